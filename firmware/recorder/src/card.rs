@@ -213,6 +213,17 @@ impl<'a, D: BlockDevice> Card<'a, D> {
         Ok(())
     }
 
+    /// Whether a segment's clusters are chained to its end: one whose part of the FAT was lost cannot be written anew.
+    pub(crate) fn is_chained(&self, segment: &LogEntry) -> Result<bool, CardError<D::Error>> {
+        let mut segment = self.place(segment)?;
+        let last = segment.blocks().saturating_sub(1);
+        match self.manager()?.device(|gate| segment.chain.locate(gate, last, 1)) {
+            Ok(_) => Ok(true),
+            Err(GateError::Device(error)) => Err(CardError::Device(error)),
+            Err(_) => Ok(false),
+        }
+    }
+
     /// Gives an existing segment a new name in one block write, and opens it to be written anew.
     pub fn recycle(&mut self, old: &LogEntry, name: LogName) -> Result<(), CardError<D::Error>> {
         self.open = None;

@@ -712,6 +712,42 @@ fn a_folder_with_the_name_of_the_next_log_is_passed_by() {
 }
 
 #[test]
+fn a_log_that_lost_its_part_of_the_fat_is_not_written_anew() {
+    let device = MemCard::formatted(40 * MIB_BLOCKS);
+    let record = |session, frames: u32| {
+        let status = CardStatus::new();
+        let mut recorder = Recorder::new(device.clone(), &status, held(), session);
+        let done =
+            sectors(frames).iter().all(|sector| put(&mut recorder, Instant::ZERO, sector) == Written::Done);
+        (done, recorder.log_name().map(|name| name.segment), status.read().state)
+    };
+    for session in 1..=15 {
+        record(session, 10);
+    }
+    // The first log's second block of the FAT, and its third one, say that it ends there.
+    let fat = 2048 + 32;
+    let end = [0xFF_u8; 512];
+    device.blocks.borrow_mut().extend([(fat + 1, end), (fat + 2, end)]);
+    assert_eq!(record(16, 1000), (true, Some(0), CardState::Recording));
+    let names = || {
+        let status = CardStatus::new();
+        let card =
+            Card::mount(device.clone(), &status, held()).map_err(|(_, error)| error).expect("it mounts");
+        let mut names = Vec::new();
+        card.logs(|entry| names.push(entry.name.session)).expect("it lists");
+        names.sort_unstable();
+        names
+    };
+    assert!(names().contains(&1) && names().contains(&16), "what the first one has stays: {:?}", names());
+    // All of it: nothing is written anew, and the card is told as damaged.
+    let blocks = 600;
+    device.blocks.borrow_mut().extend((fat..fat + blocks).map(|at| (at, end)));
+    let before = names();
+    assert_eq!(record(17, 1000), (false, None, CardState::Damaged));
+    assert_eq!(names(), before);
+}
+
+#[test]
 fn a_card_that_logs_fill_is_not_searched() {
     let device = MemCard::formatted(34 * MIB_BLOCKS);
     for session in 0..18 {

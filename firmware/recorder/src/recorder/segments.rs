@@ -14,6 +14,9 @@ use crate::status::{CardState, CardStatus};
 /// Segments that even a small card should hold, so that overwriting the oldest loses little.
 const SEGMENTS_MIN: u64 = 16;
 
+/// Logs without their clusters that are passed by for one that can be written anew: each takes a walk over the directory.
+const UNCHAINED_MAX: usize = 8;
+
 /// The session's log on the card that is in.
 #[derive(Clone, Copy)]
 pub(super) struct Log {
@@ -61,7 +64,7 @@ impl<'a> Segments<'a> {
         card: &mut Card<'_, D>,
     ) -> Result<bool, CardError<D::Error>> {
         let volume_id = card.layout().volume_id;
-        let newest = survey(card, LogName { session: 0, segment: 0 }, None)?.newest;
+        let newest = survey(card, LogName { session: 0, segment: 0 }, None, None)?.newest;
         let resumed = self.log.filter(|log| log.volume_id == volume_id && newest == Some(log.name));
         let log = if let Some(log) = resumed {
             log
@@ -181,7 +184,7 @@ impl<'a> Segments<'a> {
             Err(error) => return Err(error),
         }
         let of = card.device(D::keeps_logs).unwrap_or_default().then_some(name.session);
-        let oldest = survey(card, name, of)?.oldest.ok_or(CardError::Full)?;
+        let oldest = oldest(card, name, of)?;
         self.look_before(card);
         self.ring.forget(oldest.name);
         card.recycle(&oldest, name)?;
@@ -189,16 +192,35 @@ impl<'a> Segments<'a> {
     }
 }
 
+/// The oldest log that may be overwritten. A few whose clusters are no longer chained are passed by.
+fn oldest<D: CardDevice>(
+    card: &Card<'_, D>,
+    except: LogName,
+    of: Option<u32>,
+) -> Result<LogEntry, CardError<D::Error>> {
+    let mut after = None;
+    for _ in 0..UNCHAINED_MAX {
+        let oldest = survey(card, except, of, after)?.oldest.ok_or(CardError::Full)?;
+        if card.is_chained(&oldest)? {
+            return Ok(oldest);
+        }
+        after = Some(oldest.name);
+    }
+    Err(CardError::Damaged)
+}
+
 struct Survey {
     newest: Option<LogName>,
     oldest: Option<LogEntry>,
 }
 
-/// The newest name on the card, and the oldest log that may be overwritten: one of session `of`, where only these may.
+/// The newest name on the card, and the oldest log that may be overwritten: one of session `of`, where only these
+/// may, and one behind `after`.
 fn survey<D: CardDevice>(
     card: &Card<'_, D>,
     except: LogName,
     of: Option<u32>,
+    after: Option<LogName>,
 ) -> Result<Survey, CardError<D::Error>> {
     let mut survey = Survey { newest: None, oldest: None };
     let open = card.open_name();
@@ -206,7 +228,7 @@ fn survey<D: CardDevice>(
     card.logs(|entry| {
         let usable = entry.bytes as usize >= 2 * GROUP_SECTORS * SECTOR_BYTES;
         let older = survey.oldest.is_none_or(|oldest| entry.name < oldest.name);
-        let allowed = of.is_none_or(|session| session == entry.name.session);
+        let allowed = of.is_none_or(|session| session == entry.name.session) && Some(entry.name) > after;
         if usable && older && allowed && entry.name != except && Some(entry.name) != open {
             survey.oldest = Some(entry);
         }
