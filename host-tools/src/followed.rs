@@ -101,7 +101,11 @@ impl<T: Logged> Followed<T> {
             return Some(Misnamed::Copy { of });
         }
         let (card, number) = place(&ending.name);
-        let (before, number) = (ending.summary.marks.before?, number?);
+        let number = number?;
+        if ending.summary.marks.packed && self.sessions.has_other(card, 0, u32::MAX, session) {
+            return Some(Misnamed::Packed);
+        }
+        let before = ending.summary.marks.before?;
         // Of a power-on's first log all is there, or what is not was not to be kept.
         let is_whole = ending.summary.first_number == Some(0);
         let is_first = is_whole || ending.summary.keep.is_some_and(|keep| keep.from == 0);
@@ -349,6 +353,7 @@ mod tests {
 
     use super::*;
     use crate::logs::find;
+    use crate::logs::marks::Marks;
     use crate::logs::strangers::{Others, Strange};
 
     impl Logged for Ending {
@@ -488,6 +493,10 @@ mod tests {
             log.summary.marks.before = Some(Before { found: frames, number, session, ..Before::default() });
             assert_eq!(Followed::<Ending>::new(sessions.clone()).misnamed(&log), expected);
         }
+        // One that no recorder made.
+        log.summary.marks = Marks { packed: true, ..Marks::default() };
+        assert_eq!(Followed::<Ending>::new(sessions).misnamed(&log), Some(Misnamed::Packed));
+        assert_eq!(Followed::<Ending>::new(Sessions::default()).misnamed(&log), None, "alone");
         // Who waits takes a number more for each hundred files, which have 128 sectors or last for 5 s.
         assert_eq!(misnamed("00002", 12_800, Some(0), nothing, 0, true), None);
         assert_eq!(misnamed("00002", 12_799, Some(0), nothing, 0, true), Some(Misnamed::First));

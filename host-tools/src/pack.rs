@@ -14,6 +14,7 @@ use sha2::{Digest as _, Sha256};
 use crate::cli;
 use crate::endpoint::Endpoint;
 use crate::files::{Inputs, Output, cannot_write};
+use crate::logs::marks::PACKED;
 use crate::outcome::{Outcome, usage};
 use crate::output;
 use crate::plural::count;
@@ -21,9 +22,6 @@ use crate::source::booted::Booted;
 use crate::source::checksums::Checksums;
 use crate::source::own::JOINED;
 use crate::source::{self, Source, Timing};
-
-/// The note that a packed log begins with.
-const NOTE: &str = "packed on a PC by hums pack";
 
 /// Where UTC came from: the recording's own times (see `hums_blackbox::record::Clock`).
 const FROM_RECORDING: u8 = 2;
@@ -178,7 +176,7 @@ impl<W: Write> Packer<W> {
     }
 
     fn start(&mut self, utc_us: Option<u64>) -> Result<()> {
-        let note = Record::Note(Note { severity: 6, text: NOTE });
+        let note = Record::Note(Note { severity: 6, text: PACKED });
         self.record(Instant::ZERO, &note)?;
         if let Some(utc_micros) = utc_us {
             let clock = Clock { boot: Instant::ZERO, utc_micros, source: FROM_RECORDING };

@@ -10,6 +10,7 @@ use std::collections::BTreeMap;
 use hums_core::Monitor;
 use hums_core::cause::{Alert, Cause};
 use hums_core::happening::Happening;
+use hums_core::health::Level;
 use hums_core::health::{Scope, vocabulary};
 use hums_core::monitor::TICK;
 use hums_core::motion::{climb_mps, ground_speed_mps, height_m};
@@ -464,8 +465,8 @@ impl Judge {
         for finding in found {
             if is_of(&finding.check, self.format, self.wire.is_some()) {
                 // What hit something is seen to lie still seconds later.
-                let hit_at =
-                    if finding.check == IMPACT { self.monitor.mishap().hit_at() } else { finding.at };
+                let is_hit = finding.check == IMPACT && finding.level > Level::Ok;
+                let hit_at = if is_hit { self.monitor.mishap().hit_at() } else { finding.at };
                 let at = Clock::recording(now, steps, hit_at.min(finding.at));
                 self.here.take(&Finding { at, ..finding.clone() }, self.clock.behind());
                 self.details.tell(&finding.check, &mut self.here);
@@ -558,7 +559,10 @@ impl Judge {
         };
         let behind = if by == JudgedBy::Board { Span::ZERO } else { self.clock.behind() };
         problems.end(last, behind);
-        let (findings, findings_count) = (std::mem::take(&mut problems.findings), problems.findings_count);
+        let (mut findings, findings_count) =
+            (std::mem::take(&mut problems.findings), problems.findings_count);
+        // An impact is told once what hit something lies still.
+        findings.sort_by_key(|finding| finding.at);
         let worst_first = problems.worst_first();
         let (judged, not_judged) = self.coverage.lists(&Recording {
             by,

@@ -18,6 +18,8 @@ pub enum Misnamed {
     },
     /// It was the first session on its card.
     First,
+    /// It was packed on a PC, and lies among a card's logs.
+    Packed,
     /// The session of this number was recorded just before it, so its own number is the next one.
     Ahead {
         /// The number.
@@ -36,6 +38,9 @@ impl Misnamed {
             Self::First => {
                 "it was the first session on its card, so its number is not its own: files were renamed"
                     .to_owned()
+            }
+            Self::Packed => {
+                "it was packed on a PC, so it is no log of the card and its number is not its own".to_owned()
             }
             Self::Ahead { before } => format!(
                 "it was recorded just after session {before:05}, so its number is not its own: files were renamed"

@@ -11,6 +11,9 @@ use crate::loss::lost;
 const ARMED: u8 = 1;
 const TAKE_OFF: u8 = 3;
 
+/// The note that a packed log begins with.
+pub const PACKED: &str = "packed on a PC by hums pack";
+
 /// What the records of a part of a log say of the log.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Marks {
@@ -26,6 +29,8 @@ pub struct Marks {
     pub lost: u64,
     /// The log before on the card, as the last boot record found it.
     pub before: Option<Before>,
+    /// No recorder made it: it was packed on a PC.
+    pub packed: bool,
 }
 
 impl Marks {
@@ -41,6 +46,7 @@ impl Marks {
                 self.moved = self.moved.or(Some(at));
             }
             Record::Loss(loss) => self.lost = self.lost.saturating_add(lost(loss)),
+            Record::Note(note) => self.packed |= note.text == PACKED,
             Record::Boot(boot) if boot.before.found != Found::Unknown => self.before = Some(boot.before),
             _ => {}
         }

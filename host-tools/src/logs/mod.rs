@@ -17,7 +17,7 @@ pub mod in_order;
 mod joined;
 mod late;
 mod look;
-mod marks;
+pub mod marks;
 pub mod places;
 pub mod reader;
 mod repair;
