@@ -10,8 +10,7 @@ use std::collections::BTreeMap;
 use hums_core::Monitor;
 use hums_core::cause::{Alert, Cause};
 use hums_core::happening::Happening;
-use hums_core::health::Level;
-use hums_core::health::{Scope, vocabulary};
+use hums_core::health::{Level, Scope, vocabulary};
 use hums_core::monitor::TICK;
 use hums_core::motion::{climb_mps, ground_speed_mps, height_m};
 use hums_core::observation::{Estimator, Observation, Source, SystemStatus, VehicleKind};
@@ -465,7 +464,8 @@ impl Judge {
         for finding in found {
             if is_of(&finding.check, self.format, self.wire.is_some()) {
                 // What hit something is seen to lie still seconds later.
-                let is_hit = finding.check == IMPACT && finding.level > Level::Ok;
+                let is_hit =
+                    finding.check == IMPACT && matches!(finding.level, Level::Warning | Level::Critical);
                 let hit_at = if is_hit { self.monitor.mishap().hit_at() } else { finding.at };
                 let at = Clock::recording(now, steps, hit_at.min(finding.at));
                 self.here.take(&Finding { at, ..finding.clone() }, self.clock.behind());
