@@ -25,7 +25,7 @@ use crate::cli;
 use crate::ending::Ending;
 use crate::followed::{Followed, Logged};
 use crate::logs::side_by_side::side_by_side;
-use crate::outcome::Outcome;
+use crate::outcome::{Outcome, Usage};
 use crate::output;
 use crate::progress;
 use crate::run::params;
@@ -110,16 +110,19 @@ fn logs(args: &cli::Check) -> Result<(Found, usize)> {
         Ok(found) => return Ok((found, 0)),
         Err(error) => error,
     };
-    if !args.json {
+    // What is printed of a wrong command line might stand in an input.
+    if !args.json || error.is::<Usage>() {
         return Err(error);
     }
-    let mut good = Vec::new();
+    let (mut good, mut bad) = (Vec::new(), Vec::new());
     for input in &args.inputs {
         match find(std::slice::from_ref(input), args.salvage) {
             Ok(_) => good.push(input.clone()),
-            Err(error) => output::json_line(&json::error(&input.display().to_string(), &error))?,
+            Err(error) if error.is::<Usage>() => return Err(error),
+            Err(error) => bad.push(json::error(&input.display().to_string(), &error)),
         }
     }
+    bad.iter().try_for_each(|error| output::json_line(error))?;
     Ok((find(&good, args.salvage)?, args.inputs.len() - good.len()))
 }
 

@@ -135,9 +135,10 @@ fn shown(path: &Path) -> String {
 
 fn flight(args: &cli::Demo) -> Result<Endpoint> {
     if let Some(input) = &args.input {
-        if input.is_live() {
+        // A demo removes what an earlier one made: what came of a file can be made again.
+        if !matches!(input, Endpoint::File(_)) {
             return Err(usage(format!(
-                "{input}: hums demo takes a recording; hums sim records what comes live"
+                "{input}: hums demo takes a file; hums sim records what comes otherwise"
             )));
         }
         return Ok(input.clone());

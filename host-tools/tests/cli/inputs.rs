@@ -155,6 +155,8 @@ fn results_are_appended_to_no_input() {
     for (line, input) in [
         ("info flight.tlog", "flight.tlog"),
         ("check folder", "folder/flight.tlog"),
+        ("check --json flight.tlog", "flight.tlog"),
+        ("check --json nosuch.tlog folder", "folder/flight.tlog"),
         ("verify log.hum", "log.hum"),
         ("decode log.hum -o new --format tlog", "link-log.hum"),
         ("report log.hum -o new.html", "hard-log.hum"),
