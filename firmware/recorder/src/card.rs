@@ -156,15 +156,14 @@ impl<'a, D: BlockDevice> Card<'a, D> {
         Ok(())
     }
 
-    /// Calls `each` for every name of a log that the root directory has, also where it is that of a folder.
-    pub(crate) fn names(&self, mut each: impl FnMut(LogName)) -> Result<(), CardError<D::Error>> {
+    /// The newest name of a log that the root directory has, also where it is that of a folder.
+    pub(crate) fn newest_name(&self) -> Result<Option<LogName>, CardError<D::Error>> {
+        let mut newest = None;
         self.manager()?.iterate_dir(self.root, |entry| {
-            LogName::from_short(entry.name.base_name(), entry.name.extension())
-                .into_iter()
-                .for_each(&mut each);
+            newest = newest.max(LogName::from_short(entry.name.base_name(), entry.name.extension()));
             ControlFlow::Continue(())
         })?;
-        Ok(())
+        Ok(newest)
     }
 
     /// Makes a segment of `bytes` (rounded up to whole clusters) and opens it. Its contents are whatever its clusters

@@ -23,16 +23,8 @@ impl<S: Source> Source for Compressed<S> {
         self.inner.next()
     }
 
-    fn utc_start_us(&self) -> Option<u64> {
-        self.inner.utc_start_us()
-    }
-
-    fn has_records(&self) -> bool {
-        self.inner.has_records()
-    }
-
-    fn begins_another(&self) -> bool {
-        self.inner.begins_another()
+    fn inner(&self) -> Option<&dyn Source> {
+        Some(&self.inner)
     }
 
     fn damages(&self) -> u64 {

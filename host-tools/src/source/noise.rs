@@ -33,24 +33,8 @@ impl<S: Source> Source for Noisy<S> {
         Ok(Some(chunk))
     }
 
-    fn utc_start_us(&self) -> Option<u64> {
-        self.inner.utc_start_us()
-    }
-
-    fn has_records(&self) -> bool {
-        self.inner.has_records()
-    }
-
-    fn begins_another(&self) -> bool {
-        self.inner.begins_another()
-    }
-
-    fn damages(&self) -> u64 {
-        self.inner.damages()
-    }
-
-    fn remark(&self) -> Option<String> {
-        self.inner.remark()
+    fn inner(&self) -> Option<&dyn Source> {
+        Some(&self.inner)
     }
 }
 
@@ -59,24 +43,8 @@ impl Source for Box<dyn Source> {
         (**self).next()
     }
 
-    fn utc_start_us(&self) -> Option<u64> {
-        (**self).utc_start_us()
-    }
-
-    fn has_records(&self) -> bool {
-        (**self).has_records()
-    }
-
-    fn begins_another(&self) -> bool {
-        (**self).begins_another()
-    }
-
-    fn damages(&self) -> u64 {
-        (**self).damages()
-    }
-
-    fn remark(&self) -> Option<String> {
-        (**self).remark()
+    fn inner(&self) -> Option<&dyn Source> {
+        Some(&**self)
     }
 }
 

@@ -16,29 +16,34 @@ pub trait Source: Send {
     /// The next chunk; `None` at the end.
     fn next(&mut self) -> io::Result<Option<Chunk>>;
 
+    /// The source whose chunks it hands on: what it does not say itself, that one says.
+    fn inner(&self) -> Option<&dyn Source> {
+        None
+    }
+
     /// UTC at the first byte, microseconds since 1970, where the input told it (known once a chunk was read).
     fn utc_start_us(&self) -> Option<u64> {
-        None
+        self.inner()?.utc_start_us()
     }
 
     /// Whether each chunk is a record of its own (a frame of a tlog), not just some bytes of a stream.
     fn has_records(&self) -> bool {
-        false
+        self.inner().is_some_and(Source::has_records)
     }
 
     /// Whether another recording begins with the chunk that was handed on last: it was joined on.
     fn begins_another(&self) -> bool {
-        false
+        self.inner().is_some_and(Source::begins_another)
     }
 
     /// How many places of the input are damaged, as far as it has been read; all of them are known after its end.
     fn damages(&self) -> u64 {
-        0
+        self.inner().map_or(0, Source::damages)
     }
 
     /// A sentence about what was strange in the input, once it has been read.
     fn remark(&self) -> Option<String> {
-        None
+        self.inner()?.remark()
     }
 }
 

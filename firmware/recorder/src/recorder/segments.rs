@@ -64,7 +64,7 @@ impl<'a> Segments<'a> {
         card: &mut Card<'_, D>,
     ) -> Result<bool, CardError<D::Error>> {
         let volume_id = card.layout().volume_id;
-        let newest = survey(card, LogName { session: 0, segment: 0 }, None, None)?.newest;
+        let newest = card.newest_name()?;
         let resumed = self.log.filter(|log| log.volume_id == volume_id && newest == Some(log.name));
         let log = if let Some(log) = resumed {
             log
@@ -200,7 +200,7 @@ fn oldest<D: CardDevice>(
 ) -> Result<LogEntry, CardError<D::Error>> {
     let mut after = None;
     for _ in 0..UNCHAINED_MAX {
-        let oldest = survey(card, except, of, after)?.oldest.ok_or(CardError::Full)?;
+        let oldest = oldest_behind(card, except, of, after)?.ok_or(CardError::Full)?;
         if card.is_chained(&oldest)? {
             return Ok(oldest);
         }
@@ -209,31 +209,24 @@ fn oldest<D: CardDevice>(
     Err(CardError::Damaged)
 }
 
-struct Survey {
-    newest: Option<LogName>,
-    oldest: Option<LogEntry>,
-}
-
-/// The newest name on the card, and the oldest log that may be overwritten: one of session `of`, where only these
-/// may, and one behind `after`.
-fn survey<D: CardDevice>(
+/// The oldest log that may be written anew: one of session `of`, where only these may, and one behind `after`.
+fn oldest_behind<D: CardDevice>(
     card: &Card<'_, D>,
     except: LogName,
     of: Option<u32>,
     after: Option<LogName>,
-) -> Result<Survey, CardError<D::Error>> {
-    let mut survey = Survey { newest: None, oldest: None };
+) -> Result<Option<LogEntry>, CardError<D::Error>> {
+    let mut oldest: Option<LogEntry> = None;
     let open = card.open_name();
-    card.names(|name| survey.newest = survey.newest.max(Some(name)))?;
     card.logs(|entry| {
         let usable = entry.bytes as usize >= 2 * GROUP_SECTORS * SECTOR_BYTES;
-        let older = survey.oldest.is_none_or(|oldest| entry.name < oldest.name);
+        let older = oldest.is_none_or(|oldest| entry.name < oldest.name);
         let allowed = of.is_none_or(|session| session == entry.name.session) && Some(entry.name) > after;
         if usable && older && allowed && entry.name != except && Some(entry.name) != open {
-            survey.oldest = Some(entry);
+            oldest = Some(entry);
         }
     })?;
-    Ok(survey)
+    Ok(oldest)
 }
 
 /// Mixes two numbers into one whose every bit depends on all of theirs (the finalizer of `MurmurHash3`).
