@@ -142,7 +142,8 @@ impl Spool {
             self.end += head.bytes();
             self.points += u64::from(head.points);
         }
-        if !self.is_empty() && u64_at(&header, 32) != self.database.number {
+        // Also where its first record is damaged: an empty one has its header only.
+        if bytes > HEADER_BYTES && u64_at(&header, 32) != self.database.number {
             let name = header.get(NAME_AT..).unwrap_or_default().split(|byte| *byte == 0).next();
             bail!(
                 "{} in it for another database, {}: write these there first, or name another file",

@@ -23,6 +23,13 @@ fn points_for_another_database_are_not_given_to_this_one() {
     assert!(refused.contains("20 points are in it for another database, http://1/write"), "{refused}");
     assert!(refused.contains("name another file"), "{refused}");
     assert_eq!(std::fs::read(&path).expect("a file"), before);
+    // Nor is what stands behind a damaged one.
+    let mut damaged = before.clone();
+    damaged[HEADER_BYTES as usize + RECORD_BYTES] ^= 1;
+    std::fs::write(&path, &damaged).expect("room");
+    Spool::open(&path, 3_000, &database(2)).expect_err("another database");
+    assert_eq!(std::fs::read(&path).expect("a file"), damaged);
+    std::fs::write(&path, &before).expect("room");
     drain(&mut open(&path, 3_000));
     // An empty one is anybody's; so is one whose making was cut off.
     let mut other = Spool::open(&path, 3_000, &database(2)).expect("a file").expect("free");
