@@ -6,7 +6,7 @@ use anyhow::Result;
 use hums_blackbox::{Assembler, BlockCounts, GROUP_SECTORS, Header, Step};
 
 use super::board::{Board, HEADING_GROUPS, heading};
-use super::joined::Joints;
+use super::joined::{Found, Joints};
 use super::places::{BLOCK_BYTES, Blocks, Log};
 use super::repair::{Evidence, Repairs};
 use super::strangers::{Strange, Strangers};
@@ -24,9 +24,21 @@ fn is_empty(block: &[u8; BLOCK_BYTES]) -> bool {
 /// file between.
 const HEADING_BLOCKS: u64 = (4 * HEADING_GROUPS * GROUP_SECTORS) as u64;
 
-/// Who recorded the file that begins where `blocks` are, if one begins there.
-fn begins_here(blocks: &Blocks<'_>) -> Result<Option<Board>> {
+/// Who recorded the file that begins where `blocks` are, if one begins there, and no page of a log whose sectors go on behind it
+/// from the `last` one.
+fn begins_here(blocks: &Blocks<'_>, last: Option<Found>) -> Result<Option<Board>> {
     let rest = blocks.from_here(HEADING_BLOCKS);
+    if let Some(last) = last {
+        let (mut rest, mut at) = (rest.blocks(), blocks.place().1);
+        let blocks = std::iter::from_fn(|| {
+            let block = rest.next_block().transpose()?;
+            at += 1;
+            Some(block.map(|block| (at - 1, block)))
+        });
+        if last.is_resumed(blocks)? {
+            return Ok(None);
+        }
+    }
     let mut groups = Groups { strangers: None, joints: None, repairs: None, ..Groups::new(&rest) };
     for _ in 0..HEADING_GROUPS {
         // What lies behind a gap is no part of what begins here.
@@ -211,7 +223,9 @@ impl<'a> Groups<'a> {
 
     fn feed(&mut self, block: &[u8; BLOCK_BYTES]) -> Result<()> {
         let joined = match &mut self.joints {
-            Some(joints) => joints.look(self.blocks.place(), block, || begins_here(&self.blocks))?,
+            Some(joints) => {
+                joints.look(self.blocks.place(), block, |last| begins_here(&self.blocks, last))?
+            }
             None => None,
         };
         if joined.is_some()

@@ -3,7 +3,8 @@
 //!
 //! What is left over in a recycled file begins somewhere within the older file, as a rule within a group, and goes on in the
 //! order of its numbers. So only where a group begins whose number and place do not go on from the sector before it is there
-//! anything to look for: logs were joined there.
+//! anything to look for: logs were joined there. A page that lies where another one belongs is no file: behind it the numbers go on
+//! from those before it, or the file has no such record where it begins, and this is its own.
 
 use anyhow::Result;
 use hums_blackbox::{SECTOR_BYTES, Sector};
@@ -24,6 +25,8 @@ pub(super) struct Joints {
     file: usize,
     /// Where the file's own first group begins: the same again is a copy of it, and no other file.
     first: Option<[u8; SECTOR_BYTES]>,
+    /// The record of who records was seen in the file.
+    has_heading: bool,
     /// The last sector so far in the file.
     last: Option<Found>,
     looks: u32,
@@ -33,13 +36,36 @@ pub(super) struct Joints {
 
 /// A sector by its head, and the block of the file where it lies.
 #[derive(Clone, Copy, Debug)]
-struct Found {
+pub(super) struct Found {
     session: u32,
     number: u32,
     at: u64,
 }
 
 impl Found {
+    fn of(block: &[u8; SECTOR_BYTES], at: u64) -> Option<Self> {
+        let sector = block.starts_with(&HEAD).then(|| Sector::from_bytes(*block))?;
+        Some(Self { session: sector.session(), number: sector.number(), at })
+    }
+
+    /// Whether what lies between this sector and those of `rest` that go on from it is but a part of a log: `rest` begins behind this
+    /// one with other numbers, which run on for a while.
+    pub(super) fn is_resumed<E>(
+        &self,
+        rest: impl IntoIterator<Item = Result<(u64, [u8; SECTOR_BYTES]), E>>,
+    ) -> Result<bool, E> {
+        for block in rest {
+            let (at, block) = block?;
+            if let Some(next) = Self::of(&block, at)
+                && next.session == self.session
+                && (next.number == self.number.wrapping_add(1) || self.goes_on(&next))
+            {
+                return Ok(true);
+            }
+        }
+        Ok(false)
+    }
+
     /// Whether one follows the other as numbers and places do, whatever lies between. A copy of a sector in progress may lie
     /// one block further.
     const fn goes_on(&self, next: &Self) -> bool {
@@ -55,26 +81,26 @@ impl Joints {
         &mut self,
         (file, at): (usize, u64),
         block: &[u8; SECTOR_BYTES],
-        heading: impl FnOnce() -> Result<Option<Board>>,
+        heading: impl FnOnce(Option<Found>) -> Result<Option<Board>>,
     ) -> Result<Option<Board>> {
         if file != self.file {
             *self = Self { file, ..Self::default() };
         }
-        if self.found.is_some() || !block.starts_with(&HEAD) {
-            return Ok(self.found);
-        }
-        let sector = Sector::from_bytes(*block);
-        let next = Found { session: sector.session(), number: sector.number(), at };
-        let breaks = self.last.replace(next).is_some_and(|last| !last.goes_on(&next));
-        if sector.starts_group() && at <= FIRST_GROUP_MAX {
+        let Some(next) = Found::of(block, at).filter(|_| self.found.is_none()) else { return Ok(self.found) };
+        let last = self.last.replace(next);
+        let breaks = last.is_some_and(|last| !last.goes_on(&next));
+        let begins = Sector::from_bytes(*block).starts_group();
+        if begins && at <= FIRST_GROUP_MAX {
             self.first = Some(*block);
-        } else if breaks
-            && sector.starts_group()
-            && self.looks < LOOKS_MAX
-            && self.first.as_ref() != Some(block)
-        {
+            self.has_heading |= heading(None)?.is_some();
+        } else if breaks && begins && self.looks < LOOKS_MAX && self.first.as_ref() != Some(block) {
             self.looks += 1;
-            self.found = heading()?;
+            let found = heading(last)?;
+            // The file's own, where it had none so far.
+            if self.has_heading {
+                self.found = found;
+            }
+            self.has_heading |= found.is_some();
         }
         Ok(self.found)
     }
