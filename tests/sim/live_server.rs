@@ -96,6 +96,64 @@ fn sigterm_ends_a_recording_as_ctrl_c_does_with_the_log_closed() {
 }
 
 #[test]
+fn a_recording_that_is_broken_off_is_not_called_whole() {
+    let dir = tempfile::tempdir().unwrap();
+    let (image, said) = (dir.path().join("card.img"), dir.path().join("said"));
+    let mut sim = command(["sim", "--speed", "real", "--input"]);
+    sim.arg(own("px4_hil_quad_low.tlog")).arg("--sd").arg(&image);
+    let child = sim.stdout(Stdio::null()).stderr(std::fs::File::create(&said).unwrap()).spawn().unwrap();
+    let mut sim = Running(child);
+    let start = Instant::now();
+    while !image.exists() {
+        assert!(start.elapsed() < Duration::from_secs(20), "it does not begin");
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    std::thread::sleep(Duration::from_millis(300));
+    sim.signal("TERM");
+    assert_eq!(sim.end(Duration::from_secs(20)), Some(3));
+    let said = std::fs::read_to_string(said).unwrap();
+    assert!(said.contains("was not read to its end"), "{said}");
+}
+
+#[test]
+fn a_server_that_takes_no_point_loses_none() {
+    let server = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
+    let url = format!("http://{}", server.local_addr().unwrap());
+    // It says of everything what a database says of a bad point.
+    std::thread::spawn(move || {
+        for stream in server.incoming().flatten() {
+            let mut reader = BufReader::new(stream);
+            let headers = (&mut reader).lines().map_while(Result::ok).take_while(|line| !line.is_empty());
+            let length = headers
+                .filter_map(|line| line.to_lowercase().strip_prefix("content-length:")?.trim().parse().ok())
+                .last();
+            reader.read_exact(&mut vec![0; length.unwrap_or(0)]).unwrap();
+            let body = "{\"error\":\"no handler found\"}";
+            let head = format!("HTTP/1.1 400 Bad Request\r\nContent-Length: {}\r\n", body.len());
+            let answer = head + "Connection: close\r\n\r\n" + body;
+            reader.get_mut().write_all(answer.as_bytes()).unwrap();
+        }
+    });
+    let dir = tempfile::tempdir().unwrap();
+    let spool = dir.path().join("spool");
+    let recording = own("px4_hil_quad_low.tlog");
+    let live = Live::start(&[
+        "--input",
+        recording.to_str().unwrap(),
+        "--influx",
+        &url,
+        "--spool",
+        spool.to_str().unwrap(),
+    ]);
+    live.program.signal("TERM");
+    std::thread::sleep(Duration::from_millis(500));
+    let (code, words) = live.terminate(Duration::from_secs(10));
+    assert_eq!(code, Some(3), "{words}");
+    assert!(words.contains(" wait in ") && !words.contains("refused by"), "{words}");
+    assert!(words.contains("has taken no point so far"), "{words}");
+}
+
+#[test]
 fn sigterm_and_ctrl_c_alike_say_what_is_not_in_the_database_and_a_second_one_ends_the_wait() {
     // Nobody listens there.
     let url = format!("http://127.0.0.1:{}", free_port());

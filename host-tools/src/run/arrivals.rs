@@ -32,6 +32,8 @@ pub struct Arrivals {
     bytes: u64,
     /// To the autopilot, where there is a live one.
     autopilot: Option<Box<dyn Write + Send>>,
+    /// The run was ended before its end.
+    broken_off: bool,
 }
 
 impl Arrivals {
@@ -76,6 +78,7 @@ impl Arrivals {
             tap: tap.map_or_else(|| Ok(Beside::nowhere()), |(path, inputs)| tap_of(path, inputs))?,
             bytes: 0,
             autopilot,
+            broken_off: false,
         })
     }
 
@@ -122,12 +125,20 @@ impl Arrivals {
 
     /// The recording is damaged, as far as it has come. (Of raw bytes nobody knows: a line may be noisy.)
     pub fn is_damaged(&self) -> bool {
-        self.source.damages() > 0
+        self.broken_off || self.source.damages() > 0
+    }
+
+    /// The user has ended the run before the end of a recording.
+    pub const fn break_off(&mut self) {
+        self.broken_off = true;
     }
 
     /// What was strange in the input.
     pub fn remark(&self) -> Option<String> {
-        self.source.remark().map(|remark| format!("{}: {remark}", self.name))
+        let broken_off =
+            self.broken_off.then(|| "was not read to its end: the run was ended before".to_owned());
+        let all: Vec<String> = self.source.remark().into_iter().chain(broken_off).collect();
+        (!all.is_empty()).then(|| format!("{}: {}", self.name, all.join("; ")))
     }
 }
 

@@ -77,6 +77,7 @@ fn drive(
             }
         }
         if pace && interrupt::requested() {
+            arrivals.break_off();
             return Ok(true);
         }
         now_us = chunk.at_us;

@@ -45,6 +45,11 @@ impl Target {
         if host.is_empty() || base.contains(['?', '#', ' ']) {
             return Err(usage(format!("--influx `{url}` is no address; for instance http://127.0.0.1:8086")));
         }
+        for (flag, name) in [("--org", org), ("--bucket", Some(bucket))] {
+            if name == Some("") {
+                return Err(usage(format!("{flag} is empty; name one")));
+            }
+        }
         let statement = format!("CREATE DATABASE \"{}\"", bucket.replace(['"', '\\'], "_"));
         let bucket = percent(bucket);
         let authorization = token.map(|token| format!("Token {token}"));

@@ -54,11 +54,24 @@ pub fn start(target: Target, queue: Arc<Queue>) -> Result<JoinHandle<()>> {
 }
 
 fn write_all(agent: &Agent, target: &Target, queue: &Queue) {
+    // A server that has taken a point is a database of ours. Of one that refuses all nobody knows: its address may be wrong.
+    let mut has_taken = false;
     while let Some(batch) = queue.take() {
-        let deliver = |lines: &[u8]| persist(agent, target, queue, lines);
-        // Without an answer it stays counted as waiting, and in the file.
-        let Some(delivered) = in_halves(&batch, deliver) else { return };
-        queue.done(delivered);
+        let mut wait = WAIT_MIN;
+        loop {
+            let deliver = |lines: &[u8]| persist(agent, target, queue, lines);
+            // Without an answer it stays counted as waiting, and in the file.
+            let Some(delivered) = in_halves(&batch, deliver) else { return };
+            has_taken |= delivered.written > 0;
+            if has_taken {
+                queue.done(delivered);
+                break;
+            }
+            if !queue.trouble(format!("it has taken no point so far: {}", delivered.why), wait) {
+                return;
+            }
+            wait = (wait * 2).min(WAIT_MAX);
+        }
     }
 }
 
