@@ -178,7 +178,7 @@ fn assert_same_records(of_chip: &[Value], of_pc: &[Value], against: Against) {
         format!("{} {}", record["record"], texts.join(" "))
     };
     // What is at the end of the power: this PC is switched off in order.
-    let last_s = of_chip.iter().filter_map(|record| record["time_boot"].as_f64()).fold(0.0, f64::max) - 1.5;
+    let last_s = quiet_before_the_end_s(of_chip);
     let by_key = |records: &[Value]| {
         let mut rows = BTreeMap::<String, Vec<Value>>::new();
         let before = records.iter().filter(|record| record["time_boot"].as_f64().unwrap() < last_s);
@@ -210,6 +210,21 @@ fn assert_same_records(of_chip: &[Value], of_pc: &[Value], against: Against) {
     }
     println!("{} of {all} records differ by more than {PART_MAX}: {odd:#?}", odd.len());
     assert!(odd.len() as f64 <= ODD_PART_MAX * f64::from(all), "{} of {all} differ", odd.len());
+}
+
+/// The middle of the longest pause between two records in the second and a half before the last 1.5 s: no record is on one side of it on
+/// one machine, and on the other side on the other one.
+#[track_caller]
+fn quiet_before_the_end_s(records: &[Value]) -> f64 {
+    let mut times: Vec<_> = records.iter().filter_map(|record| record["time_boot"].as_f64()).collect();
+    times.sort_by(f64::total_cmp);
+    let end = times.last().unwrap() - 1.5;
+    let near = times.iter().filter(|time| (end - 1.5..=end).contains(*time)).chain([&end]);
+    let near: Vec<_> = [end - 1.5].iter().chain(near).copied().collect();
+    let pauses = near.windows(2).map(|pair| (pair[1] - pair[0], f64::midpoint(pair[0], pair[1])));
+    let (pause, middle) = pauses.max_by(|a, b| a.0.total_cmp(&b.0)).unwrap();
+    assert!(pause > 2.0 * TIME_MAX_S, "no quiet moment near the end: {near:?}");
+    middle
 }
 
 fn of_the_machine(record: &Value) -> &'static [&'static str] {

@@ -91,7 +91,7 @@ fn flipped(part: &str, flips: u64, apart: Ps, seed: u64) -> (Compared, Read, usi
 
 #[test]
 fn flips_in_the_codecs_memory_give_no_wrong_frame() {
-    let (compared, read, resets) = flipped("WRITER", 12, 700 * MS, 5);
+    let (compared, read, resets) = flipped("WRITER", 60, 140 * MS, 5);
     println!("{compared:?}, gaps {:?}, notes {:?}, {resets} resets", read.gaps, read.notes);
     assert_eq!(compared.wrong, 0);
     let told: usize = read.gaps.values().sum();
