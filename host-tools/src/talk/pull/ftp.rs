@@ -63,6 +63,17 @@ impl Answer {
         self.opcode == NAK && self.data.first() == Some(&error)
     }
 
+    const fn end(&self) -> u32 {
+        self.offset.saturating_add(self.data.len() as u32)
+    }
+
+    /// Where its data begin, and those of them that lie before `length`: a log in work has grown since it was opened, and a board
+    /// sends all that there is.
+    fn before(mut self, length: u32) -> (u32, Vec<u8>) {
+        self.data.truncate(length.saturating_sub(self.offset) as usize);
+        (self.offset, self.data)
+    }
+
     /// The first four bytes of its data.
     fn word(&self) -> u32 {
         self.data.iter().take(4).rev().fold(0, |word, byte| word << 8 | u32::from(*byte))
@@ -175,11 +186,14 @@ impl Ftp {
             if answer.opcode == NAK && !answer.is_nak(END_OF_FILE) {
                 return gone();
             }
-            let end = answer.offset.saturating_add(answer.data.len() as u32);
-            if answer.opcode == ACK && answer.offset >= offset && !answer.data.is_empty() && end <= length {
-                pieces.insert(answer.offset, answer.data);
+            let is_last = answer.opcode != ACK || answer.complete || answer.end() >= length;
+            if answer.opcode == ACK && answer.offset >= offset {
+                let (at, data) = answer.before(length);
+                if !data.is_empty() {
+                    pieces.insert(at, data);
+                }
             }
-            if answer.opcode != ACK || answer.complete || end >= length {
+            if is_last {
                 return Ok(pieces);
             }
         }
@@ -198,5 +212,26 @@ impl Ftp {
         // Never over the next piece.
         answer.data.truncate(usize::from(size));
         Ok(answer.data)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn of_a_piece_that_goes_over_the_length_at_opening_what_lies_before_it_counts() {
+        let answer = |offset| Answer {
+            sequence: 0,
+            opcode: ACK,
+            of: BURST,
+            complete: false,
+            offset,
+            data: vec![7; 239],
+        };
+        for (offset, bytes) in [(0, 239), (4_369, 239), (4_575, 33), (4_608, 0), (u32::MAX - 9, 0)] {
+            let (at, data) = answer(offset).before(4_608);
+            assert_eq!((at, data.len()), (offset, bytes));
+        }
     }
 }
