@@ -18,7 +18,7 @@ use crate::time::{Instant, Span};
 
 /// How long a text or an event is said to be so. PX4 tells its failing checks again when they change, some 2 s apart.
 pub const HOLDS: Span = Span::from_secs(10);
-/// What the autopilot says of a crash comes at most so long after it disarmed: heartbeats are a second apart.
+/// What the autopilot says of a crash, or that is critical, comes at most so long after it disarmed: heartbeats are a second apart.
 const DISARMED: Span = Span::from_secs(2);
 /// Flags come at 1 Hz or faster where they come at all.
 const FLAGS_AGE: Span = Span::from_secs(5);
@@ -139,15 +139,15 @@ impl Alerts {
         }
     }
 
-    /// A text or an event. An autopilot that crashes disarms with the word.
+    /// A text or an event. An autopilot that crashes disarms with the word; what broke then is told right behind it.
     pub(crate) fn tell(&mut self, at: Instant, alert: Alert) {
-        let crashed = alert.cause == Cause::Crash
+        let is_last_word = (alert.cause == Cause::Crash || alert.urgency == Urgency::Critical)
             && self.armed_at.is_some_and(|armed_at| at.since(armed_at) <= DISARMED);
         let place = alert.cause as usize;
         let (Some(told), Some(until_ms)) = (self.told.get_mut(place), self.until_ms.get_mut(place)) else {
             return;
         };
-        if !self.armed && !crashed {
+        if !self.armed && !is_last_word {
             return;
         }
         let held = told.filter(|_| !is_past(at, *until_ms));

@@ -36,6 +36,20 @@ fn texts_are_told_by_what_they_mean() {
         (2, "AFS: terminating due to fence", act(Cause::Crash)),
         (2, "Accel 0 clipping, not safe to fly!\t", warn(Cause::Vibration)),
         (3, "MAG #0 failed:  TIMEOUT!", warn(Cause::Compass)),
+        (3, "Accel #0 fail:  TIMEOUT!\t", act(Cause::Accelerometer)),
+        (0, "Gyro #1 fail:  HIGH ERRCOUNT!", act(Cause::Gyro)),
+        (0, "Baro #0 fail:  TIMEOUT!", warn(Cause::Barometer)),
+        (2, "Terrain failsafe recovery failure: No Rangefinder!", warn(Cause::Ranging)),
+        (2, "Terrain failsafe recovery timeout!", warn(Cause::Terrain)),
+        (2, "ILAB: Diff. pressure sensor unsuccessful initialization", warn(Cause::Airspeed)),
+        (3, "Mission storage failed", warn(Cause::Other)),
+        (3, "param auto save failed (-1)", warn(Cause::Other)),
+        (2, "Compass 2 failed, disabled", warn(Cause::Compass)),
+        (2, "Compass disabled", None),
+        (4, "Throttle failsafe disabled", None),
+        (4, "GCS failsafe disabled", None),
+        (2, "AutoTune: Rate D Gain Determination Failed", None),
+        (2, "RC not calibrated", None),
         (2, "Failsafe activated\t", warn(Cause::Failsafe)),
         (2, "[load_mon] gps low on stack! (100 bytes left)", warn(Cause::Processor)),
         (3, "Rangefinder: no data, using baro", warn(Cause::Ranging)),
@@ -123,6 +137,10 @@ fn a_crash_is_heard_though_the_autopilot_disarms_with_the_word() {
         (alerts.level(after(2), Cause::Crash, false), alerts.level(after(2), Cause::Gnss, false)),
         (Some(2.0), None)
     );
+    let mut alerts = armed();
+    alerts.take_armed(after(1), false);
+    alerts.tell(after(2), Alert::critical(Cause::Accelerometer));
+    assert_eq!(alerts.level(after(2), Cause::Accelerometer, false), Some(2.0), "what broke");
     let mut alerts = armed();
     alerts.take_armed(after(1), false);
     alerts.tell(after(5), Alert::critical(Cause::Crash));

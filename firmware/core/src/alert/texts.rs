@@ -2,7 +2,7 @@
 //! they have in common; no text of theirs is here whole.
 //!
 //! The first row that fits counts. Its pattern is in small letters; `*` stands for anything, `^` at its beginning for the beginning of
-//! the text.
+//! the text. Most rows are ruled out without a look at the text: a pattern's pairs of letters must be among those of the text ([`PAIRS`]).
 
 use crate::cause::{Alert, Cause, Meaning};
 
@@ -28,6 +28,11 @@ const fn fine(pattern: &'static str) -> Row {
     (pattern, Meaning::Fine, Where::Everywhere)
 }
 
+/// Only what a text is about, which texts of failures have too.
+const fn mild(pattern: &'static str) -> Row {
+    (pattern, Meaning::Fine, Where::Sound)
+}
+
 /// Which texts a row is about.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Where {
@@ -35,9 +40,15 @@ enum Where {
     Everywhere,
     /// Those that are known to be severe.
     Severe,
+    /// Those without a word of failure ([`FAILURES`]).
+    Sound,
 }
 
 type Row = (&'static str, Meaning, Where);
+
+/// Words of failure ("fail" alone is in "failsafe" too).
+const FAILURES: [&str; 8] =
+    ["failed", "failure", "fail:", "error", "lost", "timeout", " fault", "unsuccessful"];
 
 const TEXTS: &[Row] = &[
     fine("^prearm"),
@@ -54,34 +65,38 @@ const TEXTS: &[Row] = &[
     over("compensation off", Cause::Vibration),
     fine("clear"),
     fine("regained"),
-    fine("recover"),
+    fine("recovered"),
+    mild("recover"),
     fine("failsafe off"),
     fine("event off"),
     fine("crash dump"),
     fine("crashdump"),
-    fine("disabled"),
+    fine("failure injection"),
+    mild("disabled"),
     fine("returned to"),
     fine("re-enabled"),
     fine("data ok"),
     fine(": ok"),
     fine("ok again"),
-    fine("unsupported"),
+    mild("unsupported"),
     fine("clamping"),
     fine("hit ground"),
     warn("compass needs calib", Cause::Compass),
-    fine("calib"),
-    fine("initiali"),
+    mild("calib"),
+    mild("initiali"),
     fine("ground start"),
     fine("tmode"),
-    fine("tune"),
+    fine("autotune"),
+    fine("quicktune"),
+    mild("tune"),
     fine("motor test"),
     fine("cruise learn"),
     fine("yaw re-aligned"),
     warn("mission computer lost", Cause::GroundStation),
-    fine("mission"),
+    mild("mission"),
     fine("mode change"),
     fine("requires position"),
-    fine("param"),
+    mild("param"),
     fine("landing sequence"),
     fine("smartrtl"),
     fine("rally"),
@@ -179,6 +194,10 @@ const TEXTS: &[Row] = &[
     broad("optical flow", Cause::Ranging),
     broad("compass", Cause::Compass),
     warn("mag *fail", Cause::Compass),
+    // PX4's voter of sensors, of the one that it flies by: "Accel #0 fail:  TIMEOUT!".
+    act("accel #*fail", Cause::Accelerometer),
+    act("gyro #*fail", Cause::Gyro),
+    warn("baro #*fail", Cause::Barometer),
     broad("magnet", Cause::Compass),
     warn("airspeed*fail", Cause::Airspeed),
     broad("airspeed", Cause::Airspeed),
@@ -205,11 +224,47 @@ const TEXTS: &[Row] = &[
     broad("failsafe", Cause::Failsafe),
 ];
 
+/// The pairs of letters of each row's pattern.
+static PAIRS: [u64; TEXTS.len()] = {
+    let mut all = [0; TEXTS.len()];
+    let mut row = 0;
+    while row < TEXTS.len() {
+        all[row] = pairs(TEXTS[row].0.as_bytes());
+        row += 1;
+    }
+    all
+};
+
+/// The pairs of letters of a text or a pattern, each as one of 64 bits: a text that a pattern fits has all bits of the pattern.
+const fn pairs(text: &[u8]) -> u64 {
+    let mut bits = 0;
+    let mut rest = text;
+    while let [first, second, ..] = rest {
+        // What stands for anything is no letter. (No text's own `*` or `^` is in a pattern.)
+        if !matches!(first, b'*' | b'^') && !matches!(second, b'*' | b'^') {
+            let sum = first.to_ascii_lowercase() as u32 * 7 + second.to_ascii_lowercase() as u32;
+            bits |= 1 << (sum % u64::BITS);
+        }
+        let [_, next @ ..] = rest else { break };
+        rest = next;
+    }
+    bits
+}
+
 /// What a text means, known to be severe or not.
 pub(super) fn meaning(text: &[u8], is_severe: bool) -> Meaning {
-    let counts = |place: Where| is_severe || place == Where::Everywhere;
-    let row = TEXTS.iter().find(|(pattern, _, place)| counts(*place) && fits(pattern.as_bytes(), text));
-    row.map_or(Meaning::Unknown, |(_, meaning, _)| *meaning)
+    let has = pairs(text);
+    let is_about = |pattern: &str, place: Where| match place {
+        Where::Everywhere => fits(pattern.as_bytes(), text),
+        Where::Severe => is_severe && fits(pattern.as_bytes(), text),
+        Where::Sound => {
+            fits(pattern.as_bytes(), text)
+                && !FAILURES.iter().any(|word| find(text, word.as_bytes()).is_some())
+        }
+    };
+    let mut rows = TEXTS.iter().zip(&PAIRS).filter(|(_, pairs)| has & **pairs == **pairs);
+    let row = rows.find(|((pattern, _, place), _)| is_about(pattern, *place));
+    row.map_or(Meaning::Unknown, |((_, meaning, _), _)| *meaning)
 }
 
 fn fits(pattern: &[u8], text: &[u8]) -> bool {
@@ -234,4 +289,30 @@ fn find(text: &[u8], part: &[u8]) -> Option<usize> {
 
 fn starts(text: &[u8], part: &[u8]) -> bool {
     text.get(..part.len()).is_some_and(|beginning| beginning.eq_ignore_ascii_case(part))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_text_that_a_pattern_fits_has_its_pairs_of_letters() {
+        for (pattern, ..) in TEXTS {
+            for gap in ["", " ", "*", "^", "of x"] {
+                let text = pattern.replace('^', "").replace('*', gap).to_ascii_uppercase();
+                assert!(fits(pattern.as_bytes(), text.as_bytes()), "{pattern}: {text}");
+                assert_eq!(
+                    pairs(text.as_bytes()) & pairs(pattern.as_bytes()),
+                    pairs(pattern.as_bytes()),
+                    "{text}"
+                );
+            }
+            assert!(
+                pattern.is_ascii() && !pattern.bytes().any(|byte| byte.is_ascii_uppercase()),
+                "{pattern}"
+            );
+        }
+        assert_ne!(pairs(b"flux"), 0);
+        assert_eq!(pairs(b"a"), 0, "one letter is no pair");
+    }
 }
