@@ -69,7 +69,7 @@ pub(super) const TOPICS: &[Topic] = &[
     Topic {
         name: "vehicle_attitude_setpoint",
         instances: 1,
-        every_us: MEDIUM_US,
+        every_us: FAST_US,
         // Until v1.15 the angles are in it too, and before v1.6 only they.
         fields: &["q_d", "roll_body", "pitch_body"],
         take: attitude_setpoint,
@@ -77,7 +77,7 @@ pub(super) const TOPICS: &[Topic] = &[
     Topic {
         name: "vehicle_rates_setpoint",
         instances: 1,
-        every_us: MEDIUM_US,
+        every_us: FAST_US,
         fields: &["roll", "pitch"],
         take: |px4, said| {
             let rates = [said.fields.finite(0), said.fields.finite(1)];
