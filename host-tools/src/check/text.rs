@@ -353,6 +353,9 @@ fn problems(text: &mut String, judged: &Judged) {
         {
             let at = effect.first().map(|effect| moment(effect.at)).unwrap_or_default();
             let _ = writeln!(text, "                      with it {at}  {}", word(&sentence(effect)));
+            if let Some(words) = vocabulary(check_of(effect)).filter(|_| place < SHOWN_MAX) {
+                let _ = writeln!(text, "                              {}", words.meaning);
+            }
         }
         if place < SHOWN_MAX {
             text.push('\n');
