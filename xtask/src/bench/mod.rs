@@ -14,7 +14,7 @@ use std::time::Instant;
 use anyhow::{Context as _, Result, bail};
 use serde_json::Value;
 
-use tools::{median, on_one_core, work_folder};
+use tools::{median, on_one_core, repeat, work_folder};
 
 use crate::firmware::{self, Board};
 use crate::hums;
@@ -242,13 +242,6 @@ fn seconds(mut command: Command) -> Result<f64> {
         bail!("{command:?}: {}", String::from_utf8_lossy(&output.stderr));
     }
     Ok(start.elapsed().as_secs_f64())
-}
-
-/// A recording as often as it takes to have so many bytes.
-fn repeat(flight: &Path, bytes_min: f64, to: &Path) -> Result<()> {
-    let tlog = fs::read(flight)?;
-    let times = (bytes_min / tlog.len().max(1) as f64).ceil().max(1.0) as usize;
-    fs::write(to, tlog.repeat(times)).with_context(|| to.display().to_string())
 }
 
 /// Runs recordings through the image that is flashed on the model of its chip, back to back at the fastest line rate; it counts

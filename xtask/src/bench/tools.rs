@@ -2,10 +2,10 @@
 
 use std::ffi::OsStr;
 use std::fs;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use anyhow::Result;
+use anyhow::{Context as _, Result};
 
 use crate::repo;
 
@@ -31,4 +31,11 @@ pub(super) fn work_folder() -> Result<PathBuf> {
     let folder = repo::target().join("bench");
     fs::create_dir_all(&folder)?;
     Ok(folder)
+}
+
+/// A recording as often as it takes to have so many bytes.
+pub(super) fn repeat(flight: &Path, bytes_min: f64, to: &Path) -> Result<()> {
+    let tlog = fs::read(flight)?;
+    let times = (bytes_min / tlog.len().max(1) as f64).ceil().max(1.0) as usize;
+    fs::write(to, tlog.repeat(times)).with_context(|| to.display().to_string())
 }
