@@ -134,6 +134,31 @@ fn an_autopilots_log_of_thousands_of_tables_or_columns_takes_little_memory() {
 }
 
 #[test]
+fn an_autopilots_log_that_is_larger_than_what_may_be_held_takes_little_memory_with_any_command() {
+    let dir = tempfile::tempdir().unwrap();
+    let empty = empty_run(dir.path());
+    let (page, out) = (dir.path().join("page.html"), dir.path().join("out/"));
+    let (page, out) = (page.to_str().unwrap(), out.to_str().unwrap());
+    // The formats are made of rows, which both logs are read as: each of one, and the plainest of the other.
+    let all = ["csv", "jsonl", "influx", "parquet"];
+    for (log, formats) in
+        [(hostile::long_dataflash(dir.path()), &all[..1]), (hostile::long_ulog(dir.path()), &all[..])]
+    {
+        assert!(fs::metadata(&log).unwrap().len() > ABOVE_KIB_MAX << 10);
+        let shown = log.to_str().unwrap();
+        for words in [&["check", shown][..], &["info", shown], &["report", shown, "-o", page]] {
+            assert_bounded(&words.join(" "), run(words).memory_kib_max, empty);
+        }
+        for format in formats {
+            let outcome = run(&["decode", shown, "-o", out, "--format", format]);
+            assert_bounded(&format!("{format} of {shown}"), outcome.memory_kib_max, empty);
+            fs::remove_dir_all(out).unwrap();
+        }
+        let _ = (fs::remove_file(page), fs::remove_file(log));
+    }
+}
+
+#[test]
 fn the_logs_of_a_large_folder_are_told_one_by_one() {
     let dir = tempfile::tempdir().unwrap();
     let empty = empty_run(dir.path());

@@ -1,7 +1,7 @@
 //! Inputs that are made to take memory: well-formed, and far larger inside than outside.
 
 use std::fs::{self, File};
-use std::io::{BufWriter, Seek as _, SeekFrom, Write as _};
+use std::io::{BufWriter, Seek as _, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
 use hums::card::ReadOnlyImage;
@@ -209,19 +209,74 @@ pub fn long_arrays(dir: &Path) -> PathBuf {
     path
 }
 
+/// A log of PX4's of 72 MB and a minute: an attitude and a long text 20 times a second.
+pub fn long_ulog(dir: &Path) -> PathBuf {
+    let mut text = vec![0; 60_000];
+    text[..30_000].fill(b'x');
+    let message = |log: &mut dyn Write, kind: u8, body: &[&[u8]]| {
+        let body = body.concat();
+        let head = u16::try_from(body.len()).unwrap().to_le_bytes();
+        log.write_all(&[&head[..], &[kind], &body].concat()).unwrap();
+    };
+    long(dir, "long.ulg", |log| {
+        log.write_all(b"ULog\x01\x12\x35\x01").unwrap();
+        log.write_all(&1_000_000_u64.to_le_bytes()).unwrap();
+        message(log, b'F', &[b"vehicle_attitude:uint64_t timestamp;float[4] q;"]);
+        message(log, b'F', &[b"words:uint64_t timestamp;char[60000] text;"]);
+        message(log, b'A', &[&[0, 0, 0], b"vehicle_attitude"]);
+        message(log, b'A', &[&[0, 1, 0], b"words"]);
+        for row in 0..1_200_u64 {
+            let at = (1_000_000 + row * 50_000).to_le_bytes();
+            let level = [1_f32, 0.0, 0.0, row as f32 * 1e-6].map(f32::to_le_bytes).concat();
+            message(log, b'D', &[&[0, 0], &at, &level]);
+            message(log, b'D', &[&[1, 0], &at, &text]);
+        }
+    })
+}
+
+/// A log of `ArduPilot`'s of 71 MB and twelve minutes: an attitude and 25 messages of three texts 20 times a second.
+pub fn long_dataflash(dir: &Path) -> PathBuf {
+    let mut texts = [0; 3 * 64];
+    texts.chunks_mut(64).for_each(|text| text[..12].fill(b'x'));
+    long(dir, "long.bin", |log| {
+        let mut write = |bytes: &[u8]| log.write_all(bytes).unwrap();
+        write(&dataflash_format(128, 89, "FMT", "BBnNZ", "Type,Length,Name,Format,Columns"));
+        write(&dataflash_format(130, 3 + 8 + 12, "ATT", "Qfff", "TimeUS,Roll,Pitch,Yaw"));
+        write(&dataflash_format(131, 3 + 8 + texts.len(), "WORD", "QZZZ", "TimeUS,A,B,C"));
+        for row in 0..14_000_u64 {
+            let at = 1_000_000 + row * 50_000;
+            let level = [0.0, 0.0, row as f32 * 1e-3].map(f32::to_le_bytes).concat();
+            write(&[&[0xa3, 0x95, 130], &at.to_le_bytes()[..], &level].concat());
+            for part in 0..25 {
+                write(&[&[0xa3, 0x95, 131], &(at + part * 2_000).to_le_bytes()[..], &texts].concat());
+            }
+        }
+    })
+}
+
+fn long(dir: &Path, name: &str, write: impl FnOnce(&mut dyn Write)) -> PathBuf {
+    let path = dir.join(name);
+    let mut file = BufWriter::new(File::create(&path).unwrap());
+    write(&mut file);
+    file.flush().unwrap();
+    path
+}
+
+/// The definition of a message of `DataFlash`.
+fn dataflash_format(kind: u8, bytes: usize, name: &str, format: &str, columns: &str) -> Vec<u8> {
+    let mut message = vec![0xa3, 0x95, 128, kind, u8::try_from(bytes).unwrap()];
+    for (text, room) in [(name, 4), (format, 16), (columns, 64)] {
+        let mut text = text.as_bytes().to_vec();
+        text.resize(room, 0);
+        message.extend_from_slice(&text);
+    }
+    message
+}
+
 /// A log of `ArduPilot`'s that defines each of 64 messages sixteen times with other columns: as many tables as are kept.
 pub fn wide_dataflash(dir: &Path) -> PathBuf {
     const COLUMNS: usize = 14;
-    let format = |kind: u8, bytes: usize, name: &str, format: &str, columns: &str| {
-        let mut message = vec![0xa3, 0x95, 128, kind, u8::try_from(bytes).unwrap()];
-        for (text, room) in [(name, 4), (format, 16), (columns, 64)] {
-            let mut text = text.as_bytes().to_vec();
-            text.resize(room, 0);
-            message.extend_from_slice(&text);
-        }
-        message
-    };
-    let mut log = format(128, 89, "FMT", "BBnNZ", "Type,Length,Name,Format,Columns");
+    let mut log = dataflash_format(128, 89, "FMT", "BBnNZ", "Type,Length,Name,Format,Columns");
     for version in 0..16_u8 {
         for kind in 0..64_u8 {
             let letter = char::from(b'A' + version);
@@ -229,7 +284,7 @@ pub fn wide_dataflash(dir: &Path) -> PathBuf {
             let columns = (0..COLUMNS).map(column).collect::<Vec<_>>().concat();
             let bytes = 3 + 8 + COLUMNS;
             let types = format!("Q{}", "B".repeat(COLUMNS));
-            log.extend_from_slice(&format(
+            log.extend_from_slice(&dataflash_format(
                 130 + kind,
                 bytes,
                 &format!("T{kind:02}"),

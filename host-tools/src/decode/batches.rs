@@ -10,7 +10,7 @@ use hums_core::time::Instant;
 
 use super::columns::{Column, TextColumn};
 use super::field_names::free_name;
-use super::row::Row;
+use super::row::{Cell, Row};
 use super::table::Table;
 use crate::mavlink::frame::Frame;
 use crate::mavlink::values::Payload;
@@ -34,7 +34,7 @@ const TABLE_BYTES: usize = 4_096;
 const ROW_BYTES: usize = 32;
 /// What an offset or a length takes, for each field.
 const FIELD_BYTES: usize = 4;
-/// What a cell of the monitor's own takes, its text on the heap included.
+/// What a cell of a row takes, a short text on the heap included; a long one takes its length besides.
 const CELL_BYTES: usize = 96;
 
 /// The columns of frames of one type.
@@ -149,7 +149,12 @@ impl Batches {
     /// Adds a row of the monitor's own.
     pub fn row(&mut self, at: Instant, utc_us: Option<u64>, row: &Row) {
         let columns = self.rows.entry(row.table).or_default();
-        self.held_bytes += ROW_BYTES + CELL_BYTES * (1 + row.cells.len());
+        let texts = row.cells.iter().map(|(_, cell)| match cell {
+            Cell::Text(text) | Cell::Words(text, _) => text.len(),
+            Cell::Hex(bytes) => bytes.len(),
+            _ => 0,
+        });
+        self.held_bytes += ROW_BYTES + CELL_BYTES * (1 + row.cells.len()) + texts.sum::<usize>();
         columns.times.push(at, utc_us);
         columns.rows.push(row.clone());
     }
