@@ -458,14 +458,14 @@ impl Overview {
 
     /// Whether nothing was lost or damaged, and the log is proved to its end or at least to its last end mark. A recording
     /// of another format has nothing that could prove its end.
-    pub fn is_proved(&self) -> bool {
-        self.unproved().is_empty()
+    pub fn is_sound(&self) -> bool {
+        self.faults().is_empty()
     }
 
     /// Why it is not, as parts of sentences.
-    pub fn unproved(&self) -> Vec<String> {
+    pub fn faults(&self) -> Vec<String> {
         match (self.format, self.ending.summary.gaps) {
-            (None, _) => self.ending.unproved(),
+            (None, _) => self.ending.faults(),
             (Some(_), 0) => Vec::new(),
             (Some(_), gaps) => vec![damaged_places(gaps)],
         }

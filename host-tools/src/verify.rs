@@ -1,13 +1,15 @@
 //! `hums verify`: every check there is, each with what it looked at and what failed.
 
 use anyhow::Result;
+use hums_blackbox::Cause;
 use hums_blackbox::record::Lost;
-use hums_blackbox::{BlockCounts, Cause};
 use hums_core::time::Instant;
 use serde::Serialize;
 
 use crate::cli;
-use crate::ending::{BlocksJson, EndJson, PowerOn, SessionBefore, among_words, behind_words};
+use crate::ending::{
+    BlocksJson, EndJson, PowerOn, SessionBefore, among_words, behind_words, copies_words, made_again_words,
+};
 use crate::files::Inputs;
 use crate::followed::Followed;
 use crate::info::json::images_json;
@@ -28,7 +30,9 @@ pub fn run(args: &cli::Verify) -> Result<Outcome> {
     for remark in &found.remarks {
         note!("{remark}");
     }
-    let (mut ok, mut logs, mut without_earlier) = (!found.is_cut(), 0_u64, WithoutEarlier::default());
+    // Of what is no log; of the logs; sectors that had to be made again.
+    let (mut ok, mut worst, mut made_again) = (!found.is_cut(), Verdict::Holds, 0_u64);
+    let (mut logs, mut without_earlier) = (0_u64, WithoutEarlier::default());
     for folder in args.inputs.iter().filter(|input| input.is_dir()) {
         let (words, is_broken) = besides(folder, &found)?;
         for words in words {
@@ -48,11 +52,10 @@ pub fn run(args: &cli::Verify) -> Result<Outcome> {
             image.not_looked_at().map_or(Ok(()), |words| output::line(&format!("  besides {words}")))?;
         }
     }
-    let mut worst = Verdict::Holds;
     verify_each(&found, |overview: &Overview| {
         let log = LogJson::new(overview);
-        ok &= log.ok;
         worst = worst.max(log.verdict);
+        made_again += overview.ending.made_again();
         logs += u64::from(overview.ending.is_counted());
         if overview.ending.is_without_earlier() {
             without_earlier.add(&overview.ending.name);
@@ -65,12 +68,13 @@ pub fn run(args: &cli::Verify) -> Result<Outcome> {
         print(&log.checks)?;
         overview.ending.aside().map_or(Ok(()), |words| output::line(&format!("  {}", word(&words))))
     })?;
+    let worst = if ok { worst } else { Verdict::NotProved };
+    let ok = worst != Verdict::NotProved && made_again == 0;
     if let Some(list) = list {
         list.end_with("ok", &ok)?;
     } else {
         let logs = count(logs, "session");
-        let worst = if ok { worst } else { Verdict::NotProved };
-        let verdict = without_earlier.verdict(worst, found.has_passed_over());
+        let verdict = without_earlier.verdict(worst, made_again, found.has_passed_over());
         output::line(&format!("{logs}: {verdict}"))?;
     }
     Ok(Outcome::lossy(!ok))
@@ -95,9 +99,17 @@ impl WithoutEarlier {
     }
 
     /// What is said of all logs: no more than of those that were read.
-    fn verdict(&self, worst: Verdict, has_passed_over: bool) -> String {
+    fn verdict(&self, worst: Verdict, made_again: u64, has_passed_over: bool) -> String {
         let all = self.first.is_none() && !has_passed_over;
-        let words = if worst == Verdict::Holds && !all { "all that was read holds" } else { worst.words() };
+        let words = match (worst, made_again, all) {
+            (Verdict::Holds, 0, true) => "everything holds",
+            (Verdict::Holds, 0, false) => "all that was read holds",
+            (Verdict::Holds, _, true) => "nothing is lost",
+            (Verdict::Holds, _, false) => "nothing is lost of what was read",
+            (Verdict::ToMark, ..) => "whole to the last end marks; what came after them cannot be proved",
+            (Verdict::NotProved, ..) => "damage, losses or an end that is not proved: see above",
+        };
+        let made_again = made_again_words(made_again).map_or_else(String::new, |words| format!("; {words}"));
         let more = match self.more {
             0 => String::new(),
             more => format!(" and before {}", count(more, "more log")),
@@ -105,7 +117,7 @@ impl WithoutEarlier {
         let first = self.first.as_ref();
         let earlier = first.map(|first| format!("; the logs before {}{more} were not read", word(first)));
         let passed_over = if has_passed_over { "; what was passed over was not read" } else { "" };
-        format!("{words}{}{passed_over}", earlier.unwrap_or_default())
+        format!("{words}{made_again}{}{passed_over}", earlier.unwrap_or_default())
     }
 }
 
@@ -122,28 +134,19 @@ pub fn verify_each(found: &Found, mut done: impl FnMut(&Overview) -> Result<()>)
 /// What can be said of a log.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Verdict {
-    /// All checks hold, and nothing is missing at its end.
+    /// All that is in it holds, and nothing is missing at its end.
     Holds,
-    /// All checks hold up to its last end mark. What came after it is read as far as it goes.
+    /// All that is in it holds up to its last end mark. What came after it is read as far as it goes.
     ToMark,
     /// A check failed, or nothing proves that it goes to a landing, a disarming or an orderly end.
     NotProved,
 }
 
-impl Verdict {
-    /// Of all logs together, in a few words.
-    const fn words(self) -> &'static str {
-        match self {
-            Self::Holds => "everything holds",
-            Self::ToMark => "whole to the last end marks; what came after them cannot be proved",
-            Self::NotProved => "damage, losses or an end that is not proved: see above",
-        }
-    }
-}
-
-/// What can be said of a log that was read with [`Overview::verified`].
+/// What can be said of a log that was read with [`Overview::verified`]; nothing good is said of one of which sectors had to be
+/// made again.
 pub fn verdict(log: &Overview) -> Verdict {
-    LogJson::new(log).verdict
+    let log = LogJson::new(log);
+    if log.ok { log.verdict } else { Verdict::NotProved }
 }
 
 fn print(checks: &[Check]) -> Result<()> {
@@ -176,6 +179,7 @@ struct LogJson {
     /// All blocks of its files.
     blocks: BlocksJson,
     checks: Vec<Check>,
+    /// Of what is in it, also where sectors had to be made again.
     #[serde(skip)]
     verdict: Verdict,
 }
@@ -218,7 +222,7 @@ impl LogJson {
             gaps => format!("{} of which nothing tells how many: one each at least", count(gaps, "gap")),
         };
         let mut checks = vec![
-            check("sector checksums", blocks.sectors + blocks.damaged, blocks.damaged, repaired(&blocks)),
+            check("sector checksums", blocks.sectors + blocks.damaged, blocks.damaged, String::new()),
             check("sector sequence", blocks.sectors, missing, gaps_detail(log)),
             check("group decoding", summary.groups, useless, newer(log)),
             check("frames complete", contents.frames(), contents.not_frames, String::new()),
@@ -247,14 +251,20 @@ impl LogJson {
         } else if let Some(anew) = ending.begun_anew {
             checks = vec![check("files", ending.files.len() as u64, 1, anew.words())];
         }
-        let ok = checks.iter().all(|check| check.failed == 0) && ending.is_proved();
-        let end = EndJson::new(ending);
-        let blocks = BlocksJson::new(&blocks);
-        let verdict = match (ok, ending.proof.is_whole() || is_told_only) {
+        let holds = checks.iter().all(|check| check.failed == 0) && ending.unproved().is_empty();
+        let verdict = match (holds, ending.proof.is_whole() || is_told_only) {
             (true, true) => Verdict::Holds,
             (true, false) => Verdict::ToMark,
             (false, _) => Verdict::NotProved,
         };
+        let made_again = ending.made_again();
+        if made_again > 0 || !is_told_only && ending.begun_anew.is_none() {
+            let detail = if made_again > 0 { "made again from parity, without a loss" } else { "" };
+            checks.push(check("sectors intact", blocks.sectors, made_again, detail.to_owned()));
+        }
+        let ok = holds && made_again == 0;
+        let end = EndJson::new(ending);
+        let blocks = BlocksJson::new(&blocks);
         let (name, closed) = (ending.name.clone(), summary.closed);
         let (left_over, begun_anew) = (ending.left_over, ending.begun_anew.map(|anew| anew.of.unwrap_or(0)));
         Self { name, ok, closed, copy_of, left_over, end, begun_anew, blocks, checks, verdict }
@@ -288,14 +298,12 @@ fn ends(log: &Overview) -> [Check; 8] {
             gone.unwrap_or_default()
         }
     };
-    let twice = "sectors that are there twice, or lie where others belong".to_owned();
-    let twice = if blocks.misplaced > 0 { twice } else { String::new() };
     let strange = ending.strange();
     let holds = ending.proof.holds() && !newer && ending.noise().is_none();
     let parity = &summary.parity;
     [
         check("parity", parity.columns, parity.contradicted, ending.contradicted().unwrap_or_default()),
-        check("sector places", blocks.sectors + blocks.misplaced, blocks.misplaced, twice),
+        check("sector places", blocks.sectors + blocks.misplaced, blocks.misplaced, copies_words(blocks)),
         check("files", ending.files.len() as u64, strange.len() as u64, strange.join("; ")),
         check("chain", summary.groups, summary.unchained, String::new()),
         check("end marks", summary.marks.count, summary.marks.wrong, String::new()),
@@ -311,15 +319,6 @@ fn power_on(power_on: PowerOn) -> Check {
     let checked = u64::from(!matches!(power_on, PowerOn::First | PowerOn::NotRead));
     let detail = wrong.clone().unwrap_or_else(|| power_on.words().to_owned());
     Check { name: "same power-on", checked, failed: u64::from(wrong.is_some()), detail }
-}
-
-/// What was made again from parity.
-fn repaired(blocks: &BlockCounts) -> String {
-    match blocks.repaired {
-        0 => String::new(),
-        1 => "1 sector was lost or damaged, and was made again from parity".to_owned(),
-        sectors => format!("{sectors} sectors were lost or damaged, and were made again from parity"),
-    }
 }
 
 fn gaps_detail(log: &Overview) -> String {

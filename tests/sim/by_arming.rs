@@ -392,7 +392,7 @@ impl PowerOn {
         vec![
             ([&one[..], &two[1..], three].concat(), "sector sequence"),
             (with(zeroed), "sector sequence"),
-            (with(doubled), "sectors that are there twice"),
+            (with(doubled), "sectors there twice"),
         ]
     }
 

@@ -22,13 +22,14 @@ impl Checked {
     pub(super) fn outcome(&self) -> Outcome {
         let wrong = !self.judged.problems.is_empty();
         // Too little to judge, or nothing, is no damage: the verdict says so.
-        let lossy = self.aside().is_none() && (self.judged.damages > 0 || !self.unproved().is_empty());
+        let damaged = self.aside().is_none() && self.judged.damages > 0;
+        let lossy = damaged || !self.faults().is_empty();
         Outcome::lossy(lossy).and(if wrong { Outcome::Findings } else { Outcome::Done })
     }
 
-    /// Why a log of ours is not called whole, as parts of sentences.
-    pub fn unproved(&self) -> Vec<String> {
-        self.ending.as_ref().map_or_else(Vec::new, Ending::unproved)
+    /// What is wrong with a log of ours, as parts of sentences: see [`Ending::faults`].
+    pub fn faults(&self) -> Vec<String> {
+        self.ending.as_ref().map_or_else(Vec::new, Ending::faults)
     }
 
     /// What it is, where its losses do not count: see [`Ending::aside`].

@@ -144,7 +144,7 @@ pub fn line(checked: &Checked) -> serde_json::Result<String> {
         format: checked.format.name(),
         verdict: judged.verdict(),
         damaged: judged.damages > 0,
-        not_proved: checked.unproved(),
+        not_proved: checked.faults(),
         judged_by: match judged.by {
             JudgedBy::Board => "board",
             JudgedBy::Here if judged.worst().is_none() => "nobody",

@@ -63,7 +63,7 @@ pub fn run(args: &cli::Check) -> Result<Outcome> {
                 text::screen(&checked)
             };
             bar.suspend(|| {
-                checked.aside().iter().chain(&checked.unproved()).for_each(|why| note!("{name}: {why}"));
+                checked.aside().iter().chain(&checked.faults()).for_each(|why| note!("{name}: {why}"));
                 match &json {
                     Some(json) => output::json_line(json),
                     None => output::line(text.trim_end()),

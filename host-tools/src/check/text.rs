@@ -106,7 +106,7 @@ fn state(checked: &Checked) -> State {
     let judged = &checked.judged;
     let mut damages = judged.gaps.iter().filter(|gap| gap.cause.is_damage());
     match judged.damages {
-        0 if !checked.unproved().is_empty() => State::NotProved,
+        0 if checked.ending.as_ref().is_some_and(|ending| !ending.unproved().is_empty()) => State::NotProved,
         0 if judged.losses > 0 => State::Lossy,
         0 => State::Whole,
         _ if damages.all(|gap| gap.cause == Cause::Cut) => State::Cut,

@@ -203,15 +203,15 @@ impl Done {
     }
 
     fn outcome(&self) -> Outcome {
-        let is_proved = self.ending.as_ref().is_none_or(Ending::is_proved);
-        self.outcome.and(Outcome::lossy(!is_proved))
+        let is_sound = self.ending.as_ref().is_none_or(Ending::is_sound);
+        self.outcome.and(Outcome::lossy(!is_sound))
     }
 
     fn tell(&self) -> Result<()> {
         for remark in &self.remarks {
             note!("{remark}");
         }
-        let said = |ending: &Ending| ending.aside().into_iter().chain(ending.unproved()).collect::<Vec<_>>();
+        let said = |ending: &Ending| ending.aside().into_iter().chain(ending.faults()).collect::<Vec<_>>();
         for why in self.ending.iter().flat_map(said) {
             note!("{}: {why}", self.name);
         }

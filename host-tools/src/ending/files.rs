@@ -233,6 +233,13 @@ pub fn among_words(summary: &Summary) -> String {
     ])
 }
 
+/// Sectors of the log that count once more or not at all, in words; empty where there are none.
+pub fn copies_words(all: &BlockCounts) -> String {
+    let kinds = [(all.superseded, "superseded"), (all.misplaced, "there twice or where others belong")];
+    let kinds = kinds.iter().filter(|(number, _)| *number > 0);
+    kinds.map(|(number, kind)| format!("{} {kind}", count(*number, "sector"))).collect::<Vec<_>>().join(", ")
+}
+
 fn words_of(kinds: &[(u64, &str)]) -> String {
     let kinds = kinds.iter().filter(|(number, _)| *number > 0);
     kinds.map(|(number, kind)| format!("{} {kind}", count(*number, "block"))).collect::<Vec<_>>().join(", ")

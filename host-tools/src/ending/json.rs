@@ -30,7 +30,7 @@ pub struct EndJson {
     behind: BlocksJson,
     /// Sectors of a session that began later lie in it.
     newer_session: bool,
-    /// Why the log is not called whole, as sentences; none where it is.
+    /// Why the log is not called whole, and that sectors had to be made again, as sentences; none where neither is so.
     not_proved: Vec<String>,
 }
 
@@ -66,7 +66,7 @@ impl EndJson {
             frames_missing,
             behind: BlocksJson::new(&summary.behind),
             newer_session: ending.has_newer(),
-            not_proved: ending.unproved(),
+            not_proved: ending.faults(),
         }
     }
 }

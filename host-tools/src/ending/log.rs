@@ -82,12 +82,23 @@ impl Ending {
     }
 
     /// Whether nothing was lost or damaged, and the log is proved to its end or at least to its last end mark.
-    pub fn is_proved(&self) -> bool {
-        self.unproved().is_empty()
+    pub fn is_sound(&self) -> bool {
+        self.faults().is_empty()
     }
 
-    /// Why it is not, as parts of sentences: what is lost or damaged, what is not proved, what of its files is not the log's.
-    /// What there is to say of a mere copy is said of its original.
+    /// Why it is not, as parts of sentences: why it is not proved to be whole, and that sectors had to be made again.
+    pub fn faults(&self) -> Vec<String> {
+        self.unproved().into_iter().chain(made_again_words(self.made_again())).collect()
+    }
+
+    /// Sectors that had to be made again from parity, which tells of a damaged card though nothing is lost. A file that was just
+    /// begun anew has lost those that the new session wrote over.
+    pub const fn made_again(&self) -> u64 {
+        if self.begun_anew.is_some() { 0 } else { self.summary.blocks.repaired }
+    }
+
+    /// Why it is not proved to be whole, as parts of sentences: what is lost, what is not proved, what of its files is not the
+    /// log's. What is missing in a mere copy is said of its original.
     pub fn unproved(&self) -> Vec<String> {
         let mut all = Vec::new();
         if self.aside().is_some() {
@@ -180,6 +191,16 @@ impl Ending {
     pub fn has_newer(&self) -> bool {
         self.file().has_newer()
     }
+}
+
+/// That so many sectors had to be made again from parity, and what to do then; none where none had to.
+pub fn made_again_words(sectors: u64) -> Option<String> {
+    (sectors > 0).then(|| {
+        format!(
+            "{} had to be made again from parity, without a loss: keep the original as it is, copy the card, and replace it",
+            count(sectors, "sector")
+        )
+    })
 }
 
 #[cfg(test)]

@@ -11,8 +11,8 @@ mod log;
 mod place;
 mod proof;
 
-pub use files::{among_words, behind_words};
+pub use files::{among_words, behind_words, copies_words};
 pub use json::{BlocksJson, EndJson};
-pub use log::Ending;
+pub use log::{Ending, made_again_words};
 pub use place::{Misnamed, PowerOn, SessionBefore};
 pub use proof::{Proof, Teller};

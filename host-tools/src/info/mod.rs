@@ -34,7 +34,7 @@ pub fn run(args: &cli::Info) -> Result<Outcome> {
     }
     let mut followed = Followed::new(sessions_of(&found.places));
     let mut done = |overview: &Overview| {
-        outcome = outcome.and(Outcome::lossy(!overview.is_proved()));
+        outcome = outcome.and(Outcome::lossy(!overview.is_sound()));
         if let Some(list) = &mut list {
             return list.element(&LogJson::new(overview));
         }

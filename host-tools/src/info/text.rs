@@ -12,7 +12,7 @@ use hums_core::time::Instant;
 
 use super::json::{duration_s, finite, losses, vehicle};
 use super::wear;
-use crate::ending::{among_words, behind_words};
+use crate::ending::{among_words, behind_words, copies_words, made_again_words};
 use crate::logs;
 use crate::logs::begun_anew::BegunAnew;
 use crate::plural::count;
@@ -132,17 +132,12 @@ fn ending(text: &mut String, log: &Overview) {
     for strange in ending.contradicted().into_iter().chain(ending.noise()).chain(ending.strange()) {
         let _ = writeln!(text, "  files    {strange}");
     }
-    if summary.blocks.repaired > 0 {
-        let _ = writeln!(text, "  parity   {} made again", count(summary.blocks.repaired, "sector"));
+    if let Some(words) = made_again_words(ending.made_again()) {
+        let _ = writeln!(text, "  parity   {words}");
     }
-    let (superseded, misplaced) = (summary.blocks.superseded, summary.blocks.misplaced);
-    if superseded > 0 || misplaced > 0 {
-        let _ = writeln!(
-            text,
-            "  copies   {} superseded, {} there twice or where others belong",
-            count(superseded, "sector"),
-            count(misplaced, "sector")
-        );
+    let copies = copies_words(&summary.blocks);
+    if !copies.is_empty() {
+        let _ = writeln!(text, "  copies   {copies}");
     }
 }
 

@@ -85,10 +85,10 @@ pub fn run(args: &cli::Report) -> Result<Outcome> {
             }
         }
         // Also of the sessions before, which the page compares with, and of those that were read for its end.
-        for why in overview.ending.aside().into_iter().chain(overview.unproved()) {
+        for why in overview.ending.aside().into_iter().chain(overview.faults()) {
             note!("{}: {why}", overview.ending.name);
         }
-        outcome = outcome.and(Outcome::lossy(!overview.is_proved()));
+        outcome = outcome.and(Outcome::lossy(!overview.is_sound()));
         // A session that is there twice counts once, and what a file held before is older than its name says.
         let counts = overview.ending.is_counted() && overview.ending.begun_anew.is_none();
         earlier.push(counts.then_some(this));

@@ -333,18 +333,22 @@ fn a_header_that_counts_what_is_not_there_is_told_by_every_command() {
     }
 }
 
+/// The file of the only log on the card, up to the parity of its first stretch, which ends it.
+fn with_parity(dir: &TempDir) -> Vec<u8> {
+    let image = fs::read(dir.path().join("card.img")).expect("an image");
+    let all = image.as_chunks::<BLOCK>().0;
+    let begin = all.iter().position(|block| Header::read(block).is_ok()).expect("a sector");
+    let end = all.iter().rposition(|block| Parity::read(block).is_some()).expect("parity") + 1;
+    image[begin * BLOCK..end * BLOCK].to_vec()
+}
+
 /// Parity covers sectors once they are on the card, and is made of them: it tells of an end that is gone, and of what was altered with a check
 /// that fits.
 #[test]
 fn what_parity_contradicts_is_told_by_every_command() {
     let dir = copied(1, "");
     let path = dir.path().join("copied/00001_00.HUM");
-    // The parity of the first stretch ends the file.
-    let image = fs::read(dir.path().join("card.img")).expect("an image");
-    let all = image.as_chunks::<BLOCK>().0;
-    let begin = all.iter().position(|block| Header::read(block).is_ok()).expect("a sector");
-    let end = all.iter().rposition(|block| Parity::read(block).is_some()).expect("parity") + 1;
-    let whole = image[begin * BLOCK..end * BLOCK].to_vec();
+    let whole = with_parity(&dir);
     let blocks = || whole.as_chunks::<BLOCK>().0.iter();
     let header = |block: &[u8; BLOCK]| Header::read(block).ok();
     let closed =
@@ -357,7 +361,7 @@ fn what_parity_contradicts_is_told_by_every_command() {
     let verified = |bytes: &[u8]| {
         fs::write(&path, bytes).expect("written");
         let said = text(&attempt(dir.path(), "verify copied"));
-        (said.contains("FAILED  parity "), said.contains("1 sector was lost or damaged, and was made again"))
+        (said.contains("FAILED  parity "), said.contains("1 sector had to be made again from parity"))
     };
     assert_eq!(verified(&whole), (false, false));
     // A sector that is altered.
@@ -383,6 +387,89 @@ fn what_parity_contradicts_is_told_by_every_command() {
     block[480] ^= 0x20;
     Sum::P.seal(block, one.session, one.last);
     assert_eq!(verified(&lost), (true, false));
+}
+
+/// Nothing is lost of them, and a card that damaged them will damage others: no reader calls such a log good.
+#[test]
+fn sectors_that_parity_made_again_are_told_by_every_command() {
+    let dir = copied(1, "");
+    let path = dir.path().join("copied/00001_00.HUM");
+    let whole = with_parity(&dir);
+    let sector = |at: usize| at * BLOCK..(at + 1) * BLOCK;
+    let frames = |said: &str| said.lines().find(|line| line.contains("  frames ")).map(str::to_owned);
+    let before = frames(&text(&run(dir.path(), "info copied", 0)));
+    let mut flipped = whole.clone();
+    flipped[20 * BLOCK + 100] ^= 1;
+    let mut erased = whole.clone();
+    erased[20 * BLOCK..28 * BLOCK].fill(0xff);
+    let mut zeroed = whole.clone();
+    zeroed[sector(20)].fill(0);
+    let mut copied = whole.clone();
+    copied.copy_within(sector(20), 40 * BLOCK);
+    let mut swapped = whole.clone();
+    swapped[sector(20)].copy_from_slice(&whole[sector(40)]);
+    swapped[sector(40)].copy_from_slice(&whole[sector(20)]);
+    for (damaged, count) in [
+        (flipped, "1 sector"),
+        (erased, "8 sectors"),
+        (zeroed, "1 sector"),
+        (copied, "1 sector"),
+        (swapped, "2 sectors"),
+    ] {
+        fs::write(&path, damaged).expect("written");
+        let words = format!("{count} had to be made again from parity, without a loss: keep the original");
+        all_say(dir.path(), "copied", 3, &[&words]);
+        let said = text(&run(dir.path(), "verify copied", 3));
+        let last = said.lines().last().expect("a verdict");
+        assert!(last.starts_with(&format!("1 session: nothing is lost; {words}")), "{said}");
+        assert_eq!(said.matches("FAILED").count(), 1, "{said}");
+        let json = json(&run(dir.path(), "verify --json copied", 3));
+        let made_again = json["logs"][0]["blocks"]["repaired"].as_u64().expect("a number");
+        assert_eq!((&json["ok"], &json["logs"][0]["ok"]), (&false.into(), &false.into()));
+        assert!(count.starts_with(&made_again.to_string()), "{json}");
+        assert_eq!(frames(&text(&run(dir.path(), "info copied", 3))), before);
+    }
+    // Also of a copy, whose losses are its original's.
+    fs::write(dir.path().join("copied/Copy of 00001_00.HUM"), &whole).expect("written");
+    let said = text(&run(dir.path(), "verify copied", 3));
+    assert!(said.contains("not counted") && said.contains("2 sectors had to be made again"), "{said}");
+}
+
+/// What of a log's file is superseded, of another session or no sector is counted by `verify` as by `info`.
+#[test]
+fn blocks_that_do_not_count_are_counted_by_verify_and_info() {
+    let dir = copied(1, "");
+    let path = dir.path().join("copied/00001_00.HUM");
+    let mut log = fs::read(&path).expect("there");
+    let last =
+        log.as_chunks::<BLOCK>().0.iter().rposition(|block| Header::read(block).is_ok()).expect("a sector");
+    // Behind its last sector: a copy of that while it was in progress, a sector of another session, a block that is none.
+    let mut block = |at: usize, change: &dyn Fn(&mut [u8; BLOCK])| {
+        let (from, to) = (last * BLOCK, (last + at) * BLOCK);
+        log.copy_within(from..from + BLOCK, to);
+        change(log[to..].first_chunk_mut().expect("a block"));
+    };
+    block(1, &|block| {
+        let mut sector = Sector::from_bytes(*block);
+        sector.set_partial(true);
+        sector.seal(sector.session());
+        *block = *sector.bytes();
+    });
+    block(2, &|block| {
+        // A recycled file has such ones at their old places, or before these.
+        block[11..15].copy_from_slice(&(last as u32 + 10).to_le_bytes());
+        let mut sector = Sector::from_bytes(*block);
+        sector.seal(sector.session() ^ 1);
+        *block = *sector.bytes();
+    });
+    block(3, &|block| block.fill(0x5a));
+    fs::write(&path, log).expect("written");
+    for command in ["verify", "info"] {
+        let said = text(&run(dir.path(), &format!("{command} copied"), 0));
+        for words in ["1 sector superseded", "1 block of another session, 1 block that is no sector"] {
+            assert!(said.contains(words), "{command}: `{words}` is not in {said}");
+        }
+    }
 }
 
 #[test]

@@ -42,7 +42,7 @@ pub(super) const LABELS: Labels = Labels {
         "of them noticed: `verify` does not call it good",
         "of them read as the other session, and told",
         "of them told: whole up to the end mark that is named, and no further",
-        "of them told: nothing is missing, and what was made again from parity is said",
+        "of them without a loss: what was made again from parity is said, and `verify` does not call it good",
         "missed, or told wrong",
         "frames given out after these, all of them right",
     ],
@@ -107,8 +107,10 @@ fn whole_pages(options: &Options, figures: &mut Figures) -> Result<()> {
     figures.fact("of them noticed: `verify` does not call it good", all.noticed);
     figures.fact("of them read as the other session, and told", all.other);
     figures.fact("of them told: whole up to the end mark that is named, and no further", all.told);
-    figures
-        .fact("of them told: nothing is missing, and what was made again from parity is said", all.repaired);
+    figures.fact(
+        "of them without a loss: what was made again from parity is said, and `verify` does not call it good",
+        all.repaired,
+    );
     figures.fact("missed, or told wrong", all.missed);
     figures.fact("frames given out after these, all of them right", all.frames);
     let misses: Vec<_> = outcomes.iter().flat_map(|one| &one.misses).take(10).map(String::as_str).collect();

@@ -3,7 +3,7 @@
 //! A log is recorded once. Then its file is cut, pages of it are erased, zeroed, copied, exchanged or replaced by what an
 //! older session left there, or it goes on with the second half of another log, or with all of one; what is left is read and verified, and
 //! compared with the whole log. Besides, a sector is altered, or one is lost and a parity sector of it is altered, with checks that fit.
-//! What parity makes again is *told* as that. *Noticed* is what `hums verify` does not call good. A cut behind an end mark cannot be
+//! *Noticed* is what `hums verify` does not call good; that is also what parity has made again without a loss. A cut behind an end mark cannot be
 //! told from power that went there: that is *told* if `verify` says up to which mark the log is whole, and all of it is.
 
 use std::collections::BTreeSet;
@@ -101,9 +101,9 @@ pub(super) struct Tally {
     pub(super) damages: u64,
     /// `verify` does not call it good.
     pub(super) noticed: u64,
-    /// `verify` calls it whole up to an end mark, or good so far as it says, and it is.
+    /// `verify` calls it whole up to an end mark, and it is.
     pub(super) told: u64,
-    /// Of those: nothing is missing, and `verify` says what was made again.
+    /// Of those that were noticed: nothing is missing, and `verify` says what was made again.
     pub(super) repaired: u64,
     /// Read as the other session, because its sector is the first one.
     pub(super) other: u64,
@@ -429,7 +429,6 @@ impl Subject {
             _ if self.has_parity && is_lost => {
                 anyhow::bail!("{verdict:?} is said, and its parity tells of more")
             }
-            (Verdict::Holds, _) if missing.is_empty() && repaired > 0 => tally.told += 1,
             (Verdict::ToMark, Proof::Mark(at, _)) => {
                 let to = at.as_millis();
                 let first = missing.first().map(|index| self.whole.frames[*index].at_ms);
