@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 
 use anyhow::Result;
-use hums_blackbox::{Assembler, BlockCounts, GROUP_SECTORS, Header, Step};
+use hums_blackbox::{Assembler, BlockCounts, GROUP_SECTORS, Header, Sector, Step};
 
 use super::board::{Board, HEADING_GROUPS, heading};
 use super::joined::{Found, Joints};
@@ -89,6 +89,8 @@ pub struct Groups<'a> {
     joints: Option<Joints>,
     /// What was made again of the file of the last block, which is the one that is named. None as with `strangers`.
     repairs: Option<(Option<usize>, Repairs)>,
+    /// The second of two sectors that are read in the place of one block.
+    beside: Option<[u8; BLOCK_BYTES]>,
     /// Sectors that were made again.
     repaired: u64,
     /// What the parity of the files so far tells.
@@ -115,6 +117,7 @@ impl<'a> Groups<'a> {
             strangers: log.session.is_none().then(|| Strangers::new(log.pieces.len())),
             joints: log.session.is_none().then(Joints::default),
             repairs: log.session.is_none().then(Default::default),
+            beside: None,
             repaired: 0,
             evidence: Evidence::default(),
         }
@@ -206,8 +209,11 @@ impl<'a> Groups<'a> {
         Ok(())
     }
 
-    /// The next block as it was written, where that can be known.
+    /// The next block as it was written, where that can be known; before or behind it what is there, if that is nowhere else.
     fn read_block(&mut self) -> Result<Option<[u8; BLOCK_BYTES]>> {
+        if let Some(beside) = self.beside.take() {
+            return Ok(Some(beside));
+        }
         let (Some(block), (file, at)) = (self.blocks.next_block()?, self.blocks.place()) else {
             return Ok(None);
         };
@@ -216,9 +222,14 @@ impl<'a> Groups<'a> {
             *repairs = Repairs::of(self.blocks.log(), file, self.assembler.session())?;
             self.evidence.add(&repairs.evidence);
         }
-        let made = repairs.at(at).filter(|made| **made != block);
-        self.repaired += u64::from(made.is_some());
-        Ok(Some(made.copied().unwrap_or(block)))
+        let Some(made) = repairs.at(at).filter(|made| **made != block) else { return Ok(Some(block)) };
+        self.repaired += 1;
+        let mut both = [*made, block];
+        if repairs.is_displaced(at) {
+            both.sort_by_key(|sector| Sector::from_bytes(*sector).number());
+            self.beside = Some(both[1]);
+        }
+        Ok(Some(both[0]))
     }
 
     fn feed(&mut self, block: &[u8; BLOCK_BYTES]) -> Result<()> {

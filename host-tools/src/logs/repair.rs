@@ -8,11 +8,11 @@
 //!
 //! A file that is longer than any recorder makes one is read as it is: what is kept of a file is bounded by its length.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use anyhow::Result;
-use hums_blackbox::Header;
 use hums_blackbox::parity::{COLUMNS, Column, Parity, STRETCH_SECTORS};
+use hums_blackbox::{Header, Sector};
 use hums_recorder::card::SEGMENT_BYTES_MAX;
 
 use super::places::{BLOCK_BYTES, Log};
@@ -50,6 +50,8 @@ impl Evidence {
 #[derive(Debug, Default)]
 pub(super) struct Repairs {
     made: BTreeMap<u64, [u8; BLOCK_BYTES]>,
+    /// Those of the blocks that hold a sector which is nowhere else.
+    displaced: BTreeSet<u64>,
     pub(super) evidence: Evidence,
 }
 
@@ -92,12 +94,18 @@ impl Repairs {
                 all.made.insert(u64::from(sector.number().wrapping_sub(base)), *sector.bytes());
             }
         }
+        all.displaced = found.displaced(&all.made);
         Ok(all)
     }
 
-    /// What is to be read in this block instead of what is there.
+    /// The sector that was made again and belongs in this block.
     pub(super) fn at(&self, block: u64) -> Option<&[u8; BLOCK_BYTES]> {
         self.made.get(&block)
+    }
+
+    /// Whether what is there is to be read too.
+    pub(super) fn is_displaced(&self, block: u64) -> bool {
+        self.displaced.contains(&block)
     }
 }
 
@@ -160,6 +168,23 @@ impl Found {
     fn in_place(&self, base: u32, at: u32) -> Option<u32> {
         let number = self.numbers.get(at as usize).copied().flatten();
         number.filter(|number| *number == base.wrapping_add(at))
+    }
+
+    /// The blocks in which another sector belongs, which was made again, and whose own one is nowhere else. Where something was put into
+    /// a file, all that follows lies in other blocks, and some columns have lost more than can be made again.
+    fn displaced(&self, made: &BTreeMap<u64, [u8; BLOCK_BYTES]>) -> BTreeSet<u64> {
+        let number =
+            |at: u64| usize::try_from(at).ok().and_then(|at| self.numbers.get(at).copied()).flatten();
+        let mut only: BTreeMap<u32, u64> =
+            made.keys().filter_map(|at| number(*at).map(|number| (number, *at))).collect();
+        if !only.is_empty() {
+            let elsewhere = (0_u64..).zip(&self.numbers).filter(|(at, _)| !made.contains_key(at));
+            let again = made.values().map(|block| Sector::from_bytes(*block).number());
+            for number in elsewhere.filter_map(|(_, number)| *number).chain(again) {
+                only.remove(&number);
+            }
+        }
+        only.into_values().collect()
     }
 
     /// The columns that have parity and have lost no more sectors than can be made again: with the numbers of those.

@@ -435,6 +435,30 @@ fn sectors_that_parity_made_again_are_told_by_every_command() {
     assert!(said.contains("not counted") && said.contains("2 sectors had to be made again"), "{said}");
 }
 
+/// What follows lies in other blocks then, and parity makes some of it again: what lies in the place of that is read too.
+#[test]
+fn a_sector_that_was_put_between_others_costs_no_frame() {
+    let dir = copied(1, "");
+    let path = dir.path().join("copied/00001_00.HUM");
+    let whole = with_parity(&dir);
+    let blocks = whole.as_chunks::<BLOCK>().0;
+    let closed = blocks.iter().rposition(|block| Header::read(block).is_ok()).expect("a sector");
+    let frames = || {
+        let json = json(&attempt(dir.path(), "info --json copied"));
+        (json["logs"][0]["frames"].clone(), json["logs"][0]["gaps_count"].clone())
+    };
+    let before = frames();
+    // Of the eight columns none, some or all have lost more than the two that are made again.
+    for back in [3, 9, 12, 16, 18, 21, 24, 30] {
+        let mut longer = whole.clone();
+        let at = (closed - back) * BLOCK;
+        longer.splice(at..at, whole[18 * BLOCK..19 * BLOCK].to_vec());
+        fs::write(&path, longer).expect("written");
+        assert_eq!(frames(), before, "{back} sectors before the end");
+        run(dir.path(), "verify copied", 3);
+    }
+}
+
 /// What of a log's file is superseded, of another session or no sector is counted by `verify` as by `info`.
 #[test]
 fn blocks_that_do_not_count_are_counted_by_verify_and_info() {
