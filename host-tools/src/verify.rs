@@ -1,6 +1,6 @@
 //! `hums verify`: every check there is, each with what it looked at and what failed.
 
-use anyhow::Result;
+use anyhow::{Result, bail};
 use hums_blackbox::Cause;
 use hums_blackbox::record::Lost;
 use hums_core::time::Instant;
@@ -52,7 +52,7 @@ pub fn run(args: &cli::Verify) -> Result<Outcome> {
             image.not_looked_at().map_or(Ok(()), |words| output::line(&format!("  besides {words}")))?;
         }
     }
-    verify_each(&found, |overview: &Overview| {
+    let failed = verify_each(&found, |overview: &Overview| {
         let log = LogJson::new(overview);
         worst = worst.max(log.verdict);
         made_again += overview.ending.made_again();
@@ -68,7 +68,7 @@ pub fn run(args: &cli::Verify) -> Result<Outcome> {
         print(&log.checks)?;
         overview.ending.aside().map_or(Ok(()), |words| output::line(&format!("  {}", word(&words))))
     })?;
-    let worst = if ok { worst } else { Verdict::NotProved };
+    let worst = if ok && failed == 0 { worst } else { Verdict::NotProved };
     let ok = worst != Verdict::NotProved && made_again == 0;
     if let Some(list) = list {
         list.end_with("ok", &ok)?;
@@ -76,6 +76,9 @@ pub fn run(args: &cli::Verify) -> Result<Outcome> {
         let logs = count(logs, "session");
         let verdict = without_earlier.verdict(worst, made_again, found.has_passed_over());
         output::line(&format!("{logs}: {verdict}"))?;
+    }
+    if failed > 0 {
+        bail!("{failed} of {} could not be read", count(found.logs.len() as u64, "log"));
     }
     Ok(Outcome::lossy(!ok))
 }
@@ -121,14 +124,22 @@ impl WithoutEarlier {
     }
 }
 
-/// Reads all logs that were found through, and hands each on in their order, with what the others tell of it.
-pub fn verify_each(found: &Found, mut done: impl FnMut(&Overview) -> Result<()>) -> Result<()> {
+/// Reads all logs that were found through, and hands each on in their order, with what the others tell of it. Those that could not be
+/// read are told, and their number is given back.
+pub fn verify_each(found: &Found, mut done: impl FnMut(&Overview) -> Result<()>) -> Result<u64> {
     let named = found.logs.iter().map(|log| (log.name.as_str(), log));
     let mut followed = Followed::new(Sessions::of(named));
-    side_by_side(&found.logs, Overview::verified, |overview| {
-        followed.push(overview?).iter().try_for_each(&mut done)
+    let mut failed = 0;
+    side_by_side(&found.logs, Overview::verified, |overview| match overview {
+        Ok(overview) => followed.push(overview).iter().try_for_each(&mut done),
+        Err(error) => {
+            failed += 1;
+            note!("{error:#}");
+            Ok(())
+        }
     })?;
-    followed.finish().try_for_each(|overview| done(&overview))
+    followed.finish().try_for_each(|overview| done(&overview))?;
+    Ok(failed)
 }
 
 /// What can be said of a log.
@@ -365,4 +376,34 @@ fn losses_detail(log: &Overview) -> String {
         format!("{told} of unknown frames, {:.3} to {:.3} s", seconds(loss.from), seconds(loss.to))
     });
     words.collect::<Vec<_>>().join(", ")
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+
+    use hums_blackbox::Sector;
+
+    use super::*;
+
+    #[test]
+    fn a_log_that_cannot_be_read_keeps_no_other_from_being_read() {
+        let dir = tempfile::tempdir().expect("a folder");
+        for name in ["00001_00.HUM", "00002_00.HUM", "00003_00.HUM"] {
+            let mut bytes = [0; 512];
+            bytes[..2].copy_from_slice(&[0x48, 0xb2]);
+            let mut sector = Sector::from_bytes(bytes);
+            sector.seal(7);
+            fs::write(dir.path().join(name), sector.bytes()).expect("room");
+        }
+        let found = logs::find(&[dir.path().to_owned()], false).expect("three logs");
+        fs::remove_file(dir.path().join("00002_00.HUM")).expect("it is there");
+        let mut names = Vec::new();
+        let done = |log: &Overview| {
+            names.push(log.ending.name.clone());
+            Ok(())
+        };
+        assert_eq!(verify_each(&found, done).expect("two logs"), 1);
+        assert_eq!(names, ["00001", "00003"]);
+    }
 }

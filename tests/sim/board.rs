@@ -3,7 +3,7 @@
 
 use std::ffi::OsStr;
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
@@ -75,4 +75,21 @@ pub(crate) fn assert_on_card(log: &Path, card: &[u8]) {
     assert!(log.len() > 4_000 && log.len().is_multiple_of(512), "{} bytes", log.len());
     let first = card.chunks_exact(512).position(|block| block == &log[..512]).expect("its first sector");
     assert!(card[first * 512..].starts_with(&log), "the download differs from the card");
+}
+
+/// The first segment of the log of this number that `hums pull` has brought into a folder: its name has the session.
+pub(crate) fn pulled_log(folder: &Path, number: &str) -> PathBuf {
+    let all: Vec<PathBuf> = pulled_logs(folder, number);
+    assert_eq!(all.len(), 1, "{all:?}");
+    all[0].clone()
+}
+
+/// All of them, of several boxes and cards.
+pub(crate) fn pulled_logs(folder: &Path, number: &str) -> Vec<PathBuf> {
+    let entries = fs::read_dir(folder).into_iter().flatten().map(|entry| entry.unwrap().file_name());
+    let names = entries.map(|name| name.into_string().unwrap());
+    let is_it = |name: &String| name.starts_with(&format!("{number}-")) && name.ends_with("_00.HUM");
+    let mut all: Vec<PathBuf> = names.filter(is_it).map(|name| folder.join(name)).collect();
+    all.sort();
+    all
 }

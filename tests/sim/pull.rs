@@ -14,9 +14,10 @@ use hums_tests::live::Running;
 use hums_tests::program::{command, hums};
 use tempfile::TempDir;
 
-use crate::board::{Board, assert_on_card};
+use crate::board::{Board, assert_on_card, pulled_log, pulled_logs};
 
 const LOG: &str = "00001_00.HUM";
+const NUMBER: &str = "00001";
 
 /// A card with one finished session on it: this part of a recording. All such cards have logs of the same names.
 fn card(part: std::ops::Range<usize>, seed: &str) -> (TempDir, Vec<u8>) {
@@ -53,9 +54,18 @@ fn begin(board: &Board, output: &Path) -> PathBuf {
     let came = words.into_iter().find(|line| line.contains(" bytes")).expect("something comes");
     pull.signal("KILL");
     pull.end(Duration::from_secs(5));
-    let part = output.join(format!(".{LOG}.pull.hums-part"));
-    assert!(part.metadata().unwrap().len() > 5_000 && !output.join(LOG).exists(), "{came}");
+    let part = only_part(output);
+    assert!(part.metadata().unwrap().len() > 5_000 && pulled_logs(output, NUMBER).is_empty(), "{came}");
     part
+}
+
+/// What a download has begun in a folder.
+fn only_part(output: &Path) -> PathBuf {
+    let names = fs::read_dir(output).unwrap().map(|entry| entry.unwrap().path());
+    let is_part = |path: &PathBuf| path.to_string_lossy().ends_with("_00.HUM.pull.hums-part");
+    let parts: Vec<PathBuf> = names.filter(is_part).collect();
+    assert_eq!(parts.len(), 1, "{parts:?}");
+    parts[0].clone()
 }
 
 #[test]
@@ -64,58 +74,80 @@ fn two_cards_are_never_made_into_one_log() {
     let home = tempfile::tempdir().unwrap();
     let output = home.path().join("logs");
 
-    // Interrupted; then another card is in the box.
+    // Interrupted; then another card is in the box, whose log has the same name.
     let first = board(one);
     let part = begin(&first, &output);
     let kept = fs::read(&part).unwrap();
     let one = first.switch_off();
     let second = board(other);
-    let told = pull(&second, &output, &[LOG]).expect_code(&[0]).stderr;
-    assert!(told.contains("is of another log of this name, or was changed; it begins anew"), "{told}");
-    assert_on_card(&output.join(LOG), &other_card);
-    let whole = fs::read(output.join(LOG)).unwrap();
+    pull(&second, &output, &[LOG]).expect_code(&[0]);
+    let others = pulled_log(&output, NUMBER);
+    assert_on_card(&others, &other_card);
+    assert_eq!(fs::read(&part).unwrap(), kept);
 
-    // Back to the first card: what is there is not replaced, whatever its length.
+    // Back to the first card: where it had got to, it goes on, unless another run is at it.
     second.switch_off();
     let first = board(one);
-    for length in [whole.len(), 10_000] {
-        fs::write(output.join(LOG), &whole[..length]).unwrap();
-        let told = pull(&first, &output, &[LOG]).expect_code(&[1]).stderr;
-        assert!(told.contains("another log of the same name") && told.contains("-o"), "{told}");
-        assert_eq!(fs::read(output.join(LOG)).unwrap(), &whole[..length]);
+    let lock = fs::File::options().append(true).open(&part).unwrap();
+    lock.lock().unwrap();
+    let told = pull(&first, &output, &[LOG]).expect_code(&[1]).stderr;
+    assert!(told.contains("another run of hums is writing it; wait for its end"), "{told}");
+    drop(lock);
+    let told = pull(&first, &output, &[LOG]).expect_code(&[0]).stderr;
+    assert!(told.contains(&format!("goes on after {} bytes", kept.len())), "{told}");
+    let both = pulled_logs(&output, NUMBER);
+    let log = both.iter().find(|log| **log != others).expect("both are there").clone();
+    assert_eq!(both.len(), 2, "{both:?}");
+    assert_on_card(&log, &one_card);
+    assert_on_card(&others, &other_card);
+    let said = pull(&first, &output, &[LOG]).expect_code(&[0]);
+    assert!(said.stderr.contains("is there already") && said.stdout.is_empty(), "{}", said.stderr);
+
+    // Each is a log of its own to whoever reads the folder, named as what is made of it.
+    let folder = output.to_str().unwrap();
+    let read = hums(["info", "--json", folder]).expect_code(&[0]);
+    let read: serde_json::Value = serde_json::from_slice(&read.stdout).unwrap();
+    assert_eq!(read["logs"].as_array().unwrap().len(), 2, "{read}");
+    let made = home.path().join("made");
+    hums(["decode", folder, "-o", made.to_str().unwrap(), "--format", "tlog"]).expect_code(&[0]);
+    for log in &both {
+        let name = log.file_name().unwrap().to_str().unwrap().strip_suffix("_00.HUM").unwrap();
+        assert!(made.join(format!("{name}.tlog")).exists(), "{name}");
     }
 
-    // Where it had got to, it goes on.
-    let apart = home.path().join("apart");
-    fs::create_dir(&apart).unwrap();
-    fs::write(apart.join(format!(".{LOG}.pull.hums-part")), &kept).unwrap();
-    let told = pull(&first, &apart, &[LOG]).expect_code(&[0]).stderr;
-    assert!(told.contains(&format!("goes on after {} bytes", kept.len())), "{told}");
-    assert_on_card(&apart.join(LOG), &one_card);
-    let told = pull(&first, &apart, &[LOG]).expect_code(&[0]).stderr;
-    assert!(told.contains("is there already"), "{told}");
+    // One bit of it is another one, or there is something behind it, or in the middle: it may be evidence of something.
+    let whole = fs::read(&log).unwrap();
+    let flipped = |at: usize| {
+        let mut spoiled = whole.clone();
+        spoiled[at] ^= 1;
+        spoiled
+    };
+    for (spoiled, words) in [
+        (flipped(600), "differs from the board's log (the same session by its name)"),
+        (flipped(whole.len() / 2), "differs from the board's log"),
+        ([&whole[..], &[0; 5]].concat(), "begins as the board's log, and has 5 bytes more than that has"),
+        (fs::read(&others).unwrap()[..10_000].to_vec(), "differs from the board's log"),
+    ] {
+        fs::write(&log, &spoiled).unwrap();
+        let told = pull(&first, &output, &[LOG]).expect_code(&[1]).stderr;
+        assert!(told.contains(words), "{told}");
+        assert_eq!(fs::read(&log).unwrap(), spoiled);
+    }
+}
 
-    // One bit of it is another one: it is no other card's.
-    let log = apart.join(LOG);
-    let mut spoiled = fs::read(&log).unwrap();
-    spoiled[600] ^= 1;
-    fs::write(&log, &spoiled).unwrap();
-    let told = pull(&first, &apart, &[LOG]).expect_code(&[1]).stderr;
-    assert!(told.contains("differs from the board's log (the same session)"), "{told}");
-    spoiled[600] ^= 1;
-
-    // All of it, and something behind it.
-    fs::write(&log, [&spoiled[..], &[0; 5]].concat()).unwrap();
-    let told = pull(&first, &apart, &[LOG]).expect_code(&[1]).stderr;
-    assert!(told.contains("begins as the board's log, and has 5 bytes more than that has"), "{told}");
-    assert_eq!(fs::read(&log).unwrap().len(), spoiled.len() + 5);
-
-    // The same length, and one byte that is another one.
-    let middle = spoiled.len() / 2;
-    spoiled[middle] ^= 1;
-    fs::write(&log, &spoiled).unwrap();
-    pull(&first, &apart, &[LOG]).expect_code(&[1]);
-    assert_eq!(fs::read(&log).unwrap(), spoiled, "it may be evidence of something");
+/// A board's card may be damaged: that is told each time, also where its log is there already.
+#[test]
+fn what_is_there_already_is_checked_as_what_comes_is() {
+    let (dir, mut card) = card(0..30_000, "1");
+    let first = card.chunks(512).position(|block| block.starts_with(&[0x48, 0xb2])).unwrap();
+    card[(first + 3) * 512 + 100] ^= 1;
+    fs::write(dir.path().join("card.img"), &card).unwrap();
+    let board = board(dir);
+    let home = tempfile::tempdir().unwrap();
+    for words in ["bytes", "is there already"] {
+        let told = pull(&board, home.path(), &[LOG]).expect_code(&[3]).stderr;
+        assert!(told.contains(words) && told.contains("`hums verify` says more"), "{told}");
+    }
 }
 
 #[test]
@@ -123,21 +155,21 @@ fn a_log_in_work_that_has_grown_is_completed() {
     let (dir, _) = card(0..80_000, "1");
     let board = board(dir);
     let home = tempfile::tempdir().unwrap();
-    let log = home.path().join("00002_00.HUM");
     let name = ["00002_00.HUM"];
     let start = Instant::now();
-    let first = loop {
+    let log = loop {
         pull(&board, home.path(), &name).expect_code(&[0]);
-        if let Ok(first) = fs::read(&log) {
-            break first;
+        if let Some(log) = pulled_logs(home.path(), "00002").pop() {
+            break log;
         }
         assert!(start.elapsed() < Duration::from_secs(30), "nothing is recorded");
         std::thread::sleep(Duration::from_millis(500));
     };
+    let first = fs::read(&log).unwrap();
     std::thread::sleep(Duration::from_secs(5));
     let told = pull(&board, home.path(), &name).expect_code(&[0]).stderr;
     assert!(told.contains(&format!("goes on after {} bytes", first.len())), "{told}");
-    let second = fs::read(&log).unwrap();
+    let second = fs::read(pulled_log(home.path(), "00002")).unwrap();
     assert!(second.len() > first.len() && second.starts_with(&first));
     let dir = board.switch_off();
     assert_on_card(&log, &fs::read(dir.path().join("card.img")).unwrap());
@@ -206,20 +238,21 @@ fn a_board_that_computes_no_checksum_is_read_whole_and_what_its_sectors_say_coun
         let address = format!("udpout:127.0.0.1:{port}");
         hums(["pull", "--link", &address, LOG, "-o", output.to_str().unwrap()])
     };
-    // What a kill has left before anything came is of no other log.
-    fs::create_dir(&output).unwrap();
-    let part = output.join(format!(".{LOG}.pull.hums-part"));
+    let told = pull().expect_code(&[0]).stderr;
+    assert!(told.contains("the board's firmware computes no checksum"), "{told}");
+    let log = pulled_log(&output, NUMBER);
+    assert_on_card(&log, &card);
+    let part = log.with_file_name(format!(".{}.pull.hums-part", log.file_name().unwrap().to_str().unwrap()));
+    // What a kill has left before anything came is no change of anything.
+    let whole = fs::read(&log).unwrap();
+    fs::remove_file(&log).unwrap();
     fs::write(&part, "").unwrap();
     let told = pull().expect_code(&[0]).stderr;
-    assert!(
-        told.contains("the board's firmware computes no checksum") && !told.contains("another log"),
-        "{told}"
-    );
-    assert_on_card(&output.join(LOG), &card);
+    assert!(!told.contains("was changed"), "{told}");
+    assert_eq!(fs::read(&log).unwrap(), whole);
 
     // It goes on with what has the same ends; that its middle was changed, the sectors tell.
-    let whole = fs::read(output.join(LOG)).unwrap();
-    fs::remove_file(output.join(LOG)).unwrap();
+    fs::remove_file(&log).unwrap();
     let mut begun = whole[..whole.len() - 1024].to_vec();
     let middle = begun.len() / 2 + 100;
     begun[middle] ^= 1;

@@ -83,8 +83,8 @@ const PULL_EXAMPLES: &str = "Examples:
   hums pull --link udpin:0.0.0.0:14550 -o logs --last 1
   hums pull --link tcp:192.168.1.5:5760 -o logs 00001_00.HUM
 
-A file that is there already is left if it is the same log by its checksum. One that was begun (.NAME.pull.hums-part) is gone
-on with, once the board has confirmed that it is the beginning of its log. Exit code 3: a log came as it is on the card,
+Names of files say whose log it is: 00001-box3f0042000d51373435363338-s1a2b3c4d_00.HUM. One that is there already is left if it
+is the same by its checksum, and checked as a new one is. One that was begun (.NAME.pull.hums-part) is gone on with, once the board has confirmed that it is the beginning of its log. Exit code 3: a log came as it is on the card,
 and has damage there.";
 
 /// `hums pull`
@@ -97,7 +97,7 @@ pub struct Pull {
     /// The directory for the logs; made when missing
     #[arg(short, long, value_name = "DIR")]
     pub output: PathBuf,
-    /// Only these, by name
+    /// Only these, by the names that the board has for them
     #[arg(value_name = "NAME")]
     pub names: Vec<String>,
     /// Only the newest so many

@@ -1,12 +1,9 @@
-//! What a session's files are called. A name says whose session it is, so that no other one's files ever have it:
-//! `00042-box3f0042000d51373435363338-s1a2b3c4d` is the card's log 00042 of the board with that unique id, and the session
-//! that its sectors name. What is not known is left out: a packed log has no board.
+//! What the files are called that are made of a session: by the name that says whose it is ([`crate::logs::naming`]).
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result};
-use hums_recorder::LogName;
 use sha2::{Digest as _, Sha256};
 
 use crate::files::{Folder, add_ends, digest, short};
@@ -15,6 +12,7 @@ use crate::logs::Log;
 use crate::logs::board::{HEADING_GROUPS, board_of};
 use crate::logs::fingerprint::{Fingerprint, Fingerprinter};
 use crate::logs::groups::Groups;
+use crate::logs::naming::{segment_name, session_name};
 use crate::logs::sessions::Sessions;
 use crate::source::recording::Place;
 
@@ -63,16 +61,7 @@ impl Traits {
                 .identity(place)
                 .map_or_else(|| place.name.clone(), |of| format!("{}-{of}", file_name(place)));
         };
-        let mut name = base(log);
-        if let Some(board) = self.board {
-            name.push_str("-box");
-            name.push_str(&hex(&board));
-        }
-        if let Some(of) = self.identity(place) {
-            name.push('-');
-            name.push_str(&of);
-        }
-        name
+        session_name(&base(log), self.board.as_ref(), self.session)
     }
 
     /// What the names of its files end with: the session of a log of ours, `s1a2b3c4d`; of another recording a number made
@@ -195,8 +184,7 @@ fn base(log: &Log) -> String {
     let file = log.files.first().map_or(log.name.as_str(), String::as_str);
     let path = Path::new(file);
     let stem = path.file_stem().map_or_else(|| "log".to_owned(), |stem| stem.to_string_lossy().into_owned());
-    let segment = LogName::from_short(stem.to_ascii_uppercase().as_bytes(), b"HUM");
-    segment.map_or(stem, |segment| format!("{:05}", segment.session))
+    segment_name(path).map_or(stem, |segment| format!("{:05}", segment.session))
 }
 
 #[cfg(test)]

@@ -80,6 +80,13 @@ impl Folder {
             check(path)?;
         }
         let replaces = inputs.may_replace(path);
+        if replaces && !is_free && is_around_us(&target) {
+            bail!(
+                "{}: is the folder in which this runs, and would be moved away from under it; nothing was replaced; run it from \
+                 another folder",
+                path.display()
+            );
+        }
         let to = if is_free || replaces { To::Part(Part::begin(path, target, replaces)?) } else { To::There };
         let (path, made_of) = (path.to_owned(), made_of.to_owned());
         Ok(Self { path, made_of, files: Mutex::default(), to })
@@ -270,6 +277,12 @@ impl Write for FolderFile {
             FileTo::There(_) => Ok(()),
         }
     }
+}
+
+/// Whether this program runs in a folder, or in one within it: relative paths lead elsewhere once that was renamed.
+fn is_around_us(folder: &Path) -> bool {
+    let ours = std::env::current_dir().and_then(fs::canonicalize);
+    ours.is_ok_and(|ours| fs::canonicalize(folder).is_ok_and(|folder| ours.starts_with(folder)))
 }
 
 /// Refuses what is no folder of tables.

@@ -4,7 +4,7 @@ pub mod json;
 pub mod text;
 mod wear;
 
-use anyhow::Result;
+use anyhow::{Result, bail};
 
 use crate::check;
 use crate::cli;
@@ -12,6 +12,7 @@ use crate::followed::Followed;
 use crate::logs::side_by_side::side_by_side;
 use crate::outcome::Outcome;
 use crate::output;
+use crate::plural::count;
 use crate::source::find::{find, sessions_of};
 use crate::summary::Overview;
 use json::{LogJson, images_json};
@@ -41,14 +42,24 @@ pub fn run(args: &cli::Info) -> Result<Outcome> {
         output::line(text(overview).trim_end())?;
         output::line("")
     };
-    side_by_side(&found.places, check::overview, |overview| {
-        followed.push(overview?).iter().try_for_each(&mut done)
+    let (mut failed, is_one) = (0_u64, found.places.len() == 1);
+    side_by_side(&found.places, check::overview, |overview| match overview {
+        Ok(overview) => followed.push(overview).iter().try_for_each(&mut done),
+        Err(error) if is_one => Err(error),
+        Err(error) => {
+            failed += 1;
+            note!("{error:#}");
+            Ok(())
+        }
     })?;
     followed.finish().try_for_each(|overview| done(&overview))?;
     if let Some(list) = list {
         list.end()?;
     } else if found.places.is_empty() {
         output::line("no log is on it")?;
+    }
+    if failed > 0 {
+        bail!("{failed} of {} could not be read", count(found.places.len() as u64, "log"));
     }
     Ok(outcome)
 }

@@ -16,7 +16,7 @@ pub fn board_of(group: &[Step]) -> Option<Board> {
 }
 
 /// The id that the first record of a start has, which is zeros where there is no board.
-pub(super) fn heading(group: &[Step]) -> Option<Board> {
+pub fn heading(group: &[Step]) -> Option<Board> {
     find_boot(group, |boot| Some(boot.uid))
 }
 

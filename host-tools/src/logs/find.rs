@@ -5,13 +5,13 @@ use std::fs::{self, Metadata};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result, bail};
-use hums_recorder::LogName;
 
 use super::card::{image, whole_file};
 use super::folder::directory;
 pub use super::found::{Found, Image, REMARKS_MAX};
 pub use super::look::{Content, look};
-use super::places::{Log, segment_name};
+use super::naming::{SegmentName, segment_name};
+use super::places::Log;
 use crate::files::{is_seekable, why_unread};
 
 /// Finds all logs in `inputs`; with `salvage` by looking at every block of an image, whatever its file system says. An
@@ -107,7 +107,7 @@ fn named_file(path: &Path, salvage: bool, found: &mut Found) -> Result<()> {
 }
 
 /// The segments that were named one by one, by folder.
-type Segments = BTreeMap<PathBuf, Vec<(LogName, Log)>>;
+type Segments = BTreeMap<PathBuf, Vec<(SegmentName, Log)>>;
 
 /// The folder in which a file is, however that is spelled.
 fn folder_of(path: &Path) -> PathBuf {
@@ -129,10 +129,14 @@ fn as_in_folders(segments: Segments) -> Vec<Log> {
             1 => format!("{name}/"),
             count => format!("{name}-{count}/"),
         };
-        segments.sort_by_key(|(name, _)| *name);
+        segments.sort_by(|(one, _), (other, _)| one.cmp(other));
+        let mut before = None;
         for (segment, mut log) in segments {
-            log.name = format!("{prefix}{:05}", segment.session);
-            match logs.last_mut().filter(|last| last.name == log.name) {
+            log.name = format!("{prefix}{}", segment.log());
+            let session = Some((segment.of, segment.session));
+            let is_same = before == session;
+            before = session;
+            match logs.last_mut().filter(|_| is_same) {
                 Some(last) => {
                     last.files.append(&mut log.files);
                     last.pieces.append(&mut log.pieces);

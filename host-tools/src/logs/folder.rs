@@ -7,12 +7,12 @@ use std::fs::{self, FileType};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result, bail};
-use hums_recorder::LogName;
 
 use super::card::{image, is_card, whole_file};
 use super::found::{Found, LOGS_MAX};
 use super::look::{Content, look};
-use super::places::{Log, segment_name};
+use super::naming::{SegmentName, segment_name};
+use super::places::Log;
 use crate::files::why_unread;
 
 /// Folders deeper than this are not walked.
@@ -30,8 +30,8 @@ const PACKED: [&str; 5] = [".gz", ".xz", ".zst", ".bz2", ".zip"];
 /// What lies in a folder and may be ours.
 #[derive(Default)]
 struct Entries {
-    /// Segments by session.
-    sessions: BTreeMap<u32, Vec<(LogName, PathBuf)>>,
+    /// Segments by session: whose it is, and its number.
+    sessions: BTreeMap<(String, u32), Vec<(SegmentName, PathBuf)>>,
     segments: usize,
     /// Logs and images.
     files: Vec<PathBuf>,
@@ -42,7 +42,13 @@ struct Entries {
 pub(super) fn directory(root: &Path, salvage: bool, found: &mut Found) -> Result<()> {
     let mut waiting = vec![(root.to_owned(), 0)];
     while let Some((dir, depth)) = waiting.pop() {
-        let Entries { sessions, mut files, mut folders, .. } = entries(&dir, found)?;
+        let Entries { sessions, mut files, mut folders, .. } = match entries(&dir, found) {
+            Err(error) if depth > 0 => {
+                found.leave_out(format!("{error:#}"));
+                continue;
+            }
+            entries => entries?,
+        };
         files.sort();
         folders.sort();
         for path in files {
@@ -63,10 +69,10 @@ pub(super) fn directory(root: &Path, salvage: bool, found: &mut Found) -> Result
             }
         }
         let prefix = dir.strip_prefix(root).unwrap_or(Path::new("")).to_string_lossy().into_owned();
-        for (session, mut segments) in sessions {
+        for mut segments in sessions.into_values() {
             segments.sort();
-            let name =
-                if prefix.is_empty() { format!("{session:05}") } else { format!("{prefix}/{session:05}") };
+            let name = segments.first().map_or_else(String::new, |(segment, _)| segment.log());
+            let name = if prefix.is_empty() { name } else { format!("{prefix}/{name}") };
             let mut log =
                 Log { name, files: Vec::new(), pieces: Vec::new(), session: None, left_over: false };
             for (_, path) in segments {
@@ -77,9 +83,13 @@ pub(super) fn directory(root: &Path, salvage: bool, found: &mut Found) -> Result
                     ));
                     continue;
                 }
-                let segment = whole_file(&path)?;
-                log.files.extend(segment.files);
-                log.pieces.extend(segment.pieces);
+                match whole_file(&path) {
+                    Ok(segment) => {
+                        log.files.extend(segment.files);
+                        log.pieces.extend(segment.pieces);
+                    }
+                    Err(error) => found.leave_out(format!("{error:#}")),
+                }
             }
             if !log.pieces.is_empty() {
                 found.log(log);
@@ -120,7 +130,8 @@ impl Entries {
             (Ok(content), Some(_)) if content != Content::Log && path.extension().is_none() => {}
             (Ok(_), Some(name)) if self.segments < SEGMENTS_MAX => {
                 self.segments += 1;
-                self.sessions.entry(name.session).or_default().push((name, path));
+                let session = (name.of.clone(), name.session);
+                self.sessions.entry(session).or_default().push((name, path));
             }
             (Ok(_), Some(_)) => {
                 found.leave_out(format!("{shown}: is left out: there are too many segments"));

@@ -1,7 +1,8 @@
 //! What the command line calls LOG, IMAGE and DIR, and the logs in it.
 //!
 //! A log is what the monitor recorded in one session on one card. On the card it is a row of segments
-//! (`00042_00.HUM`, `00042_01.HUM`, …); copied off the card the same files, in a directory; packed, one file.
+//! (`00042_00.HUM`, `00042_01.HUM`, …); copied off the card the same files, in a directory; pulled, these with the session in their
+//! names (`naming`); packed, one file.
 //! Whatever it was, here it is a list of places to read blocks of 512 bytes from.
 
 pub mod begun_anew;
@@ -18,6 +19,7 @@ mod joined;
 mod late;
 mod look;
 pub mod marks;
+pub mod naming;
 pub mod places;
 pub mod reader;
 mod repair;
@@ -29,7 +31,8 @@ pub mod strangers;
 pub use card::{Room, damage, is_card, on_card, room};
 pub use find::{Content, Found, find};
 pub use folder::{is_named_as_log, passed_over};
-pub use places::{Log, Piece, segment_name};
+pub use naming::segment_name;
+pub use places::{Log, Piece};
 
 impl Found {
     /// All files in which something was found.

@@ -4,9 +4,9 @@ use std::fs::File;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
-use hums_recorder::LogName;
 
 use super::fat::{Extent, ReadAt as _};
+use super::naming::segment_name;
 
 /// Bytes of a block: a sector of the log.
 pub const BLOCK_BYTES: usize = 512;
@@ -62,13 +62,6 @@ impl Log {
     pub fn blocks(&self) -> Blocks<'_> {
         Blocks { log: self, piece: 0, extent: 0, offset: 0, begun: 0, file: None, buffer: Vec::new(), at: 0 }
     }
-}
-
-/// The segment that a file's name says it is: `00042_07.HUM` in any case of letters, also where the ending was lost.
-pub fn segment_name(path: &Path) -> Option<LogName> {
-    let name = path.file_name()?.to_str()?.to_ascii_uppercase();
-    let (base, extension) = name.split_once('.').unwrap_or((&name, "HUM"));
-    LogName::from_short(base.as_bytes(), extension.as_bytes())
 }
 
 /// Streams a log's blocks. A last part of less than a block is padded with zeros: it is damaged either way.

@@ -114,8 +114,8 @@ fn are_of_one_card(one: &Place, other: &Place) -> bool {
     let Some((one, other)) = one.own().zip(other.own()) else { return false };
     let image = |log: &Log| log.pieces.first().map(|piece| piece.path.clone());
     let folder = |log: &Log| {
-        let first = log.pieces.first().map(|piece| piece.path.as_path());
-        first.filter(|path| segment_name(path).is_some()).and_then(Path::parent).map(Path::to_owned)
+        let first = log.pieces.first().map(|piece| piece.path.as_path())?;
+        Some((segment_name(first)?.recorder().to_owned(), first.parent()?.to_owned()))
     };
     image(one) == image(other) || folder(one).is_some() && folder(one) == folder(other)
 }

@@ -338,7 +338,8 @@ impl Walk {
         inside.sort();
         for (path, is_folder) in inside {
             if is_folder {
-                self.folder(&path, depth + 1)?;
+                // That one cannot be read is told with our own logs.
+                let _ = self.folder(&path, depth + 1);
             } else {
                 self.paths.push(path);
             }

@@ -459,6 +459,25 @@ fn a_sector_that_was_put_between_others_costs_no_frame() {
     }
 }
 
+#[test]
+fn a_folder_that_cannot_be_read_keeps_nothing_else_from_being_read() {
+    let dir = copied(1, "");
+    // No system reads a path this long: it is made of two halves.
+    let half = |name: &str| {
+        let root = dir.path().join(name);
+        let deep = (0..8).fold(root.clone(), |path, _| path.join("x".repeat(255)));
+        fs::create_dir_all(&deep).expect("made");
+        (root, deep)
+    };
+    let ((_, first), (second, _)) = (half("copied"), half("half"));
+    fs::rename(second, first.join("x".repeat(255))).expect("moved");
+    for (command, code, said) in readers(dir.path(), "copied") {
+        assert_eq!(code, 3, "{command}: {said}");
+        assert!(said.contains("x: cannot be read"), "{command}: {said}");
+    }
+    assert!(text(&run(dir.path(), "info copied", 3)).contains("ended in order"));
+}
+
 /// What of a log's file is superseded, of another session or no sector is counted by `verify` as by `info`.
 #[test]
 fn blocks_that_do_not_count_are_counted_by_verify_and_info() {

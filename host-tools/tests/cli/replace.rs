@@ -360,3 +360,17 @@ fn tables_that_would_lie_below_a_file_are_refused_in_every_format() {
     }
     assert_eq!(fs::read(dir.path().join("notes.txt")).expect("there"), b"mine");
 }
+
+#[test]
+fn the_folder_in_which_it_runs_is_not_replaced() {
+    let dir = tempfile::tempdir().expect("directory");
+    run(dir.path(), "pack PX4 -o log.hum", 0);
+    run(dir.path(), "decode log.hum -o out --format csv --to 30", 0);
+    let inside = dir.path().join("out").join(named(&dir.path().join("out"), "log"));
+    let before = contents(dir.path());
+    let said = run(&inside, "decode ../../log.hum -o .. --format csv --to 20 --replace", 1);
+    let said = String::from_utf8_lossy(&said.stderr).into_owned();
+    assert!(said.contains("nothing was replaced; run it from another folder"), "{said}");
+    assert_eq!(contents(dir.path()), before);
+    run(&dir.path().join("out"), "decode ../log.hum -o . --format csv --to 20 --replace", 0);
+}

@@ -6,16 +6,18 @@ use std::io::{self, Read as _, Seek as _, SeekFrom};
 use std::path::Path;
 
 use anyhow::{Context as _, Result};
-use hums_blackbox::Header;
+use hums_blackbox::{Header, Sector, Step};
 use hums_link::ftp;
 
 use super::ftp::Ftp;
+use crate::logs::board::heading;
+use crate::logs::naming::{segment_name, session_name};
 
 /// What is compared where the board computes no checksum: the first sector, which names its session by a random number,
 /// and the last one.
 const SECTOR: u32 = 512;
-/// Sectors of a file that are searched for one that is sound.
-const LOOK_SECTORS: u32 = 128;
+/// A file begins with the record of who records, behind at most three sectors of a group that was begun before.
+const HEADING_SECTORS: u32 = 8;
 
 /// What a comparison says.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -45,38 +47,48 @@ pub(super) fn compare(ftp: &mut Ftp, name: &str, path: &Path, bytes: u32) -> Res
         file.seek(SeekFrom::Start(u64::from(start)))
             .and_then(|_| file.read_exact(&mut ours))
             .with_context(|| format!("{}: cannot be read", path.display()))?;
-        let mut theirs = Vec::new();
-        while theirs.len() < ours.len() {
-            let had = theirs.len() as u32;
-            theirs.extend(ftp.piece(start + had, wanted - had)?);
-        }
-        if ours != theirs {
+        if ours != bytes_of(ftp, start, wanted)? {
             return Ok(Likeness::Other);
         }
     }
     Ok(Likeness::SameEnds)
 }
 
-/// Whether a file holds sectors of the session that the board's log that is open begins with. A session's number is random.
-pub(super) fn is_same_session(ftp: &mut Ftp, path: &Path) -> Result<bool> {
-    let mut theirs = Vec::new();
-    while theirs.len() < SECTOR as usize {
-        let had = theirs.len() as u32;
-        theirs.extend(ftp.piece(had, SECTOR - had)?);
-    }
-    let theirs = theirs.first_chunk().and_then(|sector| Header::read(sector).ok());
-    let Some(theirs) = theirs else { return Ok(false) };
-    let mut file = File::open(path).with_context(|| format!("{}: cannot be read", path.display()))?;
-    let mut sector = [0; SECTOR as usize];
-    for _ in 0..LOOK_SECTORS {
-        if file.read_exact(&mut sector).is_err() {
+/// What the board's log that is open and has so many bytes is called here: by the session that its first sectors name, and the box that
+/// its record of the start does.
+pub(super) fn file_name(ftp: &mut Ftp, name: &str, length: u32) -> Result<String> {
+    let Some(segment) = segment_name(Path::new(name)) else { return Ok(name.to_owned()) };
+    let (mut session, mut board) = (None, None);
+    let mut group = Vec::new();
+    for at in (0..HEADING_SECTORS).map(|sector| sector * SECTOR).filter(|at| *at + SECTOR <= length) {
+        let bytes = bytes_of(ftp, at, SECTOR)?;
+        let Some(sector) = bytes.first_chunk().map(|bytes| Sector::from_bytes(*bytes)) else { continue };
+        let Ok(header) = Header::read(sector.bytes()) else { continue };
+        if *session.get_or_insert(header.session) != header.session {
+            continue;
+        }
+        if header.starts_group() {
+            group.clear();
+        }
+        group.push(Step { header, sector, missing: 0, damaged: 0 });
+        board = heading(&group);
+        if board.is_some() {
             break;
         }
-        if let Ok(ours) = Header::read(&sector) {
-            return Ok(ours.session == theirs.session);
-        }
     }
-    Ok(false)
+    let board = board.filter(|board| *board != [0; 12]);
+    let session = session_name(&format!("{:05}", segment.session), board.as_ref(), session);
+    Ok(format!("{session}_{:02}.HUM", segment.segment))
+}
+
+/// These bytes of the board's log that is open.
+fn bytes_of(ftp: &mut Ftp, start: u32, wanted: u32) -> Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    while bytes.len() < wanted as usize {
+        let had = bytes.len() as u32;
+        bytes.extend(ftp.piece(start + had, wanted - had)?);
+    }
+    Ok(bytes)
 }
 
 fn checksum(file: &mut File, bytes: u32) -> io::Result<u32> {

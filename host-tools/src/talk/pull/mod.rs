@@ -1,20 +1,20 @@
 //! `hums pull`: the board's logs over MAVLink FTP, burst by burst; what a burst lost is read piece by piece.
 //!
 //! A download that was interrupted is gone on with, once what is there was compared with the beginning of the board's
-//! log (by its checksum, or where the board's firmware computes none by its ends); at the end the whole is compared, and read through as `hums verify` does. A file that is there already is
-//! left only if it is the same log.
+//! log (by its checksum, or where the board's firmware computes none by its ends); at the end the whole is compared, and read through as
+//! `hums verify` does, also where it is there already. A file's name says whose session it is, so that those of two cards never meet.
 
 mod compare;
 mod ftp;
 
 use std::fs::File;
 use std::io::{self, Read as _, Write as _};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result, bail};
 use hums_blackbox::{Cause, Gap};
 
-use self::compare::{Likeness, compare, is_same_session};
+use self::compare::{Likeness, compare, file_name};
 use self::ftp::Ftp;
 use super::Client;
 use crate::cli;
@@ -43,37 +43,40 @@ pub fn run(args: &cli::Pull) -> Result<Outcome> {
     let mut out = Stdout::new();
     let mut outcome = Outcome::Done;
     for (name, _) in logs.split_off(logs.len() - newest) {
-        let path = args.output.join(&name);
-        if !pull(&mut ftp, &name, &path).with_context(|| name.clone())? {
+        let Some((path, is_new)) = pull(&mut ftp, &name, &args.output).with_context(|| name.clone())? else {
             continue;
-        }
+        };
         outcome = outcome.and(verify(&name, &path)?);
-        writeln!(out, "{}", path.display())?;
-        out.flush()?;
+        if is_new {
+            writeln!(out, "{}", path.display())?;
+            out.flush()?;
+        } else {
+            note!("{name}: is there already as {}: the same by its checksum", path.display());
+        }
     }
     Ok(outcome)
 }
 
-/// Brings a log; `false` where it is there already.
-fn pull(ftp: &mut Ftp, name: &str, path: &Path) -> Result<bool> {
+/// Brings a log: where it is, and whether it was not there already; none where nothing is in it.
+fn pull(ftp: &mut Ftp, name: &str, output: &Path) -> Result<Option<(PathBuf, bool)>> {
     let length = ftp.open(name)?;
     if length == 0 {
         note!("{name}: nothing is recorded in it yet");
-        return Ok(false);
+        return Ok(None);
     }
-    let there = there(ftp, name, path, length)?;
+    let path = output.join(file_name(ftp, name, length)?);
+    let there = there(ftp, name, &path, length)?;
     if there == There::Whole {
-        note!("{name}: is there already");
-        return Ok(false);
+        return Ok(Some((path, false)));
     }
-    let (mut file, _) = Output::resume(path)?;
+    let (mut file, _) = Output::resume(&path)?;
     let (mut have, mut likeness) = begun(ftp, name, &mut file, length)?;
     if let There::Beginning(bytes) = there
         && have < bytes
     {
         file.begin_anew()?;
-        let mut shorter = File::open(path)?.take(u64::from(bytes));
-        settle(io::copy(&mut shorter, &mut file).map(|_| ()), path)?;
+        let mut shorter = File::open(&path)?.take(u64::from(bytes));
+        settle(io::copy(&mut shorter, &mut file).map(|_| ()), &path)?;
         (have, likeness) = (bytes, Likeness::Same);
     }
     if have > 0 {
@@ -96,7 +99,7 @@ fn pull(ftp: &mut Ftp, name: &str, path: &Path) -> Result<bool> {
         }
     }
     file.finish()?;
-    Ok(true)
+    Ok(Some((path, true)))
 }
 
 /// What is on this PC already under the log's name.
@@ -126,13 +129,9 @@ fn there(ftp: &mut Ftp, name: &str, path: &Path, length: u32) -> Result<There> {
         Likeness::Same => Ok(There::Whole),
         // Not proved: it comes once more, and takes the place of what is there when it is whole.
         Likeness::SameEnds => Ok(There::Nothing),
-        Likeness::Other if is_same_session(ftp, path)? => bail!(
-            "{} differs from the board's log (the same session): damaged or changed here; move it away, or name another \
-             directory with -o",
-            path.display()
-        ),
         Likeness::Other => bail!(
-            "{} is another log of the same name, of another card or another board; name another directory with -o",
+            "{} differs from the board's log (the same session by its name): damaged or changed here; move it away, or name \
+             another directory with -o",
             path.display()
         ),
     }
@@ -148,10 +147,7 @@ fn begun(ftp: &mut Ftp, name: &str, file: &mut Output, length: u32) -> Result<(u
         return Ok((bytes, likeness));
     }
     let aside = file.set_aside()?;
-    note!(
-        "{name}: what was begun is of another log of this name, or was changed; it begins anew, and that stays as {}",
-        aside.display()
-    );
+    note!("{name}: what was begun was changed; it begins anew, and that stays as {}", aside.display());
     Ok((0, likeness))
 }
 
@@ -217,6 +213,7 @@ fn verify(name: &str, path: &Path) -> Result<Outcome> {
         let gaps = overview.ending.summary.gaps - u64::from(is_further && begins_later);
         let wrong = [
             (blocks.damaged, "damaged sectors"),
+            (overview.ending.made_again(), "sectors that had to be made again from parity"),
             (blocks.misplaced.saturating_sub(behind.misplaced), "sectors where others belong"),
             (blocks.stale.saturating_sub(behind.stale), "sectors of another session"),
             (blocks.foreign.saturating_sub(behind.foreign), "blocks that are no sectors"),

@@ -1,0 +1,107 @@
+//! What the files of a log are called. On a card that is its number alone: `00042_07.HUM`. Elsewhere the name says whose session it is, so
+//! that no other one's files ever have it: `00042-box3f0042000d51373435363338-s1a2b3c4d_07.HUM` is the same segment of the card's log
+//! 00042 of the board with that unique id, and the session that its sectors name.
+
+use std::path::Path;
+
+use hums_recorder::LogName;
+
+use super::board::Board;
+use crate::hex::hex;
+
+/// The digits of a session.
+const SESSION_DIGITS: usize = 8;
+
+/// The name of a session: what it is called on its card, and whose it is. What is not known is left out: a packed log has no
+/// board.
+pub fn session_name(on_card: &str, board: Option<&Board>, session: Option<u32>) -> String {
+    let board = board.map_or_else(String::new, |board| format!("-box{}", hex(board)));
+    let session = session.map_or_else(String::new, |session| format!("-s{session:08x}"));
+    format!("{on_card}{board}{session}")
+}
+
+/// The segment that a file's name says it is.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct SegmentName {
+    /// Whose session it is, `box3f0042000d51373435363338-s1a2b3c4d`; empty where the name is that of a card.
+    pub of: String,
+    /// The session's number on its card.
+    pub session: u32,
+    /// The segment within the session.
+    pub segment: u32,
+}
+
+impl SegmentName {
+    /// The box, where the name tells it: the logs of one box are read as those of one card.
+    pub fn recorder(&self) -> &str {
+        self.of.rsplit_once('-').map_or("", |(recorder, _)| recorder)
+    }
+
+    /// The log's name for people: `00042`, behind that of its box where the name tells it.
+    pub fn log(&self) -> String {
+        match self.recorder() {
+            "" => format!("{:05}", self.session),
+            recorder => format!("{recorder}/{:05}", self.session),
+        }
+    }
+}
+
+/// The segment that a file's name says it is, in any case of letters, also where the ending was lost.
+pub fn segment_name(path: &Path) -> Option<SegmentName> {
+    let name = path.file_name()?.to_str()?.to_ascii_lowercase();
+    let (base, extension) = name.split_once('.').unwrap_or((&name, "hum"));
+    let of = || {
+        let (number, rest) = base.split_once('-')?;
+        let (of, segment) = rest.rsplit_once('_')?;
+        is_of_session(of).then(|| (format!("{number}_{segment}"), of.to_owned()))
+    };
+    let (base, of) = of().unwrap_or_else(|| (base.to_owned(), String::new()));
+    let extension = extension.to_ascii_uppercase();
+    let LogName { session, segment } = LogName::from_short(base.as_bytes(), extension.as_bytes())?;
+    Some(SegmentName { of, session, segment })
+}
+
+/// Whether a name ends with a session, `s1a2b3c4d`, behind a box or nothing.
+fn is_of_session(of: &str) -> bool {
+    let session = match of.rsplit_once('-') {
+        Some((recorder, session)) if recorder.starts_with("box") => session,
+        Some(_) => return false,
+        None => of,
+    };
+    let digits = session.strip_prefix('s').unwrap_or_default();
+    digits.len() == SESSION_DIGITS && digits.bytes().all(|byte| byte.is_ascii_hexdigit())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_segment_is_known_by_its_name_on_the_card_and_by_the_name_of_its_session() {
+        let board = Some(&[0x3f; 12]);
+        for (name, of, log) in [
+            (session_name("00042", None, None), "", "00042"),
+            (session_name("00042", None, Some(7)), "s00000007", "00042"),
+            (
+                session_name("00042", board, Some(0x1a2b_3c4d)),
+                "box3f3f3f3f3f3f3f3f3f3f3f3f-s1a2b3c4d",
+                "box3f3f3f3f3f3f3f3f3f3f3f3f/00042",
+            ),
+        ] {
+            for ending in ["_07.HUM", "_07.hum", "_07"] {
+                let name = segment_name(Path::new(&format!("{name}{ending}"))).expect("a segment");
+                assert_eq!((name.of.as_str(), name.session, name.segment), (of, 42, 7), "{ending}");
+                assert_eq!(name.log(), log);
+            }
+        }
+        for other in [
+            "00042-s1a2b3c4d.hum",
+            "00042-x_07.HUM",
+            "00042-a-s1a2b3c4d_07.HUM",
+            "42_07.HUM",
+            "00042_07.tlog",
+        ] {
+            assert_eq!(segment_name(Path::new(other)), None, "{other}");
+        }
+    }
+}
