@@ -94,7 +94,7 @@ impl Repairs {
                 all.made.insert(u64::from(sector.number().wrapping_sub(base)), *sector.bytes());
             }
         }
-        all.displaced = found.displaced(&all.made);
+        all.displaced = found.displaced(base, &all.made);
         Ok(all)
     }
 
@@ -172,14 +172,21 @@ impl Found {
 
     /// The blocks in which another sector belongs, which was made again, and whose own one is nowhere else. Where something was put into
     /// a file, all that follows lies in other blocks, and some columns have lost more than can be made again.
-    fn displaced(&self, made: &BTreeMap<u64, [u8; BLOCK_BYTES]>) -> BTreeSet<u64> {
+    fn displaced(&self, base: u32, made: &BTreeMap<u64, [u8; BLOCK_BYTES]>) -> BTreeSet<u64> {
         let number =
             |at: u64| usize::try_from(at).ok().and_then(|at| self.numbers.get(at).copied()).flatten();
         let mut only: BTreeMap<u32, u64> =
             made.keys().filter_map(|at| number(*at).map(|number| (number, *at))).collect();
         if !only.is_empty() {
             let elsewhere = (0_u64..).zip(&self.numbers).filter(|(at, _)| !made.contains_key(at));
-            let again = made.values().map(|block| Sector::from_bytes(*block).number());
+            // One that was made again is of use up to the first that is neither there nor made: what is behind that comes in another order.
+            let hole = (0_u32..).zip(&self.numbers).find(|(at, number)| {
+                number.is_none_or(|number| Some(number) != base.checked_add(*at))
+                    && !made.contains_key(&u64::from(*at))
+            });
+            let hole = hole.map_or(u32::MAX, |(at, _)| base.saturating_add(at));
+            let again =
+                made.values().map(|block| Sector::from_bytes(*block).number()).filter(|made| *made < hole);
             for number in elsewhere.filter_map(|(_, number)| *number).chain(again) {
                 only.remove(&number);
             }
