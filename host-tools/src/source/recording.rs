@@ -170,27 +170,56 @@ impl Recording {
     /// Reads it from its beginning to its end, or until `take` says [`Stop`].
     pub fn read(mut self, want: Want<'_>, take: &mut Take<'_>) -> Result<Summary> {
         let want = Want { system: self.system, ..want };
-        let (mut last, mut is_takers) = (Instant::ZERO, false);
+        let (mut last, mut is_takers, mut seen) = (Instant::ZERO, false, Seen::default());
         let mut follow = |at: Instant, item: Item<'_>| {
             last = last.max(at);
+            seen.item(at, &item);
             let taken = take(at, item);
             is_takers |= taken.is_err();
             taken
         };
-        let summary = match self.reader.read(want, &mut follow) {
+        let mut summary = match self.reader.read(want, &mut follow) {
             Err(error) if error.is::<Stop>() => return Ok(Summary::default()),
             Err(error) if is_takers => return Err(error),
             result => result.with_context(|| self.name.clone())?,
         };
         if let Some(words) = self.progress.damage() {
             let place = Some(self.progress.taken());
-            let gap = Gap { from: Some(last), to: None, cause: Cause::Cut, place, bytes: 0, words };
+            let gap =
+                Gap { from: Some(last), to: None, cause: Cause::Cut, place, bytes: 0, words, own: None };
+            seen.item(last, &Item::Gap(&gap));
             match take(last, Item::Gap(&gap)) {
                 Err(error) if !error.is::<Stop>() => return Err(error),
                 _ => {}
             }
         }
+        let Seen { span, gaps, losses } = seen;
+        (summary.span, summary.gaps, summary.losses) = (span, gaps, losses);
         Ok(summary)
+    }
+}
+
+/// What was handed on.
+#[derive(Default)]
+struct Seen {
+    span: Option<(Instant, Instant)>,
+    gaps: u64,
+    losses: u64,
+}
+
+impl Seen {
+    fn item(&mut self, at: Instant, item: &Item<'_>) {
+        match item {
+            Item::Frame(_) | Item::Row(_) | Item::Observation(..) => {
+                let (first, last) = self.span.unwrap_or((at, at));
+                self.span = Some((first, last.max(at)));
+            }
+            Item::Gap(gap) => {
+                self.gaps += u64::from(gap.cause.is_damage());
+                self.losses += u64::from(gap.cause == Cause::Lost);
+            }
+            _ => {}
+        }
     }
 }
 
