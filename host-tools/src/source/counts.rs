@@ -35,13 +35,6 @@ impl Counts {
         self.other.add(next.other);
     }
 
-    /// Bytes of memory that they take beyond those of none.
-    pub(super) fn held_bytes(&self) -> usize {
-        // What an entry of a tree takes.
-        const ENTRY_BYTES: usize = 64;
-        ENTRY_BYTES * self.far.len()
-    }
-
     /// By their ids, and of those beyond what is counted one by one.
     pub(super) fn messages(self) -> (Vec<MessageCount>, Amount) {
         let near = (0_u32..).zip(self.near).filter(|(_, amount)| amount.count > 0);

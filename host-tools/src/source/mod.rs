@@ -9,7 +9,7 @@
 //! | PX4's `ULog` | `ulog` |
 //!
 //! A further format is one more [`item::Reader`], and a line of [`recording::Recording::new`]. A command takes the items in order
-//! ([`recording::Recording::read`]), or in [`parts`] where the work is to be shared among the cores.
+//! ([`recording::Recording::read`]), or in [`parts`] ([`recording::Place::in_parts`]) where the work is to be shared among the cores.
 //!
 //! # Bytes
 //!

@@ -107,7 +107,8 @@ impl<C: Collect> reader::Collect for Part<C> {
     }
 
     fn held_bytes(&self) -> usize {
-        self.counts.held_bytes() + self.collected.held_bytes()
+        // What is counted has a limit of its own.
+        self.collected.held_bytes()
     }
 
     fn only_counts(&self) -> bool {

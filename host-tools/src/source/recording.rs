@@ -2,6 +2,7 @@
 
 use std::fs;
 use std::io;
+use std::mem;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result, bail};
@@ -12,9 +13,11 @@ use super::input::{Input, Progress};
 use super::item::{Cause, Gap, Item, Reader, Stop, Summary, Take, Want};
 use super::mavlink::{RawReader, TlogReader};
 use super::own::OwnReader;
+use super::parts::{Collect, Deliver, PART_BYTES, PART_ITEMS};
 use super::{dataflash, ulog};
 use crate::logs::Log;
 use crate::outcome::usage;
+use crate::progress;
 
 pub use super::format::{Format, format_of};
 
@@ -119,6 +122,51 @@ impl Place {
             return Err(of_one_vehicle(&self.title));
         }
         Ok(Recording { system: self.system, ..recording })
+    }
+
+    /// Reads it in parts: `new` makes the collector of a part, `deliver` gets them in order.
+    pub fn in_parts<C: Collect>(
+        &self,
+        want: Want<'_>,
+        new: impl Fn() -> C + Sync,
+        deliver: &mut impl Deliver<C>,
+    ) -> Result<Summary> {
+        if let Some(log) = self.own() {
+            let bar = progress::bytes(Some(log.bytes()), &self.title);
+            let summary =
+                OwnReader::new(log.clone()).in_parts(want, new, deliver, |bytes| bar.set_position(bytes));
+            bar.finish_and_clear();
+            return summary;
+        }
+        let recording = self.open()?;
+        let (is_of_link, seen) = (recording.format.is_of_link(), recording.progress.clone());
+        let bar = progress::bytes(seen.total(), &self.title);
+        let (mut part, mut items) = (new(), 0);
+        let summary = recording.read(want, &mut |at, item| {
+            let begins = match item {
+                // What a frame says stays with it.
+                Item::Observation(..) => !is_of_link,
+                Item::Frame(_) | Item::Row(_) | Item::Gap(_) => true,
+                _ => return Ok(()),
+            };
+            let is_full = items >= PART_ITEMS || part.held_bytes() >= PART_BYTES;
+            if begins && (is_full || matches!(item, Item::Gap(_))) {
+                items = 0;
+                bar.set_position(seen.taken());
+                deliver.part(mem::replace(&mut part, new()))?;
+            }
+            items += u32::from(begins);
+            match item {
+                Item::Gap(gap) => deliver.gap(gap),
+                item => {
+                    part.item(at, item);
+                    Ok(())
+                }
+            }
+        })?;
+        deliver.part(part)?;
+        bar.finish_and_clear();
+        Ok(summary)
     }
 }
 
