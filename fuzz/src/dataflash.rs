@@ -30,7 +30,8 @@ pub fn check(data: &[u8]) {
         }
         Ok(())
     });
-    let read: u64 = summary.expect("damage is no failure").messages.iter().map(|message| message.bytes).sum();
+    let read: u64 =
+        summary.expect("damage is no failure").messages.iter().map(|message| message.amount.bytes).sum();
     assert!(read + unread <= log.len() as u64, "{read} bytes read and {unread} not, of {}", log.len());
 }
 

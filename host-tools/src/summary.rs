@@ -4,43 +4,31 @@ use std::collections::BTreeMap;
 
 use anyhow::Result;
 use hums_blackbox::record::{Loss, Moment, Stats, Vehicle, Why};
-use hums_blackbox::{Cause, Entry, Gap, Record};
+use hums_blackbox::{Cause, Gap, Record};
 use hums_core::component::Figures;
 use hums_core::health::exceedance::Crossings;
 use hums_core::time::Instant;
+use hums_link as link;
 
 use crate::ending::Ending;
 use crate::followed::Logged;
 use crate::logs::Log;
-use crate::logs::reader::{Collect, Deliver, read};
 use crate::mavlink::frame::{Check, Peek, peek};
-use crate::names::{counter_name, message_name};
+use crate::names::counter_name;
 use crate::plural::are;
 use crate::progress;
 use crate::source::epochs::Epochs;
-use crate::source::item;
+use crate::source::item::{self, Amount, Item, MessageCount, Want};
+use crate::source::own::OwnReader;
+use crate::source::parts::{Collect, Deliver};
 use crate::source::recording::Format;
 use crate::source::told::Finding;
 
 /// Findings, gaps and losses that are kept one by one; beyond this they are only counted, so that memory is bounded.
 pub const LISTED_MAX: usize = 10_000;
 
-/// Messages without a definition of ours that are counted one by one: there are 16 million ids.
-const UNVERIFIED_MAX: usize = 4_096;
 /// Checks with exceedances that are kept: four times those that there are, with all their instances.
 const EXCEEDANCES_MAX: usize = 1_000;
-
-/// Ids below half of this are counted in a table.
-const NEAR: usize = 1024;
-
-/// Frames of one message.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct MessageCount {
-    /// How many.
-    pub frames: u64,
-    /// Their bytes.
-    pub bytes: u64,
-}
 
 /// A check's change of level.
 #[derive(Clone, Debug, PartialEq)]
@@ -136,12 +124,10 @@ pub fn damaged_places(count: u64) -> String {
 /// All that a log holds, counted.
 #[derive(Clone, Debug, Default)]
 pub struct Contents {
-    /// By message id, and whether the checksum is that of the definition known on board.
-    pub messages: BTreeMap<(u32, bool), MessageCount>,
-    /// Messages that have a name and no id: those of recordings other than MAVLink's.
-    pub named: Vec<item::MessageCount>,
+    /// Messages by their ids, or by their names where they have none.
+    pub messages: Vec<MessageCount>,
     /// Frames of further messages, none of which is verified: only so many ids are told apart.
-    pub other_messages: MessageCount,
+    pub other_messages: Amount,
     /// Records of the monitor's own.
     pub records: u64,
     /// The first boot record.
@@ -180,19 +166,19 @@ pub struct Contents {
     pub not_frames: u64,
     /// Frames that were verified on board, whose checksum fails here.
     pub bad_frames: u64,
-    /// Entries whose time is before the entry before, within a group.
-    pub times_fell: u64,
-    last_at: Option<Instant>,
-    /// Counts of small ids, and whether verified, before they are added up.
-    near: Vec<MessageCount>,
-    /// Whether checksums are looked at again.
-    checks: bool,
 }
 
 impl Contents {
     /// Frames of all messages.
     pub fn frames(&self) -> u64 {
-        self.messages.values().map(|count| count.frames).sum::<u64>() + self.other_messages.frames
+        self.all_frames().count
+    }
+
+    fn all_frames(&self) -> Amount {
+        let mut all = self.other_messages;
+        let frames = self.messages.iter().filter(|message| message.id.is_some());
+        frames.for_each(|message| all.add(message.amount));
+        all
     }
 
     /// Whether what recorded it checked the vehicle's health: only such a recorder writes these records.
@@ -211,43 +197,12 @@ impl Contents {
 
     /// Bytes of all frames.
     pub fn frame_bytes(&self) -> u64 {
-        self.messages.values().map(|count| count.bytes).sum::<u64>() + self.other_messages.bytes
+        self.all_frames().bytes
     }
 
     /// Bytes that the frames take in a tlog.
     pub fn tlog_bytes(&self) -> u64 {
         self.frame_bytes() + 8 * self.frames()
-    }
-
-    /// The name of a message in reports.
-    pub fn message_name(id: u32, verified: bool) -> String {
-        let name = message_name(id);
-        match (hums_dialect::message(id), verified) {
-            (Some(_), false) => format!("{name} (unverified)"),
-            _ => name.into_owned(),
-        }
-    }
-
-    fn whole(&mut self, bytes: &[u8], verified: bool) {
-        let Peek::Frame(frame) = peek(bytes) else {
-            self.not_frames += 1;
-            return;
-        };
-        self.not_frames += u64::from(frame.bytes.len() != bytes.len());
-        self.bad_frames += u64::from(self.checks && verified && frame.check() == Check::Bad);
-        self.count(frame.id, verified, bytes.len());
-    }
-
-    fn count(&mut self, id: u32, verified: bool, bytes: usize) {
-        let key = (id, verified);
-        // Most ids are small, and a frame comes for each of a log's some hundred bytes: a tree takes longer to search.
-        let place = (id as usize) << 1 | usize::from(verified);
-        let count = match self.near.get_mut(place) {
-            Some(count) => count,
-            None => self.messages.entry(key).or_default(),
-        };
-        count.frames += 1;
-        count.bytes += bytes as u64;
     }
 
     fn record(&mut self, record: &Record<'_>) {
@@ -312,27 +267,8 @@ impl Contents {
         }
     }
 
-    /// Where a message's frames are added up.
-    fn sum(&mut self, key: (u32, bool)) -> &mut MessageCount {
-        let (_, verified) = key;
-        if !verified && self.messages.len() >= UNVERIFIED_MAX && !self.messages.contains_key(&key) {
-            return &mut self.other_messages;
-        }
-        self.messages.entry(key).or_default()
-    }
-
-    /// Adds what the next group held.
+    /// Adds what the next part held.
     fn add(&mut self, next: Self) {
-        for (place, count) in next.near.iter().enumerate().filter(|(_, count)| count.frames > 0) {
-            let sum = self.sum(((place >> 1) as u32, place & 1 != 0));
-            sum.frames += count.frames;
-            sum.bytes += count.bytes;
-        }
-        for (key, count) in next.messages {
-            let sum = self.sum(key);
-            sum.frames += count.frames;
-            sum.bytes += count.bytes;
-        }
         self.records += next.records;
         self.boot = self.boot.take().or(next.boot);
         self.vehicle = next.vehicle.or(self.vehicle);
@@ -347,9 +283,7 @@ impl Contents {
             add_loss(&mut self.losses, loss);
         }
         self.stats = next.stats.or(self.stats);
-        self.not_frames += next.not_frames;
         self.bad_frames += next.bad_frames;
-        self.times_fell += next.times_fell;
     }
 }
 
@@ -365,42 +299,33 @@ fn add_loss(losses: &mut BTreeMap<&'static str, Loss>, loss: &Loss) {
 }
 
 impl Collect for Contents {
-    fn entry(&mut self, entry: &Entry<'_>) {
-        let (Entry::Frame { at, .. } | Entry::Record { at, .. }) = *entry;
-        self.times_fell += u64::from(self.last_at.is_some_and(|last| at < last));
-        self.last_at = Some(at);
-        match entry {
-            Entry::Frame { bytes, verified, .. } => self.whole(bytes, *verified),
-            Entry::Record { record, .. } => self.record(record),
+    fn item(&mut self, _at: Instant, item: Item<'_>) {
+        match item {
+            Item::Record(record) => self.record(record),
+            Item::Frame(frame) if frame.check() == link::Check::Verified => {
+                let is_bad = matches!(peek(frame.bytes()), Peek::Frame(frame) if frame.check() == Check::Bad);
+                self.bad_frames += u64::from(is_bad);
+            }
+            _ => {}
         }
     }
 
     fn held_bytes(&self) -> usize {
         // What an entry of a tree takes, texts on the heap included.
         const ENTRY_BYTES: usize = 256;
-        ENTRY_BYTES * (self.messages.len() + self.findings.len() + self.exceedances.len())
-    }
-
-    fn only_counts(&self) -> bool {
-        !self.checks
-    }
-
-    fn frame(&mut self, at: Instant, id: u32, bytes: usize, verified: bool) {
-        self.times_fell += u64::from(self.last_at.is_some_and(|last| at < last));
-        self.last_at = Some(at);
-        self.count(id, verified, bytes);
+        ENTRY_BYTES * (self.findings.len() + self.exceedances.len())
     }
 }
 
 impl Deliver<Self> for Contents {
-    fn gap(&mut self, gap: &Gap) -> Result<()> {
+    fn gap(&mut self, gap: &item::Gap) -> Result<()> {
         if self.gaps.len() < LISTED_MAX {
-            self.gaps.push(*gap);
+            self.gaps.push(gap.to_own());
         }
         Ok(())
     }
 
-    fn group(&mut self, collected: Self) -> Result<()> {
+    fn part(&mut self, collected: Self) -> Result<()> {
         self.add(collected);
         Ok(())
     }
@@ -441,19 +366,18 @@ impl Overview {
 
     fn read(log: &Log, checks: bool) -> Result<Self> {
         let bar = progress::bytes(Some(log.bytes()), &log.name);
-        let new = || Contents { checks, near: vec![MessageCount::default(); NEAR], ..Contents::default() };
+        let want = Want { frames: checks, ..Want::default() };
         let mut contents = Contents::default();
-        let summary = read(log, new, &mut contents, |blocks| bar.set_position(blocks * 512))?;
+        let reader = OwnReader::new(log.clone());
+        let summary =
+            reader.in_parts(want, Contents::default, &mut contents, |bytes| bar.set_position(bytes))?;
         bar.finish_and_clear();
-        contents.epoch_us = summary.epoch_us;
-        let epochs = Epochs::of(summary.epoch_us);
-        Ok(Self {
-            ending: Ending::of(log, summary),
-            format: None,
-            epochs,
-            bytes_on_card: log.bytes(),
-            contents,
-        })
+        (contents.messages, contents.other_messages) = (summary.messages, summary.other_messages);
+        contents.not_frames = summary.not_frames;
+        let ending = summary.ending.unwrap_or_default();
+        contents.epoch_us = ending.summary.epoch_us;
+        let epochs = Epochs::of(ending.summary.epoch_us);
+        Ok(Self { ending, format: None, epochs, bytes_on_card: log.bytes(), contents })
     }
 
     /// Whether nothing was lost or damaged, and the log is proved to its end or at least to its last end mark. A recording

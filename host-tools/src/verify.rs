@@ -219,10 +219,10 @@ impl LogJson {
         let unverified: u64 = contents
             .messages
             .iter()
-            .filter(|((_, verified), _)| !verified)
-            .map(|(_, count)| count.frames)
+            .filter(|message| matches!(message.id, Some((_, false))))
+            .map(|message| message.amount.count)
             .sum::<u64>()
-            + contents.other_messages.frames;
+            + contents.other_messages.count;
         let gaps = || contents.gaps.iter().filter(|gap| gap.cause != Cause::Disarmed);
         let missing: u64 = gaps().map(|gap| u64::from(gap.sectors_lost)).sum();
         let useless: u64 = gaps().map(|gap| u64::from(gap.sectors_skipped)).sum();
@@ -249,7 +249,7 @@ impl LogJson {
             check(
                 "times in order",
                 contents.frames() + contents.records,
-                contents.times_fell + summary.times_fell,
+                summary.entries_fell + summary.times_fell,
                 String::new(),
             ),
             check("recorder losses", contents.frames() + lost, lost, losses_detail(log)),

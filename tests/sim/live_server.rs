@@ -6,20 +6,9 @@ use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
 use hums_tests::flights::own;
-use hums_tests::live::{Live, Running, free_port};
+use hums_tests::live::{Live, Running, free_port, handshake};
 use hums_tests::program::{self, command};
 use rustix::net::sockopt::set_socket_linger;
-
-/// Connects and asks for the page's WebSocket.
-fn handshake(host: &str) -> TcpStream {
-    let mut stream = TcpStream::connect(host).unwrap();
-    let request = format!(
-        "GET /ws HTTP/1.1\r\nHost: {host}\r\nConnection: Upgrade\r\nUpgrade: websocket\r\n\
-         Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n"
-    );
-    stream.write_all(request.as_bytes()).unwrap();
-    stream
-}
 
 /// The first line of the answer.
 fn answer(stream: TcpStream) -> String {
@@ -188,16 +177,4 @@ fn sigterm_ends_what_waits_for_a_board() {
     let mut words = String::new();
     stderr.read_to_string(&mut words).unwrap();
     assert!(words.contains("interrupted"), "{words}");
-}
-
-#[test]
-fn an_autopilots_own_log_is_played() {
-    let log = hums_tests::flights::root().join("tests/labelled/px4/p23_motor_dead_quad.cut.ulg.gz");
-    let live = Live::start(&["--input", log.to_str().unwrap()]);
-    let host = live.address.trim_start_matches("http://").trim_end_matches('/');
-    assert!(answer(handshake(host)).contains("101"), "its page opens");
-    // It goes on: the log is longer than this.
-    std::thread::sleep(Duration::from_secs(2));
-    let (code, said) = live.interrupt(Duration::from_secs(20));
-    assert_eq!(code, Some(0), "{said}");
 }

@@ -4,6 +4,7 @@
 //! failing card and power cuts may do and may not.
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
 
+mod any_log;
 mod board;
 mod budget;
 mod by_arming;

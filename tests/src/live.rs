@@ -1,7 +1,7 @@
 //! `hums live` as a program that goes on, and a vehicle for it.
 
-use std::io::{BufRead as _, BufReader, Read as _};
-use std::net::UdpSocket;
+use std::io::{BufRead as _, BufReader, Read as _, Write as _};
+use std::net::{TcpStream, UdpSocket};
 use std::path::Path;
 use std::process::{Child, ChildStderr, Command, Stdio};
 use std::thread;
@@ -108,6 +108,18 @@ impl Live {
         self.end_by("TERM", limit)
     }
 
+    /// Opens its page.
+    #[track_caller]
+    pub fn page(&self) -> Page {
+        let stream = handshake(self.address.trim_start_matches("http://").trim_end_matches('/'));
+        stream.set_read_timeout(Some(Duration::from_secs(20))).unwrap();
+        let mut stream = BufReader::new(stream);
+        let head: Vec<String> =
+            (&mut stream).lines().map_while(Result::ok).take_while(|line| !line.is_empty()).collect();
+        assert!(head.first().is_some_and(|line| line.contains("101")), "no page opens: {head:?}");
+        Page(stream)
+    }
+
     #[track_caller]
     fn end_by(mut self, signal: &str, limit: Duration) -> (Option<i32>, String) {
         self.program.signal(signal);
@@ -116,6 +128,44 @@ impl Live {
         self.stderr.read_to_string(&mut words).unwrap();
         assert!(!words.contains("panicked"), "{words}");
         (code, words)
+    }
+}
+
+/// Connects and asks for the page's WebSocket.
+pub fn handshake(host: &str) -> TcpStream {
+    let mut stream = TcpStream::connect(host).unwrap();
+    let request = format!(
+        "GET /ws HTTP/1.1\r\nHost: {host}\r\nConnection: Upgrade\r\nUpgrade: websocket\r\n\
+         Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n"
+    );
+    stream.write_all(request.as_bytes()).unwrap();
+    stream
+}
+
+/// What a page of `hums live` is sent.
+#[derive(Debug)]
+pub struct Page(BufReader<TcpStream>);
+
+impl Page {
+    /// The next message: a frame of a WebSocket by RFC 6455, section 5.2, of a server, which is not masked.
+    #[track_caller]
+    pub fn message(&mut self) -> String {
+        let mut head = [0; 2];
+        self.0.read_exact(&mut head).unwrap();
+        assert_eq!((head[0], head[1] & 0x80), (0x81, 0), "a text, whole, not masked");
+        let mut more = |bytes: usize| {
+            let mut length = [0; 8];
+            self.0.read_exact(&mut length[8 - bytes..]).unwrap();
+            u64::from_be_bytes(length)
+        };
+        let length = match head[1] {
+            126 => more(2),
+            127 => more(8),
+            length => length.into(),
+        };
+        let mut text = vec![0; usize::try_from(length).unwrap()];
+        self.0.read_exact(&mut text).unwrap();
+        String::from_utf8(text).unwrap()
     }
 }
 

@@ -205,7 +205,11 @@ impl Judge {
             Item::Fact(fact) => {
                 self.facts.insert(fact.about, fact.words.to_owned());
             }
-            Item::Record(told) => self.told(told),
+            Item::Record(record) => {
+                if let Some(told) = Told::of(record) {
+                    self.told(&told);
+                }
+            }
             Item::Gap(gap) => self.gap(gap),
             Item::Restart => self.restart(at),
             Item::Joint => self.joint(at),
@@ -260,7 +264,7 @@ impl Judge {
             "the recording says nothing of the vehicle for {seconds:.1} s {how}: what happened then is not known"
         );
         let (to, cause) = (Some(at), Why::Lost);
-        let gap = Gap { from: Some(from), to, cause, place: None, bytes: 0, words };
+        let gap = Gap { from: Some(from), to, cause, place: None, bytes: 0, words, own: None };
         if is_own {
             // The logger wrote nothing: that is no silence of the vehicle.
             self.gap(&gap);

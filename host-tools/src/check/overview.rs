@@ -15,7 +15,7 @@ use crate::names::counter_name;
 use crate::progress;
 use crate::source::item::{Gap, Summary, Want};
 use crate::source::recording::{Format, Place};
-use crate::summary::{Contents, ExceedanceLine, FindingLine, MessageCount, Overview};
+use crate::summary::{Contents, ExceedanceLine, FindingLine, Overview};
 
 /// Items between two looks at how far the reading is.
 const LOOK_EVERY: u32 = 4_096;
@@ -66,7 +66,7 @@ pub fn overview(place: &Place) -> Result<Overview> {
     let Read { format, judged, summary, taken } = judge(place, &limits, Heard::Somewhere, true)?;
     let mut contents = Contents::default();
     contents.epoch_us = judged.epochs.whole();
-    count(&mut contents, format, summary);
+    (contents.messages, contents.other_messages) = (summary.messages, summary.other_messages);
     contents.gaps = judged.gaps.iter().map(Gap::to_own).collect();
     contents.gap_words = judged.gaps.iter().map(|gap| (gap.place, gap.words.clone())).collect();
     let (first, last) = judged.span.unzip();
@@ -89,26 +89,6 @@ pub fn overview(place: &Place) -> Result<Overview> {
         bytes_on_card: if place.is_standard() { taken } else { place.bytes() },
         contents,
     })
-}
-
-/// Messages by their ids where they are MAVLink's, otherwise by their names.
-fn count(contents: &mut Contents, format: Format, summary: Summary) {
-    for message in summary.messages {
-        let known = || hums_dialect::messages().iter().find(|known| known.name == message.name);
-        let id = if format.is_of_link() {
-            let unknown = || message.name.strip_prefix("UNKNOWN_").and_then(|id| id.parse().ok());
-            known().map(|known| known.id).or_else(unknown)
-        } else {
-            None
-        };
-        match id {
-            Some(id) => {
-                let count = MessageCount { frames: message.count, bytes: message.bytes };
-                contents.messages.insert((id, hums_dialect::message(id).is_some()), count);
-            }
-            None => contents.named.push(message),
-        }
-    }
 }
 
 /// What the monitor here makes of a recording.

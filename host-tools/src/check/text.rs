@@ -622,6 +622,7 @@ mod tests {
             place: None,
             bytes,
             words: String::new(),
+            own: None,
         };
         let (count, large, small) =
             (gap(Cause::Damaged, 0, 0), gap(Cause::Damaged, 900, 0), gap(Cause::Cut, 20, 0));

@@ -1,15 +1,11 @@
 //! Who checked the vehicle's health in a log, as rows: `HUMS_CHECKED`, one row a log, and `HUMS_FINDING` of what this program
 //! found where the recorder ran no checks. A table without a finding is then no table that nobody has checked.
 
-use anyhow::Result;
 use hums_core::health::Level;
 use hums_core::time::Instant;
 
 use super::row::{Cell, CellType, Row};
-use crate::check::judge::{Heard, Limits};
 use crate::check::judged::{Judged, JudgedBy, TOO_LITTLE};
-use crate::check::recording;
-use crate::source::recording::Place;
 use crate::source::told::Finding;
 
 /// The word for the monitor on board, as `hums info --json` has it in `checked_by`.
@@ -32,11 +28,6 @@ pub struct Checked {
 }
 
 impl Checked {
-    /// Judges a log of ours; `None` where its own monitor did.
-    pub fn of(place: &Place) -> Result<Option<Self>> {
-        Ok(Self::new(recording(place, &Limits::default(), Heard::Somewhere)?.judged))
-    }
-
     /// Of a recording that was judged; `None` where the monitor on board did that.
     pub fn new(judged: Judged) -> Option<Self> {
         if judged.by == JudgedBy::Board {

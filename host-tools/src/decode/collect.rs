@@ -2,9 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use hums_blackbox::{Entry, Gap, Record};
+use hums_blackbox::{Gap, Record};
 use hums_core::time::Instant;
-use hums_link::{self as link, Check, observe};
+use hums_link as link;
 
 use super::batches::Batches;
 use super::checked::OnBoard;
@@ -17,10 +17,11 @@ use super::table::Table;
 use super::text::{push_csv_cells, push_integer, push_json_object, push_json_text};
 use super::unknown::UnknownLines;
 use crate::hex::push_hex;
-use crate::logs::reader::Collect;
 use crate::mavlink::frame::{Frame, Peek, peek};
 use crate::mavlink::values::Payload;
 use crate::names::message_name;
+use crate::source::item::Item;
+use crate::source::parts::Collect;
 use crate::utc::{push_iso8601, push_seconds};
 
 /// One group as text and columns.
@@ -49,6 +50,8 @@ pub struct Collected<'a> {
     pub records: u64,
     /// Findings of the log's own monitor, wanted or not.
     pub on_board: OnBoard,
+    /// Rows of tables for whose names there was no room.
+    pub rows_left_out: u64,
     /// Bytes in `tables`, and what the tables themselves take.
     tables_bytes: usize,
 }
@@ -72,17 +75,16 @@ impl<'a> Collected<'a> {
             frames: 0,
             records: 0,
             on_board: OnBoard::default(),
+            rows_left_out: 0,
             tables_bytes: 0,
         }
     }
 
-    fn frame(&mut self, at: Instant, bytes: &[u8], verified: bool, wanted: bool) {
+    fn frame(&mut self, at: Instant, frame: &link::Frame<'_>) {
         let formats = self.context.formats;
-        if formats.influx || formats.thesis {
-            self.observe(at, bytes, verified);
-        }
+        let (bytes, verified) = (frame.bytes(), frame.check() == link::Check::Verified);
         let Peek::Frame(frame) = peek(bytes) else { return };
-        if !wanted || !self.context.selection.has_id(frame.id) {
+        if !self.context.selection.has_id(frame.id) {
             return;
         }
         self.frames += 1;
@@ -104,15 +106,6 @@ impl<'a> Collected<'a> {
         }
         if formats.parquet {
             self.parquet.frame(at, self.context.epochs.utc_us(at), &frame, known.as_ref());
-        }
-    }
-
-    /// Whether wanted or not: what is wanted later depends on what the vehicle was before.
-    fn observe(&mut self, at: Instant, bytes: &[u8], verified: bool) {
-        let check = if verified { Check::Verified } else { Check::Unverified };
-        let told = link::Frame::again(bytes, check).and_then(|frame| observe(&frame));
-        if let Some((source, observation)) = told {
-            self.observed.push(Observed { at, source, observation });
         }
     }
 
@@ -215,18 +208,27 @@ impl<'a> Collected<'a> {
 }
 
 impl Collect for Collected<'_> {
-    fn entry(&mut self, entry: &Entry<'_>) {
-        let (Entry::Frame { at, .. } | Entry::Record { at, .. }) = *entry;
-        let wanted = self.context.selection.has_time(at, &self.context.epochs);
-        if let Entry::Record { record: Record::Finding(finding), .. } = entry
-            && wanted
-        {
-            self.on_board.add(finding.level);
+    fn item(&mut self, at: Instant, item: Item<'_>) {
+        // Whether wanted or not: what is wanted later depends on what the vehicle was before.
+        if let Item::Observation(source, observation) = item {
+            self.observed.push(Observed { at, source, observation: *observation });
         }
-        match entry {
-            Entry::Frame { bytes, verified, .. } => self.frame(at, bytes, *verified, wanted),
-            Entry::Record { record, .. } if wanted => self.rows(at, &rows(record)),
-            Entry::Record { .. } => {}
+        if !self.context.selection.has_time(at, &self.context.epochs) {
+            return;
+        }
+        match item {
+            Item::Frame(frame) => self.frame(at, frame),
+            Item::Row(row) => match self.context.tables.row(row) {
+                Some(row) => self.rows(at, &[row]),
+                None => self.rows_left_out += 1,
+            },
+            Item::Record(record) => {
+                if let Record::Finding(finding) = record {
+                    self.on_board.add(finding.level);
+                }
+                self.rows(at, &rows(record));
+            }
+            _ => {}
         }
     }
 

@@ -3,6 +3,7 @@
 use super::checked::Checked;
 use super::identity::Identity;
 use super::influx::Tags;
+use super::native::Tables;
 use super::selection::Selection;
 use crate::cli::Format;
 use crate::files::Inputs;
@@ -53,7 +54,7 @@ impl Formats {
 }
 
 /// What all parts of one log's decoding need to know.
-#[derive(Clone, Debug, Default)]
+#[derive(Debug, Default)]
 pub struct Context {
     /// What to write.
     pub formats: Formats,
@@ -71,4 +72,6 @@ pub struct Context {
     pub inputs: Inputs,
     /// What this program found, where the recorder ran no checks.
     pub checked: Option<Checked>,
+    /// The tables of an autopilot's own log.
+    pub tables: Tables,
 }

@@ -2,16 +2,19 @@
 //! the Parquet tables lie.
 
 use anyhow::Result;
+use hums_blackbox::Record;
 use hums_blackbox::record::Vehicle;
-use hums_blackbox::{Entry, Gap, Record};
 use hums_core::observation::Observation;
-use hums_link::{Check, Frame, observe};
+use hums_core::time::Instant;
+use sha2::{Digest as _, Sha256};
 
+use super::checked::Checked;
+use crate::check::judge::{Judge, Limits};
+use crate::ending::Ending;
 use crate::hex::hex;
-use crate::logs::Log;
-use crate::logs::reader::{Collect, Deliver, read};
-use crate::mavlink::ids::{AUTOPILOT_VERSION, HEARTBEAT};
 use crate::source::epochs::Epochs;
+use crate::source::item::{Item, Want};
+use crate::source::recording::Place;
 use crate::utc::iso8601;
 
 /// A session's names. Each begins with a letter: a tool that guesses types must not make a number of it.
@@ -28,59 +31,68 @@ pub struct Identity {
     pub epochs: Epochs,
 }
 
-impl Identity {
-    /// Reads a log through for it.
-    pub fn of(log: &Log) -> Result<Self> {
-        let mut known = Known::default();
-        let summary = read(log, Known::default, &mut known, |_| ())?;
-        let system = known.recorded.map(|vehicle| vehicle.system).or(known.heard);
-        let uid = known.recorded.map(|vehicle| vehicle.uid).filter(|uid| *uid != 0).or(known.uid);
-        let board = known.board.map(|uid| hex(&uid));
-        let vehicle = match (uid, board, system) {
-            (Some(uid), _, _) => format!("uid-{uid:016x}"),
-            (None, Some(board), _) => format!("box-{board}"),
-            (None, None, Some(system)) => format!("system-{system}"),
-            (None, None, None) => "unknown".to_owned(),
-        };
-        let utc_us =
-            summary.epoch_us.zip(summary.first).map(|(epoch, first)| epoch.saturating_add(first.as_micros()));
-        let session =
-            summary.session.map_or_else(|| "unknown".to_owned(), |session| format!("s{session:08x}"));
-        let date = utc_us.map(|utc| iso8601(utc).chars().take(10).collect());
-        Ok(Self { vehicle, date, session, epochs: Epochs::of(summary.epoch_us) })
-    }
+/// Who flew and when, and UTC; where it is asked for, what the monitor here says of it, as `hums check` does, unless the one on
+/// board did. The recording is read through for it.
+pub fn identity(place: &Place, judges: bool) -> Result<(Identity, Option<Checked>)> {
+    let (mut known, mut epochs) = (Known::default(), Epochs::default());
+    let want = Want { observations: true, ..Want::default() };
+    let recording = place.open()?;
+    let mut judge = judges.then(|| Judge::new(&Limits::default(), recording.format));
+    let summary = recording.read(want, &mut |at, item| {
+        if let Some(judge) = &mut judge {
+            judge.item(at, item);
+        }
+        epochs.take(at, &item);
+        known.take(at, &item);
+        Ok(())
+    })?;
+    let vehicle = known.vehicle();
+    let (first, session) = match &summary.ending {
+        Some(Ending { summary, .. }) => {
+            // One power-on has one clock, also where a recording that was packed has several.
+            epochs = Epochs::of(summary.epoch_us);
+            (summary.first, summary.session.map(|session| format!("s{session:08x}")))
+        }
+        None => (known.first, Some(known.session())),
+    };
+    let utc_us = first.and_then(|first| epochs.utc_us(first));
+    let date = utc_us.map(|utc| iso8601(utc).chars().take(10).collect());
+    let session = session.unwrap_or_else(|| "unknown".to_owned());
+    let checked = judge.and_then(|judge| Checked::new(judge.end()));
+    Ok((Identity { vehicle, date, session, epochs }, checked))
 }
 
-/// What the monitor recorded of the vehicle; a packed log has no such record, so the vehicle's own frames count too.
+/// What tells who it is.
 #[derive(Default)]
 struct Known {
+    /// What the monitor recorded of the vehicle; a packed log has no such record, so the vehicle's own words count too.
     recorded: Option<Vehicle>,
     /// The board's unique id.
     board: Option<[u8; 12]>,
     /// The first system whose autopilot sends a heartbeat.
     heard: Option<u8>,
     uid: Option<u64>,
+    /// The time of the first observation, and of all of them.
+    first: Option<Instant>,
+    times: Sha256,
 }
 
-/// What tells who it is.
-const TELLING: [u32; 2] = [HEARTBEAT, AUTOPILOT_VERSION];
-
-impl Collect for Known {
-    fn entry(&mut self, entry: &Entry<'_>) {
-        match entry {
-            Entry::Record { record: Record::Vehicle(vehicle), .. } => self.recorded = Some(*vehicle),
-            Entry::Record { record: Record::Boot(boot), .. } if boot.uid != [0; 12] => {
-                self.board = Some(boot.uid);
+impl Known {
+    fn take(&mut self, at: Instant, item: &Item<'_>) {
+        match item {
+            Item::Record(Record::Vehicle(vehicle)) => self.recorded = Some(*vehicle),
+            Item::Record(Record::Boot(boot)) if boot.uid != [0; 12] => {
+                self.board.get_or_insert(boot.uid);
             }
-            Entry::Frame { bytes, verified: true, .. } => {
-                let frame =
-                    Frame::again(bytes, Check::Verified).filter(|frame| TELLING.contains(&frame.id()));
-                match frame.and_then(|frame| observe(&frame)) {
-                    Some((source, Observation::Heartbeat(_))) => {
+            Item::Observation(source, observation) => {
+                self.first.get_or_insert(at);
+                self.times.update(at.as_micros().to_le_bytes());
+                match observation {
+                    Observation::Heartbeat(_) => {
                         self.heard.get_or_insert(source.system);
                     }
-                    Some((_, Observation::Identity(identity))) if identity.uid != 0 => {
-                        self.uid.get_or_insert(identity.uid);
+                    Observation::Identity(told) if told.uid != 0 => {
+                        self.uid.get_or_insert(told.uid);
                     }
                     _ => {}
                 }
@@ -89,21 +101,20 @@ impl Collect for Known {
         }
     }
 
-    fn held_bytes(&self) -> usize {
-        0
+    fn vehicle(&self) -> String {
+        let system = self.recorded.map(|vehicle| vehicle.system).or(self.heard);
+        let uid = self.recorded.map(|vehicle| vehicle.uid).filter(|uid| *uid != 0).or(self.uid);
+        match (uid, self.board, system) {
+            (Some(uid), _, _) => format!("uid-{uid:016x}"),
+            (None, Some(board), _) => format!("box-{}", hex(&board)),
+            (None, None, Some(system)) => format!("system-{system}"),
+            (None, None, None) => "unknown".to_owned(),
+        }
     }
-}
 
-impl Deliver<Self> for Known {
-    fn gap(&mut self, _: &Gap) -> Result<()> {
-        Ok(())
-    }
-
-    fn group(&mut self, next: Self) -> Result<()> {
-        self.recorded = next.recorded.or(self.recorded);
-        self.board = self.board.or(next.board);
-        self.heard = self.heard.or(next.heard);
-        self.uid = self.uid.or(next.uid);
-        Ok(())
+    /// Of a recording that no recorder gave a number: the times in it are its own.
+    fn session(self) -> String {
+        let number: [u8; 4] = self.times.finalize().first_chunk().copied().unwrap_or_default();
+        format!("r{:08x}", u32::from_be_bytes(number))
     }
 }

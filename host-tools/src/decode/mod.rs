@@ -15,7 +15,7 @@
 //! A log's files are named after its session ([`naming`]). What is there already is compared, and replaced only where the
 //! user says so ([`crate::files`]).
 //!
-//! Recordings that are no logs of ours ([`recorded`]) become the same formats, an autopilot's log with its own tables.
+//! Recordings of every kind go the same way ([`crate::source::parts`]); an autopilot's log has its own tables (`native`).
 //!
 //! Gaps are in every format: `HUMS_GAP` tables, objects and points; a table `gaps.csv` beside a tlog and with `thesis`.
 
@@ -30,9 +30,9 @@ pub mod field_names;
 pub mod identity;
 pub mod influx;
 pub mod naming;
+mod native;
 pub mod parquet;
 pub mod record;
-pub mod recorded;
 pub mod reference;
 pub mod row;
 pub mod selection;
@@ -56,21 +56,21 @@ use crate::cli;
 use crate::ending::Ending;
 use crate::files::{Folder, Inputs, appended, check_parent, means_standard_output, says_directory};
 use crate::followed::{Followed, Logged};
-use crate::logs::reader::{self, Summary};
+use crate::logs::reader;
 use crate::logs::sessions::{Sessions, copy_words};
 use crate::logs::side_by_side::side_by_side;
 use crate::outcome::{Kept, Outcome, differs, usage as usage_error};
 use crate::plural::count;
 use crate::source::epochs::Epochs;
 use crate::source::find::{find, sessions_of};
+use crate::source::item::{Rows, Summary, Want};
 use crate::source::recording::Place;
 use crate::summary::damaged_places;
-use crate::{output, printable, progress};
-use checked::Checked;
+use crate::{output, printable};
 use collect::Collected;
 use context::{Context, Formats};
 use destination::Destination;
-use identity::Identity;
+use identity::{Identity, identity};
 use influx::Tags;
 use naming::Named;
 use selection::Selection;
@@ -285,17 +285,16 @@ impl Task<'_> {
             remarks.push(nothing_of(log, &summary, &context.selection));
             return Ok(Done { remarks, ..Done::of(log) });
         }
-        let not_checked = writers.checked(summary.last)?;
+        let not_checked = writers.checked(summary.span.map(|(_, last)| last))?;
         remarks.extend(not_checked.map(|why| format!("{}: {why}", log.name)));
         let written = writers.finish()?;
         let mut outcome = Outcome::Done;
-        let ending =
-            log.own().map(|own| Ending { name: log.name.clone(), ..Ending::of(own, summary.clone()) });
+        let ending = summary.ending.map(|ending| Ending { name: log.name.clone(), ..ending });
         if ending.is_none() && summary.gaps > 0 {
             outcome = Outcome::Losses;
             remarks.push(format!("{}: {}", log.name, damaged_places(summary.gaps)));
         }
-        if summary.losses > 0 {
+        if ending.is_none() && summary.losses > 0 {
             let times = count(summary.losses, "time");
             remarks.push(format!("{}: what recorded it lost something {times}, and says so", log.name));
         }
@@ -322,26 +321,19 @@ impl Task<'_> {
             stamp: work.traits.stamp(),
             ..Context::default()
         };
-        let Some(log) = work.log.own() else {
-            let judges = self.formats.has_records();
-            (context.identity, context.checked) = recorded::identity(work.log, judges)?;
-            context.tags = Tags::new(&context.identity.session, &context.identity.vehicle);
-            context.epochs = context.identity.epochs.clone();
-            return Ok(context);
-        };
         // A box's log begins with the record of its start, and its monitor checks.
-        if self.formats.has_records() && !work.traits.has_board() {
-            context.checked = Checked::of(work.log)?;
+        let judges = self.formats.has_records() && !work.traits.has_board();
+        match work.log.own() {
+            Some(log) if !(judges || self.formats.influx || self.formats.parquet) => {
+                let epoch = if self.standard_output { reader::epoch(log) } else { reader::likely_epoch(log) };
+                context.epochs = Epochs::of(epoch?);
+            }
+            _ => {
+                (context.identity, context.checked) = identity(work.log, judges)?;
+                context.tags = Tags::new(&context.identity.session, &context.identity.vehicle);
+                context.epochs = context.identity.epochs.clone();
+            }
         }
-        context.epochs = if self.formats.influx || self.formats.parquet {
-            context.identity = Identity::of(log)?;
-            context.tags = Tags::new(&context.identity.session, &context.identity.vehicle);
-            context.identity.epochs.clone()
-        } else if self.standard_output {
-            Epochs::of(reader::epoch(log)?)
-        } else {
-            Epochs::of(reader::likely_epoch(log)?)
-        };
         Ok(context)
     }
 
@@ -357,7 +349,7 @@ impl Task<'_> {
         let epoch_us = match (read, place.own()) {
             (_, None) => return Ok(None),
             _ if self.standard_output => return Ok(None),
-            (Ok((summary, _)), _) => summary.epoch_us,
+            (Ok((summary, _)), _) => summary.ending.as_ref().and_then(|ending| ending.summary.epoch_us),
             (Err(error), Some(log)) if differs(error).is_some() => reader::epoch(log)?,
             _ => return Ok(None),
         };
@@ -378,16 +370,15 @@ impl Task<'_> {
             Destination::new(self.output, name, self.logs, self.formats)
         };
         let mut writers = Writers::new(context, destination, parquet.map(Path::to_owned))?;
-        let summary = match place.own() {
-            Some(log) => {
-                let bar = progress::bytes(Some(log.bytes()), &log.name);
-                let new = || Collected::new(context);
-                let summary = reader::read(log, new, &mut writers, |blocks| bar.set_position(blocks * 512))?;
-                bar.finish_and_clear();
-                summary
-            }
-            None => recorded::read(place, context, &mut writers)?,
+        let formats = self.formats;
+        let rows = match context.selection.names() {
+            [] if formats.has_records() => Rows::All,
+            [] => Rows::None,
+            names => Rows::Named(names),
         };
+        let want =
+            Want { frames: true, observations: formats.influx || formats.thesis, rows, ..Want::default() };
+        let summary = place.in_parts(want, || Collected::new(context), &mut writers)?;
         Ok((summary, writers))
     }
 }
@@ -403,8 +394,8 @@ fn nothing_of(log: &Place, summary: &Summary, selection: &Selection) -> String {
     format!(
         "{}: {what} is within --from and --to: its times go from {:.3} s to {:.3} s",
         log.name,
-        seconds(summary.first),
-        seconds(summary.last)
+        seconds(summary.span.map(|(first, _)| first)),
+        seconds(summary.span.map(|(_, last)| last))
     )
 }
 

@@ -18,8 +18,9 @@ use super::reference::Reference;
 use super::tables::{Tables, UNKNOWN_TABLES_MAX};
 use super::thesis::Thesis;
 use crate::files::{Folder, Output, appended, make_parent, settle};
-use crate::logs::reader::Deliver;
 use crate::plural::count;
+use crate::source::item;
+use crate::source::parts::Deliver;
 
 /// A single file, open.
 struct Single(Output);
@@ -206,16 +207,12 @@ impl<'a> Writers<'a> {
         Ok(context.checked.as_ref().and_then(Checked::not_checked))
     }
 
-    /// Counts rows that could not be written.
-    pub fn leave_out(&mut self, rows: u64) {
-        self.rows_left_out += rows;
-    }
-
     fn put(&mut self, collected: Collected<'_>) -> Result<()> {
         self.frames += collected.frames;
         self.records += collected.records;
         self.objects += lines_of(&collected.jsonl);
         self.on_board.and(collected.on_board);
+        self.rows_left_out += collected.rows_left_out;
         for (file, bytes) in [(&mut self.tlog, &collected.tlog), (&mut self.jsonl, &collected.jsonl)] {
             if let Some(file) = file {
                 file.write(bytes)?;
@@ -356,7 +353,8 @@ fn gaps_header() -> String {
 }
 
 impl<'a> Deliver<Collected<'a>> for Writers<'a> {
-    fn gap(&mut self, gap: &Gap) -> Result<()> {
+    fn gap(&mut self, gap: &item::Gap) -> Result<()> {
+        let gap = &gap.to_own();
         let mut collected = Collected::new(self.context);
         collected.gap(gap);
         if self.context.selection.overlaps(gap, &self.context.epochs) {
@@ -368,7 +366,7 @@ impl<'a> Deliver<Collected<'a>> for Writers<'a> {
         self.put(collected)
     }
 
-    fn group(&mut self, collected: Collected<'a>) -> Result<()> {
+    fn part(&mut self, collected: Collected<'a>) -> Result<()> {
         self.put(collected)
     }
 }

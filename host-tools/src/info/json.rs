@@ -6,6 +6,7 @@ use serde::Serialize;
 use crate::ending::{BlocksJson, EndJson};
 use crate::logs;
 use crate::names::{autopilot_name, type_name};
+use crate::source::item::MessageCount;
 use crate::source::recording::Format;
 use crate::states;
 use crate::summary::{Contents, Overview};
@@ -256,7 +257,7 @@ impl LogJson {
             frame_bytes: contents.frame_bytes(),
             records: contents.records,
             messages: messages(contents),
-            frames_of_other_messages: contents.other_messages.frames,
+            frames_of_other_messages: contents.other_messages.count,
             gaps_count: summary.gaps + summary.losses,
             frames_missing: summary.frames_missing,
             gaps_uncounted: summary.gaps_uncounted,
@@ -281,21 +282,14 @@ impl LogJson {
 }
 
 fn messages(contents: &Contents) -> Vec<MessageJson> {
-    let json = |(&(id, verified), count): (&(u32, bool), &crate::summary::MessageCount)| MessageJson {
-        id: Some(id),
-        name: Contents::message_name(id, true),
-        verified,
-        frames: count.frames,
-        bytes: count.bytes,
-    };
-    let named = contents.named.iter().map(|message| MessageJson {
-        id: None,
+    let json = |message: &MessageCount| MessageJson {
+        id: message.id.map(|(id, _)| id),
         name: message.name.clone(),
-        verified: true,
-        frames: message.count,
-        bytes: message.bytes,
-    });
-    contents.messages.iter().map(json).chain(named).collect()
+        verified: message.id.is_none_or(|(_, verified)| verified),
+        frames: message.amount.count,
+        bytes: message.amount.bytes,
+    };
+    contents.messages.iter().map(json).collect()
 }
 
 fn gaps(contents: &Contents) -> Vec<GapJson> {

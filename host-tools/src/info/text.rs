@@ -17,6 +17,7 @@ use crate::logs;
 use crate::logs::begun_anew::BegunAnew;
 use crate::plural::count;
 use crate::printable::{path, word};
+use crate::source::item::MessageCount;
 use crate::states;
 use crate::summary::{Contents, FindingLine, LISTED_MAX, Overview};
 use crate::utc::iso8601;
@@ -103,8 +104,8 @@ fn heading(text: &mut String, log: &Overview) {
 
 /// Messages of a recording that is no log of ours.
 fn messages(log: &Overview) -> u64 {
-    let named = log.contents.named.iter().map(|message| message.count).sum::<u64>();
-    if log.format.is_some() { log.contents.frames() + named } else { 0 }
+    let messages = log.contents.messages.iter().map(|message| message.amount.count).sum::<u64>();
+    if log.format.is_some() { messages + log.contents.other_messages.count } else { 0 }
 }
 
 /// How it ends, and what lies behind that.
@@ -322,15 +323,14 @@ fn messages_text(text: &mut String, log: &Overview) {
         let name = word(name);
         let _ = writeln!(text, "    {name:<36} {frames:>10} {rate:>9} {bytes:>10}");
     };
-    for (&(id, verified), count) in &contents.messages {
-        line(&Contents::message_name(id, verified), count.frames, count.bytes);
-    }
-    for message in &contents.named {
-        line(&message.name, message.count, message.bytes);
+    for MessageCount { id, name, amount } in &contents.messages {
+        let is_other = id.is_some_and(|(id, verified)| !verified && hums_dialect::message(id).is_some());
+        let other = if is_other { " (unverified)" } else { "" };
+        line(&format!("{name}{other}"), amount.count, amount.bytes);
     }
     let other = contents.other_messages;
-    if other.frames > 0 {
-        let _ = writeln!(text, "    {:<36} {:>10} {:>20}", "ids beyond these", other.frames, other.bytes);
+    if other.count > 0 {
+        let _ = writeln!(text, "    {:<36} {:>10} {:>20}", "ids beyond these", other.count, other.bytes);
     }
 }
 

@@ -106,13 +106,17 @@ pub fn each(opened: &mut Opened, take: &mut Take<'_>) -> Result<()> {
     let native = opened.native.is_some();
     recording.read(want, &mut |at, item| {
         let entry = if native { Entry::of(at, &item) } else { None };
+        let told = if let Item::Record(record) = item { Told::of(record) } else { None };
         let heard = match item {
+            Item::Record(_) => match &told {
+                Some(told @ (Told::Parameter { .. } | Told::Part { .. })) => Heard::Told(told),
+                _ => return Ok(()),
+            },
             Item::Observation(..) | Item::Text(_) | Item::Gap(_) => match &entry {
                 Some(entry) => Heard::Entry(entry),
                 None => return Ok(()),
             },
             Item::Frame(frame) => Heard::Frame(frame),
-            Item::Record(told @ (Told::Parameter { .. } | Told::Part { .. })) => Heard::Told(told),
             Item::Epoch(epoch) => {
                 epoch_us = Some(epoch);
                 return Ok(());

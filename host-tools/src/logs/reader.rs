@@ -77,6 +77,8 @@ pub struct Summary {
     pub not_kept: u64,
     /// Groups whose first entry came before the last one of the group before.
     pub times_fell: u64,
+    /// Entries whose time is before the entry before, within a group.
+    pub entries_fell: u64,
     /// What the blocks were.
     pub blocks: BlockCounts,
     /// The first entry's time.
@@ -261,6 +263,8 @@ struct Decoded<C> {
     check_end: Option<u32>,
     frames: u32,
     last: Option<Instant>,
+    /// Entries whose time is before the one before.
+    fell: u64,
     error: Option<GroupError>,
     ends_partial: bool,
     /// Where it ends so: damaged blocks at that place, one of which may have been the whole sector.
@@ -290,6 +294,7 @@ impl<C: Collect> Decoded<C> {
             check_end: last.map(|step| step.header.check),
             frames: 0,
             last: None,
+            fell: 0,
             error: None,
             ends_partial: last.is_some_and(|step| step.header.partial),
             damaged_partial: last.filter(|step| step.header.partial).map_or(0, |step| step.damaged),
@@ -336,16 +341,21 @@ impl<C: Collect> Decoded<C> {
         Some((error, rest.at.saturating_sub(1)))
     }
 
+    fn time(&mut self, at: Instant) {
+        self.fell += u64::from(self.last.is_some_and(|last| at < last));
+        self.last = Some(at);
+    }
+
     fn entry(&mut self, outline: Outline<'_>, collected: &mut C) {
         match outline {
             Outline::Frame { at, id, bytes, verified } => {
-                self.last = Some(at);
+                self.time(at);
                 self.frames += 1;
                 collected.frame(at, id, bytes, verified);
             }
             Outline::Whole(entry) => {
                 let (Entry::Frame { at, .. } | Entry::Record { at, .. }) = entry;
-                self.last = Some(at);
+                self.time(at);
                 self.frames += u32::from(matches!(entry, Entry::Frame { .. }));
                 match entry {
                     Entry::Record { record: Record::Keep(keep), .. } => {
@@ -464,6 +474,7 @@ impl Stitch {
         self.check = group.check_end;
         // Only now the group is decoded to its end.
         self.summary.marks.add(&group.marks);
+        self.summary.entries_fell += group.fell;
         self.summary.epoch_us = group.epoch_us.or(self.summary.epoch_us);
         Ok(())
     }

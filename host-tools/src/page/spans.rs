@@ -25,13 +25,14 @@ pub struct Seen {
 pub type Rest = (usize, Vec<(f64, Cow<'static, str>)>);
 
 impl Spans {
-    /// It is in this one now. One that lasted less than `shortest` is taken back, and is part of the one before.
+    /// It is in this one now. One that lasted less than `shortest` is taken back, and is part of the one before; so is one that
+    /// lasted no time at all, if it is the first one too: a log's first message may tell a state before its mode.
     pub fn extend(&mut self, at: Instant, name: Cow<'static, str>, shortest: Span) {
         if let Some((begun, last)) = self.begun.last() {
             if *last == name || self.begun.len() >= SPANS_MAX {
                 return;
             }
-            if at.since(*begun) < shortest && self.begun.len() > 1 {
+            if at <= *begun || at.since(*begun) < shortest && self.begun.len() > 1 {
                 self.begun.pop();
             }
         }

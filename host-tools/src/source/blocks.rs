@@ -34,6 +34,7 @@ impl Bytes {
             place: Some(place),
             bytes,
             words,
+            own: None,
         })
     }
 }

@@ -66,7 +66,15 @@ impl Checksums {
     pub fn gap(&self) -> Option<Gap> {
         let (at, place) = self.first?;
         let words = wrong_checksums(self.damaged);
-        Some(Gap { from: Some(at), to: None, cause: Cause::Damaged, place: Some(place), bytes: 0, words })
+        Some(Gap {
+            from: Some(at),
+            to: None,
+            cause: Cause::Damaged,
+            place: Some(place),
+            bytes: 0,
+            words,
+            own: None,
+        })
     }
 
     /// Those that nobody can check, as a sentence.

@@ -274,7 +274,15 @@ impl Wrong {
         let (at, place) = self.first?;
         let words =
             format!("{} with a wrong time, far from the times around it", count(self.count, "message"));
-        Some(Gap { from: Some(at), to: None, cause: Cause::Damaged, place: Some(place), bytes: 0, words })
+        Some(Gap {
+            from: Some(at),
+            to: None,
+            cause: Cause::Damaged,
+            place: Some(place),
+            bytes: 0,
+            words,
+            own: None,
+        })
     }
 }
 

@@ -13,12 +13,12 @@
 use std::sync::Arc;
 
 use anyhow::Result;
+use hums_blackbox::Record;
 use hums_core::cause::Alert;
 use hums_core::observation::{Observation, Source};
 use hums_core::time::Instant;
 use hums_link::Frame;
 
-use super::told::Told;
 use crate::ending::Ending;
 
 /// The component that an autopilot is: `MAV_COMP_ID_AUTOPILOT1`.
@@ -46,7 +46,7 @@ pub enum Item<'a> {
     /// One message of a format other than MAVLink, with its own names and units.
     Row(Row<'a>),
     /// A record of the monitor's own: only logs of HUMS have them.
-    Record(&'a Told),
+    Record(&'a Record<'a>),
     /// Something is missing or damaged here.
     Gap(&'a Gap),
     /// The recording's clock began again: another power-on of what recorded it. Time goes on from where it was.
@@ -219,11 +219,16 @@ pub struct Gap {
     pub bytes: u64,
     /// What was found there, as the end of a sentence: `a length of 3 bytes for FMT`.
     pub words: String,
+    /// The same as a log of ours has it, which counts sectors and frames.
+    pub own: Option<hums_blackbox::Gap>,
 }
 
 impl Gap {
     /// As logs of ours have it, which know neither place nor words.
     pub fn to_own(&self) -> hums_blackbox::Gap {
+        if let Some(own) = self.own {
+            return own;
+        }
         let cause = match self.cause {
             Cause::Damaged | Cause::Cut | Cause::NoTimes => hums_blackbox::Cause::Damaged,
             Cause::Lost | Cause::Silent => hums_blackbox::Cause::Missing,
@@ -346,22 +351,50 @@ impl std::fmt::Display for Stop {
 
 impl std::error::Error for Stop {}
 
+/// Messages, and their bytes in the file.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Amount {
+    /// How many.
+    pub count: u64,
+    /// Their bytes.
+    pub bytes: u64,
+}
+
+impl Amount {
+    /// Adds more.
+    pub fn add(&mut self, more: Self) {
+        self.count += more.count;
+        self.bytes += more.bytes;
+    }
+}
+
 /// Messages of one name.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct MessageCount {
+    /// MAVLink's id of it, and whether the checksum is that of the definition known to who recorded it; `None` in an autopilot's
+    /// own log.
+    pub id: Option<(u32, bool)>,
     /// Its name.
     pub name: String,
     /// How many.
-    pub count: u64,
-    /// Their bytes in the file.
-    pub bytes: u64,
+    pub amount: Amount,
 }
 
 /// What was read, in all.
 #[derive(Clone, Debug, Default)]
 pub struct Summary {
-    /// Messages by name, in order of their names, those that nobody wanted too.
+    /// Messages by name, those that nobody wanted too: in order of their ids, or of their names where they have none.
     pub messages: Vec<MessageCount>,
+    /// Messages of further ids: only so many are told apart.
+    pub other_messages: Amount,
+    /// Entries of a log of ours that should be frames and are none.
+    pub not_frames: u64,
+    /// The first and the last time of the frames, rows and observations that were handed on.
+    pub span: Option<(Instant, Instant)>,
+    /// Gaps that are damage.
+    pub gaps: u64,
+    /// Places where the recorder lost something and says so.
+    pub losses: u64,
     /// Whether it is whole, of a log of ours.
     pub ending: Option<Ending>,
 }

@@ -7,8 +7,9 @@ use hums_link::framer::Framer;
 use super::blocks::Blocks;
 use super::booted::BootTimes;
 use super::checksums::Checksums;
+use super::counts::Counts;
 use super::input::Input;
-use super::item::{About, Cause, Fact, Gap, Item, MessageCount, Reader, Summary, Take, Want};
+use super::item::{About, Cause, Fact, Gap, Item, Reader, Summary, Take, Want};
 use super::pace::Pace;
 use super::paced::Paced;
 use super::raw::Raw;
@@ -16,44 +17,15 @@ use super::said::Said;
 use super::stream::Source as _;
 use super::tlog::records::{Record, Records, TIME_BYTES};
 use super::tlog::times::{Begins, Times};
-use crate::names::message_name;
 use crate::plural::count;
 
-/// Ids below this are counted in a table; above it lie few messages, and hostile ones are bounded by [`IDS_MAX`].
-const NEAR: usize = 1024;
-/// Further ids that are counted one by one.
-const IDS_MAX: usize = 4096;
-
-/// Frames by their id.
-struct Counts {
-    near: Vec<(u64, u64)>,
-    far: std::collections::BTreeMap<u32, (u64, u64)>,
-}
-
-impl Counts {
-    fn new() -> Self {
-        Self { near: vec![(0, 0); NEAR], far: std::collections::BTreeMap::new() }
+/// What was counted; a message that has a definition here counts as verified.
+fn summary(counts: Counts) -> Summary {
+    let (mut messages, other_messages) = counts.messages();
+    for message in &mut messages {
+        message.id = message.id.map(|(id, _)| (id, hums_dialect::message(id).is_some()));
     }
-
-    fn add(&mut self, id: u32, bytes: usize) {
-        let room = self.far.len() < IDS_MAX;
-        let count = match self.near.get_mut(id as usize) {
-            Some(count) => count,
-            None if room => self.far.entry(id).or_default(),
-            None => return,
-        };
-        (count.0, count.1) = (count.0 + 1, count.1 + bytes as u64);
-    }
-
-    fn summary(&self) -> Summary {
-        let near = (0..).zip(&self.near).filter(|(_, count)| count.0 > 0);
-        let all = near.chain(self.far.iter().map(|(id, count)| (*id, count)));
-        let message =
-            |(id, &(count, bytes))| MessageCount { name: message_name(id).into_owned(), count, bytes };
-        let mut messages: Vec<_> = all.map(message).collect();
-        messages.sort_by(|a, b| a.name.cmp(&b.name));
-        Summary { messages, ending: None }
-    }
+    Summary { messages, other_messages, ..Summary::default() }
 }
 
 /// A ground station's log.
@@ -112,7 +84,7 @@ impl Reader for TlogReader {
             let now = times.now();
             push(&mut framer, &bytes, true, &mut |frame| {
                 checksums.frame(&frame);
-                counts.add(frame.id(), frame.bytes().len());
+                counts.add(frame.id(), true, frame.bytes().len());
                 said.frame(now, &frame, want, take)
             })?;
             checksums.end();
@@ -126,8 +98,8 @@ impl Reader for TlogReader {
         if let Some(words) = checksums.words() {
             take(times.now(), Item::Fact(Fact { about: About::Unchecked, words: &words }))?;
         }
-        let summary = counts.summary();
-        let frames = summary.messages.iter().map(|message| message.count).sum();
+        let summary = summary(counts);
+        let frames = summary.messages.iter().map(|message| message.amount.count).sum();
         for gap in times.gaps().chain(times.none_of(frames)) {
             take(times.now(), Item::Gap(&gap))?;
         }
@@ -176,7 +148,7 @@ impl Reader for RawReader {
         let (mut times, mut blocks) = (BootTimes::default(), Blocks::default());
         let (mut pace, mut bytes) = (Pace::default(), 0);
         let mut each = |line, frame: hums_link::Frame<'_>, take: &mut Take<'_>| {
-            counts.add(frame.id(), frame.bytes().len());
+            counts.add(frame.id(), true, frame.bytes().len());
             let (at, begins) = times.at(line, &frame);
             now = at;
             match begins {
@@ -231,12 +203,12 @@ impl Reader for RawReader {
             };
             take(now, Item::Gap(&lost))?;
         }
-        Ok(counts.summary())
+        Ok(summary(counts))
     }
 }
 
 fn gap(at: Instant, cause: Cause, place: u64, bytes: usize, words: String) -> Gap {
-    Gap { from: Some(at), to: None, cause, place: Some(place), bytes: bytes as u64, words }
+    Gap { from: Some(at), to: None, cause, place: Some(place), bytes: bytes as u64, words, own: None }
 }
 
 /// Pushes bytes into a framer whose frames go to one that may fail. `idle` says that silence follows.

@@ -8,7 +8,8 @@
 //! | ArduPilot's `DataFlash` | `dataflash` |
 //! | PX4's `ULog` | `ulog` |
 //!
-//! A further format is one more [`item::Reader`], and a line of [`recording::Recording::new`].
+//! A further format is one more [`item::Reader`], and a line of [`recording::Recording::new`]. A command takes the items in order
+//! ([`recording::Recording::read`]), or in [`parts`] ([`recording::Place::in_parts`]) where the work is to be shared among the cores.
 //!
 //! # Bytes
 //!
@@ -27,6 +28,7 @@ pub mod booted;
 pub mod checksums;
 pub mod clock;
 mod compressed;
+mod counts;
 pub mod dataflash;
 pub mod doubt;
 pub mod epochs;
@@ -40,6 +42,7 @@ pub mod noise;
 pub mod own;
 pub mod pace;
 pub mod paced;
+pub mod parts;
 pub mod raw;
 pub mod recording;
 mod said;

@@ -1,20 +1,21 @@
 //! Logs of HUMS as the one stream. Groups are decoded side by side ([`crate::logs::reader`]) and handed on in order.
 
 use anyhow::Result;
-use hums_blackbox::record::{Loss, Lost, Note};
-use hums_blackbox::{Cause as OwnCause, Entry, Gap as OwnGap, Record};
+use hums_blackbox::record::{Loss, Lost, Note, RECORD_BYTES_MAX};
+use hums_blackbox::{Cause as OwnCause, Entry, Gap as OwnGap, Record, SECTOR_BYTES};
 use hums_core::observation::{Observation, Source};
 use hums_core::time::Instant;
 use hums_link::{Check, Frame, observe};
 
 use super::checksums::wrong_checksums;
+use super::counts::Counts;
 use super::input::Progress;
-use super::item::{Cause, Gap, Item, MessageCount, Reader, Summary, Take, Want};
+use super::item::{Cause, Gap, Item, Reader, Summary, Take, Want};
+use super::parts::{Collect, Deliver};
 use super::said::Said;
-use super::told::Told;
 use crate::ending::Ending;
 use crate::logs::Log;
-use crate::logs::reader::{Collect, Deliver, epoch, read};
+use crate::logs::reader::{self, epoch};
 use crate::mavlink::ids::{HEARTBEAT, PARAM_VALUE, STATUSTEXT};
 use crate::plural::count;
 
@@ -39,6 +40,26 @@ impl OwnReader {
     pub fn progress(&self) -> Progress {
         self.progress.clone()
     }
+
+    /// Reads it in parts, which are its groups. `seen` gets the bytes that were read.
+    pub fn in_parts<C: Collect>(
+        &self,
+        want: Want<'_>,
+        new: impl Fn() -> C + Sync,
+        deliver: &mut impl Deliver<C>,
+        mut seen: impl FnMut(u64),
+    ) -> Result<Summary> {
+        let Want { frames, observations, .. } = want;
+        let new = || Part { frames, observations, counts: Counts::new(), not_frames: 0, collected: new() };
+        let mut parts = Parts { deliver, counts: Counts::new(), not_frames: 0 };
+        let summary = reader::read(&self.log, new, &mut parts, |blocks| seen(blocks * SECTOR_BYTES as u64))?;
+        let Parts { counts, not_frames, .. } = parts;
+        let (messages, other_messages) = counts.messages();
+        let ending = Ending::of(&self.log, summary);
+        let reader::Summary { first, last, gaps, losses, .. } = ending.summary;
+        let span = first.zip(last);
+        Ok(Summary { messages, other_messages, not_frames, span, gaps, losses, ending: Some(ending) })
+    }
 }
 
 impl Reader for OwnReader {
@@ -46,115 +67,170 @@ impl Reader for OwnReader {
         if let Some(epoch) = epoch(&self.log)? {
             take(Instant::ZERO, Item::Epoch(epoch))?;
         }
-        let mut hand = Hand { want, take, said: Said::default(), frames: 0, frame_bytes: 0 };
-        let new =
-            || Collected { frames: want.frames, observations: want.observations, ..Collected::default() };
-        let progress = &self.progress;
-        let summary = read(&self.log, new, &mut hand, |blocks| {
-            progress.set_taken(blocks * hums_blackbox::SECTOR_BYTES as u64);
-        })?;
+        let mut hand = Hand { want, take, said: Said::default() };
+        let new = || Kept { frames: want.frames, observations: want.observations, ..Kept::default() };
+        let all = Want { frames: true, ..Want::default() };
+        let summary = self.in_parts(all, new, &mut hand, |bytes| self.progress.set_taken(bytes))?;
         hand.said.end(hand.take)?;
-        let (count, bytes) = (hand.frames, hand.frame_bytes);
-        let messages = vec![MessageCount { name: "frames".to_owned(), count, bytes }];
-        Ok(Summary { messages, ending: Some(Ending::of(&self.log, summary)) })
+        Ok(summary)
     }
 }
 
-/// What a group tells, in order.
-#[derive(Default)]
-struct Collected {
+/// A group's entries as items.
+struct Part<C> {
     frames: bool,
     observations: bool,
-    entries: Vec<(Instant, Kept)>,
-    bytes: Vec<u8>,
-    count: u64,
-    frame_bytes: u64,
+    counts: Counts,
+    not_frames: u64,
+    collected: C,
 }
 
-enum Kept {
-    /// A frame, which ends here in `bytes`; all that it says is made of it later.
-    Frame(Check, usize),
-    Observation(Source, Box<Observation>),
-    Told(Told),
-    /// Another recording begins, in a packed log.
-    Joint,
-    /// What was packed was damaged.
-    Damaged(Loss),
-}
-
-impl Collect for Collected {
+impl<C: Collect> reader::Collect for Part<C> {
     fn entry(&mut self, entry: &Entry<'_>) {
         match *entry {
             Entry::Frame { at, bytes, verified } => {
-                (self.count, self.frame_bytes) = (self.count + 1, self.frame_bytes + bytes.len() as u64);
                 let check = if verified { Check::Verified } else { Check::Unverified };
-                let Some(frame) = Frame::again(bytes, check) else { return };
-                if self.frames || matches!(frame.id(), HEARTBEAT | PARAM_VALUE | STATUSTEXT) {
-                    self.bytes.extend_from_slice(bytes);
-                    self.entries.push((at, Kept::Frame(check, self.bytes.len())));
-                } else if let (true, Some((source, observation))) = (self.observations, observe(&frame)) {
-                    self.entries.push((at, Kept::Observation(source, Box::new(observation))));
+                let Some(frame) = Frame::again(bytes, check) else {
+                    self.not_frames += 1;
+                    return;
+                };
+                self.counts.add(frame.id(), verified, bytes.len());
+                if self.frames {
+                    self.collected.item(at, Item::Frame(&frame));
+                }
+                if let (true, Some((source, observation))) = (self.observations, observe(&frame)) {
+                    self.collected.item(at, Item::Observation(source, &observation));
                 }
             }
-            Entry::Record { at, record: Record::Note(Note { text: JOINED, .. }) } => {
-                self.entries.push((at, Kept::Joint));
+            Entry::Record { at, record } => self.collected.item(at, Item::Record(&record)),
+        }
+    }
+
+    fn held_bytes(&self) -> usize {
+        // What is counted has a limit of its own.
+        self.collected.held_bytes()
+    }
+
+    fn only_counts(&self) -> bool {
+        !self.frames && !self.observations
+    }
+
+    fn frame(&mut self, _at: Instant, id: u32, bytes: usize, verified: bool) {
+        self.counts.add(id, verified, bytes);
+    }
+}
+
+/// What is common to all parts.
+struct Parts<'a, D> {
+    deliver: &'a mut D,
+    counts: Counts,
+    not_frames: u64,
+}
+
+impl<C, D: Deliver<C>> reader::Deliver<Part<C>> for Parts<'_, D> {
+    fn gap(&mut self, own: &OwnGap) -> Result<()> {
+        self.deliver.gap(&gap(own))
+    }
+
+    fn group(&mut self, part: Part<C>) -> Result<()> {
+        self.counts.and(&part.counts);
+        self.not_frames += part.not_frames;
+        self.deliver.part(part.collected)
+    }
+}
+
+/// The items of a part until it is their turn.
+#[derive(Default)]
+struct Kept {
+    frames: bool,
+    observations: bool,
+    items: Vec<(Instant, Stored)>,
+    bytes: Vec<u8>,
+}
+
+enum Stored {
+    /// A frame, which ends here in `bytes`; all that it says is made of it later.
+    Frame(Check, usize),
+    Observation(Source, Box<Observation>),
+    /// A record, which ends here in `bytes`.
+    Record(usize),
+}
+
+impl Collect for Kept {
+    fn item(&mut self, at: Instant, item: Item<'_>) {
+        match item {
+            Item::Frame(frame) => {
+                if self.frames || matches!(frame.id(), HEARTBEAT | PARAM_VALUE | STATUSTEXT) {
+                    self.bytes.extend_from_slice(frame.bytes());
+                    self.items.push((at, Stored::Frame(frame.check(), self.bytes.len())));
+                } else if let (true, Some((source, observation))) = (self.observations, observe(frame)) {
+                    self.items.push((at, Stored::Observation(source, Box::new(observation))));
+                }
             }
-            Entry::Record {
-                at,
-                record: Record::Loss(loss @ Loss { what: Lost::WrongChecksums | Lost::DamagedPlaces, .. }),
-            } => self.entries.push((at, Kept::Damaged(loss))),
-            Entry::Record { at, record } => {
-                self.entries.extend(Told::of(&record).map(|told| (at, Kept::Told(told))));
+            Item::Record(record) => {
+                let mut stored = [0; RECORD_BYTES_MAX];
+                if let Ok(len) = record.store(&mut stored) {
+                    self.bytes.extend_from_slice(stored.get(..len).unwrap_or_default());
+                    self.items.push((at, Stored::Record(self.bytes.len())));
+                }
             }
+            _ => {}
         }
     }
 
     fn held_bytes(&self) -> usize {
         // Observations lie on the heap, each with what the allocator adds.
-        const ENTRY_BYTES: usize = size_of::<(Instant, Kept)>() + size_of::<Observation>() + 16;
-        self.bytes.len() + self.entries.len() * ENTRY_BYTES
+        const ITEM_BYTES: usize = size_of::<(Instant, Stored)>() + size_of::<Observation>() + 16;
+        self.bytes.len() + self.items.len() * ITEM_BYTES
     }
 }
 
-/// Hands groups on.
+/// Hands parts on, item by item.
 struct Hand<'a, 'b> {
     want: Want<'a>,
     take: &'a mut Take<'b>,
     said: Said,
-    frames: u64,
-    frame_bytes: u64,
 }
 
-impl Deliver<Collected> for Hand<'_, '_> {
-    fn gap(&mut self, own: &OwnGap) -> Result<()> {
-        let at = own.from.unwrap_or(Instant::ZERO);
-        (self.take)(at, Item::Gap(&gap(own)))
+impl Deliver<Kept> for Hand<'_, '_> {
+    fn gap(&mut self, gap: &Gap) -> Result<()> {
+        (self.take)(gap.from.unwrap_or(Instant::ZERO), Item::Gap(gap))
     }
 
-    fn group(&mut self, group: Collected) -> Result<()> {
-        (self.frames, self.frame_bytes) = (self.frames + group.count, self.frame_bytes + group.frame_bytes);
+    fn part(&mut self, part: Kept) -> Result<()> {
         let mut start = 0;
-        for (at, kept) in &group.entries {
-            match kept {
-                Kept::Frame(check, end) => {
-                    let bytes = group.bytes.get(start..*end).unwrap_or_default();
-                    start = *end;
-                    if let Some(frame) = Frame::again(bytes, *check) {
+        let mut bytes = |end| part.bytes.get(std::mem::replace(&mut start, end)..end).unwrap_or_default();
+        for (at, stored) in &part.items {
+            match stored {
+                Stored::Frame(check, end) => {
+                    if let Some(frame) = Frame::again(bytes(*end), *check) {
                         self.said.frame(*at, &frame, self.want, self.take)?;
                     }
                 }
-                Kept::Observation(source, observation) => {
+                Stored::Observation(source, observation) => {
                     (self.take)(*at, Item::Observation(*source, observation))?;
                 }
-                Kept::Told(told) => (self.take)(*at, Item::Record(told))?,
-                Kept::Damaged(loss) => (self.take)(*at, Item::Gap(&of_packed(loss)))?,
-                Kept::Joint => {
-                    std::mem::take(&mut self.said).end(self.take)?;
-                    (self.take)(*at, Item::Joint)?;
-                }
+                Stored::Record(end) => self.record(*at, &Record::read(bytes(*end)))?,
             }
         }
         Ok(())
+    }
+}
+
+impl Hand<'_, '_> {
+    /// A record, and what it says of the recording that was packed.
+    fn record(&mut self, at: Instant, record: &Record<'_>) -> Result<()> {
+        (self.take)(at, Item::Record(record))?;
+        match record {
+            Record::Note(Note { text: JOINED, .. }) => {
+                std::mem::take(&mut self.said).end(self.take)?;
+                (self.take)(at, Item::Joint)
+            }
+            Record::Loss(loss @ Loss { what: Lost::WrongChecksums | Lost::DamagedPlaces, .. }) => {
+                (self.take)(at, Item::Gap(&of_packed(loss)))
+            }
+            _ => Ok(()),
+        }
     }
 }
 
@@ -165,7 +241,7 @@ fn of_packed(loss: &Loss) -> Gap {
         Lost::WrongChecksums => (wrong_checksums(loss.count), Some(loss.to)),
         _ => (format!("{} in the recording that was packed", count(loss.count, "damaged place")), None),
     };
-    Gap { from: Some(loss.from), to, cause: Cause::Lost, place: None, bytes: 0, words }
+    Gap { from: Some(loss.from), to, cause: Cause::Lost, place: None, bytes: 0, words, own: None }
 }
 
 /// A gap in the stream's words.
@@ -178,7 +254,8 @@ fn gap(own: &OwnGap) -> Gap {
         to: own.to,
         cause,
         place: None,
-        bytes: sectors * hums_blackbox::SECTOR_BYTES as u64,
+        bytes: sectors * SECTOR_BYTES as u64,
         words: format!("{frames} frames are missing: {}", own.cause.name()),
+        own: Some(*own),
     }
 }

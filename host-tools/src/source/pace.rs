@@ -133,7 +133,15 @@ impl Pace {
         let words = "the recorded times stand still, fall again and again, or go on far too slowly, from here on: what is \
                      recorded there cannot be judged";
         let (from, place) = (Some(at), Some(place));
-        Some(Gap { from, to: None, cause: Cause::NoTimes, place, bytes: 0, words: words.to_owned() })
+        Some(Gap {
+            from,
+            to: None,
+            cause: Cause::NoTimes,
+            place,
+            bytes: 0,
+            words: words.to_owned(),
+            own: None,
+        })
     }
 }
 

@@ -2,6 +2,7 @@
 
 use std::fs;
 use std::io;
+use std::mem;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result, bail};
@@ -12,9 +13,11 @@ use super::input::{Input, Progress};
 use super::item::{Cause, Gap, Item, Reader, Stop, Summary, Take, Want};
 use super::mavlink::{RawReader, TlogReader};
 use super::own::OwnReader;
+use super::parts::{Collect, Deliver, PART_BYTES, PART_ITEMS};
 use super::{dataflash, ulog};
 use crate::logs::Log;
 use crate::outcome::usage;
+use crate::progress;
 
 pub use super::format::{Format, format_of};
 
@@ -120,6 +123,51 @@ impl Place {
         }
         Ok(Recording { system: self.system, ..recording })
     }
+
+    /// Reads it in parts: `new` makes the collector of a part, `deliver` gets them in order.
+    pub fn in_parts<C: Collect>(
+        &self,
+        want: Want<'_>,
+        new: impl Fn() -> C + Sync,
+        deliver: &mut impl Deliver<C>,
+    ) -> Result<Summary> {
+        if let Some(log) = self.own() {
+            let bar = progress::bytes(Some(log.bytes()), &self.title);
+            let summary =
+                OwnReader::new(log.clone()).in_parts(want, new, deliver, |bytes| bar.set_position(bytes));
+            bar.finish_and_clear();
+            return summary;
+        }
+        let recording = self.open()?;
+        let (is_of_link, seen) = (recording.format.is_of_link(), recording.progress.clone());
+        let bar = progress::bytes(seen.total(), &self.title);
+        let (mut part, mut items) = (new(), 0);
+        let summary = recording.read(want, &mut |at, item| {
+            let begins = match item {
+                // What a frame says stays with it.
+                Item::Observation(..) => !is_of_link,
+                Item::Frame(_) | Item::Row(_) | Item::Gap(_) => true,
+                _ => return Ok(()),
+            };
+            let is_full = items >= PART_ITEMS || part.held_bytes() >= PART_BYTES;
+            if begins && (is_full || matches!(item, Item::Gap(_))) {
+                items = 0;
+                bar.set_position(seen.taken());
+                deliver.part(mem::replace(&mut part, new()))?;
+            }
+            items += u32::from(begins);
+            match item {
+                Item::Gap(gap) => deliver.gap(gap),
+                item => {
+                    part.item(at, item);
+                    Ok(())
+                }
+            }
+        })?;
+        deliver.part(part)?;
+        bar.finish_and_clear();
+        Ok(summary)
+    }
 }
 
 /// Why there is no choice of a vehicle in an autopilot's own log.
@@ -170,27 +218,56 @@ impl Recording {
     /// Reads it from its beginning to its end, or until `take` says [`Stop`].
     pub fn read(mut self, want: Want<'_>, take: &mut Take<'_>) -> Result<Summary> {
         let want = Want { system: self.system, ..want };
-        let (mut last, mut is_takers) = (Instant::ZERO, false);
+        let (mut last, mut is_takers, mut seen) = (Instant::ZERO, false, Seen::default());
         let mut follow = |at: Instant, item: Item<'_>| {
             last = last.max(at);
+            seen.item(at, &item);
             let taken = take(at, item);
             is_takers |= taken.is_err();
             taken
         };
-        let summary = match self.reader.read(want, &mut follow) {
+        let mut summary = match self.reader.read(want, &mut follow) {
             Err(error) if error.is::<Stop>() => return Ok(Summary::default()),
             Err(error) if is_takers => return Err(error),
             result => result.with_context(|| self.name.clone())?,
         };
         if let Some(words) = self.progress.damage() {
             let place = Some(self.progress.taken());
-            let gap = Gap { from: Some(last), to: None, cause: Cause::Cut, place, bytes: 0, words };
+            let gap =
+                Gap { from: Some(last), to: None, cause: Cause::Cut, place, bytes: 0, words, own: None };
+            seen.item(last, &Item::Gap(&gap));
             match take(last, Item::Gap(&gap)) {
                 Err(error) if !error.is::<Stop>() => return Err(error),
                 _ => {}
             }
         }
+        let Seen { span, gaps, losses } = seen;
+        (summary.span, summary.gaps, summary.losses) = (span, gaps, losses);
         Ok(summary)
+    }
+}
+
+/// What was handed on.
+#[derive(Default)]
+struct Seen {
+    span: Option<(Instant, Instant)>,
+    gaps: u64,
+    losses: u64,
+}
+
+impl Seen {
+    fn item(&mut self, at: Instant, item: &Item<'_>) {
+        match item {
+            Item::Frame(_) | Item::Row(_) | Item::Observation(..) => {
+                let (first, last) = self.span.unwrap_or((at, at));
+                self.span = Some((first, last.max(at)));
+            }
+            Item::Gap(gap) => {
+                self.gaps += u64::from(gap.cause.is_damage());
+                self.losses += u64::from(gap.cause == Cause::Lost);
+            }
+            _ => {}
+        }
     }
 }
 

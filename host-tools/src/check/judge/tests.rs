@@ -1,5 +1,7 @@
 //! The judge, on recordings made for the purpose.
 
+use hums_blackbox::Record;
+use hums_blackbox::record::{FindingRecord, Moment, Parameter, Usage};
 use hums_core::health::{Level, VOCABULARY, Words};
 use hums_core::observation::{
     Attitude, Autopilot, Battery, Esc, EscGroup, Heartbeat, LandedState, Observation, Source, VtolState,
@@ -10,6 +12,9 @@ use hums_core::units::{Fraction, Rpm, Volts};
 use super::*;
 use crate::check::flights::Flight;
 use crate::source::item::hand_said;
+
+/// What only a monitor writes that checks.
+const CHECKED: Record<'_> = Record::Usage(Usage::new(Moment::Start, &[]));
 
 const AUTOPILOT: Source = Source { system: 1, component: 1 };
 
@@ -173,7 +178,7 @@ fn a_gap_is_no_time_in_the_air_and_a_landing_right_before_it_ends_the_flight() {
         }
         let (from, to) = (Some(at), Some(Instant::from_millis(930_000)));
         let words = String::new();
-        let gap = Gap { from, to, cause: Why::NotKept, place: None, bytes: 0, words };
+        let gap = Gap { from, to, cause: Why::NotKept, place: None, bytes: 0, words, own: None };
         judge.item(Instant::from_millis(930_000), Item::Gap(&gap));
         half_seconds(&mut judge, 930_000, 950_000, true, LandedState::InAir);
         let flights = judge.end().flights;
@@ -191,7 +196,7 @@ fn what_follows_a_gap_and_is_not_judged_is_time_in_the_air() {
         half_seconds(&mut judge, from_ms, from_ms + 4_000, true, LandedState::InAir);
         let [from, to] = [from_ms + 4_000, from_ms + 6_000].map(Instant::from_millis);
         let (words, cause) = (String::new(), Why::Lost);
-        let gap = Gap { from: Some(from), to: Some(to), cause, place: None, bytes: 0, words };
+        let gap = Gap { from: Some(from), to: Some(to), cause, place: None, bytes: 0, words, own: None };
         judge.item(to, Item::Gap(&gap));
     }
     half_seconds(&mut judge, 65_000, 70_000, true, LandedState::InAir);
@@ -385,8 +390,15 @@ fn a_recording_that_does_not_tell_arming_says_so_and_not_never() {
 #[test]
 fn nothing_of_a_vehicle_is_no_good_news() {
     let mut judge = Judge::new(&Limits::default(), Format::Tlog);
-    let gap =
-        Gap { from: None, to: None, cause: Why::Cut, place: Some(7), bytes: 3, words: "cut".to_owned() };
+    let gap = Gap {
+        from: None,
+        to: None,
+        cause: Why::Cut,
+        place: Some(7),
+        bytes: 3,
+        words: "cut".to_owned(),
+        own: None,
+    };
     judge.item(Instant::ZERO, Item::Gap(&gap));
     let judged = judge.end();
     assert_eq!((judged.worst(), judged.damages), (None, 1));
@@ -437,7 +449,7 @@ fn silence_of_a_link_is_no_finding_where_nobody_knows_which_link_it_was() {
         let given = [(Param::BatRemWarn.spec(), 15.0)];
         let mut judge = Judge::new(&Limits::new(&given), Format::Hums);
         if checked {
-            judge.item(Instant::ZERO, Item::Record(&Told::Checked));
+            judge.item(Instant::ZERO, Item::Record(&CHECKED));
         }
         fly(&mut judge, 0, 10, 10, 0.9);
         fly(&mut judge, 30, 40, 10, 0.9);
@@ -469,7 +481,7 @@ fn a_pause_of_the_recording_is_no_silence_of_an_esc_and_one_that_falls_silent_is
         let mut judge = Judge::new(&Limits::default(), Format::DataFlash);
         escs(&mut judge, 0, 10_000);
         let (from, to) = (Some(Instant::from_millis(9_900)), Some(Instant::from_millis(30_000)));
-        let gap = Gap { from, to, cause, place: None, bytes: 0, words: String::new() };
+        let gap = Gap { from, to, cause, place: None, bytes: 0, words: String::new(), own: None };
         if told {
             judge.item(Instant::from_millis(30_000), Item::Gap(&gap));
         }
@@ -494,7 +506,7 @@ fn findings_after_a_pause_have_the_recordings_time() {
     fly(&mut judge, 0, 10, 10, 0.9);
     let (from, to) = (Some(Instant::from_millis(9_900)), Some(Instant::from_millis(30_000)));
     let words = String::new();
-    let gap = Gap { from, to, cause: Why::NotKept, place: None, bytes: 0, words };
+    let gap = Gap { from, to, cause: Why::NotKept, place: None, bytes: 0, words, own: None };
     judge.item(Instant::from_millis(30_000), Item::Gap(&gap));
     fly(&mut judge, 30, 40, 10, 0.1);
     let found = found(&judge.end());
@@ -505,27 +517,27 @@ fn findings_after_a_pause_have_the_recordings_time() {
 
 #[test]
 fn what_the_board_found_counts_unless_other_limits_are_asked_for() {
-    let finding = Finding {
+    let finding = FindingRecord {
         at: Instant::from_millis(7_000),
         subsystem: hums_core::health::Subsystem::Recorder,
-        check: "card_stall".to_owned(),
+        check: "card_stall",
         instance: 0,
         level: Level::Critical,
         previous: Level::Ok,
         value: 3000.0,
         limit: 2500.0,
-        unit: "ms".to_owned(),
+        unit: "ms",
     };
     let spec = Param::BatRemWarn.spec();
     for (given, by, check) in
         [(vec![], JudgedBy::Board, "card_stall"), (vec![(spec, 95.0)], JudgedBy::Here, "batt_remaining")]
     {
         let mut judge = Judge::new(&Limits::new(&given), Format::Hums);
-        judge.item(Instant::ZERO, Item::Record(&Told::Checked));
-        let other = Told::Parameter { name: spec.name.to_owned(), value: 1.0, start: true };
-        judge.item(Instant::ZERO, Item::Record(&other));
+        judge.item(Instant::ZERO, Item::Record(&CHECKED));
+        let other = Parameter { name: spec.name, value: 1.0, changed: false, by: (0, 0) };
+        judge.item(Instant::ZERO, Item::Record(&Record::Parameter(other)));
         fly(&mut judge, 0, 10, 10, 0.9);
-        judge.item(Instant::from_millis(7_000), Item::Record(&Told::Finding(Box::new(finding.clone()))));
+        judge.item(Instant::from_millis(7_000), Item::Record(&Record::Finding(finding)));
         let judged = judge.end();
         assert_eq!(judged.by, by);
         assert_eq!(judged.problems.iter().map(|problem| problem.check.as_str()).collect::<Vec<_>>(), [check]);
@@ -579,22 +591,22 @@ fn a_finding_names_the_text_or_the_event_that_raised_it_whatever_the_words_of_it
 fn what_the_board_found_is_named_too() {
     use hums_core::cause::Urgency;
     let mut judge = Judge::new(&Limits::default(), Format::Hums);
-    let finding = Finding {
+    let finding = FindingRecord {
         at: Instant::from_millis(5_100),
         subsystem: hums_core::health::Subsystem::Power,
-        check: "battery_alert".to_owned(),
+        check: "battery_alert",
         instance: 0,
         level: Level::Warning,
         previous: Level::Ok,
         value: 1.0,
         limit: 0.5,
-        unit: String::new(),
+        unit: "",
     };
     fly(&mut judge, 0, 5, 10, 0.9);
     let alert = Some(Alert { cause: Cause::Power, urgency: Urgency::Warning });
     let text = Text { source: AUTOPILOT, severity: 4, words: "Battery 1 is low", alert };
     judge.item(Instant::from_millis(5_050), Item::Text(text));
-    judge.item(finding.at, Item::Record(&Told::Finding(Box::new(finding))));
+    judge.item(finding.at, Item::Record(&Record::Finding(finding)));
     let judged = judge.end();
     assert_eq!(
         (judged.by, judged.problems[0].details.clone()),
@@ -661,7 +673,15 @@ fn what_comes_where_the_recording_has_no_times_is_left_out() {
         fly(&mut judge, 0, 20, 10, 0.9);
         fly(&mut judge, 20, 40, 10, 0.1);
         let from = Some(Instant::from_millis(from_s * 1_000));
-        let gap = Gap { from, to: None, cause: Why::NoTimes, place: Some(1), bytes: 0, words: String::new() };
+        let gap = Gap {
+            from,
+            to: None,
+            cause: Why::NoTimes,
+            place: Some(1),
+            bytes: 0,
+            words: String::new(),
+            own: None,
+        };
         judge.item(Instant::from_millis(40_000), Item::Gap(&gap));
         judge.end()
     };

@@ -19,8 +19,8 @@ use super::table::{self, Tables};
 use crate::plural::count;
 use crate::source::clock::Wrong;
 use crate::source::item::{
-    About, Cause, Event, Fact, Gap, Item, MessageCount, Mode, Parameter, Row, Rows, Summary, Table, Take,
-    Text, Want, hand_said,
+    About, Amount, Cause, Event, Fact, Gap, Item, MessageCount, Mode, Parameter, Row, Rows, Summary, Table,
+    Take, Text, Want, hand_said,
 };
 use crate::source::pace::Pace;
 
@@ -404,7 +404,7 @@ impl<'w> Session<'w> {
                 (Cause::NotKept, "nothing was written")
             };
             let (from, to, words) = (Some(from), Some(when.at), words.to_owned());
-            take(when.at, Item::Gap(&Gap { from, to, cause, place: None, bytes: 0, words }))?;
+            take(when.at, Item::Gap(&Gap { from, to, cause, place: None, bytes: 0, words, own: None }))?;
         }
         if let Some(standing) = later.take_if(|_| when.own == Own::Sound) {
             state.stand(standing);
@@ -493,7 +493,7 @@ impl<'w> Session<'w> {
     ) -> Result<()> {
         let now = self.clock.now();
         let from = Some(now).filter(|_| self.clock.has_begun());
-        take(now, Item::Gap(&Gap { from, to: None, cause, place, bytes, words }))
+        take(now, Item::Gap(&Gap { from, to: None, cause, place, bytes, words, own: None }))
     }
 
     /// What was read.
@@ -513,8 +513,9 @@ impl<'w> Session<'w> {
             self.gap(Cause::NoTimes, None, 0, words, take)?;
         }
         self.count_by_name();
-        let told = |(name, (count, bytes))| MessageCount { name, count, bytes };
-        Ok(Summary { messages: self.counts_before.into_iter().map(told).collect(), ending: None })
+        let told = |(name, (count, bytes))| MessageCount { id: None, name, amount: Amount { count, bytes } };
+        let messages = self.counts_before.into_iter().map(told).collect();
+        Ok(Summary { messages, ..Summary::default() })
     }
 }
 
@@ -567,8 +568,15 @@ impl Said<'_, '_> {
             Say::Lost(messages) => {
                 let messages = count(messages, "message");
                 let words = format!("{messages} that the autopilot's logger had no room for");
-                let gap =
-                    Gap { from: Some(self.at), to: None, cause: Cause::Lost, place: None, bytes: 0, words };
+                let gap = Gap {
+                    from: Some(self.at),
+                    to: None,
+                    cause: Cause::Lost,
+                    place: None,
+                    bytes: 0,
+                    words,
+                    own: None,
+                };
                 return (self.take)(self.at, Item::Gap(&gap));
             }
         };

@@ -91,7 +91,15 @@ impl Beside {
              clock counts",
             self.passed_us.div_ceil(1_000_000)
         );
-        Some(Gap { from: Some(at), to: None, cause: Cause::Damaged, place: Some(place), bytes: 0, words })
+        Some(Gap {
+            from: Some(at),
+            to: None,
+            cause: Cause::Damaged,
+            place: Some(place),
+            bytes: 0,
+            words,
+            own: None,
+        })
     }
 }
 
@@ -231,6 +239,7 @@ impl Times {
             place: None,
             bytes: 0,
             words,
+            own: None,
         })
     }
 
@@ -241,6 +250,6 @@ impl Times {
         }
         let words =
             format!("{} have the same time: nothing in the log can be judged", count(self.records, "record"));
-        Some(Gap { from: None, to: None, cause: Cause::NoTimes, place: None, bytes: 0, words })
+        Some(Gap { from: None, to: None, cause: Cause::NoTimes, place: None, bytes: 0, words, own: None })
     }
 }

@@ -206,7 +206,7 @@ impl<'a, 'b> Session<'a, 'b> {
             self.tell(Item::Gap(&gap))?;
         }
         self.tell_facts()?;
-        Ok(Summary { messages: self.subscriptions.counts(), ending: None })
+        Ok(Summary { messages: self.subscriptions.counts(), ..Summary::default() })
     }
 
     fn tell(&mut self, item: Item<'_>) -> Result<()> {
@@ -219,7 +219,7 @@ impl<'a, 'b> Session<'a, 'b> {
     }
 
     fn gap(&mut self, cause: Cause, place: Option<u64>, bytes: u64, words: String) -> Result<()> {
-        let gap = Gap { from: Some(self.clock.now()), to: None, cause, place, bytes, words };
+        let gap = Gap { from: Some(self.clock.now()), to: None, cause, place, bytes, words, own: None };
         self.tell(Item::Gap(&gap))
     }
 
@@ -489,6 +489,7 @@ impl<'a, 'b> Session<'a, 'b> {
                 0 => "a dropout: the card was too slow for the logger".to_owned(),
                 _ => format!("a dropout of {milliseconds} ms: the card was too slow for the logger"),
             },
+            own: None,
         };
         self.tell(Item::Gap(&gap))
     }

@@ -50,7 +50,7 @@ fn a_log_gives_its_definitions_its_data_and_no_damage() {
     assert_eq!(read.of("text"), ["4 low battery", "6 tagged"]);
     assert_eq!(read.of("gap"), [""; 0]);
     let counts: Vec<(&str, u64)> =
-        read.summary.messages.iter().map(|message| (message.name.as_str(), message.count)).collect();
+        read.summary.messages.iter().map(|message| (message.name.as_str(), message.amount.count)).collect();
     assert_eq!(counts, [("position", 20)]);
 }
 

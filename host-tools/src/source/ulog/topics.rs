@@ -7,7 +7,7 @@ use super::fields::{Slot, slots};
 use super::format::Layout;
 use super::px4::{self, Topic};
 use super::rows;
-use crate::source::item::{MessageCount, Rows, Table};
+use crate::source::item::{Amount, MessageCount, Rows, Table};
 
 /// Subscriptions at a time at most. PX4 has some 200.
 const SUBSCRIPTIONS_MAX: usize = 4_096;
@@ -169,7 +169,7 @@ impl Subscriptions {
     /// What there was, by name.
     pub(super) fn counts(mut self) -> Vec<MessageCount> {
         self.clear();
-        let of = |(name, (count, bytes))| MessageCount { name, count, bytes };
+        let of = |(name, (count, bytes))| MessageCount { id: None, name, amount: Amount { count, bytes } };
         self.counted.into_iter().map(of).collect()
     }
 }

@@ -16,7 +16,7 @@ use hums_core::time::Instant;
 
 use self::writer::Writer;
 use super::*;
-use crate::source::item::{Item, Rows, Value};
+use crate::source::item::{Amount, Item, Rows, Value};
 
 /// What a log gives, in a form that is easily compared.
 #[derive(Debug, Default)]
@@ -172,7 +172,7 @@ fn a_definition_that_changes_gets_a_table_of_its_own() {
     let (seen, summary) = read(&log.bytes).expect("a log");
     assert_eq!(seen.rows.iter().filter(|row| row.starts_with('X')).collect::<Vec<_>>(), ["X 1 1", "X_2 2 2"]);
     let count = summary.messages.iter().find(|message| message.name == "X").expect("counted");
-    assert_eq!((count.count, count.bytes), (2, 12 + 13));
+    assert_eq!(count.amount, Amount { count: 2, bytes: 12 + 13 });
 }
 
 #[test]

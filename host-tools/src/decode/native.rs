@@ -1,0 +1,88 @@
+//! The rows of an autopilot's own log, with its own tables and units.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Mutex;
+
+use super::row::{Cell, CellType, Row};
+use crate::source::item::{self, Kind, Table, Value};
+
+/// Names of tables and columns of all logs together, bytes: they are kept for as long as the program runs. A log that
+/// has more of them is not made by an autopilot; its further tables are left out, and counted.
+const NAMES_BYTES_MAX: usize = 4 << 20;
+
+/// The names of the tables of one log that were seen, and of their columns with units; none where there was no room for them.
+#[derive(Debug, Default)]
+pub struct Tables(Mutex<BTreeMap<String, Option<Names>>>);
+
+type Names = (&'static str, Vec<&'static str>);
+
+impl Tables {
+    /// A row as cells; `None` where there was no room for the names of its table.
+    pub fn row(&self, row: item::Row<'_>) -> Option<Row> {
+        let item::Row { table, values } = row;
+        let mut seen = self.0.lock().ok()?;
+        if !seen.contains_key(&table.name) {
+            seen.insert(table.name.clone(), names(table));
+        }
+        let (name, columns) = seen.get(&table.name)?.as_ref()?;
+        let kinds = table.columns.iter().map(|column| column.kind);
+        let cells = columns.iter().zip(kinds).zip(values);
+        let cells = cells.map(|((name, kind), value)| (*name, cell(kind, *value))).collect();
+        Some(Row::new(name, cells))
+    }
+}
+
+/// The names of a table, kept for ever.
+fn names(table: &Table) -> Option<Names> {
+    let columns = table.columns.iter().map(|column| {
+        if column.unit.is_empty() {
+            kept(&column.name)
+        } else {
+            kept(&format!("{}[{}]", column.name, column.unit))
+        }
+    });
+    let columns = columns.collect::<Option<Vec<_>>>()?;
+    Some((kept(&table.name)?, columns))
+}
+
+/// A name that lives as long as the program; none where there are too many.
+fn kept(name: &str) -> Option<&'static str> {
+    static KEPT: Mutex<(BTreeSet<&'static str>, usize)> = Mutex::new((BTreeSet::new(), 0));
+    let mut kept = KEPT.lock().ok()?;
+    if let Some(known) = kept.0.get(name) {
+        return Some(known);
+    }
+    kept.1 += name.len();
+    if kept.1 > NAMES_BYTES_MAX {
+        return None;
+    }
+    let name: &'static str = Box::leak(name.to_owned().into_boxed_str());
+    kept.0.insert(name);
+    Some(name)
+}
+
+fn cell(kind: Kind, value: Value<'_>) -> Cell {
+    match value {
+        Value::Unsigned(value) => Cell::Count(value),
+        Value::Signed(value) => Cell::Signed(value),
+        Value::Single(value) => Cell::Single(value),
+        Value::Double(value) => Cell::Double(value),
+        Value::Flag(value) => Cell::Flag(value),
+        Value::Text(words) if kind == Kind::Text => Cell::Text(words.to_owned()),
+        Value::Text(words) => Cell::Words(words.to_owned(), cell_type(kind)),
+        Value::Bytes(bytes) => Cell::Hex(bytes.to_owned()),
+        Value::Unknown => Cell::Unknown(cell_type(kind)),
+    }
+}
+
+const fn cell_type(kind: Kind) -> CellType {
+    match kind {
+        Kind::Unsigned => CellType::Count,
+        Kind::Signed => CellType::Signed,
+        Kind::Single => CellType::Single,
+        Kind::Double => CellType::Double,
+        Kind::Flag => CellType::Flag,
+        Kind::Text => CellType::Text,
+        Kind::Bytes => CellType::Hex,
+    }
+}

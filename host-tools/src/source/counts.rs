@@ -1,0 +1,58 @@
+//! MAVLink messages of a recording, counted by their ids.
+
+use std::collections::BTreeMap;
+
+use super::item::{Amount, MessageCount};
+use crate::names::message_name;
+
+/// Ids below half of this are counted in a table: most ids are small, and a tree takes longer to search.
+const NEAR: usize = 1024;
+/// Further ids that are counted one by one: there are 16 million, and hostile recordings.
+const FAR_MAX: usize = 4_096;
+
+/// Frames by their id, and whether their checksum is that of the definition known here.
+#[derive(Debug)]
+pub(super) struct Counts {
+    near: Vec<Amount>,
+    far: BTreeMap<(u32, bool), Amount>,
+    /// Of the ids beyond these.
+    other: Amount,
+}
+
+impl Counts {
+    pub(super) fn new() -> Self {
+        Self { near: vec![Amount::default(); NEAR], far: BTreeMap::new(), other: Amount::default() }
+    }
+
+    pub(super) fn add(&mut self, id: u32, verified: bool, bytes: usize) {
+        self.place((id, verified)).add(Amount { count: 1, bytes: bytes as u64 });
+    }
+
+    /// Adds those of the next part.
+    pub(super) fn and(&mut self, next: &Self) {
+        self.near.iter_mut().zip(&next.near).for_each(|(count, more)| count.add(*more));
+        next.far.iter().for_each(|(key, more)| self.place(*key).add(*more));
+        self.other.add(next.other);
+    }
+
+    /// By their ids, and of those beyond what is counted one by one.
+    pub(super) fn messages(self) -> (Vec<MessageCount>, Amount) {
+        let near = (0_u32..).zip(self.near).filter(|(_, amount)| amount.count > 0);
+        let near = near.map(|(place, amount)| ((place >> 1, place & 1 != 0), amount));
+        let message = |((id, verified), amount)| MessageCount {
+            id: Some((id, verified)),
+            name: message_name(id).into_owned(),
+            amount,
+        };
+        (near.chain(self.far).map(message).collect(), self.other)
+    }
+
+    fn place(&mut self, key: (u32, bool)) -> &mut Amount {
+        let (id, verified) = key;
+        match self.near.get_mut((id as usize) << 1 | usize::from(verified)) {
+            Some(amount) => amount,
+            None if self.far.len() >= FAR_MAX && !self.far.contains_key(&key) => &mut self.other,
+            None => self.far.entry(key).or_default(),
+        }
+    }
+}
