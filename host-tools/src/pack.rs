@@ -4,7 +4,7 @@
 use std::collections::VecDeque;
 use std::io::Write;
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result};
 use hums_blackbox::record::{Clock, Loss, Lost, Note};
 use hums_blackbox::{Full, Record, Sector, SectorSink, Writer};
 use hums_core::time::Instant;
@@ -76,7 +76,7 @@ pub fn run(args: &cli::Pack) -> Result<Outcome> {
     packer.damaged(last_us, last_us, source.damages()).with_context(context)?;
     let (done, mut file) = packer.finish(last_us).with_context(context)?;
     if done.frames == 0 {
-        bail!("{}: has no MAVLink frame, so nothing was written; hums check says what a file is", args.input);
+        return Err(source::no_frame(&args.input));
     }
     file.finish()?;
     if let Some(remark) = source.remark() {

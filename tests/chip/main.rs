@@ -5,6 +5,8 @@
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
 
 #[cfg(feature = "chip")]
+mod bounds;
+#[cfg(feature = "chip")]
 mod faults;
 #[cfg(feature = "chip")]
 mod flights;

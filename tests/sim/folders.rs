@@ -11,6 +11,7 @@ use std::time::Duration;
 use hums_tests::child;
 use hums_tests::flights;
 use hums_tests::hostile;
+use hums_tests::not_tested;
 use hums_tests::program::{LIMIT, command, hums};
 use serde_json::Value;
 
@@ -56,6 +57,31 @@ fn pipes_and_sockets_in_a_folder_are_passed_over_and_said() {
     for said in ["pipe.hum: is a pipe", "socket.hum: is a pipe, a socket or a device"] {
         assert!(outcome.stderr.contains(said), "{said}: {}", outcome.stderr);
     }
+}
+
+/// A device may have no end, or do something when it is opened.
+#[test]
+fn devices_in_a_folder_are_passed_over_and_said() {
+    let dir = tempfile::tempdir().unwrap();
+    hostile::heartbeats(dir.path(), 100);
+    symlink("/dev/zero", dir.path().join("link.bin")).unwrap();
+    let node = dir.path().join("device.bin");
+    let made = Command::new("mknod").arg(&node).args(["c", "1", "5"]).output();
+    let outcome = info(dir.path()).expect_code(&[0]);
+    assert_eq!(names(&outcome), ["heartbeats"]);
+    assert!(outcome.stderr.contains("link.bin: is a link"), "{}", outcome.stderr);
+    if made.is_ok_and(|made| made.status.success()) {
+        let said = "device.bin: is a pipe, a socket or a device";
+        assert!(outcome.stderr.contains(said), "{}", outcome.stderr);
+        return;
+    }
+    // Who may not make one has one in this folder, in which there is no log.
+    if Path::new("/dev/pts/ptmx").exists() {
+        let outcome = info(Path::new("/dev/pts")).expect_code(&[1]);
+        assert!(outcome.stderr.contains("ptmx: is a pipe, a socket or a device"), "{}", outcome.stderr);
+        return;
+    }
+    not_tested("a device in a folder (none can be made here, and /dev/pts has none)");
 }
 
 /// Each command that reads recordings, with this path as its input.

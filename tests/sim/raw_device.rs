@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use hums_tests::flights::own;
+use hums_tests::not_tested;
 use hums_tests::program::{Machine, Recording, hums};
 use serde_json::Value;
 
@@ -28,21 +29,45 @@ impl Drop for Loop {
 }
 
 #[test]
-fn a_raw_device_is_read_like_its_image() {
+fn a_raw_device_is_read_like_its_image_by_each_command_and_never_written() {
     let recording = Recording::make(Machine::Sim, &own("px4_hil_quad_low.tlog"), &["--card-size", "64"]);
     let image = recording.image();
     let Some(device) = Loop::over(&image) else {
-        println!("NOT TESTED: a raw device (no loop device can be made here)");
+        not_tested("a raw device (no loop device can be made here)");
         return;
     };
     assert_eq!(fs::metadata(&device.0).unwrap().len(), 0, "its metadata says nothing of its length");
-    for command in ["info", "verify"] {
-        let told = |path: &Path| -> Value {
-            let outcome = hums([command.as_ref(), "--json".as_ref(), path.as_os_str()]).expect_code(&[0]);
-            let shown = path.display().to_string();
-            serde_json::from_str(&outcome.text().replace(&shown, "CARD")).unwrap()
-        };
-        assert_eq!(told(&device.0)["logs"], told(&image)["logs"], "{command}");
+    let told = |words: &[&str], path: &Path| -> Value {
+        let all = words.iter().map(AsRef::as_ref).chain([path.as_os_str()]);
+        let outcome = hums(all).expect_code(&[0, 4]);
+        serde_json::from_str(&outcome.text().replace(&path.display().to_string(), "CARD")).unwrap()
+    };
+    for command in ["info", "verify", "check"] {
+        let words = [command, "--json"];
+        assert_eq!(told(&words, &device.0), told(&words, &image), "{command}");
     }
-    hums(["check".as_ref(), device.0.as_os_str()]).expect_code(&[0, 4]);
+    let out = tempfile::tempdir().unwrap();
+    let decoded = |path: &Path, name: &str| {
+        let to = out.path().join(name);
+        let words = ["decode".as_ref(), path.as_os_str(), "-o".as_ref(), to.as_os_str()];
+        hums(words.into_iter().chain(["--format", "tlog"].map(AsRef::as_ref))).expect_code(&[0]);
+        fs::read(to).unwrap()
+    };
+    assert!(decoded(&device.0, "device.tlog") == decoded(&image, "image.tlog"));
+    let page = out.path().join("page.html");
+    hums(["report".as_ref(), device.0.as_os_str(), "-o".as_ref(), page.as_os_str()]).expect_code(&[0]);
+
+    let before = fs::read(&image).unwrap();
+    let tlog = own("px4_hil_quad_low.tlog");
+    let (tlog, device) = (tlog.display(), device.0.display());
+    for line in [
+        format!("pack {tlog} -o {device}"),
+        format!("report {tlog} -o {device}"),
+        format!("sim --input {tlog} --sd {}/card.img --gs {device}", out.path().display()),
+        format!("sim --input {tlog} --sd {}/card.img --tap {device}", out.path().display()),
+    ] {
+        let refused = hums(line.split(' ')).expect_code(&[2]);
+        assert!(refused.stderr.contains("is a disk or a card"), "{line}: {}", refused.stderr);
+    }
+    assert!(fs::read(&image).unwrap() == before);
 }

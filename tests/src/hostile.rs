@@ -4,6 +4,8 @@ use std::fs::{self, File};
 use std::io::{BufWriter, Seek as _, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
+use flate2::Compression;
+use flate2::write::GzEncoder;
 use hums::card::ReadOnlyImage;
 use hums_blackbox::parity::Sum;
 use hums_blackbox::{Header, SECTOR_BYTES, Sector};
@@ -260,6 +262,34 @@ fn long(dir: &Path, name: &str, write: impl FnOnce(&mut dyn Write)) -> PathBuf {
     write(&mut file);
     file.flush().unwrap();
     path
+}
+
+/// A port's bytes as `.gz`, which expand 900-fold to 70 MB: heartbeats, zeros, heartbeats.
+pub fn expanding(dir: &Path) -> PathBuf {
+    let path = dir.join("expanding.raw.gz");
+    let mut to = GzEncoder::new(File::create(&path).unwrap(), Compression::default());
+    to.write_all(&HEARTBEAT.repeat(1_000)).unwrap();
+    for _ in 0..70 {
+        to.write_all(&vec![0; 1_000_000]).unwrap();
+    }
+    to.write_all(&HEARTBEAT.repeat(1_000)).unwrap();
+    to.finish().unwrap();
+    path
+}
+
+/// A text log of `ArduPilot`'s with a line of 80 MB.
+pub fn long_line(dir: &Path) -> PathBuf {
+    long(dir, "line.log", |log| {
+        log.write_all(b"FMT, 128, 89, FMT, BBnNZ, Type,Length,Name,Format,Columns\n").unwrap();
+        log.write_all(b"FMT, 129, 23, ATT, Qff, TimeUS,Roll,Pitch\n").unwrap();
+        for second in 1..20 {
+            writeln!(log, "ATT, {}, 1.5, 2.0", second * 1_000_000).unwrap();
+        }
+        log.write_all(b"ATT, 30000000, 1.5, ").unwrap();
+        for _ in 0..80 {
+            log.write_all(&vec![b'1'; 1_000_000]).unwrap();
+        }
+    })
 }
 
 /// The definition of a message of `DataFlash`.

@@ -75,6 +75,17 @@ impl Live {
     /// As [`Self::start`], with the program at this path.
     #[track_caller]
     pub fn start_at(program: &Path, arguments: &[&str]) -> Self {
+        Self::attempt_at(program, arguments).unwrap_or_else(|words| panic!("no address: {words}"))
+    }
+
+    /// As [`Self::start`]; none where it ends with an error, as it does with what is no recording.
+    #[track_caller]
+    pub fn attempt(arguments: &[&str]) -> Option<Self> {
+        Self::attempt_at(crate::program::path(), arguments).ok()
+    }
+
+    #[track_caller]
+    fn attempt_at(program: &Path, arguments: &[&str]) -> Result<Self, String> {
         let state = tempfile::tempdir().unwrap();
         let mut command = Command::new(program);
         command
@@ -91,9 +102,11 @@ impl Live {
         if !address.starts_with("http://127.0.0.1:") {
             let mut words = String::new();
             let _ = stderr.read_to_string(&mut words);
-            panic!("no address: {address:?} {words}");
+            let code = Running(child).end(Duration::from_secs(10));
+            assert!(code == Some(1) && !words.contains("panicked"), "{code:?}: {address:?} {words}");
+            return Err(words);
         }
-        Self { program: Running(child), address: address.trim().to_owned(), stderr, _state: state }
+        Ok(Self { program: Running(child), address: address.trim().to_owned(), stderr, _state: state })
     }
 
     /// Ends it as Ctrl-C does: its exit code, and what it said.

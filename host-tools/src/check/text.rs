@@ -88,6 +88,8 @@ enum State {
     Lossy,
     /// A log of ours without damage, of which nothing proves that it is whole.
     NotProved,
+    /// A log of ours that lacks nothing, because sectors that a card had lost were made again from parity.
+    MadeAgain,
 }
 
 impl State {
@@ -98,6 +100,7 @@ impl State {
             Self::Damaged => "part of it is missing or damaged",
             Self::Lossy => "part of it was not recorded",
             Self::NotProved => "not proved to be whole",
+            Self::MadeAgain => "damaged, and made whole from its parity",
         }
     }
 }
@@ -108,6 +111,7 @@ fn state(checked: &Checked) -> State {
     match judged.damages {
         0 if checked.ending.as_ref().is_some_and(|ending| !ending.unproved().is_empty()) => State::NotProved,
         0 if judged.losses > 0 => State::Lossy,
+        0 if checked.ending.as_ref().is_some_and(|ending| ending.made_again() > 0) => State::MadeAgain,
         0 => State::Whole,
         _ if damages.all(|gap| gap.cause == Cause::Cut) => State::Cut,
         _ => State::Damaged,
@@ -123,6 +127,7 @@ fn but(checked: &Checked) -> String {
         State::Damaged => "; part of the log is missing or damaged, and was not judged".to_owned(),
         State::Lossy => "; part of the time was not recorded".to_owned(),
         State::NotProved => "; the log is not proved to be whole".to_owned(),
+        State::MadeAgain => "; the log was damaged, and made whole from its parity".to_owned(),
     };
     format!("{ends}{what}")
 }
@@ -139,6 +144,7 @@ pub struct Table {
     /// Logs that hold a session of another one.
     copies: u64,
     not_proved: u64,
+    made_again: u64,
     little: u64,
     flown_us: u64,
 }
@@ -156,6 +162,7 @@ impl Table {
         self.damaged += u64::from(state == State::Damaged);
         self.cut += u64::from(state == State::Cut);
         self.not_proved += u64::from(state == State::NotProved);
+        self.made_again += u64::from(state == State::MadeAgain);
         self.flown_us = self.flown_us.saturating_add(flown(judged).as_micros());
         let level = judged.worst().map_or("unknown", Level::name);
         self.little += u64::from(judged.worst() == Some(Level::Ok) && judged.is_little());
@@ -188,6 +195,7 @@ impl Table {
             (self.damaged, "with parts missing or damaged (counted above too)"),
             (self.cut, "cut at their end (counted above too)"),
             (self.not_proved, "not proved to be whole (counted above too)"),
+            (self.made_again, "damaged, and made whole from their parity (counted above too)"),
             (self.copies, "the same session once more (not counted above)"),
             (failed as u64, "could not be read"),
         ] {

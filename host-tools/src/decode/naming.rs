@@ -16,6 +16,9 @@ use crate::logs::naming::{segment_name, session_name};
 use crate::logs::sessions::Sessions;
 use crate::source::recording::Place;
 
+/// Of a file's own name: file systems take 255 bytes, and 55 at most follow.
+const NAME_BYTES_MAX: usize = 190;
+
 /// What tells a log from any other, read from its sectors' headers and its first records. Of a card's session it is
 /// the same wherever the card or a copy of it lies.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -170,7 +173,14 @@ fn ends_with_identity(stem: &str) -> bool {
 /// The name of a recording's file.
 fn file_name(place: &Place) -> String {
     let name = place.path().and_then(Path::file_name);
-    name.map_or_else(|| "recording".to_owned(), |name| name.to_string_lossy().into_owned())
+    name.map_or_else(|| "recording".to_owned(), |name| cut(name.to_string_lossy().into_owned()))
+}
+
+/// As much of a name as leaves room for what follows it: the box, the session, a number, `.tlog.gaps.csv`.
+fn cut(mut name: String) -> String {
+    let end = (0..=NAME_BYTES_MAX.min(name.len())).rev().find(|at| name.is_char_boundary(*at));
+    name.truncate(end.unwrap_or(0));
+    name
 }
 
 /// Of all bytes of a file.
@@ -184,7 +194,7 @@ fn base(log: &Log) -> String {
     let file = log.files.first().map_or(log.name.as_str(), String::as_str);
     let path = Path::new(file);
     let stem = path.file_stem().map_or_else(|| "log".to_owned(), |stem| stem.to_string_lossy().into_owned());
-    segment_name(path).map_or(stem, |segment| format!("{:05}", segment.session))
+    segment_name(path).map_or_else(|| cut(stem), |segment| format!("{:05}", segment.session))
 }
 
 #[cfg(test)]
@@ -201,6 +211,22 @@ mod tests {
         {
             assert!(!is_made(Path::new(other)), "{other}");
         }
+    }
+
+    #[test]
+    fn a_name_that_is_as_long_as_it_may_be_leaves_room_for_what_follows() {
+        let file = "ö".repeat(125) + ".hum";
+        let log = Log {
+            name: file.clone(),
+            files: vec![file.clone()],
+            pieces: Vec::new(),
+            session: None,
+            left_over: false,
+        };
+        let traits = Traits { session: Some(u32::MAX), board: Some([0xFF; 12]), fingerprint: [0; 16] };
+        let name = traits.name(&Place::log(file, log));
+        assert!(name.starts_with("öö") && name.ends_with("-sffffffff"), "{name}");
+        assert!(name.len() + "-10.tlog.gaps.csv".len() <= 255, "{}", name.len());
     }
 
     #[test]

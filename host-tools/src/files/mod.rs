@@ -4,8 +4,13 @@
 //! somebody opened for us (standard output, which `-` means, or `/dev/fd/3`) is written as it is, and never over bytes that
 //! are in it.
 //!
-//! Two kinds of files are updated in place by design and are not made here: a simulated card's image (`--sd`) and the
-//! simulated board's flash (`--store`). A test in `host-tools/tests/cli/inputs.rs` holds every other file to this module.
+//! Three kinds of files are updated in place, and not made by [`Output`]: a simulated card's image (`--sd`), the simulated
+//! board's flash (`--store`) and the points that wait for a database (`--spool`). They stand for memory that a program is to
+//! find as the last one left it, also where that one was killed in the middle of a write: a copy that is renamed at the end
+//! would be just what a card and a flash are not, and would lose what a kill must not lose. What keeps them safe instead:
+//! a new one has its name only once it is whole ([`make_in_place`]), one program at a time has it, an input of the same
+//! command is refused, and so is a file of any other kind. A test in `host-tools/tests/cli/inputs.rs` holds every other file
+//! to this module.
 
 mod aside;
 mod ends;
@@ -15,6 +20,7 @@ mod inputs;
 mod output;
 mod part;
 mod paths;
+mod short;
 mod stamp;
 mod there;
 
@@ -28,6 +34,7 @@ pub use paths::{
     PART, appended, cannot_write, check_parent, inside, is_seekable, make_directory, make_parent,
     remove_if_empty, says_directory, settle, why_unread,
 };
+pub use short::read_short;
 
 #[cfg(test)]
 mod tests;

@@ -47,35 +47,36 @@ pub fn is_card(path: &Path) -> Result<bool> {
 
 /// The logs that a card's file system knows; none where it has none. No block is searched for more.
 pub fn on_card(path: &Path) -> Vec<Log> {
-    walk(path).map_or_else(Vec::new, |(_, walk)| sessions_of(path, &walk.files))
+    Card::of(path).map_or_else(Vec::new, |card| card.logs)
 }
 
-/// What a card's file system has, and where it lies; none where it cannot be read.
-fn walk(path: &Path) -> Option<(Layout, Walk)> {
-    let file = File::open(path).ok()?;
-    let layout = layout(&ReadOnlyImage::new(file.try_clone().ok()?).ok()?).ok()?;
-    Some((layout, Volume::new(&file, layout).and_then(Volume::walk).ok()?))
-}
-
-/// How much room a card has for files, in bytes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Room {
-    /// What is free.
+/// What a card's file system says of itself. No block is searched for more.
+#[derive(Clone, Debug)]
+pub struct Card {
+    /// The logs that it knows.
+    pub logs: Vec<Log>,
+    /// What is wrong with it, in its first place.
+    pub damage: Option<String>,
+    /// Bytes that are free for files.
     pub free: u64,
-    /// All.
+    /// Bytes for files in all.
     pub all: u64,
 }
 
-/// The room on a card; none where its file system cannot be read.
-pub fn room(path: &Path) -> Option<Room> {
-    let (layout, walk) = walk(path)?;
-    let (all, clusters) = (layout.data_bytes(), u64::from(layout.clusters));
-    Some(Room { free: all / clusters.max(1) * walk.free_clusters, all })
-}
-
-/// What is wrong with a card's file system, in its first place.
-pub fn damage(path: &Path) -> Option<String> {
-    walk(path)?.1.damage.into_iter().next()
+impl Card {
+    /// None where it cannot be read.
+    pub fn of(path: &Path) -> Option<Self> {
+        let file = File::open(path).ok()?;
+        let layout = layout(&ReadOnlyImage::new(file.try_clone().ok()?).ok()?).ok()?;
+        let walk = Volume::new(&file, layout).and_then(Volume::walk).ok()?;
+        let (all, clusters) = (layout.data_bytes(), u64::from(layout.clusters));
+        Some(Self {
+            logs: sessions_of(path, &walk.files),
+            damage: walk.damage.into_iter().next(),
+            free: all / clusters.max(1) * walk.free_clusters,
+            all,
+        })
+    }
 }
 
 /// The logs on a card: by its file system, or where that does not tell, by looking at every block.

@@ -28,7 +28,7 @@ pub mod sessions;
 pub mod side_by_side;
 pub mod strangers;
 
-pub use card::{Room, damage, is_card, on_card, room};
+pub use card::{Card, is_card, on_card};
 pub use find::{Content, Found, find};
 pub use folder::{is_named_as_log, passed_over};
 pub use naming::segment_name;

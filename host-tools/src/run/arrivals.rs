@@ -5,7 +5,7 @@ use std::collections::VecDeque;
 use std::io::Write;
 use std::path::Path;
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result};
 use hums_link::{Check, Frame, Framer};
 
 use crate::cli::Run;
@@ -163,7 +163,7 @@ fn until_frame(
     if found.get() {
         return Ok(());
     }
-    bail!("{input}: has no MAVLink frame, so nothing was written; hums check says what a file is")
+    Err(source::no_frame(input))
 }
 
 /// A file for a copy of the bytes, which is none of the inputs.

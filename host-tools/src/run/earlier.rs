@@ -10,7 +10,7 @@ use hums_recorder::card::SEGMENT_BYTES_MAX;
 use crate::cli;
 use crate::endpoint::Endpoint;
 use crate::logs::sessions::first_session;
-use crate::logs::{self, Log, Room, segment_name};
+use crate::logs::{Card, Log, segment_name};
 use crate::outcome::usage;
 use crate::source::input::Input;
 
@@ -47,17 +47,20 @@ impl EarlierSessions {
     /// Looks at a card. A usage error where the run may have to overwrite a session; `unknown` is how much comes of an input
     /// that has no length.
     pub fn of(run: &cli::Run, unknown: u64) -> Result<Self> {
-        if let Some(damage) = logs::damage(&run.sd).filter(|_| !run.overwrite_oldest) {
+        // A card that cannot be read has no session to lose.
+        let Some(card) = Card::of(&run.sd) else {
+            return Ok(Self { sessions: Vec::new(), allowed: run.overwrite_oldest });
+        };
+        if let Some(damage) = card.damage.as_ref().filter(|_| !run.overwrite_oldest) {
             return Err(usage(format!(
                 "{}: the card's file system is damaged ({damage}), and the run might overwrite what lies on it; name another image, \
                  or say --overwrite-oldest",
                 run.sd.display()
             )));
         }
-        let logs = logs::on_card(&run.sd);
-        let sessions: Vec<Session> = logs.iter().map(Session::of).collect();
-        let oldest = oldest(&logs).filter(|_| !run.overwrite_oldest);
-        if let Some(oldest) = oldest.filter(|_| !has_room(run, unknown)) {
+        let sessions: Vec<Session> = card.logs.iter().map(Session::of).collect();
+        let oldest = oldest(&card.logs).filter(|_| !run.overwrite_oldest);
+        if let Some(oldest) = oldest.filter(|_| !has_room(&card, run, unknown)) {
             return Err(usage(format!(
                 "{}: the card is full or may become so, and the run would overwrite its oldest session ({}); name another \
                  image, or say --overwrite-oldest",
@@ -99,9 +102,9 @@ fn oldest(logs: &[Log]) -> Option<&Log> {
     logs.iter().find(|log| log.files.iter().any(is_segment))
 }
 
-/// Whether a card has room for what a run may write: as much as it reads, and a segment that is begun at each of its starts. A card
-/// that cannot be read has no session to lose. Writing errors may use up any room: segments are left early.
-fn has_room(run: &cli::Run, unknown: u64) -> bool {
+/// Whether a card has room for what a run may write: as much as it reads, and a segment that is begun at each of its starts.
+/// Writing errors may use up any room: segments are left early.
+fn has_room(card: &Card, run: &cli::Run, unknown: u64) -> bool {
     if run.faults.write_error.is_some_and(|probability| probability > 0.0) {
         return false;
     }
@@ -110,11 +113,9 @@ fn has_room(run: &cli::Run, unknown: u64) -> bool {
         _ => unknown,
     };
     let starts = 1 + run.faults.reboot_at_us.len() + run.faults.card_out.len();
-    logs::room(&run.sd).is_none_or(|Room { free, all }| {
-        let segment = (all / SEGMENTS_MIN).min(u64::from(SEGMENT_BYTES_MAX));
-        let begun = segment.saturating_mul(starts as u64);
-        free >= begun.saturating_add(read.saturating_sub(segment))
-    })
+    let segment = (card.all / SEGMENTS_MIN).min(u64::from(SEGMENT_BYTES_MAX));
+    let begun = segment.saturating_mul(starts as u64);
+    card.free >= begun.saturating_add(read.saturating_sub(segment))
 }
 
 #[cfg(test)]

@@ -6,13 +6,16 @@ use anyhow::{Context, Result};
 use hums_core::params::{Param, ParamError, ParamSpec, Params};
 use hums_link::param_line::{self, Line};
 
+use crate::files::read_short;
 use crate::outcome::usage;
+
+/// A ground station's file of all parameters of a vehicle has some 40 KiB.
+const BYTES_MAX: u64 = 1 << 20;
 
 /// The parameters that a file sets, in its order; none where there is no file.
 pub(crate) fn read(path: Option<&Path>) -> Result<Vec<(&'static ParamSpec, f32)>> {
     let Some(path) = path else { return Ok(Vec::new()) };
-    let bytes =
-        std::fs::read(path).with_context(|| format!("--params {}: cannot be read", path.display()))?;
+    let bytes = read_short(path, BYTES_MAX).context("--params")?;
     let text = String::from_utf8(bytes).map_err(|_| {
         usage(format!("--params {}: is no text; it wants lines of NAME VALUE", path.display()))
     })?;

@@ -12,7 +12,7 @@ use hums_core::params::ParamSpec;
 use hums_store::sim::{SimFlash, is_store};
 use hums_store::{Found, Key, Store, param_value};
 
-use crate::files::lock_in_place;
+use crate::files::{cannot_write, lock_in_place, make_in_place};
 
 /// A sector of the board's flash.
 const SECTOR: usize = 16 * 1024;
@@ -76,8 +76,12 @@ fn read(path: &Path) -> Result<(Vec<u8>, Option<File>)> {
         }
     }
     let context = || format!("--store {}: cannot be opened for reading and writing", path.display());
-    let file = OpenOptions::new().read(true).write(true).create(true).truncate(false).open(path);
-    let mut file = file.with_context(context)?;
+    let mut file = match OpenOptions::new().read(true).write(true).open(path) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => {
+            return Ok((Vec::new(), Some(make_in_place(path, |file| fill(file, path)).context("--store")?)));
+        }
+        opened => opened.with_context(context)?,
+    };
     lock_in_place(&file, path)?;
     let mut bytes = Vec::new();
     Read::by_ref(&mut file).take(BYTES as u64 + 1).read_to_end(&mut bytes).with_context(context)?;
@@ -95,6 +99,11 @@ fn read(path: &Path) -> Result<(Vec<u8>, Option<File>)> {
         );
     }
     Ok((bytes, Some(file)))
+}
+
+/// Flash as it is delivered.
+fn fill(mut file: &File, path: &Path) -> Result<()> {
+    file.write_all(&vec![0xFF; BYTES]).with_context(|| cannot_write(path))
 }
 
 /// What a board would find in these bytes.

@@ -51,7 +51,8 @@ impl Found {
         self.is_cut |= own.is_cut();
         self.images.extend(own.images);
         self.remarks.extend(own.remarks);
-        let single = own.logs.len() == 1 && path.is_file();
+        // A raw device is named as a file is.
+        let single = own.logs.len() == 1 && !path.is_dir();
         for log in own.logs {
             let name = match log.files.first() {
                 // A log of segments that were named one by one.

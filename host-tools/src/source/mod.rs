@@ -59,7 +59,7 @@ pub use stream::{Chunk, Source};
 use std::io::{self, Write};
 use std::path::Path;
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Error, Result, anyhow, bail};
 
 use crate::endpoint::Endpoint;
 use crate::files::is_seekable;
@@ -142,6 +142,11 @@ pub fn open(endpoint: &Endpoint, timing: Timing) -> Result<Box<dyn Source>> {
         }
     };
     Ok(Box::new(compressed::Compressed::new(source, progress)))
+}
+
+/// The error of a command that writes what it finds in an input, and finds nothing.
+pub fn no_frame(input: &Endpoint) -> Error {
+    anyhow!("{input}: has no MAVLink frame, so nothing was written; hums check says what a file is")
 }
 
 /// What HUMS itself has recorded is full of frames, but not as they came.

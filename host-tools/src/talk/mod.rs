@@ -5,7 +5,6 @@ pub mod params;
 pub mod pull;
 
 use std::collections::VecDeque;
-use std::fs;
 use std::path::Path;
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
@@ -17,6 +16,7 @@ use hums_link::{Check, Frame, Framer};
 
 use crate::cli::Link;
 use crate::duplex::{self, Duplex};
+use crate::files::read_short;
 use crate::interrupt;
 use crate::mavlink::ids::HEARTBEAT;
 use crate::outcome::usage;
@@ -30,6 +30,8 @@ const CONNECT: Duration = Duration::from_secs(15);
 /// How often we say that we are there: radios and UDP peers learn from it where to answer.
 const PRESENCE: Duration = Duration::from_secs(1);
 const READ: Duration = Duration::from_millis(20);
+/// A passphrase has a line.
+const KEY_FILE_BYTES_MAX: u64 = 4096;
 /// Our link id: unlike a ground station's first, so that each counts its own time.
 const LINK: u8 = 17;
 
@@ -159,8 +161,12 @@ impl Client {
 
 /// What a key file holds: 64 hexadecimal digits, or a passphrase.
 pub fn key(path: &Path) -> Result<Key> {
-    let text =
-        fs::read_to_string(path).with_context(|| format!("--key {}: cannot be read", path.display()))?;
+    let text = String::from_utf8(read_short(path, KEY_FILE_BYTES_MAX).context("--key")?).map_err(|_| {
+        usage(format!(
+            "--key {}: is no text; it wants 64 hexadecimal digits, or a passphrase",
+            path.display()
+        ))
+    })?;
     let text = text.trim_end_matches(['\r', '\n']);
     if text.is_empty() {
         return Err(usage(format!(

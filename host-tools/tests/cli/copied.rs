@@ -428,7 +428,15 @@ fn sectors_that_parity_made_again_are_told_by_every_command() {
         assert_eq!((&json["ok"], &json["logs"][0]["ok"]), (&false.into(), &false.into()));
         assert!(count.starts_with(&made_again.to_string()), "{json}");
         assert_eq!(frames(&text(&run(dir.path(), "info copied", 3))), before);
+        // What people look at says it too, and not only standard error.
+        let screen = text(&run(dir.path(), "check copied", 3));
+        assert!(screen.contains("; the log was damaged, and made whole from its parity"), "{screen}");
     }
+    fs::copy(&path, dir.path().join("copied/00002_00.HUM")).expect("a copy");
+    let table = text(&run(dir.path(), "check copied", 3));
+    assert!(table.contains("damaged, and made whole from its parity\n"), "{table}");
+    assert!(table.contains("1  damaged, and made whole from their parity (counted above too)"), "{table}");
+    fs::remove_file(dir.path().join("copied/00002_00.HUM")).expect("ours");
     // Also of a copy, whose losses are its original's.
     fs::write(dir.path().join("copied/Copy of 00001_00.HUM"), &whole).expect("written");
     let said = text(&run(dir.path(), "verify copied", 3));

@@ -4,7 +4,7 @@ use std::fs;
 use std::io::Write as _;
 use std::process::{Command, Stdio};
 
-use crate::support::{contents, flight, hums, json, px4, recorded, run, text, until};
+use crate::support::{attempt, contents, flight, hums, json, px4, recorded, run, text, until};
 
 #[test]
 fn two_runs_do_not_use_one_card_or_one_store() {
@@ -200,6 +200,58 @@ fn an_image_is_whole_or_not_there_and_one_without_a_partition_table_is_told() {
         "{said}"
     );
     assert!(said.contains("name an image of a card, or a new file"), "{said}");
+}
+
+/// A store of which a half is there would be refused from then on.
+#[test]
+fn a_store_or_a_spool_that_cannot_be_made_leaves_nothing_that_is_in_the_way() {
+    let dir = tempfile::tempdir().expect("a folder");
+    run(dir.path(), "sim --input PX4 --sd card.img --card-size 34", 0);
+    let (before, program) = (contents(dir.path()), env!("CARGO_BIN_EXE_hums"));
+    // No file may be longer than this, in KiB: a write beyond it fails as on a full disk. A store has 32, a spool's head a half.
+    let limited = |kib: u32, line: &str| {
+        let line =
+            format!("ulimit -f {kib}; exec {program} {}", line.replace("PX4", &px4().display().to_string()));
+        let ended =
+            Command::new("bash").args(["-c", &line]).current_dir(dir.path()).output().expect("it runs");
+        let said = String::from_utf8_lossy(&ended.stderr).into_owned();
+        assert_eq!(ended.status.code(), Some(1), "{line}: {said}");
+        said
+    };
+    let said = limited(20, "sim --input PX4 --sd card.img --store store");
+    assert!(said.contains("store: cannot be written"), "{said}");
+    assert!(contents(dir.path()) == before, "{said}");
+    let live = "live --input PX4 --influx http://127.0.0.1:9 --spool spool --listen 127.0.0.1:0";
+    let said = limited(0, live);
+    assert!(said.contains("spool: cannot be used for points that wait"), "{said}");
+    // An empty one is taken as a new one.
+    assert_eq!(fs::read(dir.path().join("spool")).expect("there").len(), 0);
+}
+
+/// At whatever write of it: the card is in order, and goes on with the next run; so does the store.
+#[test]
+fn a_run_that_is_killed_leaves_a_card_and_a_store_that_the_next_one_goes_on_with() {
+    let dir = recorded();
+    for after_ms in [0, 3, 10, 30, 60] {
+        let mut sim = Command::new(env!("CARGO_BIN_EXE_hums"))
+            .args(["sim", "--sd", "card.img", "--store", "store", "--input"])
+            .arg(px4())
+            .current_dir(dir.path())
+            .stdout(Stdio::null())
+            .stderr(Stdio::null())
+            .spawn()
+            .expect("it runs");
+        std::thread::sleep(std::time::Duration::from_millis(after_ms));
+        sim.kill().expect("it is ours");
+        sim.wait().expect("it is ours");
+        // A log that a kill has ended has no end that is proved, and nothing else is wrong.
+        let told = text(&attempt(dir.path(), "verify card.img"));
+        assert!(told.contains("  ok      file system"), "{after_ms} ms: {told}");
+    }
+    run(dir.path(), "sim --input PX4 --sd card.img --store store", 0);
+    let told = json(&attempt(dir.path(), "info card.img --json"));
+    let logs = told["logs"].as_array().expect("logs");
+    assert!(logs[0]["frames"] == 16_645 && logs.last().expect("one")["frames"] == 16_645, "{told}");
 }
 
 #[test]

@@ -47,24 +47,24 @@ pub struct Campaign {
 pub const CAMPAIGNS: &[Campaign] = &[
     Campaign {
         name: "power-cuts",
-        about: "power goes at any block write, half of them torn, on a card that keeps what it acknowledged and in its \
-                order: the file system stays in order, earlier logs stay as they are, and the log, once it has begun, \
+        about: "power goes at any block write, half of them torn, on a simulated card that keeps what it acknowledged and \
+                in its order: the file system stays in order, earlier logs stay as they are, and the log, once it has begun, \
                 gives the flight up to 200 ms before",
         labels: power_cuts::LABELS,
         run: power_cuts::run,
     },
     Campaign {
         name: "careless-cards",
-        about: "power goes at a card that keeps its last blocks in no order, has lost one that it acknowledged, or spoils the \
-                page around the last one: earlier sessions lose nothing beyond the groups that were spoiled, and each loss is \
-                told; what the next power-on writes over is counted",
+        about: "power goes at a simulated card that keeps its last blocks in no order, has lost one that it acknowledged, or \
+                spoils the page around the last one, one of these at a time: earlier sessions lose nothing beyond the groups \
+                that were spoiled, and each loss is told; what the next power-on writes over is counted",
         labels: power_cuts::careless::LABELS,
         run: power_cuts::careless::run,
     },
     Campaign {
         name: "damage",
-        about: "bits flip anywhere in a log, pages of it go wrong, and its end goes missing: each is noticed or told for \
-                what it is, no wrong frame comes out, and at most the groups that were touched are lost",
+        about: "bits flip anywhere in a log, pages of it go wrong, or its end goes missing, one damage at a time: each is \
+                noticed or told for what it is, no wrong frame comes out, and at most the groups that were touched are lost",
         labels: damage::LABELS,
         run: damage::run,
     },
@@ -77,29 +77,30 @@ pub const CAMPAIGNS: &[Campaign] = &[
     },
     Campaign {
         name: "stalls",
-        about: "the card answers nothing for 2.5 s at 921,600 baud: no frame is lost",
+        about: "a simulated card answers nothing for 2.5 s, once in a recording at 921,600 baud: no frame of an unsigned \
+                recording is lost",
         labels: stalls::LABELS,
         run: stalls::run,
     },
     Campaign {
         name: "endurance",
-        about: "24 hours at 20 kB/s on a card of 64 MiB: the newest data is always there, and memory stays as it is",
+        about: "24 simulated hours at 20 kB/s on a card of 64 MiB: the newest data is always there, and memory stays as it is",
         labels: endurance::LABELS,
         run: endurance::run,
     },
     Campaign {
         name: "hostile-gs",
-        about: "24 hours of a ground station that sends noise, floods, forged and malformed frames at full rate: no panic, \
-                no frame of the vehicle is lost, no second has more bytes than the budget at either port, earlier logs stay \
-                readable; where a key is asked for, no parameter is changed, no log is marked as erased, the record has no \
+        about: "24 simulated hours of a ground station that sends noise, floods, forged and malformed frames at full rate: no \
+                panic, no frame of the vehicle is lost, no second has more bytes than the budget at either port, earlier logs \
+                stay readable; where a key is asked for, no parameter is changed, no log is marked as erased, the record has no \
                 hole, and the autopilot gets nothing but what the box sends by itself",
         labels: hostile_gs::LABELS,
         run: hostile_gs::run,
     },
     Campaign {
         name: "noise",
-        about: "bytes on the line are damaged: each frame that is not itself damaged is recorded, unless the noise happens to \
-                make a false frame, with a checksum that fits, over it",
+        about: "bytes on the line are damaged, each at random and by itself: each frame that is not itself damaged is recorded, \
+                unless the noise happens to make a false frame, with a checksum that fits, over it",
         labels: noise::LABELS,
         run: noise::run,
     },

@@ -115,7 +115,8 @@ impl Spool {
     fn begin(&mut self) -> Result<()> {
         let bytes = self.file.metadata()?.len();
         if bytes == 0 {
-            return Ok(self.reset()?);
+            // In one write: a kill leaves an empty file or a header.
+            return Ok(self.write_header()?);
         }
         let mut header = [0; HEADER_BYTES as usize];
         self.file.seek(SeekFrom::Start(0))?;

@@ -151,7 +151,10 @@ impl Board {
 
     fn send(&mut self, port: usize, chunk: &Chunk) -> Result<()> {
         let at = Self::moment(chunk.at_us);
-        self.run_until(at)?;
+        // An input may come faster than the line can: what waits for it is held, a second of it and no more.
+        let waits = self.lines.get(port).map_or(0, |line| line.free.saturating_sub(SECOND));
+        let power = self.reboots.front().map_or(Ps::MAX, |at_us| Self::moment(*at_us));
+        self.run_until(at.max(waits.min(power)))?;
         let (Some(line), Some(usual)) = (self.lines.get_mut(port), BAUDS.get(port)) else { return Ok(()) };
         // Both ends are set alike.
         let set = self.chip.chip.usarts.get(port).map_or(0.0, Usart::baud);

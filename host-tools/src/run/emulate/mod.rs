@@ -21,10 +21,13 @@ use super::{
 use crate::card::image::is_card;
 use crate::cli;
 use crate::endpoint::Endpoint;
+use crate::files::read_short;
 use crate::outcome::{Outcome, usage};
 
 /// The environment variable that names the image as `--firmware` does.
 const FIRMWARE_VARIABLE: &str = "HUMS_FIRMWARE";
+/// The ELF file of a release with all of its symbols has 8 MB.
+const IMAGE_FILE_BYTES_MAX: u64 = 32 << 20;
 /// Where a build in the source tree leaves the image.
 const IMAGE: &str = "target/firmware/hums-f405.elf";
 
@@ -127,7 +130,7 @@ fn check_flags(run: &cli::Run) -> Result<()> {
 
 /// What the file holds.
 fn image(path: &Path) -> Result<Image> {
-    let file = std::fs::read(path).with_context(|| format!("{}: cannot be read", path.display()))?;
+    let file = read_short(path, IMAGE_FILE_BYTES_MAX)?;
     Image::parse(&file)
         .map_err(|why| anyhow!("{}: is no firmware image of the STM32F405: {why}", path.display()))
 }

@@ -21,6 +21,11 @@ const CHECKSUM_TRIES: usize = 100;
 /// A burst is over when nothing came for so long.
 const GAP: Duration = Duration::from_millis(2_500);
 
+/// More logs than a card has: its directory has 65,536 entries at most.
+const LOGS_MAX: usize = 100_000;
+/// Pieces of a burst that are held: boards send far fewer in one. What comes after them is asked for again.
+const PIECES_MAX: usize = 4_096;
+
 /// `MAV_FTP_OPCODE`
 const RESET: u8 = 2;
 const LIST: u8 = 3;
@@ -149,6 +154,9 @@ impl Ftp {
             if answer.opcode != ACK || logs.len() == before {
                 bail!("the board's directory cannot be read");
             }
+            if logs.len() > LOGS_MAX {
+                bail!("the board's directory has no end: more than {LOGS_MAX} logs are no card's");
+            }
         }
     }
 
@@ -193,7 +201,7 @@ impl Ftp {
                     pieces.insert(at, data);
                 }
             }
-            if is_last {
+            if is_last || pieces.len() >= PIECES_MAX {
                 return Ok(pieces);
             }
         }
