@@ -64,6 +64,8 @@ impl Core {
         match address {
             0xE000_1000 => 4 << 28 | control.dwt,
             0xE000_1004 => self.cyccnt(),
+            // DWT_LSR: there is no lock.
+            0xE000_1FB4 => 0,
             0xE000_E004 => u32::from(self.exceptions.lines().saturating_sub(1) / 32),
             0xE000_E008 => control.actlr,
             0xE000_E010..=0xE000_E01C => {
@@ -114,6 +116,8 @@ impl Core {
                 self.set_cyccnt(count);
             }
             0xE000_1004 => self.set_cyccnt(value),
+            // DWT_LAR: there is no lock to open (DDI 0403, D1.2.2: software lock only where it is implemented).
+            0xE000_1FB0 => {}
             0xE000_E008 => self.control.actlr = value & 0x307,
             0xE000_E010..=0xE000_E01C => {
                 self.tick();
