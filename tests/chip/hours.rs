@@ -26,7 +26,8 @@ const START: Ps = 2 * SECOND;
 /// after power, and the record cuts off to a millisecond. `skipped` are not looked at.
 fn off_ms(ended: &[Ps], recorded: &[u64], skipped: impl Fn(Ps) -> bool) -> u64 {
     let late = |place: usize| (ended[place] / MS).cast_signed() - recorded[place].cast_signed();
-    let offs = (0..ended.len()).filter(|place| !skipped(ended[*place])).map(|place| late(place).abs_diff(late(0)));
+    let offs =
+        (0..ended.len()).filter(|place| !skipped(ended[*place])).map(|place| late(place).abs_diff(late(0)));
     offs.max().unwrap()
 }
 
@@ -188,7 +189,8 @@ fn the_records_time_is_the_senders_for_an_hour_with_ten_erases() {
         println!("{round} rounds, {} erases", rig.machine.chip.flash.erases.len());
     }
     rig.run(begin + 10 * ROUND + 2 * SECOND, false).unwrap();
-    let erases: Vec<(Ps, Ps)> = rig.machine.chip.flash.erases.iter().map(|(_, at, long)| (*at, at + long)).collect();
+    let erases: Vec<(Ps, Ps)> =
+        rig.machine.chip.flash.erases.iter().map(|(_, at, long)| (*at, at + long)).collect();
     assert!(erases.len() >= 10, "{} erases", erases.len());
     let session = rig.sessions().pop().unwrap();
     assert!(session.losses.is_empty(), "{:?}", session.losses);
@@ -198,6 +200,10 @@ fn the_records_time_is_the_senders_for_an_hour_with_ten_erases() {
     // What comes while the processor stands still is taken when it goes on.
     let stood = |at: Ps| erases.iter().any(|(from, to)| (*from..to + MS).contains(&at));
     let (off, late) = (off_ms(&ended, &times, stood), off_ms(&ended, &times, |_| false));
-    println!("{} frames, {} erases: off by {off} ms, and by {late} ms in an erase", ended.len(), erases.len());
+    println!(
+        "{} frames, {} erases: off by {off} ms, and by {late} ms in an erase",
+        ended.len(),
+        erases.len()
+    );
     assert!(off <= OFF_MS_MAX, "{off} ms");
 }

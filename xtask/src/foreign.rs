@@ -138,7 +138,10 @@ fn fetch(package: &Package) -> Result<PathBuf> {
     );
     fs::write(asks.join("Cargo.toml"), manifest)?;
     let metadata = MetadataCommand::new().manifest_path(asks.join("Cargo.toml")).exec()?;
-    let found = metadata.packages.iter().find(|one| one.name.as_str() == *name && one.version.to_string() == *version);
+    let found = metadata
+        .packages
+        .iter()
+        .find(|one| one.name.as_str() == *name && one.version.to_string() == *version);
     let from = found.with_context(|| format!("cargo does not find {name} {version}"))?.manifest_path.parent();
     let from = from.context("a manifest is in a folder")?.as_std_path();
     let to = folder().join("sources").join(format!("{name}-{version}"));

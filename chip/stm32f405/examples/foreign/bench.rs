@@ -55,7 +55,11 @@ pub(crate) fn text(sent: &[(Ps, u8)]) -> String {
 }
 
 /// Runs until this millisecond, and tells at which ones a pin changed, and its new level.
-pub(crate) fn changes(machine: &mut Machine, pin: Pin, until_ms: u64) -> Result<Vec<(u64, bool)>, Box<dyn Error>> {
+pub(crate) fn changes(
+    machine: &mut Machine,
+    pin: Pin,
+    until_ms: u64,
+) -> Result<Vec<(u64, bool)>, Box<dyn Error>> {
     let mut changes = Vec::new();
     let mut was = machine.chip.gpio.is_high(pin);
     for ms in machine.ms() + 1..=until_ms {

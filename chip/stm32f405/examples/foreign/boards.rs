@@ -78,5 +78,8 @@ pub(crate) fn gpio_hal_blinky(machine: &mut Machine) -> Outcome {
         expect(*levels == wanted(step), format!("after {step} half seconds the LEDs are {levels:?}"))?;
     }
     let next = changes(machine, PINS[0], 12_500)?;
-    expect(next.len() == 1 && (12_000..12_010).contains(&next[0].0), format!("its thirteenth second: {next:?}"))
+    expect(
+        next.len() == 1 && (12_000..12_010).contains(&next[0].0),
+        format!("its thirteenth second: {next:?}"),
+    )
 }

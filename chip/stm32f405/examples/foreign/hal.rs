@@ -46,7 +46,10 @@ pub(crate) fn rtic_serial_dma_rx_idle(machine: &mut Machine) -> Outcome {
         return Err(format!("texts are in memory at {places:?}").into());
     };
     let apart = [a.abs_diff(b), b.abs_diff(c), a.abs_diff(c)];
-    expect(apart.iter().all(|bytes| *bytes == 0 || *bytes >= 100), format!("texts are in memory at {places:?}"))?;
+    expect(
+        apart.iter().all(|bytes| *bytes == 0 || *bytes >= 100),
+        format!("texts are in memory at {places:?}"),
+    )?;
     let counts = machine.chip.usarts[USART1].counts.overruns;
     expect(counts == 0, format!("{counts} overruns"))
 }
