@@ -11,6 +11,8 @@ mod faults;
 #[cfg(feature = "chip")]
 mod flights;
 #[cfg(feature = "chip")]
+mod hours;
+#[cfg(feature = "chip")]
 mod images;
 #[cfg(feature = "chip")]
 mod memory;

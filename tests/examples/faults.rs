@@ -13,9 +13,10 @@ use stm32f405_model::time::{MS, SECOND, US};
 type Outcome = Result<(), Box<dyn Error>>;
 type Scenario = (&'static str, fn(&Bench) -> Outcome);
 
-const SCENARIOS: [Scenario; 8] = [
+const SCENARIOS: [Scenario; 9] = [
     ("caches", caches),
     ("shares", shares),
+    ("first", first),
     ("refused", refused),
     ("supply", supply),
     ("cuts", cuts),
@@ -113,10 +114,30 @@ fn shares(bench: &Bench) -> Outcome {
     let mut rig = bench.settled(Board::default())?;
     let begin = rig.machine.now() + 4 * SECOND;
     rig.run(begin, true)?;
+    sample(&mut rig, 1_500)
+}
+
+/// The same in the first second and a half from power on, in which the card is mounted and the log made.
+fn first(bench: &Bench) -> Outcome {
+    let mut rig = bench.settled(Board::default())?;
+    for part in 1..=6 {
+        let before = (rig.machine.core.cycles(), rig.machine.core.slept());
+        println!("  the quarter of a second number {part}:");
+        sample(&mut rig, 250)?;
+        let (cycles, slept) = (rig.machine.core.cycles() - before.0, rig.machine.core.slept() - before.1);
+        println!("  {:.1} % busy", 100.0 - 100.0 * slept as f64 / cycles as f64);
+    }
+    Ok(())
+}
+
+/// Who has the processor in so many milliseconds.
+fn sample(rig: &mut Rig, ms: u64) -> Outcome {
+    let begin = rig.machine.now();
+    let samples = ms * 10;
     let mut counts = std::collections::BTreeMap::<&str, u32>::new();
     let mut functions = std::collections::BTreeMap::<String, u32>::new();
-    for sample in 1..=15_000_u64 {
-        rig.run(begin + sample * 101 * US, true)?;
+    for sample in 1..=samples {
+        rig.run(begin + sample * 100 * US + sample % 7 * US, true)?;
         let who = match rig.machine.core.xpsr() & 0x1FF {
             0 if rig.machine.core.is_sleeping() => "sleep",
             0 => "thread",
@@ -135,12 +156,12 @@ fn shares(bench: &Bench) -> Outcome {
         }
     }
     for (who, count) in counts {
-        println!("    {who}: {:.1} %", f64::from(count) / 150.0);
+        println!("    {who}: {:.1} %", 100.0 * f64::from(count) / samples as f64);
     }
     let mut functions: Vec<_> = functions.into_iter().collect();
     functions.sort_by_key(|(_, count)| std::cmp::Reverse(*count));
-    for (name, count) in functions.iter().take(40) {
-        println!("    {:5.2} % {name}", f64::from(*count) / 150.0);
+    for (name, count) in functions.iter().take(25) {
+        println!("    {:5.2} % {name}", 100.0 * f64::from(*count) / samples as f64);
     }
     Ok(())
 }

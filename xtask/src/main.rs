@@ -11,6 +11,7 @@ mod dfu;
 mod dist;
 mod firmware;
 mod flash;
+mod foreign;
 mod fuzz;
 mod hums;
 mod image;
@@ -45,6 +46,8 @@ cargo xtask COMMAND
                                  faults found and false alarms, on the labelled flights of the repository and of folders;
                                  --write makes docs/diagnosis.md
   prove chip [TEST]...           the long tests of the image that is flashed, on the model of its chip
+  prove foreign [EMBASSY]        programs of others on that model, built from what their packages bring; and embassy's examples, from
+                                 the folder of a checkout of its repository
   firmware [--board BOARD]       build the firmware: f405 (the default) or f429
   bench [sizes|speed|cost|logs]... what the record takes: bytes, decoding time, cycles; how fast logs are checked
   fuzz [--seconds N]             the fuzz targets, each for so long (300); needs nightly Rust and cargo-fuzz

@@ -1,11 +1,13 @@
 //! `cargo xtask prove`: the campaigns, thousands of cases each; what is left of them is `docs/proof.md`.
 //!
-//! The campaigns themselves are in the tests' crate; this builds them and sees to what they need. Two parts are no
-//! campaigns: `diagnosis` judges labelled flights and writes `docs/diagnosis.md`; `chip` is what the tests on the model of the chip leave out for want of time.
+//! The campaigns themselves are in the tests' crate; this builds them and sees to what they need. Three parts are no
+//! campaigns: `diagnosis` judges labelled flights and writes `docs/diagnosis.md`; `chip` is what the tests on the model of the chip leave out
+//! for want of time; `foreign` judges that model by programs that are not ours.
 
 use anyhow::Result;
 
 use crate::firmware::{self, Board};
+use crate::foreign;
 use crate::oracle;
 use crate::pc;
 use crate::setup::{self, Need};
@@ -17,13 +19,19 @@ pub(crate) const NEEDS: &[Need] = &[Need::Dosfstools];
 /// The part that runs the image that is flashed.
 const CHIP: &str = "chip";
 
+/// The part that judges the model of the chip.
+const FOREIGN: &str = "foreign";
+
 /// The part that looks at no card.
 const DIAGNOSIS: &str = "diagnosis";
 
-/// Runs the campaigns with these arguments: names, `--short`, `--seed N`, `--runs N`; or `diagnosis` with its own; or `chip`.
+/// Runs the campaigns with these arguments: names, `--short`, `--seed N`, `--runs N`; or `diagnosis` with its own; or `chip`
+/// or `foreign` with theirs.
 pub(crate) fn run(arguments: &[String]) -> Result<()> {
-    if let Some((CHIP, rest)) = arguments.split_first().map(|(first, rest)| (first.as_str(), rest)) {
-        return chip(rest);
+    match arguments.split_first().map(|(first, rest)| (first.as_str(), rest)) {
+        Some((CHIP, rest)) => return chip(rest),
+        Some((FOREIGN, rest)) => return foreign::run(rest),
+        _ => {}
     }
     let is_diagnosis = arguments.first().is_some_and(|first| first == DIAGNOSIS);
     let mut needs = if is_diagnosis { Vec::new() } else { NEEDS.to_vec() };

@@ -89,8 +89,9 @@ impl Core {
             0xE000_ED40..=0xE000_ED70 => FEATURES[(address - 0xE000_ED40) as usize / 4],
             0xE000_ED88 => control.cpacr,
             0xE000_ED90..=0xE000_EDB8 => self.mpu.read(address - 0xE000_ED90).unwrap_or(0),
-            // DFSR, AFSR, DHCSR and DCRDR without a debugger, STIR, MVFR2.
-            0xE000_ED30 | 0xE000_ED3C | 0xE000_EDF0 | 0xE000_EDF8 | 0xE000_EF00 | 0xE000_EF48 => 0,
+            // DWT_LSR, for there is no lock; DFSR, AFSR, DHCSR and DCRDR without a debugger, STIR, MVFR2.
+            0xE000_1FB4 | 0xE000_ED30 | 0xE000_ED3C | 0xE000_EDF0 | 0xE000_EDF8 | 0xE000_EF00
+            | 0xE000_EF48 => 0,
             0xE000_EDFC => control.demcr,
             0xE000_EF34 => control.fpccr,
             0xE000_EF38 => control.fpcar,
@@ -161,8 +162,9 @@ impl Core {
             }
             0xE000_EF38 => self.control.fpcar = value & !7,
             0xE000_EF3C => self.control.fpdscr = value & FPDSCR,
-            // Read-only, of the debugger, or with a key that is wrong.
-            0xE000_E004
+            // Read-only, of the debugger, with a key that is wrong; or DWT_LAR, the key to a lock that is not there.
+            0xE000_1FB0
+            | 0xE000_E004
             | 0xE000_ED00
             | 0xE000_ED0C
             | 0xE000_ED30

@@ -253,6 +253,9 @@ fn sleep_ends_by_an_interrupt_even_a_masked_one_and_cycles_of_sleep_are_counted_
     let mut rig = Rig::new(&[WFI, NOP, STAY]);
     // DEMCR.TRCENA, DWT_CTRL.CYCCNTENA.
     rig.set(0xE000_EDFC, 1 << 24);
+    // The unit has no lock: opening it means nothing.
+    rig.set(0xE000_1FB0, 0xC5AC_CE55);
+    assert_eq!(rig.get(0xE000_1FB4), 0);
     rig.set(0xE000_1000, 1);
     let count = rig.get(0xE000_1004);
     assert_eq!((0..3).map(|_| rig.step()).last(), Some(Outcome::Sleeping));

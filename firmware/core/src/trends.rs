@@ -95,7 +95,8 @@ impl Track {
             return;
         }
         let believed = BELIEVED * self.mean.abs() + grain;
-        self.mean += (value - self.mean).clamp(-believed, believed) / f32::from(self.samples);
+        // Not `clamp`: its panic would print floating-point numbers, 12 KB of flash that nothing else takes.
+        self.mean += (value - self.mean).max(-believed).min(believed) / f32::from(self.samples);
     }
 }
 

@@ -425,10 +425,35 @@ fn quantity(value: f32, unit: &str) -> Text {
         "degC" => ("C", 0),
         "V" => ("V", 2),
         "1/min" => ("per min", 0),
-        unit => (unit, usize::from(value.abs() < 100.0)),
+        unit => (unit, u32::from(value.abs() < 100.0)),
     };
     let space = if unit.is_empty() { "" } else { " " };
-    Text::new(format_args!(": {value:.digits$}{space}{unit}"))
+    let (sign, scaled) = (if value.is_sign_negative() { "-" } else { "" }, scaled(value, digits));
+    let (whole, part) = (scaled / 10_u64.pow(digits), scaled % 10_u64.pow(digits));
+    match digits {
+        0 => Text::new(format_args!(": {sign}{whole}{space}{unit}")),
+        _ => Text::new(format_args!(": {sign}{whole}.{part:0width$}{space}{unit}", width = digits as usize)),
+    }
+}
+
+/// The amount of a finite value in units of its last digit, of two at most; from 2^40 on it is no quantity, and stays there. As `{:.2}`, rounded
+/// to the nearest, of two equally near to the even one, without the 12 KB of flash that the formatting of floating-point numbers takes.
+fn scaled(value: f32, digits: u32) -> u64 {
+    const LARGEST: f32 = (1_u64 << 40) as f32;
+    const FRACTION: u32 = 23;
+    let bits = value.abs().min(LARGEST).to_bits();
+    let exponent = bits >> FRACTION;
+    let fraction = u64::from(bits & ((1 << FRACTION) - 1));
+    // Subnormal numbers have no leading one, and the exponent of the smallest that have.
+    let amount = (if exponent == 0 { fraction } else { fraction | 1 << FRACTION }) * 10_u64.pow(digits);
+    let down = 127 + FRACTION as i32 - exponent.max(1) as i32;
+    if down <= 0 {
+        return amount << -down;
+    }
+    // An amount has less than 32 bits.
+    let down = down.min(40);
+    let (whole, rest, half) = (amount >> down, amount & ((1 << down) - 1), 1 << (down - 1));
+    whole + u64::from(rest > half || (rest == half && whole & 1 == 1))
 }
 
 #[cfg(test)]

@@ -41,11 +41,8 @@ const fn cluster_blocks(volume_blocks: u32) -> u32 {
     blocks
 }
 
-/// Blocks that are cleared with one command.
-const CLEAR_BLOCKS: u32 = 8;
-/// In flash: they take no RAM.
-static ZEROS: [Block; CLEAR_BLOCKS as usize] =
-    [const { Block { contents: [0; Block::LEN] } }; CLEAR_BLOCKS as usize];
+/// Blocks that are cleared with one command: they lie on the stack meanwhile.
+const CLEAR_BLOCKS: u32 = 4;
 
 /// Makes a partition table and an empty FAT32 volume; everything on the card is lost.
 pub fn format<D: BlockDevice>(device: &D, volume_id: u32) -> Result<(), FormatError<D::Error>> {
@@ -118,14 +115,15 @@ impl Formatting {
             if card_blocks < BLOCKS_MIN {
                 return Err(FormatError::TooSmall);
             }
-            write(&ZEROS[..1], 0)?;
+            write(&[Block::new()], 0)?;
             self.plan = Some(Plan::new(card_blocks, self.volume_id));
             return Ok(false);
         };
         let left = plan.end - plan.next;
         if left > 0 {
+            let zeros = [const { Block { contents: [0; Block::LEN] } }; CLEAR_BLOCKS as usize];
             let count = left.min(CLEAR_BLOCKS);
-            write(ZEROS.get(..count as usize).unwrap_or_default(), plan.next)?;
+            write(zeros.get(..count as usize).unwrap_or_default(), plan.next)?;
             plan.next += count;
             return Ok(false);
         }

@@ -83,10 +83,16 @@ pub fn board(image: Image, board: Board) -> (Machine, Slot, Medium) {
 /// A board of this image with a card that has these faults.
 pub fn board_with(image: Image, board: Board, plans: Vec<Plan>) -> (Machine, Slot, Medium) {
     let medium = Medium::formatted(BLOCKS);
-    let slot = Slot::new(Some(Model { plans, ..Model::new(Kind::Sdhc, medium.clone()) }));
+    let (machine, slot) = board_of(image, board, Model { plans, ..Model::new(Kind::Sdhc, medium.clone()) });
+    (machine, slot, medium)
+}
+
+/// A board of this image with this card.
+pub fn board_of(image: Image, board: Board, card: Model) -> (Machine, Slot) {
+    let slot = Slot::new(Some(card));
     let mut machine = Machine::new(image, board);
     machine.connect(0, Pin(0, 4), Box::new(Card::new(&slot)));
-    (machine, slot, medium)
+    (machine, slot)
 }
 
 /// Writes a card's image to a file.

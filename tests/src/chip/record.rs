@@ -23,14 +23,25 @@ pub struct Session {
 
 /// All sessions, in their order.
 pub fn read(medium: &Medium) -> Vec<Session> {
+    some(medium, 0)
+}
+
+/// The newest session.
+pub fn last(medium: &Medium) -> Option<Session> {
+    some(medium, usize::MAX).pop()
+}
+
+/// All sessions but the first `skip`, and the last one at least.
+fn some(medium: &Medium, skip: usize) -> Vec<Session> {
     let (status, held) = (CardStatus::new(), HeldBlocks::new());
     let Ok(card) = Card::mount(medium.clone(), &status, &held) else { return Vec::new() };
     let mut names: BTreeMap<u32, Vec<LogName>> = BTreeMap::new();
     if card.logs(|log| names.entry(log.name.session).or_default().push(log.name)).is_err() {
         return Vec::new();
     }
+    let skip = skip.min(names.len().saturating_sub(1));
     let mut sessions = Vec::new();
-    for mut names in names.into_values() {
+    for mut names in names.into_values().skip(skip) {
         names.sort_unstable();
         let mut reader = Box::new(LogReader::new());
         let mut session = Session::default();

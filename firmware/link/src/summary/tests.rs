@@ -272,3 +272,24 @@ fn what_is_over_before_it_was_told_is_not_told() {
     findings.push((2, 3, Level::Ok, Level::Warning, ""));
     assert_eq!(told(&findings), [(0, 0), (0, 1), (0, 2)]);
 }
+
+#[test]
+fn quantities_are_printed_as_the_formatting_of_numbers_does() {
+    let mut state = 1_u32;
+    let random = std::iter::repeat_with(|| {
+        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        f32::from_bits(state)
+    });
+    let halves = (-2_000..2_000).map(|number| number as f32 / 8.0);
+    let odd = [0.0, -0.0, f32::MIN_POSITIVE, 1e-45, 0.05, 99.95, 99.96, 100.0, 1e12, 1_099_511_627_776.0];
+    let values = random.take(100_000).filter(|value| value.is_finite() && value.abs() <= 1e12);
+    for value in values.chain(halves).chain(odd) {
+        for (unit, digits, shown) in
+            [("V", 2, " V"), ("degC", 0, " C"), ("%", usize::from(value.abs() < 100.0), " %"), ("", 0, "")]
+        {
+            let digits = if unit.is_empty() { usize::from(value.abs() < 100.0) } else { digits };
+            assert_eq!(quantity(value, unit).as_str(), format!(": {value:.digits$}{shown}"), "{value:e}");
+        }
+    }
+    assert_eq!(quantity(f32::MAX, "V").as_str(), ": 1099511627776.00 V", "no quantity");
+}

@@ -1,0 +1,213 @@
+//! `cargo xtask prove foreign`: programs that are not ours on the model of the chip, the second opinion on our reading of the manual.
+//!
+//! They are the examples that packages of the registry bring, fetched and built where this runs; only their names are here. embassy's own
+//! examples are in no package: they come from a checkout of its repository, if there is one. Each program's judge, and what its source says,
+//! is in `chip/stm32f405/examples/foreign`.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context as _, Result, bail};
+use cargo_metadata::MetadataCommand;
+
+use crate::repo::{self, FIRMWARE_TARGET};
+use crate::setup::{self, Need};
+use crate::shell::Shell;
+
+/// A package that brings programs.
+struct Package {
+    name: &'static str,
+    version: &'static str,
+    features: &'static str,
+    examples: &'static [&'static str],
+}
+
+const PACKAGES: &[Package] = &[
+    Package {
+        name: "stm32f4xx-hal",
+        version: "0.23.0",
+        features: "stm32f405,rtic1",
+        examples: &[
+            "serial-dma",
+            "rtic-serial-dma-rx-idle",
+            "spi-dma",
+            "rtic-button",
+            "rtic-tick",
+            "rtic-usart-shell",
+            "delay-timer-blinky",
+            "blinky-timer-irq",
+            "delay-syst-blinky",
+        ],
+    },
+    Package { name: "feather-f405", version: "0.2.0", features: "", examples: &["flash"] },
+    Package {
+        name: "stm32f407g-disc",
+        version: "0.4.1",
+        features: "",
+        examples: &["serial_echo", "gpio_hal_blinky"],
+    },
+];
+
+/// embassy's programs, by their name in `examples/stm32f4/src/bin`, and the tag of its repository that fits [`EMBASSY_MANIFEST`].
+const EMBASSY: &[&str] = &["wdt", "flash", "usart_dma", "usart_buffered", "button_exti", "multiprio"];
+const EMBASSY_TAG: &str = "embassy-stm32-v0.6.0";
+/// What they are built with: the packages of that tag, for an STM32F405.
+const EMBASSY_MANIFEST: &str = r#"
+[package]
+name = "foreign"
+version = "0.0.0"
+edition = "2024"
+
+[workspace]
+
+[dependencies]
+embassy-stm32 = { version = "=0.6.0", features = ["defmt", "stm32f405zg", "unstable-pac", "memory-x", "time-driver-tim12", "exti"] }
+embassy-executor = { version = "=0.10.0", features = ["platform-cortex-m", "executor-thread", "executor-interrupt", "defmt"] }
+embassy-time = { version = "=0.5.1", features = ["defmt", "defmt-timestamp-uptime", "tick-hz-32_768"] }
+defmt = "1"
+defmt-rtt = "1"
+cortex-m = { version = "0.7", features = ["inline-asm", "critical-section-single-core"] }
+cortex-m-rt = "0.7"
+embedded-io-async = "0.7"
+panic-probe = { version = "1", features = ["print-defmt"] }
+static_cell = "2"
+heapless = { version = "0.9", default-features = false }
+"#;
+const EMBASSY_BUILD: &str = r#"
+fn main() {
+    for argument in ["--nmagic", "-Tlink.x", "-Tdefmt.x"] {
+        println!("cargo:rustc-link-arg-bins={argument}");
+    }
+}
+"#;
+
+/// Builds and judges them; `embassy` is the folder of a checkout of its repository.
+pub(crate) fn run(arguments: &[String]) -> Result<()> {
+    let embassy = match arguments {
+        [] => None,
+        [folder] => Some(PathBuf::from(folder).join("examples/stm32f4/src/bin")),
+        _ => bail!("prove foreign [EMBASSY]: one folder, a checkout of embassy's repository"),
+    };
+    setup::ensure(&[Need::Linker, Need::FirmwareTarget], false).require_all()?;
+    let programs = folder().join("programs");
+    empty(&programs)?;
+    for package in PACKAGES {
+        let source = fetch(package)?;
+        let examples = package.examples.iter().flat_map(|name| ["--example", name]);
+        build(&source, ["--locked", "--features", package.features].into_iter().chain(examples))?;
+        for name in package.examples {
+            keep(&format!("examples/{name}"), &programs.join(format!("{}.{name}", package.name)))?;
+        }
+    }
+    match embassy {
+        Some(sources) => {
+            build(&embassys(&sources)?, [])?;
+            for name in EMBASSY {
+                keep(name, &programs.join(format!("embassy.{name}")))?;
+            }
+        }
+        None => println!(
+            "without embassy's programs: they are in no package (prove foreign FOLDER, a checkout of its tag {EMBASSY_TAG})"
+        ),
+    }
+    let judge = ["run", "--release", "--quiet", "--package=stm32f405-model", "--example=foreign", "--"];
+    Shell::cargo().args(judge).arg(programs).run()
+}
+
+fn folder() -> PathBuf {
+    repo::target().join("foreign")
+}
+
+/// A folder with nothing in it.
+fn empty(folder: &Path) -> Result<()> {
+    if folder.exists() {
+        fs::remove_dir_all(folder).with_context(|| format!("cannot empty {}", folder.display()))?;
+    }
+    fs::create_dir_all(folder).with_context(|| format!("cannot make {}", folder.display()))
+}
+
+/// Fetches a package and gives a copy of its sources that builds by itself, its examples for any chip of the family.
+fn fetch(package: &Package) -> Result<PathBuf> {
+    let Package { name, version, .. } = package;
+    let asks = folder().join("asks");
+    empty(&asks)?;
+    fs::create_dir(asks.join("src"))?;
+    fs::write(asks.join("src/lib.rs"), "")?;
+    let manifest = format!(
+        "[package]\nname = \"asks\"\nversion = \"0.0.0\"\n[workspace]\n[dependencies]\n{name} = \"={version}\"\n"
+    );
+    fs::write(asks.join("Cargo.toml"), manifest)?;
+    let metadata = MetadataCommand::new().manifest_path(asks.join("Cargo.toml")).exec()?;
+    let found = metadata
+        .packages
+        .iter()
+        .find(|one| one.name.as_str() == *name && one.version.to_string() == *version);
+    let from = found.with_context(|| format!("cargo does not find {name} {version}"))?.manifest_path.parent();
+    let from = from.context("a manifest is in a folder")?.as_std_path();
+    let to = folder().join("sources").join(format!("{name}-{version}"));
+    empty(&to)?;
+    copy(from, &to).with_context(|| format!("cannot copy {}", from.display()))?;
+    let manifest = fs::read_to_string(from.join("Cargo.toml"))?;
+    fs::write(to.join("Cargo.toml"), for_any_chip(&manifest)?)?;
+    Ok(to)
+}
+
+/// The manifest without its examples' wish for one chip of the family, as a workspace of its own.
+fn for_any_chip(manifest: &str) -> Result<String> {
+    let mut manifest: toml::Table = manifest.parse()?;
+    let examples = manifest.get_mut("example").and_then(toml::Value::as_array_mut);
+    for example in examples.into_iter().flatten().filter_map(toml::Value::as_table_mut) {
+        example.remove("required-features");
+    }
+    manifest.insert("workspace".to_owned(), toml::Table::new().into());
+    Ok(toml::to_string(&manifest)?)
+}
+
+fn copy(from: &Path, to: &Path) -> Result<()> {
+    for entry in fs::read_dir(from)? {
+        let entry = entry?;
+        let (from, to) = (entry.path(), to.join(entry.file_name()));
+        if from.is_dir() {
+            fs::create_dir(&to)?;
+            copy(&from, &to)?;
+        } else {
+            fs::copy(&from, &to)?;
+        }
+    }
+    Ok(())
+}
+
+/// A package of embassy's programs.
+fn embassys(sources: &Path) -> Result<PathBuf> {
+    let to = folder().join("sources/embassy");
+    empty(&to.join("src/bin"))?;
+    fs::write(to.join("Cargo.toml"), EMBASSY_MANIFEST)?;
+    fs::write(to.join("build.rs"), EMBASSY_BUILD)?;
+    for name in EMBASSY {
+        let from = sources.join(format!("{name}.rs"));
+        fs::copy(&from, to.join(format!("src/bin/{name}.rs"))).with_context(|| {
+            format!("cannot read {}: is it a checkout of embassy's tag {EMBASSY_TAG}?", from.display())
+        })?;
+    }
+    Ok(to)
+}
+
+/// Builds what a package's folder holds, in it, so that its own settings of the linker count.
+fn build<'a>(source: &Path, arguments: impl IntoIterator<Item = &'a str>) -> Result<()> {
+    // What a newer compiler says of others' sources is not ours to mend.
+    let silent = format!("target.{FIRMWARE_TARGET}.rustflags=[\"-Awarnings\", \"--cap-lints=warn\"]");
+    Shell::cargo()
+        .args(["build", "--release", "--quiet", "--target", FIRMWARE_TARGET, "--config", &silent])
+        .args(arguments)
+        .env("CARGO_TARGET_DIR", folder().join("build"))
+        .env("DEFMT_LOG", "trace")
+        .within(source)
+        .run()
+}
+
+/// Keeps a program that was built: two packages may have one of the same name.
+fn keep(built: &str, to: &Path) -> Result<()> {
+    let from = folder().join("build").join(FIRMWARE_TARGET).join("release").join(built);
+    fs::copy(&from, to).with_context(|| format!("cannot copy {}", from.display()))?;
+    Ok(())
+}
