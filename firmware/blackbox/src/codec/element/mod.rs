@@ -37,9 +37,9 @@ pub(crate) enum What {
     Wide,
     WideTime,
     Upper,
-    /// Text or data, `size` bytes.
+    /// Text or data.
     Text,
-    /// The slot says it, `size` bytes.
+    /// The slot says it.
     Instance,
 }
 
@@ -64,19 +64,20 @@ pub(crate) struct Element {
     block: u16,
     other: u16,
     pub(crate) what: What,
-    /// Bytes on the wire.
-    pub(crate) size: u8,
+    /// Of a text or instance its bytes; of a number its row in the table of links.
+    detail: u8,
+    /// Where it ends in the payload.
+    pub(crate) end: u8,
     /// How surely it is a multiple of 1/100 (float) or of 1000 (64-bit integer): 3 and more. Bit 7: `step` is in
     /// hundredths.
     decimal: u8,
     /// The exponent that the classes of a random float are counted from. Of an integer with links: 1 if signed.
     pub(crate) exponent: u8,
-    /// Frames since it changed, up to 63; bit 7: it has a last value; bit 6: it has links.
+    /// Frames since it changed, up to 63; bit 7: it has a last value.
     quiet: u8,
 }
 
 const KNOWN: u8 = 0x80;
-const LINKED_FIELD: u8 = 0x40;
 const QUIET_MAX: u8 = 0x3f;
 const STEP_DECIMAL: u8 = 0x80;
 
@@ -90,13 +91,14 @@ impl Element {
         block: 0,
         other: 0,
         what: What::Integer1,
-        size: 0,
+        detail: 0,
+        end: 0,
         decimal: 0,
         exponent: 0,
         quiet: 0,
     };
 
-    pub(crate) const fn new(what: What, size: u8, links: bool) -> Self {
+    pub(crate) const fn new(what: What, detail: u8, end: u8) -> Self {
         Self {
             last: 0,
             step: 0,
@@ -105,10 +107,11 @@ impl Element {
             block: 0,
             other: 0,
             what,
-            size,
+            detail,
+            end,
             decimal: 0,
             exponent: 120,
-            quiet: if links { LINKED_FIELD } else { 0 },
+            quiet: 0,
         }
     }
 
@@ -136,16 +139,33 @@ impl Element {
         bits & QUIET != 0
     }
 
-    /// Whether the table of links names it.
+    /// Bytes on the wire.
     #[inline]
-    pub(crate) const fn has_links(&self) -> bool {
-        self.quiet & LINKED_FIELD != 0
+    pub(crate) const fn size(&self) -> usize {
+        /// Of the kinds in their order; 0 where the element says it.
+        const BYTES: [u8; 11] = [1, 2, 4, 4, 4, 4, 8, 8, 0, 0, 0];
+        match self.what {
+            What::Text | What::Instance => self.detail as usize,
+            what => BYTES[what as usize] as usize,
+        }
+    }
+
+    /// Where it begins in the payload.
+    #[inline]
+    pub(crate) const fn offset(&self) -> usize {
+        (self.end as usize).wrapping_sub(self.size())
+    }
+
+    /// A number's row in the table of links; 0: none.
+    #[inline]
+    pub(crate) const fn row(&self) -> u8 {
+        self.detail
     }
 
     #[inline]
     pub(crate) fn note(&mut self, same: bool) {
         let counted = self.quiet + u8::from(self.quiet & QUIET_MAX < QUIET_MAX);
-        self.quiet = KNOWN | if same { counted } else { self.quiet & LINKED_FIELD };
+        self.quiet = KNOWN | if same { counted } else { 0 };
     }
 
     /// The last value as a number.
