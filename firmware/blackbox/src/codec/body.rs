@@ -214,7 +214,8 @@ impl Common {
             What::Integer1 | What::Integer2 | What::Integer4 => {
                 let size = element.size();
                 let bits = word(place) & (u32::MAX >> (32 - 8 * size));
-                let value = self.distributions.integer(coder, element, bits);
+                let linked = self.registers.consult_whole(element.row());
+                let value = self.distributions.integer(coder, element, bits, linked);
                 self.registers.publish(element);
                 put::<C>(place, u64::from(value), size);
             }
@@ -227,6 +228,7 @@ impl Common {
                     step_us = step_us.wrapping_mul(1_000);
                 }
                 self.advance(at_last.wrapping_add(step_us));
+                self.registers.publish(element);
                 put::<C>(place, u64::from(value), 4);
             }
             What::Wide | What::WideTime => {

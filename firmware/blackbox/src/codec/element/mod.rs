@@ -68,8 +68,8 @@ pub(crate) struct Element {
     detail: u8,
     /// Where it ends in the payload.
     pub(crate) end: u8,
-    /// How surely it is a multiple of 1/100 (float) or of 1000 (64-bit integer): 3 and more. Bit 7: `step` is in
-    /// hundredths.
+    /// Bits 0-2: how surely it is a multiple of 1/100 (float) or of 1000 (64-bit integer): 3 and more. Bits 3-6: the last
+    /// class. Bit 7: `step` is in hundredths.
     decimal: u8,
     /// The exponent that the classes of a random float are counted from. Of an integer with links: 1 if signed.
     pub(crate) exponent: u8,
@@ -80,6 +80,9 @@ pub(crate) struct Element {
 const KNOWN: u8 = 0x80;
 const QUIET_MAX: u8 = 0x3f;
 const STEP_DECIMAL: u8 = 0x80;
+const DECIMALS: u8 = 7;
+const CLASS_AT: u32 = 3;
+const CLASS: u8 = 15 << CLASS_AT;
 
 impl Element {
     /// All zeros: a place that no slot has claimed.
@@ -180,7 +183,7 @@ impl Element {
 
     #[inline]
     fn decimals(&self) -> u8 {
-        self.decimal & !STEP_DECIMAL
+        self.decimal & DECIMALS
     }
 
     /// Learns whether the value is a decimal.
@@ -188,7 +191,18 @@ impl Element {
     fn weigh_decimal(&mut self, is: bool) {
         let decimals = self.decimals();
         let decimals = if is { (decimals + 1).min(6) } else { decimals.saturating_sub(2) };
-        self.decimal = self.decimal & STEP_DECIMAL | decimals;
+        self.decimal = self.decimal & !DECIMALS | decimals;
+    }
+
+    /// The class of the last difference.
+    #[inline]
+    fn class(&self) -> usize {
+        usize::from((self.decimal & CLASS) >> CLASS_AT)
+    }
+
+    #[inline]
+    fn note_class(&mut self, class: usize) {
+        self.decimal = self.decimal & !CLASS | (class as u8) << CLASS_AT & CLASS;
     }
 }
 
@@ -202,8 +216,8 @@ pub(crate) struct Context {
     pub(crate) clock_ms: u32,
     /// The float before in this frame: now and before.
     pub(crate) neighbour: Option<(f32, f32)>,
-    /// What the linked register predicts for the float that comes now.
-    pub(crate) link: Option<f32>,
+    /// What the linked register predicts for the float that comes now, and whether it was computed as the sender did.
+    pub(crate) link: Option<(f32, bool)>,
 }
 
 /// The elements of a group, in the order in which slots claimed them.
