@@ -42,7 +42,7 @@ pub fn sectors(stream: &[u8], entries: u16) -> Vec<[u8; SECTOR_BYTES]> {
 
 fn sector(number: u8, body: &[u8], entries: u16) -> [u8; SECTOR_BYTES] {
     let mut bytes = [0; SECTOR_BYTES];
-    bytes[..3].copy_from_slice(&[0x48, 0xb2, number]);
+    bytes[..3].copy_from_slice(&[0x48, 0xb3, number]);
     bytes[3..5].copy_from_slice(&(body.len() as u16).to_le_bytes());
     bytes[5..7].copy_from_slice(&entries.to_le_bytes());
     bytes[11] = number;

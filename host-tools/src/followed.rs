@@ -443,7 +443,7 @@ mod tests {
         let mut sector = Sector::from_bytes([0; 512]);
         sector.seal(7);
         let mut bytes = *sector.bytes();
-        bytes[..2].copy_from_slice(&[0x48, 0xb2]);
+        bytes[..2].copy_from_slice(&[0x48, 0xb3]);
         let mut sector = Sector::from_bytes(bytes);
         sector.seal(7);
         fs::write(dir.path().join("00004_00.HUM"), sector.bytes()).expect("room");

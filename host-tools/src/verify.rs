@@ -391,7 +391,7 @@ mod tests {
         let dir = tempfile::tempdir().expect("a folder");
         for name in ["00001_00.HUM", "00002_00.HUM", "00003_00.HUM"] {
             let mut bytes = [0; 512];
-            bytes[..2].copy_from_slice(&[0x48, 0xb2]);
+            bytes[..2].copy_from_slice(&[0x48, 0xb3]);
             let mut sector = Sector::from_bytes(bytes);
             sector.seal(7);
             fs::write(dir.path().join(name), sector.bytes()).expect("room");

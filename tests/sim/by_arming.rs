@@ -182,7 +182,7 @@ fn what_is_taken_from_a_log_by_arming_is_missing_and_not_called_disarmed() {
     let said = readers(&copy, 0);
     assert!(!said.contains("not recorded"), "all of it is there: {said}");
     // The last sector of the first file, without what was set aside behind it.
-    let end = whole[0].chunks(SECTOR).rposition(|block| block.starts_with(&[0x48, 0xB2])).unwrap() + 1;
+    let end = whole[0].chunks(SECTOR).rposition(|block| block.starts_with(&[0x48, 0xB3])).unwrap() + 1;
     let cases: [(usize, std::ops::Range<usize>); 7] = [
         (1, 0..usize::MAX),
         (0, 0..usize::MAX),
@@ -200,7 +200,7 @@ fn what_is_taken_from_a_log_by_arming_is_missing_and_not_called_disarmed() {
             let end = spoiled.len().min(blocks.end.saturating_mul(SECTOR));
             spoiled[blocks.start * SECTOR..end].fill(0);
             // Few sectors would be made again.
-            let parity = |block: &&mut [u8]| matches!(block, [0x48, 0xc2 | 0xd2, ..]);
+            let parity = |block: &&mut [u8]| matches!(block, [0x48, 0xc3 | 0xd3, ..]);
             spoiled.chunks_mut(SECTOR).filter(parity).for_each(|block| block.fill(0));
             fs::write(&files[file], spoiled).unwrap();
         }
@@ -237,7 +237,7 @@ fn three_times_armed(dir: &Path) -> PathBuf {
 
 /// The blocks of a file up to its last sector and the copy behind it.
 fn used(file: &[u8]) -> &[u8] {
-    let end = file.chunks(SECTOR).rposition(|block| block.starts_with(&[0x48, 0xB2])).unwrap() + 1;
+    let end = file.chunks(SECTOR).rposition(|block| block.starts_with(&[0x48, 0xB3])).unwrap() + 1;
     &file[..end * SECTOR]
 }
 
@@ -292,7 +292,7 @@ impl PowerOn {
     fn without_sectors(&self, (_, bytes): &Segment) -> PathBuf {
         let (mut card, spoiled) = (fs::read(&self.image).unwrap(), self.image.with_extension("spoiled.img"));
         let sectors: BTreeSet<&[u8]> =
-            bytes.chunks(SECTOR).filter(|block| block.starts_with(&[0x48, 0xB2])).collect();
+            bytes.chunks(SECTOR).filter(|block| block.starts_with(&[0x48, 0xB3])).collect();
         card.chunks_mut(SECTOR).filter(|block| sectors.contains(*block)).for_each(|block| block.fill(0));
         fs::write(&spoiled, card).unwrap();
         spoiled

@@ -161,7 +161,7 @@ fn truncated_images_are_read_as_far_as_they_go() {
     }
     // Cut in the middle of its data: a prefix of the flight.
     let data = fs::read(recording.image()).unwrap();
-    let end = 512 * data.chunks(512).rposition(|block| block.starts_with(&[0x48, 0xb2])).unwrap();
+    let end = 512 * data.chunks(512).rposition(|block| block.starts_with(&[0x48, 0xb3])).unwrap();
     let file = dir.path().join("half.img");
     fs::write(&file, &data[..end / 2]).unwrap();
     let half = Decoded::of(&file, &[0, 1, 3]);

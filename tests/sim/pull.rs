@@ -139,7 +139,7 @@ fn two_cards_are_never_made_into_one_log() {
 #[test]
 fn what_is_there_already_is_checked_as_what_comes_is() {
     let (dir, mut card) = card(0..30_000, "1");
-    let first = card.chunks(512).position(|block| block.starts_with(&[0x48, 0xb2])).unwrap();
+    let first = card.chunks(512).position(|block| block.starts_with(&[0x48, 0xb3])).unwrap();
     card[(first + 3) * 512 + 100] ^= 1;
     fs::write(dir.path().join("card.img"), &card).unwrap();
     let board = board(dir);

@@ -261,7 +261,7 @@ fn a_damaged_sector_is_told_as_such_on_a_card_without_a_file_system_too() {
     let recording = Recording::make(Machine::Sim, &own("px4_hil_quad_low.tlog"), &["--card-size", "64"]);
     let image = recording.image();
     let blocks = fs::read(&image).unwrap();
-    let is_sector = |block: &[u8]| block.starts_with(&[0x48, 0xB2]);
+    let is_sector = |block: &[u8]| block.starts_with(&[0x48, 0xB3]);
     let sectors: Vec<_> = (0_u64..).zip(blocks.chunks(512)).filter(|(_, block)| is_sector(block)).collect();
     let (at, block) = sectors[100];
     let file = File::options().write(true).open(&image).unwrap();

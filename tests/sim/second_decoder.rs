@@ -80,7 +80,7 @@ fn records(rows: &[Value]) -> Vec<Value> {
 
 #[test]
 fn the_golden_file_reads_the_same() {
-    let golden = root().join("firmware/blackbox/tests/golden/mixed-2.log");
+    let golden = root().join("firmware/blackbox/tests/golden/mixed-3.log");
     assert_eq!(compare(&golden, 0), (6012, 38));
 }
 

@@ -399,7 +399,7 @@ pub fn sessions(dir: &Path, count: u32) -> PathBuf {
     let mut sectors = Vec::new();
     for session in 0..count {
         let mut bytes = [0; SECTOR_BYTES];
-        bytes[..2].copy_from_slice(&[0x48, 0xb2]);
+        bytes[..2].copy_from_slice(&[0x48, 0xb3]);
         let mut sector = Sector::from_bytes(bytes);
         sector.seal(1_000_000 + session);
         sectors.extend_from_slice(sector.bytes());

@@ -121,6 +121,9 @@ pub(crate) trait Coder {
     /// A symbol below 16.
     fn symbol(&mut self, cdf: &mut Cdf, symbol: usize) -> usize;
 
+    /// The same, as likely as half-way between two distributions.
+    fn symbol_between(&mut self, one: &mut Cdf, other: &mut Cdf, symbol: usize) -> usize;
+
     /// A number of up to 16 bits, each as likely as any.
     fn bits16(&mut self, value: u32, bits: u32) -> u32;
 
@@ -155,6 +158,15 @@ impl<const N: usize> Coder for Writing<'_, N> {
         symbol
     }
 
+    #[inline(never)]
+    fn symbol_between(&mut self, one: &mut Cdf, other: &mut Cdf, symbol: usize) -> usize {
+        let (start, size) = one.part_between(other, symbol);
+        self.encoder.put(start, size, PROBABILITY_BITS, self.out);
+        one.adapt(symbol);
+        other.adapt(symbol);
+        symbol
+    }
+
     #[inline]
     fn bits16(&mut self, value: u32, bits: u32) -> u32 {
         if bits > 0 {
@@ -186,6 +198,15 @@ impl<R> Coder for Reading<'_, R> {
     fn symbol(&mut self, cdf: &mut Cdf, _: usize) -> usize {
         let (width, offset) = self.decoder.parts();
         let (symbol, start, size) = cdf.read(width, offset);
+        self.decoder.take(start, size, self.input);
+        symbol
+    }
+
+    #[expect(clippy::inline_always, reason = "as above")]
+    #[inline(always)]
+    fn symbol_between(&mut self, one: &mut Cdf, other: &mut Cdf, _: usize) -> usize {
+        let (width, offset) = self.decoder.parts();
+        let (symbol, start, size) = one.read_between(other, width, offset);
         self.decoder.take(start, size, self.input);
         symbol
     }

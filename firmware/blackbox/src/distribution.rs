@@ -106,6 +106,14 @@ impl Cdf {
         (start, end - start)
     }
 
+    /// Where a symbol begins between this distribution and another one, and its size.
+    #[inline]
+    pub(crate) fn part_between(&self, other: &Self, symbol: usize) -> (u32, u32) {
+        let ((one, size), (two, other)) = (self.part_of(symbol), other.part_of(symbol));
+        let start = (one + two).div_ceil(2);
+        (start, (one + size + two + other).div_ceil(2) - start)
+    }
+
     /// Moves towards a symbol (modulo 16).
     #[expect(clippy::inline_always, reason = "the writer's hottest path: a call more costs a tenth of it")]
     #[inline(always)]

@@ -3,7 +3,7 @@
 //!
 //! ```text
 //!   0  magic 0x48 'H'
-//!   1  0xB0 | format version (2)
+//!   1  0xB0 | format version (3)
 //!   2  bits 0..=5: sectors since the first of the group; bit 6: partial; bit 7: closed
 //!   3  u16: bits 0..=8: bytes of the body in use; bits 9..=15: records completed
 //!   5  u16: frames completed
@@ -30,7 +30,7 @@ pub const GROUP_SECTORS: usize = 64;
 pub const BODY_BYTES: usize = CRC_AT - BODY_AT;
 
 /// The format's version.
-pub const VERSION: u8 = 2;
+pub const VERSION: u8 = 3;
 
 pub(crate) const BODY_AT: usize = 19;
 const CRC_AT: usize = SECTOR_BYTES - 4;

@@ -1,6 +1,6 @@
-//! Golden files: what version 2 looks like on the card. They never change; a new version adds its own.
+//! Golden files: what version 3 looks like on the card. They never change; a new version adds its own.
 //!
-//! `mixed-2.log` holds frames and records made by `stream` below, in several groups. When it must be made anew (only
+//! `mixed-3.log` holds frames and records made by `stream` below, in several groups. When it must be made anew (only
 //! before the version is published): `HUMS_GOLDEN=write cargo test -p hums-blackbox --test golden`.
 
 #[path = "common/card.rs"]
@@ -119,11 +119,11 @@ fn write() -> Vec<u8> {
 }
 
 fn golden() -> PathBuf {
-    PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/golden/mixed-2.log"))
+    PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/golden/mixed-3.log"))
 }
 
 #[test]
-fn the_writer_writes_version_2_as_it_always_did() {
+fn the_writer_writes_version_3_as_it_always_did() {
     let log = write();
     if std::env::var("HUMS_GOLDEN").is_ok_and(|word| word == "write") {
         std::fs::write(golden(), &log).expect("writable");
@@ -133,7 +133,7 @@ fn the_writer_writes_version_2_as_it_always_did() {
 }
 
 #[test]
-fn the_reader_reads_version_2() {
+fn the_reader_reads_version_3() {
     let log = std::fs::read(golden()).expect("the golden file");
     let (mut reader, mut frames, mut records) = (Box::new(LogReader::new()), Vec::new(), 0);
     let mut blocks = log.as_chunks::<SECTOR_BYTES>().0.iter();

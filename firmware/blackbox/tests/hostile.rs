@@ -46,7 +46,7 @@ impl Random {
 }
 
 fn golden() -> Vec<u8> {
-    std::fs::read(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/golden/mixed-2.log")).expect("the golden file")
+    std::fs::read(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/golden/mixed-3.log")).expect("the golden file")
 }
 
 /// The coded stream of the golden file's first group.

@@ -172,7 +172,7 @@ mod tests {
         let path = |name: &str| dir.path().join(name);
         for name in ["00003_01.HUM", "00003_00.HUM", "00004_00.HUM", "other.hum"] {
             let mut bytes = [0; 512];
-            bytes[..2].copy_from_slice(&[0x48, 0xb2]);
+            bytes[..2].copy_from_slice(&[0x48, 0xb3]);
             let mut sector = Sector::from_bytes(bytes);
             sector.seal(7);
             fs::write(path(name), sector.bytes()).expect("room");

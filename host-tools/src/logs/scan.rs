@@ -184,7 +184,7 @@ mod tests {
 
     fn sector(session: u32, number: u8) -> [u8; SECTOR_BYTES] {
         let mut bytes = [0; SECTOR_BYTES];
-        bytes[..3].copy_from_slice(&[0x48, 0xb2, number]);
+        bytes[..3].copy_from_slice(&[0x48, 0xb3, number]);
         bytes[11] = number;
         let mut sector = Sector::from_bytes(bytes);
         sector.seal(session);

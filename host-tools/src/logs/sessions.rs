@@ -216,7 +216,7 @@ mod tests {
     /// The first sector of a session with this number.
     fn sector(session: u32, number: u32) -> Vec<u8> {
         let mut bytes = [0; 512];
-        bytes[..2].copy_from_slice(&[0x48, 0xb2]);
+        bytes[..2].copy_from_slice(&[0x48, 0xb3]);
         bytes[11..15].copy_from_slice(&number.to_le_bytes());
         sealed(Sector::from_bytes(bytes), session)
     }

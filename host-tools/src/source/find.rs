@@ -371,7 +371,7 @@ mod tests {
         let write = |count: u32| {
             for session in 0..count {
                 let mut bytes = [0; SECTOR_BYTES];
-                bytes[..2].copy_from_slice(&[0x48, 0xb2]);
+                bytes[..2].copy_from_slice(&[0x48, 0xb3]);
                 let mut sector = Sector::from_bytes(bytes);
                 sector.seal(session);
                 fs::write(dir.path().join(format!("{session}.hum")), sector.bytes()).expect("room");

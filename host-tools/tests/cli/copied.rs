@@ -55,7 +55,7 @@ fn copied(sessions: usize, flags: &str) -> TempDir {
     let mut starts: Vec<usize> = Vec::new();
     let mut last = None;
     for (at, block) in image.as_chunks::<BLOCK>().0.iter().enumerate() {
-        let session = block.starts_with(&[0x48, 0xb2]).then(|| block[7..11].to_vec());
+        let session = block.starts_with(&[0x48, 0xb3]).then(|| block[7..11].to_vec());
         if session.is_some() && session != last {
             starts.push(at * BLOCK);
             last = session;
@@ -624,7 +624,7 @@ fn a_report_of_the_newest_session_tells_that_an_older_one_on_the_card_is_damaged
     let mut image = fs::read(&path).expect("an image");
     let blocks = image.as_chunks_mut::<BLOCK>().0;
     // Every eighth: three of them are more than parity makes again.
-    let sectors = blocks.iter_mut().filter(|block| block.starts_with(&[0x48, 0xb2])).skip(20).step_by(8);
+    let sectors = blocks.iter_mut().filter(|block| block.starts_with(&[0x48, 0xb3])).skip(20).step_by(8);
     sectors.take(3).for_each(|block| block[100] ^= 4);
     fs::write(&path, image).expect("written");
     for line in ["report card.img -o page.html", "verify card.img"] {
@@ -847,7 +847,7 @@ fn noise_behind_the_last_end_mark_is_told_by_every_command() {
         .as_chunks::<BLOCK>()
         .0
         .iter()
-        .rposition(|block| block.starts_with(&[0x48, 0xb2]))
+        .rposition(|block| block.starts_with(&[0x48, 0xb3]))
         .expect("sectors");
     let mut noisy = log.clone();
     let noise = |(at, byte): (usize, &mut u8)| *byte = (at * 7 % 251) as u8 + 1;
@@ -859,7 +859,7 @@ fn noise_behind_the_last_end_mark_is_told_by_every_command() {
     // The head of a sector makes none: what fails the check is of nobody.
     let mut forged = log.clone();
     forged[last * BLOCK..(last + 1) * BLOCK].iter_mut().enumerate().for_each(noise);
-    forged[last * BLOCK..][..2].copy_from_slice(&[0x48, 0xb2]);
+    forged[last * BLOCK..][..2].copy_from_slice(&[0x48, 0xb3]);
     fs::write(&path, forged).expect("written");
     let said = text(&run(dir.path(), "verify copied", 3));
     assert!(

@@ -75,6 +75,16 @@ class Coder:
         distribution.adapt(s)
         return s
 
+    def symbol_between(self, one, other):
+        places = [(a + b + 1) // 2 for a, b in zip(one.places, other.places)]
+        part = self.part(16)
+        s = sum(place <= part for place in places)
+        start = places[s - 1] if s else 0
+        self.take(start, (places[s] if s < 15 else 65536) - start)
+        one.adapt(s)
+        other.adapt(s)
+        return s
+
     def bit(self, p):
         one = self.part(12) < p
         self.take(0 if one else p, p if one else 4096 - p)

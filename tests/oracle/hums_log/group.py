@@ -39,7 +39,7 @@ class Group:
         self.kinds = [[Distribution([60, 12, 12, 8, 1, 2, 4, 1]) for _ in range(16)] for _ in range(2)]
         self.odd = 0  # how the last frame's header was coded
         self.upper, self.lower = Distribution(), [Distribution() for _ in range(7)]
-        self.time, self.blocks, self.elements = Distribution(self.TIME), 512, 544
+        self.time, self.blocks, self.elements = Distribution(self.TIME), 432, 544
         self.header = [Distribution([4, 8, 80, 20, 1]) for _ in range(16)]
         self.first_header = Distribution([80, 4, 8, 4, 1])
         self.jump = [Distribution(), Distribution()]

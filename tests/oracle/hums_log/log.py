@@ -8,7 +8,7 @@ from group import Group
 from tables import read_layouts, read_links
 
 
-DATA, SUMS = b"\x48\xb2", [b"\x48\xc2", b"\x48\xd2"]
+DATA, SUMS = b"\x48\xb3", [b"\x48\xc3", b"\x48\xd3"]
 POWERS = [1]
 while len(POWERS) < 255:
     POWERS.append(gf_product(POWERS[-1], 2))

@@ -7,18 +7,23 @@ from coder import Distribution
 from tables import CHAR, FLOAT, INSTANCE, MICROS, MILLIS, SIGNED, SIZES
 
 
+# Registers: the first whole one, the first of three angles, of the quaternion made of them, of the one told; two times.
+WHOLE, ANGLES, QUATERNION, TOLD, TIMES = 31, 0, 23, 27, 43
+
+
 class Element:
     """One value of a payload, with what is known of it."""
 
     def __init__(self, what, offset, size, kind, role, links):
         self.what, self.offset, self.size, self.kind, self.role = what, offset, size, kind, role
-        self.links = links
+        self.links, self.is_quaternion = links, False
         self.value, self.run, self.is_first = b"" if what == "text" else 0, 0, True
         self.step, self.step_in_hundredths = 0, False
         self.costs = [0, 0, 0, 100, 100, 100]
         self.decimals, self.exponent = 0, 120
         self.clock, self.linked = 0, 0.0
         self.own = {}  # the distributions "block" and "other"
+        self.last_class = 0
         self.kept = False  # of a text: it has a place in the group's 1024 bytes
 
     @property
@@ -61,11 +66,30 @@ def of_hundredths(n):
     return bits_of(single(n * single(0.01)))
 
 
+SINE = [1 / 6227020800, -1 / 39916800, 1 / 362880, -1 / 5040, 1 / 120, -1 / 6]
+COSINE = [1 / 479001600, -1 / 3628800, 1 / 40320, -1 / 720, 1 / 24, -1 / 2]
+
+
+def sine_and_cosine(angle):
+    """By their series, each operation in single precision."""
+    square = single(angle * angle)
+
+    def series(terms):
+        total = 0.0
+        for term in terms:
+            total = single(single(total + single(term)) * square)
+        return total
+
+    return single(angle + single(angle * series(SINE))), single(1 + series(COSINE))
+
+
 class Payload:
     """Reads payloads; what all slots of a group share."""
 
     KINDS = {("int", 1): 0, ("int", 2): 1, ("int", 4): 2, ("float", 4): 3, ("time", 4): 6, ("wide", 8): 6}
-    HUNDREDTHS, RANDOM = 4, 5
+    HUNDREDTHS, RANDOM, COMPUTED = 4, 5, 7
+    # Which distributions by the class before a kind has.
+    AFTER = {0: 0, 1: 0, 2: 0, 3: 1, 4: 2, 6: 3}
 
     def __init__(self, group):
         self.group, self.coder = group, group.coder
@@ -73,7 +97,8 @@ class Payload:
         self.calm = [Distribution([600, 20]) for _ in range(8)]
         self.young = [Distribution() for _ in range(8)]
         self.clock, self.millis = 0, 0
-        self.registers = [0.0] * 32
+        self.after = [[Distribution() for _ in range(16)] for _ in range(4)]
+        self.registers = [0.0] * WHOLE + [0] * 14
         self.text_same, self.text_length = Distribution(), (Distribution(), Distribution())
         self.text_room = 1024
 
@@ -98,6 +123,7 @@ class Payload:
             for _ in range(many):
                 links = self.group.links.get((slot.message, offset), {})
                 elements.append(Element(what, offset, size, kind, role, links))
+                elements[-1].is_quaternion = slot.message == 31 and 4 <= offset < 20
                 offset += size
         cost = sum(2 if one.what == "wide" else 1 for one in elements) + (layout.instance is not None)
         if cost > min(255, self.group.elements):
@@ -142,23 +168,51 @@ class Payload:
     def publish(self, one):
         if "publishes" in one.links:
             register, scale = one.links["publishes"]
+            if register >= WHOLE:
+                self.registers[register] = one.value
+                return
             if one.what == "float":
                 number = float_of(one.value)
             else:
                 number = single(signed(one.value, 8 * one.size) if one.kind in SIGNED else one.value)
             self.registers[register] = single(number * scale)
 
+    def make_quaternion(self):
+        """Of the angles, with the sign of the one told last."""
+        def product(*factors):
+            result = factors[0]
+            for factor in factors[1:]:
+                result = single(result * factor)
+            return result
+
+        halves = [sine_and_cosine(product(self.registers[ANGLES + axis], 0.5)) for axis in range(3)]
+        (sr, cr), (sp, cp), (sy, cy) = halves
+        cc, ss, cs, sc = product(cr, cp), product(sr, sp), product(cr, sp), product(sr, cp)
+        made = [
+            single(product(cc, cy) + product(ss, sy)),
+            single(product(sc, cy) - product(cs, sy)),
+            single(product(cs, cy) + product(sc, sy)),
+            single(product(cc, sy) - product(ss, cy)),
+        ]
+        terms = [product(part, self.registers[TOLD + i]) for i, part in enumerate(made)]
+        turned = single(single(terms[0] + terms[1]) + single(terms[2] + terms[3])) < 0
+        self.registers[QUATERNION:QUATERNION + 4] = [-part if turned else part for part in made]
+
     def a_class(self, one, which, kind):
-        if which in one.own:
-            return self.coder.symbol(one.own[which])
-        if one.is_first:
+        if which not in one.own and one.is_first:
             return self.coder.symbol(self.first_of_kind[kind])
-        symbol = self.coder.symbol(self.calm[kind])
-        if symbol and self.group.blocks:
-            self.group.blocks -= 1
-            one.own[which] = self.young[kind].renewed()
-            one.own[which].adapt(symbol)
-            self.young[kind].adapt(symbol)
+        if which not in one.own:
+            symbol = self.coder.symbol(self.calm[kind])
+            if symbol and self.group.blocks:
+                self.group.blocks -= 1
+                one.own[which] = self.young[kind].renewed()
+                one.own[which].adapt(symbol)
+                self.young[kind].adapt(symbol)
+        elif kind in self.AFTER:
+            symbol = self.coder.symbol_between(one.own[which], self.after[self.AFTER[kind]][one.last_class])
+        else:
+            symbol = self.coder.symbol(one.own[which])
+        one.last_class = symbol
         return symbol
 
     def difference(self, symbol):
@@ -170,6 +224,8 @@ class Payload:
     def int(self, one, *_):
         bits = 8 * one.size
         predictions = [one.value, one.value + one.step, one.value + toward_zero(one.step, 2)]
+        if "consults" in one.links:
+            predictions.append(self.registers[one.links["consults"][0]] & (1 << bits) - 1)
         difference = self.difference(self.a_class(one, "block", self.KINDS["int", one.size]))
         value = one.choose(predictions) + difference & (1 << bits) - 1
         one.charge(predictions, lambda p: signed(value - p, bits))
@@ -225,13 +281,17 @@ class Payload:
         step = 0 if one.step_in_hundredths else one.step
         predictions = [order, order + step, order + toward_zero(step, 2)]
         computed = [last + single(neighbour[1] - neighbour[0])] if neighbour else [last]
+        is_computed = False
         if "consults" in one.links:
             register, scale = one.links["consults"]
+            if register == QUATERNION:
+                self.make_quaternion()
+            is_computed = one.is_quaternion and self.registers[TIMES] == self.registers[TIMES + 1]
             linked = single(self.registers[register] * scale)
             computed += [last + single(linked - one.linked), linked]
             one.linked = linked
         predictions += [order if math.isnan(number) else in_order(bits_of(single(number))) for number in computed]
-        value, step = self.float_value(one, predictions)
+        value, step = self.float_value(one, predictions, is_computed)
         one.charge(predictions, lambda p: signed(in_order(value) - p))
         one.count_decimals(value, hundredths(value) is not None)
         if step is None:
@@ -241,7 +301,7 @@ class Payload:
         one.step_in_hundredths = step is not None
         return value
 
-    def float_value(self, one, predictions):
+    def float_value(self, one, predictions, is_computed):
         """The value's bits, and its step where that is in hundredths."""
         bits, n = self.coder.bits, hundredths(one.value)
         if one.decimals >= 3 and n is not None:
@@ -250,6 +310,9 @@ class Payload:
             if symbol != 15 or not bits(1):
                 value = n + (one.step if linear else 0) + self.difference(symbol)
                 return of_hundredths(value), value - n
+        if not one.is_first and is_computed:
+            symbol = self.a_class(one, "other", self.COMPUTED)
+            return out_of_order(predictions[-1] + self.difference(symbol)), None
         if not one.is_first and min(one.costs[:len(predictions)]) >= 192:
             symbol = self.a_class(one, "other", self.RANDOM)
             if symbol == 0:

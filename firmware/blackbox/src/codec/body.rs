@@ -4,11 +4,11 @@ use core::ops::Range;
 
 use super::element::{Context, Distributions, ELEMENTS, Element, Elements, What};
 use super::frame::Frame;
-use super::links::{LINKS, Link, REGISTERS};
-use super::recall::{End, Recall, WORDS};
+use super::links::Registers;
+use super::recall::End;
 use super::slots::{Length, Slot};
 use super::texts::Texts;
-use crate::coder::{Coder, Reading};
+use crate::coder::Coder;
 
 /// Context of bytes by their place.
 const AT: u32 = 0x100;
@@ -23,7 +23,7 @@ pub(super) struct Body {
 pub(super) struct Common {
     pub(super) distributions: Distributions,
     pub(super) texts: Texts,
-    registers: [f32; REGISTERS],
+    registers: Registers,
     clock_us: u32,
     clock_ms: u32,
 }
@@ -35,7 +35,7 @@ impl Body {
             common: Common {
                 distributions: Distributions::new(),
                 texts: Texts::new(),
-                registers: [0.0; REGISTERS],
+                registers: Registers::new(),
                 clock_us: 0,
                 clock_ms: 0,
             },
@@ -46,7 +46,7 @@ impl Body {
         self.elements.reset();
         self.common.distributions.reset();
         self.common.texts.reset();
-        self.common.registers = [0.0; REGISTERS];
+        self.common.registers = Registers::new();
         (self.common.clock_us, self.common.clock_ms) = (0, 0);
     }
 
@@ -58,38 +58,28 @@ impl Body {
         frame: &mut Frame,
         elapsed_ms: u32,
     ) -> Option<()> {
-        let mut end = 0;
-        if slot.layout.is_some() {
-            let calm = slot.quiet && self.calm(coder, slot, frame)?;
-            end = match coder.reading() {
-                Some(mut reading) if calm || !slot.quiet => match reading.recall.end(limit(slot)) {
-                    Some(end) => self.lively(&mut reading, slot, frame, elapsed_ms).map(|()| end)?,
-                    None => self.fields(coder, slot, frame, elapsed_ms, calm)?,
-                },
-                _ => self.fields(coder, slot, frame, elapsed_ms, calm)?,
-            };
-        } else if !C::WRITES {
+        let calm = slot.quiet && self.calm(coder, slot, frame)?;
+        if let Some(reading) = coder.reading()
+            && !reading.recall.has(limit(slot))
+        {
             frame.clear();
+            self.restore(slot, frame);
         }
-        if let Length::Fixed(len) = slot.length {
-            for at in end..usize::from(len) {
-                let byte = frame.payload.get(at).copied()?;
-                let byte = self.common.texts.model.byte(coder, byte, AT | at as u32);
-                frame.payload[at] = byte;
-            }
+        let end = self.fields(coder, slot, frame, elapsed_ms, calm)?;
+        let len = if let Length::Fixed(len) = slot.length { usize::from(len) } else { 0 };
+        for at in end..len {
+            let byte = frame.payload.get(at).copied()?;
+            frame.payload[at] = self.common.texts.model.byte(coder, byte, AT | at as u32);
         }
         if let Some(reading) = coder.reading() {
-            match slot.length {
-                Length::Fixed(len) if usize::from(len) > end => reading.recall.forget(),
-                _ => reading.recall.keep(limit(slot), end),
-            }
+            reading.recall.keep(limit(slot), len <= end);
         }
         Some(())
     }
 
     /// The fields that the layout describes; gives where they end. `calm`: the quiet ones stay as they are.
     #[inline(never)]
-    fn fields<C: End>(
+    fn fields<C: Coder>(
         &mut self,
         coder: &mut C,
         slot: &mut Slot,
@@ -98,107 +88,23 @@ impl Body {
         calm: bool,
     ) -> Option<usize> {
         let limit = limit(slot);
-        if let Some(reading) = coder.reading() {
-            reading.recall.forget();
-            frame.clear();
-        }
         let (clock_us, clock_ms) = (self.common.clock_us, self.common.clock_ms);
         let mut context = Context { elapsed_ms, clock_us, clock_ms, neighbour: None, link: None };
-        let (mut offset, mut quiet) = (0, 0);
-        let mut link = usize::from(slot.links);
-        let mut elements = self.elements.list.get_mut(elements_in(slot))?.iter_mut();
-        while let Some(element) = elements.next() {
-            let (what, size) = (element.what, usize::from(element.size));
-            if offset + size > limit {
+        let (mut end, mut quiet) = (0, 0);
+        let mut rest = self.elements.list.get_mut(elements_in(slot))?;
+        while let Some((element, after)) = rest.split_first_mut() {
+            if usize::from(element.end) > limit {
                 break;
             }
-            let place = frame.place(offset);
-            let stays = calm && element.is_quiet();
-            let left = elements.len();
-            match what {
-                What::Text => {
-                    let text = frame.payload.get_mut(offset..offset + size)?;
-                    self.common.texts.code(coder, element, text, stays)?;
-                }
-                _ if stays => {
-                    if !C::WRITES {
-                        let upper = if what.is_wide() { elements.as_slice().first()?.last } else { 0 };
-                        *place = (u64::from(upper) << 32 | u64::from(element.last)).to_le_bytes();
-                    }
-                }
-                What::Integer1 | What::Integer2 | What::Integer4 => {
-                    let bits = word(place) & (u32::MAX >> (32 - 8 * size));
-                    let value = self.common.distributions.integer(coder, element, bits);
-                    if element.has_links() {
-                        self.common.publish(links_at(&mut link, slot.key.id, offset).1, element);
-                    }
-                    if !C::WRITES {
-                        put(place, value, size);
-                    }
-                }
-                What::Millis | What::Micros => self.common.time(coder, element, place, &context),
-                What::Float => {
-                    let mut links = (None, None);
-                    if element.has_links() {
-                        links = links_at(&mut link, slot.key.id, offset);
-                    }
-                    self.common.float(coder, element, place, &mut context, links);
-                }
-                What::Wide | What::WideTime => {
-                    self.common.wide(coder, element, elements.next()?, place, &context);
-                }
-                What::Instance => {
-                    let instance = slot.key.instance.get(..size)?;
-                    frame.payload.get_mut(offset..offset + size)?.copy_from_slice(instance);
-                }
-                What::Upper => {}
+            if !(calm && element.is_quiet()) {
+                self.common.element(coder, element, after, frame, &mut context)?;
             }
             quiet |= element.quiet_bits();
-            if let Some(reading) = coder.reading() {
-                reading.recall.visited(slot, left, offset, element);
-            }
-            offset += size;
+            end = usize::from(element.end);
+            rest = after;
         }
         slot.quiet = Element::any_quiet(quiet);
-        Some(offset)
-    }
-
-    /// The same of a frame whose quiet fields stay as they are in the frame before, for the reader: it visits the others.
-    #[inline(never)]
-    fn lively(
-        &mut self,
-        coder: &mut Reading<'_, Recall>,
-        slot: &mut Slot,
-        frame: &mut Frame,
-        elapsed_ms: u32,
-    ) -> Option<()> {
-        let (clock_us, clock_ms) = (self.common.clock_us, self.common.clock_ms);
-        let mut context = Context { elapsed_ms, clock_us, clock_ms, neighbour: None, link: None };
-        let mut link = usize::from(slot.links);
-        let elements = self.elements.list.get_mut(elements_in(slot))?;
-        let mut quiet = 0;
-        for word in 0..WORDS {
-            let (mut to_come, mut lively) = (*coder.recall.lively(word), 0);
-            while to_come != 0 {
-                let bit = to_come & to_come.wrapping_neg();
-                let index = word * 64 + to_come.trailing_zeros() as usize;
-                to_come ^= bit;
-                let offset = coder.recall.offset(slot, index)?;
-                let (element, rest) = elements.get_mut(index..)?.split_first_mut()?;
-                self.common.element(
-                    coder,
-                    (element, rest),
-                    (slot, frame),
-                    offset,
-                    (&mut link, &mut context),
-                )?;
-                quiet |= element.quiet_bits();
-                lively |= if element.is_quiet() { 0 } else { bit };
-            }
-            *coder.recall.lively(word) = lively;
-        }
-        slot.quiet |= Element::any_quiet(quiet);
-        Some(())
+        Some(end)
     }
 
     /// Whether all quiet elements stay as they are: one bit for all of them.
@@ -212,29 +118,23 @@ impl Body {
 
     /// Whether the frame has the quiet elements as they are.
     fn stays(&self, slot: &Slot, frame: &mut Frame) -> Option<bool> {
-        let limit = limit(slot);
-        let mut offset = 0;
-        let elements = self.elements.list.get(elements_in(slot))?;
-        for (index, element) in elements.iter().enumerate() {
-            let size = usize::from(element.size);
-            if offset + size > limit {
-                break;
-            }
+        let mut rest = self.elements.list.get(elements_in(slot))?;
+        while let Some((element, after)) = rest.split_first()
+            && usize::from(element.end) <= limit(slot)
+        {
             if element.is_quiet() {
-                let place = frame.place(offset);
-                let same = match element.what {
-                    What::Text => self.common.texts.last(element) == frame.payload.get(offset..offset + size),
-                    What::Wide | What::WideTime => {
-                        let upper = elements.get(index + 1)?;
-                        u64::from_le_bytes(*place) == u64::from(upper.last) << 32 | u64::from(element.last)
+                let (at, size) = (element.offset(), element.size());
+                let same = match self.common.last(slot, element, after)? {
+                    Last::Number(last) => {
+                        (u64::from_le_bytes(*frame.place(at)) ^ last) << (64 - 8 * size) == 0
                     }
-                    _ => word(place) & (u32::MAX >> (32 - 8 * size)) == element.last,
+                    Last::Bytes(last) => frame.payload.get(at..at + size) == Some(last),
                 };
                 if !same {
                     return Some(false);
                 }
             }
-            offset += size;
+            rest = after;
         }
         Some(true)
     }
@@ -243,142 +143,110 @@ impl Body {
     pub(super) fn is_repeat(&self, slot: &Slot, frame: &Frame) -> bool {
         let mut copy = Frame::empty();
         copy.len = frame.len;
-        self.restore(slot, &mut copy) && copy.payload == frame.payload
+        self.restore(slot, &mut copy).is_some() && copy.payload == frame.payload
     }
 
-    /// Puts together the last payload from the elements; `false` where not all of it was kept.
-    pub(super) fn restore(&self, slot: &Slot, frame: &mut Frame) -> bool {
-        if slot.layout.is_none() {
-            return false;
-        }
-        let limit = limit(slot);
-        let mut offset = 0;
-        let elements = self.elements.list.get(elements_in(slot)).unwrap_or_default();
-        for (index, element) in elements.iter().enumerate() {
-            let size = usize::from(element.size);
-            if offset + size > limit {
-                break;
-            }
-            let place = &mut frame.payload[offset..offset + size];
-            match element.what {
-                What::Instance => place.copy_from_slice(&slot.key.instance[..size]),
-                What::Text => match self.common.texts.last(element) {
-                    Some(text) => place.copy_from_slice(text),
-                    None => return false,
-                },
-                What::Wide | What::WideTime => {
-                    let upper = elements.get(index + 1).map_or(0, |upper| upper.last);
-                    let value = u64::from(upper) << 32 | u64::from(element.last);
-                    place.copy_from_slice(&value.to_le_bytes());
+    /// Puts together the last payload from the elements; nothing where not all of it was kept.
+    pub(super) fn restore(&self, slot: &Slot, frame: &mut Frame) -> Option<()> {
+        let (mut end, mut is_kept) = (0, slot.layout.is_some());
+        let mut rest = self.elements.list.get(elements_in(slot))?;
+        while let Some((element, after)) = rest.split_first()
+            && usize::from(element.end) <= limit(slot)
+        {
+            let place = frame.payload.get_mut(element.offset()..)?;
+            match self.common.last(slot, element, after) {
+                Some(Last::Number(last)) => {
+                    place
+                        .get_mut(..element.size())?
+                        .copy_from_slice(last.to_le_bytes().get(..element.size())?);
                 }
-                _ => place.copy_from_slice(&element.last.to_le_bytes()[..size]),
+                Some(Last::Bytes(last)) => place.get_mut(..last.len())?.copy_from_slice(last),
+                None => is_kept = false,
             }
-            offset += size;
+            end = usize::from(element.end);
+            rest = after;
         }
         // What lies beyond the layout is not kept.
-        frame.len <= offset || slot.length == Length::Trimmed
+        (is_kept && (frame.len <= end || slot.length == Length::Trimmed)).then_some(())
     }
 }
 
+/// What an element had last.
+enum Last<'a> {
+    Number(u64),
+    Bytes(&'a [u8]),
+}
+
 impl Common {
-    /// One element of a frame that is read, at this offset; `rest` are those after it.
+    /// What an element had last, those after it being these; nothing where it was not kept.
     #[inline]
-    fn element(
+    fn last<'a>(&'a self, slot: &'a Slot, element: &Element, after: &[Element]) -> Option<Last<'a>> {
+        Some(match element.what {
+            What::Text => Last::Bytes(self.texts.last(element)?),
+            What::Instance => Last::Bytes(slot.key.instance.get(..element.size())?),
+            What::Wide | What::WideTime => {
+                Last::Number(u64::from(after.first()?.last) << 32 | u64::from(element.last))
+            }
+            _ => Last::Number(u64::from(element.last)),
+        })
+    }
+
+    /// One element of a frame; `after` are those after it.
+    #[inline]
+    fn element<C: Coder>(
         &mut self,
-        coder: &mut Reading<'_, Recall>,
-        (element, rest): (&mut Element, &mut [Element]),
-        (slot, frame): (&Slot, &mut Frame),
-        offset: usize,
-        (link, context): (&mut usize, &mut Context),
+        coder: &mut C,
+        element: &mut Element,
+        after: &mut [Element],
+        frame: &mut Frame,
+        context: &mut Context,
     ) -> Option<()> {
-        let size = usize::from(element.size);
-        let place = frame.place(offset);
+        let place = frame.place(element.offset());
         match element.what {
             What::Float => {
-                let mut links = (None, None);
-                if element.has_links() {
-                    links = links_at(link, slot.key.id, offset);
-                }
-                self.float(coder, element, place, context, links);
+                let last = element.last;
+                context.link = self.registers.consult(element.row());
+                let value = self.distributions.float(coder, element, word(place), context);
+                context.neighbour = Some((f32::from_bits(value), f32::from_bits(last)));
+                self.registers.publish(element);
+                put::<C>(place, u64::from(value), 4);
             }
             What::Integer1 | What::Integer2 | What::Integer4 => {
-                let value = self.distributions.integer(coder, element, 0);
-                if element.has_links() {
-                    self.publish(links_at(link, slot.key.id, offset).1, element);
-                }
-                put(place, value, size);
+                let size = element.size();
+                let bits = word(place) & (u32::MAX >> (32 - 8 * size));
+                let linked = self.registers.consult_whole(element.row());
+                let value = self.distributions.integer(coder, element, bits, linked);
+                self.registers.publish(element);
+                put::<C>(place, u64::from(value), size);
             }
-            What::Millis | What::Micros => self.time(coder, element, place, context),
-            What::Wide | What::WideTime => self.wide(coder, element, rest.first_mut()?, place, context),
+            What::Millis | What::Micros => {
+                let (last, at_last) = (element.last, element.aux);
+                let value = self.distributions.time(coder, element, word(place), context);
+                let mut step_us = value.wrapping_sub(last);
+                if element.what == What::Millis {
+                    self.clock_ms = value;
+                    step_us = step_us.wrapping_mul(1_000);
+                }
+                self.advance(at_last.wrapping_add(step_us));
+                self.registers.publish(element);
+                put::<C>(place, u64::from(value), 4);
+            }
+            What::Wide | What::WideTime => {
+                let (last, at_last) = (element.last, element.aux);
+                let value = u64::from_le_bytes(*place);
+                let value = self.distributions.wide(coder, element, after.first_mut()?, value, context);
+                if element.what == What::WideTime {
+                    self.advance(at_last.wrapping_add((value as u32).wrapping_sub(last)));
+                }
+                put::<C>(place, value, 8);
+            }
             What::Text => {
-                let text = frame.payload.get_mut(offset..offset + size)?;
-                self.texts.code(coder, element, text, false)?;
+                let (start, end) = (element.offset(), usize::from(element.end));
+                self.texts.code(coder, element, frame.payload.get_mut(start..end)?)?;
             }
             What::Instance | What::Upper => {}
         }
         Some(())
-    }
-
-    #[inline]
-    fn time<C: Coder>(
-        &mut self,
-        coder: &mut C,
-        element: &mut Element,
-        place: &mut [u8; 8],
-        context: &Context,
-    ) {
-        let (last, at_last) = (element.last, element.aux);
-        let value = self.distributions.time(coder, element, word(place), context);
-        let mut step_us = value.wrapping_sub(last);
-        if element.what == What::Millis {
-            self.clock_ms = value;
-            step_us = step_us.wrapping_mul(1_000);
-        }
-        self.advance(at_last.wrapping_add(step_us));
-        if !C::WRITES {
-            put(place, value, 4);
-        }
-    }
-
-    #[inline]
-    fn wide<C: Coder>(
-        &mut self,
-        coder: &mut C,
-        element: &mut Element,
-        upper: &mut Element,
-        place: &mut [u8; 8],
-        context: &Context,
-    ) {
-        let (last, at_last) = (element.last, element.aux);
-        let value = self.distributions.wide(coder, element, upper, u64::from_le_bytes(*place), context);
-        if element.what == What::WideTime {
-            self.advance(at_last.wrapping_add((value as u32).wrapping_sub(last)));
-        }
-        if !C::WRITES {
-            *place = value.to_le_bytes();
-        }
-    }
-
-    #[inline]
-    fn float<C: Coder>(
-        &mut self,
-        coder: &mut C,
-        element: &mut Element,
-        place: &mut [u8; 8],
-        context: &mut Context,
-        (consults, publishes): Links,
-    ) {
-        context.link = match consults {
-            Some(link) => self.registers.get(usize::from(link.register)).map(|known| known * link.scale),
-            None => None,
-        };
-        let last = element.last;
-        let value = self.distributions.float(coder, element, word(place), context);
-        context.neighbour = Some((f32::from_bits(value), f32::from_bits(last)));
-        self.publish(publishes, element);
-        if !C::WRITES {
-            put(place, value, 4);
-        }
     }
 
     /// A time field proposes to move the clock: only forward, and not by more than ten seconds; anything else is no
@@ -389,19 +257,7 @@ impl Common {
             self.clock_us = proposed_us;
         }
     }
-
-    #[inline]
-    fn publish(&mut self, link: Option<&Link>, element: &Element) {
-        if let Some(link) = link
-            && let Some(register) = self.registers.get_mut(usize::from(link.register))
-        {
-            *register = element.number() * link.scale;
-        }
-    }
 }
-
-/// The links of a field: the one to consult and the one to publish.
-type Links = (Option<&'static Link>, Option<&'static Link>);
 
 fn elements_in(slot: &Slot) -> Range<usize> {
     let first = usize::from(slot.elements);
@@ -421,25 +277,15 @@ fn word(place: &[u8; 8]) -> u32 {
     u32::from_le_bytes([place[0], place[1], place[2], place[3]])
 }
 
-/// A value of 1, 2 or 4 bytes in its place, and nothing else.
+/// A value of 1, 2, 4 or 8 bytes in its place, and nothing else; the writer has it there.
 #[inline]
-fn put(place: &mut [u8; 8], value: u32, size: usize) {
-    let [a, b, c, d] = value.to_le_bytes();
+fn put<C: Coder>(place: &mut [u8; 8], value: u64, size: usize) {
+    let bytes = value.to_le_bytes();
     match size {
-        1 => place[0] = a,
-        2 => *place.first_chunk_mut().expect("two of eight") = [a, b],
-        _ => *place.first_chunk_mut().expect("four of eight") = [a, b, c, d],
+        _ if C::WRITES => {}
+        1 => place[0] = bytes[0],
+        2 => place[..2].copy_from_slice(&bytes[..2]),
+        4 => place[..4].copy_from_slice(&bytes[..4]),
+        _ => *place = bytes,
     }
-}
-
-/// The links of the field at an offset; moves on to them.
-pub(super) fn links_at(at: &mut usize, id: u32, offset: usize) -> Links {
-    let mut found = (None, None);
-    while let Some(link) = LINKS.get(*at).filter(|link| link.id == id && usize::from(link.offset) <= offset) {
-        if usize::from(link.offset) == offset {
-            *(if link.publishes { &mut found.1 } else { &mut found.0 }) = Some(link);
-        }
-        *at += 1;
-    }
-    found
 }

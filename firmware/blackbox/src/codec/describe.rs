@@ -3,7 +3,7 @@
 use hums_dialect::wire::PAYLOAD_BYTES_MAX;
 use hums_dialect::{Kind, Role};
 
-use super::body::{Body, links_at};
+use super::body::Body;
 use super::element::{Element, What};
 use super::links;
 use super::slots::{INSTANCE_BYTES, Key, Slot};
@@ -75,22 +75,22 @@ impl Body {
 
     /// Sets up the elements of a layout.
     fn prepare(&mut self, id: u32, layout: Layout, first: usize) {
-        let mut link = usize::from(links::first(id));
-        let (mut at, mut offset, mut index) = (first, 0, 0);
+        let (mut at, mut end, mut index) = (first, 0, 0);
         while let Some(field) = layout.field(index) {
             let (what, count, size) = elements_of(field);
             for _ in 0..count {
-                let linked = !matches!(links_at(&mut link, id, offset), (None, None));
-                let mut element = Element::new(what, size, linked);
+                let row = links::row_of(id, end);
+                end += usize::from(size);
+                let detail = if matches!(what, What::Text | What::Instance) { size } else { row };
+                let mut element = Element::new(what, detail, end as u8);
                 if what == What::Integer2 || what == What::Integer4 {
                     element.exponent = u8::from(matches!(field.kind, Kind::I16 | Kind::I32));
                 }
-                let upper = Element::new(What::Upper, 0, false);
+                let upper = Element::new(What::Upper, 0, end as u8);
                 for (place, element) in self.elements.list.iter_mut().skip(at).zip([element, upper]) {
                     *place = element;
                 }
                 at += if what.is_wide() { 2 } else { 1 };
-                offset += usize::from(size);
             }
             index += 1;
         }

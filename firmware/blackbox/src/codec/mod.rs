@@ -274,8 +274,7 @@ impl Model {
         slot.at_ms = at_ms as u32;
         slot.frames = slot.frames.saturating_add(1);
         if plan.header == REPEATED {
-            if let Some(reading) = coder.reading() {
-                reading.recall.forget();
+            if !C::WRITES {
                 frame.clear();
             }
             self.body.restore(slot, frame);

@@ -2,7 +2,6 @@
 //! slot remembers what its last frame looked like, and which slot came after which.
 
 use super::frame::Frame;
-use super::links;
 use crate::coder::Coder;
 use crate::distribution::{Cdf, Cell};
 use crate::layouts::{Layout, Place};
@@ -56,7 +55,6 @@ pub(crate) struct Slot {
     pub(crate) described: u8,
     /// How the header of its last frame was coded.
     pub(crate) header: u8,
-    pub(crate) links: u8,
     /// Where the instance field is, and its size; 0 where there is none.
     pub(crate) instance_at: u8,
     pub(crate) instance_size: u8,
@@ -89,7 +87,6 @@ impl Slot {
         length: Length::Trimmed,
         described: 0,
         header: 0,
-        links: 0,
         instance_at: 0,
         instance_size: 0,
         calm: Cell::UNSET,
@@ -116,7 +113,6 @@ impl Slot {
             own_seed: layout.is_some(),
             verified: layout.is_some(),
             length: if key.v2 && layout.is_some() { Length::Trimmed } else { Length::Fixed(len_base as u8) },
-            links: links::first(key.id),
             calm: Cell::EVEN,
             next: [NONE; 2],
             ..Self::UNSET

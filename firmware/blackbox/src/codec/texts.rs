@@ -46,13 +46,12 @@ impl Texts {
         self.kept.get(range_of(element)?)
     }
 
-    /// Codes a text. `calm`: it is the last one.
+    /// Codes a text.
     pub(super) fn code<C: Coder>(
         &mut self,
         coder: &mut C,
         element: &mut Element,
         text: &mut [u8],
-        calm: bool,
     ) -> Option<()> {
         if !element.known() {
             self.keep(element, text.len());
@@ -63,10 +62,8 @@ impl Texts {
         if let Some(last) = last {
             above.copy_from_slice(last);
         }
-        let same = calm || {
-            let same = last.is_some_and(|last| last == text);
-            coder.symbol(&mut self.changes, usize::from(!same)) == 0
-        };
+        let same = last.is_some_and(|last| last == text);
+        let same = coder.symbol(&mut self.changes, usize::from(!same)) == 0;
         if same {
             text.copy_from_slice(above);
         } else {
@@ -108,5 +105,5 @@ impl Texts {
 /// Where the last text of an element is kept.
 fn range_of(element: &Element) -> Option<core::ops::Range<usize>> {
     let at = usize::try_from(element.aux).ok()?;
-    Some(at..at.checked_add(usize::from(element.size))?)
+    Some(at..at.checked_add(element.size())?)
 }

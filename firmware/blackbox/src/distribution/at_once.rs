@@ -12,26 +12,51 @@ impl Cdf {
         #[cfg(target_arch = "x86_64")]
         // SAFETY: SSE2 is part of x86-64.
         unsafe {
-            sse2::read(&mut self.0, width, offset)
+            sse2::read([&mut self.0], width, offset)
         }
         #[cfg(not(target_arch = "x86_64"))]
         {
-            let part = (offset / u32::from(width)).min(u32::from(u16::MAX));
-            let mut symbol = 0;
-            for step in [8, 4, 2, 1] {
-                symbol += if u32::from(self.0[symbol + step - 1]) <= part { step } else { 0 };
-            }
+            let symbol = find(width, offset, |symbol| self.part_of(symbol));
             let (start, size) = self.part_of(symbol);
             self.adapt(symbol);
             (symbol, start, size)
         }
     }
+
+    /// The same between this distribution and another one, of which both move.
+    #[inline]
+    pub(crate) fn read_between(&mut self, other: &mut Self, width: u16, offset: u32) -> (usize, u32, u32) {
+        #[cfg(target_arch = "x86_64")]
+        // SAFETY: SSE2 is part of x86-64.
+        unsafe {
+            sse2::read([&mut self.0, &mut other.0], width, offset)
+        }
+        #[cfg(not(target_arch = "x86_64"))]
+        {
+            let symbol = find(width, offset, |symbol| self.part_between(other, symbol));
+            let (start, size) = self.part_between(other, symbol);
+            self.adapt(symbol);
+            other.adapt(symbol);
+            (symbol, start, size)
+        }
+    }
+}
+
+/// The symbol that holds a place among parts of this width, each beginning where `part_of` says.
+#[cfg(not(target_arch = "x86_64"))]
+fn find(width: u16, offset: u32, part_of: impl Fn(usize) -> (u32, u32)) -> usize {
+    let part = (offset / u32::from(width)).min(u32::from(u16::MAX));
+    let mut symbol = 0;
+    for step in [8, 4, 2, 1] {
+        symbol += if part_of(symbol + step).0 <= part { step } else { 0 };
+    }
+    symbol
 }
 
 #[cfg(target_arch = "x86_64")]
 mod sse2 {
     use core::arch::x86_64::{
-        __m128i, _mm_add_epi16, _mm_cmpgt_epi32, _mm_cvtsi32_si128, _mm_extract_epi16, _mm_loadu_si128,
+        __m128i, _mm_add_epi16, _mm_avg_epu16, _mm_cmpgt_epi32, _mm_cvtsi32_si128, _mm_loadu_si128,
         _mm_movemask_epi8, _mm_mulhi_epu16, _mm_mullo_epi16, _mm_packs_epi16, _mm_packs_epi32,
         _mm_set1_epi16, _mm_set1_epi32, _mm_srl_epi16, _mm_storeu_si128, _mm_sub_epi16, _mm_unpackhi_epi16,
         _mm_unpacklo_epi16, _mm_xor_si128,
@@ -78,11 +103,20 @@ mod sse2 {
         gains
     }
 
-    /// The symbol that holds a place among parts of this width, where it begins and its size; adapts the distribution.
+    /// The symbol that holds a place among parts of this width, where it begins and its size, of one distribution or
+    /// between two; adapts them.
     #[inline]
     #[target_feature(enable = "sse2")]
-    pub(super) fn read(places: &mut [u16; SYMBOLS], width: u16, offset: u32) -> (usize, u32, u32) {
-        let (lower, upper) = halves(places);
+    pub(super) fn read<const N: usize>(
+        mut all: [&mut [u16; SYMBOLS]; N],
+        width: u16,
+        offset: u32,
+    ) -> (usize, u32, u32) {
+        let (mut lower, mut upper) = halves(all[0]);
+        if N > 1 {
+            let other = halves(all[1]);
+            (lower, upper) = (_mm_avg_epu16(lower, other.0), _mm_avg_epu16(upper, other.1));
+        }
         // Numbers without a sign are compared as ones with a sign, all moved by as much.
         let moved = _mm_set1_epi32(i32::MIN);
         let offset = _mm_set1_epi32(offset as i32 ^ i32::MIN);
@@ -97,11 +131,23 @@ mod sse2 {
         let beyond = _mm_movemask_epi8(_mm_packs_epi16(beyond(lower), beyond(upper))) as u32 | 1 << USES;
         let symbol = beyond.trailing_zeros() as usize % SYMBOLS;
 
-        let (end, start) = (u32::from(places[symbol]), u32::from(places[symbol.wrapping_sub(1) % SYMBOLS]));
-        let end = if symbol == SYMBOLS - 1 { 1 << PROBABILITY_BITS } else { end };
-        let start = start & u32::from(symbol != 0).wrapping_neg();
+        let place = |at: usize| {
+            let sum: u32 = all.iter().map(|places| u32::from(places[at % SYMBOLS])).sum();
+            sum.div_ceil(N as u32)
+        };
+        let end = if symbol == SYMBOLS - 1 { 1 << PROBABILITY_BITS } else { place(symbol) };
+        let start = place(symbol.wrapping_sub(1)) & u32::from(symbol != 0).wrapping_neg();
+        for places in &mut all {
+            adapt(places, symbol);
+        }
+        (symbol, start, end - start)
+    }
 
-        let uses = (_mm_extract_epi16::<7>(upper) as usize).min(usize::from(USES_MAX));
+    #[inline]
+    #[target_feature(enable = "sse2")]
+    fn adapt(places: &mut [u16; SYMBOLS], symbol: usize) {
+        let (lower, upper) = halves(places);
+        let uses = usize::from(places[USES].min(USES_MAX));
         let sure = symbol == 0 && uses == usize::from(USES_MAX) && places[0] >= SURE;
         let way = if sure { STAYS } else { uses };
         let shift = _mm_cvtsi32_si128(i32::from(SHIFTS[way]));
@@ -114,7 +160,6 @@ mod sse2 {
             _mm_storeu_si128(to_lower.as_mut_ptr().cast(), adapted(lower, gains.0));
             _mm_storeu_si128(to_upper.as_mut_ptr().cast(), adapted(upper, gains.1));
         }
-        (symbol, start, end - start)
     }
 
     #[inline]
@@ -150,6 +195,27 @@ mod tests {
             assert_eq!(read.read(width, offset), (symbol, start, size), "round {round}");
             written.adapt(symbol);
             assert_eq!(read.0, written.0, "round {round}");
+        }
+    }
+
+    #[test]
+    fn between_two_distributions_what_is_read_is_what_was_written() {
+        let [mut a, mut b, mut c, mut d] = [Cdf::FLAT; 4];
+        let mut state = 7_u32;
+        for round in 0..20_000 {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            let symbol = if round % 1_000 < 500 { 0 } else { (state >> 20) as usize % 16 };
+            let (start, size) = a.part_between(&b, symbol);
+            let width = [1, 0x100, u16::MAX, (state >> 8) as u16 | 1][round % 4];
+            let (first, last) = (start * u32::from(width), (start + size) * u32::from(width) - 1);
+            let offset = [first, last][round / 4 % 2];
+            assert_eq!(c.read_between(&mut d, width, offset), (symbol, start, size), "round {round}");
+            a.adapt(symbol);
+            b.adapt(symbol);
+            if round % 300 == 0 {
+                // The two differ.
+                (b, d) = (Cdf::FLAT, Cdf::FLAT);
+            }
         }
     }
 

@@ -2,13 +2,13 @@
 
 use super::Element;
 use crate::coder::Coder;
-use crate::distribution::Cdf;
+use crate::distribution::{Cdf, SYMBOLS};
 
 /// Distributions of elements and of times at most.
-const BLOCKS: usize = 512;
+const BLOCKS: usize = 432;
 
-/// Kinds whose elements behave alike: integers of 1, 2 and 4 bytes, floats, decimal floats, random floats, times.
-const KINDS: usize = 7;
+/// Kinds whose elements behave alike: integers of 1, 2 and 4 bytes, floats, decimal floats, random floats, times, computed floats.
+const KINDS: usize = 8;
 pub(super) const INTEGER_1: usize = 0;
 pub(super) const INTEGER_2: usize = 1;
 pub(super) const INTEGER_4: usize = 2;
@@ -16,6 +16,11 @@ pub(super) const FLOAT: usize = 3;
 pub(super) const DECIMAL: usize = 4;
 pub(super) const RANDOM_FLOAT: usize = 5;
 pub(super) const TIME: usize = 6;
+pub(super) const COMPUTED: usize = 7;
+
+/// Which of the distributions by the class before a kind has; random and computed floats have none.
+const AFTER: [usize; KINDS] = [0, 0, 0, 1, 2, NONE, 3, NONE];
+const NONE: usize = usize::MAX;
 
 const CALM: Cdf = Cdf::from_sizes([600, 20, 20, 20, 20, 20, 20, 20, 20, 20, 20, 20, 20, 20, 20, 20]);
 
@@ -29,6 +34,8 @@ pub(crate) struct Distributions {
     young: [Cdf; KINDS],
     /// First values.
     first: [Cdf; KINDS],
+    /// Of all elements with distributions of their own, by the class before
+    after: [[Cdf; SYMBOLS]; 4],
 }
 
 impl Distributions {
@@ -39,6 +46,7 @@ impl Distributions {
             calm: [Cdf::UNSET; KINDS],
             young: [Cdf::UNSET; KINDS],
             first: [Cdf::UNSET; KINDS],
+            after: [[Cdf::UNSET; SYMBOLS]; 4],
         }
     }
 
@@ -47,6 +55,7 @@ impl Distributions {
         self.calm = [CALM; KINDS];
         self.young = [Cdf::FLAT; KINDS];
         self.first = [Cdf::FLAT; KINDS];
+        self.after = [[Cdf::FLAT; SYMBOLS]; 4];
     }
 
     /// A new distribution; 0 where there is none left.
@@ -64,18 +73,26 @@ impl Distributions {
     }
 
     /// Codes a class with the element's distribution; what had none and changes gets one.
-    #[inline]
+    #[expect(clippy::inline_always, reason = "so that each use has its kind as a constant")]
+    #[inline(always)]
     pub(super) fn class<C: Coder>(
         &mut self,
         coder: &mut C,
-        block: &mut u16,
+        element: &mut Element,
         kind: usize,
         symbol: usize,
     ) -> usize {
-        match self.get(*block) {
-            Some(cdf) => coder.symbol(cdf, symbol),
-            None => self.class_of_calm(coder, block, kind, symbol),
-        }
+        let after =
+            self.after.get_mut(AFTER[kind % KINDS]).map(|after| &mut after[element.class() % SYMBOLS]);
+        let is_other = matches!(kind, DECIMAL | RANDOM_FLOAT | COMPUTED);
+        let block = if is_other { &mut element.other } else { &mut element.block };
+        let symbol = match (self.blocks.get_mut(usize::from(*block).wrapping_sub(1)), after) {
+            (Some(own), Some(after)) => coder.symbol_between(own, after, symbol),
+            (Some(own), None) => coder.symbol(own, symbol),
+            (None, _) => self.class_of_calm(coder, block, kind, symbol),
+        };
+        element.note_class(symbol);
+        symbol
     }
 
     #[inline(never)]
@@ -107,7 +124,7 @@ impl Distributions {
         symbol: usize,
     ) -> usize {
         if element.known() {
-            self.class(coder, &mut element.block, kind, symbol)
+            self.class(coder, element, kind, symbol)
         } else {
             self.class_of_first(coder, kind, symbol)
         }

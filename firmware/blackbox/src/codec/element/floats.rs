@@ -1,7 +1,7 @@
 //! Floats of 4 bytes: compared in the order of their values; those that are hundredths of whole numbers are counted in
 //! hundredths, and those that nothing predicts are coded by their parts.
 
-use super::classes::{DECIMAL, FLOAT, RANDOM_FLOAT};
+use super::classes::{COMPUTED, DECIMAL, FLOAT, RANDOM_FLOAT};
 use super::costs::PREDICTIONS;
 use super::rest::{ESCAPE, float_class, float_rest, integer_class, integer_rest};
 use super::{Context, Distributions, Element, STEP_DECIMAL};
@@ -45,7 +45,7 @@ impl Distributions {
         if let Some((now, before)) = context.neighbour {
             guesses[AS_NEIGHBOUR] = order_or(number + (now - before), last_order);
         }
-        if let Some(linked) = link {
+        if let Some((linked, _)) = link {
             guesses[AS_LINK] = order_or(number + (linked - f32::from_bits(element.aux)), last_order);
             guesses[LINKED] = order_or(linked, last_order);
             element.aux = linked.to_bits();
@@ -54,12 +54,18 @@ impl Distributions {
         let value = if let Some(value) = coded {
             value
         } else {
-            let costs = element.costs;
-            let (best, cost) = match link {
-                Some(_) => costs.cheapest::<PREDICTIONS>(),
-                None => costs.cheapest::<{ AS_NEIGHBOUR + 1 }>(),
-            };
-            self.difference(coder, element, guesses[best], cost, value)
+            match (link, element.costs) {
+                (Some((_, true)), _) if element.known() => {
+                    self.computed(coder, element, guesses[LINKED], value)
+                }
+                (link, costs) => {
+                    let (best, cost) = match link {
+                        Some(_) => costs.cheapest::<PREDICTIONS>(),
+                        None => costs.cheapest::<{ AS_NEIGHBOUR + 1 }>(),
+                    };
+                    self.difference(coder, element, guesses[best], cost, value)
+                }
+            }
         };
         let now = order(value);
         let [first @ .., as_link, linked] = guesses;
@@ -69,7 +75,7 @@ impl Distributions {
             element.costs.charge_more(LINKED, now.wrapping_sub(linked));
         }
         element.step = step.unwrap_or_else(|| now.wrapping_sub(last_order));
-        element.decimal = element.decimals() | if step.is_some() { STEP_DECIMAL } else { 0 };
+        element.decimal = element.decimal & !STEP_DECIMAL | if step.is_some() { STEP_DECIMAL } else { 0 };
         if value != last && value != 0 {
             element.weigh_decimal(hundredths(value).is_some());
         }
@@ -91,12 +97,20 @@ impl Distributions {
         let now = if C::WRITES { hundredths(value) } else { None };
         let difference = now.map_or(0, |now| now.wrapping_sub(guess));
         let symbol = if now.is_some() { integer_class(difference.unsigned_abs()) } else { ESCAPE };
-        let symbol = self.class(coder, &mut element.other, DECIMAL, symbol);
+        let symbol = self.class(coder, element, DECIMAL, symbol);
         if symbol == ESCAPE && coder.bits16(u32::from(now.is_none()), 1) != 0 {
             return (None, None);
         }
         let now = guess.wrapping_add(integer_rest(coder, symbol, difference));
         (Some((now as f32 * 0.01).to_bits()), Some(now.wrapping_sub(last)))
+    }
+
+    /// A float that was computed as the sender did: the difference in order is a few steps, if any.
+    #[inline(never)]
+    fn computed<C: Coder>(&mut self, coder: &mut C, element: &mut Element, guess: i32, value: u32) -> u32 {
+        let difference = order(value).wrapping_sub(guess);
+        let symbol = self.class(coder, element, COMPUTED, integer_class(difference.unsigned_abs()));
+        unorder(guess.wrapping_add(integer_rest(coder, symbol, difference)))
     }
 
     /// The difference from a guess in the order of floats. `cost`: what the guess cost lately.
@@ -129,7 +143,7 @@ impl Distributions {
             1..=14 => offset as usize,
             _ => ESCAPE,
         };
-        let symbol = self.class(coder, &mut element.other, RANDOM_FLOAT, symbol);
+        let symbol = self.class(coder, element, RANDOM_FLOAT, symbol);
         match symbol {
             0 => element.last,
             ESCAPE => {

@@ -37,9 +37,9 @@ pub(crate) enum What {
     Wide,
     WideTime,
     Upper,
-    /// Text or data, `size` bytes.
+    /// Text or data.
     Text,
-    /// The slot says it, `size` bytes.
+    /// The slot says it.
     Instance,
 }
 
@@ -64,21 +64,25 @@ pub(crate) struct Element {
     block: u16,
     other: u16,
     pub(crate) what: What,
-    /// Bytes on the wire.
-    pub(crate) size: u8,
-    /// How surely it is a multiple of 1/100 (float) or of 1000 (64-bit integer): 3 and more. Bit 7: `step` is in
-    /// hundredths.
+    /// Of a text or instance its bytes; of a number its row in the table of links.
+    detail: u8,
+    /// Where it ends in the payload.
+    pub(crate) end: u8,
+    /// Bits 0-2: how surely it is a multiple of 1/100 (float) or of 1000 (64-bit integer): 3 and more. Bits 3-6: the last
+    /// class. Bit 7: `step` is in hundredths.
     decimal: u8,
     /// The exponent that the classes of a random float are counted from. Of an integer with links: 1 if signed.
     pub(crate) exponent: u8,
-    /// Frames since it changed, up to 63; bit 7: it has a last value; bit 6: it has links.
+    /// Frames since it changed, up to 63; bit 7: it has a last value.
     quiet: u8,
 }
 
 const KNOWN: u8 = 0x80;
-const LINKED_FIELD: u8 = 0x40;
 const QUIET_MAX: u8 = 0x3f;
 const STEP_DECIMAL: u8 = 0x80;
+const DECIMALS: u8 = 7;
+const CLASS_AT: u32 = 3;
+const CLASS: u8 = 15 << CLASS_AT;
 
 impl Element {
     /// All zeros: a place that no slot has claimed.
@@ -90,13 +94,14 @@ impl Element {
         block: 0,
         other: 0,
         what: What::Integer1,
-        size: 0,
+        detail: 0,
+        end: 0,
         decimal: 0,
         exponent: 0,
         quiet: 0,
     };
 
-    pub(crate) const fn new(what: What, size: u8, links: bool) -> Self {
+    pub(crate) const fn new(what: What, detail: u8, end: u8) -> Self {
         Self {
             last: 0,
             step: 0,
@@ -105,10 +110,11 @@ impl Element {
             block: 0,
             other: 0,
             what,
-            size,
+            detail,
+            end,
             decimal: 0,
             exponent: 120,
-            quiet: if links { LINKED_FIELD } else { 0 },
+            quiet: 0,
         }
     }
 
@@ -136,16 +142,33 @@ impl Element {
         bits & QUIET != 0
     }
 
-    /// Whether the table of links names it.
+    /// Bytes on the wire.
     #[inline]
-    pub(crate) const fn has_links(&self) -> bool {
-        self.quiet & LINKED_FIELD != 0
+    pub(crate) const fn size(&self) -> usize {
+        /// Of the kinds in their order; 0 where the element says it.
+        const BYTES: [u8; 11] = [1, 2, 4, 4, 4, 4, 8, 8, 0, 0, 0];
+        match self.what {
+            What::Text | What::Instance => self.detail as usize,
+            what => BYTES[what as usize] as usize,
+        }
+    }
+
+    /// Where it begins in the payload.
+    #[inline]
+    pub(crate) const fn offset(&self) -> usize {
+        (self.end as usize).wrapping_sub(self.size())
+    }
+
+    /// A number's row in the table of links; 0: none.
+    #[inline]
+    pub(crate) const fn row(&self) -> u8 {
+        self.detail
     }
 
     #[inline]
     pub(crate) fn note(&mut self, same: bool) {
         let counted = self.quiet + u8::from(self.quiet & QUIET_MAX < QUIET_MAX);
-        self.quiet = KNOWN | if same { counted } else { self.quiet & LINKED_FIELD };
+        self.quiet = KNOWN | if same { counted } else { 0 };
     }
 
     /// The last value as a number.
@@ -160,7 +183,7 @@ impl Element {
 
     #[inline]
     fn decimals(&self) -> u8 {
-        self.decimal & !STEP_DECIMAL
+        self.decimal & DECIMALS
     }
 
     /// Learns whether the value is a decimal.
@@ -168,7 +191,18 @@ impl Element {
     fn weigh_decimal(&mut self, is: bool) {
         let decimals = self.decimals();
         let decimals = if is { (decimals + 1).min(6) } else { decimals.saturating_sub(2) };
-        self.decimal = self.decimal & STEP_DECIMAL | decimals;
+        self.decimal = self.decimal & !DECIMALS | decimals;
+    }
+
+    /// The class of the last difference.
+    #[inline]
+    fn class(&self) -> usize {
+        usize::from((self.decimal & CLASS) >> CLASS_AT)
+    }
+
+    #[inline]
+    fn note_class(&mut self, class: usize) {
+        self.decimal = self.decimal & !CLASS | (class as u8) << CLASS_AT & CLASS;
     }
 }
 
@@ -182,8 +216,8 @@ pub(crate) struct Context {
     pub(crate) clock_ms: u32,
     /// The float before in this frame: now and before.
     pub(crate) neighbour: Option<(f32, f32)>,
-    /// What the linked register predicts for the float that comes now.
-    pub(crate) link: Option<f32>,
+    /// What the linked register predicts for the float that comes now, and whether it was computed as the sender did.
+    pub(crate) link: Option<(f32, bool)>,
 }
 
 /// The elements of a group, in the order in which slots claimed them.
