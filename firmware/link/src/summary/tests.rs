@@ -227,7 +227,7 @@ fn told(findings: &[(u64, u8, Level, Level, &'static str)]) -> Vec<(u64, u8)> {
     let mut summary = Summary::new(&Params::defaults());
     let monitor = Monitor::new(Params::defaults());
     let mut told = Vec::new();
-    for now_s in 0..120 {
+    for now_s in 0..180 {
         let now = Instant::from_millis(now_s * 1_000);
         // The number after the word of a STATUSTEXT.
         let mut out = |bytes: &[u8]| {
@@ -271,4 +271,16 @@ fn what_is_over_before_it_was_told_is_not_told() {
     let mut findings: Vec<_> = (0..4).map(|instance| (0, instance, Level::Warning, Level::Ok, "")).collect();
     findings.push((2, 3, Level::Ok, Level::Warning, ""));
     assert_eq!(told(&findings), [(0, 0), (0, 1), (0, 2)]);
+}
+
+#[test]
+fn what_is_less_urgent_takes_no_place_of_what_waits() {
+    let critical = (0..9).map(|instance| (0, instance, Level::Critical, Level::Ok, ""));
+    // Of these the numbers are beyond the one digit that is looked at; all wait.
+    let more = (9..21).map(|instance| (0, instance, Level::Critical, Level::Ok, ""));
+    let warning = [(0, 1, Level::Warning, Level::Critical, "")];
+    let all: Vec<_> = critical.chain(more).collect();
+    let before = told(&all);
+    let late: Vec<_> = all.into_iter().chain(warning).collect();
+    assert_eq!(told(&late), before, "a warning is told after them, or not at all");
 }
