@@ -33,6 +33,9 @@ pub fn counter_name(number: u8) -> String {
             Quantity::HoverThrottle => "baseline_hover_throttle".to_owned(),
             Quantity::Resistance(battery) => format!("baseline_battery{battery}_resistance_ohm"),
             Quantity::MotorSpeed(motor) => format!("baseline_motor{motor}_speed_off_percent"),
+            Quantity::HoverPower => "baseline_hover_power_w".to_owned(),
+            Quantity::MotorOutput(motor) => format!("baseline_motor{motor}_output_off_percent"),
+            Quantity::Capacity(battery) => format!("baseline_battery{battery}_capacity_ah"),
         },
         None => format!("counter_{number}"),
     }

@@ -7,10 +7,13 @@
 //!
 //! With the mean goes the spread of the flights' figures. What a next flight's figure may be follows from both and from what is known
 //! of such quantities before ([`Baseline::spread`]): Student's t distribution (normal figures of unknown mean and spread, the spread with
-//! a conjugate prior; Gelman et al., Bayesian Data Analysis, 3.2 and 3.3).
+//! a conjugate prior; Gelman et al., Bayesian Data Analysis, 3.2 and 3.3). The test of one figure against it is the likelihood ratio
+//! test for a changed mean (Lehmann and Romano, Testing Statistical Hypotheses, 5.2), so its rate of false words can be set
+//! ([`Baseline::reach`]).
 
 use crate::bytes::{Put, Take, Unreadable};
 use crate::observation::MOTORS_MAX;
+use crate::outputs::JUDGED_MAX;
 use crate::vehicle::BATTERIES_MAX;
 
 /// Flights that make a baseline; before, nothing is compared.
@@ -33,20 +36,34 @@ pub enum Quantity {
     Resistance(u8),
     /// How far a motor's speed is from the mean of the others, percent of it, with its sign.
     MotorSpeed(u8),
+    /// Power that hovers, drawn from the batteries, W.
+    HoverPower,
+    /// How far a motor's output is from the mean of all, percent of it, with its sign.
+    MotorOutput(u8),
+    /// A battery's charge from full to empty, Ah, by its place.
+    Capacity(u8),
 }
+
+/// Quantities that versions before 3 of the stored form have.
+const FIRST: usize = 2 + BATTERIES_MAX + MOTORS_MAX;
 
 impl Quantity {
     /// How many there are.
-    pub const COUNT: usize = 2 + BATTERIES_MAX + MOTORS_MAX;
+    pub const COUNT: usize = FIRST + 1 + JUDGED_MAX + BATTERIES_MAX;
 
     /// The quantity of a place in the stored form.
-    pub(crate) const fn from_index(index: usize) -> Option<Self> {
+    pub const fn from_index(index: usize) -> Option<Self> {
         const MOTORS: usize = 2 + BATTERIES_MAX;
+        const OUTPUTS: usize = FIRST + 1;
+        const CAPACITIES: usize = OUTPUTS + JUDGED_MAX;
         match index {
             0 => Some(Self::Vibration),
             1 => Some(Self::HoverThrottle),
             2..MOTORS => Some(Self::Resistance(index as u8 - 2)),
-            MOTORS..Self::COUNT => Some(Self::MotorSpeed((index - MOTORS) as u8)),
+            MOTORS..FIRST => Some(Self::MotorSpeed((index - MOTORS) as u8)),
+            FIRST => Some(Self::HoverPower),
+            OUTPUTS..CAPACITIES => Some(Self::MotorOutput((index - OUTPUTS) as u8)),
+            CAPACITIES..Self::COUNT => Some(Self::Capacity((index - CAPACITIES) as u8)),
             _ => None,
         }
     }
@@ -58,6 +75,9 @@ impl Quantity {
             Self::HoverThrottle => 1,
             Self::Resistance(battery) => 2 + battery as usize,
             Self::MotorSpeed(motor) => 2 + BATTERIES_MAX + motor as usize,
+            Self::HoverPower => FIRST,
+            Self::MotorOutput(motor) => FIRST + 1 + motor as usize,
+            Self::Capacity(battery) => FIRST + 1 + JUDGED_MAX + battery as usize,
         }
     }
 }
@@ -103,13 +123,39 @@ impl Baseline {
         let squares = PRIOR_FLIGHTS * prior * prior + flights * self.variance;
         libm::sqrtf(squares / (PRIOR_FLIGHTS + flights) * (1.0 + 1.0 / flights))
     }
+
+    /// How far a figure may be from the baseline, either way, so that where nothing changed one flight in `rarely` goes further.
+    pub fn reach(&self, prior: f32, rarely: f32) -> f32 {
+        let flights = f32::from(self.flights.clamp(1, REMEMBERED));
+        self.spread(prior) * student_t(rarely, PRIOR_FLIGHTS + flights - 1.0)
+    }
+}
+
+/// What a Student's t of so many degrees of freedom (8 and more) exceeds, either way, once in `rarely`: the normal quantile by 26.2.23 and its
+/// expansion by 26.7.5 of Abramowitz and Stegun, Handbook of Mathematical Functions; within 1 % for one in 20 to one in 100,000.
+fn student_t(rarely: f32, degrees: f32) -> f32 {
+    let root = libm::sqrtf(2.0 * libm::logf(2.0 * rarely));
+    let above = 2.515_517 + root * (0.802_853 + root * 0.010_328);
+    let below = 1.0 + root * (1.432_788 + root * (0.189_269 + root * 0.001_308));
+    let normal = root - above / below;
+    let square = normal * normal;
+    let terms = [
+        (1.0 + square) / 4.0,
+        (3.0 + square * (16.0 + square * 5.0)) / 96.0,
+        (-15.0 + square * (17.0 + square * (19.0 + square * 3.0))) / 384.0,
+        (-945.0 + square * (-1_920.0 + square * (1_482.0 + square * (776.0 + square * 79.0)))) / 92_160.0,
+    ];
+    let more = terms.iter().rev().fold(0.0, |sum, term| (sum + term) / degrees);
+    normal * (1.0 + more)
 }
 
 /// All baselines of an airframe.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Baselines([Baseline; Quantity::COUNT]);
 
-const VERSION: u8 = 2;
+const VERSION: u8 = 3;
+/// Before there were power, outputs and capacity.
+const FEWER: u8 = 2;
 /// Before there were spreads.
 const WITHOUT_SPREADS: u8 = 1;
 
@@ -164,7 +210,8 @@ impl Baselines {
         if version < WITHOUT_SPREADS {
             return Err(Unreadable);
         }
-        for baseline in &mut baselines.0 {
+        let stored = if version <= FEWER { FIRST } else { Quantity::COUNT };
+        for baseline in baselines.0.iter_mut().take(stored) {
             let value = take.f32()?;
             let variance = if version == WITHOUT_SPREADS { 0.0 } else { take.f32()? };
             let stored = Baseline { value, variance, flights: take.u16()? };
@@ -222,9 +269,27 @@ mod tests {
     }
 
     #[test]
+    fn one_flight_in_as_many_as_are_asked_for_goes_beyond() {
+        // Two-sided points of Student's t, by integration of its density.
+        for (rarely, degrees, known) in [
+            (20.0, 10.0, 2.228),
+            (100.0, 10.0, 3.169),
+            (1_000.0, 10.0, 4.587),
+            (1_000.0, 17.0, 3.965),
+            (100_000.0, 17.0, 6.184),
+        ] {
+            let told = student_t(rarely, degrees);
+            assert!((told / known - 1.0).abs() < 0.01, "{told} for {known}");
+        }
+        let mut baseline = Baseline::NONE;
+        (0..3).for_each(|_| baseline.learn(10.0));
+        assert!(baseline.reach(0.1, 1_000.0) > baseline.reach(0.1, 100.0));
+    }
+
+    #[test]
     fn baselines_of_before_there_were_spreads_are_read() {
         let mut stored = vec![1];
-        for quantity in 0..Quantity::COUNT {
+        for quantity in 0..FIRST {
             stored.extend((quantity as f32).to_le_bytes());
             stored.extend(5_u16.to_le_bytes());
         }
@@ -232,6 +297,16 @@ mod tests {
         let known = baselines.get(Quantity::Resistance(1));
         assert_eq!(known, Baseline { value: 3.0, variance: 0.0, flights: 5 });
         assert_eq!(baselines.get(Quantity::HoverThrottle), Baseline::NONE, "it meant another thing");
+    }
+
+    #[test]
+    fn baselines_of_before_there_were_power_and_outputs_are_read() {
+        let mut known = Baselines::new();
+        known.learn(Quantity::HoverThrottle, 0.4);
+        let mut stored = [0; Baselines::BYTES];
+        known.encode(&mut stored);
+        stored[0] = FEWER;
+        assert_eq!(Baselines::decode(&stored[..=10 * FIRST]), Ok(known));
     }
 
     #[test]

@@ -8,7 +8,8 @@
 //! are not sampled at the same moment, and a VTOL's transition or a fast leg sets them apart. An inertial sensor that says nothing but
 //! zeros is not fitted.
 //!
-//! Each sensor by itself: whether it is stuck ([`crate::stuck`]); the first barometer against the height of GPS ([`crate::heights`]).
+//! Each sensor by itself: whether it is stuck ([`crate::stuck`]); the first barometer against the height of GPS ([`crate::heights`]); a
+//! receiver's speed against the way between its positions ([`crate::travel`]).
 
 use crate::departure::Departure;
 use crate::flight::Flight;
@@ -19,6 +20,7 @@ use crate::observation::{Air, Estimator, EstimatorScale, Gnss, Imu, VehicleKind,
 use crate::steady::{TURNED, hovers};
 use crate::stuck::Stuck;
 use crate::time::{Instant, Span};
+use crate::travel::Travel;
 use crate::units::norm;
 use crate::vehicle::{RECEIVERS_MAX, Vehicle};
 
@@ -155,6 +157,7 @@ pub(crate) struct Crosschecks {
     sensors: [[Sensor; SENSORS_MAX]; Kind::ALL.len()],
     pairs: [[Departure; SENSORS_MAX]; Kind::ALL.len()],
     receivers: [Stuck; RECEIVERS_MAX],
+    travels: [Travel; RECEIVERS_MAX],
     moved: Moved,
     heights: Heights,
     /// When sensors of a kind were compared last, and when that was tried.
@@ -175,6 +178,7 @@ impl Crosschecks {
             sensors: [[Sensor::NEW; SENSORS_MAX]; Kind::ALL.len()],
             pairs: [[Departure::NEW; SENSORS_MAX]; Kind::ALL.len()],
             receivers: [Stuck::NEW; RECEIVERS_MAX],
+            travels: [Travel::NEW; RECEIVERS_MAX],
             moved: Moved::NONE,
             heights: Heights::new(),
             compared_at: [None; Kind::ALL.len()],
@@ -229,6 +233,9 @@ impl Crosschecks {
             let words = |degrees: f64| [degrees.to_bits() as u32, (degrees.to_bits() >> 32) as u32];
             let place = words(place.latitude_deg).into_iter().chain(words(place.longitude_deg));
             stuck.take(at, place.chain([altitude, speed]), travelled_m);
+        }
+        if let Some(travel) = self.travels.get_mut(usize::from(gnss.instance)) {
+            travel.take(at, gnss, flight.airborne());
         }
         if gnss.instance == 0 {
             self.heights.take_gnss(at, gnss, vehicle, flight);
@@ -334,6 +341,11 @@ impl Crosschecks {
     /// The same of a receiver.
     pub(crate) fn receiver_stuck(&self, now: Instant, receiver: u8) -> Option<Reading> {
         self.receivers.get(usize::from(receiver))?.lasts(now, self.moved.travelled_m, TRAVELLED_M)
+    }
+
+    /// How far a receiver's speed is from that of its positions, m/s.
+    pub(crate) fn speed_apart(&self, receiver: u8) -> Option<Reading> {
+        self.travels.get(usize::from(receiver))?.speed_apart()
     }
 
     /// The barometer against GPS, and its noise.

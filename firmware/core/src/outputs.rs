@@ -10,6 +10,10 @@
 //! against what was usual in this flight ([`crate::departure`]), less what commands vary by anyway. (Derived from the geometry of
 //! regular frames, for this project.)
 //!
+//! A motor that is a little weak stands out little, and in wind no more than others do at times; but it goes on doing so. So what a motor
+//! stands out by beyond [`DRIFT_PERCENT`] is summed over time, and what falls short of that is taken off again (a CUSUM: E. S. Page,
+//! Continuous inspection schemes, Biometrika 41, 1954). The sum of [`SUMMED_S`] seconds counts as what stands out at once.
+//!
 //! A motor that is given next to nothing while the others carry the vehicle was taken out.
 //!
 //! Other frames are not judged: three motors have no such pattern, eight and coaxial ones hardly any.
@@ -18,7 +22,7 @@ use crate::departure::Departure;
 use crate::flight::Flight;
 use crate::latest::Reading;
 use crate::observation::{MOTORS_MAX, Outputs};
-use crate::steady::flies_evenly;
+use crate::steady::flies_level;
 use crate::time::{Instant, Span};
 use crate::vehicle::Vehicle;
 
@@ -36,8 +40,16 @@ const CARRIES_US: f32 = 100.0;
 const HOLD_PERCENT: f32 = 4.0;
 /// Where commands vary much, a change must be larger: by so many of their mean distances from what is usual.
 const SPREADS: f32 = 1.5;
+/// A third of what a motor that gives 85 % of its command stands out by, percent: no healthy one does so on the average.
+const DRIFT_PERCENT: f32 = 3.0;
+/// What is beyond for so long, s, counts in full.
+const SUMMED_S: f32 = 6.0;
+/// No sum is worth more, percent: what ends is over soon.
+const SUM_MAX_PERCENT: f32 = 12.0;
 /// Below this part of the average, percent, a motor was taken out.
 const OUT_PERCENT: f32 = -70.0;
+/// 30 degrees a second: a pilot yaws faster, and gusts do not turn a vehicle so fast for long.
+const YAWS_RAD_S: f32 = 0.5;
 /// Messages that are further apart are not of the same hover.
 const PAUSE: Span = Span::from_secs(2);
 
@@ -51,6 +63,8 @@ pub(crate) struct MotorOutputs {
     /// Command against the average of all, percent.
     share: [Departure; JUDGED_MAX],
     at: Option<Instant>,
+    /// What a motor stood out by over time, percent for [`SUMMED_S`].
+    sums: [f32; JUDGED_MAX],
     /// The motor that stands out, and how far, percent.
     alone: (u8, f32),
 }
@@ -63,6 +77,7 @@ impl MotorOutputs {
             lowest: [u16::MAX; JUDGED_MAX],
             share: [Departure::NEW; JUDGED_MAX],
             at: None,
+            sums: [0.0; JUDGED_MAX],
             alone: (0, 0.0),
         }
     }
@@ -89,7 +104,8 @@ impl MotorOutputs {
         }
         let lowest = &self.lowest[..count];
         // What has no idle pulse on the ground is a servo.
-        if lowest.iter().any(|lowest| *lowest > IDLE_US) || !flies_evenly(at, vehicle, flight) {
+        if lowest.iter().any(|lowest| *lowest > IDLE_US) || !flies_level(at, vehicle, flight) || yaws(vehicle)
+        {
             return;
         }
         let zero_us =
@@ -119,7 +135,8 @@ impl MotorOutputs {
         let [first, second, .., lowest] = *changes else { return };
         let (lowest, part) = if count == JUDGED_MAX { (changes[count - 2], 0.5) } else { (lowest, 1.0) };
         let spread = self.share.iter().take(count).map(Departure::spread).sum::<f32>() / count as f32;
-        let stands_out = ((first.0 - second.0) - (second.0 - lowest.0) - SPREADS * spread) / part;
+        let alone = ((first.0 - second.0) - (second.0 - lowest.0)) / part;
+        let stands_out = (alone - SPREADS * spread / part).max(self.summed(alone, first.1, step_s));
         if !self.is_known() || stands_out < HOLD_PERCENT {
             self.share.iter_mut().for_each(|share| share.learn(step_s));
         }
@@ -127,9 +144,28 @@ impl MotorOutputs {
         self.alone = out.map_or((first.1, stands_out), |(place, _)| (place, 100.0));
     }
 
+    /// What the motor that stands out most has stood out by over time.
+    fn summed(&mut self, alone: f32, motor: u8, step_s: f32) -> f32 {
+        if !self.is_known() {
+            return 0.0;
+        }
+        for (place, sum) in (0..).zip(&mut self.sums) {
+            let beyond = if place == motor { alone } else { 0.0 } - DRIFT_PERCENT;
+            *sum = (*sum + beyond * step_s / SUMMED_S).clamp(0.0, SUM_MAX_PERCENT);
+        }
+        self.sums.get(usize::from(motor)).copied().unwrap_or(0.0)
+    }
+
     /// All learn together.
     fn is_known(&self) -> bool {
         self.share.iter().all(Departure::is_known)
+    }
+
+    /// A motor's command against the average of all, percent, smoothed.
+    pub(crate) fn share(&self, now: Instant, vehicle: &Vehicle, motor: u8) -> Option<f32> {
+        self.at.filter(|at| now.since(*at) <= PAUSE)?;
+        let share = self.share.get(..motors(vehicle))?.get(usize::from(motor))?;
+        Some(share.figure())
     }
 
     /// How far a motor's command alone is above what is usual, percent of the average; 0 for those that do not stand out.
@@ -141,6 +177,12 @@ impl MotorOutputs {
         let (place, percent) = self.alone;
         Some(Reading { at, value: if place == motor { percent.max(0.0) } else { 0.0 } })
     }
+}
+
+/// Whether it turns about its upright axis: then wind and load go round it, and two motors are given more.
+fn yaws(vehicle: &Vehicle) -> bool {
+    let rates = vehicle.attitude.get().and_then(|attitude| attitude.rates);
+    rates.is_some_and(|[.., yaw]| libm::fabsf(yaw.0) > YAWS_RAD_S)
 }
 
 /// Motors of a frame that is judged; 0 of any other. `MAV_TYPE`: 2 quadrotor, 13 hexarotor (a coaxial one calls itself so too, and is

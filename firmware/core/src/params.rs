@@ -240,6 +240,10 @@ params! {
     ThrustWarn "THRUST_WARN" "s" 2.0 0.5 1000.0 "full throttle without a climb; ArduPilot warns of thrust loss after 1 s, and looks at the attitude too";
     EkfClimbWarn "EKF_CLIMB_WARN" "m/s" 8.0 0.5 1000.0 "estimator's climb against the barometer's, over a second; up to 6.6 in healthy real flights";
     EkfClimbCrit "EKF_CLIMB_CRIT" "m/s" 12.0 0.5 1000.0 "estimator's climb against the barometer's, over a second; 14 and 24 where height control ran away";
+    GpsSpeedWarn "GPS_SPEED_WARN" "m/s" 1.0 0.1 1000.0 "a receiver's speed against the way between its positions, over four seconds";
+    TrdFalse "TRD_FALSE" "flights" 400.0 20.0 100_000.0 "of flights in which nothing changed, one in so many is told by a trend: rarer is told later; beside it the trends' limits are what is worth a word";
+    TrdCapWarn "TRD_CAP_WARN" "%" 20.0 0.0 100.0 "battery capacity below its baseline; cells are called worn out at 80 % of their capacity";
+    TrdCapCrit "TRD_CAP_CRIT" "%" 40.0 0.0 100.0 "battery capacity below its baseline";
 }
 
 impl Param {

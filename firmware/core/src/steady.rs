@@ -17,9 +17,9 @@ const LEVEL_MPS: f32 = 2.0;
 /// Further it does not lean steadily, rad.
 const LEANS_RAD: f32 = 0.6;
 
-/// Whether a multicopter turns and climbs little, and does not touch the ground: contact and the propellers' wash there set sensors
-/// apart, and motors do what the legs make them do. It may be fast, and lean against the wind.
-pub(crate) fn flies_evenly(now: Instant, vehicle: &Vehicle, flight: &Flight) -> bool {
+/// Whether a multicopter climbs little, and does not touch the ground: there motors do what the legs make them do. It may be fast, and lean
+/// against the wind.
+pub(crate) fn flies_level(now: Instant, vehicle: &Vehicle, flight: &Flight) -> bool {
     let climbs = climb_mps(now, vehicle).is_some_and(|climb| climb.abs() > LEVEL_MPS);
     let leans = |attitude: &Attitude| attitude.roll.0.abs().max(attitude.pitch.0.abs()) > LEANS_RAD;
     !climbs
@@ -27,7 +27,6 @@ pub(crate) fn flies_evenly(now: Instant, vehicle: &Vehicle, flight: &Flight) -> 
         && !vehicle.attitude.get().is_some_and(leans)
         && flight.is_settled(now)
         && is_clear(now, vehicle)
-        && vehicle.inertial.turns_little(now, TURNED)
 }
 
 /// Whether it does so, and is level and slow.
@@ -36,7 +35,10 @@ pub(crate) fn hovers(now: Instant, vehicle: &Vehicle, flight: &Flight) -> bool {
         let [north, east, _] = global.velocity.map(|speed| speed.0);
         north * north + east * east < SLOW_MPS * SLOW_MPS
     });
-    slow && flight.is_steady(now, vehicle) && flies_evenly(now, vehicle, flight)
+    // Contact, and the propellers' wash near the ground, set sensors apart too.
+    slow && flight.is_steady(now, vehicle)
+        && flies_level(now, vehicle, flight)
+        && vehicle.inertial.turns_little(now, TURNED)
 }
 
 /// Whether it is away from the ground, as far as that is known.

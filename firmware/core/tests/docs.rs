@@ -24,6 +24,10 @@ const INPUTS: &[(&str, &str)] = &[
     ("cell_deviation", "BATTERY_STATUS: highest less lowest cell"),
     ("cell_dev_lasting", "BATTERY_STATUS: the same for a minute"),
     ("batt_resistance", "BATTERY_STATUS: slope of voltage over current, against its baseline"),
+    (
+        "batt_capacity",
+        "BATTERY_STATUS: charge taken over the fall of the state of charge by its cells' voltage, below its baseline",
+    ),
     ("batt_fault", "BATTERY_STATUS: fault bits set"),
     ("batt_temperature", "BATTERY_STATUS"),
     ("rail_5v_low", "POWER_STATUS"),
@@ -54,9 +58,20 @@ const INPUTS: &[(&str, &str)] = &[
     ("pitch_rate", "the same messages"),
     (
         "motor_trend",
-        "ESC_STATUS, ESC_TELEMETRY: the speed against the others with its sign, against its baseline",
+        "ESC_STATUS, ESC_TELEMETRY: the speed against the others with its sign, against its baseline; without them SERVO_OUTPUT_RAW: the output, of quadrotors and hexarotors",
     ),
-    ("throttle_trend", "VFR_HUD: throttle in hover, for a set voltage and sea level, above its baseline"),
+    (
+        "throttle_trend",
+        "VFR_HUD: throttle in hover, for a set voltage and sea level, above its baseline, where it is not the weight",
+    ),
+    (
+        "power_trend",
+        "BATTERY_STATUS: power in hover, at sea level, above its baseline, where it is not the weight",
+    ),
+    (
+        "weight_trend",
+        "VFR_HUD, BATTERY_STATUS: throttle and power in hover above their baselines as they are with more weight",
+    ),
     ("drive_due", "components of kind motor, propeller, ESC"),
     ("drive_alert", "STATUSTEXT, EVENT; SYS_STATUS: motor outputs, propulsion; HIGH_LATENCY2"),
     ("cylinder_head", "EFI_STATUS"),
@@ -116,6 +131,7 @@ const INPUTS: &[(&str, &str)] = &[
         "SCALED_PRESSURE, SCALED_PRESSURE2, SCALED_PRESSURE3, HIGHRES_IMU: how long the pressure was the same",
     ),
     ("gps_stuck", "GPS_RAW_INT, GPS2_RAW: how long position, height and speed were the same"),
+    ("gps_speed", "GPS_RAW_INT, GPS2_RAW: speed less the way between positions, over four seconds"),
     ("gps_satellites", "GPS_RAW_INT, GPS2_RAW"),
     ("gps_hdop", "GPS_RAW_INT, GPS2_RAW"),
     ("gps_accuracy", "GPS_RAW_INT, GPS2_RAW: horizontal accuracy"),

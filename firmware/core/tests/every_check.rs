@@ -201,7 +201,7 @@ const FAULTS: [(&str, u8, Level, Fault); 97] = [
 
 /// Found by scripts of their own: silence, restarts and rates in `scripted_faults.rs`, what departs from a baseline in
 /// `trends.rs`, mishaps in `mishap.rs`, what departs from its usual level in a flight in `crosscheck.rs`.
-const ELSEWHERE: [&str; 32] = [
+const ELSEWHERE: [&str; 36] = [
     "baro_height",
     "baro_noise",
     "ekf_climb",
@@ -225,8 +225,12 @@ const ELSEWHERE: [&str; 32] = [
     "heartbeat",
     "autopilot_reboot",
     "batt_resistance",
+    "batt_capacity",
+    "gps_speed",
     "motor_trend",
     "throttle_trend",
+    "power_trend",
+    "weight_trend",
     "vibration_trend",
     "free_fall",
     "impact",

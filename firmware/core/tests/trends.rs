@@ -77,7 +77,15 @@ fn what_was_normal_for_three_flights_stays_normal() {
 #[test]
 fn each_quantity_that_leaves_what_was_normal_is_found_and_not_learned() {
     let stored = three_flights();
-    let cases: [(&str, u8, Level, Change); 5] = [
+    let cases: [(&str, u8, Level, Change); 7] = [
+        ("power_trend", 0, Level::Warning, |quad| {
+            quad.battery.current = quad.battery.current.map(|current| Amperes(current.0 * 1.1));
+        }),
+        // A tenth heavier: power goes with the 1.5th power of the weight.
+        ("weight_trend", 0, Level::Warning, |quad| {
+            quad.throttle = 0.55;
+            quad.battery.current = quad.battery.current.map(|current| Amperes(current.0 * 1.154));
+        }),
         ("vibration_trend", 0, Level::Warning, |quad| quad.vibration.levels = [Some(9.0); 3]),
         ("vibration_trend", 0, Level::Warning, |quad| quad.vibration.levels = [Some(2.5); 3]),
         ("throttle_trend", 0, Level::Warning, |quad| quad.throttle = 0.55),

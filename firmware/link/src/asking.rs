@@ -8,6 +8,10 @@
 //! it never has. A message that is refused is not asked for again until the autopilot reboots. An ArduPilot that never
 //! answers such commands, or knows none, is asked for whole groups with `REQUEST_DATA_STREAM`.
 //!
+//! ArduPilot tells its pilot of each interval that is asked for of a message that it does not have ("No ap_message for mavlink id"), and refuses
+//! `REQUEST_MESSAGE` for it without a word (`GCS_Common.cpp`, 4.1 to 4.6). So it is asked for one of them first, and for the
+//! interval of those that it has. `ESC_TELEMETRY_5_TO_8` comes with `ESC_TELEMETRY_1_TO_4`, and has no interval of its own.
+//!
 //! Parameters are asked for after the messages, each once or twice after the vehicle is heard first or has rebooted. One that the
 //! autopilot does not have is not answered, and that says nothing of it.
 //!
@@ -46,6 +50,8 @@ const ACCEPTED: u8 = 0;
 /// As above.
 const TEMPORARILY: u8 = 1;
 /// As above.
+const UNSUPPORTED: u8 = 3;
+/// As above.
 const IN_PROGRESS: u8 = 5;
 
 /// Who sends a message.
@@ -60,46 +66,61 @@ enum By {
 type Wanted = (u32, By, u8, u8);
 
 /// What the checks need, the most needed first.
-const WANTED: [Wanted; 29] = [
-    (1, By::Both, 2, 43),           // SYS_STATUS
-    (30, By::Both, 10, 40),         // ATTITUDE
-    (33, By::Both, 5, 40),          // GLOBAL_POSITION_INT
-    (24, By::Both, 2, 64),          // GPS_RAW_INT
-    (147, By::Both, 1, 66),         // BATTERY_STATUS
-    (74, By::Both, 4, 32),          // VFR_HUD
-    (241, By::Both, 2, 44),         // VIBRATION
-    (2, By::Both, 1, 24),           // SYSTEM_TIME
-    (65, By::Both, 2, 54),          // RC_CHANNELS
-    (245, By::Both, 2, 14),         // EXTENDED_SYS_STATE
-    (36, By::Both, 5, 49),          // SERVO_OUTPUT_RAW
-    (230, By::Px4, 2, 54),          // ESTIMATOR_STATUS
-    (291, By::Px4, 5, 69),          // ESC_STATUS
-    (290, By::Px4, 1, 58),          // ESC_INFO
-    (105, By::Px4, 20, 75),         // HIGHRES_IMU
-    (83, By::Px4, 2, 49),           // ATTITUDE_TARGET
-    (32, By::Px4, 5, 40),           // LOCAL_POSITION_NED
-    (193, By::ArduPilot, 2, 34),    // EKF_STATUS_REPORT
-    (62, By::ArduPilot, 2, 38),     // NAV_CONTROLLER_OUTPUT
-    (125, By::ArduPilot, 1, 18),    // POWER_STATUS
-    (11_030, By::ArduPilot, 5, 56), // ESC_TELEMETRY_1_TO_4
-    (11_031, By::ArduPilot, 5, 56), // ESC_TELEMETRY_5_TO_8
-    (27, By::ArduPilot, 10, 41),    // RAW_IMU
-    (226, By::ArduPilot, 2, 20),    // RPM
-    (225, By::ArduPilot, 2, 82),    // EFI_STATUS
-    (11_039, By::ArduPilot, 1, 22), // MCU_STATUS
-    (29, By::ArduPilot, 1, 28),     // SCALED_PRESSURE
-    (116, By::Both, 4, 36),         // SCALED_IMU2
-    (129, By::Both, 4, 36),         // SCALED_IMU3
+const WANTED: [Wanted; 32] = [
+    (1, By::Both, 2, 43),            // SYS_STATUS
+    (30, By::Both, 10, 40),          // ATTITUDE
+    (33, By::Both, 5, 40),           // GLOBAL_POSITION_INT
+    (24, By::Both, 2, 64),           // GPS_RAW_INT
+    (147, By::Both, 1, 66),          // BATTERY_STATUS
+    (74, By::Both, 4, 32),           // VFR_HUD
+    (241, By::Both, 2, 44),          // VIBRATION
+    (2, By::Both, 1, 24),            // SYSTEM_TIME
+    (65, By::Both, 2, 54),           // RC_CHANNELS
+    (245, By::Both, 2, 14),          // EXTENDED_SYS_STATE
+    (36, By::Both, 5, 49),           // SERVO_OUTPUT_RAW
+    (83, By::Both, 4, 49),           // ATTITUDE_TARGET
+    (230, By::Px4, 2, 54),           // ESTIMATOR_STATUS
+    (291, By::Px4, 5, 69),           // ESC_STATUS
+    (290, By::Px4, 1, 58),           // ESC_INFO
+    (105, By::Px4, 20, 75),          // HIGHRES_IMU
+    (193, By::ArduPilot, 2, 34),     // EKF_STATUS_REPORT
+    (62, By::ArduPilot, 2, 38),      // NAV_CONTROLLER_OUTPUT
+    (125, By::ArduPilot, 1, 18),     // POWER_STATUS
+    (11_030, By::ArduPilot, 5, 112), // ESC_TELEMETRY_1_TO_4, and 5_TO_8 with it
+    (27, By::ArduPilot, 10, 41),     // RAW_IMU
+    (226, By::ArduPilot, 2, 20),     // RPM
+    (225, By::ArduPilot, 2, 82),     // EFI_STATUS
+    (11_039, By::ArduPilot, 1, 22),  // MCU_STATUS
+    (29, By::ArduPilot, 1, 28),      // SCALED_PRESSURE
+    (116, By::Both, 4, 36),          // SCALED_IMU2
+    (129, By::Both, 4, 36),          // SCALED_IMU3
+    (137, By::Both, 1, 28),          // SCALED_PRESSURE2
+    (143, By::Both, 1, 28),          // SCALED_PRESSURE3
+    (124, By::Both, 1, 69),          // GPS2_RAW
+    (85, By::Both, 2, 63),           // POSITION_TARGET_LOCAL_NED
+    (32, By::Both, 5, 40),           // LOCAL_POSITION_NED
 ];
 
 /// Groups of `REQUEST_DATA_STREAM` and their rates: raw sensors, extended status, RC, position, extra 1 to 3.
 const GROUPS: [(u8, u16); 7] = [(1, 4), (2, 2), (3, 2), (6, 4), (10, 8), (11, 4), (12, 2)];
 
+/// Whether an autopilot has a message.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+enum Has {
+    /// Nobody knows.
+    #[default]
+    Perhaps,
+    /// It came, or one of them was granted.
+    Yes,
+    /// It was refused.
+    No,
+}
+
 #[derive(Clone, Copy, Debug, Default)]
 struct Message {
     /// Frames since the last look.
     seen: u8,
-    refused: bool,
+    has: Has,
     /// How often it was promised and did not come.
     patience: u8,
     /// Rounds to wait before it is asked for again.
@@ -118,6 +139,8 @@ struct Asked {
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum What {
+    /// One of a message, to see whether the autopilot has it.
+    One(usize),
     Interval(usize),
     Identity,
     /// The place of a parameter in [`KNOWN`].
@@ -167,7 +190,7 @@ pub struct Known {
 impl Asking {
     /// Nobody heard yet.
     pub const fn new() -> Self {
-        const NONE: Message = Message { seen: 0, refused: false, patience: 0, wait: 0, due: false };
+        const NONE: Message = Message { seen: 0, has: Has::Perhaps, patience: 0, wait: 0, due: false };
         Self {
             vehicle: None,
             reboots: 0,
@@ -198,8 +221,8 @@ impl Asking {
     /// A frame of the vehicle came.
     pub fn seen(&mut self, id: u32) {
         if let Some(index) = WANTED.iter().position(|wanted| wanted.0 == id) {
-            let seen = &mut self.messages[index].seen;
-            *seen = seen.saturating_add(1);
+            let message = &mut self.messages[index];
+            (message.seen, message.has) = (message.seen.saturating_add(1), Has::Yes);
         }
     }
 
@@ -217,6 +240,7 @@ impl Asking {
     pub fn answered(&mut self, command: u16, result: u8) {
         let Some(asked) = self.asked else { return };
         let (expected, message) = match asked.what {
+            What::One(index) => (REQUEST_MESSAGE, &mut self.messages[index]),
             What::Interval(index) => (SET_MESSAGE_INTERVAL, &mut self.messages[index]),
             What::Identity => (REQUEST_MESSAGE, &mut self.identity),
             What::Parameter(_) => return,
@@ -224,7 +248,11 @@ impl Asking {
         if command != expected || result == IN_PROGRESS {
             return;
         }
-        message.refused = !matches!(result, ACCEPTED | TEMPORARILY);
+        // One that does not know the question may know the other one.
+        let asks_one = matches!(asked.what, What::One(_));
+        let is_granted = matches!(result, ACCEPTED | TEMPORARILY) || (asks_one && result == UNSUPPORTED);
+        message.has = if is_granted { Has::Yes } else { Has::No };
+        message.due &= asks_one && is_granted;
         self.asked = None;
         self.deaf = 0;
     }
@@ -260,7 +288,7 @@ impl Asking {
                 message.patience = 0;
                 message.wait = 0;
                 message.due = false;
-            } else if is_sent_by(wanted, known.autopilot) && !message.refused {
+            } else if is_sent_by(wanted, known.autopilot) && message.has != Has::No {
                 message.due = message.wait == 0;
                 if message.due {
                     message.wait = (1_u8 << message.patience) - 1;
@@ -273,7 +301,7 @@ impl Asking {
         }
         if known.identified {
             self.identity.due = false;
-        } else if self.identity.wait == 0 && !self.identity.refused {
+        } else if self.identity.wait == 0 && self.identity.has != Has::No {
             self.identity.due = true;
             self.identity.wait = (1 << self.identity.patience) - 1;
             self.identity.patience = (self.identity.patience + 1).min(PATIENCE_MAX);
@@ -300,6 +328,10 @@ impl Asking {
             self.asked = None;
             match asked.what {
                 What::Parameter(place) => self.parameters &= !(1 << place),
+                What::One(index) => {
+                    self.messages[index].due = false;
+                    self.deaf = self.deaf.saturating_add(TRIES);
+                }
                 What::Interval(_) | What::Identity => self.deaf = self.deaf.saturating_add(TRIES),
             }
         }
@@ -322,7 +354,7 @@ impl Asking {
             match what {
                 What::Identity => self.identity.due = false,
                 What::Interval(index) => self.messages[index].due = false,
-                What::Parameter(_) => {}
+                What::One(_) | What::Parameter(_) => {}
             }
             // One that it does not have is asked for once more, and not twice.
             let tries = if matches!(what, What::Parameter(_)) { TRIES - 1 } else { 1 };
@@ -333,8 +365,12 @@ impl Asking {
     /// What is asked for next. One that knows no intervals is asked for parameters only.
     fn next(&self, known: &Known) -> Option<What> {
         let commands = || {
-            let interval = self.messages.iter().position(|message| message.due).map(What::Interval);
-            if self.identity.due { Some(What::Identity) } else { interval }
+            if self.identity.due {
+                return Some(What::Identity);
+            }
+            let (index, message) = self.messages.iter().enumerate().find(|(_, message)| message.due)?;
+            let asks_one = known.autopilot == Autopilot::ArduPilot && message.has == Has::Perhaps;
+            Some(if asks_one { What::One(index) } else { What::Interval(index) })
         };
         let command = self.groups.is_none().then(commands).flatten();
         command.or_else(|| self.parameter(known).map(What::Parameter))
@@ -354,7 +390,7 @@ impl Asking {
     /// Everything that any autopilot has was refused.
     fn knows_no_intervals(&self) -> bool {
         let both = self.messages.iter().zip(&WANTED).filter(|(_, wanted)| wanted.1 == By::Both);
-        both.filter(|(message, _)| message.refused).count() >= 3
+        both.filter(|(message, _)| message.has == Has::No).count() >= 3
     }
 }
 
@@ -380,6 +416,9 @@ fn packet(what: What, known: &Known) -> Packet {
             let (id, _, rate_hz, _) = WANTED[index];
             let interval_us = 1_000_000 / u32::from(rate_hz) * stretch(known);
             messages::command_long(SET_MESSAGE_INTERVAL, &[id as f32, interval_us as f32], system, component)
+        }
+        What::One(index) => {
+            messages::command_long(REQUEST_MESSAGE, &[WANTED[index].0 as f32], system, component)
         }
         What::Identity => {
             messages::command_long(REQUEST_MESSAGE, &[AUTOPILOT_VERSION as f32], system, component)

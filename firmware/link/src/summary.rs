@@ -240,9 +240,12 @@ impl Summary {
             return;
         }
         if self.waiting.is_full() {
-            // The last one is the least urgent.
-            self.waiting.pop();
             self.dropped = self.dropped.saturating_add(1);
+            // The last one is the least urgent of those that wait.
+            if self.waiting.last().is_some_and(|last| urgency(last) >= urgency(finding)) {
+                return;
+            }
+            self.waiting.pop();
         }
         let place = self.waiting.iter().position(|other| urgency(other) < urgency(finding));
         // There is room: one was taken out.

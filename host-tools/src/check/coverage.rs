@@ -99,6 +99,8 @@ impl Coverage {
 pub(super) struct Recording<'a> {
     pub(super) by: JudgedBy,
     pub(super) monitor: &'a Monitor,
+    /// Earlier flights are known.
+    pub(super) has_past: bool,
     /// It holds what came over a link.
     pub(super) is_of_link: bool,
     /// It was heard on the monitor's own wire.
@@ -156,8 +158,10 @@ impl Recording<'_> {
         if is_off(check, self.monitor.params()) {
             return not("its limit is off");
         }
-        if words.scope == Scope::Stored {
-            return not("only a monitor on board knows earlier flights and parts that wear");
+        if words.scope == Scope::Stored && !self.has_past {
+            return not(
+                "only a monitor on board knows earlier flights and parts that wear (--past gives it flights)",
+            );
         }
         if seen.level {
             return Verdict::Judged;

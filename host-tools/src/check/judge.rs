@@ -8,6 +8,7 @@
 use std::collections::BTreeMap;
 
 use hums_core::Monitor;
+use hums_core::baseline::Baselines;
 use hums_core::cause::{Alert, Cause};
 use hums_core::happening::Happening;
 use hums_core::health::{Level, Scope, vocabulary};
@@ -65,6 +66,8 @@ pub struct Limits {
     params: Params,
     /// Names that the user gave: what a log says of them does not count.
     given: Vec<&'static str>,
+    /// What is normal for the vehicle, from its earlier flights.
+    past: Option<Box<Baselines>>,
 }
 
 impl Limits {
@@ -77,6 +80,26 @@ impl Limits {
             limits.given.push(spec.name);
         }
         limits
+    }
+
+    /// With what is normal for the vehicle: then trends are judged against it.
+    #[must_use]
+    pub fn after(self, past: &Baselines) -> Self {
+        Self { past: Some(Box::new(*past)), ..self }
+    }
+
+    /// A monitor before the first item, that knows these.
+    fn monitor(&self) -> Monitor {
+        let mut monitor = Monitor::new(self.params);
+        if let Some(past) = &self.past {
+            monitor.remember(past);
+        }
+        monitor
+    }
+
+    /// Whether they are others than those that a log was judged with on board.
+    fn is_given(&self) -> bool {
+        !self.given.is_empty() || self.past.is_some()
     }
 }
 
@@ -134,7 +157,7 @@ impl Judge {
     /// Before the first item.
     pub fn new(limits: &Limits, format: Format) -> Self {
         Self {
-            monitor: Box::new(Monitor::new(limits.params)),
+            monitor: Box::new(limits.monitor()),
             earlier: None,
             limits: limits.clone(),
             format,
@@ -466,7 +489,7 @@ impl Judge {
         let mut found = Vec::new();
         self.monitor.tick(steps, &link, &recorder, &mut |finding| found.push(Finding::from(finding)));
         for finding in found {
-            if is_of(&finding.check, self.format, self.wire.is_some()) {
+            if is_of(&finding.check, self.format, self.wire.is_some(), self.limits.past.is_some()) {
                 // What hit something is seen to lie still seconds later.
                 let is_hit =
                     finding.check == IMPACT && matches!(finding.level, Level::Warning | Level::Critical);
@@ -550,8 +573,8 @@ impl Judge {
         let of_vehicles = self.details.remarks(self.system());
         let flights = self.flights.end(&self.monitor);
         let armed = armed(&self.monitor);
-        let given = !self.limits.given.is_empty();
-        let by = if self.checked_on_board && !given { JudgedBy::Board } else { JudgedBy::Here };
+        let by =
+            if self.checked_on_board && !self.limits.is_given() { JudgedBy::Board } else { JudgedBy::Here };
         if !self.checked_on_board && self.wire.is_none() {
             // Nobody knows where it was heard: a packed recording may be that of a ground station.
             self.here.drop_checks(|check| vocabulary(check).is_some_and(|words| words.scope == Scope::Wire));
@@ -571,6 +594,7 @@ impl Judge {
         let (judged, not_judged) = self.coverage.lists(&Recording {
             by,
             monitor: &self.monitor,
+            has_past: self.limits.past.is_some(),
             is_of_link: self.format.is_of_link(),
             on_the_wire: self.wire.is_some(),
             armed,
@@ -632,11 +656,12 @@ fn joined(joints: &[Instant]) -> Option<String> {
     })
 }
 
-/// Whether a check says anything in a recording of this format, judged here: one recording tells neither of earlier flights
-/// nor of parts that wear.
-fn is_of(check: &str, format: Format, on_the_wire: bool) -> bool {
+/// Whether a check says anything in a recording of this format, judged here: one recording tells neither of earlier flights, unless
+/// these are known, nor of parts that wear.
+fn is_of(check: &str, format: Format, on_the_wire: bool, has_past: bool) -> bool {
     let scope = vocabulary(check).map(|words| words.scope);
-    !matches!(scope, Some(Scope::Recorder | Scope::Stored))
+    !matches!(scope, Some(Scope::Recorder))
+        && (has_past || scope != Some(Scope::Stored))
         && (format == Format::Hums || on_the_wire || scope != Some(Scope::Wire))
 }
 

@@ -13,6 +13,7 @@ pub mod judge;
 pub mod judged;
 mod no_times;
 mod overview;
+pub mod past;
 pub mod problem;
 pub mod text;
 
@@ -37,7 +38,7 @@ use text::Table;
 
 /// Runs `hums check`.
 pub fn run(args: &cli::Check) -> Result<Outcome> {
-    let limits = Limits::new(&params::read(args.params.as_deref())?);
+    let limits = past::after(Limits::new(&params::read(args.params.as_deref())?), &args.past, args.system)?;
     let (found, mut failed) = logs(args)?;
     let found = found.of_system(args.system)?;
     for remark in &found.remarks {

@@ -9,10 +9,11 @@ const EXAMPLES: &str = "Examples:
   hums check --json flight.tlog
   hums check cards/
   hums check --params hums.param flight.tlog card.img
+  hums check --past flights/may flights/june.bin
 
 Reads a ground station's tlog, raw MAVLink, ArduPilot's logs (.bin, .log), PX4's logs (.ulg), each also as .gz, logs of
 HUMS, cards and their images; told apart by what is in them. The checks and their limits are those of the monitor on
-board. A log of HUMS is shown with what the monitor on board found, unless --params asks for other limits.
+board. A log of HUMS is shown with what the monitor on board found, unless --params or --past asks for another judgement.
 Exit codes: 0 nothing wrong in what could be judged (a log with too little in it says so: \"not enough to judge\"); 4 something
 wrong (a warning or worse); 3 the log has losses or damage, no times, or an end that is not proved, whatever was found; 1 failed; 2 usage.
 Of several logs the first of 1, 3, 4, 0. Where no autopilot was heard nothing is judged, which is said: 0.";
@@ -27,6 +28,9 @@ pub struct Check {
     /// Limits other than the defaults: a parameter file, as a ground station writes it
     #[arg(long, value_name = "FILE")]
     pub params: Option<PathBuf>,
+    /// Earlier flights of the same vehicle, three or more, in which it was well: trends are judged against them. May be given several times
+    #[arg(long, value_name = "LOG")]
+    pub past: Vec<PathBuf>,
     /// Of several vehicles in a recording only this one, by its system id
     #[arg(long, value_name = "ID")]
     pub system: Option<u8>,

@@ -102,6 +102,13 @@ fn of_baseline(quantity: Quantity) -> (String, &'static str, u8) {
         Quantity::MotorSpeed(motor) => {
             (format!("Usual difference of motor {}", u16::from(motor) + 1), "%", 1)
         }
+        Quantity::HoverPower => ("Usual hover power".to_owned(), "W", 0),
+        Quantity::MotorOutput(motor) => {
+            (format!("Usual output of motor {} against the mean", u16::from(motor) + 1), "%", 1)
+        }
+        Quantity::Capacity(battery) => {
+            (format!("Usual capacity of battery {}", u16::from(battery) + 1), "Ah", 1)
+        }
     }
 }
 

@@ -77,7 +77,20 @@ fn used(inputs: &Inputs<'_>, subsystem: Subsystem) -> Option<Reading> {
     Reading::new(Some(inputs.now), mine.map(|(_, percent)| percent.next_up()).reduce(f32::max))
 }
 
+/// How much heavier than normal for this airframe it hovers, percent.
+pub(super) fn heavier(inputs: &Inputs<'_>) -> Option<Reading> {
+    Reading::new(Some(inputs.now), inputs.trends.heavier(inputs.baselines, inputs.params))
+}
+
+/// The same of what hovering takes, where the vehicle is not heavier.
+pub(super) fn takes_more(inputs: &Inputs<'_>, quantity: Quantity) -> Option<Reading> {
+    let is_heavier =
+        inputs.trends.heavier(inputs.baselines, inputs.params).is_some_and(|percent| percent > 0.0);
+    let departure = departure(inputs, quantity)?;
+    Some(if is_heavier { Reading { value: 0.0, ..departure } } else { departure })
+}
+
 /// How far a quantity is from what is normal for this airframe.
 pub(super) fn departure(inputs: &Inputs<'_>, quantity: Quantity) -> Option<Reading> {
-    Reading::new(Some(inputs.now), inputs.trends.departure(quantity, inputs.baselines))
+    Reading::new(Some(inputs.now), inputs.trends.departure(quantity, inputs.baselines, inputs.params))
 }

@@ -12,6 +12,7 @@ const GNSS: &[&str] = &[
     "gps_jamming",
     "gps_spoofing",
     "gps_stuck",
+    "gps_speed",
     "gnss_alert",
     "gps_accuracy",
     "gps_satellites",
@@ -59,6 +60,7 @@ const ROWS: &[(&[&str], &[&str])] = &[
         &["gps_fix", "gps_jamming", "gps_spoofing"],
         &["gnss_alert", "gps_accuracy", "gps_satellites", "gps_hdop"],
     ),
+    (&["gps_stuck", "gnss_alert"], &["gps_speed"]),
     (GNSS, ESTIMATOR),
     (GNSS, &["baro_height"]),
     (&["accel_stuck", "accel_alert"], &["accel_mismatch"]),
@@ -84,6 +86,8 @@ const ROWS: &[(&[&str], &[&str])] = &[
     (DRIVE, ACTS),
     (ESTIMATOR, ACTS),
     (&["failsafe_alert"], &["autopilot_state"]),
+    (&["motor_trend"], &["throttle_trend", "power_trend"]),
+    (&["throttle_trend"], &["power_trend"]),
 ];
 
 /// Whether a mishap explains what a part says.

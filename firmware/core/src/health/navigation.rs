@@ -181,6 +181,15 @@ pub(super) const CHECKS: &[Check] = &[
     },
     GNSS,
     Check {
+        name: "gps_speed",
+        unit: "m/s",
+        side: Side::Above,
+        warn: Some(Param::GpsSpeedWarn),
+        hysteresis: 0.2,
+        read: |inputs, receiver| inputs.derived.crosschecks().speed_apart(receiver),
+        ..GNSS
+    },
+    Check {
         name: "gps_hdop",
         side: Side::Above,
         warn: Some(Param::GpsHdopWarn),

@@ -1,9 +1,10 @@
 //! Batteries and rails.
 
 use super::check::{Check, Side, When};
-use super::common::{STALE, STALE_SLOW, alert, due};
+use super::common::{STALE, STALE_SLOW, alert, departure, due};
 use super::finding::Subsystem;
 use super::inputs::Inputs;
+use crate::baseline::Quantity;
 use crate::cause::Cause;
 use crate::latest::{Latest, Reading};
 use crate::observation::Feeds;
@@ -84,6 +85,19 @@ pub(super) const CHECKS: &[Check] = &[
         // A trend holds until the next figure.
         stale_after: None,
         read: resistance_rise_percent,
+        ..BATTERY
+    },
+    Check {
+        name: "batt_capacity",
+        side: Side::Above,
+        warn: Some(Param::TrdCapWarn),
+        critical: Some(Param::TrdCapCrit),
+        hysteresis: 5.0,
+        debounce_warn: Span::from_secs(10),
+        debounce_critical: Span::from_secs(10),
+        when: When::InFlight,
+        stale_after: None,
+        read: |inputs, battery| departure(inputs, Quantity::Capacity(battery)),
         ..BATTERY
     },
     Check {

@@ -1,7 +1,7 @@
 //! Motors, ESCs and propellers.
 
 use super::check::{Check, Side, When};
-use super::common::{STALE_SLOW, alert, departure, due};
+use super::common::{STALE_SLOW, alert, departure, due, heavier, takes_more};
 use super::finding::Subsystem;
 use super::inputs::Inputs;
 use crate::baseline::Quantity;
@@ -41,6 +41,21 @@ const RATE: Check = Check {
     debounce_critical: Span::from_millis(200),
     when: When::InFlight,
     instances: 1,
+    ..ESC
+};
+
+/// Against the airframe's own past.
+const TREND: Check = Check {
+    name: "throttle_trend",
+    unit: "%",
+    warn: Some(Param::TrdThrWarn),
+    critical: Some(Param::TrdThrCrit),
+    hysteresis: 2.0,
+    debounce_warn: Span::from_secs(10),
+    debounce_critical: Span::from_secs(10),
+    when: When::InFlight,
+    instances: 1,
+    read: |inputs, _| takes_more(inputs, Quantity::HoverThrottle),
     ..ESC
 };
 
@@ -138,32 +153,25 @@ pub(super) const CHECKS: &[Check] = &[
     Check { name: "pitch_rate", read: |inputs, _| inputs.derived.response().rate_missing(1), ..RATE },
     Check {
         name: "motor_trend",
-        unit: "%",
         warn: Some(Param::TrdEscWarn),
         critical: Some(Param::TrdEscCrit),
         hysteresis: 1.0,
-        debounce_warn: Span::from_secs(10),
-        debounce_critical: Span::from_secs(10),
-        when: When::InFlight,
-        read: |inputs, motor| departure(inputs, Quantity::MotorSpeed(motor)),
-        ..ESC
+        instances: MOTORS_MAX as u8,
+        read: motor_departure,
+        ..TREND
     },
-    Check {
-        name: "throttle_trend",
-        unit: "%",
-        warn: Some(Param::TrdThrWarn),
-        critical: Some(Param::TrdThrCrit),
-        hysteresis: 2.0,
-        debounce_warn: Span::from_secs(10),
-        debounce_critical: Span::from_secs(10),
-        when: When::InFlight,
-        instances: 1,
-        read: |inputs, _| departure(inputs, Quantity::HoverThrottle),
-        ..ESC
-    },
+    TREND,
+    Check { name: "power_trend", read: |inputs, _| takes_more(inputs, Quantity::HoverPower), ..TREND },
+    Check { name: "weight_trend", critical: None, read: |inputs, _| heavier(inputs), ..TREND },
     Check { name: "drive_due", ..due(Subsystem::Propulsion) },
     alert::<{ Cause::Propulsion as usize }>(Subsystem::Propulsion),
 ];
+
+/// A motor's speed against the others', where its ESC tells it, or else its output.
+fn motor_departure(inputs: &Inputs<'_>, motor: u8) -> Option<Reading> {
+    let output = || (usize::from(motor) < JUDGED_MAX).then_some(Quantity::MotorOutput(motor));
+    departure(inputs, Quantity::MotorSpeed(motor)).or_else(|| departure(inputs, output()?))
+}
 
 fn motor(inputs: &Inputs<'_>, motor: u8) -> Option<Motor> {
     inputs.vehicle.motors.get(usize::from(motor)).copied()

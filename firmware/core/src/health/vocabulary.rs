@@ -144,6 +144,8 @@ vocabulary! {
     "The cells of the battery differed in voltage for more than a minute."; "Replace the pack.";
     "batt_resistance" Stored "battery resistance", "battery", says "battery # worn", "REPLACE IT", needs "resistance of earlier flights to compare with";
     "The battery's internal resistance has risen since it was new."; "Replace the pack soon.";
+    "batt_capacity" Stored "battery capacity", "battery", says "battery # holds less", "REPLACE IT", needs "charge and cell voltage of earlier flights to compare with";
+    "The battery gave less charge for the voltage that it lost than in earlier flights."; "Replace the pack soon.";
     "batt_fault" Vehicle "battery fault", "battery", says "battery # fault", "", needs "battery status";
     "The battery reported a fault of its own."; "Do not use the battery until its fault is known.";
     "batt_temperature" Vehicle "battery temperature", "battery", says "battery # hot", "LAND NOW", needs "battery temperature";
@@ -188,10 +190,14 @@ vocabulary! {
     "pitch_rate" Vehicle "pitch rate against what is wanted", "", says "pitch does not follow", "LAND NOW", needs "body rates that the autopilot wants";
     "The vehicle did not pitch as the autopilot wanted: a motor, propeller, servo or surface failed.";
     "Do not fly until motors, propellers, servos and control surfaces are checked.";
-    "motor_trend" Stored "motor balance trend", "motor", says "motor # speed changed", "CHECK IT", needs "speeds of earlier flights to compare with";
-    "The motor's speed has changed against earlier flights."; "Check its propeller and bearings.";
+    "motor_trend" Stored "motor balance trend", "motor", says "motor # changed", "CHECK IT", needs "speeds or outputs of single motors in earlier flights to compare with";
+    "The motor's speed or output has changed against the others since earlier flights."; "Check its propeller and bearings, and what is loaded on one side.";
     "throttle_trend" Stored "hover throttle trend", "", says "hover throttle up", "CHECK MOTORS", needs "throttle of earlier flights to compare with";
-    "Hovering took more throttle than in earlier flights."; "Check weight, propellers, motors and the battery.";
+    "Hovering took more throttle than in earlier flights, and not as more weight does."; "Check propellers and motors; and the weight, where power is not measured.";
+    "power_trend" Stored "hover power trend", "", says "hover power up", "CHECK MOTORS", needs "power of earlier flights to compare with";
+    "Hovering took more power than in earlier flights."; "Check propellers, motors, bearings and weight.";
+    "weight_trend" Stored "weight trend", "", says "heavier than usual", "", needs "throttle and power of earlier flights to compare with";
+    "Hovering took as much more throttle and power as a heavier vehicle takes."; "Check the load. Without more load: check propellers and motors.";
     "drive_due" Stored "life of motors, propellers, ESCs", "", says "motor/prop/ESC life used", "REPLACE IT", needs "motor, propeller or ESC registered with the monitor on board";
     "A motor, propeller or ESC has reached the end of its life."; "Replace it, and tell the monitor.";
 
@@ -277,6 +283,8 @@ vocabulary! {
     "The receiver repeated one position: it has failed."; "Check the receiver, its wiring and its firmware.";
     "gps_satellites" Vehicle "GPS satellites", "GPS", says "GPS # few satellites", "", needs "GPS satellite count";
     "Few satellites were in use: the position was not exact."; "Wait for more satellites; check the antenna's view.";
+    "gps_speed" Vehicle "GPS speed against its positions", "GPS", says "GPS # speed wrong", "", needs "GPS speed and position in flight";
+    "The receiver's speed was not that of its positions: one of both is wrong."; "Check the antenna's view, sources of interference and the receiver's firmware.";
     "gps_hdop" Vehicle "GPS dilution of precision", "GPS", says "GPS # poor geometry", "", needs "GPS dilution of precision";
     "The satellites stood badly: the position was not exact."; "Wait for more satellites; check the antenna's view.";
     "gps_accuracy" Vehicle "GPS accuracy", "GPS", says "GPS # inaccurate", "", needs "GPS accuracy";

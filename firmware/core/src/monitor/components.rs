@@ -5,6 +5,7 @@ use crate::baseline::{Baselines, Quantity};
 use crate::component::{Component, Figures, Kind, Label, Status};
 use crate::lifetime::ItemKey;
 use crate::observation::MOTORS_MAX;
+use crate::outputs::JUDGED_MAX;
 use crate::vehicle::BATTERIES_MAX;
 
 impl Monitor {
@@ -40,14 +41,23 @@ impl Monitor {
         Some(old)
     }
 
+    /// Something was changed that is no component: propellers, the battery, the payload. What is normal is learnt anew.
+    pub fn forget_past(&mut self) {
+        self.forget_baselines(Kind::Airframe, 0);
+    }
+
     /// What was normal for the old part is not for the new one.
     fn forget_baselines(&mut self, kind: Kind, number: u8) {
         let concerned = |index: usize| number == 0 || usize::from(number) == index + 1;
         match kind {
-            Kind::Airframe => self.baselines = Baselines::new(),
+            Kind::Airframe => {
+                self.baselines = Baselines::new();
+                (0..BATTERIES_MAX).for_each(|battery| self.derived.forget_resistance(battery));
+            }
             Kind::Battery => {
                 for battery in (0..BATTERIES_MAX).filter(|battery| concerned(*battery)) {
                     self.baselines.forget(Quantity::Resistance(battery as u8));
+                    self.baselines.forget(Quantity::Capacity(battery as u8));
                     self.derived.forget_resistance(battery);
                 }
             }
@@ -55,6 +65,9 @@ impl Monitor {
                 for motor in (0..MOTORS_MAX).filter(|motor| concerned(*motor)) {
                     self.baselines.forget(Quantity::MotorSpeed(motor as u8));
                 }
+                // The share of one is of all.
+                (0..JUDGED_MAX).for_each(|motor| self.baselines.forget(Quantity::MotorOutput(motor as u8)));
+                self.baselines.forget(Quantity::HoverPower);
                 self.baselines.forget(Quantity::Vibration);
                 self.baselines.forget(Quantity::HoverThrottle);
             }

@@ -80,6 +80,11 @@ impl Monitor {
         Ok(())
     }
 
+    /// Takes what earlier flights of this airframe found normal, as it was found elsewhere.
+    pub const fn remember(&mut self, past: &Baselines) {
+        self.baselines = *past;
+    }
+
     /// The item to be saved next, if any is due; the same until it is [`Self::saved`]. To be saved in this order.
     pub fn save_due(&mut self, now: Instant, room: Room) -> Option<ItemKey> {
         self.saving.due(now, self.vehicle.armed(), room)

@@ -2,7 +2,6 @@
 //! unit.
 
 mod counters;
-mod drawn;
 mod totals;
 mod touchdown;
 
@@ -13,6 +12,7 @@ pub use counters::{
 pub use totals::{MotorTotals, Totals, Wear};
 
 use crate::derived::Derived;
+use crate::drawn::{Drawn, MOTOR_AGE, discharge_a, drawn};
 use crate::flight::{Flight, FlightEvent, Phase};
 use crate::motion::{climb_mps, ground_speed_mps, height_m};
 use crate::observation::Observation;
@@ -21,7 +21,6 @@ use crate::rainflow::Rainflow;
 use crate::time::{Instant, Span};
 use crate::units::GRAVITY;
 use crate::vehicle::{BATTERIES_MAX, Vehicle};
-use drawn::{Drawn, MOTOR_AGE, discharge_a, drawn};
 use touchdown::Touchdown;
 
 /// Integration steps longer than this are gaps: nothing is known of what happened in them.

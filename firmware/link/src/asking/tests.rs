@@ -15,6 +15,8 @@ struct Script {
     deaf: bool,
     /// Answers every `SET_MESSAGE_INTERVAL` with this `MAV_RESULT`.
     refuses: Option<u8>,
+    /// Does not know `REQUEST_MESSAGE`.
+    no_single: bool,
     reboots: u32,
     identified: bool,
     baud: u32,
@@ -83,6 +85,7 @@ impl Script {
         }
         let result = match self.refuses.filter(|_| command == SET_MESSAGE_INTERVAL) {
             Some(result) => result,
+            None if self.no_single && command == REQUEST_MESSAGE => 3,
             None if self.unknown.contains(&id) => 4,
             None => 0,
         };
@@ -90,7 +93,7 @@ impl Script {
             self.streams.retain(|(stream, _)| *stream != id);
             self.streams.push((id, (1e6 / interval_us).round() as u32));
         }
-        self.identified |= result == 0 && command == REQUEST_MESSAGE;
+        self.identified |= result == 0 && (command, id) == (REQUEST_MESSAGE, AUTOPILOT_VERSION);
         asking.answered(command, result);
     }
 
@@ -161,14 +164,44 @@ fn a_reboot_and_a_stream_that_falls_silent_are_asked_again() {
 
 #[test]
 fn what_is_refused_is_not_asked_for_again_until_a_reboot() {
-    let mut copter = Script { unknown: vec![225, 226], ..Script::new(Autopilot::ArduPilot) };
+    let mut px4 = Script { unknown: vec![129, 143], ..Script::new(Autopilot::Px4) };
+    let mut asking = Asking::new();
+    px4.run(&mut asking, 0, 1_000);
+    assert_eq!((px4.count(SET_MESSAGE_INTERVAL, 129), px4.count(SET_MESSAGE_INTERVAL, 143)), (1, 1));
+    assert_eq!(px4.count(REQUEST_MESSAGE, 129), 0, "PX4 refuses in silence");
+    assert_eq!(px4.rate(230), Some(2));
+    px4.reboots = 1;
+    px4.run(&mut asking, 1_000, 1_100);
+    assert_eq!(px4.count(SET_MESSAGE_INTERVAL, 129), 2);
+}
+
+#[test]
+fn an_ardupilot_is_asked_for_no_interval_of_what_it_does_not_have() {
+    let mut copter = Script { unknown: vec![225, 11_039], ..Script::new(Autopilot::ArduPilot) };
     let mut asking = Asking::new();
     copter.run(&mut asking, 0, 1_000);
-    assert_eq!((copter.count(SET_MESSAGE_INTERVAL, 225), copter.count(SET_MESSAGE_INTERVAL, 226)), (1, 1));
-    assert_eq!(copter.rate(193), Some(2));
+    for id in [225, 11_039] {
+        assert_eq!(
+            (copter.count(REQUEST_MESSAGE, id), copter.count(SET_MESSAGE_INTERVAL, id)),
+            (1, 0),
+            "{id}"
+        );
+    }
+    for (id, by, rate, _) in WANTED.into_iter().filter(|wanted| ![225, 11_039].contains(&wanted.0)) {
+        let asked = by != By::Px4;
+        assert_eq!(copter.rate(id), asked.then_some(u32::from(rate)), "{id}");
+        assert_eq!(copter.count(REQUEST_MESSAGE, id), usize::from(asked), "{id}");
+    }
     copter.reboots = 1;
     copter.run(&mut asking, 1_000, 1_100);
-    assert_eq!(copter.count(SET_MESSAGE_INTERVAL, 225), 2);
+    assert_eq!((copter.count(REQUEST_MESSAGE, 225), copter.count(SET_MESSAGE_INTERVAL, 225)), (2, 0));
+}
+
+#[test]
+fn an_ardupilot_that_knows_no_single_messages_is_asked_for_intervals() {
+    let mut copter = Script { no_single: true, ..Script::new(Autopilot::ArduPilot) };
+    copter.run(&mut Asking::new(), 0, 120);
+    assert_eq!((copter.rate(30), copter.rate(193)), (Some(10), Some(2)));
 }
 
 #[test]

@@ -227,7 +227,7 @@ fn told(findings: &[(u64, u8, Level, Level, &'static str)]) -> Vec<(u64, u8)> {
     let mut summary = Summary::new(&Params::defaults());
     let monitor = Monitor::new(Params::defaults());
     let mut told = Vec::new();
-    for now_s in 0..120 {
+    for now_s in 0..180 {
         let now = Instant::from_millis(now_s * 1_000);
         // The number after the word of a STATUSTEXT.
         let mut out = |bytes: &[u8]| {
@@ -292,4 +292,16 @@ fn quantities_are_printed_as_the_formatting_of_numbers_does() {
         }
     }
     assert_eq!(quantity(f32::MAX, "V").as_str(), ": 1099511627776.00 V", "no quantity");
+}
+
+#[test]
+fn what_is_less_urgent_takes_no_place_of_what_waits() {
+    let critical = (0..9).map(|instance| (0, instance, Level::Critical, Level::Ok, ""));
+    // Of these the numbers are beyond the one digit that is looked at; all wait.
+    let more = (9..21).map(|instance| (0, instance, Level::Critical, Level::Ok, ""));
+    let warning = [(0, 1, Level::Warning, Level::Critical, "")];
+    let all: Vec<_> = critical.chain(more).collect();
+    let before = told(&all);
+    let late: Vec<_> = all.into_iter().chain(warning).collect();
+    assert_eq!(told(&late), before, "a warning is told after them, or not at all");
 }

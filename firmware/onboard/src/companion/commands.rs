@@ -7,7 +7,7 @@
 //! | 519, 520 | the same by their older commands |
 //! | 526 `STORAGE_FORMAT` | formats a card that cannot be recorded on as it is: while disarmed |
 //! | 2510, 2511 `LOGGING_START`, `_STOP` | records again; stops recording, while disarmed |
-//! | 31010 `USER_1` | another part is in a component's place, from 1: while disarmed |
+//! | 31010 `USER_1` | another part is in a component's place, from 1; 0 and, as param 2, 1: propellers, a battery or the payload changed: while disarmed |
 //! | 31011 `USER_2` | cancels the protective action that is announced |
 
 use hums_blackbox::record::Boot;
@@ -99,6 +99,8 @@ impl Commands {
             }
             // Which storage is it, and is it meant: a command that is sent by mistake has neither.
             (FORMAT, storage) if storage > 1 || params[1].to_bits() != 1.0_f32.to_bits() => DENIED,
+            // Likewise: the ground station's button without numbers is no word about the propellers.
+            (REPLACED, 0) if params.map(f32::to_bits) != [0.0_f32, 1.0].map(f32::to_bits) => DENIED,
             (RECORD | STOP | FORMAT | REPLACED | CANCEL, number) => {
                 if !self.allows(now, asker.port) {
                     return TEMPORARILY_REJECTED;
@@ -127,6 +129,11 @@ impl Commands {
             }
             STOP | FORMAT | REPLACED if book.monitor.vehicle().armed() => TEMPORARILY_REJECTED,
             FORMAT => format(now, by, book, sectors),
+            REPLACED if number == 0 => {
+                book.monitor.forget_past();
+                book.journal.by_hand(now, format_args!("baselines anew by {}/{}", by.0, by.1), sectors);
+                ACCEPTED
+            }
             REPLACED => {
                 let place = (number as usize).wrapping_sub(1);
                 // Its serial number can be given later; who did it is in the component's record.

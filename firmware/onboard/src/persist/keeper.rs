@@ -17,7 +17,7 @@ const AHEAD: (usize, usize) = (5, 8);
 const SCARCE: (usize, usize) = (1, 4);
 /// What landing and disarming need: all exceedances, the baselines and the session's counters twice; beside them the times of
 /// so many signed changes, 40 bytes each.
-const RESERVE: usize = 1_280;
+const RESERVE: usize = 1_408;
 pub(crate) const SIGNED_MAX: u8 = 4;
 const LANDING: usize = Exceedances::BYTES + Baselines::BYTES + 2 * Session::BYTES_TYPICAL + 4 * 16;
 const _: () = assert!(LANDING + SIGNED_MAX as usize * 40 <= RESERVE);

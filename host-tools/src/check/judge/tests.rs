@@ -360,7 +360,8 @@ fn trends_over_flights_are_not_judged_from_one_recording() {
         let stored = VOCABULARY.iter().filter(|words| words.scope == Scope::Stored);
         assert!(stored.clone().count() > 3);
         for words in stored {
-            assert!(!is_of(words.said.check, format, false), "{}", words.said.check);
+            assert!(!is_of(words.said.check, format, false, false), "{}", words.said.check);
+            assert!(is_of(words.said.check, format, false, true), "{}", words.said.check);
         }
     }
     let mut judge = Judge::new(&Limits::default(), Format::DataFlash);

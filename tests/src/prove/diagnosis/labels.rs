@@ -14,11 +14,12 @@
 //! | `autopilot_texts` | what the autopilot said: second, `MAV_SEVERITY`, text |
 //! | `flights` | from and to of each time in the air; with it, `landings` and `crashes_s` |
 //! | `battery_low_s` | when the autopilot itself first called a battery low (null: never) |
+//! | `past` | recordings, in the same folder, of the same vehicle's earlier flights: trends are judged against them |
 //!
 //! Other fields are passed over. Without `flights`, the flight takes no part in the count of flights, landings and mishaps.
 
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result, ensure};
 use hums_core::health::{Subsystem, checks};
@@ -52,13 +53,19 @@ pub(super) struct Label {
     pub(super) crashes_s: Vec<f64>,
     #[serde(default)]
     pub(super) battery_low_s: Option<f64>,
+    #[serde(default)]
+    pub(super) past: Vec<PathBuf>,
 }
 
 /// The labels of a folder, in their order.
 pub(super) fn read(folder: &Path) -> Result<Vec<Label>> {
     let path = folder.join(FILE);
     let text = fs::read_to_string(&path).with_context(|| path.display().to_string())?;
-    parse(&text).with_context(|| path.display().to_string())
+    let mut labels = parse(&text).with_context(|| path.display().to_string())?;
+    for past in labels.iter_mut().flat_map(|label| &mut label.past) {
+        *past = folder.join(&past);
+    }
+    Ok(labels)
 }
 
 fn parse(text: &str) -> Result<Vec<Label>> {

@@ -1,6 +1,6 @@
 //! One flight, judged: what the monitor said while nothing was wrong, and what it said of the fault.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use anyhow::Result;
 use hums::check::flights::Flight;
@@ -8,6 +8,7 @@ use hums::check::judge::{Heard, Limits};
 use hums::check::judged::Judged;
 use hums::names::{autopilot_name, counter_name, type_name};
 use hums::source::recording::Place;
+use hums_core::baseline::Baselines;
 use hums_core::health::Level;
 
 use super::causes;
@@ -85,9 +86,17 @@ pub(super) fn count<'a>(alarms: impl IntoIterator<Item = &'a False>, level: Leve
 pub(super) fn judge(place: &Place, label: Option<&Label>) -> Result<Outcome> {
     // The labelled flights were recorded on a telemetry port; of the others nobody knows.
     let heard = if label.is_some() { Heard::OnTheWire } else { Heard::Somewhere };
-    let judged = hums::check::recording(place, &Limits::default(), heard)?.judged;
+    let past = label.map_or(&[][..], |label| &label.past);
+    let limits = if past.is_empty() { Limits::default() } else { Limits::default().after(&learn(past)?) };
+    let judged = hums::check::recording(place, &limits, heard)?.judged;
     let by_hand = if label.is_none() { verdicts::find(Path::new(&place.title))? } else { None };
     Ok(Outcome { by_hand, ..of(&judged, &place.name, label) })
+}
+
+/// What is normal after these flights.
+fn learn(past: &[PathBuf]) -> Result<Baselines> {
+    let places: Vec<_> = past.iter().map(|path| Place::file(path)).collect();
+    hums::check::past::learn(&Limits::default(), &places)
 }
 
 fn of(judged: &Judged, name: &str, label: Option<&Label>) -> Outcome {

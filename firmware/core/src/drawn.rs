@@ -10,18 +10,18 @@ const AMPERES_MAX: f32 = 10_000.0;
 /// A battery figure holds this long.
 const BATTERY_AGE: Span = Span::from_secs(5);
 /// A motor speed or current holds this long.
-pub(super) const MOTOR_AGE: Span = Span::from_secs(2);
+pub(crate) const MOTOR_AGE: Span = Span::from_secs(2);
 
 /// The first battery's voltage, or the autopilot's figure where none reports itself; the discharge current and the power
 /// of all batteries together, or of all ESCs where no battery knows its current (PX4 in simulation).
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Drawn {
-    pub(super) voltage_v: Option<f32>,
-    pub(super) current_a: Option<f32>,
-    pub(super) power_w: f32,
+pub(crate) struct Drawn {
+    pub(crate) voltage_v: Option<f32>,
+    pub(crate) current_a: Option<f32>,
+    pub(crate) power_w: f32,
 }
 
-pub(super) fn drawn(now: Instant, vehicle: &Vehicle) -> Drawn {
+pub(crate) fn drawn(now: Instant, vehicle: &Vehicle) -> Drawn {
     let mut drawn = Drawn::default();
     let batteries = vehicle.batteries.iter();
     for battery in batteries.clone().filter_map(|slot| slot.within(now, BATTERY_AGE)) {
@@ -41,7 +41,7 @@ pub(super) fn drawn(now: Instant, vehicle: &Vehicle) -> Drawn {
 }
 
 /// The discharge current of one battery that reports itself, or of the only one by the autopilot's figure.
-pub(super) fn discharge_a(now: Instant, vehicle: &Vehicle, battery: usize) -> f64 {
+pub(crate) fn discharge_a(now: Instant, vehicle: &Vehicle, battery: usize) -> f64 {
     let Some(slot) = vehicle.batteries.get(battery) else { return 0.0 };
     let mut drawn = Drawn::default();
     if let Some(reported) = slot.within(now, BATTERY_AGE) {

@@ -1,0 +1,75 @@
+//! A battery's capacity: the charge that it gave over how far its cells' state of charge fell, from rest before a take-off on.
+//!
+//! The state of charge follows from the voltage that a cell has without load, which in flight is the measured one without its sag. The
+//! curve is that of one polymer lithium-ion cell; another cell's differs, and so the figure is not the capacity on its label. It is
+//! compared with its own past only.
+
+use crate::derived::Derived;
+use crate::latest::Latest;
+use crate::params::Params;
+use crate::units::Amperes;
+use crate::vehicle::Vehicle;
+
+/// What no cell is charged beyond, by the curve: 4.25 V.
+const FULL: f32 = 1.15;
+/// The least fall of the state of charge that tells: what a measured voltage is wrong by (10 mV) is 5 % of it in the flat part.
+const FALL_MIN: f32 = 0.3;
+
+/// What a battery had before a flight.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Charge {
+    state: f32,
+    /// Charge taken by then, Ah.
+    consumed_ah: f32,
+}
+
+impl Charge {
+    /// What a battery has; `None` for what is no lithium battery, or whose cells or charge are not known.
+    pub(crate) fn of(vehicle: &Vehicle, derived: &Derived, params: &Params, battery: u8) -> Option<Self> {
+        let known = vehicle.batteries.get(usize::from(battery)).and_then(Latest::get)?;
+        let consumed_ah = known.consumed?.0;
+        let cell_v = derived.cell_voltage(vehicle, params, battery)?.value;
+        (consumed_ah.is_finite() && cell_v.is_finite())
+            .then(|| Self { state: state_of_charge(cell_v), consumed_ah })
+    }
+
+    /// The whole capacity, Ah, by what is left in flight; `None` where too little was taken, or the sag under the load is not known.
+    pub(crate) fn capacity_ah(&self, now: &Self, derived: &Derived, battery: u8) -> Option<f32> {
+        let sags = derived.resistance(usize::from(battery))?.sag_v(Amperes(1.0)) > 0.0;
+        let fall = self.state - now.state;
+        (sags && fall >= FALL_MIN).then(|| (now.consumed_ah - self.consumed_ah) / fall)
+    }
+}
+
+/// The state of charge, 0 empty and 1 full, of a cell with this voltage without load. The voltage over it: M. Chen and G. A. Rincon-Mora,
+/// Accurate electrical battery model, IEEE Transactions on Energy Conversion 21(2), 2006.
+fn state_of_charge(cell_v: f32) -> f32 {
+    let volts = |state: f32| {
+        -1.031 * libm::expf(-35.0 * state) + 3.685 + state * (0.2156 + state * (-0.1178 + state * 0.3201))
+    };
+    let (mut low, mut high) = (0.0, FULL);
+    // To a thousandth.
+    for _ in 0..11 {
+        let middle = (low + high) / 2.0;
+        if volts(middle) < cell_v {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    (low + high) / 2.0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_state_of_charge_rises_with_the_voltage() {
+        assert!((state_of_charge(4.103) - 1.0).abs() < 0.01);
+        assert!((state_of_charge(3.80) - 0.49).abs() < 0.02);
+        assert!(state_of_charge(3.0) < 0.02);
+        assert!(state_of_charge(4.2) > 1.05);
+        assert!((state_of_charge(9.0) - FULL).abs() < 0.01 && state_of_charge(0.0) < 0.01);
+    }
+}

@@ -1,0 +1,112 @@
+//! A receiver's speed against how far its position moves: both come from the same signals, by different measurements.
+//!
+//! The way is the sum of the steps between positions, and the speed is summed over the same time; both are forgotten with [`MEMORY_S`]. What
+//! repeats a position bit for bit is the same measurement again.
+
+use crate::latest::Reading;
+use crate::observation::Gnss;
+use crate::time::{Instant, Span};
+
+/// Ways and speeds are forgotten with this time constant, s; before it has passed nothing is said.
+const MEMORY_S: f32 = 4.0;
+/// Positions further apart are not of one way.
+const PAUSE: Span = Span::from_secs(2);
+/// Less exact positions are not compared: accuracy in metres, dilution of precision.
+const ACCURACY_M: f32 = 3.0;
+const HDOP: f32 = 2.5;
+/// Degrees of latitude, in metres.
+const DEGREE_M: f32 = 111_320.0;
+/// No vehicle here is faster, m/s: garbage.
+const SPEED_MAX_MPS: f32 = 200.0;
+
+/// The memory of one receiver.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Travel {
+    /// Latitude and longitude, degrees; the speed there, m/s; and when that was.
+    before: Option<([f64; 2], f32, Instant)>,
+    /// How much further it went by its speed than by its positions, m, and in what time, s.
+    further_m: f32,
+    time_s: f32,
+}
+
+impl Travel {
+    /// Nothing seen.
+    pub(crate) const NEW: Self = Self { before: None, further_m: 0.0, time_s: 0.0 };
+
+    /// Takes what a receiver says in flight.
+    pub(crate) fn take(&mut self, at: Instant, gnss: &Gnss, airborne: bool) {
+        let good = gnss.fix >= 3
+            && airborne
+            && gnss.accuracy.is_none_or(|accuracy| accuracy.0 <= ACCURACY_M)
+            && gnss.hdop.is_none_or(|hdop| hdop <= HDOP);
+        let speed_mps = gnss.speed.map(|speed| speed.0).filter(|speed| (0.0..=SPEED_MAX_MPS).contains(speed));
+        let (Some(position), Some(speed_mps), true) = (gnss.position, speed_mps, good) else {
+            *self = Self::NEW;
+            return;
+        };
+        let place = [position.latitude_deg, position.longitude_deg];
+        let Some((was, speed_before_mps, before)) = self.before else {
+            self.before = Some((place, speed_mps, at));
+            return;
+        };
+        let step = at.since(before);
+        if step > PAUSE {
+            *self = Self { before: Some((place, speed_mps, at)), ..Self::NEW };
+            return;
+        }
+        if place.map(f64::to_bits) == was.map(f64::to_bits) {
+            return;
+        }
+        let north_m = (place[0] - was[0]) as f32 * DEGREE_M;
+        let east_m = (place[1] - was[1]) as f32 * DEGREE_M * libm::cosf((place[0] as f32).to_radians());
+        let step_s = step.as_secs_f32();
+        let further_m = (speed_mps + speed_before_mps) / 2.0 * step_s - libm::hypotf(north_m, east_m);
+        let kept = MEMORY_S / (MEMORY_S + step_s);
+        self.further_m = kept * (self.further_m + further_m);
+        self.time_s = kept * (self.time_s + step_s);
+        self.before = Some((place, speed_mps, at));
+    }
+
+    /// How far the speed is from that of the positions, m/s.
+    pub(crate) fn speed_apart(&self) -> Option<Reading> {
+        let (.., at) = self.before?;
+        // Of a whole memory two thirds are there after its time constant.
+        let apart_mps = libm::fabsf(self.further_m) / MEMORY_S;
+        (self.time_s > 0.6 * MEMORY_S).then_some(Reading { at, value: apart_mps })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::units::Position;
+    use crate::units::{Metres, MetresPerSecond};
+
+    /// Flies north with one speed by its positions and another one by what it tells, each position twice.
+    fn flown(moves_mps: f64, told_mps: f32) -> Option<f32> {
+        let mut travel = Travel::NEW;
+        for step in 0_u64..200 {
+            let gnss = Gnss {
+                fix: 3,
+                accuracy: Some(Metres(0.5)),
+                position: Some(Position {
+                    latitude_deg: 47.0 + moves_mps * (step / 2) as f64 * 0.2 / 111_320.0,
+                    longitude_deg: 8.0,
+                }),
+                speed: Some(MetresPerSecond(told_mps)),
+                ..Gnss::default()
+            };
+            travel.take(Instant::from_millis(step * 100), &gnss, true);
+        }
+        travel.speed_apart().map(|reading| reading.value)
+    }
+
+    #[test]
+    fn a_speed_that_is_not_that_of_the_positions_is_told() {
+        let apart = |moves, told| flown(moves, told).expect("known");
+        assert!(apart(5.0, 5.0) < 0.2);
+        assert!((apart(5.0, 7.0) - 2.0).abs() < 0.3);
+        assert!((apart(5.0, 3.0) - 2.0).abs() < 0.3);
+        assert_eq!(flown(0.0, 2.0), None, "one position, bit for bit, is another check's");
+    }
+}
