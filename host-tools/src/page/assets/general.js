@@ -13,12 +13,21 @@ export const general = () => {
   const pressure = gauge("pressure", "Air pressure", { unit: "hPa", low: 500, high: 1100 });
   const celsius = stat("temperature", "Barometer", { unit: "\u00b0C", decimals: 1, line: "Temperature" });
   return {
-    node: el("section", { class: "row", id: "general" }, el("h2", {}, "General"),
-      el("div", { class: "instruments" }, [time, percent, volts, pressure, celsius].map((part) => part.node))),
+    node: el(
+      "section",
+      { class: "row", id: "general" },
+      el("h2", {}, "General"),
+      el(
+        "div",
+        { class: "instruments" },
+        [time, percent, volts, pressure, celsius].map((part) => part.node),
+      ),
+    ),
     update({ values, cells, now_s: now }) {
       time.update(values.flight_time, now);
       percent.update(values.battery_percent, flight.limits("PackPercent"));
-      const [warning, critical] = flight.limits("CellVolts") ?? [0, 0], lowest = Math.min(...cells);
+      const [warning, critical] = flight.limits("CellVolts") ?? [0, 0],
+        lowest = Math.min(...cells);
       // A pack that reports no cells has none to be judged by.
       const level = cells.length < 2 ? "" : lowest < critical ? "critical" : lowest < warning ? "warning" : "";
       volts.update(values.battery_volts, now, level);

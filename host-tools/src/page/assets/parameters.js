@@ -5,12 +5,18 @@ import { flight } from "./flight.js";
 import { cells, rows } from "./layout.js";
 import { clock, plural, short } from "./text.js";
 
-const course = (values) => values.map(([at, value], i) => i ? `${short(value)} at ${clock(at - flight.start)}` : short(value)).join(" \u2192 ");
-const table = (parameters) => rows([["Parameter"], ["Value"]],
-  parameters.map(([name, values]) => cells([name, course(values)], ["t", "words"], { class: values.length > 1 ? "changed" : "" })));
+const course = (values) =>
+  values.map(([at, value], i) => (i ? `${short(value)} at ${clock(at - flight.start)}` : short(value))).join(" \u2192 ");
+const table = (parameters) =>
+  rows(
+    [["Parameter"], ["Value"]],
+    parameters.map(([name, values]) => cells([name, course(values)], ["t", "words"], { class: values.length > 1 ? "changed" : "" })),
+  );
 
 export const parameters = () => {
-  const changed = el("div"), all = el("div", { class: "scroll tall" }), count = el("summary");
+  const changed = el("div"),
+    all = el("div", { class: "scroll tall" }),
+    count = el("summary");
   const wanted = el("input", { type: "search", placeholder: "name", "aria-label": "Parameters whose name has this in it" });
   const list = el("details", {}, count, wanted, all);
   const none = el("p", { class: "dim" }, "No parameter was told. A link tells them when a ground station asks for them.");
@@ -24,7 +30,8 @@ export const parameters = () => {
   return {
     node: el("div", { class: "panel scroll" }, none, changed, list),
     update() {
-      const other = [...flight.parameters].filter(([, values]) => values.length > 1), key = `${flight.parameters.size} ${JSON.stringify(other)}`;
+      const other = [...flight.parameters].filter(([, values]) => values.length > 1),
+        key = `${flight.parameters.size} ${JSON.stringify(other)}`;
       if (key === drawn) return;
       drawn = key;
       none.hidden = flight.parameters.size > 0;
