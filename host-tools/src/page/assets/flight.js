@@ -59,6 +59,7 @@ export const flight = {
   modes: [],
   parameters: new Map(),
   parametersLeftOut: 0,
+  tellsDefaults: false,
   gaps: [],
   flights: [],
   // Takes a part; returns the notes that are new since the page looks.
@@ -78,12 +79,14 @@ export const flight = {
     for (const point of part.track) flight.track.push(point);
     takeSpans(flight.phases, part.phases);
     takeSpans(flight.modes, part.modes);
-    for (const { name, values } of part.parameters) flight.parameters.set(name, values);
+    for (const { name, values, default: usual } of part.parameters) flight.parameters.set(name, { values, usual });
+    flight.tellsDefaults = part.tells_defaults;
     flight.parametersLeftOut = part.parameters_left_out;
     flight.notesGone = part.notes_gone;
     return anew ? [] : part.notes;
   },
-  limits: (id) => flight.plots.get(id)?.limits ?? null,
+  // Warning and critical of a gauge.
+  limits: (id) => flight.plots.get(id)?.limits[0] ?? null,
   // The numbers and names of a plot's lines that have a value by now.
   lines: (id) => (flight.plots.get(id)?.lines ?? []).filter(([number]) => lines.has(`${id}:${number}`)),
   // What a line says at a time, or last; null where it was silent then.

@@ -30,6 +30,31 @@ export const notes = ({ go, newestFirst, rows = Infinity }) => {
   };
   const box = panel("notes", "Findings and messages", [list, empty, more], { class: "tall" });
   box.node.firstChild.append(filter);
+  // What a finding explains stands with it: by check, while its alarm lasts. What was seen before its cause waits.
+  let causes = new Map(),
+    waiting = new Map();
+  const explain = (cause, words) => {
+    if (cause.effects.includes(words)) return;
+    cause.effects.push(words);
+    cause.node.hidden = false;
+    cause.node.textContent = `Consequences: ${cause.effects.join(", ")}`;
+  };
+  const follows = ({ level, words, found }) => {
+    if (found.because && level !== "ok") {
+      const { check } = found.because;
+      if (causes.has(check)) explain(causes.get(check), words);
+      else waiting.set(check, [...(waiting.get(check) ?? []), words]);
+    }
+    if (level === "ok" || level === "advisory") {
+      causes.delete(found.check);
+      return null;
+    }
+    const cause = { node: el("p", { class: "why consequences", hidden: true }), effects: [] };
+    causes.set(found.check, cause);
+    for (const effect of waiting.get(found.check) ?? []) explain(cause, effect);
+    waiting.delete(found.check);
+    return cause.node;
+  };
   const row = (note) => {
     const level = badge(),
       { found } = note;
@@ -44,8 +69,9 @@ export const notes = ({ go, newestFirst, rows = Infinity }) => {
       level.node,
       el("span", { class: "words" }, note.words),
       el("small", {}, [from, found && measured(found)].filter(Boolean).join(" \u00b7 ")),
-      found?.because ? el("p", { class: "why" }, `Because of: ${found.because}`) : null,
+      found?.because ? el("p", { class: "why because" }, `Because of: ${found.because.words}`) : null,
       found?.meaning ? el("p", { class: "why" }, found.meaning, " ", el("b", {}, found.action)) : null,
+      found ? follows(note) : null,
     );
   };
   const chosen = (event) => {
@@ -60,6 +86,8 @@ export const notes = ({ go, newestFirst, rows = Infinity }) => {
     update(anew = false) {
       if (anew || flight.notes !== shown || flight.notes.length < count) {
         list.replaceChildren();
+        causes = new Map();
+        waiting = new Map();
         count = 0;
         shown = flight.notes;
       }

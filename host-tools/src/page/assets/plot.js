@@ -19,7 +19,8 @@ const range = (low, high, limits) => {
   if (low == null || high == null || (low === 0 && high === 0)) return [0, 1];
   const size = Math.max(Math.abs(low), Math.abs(high), 1e-3),
     span = Math.max(high - low, size * 0.05);
-  for (const limit of limits ?? []) {
+  for (const limit of (limits ?? []).flat()) {
+    if (limit == null) continue;
     if (limit < low && limit > low - span) low = limit;
     if (limit > high && limit < high + span) high = limit;
   }
@@ -71,18 +72,21 @@ const ground = (u, limits) => {
     );
   }
   ctx.globalAlpha = 1;
-  (limits ?? []).forEach((limit, i) => {
-    const y = u.valToPos(limit, "y", true);
-    dashed(
-      ctx,
-      i ? "critical" : "warning",
-      [7, 3],
-      [
-        [bbox.left, y],
-        [right, y],
-      ],
-    );
-  });
+  for (const pair of limits ?? []) {
+    for (const [i, limit] of pair.entries()) {
+      if (limit == null) continue;
+      const y = u.valToPos(limit, "y", true);
+      dashed(
+        ctx,
+        i ? "critical" : "warning",
+        [7, 3],
+        [
+          [bbox.left, y],
+          [right, y],
+        ],
+      );
+    }
+  }
   ctx.restore();
 };
 

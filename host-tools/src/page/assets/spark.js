@@ -11,7 +11,7 @@ const WIDTH = 320,
   HEIGHT = 72;
 const EVERY_MS = 250;
 
-export const stat = (id, title, { unit = "", decimals = 2, line = null, format = fixed, window = 300 }) => {
+export const stat = (id, title, { unit = "", decimals = 2, line = null, numbers = [0], format = fixed, window = 300 }) => {
   const number = el("b", { "data-value": id });
   const canvas = el("canvas", { width: WIDTH, height: HEIGHT, "aria-hidden": "true" });
   const box = panel(id, title, [el("p", { class: "stat" }, number, unit ? el("small", {}, unit) : null), line ? canvas : ""], {
@@ -22,7 +22,9 @@ export const stat = (id, title, { unit = "", decimals = 2, line = null, format =
   const draw = (now) => {
     const ctx = canvas.getContext("2d");
     ctx.clearRect(0, 0, WIDTH, HEIGHT);
-    const [times, column] = flight.table(line, [0], now - window, now);
+    // Of several sources the first one that tells anything.
+    const number = numbers.find((one) => flight.value(line, one) != null) ?? 0,
+      [times, column] = flight.table(line, [number], now - window, now);
     const points = [];
     times.forEach((time, i) => {
       if (column[i] != null) points.push([time, column[i]]);
