@@ -70,6 +70,7 @@ pub struct Store<P> {
     series: BTreeMap<Line<P>, Series>,
     /// Intervals that have a value, of all series.
     filled: usize,
+    series_max: usize,
 }
 
 /// What a series has in some of the intervals: their numbers, and the values of each in their order, a pair each.
@@ -77,7 +78,15 @@ pub type Part = (Vec<u16>, Vec<f32>);
 
 impl<P> Default for Store<P> {
     fn default() -> Self {
-        Self { grid: Grid { start_ms: None, interval_ms: INTERVAL_MS }, series: BTreeMap::new(), filled: 0 }
+        Self::of(SERIES_MAX)
+    }
+}
+
+impl<P> Store<P> {
+    /// With room for so many series; they have the filled intervals of all together.
+    pub fn of(series_max: usize) -> Self {
+        let grid = Grid { start_ms: None, interval_ms: INTERVAL_MS };
+        Self { grid, series: BTreeMap::new(), filled: 0, series_max }
     }
 }
 
@@ -85,7 +94,7 @@ impl<P: Copy + Ord> Store<P> {
     /// Takes a value; what is not finite is none.
     pub fn push(&mut self, at: Instant, line: Line<P>, value: f32) {
         let known = self.series.contains_key(&line);
-        if !value.is_finite() || (!known && self.series.len() >= SERIES_MAX) {
+        if !value.is_finite() || (!known && self.series.len() >= self.series_max) {
             return;
         }
         let interval = self.interval(at);

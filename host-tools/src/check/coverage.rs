@@ -237,6 +237,7 @@ mod tests {
                 armed: Span::from_secs(60),
                 arming: None,
                 flew: true,
+                has_past: false,
                 problems: &[],
             };
             let (_, not_judged) = Coverage::new().lists(&recording);

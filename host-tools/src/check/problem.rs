@@ -170,11 +170,8 @@ impl Problems {
             .collect();
         for followed in self.open.values_mut().filter(|followed| followed.unexplained) {
             let Some((since, _)) = followed.since else { continue };
-            let alarms = alarms
-                .iter()
-                .filter(|(cause_since, ..)| cause_since.since(since) <= SEEN_LATE)
-                .map(|(_, check, level)| (check.as_str(), *level));
-            if let Some(cause) = because(&followed.problem.check, followed.level, alarms) {
+            let alarms = alarms.iter().map(|(since, check, level)| (*since, check.as_str(), *level));
+            if let Some(cause) = cause(&followed.problem.check, followed.level, since, alarms) {
                 // Of several times the one counts that had its worst level first.
                 if followed.problem.because.is_none() || followed.problem.at >= since {
                     followed.problem.because = Some(cause.to_owned());
@@ -244,6 +241,17 @@ impl Problems {
         problems.sort_by_key(|problem| (std::cmp::Reverse(rank(problem.level)), problem.at));
         problems
     }
+}
+
+/// Which of the checks that have an alarm, each since a time, explains that of `effect`: also one that was seen a little later.
+pub fn cause<'a>(
+    effect: &str,
+    level: Level,
+    since: Instant,
+    alarms: impl Iterator<Item = (Instant, &'a str, Level)>,
+) -> Option<&'a str> {
+    let in_time = alarms.filter(|(cause_since, ..)| cause_since.since(since) <= SEEN_LATE);
+    because(effect, level, in_time.map(|(_, check, level)| (check, level)))
 }
 
 /// From a time, with the sum of the gaps until then, to another.

@@ -9,6 +9,7 @@ use std::thread;
 use hums_core::observation::{Observation, Source};
 use hums_core::time::Instant;
 
+use crate::page::more::{More, rows};
 use crate::source::item::{Item, Stop, Want};
 use crate::source::recording::Place;
 use crate::statustext::Text;
@@ -26,6 +27,8 @@ pub enum Entry {
     Text(Text),
     /// A parameter and its value.
     Parameter(String, f64),
+    /// What plots show besides.
+    More(More),
     /// The log has nothing from here to there.
     Gap(Instant, Instant),
 }
@@ -37,6 +40,7 @@ impl Entry {
             Item::Observation(source, observation) => Some(Self::Observation(source, Box::new(*observation))),
             Item::Text(text) => Some(Self::Text(Text::whole(at, text.source, text.severity, text.words))),
             Item::Parameter(parameter) => Some(Self::Parameter(parameter.name.to_owned(), parameter.value)),
+            Item::Row(ref row) => More::of(row).map(Self::More),
             Item::Gap(gap) => gap.from.zip(gap.to).map(|(from, to)| Self::Gap(from, to)),
             _ => None,
         }
@@ -44,8 +48,9 @@ impl Entry {
 }
 
 /// What is read of such a log.
-pub const WANT: Want<'_> =
-    Want { frames: false, observations: true, rows: crate::source::item::Rows::None, system: None };
+pub fn want() -> Want<'static> {
+    Want { observations: true, rows: rows(), ..Want::default() }
+}
 
 type Batch = Vec<(Instant, Entry)>;
 
@@ -71,7 +76,7 @@ impl Native {
         thread::Builder::new().name("log".to_owned()).spawn(move || {
             let (mut passed, mut batch) = (0_u64, Batch::new());
             let read = place.open().and_then(|recording| {
-                recording.read(WANT, &mut |at, item| {
+                recording.read(want(), &mut |at, item| {
                     let Some(entry) = Entry::of(at, &item) else { return Ok(()) };
                     passed += 1;
                     if passed > entries {

@@ -8,7 +8,7 @@ use anyhow::{Result, bail};
 use hums_core::time::Instant;
 use hums_link::Frame;
 
-use super::native::{Entry, Native, WANT};
+use super::native::{self, Entry, Native};
 use super::told::Told;
 use crate::endpoint::Endpoint;
 use crate::outcome::usage;
@@ -102,26 +102,27 @@ pub fn each(opened: &mut Opened, take: &mut Take<'_>) -> Result<()> {
     let Some(recording) = opened.recording.take() else { return Ok(()) };
     let progress = recording.progress.clone();
     let mut epoch_us = None;
-    let want = if opened.native.is_some() { WANT } else { Want { frames: true, ..Want::default() } };
+    let want =
+        if opened.native.is_some() { native::want() } else { Want { frames: true, ..Want::default() } };
     let native = opened.native.is_some();
     recording.read(want, &mut |at, item| {
         let entry = if native { Entry::of(at, &item) } else { None };
         let told = if let Item::Record(record) = item { Told::of(record) } else { None };
         let heard = match item {
-            Item::Record(_) => match &told {
-                Some(told @ (Told::Parameter { .. } | Told::Part { .. })) => Heard::Told(told),
-                _ => return Ok(()),
-            },
-            Item::Observation(..) | Item::Text(_) | Item::Gap(_) => match &entry {
-                Some(entry) => Heard::Entry(entry),
-                None => return Ok(()),
-            },
-            Item::Frame(frame) => Heard::Frame(frame),
             Item::Epoch(epoch) => {
                 epoch_us = Some(epoch);
                 return Ok(());
             }
-            _ => return Ok(()),
+            Item::Frame(frame) => Heard::Frame(frame),
+            Item::Record(_) => match &told {
+                Some(told @ (Told::Parameter { .. } | Told::Part { .. })) => Heard::Told(told),
+                _ => return Ok(()),
+            },
+            // Each that the player counts when it goes to a place.
+            _ => match &entry {
+                Some(entry) => Heard::Entry(entry),
+                None => return Ok(()),
+            },
         };
         if take(at, epoch_us, progress.part(), heard)? { Ok(()) } else { Err(Stop.into()) }
     })?;

@@ -14,6 +14,7 @@ use super::native::Entry;
 use super::told::{Limits, Told, parameter, place_of};
 use crate::check::SETTLE;
 use crate::page::history::History;
+use crate::page::more::More;
 
 /// Vehicles that are told apart; later ones are counted.
 pub const VEHICLES_MAX: usize = 8;
@@ -130,6 +131,7 @@ impl World {
             Entry::Observation(source, _) => source.system,
             Entry::Text(text) => text.source.system,
             Entry::Parameter(name, value) => return self.told_parameter(at, name, *value, histories),
+            Entry::More(more) => return self.told_more(at, more, histories),
             Entry::Gap(from, to) => return self.pass(*from, *to, histories),
         };
         self.advance(at, histories.as_deref_mut());
@@ -145,16 +147,24 @@ impl World {
         match entry {
             Entry::Observation(source, observation) => craft.observe(at, *source, observation, &mut history),
             Entry::Text(text) => craft.text(text.clone(), &mut history),
-            Entry::Parameter(..) | Entry::Gap(..) => {}
+            Entry::Parameter(..) | Entry::More(_) | Entry::Gap(..) => {}
         }
     }
 
-    /// A parameter of an autopilot's own log, which is of one vehicle.
+    /// The vehicle of an autopilot's own log, which is of one: system 1; its parameters stand before it is heard.
+    fn only(&self) -> u8 {
+        self.crafts.keys().next().copied().unwrap_or(1)
+    }
+
     fn told_parameter(&self, at: Instant, name: &str, value: f64, histories: Option<&mut Histories>) {
-        // The vehicle of such a log is system 1; its parameters stand before it is heard.
-        let system = self.crafts.keys().next().copied().unwrap_or(1);
         if let Some(histories) = histories {
-            histories.entry(system).or_default().parameter(at, name, value);
+            histories.entry(self.only()).or_default().parameter(at, name, value);
+        }
+    }
+
+    fn told_more(&self, at: Instant, more: &More, histories: Option<&mut Histories>) {
+        if let Some(histories) = histories {
+            histories.entry(self.only()).or_default().more(at, more);
         }
     }
 

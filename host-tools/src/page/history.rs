@@ -19,14 +19,14 @@ use serde::ser::{SerializeMap, Serializer};
 
 use super::frames::{Frames, Sign};
 use super::modes;
+use super::more::{self, More};
 use super::note::Note;
 use super::parameters::{ParameterJson, Parameters};
 use super::plots::{self, Line, Plot};
 use super::samples::Samples;
 use super::spans::{Rest, Seen, Spans};
 use crate::decode::reference::Reference;
-use crate::mavlink::ids::RC_CHANNELS;
-use crate::series;
+use crate::series::{self, Store};
 use crate::track::Point;
 
 /// Notes kept at most; older ones go.
@@ -71,54 +71,57 @@ pub struct Cursor {
 /// The part of a history that a page does not have yet.
 #[derive(Debug, Serialize)]
 pub struct Part {
-    t: &'static str,
-    vehicle: u8,
+    pub(super) t: &'static str,
+    pub(super) vehicle: u8,
     /// Forget what you have of it.
-    reset: bool,
-    start_s: f64,
-    step_s: f64,
+    pub(super) reset: bool,
+    pub(super) start_s: f64,
+    pub(super) step_s: f64,
     /// All plots, where there is a new one or one is called otherwise.
-    plots: Option<Vec<PlotJson>>,
-    series: Series,
-    notes: Vec<Note>,
+    pub(super) plots: Option<Vec<PlotJson>>,
+    pub(super) series: Series,
+    pub(super) notes: Vec<Note>,
     /// Notes that there was no room for: the oldest ones.
-    notes_gone: u64,
+    pub(super) notes_gone: u64,
     /// Seconds, degrees north, degrees east, height in metres.
-    track: Vec<(f64, f64, f64, Option<f32>)>,
-    phases: Option<Rest>,
-    modes: Option<Rest>,
-    parameters: Vec<ParameterJson>,
-    parameters_left_out: u64,
+    pub(super) track: Vec<(f64, f64, f64, Option<f32>)>,
+    pub(super) phases: Option<Rest>,
+    pub(super) modes: Option<Rest>,
+    pub(super) parameters: Vec<ParameterJson>,
+    pub(super) parameters_left_out: u64,
+    /// The log tells what parameters are by default: one without a default is at it.
+    pub(super) tells_defaults: bool,
 }
 
 /// A plot in words, as [`plots`] has them.
 #[derive(Debug, Serialize)]
 pub struct PlotJson {
-    id: String,
-    group: &'static str,
-    title: &'static str,
-    unit: &'static str,
-    decimals: u8,
-    limits: Option<[f32; 2]>,
+    pub(super) id: String,
+    pub(super) group: &'static str,
+    pub(super) title: String,
+    pub(super) unit: &'static str,
+    pub(super) decimals: u8,
+    /// See [`plots::limits`].
+    pub(super) limits: Vec<plots::Limits>,
     /// Numbers and names. Lines of one number have one colour in all plots.
-    lines: Vec<(u8, String)>,
+    pub(super) lines: Vec<(u8, String)>,
 }
 
 /// Each line's new intervals: `"Altitude:0": [numbers, values]`; numbers count from the one before, the first from 0.
 #[derive(Debug)]
-struct Series(Vec<(Line, u8, series::Part)>);
+pub(super) struct Series(pub(super) Vec<(String, u8, series::Part)>);
 
 impl Serialize for Series {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let mut map = serializer.serialize_map(Some(self.0.len()))?;
-        for ((plot, line), decimals, (numbers, values)) in &self.0 {
+        for (key, decimals, (numbers, values)) in &self.0 {
             let mut before = 0;
             let step = |number: &u16| number.wrapping_sub(std::mem::replace(&mut before, *number));
             let steps: Vec<u16> = numbers.iter().map(step).collect();
             let scale = 10_f64.powi(i32::from(*decimals));
             let values: Vec<f64> =
                 values.iter().map(|value| (f64::from(*value) * scale).round() / scale).collect();
-            map.serialize_entry(&format!("{plot:?}:{line}"), &(steps, values))?;
+            map.serialize_entry(key, &(steps, values))?;
         }
         map.end()
     }
@@ -149,8 +152,16 @@ impl History {
         }
         let sign = Sign { at, source: frame.source(), sequence: frame.sequence() };
         self.frames.take(&sign, vehicle, &mut self.samples.store);
-        if frame.id() == RC_CHANNELS && vehicle == Some(frame.source()) {
-            self.samples.sticks(at, frame.payload());
+        if more::is_of_use(frame.id()) && vehicle == Some(frame.source()) {
+            self.samples.message(at, frame.id(), frame.payload());
+        }
+    }
+
+    /// Takes what of a row of an autopilot's own log is no observation.
+    pub fn more(&mut self, at: Instant, more: &More) {
+        match more {
+            More::Values(values) => self.samples.values(at, values),
+            More::Default(default) => self.parameters.take_default(default),
         }
     }
 
@@ -184,6 +195,16 @@ impl History {
         }
     }
 
+    /// Its series, who flies, and the limits that hold.
+    pub(super) fn drawn(&self) -> (&Store<Plot>, Autopilot, Option<&Params>) {
+        (&self.samples.store, self.autopilot, self.params.as_deref())
+    }
+
+    /// What each parameter was last.
+    pub fn last_parameters(&self) -> impl Iterator<Item = (&str, f64)> {
+        self.parameters.last()
+    }
+
     /// Where it was.
     pub fn track(&self) -> &[Point] {
         self.samples.track.points()
@@ -204,7 +225,8 @@ impl History {
         let newest = u16::try_from(newest).unwrap_or(u16::MAX - 1);
         let from = cursor.interval.unwrap_or(0);
         let decimals = |plot: Plot| plots::about(plot, self.autopilot).decimals;
-        let parts = store.part(from..=newest).map(|(line, part)| (line, decimals(line.0), part));
+        let name = |(plot, line): Line| format!("{plot:?}:{line}");
+        let parts = store.part(from..=newest).map(|(line, part)| (name(line), decimals(line.0), part));
         let series: Vec<_> = parts.collect();
         // The newest interval may still change.
         cursor.interval = Some(newest.max(from));
@@ -249,6 +271,7 @@ impl History {
             modes,
             parameters,
             parameters_left_out: self.parameters.left_out(),
+            tells_defaults: self.parameters.tells_defaults(),
         })
     }
 
@@ -263,9 +286,9 @@ impl History {
                 continue;
             }
             let params = self.params.as_deref();
-            let limits = params.and_then(|params| plots::limits(plot, self.autopilot, params));
+            let limits = params.map(|params| plots::limits(plot, self.autopilot, params)).unwrap_or_default();
             let plots::About { group, title, unit, decimals, .. } = about;
-            let id = format!("{plot:?}");
+            let (id, title) = (format!("{plot:?}"), title.to_owned());
             all.push((plot, PlotJson { id, group, title, unit, decimals, limits, lines: vec![named] }));
         }
         all.into_iter().map(|(_, json)| json).collect()
@@ -330,7 +353,7 @@ mod tests {
     #[test]
     fn numbers_count_from_the_one_before_and_values_are_as_fine_as_their_plot() {
         let series =
-            Series(vec![((Plot::Speed, 2), 2, (vec![3, 4, 9], vec![1.234_5, 2.0, 0.1, 0.1, -3.0, 5.0]))]);
+            Series(vec![("Speed:2".to_owned(), 2, (vec![3, 4, 9], vec![1.234_5, 2.0, 0.1, 0.1, -3.0, 5.0]))]);
         let json = serde_json::to_string(&series).expect("JSON");
         assert_eq!(json, r#"{"Speed:2":[[3,1,5],[1.23,2.0,0.1,0.1,-3.0,5.0]]}"#);
     }

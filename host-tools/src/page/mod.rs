@@ -14,7 +14,9 @@
 pub mod frames;
 pub mod history;
 pub mod json;
+pub mod merged;
 pub mod modes;
+pub mod more;
 pub mod note;
 pub mod parameters;
 pub mod plots;

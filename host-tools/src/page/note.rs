@@ -52,13 +52,31 @@ pub struct Found {
     pub meaning: &'static str,
     /// What to do, as a sentence.
     pub action: &'static str,
-    /// What explains it: the name of another check; empty where nothing does.
-    pub because: &'static str,
+    /// What explains it: another check; `null` where nothing does.
+    pub because: Option<Cause>,
+}
+
+/// A check that explains a finding of another one.
+#[derive(Clone, Debug, Serialize)]
+pub struct Cause {
+    /// Its stable name.
+    check: String,
+    /// Its name for people.
+    words: String,
+}
+
+impl Cause {
+    /// Of the check of this name.
+    fn of(check: &str) -> Self {
+        let words =
+            vocabulary(check).map_or_else(|| check.replace('_', " "), |known| known.said.name.to_owned());
+        Self { check: check.to_owned(), words }
+    }
 }
 
 impl Note {
-    /// A finding of a check.
-    pub fn found(finding: &FindingLine) -> Self {
+    /// A finding of a check, and the check that explains it.
+    pub fn found(finding: &FindingLine, because: Option<&str>) -> Self {
         let known = vocabulary(&finding.check);
         let words = match known {
             Some(known) => known.said.name_of(finding.instance).to_string(),
@@ -84,14 +102,14 @@ impl Note {
                 unit: finding.unit.clone(),
                 meaning: known.filter(|_| is_worry).map_or("", |known| known.meaning),
                 action: known.filter(|_| is_worry).map_or("", |known| known.action),
-                because: "",
+                because: because.map(Cause::of),
             }),
         }
     }
 
     /// A finding of the checks here.
     pub fn finding(finding: &Finding) -> Self {
-        let mut note = Self::found(&FindingLine {
+        let line = FindingLine {
             at: finding.at,
             subsystem: finding.subsystem.name(),
             check: finding.check.to_owned(),
@@ -101,11 +119,8 @@ impl Note {
             value: finding.value,
             limit: finding.limit,
             unit: finding.unit.to_owned(),
-        });
-        if let Some(found) = &mut note.found {
-            found.because = vocabulary(finding.because).map_or(finding.because, |known| known.said.name);
-        }
-        note
+        };
+        Self::found(&line, Some(finding.because).filter(|because| !because.is_empty()))
     }
 
     /// What a component said; a HUMS on board says findings.

@@ -5,6 +5,8 @@ use std::collections::BTreeMap;
 use hums_core::time::Instant;
 use serde::Serialize;
 
+use super::more::Default as DefaultValue;
+
 /// Parameters at most: `ArduPilot` has some 1,400. Further ones are counted.
 const PARAMETERS_MAX: usize = 3_000;
 /// Changes of one that are kept; of more the last ones replace each other.
@@ -14,6 +16,8 @@ const CHANGES_MAX: usize = 16;
 #[derive(Clone, Debug, Default)]
 pub struct Parameters {
     known: BTreeMap<String, Vec<(Instant, f64)>>,
+    /// What they are by default, where the log tells it.
+    defaults: BTreeMap<String, DefaultValue>,
     /// Values of parameters beyond [`PARAMETERS_MAX`].
     left_out: u64,
     newest: Option<Instant>,
@@ -25,6 +29,9 @@ pub struct ParameterJson {
     name: String,
     /// Times, seconds, and values: the first one that was told, and each that differed from the one before.
     values: Vec<(f64, f64)>,
+    /// What it is by default, where the log tells it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    default: Option<f64>,
 }
 
 impl Parameters {
@@ -48,6 +55,25 @@ impl Parameters {
         self.newest = Some(at);
     }
 
+    /// Takes what a parameter is by default.
+    pub fn take_default(&mut self, default: &DefaultValue) {
+        let known = self.defaults.get(&default.name);
+        let has_room = known.is_some() || self.defaults.len() < PARAMETERS_MAX;
+        if has_room && known.is_none_or(|known| default.is_of_airframe || !known.is_of_airframe) {
+            self.defaults.insert(default.name.clone(), default.clone());
+        }
+    }
+
+    /// Whether the log tells what parameters are by default.
+    pub fn tells_defaults(&self) -> bool {
+        !self.defaults.is_empty()
+    }
+
+    /// What each was last.
+    pub fn last(&self) -> impl Iterator<Item = (&str, f64)> {
+        self.known.iter().filter_map(|(name, values)| Some((name.as_str(), values.last()?.1)))
+    }
+
     /// Values of parameters that there was no room for.
     pub fn left_out(&self) -> u64 {
         self.left_out
@@ -62,7 +88,12 @@ impl Parameters {
             let known = values.get(..values.partition_point(|(at, _)| *at <= until))?;
             let (last, _) = known.last()?;
             let values = known.iter().map(|(at, value)| (at.as_secs_f64(), *value)).collect();
-            from.is_none_or(|from| *last > from).then(|| ParameterJson { name: name.clone(), values })
+            let default = self.defaults.get(name).map(|default| default.value);
+            from.is_none_or(|from| *last > from).then(|| ParameterJson {
+                name: name.clone(),
+                values,
+                default,
+            })
         };
         self.known.iter().filter_map(parameter).collect()
     }
@@ -71,6 +102,20 @@ impl Parameters {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_default_of_an_airframe_comes_before_that_of_the_system() {
+        let mut parameters = Parameters::default();
+        parameters.take(Instant::ZERO, "MC_ROLL_P", 8.0);
+        assert!(!parameters.tells_defaults());
+        let default =
+            |value, is_of_airframe| DefaultValue { name: "MC_ROLL_P".to_owned(), value, is_of_airframe };
+        for (value, is_of_airframe) in [(6.5, false), (7.0, true), (6.5, false)] {
+            parameters.take_default(&default(value, is_of_airframe));
+        }
+        let told = parameters.since(None, Instant::ZERO);
+        assert_eq!((told[0].default, parameters.tells_defaults()), (Some(7.0), true));
+    }
 
     #[test]
     fn a_parameter_is_told_when_it_is_new_and_when_it_changed_and_none_is_without_end() {

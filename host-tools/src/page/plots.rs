@@ -2,34 +2,48 @@
 //!
 //! A plot has one unit, and a line one source: two sensors are two lines.
 
-use hums_core::observation::Autopilot;
+use hums_core::observation::{Autopilot, CELLS_MAX};
 use hums_core::params::{Param, Params};
 
 /// The plots, in the order of the page.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Plot {
-    /// Above home, m.
+    /// Above home, and what the autopilot wants above its local origin, m.
     Height,
-    /// Above mean sea level by the first receiver, or the estimator where there is none, m.
+    /// Above mean sea level by the first receiver, by the estimator, and what the autopilot wants, m.
     Altitude,
     /// Over ground, through the air, by the receiver, m/s.
     Speed,
-    /// Upwards, m/s.
+    /// Upwards, and what the autopilot wants, m/s.
     Vertical,
-    /// North, east, down, m/s.
+    /// North, east, down, and what the autopilot wants, m/s.
     Velocity,
     /// Roll, pitch, and those that the autopilot wants, degrees.
     Attitude,
+    /// From north, clockwise, and what the autopilot's attitude control and its navigation want, degrees.
+    Heading,
+    /// About the body's axes, and what the autopilot wants, degrees a second.
+    Rates,
+    /// Over ground, as the autopilot estimates it, m/s.
+    Wind,
+    /// Where it comes from, degrees from north, clockwise.
+    WindFrom,
     /// A line a channel of radio control, microseconds.
     Sticks,
     /// A line a battery, V.
     PackVolts,
-    /// A line a cell of the first battery, V.
+    /// A line a cell: so many ([`CELLS_MAX`]) a battery, V.
     CellVolts,
     /// A line a battery, A.
     PackAmperes,
     /// A line a battery, %.
     PackPercent,
+    /// A line a battery, degC.
+    PackCelsius,
+    /// The autopilot's supply of 5 V, V.
+    Rail,
+    /// The rail of the servos, V.
+    ServoRail,
     /// A line a motor, 1/min.
     MotorRpm,
     /// A line a motor, A.
@@ -72,9 +86,9 @@ pub enum Plot {
     Link,
     /// Received, and missing by the count of the sender, 1/s.
     Frames,
-    /// Barometer, inertial sensor, processor, and from the fifth line on the batteries, degC.
+    /// Barometer, inertial sensor, processor, and the air in the inertial sensor's message, degC.
     Temperature,
-    /// Static, of the first barometer, hPa.
+    /// Static, of the first barometer, and as the inertial sensor's message has it, hPa.
     Pressure,
     /// Of the autopilot's processor, %.
     Load,
@@ -112,6 +126,12 @@ fn battery(line: u8) -> String {
     numbered("Battery", line)
 }
 
+/// Cells of the first battery have no other name.
+fn cell(line: u8) -> String {
+    let (pack, cell) = (line / CELLS_MAX as u8, line % CELLS_MAX as u8);
+    if pack == 0 { numbered("Cell", cell) } else { format!("{}, cell {}", battery(pack), cell + 1) }
+}
+
 fn receiver(line: u8) -> String {
     numbered("Receiver", line)
 }
@@ -126,21 +146,36 @@ pub fn about(plot: Plot, autopilot: Autopilot) -> About {
     };
     let (vibration, estimator) = if px4 { ("PX4 metrics", "test ratio") } else { ("m/s\u{b2}", "variance") };
     let (group, title, unit, decimals, name): (_, _, _, _, fn(u8) -> String) = match plot {
-        Plot::Height => ("Motion", "Height above home", "m", 2, |_| "Height".into()),
-        Plot::Altitude => ("Motion", "Altitude above sea level", "m", 1, |_| "Altitude".into()),
+        Plot::Height => ("Motion", "Height above home", "m", 2, |line| {
+            named(&["Height", "Wanted, above the origin"], line)
+        }),
+        Plot::Altitude => ("Motion", "Altitude above sea level", "m", 1, |line| {
+            named(&["GNSS", "Estimator", "Wanted"], line)
+        }),
         Plot::Speed => ("Motion", "Speed", "m/s", 2, |line| named(&["Ground", "Air", "GNSS"], line)),
-        Plot::Vertical => ("Motion", "Climb rate", "m/s", 2, |_| "Climb".into()),
-        Plot::Velocity => {
-            ("Motion", "NED velocity", "m/s", 2, |line| named(&["North", "East", "Down"], line))
-        }
+        Plot::Vertical => ("Motion", "Climb rate", "m/s", 2, |line| named(&["Climb", "Climb, wanted"], line)),
+        Plot::Velocity => ("Motion", "NED velocity", "m/s", 2, |line| {
+            named(&["North", "East", "Down", "North, wanted", "East, wanted", "Down, wanted"], line)
+        }),
         Plot::Attitude => ("Motion", "Attitude", "\u{b0}", 1, |line| {
             named(&["Roll", "Pitch", "Roll, wanted", "Pitch, wanted"], line)
         }),
+        Plot::Heading => ("Motion", "Heading", "\u{b0}", 0, |line| {
+            named(&["Heading", "Wanted by attitude control", "Wanted by navigation"], line)
+        }),
+        Plot::Rates => ("Motion", "Body rates", "\u{b0}/s", 1, |line| {
+            named(&["Roll", "Pitch", "Yaw", "Roll, wanted", "Pitch, wanted"], line)
+        }),
+        Plot::Wind => ("Motion", "Wind", "m/s", 1, |_| "Wind".into()),
+        Plot::WindFrom => ("Motion", "Wind comes from", "\u{b0}", 0, |_| "From".into()),
         Plot::Sticks => ("Motion", "Radio control", "\u{b5}s", 0, |line| numbered("Channel", line)),
         Plot::PackVolts => ("Battery", "Voltage", "V", 3, battery),
-        Plot::CellVolts => ("Battery", "Cells of battery 1", "V", 3, |line| numbered("Cell", line)),
+        Plot::CellVolts => ("Battery", "Cells", "V", 3, cell),
         Plot::PackAmperes => ("Battery", "Current", "A", 2, battery),
         Plot::PackPercent => ("Battery", "Remaining", "%", 0, battery),
+        Plot::PackCelsius => ("Battery", "Battery temperature", "\u{b0}C", 1, battery),
+        Plot::Rail => ("Battery", "5 V supply", "V", 3, |_| "5 V".into()),
+        Plot::ServoRail => ("Battery", "Servo rail", "V", 3, |_| "Servos".into()),
         Plot::MotorRpm => ("Motors", "Motor speed", "rpm", 0, motor),
         Plot::MotorAmperes => ("Motors", "ESC currents", "A", 2, motor),
         Plot::MotorVolts => ("Motors", "ESC voltages", "V", 2, motor),
@@ -168,37 +203,60 @@ pub fn about(plot: Plot, autopilot: Autopilot) -> About {
         Plot::Frames => {
             ("Link", "Frames", "1/s", 0, |line| named(&["Received", "Missing by the sender's count"], line))
         }
-        Plot::Temperature => ("Computer", "Temperatures", "\u{b0}C", 1, |line| match line.checked_sub(4) {
-            Some(battery) => numbered("Battery", battery),
-            None => named(&["Barometer", "Inertial sensor", "Processor"], line),
+        Plot::Temperature => ("Computer", "Temperatures", "\u{b0}C", 1, |line| {
+            named(&["Barometer", "Inertial sensor", "Processor", "Air, by HIGHRES_IMU"], line)
         }),
-        Plot::Pressure => ("Computer", "Air pressure", "hPa", 1, |_| "Pressure".into()),
+        Plot::Pressure => {
+            ("Computer", "Air pressure", "hPa", 1, |line| named(&["Barometer", "Air, by HIGHRES_IMU"], line))
+        }
         Plot::Load => ("Computer", "Autopilot load", "%", 1, |_| "Load".into()),
     };
     About { group, title, unit, decimals, name }
 }
 
-/// The limits of warning and of critical that hold for every line of a plot. Where the second is the lower one, what is below
-/// is bad.
-pub fn limits(plot: Plot, autopilot: Autopilot, params: &Params) -> Option<[f32; 2]> {
+/// A limit of warning and one of critical, where there are such.
+pub type Limits = [Option<f32>; 2];
+
+/// The limits that hold for every line of a plot; of both sides, where there are two. Where the second is the lower one, what is
+/// below is bad.
+pub fn limits(plot: Plot, autopilot: Autopilot, params: &Params) -> Vec<Limits> {
     let px4 = autopilot == Autopilot::Px4;
-    let (warning, critical) = match plot {
-        Plot::CellVolts => (Param::CellVoltWarn, Param::CellVoltCrit),
-        Plot::PackPercent => (Param::BatRemWarn, Param::BatRemCrit),
-        Plot::MotorCelsius => (Param::EscTempWarn, Param::EscTempCrit),
-        Plot::EngineCelsius => (Param::EngChtWarn, Param::EngChtCrit),
-        Plot::Vibration if px4 => (Param::VibePx4Warn, Param::VibePx4Crit),
-        Plot::Vibration => (Param::VibeWarn, Param::VibeCrit),
-        Plot::Estimator if px4 => (Param::EkfRatioWarn, Param::EkfRatioCrit),
-        Plot::Estimator => (Param::EkfVarWarn, Param::EkfVarCrit),
-        Plot::Satellites => (Param::GpsSatsWarn, Param::GpsSatsWarn),
-        Plot::Hdop => (Param::GpsHdopWarn, Param::GpsHdopWarn),
-        Plot::Accuracy => (Param::GpsHaccWarn, Param::GpsHaccWarn),
-        Plot::Load => (Param::CpuLoadWarn, Param::CpuLoadCrit),
-        _ => return None,
+    let both = |warning, critical| [Some(params.get(warning)), Some(params.get(critical))];
+    let warning = |param| [Some(params.get(param)), None];
+    let pair = match plot {
+        Plot::CellVolts => both(Param::CellVoltWarn, Param::CellVoltCrit),
+        Plot::PackPercent => both(Param::BatRemWarn, Param::BatRemCrit),
+        Plot::PackCelsius => both(Param::BatTempWarn, Param::BatTempCrit),
+        Plot::Rail => {
+            return vec![both(Param::RailLowWarn, Param::RailLowCrit), warning(Param::RailHighWarn)];
+        }
+        Plot::MotorCelsius => both(Param::EscTempWarn, Param::EscTempCrit),
+        Plot::EngineCelsius => both(Param::EngChtWarn, Param::EngChtCrit),
+        Plot::Vibration if px4 => both(Param::VibePx4Warn, Param::VibePx4Crit),
+        Plot::Vibration => both(Param::VibeWarn, Param::VibeCrit),
+        Plot::Acceleration => {
+            // The check is of multiples of gravity.
+            let limits = both(Param::LoadFacWarn, Param::LoadFacCrit);
+            return vec![limits.map(|limit| limit.map(|load_g| load_g * GRAVITY_M_S2))];
+        }
+        Plot::Attitude => {
+            let limits = both(Param::TiltWarn, Param::TiltCrit);
+            return vec![limits, limits.map(|limit| limit.map(|tilt_deg| -tilt_deg))];
+        }
+        Plot::Estimator if px4 => both(Param::EkfRatioWarn, Param::EkfRatioCrit),
+        Plot::Estimator => both(Param::EkfVarWarn, Param::EkfVarCrit),
+        Plot::Satellites => warning(Param::GpsSatsWarn),
+        Plot::Fix => [None, Some(params.get(Param::GpsFixCrit))],
+        Plot::Hdop => warning(Param::GpsHdopWarn),
+        Plot::Accuracy => warning(Param::GpsHaccWarn),
+        Plot::Load => both(Param::CpuLoadWarn, Param::CpuLoadCrit),
+        _ => return Vec::new(),
     };
-    Some([params.get(warning), params.get(critical)])
+    vec![pair]
 }
+
+/// Standard gravity, ISO 80000-3.
+const GRAVITY_M_S2: f32 = 9.806_65;
 
 /// One line of a plot.
 pub type Line = crate::series::Line<Plot>;

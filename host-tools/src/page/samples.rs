@@ -1,10 +1,10 @@
 //! What the vehicle told, as points of series and of the track.
 
-use hums_core::observation::{Air, Esc, Imu, MOTORS_MAX, Observation};
+use hums_core::observation::{Air, Battery, CELLS_MAX, Esc, Imu, MOTORS_MAX, Observation};
 use hums_core::time::Instant;
 use hums_core::units::Position;
-use hums_link::packet::Fields;
 
+use super::more::{self, compass_deg};
 use super::plots::{Line, Plot};
 use crate::decode::reference::Reference;
 use crate::series::Store;
@@ -19,8 +19,6 @@ pub struct Samples {
     pub track: Track,
     /// How often every second place of it went, because it is bounded.
     pub thinned: u64,
-    /// A barometer tells of itself: what an inertial sensor's message tells of the air is another one's.
-    barometer: bool,
 }
 
 impl Samples {
@@ -46,9 +44,7 @@ impl Samples {
                         .zip([north, east, down])
                         .for_each(|(axis, speed)| push(Plot::Velocity, axis, Some(speed)));
                 }
-                if reference.vehicle().gnss[0].get().is_none() {
-                    push(Plot::Altitude, 0, Some(global.altitude.0));
-                }
+                push(Plot::Altitude, 1, Some(global.altitude.0));
                 if let Some(position) = global.position {
                     self.place(at, position, Some(global.relative_altitude.0));
                 }
@@ -83,11 +79,19 @@ impl Samples {
             Observation::Attitude(attitude) => {
                 push(Plot::Attitude, 0, Some(attitude.roll.0.to_degrees()));
                 push(Plot::Attitude, 1, Some(attitude.pitch.0.to_degrees()));
+                push(Plot::Heading, 0, Some(compass_deg(attitude.yaw.0)));
+                for (axis, rate) in (0..).zip(attitude.rates.into_iter().flatten()) {
+                    push(Plot::Rates, axis, Some(rate.0.to_degrees()));
+                }
             }
             Observation::Wanted(wanted) => {
                 push(Plot::Attitude, 2, Some(wanted.roll.0.to_degrees()));
                 push(Plot::Attitude, 3, Some(wanted.pitch.0.to_degrees()));
+                for (axis, rate) in (3..).zip(wanted.rates.into_iter().flatten()) {
+                    push(Plot::Rates, axis, Some(rate.0.to_degrees()));
+                }
             }
+            Observation::ClimbWanted(climb) => push(Plot::Vertical, 1, Some(climb.0)),
             _ => {}
         }
     }
@@ -96,17 +100,10 @@ impl Samples {
     fn power(&mut self, at: Instant, reference: &Reference, observation: &Observation) {
         let mut push = |plot, line: u8, value: Option<f32>| self.put(at, (plot, line), value);
         match observation {
-            Observation::Battery(battery) => {
-                let place = battery.id.min(3);
-                push(Plot::PackVolts, place, battery.voltage.map(|volts| volts.0));
-                push(Plot::PackAmperes, place, battery.current.map(|amperes| amperes.0));
-                push(Plot::PackPercent, place, battery.remaining.map(|part| part.0 * 100.0));
-                push(Plot::Temperature, 4 + place, battery.temperature.map(|celsius| celsius.0));
-                if place == 0 {
-                    for (cell, volts) in battery.cells.iter().enumerate() {
-                        push(Plot::CellVolts, cell as u8, volts.map(|volts| volts.0));
-                    }
-                }
+            Observation::Battery(battery) => self.battery(at, battery),
+            Observation::Rails(rails) => {
+                push(Plot::Rail, 0, rails.vcc.map(|volts| volts.0));
+                push(Plot::ServoRail, 0, rails.servo.map(|volts| volts.0));
             }
             Observation::SystemStatus(system) => {
                 push(Plot::Load, 0, system.load.map(|part| part.0 * 100.0));
@@ -150,16 +147,12 @@ impl Samples {
                 push(Plot::Estimator, 2, estimator.position_vertical);
                 push(Plot::Estimator, 3, estimator.compass);
             }
-            Observation::Air(air) if air.instance == 0 => {
-                self.barometer = true;
-                self.air(at, air);
-            }
+            Observation::Air(air) if air.instance == 0 => self.air(at, air, [0, 0]),
             Observation::Imu(imu) if imu.instance == 0 => self.imu(at, imu),
             Observation::ImuAndAir(imu, air) if imu.instance == 0 => {
                 self.imu(at, imu);
-                if !self.barometer {
-                    self.air(at, air);
-                }
+                // Of another sensor than the barometer's own messages.
+                self.air(at, air, [3, 1]);
             }
             Observation::Processor(processor) => {
                 push(Plot::Temperature, 2, processor.temperature.map(|celsius| celsius.0));
@@ -213,22 +206,37 @@ impl Samples {
         self.put(at, (Plot::Temperature, 1), imu.temperature.map(|celsius| celsius.0));
     }
 
-    fn air(&mut self, at: Instant, air: &Air) {
-        self.put(at, (Plot::Temperature, 0), air.temperature.map(|celsius| celsius.0));
-        self.put(at, (Plot::Pressure, 0), air.pressure.map(|pressure| pressure.0));
+    /// `lines` are those of temperature and pressure.
+    fn air(&mut self, at: Instant, air: &Air, lines: [u8; 2]) {
+        self.put(at, (Plot::Temperature, lines[0]), air.temperature.map(|celsius| celsius.0));
+        self.put(at, (Plot::Pressure, lines[1]), air.pressure.map(|pressure| pressure.0));
     }
 
-    /// What the sticks ask for: the channels of `RC_CHANNELS` that are there.
-    pub fn sticks(&mut self, at: Instant, payload: &[u8]) {
-        const CHANNELS: u8 = 8;
-        let fields = Fields(payload);
-        let count = fields.u8(40).min(CHANNELS);
-        for line in 0..count {
-            let pulse = fields.u16(4 + 2 * usize::from(line));
-            // 0 and UINT16_MAX: not used.
-            let known = pulse != 0 && pulse != u16::MAX;
-            self.put(at, (Plot::Sticks, line), known.then_some(f32::from(pulse)));
+    fn battery(&mut self, at: Instant, battery: &Battery) {
+        let values = [
+            (Plot::PackVolts, battery.voltage.map(|volts| volts.0)),
+            (Plot::PackAmperes, battery.current.map(|amperes| amperes.0)),
+            (Plot::PackPercent, battery.remaining.map(|part| part.0 * 100.0)),
+            (Plot::PackCelsius, battery.temperature.map(|celsius| celsius.0)),
+        ];
+        for (plot, value) in values {
+            self.put(at, (plot, battery.id), value);
         }
+        let first = battery.id.checked_mul(CELLS_MAX as u8);
+        let lines = first.into_iter().flat_map(|first| first..=u8::MAX);
+        for (line, volts) in lines.zip(battery.cells) {
+            self.put(at, (Plot::CellVolts, line), volts.map(|volts| volts.0));
+        }
+    }
+
+    /// Takes what of a message of the vehicle is no observation: sticks, wind, what the autopilot wants.
+    pub fn message(&mut self, at: Instant, id: u32, payload: &[u8]) {
+        more::of_message(id, payload, &mut |line, value| self.put(at, line, Some(value)));
+    }
+
+    /// Takes the same of an autopilot's own log.
+    pub fn values(&mut self, at: Instant, values: &[(Line, f32)]) {
+        values.iter().for_each(|(line, value)| self.put(at, *line, Some(*value)));
     }
 
     fn put(&mut self, at: Instant, line: Line, value: Option<f32>) {

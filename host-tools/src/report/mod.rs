@@ -7,6 +7,7 @@
 //! Nothing that a vehicle sent becomes markup: text goes into the page as data, and only as text onto it. The page's
 //! own policy lets no other script run and loads nothing.
 
+pub mod causes;
 pub mod counters;
 pub mod flights;
 pub mod page;

@@ -4,10 +4,12 @@ use anyhow::Result;
 use hums_core::observation::{Observation, Source};
 use hums_core::time::Instant;
 
+use super::causes::causes;
 use super::flights::{Extents, Flight};
 use crate::check::judge::{Judge, Limits};
 use crate::decode::reference::Reference;
 use crate::page::history::History;
+use crate::page::more::{More, rows};
 use crate::page::note::Note;
 use crate::source::item::{Item, Text, Want};
 use crate::source::recording::Place;
@@ -36,7 +38,7 @@ impl Replay {
     /// Reads a recording, of which this is known.
     pub fn of(place: &Place, overview: &Overview) -> Result<Self> {
         let mut replay = Self::default();
-        let want = Want { frames: true, observations: true, ..Want::default() };
+        let want = Want { frames: true, observations: true, rows: rows(), ..Want::default() };
         let recording = place.open()?;
         let mut judge = Judge::new(&Limits::default(), recording.format);
         recording.read(want, &mut |at, item| {
@@ -46,7 +48,10 @@ impl Replay {
         })?;
         replay.history.judged_by(judge.params());
         replay.flights = replay.extents.flights(&judge.end().flights);
-        let found = overview.contents.findings.iter().map(|finding| (finding.at, Note::found(finding)));
+        let findings = &overview.contents.findings;
+        let causes = causes(findings);
+        let found = findings.iter().zip(&causes);
+        let found = found.map(|(finding, cause)| (finding.at, Note::found(finding, cause.as_deref())));
         replay.notes.extend(found);
         replay.notes.sort_by_key(|(at, _)| *at);
         for (at, note) in replay.notes.drain(..) {
@@ -62,6 +67,11 @@ impl Replay {
             Item::Observation(source, observation) => self.observe(at, source, observation, flight),
             Item::Text(text) => self.keep(at, text),
             Item::Parameter(parameter) => self.history.parameter(at, parameter.name, parameter.value),
+            Item::Row(row) => {
+                if let Some(more) = More::of(&row) {
+                    self.history.more(at, &more);
+                }
+            }
             Item::Gap(_) => self.history.gap(),
             _ => {}
         }

@@ -14,7 +14,7 @@ use crate::hums;
 use crate::oracle;
 use crate::pc;
 use crate::prove;
-use crate::repo::FIRMWARE_TARGET;
+use crate::repo::{self, FIRMWARE_TARGET};
 use crate::setup::Need;
 use crate::shell::Shell;
 use crate::structure;
@@ -42,7 +42,7 @@ pub(super) enum Builds {
 
 /// In the order in which they begin, as far as what they need is there: first what fails soonest, then what others
 /// wait for, then what takes longest.
-pub(super) const STEPS: [Step; 19] = [
+pub(super) const STEPS: [Step; 20] = [
     Step {
         name: "fmt",
         about: "the formatting",
@@ -132,6 +132,14 @@ pub(super) const STEPS: [Step; 19] = [
         run: doc,
     },
     Step {
+        name: "page",
+        about: "formatting and lints of the page's scripts and style, by Biome",
+        needs: &[Need::PythonVenv],
+        after: &["oracle"],
+        builds: None,
+        run: page,
+    },
+    Step {
         name: "browser",
         about: "the report and the live page in Chromium",
         needs: &[Need::PythonVenv, Need::Chromium],
@@ -203,6 +211,13 @@ const FLOWN: Board = Board::F405;
 fn check_budgets() -> Result<()> {
     println!("{NOT_TESTED}board f429 (cargo xtask dist lints and measures it)");
     budgets::check(&[FLOWN])
+}
+
+/// As `host-tools/src/page/biome.json` has it. To format: `target/venv/bin/biome format --write` in that folder.
+fn page() -> Result<()> {
+    let biome = oracle::python().with_file_name("biome");
+    let folder = repo::root().join("host-tools/src/page");
+    Shell::new(biome).args(["ci", "--error-on-warnings", "--colors=off"]).within(&folder).run()
 }
 
 /// What is flashed is what is tested: the sums are those of `cargo xtask dist` of the same sources.

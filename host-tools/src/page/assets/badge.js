@@ -13,7 +13,8 @@ const SHAPES = {
   stale: ["M8 1.5a6.5 6.5 0 1 0 0 13a6.5 6.5 0 1 0 0-13z", "M6.1 6.4a2 2 0 1 1 2.7 1.9c-.6.3-.8.6-.8 1.3M8 11.7v.2"],
 };
 export const shape = () => {
-  const outer = svg("path", { class: "outer" }), inner = svg("path", { class: "inner" });
+  const outer = svg("path", { class: "outer" }),
+    inner = svg("path", { class: "inner" });
   return svg("svg", { class: "shape", viewBox: "0 0 16 16", "aria-hidden": "true" }, outer, inner);
 };
 export const shapeIs = (node, level) => {
@@ -23,7 +24,8 @@ export const shapeIs = (node, level) => {
   attribute(node, "class", `shape ${level}`);
 };
 export const badge = () => {
-  const mark = shape(), word = el("b");
+  const mark = shape(),
+    word = el("b");
   const node = el("span", { class: "badge" }, mark, word);
   return {
     node,

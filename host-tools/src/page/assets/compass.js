@@ -11,11 +11,19 @@ export const compass = () => {
   for (let degrees = 0; degrees < 360; degrees += 10) {
     ticks.push(svg("path", { d: `M0 -50v${degrees % 30 === 0 ? 7 : 4}`, transform: `rotate(${degrees})` }));
   }
-  const names = QUARTERS.map((name, i) => svg("text", { class: name === "N" ? "north" : "", y: -33, transform: `rotate(${90 * i})` }, name));
+  const names = QUARTERS.map((name, i) =>
+    svg("text", { class: name === "N" ? "north" : "", y: -33, transform: `rotate(${90 * i})` }, name),
+  );
   const rose = svg("g", {}, svg("circle", { class: "ring", r: 50 }), ticks, names);
   const number = svg("text", { class: "number", y: 7, "data-value": "heading" });
-  const picture = svg("svg", { class: "gauge compass", viewBox: "-60 -60 120 120", role: "img" },
-    rose, svg("path", { class: "pointer", d: "M0 -43l-5.5 -13h11z" }), number, svg("text", { class: "unit", y: 20 }, "\u00b0"));
+  const picture = svg(
+    "svg",
+    { class: "gauge compass", viewBox: "-60 -60 120 120", role: "img" },
+    rose,
+    svg("path", { class: "pointer", d: "M0 -43l-5.5 -13h11z" }),
+    number,
+    svg("text", { class: "unit", y: 20 }, "\u00b0"),
+  );
   const box = panel("heading", "Heading", picture, { class: "instrument" });
   let turned = 0;
   return {
@@ -26,7 +34,7 @@ export const compass = () => {
       box.fresh(shown);
       say(number, fixed(heading, 0));
       // The short way round.
-      turned += ((-(heading ?? 0) - turned) % 360 + 540) % 360 - 180;
+      turned += ((((-(heading ?? 0) - turned) % 360) + 540) % 360) - 180;
       attribute(rose, "transform", `rotate(${turned.toFixed(1)})`);
       attribute(picture, "aria-label", `Heading ${fixed(heading, 0)} degrees`);
     },

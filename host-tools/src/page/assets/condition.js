@@ -16,7 +16,13 @@ const facts = (id, title, rows, key) => {
   return {
     node: box.node,
     update(values) {
-      box.fresh(...[].concat(key).map((name) => values[name]).filter(Boolean).slice(0, 1));
+      box.fresh(
+        ...[]
+          .concat(key)
+          .map((name) => values[name])
+          .filter(Boolean)
+          .slice(0, 1),
+      );
       rows.forEach(([name, , , decimals, format], i) => {
         const shown = values[name];
         say(numbers[i], shown && format ? format(shown[0]) : fixed(shown?.[0], decimals));
@@ -35,29 +41,76 @@ export const condition = () => {
   const vibration = panel("vibration", "Vibration", [shaking.node, metrics.node, clipped]);
   const figure = (id, title) => ({ id, title, size: 1.5, decimals: 2 });
   const figures = bars([
-    figure("ekf_velocity", "Velocity"), figure("ekf_horizontal", "Horizontal"), figure("ekf_vertical", "Vertical"), figure("ekf_compass", "Compass"),
+    figure("ekf_velocity", "Velocity"),
+    figure("ekf_horizontal", "Horizontal"),
+    figure("ekf_vertical", "Vertical"),
+    figure("ekf_compass", "Compass"),
   ]);
   const estimator = panel("estimator", "Estimator (EKF)", figures.node);
-  const gnss = facts("gnss", "GNSS", [
-    ["fix", "Fix", "", 0, (fix) => FIXES[fix] ?? String(fix)], ["satellites", "Satellites", "", 0],
-    ["hdop", "HDOP", "", 2], ["accuracy", "Accuracy", "m", 2], ["gnss_speed", "Speed", "m/s", 2],
-  ], "fix");
-  const battery = facts("battery", "Battery and computer", [
-    ["battery_amperes", "Current", "A", 2], ["battery_consumed", "Consumed", "Ah", 3], ["battery_celsius", "Battery", "\u00b0C", 1],
-    ["rail_5v", "5 V rail", "V", 2], ["load", "Autopilot load", "%", 0],
-  ], ["battery_amperes", "load"]);
-  const radio = facts("radio", "Radio", [
-    ["rc_rssi", "RC signal", "", 0], ["radio_rssi", "Radio here", "", 0], ["radio_remote_rssi", "Radio there", "", 0], ["radio_noise", "Noise here", "", 0],
-  ], ["radio_rssi", "rc_rssi"]);
-  const engine = facts("engine-now", "Engine and speed sensors", [
-    ["engine_rpm", "Speed", "rpm", 0], ["engine_load", "Load", "%", 0], ["engine_fuel_flow", "Fuel flow", "", 2],
-    ["engine_fuel_consumed", "Fuel consumed", "", 1], ["engine_head_celsius", "Cylinder head", "\u00b0C", 0],
-    ["speed_sensor_0", "Sensor 1", "rpm", 0], ["speed_sensor_1", "Sensor 2", "rpm", 0],
-  ], ["engine_rpm", "speed_sensor_0"]);
-  const parts = [vibration.node, estimator.node, gnss.node, battery.node, radio.node, engine.node];
+  const gnss = facts(
+    "gnss",
+    "GNSS",
+    [
+      ["fix", "Fix", "", 0, (fix) => FIXES[fix] ?? String(fix)],
+      ["satellites", "Satellites", "", 0],
+      ["hdop", "HDOP", "", 2],
+      ["accuracy", "Accuracy", "m", 2],
+      ["gnss_speed", "Speed", "m/s", 2],
+    ],
+    "fix",
+  );
+  const wind = ["wind", "wind_from"].map((id) => el("b", { "data-value": id }));
+  const blows = panel(
+    "wind",
+    "Wind, by the autopilot",
+    el(
+      "dl",
+      { class: "facts" },
+      el("div", { class: "fact" }, el("dt", {}, "Speed"), el("dd", {}, wind[0], " m/s")),
+      el("div", { class: "fact" }, el("dt", {}, "From"), el("dd", {}, wind[1], "\u00b0")),
+    ),
+  );
+  const battery = facts(
+    "battery",
+    "Battery and computer",
+    [
+      ["battery_amperes", "Current", "A", 2],
+      ["battery_consumed", "Consumed", "Ah", 3],
+      ["battery_celsius", "Battery", "\u00b0C", 1],
+      ["rail_5v", "5 V rail", "V", 2],
+      ["load", "Autopilot load", "%", 0],
+    ],
+    ["battery_amperes", "load"],
+  );
+  const radio = facts(
+    "radio",
+    "Radio",
+    [
+      ["rc_rssi", "RC signal", "", 0],
+      ["radio_rssi", "Radio here", "", 0],
+      ["radio_remote_rssi", "Radio there", "", 0],
+      ["radio_noise", "Noise here", "", 0],
+    ],
+    ["radio_rssi", "rc_rssi"],
+  );
+  const engine = facts(
+    "engine-now",
+    "Engine and speed sensors",
+    [
+      ["engine_rpm", "Speed", "rpm", 0],
+      ["engine_load", "Load", "%", 0],
+      ["engine_fuel_flow", "Fuel flow", "", 2],
+      ["engine_fuel_consumed", "Fuel consumed", "", 1],
+      ["engine_head_celsius", "Cylinder head", "\u00b0C", 0],
+      ["speed_sensor_0", "Sensor 1", "rpm", 0],
+      ["speed_sensor_1", "Sensor 2", "rpm", 0],
+    ],
+    ["engine_rpm", "speed_sensor_0"],
+  );
+  const parts = [vibration.node, estimator.node, gnss.node, blows.node, battery.node, radio.node, engine.node];
   return {
     node: el("section", { class: "row", id: "condition" }, el("h2", {}, "Condition"), el("div", { class: "conditions" }, parts)),
-    update({ values, px4 }) {
+    update({ values, px4, now_s: now }) {
       const shown = [values.vibration_0, values.vibration_1, values.vibration_2];
       vibration.fresh(shown[0]);
       shaking.node.hidden = px4;
@@ -68,6 +121,12 @@ export const condition = () => {
       estimator.fresh(values.ekf_velocity);
       figures.update([values.ekf_velocity, values.ekf_horizontal, values.ekf_vertical, values.ekf_compass], flight.limits("Estimator"));
       for (const part of [gnss, battery, radio, engine]) part.update(values);
+      const speed = flight.value("Wind", 0, now),
+        from = flight.value("WindFrom", 0, now);
+      blows.node.hidden = flight.value("Wind", 0) == null;
+      blows.fresh(speed == null ? null : [speed, 0, 0]);
+      say(wind[0], fixed(speed, 1));
+      say(wind[1], fixed(from, 0));
       engine.node.hidden = !values.engine_rpm && !values.speed_sensor_0;
       radio.node.hidden = !values.rc_rssi && !values.radio_rssi;
     },

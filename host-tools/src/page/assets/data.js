@@ -14,6 +14,4 @@ flight.gaps = log.gaps.map((gap) => [gap.from_s ?? flight.start, gap.to_s ?? fli
 flight.flights = data.flights;
 
 const vehicle = log.vehicle;
-export const name = vehicle
-  ? `${vehicle.autopilot}${vehicle.firmware ? " " + vehicle.firmware : ""} ${vehicle.type}`
-  : "Vehicle unknown";
+export const name = vehicle ? `${vehicle.autopilot}${vehicle.firmware ? ` ${vehicle.firmware}` : ""} ${vehicle.type}` : "Vehicle unknown";

@@ -11,10 +11,12 @@ const usual = (numbers) => {
 const silence = (line) => Math.max(6 * usual(line.numbers), 6, 5 / flight.step);
 // The first place in a row that ascends whose value is not less.
 export const place = (row, wanted, of = (value) => value) => {
-  let low = 0, high = row.length;
+  let low = 0,
+    high = row.length;
   while (low < high) {
     const middle = (low + high) >> 1;
-    if (of(row[middle]) < wanted) low = middle + 1; else high = middle;
+    if (of(row[middle]) < wanted) low = middle + 1;
+    else high = middle;
   }
   return low;
 };
@@ -41,8 +43,25 @@ const takeSpans = (row, part) => {
 };
 
 export const flight = {
-  vehicle: null, version: 0, begin: 0, step: 1, start: 0, end: 1, last: 0, epoch_ms: null,
-  plots: new Map(), notes: [], notesGone: 0, track: [], phases: [], modes: [], parameters: new Map(), parametersLeftOut: 0, gaps: [], flights: [],
+  vehicle: null,
+  version: 0,
+  begin: 0,
+  step: 1,
+  start: 0,
+  end: 1,
+  last: 0,
+  epoch_ms: null,
+  plots: new Map(),
+  notes: [],
+  notesGone: 0,
+  track: [],
+  phases: [],
+  modes: [],
+  parameters: new Map(),
+  parametersLeftOut: 0,
+  tellsDefaults: false,
+  gaps: [],
+  flights: [],
   // Takes a part; returns the notes that are new since the page looks.
   take(part) {
     const anew = part.reset || part.vehicle !== flight.vehicle;
@@ -60,12 +79,14 @@ export const flight = {
     for (const point of part.track) flight.track.push(point);
     takeSpans(flight.phases, part.phases);
     takeSpans(flight.modes, part.modes);
-    for (const { name, values } of part.parameters) flight.parameters.set(name, values);
+    for (const { name, values, default: usual } of part.parameters) flight.parameters.set(name, { values, usual });
+    flight.tellsDefaults = part.tells_defaults;
     flight.parametersLeftOut = part.parameters_left_out;
     flight.notesGone = part.notes_gone;
     return anew ? [] : part.notes;
   },
-  limits: (id) => flight.plots.get(id)?.limits ?? null,
+  // Warning and critical of a gauge.
+  limits: (id) => flight.plots.get(id)?.limits[0] ?? null,
   // The numbers and names of a plot's lines that have a value by now.
   lines: (id) => (flight.plots.get(id)?.lines ?? []).filter(([number]) => lines.has(`${id}:${number}`)),
   // What a line says at a time, or last; null where it was silent then.
@@ -73,9 +94,10 @@ export const flight = {
     const line = lines.get(`${id}:${number}`);
     if (!line) return null;
     if (at == null) return line.values[line.values.length - 1];
-    const interval = (at - flight.begin) / flight.step, i = place(line.numbers, Math.floor(interval) + 1) - 1;
+    const interval = (at - flight.begin) / flight.step,
+      i = place(line.numbers, Math.floor(interval) + 1) - 1;
     if (i < 0 || interval - line.numbers[i] > silence(line)) return null;
-    return line.values[2 * i + (interval - line.numbers[i] < .5 ? 0 : 1)];
+    return line.values[2 * i + (interval - line.numbers[i] < 0.5 ? 0 : 1)];
   },
   // The lowest and the highest value of a line; null where it has none.
   extremes(id, number) {
@@ -84,21 +106,35 @@ export const flight = {
   },
   // Columns for uPlot: times, then a column a line, of a time. `undefined` is "goes on", `null` is "breaks".
   table(id, numbers, from, to) {
-    const first = Math.floor((from - flight.begin) / flight.step) - 1, end = Math.ceil((to - flight.begin) / flight.step) + 1;
+    const first = Math.floor((from - flight.begin) / flight.step) - 1,
+      end = Math.ceil((to - flight.begin) / flight.step) + 1;
     const parts = numbers.map((number) => {
       const line = lines.get(`${id}:${number}`);
       // One more on both sides: lines go on beyond the edge.
-      return line && { line, at: Math.max(place(line.numbers, first) - 1, 0), stop: place(line.numbers, end) + 1, silence: silence(line), last: null };
+      return (
+        line && {
+          line,
+          at: Math.max(place(line.numbers, first) - 1, 0),
+          stop: place(line.numbers, end) + 1,
+          silence: silence(line),
+          last: null,
+        }
+      );
     });
-    const times = [], columns = numbers.map(() => []);
+    const times = [],
+      columns = numbers.map(() => []);
     for (;;) {
       let next = Infinity;
-      for (const part of parts) if (part && part.at < Math.min(part.stop, part.line.numbers.length)) next = Math.min(next, part.line.numbers[part.at]);
+      for (const part of parts)
+        if (part && part.at < Math.min(part.stop, part.line.numbers.length)) next = Math.min(next, part.line.numbers[part.at]);
       if (next === Infinity) break;
-      times.push(flight.begin + (next + .25) * flight.step, flight.begin + (next + .75) * flight.step);
+      times.push(flight.begin + (next + 0.25) * flight.step, flight.begin + (next + 0.75) * flight.step);
       parts.forEach((part, i) => {
         const column = columns[i];
-        if (!part || part.at >= part.stop || part.line.numbers[part.at] !== next) { column.push(undefined, undefined); return; }
+        if (!part || part.at >= part.stop || part.line.numbers[part.at] !== next) {
+          column.push(undefined, undefined);
+          return;
+        }
         if (part.last != null && next - part.last > part.silence) {
           // The line breaks where nothing was heard: null in the last place that has no value.
           for (let k = column.length - 1; k >= 0 && column[k] === undefined; k--) column[k] = null;

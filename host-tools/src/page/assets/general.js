@@ -11,14 +11,23 @@ export const general = () => {
   const percent = gauge("battery_percent", "Battery", { unit: "%", high: 100 });
   const volts = stat("battery_volts", "Battery voltage", { unit: "V", line: "PackVolts" });
   const pressure = gauge("pressure", "Air pressure", { unit: "hPa", low: 500, high: 1100 });
-  const celsius = stat("temperature", "Barometer", { unit: "\u00b0C", decimals: 1, line: "Temperature" });
+  const celsius = stat("temperature", "Barometer", { unit: "\u00b0C", decimals: 1, line: "Temperature", numbers: [0, 3] });
   return {
-    node: el("section", { class: "row", id: "general" }, el("h2", {}, "General"),
-      el("div", { class: "instruments" }, [time, percent, volts, pressure, celsius].map((part) => part.node))),
+    node: el(
+      "section",
+      { class: "row", id: "general" },
+      el("h2", {}, "General"),
+      el(
+        "div",
+        { class: "instruments" },
+        [time, percent, volts, pressure, celsius].map((part) => part.node),
+      ),
+    ),
     update({ values, cells, now_s: now }) {
       time.update(values.flight_time, now);
       percent.update(values.battery_percent, flight.limits("PackPercent"));
-      const [warning, critical] = flight.limits("CellVolts") ?? [0, 0], lowest = Math.min(...cells);
+      const [warning, critical] = flight.limits("CellVolts") ?? [0, 0],
+        lowest = Math.min(...cells);
       // A pack that reports no cells has none to be judged by.
       const level = cells.length < 2 ? "" : lowest < critical ? "critical" : lowest < warning ? "warning" : "";
       volts.update(values.battery_volts, now, level);

@@ -9,11 +9,21 @@ const SUBSYSTEMS = ["power", "propulsion", "engine", "structure", "navigation", 
 
 export const board = () => {
   const rows = SUBSYSTEMS.map((name) => {
-    const level = badge(), reason = el("span", { class: "reason" }), by = el("small");
+    const level = badge(),
+      reason = el("span", { class: "reason" }),
+      by = el("small");
     const node = el("li", { "data-subsystem": name }, el("b", {}, name), level.node, el("div", {}, by, reason));
     return { node, level, reason, by };
   });
-  const box = panel("board", "Health", el("ul", { class: "board" }, rows.map((row) => row.node)));
+  const box = panel(
+    "board",
+    "Health",
+    el(
+      "ul",
+      { class: "board" },
+      rows.map((row) => row.node),
+    ),
+  );
   return {
     node: box.node,
     update({ board: parts }) {
@@ -30,11 +40,17 @@ export const board = () => {
 
 const DUE = { green: ["ok", "good"], yellow: ["warning", "soon"], red: ["critical", "due"] };
 const USAGE = [
-  ["flight_time_s", "In the air", clock, ""], ["flights", "Flights", whole, ""], ["armed_time_s", "Armed", clock, ""],
-  ["distance_m", "Distance", whole, "m"], ["height_max_m", "Greatest height", (v) => fixed(v, 1), "m"],
-  ["speed_max_m_s", "Greatest speed", (v) => fixed(v, 1), "m/s"], ["charge_ah", "Charge taken", (v) => fixed(v, 2), "Ah"],
-  ["energy_wh", "Energy taken", (v) => fixed(v, 1), "Wh"], ["voltage_min_v", "Lowest voltage", (v) => fixed(v, 2), "V"],
-  ["current_max_a", "Highest current", (v) => fixed(v, 1), "A"], ["hard_landings", "Hard landings", whole, ""],
+  ["flight_time_s", "In the air", clock, ""],
+  ["flights", "Flights", whole, ""],
+  ["armed_time_s", "Armed", clock, ""],
+  ["distance_m", "Distance", whole, "m"],
+  ["height_max_m", "Greatest height", (v) => fixed(v, 1), "m"],
+  ["speed_max_m_s", "Greatest speed", (v) => fixed(v, 1), "m/s"],
+  ["charge_ah", "Charge taken", (v) => fixed(v, 2), "Ah"],
+  ["energy_wh", "Energy taken", (v) => fixed(v, 1), "Wh"],
+  ["voltage_min_v", "Lowest voltage", (v) => fixed(v, 2), "V"],
+  ["current_max_a", "Highest current", (v) => fixed(v, 1), "A"],
+  ["hard_landings", "Hard landings", whole, ""],
   ["load_factor_max_g", "Load factor", (v) => fixed(v, 2), "g"],
 ];
 
@@ -44,10 +60,23 @@ export const usage = () => {
     return { name, format, number, node: el("div", { class: "fact" }, el("dt", {}, label), el("dd", {}, number, unit ? ` ${unit}` : "")) };
   });
   const due = el("ul", { class: "due" });
-  const none = el("p", { class: "dim small" },
+  const none = el(
+    "p",
+    { class: "dim small" },
     "No part is described. A log tells its own, a box on the link does when it is asked for its parameters, or a file does: ",
-    el("span", { class: "word" }, "--params"), ".");
-  const box = panel("usage", "Usage of this session", [el("dl", { class: "facts two" }, rows.map((row) => row.node)), el("h4", {}, "Due"), due, none]);
+    el("span", { class: "word" }, "--params"),
+    ".",
+  );
+  const box = panel("usage", "Usage of this session", [
+    el(
+      "dl",
+      { class: "facts two" },
+      rows.map((row) => row.node),
+    ),
+    el("h4", {}, "Due"),
+    due,
+    none,
+  ]);
   let parts = [];
   return {
     node: box.node,
@@ -59,19 +88,23 @@ export const usage = () => {
       none.hidden = components.length > 0;
       if (parts.length !== components.length) {
         parts = components.map(() => {
-          const level = badge(), name = el("b"), text = el("span", { class: "reason" });
+          const level = badge(),
+            name = el("b"),
+            text = el("span", { class: "reason" });
           return { level, name, text, node: el("li", {}, name, level.node, text) };
         });
         due.replaceChildren(...parts.map((part) => part.node));
       }
       components.forEach((component, i) => {
-        const { level, name, text } = parts[i], used = component.used_percent;
-        say(name, `${component.kind}${component.number ? " " + component.number : ""}${component.name ? " " + component.name : ""}`);
+        const { level, name, text } = parts[i],
+          used = component.used_percent;
+        say(name, `${component.kind}${component.number ? ` ${component.number}` : ""}${component.name ? ` ${component.name}` : ""}`);
         // What it ran before is not known on every link: then it may be due without our knowing.
         const partial = !component.life && component.status === "green" && used != null;
         const [known, word] = DUE[component.status];
         level.set(partial ? "stale" : known, partial ? "life unknown" : word);
-        const since = component.life ? "" : " in this session", part = used == null ? "no limit" : fixed(used, 0) + " % used";
+        const since = component.life ? "" : " in this session",
+          part = used == null ? "no limit" : `${fixed(used, 0)} % used`;
         say(text, `${part}, ${fixed(component.flight_h, 2)} h, ${whole(component.flights)} flights${since}`);
       });
     },
@@ -81,27 +114,54 @@ export const usage = () => {
 export const link = () => {
   const pairs = (names) => {
     const numbers = names.map(([id]) => el("b", { "data-value": id }));
-    return [numbers, el("dl", { class: "facts" }, names.map(([, label], i) => el("div", { class: "fact" }, el("dt", {}, label), el("dd", {}, numbers[i]))))];
+    return [
+      numbers,
+      el(
+        "dl",
+        { class: "facts" },
+        names.map(([, label], i) => el("div", { class: "fact" }, el("dt", {}, label), el("dd", {}, numbers[i]))),
+      ),
+    ];
   };
   const [numbers, list] = pairs([
-    ["link:rate", "Frames"], ["link:loss", "Lost, last 10 s"], ["link:missing", "Missing in all"],
-    ["link:heard", "Autopilot heard"], ["link:reboots", "Autopilot reboots"],
+    ["link:rate", "Frames"],
+    ["link:loss", "Lost, last 10 s"],
+    ["link:missing", "Missing in all"],
+    ["link:heard", "Autopilot heard"],
+    ["link:reboots", "Autopilot reboots"],
   ]);
-  const recorder = badge(), told = el("span", { class: "reason" });
-  const [points, database] = pairs([["influx:written", "Points written"], ["influx:waiting", "Waiting"]]);
+  const recorder = badge(),
+    told = el("span", { class: "reason" });
+  const [points, database] = pairs([
+    ["influx:written", "Points written"],
+    ["influx:waiting", "Waiting"],
+  ]);
   const trouble = el("p", { class: "small" });
   const stored = el("div", { hidden: true }, el("h4", {}, "Database"), database, trouble);
-  const box = panel("link", "Recorder and link", [el("p", { class: "recorder" }, el("b", {}, "Recorder"), recorder.node, told), list, stored]);
+  const box = panel("link", "Recorder and link", [
+    el("p", { class: "recorder" }, el("b", {}, "Recorder"), recorder.node, told),
+    list,
+    stored,
+  ]);
   return {
     node: box.node,
     update(state, head) {
       const { link: figures, companion } = state;
-      if (!companion) { recorder.set("stale", "not heard"); say(told, "no HUMS speaks on this link"); }
-      else if (companion.gone) { recorder.set("stale", "gone"); say(told, `last heard ${age(companion.heard_ms)} ago`); }
-      else {
-        recorder.set(companion.recorder ?? "stale", companion.recorder == null ? "not told" : companion.recorder === "ok" ? "recording" : companion.recorder);
-        const counted = [companion.flight_s == null ? "" : `${clock(companion.flight_s)} in the air`,
-          companion.flights == null ? "" : companion.flights === 1 ? "1 flight" : `${whole(companion.flights)} flights`].filter(Boolean);
+      if (!companion) {
+        recorder.set("stale", "not heard");
+        say(told, "no HUMS speaks on this link");
+      } else if (companion.gone) {
+        recorder.set("stale", "gone");
+        say(told, `last heard ${age(companion.heard_ms)} ago`);
+      } else {
+        recorder.set(
+          companion.recorder ?? "stale",
+          companion.recorder == null ? "not told" : companion.recorder === "ok" ? "recording" : companion.recorder,
+        );
+        const counted = [
+          companion.flight_s == null ? "" : `${clock(companion.flight_s)} in the air`,
+          companion.flights == null ? "" : companion.flights === 1 ? "1 flight" : `${whole(companion.flights)} flights`,
+        ].filter(Boolean);
         say(told, counted.length ? `on board: ${counted.join(", ")}` : "");
       }
       say(numbers[0], `${fixed(head.frames_s, 0)} /s, ${whole(figures.frames)} in all`);

@@ -7,15 +7,36 @@ export const bar = el("div");
 document.getElementById("nav").append(bar);
 // `host` is where it stands, `before` which one it stands before.
 export const section = (id, title, host = main, before = null) => {
-  const link = el("a", { href: "#" + id }, title);
+  const link = el("a", { href: `#${id}` }, title);
   bar.insertBefore(link, before ? bar.querySelector(`[href="#${before.id}"]`) : bar.querySelector(".back"));
   const node = el("section", { id, class: "row" }, el("h2", {}, title));
   host.insertBefore(node, before);
   return node;
 };
-export const rows = (headings, body, options = {}) => el("table", options,
-  el("thead", {}, el("tr", {}, headings.map(([text, kind]) => el("th", { class: kind || "", scope: "col" }, text)))),
-  el("tbody", {}, body));
-export const cells = (values, kinds, attributes = {}) => el("tr", attributes, values.map((value, i) => el("td", { class: kinds[i] || "" }, value)));
-export const facts = (pairs) => el("dl", { class: "list" },
-  pairs.filter(([, value]) => value != null && value !== "").flatMap(([key, value]) => [el("dt", {}, key), el("dd", {}, value)]));
+export const rows = (headings, body, options = {}) =>
+  el(
+    "table",
+    options,
+    el(
+      "thead",
+      {},
+      el(
+        "tr",
+        {},
+        headings.map(([text, kind]) => el("th", { class: kind || "", scope: "col" }, text)),
+      ),
+    ),
+    el("tbody", {}, body),
+  );
+export const cells = (values, kinds, attributes = {}) =>
+  el(
+    "tr",
+    attributes,
+    values.map((value, i) => el("td", { class: kinds[i] || "" }, value)),
+  );
+export const facts = (pairs) =>
+  el(
+    "dl",
+    { class: "list" },
+    pairs.filter(([, value]) => value != null && value !== "").flatMap(([key, value]) => [el("dt", {}, key), el("dd", {}, value)]),
+  );

@@ -5,7 +5,9 @@ const AGAIN_MS = 1000;
 export const connect = (take, changed) => {
   const token = new URLSearchParams(location.hash.slice(1)).get("token");
   const address = `ws://${location.host}/ws${token ? `?token=${encodeURIComponent(token)}` : ""}`;
-  let socket = null, vehicle = null, failures = 0;
+  let socket = null,
+    vehicle = null,
+    failures = 0;
   const open = () => {
     socket = new WebSocket(address);
     socket.onopen = () => {
@@ -20,10 +22,15 @@ export const connect = (take, changed) => {
       setTimeout(open, AGAIN_MS);
     };
   };
-  const send = (command) => { if (socket?.readyState === WebSocket.OPEN) socket.send(JSON.stringify(command)); };
+  const send = (command) => {
+    if (socket?.readyState === WebSocket.OPEN) socket.send(JSON.stringify(command));
+  };
   open();
   return {
     send,
-    follow: (system) => { vehicle = system; send({ cmd: "vehicle", system }); },
+    follow: (system) => {
+      vehicle = system;
+      send({ cmd: "vehicle", system });
+    },
   };
 };

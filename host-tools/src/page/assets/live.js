@@ -24,39 +24,63 @@ import { back, cursorTime, follow, lookAt, usually } from "./view.js";
 
 const root = document.documentElement;
 const speaker = sound();
-let head = null, state = null, marks = {}, connected = false, lostAt = null, anew = false, dirty = false, failures = 0, tokenGiven = false;
+let head = null,
+  state = null,
+  marks = {},
+  connected = false,
+  lostAt = null,
+  anew = false,
+  dirty = false,
+  failures = 0,
+  tokenGiven = false;
 // The session begins where the first thing was heard.
 let begun = false;
 
 // ---- What plots show while nobody has looked closer.
-const WINDOWS = [["1 min", 60], ["5 min", 300], ["whole flight", Infinity]];
-let shownWindow = 0, shownAt = 0;
+const WINDOWS = [
+  ["1 min", 60],
+  ["5 min", 300],
+  ["whole flight", Infinity],
+];
+let shownWindow = 0,
+  shownAt = 0;
 usually(() => {
-  const [, seconds] = WINDOWS[shownWindow], from = Math.max(flight.start, shownAt - seconds);
+  const [, seconds] = WINDOWS[shownWindow],
+    from = Math.max(flight.start, shownAt - seconds);
   return [from, Math.max(shownAt, from + Math.min(seconds, 10))];
 });
 
 // ---- Head.
-const overall = badge(), name = el("h1", {}, "HUMS"), facts = el("p", { class: "facts-line" }), picture = badge();
-const armed = el("b", { class: "chip", "data-value": "armed" }), phase = el("b", { class: "chip", "data-value": "phase" });
+const overall = badge(),
+  name = el("h1", {}, "HUMS"),
+  facts = el("p", { class: "facts-line" }),
+  picture = badge();
+const armed = el("b", { class: "chip", "data-value": "armed" }),
+  phase = el("b", { class: "chip", "data-value": "phase" });
 const vehicles = el("div", { class: "vehicles", role: "group", "aria-label": "Vehicles" });
 const speak = el("button", { type: "button", "aria-pressed": "false", title: "Findings aloud (M)", onclick: () => loud() }, "Sound off");
 const range = el("button", { type: "button", title: "What plots show (W)", onclick: () => nextWindow() }, "");
 const asked = el("button", { type: "button", title: "Keys (?)", "aria-label": "Help", onclick: () => shortcuts.help() }, "?");
-document.getElementById("head").append(
-  el("div", { class: "who" }, overall.node, el("div", {}, name, facts)),
-  el("div", { class: "chips" }, armed, phase, picture.node),
-  vehicles, el("div", { class: "tools" }, back, range, speak, asked));
+document
+  .getElementById("head")
+  .append(
+    el("div", { class: "who" }, overall.node, el("div", {}, name, facts)),
+    el("div", { class: "chips" }, armed, phase, picture.node),
+    vehicles,
+    el("div", { class: "tools" }, back, range, speak, asked),
+  );
 overall.node.id = "overall";
 picture.node.id = "source";
 
 // ---- Body.
-const rows = [general(), esc(), movement(), condition()], sides = [board(), usage(), link()], body = el("div", { class: "rows" });
+const rows = [general(), esc(), movement(), condition()],
+  sides = [board(), usage(), link()],
+  body = el("div", { class: "rows" });
 const wire = connect(take, (now, count, token) => {
   connected = now;
   failures = count;
   tokenGiven = token;
-  lostAt = now ? null : lostAt ?? performance.now();
+  lostAt = now ? null : (lostAt ?? performance.now());
   stir();
 });
 const time = player((command) => wire.send(command), stir);
@@ -64,7 +88,9 @@ const go = (at) => {
   if (!time.recording) lookAt(at);
   time.seek(at);
 };
-const log = notes({ go, newestFirst: true, rows: 200 }), strip = timeline(go), told = parameters();
+const log = notes({ go, newestFirst: true, rows: 200 }),
+  strip = timeline(go),
+  told = parameters();
 document.getElementById("player").append(time.node);
 const notice = document.getElementById("notice");
 for (const { node } of rows) {
@@ -89,7 +115,10 @@ const nextWindow = () => {
   stir();
 };
 say(range, `Plots: ${WINDOWS[0][0]}`);
-const choose = (index) => { const one = head?.vehicles[index]; if (one) wire.follow(one.system); };
+const choose = (index) => {
+  const one = head?.vehicles[index];
+  if (one) wire.follow(one.system);
+};
 const shortcuts = keys({ player: time, sound: loud, window: nextWindow, vehicle: choose });
 
 function take(message, text) {
@@ -116,8 +145,14 @@ function stir() {
 }
 
 const SOURCES = {
-  waiting: "stale", live: "ok", silent: "stale", lost: "critical", reading: "advisory", playing: "ok",
-  paused: "advisory", ended: "advisory",
+  waiting: "stale",
+  live: "ok",
+  silent: "stale",
+  lost: "critical",
+  reading: "advisory",
+  playing: "ok",
+  paused: "advisory",
+  ended: "advisory",
 };
 
 const NO_ANSWER = "hums does not answer, or wants the token that stands in the address that it printed.";
@@ -125,11 +160,13 @@ const NO_ANSWER = "hums does not answer, or wants the token that stands in the a
 const drawHead = () => {
   const { source } = head;
   const said = source.phase === "reading" ? `reading ${whole(source.progress * 100)} %` : source.phase;
-  picture.set(connected ? SOURCES[source.phase] ?? "stale" : "critical", connected ? said : "no connection");
+  picture.set(connected ? (SOURCES[source.phase] ?? "stale") : "critical", connected ? said : "no connection");
   const utc = head.utc_ms == null ? "" : ` \u00b7 ${new Date(head.utc_ms).toISOString().slice(0, 19).replace("T", " ")} UTC`;
   say(facts, `${source.name}${utc}`);
   if (vehicles.children.length !== (head.vehicles.length > 1 ? head.vehicles.length : 0)) {
-    vehicles.replaceChildren(...(head.vehicles.length > 1 ? head.vehicles : []).map((_, i) => el("button", { type: "button", onclick: () => choose(i) })));
+    vehicles.replaceChildren(
+      ...(head.vehicles.length > 1 ? head.vehicles : []).map((_, i) => el("button", { type: "button", onclick: () => choose(i) })),
+    );
   }
   [...vehicles.children].forEach((button, i) => {
     const one = head.vehicles[i];
@@ -142,14 +179,25 @@ const drawHead = () => {
   toggle(root, "playing-back", time.recording);
   const silent = state && state.heard_ms > 3000 && source.phase !== "reading";
   const refused = failures > 3 && lostAt && !head.now_s && !tokenGiven;
-  const text = !connected ? refused ? NO_ANSWER : `No connection to hums: what stands here is ${age(performance.now() - (lostAt ?? 0))} old.`
-    : source.phase === "reading" ? `Reading ${source.name}: ${whole(source.progress * 100)} %`
-    : source.phase === "lost" ? `The link is lost, and tried again every second: ${source.words}`
-    : source.words ? source.words
-    : source.phase === "waiting" ? `Waiting for the first frame on ${source.name}.`
-    : !state ? "Frames come, but no autopilot's heartbeat yet."
-    : silent ? `The autopilot has been silent for ${age(state.heard_ms)}: values are its last ones.`
-    : time.held ? "Paused: instruments and plots show an earlier moment. Level, findings and link are of now." : "";
+  const text = !connected
+    ? refused
+      ? NO_ANSWER
+      : `No connection to hums: what stands here is ${age(performance.now() - (lostAt ?? 0))} old.`
+    : source.phase === "reading"
+      ? `Reading ${source.name}: ${whole(source.progress * 100)} %`
+      : source.phase === "lost"
+        ? `The link is lost, and tried again every second: ${source.words}`
+        : source.words
+          ? source.words
+          : source.phase === "waiting"
+            ? `Waiting for the first frame on ${source.name}.`
+            : !state
+              ? "Frames come, but no autopilot's heartbeat yet."
+              : silent
+                ? `The autopilot has been silent for ${age(state.heard_ms)}: values are its last ones.`
+                : time.held
+                  ? "Paused: instruments and plots show an earlier moment. Level, findings and link are of now."
+                  : "";
   notice.hidden = !text;
   say(notice, text);
   // What was last heard of the vehicle is not known to be so any longer.
@@ -161,8 +209,8 @@ const drawHead = () => {
 };
 
 const drawState = () => {
-  say(name, `${state.name}${state.firmware ? " " + state.firmware : ""}`);
-  if (connected) document.title = `${state.overall === "ok" ? "" : state.overall.toUpperCase() + " \u00b7 "}${state.name} \u00b7 HUMS live`;
+  say(name, `${state.name}${state.firmware ? ` ${state.firmware}` : ""}`);
+  if (connected) document.title = `${state.overall === "ok" ? "" : `${state.overall.toUpperCase()} \u00b7 `}${state.name} \u00b7 HUMS live`;
   if (connected) overall.set(state.overall);
   if (!begun) {
     begun = true;
@@ -202,5 +250,7 @@ function draw() {
   root.dataset.now = (time.held ?? state)?.now_s ?? "";
 }
 // Ages go on while nothing comes.
-setInterval(() => { if (!connected) stir(); }, 500);
+setInterval(() => {
+  if (!connected) stir();
+}, 500);
 toggle(root, "unknown", true);

@@ -7,50 +7,79 @@ import { flight, place } from "./flight.js";
 import { fixed } from "./text.js";
 import { view, whenCursorMoves, whenViewChanges } from "./view.js";
 
-const EVERY_MS = 100, METRES = 111320, MARGIN = 34;
+const EVERY_MS = 100,
+  METRES = 111320,
+  MARGIN = 34;
 // Nobody flies in a window smaller than this: noise is not blown up.
 const SPAN_MIN_M = 20;
 // Viridis, from five of its colours.
-const VIRIDIS = [[68, 1, 84], [59, 82, 139], [33, 145, 140], [94, 201, 98], [253, 231, 37]];
+const VIRIDIS = [
+  [68, 1, 84],
+  [59, 82, 139],
+  [33, 145, 140],
+  [94, 201, 98],
+  [253, 231, 37],
+];
 const shade = (part) => {
-  const at = Math.min(Math.max(part, 0), 1) * (VIRIDIS.length - 1), i = Math.min(Math.floor(at), VIRIDIS.length - 2);
+  const at = Math.min(Math.max(part, 0), 1) * (VIRIDIS.length - 1),
+    i = Math.min(Math.floor(at), VIRIDIS.length - 2);
   return `rgb(${VIRIDIS[i].map((c, k) => Math.round(c + (VIRIDIS[i + 1][k] - c) * (at - i))).join(",")})`;
 };
-const bounds = (row) => row.reduce(([low, high], v) => v == null ? [low, high] : [Math.min(low, v), Math.max(high, v)], [Infinity, -Infinity]);
+const bounds = (row) =>
+  row.reduce(([low, high], v) => (v == null ? [low, high] : [Math.min(low, v), Math.max(high, v)]), [Infinity, -Infinity]);
 
 export const map = () => {
   const surface = el("canvas", { class: "map", id: "map", role: "img", "aria-label": "Track over ground, north is up" });
   const node = el("div", { class: "mapped" }, surface);
   const legend = el("p", { class: "legend" });
-  let drawn = "", drawnAt = 0, here = null;
+  let drawn = "",
+    drawnAt = 0,
+    here = null;
   const paint = () => {
-    const width = node.clientWidth || 300, height = node.clientHeight || 220, { track } = flight;
+    const width = node.clientWidth || 300,
+      height = node.clientHeight || 220,
+      { track } = flight;
     const ctx = canvas(surface, width, height);
     if (!track.length) return;
-    const [, lat0, lon0] = track[0], shrink = Math.cos(lat0 * Math.PI / 180);
+    const [, lat0, lon0] = track[0],
+      shrink = Math.cos((lat0 * Math.PI) / 180);
     const metres = ([, lat, lon]) => [(lon - lon0) * METRES * shrink, (lat - lat0) * METRES];
     const points = track.map(metres);
     if (here) points.push(metres([0, ...here.place]));
-    const [west, east] = bounds(points.map(([e]) => e)), [south, north] = bounds(points.map(([, n]) => n)), [low, high] = bounds(track.map((p) => p[3]));
-    const scale = Math.min((width - 2 * MARGIN) / Math.max(east - west, SPAN_MIN_M), (height - 2 * MARGIN) / Math.max(north - south, SPAN_MIN_M));
-    const x = (e) => width / 2 + (e - (west + east) / 2) * scale, y = (n) => height / 2 - (n - (south + north) / 2) * scale;
+    const [west, east] = bounds(points.map(([e]) => e)),
+      [south, north] = bounds(points.map(([, n]) => n)),
+      [low, high] = bounds(track.map((p) => p[3]));
+    const scale = Math.min(
+      (width - 2 * MARGIN) / Math.max(east - west, SPAN_MIN_M),
+      (height - 2 * MARGIN) / Math.max(north - south, SPAN_MIN_M),
+    );
+    const x = (e) => width / 2 + (e - (west + east) / 2) * scale,
+      y = (n) => height / 2 - (n - (south + north) / 2) * scale;
     // Squares of a round size, for a feeling of distance.
-    const power = 10 ** Math.floor(Math.log10(90 / scale)), square = [5, 2, 1].map((n) => n * power).find((n) => n <= 90 / scale) ?? power;
+    const power = 10 ** Math.floor(Math.log10(90 / scale)),
+      square = [5, 2, 1].map((n) => n * power).find((n) => n <= 90 / scale) ?? power;
     ctx.strokeStyle = colour("rule");
     ctx.lineWidth = 1;
     ctx.beginPath();
     const first = (middle, size) => Math.ceil((middle - size / 2 / scale) / square) * square;
-    for (let e = first((west + east) / 2, width); x(e) < width; e += square) { ctx.moveTo(x(e), 0); ctx.lineTo(x(e), height); }
-    for (let n = first((south + north) / 2, height); y(n) > 0; n += square) { ctx.moveTo(0, y(n)); ctx.lineTo(width, y(n)); }
+    for (let e = first((west + east) / 2, width); x(e) < width; e += square) {
+      ctx.moveTo(x(e), 0);
+      ctx.lineTo(x(e), height);
+    }
+    for (let n = first((south + north) / 2, height); y(n) > 0; n += square) {
+      ctx.moveTo(0, y(n));
+      ctx.lineTo(width, y(n));
+    }
     ctx.stroke();
     ctx.lineCap = ctx.lineJoin = "round";
     for (let i = 1; i < track.length; i++) {
-      const [from, to] = [track[i - 1][0], track[i][0]], silent = to - from > Math.max(5, 8 * flight.step);
+      const [from, to] = [track[i - 1][0], track[i][0]],
+        silent = to - from > Math.max(5, 8 * flight.step);
       const inside = !view.away || (to >= view.from && from <= view.to);
-      ctx.globalAlpha = inside ? 1 : .25;
+      ctx.globalAlpha = inside ? 1 : 0.25;
       ctx.lineWidth = inside ? 2.5 : 1.5;
       ctx.setLineDash(silent ? [3, 5] : []);
-      ctx.strokeStyle = shade(track[i][3] == null ? .4 : (track[i][3] - low) / Math.max(high - low, 1));
+      ctx.strokeStyle = shade(track[i][3] == null ? 0.4 : (track[i][3] - low) / Math.max(high - low, 1));
       ctx.beginPath();
       ctx.moveTo(x(points[i - 1][0]), y(points[i - 1][1]));
       ctx.lineTo(x(points[i][0]), y(points[i][1]));
@@ -58,7 +87,13 @@ export const map = () => {
     }
     ctx.globalAlpha = 1;
     ctx.setLineDash([]);
-    const near = (at) => points[Math.min(place(track, at, ([time]) => time), track.length - 1)];
+    const near = (at) =>
+      points[
+        Math.min(
+          place(track, at, ([time]) => time),
+          track.length - 1,
+        )
+      ];
     const spot = ([e, n], paint, size) => {
       ctx.beginPath();
       ctx.arc(x(e), y(n), size, 0, 7);
@@ -70,7 +105,8 @@ export const map = () => {
     };
     const label = ([e, n], text, up) => {
       const wide = ctx.measureText(text).width;
-      const left = Math.min(Math.max(x(e) + 8, 4), width - wide - 6), top = Math.min(Math.max(y(n) + (up ? -8 : 18), 14), height - 6);
+      const left = Math.min(Math.max(x(e) + 8, 4), width - wide - 6),
+        top = Math.min(Math.max(y(n) + (up ? -8 : 18), 14), height - 6);
       ctx.lineWidth = 3;
       ctx.strokeStyle = colour("soft");
       ctx.strokeText(text, left, top);
@@ -81,21 +117,30 @@ export const map = () => {
     flight.flights.slice(0, 9).forEach((f, i) => {
       const number = flight.flights.length > 1 ? ` ${i + 1}` : "";
       spot(near(f.from_s), PHASES.take_off, 5);
-      label(near(f.from_s), "take-off" + number, true);
-      if (f.landed) { spot(near(f.to_s), PHASES.landing, 5); label(near(f.to_s), "landing" + number, false); }
+      label(near(f.from_s), `take-off${number}`, true);
+      if (f.landed) {
+        spot(near(f.to_s), PHASES.landing, 5);
+        label(near(f.to_s), `landing${number}`, false);
+      }
     });
     if (view.cursor != null) spot(near(view.cursor), colour("accent"), 7);
     if (here) {
       const [e, n] = points[points.length - 1];
       ctx.save();
       ctx.translate(x(e), y(n));
-      ctx.rotate((here.heading ?? 0) * Math.PI / 180);
+      ctx.rotate(((here.heading ?? 0) * Math.PI) / 180);
       ctx.fillStyle = colour("ink");
       ctx.strokeStyle = colour("panel");
       ctx.lineWidth = 2;
       ctx.beginPath();
       if (here.heading == null) ctx.arc(0, 0, 5, 0, 7);
-      else { ctx.moveTo(0, -11); ctx.lineTo(7, 8); ctx.lineTo(0, 4); ctx.lineTo(-7, 8); ctx.closePath(); }
+      else {
+        ctx.moveTo(0, -11);
+        ctx.lineTo(7, 8);
+        ctx.lineTo(0, 4);
+        ctx.lineTo(-7, 8);
+        ctx.closePath();
+      }
       ctx.fill();
       ctx.stroke();
       ctx.restore();
@@ -104,7 +149,10 @@ export const map = () => {
     ctx.strokeStyle = ctx.fillStyle = colour("dim");
     ctx.lineWidth = 2;
     ctx.beginPath();
-    ctx.moveTo(14, height - 18); ctx.lineTo(14, height - 12); ctx.lineTo(14 + bar, height - 12); ctx.lineTo(14 + bar, height - 18);
+    ctx.moveTo(14, height - 18);
+    ctx.lineTo(14, height - 12);
+    ctx.lineTo(14 + bar, height - 12);
+    ctx.lineTo(14 + bar, height - 18);
     ctx.stroke();
     ctx.font = FONT;
     ctx.fillText(square >= 1000 ? `${square / 1000} km` : `${square} m`, 20, height - 18);
@@ -112,13 +160,17 @@ export const map = () => {
     legend.replaceChildren(
       el("span", {}, "from the start ", el("b", {}, fixed(Math.hypot(...away), 0)), " m"),
       Number.isFinite(low) ? el("span", {}, `height ${fixed(low, 0)} to ${fixed(high, 0)} m, from blue to yellow`) : "",
-      el("span", {}, `begins at ${fixed(lat0, 7)}\u00b0, ${fixed(lon0, 7)}\u00b0`), el("span", { class: "dim" }, "north is up"));
+      el("span", {}, `begins at ${fixed(lat0, 7)}\u00b0, ${fixed(lon0, 7)}\u00b0`),
+      el("span", { class: "dim" }, "north is up"),
+    );
   };
   const self = {
-    node, legend,
+    node,
+    legend,
     // Where the vehicle is now, where that is known: degrees.
     update(vehicle = null, now = false) {
-      const time = performance.now(), key = [flight.version, JSON.stringify(vehicle), view.cursor, view.from, view.away, node.clientWidth].join();
+      const time = performance.now(),
+        key = [flight.version, JSON.stringify(vehicle), view.cursor, view.from, view.away, node.clientWidth].join();
       if (!now && (time - drawnAt < EVERY_MS || key === drawn)) return;
       [drawn, drawnAt, here] = [key, time, vehicle];
       paint();

@@ -12,10 +12,23 @@ import { chart } from "./plot.js";
 
 const place = () => {
   const numbers = ["latitude", "longitude"].map((id) => el("b", { "data-value": id }));
-  const height = el("b", { "data-value": "height" }), altitude = el("b", { "data-value": "altitude" });
-  const box = panel("place", "Position", el("dl", { class: "place" },
-    [["Latitude", numbers[0], "\u00b0"], ["Longitude", numbers[1], "\u00b0"], ["Above sea level", altitude, " m"], ["Above home", height, " m"]]
-      .map(([name, number, unit]) => el("div", {}, el("dt", {}, name), el("dd", {}, number, unit)))), { class: "instrument" });
+  const height = el("b", { "data-value": "height" }),
+    altitude = el("b", { "data-value": "altitude" });
+  const box = panel(
+    "place",
+    "Position",
+    el(
+      "dl",
+      { class: "place" },
+      [
+        ["Latitude", numbers[0], "\u00b0"],
+        ["Longitude", numbers[1], "\u00b0"],
+        ["Above sea level", altitude, " m"],
+        ["Above home", height, " m"],
+      ].map(([name, number, unit]) => el("div", {}, el("dt", {}, name), el("dd", {}, number, unit))),
+    ),
+    { class: "instrument" },
+  );
   return {
     node: box.node,
     update({ values }) {
@@ -53,21 +66,38 @@ export const movement = () => {
     ["climb", gauge("climb", "Climb rate", { unit: "m/s", low: -10, high: 10, decimals: 1 })],
     ["throttle", gauge("throttle", "Throttle", { unit: "%", high: 100 })],
   ];
-  const views = [horizon(), compass()], track = map(), rest = [place(), acceleration()];
+  const views = [horizon(), compass()],
+    track = map(),
+    rest = [place(), acceleration()];
   const around = panel("map", "Track", [track.node, track.legend], { class: "wide" });
-  const height = chart("Height", "Height above home"), velocity = chart("Velocity", "NED velocity");
+  const height = chart("Height", "Height above home"),
+    velocity = chart("Velocity", "NED velocity");
   return {
-    node: el("section", { class: "row", id: "movement" }, el("h2", {}, "Movement"),
+    node: el(
+      "section",
+      { class: "row", id: "movement" },
+      el("h2", {}, "Movement"),
       el("div", { class: "views" }, views[0].node, around.node),
-      el("div", { class: "instruments" }, views[1].node, speeds.map(([, part]) => part.node)),
-      el("div", { class: "pairs" }, rest.map((part) => part.node)),
-      el("div", { class: "plots" }, height.node, velocity.node)),
+      el(
+        "div",
+        { class: "instruments" },
+        views[1].node,
+        speeds.map(([, part]) => part.node),
+      ),
+      el(
+        "div",
+        { class: "pairs" },
+        rest.map((part) => part.node),
+      ),
+      el("div", { class: "plots" }, height.node, velocity.node),
+    ),
     update(state) {
       const { values } = state;
       for (const [name, part] of speeds) part.update(values[name]);
       views[0].update(state);
       views[1].update(state);
-      const { latitude, longitude } = values, known = latitude?.[0] != null && longitude?.[0] != null;
+      const { latitude, longitude } = values,
+        known = latitude?.[0] != null && longitude?.[0] != null;
       around.fresh(latitude);
       track.update(known ? { place: [latitude[0], longitude[0]], heading: (values.heading ?? values.yaw)?.[0] } : null);
       for (const part of rest) part.update(state);

@@ -9,16 +9,19 @@ import { utc } from "./view.js";
 
 const quantity = (value, unit) => `${short(value)} ${unit}`.trim();
 // What a check measured, and against what.
-const measured = ({ value, state, limit, unit, previous }) => [
-  state ?? (value == null ? "" : quantity(value, unit)), limit == null ? "" : `limit ${quantity(limit, unit)}`, `was ${previous}`,
-].filter(Boolean).join(", ");
+const measured = ({ value, state, limit, unit, previous }) =>
+  [state ?? (value == null ? "" : quantity(value, unit)), limit == null ? "" : `limit ${quantity(limit, unit)}`, `was ${previous}`]
+    .filter(Boolean)
+    .join(", ");
 
 // `rows` are on the page at most, the newest first or last. A click on one goes there.
 export const notes = ({ go, newestFirst, rows = Infinity }) => {
   const list = el("ol", { class: "notes", role: "log", "aria-live": newestFirst ? "polite" : "off", "aria-relevant": "additions" });
   const empty = el("p", { class: "dim empty" }, "Nothing yet: every change of a check's level stands here.");
   const more = el("p", { class: "dim", hidden: true });
-  let only = false, shown = null, count = 0;
+  let only = false,
+    shown = null,
+    count = 0;
   const filter = el("button", { type: "button", "aria-pressed": "false", onclick: () => show(!only) }, "findings only");
   const show = (on) => {
     only = on;
@@ -27,17 +30,49 @@ export const notes = ({ go, newestFirst, rows = Infinity }) => {
   };
   const box = panel("notes", "Findings and messages", [list, empty, more], { class: "tall" });
   box.node.firstChild.append(filter);
+  // What a finding explains stands with it: by check, while its alarm lasts. What was seen before its cause waits.
+  let causes = new Map(),
+    waiting = new Map();
+  const explain = (cause, words) => {
+    if (cause.effects.includes(words)) return;
+    cause.effects.push(words);
+    cause.node.hidden = false;
+    cause.node.textContent = `Consequences: ${cause.effects.join(", ")}`;
+  };
+  const follows = ({ level, words, found }) => {
+    if (found.because && level !== "ok") {
+      const { check } = found.because;
+      if (causes.has(check)) explain(causes.get(check), words);
+      else waiting.set(check, [...(waiting.get(check) ?? []), words]);
+    }
+    if (level === "ok" || level === "advisory") {
+      causes.delete(found.check);
+      return null;
+    }
+    const cause = { node: el("p", { class: "why consequences", hidden: true }), effects: [] };
+    causes.set(found.check, cause);
+    for (const effect of waiting.get(found.check) ?? []) explain(cause, effect);
+    waiting.delete(found.check);
+    return cause.node;
+  };
   const row = (note) => {
-    const level = badge(), { found } = note;
+    const level = badge(),
+      { found } = note;
     // What is only said is no level of anything.
     const plain = note.kind === "event" || (note.kind === "text" && note.level === "ok");
     level.set(plain ? "event" : note.level, note.kind === "event" ? "event" : plain ? "says" : note.level);
     const from = note.from === "here" ? note.subsystem : note.from;
-    return el("li", { class: `${note.kind} ${note.level}`, tabindex: 0, "data-at": note.at_s, "data-check": found?.check },
-      el("time", { title: utc(note.at_s) && `${utc(note.at_s)} UTC` }, clock(note.at_s - flight.start)), level.node, el("span", { class: "words" }, note.words),
+    return el(
+      "li",
+      { class: `${note.kind} ${note.level}`, tabindex: 0, "data-at": note.at_s, "data-check": found?.check },
+      el("time", { title: utc(note.at_s) && `${utc(note.at_s)} UTC` }, clock(note.at_s - flight.start)),
+      level.node,
+      el("span", { class: "words" }, note.words),
       el("small", {}, [from, found && measured(found)].filter(Boolean).join(" \u00b7 ")),
-      found?.because ? el("p", { class: "why" }, `Because of: ${found.because}`) : null,
-      found?.meaning ? el("p", { class: "why" }, found.meaning, " ", el("b", {}, found.action)) : null);
+      found?.because ? el("p", { class: "why because" }, `Because of: ${found.because.words}`) : null,
+      found?.meaning ? el("p", { class: "why" }, found.meaning, " ", el("b", {}, found.action)) : null,
+      found ? follows(note) : null,
+    );
   };
   const chosen = (event) => {
     const at = event.target.closest("li")?.dataset.at;
@@ -51,11 +86,14 @@ export const notes = ({ go, newestFirst, rows = Infinity }) => {
     update(anew = false) {
       if (anew || flight.notes !== shown || flight.notes.length < count) {
         list.replaceChildren();
+        causes = new Map();
+        waiting = new Map();
         count = 0;
         shown = flight.notes;
       }
       const fresh = flight.notes.slice(Math.max(count, flight.notes.length - rows)).map(row);
-      if (newestFirst) list.prepend(...fresh.reverse()); else list.append(...fresh);
+      if (newestFirst) list.prepend(...fresh.reverse());
+      else list.append(...fresh);
       while (list.children.length > rows) list.lastChild.remove();
       count = flight.notes.length;
       empty.hidden = count > 0;

@@ -1,37 +1,91 @@
-// The autopilot's parameters: those that changed first, then all, by name.
+// The autopilot's parameters: those that changed, those that are not at their default, those that are others than in the last flight; and
+// all, by name.
 
 import { el } from "./elements.js";
 import { flight } from "./flight.js";
 import { cells, rows } from "./layout.js";
 import { clock, plural, short } from "./text.js";
 
-const course = (values) => values.map(([at, value], i) => i ? `${short(value)} at ${clock(at - flight.start)}` : short(value)).join(" \u2192 ");
-const table = (parameters) => rows([["Parameter"], ["Value"]],
-  parameters.map(([name, values]) => cells([name, course(values)], ["t", "words"], { class: values.length > 1 ? "changed" : "" })));
+const course = (values) =>
+  values.map(([at, value], i) => (i ? `${short(value)} at ${clock(at - flight.start)}` : short(value))).join(" \u2192 ");
+const last = ({ values }) => values[values.length - 1][1];
+// A parameter is of single precision on the wire.
+const same = (one, other) => Math.fround(one) === Math.fround(other);
+// One without a default is at it, where a log tells defaults.
+const isOther = ({ values, usual }) => usual != null && !same(values[values.length - 1][1], usual);
+const table = (parameters) =>
+  rows(
+    [["Parameter"], ["Value"], ...(flight.tellsDefaults ? [["Default"]] : [])],
+    parameters.map(([name, one]) =>
+      cells([name, course(one.values), ...(flight.tellsDefaults ? [one.usual == null ? "" : short(one.usual)] : [])], ["t", "words", "t"], {
+        class: one.values.length > 1 ? "changed" : "",
+      }),
+    ),
+  );
 
-export const parameters = () => {
-  const changed = el("div"), all = el("div", { class: "scroll tall" }), count = el("summary");
+const NO_DEFAULTS =
+  "What is not at its default is not known: this recording does not tell defaults. ArduPilot's own log (.bin) does since 4.3, and PX4's ULog since 1.12.";
+
+// What is other than in the flight before, where that is known: names with their values then.
+const compared = ({ name, values }) => {
+  const before = new Map(values);
+  const other = [...flight.parameters].filter(([key, one]) => before.has(key) && !same(before.get(key), one.values[0][1]));
+  const gone = values.filter(([key]) => !flight.parameters.has(key)).length;
+  const added = [...flight.parameters].filter(([key]) => !before.has(key)).length;
+  const rest = [
+    added ? `${plural(added, "parameter is", "parameters are")} told here and not there.` : "",
+    gone ? `${plural(gone, "is", "are")} told there and not here.` : "",
+  ];
+  return [
+    other.length
+      ? rows(
+          [["Parameter"], [`In ${name}`], ["Here"]],
+          other.map(([key, one]) =>
+            cells([key, short(before.get(key)), course(one.values)], ["t", "words", "words"], { class: "changed" }),
+          ),
+          { id: "parameters-before" },
+        )
+      : el("p", { class: "dim", id: "parameters-before" }, `All that both tell are as in ${name}.`),
+    el("p", { class: "dim" }, rest.filter(Boolean).join(" ")),
+  ];
+};
+
+// `before` is the flight before of the same vehicle: its name, and its parameters as they were at its end.
+export const parameters = (before = null) => {
+  const changed = el("div"),
+    notUsual = el("div", { id: "parameters-other" }),
+    earlier = el("div"),
+    all = el("div", { class: "scroll tall" }),
+    count = el("summary");
   const wanted = el("input", { type: "search", placeholder: "name", "aria-label": "Parameters whose name has this in it" });
   const list = el("details", {}, count, wanted, all);
   const none = el("p", { class: "dim" }, "No parameter was told. A link tells them when a ground station asks for them.");
+  const some = el("div", {}, changed, notUsual, earlier, list);
   let drawn = "";
   const fill = () => {
     const part = wanted.value.toUpperCase();
     if (list.open) all.replaceChildren(table([...flight.parameters].filter(([name]) => name.toUpperCase().includes(part))));
   };
+  const group = (node, title, parameters, empty) =>
+    node.replaceChildren(el("h4", {}, title), parameters.length ? table(parameters) : el("p", { class: "dim" }, empty));
   wanted.addEventListener("input", fill);
   list.addEventListener("toggle", fill);
   return {
-    node: el("div", { class: "panel scroll" }, none, changed, list),
+    node: el("div", { class: "panel scroll" }, none, some),
     update() {
-      const other = [...flight.parameters].filter(([, values]) => values.length > 1), key = `${flight.parameters.size} ${JSON.stringify(other)}`;
+      const known = [...flight.parameters],
+        moved = known.filter(([, { values }]) => values.length > 1),
+        other = known.filter(([, one]) => isOther(one)),
+        key = `${known.length} ${JSON.stringify(moved)} ${other.map(([name, one]) => name + last(one))}`;
       if (key === drawn) return;
       drawn = key;
-      none.hidden = flight.parameters.size > 0;
-      list.hidden = !none.hidden;
-      changed.replaceChildren(other.length ? table(other) : el("p", { class: "dim", hidden: !flight.parameters.size }, "None changed."));
+      none.hidden = known.length > 0;
+      some.hidden = !none.hidden;
+      group(changed, "Changed while this was recorded", moved, "None changed.");
+      group(notUsual, "Not at their default", other, flight.tellsDefaults ? "All are at their default." : NO_DEFAULTS);
+      if (before) earlier.replaceChildren(el("h4", {}, "Changed since the last flight"), ...compared(before));
       const left = flight.parametersLeftOut ? `; ${plural(flight.parametersLeftOut, "value")} of others not kept` : "";
-      count.textContent = `All ${plural(flight.parameters.size, "parameter")}${left}`;
+      count.textContent = `All ${plural(known.length, "parameter")}${left}`;
       fill();
     },
   };

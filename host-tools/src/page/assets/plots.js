@@ -6,7 +6,8 @@ import { chart } from "./plot.js";
 
 // `place` gives a group's section; what is shown elsewhere is left out.
 export const plots = (place, elsewhere = []) => {
-  const groups = new Map(), made = new Map();
+  const groups = new Map(),
+    made = new Map();
   return {
     // A plot is there as soon as it has a line.
     update() {
@@ -16,7 +17,8 @@ export const plots = (place, elsewhere = []) => {
           groups.set(group, el("div", { class: "plots" }));
           place(group).append(groups.get(group));
         }
-        const one = chart(id), order = [...flight.plots.keys()];
+        const one = chart(id),
+          order = [...flight.plots.keys()];
         made.set(id, one);
         const next = [...groups.get(group).children].find((node) => order.indexOf(node.id.slice("plot-".length)) > order.indexOf(id));
         groups.get(group).insertBefore(one.node, next ?? null);

@@ -24,18 +24,32 @@ const LEVELS = ["ok", "advisory", "stale", "warning", "critical"];
 
 // ---- Who flew, when, and the verdict.
 const findings = flight.notes.filter(({ kind, found }) => kind === "finding" && found);
-const worst = findings.reduce((worst, { level }) => LEVELS.indexOf(level) > LEVELS.indexOf(worst) ? level : worst, "ok");
+const worst = findings.reduce((worst, { level }) => (LEVELS.indexOf(level) > LEVELS.indexOf(worst) ? level : worst), "ok");
 const count = (level) => findings.filter((note) => note.level === level).length;
 const unjudged = log.format !== "hums" && !log.vehicle;
-const verdict = log.checked_by === "nobody" || unjudged ? "Not checked" : worst === "ok" ? "No findings"
-  : ["critical", "warning", "stale", "advisory"].filter(count).map((level) => `${count(level)} ${level}`).join(", ");
+const verdict =
+  log.checked_by === "nobody" || unjudged
+    ? "Not checked"
+    : worst === "ok"
+      ? "No findings"
+      : ["critical", "warning", "stale", "advisory"]
+          .filter(count)
+          .map((level) => `${count(level)} ${level}`)
+          .join(", ");
 const when = log.start_utc ? `${log.start_utc.slice(0, 10)} ${log.start_utc.slice(11, 19)} UTC` : "time of day unknown";
 const session = log.format === "hums" ? "session " : "";
 document.title = `${name}, ${session}${log.name}, ${when}`;
-document.getElementById("head").append(
-  el("h1", {}, name),
-  el("p", { class: "dim" }, [`${session}${log.name}`, when, span(log.duration_s), log.format === "hums" ? log.end.words : ""].filter(Boolean).join(" \u00b7 ")),
-  el("p", { class: `verdict ${worst}`, id: "verdict" }, verdict));
+document
+  .getElementById("head")
+  .append(
+    el("h1", {}, name),
+    el(
+      "p",
+      { class: "dim" },
+      [`${session}${log.name}`, when, span(log.duration_s), log.format === "hums" ? log.end.words : ""].filter(Boolean).join(" \u00b7 "),
+    ),
+    el("p", { class: `verdict ${worst}`, id: "verdict" }, verdict),
+  );
 bar.append(back);
 
 // ---- Sections.
@@ -44,20 +58,45 @@ summary((from, to) => {
   document.getElementById("time").scrollIntoView({ behavior: "smooth" });
 });
 const found = section("findings", "Findings and messages");
-const list = notes({ go: (at) => { lookAt(at); document.getElementById("time").scrollIntoView({ behavior: "smooth" }); }, newestFirst: false });
+const list = notes({
+  go: (at) => {
+    lookAt(at);
+    document.getElementById("time").scrollIntoView({ behavior: "smooth" });
+  },
+  newestFirst: false,
+});
 list.update();
 list.only(findings.length > 0);
-const unlisted = log.findings_count - findings.length, unsaid = data.texts_count - flight.notes.filter(({ kind, found }) => kind !== "event" && !found).length;
-found.append(list.node, ...[
-  findings.length ? "" : unjudged ? "Nothing was judged: no autopilot was heard in this recording."
-    : log.checked_by === "nobody" ? "Not checked: what recorded this ran no checks." : "Every check stayed within its limits, or had nothing to look at.",
-  unlisted > 0 ? `And ${plural(unlisted, "finding")} more.` : "", unsaid > 0 ? `And ${plural(unsaid, "text")} more.` : "",
-  log.checked_by === "hums" ? "Checked when this page was made: what recorded this ran no checks." : "",
-].filter(Boolean).map((text) => el("p", { class: "dim" }, text)));
+const unlisted = log.findings_count - findings.length,
+  unsaid = data.texts_count - flight.notes.filter(({ kind, found }) => kind !== "event" && !found).length;
+found.append(
+  list.node,
+  ...[
+    findings.length
+      ? ""
+      : unjudged
+        ? "Nothing was judged: no autopilot was heard in this recording."
+        : log.checked_by === "nobody"
+          ? "Not checked: what recorded this ran no checks."
+          : "Every check stayed within its limits, or had nothing to look at.",
+    unlisted > 0 ? `And ${plural(unlisted, "finding")} more.` : "",
+    unsaid > 0 ? `And ${plural(unsaid, "text")} more.` : "",
+    log.checked_by === "hums" ? "Checked when this page was made: what recorded this ran no checks." : "",
+  ]
+    .filter(Boolean)
+    .map((text) => el("p", { class: "dim" }, text)),
+);
 
-const time = section("time", "Timeline and track"), strip = timeline(), track = map();
-time.append(strip.node, flight.track.length ? el("div", { class: "panel" }, track.node, track.legend)
-  : el("p", { class: "dim" }, "The vehicle never knew where it was: there is no track."), cursorTime);
+const time = section("time", "Timeline and track"),
+  strip = timeline(),
+  track = map();
+time.append(
+  strip.node,
+  flight.track.length
+    ? el("div", { class: "panel" }, track.node, track.legend)
+    : el("p", { class: "dim" }, "The vehicle never knew where it was: there is no track."),
+  cursorTime,
+);
 usually(() => [flight.start, flight.end]);
 plots((group) => section(group.toLowerCase(), group)).update();
 
@@ -67,11 +106,30 @@ section("parameters", "Parameters").append(told.node);
 usageSection();
 trendSection();
 recorderSection();
-section("sent", "Messages sent").append(el("div", { class: "panel scroll tall" }, rows([["Message"], ["Frames", "n"], ["per s", "n"]],
-  [...log.messages].sort((a, b) => b.frames - a.frames).map((m) => cells([m.name + (m.verified ? "" : " (unverified)"), whole(m.frames),
-    fixed(m.frames / Math.max(log.duration_s, 1), 2)], ["words", "n", "n"])))));
-document.getElementById("foot").append(`Made by hums ${data.version}. Times count from the session's start; intervals of ${
-  flight.step >= 1 ? flight.step + " s" : flight.step * 1000 + " ms"} keep their lowest and highest value. Plots: uPlot, MIT.`);
+section("sent", "Messages sent").append(
+  el(
+    "div",
+    { class: "panel scroll tall" },
+    rows(
+      [["Message"], ["Frames", "n"], ["per s", "n"]],
+      [...log.messages]
+        .sort((a, b) => b.frames - a.frames)
+        .map((m) =>
+          cells(
+            [m.name + (m.verified ? "" : " (unverified)"), whole(m.frames), fixed(m.frames / Math.max(log.duration_s, 1), 2)],
+            ["words", "n", "n"],
+          ),
+        ),
+    ),
+  ),
+);
+document
+  .getElementById("foot")
+  .append(
+    `Made by hums ${data.version}. Times count from the session's start; intervals of ${
+      flight.step >= 1 ? `${flight.step} s` : `${flight.step * 1000} ms`
+    } keep their lowest and highest value. Plots: uPlot, MIT.`,
+  );
 
 // ---- Redrawing.
 const draw = () => {
@@ -80,5 +138,7 @@ const draw = () => {
   track.update(null, true);
 };
 draw();
-whenColoursChange(() => { for (const meter of document.querySelectorAll("[data-colour]")) meter.style.background = colour(meter.dataset.colour); });
+whenColoursChange(() => {
+  for (const meter of document.querySelectorAll("[data-colour]")) meter.style.background = colour(meter.dataset.colour);
+});
 root.dataset.ready = String(main.children.length > 0);

@@ -8,15 +8,17 @@ import { fixed, plural, span, whole } from "./text.js";
 import { utc } from "./view.js";
 
 const { usage, vehicle } = log;
-const tile = (value, unit, label) => value == null ? null
-  : el("div", { class: "tile" }, el("b", {}, value, unit ? el("span", {}, unit) : null), el("small", {}, label));
+const tile = (value, unit, label) =>
+  value == null ? null : el("div", { class: "tile" }, el("b", {}, value, unit ? el("span", {}, unit) : null), el("small", {}, label));
 const tiles = () => {
   const flown = data.flights.reduce((sum, f) => sum + f.air_s, 0);
   const peak = (id) => flight.extremes(id, 0)?.[1];
   const low = (id) => flight.extremes(id, 0)?.[0];
-  const of = (value, decimals) => value == null || !Number.isFinite(value) ? null : fixed(value, decimals);
+  const of = (value, decimals) => (value == null || !Number.isFinite(value) ? null : fixed(value, decimals));
   const battery = data.flights.length ? data.flights[data.flights.length - 1] : null;
-  return el("div", { class: "tiles" },
+  return el(
+    "div",
+    { class: "tiles" },
     tile(span(flown), "", plural(data.flights.length, "flight")),
     tile(of(usage.distance_m, 0), "m", "over ground in the air"),
     tile(of(usage.height_max_m ?? peak("Height"), 1), "m", "greatest height"),
@@ -24,23 +26,29 @@ const tiles = () => {
     tile(of(low("PackVolts"), 2), "V", "lowest battery voltage"),
     tile(of(peak("PackAmperes"), 1), "A", "highest battery current"),
     battery && battery.percent_to != null && data.flights[0].percent_from != null
-      ? tile(`${of(data.flights[0].percent_from, 0)} \u2192 ${of(battery.percent_to, 0)}`, "%", "battery in flight") : null,
+      ? tile(`${of(data.flights[0].percent_from, 0)} \u2192 ${of(battery.percent_to, 0)}`, "%", "battery in flight")
+      : null,
     tile(of(usage.vibration_max_m_s2, 1), "m/s\u00b2", "highest vibration"),
     log.frames ? tile(whole(log.frames), "", "frames recorded") : null,
-    log.format === "hums" && log.frames ? tile(fixed(log.ratio, 1), "\u00d7", "smaller than a tlog") : null);
+    log.format === "hums" && log.frames ? tile(fixed(log.ratio, 1), "\u00d7", "smaller than a tlog") : null,
+  );
 };
 
-const identity = () => facts([
-  ["Vehicle", name],
-  ["System", vehicle && `${vehicle.system}, component ${vehicle.component}`],
-  ["Autopilot's id", vehicle?.uid],
-  ["From", log.start_utc ?? `${fixed(flight.start, 3)} s after power-on`],
-  ["To", log.end_utc ?? `${fixed(flight.end, 3)} s after power-on`],
-  ["Monitor", log.monitor
-    && `${log.monitor.version} ${log.monitor.git} on ${log.monitor.board}, started by ${log.monitor.reset}, start ${log.monitor.boots}`],
-  ["Session id", log.session],
-  ["Files", log.files.join(", ")],
-]);
+const identity = () =>
+  facts([
+    ["Vehicle", name],
+    ["System", vehicle && `${vehicle.system}, component ${vehicle.component}`],
+    ["Autopilot's id", vehicle?.uid],
+    ["From", log.start_utc ?? `${fixed(flight.start, 3)} s after power-on`],
+    ["To", log.end_utc ?? `${fixed(flight.end, 3)} s after power-on`],
+    [
+      "Monitor",
+      log.monitor &&
+        `${log.monitor.version} ${log.monitor.git} on ${log.monitor.board}, started by ${log.monitor.reset}, start ${log.monitor.boots}`,
+    ],
+    ["Session id", log.session],
+    ["Files", log.files.join(", ")],
+  ]);
 
 // When it landed, or how the flight ended otherwise.
 const landing = (f) => {
@@ -50,20 +58,42 @@ const landing = (f) => {
   return flight.end - f.to_s < 5 ? "in the air at the end" : `not seen, last in the air ${at}`;
 };
 
-const flights = (go) => data.flights.length ? rows(
-  [["#", "n"], ["Take-off"], ["Landing"], ["Time", "n"], ["Height", "n"], ["Speed", "n"], ["Battery", "n"]],
-  data.flights.map((f, i) => cells([
-    i + 1, utc(f.from_s) || span(f.from_s - flight.start), landing(f), span(f.air_s),
-    fixed(f.height_max_m, 1) + " m", fixed(f.speed_max_m_s, 1) + " m/s",
-    f.percent_from != null && f.percent_to != null ? `${fixed(f.percent_from, 0)} \u2192 ${fixed(f.percent_to, 0)} %` : "",
-  ], ["n", "t", "t", "n", "n", "n", "n"], {
-    class: "go", tabindex: 0, onclick: () => go(f.from_s, f.to_s), onkeydown: (e) => e.key === "Enter" && go(f.from_s, f.to_s),
-  })))
-  : el("p", { class: "dim" }, "The vehicle was not in the air.");
+const flights = (go) =>
+  data.flights.length
+    ? rows(
+        [["#", "n"], ["Take-off"], ["Landing"], ["Time", "n"], ["Height", "n"], ["Speed", "n"], ["Battery", "n"]],
+        data.flights.map((f, i) =>
+          cells(
+            [
+              i + 1,
+              utc(f.from_s) || span(f.from_s - flight.start),
+              landing(f),
+              span(f.air_s),
+              `${fixed(f.height_max_m, 1)} m`,
+              `${fixed(f.speed_max_m_s, 1)} m/s`,
+              f.percent_from != null && f.percent_to != null ? `${fixed(f.percent_from, 0)} \u2192 ${fixed(f.percent_to, 0)} %` : "",
+            ],
+            ["n", "t", "t", "n", "n", "n", "n"],
+            {
+              class: "go",
+              tabindex: 0,
+              onclick: () => go(f.from_s, f.to_s),
+              onkeydown: (e) => e.key === "Enter" && go(f.from_s, f.to_s),
+            },
+          ),
+        ),
+      )
+    : el("p", { class: "dim" }, "The vehicle was not in the air.");
 
 export const summary = (go) => {
   const host = section("summary", "Summary");
   host.append(tiles());
-  host.append(el("div", { class: "split" },
-    el("div", { class: "panel scroll" }, identity()), el("div", { class: "panel scroll", id: "flights" }, flights(go))));
+  host.append(
+    el(
+      "div",
+      { class: "split" },
+      el("div", { class: "panel scroll" }, identity()),
+      el("div", { class: "panel scroll", id: "flights" }, flights(go)),
+    ),
+  );
 };

@@ -8,7 +8,8 @@ import { fixed, span, whole, words } from "./text.js";
 
 const COMPONENT = { green: "ok", yellow: "warning", red: "critical" };
 const meter = (percent, status) => {
-  const inner = el("i"), outer = el("span", { class: "meter" }, inner);
+  const inner = el("i"),
+    outer = el("span", { class: "meter" }, inner);
   inner.dataset.colour = COMPONENT[status] ?? "stale";
   inner.style.width = `${Math.min(Math.max(percent, 0), 100)}%`;
   inner.style.background = colour(inner.dataset.colour);
@@ -16,53 +17,135 @@ const meter = (percent, status) => {
 };
 
 const parts = (wear) => {
-  wear.append(el("div", { class: "panel scroll", id: "components" }, rows(
-    [["Part"], ["Serial number"], ["Used"], ["State"], ["In the air", "n"], ["Turning", "n"], ["Flights", "n"], ["Cycles", "n"]],
-    [...log.components].sort((x, y) => (y.used_percent ?? -1) - (x.used_percent ?? -1)).map((c) => cells([
-      `${words(c.kind)}${c.number ? " " + c.number : ""}${c.name ? " \u00b7 " + c.name : ""}`, c.serial,
-      c.used_percent == null ? "no limit" : el("span", { class: "used" }, meter(c.used_percent, c.status), `${fixed(c.used_percent, 1)} %`),
-      el("span", { class: `badge ${COMPONENT[c.status] ?? "stale"}` }, c.used_percent >= 100 ? "due" : c.status),
-      `${fixed(c.flight_s / 3600, 2)} h`, `${fixed(c.motor_s / 3600, 2)} h`, whole(c.flights), fixed(c.cycles, 2),
-    ], ["", "t", "", "t", "n", "n", "n", "n"])))));
+  wear.append(
+    el(
+      "div",
+      { class: "panel scroll", id: "components" },
+      rows(
+        [["Part"], ["Serial number"], ["Used"], ["State"], ["In the air", "n"], ["Turning", "n"], ["Flights", "n"], ["Cycles", "n"]],
+        [...log.components]
+          .sort((x, y) => (y.used_percent ?? -1) - (x.used_percent ?? -1))
+          .map((c) =>
+            cells(
+              [
+                `${words(c.kind)}${c.number ? ` ${c.number}` : ""}${c.name ? ` \u00b7 ${c.name}` : ""}`,
+                c.serial,
+                c.used_percent == null
+                  ? "no limit"
+                  : el("span", { class: "used" }, meter(c.used_percent, c.status), `${fixed(c.used_percent, 1)} %`),
+                el("span", { class: `badge ${COMPONENT[c.status] ?? "stale"}` }, c.used_percent >= 100 ? "due" : c.status),
+                `${fixed(c.flight_s / 3600, 2)} h`,
+                `${fixed(c.motor_s / 3600, 2)} h`,
+                whole(c.flights),
+                fixed(c.cycles, 2),
+              ],
+              ["", "t", "", "t", "n", "n", "n", "n"],
+            ),
+          ),
+      ),
+    ),
+  );
 };
 
 const exceeded = (wear) => {
   const exceeded = log.exceedances.filter((e) => e.session.warnings || e.session.criticals || e.lifetime.warnings || e.lifetime.criticals);
   if (!exceeded.length) return;
-  const times = (count, seconds) => count ? `${whole(count)} \u00d7, ${fixed(seconds, 1)} s` : "";
-  const peak = (e, of) => e[of].peak == null ? "" : `${Number(e[of].peak.toPrecision(4))} ${e.unit}`;
-  wear.append(el("h3", { class: "above" }, "Limits exceeded"), el("div", { class: "panel scroll" }, rows(
-    [["Check"], ["Warning", "n"], ["Critical", "n"], ["Peak", "n"], ["Warning, in its life", "n"], ["Critical, in its life", "n"], ["Peak, in its life", "n"]],
-    exceeded.map((e) => cells([`${words(e.check)}${e.instance ? " " + (e.instance + 1) : ""}`,
-      times(e.session.warnings, e.session.warning_s), times(e.session.criticals, e.session.critical_s), peak(e, "session"),
-      times(e.lifetime.warnings, e.lifetime.warning_s), times(e.lifetime.criticals, e.lifetime.critical_s), peak(e, "lifetime")],
-    ["", "n", "n", "n", "n", "n", "n"])))));
+  const times = (count, seconds) => (count ? `${whole(count)} \u00d7, ${fixed(seconds, 1)} s` : "");
+  const peak = (e, of) => (e[of].peak == null ? "" : `${Number(e[of].peak.toPrecision(4))} ${e.unit}`);
+  wear.append(
+    el("h3", { class: "above" }, "Limits exceeded"),
+    el(
+      "div",
+      { class: "panel scroll" },
+      rows(
+        [
+          ["Check"],
+          ["Warning", "n"],
+          ["Critical", "n"],
+          ["Peak", "n"],
+          ["Warning, in its life", "n"],
+          ["Critical, in its life", "n"],
+          ["Peak, in its life", "n"],
+        ],
+        exceeded.map((e) =>
+          cells(
+            [
+              `${words(e.check)}${e.instance ? ` ${e.instance + 1}` : ""}`,
+              times(e.session.warnings, e.session.warning_s),
+              times(e.session.criticals, e.session.critical_s),
+              peak(e, "session"),
+              times(e.lifetime.warnings, e.lifetime.warning_s),
+              times(e.lifetime.criticals, e.lifetime.critical_s),
+              peak(e, "lifetime"),
+            ],
+            ["", "n", "n", "n", "n", "n", "n"],
+          ),
+        ),
+      ),
+    ),
+  );
 };
 
-const shown = (value, unit, decimals) => value == null ? ""
-  : unit === "s" ? `${span(value)} (${whole(value)} s)` : `${Number.isInteger(value) && !unit ? whole(value) : fixed(value, decimals)} ${unit}`.trim();
+const shown = (value, unit, decimals) =>
+  value == null
+    ? ""
+    : unit === "s"
+      ? `${span(value)} (${whole(value)} s)`
+      : `${Number.isInteger(value) && !unit ? whole(value) : fixed(value, decimals)} ${unit}`.trim();
 const counters = (wear, { plain, motors, ranges }) => {
   const lived = plain.some(({ life }) => life != null) || motors.some((motor) => motor.life_run_time_s != null);
-  const ever = (headings) => lived ? headings : [];
-  const time = (value) => value == null ? "" : span(value), turns = (value) => value == null ? "" : whole(value);
-  const motorTable = rows([["Motor"], ["Run time", "n"], ["Revolutions", "n"], ...ever([["Run time, in its life", "n"], ["Revolutions, in its life", "n"]])],
-    motors.map((m) => cells([m.number + 1, time(m.run_time_s), turns(m.revolutions), ...ever([time(m.life_run_time_s), turns(m.life_revolutions)])],
-      ["", "n", "n", "n", "n"])));
-  const histograms = ranges.map(({ title, unit, bands }) => {
-    const sum = bands.reduce((all, [, , s]) => all + s, 0);
-    if (sum === 0) return null;
-    const body = bands.map(([from, to, s]) => {
-      const text = from == null ? `below ${to} ${unit}` : to == null ? `from ${from} ${unit}` : `${from} to ${to} ${unit}`;
-      const inner = el("i"), meter = el("span", { class: "meter wide" }, inner);
-      inner.style.width = `${s / sum * 100}%`;
-      return cells([text, meter, s ? `${fixed(s / sum * 100, s / sum < .1 ? 1 : 0)} %` : "", s ? span(s) : ""], ["t", "", "n", "n"]);
-    });
-    return el("div", { class: "panel scroll" }, el("h3", {}, words(title)), el("table", {}, el("tbody", {}, body)));
-  }).filter(Boolean);
-  wear.append(el("h3", { class: "above" }, "Counters"), el("div", { class: "split" },
-    el("div", { class: "panel scroll tall" }, rows([["Counter"], ["This session", "n"], ...ever([["In its life", "n"]])],
-      plain.map((c) => cells([c.title, shown(c.session, c.unit, c.decimals), ...ever([shown(c.life, c.unit, c.decimals)])], ["", "n", "n"])))),
-    motors.length ? el("div", { class: "panel scroll" }, motorTable) : ""));
+  const ever = (headings) => (lived ? headings : []);
+  const time = (value) => (value == null ? "" : span(value)),
+    turns = (value) => (value == null ? "" : whole(value));
+  const motorTable = rows(
+    [
+      ["Motor"],
+      ["Run time", "n"],
+      ["Revolutions", "n"],
+      ...ever([
+        ["Run time, in its life", "n"],
+        ["Revolutions, in its life", "n"],
+      ]),
+    ],
+    motors.map((m) =>
+      cells(
+        [m.number + 1, time(m.run_time_s), turns(m.revolutions), ...ever([time(m.life_run_time_s), turns(m.life_revolutions)])],
+        ["", "n", "n", "n", "n"],
+      ),
+    ),
+  );
+  const histograms = ranges
+    .map(({ title, unit, bands }) => {
+      const sum = bands.reduce((all, [, , s]) => all + s, 0);
+      if (sum === 0) return null;
+      const body = bands.map(([from, to, s]) => {
+        const text = from == null ? `below ${to} ${unit}` : to == null ? `from ${from} ${unit}` : `${from} to ${to} ${unit}`;
+        const inner = el("i"),
+          meter = el("span", { class: "meter wide" }, inner);
+        inner.style.width = `${(s / sum) * 100}%`;
+        return cells([text, meter, s ? `${fixed((s / sum) * 100, s / sum < 0.1 ? 1 : 0)} %` : "", s ? span(s) : ""], ["t", "", "n", "n"]);
+      });
+      return el("div", { class: "panel scroll" }, el("h3", {}, words(title)), el("table", {}, el("tbody", {}, body)));
+    })
+    .filter(Boolean);
+  wear.append(
+    el("h3", { class: "above" }, "Counters"),
+    el(
+      "div",
+      { class: "split" },
+      el(
+        "div",
+        { class: "panel scroll tall" },
+        rows(
+          [["Counter"], ["This session", "n"], ...ever([["In its life", "n"]])],
+          plain.map((c) =>
+            cells([c.title, shown(c.session, c.unit, c.decimals), ...ever([shown(c.life, c.unit, c.decimals)])], ["", "n", "n"]),
+          ),
+        ),
+      ),
+      motors.length ? el("div", { class: "panel scroll" }, motorTable) : "",
+    ),
+  );
   if (histograms.length) wear.append(el("h3", { class: "above" }, "Time spent in ranges"), el("div", { class: "split" }, histograms));
 };
 

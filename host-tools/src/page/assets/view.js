@@ -7,7 +7,8 @@ import { clock } from "./text.js";
 // `away` once the user has looked closer: what is looked at stays, also while the flight goes on.
 export const view = { from: 0, to: 1, cursor: null, away: false };
 
-const followers = [], cursorFollowers = [];
+const followers = [],
+  cursorFollowers = [];
 export const whenViewChanges = (follower) => followers.push(follower);
 export const whenCursorMoves = (follower) => cursorFollowers.push(follower);
 
@@ -28,22 +29,25 @@ export const usually = (range) => {
   if (!view.away) home();
 };
 // What is usual is another one now; nobody is told, because whoever goes on draws anyway.
-export const follow = () => { if (!view.away) [view.from, view.to] = usual(); };
+export const follow = () => {
+  if (!view.away) [view.from, view.to] = usual();
+};
 export const look = (from, to) => {
   const [low, high] = [Math.max(from, flight.start), Math.min(to, flight.end)];
-  if (!(high - low > .01)) return;
+  if (!(high - low > 0.01)) return;
   [view.from, view.to, view.away] = [low, high, true];
   changed();
 };
 export const zoom = (from, to) => {
-  const margin = Math.max((to - from) * .03, 1);
+  const margin = Math.max((to - from) * 0.03, 1);
   look(from - margin, to + margin);
 };
 
 // The time under the cursor, of the session and of the day.
-const time = el("b"), day = el("span");
+const time = el("b"),
+  day = el("span");
 export const cursorTime = el("p", { class: "cursor-time", hidden: true, "aria-live": "off" }, time, " ", day);
-export const utc = (seconds) => flight.epoch_ms == null ? "" : new Date(flight.epoch_ms + seconds * 1000).toISOString().slice(11, 19);
+export const utc = (seconds) => (flight.epoch_ms == null ? "" : new Date(flight.epoch_ms + seconds * 1000).toISOString().slice(11, 19));
 
 export const moveCursor = (at) => {
   view.cursor = at;

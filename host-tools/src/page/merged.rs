@@ -1,0 +1,183 @@
+//! Several flights in the same plots: what each told, from its take-off on, as lines of one plot for each quantity. So they have one
+//! scale, and the page draws them as it draws one flight.
+
+use hums_core::observation::Autopilot;
+use hums_core::time::Instant;
+
+use super::history::{History, Part, PlotJson, Series};
+use super::plots::{self, Limits, Plot};
+use crate::series::Store;
+
+/// Series that each flight may have: all lines of what is compared.
+const SERIES_EACH: usize = 96;
+
+/// A quantity: the plot, the line of it, and whether it is as PX4 has it, whose figures of vibration and estimator are others.
+type Quantity = (Plot, u8, bool);
+
+/// A flight to be merged with others.
+#[derive(Clone, Copy, Debug)]
+pub struct Flight<'a> {
+    /// What it is called.
+    pub name: &'a str,
+    /// What was recorded.
+    pub history: &'a History,
+    /// Take-off, and when it was in the air last.
+    pub span: (Instant, Instant),
+}
+
+/// Whether a line is compared: what was measured, and not what was wanted or sent.
+const fn is_compared(plot: Plot, line: u8) -> bool {
+    match plot {
+        Plot::Height | Plot::Vertical => line == 0,
+        Plot::Velocity
+        | Plot::Heading
+        | Plot::Rates
+        | Plot::Altitude
+        | Plot::WindFrom
+        | Plot::Sticks
+        | Plot::MotorVolts
+        | Plot::EscErrors
+        | Plot::Fix
+        | Plot::Clips
+        | Plot::Link
+        | Plot::Frames
+        | Plot::Pressure => false,
+        Plot::Speed | Plot::Attitude => line < 2,
+        Plot::Outputs => line < 12,
+        _ => true,
+    }
+}
+
+/// One part that is all of them, in the order in which they are given; limits are those of the first one.
+pub fn merged(flights: &[Flight<'_>]) -> Part {
+    let mut store: Store<Quantity> = Store::of(SERIES_EACH * flights.len());
+    // Take-off is the beginning of all.
+    store.interval(Instant::ZERO);
+    for (number, flight) in (0..).zip(flights) {
+        add(&mut store, number, flight);
+    }
+    let (start_ms, step_ms) = store.spacing_ms().unwrap_or((0, 1));
+    let name = |(quantity, line)| format!("{}:{line}", id(quantity));
+    let series = store.part(0..=u16::MAX);
+    let series = series.map(|(line, part)| (name(line), about(line.0).decimals, part)).collect();
+    let plots = plots(&store, flights);
+    Part {
+        t: "history",
+        vehicle: 0,
+        reset: true,
+        start_s: start_ms as f64 / 1e3,
+        step_s: step_ms as f64 / 1e3,
+        plots: Some(plots),
+        series: Series(series),
+        notes: Vec::new(),
+        notes_gone: 0,
+        track: Vec::new(),
+        phases: None,
+        modes: None,
+        parameters: Vec::new(),
+        parameters_left_out: 0,
+        tells_defaults: false,
+    }
+}
+
+/// Adds the series of a flight, from its take-off on.
+fn add(store: &mut Store<Quantity>, number: u8, flight: &Flight<'_>) {
+    let (own, autopilot, _) = flight.history.drawn();
+    let Some((start_ms, step_ms)) = own.spacing_ms() else { return };
+    let (from, to) = flight.span;
+    let of_px4 = |plot| autopilot == Autopilot::Px4 && matches!(plot, Plot::Vibration | Plot::Estimator);
+    for ((plot, line), (numbers, values)) in own.part(0..=u16::MAX) {
+        if !is_compared(plot, line) {
+            continue;
+        }
+        for (interval, pair) in numbers.iter().zip(values.chunks_exact(2)) {
+            let begin_ms = start_ms + u64::from(*interval) * step_ms;
+            // An interval has its extremes somewhere in it.
+            for (at_ms, value) in [begin_ms + step_ms / 4, begin_ms + step_ms * 3 / 4].into_iter().zip(pair) {
+                let at = Instant::from_millis(at_ms);
+                if at >= from && at <= to {
+                    let since = Instant::from_micros(at.since(from).as_micros());
+                    store.push(since, ((plot, line, of_px4(plot)), number), *value);
+                }
+            }
+        }
+    }
+}
+
+fn plots(store: &Store<Quantity>, flights: &[Flight<'_>]) -> Vec<PlotJson> {
+    let mut all: Vec<(Quantity, PlotJson)> = Vec::new();
+    for (quantity, number) in store.lines() {
+        let flight = flights.get(usize::from(number));
+        let named = (number, flight.map_or_else(String::new, |flight| flight.name.to_owned()));
+        if let Some((_, json)) = all.last_mut().filter(|(last, _)| *last == quantity) {
+            json.lines.push(named);
+            continue;
+        }
+        let plots::About { group, title, unit, decimals, name } = about(quantity);
+        let line = name(quantity.1);
+        let title = if title == line { line } else { format!("{title}: {line}") };
+        let limits = limits(quantity, flights);
+        let id = id(quantity);
+        all.push((quantity, PlotJson { id, group, title, unit, decimals, limits, lines: vec![named] }));
+    }
+    all.into_iter().map(|(_, json)| json).collect()
+}
+
+fn about((plot, _, of_px4): Quantity) -> plots::About {
+    plots::about(plot, if of_px4 { Autopilot::Px4 } else { Autopilot::ArduPilot })
+}
+
+fn limits((plot, _, of_px4): Quantity, flights: &[Flight<'_>]) -> Vec<Limits> {
+    let params = flights.iter().find_map(|flight| flight.history.drawn().2);
+    let autopilot = if of_px4 { Autopilot::Px4 } else { Autopilot::ArduPilot };
+    params.map(|params| plots::limits(plot, autopilot, params)).unwrap_or_default()
+}
+
+/// Safe as an element's name.
+fn id((plot, line, of_px4): Quantity) -> String {
+    format!("{plot:?}-{line}{}", if of_px4 { "-px4" } else { "" })
+}
+
+#[cfg(test)]
+mod tests {
+    use hums_core::observation::{GlobalPosition, Observation};
+    use hums_core::units::Metres;
+
+    use super::*;
+    use crate::decode::reference::Reference;
+
+    /// Rises by a metre a second from its take-off on.
+    fn rises(take_off_s: u64) -> History {
+        let mut history = History::default();
+        for second in 0..take_off_s + 60 {
+            let relative_altitude = Metres(second.saturating_sub(take_off_s) as f32);
+            let global = GlobalPosition { relative_altitude, ..GlobalPosition::default() };
+            let at = Instant::from_millis(second * 1_000);
+            history.sample(at, &Reference::new(), &Observation::GlobalPosition(global));
+        }
+        history
+    }
+
+    #[test]
+    fn flights_stand_in_one_plot_from_their_take_off_on() {
+        let histories = [rises(10), rises(300)];
+        let span = |take_off_s: u64| {
+            (Instant::from_millis(take_off_s * 1_000), Instant::from_millis((take_off_s + 40) * 1_000))
+        };
+        let flight = |name, history, take_off_s| Flight { name, history, span: span(take_off_s) };
+        let part = merged(&[flight("one", &histories[0], 10), flight("other", &histories[1], 300)]);
+        let plots = part.plots.expect("plots");
+        let height = plots.iter().find(|plot| plot.id == "Height-0").expect("its height");
+        assert_eq!(height.lines, [(0, "one".to_owned()), (1, "other".to_owned())]);
+        for number in 0..2 {
+            let key = format!("Height-0:{number}");
+            let (_, _, (numbers, values)) =
+                part.series.0.iter().find(|(name, ..)| *name == key).expect("one");
+            for (interval, pair) in numbers.iter().zip(values.chunks_exact(2)) {
+                let at_s = (f64::from(*interval) + 0.5) * part.step_s;
+                assert!((f64::from(pair[1]) - at_s).abs() < 2.0, "{pair:?} m after {at_s} s");
+            }
+            assert!(values.iter().all(|height_m| *height_m < 42.0), "no more than the flight");
+        }
+    }
+}

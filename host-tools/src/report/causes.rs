@@ -1,0 +1,97 @@
+//! What explains each finding of a log: a record of a finding does not have it.
+
+use std::collections::BTreeMap;
+
+use hums_core::health::Level;
+use hums_core::time::Instant;
+
+use crate::check::problem::cause;
+use crate::summary::FindingLine;
+
+/// A check of a part that is not well.
+struct Open<'a> {
+    since: Instant,
+    level: Level,
+    check: &'a str,
+    /// Its findings that nothing explains yet.
+    unexplained: Vec<usize>,
+}
+
+/// The check that explains each of the findings, which stand in order; `None` where nothing does.
+pub fn causes(findings: &[FindingLine]) -> Vec<Option<String>> {
+    let mut causes = vec![None; findings.len()];
+    let mut open: BTreeMap<(&str, u8), Open<'_>> = BTreeMap::new();
+    for (place, finding) in findings.iter().enumerate() {
+        let key = (finding.check.as_str(), finding.instance);
+        let level = level_of(finding.level);
+        if !matches!(level, Level::Warning | Level::Critical | Level::Stale) {
+            open.remove(&key);
+            continue;
+        }
+        let one = open.entry(key).or_insert_with(|| Open {
+            since: finding.at,
+            level,
+            check: &finding.check,
+            unexplained: Vec::new(),
+        });
+        one.level = level;
+        one.unexplained.push(place);
+        // Also what came before: the consequence may be seen first.
+        let alarms: Vec<(Instant, &str, Level)> =
+            open.values().map(|one| (one.since, one.check, one.level)).collect();
+        for one in open.values_mut().filter(|one| !one.unexplained.is_empty()) {
+            if let Some(cause) = cause(one.check, one.level, one.since, alarms.iter().copied()) {
+                for place in one.unexplained.drain(..) {
+                    if let Some(known) = causes.get_mut(place) {
+                        *known = Some(cause.to_owned());
+                    }
+                }
+            }
+        }
+    }
+    causes
+}
+
+fn level_of(name: &str) -> Level {
+    (0..=4).filter_map(Level::from_number).find(|level| level.name() == name).unwrap_or(Level::Ok)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn finding(at_s: u64, check: &str, level: &'static str) -> FindingLine {
+        FindingLine {
+            at: Instant::from_millis(at_s * 1000),
+            subsystem: "navigation",
+            check: check.to_owned(),
+            instance: 0,
+            level,
+            previous: "ok",
+            value: 1.0,
+            limit: 1.0,
+            unit: String::new(),
+        }
+    }
+
+    #[test]
+    fn a_finding_names_its_cause_while_that_is_so_and_when_it_was_seen_a_little_later() {
+        let findings = [
+            finding(1, "gps_fix", "critical"),
+            finding(2, "ekf_failsafe", "critical"),
+            finding(3, "ekf_failsafe", "ok"),
+            finding(4, "gps_fix", "ok"),
+            finding(5, "ekf_failsafe", "critical"),
+            finding(9, "gps_fix", "critical"),
+            finding(20, "ekf_failsafe", "ok"),
+            finding(21, "gps_fix", "ok"),
+            finding(30, "ekf_failsafe", "critical"),
+            finding(50, "gps_fix", "critical"),
+        ];
+        let causes = causes(&findings);
+        let explained: Vec<usize> =
+            (0..).zip(&causes).filter_map(|(at, cause)| cause.as_ref().map(|_| at)).collect();
+        assert_eq!(explained, [1, 4], "the last one had stood for twenty seconds: {causes:?}");
+        assert_eq!(causes[1].as_deref(), Some("gps_fix"));
+    }
+}
