@@ -99,7 +99,7 @@ fn hours_of_flight_are_recorded_whole_and_at_their_times() {
     let (hours, minutes) = (number("HUMS_CHIP_HOURS", 3), number("HUMS_CHIP_MINUTES", 180));
     let bench = bench();
     let digest = Sha256::digest(fs::read(program::firmware()).unwrap());
-    let image: String = digest.iter().map(|byte| format!("{byte:02x}")).collect();
+    let image = digest.iter().map(|byte| format!("{byte:02x}")).collect::<Vec<_>>().concat();
     let (shelf, mut done) = Shelf::look(&image, minutes);
     println!("{done} power-ons of {minutes} min are done");
     while done * minutes < hours * 60 {
