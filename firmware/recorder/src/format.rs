@@ -108,31 +108,37 @@ impl Formatting {
 
     /// Does one step; whether it was the last one.
     pub fn step<D: BlockDevice>(&mut self, device: &D) -> Result<bool, FormatError<D::Error>> {
-        let write =
-            |blocks: &[Block], at: u32| device.write(blocks, BlockIdx(at)).map_err(FormatError::Device);
         let Some(plan) = &mut self.plan else {
             let card_blocks = device.num_blocks().map_err(FormatError::Device)?.0;
             if card_blocks < BLOCKS_MIN {
                 return Err(FormatError::TooSmall);
             }
-            write(&[Block::new()], 0)?;
+            clear(device, 0, 1)?;
             self.plan = Some(Plan::new(card_blocks, self.volume_id));
             return Ok(false);
         };
         let left = plan.end - plan.next;
         if left > 0 {
-            let zeros = [const { Block { contents: [0; Block::LEN] } }; CLEAR_BLOCKS as usize];
             let count = left.min(CLEAR_BLOCKS);
-            write(zeros.get(..count as usize).unwrap_or_default(), plan.next)?;
+            clear(device, plan.next, count)?;
             plan.next += count;
             return Ok(false);
         }
         if let Some((make, at)) = STRUCTURES.get(plan.structures) {
-            write(&[make(plan)], *at)?;
+            device.write(&[make(plan)], BlockIdx(*at)).map_err(FormatError::Device)?;
             plan.structures += 1;
         }
         Ok(plan.structures >= STRUCTURES.len())
     }
+}
+
+/// Clears blocks, [`CLEAR_BLOCKS`] at most.
+// Not within its caller, whose place on the stack others stand on.
+#[inline(never)]
+fn clear<D: BlockDevice>(device: &D, at: u32, count: u32) -> Result<(), FormatError<D::Error>> {
+    let zeros = [const { Block { contents: [0; Block::LEN] } }; CLEAR_BLOCKS as usize];
+    let zeros = zeros.get(..count as usize).unwrap_or_default();
+    device.write(zeros, BlockIdx(at)).map_err(FormatError::Device)
 }
 
 fn put(block: &mut Block, at: usize, bytes: &[u8]) {
