@@ -11,6 +11,8 @@ pub mod archive;
 pub mod card;
 pub mod check;
 pub mod cli;
+pub mod colour;
+pub mod counters;
 pub mod decode;
 pub mod demo;
 pub mod duplex;
@@ -37,6 +39,7 @@ pub mod report;
 pub mod rng;
 pub mod run;
 pub mod series;
+pub mod shell;
 pub mod sink;
 pub mod source;
 pub mod states;
@@ -74,6 +77,7 @@ fn command(command: &Command) -> anyhow::Result<Outcome> {
         Command::Sim(args) => run::sim::run(args),
         Command::Emulate(args) => run::emulate::run(args),
         Command::Check(args) => check::run(args),
+        Command::Ls(args) => info::list::run(args),
         Command::Info(args) => info::run(args),
         Command::Verify(args) => verify::run(args),
         Command::Report(args) => report::run(args),
@@ -83,5 +87,7 @@ fn command(command: &Command) -> anyhow::Result<Outcome> {
         Command::Params(args) => talk::params::run(args),
         Command::Pull(args) => talk::pull::run(args),
         Command::Format(args) => talk::format::run(args),
+        Command::Completions(args) => shell::completions(args),
+        Command::Man(args) => shell::man(args),
     }
 }

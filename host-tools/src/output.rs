@@ -7,6 +7,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use anyhow::Result;
 use serde::Serialize;
 
+use crate::colour;
 use crate::outcome::ReaderGone;
 use crate::printable;
 
@@ -18,9 +19,48 @@ pub fn leave_standard_output() {
     TAKEN.store(true, Ordering::Relaxed);
 }
 
-/// Prints one line, or several; what the world put into it obeys no terminal.
+/// Name and version of what `--json` prints. The version rises when a name goes or changes its meaning, not when one is
+/// added (`docs/json.md`).
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct Schema {
+    schema: &'static str,
+    version: u32,
+}
+
+impl Schema {
+    /// The first version of a command's object.
+    pub const fn first(schema: &'static str) -> Self {
+        Self { schema, version: 1 }
+    }
+}
+
+/// An object with what says which one it is.
+#[derive(Serialize)]
+struct Named<'a, T> {
+    #[serde(flatten)]
+    schema: Schema,
+    #[serde(flatten)]
+    value: &'a T,
+}
+
+/// Prints one line, or several, with the colours of its levels; what the world put into it obeys no terminal.
 pub fn line(text: &str) -> Result<()> {
-    raw_line(&printable::lines(text))
+    raw_line(&colour::shown(&printable::lines(text), is_in_colour()))
+}
+
+/// Whether results go to a terminal that wants colours.
+pub fn is_in_colour() -> bool {
+    let choice = if TAKEN.load(Ordering::Relaxed) {
+        anstream::AutoStream::choice(&io::stderr())
+    } else {
+        anstream::AutoStream::choice(&io::stdout())
+    };
+    choice != anstream::ColorChoice::Never
+}
+
+/// Prints what was made for a terminal, and has its sequences: nothing of the world is in it.
+pub fn terminal_only(text: &str) -> Result<()> {
+    raw_line(text)
 }
 
 /// Prints a line of JSON.
@@ -39,8 +79,8 @@ fn raw_line(text: &str) -> Result<()> {
 }
 
 /// Prints one JSON object, indented.
-pub fn json(value: &impl Serialize) -> Result<()> {
-    json_line(&serde_json::to_string_pretty(value)?)
+pub fn json(schema: Schema, value: &impl Serialize) -> Result<()> {
+    json_line(&serde_json::to_string_pretty(&Named { schema, value })?)
 }
 
 /// A JSON object that is printed as it is made: some members, then a list that is too long to be held. Its text is that
@@ -50,9 +90,10 @@ pub struct JsonList {
 }
 
 impl JsonList {
-    /// Prints the first member and the beginning of the list.
-    pub fn begin(name: &str, value: &impl Serialize, list: &str) -> Result<Self> {
-        print(&format!("{{\n  \"{name}\": {},\n  \"{list}\": [", indented(value, "  ")?))?;
+    /// Prints what says which object it is, further members, and the beginning of the list.
+    pub fn begin(schema: Schema, members: &impl Serialize, list: &str) -> Result<Self> {
+        let before = serde_json::to_string_pretty(&Named { schema, value: members })?;
+        print(&format!("{},\n  \"{list}\": [", printable::json(before.trim_end_matches("\n}"))))?;
         Ok(Self { empty: true })
     }
 
@@ -84,10 +125,14 @@ fn indented(value: &impl Serialize, by: &str) -> Result<String> {
 }
 
 fn print(text: &str) -> Result<()> {
-    if TAKEN.load(Ordering::Relaxed) {
-        return settle(io::stderr().lock().write_all(text.as_bytes()));
-    }
-    settle(io::stdout().lock().write_all(text.as_bytes()))
+    let bytes = text.as_bytes();
+    // `anstream` has an older Windows show colours too.
+    settle(match (TAKEN.load(Ordering::Relaxed), is_in_colour()) {
+        (true, true) => anstream::stderr().lock().write_all(bytes),
+        (true, false) => io::stderr().lock().write_all(bytes),
+        (false, true) => anstream::stdout().lock().write_all(bytes),
+        (false, false) => io::stdout().lock().write_all(bytes),
+    })
 }
 
 /// A broken pipe on standard output becomes [`ReaderGone`].

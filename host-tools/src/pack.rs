@@ -3,12 +3,14 @@
 
 use std::collections::VecDeque;
 use std::io::Write;
+use std::path::Path;
 
 use anyhow::{Context, Result};
 use hums_blackbox::record::{Clock, Loss, Lost, Note};
 use hums_blackbox::{Full, Record, Sector, SectorSink, Writer};
 use hums_core::time::Instant;
 use hums_link::{Check, Framer};
+use serde::Serialize;
 use sha2::{Digest as _, Sha256};
 
 use crate::cli;
@@ -16,7 +18,7 @@ use crate::endpoint::Endpoint;
 use crate::files::{Inputs, Output, cannot_write};
 use crate::logs::marks::PACKED;
 use crate::outcome::{Outcome, usage};
-use crate::output;
+use crate::output::{self, Schema};
 use crate::plural::count;
 use crate::source::booted::Booted;
 use crate::source::checksums::Checksums;
@@ -25,6 +27,18 @@ use crate::source::{self, Source, Timing};
 
 /// Where UTC came from: the recording's own times (see `hums_blackbox::record::Clock`).
 const FROM_RECORDING: u8 = 2;
+
+/// What `hums pack --json` prints.
+const SCHEMA: Schema = Schema::first("hums-pack");
+
+#[derive(Debug, Serialize)]
+struct PackedJson<'a> {
+    path: &'a Path,
+    frames: u64,
+    log_bytes: u64,
+    tlog_bytes: u64,
+    bytes_not_frames: u64,
+}
 
 /// Runs `hums pack`.
 pub fn run(args: &cli::Pack) -> Result<Outcome> {
@@ -82,13 +96,7 @@ pub fn run(args: &cli::Pack) -> Result<Outcome> {
     if let Some(remark) = source.remark() {
         note!("{}: {remark}", args.input);
     }
-    output::line(&format!(
-        "{}: {}, {}, {}",
-        args.output.display(),
-        count(done.frames, "frame"),
-        count(done.log_bytes, "byte"),
-        beside_a_tlog(done.recording_bytes, done.log_bytes)
-    ))?;
+    tell(args, &done)?;
     if let Endpoint::File(_) | Endpoint::Standard = args.input
         && done.bytes_not_frames > 0
     {
@@ -99,6 +107,22 @@ pub fn run(args: &cli::Pack) -> Result<Outcome> {
         note!("{}: {words}", args.input);
     }
     Ok(Outcome::lossy(source.damages() > 0 || done.wrong_checksums.is_some()))
+}
+
+/// Says what was written.
+fn tell(args: &cli::Pack, done: &Done) -> Result<()> {
+    if args.json {
+        let Done { frames, log_bytes, recording_bytes: tlog_bytes, bytes_not_frames, .. } = *done;
+        let json = PackedJson { path: &args.output, frames, log_bytes, tlog_bytes, bytes_not_frames };
+        return output::json(SCHEMA, &json);
+    }
+    output::line(&format!(
+        "{}: {}, {}, {}",
+        args.output.display(),
+        count(done.frames, "frame"),
+        count(done.log_bytes, "byte"),
+        beside_a_tlog(done.recording_bytes, done.log_bytes)
+    ))
 }
 
 /// How large the log is beside a tlog of the same frames, as words.

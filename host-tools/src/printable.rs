@@ -9,6 +9,8 @@ use std::borrow::Cow;
 use std::fmt::Write as _;
 use std::path::Path;
 
+use crate::colour::is_mark;
+
 /// Characters that change the direction of writing (Unicode 16, property `Bidi_Control`), and the two separators that end a
 /// line.
 pub const fn redirects(c: char) -> bool {
@@ -23,9 +25,9 @@ fn is_obeyed(c: char) -> bool {
     c.is_control() || redirects(c)
 }
 
-/// A name, or words of the world: one line.
+/// A name, or words of the world: one line, without colours.
 pub fn word(text: &str) -> Cow<'_, str> {
-    escaped(text, is_obeyed)
+    escaped(text, |c| is_obeyed(c) || is_mark(c))
 }
 
 /// A path, as one line.
@@ -40,7 +42,7 @@ pub fn lines(text: &str) -> Cow<'_, str> {
 
 /// A message. Further lines of ours are set in by two spaces; any other line's end came with words of the world.
 pub fn message(text: &str) -> Cow<'_, str> {
-    if !text.contains(is_obeyed) {
+    if !text.contains(|c| is_obeyed(c) || is_mark(c)) {
         return Cow::Borrowed(text);
     }
     text.split("\n  ").map(word).collect::<Vec<_>>().join("\n  ").into()

@@ -1,6 +1,9 @@
-//! Times as people and other tools read them: UTC in ISO 8601, and seconds since the monitor's power-on.
+//! Times as people and other tools read them: UTC in ISO 8601, and seconds since the monitor's power-on; for people hours,
+//! minutes and seconds.
 
 use std::io::Write;
+
+use hums_core::time::{Instant, Span};
 
 /// Microseconds since 1970 as `2026-11-21T10:13:42.123456Z`, appended to `out`. Years up to 9999; a later time is
 /// damage and reads as the last one.
@@ -26,6 +29,28 @@ pub fn iso8601(utc_us: u64) -> String {
     let mut out = Vec::with_capacity(27);
     push_iso8601(&mut out, utc_us);
     String::from_utf8_lossy(&out).into_owned()
+}
+
+/// To the second, for people: `2026-11-21 10:13:42`.
+pub fn date_and_time(utc_us: u64) -> String {
+    iso8601(utc_us).chars().take(19).map(|c| if c == 'T' { ' ' } else { c }).collect()
+}
+
+/// A time in a recording for people, to a tenth of a second: `4:20.8`, `1:04:20.8`.
+pub fn moment(at: Instant) -> String {
+    let tenths = at.as_micros() / 100_000;
+    let (hours, minutes, seconds) = (tenths / 36_000, tenths / 600 % 60, tenths / 10 % 60);
+    let hours = if hours > 0 { format!("{hours}:{minutes:02}") } else { minutes.to_string() };
+    format!("{hours}:{seconds:02}.{}", tenths % 10)
+}
+
+/// A length of time for people, to the second: `4:21`, `1:04:21`.
+pub fn clock(span: Span) -> String {
+    let seconds = (span.as_micros() + 500_000) / 1_000_000;
+    match (seconds / 3600, seconds / 60 % 60, seconds % 60) {
+        (0, minutes, seconds) => format!("{minutes}:{seconds:02}"),
+        (hours, minutes, seconds) => format!("{hours}:{minutes:02}:{seconds:02}"),
+    }
 }
 
 /// Microseconds as seconds with all six decimals.
@@ -54,6 +79,18 @@ fn civil(days: u64) -> (u64, u64, u64) {
     (year_of_era + era * 400 + u64::from(month <= 2), month, day)
 }
 
+/// A time as [`moment`] writes it, in microseconds: `4:20.8`, `1:04:20`.
+fn parse_moment(text: &str) -> Option<u64> {
+    let (before, seconds) = text.rsplit_once(':')?;
+    let (hours, minutes) = before.split_once(':').unwrap_or(("0", before));
+    let whole =
+        |text: &str| text.bytes().all(|byte| byte.is_ascii_digit()).then(|| text.parse::<u32>().ok())?;
+    let is_below_60 = |micros: &u64| *micros < 60_000_000;
+    let seconds = parse_seconds(seconds).filter(is_below_60)?;
+    let minutes = u64::from(whole(hours)?) * 60 + u64::from(whole(minutes)?);
+    Some(minutes * 60_000_000 + seconds)
+}
+
 /// Seconds as text, in microseconds.
 pub fn parse_seconds(text: &str) -> Option<u64> {
     text.parse().ok().and_then(seconds_to_micros)
@@ -77,14 +114,14 @@ impl std::str::FromStr for When {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        if let Some(micros) = parse_seconds(text) {
+        if let Some(micros) = parse_seconds(text).or_else(|| parse_moment(text)) {
             return Ok(Self::Seconds(micros));
         }
         let instant: Result<jiff::Timestamp, _> = text.parse();
         match instant.map(|instant| u64::try_from(instant.as_microsecond())) {
             Ok(Ok(micros)) => Ok(Self::Utc(micros)),
             _ => Err(format!(
-                "`{text}` is neither seconds since the session's start nor UTC as 2026-11-21T10:13:42Z"
+                "`{text}` is no time: seconds as 260.8, minutes as 4:20.8, or UTC as 2026-11-21T10:13:42Z"
             )),
         }
     }
@@ -104,6 +141,15 @@ mod tests {
     }
 
     #[test]
+    fn times_are_read_at_a_glance() {
+        assert_eq!(moment(Instant::from_millis(260_849)), "4:20.8");
+        assert_eq!(moment(Instant::from_millis(3_860_000)), "1:04:20.0");
+        assert_eq!(clock(Span::from_millis(59_600)), "1:00");
+        assert_eq!(clock(Span::from_secs(3_861)), "1:04:21");
+        assert_eq!(date_and_time(1_795_256_022_999_999), "2026-11-21 10:13:42");
+    }
+
+    #[test]
     fn seconds_keep_every_microsecond() {
         let mut out = Vec::new();
         push_seconds(&mut out, 12_000_034);
@@ -114,9 +160,12 @@ mod tests {
     #[test]
     fn both_forms_of_a_time() {
         assert_eq!("12.5".parse(), Ok(When::Seconds(12_500_000)));
+        assert_eq!("4:20.8".parse(), Ok(When::Seconds(260_800_000)));
+        assert_eq!("1:04:20".parse(), Ok(When::Seconds(3_860_000_000)));
         assert_eq!("1970-01-01T00:00:01.5Z".parse(), Ok(When::Utc(1_500_000)));
         assert_eq!("1970-01-01T02:00:00+02:00".parse(), Ok(When::Utc(0)));
-        for text in ["", "yesterday", "-5", "1960-01-01T00:00:00Z"] {
+        for text in ["", "yesterday", "-5", "1:60", "1:-5", "+1:00", "1:2:3:4", ":5", "1960-01-01T00:00:00Z"]
+        {
             assert!(text.parse::<When>().is_err(), "{text}");
         }
     }

@@ -7,6 +7,7 @@ use hums_core::time::Instant;
 use serde::Serialize;
 
 use crate::cli;
+use crate::colour::level;
 use crate::ending::{
     BlocksJson, EndJson, PowerOn, SessionBefore, among_words, behind_words, copies_words, made_again_words,
 };
@@ -17,11 +18,14 @@ use crate::logs::sessions::{Sessions, place};
 use crate::logs::side_by_side::side_by_side;
 use crate::logs::{self, Found, find::Image};
 use crate::outcome::Outcome;
-use crate::output;
+use crate::output::{self, JsonList, Schema};
 use crate::plural::count;
 use crate::printable::{path, word};
 use crate::source::find::besides;
 use crate::summary::Overview;
+
+/// What `hums verify --json` prints.
+const SCHEMA: Schema = Schema::first("hums-verify");
 
 /// Runs `hums verify`.
 pub fn run(args: &cli::Verify) -> Result<Outcome> {
@@ -41,7 +45,7 @@ pub fn run(args: &cli::Verify) -> Result<Outcome> {
         ok &= !is_broken;
     }
     // The list is printed as it is made: a folder may have ten thousand logs.
-    let begin = || output::JsonList::begin("images", &images_json(&found.images), "logs");
+    let begin = || JsonList::begin(SCHEMA, &images_json(&found.images), "logs");
     let mut list = args.json.then(begin).transpose()?;
     for image in &found.images {
         let check = file_system(image);
@@ -162,10 +166,10 @@ pub fn verdict(log: &Overview) -> Verdict {
 
 fn print(checks: &[Check]) -> Result<()> {
     for check in checks {
-        let verdict = if check.failed == 0 { "ok     " } else { "FAILED " };
+        let verdict = level(if check.failed == 0 { "ok" } else { "FAILED" });
         let detail = if check.detail.is_empty() { String::new() } else { format!("; {}", check.detail) };
         output::line(&format!(
-            "  {verdict} {:<18} {} checked, {} failed{detail}",
+            "  {verdict:<7} {:<18} {} checked, {} failed{detail}",
             check.name, check.checked, check.failed
         ))?;
     }

@@ -175,6 +175,89 @@ fn a_log_in_work_that_has_grown_is_completed() {
     assert_on_card(&log, &fs::read(dir.path().join("card.img")).unwrap());
 }
 
+/// The records of a tlog that lie between two times, seconds after its first one.
+fn cut(tlog: &[u8], from_s: u64, to_s: u64) -> Vec<u8> {
+    let (mut at, mut first, mut out) = (0, None, Vec::new());
+    while let Some(record) = tlog.get(at..).filter(|record| record.len() > 11) {
+        let time = u64::from_be_bytes(record[..8].try_into().unwrap());
+        // MAVLink 2 (with a signature where its flag says so) and 1.
+        let frame = if record[8] == 0xfd { 12 + 13 * usize::from(record[10] & 1) } else { 8 };
+        let bytes = 8 + frame + usize::from(record[9]);
+        let after = time - *first.get_or_insert(time);
+        if (from_s * 1_000_000..to_s * 1_000_000).contains(&after) {
+            out.extend_from_slice(&record[..bytes]);
+        }
+        at += bytes;
+    }
+    out
+}
+
+/// The parts of logs in a folder.
+fn parts(output: &Path) -> Vec<PathBuf> {
+    let entries = fs::read_dir(output).unwrap().map(|entry| entry.unwrap().path());
+    entries.filter(|path| path.to_string_lossy().ends_with(".part.HUM")).collect()
+}
+
+/// The places of sectors of zeros.
+fn zeros(bytes: &[u8]) -> Vec<usize> {
+    let is_zero = |(_, sector): &(usize, &[u8])| sector.iter().all(|byte| *byte == 0);
+    bytes.chunks(512).enumerate().filter(is_zero).map(|(place, _)| place).collect()
+}
+
+#[test]
+fn a_finding_comes_first_as_a_part_that_says_so_and_the_rest_comes_once() {
+    const GROUP: usize = 64;
+    let dir = tempfile::tempdir().unwrap();
+    let (input, image) = (dir.path().join("short.tlog"), dir.path().join("card.img"));
+    // The autopilot declares a failsafe 35 s after its beginning, in the second group of the log.
+    fs::write(&input, cut(&fs::read(own("ap_quad_faults.tlog")).unwrap(), 232, 272)).unwrap();
+    fs::write(dir.path().join("params.txt"), "GS_BUDGET 5000\n").unwrap();
+    let mut sim = command(["sim", "--input"]);
+    sim.arg(&input).arg("--sd").arg(&image);
+    hums_tests::child::run(&mut sim, Duration::from_mins(1)).expect_code(&[0]);
+    let card = fs::read(&image).unwrap();
+    let board = board(dir);
+    let home = tempfile::tempdir().unwrap();
+    let output = home.path();
+
+    let found = pull(&board, output, &[LOG, "--around", "autopilot_state", "--span", "1", "--json"])
+        .expect_code(&[0]);
+    let found: serde_json::Value = serde_json::from_slice(&found.stdout).unwrap();
+    assert_eq!(found["around"]["level"], "critical", "{found}");
+    assert!((33.0..37.0).contains(&found["around"]["time_s"].as_f64().unwrap()), "{found}");
+    let part = parts(output).pop().expect("a part");
+    let bytes = fs::read(&part).unwrap();
+    let missing = zeros(&bytes);
+    assert!(bytes.len() / 512 > GROUP + 20 && missing.len() > GROUP / 2, "{missing:?} of {}", bytes.len());
+    assert!(missing.iter().all(|place| *place < GROUP), "the second group is there: {missing:?}");
+
+    // Every reader takes it, and says what it is.
+    let name = part.to_str().unwrap();
+    for command in ["info", "verify"] {
+        let told = hums([command, name]).expect_code(&[3]).text();
+        assert!(told.contains("is a part of its log, as `hums pull --around` brings it"), "{told}");
+    }
+    let made = home.path().join("part.tlog");
+    hums(["decode", name, "-o", made.to_str().unwrap(), "--format", "tlog"]).expect_code(&[3]);
+    // Its last record is the flight's last one: time, then the frame.
+    let (decoded, whole) = (fs::read(&made).unwrap(), fs::read(&input).unwrap());
+    let end = |tlog: &[u8]| tlog[tlog.len() - 12..].to_vec();
+    assert!(decoded.len() > 10_000 && end(&decoded) == end(&whole), "{} bytes", decoded.len());
+
+    // The first moment, which is not there yet; then the rest, of which only that is brought that is missing.
+    pull(&board, output, &[LOG, "--around", "0:00.5", "--span", "0.5"]).expect_code(&[0]);
+    let bytes = fs::read(&part).unwrap();
+    assert_eq!(zeros(&bytes), Vec::<usize>::new());
+    let told = pull(&board, output, &[LOG]).expect_code(&[0]);
+    assert!(!told.stderr.contains(" of "), "nothing is brought twice: {}", told.stderr);
+    assert!(parts(output).is_empty(), "it is in the whole now");
+    assert_on_card(&pulled_log(output, NUMBER), &card);
+    let told = pull(&board, output, &[LOG, "--around", "critical"]).expect_code(&[1]).stderr;
+    assert!(told.contains("is there already"), "{told}");
+    let told = pull(&board, output, &["--around", "no_such_check"]).expect_code(&[2]).stderr;
+    assert!(told.contains("is no time (4:20, 260.8, 2026-11-21T10:13:42Z) and no finding"), "{told}");
+}
+
 /// Between a client and a board, as if the board's firmware did not know `CalcFileCRC32`: the client's opcode 14 reaches the
 /// board as one that nobody knows, and the refusal of that comes back as a refusal of opcode 14. Gives its port.
 fn without_checksums(board: u16) -> u16 {

@@ -15,18 +15,20 @@ use sha2::{Digest as _, Sha256};
 use crate::budgets;
 use crate::firmware::{self, Board};
 use crate::repo::{self, FIRMWARE_TARGET};
-use crate::setup::{self, Need, STATIC_TARGET};
+use crate::setup::{self, Need, STATIC_TARGET, WINDOWS_TARGET};
 use crate::shell::Shell;
 
 /// Makes a release of the commit that is checked out, in `target/dist`; with `check` a second one elsewhere, and compares.
 pub(crate) fn run(check: bool) -> Result<()> {
-    setup::ensure(&[Need::Linker, Need::FirmwareTarget, Need::StaticTarget], false).require_all()?;
+    let targets = [Need::FirmwareTarget, Need::StaticTarget, Need::WindowsTarget, Need::Mingw];
+    setup::ensure(&[&[Need::Linker, Need::Clippy], &targets[..]].concat(), false).require_all()?;
     ensure_cyclonedx()?;
     // `cargo xtask test` leaves out the board that none of its steps runs on.
     for board in Board::ALL {
         firmware::lint(board)?;
     }
     budgets::check(&Board::ALL)?;
+    lint_for_windows()?;
     let commit = git(&["rev-parse", "HEAD"])?;
     if !git(&["status", "--porcelain"])?.is_empty() {
         eprintln!("note: what is not committed is not in the release, which is of {commit}");
@@ -87,7 +89,11 @@ impl Release {
         let program = self.target().join(STATIC_TARGET).join("release/hums");
         self.try_out(&program)?;
         files.push(read("hums", &program)?);
+        files.extend(for_shells(&program)?);
         files.push(self.sbom("hums", "host-tools", &["--target", STATIC_TARGET])?);
+        self.build(&["--release", "--package=hums", "--target", WINDOWS_TARGET])?;
+        files.push(read("hums.exe", &self.target().join(WINDOWS_TARGET).join("release/hums.exe"))?);
+        files.push(self.sbom("hums.exe", "host-tools", &["--target", WINDOWS_TARGET])?);
         for licence in ["LICENSE-APACHE", "LICENSE-MIT"] {
             files.push(read(licence, &self.tree.join(licence))?);
         }
@@ -122,18 +128,25 @@ impl Release {
             .within(&self.tree)
             .env("CARGO_TARGET_DIR", self.target())
             .env("CARGO_ENCODED_RUSTFLAGS", &self.flags)
+            // The linker for Windows writes it instead of the time of day.
+            .env("SOURCE_DATE_EPOCH", self.stamp()?)
             .args(["build", "--locked"])
             .args(arguments)
             .run()
     }
 
+    /// When the commit was made, seconds since 1970.
+    fn stamp(&self) -> Result<String> {
+        let stamp = Shell::new("git").within(&self.tree).args(["log", "-1", "--format=%ct"]).output()?;
+        Ok(stamp.trim().to_owned())
+    }
+
     /// The bill of materials of the one program in the package at `folder`, as `CycloneDX` has it: every crate that is built for it.
     fn sbom<A: AsRef<std::ffi::OsStr>>(&self, name: &str, folder: &str, arguments: &[A]) -> Result<File> {
         let folder = self.tree.join(folder);
-        let stamp = Shell::new("git").within(&self.tree).args(["log", "-1", "--format=%ct"]).output()?;
         Shell::cargo()
             .within(&folder)
-            .env("SOURCE_DATE_EPOCH", stamp.trim())
+            .env("SOURCE_DATE_EPOCH", self.stamp()?)
             .args(["cyclonedx", "--quiet", "--format=json", "--spec-version=1.5", "--describe=binaries"])
             .arg("--manifest-path")
             .arg(folder.join("Cargo.toml"))
@@ -156,6 +169,34 @@ impl Release {
         let rustc = rustc.args(["--version", "--verbose"]).output()?;
         Ok(format!("commit {}\n{rustc}command cargo xtask dist\n", self.commit))
     }
+}
+
+/// No step of `cargo xtask test` builds for Windows: that would take minutes.
+fn lint_for_windows() -> Result<()> {
+    let choice = ["--package=hums", "--lib", "--bins", "--target", WINDOWS_TARGET];
+    Shell::cargo().arg("clippy").args(choice).args(["--", "-D", "warnings"]).run()
+}
+
+/// Scripts by which shells complete what is typed, and pages of the manual, as the program makes them.
+fn for_shells(program: &Path) -> Result<Vec<File>> {
+    let made = |name: &str, arguments: &[&str]| -> Result<File> {
+        Ok((name.to_owned(), Shell::new(program).args(arguments).output()?.into_bytes()))
+    };
+    let mut files = Vec::new();
+    for (name, shell) in
+        [("hums.bash", "bash"), ("_hums", "zsh"), ("hums.fish", "fish"), ("hums.ps1", "powershell")]
+    {
+        files.push(made(name, &["completions", shell])?);
+    }
+    let (name, page) = made("hums.1", &["man"])?;
+    // The page of the whole program names those of its commands.
+    let text = String::from_utf8_lossy(&page).replace("\\-", "-");
+    let commands = text.lines().filter_map(|line| line.strip_prefix("hums-")?.strip_suffix("(1)"));
+    for command in commands.filter(|command| *command != "help") {
+        files.push(made(&format!("hums-{command}.1"), &["man", command])?);
+    }
+    files.push((name, page));
+    Ok(files)
 }
 
 /// `cargo cyclonedx`, installed if it is missing.

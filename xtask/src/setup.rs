@@ -17,6 +17,9 @@ use crate::shell::{Shell, is_root};
 pub(crate) const STATIC_TARGET: &str =
     if cfg!(target_arch = "aarch64") { "aarch64-unknown-linux-musl" } else { "x86_64-unknown-linux-musl" };
 
+/// The target of the `hums` for Windows, which MinGW links.
+pub(crate) const WINDOWS_TARGET: &str = "x86_64-pc-windows-gnu";
+
 /// Something that a command needs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Need {
@@ -24,6 +27,8 @@ pub(crate) enum Need {
     Linker,
     FirmwareTarget,
     StaticTarget,
+    WindowsTarget,
+    Mingw,
     Rustfmt,
     Clippy,
     Mtools,
@@ -36,10 +41,12 @@ pub(crate) enum Need {
 }
 
 impl Need {
-    pub(crate) const ALL: [Self; 12] = [
+    pub(crate) const ALL: [Self; 14] = [
         Self::Linker,
         Self::FirmwareTarget,
         Self::StaticTarget,
+        Self::WindowsTarget,
+        Self::Mingw,
         Self::Rustfmt,
         Self::Clippy,
         Self::Mtools,
@@ -57,6 +64,8 @@ impl Need {
             Self::Linker => "a C linker (cc), for everything that rustc builds",
             Self::FirmwareTarget => "the Rust target thumbv7em-none-eabihf, for the firmware",
             Self::StaticTarget => "Rust's musl target, for the static hums of a release",
+            Self::WindowsTarget => "Rust's target for Windows, for the hums.exe of a release",
+            Self::Mingw => "MinGW's linker for Windows (gcc-mingw-w64-x86-64), for the same",
             Self::Rustfmt => "rustfmt, for the check of the formatting",
             Self::Clippy => "clippy, for the lints",
             Self::Mtools => "mtools, which reads the card's image independently of our own reader",
@@ -75,6 +84,8 @@ impl Need {
             Self::Linker => find_program("cc").is_some(),
             Self::FirmwareTarget => target_installed(FIRMWARE_TARGET),
             Self::StaticTarget => target_installed(STATIC_TARGET),
+            Self::WindowsTarget => target_installed(WINDOWS_TARGET),
+            Self::Mingw => find_program("x86_64-w64-mingw32-gcc").is_some(),
             Self::Rustfmt => cargo_has("fmt"),
             Self::Clippy => cargo_has("clippy"),
             Self::Mtools => find_program("mcopy").is_some(),
@@ -92,6 +103,7 @@ impl Need {
         match self {
             Self::FirmwareTarget => Some(["target", "add", FIRMWARE_TARGET]),
             Self::StaticTarget => Some(["target", "add", STATIC_TARGET]),
+            Self::WindowsTarget => Some(["target", "add", WINDOWS_TARGET]),
             Self::Rustfmt => Some(["component", "add", "rustfmt"]),
             Self::Clippy => Some(["component", "add", "clippy"]),
             _ => None,
@@ -102,6 +114,7 @@ impl Need {
     fn packages(self) -> &'static [&'static str] {
         match self {
             Self::Linker => &["gcc", "libc6-dev"],
+            Self::Mingw => &["gcc-mingw-w64-x86-64"],
             Self::Mtools => &["mtools"],
             Self::Dosfstools => &["dosfstools"],
             Self::PythonVenv => &["python3-venv"],
@@ -109,7 +122,11 @@ impl Need {
             Self::Victoria => &["victoria-metrics"],
             Self::Chromium => &["chromium", "chromium-driver", "fonts-dejavu-core"],
             Self::Graphviz => &["graphviz"],
-            Self::FirmwareTarget | Self::StaticTarget | Self::Rustfmt | Self::Clippy => &[],
+            Self::FirmwareTarget
+            | Self::StaticTarget
+            | Self::WindowsTarget
+            | Self::Rustfmt
+            | Self::Clippy => &[],
         }
     }
 }

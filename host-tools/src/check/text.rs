@@ -7,18 +7,19 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
 use hums_core::health::{Level, Side, Subsystem, vocabulary};
-use hums_core::time::{Instant, Span};
+use hums_core::time::Span;
 
 use super::checked::Checked;
 use super::judged::{EndsInAir, Judged, JudgedBy};
 use super::problem::{Problem, side};
+use crate::colour::level as coloured;
 use crate::names::{autopilot_name, type_name};
 use crate::plural::count;
 use crate::printable::word;
 use crate::source::item::{About, Cause, Gap};
 use crate::source::recording::Format;
 use crate::states;
-use crate::utc::iso8601;
+use crate::utc::{clock, iso8601, moment};
 
 /// Problems that are shown with their words; the rest gets a line.
 const SHOWN_MAX: usize = 6;
@@ -72,7 +73,9 @@ pub fn line(checked: &Checked) -> String {
         .filter(|words| !words.is_empty())
         .collect();
     let air = clock(flown(judged));
-    format!("{level:<8}  {air:>8}  {}  {}", word(&checked.name), what.join("; ")).trim_end().to_owned()
+    format!("{:<8}  {air:>8}  {}  {}", coloured(level), word(&checked.name), what.join("; "))
+        .trim_end()
+        .to_owned()
 }
 
 /// What is wrong with the recording itself.
@@ -350,7 +353,8 @@ fn problems(text: &mut String, judged: &Judged) {
         let Some(first) = group.first() else { continue };
         let words = vocabulary(&first.check);
         let level = if first.level == Level::Critical { "CRITICAL" } else { "warning" };
-        let _ = writeln!(text, "  {level:<8} {:>9}  {}", moment(first.at), word(&sentence(group)));
+        let _ =
+            writeln!(text, "  {:<8} {:>9}  {}", coloured(level), moment(first.at), word(&sentence(group)));
         if let Some(words) = words.filter(|_| place < SHOWN_MAX) {
             let _ = writeln!(text, "                      {}", words.meaning);
             let _ = writeln!(text, "                      {}", words.action);
@@ -545,23 +549,6 @@ fn ends_in_air(end: &EndsInAir) -> String {
     format!("the recording ends in the air{known}; what became of the vehicle is not in it")
 }
 
-/// A time in the recording, to a tenth of a second: `4:20.8`.
-fn moment(at: Instant) -> String {
-    let tenths = at.as_micros() / 100_000;
-    let (hours, minutes, seconds) = (tenths / 36_000, tenths / 600 % 60, tenths / 10 % 60);
-    let hours = if hours > 0 { format!("{hours}:{minutes:02}") } else { minutes.to_string() };
-    format!("{hours}:{seconds:02}.{}", tenths % 10)
-}
-
-/// A length of time: `4:21`, `1:04:21`.
-fn clock(span: Span) -> String {
-    let seconds = (span.as_micros() + 500_000) / 1_000_000;
-    match (seconds / 3600, seconds / 60 % 60, seconds % 60) {
-        (0, minutes, seconds) => format!("{minutes}:{seconds:02}"),
-        (hours, minutes, seconds) => format!("{hours}:{minutes:02}:{seconds:02}"),
-    }
-}
-
 /// With as many digits as a limit has.
 fn short(value: f32) -> String {
     if value.abs() >= IMPOSSIBLE {
@@ -578,6 +565,8 @@ fn possible(value: &f32) -> bool {
 
 #[cfg(test)]
 mod tests {
+    use hums_core::time::Instant;
+
     use super::*;
 
     #[test]
@@ -641,11 +630,7 @@ mod tests {
     }
 
     #[test]
-    fn times_are_read_at_a_glance() {
-        assert_eq!(moment(Instant::from_millis(260_849)), "4:20.8");
-        assert_eq!(moment(Instant::from_millis(3_860_000)), "1:04:20.0");
-        assert_eq!(clock(Span::from_millis(59_600)), "1:00");
-        assert_eq!(clock(Span::from_secs(3_861)), "1:04:21");
+    fn numbers_are_read_at_a_glance() {
         assert_eq!((short(3.4), short(10.0), short(0.256)), ("3.4".into(), "10".into(), "0.26".into()));
     }
 }

@@ -12,11 +12,12 @@ const LIVE_EXAMPLES: &str = "Examples:
   hums live --input flight.tlog --open
   hums live --input card.img --session 00001
   hums live --input udpin:0.0.0.0:14550 --influx http://127.0.0.1:8086 --org drones --bucket hums --token T
-  hums live --input udpin:0.0.0.0:14550 --listen 192.168.1.5:8080
+  hums live --input udpin:0.0.0.0:14550 --listen 0.0.0.0:8080
 
 The address to open is printed to standard output. Ctrl-C ends it. A recording or a log is played, and can be paused,
-sought and played at other speeds. Nothing is sent to the vehicle. With --listen on an address that other machines reach,
-a token is made and stands in the printed address; the page shows nothing without it.";
+wound back and forth, and played at other speeds. Nothing is sent to the vehicle.
+For a phone or a tablet: --listen 0.0.0.0:8080. The address of this PC in its network is then printed too, and on a terminal
+as a code for the phone's camera. Such an address ends with a token; the page shows nothing without it.";
 
 /// `hums live`
 #[derive(Args, Clone, Debug)]
@@ -25,7 +26,7 @@ pub struct Live {
     /// A link (udpin:, udpout:, tcp:, serial:), a recording (tlog or raw MAVLink, `-`), or a log (file, image, folder)
     #[arg(long, value_name = "SRC")]
     pub input: Endpoint,
-    /// Of several sessions this one, by the name that `hums info` gives; otherwise the newest
+    /// Of several sessions this one, by the name that `hums ls` gives; otherwise the newest
     #[arg(long, value_name = "NAME")]
     pub session: Option<String>,
     /// Where the page is served; port 0 is any free one
@@ -40,6 +41,9 @@ pub struct Live {
     /// Show the page in the browser
     #[arg(long)]
     pub open: bool,
+    /// Print the addresses as one JSON object (docs/json.md)
+    #[arg(long)]
+    pub json: bool,
     /// Also write every message to this database, as `hums decode --format influx` would: http://ADDR:PORT
     #[arg(long, value_name = "URL", help_heading = "Database")]
     pub influx: Option<String>,

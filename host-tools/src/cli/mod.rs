@@ -5,6 +5,7 @@ mod demo;
 mod live;
 mod read;
 mod run;
+mod shell;
 mod talk;
 
 use clap::{Parser, Subcommand};
@@ -12,9 +13,10 @@ use clap::{Parser, Subcommand};
 pub use check::Check;
 pub use demo::{Dashboard, Demo};
 pub use live::Live;
-pub use read::{Decode, Format, Info, Pack, Report, Verify};
+pub use read::{Decode, Format, Info, Ls, Pack, Report, Verify};
 pub use run::{Emulate, FaultFlags, Run, Sim, Speed};
-pub use talk::{FormatCard, Link, Params, ParamsAction, Pull};
+pub use shell::{Completions, Man};
+pub use talk::{Around, FormatCard, Link, Params, ParamsAction, Pull};
 
 const ABOUT: &str = "HUMS: an on-board black box and health monitor for drones that speak MAVLink.
 
@@ -33,17 +35,18 @@ Examples:
   hums demo                                                  a recorded flight through all of it
   hums check flight.tlog                                     what is wrong with a flight
   hums sim --input flight.tlog --sd card.img                 record a flight onto an SD card image
-  hums info card.img                                         what is on a card
+  hums ls card.img                                           the flights on a card, a line each
+  hums info card.img --session 00001                         all that is known of one of them
   hums decode card.img -o out --format tlog,csv              a card's logs for other tools
   hums live --input udpin:0.0.0.0:14550 --open               the vehicle as it flies, in the browser
 
 Exit codes: 0 done; 1 failed; 2 usage; 3 done, but the log has losses or damage (all that could be read was read);
 4 done, and `hums check` found something wrong with the vehicle.
-Results go to standard output, everything else to standard error.";
+Results go to standard output, everything else to standard error. Colours are for terminals only, and NO_COLOR=1 turns them off.";
 
 /// The whole command line.
 #[derive(Debug, Parser)]
-#[command(name = "hums", version, about = ABOUT, after_help = AFTER, max_term_width = 110)]
+#[command(name = "hums", version = env!("HUMS_VERSION"), about = ABOUT, after_help = AFTER, max_term_width = 110)]
 pub struct Cli {
     /// What to do.
     #[command(subcommand)]
@@ -55,12 +58,14 @@ pub struct Cli {
 pub enum Command {
     /// Run the firmware's pipeline on this PC: bytes in at the autopilot UART, an SD card image out
     Sim(Sim),
-    /// The same with the image that is flashed, on a model of its chip
+    /// The same with the firmware image that is flashed, on a model of its chip
     Emulate(Emulate),
     /// Turn logs into files for other tools: tlog, CSV, JSON lines, line protocol, Parquet, the thesis's tables
     Decode(Decode),
     /// Say what is wrong with a flight, from the log of any autopilot or ground station
     Check(Check),
+    /// List flights, a line each: date, length, size, the worst finding
+    Ls(Ls),
     /// Say what is in a log: sessions, vehicle, frames, gaps, findings, usage, sizes
     Info(Info),
     /// Check everything that can be checked about a log or a card
@@ -69,7 +74,7 @@ pub enum Command {
     Report(Report),
     /// Show the vehicle as it flies, on a page that this program serves: from a link, a recording or a log
     Live(Live),
-    /// Write one log file from a recording, without a card's file system
+    /// Turn a recording into one log file of HUMS, without a card
     Pack(Pack),
     /// List, read or set the board's parameters over MAVLink
     Params(Params),
@@ -77,8 +82,12 @@ pub enum Command {
     Pull(Pull),
     /// Have the board format a card that it cannot record on
     Format(FormatCard),
-    /// Show it: a recorded flight is recorded, decoded and summed up, and played on the dashboard
+    /// Show what HUMS does: a flight is recorded, decoded and summed up, and played on the dashboard
     Demo(Demo),
+    /// Print a script that has a shell complete commands, flags and file names
+    Completions(Completions),
+    /// Print the manual page of the program or of one command
+    Man(Man),
 }
 
 #[cfg(test)]
@@ -86,6 +95,11 @@ mod tests {
     use clap::CommandFactory;
 
     use super::*;
+
+    /// What the shell does with a command's output is left out.
+    fn without_redirection(line: &str) -> &str {
+        line.split(['|', '>']).next().unwrap_or_default().trim_end()
+    }
 
     #[test]
     fn every_example_of_every_help_is_a_command_line() {
@@ -97,9 +111,9 @@ mod tests {
         for help in &helps {
             assert!(help.contains("Examples:"), "{help}");
             for line in help.lines().filter_map(|line| line.strip_prefix("  hums ")) {
-                // A remark stands after three spaces, and a pipe is the shell's.
-                let line =
-                    line.split("   ").next().unwrap_or_default().split(" | ").next().unwrap_or_default();
+                // A remark stands after three spaces.
+                let line = line.split("   ").next().unwrap_or_default();
+                let line = without_redirection(line);
                 let words = std::iter::once("hums").chain(line.split_whitespace());
                 assert!(Cli::try_parse_from(words).is_ok(), "hums {line}");
                 examples += 1;
@@ -122,7 +136,7 @@ mod tests {
                 // Commands stand in a column; what stands in the next one is a remark.
                 let (name, arguments) = line.split_once(' ').unwrap_or((line, ""));
                 let arguments = arguments.trim_start().split("   ").next().unwrap_or_default();
-                let line = format!("{name} {}", arguments.split(" | ").next().unwrap_or_default());
+                let line = format!("{name} {}", without_redirection(arguments));
                 let words = std::iter::once("hums").chain(line.split_whitespace());
                 let parsed = Cli::try_parse_from(words);
                 assert!(parsed.is_ok(), "{}: hums {line}: {parsed:?}", path.display());

@@ -1,4 +1,4 @@
-//! What reads logs: `hums decode`, `hums info`, `hums verify`, `hums report`; and `hums pack`, which makes one.
+//! What reads logs: `hums ls`, `hums info`, `hums decode`, `hums verify`, `hums report`; and `hums pack`, which makes one.
 
 use std::path::PathBuf;
 
@@ -40,7 +40,7 @@ pub struct Decode {
     /// What to write, several with commas
     #[arg(long, value_enum, value_delimiter = ',', required = true)]
     pub format: Vec<Format>,
-    /// Leave out what is earlier: seconds as the tables have them, or UTC as 2026-11-21T10:13:42Z
+    /// Leave out what is earlier: seconds as the tables have them (260.8), minutes (4:20.8), or UTC (2026-11-21T10:13:42Z)
     #[arg(long, value_name = "T")]
     pub from: Option<When>,
     /// Leave out what is later
@@ -52,6 +52,9 @@ pub struct Decode {
     /// Keep an output that is there already and has other content in the folder hums-kept, and give its name to the new one
     #[arg(long)]
     pub replace: bool,
+    /// Print the result as one JSON object (docs/json.md)
+    #[arg(long)]
+    pub json: bool,
 }
 
 /// What to write.
@@ -71,8 +74,32 @@ pub enum Format {
     Thesis,
 }
 
+const LS_EXAMPLES: &str = "Examples:
+  hums ls card.img
+  hums ls cards/ flight.tlog
+  hums ls --json 00001_00.HUM
+
+A line for each flight: when it began, how long it is, how long the vehicle was in the air, how large it is, and the worst
+finding. `hums info --session NAME` shows all of one. Exit code 3: one of them has losses or damage.";
+
+/// `hums ls`
+#[derive(Args, Clone, Debug)]
+#[command(after_help = LS_EXAMPLES)]
+pub struct Ls {
+    /// Logs, card images, recordings of any kind that `hums check` reads, or directories with such
+    #[arg(required = true, value_name = "LOG|IMAGE|DIR")]
+    pub inputs: Vec<PathBuf>,
+    /// Look at every block of an image: finds logs that were deleted, and what is left of overwritten ones
+    #[arg(long)]
+    pub salvage: bool,
+    /// Print the result as one JSON object (docs/json.md)
+    #[arg(long)]
+    pub json: bool,
+}
+
 const INFO_EXAMPLES: &str = "Examples:
   hums info card.img
+  hums info card.img --session 00001
   hums info flight.tlog
   hums info --json 00001_00.HUM";
 
@@ -83,13 +110,16 @@ pub struct Info {
     /// Logs, card images, recordings of any kind that `hums check` reads, or directories with such
     #[arg(required = true, value_name = "LOG|IMAGE|DIR")]
     pub inputs: Vec<PathBuf>,
+    /// Only this session, by the name that `hums ls` gives
+    #[arg(long, value_name = "NAME")]
+    pub session: Option<String>,
     /// Of several vehicles in a recording only this one, by its system id
     #[arg(long, value_name = "ID")]
     pub system: Option<u8>,
     /// Look at every block of an image: finds logs that were deleted, and what is left of overwritten ones
     #[arg(long)]
     pub salvage: bool,
-    /// Print the result as one JSON object
+    /// Print the result as one JSON object (docs/json.md)
     #[arg(long)]
     pub json: bool,
 }
@@ -111,7 +141,7 @@ pub struct Verify {
     /// Look at every block of an image: finds logs that were deleted, and what is left of overwritten ones
     #[arg(long)]
     pub salvage: bool,
-    /// Print the result as one JSON object
+    /// Print the result as one JSON object (docs/json.md)
     #[arg(long)]
     pub json: bool,
 }
@@ -135,7 +165,7 @@ pub struct Report {
     /// The page to write, or a directory for a page a session
     #[arg(short, long, value_name = "OUT")]
     pub output: PathBuf,
-    /// Only this session, by the name that `hums info` gives
+    /// Only this session, by the name that `hums ls` gives
     #[arg(long, value_name = "NAME")]
     pub session: Option<String>,
     /// Of several vehicles in a recording only this one, by its system id
@@ -144,6 +174,9 @@ pub struct Report {
     /// Keep a page that is there already and has other content in the folder hums-kept, and give its name to the new one
     #[arg(long)]
     pub replace: bool,
+    /// Print the result as one JSON object (docs/json.md)
+    #[arg(long)]
+    pub json: bool,
 }
 
 const PACK_EXAMPLES: &str = "Examples:
@@ -163,4 +196,7 @@ pub struct Pack {
     /// Keep a log that is there already and has other content in the folder hums-kept, and give its name to the new one
     #[arg(long)]
     pub replace: bool,
+    /// Print the result as one JSON object (docs/json.md)
+    #[arg(long)]
+    pub json: bool,
 }

@@ -30,10 +30,10 @@ pub struct Run {
     /// The SD card image (MBR + FAT32); made, 256 MiB and sparse, when missing
     #[arg(long, value_name = "IMAGE")]
     pub sd: PathBuf,
-    /// Where the bytes for the ground station go; where somebody is there (udp, tcp, serial), its own are heard too
+    /// Where the messages for the ground station go; over udp, tcp and serial the ground station is heard too
     #[arg(long, value_name = "SINK")]
     pub gs: Option<Endpoint>,
-    /// What the ground station sends, with the times that it has in this file
+    /// A recording of what the ground station sends, each message at its time
     #[arg(long, value_name = "SRC")]
     pub gs_input: Option<Endpoint>,
     /// The flash in which counters and parameters outlive power (32 KiB; made when missing); without it all begin anew
@@ -48,7 +48,7 @@ pub struct Run {
     /// Overwrite the oldest sessions where the card has no room, as on a vehicle
     #[arg(long)]
     pub overwrite_oldest: bool,
-    /// Print the result as one JSON object
+    /// Print the result as one JSON object (docs/json.md)
     #[arg(long)]
     pub json: bool,
     /// What to put in the way
@@ -69,10 +69,10 @@ pub enum Speed {
 #[derive(Args, Clone, Debug, Default)]
 #[command(next_help_heading = "Faults (each may be given several times)")]
 pub struct FaultFlags {
-    /// Power goes at the N-th 512-byte block write (torn: half of that block is old); the run ends there
+    /// Cut the power at the N-th 512-byte block write (torn: half of that block stays old); the run ends there
     #[arg(long, value_name = "N[:torn]")]
     pub cut_after_writes: Vec<Cut>,
-    /// Power goes at the N-th word that is written to the store, or sector that is erased; the run ends there
+    /// Cut the power at the N-th word that is written to the store, or sector that is erased there; the run ends there
     #[arg(long, value_name = "N", overrides_with = "cut_store_after")]
     pub cut_store_after: Option<u64>,
     /// The card answers nothing for MS milliseconds from T seconds on
@@ -93,10 +93,10 @@ pub struct FaultFlags {
     /// Ignore the recorded times: feed the bytes back to back at this rate
     #[arg(long, value_name = "BAUD", value_parser = clap::value_parser!(u32).range(1..), overrides_with = "line_rate")]
     pub line_rate: Option<u32>,
-    /// Our own power goes for a moment T seconds after the first byte; the card stays
+    /// Cut the board's own power for a moment, T seconds after the first byte; the card stays in its slot
     #[arg(long = "reboot-at", value_name = "T", value_parser = micros)]
     pub reboot_at_us: Vec<u64>,
-    /// Which of the possible random faults happen
+    /// The seed of all that is random: the same number gives the same faults
     #[arg(long, value_name = "N", default_value_t = 0, overrides_with = "seed")]
     pub seed: u64,
 }

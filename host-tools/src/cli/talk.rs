@@ -3,8 +3,11 @@
 use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
+use hums_core::health::{Level, vocabulary};
+use hums_core::time::Span;
 
 use crate::endpoint::Endpoint;
+use crate::utc::{When, parse_seconds};
 
 const PARAMS_EXAMPLES: &str = "Examples:
   hums params list --link serial:/dev/ttyUSB0:57600
@@ -37,16 +40,16 @@ pub struct Link {
 /// What to do with parameters.
 #[derive(Clone, Debug, Subcommand)]
 pub enum ParamsAction {
-    /// All of them, in the board's order
+    /// List all parameters, in the board's order
     List {
         /// Where the board is.
         #[command(flatten)]
         at: Link,
-        /// Print one JSON object
+        /// Print the result as one JSON object (docs/json.md)
         #[arg(long)]
         json: bool,
     },
-    /// Some of them
+    /// Read some parameters
     Get {
         /// Names, for instance `GS_BUDGET`
         #[arg(required = true, value_name = "NAME")]
@@ -54,6 +57,9 @@ pub enum ParamsAction {
         /// Where the board is.
         #[command(flatten)]
         at: Link,
+        /// Print the result as one JSON object (docs/json.md)
+        #[arg(long)]
+        json: bool,
     },
     /// Give the board the key of --key, over the port that its `SIGN_PORT` trusts
     Sign {
@@ -63,8 +69,11 @@ pub enum ParamsAction {
         /// Take the key away
         #[arg(long)]
         remove: bool,
+        /// Print the result as one JSON object (docs/json.md)
+        #[arg(long)]
+        json: bool,
     },
-    /// Set one; fails where the board keeps another value
+    /// Set a parameter; fails where the board keeps another value
     Set {
         /// The name
         #[arg(value_name = "NAME")]
@@ -75,6 +84,9 @@ pub enum ParamsAction {
         /// Where the board is.
         #[command(flatten)]
         at: Link,
+        /// Print the result as one JSON object (docs/json.md)
+        #[arg(long)]
+        json: bool,
     },
 }
 
@@ -82,10 +94,13 @@ const PULL_EXAMPLES: &str = "Examples:
   hums pull --link serial:/dev/ttyUSB0:57600 -o logs
   hums pull --link udpin:0.0.0.0:14550 -o logs --last 1
   hums pull --link tcp:192.168.1.5:5760 -o logs 00001_00.HUM
+  hums pull --link serial:/dev/ttyUSB0:57600 -o logs --around critical
+  hums pull --link serial:/dev/ttyUSB0:57600 -o logs --around 4:20 --span 60
 
 Names of files say whose log it is: 00001-box3f0042000d51373435363338-s1a2b3c4d_00.HUM. One that is there already is left if it
-is the same by its checksum, and checked as a new one is. One that was begun (.NAME.pull.hums-part) is gone on with, once the board has confirmed that it is the beginning of its log. Exit code 3: a log came as it is on the card,
-and has damage there.";
+is the same by its checksum, and checked as a new one is. One that was begun (.NAME.pull.hums-part) is gone on with, once the board has
+confirmed that it is the beginning of its log. With --around a part of a log comes, NAME.part.HUM, which every command reads and calls a part;
+without it all of the log comes, but for what is in the part already. Exit code 3: a log came as it is on the card, and has damage there.";
 
 /// `hums pull`
 #[derive(Args, Clone, Debug)]
@@ -101,8 +116,53 @@ pub struct Pull {
     #[arg(value_name = "NAME")]
     pub names: Vec<String>,
     /// Only the newest so many
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", conflicts_with = "around")]
     pub last: Option<usize>,
+    /// First what matters: of the newest session only what was recorded around a time (4:20, or UTC), the latest critical finding
+    /// (`critical`), the latest of any kind (`warning`), or the latest of one check (`motor_loss`)
+    #[arg(long, value_name = "TIME|FINDING")]
+    pub around: Option<Around>,
+    /// With --around: so many seconds before it and as many after it
+    #[arg(long, value_name = "S", default_value = "30", value_parser = span, requires = "around")]
+    pub span: Span,
+    /// Print the result as one JSON object (docs/json.md)
+    #[arg(long)]
+    pub json: bool,
+}
+
+fn span(text: &str) -> Result<Span, String> {
+    let micros = parse_seconds(text).ok_or_else(|| format!("`{text}` is no number of seconds"))?;
+    Ok(Span::from_micros(micros))
+}
+
+/// A moment of a log.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Around {
+    /// A time.
+    Time(When),
+    /// The latest finding of this level, or a worse one.
+    Level(Level),
+    /// The latest finding of this check.
+    Check(String),
+}
+
+impl std::str::FromStr for Around {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text {
+            "critical" => return Ok(Self::Level(Level::Critical)),
+            "warning" => return Ok(Self::Level(Level::Warning)),
+            check if vocabulary(check).is_some() => return Ok(Self::Check(check.to_owned())),
+            _ => {}
+        }
+        text.parse().map(Self::Time).map_err(|_| {
+            format!(
+                "`{text}` is no time (4:20, 260.8, 2026-11-21T10:13:42Z) and no finding: critical, warning, or the name of a check as \
+                 docs/health.md has it"
+            )
+        })
+    }
 }
 
 const FORMAT_EXAMPLES: &str = "Examples:
@@ -118,7 +178,10 @@ pub struct FormatCard {
     /// Where the board is.
     #[command(flatten)]
     pub at: Link,
-    /// Everything on the card may be lost
+    /// Yes, everything on the card may be lost
     #[arg(long)]
     pub yes: bool,
+    /// Print the result as one JSON object (docs/json.md)
+    #[arg(long)]
+    pub json: bool,
 }

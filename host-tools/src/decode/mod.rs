@@ -29,6 +29,7 @@ pub mod destination;
 pub mod field_names;
 pub mod identity;
 pub mod influx;
+pub mod made;
 pub mod naming;
 mod native;
 pub mod parquet;
@@ -60,23 +61,28 @@ use crate::logs::reader;
 use crate::logs::sessions::{Sessions, copy_words};
 use crate::logs::side_by_side::side_by_side;
 use crate::outcome::{Kept, Outcome, differs, usage as usage_error};
+use crate::output::{self, Schema};
 use crate::plural::count;
 use crate::source::epochs::Epochs;
 use crate::source::find::{find, sessions_of};
 use crate::source::item::{Rows, Summary, Want};
 use crate::source::recording::Place;
 use crate::summary::damaged_places;
-use crate::{output, printable};
+use crate::{printable, progress};
 use collect::Collected;
 use context::{Context, Formats};
 use destination::Destination;
 use identity::{Identity, identity};
 use influx::Tags;
+use made::{LogJson, Made, MadeJson};
 use naming::Named;
 use selection::Selection;
 
 use works::{Work, Works, check_forms};
 use write::Writers;
+
+/// What `hums decode --json` prints.
+const SCHEMA: Schema = Schema::first("hums-decode");
 
 /// Runs `hums decode`.
 pub fn run(args: &cli::Decode) -> Result<Outcome> {
@@ -112,10 +118,11 @@ pub fn run(args: &cli::Decode) -> Result<Outcome> {
     let taken = Mutex::new(BTreeSet::new());
     let mut written = works.is_empty();
     let (mut kept, mut any_kept) = (Kept::default(), false);
+    let mut json = args.json.then(MadeJson::default);
     let mut tell = |done: Done| {
         outcome = outcome.and(done.outcome());
         written |= done.written;
-        done.tell()
+        done.tell(json.as_mut())
     };
     side_by_side(
         &works,
@@ -127,6 +134,7 @@ pub fn run(args: &cli::Decode) -> Result<Outcome> {
         },
     )?;
     followed.finish().try_for_each(&mut tell)?;
+    json.map_or(Ok(()), |json| output::json(SCHEMA, &json))?;
     kept.end()?;
     if !written && !any_kept {
         bail!("nothing of what was asked for is there, so nothing was written");
@@ -190,7 +198,7 @@ struct Done {
     /// Whether there was anything to write.
     written: bool,
     /// What was written.
-    lines: Vec<String>,
+    made: Vec<Made>,
     /// What there is to say of it.
     remarks: Vec<String>,
 }
@@ -198,8 +206,8 @@ struct Done {
 impl Done {
     /// Nothing was written of it, and nothing is said.
     fn of(log: &Place) -> Self {
-        let (lines, remarks) = (Vec::new(), Vec::new());
-        Self { name: log.name.clone(), outcome: Outcome::Done, ending: None, written: false, lines, remarks }
+        let (made, remarks) = (Vec::new(), Vec::new());
+        Self { name: log.name.clone(), outcome: Outcome::Done, ending: None, written: false, made, remarks }
     }
 
     fn outcome(&self) -> Outcome {
@@ -207,7 +215,8 @@ impl Done {
         self.outcome.and(Outcome::lossy(!is_sound))
     }
 
-    fn tell(&self) -> Result<()> {
+    /// Says what there is to say of it, and what was written, or adds that to the JSON.
+    fn tell(self, json: Option<&mut MadeJson>) -> Result<()> {
         for remark in &self.remarks {
             note!("{remark}");
         }
@@ -215,7 +224,12 @@ impl Done {
         for why in self.ending.iter().flat_map(said) {
             note!("{}: {why}", self.name);
         }
-        self.lines.iter().try_for_each(|line| output::line(&printable::word(line)))
+        let Some(json) = json else {
+            return self.made.iter().try_for_each(|made| output::line(&printable::word(&made.line())));
+        };
+        let whole = self.outcome() == Outcome::Done;
+        json.logs.push(LogJson { name: self.name, whole, files: self.made });
+        Ok(())
     }
 }
 
@@ -300,8 +314,8 @@ impl Task<'_> {
         }
         remarks.extend(written.left_out().map(|words| format!("{}: {words}", log.name)));
         outcome = outcome.and(Outcome::lossy(written.rows_left_out > 0));
-        let lines = if self.standard_output { Vec::new() } else { written.lines };
-        Ok(Done { outcome, ending, written: true, lines, remarks, ..Done::of(log) })
+        let made = if self.standard_output { Vec::new() } else { written.made };
+        Ok(Done { outcome, ending, written: true, made, remarks, ..Done::of(log) })
     }
 
     /// A log that is a copy of another one. Under two numbers of one card one of them has lost its own session.

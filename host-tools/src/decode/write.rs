@@ -12,6 +12,7 @@ use super::collect::Collected;
 use super::context::Context;
 use super::destination::Destination;
 use super::influx::{Clock, Lines};
+use super::made::Made;
 use super::parquet::ParquetTables;
 use super::record::gap_row;
 use super::reference::Reference;
@@ -56,8 +57,8 @@ impl Single {
 /// What was written.
 #[derive(Debug, Default)]
 pub struct Written {
-    /// For people: each file with what is in it.
-    pub lines: Vec<String>,
+    /// Each file with what is in it.
+    pub made: Vec<Made>,
     /// Rows of tables for whose names there was no room.
     pub rows_left_out: u64,
     /// Gaps of a tlog beside which no table can lie.
@@ -277,13 +278,14 @@ impl<'a> Writers<'a> {
 
     /// All of the log is there: the files get their names. Says what was written.
     pub fn finish(mut self) -> Result<Written> {
-        let mut lines = Vec::new();
-        let frames = count(self.frames, "frame");
+        let mut made = Vec::new();
+        let frames = (self.frames, "frame");
         let rows = if self.frames == 0 {
-            count(self.records, "row")
+            vec![(self.records, "row")]
         } else {
-            format!("{frames}, {}", count(self.records, "record"))
+            vec![frames, (self.records, "record")]
         };
+        let of_tables = |tables: usize| [&[(tables as u64, "table")], &rows[..]].concat();
         // An empty tlog would be taken for a log in which nothing came.
         let has_no_frame = self.frames == 0 && self.context.selection.is_part() && self.tlog.take().is_some();
         self.gaps = self.gaps.filter(|_| !has_no_frame);
@@ -295,42 +297,41 @@ impl<'a> Writers<'a> {
         // Gaps of an earlier decoding beside a tlog that has none now would be taken for its own.
         let stale = self.tlog.as_ref().filter(|_| self.gaps.is_none()).and_then(Single::gaps_path);
         stale.as_deref().map_or(Ok(()), |path| Output::check_none(path, &self.context.inputs))?;
-        let objects = count(self.objects, "object");
-        let mut singles = vec![(self.tlog.take(), frames), (self.jsonl.take(), objects)];
+        let mut singles =
+            vec![(self.tlog.take(), "tlog", frames), (self.jsonl.take(), "jsonl", (self.objects, "object"))];
         if let Some(Influx { file, count: points, .. }) = self.influx.take() {
-            singles.push((Some(file), count(points, "point")));
+            singles.push((Some(file), "influx", (points, "point")));
         }
-        for (file, what) in singles {
+        for (file, format, what) in singles {
             if let Some(file) = file {
-                lines.push(format!("{}: {what}", file.finish()?.display()));
+                made.push(Made::of(file.finish()?, format, &[what]));
             }
         }
         stale.map_or(Ok(()), |path| Output::keep(&path, &self.context.inputs))?;
         if let Some(file) = self.gaps.take() {
-            lines.push(format!("{}: gaps", file.finish()?.display()));
+            made.push(Made::with_words(file.finish()?, "gaps", "gaps".to_owned()));
         }
         if let (Some(csv), Some(dir)) = (self.csv.take(), self.destination.tables()) {
-            let tables = count(csv.count() as u64, "table");
-            let shared = csv.has_shared();
+            let (tables, shared) = (csv.count(), csv.has_shared());
             csv.finish()?;
-            lines.push(format!("{}: {tables}, {rows}", dir.display()));
+            made.push(Made::of(dir.clone(), "csv", &of_tables(tables)));
             if shared {
-                lines.push(format!(
-                    "{}: the messages without a definition beyond the first {UNKNOWN_TABLES_MAX}, with their ids in a column",
-                    dir.join("UNKNOWN.csv").display()
-                ));
+                let words = format!(
+                    "the messages without a definition beyond the first {UNKNOWN_TABLES_MAX}, with their ids in a column"
+                );
+                made.push(Made::with_words(dir.join("UNKNOWN.csv"), "csv", words));
             }
         }
         if let Some(thesis) = self.thesis.take() {
             let (dir, seconds) = thesis.finish()?;
-            lines.push(format!("{}: {}", dir.display(), count(seconds, "second")));
+            made.push(Made::of(dir, "thesis", &[(seconds, "second")]));
         }
         if let Some(parquet) = self.parquet.take() {
             let (dir, tables) = parquet.finish()?;
-            lines.push(format!("{}: {}, {rows}", dir.display(), count(tables as u64, "table")));
+            made.push(Made::of(dir, "parquet", &of_tables(tables)));
         }
         let Self { rows_left_out, gaps_left_out, .. } = self;
-        Ok(Written { lines, rows_left_out, gaps_left_out, has_no_frame })
+        Ok(Written { made, rows_left_out, gaps_left_out, has_no_frame })
     }
 }
 

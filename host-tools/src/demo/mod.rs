@@ -52,17 +52,7 @@ pub fn run(args: &cli::Demo) -> Result<Outcome> {
     parts.into_iter().try_for_each(InPlacePart::finish)?;
     line("")?;
     line("2. what was on the SD card")?;
-    let arguments = cli::Decode {
-        salvage: false,
-        inputs: vec![card.clone()],
-        output: decoded.clone(),
-        format: vec![Format::Tlog, Format::Csv],
-        from: None,
-        to: None,
-        message: Vec::new(),
-        replace: false,
-    };
-    let read = decode::run(&arguments)?;
+    let read = decode::run(&tables_of(&card, &decoded))?;
     place.note_tables()?;
     let page_of = cli::Report {
         inputs: vec![card.clone()],
@@ -70,6 +60,7 @@ pub fn run(args: &cli::Demo) -> Result<Outcome> {
         session: None,
         system: None,
         replace: false,
+        json: false,
     };
     report::run(&page_of)?;
     place.note(&[(earlier::REPORT, &page)])?;
@@ -100,6 +91,21 @@ pub fn run(args: &cli::Demo) -> Result<Outcome> {
     Ok(outcome)
 }
 
+/// What becomes of the card.
+fn tables_of(card: &Path, decoded: &Path) -> cli::Decode {
+    cli::Decode {
+        salvage: false,
+        inputs: vec![card.to_owned()],
+        output: decoded.to_owned(),
+        format: vec![Format::Tlog, Format::Csv],
+        from: None,
+        to: None,
+        message: Vec::new(),
+        replace: false,
+        json: false,
+    }
+}
+
 /// Whoever calls this from a script waits for its end.
 fn is_wanted(dashboard: Dashboard) -> bool {
     match dashboard {
@@ -120,6 +126,7 @@ fn dashboard(card: &Path) -> Result<Outcome> {
         listen_token: None,
         params: None,
         open: false,
+        json: false,
         influx: None,
         token: None,
         org: None,

@@ -6,6 +6,7 @@ use hums_blackbox::{BlockCounts, PAGE_SECTORS};
 
 use super::proof::Proof;
 use crate::hex::hex;
+use crate::logs::naming::is_part;
 use crate::logs::reader::Summary;
 use crate::logs::segment_name;
 use crate::logs::strangers::{Others, Shift, Strange};
@@ -61,9 +62,16 @@ impl Files<'_> {
 
     /// Files that hold what is not the log's, and files that are missing before its first one.
     pub(super) fn strange(&self) -> Vec<String> {
+        let parts = self.names.iter().filter(|name| is_part(Path::new(name)));
+        let part_words = |name: &String| {
+            format!(
+                "{name} is a part of its log, as `hums pull --around` brings it: what it lacks was not brought, and `hums pull` brings it"
+            )
+        };
+        let parts: Vec<_> = parts.map(part_words).collect();
         let told: Vec<_> = self.summary.strange.iter().filter(|strange| !self.is_usual(strange)).collect();
-        let mut all: Vec<_> =
-            told.iter().take(NAMED_MAX).map(|strange| self.strange_words(strange)).collect();
+        let strange = told.iter().take(NAMED_MAX).map(|strange| self.strange_words(strange));
+        let mut all: Vec<_> = parts.into_iter().chain(strange).collect();
         if told.len() > NAMED_MAX {
             all.push(format!("so it is with {} more of its files", told.len() - NAMED_MAX));
         }

@@ -23,8 +23,14 @@ pub struct ImageJson {
     not_looked_at: Option<String>,
 }
 
+/// The images of a run.
+#[derive(Debug, Serialize)]
+pub struct ImagesJson {
+    images: Vec<ImageJson>,
+}
+
 /// The images of a run as JSON.
-pub fn images_json(images: &[logs::find::Image]) -> Vec<ImageJson> {
+pub fn images_json(images: &[logs::find::Image]) -> ImagesJson {
     let json = |image: &logs::find::Image| ImageJson {
         path: image.path.display().to_string(),
         damage: image.damage.clone(),
@@ -32,7 +38,7 @@ pub fn images_json(images: &[logs::find::Image]) -> Vec<ImageJson> {
         found_by_scan: image.scanned,
         not_looked_at: image.not_looked_at(),
     };
-    images.iter().map(json).collect()
+    ImagesJson { images: images.iter().map(json).collect() }
 }
 
 /// One log.
@@ -126,11 +132,11 @@ struct GapJson {
 }
 
 #[derive(Debug, Serialize)]
-pub(super) struct LossJson {
-    pub(super) what: &'static str,
-    pub(super) count: u64,
-    pub(super) from_s: f64,
-    pub(super) to_s: f64,
+struct LossJson {
+    what: &'static str,
+    count: u64,
+    from_s: f64,
+    to_s: f64,
 }
 
 #[derive(Debug, Serialize)]
@@ -304,7 +310,7 @@ fn gaps(contents: &Contents) -> Vec<GapJson> {
     contents.gaps.iter().map(json).collect()
 }
 
-pub(super) fn losses(contents: &Contents) -> Vec<LossJson> {
+fn losses(contents: &Contents) -> Vec<LossJson> {
     let json = |loss: &hums_blackbox::record::Loss| LossJson {
         what: loss.what.name(),
         count: loss.count,

@@ -2,25 +2,28 @@
 //!
 //! Writing to a `String` cannot fail; the results of `write!` are dropped on purpose in all of this.
 
-use std::collections::BTreeSet;
 use std::fmt::Write as _;
+use std::path::Path;
 
 use hums_blackbox::Cause;
 use hums_core::health;
 use hums_core::observation::Feeds;
 use hums_core::time::Instant;
 
-use super::json::{duration_s, finite, losses, vehicle};
-use super::wear;
+use super::json::{duration_s, finite, vehicle};
+use super::number::short;
+use super::{usage, wear};
+use crate::colour::level;
 use crate::ending::{among_words, behind_words, copies_words, made_again_words};
 use crate::logs;
 use crate::logs::begun_anew::BegunAnew;
+use crate::logs::naming::is_part;
 use crate::plural::count;
 use crate::printable::{path, word};
 use crate::source::item::MessageCount;
 use crate::states;
 use crate::summary::{Contents, FindingLine, LISTED_MAX, Overview};
-use crate::utc::iso8601;
+use crate::utc::{clock, iso8601, moment};
 
 /// Findings and gaps that people are shown; the rest is counted, and is in `--json` and `hums decode`.
 const SHOWN_MAX: usize = 40;
@@ -46,7 +49,7 @@ pub fn text(log: &Overview) -> String {
     heading(&mut text, log);
     findings_text(&mut text, log);
     gaps_text(&mut text, log);
-    usage_text(&mut text, log);
+    usage::text(&mut text, log);
     wear::text(&mut text, log);
     messages_text(&mut text, log);
     text
@@ -63,8 +66,9 @@ fn heading(text: &mut String, log: &Overview) {
             let utc = |at| {
                 log.utc_us(at).map_or_else(|| "UTC unknown".to_owned(), |utc| iso8601(utc / 1000 * 1000))
             };
-            let _ = writeln!(text, "  from     {:>10.3} s  {}", first.as_secs_f64(), utc(first));
-            let _ = writeln!(text, "  to       {:>10.3} s  {}", last.as_secs_f64(), utc(last));
+            let _ = writeln!(text, "  from     {:>12}  {}", moment(first), utc(first));
+            let _ = writeln!(text, "  to       {:>12}  {}", moment(last), utc(last));
+            let _ = writeln!(text, "  length   {:>12}", clock(last.since(first)));
         }
         _ if messages(log) > 0 => {}
         _ => text.push_str("  nothing in it can be read\n"),
@@ -158,9 +162,9 @@ fn findings_text(text: &mut String, log: &Overview) {
     for finding in contents.findings.iter().take(SHOWN_MAX) {
         let _ = writeln!(
             text,
-            "    {:>9.3} s  {:<8}  {}",
-            finding.at.as_secs_f64(),
-            finding.level,
+            "    {:>11}  {:<8}  {}",
+            moment(finding.at),
+            level(finding.level),
             word(&sentence(finding))
         );
     }
@@ -189,15 +193,6 @@ fn sentence(finding: &FindingLine) -> String {
     sentence
 }
 
-/// To three decimals, and no more than it needs; what is too large for any sensor or counter is not written out.
-fn short(value: f64) -> String {
-    if value.abs() >= 1e15 {
-        return format!("{value:.0e}");
-    }
-    let text = format!("{value:.3}");
-    text.trim_end_matches('0').trim_end_matches('.').to_owned()
-}
-
 fn more(text: &mut String, count: u64, listed: usize) {
     let shown = listed.min(SHOWN_MAX) as u64;
     if count > shown {
@@ -211,6 +206,7 @@ fn more(text: &mut String, count: u64, listed: usize) {
 
 fn gaps_text(text: &mut String, log: &Overview) {
     let (summary, contents) = (&log.ending.summary, &log.contents);
+    let is_part = log.ending.files.iter().any(|file| is_part(Path::new(file)));
     // Frames and sectors are counted in logs of ours only.
     let own = log.format.is_none();
     if summary.gaps + summary.losses + summary.blocks.damaged == 0 {
@@ -235,14 +231,12 @@ fn gaps_text(text: &mut String, log: &Overview) {
         return foreign_gaps(text, log);
     }
     for gap in contents.gaps.iter().filter(|gap| gap.cause == Cause::Disarmed).take(SHOWN_MAX) {
-        let time = |at: Option<Instant>| at.map_or(0.0, Instant::as_secs_f64);
+        let time = |at: Option<Instant>| moment(at.unwrap_or(Instant::ZERO));
         let (from, to) = (time(gap.from), time(gap.to));
-        let _ = writeln!(text, "    from {from:.3} to {to:.3} s: not recorded: disarmed");
+        let _ = writeln!(text, "    from {from} to {to}: not recorded: disarmed");
     }
     for gap in contents.gaps.iter().filter(|gap| gap.cause != Cause::Disarmed).take(SHOWN_MAX) {
-        let time = |at: Option<Instant>, none: &str| {
-            at.map_or_else(|| none.to_owned(), |at| format!("{:.3} s", at.as_secs_f64()))
-        };
+        let time = |at: Option<Instant>, none: &str| at.map_or_else(|| none.to_owned(), moment);
         let frames = gap
             .frames
             .map_or_else(|| "an unknown number of frames".to_owned(), |frames| count(frames, "frame"));
@@ -251,18 +245,15 @@ fn gaps_text(text: &mut String, log: &Overview) {
             "    from {} to {}: {}, {} lost, {} more of no use, {frames} missing",
             time(gap.from, "the beginning"),
             time(gap.to, "the end"),
-            words(gap.cause),
+            if is_part && gap.cause == Cause::Missing { "not brought yet" } else { words(gap.cause) },
             count(gap.sectors_lost, "sector"),
             gap.sectors_skipped
         );
     }
     more(text, (summary.gaps + summary.losses).max(contents.gaps.len() as u64), contents.gaps.len());
-    for loss in losses(contents) {
-        let _ = writeln!(
-            text,
-            "  lost     {} {} between {:.3} and {:.3} s",
-            loss.count, loss.what, loss.from_s, loss.to_s
-        );
+    for loss in contents.losses.values() {
+        let (from, to) = (moment(loss.from), moment(loss.to));
+        let _ = writeln!(text, "  lost     {} {} between {from} and {to}", loss.count, loss.what.name());
     }
 }
 
@@ -270,10 +261,9 @@ fn gaps_text(text: &mut String, log: &Overview) {
 fn foreign_gaps(text: &mut String, log: &Overview) {
     let (summary, contents) = (&log.ending.summary, &log.contents);
     for (gap, (place, found)) in contents.gaps.iter().zip(&contents.gap_words).take(SHOWN_MAX) {
-        let seconds = |at: Instant| format!("{:.3}", at.as_secs_f64());
         let when = match (gap.from, gap.to) {
-            (Some(from), Some(to)) => format!("from {} to {} s", seconds(from), seconds(to)),
-            (Some(from), None) => format!("at {} s", seconds(from)),
+            (Some(from), Some(to)) => format!("from {} to {}", moment(from), moment(to)),
+            (Some(from), None) => format!("at {}", moment(from)),
             (None, _) => "at the beginning".to_owned(),
         };
         let place = place.map_or_else(String::new, |place| format!("byte {place}: "));
@@ -298,19 +288,6 @@ fn words(cause: Cause) -> &'static str {
         Cause::Corrupt => "sectors hold what no recorder writes",
         Cause::Altered => "the recorder's memory had changed: what it wrote is not what came",
         Cause::Disarmed => "not recorded: disarmed",
-    }
-}
-
-fn usage_text(text: &mut String, log: &Overview) {
-    if !log.contents.usage.is_empty() {
-        text.push_str("  usage                                     session           life\n");
-    }
-    let number = |value: Option<&f64>| value.map_or_else(String::new, |&value| short(value));
-    let Contents { usage, lifetime, .. } = &log.contents;
-    let names: BTreeSet<_> = usage.keys().chain(lifetime.keys()).collect();
-    for name in names {
-        let (session, life) = (number(usage.get(name)), number(lifetime.get(name)));
-        let _ = writeln!(text, "{}", format!("    {name:<34} {session:>14} {life:>14}").trim_end());
     }
 }
 

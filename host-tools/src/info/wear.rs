@@ -3,9 +3,11 @@
 use std::fmt::Write as _;
 
 use hums_core::health::exceedance::Crossings;
+use hums_core::time::Instant;
 
 use super::json::finite;
 use crate::summary::Overview;
+use crate::utc::moment;
 
 /// Exceedances and components of a log.
 pub(super) fn text(text: &mut String, log: &Overview) {
@@ -21,7 +23,7 @@ pub(super) fn text(text: &mut String, log: &Overview) {
                 continue;
             }
             let Crossings { warnings, criticals, warning_tenths, critical_tenths, peak } = *crossings;
-            let seconds = |tenths: u32| format!("{:.1} s", f64::from(tenths) / 10.0);
+            let seconds = |tenths: u32| moment(Instant::from_millis(u64::from(tenths) * 100));
             let peak = finite(peak).map_or_else(String::new, |peak| format!("{peak:.6} {}", line.unit));
             let _ = writeln!(
                 text,

@@ -20,6 +20,7 @@ pub mod influx;
 pub mod latest;
 pub mod native;
 pub mod playback;
+pub mod qr;
 pub mod rate;
 pub mod recording;
 pub mod server;
@@ -29,6 +30,7 @@ pub mod told;
 pub mod values;
 pub mod world;
 
+use std::io::IsTerminal as _;
 use std::net::{IpAddr, SocketAddr, TcpListener, ToSocketAddrs};
 use std::path::PathBuf;
 use std::process::{Command, Stdio};
@@ -38,6 +40,7 @@ use std::thread::JoinHandle;
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use anyhow::{Context as _, Result, anyhow};
+use serde::Serialize;
 
 use self::feed::Feed;
 use self::guard::Guard;
@@ -51,7 +54,7 @@ use crate::cli;
 use crate::files::Inputs;
 use crate::interrupt;
 use crate::outcome::{Outcome, usage};
-use crate::output;
+use crate::output::{self, Schema};
 use crate::plural::{are, count};
 
 /// Runs `hums live`.
@@ -65,9 +68,7 @@ pub fn run(args: &cli::Live) -> Result<Outcome> {
     interrupt::watch();
     let follower = follow(args, &limits, &hub, commands, influx)?;
     let pages = page_addresses(address, token.as_deref(), others());
-    for page in &pages {
-        output::line(page)?;
-    }
+    tell(args, &pages)?;
     if let Some(page) = pages.first().filter(|_| args.open) {
         open(page);
     }
@@ -84,6 +85,33 @@ pub fn run(args: &cli::Live) -> Result<Outcome> {
     }
     server.join().map_err(|_| anyhow!("the server has failed"))??;
     Ok(Outcome::Done)
+}
+
+/// What `hums live --json` prints.
+const SCHEMA: Schema = Schema::first("hums-live");
+
+/// Where the page is.
+#[derive(Debug, Serialize)]
+struct PagesJson<'a> {
+    pages: &'a [String],
+}
+
+/// Says where the page is: on a terminal also as a code for the camera of a phone, where a phone can reach it.
+fn tell(args: &cli::Live, pages: &[String]) -> Result<()> {
+    if args.json {
+        return output::json(SCHEMA, &PagesJson { pages });
+    }
+    pages.iter().try_for_each(|page| output::line(page))?;
+    let Some(page) = pages.iter().find(|page| !is_here_only(page)) else { return Ok(()) };
+    if std::io::stdout().is_terminal() {
+        output::terminal_only(&qr::code(page, output::is_in_colour())?)?;
+    }
+    Ok(())
+}
+
+/// Whether other machines cannot reach it.
+fn is_here_only(page: &str) -> bool {
+    ["http://localhost:", "http://127.", "http://[::1]:"].iter().any(|here| page.starts_with(here))
 }
 
 type Follower = JoinHandle<Result<Option<Influx>>>;
@@ -276,5 +304,7 @@ mod tests {
         assert_eq!(pages("0.0.0.0:80"), ["http://localhost:80/#token=t0", "http://192.168.1.5:80/#token=t0"]);
         assert_eq!(pages("[::]:80").last().map(String::as_str), Some("http://[2001:db8::5]:80/#token=t0"));
         assert_eq!(pages("127.0.0.1:80"), ["http://127.0.0.1:80/#token=t0"]);
+        assert!(pages("127.0.0.1:80").iter().chain(&pages("[::1]:80")).all(|page| is_here_only(page)));
+        assert!(is_here_only(&pages("0.0.0.0:80")[0]) && !is_here_only(&pages("0.0.0.0:80")[1]));
     }
 }

@@ -2,7 +2,7 @@
 //! that no other one's files ever have it: `00042-box3f0042000d51373435363338-s1a2b3c4d_07.HUM` is the same segment of the card's log
 //! 00042 of the board with that unique id, and the session that its sectors name.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use hums_recorder::LogName;
 
@@ -61,6 +61,21 @@ pub fn segment_name(path: &Path) -> Option<SegmentName> {
     Some(SegmentName { of, session, segment })
 }
 
+/// What stands before the ending of a part of a log.
+const PART: &str = ".part";
+
+/// The path of a part of this log, which `hums pull --around` brings: `00042-s1a2b3c4d_07.part.HUM`.
+pub fn part_name(whole: &Path) -> PathBuf {
+    whole.with_extension("part.HUM")
+}
+
+/// Whether a file's name says that it is a part of a log.
+pub fn is_part(path: &Path) -> bool {
+    let is_hum = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("hum"));
+    let stem = path.file_stem().map(|stem| stem.to_string_lossy().to_ascii_lowercase());
+    is_hum && stem.is_some_and(|stem| stem.ends_with(PART))
+}
+
 /// Whether a name ends with a session, `s1a2b3c4d`, behind a box or nothing.
 fn is_of_session(of: &str) -> bool {
     let session = match of.rsplit_once('-') {
@@ -75,6 +90,16 @@ fn is_of_session(of: &str) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_part_is_known_by_its_name_and_is_no_segment() {
+        let part = part_name(Path::new("logs/00042-s1a2b3c4d_07.HUM"));
+        assert_eq!(part, Path::new("logs/00042-s1a2b3c4d_07.part.HUM"));
+        assert!(is_part(&part) && is_part(Path::new("a.PART.hum")) && segment_name(&part).is_none());
+        for other in ["00042-s1a2b3c4d_07.HUM", "a.part", "part.HUM", "a.part.tlog"] {
+            assert!(!is_part(Path::new(other)), "{other}");
+        }
+    }
 
     #[test]
     fn a_segment_is_known_by_its_name_on_the_card_and_by_the_name_of_its_session() {

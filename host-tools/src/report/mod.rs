@@ -8,7 +8,6 @@
 //! own policy lets no other script run and loads nothing.
 
 pub mod causes;
-pub mod counters;
 pub mod flights;
 pub mod page;
 pub mod replay;
@@ -19,6 +18,7 @@ use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Result, bail};
+use serde::Serialize;
 
 use crate::check;
 use crate::cli;
@@ -29,12 +29,28 @@ use crate::logs::sessions::Sessions;
 use crate::logs::side_by_side::side_by_side;
 use crate::logs::{Log, segment_name};
 use crate::outcome::{Kept, Outcome, usage};
-use crate::output;
+use crate::output::{self, Schema};
 use crate::plural::count;
 use crate::printable::{path as shown, word};
 use crate::source::find::{find, sessions_of};
 use crate::source::recording::Place;
 use crate::summary::Overview;
+
+/// What `hums report --json` prints.
+const SCHEMA: Schema = Schema::first("hums-report");
+
+/// The pages that were written.
+#[derive(Debug, Default, Serialize)]
+struct PagesJson {
+    pages: Vec<PageJson>,
+}
+
+#[derive(Debug, Serialize)]
+struct PageJson {
+    path: PathBuf,
+    session: String,
+    bytes: u64,
+}
 
 /// Runs `hums report`.
 pub fn run(args: &cli::Report) -> Result<Outcome> {
@@ -56,7 +72,7 @@ pub fn run(args: &cli::Report) -> Result<Outcome> {
     inputs.refuse(&args.output)?;
     // Of each session only what later ones are compared with is kept.
     let mut earlier: Vec<Option<trend::Session>> = Vec::new();
-    let mut kept = Kept::default();
+    let (mut kept, mut pages) = (Kept::default(), PagesJson::default());
     // The next start on the card tells how a session ended.
     let end = found.places.len().min(*wanted.sessions.end() + 1 + HELD_MAX);
     let mut followed = Followed::new(sessions);
@@ -81,7 +97,10 @@ pub fn run(args: &cli::Report) -> Result<Outcome> {
                 }
                 Named::As(name, _) => {
                     let trend = trend::of(&this, &before);
-                    kept.pass(make(place, &overview, &trend, &wanted.path(&name), &inputs))?;
+                    pages.add(
+                        kept.pass(make(place, &overview, &trend, wanted.path(&name), &inputs))?,
+                        args.json,
+                    )?;
                 }
             }
         }
@@ -105,8 +124,31 @@ pub fn run(args: &cli::Report) -> Result<Outcome> {
             found.places.len()
         );
     }
+    pages.end(args.json)?;
     kept.end()?;
     Ok(outcome)
+}
+
+impl PagesJson {
+    /// A page was written, or was kept as it is.
+    fn add(&mut self, page: Option<PageJson>, json: bool) -> Result<()> {
+        if !json {
+            page.iter().try_for_each(PageJson::tell)?;
+        }
+        self.pages.extend(page);
+        Ok(())
+    }
+
+    fn end(&self, json: bool) -> Result<()> {
+        if json { output::json(SCHEMA, self) } else { Ok(()) }
+    }
+}
+
+impl PageJson {
+    fn tell(&self) -> Result<()> {
+        let bytes = count(self.bytes, "byte");
+        output::line(&format!("{}: session {}, {bytes}", shown(&self.path), word(&self.session)))
+    }
 }
 
 /// Whether two sessions are of one card: in one image, or segments in one folder. Then one box recorded them. What lies
@@ -121,18 +163,17 @@ fn are_of_one_card(one: &Place, other: &Place) -> bool {
     image(one) == image(other) || folder(one).is_some() && folder(one) == folder(other)
 }
 
-/// Makes the page of a session, and says so.
+/// Makes the page of a session.
 fn make(
     place: &Place,
     overview: &Overview,
     trend: &trend::Trend,
-    path: &Path,
+    path: PathBuf,
     inputs: &Inputs,
-) -> Result<()> {
+) -> Result<PageJson> {
     let html = page::html(overview, &replay::Replay::of(place, overview)?, trend)?;
-    write(path, &html, inputs)?;
-    let bytes = count(html.len() as u64, "byte");
-    output::line(&format!("{}: session {}, {bytes}", shown(path), word(&place.name)))
+    write(&path, &html, inputs)?;
+    Ok(PageJson { path, session: place.name.clone(), bytes: html.len() as u64 })
 }
 
 fn write(path: &Path, html: &str, inputs: &Inputs) -> Result<()> {

@@ -8,10 +8,10 @@ use hums_core::time::Instant;
 use serde::Serialize;
 use sha2::{Digest as _, Sha256};
 
-use super::counters::{self, Counters};
 use super::flights::Flight;
 use super::replay::Replay;
 use super::trend::Trend;
+use crate::counters::{self, Counters};
 use crate::info::json::LogJson;
 use crate::page::history::{Cursor, Part};
 use crate::page::json::embedded;

@@ -12,9 +12,12 @@ use super::earlier::EarlierSessions;
 use crate::endpoint::Endpoint;
 use crate::logs;
 use crate::outcome::Outcome;
-use crate::output;
+use crate::output::{self, Schema};
 use crate::plural::count;
 use crate::summary::{FindingLine, Overview};
+
+/// What `hums sim --json` and `hums emulate --json` print.
+const SCHEMA: Schema = Schema::first("hums-run");
 
 /// The object of `--json`; its names are a contract.
 #[derive(Clone, Debug, Default, Serialize)]
@@ -194,7 +197,7 @@ impl Report {
     /// Prints it, and says how the run ended: what was lost because power was cut on purpose is no loss of the recorder.
     pub fn print(&self, json: bool, quiet: bool) -> Result<Outcome> {
         if json {
-            output::json(self)?;
+            output::json(SCHEMA, self)?;
         } else if quiet {
             eprintln!("{}", self.text());
         } else {

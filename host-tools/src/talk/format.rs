@@ -1,17 +1,17 @@
 //! `hums format`: the board formats a card that it cannot record on.
 
-use std::io::Write as _;
 use std::time::{Duration, Instant};
 
 use anyhow::{Context as _, Result, bail};
 use hums_link::messages;
 use hums_link::packet::Fields;
+use serde::Serialize;
 
 use super::Client;
 use crate::cli;
 use crate::mavlink::ids::{COMMAND_ACK, STATUSTEXT};
 use crate::outcome::{Outcome, usage};
-use crate::output::Stdout;
+use crate::output::{self, Schema};
 
 /// `MAV_CMD_STORAGE_FORMAT`
 const FORMAT: u16 = 526;
@@ -19,6 +19,14 @@ const ANSWER: Duration = Duration::from_millis(700);
 const TRIES: usize = 8;
 /// A card of 512 GB takes two minutes.
 const PATIENCE: Duration = Duration::from_mins(10);
+
+/// What `hums format --json` prints.
+const SCHEMA: Schema = Schema::first("hums-format");
+
+#[derive(Debug, Serialize)]
+struct FormattedJson {
+    formatted: bool,
+}
 
 /// Runs `hums format`.
 pub fn run(args: &cli::FormatCard) -> Result<Outcome> {
@@ -50,9 +58,11 @@ pub fn run(args: &cli::FormatCard) -> Result<Outcome> {
     })?;
     match told.as_deref() {
         Some("recording") => {
-            let mut out = Stdout::new();
-            writeln!(out, "formatted, and recorded on")?;
-            out.flush()?;
+            if args.json {
+                output::json(SCHEMA, &FormattedJson { formatted: true })?;
+            } else {
+                output::line("formatted, and recorded on")?;
+            }
             Ok(Outcome::Done)
         }
         Some(state) => bail!("it did not work, the board says of its card: {state}"),

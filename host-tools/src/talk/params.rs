@@ -1,13 +1,13 @@
 //! `hums params`: the board's parameters, as ground stations ask for them.
 
 use std::collections::BTreeMap;
-use std::io::Write as _;
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail};
 use hums_link::Frame;
 use hums_link::packet::{Fields, Packet};
 use hums_link::signing::{KEY_BYTES, Key};
+use serde::Serialize;
 
 use super::Client;
 use crate::cli::{self, Link, ParamsAction};
@@ -15,7 +15,7 @@ use crate::mavlink::ids::{
     PARAM_REQUEST_LIST, PARAM_REQUEST_READ, PARAM_SET, PARAM_VALUE, SETUP_SIGNING, STATUSTEXT,
 };
 use crate::outcome::{Outcome, usage};
-use crate::output::Stdout;
+use crate::output::{self, Schema};
 use crate::talk;
 
 /// A silence of this long in a list means that what is missing was lost.
@@ -35,32 +35,27 @@ struct Param {
 
 /// Runs `hums params`.
 pub fn run(args: &cli::Params) -> Result<Outcome> {
-    let mut out = Stdout::new();
     match &args.action {
-        ParamsAction::List { at, json } => {
-            let values = list(&mut Client::connect(at)?)?;
-            if *json {
-                let object: serde_json::Map<_, _> =
-                    values.iter().map(|value| (value.name.clone(), f64::from(value.value).into())).collect();
-                writeln!(out, "{}", serde_json::Value::Object(object))?;
-            } else {
-                for value in values {
-                    writeln!(out, "{} {}", value.name, value.value)?;
-                }
-            }
-        }
-        ParamsAction::Get { names, at } => {
+        ParamsAction::List { at, json } => show(list(&mut Client::connect(at)?)?, *json)?,
+        ParamsAction::Get { names, at, json } => {
             let mut client = Client::connect(at)?;
-            for name in names {
-                let value = read(&mut client, name)?;
-                writeln!(out, "{name} {}", value.value)?;
+            let values = names.iter().map(|name| read(&mut client, name));
+            if *json {
+                show(values.collect::<Result<Vec<_>>>()?, true)?;
+            } else {
+                // Each as it comes: a later one may not be there.
+                values.into_iter().try_for_each(|value| show([value?], false))?;
             }
         }
-        ParamsAction::Sign { at, remove } => {
+        ParamsAction::Sign { at, remove, json } => {
             sign(at, *remove)?;
-            writeln!(out, "{}", if *remove { "key removed" } else { "key set" })?;
+            if *json {
+                output::json(SIGNED, &KeyJson { has_key: !*remove })?;
+            } else {
+                output::line(if *remove { "key removed" } else { "key set" })?;
+            }
         }
-        ParamsAction::Set { name, value, at } => {
+        ParamsAction::Set { name, value, at, json } => {
             let mut client = Client::connect(at)?;
             let (system, component) = client.target();
             let packet = Packet::new(PARAM_SET)
@@ -75,11 +70,31 @@ pub fn run(args: &cli::Params) -> Result<Outcome> {
             if kept.value.to_bits() != value.to_bits() {
                 bail!("{name}: the board refused {value} and keeps {}", kept.value);
             }
-            writeln!(out, "{name} {value}")?;
+            show([kept], *json)?;
         }
     }
-    out.flush()?;
     Ok(Outcome::Done)
+}
+
+/// What `hums params list`, `get` and `set` print with `--json`.
+const VALUES: Schema = Schema::first("hums-params");
+/// What `hums params sign --json` prints.
+const SIGNED: Schema = Schema::first("hums-params-sign");
+
+/// What the board said of its key.
+#[derive(Debug, Serialize)]
+struct KeyJson {
+    has_key: bool,
+}
+
+/// Prints parameters, as lines that `hums sim --params` reads back, or as one object.
+fn show(values: impl IntoIterator<Item = Param>, json: bool) -> Result<()> {
+    if json {
+        let object: serde_json::Map<_, _> =
+            values.into_iter().map(|value| (value.name, f64::from(value.value).into())).collect();
+        return output::json(VALUES, &object);
+    }
+    values.into_iter().try_for_each(|value| output::line(&format!("{} {}", value.name, value.value)))
 }
 
 /// Brings the board the key, or takes it away. The board answers with a text.

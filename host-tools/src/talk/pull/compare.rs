@@ -54,15 +54,27 @@ pub(super) fn compare(ftp: &mut Ftp, name: &str, path: &Path, bytes: u32) -> Res
     Ok(Likeness::SameEnds)
 }
 
+/// The beginning of a log on the board.
+pub(super) struct Heading {
+    /// What the log is called here.
+    pub(super) name: String,
+    /// The first sectors, as far as they were looked at.
+    pub(super) sectors: Vec<Sector>,
+}
+
 /// What the board's log that is open and has so many bytes is called here: by the session that its first sectors name, and the box that
 /// its record of the start does.
-pub(super) fn file_name(ftp: &mut Ftp, name: &str, length: u32) -> Result<String> {
-    let Some(segment) = segment_name(Path::new(name)) else { return Ok(name.to_owned()) };
+pub(super) fn heading_of(ftp: &mut Ftp, name: &str, length: u32) -> Result<Heading> {
+    let mut sectors = Vec::new();
+    let Some(segment) = segment_name(Path::new(name)) else {
+        return Ok(Heading { name: name.to_owned(), sectors });
+    };
     let (mut session, mut board) = (None, None);
     let mut group = Vec::new();
     for at in (0..HEADING_SECTORS).map(|sector| sector * SECTOR).filter(|at| *at + SECTOR <= length) {
         let bytes = bytes_of(ftp, at, SECTOR)?;
-        let Some(sector) = bytes.first_chunk().map(|bytes| Sector::from_bytes(*bytes)) else { continue };
+        let Some(sector) = bytes.first_chunk().map(|bytes| Sector::from_bytes(*bytes)) else { break };
+        sectors.push(sector);
         let Ok(header) = Header::read(sector.bytes()) else { continue };
         if *session.get_or_insert(header.session) != header.session {
             continue;
@@ -78,11 +90,11 @@ pub(super) fn file_name(ftp: &mut Ftp, name: &str, length: u32) -> Result<String
     }
     let board = board.filter(|board| *board != [0; 12]);
     let session = session_name(&format!("{:05}", segment.session), board.as_ref(), session);
-    Ok(format!("{session}_{:02}.HUM", segment.segment))
+    Ok(Heading { name: format!("{session}_{:02}.HUM", segment.segment), sectors })
 }
 
 /// These bytes of the board's log that is open.
-fn bytes_of(ftp: &mut Ftp, start: u32, wanted: u32) -> Result<Vec<u8>> {
+pub(super) fn bytes_of(ftp: &mut Ftp, start: u32, wanted: u32) -> Result<Vec<u8>> {
     let mut bytes = Vec::new();
     while bytes.len() < wanted as usize {
         let had = bytes.len() as u32;

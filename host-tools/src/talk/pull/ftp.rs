@@ -182,6 +182,42 @@ impl Ftp {
         }
     }
 
+    /// Brings these bytes of the log that is open, in order, in pieces as they come.
+    pub(super) fn bring(
+        &mut self,
+        from: u32,
+        to: u32,
+        mut take: impl FnMut(&[u8]) -> Result<()>,
+    ) -> Result<()> {
+        let mut have = from;
+        let mut silent = 0;
+        while have < to {
+            let pieces = self.burst(have, to)?;
+            silent = if pieces.is_empty() { silent + 1 } else { 0 };
+            if silent >= TRIES {
+                bail!("nothing more comes; to go on, call again");
+            }
+            let (before, mut came) = (have, Vec::new());
+            let end = pieces.iter().map(|(at, data)| *at + data.len() as u32).max().unwrap_or(have);
+            while have < end {
+                let data = if let Some(data) = pieces.get(&have) {
+                    data.clone()
+                } else {
+                    // Up to the next piece that came.
+                    let next = pieces.range(have..).next().map_or(end, |(at, _)| *at);
+                    self.piece(have, next - have)?
+                };
+                have += data.len() as u32;
+                came.extend(data);
+            }
+            take(&came)?;
+            if have == before && silent == 0 {
+                bail!("the board sends nothing new");
+            }
+        }
+        Ok(())
+    }
+
     /// What a burst from `offset` brings, by offset, as much of it as came.
     pub(super) fn burst(&mut self, offset: u32, length: u32) -> Result<BTreeMap<u32, Vec<u8>>> {
         self.say(BURST, offset, DATA_MAX, b"")?;

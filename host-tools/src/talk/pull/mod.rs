@@ -4,29 +4,73 @@
 //! log (by its checksum, or where the board's firmware computes none by its ends); at the end the whole is compared, and read through as
 //! `hums verify` does, also where it is there already. A file's name says whose session it is, so that those of two cards never meet.
 
+mod around;
 mod compare;
 mod ftp;
+mod moment;
+mod part;
 
 use std::fs::File;
 use std::io::{self, Read as _, Write as _};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result, bail};
-use hums_blackbox::{Cause, Gap};
+use hums_blackbox::{Cause, Gap, SECTOR_BYTES};
+use hums_core::time::Instant;
+use serde::Serialize;
 
-use self::compare::{Likeness, compare, file_name};
+use self::compare::{Likeness, compare, heading_of};
 use self::ftp::Ftp;
+use self::part::Part;
 use super::Client;
 use crate::cli;
 use crate::files::{Output, make_directory, settle};
 use crate::logs::{self, segment_name};
 use crate::outcome::Outcome;
-use crate::output::Stdout;
+use crate::output::{self, Schema};
 use crate::plural::count;
+use crate::printable::word;
 use crate::summary::Overview;
 
-/// Bursts without an answer after which the board is taken for gone.
-const TRIES: usize = 10;
+/// What `hums pull --json` prints.
+const SCHEMA: Schema = Schema::first("hums-pull");
+
+#[derive(Debug, Serialize)]
+struct PulledJson {
+    logs: Vec<LogJson>,
+    /// With `--around`.
+    around: Option<MomentJson>,
+}
+
+#[derive(Debug, Serialize)]
+struct MomentJson {
+    time_s: f64,
+    check: Option<String>,
+    instance: Option<u8>,
+    level: Option<&'static str>,
+}
+
+impl MomentJson {
+    fn of(at: Instant, found: Option<around::Found>) -> Self {
+        let (check, instance, level) = found
+            .map(|found| (found.check, found.instance, found.level))
+            .map_or((None, None, None), |(check, instance, level)| {
+                (Some(check), Some(instance), Some(level))
+            });
+        Self { time_s: at.as_secs_f64(), check, instance, level }
+    }
+}
+
+#[derive(Debug, Serialize)]
+struct LogJson {
+    /// As the board calls it.
+    name: String,
+    path: PathBuf,
+    /// It was not there already.
+    is_new: bool,
+    /// Nothing in it is damaged or missing.
+    whole: bool,
+}
 
 /// Runs `hums pull`.
 pub fn run(args: &cli::Pull) -> Result<Outcome> {
@@ -39,22 +83,76 @@ pub fn run(args: &cli::Pull) -> Result<Outcome> {
         bail!("{missing}: the board has no such log; it has {}", names.join(", "));
     }
     logs.retain(|(log, _)| args.names.is_empty() || args.names.contains(log));
+    if let Some(moment) = &args.around {
+        return around(&mut ftp, logs.into_iter().map(|(log, _)| log).collect(), args, moment);
+    }
     let newest = args.last.unwrap_or(logs.len()).min(logs.len());
-    let mut out = Stdout::new();
     let mut outcome = Outcome::Done;
+    let mut pulled = Vec::new();
     for (name, _) in logs.split_off(logs.len() - newest) {
         let Some((path, is_new)) = pull(&mut ftp, &name, &args.output).with_context(|| name.clone())? else {
             continue;
         };
-        outcome = outcome.and(verify(&name, &path)?);
-        if is_new {
-            writeln!(out, "{}", path.display())?;
-            out.flush()?;
-        } else {
+        let verified = verify(&name, &path)?;
+        outcome = outcome.and(verified);
+        if !is_new {
             note!("{name}: is there already as {}: the same by its checksum", path.display());
+        } else if !args.json {
+            output::line(&word(&path.display().to_string()))?;
         }
+        pulled.push(LogJson { name, path, is_new, whole: verified == Outcome::Done });
+    }
+    if args.json {
+        output::json(SCHEMA, &PulledJson { logs: pulled, around: None })?;
     }
     Ok(outcome)
+}
+
+/// Brings a moment of the newest session of these logs.
+fn around(ftp: &mut Ftp, mut logs: Vec<String>, args: &cli::Pull, moment: &cli::Around) -> Result<Outcome> {
+    let session = |log: &String| segment_name(Path::new(log)).map(|name| name.session);
+    let newest = logs.iter().filter_map(session).max();
+    logs.retain(|log| session(log) == newest);
+    if newest.is_none() {
+        bail!("the board has no log");
+    }
+    let brought = around::pull(ftp, &logs, &args.output, moment, args.span)?;
+    let mut outcome = Outcome::Done;
+    let mut pulled = Vec::new();
+    for (name, path) in brought.parts {
+        let sound = is_sound(&name, &path)?;
+        outcome = outcome.and(Outcome::lossy(!sound));
+        if !args.json {
+            output::line(&word(&path.display().to_string()))?;
+        }
+        pulled.push(LogJson { name, path, is_new: true, whole: false });
+    }
+    if args.json {
+        output::json(
+            SCHEMA,
+            &PulledJson { logs: pulled, around: Some(MomentJson::of(brought.at, brought.found)) },
+        )?;
+    }
+    Ok(outcome)
+}
+
+/// Whether the sectors of a part, and the frames in them, are as they were recorded.
+fn is_sound(name: &str, path: &Path) -> Result<bool> {
+    let mut sound = true;
+    for log in &logs::find(&[path.to_owned()], false)?.logs {
+        let overview = Overview::verified(log)?;
+        let (blocks, frames) = (overview.ending.summary.blocks, overview.contents.bad_frames);
+        for (number, what) in [
+            (blocks.damaged + blocks.unsound, "damaged sectors"),
+            (frames, "frames that fail their checksum"),
+        ] {
+            if number > 0 {
+                note!("{name}: {what}: {number}; `hums verify` says more");
+                sound = false;
+            }
+        }
+    }
+    Ok(sound)
 }
 
 /// Brings a log: where it is, and whether it was not there already; none where nothing is in it.
@@ -64,9 +162,11 @@ fn pull(ftp: &mut Ftp, name: &str, output: &Path) -> Result<Option<(PathBuf, boo
         note!("{name}: nothing is recorded in it yet");
         return Ok(None);
     }
-    let path = output.join(file_name(ftp, name, length)?);
+    let path = output.join(heading_of(ftp, name, length)?.name);
     let there = there(ftp, name, &path, length)?;
+    let mut part = Part::there(&path, length / SECTOR_BYTES as u32)?;
     if there == There::Whole {
+        part.map_or(Ok(()), Part::remove)?;
         return Ok(Some((path, false)));
     }
     let (mut file, _) = Output::resume(&path)?;
@@ -86,11 +186,11 @@ fn pull(ftp: &mut Ftp, name: &str, output: &Path) -> Result<Option<(PathBuf, boo
         };
         note!("{name}: goes on after {have} bytes, {who}");
     }
-    fetch(ftp, name, &mut file, have, length)?;
+    fetch(ftp, name, &mut file, have, length, part.as_mut())?;
     if !is_whole(ftp, name, &mut file, length)? {
         note!("{name}: what came differs from the board's log; once more from its beginning");
         file.begin_anew()?;
-        fetch(ftp, name, &mut file, 0, length)?;
+        fetch(ftp, name, &mut file, 0, length, None)?;
         if !is_whole(ftp, name, &mut file, length)? {
             bail!(
                 "what came differs from the board's log twice; does its card give the same bytes each time? {} has what came",
@@ -99,6 +199,7 @@ fn pull(ftp: &mut Ftp, name: &str, output: &Path) -> Result<Option<(PathBuf, boo
         }
     }
     file.finish()?;
+    part.map_or(Ok(()), Part::remove)?;
     Ok(Some((path, true)))
 }
 
@@ -151,34 +252,38 @@ fn begun(ftp: &mut Ftp, name: &str, file: &mut Output, length: u32) -> Result<(u
     Ok((0, likeness))
 }
 
-/// Brings what is missing.
-fn fetch(ftp: &mut Ftp, name: &str, file: &mut Output, from: u32, length: u32) -> Result<()> {
+/// Brings what is missing, but for what is in a part of it that is here already.
+fn fetch(
+    ftp: &mut Ftp,
+    name: &str,
+    file: &mut Output,
+    from: u32,
+    length: u32,
+    mut part: Option<&mut Part>,
+) -> Result<()> {
+    const SECTOR: u32 = SECTOR_BYTES as u32;
     let mut have = from;
-    let mut silent = 0;
     while have < length {
-        let pieces = ftp.burst(have, length)?;
-        silent = if pieces.is_empty() { silent + 1 } else { 0 };
-        if silent >= TRIES {
-            bail!("nothing more comes after {have} of {length} bytes; to go on, call again");
-        }
-        let before = have;
-        let end = pieces.iter().map(|(at, data)| *at + data.len() as u32).max().unwrap_or(have);
-        while have < end {
-            let data = if let Some(data) = pieces.get(&have) {
-                data.clone()
-            } else {
-                // Up to the next piece that came.
-                let next = pieces.range(have..).next().map_or(end, |(at, _)| *at);
-                ftp.piece(have, next - have)?
-            };
-            let written = file.write_all(&data);
+        // What is begun of a sector is brought to its end.
+        let place = have.div_ceil(SECTOR);
+        if let Some(part) = part.as_mut().filter(|part| have.is_multiple_of(SECTOR) && part.has(place)) {
+            let written = file.write_all(part.read(place)?.bytes());
             settle(written, file.path())?;
-            have += data.len() as u32;
+            have += SECTOR;
+            continue;
         }
-        note!("{name}: {have} of {length} bytes");
-        if have == before && silent == 0 {
-            bail!("the board sends nothing new after {have} of {length} bytes");
-        }
+        let next = part.as_ref().and_then(|part| part.next(place, true));
+        let end = next.map_or(length, |next| (next * SECTOR).min(length));
+        let context = || format!("after {have} of {length} bytes");
+        let mut done = have;
+        ftp.bring(have, end, |bytes| {
+            settle(file.write_all(bytes), file.path())?;
+            done += bytes.len() as u32;
+            note!("{name}: {done} of {length} bytes");
+            Ok(())
+        })
+        .with_context(context)?;
+        have = end;
     }
     Ok(())
 }
@@ -248,7 +353,8 @@ mod tests {
     fn packed(dir: &Path, name: &str) -> Vec<u8> {
         let input = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../tests/flights").join(name);
         let output = dir.join(name);
-        let pack = cli::Pack { input: Endpoint::File(input), output: output.clone(), replace: false };
+        let pack =
+            cli::Pack { input: Endpoint::File(input), output: output.clone(), replace: false, json: false };
         crate::pack::run(&pack).expect("packed");
         fs::read(output).expect("there")
     }

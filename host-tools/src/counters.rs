@@ -1,4 +1,4 @@
-//! The usage counters as the page takes them: with titles and units, motors and ranges apart.
+//! The usage counters for people: with titles and units, motors and ranges apart.
 
 use std::collections::BTreeMap;
 
@@ -11,40 +11,56 @@ use crate::names::counter_name;
 /// All counters of a session.
 #[derive(Debug, Default, Serialize)]
 pub struct Counters {
-    plain: Vec<Plain>,
-    motors: Vec<Motor>,
-    ranges: Vec<Ranges>,
+    /// Those of the vehicle.
+    pub plain: Vec<Plain>,
+    /// By motor.
+    pub motors: Vec<Motor>,
+    /// By quantity.
+    pub ranges: Vec<Ranges>,
 }
 
 /// One of the vehicle.
 #[derive(Debug, Serialize)]
-struct Plain {
-    title: String,
-    unit: &'static str,
+pub struct Plain {
+    /// For people.
+    pub title: String,
+    /// Of its values; empty for a number of things.
+    pub unit: &'static str,
     decimals: u8,
-    session: f64,
-    life: Option<f64>,
+    /// In this session.
+    pub session: f64,
+    /// In the airframe's life.
+    pub life: Option<f64>,
 }
 
 /// A motor: seconds and turns.
 #[derive(Debug, Default, Serialize)]
-struct Motor {
+pub struct Motor {
     /// From 0.
-    number: u8,
-    run_time_s: Option<f64>,
-    revolutions: Option<f64>,
-    life_run_time_s: Option<f64>,
-    life_revolutions: Option<f64>,
+    pub number: u8,
+    /// How long it turned in this session, s.
+    pub run_time_s: Option<f64>,
+    /// How often it turned in this session.
+    pub revolutions: Option<f64>,
+    /// How long in its life, s.
+    pub life_run_time_s: Option<f64>,
+    /// How often in its life.
+    pub life_revolutions: Option<f64>,
 }
 
 /// Where a quantity stood for how long.
 #[derive(Debug, Serialize)]
-struct Ranges {
-    title: &'static str,
-    unit: &'static str,
-    /// From, to (`null` where there is no end), seconds.
-    bands: Vec<(Option<f32>, Option<f32>, f64)>,
+pub struct Ranges {
+    /// The quantity's name.
+    pub title: &'static str,
+    /// Of the ranges' ends.
+    pub unit: &'static str,
+    /// Its ranges.
+    pub bands: Vec<Band>,
 }
+
+/// From, to (`null` where there is no end), seconds.
+pub type Band = (Option<f32>, Option<f32>, f64);
 
 /// Title, unit and decimals of a counter of the vehicle.
 const fn about(counter: UsageCounter) -> (&'static str, &'static str, u8) {
@@ -161,7 +177,7 @@ impl Counters {
         }
     }
 
-    fn range(&mut self, title: &'static str, unit: &'static str, band: (Option<f32>, Option<f32>, f64)) {
+    fn range(&mut self, title: &'static str, unit: &'static str, band: Band) {
         match self.ranges.last_mut().filter(|ranges| ranges.title == title) {
             Some(ranges) => ranges.bands.push(band),
             None => self.ranges.push(Ranges { title, unit, bands: vec![band] }),

@@ -1,0 +1,57 @@
+//! What a decoding made, for people and as JSON.
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+use serde::Serialize;
+
+use crate::plural::{count, noun};
+
+/// What `hums decode --json` prints.
+#[derive(Debug, Default, Serialize)]
+pub struct MadeJson {
+    /// By log.
+    pub logs: Vec<LogJson>,
+}
+
+/// A log, and what was made of it.
+#[derive(Debug, Serialize)]
+pub struct LogJson {
+    /// Its name.
+    pub name: String,
+    /// Nothing of it is lost, damaged or not proved, and all that was asked for is there.
+    pub whole: bool,
+    /// Its files and folders.
+    pub files: Vec<Made>,
+}
+
+/// A file, or a folder of tables.
+#[derive(Debug, Serialize)]
+pub struct Made {
+    path: PathBuf,
+    /// `tlog`, `jsonl`, `influx`, `gaps`, `csv`, `thesis`, `parquet`.
+    format: &'static str,
+    /// How much is in it: `frames`, `records`, `rows`, `tables`, `objects`, `points`, `seconds`.
+    counts: BTreeMap<String, u64>,
+    #[serde(skip)]
+    words: String,
+}
+
+impl Made {
+    /// With so many things in it.
+    pub fn of(path: PathBuf, format: &'static str, counts: &[(u64, &str)]) -> Self {
+        let words: Vec<String> = counts.iter().map(|(number, thing)| count(*number, thing)).collect();
+        let counts = counts.iter().map(|(number, thing)| (noun(2, thing), *number)).collect();
+        Self { path, format, counts, words: words.join(", ") }
+    }
+
+    /// With what these words say.
+    pub fn with_words(path: PathBuf, format: &'static str, words: String) -> Self {
+        Self { path, format, counts: BTreeMap::new(), words }
+    }
+
+    /// For people.
+    pub fn line(&self) -> String {
+        format!("{}: {}", self.path.display(), self.words)
+    }
+}

@@ -1,0 +1,64 @@
+//! Reads all logs that were found through, one after the other.
+
+use anyhow::{Result, bail};
+
+use crate::check;
+use crate::followed::{Followed, HELD_MAX};
+use crate::logs::side_by_side::side_by_side;
+use crate::outcome::Outcome;
+use crate::plural::count;
+use crate::source::find::{Found, sessions_of};
+use crate::summary::Overview;
+
+/// How reading went.
+pub(super) struct Read {
+    outcome: Outcome,
+    failed: u64,
+    all: usize,
+}
+
+impl Read {
+    /// An error where some could not be read.
+    pub(super) fn end(self) -> Result<Outcome> {
+        if self.failed > 0 {
+            bail!("{} of {} could not be read", self.failed, count(self.all as u64, "log"));
+        }
+        Ok(self.outcome)
+    }
+}
+
+/// Reads what was found, or one session of it, and shows each with what the others tell of its end: of one those beside it do.
+pub(super) fn each(
+    found: &Found,
+    wanted: Option<usize>,
+    mut show: impl FnMut(&Overview) -> Result<()>,
+) -> Result<Read> {
+    let beside = |index: usize| index.saturating_sub(HELD_MAX)..index.saturating_add(HELD_MAX + 1);
+    let range = wanted.map_or(0..usize::MAX, beside);
+    let places = found.places.get(range.start..range.end.min(found.places.len())).unwrap_or_default();
+    let name = wanted.and_then(|wanted| found.places.get(wanted)).map(|place| &place.name);
+    for remark in &found.remarks {
+        note!("{remark}");
+    }
+    let mut outcome = Outcome::lossy(found.is_lossy());
+    let mut followed = Followed::new(sessions_of(&found.places));
+    let mut done = |overview: &Overview| {
+        if name.is_some_and(|name| overview.ending.name != *name) {
+            return Ok(());
+        }
+        outcome = outcome.and(Outcome::lossy(!overview.is_sound()));
+        show(overview)
+    };
+    let (mut failed, is_one) = (0, places.len() == 1);
+    side_by_side(places, check::overview, |overview| match overview {
+        Ok(overview) => followed.push(overview).iter().try_for_each(&mut done),
+        Err(error) if is_one => Err(error),
+        Err(error) => {
+            failed += 1;
+            note!("{error:#}");
+            Ok(())
+        }
+    })?;
+    followed.finish().try_for_each(|overview| done(&overview))?;
+    Ok(Read { outcome, failed, all: places.len() })
+}

@@ -1,0 +1,214 @@
+//! `hums ls`: a line for each flight of a card, a folder or a log: when, how long, the worst that was found, how large.
+
+use std::fmt::Write as _;
+
+use anyhow::Result;
+use hums_core::health::{Level, vocabulary};
+use hums_core::time::{Instant, Span};
+use hums_core::usage::UsageCounter;
+use indicatif::BinaryBytes;
+use serde::Serialize;
+
+use super::each::each;
+use super::json::{duration_s, images_json};
+use super::text::image_text;
+use crate::cli;
+use crate::colour::{level, warning};
+use crate::outcome::Outcome;
+use crate::output::{self, JsonList, Schema};
+use crate::printable::word;
+use crate::source::find::find;
+use crate::source::recording::Format;
+use crate::summary::{FindingLine, Overview};
+use crate::utc::{clock, date_and_time, iso8601};
+
+/// What `hums ls --json` prints.
+const SCHEMA: Schema = Schema::first("hums-ls");
+
+/// Runs `hums ls`.
+pub fn run(args: &cli::Ls) -> Result<Outcome> {
+    let found = find(&args.inputs, args.salvage)?;
+    let mut list =
+        args.json.then(|| JsonList::begin(SCHEMA, &images_json(&found.images), "logs")).transpose()?;
+    let width = found.places.iter().map(|place| word(&place.name).chars().count()).max().unwrap_or(0);
+    if list.is_none() {
+        for image in found.images.iter().filter(|image| !image.damage.is_empty()) {
+            output::line(&image_text(image))?;
+        }
+        if !found.places.is_empty() {
+            output::line(&heading(width))?;
+        }
+    }
+    let read = each(&found, None, |overview| match &mut list {
+        Some(list) => list.element(&LogJson::of(overview)),
+        None => output::line(&line(overview, width)),
+    })?;
+    if let Some(list) = list {
+        list.end()?;
+    } else if found.places.is_empty() {
+        output::line("no log is on it")?;
+    }
+    read.end()
+}
+
+/// A log; names carry their units.
+#[derive(Debug, Serialize)]
+struct LogJson {
+    name: String,
+    format: &'static str,
+    files: Vec<String>,
+    /// `null` where nothing told the time of day.
+    start_utc: Option<String>,
+    duration_s: f64,
+    /// `null` where nobody counted.
+    flight_s: Option<f64>,
+    checked_by: &'static str,
+    findings_count: u64,
+    /// `null` where no check has found anything.
+    worst: Option<WorstJson>,
+    bytes: u64,
+    /// Nothing is lost, damaged or not proved.
+    whole: bool,
+}
+
+#[derive(Debug, Serialize)]
+struct WorstJson {
+    level: &'static str,
+    check: String,
+    instance: u8,
+    time_s: f64,
+}
+
+impl LogJson {
+    fn of(log: &Overview) -> Self {
+        let worst = worst(log).map(|finding| WorstJson {
+            level: finding.level,
+            check: finding.check.clone(),
+            instance: finding.instance,
+            time_s: finding.at.as_secs_f64(),
+        });
+        Self {
+            name: log.ending.name.clone(),
+            format: log.format.map_or("hums", Format::name),
+            files: log.ending.files.clone(),
+            start_utc: start_utc_us(log).map(iso8601),
+            duration_s: duration_s(log),
+            flight_s: flight_s(log),
+            checked_by: log.contents.checked_by(),
+            findings_count: log.contents.findings_count,
+            worst,
+            bytes: bytes(log),
+            whole: log.is_sound(),
+        }
+    }
+}
+
+fn heading(width: usize) -> String {
+    format!(
+        "{:<width$}  {:<19}  {:>8}  {:>8}  {:>10}  {}",
+        "log", "date (UTC)", "length", "in air", "size", "worst finding"
+    )
+}
+
+/// A log in a line.
+fn line(log: &Overview, width: usize) -> String {
+    let date = start_utc_us(log).map_or_else(|| "unknown".to_owned(), date_and_time);
+    let length = clock(span(duration_s(log)));
+    let air = flight_s(log).map_or_else(|| "-".to_owned(), |seconds| clock(span(seconds)));
+    let size = BinaryBytes(bytes(log)).to_string();
+    let name = word(&log.ending.name);
+    let mut text = format!("{name:<width$}  {date:<19}  {length:>8}  {air:>8}  {size:>10}  {}", found(log));
+    if let Some(aside) = log.ending.aside() {
+        // Writing to a `String` cannot fail.
+        let _ = write!(text, "; {}", word(&aside));
+    } else if !log.is_sound() {
+        let _ = write!(text, "; {} (hums verify says why)", warning("not proved to be whole"));
+    }
+    text
+}
+
+/// The worst that was found, and how much there is besides.
+fn found(log: &Overview) -> String {
+    let Some(finding) = worst(log) else {
+        let checked = log.contents.checked_by() != "nobody";
+        return if checked { format!("{}", level("ok")) } else { "not checked".to_owned() };
+    };
+    let name = vocabulary(&finding.check).map_or(finding.check.as_str(), |words| words.said.name);
+    format!("{}: {}", level(finding.level), word(name))
+}
+
+/// The first finding of the worst level; good news is none.
+fn worst(log: &Overview) -> Option<&FindingLine> {
+    let rank = |finding: &&FindingLine| {
+        let levels = [Level::Advisory, Level::Warning, Level::Critical];
+        levels.iter().position(|level| level.name() == finding.level)
+    };
+    let findings = log.contents.findings.iter().filter(|finding| rank(finding).is_some());
+    findings.reduce(|worst, finding| if rank(&finding) > rank(&worst) { finding } else { worst })
+}
+
+fn start_utc_us(log: &Overview) -> Option<u64> {
+    log.ending.summary.first.and_then(|first: Instant| log.utc_us(first))
+}
+
+/// How long it was in the air by the usage counters.
+fn flight_s(log: &Overview) -> Option<f64> {
+    log.contents.usage.get(UsageCounter::Flight.name()).copied()
+}
+
+/// What is recorded of it, without the room that is set aside for it on a card.
+fn bytes(log: &Overview) -> u64 {
+    if log.format.is_some() { log.bytes_on_card } else { log.log_bytes() }
+}
+
+/// Seconds of a log, which may be any number: the cast saturates.
+fn span(seconds: f64) -> Span {
+    Span::from_micros((seconds * 1e6) as u64)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn finding(check: &str, level: &'static str, at_s: u64) -> FindingLine {
+        FindingLine {
+            at: Instant::from_millis(at_s * 1000),
+            subsystem: "power",
+            check: check.to_owned(),
+            instance: 0,
+            level,
+            previous: "ok",
+            value: 1.0,
+            limit: 2.0,
+            unit: String::new(),
+        }
+    }
+
+    #[test]
+    fn the_first_of_the_worst_level_counts_and_that_all_is_well_again_does_not() {
+        let mut log = Overview::default();
+        assert_eq!(found(&log), "not checked");
+        log.contents.usage.insert(UsageCounter::Flight.name().to_owned(), 61.0);
+        assert_eq!(found(&log), format!("{}", level("ok")));
+        log.contents.findings = vec![
+            finding("gps_satellites", "warning", 1),
+            finding("cell_voltage", "critical", 2),
+            finding("motor_loss", "critical", 3),
+            finding("motor_loss", "ok", 4),
+        ];
+        assert_eq!(worst(&log).map(|worst| worst.at), Some(Instant::from_millis(2000)));
+        log.contents.findings.truncate(1);
+        assert_eq!(worst(&log).map(|worst| worst.level), Some("warning"));
+        log.contents.findings = vec![finding("cell_voltage", "ok", 2)];
+        assert!(worst(&log).is_none());
+    }
+
+    #[test]
+    fn columns_stand_under_their_heading() {
+        let line = crate::colour::shown(&line(&Overview::default(), 5), false).into_owned();
+        let heading = heading(5);
+        let end = |text: &str, of: &str| text.find(of).map(|at| at + of.len());
+        assert_eq!(end(&heading, "length"), end(&line, "0:00"));
+        assert_eq!(heading.find("worst"), line.find("not checked"));
+    }
+}

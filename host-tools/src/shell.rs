@@ -1,0 +1,43 @@
+//! `hums completions` and `hums man`: what a shell and a reader of manuals take, made from the definition of the command line.
+
+use std::io::Write as _;
+
+use anyhow::Result;
+use clap::CommandFactory as _;
+
+use crate::cli::{self, Cli};
+use crate::outcome::{Outcome, usage};
+use crate::output::Stdout;
+
+/// Runs `hums completions`.
+pub fn completions(args: &cli::Completions) -> Result<Outcome> {
+    let mut script = Vec::new();
+    clap_complete::generate(args.shell, &mut Cli::command(), "hums", &mut script);
+    print(&script)
+}
+
+/// Runs `hums man`.
+pub fn man(args: &cli::Man) -> Result<Outcome> {
+    let mut root = Cli::command();
+    root.build();
+    let page = match &args.command {
+        None => root,
+        Some(name) => {
+            let named = |command: &&clap::Command| command.get_name() == name && name != "help";
+            let Some(command) = root.get_subcommands().find(named) else {
+                return Err(usage(format!("{name}: is no command of hums; hums --help lists them")));
+            };
+            command.clone()
+        }
+    };
+    let mut text = Vec::new();
+    clap_mangen::Man::new(page).render(&mut text)?;
+    print(&text)
+}
+
+fn print(text: &[u8]) -> Result<Outcome> {
+    let mut out = Stdout::new();
+    out.write_all(text)?;
+    out.flush()?;
+    Ok(Outcome::Done)
+}

@@ -1,0 +1,162 @@
+//! Where in a log a moment is, by random access: a group begins with its time, so that each sector that is looked at halves the
+//! log.
+
+use std::ops::Range;
+
+use anyhow::Result;
+use hums_blackbox::{GROUP_SECTORS, Header, Sector};
+use hums_core::time::Instant;
+
+/// Sectors before one that cannot be read, among which the beginning of a group is looked for.
+const STEPS_BACK_MAX: u32 = 2 * GROUP_SECTORS as u32;
+
+/// A log of which any sector can be had.
+pub(super) trait Sectors {
+    /// How many it has.
+    fn count(&self) -> u32;
+
+    /// The sector at this place; `None` where it is damaged.
+    fn sector(&mut self, place: u32) -> Result<Option<(Header, Sector)>>;
+}
+
+/// The beginning of a group.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Start {
+    /// The place of its first sector.
+    pub(super) place: u32,
+    /// When it begins, on the monitor's clock.
+    pub(super) at: Instant,
+    /// UTC at power-on, microseconds since 1970, where it was known by then.
+    pub(super) epoch_us: Option<u64>,
+}
+
+/// The group that a sector is in; where that cannot be read, the last one before it that can.
+pub(super) fn group_of(log: &mut impl Sectors, place: u32) -> Result<Option<Start>> {
+    let mut next = Some(place);
+    for _ in 0..STEPS_BACK_MAX {
+        let Some(place) = next else { break };
+        next = match log.sector(place)? {
+            Some((header, sector)) if header.starts_group() => {
+                let start = |preamble: hums_blackbox::Preamble| Start {
+                    place,
+                    at: Instant::from_millis(preamble.start_ms),
+                    epoch_us: preamble.epoch_micros,
+                };
+                return Ok(sector.preamble().map(start));
+            }
+            Some((header, _)) => place.checked_sub(u32::from(header.since_first)),
+            None => place.checked_sub(1),
+        };
+    }
+    Ok(None)
+}
+
+/// Sectors among which is all that was recorded from one time to the other, and no more than a group before and behind it.
+pub(super) fn between(log: &mut impl Sectors, from: Instant, to: Instant) -> Result<Range<u32>> {
+    Ok(around(log, from)?.start..around(log, to)?.end)
+}
+
+/// Sectors among which is what was recorded at this time: from the beginning of a group that begins then or before, and to one
+/// that begins later, or to the end.
+fn around(log: &mut impl Sectors, time: Instant) -> Result<Range<u32>> {
+    let group = GROUP_SECTORS as u32;
+    let (mut start, mut end) = (0, log.count());
+    while end - start > group {
+        // Never in the group that begins at `start`.
+        let middle = start + ((end - start) / 2).max(group);
+        match group_of(log, middle)? {
+            Some(found) if found.place > start && found.at <= time => start = found.place,
+            Some(found) if found.place > start => end = found.place,
+            // Nothing tells what is before it: all of it is taken.
+            _ => break,
+        }
+    }
+    Ok(start..end)
+}
+
+#[cfg(test)]
+mod tests {
+    use hums_blackbox::record::{Note, Record};
+    use hums_blackbox::{SectorSink, Writer};
+
+    use super::*;
+
+    struct Memory {
+        sectors: Vec<Sector>,
+        damaged: Range<u32>,
+        looks: u32,
+    }
+
+    impl SectorSink for Memory {
+        fn room(&self) -> usize {
+            usize::MAX
+        }
+
+        fn put(&mut self, sector: &Sector) {
+            let mut sector = *sector;
+            sector.seal(7);
+            self.sectors.push(sector);
+        }
+    }
+
+    impl Sectors for Memory {
+        fn count(&self) -> u32 {
+            self.sectors.len() as u32
+        }
+
+        fn sector(&mut self, place: u32) -> Result<Option<(Header, Sector)>> {
+            self.looks += 1;
+            let sector = self.sectors.get(place as usize).filter(|_| !self.damaged.contains(&place));
+            Ok(sector.and_then(|sector| Some((Header::read(sector.bytes()).ok()?, *sector))))
+        }
+    }
+
+    /// A log of a note each tenth of a second, for an hour.
+    fn log() -> Memory {
+        let mut memory = Memory { sectors: Vec::new(), damaged: 0..0, looks: 0 };
+        let mut writer = Box::new(Writer::new());
+        for tenth in 0..36_000_u64 {
+            let random = tenth.wrapping_mul(0x9E37_79B9_7F4A_7C15);
+            let text = format!("{random:016x}{:016x}", random.rotate_left(29) ^ tenth);
+            let note = Record::Note(Note { severity: 6, text: &text });
+            writer.record(Instant::from_millis(tenth * 100), &note, &mut memory).expect("there is room");
+        }
+        memory
+    }
+
+    #[test]
+    fn any_moment_is_found_by_looking_at_few_sectors() {
+        let mut log = log();
+        let count = log.count();
+        assert!(count > 1_000, "{count}");
+        for second in [0, 1, 777, 1_800, 3_598, 3_600, 9_999] {
+            log.looks = 0;
+            let time = Instant::from_millis(second * 1_000);
+            let found = around(&mut log, time).expect("memory");
+            assert!(
+                log.looks < 40 && found.len() <= 2 * GROUP_SECTORS,
+                "{second}: {} looks, {found:?}",
+                log.looks
+            );
+            let start = group_of(&mut log, found.start).expect("memory").expect("a group");
+            assert!(start.place == found.start && start.at <= time, "{second}: {start:?}");
+            if found.end < count {
+                let next = group_of(&mut log, found.end).expect("memory").expect("a group");
+                assert!(next.place == found.end && next.at > time, "{second}: {next:?}");
+            }
+        }
+        let minute =
+            between(&mut log, Instant::from_millis(600_000), Instant::from_millis(660_000)).expect("memory");
+        assert!(minute.len() < count as usize / 60 + 3 * GROUP_SECTORS, "{minute:?}");
+    }
+
+    #[test]
+    fn damaged_sectors_hide_no_moment() {
+        let mut log = log();
+        let whole = around(&mut log, Instant::from_millis(1_800_000)).expect("memory");
+        log.damaged = whole.start..whole.start + 3;
+        let found = around(&mut log, Instant::from_millis(1_800_000)).expect("memory");
+        assert!(found.start <= whole.start && found.end >= whole.end, "{found:?} {whole:?}");
+        assert!(found.len() < 6 * GROUP_SECTORS, "{found:?}");
+    }
+}
