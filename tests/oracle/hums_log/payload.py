@@ -21,7 +21,7 @@ class Element:
         self.step, self.step_in_hundredths = 0, False
         self.costs = [0, 0, 0, 100, 100, 100]
         self.decimals, self.exponent = 0, 120
-        self.clock, self.linked = 0, 0.0
+        self.clock, self.linked, self.linked_whole = 0, 0.0, 0
         self.own = {}  # the distributions "block" and "other"
         self.last_class = 0
         self.kept = False  # of a text: it has a place in the group's 1024 bytes
@@ -225,12 +225,20 @@ class Payload:
         bits = 8 * one.size
         predictions = [one.value, one.value + one.step, one.value + toward_zero(one.step, 2)]
         if "consults" in one.links:
-            predictions.append(self.registers[one.links["consults"][0]] & (1 << bits) - 1)
+            linked = self.linked_whole(*one.links["consults"])
+            predictions += [linked, one.value + linked - one.linked_whole]
+            one.linked_whole = linked
         difference = self.difference(self.a_class(one, "block", self.KINDS["int", one.size]))
         value = one.choose(predictions) + difference & (1 << bits) - 1
         one.charge(predictions, lambda p: signed(value - p, bits))
         one.step = 0 if one.is_first else signed(value - one.value, bits)
         return value
+
+    def linked_whole(self, register, scale):
+        if register >= WHOLE:
+            return self.registers[register]
+        number = single(self.registers[register] * scale)
+        return 0 if math.isnan(number) else int(min(max(number, -(1 << 31)), (1 << 31) - 1))
 
     def time(self, one, elapsed_ms, clock, _):
         by_clock = clock - one.clock & M32

@@ -31,7 +31,7 @@ const CLOCK_HZ: f64 = 168e6;
 /// Bytes of MAVLink a second at 921,600 baud.
 pub(crate) const BYTES_PER_S: f64 = 92_160.0;
 /// What the encoder may take of the processor.
-const LOAD_MAX: f64 = 0.10;
+const LOAD_MAX: f64 = 0.16;
 /// How fast decoding is to be, as a part of the speed of `gzip -d`.
 const AGAINST_GZIP_MIN: f64 = 0.4;
 /// Steps of all checks, usage and trends, a second.

@@ -54,19 +54,22 @@ impl Row {
 /// Degrees in a radian.
 const DEGREES: f32 = 57.295_78;
 
+/// 1e-7 degrees of latitude in a metre: 1e7 / 111,319.
+const LATITUDE: f32 = 89.832;
+
 /// By id, then offset. Registers: 0-2 roll, pitch, yaw in rad; 3-5 body rates in rad/s; 6-8 the same from the raw IMU; 9, 10 horizontal NED
 /// velocity in m/s (`GLOBAL_POSITION_INT`), 14, 15 the same (`LOCAL_POSITION_NED`); 11 velocity downwards, as the latest float has it; 12 relative
 /// altitude, 13 altitude in m; 16-18 local position in m; 19 altitude (`AHRS2`); 20 pressure altitude; 21, 22 monotonic and relative altitude
 /// (`ALTITUDE`); 23-26 the quaternion of 0-2, 27-30 the one told last. Whole ones: 31, 32 latitude and longitude in 1e-7 degrees; 33-40 channels
 /// of the remote control; 41, 42 voltage and current of the battery; 43, 44 times of the attitude and of the message with its quaternion.
-static ROWS: [Row; 95] = [
+static ROWS: [Row; 98] = [
     row(1, 14).consults(41, 1.0).publishes(41, 1.0),
     row(1, 16).consults(42, 1.0).publishes(42, 1.0),
     row(24, 8).consults(31, 1.0).publishes(31, 1.0),
     row(24, 12).consults(32, 1.0).publishes(32, 1.0),
-    row(27, 14).publishes(6, 0.001),
-    row(27, 16).publishes(7, 0.001),
-    row(27, 18).publishes(8, 0.001),
+    row(27, 14).consults(3, 1_000.0).publishes(6, 0.001),
+    row(27, 16).consults(4, 1_000.0).publishes(7, 0.001),
+    row(27, 18).consults(5, 1_000.0).publishes(8, 0.001),
     row(30, 0).publishes(43, 1.0),
     row(30, 4).publishes(0, 1.0),
     row(30, 8).publishes(1, 1.0),
@@ -88,12 +91,14 @@ static ROWS: [Row; 95] = [
     row(32, 16).consults(9, 1.0).publishes(14, 1.0),
     row(32, 20).consults(10, 1.0).publishes(15, 1.0),
     row(32, 24).consults(11, 1.0).publishes(11, 1.0),
-    row(33, 4).consults(31, 1.0).publishes(31, 1.0),
+    row(33, 4).consults(16, LATITUDE).publishes(31, 1.0),
     row(33, 8).consults(32, 1.0).publishes(32, 1.0),
-    row(33, 12).publishes(13, 0.001),
-    row(33, 16).publishes(12, 0.001),
-    row(33, 20).publishes(9, 0.01),
-    row(33, 22).publishes(10, 0.01),
+    row(33, 12).consults(18, -1_000.0).publishes(13, 0.001),
+    row(33, 16).consults(18, -1_000.0).publishes(12, 0.001),
+    row(33, 20).consults(14, 100.0).publishes(9, 0.01),
+    row(33, 22).consults(15, 100.0).publishes(10, 0.01),
+    row(33, 24).consults(11, 100.0),
+    row(33, 26).consults(2, 100.0 * DEGREES),
     row(35, 4).consults(33, 1.0).publishes(33, 1.0),
     row(35, 6).consults(34, 1.0).publishes(34, 1.0),
     row(35, 8).consults(35, 1.0).publishes(35, 1.0),
@@ -114,6 +119,7 @@ static ROWS: [Row; 95] = [
     row(65, 18).consults(40, 1.0).publishes(40, 1.0),
     row(74, 8).consults(13, 1.0),
     row(74, 12).consults(11, -1.0).publishes(11, -1.0),
+    row(74, 16).consults(2, DEGREES),
     row(85, 16).consults(14, 1.0),
     row(85, 20).consults(15, 1.0),
     row(85, 24).consults(11, 1.0),
@@ -190,11 +196,15 @@ impl Registers {
         Some((self.get(register) * link.scale, is_computed))
     }
 
-    /// The same of an integer.
+    /// The same of an integer: a number counts without its fraction.
     #[inline]
     pub(super) fn consult_whole(&self, row: u8) -> Option<u32> {
         let link = ROWS.get(usize::from(row).wrapping_sub(1))?.consults?;
-        self.0.get(usize::from(link.register)).copied()
+        let register = usize::from(link.register);
+        if register >= WHOLE {
+            return self.0.get(register).copied();
+        }
+        Some((self.get(register) * link.scale) as i32 as u32)
     }
 
     /// A field tells its register.

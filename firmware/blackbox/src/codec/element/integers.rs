@@ -5,11 +5,10 @@ use super::rest::{integer_class, integer_rest};
 use super::{Distributions, Element, What};
 use crate::coder::Coder;
 
-/// From the last value: as it is, with the last step, with half of it; or equal to the linked register.
-const LAST: usize = 0;
-const LINEAR: usize = 1;
+/// From the last value: as it is, with the last step, with half of it; equal to the linked register, or changed as it.
 const HALF: usize = 2;
 const LINKED: usize = 3;
+const AS_LINK: usize = 4;
 
 impl Distributions {
     /// Codes the value's bits.
@@ -30,15 +29,16 @@ impl Distributions {
         let fold = |difference: u32| ((difference << spare) as i32) >> spare;
         let (last, step, known) = (element.last, element.step, element.known());
         // The first value is predicted as zero, which is what `last` is then.
+        let mut ahead_by = [0, step, step / 2, 0, 0];
+        if let Some(linked) = linked {
+            ahead_by[LINKED] = fold(linked.wrapping_sub(last));
+            ahead_by[AS_LINK] = fold(linked.wrapping_sub(element.aux));
+            element.aux = linked;
+        }
         let ahead = match (step, linked) {
-            (0, None) => 0,
-            _ => match element.costs.cheapest::<4>().0 {
-                _ if !known => 0,
-                LAST => 0,
-                LINEAR => step,
-                HALF => step / 2,
-                _ => fold(linked.unwrap_or(last).wrapping_sub(last)),
-            },
+            (_, Some(_)) if known => ahead_by[element.costs.cheapest::<{ AS_LINK + 1 }>().0],
+            (0, _) => 0,
+            _ => ahead_by[element.costs.cheapest::<{ HALF + 1 }>().0],
         };
         let guess = last.wrapping_add(ahead as u32);
         let difference = fold(value.wrapping_sub(guess));
@@ -50,14 +50,12 @@ impl Distributions {
         if step == 0 && linked.is_none() {
             element.costs.charge_all(change);
         } else {
-            let mut errors = [change; 4];
-            let ahead_by = |ahead: i32| fold((change as u32).wrapping_sub(ahead as u32));
-            errors[LINEAR] = ahead_by(step);
-            errors[HALF] = ahead_by(step / 2);
-            if let Some(linked) = linked {
-                errors[LINKED] = fold(value.wrapping_sub(linked));
+            let [first @ .., as_link] = ahead_by;
+            let error = |ahead: i32| fold((change as u32).wrapping_sub(ahead as u32));
+            element.costs.charge(first.map(error));
+            if linked.is_some() {
+                element.costs.charge_more(AS_LINK, error(as_link));
             }
-            element.costs.charge(errors);
         }
         element.step = if known { change } else { 0 };
         element.note(change == 0);
