@@ -12,6 +12,7 @@
 //! ([`Baseline::reach`]).
 
 use crate::bytes::{Put, Take, Unreadable};
+use crate::half;
 use crate::observation::MOTORS_MAX;
 use crate::outputs::JUDGED_MAX;
 use crate::vehicle::BATTERIES_MAX;
@@ -87,15 +88,15 @@ impl Quantity {
 pub struct Baseline {
     /// In the quantity's unit.
     pub value: f32,
-    /// Mean square distance of the flights' figures from it.
-    pub variance: f32,
+    /// Root of the mean square distance of the flights' figures from it, in half precision.
+    spread: u16,
     /// Flights that it was learned from; it holds from [`FLIGHTS_MIN`] on.
     pub flights: u16,
 }
 
 impl Baseline {
     /// Nothing learned.
-    pub const NONE: Self = Self { value: 0.0, variance: 0.0, flights: 0 };
+    pub const NONE: Self = Self { value: 0.0, spread: 0, flights: 0 };
 
     /// The baseline, once enough flights made it.
     pub fn known(&self) -> Option<f32> {
@@ -110,17 +111,24 @@ impl Baseline {
         let weight = (1.0 / (f32::from(self.flights) + 1.0)).max(WEIGHT);
         let off = figure - self.value;
         // Mean and variance with weights: D. H. D. West, Communications of the ACM 22, 1979.
-        self.variance =
-            if self.flights == 0 { 0.0 } else { (1.0 - weight) * (self.variance + weight * off * off) };
+        let variance =
+            if self.flights == 0 { 0.0 } else { (1.0 - weight) * (self.variance() + weight * off * off) };
+        self.spread = half::to_bits(libm::sqrtf(variance));
         self.value += weight * off;
         self.flights = self.flights.saturating_add(1);
+    }
+
+    /// Mean square distance of the flights' figures from the value.
+    fn variance(&self) -> f32 {
+        let spread = half::from_bits(self.spread);
+        spread * spread
     }
 
     /// How far the next flight's figure is from the baseline on the average, where nothing changed; `prior` is the spread that such a
     /// quantity has as a rule.
     pub fn spread(&self, prior: f32) -> f32 {
         let flights = f32::from(self.flights.clamp(1, REMEMBERED));
-        let squares = PRIOR_FLIGHTS * prior * prior + flights * self.variance;
+        let squares = PRIOR_FLIGHTS * prior * prior + flights * self.variance();
         libm::sqrtf(squares / (PRIOR_FLIGHTS + flights) * (1.0 + 1.0 / flights))
     }
 
@@ -198,7 +206,7 @@ impl Baselines {
         let mut put = Put::new(out);
         put.u8(VERSION);
         for baseline in &self.0 {
-            put.f32(baseline.value).f32(baseline.variance).u16(baseline.flights);
+            put.f32(baseline.value).f32(baseline.variance()).u16(baseline.flights);
         }
     }
 
@@ -214,8 +222,10 @@ impl Baselines {
         for baseline in baselines.0.iter_mut().take(stored) {
             let value = take.f32()?;
             let variance = if version == WITHOUT_SPREADS { 0.0 } else { take.f32()? };
-            let stored = Baseline { value, variance, flights: take.u16()? };
-            let sane = value.is_finite() && variance.is_finite() && variance >= 0.0;
+            let stored =
+                Baseline { value, spread: half::to_bits(libm::sqrtf(variance)), flights: take.u16()? };
+            // Of a negative one the root is no number.
+            let sane = value.is_finite() && stored.variance().is_finite();
             *baseline = if sane { stored } else { Baseline::NONE };
         }
         if version == WITHOUT_SPREADS {
@@ -295,7 +305,7 @@ mod tests {
         }
         let baselines = Baselines::decode(&stored).expect("readable");
         let known = baselines.get(Quantity::Resistance(1));
-        assert_eq!(known, Baseline { value: 3.0, variance: 0.0, flights: 5 });
+        assert_eq!(known, Baseline { value: 3.0, spread: 0, flights: 5 });
         assert_eq!(baselines.get(Quantity::HoverThrottle), Baseline::NONE, "it meant another thing");
     }
 

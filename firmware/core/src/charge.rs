@@ -50,14 +50,14 @@ fn state_of_charge(cell_v: f32) -> f32 {
     let (mut low, mut high) = (0.0, FULL);
     // To a thousandth.
     for _ in 0..11 {
-        let middle = (low + high) / 2.0;
+        let middle = f32::midpoint(low, high);
         if volts(middle) < cell_v {
             low = middle;
         } else {
             high = middle;
         }
     }
-    (low + high) / 2.0
+    f32::midpoint(low, high)
 }
 
 #[cfg(test)]

@@ -60,7 +60,7 @@ impl Travel {
         let north_m = (place[0] - was[0]) as f32 * DEGREE_M;
         let east_m = (place[1] - was[1]) as f32 * DEGREE_M * libm::cosf((place[0] as f32).to_radians());
         let step_s = step.as_secs_f32();
-        let further_m = (speed_mps + speed_before_mps) / 2.0 * step_s - libm::hypotf(north_m, east_m);
+        let further_m = f32::midpoint(speed_mps, speed_before_mps) * step_s - libm::hypotf(north_m, east_m);
         let kept = MEMORY_S / (MEMORY_S + step_s);
         self.further_m = kept * (self.further_m + further_m);
         self.time_s = kept * (self.time_s + step_s);

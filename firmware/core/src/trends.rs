@@ -32,6 +32,7 @@ use crate::observation::{Autopilot, MOTORS_MAX, VehicleKind, VibrationScale};
 use crate::outputs::JUDGED_MAX;
 use crate::params::{Param, Params};
 use crate::time::{Instant, Span};
+use crate::trend::Resistance;
 use crate::vehicle::{BATTERIES_MAX, Vehicle};
 
 /// Between samples.
@@ -211,7 +212,7 @@ impl Trends {
             let value = match quantity {
                 // The resistance shows under a load that changes, and has a mean of its own; the charge sinks in any flight.
                 Quantity::Resistance(battery) => {
-                    derived.resistance(usize::from(battery)).and_then(|of| of.ohm())
+                    derived.resistance(usize::from(battery)).and_then(Resistance::ohm)
                 }
                 Quantity::Capacity(battery) => self.capacity_ah(vehicle, derived, params, battery),
                 _ if !steady => continue,

@@ -266,6 +266,22 @@ fn a_weak_motor_of_a_quadrotor_is_named() {
     finds("motor_output", 1, Level::Critical, 6_000, |_, fitted| fitted.pulses[1] = 1_000.0);
 }
 
+#[test]
+fn a_motor_that_is_a_little_weak_is_named_once_it_has_been_so_for_long() {
+    // It stands out by 6 %, which is no warning at once.
+    finds("motor_output", 2, Level::Warning, 20_000, |_, fitted| fitted.pulses[2] += 33.0);
+    is_quiet(|now_ms, fitted| {
+        let is_gust = (FAULT_MS..FAULT_MS + 4_000).contains(&now_ms);
+        fitted.pulses[2] += if is_gust { 33.0 } else { 0.0 };
+    });
+    // A pilot who yaws for long.
+    is_quiet(|now_ms, fitted| {
+        let yaws = now_ms >= FAULT_MS;
+        (fitted.yaw_rate, fitted.pulses[2]) =
+            if yaws { (1.0, fitted.pulses[2] + 60.0) } else { (0.0, fitted.pulses[2]) };
+    });
+}
+
 /// A hexarotor's commands, where one motor has lost thrust worth `loss` us: the projection on thrust, roll, pitch and yaw.
 fn hexa(fitted: &mut Fitted, now_ms: u64, shift: [f32; 6]) {
     fitted.quad.type_number = 13;

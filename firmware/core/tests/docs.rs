@@ -132,8 +132,11 @@ const INPUTS: &[(&str, &str)] = &[
     ),
     ("gps_stuck", "GPS_RAW_INT, GPS2_RAW: how long position, height and speed were the same"),
     ("gps_speed", "GPS_RAW_INT, GPS2_RAW: speed less the way between positions, over four seconds"),
-    ("gps_satellites", "GPS_RAW_INT, GPS2_RAW"),
-    ("gps_hdop", "GPS_RAW_INT, GPS2_RAW"),
+    (
+        "gps_satellites",
+        "GPS_RAW_INT, GPS2_RAW, where the receiver does not tell an accuracy within half of GPS_HACC_WARN",
+    ),
+    ("gps_hdop", "the same messages, likewise"),
     ("gps_accuracy", "GPS_RAW_INT, GPS2_RAW: horizontal accuracy"),
     ("gps_fix", "GPS_RAW_INT, GPS2_RAW: fix type, of a receiver that had one"),
     ("gps_jamming", "GNSS_INTEGRITY"),

@@ -120,11 +120,15 @@ const FAULTS: [(&str, u8, Level, Fault); 97] = [
         quad.estimator.scale = EstimatorScale::TestRatio;
         quad.estimator.compass = Some(1.5);
     }),
-    ("gps_satellites", 0, Level::Warning, |quad, _| quad.gnss.satellites = Some(5)),
+    ("gps_satellites", 0, Level::Warning, |quad, _| {
+        (quad.gnss.satellites, quad.gnss.accuracy) = (Some(5), Some(Metres(2.0)));
+    }),
     ("gps_satellites", 1, Level::Warning, |_, more| {
         more.push(Observation::Gnss(Gnss { instance: 1, fix: 3, satellites: Some(5), ..Gnss::default() }));
     }),
-    ("gps_hdop", 0, Level::Warning, |quad, _| quad.gnss.hdop = Some(3.0)),
+    ("gps_hdop", 0, Level::Warning, |quad, _| {
+        (quad.gnss.hdop, quad.gnss.accuracy) = (Some(3.0), None);
+    }),
     ("gps_accuracy", 0, Level::Warning, |quad, _| quad.gnss.accuracy = Some(Metres(4.0))),
     ("gps_fix", 0, Level::Critical, |quad, _| quad.gnss.fix = 1),
     ("gps_jamming", 0, Level::Critical, |quad, _| quad.integrity.jamming = 3),
@@ -360,6 +364,15 @@ fn each_kind_of_component_is_due_in_its_own_subsystem() {
         // In the air after 2.5 s; one component is looked at a tick, and the debounce is a second.
         assert!((3_500..=4_000).contains(&findings[0].at.as_millis()), "{findings:?}");
     }
+}
+
+#[test]
+fn few_satellites_are_enough_for_a_receiver_that_knows_where_it_is() {
+    let findings = fly(&LIMITS, |quad, _| {
+        (quad.gnss.satellites, quad.gnss.hdop) = (Some(5), Some(3.0));
+        quad.gnss.accuracy = Some(Metres(0.8));
+    });
+    assert_eq!(findings, []);
 }
 
 #[test]

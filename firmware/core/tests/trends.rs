@@ -11,6 +11,7 @@ use hums_core::baseline::Quantity;
 use hums_core::component::Label;
 use hums_core::health::{Finding, Level};
 use hums_core::lifetime::{ITEM_BYTES_MAX, ItemKey};
+use hums_core::observation::{Observation, Outputs};
 use hums_core::params::Params;
 use hums_core::status::LinkReading;
 use hums_core::time::Instant;
@@ -21,6 +22,16 @@ fn fly(
     params: &Params,
     stored: Option<&[u8]>,
     change: impl Fn(&mut Quad),
+) -> (Vec<Finding>, Monitor, Vec<u8>) {
+    fly_with(params, stored, change, None)
+}
+
+/// The same, with what its motors are given in flight.
+fn fly_with(
+    params: &Params,
+    stored: Option<&[u8]>,
+    change: impl Fn(&mut Quad),
+    pulses: Option<[u16; 4]>,
 ) -> (Vec<Finding>, Monitor, Vec<u8>) {
     let mut monitor = Monitor::new(*params);
     if let Some(stored) = stored {
@@ -38,6 +49,12 @@ fn fly(
         if now_ms.is_multiple_of(100) {
             for observation in quad.says(now_ms) {
                 monitor.observe(now, AUTOPILOT, &observation);
+            }
+            if let Some(flies) = pulses {
+                let mut outputs = Outputs::default();
+                let given = if (4_000..85_000).contains(&now_ms) { flies } else { [1_000; 4] };
+                outputs.pulses[..4].copy_from_slice(&given);
+                monitor.observe(now, AUTOPILOT, &Observation::Outputs(outputs));
             }
         }
         let link = LinkReading { frames_lost: Some(0.0), at: now };
@@ -123,6 +140,23 @@ fn a_battery_whose_resistance_rises_is_found() {
     assert!((60_000..=75_000).contains(&found.at.as_millis()), "{found:?}");
     assert!((100.0..=130.0).contains(&found.value), "{found:?}");
     assert!(findings.iter().all(|finding| finding.check == "batt_resistance"), "{findings:?}");
+}
+
+#[test]
+fn without_telemetry_of_escs_a_motors_output_is_its_figure() {
+    let no_telemetry: Change = |quad| quad.escs = [None; 4];
+    let mut stored = None;
+    for _ in 0..3 {
+        let (findings, _, item) =
+            fly_with(&Params::defaults(), stored.as_deref(), no_telemetry, Some([1_500; 4]));
+        assert_eq!(findings, []);
+        stored = Some(item);
+    }
+    let weak = Some([1_450, 1_450, 1_650, 1_450]);
+    let (findings, ..) = fly_with(&Params::defaults(), stored.as_deref(), no_telemetry, weak);
+    let named: Vec<_> =
+        findings.iter().filter(|one| one.instance == 2).map(|one| (one.check, one.level)).collect();
+    assert!(named.contains(&("motor_trend", Level::Critical)), "{findings:?}");
 }
 
 #[test]

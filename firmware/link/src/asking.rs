@@ -8,7 +8,7 @@
 //! it never has. A message that is refused is not asked for again until the autopilot reboots. An ArduPilot that never
 //! answers such commands, or knows none, is asked for whole groups with `REQUEST_DATA_STREAM`.
 //!
-//! ArduPilot tells its pilot of each interval that is asked for of a message that it does not have ("No ap_message for mavlink id"), and refuses
+//! ArduPilot tells its pilot of each interval that is asked for of a message that it does not have (that it has "no message" of that number), and refuses
 //! `REQUEST_MESSAGE` for it without a word (`GCS_Common.cpp`, 4.1 to 4.6). So it is asked for one of them first, and for the
 //! interval of those that it has. `ESC_TELEMETRY_5_TO_8` comes with `ESC_TELEMETRY_1_TO_4`, and has no interval of its own.
 //!

@@ -1,6 +1,7 @@
 //! Which checks had something to judge in a recording, and why the others had not.
 
 use hums_core::Monitor;
+use hums_core::baseline::Baselines;
 use hums_core::health::{Check, Level, Scope, Side, VOCABULARY, When, checks, vocabulary};
 use hums_core::observation::{Autopilot, Gnss, Heartbeat};
 use hums_core::params::{Param, Params};
@@ -99,8 +100,8 @@ impl Coverage {
 pub(super) struct Recording<'a> {
     pub(super) by: JudgedBy,
     pub(super) monitor: &'a Monitor,
-    /// Earlier flights are known.
-    pub(super) has_past: bool,
+    /// What is normal, where earlier flights are known.
+    pub(super) past: Option<&'a Baselines>,
     /// It holds what came over a link.
     pub(super) is_of_link: bool,
     /// It was heard on the monitor's own wire.
@@ -158,7 +159,7 @@ impl Recording<'_> {
         if is_off(check, self.monitor.params()) {
             return not("its limit is off");
         }
-        if words.scope == Scope::Stored && !self.has_past {
+        if words.scope == Scope::Stored && self.past.is_none() {
             return not(
                 "only a monitor on board knows earlier flights and parts that wear (--past gives it flights)",
             );
@@ -232,6 +233,7 @@ mod tests {
             let recording = Recording {
                 by: JudgedBy::Here,
                 monitor: &monitor,
+                past: None,
                 is_of_link: false,
                 on_the_wire: false,
                 armed: Span::from_secs(60),

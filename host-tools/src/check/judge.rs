@@ -594,7 +594,7 @@ impl Judge {
         let (judged, not_judged) = self.coverage.lists(&Recording {
             by,
             monitor: &self.monitor,
-            has_past: self.limits.past.is_some(),
+            past: self.limits.past.as_deref(),
             is_of_link: self.format.is_of_link(),
             on_the_wire: self.wire.is_some(),
             armed,

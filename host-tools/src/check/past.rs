@@ -6,7 +6,7 @@ use anyhow::{Context as _, Result};
 use hums_core::baseline::{Baselines, FLIGHTS_MIN, Quantity};
 
 use super::judge::{Heard, Limits};
-use super::recording;
+use super::overview;
 use crate::source::find::find;
 use crate::source::recording::Place;
 
@@ -29,8 +29,8 @@ pub(super) fn after(limits: Limits, past: &[PathBuf], system: Option<u8>) -> Res
 /// What is normal after the flights of these recordings, in their order.
 pub fn learn(limits: &Limits, places: &[Place]) -> Result<Baselines> {
     places.iter().try_fold(Baselines::new(), |past, place| {
-        let judged = recording(place, &limits.clone().after(&past), Heard::Somewhere)?.judged;
-        Ok(*judged.monitor.baselines())
+        let read = overview::judge(place, &limits.clone().after(&past), Heard::Somewhere, false)?;
+        Ok(*read.judged.monitor.baselines())
     })
 }
 

@@ -12,6 +12,9 @@ use crate::params::Param;
 use crate::time::Span;
 use crate::vehicle::RECEIVERS_MAX;
 
+/// So far on the good side of its limit a value is good again.
+const MARGIN: f32 = 0.5;
+
 const ESTIMATOR: Check = Check {
     name: "ekf_variance",
     subsystem: Subsystem::Navigation,
@@ -38,7 +41,13 @@ const GNSS: Check = Check {
     hysteresis: 0.0,
     debounce_warn: Span::from_secs(2),
     instances: RECEIVERS_MAX as u8,
-    read: |inputs, receiver| gnss(inputs, receiver, |gnss| gnss.satellites.map(f32::from)),
+    read: |inputs, receiver| {
+        let enough = inputs.params.get(Param::GpsSatsWarn) + MARGIN;
+        gnss(inputs, receiver, |gnss| {
+            let count = gnss.satellites.map(f32::from)?;
+            Some(if is_exact(inputs, gnss) { count.max(enough) } else { count })
+        })
+    },
     ..ESTIMATOR
 };
 
@@ -194,7 +203,12 @@ pub(super) const CHECKS: &[Check] = &[
         side: Side::Above,
         warn: Some(Param::GpsHdopWarn),
         hysteresis: 0.1,
-        read: |inputs, receiver| gnss(inputs, receiver, |gnss| gnss.hdop),
+        read: |inputs, receiver| {
+            let little = inputs.params.get(Param::GpsHdopWarn) - MARGIN;
+            gnss(inputs, receiver, |gnss| {
+                gnss.hdop.map(|hdop| if is_exact(inputs, gnss) { hdop.min(little) } else { hdop })
+            })
+        },
         ..GNSS
     },
     Check {
@@ -288,6 +302,12 @@ fn gnss(inputs: &Inputs<'_>, receiver: u8, value: impl FnOnce(&Gnss) -> Option<f
     let slot = inputs.vehicle.gnss.get(usize::from(receiver))?;
     let known = slot.get().filter(|_| inputs.derived.had_fix(receiver))?;
     Reading::new(slot.at(), value(known))
+}
+
+/// A receiver that knows where it is within half of what its accuracy may be does so with however few satellites: its own word is better than
+/// their number, which depends on how many systems and bands it hears.
+fn is_exact(inputs: &Inputs<'_>, gnss: &Gnss) -> bool {
+    gnss.accuracy.is_some_and(|accuracy| accuracy.0 <= inputs.params.get(Param::GpsHaccWarn) / 2.0)
 }
 
 fn integrity(inputs: &Inputs<'_>, receiver: u8, value: impl FnOnce(u8, u8) -> u8) -> Option<Reading> {
