@@ -69,6 +69,7 @@ pub fn run(args: &cli::Demo) -> Result<Outcome> {
         output: page.clone(),
         session: None,
         system: None,
+        compare: false,
         replace: false,
     };
     report::run(&page_of)?;

@@ -102,7 +102,8 @@ pub fn each(opened: &mut Opened, take: &mut Take<'_>) -> Result<()> {
     let Some(recording) = opened.recording.take() else { return Ok(()) };
     let progress = recording.progress.clone();
     let mut epoch_us = None;
-    let want = if opened.native.is_some() { native::want() } else { Want { frames: true, ..Want::default() } };
+    let want =
+        if opened.native.is_some() { native::want() } else { Want { frames: true, ..Want::default() } };
     let native = opened.native.is_some();
     recording.read(want, &mut |at, item| {
         let entry = if native { Entry::of(at, &item) } else { None };

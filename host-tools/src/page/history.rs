@@ -161,7 +161,7 @@ impl History {
     pub fn more(&mut self, at: Instant, more: &More) {
         match more {
             More::Values(values) => self.samples.values(at, values),
-            More::Default(default) => self.parameters.default(default),
+            More::Default(default) => self.parameters.learn_default(default),
         }
     }
 
@@ -286,8 +286,7 @@ impl History {
                 continue;
             }
             let params = self.params.as_deref();
-            let limits =
-                params.map(|params| plots::limits(plot, self.autopilot, params)).unwrap_or_default();
+            let limits = params.map(|params| plots::limits(plot, self.autopilot, params)).unwrap_or_default();
             let plots::About { group, title, unit, decimals, .. } = about;
             let (id, title) = (format!("{plot:?}"), title.to_owned());
             all.push((plot, PlotJson { id, group, title, unit, decimals, limits, lines: vec![named] }));

@@ -171,7 +171,8 @@ mod tests {
         assert_eq!(height.lines, [(0, "one".to_owned()), (1, "other".to_owned())]);
         for number in 0..2 {
             let key = format!("Height-0:{number}");
-            let (_, _, (numbers, values)) = part.series.0.iter().find(|(name, ..)| *name == key).expect("one");
+            let (_, _, (numbers, values)) =
+                part.series.0.iter().find(|(name, ..)| *name == key).expect("one");
             for (interval, pair) in numbers.iter().zip(values.chunks_exact(2)) {
                 let at_s = (f64::from(*interval) + 0.5) * part.step_s;
                 assert!((f64::from(pair[1]) - at_s).abs() < 2.0, "{pair:?} m after {at_s} s");

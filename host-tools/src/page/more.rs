@@ -341,7 +341,10 @@ mod tests {
         let of = |value| [Value::Text("RTL_ALT"), Value::Single(15.0), Value::Single(value)];
         let parm = |value| with_row("PARM", &["Name", "Value", "Default"], &of(value), default_of);
         assert_eq!(parm(f32::NAN), None, "before 4.3, and where it is not known");
-        assert_eq!(parm(20.0).map(|default| (default.name, default.value)), Some(("RTL_ALT".to_owned(), 20.0)));
+        assert_eq!(
+            parm(20.0).map(|default| (default.name, default.value)),
+            Some(("RTL_ALT".to_owned(), 20.0))
+        );
         let values = [Value::Text("MC_ROLL_P"), Value::Double(6.5), Value::Flag(false), Value::Flag(true)];
         let columns = ["name", "value", "system", "configuration"];
         let default = with_row("default_parameters", &columns, &values, default_of).expect("one");

@@ -68,7 +68,8 @@ pub struct Cause {
 impl Cause {
     /// Of the check of this name.
     fn of(check: &str) -> Self {
-        let words = vocabulary(check).map_or_else(|| check.replace('_', " "), |known| known.said.name.to_owned());
+        let words =
+            vocabulary(check).map_or_else(|| check.replace('_', " "), |known| known.said.name.to_owned());
         Self { check: check.to_owned(), words }
     }
 }

@@ -56,7 +56,7 @@ impl Parameters {
     }
 
     /// Takes what a parameter is by default.
-    pub fn default(&mut self, default: &DefaultValue) {
+    pub fn learn_default(&mut self, default: &DefaultValue) {
         let known = self.defaults.get(&default.name);
         let has_room = known.is_some() || self.defaults.len() < PARAMETERS_MAX;
         if has_room && known.is_none_or(|known| default.is_of_airframe || !known.is_of_airframe) {
@@ -89,7 +89,11 @@ impl Parameters {
             let (last, _) = known.last()?;
             let values = known.iter().map(|(at, value)| (at.as_secs_f64(), *value)).collect();
             let default = self.defaults.get(name).map(|default| default.value);
-            from.is_none_or(|from| *last > from).then(|| ParameterJson { name: name.clone(), values, default })
+            from.is_none_or(|from| *last > from).then(|| ParameterJson {
+                name: name.clone(),
+                values,
+                default,
+            })
         };
         self.known.iter().filter_map(parameter).collect()
     }
@@ -104,9 +108,10 @@ mod tests {
         let mut parameters = Parameters::default();
         parameters.take(Instant::ZERO, "MC_ROLL_P", 8.0);
         assert!(!parameters.tells_defaults());
-        let default = |value, is_of_airframe| DefaultValue { name: "MC_ROLL_P".to_owned(), value, is_of_airframe };
+        let default =
+            |value, is_of_airframe| DefaultValue { name: "MC_ROLL_P".to_owned(), value, is_of_airframe };
         for (value, is_of_airframe) in [(6.5, false), (7.0, true), (6.5, false)] {
-            parameters.default(&default(value, is_of_airframe));
+            parameters.learn_default(&default(value, is_of_airframe));
         }
         let told = parameters.since(None, Instant::ZERO);
         assert_eq!((told[0].default, parameters.tells_defaults()), (Some(7.0), true));

@@ -146,16 +146,14 @@ pub fn about(plot: Plot, autopilot: Autopilot) -> About {
     };
     let (vibration, estimator) = if px4 { ("PX4 metrics", "test ratio") } else { ("m/s\u{b2}", "variance") };
     let (group, title, unit, decimals, name): (_, _, _, _, fn(u8) -> String) = match plot {
-        Plot::Height => {
-            ("Motion", "Height above home", "m", 2, |line| named(&["Height", "Wanted, above the origin"], line))
-        }
+        Plot::Height => ("Motion", "Height above home", "m", 2, |line| {
+            named(&["Height", "Wanted, above the origin"], line)
+        }),
         Plot::Altitude => ("Motion", "Altitude above sea level", "m", 1, |line| {
             named(&["GNSS", "Estimator", "Wanted"], line)
         }),
         Plot::Speed => ("Motion", "Speed", "m/s", 2, |line| named(&["Ground", "Air", "GNSS"], line)),
-        Plot::Vertical => {
-            ("Motion", "Climb rate", "m/s", 2, |line| named(&["Climb", "Climb, wanted"], line))
-        }
+        Plot::Vertical => ("Motion", "Climb rate", "m/s", 2, |line| named(&["Climb", "Climb, wanted"], line)),
         Plot::Velocity => ("Motion", "NED velocity", "m/s", 2, |line| {
             named(&["North", "East", "Down", "North, wanted", "East, wanted", "Down, wanted"], line)
         }),
@@ -208,9 +206,9 @@ pub fn about(plot: Plot, autopilot: Autopilot) -> About {
         Plot::Temperature => ("Computer", "Temperatures", "\u{b0}C", 1, |line| {
             named(&["Barometer", "Inertial sensor", "Processor", "Air, by HIGHRES_IMU"], line)
         }),
-        Plot::Pressure => ("Computer", "Air pressure", "hPa", 1, |line| {
-            named(&["Barometer", "Air, by HIGHRES_IMU"], line)
-        }),
+        Plot::Pressure => {
+            ("Computer", "Air pressure", "hPa", 1, |line| named(&["Barometer", "Air, by HIGHRES_IMU"], line))
+        }
         Plot::Load => ("Computer", "Autopilot load", "%", 1, |_| "Load".into()),
     };
     About { group, title, unit, decimals, name }

@@ -89,7 +89,8 @@ mod tests {
             finding(50, "gps_fix", "critical"),
         ];
         let causes = causes(&findings);
-        let explained: Vec<usize> = (0..).zip(&causes).filter_map(|(at, cause)| cause.as_ref().map(|_| at)).collect();
+        let explained: Vec<usize> =
+            (0..).zip(&causes).filter_map(|(at, cause)| cause.as_ref().map(|_| at)).collect();
         assert_eq!(explained, [1, 4], "the last one had stood for twenty seconds: {causes:?}");
         assert_eq!(causes[1].as_deref(), Some("gps_fix"));
     }
