@@ -102,8 +102,8 @@ fn a_flights_page_shows_the_flight() {
     assert_pointed_values(&recording.image(), &shown);
     assert!(shown["cursor"].as_str().unwrap().contains(':'), "no time under the cursor: {}", shown["cursor"]);
     // The defaults of docs/parameters.md.
-    assert_eq!(shown["limits"]["Vibration"], serde_json::json!([[30.0, 60.0]]));
-    assert_eq!(shown["limits"]["Attitude"], serde_json::json!([[45.0, 60.0], [-45.0, -60.0]]));
+    assert_eq!(shown["limits"]["Vibration"], serde_json::json!([[30, 60]]));
+    assert_eq!(shown["limits"]["Attitude"], serde_json::json!([[45, 60], [-45, -60]]));
     assert_eq!(shown["plots"]["Altitude"]["lines"], 3, "receiver, estimator and what is wanted are apart");
     assert!(!shown["why"].as_array().unwrap().is_empty(), "no finding says what it means");
 }
@@ -471,12 +471,17 @@ fn parameters_that_are_not_at_their_default_are_those_of_which_the_log_says_so()
     // By pymavlink: the last value of each.
     let lines = oracle::dataflash(&log);
     let rows = lines.lines().map(json).filter(|row| row[0] == "PARM");
-    let mut other: BTreeMap<String, bool> = BTreeMap::new();
+    let (mut other, mut defaults) = (BTreeMap::new(), BTreeMap::new());
     for row in rows {
-        let (name, value, default) = (&row[1][1], &row[1][2], &row[1][3]);
-        let differs =
-            default.as_f64().is_some_and(|default| default.total_cmp(&value.as_f64().unwrap()).is_ne());
-        other.insert(name.as_str().unwrap().to_owned(), differs);
+        let name = row[1][1].as_str().unwrap().to_owned();
+        // A change in flight comes without it.
+        if let Some(default) = row[1][3].as_f64() {
+            defaults.insert(name.clone(), default);
+        }
+        let differs = defaults
+            .get(&name)
+            .is_some_and(|default| default.total_cmp(&row[1][2].as_f64().unwrap()).is_ne());
+        other.insert(name, differs);
     }
     let wanted: Vec<&String> = other.iter().filter(|(_, other)| **other).map(|(name, _)| name).collect();
     let mut page = LivePage::start();
