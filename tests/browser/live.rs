@@ -129,7 +129,7 @@ fn shots() -> Option<PathBuf> {
     Some(folder)
 }
 
-fn shoot(page: &mut LivePage, name: &str) {
+pub(crate) fn shoot(page: &mut LivePage, name: &str) {
     if let Some(folder) = shots() {
         page.shot(&folder.join(format!("{name}.png")), true);
     }

@@ -1,13 +1,17 @@
 //! Reports of recorded flights, looked at in Chromium.
 
+use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use hums_tests::flights::{Manifest, own};
 use hums_tests::frames::build_v2;
+use hums_tests::oracle::LivePage;
 use hums_tests::program::{LIMIT, Machine, Recording, command, hums};
 use hums_tests::{child, oracle};
 use serde_json::Value;
+
+use super::live::shoot;
 
 fn json(text: &str) -> Value {
     serde_json::from_str(text).unwrap()
@@ -98,8 +102,9 @@ fn a_flights_page_shows_the_flight() {
     assert_pointed_values(&recording.image(), &shown);
     assert!(shown["cursor"].as_str().unwrap().contains(':'), "no time under the cursor: {}", shown["cursor"]);
     // The defaults of docs/parameters.md.
-    let limits = [0, 1].map(|level| shown["limits"]["Vibration"][level].as_f64());
-    assert_eq!(limits, [Some(30.0), Some(60.0)]);
+    assert_eq!(shown["limits"]["Vibration"], serde_json::json!([[30, 60]]));
+    assert_eq!(shown["limits"]["Attitude"], serde_json::json!([[45, 60], [-45, -60]]));
+    assert_eq!(shown["plots"]["Altitude"]["lines"], 3, "receiver, estimator and what is wanted are apart");
     assert!(!shown["why"].as_array().unwrap().is_empty(), "no finding says what it means");
 }
 
@@ -135,7 +140,9 @@ fn assert_pointed_values(image: &Path, shown: &Value) {
     let mut decode = command(["decode".as_ref(), image.as_os_str()]);
     let jsonl = child::run(decode.args(["-o", "-", "--format", "jsonl"]), LIMIT).expect_code(&[0]).text();
     assert_modes(&jsonl, shown);
-    let lines: [Line; 4] = [
+    let lines: [Line; 6] = [
+        ("Wind", "Wind", "WIND", 0.06, |fields| fields["speed"].as_f64().unwrap()),
+        ("Altitude", "Wanted", "POSITION_TARGET_GLOBAL_INT", 0.06, |fields| fields["alt"].as_f64().unwrap()),
         ("Height", "Height", "GLOBAL_POSITION_INT", 0.01, |fields| {
             fields["relative_alt"].as_f64().unwrap() / 1e3
         }),
@@ -222,4 +229,344 @@ fn several_sessions_of_a_card_become_a_trend() {
     assert_sound(&shown);
     let text = shown["text"].as_str().unwrap();
     assert!(text.contains("This session against the 1 session before it on the same card"), "no trend");
+}
+
+fn labelled(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("labelled").join(name)
+}
+
+/// Frames of one vehicle that stands: heartbeats, and what else is given, each a second.
+fn standing(seconds: u8, more: impl Fn(u8) -> Vec<(u32, Vec<u8>)>) -> Vec<u8> {
+    let seeds = &Manifest::own().seeds;
+    let (mut data, mut sequence, start_us) = (Vec::new(), 0_u8, 1_700_000_000_000_000_u64);
+    for second in 0..seconds {
+        let beat = (0, vec![4, 0, 0, 0, 2, 3, 0x51, 4, 3]);
+        for (id, payload) in std::iter::once(beat).chain(more(second)) {
+            data.extend((start_us + u64::from(second) * 1_000_000).to_be_bytes());
+            data.extend(build_v2(sequence, id, &payload, seeds[&id]));
+            sequence = sequence.wrapping_add(1);
+        }
+    }
+    data
+}
+
+#[test]
+fn each_battery_has_its_own_lines_and_two_barometers_are_two() {
+    let battery = |id: u8, millivolts: u16| {
+        let mut payload = vec![0xff; 36];
+        payload[..10].copy_from_slice(&[0; 10]);
+        for cell in 0..2 {
+            payload[10 + 2 * cell..12 + 2 * cell].copy_from_slice(&millivolts.to_le_bytes());
+        }
+        payload[32..36].copy_from_slice(&[id, 0, 1, 50]);
+        payload
+    };
+    // SCALED_PRESSURE and HIGHRES_IMU, of other temperatures.
+    let pressure = || [&[0; 4][..], &1_000_f32.to_le_bytes(), &[0; 4], &1_180_i16.to_le_bytes()].concat();
+    let highres = || {
+        [&[0; 8][..], &[0; 36], &1_001_f32.to_le_bytes(), &[0; 8], &15_f32.to_le_bytes(), &[255, 31]].concat()
+    };
+    let data = standing(20, |_| {
+        let batteries = (0..6).map(|id| (147, battery(id, 3_500 + 50 * u16::from(id))));
+        batteries.chain([(29, pressure()), (105, highres())]).collect()
+    });
+    let dir = tempfile::tempdir().unwrap();
+    let file = dir.path().join("six.tlog");
+    fs::write(&file, data).unwrap();
+    let (_dir, path) = report(&file, &[0]);
+    let mut page = LivePage::start();
+    page.open(&format!("file://{}", path.display()), "light", 1280, 900);
+    let lines = |page: &mut LivePage, plot: &str| {
+        let keys = format!("document.querySelectorAll('#plot-{plot} .keys button')");
+        page.run(&format!(
+            "return [...{keys}].map((key) => [key.childNodes[1].textContent, key.lastChild.textContent])"
+        ))
+    };
+    let volts = lines(&mut page, "PackVolts");
+    let volts = volts.as_array().unwrap();
+    assert_eq!(volts.len(), 6, "{volts:?}");
+    assert_eq!(volts[5], serde_json::json!(["Battery 6", "7.500"]));
+    let cells = lines(&mut page, "CellVolts");
+    assert_eq!(cells[0], serde_json::json!(["Cell 1", "3.500"]));
+    assert_eq!(cells[11], serde_json::json!(["Battery 6, cell 2", "3.750"]));
+    let celsius = lines(&mut page, "Temperature");
+    assert_eq!(celsius, serde_json::json!([["Barometer", "11.8"], ["Air, by HIGHRES_IMU", "15.0"]]));
+}
+
+#[test]
+fn a_finding_stands_with_its_cause_and_with_its_consequences() {
+    let (_dir, page) = report(&labelled("f10_gps_off.tlog.gz"), &[0]);
+    let shown = oracle::browser(&page);
+    assert_sound(&shown);
+    let says = |kind: &str, words: &str| {
+        shown[kind].as_array().unwrap().iter().any(|text| text.as_str().unwrap().contains(words))
+    };
+    assert!(says("because", "Because of: GPS"), "{}", shown["because"]);
+    assert!(says("consequences", "Consequences: "), "{}", shown["consequences"]);
+}
+
+/// What stands in the cells of a table's rows.
+fn table(page: &mut LivePage, selector: &str) -> Vec<Vec<String>> {
+    let rows = page.run(&format!(
+        "return [...document.querySelectorAll('{selector} tbody tr')].map((row) => [...row.children].map((cell) => cell.textContent))"
+    ));
+    serde_json::from_value(rows).unwrap()
+}
+
+fn data_of(path: &Path) -> Value {
+    let text = fs::read_to_string(path).unwrap();
+    let data = text.split_once("id=\"data\">").unwrap().1;
+    json(data.split_once("</script>").unwrap().0)
+}
+
+/// The parameters that a link told, as an independent reader has them, at the end.
+fn parameters(recording: &Path) -> BTreeMap<String, u32> {
+    let dir = tempfile::tempdir().unwrap();
+    let log = dir.path().join("flight.hum");
+    hums(["pack".as_ref(), recording.as_os_str(), "-o".as_ref(), log.as_os_str()]).expect_code(&[0]);
+    let mut decode = command(["decode".as_ref(), log.as_os_str()]);
+    let lines = child::run(decode.args(["-o", "-", "--format", "jsonl"]), LIMIT).expect_code(&[0]).text();
+    let values = lines.lines().filter(|line| line.contains("\"PARAM_VALUE\"")).map(json);
+    let of_autopilot = values.filter(|entry| entry["component"] == 1);
+    let fields = of_autopilot.map(|entry| entry["fields"].clone());
+    fields
+        .map(|fields| {
+            (
+                fields["param_id"].as_str().unwrap().to_owned(),
+                (fields["param_value"].as_f64().unwrap() as f32).to_bits(),
+            )
+        })
+        .collect()
+}
+
+#[test]
+fn a_folder_of_pages_has_a_table_and_flights_stand_side_by_side() {
+    let dir = tempfile::tempdir().unwrap();
+    let pages = dir.path().join("pages");
+    let flights = ["ap_quad_guided.tlog", "ap_quad_faults.tlog"].map(own);
+    let mut make = command(["report", "--compare"]);
+    make.args(&flights).arg("-o").arg(format!("{}/", pages.display()));
+    child::run(&mut make, LIMIT).expect_code(&[0]);
+    let mut page = LivePage::start();
+    let index = format!("file://{}/index.html", pages.display());
+    page.open(&index, "light", 1280, 900);
+    page.wait("return document.documentElement.dataset.ready === 'true'", 20);
+    let rows = table(&mut page, "#pages");
+    assert_eq!(rows.len(), 2);
+    // The headings sort, also from the keyboard.
+    let air = |rows: &[Vec<String>]| rows.iter().map(|row| row[6].clone()).collect::<Vec<_>>();
+    page.run("document.querySelectorAll('#pages .sort')[6].focus()");
+    page.press(&["ENTER"]);
+    let (falling, other) = (air(&table(&mut page, "#pages")), {
+        page.press(&["ENTER"]);
+        air(&table(&mut page, "#pages"))
+    });
+    assert_ne!(falling, other);
+    page.run("const word = document.querySelector('input'); word.value = 'faults'; word.dispatchEvent(new Event('input'))");
+    assert_eq!(table(&mut page, "#pages").len(), 1);
+    assert_eq!(page.console(), serde_json::json!([]));
+    shoot(&mut page, "index");
+    // Each row leads to its page, which says what changed since the flight before.
+    page.run("document.querySelector('#pages a').click()");
+    page.wait("return document.title.includes('ap_quad_faults') && document.documentElement.dataset.ready === 'true'", 20);
+    let [before, now] = [0, 1].map(|flight: usize| parameters(&flights[flight]));
+    let differ: Vec<&String> = now
+        .iter()
+        .filter(|(name, value)| before.get(*name).is_some_and(|before| before != *value))
+        .map(|(name, _)| name)
+        .collect();
+    let changed: Vec<String> =
+        table(&mut page, "#parameters-before").into_iter().map(|row| row[0].clone()).collect();
+    assert_eq!(changed.iter().collect::<Vec<_>>(), differ);
+    assert!(
+        page.run("return document.getElementById('parameters-other').textContent")
+            .as_str()
+            .unwrap()
+            .contains("does not tell defaults")
+    );
+
+    page.open(&index, "light", 390, 844);
+    page.wait("return document.documentElement.dataset.ready === 'true'", 20);
+    let width = page.run("return [document.documentElement.scrollWidth, innerWidth]");
+    assert!(width[0].as_f64() <= width[1].as_f64(), "{width}");
+    page.run("document.querySelector('#comparisons a').click()");
+    page.wait(
+        "return document.title.includes('side by side') && document.documentElement.dataset.ready === 'true'",
+        20,
+    );
+    page.open(page_of(&pages, "compare-").as_str(), "light", 1280, 900);
+    page.wait("return document.documentElement.dataset.ready === 'true'", 20);
+    assert_compared(&mut page, &pages, &now, &before);
+}
+
+fn page_of(pages: &Path, begins: &str) -> String {
+    let mut files = fs::read_dir(pages).unwrap().map(|entry| entry.unwrap().path());
+    let file = files.find(|file| file.file_name().unwrap().to_string_lossy().starts_with(begins)).unwrap();
+    format!("file://{}", file.display())
+}
+
+/// The newest flight stands first: in the figures, in each plot, and in the parameters that differ.
+fn assert_compared(
+    page: &mut LivePage,
+    pages: &Path,
+    now: &BTreeMap<String, u32>,
+    before: &BTreeMap<String, u32>,
+) {
+    let figures = table(page, "#figures");
+    let figure = |name: &str| {
+        let row =
+            figures.iter().find(|row| row[0] == name).unwrap_or_else(|| panic!("no {name}: {figures:?}"));
+        [number(&row[1]), number(&row[2])]
+    };
+    let page_data = |name: &str| data_of(Path::new(page_of(pages, name).trim_start_matches("file://")));
+    for (column, name) in ["ap_quad_faults", "ap_quad_guided"].into_iter().enumerate() {
+        let data = page_data(name);
+        let height = data["flights"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .map(|f| f["height_max_m"].as_f64().unwrap())
+            .fold(0.0, f64::max);
+        assert!((figure("Greatest height")[column] - height).abs() < 0.051, "{name}: {height} {figures:?}");
+    }
+    let names = "return [...document.querySelectorAll('#plot-PackVolts-0 .keys button')].map((key) => key.textContent)";
+    assert_eq!(page.run(names).as_array().unwrap().len(), 2, "both in one plot, on one scale");
+    // Without the second one only the first is drawn, everywhere.
+    page.run("document.querySelectorAll('#figures input')[1].click()");
+    let off = page.run("return [...document.querySelectorAll('.plot')].filter((plot) => plot.querySelectorAll('.keys .off').length !== 1).length");
+    let whole = page.run("return [...document.querySelectorAll('.plot')].filter((plot) => plot.querySelectorAll('.keys button').length === 2).length");
+    let all = page.run("return document.querySelectorAll('.plot').length");
+    assert!(
+        whole.as_u64() > Some(10)
+            && off.as_u64() == all.as_u64().zip(whole.as_u64()).map(|(all, whole)| all - whole),
+        "{off} {whole} {all}"
+    );
+    page.run("document.querySelectorAll('#figures input')[1].click()");
+    let differ =
+        now.iter().filter(|(name, value)| before.get(*name).is_some_and(|before| before != *value)).count();
+    let shown = if differ == 0 { 0 } else { table(page, "#parameters").len() };
+    assert_eq!(shown, differ);
+    assert_eq!(page.console(), serde_json::json!([]));
+    shoot(page, "compare");
+}
+
+#[test]
+fn flights_of_one_file_and_a_single_one_cannot_be_compared() {
+    let dir = tempfile::tempdir().unwrap();
+    let out = dir.path().join("one.html");
+    let mut make = command(["report", "--compare"]);
+    make.arg(own("ap_quad_guided.tlog")).arg("-o").arg(&out);
+    let refused = child::run(&mut make, LIMIT).expect_code(&[1]);
+    assert!(refused.stderr.contains("not two flights"), "{}", refused.stderr);
+    assert!(!out.exists());
+}
+
+#[test]
+fn parameters_that_are_not_at_their_default_are_those_of_which_the_log_says_so() {
+    let dir = tempfile::tempdir().unwrap();
+    let log = dir.path().join("flight.bin");
+    let mut input = hums::source::input::Input::open(&labelled("bin/n03_wind9_gusty.bin.gz")).unwrap();
+    std::io::copy(&mut input, &mut fs::File::create(&log).unwrap()).unwrap();
+    let (_dir, path) = report(&log, &[0]);
+    // By pymavlink: the last value of each.
+    let lines = oracle::dataflash(&log);
+    let rows = lines.lines().map(json).filter(|row| row[0] == "PARM");
+    let (mut other, mut defaults) = (BTreeMap::new(), BTreeMap::new());
+    for row in rows {
+        let name = row[1][1].as_str().unwrap().to_owned();
+        // A change in flight comes without it.
+        if let Some(default) = row[1][3].as_f64() {
+            defaults.insert(name.clone(), default);
+        }
+        let differs = defaults
+            .get(&name)
+            .is_some_and(|default| default.total_cmp(&row[1][2].as_f64().unwrap()).is_ne());
+        other.insert(name, differs);
+    }
+    let wanted: Vec<&String> = other.iter().filter(|(_, other)| **other).map(|(name, _)| name).collect();
+    let mut page = LivePage::start();
+    page.open(&format!("file://{}", path.display()), "light", 1280, 900);
+    let shown: Vec<String> =
+        table(&mut page, "#parameters-other").into_iter().map(|row| row[0].clone()).collect();
+    assert!(!wanted.is_empty() && other.len() > wanted.len(), "{} of {}", wanted.len(), other.len());
+    assert_eq!(shown.iter().collect::<Vec<_>>(), wanted);
+}
+
+/// The contrast of each text with what is behind it, as WCAG 2.2 defines it: the lowest, with its text. Small print is judged as such.
+const CONTRAST: &str = "
+const channel = (c) => (c /= 255) <= .04045 ? c / 12.92 : ((c + .055) / 1.055) ** 2.4;
+const light = ([r, g, b]) => .2126 * channel(r) + .7152 * channel(g) + .0722 * channel(b);
+const colour = (text) => { const n = text.match(/[0-9.]+/g).map(Number); return n.length < 4 ? [...n, 1] : n; };
+const over = ([r, g, b, a], under) => [r, g, b].map((c, i) => c * a + under[i] * (1 - a));
+const behind = (node) => {
+  const layers = [];
+  for (let one = node; one; one = one.parentElement) {
+    const c = colour(getComputedStyle(one).backgroundColor);
+    if (c[3] > 0) layers.push(c);
+    if (c[3] === 1) break;
+  }
+  return layers.reverse().reduce((under, layer) => over(layer, under), [255, 255, 255]);
+};
+let worst = [99, ''];
+const walk = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
+for (let text = walk.nextNode(); text; text = walk.nextNode()) {
+  const node = text.parentElement;
+  if (!text.data.trim() || !node.checkVisibility({ visibilityProperty: true }) || node.closest('script, svg, .off, noscript')) continue;
+  const ground = behind(node), ink = over(colour(getComputedStyle(node).color), ground);
+  const [a, b] = [light(ink), light(ground)].sort((x, y) => y - x), ratio = (a + .05) / (b + .05);
+  if (ratio < worst[0]) worst = [ratio, text.data.slice(0, 40), getComputedStyle(node).color, String(ground)];
+}
+return worst;
+";
+
+#[test]
+fn a_report_is_read_on_paper_in_the_dark_with_high_contrast_on_a_phone_and_from_the_keyboard() {
+    let recording = Recording::make(Machine::Sim, &own("ap_quad_faults.tlog"), &[]);
+    let (dir, path) = report(&recording.image(), &[0]);
+    let address = format!("file://{}", path.display());
+    let mut page = LivePage::start();
+    page.open(&address, "light", 1280, 900);
+    page.wait("return document.documentElement.dataset.ready === 'true'", 20);
+    for (name, media, scheme, contrast, least) in [
+        ("report-light", "", "light", "no-preference", 4.5),
+        ("report-dark", "", "dark", "no-preference", 4.5),
+        ("report-contrast", "", "light", "more", 7.0),
+        ("report-contrast-dark", "", "dark", "more", 7.0),
+        ("report-print", "print", "light", "no-preference", 4.5),
+    ] {
+        let features = serde_json::json!({ "prefers-color-scheme": scheme, "prefers-contrast": contrast });
+        page.media(media, &features);
+        let worst = page.run(CONTRAST);
+        assert!(worst[0].as_f64() >= Some(least), "{name}: {worst}");
+        shoot(&mut page, name);
+    }
+    page.media("", &serde_json::json!({ "forced-colors": "active" }));
+    let framed = page.run("return getComputedStyle(document.querySelector('.badge')).borderTopStyle");
+    assert_eq!(framed, "solid", "a level without its colour");
+    page.media("", &serde_json::json!({}));
+    // The keyboard: a step of the timeline moves the cursor in all plots, Enter looks closer, Escape goes back.
+    page.run("document.getElementById('timeline').focus()");
+    page.press(&["HOME", "ARROW_RIGHT", "ARROW_RIGHT"]);
+    let cursor = page.run("return document.querySelector('.cursor-time').textContent");
+    assert!(cursor.as_str().unwrap().contains(':'), "{cursor}");
+    let span = "return Number(document.getElementById('timeline').getAttribute('aria-valuenow'))";
+    let first = page.run(span).as_f64();
+    page.press(&["ARROW_RIGHT"]);
+    assert!(page.run(span).as_f64() > first);
+    page.press(&["ENTER"]);
+    page.wait("return !document.querySelector('.back').hidden", 5);
+    shoot(&mut page, "report-keyboard");
+    page.press(&["ESCAPE"]);
+    page.wait("return document.querySelector('.back').hidden", 5);
+    // Nothing that can be clicked is out of its reach.
+    let mute = page.run("return [...document.querySelectorAll('[onclick], tr.go, .notes li, canvas[role=slider]')].filter((node) => node.tabIndex < 0).length");
+    assert_eq!(mute, 0);
+    let pdf = dir.path().join("report.pdf");
+    page.pdf(&pdf);
+    let bytes = fs::read(&pdf).unwrap();
+    assert!(bytes.starts_with(b"%PDF") && bytes.len() > 50_000, "{} bytes", bytes.len());
+    page.open(&address, "light", 390, 844);
+    page.wait("return document.documentElement.dataset.ready === 'true'", 20);
+    shoot(&mut page, "report-phone");
+    assert_eq!(page.console(), serde_json::json!([]));
 }

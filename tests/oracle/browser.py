@@ -11,8 +11,9 @@ usage: browser.py CHROMIUM CHROMEDRIVER PAGE [SCREENSHOT]        prints JSON
                 at 30, 50 and 70 % of it, with the time there
   cursor        the time under the cursor, at the last of these
   modes         names of the flight modes, in order
-  limits        of warning and critical, by plot
+  limits        pairs of warning and critical, by plot
   why           what findings mean, and what to do
+  because, consequences   what explains findings, and what they explain
   map           the part of the map's pixels that is drawn on
   width         of the page and of the window, at the width of a phone
 """
@@ -66,7 +67,7 @@ return JSON.parse(document.getElementById("data").textContent).flight.modes[1].m
 # The limits of warning and critical by plot.
 LIMITS = """
 const { plots } = JSON.parse(document.getElementById("data").textContent).flight;
-return Object.fromEntries(plots.filter(({ limits }) => limits).map(({ id, limits }) => [id, limits]));
+return Object.fromEntries(plots.filter(({ limits }) => limits.length).map(({ id, limits }) => [id, limits]));
 """
 
 
@@ -129,6 +130,8 @@ def look(driver, page, screenshot):
     shown["modes"] = driver.execute_script(MODES)
     shown["limits"] = driver.execute_script(LIMITS)
     shown["why"] = [row.get_attribute("textContent") for row in all_of(".notes .why")]
+    for kind in ["because", "consequences"]:
+        shown[kind] = [row.get_attribute("textContent") for row in all_of(f".notes .{kind}:not([hidden])")]
     shown["map"] = [driver.execute_script(DRAWN, canvas) for canvas in all_of("#map")]
     shown["timeline"] = driver.execute_script(DRAWN, driver.find_element("id", "timeline"))
     if all_of(".notes .finding"):

@@ -3,6 +3,8 @@
 usage: live.py CHROMIUM CHROMEDRIVER        a JSON object a line on standard input is answered by one on standard output
 
   {"do": "open", "url": U, "scheme": "light" | "dark", "width": W, "height": H}
+  {"do": "media", "media": "" | "print", "features": {NAME: VALUE}}     how it is shown: `prefers-color-scheme`, `prefers-contrast`, ...
+  {"do": "pdf", "path": P}                  as it is printed on A4
   {"do": "read"}                            what the page shows at one moment: see READ
   {"do": "wait", "script": JS, "limit_s": S}  until the script returns something true; answers what it returned
   {"do": "run", "script": JS}               answers what it returned
@@ -94,6 +96,15 @@ def step(driver, asked):
         scheme = {"name": "prefers-color-scheme", "value": asked["scheme"]}
         driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": [scheme]})
         driver.get(asked["url"])
+        return None
+    if do == "media":
+        features = [{"name": name, "value": value} for name, value in asked["features"].items()]
+        driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": asked["media"], "features": features})
+        return None
+    if do == "pdf":
+        made = driver.execute_cdp_cmd("Page.printToPDF", {"printBackground": False, "paperWidth": 8.27, "paperHeight": 11.69})
+        with open(asked["path"], "wb") as file:
+            file.write(base64.b64decode(made["data"]))
         return None
     if do == "read":
         return driver.execute_script(READ)

@@ -126,6 +126,18 @@ impl LivePage {
         self.ask(&serde_json::json!({ "do": "open", "url": url, "scheme": scheme, "width": width, "height": height }));
     }
 
+    /// Shows it on a screen or, with `print`, on paper, with these of the reader's preferences.
+    #[track_caller]
+    pub fn media(&mut self, media: &str, features: &Value) {
+        self.ask(&serde_json::json!({ "do": "media", "media": media, "features": features }));
+    }
+
+    /// Prints it as a PDF.
+    #[track_caller]
+    pub fn pdf(&mut self, path: &Path) {
+        self.ask(&serde_json::json!({ "do": "pdf", "path": path }));
+    }
+
     /// What the page shows at one moment.
     #[track_caller]
     pub fn read(&mut self) -> Value {

@@ -239,7 +239,6 @@ mod tests {
                 armed: Span::from_secs(60),
                 arming: None,
                 flew: true,
-                has_past: false,
                 problems: &[],
             };
             let (_, not_judged) = Coverage::new().lists(&recording);

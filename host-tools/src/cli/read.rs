@@ -151,9 +151,10 @@ const REPORT_EXAMPLES: &str = "Examples:
   hums report card.img -o pages/
   hums report card.img --session 00001 -o report.html
   hums report flight.tlog -o flight.html
+  hums report before.tlog after.tlog --compare -o both.html
 
-With a directory for -o each session gets a page, named after log, box and session; otherwise the newest gets one. The page compares with
-the sessions before on the same card.";
+With a directory for -o each session gets a page, named after log, box and session, and index.html is a table of them; otherwise the newest
+gets one. The page compares with the sessions before on the same card, and the parameters with those of the airframe's last flight.";
 
 /// `hums report`
 #[derive(Args, Clone, Debug)]
@@ -168,6 +169,9 @@ pub struct Report {
     /// Only this session, by the name that `hums ls` gives
     #[arg(long, value_name = "NAME")]
     pub session: Option<String>,
+    /// Compare the last eleven flights side by side on one page; with a directory those of each airframe, besides the pages
+    #[arg(long)]
+    pub compare: bool,
     /// Of several vehicles in a recording only this one, by its system id
     #[arg(long, value_name = "ID")]
     pub system: Option<u8>,

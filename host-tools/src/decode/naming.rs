@@ -1,6 +1,8 @@
 //! What the files are called that are made of a session: by the name that says whose it is ([`crate::logs::naming`]).
 
 use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result};
@@ -155,6 +157,9 @@ fn is_made(path: &Path) -> bool {
     if path.is_dir() {
         return Folder::made_of(path).is_some() || name.starts_with("vehicle=");
     }
+    if name.ends_with(".html") && says_report(path) {
+        return true;
+    }
     let endings = [".tlog.gaps.csv", ".jsonl", ".lp", ".html"];
     endings.iter().filter_map(|ending| name.strip_suffix(ending)).any(|stem| {
         // A further log of a session has a number behind it.
@@ -162,6 +167,16 @@ fn is_made(path: &Path) -> bool {
         std::iter::once(stem).chain(numbered.map(|(stem, _)| stem)).any(ends_with_identity)
     })
 }
+
+/// Whether a page says at its beginning that `hums report` made it: the table of a folder's pages has no session in its name.
+fn says_report(path: &Path) -> bool {
+    let mut head = Vec::new();
+    let read = File::open(path).and_then(|file| file.take(1_024).read_to_end(&mut head));
+    read.is_ok() && head.windows(GENERATOR.len()).any(|part| part == GENERATOR)
+}
+
+/// What such a page's head has.
+const GENERATOR: &[u8] = b"name=\"generator\" content=\"hums report\"";
 
 /// Whether a name ends with a session's number, `-s1a2b3c4d`, or with that of a recording's content, `-r1a2b3c4d`.
 fn ends_with_identity(stem: &str) -> bool {

@@ -59,6 +59,7 @@ pub fn run(args: &cli::Demo) -> Result<Outcome> {
         output: page.clone(),
         session: None,
         system: None,
+        compare: false,
         replace: false,
         json: false,
     };

@@ -22,7 +22,7 @@ use crate::plural::count;
 use crate::printable::{path, word};
 use crate::source::item::MessageCount;
 use crate::states;
-use crate::summary::{Contents, FindingLine, LISTED_MAX, Overview};
+use crate::summary::{FindingLine, LISTED_MAX, Overview};
 use crate::utc::{clock, iso8601, moment};
 
 /// Findings and gaps that people are shown; the rest is counted, and is in `--json` and `hums decode`.

@@ -161,7 +161,7 @@ impl History {
     pub fn more(&mut self, at: Instant, more: &More) {
         match more {
             More::Values(values) => self.samples.values(at, values),
-            More::Default(default) => self.parameters.take_default(default),
+            More::Default(default) => self.parameters.learn_default(default),
         }
     }
 

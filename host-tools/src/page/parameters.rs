@@ -56,7 +56,7 @@ impl Parameters {
     }
 
     /// Takes what a parameter is by default.
-    pub fn take_default(&mut self, default: &DefaultValue) {
+    pub fn learn_default(&mut self, default: &DefaultValue) {
         let known = self.defaults.get(&default.name);
         let has_room = known.is_some() || self.defaults.len() < PARAMETERS_MAX;
         if has_room && known.is_none_or(|known| default.is_of_airframe || !known.is_of_airframe) {
@@ -111,7 +111,7 @@ mod tests {
         let default =
             |value, is_of_airframe| DefaultValue { name: "MC_ROLL_P".to_owned(), value, is_of_airframe };
         for (value, is_of_airframe) in [(6.5, false), (7.0, true), (6.5, false)] {
-            parameters.take_default(&default(value, is_of_airframe));
+            parameters.learn_default(&default(value, is_of_airframe));
         }
         let told = parameters.since(None, Instant::ZERO);
         assert_eq!((told[0].default, parameters.tells_defaults()), (Some(7.0), true));

@@ -132,6 +132,22 @@ fn cell(line: u8) -> String {
     if pack == 0 { numbered("Cell", cell) } else { format!("{}, cell {}", battery(pack), cell + 1) }
 }
 
+fn velocity(line: u8) -> String {
+    named(&["North", "East", "Down", "North, wanted", "East, wanted", "Down, wanted"], line)
+}
+
+fn attitude(line: u8) -> String {
+    named(&["Roll", "Pitch", "Roll, wanted", "Pitch, wanted"], line)
+}
+
+fn heading(line: u8) -> String {
+    named(&["Heading", "Wanted by attitude control", "Wanted by navigation"], line)
+}
+
+fn rates(line: u8) -> String {
+    named(&["Roll", "Pitch", "Yaw", "Roll, wanted", "Pitch, wanted"], line)
+}
+
 fn receiver(line: u8) -> String {
     numbered("Receiver", line)
 }
@@ -154,18 +170,10 @@ pub fn about(plot: Plot, autopilot: Autopilot) -> About {
         }),
         Plot::Speed => ("Motion", "Speed", "m/s", 2, |line| named(&["Ground", "Air", "GNSS"], line)),
         Plot::Vertical => ("Motion", "Climb rate", "m/s", 2, |line| named(&["Climb", "Climb, wanted"], line)),
-        Plot::Velocity => ("Motion", "NED velocity", "m/s", 2, |line| {
-            named(&["North", "East", "Down", "North, wanted", "East, wanted", "Down, wanted"], line)
-        }),
-        Plot::Attitude => ("Motion", "Attitude", "\u{b0}", 1, |line| {
-            named(&["Roll", "Pitch", "Roll, wanted", "Pitch, wanted"], line)
-        }),
-        Plot::Heading => ("Motion", "Heading", "\u{b0}", 0, |line| {
-            named(&["Heading", "Wanted by attitude control", "Wanted by navigation"], line)
-        }),
-        Plot::Rates => ("Motion", "Body rates", "\u{b0}/s", 1, |line| {
-            named(&["Roll", "Pitch", "Yaw", "Roll, wanted", "Pitch, wanted"], line)
-        }),
+        Plot::Velocity => ("Motion", "NED velocity", "m/s", 2, velocity),
+        Plot::Attitude => ("Motion", "Attitude", "\u{b0}", 1, attitude),
+        Plot::Heading => ("Motion", "Heading", "\u{b0}", 0, heading),
+        Plot::Rates => ("Motion", "Body rates", "\u{b0}/s", 1, rates),
         Plot::Wind => ("Motion", "Wind", "m/s", 1, |_| "Wind".into()),
         Plot::WindFrom => ("Motion", "Wind comes from", "\u{b0}", 0, |_| "From".into()),
         Plot::Sticks => ("Motion", "Radio control", "\u{b5}s", 0, |line| numbered("Channel", line)),

@@ -2,8 +2,8 @@
 //!
 //! The files in `assets/` are ECMAScript modules, with two habits that make putting them together simple: an `import` is one
 //! line, and what is exported is a `const` where it is defined. Each becomes a function that is called once and gives what
-//! it exports; an import takes from that. `live` and `report` are the two that nobody imports: each with all that it needs is
-//! one program.
+//! it exports; an import takes from that. `live`, `report`, `index` and `compare` are those that nobody imports: each with all that it
+//! needs is one program.
 
 use std::fmt::Write as _;
 
@@ -18,6 +18,8 @@ modules! {
     "badge" "canvas" "colours" "dom" "elements" "flight" "layout" "map" "notes" "parameters" "plot" "plots" "text" "timeline" "view"
     // The whole one.
     "data" "recorder" "report" "summary" "trend" "usage"
+    // The table of a folder's pages, and flights side by side.
+    "index" "compare"
     // The one that grows.
     "bar" "compass" "condition" "esc" "gauge" "general" "health" "horizon" "keys" "link" "live" "movement" "player" "sound" "spark"
 }
@@ -121,7 +123,8 @@ mod tests {
 
     #[test]
     fn every_module_is_needed_and_what_it_exports_too() {
-        let used: BTreeSet<&str> = ["live", "report"].into_iter().flat_map(needed).collect();
+        let used: BTreeSet<&str> =
+            ["live", "report", "index", "compare"].into_iter().flat_map(needed).collect();
         for (name, text) in MODULES {
             assert!(used.contains(name), "nobody needs {name}");
             for line in text.lines().filter(|line| line.starts_with("export")) {
@@ -178,7 +181,7 @@ mod tests {
 
     #[test]
     fn nothing_that_a_vehicle_sent_becomes_markup_and_nothing_is_loaded() {
-        for program in ["live", "report"].map(program) {
+        for program in ["live", "report", "index", "compare"].map(program) {
             for markup in ["innerHTML", "outerHTML", "insertAdjacentHTML", "document.write", "eval("] {
                 assert!(!program.contains(markup), "{markup}");
             }

@@ -10,17 +10,25 @@ use crate::decode::reference::{Quantity, Reference};
 /// One flight: from take-off to landing, or to the end of the log.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct Flight {
-    from_s: f64,
-    to_s: f64,
+    pub(super) from_s: f64,
+    pub(super) to_s: f64,
     /// In the air, without stops on the ground and gaps of the record.
-    air_s: f64,
-    landed: bool,
+    pub(super) air_s: f64,
+    pub(super) landed: bool,
     /// Disarmed in the air, which is no landing.
-    disarmed_in_air: bool,
-    height_max_m: f32,
-    speed_max_m_s: f32,
-    percent_from: Option<f32>,
-    percent_to: Option<f32>,
+    pub(super) disarmed_in_air: bool,
+    pub(super) height_max_m: f32,
+    pub(super) speed_max_m_s: f32,
+    pub(super) percent_from: Option<f32>,
+    pub(super) percent_to: Option<f32>,
+}
+
+impl Flight {
+    /// Take-off, and when it was in the air last.
+    pub(super) fn span(&self) -> (Instant, Instant) {
+        let instant = |seconds: f64| Instant::from_micros((seconds * 1e6).round() as u64);
+        (instant(self.from_s), instant(self.to_s))
+    }
 }
 
 /// How high and fast the vehicle was in each flight, and what it took of the battery.

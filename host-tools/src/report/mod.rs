@@ -1,4 +1,5 @@
-//! `hums report`: one page for each session, whole in itself: no network, no file beside it.
+//! `hums report`: one page for each session, whole in itself: no network, no file beside it. A folder of pages has a table of them
+//! ([`index`]); flights are compared on a page of their own ([`compare`]).
 //!
 //! [`replay`] reads the log in order: what the vehicle told becomes a history as `hums live` has it ([`crate::page`]),
 //! bounded, so that a page of hours stays below a few megabytes; [`flights`] finds flights with the firmware's own rules; [`trend`] compares with
@@ -8,11 +9,15 @@
 //! own policy lets no other script run and loads nothing.
 
 pub mod causes;
+pub mod compare;
 pub mod flights;
+pub mod index;
 pub mod page;
 pub mod replay;
 pub mod trend;
 
+use std::collections::BTreeMap;
+use std::fmt::{self, Display, Formatter};
 use std::io::Write as _;
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
@@ -48,7 +53,8 @@ struct PagesJson {
 #[derive(Debug, Serialize)]
 struct PageJson {
     path: PathBuf,
-    session: String,
+    /// `null` of a table or a comparison.
+    session: Option<String>,
     bytes: u64,
 }
 
@@ -62,7 +68,6 @@ pub fn run(args: &cli::Report) -> Result<Outcome> {
     for image in found.images.iter().filter(|image| !image.damage.is_empty()) {
         note!("{}: {}", image.path.display(), image.damage.join("; "));
     }
-    let mut outcome = Outcome::lossy(found.is_lossy());
     if let Some(place) = found.places.iter().find(|place| place.is_standard()) {
         bail!("{}: is read twice for a page; give a file", place.title)
     }
@@ -70,84 +75,234 @@ pub fn run(args: &cli::Report) -> Result<Outcome> {
     let wanted = wanted(args, &found.places, &sessions)?;
     let inputs = Inputs::of(given.iter().map(PathBuf::as_path).chain(found.paths())).replacing(args.replace);
     inputs.refuse(&args.output)?;
-    // Of each session only what later ones are compared with is kept.
-    let mut earlier: Vec<Option<trend::Session>> = Vec::new();
-    let (mut kept, mut pages) = (Kept::default(), PagesJson::default());
     // The next start on the card tells how a session ended.
     let end = found.places.len().min(*wanted.sessions.end() + 1 + HELD_MAX);
     let mut followed = Followed::new(sessions);
-    let mut names = Names::default();
-    let mut done = |overview: Overview| {
-        let (index, this) = (earlier.len(), trend::Session::of(&overview));
-        if let Some(place) = found.places.get(index).filter(|_| wanted.sessions.contains(&index)) {
-            let on_card =
-                earlier.iter().zip(&found.places).filter(|(_, other)| are_of_one_card(place, other));
-            let before: Vec<trend::Session> = on_card.filter_map(|(session, _)| session.clone()).collect();
+    let mut making = Making {
+        places: &found.places,
+        inputs: &inputs,
+        wanted: &wanted,
+        earlier: Vec::new(),
+        pages: BTreeMap::new(),
+        rows: Vec::new(),
+        names: Names::default(),
+        kept: Kept::default(),
+        outcome: Outcome::lossy(found.is_lossy()),
+        parameters: None,
+        json: args.json,
+        made: PagesJson::default(),
+    };
+    side_by_side(found.places.get(..end).unwrap_or_default(), check::overview, |overview| {
+        followed.push(overview?).into_iter().try_for_each(|overview| making.session(&overview))
+    })?;
+    followed.finish().try_for_each(|overview| making.session(&overview))?;
+    if *wanted.sessions.start() > 0 && args.session.is_none() && !args.compare {
+        note!(
+            "this is the last one of {}; -o DIR/ writes a page for each, --session NAME one of them, --compare the flights side by side",
+            found.places.len()
+        );
+    }
+    making.end(args.compare)
+}
+
+/// What is made, session by session.
+struct Making<'a> {
+    places: &'a [Place],
+    inputs: &'a Inputs,
+    wanted: &'a Wanted,
+    /// Of each session only what later ones are compared with is kept.
+    earlier: Vec<Option<trend::Session>>,
+    /// Files of pages, by the index of their session.
+    pages: BTreeMap<usize, String>,
+    rows: Vec<index::Row>,
+    names: Names,
+    kept: Kept,
+    outcome: Outcome,
+    /// The parameters of a session that was read last, by its index.
+    parameters: Option<(usize, Vec<(String, f64)>)>,
+    /// Whether what was made is told as JSON, at the end.
+    json: bool,
+    made: PagesJson,
+}
+
+impl Making<'_> {
+    /// Takes the next session, and makes its page where it is wanted.
+    fn session(&mut self, overview: &Overview) -> Result<()> {
+        let (index, this) = (self.earlier.len(), trend::Session::of(overview));
+        let is_wanted = self.wanted.pages && self.wanted.sessions.contains(&index);
+        if let Some(place) = self.places.get(index).filter(|_| is_wanted) {
             let traits = Traits::of(place)?;
             let original = overview.ending.again.as_deref();
-            let original = original.and_then(|of| found.places.iter().position(|place| place.name == of));
-            let named = match original.filter(|of| wanted.sessions.contains(of)) {
+            let original = original.and_then(|of| self.places.iter().position(|place| place.name == of));
+            let named = match original.filter(|of| self.wanted.sessions.contains(of)) {
                 Some(of) => Named::Copy(of),
-                None => names.name(index, place, &traits),
+                None => self.names.name(index, place, &traits),
             };
             match named {
                 Named::Copy(of) => {
-                    let of = found.places.get(of).map_or("another log", |place| &place.name);
+                    let of = self.places.get(of).map_or("another log", |place| &place.name);
                     note!("{}: is a copy of {of}, whose page is written once", place.name);
                 }
-                Named::As(name, _) => {
-                    let trend = trend::of(&this, &before);
-                    pages.add(
-                        kept.pass(make(place, &overview, &trend, wanted.path(&name), &inputs))?,
-                        args.json,
-                    )?;
-                }
+                Named::As(name, _) => self.page(index, place, overview, &this, &name)?,
             }
         }
         // Also of the sessions before, which the page compares with, and of those that were read for its end.
         for why in overview.ending.aside().into_iter().chain(overview.faults()) {
             note!("{}: {why}", overview.ending.name);
         }
-        outcome = outcome.and(Outcome::lossy(!overview.is_sound()));
+        self.outcome = self.outcome.and(Outcome::lossy(!overview.is_sound()));
         // A session that is there twice counts once, and what a file held before is older than its name says.
         let counts = overview.ending.is_counted() && overview.ending.begun_anew.is_none();
-        earlier.push(counts.then_some(this));
+        self.earlier.push(counts.then_some(this));
         Ok(())
-    };
-    side_by_side(found.places.get(..end).unwrap_or_default(), check::overview, |overview| {
-        followed.push(overview?).into_iter().try_for_each(&mut done)
-    })?;
-    followed.finish().try_for_each(&mut done)?;
-    if *wanted.sessions.start() > 0 && args.session.is_none() {
-        note!(
-            "this is the last one of {}; -o DIR/ writes a page for each, --session NAME one of them",
-            found.places.len()
-        );
     }
-    pages.end(args.json)?;
-    kept.end()?;
-    Ok(outcome)
-}
 
-impl PagesJson {
-    /// A page was written, or was kept as it is.
-    fn add(&mut self, page: Option<PageJson>, json: bool) -> Result<()> {
-        if !json {
-            page.iter().try_for_each(PageJson::tell)?;
+    /// Makes the page of a session, and says so.
+    fn page(
+        &mut self,
+        index: usize,
+        place: &Place,
+        overview: &Overview,
+        this: &trend::Session,
+        name: &str,
+    ) -> Result<()> {
+        let path = self.wanted.path(name);
+        let on_card = self.earlier.iter().zip(self.places).filter(|(_, other)| are_of_one_card(place, other));
+        let before: Vec<trend::Session> = on_card.filter_map(|(session, _)| session.clone()).collect();
+        let trend = trend::of(this, &before);
+        let last = self.last_flight(this)?;
+        let replay = replay::Replay::of(place, overview)?;
+        let html = page::html(overview, &replay, &trend, last.as_ref());
+        let file = path.file_name().map_or_else(String::new, |file| file.to_string_lossy().into_owned());
+        self.rows.push(index::Row::new(file.clone(), overview, &replay));
+        self.pages.insert(index, file);
+        self.parameters = Some((
+            index,
+            replay.history.last_parameters().map(|(name, value)| (name.to_owned(), value)).collect(),
+        ));
+        self.write(&path, &html, &What::Session(&place.name), self.inputs)
+    }
+
+    /// The recording before of the same airframe: by their times, where both are known, otherwise in their order.
+    fn last_flight(&mut self, this: &trend::Session) -> Result<Option<page::Before>> {
+        let is_before = |other: &trend::Session| {
+            let is_later = this.start_utc().zip(other.start_utc()).is_some_and(|(this, other)| other > this);
+            other.airframe.is_some() && other.airframe == this.airframe && !is_later
+        };
+        let earlier = self.earlier.iter().enumerate();
+        let earlier = earlier.filter_map(|(index, other)| Some((index, other.as_ref()?)));
+        let last = earlier
+            .filter(|(_, other)| is_before(other))
+            .max_by_key(|(index, other)| (other.start_utc(), *index));
+        let Some((index, place)) = last.and_then(|(index, _)| Some((index, self.places.get(index)?))) else {
+            return Ok(None);
+        };
+        let values = match self.parameters.take() {
+            Some((known, values)) if known == index => values,
+            _ => replay::parameters(place)?,
+        };
+        Ok((!values.is_empty()).then(|| page::Before { name: place.name.clone(), values }))
+    }
+
+    fn write(&mut self, path: &Path, html: &str, what: &What<'_>, inputs: &Inputs) -> Result<()> {
+        if self.kept.pass(write(path, html, inputs))?.is_none() {
+            return Ok(());
         }
-        self.pages.extend(page);
+        let made = PageJson { path: path.to_owned(), session: what.session(), bytes: html.len() as u64 };
+        if !self.json {
+            output::line(&format!("{}: {what}, {}", shown(path), count(made.bytes, "byte")))?;
+        }
+        self.made.pages.push(made);
         Ok(())
     }
 
-    fn end(&self, json: bool) -> Result<()> {
-        if json { output::json(SCHEMA, self) } else { Ok(()) }
+    /// All sessions have been: the comparisons, and the table of a folder.
+    fn end(mut self, compare: bool) -> Result<Outcome> {
+        let comparisons = if compare { self.compare()? } else { Vec::new() };
+        if self.wanted.directory {
+            let folder = &self.wanted.output;
+            let known = index::Pages::of(folder);
+            // A table of ours goes on, and what it was is kept: that another flight has a page is no reason to ask.
+            let inputs =
+                if known.is_some() { self.inputs.clone().replacing(true) } else { self.inputs.clone() };
+            let pages =
+                index::Pages { pages: std::mem::take(&mut self.rows), comparisons, ..Default::default() };
+            let pages = pages.with(known.unwrap_or_default(), folder);
+            let what = What::Table(pages.pages.len());
+            let path = folder.join(index::FILE);
+            self.write(&path, &pages.html(), &what, &inputs)?;
+        }
+        if self.json {
+            output::json(SCHEMA, &self.made)?;
+        }
+        self.kept.end()?;
+        Ok(self.outcome)
+    }
+
+    /// Compares the last flights: of each airframe in a folder, or of all in a file. Gives airframes and files.
+    fn compare(&mut self) -> Result<Vec<(String, String)>> {
+        let mut groups: BTreeMap<String, Vec<usize>> = BTreeMap::new();
+        let known = self.earlier.iter().enumerate().take(*self.wanted.sessions.end() + 1);
+        for (index, session) in known.filter_map(|(index, session)| Some((index, session.as_ref()?))) {
+            let airframe = if self.wanted.directory { session.airframe.clone() } else { Some(String::new()) };
+            if let Some(airframe) = airframe {
+                groups.entry(airframe).or_default().push(index);
+            }
+        }
+        let mut comparisons = Vec::new();
+        for (airframe, mut sessions) in groups {
+            // By their times; what has none stands before all that have.
+            let start = |index: &usize| {
+                let session = self.earlier.get(*index).and_then(Option::as_ref);
+                session.and_then(trend::Session::start_utc).map(str::to_owned)
+            };
+            sessions.sort_by_key(|index| (start(index), *index));
+            let candidate = |index: &usize| {
+                let page = self.pages.get(index).map(String::as_str);
+                Some(compare::Candidate { place: self.places.get(*index)?, page })
+            };
+            let candidates: Vec<_> = sessions.iter().filter_map(candidate).collect();
+            let Some(html) = compare::html(&candidates)? else { continue };
+            let file = format!("compare-{airframe}.html");
+            let path = if self.wanted.directory {
+                self.wanted.output.join(&file)
+            } else {
+                self.wanted.output.clone()
+            };
+            let is_ours = self.wanted.directory && index::Pages::of(&self.wanted.output).is_some();
+            let inputs = self.inputs.clone();
+            let inputs = if is_ours { inputs.replacing(true) } else { inputs };
+            self.write(&path, &html, &What::Comparison, &inputs)?;
+            comparisons.push((airframe, file));
+        }
+        if comparisons.is_empty() && !self.wanted.directory {
+            bail!("there are not two flights in it, so there is nothing to compare");
+        }
+        Ok(comparisons)
     }
 }
 
-impl PageJson {
-    fn tell(&self) -> Result<()> {
-        let bytes = count(self.bytes, "byte");
-        output::line(&format!("{}: session {}, {bytes}", shown(&self.path), word(&self.session)))
+/// What a page is.
+enum What<'a> {
+    Session(&'a str),
+    /// Of a folder's pages, so many.
+    Table(usize),
+    Comparison,
+}
+
+impl What<'_> {
+    fn session(&self) -> Option<String> {
+        if let Self::Session(name) = self { Some((*name).to_owned()) } else { None }
+    }
+}
+
+impl Display for What<'_> {
+    fn fmt(&self, formatter: &mut Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Session(name) => write!(formatter, "session {}", word(name)),
+            Self::Table(pages) => write!(formatter, "table of {}", count(*pages as u64, "page")),
+            Self::Comparison => formatter.write_str("flights side by side"),
+        }
     }
 }
 
@@ -163,19 +318,6 @@ fn are_of_one_card(one: &Place, other: &Place) -> bool {
     image(one) == image(other) || folder(one).is_some() && folder(one) == folder(other)
 }
 
-/// Makes the page of a session.
-fn make(
-    place: &Place,
-    overview: &Overview,
-    trend: &trend::Trend,
-    path: PathBuf,
-    inputs: &Inputs,
-) -> Result<PageJson> {
-    let html = page::html(overview, &replay::Replay::of(place, overview)?, trend)?;
-    write(&path, &html, inputs)?;
-    Ok(PageJson { path, session: place.name.clone(), bytes: html.len() as u64 })
-}
-
 fn write(path: &Path, html: &str, inputs: &Inputs) -> Result<()> {
     inputs.refuse(path)?;
     make_parent(path)?;
@@ -189,6 +331,8 @@ struct Wanted {
     sessions: RangeInclusive<usize>,
     output: PathBuf,
     directory: bool,
+    /// A page a session, and not the comparison alone.
+    pages: bool,
 }
 
 fn wanted(args: &cli::Report, logs: &[Place], sessions: &Sessions) -> Result<Wanted> {
@@ -215,7 +359,8 @@ fn wanted(args: &cli::Report, logs: &[Place], sessions: &Sessions) -> Result<Wan
             last..=last
         }
     };
-    Ok(Wanted { sessions, output: args.output.clone(), directory })
+    let pages = directory || !args.compare;
+    Ok(Wanted { sessions, output: args.output.clone(), directory, pages })
 }
 
 impl Wanted {

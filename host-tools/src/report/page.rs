@@ -1,6 +1,5 @@
 //! The page: one HTML file with its style, its program and its data inside.
 
-use anyhow::Result;
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD as BASE64;
 use hums_blackbox::record::Stats;
@@ -33,6 +32,17 @@ struct Data<'a> {
     counters: Counters,
     stats: Option<StatsJson>,
     trend: &'a Trend,
+    /// The flight before of the same airframe.
+    before: Option<&'a Before>,
+}
+
+/// The recording before of the same airframe.
+#[derive(Debug, Serialize)]
+pub struct Before {
+    /// What it is called.
+    pub name: String,
+    /// The autopilot's parameters as they were at its end.
+    pub values: Vec<(String, f64)>,
 }
 
 #[derive(Serialize)]
@@ -75,7 +85,7 @@ impl From<&Stats> for StatsJson {
 }
 
 /// A session's page.
-pub fn html(log: &Overview, replay: &Replay, trend: &Trend) -> Result<String> {
+pub fn html(log: &Overview, replay: &Replay, trend: &Trend, before: Option<&Before>) -> String {
     let data = Data {
         version: env!("CARGO_PKG_VERSION"),
         log: LogJson::new(log),
@@ -86,8 +96,14 @@ pub fn html(log: &Overview, replay: &Replay, trend: &Trend) -> Result<String> {
         counters: counters::of(&log.contents.usage, &log.contents.lifetime),
         stats: log.contents.stats.as_ref().map(StatsJson::from),
         trend,
+        before,
     };
-    let program = program("report");
+    whole("report", &data)
+}
+
+/// A page that is whole in itself: the program that begins with `entry`, and what it draws.
+pub fn whole(entry: &str, data: &impl Serialize) -> String {
+    let program = program(entry);
     let programs = [UPLOT, program.as_str()];
     // Only these two programs may run, whatever else may ever get onto the page.
     let hashes: Vec<String> = programs
@@ -101,11 +117,11 @@ pub fn html(log: &Overview, replay: &Replay, trend: &Trend) -> Result<String> {
         ("{{uplot}}", UPLOT),
         ("{{program}}", program.as_str()),
         // Last, so that nothing in it is taken for a mark.
-        ("{{data}}", embedded(&data).as_str()),
+        ("{{data}}", embedded(data).as_str()),
     ] {
         page = page.replacen(mark, text, 1);
     }
-    Ok(page)
+    page
 }
 
 #[cfg(test)]

@@ -11,6 +11,7 @@ use crate::decode::reference::Reference;
 use crate::page::history::History;
 use crate::page::more::{More, rows};
 use crate::page::note::Note;
+use crate::page::parameters::Parameters;
 use crate::source::item::{Item, Text, Want};
 use crate::source::recording::Place;
 use crate::statustext;
@@ -32,6 +33,18 @@ pub struct Replay {
     notes: Vec<(Instant, Note)>,
     reference: Reference,
     extents: Extents,
+}
+
+/// The autopilot's parameters as they were at the end of a recording.
+pub fn parameters(place: &Place) -> Result<Vec<(String, f64)>> {
+    let mut parameters = Parameters::default();
+    place.open()?.read(Want::default(), &mut |at, item| {
+        if let Item::Parameter(parameter) = item {
+            parameters.take(at, parameter.name, parameter.value);
+        }
+        Ok(())
+    })?;
+    Ok(parameters.last().map(|(name, value)| (name.to_owned(), value)).collect())
 }
 
 impl Replay {

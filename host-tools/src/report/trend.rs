@@ -1,7 +1,9 @@
 //! The session against those before it on the same card.
 
+use hums_blackbox::record::Vehicle;
 use serde::Serialize;
 
+use crate::names::type_name;
 use crate::summary::Overview;
 use crate::utc::iso8601;
 
@@ -52,6 +54,8 @@ pub struct Session {
     json: SessionJson,
     /// System, unique id, autopilot and type, where they are known.
     vehicle: Option<(u8, u64, u8, u8)>,
+    /// Which airframe it was, as far as it is told: see [`airframe`].
+    pub airframe: Option<String>,
     /// By [`FOLLOWED`].
     values: [Option<f64>; FOLLOWED.len()],
     worrying: f64,
@@ -67,11 +71,29 @@ impl Session {
             .map(|vehicle| (vehicle.system, vehicle.uid, vehicle.autopilot, vehicle.vehicle_type));
         Self {
             json: SessionJson { name: log.ending.name.clone(), start_utc },
+            airframe: log.contents.vehicle.as_ref().map(airframe),
             vehicle,
             values: FOLLOWED.map(|(counter, _, _, hourly)| value(log, counter, hourly)),
             worrying: worrying(log),
         }
     }
+}
+
+impl Session {
+    /// When it began, UTC, where that is known.
+    pub fn start_utc(&self) -> Option<&str> {
+        self.json.start_utc.as_deref()
+    }
+}
+
+/// The airframe, as a part of a file's name: by the autopilot's unique id, and where that is not told by system and type.
+pub fn airframe(vehicle: &Vehicle) -> String {
+    if vehicle.uid != 0 {
+        return format!("uid-{:016x}", vehicle.uid);
+    }
+    let kind = type_name(vehicle.vehicle_type).to_lowercase();
+    let kind: String = kind.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '-' }).collect();
+    format!("system-{}-{kind}", vehicle.system)
 }
 
 /// Compares a session with those before it of the same vehicle, as far as the vehicle is known.

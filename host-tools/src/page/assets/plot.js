@@ -119,17 +119,13 @@ export const chart = (id, name = null) => {
     ticks: { stroke: colour("grid"), width: 1, size: 4 },
     ...extra,
   });
-  const label = ([number, text], i) => {
+  const label = ([number, text]) => {
     const mark = el("i"),
       value = el("b", { "data-value": `${id}:${number}` });
     const node = el("button", { type: "button", title: "show or hide" }, mark, text, value);
     const one = { number, node, value, shown: labels.find((known) => known.number === number)?.shown ?? true };
     mark.style.borderColor = line(number);
-    node.addEventListener("click", () => {
-      one.shown = !one.shown;
-      made.setSeries(i + 1, { show: one.shown });
-      values();
-    });
+    node.addEventListener("click", () => self.show(number, !one.shown));
     return one;
   };
   const build = () => {
@@ -222,6 +218,14 @@ export const chart = (id, name = null) => {
         );
         made.setScale("x", { min: view.from, max: view.to });
       });
+      values();
+    },
+    // Shows or hides the line of a number.
+    show(number, on) {
+      const place = labels.findIndex((known) => known.number === number);
+      if (place < 0) return;
+      labels[place].shown = on;
+      made.setSeries(place + 1, { show: on });
       values();
     },
     // In other colours.

@@ -16,7 +16,7 @@ import { fixed, plural, span, whole } from "./text.js";
 import { timeline } from "./timeline.js";
 import { trendSection } from "./trend.js";
 import { usageSection } from "./usage.js";
-import { back, cursorTime, lookAt, usually, zoom } from "./view.js";
+import { back, cursorTime, home, lookAt, usually, zoom } from "./view.js";
 
 const root = document.documentElement;
 // From the best to the worst.
@@ -100,7 +100,7 @@ time.append(
 usually(() => [flight.start, flight.end]);
 plots((group) => section(group.toLowerCase(), group)).update();
 
-const told = parameters();
+const told = parameters(data.before);
 told.update();
 section("parameters", "Parameters").append(told.node);
 usageSection();
@@ -130,6 +130,8 @@ document
       flight.step >= 1 ? `${flight.step} s` : `${flight.step * 1000} ms`
     } keep their lowest and highest value. Plots: uPlot, MIT.`,
   );
+
+addEventListener("keydown", (event) => event.key === "Escape" && home());
 
 // ---- Redrawing.
 const draw = () => {

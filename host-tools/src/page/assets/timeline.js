@@ -2,10 +2,11 @@
 
 import { canvas } from "./canvas.js";
 import { PHASES, colour, modeColour, whenColoursChange } from "./colours.js";
+import { attribute } from "./dom.js";
 import { el } from "./elements.js";
 import { flight } from "./flight.js";
 import { clock, words } from "./text.js";
-import { lookAt, view, whenCursorMoves, whenViewChanges } from "./view.js";
+import { home, lookAt, moveCursor, view, whenCursorMoves, whenViewChanges } from "./view.js";
 
 const EVERY_MS = 250,
   HEIGHT = 96,
@@ -16,7 +17,13 @@ const EVERY_MS = 250,
 const STEPS = [1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 1200, 1800, 3600, 7200, 14400, 36000, 86400, 604800];
 
 export const timeline = (go = lookAt) => {
-  const strip = el("canvas", { class: "strip", id: "timeline", role: "img", "aria-label": "Phases, modes, findings and gaps over time" });
+  const strip = el("canvas", {
+    class: "strip",
+    id: "timeline",
+    role: "slider",
+    tabindex: 0,
+    "aria-label": "Time: phases, modes, findings and gaps; arrows move the cursor, Enter looks closer",
+  });
   const legend = el("div", { class: "legend" });
   const node = el("div", { class: "panel" }, strip, legend);
   let drawn = "",
@@ -35,6 +42,11 @@ export const timeline = (go = lookAt) => {
       ctx.fillText(text(name), left + (wide - size) / 2, top + 14.5);
     });
   const paint = () => {
+    const here = view.cursor ?? view.from;
+    attribute(strip, "aria-valuemin", String(Math.round(flight.start)));
+    attribute(strip, "aria-valuemax", String(Math.round(flight.end)));
+    attribute(strip, "aria-valuenow", String(Math.round(here)));
+    attribute(strip, "aria-valuetext", clock(here - flight.start));
     const ctx = canvas(strip, width(), HEIGHT);
     ctx.fillStyle = colour("soft");
     ctx.fillRect(0, PHASE_TOP, width(), MODE_TOP + ROW - PHASE_TOP);
@@ -96,6 +108,24 @@ export const timeline = (go = lookAt) => {
       paint();
     },
   };
+  // Everything that the mouse does: a step is a hundredth of what is looked at.
+  strip.addEventListener("keydown", (event) => {
+    const size = (view.to - view.from) / (event.shiftKey ? 10 : 100),
+      at = view.cursor ?? (view.from + view.to) / 2,
+      does = {
+        ArrowLeft: () => moveCursor(Math.max(at - size, flight.start)),
+        ArrowRight: () => moveCursor(Math.min(at + size, flight.end)),
+        Home: () => moveCursor(flight.start),
+        End: () => moveCursor(flight.end),
+        Enter: () => go(at),
+        Escape: home,
+      }[event.key];
+    if (!does || event.ctrlKey || event.metaKey || event.altKey) return;
+    event.preventDefault();
+    event.stopPropagation();
+    does();
+  });
+  strip.addEventListener("blur", () => moveCursor(null));
   strip.addEventListener("click", (event) => {
     const box = strip.getBoundingClientRect();
     go(flight.start + ((event.clientX - box.left) / box.width) * (flight.end - flight.start));

@@ -1,0 +1,172 @@
+// Flights side by side: figures, findings and parameters in columns; and in one plot for each quantity, from take-off on.
+
+import { line, whenColoursChange } from "./colours.js";
+import { el } from "./elements.js";
+import { flight } from "./flight.js";
+import { bar, cells, rows, section } from "./layout.js";
+import { charts } from "./plot.js";
+import { plots } from "./plots.js";
+import { clock, fixed, plural, short, span } from "./text.js";
+import { back, cursorTime, home, usually } from "./view.js";
+
+const data = JSON.parse(document.getElementById("data").textContent);
+const root = document.documentElement;
+const { flights } = data;
+const one = new Set(flights.map(({ airframe }) => airframe)).size === 1;
+const NAME_MAX = 34;
+const brief = (name) => (name.length > NAME_MAX ? `\u2026${name.slice(1 - NAME_MAX)}` : name);
+
+flight.take(data.flight);
+// Times count from each flight's take-off.
+flight.start = 0;
+flight.end = Math.max(...flights.map(({ from_s, to_s }) => to_s - from_s), 1);
+document.title = `${plural(flights.length, "flight")} side by side`;
+document
+  .getElementById("head")
+  .append(
+    el("h1", {}, `${plural(flights.length, "flight")} side by side`),
+    el("p", { class: "dim" }, `${one ? "" : "Of different airframes, as far as they tell. "}Times count from each flight's take-off.`),
+  );
+bar.append(back);
+
+// ---- Which of them are drawn.
+const shown = flights.map(() => true);
+const show = (number, on) => {
+  shown[number] = on;
+  for (const chart of charts) chart.show(number, on);
+};
+const mark = (number) => {
+  const node = el("i", { class: "flight-mark" });
+  const paint = () => {
+    node.style.background = line(number);
+  };
+  paint();
+  whenColoursChange(paint);
+  return node;
+};
+const choice = (name, number) => {
+  const box = el("input", {
+    type: "checkbox",
+    checked: true,
+    "aria-label": `Draw ${name}`,
+    onchange: () => show(number, box.checked),
+  });
+  return box;
+};
+const title = ({ name, page }) =>
+  page ? el("a", { href: encodeURIComponent(page), title: name }, brief(name)) : el("span", { title: name }, brief(name));
+
+// ---- Figures: what is of the flight, and the extremes of what it told.
+const low = (id) => (number) => flight.extremes(id, number)?.[0];
+const high = (id) => (number) => flight.extremes(id, number)?.[1];
+const highest = (plot) => (number) => {
+  const values = [...flight.plots.keys()].filter((id) => id.startsWith(`${plot}-`)).map((id) => high(id)(number));
+  return values.some((value) => value != null) ? Math.max(...values.filter((value) => value != null)) : null;
+};
+const lowest = (plot) => (number) => {
+  const values = [...flight.plots.keys()].filter((id) => id.startsWith(`${plot}-`)).map((id) => low(id)(number));
+  return values.some((value) => value != null) ? Math.min(...values.filter((value) => value != null)) : null;
+};
+const FIGURES = [
+  ["Greatest height", "m", 1, (number) => flights[number].height_max_m],
+  ["Greatest ground speed", "m/s", 1, (number) => flights[number].speed_max_m_s],
+  ["Strongest wind", "m/s", 1, highest("Wind")],
+  ["Lowest voltage, battery 1", "V", 2, low("PackVolts-0")],
+  ["Lowest cell", "V", 3, lowest("CellVolts")],
+  ["Highest current, battery 1", "A", 1, high("PackAmperes-0")],
+  ["Hottest battery", "\u00b0C", 1, highest("PackCelsius")],
+  ["Fastest motor", "rpm", 0, highest("MotorRpm")],
+  ["Hottest ESC", "\u00b0C", 1, highest("MotorCelsius")],
+  ["Highest vibration", "", 2, highest("Vibration")],
+  ["Estimator, worst figure", "", 2, highest("Estimator")],
+  ["Fewest satellites, receiver 1", "", 0, low("Satellites-0")],
+  ["Highest load of the autopilot", "%", 0, high("Load-0")],
+];
+const ended = ({ landed, disarmed_in_air: disarmed }) => (landed ? "landed" : disarmed ? "disarmed in the air" : "landing not seen");
+const count = ({ findings }, level) => findings.filter(([, known]) => known === level).length;
+const FACTS = [
+  ["Take-off, UTC", ({ start_utc: utc }) => (utc == null ? "not known" : `${utc.slice(0, 10)} ${utc.slice(11, 19)}`)],
+  ["Vehicle", ({ vehicle, airframe }) => [vehicle, one ? null : airframe].filter(Boolean).join(", ") || "not known"],
+  ["In the air", ({ air_s: air }) => span(air)],
+  ["End", ended],
+  ["Battery", ({ percent_from: from, percent_to: to }) => (from == null || to == null ? "" : `${fixed(from, 0)} \u2192 ${fixed(to, 0)} %`)],
+  [
+    "Findings",
+    (f) =>
+      ["critical", "warning"]
+        .map((level) => (count(f, level) ? `${count(f, level)} ${level}` : ""))
+        .filter(Boolean)
+        .join(", ") || "none",
+  ],
+];
+const columns = (first) => [[first], ...flights.map((f, i) => [el("span", { class: "column" }, mark(i), title(f)), "n"])];
+const figures = FIGURES.map(([name, unit, decimals, of]) => [name, flights.map((_, i) => of(i)), unit, decimals]).filter(([, values]) =>
+  values.some((value) => value != null && Number.isFinite(value)),
+);
+const table = section("figures", "Figures");
+table.append(
+  el(
+    "div",
+    { class: "panel scroll" },
+    rows(
+      columns(""),
+      [
+        el("tr", {}, el("th", { scope: "row" }, "Draw"), ...flights.map((f, i) => el("td", { class: "n" }, choice(f.name, i)))),
+        ...FACTS.map(([name, of]) => cells([name, ...flights.map(of)], ["", ...flights.map(() => "n")])),
+        ...figures.map(([name, values, unit, decimals]) =>
+          cells(
+            [name, ...values.map((value) => (value == null ? "" : `${fixed(value, decimals)} ${unit}`.trim()))],
+            ["", ...flights.map(() => "n")],
+          ),
+        ),
+      ],
+      { class: "compared" },
+    ),
+  ),
+);
+
+const found = section("findings", "Findings");
+found.append(
+  el(
+    "div",
+    { class: "columns" },
+    flights.map((f, i) =>
+      el(
+        "div",
+        { class: "panel" },
+        el("h3", {}, mark(i), brief(f.name)),
+        f.findings.length
+          ? el(
+              "ol",
+              { class: "found" },
+              f.findings.map(([at, level, words]) =>
+                el("li", {}, el("time", {}, clock(at)), el("span", { class: `badge ${level}` }, level), words),
+              ),
+            )
+          : el("p", { class: "dim" }, "No warning, nothing critical."),
+        f.findings_count > f.findings.length ? el("p", { class: "dim" }, `and ${f.findings_count - f.findings.length} more`) : null,
+      ),
+    ),
+  ),
+);
+
+usually(() => [flight.start, flight.end]);
+plots((group) => section(group.toLowerCase(), group)).update();
+section("parameters", "Parameters that differ").append(
+  data.parameters.length
+    ? el(
+        "div",
+        { class: "panel scroll" },
+        rows(
+          columns("Parameter"),
+          data.parameters.map(([name, values]) =>
+            cells([name, ...values.map((value) => (value == null ? "not told" : short(value)))], ["t", ...flights.map(() => "n")]),
+          ),
+        ),
+      )
+    : el("p", { class: "dim" }, "None: what more than one of them told is the same in all."),
+);
+document.getElementById("foot").append(`Made by hums ${data.version}. Plots: uPlot, MIT.`, cursorTime);
+addEventListener("keydown", (event) => event.key === "Escape" && home());
+for (const chart of charts) chart.draw();
+root.dataset.ready = "true";

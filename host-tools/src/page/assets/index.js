@@ -1,0 +1,112 @@
+// The pages of a folder: a table that is sorted by any of its columns, and narrowed by a word.
+
+import { el } from "./elements.js";
+import { bar, main } from "./layout.js";
+import { fixed, plural, span } from "./text.js";
+
+const { pages, comparisons, version } = JSON.parse(document.getElementById("data").textContent);
+const root = document.documentElement;
+document.title = `HUMS flights: ${plural(pages.length, "page")}`;
+document
+  .getElementById("head")
+  .append(el("h1", {}, "Flights"), el("p", { class: "dim" }, `${plural(pages.length, "recording")} in this folder, by hums ${version}.`));
+bar.parentElement.hidden = true;
+
+const when = (utc) => (utc == null ? "time not known" : `${utc.slice(0, 10)} ${utc.slice(11, 19)}`);
+const RANK = { critical: 3, warning: 2, "not checked": 1, ok: 0 };
+const worst = ({ critical, warning, checked }) => (critical ? "critical" : warning ? "warning" : checked ? "ok" : "not checked");
+const verdict = (page) =>
+  [page.critical ? `${page.critical} critical` : "", page.warning ? plural(page.warning, "warning") : ""].filter(Boolean).join(", ") ||
+  (page.checked ? "no findings" : "not checked");
+// Title, kind of cell, what it is sorted by, what stands there.
+const COLUMNS = [
+  ["Begin, UTC", "t", ({ start_utc }) => start_utc ?? "", ({ start_utc }) => when(start_utc)],
+  [
+    "Recording",
+    "words",
+    ({ name }) => name,
+    ({ name, file }) => el("a", { href: encodeURIComponent(file) }, name.length > 48 ? `\u2026${name.slice(-47)}` : name),
+  ],
+  ["Vehicle", "words", ({ vehicle }) => vehicle ?? "", ({ vehicle }) => vehicle ?? "not known"],
+  ["Airframe", "words", ({ airframe }) => airframe ?? "", ({ airframe }) => airframe ?? ""],
+  ["Length", "n", ({ duration_s }) => duration_s ?? -1, ({ duration_s }) => span(duration_s)],
+  ["Flights", "n", ({ flights }) => flights, ({ flights }) => String(flights)],
+  ["In the air", "n", ({ air_s }) => air_s, ({ air_s }) => span(air_s)],
+  [
+    "Height",
+    "n",
+    ({ height_max_m }) => height_max_m ?? -1,
+    ({ height_max_m }) => (height_max_m == null ? "" : `${fixed(height_max_m, 1)} m`),
+  ],
+  [
+    "Speed",
+    "n",
+    ({ speed_max_m_s }) => speed_max_m_s ?? -1,
+    ({ speed_max_m_s }) => (speed_max_m_s == null ? "" : `${fixed(speed_max_m_s, 1)} m/s`),
+  ],
+  [
+    "Findings",
+    "t",
+    (page) => RANK[worst(page)] * 1e6 + page.critical * 1e3 + page.warning,
+    (page) => el("span", { class: `badge ${worst(page) === "not checked" ? "stale" : worst(page)}` }, verdict(page)),
+  ],
+  ["Recording is", "words", ({ faults }) => faults.length, ({ faults }) => faults.join("; ") || "whole"],
+];
+
+let by = 0,
+  down = true;
+const body = el("tbody");
+const word = el("input", {
+  type: "search",
+  placeholder: "vehicle, name, date",
+  "aria-label": "Only recordings that have this in their row",
+});
+const heads = COLUMNS.map(([title, kind], i) => {
+  const button = el("button", { type: "button", class: "sort", onclick: () => sort(i) }, title);
+  return el("th", { class: kind === "n" ? "n" : "", scope: "col" }, button);
+});
+const rows = pages.map((page) => ({
+  page,
+  node: el(
+    "tr",
+    {},
+    COLUMNS.map(([, kind, , shown]) => el("td", { class: kind }, shown(page))),
+  ),
+}));
+const draw = () => {
+  const [, , key] = COLUMNS[by];
+  rows.sort((one, other) => {
+    const [a, b] = [key(one.page), key(other.page)];
+    return (a < b ? -1 : a > b ? 1 : 0) * (down ? -1 : 1);
+  });
+  const part = word.value.toLowerCase();
+  body.replaceChildren(...rows.map(({ node }) => node).filter((node) => node.textContent.toLowerCase().includes(part)));
+  heads.forEach((head, i) => {
+    head.setAttribute("aria-sort", i !== by ? "none" : down ? "descending" : "ascending");
+  });
+};
+const sort = (column) => {
+  down = column === by ? !down : COLUMNS[column][1] === "n" || column === 0;
+  by = column;
+  draw();
+};
+word.addEventListener("input", draw);
+
+main.append(
+  word,
+  el("div", { class: "panel scroll", id: "pages" }, el("table", {}, el("thead", {}, el("tr", {}, heads)), body)),
+  comparisons.length
+    ? el(
+        "div",
+        { class: "panel", id: "comparisons" },
+        el("h3", {}, "The last flights side by side"),
+        el(
+          "ul",
+          {},
+          comparisons.map(([airframe, file]) => el("li", {}, el("a", { href: encodeURIComponent(file) }, airframe))),
+        ),
+      )
+    : el("p", { class: "dim" }, "hums report with --compare adds a page with the last flights of each airframe side by side."),
+);
+draw();
+root.dataset.ready = "true";
