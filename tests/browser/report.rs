@@ -290,7 +290,7 @@ fn each_battery_has_its_own_lines_and_two_barometers_are_two() {
     assert_eq!(cells[0], serde_json::json!(["Cell 1", "3.500"]));
     assert_eq!(cells[11], serde_json::json!(["Battery 6, cell 2", "3.750"]));
     let celsius = lines(&mut page, "Temperature");
-    assert_eq!(celsius, serde_json::json!([["Barometer", "11.8"], ["Air, by HIGHRES_IMU", "15.0"]]));
+    assert_eq!(celsius, serde_json::json!([["Barometer", "11.8"], ["Inertial sensor", "15.0"], ["Air, by HIGHRES_IMU", "15.0"]]));
 }
 
 #[test]
