@@ -307,7 +307,9 @@ fn gnss(inputs: &Inputs<'_>, receiver: u8, value: impl FnOnce(&Gnss) -> Option<f
 /// A receiver that knows where it is within half of what its accuracy may be does so with however few satellites: its own word is better than
 /// their number, which depends on how many systems and bands it hears.
 fn is_exact(inputs: &Inputs<'_>, gnss: &Gnss) -> bool {
-    gnss.accuracy.is_some_and(|accuracy| accuracy.0 <= inputs.params.get(Param::GpsHaccWarn) / 2.0)
+    // What it tells without a fix is of before.
+    gnss.fix >= 3
+        && gnss.accuracy.is_some_and(|accuracy| accuracy.0 <= inputs.params.get(Param::GpsHaccWarn) / 2.0)
 }
 
 fn integrity(inputs: &Inputs<'_>, receiver: u8, value: impl FnOnce(u8, u8) -> u8) -> Option<Reading> {
