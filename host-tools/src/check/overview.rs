@@ -64,11 +64,14 @@ pub fn overview(place: &Place) -> Result<Overview> {
         return Ok(overview);
     }
     let Read { format, judged, summary, taken } = judge(place, &limits, Heard::Somewhere, true)?;
-    let mut contents = Contents::default();
-    contents.epoch_us = judged.epochs.whole();
-    (contents.messages, contents.other_messages) = (summary.messages, summary.other_messages);
-    contents.gaps = judged.gaps.iter().map(Gap::to_own).collect();
-    contents.gap_words = judged.gaps.iter().map(|gap| (gap.place, gap.words.clone())).collect();
+    let mut contents = Contents {
+        messages: summary.messages,
+        other_messages: summary.other_messages,
+        epoch_us: judged.epochs.whole(),
+        gaps: judged.gaps.iter().map(Gap::to_own).collect(),
+        gap_words: judged.gaps.iter().map(|gap| (gap.place, gap.words.clone())).collect(),
+        ..Contents::default()
+    };
     let (first, last) = judged.span.unzip();
     let epochs = judged.epochs.clone();
     let summary = reader::Summary {
