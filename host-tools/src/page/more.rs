@@ -262,6 +262,7 @@ fn is_first(row: &Row<'_>) -> bool {
 
 #[cfg(test)]
 mod tests {
+    use std::f32::consts::FRAC_1_SQRT_2;
     use std::sync::Arc;
 
     use hums_link::packet::Packet;
@@ -316,7 +317,7 @@ mod tests {
         let ignoring = target.clone().u16(48, IGNORES_Z | IGNORES_VELOCITY[1] | IGNORES_VELOCITY[2]);
         assert_eq!(message(&ignoring), [((Plot::Velocity, 3), 3.0)]);
         assert_eq!(message(&target)[0], ((Plot::Height, 1), 20.0));
-        let turned = Packet::new(ATTITUDE_TARGET).f32(4, 0.707_1).f32(16, -0.707_1);
+        let turned = Packet::new(ATTITUDE_TARGET).f32(4, FRAC_1_SQRT_2).f32(16, -FRAC_1_SQRT_2);
         assert_eq!(message(&turned), [((Plot::Heading, 1), 270.0)]);
         assert_eq!(message(&Packet::new(ATTITUDE_TARGET)), [], "there is none yet");
         let bearing = Packet::new(NAV_CONTROLLER_OUTPUT).u16(20, (-90_i16).cast_unsigned());

@@ -236,7 +236,9 @@ impl Samples {
 
     /// Takes the same of an autopilot's own log.
     pub fn values(&mut self, at: Instant, values: &[(Line, f32)]) {
-        values.iter().for_each(|(line, value)| self.put(at, *line, Some(*value)));
+        for (line, value) in values {
+            self.put(at, *line, Some(*value));
+        }
     }
 
     fn put(&mut self, at: Instant, line: Line, value: Option<f32>) {
