@@ -61,8 +61,22 @@ use outcome::Outcome;
 /// Runs the program with these arguments (the first is the program's own name).
 pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
     interrupt::no_end_by_file_size();
-    match Cli::try_parse_from(arguments) {
-        Ok(cli) => outcome::exit_code(files::check_standard_output().and_then(|()| command(&cli.command))),
+    let arguments: Vec<OsString> = arguments.into_iter().collect();
+    let words = arguments.get(1..).unwrap_or_default();
+    if files::is_standard_error_named(words) {
+        // What is wrong cannot be said without writing into that file.
+        return ExitCode::from(2);
+    }
+    match Cli::try_parse_from(&arguments) {
+        Ok(cli) => outcome::exit_code(
+            files::check_standard_output()
+                .and_then(|()| match cli.command {
+                    // Their words are no files.
+                    Command::Completions(_) | Command::Man(_) => Ok(()),
+                    _ => files::check_standard_output_is_not_named(words),
+                })
+                .and_then(|()| command(&cli.command)),
+        ),
         Err(error) => {
             // Help and version go to standard output and are no failure; a reader that has gone is none either.
             let _ = error.print();

@@ -119,6 +119,29 @@ fn a_log_whose_directory_entry_is_lost_is_found_and_told_beside_others() {
     assert_eq!(info["logs"].as_array().unwrap().len(), 2, "{info}");
     assert!(info["images"][0]["damage"][0].as_str().unwrap().contains("belong to no file"), "{info}");
     assert_eq!(json("verify", &image, &[], 3)["logs"].as_array().unwrap().len(), 2);
+
+    // The FAT of its sectors is lost as well, and its parity is all that is left in clusters of no file.
+    let Places { fat, data, cluster_bytes, .. } = places(&image);
+    let first = entry_word(&content, entry + 26);
+    let start = data as usize + (first - 2) * cluster_bytes as usize;
+    let is_sector = |block: &&[u8]| block.starts_with(&[0x48, 0xB3]);
+    let sectors = content[start..].chunks(BLOCK as usize).take_while(is_sector).count();
+    let clusters = (sectors * BLOCK as usize).div_ceil(cluster_bytes as usize);
+    content[entry..entry + 32].fill(0);
+    content[fat as usize + 4 * first..][..4 * clusters].fill(0);
+    // What is behind an entry of zeros is no directory: the other log's takes its place.
+    content.copy_within(entry + 32..entry + 64, entry);
+    content[entry + 32..entry + 64].fill(0);
+    fs::write(&image, &content).unwrap();
+    let info = json("info", &image, &[], 3);
+    assert_eq!(info["logs"].as_array().unwrap().len(), 2, "{info}");
+    assert!(info["images"][0]["damage"][0].as_str().unwrap().contains("sectors of logs in them"), "{info}");
+    json("verify", &image, &[], 3);
+}
+
+/// Two bytes of a directory entry.
+fn entry_word(image: &[u8], at: usize) -> usize {
+    usize::from(u16::from_le_bytes([image[at], image[at + 1]]))
 }
 
 /// The card was formatted on a PC: its file system is in order and empty, and may have known of more than is left.

@@ -1,5 +1,6 @@
 //! Which file a path means, whatever its spelling: links, hard links, `./` and `..` come out alike.
 
+use std::ffi::OsString;
 use std::fs;
 use std::io;
 use std::path::{Component, Path, PathBuf};
@@ -65,6 +66,43 @@ impl FileId {
     pub fn of_standard_output() -> Option<Self> {
         standard(io::stdout())
     }
+
+    /// The file that standard error is, where it is one.
+    fn of_standard_error() -> Option<Self> {
+        standard(io::stderr())
+    }
+}
+
+/// The word of a command line, or standard input, that is the file to which this stream leads. A word that means standard
+/// output itself (`-o /dev/stdout`) is none.
+fn named(stream: &FileId, words: &[OsString]) -> Option<String> {
+    let values = words.iter().filter_map(|word| {
+        let word = word.to_str()?;
+        Some([Some(word), word.split_once('=').map(|(_, value)| value)])
+    });
+    let is_it = |word: &&str| {
+        let path = Path::new(*word);
+        !means_standard_output(path) && FileId::of(path).is_ok_and(|id| id == *stream)
+    };
+    let word = values.flatten().flatten().find(is_it).map(str::to_owned);
+    let is_input = || FileId::of_standard_input().is_some_and(|id| id == *stream);
+    word.or_else(|| is_input().then(|| "standard input".to_owned()))
+}
+
+/// Refuses a standard output that leads into a file which the command line names: `hums check a.tlog >> a.tlog`, also through a
+/// link, as standard input or as `--key`. Inputs that lie in a folder are refused once they are known ([`super::Inputs`]).
+pub fn check_standard_output_is_not_named(words: &[OsString]) -> Result<()> {
+    match FileId::of_standard_output().and_then(|stream| named(&stream, words)) {
+        Some(word) => Err(usage(format!(
+            "standard output: goes into {word}, which this command line names; nothing was written; send it elsewhere"
+        ))),
+        None => Ok(()),
+    }
+}
+
+/// Whether standard error leads into such a file: then nothing may be said there.
+pub fn is_standard_error_named(words: &[OsString]) -> bool {
+    FileId::of_standard_error().is_some_and(|stream| named(&stream, words).is_some())
 }
 
 #[cfg(unix)]

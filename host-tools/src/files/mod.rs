@@ -26,7 +26,10 @@ mod there;
 
 pub use ends::{add_ends, digest, short};
 pub use folder::{Folder, FolderFile, buffered};
-pub use identity::{FileId, check_standard_output, check_standard_output_is_open, means_standard_output};
+pub use identity::{
+    FileId, check_standard_output, check_standard_output_is_not_named, check_standard_output_is_open,
+    is_standard_error_named, means_standard_output,
+};
 pub use inputs::Inputs;
 pub use output::Output;
 pub use part::{InPlacePart, lock_in_place, make_in_place};

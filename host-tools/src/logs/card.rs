@@ -7,6 +7,7 @@ use std::path::Path;
 
 use anyhow::{Context as _, Result, bail};
 use hums_blackbox::Header;
+use hums_blackbox::parity::Parity;
 use hums_recorder::layout::{Layout, LayoutError};
 
 use super::begun_anew;
@@ -120,7 +121,7 @@ pub(super) fn image(path: &Path, salvage: bool, found: &mut Found) -> Result<()>
 fn by_file_system(path: &Path, walk: Walk, about: &mut Image) -> Result<Vec<CardFile>> {
     about.damage = walk.damage;
     about.lost_clusters = walk.lost_clusters;
-    if about.damage.is_empty() && has_sector(path, walk.lost)? {
+    if about.damage.is_empty() && has_part_of_log(path, walk.lost)? {
         let clusters = belong(walk.lost_clusters);
         about
             .damage
@@ -197,9 +198,16 @@ fn cut_short(file: &File, device: &ReadOnlyImage) -> io::Result<Option<String>> 
     }))
 }
 
-/// Whether there is a sector of a log here.
-fn has_sector(path: &Path, extents: Vec<Extent>) -> Result<bool> {
-    Ok(first_sector(path, extents)?.is_some())
+/// Whether there is a sector of a log here, or the parity of some.
+fn has_part_of_log(path: &Path, extents: Vec<Extent>) -> Result<bool> {
+    let lost = lost(path, extents);
+    let mut blocks = lost.blocks();
+    while let Some(block) = blocks.next_block()? {
+        if Header::read(&block).is_ok() || Parity::read(&block).is_some() {
+            return Ok(true);
+        }
+    }
+    Ok(false)
 }
 
 /// The first sector of a log here.
