@@ -200,10 +200,14 @@ fn attitude(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
 }
 
 /// The body's rates and those that are wanted, of one moment: degrees a second, until 3.3 hundredths of them (`Log_Write_Rate` of
-/// `ArduCopter`). Where no version is told, nobody knows which.
+/// `ArduCopter`). Where the version does not tell, the gyro does.
 fn rates(state: &mut State, given: &Given<'_>, _: &mut Out<'_>) {
-    let Some(unit_deg) = state.facts.rate_unit_deg() else { return };
     let Some(rates) = given.singles::<5>(0) else { return };
+    let [_, _, flown @ ..] = rates;
+    if let Some(gyro) = state.gyro.within(given.at, AT_ONCE) {
+        state.rate_unit.take(norm(flown), gyro.to_degrees());
+    }
+    let Some(unit_deg) = state.facts.rate_unit_deg().or(state.rate_unit.degrees()) else { return };
     let [wanted_roll, wanted_pitch, flown @ ..] =
         rates.map(|rate| RadiansPerSecond((rate * unit_deg).to_radians()));
     state.rates.set(given.at, Rates { wanted: [wanted_roll, wanted_pitch], flown });
@@ -234,6 +238,9 @@ fn imu(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
         }
     }
     state.has_inertial = true;
+    if let Some(rate) = rate.filter(|_| instance == 0) {
+        state.gyro.set(given.at, norm(rate.map(|axis| axis.0)));
+    }
     // A sensor without a thermometer says 0.
     let temperature = given.single(7).filter(|celsius| *celsius != 0.0).map(Celsius);
     let field = state.fields.get_mut(usize::from(instance)).and_then(Option::take);
