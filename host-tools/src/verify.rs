@@ -21,7 +21,7 @@ use crate::outcome::Outcome;
 use crate::output::{self, JsonList, Schema};
 use crate::plural::count;
 use crate::printable::{path, word};
-use crate::source::find::besides;
+use crate::source::find::{besides, not_ours};
 use crate::summary::Overview;
 
 /// What `hums verify --json` prints.
@@ -29,7 +29,7 @@ const SCHEMA: Schema = Schema::first("hums-verify");
 
 /// Runs `hums verify`.
 pub fn run(args: &cli::Verify) -> Result<Outcome> {
-    let found = logs::find(&args.inputs, args.salvage)?;
+    let found = logs::find(&args.inputs, args.salvage).map_err(|error| not_ours(&args.inputs, error))?;
     Inputs::of(found.paths()).refuse_standard_output()?;
     for remark in &found.remarks {
         note!("{remark}");

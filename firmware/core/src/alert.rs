@@ -25,9 +25,14 @@ const FLAGS_AGE: Span = Span::from_secs(5);
 
 /// What a text of the autopilot says is wrong. `severity` is a `MAV_SEVERITY`: what is only a notice, or less, says nothing is
 /// wrong. `None` where a log keeps none: then only texts count that are known and tell by themselves that they are severe.
+///
+/// `MAV_SEVERITY_ALERT` is none either: until 3.2, of 2015, `ArduPilot` counted from 1 for low to 4 for critical, and says "Reached
+/// Command #1" with it; since then it has it of a parachute, a fuel cell's states and what developers look for, and PX4's texts never.
 pub fn of_text(severity: Option<u8>, text: &[u8]) -> Option<Alert> {
     const NOTICE: u8 = 5;
     const WARNING: u8 = 4;
+    const ALERT: u8 = 1;
+    let severity = severity.filter(|severity| *severity != ALERT);
     if severity.is_some_and(|severity| severity >= NOTICE) {
         return None;
     }

@@ -5,7 +5,8 @@
 //! air's temperature, [`SCALE_PART`] of what it is above or below its usual height, and the wind of the flight on its housing, a half of
 //! what the dynamic pressure is above or below its usual one.
 //!
-//! Noise is how far the height steps from sample to sample, less the climb.
+//! Noise is how far the height steps from sample to sample, less the climb, and less what a late message makes of that ([`LATE_S`]) and a
+//! climb that changed.
 //!
 //! The estimator's climb against that of the barometer: vibration that an accelerometer folds into an offset lets an estimator fall
 //! while the vehicle climbs, and height control gives full throttle. On rotors only, whose climb is told by `VFR_HUD`. What wind makes
@@ -25,6 +26,8 @@ use crate::vehicle::Vehicle;
 pub(crate) const SCALE_HEIGHT_M: f32 = 8_430.0;
 /// A standard atmosphere is wrong by so much of a climb where the air is 28 K warmer or colder than it says.
 const SCALE_PART: f32 = 0.1;
+/// Messages on a link are late by so much: a step takes that much longer or shorter.
+const LATE_S: f32 = 0.3;
 /// Receivers are some tenths of a second late: faster than this, m/s, the two heights are not of the same moment.
 const CLIMB_MPS: f32 = 2.0;
 /// Less exact positions are not compared: accuracy in metres, dilution of precision.
@@ -47,8 +50,9 @@ const PAUSE: Span = Span::from_secs(2);
 pub(crate) struct Heights {
     /// The first pressure of the flight, hPa; 0 before it.
     first_hpa: f32,
-    /// Height above that, the dynamic pressure of the speed over ground as a height, both in m; and when they were measured.
-    height: Option<(Instant, f32, f32)>,
+    /// Height above that, the dynamic pressure of the speed over ground as a height, both in m; the climb, m/s; and when they were
+    /// measured.
+    height: Option<(Instant, f32, f32, f32)>,
     noise: Departure,
     /// The climb that is missing in the estimator's, smoothed, m/s.
     climbs_mps: Option<f32>,
@@ -91,18 +95,20 @@ impl Heights {
         let height_m = SCALE_HEIGHT_M * libm::logf(self.first_hpa / pressure.0);
         let speed_mps = ground_speed_mps(at, vehicle).unwrap_or(0.0);
         let wind_m = speed_mps * speed_mps / (2.0 * GRAVITY);
-        let before = self.height.replace((at, height_m, wind_m));
-        if let Some((before, before_m, wind_before_m)) = before {
+        let climb = climb_mps(at, vehicle);
+        let before = self.height.replace((at, height_m, wind_m, climb.unwrap_or(0.0)));
+        if let Some((before, before_m, wind_before_m, _)) = before {
             let by_wind_m = libm::fabsf(wind_m - wind_before_m);
             self.take_climb(at, at.since(before), height_m - before_m, by_wind_m, vehicle);
         }
         let calm = is_clear(at, vehicle) && vehicle.inertial.turns_little(at, TURNED);
-        if let (Some((before, before_m, _)), Some(climb_mps), true) = (before, climb_mps(at, vehicle), calm) {
+        if let (Some((before, before_m, _, climbed_mps)), Some(climb_mps), true) = (before, climb, calm) {
             let step = at.since(before);
             if step > Span::ZERO && step <= PAUSE {
                 let step_s = step.as_secs_f32();
                 let off_m = libm::fabsf(height_m - before_m - climb_mps * step_s);
-                self.noise.take(off_m, step_s, NOISE_HOLD_M);
+                let late_m = LATE_S * libm::fabsf(climb_mps) + step_s * libm::fabsf(climb_mps - climbed_mps);
+                self.noise.take((off_m - late_m).max(0.0), step_s, NOISE_HOLD_M);
             }
         }
     }
@@ -134,7 +140,7 @@ impl Heights {
             && gnss.accuracy.is_none_or(|accuracy| accuracy.0 <= ACCURACY_M)
             && gnss.hdop.is_none_or(|hdop| hdop <= HDOP);
         let climbs = climb_mps(at, vehicle).is_none_or(|climb| libm::fabsf(climb) > CLIMB_MPS);
-        let (Some((_, height_m, _)), Some(altitude)) = (height, gnss.altitude) else { return };
+        let (Some((_, height_m, ..)), Some(altitude)) = (height, gnss.altitude) else { return };
         if !good || climbs || !is_clear(at, vehicle) || !flight.airborne() {
             return;
         }

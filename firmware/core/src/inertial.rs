@@ -3,7 +3,8 @@
 //!
 //! An estimator that is fed by a gyro with an offset turns its attitude over while the vehicle stands. What really turns over turns
 //! fast, and what flies at a great tilt is carried with more than its weight, or falls. So an attitude far from level is contradicted
-//! where the force has been that of a level vehicle at rest for `LASTS`, and nothing turned; and it is so until both agree again.
+//! where the force has been that of a level vehicle at rest for `LASTS`, or has come from far elsewhere than the attitude has it, and
+//! nothing turned; and it is so until both agree again.
 //!
 //! Motors that run shake a vehicle. How far the force steps from sample to sample is compared with what it did at rest.
 //!
@@ -12,7 +13,7 @@
 
 use crate::observation::Imu;
 use crate::time::{Instant, Span};
-use crate::units::{GRAVITY, MetresPerSecond2, Radians, RadiansPerSecond};
+use crate::units::{GRAVITY, MetresPerSecond2, Radians, RadiansPerSecond, norm};
 
 /// Time constant of the force.
 const SMOOTHING_S: f32 = 0.3;
@@ -71,6 +72,8 @@ pub struct Inertial {
     /// The estimator's attitude is another one than that of the sensors; and since when it has been far from level.
     contradicts: bool,
     tilted_since: Option<Instant>,
+    /// Since when it has been carried by its weight and still, whichever way up; and level besides.
+    rests_since: Option<Instant>,
     level_since: Option<Instant>,
     over_since: Option<Instant>,
 }
@@ -91,6 +94,7 @@ impl Inertial {
             turned_at: None,
             contradicts: false,
             tilted_since: None,
+            rests_since: None,
             level_since: None,
             over_since: None,
         }
@@ -149,6 +153,7 @@ impl Inertial {
         // No root: squares of cosines, with the sign of z, which is negative in what is upright.
         let level = rests && self.still && z < 0.0 && z * z > LEVEL * LEVEL * square;
         let over = rests && (z > 0.0 || z * z < OVER * OVER * square);
+        self.rests_since = (rests && self.still).then(|| self.rests_since.unwrap_or(at));
         self.level_since = level.then(|| self.level_since.unwrap_or(at));
         self.over_since = over.then(|| self.over_since.unwrap_or(at));
     }
@@ -210,9 +215,21 @@ impl Inertial {
         let tilt = libm::fabsf(roll.0).max(libm::fabsf(pitch.0));
         self.tilted_since = (tilt > TILTED_RAD).then(|| self.tilted_since.unwrap_or(at));
         let tilted = self.tilted_since.is_some_and(|since| at.since(since) >= TILTED);
-        if (tilted || tilt < AGREES_RAD) && self.is_level(at) {
-            self.contradicts = tilted;
+        let rests = self.is_fresh(at) && self.rests_since.is_some_and(|since| at.since(since) >= LASTS);
+        if rests && tilted && (self.is_level(at) || self.is_carried_elsewhere(roll, pitch)) {
+            self.contradicts = true;
+        } else if rests && tilt < AGREES_RAD {
+            self.contradicts = false;
         }
+    }
+
+    /// Whether the force is further than 45 degrees from the weight that a vehicle with this attitude carries.
+    fn is_carried_elsewhere(&self, roll: Radians, pitch: Radians) -> bool {
+        const FAR: f32 = 0.707;
+        let across = libm::cosf(pitch.0);
+        let weight = [libm::sinf(pitch.0), -libm::sinf(roll.0) * across, -libm::cosf(roll.0) * across];
+        let along: f32 = self.force.iter().zip(weight).map(|(force, weight)| force * weight).sum();
+        along < FAR * norm(self.force)
     }
 
     /// Whether the estimator's attitude is not that of the vehicle.
@@ -232,4 +249,45 @@ impl Inertial {
 fn weight(before: Option<Instant>, at: Instant, constant_s: f32) -> f32 {
     let step_s = before.map_or(f32::INFINITY, |before| at.since(before).as_secs_f32());
     if step_s < 1.0 { step_s / (constant_s + step_s) } else { 1.0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Whether a still vehicle that is carried with this force for three seconds contradicts an attitude that rolls to so many degrees,
+    /// and then one that is level.
+    fn contradicts(force: [f32; 3], roll_deg: f32) -> (bool, bool) {
+        let mut inertial = Inertial::new();
+        let mut now = Instant::ZERO;
+        let mut said = [false; 2];
+        for (roll_deg, said) in [roll_deg, 0.0].into_iter().zip(&mut said) {
+            for _ in 0..30 {
+                now = now + Span::from_millis(100);
+                let imu = Imu {
+                    acceleration: Some(force.map(MetresPerSecond2)),
+                    rate: Some([0.01; 3].map(RadiansPerSecond)),
+                    ..Imu::default()
+                };
+                inertial.take(now, &imu);
+                inertial.take_attitude(now, Radians(roll_deg.to_radians()), Radians(0.05));
+            }
+            *said = inertial.contradicts(now);
+        }
+        (said[0], said[1])
+    }
+
+    #[test]
+    fn an_attitude_is_contradicted_by_what_carries_the_vehicle_from_elsewhere() {
+        assert_eq!(contradicts([0.1, 0.3, -9.8], -70.0), (true, false), "level");
+        assert_eq!(
+            contradicts([0.1, 0.3, 10.0], -70.0),
+            (true, false),
+            "its sensor says that it lies on its back"
+        );
+        assert_eq!(contradicts([0.1, 9.5, -1.0], -80.0), (false, false), "it lies on its side");
+        assert_eq!(contradicts([0.1, -9.5, -1.0], -80.0), (true, false), "on the other one");
+        assert_eq!(contradicts([0.1, 0.3, 9.8], 178.0), (false, false), "on its back");
+        assert_eq!(contradicts([0.1, 0.3, 14.0], -70.0), (false, false), "it does not rest");
+    }
 }

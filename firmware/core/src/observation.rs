@@ -4,6 +4,8 @@
 //! extension fields that read as zero); from here on nobody needs to know where a value came from, but for the few
 //! quantities that the two autopilots define differently, which say so ([`VibrationScale`], [`EstimatorScale`]).
 
+use core::num::NonZeroU32;
+
 use crate::cause::{Alert, Causes};
 use crate::units::{
     AmpereHours, Amperes, Celsius, Fraction, Gauss, Hectopascals, Metres, MetresPerSecond, MetresPerSecond2,
@@ -125,6 +127,8 @@ pub struct Gnss {
     pub altitude: Option<Metres>,
     /// Ground speed.
     pub speed: Option<MetresPerSecond>,
+    /// When that was measured, by the receiver's clock or when the autopilot took it: milliseconds modulo 2^32, from any beginning.
+    pub measured_ms: Option<NonZeroU32>,
 }
 
 /// Interference that a GNSS receiver reports.

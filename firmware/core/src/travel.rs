@@ -2,15 +2,18 @@
 //!
 //! The way is the sum of the steps between positions, and the speed is summed over the same time; both are forgotten with [`MEMORY_S`]. What
 //! repeats a position bit for bit is the same measurement again.
+//!
+//! How long a step took is the receiver's word ([`Gnss::measured_ms`]): messages wait on a link and then come all at once, and
+//! a clock that is slow makes each way a fast one. Where that is not known nothing is said.
 
 use crate::latest::Reading;
 use crate::observation::Gnss;
-use crate::time::{Instant, Span};
+use crate::time::Instant;
 
 /// Ways and speeds are forgotten with this time constant, s; before it has passed nothing is said.
 const MEMORY_S: f32 = 4.0;
-/// Positions further apart are not of one way.
-const PAUSE: Span = Span::from_secs(2);
+/// Positions further apart are not of one way, ms.
+const PAUSE_MS: u32 = 2_000;
 /// Less exact positions are not compared: accuracy in metres, dilution of precision.
 const ACCURACY_M: f32 = 3.0;
 const HDOP: f32 = 2.5;
@@ -22,8 +25,8 @@ const SPEED_MAX_MPS: f32 = 200.0;
 /// The memory of one receiver.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Travel {
-    /// Latitude and longitude, degrees; the speed there, m/s; and when that was.
-    before: Option<([f64; 2], f32, Instant)>,
+    /// Latitude and longitude, degrees; the speed there, m/s; when that was measured, ms; and when it came.
+    before: Option<([f64; 2], f32, u32, Instant)>,
     /// How much further it went by its speed than by its positions, m, and in what time, s.
     further_m: f32,
     time_s: f32,
@@ -40,31 +43,36 @@ impl Travel {
             && gnss.accuracy.is_none_or(|accuracy| accuracy.0 <= ACCURACY_M)
             && gnss.hdop.is_none_or(|hdop| hdop <= HDOP);
         let speed_mps = gnss.speed.map(|speed| speed.0).filter(|speed| (0.0..=SPEED_MAX_MPS).contains(speed));
-        let (Some(position), Some(speed_mps), true) = (gnss.position, speed_mps, good) else {
+        let (Some(position), Some(speed_mps), Some(measured_ms), true) =
+            (gnss.position, speed_mps, gnss.measured_ms, good)
+        else {
             *self = Self::NEW;
             return;
         };
         let place = [position.latitude_deg, position.longitude_deg];
-        let Some((was, speed_before_mps, before)) = self.before else {
-            self.before = Some((place, speed_mps, at));
+        let told = Some((place, speed_mps, measured_ms.get(), at));
+        let Some((was, speed_before_mps, before_ms, _)) = self.before else {
+            self.before = told;
             return;
         };
-        let step = at.since(before);
-        if step > PAUSE {
-            *self = Self { before: Some((place, speed_mps, at)), ..Self::NEW };
+        let step_ms = measured_ms.get().wrapping_sub(before_ms);
+        let is_same = place.map(f64::to_bits) == was.map(f64::to_bits);
+        // A time that stands still, or goes back, is none.
+        if step_ms > PAUSE_MS || (step_ms == 0 && !is_same) {
+            *self = Self { before: told, ..Self::NEW };
             return;
         }
-        if place.map(f64::to_bits) == was.map(f64::to_bits) {
+        if is_same {
             return;
         }
         let north_m = (place[0] - was[0]) as f32 * DEGREE_M;
         let east_m = (place[1] - was[1]) as f32 * DEGREE_M * libm::cosf((place[0] as f32).to_radians());
-        let step_s = step.as_secs_f32();
+        let step_s = step_ms as f32 / 1e3;
         let further_m = f32::midpoint(speed_mps, speed_before_mps) * step_s - libm::hypotf(north_m, east_m);
         let kept = MEMORY_S / (MEMORY_S + step_s);
         self.further_m = kept * (self.further_m + further_m);
         self.time_s = kept * (self.time_s + step_s);
-        self.before = Some((place, speed_mps, at));
+        self.before = told;
     }
 
     /// How far the speed is from that of the positions, m/s.
@@ -78,12 +86,18 @@ impl Travel {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
-    use crate::units::Position;
-    use crate::units::{Metres, MetresPerSecond};
+    use core::num::NonZeroU32;
 
-    /// Flies north with one speed by its positions and another one by what it tells, each position twice.
-    fn flown(moves_mps: f64, told_mps: f32) -> Option<f32> {
+    use super::*;
+    use crate::units::{Metres, MetresPerSecond, Position};
+
+    /// Flies north with one speed by its positions and another one by what it tells, each position twice. `came` is when a step's
+    /// message comes, and `measured` when it was measured, both in ms.
+    fn heard(
+        (moves_mps, told_mps): (f64, f32),
+        came: fn(u64) -> u64,
+        measured: fn(u64) -> u32,
+    ) -> Option<f32> {
         let mut travel = Travel::NEW;
         for step in 0_u64..200 {
             let gnss = Gnss {
@@ -94,11 +108,16 @@ mod tests {
                     longitude_deg: 8.0,
                 }),
                 speed: Some(MetresPerSecond(told_mps)),
+                measured_ms: NonZeroU32::new(measured(step)),
                 ..Gnss::default()
             };
-            travel.take(Instant::from_millis(step * 100), &gnss, true);
+            travel.take(Instant::from_millis(came(step)), &gnss, true);
         }
         travel.speed_apart().map(|reading| reading.value)
+    }
+
+    fn flown(moves_mps: f64, told_mps: f32) -> Option<f32> {
+        heard((moves_mps, told_mps), |step| step * 100, |step| 7 + (step / 2) as u32 * 200)
     }
 
     #[test]
@@ -108,5 +127,18 @@ mod tests {
         assert!((apart(5.0, 7.0) - 2.0).abs() < 0.3);
         assert!((apart(5.0, 3.0) - 2.0).abs() < 0.3);
         assert_eq!(flown(0.0, 2.0), None, "one position, bit for bit, is another check's");
+    }
+
+    #[test]
+    fn the_receivers_time_counts_and_not_when_its_messages_come() {
+        let measured = |step: u64| (u32::MAX - 9_998).wrapping_add((step / 2) as u32 * 200);
+        let at_once = |step: u64| step / 20 * 2_000 + step % 20;
+        let slow_clock = |step: u64| step * 60;
+        for came in [at_once, slow_clock] {
+            assert!(heard((15.0, 15.0), came, measured).expect("known") < 0.2);
+            assert!((heard((15.0, 12.0), came, measured).expect("known") - 3.0).abs() < 0.4);
+        }
+        assert_eq!(heard((15.0, 12.0), |step| step * 100, |_| 0), None, "not known");
+        assert_eq!(heard((15.0, 12.0), |step| step * 100, |_| 7), None, "stands still");
     }
 }

@@ -104,6 +104,8 @@ pub struct Vehicle {
     pub landed: Latest<LandedState>,
     /// What a VTOL flies on, as old as `landed`.
     pub vtol: VtolState,
+    /// How often the vertical speed of `GLOBAL_POSITION_INT` had the sign of the displayed climb, less how often the other one.
+    counts_up: i8,
     /// The autopilot's processor.
     pub processor: Latest<Processor>,
     /// The autopilot's identity.
@@ -182,6 +184,7 @@ impl Vehicle {
             engine: Latest::nothing(),
             landed: Latest::nothing(),
             vtol: VtolState::Unknown,
+            counts_up: 0,
             processor: Latest::nothing(),
             identity: Latest::nothing(),
             command_ack: Latest::nothing(),
@@ -333,7 +336,7 @@ impl Vehicle {
             Observation::Wanted(wanted) => self.wanted.set(at, wanted),
             Observation::ClimbWanted(climb) => self.climb_wanted.set(at, climb),
             Observation::LocalPosition(local) => self.local.set(at, local),
-            Observation::GlobalPosition(global) => self.global.set(at, global),
+            Observation::GlobalPosition(global) => self.take_global(at, global),
             Observation::Hud(hud) => self.hud.set(at, hud),
             Observation::RadioControl(rc) => self.rc.set(at, rc),
             Observation::TelemetryRadio(radio) => self.radio.set(at, radio),
@@ -405,6 +408,33 @@ impl Vehicle {
             self.rebooted_armed = self.boot_armed && silent_ms <= OFF.as_millis();
         }
         (self.boot, self.odd_boot, self.boot_armed) = (Some((boot_ms, at)), None, self.armed());
+    }
+
+    /// Its vertical speed counts down. `ArduPilot`'s counted up until about 2018 (seen in Copter of 2013, 2016 and 3.5.7, Plane 3.6.0), so
+    /// where it may be so old, it is held against the displayed climb, where both say that it climbs or sinks about as fast.
+    fn take_global(&mut self, at: Instant, mut global: GlobalPosition) {
+        const FRESH: Span = Span::from_secs(1);
+        const MOVES_MPS: f32 = 0.5;
+        const SURE: i8 = 8;
+        const MOST: i8 = 3 * SURE;
+        /// Versions are bytes from the top down.
+        const COUNTS_DOWN_SINCE: u32 = 0x0400_0000;
+        let is_old =
+            self.heartbeat.get().is_some_and(|heartbeat| heartbeat.autopilot == Autopilot::ArduPilot)
+                && self.identity.get().is_none_or(|identity| identity.firmware < COUNTS_DOWN_SINCE);
+        let [.., down] = &mut global.velocity;
+        let told = self.hud.within(at, FRESH).and_then(|hud| hud.climb).map(|climb| climb.0);
+        if let Some(climb_mps) = told
+            && libm::fabsf(down.0).min(libm::fabsf(climb_mps)) > MOVES_MPS
+            && (0.5..2.0).contains(&libm::fabsf(climb_mps / down.0))
+        {
+            let vote = if climb_mps * down.0 > 0.0 { 1 } else { -1 };
+            self.counts_up = (self.counts_up + vote).clamp(-MOST, MOST);
+        }
+        if is_old && self.counts_up >= SURE {
+            down.0 = -down.0;
+        }
+        self.global.set(at, global);
     }
 
     fn note_led(&mut self, at: Instant, attitude: &Attitude) {
@@ -532,6 +562,45 @@ mod tests {
         assert_eq!((motor.esc.rpm, motor.esc.errors), (Some(Rpm(5_000.0)), Some(3)));
         assert_eq!(motor.moved_at, Some(Instant::from_millis(1)));
         assert_eq!(motor.at, Some(Instant::from_millis(2)));
+    }
+
+    /// The climb that is known of an autopilot after so many positions with this vertical speed, beside a displayed climb.
+    fn climb_of(
+        (autopilot, firmware): (Autopilot, u32),
+        positions: u64,
+        down_mps: f32,
+        climb_mps: f32,
+    ) -> Option<f32> {
+        let mut vehicle = known();
+        let heartbeat = Heartbeat { autopilot, ..Heartbeat::default() };
+        vehicle.observe(Instant::ZERO, AUTOPILOT, &Observation::Heartbeat(heartbeat));
+        let identity = AutopilotIdentity { firmware, uid: 0 };
+        vehicle.observe(Instant::ZERO, AUTOPILOT, &Observation::Identity(identity));
+        let mut now = Instant::ZERO;
+        for step in 0..positions {
+            now = Instant::from_millis(step * 250);
+            let hud = Hud { climb: Some(MetresPerSecond(climb_mps)), ..Hud::default() };
+            vehicle.observe(now, AUTOPILOT, &Observation::Hud(hud));
+            let velocity = [0.0, 0.0, down_mps].map(MetresPerSecond);
+            let global = GlobalPosition { velocity, ..GlobalPosition::default() };
+            vehicle.observe(now, AUTOPILOT, &Observation::GlobalPosition(global));
+        }
+        crate::motion::climb_mps(now, &vehicle)
+    }
+
+    #[test]
+    fn a_vertical_speed_that_counts_up_is_known_by_the_displayed_climb() {
+        let old = (Autopilot::ArduPilot, 0x0305_07FF);
+        let climb_known = |positions, down_mps, climb_mps| climb_of(old, positions, down_mps, climb_mps);
+        for other in [(Autopilot::ArduPilot, 0x0400_00FF), (Autopilot::Px4, 0)] {
+            assert_eq!(climb_of(other, 20, 3.0, 3.1), Some(-3.0), "{other:?}");
+        }
+        assert_eq!(climb_known(20, 3.0, 3.1), Some(3.0));
+        assert_eq!(climb_known(20, -3.0, -2.5), Some(-3.0));
+        assert_eq!(climb_known(20, -3.0, 3.1), Some(3.0), "as MAVLink has it");
+        assert_eq!(climb_known(5, 3.0, 3.1), Some(-3.0), "not sure yet");
+        assert_eq!(climb_known(20, 8.0, 1.0), Some(-8.0), "not of one motion");
+        assert_eq!(climb_known(20, 0.3, 0.3), Some(-0.3), "hardly moves");
     }
 
     #[test]

@@ -438,6 +438,20 @@ fn a_noisy_barometer_is_named() {
 }
 
 #[test]
+fn messages_that_come_late_make_no_noise_of_a_fast_descent() {
+    is_quiet(|now_ms, fitted| {
+        let fallen_s = (now_ms.saturating_sub(FAULT_MS) as f32 / 1_000.0).min(8.0);
+        let falls = fallen_s > 0.0 && fallen_s < 8.0;
+        let late_s = if falls { 0.25 * noise(now_ms, 81) } else { 0.0 };
+        fitted.quad.climb = if falls { -10.0 } else { 0.0 };
+        fitted.quad.climb_wanted = Some(fitted.quad.climb);
+        fitted.quad.height = 120.0 - 10.0 * fallen_s;
+        fitted.altitude -= 10.0 * fallen_s;
+        fitted.pressure.iter_mut().for_each(|pressure| *pressure += 1.18 * (fallen_s + late_s));
+    });
+}
+
+#[test]
 fn what_does_not_turn_as_it_is_told_is_named_and_what_turns_fast_is_not() {
     for (axis, check) in ["roll_rate", "pitch_rate"].into_iter().enumerate() {
         finds(check, 0, Level::Critical, 2_500, |_, fitted| fitted.wanted[axis] = -2.5);

@@ -1,6 +1,8 @@
 //! Nothing that a vehicle can say, in whatever order, at whatever time and however often, panics or overflows, spoils a
 //! figure, or makes what is not known look healthy. (From bytes on: `hums-link`'s `tests/hostile.rs`.)
 
+use core::num::NonZeroU32;
+
 use hums_core::Monitor;
 use hums_core::health::{EXPECTED, Level, Subsystem};
 use hums_core::lifetime::{ITEM_BYTES_MAX, Room};
@@ -158,6 +160,7 @@ impl Random {
             }),
             altitude: self.float(Metres),
             speed: self.float(MetresPerSecond),
+            measured_ms: NonZeroU32::new(self.u32()),
         }
     }
 

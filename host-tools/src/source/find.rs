@@ -5,7 +5,7 @@ use std::fs;
 use std::mem;
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context as _, Result, bail};
+use anyhow::{Context as _, Result, anyhow, bail};
 
 use super::format::{KNOWN, detect, format_of, hint, is_recording, start_of};
 use super::recording::{Place, of_one_vehicle};
@@ -232,6 +232,25 @@ fn is_own(path: &Path) -> Result<bool> {
         Content::Image => !is_recording(path),
         Content::Mavlink | Content::Empty | Content::Other => false,
     })
+}
+
+/// Why no log of ours was found, for a command that reads nothing else: a recording of another kind that was named is told as that.
+pub fn not_ours(inputs: &[PathBuf], error: anyhow::Error) -> anyhow::Error {
+    let is_ours = |input: &Path| input.is_dir() || is_own(input).unwrap_or(false);
+    // What it failed on is the first of them.
+    let first = inputs.iter().find(|input| !is_ours(input));
+    match first.and_then(|input| Some((input, format_of(&start_of(input))?))) {
+        Some((input, format)) if !format.is_of_link() => anyhow!(
+            "{}: is {}, not a log of HUMS; `hums check` judges it",
+            input.display(),
+            format.with_article()
+        ),
+        Some((input, _)) => anyhow!(
+            "{}: is a recording of MAVLink, not a log of HUMS; `hums check` judges it, `hums pack` makes it one",
+            input.display()
+        ),
+        None => error,
+    }
 }
 
 /// A large file of anything may be a card whose first blocks are gone. That nothing was found on it is no news to whoever named

@@ -391,6 +391,17 @@ fn what_is_no_log_is_told_apart() {
     fs::write(at.join("text"), "hello").expect("written");
     fs::write(at.join("zeros"), vec![0; 3 << 20]).expect("written");
     fs::create_dir(at.join("folder")).expect("made");
+    let dataflash = b"FMT, 128, 89, FMT, BBnNZ, Type,Length,Name,Format,Columns\n";
+    let ulog = [&b"ULog\x01\x12\x35\x01"[..], &[0; 8]].concat();
+    fs::write(at.join("ArduPilot"), dataflash).expect("written");
+    fs::write(at.join("ULog"), &ulog).expect("written");
+    // As large as what may be a card without a partition table.
+    fs::write(at.join("large"), [&dataflash[..], &[b'\n'; 3 << 20]].concat()).expect("written");
+    for input in ["ArduPilot", "ULog", "large", "PX4"] {
+        let output = run(at, &format!("verify {input}"), 1);
+        let error = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(error.contains("not a log of HUMS; `hums check` judges it"), "{input}: {error}");
+    }
     for (input, said) in [
         ("empty", "is empty"),
         ("text", "neither a log"),

@@ -71,6 +71,19 @@ fn texts_are_told_by_what_they_mean() {
 }
 
 #[test]
+fn the_lowest_severity_of_old_autopilots_is_no_alert() {
+    for text in ["Reached Command #1", "init home", "gps alt: 25", "Nav command index updated to #1"] {
+        assert_eq!(of_text(Some(1), text.as_bytes()), None, "{text}");
+    }
+    assert_eq!(
+        of_text(Some(1), b"Parachute: Released"),
+        Some(Alert::critical(Cause::Crash)),
+        "known by itself"
+    );
+    assert_eq!(of_text(Some(1), b"Throttle failsafe on 900"), Some(Alert::warning(Cause::RemoteControl)));
+}
+
+#[test]
 fn patterns_fit_what_they_say_and_never_panic() {
     for text in ["", "^", "*", "e", "EKF", "\u{0}\u{ff}", "esc"] {
         let _ = of_text(Some(0), text.as_bytes());

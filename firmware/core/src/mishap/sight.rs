@@ -1,7 +1,7 @@
 //! What each observation shows of a mishap.
 
 use super::evidence::{
-    BREAKS_OFF, BROKEN_OFF, FULL_THROTTLE, IDLE_THROTTLE, Shock, THRUST_PART, is_believed, on_rotors,
+    BREAKS_OFF, BROKEN_OFF, FRESH, FULL_THROTTLE, IDLE_THROTTLE, Shock, THRUST_PART, is_believed, on_rotors,
     throttle,
 };
 use super::{Kind, Mishap, State, WATCHED};
@@ -240,7 +240,8 @@ impl Mishap {
             Some(false) => lost_m > LOST_M,
             None => false,
         };
-        let believed = || self.pressure.agrees(at, sink_mps).unwrap_or_else(|| is_believed(vehicle, params));
+        let by_display = || is_believed(vehicle, params) && is_displayed(at, sink_mps, vehicle);
+        let believed = || self.pressure.agrees(at, sink_mps).unwrap_or_else(by_display);
         let sinks = sinks && self.armed && believed();
         if self.sinks.take(at, sinks).is_some_and(|span| span >= SINKS) {
             self.see(at, Kind::Sinking, sink_mps.max(limit_mps.next_up()));
@@ -281,4 +282,14 @@ impl Mishap {
 fn is_told_to_sink(at: Instant, sink_mps: f32, limit_mps: f32, vehicle: &Vehicle) -> bool {
     let wanted_mps = vehicle.climb_wanted.within(at, WANTED_AGE).map(|climb| -climb.0);
     wanted_mps.is_some_and(|wanted_mps| wanted_mps > limit_mps && sink_mps < wanted_mps + FOLLOWS_MPS)
+}
+
+/// Whether the display sinks too; so it is where no climb is displayed, or nothing but zeros. A receiver that loses its satellites tells
+/// of a fall that neither the barometer nor the inertial sensors know of.
+fn is_displayed(at: Instant, sink_mps: f32, vehicle: &Vehicle) -> bool {
+    const PART: f32 = 0.3;
+    let climb_mps = vehicle.hud.within(at, FRESH).and_then(|hud| hud.climb).map(|climb| climb.0);
+    climb_mps
+        .filter(|climb_mps| libm::fabsf(*climb_mps) > 0.0)
+        .is_none_or(|climb_mps| -climb_mps > PART * sink_mps)
 }

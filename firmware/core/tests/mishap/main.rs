@@ -13,13 +13,13 @@ use hums_core::happening::Happening;
 use hums_core::health::{Finding, Level, Subsystem};
 use hums_core::mishap::{Change, Kind, Place, Report};
 use hums_core::observation::{
-    Air, Attitude, Autopilot, GlobalPosition, Imu, LandedState, Observation, VehicleKind, VtolState,
+    Air, Attitude, Autopilot, GlobalPosition, Hud, Imu, LandedState, Observation, VehicleKind, VtolState,
 };
 use hums_core::params::Params;
 use hums_core::status::LinkReading;
 use hums_core::time::Instant;
 use hums_core::units::{
-    Hectopascals, MetresPerSecond, MetresPerSecond2, Position, Radians, RadiansPerSecond,
+    Fraction, Hectopascals, MetresPerSecond, MetresPerSecond2, Position, Radians, RadiansPerSecond,
 };
 use hums_core::usage::UsageCounter;
 
@@ -37,6 +37,8 @@ struct Motion {
     pressure_hpa: Option<f32>,
     /// The greatest specific force between the sample before and this one, where it is a shock.
     shock_g: Option<f32>,
+    /// The climb of the pilot's display, where it has one.
+    displayed_mps: Option<f32>,
 }
 
 const CALM: Motion = Motion {
@@ -46,6 +48,7 @@ const CALM: Motion = Motion {
     pitch: 0.02,
     pressure_hpa: None,
     shock_g: None,
+    displayed_mps: None,
 };
 
 type Script = fn(u64, &mut Quad, &mut Motion);
@@ -114,7 +117,11 @@ fn fly(vehicle: &Quad, script: Script) -> Outcome {
             let air = Air { pressure: motion.pressure_hpa.map(Hectopascals), ..Air::default() };
             let own =
                 [Observation::Air(air), Observation::Attitude(attitude), Observation::GlobalPosition(global)];
-            for said in said.chain(own) {
+            let hud = motion.displayed_mps.map(|climb_mps| {
+                let throttle = Some(Fraction(quad.throttle));
+                Observation::Hud(Hud { throttle, climb: Some(MetresPerSecond(climb_mps)), ..Hud::default() })
+            });
+            for said in said.chain(hud).chain(own) {
                 monitor.observe(now, AUTOPILOT, &said);
             }
         }

@@ -135,6 +135,27 @@ fn an_estimator_that_believes_itself_makes_no_mishap_against_the_air() {
 }
 
 #[test]
+fn a_receiver_alone_makes_no_mishap_against_the_display() {
+    fn by_receiver(ms: u64, quad: &mut Quad, motion: &mut Motion) {
+        quad.climb = if (3_000..8_000).contains(&ms) { -12.0 } else { 0.0 };
+        motion.displayed_mps = Some(0.02);
+    }
+    for of in ROTORS {
+        assert!(fly(&hovering(of), by_receiver).told().is_empty(), "{of:?}");
+        let both = fly(&hovering(of), |ms, quad, motion| {
+            by_receiver(ms, quad, motion);
+            motion.displayed_mps = Some(0.5 * quad.climb);
+        });
+        assert_eq!(both.told(), ["sinking"], "{of:?}");
+        let no_display = fly(&hovering(of), |ms, quad, motion| {
+            by_receiver(ms, quad, motion);
+            motion.displayed_mps = Some(0.0);
+        });
+        assert_eq!(no_display.told(), ["sinking"], "{of:?}: nothing but zeros is no display");
+    }
+}
+
+#[test]
 fn a_sink_that_the_autopilot_wants_and_follows_is_none() {
     let sinks: Script = |ms, quad, _| {
         if ms < 2_000 {

@@ -1,5 +1,7 @@
 //! Where the vehicle is, how it moves and how well it knows.
 
+use core::num::NonZeroU32;
+
 use hums_core::observation::{
     Air, Attitude, Estimator, EstimatorScale, GlobalPosition, Gnss, GnssIntegrity, Hud, Imu, LocalPosition,
     MOTORS_MAX, Outputs, Vibration, VibrationScale, Wanted,
@@ -47,6 +49,11 @@ fn speed(centimetres: u16) -> Option<MetresPerSecond> {
     unless(centimetres, u16::MAX).map(|speed| MetresPerSecond(f32::from(speed) / 100.0))
 }
 
+/// Modulo 2^32; 0 is what is sent where nobody knows.
+const fn milliseconds(us: u64) -> Option<NonZeroU32> {
+    NonZeroU32::new((us / 1_000) as u32)
+}
+
 pub(super) fn gnss(payload: &[u8]) -> Option<Gnss> {
     /// Where the fix stands: the only enumeration.
     const FIX: usize = 28;
@@ -60,6 +67,7 @@ pub(super) fn gnss(payload: &[u8]) -> Option<Gnss> {
         hdop: dilution(gps.eph),
         accuracy: error(gps.h_acc),
         speed: speed(gps.vel),
+        measured_ms: milliseconds(gps.time_usec),
         position: position(gps.lat, gps.lon).filter(|_| has_position),
         altitude: has_position.then(|| Metres(gps.alt as f32 / 1e3)),
     })
@@ -77,6 +85,7 @@ pub(super) fn gnss2(payload: &[u8]) -> Option<Gnss> {
         hdop: dilution(gps.eph),
         accuracy: error(gps.h_acc),
         speed: speed(gps.vel),
+        measured_ms: milliseconds(gps.time_usec),
         position: position(gps.lat, gps.lon).filter(|_| has_position),
         altitude: has_position.then(|| Metres(gps.alt as f32 / 1e3)),
     })

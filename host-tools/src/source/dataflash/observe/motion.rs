@@ -1,5 +1,7 @@
 //! Where the vehicle is, how it moves and how well it knows.
 
+use std::num::NonZeroU32;
+
 use hums_core::observation::{
     Air, Attitude, Estimator, EstimatorScale, GlobalPosition, Gnss, Hud, Imu, LocalPosition, MOTORS_MAX,
     Observation, Outputs, SystemTime, Vibration, VibrationScale, Wanted,
@@ -25,6 +27,8 @@ const PRESSURE: u32 = 1 << 3;
 const FIX_2D: u8 = 2;
 /// `GPS_FIX_TYPE_3D_FIX`
 const FIX_3D: u8 = 3;
+/// A week of the receiver's time.
+const WEEK_MS: u64 = 7 * 86_400_000;
 /// What belongs together in one of MAVLink's messages was logged within this.
 const TOGETHER: Span = Span::from_secs(2);
 /// A shock's specific force is greater than this: below the least limit of one, and above what nearly all flights have.
@@ -196,10 +200,14 @@ fn attitude(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
 }
 
 /// The body's rates and those that are wanted, of one moment: degrees a second, until 3.3 hundredths of them (`Log_Write_Rate` of
-/// `ArduCopter`). Where no version is told, nobody knows which.
+/// `ArduCopter`). Where the version does not tell, the gyro does.
 fn rates(state: &mut State, given: &Given<'_>, _: &mut Out<'_>) {
-    let Some(unit_deg) = state.facts.rate_unit_deg() else { return };
     let Some(rates) = given.singles::<5>(0) else { return };
+    let [_, _, flown @ ..] = rates;
+    if let Some(gyro) = state.gyro.within(given.at, AT_ONCE) {
+        state.rate_unit.take(norm(flown), gyro.to_degrees());
+    }
+    let Some(unit_deg) = state.facts.rate_unit_deg().or(state.rate_unit.degrees()) else { return };
     let [wanted_roll, wanted_pitch, flown @ ..] =
         rates.map(|rate| RadiansPerSecond((rate * unit_deg).to_radians()));
     state.rates.set(given.at, Rates { wanted: [wanted_roll, wanted_pitch], flown });
@@ -230,6 +238,9 @@ fn imu(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
         }
     }
     state.has_inertial = true;
+    if let Some(rate) = rate.filter(|_| instance == 0) {
+        state.gyro.set(given.at, norm(rate.map(|axis| axis.0)));
+    }
     // A sensor without a thermometer says 0.
     let temperature = given.single(7).filter(|celsius| *celsius != 0.0).map(Celsius);
     let field = state.fields.get_mut(usize::from(instance)).and_then(Option::take);
@@ -260,6 +271,7 @@ fn gnss(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
         position: position.filter(|_| has_position),
         altitude: given.single(6).filter(|_| has_position).map(Metres),
         speed: speed.map(MetresPerSecond),
+        measured_ms: receiver_ms(given),
     };
     out.observe(&Observation::Gnss(gnss));
     if instance == 0 {
@@ -274,16 +286,21 @@ fn gnss(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
     }
 }
 
+/// The receiver's time, modulo 2^32.
+fn receiver_ms(given: &Given<'_>) -> Option<NonZeroU32> {
+    let (week, ms) = given.unsigned(10).zip(given.unsigned(11))?;
+    NonZeroU32::new(week.wrapping_mul(WEEK_MS).wrapping_add(ms) as u32)
+}
+
 /// UTC by the receiver's time of the week.
 fn time(state: &mut State, given: &Given<'_>, fix: u8, out: &mut Out<'_>) {
     /// 1980-01-06 in seconds since 1970.
     const GPS_EPOCH_S: u64 = 315_964_800;
-    const WEEK_S: u64 = 7 * 86_400;
     /// A week before 2010 or after 2100 is not known, but made up.
     const WEEKS: std::ops::Range<u64> = 1_564..6_260;
     const SAID_EVERY: Span = Span::from_secs(1);
     let (Some(week), Some(ms)) = (given.unsigned(10), given.unsigned(11)) else { return };
-    if fix < FIX_3D || !WEEKS.contains(&week) || ms > WEEK_S * 1_000 {
+    if fix < FIX_3D || !WEEKS.contains(&week) || ms > WEEK_MS {
         return;
     }
     // Leap seconds came at the ends of June 2012, June 2015 and December 2016 (IERS Bulletin C).
@@ -293,7 +310,7 @@ fn time(state: &mut State, given: &Given<'_>, fix: u8, out: &mut Out<'_>) {
         1_851..1_930 => 17,
         _ => 18,
     };
-    let utc_us = (GPS_EPOCH_S + week * WEEK_S - leap_s) * 1_000_000 + ms * 1_000;
+    let utc_us = (GPS_EPOCH_S - leap_s) * 1_000_000 + (week * WEEK_MS + ms) * 1_000;
     if state.utc_said.is_some_and(|at| given.at.since(at) < SAID_EVERY) {
         return;
     }

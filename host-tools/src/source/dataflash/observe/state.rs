@@ -52,6 +52,35 @@ pub(super) struct Rates {
     pub(super) flown: [RadiansPerSecond; 3],
 }
 
+/// What a gyro says of the unit of `RATE`: its samples that agree with degrees a second, less those that agree with hundredths.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct RateUnit(i8);
+
+impl RateUnit {
+    /// A rate as it is logged, and that of a gyro in degrees a second.
+    pub(super) fn take(&mut self, logged: f32, gyro_dps: f32) {
+        /// What turns slower says nothing.
+        const TURNS_DPS: f32 = 10.0;
+        let ratio = logged / gyro_dps;
+        let vote = match (gyro_dps > TURNS_DPS, ratio) {
+            (true, 0.3..3.0) => 1,
+            (true, 30.0..300.0) => -1,
+            _ => 0,
+        };
+        self.0 = self.0.saturating_add(vote);
+    }
+
+    /// The unit, degrees a second.
+    pub(super) const fn degrees(self) -> Option<f32> {
+        const SURE: i8 = 5;
+        match self.0 {
+            SURE.. => Some(1.0),
+            votes if votes <= -SURE => Some(0.01),
+            _ => None,
+        }
+    }
+}
+
 /// Where messages tell arming.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) enum ToldArming {
@@ -95,11 +124,15 @@ pub(in crate::source::dataflash) struct Facts {
 }
 
 impl Facts {
-    /// The unit of `RATE`, degrees a second; `None` where the version is not known.
+    /// The unit of `RATE`, degrees a second; `None` where the version is not known, and in those that were developed while it changed.
     pub(super) fn rate_unit_deg(&self) -> Option<f32> {
         /// Versions are bytes from the top down.
         const DEGREES_SINCE: u32 = 0x0304_0000;
-        (self.version > 0).then_some(if self.version < DEGREES_SINCE { 0.01 } else { 1.0 })
+        (self.version > 0 && self.version != DEGREES_SINCE).then_some(if self.version < DEGREES_SINCE {
+            0.01
+        } else {
+            1.0
+        })
     }
 }
 
@@ -125,6 +158,9 @@ pub(in crate::source::dataflash) struct State {
     /// Sensors that say that they are not healthy: bits of `MAV_SYS_STATUS_SENSOR`, one set for each instance.
     pub(super) unhealthy: [u32; INSTANCES],
     pub(super) rates: Dated<Rates>,
+    /// The first gyro's rate, rad/s, and what it says of the unit of `RATE`.
+    pub(super) gyro: Dated<f32>,
+    pub(super) rate_unit: RateUnit,
     /// The inertial sensor that felt a shock last, and when.
     pub(super) shaken: Option<(u8, Instant)>,
     /// It logs inertial sensors.

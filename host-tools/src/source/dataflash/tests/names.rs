@@ -129,6 +129,40 @@ fn body_rates_and_those_that_are_wanted_are_in_degrees_since_3_4_and_in_hundredt
     assert_eq!(rates("ArduCopter V3.3.3 (acf2e10c)", 1_000.0), known);
     let unknown = (vec![None; 2], vec![None; 2]);
     assert_eq!(rates("ArduCopter", 10.0), unknown, "nobody knows the unit");
+    assert_eq!(rates("ArduCopter V3.4-dev (acf2e10c)", 10.0), unknown, "it changed in these");
+}
+
+#[test]
+fn the_gyro_tells_the_unit_of_the_rates_where_the_version_does_not() {
+    let last_dps = |firmware: &str, rate: f32, gyro_dps: f32| {
+        let mut log = format!(
+            "{firmware}\n\
+             FMT, 128, 89, FMT, BBnNZ, Type,Length,Name,Format,Columns\n\
+             FMT, 150, 23, ATT, Qccccc, TimeUS,DesRoll,Roll,DesPitch,Pitch,Yaw\n\
+             FMT, 151, 63, RATE, Qfffffffff, TimeUS,RDes,R,ROut,PDes,P,POut,YDes,Y,YOut\n\
+             FMT, 152, 35, IMU, Qffffff, TimeUS,GyrX,GyrY,GyrZ,AccX,AccY,AccZ\n"
+        );
+        for time_us in (0..10_u32).map(|step| 1_000_000 + step * 100_000) {
+            let gyro = gyro_dps.to_radians();
+            let _ = writeln!(log, "IMU, {time_us}, {gyro}, 0, 0, 0, 0, -9.8");
+            let _ = writeln!(log, "RATE, {}, {rate}, {rate}, 0.1, 0, 0, 0.1, 0, 0, 0", time_us + 10_000);
+            let _ = writeln!(log, "ATT, {}, 1.0, 1.0, 2.0, 2.0, 3.0", time_us + 20_000);
+        }
+        let attitudes = seen(log.as_bytes()).find(|observation| match observation {
+            Observation::Attitude(attitude) => {
+                Some(attitude.rates.map(|rates| rates[0].0.to_degrees().round()))
+            }
+            _ => None,
+        });
+        attitudes.last().copied().flatten()
+    };
+    for firmware in ["ArduCopter V3.4-dev (acf2e10c)", "ArduCopter"] {
+        assert_eq!(last_dps(firmware, 3_000.0, 33.0), Some(30.0), "hundredths");
+        assert_eq!(last_dps(firmware, 30.0, 33.0), Some(30.0), "degrees");
+        assert_eq!(last_dps(firmware, 3.0, 3.3), None, "it turns too little to tell");
+        assert_eq!(last_dps(firmware, 30.0, 330.0), None, "neither of them");
+    }
+    assert_eq!(last_dps("ArduCopter V4.6.3 (3fc7011a)", 3_000.0, 33.0), Some(3_000.0), "the version tells");
 }
 
 #[test]

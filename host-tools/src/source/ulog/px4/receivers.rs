@@ -4,6 +4,8 @@
 //! each is an instance of the latter. MAVLink sends the receivers, and says "no receiver" when one falls silent for a
 //! second; in a log, where receivers have one message a second, it takes [`SILENCE`].
 
+use std::num::NonZeroU32;
+
 use hums_core::observation::{Gnss, GnssIntegrity, Observation};
 use hums_core::time::{Instant, Span};
 use hums_core::units::{Metres, MetresPerSecond};
@@ -96,6 +98,8 @@ fn receiver(px4: &mut Px4, said: &Said<'_>) {
         position: position.filter(|_| has_position),
         altitude: altitude.filter(|_| has_position).map(Metres),
         speed: fields.finite(10).filter(|speed| (0.0..655.35).contains(speed)).map(MetresPerSecond),
+        // The receiver's UTC: 0 where it has none.
+        measured_ms: fields.count(11).and_then(|us| NonZeroU32::new((us / 1_000) as u32)),
     }));
     if let Some(heard) = px4.receivers.heard.get_mut(usize::from(said.instance)) {
         *heard = Some(said.at);
