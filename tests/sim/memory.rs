@@ -55,7 +55,8 @@ fn tried(command: &str) -> Tried {
         "info" => lines(&["info IN", "info --json IN", "info --salvage IN"]),
         "verify" => lines(&["verify IN", "verify --json IN"]),
         "check" => lines(&["check IN", "check --json IN"]),
-        "report" => lines(&["report IN -o OUT/page.html"]),
+        "ls" => lines(&["ls IN", "ls --json IN"]),
+        "report" => lines(&["report IN -o OUT/page.html", "report IN -o OUT/pages.html --compare"]),
         "decode" => {
             let name = |format: &Format| format.to_possible_value().unwrap().get_name().to_owned();
             let formats = Format::value_variants().iter().map(name);
@@ -72,6 +73,7 @@ fn tried(command: &str) -> Tried {
         "emulate" => {
             Tried::Nothing("its input comes through what `sim` reads with, and tests/chip measures it")
         }
+        "completions" | "man" => Tried::Nothing("it reads no file"),
         "params" | "pull" | "format" => Tried::Nothing(
             "a line's bytes; what is kept of them has a limit (host-tools/src/talk), and a key 4 KiB",
         ),

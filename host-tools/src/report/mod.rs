@@ -174,13 +174,15 @@ impl Making<'_> {
         let replay = replay::Replay::of(place, overview)?;
         let html = page::html(overview, &replay, &trend, last.as_ref());
         let file = path.file_name().map_or_else(String::new, |file| file.to_string_lossy().into_owned());
-        self.rows.push(index::Row::new(file.clone(), overview, &replay));
-        self.pages.insert(index, file);
         self.parameters = Some((
             index,
             replay.history.last_parameters().map(|(name, value)| (name.to_owned(), value)).collect(),
         ));
-        self.write(&path, &html, &What::Session(&place.name), self.inputs)
+        if self.write(&path, &html, &What::Session(&place.name), self.inputs)? {
+            self.rows.push(index::Row::new(file.clone(), overview, &replay));
+            self.pages.insert(index, file);
+        }
+        Ok(())
     }
 
     /// The recording before of the same airframe: by their times, where both are known, otherwise in their order.
@@ -204,16 +206,17 @@ impl Making<'_> {
         Ok((!values.is_empty()).then(|| page::Before { name: place.name.clone(), values }))
     }
 
-    fn write(&mut self, path: &Path, html: &str, what: &What<'_>, inputs: &Inputs) -> Result<()> {
+    /// Whether it is there now: a page with other content is kept, and told.
+    fn write(&mut self, path: &Path, html: &str, what: &What<'_>, inputs: &Inputs) -> Result<bool> {
         if self.kept.pass(write(path, html, inputs))?.is_none() {
-            return Ok(());
+            return Ok(false);
         }
         let made = PageJson { path: path.to_owned(), session: what.session(), bytes: html.len() as u64 };
         if !self.json {
             output::line(&format!("{}: {what}, {}", shown(path), count(made.bytes, "byte")))?;
         }
         self.made.pages.push(made);
-        Ok(())
+        Ok(true)
     }
 
     /// All sessions have been: the comparisons, and the table of a folder.

@@ -895,12 +895,15 @@ fn two_copies_of_one_session_have_two_pages_and_the_damaged_one_is_not_kept_alon
     for flags in ["", "--replace"] {
         let said = run(dir.path(), &format!("report damaged copied same -o pages/ {flags}"), 3);
         let lines = text(&said);
-        assert_eq!(lines.lines().count(), 2, "{lines}");
+        let (tables, pages): (Vec<_>, Vec<_>) =
+            lines.lines().partition(|line| line.contains("table of 2 pages"));
+        assert_eq!((pages.len(), tables.len()), (2, 1), "{lines}");
         let told = String::from_utf8_lossy(&said.stderr).into_owned();
         assert!(told.contains("is a copy of copied/00001, whose page is written once"), "{told}");
         let mut pages: Vec<String> = fs::read_dir(dir.path().join("pages"))
             .expect("pages")
             .map(|page| page.expect("a page").file_name().to_string_lossy().into_owned())
+            .filter(|name| name != "index.html" && name != "hums-kept")
             .collect();
         pages.sort();
         assert!(pages.len() == 2 && pages[0].ends_with("-2.html"), "{pages:?}");

@@ -73,6 +73,10 @@ fn furnished() -> TempDir {
     fs::create_dir(path("cards")).expect("a directory");
     copy(&path("card.img"), &path("cards/card.img"));
     run(dir.path(), "pack flight.tlog -o 00001_00.HUM", 0);
+    fs::create_dir_all(path("flights/may")).expect("a directory");
+    for copy in ["flights/may/flight.tlog", "flights/june.bin", "before.tlog", "after.tlog"] {
+        fs::copy(px4(), path(copy)).expect("a copy");
+    }
     dir
 }
 

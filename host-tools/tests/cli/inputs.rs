@@ -22,13 +22,13 @@ enum Role {
 /// An argument that is not here fails the test: decide what it names, and the test tries it from then on.
 fn role(arg: &Arg) -> Role {
     match arg.get_id().as_str() {
-        "inputs" | "input" | "gs_input" | "params" | "key" | "firmware" => Role::Input,
+        "inputs" | "input" | "gs_input" | "params" | "key" | "firmware" | "past" => Role::Input,
         "output" | "sd" | "gs" | "tap" | "store" | "dir" | "spool" => Role::Output,
-        "bucket" | "card_out" | "card_size" | "cut_after_writes" | "cut_store_after" | "dashboard"
-        | "format" | "from" | "influx" | "last" | "line_rate" | "link" | "listen" | "listen_token"
-        | "message" | "name" | "names" | "noise" | "org" | "provoke" | "reboot_at_us" | "seed"
-        | "session" | "speed" | "spool_limit" | "stall" | "system" | "to" | "token" | "value"
-        | "write_error" => Role::Other,
+        "around" | "bucket" | "card_out" | "command" | "card_size" | "cut_after_writes"
+        | "cut_store_after" | "dashboard" | "format" | "from" | "influx" | "last" | "line_rate" | "link"
+        | "listen" | "listen_token" | "message" | "name" | "names" | "noise" | "org" | "provoke"
+        | "reboot_at_us" | "seed" | "session" | "shell" | "span" | "speed" | "spool_limit" | "stall"
+        | "system" | "to" | "token" | "value" | "write_error" => Role::Other,
         unknown => panic!("is --{unknown} an input, an output or none? Say so in `role`"),
     }
 }
@@ -44,8 +44,11 @@ const ELSE_REFUSED: [(&str, &str, &str, &str); 2] = [
 ];
 
 /// Commands that have inputs and write no file, or outputs and no input, and why there is no pair to try.
-const NO_PAIRS: [(&str, &str); 8] = [
+const NO_PAIRS: [(&str, &str); 11] = [
     ("check", "prints"),
+    ("ls", "prints"),
+    ("completions", "prints"),
+    ("man", "prints"),
     ("info", "prints"),
     ("verify", "prints"),
     ("format", "talks with a board"),
@@ -59,7 +62,9 @@ const NO_PAIRS: [(&str, &str); 8] = [
 pub(crate) fn value(command: &str, arg: &str) -> &'static str {
     match (command, arg) {
         ("decode" | "report" | "info" | "verify", "inputs") => "log.hum",
-        (_, "input" | "gs_input") => "flight.tlog",
+        ("check" | "ls", "inputs") | (_, "input" | "gs_input") => "flight.tlog",
+        ("check", "past") => "log.hum",
+        ("completions", "shell") => "bash",
         (_, "params") => "hums.param",
         (_, "key") => "key.txt",
         (_, "firmware") => "hums.elf",
@@ -217,7 +222,7 @@ fn results_are_appended_to_no_input() {
         ("check --json -", "flight.tlog"),
         ("live --input - --listen 127.0.0.1:0", "hard-flight.tlog"),
         ("demo --input flight.tlog --dashboard never", "link-flight.tlog"),
-        ("params --link udpout:127.0.0.1:9 --key=hums.param list", "hums.param"),
+        ("params list --link udpout:127.0.0.1:9 --key=hums.param", "hums.param"),
     ] {
         let open = || fs::File::options().append(true).open(dir.path().join(input)).expect("opened");
         let hums = || {
@@ -325,12 +330,16 @@ fn an_output_into_an_input_folder_replaces_nothing_there() {
 }
 
 /// Where files may be made, emptied, renamed or removed besides `files/`, and why.
-const MAY_WRITE: [(&str, &str); 3] = [
+const MAY_WRITE: [(&str, &str); 4] = [
     ("card/image.rs", "a simulated card's image is updated in place, as a card is"),
     ("run/store.rs", "the simulated board's flash is updated in place, as flash is"),
     (
         "live/influx/spool.rs",
         "a queue that outlives the program, in place; it takes a file of its own kind only",
+    ),
+    (
+        "talk/pull/part.rs",
+        "sectors of a log come in any order, each to its place in a file whose name says that it is a part",
     ),
 ];
 

@@ -80,7 +80,8 @@ fn every_object_says_which_one_it_is_and_the_document_has_all_of_its_names() {
 fn a_session_alone_is_what_it_is_among_all() {
     let dir = recorded();
     for seed in 1..=5 {
-        run(dir.path(), &format!("sim --input PX4 --sd card.img --seed {seed} --cut-after-writes 400"), 0);
+        // Where power goes in the flight depends on how small the log is.
+        attempt(dir.path(), &format!("sim --input PX4 --sd card.img --seed {seed} --cut-after-writes 400"));
     }
     let all: Value =
         serde_json::from_slice(&attempt(dir.path(), "info --json card.img").stdout).expect("JSON");

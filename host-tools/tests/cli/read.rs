@@ -396,7 +396,7 @@ fn what_is_no_log_is_told_apart() {
     fs::write(at.join("ArduPilot"), dataflash).expect("written");
     fs::write(at.join("ULog"), &ulog).expect("written");
     // As large as what may be a card without a partition table.
-    fs::write(at.join("large"), [&dataflash[..], &[b'\n'; 3 << 20]].concat()).expect("written");
+    fs::write(at.join("large"), [&dataflash[..], &vec![b'\n'; 3 << 20]].concat()).expect("written");
     for input in ["ArduPilot", "ULog", "large", "PX4"] {
         let output = run(at, &format!("verify {input}"), 1);
         let error = String::from_utf8_lossy(&output.stderr).into_owned();

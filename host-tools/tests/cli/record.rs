@@ -84,10 +84,10 @@ fn a_tcp_server_is_listened_to_until_it_closes() {
 fn parameters_come_from_a_file_and_slips_in_it_are_told() {
     let dir = tempfile::tempdir().expect("directory");
     let params = |text: &str| fs::write(dir.path().join("p.param"), text).expect("written");
-    params("# limits\nGPS_SATS_WARN 30\nVIBE_WARN,25.5\n");
+    params("# limits\nCELL_VOLT_WARN 4.1\nVIBE_WARN,25.5\n");
     let output = run(dir.path(), "sim --input PX4 --sd a.img --params p.param --json", 0);
     let findings = json(&output)["findings"].to_string();
-    assert!(findings.contains("satellites"), "30 satellites are wanted: {findings}");
+    assert!(findings.contains("cell_voltage"), "4.1 V are wanted: {findings}");
     for wrong in ["NO_SUCH_NAME 1", "VIBE_WARN", "VIBE_WARN x", "VIBE_WARN 1e9", "VIBE_WARN 1 2"] {
         params(wrong);
         let output = run(dir.path(), "sim --input PX4 --sd b.img --params p.param", 2);
