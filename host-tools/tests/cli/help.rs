@@ -38,9 +38,9 @@ fn helps(dir: &Path) -> Vec<String> {
         .collect()
 }
 
-/// Whether an example waits for somebody, or takes as long as the flight did.
+/// Whether an example waits for somebody, takes as long as the flight did, or needs a port that another program may have.
 fn waits(example: &str) -> bool {
-    let for_a_link = ["serial:", "tcp:", "192.168."].iter().any(|form| example.contains(form));
+    let for_a_link = ["serial:", "tcp:", "192.168.", "--listen"].iter().any(|form| example.contains(form));
     let live = example.starts_with(SERVES);
     for_a_link || (!live && (example.contains("udpin:") || example.contains("udpout:")))
 }

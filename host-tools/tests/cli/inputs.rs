@@ -61,9 +61,8 @@ const NO_PAIRS: [(&str, &str); 11] = [
 /// A good value for an argument, where one is needed.
 pub(crate) fn value(command: &str, arg: &str) -> &'static str {
     match (command, arg) {
-        ("decode" | "report" | "info" | "verify", "inputs") => "log.hum",
+        ("decode" | "report" | "info" | "verify", "inputs") | ("check", "past") => "log.hum",
         ("check" | "ls", "inputs") | (_, "input" | "gs_input") => "flight.tlog",
-        ("check", "past") => "log.hum",
         ("completions", "shell") => "bash",
         (_, "params") => "hums.param",
         (_, "key") => "key.txt",
