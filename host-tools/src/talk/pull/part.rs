@@ -110,7 +110,7 @@ mod tests {
 
     fn sector(number: u8) -> Sector {
         let mut bytes = [0; SECTOR_BYTES];
-        (bytes[0], bytes[1], bytes[11]) = (b'H', 0xb2, number);
+        (bytes[0], bytes[1], bytes[11]) = (b'H', 0xb0 | hums_blackbox::VERSION, number);
         let mut sector = Sector::from_bytes(bytes);
         sector.seal(7);
         sector
