@@ -347,8 +347,8 @@ mod tests {
     }
 
     #[test]
-    fn the_load_that_is_asked_for_is_some_182_cycles_a_byte() {
-        assert!(load(182.0) <= LOAD_MAX && load(183.0) > LOAD_MAX);
+    fn the_load_that_is_asked_for_is_some_291_cycles_a_byte() {
+        assert!(load(291.0) <= LOAD_MAX && load(292.0) > LOAD_MAX);
     }
 
     #[test]
