@@ -200,23 +200,26 @@ fn cut_short(file: &File, device: &ReadOnlyImage) -> io::Result<Option<String>> 
 
 /// Whether there is a sector of a log here, or the parity of some.
 fn has_part_of_log(path: &Path, extents: Vec<Extent>) -> Result<bool> {
-    let lost = lost(path, extents);
-    let mut blocks = lost.blocks();
-    while let Some(block) = blocks.next_block()? {
-        if Header::read(&block).is_ok() || Parity::read(&block).is_some() {
-            return Ok(true);
-        }
-    }
-    Ok(false)
+    let is_part = |block: &_| (Header::read(block).is_ok() || Parity::read(block).is_some()).then_some(());
+    Ok(first_block(path, extents, is_part)?.is_some())
 }
 
 /// The first sector of a log here.
 fn first_sector(path: &Path, extents: Vec<Extent>) -> Result<Option<Header>> {
+    first_block(path, extents, |block| Header::read(block).ok())
+}
+
+/// What `look` makes of the first block here of which it makes something.
+fn first_block<T>(
+    path: &Path,
+    extents: Vec<Extent>,
+    look: impl Fn(&[u8; BLOCK_BYTES]) -> Option<T>,
+) -> Result<Option<T>> {
     let lost = lost(path, extents);
     let mut blocks = lost.blocks();
     while let Some(block) = blocks.next_block()? {
-        if let Ok(header) = Header::read(&block) {
-            return Ok(Some(header));
+        if let Some(made) = look(&block) {
+            return Ok(Some(made));
         }
     }
     Ok(None)

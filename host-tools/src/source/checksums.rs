@@ -3,7 +3,7 @@
 use hums_core::time::Instant;
 use hums_link::Check;
 
-use super::item::{Cause, Gap};
+use super::item::Gap;
 use crate::mavlink::frame::{Peek, peek};
 use crate::plural::count;
 
@@ -66,15 +66,7 @@ impl Checksums {
     pub fn gap(&self) -> Option<Gap> {
         let (at, place) = self.first?;
         let words = wrong_checksums(self.damaged);
-        Some(Gap {
-            from: Some(at),
-            to: None,
-            cause: Cause::Damaged,
-            place: Some(place),
-            bytes: 0,
-            words,
-            own: None,
-        })
+        Some(Gap::damaged(at, place, words))
     }
 
     /// Those that nobody can check, as a sentence.

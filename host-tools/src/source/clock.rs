@@ -11,7 +11,7 @@
 use hums_core::time::Instant;
 
 use super::doubt::{DISORDER_US, Ends, Question, RUN, Time};
-use super::item::{Cause, Gap};
+use super::item::Gap;
 use super::timeline::{Moment, STEP_BACK_US_MAX, STEP_FORWARD_US_MAX, Timeline};
 use crate::plural::count;
 
@@ -274,15 +274,7 @@ impl Wrong {
         let (at, place) = self.first?;
         let words =
             format!("{} with a wrong time, far from the times around it", count(self.count, "message"));
-        Some(Gap {
-            from: Some(at),
-            to: None,
-            cause: Cause::Damaged,
-            place: Some(place),
-            bytes: 0,
-            words,
-            own: None,
-        })
+        Some(Gap::damaged(at, place, words))
     }
 }
 

@@ -224,6 +224,12 @@ pub struct Gap {
 }
 
 impl Gap {
+    /// What is there from this time and place on is damaged; no byte of it is passed over.
+    pub const fn damaged(at: Instant, place: u64, words: String) -> Self {
+        let (from, place) = (Some(at), Some(place));
+        Self { from, to: None, cause: Cause::Damaged, place, bytes: 0, words, own: None }
+    }
+
     /// As logs of ours have it, which know neither place nor words.
     pub fn to_own(&self) -> hums_blackbox::Gap {
         if let Some(own) = self.own {

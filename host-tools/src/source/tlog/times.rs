@@ -91,15 +91,7 @@ impl Beside {
              clock counts",
             self.passed_us.div_ceil(1_000_000)
         );
-        Some(Gap {
-            from: Some(at),
-            to: None,
-            cause: Cause::Damaged,
-            place: Some(place),
-            bytes: 0,
-            words,
-            own: None,
-        })
+        Some(Gap::damaged(at, place, words))
     }
 }
 
