@@ -29,14 +29,15 @@ pub(crate) struct Database {
 }
 
 impl Database {
-    /// Starts one.
+    /// Starts one. Its port is another one when a program took the first between the look and the start.
     pub(crate) fn start(kind: Kind) -> Self {
         let folder = tempfile::tempdir().unwrap();
         let mut database = Self { kind, folder, port: free_port(), running: None };
-        if kind == Kind::Influx {
-            fs::write(database.config(), database.configuration()).unwrap();
+        let start = Instant::now();
+        while !database.runs() {
+            assert!(start.elapsed() < START, "{kind:?} does not start");
+            database.port = free_port();
         }
-        database.again();
         database
     }
 
@@ -45,36 +46,51 @@ impl Database {
     }
 
     fn configuration(&self) -> String {
-        let (folder, port, other) = (self.folder.path().display(), self.port, free_port());
+        let (folder, port) = (self.folder.path().display(), self.port);
         format!(
-            "reporting-disabled = true\nbind-address = \"127.0.0.1:{other}\"\n[meta]\ndir = \"{folder}/meta\"\n\
+            "reporting-disabled = true\nbind-address = \"127.0.0.1:0\"\n[meta]\ndir = \"{folder}/meta\"\n\
              [data]\ndir = \"{folder}/data\"\nwal-dir = \"{folder}/wal\"\nquery-log-enabled = false\n\
              [http]\nbind-address = \"127.0.0.1:{port}\"\nlog-enabled = false\nmax-row-limit = 0\n\
              [monitor]\nstore-enabled = false\n"
         )
     }
 
-    /// Starts it with what it has.
+    /// Starts it with what it has, at the port that it had.
     pub(crate) fn again(&mut self) {
+        let start = Instant::now();
+        while !self.runs() {
+            assert!(start.elapsed() < START, "{:?} does not start again", self.kind);
+        }
+    }
+
+    /// Starts the program and waits until it answers; false if the program ends before it does.
+    fn runs(&mut self) -> bool {
         let mut command = match self.kind {
             Kind::Influx => Command::new(program("HUMS_INFLUXD", "/usr/bin/influxd")),
             Kind::Victoria => Command::new(program("HUMS_VICTORIA", "/usr/bin/victoria-metrics")),
         };
         match self.kind {
-            Kind::Influx => command.arg("run").arg("-config").arg(self.config()),
+            Kind::Influx => {
+                fs::write(self.config(), self.configuration()).unwrap();
+                command.arg("run").arg("-config").arg(self.config())
+            }
             Kind::Victoria => command
                 .arg(format!("-httpListenAddr=127.0.0.1:{}", self.port))
                 .arg(format!("-storageDataPath={}", self.folder.path().display()))
                 .arg("-retentionPeriod=100y"),
         };
-        let child = command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
-        self.running = Some(Running(child));
+        let mut running = Running(command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap());
         let start = Instant::now();
         let path = if self.kind == Kind::Influx { "/ping" } else { "/health" };
-        while !self.get(path).is_ok_and(|(code, _)| code / 100 == 2) {
-            assert!(start.elapsed() < START, "{:?} does not start", self.kind);
+        while running.0.try_wait().unwrap().is_none() {
+            if self.get(path).is_ok_and(|(code, _)| code / 100 == 2) {
+                self.running = Some(running);
+                return true;
+            }
+            assert!(start.elapsed() < START, "{:?} does not answer", self.kind);
             std::thread::sleep(Duration::from_millis(50));
         }
+        false
     }
 
     /// Ends it: `InfluxDB` at once, as power would; `VictoriaMetrics` in order, because it holds what it has accepted
