@@ -76,7 +76,7 @@ def point(driver, plot, part, time_range):
     over = plot.find_element("css selector", ".u-over")
     width = over.rect["width"]
     offset = round(width * (part - 0.5))
-    ActionChains(driver).move_to_element_with_offset(over, offset, 10).perform()
+    ActionChains(driver, duration=0).move_to_element_with_offset(over, offset, 10).perform()
     values = {}
     for key in plot.find_elements("css selector", ".keys button"):
         value = key.find_element("tag name", "b").text

@@ -110,15 +110,16 @@ fn assert_bounded_but(input: &Path, empty: u64, is_left_out: impl Fn(&str) -> bo
 /// `hums live`, until it has read all, or refuses the input.
 fn assert_live_bounded(log: &Path, empty: u64) {
     let Some(live) = Live::attempt(&["--input", log.to_str().unwrap()]) else { return };
-    let mut before = (-1.0, 0);
+    let (mut before, mut quiet) = (0.0, 0);
     let most = loop {
+        thread::sleep(Duration::from_millis(300));
         let (seconds, _, most) = live.program.cost().expect("it runs");
         // It publishes ten times a second once it plays, which takes next to nothing.
-        if seconds - before.0 < 0.1 && seconds > 0.1 {
+        quiet = if seconds - before < 0.06 { quiet + 1 } else { 0 };
+        before = seconds;
+        if quiet == 4 {
             break most;
         }
-        before = (seconds, most);
-        thread::sleep(Duration::from_millis(500));
     };
     assert_bounded(&format!("live of {}", log.display()), most, empty);
 }
