@@ -131,12 +131,12 @@ fn name(flight: &Path) -> String {
 
 fn sizes(flights: &[PathBuf]) -> Result<()> {
     println!("\nSizes\n");
-    Shell::cargo()
+    let logs = Shell::cargo()
         .args(["run", "--quiet", "--release", "-p", "hums-blackbox", "--example", "sizes", "--"])
         .args(flights)
         .run()
-        .context("a size misses its target, or xz is missing")?;
-    sizes_of_sessions(flights)
+        .context("a size misses its target, or xz is missing");
+    sizes_of_sessions(flights).and(logs)
 }
 
 /// What whole sessions take: with every finding, snapshot, counter and statistic that the monitor makes of a recording.
@@ -186,6 +186,8 @@ fn speed(flights: &[PathBuf]) -> Result<()> {
         let (log, zipped) = (folder.join("flight.hum"), folder.join("flight.tlog.gz"));
         let tlog = folder.join("long.tlog");
         repeat(flight, DECODED_MIN, &tlog)?;
+        // `pack` replaces nothing that is there.
+        let _ = fs::remove_file(&log);
         let done = Command::new(&program).arg("pack").arg(&tlog).arg("-o").arg(&log).output()?;
         if !log.is_file() || !done.status.success() {
             bail!("hums pack {}: {}", flight.display(), String::from_utf8_lossy(&done.stderr));
