@@ -13,6 +13,7 @@
 //! to this module.
 
 mod aside;
+mod descriptor;
 mod ends;
 mod folder;
 mod identity;
@@ -24,15 +25,16 @@ mod short;
 mod stamp;
 mod there;
 
+pub use descriptor::{
+    Opened, STANDARD_ERROR, STANDARD_INPUT, STANDARD_OUTPUT, check_standard_output_is_open, descriptor,
+    means_standard_output, written_over,
+};
 pub use ends::{add_ends, digest, short};
 pub use folder::{Folder, FolderFile, buffered};
-pub use identity::{
-    FileId, check_standard_output, check_standard_output_is_not_named, check_standard_output_is_open,
-    is_standard_error_named, means_standard_output,
-};
+pub use identity::FileId;
 pub use inputs::Inputs;
-pub use output::Output;
-pub use part::{InPlacePart, lock_in_place, make_in_place};
+pub use output::{Begun, Output};
+pub use part::{lock_in_place, make_in_place, take_turn};
 pub use paths::{
     PART, appended, cannot_write, check_parent, inside, is_seekable, make_directory, make_parent,
     remove_if_empty, says_directory, settle, why_unread,

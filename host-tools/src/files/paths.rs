@@ -8,8 +8,9 @@ use anyhow::{Context as _, Result, bail};
 
 use sha2::{Digest as _, Sha256};
 
+use super::descriptor::descriptor;
 use super::ends::short;
-use super::identity::{folded, leads_to, without_links};
+use super::identity::{FileId, folded, without_links};
 use crate::outcome::usage;
 
 /// How the name of a file or a folder ends that is not whole yet.
@@ -57,6 +58,15 @@ pub(super) fn target_of(path: &Path) -> Result<PathBuf> {
         path.display(),
         target.display()
     )))
+}
+
+/// Whether what a path leads to is what lies at `target`, which is [`without_links`] of it. What nothing is at yet may be made
+/// there, and what is neither a file nor a folder is written as it is.
+fn leads_to(path: &Path, target: &Path) -> bool {
+    let Ok(about) = fs::metadata(path) else { return true };
+    let is_ours = descriptor(path).is_some() && !about.is_dir();
+    let is_kept = about.is_file() || about.is_dir();
+    is_ours || !is_kept || FileId::of(path).ok() == FileId::of(target).ok()
 }
 
 fn beside(target: &Path, what: &str, number: u32) -> Result<PathBuf> {

@@ -7,9 +7,9 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result, anyhow, bail};
 
-use super::format::{KNOWN, detect, format_of, hint, is_recording, start_of};
+use super::format::{Format, KNOWN, detect, format_of, hint, is_recording, start_of};
 use super::recording::{Place, of_one_vehicle};
-use crate::files::{FileId, Inputs, why_unread};
+use crate::files::{FileId, why_unread};
 use crate::logs::find::{Image, REMARKS_MAX, check_seekable};
 use crate::logs::sessions::Sessions;
 use crate::logs::{self, Content, segment_name};
@@ -175,8 +175,6 @@ pub fn find(inputs: &[PathBuf], salvage: bool) -> Result<Found> {
         }
     }
     make_names_unique(&mut found.places);
-    // What a command prints is not to stand in what it reads (`>> FILE`).
-    Inputs::of(found.paths()).refuse_standard_output()?;
     Ok(found)
 }
 
@@ -232,6 +230,32 @@ fn is_own(path: &Path) -> Result<bool> {
         Content::Image => !is_recording(path),
         Content::Mavlink | Content::Empty | Content::Other => false,
     })
+}
+
+/// What a file that lies at `content` is, by its first bytes; none where that is not known.
+pub fn kind_of(content: &Path) -> Option<Format> {
+    match logs::find::look(content) {
+        Ok(Content::Log) => Some(Format::Hums),
+        _ => format_of(&start_of(content)),
+    }
+}
+
+/// Whether the file of this path is what this program reads or keeps, by its name, or by its content, which lies at `content`: a
+/// recording, a card, an archive of such, what waits for a database. A damaged one may have nothing but its name.
+pub fn is_data(path: &Path, content: &Path) -> bool {
+    let is_named =
+        || logs::is_named_as_log(path) || logs::is_named_as_card(path) || is_named_as_recording(path);
+    let is_known = || {
+        let start = start_of(content);
+        detect(&start).is_some() || hint(&start).is_some()
+    };
+    let is_ours = || match logs::find::look(content) {
+        Ok(Content::Log | Content::Unread(_) | Content::Mavlink) => true,
+        // A large file of anything may be one.
+        Ok(Content::Image) => logs::is_card(content).unwrap_or(false),
+        Ok(Content::Empty | Content::Other) | Err(_) => false,
+    };
+    why_unread(path).is_some() || is_named() || is_known() || is_ours()
 }
 
 /// Why no log of ours was found, for a command that reads nothing else: a recording of another kind that was named is told as that.

@@ -203,49 +203,6 @@ fn a_demo_into_the_folder_of_its_input_changes_nothing() {
 }
 
 #[test]
-fn results_are_appended_to_no_input() {
-    let dir = furnished();
-    let before = contents(dir.path());
-    for (line, input) in [
-        ("info flight.tlog", "flight.tlog"),
-        ("check folder", "folder/flight.tlog"),
-        ("check --json flight.tlog", "flight.tlog"),
-        ("check --json nosuch.tlog folder", "folder/flight.tlog"),
-        ("verify log.hum", "log.hum"),
-        ("decode log.hum -o new --format tlog", "link-log.hum"),
-        ("report log.hum -o new.html", "hard-log.hum"),
-        ("pack flight.tlog -o new.hum", "flight.tlog"),
-        ("sim --input flight.tlog --sd new.img", "flight.tlog"),
-        ("sim --input flight.tlog --params hums.param --sd new.img", "hums.param"),
-        ("check flight.tlog --params hums.param", "hums.param"),
-        ("check --json -", "flight.tlog"),
-        ("live --input - --listen 127.0.0.1:0", "hard-flight.tlog"),
-        ("demo --input flight.tlog --dashboard never", "link-flight.tlog"),
-        ("params list --link udpout:127.0.0.1:9 --key=hums.param", "hums.param"),
-    ] {
-        let open = || fs::File::options().append(true).open(dir.path().join(input)).expect("opened");
-        let hums = || {
-            let mut hums = std::process::Command::new(env!("CARGO_BIN_EXE_hums"));
-            hums.args(line.split(' ')).current_dir(dir.path());
-            if line.contains(" -") && line.split(' ').any(|word| word == "-") {
-                hums.stdin(fs::File::open(dir.path().join("flight.tlog")).expect("opened"));
-            }
-            hums
-        };
-        if line.split(' ').any(|word| word == input) {
-            let ended = hums().stderr(open()).output().expect("it runs");
-            assert_eq!(ended.status.code(), Some(2), "{line} 2>>");
-            assert!(contents(dir.path()) == before, "{line} 2>> changed something");
-        }
-        let ended = hums().stdout(open()).output().expect("it runs");
-        let said = String::from_utf8_lossy(&ended.stderr);
-        assert_eq!(ended.status.code(), Some(2), "{line}: {said}");
-        assert!(said.contains("standard output: goes into"), "{line}: {said}");
-        assert!(contents(dir.path()) == before, "{line} changed something");
-    }
-}
-
-#[test]
 fn a_cards_image_is_written_over_by_no_format() {
     let dir = recorded();
     let at = dir.path();

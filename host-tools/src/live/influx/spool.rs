@@ -27,8 +27,8 @@ use super::batch::Batch;
 use super::target::Database;
 use crate::files::PART;
 use crate::plural::are;
+use crate::source::format::SPOOL_MAGIC as MAGIC;
 
-const MAGIC: &[u8; 8] = b"HUMSPOOL";
 const VERSION: u32 = 2;
 const HEADER_BYTES: u64 = 512;
 /// Where the database's address begins.

@@ -1,0 +1,73 @@
+//! Where standard output and standard error may lead. A shell sends them anywhere (`>> FILE`, `2>> FILE`, `1<> FILE`), and what
+//! is said there is not to spoil what somebody has. Refused is, whatever the command, a stream that goes
+//! 1. over bytes that are there (`1<>`),
+//! 2. into a file that the command line names, or that is standard input,
+//! 3. behind a recording, a card, or what this program makes of one, wherever that lies: in a folder that is named, too.
+//!
+//! This is checked once, before anything is said, and nothing else is done then. What a command makes on standard output itself
+//! (`-o -`) may follow a recording of its own kind: `hums decode a.hum -o - --format tlog >> all.tlog`.
+
+use std::ffi::OsString;
+use std::path::Path;
+
+use crate::decode::naming::is_made;
+use crate::files::{
+    FileId, Folder, Opened, STANDARD_ERROR, STANDARD_INPUT, STANDARD_OUTPUT, descriptor, written_over,
+};
+use crate::source::find::{is_data, kind_of};
+use crate::source::format::Format;
+
+/// Refuses what standard output leads to; the words are for standard error. `made` is what the command makes there.
+pub fn check_output(words: &[OsString], made: Option<Format>) -> Result<(), String> {
+    check(STANDARD_OUTPUT, words, made).map_err(|why| format!("standard output: {why}"))
+}
+
+/// Refuses what standard error leads to: then nothing may be said there.
+pub fn check_error(words: &[OsString]) -> Result<(), String> {
+    check(STANDARD_ERROR, words, None).map_err(|why| format!("standard error: {why}"))
+}
+
+fn check(number: u32, words: &[OsString], made: Option<Format>) -> Result<(), String> {
+    let Some(opened) = Opened::of(number) else { return Ok(()) };
+    if opened.is_written_over() {
+        return Err(written_over(&opened));
+    }
+    let why = match opened.id().and_then(|id| named(&id, words)) {
+        Some(word) => format!("goes into {word}, which this command line names"),
+        None if opened.is_empty() || !is_kept(&opened, made) => return Ok(()),
+        None => {
+            let path = opened.path();
+            format!("goes into {}, which holds a recording, or what hums makes of one", path.display())
+        }
+    };
+    Err(format!("{why}; nothing was written; send it elsewhere"))
+}
+
+/// The word of a command line, or standard input, that is this file. A word that means the stream itself (`-o /dev/stdout`)
+/// is none.
+fn named(stream: &FileId, words: &[OsString]) -> Option<String> {
+    let is_it = |word: &&str| {
+        let path = Path::new(*word);
+        let is_stream = matches!(descriptor(path), Some(STANDARD_OUTPUT | STANDARD_ERROR));
+        !is_stream && FileId::of(path).is_ok_and(|id| id == *stream)
+    };
+    let values = words.iter().filter_map(|word| word.to_str()).flat_map(spellings);
+    let word = values.into_iter().flatten().find(is_it).map(str::to_owned);
+    let is_input = || Opened::of(STANDARD_INPUT).and_then(|input| input.id()).is_some_and(|id| id == *stream);
+    word.or_else(|| is_input().then(|| "standard input".to_owned()))
+}
+
+/// What a word may name: itself, `--flag=VALUE`, `-fVALUE`.
+fn spellings(word: &str) -> [Option<&str>; 3] {
+    let behind_flag = word.strip_prefix('-').and_then(|flag| flag.get(1..)).filter(|value| !value.is_empty());
+    [Some(word), word.split_once('=').map(|(_, value)| value), behind_flag]
+}
+
+/// Whether words behind what is in it would spoil it.
+fn is_kept(opened: &Opened, made: Option<Format>) -> bool {
+    let (path, content) = (opened.path(), opened.content());
+    let goes_on = made.is_some() && kind_of(&content) == made;
+    // Tables lie in a folder that is ours.
+    let is_table = || path.parent().is_some_and(|folder| Folder::made_of(folder).is_some());
+    !goes_on && (is_data(&path, &content) || is_made(&path) || is_table())
+}
