@@ -25,6 +25,7 @@ mod short;
 mod stamp;
 mod there;
 
+pub use aside::remake_in_place;
 pub use descriptor::{
     Opened, STANDARD_ERROR, STANDARD_INPUT, STANDARD_OUTPUT, check_standard_output_is_open, descriptor,
     means_standard_output, written_over,

@@ -47,13 +47,22 @@ pub fn lock_in_place(file: &File, path: &Path) -> Result<()> {
 /// that is killed before leaves nothing of this name.
 pub fn make_in_place(path: &Path, fill: impl FnOnce(&File) -> Result<()>) -> Result<File> {
     let target = target_of(path)?;
-    let beginning = lock_folder_of(&target);
-    let part = free_part(&target, path)?;
+    fill_part(&target, fill, |part| rename_new(part, &target))
+}
+
+/// The same, where `place` gives the part its name.
+pub(super) fn fill_part(
+    target: &Path,
+    fill: impl FnOnce(&File) -> Result<()>,
+    place: impl FnOnce(&Path) -> io::Result<()>,
+) -> Result<File> {
+    let beginning = lock_folder_of(target);
+    let part = free_part(target, target)?;
     let file = File::options().read(true).write(true).create_new(true).open(&part);
-    let file = file.with_context(|| cannot_write(path))?;
-    lock(&file, path)?;
+    let file = file.with_context(|| cannot_write(target))?;
+    lock(&file, target)?;
     drop(beginning);
-    let made = fill(&file).and_then(|()| rename_new(&part, &target).with_context(|| cannot_write(path)));
+    let made = fill(&file).and_then(|()| place(&part).with_context(|| cannot_write(target)));
     if !cfg!(unix) {
         // As `lock_in_place` has it.
         let _ = file.unlock();

@@ -6,7 +6,7 @@ use std::path::Path;
 use clap::{Arg, ArgAction, CommandFactory as _};
 use hums::cli::Cli;
 
-use crate::support::{Stamp, attempt, contents, furnished, px4, recorded, run, stamps};
+use crate::support::{Stamp, attempt, contents, furnished, px4, recorded, run, stamps, text};
 
 /// What an argument names.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -199,6 +199,22 @@ fn a_demo_into_the_folder_of_its_input_changes_nothing() {
         let said = String::from_utf8_lossy(&ended.stderr);
         assert!(matches!(ended.status.code(), Some(1 | 2)), "{line}: {said}");
         assert!(contents(&folder) == before, "{line}: {said}");
+    }
+}
+
+/// The table of a folder's pages has a name of its own, which may be a link.
+#[test]
+fn a_page_that_would_go_into_an_input_is_refused_before_any_other_is_written() {
+    let dir = furnished();
+    let pages = dir.path().join("pages");
+    fs::create_dir(&pages).expect("made");
+    std::os::unix::fs::symlink("../log.hum", pages.join("index.html")).expect("a link");
+    let before = contents(dir.path());
+    for flag in ["", "--replace", "--compare"] {
+        let ended = run(dir.path(), &format!("report log.hum -o pages {flag}"), 2);
+        let said = String::from_utf8_lossy(&ended.stderr);
+        assert!(said.contains("index.html: is an input of this command"), "{said}");
+        assert!(contents(dir.path()) == before && text(&ended).is_empty(), "{flag}: {said}");
     }
 }
 
