@@ -2,7 +2,7 @@
 //! is said there is not to spoil what somebody has. Refused is, whatever the command, a stream that goes
 //! 1. over bytes that are there (`1<>`),
 //! 2. into a file that the command line names, or that is standard input,
-//! 3. behind a recording, a card, or what this program makes of one, wherever that lies: in a folder that is named, too.
+//! 3. behind a recording, what this program made of one, or what is no text, wherever that lies: in a folder that is named, too.
 //!
 //! This is checked once, before anything is said, and nothing else is done then. What a command makes on standard output itself
 //! (`-o -`) may follow a recording of its own kind: `hums decode a.hum -o - --format tlog >> all.tlog`.
@@ -14,7 +14,7 @@ use crate::decode::naming::is_made;
 use crate::files::{
     FileId, Folder, Opened, STANDARD_ERROR, STANDARD_INPUT, STANDARD_OUTPUT, descriptor, written_over,
 };
-use crate::source::find::{is_data, kind_of};
+use crate::source::find::{is_no_text, kind_of};
 use crate::source::format::Format;
 
 /// Refuses what standard output leads to; the words are for standard error. `made` is what the command makes there.
@@ -37,7 +37,10 @@ fn check(number: u32, words: &[OsString], made: Option<Format>) -> Result<(), St
         None if opened.is_empty() || !is_kept(&opened, made) => return Ok(()),
         None => {
             let path = opened.path();
-            format!("goes into {}, which holds a recording, or what hums makes of one", path.display())
+            format!(
+                "goes into {}, which is a recording, is what hums made of one, or is no text",
+                path.display()
+            )
         }
     };
     Err(format!("{why}; nothing was written; send it elsewhere"))
@@ -69,5 +72,5 @@ fn is_kept(opened: &Opened, made: Option<Format>) -> bool {
     let goes_on = made.is_some() && kind_of(&content) == made;
     // Tables lie in a folder that is ours.
     let is_table = || path.parent().is_some_and(|folder| Folder::made_of(folder).is_some());
-    !goes_on && (is_data(&path, &content) || is_made(&path) || is_table())
+    !goes_on && (is_no_text(&path, &content) || is_made(&path) || is_table())
 }

@@ -2,12 +2,13 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
+use std::io::Read as _;
 use std::mem;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result, anyhow, bail};
 
-use super::format::{Format, KNOWN, detect, format_of, hint, is_recording, start_of};
+use super::format::{Format, KNOWN, LOOK_BYTES, detect, format_of, hint, is_recording, start_of};
 use super::recording::{Place, of_one_vehicle};
 use crate::files::{FileId, why_unread};
 use crate::logs::find::{Image, REMARKS_MAX, check_seekable};
@@ -240,22 +241,17 @@ pub fn kind_of(content: &Path) -> Option<Format> {
     }
 }
 
-/// Whether the file of this path is what this program reads or keeps, by its name, or by its content, which lies at `content`: a
-/// recording, a card, an archive of such, what waits for a database. A damaged one may have nothing but its name.
-pub fn is_data(path: &Path, content: &Path) -> bool {
-    let is_named =
-        || logs::is_named_as_log(path) || logs::is_named_as_card(path) || is_named_as_recording(path);
-    let is_known = || {
-        let start = start_of(content);
-        detect(&start).is_some() || hint(&start).is_some()
+/// Whether words that are appended to the file of this path, whose content lies at `content`, would spoil a recording or a card, or
+/// are in a file that is no text at all. A damaged one may have nothing but its name.
+pub fn is_no_text(path: &Path, content: &Path) -> bool {
+    let is_named = logs::is_named_as_log(path) || logs::is_named_as_card(path) || is_named_as_recording(path);
+    let is_binary = || {
+        let mut start = Vec::new();
+        let read =
+            fs::File::open(content).and_then(|file| file.take(LOOK_BYTES as u64).read_to_end(&mut start));
+        read.is_ok() && start.contains(&0)
     };
-    let is_ours = || match logs::find::look(content) {
-        Ok(Content::Log | Content::Unread(_) | Content::Mavlink) => true,
-        // A large file of anything may be one.
-        Ok(Content::Image) => logs::is_card(content).unwrap_or(false),
-        Ok(Content::Empty | Content::Other) | Err(_) => false,
-    };
-    why_unread(path).is_some() || is_named() || is_known() || is_ours()
+    is_named || why_unread(path).is_some() || is_binary() || is_recording(content)
 }
 
 /// Why no log of ours was found, for a command that reads nothing else: a recording of another kind that was named is told as that.

@@ -43,9 +43,11 @@ impl Place {
         }
         std::os::unix::fs::symlink(format!("out/{name}"), at("tables")).expect("a link");
         fs::copy(at("flight.tlog"), at("folder/NAME.HUM")).expect("a copy");
+        let session = contents(&at("out")).into_iter().find(|(name, _)| name.ends_with("ATTITUDE.parquet"));
+        fs::write(at("part.parquet.mine"), session.expect("a table").1).expect("written");
         // Damaged from its beginning on: only its name says what it is.
         fs::write(at("folder/bad.ulg"), [7; 5_000]).expect("written");
-        fs::write(at("spool"), b"HUMSPOOL and what waits").expect("written");
+        fs::write(at("spool"), b"HUMSPOOL\x02\0\0\0 and what waits").expect("written");
         fs::write(at("there"), "what was there").expect("written");
         let before = stamps(dir.path());
         Self { dir, before }
@@ -102,6 +104,7 @@ fn nothing_that_is_said_goes_behind_a_recording_or_what_is_made_of_one_wherever_
         "folder/bad.ulg",
         "card.img",
         "store.bin",
+        "part.parquet.mine",
         "spool",
         "made.tlog",
         "made.jsonl",
