@@ -83,10 +83,12 @@ fn are_streams_safe(words: &[OsString], cli: Option<&Cli>) -> bool {
     match (streams::check_error(words), output) {
         (Ok(()), Ok(())) => return true,
         (Ok(()), Err(why)) => note!("{why}"),
-        // A reader that has gone changes nothing.
-        (Err(why), Ok(())) => drop(output::line(&format!("hums: {why}"))),
+        // What may follow a recording of its kind there is no word. A reader that has gone changes nothing.
+        (Err(why), _) if streams::check_output(words, None).is_ok() => {
+            drop(output::line(&format!("hums: {why}")));
+        }
         // There is nobody to tell.
-        (Err(_), Err(_)) => {}
+        (Err(_), _) => {}
     }
     false
 }

@@ -7,13 +7,11 @@
 //! This is checked once, before anything is said, and nothing else is done then. What a command makes on standard output itself
 //! (`-o -`) may follow a recording of its own kind: `hums decode a.hum -o - --format tlog >> all.tlog`.
 
-use std::ffi::OsString;
+use std::ffi::{OsStr, OsString};
 use std::path::Path;
 
 use crate::decode::naming::is_made;
-use crate::files::{
-    FileId, Folder, Opened, STANDARD_ERROR, STANDARD_INPUT, STANDARD_OUTPUT, descriptor, written_over,
-};
+use crate::files::{FileId, Folder, Opened, STANDARD_ERROR, STANDARD_INPUT, STANDARD_OUTPUT, descriptor};
 use crate::source::find::{is_no_text, kind_of};
 use crate::source::format::Format;
 
@@ -29,9 +27,7 @@ pub fn check_error(words: &[OsString]) -> Result<(), String> {
 
 fn check(number: u32, words: &[OsString], made: Option<Format>) -> Result<(), String> {
     let Some(opened) = Opened::of(number) else { return Ok(()) };
-    if opened.is_written_over() {
-        return Err(written_over(&opened));
-    }
+    opened.check()?;
     let why = match opened.id().and_then(|id| named(&id, words)) {
         Some(word) => format!("goes into {word}, which this command line names"),
         None if opened.is_empty() || !is_kept(&opened, made) => return Ok(()),
@@ -49,21 +45,24 @@ fn check(number: u32, words: &[OsString], made: Option<Format>) -> Result<(), St
 /// The word of a command line, or standard input, that is this file. A word that means the stream itself (`-o /dev/stdout`)
 /// is none.
 fn named(stream: &FileId, words: &[OsString]) -> Option<String> {
-    let is_it = |word: &&str| {
+    let is_it = |word: &&OsStr| {
         let path = Path::new(*word);
         let is_stream = matches!(descriptor(path), Some(STANDARD_OUTPUT | STANDARD_ERROR));
         !is_stream && FileId::of(path).is_ok_and(|id| id == *stream)
     };
-    let values = words.iter().filter_map(|word| word.to_str()).flat_map(spellings);
-    let word = values.into_iter().flatten().find(is_it).map(str::to_owned);
+    let word = words.iter().flat_map(|word| spellings(word)).flatten().find(is_it);
     let is_input = || Opened::of(STANDARD_INPUT).and_then(|input| input.id()).is_some_and(|id| id == *stream);
-    word.or_else(|| is_input().then(|| "standard input".to_owned()))
+    let name = word.map(|word| word.display().to_string());
+    name.or_else(|| is_input().then(|| "standard input".to_owned()))
 }
 
 /// What a word may name: itself, `--flag=VALUE`, `-fVALUE`.
-fn spellings(word: &str) -> [Option<&str>; 3] {
-    let behind_flag = word.strip_prefix('-').and_then(|flag| flag.get(1..)).filter(|value| !value.is_empty());
-    [Some(word), word.split_once('=').map(|(_, value)| value), behind_flag]
+fn spellings(word: &OsStr) -> [Option<&OsStr>; 3] {
+    let text = word.to_str();
+    let behind_sign = text.and_then(|word| word.split_once('=')).map(|(_, value)| value);
+    let behind_flag =
+        text.and_then(|word| word.strip_prefix('-')?.get(1..)).filter(|value| !value.is_empty());
+    [Some(word), behind_sign.map(OsStr::new), behind_flag.map(OsStr::new)]
 }
 
 /// Whether words behind what is in it would spoil it.

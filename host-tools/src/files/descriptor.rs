@@ -80,14 +80,21 @@ impl Opened {
         self.about.len() == 0
     }
 
-    /// Whether it has bytes where it would be written (`1<>FILE`). What is open to append is written at its end.
-    pub fn is_written_over(&self) -> bool {
+    /// Refuses one that has bytes where it would be written (`1<>FILE`): they are not ours to overwrite. What is open to append
+    /// is written at its end.
+    pub fn check(&self) -> Result<(), String> {
         let open = fs::read_to_string(format!("/proc/self/fdinfo/{}", self.number)).unwrap_or_default();
         let field = |name: &str| open.lines().find_map(|line| line.strip_prefix(name)).map(str::trim);
         let flags = field("flags:").and_then(|flags| u32::from_str_radix(flags, 8).ok());
         // Where the system does not tell, it was opened as shells open a file.
         let at: u64 = field("pos:").and_then(|at| at.parse().ok()).unwrap_or(u64::MAX);
-        !flags.is_some_and(appends) && at < self.about.len()
+        if flags.is_some_and(appends) || at >= self.about.len() {
+            return Ok(());
+        }
+        Err(format!(
+            "goes into {}, which has something in it where it would be written; nothing was written; open it with > or >>",
+            self.path().display()
+        ))
     }
 }
 
@@ -104,22 +111,6 @@ fn appends(flags: u32) -> bool {
 #[cfg(not(target_os = "linux"))]
 const fn appends(_: u32) -> bool {
     true
-}
-
-/// Refuses to write to a file that is open and has bytes where it would be written: it is not ours to overwrite.
-pub(super) fn refuse_overwriting(number: u32) -> Result<()> {
-    match Opened::of(number).filter(Opened::is_written_over) {
-        Some(opened) => Err(usage(format!("descriptor {number}: {}", written_over(&opened)))),
-        None => Ok(()),
-    }
-}
-
-/// What is said of such a file.
-pub fn written_over(opened: &Opened) -> String {
-    format!(
-        "goes into {}, which has something in it where it would be written; nothing was written; open it with > or >>",
-        opened.path().display()
-    )
 }
 
 /// Whether an open file, pipe or terminal is what standard output is.

@@ -1,4 +1,4 @@
-//! The files that commands write. [`Output`] and [`Folder`] are the only things in this program that make, empty or
+//! The files that commands write. [`Output`], [`Folder`] and [`Begun`] are the only things in this program that make, empty or
 //! rename files of the user's. They never touch an input ([`Inputs`]). What is there is never removed or written over: it
 //! stays, or, where the user says `--replace`, it is kept under another name once the new one is whole. What
 //! somebody opened for us (standard output, which `-` means, or `/dev/fd/3`) is written as it is, and never over bytes that
@@ -28,7 +28,7 @@ mod there;
 pub use aside::remake_in_place;
 pub use descriptor::{
     Opened, STANDARD_ERROR, STANDARD_INPUT, STANDARD_OUTPUT, check_standard_output_is_open, descriptor,
-    means_standard_output, written_over,
+    means_standard_output,
 };
 pub use ends::{add_ends, digest, short};
 pub use folder::{Folder, FolderFile, buffered};
@@ -38,7 +38,7 @@ pub use output::{Begun, Output};
 pub use part::{lock_in_place, make_in_place, take_turn};
 pub use paths::{
     PART, appended, cannot_write, check_parent, inside, is_seekable, make_directory, make_parent,
-    remove_if_empty, says_directory, settle, why_unread,
+    says_directory, settle, why_unread,
 };
 pub use short::read_short;
 

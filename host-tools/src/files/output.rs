@@ -8,7 +8,7 @@ use anyhow::{Context as _, Result, bail};
 
 use super::aside::{kept_as, replace, set_aside};
 use super::descriptor::{
-    check_standard_output_is_open, descriptor, is_standard_output, means_standard_output, refuse_overwriting,
+    Opened, check_standard_output_is_open, descriptor, is_standard_output, means_standard_output,
 };
 use super::inputs::Inputs;
 use super::part::{free_part, lock, lock_folder_of, rename_new, sync_folder_of};
@@ -159,12 +159,6 @@ impl Output {
         Ok(aside)
     }
 
-    /// Removes a file that an earlier run made, and that is no input.
-    pub fn remove(path: &Path, inputs: &Inputs) -> Result<()> {
-        inputs.refuse(path)?;
-        fs::remove_file(path).with_context(|| format!("{}: cannot be removed", path.display()))
-    }
-
     fn new(to: To, path: &Path, part: Option<Part>) -> Self {
         Self { to: BufWriter::with_capacity(BUFFER_BYTES, to), path: path.to_owned(), part }
     }
@@ -201,7 +195,10 @@ impl Output {
 
     /// What is no regular file is written as it is. Appending does no harm where it leads to a regular file after all.
     fn direct(path: &Path) -> Result<Self> {
-        descriptor(path).map_or(Ok(()), refuse_overwriting)?;
+        let opened = descriptor(path).and_then(Opened::of);
+        opened
+            .map_or(Ok(()), |opened| opened.check())
+            .map_err(|why| usage(format!("{}: {why}", path.display())))?;
         if is_pipe(path) {
             note!("{}: is a pipe, into which is written once something reads it", path.display());
         }

@@ -114,12 +114,6 @@ pub fn check_parent(path: &Path) -> Result<()> {
     path.parent().map_or(Ok(()), check_directory)
 }
 
-/// Removes a directory, if nothing is in it.
-pub fn remove_if_empty(dir: &Path) {
-    // One with something in it stays.
-    let _ = fs::remove_dir(dir);
-}
-
 /// Makes the directory that a file is to lie in, unless it is there.
 pub fn make_parent(path: &Path) -> Result<()> {
     match path.parent().filter(|dir| !dir.as_os_str().is_empty()) {

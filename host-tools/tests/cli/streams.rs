@@ -187,6 +187,7 @@ fn what_is_said_may_follow_a_text_and_a_recording_may_follow_one_of_its_kind() {
         "hums decode log.hum -o - --format tlog >> all.hum",
         "hums decode log.hum -o - --format jsonl >> all.tlog",
         "hums pack flight.tlog -o - >> all.tlog",
+        "hums pack flight.tlog -o - >> all.hum 2>&1",
         "hums report log.hum -o - >> folder/flight.tlog",
     ] {
         assert_eq!(shell(dir.path(), line).status.code(), Some(2), "{line}");
