@@ -37,8 +37,8 @@ pub use inputs::Inputs;
 pub use output::{Begun, Output};
 pub use part::{lock_in_place, make_in_place, take_turn};
 pub use paths::{
-    PART, appended, cannot_write, check_parent, inside, is_seekable, make_directory, make_parent,
-    says_directory, settle, why_unread,
+    appended, cannot_write, check_parent, inside, is_seekable, make_directory, make_parent, says_directory,
+    settle, why_unread,
 };
 pub use short::read_short;
 

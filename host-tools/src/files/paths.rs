@@ -14,7 +14,7 @@ use super::identity::{FileId, folded, without_links};
 use crate::outcome::usage;
 
 /// How the name of a file or a folder ends that is not whole yet.
-pub const PART: &str = ".hums-part";
+pub(super) const PART: &str = ".hums-part";
 /// The folder of what was replaced.
 pub(super) const KEPT: &str = "hums-kept";
 
