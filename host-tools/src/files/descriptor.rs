@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Result;
 
-use super::identity::{FileId, LINKS_MAX, linked};
+use super::identity::{FileId, LINKS_MAX, is_seekable, linked};
 use crate::outcome::usage;
 
 /// Where the system shows what this process has open.
@@ -46,7 +46,7 @@ pub fn means_standard_output(path: &Path) -> bool {
     path == Path::new("-") || descriptor(path) == Some(STANDARD_OUTPUT)
 }
 
-/// A regular file that somebody opened for this process.
+/// A regular file, or a disk or a card, that somebody opened for this process.
 #[derive(Debug)]
 pub struct Opened {
     number: u32,
@@ -54,9 +54,9 @@ pub struct Opened {
 }
 
 impl Opened {
-    /// What is open under this number, where that is a regular file and the system shows it.
+    /// What is open under this number, where that is such a file and the system shows it.
     pub fn of(number: u32) -> Option<Self> {
-        let about = fs::metadata(shown_at(number)).ok().filter(Metadata::is_file)?;
+        let about = fs::metadata(shown_at(number)).ok().filter(is_seekable)?;
         Some(Self { number, about })
     }
 
@@ -81,8 +81,14 @@ impl Opened {
     }
 
     /// Refuses one that has bytes where it would be written (`1<>FILE`): they are not ours to overwrite. What is open to append
-    /// is written at its end.
+    /// is written at its end, which a disk has not.
     pub fn check(&self) -> Result<(), String> {
+        if !self.about.is_file() {
+            return Err(format!(
+                "goes into {}, which is a disk or a card; nothing was written; send it into a file",
+                self.path().display()
+            ));
+        }
         let open = fs::read_to_string(format!("/proc/self/fdinfo/{}", self.number)).unwrap_or_default();
         let field = |name: &str| open.lines().find_map(|line| line.strip_prefix(name)).map(str::trim);
         let flags = field("flags:").and_then(|flags| u32::from_str_radix(flags, 8).ok());

@@ -1,6 +1,6 @@
 //! Which file a path means, whatever its spelling: links, hard links, `./` and `..` come out alike.
 
-use std::fs;
+use std::fs::{self, Metadata};
 use std::io;
 use std::path::{Component, Path, PathBuf};
 
@@ -104,4 +104,15 @@ pub(super) fn without_links(path: &Path) -> io::Result<PathBuf> {
 pub(super) fn linked(path: &Path) -> io::Result<PathBuf> {
     let to = fs::read_link(path)?;
     Ok(path.parent().unwrap_or(Path::new("")).join(to))
+}
+
+/// Whether it can be read from any place, and has an end: a file, or a raw device such as a card reader's.
+pub fn is_seekable(about: &Metadata) -> bool {
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::FileTypeExt as _;
+        about.is_file() || about.file_type().is_block_device()
+    }
+    #[cfg(not(unix))]
+    about.is_file()
 }

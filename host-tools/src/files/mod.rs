@@ -32,13 +32,13 @@ pub use descriptor::{
 };
 pub use ends::{add_ends, digest, short};
 pub use folder::{Folder, FolderFile, buffered};
-pub use identity::FileId;
+pub use identity::{FileId, is_seekable};
 pub use inputs::Inputs;
 pub use output::{Begun, Output};
 pub use part::{lock_in_place, make_in_place, take_turn};
 pub use paths::{
-    appended, cannot_write, check_parent, inside, is_seekable, make_directory, make_parent, says_directory,
-    settle, why_unread,
+    appended, cannot_write, check_parent, inside, make_directory, make_parent, says_directory, settle,
+    why_unread,
 };
 pub use short::read_short;
 

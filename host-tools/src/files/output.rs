@@ -10,6 +10,7 @@ use super::aside::{kept_as, replace, set_aside};
 use super::descriptor::{
     Opened, check_standard_output_is_open, descriptor, is_standard_output, means_standard_output,
 };
+use super::identity::is_seekable;
 use super::inputs::Inputs;
 use super::part::{free_part, lock, lock_folder_of, rename_new, sync_folder_of};
 use super::paths::{begun_of, cannot_write, settle, target_of};
@@ -422,7 +423,7 @@ fn check(path: &Path, about: &Metadata) -> Result<()> {
     if about.is_dir() {
         return Err(usage(format!("{shown}: is a directory, and a file is to be written; name a file")));
     }
-    if is_block_device(about) {
+    if is_seekable(about) && !about.is_file() {
         return Err(usage(format!("{shown}: is a disk or a card, and hums writes files only; name a file")));
     }
     Ok(())
@@ -437,16 +438,5 @@ fn is_pipe(path: &Path) -> bool {
 
 #[cfg(not(unix))]
 fn is_pipe(_: &Path) -> bool {
-    false
-}
-
-#[cfg(unix)]
-fn is_block_device(about: &Metadata) -> bool {
-    use std::os::unix::fs::FileTypeExt as _;
-    about.file_type().is_block_device()
-}
-
-#[cfg(not(unix))]
-fn is_block_device(_: &Metadata) -> bool {
     false
 }

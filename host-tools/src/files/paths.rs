@@ -1,6 +1,6 @@
 //! Names of output files, and what is said of one that cannot be written.
 
-use std::fs::{self, Metadata};
+use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -137,17 +137,6 @@ pub fn cannot_write(path: &Path) -> String {
 /// An error in terms of the file.
 pub fn settle<T>(result: io::Result<T>, path: &Path) -> Result<T> {
     result.with_context(|| cannot_write(path))
-}
-
-/// Whether it can be read from any place, and has an end: a file, or a raw device such as a card reader's.
-pub fn is_seekable(about: &Metadata) -> bool {
-    #[cfg(unix)]
-    {
-        use std::os::unix::fs::FileTypeExt as _;
-        about.is_file() || about.file_type().is_block_device()
-    }
-    #[cfg(not(unix))]
-    about.is_file()
 }
 
 /// Whether an output is named as a directory: it is one, or its name ends like one.
