@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result, anyhow, bail};
 
-use super::format::{Format, KNOWN, LOOK_BYTES, detect, format_of, hint, is_recording, start_of};
+use super::format::{Format, KNOWN, detect, format_of, hint, is_recording, start_of};
 use super::recording::{Place, of_one_vehicle};
 use crate::files::{FileId, why_unread};
 use crate::logs::find::{Image, REMARKS_MAX, check_seekable};
@@ -245,10 +245,11 @@ pub fn kind_of(content: &Path) -> Option<Format> {
 /// are in a file that is no text at all. A damaged one may have nothing but its name.
 pub fn is_no_text(path: &Path, content: &Path) -> bool {
     let is_named = logs::is_named_as_log(path) || logs::is_named_as_card(path) || is_named_as_recording(path);
+    // Further on, a text may have zeros too: a PC that loses its power leaves such in its logs.
     let is_binary = || {
+        const START_BYTES: u64 = 512;
         let mut start = Vec::new();
-        let read =
-            fs::File::open(content).and_then(|file| file.take(LOOK_BYTES as u64).read_to_end(&mut start));
+        let read = fs::File::open(content).and_then(|file| file.take(START_BYTES).read_to_end(&mut start));
         read.is_ok() && start.contains(&0)
     };
     is_named || why_unread(path).is_some() || is_binary() || is_recording(content)
