@@ -44,6 +44,7 @@ pub mod sink;
 pub mod source;
 pub mod states;
 pub mod statustext;
+pub mod streams;
 pub mod summary;
 pub mod talk;
 pub mod track;
@@ -62,27 +63,34 @@ use outcome::Outcome;
 pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
     interrupt::no_end_by_file_size();
     let arguments: Vec<OsString> = arguments.into_iter().collect();
-    let words = arguments.get(1..).unwrap_or_default();
-    if files::is_standard_error_named(words) {
-        // What is wrong cannot be said without writing into that file.
+    let parsed = Cli::try_parse_from(&arguments);
+    if !are_streams_safe(arguments.get(1..).unwrap_or_default(), parsed.as_ref().ok()) {
         return ExitCode::from(2);
     }
-    match Cli::try_parse_from(&arguments) {
-        Ok(cli) => outcome::exit_code(
-            files::check_standard_output()
-                .and_then(|()| match cli.command {
-                    // Their words are no files.
-                    Command::Completions(_) | Command::Man(_) => Ok(()),
-                    _ => files::check_standard_output_is_not_named(words),
-                })
-                .and_then(|()| command(&cli.command)),
-        ),
+    match parsed {
+        Ok(cli) => outcome::exit_code(command(&cli.command)),
         Err(error) => {
             // Help and version go to standard output and are no failure; a reader that has gone is none either.
             let _ = error.print();
             ExitCode::from(if error.use_stderr() { 2 } else { 0 })
         }
     }
+}
+
+/// Whether standard output and standard error lead to where something may be said. What is wrong is told on the other one.
+fn are_streams_safe(words: &[OsString], cli: Option<&Cli>) -> bool {
+    let output = streams::check_output(words, cli.and_then(|cli| cli.command.on_standard_output()));
+    match (streams::check_error(words), output) {
+        (Ok(()), Ok(())) => return true,
+        (Ok(()), Err(why)) => note!("{why}"),
+        // What may follow a recording of its kind there is no word. A reader that has gone changes nothing.
+        (Err(why), _) if streams::check_output(words, None).is_ok() => {
+            drop(output::line(&format!("hums: {why}")));
+        }
+        // There is nobody to tell.
+        (Err(_), _) => {}
+    }
+    false
 }
 
 fn command(command: &Command) -> anyhow::Result<Outcome> {

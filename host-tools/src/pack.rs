@@ -50,7 +50,6 @@ pub fn run(args: &cli::Pack) -> Result<Outcome> {
     }
     let mut inputs = Inputs::none().replacing(args.replace);
     inputs.add_endpoint(&args.input);
-    inputs.refuse_standard_output()?;
     let source = source::open(&args.input, Timing { line_rate: None })?;
     // Raw bytes have the times that the autopilot tells, as in `check`.
     let mut source: Box<dyn Source> =

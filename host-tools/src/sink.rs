@@ -152,7 +152,6 @@ pub fn open(endpoint: &Endpoint, inputs: &Inputs) -> Result<Ground> {
             Ok(Ground { writer: Beside::file(FLAG, file), heard })
         }
         Endpoint::Standard => {
-            inputs.refuse_standard_output()?;
             check_standard_output_is_open()?;
             let stream = To::Stream(Box::new(BufWriter::new(Stdout::new())));
             Ok(Ground { writer: Beside::new(FLAG, stream), heard })

@@ -11,7 +11,6 @@ use crate::colour::level;
 use crate::ending::{
     BlocksJson, EndJson, PowerOn, SessionBefore, among_words, behind_words, copies_words, made_again_words,
 };
-use crate::files::Inputs;
 use crate::followed::Followed;
 use crate::info::json::images_json;
 use crate::logs::sessions::{Sessions, place};
@@ -30,7 +29,6 @@ const SCHEMA: Schema = Schema::first("hums-verify");
 /// Runs `hums verify`.
 pub fn run(args: &cli::Verify) -> Result<Outcome> {
     let found = logs::find(&args.inputs, args.salvage).map_err(|error| not_ours(&args.inputs, error))?;
-    Inputs::of(found.paths()).refuse_standard_output()?;
     for remark in &found.remarks {
         note!("{remark}");
     }

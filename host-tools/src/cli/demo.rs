@@ -23,6 +23,9 @@ pub struct Demo {
     /// Where to put the card image and what is decoded from it
     #[arg(long, value_name = "DIR", default_value = "hums-demo")]
     pub dir: PathBuf,
+    /// Replace what is there with other content, which is kept in a folder hums-kept beside it
+    #[arg(long)]
+    pub replace: bool,
     /// Whether it ends with the dashboard
     #[arg(long, value_enum, value_name = "WHEN", default_value_t = Dashboard::Auto)]
     pub dashboard: Dashboard,

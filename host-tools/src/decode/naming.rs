@@ -152,7 +152,7 @@ pub fn without_made(inputs: &[PathBuf]) -> (Vec<PathBuf>, Vec<String>) {
 }
 
 /// Whether a file or a folder has a name, or a folder a stamp, as our outputs that are no recordings have.
-fn is_made(path: &Path) -> bool {
+pub fn is_made(path: &Path) -> bool {
     let name = path.file_name().map_or_else(Default::default, |name| name.to_string_lossy());
     if path.is_dir() {
         return Folder::made_of(path).is_some() || name.starts_with("vehicle=");

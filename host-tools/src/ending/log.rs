@@ -61,8 +61,7 @@ impl Ending {
     pub fn aside(&self) -> Option<String> {
         let left_over = || {
             format!(
-                "is left over from before: no file holds it any more; {} can be read, and what is missing was deleted or \
-                 written over",
+                "is in no file: it was deleted, its file lost its name, or newer sessions have written over it; {} can be read",
                 count(self.summary.frames, "frame")
             )
         };

@@ -4,11 +4,13 @@
 //! `hums-kept/2/x.tlog`. The numbers only grow, so that what one run replaces lies together. In a folder of its own it is not
 //! read as a second recording, and its ending still says what it is.
 
-use std::fs;
+use std::fs::{self, File};
 use std::io;
 use std::path::{Path, PathBuf};
 
-use super::part::{rename_new, sync_folder_of};
+use anyhow::Result;
+
+use super::part::{fill_part, rename_new, sync_folder_of};
 use super::paths::KEPT;
 
 /// Keeps what lies at `from` as an earlier `target`, and gives its new path. Nothing is ever written over.
@@ -16,6 +18,12 @@ pub(super) fn set_aside(from: &Path, target: &Path) -> io::Result<PathBuf> {
     let name = target.file_name().ok_or(io::ErrorKind::InvalidInput)?;
     let kept = target.with_file_name(KEPT);
     let mut number = newest(&kept).unwrap_or(1);
+    if fs::metadata(&kept).is_ok_and(|about| !about.is_dir()) {
+        return Err(io::Error::other(format!(
+            "what is replaced is kept in a folder {}, and that is a file; nothing was replaced: move it away or rename it",
+            kept.display()
+        )));
+    }
     loop {
         let folder = kept.join(number.to_string());
         fs::create_dir_all(&folder)?;
@@ -50,6 +58,12 @@ pub(super) fn replace(part: &Path, target: &Path) -> io::Result<()> {
     }
     note!("{}: {}", target.display(), kept_as(&aside));
     Ok(())
+}
+
+/// Makes a file that is updated in place anew: `fill` fills it, and when it is whole it takes the name of the old one, which is
+/// kept or goes. Gives it, locked, for reading and writing.
+pub fn remake_in_place(target: &Path, keep: bool, fill: impl FnOnce(&File) -> Result<()>) -> Result<File> {
+    fill_part(target, fill, |part| if keep { replace(part, target) } else { fs::rename(part, target) })
 }
 
 /// What is said of it.

@@ -6,6 +6,7 @@ use std::path::Path;
 
 use anyhow::Result;
 
+use super::descriptor::{Opened, STANDARD_INPUT};
 use super::identity::FileId;
 use crate::endpoint::Endpoint;
 use crate::outcome::usage;
@@ -77,7 +78,7 @@ impl Inputs {
         match endpoint {
             Endpoint::File(path) => self.add(path),
             Endpoint::Standard => {
-                if let Some(id) = FileId::of_standard_input() {
+                if let Some(id) = Opened::of(STANDARD_INPUT).and_then(|input| input.id()) {
                     self.files.insert(id, "standard input".to_owned());
                 }
             }
@@ -93,17 +94,7 @@ impl Inputs {
         let which =
             if *input == shown.to_string() { String::new() } else { format!(", the same file as {input}") };
         Err(usage(format!(
-            "{shown}: is an input of this command{which}; nothing was written; name another output"
+            "{shown}: is an input of this command{which}, and stays as it is; name another output"
         )))
-    }
-
-    /// Refuses standard output where it leads into an input.
-    pub fn refuse_standard_output(&self) -> Result<()> {
-        match FileId::of_standard_output().and_then(|id| self.files.get(&id)) {
-            Some(input) => {
-                Err(usage(format!("standard output: goes into {input}, an input of this command")))
-            }
-            None => Ok(()),
-        }
     }
 }

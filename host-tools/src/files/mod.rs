@@ -1,4 +1,4 @@
-//! The files that commands write. [`Output`] and [`Folder`] are the only things in this program that make, empty or
+//! The files that commands write. [`Output`], [`Folder`] and [`Begun`] are the only things in this program that make, empty or
 //! rename files of the user's. They never touch an input ([`Inputs`]). What is there is never removed or written over: it
 //! stays, or, where the user says `--replace`, it is kept under another name once the new one is whole. What
 //! somebody opened for us (standard output, which `-` means, or `/dev/fd/3`) is written as it is, and never over bytes that
@@ -13,6 +13,7 @@
 //! to this module.
 
 mod aside;
+mod descriptor;
 mod ends;
 mod folder;
 mod identity;
@@ -24,18 +25,20 @@ mod short;
 mod stamp;
 mod there;
 
+pub use aside::remake_in_place;
+pub use descriptor::{
+    Opened, STANDARD_ERROR, STANDARD_INPUT, STANDARD_OUTPUT, check_standard_output_is_open, descriptor,
+    means_standard_output,
+};
 pub use ends::{add_ends, digest, short};
 pub use folder::{Folder, FolderFile, buffered};
-pub use identity::{
-    FileId, check_standard_output, check_standard_output_is_not_named, check_standard_output_is_open,
-    is_standard_error_named, means_standard_output,
-};
+pub use identity::{FileId, is_seekable};
 pub use inputs::Inputs;
-pub use output::Output;
-pub use part::{InPlacePart, lock_in_place, make_in_place};
+pub use output::{Begun, Output};
+pub use part::{lock_in_place, make_in_place, take_turn};
 pub use paths::{
-    PART, appended, cannot_write, check_parent, inside, is_seekable, make_directory, make_parent,
-    remove_if_empty, says_directory, settle, why_unread,
+    appended, cannot_write, check_parent, inside, make_directory, make_parent, says_directory, settle,
+    why_unread,
 };
 pub use short::read_short;
 

@@ -7,10 +7,10 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context as _, Result, bail};
 
 use super::aside::{kept_as, replace, set_aside};
-use super::identity::{
-    check_standard_output, check_standard_output_is_open, descriptor, is_standard_output,
-    means_standard_output, refuse_overwriting,
+use super::descriptor::{
+    Opened, check_standard_output_is_open, descriptor, is_standard_output, means_standard_output,
 };
+use super::identity::is_seekable;
 use super::inputs::Inputs;
 use super::part::{free_part, lock, lock_folder_of, rename_new, sync_folder_of};
 use super::paths::{begun_of, cannot_write, settle, target_of};
@@ -76,7 +76,7 @@ enum Place {
     /// Nothing, an empty file, or a file that may be replaced.
     Free(Part),
     /// A file with something in it, which stays.
-    Taken,
+    Taken(Part),
     /// No regular file.
     Stream,
 }
@@ -85,13 +85,13 @@ impl Output {
     /// Begins a file, which is none of the inputs. Its folder must be there.
     pub fn create(path: &Path, inputs: &Inputs) -> Result<Self> {
         if means_standard_output(path) {
-            return Self::standard(path, inputs);
+            return Self::standard(path);
         }
         match Part::of(path, inputs)? {
             Place::Free(_) if inputs.is_live() => Self::record(path),
             Place::Free(part) => Self::begin(path, part),
-            Place::Taken if inputs.is_live() => Err(Differs::at_all(path).into()),
-            Place::Taken => {
+            Place::Taken(_) if inputs.is_live() => Err(Differs::at_all(path).into()),
+            Place::Taken(_) => {
                 let there =
                     There::open(path, 0).with_context(|| format!("{}: cannot be read", path.display()));
                 Ok(Self::new(To::There(there?), path, None))
@@ -104,10 +104,10 @@ impl Output {
     /// comparing would come too late.
     pub fn check_new(path: &Path, inputs: &Inputs) -> Result<()> {
         if means_standard_output(path) {
-            return inputs.refuse_standard_output();
+            return Ok(());
         }
         match Part::of(path, inputs)? {
-            Place::Taken => Err(Differs::at_all(path).into()),
+            Place::Taken(_) => Err(Differs::at_all(path).into()),
             Place::Free(_) | Place::Stream => Ok(()),
         }
     }
@@ -116,7 +116,7 @@ impl Output {
     /// `--replace` it may be [kept](Self::keep).
     pub fn check_none(path: &Path, inputs: &Inputs) -> Result<()> {
         match Part::of(path, inputs)? {
-            Place::Taken => Err(Differs::new(path).into()),
+            Place::Taken(_) => Err(Differs::new(path).into()),
             Place::Free(_) | Place::Stream => Ok(()),
         }
     }
@@ -160,12 +160,6 @@ impl Output {
         Ok(aside)
     }
 
-    /// Removes a file that an earlier run made, and that is no input.
-    pub fn remove(path: &Path, inputs: &Inputs) -> Result<()> {
-        inputs.refuse(path)?;
-        fs::remove_file(path).with_context(|| format!("{}: cannot be removed", path.display()))
-    }
-
     fn new(to: To, path: &Path, part: Option<Part>) -> Self {
         Self { to: BufWriter::with_capacity(BUFFER_BYTES, to), path: path.to_owned(), part }
     }
@@ -193,9 +187,7 @@ impl Output {
         Ok(Self::new(To::File(file), path, Some(part)))
     }
 
-    fn standard(path: &Path, inputs: &Inputs) -> Result<Self> {
-        inputs.refuse_standard_output()?;
-        check_standard_output()?;
+    fn standard(path: &Path) -> Result<Self> {
         check_standard_output_is_open()?;
         // The results that the command prints are not to stand in what it makes.
         crate::output::leave_standard_output();
@@ -204,7 +196,10 @@ impl Output {
 
     /// What is no regular file is written as it is. Appending does no harm where it leads to a regular file after all.
     fn direct(path: &Path) -> Result<Self> {
-        descriptor(path).map_or(Ok(()), refuse_overwriting)?;
+        let opened = descriptor(path).and_then(Opened::of);
+        opened
+            .map_or(Ok(()), |opened| opened.check())
+            .map_err(|why| usage(format!("{}: {why}", path.display())))?;
         if is_pipe(path) {
             note!("{}: is a pipe, into which is written once something reads it", path.display());
         }
@@ -269,6 +264,53 @@ impl Output {
     }
 }
 
+/// A file that other commands make, under the name of a part: a card on which a demo records. It gets its own name once it is
+/// whole, by the rules of [`Output`].
+#[derive(Debug)]
+pub struct Begun(Part);
+
+impl Begun {
+    /// Finds a name for the part that nothing has. The file is none of the inputs.
+    pub fn of(path: &Path, inputs: &Inputs) -> Result<Self> {
+        match Part::of(path, inputs)? {
+            Place::Free(mut part) | Place::Taken(mut part) => {
+                part.path = free_part(&part.target, path)?;
+                Ok(Self(part))
+            }
+            Place::Stream => bail!("{}: is no regular file; name another output", path.display()),
+        }
+    }
+
+    /// Where it is made.
+    pub fn path(&self) -> &Path {
+        &self.0.path
+    }
+
+    /// Refuses what lies at its place with other content, where that stays.
+    pub fn check(&self) -> Result<()> {
+        let Part { path, target, taken, .. } = &self.0;
+        let is_other = fs::metadata(target).is_ok_and(|about| about.len() > 0)
+            && settle(likeness(target, path), target)? != Likeness::Equal;
+        if is_other && *taken != Taken::Kept { Err(Differs::new(target).into()) } else { Ok(()) }
+    }
+
+    /// It is whole.
+    pub fn finish(self) -> Result<()> {
+        let Part { path, target, .. } = &self.0;
+        let placed = File::open(path).and_then(|file| file.sync_all().and_then(|()| self.0.place(&file)));
+        settle(placed, target)?;
+        sync_folder_of(target);
+        Ok(())
+    }
+}
+
+impl Drop for Begun {
+    /// What has become the file has this name no more.
+    fn drop(&mut self) {
+        self.0.abandon();
+    }
+}
+
 /// A part that an earlier run may have begun, to be gone on with.
 fn open_to_go_on(part: &Path, path: &Path) -> Result<File> {
     let file = File::options().read(true).append(true).create(true).open(part);
@@ -321,11 +363,13 @@ impl Part {
         let replaces = inputs.may_replace(path);
         let part = |or| {
             let taken = if replaces { Taken::Kept } else { or };
-            Ok(Place::Free(Self { path: PathBuf::new(), target, taken, resumed: false }))
+            Self { path: PathBuf::new(), target, taken, resumed: false }
         };
         let about = match fs::metadata(path) {
             Ok(about) => about,
-            Err(error) if error.kind() == io::ErrorKind::NotFound => return part(Taken::Stays),
+            Err(error) if error.kind() == io::ErrorKind::NotFound => {
+                return Ok(Place::Free(part(Taken::Stays)));
+            }
             Err(error) => return Err(error).with_context(|| cannot_write(path)),
         };
         check(path, &about)?;
@@ -333,12 +377,12 @@ impl Part {
             return Ok(Place::Stream);
         }
         if about.len() > 0 && !replaces {
-            return Ok(Place::Taken);
+            return Ok(Place::Taken(part(Taken::Stays)));
         }
         if about.permissions().readonly() {
             bail!("{}: is read-only; make it writable or name another output", path.display());
         }
-        part(Taken::Completed)
+        Ok(Place::Free(part(Taken::Completed)))
     }
 
     /// Gives it its name.
@@ -379,7 +423,7 @@ fn check(path: &Path, about: &Metadata) -> Result<()> {
     if about.is_dir() {
         return Err(usage(format!("{shown}: is a directory, and a file is to be written; name a file")));
     }
-    if is_block_device(about) {
+    if is_seekable(about) && !about.is_file() {
         return Err(usage(format!("{shown}: is a disk or a card, and hums writes files only; name a file")));
     }
     Ok(())
@@ -394,16 +438,5 @@ fn is_pipe(path: &Path) -> bool {
 
 #[cfg(not(unix))]
 fn is_pipe(_: &Path) -> bool {
-    false
-}
-
-#[cfg(unix)]
-fn is_block_device(about: &Metadata) -> bool {
-    use std::os::unix::fs::FileTypeExt as _;
-    about.file_type().is_block_device()
-}
-
-#[cfg(not(unix))]
-fn is_block_device(_: &Metadata) -> bool {
     false
 }

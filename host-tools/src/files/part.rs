@@ -47,13 +47,22 @@ pub fn lock_in_place(file: &File, path: &Path) -> Result<()> {
 /// that is killed before leaves nothing of this name.
 pub fn make_in_place(path: &Path, fill: impl FnOnce(&File) -> Result<()>) -> Result<File> {
     let target = target_of(path)?;
-    let beginning = lock_folder_of(&target);
-    let part = free_part(&target, path)?;
+    fill_part(&target, fill, |part| rename_new(part, &target))
+}
+
+/// The same, where `place` gives the part its name.
+pub(super) fn fill_part(
+    target: &Path,
+    fill: impl FnOnce(&File) -> Result<()>,
+    place: impl FnOnce(&Path) -> io::Result<()>,
+) -> Result<File> {
+    let beginning = lock_folder_of(target);
+    let part = free_part(target, target)?;
     let file = File::options().read(true).write(true).create_new(true).open(&part);
-    let file = file.with_context(|| cannot_write(path))?;
-    lock(&file, path)?;
+    let file = file.with_context(|| cannot_write(target))?;
+    lock(&file, target)?;
     drop(beginning);
-    let made = fill(&file).and_then(|()| rename_new(&part, &target).with_context(|| cannot_write(path)));
+    let made = fill(&file).and_then(|()| place(&part).with_context(|| cannot_write(target)));
     if !cfg!(unix) {
         // As `lock_in_place` has it.
         let _ = file.unlock();
@@ -65,34 +74,11 @@ pub fn make_in_place(path: &Path, fill: impl FnOnce(&File) -> Result<()>) -> Res
     made.map(|()| file)
 }
 
-/// A file that is made in place under the name of a part, and gets its own once it is whole: a card on which a demo
-/// records.
-#[derive(Debug)]
-pub struct InPlacePart {
-    part: PathBuf,
-    target: PathBuf,
-}
-
-impl InPlacePart {
-    /// Finds a name that nothing has.
-    pub fn begin(target: &Path) -> Result<Self> {
-        Ok(Self { part: free_part(target, target)?, target: target.to_owned() })
-    }
-
-    /// Where it is made.
-    pub fn path(&self) -> &Path {
-        &self.part
-    }
-
-    /// Removes it, if it was begun.
-    pub fn discard(&self) {
-        let _ = std::fs::remove_file(&self.part);
-    }
-
-    /// It is whole.
-    pub fn finish(self) -> Result<()> {
-        rename_new(&self.part, &self.target).with_context(|| cannot_write(&self.target))
-    }
+/// Keeps a second run away from the folder of this file, which is made where it is missing, for as long as it is open.
+pub fn take_turn(path: &Path) -> Result<File> {
+    let file = File::options().append(true).create(true).open(path).with_context(|| cannot_write(path))?;
+    lock(&file, path.parent().unwrap_or(path))?;
+    Ok(file)
 }
 
 /// The first name of a part that nothing has. An error where another run is writing one.

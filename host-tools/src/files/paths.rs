@@ -1,6 +1,6 @@
 //! Names of output files, and what is said of one that cannot be written.
 
-use std::fs::{self, Metadata};
+use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -8,12 +8,13 @@ use anyhow::{Context as _, Result, bail};
 
 use sha2::{Digest as _, Sha256};
 
+use super::descriptor::descriptor;
 use super::ends::short;
-use super::identity::{folded, leads_to, without_links};
+use super::identity::{FileId, folded, without_links};
 use crate::outcome::usage;
 
 /// How the name of a file or a folder ends that is not whole yet.
-pub const PART: &str = ".hums-part";
+pub(super) const PART: &str = ".hums-part";
 /// The folder of what was replaced.
 pub(super) const KEPT: &str = "hums-kept";
 
@@ -57,6 +58,15 @@ pub(super) fn target_of(path: &Path) -> Result<PathBuf> {
         path.display(),
         target.display()
     )))
+}
+
+/// Whether what a path leads to is what lies at `target`, which is [`without_links`] of it. What nothing is at yet may be made
+/// there, and what is neither a file nor a folder is written as it is.
+fn leads_to(path: &Path, target: &Path) -> bool {
+    let Ok(about) = fs::metadata(path) else { return true };
+    let is_ours = descriptor(path).is_some() && !about.is_dir();
+    let is_kept = about.is_file() || about.is_dir();
+    is_ours || !is_kept || FileId::of(path).ok() == FileId::of(target).ok()
 }
 
 fn beside(target: &Path, what: &str, number: u32) -> Result<PathBuf> {
@@ -104,12 +114,6 @@ pub fn check_parent(path: &Path) -> Result<()> {
     path.parent().map_or(Ok(()), check_directory)
 }
 
-/// Removes a directory, if nothing is in it.
-pub fn remove_if_empty(dir: &Path) {
-    // One with something in it stays.
-    let _ = fs::remove_dir(dir);
-}
-
 /// Makes the directory that a file is to lie in, unless it is there.
 pub fn make_parent(path: &Path) -> Result<()> {
     match path.parent().filter(|dir| !dir.as_os_str().is_empty()) {
@@ -133,17 +137,6 @@ pub fn cannot_write(path: &Path) -> String {
 /// An error in terms of the file.
 pub fn settle<T>(result: io::Result<T>, path: &Path) -> Result<T> {
     result.with_context(|| cannot_write(path))
-}
-
-/// Whether it can be read from any place, and has an end: a file, or a raw device such as a card reader's.
-pub fn is_seekable(about: &Metadata) -> bool {
-    #[cfg(unix)]
-    {
-        use std::os::unix::fs::FileTypeExt as _;
-        about.is_file() || about.file_type().is_block_device()
-    }
-    #[cfg(not(unix))]
-    about.is_file()
 }
 
 /// Whether an output is named as a directory: it is one, or its name ends like one.

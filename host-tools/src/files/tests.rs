@@ -91,7 +91,12 @@ fn a_replacement_that_fails_or_is_killed_loses_nothing() {
     );
     // Where nothing can be kept, nothing is replaced.
     fs::write(dir.path().join("hums-kept"), "a file").expect("written");
-    write(&path, &Inputs::none().replacing(true), "new").expect_err("there is no place for the old one");
+    let refused =
+        write(&path, &Inputs::none().replacing(true), "new").expect_err("there is no place for the old one");
+    assert!(
+        refused.contains("hums-kept, and that is a file; nothing was replaced: move it away"),
+        "{refused}"
+    );
     assert_eq!(names(dir.path()), ["hums-kept", "old"]);
     assert_eq!(fs::read(&path).expect("there"), b"what was there");
     fs::remove_file(dir.path().join("hums-kept")).expect("removed");

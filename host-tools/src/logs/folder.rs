@@ -153,7 +153,7 @@ pub fn is_named_as_log(path: &Path) -> bool {
 }
 
 /// Whether its name ends as that of a card's image does, compressed or not.
-fn is_named_as_card(path: &Path) -> bool {
+pub fn is_named_as_card(path: &Path) -> bool {
     is_named(path, &IMAGES)
 }
 

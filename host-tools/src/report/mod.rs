@@ -75,6 +75,10 @@ pub fn run(args: &cli::Report) -> Result<Outcome> {
     let wanted = wanted(args, &found.places, &sessions)?;
     let inputs = Inputs::of(given.iter().map(PathBuf::as_path).chain(found.paths())).replacing(args.replace);
     inputs.refuse(&args.output)?;
+    if wanted.directory {
+        // Before any page is written. That of a session is refused by itself, when its name is known.
+        inputs.refuse(&args.output.join(index::FILE))?;
+    }
     // The next start on the card tells how a session ended.
     let end = found.places.len().min(*wanted.sessions.end() + 1 + HELD_MAX);
     let mut followed = Followed::new(sessions);

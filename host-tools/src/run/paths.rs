@@ -19,7 +19,6 @@ pub(super) fn inputs(run: &Run, tap: Option<&Path>, firmware: Option<&Path>) -> 
         inputs.refuse(in_place)?;
         inputs.add(in_place);
     }
-    inputs.refuse_standard_output()?;
     let gs = match &run.gs {
         Some(Endpoint::File(path)) => Some(path.as_path()),
         _ => None,

@@ -13,9 +13,8 @@ use hums_store::sim::{SimFlash, is_store};
 use hums_store::{Found, Key, Store, param_value};
 
 use crate::files::{cannot_write, lock_in_place, make_in_place};
+use crate::source::format::STORE_SECTOR_BYTES as SECTOR;
 
-/// A sector of the board's flash.
-const SECTOR: usize = 16 * 1024;
 /// Two of them are the store.
 const BYTES: usize = 2 * SECTOR;
 

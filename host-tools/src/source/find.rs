@@ -2,14 +2,15 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
+use std::io::Read as _;
 use std::mem;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result, anyhow, bail};
 
-use super::format::{KNOWN, detect, format_of, hint, is_recording, start_of};
+use super::format::{Format, KNOWN, detect, format_of, hint, is_recording, start_of};
 use super::recording::{Place, of_one_vehicle};
-use crate::files::{FileId, Inputs, why_unread};
+use crate::files::{FileId, why_unread};
 use crate::logs::find::{Image, REMARKS_MAX, check_seekable};
 use crate::logs::sessions::Sessions;
 use crate::logs::{self, Content, segment_name};
@@ -175,8 +176,6 @@ pub fn find(inputs: &[PathBuf], salvage: bool) -> Result<Found> {
         }
     }
     make_names_unique(&mut found.places);
-    // What a command prints is not to stand in what it reads (`>> FILE`).
-    Inputs::of(found.paths()).refuse_standard_output()?;
     Ok(found)
 }
 
@@ -232,6 +231,28 @@ fn is_own(path: &Path) -> Result<bool> {
         Content::Image => !is_recording(path),
         Content::Mavlink | Content::Empty | Content::Other => false,
     })
+}
+
+/// What a file that lies at `content` is, by its first bytes; none where that is not known.
+pub fn kind_of(content: &Path) -> Option<Format> {
+    match logs::find::look(content) {
+        Ok(Content::Log) => Some(Format::Hums),
+        _ => format_of(&start_of(content)),
+    }
+}
+
+/// Whether words that are appended to the file of this path, whose content lies at `content`, would spoil a recording or a card, or
+/// are in a file that is no text at all. A damaged one may have nothing but its name.
+pub fn is_no_text(path: &Path, content: &Path) -> bool {
+    let is_named = logs::is_named_as_log(path) || logs::is_named_as_card(path) || is_named_as_recording(path);
+    // Further on, a text may have zeros too: a PC that loses its power leaves such in its logs.
+    let is_binary = || {
+        const START_BYTES: u64 = 512;
+        let mut start = Vec::new();
+        let read = fs::File::open(content).and_then(|file| file.take(START_BYTES).read_to_end(&mut start));
+        read.is_ok() && start.contains(&0)
+    };
+    is_named || why_unread(path).is_some() || is_binary() || is_recording(content)
 }
 
 /// Why no log of ours was found, for a command that reads nothing else: a recording of another kind that was named is told as that.

@@ -202,6 +202,24 @@ fn an_image_is_whole_or_not_there_and_one_without_a_partition_table_is_told() {
     assert!(said.contains("name an image of a card, or a new file"), "{said}");
 }
 
+#[test]
+fn a_store_and_a_spool_beside_recordings_are_named_and_are_no_loss() {
+    let dir = recorded();
+    run(dir.path(), "sim --input PX4 --sd new.img --store store.bin", 0);
+    fs::write(dir.path().join("spool.bin"), b"HUMSPOOL and what waits").expect("written");
+    for line in ["info .", "check .", "ls .", "verify .", "decode . -o out --format tlog --to 1"] {
+        let ended = run(dir.path(), line, 0);
+        let said = String::from_utf8_lossy(&ended.stderr);
+        assert!(said.contains("store.bin: is the memory of a simulated board (--store)"), "{line}: {said}");
+        assert!(said.contains("spool.bin: holds points that wait for a database"), "{line}: {said}");
+    }
+    let said = run(dir.path(), "check store.bin", 1);
+    assert!(String::from_utf8_lossy(&said.stderr).contains("is the memory of a simulated board"));
+    // Of another file with such a name that holds nothing, it is.
+    fs::write(dir.path().join("flight.bin"), vec![7; 32 << 10]).expect("written");
+    run(dir.path(), "info .", 3);
+}
+
 /// A store of which a half is there would be refused from then on.
 #[test]
 fn a_store_or_a_spool_that_cannot_be_made_leaves_nothing_that_is_in_the_way() {

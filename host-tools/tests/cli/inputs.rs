@@ -6,7 +6,7 @@ use std::path::Path;
 use clap::{Arg, ArgAction, CommandFactory as _};
 use hums::cli::Cli;
 
-use crate::support::{Stamp, attempt, contents, furnished, px4, recorded, run, stamps};
+use crate::support::{Stamp, attempt, contents, furnished, px4, recorded, run, stamps, text};
 
 /// What an argument names.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -202,46 +202,19 @@ fn a_demo_into_the_folder_of_its_input_changes_nothing() {
     }
 }
 
+/// The table of a folder's pages has a name of its own, which may be a link.
 #[test]
-fn results_are_appended_to_no_input() {
+fn a_page_that_would_go_into_an_input_is_refused_before_any_other_is_written() {
     let dir = furnished();
+    let pages = dir.path().join("pages");
+    fs::create_dir(&pages).expect("made");
+    std::os::unix::fs::symlink("../log.hum", pages.join("index.html")).expect("a link");
     let before = contents(dir.path());
-    for (line, input) in [
-        ("info flight.tlog", "flight.tlog"),
-        ("check folder", "folder/flight.tlog"),
-        ("check --json flight.tlog", "flight.tlog"),
-        ("check --json nosuch.tlog folder", "folder/flight.tlog"),
-        ("verify log.hum", "log.hum"),
-        ("decode log.hum -o new --format tlog", "link-log.hum"),
-        ("report log.hum -o new.html", "hard-log.hum"),
-        ("pack flight.tlog -o new.hum", "flight.tlog"),
-        ("sim --input flight.tlog --sd new.img", "flight.tlog"),
-        ("sim --input flight.tlog --params hums.param --sd new.img", "hums.param"),
-        ("check flight.tlog --params hums.param", "hums.param"),
-        ("check --json -", "flight.tlog"),
-        ("live --input - --listen 127.0.0.1:0", "hard-flight.tlog"),
-        ("demo --input flight.tlog --dashboard never", "link-flight.tlog"),
-        ("params list --link udpout:127.0.0.1:9 --key=hums.param", "hums.param"),
-    ] {
-        let open = || fs::File::options().append(true).open(dir.path().join(input)).expect("opened");
-        let hums = || {
-            let mut hums = std::process::Command::new(env!("CARGO_BIN_EXE_hums"));
-            hums.args(line.split(' ')).current_dir(dir.path());
-            if line.contains(" -") && line.split(' ').any(|word| word == "-") {
-                hums.stdin(fs::File::open(dir.path().join("flight.tlog")).expect("opened"));
-            }
-            hums
-        };
-        if line.split(' ').any(|word| word == input) {
-            let ended = hums().stderr(open()).output().expect("it runs");
-            assert_eq!(ended.status.code(), Some(2), "{line} 2>>");
-            assert!(contents(dir.path()) == before, "{line} 2>> changed something");
-        }
-        let ended = hums().stdout(open()).output().expect("it runs");
+    for flag in ["", "--replace", "--compare"] {
+        let ended = run(dir.path(), &format!("report log.hum -o pages {flag}"), 2);
         let said = String::from_utf8_lossy(&ended.stderr);
-        assert_eq!(ended.status.code(), Some(2), "{line}: {said}");
-        assert!(said.contains("standard output: goes into"), "{line}: {said}");
-        assert!(contents(dir.path()) == before, "{line} changed something");
+        assert!(said.contains("index.html: is an input of this command"), "{said}");
+        assert!(contents(dir.path()) == before && text(&ended).is_empty(), "{flag}: {said}");
     }
 }
 

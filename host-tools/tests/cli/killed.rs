@@ -1,13 +1,16 @@
 //! What a kill, a full disk or an earlier demo leaves.
 
+use std::collections::BTreeSet;
 use std::fs;
 use std::io::Write as _;
 use std::net::TcpListener;
 use std::path::Path;
 use std::process::{Command, Stdio};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
-use crate::support::{all_named, attempt, contents, flight, frames_of, hums, json, named, px4, run, until};
+use sha2::Digest as _;
+
+use crate::support::{all_named, attempt, contents, flight, frames_of, json, named, px4, run, stamps, until};
 
 /// Files and folders that are not whole.
 fn parts(dir: &Path) -> Vec<String> {
@@ -164,30 +167,118 @@ fn tables_of_a_killed_run_are_the_old_ones_or_the_new_ones() {
     assert_eq!(contents(&out).into_iter().filter(is_made).collect::<Vec<_>>(), whole);
 }
 
-#[test]
-fn a_demo_that_was_killed_is_in_the_next_ones_way_nowhere() {
+/// A demo of a recording, on this PC.
+fn demo(dir: &Path, input: &str, flags: &[&str]) -> Command {
+    let mut demo = Command::new(env!("CARGO_BIN_EXE_hums"));
+    // Without the firmware it records on this PC.
+    demo.current_dir(dir).env("HUMS_FIRMWARE", "none").stdout(Stdio::null()).stderr(Stdio::piped());
+    demo.args(["demo", "--input", input, "--dir", "demo", "--dashboard", "never"]).args(flags);
+    demo
+}
+
+#[track_caller]
+fn demo_ends(dir: &Path, input: &str, flags: &[&str], code: i32) -> String {
+    let ended = demo(dir, input, flags).output().expect("it runs");
+    let said = String::from_utf8_lossy(&ended.stderr).into_owned();
+    assert_eq!(ended.status.code(), Some(code), "{input} {flags:?}: {said}");
+    said
+}
+
+/// Two short recordings of different vehicles.
+fn two_flights() -> tempfile::TempDir {
     let dir = tempfile::tempdir().expect("directory");
-    let input = px4().display().to_string();
-    let mine = dir.path().join(".card.img.hums-part");
+    let few: usize = frames_of(&px4())[..400].iter().map(|frame| 8 + frame.len()).sum();
+    fs::write(dir.path().join("one.tlog"), &fs::read(px4()).expect("a recording")[..few]).expect("written");
+    let raw = fs::read(flight("ap_quad_signed.raw")).expect("a recording");
+    fs::write(dir.path().join("two.raw"), &raw[..20_000]).expect("written");
+    dir
+}
+
+/// The contents of all files, whatever they are called.
+fn bytes_of(dir: &Path) -> BTreeSet<Vec<u8>> {
+    let digest = |(_, bytes): (String, Vec<u8>)| sha2::Sha256::digest(bytes).to_vec();
+    contents(dir).into_iter().map(digest).collect()
+}
+
+#[test]
+fn a_demo_replaces_another_one_only_where_the_user_says_so_and_keeps_it() {
+    let dir = two_flights();
+    let at = |name: &str| dir.path().join("demo").join(name);
+    demo_ends(dir.path(), "one.tlog", &[], 0);
+    // The same again, and what the user has put beside it.
+    for path in ["mine.tlog", "decoded/mine.csv"] {
+        fs::write(at(path), "mine").expect("written");
+    }
+    let before = stamps(&dir.path().join("demo"));
+    demo_ends(dir.path(), "one.tlog", &[], 0);
+    assert!(stamps(&dir.path().join("demo")) == before);
+    // Another one, what cannot be recorded, and what is a demo's own.
+    let mut made =
+        fs::read_dir(at("decoded")).expect("a folder").map(|entry| entry.expect("an entry").path());
+    let tlog = made.find(|path| path.extension().is_some_and(|of| of == "tlog")).expect("a tlog");
+    fs::write(dir.path().join("notes.txt"), "no recording").expect("written");
+    for (input, flag, code) in [
+        ("two.raw", None, 1),
+        ("nosuch.tlog", Some("--replace"), 1),
+        ("notes.txt", Some("--replace"), 1),
+        ("demo", Some("--replace"), 1),
+        (tlog.to_str().expect("UTF-8"), Some("--replace"), 2),
+        ("demo/card.img", Some("--replace"), 2),
+    ] {
+        let said = demo_ends(dir.path(), input, flag.as_slice(), code);
+        assert!(stamps(&dir.path().join("demo")) == before, "{input}: {said}");
+        assert!(
+            input != "two.raw" || said.contains("card.img: is there already") && said.contains("--replace")
+        );
+    }
+    let was = bytes_of(dir.path());
+    demo_ends(dir.path(), "two.raw", &["--replace"], 0);
+    assert!(bytes_of(dir.path()).is_superset(&was) && fs::read(at("mine.tlog")).expect("there") == b"mine");
+    for name in ["card.img", "ground-station.bin", "report.html"] {
+        assert!(at("hums-kept/1").join(name).exists(), "{name}");
+        // What no demo made stays too.
+        let was = fs::read(at(name)).expect("there");
+        fs::write(at(name), "evidence").expect("written");
+        demo_ends(dir.path(), "two.raw", &[], 1);
+        assert_eq!(fs::read(at(name)).expect("there"), b"evidence");
+        fs::write(at(name), was).expect("written");
+    }
+}
+
+#[test]
+fn a_demo_that_is_killed_takes_nothing_of_an_earlier_one_away_and_is_in_nobodys_way() {
+    let dir = two_flights();
+    let mine = dir.path().join("demo/.card.img.hums-part");
+    fs::create_dir(dir.path().join("demo")).expect("made");
     fs::write(&mine, "mine").expect("written");
-    let demo = || {
-        let mut demo = Command::new(env!("CARGO_BIN_EXE_hums"));
-        // Without the firmware it records on this PC.
-        demo.current_dir(dir.path()).env("HUMS_FIRMWARE", "none").stdout(Stdio::null()).stderr(Stdio::null());
-        demo.args(["demo", "--input", &input, "--dir", ".", "--dashboard", "never"]);
-        demo
-    };
-    // Killed while it records.
-    for after_ms in [0, 20, 40] {
-        let mut killed = demo().spawn().expect("it runs");
-        let before = fs::read_dir(dir.path()).expect("a folder").count();
-        until("it begins", || fs::read_dir(dir.path()).expect("a folder").count() > before);
-        std::thread::sleep(Duration::from_millis(after_ms));
+    let begun = Instant::now();
+    demo_ends(dir.path(), "one.tlog", &[], 0);
+    let lasts = begun.elapsed();
+    // Also in the moments in which the outputs get their names, near the end.
+    for tenth in [1, 3, 5, 7, 8, 9] {
+        let was = bytes_of(&dir.path().join("demo"));
+        let mut killed = demo(dir.path(), "two.raw", &["--replace"]).spawn().expect("it runs");
+        std::thread::sleep(lasts * tenth / 10);
         killed.kill().expect("it is ours");
         killed.wait().expect("it is ours");
+        assert!(bytes_of(&dir.path().join("demo")).is_superset(&was), "{tenth}");
     }
-    assert!(demo().status().expect("it runs").success());
+    demo_ends(dir.path(), "two.raw", &["--replace"], 0);
     assert_eq!(fs::read(&mine).expect("there"), b"mine");
+}
+
+#[test]
+fn of_two_demos_in_one_folder_one_is_refused_and_the_other_is_whole() {
+    let dir = two_flights();
+    let alone = tempfile::tempdir().expect("directory");
+    fs::copy(dir.path().join("one.tlog"), alone.path().join("one.tlog")).expect("copied");
+    demo_ends(alone.path(), "one.tlog", &[], 0);
+    let mut first = demo(dir.path(), "one.tlog", &["--replace"]).spawn().expect("it runs");
+    until("it has begun", || dir.path().join("demo/.card.img.hums-part").exists());
+    let said = demo_ends(dir.path(), "two.raw", &["--replace"], 1);
+    assert!(said.contains("demo: another run of hums is writing it; wait for its end"), "{said}");
+    assert!(first.wait().expect("it ends").success());
+    assert!(contents(&dir.path().join("demo")) == contents(&alone.path().join("demo")));
 }
 
 #[test]
@@ -248,71 +339,6 @@ fn what_is_not_whole_or_was_replaced_in_a_folder_is_passed_over_and_told() {
     assert_eq!(all_named(&dir.path().join("out"), "00001").len(), 1);
     // Named by itself it is read.
     run(dir.path(), "verify folder/hums-kept", 0);
-}
-
-#[test]
-fn a_demo_removes_what_a_demo_made_and_nothing_else() {
-    let dir = tempfile::tempdir().expect("directory");
-    let at = |name: &str| dir.path().join(name);
-    let demo = |code: i32| -> String {
-        let input = px4().display().to_string();
-        let words = ["demo", "--input", &input, "--dir", ".", "--dashboard", "never"];
-        // Without the firmware it records on this PC.
-        let ended = hums()
-            .current_dir(dir.path())
-            .env("HUMS_FIRMWARE", "none")
-            .args(words)
-            .output()
-            .expect("it runs");
-        let said = String::from_utf8_lossy(&ended.stderr).into_owned();
-        assert_eq!(ended.status.code(), Some(code), "{said}");
-        said
-    };
-    for name in ["card.img", "report.html"] {
-        fs::write(at(name), "evidence").expect("written");
-        assert!(demo(1).contains("no demo made it"));
-        assert_eq!(fs::read(at(name)).expect("there"), b"evidence");
-        fs::remove_file(at(name)).expect("removed");
-    }
-    demo(0);
-    let made = contents(dir.path());
-    // What the user puts beside it stays.
-    let tables = at("decoded").join(named(&at("decoded"), "00001"));
-    for path in [at("mine.tlog"), at("decoded/mine.csv")] {
-        fs::write(path, "mine").expect("written");
-    }
-    demo(0);
-    for path in [at("mine.tlog"), at("decoded/mine.csv")] {
-        assert_eq!(fs::read(&path).expect("there"), b"mine");
-        fs::remove_file(path).expect("removed");
-    }
-    assert!(contents(dir.path()) == made, "a demo is the same again");
-    // What cannot be recorded takes nothing away, nor does what would be an input of its own.
-    fs::write(at("notes.txt"), "no recording").expect("written");
-    let tlog = tables.with_extension("tlog").display().to_string();
-    for (input, code) in [("nosuch.tlog", 1), ("notes.txt", 1), ("decoded", 1), (&tlog, 2)] {
-        let before = contents(dir.path());
-        let mut words = hums();
-        words.current_dir(dir.path()).env("HUMS_FIRMWARE", "none");
-        words.args(["demo", "--input", input, "--dir", ".", "--dashboard", "never"]);
-        let ended = words.output().expect("it runs");
-        let said = String::from_utf8_lossy(&ended.stderr);
-        assert_eq!(ended.status.code(), Some(code), "{input}: {said}");
-        assert!(contents(dir.path()) == before, "{input}: {said}");
-    }
-    // What was changed, or put among the tables, ends it before anything is removed.
-    for (path, why) in [
-        (tables.join("mine.csv"), "is among the demo's tables"),
-        (tables.join("HEARTBEAT.csv"), "was changed since the demo made it"),
-        (at("card.img"), "was changed since the demo made it"),
-    ] {
-        let was = fs::read(&path).ok();
-        fs::write(&path, "evidence").expect("written");
-        let before = contents(dir.path());
-        assert!(demo(1).contains(why), "{}", path.display());
-        assert!(contents(dir.path()) == before, "{}", path.display());
-        was.map_or_else(|| fs::remove_file(&path), |was| fs::write(&path, was)).expect("as it was");
-    }
 }
 
 #[test]

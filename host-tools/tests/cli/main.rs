@@ -13,4 +13,5 @@ mod read;
 mod record;
 mod replace;
 mod shell;
+mod streams;
 mod support;

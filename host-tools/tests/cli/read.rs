@@ -55,41 +55,6 @@ fn what_is_made_on_standard_output_by_its_path_is_nothing_but_that() {
     assert!(!dir.path().join("-").exists());
 }
 
-/// What somebody opened is not emptied for us: only its end is ours to write.
-#[test]
-#[cfg(target_os = "linux")]
-fn nothing_is_written_over_what_is_in_a_file_that_somebody_opened() {
-    let dir = tempfile::tempdir().expect("directory");
-    run(dir.path(), &format!("pack {} -o few.hum", flight("px4_hil_quad_low.tlog").display()), 0);
-    let there = dir.path().join("there");
-    let program = hums().get_program().to_owned();
-    let shell = |line: &str| {
-        fs::write(&there, "what was there").expect("written");
-        let line = line.replace("hums", &program.to_string_lossy());
-        let shell = std::process::Command::new("sh").current_dir(dir.path()).args(["-c", &line]).output();
-        let ended = shell.expect("a shell");
-        (ended.status.code(), String::from_utf8_lossy(&ended.stderr).into_owned())
-    };
-    for line in [
-        "hums info few.hum 1<>there",
-        "hums decode few.hum --format tlog -o - 1<>there",
-        "hums report few.hum -o /dev/stdout 1<>there",
-        "hums decode few.hum --format tlog -o /dev/fd/7 7<>there",
-    ] {
-        let (code, said) = shell(line);
-        assert!(
-            code == Some(2) && said.contains("has something in it where it would be written"),
-            "{line}: {said}"
-        );
-        assert_eq!(fs::read(&there).expect("there"), b"what was there", "{line}");
-    }
-    for line in ["hums info few.hum >> there", "hums report few.hum -o /dev/fd/7 7>>there"] {
-        assert_eq!(shell(line).0, Some(0), "{line}");
-        let now = fs::read(&there).expect("there");
-        assert!(now.starts_with(b"what was there") && now.len() > 100, "{line}");
-    }
-}
-
 #[test]
 fn what_has_no_frame_is_not_packed() {
     let dir = tempfile::tempdir().expect("directory");

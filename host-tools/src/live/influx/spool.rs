@@ -16,7 +16,7 @@
 //! Numbers are little-endian. Nothing is synced to the disk: a kill loses nothing, a PC that loses its power what its
 //! system had not written yet.
 
-use std::fs::{self, File, OpenOptions, TryLockError};
+use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{self, Read, Seek as _, SeekFrom, Write as _};
 use std::path::{Path, PathBuf};
 
@@ -25,10 +25,10 @@ use crc::{CRC_32_ISCSI, Crc};
 
 use super::batch::Batch;
 use super::target::Database;
-use crate::files::PART;
+use crate::files::remake_in_place;
 use crate::plural::are;
+use crate::source::format::SPOOL_MAGIC as MAGIC;
 
-const MAGIC: &[u8; 8] = b"HUMSPOOL";
 const VERSION: u32 = 2;
 const HEADER_BYTES: u64 = 512;
 /// Where the database's address begins.
@@ -135,14 +135,16 @@ impl Spool {
         }
         (self.size, self.oldest) = (u64_at(&header, 16), u64_at(&header, 24));
         self.end = self.oldest;
-        if self.size < RECORD_BYTES as u64 {
-            bail!("its header is damaged; remove it, or name another one");
+        let is_possible = |end: u64| self.size >= RECORD_BYTES as u64 && end < i64::MAX as u64;
+        if !self.oldest.checked_add(self.size).is_some_and(is_possible) {
+            bail!("its header is damaged; move it away, or name another one");
         }
-        // As far as records are sound: a kill may have cut off the last one.
-        while let Some((head, _)) = self.record(self.end)? {
-            self.end += head.bytes();
-            self.points += u64::from(head.points);
-        }
+        let mut points = 0;
+        self.damage = self.each_sound(bytes, |head, _| {
+            points += u64::from(head.points);
+            Ok(())
+        })?;
+        self.points = points;
         // Also where its first record is damaged: an empty one has its header only.
         if bytes > HEADER_BYTES && u64_at(&header, 32) != self.database.number {
             let name = header.get(NAME_AT..).unwrap_or_default().split(|byte| *byte == 0).next();
@@ -152,12 +154,14 @@ impl Spool {
                 String::from_utf8_lossy(name.unwrap_or_default())
             );
         }
-        self.find_damage(bytes)?;
+        if self.damage.bytes > 0 {
+            return self.mend(bytes);
+        }
         if self.is_empty() {
             return Ok(self.reset()?);
         }
         if self.size < self.limit
-            && let Err(error) = self.grow()
+            && let Err(error) = self.write_anew(bytes, false)
         {
             note!(
                 "{}: cannot be made larger ({error}): its limit stays {} bytes until nothing waits in it",
@@ -168,73 +172,134 @@ impl Spool {
         Ok(())
     }
 
-    /// Makes the ring as large as the limit: what waits is written anew, beside the file, and takes its place when it is
-    /// whole. Until then a kill leaves the old one.
-    fn grow(&mut self) -> Result<()> {
-        let path = self.path.canonicalize()?;
-        let mut part = path.clone().into_os_string();
-        part.push(PART);
-        let part = PathBuf::from(part);
-        let file = File::options().read(true).write(true).create(true).truncate(true).open(&part)?;
-        let grown = self.copy_to(file).and_then(|new| {
-            fs::rename(&part, &path)?;
-            Ok(new)
+    /// Goes on without what is damaged, which is kept aside with all of the file. What a kill or a full disk has cut off at the
+    /// end is no batch, and goes.
+    fn mend(&mut self, file_bytes: u64) -> Result<()> {
+        let is_cut = self.first_lap_end(file_bytes).is_some_and(|end| {
+            let is_last = self.end + self.damage.bytes == end;
+            let whole = self.head(self.end).ok().flatten().map_or(RECORD_BYTES as u64, Head::bytes);
+            is_last && self.damage.bytes < whole
         });
-        match grown {
-            Ok(new) => {
-                *self = new;
-                Ok(())
-            }
-            Err(error) => {
-                // The next program writes it anew.
-                let _ = fs::remove_file(&part);
-                Err(error)
-            }
+        if !is_cut {
+            return self.write_anew(file_bytes, true).context("what is sound in it cannot be written anew");
         }
+        if self.is_empty() {
+            return Ok(self.reset()?);
+        }
+        Ok(self.file.set_len(HEADER_BYTES + self.end)?)
     }
 
-    /// All that waits, in a file as large as the limit allows, which is locked.
-    fn copy_to(&mut self, file: File) -> Result<Self> {
-        match file.try_lock() {
-            Err(TryLockError::WouldBlock) => bail!("another program writes it"),
-            Err(TryLockError::Error(error)) => return Err(error.into()),
-            Ok(()) => {}
+    /// Writes what waits anew, with a ring as large as the limit or as what waits, beside the file; it takes its place when it is
+    /// whole. The old file is kept aside, or goes. Until then a kill leaves that one.
+    fn write_anew(&mut self, file_bytes: u64, keep: bool) -> Result<()> {
+        let path = self.path.canonicalize()?;
+        let (damage, mut new) = (self.damage, None);
+        remake_in_place(&path, keep, |file| {
+            new = Some(self.copy_to(file.try_clone()?, file_bytes)?);
+            Ok(())
+        })?;
+        let path = std::mem::take(&mut self.path);
+        if let Some(new) = new {
+            *self = Self { path, damage, ..new };
         }
+        Ok(())
+    }
+
+    /// All that waits and is sound, in a new file.
+    fn copy_to(&mut self, file: File, file_bytes: u64) -> Result<Self> {
         let mut new = Self {
             file,
-            path: self.path.clone(),
-            size: self.limit,
-            limit: self.limit,
+            path: PathBuf::new(),
+            size: self.limit.max(self.size),
+            limit: self.limit.max(self.size),
             oldest: 0,
             end: 0,
             points: 0,
             removed: 0,
             database: self.database.clone(),
-            damage: self.damage,
+            damage: Damage::default(),
         };
         new.reset()?;
-        let mut at = self.oldest;
-        while let Some((head, text)) = self.record(at)? {
-            at += head.bytes();
+        self.each_sound(file_bytes, |head, text| {
             new.put(&Batch { text, points: u64::from(head.points) })?;
-        }
+            Ok(())
+        })?;
+        new.limit = self.limit;
         Ok(new)
     }
 
-    /// What lies behind the last sound record and was one: of a file whose ring has not begun anew, any byte; otherwise
-    /// what has the beginning of a record of this position.
-    fn find_damage(&mut self, file_bytes: u64) -> io::Result<()> {
-        let mut at = self.end;
-        while let Some(head) = self.head(at)? {
-            self.damage.points += u64::from(head.points);
+    /// Hands out each sound batch that waits, and says what lies between them and behind them and is none: of a file whose ring has
+    /// not begun anew, any byte; otherwise what has the head of a record. The end is behind the last one that is sound.
+    fn each_sound(
+        &mut self,
+        file_bytes: u64,
+        mut take: impl FnMut(Head, Vec<u8>) -> Result<()>,
+    ) -> Result<Damage> {
+        let (mut at, mut damage) = (self.oldest, Damage::default());
+        self.end = at;
+        loop {
+            if let Some((head, text)) = self.record(at)? {
+                at += head.bytes();
+                self.end = at;
+                take(head, text)?;
+                continue;
+            }
+            let next = self.next_sound(at + 1)?;
+            let (points, end) = self.claimed(at, next.unwrap_or(u64::MAX))?;
+            damage.points += points;
+            // Of a file in its first lap nothing else can lie at its end.
+            let end = next.or_else(|| self.first_lap_end(file_bytes)).unwrap_or(end);
+            damage.bytes += end.saturating_sub(at);
+            match next {
+                Some(next) => at = next,
+                None => return Ok(damage),
+            }
+        }
+    }
+
+    /// What the heads of damaged batches say from a position on: their points, and where they end.
+    fn claimed(&mut self, mut at: u64, until: u64) -> io::Result<(u64, u64)> {
+        let mut points = 0;
+        while at < until
+            && let Some(head) = self.head(at)?
+        {
+            points += u64::from(head.points);
             at += head.bytes();
         }
-        self.damage.bytes = at - self.end;
-        if self.end < self.size {
-            self.damage.bytes = file_bytes.saturating_sub(HEADER_BYTES + self.end);
-            self.file.set_len(HEADER_BYTES + self.end)?;
+        Ok((points, at))
+    }
+
+    /// Where the file ends, as a position, where its ring has not begun anew.
+    fn first_lap_end(&self, file_bytes: u64) -> Option<u64> {
+        (self.end < self.size).then(|| file_bytes.saturating_sub(HEADER_BYTES))
+    }
+
+    /// The next position at which a sound record begins.
+    fn next_sound(&mut self, from: u64) -> io::Result<Option<u64>> {
+        const PIECE_BYTES: u64 = 64 * 1024;
+        let until = self.oldest + self.size;
+        let mut piece = Vec::new();
+        let mut at = from;
+        while at < until {
+            // The position lies 8 bytes behind a record's beginning.
+            let (place, row) = self.place(at + 8);
+            let bytes = row.min(PIECE_BYTES);
+            piece.clear();
+            self.file.seek(SeekFrom::Start(place))?;
+            Read::by_ref(&mut self.file).take(bytes).read_to_end(&mut piece)?;
+            for (position, word) in (at..until).zip(piece.windows(8)) {
+                if word == position.to_le_bytes() && self.record(position)?.is_some() {
+                    return Ok(Some(position));
+                }
+            }
+            // A word may go on in the next piece, and at the ring's end at its beginning: that one is looked at by itself.
+            let looked_at = bytes.saturating_sub(7).max(1);
+            if looked_at == 1 && self.record(at)?.is_some() {
+                return Ok(Some(at));
+            }
+            at += looked_at;
         }
-        Ok(())
+        Ok(None)
     }
 
     /// What an earlier program has left here and cannot be read.

@@ -209,6 +209,33 @@ fn data_that_was_appended_to_a_log_that_ends_in_the_middle_of_a_message_is_read(
     assert_eq!(read.of("gap"), ["Cut a message that the end cuts off"]);
 }
 
+/// What is read at once, and the longest message, end near there.
+#[test]
+fn a_log_that_is_cut_near_any_multiple_of_64_kib_says_so_unless_it_is_cut_between_two_messages() {
+    const SEAM: usize = 64 * 1024;
+    let (mut writer, mut ends) = (small(), Vec::new());
+    for number in 0..16_u64 {
+        // Also messages across a seam or two, and the longest there is.
+        let words = "x".repeat([20, 3_000, 40_000, 65_526][number as usize % 4]);
+        writer = writer.data(0, (4 + number) * SECOND, &position(1.0, 1)).text(
+            b'6',
+            (4 + number) * SECOND,
+            &words,
+        );
+        let text_bytes = words.len() + 12;
+        ends.extend([writer.bytes.len() - text_bytes, writer.bytes.len()]);
+    }
+    let log = writer.bytes;
+    let seams = (SEAM..log.len()).step_by(SEAM);
+    let near = ends.iter().filter(|end| **end < log.len()).copied();
+    for place in seams.chain(near) {
+        for cut in (place - 4..=place + 4).filter(|cut| *cut < log.len()) {
+            let told = read(&log[..cut]).gaps.len();
+            assert_eq!(told, usize::from(!ends.contains(&cut)), "cut at {cut}");
+        }
+    }
+}
+
 #[test]
 fn offsets_of_appended_data_behind_the_end_or_backwards_are_said_and_do_no_harm() {
     for (offsets, words) in [

@@ -105,18 +105,71 @@ fn a_record_that_was_cut_off_ends_it_and_those_before_are_there() {
         drop(spool);
         assert_eq!(open(&path, 100_000).damage(), Damage::default(), "it is told once");
     }
-    let mut spoiled = whole.clone();
-    let at = whole.len() - 10;
-    spoiled[at] ^= 1;
-    std::fs::write(&path, spoiled).expect("room");
-    assert_eq!(open(&path, 100_000).damage(), Damage { points: batch(4).points, bytes: last as u64 });
-    assert_eq!(drain(&mut open(&path, 100_000)).len(), 4);
-    // One in the middle: those behind it are not reached either.
-    let mut spoiled = whole;
-    spoiled[HEADER_BYTES as usize + RECORD_BYTES + 5] ^= 1;
-    std::fs::write(&path, spoiled).expect("room");
-    let points: u64 = (0..5).map(|number| batch(number).points).sum();
-    assert_eq!(open(&path, 100_000).damage().points, points);
+}
+
+#[test]
+fn what_is_sound_in_a_damaged_one_is_written_on_and_the_damaged_one_is_kept() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let path = dir.path().join("spool");
+    // In its first lap, and where the ring has begun anew.
+    for (limit, count) in [(100_000, 12), (4_000, 40)] {
+        let _ = std::fs::remove_file(&path);
+        let mut spool = open(&path, limit);
+        for number in 0..count {
+            spool.put(&batch(number)).expect("room");
+        }
+        let (oldest, waits) = (spool.oldest, drain(&mut open_copy(&mut spool)));
+        drop(spool);
+        let whole = std::fs::read(&path).expect("a file");
+        // A byte of a batch's lines, of its length, of its position; the bytes of two batches; in each batch in turn.
+        for (nth, _) in waits.iter().enumerate().filter(|(nth, _)| nth + 2 < waits.len()) {
+            let bytes = |nth: usize| {
+                waits[..nth].iter().map(|batch| (RECORD_BYTES + batch.text.len()) as u64).sum::<u64>()
+            };
+            let at = |byte: u64| (HEADER_BYTES + (oldest + bytes(nth) + byte) % limit) as usize;
+            let next = bytes(nth + 1) - bytes(nth);
+            for (spoiled, lost) in
+                [(30..31, 1), (1..2, 1), (9..10, 1), (next - 5..next + 3, 2), (0..next + 30, 2)]
+            {
+                let mut damaged = whole.clone();
+                spoiled.for_each(|byte| damaged[at(byte)] ^= 0x55);
+                std::fs::write(&path, &damaged).expect("room");
+                let spool = open(&path, limit);
+                assert!(spool.damage().bytes >= bytes(nth + lost) - bytes(nth), "{limit} {nth} {lost}");
+                let sound: Vec<Batch> = [&waits[..nth], &waits[nth + lost..]].concat();
+                assert_eq!(spool.points(), sound.iter().map(|batch| batch.points).sum::<u64>());
+                // Also where it is killed before it has written any of it.
+                drop(spool);
+                let mut spool = open(&path, limit);
+                assert_eq!(spool.damage(), Damage::default(), "it is told once");
+                assert!(drain(&mut spool) == sound, "{limit} {nth} {lost}");
+                let kept = dir.path().join("hums-kept");
+                assert!(std::fs::read(kept.join("1/spool")).expect("kept") == damaged);
+                std::fs::remove_dir_all(kept).expect("there");
+            }
+        }
+        // The last one, and all of them.
+        let all = HEADER_BYTES as usize..whole.len();
+        for (spoiled, left) in [(whole.len() - 10..whole.len() - 9, waits.len() - 1), (all, 0)] {
+            if limit > 4_000 {
+                let mut damaged = whole.clone();
+                damaged[spoiled].iter_mut().for_each(|byte| *byte ^= 0x55);
+                std::fs::write(&path, &damaged).expect("room");
+                let mut spool = open(&path, limit);
+                assert!(spool.damage().bytes > 0);
+                assert!(drain(&mut spool) == waits[..left]);
+                assert!(std::fs::read(dir.path().join("hums-kept/1/spool")).expect("kept") == damaged);
+                std::fs::remove_dir_all(dir.path().join("hums-kept")).expect("there");
+            }
+        }
+    }
+}
+
+/// A spool with the same bytes, to be emptied in its place.
+fn open_copy(spool: &mut Spool) -> Spool {
+    let copy = spool.path().with_file_name("copy");
+    std::fs::copy(spool.path(), &copy).expect("room");
+    open(&copy, spool.limit)
 }
 
 #[test]

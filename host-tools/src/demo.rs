@@ -1,7 +1,9 @@
 //! `hums demo`: a recorded flight is recorded by the firmware (on the model of its chip, where there is an image), the card is
 //! decoded, what came of it is summed up, and the dashboard plays the card.
-
-mod earlier;
+//!
+//! It is these commands one after the other, each with its own rules for what is there already. The card and what the ground
+//! station got are recorded beside their places, and get their names together. One demo at a time has a folder: it holds a
+//! lock on the file `.hums-demo`, which has nothing in it and stays.
 
 use std::io::IsTerminal as _;
 use std::net::TcpListener;
@@ -11,7 +13,7 @@ use anyhow::Result;
 
 use crate::cli::{self, Dashboard, FaultFlags, Format};
 use crate::endpoint::Endpoint;
-use crate::files::{InPlacePart, Inputs, make_directory};
+use crate::files::{Begun, Inputs, make_directory, take_turn};
 use crate::logs;
 use crate::outcome::{Outcome, usage};
 use crate::output::line;
@@ -28,43 +30,32 @@ const PORT: u16 = 8080;
 /// Runs `hums demo`.
 pub fn run(args: &cli::Demo) -> Result<Outcome> {
     let flight = flight(args)?;
-    make_directory(&args.dir)?;
-    let [card, gs, decoded, page] =
-        [earlier::CARD, earlier::GROUND_STATION, earlier::DECODED, earlier::REPORT]
+    let [turn, card, gs, decoded, page] =
+        [".hums-demo", "card.img", "ground-station.bin", "decoded", "report.html"]
             .map(|name| args.dir.join(name));
-    let mut inputs = Inputs::none();
-    inputs.add_endpoint(&flight);
-    let mut place = earlier::Place::look(&args.dir, &inputs)?;
+    let inputs = inputs(args, &flight, [&card, &gs, &page], &decoded)?;
+    make_directory(&args.dir)?;
+    let turn = take_turn(&turn)?;
     line(&format!("1. {flight} goes in at the autopilot UART"))?;
     // Each demo begins with an empty card.
-    let parts = [InPlacePart::begin(&card)?, InPlacePart::begin(&gs)?];
-    let [card_part, gs_part] = parts.each_ref().map(InPlacePart::path);
-    let recorded = match record(&flight, card_part, gs_part) {
-        Ok(recorded) => recorded,
-        Err(error) => {
-            parts.iter().for_each(InPlacePart::discard);
-            return Err(error);
-        }
-    };
-    // What an earlier demo made goes once this one has something to put there.
-    place.clear()?;
-    place.note(&[(earlier::CARD, card_part), (earlier::GROUND_STATION, gs_part)])?;
-    parts.into_iter().try_for_each(InPlacePart::finish)?;
+    let parts = [Begun::of(&card, &inputs)?, Begun::of(&gs, &inputs)?];
+    let [card_part, gs_part] = parts.each_ref().map(Begun::path);
+    let recorded = record(&flight, card_part, gs_part)?;
+    parts.iter().try_for_each(Begun::check)?;
+    parts.into_iter().try_for_each(Begun::finish)?;
     line("")?;
     line("2. what was on the SD card")?;
-    let read = decode::run(&tables_of(&card, &decoded))?;
-    place.note_tables()?;
+    let read = decode::run(&tables_of(args, &card, &decoded))?;
     let page_of = cli::Report {
         inputs: vec![card.clone()],
         output: page.clone(),
         session: None,
         system: None,
         compare: false,
-        replace: false,
+        replace: args.replace,
         json: false,
     };
     report::run(&page_of)?;
-    place.note(&[(earlier::REPORT, &page)])?;
     line("")?;
     line("3. what it says of the flight")?;
     for log in &logs::find(std::slice::from_ref(&card), false)?.logs {
@@ -87,13 +78,31 @@ pub fn run(args: &cli::Demo) -> Result<Outcome> {
         line(&format!("5. the dashboard: hums live --input {} --open", shown(&card)))?;
         return Ok(outcome);
     }
+    drop(turn);
     line("5. the dashboard plays it, until Ctrl-C, at")?;
     dashboard(&card)?;
     Ok(outcome)
 }
 
+/// The flight, which none of the outputs may be, nor may it lie among the tables.
+fn inputs(args: &cli::Demo, flight: &Endpoint, outputs: [&PathBuf; 3], decoded: &Path) -> Result<Inputs> {
+    let mut inputs = Inputs::none().replacing(args.replace);
+    inputs.add_endpoint(flight);
+    outputs.into_iter().try_for_each(|output| inputs.refuse(output))?;
+    if let Endpoint::File(path) = flight
+        && let (Ok(path), Ok(decoded)) = (path.canonicalize(), decoded.canonicalize())
+        && path.starts_with(&decoded)
+    {
+        return Err(usage(format!(
+            "{flight}: lies in {}, where the demo writes; copy it elsewhere first",
+            decoded.display()
+        )));
+    }
+    Ok(inputs)
+}
+
 /// What becomes of the card.
-fn tables_of(card: &Path, decoded: &Path) -> cli::Decode {
+fn tables_of(args: &cli::Demo, card: &Path, decoded: &Path) -> cli::Decode {
     cli::Decode {
         salvage: false,
         inputs: vec![card.to_owned()],
@@ -102,7 +111,7 @@ fn tables_of(card: &Path, decoded: &Path) -> cli::Decode {
         from: None,
         to: None,
         message: Vec::new(),
-        replace: false,
+        replace: args.replace,
         json: false,
     }
 }
@@ -143,7 +152,6 @@ fn shown(path: &Path) -> String {
 
 fn flight(args: &cli::Demo) -> Result<Endpoint> {
     if let Some(input) = &args.input {
-        // A demo removes what an earlier one made: what came of a file can be made again.
         if !matches!(input, Endpoint::File(_)) {
             return Err(usage(format!(
                 "{input}: hums demo takes a file; hums sim records what comes otherwise"
