@@ -22,6 +22,8 @@ mod persistence;
 mod power;
 #[cfg(feature = "chip")]
 mod program;
+#[cfg(feature = "chip")]
+mod recompute;
 
 /// In the list of what was ignored: what was not tested is no success.
 #[cfg(not(feature = "chip"))]

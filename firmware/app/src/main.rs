@@ -40,7 +40,7 @@ static QUEUES: ConstStaticCell<Queues> = ConstStaticCell::new(Queues::new());
 /// In CCM: the hottest data there is, and no DMA reads it (see `memory.x`).
 #[unsafe(link_section = ".bss.ccm.writer")]
 static WRITER: ConstStaticCell<Writer> = ConstStaticCell::new(Writer::new());
-static MONITOR: ConstStaticCell<Monitor> = ConstStaticCell::new(Monitor::new(Params::defaults()));
+static MONITOR: StaticCell<Monitor> = StaticCell::new();
 static MONITORING: StaticCell<Monitoring<'static>> = StaticCell::new();
 static KEEPER: StaticCell<Keeper<'static, board::StoreFlash>> = StaticCell::new();
 static HANDOVER: StaticCell<Handover<'static>> = StaticCell::new();
@@ -74,7 +74,7 @@ fn start() -> board::Idle {
         boots,
         before: Before::default(),
     };
-    let monitor = MONITOR.take();
+    let monitor = Monitor::begin(MONITOR.uninit(), &Params::defaults());
     let (items_in, items_out) = status::MAILBOX.split();
     let keeper = restore(parts.store, items_out, parts.boot.cause, monitor);
     let entropy = parts.boot.entropy.unwrap_or_else(|| counted(keeper.mounts(), &identity));

@@ -3,6 +3,7 @@
 #![cfg_attr(not(test), no_std)]
 
 pub mod alert;
+mod apart;
 pub mod baseline;
 mod bytes;
 pub mod cause;

@@ -3,6 +3,9 @@
 mod components;
 mod stored;
 
+use core::mem::MaybeUninit;
+
+use crate::apart::{apart, place};
 use crate::baseline::{Baselines, Quantity};
 use crate::cells;
 use crate::component::{COMPONENTS_MAX, Component, Kind};
@@ -92,31 +95,39 @@ const _: () = assert!(size_of::<Monitor>() <= 16 * 1024);
 
 impl Monitor {
     /// Before the first observation.
-    pub const fn new(params: Params) -> Self {
-        Self {
-            params,
-            vehicle: Vehicle::unknown(),
-            flight: Flight::grounded(),
-            mishap: Mishap::new(),
-            derived: Derived::new(),
-            health: Health::new(),
-            usage: Usage::new(),
-            before: Lifetime::new(),
-            baselines: Baselines::new(),
-            exceedances: Exceedances::new(),
-            exposure: Exposure::new(),
-            components: [Component::NONE; COMPONENTS_MAX],
-            wear: [None; COMPONENTS_MAX],
-            wear_next: 0,
-            trends: Trends::new(),
-            snapshots: Snapshots::new(),
-            protect: Protect::new(),
-            saving: Saving::new(),
-            happenings: Happenings::new(),
-            before_tick: Before::NOTHING,
-            cells_told: false,
-            parameters_asked: false,
-        }
+    pub fn new(params: Params) -> Self {
+        *Self::begin(&mut MaybeUninit::uninit(), &params)
+    }
+
+    /// The same, made where it stays: never whole on the stack.
+    pub fn begin<'a>(place: &'a mut MaybeUninit<Self>, params: &Params) -> &'a mut Self {
+        place!(
+            place,
+            Monitor {
+                params: *params,
+                vehicle: Vehicle::unknown(),
+                flight: Flight::grounded(),
+                mishap: Mishap::new(),
+                derived: Derived::new(),
+                health: Health::new(),
+                usage: Usage::new(),
+                before: Lifetime::new(),
+                baselines: Baselines::new(),
+                exceedances: Exceedances::new(),
+                exposure: Exposure::new(),
+                components: [Component::NONE; COMPONENTS_MAX],
+                wear: [None; COMPONENTS_MAX],
+                wear_next: 0,
+                trends: Trends::new(),
+                snapshots: Snapshots::new(),
+                protect: Protect::new(),
+                saving: Saving::new(),
+                happenings: Happenings::new(),
+                before_tick: Before::NOTHING,
+                cells_told: false,
+                parameters_asked: false,
+            }
+        )
     }
 
     /// Takes what somebody on the link said; `false` when it is not of the monitored vehicle.
@@ -139,9 +150,9 @@ impl Monitor {
     fn begin_with_another(&mut self) {
         self.before_tick = Before { changes: self.vehicle.changes, ..Before::NOTHING };
         self.flight = Flight::grounded();
-        self.mishap = Mishap::new();
-        self.derived = Derived::new();
-        self.health = Health::new();
+        apart(|| self.mishap = Mishap::new());
+        apart(|| self.derived = Derived::new());
+        self.health.clear();
         self.protect = Protect::new();
         self.usage.break_off();
         self.parameters_asked = false;

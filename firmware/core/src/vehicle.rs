@@ -143,6 +143,8 @@ impl Default for Vehicle {
 
 impl Vehicle {
     /// Nothing known.
+    #[expect(clippy::inline_always, reason = "else it is on the stack twice: 2 KiB more")]
+    #[inline(always)]
     pub const fn unknown() -> Self {
         Self {
             source: None,

@@ -1,7 +1,7 @@
 //! MAVLink FTP: what a client asks, and the answers, byte for byte as they lie in `FILE_TRANSFER_PROTOCOL`
 //! (<https://mavlink.io/en/services/ftp.html>). Reading only.
 
-use crc::{Algorithm, Crc};
+use crc::{Algorithm, Crc, NoTable};
 
 use crate::packet::Fields;
 
@@ -16,8 +16,8 @@ pub const CHECKSUM: u8 = 14;
 pub const BURST: u8 = 15;
 
 /// The CRC-32 that MAVLink FTP means by `CalcFileCRC32`: the polynomial of Ethernet, reflected, but from 0 and without a
-/// final inversion, as PX4 (`crc32part` with 0) and `ArduPilot` (`crc_crc32` with 0) compute it.
-static CRC: Crc<u32> = Crc::<u32>::new(&Algorithm {
+/// final inversion, as PX4 (`crc32part` with 0) and `ArduPilot` (`crc_crc32` with 0) compute it. Bit by bit: a table is 1 KiB for what is seldom asked.
+static CRC: Crc<u32, NoTable> = Crc::<u32, NoTable>::new(&Algorithm {
     width: 32,
     poly: 0x04c1_1db7,
     init: 0,

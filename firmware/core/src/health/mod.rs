@@ -62,6 +62,13 @@ impl Health {
         Self { states: [const { State::new() }; STATES], looked_at: 0 }
     }
 
+    /// As if nothing had been seen.
+    pub(crate) fn clear(&mut self) {
+        let Self { states, looked_at } = self;
+        states.fill(State::new());
+        *looked_at = 0;
+    }
+
     /// One step of all checks, at least every 50 ms; each change of level is a finding, and so is an alarm that outlives the one that
     /// explained it.
     pub fn step(

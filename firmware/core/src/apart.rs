@@ -1,0 +1,27 @@
+//! Large values are made part by part, where they stay: a board's stack is as large as one of them, and a constant of it would be a
+//! copy in flash, zeros nearly all of it.
+
+/// Does this with a stack of its own: what it builds there is gone when the next thing is built.
+#[inline(never)]
+pub(crate) fn apart(act: impl FnOnce()) {
+    act();
+}
+
+/// Makes a structure in a place ([`core::mem::MaybeUninit`]) out of all its fields, one after the other; gives the reference to it. Who
+/// leaves a field out does not compile.
+macro_rules! place {
+    ($place:expr, $Whole:ident { $($part:ident: $value:expr),* $(,)? }) => {{
+        let place: &mut core::mem::MaybeUninit<$Whole> = $place;
+        let whole = place.as_mut_ptr();
+        $($crate::apart::apart(|| {
+            let part = $value;
+            // SAFETY: the place is ours alone and large enough; a field of it is written, nothing is read.
+            unsafe { (&raw mut (*whole).$part).write(part) }
+        });)*
+        let _all = |$($part),*| $Whole { $($part),* };
+        // SAFETY: `_all` names each field there is, and each of these was written.
+        unsafe { place.assume_init_mut() }
+    }};
+}
+
+pub(crate) use place;
