@@ -6,6 +6,7 @@ robust_parsing is off, so the first byte that is not part of a good frame ends t
   frames            all of them
   frames_by_sender  per "system/component"
   heartbeats        per "system/component/autopilot/type"
+  computer          the last ONBOARD_COMPUTER_STATUS, and how many there were
 """
 
 import collections
@@ -22,6 +23,7 @@ def main():
     mav = dialect.MAVLink(None)
     mav.robust_parsing = False
     senders, heartbeats, sequences, gaps = collections.Counter(), collections.Counter(), {}, 0
+    computer = {}
     with open(sys.argv[2], "rb") as stream:
         data = stream.read()
     for message in mav.parse_buffer(data) or []:
@@ -36,6 +38,8 @@ def main():
             sequences[sender] = message.get_seq()
         if message.get_type() == "HEARTBEAT":
             heartbeats[f"{sender}/{message.autopilot}/{message.type}"] += 1
+        if message.get_type() == "ONBOARD_COMPUTER_STATUS":
+            computer = dict(message.to_dict(), count=computer.get("count", 0) + 1)
     if mav.buf_len() != 0:
         sys.exit(f"the stream ends inside a frame: {mav.buf_len()} bytes left")
     print(json.dumps({
@@ -43,6 +47,7 @@ def main():
         "frames_by_sender": senders,
         "heartbeats": heartbeats,
         "sequence_gaps": gaps,
+        "computer": computer,
     }))
 
 

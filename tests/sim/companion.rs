@@ -1,6 +1,7 @@
 //! The box as a companion, against a ground station of pymavlink's.
 #![cfg(feature = "oracle")]
 
+use std::ffi::OsStr;
 use std::fs;
 use std::io::ErrorKind;
 use std::net::UdpSocket;
@@ -9,7 +10,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::time::Duration;
 
-use hums_tests::flights::own;
+use hums_tests::flights::{own, root};
 use hums_tests::oracle;
 use hums_tests::program::hums;
 use serde_json::Value;
@@ -213,6 +214,32 @@ fn mavproxy_lists_sets_downloads_and_signs() {
     let set = hums(["params", "sign", "--key", key, "--link", &address]).expect_code(&[0]);
     assert_eq!(set.text(), "key set\n");
     hums(["params", "get", "BAT_REM_WARN", "--key", key, "--link", &address]).expect_code(&[0]);
+}
+
+#[test]
+fn mavproxy_shows_what_the_box_says_with_the_module_and_nothing_without_it() {
+    let dir = tempfile::tempdir().unwrap();
+    let (card, stream) = (dir.path().join("card.img"), dir.path().join("stream.raw"));
+    let flight = root().join("tests/labelled/f40_baro_off.tlog.gz");
+    let arguments: [&OsStr; 7] = [
+        "sim".as_ref(),
+        "--input".as_ref(),
+        flight.as_os_str(),
+        "--sd".as_ref(),
+        card.as_os_str(),
+        "--gs".as_ref(),
+        stream.as_os_str(),
+    ];
+    hums(arguments).expect_code(&[0]);
+    let said = oracle::mavproxy_alerts(&stream, &root().join("docs/stations"), &dir.path().join("mavproxy"));
+    assert_eq!((&said["autopilot"], &said["loaded"]), (&true.into(), &true.into()), "{said}");
+    let texts = said["texts"].as_array().unwrap();
+    assert!(texts.contains(&"HUMS: autopilot warns: barometer".into()), "{said}");
+    assert_eq!(said["without"], serde_json::json!([]), "{said}");
+    assert_eq!(said["with"], said["texts"], "each, in its order: {said}");
+    assert_eq!(said["again"], said["texts"], "{said}");
+    let level = said["level"].as_str().unwrap();
+    assert!(level.contains("HUMS level: ") && !level.contains("not heard"), "{said}");
 }
 
 #[test]

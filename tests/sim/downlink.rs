@@ -29,6 +29,33 @@ fn the_stream_of_each_flight_parses_without_one_bad_frame() {
 }
 
 #[test]
+fn the_box_tells_how_it_is_doing_as_an_onboard_computer() {
+    let recording = Recording::make(Machine::Sim, &own("ap_quad_guided.tlog"), &[]);
+    let stream = oracle::ground_station(&recording.gs());
+    let told = &stream["computer"];
+    let seconds = told["uptime"].as_u64().unwrap() / 1_000;
+    let count = told["count"].as_u64().unwrap();
+    assert!((seconds / 12..=seconds / 9).contains(&count), "every ten seconds: {count} in {seconds} s");
+    let unknown = u32::MAX;
+    assert_eq!(told["storage_type"], serde_json::json!([4, unknown, unknown, unknown]), "{told}");
+    let (used, total) =
+        (told["storage_usage"][0].as_u64().unwrap(), told["storage_total"][0].as_u64().unwrap());
+    assert!((240..256).contains(&total) && used <= total, "a card of 256 MiB: {told}");
+    assert_eq!((&told["link_type"][0], &told["link_type"][1]), (&0.into(), &1.into()), "{told}");
+    let rate = |name: &str, link: usize| told[name][link].as_u64().unwrap();
+    // 921,600 and 57,600 baud; the budget is 2,000 bytes a second.
+    assert_eq!((rate("link_rx_max", 0), rate("link_tx_max", 1)), (90, 6), "{told}");
+    assert!(
+        (1..=90).contains(&rate("link_rx_rate", 0)) && (1..=2).contains(&rate("link_tx_rate", 1)),
+        "{told}"
+    );
+    for (name, nothing) in [("temperature_board", 127), ("ram_total", unknown), ("ram_usage", unknown)] {
+        assert_eq!(told[name], nothing, "{told}");
+    }
+    assert_eq!(told["cpu_cores"][1], 255, "{told}");
+}
+
+#[test]
 #[ignore = "further recordings (HUMS_FLIGHTS names no folder of them)"]
 fn the_stream_of_each_further_recording_parses_without_one_bad_frame() {
     for file in flights::further() {

@@ -12,6 +12,7 @@ mod card_trouble;
 mod companion;
 mod downlink;
 mod ending;
+mod file_dates;
 mod folders;
 mod hostile_input;
 mod live_server;
@@ -25,6 +26,7 @@ mod raw_device;
 mod round_trip;
 mod salvage;
 mod second_decoder;
+mod texts;
 mod usage;
 
 /// In the list of what was ignored: what was not tested is no success.

@@ -245,6 +245,12 @@ pub fn mavproxy(port: u16, folder: &Path) -> Value {
     json(&run("gs_mavproxy.py", &[PathBuf::from(port.to_string()), folder.to_owned()]))
 }
 
+/// Plays a recorded stream of the box to MAVProxy, without and with the module in this folder: see
+/// `tests/oracle/gs_mavproxy_alerts.py`.
+pub fn mavproxy_alerts(stream: &Path, modules: &Path, folder: &Path) -> Value {
+    json(&run("gs_mavproxy_alerts.py", &[stream.to_owned(), modules.to_owned(), folder.to_owned()]))
+}
+
 /// Downloads the oldest log to `out` as a ground station does, `loss` of all frames lost: see
 /// `tests/oracle/log_download.py`.
 pub fn log_download(port: u16, out: &Path, loss: f64) -> Value {

@@ -94,6 +94,7 @@ impl Release {
         self.build(&["--release", "--package=hums", "--target", WINDOWS_TARGET])?;
         files.push(read("hums.exe", &self.target().join(WINDOWS_TARGET).join("release/hums.exe"))?);
         files.push(self.sbom("hums.exe", "host-tools", &["--target", WINDOWS_TARGET])?);
+        files.push(read("mavproxy_hums.py", &self.tree.join("docs/stations/mavproxy_hums.py"))?);
         for licence in ["LICENSE-APACHE", "LICENSE-MIT"] {
             files.push(read(licence, &self.tree.join(licence))?);
         }

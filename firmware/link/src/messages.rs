@@ -75,6 +75,61 @@ pub fn autopilot_version(version: [u8; 3], git: &str, uid: &[u8; 12]) -> Packet 
     Packet::new(148).u64(0, CAPABILITIES).u64(8, short).u32(16, number).text(36, 8, git).bytes(60, uid)
 }
 
+/// How a computer is doing, as far as it knows: `None` is told as unknown.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct ComputerStatus {
+    /// Busy, percent.
+    pub cpu_percent: u8,
+    /// Used and total room on the card, MiB.
+    pub storage_mib: Option<(u32, u32)>,
+    /// The autopilot's port and the ground station's.
+    pub links: [LinkStatus; 2],
+}
+
+/// How much goes over a port.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct LinkStatus {
+    /// Its rate, baud.
+    pub baud: u32,
+    /// What we send, bytes a second.
+    pub tx: Option<u32>,
+    /// What comes, bytes a second.
+    pub rx: Option<u32>,
+}
+
+/// `ONBOARD_COMPUTER_STATUS`. Of memory it tells nothing, because its unit is MiB; of temperatures and fans nothing, because there are none.
+pub fn computer_status(now: Instant, status: &ComputerStatus) -> Packet {
+    /// Storage of this kind: a card that can be taken out.
+    const CARD: u32 = 4;
+    const UNKNOWN: &[u8] = &[0xFF; 16];
+    let micros = now.as_micros();
+    // From `cpu_cores` to `gpu_combined`; what is signed has its largest number where it is unknown.
+    let mut packet = Packet::new(390)
+        .u64(0, micros)
+        .u32(8, now.as_millis() as u32)
+        .bytes(12, &[0xFF; 56])
+        .bytes(92, &[0xFF; 96])
+        .bytes(197, UNKNOWN)
+        .bytes(213, UNKNOWN)
+        .bytes(229, &[0x7F; 9])
+        .u8(197, status.cpu_percent);
+    for fan in 0..4 {
+        packet = packet.u16(188 + 2 * fan, i16::MAX as u16);
+    }
+    if let Some((used, total)) = status.storage_mib {
+        packet = packet.u32(20, CARD).u32(36, used).u32(52, total);
+    }
+    // Both are UARTs: type 0, and 1 for the second one.
+    for (link, LinkStatus { baud, tx, rx }) in status.links.iter().enumerate() {
+        let kib = |bytes: u32| bytes.div_ceil(1_024);
+        let place = 4 * link;
+        packet = packet.u32(68 + place, link as u32);
+        packet = packet.u32(92 + place, tx.map_or(u32::MAX, kib)).u32(116 + place, rx.map_or(u32::MAX, kib));
+        packet = packet.u32(140 + place, kib(baud / 10)).u32(164 + place, kib(baud / 10));
+    }
+    packet
+}
+
 /// `PROTOCOL_VERSION`: MAVLink 2.0, and nothing older.
 pub fn protocol_version() -> Packet {
     Packet::new(300).u16(0, 200).u16(2, 200).u16(4, 200)
@@ -125,6 +180,7 @@ mod tests {
             command_long(511, &[1.0; 9], 1, 1),
             request_data_stream(1, 4, 1, 1),
             autopilot_version([0, 1, 2], "0123456789", &[7; 12]),
+            computer_status(Instant::from_millis(1), &ComputerStatus::default()),
             protocol_version(),
             log_entry(1, 1, 1, 1, 1),
             log_data(1, 0, &[1; 100]),

@@ -17,12 +17,13 @@ use hums_core::observation::{Feeds, Source};
 use hums_core::params::{Param, Params};
 use hums_core::time::{Instant, Span};
 use hums_core::usage::UsageCounter;
+use hums_dialect::wire::SIGNATURE_BYTES;
 
 use crate::frame::Frame;
-use crate::messages;
+use crate::messages::{self, ComputerStatus};
 use crate::outlet::{Class, Outlet};
 use crate::packet::Packet;
-use crate::telling::Telling;
+use crate::telling::{Fate, Telling};
 use crate::text::{Severity, TEXT_BYTES_MAX, Text};
 
 /// Forwarded messages: id and how long between two, in milliseconds (0: every one).
@@ -60,11 +61,16 @@ const FORWARDED: &[(u32, u16)] = &[
 const VALUES: usize = FORWARDED.len();
 /// All levels together.
 const STATE: usize = VALUES + 1;
-const TURNS: usize = STATE + 1;
+/// `ONBOARD_COMPUTER_STATUS`.
+const COMPUTER: usize = STATE + 1;
+const TURNS: usize = COMPUTER + 1;
 const VALUES_MS: u16 = 700;
 const STATE_MS: u16 = 2_000;
+const COMPUTER_MS: u16 = 10_000;
 /// `NAMED_VALUE_FLOAT` and `_INT` with their header.
 const VALUE_BYTES: usize = 30;
+/// `ONBOARD_COMPUTER_STATUS` with its header, and a signature.
+const COMPUTER_BYTES: usize = 250 + SIGNATURE_BYTES;
 
 /// Bytes that may wait at the port, findings apart: 50 ms at 57,600 baud.
 pub const WAITING_BYTES: u32 = 288;
@@ -113,6 +119,7 @@ const fn interval_ms(index: usize) -> u32 {
     (match index {
         VALUES => VALUES_MS,
         STATE => STATE_MS,
+        COMPUTER => COMPUTER_MS,
         _ => FORWARDED[index].1,
     }) as u32
 }
@@ -128,6 +135,8 @@ pub struct OwnFigures {
     pub queue_percent: f32,
     /// The longest the card took for one call, seconds.
     pub stall_s: f32,
+    /// What `ONBOARD_COMPUTER_STATUS` tells.
+    pub computer: ComputerStatus,
 }
 
 /// The summary stream.
@@ -232,11 +241,12 @@ impl Summary {
         self.outlet.fits_besides(now, class, bytes, first.1)
     }
 
-    /// Tells a finding that a pilot should hear of, now or as soon as the budget and the limit on texts (five in 30 s) allow.
+    /// Tells a finding that a pilot should hear of ([`crate::telling`]), now or as soon as the budget and its event allow.
     pub fn finding(&mut self, now: Instant, finding: &Finding, out: &mut impl FnMut(&[u8])) {
         // What was not told yet is out of date.
         self.waiting.retain(|other| (other.check, other.instance) != (finding.check, finding.instance));
-        if severity(finding).is_none() || !self.telling.is_news(finding) {
+        let is_news = self.telling.is_news(finding);
+        if severity(finding).is_none() || !is_news {
             return;
         }
         if self.waiting.is_full() {
@@ -254,18 +264,29 @@ impl Summary {
     }
 
     fn tell(&mut self, now: Instant, out: &mut impl FnMut(&[u8])) {
-        while let Some(finding) = self.waiting.first() {
-            let class = if finding.level == Level::Critical { Class::Critical } else { Class::Finding };
-            if !self.telling.has_room(now, finding.level) {
-                return;
+        let mut place = 0;
+        while let Some(finding) = self.waiting.get(place) {
+            match self.telling.fate(now, finding) {
+                Fate::Now => {}
+                Fate::Later => {
+                    place += 1;
+                    continue;
+                }
+                Fate::Never => {
+                    self.waiting.remove(place);
+                    continue;
+                }
             }
+            let class = if finding.level == Level::Critical { Class::Critical } else { Class::Finding };
             let severity = severity(finding).unwrap_or(Severity::Notice);
             let packet = messages::status_text(severity, text(finding).as_str());
             if !self.outlet.send(now, class, &packet, out) {
                 return;
             }
-            let told = self.waiting.remove(0);
+            let told = self.waiting.remove(place);
             self.telling.told(now, &told);
+            self.waiting.retain(|waits| !Telling::is_consequence(&told, waits));
+            place = 0;
         }
     }
 
@@ -284,15 +305,20 @@ impl Summary {
             self.heartbeat_at = Some(now);
         }
         let now_ms = now.as_millis() as u32;
-        for index in [STATE, VALUES] {
-            self.announce(index, now_ms, VALUE_BYTES);
-            if !self.has_turn(index, now, VALUE_BYTES) {
+        // Where it is longer than what may hold up a finding, or than a slow budget carries, it would wait for ever.
+        let has_room = COMPUTER_BYTES <= self.outlet.bulk_frame_max();
+        for (index, bytes) in [(STATE, VALUE_BYTES), (VALUES, VALUE_BYTES), (COMPUTER, COMPUTER_BYTES)] {
+            if index == COMPUTER && !has_room {
                 continue;
             }
-            let packet = if index == STATE {
-                messages::named_int(now, "HUMS_STATE", state(monitor))
-            } else {
-                value(now, monitor, &self.own, self.next_value)
+            self.announce(index, now_ms, bytes);
+            if !self.has_turn(index, now, bytes) {
+                continue;
+            }
+            let packet = match index {
+                STATE => messages::named_int(now, "HUMS_STATE", state(monitor)),
+                VALUES => value(now, monitor, &self.own, self.next_value),
+                _ => messages::computer_status(now, &self.own.computer),
             };
             if self.outlet.send(now, Class::Forward, &packet, out) {
                 self.turns[index].took(now_ms, interval_ms(index));

@@ -1,62 +1,188 @@
-//! Which findings a pilot hears of, and how many: one cause is told once, not everything that it brings with it.
+//! Which findings a pilot hears of: of one event at most three texts, and what is critical at once.
+//!
+//! An event is what goes wrong in one family ([`family`]) within [`EVENT`] of the first text of it. A mishap is an event until it is over.
 //!
 //! * A finding that another one explains ([`Finding::because`]) is recorded, and not told.
-//! * That something is over is told only of what was told.
-//! * In any [`SPAN`] at most [`TEXTS_MAX`] are told, the worst first; what is not critical leaves [`RESERVED`] of these. What waits is
-//!   told later, if it is still so.
+//! * A critical finding is never delayed. It is told where it asks for something that the event's texts did not ask for yet: the
+//!   fourth motor that is lost, or the pitch beside the roll, does not say LAND NOW again.
+//! * A warning, which needs nothing at once, waits for [`HOLD`]: where it becomes critical only that is told. Then it is the first text
+//!   of an event, or waits for the event's end, and is told if it is still so. So is what has no data, or is good again.
+//! * Of a mishap its first kind is told, and one more that asks for something else where nothing led to it; that it is down, and
+//!   where, comes by itself. What is mild and waits is a consequence, and is not told any longer.
+//! * That something is over is told only of what was told; that there are no data, only while no alarm is open.
+//! * What is not critical waits while an event goes on of which something critical was told, and at most [`MILD_MAX`] are told in any
+//!   [`SPAN`], the worst first.
 
-use hums_core::health::{Finding, Level};
+use hums_core::health::{self, Finding, Level, Subsystem};
 use hums_core::time::{Instant, Span};
 
-/// Texts in any span of this length, and how many of these only critical findings may use.
-const TEXTS_MAX: usize = 5;
-/// See [`TEXTS_MAX`].
+/// How long an event lasts, from its first text.
+const EVENT: Span = Span::from_secs(10);
+/// How long a warning waits for becoming critical.
+const HOLD: Span = Span::from_secs(1);
+/// What is not critical: texts in any span of this length.
+const MILD_MAX: usize = 3;
+/// See [`MILD_MAX`].
 const SPAN: Span = Span::from_secs(30);
-const RESERVED: usize = 2;
+/// Texts of a mishap, with one that led to it; that it is down comes beside them.
+const MISHAP_MAX: u8 = 2;
 /// Alarms that were told and are not over, of which more is known.
 const OPEN_MAX: usize = 16;
+
+/// What becomes of a finding that waits.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Fate {
+    /// It is told now.
+    Now,
+    /// It is told later, if it is still so.
+    Later,
+    /// It is in the record.
+    Never,
+}
+
+/// What goes wrong together: a motor that fails is seen in the attitude.
+const fn family(part: Subsystem) -> Subsystem {
+    if matches!(part, Subsystem::Attitude) { Subsystem::Propulsion } else { part }
+}
+
+/// What was told of one family.
+#[derive(Clone, Copy, Debug)]
+struct Event {
+    /// When its first text went, in milliseconds modulo 2^32.
+    begun_ms: u32,
+    /// Texts; 0: there is no event.
+    told: u8,
+    /// The numbers of the critical checks that were told.
+    critical: [Option<u8>; 3],
+}
+
+impl Event {
+    const NONE: Self = Self { begun_ms: 0, told: 0, critical: [None; 3] };
+
+    const fn is_running(&self, now: Instant) -> bool {
+        self.told > 0 && since(now, self.begun_ms) < EVENT.as_millis()
+    }
+
+    fn asked_for(&self, advice: &str) -> bool {
+        self.critical.iter().flatten().any(|number| self::advice(*number) == advice)
+    }
+}
 
 /// What was told.
 #[derive(Clone, Debug)]
 pub(crate) struct Telling {
-    /// When the last texts went.
-    times: heapless::Deque<Instant, TEXTS_MAX>,
-    /// Check and instance of the alarms that were told and are not over.
-    open: heapless::Vec<(&'static str, u8), OPEN_MAX>,
+    /// By family.
+    events: [Event; Subsystem::ALL.len()],
+    /// When the last texts went that were not critical, in milliseconds modulo 2^32.
+    mild: heapless::Deque<u32, MILD_MAX>,
+    /// The check's number, and the instance, of the alarms that were told and are not over.
+    open: heapless::Vec<(u8, u8), OPEN_MAX>,
 }
 
 impl Telling {
     pub(crate) const fn new() -> Self {
-        Self { times: heapless::Deque::new(), open: heapless::Vec::new() }
+        Self {
+            events: [Event::NONE; Subsystem::ALL.len()],
+            mild: heapless::Deque::new(),
+            open: heapless::Vec::new(),
+        }
     }
 
-    /// Whether a pilot is to hear of it.
-    pub(crate) fn is_news(&self, finding: &Finding) -> bool {
+    /// Whether a pilot is to hear of it, now or later.
+    pub(crate) fn is_news(&mut self, finding: &Finding) -> bool {
+        let Some(key) = key(finding) else { return finding.because.is_empty() };
         match finding.level {
-            Level::Ok => self.open.contains(&(finding.check, finding.instance)),
+            Level::Ok if finding.subsystem == Subsystem::Mishap => {
+                // It flies on, which is told by itself, or something new begins.
+                self.events[Subsystem::Mishap as usize] = Event::NONE;
+                false
+            }
+            Level::Ok => self.open.contains(&key),
+            Level::Stale => finding.because.is_empty() && self.open.is_empty(),
             _ => finding.because.is_empty(),
         }
     }
 
-    /// Whether one more may go now.
-    pub(crate) fn has_room(&mut self, now: Instant, level: Level) -> bool {
-        while self.times.front().is_some_and(|at| now.since(*at) >= SPAN) {
-            self.times.pop_front();
+    /// What becomes of it now.
+    pub(crate) fn fate(&mut self, now: Instant, finding: &Finding) -> Fate {
+        let event = &self.events[family(finding.subsystem) as usize];
+        let is_mishap = finding.subsystem == Subsystem::Mishap;
+        if finding.level == Level::Critical {
+            let is_running = if is_mishap { event.told > 0 } else { event.is_running(now) };
+            let advice = health::said(finding.check).map_or("", |said| said.advice);
+            let is_told = is_running && (event.asked_for(advice) || (is_mishap && event.told >= MISHAP_MAX));
+            return if is_told { Fate::Never } else { Fate::Now };
         }
-        let most = if level == Level::Critical { TEXTS_MAX } else { TEXTS_MAX - RESERVED };
-        self.times.len() < most
+        if is_mishap {
+            return Fate::Never;
+        }
+        let is_held = finding.level == Level::Warning && now.since(finding.at) < HOLD;
+        let is_busy = event.is_running(now)
+            || self.events.iter().any(|event| event.critical[0].is_some() && event.is_running(now));
+        while self.mild.front().is_some_and(|at_ms| since(now, *at_ms) >= SPAN.as_millis()) {
+            self.mild.pop_front();
+        }
+        if is_held || is_busy || self.mild.is_full() { Fate::Later } else { Fate::Now }
+    }
+
+    /// Whether what waits is not told any longer once this was: a mishap, and what it brings with it.
+    pub(crate) fn is_consequence(told: &Finding, waits: &Finding) -> bool {
+        told.subsystem == Subsystem::Mishap
+            && waits.level != Level::Critical
+            && health::is_of_mishap(waits.subsystem)
     }
 
     /// It went.
     pub(crate) fn told(&mut self, now: Instant, finding: &Finding) {
-        // There was room.
-        let _ = self.times.push_back(now);
-        self.open.retain(|open| *open != (finding.check, finding.instance));
-        if matches!(finding.level, Level::Warning | Level::Critical) {
+        let is_mishap = finding.subsystem == Subsystem::Mishap;
+        let is_led_to = is_mishap && self.events.iter().any(|event| event.is_running(now));
+        let now_ms = now.as_millis() as u32;
+        let event = &mut self.events[family(finding.subsystem) as usize];
+        let goes_on = if is_mishap { event.told > 0 } else { event.is_running(now) };
+        if !goes_on {
+            *event = Event { begun_ms: now_ms, told: u8::from(is_led_to), ..Event::NONE };
+        }
+        event.told = event.told.saturating_add(1);
+        let key = key(finding);
+        if finding.level == Level::Critical {
+            if let Some(free) = event.critical.iter_mut().find(|number| number.is_none()) {
+                *free = key.map(|(number, _)| number);
+            }
+        } else {
+            // There was room.
+            let _ = self.mild.push_back(now_ms);
+        }
+        let Some(key) = key else { return };
+        self.open.retain(|open| *open != key);
+        if is_mishap {
+            self.open.retain(|(number, _)| !part(*number).is_some_and(health::is_of_mishap));
+        } else if matches!(finding.level, Level::Warning | Level::Critical) {
             if self.open.is_full() {
                 self.open.remove(0);
             }
-            let _ = self.open.push((finding.check, finding.instance));
+            let _ = self.open.push(key);
         }
     }
+}
+
+/// Milliseconds since a moment that is known modulo 2^32.
+const fn since(now: Instant, at_ms: u32) -> u64 {
+    (now.as_millis() as u32).wrapping_sub(at_ms) as u64
+}
+
+/// The number of a finding's check in the tables, and its instance.
+fn key(finding: &Finding) -> Option<(u8, u8)> {
+    let number = health::checks().position(|check| check.name == finding.check)?;
+    Some((number as u8, finding.instance))
+}
+
+/// The part that a check is of, by its number.
+fn part(number: u8) -> Option<Subsystem> {
+    Some(health::checks().nth(usize::from(number))?.subsystem)
+}
+
+/// What a critical finding asks the pilot for.
+fn advice(number: u8) -> &'static str {
+    let check = health::checks().nth(usize::from(number));
+    check.and_then(|check| health::said(check.name)).map_or("", |said| said.advice)
 }

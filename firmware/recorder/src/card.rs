@@ -3,7 +3,8 @@
 use core::ops::ControlFlow;
 
 use embedded_sdmmc::{
-    Block, BlockDevice, BlockIdx, Mode, RawDirectory, RawVolume, ShortFileName, VolumeIdx, VolumeManager,
+    Block, BlockDevice, BlockIdx, Mode, RawDirectory, RawVolume, ShortFileName, TimeSource as _, VolumeIdx,
+    VolumeManager,
 };
 
 pub use crate::card_error::CardError;
@@ -24,6 +25,12 @@ pub const SEGMENT_BYTES_MAX: u32 = 8 * 1024 * 1024;
 
 /// The attribute of a file that lists do not show.
 const HIDDEN: u8 = 2;
+
+/// A directory entry's bytes, and where in it stand the attributes, when it was made (time and date), and when it was written.
+const ENTRY_BYTES: usize = 32;
+const ATTRIBUTES: usize = LogName::SHORT_BYTES;
+const MADE: usize = 14;
+const WRITTEN: usize = 22;
 
 /// One log segment in the card's root directory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -223,14 +230,14 @@ impl<'a, D: BlockDevice> Card<'a, D> {
         }
     }
 
-    /// Gives an existing segment a new name in one block write, and opens it to be written anew.
+    /// Gives an existing segment a new name, and the date of now, in one block write, and opens it to be written anew.
     pub fn recycle(&mut self, old: &LogEntry, name: LogName) -> Result<(), CardError<D::Error>> {
         self.open = None;
+        let date = self.clock.get_timestamp().serialize_to_fat();
         self.change_entry(old, |entry| {
-            if let Some((short, attributes)) = entry.split_first_chunk_mut() {
-                *short = name.short();
-                attributes[0] &= !HIDDEN;
-            }
+            entry[..LogName::SHORT_BYTES].copy_from_slice(&name.short());
+            entry[ATTRIBUTES] &= !HIDDEN;
+            set_date(entry, date);
         })?;
         self.open(name)
     }
@@ -238,16 +245,27 @@ impl<'a, D: BlockDevice> Card<'a, D> {
     /// Marks a segment as hidden, in one block write: it stays as it is, and the open one stays open.
     pub fn hide(&mut self, segment: &LogEntry) -> Result<(), CardError<D::Error>> {
         let open = self.open;
-        self.change_entry(segment, |entry| entry[LogName::SHORT_BYTES] |= HIDDEN)?;
+        self.change_entry(segment, |entry| entry[ATTRIBUTES] |= HIDDEN)?;
         self.open = open;
         Ok(())
     }
 
-    /// Changes name and attributes of a directory entry that is still as it was.
+    /// Gives the open segment the date of now, in one block write. It stays open.
+    pub(crate) fn date_open(&mut self) -> Result<(), CardError<D::Error>> {
+        let open = self.open.ok_or(CardError::NotOpen)?;
+        let mut found = None;
+        self.logs(|entry| found = found.or((entry.name == open.name).then_some(entry)))?;
+        let date = self.clock.get_timestamp().serialize_to_fat();
+        self.change_entry(&found.ok_or(CardError::NotFound)?, |entry| set_date(entry, date))?;
+        self.open = Some(open);
+        Ok(())
+    }
+
+    /// Changes name, attributes or dates of a directory entry that is still as it was.
     fn change_entry(
         &mut self,
         old: &LogEntry,
-        change: impl FnOnce(&mut [u8; LogName::SHORT_BYTES + 1]),
+        change: impl FnOnce(&mut [u8; ENTRY_BYTES]),
     ) -> Result<(), CardError<D::Error>> {
         let old_short = old.name.short();
         let at = old.offset as usize;
@@ -361,14 +379,20 @@ impl<'a, D: BlockDevice> Card<'a, D> {
     }
 
     /// Counts a little further how much of the card logs can have, one block of the FAT at a call; the share in
-    /// thousandths once all of it is counted.
-    pub(crate) fn count_room(&mut self) -> Result<Option<u32>, CardError<D::Error>> {
+    /// thousandths once all of it is counted, and how many MiB of it are in use, by logs too, and how many there are.
+    pub(crate) fn count_room(&mut self) -> Result<Option<(u32, [u32; 2])>, CardError<D::Error>> {
         let mut room = self.room;
         let counted = self.manager()?.device(|gate| room.count(gate));
         self.room = room;
         let Some(free) = counted? else { return Ok(None) };
         let room = u64::from(free) + u64::from(self.log_clusters()?);
-        Ok(Some((room * 1000 / u64::from(self.layout.clusters)).min(1000) as u32))
+        let clusters = self.layout.clusters;
+        let permille = (room * 1000 / u64::from(clusters)).min(1000) as u32;
+        let mib = |clusters: u32| {
+            (u64::from(clusters) * u64::from(self.layout.cluster_blocks) * u64::from(Block::LEN_U32) >> 20)
+                as u32
+        };
+        Ok(Some((permille, [clusters.saturating_sub(free), clusters].map(mib))))
     }
 
     /// So many clusters at least the logs have. None has more than a segment can have, whatever its entry says.
@@ -379,6 +403,13 @@ impl<'a, D: BlockDevice> Card<'a, D> {
             clusters = clusters.saturating_add(entry.bytes.min(SEGMENT_BYTES_MAX).div_ceil(cluster_bytes));
         })?;
         Ok(clusters)
+    }
+}
+
+/// When it was made and when it was written: the same.
+fn set_date(entry: &mut [u8; ENTRY_BYTES], date: [u8; 4]) {
+    for at in [MADE, WRITTEN] {
+        entry[at..at + 4].copy_from_slice(&date);
     }
 }
 

@@ -101,7 +101,7 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
                 }
             }
             (self.segments.is_open, self.room_known) = (false, false);
-            self.status.set_room_permille(None);
+            self.status.set_room(None);
         }
         if self.segments.is_open {
             return Written::Done;
@@ -194,12 +194,13 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
         self.status.count_write_errors(self.slot.take_retries());
     }
 
-    /// With nothing to write: looks for where the session before ended, once the session has a sector on the card, and counts
-    /// a little further how much room there is on the card.
+    /// With nothing to write: looks for where the session before ended, once the session has a sector on the card, gives the
+    /// segment its date, once it is known, and counts a little further how much room there is on the card.
     pub fn idle(&mut self) {
         let Some(card) = self.slot.card() else { return };
         if self.segments.has_sector() {
             self.segments.look_before(card);
+            self.segments.date(card);
         }
         if self.room_known {
             return;
@@ -207,7 +208,7 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
         match card.count_room() {
             Ok(None) => {}
             Ok(room) => {
-                self.status.set_room_permille(room);
+                self.status.set_room(room);
                 self.room_known = true;
             }
             // The next write meets the same trouble and deals with it.

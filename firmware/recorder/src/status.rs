@@ -87,6 +87,8 @@ pub struct CardStatus {
     busy_since_ms: AtomicU32,
     /// Thousandths of the card that logs can have.
     room: AtomicU32,
+    used_mib: AtomicU32,
+    total_mib: AtomicU32,
     group_wanted: AtomicBool,
     format_wanted: AtomicBool,
     /// From this sector on only the latest are kept; [`KEEP_ALL`]: all are.
@@ -132,6 +134,8 @@ pub struct CardReading {
     /// The share of the card that logs can have, in thousandths: free clusters and those of logs. `None` until the
     /// file allocation table was counted, which takes a while on a large card.
     pub room_permille: Option<u32>,
+    /// What was in use when that was counted, logs included, and all there is, in MiB.
+    pub storage_mib: Option<(u32, u32)>,
 }
 
 impl Default for CardStatus {
@@ -157,6 +161,8 @@ impl CardStatus {
             stall_ms_max: AtomicU32::new(0),
             busy_since_ms: AtomicU32::new(IDLE),
             room: AtomicU32::new(UNCOUNTED),
+            used_mib: AtomicU32::new(0),
+            total_mib: AtomicU32::new(0),
             group_wanted: AtomicBool::new(false),
             format_wanted: AtomicBool::new(false),
             waiting_from: AtomicU32::new(KEEP_ALL),
@@ -187,6 +193,11 @@ impl CardStatus {
             sectors_lost: self.sectors_lost.load(Ordering::Relaxed),
             stall_ms_max: self.stall_ms_max.load(Ordering::Relaxed),
             room_permille: Some(self.room.load(Ordering::Relaxed)).filter(|room| *room != UNCOUNTED),
+            storage_mib: Some((
+                self.used_mib.load(Ordering::Relaxed),
+                self.total_mib.load(Ordering::Relaxed),
+            ))
+            .filter(|(_, total)| *total > 0),
         }
     }
 
@@ -218,9 +229,12 @@ impl CardStatus {
         self.frames_lost.fetch_add(frames, Ordering::Relaxed);
     }
 
-    /// Notes how much of the card logs can have, in thousandths; `None`: not counted.
-    pub(crate) fn set_room_permille(&self, room: Option<u32>) {
-        self.room.store(room.unwrap_or(UNCOUNTED), Ordering::Relaxed);
+    /// Notes how much of the card logs can have, in thousandths, and how many MiB are in use and there; `None`: not counted.
+    pub(crate) fn set_room(&self, room: Option<(u32, [u32; 2])>) {
+        let (permille, [used, total]) = room.unwrap_or((UNCOUNTED, [0; 2]));
+        self.used_mib.store(used, Ordering::Relaxed);
+        self.total_mib.store(total, Ordering::Relaxed);
+        self.room.store(permille, Ordering::Relaxed);
     }
 
     /// A service of the card begins; [`Self::end_service`] is to follow.
@@ -309,6 +323,11 @@ impl CardStatus {
     /// Tells the date for directory entries, in seconds since 1970 UTC.
     pub fn set_utc_secs(&self, utc_secs: u32) {
         self.fat_time.store(utc_secs, Ordering::Relaxed);
+    }
+
+    /// Whether the date was told.
+    pub(crate) fn is_utc_known(&self) -> bool {
+        self.fat_time.load(Ordering::Relaxed) != 0
     }
 }
 

@@ -91,7 +91,7 @@ const ROWS: &[(&[&str], &[&str])] = &[
 ];
 
 /// Whether a mishap explains what a part says.
-const fn is_of_mishap(part: Subsystem) -> bool {
+pub const fn is_of_mishap(part: Subsystem) -> bool {
     matches!(
         part,
         Subsystem::Propulsion

@@ -24,7 +24,7 @@ mod vocabulary;
 
 use check::Change;
 pub use check::{CLEAR, CLEAR_MAX, CLEAR_MAX_ALWAYS, Check, Side, State, When};
-pub use consequence::because;
+pub use consequence::{because, is_of_mishap};
 pub use finding::{Finding, Level, Subsystem};
 pub use inputs::Inputs;
 pub use tables::{check_named, checks, instances};

@@ -192,6 +192,8 @@ pub(super) const CHECKS: &[Check] = &[
     Check {
         name: "gps_speed",
         unit: "m/s",
+        // Never stale: only what moves says something.
+        stale_after: None,
         side: Side::Above,
         warn: Some(Param::GpsSpeedWarn),
         hysteresis: 0.2,

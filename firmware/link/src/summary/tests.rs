@@ -222,24 +222,39 @@ fn the_state_holds_every_subsystem() {
     assert!(VALUES_TOLD.iter().all(|(name, _)| name.len() <= 10));
 }
 
-/// What is told of findings that come at these seconds: their instances, by second.
-fn told(findings: &[(u64, u8, Level, Level, &'static str)]) -> Vec<(u64, u8)> {
+/// A finding that comes at these tenths of a second: check, instance, level, the one before.
+type Comes = (u64, &'static str, u8, Level, Level);
+
+/// What is told of findings: tenths of a second, and the text after our name.
+fn told(findings: &[Comes]) -> Vec<(u64, String)> {
+    told_because(findings, "")
+}
+
+fn told_because(findings: &[Comes], because: &'static str) -> Vec<(u64, String)> {
     let mut summary = Summary::new(&Params::defaults());
     let monitor = Monitor::new(Params::defaults());
     let mut told = Vec::new();
-    for now_s in 0..180 {
-        let now = Instant::from_millis(now_s * 1_000);
-        // The number after the word of a STATUSTEXT.
+    for tenths in 0..1_800 {
+        let now = Instant::from_millis(tenths * 100);
         let mut out = |bytes: &[u8]| {
-            let word = b"battery ";
-            let place = bytes.windows(word.len()).position(|found| found == word);
-            let digit = place.and_then(|place| bytes.get(place + word.len()));
-            if let (Some(digit), Some(253)) = (digit, bytes.get(7)) {
-                told.push((now_s, digit - b'1'));
+            let text = bytes.get(11..bytes.len().saturating_sub(2)).unwrap_or_default();
+            if let (Some(253), Some(text)) = (bytes.get(7), text.strip_prefix(b"HUMS: ")) {
+                told.push((tenths, String::from_utf8_lossy(text).trim_end_matches('\0').to_owned()));
             }
         };
-        for (_, instance, level, previous, because) in findings.iter().filter(|(at_s, ..)| *at_s == now_s) {
-            let finding = Finding { instance: *instance, previous: *previous, because, ..finding(*level) };
+        for (_, check, instance, level, previous) in findings.iter().filter(|(at, ..)| *at == tenths) {
+            let check = health::check_named(check).expect("a check");
+            let finding = Finding {
+                at: now,
+                subsystem: check.subsystem,
+                check: check.name,
+                instance: *instance,
+                previous: *previous,
+                unit: "",
+                value: f32::NAN,
+                because,
+                ..finding(*level)
+            };
             summary.finding(now, &finding, &mut out);
         }
         summary.tick(now, &monitor, &mut out);
@@ -247,30 +262,125 @@ fn told(findings: &[(u64, u8, Level, Level, &'static str)]) -> Vec<(u64, u8)> {
     told
 }
 
+fn texts(told: &[(u64, String)]) -> Vec<(u64, &str)> {
+    told.iter().map(|(at, text)| (*at, text.as_str())).collect()
+}
+
+const WARNING: (Level, Level) = (Level::Warning, Level::Ok);
+const CRITICAL: (Level, Level) = (Level::Critical, Level::Warning);
+
+fn comes(at: u64, check: &'static str, instance: u8, (level, previous): (Level, Level)) -> Comes {
+    (at, check, instance, level, previous)
+}
+
 #[test]
-fn in_any_half_minute_at_most_five_are_told_and_the_worst_first() {
-    let warnings = (0..6).map(|instance| (0, instance, Level::Warning, Level::Ok, ""));
-    let critical = (6..9).map(|instance| (1, instance, Level::Critical, Level::Ok, ""));
-    let told = told(&warnings.chain(critical).collect::<Vec<_>>());
-    assert_eq!(told, [(0, 0), (0, 1), (0, 2), (1, 6), (1, 7), (30, 8), (31, 3), (31, 4), (60, 5)]);
+fn a_warning_that_becomes_critical_is_one_text_and_so_is_what_asks_for_the_same() {
+    let told = told(&[
+        comes(20, "roll_rate", 0, WARNING),
+        comes(22, "roll_rate", 0, CRITICAL),
+        comes(23, "pitch_rate", 0, CRITICAL),
+        comes(24, "motor_imbalance", 1, CRITICAL),
+        comes(30, "motor_output", 1, CRITICAL),
+        // Another family.
+        comes(31, "batt_remaining", 0, CRITICAL),
+    ]);
+    let expected = [
+        (22, "roll does not follow, LAND NOW"),
+        (24, "motor 2 speed differs, LAND"),
+        (31, "battery 1 low, LAND NOW"),
+    ];
+    assert_eq!(texts(&told), expected);
+}
+
+#[test]
+fn a_critical_finding_is_told_at_once_whatever_was_told_before() {
+    let checks =
+        ["batt_remaining", "gps_fix", "ekf_test_ratio", "motor_loss", "vibration", "heartbeat", "load"];
+    let before = ["cell_deviation", "gps_hdop", "esc_errors"].map(|check| comes(0, check, 0, WARNING));
+    let all: Vec<_> = before.into_iter().chain(checks.map(|check| comes(40, check, 0, CRITICAL))).collect();
+    let told = told(&all);
+    let at_once = told.iter().filter(|(at, _)| *at == 40).count();
+    assert_eq!(at_once, checks.len(), "{told:?}");
+}
+
+#[test]
+fn warnings_wait_for_their_events_end_and_three_are_told_in_half_a_minute() {
+    let warnings = ["gps_hdop", "gps_satellites", "baro_noise", "vibration_rise", "esc_errors", "batt_fault"];
+    let told = told(&warnings.map(|check| comes(0, check, 0, WARNING)));
+    let expected = [
+        (10, "GPS 1 poor geometry"),
+        (10, "vibration rose"),
+        (10, "ESC 1 errors"),
+        // When the first ones are half a minute ago.
+        (310, "GPS 1 few satellites"),
+        (310, "battery 1 fault"),
+        (410, "barometer noisy"),
+    ];
+    assert_eq!(texts(&told), expected);
+}
+
+#[test]
+fn what_is_not_critical_waits_for_the_end_of_what_is() {
+    let told = told(&[comes(0, "gps_fix", 0, CRITICAL), comes(5, "vibration_rise", 0, WARNING)]);
+    assert_eq!(texts(&told), [(0, "GPS 1 position lost, FLY MANUALLY"), (100, "vibration rose")]);
+}
+
+#[test]
+fn a_mishap_is_told_once_and_what_waits_is_its_consequence() {
+    let mishap = [
+        comes(0, "compass_unused", 0, WARNING),
+        comes(9, "baro_noise", 0, WARNING),
+        comes(15, "roll_rate", 0, CRITICAL),
+        comes(20, "sinking", 0, CRITICAL),
+        comes(25, "impact", 0, CRITICAL),
+        comes(30, "overturned", 0, CRITICAL),
+        comes(35, "tumbling", 0, CRITICAL),
+        comes(400, "roll_rate", 0, (Level::Ok, Level::Critical)),
+    ];
+    let led_to = [
+        (10, "EKF dropped compass"),
+        (15, "roll does not follow, LAND NOW"),
+        (20, "sinking fast, ADD THRUST"),
+    ];
+    assert_eq!(texts(&told(&mishap)), led_to, "one kind, where something led to it");
+    let alone = &mishap[3..7];
+    let expected = [(20, "sinking fast, ADD THRUST"), (25, "impact, DISARM")];
+    assert_eq!(texts(&told(alone)), expected, "and one that asks for something else");
+    let again = [
+        comes(0, "sinking", 0, CRITICAL),
+        comes(300, "sinking", 0, (Level::Ok, Level::Critical)),
+        comes(400, "sinking", 0, CRITICAL),
+    ];
+    let expected = [(0, "sinking fast, ADD THRUST"), (400, "sinking fast, ADD THRUST")];
+    assert_eq!(texts(&told(&again)), expected, "and the next one as the first");
 }
 
 #[test]
 fn what_another_one_explains_is_not_told_nor_that_it_is_over() {
-    let both = [
-        (1, 0, Level::Critical, Level::Ok, ""),
-        (1, 1, Level::Critical, Level::Ok, "gps_fix"),
-        (5, 0, Level::Ok, Level::Critical, ""),
-        (5, 1, Level::Ok, Level::Critical, ""),
-    ];
-    assert_eq!(told(&both), [(1, 0), (5, 0)]);
+    let explained =
+        [comes(10, "gps_fix", 0, CRITICAL), comes(50, "gps_fix", 0, (Level::Ok, Level::Critical))];
+    assert_eq!(told_because(&explained, "heartbeat"), []);
+    let expected = [(10, "GPS 1 position lost, FLY MANUALLY"), (110, "ok: GPS 1 fix")];
+    assert_eq!(texts(&told(&explained)), expected, "where nothing explains it, both");
 }
 
 #[test]
 fn what_is_over_before_it_was_told_is_not_told() {
-    let mut findings: Vec<_> = (0..4).map(|instance| (0, instance, Level::Warning, Level::Ok, "")).collect();
-    findings.push((2, 3, Level::Ok, Level::Warning, ""));
-    assert_eq!(told(&findings), [(0, 0), (0, 1), (0, 2)]);
+    let over = [comes(0, "gps_hdop", 0, WARNING), comes(8, "gps_hdop", 0, (Level::Ok, Level::Warning))];
+    assert_eq!(told(&over), []);
+}
+
+#[test]
+fn that_there_are_no_data_is_told_while_nothing_is_wrong() {
+    let stale = (Level::Stale, Level::Ok);
+    let told = told(&[
+        comes(0, "gps_hdop", 0, stale),
+        comes(200, "gps_fix", 0, CRITICAL),
+        comes(250, "gps_accuracy", 0, stale),
+        comes(260, "batt_remaining", 0, stale),
+    ]);
+    let expected = [(0, "no data: GPS 1 dilution of precision"), (200, "GPS 1 position lost, FLY MANUALLY")];
+    assert_eq!(texts(&told), expected);
 }
 
 #[test]
@@ -296,12 +406,16 @@ fn quantities_are_printed_as_the_formatting_of_numbers_does() {
 
 #[test]
 fn what_is_less_urgent_takes_no_place_of_what_waits() {
-    let critical = (0..9).map(|instance| (0, instance, Level::Critical, Level::Ok, ""));
-    // Of these the numbers are beyond the one digit that is looked at; all wait.
-    let more = (9..21).map(|instance| (0, instance, Level::Critical, Level::Ok, ""));
-    let warning = [(0, 1, Level::Warning, Level::Critical, "")];
-    let all: Vec<_> = critical.chain(more).collect();
-    let before = told(&all);
-    let late: Vec<_> = all.into_iter().chain(warning).collect();
-    assert_eq!(told(&late), before, "a warning is told after them, or not at all");
+    let mut summary = Summary::new(&Params::defaults());
+    summary.outlet.set(Instant::ZERO, 0, 57_600);
+    for instance in 0..WAITING_MAX as u8 + 4 {
+        let critical = Finding { instance, ..finding(Level::Critical) };
+        summary.finding(Instant::ZERO, &critical, &mut |_| panic!("there is no budget"));
+    }
+    let before: Vec<_> = summary.waiting.iter().map(|finding| finding.instance).collect();
+    let warning = Finding { instance: 99, ..finding(Level::Warning) };
+    summary.finding(Instant::ZERO, &warning, &mut |_| panic!("there is no budget"));
+    let after: Vec<_> = summary.waiting.iter().map(|finding| finding.instance).collect();
+    assert_eq!((after.len(), summary.dropped()), (WAITING_MAX, 5));
+    assert_eq!(before, after);
 }

@@ -4,6 +4,7 @@ use hums_blackbox::SECTOR_BYTES;
 use hums_blackbox::record::{Lost, Stats};
 use hums_core::status::{RecorderStatus, Recording};
 use hums_core::time::{Instant, Span};
+use hums_link::messages::{ComputerStatus, LinkStatus};
 use hums_link::summary::OwnFigures;
 use hums_recorder::status::{CardState, CardStatus};
 
@@ -13,6 +14,9 @@ use crate::port::{PortReading, PortStatus};
 use crate::queues::{
     FRAME_QUEUE_BYTES, GS_QUEUE_BYTES, GsIn, SECTOR_QUEUE_BYTES, SECTOR_QUEUE_SECTORS, SectorsIn,
 };
+
+/// Over how long the rates of the ports are counted.
+const RATES: Span = Span::from_secs(5);
 
 /// How long a card may take to be found before it counts as missing.
 const START: Span = Span::from_secs(3);
@@ -48,6 +52,31 @@ pub(super) struct Figures<'a> {
     sums: Sums,
     pub(super) machine: Machine,
     queue_sectors_max: usize,
+    rates: Rates,
+}
+
+/// How much goes over the ports, bytes a second, by what was counted every [`RATES`].
+#[derive(Clone, Copy, Debug, Default)]
+struct Rates {
+    /// When it was counted last, in milliseconds modulo 2^32, and the counts.
+    at_ms: u32,
+    counts: [u32; 2],
+    /// What comes from the autopilot, and what goes to the ground station's port.
+    rates: [u32; 2],
+}
+
+impl Rates {
+    fn count(&mut self, now: Instant, counts: [u32; 2]) {
+        let now_ms = now.as_millis() as u32;
+        let span_ms = now_ms.wrapping_sub(self.at_ms);
+        if u64::from(span_ms) < RATES.as_millis() {
+            return;
+        }
+        for (rate, (count, before)) in self.rates.iter_mut().zip(counts.into_iter().zip(self.counts)) {
+            *rate = (u64::from(count.wrapping_sub(before)) * 1_000 / u64::from(span_ms)) as u32;
+        }
+        (self.at_ms, self.counts) = (now_ms, counts);
+    }
 }
 
 impl<'a> Figures<'a> {
@@ -60,17 +89,30 @@ impl<'a> Figures<'a> {
             sums: Sums::default(),
             machine: Machine::default(),
             queue_sectors_max: 0,
+            rates: Rates::default(),
         }
     }
 
-    /// In percent, with the worst of the queues and of the card: for the summary stream.
-    pub(super) fn own(&self, card: &CardStatus) -> OwnFigures {
+    /// In percent, with the worst of the queues and of the card: for the summary stream. `bauds` are the rates of the autopilot's
+    /// port and of the ground station's.
+    pub(super) fn own(&mut self, now: Instant, card: &CardStatus, bauds: [u32; 2], gs: &GsIn) -> OwnFigures {
         let Machine { cpu_permille, stack_bytes_max, stack_bytes, .. } = self.machine;
+        self.rates.count(now, [self.port_before.bytes, gs.bytes() as u32]);
+        let [from_autopilot, to_gs] = self.rates.rates;
+        let [autopilot, ground] = bauds;
         OwnFigures {
             cpu_percent: f32::from(cpu_permille) / 10.0,
             stack_percent: 100.0 * stack_bytes_max as f32 / stack_bytes.max(1) as f32,
             queue_percent: 100.0 * self.queue_sectors_max as f32 / SECTOR_QUEUE_SECTORS as f32,
             stall_s: card.read().stall_ms_max as f32 / 1_000.0,
+            computer: ComputerStatus {
+                cpu_percent: cpu_permille.div_ceil(10).min(100) as u8,
+                storage_mib: card.read().storage_mib,
+                links: [
+                    LinkStatus { baud: autopilot, tx: None, rx: Some(from_autopilot) },
+                    LinkStatus { baud: ground, tx: Some(to_gs), rx: None },
+                ],
+            },
         }
     }
 

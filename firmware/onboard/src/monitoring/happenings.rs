@@ -92,6 +92,9 @@ fn mishap(
     };
     let report = book.monitor.mishap().report(change);
     book.journal.record(now, &Record::Event(Event { number, text: &report.text() }), sectors);
-    notices.announce(Notice::Mishap(report));
+    // That it began is told as a finding.
+    if !matches!(change, Change::Began(_)) {
+        notices.announce(Notice::Mishap(report));
+    }
     marks.at_once(Resting::Mishap);
 }

@@ -275,7 +275,7 @@ impl<'a> Monitoring<'a> {
         let Self { book, summary, companion, notices, figures, identity, .. } = self;
         let is_known = book.monitor.vehicle().source.is_some();
         notices.tell(now, is_known, &mut summary.outlet, gs);
-        summary.own = figures.own(book.card);
+        summary.own = figures.own(now, book.card, [companion.baud(), summary.outlet.baud()], gs);
         summary.tick(now, book.monitor, &mut |bytes| gs.tell(bytes));
         companion.converse(now, book, summary, notices, sectors, gs);
         companion.answer(now, book.monitor, identity, summary, gs);

@@ -44,11 +44,13 @@ pub(super) struct Segments<'a> {
     pub(super) ring: Ring,
     /// The newest segment that was on the card before the session, until it was looked at.
     earlier: Option<LogName>,
+    /// The open segment has a date in its directory entry, or there was trouble with it.
+    is_dated: bool,
 }
 
 impl<'a> Segments<'a> {
     pub(super) const fn new(status: &'a CardStatus, entropy: u32) -> Self {
-        Self { status, entropy, log: None, is_open: false, ring: Ring::new(), earlier: None }
+        Self { status, entropy, log: None, is_open: false, ring: Ring::new(), earlier: None, is_dated: false }
     }
 
     /// A number for a card that is formatted now.
@@ -105,6 +107,16 @@ impl<'a> Segments<'a> {
         }
     }
 
+    /// Gives the open segment the date in its directory entry, if it was opened before UTC was known. A block is read and one
+    /// written, in which nothing else is: so it waits until there is nothing to write. What fails is not tried again.
+    #[inline(never)]
+    pub(super) fn date<D: CardDevice>(&mut self, card: &mut Card<'_, D>) {
+        if !self.is_dated && self.status.is_utc_known() {
+            self.is_dated = true;
+            let _ = card.date_open();
+        }
+    }
+
     /// Whether the open segment has a sector.
     pub(super) fn has_sector(&self) -> bool {
         self.log.is_some_and(|log| log.base.is_some())
@@ -143,6 +155,7 @@ impl<'a> Segments<'a> {
             log.copy_in_place = false;
         }
         self.ring.begin(name, now);
+        self.is_dated = self.status.is_utc_known();
         self.status.begin_segment(name.session, overwrote);
         self.status.set_state(CardState::Recording);
         Ok(())

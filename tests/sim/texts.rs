@@ -1,0 +1,135 @@
+//! A pilot hears of one event in three texts at most, on every labelled flight and recording, and of what is critical at once.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use hums::card::{Faults, SimCard, image};
+use hums::endpoint::Endpoint;
+use hums::run::sim::both_ports::{Board, Side, run};
+use hums::source::{self, Timing};
+use hums_core::health::{self, Subsystem};
+use hums_core::params::Params;
+use hums_link::packet::Fields;
+use hums_link::{Check, Frame};
+use hums_tests::flights::{self, OWN, own, root};
+use rayon::prelude::*;
+
+/// What belongs together begins within this time of the first text of it.
+const EVENT_S: f64 = 10.0;
+const TEXTS_MAX: usize = 3;
+/// In any ten seconds, whatever goes wrong in them: a pilot reads some four. Two events are at the same time in the worst of these flights.
+const AT_A_TIME_MAX: usize = 4;
+
+/// What is critical waits for nothing but the line: a text of 80 bytes after one of 250 takes 60 ms at 57,600 baud.
+const LATE_MAX_S: f64 = 0.1;
+
+/// A text of the box.
+#[derive(Debug)]
+struct Said {
+    at_s: f64,
+    severity: u8,
+    text: String,
+}
+
+/// What the box says on a recording, and when a check became critical.
+fn listen(recording: &Path) -> (Vec<Said>, Vec<f64>) {
+    let dir = tempfile::tempdir().unwrap();
+    let file = image::open_or_make(&dir.path().join("card.img"), Some(256), |_| Ok(())).unwrap();
+    let card = SimCard::new(file, Faults::default()).unwrap();
+    hums_recorder::format::format(&card, 7).unwrap();
+    let params = Params::defaults();
+    let board = Board { card: &card, params: &params, key: None };
+    let endpoint: Endpoint = recording.display().to_string().parse().unwrap();
+    let mut source = source::open(&endpoint, Timing { line_rate: None }).unwrap();
+    let chunks = std::iter::from_fn(|| source.next().unwrap()).map(|chunk| (Side::Autopilot, chunk));
+    let mut said = Vec::new();
+    let outcome = run(&board, chunks, |side, at_us, bytes| {
+        let frame = Frame::again(bytes, Check::Verified).filter(|frame| frame.id() == 253);
+        if let Some(frame) = frame.filter(|frame| side == Side::Ground && frame.component() == 191) {
+            let fields = Fields(frame.payload());
+            let text = fields.text(1, 50).unwrap().to_owned();
+            said.push(Said { at_s: at_us as f64 / 1e6, severity: fields.u8(0), text });
+        }
+    });
+    let critical = outcome.unwrap().findings.into_iter().filter(|finding| finding.level == "critical");
+    (said, critical.map(|finding| finding.time_s).collect())
+}
+
+/// What a text is of: attitude goes with what turns the motors.
+fn family(text: &str) -> Subsystem {
+    let words = text.strip_prefix("HUMS: ").unwrap_or(text);
+    if words.starts_with("down at") || words.starts_with("mishap over") {
+        return Subsystem::Mishap;
+    }
+    let fits = |name: &str| {
+        let said = health::said(name).unwrap();
+        if let Some(good) = words.strip_prefix("ok: ").or(words.strip_prefix("no data: ")) {
+            return good.starts_with(&said.name_of(0).to_string())
+                || (1..9).any(|n| good == said.name_of(n).to_string());
+        }
+        let (before, after) = said.alarm.split_once('#').unwrap_or((said.alarm, ""));
+        words.starts_with(before) && words.contains(after)
+    };
+    let found = health::checks().filter(|check| fits(check.name));
+    let longest = found.max_by_key(|check| health::said(check.name).unwrap().alarm.len());
+    match longest.unwrap_or_else(|| panic!("of which check is {text}?")).subsystem {
+        Subsystem::Attitude => Subsystem::Propulsion,
+        part => part,
+    }
+}
+
+/// The texts of each event.
+fn events(said: &[Said]) -> Vec<Vec<&Said>> {
+    let mut running: BTreeMap<u8, Vec<&Said>> = BTreeMap::new();
+    let mut over = Vec::new();
+    for one in said {
+        let family = family(&one.text);
+        let event = running.entry(family as u8).or_default();
+        // A mishap lasts until it is over.
+        let goes_on = event.first().is_some_and(|first| {
+            family == Subsystem::Mishap && !event.iter().any(|one| one.text.contains("mishap over"))
+                || one.at_s - first.at_s < EVENT_S
+        });
+        if !goes_on {
+            over.push(std::mem::take(event));
+        }
+        event.push(one);
+    }
+    over.into_iter().chain(running.into_values()).filter(|event| !event.is_empty()).collect()
+}
+
+fn recordings() -> Vec<PathBuf> {
+    let folders = ["tests/labelled", "tests/labelled/px4"].map(|folder| root().join(folder));
+    let files = folders.iter().flat_map(|folder| std::fs::read_dir(folder).unwrap());
+    let labelled = files
+        .map(|file| file.unwrap().path())
+        .filter(|path| path.to_str().is_some_and(|path| path.ends_with(".tlog.gz")));
+    let mut all: Vec<_> = labelled.chain(OWN.map(own)).chain(flights::more()).collect();
+    all.sort();
+    all
+}
+
+#[test]
+fn one_event_is_three_texts_at_most_and_what_is_critical_is_told_at_once() {
+    let heard: Vec<_> = recordings().into_par_iter().map(|path| (listen(&path), path)).collect();
+    let mut histogram: BTreeMap<usize, usize> = BTreeMap::new();
+    let mut texts = 0;
+    for ((said, critical), path) in &heard {
+        let name = path.display();
+        texts += said.len();
+        for event in events(said) {
+            *histogram.entry(event.len()).or_default() += 1;
+            assert!(event.len() <= TEXTS_MAX, "{name}: {event:#?}");
+        }
+        for one in said {
+            let span = one.at_s..one.at_s + EVENT_S;
+            let together: Vec<_> = said.iter().filter(|other| span.contains(&other.at_s)).collect();
+            assert!(together.len() <= AT_A_TIME_MAX, "{name}: {together:#?}");
+        }
+        for one in said.iter().filter(|one| one.severity == 2 && !one.text.starts_with("HUMS: down at")) {
+            let late = |found_s: &f64| (-0.01..LATE_MAX_S).contains(&(one.at_s - found_s));
+            assert!(critical.iter().any(late), "{name}: {one:?} is late: {critical:?}");
+        }
+    }
+    println!("{} recordings, {texts} texts; events by their texts: {histogram:?}", heard.len());
+}
