@@ -36,7 +36,7 @@ fn a_log_has_the_date_of_its_flight_and_none_before_it_is_known() {
     fs::write(&early, &whole[..600]).unwrap();
     // Its last record is cut.
     record(&early, &[0, 3]);
-    record(&own("px4_hil_quad_low.tlog"), &[0]);
+    record(&own("ap_quad_faults.tlog"), &[0]);
     let dates = dates(&image);
     let day = |index: usize| dates[index].1.split(' ').next().unwrap().to_owned();
     println!("{dates:?}");
@@ -48,7 +48,7 @@ fn a_log_has_the_date_of_its_flight_and_none_before_it_is_known() {
 
 /// The day that `hums info` tells of a session.
 fn utc_day(image: &Path, session: u32) -> String {
-    let session = session.to_string();
+    let session = format!("{session:05}");
     let text =
         hums(["info".as_ref(), image.as_os_str(), "--session".as_ref(), session.as_ref(), "--json".as_ref()])
             .expect_code(&[0])

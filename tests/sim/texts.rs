@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use hums::card::{Faults, SimCard, image};
 use hums::endpoint::Endpoint;
 use hums::run::sim::both_ports::{Board, Side, run};
-use hums::source::{self, Timing};
+use hums::source::{self, Chunk, Timing};
 use hums_core::health::{self, Subsystem};
 use hums_core::params::Params;
 use hums_link::packet::Fields;
@@ -21,7 +21,9 @@ const TEXTS_MAX: usize = 3;
 const AT_A_TIME_MAX: usize = 4;
 
 /// What is critical waits for nothing but the line: a text of 80 bytes after one of 250 takes 60 ms at 57,600 baud.
-const LATE_MAX_S: f64 = 0.1;
+/// It is known to [`LOOK_US`] when a text is said.
+const LATE_MAX_S: f64 = 0.25;
+const LOOK_US: u64 = 100_000;
 
 /// A text of the box.
 #[derive(Debug)]
@@ -41,7 +43,15 @@ fn listen(recording: &Path) -> (Vec<Said>, Vec<f64>) {
     let board = Board { card: &card, params: &params, key: None };
     let endpoint: Endpoint = recording.display().to_string().parse().unwrap();
     let mut source = source::open(&endpoint, Timing { line_rate: None }).unwrap();
-    let chunks = std::iter::from_fn(|| source.next().unwrap()).map(|chunk| (Side::Autopilot, chunk));
+    // Also where nothing arrives it is known when something is said.
+    let (mut chunks, mut now_us) = (Vec::new(), 0);
+    while let Some(chunk) = source.next().unwrap() {
+        while now_us < chunk.at_us {
+            chunks.push((Side::Autopilot, Chunk { at_us: now_us, bytes: Vec::new() }));
+            now_us += LOOK_US;
+        }
+        chunks.push((Side::Autopilot, chunk));
+    }
     let mut said = Vec::new();
     let outcome = run(&board, chunks, |side, at_us, bytes| {
         let frame = Frame::again(bytes, Check::Verified).filter(|frame| frame.id() == 253);
