@@ -1,5 +1,10 @@
 //! The `hums` command: the pipeline of the firmware on this PC, and everything that reads what it wrote.
 
+#![deny(
+    clippy::print_stderr,
+    reason = "`eprintln!` panics where standard error lies on a full disk: `output::note`, `output::aside`"
+)]
+
 /// A message on standard error: what the world put into it obeys no terminal.
 macro_rules! note {
     ($($words:tt)*) => {

@@ -68,9 +68,15 @@ pub fn json_line(text: &str) -> Result<()> {
     raw_line(&printable::json(text))
 }
 
-/// Says something on standard error, with our name before it. A standard error that is gone changes nothing.
+/// Says something on standard error, with our name before it.
 pub fn note(text: &str) {
-    eprintln!("hums: {}", printable::message(text));
+    aside(&format!("hums: {}", printable::message(text)));
+}
+
+/// Prints a line on standard error. One that is gone, or lies on a full disk, changes nothing: `eprintln!` would panic, in the middle of
+/// a recording too.
+pub fn aside(text: &str) {
+    let _ = io::stderr().lock().write_all(format!("{text}\n").as_bytes());
 }
 
 fn raw_line(text: &str) -> Result<()> {

@@ -12,7 +12,7 @@ use std::path::Path;
 
 use crate::decode::naming::is_made;
 use crate::files::{FileId, Folder, Opened, STANDARD_ERROR, STANDARD_INPUT, STANDARD_OUTPUT, descriptor};
-use crate::source::find::{is_no_text, kind_of};
+use crate::source::find::{is_compressed, is_no_text, kind_of};
 use crate::source::format::Format;
 
 /// Refuses what standard output leads to; the words are for standard error. `made` is what the command makes there.
@@ -68,8 +68,9 @@ fn spellings(word: &OsStr) -> [Option<&OsStr>; 3] {
 /// Whether words behind what is in it would spoil it.
 fn is_kept(opened: &Opened, made: Option<Format>) -> bool {
     let (path, content) = (opened.path(), opened.content());
-    let goes_on = made.is_some() && kind_of(&content) == made;
+    // What follows a compressed recording is not read.
+    let goes_on = made.is_some() && kind_of(&content) == made && !is_compressed(&content);
     // Tables lie in a folder that is ours.
     let is_table = || path.parent().is_some_and(|folder| Folder::made_of(folder).is_some());
-    !goes_on && (is_no_text(&path, &content) || is_made(&path) || is_table())
+    !goes_on && (made.is_some() || is_no_text(&path, &content) || is_made(&path) || is_table())
 }

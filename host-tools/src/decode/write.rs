@@ -297,6 +297,9 @@ impl<'a> Writers<'a> {
         // Gaps of an earlier decoding beside a tlog that has none now would be taken for its own.
         let stale = self.tlog.as_ref().filter(|_| self.gaps.is_none()).and_then(Single::gaps_path);
         stale.as_deref().map_or(Ok(()), |path| Output::check_none(path, &self.context.inputs))?;
+        // A tlog never has its name without its gaps, nor beside those of another.
+        stale.map_or(Ok(()), |path| Output::keep(&path, &self.context.inputs))?;
+        let gaps = self.gaps.take().map(Single::finish).transpose()?;
         let mut singles =
             vec![(self.tlog.take(), "tlog", frames), (self.jsonl.take(), "jsonl", (self.objects, "object"))];
         if let Some(Influx { file, count: points, .. }) = self.influx.take() {
@@ -307,9 +310,8 @@ impl<'a> Writers<'a> {
                 made.push(Made::of(file.finish()?, format, &[what]));
             }
         }
-        stale.map_or(Ok(()), |path| Output::keep(&path, &self.context.inputs))?;
-        if let Some(file) = self.gaps.take() {
-            made.push(Made::with_words(file.finish()?, "gaps", "gaps".to_owned()));
+        if let Some(path) = gaps {
+            made.push(Made::with_words(path, "gaps", "gaps".to_owned()));
         }
         if let (Some(csv), Some(dir)) = (self.csv.take(), self.destination.tables()) {
             let (tables, shared) = (csv.count(), csv.has_shared());

@@ -201,15 +201,18 @@ struct Waiting {
 fn finish(influx: Influx, spool: &Waiting) -> Outcome {
     let figures = influx.finish();
     let missing = figures.waiting + figures.lost + figures.rejected;
-    eprintln!("{} written", count(figures.written, "point"));
+    output::aside(&format!("{} written", count(figures.written, "point")));
     if missing > 0 {
         let why = if figures.trouble.is_empty() { String::new() } else { format!(": {}", figures.trouble) };
-        eprintln!("{} not in the database{why}", are(missing, "point"));
+        output::aside(&format!("{} not in the database{why}", are(missing, "point")));
         if figures.rejected > 0 {
-            eprintln!("  {} refused by the database: {}", figures.rejected, figures.refusal);
+            output::aside(&format!("  {} refused by the database: {}", figures.rejected, figures.refusal));
         }
         if figures.lost > 0 {
-            eprintln!("  {} lost: for want of room, or with what an earlier run left damaged", figures.lost);
+            output::aside(&format!(
+                "  {} lost: for want of room, or with what an earlier run left damaged",
+                figures.lost
+            ));
         }
         if figures.stored > 0 {
             note!(
@@ -220,14 +223,14 @@ fn finish(influx: Influx, spool: &Waiting) -> Outcome {
         }
         let unsaved = figures.waiting.saturating_sub(figures.stored);
         if unsaved > 0 {
-            eprintln!("  {unsaved} waited in memory only, and are lost");
+            output::aside(&format!("  {unsaved} waited in memory only, and are lost"));
         }
     }
     if !figures.left_out.is_empty() {
         note!("{}; the rest is not in the database: write the recording again", figures.left_out);
     }
     if !figures.disk.is_empty() {
-        eprintln!("{}: {}", spool.path.display(), figures.disk);
+        output::aside(&format!("{}: {}", spool.path.display(), figures.disk));
     }
     Outcome::lossy(
         missing > 0 || spool.is_damaged || !figures.disk.is_empty() || !figures.left_out.is_empty(),
@@ -288,7 +291,7 @@ fn open(page: &str) {
     let mut command = Command::new(program);
     command.args(first).arg(page).stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
     if command.spawn().is_err() {
-        eprintln!("no browser was found: open the address above");
+        output::aside("no browser was found: open the address above");
     }
 }
 

@@ -199,7 +199,7 @@ impl Report {
         if json {
             output::json(SCHEMA, self)?;
         } else if quiet {
-            eprintln!("{}", self.text());
+            output::aside(&self.text());
         } else {
             output::line(&self.text())?;
         }

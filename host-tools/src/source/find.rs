@@ -10,6 +10,7 @@ use anyhow::{Context as _, Result, anyhow, bail};
 
 use super::format::{Format, KNOWN, detect, format_of, hint, is_recording, start_of};
 use super::recording::{Place, of_one_vehicle};
+use crate::archive::GZIP;
 use crate::files::{FileId, why_unread};
 use crate::logs::find::{Image, REMARKS_MAX, check_seekable};
 use crate::logs::sessions::Sessions;
@@ -241,16 +242,26 @@ pub fn kind_of(content: &Path) -> Option<Format> {
     }
 }
 
+/// Whether it is compressed with gzip.
+pub fn is_compressed(content: &Path) -> bool {
+    start_of_bytes(content, GZIP.len()).is_some_and(|start| start == GZIP)
+}
+
+/// Its first bytes, as they lie there; none where it cannot be read.
+fn start_of_bytes(content: &Path, bytes: usize) -> Option<Vec<u8>> {
+    let mut start = Vec::new();
+    fs::File::open(content).and_then(|file| file.take(bytes as u64).read_to_end(&mut start)).ok()?;
+    Some(start)
+}
+
 /// Whether words that are appended to the file of this path, whose content lies at `content`, would spoil a recording or a card, or
 /// are in a file that is no text at all. A damaged one may have nothing but its name.
 pub fn is_no_text(path: &Path, content: &Path) -> bool {
     let is_named = logs::is_named_as_log(path) || logs::is_named_as_card(path) || is_named_as_recording(path);
     // Further on, a text may have zeros too: a PC that loses its power leaves such in its logs.
     let is_binary = || {
-        const START_BYTES: u64 = 512;
-        let mut start = Vec::new();
-        let read = fs::File::open(content).and_then(|file| file.take(START_BYTES).read_to_end(&mut start));
-        read.is_ok() && start.contains(&0)
+        const START_BYTES: usize = 512;
+        start_of_bytes(content, START_BYTES).is_some_and(|start| start.contains(&0))
     };
     is_named || why_unread(path).is_some() || is_binary() || is_recording(content)
 }
@@ -361,7 +372,9 @@ impl Walk {
                     }
                     self.passed_over.push(words);
                 }
-                if kind.is_file() && hint(&start).is_none() && is_named_as_recording(&path) {
+                // Of one that nobody may read, that is told.
+                let is_read = || fs::File::open(&path).is_ok();
+                if kind.is_file() && hint(&start).is_none() && is_named_as_recording(&path) && is_read() {
                     self.unknown += 1;
                     if self.remarks.len() < REMARKS_MAX {
                         self.remarks
@@ -402,7 +415,6 @@ mod tests {
     use hums_blackbox::{SECTOR_BYTES, Sector};
 
     use super::*;
-    use crate::archive;
     use crate::source::recording::tests::dataflash;
 
     #[test]
@@ -435,7 +447,7 @@ mod tests {
         tar.extend(&log);
         let zip = [b"PK\x03\x04 stored", &log[..]].concat();
         let utf_16: Vec<u8> = b"\xff\xfe".iter().copied().chain([b'F', 0].repeat(10)).collect();
-        let twice = [&archive::GZIP[..], &[0; 100]].concat();
+        let twice = [&GZIP[..], &[0; 100]].concat();
         assert_eq!(hint(&twice).map(|what| what.contains("twice")), Some(true));
         for (start, what) in [(tar, "tar"), (zip, "ZIP"), (utf_16, "UTF-16")] {
             for bytes in [0, 2 << 20] {

@@ -49,7 +49,7 @@ pub fn run(args: &cli::FormatCard) -> Result<Outcome> {
         ),
         _ => bail!("there is no card that can be formatted"),
     }
-    eprintln!("the card is being formatted");
+    output::aside("the card is being formatted");
     let end = Instant::now() + PATIENCE;
     let told = client.until(end, |frame| {
         let text = Fields(frame.payload()).text(1, 50).filter(|_| frame.id() == STATUSTEXT)?;

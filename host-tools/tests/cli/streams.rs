@@ -183,7 +183,8 @@ fn what_is_said_may_follow_a_text_and_a_recording_may_follow_one_of_its_kind() {
         at("all.hum").metadata().expect("there").len(),
         2 * at("log.hum").metadata().expect("there").len()
     );
-    // Of another kind it does not.
+    // Of another kind it does not, nor what is compressed, nor a text.
+    assert!(shell(dir.path(), "gzip -c flight.tlog > flight.tlog.gz && echo mine > notes").status.success());
     let before = contents(dir.path());
     for line in [
         "hums decode log.hum -o - --format tlog >> all.hum",
@@ -191,8 +192,23 @@ fn what_is_said_may_follow_a_text_and_a_recording_may_follow_one_of_its_kind() {
         "hums pack flight.tlog -o - >> all.tlog",
         "hums pack flight.tlog -o - >> all.hum 2>&1",
         "hums report log.hum -o - >> folder/flight.tlog",
+        "hums decode log.hum -o - --format tlog >> flight.tlog.gz",
+        "hums decode log.hum -o - --format tlog >> notes",
     ] {
         assert_eq!(shell(dir.path(), line).status.code(), Some(2), "{line}");
     }
     assert!(contents(dir.path()) == before);
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_standard_error_on_a_full_disk_ends_nothing() {
+    let dir = furnished();
+    assert_eq!(shell(dir.path(), "hums ls nosuch 2> /dev/full").status.code(), Some(1));
+    // What is said in flight cannot be said: the card has all of it.
+    let line = "hums sim --input flight.tlog --sd card.img --card-size 34 --tap /dev/full 2> /dev/full";
+    assert_eq!(shell(dir.path(), line).status.code(), Some(3));
+    let line = "hums decode card.img -o all.tlog --format tlog";
+    assert_eq!(shell(dir.path(), line).status.code(), Some(0));
+    assert_eq!(frames_of(&dir.path().join("all.tlog")).len(), frames_of(&px4()).len());
 }

@@ -83,7 +83,12 @@ impl Spool {
     /// points for another database.
     pub fn open(path: &Path, limit: u64, database: &Database) -> Result<Option<Self>> {
         let context = || format!("{}: cannot be used for points that wait", path.display());
-        if path.metadata().is_ok_and(|about| about.permissions().readonly()) {
+        let about = path.metadata().ok();
+        // A disk or a card has a length of 0, as an empty file has.
+        if about.as_ref().is_some_and(|about| !about.is_file()) {
+            bail!("{}: is no regular file; nothing was written; name a file", path.display());
+        }
+        if about.is_some_and(|about| about.permissions().readonly()) {
             bail!("{}: is read-only; make it writable or name another file", path.display());
         }
         let mut options = OpenOptions::new();

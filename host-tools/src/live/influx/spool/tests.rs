@@ -234,3 +234,12 @@ fn a_limit_below_what_is_found_lets_nothing_be_added_and_nothing_be_lost() {
     spool.put(&batch(0)).expect("room");
     assert!((1..4).map(|number| spool.put(&batch(number)).expect("room")).sum::<u64>() > 0);
 }
+
+#[cfg(unix)]
+#[test]
+fn what_is_no_file_is_refused() {
+    // A disk or a card has a length of 0 too.
+    let refused =
+        format!("{:#}", Spool::open(Path::new("/dev/null"), 3_000, &database(1)).expect_err("no file"));
+    assert!(refused.contains("is no regular file"), "{refused}");
+}
