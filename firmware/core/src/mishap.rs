@@ -13,9 +13,9 @@
 //! | tumbling | body rates above `MIS_TUMBLE` for half a second, on wings for 1.5 s; not in modes made for it | everywhere |
 //! | disarmed in the air | disarmed above `MIS_DISARM_H` or while it sinks; then it falls, sinks or goes on moving | everywhere |
 //! | overturned | its top looks down, by more than 100 degrees of tilt, for 0.7 s; not in modes made for it | on rotors |
-//! | | it lies over by more than `MIS_OVERTURN`, by the force that carries it, within 5 s of throttle | on rotors |
+//! | | it lies over by more than `MIS_OVERTURN`, by the force that carries it, within 5 s of throttle, and is slower than 12 m/s | on rotors |
 //! | sinking | faster than `MIS_SINK` for half a second; where the pilot has the throttle, at nearly full throttle only | on rotors |
-//! | | 7 m lost, faster than 1 m/s, at full throttle, where the autopilot has it | everywhere |
+//! | | 7 m lost, faster than 1 m/s, at full throttle, where the autopilot has it and wants no steep bank | everywhere |
 //!
 //! ```text
 //!        seen in a flight            it lies still, or 10 s after disarming
@@ -71,6 +71,8 @@ const ROSE_M: f32 = 3.0;
 const ON_BACK_G: f32 = 0.5;
 /// What lies over so long after its last throttle was turned over by its rotors, and by no hand.
 const DRIVEN: Span = Span::from_secs(5);
+/// What is faster than this over ground flies, and the air carries it from ahead besides its rotors, m/s.
+const DRAGS_MPS: f32 = 12.0;
 /// How long it is seen whether what was disarmed falls.
 const FALL_SHOWS: Span = Span::from_secs(3);
 const FALLEN_M: f32 = 2.0;
@@ -354,8 +356,9 @@ impl Mishap {
 
     /// How far it lies over, in radians, what stood level while it was armed and turned since.
     fn lies_turned(&self, now: Instant, vehicle: &Vehicle) -> Option<f32> {
+        let flies = || ground_speed_mps(now, vehicle).is_some_and(|speed_mps| speed_mps > DRAGS_MPS);
         let turned = self.stood && !vehicle.inertial.turns_little(now, DRIVEN);
-        vehicle.inertial.lies_over(now).filter(|_| turned)
+        vehicle.inertial.lies_over(now).filter(|_| turned && !flies())
     }
 
     fn was_driven(&self, now: Instant) -> bool {

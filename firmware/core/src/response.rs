@@ -15,8 +15,9 @@ use crate::vehicle::Vehicle;
 
 /// Time constant of rates, s.
 const SMOOTHING_S: f32 = 1.0;
-/// What is wanted is as old as this at most.
-const FRESH: Span = Span::from_millis(500);
+/// What is wanted is as old as this at most: an agile vehicle turns otherwise after it. Between comparisons, [`PAUSE`] at most counts.
+const FRESH: Span = Span::from_millis(150);
+const PAUSE: Span = Span::from_millis(500);
 /// This part of the rates that are wanted may be missing.
 const LATE_PART: f32 = 0.3;
 /// No vehicle turns faster, rad/s: garbage.
@@ -78,7 +79,7 @@ impl Response {
         if !judged || !flight.is_settled(at) || !wanted.iter().chain(&[roll, pitch]).all(sane) {
             return;
         }
-        let step_s = self.compared_at.map_or(0.0, |before| at.since(before).min(FRESH).as_secs_f32());
+        let step_s = self.compared_at.map_or(0.0, |before| at.since(before).min(PAUSE).as_secs_f32());
         let weight = step_s / (SMOOTHING_S + step_s);
         for (axis, (wanted, flown)) in wanted.iter().zip([roll, pitch]).enumerate() {
             self.missing[axis] += weight * (wanted.0 - flown.0 - self.missing[axis]);

@@ -37,6 +37,8 @@ struct Fitted {
     /// Body rates about roll and pitch, and those that are wanted, rad/s.
     turns: [f32; 2],
     wanted: [f32; 2],
+    /// Whether it tells what is wanted now.
+    wants: bool,
     /// How far GPS is above sea level, m.
     altitude: f32,
     /// How far its attitude trembles, rad.
@@ -84,6 +86,7 @@ impl Fitted {
             yaw_rate: 0.0,
             turns,
             wanted: [0.0; 2],
+            wants: true,
             altitude,
             attitude_noise: 0.01,
             hud_climb: None,
@@ -110,8 +113,10 @@ impl Fitted {
         }
         let [roll, pitch] = self.turns;
         let rates = Some([roll, pitch, self.yaw_rate].map(RadiansPerSecond));
-        let wanted = Some(self.wanted.map(RadiansPerSecond));
-        said.push(Observation::Wanted(Wanted { rates: wanted, ..Wanted::default() }));
+        if self.wants {
+            let wanted = Some(self.wanted.map(RadiansPerSecond));
+            said.push(Observation::Wanted(Wanted { rates: wanted, ..Wanted::default() }));
+        }
         said.push(Observation::Attitude(Attitude {
             roll: Radians(self.quad.roll + self.attitude_noise * noise(now_ms, 74)),
             rates,
@@ -460,6 +465,12 @@ fn what_does_not_turn_as_it_is_told_is_named_and_what_turns_fast_is_not() {
         // Hard turns to and fro, a tenth of a second late.
         let turning = |now_ms: u64| [3.0 * (now_ms as f32 / 400.0).sin(), 0.0];
         (fitted.wanted, fitted.turns) = (turning(now_ms), turning(now_ms.saturating_sub(100)));
+    });
+    is_quiet(|now_ms, fitted| {
+        // What it was told a while ago is another thing than what it is told now, which nobody hears.
+        fitted.wants = now_ms.is_multiple_of(400);
+        fitted.turns = [if fitted.wants { 3.0 } else { -1.0 }, 0.0];
+        fitted.wanted = fitted.turns;
     });
 }
 

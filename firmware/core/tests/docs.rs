@@ -204,7 +204,7 @@ const INPUTS: &[(&str, &str)] = &[
     ),
     (
         "overturned",
-        "ATTITUDE: the top down by more than 100 degrees; the inertial messages: it lies over, with throttle of late; for 0.7 s, on rotors",
+        "ATTITUDE: the top down by more than 100 degrees; the inertial messages: it lies over, with throttle of late, slower than 12 m/s; for 0.7 s, on rotors",
     ),
     ("crash_alert", "STATUSTEXT, EVENT"),
 ];

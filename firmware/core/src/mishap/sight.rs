@@ -38,6 +38,8 @@ const FOLLOWS_MPS: f32 = 2.0;
 const LOST_M: f32 = 7.0;
 /// What sinks slower than this with all its thrust follows a glide path against the wind, m/s: a height is forgotten so fast.
 const GLIDES_MPS: f32 = 1.0;
+/// A bank in which all the thrust may not carry what hangs on rotors, rad.
+const BANKS_RAD: f32 = 0.6;
 /// All the throttle of a plane, which may need most of it on a steep path against the wind.
 const FULL_ON_WINGS: f32 = 0.97;
 /// Wings pull out of a dive with so much at most: the limit of CS-23 for the aerobatic category.
@@ -233,7 +235,7 @@ impl Mishap {
         let full = throttle(at, vehicle).is_some_and(|part| part >= least);
         let by_hand = has_pilots_throttle(vehicle);
         let told_to = by_hand || is_told_to_sink(at, sink_mps, limit_mps, vehicle);
-        let lost_m = self.lose_height(at, full && !by_hand, vehicle);
+        let lost_m = self.lose_height(at, full && !by_hand && !is_told_to_bank(at, vehicle), vehicle);
         let sinks = match vehicle.hovers(at) {
             // It descends as it is told to, but not with all its thrust.
             Some(true) => (sink_mps > limit_mps && (full || !told_to)) || lost_m > LOST_M,
@@ -282,6 +284,13 @@ impl Mishap {
 fn is_told_to_sink(at: Instant, sink_mps: f32, limit_mps: f32, vehicle: &Vehicle) -> bool {
     let wanted_mps = vehicle.climb_wanted.within(at, WANTED_AGE).map(|climb| -climb.0);
     wanted_mps.is_some_and(|wanted_mps| wanted_mps > limit_mps && sink_mps < wanted_mps + FOLLOWS_MPS)
+}
+
+/// Whether the autopilot wants a bank in which all the thrust of a multicopter may not carry it.
+fn is_told_to_bank(at: Instant, vehicle: &Vehicle) -> bool {
+    vehicle.wanted.within(at, WANTED_AGE).is_some_and(|wanted| {
+        vehicle.is_multicopter() && wanted.roll.0.abs().max(wanted.pitch.0.abs()) > BANKS_RAD
+    })
 }
 
 /// Whether the display sinks too; so it is where no climb is displayed, or nothing but zeros. A receiver that loses its satellites tells

@@ -14,6 +14,7 @@ use hums_core::health::{Finding, Level, Subsystem};
 use hums_core::mishap::{Change, Kind, Place, Report};
 use hums_core::observation::{
     Air, Attitude, Autopilot, GlobalPosition, Hud, Imu, LandedState, Observation, VehicleKind, VtolState,
+    Wanted,
 };
 use hums_core::params::Params;
 use hums_core::status::LinkReading;
@@ -30,6 +31,8 @@ const AT_MS: u64 = 20_000;
 #[derive(Clone, Copy)]
 struct Motion {
     load_g: f32,
+    /// What carries it from ahead, where the air does.
+    drag_g: f32,
     rates: [f32; 3],
     ground_mps: f32,
     pitch: f32,
@@ -39,16 +42,20 @@ struct Motion {
     shock_g: Option<f32>,
     /// The climb of the pilot's display, where it has one.
     displayed_mps: Option<f32>,
+    /// The roll that the autopilot wants, where it says so.
+    roll_wanted: Option<f32>,
 }
 
 const CALM: Motion = Motion {
     load_g: 1.0,
+    drag_g: 0.0,
     rates: [0.01, 0.02, 0.0],
     ground_mps: 0.1,
     pitch: 0.02,
     pressure_hpa: None,
     shock_g: None,
     displayed_mps: None,
+    roll_wanted: None,
 };
 
 type Script = fn(u64, &mut Quad, &mut Motion);
@@ -91,7 +98,8 @@ fn fly(vehicle: &Quad, script: Script) -> Outcome {
         }
         // No sensor says the same for ever.
         let noise = (now_ms / 50 % 7) as f32 * 0.002;
-        let acceleration = Some([0.0, 0.0, -(motion.load_g + noise) * 9.806_65].map(MetresPerSecond2));
+        let forces_g = [motion.drag_g, 0.0, -(motion.load_g + noise)];
+        let acceleration = Some(forces_g.map(|force_g| MetresPerSecond2(force_g * 9.806_65)));
         let rates = Some(motion.rates.map(RadiansPerSecond));
         let imu = Imu { acceleration, rate: rates, ..Imu::default() };
         if let Some(shock_g) = motion.shock_g {
@@ -121,7 +129,10 @@ fn fly(vehicle: &Quad, script: Script) -> Outcome {
                 let throttle = Some(Fraction(quad.throttle));
                 Observation::Hud(Hud { throttle, climb: Some(MetresPerSecond(climb_mps)), ..Hud::default() })
             });
-            for said in said.chain(hud).chain(own) {
+            let wanted = motion
+                .roll_wanted
+                .map(|roll| Observation::Wanted(Wanted { roll: Radians(roll), ..Wanted::default() }));
+            for said in said.chain(hud).chain(wanted).chain(own) {
                 monitor.observe(now, AUTOPILOT, &said);
             }
         }

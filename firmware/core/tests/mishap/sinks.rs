@@ -116,6 +116,22 @@ fn a_multicopter_that_loses_height_with_all_its_thrust_sinks_though_it_sinks_slo
     }
 }
 
+#[test]
+fn a_multicopter_that_is_told_to_bank_steeply_may_lose_height_with_all_its_thrust() {
+    let of = ROTORS[0];
+    let banks = |wanted: Script| fly(&Quad { height: 60.0, ..hovering(of) }, wanted).told();
+    let told_to = banks(|ms, quad, motion| {
+        sinks_slowly(ms, quad, motion);
+        motion.roll_wanted = Some(0.8);
+    });
+    assert!(told_to.is_empty(), "{told_to:?}");
+    let falls = banks(|ms, quad, motion| {
+        sinks_slowly(ms, quad, motion);
+        motion.roll_wanted = Some(0.3);
+    });
+    assert_eq!(falls, ["sinking"]);
+}
+
 /// It stands in the air, its barometer says so, and the estimator falls.
 fn falls_by_estimate(ms: u64, quad: &mut Quad, motion: &mut Motion) {
     motion.pressure_hpa = Some(980.0 + (ms / 100 % 5) as f32 * 0.01);

@@ -150,3 +150,23 @@ fn what_turns_over_after_each_arming_is_told_each_time() {
     });
     assert_eq!(outcome.told(), ["overturned"; 3], "{:?}", outcome.changes);
 }
+
+/// Banks and then flies on, or is stopped, with what the air or the ground carries it with from ahead.
+fn is_carried_from_ahead(ms: u64, quad: &mut Quad, motion: &mut Motion, ground_mps: f32) {
+    (quad.height, quad.throttle, motion.ground_mps) = (40.0, 0.5, ground_mps);
+    match ms {
+        ..500 => motion.rates = [0.0, 2.0, 0.0],
+        500..4_000 => (motion.load_g, motion.drag_g, motion.pitch) = (0.4, 0.9, -1.1),
+        _ => {}
+    }
+}
+
+#[test]
+fn what_flies_fast_is_carried_by_the_air_too_and_does_not_lie_over() {
+    for of in ROTORS {
+        let lies = fly(&hovering(of), |ms, quad, motion| is_carried_from_ahead(ms, quad, motion, 1.0));
+        assert!(lies.told().contains(&"overturned"), "{of:?}: {:?}", lies.changes);
+        let flies = fly(&hovering(of), |ms, quad, motion| is_carried_from_ahead(ms, quad, motion, 30.0));
+        assert!(flies.told().is_empty(), "{of:?}: {:?}", flies.changes);
+    }
+}
