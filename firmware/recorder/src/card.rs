@@ -13,7 +13,7 @@ use crate::gate::{Gate, GateError, HeldBlocks};
 use crate::layout::{Layout, LayoutError};
 use crate::name::{EXTENSION, LogName};
 use crate::room::Room;
-use crate::status::{CardStatus, FatClock};
+use crate::status::{CardStatus, Counted, FatClock};
 
 type Manager<'a, D> = VolumeManager<Gate<'a, D>, FatClock<'a>, 1, 1, 1>;
 
@@ -22,6 +22,9 @@ const DIRECTORY_BLOCKS_MAX: u32 = 4_096;
 
 /// Bytes of a segment on a card with room for many: an hour of a busy vehicle.
 pub const SEGMENT_BYTES_MAX: u32 = 8 * 1024 * 1024;
+
+/// Blocks of 512 bytes.
+const BLOCKS_PER_MIB: u64 = 2_048;
 
 /// The attribute of a file that lists do not show.
 const HIDDEN: u8 = 2;
@@ -378,21 +381,21 @@ impl<'a, D: BlockDevice> Card<'a, D> {
         Ok(read?)
     }
 
-    /// Counts a little further how much of the card logs can have, one block of the FAT at a call; the share in
-    /// thousandths once all of it is counted, and how many MiB of it are in use, by logs too, and how many there are.
-    pub(crate) fn count_room(&mut self) -> Result<Option<(u32, [u32; 2])>, CardError<D::Error>> {
+    /// Counts a little further how much of the card logs can have, one block of the FAT at a call; how much once all of it is
+    /// counted.
+    pub(crate) fn count_room(&mut self) -> Result<Option<Counted>, CardError<D::Error>> {
         let mut room = self.room;
         let counted = self.manager()?.device(|gate| room.count(gate));
         self.room = room;
         let Some(free) = counted? else { return Ok(None) };
-        let room = u64::from(free) + u64::from(self.log_clusters()?);
-        let clusters = self.layout.clusters;
-        let permille = (room * 1000 / u64::from(clusters)).min(1000) as u32;
-        let mib = |clusters: u32| {
-            (u64::from(clusters) * u64::from(self.layout.cluster_blocks) * u64::from(Block::LEN_U32) >> 20)
-                as u32
-        };
-        Ok(Some((permille, [clusters.saturating_sub(free), clusters].map(mib))))
+        let Layout { clusters, cluster_blocks, .. } = self.layout;
+        let for_logs = u64::from(free) + u64::from(self.log_clusters()?);
+        let mib = |clusters: u32| (u64::from(clusters) * u64::from(cluster_blocks) / BLOCKS_PER_MIB) as u32;
+        Ok(Some(Counted {
+            permille: (for_logs * 1000 / u64::from(clusters)).min(1000) as u32,
+            used_mib: mib(clusters.saturating_sub(free)),
+            total_mib: mib(clusters),
+        }))
     }
 
     /// So many clusters at least the logs have. None has more than a segment can have, whatever its entry says.

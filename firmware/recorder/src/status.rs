@@ -106,6 +106,17 @@ pub struct CardStatus {
     before_check: AtomicU32,
 }
 
+/// How much room a card has.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Counted {
+    /// What logs can have of it, in thousandths.
+    pub(crate) permille: u32,
+    /// What is in use, logs included, in MiB.
+    pub(crate) used_mib: u32,
+    /// All there is, in MiB.
+    pub(crate) total_mib: u32,
+}
+
 /// A reading of [`CardStatus`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct CardReading {
@@ -229,12 +240,12 @@ impl CardStatus {
         self.frames_lost.fetch_add(frames, Ordering::Relaxed);
     }
 
-    /// Notes how much of the card logs can have, in thousandths, and how many MiB are in use and there; `None`: not counted.
-    pub(crate) fn set_room(&self, room: Option<(u32, [u32; 2])>) {
-        let (permille, [used, total]) = room.unwrap_or((UNCOUNTED, [0; 2]));
-        self.used_mib.store(used, Ordering::Relaxed);
-        self.total_mib.store(total, Ordering::Relaxed);
-        self.room.store(permille, Ordering::Relaxed);
+    /// Notes how much room the card has; `None`: not counted.
+    pub(crate) fn set_room(&self, room: Option<Counted>) {
+        let room = room.unwrap_or(Counted { permille: UNCOUNTED, used_mib: 0, total_mib: 0 });
+        self.used_mib.store(room.used_mib, Ordering::Relaxed);
+        self.total_mib.store(room.total_mib, Ordering::Relaxed);
+        self.room.store(room.permille, Ordering::Relaxed);
     }
 
     /// A service of the card begins; [`Self::end_service`] is to follow.

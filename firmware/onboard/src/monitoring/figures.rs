@@ -62,7 +62,7 @@ struct Rates {
     at_ms: u32,
     counts: [u32; 2],
     /// What comes from the autopilot, and what goes to the ground station's port.
-    rates: [u32; 2],
+    a_second: [u32; 2],
 }
 
 impl Rates {
@@ -72,7 +72,7 @@ impl Rates {
         if u64::from(span_ms) < RATES.as_millis() {
             return;
         }
-        for (rate, (count, before)) in self.rates.iter_mut().zip(counts.into_iter().zip(self.counts)) {
+        for (rate, (count, before)) in self.a_second.iter_mut().zip(counts.into_iter().zip(self.counts)) {
             *rate = (u64::from(count.wrapping_sub(before)) * 1_000 / u64::from(span_ms)) as u32;
         }
         (self.at_ms, self.counts) = (now_ms, counts);
@@ -98,7 +98,7 @@ impl<'a> Figures<'a> {
     pub(super) fn own(&mut self, now: Instant, card: &CardStatus, bauds: [u32; 2], gs: &GsIn) -> OwnFigures {
         let Machine { cpu_permille, stack_bytes_max, stack_bytes, .. } = self.machine;
         self.rates.count(now, [self.port_before.bytes, gs.bytes() as u32]);
-        let [from_autopilot, to_gs] = self.rates.rates;
+        let [from_autopilot, to_gs] = self.rates.a_second;
         let [autopilot, ground] = bauds;
         OwnFigures {
             cpu_percent: f32::from(cpu_permille) / 10.0,
