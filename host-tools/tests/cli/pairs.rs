@@ -35,14 +35,16 @@ fn problems(dir: &Path, name: &str) -> Vec<(String, u64, String, f64)> {
 #[test]
 fn an_autopilots_log_and_a_recording_of_the_same_flight_are_judged_alike() {
     let dir = tempfile::tempdir().expect("a directory");
-    // The shock of a crash is shorter than the time between two samples of a recording.
+    // The shock of a crash is shorter than the time between two samples of a recording; and what is wanted in a fall is told too
+    // seldom there to be compared with each rate.
     for (log, recording, only_in_log) in [
-        ("bin/f12_gps_jump.bin.gz", "f12_gps_jump.tlog.gz", ""),
-        ("bin/n03_wind9_gusty.bin.gz", "n03_wind9_gusty.tlog.gz", ""),
-        ("px4/p23_motor_dead_quad.cut.ulg.gz", "px4/p23_motor_dead_quad.tlog.gz", "impact"),
+        ("bin/f12_gps_jump.bin.gz", "f12_gps_jump.tlog.gz", &[][..]),
+        ("bin/n03_wind9_gusty.bin.gz", "n03_wind9_gusty.tlog.gz", &[]),
+        ("px4/p23_motor_dead_quad.cut.ulg.gz", "px4/p23_motor_dead_quad.tlog.gz", &["impact", "pitch_rate"]),
     ] {
         let (own, told) = (problems(dir.path(), log), problems(dir.path(), recording));
-        let own: Vec<_> = own.into_iter().filter(|(check, ..)| check != only_in_log).collect();
+        let own: Vec<_> =
+            own.into_iter().filter(|(check, ..)| !only_in_log.contains(&check.as_str())).collect();
         assert_eq!(own.len(), told.len(), "{log}: {own:?}\n{told:?}");
         assert_eq!(log.contains("n03"), told.is_empty(), "{log}: {told:?}");
         for (check, instance, level, at) in &told {
