@@ -228,7 +228,12 @@ fn an_older_log_that_a_newer_one_overwrites_gives_what_is_left_of_it_and_never_m
     // It is no damage of the card.
     let found = json("info", &image, &["--salvage"], 0);
     let verify = hums(["verify".as_ref(), "--salvage".as_ref(), image.as_os_str()]).expect_code(&[0]).text();
-    assert!(verify.contains("is left over from before: no file holds it any more; "), "{verify}");
+    assert!(
+        verify.contains(
+            "is in no file: it was deleted, its file lost its name, or newer sessions have written over it; "
+        ),
+        "{verify}"
+    );
     let with_gaps: Vec<&Value> =
         found["logs"].as_array().unwrap().iter().filter(|log| log["gaps_count"] != 0).collect();
     assert_eq!(with_gaps.len(), 1, "only the oldest misses anything: {found}");
@@ -239,7 +244,7 @@ fn an_older_log_that_a_newer_one_overwrites_gives_what_is_left_of_it_and_never_m
     let decode = ["decode".as_ref(), image.as_os_str(), "--salvage".as_ref(), "-o".as_ref(), out.as_os_str()];
     let told =
         hums(decode.into_iter().chain(["--format".as_ref(), "tlog".as_ref()])).expect_code(&[0]).stderr;
-    assert!(told.contains("is left over from before"), "{told}");
+    assert!(told.contains("is in no file: "), "{told}");
     let session = with_gaps[0]["name"].as_str().unwrap().strip_prefix("session-").unwrap();
     let files = fs::read_dir(&out).unwrap().map(|file| file.unwrap().path());
     let ending = format!("-s{session}.tlog");
