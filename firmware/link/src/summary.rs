@@ -241,7 +241,7 @@ impl Summary {
         self.outlet.fits_besides(now, class, bytes, first.1)
     }
 
-    /// Tells a finding that a pilot should hear of ([`crate::telling`]), now or as soon as the budget and its event allow.
+    /// Tells a finding that a pilot should hear of (`telling.rs`), now or as soon as the budget and its event allow.
     pub fn finding(&mut self, now: Instant, finding: &Finding, out: &mut impl FnMut(&[u8])) {
         // What was not told yet is out of date.
         self.waiting.retain(|other| (other.check, other.instance) != (finding.check, finding.instance));
