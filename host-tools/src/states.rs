@@ -1,4 +1,29 @@
-//! Values of checks that are states and not quantities, in MAVLink's words.
+//! What people are shown of a check's value: a quantity with its limit, or the words of a state.
+
+use hums_core::health::check_named;
+
+/// Counts of what should never happen: a limit below one means "any", which tells nobody anything.
+const COUNTS: [&str; 2] = ["card_errors", "record_lost"];
+
+/// A value for people.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Shown {
+    /// What the number stands for; `None` where nobody knows. The number is not for people, and neither is its limit, which
+    /// lies between two of them.
+    State(Option<&'static str>),
+    /// A quantity, where there is one, and its limit, where that says something.
+    Quantity(Option<f32>, Option<f32>),
+}
+
+/// What is shown of a check's value and of the limit that it crossed.
+pub fn shown(check: &str, value: f32, limit: f32) -> Shown {
+    if check_named(check).is_some_and(|check| check.is_flag) {
+        return Shown::State(name(check, value));
+    }
+    let finite = |value: f32| value.is_finite().then_some(value);
+    let says_nothing = COUNTS.contains(&check) && limit < 1.0;
+    Shown::Quantity(finite(value), finite(limit).filter(|_| !says_nothing))
+}
 
 /// The state that a value of a check is; `None` for a check of a quantity.
 pub fn name(check: &str, value: f32) -> Option<&'static str> {
@@ -30,6 +55,16 @@ pub fn name(check: &str, value: f32) -> Option<&'static str> {
         // GPS_JAMMING_STATE, GPS_SPOOFING_STATE
         "gps_jamming" | "gps_spoofing" => &["unknown", "ok", "mitigated", "detected"],
         "autopilot_reboot" => &["no", "restarted"],
+        // The ranks that the check makes of MAV_BATTERY_CHARGE_STATE, of ESC_FAILURE_FLAGS, of the recorder.
+        "batt_state" => &["normal", "low or unhealthy", "critical, emergency or failed"],
+        "esc_failure" => &["no failure", "a failure", "motor stuck or ESC failed"],
+        "recording" => &["recording", "not recording", "not recording while armed"],
+        "compass_unused" => &["used", "not used"],
+        // A number of faults.
+        "batt_fault" if value >= 2.0 => return Some("several faults"),
+        "batt_fault" => &["no fault", "one fault"],
+        // `hums_core::cause::Urgency`
+        alert if alert.ends_with("_alert") => &["over", "worth knowing", "to be acted on at once"],
         _ => return None,
     };
     // What no state has is no number of one.
@@ -84,6 +119,8 @@ pub fn sensors(bits: u32) -> impl Iterator<Item = &'static str> {
 
 #[cfg(test)]
 mod tests {
+    use hums_core::health::checks;
+
     use super::*;
 
     #[test]
@@ -92,6 +129,26 @@ mod tests {
         assert_eq!(name("autopilot_state", 6.0), Some("emergency"));
         assert_eq!((name("autopilot_state", 99.0), name("autopilot_state", f32::NAN)), (None, None));
         assert_eq!(name("cell_voltage", 3.0), None);
+    }
+
+    #[test]
+    fn no_number_of_a_state_is_shown_and_each_has_words() {
+        for check in checks().filter(|check| check.is_flag) {
+            let limits = [check.warn, check.critical].into_iter().flatten().map(|limit| limit.spec().default);
+            let highest = limits.fold(0.0, f32::max).ceil() as u8;
+            for value in 0..=highest {
+                let shown = shown(check.name, f32::from(value), 0.5);
+                assert!(matches!(shown, Shown::State(Some(_))), "{} {value}: {shown:?}", check.name);
+            }
+            assert_eq!(shown(check.name, f32::NAN, 0.5), Shown::State(None));
+        }
+    }
+
+    #[test]
+    fn a_limit_that_means_any_is_not_shown() {
+        assert_eq!(shown("card_errors", 3.0, 0.5), Shown::Quantity(Some(3.0), None));
+        assert_eq!(shown("card_errors", 12.0, 10.0), Shown::Quantity(Some(12.0), Some(10.0)));
+        assert_eq!(shown("ekf_test_ratio", 0.7, 0.5), Shown::Quantity(Some(0.7), Some(0.5)));
     }
 
     #[test]

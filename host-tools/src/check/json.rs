@@ -12,6 +12,7 @@ use super::text::{firmware, flown};
 use crate::names::{autopilot_name, type_name};
 use crate::source::item::{About, Gap};
 use crate::source::told::Finding;
+use crate::states;
 use crate::utc::iso8601;
 
 /// The version of the object: it rises when a name goes or changes its meaning, not when one is added.
@@ -88,6 +89,7 @@ struct ProblemJson<'a> {
     times: u32,
     to_the_end: bool,
     value: Option<f64>,
+    state: Option<&'static str>,
     limit: Option<f64>,
     unit: &'a str,
     because: Option<&'a str>,
@@ -230,6 +232,7 @@ fn problem(problem: &Problem, time_utc: Option<String>) -> ProblemJson<'_> {
         times: problem.times,
         to_the_end: problem.lasting,
         value: known(problem.value),
+        state: states::name(&problem.check, problem.value),
         limit: known(problem.limit),
         unit: &problem.unit,
         because: problem.because.as_deref(),

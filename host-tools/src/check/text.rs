@@ -18,7 +18,7 @@ use crate::plural::count;
 use crate::printable::word;
 use crate::source::item::{About, Cause, Gap};
 use crate::source::recording::Format;
-use crate::states;
+use crate::states::{Shown, shown};
 use crate::utc::{clock, iso8601, moment};
 
 /// Problems that are shown with their words; the rest gets a line.
@@ -449,19 +449,26 @@ fn sentence(group: &[&Problem]) -> String {
         _ => name.to_owned(),
     };
     let unit = if first.unit.is_empty() { String::new() } else { format!(" {}", first.unit) };
-    // The limit of a state is a number between two of them, which tells nobody anything.
-    let state = states::name(&first.check, first.value);
+    let (state, value, limit) = match shown(&first.check, first.value, first.limit) {
+        Shown::State(state) => (state, None, None),
+        Shown::Quantity(value, limit) => (None, value, limit),
+    };
     if let Some(state) = state {
         let _ = write!(text, ": {state}");
-    } else if first.value.is_finite() && possible(&first.value) {
-        let _ = write!(text, ": {}{unit}", short(first.value));
-    } else if first.value.is_finite() {
-        let _ = write!(text, ": {}{unit}, which no sensor can have", short(first.value));
+    }
+    match value {
+        Some(value) if possible(&value) => {
+            let _ = write!(text, ": {}{unit}", short(value));
+        }
+        Some(value) => {
+            let _ = write!(text, ": {}{unit}, which no sensor can have", short(value));
+        }
+        None => {}
     }
     if !first.details.is_empty() {
         let _ = write!(text, ": {}", first.details.join(", "));
-    } else if first.limit.is_finite() && state.is_none() {
-        let _ = write!(text, " (limit {}{unit})", short(first.limit));
+    } else if let Some(limit) = limit {
+        let _ = write!(text, " (limit {}{unit})", short(limit));
     }
     // A mishap is a moment: its level stays until the next arming.
     let is_moment = first.subsystem == Subsystem::Mishap;

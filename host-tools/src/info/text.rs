@@ -10,7 +10,7 @@ use hums_core::health;
 use hums_core::observation::Feeds;
 use hums_core::time::Instant;
 
-use super::json::{duration_s, finite, vehicle};
+use super::json::{duration_s, vehicle};
 use super::number::short;
 use super::{usage, wear};
 use crate::colour::level;
@@ -21,7 +21,7 @@ use crate::logs::naming::is_part;
 use crate::plural::count;
 use crate::printable::{path, word};
 use crate::source::item::MessageCount;
-use crate::states;
+use crate::states::{Shown, shown};
 use crate::summary::{FindingLine, LISTED_MAX, Overview};
 use crate::utc::{clock, iso8601, moment};
 
@@ -177,17 +177,19 @@ fn sentence(finding: &FindingLine) -> String {
     let words = health::said(check)
         .map_or_else(|| check.clone(), |said| said.alarm_of(*instance, Feeds::Unsaid).to_string());
     let mut sentence = format!("{subsystem}: {words}");
-    // The limit of a state is a number between two of them.
-    if let Some(state) = states::name(check, *value) {
+    let (state, value, limit) = match shown(check, *value, *limit) {
+        Shown::State(state) => (state, None, None),
+        Shown::Quantity(value, limit) => (None, value, limit),
+    };
+    if let Some(state) = state {
         let _ = write!(sentence, ", {state}");
-    } else {
-        if let Some(value) = finite(*value) {
-            let _ = write!(sentence, ", {} {unit}", short(value.into()));
-            sentence.truncate(sentence.trim_end().len());
-        }
-        if let Some(limit) = finite(*limit) {
-            let _ = write!(sentence, " (limit {})", short(limit.into()));
-        }
+    }
+    if let Some(value) = value {
+        let _ = write!(sentence, ", {} {unit}", short(value.into()));
+        sentence.truncate(sentence.trim_end().len());
+    }
+    if let Some(limit) = limit {
+        let _ = write!(sentence, " (limit {})", short(limit.into()));
     }
     let _ = write!(sentence, "; was {previous} [{check}]");
     sentence
@@ -332,6 +334,8 @@ mod tests {
         };
         let state = sentence(&finding("autopilot_state", 6.0, 4.5, ""));
         assert_eq!(state, "computer: autopilot in failsafe, emergency; was ok [autopilot_state]");
+        let charge = sentence(&finding("batt_state", 1.0, 0.5, ""));
+        assert_eq!(charge, "computer: autopilot: battery 1 low, low or unhealthy; was ok [batt_state]");
         let load = sentence(&finding("load", 97.0, 95.0, "%"));
         assert!(load.contains(", 97 % (limit 95); was ok"), "{load}");
     }

@@ -83,8 +83,7 @@ pub struct Part {
     pub(super) notes: Vec<Note>,
     /// Notes that there was no room for: the oldest ones.
     pub(super) notes_gone: u64,
-    /// Seconds, degrees north, degrees east, height in metres.
-    pub(super) track: Vec<(f64, f64, f64, Option<f32>)>,
+    pub(super) track: Vec<Place>,
     pub(super) phases: Option<Rest>,
     pub(super) modes: Option<Rest>,
     pub(super) parameters: Vec<ParameterJson>,
@@ -92,6 +91,9 @@ pub struct Part {
     /// The log tells what parameters are by default: one without a default is at it.
     pub(super) tells_defaults: bool,
 }
+
+/// Seconds, degrees north, degrees east, height in metres.
+pub type Place = (f64, f64, f64, Option<f32>);
 
 /// A plot in words, as [`plots`] has them.
 #[derive(Debug, Serialize)]
@@ -243,7 +245,7 @@ impl History {
         let points = track.points();
         let places = points.partition_point(|place| place.at <= until);
         let new = points.get(cursor.places..places).unwrap_or_default();
-        let track: Vec<_> = new.iter().map(told).collect();
+        let track: Vec<_> = new.iter().map(|place| told(place, Instant::ZERO)).collect();
         cursor.places = places;
 
         let (phases, modes) =
@@ -295,9 +297,10 @@ impl History {
     }
 }
 
-fn told(place: &Point) -> (f64, f64, f64, Option<f32>) {
+/// A place, at its time since `from`.
+pub(super) fn told(place: &Point, from: Instant) -> Place {
     let height_m = place.height_m.filter(|height_m| height_m.is_finite());
-    (place.at.as_secs_f64(), place.latitude_deg, place.longitude_deg, height_m)
+    (place.at.since(from).as_secs_f64(), place.latitude_deg, place.longitude_deg, height_m)
 }
 
 #[cfg(test)]

@@ -4,12 +4,15 @@
 use hums_core::observation::Autopilot;
 use hums_core::time::Instant;
 
-use super::history::{History, Part, PlotJson, Series};
+use super::history::{History, Part, Place, PlotJson, Series, told};
 use super::plots::{self, Limits, Plot};
 use crate::series::Store;
 
 /// Series that each flight may have: all lines of what is compared.
 const SERIES_EACH: usize = 96;
+
+/// Places of a track side by side: a map there is small.
+const PLACES_MAX: usize = 1_000;
 
 /// A quantity: the plot, the line of it, and whether it is as PX4 has it, whose figures of vibration and estimator are others.
 type Quantity = (Plot, u8, bool);
@@ -102,6 +105,18 @@ fn add(store: &mut Store<Quantity>, number: u8, flight: &Flight<'_>) {
             }
         }
     }
+}
+
+/// Where a flight was, from its take-off on: the first of each of [`PLACES_MAX`] pieces at most, and the last.
+pub fn places(flight: &Flight<'_>) -> Vec<Place> {
+    let (from, to) = flight.span;
+    let track = flight.history.track();
+    let begin = track.partition_point(|place| place.at < from);
+    let of_it = track.get(begin..track.partition_point(|place| place.at <= to)).unwrap_or_default();
+    let each = of_it.len().div_ceil(PLACES_MAX).max(1);
+    let chosen = of_it.iter().step_by(each);
+    let last = of_it.last().filter(|_| of_it.len() % each != 1 && each > 1);
+    chosen.chain(last).map(|place| told(place, from)).collect()
 }
 
 fn plots(store: &Store<Quantity>, flights: &[Flight<'_>]) -> Vec<PlotJson> {

@@ -6,7 +6,7 @@ use hums_core::time::Instant;
 use hums_link::encode::COMPONENT;
 use serde::Serialize;
 
-use crate::states;
+use crate::states::{Shown, shown};
 use crate::statustext::Text;
 use crate::summary::FindingLine;
 
@@ -40,7 +40,7 @@ pub struct Found {
     pub check: String,
     /// The level before.
     pub previous: &'static str,
-    /// What decided; `null` where the input stopped.
+    /// What decided; `null` where the input stopped, and where it is no quantity.
     pub value: Option<f32>,
     /// The state that the value is, where it is no quantity.
     pub state: Option<&'static str>,
@@ -83,8 +83,10 @@ impl Note {
             None => finding.check.replace('_', " "),
         };
         let is_worry = matches!(finding.level, "warning" | "critical");
-        let state = states::name(&finding.check, finding.value);
-        let finite = |value: f32| value.is_finite().then_some(value);
+        let (state, value, limit) = match shown(&finding.check, finding.value, finding.limit) {
+            Shown::State(state) => (state, None, None),
+            Shown::Quantity(value, limit) => (None, value, limit),
+        };
         Self {
             at_s: finding.at.as_secs_f64(),
             kind: "finding",
@@ -95,10 +97,9 @@ impl Note {
             found: Some(Found {
                 check: finding.check.clone(),
                 previous: finding.previous,
-                value: finite(finding.value),
+                value,
                 state,
-                // The limit of a state is a number between two of them.
-                limit: finite(finding.limit).filter(|_| state.is_none()),
+                limit,
                 unit: finding.unit.clone(),
                 meaning: known.filter(|_| is_worry).map_or("", |known| known.meaning),
                 action: known.filter(|_| is_worry).map_or("", |known| known.action),

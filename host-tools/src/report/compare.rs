@@ -11,8 +11,8 @@ use super::replay::Replay;
 use super::trend::airframe;
 use crate::check;
 use crate::names::{autopilot_name, type_name};
-use crate::page::history::Part;
-use crate::page::merged::{self, merged};
+use crate::page::history::{Part, Place as Whereabouts};
+use crate::page::merged::{self, merged, places};
 use crate::page::note::Note;
 use crate::source::recording::Place;
 use crate::summary::Overview;
@@ -62,6 +62,8 @@ struct FlightJson {
     /// Seconds since its take-off, level, words; warning and worse.
     findings: Vec<(f64, &'static str, String)>,
     findings_count: usize,
+    /// From its take-off on.
+    track: Vec<Whereabouts>,
 }
 
 /// A page of the last flights in recordings, which stand in order; `None` where there are less than two.
@@ -92,7 +94,7 @@ pub fn html(recordings: &[Candidate<'_>]) -> Result<Option<String>> {
             span: flight.span(),
         })
         .collect();
-    let json = flights.iter().zip(&names).map(|((one, (_, flight)), name)| one.json(name.clone(), flight));
+    let json = flights.iter().zip(&drawn).map(|((one, (_, flight)), drawn)| one.json(flight, drawn));
     let data = Data {
         version: env!("CARGO_PKG_VERSION"),
         flight: merged(&drawn),
@@ -109,7 +111,7 @@ impl Recorded<'_> {
         if self.replay.flights.len() > 1 { format!("{name}, flight {}", index + 1) } else { name.clone() }
     }
 
-    fn json(&self, name: String, flight: &Flight) -> FlightJson {
+    fn json(&self, flight: &Flight, drawn: &merged::Flight<'_>) -> FlightJson {
         let (from, to) = flight.span();
         let contents = &self.overview.contents;
         let is_of_it = |at| at >= from && at <= to;
@@ -128,7 +130,7 @@ impl Recorded<'_> {
             .collect();
         let vehicle = contents.vehicle.as_ref();
         FlightJson {
-            name,
+            name: drawn.name.to_owned(),
             page: self.candidate.page.map(str::to_owned),
             start_utc: self.overview.utc_us(from).map(iso8601),
             vehicle: vehicle.map(|known| {
@@ -138,6 +140,7 @@ impl Recorded<'_> {
             flight: *flight,
             findings_count: findings.len(),
             findings: findings.into_iter().take(FINDINGS_MAX).collect(),
+            track: places(drawn),
         }
     }
 }

@@ -28,7 +28,7 @@ const STATE: Check = Check {
 };
 
 pub(super) const CHECKS: &[Check] = &[
-    STATE,
+    Check { is_flag: true, ..STATE },
     Check {
         name: "record_queue",
         unit: "%",

@@ -1,9 +1,10 @@
-// Flights side by side: figures, findings and parameters in columns; and in one plot for each quantity, from take-off on.
+// Flights side by side: figures, findings, tracks and parameters in columns; and in one plot for each quantity, from take-off on.
 
 import { line, whenColoursChange } from "./colours.js";
 import { el } from "./elements.js";
 import { flight } from "./flight.js";
 import { bar, cells, rows, section } from "./layout.js";
+import { extent, map } from "./map.js";
 import { charts } from "./plot.js";
 import { plots } from "./plots.js";
 import { clock, fixed, plural, short, span } from "./text.js";
@@ -29,11 +30,42 @@ document
   );
 bar.append(back);
 
+// ---- Tracks: each on a map of its own, and all of one scale.
+const extents = flights.map(({ track }) => (track.length ? extent(track) : null));
+const frame = () => {
+  const drawn = extents.filter((known, number) => known && shown[number]);
+  const most = (of) => Math.max(0, ...drawn.map(of));
+  return {
+    wide: most(({ wide }) => wide),
+    tall: most(({ tall }) => tall),
+    heights: [Math.min(...drawn.map(({ heights }) => heights[0])), Math.max(...drawn.map(({ heights }) => heights[1]))],
+  };
+};
+const maps = flights.map(({ name, track, findings, from_s: from, to_s: to, landed }, number) =>
+  extents[number]
+    ? map({
+        id: `map-${number}`,
+        name: `Track of ${name}, north is up`,
+        frame,
+        whose: {
+          track,
+          notes: findings.map(([at_s, level]) => ({ kind: "finding", level, at_s })),
+          flights: [{ from_s: 0, to_s: to - from, landed }],
+          step: Math.max(flight.step, (to - from) / track.length),
+          version: 0,
+        },
+      })
+    : null,
+);
+
 // ---- Which of them are drawn.
 const shown = flights.map(() => true);
 const show = (number, on) => {
   shown[number] = on;
   for (const chart of charts) chart.show(number, on);
+  tracks[number].hidden = !on;
+  // The others may be larger now.
+  for (const track of maps) track?.update(null, true);
 };
 const mark = (number) => {
   const node = el("i", { class: "flight-mark" });
@@ -69,6 +101,7 @@ const lowest = (plot) => (number) => {
 };
 const FIGURES = [
   ["Greatest height", "m", 1, (number) => flights[number].height_max_m],
+  ["Farthest from take-off", "m", 0, (number) => extents[number]?.far],
   ["Greatest ground speed", "m/s", 1, (number) => flights[number].speed_max_m_s],
   ["Strongest wind", "m/s", 1, highest("Wind")],
   ["Lowest voltage, battery 1", "V", 2, low("PackVolts-0")],
@@ -148,6 +181,19 @@ found.append(
       ),
     ),
   ),
+);
+
+const tracks = flights.map((f, i) =>
+  el(
+    "div",
+    { class: "panel" },
+    el("h3", {}, mark(i), brief(f.name)),
+    maps[i] ? [maps[i].node, maps[i].legend] : el("p", { class: "dim" }, "It never told where it was."),
+  ),
+);
+section("tracks", "Tracks").append(
+  el("p", { class: "dim" }, "All in one scale, and of one height in one colour; each stands in the middle of its own map."),
+  el("div", { class: "columns" }, tracks),
 );
 
 usually(() => [flight.start, flight.end]);

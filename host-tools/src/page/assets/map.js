@@ -28,8 +28,27 @@ const shade = (part) => {
 const bounds = (row) =>
   row.reduce(([low, high], v) => (v == null ? [low, high] : [Math.min(low, v), Math.max(high, v)]), [Infinity, -Infinity]);
 
-export const map = () => {
-  const surface = el("canvas", { class: "map", id: "map", role: "img", "aria-label": "Track over ground, north is up" });
+// Places as metres east and north of one.
+const around = ([, lat0, lon0]) => {
+  const shrink = Math.cos((lat0 * Math.PI) / 180);
+  return ([, lat, lon]) => [(lon - lon0) * METRES * shrink, (lat - lat0) * METRES];
+};
+const edges = (points) => [bounds(points.map(([e]) => e)), bounds(points.map(([, n]) => n))];
+// How wide and how tall a track is, how far it leads from its beginning, and between which heights: metres.
+export const extent = (track) => {
+  const points = track.map(around(track[0]));
+  const [[west, east], [south, north]] = edges(points);
+  return {
+    wide: east - west,
+    tall: north - south,
+    far: points.reduce((far, point) => Math.max(far, Math.hypot(...point)), 0),
+    heights: bounds(track.map((p) => p[3])),
+  };
+};
+
+// Of the flight, or of another one (`whose`); `frame` gives the size and the heights that maps side by side have in common.
+export const map = ({ id = "map", whose = flight, frame = null, name = "Track over ground, north is up" } = {}) => {
+  const surface = el("canvas", { class: "map", id, role: "img", "aria-label": name });
   const node = el("div", { class: "mapped" }, surface);
   const legend = el("p", { class: "legend" });
   let drawn = "",
@@ -38,20 +57,19 @@ export const map = () => {
   const paint = () => {
     const width = node.clientWidth || 300,
       height = node.clientHeight || 220,
-      { track } = flight;
+      { track } = whose;
     const ctx = canvas(surface, width, height);
     if (!track.length) return;
     const [, lat0, lon0] = track[0],
-      shrink = Math.cos((lat0 * Math.PI) / 180);
-    const metres = ([, lat, lon]) => [(lon - lon0) * METRES * shrink, (lat - lat0) * METRES];
+      metres = around(track[0]);
     const points = track.map(metres);
     if (here) points.push(metres([0, ...here.place]));
-    const [west, east] = bounds(points.map(([e]) => e)),
-      [south, north] = bounds(points.map(([, n]) => n)),
-      [low, high] = bounds(track.map((p) => p[3]));
+    const [[west, east], [south, north]] = edges(points),
+      { wide, tall, heights } = frame?.() ?? { wide: east - west, tall: north - south, heights: bounds(track.map((p) => p[3])) },
+      [low, high] = heights;
     const scale = Math.min(
-      (width - 2 * MARGIN) / Math.max(east - west, SPAN_MIN_M),
-      (height - 2 * MARGIN) / Math.max(north - south, SPAN_MIN_M),
+      (width - 2 * MARGIN) / Math.max(wide, SPAN_MIN_M),
+      (height - 2 * MARGIN) / Math.max(tall, SPAN_MIN_M),
     );
     const x = (e) => width / 2 + (e - (west + east) / 2) * scale,
       y = (n) => height / 2 - (n - (south + north) / 2) * scale;
@@ -74,7 +92,7 @@ export const map = () => {
     ctx.lineCap = ctx.lineJoin = "round";
     for (let i = 1; i < track.length; i++) {
       const [from, to] = [track[i - 1][0], track[i][0]],
-        silent = to - from > Math.max(5, 8 * flight.step);
+        silent = to - from > Math.max(5, 8 * whose.step);
       const inside = !view.away || (to >= view.from && from <= view.to);
       ctx.globalAlpha = inside ? 1 : 0.25;
       ctx.lineWidth = inside ? 2.5 : 1.5;
@@ -113,9 +131,9 @@ export const map = () => {
       ctx.fillStyle = colour("ink");
       ctx.fillText(text, left, top);
     };
-    for (const { kind, level, at_s } of flight.notes) if (kind === "finding" && level !== "ok") spot(near(at_s), colour(level), 5);
-    flight.flights.slice(0, 9).forEach((f, i) => {
-      const number = flight.flights.length > 1 ? ` ${i + 1}` : "";
+    for (const { kind, level, at_s } of whose.notes) if (kind === "finding" && level !== "ok") spot(near(at_s), colour(level), 5);
+    whose.flights.slice(0, 9).forEach((f, i) => {
+      const number = whose.flights.length > 1 ? ` ${i + 1}` : "";
       spot(near(f.from_s), PHASES.take_off, 5);
       label(near(f.from_s), `take-off${number}`, true);
       if (f.landed) {
@@ -145,6 +163,7 @@ export const map = () => {
       ctx.stroke();
       ctx.restore();
     }
+    surface.dataset.scale = scale;
     const bar = square * scale;
     ctx.strokeStyle = ctx.fillStyle = colour("dim");
     ctx.lineWidth = 2;
@@ -170,7 +189,7 @@ export const map = () => {
     // Where the vehicle is now, where that is known: degrees.
     update(vehicle = null, now = false) {
       const time = performance.now(),
-        key = [flight.version, JSON.stringify(vehicle), view.cursor, view.from, view.away, node.clientWidth].join();
+        key = [whose.version, JSON.stringify(vehicle), view.cursor, view.from, view.away, node.clientWidth].join();
       if (!now && (time - drawnAt < EVERY_MS || key === drawn)) return;
       [drawn, drawnAt, here] = [key, time, vehicle];
       paint();
