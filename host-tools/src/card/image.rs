@@ -10,7 +10,7 @@ use embedded_sdmmc::{Block, BlockCount, BlockDevice, BlockIdx};
 use hums_recorder::format::BLOCKS_MIN;
 use hums_recorder::layout::{Layout, LayoutError};
 
-use crate::files::{is_seekable, lock_in_place, make_in_place};
+use crate::files::{is_seekable, make_in_place, open_in_place};
 use crate::outcome::usage;
 
 /// The size of an image that is made, in MiB, unless `--card-size` says otherwise.
@@ -60,10 +60,8 @@ fn open(path: &Path, about: &Metadata, size_mib: Option<u64>) -> Result<File> {
             about.len() >> 20
         )));
     }
-    let file = OpenOptions::new().read(true).write(true).open(path);
-    let file = file.with_context(|| format!("{shown}: cannot be opened for writing"))?;
-    lock_in_place(&file, path)?;
-    Ok(file)
+    open_in_place(OpenOptions::new().read(true).write(true), path)
+        .with_context(|| format!("{shown}: cannot be opened for writing"))
 }
 
 /// Refuses an image that is no card: one on which the recorder finds no file system that it can use is only taken where

@@ -13,14 +13,8 @@ pub enum FileId {
     Place(PathBuf),
 }
 
-/// Device and inode.
-#[cfg(unix)]
+/// Device and inode; on Windows the volume's serial number and the file's index in it.
 type Node = (u64, u64);
-
-/// The path without links. Two hard links of one file differ by it: Windows has a file index, which the standard
-/// library does not give yet.
-#[cfg(not(unix))]
-type Node = PathBuf;
 
 #[cfg(unix)]
 fn node(path: &Path) -> io::Result<Node> {
@@ -28,9 +22,10 @@ fn node(path: &Path) -> io::Result<Node> {
     fs::metadata(path).map(|about| (about.dev(), about.ino()))
 }
 
-#[cfg(not(unix))]
+#[cfg(windows)]
 fn node(path: &Path) -> io::Result<Node> {
-    path.canonicalize()
+    let about = winapi_util::file::information(winapi_util::Handle::from_path_any(path)?)?;
+    Ok((about.volume_serial_number(), about.file_index()))
 }
 
 impl FileId {

@@ -35,7 +35,7 @@ pub use folder::{Folder, FolderFile, buffered};
 pub use identity::{FileId, is_seekable};
 pub use inputs::Inputs;
 pub use output::{Begun, Output};
-pub use part::{lock_in_place, make_in_place, take_turn};
+pub use part::{make_in_place, open_in_place, take_turn};
 pub use paths::{
     appended, cannot_write, check_parent, inside, make_directory, make_parent, says_directory, settle,
     why_unread,

@@ -1,7 +1,7 @@
 //! One output file.
 
 use std::fs::{self, File, Metadata};
-use std::io::{self, BufWriter, Write};
+use std::io::{self, BufWriter, Seek as _, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result, bail};
@@ -12,7 +12,9 @@ use super::descriptor::{
 };
 use super::identity::is_seekable;
 use super::inputs::Inputs;
-use super::part::{free_part, lock, lock_folder_of, rename_new, sync_folder_of};
+use super::part::{
+    begin, free_part, is_written, lock_folder_of, open_in_place, rename_new, sync_folder_of, unlock_to_read,
+};
 use super::paths::{begun_of, cannot_write, settle, target_of};
 use super::there::{Likeness, There, likeness};
 use crate::outcome::{Differs, usage};
@@ -179,11 +181,9 @@ impl Output {
     }
 
     fn begin(path: &Path, mut part: Part) -> Result<Self> {
-        let _beginning = lock_folder_of(&part.target);
-        part.path = free_part(&part.target, path)?;
-        let file = File::options().write(true).create_new(true).open(&part.path);
-        let file = file.with_context(|| cannot_write(path))?;
-        lock(&file, path)?;
+        let make = |part: &Path| File::options().write(true).create_new(true).open(part);
+        let (begun, file) = begin(&part.target, path, make)?;
+        part.path = begun;
         Ok(Self::new(To::File(file), path, Some(part)))
     }
 
@@ -239,8 +239,8 @@ impl Output {
 
     /// Throws away what was written, or what an earlier run has left: the file begins anew.
     pub fn begin_anew(&mut self) -> Result<()> {
-        let emptied = self.to.flush().and_then(|()| match self.to.get_ref() {
-            To::File(file) => file.set_len(0),
+        let emptied = self.to.flush().and_then(|()| match self.to.get_mut() {
+            To::File(file) => file.set_len(0).and_then(|()| file.rewind()),
             To::There(_) | To::Standard(_) => Ok(()),
         });
         settle(emptied, &self.path)
@@ -313,9 +313,15 @@ impl Drop for Begun {
 
 /// A part that an earlier run may have begun, to be gone on with.
 fn open_to_go_on(part: &Path, path: &Path) -> Result<File> {
-    let file = File::options().read(true).append(true).create(true).open(part);
-    let file = file.with_context(|| cannot_write(path))?;
-    lock(&file, path)?;
+    // Windows lets nobody cut a file that is open to append; one run at a time has it, so its end is where this run left it.
+    let mut options = File::options();
+    options.read(true).write(true).create(true).truncate(false);
+    let opened = open_in_place(&mut options, part);
+    if opened.as_ref().is_err_and(|error| error.kind() == io::ErrorKind::ResourceBusy) {
+        bail!(is_written(path));
+    }
+    let mut file = opened.with_context(|| cannot_write(path))?;
+    file.seek(SeekFrom::End(0)).with_context(|| cannot_write(path))?;
     Ok(file)
 }
 
@@ -392,6 +398,7 @@ impl Part {
             Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {}
             done => return done,
         }
+        unlock_to_read(file);
         // What the user means to replace or to complete, or what somebody has put there meanwhile.
         let permissions = fs::metadata(&self.target)?.permissions();
         match likeness(&self.target, &self.path)? {

@@ -3,7 +3,7 @@
 //! Whoever writes one holds a lock on it, which a second run sees. What is not locked has the name by chance, or was left by
 //! a run that was killed. Nothing tells these apart, so it stays, and the run takes `.NAME.2.hums-part`.
 
-use std::fs::{File, TryLockError};
+use std::fs::{File, OpenOptions, TryLockError};
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -17,12 +17,23 @@ pub(super) fn lock(file: &File, target: &Path) -> Result<()> {
     match file.try_lock() {
         // On a file system without locks nothing tells two runs apart.
         Ok(()) | Err(TryLockError::Error(_)) => Ok(()),
-        Err(TryLockError::WouldBlock) => {
-            bail!(
-                "{}: another run of hums is writing it; wait for its end, or name another output",
-                target.display()
-            )
-        }
+        Err(TryLockError::WouldBlock) => bail!(is_written(target)),
+    }
+}
+
+/// What is said where another run has the lock.
+pub(super) fn is_written(target: &Path) -> String {
+    format!(
+        "{}: another run of hums is writing it; wait for its end, or name another output",
+        target.display()
+    )
+}
+
+/// Lets this run read a part of its own by its name: on Windows a lock keeps everybody from that but who holds it.
+pub(super) fn unlock_to_read(part: &File) {
+    if !cfg!(unix) {
+        // Where it had none, there is nothing to release.
+        let _ = part.unlock();
     }
 }
 
@@ -34,13 +45,33 @@ pub(super) fn lock_folder_of(target: &Path) -> Option<File> {
     folder.lock().ok().map(|()| folder)
 }
 
-/// Takes the lock of a file that is updated in place, for as long as it is open: two runs that write one card or one
-/// store would leave neither's. Only on Unix: a lock on Windows would also keep the same run from reading it.
-pub fn lock_in_place(file: &File, path: &Path) -> Result<()> {
-    if cfg!(unix) && matches!(file.try_lock(), Err(TryLockError::WouldBlock)) {
-        bail!("{}: another run of hums is using it; wait for its end, or name another file", path.display());
+/// Opens a file that is updated in place, and keeps other runs from doing the same for as long as it is open: two that write
+/// one card or one store would leave neither's. [`io::ErrorKind::ResourceBusy`] while another run has it. Everybody may
+/// read it meanwhile.
+pub fn open_in_place(options: &mut OpenOptions, path: &Path) -> io::Result<File> {
+    let busy = || {
+        io::Error::new(
+            io::ErrorKind::ResourceBusy,
+            "another run of hums is using it; wait for its end, or name another file",
+        )
+    };
+    #[cfg(windows)]
+    {
+        use std::os::windows::fs::OpenOptionsExt as _;
+        const SHARE_READ_AND_DELETE: u32 = 1 | 4;
+        const SHARING_VIOLATION: i32 = 32;
+        let opened = options.share_mode(SHARE_READ_AND_DELETE).open(path);
+        opened.map_err(|error| if error.raw_os_error() == Some(SHARING_VIOLATION) { busy() } else { error })
     }
-    Ok(())
+    #[cfg(not(windows))]
+    {
+        let file = options.open(path)?;
+        match file.try_lock() {
+            Err(TryLockError::WouldBlock) => Err(busy()),
+            // On a file system without locks nothing tells two runs apart.
+            Ok(()) | Err(TryLockError::Error(_)) => Ok(file),
+        }
+    }
 }
 
 /// Makes a file that has its name only once `fill` has filled it, and gives it, locked, for reading and writing. A run
@@ -56,22 +87,35 @@ pub(super) fn fill_part(
     fill: impl FnOnce(&File) -> Result<()>,
     place: impl FnOnce(&Path) -> io::Result<()>,
 ) -> Result<File> {
-    let beginning = lock_folder_of(target);
-    let part = free_part(target, target)?;
-    let file = File::options().read(true).write(true).create_new(true).open(&part);
-    let file = file.with_context(|| cannot_write(target))?;
-    lock(&file, target)?;
-    drop(beginning);
+    let (part, file) = begin(target, target, |part| {
+        open_in_place(File::options().read(true).write(true).create_new(true), part)
+    })?;
     let made = fill(&file).and_then(|()| place(&part).with_context(|| cannot_write(target)));
-    if !cfg!(unix) {
-        // As `lock_in_place` has it.
-        let _ = file.unlock();
-    }
+    unlock_to_read(&file);
     if made.is_err() {
         // Where it cannot be removed, it is in nobody's way.
         let _ = std::fs::remove_file(&part);
     }
     made.map(|()| file)
+}
+
+/// Begins a part under the first name that nothing has: `make` makes it, which fails where something has its name. It is locked.
+pub(super) fn begin(
+    target: &Path,
+    path: &Path,
+    make: impl Fn(&Path) -> io::Result<File>,
+) -> Result<(PathBuf, File)> {
+    let _beginning = lock_folder_of(target);
+    let mut part = free_part(target, path)?;
+    // Where no folder is locked, another run may be quicker.
+    let mut made = make(&part);
+    while made.as_ref().is_err_and(|error| error.kind() == io::ErrorKind::AlreadyExists) {
+        part = free_part(target, path)?;
+        made = make(&part);
+    }
+    let file = made.with_context(|| cannot_write(path))?;
+    lock(&file, path)?;
+    Ok((part, file))
 }
 
 /// Keeps a second run away from the folder of this file, which is made where it is missing, for as long as it is open.

@@ -12,7 +12,7 @@ use hums_core::params::ParamSpec;
 use hums_store::sim::{SimFlash, is_store};
 use hums_store::{Found, Key, Store, param_value};
 
-use crate::files::{cannot_write, lock_in_place, make_in_place};
+use crate::files::{cannot_write, make_in_place, open_in_place};
 use crate::source::format::STORE_SECTOR_BYTES as SECTOR;
 
 /// Two of them are the store.
@@ -75,13 +75,12 @@ fn read(path: &Path) -> Result<(Vec<u8>, Option<File>)> {
         }
     }
     let context = || format!("--store {}: cannot be opened for reading and writing", path.display());
-    let mut file = match OpenOptions::new().read(true).write(true).open(path) {
+    let mut file = match open_in_place(OpenOptions::new().read(true).write(true), path) {
         Err(error) if error.kind() == io::ErrorKind::NotFound => {
             return Ok((Vec::new(), Some(make_in_place(path, |file| fill(file, path)).context("--store")?)));
         }
         opened => opened.with_context(context)?,
     };
-    lock_in_place(&file, path)?;
     let mut bytes = Vec::new();
     Read::by_ref(&mut file).take(BYTES as u64 + 1).read_to_end(&mut bytes).with_context(context)?;
     if !bytes.is_empty() && bytes.len() != BYTES {

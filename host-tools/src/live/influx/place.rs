@@ -87,8 +87,9 @@ mod tests {
         let of = |variables: &[(&str, &str)]| {
             folder(|name| Some(variables.iter().find(|(known, _)| *known == name)?.1.into()))
         };
-        let service = [("STATE_DIRECTORY", "/var/lib/hums:/var/lib/other"), ("HOME", "/home/a")];
-        assert_eq!(of(&service), Some("/var/lib/hums".into()));
+        let folders = std::env::join_paths(["/var/lib/hums", "/var/lib/other"]).expect("a list");
+        let folders = folders.to_str().expect("text");
+        assert_eq!(of(&[("STATE_DIRECTORY", folders), ("HOME", "/home/a")]), Some("/var/lib/hums".into()));
         assert_eq!(of(&[("XDG_STATE_HOME", "/x"), ("HOME", "/home/a")]), Some("/x/hums".into()));
         assert_eq!(
             of(&[("XDG_STATE_HOME", "x"), ("HOME", "/home/a")]),

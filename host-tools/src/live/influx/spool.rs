@@ -16,7 +16,7 @@
 //! Numbers are little-endian. Nothing is synced to the disk: a kill loses nothing, a PC that loses its power what its
 //! system had not written yet.
 
-use std::fs::{File, OpenOptions, TryLockError};
+use std::fs::{File, OpenOptions};
 use std::io::{self, Read, Seek as _, SeekFrom, Write as _};
 use std::path::{Path, PathBuf};
 
@@ -25,7 +25,7 @@ use crc::{CRC_32_ISCSI, Crc};
 
 use super::batch::Batch;
 use super::target::Database;
-use crate::files::remake_in_place;
+use crate::files::{open_in_place, remake_in_place};
 use crate::plural::are;
 use crate::source::format::SPOOL_MAGIC as MAGIC;
 
@@ -92,13 +92,11 @@ impl Spool {
             bail!("{}: is read-only; make it writable or name another file", path.display());
         }
         let mut options = OpenOptions::new();
-        let file = options.read(true).write(true).create(true).truncate(false).open(path);
-        let file = file.with_context(context)?;
-        match file.try_lock() {
-            Ok(()) => {}
-            Err(TryLockError::WouldBlock) => return Ok(None),
-            Err(TryLockError::Error(error)) => return Err(error).with_context(context),
-        }
+        options.read(true).write(true).create(true).truncate(false);
+        let file = match open_in_place(&mut options, path) {
+            Err(error) if error.kind() == io::ErrorKind::ResourceBusy => return Ok(None),
+            opened => opened.with_context(context)?,
+        };
         let path = path.to_owned();
         let mut spool = Self {
             file,

@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context as _, Result, bail};
 use hums_blackbox::{Header, SECTOR_BYTES, Sector};
 
-use crate::files::{cannot_write, lock_in_place};
+use crate::files::{cannot_write, open_in_place};
 use crate::logs::naming::part_name;
 
 /// The part of one log.
@@ -26,9 +26,9 @@ impl Part {
     /// The part beside a log's own path; made when missing. A log in work may have become longer.
     pub(super) fn open(whole: &Path, sectors: u32) -> Result<Self> {
         let path = part_name(whole);
-        let file = File::options().read(true).write(true).create(true).truncate(false).open(&path);
-        let file = file.with_context(|| cannot_write(&path))?;
-        lock_in_place(&file, &path)?;
+        let mut options = File::options();
+        options.read(true).write(true).create(true).truncate(false);
+        let file = open_in_place(&mut options, &path).with_context(|| cannot_write(&path))?;
         let about = file.metadata().with_context(|| cannot_write(&path))?;
         let bytes = u64::from(sectors) * SECTOR_BYTES as u64;
         if !about.is_file() || about.len() > bytes {
