@@ -436,7 +436,11 @@ fn assert_compared(
             .fold(0.0, f64::max);
         assert!((figure("Greatest height")[column] - height).abs() < 0.051, "{name}: {height} {figures:?}");
     }
-    assert_tracks(page, &["ap_quad_faults", "ap_quad_guided"].map(page_data), figure("Farthest from take-off"));
+    assert_tracks(
+        page,
+        &["ap_quad_faults", "ap_quad_guided"].map(page_data),
+        figure("Farthest from take-off"),
+    );
     let names = "return [...document.querySelectorAll('#plot-PackVolts-0 .keys button')].map((key) => key.textContent)";
     assert_eq!(page.run(names).as_array().unwrap().len(), 2, "both in one plot, on one scale");
     // Without the second one only the first is drawn, everywhere.
@@ -464,7 +468,8 @@ fn assert_tracks(page: &mut LivePage, pages: &[Value; 2], far_m: [f64; 2]) {
     for (data, far_m) in pages.iter().zip(far_m) {
         // Of several flights in a log the last stands first.
         let last = data["flights"].as_array().unwrap().last().unwrap();
-        let within = |at: &Value| at.as_f64() >= last["from_s"].as_f64() && at.as_f64() <= last["to_s"].as_f64();
+        let within =
+            |at: &Value| at.as_f64() >= last["from_s"].as_f64() && at.as_f64() <= last["to_s"].as_f64();
         let track = data["flight"]["track"].as_array().unwrap().iter().filter(|place| within(&place[0]));
         let places: Vec<[f64; 2]> =
             track.map(|place| [1, 2].map(|axis: usize| place[axis].as_f64().unwrap())).collect();
@@ -476,7 +481,8 @@ fn assert_tracks(page: &mut LivePage, pages: &[Value; 2], far_m: [f64; 2]) {
         let expected = places.iter().map(metres).fold(0.0, f64::max);
         assert!(expected > 10.0 && (expected - far_m).abs() < 1.5, "{expected} {far_m}");
     }
-    let scales = "return [...document.querySelectorAll('#tracks canvas')].map((map) => Number(map.dataset.scale))";
+    let scales =
+        "return [...document.querySelectorAll('#tracks canvas')].map((map) => Number(map.dataset.scale))";
     let both = page.run(scales);
     assert!(both[0].as_f64() > Some(0.0) && both[0] == both[1] && both[2].is_null(), "{both}");
     // Without one of them the other may be drawn larger, and never smaller.

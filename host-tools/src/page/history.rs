@@ -300,7 +300,7 @@ impl History {
 /// A place, at its time since `from`.
 pub(super) fn told(place: &Point, from: Instant) -> Place {
     let height_m = place.height_m.filter(|height_m| height_m.is_finite());
-    (place.at.since(from).as_secs_f64(), place.latitude_deg, place.longitude_deg, height_m)
+    (place.at.as_secs_f64() - from.as_secs_f64(), place.latitude_deg, place.longitude_deg, height_m)
 }
 
 #[cfg(test)]
