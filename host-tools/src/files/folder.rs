@@ -16,7 +16,7 @@ use anyhow::{Context as _, Result, bail};
 
 use super::aside::replace;
 use super::inputs::Inputs;
-use super::part::{free_part, lock, lock_folder_of, rename_new, sync_folder_of};
+use super::part::{begin, lock_folder_of, rename_new, sync_folder_of};
 use super::paths::{cannot_write, make_parent, settle, target_of};
 use super::stamp::{STAMP, Stamp};
 use super::there::{Likeness, There, likeness};
@@ -186,20 +186,11 @@ fn is_all_there(path: &Path, files: &BTreeMap<String, Arc<AtomicU64>>) -> Result
 
 impl Part {
     fn begin(path: &Path, target: PathBuf, replaces: bool) -> Result<Self> {
-        let part = free_part(&target, path)?;
-        fs::create_dir(&part).with_context(|| cannot_write(path))?;
-        let stamp = File::options().write(true).create_new(true).open(part.join(STAMP));
-        let stamp = stamp.with_context(|| cannot_write(path)).and_then(|stamp| {
-            lock(&stamp, path)?;
-            Ok(stamp)
-        });
-        match stamp {
-            Ok(stamp) => Ok(Self { path: part, target, replaces, stamp: Some(stamp) }),
-            Err(error) => {
-                remove_made(&part, []);
-                Err(error)
-            }
-        }
+        let (part, stamp) = begin(&target, path, |part| {
+            fs::create_dir(part)?;
+            File::options().write(true).create_new(true).open(part.join(STAMP))
+        })?;
+        Ok(Self { path: part, target, replaces, stamp: Some(stamp) })
     }
 
     fn finish(&mut self, path: &Path, stamp: &Stamp) -> Result<()> {

@@ -181,6 +181,7 @@ impl Output {
     }
 
     fn begin(path: &Path, mut part: Part) -> Result<Self> {
+        let _beginning = lock_folder_of(&part.target);
         let make = |part: &Path| File::options().write(true).create_new(true).open(part);
         let (begun, file) = begin(&part.target, path, make)?;
         part.path = begun;

@@ -87,9 +87,11 @@ pub(super) fn fill_part(
     fill: impl FnOnce(&File) -> Result<()>,
     place: impl FnOnce(&Path) -> io::Result<()>,
 ) -> Result<File> {
+    let beginning = lock_folder_of(target);
     let (part, file) = begin(target, target, |part| {
         open_in_place(File::options().read(true).write(true).create_new(true), part)
     })?;
+    drop(beginning);
     let made = fill(&file).and_then(|()| place(&part).with_context(|| cannot_write(target)));
     unlock_to_read(&file);
     if made.is_err() {
@@ -100,12 +102,12 @@ pub(super) fn fill_part(
 }
 
 /// Begins a part under the first name that nothing has: `make` makes it, which fails where something has its name. It is locked.
+/// The caller holds the lock of the folder ([`lock_folder_of`]).
 pub(super) fn begin(
     target: &Path,
     path: &Path,
     make: impl Fn(&Path) -> io::Result<File>,
 ) -> Result<(PathBuf, File)> {
-    let _beginning = lock_folder_of(target);
     let mut part = free_part(target, path)?;
     // Where no folder is locked, another run may be quicker.
     let mut made = make(&part);
@@ -114,8 +116,21 @@ pub(super) fn begin(
         made = make(&part);
     }
     let file = made.with_context(|| cannot_write(path))?;
-    lock(&file, path)?;
+    if let Err(error) = lock(&file, path) {
+        drop(file);
+        remove_begun(&part);
+        return Err(error);
+    }
     Ok((part, file))
+}
+
+/// Removes what has just been begun: a file, or a folder with nothing but its stamp in it. Where it cannot be removed, it is
+/// in nobody's way.
+fn remove_begun(part: &Path) {
+    if std::fs::remove_file(part).is_err() {
+        let _ = std::fs::remove_file(part.join(STAMP));
+        let _ = std::fs::remove_dir(part);
+    }
 }
 
 /// Keeps a second run away from the folder of this file, which is made where it is missing, for as long as it is open.
