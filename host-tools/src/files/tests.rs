@@ -244,6 +244,7 @@ fn what_was_begun_goes_on_and_can_begin_anew() {
     output.write_all(b"onetwothree").expect("written");
     assert_eq!(kept(dir.path(), 1, "log"), "of another log");
     output.finish().expect("whole");
+    drop(output);
     assert_eq!(kept(dir.path(), 1, "log"), "of another log");
     fs::remove_dir_all(dir.path().join("hums-kept")).expect("there");
     let (mut output, _) = Output::resume(&path).expect("created");
@@ -505,5 +506,7 @@ fn of_many_runs_that_begin_at_once_each_gets_its_turn_or_is_told_of_another_one(
     for told in told {
         assert!(told.contains("another run of hums is writing it"), "{told}");
     }
-    assert_eq!(names(dir.path()), ["old"]);
+    // Windows does not remove a part while another run looks whether it is locked: that one stays.
+    let names = names(dir.path()).into_iter().filter(|name| cfg!(unix) || !name.ends_with(".hums-part"));
+    assert_eq!(names.collect::<Vec<_>>(), ["old"]);
 }
