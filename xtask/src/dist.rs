@@ -2,7 +2,7 @@
 //!
 //! A release is built from a commit, in a clone of its own, so that nothing that lies about in the working copy gets
 //! into it. The firmware's flags and files are those of every build of it ([`firmware::flags`], [`firmware::files`]). Two builds in two
-//! places are equal byte by byte, which `--check` shows by doing so.
+//! places are equal byte by byte, which `--check` shows by doing so; it also runs the unit tests and the program for Windows under Wine.
 
 use std::ffi::OsString;
 use std::fmt::Write as _;
@@ -15,20 +15,24 @@ use sha2::{Digest as _, Sha256};
 use crate::budgets;
 use crate::firmware::{self, Board};
 use crate::repo::{self, FIRMWARE_TARGET};
-use crate::setup::{self, Need, STATIC_TARGET, WINDOWS_TARGET};
+use crate::setup::{self, MAC_TARGET, Need, STATIC_TARGET, WINDOWS_TARGET};
 use crate::shell::Shell;
+use crate::wine::{self, Wine};
 
 /// Makes a release of the commit that is checked out, in `target/dist`; with `check` a second one elsewhere, and compares.
 pub(crate) fn run(check: bool) -> Result<()> {
-    let targets = [Need::FirmwareTarget, Need::StaticTarget, Need::WindowsTarget, Need::Mingw];
-    setup::ensure(&[&[Need::Linker, Need::Clippy], &targets[..]].concat(), false).require_all()?;
+    let mut needs = vec![Need::Linker, Need::Clippy, Need::FirmwareTarget, Need::StaticTarget];
+    needs.extend([Need::WindowsTarget, Need::Mingw, Need::MacTarget]);
+    needs.extend(check.then_some(Need::Wine));
+    setup::ensure(&needs, false).require_all()?;
     ensure_cyclonedx()?;
     // `cargo xtask test` leaves out the board that none of its steps runs on.
     for board in Board::ALL {
         firmware::lint(board)?;
     }
     budgets::check(&Board::ALL)?;
-    lint_for_windows()?;
+    lint_for(WINDOWS_TARGET)?;
+    lint_for(MAC_TARGET)?;
     let commit = git(&["rev-parse", "HEAD"])?;
     if !git(&["status", "--porcelain"])?.is_empty() {
         eprintln!("note: what is not committed is not in the release, which is of {commit}");
@@ -41,6 +45,11 @@ pub(crate) fn run(check: bool) -> Result<()> {
     if !check {
         return Ok(());
     }
+    let wine = Wine::start()?;
+    wine.unit_tests()?;
+    let windows = folder.join("hums.exe");
+    check_findings(|flight| wine.run(&windows).args(["check", "--json"]).arg(flight), repo::root())?;
+    wine::try_out(&wine, &windows, &repo::root().join(FAULTY))?;
     let elsewhere = env::temp_dir().join(format!("hums-built-again-{}", std::process::id()));
     let again = Release::new(&commit, &elsewhere).and_then(|release| release.make());
     // Gigabytes, and of no use to anybody, whatever came of it.
@@ -87,7 +96,8 @@ impl Release {
         }
         self.build(&["--release", "--package=hums", "--target", STATIC_TARGET])?;
         let program = self.target().join(STATIC_TARGET).join("release/hums");
-        self.try_out(&program)?;
+        // The tests run a program that is built for tests. This is the one that is released.
+        check_findings(|flight| Shell::new(&program).args(["check", "--json"]).arg(flight), &self.tree)?;
         files.push(read("hums", &program)?);
         files.extend(for_shells(&program)?);
         files.push(self.sbom("hums", "host-tools", &["--target", STATIC_TARGET])?);
@@ -101,23 +111,6 @@ impl Release {
         files.push(("BUILD".to_owned(), self.provenance()?.into_bytes()));
         files.push(("SHA256SUMS".to_owned(), sums(&files).into_bytes()));
         Ok(files)
-    }
-
-    /// The tests run a program that is built for tests. This is the one that is released: it must find what is in the flight
-    /// with faults (`docs/health.md`).
-    fn try_out(&self, program: &Path) -> Result<()> {
-        const FINDINGS: [&str; 3] = ["cell_voltage", "autopilot_state", "batt_state"];
-        let flight = self.tree.join("tests/flights/ap_quad_faults.tlog");
-        let (json, code) = Shell::new(program).args(["check", "--json"]).arg(flight).output_and_code()?;
-        let missing: Vec<_> =
-            FINDINGS.into_iter().filter(|check| !json.contains(&format!("\"{check}\""))).collect();
-        if code != 4 || !missing.is_empty() {
-            bail!(
-                "the program of the release does not find {} in ap_quad_faults.tlog (exit code {code}, not 4)",
-                missing.join(", ")
-            );
-        }
-        Ok(())
     }
 
     fn target(&self) -> PathBuf {
@@ -172,9 +165,27 @@ impl Release {
     }
 }
 
-/// No step of `cargo xtask test` builds for Windows: that would take minutes.
-fn lint_for_windows() -> Result<()> {
-    let choice = ["--package=hums", "--lib", "--bins", "--target", WINDOWS_TARGET];
+/// A flight with faults (`docs/health.md`).
+const FAULTY: &str = "tests/flights/ap_quad_faults.tlog";
+
+/// Whether a program, as `check --json`, finds what is in the flight with faults.
+fn check_findings(program: impl Fn(&Path) -> Shell, tree: &Path) -> Result<()> {
+    const FINDINGS: [&str; 3] = ["cell_voltage", "autopilot_state", "batt_state"];
+    let (json, code) = program(&tree.join(FAULTY)).output_and_code()?;
+    let missing: Vec<_> =
+        FINDINGS.into_iter().filter(|check| !json.contains(&format!("\"{check}\""))).collect();
+    if code != 4 || !missing.is_empty() {
+        bail!(
+            "the program of the release does not find {} in {FAULTY} (exit code {code}, not 4)",
+            missing.join(", ")
+        );
+    }
+    Ok(())
+}
+
+/// No step of `cargo xtask test` builds for other systems: that would take minutes.
+fn lint_for(target: &str) -> Result<()> {
+    let choice = ["--package=hums", "--lib", "--bins", "--target", target];
     Shell::cargo().arg("clippy").args(choice).args(["--", "-D", "warnings"]).run()
 }
 

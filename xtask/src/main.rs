@@ -23,6 +23,7 @@ mod setup;
 mod shell;
 mod structure;
 mod test;
+mod wine;
 
 use std::process::ExitCode;
 
@@ -51,7 +52,8 @@ cargo xtask COMMAND
   firmware [--board BOARD]       build the firmware: f405 (the default) or f429
   bench [sizes|speed|cost|logs]... what the record takes: bytes, decoding time, cycles; how fast logs are checked
   fuzz [--seconds N]             the fuzz targets, each for so long (300); needs nightly Rust and cargo-fuzz
-  dist [--check]                 the files of a release, in target/dist; --check builds them twice and compares
+  dist [--check]                 the files of a release, in target/dist; --check builds them twice, compares,
+                                 and runs what is for Windows under Wine
   flash [--board BOARD] [--dfu]  build the firmware and program it: by a debug probe (probe-rs), or over USB by the chip's own
                                  boot loader (dfu-util); what the board has stored stays
   attach [--board BOARD]         show the log of a board that runs (probe-rs)

@@ -20,6 +20,9 @@ pub(crate) const STATIC_TARGET: &str =
 /// The target of the `hums` for Windows, which MinGW links.
 pub(crate) const WINDOWS_TARGET: &str = "x86_64-pc-windows-gnu";
 
+/// The target of a `hums` for macOS, which nothing here links.
+pub(crate) const MAC_TARGET: &str = "aarch64-apple-darwin";
+
 /// Something that a command needs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Need {
@@ -29,6 +32,8 @@ pub(crate) enum Need {
     StaticTarget,
     WindowsTarget,
     Mingw,
+    Wine,
+    MacTarget,
     Rustfmt,
     Clippy,
     Mtools,
@@ -41,12 +46,14 @@ pub(crate) enum Need {
 }
 
 impl Need {
-    pub(crate) const ALL: [Self; 14] = [
+    pub(crate) const ALL: [Self; 16] = [
         Self::Linker,
         Self::FirmwareTarget,
         Self::StaticTarget,
         Self::WindowsTarget,
         Self::Mingw,
+        Self::Wine,
+        Self::MacTarget,
         Self::Rustfmt,
         Self::Clippy,
         Self::Mtools,
@@ -66,6 +73,8 @@ impl Need {
             Self::StaticTarget => "Rust's musl target, for the static hums of a release",
             Self::WindowsTarget => "Rust's target for Windows, for the hums.exe of a release",
             Self::Mingw => "MinGW's linker for Windows (gcc-mingw-w64-x86-64), for the same",
+            Self::Wine => "Wine (wine64), which runs hums.exe for dist --check",
+            Self::MacTarget => "Rust's target for macOS, for which hums is type-checked before a release",
             Self::Rustfmt => "rustfmt, for the check of the formatting",
             Self::Clippy => "clippy, for the lints",
             Self::Mtools => "mtools, which reads the card's image independently of our own reader",
@@ -86,6 +95,8 @@ impl Need {
             Self::StaticTarget => target_installed(STATIC_TARGET),
             Self::WindowsTarget => target_installed(WINDOWS_TARGET),
             Self::Mingw => find_program("x86_64-w64-mingw32-gcc").is_some(),
+            Self::Wine => find_wine().is_some(),
+            Self::MacTarget => target_installed(MAC_TARGET),
             Self::Rustfmt => cargo_has("fmt"),
             Self::Clippy => cargo_has("clippy"),
             Self::Mtools => find_program("mcopy").is_some(),
@@ -104,6 +115,7 @@ impl Need {
             Self::FirmwareTarget => Some(["target", "add", FIRMWARE_TARGET]),
             Self::StaticTarget => Some(["target", "add", STATIC_TARGET]),
             Self::WindowsTarget => Some(["target", "add", WINDOWS_TARGET]),
+            Self::MacTarget => Some(["target", "add", MAC_TARGET]),
             Self::Rustfmt => Some(["component", "add", "rustfmt"]),
             Self::Clippy => Some(["component", "add", "clippy"]),
             _ => None,
@@ -115,6 +127,7 @@ impl Need {
         match self {
             Self::Linker => &["gcc", "libc6-dev"],
             Self::Mingw => &["gcc-mingw-w64-x86-64"],
+            Self::Wine => &["wine64"],
             Self::Mtools => &["mtools"],
             Self::Dosfstools => &["dosfstools"],
             Self::PythonVenv => &["python3-venv"],
@@ -125,6 +138,7 @@ impl Need {
             Self::FirmwareTarget
             | Self::StaticTarget
             | Self::WindowsTarget
+            | Self::MacTarget
             | Self::Rustfmt
             | Self::Clippy => &[],
         }
@@ -240,6 +254,12 @@ fn find_program(name: &str) -> Option<PathBuf> {
     let path = env::var_os("PATH").unwrap_or_default();
     let system = ["/usr/sbin", "/sbin"].map(PathBuf::from);
     env::split_paths(&path).chain(system).map(|dir| dir.join(name)).find(|file| file.is_file())
+}
+
+/// Wine: Debian keeps the program of its package `wine64` out of `PATH`.
+pub(crate) fn find_wine() -> Option<PathBuf> {
+    let hidden = || Some(PathBuf::from("/usr/lib/wine/wine64")).filter(|path| path.is_file());
+    ["wine64", "wine"].into_iter().find_map(find_program).or_else(hidden)
 }
 
 fn may_be_root() -> bool {
