@@ -47,10 +47,10 @@ pub struct Live {
     /// Also write every message to this database, as `hums decode --format influx` would: http://ADDR:PORT
     #[arg(long, value_name = "URL", help_heading = "Database")]
     pub influx: Option<String>,
-    /// Its token (1.x: USER:PASSWORD); otherwise the environment's `HUMS_INFLUX_TOKEN`
+    /// Its token (1.x: USER:PASSWORD); otherwise what `HUMS_INFLUX_TOKEN` in the environment says
     #[arg(long, value_name = "T", help_heading = "Database")]
     pub token: Option<String>,
-    /// Its organisation: `InfluxDB` 2 or 3; without it `InfluxDB` 1.x and `VictoriaMetrics`
+    /// Its organisation, which InfluxDB 2 and 3 have; InfluxDB 1.x and VictoriaMetrics have none
     #[arg(long, value_name = "O", help_heading = "Database")]
     pub org: Option<String>,
     /// Its bucket or database

@@ -68,7 +68,7 @@ pub enum Format {
     Jsonl,
     /// Line protocol, with the reference system's measurement HUMS
     Influx,
-    /// Typed columns by vehicle, date and session, for `DuckDB`, Spark, pandas
+    /// Typed columns by vehicle, date and session, for DuckDB, Spark, pandas
     Parquet,
     /// The reference system's four tables, a row a second
     Thesis,

@@ -61,7 +61,7 @@ pub struct Run {
 pub enum Speed {
     /// A virtual clock, as fast as the machine goes
     Max,
-    /// The wall's clock
+    /// As long as it took
     Real,
 }
 

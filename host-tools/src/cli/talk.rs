@@ -61,7 +61,7 @@ pub enum ParamsAction {
         #[arg(long)]
         json: bool,
     },
-    /// Give the board the key of --key, over the port that its `SIGN_PORT` trusts
+    /// Give the board the key of --key, over the port from which it takes keys (parameter `SIGN_PORT`)
     Sign {
         /// Where the board is.
         #[command(flatten)]
