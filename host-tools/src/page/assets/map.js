@@ -67,10 +67,7 @@ export const map = ({ id = "map", whose = flight, frame = null, name = "Track ov
     const [[west, east], [south, north]] = edges(points),
       { wide, tall, heights } = frame?.() ?? { wide: east - west, tall: north - south, heights: bounds(track.map((p) => p[3])) },
       [low, high] = heights;
-    const scale = Math.min(
-      (width - 2 * MARGIN) / Math.max(wide, SPAN_MIN_M),
-      (height - 2 * MARGIN) / Math.max(tall, SPAN_MIN_M),
-    );
+    const scale = Math.min((width - 2 * MARGIN) / Math.max(wide, SPAN_MIN_M), (height - 2 * MARGIN) / Math.max(tall, SPAN_MIN_M));
     const x = (e) => width / 2 + (e - (west + east) / 2) * scale,
       y = (n) => height / 2 - (n - (south + north) / 2) * scale;
     // Squares of a round size, for a feeling of distance.
