@@ -98,36 +98,39 @@ pub struct LinkStatus {
 }
 
 /// `ONBOARD_COMPUTER_STATUS`. Of memory it tells nothing, because its unit is MiB; of temperatures and fans nothing, because there are none.
+#[inline(never)]
 pub fn computer_status(now: Instant, status: &ComputerStatus) -> Packet {
     /// Storage of this kind: a card that can be taken out.
     const CARD: u32 = 4;
-    const UNKNOWN: &[u8] = &[0xFF; 16];
-    let micros = now.as_micros();
-    // From `cpu_cores` to `gpu_combined`; what is signed has its largest number where it is unknown.
-    let mut packet = Packet::new(390)
-        .u64(0, micros)
-        .u32(8, now.as_millis() as u32)
-        .bytes(12, &[0xFF; 56])
-        .bytes(92, &[0xFF; 96])
-        .bytes(197, UNKNOWN)
-        .bytes(213, UNKNOWN)
-        .bytes(229, &[0x7F; 9])
-        .u8(197, status.cpu_percent);
-    for fan in 0..4 {
-        packet = packet.u16(188 + 2 * fan, i16::MAX as u16);
-    }
+    // The largest number is what is unknown, or unused.
+    let mut payload = [0xFF_u8; 238];
+    let mut put = |at: usize, bytes: &[u8]| payload[at..at + bytes.len()].copy_from_slice(bytes);
+    put(0, &now.as_micros().to_le_bytes());
+    put(8, &(now.as_millis() as u32).to_le_bytes());
     if let Some((used, total)) = status.storage_mib {
-        packet = packet.u32(20, CARD).u32(36, used).u32(52, total);
+        for (at, value) in [(20, CARD), (36, used), (52, total)] {
+            put(at, &value.to_le_bytes());
+        }
     }
     // Both are UARTs: type 0, and 1 for the second one.
-    for (link, LinkStatus { baud, tx, rx }) in status.links.iter().enumerate() {
+    put(68, &[0; 24]);
+    for (link, LinkStatus { baud, tx, rx }) in (0_u8..).zip(&status.links) {
+        let place = 4 * usize::from(link);
+        put(68 + place, &[link]);
         let kib = |bytes: u32| bytes.div_ceil(1_024);
-        let place = 4 * link;
-        packet = packet.u32(68 + place, link as u32);
-        packet = packet.u32(92 + place, tx.map_or(u32::MAX, kib)).u32(116 + place, rx.map_or(u32::MAX, kib));
-        packet = packet.u32(140 + place, kib(baud / 10)).u32(164 + place, kib(baud / 10));
+        let most = kib(baud / 10);
+        let values =
+            [(92, tx.map_or(u32::MAX, kib)), (116, rx.map_or(u32::MAX, kib)), (140, most), (164, most)];
+        for (at, value) in values {
+            put(at + place, &value.to_le_bytes());
+        }
     }
-    packet
+    for fan in 0..4 {
+        put(188 + 2 * fan, &i16::MAX.to_le_bytes());
+    }
+    put(196, &[0, status.cpu_percent]);
+    put(229, &[i8::MAX as u8; 9]);
+    Packet::new(390).bytes(0, &payload)
 }
 
 /// `PROTOCOL_VERSION`: MAVLink 2.0, and nothing older.

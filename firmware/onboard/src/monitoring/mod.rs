@@ -270,7 +270,8 @@ impl<'a> Monitoring<'a> {
         self.talk(now, sectors, gs);
     }
 
-    /// What time alone asks for at the ports.
+    /// What time alone asks for at the ports. Not within the tick, as those below.
+    #[inline(never)]
     fn talk(&mut self, now: Instant, sectors: &mut SectorsIn, gs: &mut GsIn) {
         let Self { book, summary, companion, notices, figures, identity, .. } = self;
         let is_known = book.monitor.vehicle().source.is_some();
