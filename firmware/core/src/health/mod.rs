@@ -22,8 +22,8 @@ mod structure;
 mod tables;
 mod vocabulary;
 
-use check::Change;
 pub use check::{CLEAR, CLEAR_MAX, CLEAR_MAX_ALWAYS, Check, Side, State, When};
+use check::{Change, Part};
 pub use consequence::{because, is_of_mishap};
 pub use finding::{Finding, Level, Subsystem};
 pub use inputs::Inputs;
@@ -83,6 +83,7 @@ impl Health {
         let over =
             inputs.mishap.is_going() && (!heard || (inputs.mishap.is_down() && !inputs.vehicle.armed()));
         let quiet = inputs.mishap.is_going() && !over;
+        let (motors, batteries) = (inputs.vehicle.motors_known(), inputs.vehicle.batteries_known().max(1));
         let looked_at = usize::from(self.looked_at);
         self.looked_at = ((looked_at + 1) % STATES) as u8;
         let mut first = 0;
@@ -102,14 +103,25 @@ impl Health {
             if !applies && self.states.get(slots.clone()).is_none_or(is_idle) {
                 continue;
             }
+            let there = match check.part {
+                Part::Vehicle => check.instances,
+                Part::Motor => motors,
+                Part::Battery => batteries,
+            };
             for (instance, slot) in (0..check.instances).zip(slots) {
                 let Some(state) = self.states.get_mut(slot) else { return };
                 let is_new = state.is_new();
-                if is_new && !applies {
+                if is_new && (!applies || instance >= there) {
                     continue;
                 }
                 let reading = (check.read)(inputs, instance);
                 if is_new && reading.is_none() {
+                    continue;
+                }
+                if !latched && !quiet {
+                    state.release();
+                }
+                if applies && !quiet && state.stays_calm(check, inputs.now, reading, inputs.params) {
                     continue;
                 }
                 let before = *state;
@@ -119,7 +131,7 @@ impl Health {
                     *state = before.seen_as(state);
                     continue;
                 }
-                let change = if latched { state.hold(&before, change) } else { state.release(change) };
+                let change = if latched { state.hold(&before, change) } else { change };
                 let is_change = change.is_some();
                 let told = if let Some(change) = change {
                     let because = self.because(check, change.level);
@@ -169,6 +181,15 @@ impl Health {
             .flat_map(|check| (0..check.instances).map(move |instance| (check, instance)))
             .zip(&self.states)
             .filter_map(|((check, instance), state)| state.level().map(|level| (check, instance, level)))
+    }
+
+    /// Of each check, in the order of [`checks`], whether an instance has a level that is known.
+    pub fn judged(&self) -> impl Iterator<Item = bool> {
+        let mut states = self.states.iter();
+        checks().map(move |check| {
+            let mine = states.by_ref().take(usize::from(check.instances));
+            mine.fold(false, |known, state| known | state.level().is_some_and(|level| level != Level::Stale))
+        })
     }
 
     /// A subsystem's level: its worst known part; stale where nothing is known.
