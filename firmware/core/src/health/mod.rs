@@ -98,20 +98,24 @@ impl Health {
             };
             let slots = first..first + usize::from(check.instances);
             first = slots.end;
+            // What never spoke has no value, and its states are new.
+            let there = match check.part {
+                Part::Vehicle => check.instances,
+                Part::Motor => motors.min(check.instances),
+                Part::Battery => batteries.min(check.instances),
+            };
+            if there == 0 {
+                continue;
+            }
             // Most have nothing to say and never had: a step would change nothing.
             let is_idle = |states: &[State]| states.iter().all(State::is_new);
             if !applies && self.states.get(slots.clone()).is_none_or(is_idle) {
                 continue;
             }
-            let there = match check.part {
-                Part::Vehicle => check.instances,
-                Part::Motor => motors,
-                Part::Battery => batteries,
-            };
-            for (instance, slot) in (0..check.instances).zip(slots) {
+            for (instance, slot) in (0..there).zip(slots) {
                 let Some(state) = self.states.get_mut(slot) else { return };
                 let is_new = state.is_new();
-                if is_new && (!applies || instance >= there) {
+                if is_new && !applies {
                     continue;
                 }
                 let reading = (check.read)(inputs, instance);
