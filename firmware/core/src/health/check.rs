@@ -411,9 +411,19 @@ impl State {
         Self { seen: later.seen, ..self }
     }
 
-    /// Levels may fall.
-    pub(super) const fn release(&mut self) {
-        self.held = None;
+    /// Before a step: levels may fall again that are not `latched`; whether the step would change nothing more.
+    pub(super) fn rests(
+        &mut self,
+        check: &Check,
+        inputs: &Inputs<'_>,
+        reading: Option<Reading>,
+        applies: bool,
+        latched: bool,
+    ) -> bool {
+        if !latched {
+            self.held = None;
+        }
+        applies && self.stays_calm(check, inputs.now, reading, inputs.params)
     }
 
     /// How long it must be good before the level falls.

@@ -99,14 +99,7 @@ impl Health {
             let slots = first..first + usize::from(check.instances);
             first = slots.end;
             // What never spoke has no value, and its states are new.
-            let there = match check.part {
-                Part::Vehicle => check.instances,
-                Part::Motor => motors.min(check.instances),
-                Part::Battery => batteries.min(check.instances),
-            };
-            if there == 0 {
-                continue;
-            }
+            let Some(there) = part_count(check, motors, batteries) else { continue };
             // Most have nothing to say and never had: a step would change nothing.
             let is_idle = |states: &[State]| states.iter().all(State::is_new);
             if !applies && self.states.get(slots.clone()).is_none_or(is_idle) {
@@ -114,18 +107,13 @@ impl Health {
             }
             for (instance, slot) in (0..there).zip(slots) {
                 let Some(state) = self.states.get_mut(slot) else { return };
+                // Of what is new, a step without a value changes nothing.
                 let is_new = state.is_new();
-                if is_new && !applies {
-                    continue;
-                }
-                let reading = (check.read)(inputs, instance);
+                let reading = if is_new && !applies { None } else { (check.read)(inputs, instance) };
                 if is_new && reading.is_none() {
                     continue;
                 }
-                if !latched && !quiet {
-                    state.release();
-                }
-                if applies && !quiet && state.stays_calm(check, inputs.now, reading, inputs.params) {
+                if !quiet && state.rests(check, inputs, reading, applies, latched) {
                     continue;
                 }
                 let before = *state;
@@ -211,6 +199,16 @@ impl Health {
         let unknown = EXPECTED.into_iter().any(|subsystem| self.subsystem(subsystem) == Level::Stale);
         worst(self.levels().map(|(.., level)| level).chain(unknown.then_some(Level::Stale)))
     }
+}
+
+/// How many instances of a check may have a value; `None` where there is none.
+fn part_count(check: &Check, motors: u8, batteries: u8) -> Option<u8> {
+    let count = match check.part {
+        Part::Vehicle => check.instances,
+        Part::Motor => motors.min(check.instances),
+        Part::Battery => batteries.min(check.instances),
+    };
+    (count > 0).then_some(count)
 }
 
 /// Critical before stale before warning: not knowing is worse than a known warning, and better than a known danger.
