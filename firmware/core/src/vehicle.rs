@@ -45,6 +45,11 @@ pub struct Motor {
     pub moved_at: Option<Instant>,
 }
 
+/// The places up to the last one that is known.
+fn known(places: impl Iterator<Item = bool>) -> u8 {
+    (1..).zip(places).fold(0, |count, (place, is_known)| if is_known { place } else { count })
+}
+
 /// The vehicle as it is known now.
 #[derive(Clone, Copy, Debug)]
 pub struct Vehicle {
@@ -202,6 +207,16 @@ impl Vehicle {
             terminated_since: None,
             climb_wanted: Latest::nothing(),
         }
+    }
+
+    /// Motors up to the last one whose ESC has said anything.
+    pub(crate) fn motors_known(&self) -> u8 {
+        known(self.motors.iter().map(|motor| motor.at.is_some()))
+    }
+
+    /// Batteries up to the last one that has reported itself.
+    pub(crate) fn batteries_known(&self) -> u8 {
+        known(self.batteries.iter().map(|slot| slot.get().is_some()))
     }
 
     /// Whether motors may turn, by the last heartbeat.

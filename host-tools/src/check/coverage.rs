@@ -2,7 +2,7 @@
 
 use hums_core::Monitor;
 use hums_core::baseline::Baselines;
-use hums_core::health::{Check, Level, Scope, Side, VOCABULARY, When, checks, vocabulary};
+use hums_core::health::{Check, Scope, Side, VOCABULARY, When, checks, vocabulary};
 use hums_core::observation::{Autopilot, Gnss, Heartbeat};
 use hums_core::params::{Param, Params};
 use hums_core::status::{LinkReading, RecorderStatus};
@@ -67,16 +67,8 @@ impl Coverage {
         if self.seen.iter().all(|seen| seen.level) {
             return;
         }
-        // Both are in the order of the checks. Told apart by their names: a constant may have several addresses.
-        let mut all = checks().zip(&mut self.seen);
-        let mut at = all.next();
-        for (check, ..) in monitor.health().levels().filter(|(.., level)| *level != Level::Stale) {
-            while at.as_ref().is_some_and(|(known, _)| known.name != check.name) {
-                at = all.next();
-            }
-            if let Some((_, seen)) = &mut at {
-                seen.level = true;
-            }
+        for (seen, judged) in self.seen.iter_mut().zip(monitor.health().judged()) {
+            seen.level |= judged;
         }
     }
 

@@ -5,7 +5,7 @@
 //! wanted one. Where nobody says what is wanted, it counts but in modes in which the pilot banks as far as he likes. What is said to
 //! be wanted and is the attitude itself, sample by sample, is no word about what is wanted.
 
-use super::check::{Check, Side, When};
+use super::check::{Check, Part, Side, When};
 use super::common::{STALE, alert};
 use super::finding::Subsystem;
 use super::inputs::Inputs;
@@ -39,6 +39,7 @@ const ROLL: Check = Check {
     instances: 1,
     alarm_only: false,
     is_flag: false,
+    part: Part::Vehicle,
     read: |inputs, _| degrees(inputs, |attitude| attitude.roll, |wanted| wanted.roll),
 };
 

@@ -47,6 +47,18 @@ pub enum When {
     InFlight,
 }
 
+/// What the instances of a check are. One that never said anything has no value, and is not asked for one: a vehicle has four motors
+/// and one battery more often than twelve and four, and most of a step went into asking.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Part {
+    /// The vehicle, or parts of it that nobody counts: each is asked.
+    Vehicle,
+    /// Motors, whose ESCs tell of them.
+    Motor,
+    /// Batteries. The first one may be the autopilot's own, which no message names.
+    Battery,
+}
+
 /// One check.
 #[derive(Clone, Copy, Debug)]
 pub struct Check {
@@ -79,6 +91,8 @@ pub struct Check {
     pub alarm_only: bool,
     /// Its value is a flag or the number of a state, which tells a pilot nothing: the alarm alone is told.
     pub is_flag: bool,
+    /// What its instances are.
+    pub part: Part,
     /// Reads the value; `None` while it has never been measured.
     pub read: fn(&Inputs<'_>, u8) -> Option<Reading>,
 }
@@ -306,6 +320,37 @@ impl State {
         self.level == Some(Level::Ok) && self.better.is_set() && !counts
     }
 
+    /// One step of what is good as it was for long and stays so, as nearly every step is: the time of its measurement is noted, and
+    /// nothing else changes. `false` where [`Self::step`] has more to do; nothing was changed then.
+    pub(super) fn stays_calm(
+        &mut self,
+        check: &Check,
+        now: Instant,
+        reading: Option<Reading>,
+        params: &Params,
+    ) -> bool {
+        let Some(Reading { at, value }) = reading else { return false };
+        if !self.is_calm() || !value.is_finite() {
+            return false;
+        }
+        // A limit that is NaN is off: no comparison with it is true.
+        let is_beyond = |limit: Option<Param>| {
+            limit.map(|limit| params.get(limit)).is_some_and(|limit| match check.side {
+                Side::Above => value > limit,
+                Side::Below => value < limit,
+            })
+        };
+        if is_beyond(check.warn) || is_beyond(check.critical) {
+            return false;
+        }
+        let seen = Stamp::at(at.min(now));
+        let is_stale = check.stale_after.is_some_and(|limit| at < now && seen.older_than(now, limit));
+        if !is_stale {
+            self.seen = seen;
+        }
+        !is_stale
+    }
+
     /// One step: at least every 50 ms.
     pub fn step(
         &mut self,
@@ -325,6 +370,9 @@ impl State {
                 value: f32::NAN,
                 limit: f32::NAN,
             });
+        }
+        if self.stays_calm(check, now, reading, params) {
+            return None;
         }
         let reading = reading.filter(|reading| reading.value.is_finite());
         let seen = reading.map_or(self.seen, |reading| Stamp::at(reading.at.min(now)));
@@ -363,10 +411,19 @@ impl State {
         Self { seen: later.seen, ..self }
     }
 
-    /// After a step, where levels may fall.
-    pub(super) const fn release(&mut self, change: Option<Change>) -> Option<Change> {
-        self.held = None;
-        change
+    /// Before a step: levels may fall again that are not `latched`; whether the step would change nothing more.
+    pub(super) fn rests(
+        &mut self,
+        check: &Check,
+        inputs: &Inputs<'_>,
+        reading: Option<Reading>,
+        applies: bool,
+        latched: bool,
+    ) -> bool {
+        if !latched {
+            self.held = None;
+        }
+        applies && self.stays_calm(check, inputs.now, reading, inputs.params)
     }
 
     /// How long it must be good before the level falls.
@@ -406,10 +463,6 @@ impl State {
             Side::Above => value > limit - margin,
             Side::Below => value < limit + margin,
         };
-        // Good as it was for long: a step changes nothing.
-        if self.is_calm() && !beyond(warn, 0.0) && !beyond(critical, 0.0) {
-            return None;
-        }
         let very_bad = self.samples.count(Samples::VERY_BAD, beyond(critical, 0.0), measured)
             & self.very_bad.run(beyond(critical, 0.0), now, check.debounce_critical);
         // Without a warning limit there is no warning on the way to critical.

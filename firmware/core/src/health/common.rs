@@ -1,6 +1,6 @@
 //! What several subsystems' tables share.
 
-use super::check::{Check, Side, When};
+use super::check::{Check, Part, Side, When};
 use super::finding::Subsystem;
 use super::inputs::Inputs;
 use crate::baseline::Quantity;
@@ -33,6 +33,7 @@ pub(super) const fn alert<const CAUSE: usize>(subsystem: Subsystem) -> Check {
         // That it says nothing is no word about its health.
         alarm_only: true,
         is_flag: true,
+        part: Part::Vehicle,
         read: |inputs, _| {
             Reading::new(
                 Some(inputs.now),
@@ -60,6 +61,7 @@ pub(super) const fn due(subsystem: Subsystem) -> Check {
         // That a part is not due does not make its subsystem healthy.
         alarm_only: true,
         is_flag: false,
+        part: Part::Vehicle,
         read: match subsystem {
             Subsystem::Power => |inputs, _| used(inputs, Subsystem::Power),
             Subsystem::Propulsion => |inputs, _| used(inputs, Subsystem::Propulsion),

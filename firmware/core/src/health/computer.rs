@@ -1,6 +1,6 @@
 //! The autopilot's processor.
 
-use super::check::{Check, Side, When};
+use super::check::{Check, Part, Side, When};
 use super::common::{STALE, alert};
 use super::finding::Subsystem;
 use super::inputs::Inputs;
@@ -32,6 +32,7 @@ const LOAD: Check = Check {
     instances: 1,
     alarm_only: false,
     is_flag: false,
+    part: Part::Vehicle,
     read: load_percent,
 };
 

@@ -1,7 +1,7 @@
 //! The combustion engine (EFI). What is normal depends on the engine, so the limits are off (at their maximum) until
 //! they are set.
 
-use super::check::{Check, Side, When};
+use super::check::{Check, Part, Side, When};
 use super::common::{STALE, due};
 use super::finding::Subsystem;
 use super::inputs::Inputs;
@@ -25,6 +25,7 @@ const ENGINE: Check = Check {
     instances: 1,
     alarm_only: false,
     is_flag: false,
+    part: Part::Vehicle,
     read: |inputs, _| read(inputs, |engine| engine.cylinder_head.map(|temperature| temperature.0)),
 };
 

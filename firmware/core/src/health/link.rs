@@ -1,6 +1,6 @@
 //! The autopilot's, the pilot's and the ground station's links.
 
-use super::check::{Check, Side, When};
+use super::check::{Check, Part, Side, When};
 use super::common::{STALE, alert};
 use super::finding::Subsystem;
 use super::inputs::Inputs;
@@ -24,6 +24,7 @@ const HEARTBEAT: Check = Check {
     instances: 1,
     alarm_only: false,
     is_flag: false,
+    part: Part::Vehicle,
     read: heartbeat_age_s,
 };
 

@@ -1,7 +1,7 @@
 //! Mishaps: what [`crate::mishap`] saw. No gate holds them back, and they stay critical until the vehicle is armed again or flies
 //! on.
 
-use super::check::{Check, Side, When};
+use super::check::{Check, Part, Side, When};
 use super::common::{STALE, alert};
 use super::finding::Subsystem;
 use crate::cause::Cause;
@@ -24,6 +24,7 @@ const FREE_FALL: Check = Check {
     instances: 1,
     alarm_only: false,
     is_flag: false,
+    part: Part::Vehicle,
     read: |inputs, _| inputs.mishap.reading(Kind::FreeFall, inputs.now, inputs.vehicle),
 };
 

@@ -22,8 +22,8 @@ mod structure;
 mod tables;
 mod vocabulary;
 
-use check::Change;
 pub use check::{CLEAR, CLEAR_MAX, CLEAR_MAX_ALWAYS, Check, Side, State, When};
+use check::{Change, Part};
 pub use consequence::{because, is_of_mishap};
 pub use finding::{Finding, Level, Subsystem};
 pub use inputs::Inputs;
@@ -83,6 +83,7 @@ impl Health {
         let over =
             inputs.mishap.is_going() && (!heard || (inputs.mishap.is_down() && !inputs.vehicle.armed()));
         let quiet = inputs.mishap.is_going() && !over;
+        let (motors, batteries) = (inputs.vehicle.motors_known(), inputs.vehicle.batteries_known().max(1));
         let looked_at = usize::from(self.looked_at);
         self.looked_at = ((looked_at + 1) % STATES) as u8;
         let mut first = 0;
@@ -97,19 +98,22 @@ impl Health {
             };
             let slots = first..first + usize::from(check.instances);
             first = slots.end;
+            // What never spoke has no value, and its states are new.
+            let Some(there) = part_count(check, motors, batteries) else { continue };
             // Most have nothing to say and never had: a step would change nothing.
             let is_idle = |states: &[State]| states.iter().all(State::is_new);
             if !applies && self.states.get(slots.clone()).is_none_or(is_idle) {
                 continue;
             }
-            for (instance, slot) in (0..check.instances).zip(slots) {
+            for (instance, slot) in (0..there).zip(slots) {
                 let Some(state) = self.states.get_mut(slot) else { return };
+                // Of what is new, a step without a value changes nothing.
                 let is_new = state.is_new();
-                if is_new && !applies {
+                let reading = if is_new && !applies { None } else { (check.read)(inputs, instance) };
+                if is_new && reading.is_none() {
                     continue;
                 }
-                let reading = (check.read)(inputs, instance);
-                if is_new && reading.is_none() {
+                if !quiet && state.rests(check, inputs, reading, applies, latched) {
                     continue;
                 }
                 let before = *state;
@@ -119,7 +123,7 @@ impl Health {
                     *state = before.seen_as(state);
                     continue;
                 }
-                let change = if latched { state.hold(&before, change) } else { state.release(change) };
+                let change = if latched { state.hold(&before, change) } else { change };
                 let is_change = change.is_some();
                 let told = if let Some(change) = change {
                     let because = self.because(check, change.level);
@@ -171,6 +175,15 @@ impl Health {
             .filter_map(|((check, instance), state)| state.level().map(|level| (check, instance, level)))
     }
 
+    /// Of each check, in the order of [`checks`], whether an instance has a level that is known.
+    pub fn judged(&self) -> impl Iterator<Item = bool> {
+        let mut states = self.states.iter();
+        checks().map(move |check| {
+            let mine = states.by_ref().take(usize::from(check.instances));
+            mine.fold(false, |known, state| known | state.level().is_some_and(|level| level != Level::Stale))
+        })
+    }
+
     /// A subsystem's level: its worst known part; stale where nothing is known.
     pub fn subsystem(&self, subsystem: Subsystem) -> Level {
         let part = self.levels().filter(|(check, ..)| check.subsystem == subsystem);
@@ -186,6 +199,16 @@ impl Health {
         let unknown = EXPECTED.into_iter().any(|subsystem| self.subsystem(subsystem) == Level::Stale);
         worst(self.levels().map(|(.., level)| level).chain(unknown.then_some(Level::Stale)))
     }
+}
+
+/// How many instances of a check may have a value; `None` where there is none.
+fn part_count(check: &Check, motors: u8, batteries: u8) -> Option<u8> {
+    let count = match check.part {
+        Part::Vehicle => check.instances,
+        Part::Motor => motors.min(check.instances),
+        Part::Battery => batteries.min(check.instances),
+    };
+    (count > 0).then_some(count)
 }
 
 /// Critical before stale before warning: not knowing is worse than a known warning, and better than a known danger.

@@ -1,6 +1,6 @@
 //! Estimator and GNSS.
 
-use super::check::{Check, Side, When};
+use super::check::{Check, Part, Side, When};
 use super::common::{STALE, alert};
 use super::finding::Subsystem;
 use super::inputs::Inputs;
@@ -31,6 +31,7 @@ const ESTIMATOR: Check = Check {
     instances: 1,
     alarm_only: false,
     is_flag: false,
+    part: Part::Vehicle,
     read: |inputs, _| estimator(inputs, EstimatorScale::Variance, largest),
 };
 

@@ -1,6 +1,6 @@
 //! Batteries and rails.
 
-use super::check::{Check, Side, When};
+use super::check::{Check, Part, Side, When};
 use super::common::{STALE, STALE_SLOW, alert, departure, due};
 use super::finding::Subsystem;
 use super::inputs::Inputs;
@@ -29,6 +29,7 @@ const BATTERY: Check = Check {
     instances: BATTERIES,
     alarm_only: false,
     is_flag: false,
+    part: Part::Battery,
     read: remaining_percent,
 };
 
@@ -97,6 +98,7 @@ pub(super) const CHECKS: &[Check] = &[
         debounce_critical: Span::from_secs(10),
         when: When::InFlight,
         stale_after: None,
+        part: Part::Vehicle,
         read: |inputs, battery| departure(inputs, Quantity::Capacity(battery)),
         ..BATTERY
     },

@@ -1,6 +1,6 @@
 //! Motors, ESCs and propellers.
 
-use super::check::{Check, Side, When};
+use super::check::{Check, Part, Side, When};
 use super::common::{STALE_SLOW, alert, departure, due, heavier, takes_more};
 use super::finding::Subsystem;
 use super::inputs::Inputs;
@@ -28,6 +28,7 @@ const ESC: Check = Check {
     instances: MOTORS_MAX as u8,
     alarm_only: false,
     is_flag: false,
+    part: Part::Motor,
     read: |inputs, motor| inputs.derived.esc_silence(inputs.now, motor),
 };
 
@@ -41,6 +42,7 @@ const RATE: Check = Check {
     debounce_critical: Span::from_millis(200),
     when: When::InFlight,
     instances: 1,
+    part: Part::Vehicle,
     ..ESC
 };
 
@@ -55,6 +57,7 @@ const TREND: Check = Check {
     debounce_critical: Span::from_secs(10),
     when: When::InFlight,
     instances: 1,
+    part: Part::Vehicle,
     read: |inputs, _| takes_more(inputs, Quantity::HoverThrottle),
     ..ESC
 };
@@ -135,6 +138,7 @@ pub(super) const CHECKS: &[Check] = &[
         debounce_critical: Span::from_secs(1),
         when: When::InFlight,
         instances: JUDGED_MAX as u8,
+        part: Part::Vehicle,
         read: |inputs, motor| inputs.derived.outputs().alone(inputs.now, inputs.vehicle, motor),
         ..ESC
     },
@@ -146,6 +150,7 @@ pub(super) const CHECKS: &[Check] = &[
         hysteresis: 0.0,
         when: When::InFlight,
         instances: 1,
+        part: Part::Vehicle,
         read: |inputs, _| inputs.derived.response().full_in_vain(),
         ..ESC
     },

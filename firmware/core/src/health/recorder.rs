@@ -1,6 +1,6 @@
 //! Our own recording: a black box that stopped unnoticed is the failure that pilots report most.
 
-use super::check::{Check, Side, When};
+use super::check::{Check, Part, Side, When};
 use super::common::due;
 use super::finding::Subsystem;
 use super::inputs::Inputs;
@@ -24,6 +24,7 @@ const STATE: Check = Check {
     instances: 1,
     alarm_only: false,
     is_flag: false,
+    part: Part::Vehicle,
     read: stopped_rank,
 };
 

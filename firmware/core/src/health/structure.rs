@@ -1,6 +1,6 @@
 //! Vibration, clipping and load factor.
 
-use super::check::{Check, Side, When};
+use super::check::{Check, Part, Side, When};
 use super::common::{STALE, alert, departure, due};
 use super::finding::Subsystem;
 use super::inputs::Inputs;
@@ -26,6 +26,7 @@ const VIBRATION: Check = Check {
     instances: 1,
     alarm_only: false,
     is_flag: false,
+    part: Part::Vehicle,
     read: per_axis,
 };
 

@@ -17,6 +17,7 @@ const CHECK: Check = Check {
     instances: 1,
     alarm_only: false,
     is_flag: false,
+    part: Part::Vehicle,
     read: |_, _| None,
 };
 
