@@ -107,7 +107,7 @@ fn add(store: &mut Store<Quantity>, number: u8, flight: &Flight<'_>) {
     }
 }
 
-/// Where a flight was, from its take-off on: the first of each of [`PLACES_MAX`] pieces at most, and the last.
+/// Where a flight was, from its take-off on: the first of each of `PLACES_MAX` pieces at most, and the last.
 pub fn places(flight: &Flight<'_>) -> Vec<Place> {
     let (from, to) = flight.span;
     let track = flight.history.track();
