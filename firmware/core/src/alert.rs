@@ -180,6 +180,12 @@ impl Alerts {
         self.estimator.take(at, of_estimator(estimator, self.had_both, has_fix));
     }
 
+    /// Whether anything was ever said.
+    pub(crate) fn are_known(&self) -> bool {
+        let flags = [&self.sensors, &self.failures, &self.estimator];
+        flags.iter().any(|flags| flags.at.is_some()) || self.told.iter().any(Option::is_some)
+    }
+
     /// How bad the autopilot says it is, as [`Urgency`] numbers it; `None` where nothing was ever said. In a mishap flags only echo it.
     pub fn level(&self, now: Instant, cause: Cause, in_mishap: bool) -> Option<f32> {
         let (told, until_ms) = (self.told.get(cause as usize)?, self.until_ms.get(cause as usize)?);

@@ -318,6 +318,12 @@ impl Crosschecks {
         }
     }
 
+    /// Sensors up to the last one of any kind that has measured.
+    pub(crate) fn sensors_known(&self) -> u8 {
+        let measured = |instance: usize| self.sensors.iter().any(|of_kind| of_kind[instance].at.is_some());
+        (0..SENSORS_MAX).rev().find(|instance| measured(*instance)).map_or(0, |last| last as u8 + 1)
+    }
+
     /// How far a sensor is apart from all others of its kind, beyond what is usual; of two, for the second one.
     pub(crate) fn mismatch(&self, now: Instant, kind: Kind, sensor: u8) -> Option<Reading> {
         let at = self.compared_at[kind as usize].filter(|at| now.since(*at) <= EVERY + EVERY)?;

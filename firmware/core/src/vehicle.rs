@@ -219,6 +219,12 @@ impl Vehicle {
         known(self.batteries.iter().map(|slot| slot.get().is_some()))
     }
 
+    /// Receivers up to the last one that has said anything.
+    pub(crate) fn receivers_known(&self) -> u8 {
+        let of_both = self.gnss.iter().zip(&self.gnss_integrity);
+        known(of_both.map(|(gnss, integrity)| gnss.get().is_some() || integrity.get().is_some()))
+    }
+
     /// Whether motors may turn, by the last heartbeat.
     pub fn armed(&self) -> bool {
         self.heartbeat.get().is_some_and(|heartbeat| heartbeat.armed)

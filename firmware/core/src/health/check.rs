@@ -47,8 +47,8 @@ pub enum When {
     InFlight,
 }
 
-/// What the instances of a check are. One that never said anything has no value, and is not asked for one: a vehicle has four motors
-/// and one battery more often than twelve and four, and most of a step went into asking.
+/// What a check, or an instance of it, has its value from. What never said anything has none, and is not asked for one: most of a step
+/// went into asking. [`Parts`] counts what has spoken.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Part {
     /// The vehicle, or parts of it that nobody counts: each is asked.
@@ -57,6 +57,51 @@ pub enum Part {
     Motor,
     /// Batteries. The first one may be the autopilot's own, which no message names.
     Battery,
+    /// GNSS receivers.
+    Receiver,
+    /// Accelerometers, gyros, compasses and barometers by instance.
+    Sensor,
+    /// The estimator.
+    Estimator,
+    /// The combustion engine.
+    Engine,
+    /// The autopilot's own word on what is wrong.
+    Alert,
+    /// Components that wear.
+    Wear,
+    /// The airframe's earlier flights.
+    Past,
+}
+
+/// How many of each [`Part`] have ever spoken.
+pub(super) struct Parts([u8; Part::Past as usize + 1]);
+
+impl Parts {
+    pub(super) fn of(inputs: &Inputs<'_>) -> Self {
+        let Inputs { vehicle, .. } = inputs;
+        let all = |known: bool| if known { u8::MAX } else { 0 };
+        let mut counts = [u8::MAX; _];
+        for (part, count) in [
+            (Part::Motor, vehicle.motors_known()),
+            (Part::Battery, vehicle.batteries_known().max(1)),
+            (Part::Receiver, vehicle.receivers_known()),
+            (Part::Sensor, inputs.derived.crosschecks().sensors_known()),
+            (Part::Estimator, all(vehicle.estimator.get().is_some())),
+            (Part::Engine, all(vehicle.engine.get().is_some())),
+            (Part::Alert, all(vehicle.alerts.are_known())),
+            (Part::Wear, all(inputs.wear.iter().any(Option::is_some))),
+            (Part::Past, all(inputs.baselines.are_known())),
+        ] {
+            counts[part as usize] = count;
+        }
+        Self(counts)
+    }
+
+    /// How many instances of a check may have a value.
+    pub(super) const fn count(&self, check: &Check) -> u8 {
+        let spoken = self.0[check.part as usize];
+        if spoken < check.instances { spoken } else { check.instances }
+    }
 }
 
 /// One check.
@@ -91,7 +136,7 @@ pub struct Check {
     pub alarm_only: bool,
     /// Its value is a flag or the number of a state, which tells a pilot nothing: the alarm alone is told.
     pub is_flag: bool,
-    /// What its instances are.
+    /// What its value is from.
     pub part: Part,
     /// Reads the value; `None` while it has never been measured.
     pub read: fn(&Inputs<'_>, u8) -> Option<Reading>,

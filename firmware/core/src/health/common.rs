@@ -33,7 +33,7 @@ pub(super) const fn alert<const CAUSE: usize>(subsystem: Subsystem) -> Check {
         // That it says nothing is no word about its health.
         alarm_only: true,
         is_flag: true,
-        part: Part::Vehicle,
+        part: Part::Alert,
         read: |inputs, _| {
             Reading::new(
                 Some(inputs.now),
@@ -61,7 +61,7 @@ pub(super) const fn due(subsystem: Subsystem) -> Check {
         // That a part is not due does not make its subsystem healthy.
         alarm_only: true,
         is_flag: false,
-        part: Part::Vehicle,
+        part: Part::Wear,
         read: match subsystem {
             Subsystem::Power => |inputs, _| used(inputs, Subsystem::Power),
             Subsystem::Propulsion => |inputs, _| used(inputs, Subsystem::Propulsion),

@@ -25,7 +25,7 @@ const ENGINE: Check = Check {
     instances: 1,
     alarm_only: false,
     is_flag: false,
-    part: Part::Vehicle,
+    part: Part::Engine,
     read: |inputs, _| read(inputs, |engine| engine.cylinder_head.map(|temperature| temperature.0)),
 };
 

@@ -23,7 +23,7 @@ mod tables;
 mod vocabulary;
 
 pub use check::{CLEAR, CLEAR_MAX, CLEAR_MAX_ALWAYS, Check, Side, State, When};
-use check::{Change, Part};
+use check::{Change, Parts};
 pub use consequence::{because, is_of_mishap};
 pub use finding::{Finding, Level, Subsystem};
 pub use inputs::Inputs;
@@ -83,9 +83,11 @@ impl Health {
         let over =
             inputs.mishap.is_going() && (!heard || (inputs.mishap.is_down() && !inputs.vehicle.armed()));
         let quiet = inputs.mishap.is_going() && !over;
-        let (motors, batteries) = (inputs.vehicle.motors_known(), inputs.vehicle.batteries_known().max(1));
+        let parts = Parts::of(inputs);
         let looked_at = usize::from(self.looked_at);
         self.looked_at = ((looked_at + 1) % STATES) as u8;
+        // Most have nothing to say and never had: a step would change nothing.
+        let is_idle = |states: &[State]| states.iter().all(State::is_new);
         let mut first = 0;
         for (place, check) in (0..).zip(TABLES.iter().copied().flatten()) {
             let quiet = quiet && check.when != When::Always;
@@ -98,13 +100,17 @@ impl Health {
             };
             let slots = first..first + usize::from(check.instances);
             first = slots.end;
-            // What never spoke has no value, and its states are new.
-            let Some(there) = part_count(check, motors, batteries) else { continue };
-            // Most have nothing to say and never had: a step would change nothing.
-            let is_idle = |states: &[State]| states.iter().all(State::is_new);
-            if !applies && self.states.get(slots.clone()).is_none_or(is_idle) {
+            let there = parts.count(check);
+            debug_assert!(
+                (there..check.instances).all(|instance| (check.read)(inputs, instance).is_none()),
+                "{} has a value, though its part never spoke",
+                check.name
+            );
+            if (!applies || there == 0) && self.states.get(slots.clone()).is_none_or(is_idle) {
                 continue;
             }
+            // What is not idle is stepped, though it is not known any more.
+            let there = if there == 0 { check.instances } else { there };
             for (instance, slot) in (0..there).zip(slots) {
                 let Some(state) = self.states.get_mut(slot) else { return };
                 // Of what is new, a step without a value changes nothing.
@@ -199,16 +205,6 @@ impl Health {
         let unknown = EXPECTED.into_iter().any(|subsystem| self.subsystem(subsystem) == Level::Stale);
         worst(self.levels().map(|(.., level)| level).chain(unknown.then_some(Level::Stale)))
     }
-}
-
-/// How many instances of a check may have a value; `None` where there is none.
-fn part_count(check: &Check, motors: u8, batteries: u8) -> Option<u8> {
-    let count = match check.part {
-        Part::Vehicle => check.instances,
-        Part::Motor => motors.min(check.instances),
-        Part::Battery => batteries.min(check.instances),
-    };
-    (count > 0).then_some(count)
 }
 
 /// Critical before stale before warning: not knowing is worse than a known warning, and better than a known danger.

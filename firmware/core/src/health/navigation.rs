@@ -31,7 +31,7 @@ const ESTIMATOR: Check = Check {
     instances: 1,
     alarm_only: false,
     is_flag: false,
-    part: Part::Vehicle,
+    part: Part::Estimator,
     read: |inputs, _| estimator(inputs, EstimatorScale::Variance, largest),
 };
 
@@ -42,6 +42,7 @@ const GNSS: Check = Check {
     hysteresis: 0.0,
     debounce_warn: Span::from_secs(2),
     instances: RECEIVERS_MAX as u8,
+    part: Part::Receiver,
     read: |inputs, receiver| {
         let enough = inputs.params.get(Param::GpsSatsWarn) + MARGIN;
         gnss(inputs, receiver, |gnss| {
@@ -62,6 +63,7 @@ const MISMATCH: Check = Check {
     // Never stale: they are compared where that says something.
     stale_after: None,
     instances: SENSORS_MAX as u8,
+    part: Part::Sensor,
     read: |inputs, sensor| mismatch(inputs, Kind::Accelerometer, sensor),
     ..ESTIMATOR
 };
@@ -186,6 +188,7 @@ pub(super) const CHECKS: &[Check] = &[
     Check {
         name: "gps_stuck",
         instances: RECEIVERS_MAX as u8,
+        part: Part::Receiver,
         read: |inputs, receiver| inputs.derived.crosschecks().receiver_stuck(inputs.now, receiver),
         ..STUCK
     },

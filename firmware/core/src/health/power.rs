@@ -98,7 +98,7 @@ pub(super) const CHECKS: &[Check] = &[
         debounce_critical: Span::from_secs(10),
         when: When::InFlight,
         stale_after: None,
-        part: Part::Vehicle,
+        part: Part::Past,
         read: |inputs, battery| departure(inputs, Quantity::Capacity(battery)),
         ..BATTERY
     },

@@ -57,7 +57,7 @@ const TREND: Check = Check {
     debounce_critical: Span::from_secs(10),
     when: When::InFlight,
     instances: 1,
-    part: Part::Vehicle,
+    part: Part::Past,
     read: |inputs, _| takes_more(inputs, Quantity::HoverThrottle),
     ..ESC
 };

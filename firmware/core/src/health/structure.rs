@@ -89,6 +89,7 @@ pub(super) const CHECKS: &[Check] = &[
         when: When::InFlight,
         // A trend holds until the next figure.
         stale_after: None,
+        part: Part::Past,
         read: |inputs, _| departure(inputs, Quantity::Vibration),
         ..VIBRATION
     },
