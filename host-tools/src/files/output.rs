@@ -8,7 +8,7 @@ use anyhow::{Context as _, Result, bail};
 
 use super::aside::{kept_as, replace, set_aside};
 use super::descriptor::{
-    Opened, check_standard_output_is_open, descriptor, is_standard_output, means_standard_output,
+    Opened, check_standard_output, descriptor, is_standard_output, means_standard_output,
 };
 use super::identity::is_seekable;
 use super::inputs::Inputs;
@@ -106,7 +106,7 @@ impl Output {
     /// comparing would come too late.
     pub fn check_new(path: &Path, inputs: &Inputs) -> Result<()> {
         if means_standard_output(path) {
-            return Ok(());
+            return check_standard_output();
         }
         match Part::of(path, inputs)? {
             Place::Taken(_) => Err(Differs::at_all(path).into()),
@@ -189,7 +189,7 @@ impl Output {
     }
 
     fn standard(path: &Path) -> Result<Self> {
-        check_standard_output_is_open()?;
+        check_standard_output()?;
         // The results that the command prints are not to stand in what it makes.
         crate::output::leave_standard_output();
         Ok(Self::new(To::Standard(Stdout::new()), path, None))
@@ -199,7 +199,7 @@ impl Output {
     fn direct(path: &Path) -> Result<Self> {
         let opened = descriptor(path).and_then(Opened::of);
         opened
-            .map_or(Ok(()), |opened| opened.check())
+            .map_or(Ok(()), |opened| opened.check_empty())
             .map_err(|why| usage(format!("{}: {why}", path.display())))?;
         if is_pipe(path) {
             note!("{}: is a pipe, into which is written once something reads it", path.display());
