@@ -126,12 +126,7 @@ impl Output {
     /// Keeps such a file under another name.
     pub fn keep(path: &Path, inputs: &Inputs) -> Result<()> {
         let Place::Free(part) = Part::of(path, inputs)? else { return Ok(()) };
-        let _ending = lock_folder_of(&part.target);
-        if fs::metadata(&part.target).is_ok_and(|about| about.len() > 0) {
-            let aside = settle(set_aside(&part.target, &part.target), path)?;
-            note!("{}: {}", path.display(), kept_as(&aside));
-        }
-        Ok(())
+        settle(part.keep_there(), path)
     }
 
     /// Goes on with what an earlier run has left of a file, and says how many bytes that is. Dropped before its end it
@@ -238,6 +233,22 @@ impl Output {
         settle(ended, &self.path)
     }
 
+    /// Whether something with other content lies at its place, which it replaces. All of it is written.
+    pub fn replaces(&self) -> Result<bool> {
+        let (Some(part), To::File(file)) = (&self.part, self.to.get_ref()) else { return Ok(false) };
+        unlock_to_read(file);
+        Ok(part.taken == Taken::Kept && part.is_other()?)
+    }
+
+    /// Keeps what it replaces before it gets its name: for what must not have its name beside what belongs to that.
+    pub fn make_way(&self) -> Result<()> {
+        let (Some(part), To::File(file)) = (&self.part, self.to.get_ref()) else { return Ok(()) };
+        let Some(about) = fs::metadata(&part.target).ok().filter(|_| part.taken == Taken::Kept) else {
+            return Ok(());
+        };
+        settle(file.set_permissions(about.permissions()).and_then(|()| part.keep_there()), &self.path)
+    }
+
     /// Throws away what was written, or what an earlier run has left: the file begins anew.
     pub fn begin_anew(&mut self) -> Result<()> {
         let emptied = self.to.flush().and_then(|()| match self.to.get_mut() {
@@ -289,10 +300,8 @@ impl Begun {
 
     /// Refuses what lies at its place with other content, where that stays.
     pub fn check(&self) -> Result<()> {
-        let Part { path, target, taken, .. } = &self.0;
-        let is_other = fs::metadata(target).is_ok_and(|about| about.len() > 0)
-            && settle(likeness(target, path), target)? != Likeness::Equal;
-        if is_other && *taken != Taken::Kept { Err(Differs::new(target).into()) } else { Ok(()) }
+        let Part { target, taken, .. } = &self.0;
+        if self.0.is_other()? && *taken != Taken::Kept { Err(Differs::new(target).into()) } else { Ok(()) }
     }
 
     /// It is whole.
@@ -390,6 +399,23 @@ impl Part {
             bail!("{}: is read-only; make it writable or name another output", path.display());
         }
         Ok(Place::Free(part(Taken::Completed)))
+    }
+
+    /// Whether something with other content lies at its place.
+    fn is_other(&self) -> Result<bool> {
+        let Self { path, target, .. } = self;
+        let is_there = fs::metadata(target).is_ok_and(|about| about.len() > 0);
+        Ok(is_there && settle(likeness(target, path), target)? != Likeness::Equal)
+    }
+
+    /// Keeps what lies at its place under another name.
+    fn keep_there(&self) -> io::Result<()> {
+        let _ending = lock_folder_of(&self.target);
+        if fs::metadata(&self.target).is_ok_and(|about| about.len() > 0) {
+            let aside = set_aside(&self.target, &self.target)?;
+            note!("{}: {}", self.target.display(), kept_as(&aside));
+        }
+        Ok(())
     }
 
     /// Gives it its name.
