@@ -69,7 +69,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
     interrupt::no_end_by_file_size();
     let arguments: Vec<OsString> = arguments.into_iter().collect();
     let parsed = Cli::try_parse_from(&arguments);
-    if !are_streams_safe(arguments.get(1..).unwrap_or_default(), parsed.as_ref().ok()) {
+    if !are_streams_safe(arguments.get(1..).unwrap_or_default()) {
         return ExitCode::from(2);
     }
     match parsed {
@@ -83,17 +83,14 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
 }
 
 /// Whether standard output and standard error lead to where something may be said. What is wrong is told on the other one.
-fn are_streams_safe(words: &[OsString], cli: Option<&Cli>) -> bool {
-    let output = streams::check_output(words, cli.and_then(|cli| cli.command.on_standard_output()));
-    match (streams::check_error(words), output) {
+fn are_streams_safe(words: &[OsString]) -> bool {
+    match (streams::check_error(words), streams::check_output(words)) {
         (Ok(()), Ok(())) => return true,
         (Ok(()), Err(why)) => note!("{why}"),
-        // What may follow a recording of its kind there is no word. A reader that has gone changes nothing.
-        (Err(why), _) if streams::check_output(words, None).is_ok() => {
-            drop(output::line(&format!("hums: {why}")));
-        }
+        // A reader that has gone changes nothing.
+        (Err(why), Ok(())) => drop(output::line(&format!("hums: {why}"))),
         // There is nobody to tell.
-        (Err(_), _) => {}
+        (Err(_), Err(_)) => {}
     }
     false
 }

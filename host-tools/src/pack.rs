@@ -179,6 +179,8 @@ struct Packer<W> {
     session: u32,
     log_bytes: u64,
     checksums: Checksums,
+    /// Bytes of frames of unknown messages that the framer took for none, and that are kept all the same.
+    unknown_bytes: u64,
     /// Places of the recording that are damaged, until now.
     damages: u64,
 }
@@ -194,6 +196,7 @@ impl<W: Write> Packer<W> {
             session,
             log_bytes: 0,
             checksums: Checksums::default(),
+            unknown_bytes: 0,
             damages: 0,
         }
     }
@@ -229,7 +232,11 @@ impl<W: Write> Packer<W> {
         framer.push(bytes, &mut take);
         if is_record {
             framer.idle(&mut take);
-            checksums.end();
+            if let Some(frame) = checksums.end(bytes) {
+                self.unknown_bytes += bytes.len() as u64;
+                result =
+                    result.and(writer.frame(Instant::from_micros(at_us), frame.bytes(), false, finished));
+            }
         }
         result.map_err(|full: Full| anyhow::anyhow!("the log writer refused a frame: {full}"))?;
         self.write_out()
@@ -254,11 +261,11 @@ impl<W: Write> Packer<W> {
 
     fn finish(mut self, last_us: u64) -> Result<(Done, W)> {
         self.chunk(last_us, &[], true)?;
-        let counts = self.framer.counts();
-        if counts.bytes_not_frames > 0 {
+        let bytes_not_frames = self.framer.counts().bytes_not_frames.saturating_sub(self.unknown_bytes);
+        if bytes_not_frames > 0 {
             let loss = Loss {
                 what: Lost::NotFrames,
-                count: counts.bytes_not_frames,
+                count: bytes_not_frames,
                 from: Instant::ZERO,
                 to: Instant::from_micros(last_us),
             };
@@ -277,7 +284,7 @@ impl<W: Write> Packer<W> {
             frames: counters.frames,
             recording_bytes: counters.frame_bytes + 8 * counters.frames,
             log_bytes: self.log_bytes,
-            bytes_not_frames: counts.bytes_not_frames,
+            bytes_not_frames,
             wrong_checksums: wrong_checksums.map(|gap| gap.words),
         };
         Ok((done, self.file))

@@ -5,32 +5,31 @@
 //! 3. behind a recording, what this program made of one, or what is no text, wherever that lies: in a folder that is named, too.
 //!
 //! This is checked once, before anything is said, and nothing else is done then. What a command makes on standard output itself
-//! (`-o -`) may follow a recording of its own kind: `hums decode a.hum -o - --format tlog >> all.tlog`.
+//! (`-o -`) goes into an empty file only ([`crate::files::check_standard_output`]).
 
 use std::ffi::{OsStr, OsString};
 use std::path::Path;
 
-use crate::decode::naming::is_made;
+use crate::decode::naming::{is_made, is_made_by_content};
 use crate::files::{FileId, Folder, Opened, STANDARD_ERROR, STANDARD_INPUT, STANDARD_OUTPUT, descriptor};
-use crate::source::find::{is_compressed, is_no_text, kind_of};
-use crate::source::format::Format;
+use crate::source::find::is_no_text;
 
-/// Refuses what standard output leads to; the words are for standard error. `made` is what the command makes there.
-pub fn check_output(words: &[OsString], made: Option<Format>) -> Result<(), String> {
-    check(STANDARD_OUTPUT, words, made).map_err(|why| format!("standard output: {why}"))
+/// Refuses what standard output leads to; the words are for standard error.
+pub fn check_output(words: &[OsString]) -> Result<(), String> {
+    check(STANDARD_OUTPUT, words).map_err(|why| format!("standard output: {why}"))
 }
 
 /// Refuses what standard error leads to: then nothing may be said there.
 pub fn check_error(words: &[OsString]) -> Result<(), String> {
-    check(STANDARD_ERROR, words, None).map_err(|why| format!("standard error: {why}"))
+    check(STANDARD_ERROR, words).map_err(|why| format!("standard error: {why}"))
 }
 
-fn check(number: u32, words: &[OsString], made: Option<Format>) -> Result<(), String> {
+fn check(number: u32, words: &[OsString]) -> Result<(), String> {
     let Some(opened) = Opened::of(number) else { return Ok(()) };
     opened.check()?;
     let why = match opened.id().and_then(|id| named(&id, words)) {
         Some(word) => format!("goes into {word}, which this command line names"),
-        None if opened.is_empty() || !is_kept(&opened, made) => return Ok(()),
+        None if opened.is_empty() || !is_kept(&opened) => return Ok(()),
         None => {
             let path = opened.path();
             format!(
@@ -66,11 +65,9 @@ fn spellings(word: &OsStr) -> [Option<&OsStr>; 3] {
 }
 
 /// Whether words behind what is in it would spoil it.
-fn is_kept(opened: &Opened, made: Option<Format>) -> bool {
+fn is_kept(opened: &Opened) -> bool {
     let (path, content) = (opened.path(), opened.content());
-    // What follows a compressed recording is not read.
-    let goes_on = made.is_some() && kind_of(&content) == made && !is_compressed(&content);
     // Tables lie in a folder that is ours.
     let is_table = || path.parent().is_some_and(|folder| Folder::made_of(folder).is_some());
-    !goes_on && (made.is_some() || is_no_text(&path, &content) || is_made(&path) || is_table())
+    is_no_text(&path, &content) || is_made(&path) || is_table() || is_made_by_content(&content)
 }

@@ -10,6 +10,7 @@ use crate::cli;
 use crate::colour::level;
 use crate::ending::{
     BlocksJson, EndJson, PowerOn, SessionBefore, among_words, behind_words, copies_words, made_again_words,
+    unprotected_words,
 };
 use crate::followed::Followed;
 use crate::info::json::images_json;
@@ -32,8 +33,8 @@ pub fn run(args: &cli::Verify) -> Result<Outcome> {
     for remark in &found.remarks {
         note!("{remark}");
     }
-    // Of what is no log; of the logs; sectors that had to be made again.
-    let (mut ok, mut worst, mut made_again) = (!found.is_cut(), Verdict::Holds, 0_u64);
+    // Of what is no log; of the logs.
+    let (mut ok, mut worst, mut weakened) = (!found.is_cut(), Verdict::Holds, Weakened::default());
     let (mut logs, mut without_earlier) = (0_u64, WithoutEarlier::default());
     for folder in args.inputs.iter().filter(|input| input.is_dir()) {
         let (words, is_broken) = besides(folder, &found)?;
@@ -57,7 +58,8 @@ pub fn run(args: &cli::Verify) -> Result<Outcome> {
     let failed = verify_each(&found, |overview: &Overview| {
         let log = LogJson::new(overview);
         worst = worst.max(log.verdict);
-        made_again += overview.ending.made_again();
+        weakened.made_again += overview.ending.made_again();
+        weakened.unprotected += overview.ending.unprotected();
         logs += u64::from(overview.ending.is_counted());
         if overview.ending.is_without_earlier() {
             without_earlier.add(&overview.ending.name);
@@ -71,18 +73,25 @@ pub fn run(args: &cli::Verify) -> Result<Outcome> {
         overview.ending.aside().map_or(Ok(()), |words| output::line(&format!("  {}", word(&words))))
     })?;
     let worst = if ok && failed == 0 { worst } else { Verdict::NotProved };
-    let ok = worst != Verdict::NotProved && made_again == 0;
+    let ok = worst != Verdict::NotProved && weakened == Weakened::default();
     if let Some(list) = list {
         list.end_with("ok", &ok)?;
     } else {
         let logs = count(logs, "session");
-        let verdict = without_earlier.verdict(worst, made_again, found.has_passed_over());
+        let verdict = without_earlier.verdict(worst, weakened, found.has_passed_over());
         output::line(&format!("{logs}: {verdict}"))?;
     }
     if failed > 0 {
         bail!("{failed} of {} could not be read", count(found.logs.len() as u64, "log"));
     }
     Ok(Outcome::lossy(!ok))
+}
+
+/// What cards have lost without a loss of frames: sectors that were made again, and parity that is missing.
+#[derive(Clone, Copy, Default, PartialEq, Eq)]
+struct Weakened {
+    made_again: u64,
+    unprotected: u64,
 }
 
 /// The first log of each card of which those before it were not read: the first one's name, and how many more there are.
@@ -104,17 +113,18 @@ impl WithoutEarlier {
     }
 
     /// What is said of all logs: no more than of those that were read.
-    fn verdict(&self, worst: Verdict, made_again: u64, has_passed_over: bool) -> String {
+    fn verdict(&self, worst: Verdict, weakened: Weakened, has_passed_over: bool) -> String {
         let all = self.first.is_none() && !has_passed_over;
-        let words = match (worst, made_again, all) {
-            (Verdict::Holds, 0, true) => "everything holds",
-            (Verdict::Holds, 0, false) => "all that was read holds",
+        let words = match (worst, weakened == Weakened::default(), all) {
+            (Verdict::Holds, true, true) => "everything holds",
+            (Verdict::Holds, true, false) => "all that was read holds",
             (Verdict::Holds, _, true) => "nothing is lost",
             (Verdict::Holds, _, false) => "nothing is lost of what was read",
             (Verdict::ToMark, ..) => "whole to the last end marks; what came after them cannot be proved",
             (Verdict::NotProved, ..) => "damage, losses or an end that is not proved: see above",
         };
-        let made_again = made_again_words(made_again).map_or_else(String::new, |words| format!("; {words}"));
+        let weakened = [made_again_words(weakened.made_again), unprotected_words(weakened.unprotected)];
+        let weakened: String = weakened.into_iter().flatten().map(|words| format!("; {words}")).collect();
         let more = match self.more {
             0 => String::new(),
             more => format!(" and before {}", count(more, "more log")),
@@ -122,7 +132,7 @@ impl WithoutEarlier {
         let first = self.first.as_ref();
         let earlier = first.map(|first| format!("; the logs before {}{more} were not read", word(first)));
         let passed_over = if has_passed_over { "; what was passed over was not read" } else { "" };
-        format!("{words}{made_again}{}{passed_over}", earlier.unwrap_or_default())
+        format!("{words}{weakened}{}{passed_over}", earlier.unwrap_or_default())
     }
 }
 
@@ -275,7 +285,13 @@ impl LogJson {
             let detail = if made_again > 0 { "made again from parity, without a loss" } else { "" };
             checks.push(check("sectors intact", blocks.sectors, made_again, detail.to_owned()));
         }
-        let ok = holds && made_again == 0;
+        let (parity, missing) = (&summary.parity, ending.unprotected());
+        if summary.marks.has_boot && !is_told_only && ending.begun_anew.is_none() {
+            let detail =
+                if missing > 0 { "what the card loses of these files cannot be made again" } else { "" };
+            checks.push(check("sectors protected", parity.written, missing, detail.to_owned()));
+        }
+        let ok = holds && made_again == 0 && missing == 0;
         let end = EndJson::new(ending);
         let blocks = BlocksJson::new(&blocks);
         let (name, closed) = (ending.name.clone(), summary.closed);

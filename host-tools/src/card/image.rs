@@ -10,7 +10,7 @@ use embedded_sdmmc::{Block, BlockCount, BlockDevice, BlockIdx};
 use hums_recorder::format::BLOCKS_MIN;
 use hums_recorder::layout::{Layout, LayoutError};
 
-use crate::files::{is_seekable, make_in_place, open_in_place};
+use crate::files::{make_in_place, open_in_place};
 use crate::outcome::usage;
 
 /// The size of an image that is made, in MiB, unless `--card-size` says otherwise.
@@ -48,8 +48,8 @@ fn open(path: &Path, about: &Metadata, size_mib: Option<u64>) -> Result<File> {
     if about.is_dir() {
         bail!("{shown}: is a directory; --sd takes an image file");
     }
-    if !is_seekable(about) {
-        bail!("{shown}: is a pipe, a socket, a terminal or the like; --sd takes an image file");
+    if !about.is_file() {
+        bail!("{shown}: is no file; --sd takes an image file");
     }
     if about.permissions().readonly() {
         bail!("{shown}: is read-only; make it writable or name another image");

@@ -93,6 +93,8 @@ enum State {
     NotProved,
     /// A log of ours that lacks nothing, because sectors that a card had lost were made again from parity.
     MadeAgain,
+    /// A log of ours that lacks nothing but its parity.
+    Unprotected,
 }
 
 impl State {
@@ -104,6 +106,7 @@ impl State {
             Self::Lossy => "part of it was not recorded",
             Self::NotProved => "not proved to be whole",
             Self::MadeAgain => "damaged, and made whole from its parity",
+            Self::Unprotected => "whole, without all of its parity",
         }
     }
 }
@@ -115,6 +118,7 @@ fn state(checked: &Checked) -> State {
         0 if checked.ending.as_ref().is_some_and(|ending| !ending.unproved().is_empty()) => State::NotProved,
         0 if judged.losses > 0 => State::Lossy,
         0 if checked.ending.as_ref().is_some_and(|ending| ending.made_again() > 0) => State::MadeAgain,
+        0 if checked.ending.as_ref().is_some_and(|ending| ending.unprotected() > 0) => State::Unprotected,
         0 => State::Whole,
         _ if damages.all(|gap| gap.cause == Cause::Cut) => State::Cut,
         _ => State::Damaged,
@@ -131,6 +135,7 @@ fn but(checked: &Checked) -> String {
         State::Lossy => "; part of the time was not recorded".to_owned(),
         State::NotProved => "; the log is not proved to be whole".to_owned(),
         State::MadeAgain => "; the log was damaged, and made whole from its parity".to_owned(),
+        State::Unprotected => "; the log is whole, without all of its parity".to_owned(),
     };
     format!("{ends}{what}")
 }
@@ -148,6 +153,7 @@ pub struct Table {
     copies: u64,
     not_proved: u64,
     made_again: u64,
+    unprotected: u64,
     little: u64,
     flown_us: u64,
 }
@@ -166,6 +172,7 @@ impl Table {
         self.cut += u64::from(state == State::Cut);
         self.not_proved += u64::from(state == State::NotProved);
         self.made_again += u64::from(state == State::MadeAgain);
+        self.unprotected += u64::from(state == State::Unprotected);
         self.flown_us = self.flown_us.saturating_add(flown(judged).as_micros());
         let level = judged.worst().map_or("unknown", Level::name);
         self.little += u64::from(judged.worst() == Some(Level::Ok) && judged.is_little());
@@ -199,6 +206,7 @@ impl Table {
             (self.cut, "cut at their end (counted above too)"),
             (self.not_proved, "not proved to be whole (counted above too)"),
             (self.made_again, "damaged, and made whole from their parity (counted above too)"),
+            (self.unprotected, "whole, without all of their parity (counted above too)"),
             (self.copies, "the same session once more (not counted above)"),
             (failed as u64, "could not be read"),
         ] {

@@ -10,10 +10,6 @@ mod talk;
 
 use clap::{Parser, Subcommand};
 
-use crate::endpoint::Endpoint;
-use crate::files::means_standard_output;
-use crate::source::format::Format as Kind;
-
 pub use check::Check;
 pub use demo::{Dashboard, Demo};
 pub use live::Live;
@@ -92,29 +88,6 @@ pub enum Command {
     Completions(Completions),
     /// Print the manual page of the program or of one command
     Man(Man),
-}
-
-impl Command {
-    /// The recording that it makes on standard output, where it does.
-    pub fn on_standard_output(&self) -> Option<Kind> {
-        let is_sent = |to: &Option<Endpoint>| match to {
-            Some(Endpoint::Standard) => true,
-            Some(Endpoint::File(path)) => means_standard_output(path),
-            _ => false,
-        };
-        match self {
-            Self::Decode(args) if means_standard_output(&args.output) => {
-                (args.format == [Format::Tlog]).then_some(Kind::Tlog)
-            }
-            Self::Pack(args) => means_standard_output(&args.output).then_some(Kind::Hums),
-            Self::Sim(Sim { run, tap }) => {
-                let is_tapped = tap.as_deref().is_some_and(means_standard_output);
-                (is_tapped || is_sent(&run.gs)).then_some(Kind::Raw)
-            }
-            Self::Emulate(args) => is_sent(&args.run.gs).then_some(Kind::Raw),
-            _ => None,
-        }
-    }
 }
 
 #[cfg(test)]

@@ -170,9 +170,40 @@ pub fn is_made(path: &Path) -> bool {
 
 /// Whether a page says at its beginning that `hums report` made it: the table of a folder's pages has no session in its name.
 fn says_report(path: &Path) -> bool {
+    head(path).windows(GENERATOR.len()).any(|part| part == GENERATOR)
+}
+
+/// Whether what lies at this path begins as our outputs do that are no recordings, whatever its name.
+pub fn is_made_by_content(path: &Path) -> bool {
+    let head = head(path);
+    if BEGINNINGS.iter().any(|beginning| head.starts_with(beginning)) || says_report(path) {
+        return true;
+    }
+    // A point: the measurement and its tags, then fields.
+    let line = head.split(|byte| *byte == b'\n').next().unwrap_or_default();
+    let has_tag = |tag: &[u8]| line.windows(tag.len()).any(|part| part == tag);
+    has_tag(b",session=") && has_tag(b",vehicle=")
+}
+
+/// How tables begin, objects of `jsonl`, and the stamp of a folder.
+const BEGINNINGS: [&[u8]; 9] = [
+    b"time_boot[s],time_utc",
+    b"from[s],to[s],cause,",
+    b"{\"time_boot\":",
+    b"Flight Time [s]; Battery %;",
+    b"esc_rpm1; esc_rpm2;",
+    b"escfail1; escfail2;",
+    b"Airspeed [m/s]; Groundspeed [m/s];",
+    b"From [s]; To [s]; Cause;",
+    b"hums session ",
+];
+
+/// The first bytes of a file; none where it cannot be read.
+fn head(path: &Path) -> Vec<u8> {
     let mut head = Vec::new();
-    let read = File::open(path).and_then(|file| file.take(1_024).read_to_end(&mut head));
-    read.is_ok() && head.windows(GENERATOR.len()).any(|part| part == GENERATOR)
+    // What came before an error counts.
+    let _ = File::open(path).and_then(|file| file.take(1_024).read_to_end(&mut head));
+    head
 }
 
 /// What such a page's head has.

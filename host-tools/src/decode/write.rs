@@ -276,6 +276,13 @@ impl<'a> Writers<'a> {
         self.frames == 0 && !has_records && !has_points && !has_rows
     }
 
+    /// Whether a tlog and its gaps replace others, of which one has gaps. `stale` is where gaps of an earlier tlog would be.
+    fn replaces_pair(&self, stale: Option<&Path>) -> Result<bool> {
+        let has_stale = stale.is_some_and(|path| path.metadata().is_ok_and(|about| about.len() > 0));
+        let Some(gaps) = &self.gaps else { return Ok(has_stale) };
+        Ok(gaps.0.replaces()? || self.tlog.as_ref().map_or(Ok(false), |tlog| tlog.0.replaces())?)
+    }
+
     /// All of the log is there: the files get their names. Says what was written.
     pub fn finish(mut self) -> Result<Written> {
         let mut made = Vec::new();
@@ -297,7 +304,12 @@ impl<'a> Writers<'a> {
         // Gaps of an earlier decoding beside a tlog that has none now would be taken for its own.
         let stale = self.tlog.as_ref().filter(|_| self.gaps.is_none()).and_then(Single::gaps_path);
         stale.as_deref().map_or(Ok(()), |path| Output::check_none(path, &self.context.inputs))?;
-        // A tlog never has its name without its gaps, nor beside those of another.
+        // A tlog never has its name without its gaps, nor beside those of another: an earlier one makes way first.
+        if let Some(tlog) = &self.tlog
+            && self.replaces_pair(stale.as_deref())?
+        {
+            tlog.0.make_way()?;
+        }
         stale.map_or(Ok(()), |path| Output::keep(&path, &self.context.inputs))?;
         let gaps = self.gaps.take().map(Single::finish).transpose()?;
         let mut singles =

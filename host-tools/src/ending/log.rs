@@ -85,15 +85,24 @@ impl Ending {
         self.faults().is_empty()
     }
 
-    /// Why it is not, as parts of sentences: why it is not proved to be whole, and that sectors had to be made again.
+    /// Why it is not, as parts of sentences: why it is not proved to be whole, that sectors had to be made again, and that its parity is
+    /// missing.
     pub fn faults(&self) -> Vec<String> {
-        self.unproved().into_iter().chain(made_again_words(self.made_again())).collect()
+        let weakened = [made_again_words(self.made_again()), unprotected_words(self.unprotected())];
+        self.unproved().into_iter().chain(weakened.into_iter().flatten()).collect()
     }
 
     /// Sectors that had to be made again from parity, which tells of a damaged card though nothing is lost. A file that was just
     /// begun anew has lost those that the new session wrote over.
     pub const fn made_again(&self) -> u64 {
         if self.begun_anew.is_some() { 0 } else { self.summary.blocks.repaired }
+    }
+
+    /// Parity sectors that its recorder wrote and that are not there: nothing is lost, and what its card loses next cannot be made
+    /// again. Of what is no log of its own, or is gone with its sectors, that is no news.
+    pub fn unprotected(&self) -> u64 {
+        let counts = self.begun_anew.is_none() && self.aside().is_none() && self.summary.marks.has_boot;
+        if counts { self.summary.parity.missing } else { 0 }
     }
 
     /// Why it is not proved to be whole, as parts of sentences: what is lost, what is not proved, what of its files is not the
@@ -198,6 +207,16 @@ pub fn made_again_words(sectors: u64) -> Option<String> {
         format!(
             "{} had to be made again from parity, without a loss: keep the original as it is, copy the card, and replace it",
             count(sectors, "sector")
+        )
+    })
+}
+
+/// That so many parity sectors are missing, and what to do then; none where none is.
+pub fn unprotected_words(sectors: u64) -> Option<String> {
+    (sectors > 0).then(|| {
+        format!(
+            "{} missing: what the card loses of these files cannot be made again: keep the original as it is, copy the card, and replace it",
+            are(sectors, "parity sector")
         )
     })
 }

@@ -102,6 +102,19 @@ impl Opened {
             self.path().display()
         ))
     }
+
+    /// Refuses one that has anything in it, for what a command makes: a second log behind a first one is not read, and a second
+    /// table would be read as a part of the first.
+    pub fn check_empty(&self) -> Result<(), String> {
+        self.check()?;
+        if self.is_empty() {
+            return Ok(());
+        }
+        Err(format!(
+            "goes into {}, which has something in it, behind which nothing is made; nothing was written; name a new file",
+            self.path().display()
+        ))
+    }
 }
 
 fn shown_at(number: u32) -> PathBuf {
@@ -132,9 +145,9 @@ pub(super) fn is_standard_output(_: &File) -> bool {
     false
 }
 
-/// Refuses a standard output that is closed: what is made would be gone, without an error. Rust opens `/dev/null` in its place
-/// for reading and writing, which `>/dev/null` does not.
-pub fn check_standard_output_is_open() -> Result<()> {
+/// Refuses a standard output on which nothing can be made. One that is closed: what is made would be gone, without an error. Rust
+/// opens `/dev/null` in its place for reading and writing, which `>/dev/null` does not. And a file with something in it.
+pub fn check_standard_output() -> Result<()> {
     let same = |one: &Path, other: &Path| {
         FileId::of(one).ok().zip(FileId::of(other).ok()).is_some_and(|(a, b)| a == b)
     };
@@ -144,5 +157,7 @@ pub fn check_standard_output_is_open() -> Result<()> {
     if is_both && same(Path::new("/dev/null"), &shown_at(STANDARD_OUTPUT)) {
         return Err(usage("standard output: is closed; nothing was written; name a file"));
     }
-    Ok(())
+    Opened::of(STANDARD_OUTPUT)
+        .map_or(Ok(()), |opened| opened.check_empty())
+        .map_err(|why| usage(format!("standard output: {why}")))
 }

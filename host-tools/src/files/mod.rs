@@ -27,7 +27,7 @@ mod there;
 
 pub use aside::remake_in_place;
 pub use descriptor::{
-    Opened, STANDARD_ERROR, STANDARD_INPUT, STANDARD_OUTPUT, check_standard_output_is_open, descriptor,
+    Opened, STANDARD_ERROR, STANDARD_INPUT, STANDARD_OUTPUT, check_standard_output, descriptor,
     means_standard_output,
 };
 pub use ends::{add_ends, digest, short};

@@ -8,7 +8,7 @@ use anyhow::{Context as _, Result, bail};
 
 use super::aside::{kept_as, replace, set_aside};
 use super::descriptor::{
-    Opened, check_standard_output_is_open, descriptor, is_standard_output, means_standard_output,
+    Opened, check_standard_output, descriptor, is_standard_output, means_standard_output,
 };
 use super::identity::is_seekable;
 use super::inputs::Inputs;
@@ -106,7 +106,7 @@ impl Output {
     /// comparing would come too late.
     pub fn check_new(path: &Path, inputs: &Inputs) -> Result<()> {
         if means_standard_output(path) {
-            return Ok(());
+            return check_standard_output();
         }
         match Part::of(path, inputs)? {
             Place::Taken(_) => Err(Differs::at_all(path).into()),
@@ -126,12 +126,7 @@ impl Output {
     /// Keeps such a file under another name.
     pub fn keep(path: &Path, inputs: &Inputs) -> Result<()> {
         let Place::Free(part) = Part::of(path, inputs)? else { return Ok(()) };
-        let _ending = lock_folder_of(&part.target);
-        if fs::metadata(&part.target).is_ok_and(|about| about.len() > 0) {
-            let aside = settle(set_aside(&part.target, &part.target), path)?;
-            note!("{}: {}", path.display(), kept_as(&aside));
-        }
-        Ok(())
+        settle(part.keep_there(), path)
     }
 
     /// Goes on with what an earlier run has left of a file, and says how many bytes that is. Dropped before its end it
@@ -189,7 +184,7 @@ impl Output {
     }
 
     fn standard(path: &Path) -> Result<Self> {
-        check_standard_output_is_open()?;
+        check_standard_output()?;
         // The results that the command prints are not to stand in what it makes.
         crate::output::leave_standard_output();
         Ok(Self::new(To::Standard(Stdout::new()), path, None))
@@ -199,7 +194,7 @@ impl Output {
     fn direct(path: &Path) -> Result<Self> {
         let opened = descriptor(path).and_then(Opened::of);
         opened
-            .map_or(Ok(()), |opened| opened.check())
+            .map_or(Ok(()), |opened| opened.check_empty())
             .map_err(|why| usage(format!("{}: {why}", path.display())))?;
         if is_pipe(path) {
             note!("{}: is a pipe, into which is written once something reads it", path.display());
@@ -236,6 +231,22 @@ impl Output {
             To::File(_) | To::Standard(_) => Ok(()),
         });
         settle(ended, &self.path)
+    }
+
+    /// Whether something with other content lies at its place, which it replaces. All of it is written.
+    pub fn replaces(&self) -> Result<bool> {
+        let (Some(part), To::File(file)) = (&self.part, self.to.get_ref()) else { return Ok(false) };
+        unlock_to_read(file);
+        Ok(part.taken == Taken::Kept && part.is_other()?)
+    }
+
+    /// Keeps what it replaces before it gets its name: for what must not have its name beside what belongs to that.
+    pub fn make_way(&self) -> Result<()> {
+        let (Some(part), To::File(file)) = (&self.part, self.to.get_ref()) else { return Ok(()) };
+        let Some(about) = fs::metadata(&part.target).ok().filter(|_| part.taken == Taken::Kept) else {
+            return Ok(());
+        };
+        settle(file.set_permissions(about.permissions()).and_then(|()| part.keep_there()), &self.path)
     }
 
     /// Throws away what was written, or what an earlier run has left: the file begins anew.
@@ -289,10 +300,8 @@ impl Begun {
 
     /// Refuses what lies at its place with other content, where that stays.
     pub fn check(&self) -> Result<()> {
-        let Part { path, target, taken, .. } = &self.0;
-        let is_other = fs::metadata(target).is_ok_and(|about| about.len() > 0)
-            && settle(likeness(target, path), target)? != Likeness::Equal;
-        if is_other && *taken != Taken::Kept { Err(Differs::new(target).into()) } else { Ok(()) }
+        let Part { target, taken, .. } = &self.0;
+        if self.0.is_other()? && *taken != Taken::Kept { Err(Differs::new(target).into()) } else { Ok(()) }
     }
 
     /// It is whole.
@@ -390,6 +399,23 @@ impl Part {
             bail!("{}: is read-only; make it writable or name another output", path.display());
         }
         Ok(Place::Free(part(Taken::Completed)))
+    }
+
+    /// Whether something with other content lies at its place.
+    fn is_other(&self) -> Result<bool> {
+        let Self { path, target, .. } = self;
+        let is_there = fs::metadata(target).is_ok_and(|about| about.len() > 0);
+        Ok(is_there && settle(likeness(target, path), target)? != Likeness::Equal)
+    }
+
+    /// Keeps what lies at its place under another name.
+    fn keep_there(&self) -> io::Result<()> {
+        let _ending = lock_folder_of(&self.target);
+        if fs::metadata(&self.target).is_ok_and(|about| about.len() > 0) {
+            let aside = set_aside(&self.target, &self.target)?;
+            note!("{}: {}", self.target.display(), kept_as(&aside));
+        }
+        Ok(())
     }
 
     /// Gives it its name.

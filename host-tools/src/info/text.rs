@@ -14,7 +14,7 @@ use super::json::{duration_s, vehicle};
 use super::number::short;
 use super::{usage, wear};
 use crate::colour::level;
-use crate::ending::{among_words, behind_words, copies_words, made_again_words};
+use crate::ending::{among_words, behind_words, copies_words, made_again_words, unprotected_words};
 use crate::logs;
 use crate::logs::begun_anew::BegunAnew;
 use crate::logs::naming::is_part;
@@ -137,7 +137,8 @@ fn ending(text: &mut String, log: &Overview) {
     for strange in ending.contradicted().into_iter().chain(ending.noise()).chain(ending.strange()) {
         let _ = writeln!(text, "  files    {strange}");
     }
-    if let Some(words) = made_again_words(ending.made_again()) {
+    let weakened = [made_again_words(ending.made_again()), unprotected_words(ending.unprotected())];
+    for words in weakened.into_iter().flatten() {
         let _ = writeln!(text, "  parity   {words}");
     }
     let copies = copies_words(&summary.blocks);

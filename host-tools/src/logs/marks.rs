@@ -31,6 +31,8 @@ pub struct Marks {
     pub before: Option<Before>,
     /// No recorder made it: it was packed on a PC.
     pub packed: bool,
+    /// A box recorded it: it says how it started.
+    pub has_boot: bool,
 }
 
 impl Marks {
@@ -47,7 +49,11 @@ impl Marks {
             }
             Record::Loss(loss) => self.lost = self.lost.saturating_add(lost(loss)),
             Record::Note(note) => self.packed |= note.text == PACKED,
-            Record::Boot(boot) if boot.before.found != Found::Unknown => self.before = Some(boot.before),
+            Record::Boot(boot) => {
+                self.has_boot = true;
+                self.before =
+                    Some(boot.before).filter(|before| before.found != Found::Unknown).or(self.before);
+            }
             _ => {}
         }
     }
@@ -57,6 +63,7 @@ impl Marks {
         self.count += next.count;
         self.wrong += next.wrong;
         self.lost = self.lost.saturating_add(next.lost);
+        self.has_boot |= next.has_boot;
         self.before = next.before.or(self.before);
         if next.last.is_some() {
             (self.last, self.moved) = (next.last, next.moved);

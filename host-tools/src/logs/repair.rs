@@ -11,7 +11,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use anyhow::Result;
-use hums_blackbox::parity::{COLUMNS, Column, Parity, STRETCH_SECTORS};
+use hums_blackbox::parity::{COLUMNS, Column, Parity, STRETCH_SECTORS, Sum};
 use hums_blackbox::{Header, Sector};
 use hums_recorder::card::SEGMENT_BYTES_MAX;
 
@@ -28,6 +28,11 @@ const FILE_BYTES_MAX: u64 = 2 * SEGMENT_BYTES_MAX as u64;
 pub struct Evidence {
     /// The last sector that any of it covers: all up to there were written.
     pub last: Option<u32>,
+    /// Parity sectors that the recorder had written for sure: of a stretch that was full before the next one began, and of the
+    /// last one of a log that ended in order.
+    pub written: u64,
+    /// How many of these are not there, or not sound.
+    pub missing: u64,
     /// Columns of sectors that were held against it.
     pub columns: u64,
     /// Those that disagree with it.
@@ -40,6 +45,8 @@ impl Evidence {
     /// Adds that of a further file.
     pub fn add(&mut self, next: &Self) {
         self.last = self.last.max(next.last);
+        self.written += next.written;
+        self.missing += next.missing;
         self.columns += next.columns;
         self.contradicted += next.contradicted;
         self.first = self.first.or(next.first);
@@ -67,6 +74,7 @@ impl Repairs {
         let last = found.parity.iter().map(|(one, _)| one.last).max();
         let mut all = Self { evidence: Evidence { last, ..Evidence::default() }, ..Self::default() };
         let Some(base) = found.base else { return Ok(all) };
+        (all.evidence.written, all.evidence.missing) = found.written_and_missing(base);
         let mut columns = found.columns(base);
         let mut blocks = file.blocks();
         let mut at = 0;
@@ -121,14 +129,16 @@ struct Found {
     base: Option<u32>,
     /// The number of the whole sector of the session in each block, where there is one.
     numbers: Vec<Option<u32>>,
+    /// The number of the one that ends the log in order.
+    closed: Option<u32>,
     parity: Vec<(Parity, [u8; BLOCK_BYTES])>,
 }
 
 impl Found {
-    /// `None` where there is no parity of the session.
+    /// `None` where there is no sector.
     fn of(file: &Log, session: Option<u32>) -> Result<Option<Self>> {
         let (mut session, mut numbers, mut parity) = (session, Vec::new(), Vec::new());
-        let (mut bases, mut begins) = (BTreeMap::<u32, u32>::new(), None);
+        let (mut bases, mut begins, mut closed) = (BTreeMap::<u32, u32>::new(), None, None);
         let (mut blocks, mut at) = (file.blocks(), 0_u32);
         while let Some(block) = blocks.next_block()? {
             let header = Header::read(&block).ok();
@@ -142,6 +152,7 @@ impl Found {
             let own = own.filter(|own| !own.partial);
             if let Some(own) = own {
                 *bases.entry(own.number.wrapping_sub(at)).or_default() += 1;
+                closed = closed.or(own.closed.then_some(own.number));
             } else if header.is_none()
                 && let Some(one) = Parity::read(&block)
             {
@@ -161,7 +172,31 @@ impl Found {
         let base = begins.filter(anew).or(base);
         let Some(session) = session else { return Ok(None) };
         parity.retain(|(one, _)| one.session == session);
-        Ok((!parity.is_empty()).then_some(Self { session, base, numbers, parity }))
+        Ok(Some(Self { session, base, numbers, closed, parity }))
+    }
+
+    /// How many parity sectors were written for sure, and how many of them are not there. The recorder writes those of a stretch
+    /// before the first sector of the next one, and once a log has ended in order.
+    fn written_and_missing(&self, base: u32) -> (u64, u64) {
+        let last = (0..self.numbers.len() as u32).rev().find(|at| self.in_place(base, *at).is_some());
+        let Some(last) = last else { return (0, 0) };
+        let (full, begun) = (last / STRETCH_SECTORS, last % STRETCH_SECTORS + 1);
+        let is_closed = self.closed == Some(base.wrapping_add(last));
+        let columns = |stretch| match stretch {
+            _ if stretch < full => COLUMNS as u32,
+            _ if stretch == full && is_closed => begun.min(COLUMNS as u32),
+            _ => 0,
+        };
+        let written = (0..=full).map(|stretch| 2 * u64::from(columns(stretch))).sum();
+        let there: BTreeSet<_> = self
+            .parity
+            .iter()
+            .filter_map(|(one, _)| {
+                let (stretch, column) = column_of(one.last.checked_sub(base)?);
+                (column < columns(stretch)).then_some((stretch, column, one.sum == Sum::P))
+            })
+            .collect();
+        (written, written - there.len() as u64)
     }
 
     /// The number of the sector in this block, if it is the one that belongs there.

@@ -6,7 +6,7 @@ use anyhow::Result;
 
 use crate::cli::Run;
 use crate::endpoint::Endpoint;
-use crate::files::{FileId, Inputs, Output, means_standard_output};
+use crate::files::{FileId, Inputs, Output, is_seekable, means_standard_output};
 use crate::outcome::usage;
 
 /// What of a run must not be written over: its inputs, and the card and the store, which are updated in place. Refuses
@@ -15,6 +15,13 @@ pub(super) fn inputs(run: &Run, tap: Option<&Path>, firmware: Option<&Path>) -> 
     let mut inputs = Inputs::of(run.params.as_deref().into_iter().chain(firmware));
     inputs.add_endpoint(&run.input);
     run.gs_input.iter().for_each(|input| inputs.add_endpoint(input));
+    if run.sd.metadata().is_ok_and(|about| is_seekable(&about) && !about.is_file()) {
+        return Err(usage(format!(
+            "--sd {}: is a disk or a card, and a run records into a file only; nothing was written; name an image file, and copy \
+             it to a card with a program for that (dd)",
+            run.sd.display()
+        )));
+    }
     for in_place in std::iter::once(run.sd.as_path()).chain(run.store.as_deref()) {
         inputs.refuse(in_place)?;
         inputs.add(in_place);

@@ -1,7 +1,7 @@
 //! Frames of a ground station's log whose checksum does not fit: they are not read, and that is told.
 
 use hums_core::time::Instant;
-use hums_link::Check;
+use hums_link::{Check, Frame};
 
 use super::item::Gap;
 use crate::mavlink::frame::{Peek, peek};
@@ -40,21 +40,21 @@ impl Checksums {
     }
 
     /// A frame that is one.
-    pub fn frame(&mut self, frame: &hums_link::Frame<'_>) {
+    pub fn frame(&mut self, frame: &Frame<'_>) {
         self.waits = None;
         self.unchecked += u64::from(frame.check() == Check::Unverified);
     }
 
-    /// The record is over.
-    pub fn end(&mut self) {
-        match self.waits.take() {
-            Some(true) => {
-                self.damaged += 1;
-                self.first.get_or_insert((self.at, self.place));
-            }
-            Some(false) => self.unchecked += 1,
-            None => {}
+    /// The record is over. Gives its frame, of these bytes, where it came out as none only because its message is not known: it
+    /// is kept as it is.
+    pub fn end<'a>(&mut self, bytes: &'a [u8]) -> Option<Frame<'a>> {
+        if self.waits.take()? {
+            self.damaged += 1;
+            self.first.get_or_insert((self.at, self.place));
+            return None;
         }
+        self.unchecked += 1;
+        Frame::again(bytes, Check::Unverified)
     }
 
     /// How many are damaged.

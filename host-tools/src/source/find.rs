@@ -8,9 +8,8 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result, anyhow, bail};
 
-use super::format::{Format, KNOWN, detect, format_of, hint, is_recording, start_of};
+use super::format::{KNOWN, detect, format_of, hint, is_recording, start_of};
 use super::recording::{Place, of_one_vehicle};
-use crate::archive::GZIP;
 use crate::files::{FileId, why_unread};
 use crate::logs::find::{Image, REMARKS_MAX, check_seekable};
 use crate::logs::sessions::Sessions;
@@ -234,19 +233,6 @@ fn is_own(path: &Path) -> Result<bool> {
     })
 }
 
-/// What a file that lies at `content` is, by its first bytes; none where that is not known.
-pub fn kind_of(content: &Path) -> Option<Format> {
-    match logs::find::look(content) {
-        Ok(Content::Log) => Some(Format::Hums),
-        _ => format_of(&start_of(content)),
-    }
-}
-
-/// Whether it is compressed with gzip.
-pub fn is_compressed(content: &Path) -> bool {
-    start_of_bytes(content, GZIP.len()).is_some_and(|start| start == GZIP)
-}
-
 /// Its first bytes, as they lie there; none where it cannot be read.
 fn start_of_bytes(content: &Path, bytes: usize) -> Option<Vec<u8>> {
     let mut start = Vec::new();
@@ -258,10 +244,11 @@ fn start_of_bytes(content: &Path, bytes: usize) -> Option<Vec<u8>> {
 /// are in a file that is no text at all. A damaged one may have nothing but its name.
 pub fn is_no_text(path: &Path, content: &Path) -> bool {
     let is_named = logs::is_named_as_log(path) || logs::is_named_as_card(path) || is_named_as_recording(path);
-    // Further on, a text may have zeros too: a PC that loses its power leaves such in its logs.
+    // Further on, a text may have zeros too: a PC that loses its power leaves such in its logs. A backspace is in the talk of a terminal.
+    let is_of_text = |byte: &u8| matches!(byte, 0x08..=0x0D | 0x1B | b' '..);
     let is_binary = || {
         const START_BYTES: usize = 512;
-        start_of_bytes(content, START_BYTES).is_some_and(|start| start.contains(&0))
+        start_of_bytes(content, START_BYTES).is_some_and(|start| !start.iter().all(is_of_text))
     };
     is_named || why_unread(path).is_some() || is_binary() || is_recording(content)
 }
@@ -415,6 +402,7 @@ mod tests {
     use hums_blackbox::{SECTOR_BYTES, Sector};
 
     use super::*;
+    use crate::archive::GZIP;
     use crate::source::recording::tests::dataflash;
 
     #[test]

@@ -87,7 +87,10 @@ impl Reader for TlogReader {
                 counts.add(frame.id(), true, frame.bytes().len());
                 said.frame(now, &frame, want, take)
             })?;
-            checksums.end();
+            if let Some(frame) = checksums.end(&bytes) {
+                counts.add(frame.id(), true, bytes.len());
+                said.frame(now, &frame, want, take)?;
+            }
         }
         if let Some(noise) = noise {
             noise.tell(take)?;

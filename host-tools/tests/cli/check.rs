@@ -692,6 +692,26 @@ fn a_packed_recording_has_the_times_the_damage_and_the_joints_that_check_sees() 
     assert_eq!(checked["gaps"][0]["why"], "1 frame with a wrong checksum, which is not read");
 }
 
+/// Nobody can say whether such a frame is damaged: it is kept as it is.
+#[test]
+fn a_frame_whose_id_is_not_known_is_kept_bit_for_bit() {
+    let dir = tempfile::tempdir().expect("directory");
+    let mut tlog = fs::read(px4()).expect("a recording");
+    let place: usize = frames_of(&px4())[..700].iter().map(|frame| 8 + frame.len()).sum();
+    assert_eq!(tlog[place + 8], 0xFD, "MAVLink 2");
+    tlog[place + 8 + 8] ^= 0x40;
+    fs::write(dir.path().join("flip.tlog"), &tlog).expect("written");
+    run(dir.path(), "decode flip.tlog -o same.tlog --format tlog", 0);
+    assert!(fs::read(dir.path().join("same.tlog")).expect("made") == tlog);
+    let packed = json(&run(dir.path(), "pack flip.tlog -o flip.hum --json", 0));
+    assert_eq!((&packed["frames"], &packed["bytes_not_frames"]), (&16_645.into(), &0.into()));
+    run(dir.path(), "verify flip.hum", 0);
+    run(dir.path(), "decode flip.hum -o back.tlog --format tlog", 0);
+    assert!(frames_of(&dir.path().join("back.tlog")) == frames_of(&dir.path().join("flip.tlog")));
+    let told = text(&attempt(dir.path(), "check flip.tlog"));
+    assert!(told.contains("1 frame of messages that this program has no definition of"), "{told}");
+}
+
 #[test]
 fn a_file_that_is_no_log_has_an_object_too() {
     let dir = tempfile::tempdir().expect("directory");

@@ -12,8 +12,8 @@ use tempfile::TempDir;
 use crate::support::{attempt, end_of, flight, json, px4, run, text};
 
 const BLOCK: usize = 512;
-/// A segment of the cards here.
-const SEGMENT: usize = 2 << 20;
+/// A segment of the cards here, with its parity at its end.
+const SEGMENT: usize = 7_999 * BLOCK;
 
 /// Every command that reads, with these inputs: its exit code and what it said on both streams. A finding of the vehicle's
 /// health is no damage.
@@ -443,6 +443,56 @@ fn sectors_that_parity_made_again_are_told_by_every_command() {
     assert!(said.contains("not counted") && said.contains("2 sectors had to be made again"), "{said}");
 }
 
+/// A file in which so many parity sectors are overwritten.
+fn without(bytes: &[u8], most: usize, with: u8) -> Vec<u8> {
+    let mut bytes = bytes.to_vec();
+    let parity = bytes.as_chunks_mut::<BLOCK>().0.iter_mut().filter(|block| Parity::read(block).is_some());
+    parity.take(most).for_each(|block| block.fill(with));
+    bytes
+}
+
+/// The log is whole, and nothing can be made again of what its card loses next.
+#[test]
+fn parity_that_is_gone_is_told_by_every_command() {
+    let dir = copied(1, "");
+    let path = dir.path().join("copied/00001_00.HUM");
+    let whole = with_parity(&dir);
+    let is_parity = |block: &[u8; BLOCK]| Parity::read(block).is_some();
+    let all = whole.as_chunks::<BLOCK>().0.iter().filter(|block| is_parity(block)).count();
+    for (most, with, words) in [
+        (all, 0, format!("{all} parity sectors are missing: what the card loses")),
+        (all, 0xff, format!("{all} parity sectors are missing: what the card loses")),
+        (1, 0, "1 parity sector is missing: what the card loses".to_owned()),
+    ] {
+        fs::write(&path, without(&whole, most, with)).expect("written");
+        all_say(dir.path(), "copied", 3, &[&words]);
+        let said = text(&run(dir.path(), "verify copied", 3));
+        let last = said.lines().last().expect("a verdict");
+        assert!(last.starts_with(&format!("1 session: nothing is lost; {words}")), "{said}");
+        assert_eq!(said.matches("FAILED").count(), 1, "{said}");
+        assert!(said.contains("FAILED  sectors protected"), "{said}");
+        assert_eq!(json(&run(dir.path(), "verify --json copied", 3))["ok"], false);
+        let screen = text(&run(dir.path(), "check copied", 3));
+        assert!(screen.contains("; the log is whole, without all of its parity"), "{screen}");
+    }
+    // Of a log whose power went: that of each stretch but the last was written.
+    let long = flight("ap_quad_guided.tlog");
+    run(dir.path(), &format!("sim --input {} --sd long.img --card-size 64", long.display()), 0);
+    fs::rename(dir.path().join("long.img"), dir.path().join("card.img")).expect("renamed");
+    let mut long = with_parity(&dir);
+    let blocks = long.as_chunks_mut::<BLOCK>().0;
+    let end = blocks.iter().rposition(|block| Header::read(block).is_ok()).expect("a sector");
+    assert!(end > 540, "{end}");
+    blocks[520..=end].iter_mut().for_each(|block| block.fill(0));
+    let is_later = |block: &[u8; BLOCK]| Parity::read(block).is_some_and(|one| one.last >= 504);
+    blocks.iter_mut().filter(|block| is_later(block)).for_each(|block| block.fill(0));
+    for (bytes, is_told) in [(long.clone(), false), (without(&long, usize::MAX, 0), true)] {
+        fs::write(&path, bytes).expect("written");
+        let said = text(&run(dir.path(), "verify copied", 3));
+        assert_eq!(said.contains("FAILED  sectors protected  16 checked, 16 failed"), is_told, "{said}");
+    }
+}
+
 /// What follows lies in other blocks then, and parity makes some of it again: what lies in the place of that is read too.
 #[test]
 fn a_sector_that_was_put_between_others_costs_no_frame() {
@@ -787,7 +837,7 @@ fn a_mere_copy_is_told_and_its_flight_counted_once() {
         assert!(said.contains("1 log checked") && said.contains("the same session once more"), "{said}");
     }
     // One that differs is a log as any other.
-    let mut copy = fs::read(&log).expect("there");
+    let mut copy = without(&fs::read(&log).expect("there"), usize::MAX, 0);
     copy[20 * BLOCK + 100] ^= 1;
     fs::write(dir.path().join("copied/flight.hum"), copy).expect("written");
     let said = text(&run(dir.path(), "verify copied", 3));
@@ -842,7 +892,7 @@ fn logs_that_were_renamed_or_exchanged_are_told_by_every_command() {
 fn noise_behind_the_last_end_mark_is_told_by_every_command() {
     let dir = copied(1, "");
     let path = dir.path().join("copied/00001_00.HUM");
-    let log = fs::read(&path).expect("a log");
+    let log = without(&fs::read(&path).expect("a log"), usize::MAX, 0);
     let last = log
         .as_chunks::<BLOCK>()
         .0
@@ -888,7 +938,10 @@ fn two_copies_of_one_session_have_two_pages_and_the_damaged_one_is_not_kept_alon
     let whole = fs::read(dir.path().join("copied/00001_00.HUM")).expect("a log");
     for (folder, spoiled) in [("damaged", true), ("same", false)] {
         let mut log = whole.clone();
-        log[20 * BLOCK + 100] ^= u8::from(spoiled);
+        if spoiled {
+            log = without(&log, usize::MAX, 0);
+            log[20 * BLOCK + 100] ^= 1;
+        }
         fs::create_dir(dir.path().join(folder)).expect("made");
         fs::write(dir.path().join(folder).join("00001_00.HUM"), log).expect("written");
     }

@@ -119,6 +119,64 @@ fn a_killed_run_leaves_the_old_file_and_is_in_nobodys_way() {
     run(dir.path(), "verify old.hum", 0);
 }
 
+/// A recording with gaps, another one with others, and a whole one: each is decoded in the place of each, and killed at every
+/// rename.
+#[test]
+fn a_tlog_never_stands_without_its_gaps_nor_beside_those_of_another() {
+    let dir = tempfile::tempdir().expect("directory");
+    let at = |name: &str| dir.path().join(name);
+    run(dir.path(), "pack PX4 -o whole.hum", 0);
+    let log = fs::read(at("whole.hum")).expect("a log");
+    for (name, sector) in [("one", 150), ("two", 350)] {
+        let mut damaged = log.clone();
+        damaged[sector * 512 + 100] ^= 4;
+        fs::write(at(&format!("{name}.hum")), damaged).expect("written");
+    }
+    let pair =
+        |name: &str| [".tlog", ".tlog.gaps.csv"].map(|ending| fs::read(at(&format!("{name}{ending}"))).ok());
+    let of = ["one", "two", "whole"].map(|name| {
+        attempt(dir.path(), &format!("decode {name}.hum -o {name}.tlog --format tlog"));
+        (name, pair(name))
+    });
+    let has_strace = Command::new("strace").arg("-V").output().is_ok();
+    for (old, there) in &of {
+        for (new, made) in of.iter().filter(|(new, _)| new != old) {
+            let begin = || {
+                let _ = fs::remove_dir_all(at("hums-kept"));
+                for ending in [".tlog", ".tlog.gaps.csv"] {
+                    let _ = fs::remove_file(at(&format!("x{ending}")));
+                    let _ = fs::copy(at(&format!("{old}{ending}")), at(&format!("x{ending}")));
+                }
+            };
+            let decode = ["decode", &format!("{new}.hum"), "-o", "x.tlog", "--format", "tlog", "--replace"]
+                .map(str::to_owned);
+            begin();
+            let said = String::from_utf8_lossy(&attempt(dir.path(), &decode.join(" ")).stderr).into_owned();
+            let kept: Vec<_> = said.lines().filter(|line| line.contains("is kept as")).collect();
+            assert!(kept[0].contains("x.tlog: what was there"), "{said}");
+            assert_eq!(pair("x"), *made);
+            for rename in (1..8).take_while(|_| has_strace) {
+                begin();
+                let inject = format!("inject=renameat2:signal=KILL:when={rename}");
+                let mut killed = Command::new("strace");
+                killed
+                    .args(["-f", "-o", "/dev/null", "-e", &inject, env!("CARGO_BIN_EXE_hums")])
+                    .args(&decode);
+                killed.current_dir(dir.path()).output().expect("it ends");
+                let now = pair("x");
+                assert!(
+                    now == *there || now == *made || now[0].is_none(),
+                    "{new} for {old}, rename {rename}"
+                );
+                // Nothing of the old ones is gone.
+                let all = contents(dir.path());
+                assert!(there.iter().flatten().all(|old| all.iter().any(|(_, bytes)| bytes == old)));
+                parts(dir.path()).iter().for_each(|part| fs::remove_file(at(part)).expect("ours"));
+            }
+        }
+    }
+}
+
 #[test]
 fn tables_of_a_killed_run_are_the_old_ones_or_the_new_ones() {
     let dir = tempfile::tempdir().expect("directory");

@@ -42,6 +42,21 @@ impl Place {
                 .expect("a link");
         }
         std::os::unix::fs::symlink(format!("out/{name}"), at("tables")).expect("a link");
+        // Under names that say nothing.
+        for (nth, table) in ["ATTITUDE.csv", ".hums"].iter().enumerate() {
+            fs::copy(at("out").join(&name).join(table), at(&format!("renamed.{nth}"))).expect("a copy");
+        }
+        for ending in ["jsonl", "lp"] {
+            fs::copy(at(&format!("out/{name}.{ending}")), at(&format!("{ending}.txt"))).expect("a copy");
+        }
+        for table in ["flightvalues", "esc_status", "esc_info", "vfr_hud", "gaps"] {
+            let of = at(&format!("out/{name}.thesis/{table}.csv"));
+            fs::copy(of, at(&format!("{table}.txt"))).expect("a copy");
+        }
+        fs::write(at("gaps"), "from[s],to[s],cause,sectors_lost,sectors_skipped,frames_missing\n")
+            .expect("written");
+        fs::copy(at("out/index.html"), at("page")).expect("a copy");
+        assert!(shell(dir.path(), "gzip -c renamed.0 > packed").status.success());
         fs::copy(at("flight.tlog"), at("folder/NAME.HUM")).expect("a copy");
         let session = contents(&at("out")).into_iter().find(|(name, _)| name.ends_with("ATTITUDE.parquet"));
         fs::write(at("part.parquet.mine"), session.expect("a table").1).expect("written");
@@ -113,6 +128,18 @@ fn nothing_that_is_said_goes_behind_a_recording_or_what_is_made_of_one_wherever_
         "tables/table",
         "tables/.hums",
         "out/index.html",
+        "renamed.0",
+        "renamed.1",
+        "jsonl.txt",
+        "lp.txt",
+        "flightvalues.txt",
+        "esc_status.txt",
+        "esc_info.txt",
+        "vfr_hud.txt",
+        "gaps.txt",
+        "gaps",
+        "page",
+        "packed",
     ];
     for (at, into) in kept.iter().enumerate() {
         // Each command with each way, and each file with each way.
@@ -152,7 +179,7 @@ fn nothing_is_written_over_what_is_in_a_file_that_somebody_opened() {
 }
 
 #[test]
-fn what_is_said_may_follow_a_text_and_a_recording_may_follow_one_of_its_kind() {
+fn what_is_said_may_follow_a_text() {
     let dir = furnished();
     let at = |name: &str| dir.path().join(name);
     for line in [
@@ -160,7 +187,6 @@ fn what_is_said_may_follow_a_text_and_a_recording_may_follow_one_of_its_kind() {
         "(echo first; hums info folder; hums check folder --json) > folder/notes.txt",
         "hums ls nosuch 2>> notes",
         "hums info . >> folder/notes.txt",
-        "hums report log.hum -o /dev/fd/7 7>>notes",
         "hums check --json flight.tlog >> results.jsonl; hums check --json flight.tlog >> results.jsonl",
         "hums completions bash > folder/new",
     ] {
@@ -170,34 +196,41 @@ fn what_is_said_may_follow_a_text_and_a_recording_may_follow_one_of_its_kind() {
         assert!(matches!(ended.status.code(), Some(0 | 1 | 4)), "{line}: {said}");
         assert!(fs::read(at("notes")).expect("there").starts_with(b"what was there"), "{line}");
     }
-    // As power that went leaves a log of this PC.
-    fs::write(at("notes"), [&[b'.'; 600][..], &[0; 600]].concat()).expect("written");
-    assert_eq!(shell(dir.path(), "hums info folder >> notes 2>&1").status.code(), Some(0));
-    let loops = "for nth in 1 2; do hums decode log.hum -o - --format tlog; done > all.tlog; \
-                 hums decode log.hum -o - --format tlog >> all.tlog; \
-                 for nth in 1 2; do hums pack flight.tlog -o -; done > all.hum";
-    let ended = shell(dir.path(), loops);
-    assert_eq!(ended.status.code(), Some(0), "{}", String::from_utf8_lossy(&ended.stderr));
-    assert_eq!(frames_of(&at("all.tlog")).len(), 3 * frames_of(&px4()).len());
-    assert_eq!(
-        at("all.hum").metadata().expect("there").len(),
-        2 * at("log.hum").metadata().expect("there").len()
-    );
-    // Of another kind it does not, nor what is compressed, nor a text.
-    assert!(shell(dir.path(), "gzip -c flight.tlog > flight.tlog.gz && echo mine > notes").status.success());
+    // As power that went leaves a log of this PC; and what was said in another script than ASCII's, in colour.
+    for text in [[&[b'.'; 600][..], &[0; 600]].concat(), "\u{1b}[31mHöhe\u{1b}[0m\t1\r\n".into()] {
+        fs::write(at("notes"), text).expect("written");
+        assert_eq!(shell(dir.path(), "hums info folder >> notes 2>&1").status.code(), Some(0));
+    }
+}
+
+#[test]
+fn what_is_made_goes_behind_nothing() {
+    let dir = furnished();
+    let made = "echo mine > notes; hums decode log.hum -o - --format tlog > all.tlog && hums pack flight.tlog -o - > all.hum && \
+                hums decode log.hum -o - --format tlog | cat >> notes";
+    assert!(shell(dir.path(), made).status.success());
+    assert_eq!(frames_of(&dir.path().join("all.tlog")).len(), frames_of(&px4()).len());
     let before = contents(dir.path());
     for line in [
-        "hums decode log.hum -o - --format tlog >> all.hum",
-        "hums decode log.hum -o - --format jsonl >> all.tlog",
-        "hums pack flight.tlog -o - >> all.tlog",
+        "hums pack flight.tlog -o - >> all.hum",
         "hums pack flight.tlog -o - >> all.hum 2>&1",
+        "hums pack flight.tlog -o /dev/stdout >> all.hum",
+        "hums pack flight.tlog -o /dev/fd/7 7>>all.hum",
+        "hums decode log.hum -o - --format tlog >> all.tlog",
+        "hums decode log.hum -o - --format jsonl >> all.tlog",
+        "hums decode log.hum -o - --format jsonl >> notes",
         "hums report log.hum -o - >> folder/flight.tlog",
-        "hums decode log.hum -o - --format tlog >> flight.tlog.gz",
-        "hums decode log.hum -o - --format tlog >> notes",
+        "hums report log.hum -o /dev/fd/7 7>>notes",
+        "hums sim --input flight.tlog --sd card.img --gs - >> notes",
+        "hums sim --input flight.tlog --sd card.img --tap - >> notes",
+        "hums sim --input flight.tlog --sd card.img --gs /dev/stdout >> notes",
     ] {
-        assert_eq!(shell(dir.path(), line).status.code(), Some(2), "{line}");
+        let ended = shell(dir.path(), line);
+        let said = String::from_utf8_lossy(&ended.stderr).into_owned();
+        assert_eq!(ended.status.code(), Some(2), "{line}: {said}");
+        assert!(line.contains("2>&1") || said.contains("nothing was written"), "{line}: {said}");
+        assert!(contents(dir.path()) == before, "{line}");
     }
-    assert!(contents(dir.path()) == before);
 }
 
 #[cfg(target_os = "linux")]

@@ -319,6 +319,7 @@ fn verify(name: &str, path: &Path) -> Result<Outcome> {
         let wrong = [
             (blocks.damaged, "damaged sectors"),
             (overview.ending.made_again(), "sectors that had to be made again from parity"),
+            (overview.ending.unprotected(), "parity sectors that are missing"),
             (blocks.misplaced.saturating_sub(behind.misplaced), "sectors where others belong"),
             (blocks.stale.saturating_sub(behind.stale), "sectors of another session"),
             (blocks.foreign.saturating_sub(behind.foreign), "blocks that are no sectors"),
