@@ -2,7 +2,7 @@
 
 use hums_tests::chip::BAUD;
 use hums_tests::chip::record::{Compared, Session};
-use hums_tests::chip::rig::{Rig, heartbeat, set};
+use hums_tests::chip::rig::{Rig, frame, heartbeat, set};
 use stm32f405_model::flash::Speed;
 use stm32f405_model::machine::Board;
 use stm32f405_model::rcc::Cause;
@@ -205,4 +205,57 @@ fn flash_that_refuses_a_word_is_told_and_saving_goes_on() {
     assert_no_reset(&rig);
     let heard: Vec<u8> = rig.machine.take_sent(1).into_iter().map(|(_, byte)| byte).collect();
     assert!(String::from_utf8_lossy(&heard).contains("HUMS: saving failed"), "the ground was not told");
+}
+
+/// A line that carries beginnings of frames and no frame, as fast as it can, is the dearest for the framer: whoever looked for the next byte
+/// as soon as it was done with one would find one each time, and nobody else would run again.
+#[test]
+fn beginnings_without_a_frame_at_full_rate_starve_nobody() {
+    let mut rig = bench().settled(Board::default()).unwrap();
+    let begin = rig.machine.now() + SECOND;
+    rig.run(begin, false).unwrap();
+    for pattern in [[0xFE; 5], [0xFD, 0xFF, 0, 0, 0]] {
+        let now = rig.machine.now();
+        let end = rig.machine.send(0, &pattern.repeat(28_000), now, BAUD);
+        rig.run(end + 50 * MS, false).unwrap();
+    }
+    assert_no_reset(&rig);
+    let now = rig.machine.now();
+    rig.run(now + SECOND, true).unwrap();
+    rig.run(now + 3 * SECOND, false).unwrap();
+    assert_whole(&rig);
+    assert_no_reset(&rig);
+}
+
+/// The flash is made so slow that the processor cannot take the smallest frames as fast as they come.
+#[test]
+fn more_frames_than_the_processor_can_take_are_lost_and_counted() {
+    const ESC_STATUS: (u32, u8) = (291, 10);
+    let mut rig = bench().settled(Board::default()).unwrap();
+    let begin = rig.machine.now() + SECOND;
+    rig.run(begin, false).unwrap();
+    let art = &mut rig.machine.chip.art;
+    let (latency, prefetch) = (art.latency, art.prefetch);
+    art.set_caches(false, false);
+    (art.latency, art.prefetch) = (12, false);
+    let mut free = begin;
+    for number in 0..21_000_u32 {
+        let frame = frame(ESC_STATUS.0, &[1 + (number % 255) as u8], ESC_STATUS.1, number as u8);
+        free = rig.machine.send(0, &frame, free, BAUD);
+        rig.sent.push((free, frame));
+    }
+    let slept = rig.machine.core.slept();
+    rig.run(free, false).unwrap();
+    assert_no_reset(&rig);
+    let idle = (rig.machine.core.slept() - slept) as f64 / 168e6 / ((free - begin) as f64 / SECOND as f64);
+    assert!(idle < 0.1, "{idle}: the processor was not too slow, this has tried nothing");
+    let art = &mut rig.machine.chip.art;
+    art.set_caches(true, true);
+    (art.latency, art.prefetch) = (latency, prefetch);
+    rig.run(free + 4 * SECOND, false).unwrap();
+    assert_no_reset(&rig);
+    let (compared, losses) = (rig.compared(), last(&rig).losses);
+    let told: u64 = losses.iter().map(|(_, count, ..)| count).sum();
+    assert!(compared.wrong == 0 && compared.missing > 1_000, "{compared:?}");
+    assert_eq!(told, compared.missing as u64, "{losses:?}");
 }

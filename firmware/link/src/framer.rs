@@ -19,7 +19,8 @@
 //! # Limits
 //! About 1 KiB. A candidate waits for at most 281 bytes (3 ms at 921,600 baud) or for `idle`. Per byte: one copy, one
 //! step of the checksum; candidates that are not trusted may cost no more than four such steps for each
-//! byte received, so that no input can starve the other tasks.
+//! byte received, so that no input takes longer than it needs to come: the dearest known, start bytes without end, some 1,100 of the
+//! 1,823 cycles that the processor has for a byte at 921,600 baud.
 
 use hums_dialect::crc;
 use hums_dialect::wire::{FRAME_BYTES_MAX, START_V1, START_V2};

@@ -4,7 +4,7 @@
 use core::sync::atomic::{AtomicBool, Ordering};
 
 use embassy_futures::select::{Either3, select3};
-use embassy_time::Ticker;
+use embassy_time::{Duration, Ticker, Timer};
 use hums_onboard::monitoring::{Machine, Monitoring, Step, TICK};
 use hums_onboard::queues::{FramesOut, GsIn, SectorsIn, UplinkOut};
 use hums_onboard::{Handover, Task};
@@ -24,6 +24,11 @@ use crate::watch;
 const BLINK_RECORDING: u32 = 10;
 /// The same while it does not: 0.1 s.
 const BLINK_TROUBLE: u32 = 2;
+
+/// Frames in a row before others have their turn: some 10 ms of work.
+const DRAINED_MAX: usize = 64;
+/// That turn.
+const REST: Duration = Duration::from_millis(1);
 
 /// The monitor's ends of the queues.
 pub(crate) struct Ends {
@@ -51,11 +56,14 @@ pub(crate) async fn run(
     let mut load = costs::Load::new();
     loop {
         SUPERVISOR.report(Task::Monitor, now());
-        // Frames first where both are due: they came before this tick.
-        match select3(links::FRAMES.wait(), ticker.next(), links::UPLINK.wait()).await {
-            Either3::First(()) => drain(body, &mut ends),
+        let mut is_behind = false;
+        // The tick first: where frames come faster than they are worked on, they are always due.
+        match select3(ticker.next(), links::FRAMES.wait(), links::UPLINK.wait()).await {
+            Either3::Second(()) => is_behind = drain(body, &mut ends),
             Either3::Third(()) => uplink(body, &mut ends),
-            Either3::Second(()) => {
+            Either3::First(()) => {
+                // What came before this tick.
+                is_behind = drain(body, &mut ends);
                 if let Some((cpu_permille, cpu_permille_max)) = load.step(now()) {
                     let (stack_bytes_max, stack_bytes) = memory::stack_used();
                     let (stack_bytes_max, stack_bytes) = (stack_bytes_max as u32, stack_bytes as u32);
@@ -81,6 +89,11 @@ pub(crate) async fn run(
             }
         }
         wake_others();
+        if is_behind {
+            // Those less urgent go on, and what does not fit into the frame queue meanwhile is lost and counted.
+            links::FRAMES.signal(());
+            Timer::after(REST).await;
+        }
     }
 }
 
@@ -116,8 +129,9 @@ fn tell_board(body: &mut Monitoring<'static>, ends: &mut Ends, told: &mut [bool;
 
 // None of these within the task: what one of them takes of the stack is not to lie below what another takes.
 
+/// Takes the frames that are there, or [`DRAINED_MAX`] of them: `true`, there may be more.
 #[inline(never)]
-fn drain(body: &mut Monitoring<'static>, ends: &mut Ends) {
+fn drain(body: &mut Monitoring<'static>, ends: &mut Ends) -> bool {
     let Ends { frames, sectors, gs, .. } = ends;
     let mut begin = |step| {
         costs::enter(match step {
@@ -129,7 +143,8 @@ fn drain(body: &mut Monitoring<'static>, ends: &mut Ends) {
             Step::Summary => Stage::Summary,
         });
     };
-    while measure(Stage::Monitor, || body.drain_in_steps(frames, sectors, gs, &mut begin)) {}
+    let mut drain = || measure(Stage::Monitor, || body.drain_in_steps(frames, sectors, gs, &mut begin));
+    (0..DRAINED_MAX).all(|_| drain())
 }
 
 #[inline(never)]

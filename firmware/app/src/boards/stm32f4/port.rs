@@ -24,6 +24,8 @@ pub(crate) struct PortRx {
     clock: u64,
     fetch_every: Duration,
     looked: Instant,
+    /// The last look took as much as it could: there may be more.
+    is_behind: bool,
 }
 
 impl PortRx {
@@ -45,7 +47,7 @@ impl PortRx {
         ring.start();
         registers.cr3().modify(|w| w.set_dmar(true));
         let clock = u64::from(baud) * u64::from(registers.brr().read().0);
-        Self { _port: port, ring, registers, clock, fetch_every, looked: Instant::now() }
+        Self { _port: port, ring, registers, clock, fetch_every, looked: Instant::now(), is_behind: false }
     }
 
     /// How long it takes to fill the ring at the port's rate of now: ten bits a byte.
@@ -58,11 +60,18 @@ impl PortRx {
 impl Receive for PortRx {
     async fn receive(&mut self, buffer: &mut [u8]) -> Result<usize, Overrun> {
         loop {
+            // Also after a look that found something: as soon as what is done with a byte takes longer than the next one needs to
+            // come, whoever looks again at once finds something each time, and nobody less urgent ever runs again.
+            if !self.is_behind {
+                Timer::at(self.looked + self.fetch_every).await;
+            }
             let now = Instant::now();
             let blind = now - self.looked;
             self.looked = now;
-            match self.ring.read(buffer) {
-                Ok((0, _)) => Timer::after(self.fetch_every).await,
+            let read = self.ring.read(buffer);
+            self.is_behind = read.as_ref().is_ok_and(|(count, _)| *count == buffer.len());
+            match read {
+                Ok((0, _)) => {}
                 Ok((count, _)) if blind < self.holds() => return Ok(count),
                 Ok(_) | Err(_) => {
                     self.ring.clear();
