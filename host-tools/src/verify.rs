@@ -124,7 +124,7 @@ impl WithoutEarlier {
             (Verdict::NotProved, ..) => "damage, losses or an end that is not proved: see above",
         };
         let weakened = [made_again_words(weakened.made_again), unprotected_words(weakened.unprotected)];
-        let weakened: String = weakened.into_iter().flatten().map(|words| format!("; {words}")).collect();
+        let weakened = weakened.into_iter().flatten().fold(String::new(), |all, words| all + "; " + &words);
         let more = match self.more {
             0 => String::new(),
             more => format!(" and before {}", count(more, "more log")),
@@ -280,24 +280,37 @@ impl LogJson {
             (true, false) => Verdict::ToMark,
             (false, _) => Verdict::NotProved,
         };
-        let made_again = ending.made_again();
-        if made_again > 0 || !is_told_only && ending.begun_anew.is_none() {
-            let detail = if made_again > 0 { "made again from parity, without a loss" } else { "" };
-            checks.push(check("sectors intact", blocks.sectors, made_again, detail.to_owned()));
-        }
-        let (parity, missing) = (&summary.parity, ending.unprotected());
-        if summary.marks.has_boot && !is_told_only && ending.begun_anew.is_none() {
-            let detail =
-                if missing > 0 { "what the card loses of these files cannot be made again" } else { "" };
-            checks.push(check("sectors protected", parity.written, missing, detail.to_owned()));
-        }
-        let ok = holds && made_again == 0 && missing == 0;
+        let weakened = weakened(log);
+        let ok = holds && weakened.iter().all(|check| check.failed == 0);
+        checks.extend(weakened);
         let end = EndJson::new(ending);
         let blocks = BlocksJson::new(&blocks);
         let (name, closed) = (ending.name.clone(), summary.closed);
         let (left_over, begun_anew) = (ending.left_over, ending.begun_anew.map(|anew| anew.of.unwrap_or(0)));
         Self { name, ok, closed, copy_of, left_over, end, begun_anew, blocks, checks, verdict }
     }
+}
+
+/// What its card has lost of it without a loss of frames.
+fn weakened(log: &Overview) -> Vec<Check> {
+    let (ending, summary) = (&log.ending, &log.ending.summary);
+    let check = |name, checked, failed, words: &str| Check {
+        name,
+        checked,
+        failed,
+        detail: if failed > 0 { words.to_owned() } else { String::new() },
+    };
+    let sectors = summary.blocks.sectors;
+    let intact =
+        check("sectors intact", sectors, ending.made_again(), "made again from parity, without a loss");
+    if ending.aside().is_some() || ending.begun_anew.is_some() {
+        // Of a copy, too, it is told that its card is damaged.
+        return Some(intact).filter(|intact| intact.failed > 0).into_iter().collect();
+    }
+    let words = "parity is missing: what the card loses of these files cannot be made again";
+    // What was packed on a PC has none.
+    let written = if summary.marks.has_boot { summary.parity.written } else { 0 };
+    vec![intact, check("sectors protected", written, ending.unprotected(), words)]
 }
 
 /// What the log says of its end and of its place.

@@ -333,20 +333,19 @@ fn a_file_that_is_spelled_through_proc_is_a_file_and_a_descriptor_is_written_as_
         assert_eq!(fs::read(&old).expect("there"), b"what was there", "{}", path.display());
         write(&path, &Inputs::none().replacing(true), "what was there").expect("the same");
     }
-    // What is open is appended to.
+    // What is open is written where nothing is in it.
     let open = fs::File::options().append(true).open(&old).expect("opened");
-    std::os::unix::fs::symlink(format!("/dev/fd/{}", open.as_raw_fd()), dir.path().join("link"))
-        .expect("a link");
-    let number = open.as_raw_fd();
-    for path in [
-        format!("/dev/fd/{number}"),
-        format!("/proc/self/fd/{number}"),
-        format!("/proc/thread-self/fd/{number}"),
-    ] {
-        write(Path::new(&path), &Inputs::none(), "+").expect("written");
+    let (number, link) = (open.as_raw_fd(), dir.path().join("link"));
+    std::os::unix::fs::symlink(format!("/dev/fd/{number}"), &link).expect("a link");
+    let paths = ["/dev/fd", "/proc/self/fd", "/proc/thread-self/fd"];
+    for path in paths.map(|folder| Path::new(folder).join(number.to_string())).iter().chain([&link]) {
+        let refused = write(path, &Inputs::none(), "+").expect_err("something is in it");
+        assert!(refused.contains("has something in it, behind which nothing is made"), "{refused}");
+        let there = fs::read(&old).expect("there");
+        open.set_len(0).expect("emptied");
+        write(path, &Inputs::none(), "+").expect("written");
+        assert_eq!((there.is_empty(), fs::read(&old).expect("there")), (false, b"+".to_vec()));
     }
-    write(&dir.path().join("link"), &Inputs::none(), "+").expect("written");
-    assert_eq!(fs::read(&old).expect("there"), b"what was there++++");
 }
 
 /// Its name may be another file's by now: what lies there is none of the output.

@@ -139,39 +139,35 @@ fn a_tlog_never_stands_without_its_gaps_nor_beside_those_of_another() {
         (name, pair(name))
     });
     let has_strace = Command::new("strace").arg("-V").output().is_ok();
-    for (old, there) in &of {
-        for (new, made) in of.iter().filter(|(new, _)| new != old) {
-            let begin = || {
-                let _ = fs::remove_dir_all(at("hums-kept"));
-                for ending in [".tlog", ".tlog.gaps.csv"] {
-                    let _ = fs::remove_file(at(&format!("x{ending}")));
-                    let _ = fs::copy(at(&format!("{old}{ending}")), at(&format!("x{ending}")));
-                }
-            };
-            let decode = ["decode", &format!("{new}.hum"), "-o", "x.tlog", "--format", "tlog", "--replace"]
-                .map(str::to_owned);
+    for [old, new] in [[0, 1], [0, 2], [2, 0]] {
+        let ((old, there), (new, made)) = (&of[old], &of[new]);
+        let begin = || {
+            let _ = fs::remove_dir_all(at("hums-kept"));
+            for ending in [".tlog", ".tlog.gaps.csv"] {
+                let _ = fs::remove_file(at(&format!("x{ending}")));
+                let _ = fs::copy(at(&format!("{old}{ending}")), at(&format!("x{ending}")));
+            }
+        };
+        let decode = ["decode", &format!("{new}.hum"), "-o", "x.tlog", "--format", "tlog", "--replace"]
+            .map(str::to_owned);
+        begin();
+        let said = String::from_utf8_lossy(&attempt(dir.path(), &decode.join(" ")).stderr).into_owned();
+        let kept: Vec<_> = said.lines().filter(|line| line.contains("is kept as")).collect();
+        assert!(kept[0].contains("x.tlog: what was there"), "{said}");
+        assert_eq!(pair("x"), *made);
+        for rename in (1..5).take_while(|_| has_strace) {
             begin();
-            let said = String::from_utf8_lossy(&attempt(dir.path(), &decode.join(" ")).stderr).into_owned();
-            let kept: Vec<_> = said.lines().filter(|line| line.contains("is kept as")).collect();
-            assert!(kept[0].contains("x.tlog: what was there"), "{said}");
-            assert_eq!(pair("x"), *made);
-            for rename in (1..8).take_while(|_| has_strace) {
-                begin();
-                let inject = format!("inject=renameat2:signal=KILL:when={rename}");
-                let mut killed = Command::new("strace");
-                killed
-                    .args(["-f", "-o", "/dev/null", "-e", &inject, env!("CARGO_BIN_EXE_hums")])
-                    .args(&decode);
-                killed.current_dir(dir.path()).output().expect("it ends");
-                let now = pair("x");
-                assert!(
-                    now == *there || now == *made || now[0].is_none(),
-                    "{new} for {old}, rename {rename}"
-                );
-                // Nothing of the old ones is gone.
-                let all = contents(dir.path());
-                assert!(there.iter().flatten().all(|old| all.iter().any(|(_, bytes)| bytes == old)));
-                parts(dir.path()).iter().for_each(|part| fs::remove_file(at(part)).expect("ours"));
+            let inject = format!("inject=renameat2:signal=KILL:when={rename}");
+            let mut killed = Command::new("strace");
+            killed.args(["-f", "-o", "/dev/null", "-e", &inject, env!("CARGO_BIN_EXE_hums")]).args(&decode);
+            killed.current_dir(dir.path()).output().expect("it ends");
+            let now = pair("x");
+            assert!(now == *there || now == *made || now[0].is_none(), "{new} for {old}, rename {rename}");
+            // Nothing of the old ones is gone.
+            let all = contents(dir.path());
+            assert!(there.iter().flatten().all(|old| all.iter().any(|(_, bytes)| bytes == old)));
+            for part in parts(dir.path()) {
+                fs::remove_file(at(&part)).expect("ours");
             }
         }
     }
