@@ -191,7 +191,12 @@ impl Subject {
     pub(super) fn record(flight: &str, closed: bool, boots: u32) -> Result<Self> {
         let card = Card::new(64)?;
         let stream = Stream::of_flight(&own(flight), FULL_RATE)?;
-        let stream = stream.flying_and_resting(&[(9.0, 1.5), (4.0, 1.5)])?;
+        // An open one ends before its first parity: what was written and is not there would be told before any damage.
+        let stream = stream.flying_and_resting(if closed {
+            &[(9.0, 1.5), (4.0, 1.5)]
+        } else {
+            &[(5.0, 1.5), (2.0, 1.5)]
+        })?;
         let done = card.record(&stream, boots)?;
         ensure!(done.stats.frames_lost == 0, "frames were lost");
         let log = on_card(&card.path()).pop().context("no log")?;

@@ -48,7 +48,7 @@ pub enum When {
 }
 
 /// What a check, or an instance of it, has its value from. What never said anything has none, and is not asked for one: most of a step
-/// went into asking. [`Parts`] counts what has spoken.
+/// went into asking.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Part {
     /// The vehicle, or parts of it that nobody counts: each is asked.

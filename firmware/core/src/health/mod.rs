@@ -91,18 +91,12 @@ impl Health {
         let mut first = 0;
         for (place, check) in (0..).zip(TABLES.iter().copied().flatten()) {
             let quiet = quiet && check.when != When::Always;
-            let applies = match check.when {
-                When::Always => true,
-                _ if over => false,
-                _ if quiet => true,
-                When::Armed => inputs.vehicle.armed(),
-                When::InFlight => inputs.flight.airborne(),
-            };
+            let applies = quiet || (check.when == When::Always || !over) && is_now(check.when, inputs);
             let slots = first..first + usize::from(check.instances);
             first = slots.end;
             let there = parts.count(check);
             debug_assert!(
-                (there..check.instances).all(|instance| (check.read)(inputs, instance).is_none()),
+                silent(check, there, inputs),
                 "{} has a value, though its part never spoke",
                 check.name
             );
@@ -205,6 +199,20 @@ impl Health {
         let unknown = EXPECTED.into_iter().any(|subsystem| self.subsystem(subsystem) == Level::Stale);
         worst(self.levels().map(|(.., level)| level).chain(unknown.then_some(Level::Stale)))
     }
+}
+
+/// Whether it is so now.
+fn is_now(when: When, inputs: &Inputs<'_>) -> bool {
+    match when {
+        When::Always => true,
+        When::Armed => inputs.vehicle.armed(),
+        When::InFlight => inputs.flight.airborne(),
+    }
+}
+
+/// Whether none but the first instances of a check have a value.
+fn silent(check: &Check, there: u8, inputs: &Inputs<'_>) -> bool {
+    (there..check.instances).all(|instance| (check.read)(inputs, instance).is_none())
 }
 
 /// Critical before stale before warning: not knowing is worse than a known warning, and better than a known danger.
