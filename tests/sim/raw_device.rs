@@ -65,7 +65,7 @@ fn a_raw_device_is_read_like_its_image_by_each_command_and_never_written() {
         format!("report {tlog} -o {device}"),
         format!("sim --input {tlog} --sd {device}"),
         // Before anything is waited for.
-        format!("sim --input udpin:127.0.0.1:0 --sd {device}"),
+        format!("sim --input udpin:127.0.0.1:14559 --sd {device}"),
         format!("sim --input {tlog} --sd {}/card.img --gs {device}", out.path().display()),
         format!("sim --input {tlog} --sd {}/card.img --tap {device}", out.path().display()),
     ] {

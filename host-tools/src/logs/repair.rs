@@ -11,7 +11,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use anyhow::Result;
-use hums_blackbox::parity::{COLUMNS, Column, Parity, STRETCH_SECTORS, Sum};
+use hums_blackbox::parity::{COLUMNS, Column, Parity, STRETCH_SECTORS, Sum, parity_block};
 use hums_blackbox::{Header, Sector};
 use hums_recorder::card::SEGMENT_BYTES_MAX;
 
@@ -176,13 +176,16 @@ impl Found {
     }
 
     /// How many parity sectors were written for sure, and how many of them are not there. The recorder writes those of a stretch
-    /// before the first sector of the next one, and once a log has ended in order.
+    /// before the first sector of the next one, and once a log has ended in order. They lie at the end of the file: one that was
+    /// trimmed behind its last sector, as a download is, never had them.
     fn written_and_missing(&self, base: u32) -> (u64, u64) {
         let last = (0..self.numbers.len() as u32).rev().find(|at| self.in_place(base, *at).is_some());
         let Some(last) = last else { return (0, 0) };
         let (full, begun) = (last / STRETCH_SECTORS, last % STRETCH_SECTORS + 1);
         let is_closed = self.closed == Some(base.wrapping_add(last));
+        let has_place = |stretch| parity_block(self.numbers.len() as u32, stretch) > last;
         let columns = |stretch| match stretch {
+            _ if !has_place(stretch) => 0,
             _ if stretch < full => COLUMNS as u32,
             _ if stretch == full && is_closed => begun.min(COLUMNS as u32),
             _ => 0,
