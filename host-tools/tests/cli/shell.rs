@@ -43,7 +43,8 @@ fn the_shell_and_the_manual_know_every_command() {
     run(dir.path(), "completions tcsh", 2);
     // The script is one that bash reads, and with it bash completes.
     std::fs::write(dir.path().join("hums.bash"), &bash).expect("written");
-    let typed = "source ./hums.bash; COMP_WORDS=(hums de); COMP_CWORD=1; _hums hums de hums; echo ${COMPREPLY[@]}";
+    let typed =
+        "source ./hums.bash; COMP_WORDS=(hums de); COMP_CWORD=1; _hums hums de hums; echo ${COMPREPLY[@]}";
     let completed = Command::new("bash").current_dir(dir.path()).args(["--norc", "-c", typed]).output();
     assert_eq!(text(&completed.expect("bash")).trim_end(), "decode demo");
 }
