@@ -15,8 +15,7 @@ use serde_json::{Value, json};
 
 use crate::board::Board;
 
-/// The version of both files that `QGroundControl` and PX4 know. The schema of the parameters has 3 as its least, which neither of
-/// them writes or reads (mavlink/mavlink f368676f).
+/// The version of both files that `QGroundControl` reads. The schema of the parameters has 3 as its least (mavlink/mavlink f368676f).
 const VERSION: u32 = 1;
 /// `COMP_METADATA_TYPE_PARAMETER`
 const PARAMETER: u32 = 1;

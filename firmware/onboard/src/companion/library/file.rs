@@ -114,14 +114,17 @@ impl Job {
 
     pub(super) const fn want(&self) -> Option<(Which, What)> {
         match self.kind {
-            Kind::Say(_) | Kind::Number(_) | Kind::Checksum { sum: Some(_), .. } => None,
             Kind::List(entry) => Some((Which::At(entry), What::Length)),
             Kind::Open(name) => Some((Which::Named(name), What::Length)),
             Kind::Checksum { name, bytes, sum: None } => Some((Which::Named(name), What::Checksum(bytes))),
             Kind::Read { of: Open::Log(log), .. } | Kind::Burst { of: Open::Log(log), .. } => {
                 Some((Which::Same(log), What::Data(self.reply.offset)))
             }
-            Kind::Read { of: Open::Held(_), .. } | Kind::Burst { of: Open::Held(_), .. } => None,
+            Kind::Say(_)
+            | Kind::Number(_)
+            | Kind::Checksum { sum: Some(_), .. }
+            | Kind::Read { of: Open::Held(_), .. }
+            | Kind::Burst { of: Open::Held(_), .. } => None,
         }
     }
 
