@@ -17,6 +17,7 @@ mod folders;
 mod hostile_input;
 mod live_server;
 mod memory;
+mod metadata;
 mod noise;
 mod persistence;
 mod power_cut;

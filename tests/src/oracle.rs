@@ -221,6 +221,26 @@ pub fn companion(port: u16) -> Value {
     serde_json::from_str(&said).expect("companion.py prints JSON")
 }
 
+/// Packs a text as the firmware holds it: see `tests/oracle/metadata.py`.
+pub fn pack(text: &Path, into: &Path) {
+    run("metadata.py", &["pack".into(), text.to_owned(), into.to_owned()]);
+}
+
+/// What is packed in a file, by Python's xz.
+pub fn unpack(file: &Path) -> String {
+    run("metadata.py", &["unpack".into(), file.to_owned()])
+}
+
+/// What Mission Planner finds in its file of descriptions.
+pub fn descriptions(file: &Path) -> Value {
+    json(&run("metadata.py", &["words".into(), file.to_owned()]))
+}
+
+/// Fetches the box's component information at this UDP port with pymavlink's FTP into a folder: see `tests/oracle/metadata.py`.
+pub fn metadata(port: u16, folder: &Path) -> Value {
+    json(&ask("metadata.py", &["fetch".into(), port.to_string().into(), folder.to_owned()]))
+}
+
 /// Talks to the box at this UDP port with pymavlink's signing; `state` is what a run leaves for the next one: see
 /// `tests/oracle/signing.py`.
 pub fn signing(port: u16, state: &Path) -> Value {

@@ -104,7 +104,9 @@ impl Release {
         self.build(&["--release", "--package=hums", "--target", WINDOWS_TARGET])?;
         files.push(read("hums.exe", &self.target().join(WINDOWS_TARGET).join("release/hums.exe"))?);
         files.push(self.sbom("hums.exe", "host-tools", &["--target", WINDOWS_TARGET])?);
-        files.push(read("mavproxy_hums.py", &self.tree.join("docs/stations/mavproxy_hums.py"))?);
+        for name in ["mavproxy_hums.py", "hums_texts.lua", "ParameterMetaData.xml"] {
+            files.push(read(name, &self.tree.join("docs/stations").join(name))?);
+        }
         for licence in ["LICENSE-APACHE", "LICENSE-MIT"] {
             files.push(read(licence, &self.tree.join(licence))?);
         }

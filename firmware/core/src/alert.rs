@@ -28,10 +28,17 @@ const FLAGS_AGE: Span = Span::from_secs(5);
 ///
 /// `MAV_SEVERITY_ALERT` is none either: until 3.2, of 2015, `ArduPilot` counted from 1 for low to 4 for critical, and says "Reached
 /// Command #1" with it; since then it has it of a parachute, a fuel cell's states and what developers look for, and PX4's texts never.
+///
+/// Nor what the autopilot only repeats: our own texts, where a script has it send them on to the pilot's radio
+/// (`docs/stations/hums_texts.lua`), and those of others in `ArduPilot`'s log, which marks them (`GCS_MAVLINK::handle_statustext`).
 pub fn of_text(severity: Option<u8>, text: &[u8]) -> Option<Alert> {
     const NOTICE: u8 = 5;
     const WARNING: u8 = 4;
     const ALERT: u8 = 1;
+    const REPEATED: [&[u8]; 3] = [b"HUMS: ", b"SRC=", b"GCS:"];
+    if REPEATED.iter().any(|mark| text.starts_with(mark)) {
+        return None;
+    }
     let severity = severity.filter(|severity| *severity != ALERT);
     if severity.is_some_and(|severity| severity >= NOTICE) {
         return None;

@@ -31,6 +31,7 @@ pub mod monitor;
 pub mod motion;
 pub mod observation;
 mod outputs;
+pub mod param_words;
 pub mod params;
 pub mod protect;
 mod rainflow;

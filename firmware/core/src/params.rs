@@ -19,12 +19,17 @@ pub struct ParamSpec {
 pub struct ParamWords {
     /// The unit of value, default and range.
     pub unit: &'static str,
-    /// What it is, where the default comes from.
+    /// What it is, in a few words; empty where it is the limit of one check, whose name says it ([`crate::param_words`]).
+    pub what: &'static str,
+    /// What its values mean, from 0; empty where they are quantities.
+    pub options: &'static [&'static str],
+    /// More of it, and where the default comes from.
     pub source: &'static str,
 }
 
 macro_rules! params {
-    ($($variant:ident $name:literal $unit:literal $default:literal $min:literal $max:literal $source:literal;)*) => {
+    ($($variant:ident $name:literal $unit:literal $default:literal $min:literal $max:literal $source:literal
+       $(is $what:literal)? $(of $($option:literal)|+)?;)*) => {
         /// A parameter; its number is its index in [`TABLE`].
         #[derive(Clone, Copy, Debug, PartialEq, Eq)]
         #[repr(u8)]
@@ -45,7 +50,12 @@ macro_rules! params {
         ];
 
         /// What people read of all parameters, in the same order.
-        pub const WORDS: &[ParamWords] = &[$(ParamWords { unit: $unit, source: $source },)*];
+        pub const WORDS: &[ParamWords] = &[$(ParamWords {
+            unit: $unit,
+            what: concat!($($what)?),
+            options: &[$($($option,)+)?],
+            source: $source,
+        },)*];
 
         /// The values of all parameters, and which of them are still to be saved.
         #[derive(Clone, Copy, Debug, PartialEq)]
@@ -67,10 +77,10 @@ macro_rules! params {
 params! {
     BatRemWarn "BAT_REM_WARN" "%" 15.0 0.0 100.0 "PX4 commander, COM_LOW_BAT (BAT_LOW_THR 15 %)";
     BatRemCrit "BAT_REM_CRIT" "%" 7.0 0.0 100.0 "PX4 commander, BAT_CRIT_THR 7 %";
-    BatCells "BAT_CELLS" "" 0.0 0.0 24.0 "0: reported, of the autopilot's parameters, or of the voltage at rest where it fits one count only";
+    BatCells "BAT_CELLS" "" 0.0 0.0 24.0 "0: reported, of the autopilot's parameters, or of the voltage at rest where it fits one count only" is "Cells of a battery in series";
     CellVoltWarn "CELL_VOLT_WARN" "V" 3.6 0.0 4.5 "common LiPo practice";
     CellVoltCrit "CELL_VOLT_CRIT" "V" 3.5 0.0 4.5 "common LiPo practice";
-    CellDevWarn "CELL_DEV_WARN" "V" 0.07 0.0 2.0 "AirData: 0.07 V for 10 s";
+    CellDevWarn "CELL_DEV_WARN" "V" 0.07 0.0 2.0 "AirData: 0.07 V for 10 s" is "Battery cell balance: warning above; critical where it lasts for a minute";
     CellDevCrit "CELL_DEV_CRIT" "V" 0.15 0.0 2.0 "AirData: 0.15 V for 10 s";
     BatTempWarn "BAT_TEMP_WARN" "degC" 60.0 0.0 150.0 "battery vendors";
     BatTempCrit "BAT_TEMP_CRIT" "degC" 75.0 0.0 150.0 "battery vendors";
@@ -83,18 +93,18 @@ params! {
     EscTempCrit "ESC_TEMP_CRIT" "degC" 110.0 0.0 200.0 "ESC vendors";
     MotImbalWarn "MOT_IMBAL_WARN" "%" 15.0 1.0 100.0 "LogHat; PX4 imbalanced propeller metric";
     MotImbalCrit "MOT_IMBAL_CRIT" "%" 30.0 1.0 100.0 "LogHat; PX4 imbalanced propeller metric 30";
-    VibeWarn "VIBE_WARN" "m/s2" 30.0 0.0 500.0 "ArduPilot vibration guide";
-    VibeCrit "VIBE_CRIT" "m/s2" 60.0 0.0 500.0 "ArduPilot vibration guide";
-    VibePx4Warn "VIBE_PX4_WARN" "m/s2" 4.905 0.0 500.0 "PX4 Flight Review: accelerometer metric, yellow";
-    VibePx4Crit "VIBE_PX4_CRIT" "m/s2" 9.81 0.0 500.0 "PX4 Flight Review: accelerometer metric, red";
+    VibeWarn "VIBE_WARN" "m/s2" 30.0 0.0 500.0 "ArduPilot vibration guide" is "Vibration of an ArduPilot: warning above";
+    VibeCrit "VIBE_CRIT" "m/s2" 60.0 0.0 500.0 "ArduPilot vibration guide" is "Vibration of an ArduPilot: critical above";
+    VibePx4Warn "VIBE_PX4_WARN" "m/s2" 4.905 0.0 500.0 "PX4 Flight Review: accelerometer metric, yellow" is "Vibration of a PX4: warning above";
+    VibePx4Crit "VIBE_PX4_CRIT" "m/s2" 9.81 0.0 500.0 "PX4 Flight Review: accelerometer metric, red" is "Vibration of a PX4: critical above";
     ClipWarn "CLIP_WARN" "" 10.0 1.0 100_000.0 "samples without ten calm seconds between: one or a few are a gust or a touch";
     ClipCrit "CLIP_CRIT" "" 100.0 1.0 100_000.0 "ArduPilot vibration guide: more than 100";
     LoadFacWarn "LOAD_FAC_WARN" "g" 3.8 1.0 20.0 "by airframe; the limit of CS-23 for the normal category";
     LoadFacCrit "LOAD_FAC_CRIT" "g" 4.4 1.0 20.0 "by airframe; the limit of CS-23 for the utility category";
-    EkfVarWarn "EKF_VAR_WARN" "" 0.8 0.0 10.0 "ArduPilot FS_EKF_THRESH 0.8: above it an innovation is not believed";
+    EkfVarWarn "EKF_VAR_WARN" "" 0.8 0.0 10.0 "ArduPilot FS_EKF_THRESH 0.8: above it an innovation is not believed" is "Estimator variance, that of the compass too: warning above";
     EkfVarCrit "EKF_VAR_CRIT" "" 0.8 0.0 10.0 "ArduPilot FS_EKF_THRESH 0.8 on two of three";
-    EkfRatioWarn "EKF_RATIO_WARN" "" 0.5 0.0 10.0 "PX4 innovation test ratio, half way";
-    EkfRatioCrit "EKF_RATIO_CRIT" "" 1.0 0.0 10.0 "PX4: a ratio above 1 rejects the sensor";
+    EkfRatioWarn "EKF_RATIO_WARN" "" 0.5 0.0 10.0 "PX4 innovation test ratio, half way" is "Estimator test ratio, that of the compass too: warning above";
+    EkfRatioCrit "EKF_RATIO_CRIT" "" 1.0 0.0 10.0 "PX4: a ratio above 1 rejects the sensor" is "Estimator test ratio, that of the compass too: critical above";
     GpsSatsWarn "GPS_SATS_WARN" "" 6.0 0.0 60.0 "PX4 EKF2_REQ_NSATS 6: fewer are not flown with";
     GpsHdopWarn "GPS_HDOP_WARN" "" 2.5 0.0 50.0 "PX4 EKF2_REQ_PDOP 2.5";
     GpsHaccWarn "GPS_HACC_WARN" "m" 3.0 0.0 100.0 "PX4 EKF2_REQ_EPH 3 m";
@@ -110,8 +120,8 @@ params! {
     CpuLoadCrit "CPU_LOAD_CRIT" "%" 95.0 0.0 100.0 "PX4 CPU check";
     McuTempWarn "MCU_TEMP_WARN" "degC" 85.0 0.0 150.0 "PX4; STM32 ambient limit";
     McuTempCrit "MCU_TEMP_CRIT" "degC" 100.0 0.0 150.0 "PX4; STM32 junction limit 105";
-    TiltWarn "TILT_WARN" "deg" 45.0 0.0 180.0 "PX4 failure detector FD_FAIL_R, FD_FAIL_P 60";
-    TiltCrit "TILT_CRIT" "deg" 60.0 0.0 180.0 "PX4 failure detector FD_FAIL_R, FD_FAIL_P 60";
+    TiltWarn "TILT_WARN" "deg" 45.0 0.0 180.0 "PX4 failure detector FD_FAIL_R, FD_FAIL_P 60" is "Roll and pitch angle that is not wanted: warning above";
+    TiltCrit "TILT_CRIT" "deg" 60.0 0.0 180.0 "PX4 failure detector FD_FAIL_R, FD_FAIL_P 60" is "Roll and pitch angle that is not wanted: critical above";
     RecQueueWarn "REC_QUEUE_WARN" "%" 50.0 0.0 100.0 "half of what a standing card may fill";
     RecQueueCrit "REC_QUEUE_CRIT" "%" 90.0 0.0 100.0 "frames are lost next";
     RecStopWarn "REC_STOP_WARN" "" 0.5 0.0 3.0 "1: not recording";
@@ -125,9 +135,9 @@ params! {
     EngEgtCrit "ENG_EGT_CRIT" "degC" 2000.0 0.0 2000.0 "by engine; off until set";
     EngFuelWarn "ENG_FUEL_WARN" "hPa" 0.0 0.0 20_000.0 "by engine; off until set";
     EngFuelCrit "ENG_FUEL_CRIT" "hPa" 0.0 0.0 20_000.0 "by engine; off until set";
-    GpsJamWarn "GPS_JAM_WARN" "" 1.5 0.0 4.0 "GNSS_INTEGRITY: 2 is mitigated";
-    GpsJamCrit "GPS_JAM_CRIT" "" 2.5 0.0 4.0 "GNSS_INTEGRITY: 3 is detected";
-    Latch "HEALTH_LATCH" "" 0.0 0.0 1.0 "1: a warning stays until the vehicle disarms";
+    GpsJamWarn "GPS_JAM_WARN" "" 1.5 0.0 4.0 "GNSS_INTEGRITY: 2 is mitigated" is "GPS jamming and spoofing: warning above this state";
+    GpsJamCrit "GPS_JAM_CRIT" "" 2.5 0.0 4.0 "GNSS_INTEGRITY: 3 is detected" is "GPS jamming and spoofing: critical above this state";
+    Latch "HEALTH_LATCH" "" 0.0 0.0 1.0 "no: a warning ends when its value is good again" is "Warnings stay until the vehicle disarms" of "no" | "yes";
     BatResWarn "BAT_RES_WARN" "%" 30.0 0.0 1000.0 "LogHat: internal resistance above its baseline";
     BatResCrit "BAT_RES_CRIT" "%" 60.0 0.0 1000.0 "LogHat: internal resistance above its baseline";
     BatFaultWarn "BAT_FAULT_WARN" "" 0.5 0.0 32.0 "any MAV_BATTERY_FAULT bit";
@@ -136,87 +146,87 @@ params! {
     RadioRssiWarn "RADIO_RSSI_WARN" "" 0.0 0.0 254.0 "device scale; 0 is off";
     RebootCrit "AP_REBOOT_CRIT" "" 0.5 0.0 100.0 "1: the autopilot restarted within 30 s";
     StateCrit "AP_STATE_CRIT" "" 4.5 0.0 10.0 "MAV_STATE: 5 is critical, 6 emergency";
-    AlertWarn "AP_ALERT_WARN" "" 0.5 0.0 3.0 "1: the autopilot says that something is wrong";
-    AlertCrit "AP_ALERT_CRIT" "" 1.5 0.0 3.0 "2: what it says is one to act on at once";
-    HardLanding "HARD_LANDING" "m/s" 2.0 0.1 20.0 "four times ArduPilot's LAND_SPEED of 0.5 m/s";
-    BatCapacity "BAT_CAPACITY" "Ah" 0.0 0.0 1000.0 "of all batteries together, for counting cycles; 0: as the autopilot has it (BATT_CAPACITY, BAT1_CAPACITY)";
-    GsBudget "GS_BUDGET" "B/s" 2000.0 100.0 5000.0 "a 57,600 baud radio shared with its own overhead";
+    AlertWarn "AP_ALERT_WARN" "" 0.5 0.0 3.0 "1: the autopilot says that something is wrong" is "What the autopilot says is wrong: warning above this state";
+    AlertCrit "AP_ALERT_CRIT" "" 1.5 0.0 3.0 "2: what it says is one to act on at once" is "What the autopilot says is wrong: critical above this state";
+    HardLanding "HARD_LANDING" "m/s" 2.0 0.1 20.0 "four times ArduPilot's LAND_SPEED of 0.5 m/s" is "Sink rate from which a landing counts as hard";
+    BatCapacity "BAT_CAPACITY" "Ah" 0.0 0.0 1000.0 "of all batteries together, for counting cycles; 0: as the autopilot has it (BATT_CAPACITY, BAT1_CAPACITY)" is "Capacity of all batteries together";
+    GsBudget "GS_BUDGET" "B/s" 2000.0 100.0 5000.0 "a 57,600 baud radio shared with its own overhead" is "Most that is sent to the ground station in a second";
     TrdVibeWarn "TRD_VIBE_WARN" "%" 30.0 0.0 10_000.0 "steady vibration above or below its baseline, of real cut propellers 35 below; off from 10,000";
     TrdVibeCrit "TRD_VIBE_CRIT" "%" 150.0 0.0 10_000.0 "steady vibration above or below its baseline";
-    TrdThrWarn "TRD_THR_WARN" "%" 3.0 0.0 10_000.0 "hover throttle above its baseline: heavier, or less thrust; real propellers cut by 10 mm and more 10 to 20, by 5 mm 2 to 4";
-    TrdThrCrit "TRD_THR_CRIT" "%" 20.0 0.0 10_000.0 "hover throttle above its baseline";
+    TrdThrWarn "TRD_THR_WARN" "%" 3.0 0.0 10_000.0 "hover throttle above its baseline: heavier, or less thrust; real propellers cut by 10 mm and more 10 to 20, by 5 mm 2 to 4" is "Hover throttle and power against earlier flights: warning above";
+    TrdThrCrit "TRD_THR_CRIT" "%" 20.0 0.0 10_000.0 "hover throttle above its baseline" is "Hover throttle and power against earlier flights: critical above";
     TrdEscWarn "TRD_ESC_WARN" "%" 5.0 0.0 100.0 "LogHat: a motor's speed against the others, from its baseline";
     TrdEscCrit "TRD_ESC_CRIT" "%" 15.0 0.0 100.0 "a motor's speed against the others, from its baseline";
-    ProtAction "PROT_ACTION" "" 0.0 0.0 2.0 "0 none, 1 return (MAV_CMD 20), 2 land (MAV_CMD 21)";
-    ProtCheck "PROT_CHECK" "" 0.0 0.0 9.0 "0 empty battery; 1 power, 2 propulsion, 3 engine, 4 structure, 5 navigation, 6 link, 7 computer, 8 attitude, 9 recorder: any check";
-    ProtDelay "PROT_DELAY" "s" 10.0 0.0 120.0 "the time in which the pilot can cancel";
+    ProtAction "PROT_ACTION" "" 0.0 0.0 2.0 "MAV_CMD 20 and 21, announced first; see docs/safety.md" is "What the autopilot is asked to do by itself" of "nothing" | "return" | "land";
+    ProtCheck "PROT_CHECK" "" 0.0 0.0 9.0 "any check of the subsystem, but for 0" is "What a critical finding must be of, to ask for it" of "empty battery" | "power" | "propulsion" | "engine" | "structure" | "navigation" | "link" | "computer" | "attitude" | "recorder";
+    ProtDelay "PROT_DELAY" "s" 10.0 0.0 120.0 "the time in which the pilot can cancel" is "Time from the announcement to the request";
     RecStallWarn "REC_STALL_WARN" "ms" 500.0 0.0 60_000.0 "SD cards: 250 ms are allowed, 2.5 s were seen (PX4#15596)";
     RecStallCrit "REC_STALL_CRIT" "ms" 2_500.0 0.0 60_000.0 "the queue lasts for so long at full rate";
     RecErrWarn "REC_ERR_WARN" "" 0.5 0.0 1_000_000.0 "any block write that the card refused in the last ten seconds";
     RecRoomWarn "REC_ROOM_WARN" "%" 10.0 0.0 100.0 "of the card are left for logs: other files fill it";
     RecRoomCrit "REC_ROOM_CRIT" "%" 1.0 0.0 100.0 "of the card are left for logs: other files fill it";
-    CompYellow "CMP_YELLOW" "%" 90.0 1.0 1000.0 "of the limit that trips first: soon due";
-    CompRed "CMP_RED" "%" 100.0 1.0 1000.0 "of the limit that trips first: due";
-    Cmp1Kind "CMP1_KIND" "" 0.0 0.0 8.0 "0 none, 1 airframe, 2 battery, 3 motor, 4 propeller, 5 ESC, 6 card, 7 engine, 8 other";
-    Cmp1Number "CMP1_NUMBER" "" 0.0 0.0 12.0 "which battery or motor, from 1; 0: all";
-    Cmp1Hours "CMP1_HOURS" "h" 0.0 0.0 100_000.0 "limit of hours in the air (card, other: powered); 0: none";
-    Cmp1Flights "CMP1_FLIGHTS" "" 0.0 0.0 1_000_000.0 "limit of flights; 0: none";
-    Cmp1Cycles "CMP1_CYCLES" "" 0.0 0.0 100_000.0 "limit of full battery discharges; 0: none";
-    Cmp1MotorHours "CMP1_MOT_HOURS" "h" 0.0 0.0 100_000.0 "limit of hours that the motor turned; 0: none";
-    Cmp2Kind "CMP2_KIND" "" 0.0 0.0 8.0 "0 none, 1 airframe, 2 battery, 3 motor, 4 propeller, 5 ESC, 6 card, 7 engine, 8 other";
-    Cmp2Number "CMP2_NUMBER" "" 0.0 0.0 12.0 "which battery or motor, from 1; 0: all";
-    Cmp2Hours "CMP2_HOURS" "h" 0.0 0.0 100_000.0 "limit of hours in the air (card, other: powered); 0: none";
-    Cmp2Flights "CMP2_FLIGHTS" "" 0.0 0.0 1_000_000.0 "limit of flights; 0: none";
-    Cmp2Cycles "CMP2_CYCLES" "" 0.0 0.0 100_000.0 "limit of full battery discharges; 0: none";
-    Cmp2MotorHours "CMP2_MOT_HOURS" "h" 0.0 0.0 100_000.0 "limit of hours that the motor turned; 0: none";
-    Cmp3Kind "CMP3_KIND" "" 0.0 0.0 8.0 "0 none, 1 airframe, 2 battery, 3 motor, 4 propeller, 5 ESC, 6 card, 7 engine, 8 other";
-    Cmp3Number "CMP3_NUMBER" "" 0.0 0.0 12.0 "which battery or motor, from 1; 0: all";
-    Cmp3Hours "CMP3_HOURS" "h" 0.0 0.0 100_000.0 "limit of hours in the air (card, other: powered); 0: none";
-    Cmp3Flights "CMP3_FLIGHTS" "" 0.0 0.0 1_000_000.0 "limit of flights; 0: none";
-    Cmp3Cycles "CMP3_CYCLES" "" 0.0 0.0 100_000.0 "limit of full battery discharges; 0: none";
-    Cmp3MotorHours "CMP3_MOT_HOURS" "h" 0.0 0.0 100_000.0 "limit of hours that the motor turned; 0: none";
-    Cmp4Kind "CMP4_KIND" "" 0.0 0.0 8.0 "0 none, 1 airframe, 2 battery, 3 motor, 4 propeller, 5 ESC, 6 card, 7 engine, 8 other";
-    Cmp4Number "CMP4_NUMBER" "" 0.0 0.0 12.0 "which battery or motor, from 1; 0: all";
-    Cmp4Hours "CMP4_HOURS" "h" 0.0 0.0 100_000.0 "limit of hours in the air (card, other: powered); 0: none";
-    Cmp4Flights "CMP4_FLIGHTS" "" 0.0 0.0 1_000_000.0 "limit of flights; 0: none";
-    Cmp4Cycles "CMP4_CYCLES" "" 0.0 0.0 100_000.0 "limit of full battery discharges; 0: none";
-    Cmp4MotorHours "CMP4_MOT_HOURS" "h" 0.0 0.0 100_000.0 "limit of hours that the motor turned; 0: none";
-    Cmp5Kind "CMP5_KIND" "" 0.0 0.0 8.0 "0 none, 1 airframe, 2 battery, 3 motor, 4 propeller, 5 ESC, 6 card, 7 engine, 8 other";
-    Cmp5Number "CMP5_NUMBER" "" 0.0 0.0 12.0 "which battery or motor, from 1; 0: all";
-    Cmp5Hours "CMP5_HOURS" "h" 0.0 0.0 100_000.0 "limit of hours in the air (card, other: powered); 0: none";
-    Cmp5Flights "CMP5_FLIGHTS" "" 0.0 0.0 1_000_000.0 "limit of flights; 0: none";
-    Cmp5Cycles "CMP5_CYCLES" "" 0.0 0.0 100_000.0 "limit of full battery discharges; 0: none";
-    Cmp5MotorHours "CMP5_MOT_HOURS" "h" 0.0 0.0 100_000.0 "limit of hours that the motor turned; 0: none";
-    Cmp6Kind "CMP6_KIND" "" 0.0 0.0 8.0 "0 none, 1 airframe, 2 battery, 3 motor, 4 propeller, 5 ESC, 6 card, 7 engine, 8 other";
-    Cmp6Number "CMP6_NUMBER" "" 0.0 0.0 12.0 "which battery or motor, from 1; 0: all";
-    Cmp6Hours "CMP6_HOURS" "h" 0.0 0.0 100_000.0 "limit of hours in the air (card, other: powered); 0: none";
-    Cmp6Flights "CMP6_FLIGHTS" "" 0.0 0.0 1_000_000.0 "limit of flights; 0: none";
-    Cmp6Cycles "CMP6_CYCLES" "" 0.0 0.0 100_000.0 "limit of full battery discharges; 0: none";
-    Cmp6MotorHours "CMP6_MOT_HOURS" "h" 0.0 0.0 100_000.0 "limit of hours that the motor turned; 0: none";
-    Cmp7Kind "CMP7_KIND" "" 0.0 0.0 8.0 "0 none, 1 airframe, 2 battery, 3 motor, 4 propeller, 5 ESC, 6 card, 7 engine, 8 other";
-    Cmp7Number "CMP7_NUMBER" "" 0.0 0.0 12.0 "which battery or motor, from 1; 0: all";
-    Cmp7Hours "CMP7_HOURS" "h" 0.0 0.0 100_000.0 "limit of hours in the air (card, other: powered); 0: none";
-    Cmp7Flights "CMP7_FLIGHTS" "" 0.0 0.0 1_000_000.0 "limit of flights; 0: none";
-    Cmp7Cycles "CMP7_CYCLES" "" 0.0 0.0 100_000.0 "limit of full battery discharges; 0: none";
-    Cmp7MotorHours "CMP7_MOT_HOURS" "h" 0.0 0.0 100_000.0 "limit of hours that the motor turned; 0: none";
-    Cmp8Kind "CMP8_KIND" "" 0.0 0.0 8.0 "0 none, 1 airframe, 2 battery, 3 motor, 4 propeller, 5 ESC, 6 card, 7 engine, 8 other";
-    Cmp8Number "CMP8_NUMBER" "" 0.0 0.0 12.0 "which battery or motor, from 1; 0: all";
-    Cmp8Hours "CMP8_HOURS" "h" 0.0 0.0 100_000.0 "limit of hours in the air (card, other: powered); 0: none";
-    Cmp8Flights "CMP8_FLIGHTS" "" 0.0 0.0 1_000_000.0 "limit of flights; 0: none";
-    Cmp8Cycles "CMP8_CYCLES" "" 0.0 0.0 100_000.0 "limit of full battery discharges; 0: none";
-    Cmp8MotorHours "CMP8_MOT_HOURS" "h" 0.0 0.0 100_000.0 "limit of hours that the motor turned; 0: none";
-    GsPath "GS_PATH" "" 1.0 0.0 2.0 "0: no summary, 1: a radio at the GS port, 2: through the autopilot";
-    GsBaud "GS_BAUD" "baud" 57_600.0 9_600.0 921_600.0 "what SiK radios come with";
-    GsPass "GS_PASS" "" 0.0 0.0 1.0 "1: what is not for us passes between ground station and autopilot";
-    GsSign "GS_SIGN" "" 0.0 0.0 2.0 "with a key, 1: our frames are signed, 2: and whatever is asked unsigned is refused";
-    ApBaud "AP_BAUD" "baud" 921_600.0 9_600.0 921_600.0 "PX4 TELEM2, ArduPilot SERIAL2 for companions";
-    ApBudget "AP_BUDGET" "B/s" 2000.0 100.0 10_000.0 "what we send to the autopilot, answers it carries on included";
-    ApStreams "AP_STREAMS" "" 1.0 0.0 1.0 "1: ask the autopilot for the messages that the checks need";
-    ApSign "AP_SIGN" "" 0.0 0.0 2.0 "as GS_SIGN, for what comes through the autopilot";
-    SignPort "SIGN_PORT" "" 0.0 0.0 2.0 "the port that may bring a key: 0 none, 1 the ground station's, 2 the autopilot's";
-    RecMode "REC_MODE" "" 0.0 0.0 1.0 "as PX4 SDLOG_MODE and ArduPilot LOG_DISARMED: 0 from power-on, 1 by arming";
-    RecBefore "REC_BEFORE" "s" 30.0 5.0 120.0 "by arming: what is kept of the time before";
-    RecAfter "REC_AFTER" "s" 15.0 0.0 600.0 "by arming: ArduPilot records 15 s on after disarming (HAL_LOGGER_ARM_PERSIST)";
+    CompYellow "CMP_YELLOW" "%" 90.0 1.0 1000.0 "of the limit that trips first: soon due" is "A part's life used: warning above";
+    CompRed "CMP_RED" "%" 100.0 1.0 1000.0 "of the limit that trips first: due" is "A part's life used: critical above";
+    Cmp1Kind "CMP1_KIND" "" 0.0 0.0 8.0 "docs/usage.md" is "Part 1: kind" of "none" | "airframe" | "battery" | "motor" | "propeller" | "ESC" | "card" | "engine" | "other";
+    Cmp1Number "CMP1_NUMBER" "" 0.0 0.0 12.0 "which battery or motor, from 1; 0: all" is "Part 1: number";
+    Cmp1Hours "CMP1_HOURS" "h" 0.0 0.0 100_000.0 "limit of hours in the air (card, other: powered); 0: none" is "Part 1: life in hours";
+    Cmp1Flights "CMP1_FLIGHTS" "" 0.0 0.0 1_000_000.0 "limit of flights; 0: none" is "Part 1: life in flights";
+    Cmp1Cycles "CMP1_CYCLES" "" 0.0 0.0 100_000.0 "limit of full battery discharges; 0: none" is "Part 1: life in battery cycles";
+    Cmp1MotorHours "CMP1_MOT_HOURS" "h" 0.0 0.0 100_000.0 "limit of hours that the motor turned; 0: none" is "Part 1: life in motor hours";
+    Cmp2Kind "CMP2_KIND" "" 0.0 0.0 8.0 "docs/usage.md" is "Part 2: kind" of "none" | "airframe" | "battery" | "motor" | "propeller" | "ESC" | "card" | "engine" | "other";
+    Cmp2Number "CMP2_NUMBER" "" 0.0 0.0 12.0 "which battery or motor, from 1; 0: all" is "Part 2: number";
+    Cmp2Hours "CMP2_HOURS" "h" 0.0 0.0 100_000.0 "limit of hours in the air (card, other: powered); 0: none" is "Part 2: life in hours";
+    Cmp2Flights "CMP2_FLIGHTS" "" 0.0 0.0 1_000_000.0 "limit of flights; 0: none" is "Part 2: life in flights";
+    Cmp2Cycles "CMP2_CYCLES" "" 0.0 0.0 100_000.0 "limit of full battery discharges; 0: none" is "Part 2: life in battery cycles";
+    Cmp2MotorHours "CMP2_MOT_HOURS" "h" 0.0 0.0 100_000.0 "limit of hours that the motor turned; 0: none" is "Part 2: life in motor hours";
+    Cmp3Kind "CMP3_KIND" "" 0.0 0.0 8.0 "docs/usage.md" is "Part 3: kind" of "none" | "airframe" | "battery" | "motor" | "propeller" | "ESC" | "card" | "engine" | "other";
+    Cmp3Number "CMP3_NUMBER" "" 0.0 0.0 12.0 "which battery or motor, from 1; 0: all" is "Part 3: number";
+    Cmp3Hours "CMP3_HOURS" "h" 0.0 0.0 100_000.0 "limit of hours in the air (card, other: powered); 0: none" is "Part 3: life in hours";
+    Cmp3Flights "CMP3_FLIGHTS" "" 0.0 0.0 1_000_000.0 "limit of flights; 0: none" is "Part 3: life in flights";
+    Cmp3Cycles "CMP3_CYCLES" "" 0.0 0.0 100_000.0 "limit of full battery discharges; 0: none" is "Part 3: life in battery cycles";
+    Cmp3MotorHours "CMP3_MOT_HOURS" "h" 0.0 0.0 100_000.0 "limit of hours that the motor turned; 0: none" is "Part 3: life in motor hours";
+    Cmp4Kind "CMP4_KIND" "" 0.0 0.0 8.0 "docs/usage.md" is "Part 4: kind" of "none" | "airframe" | "battery" | "motor" | "propeller" | "ESC" | "card" | "engine" | "other";
+    Cmp4Number "CMP4_NUMBER" "" 0.0 0.0 12.0 "which battery or motor, from 1; 0: all" is "Part 4: number";
+    Cmp4Hours "CMP4_HOURS" "h" 0.0 0.0 100_000.0 "limit of hours in the air (card, other: powered); 0: none" is "Part 4: life in hours";
+    Cmp4Flights "CMP4_FLIGHTS" "" 0.0 0.0 1_000_000.0 "limit of flights; 0: none" is "Part 4: life in flights";
+    Cmp4Cycles "CMP4_CYCLES" "" 0.0 0.0 100_000.0 "limit of full battery discharges; 0: none" is "Part 4: life in battery cycles";
+    Cmp4MotorHours "CMP4_MOT_HOURS" "h" 0.0 0.0 100_000.0 "limit of hours that the motor turned; 0: none" is "Part 4: life in motor hours";
+    Cmp5Kind "CMP5_KIND" "" 0.0 0.0 8.0 "docs/usage.md" is "Part 5: kind" of "none" | "airframe" | "battery" | "motor" | "propeller" | "ESC" | "card" | "engine" | "other";
+    Cmp5Number "CMP5_NUMBER" "" 0.0 0.0 12.0 "which battery or motor, from 1; 0: all" is "Part 5: number";
+    Cmp5Hours "CMP5_HOURS" "h" 0.0 0.0 100_000.0 "limit of hours in the air (card, other: powered); 0: none" is "Part 5: life in hours";
+    Cmp5Flights "CMP5_FLIGHTS" "" 0.0 0.0 1_000_000.0 "limit of flights; 0: none" is "Part 5: life in flights";
+    Cmp5Cycles "CMP5_CYCLES" "" 0.0 0.0 100_000.0 "limit of full battery discharges; 0: none" is "Part 5: life in battery cycles";
+    Cmp5MotorHours "CMP5_MOT_HOURS" "h" 0.0 0.0 100_000.0 "limit of hours that the motor turned; 0: none" is "Part 5: life in motor hours";
+    Cmp6Kind "CMP6_KIND" "" 0.0 0.0 8.0 "docs/usage.md" is "Part 6: kind" of "none" | "airframe" | "battery" | "motor" | "propeller" | "ESC" | "card" | "engine" | "other";
+    Cmp6Number "CMP6_NUMBER" "" 0.0 0.0 12.0 "which battery or motor, from 1; 0: all" is "Part 6: number";
+    Cmp6Hours "CMP6_HOURS" "h" 0.0 0.0 100_000.0 "limit of hours in the air (card, other: powered); 0: none" is "Part 6: life in hours";
+    Cmp6Flights "CMP6_FLIGHTS" "" 0.0 0.0 1_000_000.0 "limit of flights; 0: none" is "Part 6: life in flights";
+    Cmp6Cycles "CMP6_CYCLES" "" 0.0 0.0 100_000.0 "limit of full battery discharges; 0: none" is "Part 6: life in battery cycles";
+    Cmp6MotorHours "CMP6_MOT_HOURS" "h" 0.0 0.0 100_000.0 "limit of hours that the motor turned; 0: none" is "Part 6: life in motor hours";
+    Cmp7Kind "CMP7_KIND" "" 0.0 0.0 8.0 "docs/usage.md" is "Part 7: kind" of "none" | "airframe" | "battery" | "motor" | "propeller" | "ESC" | "card" | "engine" | "other";
+    Cmp7Number "CMP7_NUMBER" "" 0.0 0.0 12.0 "which battery or motor, from 1; 0: all" is "Part 7: number";
+    Cmp7Hours "CMP7_HOURS" "h" 0.0 0.0 100_000.0 "limit of hours in the air (card, other: powered); 0: none" is "Part 7: life in hours";
+    Cmp7Flights "CMP7_FLIGHTS" "" 0.0 0.0 1_000_000.0 "limit of flights; 0: none" is "Part 7: life in flights";
+    Cmp7Cycles "CMP7_CYCLES" "" 0.0 0.0 100_000.0 "limit of full battery discharges; 0: none" is "Part 7: life in battery cycles";
+    Cmp7MotorHours "CMP7_MOT_HOURS" "h" 0.0 0.0 100_000.0 "limit of hours that the motor turned; 0: none" is "Part 7: life in motor hours";
+    Cmp8Kind "CMP8_KIND" "" 0.0 0.0 8.0 "docs/usage.md" is "Part 8: kind" of "none" | "airframe" | "battery" | "motor" | "propeller" | "ESC" | "card" | "engine" | "other";
+    Cmp8Number "CMP8_NUMBER" "" 0.0 0.0 12.0 "which battery or motor, from 1; 0: all" is "Part 8: number";
+    Cmp8Hours "CMP8_HOURS" "h" 0.0 0.0 100_000.0 "limit of hours in the air (card, other: powered); 0: none" is "Part 8: life in hours";
+    Cmp8Flights "CMP8_FLIGHTS" "" 0.0 0.0 1_000_000.0 "limit of flights; 0: none" is "Part 8: life in flights";
+    Cmp8Cycles "CMP8_CYCLES" "" 0.0 0.0 100_000.0 "limit of full battery discharges; 0: none" is "Part 8: life in battery cycles";
+    Cmp8MotorHours "CMP8_MOT_HOURS" "h" 0.0 0.0 100_000.0 "limit of hours that the motor turned; 0: none" is "Part 8: life in motor hours";
+    GsPath "GS_PATH" "" 1.0 0.0 2.0 "docs/companion.md" is "Where the summary for the ground station goes" of "nowhere" | "radio at the box" | "through the autopilot";
+    GsBaud "GS_BAUD" "baud" 57_600.0 9_600.0 921_600.0 "what SiK radios come with" is "Rate of the ground station's port";
+    GsPass "GS_PASS" "" 0.0 0.0 1.0 "what is not for us passes between ground station and autopilot" is "The radio serves the autopilot too" of "no" | "yes";
+    GsSign "GS_SIGN" "" 0.0 0.0 2.0 "counts once there is a key" is "Signing at the ground station's port" of "no" | "our frames are signed" | "and unsigned requests are refused";
+    ApBaud "AP_BAUD" "baud" 921_600.0 9_600.0 921_600.0 "PX4 TELEM2, ArduPilot SERIAL2 for companions" is "Rate of the autopilot's port";
+    ApBudget "AP_BUDGET" "B/s" 2000.0 100.0 10_000.0 "what we send to the autopilot, answers it carries on included" is "Most that is sent to the autopilot in a second";
+    ApStreams "AP_STREAMS" "" 1.0 0.0 1.0 "SET_MESSAGE_INTERVAL, REQUEST_DATA_STREAM" is "The autopilot is asked for what the checks need" of "no" | "yes";
+    ApSign "AP_SIGN" "" 0.0 0.0 2.0 "as GS_SIGN, for what comes through the autopilot" is "Signing at the autopilot's port" of "no" | "our frames are signed" | "and unsigned requests are refused";
+    SignPort "SIGN_PORT" "" 0.0 0.0 2.0 "docs/companion.md" is "The port that may bring a key" of "none" | "ground station's" | "autopilot's";
+    RecMode "REC_MODE" "" 0.0 0.0 1.0 "as PX4 SDLOG_MODE and ArduPilot LOG_DISARMED" is "When is recorded" of "from power-on" | "by arming";
+    RecBefore "REC_BEFORE" "s" 30.0 5.0 120.0 "by arming: what is kept of the time before" is "Recording by arming: time before it that is kept";
+    RecAfter "REC_AFTER" "s" 15.0 0.0 600.0 "by arming: ArduPilot records 15 s on after disarming (HAL_LOGGER_ARM_PERSIST)" is "Recording by arming: time after disarming";
     MisFallTime "MIS_FALL_TIME" "s" 0.3 0.1 5.0 "a fall of half a metre, below 0.3 g";
     MisImpact "MIS_IMPACT" "g" 3.0 1.5 50.0 "a shock; landings at 2 m/s and less stay below";
     MisTumble "MIS_TUMBLE" "deg/s" 300.0 60.0 3000.0 "above the rates that angle modes fly with (PX4 220, ArduPilot 200)";
@@ -232,16 +242,16 @@ params! {
     VibeRiseWarn "VIBE_RISE_WARN" "" 2.2 1.1 1000.0 "times what is usual in this flight, in hover";
     MotOutWarn "MOT_OUT_WARN" "%" 8.0 1.0 1000.0 "a motor's output alone above its usual share and what it varies by; healthy flights stay below 7";
     MotOutCrit "MOT_OUT_CRIT" "%" 35.0 1.0 1000.0 "a motor's output alone above its usual share: it gives two thirds of its thrust";
-    StuckWarn "SENS_STUCK_WARN" "s" 1.0 0.3 1000.0 "a sensor repeats one value in flight, four times as long as it ever did before in it";
+    StuckWarn "SENS_STUCK_WARN" "s" 1.0 0.3 1000.0 "a sensor repeats one value in flight, four times as long as it ever did before in it" is "A sensor repeats one value: warning after";
     BaroGpsWarn "BARO_GPS_WARN" "m" 8.0 1.0 10_000.0 "barometer and GPS height apart beyond usual, a tenth of the climb and half of the dynamic pressure";
     BaroNoiseWarn "BARO_NOISE_WARN" "m" 2.0 0.2 10_000.0 "steps of the barometer's height beyond usual; noise of barometers is 0.1 to 0.3 (data sheets)";
-    RateWarn "RATE_MISS_WARN" "deg/s" 30.0 5.0 1000.0 "body rate that is wanted and missing, over a second; healthy flights reach 12";
-    RateCrit "RATE_MISS_CRIT" "deg/s" 60.0 5.0 1000.0 "body rate that is wanted and missing, over a second";
+    RateWarn "RATE_MISS_WARN" "deg/s" 30.0 5.0 1000.0 "body rate that is wanted and missing, over a second; healthy flights reach 12" is "Roll and pitch rate that are wanted and missing: warning above";
+    RateCrit "RATE_MISS_CRIT" "deg/s" 60.0 5.0 1000.0 "body rate that is wanted and missing, over a second" is "Roll and pitch rate that are wanted and missing: critical above";
     ThrustWarn "THRUST_WARN" "s" 2.0 0.5 1000.0 "full throttle without a climb; ArduPilot warns of thrust loss after 1 s, and looks at the attitude too";
     EkfClimbWarn "EKF_CLIMB_WARN" "m/s" 8.0 0.5 1000.0 "estimator's climb against the barometer's, over a second; up to 6.6 in healthy real flights";
     EkfClimbCrit "EKF_CLIMB_CRIT" "m/s" 12.0 0.5 1000.0 "estimator's climb against the barometer's, over a second; 14 and 24 where height control ran away";
     GpsSpeedWarn "GPS_SPEED_WARN" "m/s" 1.0 0.1 1000.0 "a receiver's speed against the way between its positions, over four seconds";
-    TrdFalse "TRD_FALSE" "flights" 400.0 20.0 100_000.0 "of flights in which nothing changed, one in so many is told by a trend: rarer is told later; beside it the trends' limits are what is worth a word";
+    TrdFalse "TRD_FALSE" "flights" 400.0 20.0 100_000.0 "of flights in which nothing changed, one in so many is told by a trend: rarer is told later; beside it the trends' limits are what is worth a word" is "Flights for one false word of a trend";
     TrdCapWarn "TRD_CAP_WARN" "%" 20.0 0.0 100.0 "battery capacity below its baseline; cells are called worn out at 80 % of their capacity";
     TrdCapCrit "TRD_CAP_CRIT" "%" 40.0 0.0 100.0 "battery capacity below its baseline";
 }

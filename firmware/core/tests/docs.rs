@@ -9,7 +9,8 @@ use std::path::PathBuf;
 
 use hums_core::exposure;
 use hums_core::health::{Check, Said, Side, VOCABULARY, When, checks};
-use hums_core::params::{Param, Params, TABLE, WORDS};
+use hums_core::param_words;
+use hums_core::params::{Param, Params, TABLE};
 use hums_core::time::Span;
 use hums_core::usage::UsageCounter;
 
@@ -231,18 +232,54 @@ fn number(value: f32) -> String {
 fn the_parameters_are_documented_as_they_are() {
     let mut text = "# Parameters\n\n\
         Made from the table in `firmware/core/src/params.rs` by `firmware/core/tests/docs.rs`. Set by `hums sim --params FILE`, by a\n\
-        ground station over MAVLink, and kept over power-off. A change is recorded with who made it and applies at once.\n\n\
-        | name | unit | default | range | what it is, where the default comes from |\n|---|---|---|---|---|\n"
+        ground station over MAVLink, and kept over power-off. A change is recorded with who made it and applies at once. Ground stations get\n\
+        these words from the box, or from a file: [companion.md](companion.md#settings-in-words).\n\n\
+        | name | unit | default | range | what it is | more, and where the default comes from |\n|---|---|---|---|---|---|\n"
         .to_owned();
-    for (spec, words) in TABLE.iter().zip(WORDS) {
-        let (unit, default) = (words.unit, number(spec.default));
+    for param in Param::ALL {
+        let (spec, words) = (param.spec(), param.words());
+        let (unit, default, what) = (words.unit, number(spec.default), param_words::short(param));
+        let options = words.options.iter().enumerate().map(|(number, option)| format!("{number} {option}"));
+        let options = options.collect::<Vec<_>>().join(", ");
+        let options = if options.is_empty() { options } else { format!(": {options}") };
         let _ = writeln!(
             text,
-            "| {} | {unit} | {default} | {} to {} | {} |",
+            "| {} | {unit} | {default} | {} to {} | {what}{options} | {} |",
             spec.name, spec.min, spec.max, words.source
         );
     }
     assert_is("parameters.md", &text);
+}
+
+/// The file that Mission Planner reads descriptions of parameters from that it knows no other of, in its own terms. It takes a component
+/// that is no autopilot for an `ArduCopter2`.
+#[test]
+fn mission_planner_gets_the_words_of_every_parameter() {
+    let mut text = "<?xml version=\"1.0\" encoding=\"utf-8\"?>\n\
+        <!-- Made by firmware/core/tests/docs.rs. Where it goes: docs/companion.md. -->\n<Params>\n  <ArduCopter2>\n"
+        .to_owned();
+    for param in Param::ALL {
+        let (spec, words) = (param.spec(), param.words());
+        let _ = writeln!(text, "    <{}>", spec.name);
+        let mut say = |element: &str, value: &dyn std::fmt::Display| {
+            let value = value.to_string().replace('&', "&amp;").replace('<', "&lt;");
+            if !value.is_empty() {
+                let _ = writeln!(text, "      <{element}>{value}</{element}>");
+            }
+        };
+        say("DisplayName", &param_words::short(param));
+        let meaning = param_words::meaning(param).map_or_else(String::new, |meaning| format!("{meaning} "));
+        let (more, default) = (param_words::long(param), number(spec.default));
+        say("Description", &format!("{meaning}{more} Default: {default}."));
+        say("Units", &words.unit);
+        say("Range", &format!("{} {}", spec.min, spec.max));
+        let options = words.options.iter().enumerate().map(|(number, option)| format!("{number}:{option}"));
+        say("Values", &options.collect::<Vec<_>>().join(","));
+        say("RebootRequired", &"False");
+        let _ = writeln!(text, "    </{}>", spec.name);
+    }
+    text += "  </ArduCopter2>\n</Params>\n";
+    assert_is("stations/ParameterMetaData.xml", &text);
 }
 
 fn limit(param: Option<Param>) -> String {

@@ -17,7 +17,7 @@ pub const BURST: u8 = 15;
 
 /// The CRC-32 that MAVLink FTP means by `CalcFileCRC32`: the polynomial of Ethernet, reflected, but from 0 and without a
 /// final inversion, as PX4 (`crc32part` with 0) and `ArduPilot` (`crc_crc32` with 0) compute it. Bit by bit: a table is 1 KiB for what is seldom asked.
-static CRC: Crc<u32, NoTable> = Crc::<u32, NoTable>::new(&Algorithm {
+const CRC: Crc<u32, NoTable> = Crc::<u32, NoTable>::new(&Algorithm {
     width: 32,
     poly: 0x04c1_1db7,
     init: 0,
@@ -27,6 +27,11 @@ static CRC: Crc<u32, NoTable> = Crc::<u32, NoTable>::new(&Algorithm {
     check: 0x2dfd_2d88,
     residue: 0,
 });
+
+/// The checksum of a whole file that is known when the program is built.
+pub const fn checksum_of(file: &[u8]) -> u32 {
+    CRC.checksum(file)
+}
 
 /// The checksum of a file of which `before` is that of what comes before `bytes`; 0 where nothing does.
 pub fn checksum(before: u32, bytes: &[u8]) -> u32 {
@@ -184,6 +189,7 @@ mod tests {
         });
         assert_eq!((checksum(0, b"123456789"), bitwise), (0x2dfd_2d88, 0x2dfd_2d88));
         assert_eq!(checksum(checksum(checksum(0, b"1234"), b""), b"56789"), 0x2dfd_2d88);
+        assert_eq!(checksum_of(b"123456789"), 0x2dfd_2d88);
     }
 
     #[test]

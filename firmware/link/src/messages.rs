@@ -133,6 +133,12 @@ pub fn computer_status(now: Instant, status: &ComputerStatus) -> Packet {
     Packet::new(390).bytes(0, &payload)
 }
 
+/// `COMPONENT_METADATA`: where the general file of the component information is, and its checksum.
+pub fn component_metadata(now: Instant, crc: u32, uri: &str) -> Packet {
+    // The text ends with a zero: it is shorter than its 100 bytes.
+    Packet::new(397).u32(0, now.as_millis() as u32).u32(4, crc).text(8, 99, uri)
+}
+
 /// `PROTOCOL_VERSION`: MAVLink 2.0, and nothing older.
 pub fn protocol_version() -> Packet {
     Packet::new(300).u16(0, 200).u16(2, 200).u16(4, 200)
@@ -185,6 +191,7 @@ mod tests {
             autopilot_version([0, 1, 2], "0123456789", &[7; 12]),
             computer_status(Instant::from_millis(1), &ComputerStatus::default()),
             protocol_version(),
+            component_metadata(Instant::from_millis(1), 1, &"x".repeat(120)),
             log_entry(1, 1, 1, 1, 1),
             log_data(1, 0, &[1; 100]),
             file_transfer(255, 190, &[1; 300]),

@@ -97,6 +97,8 @@ pub enum Reply {
     Version,
     /// `PROTOCOL_VERSION`
     Protocol,
+    /// `COMPONENT_METADATA`
+    Metadata,
     /// HEARTBEAT
     Heartbeat,
     /// What stands against a flight, as a text.

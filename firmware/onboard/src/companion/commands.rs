@@ -3,7 +3,7 @@
 //! | `MAV_CMD` | does |
 //! |---|---|
 //! | 401 `RUN_PREARM_CHECKS` | tells what stands against a flight; accepted when nothing does |
-//! | 512 `REQUEST_MESSAGE` | `HEARTBEAT`, `AUTOPILOT_VERSION`, `PROTOCOL_VERSION` |
+//! | 512 `REQUEST_MESSAGE` | `HEARTBEAT`, `AUTOPILOT_VERSION`, `PROTOCOL_VERSION`, `COMPONENT_METADATA` |
 //! | 519, 520 | the same by their older commands |
 //! | 526 `STORAGE_FORMAT` | formats a card that cannot be recorded on as it is: while disarmed |
 //! | 2510, 2511 `LOGGING_START`, `_STOP` | records again; stops recording, while disarmed |
@@ -23,6 +23,7 @@ use hums_link::summary;
 use hums_link::text::{Severity, Text};
 use hums_recorder::CardState;
 
+use super::library::held::{self, Held};
 use super::limiter::{Asker, Limiter};
 use crate::journal::{By, Journal, Logbook};
 use crate::queues::SectorsIn;
@@ -93,6 +94,7 @@ impl Commands {
             (CAPABILITIES, _) | (MESSAGE, 148) => reply(Reply::Version),
             (PROTOCOL, _) | (MESSAGE, 300) => reply(Reply::Protocol),
             (MESSAGE, 0) => reply(Reply::Heartbeat),
+            (MESSAGE, 397) => reply(Reply::Metadata),
             (PREFLIGHT, _) => {
                 reply(Reply::Preflight);
                 if preflight(book.monitor).is_none() { ACCEPTED } else { FAILED }
@@ -202,7 +204,7 @@ fn not_ready(check: &str, part: u8) -> Text {
 }
 
 /// An answer as a message.
-pub(crate) fn packet(reply: Reply, monitor: &Monitor, identity: &Boot<'_>) -> Packet {
+pub(crate) fn packet(now: Instant, reply: Reply, monitor: &Monitor, identity: &Boot<'_>) -> Packet {
     match reply {
         Reply::Param(index) => match monitor.params().iter().nth(usize::from(index)) {
             Some((spec, value)) => messages::param_value(spec.name, value, index, TABLE.len() as u16),
@@ -214,6 +216,7 @@ pub(crate) fn packet(reply: Reply, monitor: &Monitor, identity: &Boot<'_>) -> Pa
         }
         Reply::Version => messages::autopilot_version(version(identity.version), identity.git, &identity.uid),
         Reply::Protocol => messages::protocol_version(),
+        Reply::Metadata => messages::component_metadata(now, Held::General.crc(), held::GENERAL_URI),
         Reply::Heartbeat => summary::heartbeat(monitor),
         Reply::Preflight => match preflight(monitor) {
             Some((check, part)) => messages::status_text(Severity::Warning, not_ready(check, part).as_str()),

@@ -399,12 +399,12 @@ impl Companion {
         let replies = &mut self.commands.replies;
         for _ in 0..replies.len() {
             let Some((port, reply)) = replies.first() else { break };
-            let packet = commands::packet(reply, monitor, identity);
+            let packet = commands::packet(now, reply, monitor, identity);
             replies.done(ways.send(now, port, Class::Own, &packet));
         }
         for port in Port::ALL {
             while let Some(index) = replies.listed(port) {
-                let packet = commands::packet(Reply::Param(index), monitor, identity);
+                let packet = commands::packet(now, Reply::Param(index), monitor, identity);
                 if !ways.send(now, port, Class::Bulk, &packet) {
                     break;
                 }

@@ -2,7 +2,8 @@
 //! checksum.
 //!
 //! An open file is a log and not a name: once it is overwritten, or the card is another one, what is asked of it is
-//! answered with an error.
+//! answered with an error. Files that the firmware holds ([`super::held`]) are opened by their names, are in no list, and need
+//! nothing of the card.
 
 use core::fmt::Write as _;
 
@@ -10,12 +11,22 @@ use hums_link::ftp::{self, Error, Operation};
 use hums_link::request::Reply;
 use hums_recorder::LogName;
 
+use super::held::Held;
 use super::step::{Out, Step};
 use crate::shelf::{Answer, LogId, What, Which};
 
 /// Bytes of one burst, in messages of the longest data; the client then asks on, and so one that has gone is not sent a
 /// whole log.
 const BURST_BYTES: u32 = 64 * ftp::DATA_MAX as u32;
+
+/// What is open.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Open {
+    /// A log on the card.
+    Log(LogId),
+    /// A file of the firmware's own.
+    Held(Held),
+}
 
 /// What is being answered.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -30,19 +41,21 @@ enum Kind {
     Say(Option<Error>),
     /// One entry of the directory, by place.
     List(u16),
-    /// The file is to be opened.
+    /// The log is to be opened.
     Open(LogName),
-    /// Bytes of the file that is open, so many a message, from the reply's offset on.
-    Read { log: LogId, size: u8 },
+    /// An answer that is a number: the length or the checksum of a file that the firmware holds.
+    Number(u32),
+    /// Bytes of what is open, so many a message, from the reply's offset on.
+    Read { of: Open, size: u8 },
     /// The same, message after message; so many bytes are left of the burst.
-    Burst { log: LogId, size: u8, left: u32 },
+    Burst { of: Open, size: u8, left: u32 },
     /// The checksum of the file's first so many bytes; 0 is all.
     Checksum { name: LogName, bytes: u32, sum: Option<u32> },
 }
 
 impl Job {
-    /// What a client asks, where this log is open.
-    pub(super) fn new(asked: &ftp::Asked<'_>, open: &mut Option<LogId>) -> Self {
+    /// What a client asks, where this is open.
+    pub(super) fn new(asked: &ftp::Asked<'_>, open: &mut Option<Open>) -> Self {
         let mut reply = ftp::Reply::to(asked);
         let kind = match asked.operation {
             Operation::None => Kind::Say(None),
@@ -55,18 +68,28 @@ impl Job {
             }
             Operation::List(..) => Kind::Say(Some(Error::FileNotFound)),
             Operation::Open(path) => {
-                *open = None;
-                name(path).map_or(Kind::Say(Some(Error::FileNotFound)), Kind::Open)
+                let held = Held::named(path);
+                *open = held.map(Open::Held);
+                match (held, name(path)) {
+                    (Some(held), _) => Kind::Number(held.bytes().len() as u32),
+                    (None, Some(name)) => Kind::Open(name),
+                    (None, None) => Kind::Say(Some(Error::FileNotFound)),
+                }
             }
-            Operation::Checksum(path, bytes) => match name(path) {
-                Some(name) => Kind::Checksum { name, bytes, sum: None },
-                None => Kind::Say(Some(Error::FileNotFound)),
+            Operation::Checksum(path, bytes) => match (Held::named(path), name(path)) {
+                (Some(held), _) => {
+                    // Of all of it, whatever part is asked for.
+                    reply.offset = held.bytes().len() as u32;
+                    Kind::Number(held.crc())
+                }
+                (None, Some(name)) => Kind::Checksum { name, bytes, sum: None },
+                (None, None) => Kind::Say(Some(Error::FileNotFound)),
             },
             Operation::Read(offset, size) | Operation::Burst(offset, size) => {
                 reply.offset = offset;
                 match *open {
-                    Some(log) if asked.opcode == ftp::BURST => Kind::Burst { log, size, left: BURST_BYTES },
-                    Some(log) => Kind::Read { log, size },
+                    Some(of) if asked.opcode == ftp::BURST => Kind::Burst { of, size, left: BURST_BYTES },
+                    Some(of) => Kind::Read { of, size },
                     None => Kind::Say(Some(Error::InvalidSession)),
                 }
             }
@@ -91,13 +114,17 @@ impl Job {
 
     pub(super) const fn want(&self) -> Option<(Which, What)> {
         match self.kind {
-            Kind::Say(_) | Kind::Checksum { sum: Some(_), .. } => None,
             Kind::List(entry) => Some((Which::At(entry), What::Length)),
             Kind::Open(name) => Some((Which::Named(name), What::Length)),
             Kind::Checksum { name, bytes, sum: None } => Some((Which::Named(name), What::Checksum(bytes))),
-            Kind::Read { log, .. } | Kind::Burst { log, .. } => {
+            Kind::Read { of: Open::Log(log), .. } | Kind::Burst { of: Open::Log(log), .. } => {
                 Some((Which::Same(log), What::Data(self.reply.offset)))
             }
+            Kind::Say(_)
+            | Kind::Number(_)
+            | Kind::Checksum { sum: Some(_), .. }
+            | Kind::Read { of: Open::Held(_), .. }
+            | Kind::Burst { of: Open::Held(_), .. } => None,
         }
     }
 
@@ -105,7 +132,7 @@ impl Job {
     pub(super) fn step(
         &mut self,
         answer: Option<(&Answer, &[u8])>,
-        open: &mut Option<LogId>,
+        open: &mut Option<Open>,
         out: &mut Out<'_, '_, '_>,
     ) -> Step {
         let mut buffer = [0; ftp::HEAD + ftp::DATA_MAX];
@@ -126,7 +153,7 @@ impl Job {
                 out.file(reply.nak(Error::FileNotFound, &mut buffer), Step::Done)
             }
             (Kind::Open(_), Some((answer, _))) => {
-                *open = Some(answer.log);
+                *open = Some(Open::Log(answer.log));
                 out.file(reply.ack(&answer.bytes.to_le_bytes(), &mut buffer), Step::Done)
             }
             (Kind::Checksum { name, bytes, sum: None }, Some((answer, data))) => {
@@ -136,34 +163,37 @@ impl Job {
                 *kind = Kind::Checksum { name, bytes, sum: Some(sum) };
                 out.file(reply.ack(&sum.to_le_bytes(), &mut buffer), Step::Done)
             }
-            (Kind::Checksum { sum: Some(sum), .. }, _) => {
+            (Kind::Checksum { sum: Some(sum), .. } | Kind::Number(sum), _) => {
                 out.file(reply.ack(&sum.to_le_bytes(), &mut buffer), Step::Done)
             }
-            (Kind::Read { log, .. } | Kind::Burst { log, .. }, Some((answer, _)))
-                if answer.found.is_none() =>
-            {
+            (Kind::Read { of, .. } | Kind::Burst { of, .. }, Some((answer, _))) if answer.found.is_none() => {
                 let step = out.file(reply.nak(Error::FileNotFound, &mut buffer), Step::End(Reply::LogGone));
-                if step != Step::Wait && *open == Some(log) {
+                if step != Step::Wait && *open == Some(of) {
                     *open = None;
                 }
                 step
             }
             (Kind::Read { .. } | Kind::Burst { .. }, Some((answer, data))) => {
-                self.read(answer, data, &mut buffer, out)
+                self.read(answer.bytes, data, &mut buffer, out)
+            }
+            (Kind::Read { of: Open::Held(held), .. } | Kind::Burst { of: Open::Held(held), .. }, None) => {
+                let bytes = held.bytes();
+                let rest = bytes.get(self.reply.offset as usize..).unwrap_or_default();
+                self.read(bytes.len() as u32, rest, &mut buffer, out)
             }
             // What is asked of the card and was not answered.
             (_, None) => Step::Done,
         }
     }
 
-    /// Sends what an answer holds, in messages of the size that was asked for, as far as the port's line allows.
+    /// Sends what there is of a file of so many bytes, in messages of the size that was asked for, as far as the port's line allows.
     ///
     /// "Burst complete" stands only in a message of the whole size: `MAVProxy` (`mavproxy_ftp.py`, 1.8.75) takes a
     /// shorter one for the file's end. Where the line is too slow for that size, a burst ends without it, and the client
     /// asks on when nothing more comes. The file's end is always said by itself.
     fn read(
         &mut self,
-        answer: &Answer,
+        bytes: u32,
         data: &[u8],
         buffer: &mut [u8; ftp::HEAD + ftp::DATA_MAX],
         out: &mut Out<'_, '_, '_>,
@@ -177,7 +207,7 @@ impl Job {
         let size = asked.min(out.file_data_max());
         let mut rest = data;
         loop {
-            if reply.offset >= answer.bytes {
+            if reply.offset >= bytes {
                 return out.file(reply.nak(Error::EndOfFile, buffer), Step::Done);
             }
             let piece = rest.get(..size).unwrap_or(rest);
@@ -185,7 +215,7 @@ impl Job {
             if data.is_empty() {
                 return out.file(reply.nak(Error::Fail, buffer), Step::Done);
             }
-            if piece.len() < size && end < answer.bytes {
+            if piece.len() < size && end < bytes {
                 return Step::Next;
             }
             let is_last = left <= piece.len() as u32;

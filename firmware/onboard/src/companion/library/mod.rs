@@ -1,5 +1,5 @@
 //! Logs for download: `LOG_REQUEST_LIST`, `LOG_REQUEST_DATA` as ground stations speak them ([`log`]), and MAVLink FTP
-//! (`file`).
+//! (`file`), which also has the files that the firmware holds itself ([`held`]).
 //!
 //! One conversation at a time: who asks anew ends the one before. Nothing is remembered that a client could fill: a
 //! question that is lost, or its answer, is asked again by the client, from wherever it likes. Everything goes out in
@@ -10,6 +10,7 @@
 //! ```
 
 mod file;
+pub(super) mod held;
 mod log;
 mod step;
 
@@ -17,11 +18,12 @@ use hums_core::time::Instant;
 use hums_link::ftp;
 use hums_link::request::{Port, Reply, Request};
 
+use self::file::Open;
 use self::log::Places;
 use self::step::{Out, Step};
 use super::limiter::Asker;
 use super::ways::Ways;
-use crate::shelf::{Answer, DATA_MAX, LogId, Want, What, Which};
+use crate::shelf::{Answer, DATA_MAX, Want, What, Which};
 
 /// Answers looked at in one call. The port's budget is the limit; this is one all the same.
 const LOOKS_MAX: usize = 64;
@@ -37,8 +39,8 @@ pub(crate) struct Library {
     pub(crate) erases: bool,
     /// What the numbers of logs mean.
     places: Places,
-    /// The log that is open over FTP.
-    open: Option<LogId>,
+    /// What is open over FTP.
+    open: Option<Open>,
 }
 
 #[derive(Clone, Copy, Debug)]

@@ -1,0 +1,66 @@
+//! Files that the firmware holds itself: MAVLink's component information (<https://mavlink.io/en/services/component_information.html>),
+//! by which a ground station shows our settings with their words, units and ranges.
+//!
+//! `firmware/onboard/metadata` has them as they are sent; `tests/sim/metadata.rs` makes them from the table of parameters, and
+//! fails where they are not what the table says.
+
+use hums_link::ftp;
+
+/// Where the general file is, as `COMPONENT_METADATA` says it.
+pub(in crate::companion) const GENERAL_URI: &str = "mftp://[;comp=191]/general.json";
+
+/// One of them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(in crate::companion) enum Held {
+    /// Which others there are (`COMP_METADATA_TYPE_GENERAL`).
+    General,
+    /// The parameters (`COMP_METADATA_TYPE_PARAMETER`), packed with xz.
+    Parameters,
+}
+
+impl Held {
+    /// The one of this name, with or without the directory before it.
+    pub(super) fn named(path: &str) -> Option<Self> {
+        match path.strip_prefix('/').unwrap_or(path) {
+            "general.json" => Some(Self::General),
+            "parameters.json.xz" => Some(Self::Parameters),
+            _ => None,
+        }
+    }
+
+    /// All of it.
+    pub(super) const fn bytes(self) -> &'static [u8] {
+        match self {
+            Self::General => include_bytes!("../../../metadata/general.json"),
+            Self::Parameters => include_bytes!("../../../metadata/parameters.json.xz"),
+        }
+    }
+
+    /// Its checksum, by which a ground station knows the one that it has already.
+    pub(in crate::companion) const fn crc(self) -> u32 {
+        const GENERAL: u32 = ftp::checksum_of(Held::General.bytes());
+        const PARAMETERS: u32 = ftp::checksum_of(Held::Parameters.bytes());
+        match self {
+            Self::General => GENERAL,
+            Self::Parameters => PARAMETERS,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_general_file_names_the_other_one_with_its_checksum() {
+        let general = core::str::from_utf8(Held::General.bytes()).expect("text");
+        assert!(general.contains(&format!("\"fileCrc\":{}", Held::Parameters.crc())), "{general}");
+        let uri =
+            general.split("\"uri\":\"").nth(1).and_then(|rest| rest.split('"').next()).expect("an address");
+        let path = |uri: &str| uri.strip_prefix("mftp://[;comp=191]").map(str::to_owned).expect("ours");
+        assert_eq!(Held::named(&path(uri)), Some(Held::Parameters));
+        assert_eq!(Held::named(&path(GENERAL_URI)), Some(Held::General));
+        assert_eq!(Held::named("/00001_00.HUM"), None);
+        assert_eq!(ftp::checksum(0, Held::Parameters.bytes()), Held::Parameters.crc());
+    }
+}
