@@ -116,7 +116,7 @@ fn tell(args: &cli::Pack, done: &Done) -> Result<()> {
         return output::json(SCHEMA, &json);
     }
     output::line(&format!(
-        "{}: {}, {}, {}",
+        "{}: {}, {}, {}; times to the millisecond",
         args.output.display(),
         count(done.frames, "frame"),
         count(done.log_bytes, "byte"),

@@ -258,7 +258,7 @@ struct PowerOn {
     image: PathBuf,
     folder: PathBuf,
     whole: Vec<Segment>,
-    /// The files of the three armed times.
+    /// The files of the three armed times, each up to its last sector: without its parity.
     logs: [Vec<Segment>; 3],
 }
 
@@ -274,12 +274,13 @@ impl PowerOn {
         let mut files: Vec<_> = fs::read_dir(&folder).unwrap().map(|file| file.unwrap().path()).collect();
         files.retain(|file| file.extension().is_some_and(|extension| extension == "HUM"));
         files.sort();
-        let segment = |file: PathBuf| (file.clone(), used(&fs::read(file).unwrap()).to_vec());
+        let segment = |file: PathBuf| (file.clone(), fs::read(file).unwrap());
         let whole: Vec<Segment> = files.into_iter().map(segment).collect();
         let logs = [1, 2, 3].map(|log| {
             let name = format!("{log:05}_");
             let is_of = |(path, _): &&Segment| path.file_name().unwrap().to_string_lossy().starts_with(&name);
-            whole.iter().filter(is_of).cloned().collect::<Vec<_>>()
+            let up_to_end = |(path, bytes): &Segment| (path.clone(), used(bytes).to_vec());
+            whole.iter().filter(is_of).map(up_to_end).collect::<Vec<_>>()
         });
         assert!(
             logs[0].len() > 1 && logs[1].len() == 2 && logs[2].len() == 2,
@@ -427,7 +428,8 @@ fn what_is_taken_from_the_logs_of_one_power_on_or_mixed_up_is_told() {
     power_on.put(&[&one[..], three].concat());
     let said = readers(folder, 3);
     assert!(said.contains("after session 00001 in the same power-on is not there: up to "), "{said}");
-    power_on.put(&[&two[..], three].concat());
+    let is_newer = |(path, _): &&Segment| one.iter().all(|(other, _)| other != path);
+    power_on.put(&power_on.whole.iter().filter(is_newer).cloned().collect::<Vec<_>>());
     verified(folder, 0, "the oldest logs make room");
 
     // What is joined is read once: from its own file.

@@ -6,15 +6,14 @@ use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result};
-use sha2::{Digest as _, Sha256};
 
-use crate::files::{Folder, add_ends, digest, short};
+use crate::files::{Folder, content_identity, digest};
 use crate::hex::hex;
 use crate::logs::Log;
 use crate::logs::board::{HEADING_GROUPS, board_of};
 use crate::logs::fingerprint::{Fingerprint, Fingerprinter};
 use crate::logs::groups::Groups;
-use crate::logs::naming::{segment_name, session_name};
+use crate::logs::naming::{identity_at_end, segment_name, session_name};
 use crate::logs::sessions::Sessions;
 use crate::source::recording::Place;
 
@@ -74,11 +73,7 @@ impl Traits {
     pub fn identity(&self, place: &Place) -> Option<String> {
         match (place.own(), place.path()) {
             (Some(_), _) => self.session.map(|session| format!("s{session:08x}")),
-            (None, Some(path)) => {
-                let mut hash = Sha256::new();
-                add_ends(&mut hash, path).ok()?;
-                Some(format!("r{:08x}", short(hash)))
-            }
+            (None, Some(path)) => content_identity(path),
             (None, None) => None,
         }
     }
@@ -161,11 +156,8 @@ pub fn is_made(path: &Path) -> bool {
         return true;
     }
     let endings = [".tlog.gaps.csv", ".jsonl", ".lp", ".html"];
-    endings.iter().filter_map(|ending| name.strip_suffix(ending)).any(|stem| {
-        // A further log of a session has a number behind it.
-        let numbered = stem.rsplit_once('-').filter(|(_, number)| number.parse::<u32>().is_ok());
-        std::iter::once(stem).chain(numbered.map(|(stem, _)| stem)).any(ends_with_identity)
-    })
+    let mut stems = endings.iter().filter_map(|ending| name.strip_suffix(ending));
+    stems.find_map(identity_at_end).is_some()
 }
 
 /// Whether a page says at its beginning that `hums report` made it: the table of a folder's pages has no session in its name.
@@ -208,13 +200,6 @@ fn head(path: &Path) -> Vec<u8> {
 
 /// What such a page's head has.
 const GENERATOR: &[u8] = b"name=\"generator\" content=\"hums report\"";
-
-/// Whether a name ends with a session's number, `-s1a2b3c4d`, or with that of a recording's content, `-r1a2b3c4d`.
-fn ends_with_identity(stem: &str) -> bool {
-    let last = stem.rsplit_once('-').map_or("", |(_, last)| last);
-    let digits = last.strip_prefix(['s', 'r']).unwrap_or_default();
-    digits.len() == 8 && digits.bytes().all(|byte| matches!(byte, b'0'..=b'9' | b'a'..=b'f'))
-}
 
 /// The name of a recording's file.
 fn file_name(place: &Place) -> String {

@@ -18,10 +18,11 @@ pub(super) fn set_aside(from: &Path, target: &Path) -> io::Result<PathBuf> {
     let name = target.file_name().ok_or(io::ErrorKind::InvalidInput)?;
     let kept = target.with_file_name(KEPT);
     let mut number = newest(&kept).unwrap_or(1);
-    if fs::metadata(&kept).is_ok_and(|about| !about.is_dir()) {
+    if let Some(about) = fs::symlink_metadata(&kept).ok().filter(|about| !about.is_dir()) {
         return Err(io::Error::other(format!(
-            "what is replaced is kept in a folder {}, and that is a file; nothing was replaced: move it away or rename it",
-            kept.display()
+            "what is replaced is kept in a folder {}, and that is a {}; nothing was replaced: move it away or rename it",
+            kept.display(),
+            if about.is_symlink() { "link" } else { "file" }
         )));
     }
     loop {

@@ -34,6 +34,13 @@ pub fn digest(path: &Path) -> io::Result<[u8; 32]> {
     }
 }
 
+/// A number that tells a file from others, as the names of what is made of it have it: `r1a2b3c4d`; none where it cannot be read.
+pub fn content_identity(path: &Path) -> Option<String> {
+    let mut hash = Sha256::new();
+    add_ends(&mut hash, path).ok()?;
+    Some(format!("r{:08x}", short(hash)))
+}
+
 /// The first 32 bits of a digest.
 pub fn short(hash: Sha256) -> u32 {
     hash.finalize().first_chunk().map_or(0, |bytes| u32::from_be_bytes(*bytes))

@@ -30,7 +30,7 @@ pub use descriptor::{
     Opened, STANDARD_ERROR, STANDARD_INPUT, STANDARD_OUTPUT, check_standard_output, descriptor,
     means_standard_output,
 };
-pub use ends::{add_ends, digest, short};
+pub use ends::{add_ends, content_identity, digest, short};
 pub use folder::{Folder, FolderFile, buffered};
 pub use identity::{FileId, is_seekable};
 pub use inputs::Inputs;

@@ -76,6 +76,21 @@ pub fn is_part(path: &Path) -> bool {
     is_hum && stem.is_some_and(|stem| stem.ends_with(PART))
 }
 
+/// What stands before and what is the identity with which the name of what is made of a log ends, without its ending: a session,
+/// `s1a2b3c4d`, or the content of another recording, `r1a2b3c4d`. A further log of a session has a number behind it.
+pub fn identity_at_end(stem: &str) -> Option<(&str, &str)> {
+    let split = |stem: &'_ str| -> Option<usize> {
+        let at = stem.rfind('-')?;
+        let digits = stem.get(at + 1..)?.strip_prefix(['s', 'r'])?;
+        let is_hex = digits.bytes().all(|byte| matches!(byte, b'0'..=b'9' | b'a'..=b'f'));
+        (digits.len() == SESSION_DIGITS && is_hex).then_some(at)
+    };
+    let unnumbered = stem.rsplit_once('-').filter(|(_, number)| number.parse::<u32>().is_ok());
+    let stem = unnumbered.map(|(stem, _)| stem).filter(|stem| split(stem).is_some()).unwrap_or(stem);
+    let (base, identity) = stem.split_at_checked(split(stem)?)?;
+    Some((base, identity.get(1..)?))
+}
+
 /// Whether a name ends with a session, `s1a2b3c4d`, behind a box or nothing.
 fn is_of_session(of: &str) -> bool {
     let session = match of.rsplit_once('-') {
@@ -98,6 +113,20 @@ mod tests {
         assert!(is_part(&part) && is_part(Path::new("a.PART.hum")) && segment_name(&part).is_none());
         for other in ["00042-s1a2b3c4d_07.HUM", "a.part", "part.HUM", "a.part.tlog"] {
             assert!(!is_part(Path::new(other)), "{other}");
+        }
+    }
+
+    #[test]
+    fn what_is_made_of_a_log_is_known_by_its_name() {
+        for (stem, expected) in [
+            ("00001-box3f-s1a2b3c4d", Some(("00001-box3f", "s1a2b3c4d"))),
+            ("a.tlog-r00112233-2", Some(("a.tlog", "r00112233"))),
+            ("log-s1a2b3c4", None),
+            ("log-s1A2b3c4d", None),
+            ("log-2", None),
+            ("s1a2b3c4d", None),
+        ] {
+            assert_eq!(identity_at_end(stem), expected, "{stem}");
         }
     }
 

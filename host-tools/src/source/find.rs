@@ -10,9 +10,10 @@ use anyhow::{Context as _, Result, anyhow, bail};
 
 use super::format::{KNOWN, detect, format_of, hint, is_recording, start_of};
 use super::recording::{Place, of_one_vehicle};
-use crate::files::{FileId, why_unread};
+use crate::files::{FileId, content_identity, why_unread};
 use crate::logs::find::{Image, REMARKS_MAX, check_seekable};
-use crate::logs::sessions::Sessions;
+use crate::logs::naming::identity_at_end;
+use crate::logs::sessions::{Sessions, first_session};
 use crate::logs::{self, Content, segment_name};
 use crate::outcome::usage;
 use crate::plural::count;
@@ -94,6 +95,42 @@ impl Found {
         self.seen.extend(inside.into_keys());
     }
 
+    /// Drops tlogs that `hums decode` made of what is there too, by their names: a flight counts once.
+    fn drop_made(&mut self, before: usize) {
+        let made = |place: &Place| {
+            let path = place.path()?;
+            let stem = path.file_name()?.to_str()?.strip_suffix(".tlog")?;
+            identity_at_end(stem).map(|(base, identity)| (base.to_owned(), identity.to_owned()))
+        };
+        let found = self.places.get(before..).unwrap_or_default();
+        if !found.iter().any(|place| made(place).is_some()) {
+            return;
+        }
+        let sessions: BTreeMap<u32, String> = found
+            .iter()
+            .filter_map(|place| Some((first_session(place.own()?)?, place.title.clone())))
+            .collect();
+        let files: Vec<PathBuf> = found.iter().filter_map(Place::path).map(Path::to_owned).collect();
+        let of = |base: &str, identity: &str| match identity.strip_prefix('s') {
+            Some(digits) => sessions.get(&u32::from_str_radix(digits, 16).ok()?).cloned(),
+            None => files
+                .iter()
+                .filter(|path| path.file_name().is_some_and(|name| name == base))
+                .find(|path| content_identity(path).is_some_and(|content| content == identity))
+                .map(|path| path.display().to_string()),
+        };
+        for place in self.places.split_off(before) {
+            match made(&place).and_then(|(base, identity)| of(&base, &identity)) {
+                Some(of) if self.remarks.len() < REMARKS_MAX => self.remarks.push(format!(
+                    "{}: was made by hums of {of}, which is read, and is passed over",
+                    place.title
+                )),
+                Some(_) => {}
+                None => self.places.push(place),
+            }
+        }
+    }
+
     /// Of several vehicles in each recording only that with this system id.
     pub fn of_system(mut self, system: Option<u8>) -> Result<Self> {
         if let Some(own) = self.places.iter().find(|place| system.is_some() && place.own().is_some()) {
@@ -147,6 +184,7 @@ pub fn find(inputs: &[PathBuf], salvage: bool) -> Result<Found> {
             let mut walk = Walk::of(input, &own)?;
             found.add_own(input, own);
             found.places.extend(walk.paths.iter().map(|path| Place::file(path)));
+            found.drop_made(before);
             found.is_cut |= walk.left_out > 0;
             found.remarks.extend(walk.left_out_words(input));
             found.is_cut |= walk.unknown > 0;

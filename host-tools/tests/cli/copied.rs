@@ -844,6 +844,31 @@ fn a_mere_copy_is_told_and_its_flight_counted_once() {
     assert!(said.contains("\n2 sessions: "), "{said}");
 }
 
+/// What `decode` made is read where what it was made of is not there.
+#[test]
+fn a_tlog_that_was_made_of_a_log_counts_its_flight_once_beside_it() {
+    let dir = copied(1, "");
+    let recording = end_of("px4_hil_quad_low.tlog", &dir.path().join("copied"));
+    run(dir.path(), "decode copied -o copied/ --format tlog", 0);
+    let made: Vec<_> = fs::read_dir(dir.path().join("copied"))
+        .expect("there")
+        .map(|entry| entry.expect("there").path())
+        .filter(|path| path.extension().is_some_and(|ending| ending == "tlog") && *path != recording)
+        .collect();
+    assert_eq!(made.len(), 2, "{made:?}");
+    for command in ["check copied", "ls copied", "info copied", "report copied -o pages/"] {
+        let said = attempt(dir.path(), command);
+        let told = String::from_utf8_lossy(&said.stderr).into_owned();
+        assert_eq!(told.matches(", which is read, and is passed over").count(), 2, "{command}: {told}");
+    }
+    let said = text(&attempt(dir.path(), "check copied"));
+    assert!(said.contains("2 logs checked"), "{said}");
+    fs::remove_file(dir.path().join("copied/00001_00.HUM")).expect("ours");
+    fs::remove_file(recording).expect("ours");
+    let said = text(&attempt(dir.path(), "check copied"));
+    assert!(said.contains("2 logs checked"), "{said}");
+}
+
 #[test]
 fn logs_that_were_renamed_or_exchanged_are_told_by_every_command() {
     let dir = copied(3, "");

@@ -297,6 +297,12 @@ fn gaps_of_an_earlier_copy_do_not_stay_beside_a_tlog_without_gaps() {
     fs::remove_file(dir.path().join("back.tlog")).expect("removed");
     run(dir.path(), line, 1);
     assert!(gaps.exists() && !dir.path().join("back.tlog").exists());
+    // A link in the place of the folder is followed nowhere.
+    fs::create_dir(dir.path().join("elsewhere")).expect("made");
+    std::os::unix::fs::symlink("elsewhere", dir.path().join("hums-kept")).expect("a link");
+    let said = String::from_utf8_lossy(&run(dir.path(), &format!("{line} --replace"), 1).stderr).into_owned();
+    assert!(said.contains("and that is a link; nothing was replaced") && gaps.exists(), "{said}");
+    fs::remove_file(dir.path().join("hums-kept")).expect("removed");
     // What the user has noted in it is kept, and lies beside the tlog of these gaps.
     fs::write(dir.path().join("back.tlog"), "those gaps'").expect("written");
     fs::write(&gaps, "my remarks").expect("written");
