@@ -5,8 +5,8 @@
 //! others; of two nobody knows which of them is wrong, and the second one is told.
 //!
 //! Accelerometers and gyros are not mounted at the same place and not sampled at the same moment, so that turns and a VTOL's transition set
-//! them apart: they are compared where multicopters hover; and where what hangs on rotors, gyros also where what flies on wings, has turned
-//! little for [`CALM`], smoothed for longer. Vibration is judged on rotors away from the ground, however fast. An inertial sensor that says
+//! them apart: they are compared where multicopters hover; and smoothed for longer where the vehicle has turned little for [`CALM`], forces on
+//! rotors, rates on wings and of helicopters. Vibration is judged on rotors away from the ground, however fast. An inertial sensor that says
 //! nothing but zeros is not fitted.
 //!
 //! Each sensor by itself: whether it is stuck ([`crate::stuck`]); the first barometer against the height of GPS ([`crate::heights`]); a
@@ -173,8 +173,8 @@ pub(crate) struct Crosschecks {
     /// Ratios of the compass that the estimator told in this flight, and whether the last one was none.
     ratios: u8,
     unused: Option<Reading>,
-    /// It turns little, and does not hover.
-    rough: bool,
+    /// It is compared where it does not hover: forces and rates.
+    rough: [bool; 2],
 }
 
 impl Crosschecks {
@@ -194,7 +194,7 @@ impl Crosschecks {
             vibration_grain: 0.0,
             ratios: 0,
             unused: None,
-            rough: false,
+            rough: [false; 2],
         }
     }
 
@@ -207,13 +207,14 @@ impl Crosschecks {
         let rate = imu.rate.map(|rate| rate.map(|axis| axis.0));
         let field = imu.field.map(|field| field.map(|axis| axis.0));
         let turned = flight.airborne().then_some(self.moved.turned_rad);
-        let smoothing_s = if self.rough { ROUGH_S } else { SMOOTHING_S };
         // A gyro that stands still may measure zeros, but not beside an accelerometer that does.
         let is_fitted = force != Some([0.0; 3]);
-        for (kind, sample) in [
-            (Kind::Accelerometer, force.filter(|_| is_fitted)),
-            (Kind::Gyro, rate.filter(|_| is_fitted)),
-            (Kind::Compass, field.filter(|field| field.iter().any(|axis| axis.abs() > 0.0))),
+        let [rough_force, rough_rate] = self.rough.map(|rough| if rough { ROUGH_S } else { SMOOTHING_S });
+        let field = field.filter(|field| field.iter().any(|axis| axis.abs() > 0.0));
+        for (kind, sample, smoothing_s) in [
+            (Kind::Accelerometer, force.filter(|_| is_fitted), rough_force),
+            (Kind::Gyro, rate.filter(|_| is_fitted), rough_rate),
+            (Kind::Compass, field, SMOOTHING_S),
         ] {
             if let (Some(sample), Some(sensor)) = (sample, self.sensor(kind, imu.instance)) {
                 sensor.take(at, sample, smoothing_s, turned);
@@ -308,13 +309,15 @@ impl Crosschecks {
             && matches!(vehicle.kind(), VehicleKind::Rotorcraft | VehicleKind::Plane)
             && flight.is_settled(now);
         let hovers = hovers(now, vehicle, flight);
-        self.rough = calm && !hovers;
-        let compares_inertial = hovers || (calm && vehicle.inertial.turns_little(now, CALM));
+        // On wings a vehicle is carried by more than its weight for as long as it turns, and a multicopter's legs are full of turns.
+        let on_rotors = vehicle.kind() == VehicleKind::Rotorcraft;
+        self.rough = [on_rotors, !vehicle.is_multicopter()].map(|compares| compares && calm && !hovers);
+        let is_long_calm = vehicle.inertial.turns_little(now, CALM);
+        let compares_inertial = self.rough.map(|rough| hovers || (rough && is_long_calm));
         for kind in Kind::ALL {
             let compares = match kind {
-                // On wings a vehicle is carried by more than its weight for as long as it turns.
-                Kind::Accelerometer => compares_inertial && vehicle.kind() == VehicleKind::Rotorcraft,
-                Kind::Gyro => compares_inertial,
+                Kind::Accelerometer => compares_inertial[0],
+                Kind::Gyro => compares_inertial[1],
                 Kind::Compass | Kind::Barometer => calm,
             };
             if compares {

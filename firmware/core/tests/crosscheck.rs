@@ -259,9 +259,9 @@ fn a_fast_turn_and_a_vtol_say_nothing_about_sensors() {
 
 #[test]
 fn on_a_fast_leg_sensors_and_vibration_are_judged_too() {
-    let first = |fault: fn(&mut Fitted)| {
+    let first = |type_number, fault: fn(&mut Fitted)| {
         let findings = fly(|now_ms, fitted| {
-            fitted.speed = 10.0;
+            (fitted.quad.type_number, fitted.speed) = (type_number, 10.0);
             if now_ms >= FAULT_MS {
                 fault(fitted);
             }
@@ -270,9 +270,12 @@ fn on_a_fast_leg_sensors_and_vibration_are_judged_too() {
         assert!((FAULT_MS..FAULT_MS + 6_000).contains(&found.at.as_millis()), "{found:?}");
         (found.check, found.instance)
     };
-    assert_eq!(first(|fitted| fitted.force[1][2] += 3.0), ("accel_mismatch", 1));
-    assert_eq!(first(|fitted| fitted.rate[2][0] += 0.4), ("gyro_mismatch", 2));
-    assert_eq!(first(|fitted| fitted.quad.vibration.levels[0] = Some(18.0)), ("vibration_rise", 0));
+    const QUADROTOR: u8 = 2;
+    const HELICOPTER: u8 = 4;
+    assert_eq!(first(QUADROTOR, |fitted| fitted.force[1][2] += 3.0), ("accel_mismatch", 1));
+    assert_eq!(first(HELICOPTER, |fitted| fitted.rate[2][0] += 0.4), ("gyro_mismatch", 2));
+    let shakes = |fitted: &mut Fitted| fitted.quad.vibration.levels[0] = Some(18.0);
+    assert_eq!(first(HELICOPTER, shakes), ("vibration_rise", 0));
     is_quiet(|_, fitted| fitted.speed = 10.0);
 }
 

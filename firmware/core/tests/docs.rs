@@ -99,7 +99,10 @@ const INPUTS: &[(&str, &str)] = &[
         "accel_mismatch",
         "RAW_IMU, SCALED_IMU, SCALED_IMU2, SCALED_IMU3, HIGHRES_IMU: difference of the forces beyond its usual range in this flight; on rotors, in a hover or turning little",
     ),
-    ("gyro_mismatch", "the same messages: difference of the rates, likewise; on wings too"),
+    (
+        "gyro_mismatch",
+        "the same messages: difference of the rates, likewise; of multicopters in a hover only, on wings too",
+    ),
     (
         "compass_mismatch",
         "the same messages: difference of the fields, percent of their length, likewise; not of VTOLs, not in fast turns",
