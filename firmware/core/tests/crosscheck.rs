@@ -259,6 +259,8 @@ fn a_fast_turn_and_a_vtol_say_nothing_about_sensors() {
 
 #[test]
 fn on_a_fast_leg_sensors_and_vibration_are_judged_too() {
+    const QUADROTOR: u8 = 2;
+    const HELICOPTER: u8 = 4;
     let first = |type_number, fault: fn(&mut Fitted)| {
         let findings = fly(|now_ms, fitted| {
             (fitted.quad.type_number, fitted.speed) = (type_number, 10.0);
@@ -270,8 +272,6 @@ fn on_a_fast_leg_sensors_and_vibration_are_judged_too() {
         assert!((FAULT_MS..FAULT_MS + 6_000).contains(&found.at.as_millis()), "{found:?}");
         (found.check, found.instance)
     };
-    const QUADROTOR: u8 = 2;
-    const HELICOPTER: u8 = 4;
     assert_eq!(first(QUADROTOR, |fitted| fitted.force[1][2] += 3.0), ("accel_mismatch", 1));
     assert_eq!(first(HELICOPTER, |fitted| fitted.rate[2][0] += 0.4), ("gyro_mismatch", 2));
     let shakes = |fitted: &mut Fitted| fitted.quad.vibration.levels[0] = Some(18.0);
