@@ -4,12 +4,13 @@
 //! currents make one, and it is no fault. What comes to it in flight is. Of three sensors the one is told that is apart from both
 //! others; of two nobody knows which of them is wrong, and the second one is told.
 //!
-//! Accelerometers and gyros are compared, and vibration judged, where multicopters hover: they are not mounted at the same place, they
-//! are not sampled at the same moment, and a VTOL's transition or a fast leg sets them apart. An inertial sensor that says nothing but
-//! zeros is not fitted.
+//! Accelerometers and gyros are not mounted at the same place and not sampled at the same moment, so that turns and a VTOL's transition set
+//! them apart: they are compared where multicopters hover; and smoothed for longer where the vehicle has turned little for [`CALM`], forces on
+//! rotors, rates on wings and of helicopters. Vibration is judged on rotors away from the ground, however fast. An inertial sensor that says
+//! nothing but zeros is not fitted.
 //!
 //! Each sensor by itself: whether it is stuck ([`crate::stuck`]); the first barometer against the height of GPS ([`crate::heights`]); a
-//! receiver's speed against the way between its positions ([`crate::travel`]).
+//! receiver's velocity against the way between its positions ([`crate::travel`]).
 
 use crate::departure::Departure;
 use crate::flight::Flight;
@@ -17,9 +18,9 @@ use crate::heights::{Heights, SCALE_HEIGHT_M};
 use crate::latest::Reading;
 use crate::motion::{climb_mps, ground_speed_mps, throttle};
 use crate::observation::{Air, Estimator, EstimatorScale, Gnss, Imu, VehicleKind, VibrationScale};
-use crate::steady::{TURNED, hovers};
+use crate::steady::{TURNED, hovers, is_clear};
 use crate::stuck::Stuck;
-use crate::time::{Instant, Span};
+use crate::time::{Instant, Span, Stamp};
 use crate::travel::Travel;
 use crate::units::norm;
 use crate::vehicle::{RECEIVERS_MAX, Vehicle};
@@ -32,8 +33,11 @@ const PAIRS: [(usize, usize); SENSORS_MAX] = [(0, 1), (0, 2), (1, 2)];
 const EVERY: Span = Span::from_millis(100);
 /// Older samples are not compared, and older comparisons say nothing.
 const FRESH: Span = Span::from_secs(1);
-/// Time constant of the samples: sensors are not sampled at the same moment.
+/// Time constants of the samples: sensors are not sampled at the same moment. The longer one is for what turns little and does not hover.
 const SMOOTHING_S: f32 = 0.5;
+const ROUGH_S: f32 = 2.0;
+/// What does not hover is compared once it has turned little for so long.
+const CALM: Span = Span::from_secs(3);
 /// No sensor measures so much, in any of the units.
 const GARBAGE: f32 = 1e6;
 /// Ratios that the estimator told of its compass in flight, before their end says that it does not use it any more: at 1 Hz or more.
@@ -93,32 +97,32 @@ impl Kind {
 /// The smoothed samples of one sensor, and whether they are always the same.
 #[derive(Clone, Copy, Debug)]
 struct Sensor {
-    at: Option<Instant>,
+    at: Stamp,
     smooth: [f32; 3],
     stuck: Stuck,
 }
 
 impl Sensor {
-    const NEW: Self = Self { at: None, smooth: [0.0; 3], stuck: Stuck::NEW };
+    const NEW: Self = Self { at: Stamp::NONE, smooth: [0.0; 3], stuck: Stuck::NEW };
 
-    fn take(&mut self, at: Instant, sample: [f32; 3], moved: Option<f32>) {
+    fn take(&mut self, at: Instant, sample: [f32; 3], smoothing_s: f32, moved: Option<f32>) {
         if !sample.iter().all(|axis| axis.abs() <= GARBAGE) {
             return;
         }
         if let Some(moved) = moved {
             self.stuck.take(at, sample.map(f32::to_bits), moved);
         }
-        let step_s = self.at.map_or(f32::INFINITY, |before| at.since(before).as_secs_f32());
-        let weight = if step_s < 1.0 { step_s / (SMOOTHING_S + step_s) } else { 1.0 };
+        let step_s = self.at.age(at).map_or(f32::INFINITY, Span::as_secs_f32);
+        let weight = if step_s < 1.0 { step_s / (smoothing_s + step_s) } else { 1.0 };
         for (smooth, axis) in self.smooth.iter_mut().zip(sample) {
             *smooth += weight * (axis - *smooth);
         }
-        self.at = Some(at);
+        self.at = Stamp::at(at);
     }
 
     /// Its samples, smoothed, while they are fresh.
     fn fresh(&self, now: Instant) -> Option<[f32; 3]> {
-        self.at.filter(|at| now.since(*at) <= FRESH).map(|_| self.smooth)
+        self.at.age(now).filter(|age| *age <= FRESH).map(|_| self.smooth)
     }
 }
 
@@ -161,14 +165,16 @@ pub(crate) struct Crosschecks {
     moved: Moved,
     heights: Heights,
     /// When sensors of a kind were compared last, and when that was tried.
-    compared_at: [Option<Instant>; Kind::ALL.len()],
-    stepped_at: Option<Instant>,
+    compared_at: [Stamp; Kind::ALL.len()],
+    stepped_at: Stamp,
     vibration: Departure,
     vibration_at: Option<Instant>,
     vibration_grain: f32,
     /// Ratios of the compass that the estimator told in this flight, and whether the last one was none.
     ratios: u8,
     unused: Option<Reading>,
+    /// It is compared where it does not hover: forces and rates.
+    rough: [bool; 2],
 }
 
 impl Crosschecks {
@@ -181,13 +187,14 @@ impl Crosschecks {
             travels: [Travel::NEW; RECEIVERS_MAX],
             moved: Moved::NONE,
             heights: Heights::new(),
-            compared_at: [None; Kind::ALL.len()],
-            stepped_at: None,
+            compared_at: [Stamp::NONE; Kind::ALL.len()],
+            stepped_at: Stamp::NONE,
             vibration: Departure::NEW,
             vibration_at: None,
             vibration_grain: 0.0,
             ratios: 0,
             unused: None,
+            rough: [false; 2],
         }
     }
 
@@ -202,13 +209,15 @@ impl Crosschecks {
         let turned = flight.airborne().then_some(self.moved.turned_rad);
         // A gyro that stands still may measure zeros, but not beside an accelerometer that does.
         let is_fitted = force != Some([0.0; 3]);
-        for (kind, sample) in [
-            (Kind::Accelerometer, force.filter(|_| is_fitted)),
-            (Kind::Gyro, rate.filter(|_| is_fitted)),
-            (Kind::Compass, field.filter(|field| field.iter().any(|axis| axis.abs() > 0.0))),
+        let [rough_force, rough_rate] = self.rough.map(|rough| if rough { ROUGH_S } else { SMOOTHING_S });
+        let field = field.filter(|field| field.iter().any(|axis| axis.abs() > 0.0));
+        for (kind, sample, smoothing_s) in [
+            (Kind::Accelerometer, force.filter(|_| is_fitted), rough_force),
+            (Kind::Gyro, rate.filter(|_| is_fitted), rough_rate),
+            (Kind::Compass, field, SMOOTHING_S),
         ] {
             if let (Some(sample), Some(sensor)) = (sample, self.sensor(kind, imu.instance)) {
-                sensor.take(at, sample, turned);
+                sensor.take(at, sample, smoothing_s, turned);
             }
         }
     }
@@ -217,7 +226,7 @@ impl Crosschecks {
         let pressure = air.pressure.filter(|pressure| pressure.0 > 0.0);
         let climbed = flight.airborne().then_some(self.moved.climbed_m);
         if let (Some(pressure), Some(sensor)) = (pressure, self.sensor(Kind::Barometer, air.instance)) {
-            sensor.take(at, [pressure.0, 0.0, 0.0], climbed);
+            sensor.take(at, [pressure.0, 0.0, 0.0], SMOOTHING_S, climbed);
             if air.instance == 0 {
                 self.heights.take_pressure(at, pressure, vehicle, flight);
             }
@@ -235,7 +244,7 @@ impl Crosschecks {
             stuck.take(at, place.chain([altitude, speed]), travelled_m);
         }
         if let Some(travel) = self.travels.get_mut(usize::from(gnss.instance)) {
-            travel.take(at, gnss, flight.airborne());
+            travel.take(gnss, flight.airborne());
         }
         if gnss.instance == 0 {
             self.heights.take_gnss(at, gnss, vehicle, flight);
@@ -262,7 +271,9 @@ impl Crosschecks {
             VibrationScale::PerAxis => vibration.levels.into_iter().flatten().reduce(f32::max),
             VibrationScale::Px4Metrics => vibration.levels[2],
         };
-        let (Some(level), true) = (level, hovers(at, vehicle, flight)) else { return };
+        let judged =
+            vehicle.kind() == VehicleKind::Rotorcraft && flight.is_settled(at) && is_clear(at, vehicle);
+        let (Some(level), true) = (level, judged) else { return };
         self.vibration_grain = match vibration.scale {
             VibrationScale::PerAxis => GRAIN_PER_AXIS,
             VibrationScale::Px4Metrics => GRAIN_PX4,
@@ -282,24 +293,31 @@ impl Crosschecks {
 
     /// One step, at least every 50 ms.
     pub(crate) fn step(&mut self, now: Instant, vehicle: &Vehicle, flight: &Flight) {
-        if self.stepped_at.is_some_and(|at| now.since(at) < EVERY) || !flight.airborne() {
+        let step = self.stepped_at.age(now);
+        if step.is_some_and(|step| step < EVERY) || !flight.airborne() {
             return;
         }
-        let step_s = self.stepped_at.map_or(0.0, |at| now.since(at).min(FRESH).as_secs_f32());
-        self.stepped_at = Some(now);
+        let step_s = step.map_or(0.0, |step| step.min(FRESH).as_secs_f32());
+        self.stepped_at = Stamp::at(now);
         // What stands does not move, whatever an estimator makes of the touch-down.
         let idles = throttle(now, vehicle).is_some_and(|throttle| throttle < IDLE_THROTTLE);
         if !(idles && vehicle.hovers(now) == Some(true) && vehicle.inertial.is_level(now)) {
             self.moved.step(now, step_s, vehicle);
         }
         let turns_little = vehicle.inertial.turns_little(now, TURNED);
-        let hovers = hovers(now, vehicle, flight);
         let calm = turns_little
             && matches!(vehicle.kind(), VehicleKind::Rotorcraft | VehicleKind::Plane)
             && flight.is_settled(now);
+        let hovers = hovers(now, vehicle, flight);
+        // On wings a vehicle is carried by more than its weight for as long as it turns, and a multicopter's legs are full of turns.
+        let on_rotors = vehicle.kind() == VehicleKind::Rotorcraft;
+        self.rough = [on_rotors, !vehicle.is_multicopter()].map(|compares| compares && calm && !hovers);
+        let is_long_calm = vehicle.inertial.turns_little(now, CALM);
+        let compares_inertial = self.rough.map(|rough| hovers || (rough && is_long_calm));
         for kind in Kind::ALL {
             let compares = match kind {
-                Kind::Accelerometer | Kind::Gyro => hovers,
+                Kind::Accelerometer => compares_inertial[0],
+                Kind::Gyro => compares_inertial[1],
                 Kind::Compass | Kind::Barometer => calm,
             };
             if compares {
@@ -313,20 +331,20 @@ impl Crosschecks {
         for ((one, other), pair) in PAIRS.into_iter().zip(&mut self.pairs[kind as usize]) {
             if let (Some(one), Some(other)) = (fresh[one], fresh[other]) {
                 pair.take(kind.apart(one, other), EVERY.as_secs_f32(), kind.hold());
-                self.compared_at[kind as usize] = Some(now);
+                self.compared_at[kind as usize] = Stamp::at(now);
             }
         }
     }
 
     /// Sensors up to the last one of any kind that has measured.
     pub(crate) fn sensors_known(&self) -> u8 {
-        let measured = |instance: usize| self.sensors.iter().any(|of_kind| of_kind[instance].at.is_some());
+        let measured = |instance: usize| self.sensors.iter().any(|of_kind| of_kind[instance].at.is_set());
         (0..SENSORS_MAX).rev().find(|instance| measured(*instance)).map_or(0, |last| last as u8 + 1)
     }
 
     /// How far a sensor is apart from all others of its kind, beyond what is usual; of two, for the second one.
     pub(crate) fn mismatch(&self, now: Instant, kind: Kind, sensor: u8) -> Option<Reading> {
-        let at = self.compared_at[kind as usize].filter(|at| now.since(*at) <= EVERY + EVERY)?;
+        let at = self.compared_at[kind as usize].instant(now).filter(|at| now.since(*at) <= EVERY + EVERY)?;
         let pairs = || PAIRS.iter().zip(&self.pairs[kind as usize]);
         let three = pairs().all(|(_, pair)| pair.beyond().is_some());
         let sensor = usize::from(sensor);
@@ -349,8 +367,8 @@ impl Crosschecks {
         self.receivers.get(usize::from(receiver))?.lasts(now, self.moved.travelled_m, TRAVELLED_M)
     }
 
-    /// How far a receiver's speed is from that of its positions, m/s.
-    pub(crate) fn speed_apart(&self, receiver: u8) -> Option<Reading> {
+    /// How far a receiver's velocity is from that of its positions, m/s.
+    pub(crate) fn speed_apart(&self, receiver: u8) -> Option<f32> {
         self.travels.get(usize::from(receiver))?.speed_apart()
     }
 

@@ -11,7 +11,7 @@ use crate::outputs::MotorOutputs;
 use crate::params::{Param, Params};
 use crate::response::Response;
 use crate::status::RecorderStatus;
-use crate::time::{Instant, Span};
+use crate::time::{Instant, Span, Stamp};
 use crate::trend::{Rate, Resistance};
 use crate::units::{GRAVITY, MetresPerSecond2, norm};
 use crate::vehicle::{BATTERIES_MAX, RECEIVERS_MAX, Vehicle};
@@ -87,21 +87,22 @@ pub struct Derived {
 /// A count of the last ten seconds, of one that only rises.
 #[derive(Clone, Copy, Debug, Default)]
 struct Lately {
-    count: u64,
-    rose_at: Option<Instant>,
-    before: u64,
+    count: u32,
+    before: u32,
+    rose_at: Stamp,
 }
 
 impl Lately {
-    const NONE: Self = Self { count: 0, rose_at: None, before: 0 };
+    const NONE: Self = Self { count: 0, before: 0, rose_at: Stamp::NONE };
 
     fn take(&mut self, now: Instant, count: u64) {
+        let count = u32::try_from(count).unwrap_or(u32::MAX);
         if count > self.count {
             self.count = count;
-            self.rose_at = Some(now);
-        } else if self.rose_at.is_some_and(|at| now.since(at) > LOSS_MEMORY) {
+            self.rose_at = Stamp::at(now);
+        } else if self.rose_at.older_than(now, LOSS_MEMORY) {
             self.before = self.count;
-            self.rose_at = None;
+            self.rose_at = Stamp::NONE;
         }
     }
 
@@ -277,13 +278,13 @@ impl Derived {
             self.response.begin();
         }
         self.crosschecks.step(now, vehicle, flight);
-        let clips = clips(vehicle).map_or(0, u64::from);
+        let clips = clips(vehicle).unwrap_or(0);
         // What was clipped before this flight, or before the autopilot's restart, is not of this flight.
         if event.is_some() || clips < self.clips.count || !self.clips_known {
             self.clips_known = vehicle.vibration.get().is_some();
-            self.clips = Lately { count: clips, rose_at: None, before: clips };
+            self.clips = Lately { count: clips, before: clips, ..Lately::NONE };
         }
-        self.clips.take(now, clips);
+        self.clips.take(now, clips.into());
         self.find_furthest();
         self.frames_lost.take(now, recorder.frames_lost);
         self.write_errors.take(now, recorder.write_errors);

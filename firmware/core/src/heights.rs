@@ -8,6 +8,11 @@
 //! Noise is how far the height steps from sample to sample, less the climb, and less what a late message makes of that ([`LATE_S`]) and a
 //! climb that changed.
 //!
+//! Which of the two is wrong where they come apart at once: the climb of the estimator, which is that of its accelerometer over so short a
+//! time, is the third that votes. What a height moves within [`VOTE_S`] that the climb does not have is no height. Where the receiver has
+//! done so and the barometer by less than half as much, the receiver is the one that is wrong. A slow drift leads the estimator with it,
+//! and nobody knows whose it is.
+//!
 //! The estimator's climb against that of the barometer: vibration that an accelerometer folds into an offset lets an estimator fall
 //! while the vehicle climbs, and height control gives full throttle. On rotors only, whose climb is told by `VFR_HUD`. What wind makes
 //! of it, the change of the whole dynamic pressure, is taken off.
@@ -18,7 +23,7 @@ use crate::latest::Reading;
 use crate::motion::{climb_mps, ground_speed_mps};
 use crate::observation::Gnss;
 use crate::steady::{TURNED, is_clear};
-use crate::time::{Instant, Span};
+use crate::time::{Instant, Span, Stamp};
 use crate::units::{GRAVITY, Hectopascals};
 use crate::vehicle::Vehicle;
 
@@ -33,6 +38,10 @@ const CLIMB_MPS: f32 = 2.0;
 /// Less exact positions are not compared: accuracy in metres, dilution of precision.
 const ACCURACY_M: f32 = 3.0;
 const HDOP: f32 = 2.5;
+/// A receiver's height is so old, s: 1 of those of 2013.
+const RECEIVER_LATE_S: f32 = 1.0;
+/// Heights and climb are summed over this time, s, when they vote.
+const VOTE_S: f32 = 4.0;
 /// Time constants of the difference of heights, of climbs, and of usual height and speed, s.
 const SMOOTHING_S: f32 = 0.5;
 const CLIMBS_S: f32 = 1.0;
@@ -44,6 +53,42 @@ const NOISE_HOLD_M: f32 = 1.0;
 const CLIMB_MAX_MPS: f32 = 200.0;
 /// Samples further apart are not compared.
 const PAUSE: Span = Span::from_secs(2);
+
+/// What a height has moved of late that the climb does not have.
+#[derive(Clone, Copy, Debug)]
+struct Leap {
+    /// The last height, m, and when it was measured.
+    height_m: f32,
+    at: Stamp,
+    leapt_m: f32,
+    /// What a height that is late may make of the climb, m.
+    late_m: f32,
+}
+
+impl Leap {
+    const NONE: Self = Self { height_m: 0.0, at: Stamp::NONE, leapt_m: 0.0, late_m: 0.0 };
+
+    /// `None`: it is not known how it climbs.
+    fn take(&mut self, at: Instant, height_m: f32, climb_mps: Option<f32>) {
+        let step = self.at.age(at).filter(|step| *step <= PAUSE);
+        let risen_m = height_m - self.height_m;
+        (self.at, self.height_m) = (Stamp::at(at), height_m);
+        let (Some(step), Some(climb_mps)) = (step, climb_mps) else {
+            (self.leapt_m, self.late_m) = (0.0, 0.0);
+            return;
+        };
+        let step_s = step.as_secs_f32();
+        let kept = VOTE_S / (VOTE_S + step_s);
+        let leapt_m = kept * (self.leapt_m + risen_m - climb_mps * step_s);
+        self.leapt_m = if leapt_m.is_finite() { leapt_m } else { 0.0 };
+        self.late_m = (kept * self.late_m).max(RECEIVER_LATE_S * libm::fabsf(climb_mps));
+    }
+
+    /// How far, m, either way.
+    fn far_m(&self) -> f32 {
+        (libm::fabsf(self.leapt_m) - self.late_m).max(0.0)
+    }
+}
 
 /// The memory of both.
 #[derive(Clone, Copy, Debug)]
@@ -62,6 +107,8 @@ pub(crate) struct Heights {
     /// Height and a half of the dynamic pressure, both in m; the means of the last minute; and what they explain.
     air: [f32; 2],
     taken_off_m: f32,
+    /// The leaps of barometer and receiver.
+    leaps: [Leap; 2],
 }
 
 impl Heights {
@@ -76,6 +123,7 @@ impl Heights {
             apart_at: None,
             air: [0.0; 2],
             taken_off_m: 0.0,
+            leaps: [Leap::NONE; 2],
         }
     }
 
@@ -96,6 +144,7 @@ impl Heights {
         let speed_mps = ground_speed_mps(at, vehicle).unwrap_or(0.0);
         let wind_m = speed_mps * speed_mps / (2.0 * GRAVITY);
         let climb = climb_mps(at, vehicle);
+        self.leaps[0].take(at, height_m, climb);
         let before = self.height.replace((at, height_m, wind_m, climb.unwrap_or(0.0)));
         if let Some((before, before_m, wind_before_m, _)) = before {
             let by_wind_m = libm::fabsf(wind_m - wind_before_m);
@@ -139,6 +188,9 @@ impl Heights {
         let good = gnss.fix >= 3
             && gnss.accuracy.is_none_or(|accuracy| accuracy.0 <= ACCURACY_M)
             && gnss.hdop.is_none_or(|hdop| hdop <= HDOP);
+        if let Some(altitude) = gnss.altitude.filter(|_| good && flight.is_settled(at)) {
+            self.leaps[1].take(at, altitude.0, climb_mps(at, vehicle));
+        }
         let climbs = climb_mps(at, vehicle).is_none_or(|climb| libm::fabsf(climb) > CLIMB_MPS);
         let (Some((_, height_m, ..)), Some(altitude)) = (height, gnss.altitude) else { return };
         if !good || climbs || !is_clear(at, vehicle) || !flight.airborne() {
@@ -171,6 +223,13 @@ impl Heights {
     /// How far the barometer is apart from GPS, beyond what is usual, m.
     pub(crate) fn apart(&self) -> Option<Reading> {
         Reading::new(self.apart_at, self.apart.is_known().then(|| self.apart_m()))
+    }
+
+    /// How far the receiver's height has leapt alone, m.
+    pub(crate) fn receiver_leapt(&self, now: Instant) -> Option<Reading> {
+        let [barometer_m, receiver_m] = [0, 1].map(|of| self.leaps[of].far_m());
+        let alone_m = if receiver_m > 2.0 * barometer_m { receiver_m } else { 0.0 };
+        Reading::new(self.leaps[1].at.instant(now), Some(alone_m))
     }
 
     /// How far the barometer's height steps, beyond what is usual, m.

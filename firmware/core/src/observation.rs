@@ -127,6 +127,8 @@ pub struct Gnss {
     pub altitude: Option<Metres>,
     /// Ground speed.
     pub speed: Option<MetresPerSecond>,
+    /// The direction of that, from north, clockwise.
+    pub course: Option<Radians>,
     /// When that was measured, by the receiver's clock or when the autopilot took it: milliseconds modulo 2^32, from any beginning.
     pub measured_ms: Option<NonZeroU32>,
 }

@@ -239,7 +239,7 @@ params! {
     GyroMismWarn "GYRO_MISM_WARN" "rad/s" 0.15 0.01 10.0 "gyros apart beyond usual; PX4 arms up to 0.25 (COM_ARM_IMU_GYR), ArduPilot up to 0.09";
     MagMismWarn "MAG_MISM_WARN" "%" 40.0 1.0 1000.0 "compasses apart beyond usual, of the field; ArduPilot arms up to 200 mG, which is 40 % of it";
     BaroMismWarn "BARO_MISM_WARN" "m" 8.0 0.5 10_000.0 "barometers apart beyond usual; above what wind and motors do to one of them";
-    VibeRiseWarn "VIBE_RISE_WARN" "" 2.2 1.1 1000.0 "times what is usual in this flight, in hover";
+    VibeRiseWarn "VIBE_RISE_WARN" "" 2.2 1.1 1000.0 "times what is usual in this flight, on rotors";
     MotOutWarn "MOT_OUT_WARN" "%" 8.0 1.0 1000.0 "a motor's output alone above its usual share and what it varies by; healthy flights stay below 7";
     MotOutCrit "MOT_OUT_CRIT" "%" 35.0 1.0 1000.0 "a motor's output alone above its usual share: it gives two thirds of its thrust";
     StuckWarn "SENS_STUCK_WARN" "s" 1.0 0.3 1000.0 "a sensor repeats one value in flight, four times as long as it ever did before in it" is "A sensor repeats one value: warning after";
@@ -250,10 +250,12 @@ params! {
     ThrustWarn "THRUST_WARN" "s" 2.0 0.5 1000.0 "full throttle without a climb; ArduPilot warns of thrust loss after 1 s, and looks at the attitude too";
     EkfClimbWarn "EKF_CLIMB_WARN" "m/s" 8.0 0.5 1000.0 "estimator's climb against the barometer's, over a second; up to 6.6 in healthy real flights";
     EkfClimbCrit "EKF_CLIMB_CRIT" "m/s" 12.0 0.5 1000.0 "estimator's climb against the barometer's, over a second; 14 and 24 where height control ran away";
-    GpsSpeedWarn "GPS_SPEED_WARN" "m/s" 1.0 0.1 1000.0 "a receiver's speed against the way between its positions, over four seconds";
+    GpsSpeedWarn "GPS_SPEED_WARN" "m/s" 1.0 0.1 1000.0 "a receiver's velocity against the way between its positions, over four seconds; below 1 in healthy real flights";
     TrdFalse "TRD_FALSE" "flights" 400.0 20.0 100_000.0 "of flights in which nothing changed, one in so many is told by a trend: rarer is told later; beside it the trends' limits are what is worth a word" is "Flights for one false word of a trend";
     TrdCapWarn "TRD_CAP_WARN" "%" 20.0 0.0 100.0 "battery capacity below its baseline; cells are called worn out at 80 % of their capacity";
     TrdCapCrit "TRD_CAP_CRIT" "%" 40.0 0.0 100.0 "battery capacity below its baseline";
+    GpsHeightWarn "GPS_HEIGHT_WARN" "m" 6.0 0.5 10_000.0 "a receiver's height moves within four seconds as neither climb nor barometer do; up to 5.3 in healthy real flights";
+    PosAgeWarn "POS_AGE_WARN" "s" 3.0 0.5 60.0 "position messages stop in flight, while others come: some come at 1 Hz";
 }
 
 impl Param {

@@ -3,7 +3,7 @@
 //! 64 bits of microseconds last 584,000 years, so nothing here wraps.
 
 use core::fmt;
-use core::num::NonZeroU64;
+use core::num::{NonZeroU32, NonZeroU64};
 use core::ops::Add;
 
 /// A point in time: microseconds since the monitor's power-on. Kept one higher, so that one that may be missing takes no more
@@ -65,6 +65,60 @@ impl Add<Span> for Instant {
 
     fn add(self, span: Span) -> Self {
         Self(self.0.saturating_add(span.0))
+    }
+}
+
+/// A point in time, or none, in four bytes, for what there is much of: milliseconds modulo 2^32, and never zero. What is measured from
+/// it is far shorter than the 49.7 days after which it would be mistaken.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Stamp(Option<NonZeroU32>);
+
+impl Stamp {
+    pub(crate) const NONE: Self = Self(None);
+
+    pub(crate) const fn at(at: Instant) -> Self {
+        match NonZeroU32::new(at.as_millis() as u32) {
+            Some(millis) => Self(Some(millis)),
+            // A millisecond earlier.
+            None => Self(Some(NonZeroU32::MAX)),
+        }
+    }
+
+    pub(crate) const fn is_set(self) -> bool {
+        self.0.is_some()
+    }
+
+    /// Whether it is set and more than `span` ago.
+    pub(crate) fn older_than(self, now: Instant, span: Span) -> bool {
+        self.age_ms(now).is_some_and(|age_ms| age_ms > span.as_millis())
+    }
+
+    pub(crate) fn age_ms(self, now: Instant) -> Option<u64> {
+        Some(u64::from((now.as_millis() as u32).wrapping_sub(self.0?.get())))
+    }
+
+    /// How long ago it was, up to 24.8 days; no time where it is yet to come.
+    pub(crate) fn age(self, now: Instant) -> Option<Span> {
+        let age_ms = (now.as_millis() as u32).wrapping_sub(self.0?.get()).cast_signed();
+        Some(Span::from_millis(u64::from(age_ms.max(0).cast_unsigned())))
+    }
+
+    /// The point in time, to a millisecond.
+    pub(crate) fn instant(self, now: Instant) -> Option<Instant> {
+        let age_ms = self.age(now)?.as_millis();
+        Some(Instant::from_millis(now.as_millis().saturating_sub(age_ms)))
+    }
+
+    /// Runs while `on`; whether it has run for `span`.
+    pub(crate) fn run(&mut self, on: bool, now: Instant, span: Span) -> bool {
+        if !on {
+            *self = Self::NONE;
+            return false;
+        }
+        if !self.is_set() {
+            *self = Self::at(now);
+        }
+        self.age_ms(now).is_some_and(|age_ms| age_ms >= span.as_millis())
     }
 }
 

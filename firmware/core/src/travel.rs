@@ -1,144 +1,188 @@
-//! A receiver's speed against how far its position moves: both come from the same signals, by different measurements.
+//! A receiver's velocity against how far its position moves: both come from the same signals, by different measurements.
 //!
-//! The way is the sum of the steps between positions, and the speed is summed over the same time; both are forgotten with [`MEMORY_S`]. What
-//! repeats a position bit for bit is the same measurement again.
+//! The way is the sum of the steps between positions, and the velocity is summed over the same time; both are forgotten with [`MEMORY_S`].
+//! They are vectors, so that an error in one direction does not hide behind a course that changes. What repeats a position bit for bit is
+//! the same measurement again. A receiver's filters may be late by [`LATE_S`] with one of the two: that part of what the velocity has
+//! changed by is taken off.
 //!
 //! How long a step took is the receiver's word ([`Gnss::measured_ms`]): messages wait on a link and then come all at once, and
 //! a clock that is slow makes each way a fast one. Where that is not known nothing is said.
 
-use crate::latest::Reading;
-use crate::observation::Gnss;
-use crate::time::Instant;
+use core::num::NonZeroU32;
 
-/// Ways and speeds are forgotten with this time constant, s; before it has passed nothing is said.
+use crate::observation::Gnss;
+use crate::units::Position;
+
+/// Ways and velocities are forgotten with this time constant, s; before it has passed nothing is said.
 const MEMORY_S: f32 = 4.0;
 /// Positions further apart are not of one way, ms.
 const PAUSE_MS: u32 = 2_000;
+/// One of the two may be older by so much, s.
+const LATE_S: f32 = 0.3;
 /// Less exact positions are not compared: accuracy in metres, dilution of precision.
 const ACCURACY_M: f32 = 3.0;
 const HDOP: f32 = 2.5;
-/// Degrees of latitude, in metres.
-const DEGREE_M: f32 = 111_320.0;
+/// Positions are compared in units of 1e-7 degrees of latitude, in metres.
+const UNIT_M: f32 = 0.011_132;
+/// Nothing jumps further, m: garbage, or the date line.
+const JUMP_MAX_M: f32 = 100_000.0;
 /// No vehicle here is faster, m/s: garbage.
 const SPEED_MAX_MPS: f32 = 200.0;
+
+/// One measurement of a receiver.
+#[derive(Clone, Copy, Debug)]
+struct Fix {
+    /// Latitude and longitude, 1e-7 degrees.
+    place: [i32; 2],
+    /// North and east, m/s.
+    velocity: [f32; 2],
+    measured_ms: NonZeroU32,
+}
 
 /// The memory of one receiver.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Travel {
-    /// Latitude and longitude, degrees; the speed there, m/s; when that was measured, ms; and when it came.
-    before: Option<([f64; 2], f32, u32, Instant)>,
-    /// How much further it went by its speed than by its positions, m, and in what time, s.
-    further_m: f32,
+    before: Option<Fix>,
+    /// How much further it went by its velocity than by its positions, m, and in what time, s.
+    further_m: [f32; 2],
     time_s: f32,
+    /// The mean velocity of that time, m/s.
+    mean: [f32; 2],
 }
 
 impl Travel {
     /// Nothing seen.
-    pub(crate) const NEW: Self = Self { before: None, further_m: 0.0, time_s: 0.0 };
+    pub(crate) const NEW: Self = Self { before: None, further_m: [0.0; 2], time_s: 0.0, mean: [0.0; 2] };
 
     /// Takes what a receiver says in flight.
-    pub(crate) fn take(&mut self, at: Instant, gnss: &Gnss, airborne: bool) {
-        let good = gnss.fix >= 3
-            && airborne
-            && gnss.accuracy.is_none_or(|accuracy| accuracy.0 <= ACCURACY_M)
-            && gnss.hdop.is_none_or(|hdop| hdop <= HDOP);
-        let speed_mps = gnss.speed.map(|speed| speed.0).filter(|speed| (0.0..=SPEED_MAX_MPS).contains(speed));
-        let (Some(position), Some(speed_mps), Some(measured_ms), true) =
-            (gnss.position, speed_mps, gnss.measured_ms, good)
-        else {
+    pub(crate) fn take(&mut self, gnss: &Gnss, airborne: bool) {
+        let Some(told) = fix(gnss).filter(|_| airborne) else {
             *self = Self::NEW;
             return;
         };
-        let place = [position.latitude_deg, position.longitude_deg];
-        let told = Some((place, speed_mps, measured_ms.get(), at));
-        let Some((was, speed_before_mps, before_ms, _)) = self.before else {
-            self.before = told;
+        let Some(was) = self.before else {
+            *self = Self { before: Some(told), mean: told.velocity, ..Self::NEW };
             return;
         };
-        let step_ms = measured_ms.get().wrapping_sub(before_ms);
-        let is_same = place.map(f64::to_bits) == was.map(f64::to_bits);
+        let step_ms = told.measured_ms.get().wrapping_sub(was.measured_ms.get());
+        let is_same = told.place == was.place;
         // A time that stands still, or goes back, is none.
         if step_ms > PAUSE_MS || (step_ms == 0 && !is_same) {
-            *self = Self { before: told, ..Self::NEW };
+            *self = Self { before: Some(told), mean: told.velocity, ..Self::NEW };
             return;
         }
         if is_same {
             return;
         }
-        let north_m = (place[0] - was[0]) as f32 * DEGREE_M;
-        let east_m = (place[1] - was[1]) as f32 * DEGREE_M * libm::cosf((place[0] as f32).to_radians());
+        let [north, east] = [0, 1].map(|axis| told.place[axis].wrapping_sub(was.place[axis]) as f32 * UNIT_M);
+        let latitude = told.place[0] as f32 * 1e-7;
+        let moved_m = [north, east * libm::cosf(latitude.to_radians())];
+        if moved_m.iter().any(|moved_m| libm::fabsf(*moved_m) > JUMP_MAX_M) {
+            *self = Self { before: Some(told), mean: told.velocity, ..Self::NEW };
+            return;
+        }
         let step_s = step_ms as f32 / 1e3;
-        let further_m = f32::midpoint(speed_mps, speed_before_mps) * step_s - libm::hypotf(north_m, east_m);
         let kept = MEMORY_S / (MEMORY_S + step_s);
-        self.further_m = kept * (self.further_m + further_m);
+        for (axis, moved_m) in moved_m.iter().enumerate() {
+            let further_m = f32::midpoint(told.velocity[axis], was.velocity[axis]) * step_s - moved_m;
+            self.further_m[axis] = kept * (self.further_m[axis] + further_m);
+            self.mean[axis] = told.velocity[axis] + kept * (self.mean[axis] - told.velocity[axis]);
+        }
         self.time_s = kept * (self.time_s + step_s);
-        self.before = told;
+        self.before = Some(told);
     }
 
-    /// How far the speed is from that of the positions, m/s.
-    pub(crate) fn speed_apart(&self) -> Option<Reading> {
-        let (.., at) = self.before?;
+    /// How far the velocity is from that of the positions, m/s.
+    pub(crate) fn speed_apart(&self) -> Option<f32> {
+        let now = self.before?.velocity;
+        let late_m = LATE_S * length([0, 1].map(|axis| now[axis] - self.mean[axis]));
+        let apart_mps = (length(self.further_m) - late_m).max(0.0) / MEMORY_S;
         // Of a whole memory two thirds are there after its time constant.
-        let apart_mps = libm::fabsf(self.further_m) / MEMORY_S;
-        (self.time_s > 0.6 * MEMORY_S).then_some(Reading { at, value: apart_mps })
+        (self.time_s > 0.6 * MEMORY_S).then_some(apart_mps)
     }
 }
 
+fn length([north, east]: [f32; 2]) -> f32 {
+    libm::sqrtf(north * north + east * east)
+}
+
+/// What is said of where it is and how it moves, where that is exact.
+fn fix(gnss: &Gnss) -> Option<Fix> {
+    let good = gnss.fix >= 3
+        && gnss.accuracy.is_none_or(|accuracy| accuracy.0 <= ACCURACY_M)
+        && gnss.hdop.is_none_or(|hdop| hdop <= HDOP);
+    let speed_mps = gnss.speed.map(|speed| speed.0).filter(|speed| (0.0..=SPEED_MAX_MPS).contains(speed))?;
+    let course = gnss.course.map(|course| course.0).filter(|course| course.is_finite() && good)?;
+    let Position { latitude_deg, longitude_deg } = gnss.position?;
+    Some(Fix {
+        place: [latitude_deg, longitude_deg].map(|degrees| (degrees * 1e7) as i32),
+        velocity: [speed_mps * libm::cosf(course), speed_mps * libm::sinf(course)],
+        measured_ms: gnss.measured_ms?,
+    })
+}
 #[cfg(test)]
 mod tests {
-    use core::num::NonZeroU32;
-
     use super::*;
-    use crate::units::{Metres, MetresPerSecond, Position};
+    use crate::units::{Metres, MetresPerSecond, Radians};
 
-    /// Flies north with one speed by its positions and another one by what it tells, each position twice. `came` is when a step's
-    /// message comes, and `measured` when it was measured, both in ms.
-    fn heard(
-        (moves_mps, told_mps): (f64, f32),
-        came: fn(u64) -> u64,
-        measured: fn(u64) -> u32,
-    ) -> Option<f32> {
+    /// Flies with a velocity that turns once in so many seconds, and tells one that is off by an error, both north and east in m/s; each
+    /// position twice. `measured` is when a step was measured, ms.
+    fn heard((speed_mps, turn_s): (f32, f32), error_mps: [f32; 2], measured: fn(u64) -> u32) -> Option<f32> {
         let mut travel = Travel::NEW;
-        for step in 0_u64..200 {
+        let mut place = [47.0, 8.0];
+        for step in 0_u64..100 {
+            let course = step as f32 * 0.2 / turn_s * core::f32::consts::TAU;
+            let velocity = [speed_mps * course.cos(), speed_mps * course.sin()];
+            let [north, east] = [0, 1].map(|axis| velocity[axis] + error_mps[axis]);
             let gnss = Gnss {
                 fix: 3,
                 accuracy: Some(Metres(0.5)),
-                position: Some(Position {
-                    latitude_deg: 47.0 + moves_mps * (step / 2) as f64 * 0.2 / 111_320.0,
-                    longitude_deg: 8.0,
-                }),
-                speed: Some(MetresPerSecond(told_mps)),
+                position: Some(Position { latitude_deg: place[0], longitude_deg: place[1] }),
+                speed: Some(MetresPerSecond(north.hypot(east))),
+                course: Some(Radians(east.atan2(north))),
                 measured_ms: NonZeroU32::new(measured(step)),
                 ..Gnss::default()
             };
-            travel.take(Instant::from_millis(came(step)), &gnss, true);
+            travel.take(&gnss, true);
+            travel.take(&gnss, true);
+            place[0] += f64::from(velocity[0]) * 0.2 / 111_320.0;
+            place[1] += f64::from(velocity[1]) * 0.2 / (111_320.0 * 47.0_f64.to_radians().cos());
         }
-        travel.speed_apart().map(|reading| reading.value)
+        travel.speed_apart()
     }
 
-    fn flown(moves_mps: f64, told_mps: f32) -> Option<f32> {
-        heard((moves_mps, told_mps), |step| step * 100, |step| 7 + (step / 2) as u32 * 200)
+    const STRAIGHT_S: f32 = 1e6;
+
+    fn flown(speed_mps: f32, turn_s: f32, error_mps: [f32; 2]) -> f32 {
+        heard((speed_mps, turn_s), error_mps, |step| 7 + step as u32 * 200).expect("known")
     }
 
     #[test]
-    fn a_speed_that_is_not_that_of_the_positions_is_told() {
-        let apart = |moves, told| flown(moves, told).expect("known");
-        assert!(apart(5.0, 5.0) < 0.2);
-        assert!((apart(5.0, 7.0) - 2.0).abs() < 0.3);
-        assert!((apart(5.0, 3.0) - 2.0).abs() < 0.3);
-        assert_eq!(flown(0.0, 2.0), None, "one position, bit for bit, is another check's");
+    fn a_velocity_that_is_not_that_of_the_positions_is_told() {
+        assert!(flown(5.0, STRAIGHT_S, [0.0; 2]) < 0.1);
+        assert!((flown(5.0, STRAIGHT_S, [2.0, 0.0]) - 2.0).abs() < 0.3);
+        assert!((flown(5.0, STRAIGHT_S, [-2.0, 0.0]) - 2.0).abs() < 0.3);
+        assert_eq!(
+            heard((0.0, STRAIGHT_S), [2.0, 0.0], |step| 7 + step as u32 * 200),
+            None,
+            "one position, bit for bit, is another check's"
+        );
     }
 
     #[test]
-    fn the_receivers_time_counts_and_not_when_its_messages_come() {
-        let measured = |step: u64| (u32::MAX - 9_998).wrapping_add((step / 2) as u32 * 200);
-        let at_once = |step: u64| step / 20 * 2_000 + step % 20;
-        let slow_clock = |step: u64| step * 60;
-        for came in [at_once, slow_clock] {
-            assert!(heard((15.0, 15.0), came, measured).expect("known") < 0.2);
-            assert!((heard((15.0, 12.0), came, measured).expect("known") - 3.0).abs() < 0.4);
-        }
-        assert_eq!(heard((15.0, 12.0), |step| step * 100, |_| 0), None, "not known");
-        assert_eq!(heard((15.0, 12.0), |step| step * 100, |_| 7), None, "stands still");
+    fn an_error_does_not_hide_behind_a_turn_and_a_turn_is_none() {
+        assert!(flown(10.0, 20.0, [0.0; 2]) < 0.1);
+        assert!(flown(10.0, 6.0, [0.0; 2]) < 0.1);
+        assert!(flown(3.0, 6.0, [2.0, 0.0]) > 1.4);
+        assert!(flown(3.0, 6.0, [0.0, -2.0]) > 1.4);
+    }
+
+    #[test]
+    fn the_receivers_time_counts() {
+        let wraps = |step: u64| (u32::MAX - 9_998).wrapping_add(step as u32 * 200);
+        assert!(heard((15.0, STRAIGHT_S), [0.0; 2], wraps).expect("known") < 0.2);
+        assert!((heard((15.0, STRAIGHT_S), [3.0, 0.0], wraps).expect("known") - 3.0).abs() < 0.4);
+        assert_eq!(heard((15.0, STRAIGHT_S), [3.0, 0.0], |_| 0), None, "not known");
+        assert_eq!(heard((15.0, STRAIGHT_S), [3.0, 0.0], |_| 7), None, "stands still");
     }
 }

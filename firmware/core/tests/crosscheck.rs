@@ -47,6 +47,10 @@ struct Fitted {
     hud_climb: Option<f32>,
     /// A second after this, GPS repeats its position.
     gps_until_ms: u64,
+    /// How fast it flies north, m/s.
+    speed: f32,
+    /// Whether it tells its position now.
+    places: bool,
 }
 
 /// A number between -1 and 1 for a moment and a sensor: the same one each time.
@@ -91,15 +95,21 @@ impl Fitted {
             attitude_noise: 0.01,
             hud_climb: None,
             gps_until_ms: u64::MAX,
+            speed: 1.0,
+            places: true,
         }
     }
 
     fn says(&self, now_ms: u64) -> Vec<Observation> {
         let mut said = self.quad.says(now_ms);
-        said.retain(|said| !matches!(said, Observation::Imu(_) | Observation::Attitude(_)));
+        said.retain(|said| match said {
+            Observation::Imu(_) | Observation::Attitude(_) => false,
+            Observation::GlobalPosition(_) | Observation::LocalPosition(_) => self.places,
+            _ => true,
+        });
         for observation in &mut said {
             if let Observation::GlobalPosition(global) = observation {
-                global.velocity[0] = MetresPerSecond(1.0);
+                global.velocity[0] = MetresPerSecond(self.speed);
             }
             if let Observation::Hud(hud) = observation {
                 hud.climb = self.hud_climb.map(MetresPerSecond);
@@ -245,6 +255,66 @@ fn a_fast_turn_and_a_vtol_say_nothing_about_sensors() {
         apart(now_ms, fitted);
         (fitted.quad.kind, fitted.quad.type_number) = (VehicleKind::Vtol, 20);
     });
+}
+
+#[test]
+fn on_a_fast_leg_sensors_and_vibration_are_judged_too() {
+    const QUADROTOR: u8 = 2;
+    const HELICOPTER: u8 = 4;
+    let first = |type_number, fault: fn(&mut Fitted)| {
+        let findings = fly(|now_ms, fitted| {
+            (fitted.quad.type_number, fitted.speed) = (type_number, 10.0);
+            if now_ms >= FAULT_MS {
+                fault(fitted);
+            }
+        });
+        let [found] = findings[..] else { panic!("{findings:?}") };
+        assert!((FAULT_MS..FAULT_MS + 6_000).contains(&found.at.as_millis()), "{found:?}");
+        (found.check, found.instance)
+    };
+    assert_eq!(first(QUADROTOR, |fitted| fitted.force[1][2] += 3.0), ("accel_mismatch", 1));
+    assert_eq!(first(HELICOPTER, |fitted| fitted.rate[2][0] += 0.4), ("gyro_mismatch", 2));
+    let shakes = |fitted: &mut Fitted| fitted.quad.vibration.levels[0] = Some(18.0);
+    assert_eq!(first(HELICOPTER, shakes), ("vibration_rise", 0));
+    is_quiet(|_, fitted| fitted.speed = 10.0);
+}
+
+#[test]
+fn position_messages_that_stop_are_told() {
+    let findings = fly(|now_ms, fitted| fitted.places = now_ms < FAULT_MS);
+    let found = findings.first().expect("something");
+    assert_eq!((found.check, found.level), ("position_silent", Level::Warning));
+    assert!(found.at.as_millis() < FAULT_MS + 3_500, "{found:?}");
+    // What needs a position has none.
+    assert!(findings.iter().skip(1).all(|one| one.level == Level::Stale), "{findings:?}");
+}
+
+#[test]
+fn of_two_heights_the_one_that_leapt_is_named() {
+    let fly = |fault: fn(u64, &mut Fitted)| {
+        fly(|now_ms, fitted| {
+            if now_ms >= FAULT_MS {
+                fault(now_ms - FAULT_MS, fitted);
+            }
+        })
+    };
+    for leap_m in [15.0, -15.0] {
+        let findings = if leap_m > 0.0 {
+            fly(|_, fitted| fitted.altitude += 15.0)
+        } else {
+            fly(|_, fitted| fitted.altitude -= 15.0)
+        };
+        let found = findings.first().expect("something");
+        assert_eq!((found.check, found.because), ("gps_height", ""), "{findings:?}");
+        assert!(found.at.as_millis() < FAULT_MS + 600, "{found:?}");
+        let height = findings.iter().find(|one| one.check == "baro_height").expect("they are apart");
+        assert_eq!(height.because, "gps_height");
+    }
+    // A slow drift is nobody's, and a barometer that leaps is another check's.
+    let drifts = fly(|since_ms, fitted| fitted.altitude += since_ms as f32 * 0.0005);
+    assert!(drifts.iter().all(|one| one.check == "baro_height"), "{drifts:?}");
+    let leaps = fly(|_, fitted| fitted.pressure.iter_mut().for_each(|pressure| *pressure -= 1.8));
+    assert!(leaps.iter().all(|one| one.check == "baro_height"), "{leaps:?}");
 }
 
 #[test]

@@ -83,7 +83,7 @@ const INPUTS: &[(&str, &str)] = &[
     ("vibration_px4", "VIBRATION of PX4: the accelerometer metric"),
     (
         "vibration_rise",
-        "VIBRATION: the worst axis, or PX4's accelerometer metric, over what is usual in this flight; multicopters in hover",
+        "VIBRATION: the worst axis, or PX4's accelerometer metric, over what is usual in this flight; on rotors away from the ground",
     ),
     ("clipping", "VIBRATION: clipped samples of a flight, since ten seconds without any"),
     ("load_factor", "SCALED_IMU, RAW_IMU, HIGHRES_IMU: specific force over gravity"),
@@ -98,9 +98,12 @@ const INPUTS: &[(&str, &str)] = &[
     ("compass_unused", "ESTIMATOR_STATUS: no test ratio of a compass that had 20 of them in this flight"),
     (
         "accel_mismatch",
-        "RAW_IMU, SCALED_IMU, SCALED_IMU2, SCALED_IMU3, HIGHRES_IMU: difference of the forces beyond its usual range in this flight; multicopters in hover",
+        "RAW_IMU, SCALED_IMU, SCALED_IMU2, SCALED_IMU3, HIGHRES_IMU: difference of the forces beyond its usual range in this flight; on rotors, in a hover or turning little",
     ),
-    ("gyro_mismatch", "the same messages: difference of the rates, likewise"),
+    (
+        "gyro_mismatch",
+        "the same messages: difference of the rates, likewise; of multicopters in a hover only, on wings too",
+    ),
     (
         "compass_mismatch",
         "the same messages: difference of the fields, percent of their length, likewise; not of VTOLs, not in fast turns",
@@ -132,7 +135,14 @@ const INPUTS: &[(&str, &str)] = &[
         "SCALED_PRESSURE, SCALED_PRESSURE2, SCALED_PRESSURE3, HIGHRES_IMU: how long the pressure was the same",
     ),
     ("gps_stuck", "GPS_RAW_INT, GPS2_RAW: how long position, height and speed were the same"),
-    ("gps_speed", "GPS_RAW_INT, GPS2_RAW: speed less the way between positions, over four seconds"),
+    (
+        "gps_speed",
+        "GPS_RAW_INT, GPS2_RAW: speed and course less the way between positions, over four seconds",
+    ),
+    (
+        "gps_height",
+        "GPS_RAW_INT: what its height moved in four seconds less the climb of GLOBAL_POSITION_INT, LOCAL_POSITION_NED or VFR_HUD, where the barometer (SCALED_PRESSURE, HIGHRES_IMU) did less than half of it",
+    ),
     (
         "gps_satellites",
         "GPS_RAW_INT, GPS2_RAW, where the receiver does not tell an accuracy within half of GPS_HACC_WARN",
@@ -159,6 +169,10 @@ const INPUTS: &[(&str, &str)] = &[
     ),
     ("heartbeat", "HEARTBEAT of the autopilot: its age"),
     ("frames_lost", "sequence numbers on the autopilot's port, ten seconds"),
+    (
+        "position_silent",
+        "GLOBAL_POSITION_INT, LOCAL_POSITION_NED: how long before the latest ATTITUDE or HEARTBEAT the last one came",
+    ),
     ("rc_rssi", "RC_CHANNELS; device scale"),
     ("radio_rssi", "RADIO_STATUS; device scale"),
     (

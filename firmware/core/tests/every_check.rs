@@ -205,7 +205,9 @@ const FAULTS: [(&str, u8, Level, Fault); 97] = [
 
 /// Found by scripts of their own: silence, restarts and rates in `scripted_faults.rs`, what departs from a baseline in
 /// `trends.rs`, mishaps in `mishap.rs`, what departs from its usual level in a flight in `crosscheck.rs`.
-const ELSEWHERE: [&str; 36] = [
+const ELSEWHERE: [&str; 38] = [
+    "gps_height",
+    "position_silent",
     "baro_height",
     "baro_noise",
     "ekf_climb",
@@ -391,6 +393,7 @@ fn there_are_as_many_of_each_check_as_there_may_be_of_what_it_watches() {
             name if name.starts_with("batt_") || name.starts_with("cell_") => 4,
             "motor_output" => 6,
             "gps_stuck" => 2,
+            "gps_height" => 1,
             name if name.ends_with("_mismatch") || name.ends_with("_stuck") => 3,
             name if name.starts_with("esc_") || name.starts_with("motor_") => 12,
             name if name.starts_with("gps_") => 2,

@@ -160,6 +160,7 @@ impl Random {
             }),
             altitude: self.float(Metres),
             speed: self.float(MetresPerSecond),
+            course: self.float(Radians),
             measured_ms: NonZeroU32::new(self.u32()),
         }
     }

@@ -18,14 +18,12 @@
 //! again, up to [`CLEAR_MAX`], until the check no longer applies (the vehicle landed, or was disarmed). So does the time after
 //! which a bad value is stale: a stream that is slower than values stay fresh is no new alarm with each message.
 
-use core::num::NonZeroU32;
-
 use super::finding::{Finding, Level, Subsystem};
 use super::inputs::Inputs;
 use crate::latest::Reading;
 use crate::observation::Feeds;
 use crate::params::{Param, Params};
-use crate::time::{Instant, Span};
+use crate::time::{Instant, Span, Stamp};
 
 /// Which side of its limits is the bad one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -155,48 +153,6 @@ const _: () = assert!(CLEAR.as_millis() << (3 * Repeats::MOST) == CLEAR_MAX.as_m
 
 /// Measurements that have to be bad, one after the other: one message of nonsense is no alarm.
 pub const SAMPLES: u8 = 2;
-
-/// A point in time in four bytes, because there are some 140 states: milliseconds modulo 2^32, and never zero. What is
-/// measured from it is far shorter than the 49.7 days after which it would be mistaken.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-struct Stamp(Option<NonZeroU32>);
-
-impl Stamp {
-    const NONE: Self = Self(None);
-
-    const fn at(at: Instant) -> Self {
-        match NonZeroU32::new(at.as_millis() as u32) {
-            Some(millis) => Self(Some(millis)),
-            // A millisecond earlier.
-            None => Self(Some(NonZeroU32::MAX)),
-        }
-    }
-
-    const fn is_set(self) -> bool {
-        self.0.is_some()
-    }
-
-    /// Whether it is set and more than `span` ago.
-    fn older_than(self, now: Instant, span: Span) -> bool {
-        self.age_ms(now).is_some_and(|age_ms| age_ms > span.as_millis())
-    }
-
-    fn age_ms(self, now: Instant) -> Option<u64> {
-        Some(u64::from((now.as_millis() as u32).wrapping_sub(self.0?.get())))
-    }
-
-    /// Runs while `on`; whether it has run for `span`.
-    fn run(&mut self, on: bool, now: Instant, span: Span) -> bool {
-        if !on {
-            *self = Self::NONE;
-            return false;
-        }
-        if !self.is_set() {
-            *self = Self::at(now);
-        }
-        self.age_ms(now).is_some_and(|age_ms| age_ms >= span.as_millis())
-    }
-}
 
 /// Two counts up to 15 in a byte.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -56,6 +56,14 @@ pub(super) const CHECKS: &[Check] = &[
         read: frames_lost_percent,
         ..HEARTBEAT
     },
+    Check {
+        name: "position_silent",
+        warn: Some(Param::PosAgeWarn),
+        critical: None,
+        when: When::InFlight,
+        read: position_age_s,
+        ..HEARTBEAT
+    },
     RADIO,
     Check {
         name: "radio_rssi",
@@ -82,6 +90,14 @@ pub(super) const CHECKS: &[Check] = &[
 fn heartbeat_age_s(inputs: &Inputs<'_>, _: u8) -> Option<Reading> {
     let at = inputs.vehicle.heartbeat.at()?;
     Some(Reading { at: inputs.now, value: inputs.now.since(at).as_secs_f32() })
+}
+
+/// Since the last position, global or local, while the autopilot is heard.
+fn position_age_s(inputs: &Inputs<'_>, _: u8) -> Option<Reading> {
+    let Inputs { now, vehicle, .. } = *inputs;
+    let at = vehicle.global.at().max(vehicle.local.at())?;
+    let heard = vehicle.heartbeat.at()?.max(vehicle.attitude.at()?);
+    Some(Reading { at: now, value: heard.since(at).as_secs_f32() })
 }
 
 fn frames_lost_percent(inputs: &Inputs<'_>, _: u8) -> Option<Reading> {

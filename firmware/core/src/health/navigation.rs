@@ -201,7 +201,23 @@ pub(super) const CHECKS: &[Check] = &[
         side: Side::Above,
         warn: Some(Param::GpsSpeedWarn),
         hysteresis: 0.2,
-        read: |inputs, receiver| inputs.derived.crosschecks().speed_apart(receiver),
+        read: |inputs, receiver| {
+            let apart = inputs.derived.crosschecks().speed_apart(receiver);
+            Reading::new(inputs.vehicle.gnss.get(usize::from(receiver))?.at(), apart)
+        },
+        ..GNSS
+    },
+    Check {
+        name: "gps_height",
+        unit: "m",
+        stale_after: None,
+        side: Side::Above,
+        warn: Some(Param::GpsHeightWarn),
+        hysteresis: 1.0,
+        // Two messages at 5 Hz.
+        debounce_warn: Span::from_millis(200),
+        instances: 1,
+        read: |inputs, _| inputs.derived.crosschecks().heights().receiver_leapt(inputs.now),
         ..GNSS
     },
     Check {

@@ -48,7 +48,7 @@ pub(super) const CHECKS: &[Check] = &[
         hysteresis: 0.5,
         debounce_warn: Span::from_millis(500),
         when: When::InFlight,
-        // Never stale: only hover says something.
+        // Never stale: only what flies on rotors says something.
         stale_after: None,
         read: |inputs, _| inputs.derived.crosschecks().vibration_rise(),
         ..VIBRATION

@@ -220,7 +220,7 @@ vocabulary! {
     "vibration_px4" Px4 "vibration", "", says "vibration high", "LAND", needs "vibration metrics";
     "Vibration was strong enough to disturb the estimator.";
     "Balance propellers and motors, and check the autopilot's mounting.";
-    "vibration_rise" Vehicle "vibration within the flight", "", says "vibration rose", "", needs "vibration levels of a multicopter in hover";
+    "vibration_rise" Vehicle "vibration within the flight", "", says "vibration rose", "", needs "vibration levels of what flies on rotors";
     "Vibration rose to a multiple of what it was before in the same flight.";
     "Check propellers, motor bearings and mounting before the next flight.";
     "clipping" Vehicle "accelerometer clipping", "", says "accelerometer clipping", "LAND", needs "clipping counts";
@@ -253,10 +253,10 @@ vocabulary! {
     "Check the compass, its calibration and currents or magnets near it.";
     "compass_unused" Px4 "compass in use", "", says "EKF dropped compass", "", needs "estimator test ratio of the compass";
     "The estimator stopped using the compass."; "Check the compass, its calibration and currents or magnets near it.";
-    "accel_mismatch" Vehicle "accelerometer agreement", "accelerometer", says "accelerometer # disagrees", "", needs "second accelerometer on a multicopter";
+    "accel_mismatch" Vehicle "accelerometer agreement", "accelerometer", says "accelerometer # disagrees", "", needs "second accelerometer on rotors";
     "Two accelerometers came apart in flight: one of them is wrong.";
     "Do not fly until the autopilot's accelerometers are checked.";
-    "gyro_mismatch" Vehicle "gyro agreement", "gyro", says "gyro # disagrees", "", needs "second gyro on a multicopter";
+    "gyro_mismatch" Vehicle "gyro agreement", "gyro", says "gyro # disagrees", "", needs "second gyro in flight";
     "Two gyros came apart in flight: one of them is wrong."; "Do not fly until the autopilot's gyros are checked.";
     "compass_mismatch" Vehicle "compass agreement", "compass", says "compass # disagrees", "", needs "second compass";
     "Two compasses came apart in flight: one of them is wrong, or a current or magnet is near it.";
@@ -284,7 +284,9 @@ vocabulary! {
     "gps_satellites" Vehicle "GPS satellites", "GPS", says "GPS # few satellites", "", needs "GPS satellite count";
     "Few satellites were in use: the position was not exact."; "Wait for more satellites; check the antenna's view.";
     "gps_speed" Vehicle "GPS speed against its positions", "GPS", says "GPS # speed wrong", "", needs "GPS speed and position in flight";
-    "The receiver's speed was not that of its positions: one of both is wrong."; "Check the antenna's view, sources of interference and the receiver's firmware.";
+    "The receiver's speed and course were not those of its positions: one of both is wrong."; "Check the antenna's view, sources of interference and the receiver's firmware.";
+    "gps_height" Vehicle "GPS height against barometer and climb", "", says "GPS height wrong", "", needs "GPS height, air pressure and climb in flight";
+    "The receiver's height moved as neither the barometer nor the climb did: it is wrong."; "Check the antenna's view, sources of interference and the receiver's firmware.";
     "gps_hdop" Vehicle "GPS dilution of precision", "GPS", says "GPS # poor geometry", "", needs "GPS dilution of precision";
     "The satellites stood badly: the position was not exact."; "Wait for more satellites; check the antenna's view.";
     "gps_accuracy" Vehicle "GPS accuracy", "GPS", says "GPS # inaccurate", "", needs "GPS accuracy";
@@ -327,6 +329,8 @@ vocabulary! {
     "The autopilot fell silent."; "Check the wire between autopilot and monitor, and the autopilot's supply.";
     "frames_lost" Wire "frames lost on the wire", "", says "autopilot's data lost", "CHECK WIRE", needs "monitor on the autopilot's wire";
     "Messages of the autopilot were lost on the way."; "Check the wire, and lower the message rates or raise the baud rate.";
+    "position_silent" Wire "position messages", "", says "no position heard", "", needs "position of the estimator in flight";
+    "The autopilot stopped telling its position: it has none, or its link is set otherwise."; "Check the receiver and the estimator; check the rates of the autopilot's messages.";
     "rc_rssi" Vehicle "remote control signal", "", says "RC signal weak", "FLY BACK", needs "signal strength of the remote control";
     "The remote control's signal was weak."; "Check antennas and range.";
     "radio_rssi" Vehicle "telemetry signal", "", says "telemetry signal weak", "", needs "telemetry radio status";

@@ -49,6 +49,11 @@ fn speed(centimetres: u16) -> Option<MetresPerSecond> {
     unless(centimetres, u16::MAX).map(|speed| MetresPerSecond(f32::from(speed) / 100.0))
 }
 
+/// Hundredths of a degree: 65535 is unknown.
+fn course(hundredths: u16) -> Option<Radians> {
+    unless(hundredths, u16::MAX).map(|course| Radians((f32::from(course) / 100.0).to_radians()))
+}
+
 /// Modulo 2^32; 0 is what is sent where nobody knows.
 const fn milliseconds(us: u64) -> Option<NonZeroU32> {
     NonZeroU32::new((us / 1_000) as u32)
@@ -67,6 +72,7 @@ pub(super) fn gnss(payload: &[u8]) -> Option<Gnss> {
         hdop: dilution(gps.eph),
         accuracy: error(gps.h_acc),
         speed: speed(gps.vel),
+        course: course(gps.cog),
         measured_ms: milliseconds(gps.time_usec),
         position: position(gps.lat, gps.lon).filter(|_| has_position),
         altitude: has_position.then(|| Metres(gps.alt as f32 / 1e3)),
@@ -85,6 +91,7 @@ pub(super) fn gnss2(payload: &[u8]) -> Option<Gnss> {
         hdop: dilution(gps.eph),
         accuracy: error(gps.h_acc),
         speed: speed(gps.vel),
+        course: course(gps.cog),
         measured_ms: milliseconds(gps.time_usec),
         position: position(gps.lat, gps.lon).filter(|_| has_position),
         altitude: has_position.then(|| Metres(gps.alt as f32 / 1e3)),

@@ -74,6 +74,7 @@ pub(super) const CLASSES: &[Class] = &[
             "gps_spoofing",
             "gps_stuck",
             "gps_speed",
+            "gps_height",
             "gnss_alert",
         ],
     },
@@ -133,7 +134,7 @@ pub(super) const CLASSES: &[Class] = &[
     Class {
         name: "link",
         about: "links of the autopilot",
-        checks: &["heartbeat", "frames_lost", "gcs_alert"],
+        checks: &["heartbeat", "frames_lost", "position_silent", "gcs_alert"],
     },
     Class { name: "rc", about: "remote control", checks: &["rc_rssi", "rc_alert"] },
     Class {

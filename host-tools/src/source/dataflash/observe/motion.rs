@@ -271,6 +271,7 @@ fn gnss(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
         position: position.filter(|_| has_position),
         altitude: given.single(6).filter(|_| has_position).map(Metres),
         speed: speed.map(MetresPerSecond),
+        course: given.single(8).map(|degrees| Radians(degrees.to_radians())),
         measured_ms: receiver_ms(given),
     };
     out.observe(&Observation::Gnss(gnss));

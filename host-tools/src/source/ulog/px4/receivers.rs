@@ -8,7 +8,7 @@ use std::num::NonZeroU32;
 
 use hums_core::observation::{Gnss, GnssIntegrity, Observation};
 use hums_core::time::{Instant, Span};
-use hums_core::units::{Metres, MetresPerSecond};
+use hums_core::units::{Metres, MetresPerSecond, Radians};
 
 use super::motion::place;
 use super::state::{MEDIUM_US, Px4, RECEIVERS_MAX, Receivers, Said, Told, Topic};
@@ -33,6 +33,7 @@ const FIELDS: &[&str] = &[
     "time_utc_usec",
     "jamming_state",
     "spoofing_state",
+    "cog_rad",
 ];
 
 pub(super) const TOPICS: &[Topic] = &[
@@ -98,6 +99,8 @@ fn receiver(px4: &mut Px4, said: &Said<'_>) {
         position: position.filter(|_| has_position),
         altitude: altitude.filter(|_| has_position).map(Metres),
         speed: fields.finite(10).filter(|speed| (0.0..655.35).contains(speed)).map(MetresPerSecond),
+        // As MAVLink holds it: of a turn from north.
+        course: fields.finite(14).map(|course| Radians(course.rem_euclid(core::f32::consts::TAU))),
         // The receiver's UTC: 0 where it has none.
         measured_ms: fields.count(11).and_then(|us| NonZeroU32::new((us / 1_000) as u32)),
     }));
