@@ -50,7 +50,8 @@ impl Departure {
     /// Both at once, of a figure that is wrong where it is large: further above its usual range than `hold` it teaches nothing.
     pub(crate) fn take(&mut self, figure: f32, step_s: f32, hold: f32) {
         self.follow(figure, step_s, SMOOTHING_S);
-        if self.beyond().is_none_or(|beyond| beyond <= hold) {
+        let is_garbage = !(-FIGURE_MAX..=FIGURE_MAX).contains(&figure);
+        if !is_garbage && self.beyond().is_none_or(|beyond| beyond <= hold) {
             self.learn(step_s);
         }
     }
@@ -128,6 +129,7 @@ mod tests {
 
     #[test]
     fn garbage_changes_nothing() {
+        assert_eq!(taken(core::iter::repeat_n(f32::NAN, 300)).beyond(), None);
         let departed =
             taken(noise(5.0, 200).chain([f32::NAN, f32::INFINITY, f32::MAX, -1.0]).chain(noise(5.0, 10)));
         assert_eq!(departed.beyond(), Some(0.0));

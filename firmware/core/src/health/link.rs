@@ -61,6 +61,8 @@ pub(super) const CHECKS: &[Check] = &[
         warn: Some(Param::PosAgeWarn),
         critical: None,
         when: When::InFlight,
+        // That positions come says nothing about how good they are.
+        alarm_only: true,
         read: position_age_s,
         ..HEARTBEAT
     },
