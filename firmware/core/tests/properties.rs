@@ -437,13 +437,12 @@ fn after_anything_at_all_a_vehicle_that_falls_silent_is_critical_and_nothing_tha
 }
 
 /// Checks of whole numbers that have no way of saying that they are unknown, of ages, and of ourselves.
-const KNOWN_ANYWAY: [&str; 9] = [
+const KNOWN_ANYWAY: [&str; 8] = [
     "batt_fault",
     "esc_silent",
     "clipping",
     "heartbeat",
     "frames_lost",
-    "position_silent",
     "autopilot_reboot",
     "autopilot_state",
     "gps_fix",
