@@ -422,6 +422,7 @@ fn flags_that_are_not_set_and_parts_that_are_not_due_make_nothing_healthy() {
         "autopilot_state",
         "compass_unused",
         "disarmed_in_air",
+        "position_silent",
     ];
     for check in checks() {
         let due = DUE.iter().any(|(name, _)| *name == check.name);
