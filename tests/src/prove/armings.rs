@@ -311,10 +311,14 @@ fn page(kind: Kind, bytes: &mut Vec<u8>, random: &mut Random) -> String {
 fn files_of(log: &Log) -> Result<Vec<(String, Vec<u8>)>> {
     let of = |(file, piece): (&String, &hums::logs::Piece)| {
         let one = Log { pieces: vec![piece.clone()], ..log.clone() };
-        let (mut blocks, mut bytes, mut end) = (one.blocks(), Vec::new(), 0);
+        let (mut blocks, mut bytes, mut end, mut base) = (one.blocks(), Vec::new(), 0, None);
         while let Some(block) = blocks.next_block()? {
+            let at = (bytes.len() / BLOCK) as u32;
             bytes.extend_from_slice(&block);
-            if Header::read(&block).is_ok() {
+            // What the file held before lies in another order.
+            if let Ok(header) = Header::read(&block)
+                && *base.get_or_insert(header.number) + at == header.number
+            {
                 end = bytes.len();
             }
         }
