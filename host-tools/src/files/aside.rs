@@ -14,7 +14,7 @@ use super::part::{fill_part, rename_new, sync_folder_of};
 use super::paths::KEPT;
 
 /// Keeps what lies at `from` as an earlier `target`, and gives its new path. Nothing is ever written over.
-pub(super) fn set_aside(from: &Path, target: &Path) -> io::Result<PathBuf> {
+pub fn set_aside(from: &Path, target: &Path) -> io::Result<PathBuf> {
     let name = target.file_name().ok_or(io::ErrorKind::InvalidInput)?;
     let kept = target.with_file_name(KEPT);
     let mut number = newest(&kept).unwrap_or(1);

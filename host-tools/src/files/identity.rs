@@ -4,6 +4,8 @@ use std::fs::{self, Metadata};
 use std::io;
 use std::path::{Component, Path, PathBuf};
 
+use anyhow::{Result, bail};
+
 /// A file's identity.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum FileId {
@@ -46,6 +48,23 @@ impl FileId {
             }
         }
     }
+}
+
+/// Refuses a file that is to be written in place and has another name too: what is kept under that would change with it.
+pub fn check_only_name(about: &Metadata, path: &Path) -> Result<()> {
+    #[cfg(unix)]
+    let names = std::os::unix::fs::MetadataExt::nlink(about);
+    // A file that is open tells it nowhere else without asking once more.
+    #[cfg(not(unix))]
+    let names = about.len().min(1);
+    if names > 1 {
+        bail!(
+            "{}: has another name too (a hard link, of a backup perhaps), under which it would change as well; nothing was \
+             written: put a copy in its place, or move it away",
+            path.display()
+        );
+    }
+    Ok(())
 }
 
 /// A path without the slash at its end; `None` where there is none.

@@ -25,14 +25,14 @@ mod short;
 mod stamp;
 mod there;
 
-pub use aside::remake_in_place;
+pub use aside::{remake_in_place, set_aside};
 pub use descriptor::{
     Opened, STANDARD_ERROR, STANDARD_INPUT, STANDARD_OUTPUT, check_standard_output, descriptor,
     means_standard_output,
 };
 pub use ends::{add_ends, content_identity, digest, short};
 pub use folder::{Folder, FolderFile, buffered};
-pub use identity::{FileId, is_seekable};
+pub use identity::{FileId, check_only_name, is_seekable};
 pub use inputs::Inputs;
 pub use output::{Begun, Output};
 pub use part::{make_in_place, open_in_place, take_turn};

@@ -10,7 +10,7 @@ use super::aside::{kept_as, replace, set_aside};
 use super::descriptor::{
     Opened, check_standard_output, descriptor, is_standard_output, means_standard_output,
 };
-use super::identity::is_seekable;
+use super::identity::{check_only_name, is_seekable};
 use super::inputs::Inputs;
 use super::part::{
     begin, free_part, is_written, lock_folder_of, open_in_place, rename_new, sync_folder_of, unlock_to_read,
@@ -144,8 +144,9 @@ impl Output {
             bail!("{}: is no file of ours, and stands where one is begun; move it away", part.path.display());
         }
         let file = open_to_go_on(&part.path, path)?;
-        let bytes = file.metadata().with_context(|| cannot_write(path))?.len();
-        Ok((Self::at_once(file, path, Some(part)), bytes))
+        let about = file.metadata().with_context(|| cannot_write(path))?;
+        check_only_name(&about, &part.path)?;
+        Ok((Self::at_once(file, path, Some(part)), about.len()))
     }
 
     /// Begins anew what [`Output::resume`] gave. What an earlier run has left is kept under the path that is given back.

@@ -166,7 +166,7 @@ fn pull(ftp: &mut Ftp, name: &str, output: &Path) -> Result<Option<(PathBuf, boo
     let there = there(ftp, name, &path, length)?;
     let mut part = Part::there(&path, length / SECTOR_BYTES as u32)?;
     if there == There::Whole {
-        part.map_or(Ok(()), Part::remove)?;
+        part.map_or(Ok(()), |part| part.finish(&path))?;
         return Ok(Some((path, false)));
     }
     let (mut file, _) = Output::resume(&path)?;
@@ -199,7 +199,7 @@ fn pull(ftp: &mut Ftp, name: &str, output: &Path) -> Result<Option<(PathBuf, boo
         }
     }
     file.finish()?;
-    part.map_or(Ok(()), Part::remove)?;
+    part.map_or(Ok(()), |part| part.finish(&path))?;
     Ok(Some((path, true)))
 }
 
@@ -231,8 +231,8 @@ fn there(ftp: &mut Ftp, name: &str, path: &Path, length: u32) -> Result<There> {
         // Not proved: it comes once more, and takes the place of what is there when it is whole.
         Likeness::SameEnds => Ok(There::Nothing),
         Likeness::Other => bail!(
-            "{} differs from the board's log (the same session by its name): damaged or changed here; move it away, or name \
-             another directory with -o",
+            "{} differs from the board's log of the same session: one of both is damaged or was changed, and `hums verify` \
+             says whether this one is; it is left as it is: move it away, or name another directory with -o",
             path.display()
         ),
     }

@@ -4,13 +4,13 @@
 //! in it is not brought again, neither by `--around` nor when all of the log is.
 
 use std::fs::{self, File};
-use std::io::{Read as _, Seek as _, SeekFrom, Write as _};
+use std::io::{BufReader, Read as _, Seek as _, SeekFrom, Write as _};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result, bail};
 use hums_blackbox::{Header, SECTOR_BYTES, Sector};
 
-use crate::files::{cannot_write, open_in_place};
+use crate::files::{cannot_write, check_only_name, open_in_place, set_aside, settle};
 use crate::logs::naming::part_name;
 
 /// The part of one log.
@@ -30,6 +30,7 @@ impl Part {
         options.read(true).write(true).create(true).truncate(false);
         let file = open_in_place(&mut options, &path).with_context(|| cannot_write(&path))?;
         let about = file.metadata().with_context(|| cannot_write(&path))?;
+        check_only_name(&about, &path)?;
         let bytes = u64::from(sectors) * SECTOR_BYTES as u64;
         if !about.is_file() || about.len() > bytes {
             bail!("{}: is no part of the board's log, which has {bytes} bytes; move it away", path.display());
@@ -97,10 +98,37 @@ impl Part {
         self.file.seek(SeekFrom::Start(u64::from(place) * SECTOR_BYTES as u64)).map(|_| ())
     }
 
-    /// All of it is in the whole log now.
-    pub(super) fn remove(self) -> Result<()> {
-        drop(self.file);
-        fs::remove_file(&self.path).with_context(|| format!("{}: cannot be removed", self.path.display()))
+    /// The whole log is here now: what is in that goes. What has more than that is kept: the card may have lost it since.
+    pub(super) fn finish(mut self, whole: &Path) -> Result<()> {
+        let is_in_it = self.is_in(whole)?;
+        let Self { file, path, .. } = self;
+        drop(file);
+        if is_in_it {
+            return fs::remove_file(&path).with_context(|| format!("{}: cannot be removed", path.display()));
+        }
+        let aside = settle(set_aside(&path, &path), &path)?;
+        note!(
+            "{}: has sectors that the whole log has not: it is kept as {}",
+            path.display(),
+            aside.display()
+        );
+        Ok(())
+    }
+
+    /// Whether the whole log has all that is in it, but for a sector that was in progress then.
+    fn is_in(&mut self, whole: &Path) -> Result<bool> {
+        let mut log = BufReader::new(settle(File::open(whole), whole)?);
+        let mut theirs = [0; SECTOR_BYTES];
+        for place in 0..self.has.len() as u32 {
+            settle(log.read_exact(&mut theirs), whole)?;
+            let ours = self.read(place)?;
+            let is_nothing = ours.bytes().iter().all(|byte| *byte == 0);
+            let was_in_progress = || Header::read(ours.bytes()).is_ok_and(|header| header.partial);
+            if *ours.bytes() != theirs && !is_nothing && !was_in_progress() {
+                return Ok(false);
+            }
+        }
+        Ok(true)
     }
 }
 
@@ -133,9 +161,24 @@ mod tests {
         assert_eq!((0..10).filter(|place| part.has(*place)).collect::<Vec<_>>(), [0, 3, 4]);
         assert_eq!((part.next(1, true), part.next(3, false), part.next(5, true)), (Some(3), Some(5), None));
         assert_eq!(part.read(3).expect("a sector"), sector(3));
-        part.remove().expect("removed");
+        // What is in the whole log goes; what the card has lost since does not.
+        let mut log = std::fs::read(part_name(&whole)).expect("there");
+        log[1] ^= 1;
+        std::fs::write(&whole, &log).expect("written");
+        part.finish(&whole).expect("kept");
+        log[1] ^= 1;
+        let kept = dir.path().join("hums-kept/1").join(part_name(&whole).file_name().expect("a name"));
+        assert_eq!(std::fs::read(&kept).expect("kept"), log);
+        std::fs::rename(&kept, part_name(&whole)).expect("put back");
+        std::fs::write(&whole, &log).expect("written");
+        let part = Part::there(&whole, 10).expect("it is").expect("there");
+        part.finish(&whole).expect("removed");
         assert!(!part_name(&whole).exists());
         std::fs::write(part_name(&whole), [0; 11 * SECTOR_BYTES]).expect("written");
         assert!(Part::open(&whole, 10).is_err(), "longer than the log");
+        std::fs::write(part_name(&whole), [0; SECTOR_BYTES]).expect("written");
+        std::fs::hard_link(part_name(&whole), dir.path().join("backup")).expect("a second name");
+        let refused = Part::open(&whole, 10).expect_err("it has two names");
+        assert!(cfg!(not(unix)) || refused.to_string().contains("has another name too"), "{refused}");
     }
 }
