@@ -185,8 +185,10 @@ fn database(args: &cli::Live) -> Result<Option<(Influx, Waiting)>> {
         );
     }
     let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
-    // As good as unique among the sessions of one vehicle, and in their order.
-    let session = format!("s{:08x}", now.as_secs() as u32);
+    // In their order, and unique also where several begin in one second.
+    let mut number = [0; 4];
+    getrandom::fill(&mut number).map_err(|error| anyhow!("no random numbers: {error}"))?;
+    let session = format!("s{:08x}{:08x}", now.as_secs() as u32, u32::from_le_bytes(number));
     let influx = Influx::start(target, session, spool, !args.input.is_live())?;
     Ok(Some((influx, Waiting { path, is_damaged: damage.bytes > 0 })))
 }

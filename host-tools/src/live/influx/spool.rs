@@ -9,7 +9,7 @@
 //! ```text
 //! header  "HUMSPOOL"  version u32  0 u32  ring's size u64  position of the oldest u64
 //!         the database's number u64  its address, zeros up to 512 bytes
-//! record  length u32  points u32  position u64  CRC-32 u32  0 u32  lines
+//! record  length u32  points u32  position u64  CRC-32 of these and the lines u32  0 u32  lines
 //! ```
 //! Points go to the database that they were made for and to no other: a file that has points for another one is refused.
 //!
@@ -29,11 +29,12 @@ use crate::files::{open_in_place, remake_in_place};
 use crate::plural::are;
 use crate::source::format::SPOOL_MAGIC as MAGIC;
 
-const VERSION: u32 = 2;
+const VERSION: u32 = 3;
 const HEADER_BYTES: u64 = 512;
 /// Where the database's address begins.
 const NAME_AT: usize = 40;
 const RECORD_BYTES: usize = 24;
+const SUM_AT: usize = 16;
 /// Of all records of all files that we write.
 const BATCH_BYTES_MAX: usize = 64 * 1024 * 1024;
 
@@ -63,6 +64,14 @@ pub struct Damage {
     pub points: u64,
     /// Bytes of batches that are not whole or not sound.
     pub bytes: u64,
+}
+
+/// What a record is checked by: of its head, up to where this stands, and of its lines.
+fn sum(head: &[u8], text: &[u8]) -> u32 {
+    let mut digest = CRC.digest();
+    digest.update(head.get(..SUM_AT).unwrap_or(head));
+    digest.update(text);
+    digest.finalize()
 }
 
 /// A record's head.
@@ -380,7 +389,7 @@ impl Spool {
         bytes.extend((head.length as u32).to_le_bytes());
         bytes.extend(head.points.to_le_bytes());
         bytes.extend(self.end.to_le_bytes());
-        bytes.extend(CRC.checksum(&batch.text).to_le_bytes());
+        bytes.extend(sum(&bytes, &batch.text).to_le_bytes());
         bytes.extend([0; 4]);
         bytes.extend(&batch.text);
         if let Err(error) = self.write_ring(self.end, &bytes) {
@@ -463,7 +472,7 @@ impl Spool {
             return Ok(None);
         }
         let text = bytes.split_off(RECORD_BYTES);
-        let sound = CRC.checksum(&text) == u32_at(&bytes, 16);
+        let sound = sum(&bytes, &text) == u32_at(&bytes, SUM_AT);
         Ok(sound.then_some((head, text)))
     }
 

@@ -121,7 +121,7 @@ fn what_is_sound_in_a_damaged_one_is_written_on_and_the_damaged_one_is_kept() {
         let (oldest, waits) = (spool.oldest, drain(&mut open_copy(&mut spool)));
         drop(spool);
         let whole = std::fs::read(&path).expect("a file");
-        // A byte of a batch's lines, of its length, of its position; the bytes of two batches; in each batch in turn.
+        // A byte of a batch's lines, of its length, of its count, of its position; the bytes of two batches; in each batch in turn.
         for (nth, _) in waits.iter().enumerate().filter(|(nth, _)| nth + 2 < waits.len()) {
             let bytes = |nth: usize| {
                 waits[..nth].iter().map(|batch| (RECORD_BYTES + batch.text.len()) as u64).sum::<u64>()
@@ -129,7 +129,7 @@ fn what_is_sound_in_a_damaged_one_is_written_on_and_the_damaged_one_is_kept() {
             let at = |byte: u64| (HEADER_BYTES + (oldest + bytes(nth) + byte) % limit) as usize;
             let next = bytes(nth + 1) - bytes(nth);
             for (spoiled, lost) in
-                [(30..31, 1), (1..2, 1), (9..10, 1), (next - 5..next + 3, 2), (0..next + 30, 2)]
+                [(30..31, 1), (1..2, 1), (5..6, 1), (9..10, 1), (next - 5..next + 3, 2), (0..next + 30, 2)]
             {
                 let mut damaged = whole.clone();
                 spoiled.for_each(|byte| damaged[at(byte)] ^= 0x55);
