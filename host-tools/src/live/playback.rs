@@ -269,13 +269,13 @@ impl Player {
             !interrupt::requested()
         })?;
         let name = &self.source.name;
-        if let Some(part) = self.read_to {
-            let percent = part * 100.0;
-            influx.leave_out(format!("{name}: {percent:.0} % of it were read when it was ended"));
+        let [given, end_s] = [given_to, end].map(Instant::as_secs_f64);
+        if self.read_to.is_some() {
+            influx
+                .leave_out(format!("{name}: its points go to {given:.1} s: it was ended while it was read"));
         } else if given_to < end {
-            let [given, end] = [given_to, end].map(Instant::as_secs_f64);
             influx.leave_out(format!(
-                "{name}: its points go to {given:.1} s of {end:.1} s, where it was ended"
+                "{name}: its points go to {given:.1} s of {end_s:.1} s, where it was ended"
             ));
         }
         loaded.seek(0, 0)
