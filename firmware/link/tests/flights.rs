@@ -233,7 +233,7 @@ fn the_faults_that_show_in_the_telemetry_of_the_faulty_flight_are_found() {
     // throughout, enough for a flight). Its vibration from 85.5 s on stays at 15 m/s2, half of the limit, and is far above
     // what this flight had.
     let expected = [
-        ("vibration_rise", Level::Warning, 91.0, 92.0),
+        ("vibration_rise", Level::Warning, 86.5, 87.5),
         ("cell_voltage", Level::Critical, 260.7, 260.9),
         // Its texts, and two heartbeats, one a second, say so.
         ("battery_alert", Level::Warning, 265.7, 266.0),
