@@ -285,7 +285,7 @@ vocabulary! {
     "Few satellites were in use: the position was not exact."; "Wait for more satellites; check the antenna's view.";
     "gps_speed" Vehicle "GPS speed against its positions", "GPS", says "GPS # speed wrong", "", needs "GPS speed and position in flight";
     "The receiver's speed and course were not those of its positions: one of both is wrong."; "Check the antenna's view, sources of interference and the receiver's firmware.";
-    "gps_height" Vehicle "GPS height against barometer and climb", "", says "GPS height wrong", "", needs "GPS height, air pressure and climb in flight";
+    "gps_height" Vehicle "GPS height against climb", "", says "GPS height wrong", "", needs "GPS height, air pressure and climb in flight";
     "The receiver's height moved as neither the barometer nor the climb did: it is wrong."; "Check the antenna's view, sources of interference and the receiver's firmware.";
     "gps_hdop" Vehicle "GPS dilution of precision", "GPS", says "GPS # poor geometry", "", needs "GPS dilution of precision";
     "The satellites stood badly: the position was not exact."; "Wait for more satellites; check the antenna's view.";
