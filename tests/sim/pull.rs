@@ -123,7 +123,7 @@ fn two_cards_are_never_made_into_one_log() {
         spoiled
     };
     for (spoiled, words) in [
-        (flipped(600), "differs from the board's log (the same session by its name)"),
+        (flipped(600), "differs from the board's log of the same session"),
         (flipped(whole.len() / 2), "differs from the board's log"),
         ([&whole[..], &[0; 5]].concat(), "begins as the board's log, and has 5 bytes more than that has"),
         (fs::read(&others).unwrap()[..10_000].to_vec(), "differs from the board's log"),
