@@ -190,4 +190,31 @@ mod tests {
             ]
         );
     }
+
+    #[test]
+    fn the_logs_of_a_box_are_in_the_order_of_their_numbers_and_not_of_their_random_sessions() {
+        let dir = tempfile::tempdir().expect("a folder");
+        let mut bytes = [0; 512];
+        bytes[..2].copy_from_slice(&[0x48, 0xb3]);
+        let mut sector = Sector::from_bytes(bytes);
+        sector.seal(7);
+        let names = [
+            "00001-s0000000c_00.HUM",
+            "00001-s0000000c_01.HUM",
+            "00002-s0000000b_00.HUM",
+            "00003-s0000000a_00.HUM",
+            "00001-box3f0042000d51373435363338-s0000000f_00.HUM",
+            "00002-box3f0042000d51373435363338-s0000000e_00.HUM",
+        ]
+        .map(|name| dir.path().join(name));
+        for path in &names {
+            fs::write(path, sector.bytes()).expect("room");
+        }
+        let files = |paths: &[PathBuf]| -> Vec<String> {
+            find(paths, false).expect("logs").logs.into_iter().flat_map(|log| log.files).collect()
+        };
+        let wanted: Vec<String> = names.iter().map(|path| path.display().to_string()).collect();
+        assert_eq!(files(&[dir.path().to_owned()]), wanted);
+        assert_eq!(files(&names), wanted);
+    }
 }

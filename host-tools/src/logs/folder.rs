@@ -30,8 +30,8 @@ const PACKED: [&str; 5] = [".gz", ".xz", ".zst", ".bz2", ".zip"];
 /// What lies in a folder and may be ours.
 #[derive(Default)]
 struct Entries {
-    /// Segments by session: whose it is, and its number.
-    sessions: BTreeMap<(String, u32), Vec<(SegmentName, PathBuf)>>,
+    /// Segments by session, which its first one's name stands for.
+    sessions: BTreeMap<SegmentName, Vec<(SegmentName, PathBuf)>>,
     segments: usize,
     /// Logs and images.
     files: Vec<PathBuf>,
@@ -130,8 +130,7 @@ impl Entries {
             (Ok(content), Some(_)) if content != Content::Log && path.extension().is_none() => {}
             (Ok(_), Some(name)) if self.segments < SEGMENTS_MAX => {
                 self.segments += 1;
-                let session = (name.of.clone(), name.session);
-                self.sessions.entry(session).or_default().push((name, path));
+                self.sessions.entry(name.first()).or_default().push((name, path));
             }
             (Ok(_), Some(_)) => {
                 found.leave_out(format!("{shown}: is left out: there are too many segments"));

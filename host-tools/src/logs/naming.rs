@@ -2,6 +2,7 @@
 //! that no other one's files ever have it: `00042-box3f0042000d51373435363338-s1a2b3c4d_07.HUM` is the same segment of the card's log
 //! 00042 of the board with that unique id, and the session that its sectors name.
 
+use std::cmp::Ordering;
 use std::path::{Path, PathBuf};
 
 use hums_recorder::LogName;
@@ -20,8 +21,9 @@ pub fn session_name(on_card: &str, board: Option<&Board>, session: Option<u32>) 
     format!("{on_card}{board}{session}")
 }
 
-/// The segment that a file's name says it is.
-#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+/// The segment that a file's name says it is. In their order those of a box are together, the oldest first: by their numbers,
+/// and not by what names a session, which is random.
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SegmentName {
     /// Whose session it is, `box3f0042000d51373435363338-s1a2b3c4d`; empty where the name is that of a card.
     pub of: String,
@@ -31,7 +33,28 @@ pub struct SegmentName {
     pub segment: u32,
 }
 
+impl Ord for SegmentName {
+    fn cmp(&self, other: &Self) -> Ordering {
+        self.recorder()
+            .cmp(other.recorder())
+            .then(self.session.cmp(&other.session))
+            .then_with(|| self.of.cmp(&other.of))
+            .then(self.segment.cmp(&other.segment))
+    }
+}
+
+impl PartialOrd for SegmentName {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
 impl SegmentName {
+    /// The first segment of its session.
+    pub fn first(&self) -> Self {
+        Self { segment: 0, ..self.clone() }
+    }
+
     /// The box, where the name tells it: the logs of one box are read as those of one card.
     pub fn recorder(&self) -> &str {
         self.of.rsplit_once('-').map_or("", |(recorder, _)| recorder)
