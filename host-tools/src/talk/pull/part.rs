@@ -115,18 +115,28 @@ impl Part {
         Ok(())
     }
 
-    /// Whether the whole log has all that is in it, but for a sector that was in progress then.
+    /// Whether the whole log has all that is in it. Copies of a sector in progress are at its own place and the one after: the
+    /// full one, where it can be read, has what they have.
     fn is_in(&mut self, whole: &Path) -> Result<bool> {
         let mut log = BufReader::new(settle(File::open(whole), whole)?);
-        let mut theirs = [0; SECTOR_BYTES];
+        let (mut theirs, mut before) = ([0; SECTOR_BYTES], None);
         for place in 0..self.has.len() as u32 {
             settle(log.read_exact(&mut theirs), whole)?;
             let ours = self.read(place)?;
             let is_nothing = ours.bytes().iter().all(|byte| *byte == 0);
-            let was_in_progress = || Header::read(ours.bytes()).is_ok_and(|header| header.partial);
-            if *ours.bytes() != theirs && !is_nothing && !was_in_progress() {
+            let (here, copy) = (Header::read(&theirs).ok(), Header::read(ours.bytes()).ok());
+            let is_full_one = |full: &Header| {
+                copy.is_some_and(|copy| {
+                    copy.partial
+                        && !full.partial
+                        && (copy.session, copy.number) == (full.session, full.number)
+                })
+            };
+            let became = [before, here].iter().flatten().any(is_full_one);
+            if *ours.bytes() != theirs && !is_nothing && !became {
                 return Ok(false);
             }
+            before = here;
         }
         Ok(true)
     }
@@ -180,5 +190,29 @@ mod tests {
         std::fs::hard_link(part_name(&whole), dir.path().join("backup")).expect("a second name");
         let refused = Part::open(&whole, 10).expect_err("it has two names");
         assert!(cfg!(not(unix)) || refused.to_string().contains("has another name too"), "{refused}");
+    }
+
+    #[test]
+    fn a_sector_in_progress_is_kept_until_the_whole_log_has_what_it_became() {
+        let dir = tempfile::tempdir().expect("a folder");
+        let whole = dir.path().join("00042-s00000007_07.HUM");
+        let mut in_progress = sector(1);
+        in_progress.set_partial(true);
+        in_progress.seal(7);
+        assert!(Header::read(in_progress.bytes()).is_ok_and(|header| header.partial));
+        let is_kept = |theirs: &Sector| {
+            let mut part = Part::open(&whole, 1).expect("made");
+            part.put(0, &in_progress).expect("room");
+            std::fs::write(&whole, theirs.bytes()).expect("written");
+            part.finish(&whole).expect("finished");
+            let kept = dir.path().join("hums-kept/1").join(part_name(&whole).file_name().expect("a name"));
+            let is_kept = kept.exists();
+            let _ = std::fs::remove_dir_all(dir.path().join("hums-kept"));
+            is_kept
+        };
+        assert!(!is_kept(&sector(1)) && !is_kept(&in_progress));
+        let mut damaged = *sector(1).bytes();
+        damaged[300] ^= 1;
+        assert!(is_kept(&Sector::from_bytes(damaged)), "the card has lost it since");
     }
 }
