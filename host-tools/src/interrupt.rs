@@ -1,12 +1,14 @@
 //! Ctrl-C and SIGTERM end a run that would go on for ever in good order: what waits is written, the log is closed and
-//! the results are printed. A second one ends the program at once (of a wait for a database it ends the wait, and the third
+//! the results are printed. A second one ends the program at once (with a database it ends the wait for that, and the third
 //! one the program). SIGTERM is what `systemctl stop` and `docker stop` send.
 //!
 //! SIGHUP keeps its default, so that `nohup` works. SIGXFSZ, which a file beyond the limit of `ulimit -f` sends, is only
 //! noted: then the write fails with an error that names the file.
 
+use std::io;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, OnceLock};
+use std::time::Duration;
 
 use signal_hook::consts::{SIGINT, SIGTERM};
 use signal_hook::flag;
@@ -14,27 +16,71 @@ use signal_hook::flag;
 /// What a shell reports of a program that Ctrl-C ended.
 const EXIT_CODE: i32 = 130;
 
-static REQUESTED: OnceLock<Arc<AtomicBool>> = OnceLock::new();
-/// Whether the next one ends the program at once.
-static ARMED: OnceLock<Arc<AtomicBool>> = OnceLock::new();
+/// Signals that come within so long after one are the same wish: `timeout -s INT` sends two.
+const ECHO: Duration = Duration::from_millis(50);
+/// How often it is looked whether one has come.
+const LOOK: Duration = Duration::from_millis(20);
 
-/// From now on the first Ctrl-C or SIGTERM is only noted.
+static REQUESTED: OnceLock<Arc<AtomicBool>> = OnceLock::new();
+/// Whether a second one was asked for, where that is told from the first.
+static AGAIN: AtomicBool = AtomicBool::new(false);
+
+/// From now on the first Ctrl-C or SIGTERM is only noted; the second one ends the program at once.
 pub fn watch() {
     REQUESTED.get_or_init(|| {
         let requested = Arc::new(AtomicBool::new(false));
-        for signal in [SIGINT, SIGTERM] {
-            // In this order: the first one must not find the flag set.
-            let armed = Arc::clone(ARMED.get_or_init(Arc::default));
-            let second = flag::register_conditional_shutdown(signal, EXIT_CODE, Arc::clone(&armed));
-            let first = second.and_then(|_| flag::register(signal, armed));
-            let first = first.and_then(|_| flag::register(signal, Arc::clone(&requested)));
-            // Without a handler the signal simply ends the program, as before.
-            if let Err(error) = first {
-                note!("Ctrl-C will end the program without closing the log: {error}");
-            }
-        }
+        let armed = Arc::new(AtomicBool::new(false));
+        // In this order: the first one must not find the flag set.
+        note_failure(register(&armed, [&armed, &requested]));
         requested
     });
+}
+
+/// From now on the first and the second Ctrl-C or SIGTERM are only noted; the third one ends the program at once.
+pub fn watch_twice() {
+    REQUESTED.get_or_init(|| {
+        let requested = Arc::new(AtomicBool::new(false));
+        let [armed, another] = [(); 2].map(|()| Arc::new(AtomicBool::new(false)));
+        note_failure(register(&armed, [&another, &requested]));
+        let first = Arc::clone(&requested);
+        let thread = std::thread::Builder::new().name("signals".to_owned());
+        note_failure(thread.spawn(move || tell_apart(&first, &another, &armed)).map(|_| ()));
+        requested
+    });
+}
+
+/// Waits for the first one, and for another one, of which the next ends the program at once.
+fn tell_apart(first: &AtomicBool, another: &AtomicBool, armed: &AtomicBool) {
+    let wait_for = |flag: &AtomicBool| {
+        while !flag.load(Ordering::SeqCst) {
+            std::thread::sleep(LOOK);
+        }
+    };
+    wait_for(first);
+    std::thread::sleep(ECHO);
+    another.store(false, Ordering::SeqCst);
+    wait_for(another);
+    AGAIN.store(true, Ordering::SeqCst);
+    std::thread::sleep(ECHO);
+    armed.store(true, Ordering::SeqCst);
+}
+
+/// Each signal sets these, and ends the program at once where it finds `armed` set.
+fn register(armed: &Arc<AtomicBool>, set: [&Arc<AtomicBool>; 2]) -> io::Result<()> {
+    for signal in [SIGINT, SIGTERM] {
+        flag::register_conditional_shutdown(signal, EXIT_CODE, Arc::clone(armed))?;
+        for each in set {
+            flag::register(signal, Arc::clone(each))?;
+        }
+    }
+    Ok(())
+}
+
+/// Without a handler the signal simply ends the program, as before.
+fn note_failure(result: io::Result<()>) {
+    if let Err(error) = result {
+        note!("Ctrl-C will end the program without closing the log: {error}");
+    }
 }
 
 /// From now on a file that grows beyond the process's limit is an error of the write, and not the end of the program.
@@ -49,17 +95,7 @@ pub fn requested() -> bool {
     REQUESTED.get().is_some_and(|requested| requested.load(Ordering::SeqCst))
 }
 
-/// The first one has come, and something is waited for that may take long: from now on a second one is noted too, and the
-/// third one ends the program at once. What is given says whether the second one has come.
-pub fn watch_again() -> Arc<AtomicBool> {
-    let again = Arc::new(AtomicBool::new(false));
-    if let Some(armed) = ARMED.get() {
-        for signal in [SIGINT, SIGTERM] {
-            // Without a handler the second one ends the program at once, as before.
-            if flag::register(signal, Arc::clone(&again)).is_ok() {
-                armed.store(false, Ordering::SeqCst);
-            }
-        }
-    }
-    again
+/// Whether that was asked a second time, after [`watch_twice`].
+pub fn requested_again() -> bool {
+    AGAIN.load(Ordering::SeqCst)
 }

@@ -178,3 +178,19 @@ fn sigterm_ends_what_waits_for_a_board() {
     stderr.read_to_string(&mut words).unwrap();
     assert!(words.contains("interrupted"), "{words}");
 }
+
+#[test]
+fn two_signals_at_once_are_one_wish_and_end_nothing_without_a_word() {
+    let url = format!("http://127.0.0.1:{}", free_port());
+    let recording = own("px4_hil_quad_low.tlog");
+    let live = Live::start(&["--input", recording.to_str().unwrap(), "--influx", &url]);
+    // As `timeout -s INT` sends them: to the program and to its group.
+    let interrupt = || live.program.signal("INT");
+    interrupt();
+    interrupt();
+    std::thread::sleep(Duration::from_millis(300));
+    // The second wish ends the wait for the database.
+    let (code, words) = live.interrupt(Duration::from_secs(5));
+    assert_eq!(code, Some(3), "{words}");
+    assert!(words.contains("not in the database"), "{words}");
+}

@@ -37,7 +37,7 @@ use std::process::{Command, Stdio};
 use std::sync::Arc;
 use std::sync::mpsc::Receiver;
 use std::thread::JoinHandle;
-use std::time::{SystemTime, UNIX_EPOCH};
+use std::time::SystemTime;
 
 use anyhow::{Context as _, Result, anyhow};
 use serde::Serialize;
@@ -59,13 +59,18 @@ use crate::plural::{are, count};
 
 /// Runs `hums live`.
 pub fn run(args: &cli::Live) -> Result<Outcome> {
+    // Before anything is opened: a spool is read through, which may take a while.
+    if args.influx.is_some() {
+        interrupt::watch_twice();
+    } else {
+        interrupt::watch();
+    }
     let limits = Limits::new(&crate::run::params::read(args.params.as_deref())?);
     let (influx, spool) = database(args)?.unzip();
     let (listener, address) = listen(&args.listen)?;
     let host = args.listen.rsplit_once(':').map_or("", |(host, _)| host);
     let (guard, token) = Guard::new(address, host, args.listen_token.as_deref())?;
     let (hub, commands) = Hub::new();
-    interrupt::watch();
     let follower = follow(args, &limits, &hub, commands, influx)?;
     let pages = page_addresses(address, token.as_deref(), others());
     tell(args, &pages)?;
@@ -184,11 +189,7 @@ fn database(args: &cli::Live) -> Result<Option<(Influx, Waiting)>> {
             args.spool_limit
         );
     }
-    let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
-    // In their order, and unique also where several begin in one second.
-    let mut number = [0; 4];
-    getrandom::fill(&mut number).map_err(|error| anyhow!("no random numbers: {error}"))?;
-    let session = format!("s{:08x}{:08x}", now.as_secs() as u32, u32::from_le_bytes(number));
+    let session = influx::names::session(SystemTime::now())?;
     let influx = Influx::start(target, session, spool, !args.input.is_live())?;
     Ok(Some((influx, Waiting { path, is_damaged: damage.bytes > 0 })))
 }

@@ -433,3 +433,29 @@ fn a_recording_whose_writing_is_ended_says_what_of_it_is_not_in_the_database() {
     assert_eq!(live.wait().expect("it ends").code(), Some(3), "{said}");
     assert!(said.contains("where it was ended; the rest is not in the database"), "{said}");
 }
+
+#[test]
+fn a_signal_while_it_starts_ends_the_writing_of_a_recording_with_words() {
+    let dir = tempfile::tempdir().expect("directory");
+    let params = dir.path().join("params");
+    let made = Command::new("mkfifo").arg(&params).status();
+    assert!(made.expect("it runs").success());
+    let mut live = Command::new(env!("CARGO_BIN_EXE_hums"));
+    live.args(["live", "--influx", "http://127.0.0.1:9", "--listen", "127.0.0.1:0", "--input"]).arg(px4());
+    live.arg("--params").arg(&params).arg("--spool").arg(dir.path().join("spool"));
+    let mut live = live.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().expect("it runs");
+    // It reads its parameters, and has opened nothing else.
+    let mut writer = fs::OpenOptions::new().write(true).open(&params).expect("it is read");
+    let end = || Command::new("kill").args(["-TERM", &live.id().to_string()]).status();
+    assert!(end().expect("it runs").success());
+    std::thread::sleep(Duration::from_millis(200));
+    writer.write_all(b"GS_BUDGET 5000\n").expect("it is read");
+    drop(writer);
+    std::thread::sleep(Duration::from_millis(500));
+    // Ends the wait for the database.
+    end().expect("it runs");
+    let mut said = String::new();
+    std::io::Read::read_to_string(live.stderr.as_mut().expect("piped"), &mut said).expect("text");
+    assert_eq!(live.wait().expect("it ends").code(), Some(3), "{said}");
+    assert!(said.contains("it was ended while it was read; the rest is not in the database"), "{said}");
+}

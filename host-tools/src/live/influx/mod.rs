@@ -14,7 +14,6 @@ pub mod target;
 pub mod writer;
 
 use std::sync::Arc;
-use std::sync::atomic::Ordering;
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant as Wall};
 
@@ -216,10 +215,9 @@ impl Influx {
         let settled = self.names.end();
         self.give_settled(settled.as_ref());
         self.queue.close(Wall::now() + LAST_WAIT);
-        let again = interrupt::watch_again();
         // A panic of the writer shows in the figures: its points still wait.
         while self.writer.as_ref().is_some_and(|writer| !writer.is_finished())
-            && !again.load(Ordering::SeqCst)
+            && !interrupt::requested_again()
         {
             std::thread::sleep(LOOK);
         }

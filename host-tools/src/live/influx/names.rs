@@ -4,7 +4,7 @@
 //! that has told nothing by then is `system-1`, from the moment it does its id.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::time::{Duration, Instant as Wall};
+use std::time::{Duration, Instant as Wall, SystemTime, UNIX_EPOCH};
 
 use anyhow::{Result, anyhow};
 
@@ -16,6 +16,19 @@ use crate::live::world::World;
 pub const WAIT: Duration = Duration::from_secs(10);
 /// What a fast link brings in that time.
 pub const WAITING_BYTES_MAX: usize = 8 * 1024 * 1024;
+
+/// A new name for a session: in the order of time by the second; of those that begin in one second two are alike once in
+/// four thousand million.
+pub fn session(now: SystemTime) -> Result<String> {
+    let seconds = now.duration_since(UNIX_EPOCH).unwrap_or_default().as_secs();
+    Ok(format!("s{:08x}{:08x}", seconds as u32, u32::from_le_bytes(random()?)))
+}
+
+fn random<const N: usize>() -> Result<[u8; N]> {
+    let mut random = [0; N];
+    getrandom::fill(&mut random).map_err(|error| anyhow!("this PC has no random numbers: {error}"))?;
+    Ok(random)
+}
 
 /// Who is who, as far as it is known.
 #[derive(Debug)]
@@ -40,9 +53,7 @@ struct Waiting {
 impl Names {
     /// Nobody is known; `session` tags every point.
     pub fn new(session: String) -> Result<Self> {
-        let mut random = [0; 8];
-        getrandom::fill(&mut random).map_err(|error| anyhow!("this PC has no random numbers: {error}"))?;
-        let mark = format!("mark-{:016x}-", u64::from_le_bytes(random));
+        let mark = format!("mark-{:016x}-", u64::from_le_bytes(random()?));
         let (vehicles, tags) = (BTreeMap::new(), BTreeMap::new());
         Ok(Self { session, vehicles, tags, mark, waiting: Some(Waiting::default()) })
     }
@@ -134,5 +145,20 @@ impl Names {
         }
         batch.text = text.into_bytes();
         Some(batch)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sessions_that_begin_in_one_second_have_names_of_their_own_in_the_order_of_time() {
+        let at = |seconds| UNIX_EPOCH + Duration::from_secs(seconds);
+        let names: BTreeSet<String> =
+            (0..100).map(|_| session(at(0x6a0f_3c21)).expect("random numbers")).collect();
+        assert_eq!(names.len(), 100);
+        assert!(names.iter().all(|name| name.starts_with("s6a0f3c21") && name.len() == 17), "{names:?}");
+        assert!(session(at(0x6a0f_3c22)).expect("random numbers") > *names.last().expect("some"));
     }
 }
