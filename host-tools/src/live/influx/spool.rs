@@ -2,14 +2,15 @@
 //! written by the next one.
 //!
 //! The file is a header and a ring of records. A position counts all bytes that were ever put into the ring; a byte of
-//! position `p` lies at `p` modulo the ring's size. The header has the position of the oldest record; how many follow
-//! shows when the file is opened, because a record has its own position and a checksum. An empty ring is cut off, so the
-//! file is as long as what waited at most at a time.
+//! position `p` lies at `p` modulo the ring's size. The header has the positions of the oldest record and of the end of the
+//! newest one, and how many points these have. It is written after a record, so that a kill leaves one behind that end, whole
+//! or cut off; what is not sound before it is damage. An empty ring is cut off, so the file is as long as what waited at
+//! most at a time.
 //!
 //! ```text
 //! header  "HUMSPOOL"  version u32  0 u32  ring's size u64  position of the oldest u64
-//!         the database's number u64  its address, zeros up to 512 bytes
-//! record  length u32  points u32  position u64  CRC-32 of these and the lines u32  0 u32  lines
+//!         the database's number u64  position of the end u64  points u64  the database's address, zeros up to 512 bytes
+//! record  length u32  points u32  position u64  CRC-32 of the lines u32  CRC-32 of these u32  lines
 //! ```
 //! Points go to the database that they were made for and to no other: a file that has points for another one is refused.
 //!
@@ -29,12 +30,14 @@ use crate::files::{open_in_place, remake_in_place};
 use crate::plural::are;
 use crate::source::format::SPOOL_MAGIC as MAGIC;
 
-const VERSION: u32 = 3;
+const VERSION: u32 = 4;
 const HEADER_BYTES: u64 = 512;
 /// Where the database's address begins.
-const NAME_AT: usize = 40;
+const NAME_AT: usize = 56;
 const RECORD_BYTES: usize = 24;
-const SUM_AT: usize = 16;
+/// Where a head's checksums are: that of the lines, that of what stands before it.
+const TEXT_SUM_AT: usize = 16;
+const HEAD_SUM_AT: usize = 20;
 /// Of all records of all files that we write.
 const BATCH_BYTES_MAX: usize = 64 * 1024 * 1024;
 
@@ -66,19 +69,12 @@ pub struct Damage {
     pub bytes: u64,
 }
 
-/// What a record is checked by: of its head, up to where this stands, and of its lines.
-fn sum(head: &[u8], text: &[u8]) -> u32 {
-    let mut digest = CRC.digest();
-    digest.update(head.get(..SUM_AT).unwrap_or(head));
-    digest.update(text);
-    digest.finalize()
-}
-
 /// A record's head.
 #[derive(Clone, Copy, Debug)]
 struct Head {
     length: usize,
     points: u32,
+    text_sum: u32,
 }
 
 impl Head {
@@ -146,17 +142,17 @@ impl Spool {
             bail!("it is of another version of this program; move it away, or name another file");
         }
         (self.size, self.oldest) = (u64_at(&header, 16), u64_at(&header, 24));
+        let (told_end, told_points) = (u64_at(&header, 40), u64_at(&header, 48));
         self.end = self.oldest;
-        let is_possible = |end: u64| self.size >= RECORD_BYTES as u64 && end < i64::MAX as u64;
+        let is_possible = |end: u64| {
+            self.size >= RECORD_BYTES as u64
+                && end < i64::MAX as u64
+                && (self.oldest..=end).contains(&told_end)
+        };
         if !self.oldest.checked_add(self.size).is_some_and(is_possible) {
             bail!("its header is damaged; move it away, or name another one");
         }
-        let mut points = 0;
-        self.damage = self.each_sound(bytes, |head, _| {
-            points += u64::from(head.points);
-            Ok(())
-        })?;
-        self.points = points;
+        let damaged_bytes = self.look_through(bytes, told_end, told_points)?;
         // Also where its first record is damaged: an empty one has its header only.
         if bytes > HEADER_BYTES && u64_at(&header, 32) != self.database.number {
             let name = header.get(NAME_AT..).unwrap_or_default().split(|byte| *byte == 0).next();
@@ -166,14 +162,19 @@ impl Spool {
                 String::from_utf8_lossy(name.unwrap_or_default())
             );
         }
+        if damaged_bytes > 0 {
+            return self
+                .write_anew(told_end, true)
+                .context("what is sound in it cannot be written anew, without what is damaged");
+        }
         if self.damage.bytes > 0 {
-            return self.mend(bytes);
+            self.forget_cut_off()?;
         }
         if self.is_empty() {
             return Ok(self.reset()?);
         }
         if self.size < self.limit
-            && let Err(error) = self.write_anew(bytes, false)
+            && let Err(error) = self.write_anew(told_end, false)
         {
             note!(
                 "{}: cannot be made larger ({error}): its limit stays {} bytes until nothing waits in it",
@@ -184,30 +185,51 @@ impl Spool {
         Ok(())
     }
 
-    /// Goes on without what is damaged, which is kept aside with all of the file. What a kill or a full disk has cut off at the
-    /// end is no batch, and goes.
-    fn mend(&mut self, file_bytes: u64) -> Result<()> {
-        let is_cut = self.first_lap_end(file_bytes).is_some_and(|end| {
-            let is_last = self.end + self.damage.bytes == end;
-            let whole = self.head(self.end).ok().flatten().map_or(RECORD_BYTES as u64, Head::bytes);
-            is_last && self.damage.bytes < whole
-        });
-        if !is_cut {
-            return self.write_anew(file_bytes, true).context("what is sound in it cannot be written anew");
+    /// Finds what waits and what of it is damaged; gives how many bytes of batches that were whole are.
+    fn look_through(&mut self, file_bytes: u64, told_end: u64, told_points: u64) -> Result<u64> {
+        let (mut points, mut before_end) = (0, 0);
+        let damaged_bytes = self.each_sound(told_end, |at, head, _| {
+            points += u64::from(head.points);
+            before_end += if at < told_end { u64::from(head.points) } else { 0 };
+            Ok(())
+        })?;
+        self.points = points;
+        self.damage = self.cut_off(file_bytes, told_end)?;
+        if damaged_bytes > 0 {
+            self.damage.bytes += damaged_bytes;
+            self.damage.points += told_points.saturating_sub(before_end);
         }
-        if self.is_empty() {
-            return Ok(self.reset()?);
+        Ok(damaged_bytes)
+    }
+
+    /// What a kill or a full disk has cut off behind the newest batch, as far as that is known: it is none.
+    fn cut_off(&mut self, file_bytes: u64, told_end: u64) -> io::Result<Damage> {
+        let at = self.end.max(told_end);
+        let head = self.head(at)?;
+        // In the ring's first lap nothing else can lie there.
+        let bytes = if at < self.size {
+            file_bytes.saturating_sub(HEADER_BYTES + at)
+        } else {
+            head.map_or(0, Head::bytes)
+        };
+        Ok(Damage { points: head.map_or(0, |head| head.points.into()), bytes })
+    }
+
+    /// So that it is told once.
+    fn forget_cut_off(&mut self) -> io::Result<()> {
+        if self.end < self.size {
+            return self.file.set_len(HEADER_BYTES + self.end);
         }
-        Ok(self.file.set_len(HEADER_BYTES + self.end)?)
+        self.write_ring(self.end, &[0; RECORD_BYTES])
     }
 
     /// Writes what waits anew, with a ring as large as the limit or as what waits, beside the file; it takes its place when it is
     /// whole. The old file is kept aside, or goes. Until then a kill leaves that one.
-    fn write_anew(&mut self, file_bytes: u64, keep: bool) -> Result<()> {
+    fn write_anew(&mut self, told_end: u64, keep: bool) -> Result<()> {
         let path = self.path.canonicalize()?;
         let (damage, mut new) = (self.damage, None);
         remake_in_place(&path, keep, |file| {
-            new = Some(self.copy_to(file.try_clone()?, file_bytes)?);
+            new = Some(self.copy_to(file.try_clone()?, told_end)?);
             Ok(())
         })?;
         let path = std::mem::take(&mut self.path);
@@ -218,7 +240,7 @@ impl Spool {
     }
 
     /// All that waits and is sound, in a new file.
-    fn copy_to(&mut self, file: File, file_bytes: u64) -> Result<Self> {
+    fn copy_to(&mut self, file: File, told_end: u64) -> Result<Self> {
         let mut new = Self {
             file,
             path: PathBuf::new(),
@@ -232,7 +254,7 @@ impl Spool {
             damage: Damage::default(),
         };
         new.reset()?;
-        self.each_sound(file_bytes, |head, text| {
+        self.each_sound(told_end, |_, head, text| {
             new.put(&Batch { text, points: u64::from(head.points) })?;
             Ok(())
         })?;
@@ -240,50 +262,28 @@ impl Spool {
         Ok(new)
     }
 
-    /// Hands out each sound batch that waits, and says what lies between them and behind them and is none: of a file whose ring has
-    /// not begun anew, any byte; otherwise what has the head of a record. The end is behind the last one that is sound.
+    /// Hands out each sound batch that waits, with its position; gives how many bytes before the end that the header tells are of
+    /// none. The end is behind the last one that is sound.
     fn each_sound(
         &mut self,
-        file_bytes: u64,
-        mut take: impl FnMut(Head, Vec<u8>) -> Result<()>,
-    ) -> Result<Damage> {
-        let (mut at, mut damage) = (self.oldest, Damage::default());
+        told_end: u64,
+        mut take: impl FnMut(u64, Head, Vec<u8>) -> Result<()>,
+    ) -> Result<u64> {
+        let (mut at, mut damaged_bytes) = (self.oldest, 0);
         self.end = at;
         loop {
             if let Some((head, text)) = self.record(at)? {
+                take(at, head, text)?;
                 at += head.bytes();
                 self.end = at;
-                take(head, text)?;
-                continue;
-            }
-            let next = self.next_sound(at + 1)?;
-            let (points, end) = self.claimed(at, next.unwrap_or(u64::MAX))?;
-            damage.points += points;
-            // Of a file in its first lap nothing else can lie at its end.
-            let end = next.or_else(|| self.first_lap_end(file_bytes)).unwrap_or(end);
-            damage.bytes += end.saturating_sub(at);
-            match next {
-                Some(next) => at = next,
-                None => return Ok(damage),
+            } else if at < told_end {
+                let next = self.next_sound(at + 1)?.unwrap_or(told_end);
+                damaged_bytes += next - at;
+                at = next;
+            } else {
+                return Ok(damaged_bytes);
             }
         }
-    }
-
-    /// What the heads of damaged batches say from a position on: their points, and where they end.
-    fn claimed(&mut self, mut at: u64, until: u64) -> io::Result<(u64, u64)> {
-        let mut points = 0;
-        while at < until
-            && let Some(head) = self.head(at)?
-        {
-            points += u64::from(head.points);
-            at += head.bytes();
-        }
-        Ok((points, at))
-    }
-
-    /// Where the file ends, as a position, where its ring has not begun anew.
-    fn first_lap_end(&self, file_bytes: u64) -> Option<u64> {
-        (self.end < self.size).then(|| file_bytes.saturating_sub(HEADER_BYTES))
     }
 
     /// The next position at which a sound record begins.
@@ -372,6 +372,7 @@ impl Spool {
         let head = Head {
             length: batch.text.len(),
             points: u32::try_from(batch.points).map_err(|_| io::ErrorKind::InvalidInput)?,
+            text_sum: CRC.checksum(&batch.text),
         };
         if self.is_over_limit() {
             return Ok(batch.points);
@@ -389,8 +390,8 @@ impl Spool {
         bytes.extend((head.length as u32).to_le_bytes());
         bytes.extend(head.points.to_le_bytes());
         bytes.extend(self.end.to_le_bytes());
-        bytes.extend(sum(&bytes, &batch.text).to_le_bytes());
-        bytes.extend([0; 4]);
+        bytes.extend(head.text_sum.to_le_bytes());
+        bytes.extend(CRC.checksum(&bytes).to_le_bytes());
         bytes.extend(&batch.text);
         if let Err(error) = self.write_ring(self.end, &bytes) {
             if self.end < self.size {
@@ -401,6 +402,8 @@ impl Spool {
         }
         self.end += head.bytes();
         self.points += batch.points;
+        // Where that fails it is found behind the end.
+        let _ = self.write_header();
         Ok(lost)
     }
 
@@ -434,10 +437,12 @@ impl Spool {
         lost
     }
 
-    /// Empty: the disk gets its room back. In this order, so that a kill in between leaves an empty one too.
+    /// Empty: the disk gets its room back. A kill after any of these steps leaves an empty one too.
     fn reset(&mut self) -> io::Result<()> {
+        (self.oldest, self.points) = (self.end, 0);
+        self.write_header()?;
         self.file.set_len(HEADER_BYTES)?;
-        (self.size, self.oldest, self.end, self.points) = (self.limit, 0, 0, 0);
+        (self.size, self.oldest, self.end) = (self.limit, 0, 0);
         self.write_header()
     }
 
@@ -447,7 +452,9 @@ impl Spool {
         header[8..12].copy_from_slice(&VERSION.to_le_bytes());
         header[16..24].copy_from_slice(&self.size.to_le_bytes());
         header[24..32].copy_from_slice(&self.oldest.to_le_bytes());
-        header[32..NAME_AT].copy_from_slice(&self.database.number.to_le_bytes());
+        header[32..40].copy_from_slice(&self.database.number.to_le_bytes());
+        header[40..48].copy_from_slice(&self.end.to_le_bytes());
+        header[48..NAME_AT].copy_from_slice(&self.points.to_le_bytes());
         header.iter_mut().skip(NAME_AT).zip(self.database.name.bytes()).for_each(|(to, from)| *to = from);
         self.file.seek(SeekFrom::Start(0))?;
         self.file.write_all(&header)
@@ -459,7 +466,15 @@ impl Spool {
         if !self.read_ring(position, &mut bytes)? || u64_at(&bytes, 8) != position {
             return Ok(None);
         }
-        let head = Head { length: u32_at(&bytes, 0) as usize, points: u32_at(&bytes, 4) };
+        let (before, sum) = bytes.split_at(HEAD_SUM_AT);
+        if CRC.checksum(before) != u32_at(sum, 0) {
+            return Ok(None);
+        }
+        let head = Head {
+            length: u32_at(&bytes, 0) as usize,
+            points: u32_at(&bytes, 4),
+            text_sum: u32_at(&bytes, TEXT_SUM_AT),
+        };
         let fits = head.length <= BATCH_BYTES_MAX && position - self.oldest + head.bytes() <= self.size;
         Ok(Some(head).filter(|_| fits))
     }
@@ -472,7 +487,7 @@ impl Spool {
             return Ok(None);
         }
         let text = bytes.split_off(RECORD_BYTES);
-        let sound = sum(&bytes, &text) == u32_at(&bytes, SUM_AT);
+        let sound = CRC.checksum(&text) == head.text_sum;
         Ok(sound.then_some((head, text)))
     }
 

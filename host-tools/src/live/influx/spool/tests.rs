@@ -84,27 +84,99 @@ fn what_waits_is_found_again_in_order_wherever_the_ring_begins() {
     assert_eq!(path.metadata().expect("a file").len(), HEADER_BYTES, "the room is given back");
 }
 
+/// As a kill leaves it while it puts this batch: the record as far as it was written, and the header not.
+fn killed_in_put(path: &Path, limit: u64, batch: &Batch, less: usize) -> u64 {
+    let mut spool = open(path, limit);
+    let header = std::fs::read(path).expect("a file")[..HEADER_BYTES as usize].to_vec();
+    assert_eq!(spool.put(batch).expect("room"), 0, "no older one goes");
+    let end = spool.end;
+    drop(spool);
+    let mut left = std::fs::read(path).expect("a file");
+    left[..header.len()].copy_from_slice(&header);
+    let written = RECORD_BYTES + batch.text.len() - less;
+    for at in end - less as u64..end {
+        left[(HEADER_BYTES + at % limit) as usize] = 0x55;
+    }
+    if end < limit {
+        left.truncate(left.len() - less);
+    }
+    std::fs::write(path, left).expect("room");
+    written as u64
+}
+
 #[test]
 fn a_record_that_was_cut_off_ends_it_and_those_before_are_there() {
     let dir = tempfile::tempdir().expect("a folder");
     let path = dir.path().join("spool");
-    let mut spool = open(&path, 100_000);
-    for number in 0..5 {
-        spool.put(&batch(number)).expect("room");
+    // In its first lap, and where the ring has begun anew.
+    for limit in [100_000, 4_000] {
+        let _ = std::fs::remove_file(&path);
+        let mut spool = open(&path, limit);
+        (0..40).for_each(|number| {
+            spool.put(&batch(number)).expect("room");
+        });
+        (0..2).for_each(|_| spool.drop_oldest().expect("it is there"));
+        let expected = drain(&mut open_copy(&mut spool));
+        drop(spool);
+        let whole = std::fs::read(&path).expect("a file");
+        let last = RECORD_BYTES + batch(40).text.len();
+        for less in [0, 1, 30, last - RECORD_BYTES, last - 10, last] {
+            std::fs::write(&path, &whole).expect("room");
+            let bytes = killed_in_put(&path, limit, &batch(40), less);
+            let mut spool = open(&path, limit);
+            let damage = match (less, last - less < RECORD_BYTES) {
+                (0, _) => Damage::default(),
+                // Of a record with its head its points are known; of less in a ring that has begun anew nothing is.
+                (_, false) => {
+                    let bytes = if limit == 4_000 { last as u64 } else { bytes };
+                    Damage { points: batch(40).points, bytes }
+                }
+                (_, true) => Damage { points: 0, bytes: if limit == 4_000 { 0 } else { bytes } },
+            };
+            assert_eq!(spool.damage(), damage, "{limit}: {less} bytes less");
+            let more = if less == 0 { vec![batch(40)] } else { Vec::new() };
+            assert!(drain(&mut open_copy(&mut spool)) == [&expected[..], &more].concat(), "{limit} {less}");
+            drop(spool);
+            assert_eq!(open(&path, limit).damage(), Damage::default(), "it is told once");
+            assert!(!dir.path().join("hums-kept").exists(), "it was never a batch");
+        }
     }
+}
+
+#[test]
+fn a_file_that_has_lost_its_end_is_damaged_and_kept() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let path = dir.path().join("spool");
+    let mut spool = open(&path, 100_000);
+    (0..5).for_each(|number| assert_eq!(spool.put(&batch(number)).expect("room"), 0));
     drop(spool);
     let whole = std::fs::read(&path).expect("a file");
     let last = RECORD_BYTES + batch(4).text.len();
-    for cut in [1, 30, last - RECORD_BYTES + 3, last - 1] {
-        std::fs::write(&path, &whole[..whole.len() - cut]).expect("room");
+    for less in [1, last - 3, last, whole.len() - HEADER_BYTES as usize] {
+        let damaged = &whole[..whole.len() - less];
+        std::fs::write(&path, damaged).expect("room");
         let mut spool = open(&path, 100_000);
-        // Of a record with its head its points are known.
-        let points = if last - cut < RECORD_BYTES { 0 } else { batch(4).points };
-        assert_eq!(spool.damage(), Damage { points, bytes: (last - cut) as u64 }, "{cut} bytes less");
-        assert_eq!(drain(&mut spool), (0..4).map(batch).collect::<Vec<_>>(), "{cut} bytes less");
-        drop(spool);
-        assert_eq!(open(&path, 100_000).damage(), Damage::default(), "it is told once");
+        let waits = if less > last { 0 } else { 4 };
+        let lost = (waits..5).map(batch);
+        let bytes = lost.clone().map(|batch| (RECORD_BYTES + batch.text.len()) as u64).sum();
+        assert_eq!(spool.damage(), Damage { points: lost.map(|batch| batch.points).sum(), bytes }, "{less}");
+        assert!(drain(&mut spool) == (0..waits).map(batch).collect::<Vec<_>>(), "{less}");
+        assert!(std::fs::read(dir.path().join("hums-kept/1/spool")).expect("kept") == damaged);
+        std::fs::remove_dir_all(dir.path().join("hums-kept")).expect("there");
     }
+}
+
+#[test]
+fn a_file_of_an_earlier_version_is_told_as_that_and_left_as_it_is() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let path = dir.path().join("spool");
+    open(&path, 3_000).put(&batch(0)).expect("room");
+    let mut old = std::fs::read(&path).expect("a file");
+    old[8] = 2;
+    std::fs::write(&path, &old).expect("room");
+    let refused = format!("{:#}", Spool::open(&path, 3_000, &database(1)).expect_err("an old one"));
+    assert!(refused.contains("another version of this program; move it away, or name"), "{refused}");
+    assert_eq!(std::fs::read(&path).expect("a file"), old);
 }
 
 #[test]
@@ -122,20 +194,25 @@ fn what_is_sound_in_a_damaged_one_is_written_on_and_the_damaged_one_is_kept() {
         drop(spool);
         let whole = std::fs::read(&path).expect("a file");
         // A byte of a batch's lines, of its length, of its count, of its position; the bytes of two batches; in each batch in turn.
-        for (nth, _) in waits.iter().enumerate().filter(|(nth, _)| nth + 2 < waits.len()) {
+        for nth in 0..waits.len() {
             let bytes = |nth: usize| {
                 waits[..nth].iter().map(|batch| (RECORD_BYTES + batch.text.len()) as u64).sum::<u64>()
             };
             let at = |byte: u64| (HEADER_BYTES + (oldest + bytes(nth) + byte) % limit) as usize;
             let next = bytes(nth + 1) - bytes(nth);
-            for (spoiled, lost) in
-                [(30..31, 1), (1..2, 1), (5..6, 1), (9..10, 1), (next - 5..next + 3, 2), (0..next + 30, 2)]
-            {
+            let ones =
+                [30..31, 1..2, 2..3, 5..6, 9..10, 17..18, 21..22, next - 1..next].map(|spoiled| (spoiled, 1));
+            // The last one has none behind it.
+            let twos = [next - 5..next + 3, 0..next + 30].map(|spoiled| (spoiled, 2));
+            let twos = twos.into_iter().filter(|_| nth + 1 < waits.len());
+            for (spoiled, lost) in ones.into_iter().chain(twos) {
                 let mut damaged = whole.clone();
                 spoiled.for_each(|byte| damaged[at(byte)] ^= 0x55);
                 std::fs::write(&path, &damaged).expect("room");
                 let spool = open(&path, limit);
-                assert!(spool.damage().bytes >= bytes(nth + lost) - bytes(nth), "{limit} {nth} {lost}");
+                let points = waits[nth..nth + lost].iter().map(|batch| batch.points).sum();
+                let damage = Damage { points, bytes: bytes(nth + lost) - bytes(nth) };
+                assert_eq!(spool.damage(), damage, "{limit} {nth} {lost}");
                 let sound: Vec<Batch> = [&waits[..nth], &waits[nth + lost..]].concat();
                 assert_eq!(spool.points(), sound.iter().map(|batch| batch.points).sum::<u64>());
                 // Also where it is killed before it has written any of it.
