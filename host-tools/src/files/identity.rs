@@ -1,10 +1,10 @@
 //! Which file a path means, whatever its spelling: links, hard links, `./` and `..` come out alike.
 
-use std::fs::{self, Metadata};
+use std::fs::{self, File, Metadata};
 use std::io;
 use std::path::{Component, Path, PathBuf};
 
-use anyhow::{Result, bail};
+use anyhow::{Context as _, Result, bail};
 
 /// A file's identity.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -30,6 +30,18 @@ fn node(path: &Path) -> io::Result<Node> {
     Ok((about.volume_serial_number(), about.file_index()))
 }
 
+/// How many names an open file has.
+#[cfg(unix)]
+fn names(file: &File) -> io::Result<u64> {
+    use std::os::unix::fs::MetadataExt as _;
+    file.metadata().map(|about| about.nlink())
+}
+
+#[cfg(windows)]
+fn names(file: &File) -> io::Result<u64> {
+    winapi_util::file::information(file).map(|about| about.number_of_links())
+}
+
 impl FileId {
     /// The identity of what `path` means. Links are followed, also one to a file that is not there yet. `..` behind a folder
     /// that is not there leads back to where that folder would be made, and a slash behind a file's name says nothing.
@@ -51,13 +63,8 @@ impl FileId {
 }
 
 /// Refuses a file that is to be written in place and has another name too: what is kept under that would change with it.
-pub fn check_only_name(about: &Metadata, path: &Path) -> Result<()> {
-    #[cfg(unix)]
-    let names = std::os::unix::fs::MetadataExt::nlink(about);
-    // A file that is open tells it nowhere else without asking once more.
-    #[cfg(not(unix))]
-    let names = about.len().min(1);
-    if names > 1 {
+pub fn check_only_name(file: &File, path: &Path) -> Result<()> {
+    if names(file).with_context(|| format!("{}: cannot be looked at", path.display()))? > 1 {
         bail!(
             "{}: has another name too (a hard link, of a backup perhaps), under which it would change as well; nothing was \
              written: put a copy in its place, or move it away",

@@ -145,7 +145,7 @@ impl Output {
         }
         let file = open_to_go_on(&part.path, path)?;
         let about = file.metadata().with_context(|| cannot_write(path))?;
-        check_only_name(&about, &part.path)?;
+        check_only_name(&file, &part.path)?;
         Ok((Self::at_once(file, path, Some(part)), about.len()))
     }
 

@@ -64,6 +64,7 @@ impl Marks {
         self.wrong += next.wrong;
         self.lost = self.lost.saturating_add(next.lost);
         self.has_boot |= next.has_boot;
+        self.packed |= next.packed;
         self.before = next.before.or(self.before);
         if next.last.is_some() {
             (self.last, self.moved) = (next.last, next.moved);
