@@ -12,7 +12,7 @@ use hums_tests::{fat, oracle};
 use serde_json::{Value, json};
 
 /// Bytes of each recording: some thousands of frames over several groups, in seconds of Python.
-const RECORDING_BYTES: usize = 500_000;
+const RECORDING_BYTES: usize = 250_000;
 
 /// Tables of which the second decoder reads every field.
 const TABLES: [&str; 11] = [
