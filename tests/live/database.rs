@@ -8,7 +8,7 @@ use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
 use hums_tests::live::{Running, free_port};
-use serde_json::Value;
+use serde_json::{Value, json};
 
 /// A database may read its own files for a while before it answers.
 const START: Duration = Duration::from_mins(1);
@@ -77,7 +77,9 @@ impl Database {
             Kind::Victoria => command
                 .arg(format!("-httpListenAddr=127.0.0.1:{}", self.port))
                 .arg(format!("-storageDataPath={}", self.folder.path().display()))
-                .arg("-retentionPeriod=100y"),
+                .arg("-retentionPeriod=100y")
+                // As the compose file of the dashboards has it: the newest half minute is not hidden.
+                .arg("-search.latencyOffset=1s"),
         };
         let mut running = Running(command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap());
         let start = Instant::now();
@@ -130,14 +132,42 @@ impl Database {
         }
     }
 
+    /// The JSON that a path gives.
+    fn json(&self, path: &str) -> Value {
+        let (code, body) = self.get(path).unwrap();
+        assert_eq!(code, 200, "{body}");
+        serde_json::from_str(&body).unwrap()
+    }
+
     /// `InfluxDB`: the answer to a question.
     pub(crate) fn ask(&self, question: &str) -> Vec<Value> {
-        let bytes: Vec<String> = question.bytes().map(|byte| format!("%{byte:02X}")).collect();
-        let question = bytes.concat();
-        let (code, body) = self.get(&format!("/query?db=hums&epoch=ns&q={question}")).unwrap();
-        assert_eq!(code, 200, "{body}");
-        let answer: Value = serde_json::from_str(&body).unwrap();
+        let answer = self.json(&format!("/query?db=hums&epoch=ns&q={}", escaped(question)));
+        assert!(answer["results"][0]["error"].is_null(), "{question}: {answer}");
         answer["results"][0]["series"].as_array().cloned().unwrap_or_default()
+    }
+
+    /// `VictoriaMetrics`: the values of an expression, at the end of a span or in each second of it (seconds since 1970).
+    pub(crate) fn query(&self, expression: &str, [from_s, to_s]: [f64; 2], instant: bool) -> Vec<Value> {
+        self.get("/internal/force_flush").unwrap();
+        let (kind, span) = match instant {
+            true => ("query", format!("time={to_s}")),
+            false => ("query_range", format!("start={from_s}&end={to_s}&step=1")),
+        };
+        let answer = self.json(&format!("/api/v1/{kind}?{span}&nocache=1&query={}", escaped(expression)));
+        let member = if instant { "value" } else { "values" };
+        let series = answer["data"]["result"].as_array().unwrap();
+        let number = |pair: &Value| json!(pair[1].as_str().unwrap().parse::<f64>().unwrap());
+        let pairs = series.iter().flat_map(|one| match &one[member] {
+            Value::Array(pairs) if !instant => pairs.clone(),
+            pair => vec![pair.clone()],
+        });
+        pairs.map(|pair| number(&pair)).collect()
+    }
+
+    /// `VictoriaMetrics`: the values of a label, of all series or of those that match.
+    pub(crate) fn labels(&self, label: &str, of: &str) -> Vec<Value> {
+        let of = if of.is_empty() { String::new() } else { format!("?match[]={}", escaped(of)) };
+        self.json(&format!("/api/v1/label/{label}/values{of}"))["data"].as_array().unwrap().clone()
     }
 
     /// `InfluxDB`: how many points a measurement has.
@@ -164,6 +194,11 @@ impl Database {
         };
         lines.map(|line| count(line) as u64).sum()
     }
+}
+
+/// As an address has it.
+fn escaped(text: &str) -> String {
+    text.bytes().map(|byte| format!("%{byte:02X}")).collect()
 }
 
 fn program(variable: &str, path: &str) -> PathBuf {

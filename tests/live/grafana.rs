@@ -1,5 +1,6 @@
-//! The dashboards in `host-tools/grafana`: whole by Grafana's own schema and by what it leaves open, and asking for what
-//! the points have.
+//! The dashboards in `host-tools/grafana`, for each kind of database: whole by Grafana's own schema and by what it leaves
+//! open, the same for all but for what they ask, and asking for what the points have; the databases that can be had answer
+//! each query, as `writes` shows.
 #![cfg(feature = "oracle")]
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -9,6 +10,16 @@ use hums_tests::flights::{own, root};
 use hums_tests::oracle;
 use hums_tests::program::hums;
 use serde_json::{Value, json};
+
+/// A folder of dashboards: the type of their data source, the member that is the query, and what each query has.
+pub(crate) type Kind = (&'static str, &'static str, &'static str, &'static [&'static str]);
+const FLUX: Kind =
+    ("flux", "influxdb", "query", &["v.defaultBucket", "v.timeRangeStart", "${vehicle}", "${session}"]);
+pub(crate) const INFLUXQL: Kind =
+    ("influxql", "influxdb", "query", &["$timeFilter", "'$vehicle'", "'$session'"]);
+pub(crate) const VICTORIA: Kind =
+    ("victoriametrics", "prometheus", "expr", &["[$__ra", "vehicle=\"$vehicle\"", "session=\"$session\""]);
+const KINDS: [Kind; 3] = [FLUX, INFLUXQL, VICTORIA];
 
 /// Units of Grafana that the dashboards use; a slip in one shows as plain text on the panel.
 const UNITS: [&str; 14] = [
@@ -54,38 +65,40 @@ const PANELS: [&str; 22] = [
     "Accel Module",
 ];
 
-fn dashboards() -> Vec<(String, Value)> {
-    let folder = root().join("host-tools/grafana/dashboards");
-    let files = fs::read_dir(folder).unwrap().map(|file| file.unwrap().path());
-    let read = |path: std::path::PathBuf| {
-        let name = path.file_name().unwrap().to_string_lossy().into_owned();
-        (name, serde_json::from_str(&fs::read_to_string(path).unwrap()).unwrap())
-    };
-    files.map(read).collect()
+const NAMES: [&str; 2] = ["flight.json", "health.json"];
+
+fn path_of(kind: Kind, name: &str) -> std::path::PathBuf {
+    root().join("host-tools/grafana").join(kind.0).join(name)
 }
 
-fn panels(dashboard: &Value) -> &Vec<Value> {
+pub(crate) fn dashboards(kind: Kind) -> Vec<(String, Value)> {
+    let read = |name| serde_json::from_str(&fs::read_to_string(path_of(kind, name)).unwrap()).unwrap();
+    NAMES.map(|name| (format!("{}/{name}", kind.0), read(name))).to_vec()
+}
+
+pub(crate) fn panels(dashboard: &Value) -> &Vec<Value> {
     dashboard["panels"].as_array().unwrap()
 }
 
-fn queries(panel: &Value) -> impl Iterator<Item = &str> {
-    panel["targets"].as_array().into_iter().flatten().map(|target| target["query"].as_str().unwrap())
+fn queries(kind: Kind, panel: &Value) -> impl Iterator<Item = &str> {
+    panel["targets"].as_array().into_iter().flatten().map(move |target| target[kind.2].as_str().unwrap())
 }
 
 #[test]
 fn grafanas_own_model_takes_every_member_of_the_dashboards() {
-    let folder = root().join("host-tools/grafana");
-    let paths = ["flight.json", "health.json"].map(|name| folder.join("dashboards").join(name));
+    let paths = KINDS.map(|kind| NAMES.map(|name| path_of(kind, name))).concat();
     let said = oracle::grafana(&paths);
     assert_eq!(said["told"], json!([]), "Grafana has other members or types");
-    let count: usize = dashboards().iter().map(|(_, dashboard)| panels(dashboard).len()).sum();
+    let all = KINDS.map(dashboards).concat();
+    let count: usize = all.iter().map(|(_, dashboard)| panels(dashboard).len()).sum();
     assert_eq!(said["panels"], count);
 
     // That silence means something: each slip is told.
     let dir = tempfile::tempdir().unwrap();
-    let (_, whole) = dashboards().into_iter().find(|(name, _)| name == "flight.json").unwrap();
+    let (_, whole) = dashboards(FLUX).swap_remove(0);
     let place = panels(&whole).iter().position(|panel| panel["type"] == "stat").unwrap();
-    let slips: [(&str, Value); 5] = [
+    let slips: [(&str, Value); 6] = [
+        ("/transformations", json!([{ "id": "merge", "option": {} }])),
         ("/options/graphMode", json!("sparkle")),
         ("/options/reduceOptions/calcs", json!("last")),
         ("/fieldConfig/defaults/thresholds/mode", json!("relative")),
@@ -94,7 +107,11 @@ fn grafanas_own_model_takes_every_member_of_the_dashboards() {
     ];
     for (member, value) in slips {
         let mut slip = whole.clone();
-        *slip["panels"][place].pointer_mut(member).unwrap_or_else(|| panic!("no {member}")) = value;
+        let panel = &mut slip["panels"][place];
+        match panel.pointer_mut(member) {
+            Some(place) => *place = value,
+            None => panel[&member[1..]] = value,
+        }
         let path = dir.path().join("slip.json");
         fs::write(&path, slip.to_string()).unwrap();
         assert_ne!(oracle::grafana(&[path])["told"], json!([]), "{member}");
@@ -103,14 +120,26 @@ fn grafanas_own_model_takes_every_member_of_the_dashboards() {
     let model = fs::read_to_string(root().join("tests/oracle/requirements.txt")).unwrap();
     let release = model.lines().find_map(|line| line.strip_prefix("grafana-foundation-sdk==")).unwrap();
     let release = release.split('!').next_back().unwrap();
-    let compose = fs::read_to_string(folder.join("compose.yaml")).unwrap();
-    assert!(compose.contains(&format!("grafana/grafana:{release}")), "the model is of {release}");
+    assert!(compose().contains(&format!("grafana/grafana:{release}")), "the model is of {release}");
+}
+
+fn compose() -> String {
+    fs::read_to_string(root().join("host-tools/grafana/compose.yaml")).unwrap()
 }
 
 #[test]
 fn the_dashboards_are_whole() {
+    for kind in KINDS {
+        are_whole(kind);
+    }
+}
+
+fn are_whole(kind: Kind) {
+    let source = json!({ "type": kind.1, "uid": "hums" });
+    let file = fs::read_to_string(path_of(kind, "datasource.yaml")).unwrap();
+    assert!(file.contains("uid: hums\n") && file.contains(&format!("type: {}\n", kind.1)), "{}", kind.0);
     let mut uids = BTreeSet::new();
-    for (name, dashboard) in dashboards() {
+    for (name, dashboard) in dashboards(kind) {
         assert!(uids.insert(dashboard["uid"].as_str().unwrap().to_owned()), "{name}: its uid is another's");
         assert!(dashboard["schemaVersion"].as_u64().is_some_and(|version| version >= 36), "{name}");
         assert!(dashboard["title"].as_str().is_some_and(|title| !title.is_empty()), "{name}");
@@ -119,8 +148,8 @@ fn the_dashboards_are_whole() {
         for panel in panels(&dashboard) {
             let title = panel["title"].as_str().unwrap();
             assert!(ids.insert(panel["id"].as_u64().unwrap()), "{name}, {title}: its id is another's");
-            let kind = panel["type"].as_str().unwrap();
-            assert!(TYPES.contains(&kind), "{name}, {title}: {kind}");
+            let drawn = panel["type"].as_str().unwrap();
+            assert!(TYPES.contains(&drawn), "{name}, {title}: {drawn}");
             let [x, y, w, h] = ["x", "y", "w", "h"].map(|side| panel["gridPos"][side].as_u64().unwrap());
             assert!(x + w <= 24 && w > 0 && h > 0, "{name}, {title} is beyond the page's 24 columns");
             for place in (x..x + w).flat_map(|x| (y..y + h).map(move |y| (x, y))) {
@@ -128,10 +157,10 @@ fn the_dashboards_are_whole() {
                     panic!("{name}: {title} lies on {other}");
                 }
             }
-            if kind == "row" {
+            if drawn == "row" {
                 continue;
             }
-            assert_eq!(panel["datasource"]["uid"], "hums", "{name}, {title}");
+            assert_eq!(panel["datasource"], source, "{name}, {title}");
             let unit = panel["fieldConfig"]["defaults"]["unit"].as_str().unwrap();
             assert!(UNITS.contains(&unit), "{name}, {title}: unit {unit}");
             let steps = panel["fieldConfig"]["defaults"]["thresholds"]["steps"].as_array().unwrap();
@@ -139,11 +168,11 @@ fn the_dashboards_are_whole() {
             let mut letters = BTreeSet::new();
             for target in panel["targets"].as_array().unwrap() {
                 assert!(letters.insert(target["refId"].as_str().unwrap()), "{name}, {title}: a letter twice");
-                assert_eq!(target["datasource"]["uid"], "hums", "{name}, {title}");
+                assert_eq!(target["datasource"], source, "{name}, {title}");
             }
             assert!(!letters.is_empty(), "{name}, {title} asks for nothing");
-            for query in queries(panel) {
-                for part in ["v.defaultBucket", "v.timeRangeStart", "${vehicle}", "${session}"] {
+            for query in queries(kind, panel) {
+                for part in kind.3 {
                     assert!(query.contains(part), "{name}, {title}: no {part} in {query}");
                 }
                 let balanced = |open, close| query.matches(open).count() == query.matches(close).count();
@@ -154,19 +183,43 @@ fn the_dashboards_are_whole() {
     assert_eq!(uids.len(), 2);
 }
 
+/// What a database needs otherwise: what is asked of it, what its answers are called, and how they are put together.
+const ITS_OWN: [&str; 4] = ["datasource", "targets", "transformations", "description"];
+
+#[test]
+fn the_dashboards_of_all_databases_are_the_same_but_for_what_they_ask() {
+    let bare = |(_, mut dashboard): (String, Value)| {
+        for panel in dashboard["panels"].as_array_mut().unwrap() {
+            let panel = panel.as_object_mut().unwrap();
+            panel.retain(|member, _| !ITS_OWN.contains(&member.as_str()));
+            if let Some(config) = panel.get_mut("fieldConfig") {
+                config["overrides"].take();
+                config["defaults"].as_object_mut().unwrap().retain(|member, value| {
+                    member != "mappings" && !value.as_str().is_some_and(|text| text.contains("${__field"))
+                });
+            }
+        }
+        for variable in dashboard["templating"]["list"].as_array_mut().unwrap() {
+            variable.as_object_mut().unwrap().retain(|member, _| member != "query" && member != "datasource");
+        }
+        dashboard
+    };
+    let all = KINDS.map(|kind| dashboards(kind).into_iter().map(bare).collect::<Vec<_>>());
+    assert_eq!(all[0], all[1]);
+    assert_eq!(all[0], all[2]);
+}
+
 #[test]
 fn every_panel_of_the_reference_system_is_there_in_its_row() {
-    let all = dashboards();
-    let (_, flight) = all.iter().find(|(name, _)| name == "flight.json").unwrap();
-    let titles: Vec<&str> = panels(flight).iter().map(|panel| panel["title"].as_str().unwrap()).collect();
+    let (_, flight) = dashboards(FLUX).swap_remove(0);
+    let titles: Vec<&str> = panels(&flight).iter().map(|panel| panel["title"].as_str().unwrap()).collect();
     let place =
         |title: &str| titles.iter().position(|other| *other == title).unwrap_or_else(|| panic!("no {title}"));
     let rows = ["General Information", "ESC Information", "Movement Information"].map(place);
     let order: Vec<usize> = PANELS.map(place).to_vec();
     assert!(order.is_sorted(), "in the reference's order: {titles:?}");
     assert_eq!([order[0], order[5], order[10]], rows.map(|row| row + 1));
-    let compose = fs::read_to_string(root().join("host-tools/grafana/compose.yaml")).unwrap();
-    assert!(compose.contains("GF_DASHBOARDS_MIN_REFRESH_INTERVAL: 100ms"));
+    assert!(compose().contains("GF_DASHBOARDS_MIN_REFRESH_INTERVAL: 100ms"));
     assert!(flight["timepicker"]["refresh_intervals"].as_array().unwrap().contains(&"100ms".into()));
 }
 
@@ -227,9 +280,9 @@ fn whatever_a_panel_asks_for_is_in_the_points_of_the_recorded_flights() {
     for recording in ["ap_quad_faults.tlog", "px4_hil_quad_low.tlog"] {
         Points::of(recording, &mut points);
     }
-    for (name, dashboard) in dashboards() {
+    for (name, dashboard) in dashboards(FLUX) {
         for panel in panels(&dashboard) {
-            for query in queries(panel) {
+            for query in queries(FLUX, panel) {
                 let place = format!("{name}, {}", panel["title"]);
                 let measurement = quoted(query, "r._measurement == \"");
                 let fields =

@@ -3,6 +3,8 @@
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
 
 #[cfg(feature = "databases")]
+mod answers;
+#[cfg(feature = "databases")]
 mod database;
 mod grafana;
 #[cfg(feature = "databases")]

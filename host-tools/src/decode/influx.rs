@@ -13,6 +13,7 @@
 //! A database keeps one point for a set of tags and a time. The record's clock has milliseconds, in which a message may
 //! come twice: the second one's time is a nanosecond later, so that none replaces another.
 
+use hums_core::health::Level;
 use hums_core::observation::Observation;
 use hums_core::time::Instant;
 use hums_dialect::{Field, Kind};
@@ -197,6 +198,9 @@ impl Lines {
         let mut fields = Fields::of(&mut self.text);
         for (name, cell) in row.cells.iter().filter(|(name, _)| !TAGS.contains(name)) {
             fields.cell(name, cell);
+            if let ("level", Cell::Text(level)) = (*name, cell) {
+                fields.level_number(level);
+            }
         }
         let count = fields.count;
         self.end(start, at, count);
@@ -280,6 +284,13 @@ impl<'a> Fields<'a> {
             }
         }
         out.push(b'"');
+    }
+
+    /// A finding's level for databases that keep numbers only, as `VictoriaMetrics`: by [`Level::ALL`].
+    fn level_number(&mut self, name: &str) {
+        if let Some(number) = (0_i64..).zip(Level::ALL).find(|(_, level)| level.name() == name) {
+            self.name("level_number").integer(number.0);
+        }
     }
 
     fn cell(&mut self, name: &str, cell: &Cell) {

@@ -1,0 +1,79 @@
+//! What the dashboards ask, asked of the databases that can be had, which have a flight of a moment ago.
+
+use std::time::{SystemTime, UNIX_EPOCH};
+
+use serde_json::Value;
+
+use crate::database::Database;
+use crate::grafana::{INFLUXQL, Kind, VICTORIA, dashboards, panels};
+
+/// Of an ArduPilot vehicle without ESC_INFO there is nothing to show in these.
+const OF_PX4: [&str; 3] = ["ESC Fails", "ESC currently failing", "Estimator, PX4"];
+
+/// From when to when is asked, seconds since 1970.
+type Span = [f64; 2];
+
+fn lately() -> Span {
+    let now_s = SystemTime::now().duration_since(UNIX_EPOCH).unwrap().as_secs_f64().round();
+    [now_s - 300.0, now_s]
+}
+
+/// What Grafana puts in for its variables.
+fn filled(query: &str, [vehicle, session]: [&str; 2], [from_s, to_s]: Span) -> String {
+    let between = format!("time >= {} AND time <= {}", (from_s * 1e9) as u64, (to_s * 1e9) as u64);
+    let replaced = query.replace("$timeFilter", &between).replace("$__interval", "1s");
+    let replaced = replaced.replace("$__range", "1h").replace("$__rate_interval", "4s");
+    replaced.replace("$vehicle", vehicle).replace("$session", session)
+}
+
+/// Asks what a kind's dashboards ask, variables first: each panel has something to show. Gives how many queries there were.
+fn ask_all(kind: Kind, span: Span, ask: impl Fn(&Value, &dyn Fn(&str) -> String) -> Vec<Value>) -> usize {
+    let mut asked = 0;
+    for (name, dashboard) in dashboards(kind) {
+        let mut chosen = [String::new(), String::new()];
+        for (place, variable) in dashboard["templating"]["list"].as_array().unwrap().iter().enumerate() {
+            let fill = |query: &str| filled(query, [&chosen[0], &chosen[1]], span);
+            let values = ask(&variable["query"], &fill);
+            let [one] = values.as_slice() else { panic!("{name}, {}: {values:?}", variable["name"]) };
+            chosen[place] = one.as_str().unwrap().to_owned();
+        }
+        for panel in panels(&dashboard) {
+            for target in panel["targets"].as_array().into_iter().flatten() {
+                let values = ask(target, &|query| filled(query, [&chosen[0], &chosen[1]], span));
+                let title = panel["title"].as_str().unwrap();
+                assert_eq!(values.is_empty(), OF_PX4.contains(&title), "{name}, {title}: {values:?}");
+                if title == "Battery (V)" {
+                    let volts = values.last().and_then(Value::as_f64).unwrap();
+                    assert!((9.0..13.0).contains(&volts), "{name}: {values:?}");
+                }
+                asked += 1;
+            }
+        }
+    }
+    asked
+}
+
+/// `InfluxDB` 1.x, which has the points of an ArduPilot flight of a moment ago, answers each query of its dashboards.
+pub(crate) fn assert_answered_by_influx(database: &Database) {
+    let asked = ask_all(INFLUXQL, lately(), |query, fill| {
+        let series = database.ask(&fill(query["query"].as_str().unwrap()));
+        let rows = series.iter().flat_map(|one| one["values"].as_array().unwrap());
+        rows.map(|row| row.as_array().unwrap()[1].clone()).collect()
+    });
+    assert!(asked > 40, "{asked}");
+}
+
+/// As [`assert_answered_by_influx`], of `VictoriaMetrics`.
+pub(crate) fn assert_answered_by_victoria(database: &Database) {
+    let span = lately();
+    let asked = ask_all(VICTORIA, span, |query, fill| {
+        let Some(expression) = query["expr"].as_str() else {
+            let variable = query["query"].as_str().unwrap();
+            let inside = variable.strip_prefix("label_values(").and_then(|rest| rest.strip_suffix(')'));
+            let (of, label) = inside.unwrap().rsplit_once(", ").unwrap_or(("", inside.unwrap()));
+            return database.labels(label, &fill(of));
+        };
+        database.query(&fill(expression), span, query["instant"] == true)
+    });
+    assert!(asked > 40, "{asked}");
+}
