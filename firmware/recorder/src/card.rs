@@ -12,7 +12,7 @@ use crate::chain::Chain;
 use crate::gate::{Gate, GateError, HeldBlocks};
 use crate::layout::{Layout, LayoutError};
 use crate::name::{EXTENSION, LogName};
-use crate::room::Room;
+use crate::room::{Room, chain_free};
 use crate::status::{CardStatus, Counted, FatClock};
 
 type Manager<'a, D> = VolumeManager<Gate<'a, D>, FatClock<'a>, 1, 1, 1>;
@@ -26,14 +26,19 @@ pub const SEGMENT_BYTES_MAX: u32 = 8 * 1024 * 1024;
 /// Blocks of 512 bytes.
 const BLOCKS_PER_MIB: u64 = 2_048;
 
-/// The attribute of a file that lists do not show.
+/// The attributes of a file that lists do not show, and of one that was written since a backup.
 const HIDDEN: u8 = 2;
+const ARCHIVE: u8 = 32;
 
-/// A directory entry's bytes, and where in it stand the attributes, when it was made (time and date), and when it was written.
+/// A directory entry's bytes, and where in it stand the attributes, when it was made (time and date), when it was written, its first
+/// cluster's upper and lower half, and the file's length.
 const ENTRY_BYTES: usize = 32;
 const ATTRIBUTES: usize = LogName::SHORT_BYTES;
 const MADE: usize = 14;
 const WRITTEN: usize = 22;
+const CLUSTER_HIGH: usize = 20;
+const CLUSTER_LOW: usize = 26;
+const LENGTH: usize = 28;
 
 /// One log segment in the card's root directory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -207,18 +212,24 @@ impl<'a, D: BlockDevice> Card<'a, D> {
         let mut room = self.room;
         let found = self.manager()?.device(|gate| room.find(gate, clusters));
         self.room = room;
-        self.reopen(found?)?;
+        let from = found?;
+        self.reopen(from)?;
         let manager = self.manager()?;
         manager.device(|gate| gate.begin());
+        // Makes the directory longer where it is full. Only then are the file's clusters taken.
         let file = manager.open_file_in_dir(self.root, short_name(name)?, Mode::ReadWriteCreate)?;
-        manager.device(|gate| gate.discard_data(true));
-        let zeros = [0; Block::LEN];
-        for _ in 0..clusters * self.layout.cluster_blocks {
-            // Each block may look for a free cluster through the whole FAT.
-            self.manager()?.write(file, &zeros)?;
-        }
-        manager.device(|gate| gate.discard_data(false));
-        self.manager()?.close_file(file)?;
+        manager.close_file(file)?;
+        let (first, last) = self.manager()?.device(|gate| chain_free(gate, from, clusters))?;
+        let made = self.find(name)?;
+        self.manager()?.device(|gate| {
+            gate.set_hint(last + 1)?;
+            change_entry(gate, &made, |entry| {
+                entry[ATTRIBUTES] |= ARCHIVE;
+                entry[CLUSTER_HIGH..CLUSTER_HIGH + 2].copy_from_slice(&first.to_le_bytes()[2..]);
+                entry[CLUSTER_LOW..CLUSTER_LOW + 2].copy_from_slice(&first.to_le_bytes()[..2]);
+                entry[LENGTH..].copy_from_slice(&(clusters * cluster_bytes).to_le_bytes());
+            })
+        })?;
         Ok(())
     }
 
@@ -256,47 +267,33 @@ impl<'a, D: BlockDevice> Card<'a, D> {
     /// Gives the open segment the date of now, in one block write. It stays open.
     pub(crate) fn date_open(&mut self) -> Result<(), CardError<D::Error>> {
         let open = self.open.ok_or(CardError::NotOpen)?;
-        let mut found = None;
-        self.logs(|entry| found = found.or((entry.name == open.name).then_some(entry)))?;
         let date = self.clock.get_timestamp().serialize_to_fat();
-        self.change_entry(&found.ok_or(CardError::NotFound)?, |entry| set_date(entry, date))?;
+        self.change_entry(&self.find(open.name)?, |entry| set_date(entry, date))?;
         self.open = Some(open);
         Ok(())
     }
 
-    /// Changes name, attributes or dates of a directory entry that is still as it was.
+    /// Changes name, attributes or dates of a directory entry that is still as it was, at once.
     fn change_entry(
         &mut self,
         old: &LogEntry,
         change: impl FnOnce(&mut [u8; ENTRY_BYTES]),
     ) -> Result<(), CardError<D::Error>> {
-        let old_short = old.name.short();
-        let at = old.offset as usize;
-        let changed = self.manager()?.device(|gate| {
-            let mut block = [Block::new()];
-            gate.allow_reads(1);
-            gate.read(&mut block, old.block)?;
-            let entry = block[0].get_mut(at..).and_then(|entry| entry.first_chunk_mut());
-            let entry = entry.ok_or(GateError::Refused)?;
-            if entry.first_chunk() != Some(&old_short) {
-                return Err(GateError::Refused);
-            }
-            change(entry);
-            gate.write(&block, old.block)
-        });
+        let changed = self.manager()?.device(|gate| change_entry(gate, old, change));
         self.reopen(0)?;
         Ok(changed?)
     }
 
+    /// A segment's directory entry.
+    fn find(&self, name: LogName) -> Result<LogEntry, CardError<D::Error>> {
+        let mut found = None;
+        self.logs(|entry| found = found.or((entry.name == name).then_some(entry)))?;
+        found.ok_or(CardError::NotFound)
+    }
+
     /// Finds an existing segment.
     pub fn segment(&self, name: LogName) -> Result<Segment, CardError<D::Error>> {
-        let mut found = None;
-        self.logs(|entry| {
-            if entry.name == name {
-                found = Some(entry);
-            }
-        })?;
-        self.place(&found.ok_or(CardError::NotFound)?)
+        self.place(&self.find(name)?)
     }
 
     fn place(&self, entry: &LogEntry) -> Result<Segment, CardError<D::Error>> {
@@ -407,6 +404,24 @@ impl<'a, D: BlockDevice> Card<'a, D> {
         })?;
         Ok(clusters)
     }
+}
+
+/// Changes a directory entry that is still as it was.
+fn change_entry<D: BlockDevice>(
+    gate: &Gate<'_, D>,
+    old: &LogEntry,
+    change: impl FnOnce(&mut [u8; ENTRY_BYTES]),
+) -> Result<(), GateError<D::Error>> {
+    let mut block = [Block::new()];
+    gate.allow_reads(1);
+    gate.read(&mut block, old.block)?;
+    let entry = block[0].get_mut(old.offset as usize..).and_then(|entry| entry.first_chunk_mut());
+    let entry = entry.ok_or(GateError::Refused)?;
+    if entry.first_chunk() != Some(&old.name.short()) {
+        return Err(GateError::Refused);
+    }
+    change(entry);
+    gate.write(&block, old.block)
 }
 
 /// When it was made and when it was written: the same.

@@ -10,6 +10,8 @@ use crate::layout::Layout;
 
 /// FAT entries of a block.
 pub(crate) const ENTRIES: u32 = 128;
+/// What the last cluster of a chain has in the FAT.
+pub(crate) const END_OF_CHAIN: u32 = 0x0FFF_FFFF;
 
 /// A walk along one file's chain.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -103,6 +105,14 @@ pub(crate) fn entry(block: &Block, cluster: u32) -> u32 {
     let at = (cluster % ENTRIES * 4) as usize;
     let entry = block.get(at..at + 4).and_then(|entry| entry.try_into().ok());
     entry.map_or(0, u32::from_le_bytes) & 0x0FFF_FFFF
+}
+
+/// Lets the FAT block of this cluster say that; the entry's upper four bits are nobody's and stay.
+pub(crate) fn set_entry(block: &mut Block, cluster: u32, value: u32) {
+    let at = (cluster % ENTRIES * 4) as usize;
+    if let Some(entry) = block.get_mut(at..).and_then(|entries| entries.first_chunk_mut()) {
+        *entry = (u32::from_le_bytes(*entry) & 0xF000_0000 | value).to_le_bytes();
+    }
 }
 
 const fn is_cluster(layout: &Layout, cluster: u32) -> bool {

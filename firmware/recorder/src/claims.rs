@@ -8,7 +8,7 @@
 
 use embedded_sdmmc::{Block, BlockDevice, BlockIdx};
 
-use crate::chain::{Chain, ENTRIES, entry};
+use crate::chain::{Chain, END_OF_CHAIN, ENTRIES, entry, set_entry};
 use crate::gate::{Gate, GateError};
 use crate::name::LogName;
 
@@ -19,7 +19,6 @@ const DIRECTORY_ENTRY_BYTES: usize = 32;
 const DIRECTORY_ENTRIES: u32 = Block::LEN_U32 / DIRECTORY_ENTRY_BYTES as u32;
 /// Attributes of what is no file: a volume's label, a directory; a part of a long name has both.
 const NO_FILE: u8 = 0x18;
-const END_OF_CHAIN: u32 = 0x0FFF_FFFF;
 
 /// The row of clusters that a log's directory entry claims.
 #[derive(Clone, Copy)]
@@ -160,12 +159,8 @@ fn chain_block<D: BlockDevice>(
     let mut changed = false;
     for cluster in (first..end).rev() {
         let old = entry(&block[0], cluster);
-        let place = (cluster % ENTRIES * 4) as usize;
-        if old == 0
-            && let Some(bytes) = block[0].get_mut(place..place + 4)
-        {
-            let value = if next == 0 { cluster + 1 } else { END_OF_CHAIN };
-            bytes.copy_from_slice(&value.to_le_bytes());
+        if old == 0 {
+            set_entry(&mut block[0], cluster, if next == 0 { cluster + 1 } else { END_OF_CHAIN });
             changed = true;
         }
         next = old;

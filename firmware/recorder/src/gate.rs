@@ -6,10 +6,6 @@
 //! directory, and at worst clusters that no file uses. Outside a transaction the library cannot write metadata at all; the
 //! recorder itself writes there to chain a log's lost clusters again (`claims`).
 //!
-//! **Allocation without data.** The library allocates by writing; while [`Gate::discard_data`] is on, what it writes
-//! into clusters goes nowhere, so a segment of 8 MiB costs its FAT blocks and no more. What an earlier file left in
-//! those clusters stays there until it is overwritten: readers tell it by its session.
-//!
 //! **The free count** of the information sector is set to "unknown" once, so that it can never be wrong; the hint
 //! where to look for free clusters is kept. A sector that is damaged is shown, and written, as one that knows nothing.
 //!
@@ -36,6 +32,9 @@ pub(crate) const HELD_BLOCKS: usize = 8;
 /// takes clusters that no file has, so that a card which refuses now and then would look full after a while. The
 /// device bounds the time of all tries together ([`crate::CardDevice::begin_service`]).
 const METADATA_TRIES: u32 = 8;
+
+/// Where in the information sector stands from which cluster on to look for free ones.
+pub(crate) const HINT: usize = 492;
 
 /// What went wrong below the file system.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -107,7 +106,6 @@ pub(crate) struct Gate<'a, D: BlockDevice> {
     device: D,
     layout: Layout,
     transaction: Cell<bool>,
-    discard: Cell<bool>,
     reads_left: Cell<u32>,
     /// From which cluster on the library is to look for free ones; 0: as the information sector says.
     free_from: u32,
@@ -125,7 +123,6 @@ impl<'a, D: BlockDevice> Gate<'a, D> {
             device,
             layout,
             transaction: Cell::new(false),
-            discard: Cell::new(false),
             reads_left: Cell::new(0),
             free_from,
             held,
@@ -165,15 +162,9 @@ impl<'a, D: BlockDevice> Gate<'a, D> {
         self.transaction.set(true);
     }
 
-    /// While on (within a transaction), writes into clusters go nowhere.
-    pub(crate) fn discard_data(&self, on: bool) {
-        self.discard.set(on);
-    }
-
     /// Writes what was held back, FAT blocks first, directory entries last.
     pub(crate) fn commit(&self) -> Result<(), GateError<D::Error>> {
         self.transaction.set(false);
-        self.discard.set(false);
         let (mut held, mut parity) = (self.held.metadata.borrow_mut(), self.held.parity.borrow_mut());
         for kind in [Kind::Fat, Kind::Info, Kind::Directory] {
             for (entry, block) in held.iter().zip(parity.lend()).filter(|(entry, _)| entry.kind == kind) {
@@ -201,8 +192,15 @@ impl<'a, D: BlockDevice> Gate<'a, D> {
     /// Forgets what was held back. The library may still remember some of it: open the volume anew.
     pub(crate) fn abort(&self) {
         self.transaction.set(false);
-        self.discard.set(false);
         self.held.metadata.borrow_mut().clear();
+    }
+
+    /// From which cluster on the next search for free ones is to begin, on whatever computer. Within a transaction.
+    pub(crate) fn set_hint(&self, cluster: u32) -> Result<(), GateError<D::Error>> {
+        let mut block = Block::new();
+        self.read_block(&mut block, self.layout.info)?;
+        block[HINT..HINT + 4].copy_from_slice(&cluster.to_le_bytes());
+        self.write_block(&block, self.layout.info)
     }
 
     /// Writes blocks of a file in place, in one command. Not for use within a transaction.
@@ -242,7 +240,7 @@ impl<'a, D: BlockDevice> Gate<'a, D> {
         } else if at == self.layout.info {
             self.correct_info(block);
             if self.free_from > 0 {
-                block[492..496].copy_from_slice(&self.free_from.to_le_bytes());
+                block[HINT..HINT + 4].copy_from_slice(&self.free_from.to_le_bytes());
             }
         }
         Ok(())
@@ -288,9 +286,9 @@ impl<'a, D: BlockDevice> Gate<'a, D> {
             }
         }
         block[488..492].copy_from_slice(&u32::MAX.to_le_bytes());
-        let hint = u32::from_le_bytes([block[492], block[493], block[494], block[495]]);
+        let hint = u32::from_le_bytes([block[HINT], block[HINT + 1], block[HINT + 2], block[HINT + 3]]);
         if !(2..self.layout.clusters + 2).contains(&hint) {
-            block[492..496].copy_from_slice(&u32::MAX.to_le_bytes());
+            block[HINT..HINT + 4].copy_from_slice(&u32::MAX.to_le_bytes());
         }
     }
 
@@ -316,9 +314,6 @@ impl<'a, D: BlockDevice> Gate<'a, D> {
     fn write_cluster(&self, block: &Block, at: u32) -> Result<(), GateError<D::Error>> {
         if !self.transaction.get() {
             return self.write_device(block, at);
-        }
-        if self.discard.get() {
-            return Ok(());
         }
         // The only blocks of zeros that the library writes here are those of a cluster that makes the directory
         // longer: nothing refers to it yet, so it can be cleared at once.

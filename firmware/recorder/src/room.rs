@@ -1,11 +1,16 @@
-//! How much room there is: free clusters, found for one more segment and counted for the share that logs can have.
+//! How much room there is: free clusters, found for one more segment, chained to be its own, and counted for the share that logs can
+//! have.
+//!
+//! **Allocation without data.** The library allocates by writing, block by block; here a segment of 8 MiB costs its FAT blocks and no
+//! more. What an earlier file left in those clusters stays there until it is overwritten: readers tell it by its session.
 
 use embedded_sdmmc::{Block, BlockDevice, BlockIdx};
 
 use crate::card_error::CardError;
-use crate::chain::ENTRIES;
+use crate::chain::{END_OF_CHAIN, ENTRIES, entry, set_entry};
 use crate::claims::chain_again;
-use crate::gate::{Gate, GateError};
+use crate::gate::{Gate, GateError, HINT};
+use crate::layout::Layout;
 
 /// FAT blocks that are looked through at a time, beside a segment's own: 64 ms of a usual card. All of a large card's FAT takes
 /// seconds, and no one service of the card may take so long.
@@ -103,11 +108,97 @@ impl Room {
     }
 }
 
+/// Makes so many free clusters one chain, from this one's block of the FAT on, and behind the FAT's end from its beginning; the first
+/// and the last of them. Within a transaction: what was chained when it fails is forgotten with it.
+pub(crate) fn chain_free<D: BlockDevice>(
+    gate: &Gate<'_, D>,
+    from: u32,
+    wanted: u32,
+) -> Result<(u32, u32), CardError<D::Error>> {
+    let fat_blocks = gate.layout().fat_blocks;
+    let mut ends: Option<(u32, u32)> = None;
+    let mut left = wanted;
+    for index in 0..fat_blocks {
+        let Some(part) = chain_in_block(gate, (from / ENTRIES + index) % fat_blocks, left)? else { continue };
+        ends = match ends {
+            None => Some((part.first, part.last)),
+            Some((first, last)) => {
+                link(gate, last, part.first)?;
+                Some((first, part.last))
+            }
+        };
+        left -= part.clusters;
+        if left == 0 {
+            break;
+        }
+    }
+    ends.filter(|_| left == 0).ok_or(CardError::Full)
+}
+
+/// What of a chain lies in one block of the FAT.
+struct Part {
+    first: u32,
+    last: u32,
+    clusters: u32,
+}
+
+/// Makes the free clusters of one block of the FAT a chain, or so many of them.
+// Each function that holds a block is a call of its own, so that the stack never has two of them.
+#[inline(never)]
+fn chain_in_block<D: BlockDevice>(
+    gate: &Gate<'_, D>,
+    index: u32,
+    most: u32,
+) -> Result<Option<Part>, GateError<D::Error>> {
+    let layout = *gate.layout();
+    let mut block = [Block::new()];
+    gate.read(&mut block, BlockIdx(layout.fat_start + index))?;
+    let mut part: Option<Part> = None;
+    for cluster in (index * ENTRIES).max(2)..((index + 1) * ENTRIES).min(layout.clusters + 2) {
+        if entry(&block[0], cluster) != 0 {
+            continue;
+        }
+        set_entry(&mut block[0], cluster, END_OF_CHAIN);
+        let part = part.get_or_insert(Part { first: cluster, last: cluster, clusters: 0 });
+        if part.clusters > 0 {
+            set_entry(&mut block[0], part.last, cluster);
+        }
+        (part.last, part.clusters) = (cluster, part.clusters + 1);
+        if part.clusters == most {
+            break;
+        }
+    }
+    if part.is_some() {
+        write_fat(gate, &block, index)?;
+    }
+    Ok(part)
+}
+
+/// Lets the FAT say that this cluster is followed by that one.
+#[inline(never)]
+fn link<D: BlockDevice>(gate: &Gate<'_, D>, cluster: u32, next: u32) -> Result<(), GateError<D::Error>> {
+    let mut block = [Block::new()];
+    gate.read(&mut block, BlockIdx(gate.layout().fat_start + cluster / ENTRIES))?;
+    set_entry(&mut block[0], cluster, next);
+    write_fat(gate, &block, cluster / ENTRIES)
+}
+
+/// Writes a block of the FAT into each of its copies.
+fn write_fat<D: BlockDevice>(
+    gate: &Gate<'_, D>,
+    block: &[Block; 1],
+    index: u32,
+) -> Result<(), GateError<D::Error>> {
+    let Layout { fat_start, fat_blocks, fat_copies, .. } = *gate.layout();
+    (0..fat_copies).try_for_each(|copy| gate.write(block, BlockIdx(fat_start + copy * fat_blocks + index)))
+}
+
 /// The cluster from which on a search is to begin, as the information sector says; the first one where it does not.
 fn hint<D: BlockDevice>(gate: &Gate<'_, D>) -> Result<u32, GateError<D::Error>> {
     let mut block = [Block::new()];
     gate.read(&mut block, BlockIdx(gate.layout().info))?;
-    let hint = block[0].get(492..496).and_then(|hint| hint.try_into().ok()).map_or(0, u32::from_le_bytes);
+    let hint =
+        block[0].get(HINT..HINT + 4).and_then(|hint| hint.try_into().ok()).map_or(0, u32::from_le_bytes);
     Ok(if hint < gate.layout().clusters + 2 { hint } else { 0 })
 }
 

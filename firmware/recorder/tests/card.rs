@@ -425,3 +425,58 @@ fn free_clusters_that_no_log_lost_are_taken() {
     let mut block = Block::new();
     card.read(&mut segment, 3071, &mut block).expect("its chain is as it was");
 }
+
+/// Free clusters one by one, over many blocks of the FAT and on from its beginning: a segment takes each that nobody has, in both
+/// copies of the FAT, and no other one.
+#[test]
+fn a_segment_is_chained_through_whatever_clusters_are_free() {
+    const LAST: u32 = 0x0FFF_FFFF;
+    let device = MemCard::formatted(64 * MIB_BLOCKS);
+    let status = CardStatus::new();
+    // As others format: with two copies of the FAT.
+    change(&device, 2048, |boot| boot[16] = 2);
+    let layout = *mount(&device, &status).layout();
+    let entries = |copy: u32| -> Vec<u32> {
+        let blocks = device.blocks.borrow();
+        let fat = (0..layout.fat_blocks).flat_map(|index| {
+            let at = layout.fat_start + copy * layout.fat_blocks + index;
+            blocks.get(&at).copied().unwrap_or([0; 512])
+        });
+        let bytes: Vec<u8> = fat.collect();
+        bytes.chunks_exact(4).map(|entry| u32::from_le_bytes(entry.try_into().expect("four"))).collect()
+    };
+    // Somebody has two of three clusters, and the search begins in the last block but three.
+    for cluster in (3..layout.clusters + 2).filter(|cluster| cluster % 3 != 0) {
+        let at = cluster as usize % 128 * 4;
+        for copy in 0..layout.fat_copies {
+            let block = layout.fat_start + copy * layout.fat_blocks + cluster / 128;
+            change(&device, block, |block| block[at..at + 4].copy_from_slice(&LAST.to_le_bytes()));
+        }
+    }
+    let hint = (layout.clusters + 2) / 128 * 128 - 3 * 128;
+    change(&device, layout.info, |block| block[492..496].copy_from_slice(&hint.to_le_bytes()));
+    let before = entries(0);
+    let wanted = 500;
+    let mut card = mount(&device, &status);
+    card.create(FIRST, wanted * layout.cluster_blocks * 512).expect("there is room");
+
+    let after = entries(0);
+    assert!(after[3..] == entries(1)[3..], "the copies differ");
+    let changed: Vec<u32> =
+        (0..).zip(&before).zip(&after).filter(|((_, a), b)| a != b).map(|((n, _), _)| n).collect();
+    assert_eq!(changed.len(), wanted as usize);
+    assert!(changed.iter().all(|cluster| before[*cluster as usize] == 0), "somebody's cluster");
+    assert!(changed[0] < 1_200 && *changed.last().expect("some") > hint, "{changed:?}");
+    let mut cluster = *changed.iter().find(|cluster| **cluster >= hint).expect("some");
+    let mut walked = vec![cluster];
+    while after[cluster as usize] != LAST {
+        cluster = after[cluster as usize];
+        walked.push(cluster);
+    }
+    walked.sort_unstable();
+    assert_eq!(walked, changed, "the chain is not of what was taken");
+    let mut segment = card.segment(FIRST).expect("it is there");
+    assert_eq!(segment.blocks(), wanted * layout.cluster_blocks);
+    let last = segment.blocks() - 1;
+    card.read(&mut segment, last, &mut Block::new()).expect("its chain ends with it");
+}
