@@ -181,7 +181,7 @@ impl Common {
     /// What an element had last, those after it being these; nothing where it was not kept.
     #[inline]
     fn last<'a>(&'a self, slot: &'a Slot, element: &Element, after: &[Element]) -> Option<Last<'a>> {
-        Some(match element.what {
+        Some(match element.what() {
             What::Text => Last::Bytes(self.texts.last(element)?),
             What::Instance => Last::Bytes(slot.key.instance.get(..element.size())?),
             What::Wide | What::WideTime => {
@@ -202,7 +202,7 @@ impl Common {
         context: &mut Context,
     ) -> Option<()> {
         let place = frame.place(element.offset());
-        match element.what {
+        match element.what() {
             What::Float => {
                 let last = element.last;
                 context.link = self.registers.consult(element.row());
@@ -223,7 +223,7 @@ impl Common {
                 let (last, at_last) = (element.last, element.aux);
                 let value = self.distributions.time(coder, element, word(place), context);
                 let mut step_us = value.wrapping_sub(last);
-                if element.what == What::Millis {
+                if element.what() == What::Millis {
                     self.clock_ms = value;
                     step_us = step_us.wrapping_mul(1_000);
                 }
@@ -235,7 +235,7 @@ impl Common {
                 let (last, at_last) = (element.last, element.aux);
                 let value = u64::from_le_bytes(*place);
                 let value = self.distributions.wide(coder, element, after.first_mut()?, value, context);
-                if element.what == What::WideTime {
+                if element.what() == What::WideTime {
                     self.advance(at_last.wrapping_add((value as u32).wrapping_sub(last)));
                 }
                 put::<C>(place, value, 8);

@@ -21,7 +21,7 @@ impl Distributions {
         linked: Option<u32>,
     ) -> u32 {
         // Bits that the value does not have.
-        let (spare, kind) = match element.what {
+        let (spare, kind) = match element.what() {
             What::Integer1 => (24, INTEGER_1),
             What::Integer2 => (16, INTEGER_2),
             _ => (0, INTEGER_4),

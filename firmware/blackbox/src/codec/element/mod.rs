@@ -44,6 +44,25 @@ pub(crate) enum What {
 }
 
 impl What {
+    /// What an element says of itself. Memory may flip: what is none of these is taken for an element of which nothing is coded, because
+    /// a jump by it would go anywhere.
+    #[inline]
+    const fn of(kind: u8) -> Self {
+        match kind {
+            0 => Self::Integer1,
+            1 => Self::Integer2,
+            2 => Self::Integer4,
+            3 => Self::Millis,
+            4 => Self::Micros,
+            5 => Self::Float,
+            6 => Self::Wide,
+            7 => Self::WideTime,
+            9 => Self::Text,
+            10 => Self::Instance,
+            _ => Self::Upper,
+        }
+    }
+
     /// Whether it takes two elements.
     pub(crate) const fn is_wide(self) -> bool {
         matches!(self, Self::Wide | Self::WideTime)
@@ -63,7 +82,8 @@ pub(crate) struct Element {
     /// Its own distribution, and the one for its other mode; 0: none yet.
     block: u16,
     other: u16,
-    pub(crate) what: What,
+    /// How it is coded, a [`What`].
+    kind: u8,
     /// Of a text or instance its bytes; of a number its row in the table of links.
     detail: u8,
     /// Where it ends in the payload.
@@ -93,7 +113,7 @@ impl Element {
         costs: Costs::UNSET,
         block: 0,
         other: 0,
-        what: What::Integer1,
+        kind: What::Integer1 as u8,
         detail: 0,
         end: 0,
         decimal: 0,
@@ -109,13 +129,19 @@ impl Element {
             costs: Costs::NEW,
             block: 0,
             other: 0,
-            what,
+            kind: what as u8,
             detail,
             end,
             decimal: 0,
             exponent: 120,
             quiet: 0,
         }
+    }
+
+    /// How it is coded.
+    #[inline]
+    pub(crate) const fn what(&self) -> What {
+        What::of(self.kind)
     }
 
     /// Whether it has a last value.
@@ -147,7 +173,7 @@ impl Element {
     pub(crate) const fn size(&self) -> usize {
         /// Of the kinds in their order; 0 where the element says it.
         const BYTES: [u8; 11] = [1, 2, 4, 4, 4, 4, 8, 8, 0, 0, 0];
-        match self.what {
+        match self.what() {
             What::Text | What::Instance => self.detail as usize,
             what => BYTES[what as usize] as usize,
         }
@@ -173,7 +199,7 @@ impl Element {
 
     /// The last value as a number.
     pub(crate) fn number(&self) -> f32 {
-        match (self.what, self.exponent) {
+        match (self.what(), self.exponent) {
             (What::Float, _) => f32::from_bits(self.last),
             (What::Integer2, 1) => f32::from(self.last as i16),
             (What::Integer4, 1) => self.last as i32 as f32,
@@ -249,6 +275,16 @@ impl Elements {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// What a flip makes of a kind is a kind, whatever it is: the image would jump by it.
+    #[test]
+    fn whatever_memory_holds_is_a_kind() {
+        for kind in 0..=u8::MAX {
+            let element = Element { kind, ..Element::UNSET };
+            let expected = if kind < 11 { kind } else { What::Upper as u8 };
+            assert_eq!((element.what() as u8, element.size() <= 8), (expected, true));
+        }
+    }
 
     #[test]
     fn elements_are_claimed_until_the_last_one_and_no_further() {
