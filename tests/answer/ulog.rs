@@ -5,7 +5,7 @@ use std::fs::{self, File};
 use std::io::{BufWriter, Write as _};
 use std::path::Path;
 
-use hums::source::item::{Cause, Item, Rows, Value, Want};
+use hums::source::item::{Cause, Item, Row, Rows, Value, Want};
 use hums::source::recording::Place;
 use hums_tests::{flights, oracle};
 use serde_json::json;
@@ -28,6 +28,16 @@ fn write(log: &Path, folder: &Path) {
     let want = Want { rows: Rows::All, ..Want::default() };
     let take = &mut |_, item: Item<'_>| {
         match item {
+            Item::Row(Row { table, values: &[Value::Text(name), Value::Double(value)] })
+                if table.name == "parameters" =>
+            {
+                parameters.insert(name.to_owned(), value);
+            }
+            Item::Row(Row { table, values: &[.., Value::Text(words)] })
+                if table.name == "logged_messages" =>
+            {
+                texts.push(words.to_owned());
+            }
             Item::Row(row) => {
                 let name = &row.table.name;
                 let (_, out) = tables.entry(name.clone()).or_insert_with(|| {
@@ -36,10 +46,6 @@ fn write(log: &Path, folder: &Path) {
                 });
                 row.values.iter().try_for_each(|value| out.write_all(&bits(value).to_le_bytes()))?;
             }
-            Item::Parameter(parameter) => {
-                parameters.insert(parameter.name.to_owned(), parameter.value);
-            }
-            Item::Text(text) => texts.push(text.words.to_owned()),
             Item::Gap(gap) => {
                 assert_eq!(gap.cause, Cause::Lost, "{gap:?}");
                 dropouts.push(gap.to.zip(gap.from).map_or(0, |(to, from)| to.since(from).as_millis()));

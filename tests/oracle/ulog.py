@@ -64,7 +64,7 @@ def main():
     texts = [message.message for message in ulog.logged_messages]
     texts += [message.message for tagged in ulog.logged_messages_tagged.values() for message in tagged]
     result["texts"] = len(texts)
-    if set(text.strip() for text in texts if text.strip()) != set(text.strip() for text in ours["texts"]):
+    if sorted(texts) != sorted(ours["texts"]):
         result["wrong"].append("texts")
     dropouts = [dropout.duration for dropout in ulog.dropouts]
     if dropouts != ours["dropouts"]:

@@ -40,8 +40,8 @@ pub(super) enum Message<'a> {
     Unsubscribe(u16),
     /// `D`
     Data { id: u16, data: &'a [u8] },
-    /// `L` and `C`
-    Text { level: u8, time_us: u64, words: &'a [u8] },
+    /// `L`, and `C` with a tag: the module that says it.
+    Text { level: u8, tag: Option<u16>, time_us: u64, words: &'a [u8] },
     /// `O`, milliseconds.
     Dropout(u16),
     /// `S`
@@ -349,9 +349,12 @@ fn flags<'a>(body: &[u8]) -> Option<Message<'a>> {
 fn text(kind: u8, body: &[u8]) -> Option<Belief<'_>> {
     let (&level, rest) = body.split_first()?;
     let level = level.checked_sub(b'0').filter(|level| *level < 8)?;
-    let rest = if kind == b'C' { rest.get(2..)? } else { rest };
+    let (tag, rest) = match kind {
+        b'C' => rest.split_first_chunk().map(|(tag, rest)| (Some(u16::from_le_bytes(*tag)), rest))?,
+        _ => (None, rest),
+    };
     let (time, words) = rest.split_first_chunk()?;
-    let message = Message::Text { level, time_us: u64::from_le_bytes(*time), words };
+    let message = Message::Text { level, tag, time_us: u64::from_le_bytes(*time), words };
     let plain = std::str::from_utf8(words)
         .is_ok_and(|words| !words.contains(|letter: char| letter < ' ' && !"\n\r\t\u{1b}".contains(letter)));
     Some(if plain && !words.is_empty() { Belief::Sure(message) } else { Belief::Likely(message) })

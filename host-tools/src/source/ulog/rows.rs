@@ -29,9 +29,16 @@ pub(super) fn columns(layout: &Layout) -> usize {
     1 + layout.fields.iter().map(|field| elements(field).unwrap_or(1) as usize).sum::<usize>()
 }
 
-/// Its name: the topic's, without what a file's name cannot have.
+/// Names of tables that are no topic's.
+const OWN: [&str; 4] = ["default_parameters", "information", "parameters", "logged_messages"];
+
+/// Its name: the topic's, without what a file's name cannot have. No topic of PX4's has a name of those that are no topic's,
+/// or that are ours; one that does is told apart from them.
 pub(super) fn table_name(layout: &Layout) -> String {
-    layout.name.replace('/', "_")
+    let name = layout.name.replace('/', "_");
+    let is_taken =
+        OWN.contains(&name.as_str()) || name.get(..5).is_some_and(|ours| ours.eq_ignore_ascii_case("HUMS_"));
+    if is_taken { format!("topic_{name}") } else { name }
 }
 
 /// The values of a message, as many as its table has columns.

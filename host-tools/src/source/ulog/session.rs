@@ -239,7 +239,13 @@ impl<'a, 'b> Session<'a, 'b> {
                 self.subscriptions.remove(id);
                 Ok(())
             }
-            Message::Text { level, time_us, words } => self.text(place, (level, time_us, words), after),
+            Message::Text { level, tag, time_us, words } => {
+                self.tell_facts()?;
+                if time_us > 0 {
+                    self.time(times::of_text(time_us), place, after)?;
+                }
+                self.text(level, tag, time_us, &text_of(words))
+            }
             Message::Dropout(milliseconds) => self.dropout(place, milliseconds),
             Message::Beginning { time_us } => self.another(place, time_us, after),
             Message::Sync | Message::Unknown => Ok(()),
@@ -296,6 +302,10 @@ impl<'a, 'b> Session<'a, 'b> {
     fn parameter(&mut self, value: &Keyed<'_>) -> Result<()> {
         let Some(number) = value.number() else { return Ok(()) };
         self.px4.parameter(value.name, number);
+        if let Some(table) = self.own.parameters.clone() {
+            let values = [Value::Text(value.name), Value::Double(number)];
+            self.tell(Item::Row(Row { table: &table, values: &values }))?;
+        }
         self.tell(Item::Parameter(Parameter { name: value.name, value: number }))
     }
 
@@ -458,12 +468,13 @@ impl<'a, 'b> Session<'a, 'b> {
         }
     }
 
-    fn text(&mut self, place: u64, (level, time_us, words): (u8, u64, &[u8]), after: &[u8]) -> Result<()> {
-        self.tell_facts()?;
-        if time_us > 0 {
-            self.time(times::of_text(time_us), place, after)?;
+    fn text(&mut self, level: u8, tag: Option<u16>, time_us: u64, words: &str) -> Result<()> {
+        if let Some(table) = self.own.texts.clone() {
+            let tag = tag.map_or(Value::Unknown, |tag| Value::Unsigned(u64::from(tag)));
+            let [level, time_us] = [u64::from(level), time_us].map(Value::Unsigned);
+            self.tell(Item::Row(Row { table: &table, values: &[time_us, level, tag, Value::Text(words)] }))?;
         }
-        self.say(level, text_of(words).trim_end())
+        self.say(level, words.trim_end())
     }
 
     fn say(&mut self, severity: u8, words: &str) -> Result<()> {
@@ -555,23 +566,33 @@ fn version(release: u32) -> String {
 struct OwnTables {
     defaults: Option<Arc<Table>>,
     information: Option<Arc<Table>>,
+    parameters: Option<Arc<Table>>,
+    texts: Option<Arc<Table>>,
 }
 
 impl OwnTables {
     fn new(rows: Rows<'_>) -> Self {
         let table = |name: &str, columns: &[(&str, Kind)]| {
-            let column =
-                |&(name, kind): &(&str, Kind)| Column { name: name.to_owned(), unit: String::new(), kind };
+            let column = |&(name, kind): &(&str, Kind)| Column {
+                name: name.to_owned(),
+                unit: rows::unit(name).to_owned(),
+                kind,
+            };
             let table = Table { name: name.to_owned(), columns: columns.iter().map(column).collect() };
             rows.has(name).then(|| Arc::new(table))
         };
-        let (text, flag, number) = (Kind::Text, Kind::Flag, Kind::Double);
+        let (text, flag, number, count) = (Kind::Text, Kind::Flag, Kind::Double, Kind::Unsigned);
         Self {
             defaults: table(
                 "default_parameters",
                 &[("name", text), ("value", number), ("system", flag), ("configuration", flag)],
             ),
             information: table("information", &[("key", text), ("text", text), ("number", number)]),
+            parameters: table("parameters", &[("name", text), ("value", number)]),
+            texts: table(
+                "logged_messages",
+                &[("timestamp", count), ("severity", count), ("tag", count), ("text", text)],
+            ),
         }
     }
 }

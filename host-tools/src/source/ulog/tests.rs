@@ -43,6 +43,8 @@ fn a_log_gives_its_definitions_its_data_and_no_damage() {
     assert_eq!(read.of("fact"), ["Firmware PX4 v1.14.3"]);
     assert_eq!(read.of("parameter"), ["A_GAIN 0.5", "MAV_SYS_ID 7"]);
     assert_eq!(read.of("row default_parameters"), ["A_GAIN,0.25,true,false"]);
+    assert_eq!(read.of("row parameters"), ["A_GAIN,0.5", "MAV_SYS_ID,7"]);
+    assert_eq!(read.of("row logged_messages"), ["3000000,4,,low battery\n", "3000000,6,3,tagged"]);
     assert_eq!(read.of("row information"), ["sys_name,PX4,", "ver_sw_release,,17695743"]);
     let rows = read.of("row position");
     assert_eq!(rows.len(), 20);
