@@ -12,7 +12,7 @@ use hums_core::params::ParamSpec;
 use hums_store::sim::{SimFlash, is_store};
 use hums_store::{Found, Key, Store, param_value};
 
-use crate::files::{cannot_write, make_in_place, open_in_place};
+use crate::files::{cannot_write, make_in_place, open_in_place, remake_in_place};
 use crate::source::format::STORE_SECTOR_BYTES as SECTOR;
 
 /// Two of them are the store.
@@ -21,10 +21,16 @@ const BYTES: usize = 2 * SECTOR;
 /// Opens the file and makes it where it is missing, and sets parameters in it as a ground station would have. Without a
 /// path everything ends with the run.
 pub(super) fn open(path: Option<&Path>, params: &[(&ParamSpec, f32)]) -> Result<FileFlash> {
-    let (bytes, file) = match path {
+    let (bytes, mut file) = match path {
         Some(path) => read(path)?,
         None => (Vec::new(), None),
     };
+    // What is damaged is written over by what still counts of it.
+    if let Some(path) = path.filter(|_| found(&bytes) == Some(Found::Damaged)) {
+        drop(file);
+        let whole = |mut file: &File| file.write_all(&bytes).with_context(|| cannot_write(path));
+        file = Some(remake_in_place(path, true, whole).context("--store")?);
+    }
     let flash = FileFlash(Rc::new(RefCell::new(Inside { flash: SimFlash::with(&bytes), file, error: None })));
     flash.write_out(0, BYTES);
     if !params.is_empty() {

@@ -134,6 +134,8 @@ fn a_damaged_store_is_told_and_one_that_cannot_be_read_is_refused_and_stays() {
         assert!((1.0..=3.0).contains(&boots()), "{at}: {}", boots());
         let said = String::from_utf8_lossy(&said.stderr);
         assert!(said.contains("--store store: is damaged: a stored item was lost"), "{at}: {said}");
+        let kept = dir.path().join(format!("hums-kept/{told}/store"));
+        assert!(fs::read(kept).expect("kept") == damaged, "{at}: {said}");
         run(dir.path(), &format!("decode card.img -o out{at} --format jsonl"), 0);
         let records: Vec<u8> =
             contents(&dir.path().join(format!("out{at}"))).into_iter().flat_map(|(_, bytes)| bytes).collect();
