@@ -342,6 +342,11 @@ impl Crosschecks {
         (0..SENSORS_MAX).rev().find(|instance| measured(*instance)).map_or(0, |last| last as u8 + 1)
     }
 
+    /// Whether any two were compared in this flight.
+    pub(crate) fn are_compared(&self) -> bool {
+        self.compared_at.iter().any(|at| at.is_set())
+    }
+
     /// How far a sensor is apart from all others of its kind, beyond what is usual; of two, for the second one.
     pub(crate) fn mismatch(&self, now: Instant, kind: Kind, sensor: u8) -> Option<Reading> {
         let at = self.compared_at[kind as usize].instant(now).filter(|at| now.since(*at) <= EVERY + EVERY)?;

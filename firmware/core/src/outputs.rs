@@ -161,6 +161,11 @@ impl MotorOutputs {
         self.share.iter().all(Departure::is_known)
     }
 
+    /// Whether any told something in this flight.
+    pub(crate) const fn are_told(&self) -> bool {
+        self.at.is_some()
+    }
+
     /// A motor's command against the average of all, percent, smoothed.
     pub(crate) fn share(&self, now: Instant, vehicle: &Vehicle, motor: u8) -> Option<f32> {
         self.at.filter(|at| now.since(*at) <= PAUSE)?;

@@ -2,7 +2,7 @@
 
 use hums_core::Monitor;
 use hums_core::baseline::Baselines;
-use hums_core::health::{Check, Scope, Side, VOCABULARY, When, checks, vocabulary};
+use hums_core::health::{Check, Level, Parts, Scope, Side, VOCABULARY, When, checks, vocabulary};
 use hums_core::observation::{Autopilot, Gnss, Heartbeat};
 use hums_core::params::{Param, Params};
 use hums_core::status::{LinkReading, RecorderStatus};
@@ -59,16 +59,14 @@ impl Coverage {
             return;
         }
         let inputs = monitor.inputs(steps, link, recorder);
+        let parts = Parts::of(&inputs);
         for (seen, check) in self.seen.iter_mut().zip(checks()).filter(|(seen, _)| !seen.value) {
-            seen.value = (0..check.instances).any(|instance| {
+            seen.value = (0..parts.count(check)).any(|instance| {
                 (check.read)(&inputs, instance).is_some_and(|reading| reading.value.is_finite())
             });
         }
-        if self.seen.iter().all(|seen| seen.level) {
-            return;
-        }
-        for (seen, judged) in self.seen.iter_mut().zip(monitor.health().judged()) {
-            seen.level |= judged;
+        for (seen, mut levels) in self.seen.iter_mut().zip(monitor.health().by_check()) {
+            seen.level = seen.level || levels.any(|level| level != Level::Stale);
         }
     }
 

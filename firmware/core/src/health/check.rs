@@ -45,6 +45,11 @@ pub enum When {
     InFlight,
 }
 
+impl When {
+    /// All of them, by their number.
+    pub(super) const ALL: [Self; 3] = [Self::Always, Self::Armed, Self::InFlight];
+}
+
 /// What a check, or an instance of it, has its value from. What never said anything has none, and is not asked for one: most of a step
 /// went into asking.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -53,12 +58,24 @@ pub enum Part {
     Vehicle,
     /// Motors, whose ESCs tell of them.
     Motor,
-    /// Batteries. The first one may be the autopilot's own, which no message names.
+    /// Motors by what they are given.
+    Output,
+    /// Batteries, the first one also by the autopilot's own figures, which name none.
+    Supply,
+    /// Batteries that report themselves.
     Battery,
+    /// The autopilot's board: its rails, its processor's temperature.
+    Board,
+    /// Vibration, and what it clips.
+    Vibration,
+    /// The remote control's receiver and the telemetry radio.
+    Radio,
     /// GNSS receivers.
     Receiver,
     /// Accelerometers, gyros, compasses and barometers by instance.
     Sensor,
+    /// Two sensors of a kind that were compared.
+    Pair,
     /// The estimator.
     Estimator,
     /// The combustion engine.
@@ -71,21 +88,34 @@ pub enum Part {
     Past,
 }
 
+impl Part {
+    pub(super) const COUNT: usize = Self::Past as usize + 1;
+}
+
 /// How many of each [`Part`] have ever spoken.
-pub(super) struct Parts([u8; Part::Past as usize + 1]);
+pub struct Parts([u8; Part::COUNT]);
 
 impl Parts {
-    pub(super) fn of(inputs: &Inputs<'_>) -> Self {
-        let Inputs { vehicle, .. } = inputs;
+    /// As they are now.
+    pub fn of(inputs: &Inputs<'_>) -> Self {
+        let Inputs { vehicle, derived, .. } = inputs;
         let all = |known: bool| if known { u8::MAX } else { 0 };
+        let is_known = |at: Option<Instant>| all(at.is_some());
+        let batteries = vehicle.batteries_known();
         let mut counts = [u8::MAX; _];
         for (part, count) in [
             (Part::Motor, vehicle.motors_known()),
-            (Part::Battery, vehicle.batteries_known().max(1)),
+            (Part::Output, all(derived.outputs().are_told())),
+            (Part::Supply, batteries.max(1)),
+            (Part::Battery, batteries),
+            (Part::Board, is_known(vehicle.rails.at().or(vehicle.processor.at()))),
+            (Part::Vibration, is_known(vehicle.vibration.at())),
+            (Part::Radio, is_known(vehicle.rc.at().or(vehicle.radio.at()))),
             (Part::Receiver, vehicle.receivers_known()),
-            (Part::Sensor, inputs.derived.crosschecks().sensors_known()),
-            (Part::Estimator, all(vehicle.estimator.get().is_some())),
-            (Part::Engine, all(vehicle.engine.get().is_some())),
+            (Part::Sensor, derived.crosschecks().sensors_known()),
+            (Part::Pair, all(derived.crosschecks().are_compared())),
+            (Part::Estimator, is_known(vehicle.estimator.at())),
+            (Part::Engine, is_known(vehicle.engine.at())),
             (Part::Alert, all(vehicle.alerts.are_known())),
             (Part::Wear, all(inputs.wear.iter().any(Option::is_some))),
             (Part::Past, all(inputs.baselines.are_known())),
@@ -95,8 +125,13 @@ impl Parts {
         Self(counts)
     }
 
+    /// The parts of which any has spoken: a bit each.
+    pub(super) fn spoken(&self) -> u16 {
+        self.0.iter().rev().fold(0, |spoken, count| spoken << 1 | u16::from(*count > 0))
+    }
+
     /// How many instances of a check may have a value.
-    pub(super) const fn count(&self, check: &Check) -> u8 {
+    pub const fn count(&self, check: &Check) -> u8 {
         let spoken = self.0[check.part as usize];
         if spoken < check.instances { spoken } else { check.instances }
     }
@@ -344,8 +379,10 @@ impl State {
         if is_beyond(check.warn) || is_beyond(check.critical) {
             return false;
         }
-        let seen = Stamp::at(at.min(now));
-        let is_stale = check.stale_after.is_some_and(|limit| at < now && seen.older_than(now, limit));
+        // Dividing is dear: that of now is done once for all checks, and what is younger than its limit needs none.
+        let seen = if at < now { Stamp::at(at) } else { Stamp::at(now) };
+        let is_old = |limit| now.since(at) > limit && seen.older_than(now, limit);
+        let is_stale = check.stale_after.is_some_and(is_old);
         if !is_stale {
             self.seen = seen;
         }

@@ -43,6 +43,7 @@ pub(super) const CHECKS: &[Check] = &[
         unit: "degC",
         warn: Some(Param::McuTempWarn),
         critical: Some(Param::McuTempCrit),
+        part: Part::Board,
         read: temperature_c,
         ..LOAD
     },

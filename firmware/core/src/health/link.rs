@@ -39,6 +39,7 @@ const RADIO: Check = Check {
     debounce_critical: Span::from_secs(1),
     when: When::Armed,
     stale_after: STALE,
+    part: Part::Radio,
     read: rc_rssi,
     ..HEARTBEAT
 };

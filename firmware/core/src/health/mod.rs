@@ -22,18 +22,19 @@ mod structure;
 mod tables;
 mod vocabulary;
 
-pub use check::{CLEAR, CLEAR_MAX, CLEAR_MAX_ALWAYS, Check, Side, State, When};
-use check::{Change, Parts};
+use check::Change;
+pub use check::{CLEAR, CLEAR_MAX, CLEAR_MAX_ALWAYS, Check, Parts, Side, State, When};
 pub use consequence::{because, is_of_mishap};
 pub use finding::{Finding, Level, Subsystem};
 pub use inputs::Inputs;
 pub use tables::{check_named, checks, instances};
 pub use vocabulary::{Said, Scope, VOCABULARY, Words, said, vocabulary};
 
-use crate::params::Param;
+use crate::latest::Reading;
+use crate::params::{Param, Params};
 use crate::time::Span;
 use exceedance::Exceedances;
-use tables::{STATES, TABLES};
+use tables::{Kinds, STATES};
 
 /// A vehicle that has not been heard for so long is silent.
 const SILENT: Span = Span::from_secs(5);
@@ -46,9 +47,11 @@ pub struct Health {
     states: [State; STATES],
     /// The state that is looked at next: whether what explained its alarm still does. One a step, each every 8 s.
     looked_at: u8,
+    /// Kinds of checks whose states may not be new: of all others a step changes nothing while they do not apply.
+    awake: Kinds,
 }
 
-const _: () = assert!(size_of::<Health>() <= 5 * 1024 && STATES <= u8::MAX as usize);
+const _: () = assert!(size_of::<Health>() <= 5 * 1024);
 
 impl Default for Health {
     fn default() -> Self {
@@ -59,14 +62,14 @@ impl Default for Health {
 impl Health {
     /// Nothing seen yet.
     pub const fn new() -> Self {
-        Self { states: [const { State::new() }; STATES], looked_at: 0 }
+        Self { states: [const { State::new() }; STATES], looked_at: 0, awake: Kinds::NONE }
     }
 
     /// As if nothing had been seen.
     pub(crate) fn clear(&mut self) {
-        let Self { states, looked_at } = self;
+        let Self { states, looked_at, awake } = self;
         states.fill(State::new());
-        *looked_at = 0;
+        (*looked_at, *awake) = (0, Kinds::NONE);
     }
 
     /// One step of all checks, at least every 50 ms; each change of level is a finding, and so is an alarm that outlives the one that
@@ -77,81 +80,109 @@ impl Health {
         exceedances: &mut Exceedances,
         findings: &mut impl FnMut(&Finding),
     ) {
-        let latched = inputs.params.get(Param::Latch) >= 0.5 && inputs.vehicle.armed();
-        let heard = inputs.vehicle.heartbeat.within(inputs.now, SILENT).is_some();
-        // What lies disarmed, or is silent, has nothing more to judge but itself.
-        let over =
-            inputs.mishap.is_going() && (!heard || (inputs.mishap.is_down() && !inputs.vehicle.armed()));
-        let quiet = inputs.mishap.is_going() && !over;
+        let Now { whens, quiet, latched } = Now::of(inputs);
         let parts = Parts::of(inputs);
-        let looked_at = usize::from(self.looked_at);
-        self.looked_at = ((looked_at + 1) % STATES) as u8;
-        // Most have nothing to say and never had: a step would change nothing.
-        let is_idle = |states: &[State]| states.iter().all(State::is_new);
-        let mut first = 0;
-        for (place, check) in (0..).zip(TABLES.iter().copied().flatten()) {
-            let quiet = quiet && check.when != When::Always;
-            let applies = quiet || (check.when == When::Always || !over) && is_now(check.when, inputs);
-            let slots = first..first + usize::from(check.instances);
-            first = slots.end;
-            let there = parts.count(check);
-            debug_assert!(
-                silent(check, there, inputs),
-                "{} has a value, though its part never spoke",
-                check.name
-            );
-            if (!applies || there == 0) && self.states.get(slots.clone()).is_none_or(is_idle) {
-                continue;
-            }
-            // What is not idle is stepped, though it is not known any more.
-            let there = if there == 0 { check.instances } else { there };
-            for (instance, slot) in (0..there).zip(slots) {
-                let Some(state) = self.states.get_mut(slot) else { return };
+        debug_assert_eq!(speaks(&parts, inputs), None, "has a value, though its part never spoke");
+        let kinds = Kinds::of(parts.spoken(), whens);
+        let stepped = kinds.and(self.awake);
+        for (place, check, first) in stepped.checks() {
+            let (quiet, applies) = (quiet && check.when != When::Always, whens[check.when as usize]);
+            // What is not new is stepped, though it is not known any more.
+            let there = match parts.count(check) {
+                0 => check.instances,
+                there => there,
+            };
+            for instance in 0..there {
+                let slot = first + usize::from(instance);
+                let Some(state) = self.states.get_mut(slot) else { break };
                 // Of what is new, a step without a value changes nothing.
                 let is_new = state.is_new();
                 let reading = if is_new && !applies { None } else { (check.read)(inputs, instance) };
-                if is_new && reading.is_none() {
-                    continue;
-                }
-                if !quiet && state.rests(check, inputs, reading, applies, latched) {
-                    continue;
-                }
-                let before = *state;
-                let change = state.step(check, inputs.now, reading, applies, inputs.params);
-                if quiet {
-                    // It would only echo the mishap: it stays as it was.
-                    *state = before.seen_as(state);
-                    continue;
-                }
-                let change = if latched { state.hold(&before, change) } else { change };
-                let is_change = change.is_some();
-                let told = if let Some(change) = change {
-                    let because = self.because(check, change.level);
-                    if let Some(state) = self.states.get_mut(slot) {
-                        state.explain(!because.is_empty());
-                    }
-                    Some((change, because))
-                } else if let (Some(level @ (Level::Warning | Level::Critical)), Some(reading)) =
-                    (state.level(), reading)
+                if is_new && reading.is_none()
+                    || !quiet && state.rests(check, inputs, reading, applies, latched)
                 {
-                    exceedances.note(place, instance, check.side, reading.value);
-                    let is_alone =
-                        slot == looked_at && state.was_explained() && self.outlives(slot, check, level);
-                    let limit = check.limit(level, inputs.params);
-                    is_alone.then_some((Change { level, previous: level, value: reading.value, limit }, ""))
-                } else {
-                    None
-                };
-                let Some((change, because)) = told else { continue };
-                let feeds = power::feeds(check, inputs, instance);
-                let finding = Finding { because, ..check.finding(instance, inputs.now, change, feeds) };
-                if is_change {
-                    exceedances.change(place, check.side, &finding);
+                    continue;
                 }
-                // In one place: the compiler puts what is done with it here, with its stack.
-                findings(&finding);
+                let at = (place, check, instance, slot);
+                let how = How { applies, quiet, latched };
+                if let Some(finding) = self.turn(at, inputs, reading, how, exceedances) {
+                    findings(&finding);
+                }
             }
         }
+        self.looked_at = ((usize::from(self.looked_at) + 1) % STATES) as u8;
+        self.awake = if stepped == kinds { kinds } else { self.awake(stepped, kinds) };
+        debug_assert_eq!(self.awake(Kinds::ALL, self.awake), self.awake, "what is left out is new");
+    }
+
+    /// A step of one state that may change it. Apart, so that the many that change nothing need few registers.
+    #[inline(never)]
+    fn turn(
+        &mut self,
+        (place, check, instance, slot): (u8, &'static Check, u8, usize),
+        inputs: &Inputs<'_>,
+        reading: Option<Reading>,
+        How { applies, quiet, latched }: How,
+        exceedances: &mut Exceedances,
+    ) -> Option<Finding> {
+        let state = self.states.get_mut(slot)?;
+        let before = *state;
+        let change = state.step(check, inputs.now, reading, applies, inputs.params);
+        if quiet {
+            // It would only echo the mishap: it stays as it was.
+            *state = before.seen_as(state);
+            return None;
+        }
+        let change = if latched { state.hold(&before, change) } else { change };
+        if let (None, Some(Level::Warning | Level::Critical), Some(reading)) =
+            (change, state.level(), reading)
+        {
+            exceedances.note(place, instance, check.side, reading.value);
+        }
+        let (told, because) = match change {
+            Some(change) => self.explained(slot, check, change),
+            None if slot == usize::from(self.looked_at) => self.alone(slot, check, reading, inputs.params)?,
+            None => return None,
+        };
+        let feeds = power::feeds(check, inputs, instance);
+        let finding = Finding { because, ..check.finding(instance, inputs.now, told, feeds) };
+        if change.is_some() {
+            exceedances.change(place, check.side, &finding);
+        }
+        Some(finding)
+    }
+
+    /// These `kinds` of checks, and of the `others` those that have a state which is not new.
+    fn awake(&self, others: Kinds, kinds: Kinds) -> Kinds {
+        let others = others.checks().filter(|(_, check, _)| !kinds.has(check));
+        others.fold(kinds, |awake, (_, check, first)| {
+            let mut states = self.states.iter().skip(first).take(usize::from(check.instances));
+            if states.all(State::is_new) { awake } else { awake.and(Kinds::of_check(check)) }
+        })
+    }
+
+    /// A change, and the check whose alarm explains it.
+    fn explained(&mut self, slot: usize, check: &Check, change: Change) -> (Change, &'static str) {
+        let because = self.because(check, change.level);
+        if let Some(state) = self.states.get_mut(slot) {
+            state.explain(!because.is_empty());
+        }
+        (change, because)
+    }
+
+    /// An alarm that outlives the one that explained it, as a change of its own.
+    fn alone(
+        &mut self,
+        slot: usize,
+        check: &Check,
+        reading: Option<Reading>,
+        params: &Params,
+    ) -> Option<(Change, &'static str)> {
+        let state = self.states.get(slot).filter(|state| state.was_explained())?;
+        let level = state.level().filter(|level| matches!(level, Level::Warning | Level::Critical))?;
+        let value = reading?.value;
+        let change = Change { level, previous: level, value, limit: check.limit(level, params) };
+        self.outlives(slot, check, level).then_some((change, ""))
     }
 
     /// The check whose alarm explains another one's change to a level; empty where none does.
@@ -175,12 +206,13 @@ impl Health {
             .filter_map(|((check, instance), state)| state.level().map(|level| (check, instance, level)))
     }
 
-    /// Of each check, in the order of [`checks`], whether an instance has a level that is known.
-    pub fn judged(&self) -> impl Iterator<Item = bool> {
-        let mut states = self.states.iter();
+    /// Of each check, in the order of [`checks`], the levels of its instances.
+    pub fn by_check(&self) -> impl Iterator<Item = impl Iterator<Item = Level>> {
+        let mut states = &self.states[..];
         checks().map(move |check| {
-            let mine = states.by_ref().take(usize::from(check.instances));
-            mine.fold(false, |known, state| known | state.level().is_some_and(|level| level != Level::Stale))
+            let (mine, rest) = states.split_at_checked(usize::from(check.instances)).unwrap_or_default();
+            states = rest;
+            mine.iter().filter_map(State::level)
         })
     }
 
@@ -201,18 +233,47 @@ impl Health {
     }
 }
 
-/// Whether it is so now.
-fn is_now(when: When, inputs: &Inputs<'_>) -> bool {
-    match when {
-        When::Always => true,
-        When::Armed => inputs.vehicle.armed(),
-        When::InFlight => inputs.flight.airborne(),
+/// How a state is stepped.
+#[derive(Clone, Copy)]
+struct How {
+    applies: bool,
+    quiet: bool,
+    latched: bool,
+}
+
+/// What is common to all checks of a step.
+struct Now {
+    /// Which checks apply, by [`When`].
+    whens: [bool; When::ALL.len()],
+    /// A mishap goes on: all but those that always apply would only echo it.
+    quiet: bool,
+    /// Levels do not fall.
+    latched: bool,
+}
+
+impl Now {
+    fn of(inputs: &Inputs<'_>) -> Self {
+        let Inputs { now, vehicle, mishap, .. } = *inputs;
+        let armed = vehicle.armed();
+        let is_silent = || vehicle.heartbeat.within(now, SILENT).is_none();
+        // What lies disarmed, or is silent, has nothing more to judge but itself.
+        let over = mishap.is_going() && ((mishap.is_down() && !armed) || is_silent());
+        let quiet = mishap.is_going() && !over;
+        let whens = When::ALL.map(|when| match when {
+            When::Always => true,
+            When::Armed => quiet || (!over && armed),
+            When::InFlight => quiet || (!over && inputs.flight.airborne()),
+        });
+        Self { whens, quiet, latched: armed && inputs.params.get(Param::Latch) >= 0.5 }
     }
 }
 
-/// Whether none but the first instances of a check have a value.
-fn silent(check: &Check, there: u8, inputs: &Inputs<'_>) -> bool {
-    (there..check.instances).all(|instance| (check.read)(inputs, instance).is_none())
+/// A check of which more instances have a value than of its part have spoken; there is none.
+fn speaks(parts: &Parts, inputs: &Inputs<'_>) -> Option<&'static str> {
+    let has_more = |check: &&Check| {
+        (parts.count(check)..check.instances).any(|instance| (check.read)(inputs, instance).is_some())
+    };
+    checks().find(has_more).map(|check| check.name)
 }
 
 /// Critical before stale before warning: not knowing is worse than a known warning, and better than a known danger.

@@ -63,7 +63,7 @@ const MISMATCH: Check = Check {
     // Never stale: they are compared where that says something.
     stale_after: None,
     instances: SENSORS_MAX as u8,
-    part: Part::Sensor,
+    part: Part::Pair,
     read: |inputs, sensor| mismatch(inputs, Kind::Accelerometer, sensor),
     ..ESTIMATOR
 };
@@ -76,6 +76,7 @@ const STUCK: Check = Check {
     hysteresis: 0.0,
     debounce_warn: Span::ZERO,
     alarm_only: true,
+    part: Part::Sensor,
     read: |inputs, sensor| stuck(inputs, Kind::Accelerometer, sensor),
     ..MISMATCH
 };
@@ -156,6 +157,7 @@ pub(super) const CHECKS: &[Check] = &[
         hysteresis: 1.0,
         debounce_warn: Span::from_secs(1),
         instances: 1,
+        part: Part::Sensor,
         read: |inputs, _| inputs.derived.crosschecks().heights().apart(),
         ..MISMATCH
     },
@@ -166,6 +168,7 @@ pub(super) const CHECKS: &[Check] = &[
         hysteresis: 0.5,
         debounce_warn: Span::from_secs(1),
         instances: 1,
+        part: Part::Sensor,
         read: |inputs, _| inputs.derived.crosschecks().heights().noise(),
         ..MISMATCH
     },
@@ -178,6 +181,7 @@ pub(super) const CHECKS: &[Check] = &[
         debounce_warn: Span::from_millis(500),
         debounce_critical: Span::from_millis(500),
         instances: 1,
+        part: Part::Sensor,
         read: |inputs, _| inputs.derived.crosschecks().heights().climbs_apart(),
         ..MISMATCH
     },

@@ -29,7 +29,7 @@ const BATTERY: Check = Check {
     instances: BATTERIES,
     alarm_only: false,
     is_flag: false,
-    part: Part::Battery,
+    part: Part::Supply,
     read: remaining_percent,
 };
 
@@ -57,6 +57,7 @@ pub(super) const CHECKS: &[Check] = &[
         hysteresis: 0.01,
         debounce_warn: Span::from_secs(10),
         debounce_critical: Span::from_secs(10),
+        part: Part::Battery,
         read: cell_deviation_v,
         when: When::Armed,
         ..BATTERY
@@ -70,6 +71,7 @@ pub(super) const CHECKS: &[Check] = &[
         hysteresis: 0.01,
         // AirData: above the warning's limit for a minute is as bad as far above it.
         debounce_critical: Span::from_secs(60),
+        part: Part::Battery,
         read: cell_deviation_v,
         when: When::Armed,
         ..BATTERY
@@ -85,6 +87,7 @@ pub(super) const CHECKS: &[Check] = &[
         when: When::InFlight,
         // A trend holds until the next figure.
         stale_after: None,
+        part: Part::Battery,
         read: resistance_rise_percent,
         ..BATTERY
     },
@@ -111,6 +114,7 @@ pub(super) const CHECKS: &[Check] = &[
         critical: None,
         hysteresis: 0.0,
         alarm_only: true,
+        part: Part::Battery,
         read: faults,
         ..BATTERY
     },
@@ -121,6 +125,7 @@ pub(super) const CHECKS: &[Check] = &[
         warn: Some(Param::BatTempWarn),
         critical: Some(Param::BatTempCrit),
         hysteresis: 3.0,
+        part: Part::Battery,
         read: temperature_c,
         ..BATTERY
     },
@@ -132,6 +137,7 @@ pub(super) const CHECKS: &[Check] = &[
         warn: Some(Param::BatStateWarn),
         critical: Some(Param::BatStateCrit),
         hysteresis: 0.0,
+        part: Part::Battery,
         read: |inputs, battery| {
             let slot = inputs.vehicle.batteries.get(usize::from(battery))?;
             let value = match slot.get()?.charge {
@@ -156,6 +162,7 @@ pub(super) const CHECKS: &[Check] = &[
         when: When::Armed,
         stale_after: STALE,
         instances: 1,
+        part: Part::Board,
         read: rail_v,
         ..BATTERY
     },
@@ -169,6 +176,7 @@ pub(super) const CHECKS: &[Check] = &[
         debounce_warn: Span::from_secs(1),
         stale_after: STALE,
         instances: 1,
+        part: Part::Board,
         read: rail_v,
         ..BATTERY
     },

@@ -138,7 +138,7 @@ pub(super) const CHECKS: &[Check] = &[
         debounce_critical: Span::from_secs(1),
         when: When::InFlight,
         instances: JUDGED_MAX as u8,
-        part: Part::Vehicle,
+        part: Part::Output,
         read: |inputs, motor| inputs.derived.outputs().alone(inputs.now, inputs.vehicle, motor),
         ..ESC
     },

@@ -26,7 +26,7 @@ const VIBRATION: Check = Check {
     instances: 1,
     alarm_only: false,
     is_flag: false,
-    part: Part::Vehicle,
+    part: Part::Vibration,
     read: per_axis,
 };
 
@@ -75,6 +75,7 @@ pub(super) const CHECKS: &[Check] = &[
         debounce_warn: Span::from_millis(500),
         debounce_critical: Span::from_millis(500),
         when: When::InFlight,
+        part: Part::Vehicle,
         read: |inputs, _| inputs.derived.load_factor(),
         ..VIBRATION
     },

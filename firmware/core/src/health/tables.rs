@@ -1,6 +1,6 @@
 //! All checks: each subsystem's table is in a file of its own.
 
-use super::check::Check;
+use super::check::{Check, Part, When};
 use super::{attitude, computer, engine, link, mishap, navigation, power, propulsion, recorder, structure};
 
 pub(super) const TABLES: [&[Check]; 10] = [
@@ -16,9 +16,9 @@ pub(super) const TABLES: [&[Check]; 10] = [
     mishap::CHECKS,
 ];
 
-/// States that all checks together have: one for each instance.
-pub(super) const STATES: usize = {
-    let mut states = 0;
+/// Checks in all tables together, and states that they have: one for each instance.
+const COUNTS: (usize, usize) = {
+    let (mut rows, mut states) = (0, 0);
     let mut table = 0;
     while table < TABLES.len() {
         let mut check = 0;
@@ -26,14 +26,145 @@ pub(super) const STATES: usize = {
             states += TABLES[table][check].instances as usize;
             check += 1;
         }
+        rows += check;
         table += 1;
     }
-    states
+    (rows, states)
 };
 
+/// How many checks there are.
+const CHECKS_COUNT: usize = COUNTS.0;
+/// States that all checks together have: one for each instance.
+pub(super) const STATES: usize = COUNTS.1;
+
 /// All checks, by subsystem.
-pub fn checks() -> impl Iterator<Item = &'static Check> {
-    TABLES.iter().copied().flatten()
+static CHECKS: [Check; CHECKS_COUNT] = {
+    let mut all = [TABLES[0][0]; CHECKS_COUNT];
+    let (mut table, mut count) = (0, 0);
+    while table < TABLES.len() {
+        let mut check = 0;
+        while check < TABLES[table].len() {
+            all[count] = TABLES[table][check];
+            (check, count) = (check + 1, count + 1);
+        }
+        table += 1;
+    }
+    all
+};
+
+/// The first state of each check.
+static FIRST_STATES: [u8; CHECKS_COUNT] = {
+    let mut first = [0; CHECKS_COUNT];
+    let mut place = 1;
+    while place < CHECKS_COUNT {
+        first[place] = first[place - 1] + CHECKS[place - 1].instances;
+        place += 1;
+    }
+    first
+};
+
+/// A set of checks by their places: a bit each.
+type Places = [u32; CHECKS_COUNT.div_ceil(u32::BITS as usize)];
+
+const NOWHERE: Places = [0; CHECKS_COUNT.div_ceil(u32::BITS as usize)];
+
+const _: () = assert!(CHECKS_COUNT <= STATES && STATES <= u8::MAX as usize);
+
+/// The checks whose value is from each part.
+static OF_PART: [Places; Part::COUNT] = {
+    let mut of_part = [NOWHERE; Part::COUNT];
+    let mut place = 0;
+    while place < CHECKS_COUNT {
+        of_part[CHECKS[place].part as usize][place / 32] |= 1 << (place % 32);
+        place += 1;
+    }
+    of_part
+};
+
+/// The checks that apply at each time.
+static OF_WHEN: [Places; When::ALL.len()] = {
+    let mut of_when = [NOWHERE; When::ALL.len()];
+    let mut place = 0;
+    while place < CHECKS_COUNT {
+        of_when[CHECKS[place].when as usize][place / 32] |= 1 << (place % 32);
+        place += 1;
+    }
+    of_when
+};
+
+/// Kinds of checks: those that have their value from one of some parts, and apply at one of some times. A bit each; in bytes, so that
+/// they fit in beside another one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Kinds {
+    parts: [u8; 2],
+    times: u8,
+}
+
+const _: () = assert!(Part::COUNT <= u16::BITS as usize && When::ALL.len() <= u8::BITS as usize);
+
+impl Kinds {
+    /// None.
+    pub(super) const NONE: Self = Self { parts: [0; 2], times: 0 };
+
+    /// All of them: for assertions.
+    pub(super) const ALL: Self = Self { parts: [u8::MAX; 2], times: u8::MAX };
+
+    /// Those of these parts, at times that `are_now`.
+    pub(super) fn of(parts: u16, are_now: [bool; When::ALL.len()]) -> Self {
+        let times = are_now.into_iter().rev().fold(0, |times, is_now| times << 1 | u8::from(is_now));
+        Self { parts: parts.to_le_bytes(), times }
+    }
+
+    pub(super) const fn of_check(check: &Check) -> Self {
+        Self { parts: (1_u16 << check.part as u8).to_le_bytes(), times: 1 << check.when as u8 }
+    }
+
+    pub(super) fn has(self, check: &Check) -> bool {
+        self.and(Self::of_check(check)) == self
+    }
+
+    /// The parts and the times of both.
+    pub(super) fn and(self, other: Self) -> Self {
+        let parts = u16::from_le_bytes(self.parts) | u16::from_le_bytes(other.parts);
+        Self { parts: parts.to_le_bytes(), times: self.times | other.times }
+    }
+
+    /// The checks of these kinds, in their order: the place of each, and its first state.
+    pub(super) fn checks(self) -> impl Iterator<Item = (u8, &'static Check, usize)> {
+        let places = self.places();
+        let (mut word, mut left) = (0, places[0]);
+        core::iter::from_fn(move || {
+            while left == 0 {
+                word += 1;
+                left = *places.get(word)?;
+            }
+            let place = word * u32::BITS as usize + left.trailing_zeros() as usize;
+            left &= left - 1;
+            let (check, first) = (CHECKS.get(place)?, FIRST_STATES.get(place)?);
+            Some((place as u8, check, usize::from(*first)))
+        })
+    }
+
+    fn places(self) -> Places {
+        let parts = union(&OF_PART, u16::from_le_bytes(self.parts).into());
+        let mut places = union(&OF_WHEN, self.times.into());
+        places.iter_mut().zip(parts).for_each(|(places, parts)| *places &= parts);
+        places
+    }
+}
+
+/// All places of those sets whose bit is set.
+fn union(sets: &[Places], bits: u32) -> Places {
+    let mut all = NOWHERE;
+    for (_, set) in sets.iter().enumerate().filter(|(bit, _)| bits >> bit & 1 != 0) {
+        all.iter_mut().zip(set).for_each(|(all, places)| *all |= places);
+    }
+    all
+}
+
+/// All checks, by subsystem.
+pub fn checks() -> impl ExactSizeIterator<Item = &'static Check> + Clone {
+    CHECKS.iter()
 }
 
 /// The check of this name.

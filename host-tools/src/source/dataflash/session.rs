@@ -84,11 +84,13 @@ impl First {
     /// Takes a message.
     pub(super) fn learn(&mut self, kind: u8, body: Body<'_>) {
         let Self { formats, state, handlers, timed, .. } = self;
-        let defined = defined_by(formats, kind, body);
-        define(formats, kind, body);
-        if let Some((defined, _)) = defined {
-            handlers.forget(defined);
-            formats.get(defined).into_iter().for_each(|format| state.define(format));
+        if formats.get(kind).is_some_and(|format| format.role != Role::Other) {
+            let defined = defined_by(formats, kind, body);
+            define(formats, kind, body);
+            if let Some((defined, _)) = defined {
+                handlers.forget(defined);
+                formats.get(defined).into_iter().for_each(|format| state.define(format));
+            }
         }
         let Some(format) = formats.get(kind) else { return };
         *timed |= tells_time(format);
