@@ -24,12 +24,12 @@ fn is_empty(block: &[u8; BLOCK_BYTES]) -> bool {
 /// file between.
 const HEADING_BLOCKS: u64 = (4 * HEADING_GROUPS * GROUP_SECTORS) as u64;
 
-/// Who recorded the file that begins where `blocks` are, if one begins there, and no page of a log whose sectors go on behind it
-/// from the `last` one.
-fn begins_here(blocks: &Blocks<'_>, last: Option<Found>) -> Result<Option<Board>> {
-    let rest = blocks.from_here(HEADING_BLOCKS);
+/// Who recorded the file that begins at this block of the one that `blocks` are of, if one begins there, and no page of a log whose
+/// sectors go on behind it from the `last` one.
+fn begins_at(blocks: &Blocks<'_>, mut at: u64, last: Option<Found>) -> Result<Option<Board>> {
+    let rest = blocks.from(at, HEADING_BLOCKS);
     if let Some(last) = last {
-        let (mut rest, mut at) = (rest.blocks(), blocks.place().1);
+        let mut rest = rest.blocks();
         let blocks = std::iter::from_fn(|| {
             let block = rest.next_block().transpose()?;
             at += 1;
@@ -235,7 +235,7 @@ impl<'a> Groups<'a> {
     fn feed(&mut self, block: &[u8; BLOCK_BYTES]) -> Result<()> {
         let joined = match &mut self.joints {
             Some(joints) => {
-                joints.look(self.blocks.place(), block, |last| begins_here(&self.blocks, last))?
+                joints.look(self.blocks.place(), block, |at, last| begins_at(&self.blocks, at, last))?
             }
             None => None,
         };

@@ -25,7 +25,10 @@ pub(super) struct Joints {
     file: usize,
     /// Where the file's own first group begins: the same again is a copy of it, and no other file.
     first: Option<[u8; SECTOR_BYTES]>,
-    /// The record of who records was seen in the file.
+    /// Blocks at the file's beginning where a group begins: a bit each. One of them has the record of who records; they are decoded
+    /// where something is joined, which is nowhere in nearly every log.
+    begins: u8,
+    /// The record of who records was seen in the file, further on.
     has_heading: bool,
     /// The last sector so far in the file.
     last: Option<Found>,
@@ -76,12 +79,12 @@ impl Found {
 
 impl Joints {
     /// Who recorded the file that was joined to this one and that this block belongs to, if it does; `heading` gives who
-    /// recorded the file that begins here, if one does.
+    /// recorded the file that begins at a block, if one does.
     pub(super) fn look(
         &mut self,
         (file, at): (usize, u64),
         block: &[u8; SECTOR_BYTES],
-        heading: impl FnOnce(Option<Found>) -> Result<Option<Board>>,
+        heading: impl Fn(u64, Option<Found>) -> Result<Option<Board>>,
     ) -> Result<Option<Board>> {
         if file != self.file {
             *self = Self { file, ..Self::default() };
@@ -92,10 +95,15 @@ impl Joints {
         let begins = Sector::from_bytes(*block).starts_group();
         if begins && at <= FIRST_GROUP_MAX {
             self.first = Some(*block);
-            self.has_heading |= heading(None)?.is_some();
+            self.begins |= 1 << at;
         } else if breaks && begins && self.looks < LOOKS_MAX && self.first.as_ref() != Some(block) {
             self.looks += 1;
-            let found = heading(last)?;
+            let found = heading(at, last)?;
+            if found.is_some() && !self.has_heading {
+                for at in (0..=FIRST_GROUP_MAX).filter(|at| self.begins >> at & 1 != 0) {
+                    self.has_heading |= heading(at, None)?.is_some();
+                }
+            }
             // The file's own, where it had none so far.
             if self.has_heading {
                 self.found = found;

@@ -102,9 +102,9 @@ impl<'a> Blocks<'a> {
         (self.piece, (self.begun + self.at as u64).saturating_sub(1) / BLOCK_BYTES as u64)
     }
 
-    /// The same file from the last block on, so many blocks of it at most, as a log of its own.
-    pub fn from_here(&self, blocks: u64) -> Log {
-        let (piece, at) = self.place();
+    /// The same file from this block on, so many blocks of it at most, as a log of its own.
+    pub fn from(&self, at: u64, blocks: u64) -> Log {
+        let (piece, _) = self.place();
         let (mut skipped, mut left) = (at * BLOCK_BYTES as u64, blocks * BLOCK_BYTES as u64);
         let rest = |extent: &Extent| {
             let less = skipped.min(extent.length);
