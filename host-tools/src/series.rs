@@ -93,12 +93,16 @@ impl<P> Store<P> {
 impl<P: Copy + Ord> Store<P> {
     /// Takes a value; what is not finite is none.
     pub fn push(&mut self, at: Instant, line: Line<P>, value: f32) {
-        let known = self.series.contains_key(&line);
-        if !value.is_finite() || (!known && self.series.len() >= self.series_max) {
+        if !value.is_finite() {
             return;
         }
         let interval = self.interval(at);
-        let series = self.series.entry(line).or_default();
+        let has_room = self.series.len() < self.series_max;
+        let series = match self.series.get_mut(&line) {
+            Some(series) => series,
+            None if has_room => self.series.entry(line).or_default(),
+            None => return,
+        };
         match series.values.entry(interval) {
             Entry::Occupied(mut known) => *known.get_mut() = known.get().with(value),
             Entry::Vacant(place) => {
@@ -143,6 +147,11 @@ impl<P: Copy + Ord> Store<P> {
         // An empty range is one that ends before it begins, which a map refuses.
         let some = intervals.start() <= intervals.end();
         self.series.iter().filter(move |_| some).filter_map(move |(line, series)| {
+            // Most series have nothing new at a look.
+            let (last, _) = series.values.last_key_value()?;
+            if last < intervals.start() {
+                return None;
+            }
             let (mut numbers, mut values) = (Vec::new(), Vec::new());
             for (&number, extremes) in series.values.range(intervals.clone()) {
                 numbers.push(number);

@@ -149,9 +149,10 @@ impl Database {
     /// `VictoriaMetrics`: the values of an expression, at the end of a span or in each second of it (seconds since 1970).
     pub(crate) fn query(&self, expression: &str, [from_s, to_s]: [f64; 2], instant: bool) -> Vec<Value> {
         self.get("/internal/force_flush").unwrap();
-        let (kind, span) = match instant {
-            true => ("query", format!("time={to_s}")),
-            false => ("query_range", format!("start={from_s}&end={to_s}&step=1")),
+        let (kind, span) = if instant {
+            ("query", format!("time={to_s}"))
+        } else {
+            ("query_range", format!("start={from_s}&end={to_s}&step=1"))
         };
         let answer = self.json(&format!("/api/v1/{kind}?{span}&nocache=1&query={}", escaped(expression)));
         let member = if instant { "value" } else { "values" };

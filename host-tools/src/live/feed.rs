@@ -1,7 +1,7 @@
 //! A live source: bytes as they come, on this PC's clock, until Ctrl-C.
 //!
 //! The thread waits for bytes at most `SILENCE`, takes them through the framer into the world, and publishes twenty
-//! to thirty times a second. A connection that breaks is opened again; meanwhile the values grow old, and the page says so.
+//! to twenty-five times a second. A connection that breaks is opened again; meanwhile the values grow old, and the page says so.
 
 use std::sync::Arc;
 use std::time::{Duration, Instant as Wall, SystemTime, UNIX_EPOCH};
@@ -24,9 +24,9 @@ use crate::interrupt;
 const SILENCE: Duration = Duration::from_millis(10);
 /// The largest UDP datagram.
 const BUFFER_BYTES: usize = 65_536;
-/// What has come is shown so long after the last turn: at once where nothing came for a while. Pages that draw in 10 ms
-/// have time for it, and a packet waits half as long as for the turn of a silent source.
-const SOON: Duration = Duration::from_millis(30);
+/// What has come is shown so long after what came before was: at once where nothing came for a while. Pages that draw in
+/// 10 ms have time for it.
+const SOON: Duration = Duration::from_millis(40);
 /// How soon a broken connection is tried again.
 const AGAIN: Duration = Duration::from_secs(1);
 /// A source that says nothing for so long is silent.
@@ -72,14 +72,16 @@ impl Feed {
     /// Runs until Ctrl-C; gives what is still to be written.
     pub fn run(mut self) -> Option<Influx> {
         let mut buffer = vec![0; BUFFER_BYTES];
-        let (mut published, mut news) = (Wall::now(), false);
+        let (mut published, mut shown, mut news) = (Wall::now(), Wall::now(), false);
         while !interrupt::requested() {
             let frames = self.world.frames;
             self.read(&mut buffer);
             news |= self.world.frames != frames;
-            if published.elapsed() >= if news { SOON } else { PUBLISH } {
+            if (news && shown.elapsed() >= SOON) || published.elapsed() >= PUBLISH {
                 published = Wall::now();
-                news = false;
+                if std::mem::take(&mut news) {
+                    shown = published;
+                }
                 self.publish();
             }
         }

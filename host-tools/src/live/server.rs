@@ -15,6 +15,7 @@ use axum::http::{HeaderMap, HeaderName, HeaderValue, StatusCode, header};
 use axum::middleware::{self, Next};
 use axum::response::{IntoResponse, Response};
 use axum::routing::get;
+use futures_util::SinkExt as _;
 use serde::Deserialize;
 use tokio::net::TcpListener;
 
@@ -148,6 +149,14 @@ async fn connect(
     )
 }
 
+/// Sends them as one write: each of its own would wake the page and the network once more.
+async fn send(socket: &mut WebSocket, messages: Vec<String>) -> Result<(), axum::Error> {
+    for text in messages {
+        socket.feed(Message::Text(text.into())).await?;
+    }
+    socket.flush().await
+}
+
 /// What a page sends.
 #[derive(Debug, Deserialize)]
 #[serde(tag = "cmd", rename_all = "lowercase")]
@@ -196,11 +205,8 @@ impl Page {
                     Err(_) => return,
                 },
             };
-            for text in messages {
-                let sent = tokio::time::timeout(PATIENCE, socket.send(Message::Text(text.into()))).await;
-                if !matches!(sent, Ok(Ok(()))) {
-                    return;
-                }
+            if !matches!(tokio::time::timeout(PATIENCE, send(&mut socket, messages)).await, Ok(Ok(()))) {
+                return;
             }
         }
     }
