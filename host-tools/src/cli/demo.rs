@@ -23,7 +23,7 @@ pub struct Demo {
     /// Where to put the card image and what is decoded from it
     #[arg(long, value_name = "DIR", default_value = "hums-demo")]
     pub dir: PathBuf,
-    /// Replace what is there with other content, which is kept in a folder hums-kept beside it
+    /// Where it is there already with other content: move the old one into the folder hums-kept beside it, and write the new one
     #[arg(long)]
     pub replace: bool,
     /// Whether it ends with the dashboard

@@ -60,7 +60,7 @@ pub enum Command {
     Sim(Sim),
     /// The same with the firmware image that is flashed, on a model of its chip
     Emulate(Emulate),
-    /// Turn logs into files for other tools: tlog, CSV, JSON lines, line protocol, Parquet, the thesis's tables
+    /// Turn logs into files for other tools: tlog, CSV, JSON lines, Parquet, InfluxDB
     Decode(Decode),
     /// Say what is wrong with a flight, from the log of any autopilot or ground station
     Check(Check),

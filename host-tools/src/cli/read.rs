@@ -49,7 +49,7 @@ pub struct Decode {
     /// Only these messages, by name; HUMS records and gaps stay
     #[arg(long, value_name = "NAME")]
     pub message: Vec<String>,
-    /// Keep an output that is there already and has other content in the folder hums-kept, and give its name to the new one
+    /// Where it is there already with other content: move the old one into the folder hums-kept beside it, and write the new one
     #[arg(long)]
     pub replace: bool,
     /// Print the result as one JSON object (docs/json.md)
@@ -62,15 +62,15 @@ pub struct Decode {
 pub enum Format {
     /// A ground station's log: opens in Mission Planner, QGroundControl, MAVProxy, pymavlink
     Tlog,
-    /// A table for each message type, units in the header
+    /// A table for each type of message, units in the header
     Csv,
     /// An object a line, in order of time
     Jsonl,
-    /// Line protocol, with the reference system's measurement HUMS
+    /// Lines for InfluxDB, VictoriaMetrics and QuestDB
     Influx,
     /// Typed columns by vehicle, date and session, for DuckDB, Spark, pandas
     Parquet,
-    /// The reference system's four tables, a row a second
+    /// Four tables with a row a second, as the thesis has them on which HUMS is built: flight, ESC status, ESC errors, speeds
     Thesis,
 }
 
@@ -153,8 +153,8 @@ const REPORT_EXAMPLES: &str = "Examples:
   hums report flight.tlog -o flight.html
   hums report before.tlog after.tlog --compare -o both.html
 
-With a directory for -o each session gets a page, named after log, box and session, and index.html is a table of them; otherwise the newest
-gets one. The page compares with the sessions before on the same card, and the parameters with those of the airframe's last flight.";
+With a directory for -o each session gets a page, named after log, box and session, and index.html is a table of them; otherwise only the
+newest session gets a page. A page compares with the sessions before on the same card, and the parameters with those of the airframe's last flight.";
 
 /// `hums report`
 #[derive(Args, Clone, Debug)]
@@ -169,13 +169,13 @@ pub struct Report {
     /// Only this session, by the name that `hums ls` gives
     #[arg(long, value_name = "NAME")]
     pub session: Option<String>,
-    /// Compare the last eleven flights side by side on one page; with a directory those of each airframe, besides the pages
+    /// Show the newest flight and up to ten before it side by side on one page; with a directory such a page for each airframe too
     #[arg(long)]
     pub compare: bool,
     /// Of several vehicles in a recording only this one, by its system id
     #[arg(long, value_name = "ID")]
     pub system: Option<u8>,
-    /// Keep a page that is there already and has other content in the folder hums-kept, and give its name to the new one
+    /// Where it is there already with other content: move the old one into the folder hums-kept beside it, and write the new one
     #[arg(long)]
     pub replace: bool,
     /// Print the result as one JSON object (docs/json.md)
@@ -197,7 +197,7 @@ pub struct Pack {
     /// The log file to write
     #[arg(short, long, value_name = "LOG")]
     pub output: PathBuf,
-    /// Keep a log that is there already and has other content in the folder hums-kept, and give its name to the new one
+    /// Where it is there already with other content: move the old one into the folder hums-kept beside it, and write the new one
     #[arg(long)]
     pub replace: bool,
     /// Print the result as one JSON object (docs/json.md)

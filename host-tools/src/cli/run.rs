@@ -18,7 +18,7 @@ const SIM_EXAMPLES: &str = "Examples:
   hums sim --input flight.tlog --sd card.img --store store.bin --params hums.param
 
 Raw bytes carry no times: they come as on a line at 115,200 baud. A file without a MAVLink frame is refused before anything
-is written. --sd is kept: a second run adds a session to it; a file that is no card is refused. Where --gs or --tap fails the recording goes on (exit code 3).
+is written. The image of --sd is kept: a second run adds a session to it; a file that is no card is refused. Where --gs or --tap fails the recording goes on (exit code 3).
 A file of --gs or --tap must be new, or empty.";
 
 /// What `sim` and `emulate` share.

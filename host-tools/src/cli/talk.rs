@@ -98,8 +98,8 @@ const PULL_EXAMPLES: &str = "Examples:
   hums pull --link serial:/dev/ttyUSB0:57600 -o logs --around 4:20 --span 60
 
 Names of files say whose log it is: 00001-box3f0042000d51373435363338-s1a2b3c4d_00.HUM. One that is there already is left if it
-is the same by its checksum, and checked as a new one is. One that was begun (.NAME.pull.hums-part) is gone on with, once the board has
-confirmed that it is the beginning of its log. With --around a part of a log comes, NAME.part.HUM, which every command reads and calls a part;
+is the same by its checksum, and checked as a new one is. A download that was cut off (.NAME.pull.hums-part) goes on
+where it stopped, once the board has confirmed that what is there is the beginning of its log. With --around a part of a log comes, NAME.part.HUM, which every command reads and calls a part;
 without it all of the log comes, but for what is in the part already. Exit code 3: a log came as it is on the card, and has damage there.";
 
 /// `hums pull`
@@ -115,14 +115,14 @@ pub struct Pull {
     /// Only these, by the names that the board has for them
     #[arg(value_name = "NAME")]
     pub names: Vec<String>,
-    /// Only the newest so many
+    /// Only the newest N logs
     #[arg(long, value_name = "N", conflicts_with = "around")]
     pub last: Option<usize>,
-    /// First what matters: of the newest session only what was recorded around a time (4:20, or UTC), the latest critical finding
-    /// (`critical`), the latest of any kind (`warning`), or the latest of one check (`motor_loss`)
+    /// First what matters: of the newest session only what was recorded around a time (4:20 after power-on, or UTC), around the
+    /// latest critical finding (`critical`), the latest warning or worse (`warning`), or the latest of one check (`motor_loss`)
     #[arg(long, value_name = "TIME|FINDING")]
     pub around: Option<Around>,
-    /// With --around: so many seconds before it and as many after it
+    /// With --around: from S seconds before it to S seconds after it
     #[arg(long, value_name = "S", default_value = "30", value_parser = span, requires = "around")]
     pub span: Span,
     /// Print the result as one JSON object (docs/json.md)

@@ -190,11 +190,11 @@ vocabulary! {
     "pitch_rate" Vehicle "pitch rate against what is wanted", "", says "pitch does not follow", "LAND NOW", needs "body rates that the autopilot wants";
     "The vehicle did not pitch as the autopilot wanted: a motor, propeller, servo or surface failed.";
     "Do not fly until motors, propellers, servos and control surfaces are checked.";
-    "motor_trend" Stored "motor balance trend", "motor", says "motor # changed", "CHECK IT", needs "speeds or outputs of single motors in earlier flights to compare with";
+    "motor_trend" Stored "motor balance trend", "motor", says "motor # not as before", "CHECK IT", needs "speeds or outputs of single motors in earlier flights to compare with";
     "The motor's speed or output has changed against the others since earlier flights."; "Check its propeller and bearings, and what is loaded on one side.";
-    "throttle_trend" Stored "hover throttle trend", "", says "hover throttle up", "CHECK MOTORS", needs "throttle of earlier flights to compare with";
+    "throttle_trend" Stored "hover throttle trend", "", says "more throttle to hover", "CHECK MOTORS", needs "throttle of earlier flights to compare with";
     "Hovering took more throttle than in earlier flights, and not as more weight does."; "Check propellers and motors; and the weight, where power is not measured.";
-    "power_trend" Stored "hover power trend", "", says "hover power up", "CHECK MOTORS", needs "power of earlier flights to compare with";
+    "power_trend" Stored "hover power trend", "", says "more power to hover", "CHECK MOTORS", needs "power of earlier flights to compare with";
     "Hovering took more power than in earlier flights."; "Check propellers, motors, bearings and weight.";
     "weight_trend" Stored "weight trend", "", says "heavier than usual", "", needs "throttle and power of earlier flights to compare with";
     "Hovering took as much more throttle and power as a heavier vehicle takes."; "Check the load. Without more load: check propellers and motors.";
@@ -335,12 +335,12 @@ vocabulary! {
     "The remote control's signal was weak."; "Check antennas and range.";
     "radio_rssi" Vehicle "telemetry signal", "", says "telemetry signal weak", "", needs "telemetry radio status";
     "The telemetry radio's signal was weak."; "Check antennas and range.";
-    "radio_margin" Vehicle "telemetry signal above noise", "", says "telemetry near noise", "", needs "telemetry radio status";
+    "radio_margin" Vehicle "telemetry signal above noise", "", says "telemetry signal near noise", "", needs "telemetry radio status";
     "The telemetry radio's signal was hardly above the noise."; "Check antennas, range and sources of interference.";
 
     "rc_alert" Said "autopilot's alert: remote control", "", says "autopilot warns: RC lost", "FLY BACK", needs "texts, events or health flags of the autopilot";
     "The autopilot said that the remote control was lost."; "Check transmitter, receiver, antennas and range.";
-    "gcs_alert" Said "autopilot's alert: ground station", "", says "autopilot warns: no station", "FLY BACK", needs "texts, events or health flags of the autopilot";
+    "gcs_alert" Said "autopilot's alert: ground station", "", says "autopilot warns: GCS lost", "FLY BACK", needs "texts, events or health flags of the autopilot";
     "The autopilot said that the ground station or a companion was lost."; "Check the telemetry link and its range.";
 
     "load" Vehicle "processor load", "", says "autopilot CPU full", "LAND", needs "processor load";
@@ -378,7 +378,7 @@ vocabulary! {
     "The card was too slow for a while."; "Take a faster card.";
     "record_lost" Recorder "frames lost by the recorder", "", says "log frames lost", "", needs "monitor's own recorder";
     "The recorder lost frames."; "Take a faster card.";
-    "card_stall" Recorder "card stall", "", says "card waits", "CHANGE CARD", needs "monitor's own recorder";
+    "card_stall" Recorder "card stall", "", says "card stalls", "CHANGE CARD", needs "monitor's own recorder";
     "The card kept the recorder waiting."; "Take a faster card.";
     "card_errors" Recorder "card errors", "", says "card refuses writes", "", needs "monitor's own recorder";
     "The card refused blocks."; "Copy its logs, then replace it.";
