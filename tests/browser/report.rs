@@ -61,7 +61,7 @@ fn around(jsonl: &str, message: &str, at_s: f64, around_s: f64, value: impl Fn(&
 fn a_flights_page_shows_the_flight() {
     let recording = Recording::make(Machine::Sim, &own("ap_quad_faults.tlog"), &[]);
     let (_dir, page) = report(&recording.image(), &[0]);
-    let shown = oracle::browser(&page);
+    let shown = oracle::browser(&page, &[0.3, 0.5, 0.7]);
     assert_sound(&shown);
 
     let info = json(&hums(["info".as_ref(), "--json".as_ref(), recording.image().as_os_str()]).text());
@@ -177,7 +177,7 @@ fn a_px4_flights_page_shows_its_cells_of_the_recorder_and_a_gap() {
     bytes[150 * 512 + 100] ^= 0x10;
     fs::write(&log, bytes).unwrap();
     let (_dir, page) = report(&log, &[3]);
-    let shown = oracle::browser(&page);
+    let shown = oracle::browser(&page, &[0.5]);
     assert_sound(&shown);
     let gaps = shown["gaps"].as_array().unwrap();
     assert_eq!(gaps.len(), 1);
@@ -206,7 +206,7 @@ fn words_of_a_hostile_vehicle_stay_words() {
     fs::write(&file, &data).unwrap();
     let recording = Recording::make(Machine::Sim, &file, &[]);
     let (_dir, page) = report(&recording.image(), &[0]);
-    let shown = oracle::browser(&page);
+    let shown = oracle::browser(&page, &[0.5]);
     assert_sound(&shown);
     assert!(!shown["title"].as_str().unwrap().contains("owned"), "{}", shown["title"]);
     let texts = shown["texts"].as_array().unwrap();
@@ -225,7 +225,7 @@ fn several_sessions_of_a_card_become_a_trend() {
         child::run(sim.arg(own(flight)).arg("--sd").arg(&image), LIMIT).expect_code(&[0]);
     }
     let (_dir, page) = report(&image, &[0]);
-    let shown = oracle::browser(&page);
+    let shown = oracle::browser(&page, &[0.5]);
     assert_sound(&shown);
     let text = shown["text"].as_str().unwrap();
     assert!(text.contains("This session against the 1 session before it on the same card"), "no trend");
@@ -303,7 +303,7 @@ fn each_battery_has_its_own_lines_and_two_barometers_are_two() {
 #[test]
 fn a_finding_stands_with_its_cause_and_with_its_consequences() {
     let (_dir, page) = report(&labelled("f10_gps_off.tlog.gz"), &[0]);
-    let shown = oracle::browser(&page);
+    let shown = oracle::browser(&page, &[0.5]);
     assert_sound(&shown);
     let says = |kind: &str, words: &str| {
         shown[kind].as_array().unwrap().iter().any(|text| text.as_str().unwrap().contains(words))

@@ -1,14 +1,15 @@
 """Looks at a report in Chromium, as a person would, and tells what it shows.
 
-usage: browser.py CHROMIUM CHROMEDRIVER PAGE [SCREENSHOT]        prints JSON
+usage: browser.py CHROMIUM CHROMEDRIVER PAGE PART...        prints JSON
+  PART          how far from the left the mouse points in each plot, 0 to 1
 
   console       what the browser complained about
   requests      addresses that the page asked for, but for itself
   title, text   what stands there
   findings      time, level, check and words of each finding in the list
   tiles         label and value
-  plots         for each plot: id, lines, the pixels of each line's colour, and what its lines say where the mouse points
-                at 30, 50 and 70 % of it, with the time there
+  plots         for each plot: id, lines, the pixels of each line's colour, and what its lines say where the mouse points,
+                with the time there
   cursor        the time under the cursor, at the last of these
   modes         names of the flight modes, in order
   limits        pairs of warning and critical, by plot
@@ -71,22 +72,44 @@ return Object.fromEntries(plots.filter(({ limits }) => limits.length).map(({ id,
 """
 
 
+# What stands there, read at once: each question to the browser takes its time.
+SHOWN = """
+const all = (selector, within = document) => [...within.querySelectorAll(selector)];
+const text = (node) => node.textContent;
+const part = (row, selector) => text(row.querySelector(selector));
+return {
+  title: document.title,
+  text: document.body.innerText,
+  findings: all(".notes .finding").map((row) => [part(row, "time"), part(row, ".badge"), row.dataset.check, part(row, ".words")]),
+  gaps: all("tr.gap").map((row) => row.innerText),
+  texts: all(".notes .text").map((row) => part(row, ".words")),
+  tiles: Object.fromEntries(all(".tile").map((tile) => [tile.querySelector("small").innerText, tile.querySelector("b").innerText])),
+  why: all(".notes .why").map(text),
+  because: all(".notes .because:not([hidden])").map(text),
+  consequences: all(".notes .consequences:not([hidden])").map(text),
+};
+"""
+# The lines of a plot, and what they say.
+VALUES = """
+return Object.fromEntries([...arguments[0].querySelectorAll(".keys button")].map((key) => {
+  const value = key.querySelector("b").innerText.trim(), name = key.innerText.trim();
+  return [name.slice(0, name.length - value.length).trim(), value.replaceAll("\\u202f", "")];
+}));
+"""
+
+
 def point(driver, plot, part, time_range):
     """Moves the mouse over a plot and reads its lines' values."""
     over = plot.find_element("css selector", ".u-over")
     width = over.rect["width"]
     offset = round(width * (part - 0.5))
     ActionChains(driver, duration=0).move_to_element_with_offset(over, offset, 10).perform()
-    values = {}
-    for key in plot.find_elements("css selector", ".keys button"):
-        value = key.find_element("tag name", "b").text
-        values[key.text.removesuffix(value).strip()] = value.replace("\u202f", "")
     at = time_range[0] + (round(width / 2) + offset) / width * (time_range[1] - time_range[0])
-    return {"time_s": at, "values": values}
+    return {"time_s": at, "values": driver.execute_script(VALUES, plot)}
 
 
 def main():
-    if len(sys.argv) not in (4, 5):
+    if len(sys.argv) < 5:
         sys.exit(__doc__)
     options = webdriver.ChromeOptions()
     options.binary_location = sys.argv[1]
@@ -96,26 +119,19 @@ def main():
             options.add_argument(flag)
         driver = webdriver.Chrome(options=options, service=Service(sys.argv[2]))
         try:
-            print(json.dumps(look(driver, sys.argv[3], sys.argv[4] if len(sys.argv) == 5 else None)))
+            print(json.dumps(look(driver, sys.argv[3], [float(part) for part in sys.argv[4:]])))
         finally:
             driver.quit()
 
 
-def look(driver, page, screenshot):
+def look(driver, page, parts):
     address = f"file://{page}"
     driver.get(address)
     WebDriverWait(driver, 60).until(
         lambda driver: driver.execute_script("return document.documentElement.dataset.ready") == "true")
     time_range = driver.execute_script(RANGE)
     all_of = lambda selector: driver.find_elements("css selector", selector)
-    shown = {"title": driver.title, "text": driver.find_element("tag name", "body").text}
-    content = lambda row, part: row.find_element("css selector", part).get_attribute("textContent")
-    shown["findings"] = [[content(row, "time"), content(row, ".badge"), row.get_attribute("data-check"), content(row, ".words")]
-                         for row in all_of(".notes .finding")]
-    shown["gaps"] = [row.text for row in all_of("tr.gap")]
-    shown["texts"] = [content(row, ".words") for row in all_of(".notes .text")]
-    shown["tiles"] = {tile.find_element("tag name", "small").text: tile.find_element("tag name", "b").text
-                      for tile in all_of(".tile")}
+    shown = driver.execute_script(SHOWN)
     shown["plots"] = {}
     for plot in all_of(".plot"):
         driver.execute_script("arguments[0].scrollIntoView({block: 'center', behavior: 'instant'})", plot)
@@ -124,14 +140,11 @@ def look(driver, page, screenshot):
             "lines": len(plot.find_elements("css selector", ".keys button")),
             "pixels": driver.execute_script(
                 LINE_PIXELS, canvas, plot.find_elements("css selector", ".keys i")),
-            "points": [point(driver, plot, part, time_range) for part in (0.3, 0.5, 0.7)],
+            "points": [point(driver, plot, part, time_range) for part in parts],
         }
     shown["cursor"] = driver.find_element("css selector", ".cursor-time").text
     shown["modes"] = driver.execute_script(MODES)
     shown["limits"] = driver.execute_script(LIMITS)
-    shown["why"] = [row.get_attribute("textContent") for row in all_of(".notes .why")]
-    for kind in ["because", "consequences"]:
-        shown[kind] = [row.get_attribute("textContent") for row in all_of(f".notes .{kind}:not([hidden])")]
     shown["map"] = [driver.execute_script(DRAWN, canvas) for canvas in all_of("#map")]
     shown["timeline"] = driver.execute_script(DRAWN, driver.find_element("id", "timeline"))
     if all_of(".notes .finding"):
@@ -141,9 +154,6 @@ def look(driver, page, screenshot):
         WebDriverWait(driver, 10).until(lambda _: back.is_displayed())
         driver.execute_script("arguments[0].click()", back)
         WebDriverWait(driver, 10).until(lambda _: not back.is_displayed())
-    if screenshot:
-        driver.set_window_size(1280, min(driver.execute_script("return document.body.scrollHeight") + 200, 12000))
-        driver.save_screenshot(screenshot)
     driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride",
                            {"width": 390, "height": 844, "deviceScaleFactor": 1, "mobile": True})
     WebDriverWait(driver, 10).until(

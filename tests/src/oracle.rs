@@ -81,11 +81,15 @@ pub fn grafana(dashboards: &[PathBuf]) -> Value {
     json(&run("grafana.py", dashboards))
 }
 
-/// Looks at a page in a browser: see `tests/oracle/browser.py`.
-pub fn browser(page: &Path) -> Value {
+/// Looks at a page in a browser, with the mouse at these parts of each plot: see `tests/oracle/browser.py`.
+pub fn browser(page: &Path, parts: &[f32]) -> Value {
     let chromium = program("HUMS_CHROMIUM", "/usr/bin/chromium");
     let driver = program("HUMS_CHROMEDRIVER", "/usr/bin/chromedriver");
-    json(&run("browser.py", &[chromium, driver, page.to_owned()]))
+    let parts = parts.iter().map(|part| PathBuf::from(part.to_string()));
+    json(&run(
+        "browser.py",
+        &[chromium, driver, page.to_owned()].into_iter().chain(parts).collect::<Vec<_>>(),
+    ))
 }
 
 /// A page of `hums live` in a browser: see `tests/oracle/live.py`. Ends with the browser.
