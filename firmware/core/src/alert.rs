@@ -14,7 +14,7 @@ pub use events::name as event_name;
 
 use crate::cause::{Alert, Cause, Causes, Meaning, Urgency};
 use crate::observation::{Estimator, EstimatorScale};
-use crate::time::{Instant, Span};
+use crate::time::{Instant, Span, Stamp};
 
 /// How long a text or an event is said to be so. PX4 tells its failing checks again when they change, some 2 s apart.
 pub const HOLDS: Span = Span::from_secs(10);
@@ -92,18 +92,18 @@ const fn has_both(flags: u16) -> bool {
 struct Flags {
     now: Causes,
     before: Causes,
-    at: Option<Instant>,
+    at: Stamp,
 }
 
 impl Flags {
-    const NONE: Self = Self { now: Causes::NONE, before: Causes::NONE, at: None };
+    const NONE: Self = Self { now: Causes::NONE, before: Causes::NONE, at: Stamp::NONE };
 
     const fn take(&mut self, at: Instant, causes: Causes) {
-        *self = Self { now: causes, before: self.now, at: Some(at) };
+        *self = Self { now: causes, before: self.now, at: Stamp::at(at) };
     }
 
     fn has(&self, now: Instant, cause: Cause) -> bool {
-        self.now.both(self.before).has(cause) && self.at.is_some_and(|at| now.since(at) <= FLAGS_AGE)
+        self.now.both(self.before).has(cause) && self.at.age(now).is_some_and(|age| age <= FLAGS_AGE)
     }
 }
 
@@ -117,7 +117,7 @@ pub struct Alerts {
     failures: Flags,
     estimator: Flags,
     armed: bool,
-    armed_at: Option<Instant>,
+    armed_at: Stamp,
     /// The receiver of the remote control was healthy once: one that never was is not fitted or not switched on.
     had_remote_control: bool,
     /// The estimator had attitude and position.
@@ -133,7 +133,7 @@ impl Alerts {
             failures: Flags::NONE,
             estimator: Flags::NONE,
             armed: false,
-            armed_at: None,
+            armed_at: Stamp::NONE,
             had_remote_control: false,
             had_both: false,
         }
@@ -147,14 +147,14 @@ impl Alerts {
         }
         self.armed = armed;
         if armed {
-            self.armed_at = Some(at);
+            self.armed_at = Stamp::at(at);
         }
     }
 
     /// A text or an event. An autopilot that crashes disarms with the word; what broke then is told right behind it.
     pub(crate) fn tell(&mut self, at: Instant, alert: Alert) {
         let is_last_word = (alert.cause == Cause::Crash || alert.urgency == Urgency::Critical)
-            && self.armed_at.is_some_and(|armed_at| at.since(armed_at) <= DISARMED);
+            && self.armed_at.age(at).is_some_and(|age| age <= DISARMED);
         let place = alert.cause as usize;
         let (Some(told), Some(until_ms)) = (self.told.get_mut(place), self.until_ms.get_mut(place)) else {
             return;
@@ -190,7 +190,7 @@ impl Alerts {
     /// Whether anything was ever said.
     pub(crate) fn are_known(&self) -> bool {
         let flags = [&self.sensors, &self.failures, &self.estimator];
-        flags.iter().any(|flags| flags.at.is_some()) || self.told.iter().any(Option::is_some)
+        flags.iter().any(|flags| flags.at.is_set()) || self.told.iter().any(Option::is_some)
     }
 
     /// How bad the autopilot says it is, as [`Urgency`] numbers it; `None` where nothing was ever said. In a mishap flags only echo it.
@@ -198,7 +198,7 @@ impl Alerts {
         let (told, until_ms) = (self.told.get(cause as usize)?, self.until_ms.get(cause as usize)?);
         let told = told.map(|urgency| if is_past(now, *until_ms) { Urgency::Over } else { urgency });
         let all = [&self.sensors, &self.failures, &self.estimator];
-        let known = all.iter().any(|flags| flags.at.is_some());
+        let known = all.iter().any(|flags| flags.at.is_set());
         let flagged = self.armed
             && !in_mishap
             && all.iter().any(|flags| flags.has(now, cause))

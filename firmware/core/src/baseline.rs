@@ -14,7 +14,6 @@
 use crate::bytes::{Put, Take, Unreadable};
 use crate::half;
 use crate::observation::MOTORS_MAX;
-use crate::outputs::JUDGED_MAX;
 use crate::vehicle::BATTERIES_MAX;
 
 /// Flights that make a baseline; before, nothing is compared.
@@ -45,18 +44,20 @@ pub enum Quantity {
     Capacity(u8),
 }
 
+/// Motors of the largest frame whose outputs have a past.
+pub const OUTPUTS_MAX: usize = 6;
 /// Quantities that versions before 3 of the stored form have.
 const FIRST: usize = 2 + BATTERIES_MAX + MOTORS_MAX;
 
 impl Quantity {
     /// How many there are.
-    pub const COUNT: usize = FIRST + 1 + JUDGED_MAX + BATTERIES_MAX;
+    pub const COUNT: usize = FIRST + 1 + OUTPUTS_MAX + BATTERIES_MAX;
 
     /// The quantity of a place in the stored form.
     pub const fn from_index(index: usize) -> Option<Self> {
         const MOTORS: usize = 2 + BATTERIES_MAX;
         const OUTPUTS: usize = FIRST + 1;
-        const CAPACITIES: usize = OUTPUTS + JUDGED_MAX;
+        const CAPACITIES: usize = OUTPUTS + OUTPUTS_MAX;
         match index {
             0 => Some(Self::Vibration),
             1 => Some(Self::HoverThrottle),
@@ -78,7 +79,7 @@ impl Quantity {
             Self::MotorSpeed(motor) => 2 + BATTERIES_MAX + motor as usize,
             Self::HoverPower => FIRST,
             Self::MotorOutput(motor) => FIRST + 1 + motor as usize,
-            Self::Capacity(battery) => FIRST + 1 + JUDGED_MAX + battery as usize,
+            Self::Capacity(battery) => FIRST + 1 + OUTPUTS_MAX + battery as usize,
         }
     }
 }

@@ -22,7 +22,7 @@ use crate::steady::{TURNED, hovers, is_clear};
 use crate::stuck::Stuck;
 use crate::time::{Instant, Span, Stamp};
 use crate::travel::Travel;
-use crate::units::norm;
+use crate::units::{RadiansPerSecond, norm};
 use crate::vehicle::{RECEIVERS_MAX, Vehicle};
 
 /// Sensors of one kind that are compared.
@@ -55,8 +55,15 @@ const IDLE_THROTTLE: f32 = 0.1;
 /// Vibration comes at 1 Hz or faster; what comes after a longer pause is not of the same hover.
 const VIBRATION_PAUSE: Span = Span::from_secs(3);
 /// Vibration that rises by less did not rise: per axis, and PX4's metric, m/s2.
-const GRAIN_PER_AXIS: f32 = 3.0;
+const GRAIN_PER_AXIS: f32 = 2.5;
 const GRAIN_PX4: f32 = 1.0;
+
+/// The compass's heading is compared with an attitude that is so old at most, and turns slower about each axis, rad/s: the two are not of one
+/// moment. Beyond half of the default limit, degrees, nothing is learnt.
+const ATTITUDE_AGE: Span = Span::from_millis(200);
+const HEADS_RAD_S: f32 = 0.2;
+const HEADING_SMOOTHING_S: f32 = 0.5;
+const HEADING_HOLD_DEG: f32 = 6.0;
 
 /// A kind of sensors.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -78,7 +85,7 @@ impl Kind {
     const fn hold(self) -> f32 {
         match self {
             Self::Accelerometer => 0.5,
-            Self::Gyro => 0.07,
+            Self::Gyro => 0.05,
             Self::Compass => 20.0,
             Self::Barometer => 4.0,
         }
@@ -167,12 +174,17 @@ pub(crate) struct Crosschecks {
     /// When sensors of a kind were compared last, and when that was tried.
     compared_at: [Stamp; Kind::ALL.len()],
     stepped_at: Stamp,
+    /// The estimator's heading less that of the first compass, degrees.
+    heading: Departure,
+    heading_at: Stamp,
     vibration: Departure,
-    vibration_at: Option<Instant>,
+    vibration_at: Stamp,
+    /// The last message's, m/s2.
+    vibration_before: f32,
     vibration_grain: f32,
     /// Ratios of the compass that the estimator told in this flight, and whether the last one was none.
     ratios: u8,
-    unused: Option<Reading>,
+    unused: (Stamp, bool),
     /// It is compared where it does not hover: forces and rates.
     rough: [bool; 2],
 }
@@ -189,11 +201,14 @@ impl Crosschecks {
             heights: Heights::new(),
             compared_at: [Stamp::NONE; Kind::ALL.len()],
             stepped_at: Stamp::NONE,
+            heading: Departure::NEW,
+            heading_at: Stamp::NONE,
             vibration: Departure::NEW,
-            vibration_at: None,
+            vibration_at: Stamp::NONE,
+            vibration_before: 0.0,
             vibration_grain: 0.0,
             ratios: 0,
-            unused: None,
+            unused: (Stamp::NONE, false),
             rough: [false; 2],
         }
     }
@@ -202,7 +217,7 @@ impl Crosschecks {
         self.sensors[kind as usize].get_mut(usize::from(instance))
     }
 
-    pub(crate) fn take_imu(&mut self, at: Instant, imu: &Imu, flight: &Flight) {
+    pub(crate) fn take_imu(&mut self, at: Instant, imu: &Imu, vehicle: &Vehicle, flight: &Flight) {
         let force = imu.acceleration.map(|force| force.map(|axis| axis.0));
         let rate = imu.rate.map(|rate| rate.map(|axis| axis.0));
         let field = imu.field.map(|field| field.map(|axis| axis.0));
@@ -211,6 +226,9 @@ impl Crosschecks {
         let is_fitted = force != Some([0.0; 3]);
         let [rough_force, rough_rate] = self.rough.map(|rough| if rough { ROUGH_S } else { SMOOTHING_S });
         let field = field.filter(|field| field.iter().any(|axis| axis.abs() > 0.0));
+        if let (Some(field), 0) = (field, imu.instance) {
+            self.take_heading(at, field, vehicle, flight);
+        }
         for (kind, sample, smoothing_s) in [
             (Kind::Accelerometer, force.filter(|_| is_fitted), rough_force),
             (Kind::Gyro, rate.filter(|_| is_fitted), rough_rate),
@@ -219,6 +237,34 @@ impl Crosschecks {
             if let (Some(sample), Some(sensor)) = (sample, self.sensor(kind, imu.instance)) {
                 sensor.take(at, sample, smoothing_s, turned);
             }
+        }
+    }
+
+    /// The field by the attitude's roll and pitch, and how far its heading is from the attitude's: it includes the declination, which is
+    /// usual.
+    fn take_heading(&mut self, at: Instant, [x, y, z]: [f32; 3], vehicle: &Vehicle, flight: &Flight) {
+        let judged = matches!(vehicle.kind(), VehicleKind::Rotorcraft | VehicleKind::Plane)
+            && flight.is_settled(at)
+            && is_clear(at, vehicle);
+        let Some(attitude) = vehicle.attitude.within(at, ATTITUDE_AGE).filter(|_| judged) else { return };
+        let turns = |rates: [RadiansPerSecond; 3]| rates.iter().any(|rate| rate.0.abs() > HEADS_RAD_S);
+        if attitude.rates.is_none_or(turns) {
+            return;
+        }
+        let (sin_roll, cos_roll) = (libm::sinf(attitude.roll.0), libm::cosf(attitude.roll.0));
+        let across = y * cos_roll - z * sin_roll;
+        let down = y * sin_roll + z * cos_roll;
+        let ahead = x * libm::cosf(attitude.pitch.0) + down * libm::sinf(attitude.pitch.0);
+        let off_deg = (attitude.yaw.0 - libm::atan2f(-across, ahead)).to_degrees();
+        // The short way round from what it was.
+        let before_deg = self.heading.figure();
+        let turned_deg = off_deg - before_deg;
+        let figure_deg = before_deg + turned_deg - 360.0 * libm::roundf(turned_deg / 360.0);
+        let step_s = self.heading_at.age(at).filter(|step| *step <= FRESH).map_or(0.0, Span::as_secs_f32);
+        self.heading_at = Stamp::at(at);
+        self.heading.follow(figure_deg, step_s, HEADING_SMOOTHING_S);
+        if self.heading.beyond_either_way().is_none_or(|beyond_deg| beyond_deg <= HEADING_HOLD_DEG) {
+            self.heading.learn(step_s);
         }
     }
 
@@ -260,8 +306,7 @@ impl Crosschecks {
         // An estimator that tells nothing at all says nothing about its compass.
         let tells = estimator.velocity.is_some() || estimator.position_horizontal.is_some();
         if tells && self.ratios >= RATIOS_KNOWN {
-            let unused = estimator.compass.is_none();
-            self.unused = Some(Reading { at, value: f32::from(u8::from(unused)) });
+            self.unused = (Stamp::at(at), estimator.compass.is_none());
         }
     }
 
@@ -278,10 +323,12 @@ impl Crosschecks {
             VibrationScale::PerAxis => GRAIN_PER_AXIS,
             VibrationScale::Px4Metrics => GRAIN_PX4,
         };
-        let step_s = self.vibration_at.map_or(0.0, |before| at.since(before).as_secs_f32());
-        self.vibration_at = Some(at);
-        if step_s > 0.0 && step_s < VIBRATION_PAUSE.as_secs_f32() {
-            self.vibration.take(level, step_s, self.vibration_grain);
+        let step = self.vibration_at.age(at).filter(|step| *step > Span::ZERO && *step < VIBRATION_PAUSE);
+        self.vibration_at = Stamp::at(at);
+        // A shock is in one message: what is in two counts.
+        let lasting = level.min(core::mem::replace(&mut self.vibration_before, level));
+        if let Some(step) = step {
+            self.vibration.take(lasting, step.as_secs_f32(), self.vibration_grain);
         }
     }
 
@@ -372,6 +419,12 @@ impl Crosschecks {
         self.receivers.get(usize::from(receiver))?.lasts(now, self.moved.travelled_m, TRAVELLED_M)
     }
 
+    /// How far the compass's heading is from the estimator's, beyond what is usual, degrees.
+    pub(crate) fn heading_apart(&self, now: Instant) -> Option<Reading> {
+        let beyond_deg = self.heading.beyond_either_way().map(|beyond_deg| beyond_deg.min(180.0));
+        Reading::new(self.heading_at.instant(now), beyond_deg)
+    }
+
     /// How far a receiver's velocity is from that of its positions, m/s.
     pub(crate) fn speed_apart(&self, receiver: u8) -> Option<f32> {
         self.travels.get(usize::from(receiver))?.speed_apart()
@@ -383,12 +436,13 @@ impl Crosschecks {
     }
 
     /// Whether the estimator stopped using a compass that it used in this flight.
-    pub(crate) const fn compass_unused(&self) -> Option<Reading> {
-        self.unused
+    pub(crate) fn compass_unused(&self, now: Instant) -> Option<Reading> {
+        let (at, unused) = self.unused;
+        Reading::new(at.instant(now), Some(f32::from(u8::from(unused))))
     }
 
     /// Vibration as a multiple of what is usual in this flight.
-    pub(crate) fn vibration_rise(&self) -> Option<Reading> {
-        Reading::new(self.vibration_at, self.vibration.multiple(self.vibration_grain))
+    pub(crate) fn vibration_rise(&self, now: Instant) -> Option<Reading> {
+        Reading::new(self.vibration_at.instant(now), self.vibration.multiple(self.vibration_grain))
     }
 }

@@ -72,6 +72,12 @@ impl Departure {
         self.is_known().then_some(beyond.max(0.0))
     }
 
+    /// The same of a figure that is wrong either way.
+    pub(crate) fn beyond_either_way(&self) -> Option<f32> {
+        let beyond = libm::fabsf(self.departed()) - SPREADS * self.spread;
+        self.is_known().then_some(beyond.max(0.0))
+    }
+
     /// Its mean distance from its usual level.
     pub(crate) fn spread(&self) -> f32 {
         self.spread

@@ -53,7 +53,7 @@ struct MotorTrack {
     errors: Option<Rate>,
     /// Smoothed interval between messages that carry speed or current, seconds; 0 before there are two.
     interval_s: f32,
-    last: Option<Instant>,
+    last: Stamp,
     highest_rpm: f32,
     smooth_rpm: f32,
 }
@@ -120,8 +120,13 @@ impl Default for Derived {
 impl Derived {
     /// Nothing seen yet.
     pub const fn new() -> Self {
-        const MOTOR: MotorTrack =
-            MotorTrack { errors: None, interval_s: 0.0, last: None, highest_rpm: 0.0, smooth_rpm: 0.0 };
+        const MOTOR: MotorTrack = MotorTrack {
+            errors: None,
+            interval_s: 0.0,
+            last: Stamp::NONE,
+            highest_rpm: 0.0,
+            smooth_rpm: 0.0,
+        };
         Self {
             cells: Cells::new(),
             resistance: [Resistance::new(); BATTERIES_MAX],
@@ -158,10 +163,10 @@ impl Derived {
     pub fn observe(&mut self, at: Instant, vehicle: &Vehicle, flight: &Flight, observation: &Observation) {
         self.hear(at);
         match observation {
-            Observation::Imu(imu) => self.take_imu(at, imu, flight),
+            Observation::Imu(imu) => self.take_imu(at, imu, vehicle, flight),
             Observation::Air(air) => self.crosschecks.take_air(at, air, vehicle, flight),
             Observation::ImuAndAir(imu, air) => {
-                self.take_imu(at, imu, flight);
+                self.take_imu(at, imu, vehicle, flight);
                 self.crosschecks.take_air(at, air, vehicle, flight);
             }
             Observation::Attitude(attitude) => self.response.take_attitude(at, attitude, vehicle, flight),
@@ -203,8 +208,8 @@ impl Derived {
         }
     }
 
-    fn take_imu(&mut self, at: Instant, imu: &Imu, flight: &Flight) {
-        self.crosschecks.take_imu(at, imu, flight);
+    fn take_imu(&mut self, at: Instant, imu: &Imu, vehicle: &Vehicle, flight: &Flight) {
+        self.crosschecks.take_imu(at, imu, vehicle, flight);
         if imu.instance == 0
             && let Some(load_g) = imu.acceleration.and_then(load_factor_g)
         {
@@ -244,11 +249,11 @@ impl Derived {
 
     fn take_motor(&mut self, at: Instant, vehicle: &Vehicle, number: usize) {
         let (motor, track) = (&vehicle.motors[number], &mut self.motors[number]);
-        if motor.moved_at != Some(at) || track.last == Some(at) {
+        if motor.moved_at != Some(at) || track.last == Stamp::at(at) {
             return;
         }
-        let interval_s = track.last.map(|last| at.since(last).as_secs_f32());
-        track.last = Some(at);
+        let interval_s = track.last.age(at).map(Span::as_secs_f32);
+        track.last = Stamp::at(at);
         // A pause is not a rhythm: it must not make the next pause look normal.
         if let Some(interval_s) = interval_s.filter(|interval_s| *interval_s < 5.0) {
             let weight = if track.interval_s == 0.0 { 1.0 } else { 0.1 };
@@ -385,7 +390,8 @@ impl Derived {
     /// vehicle was heard last: a link that is silent says nothing about an ESC.
     pub(crate) fn esc_silence(&self, now: Instant, motor: u8) -> Option<Reading> {
         let track = self.motors.get(usize::from(motor))?;
-        let silence_s = self.heard?.since(track.last?.max(self.resumed)).as_secs_f32();
+        let heard = self.heard?;
+        let silence_s = heard.since(track.last.instant(heard)?.max(self.resumed)).as_secs_f32();
         let missed = track.interval_s > 0.0 && silence_s > INTERVALS_MISSED * track.interval_s;
         Some(Reading { at: now, value: if missed { silence_s } else { 0.0 } })
     }
@@ -424,7 +430,7 @@ impl Derived {
         let named = usize::from(self.furthest) == usize::from(motor);
         let alone = if lost { f32::INFINITY } else { self.apart(motor) };
         let off = (track.smooth_rpm - middle).abs().min(alone) / middle * 100.0;
-        Reading::new(track.last, Some(if named { off } else { 0.0 }))
+        Reading::new(track.last.instant(now), Some(if named { off } else { 0.0 }))
     }
 
     /// How far a motor's speed is from the nearest one of the others.
@@ -470,7 +476,7 @@ impl Derived {
     fn motors_told(&self, now: Instant, mean_rpm: f32) -> bool {
         let mut fitted = self.motors.iter().filter(|track| track.highest_rpm > TURNING_RPM);
         let flying = |track: &MotorTrack| {
-            track.last.is_some_and(|last| now.since(last) <= MOTORS_TOLD)
+            track.last.age(now).is_some_and(|age| age <= MOTORS_TOLD)
                 && mean_rpm >= FLYING_PART * track.highest_rpm
         };
         fitted.all(flying)

@@ -12,7 +12,7 @@
 //! rates, nothing is said.
 
 use crate::observation::Imu;
-use crate::time::{Instant, Span};
+use crate::time::{Instant, Span, Stamp};
 use crate::units::{GRAVITY, MetresPerSecond2, Radians, RadiansPerSecond, norm};
 
 /// Time constant of the force.
@@ -65,17 +65,17 @@ pub struct Inertial {
     at: Option<Instant>,
     /// Rates, smoothed, rad/s.
     rate: [f32; 3],
-    rates_at: Option<Instant>,
+    rates_at: Stamp,
     still: bool,
     /// When it turned fast last.
-    turned_at: Option<Instant>,
+    turned_at: Stamp,
     /// The estimator's attitude is another one than that of the sensors; and since when it has been far from level.
     contradicts: bool,
-    tilted_since: Option<Instant>,
+    tilted_since: Stamp,
     /// Since when it has been carried by its weight and still, whichever way up; and level besides.
-    rests_since: Option<Instant>,
-    level_since: Option<Instant>,
-    over_since: Option<Instant>,
+    rests_since: Stamp,
+    level_since: Stamp,
+    over_since: Stamp,
 }
 
 impl Inertial {
@@ -89,14 +89,14 @@ impl Inertial {
             step_at_rest: 0.0,
             at: None,
             rate: [0.0; 3],
-            rates_at: None,
+            rates_at: Stamp::NONE,
             still: false,
-            turned_at: None,
+            turned_at: Stamp::NONE,
             contradicts: false,
-            tilted_since: None,
-            rests_since: None,
-            level_since: None,
-            over_since: None,
+            tilted_since: Stamp::NONE,
+            rests_since: Stamp::NONE,
+            level_since: Stamp::NONE,
+            over_since: Stamp::NONE,
         }
     }
 
@@ -104,7 +104,7 @@ impl Inertial {
     pub(crate) fn take(&mut self, at: Instant, imu: &Imu) {
         self.take_rates(at, imu.rate);
         if let Some(rates) = imu.rate {
-            let weight = weight(self.rates_at, at, SMOOTHING_S);
+            let weight = weight(self.rates_at.age(at), SMOOTHING_S);
             let (mut square, mut apart) = (0.0, 0.0);
             for (smooth, axis) in self.rate.iter_mut().zip(rates) {
                 let off = axis.0 - *smooth;
@@ -116,7 +116,7 @@ impl Inertial {
             if !self.rate.iter().all(|axis| axis.is_finite()) {
                 self.rate = [0.0; 3];
             }
-            self.rates_at = Some(at);
+            self.rates_at = Stamp::at(at);
         }
         if let Some(force) = imu.acceleration {
             self.take_force(at, force.map(|MetresPerSecond2(axis)| axis));
@@ -128,7 +128,7 @@ impl Inertial {
         // No root: this is done with each inertial sample.
         let square = |rates: [RadiansPerSecond; 3]| rates.iter().map(|rate| rate.0 * rate.0).sum::<f32>();
         if rates.is_some_and(|rates| square(rates) > TURNS_RATE * TURNS_RATE) {
-            self.turned_at = Some(at);
+            self.turned_at = Stamp::at(at);
         }
     }
 
@@ -137,7 +137,7 @@ impl Inertial {
         if step_s == 0.0 {
             return;
         }
-        let weight = weight(self.at, at, SMOOTHING_S);
+        let weight = weight(self.at.map(|before| at.since(before)), SMOOTHING_S);
         self.at = Some(at);
         for (smooth, axis) in self.force.iter_mut().zip(force) {
             *smooth += weight * (axis - *smooth);
@@ -153,9 +153,9 @@ impl Inertial {
         // No root: squares of cosines, with the sign of z, which is negative in what is upright.
         let level = rests && self.still && z < 0.0 && z * z > LEVEL * LEVEL * square;
         let over = rests && (z > 0.0 || z * z < OVER * OVER * square);
-        self.rests_since = (rests && self.still).then(|| self.rests_since.unwrap_or(at));
-        self.level_since = level.then(|| self.level_since.unwrap_or(at));
-        self.over_since = over.then(|| self.over_since.unwrap_or(at));
+        self.rests_since.run(rests && self.still, at, Span::ZERO);
+        self.level_since.run(level, at, Span::ZERO);
+        self.over_since.run(over, at, Span::ZERO);
     }
 
     fn take_step(&mut self, at: Instant, step_s: f32, down: f32) {
@@ -191,13 +191,13 @@ impl Inertial {
     }
 
     fn is_fresh(&self, now: Instant) -> bool {
-        let fresh = |at: Option<Instant>| at.is_some_and(|at| now.since(at) <= FRESH);
-        fresh(self.at) && fresh(self.rates_at)
+        self.at.is_some_and(|at| now.since(at) <= FRESH)
+            && self.rates_at.age(now).is_some_and(|age| age <= FRESH)
     }
 
     /// Whether it has not turned fast for so long.
     pub(crate) fn turns_little(&self, now: Instant, span: Span) -> bool {
-        self.turned_at.is_none_or(|at| now.since(at) > span)
+        self.turned_at.age(now).is_none_or(|age| age > span)
     }
 
     /// Whether it has been level and still for a while, whatever an estimator says.
@@ -207,15 +207,14 @@ impl Inertial {
 
     /// Whether it has been level and still for so long.
     pub(crate) fn is_level_for(&self, now: Instant, span: Span) -> bool {
-        self.is_fresh(now) && self.level_since.is_some_and(|since| now.since(since) >= span)
+        self.is_fresh(now) && self.level_since.age(now).is_some_and(|age| age >= span)
     }
 
     /// The estimator's attitude.
     pub(crate) fn take_attitude(&mut self, at: Instant, roll: Radians, pitch: Radians) {
         let tilt = libm::fabsf(roll.0).max(libm::fabsf(pitch.0));
-        self.tilted_since = (tilt > TILTED_RAD).then(|| self.tilted_since.unwrap_or(at));
-        let tilted = self.tilted_since.is_some_and(|since| at.since(since) >= TILTED);
-        let rests = self.is_fresh(at) && self.rests_since.is_some_and(|since| at.since(since) >= LASTS);
+        let tilted = self.tilted_since.run(tilt > TILTED_RAD, at, TILTED);
+        let rests = self.is_fresh(at) && self.rests_since.age(at).is_some_and(|age| age >= LASTS);
         if rests && tilted && (self.is_level(at) || self.is_carried_elsewhere(roll, pitch)) {
             self.contradicts = true;
         } else if rests && tilt < AGREES_RAD {
@@ -239,15 +238,15 @@ impl Inertial {
 
     /// How far it lies over, in radians, once it has lain so for a moment: by the force that carries it.
     pub(crate) fn lies_over(&self, now: Instant) -> Option<f32> {
-        let lasts = self.is_fresh(now) && self.over_since.is_some_and(|since| now.since(since) >= LIES);
+        let lasts = self.is_fresh(now) && self.over_since.age(now).is_some_and(|age| age >= LIES);
         let [x, y, z] = self.force;
         lasts.then(|| libm::atan2f(libm::sqrtf(x * x + y * y), -z))
     }
 }
 
 /// How much a sample counts.
-fn weight(before: Option<Instant>, at: Instant, constant_s: f32) -> f32 {
-    let step_s = before.map_or(f32::INFINITY, |before| at.since(before).as_secs_f32());
+fn weight(step: Option<Span>, constant_s: f32) -> f32 {
+    let step_s = step.map_or(f32::INFINITY, Span::as_secs_f32);
     if step_s < 1.0 { step_s / (constant_s + step_s) } else { 1.0 }
 }
 

@@ -10,30 +10,35 @@
 //! against what was usual in this flight ([`crate::departure`]), less what commands vary by anyway. (Derived from the geometry of
 //! regular frames, for this project.)
 //!
+//! Of eight motors, flat or two on each of four arms, it is 1/2 of the loss at the weak motor, a quarter or less at three others, and less at
+//! the rest. So the second to the fourth are apart by as little as noise, and the weak motor alone is a quarter of the loss above them (flat:
+//! a fifth, with what the fourth has less), while what tilts such a vehicle raises two or three alike. It counts five times.
+//!
 //! A motor that is a little weak stands out little, and in wind no more than others do at times; but it goes on doing so. So what a motor
 //! stands out by beyond [`DRIFT_PERCENT`] is summed over time, and what falls short of that is taken off again (a CUSUM: E. S. Page,
 //! Continuous inspection schemes, Biometrika 41, 1954). The sum of [`SUMMED_S`] seconds counts as what stands out at once.
 //!
 //! A motor that is given next to nothing while the others carry the vehicle was taken out.
 //!
-//! Other frames are not judged: three motors have no such pattern, eight and coaxial ones hardly any.
+//! Other frames are not judged: three motors have no such pattern, and of three arms with two motors each none stands out.
 
+use crate::baseline::OUTPUTS_MAX;
 use crate::departure::Departure;
 use crate::flight::Flight;
 use crate::latest::Reading;
 use crate::observation::{MOTORS_MAX, Outputs};
 use crate::steady::flies_level;
-use crate::time::{Instant, Span};
+use crate::time::{Instant, Span, Stamp};
 use crate::vehicle::Vehicle;
 
 /// Motors of the largest frame that is judged.
-pub(crate) const JUDGED_MAX: usize = 6;
+pub(crate) const JUDGED_MAX: usize = 8;
 /// Time constant of the commands, s: gusts and corrections of course are over sooner.
 const SMOOTHING_S: f32 = 4.0;
 /// Pulses of a motor that does not turn are not longer than this, us.
 const IDLE_US: u16 = 1_150;
-/// Pulses begin here, us. What is shorter on the ground is on another scale, which begins at nothing.
-const ZERO_US: f32 = 1_000.0;
+/// Pulses begin here, us. What is shorter than half of that on the ground is on another scale, which begins at nothing.
+const ZERO_US: u16 = 1_000;
 /// Motors that carry a vehicle are given so much more on the average.
 const CARRIES_US: f32 = 100.0;
 /// Further above the others a change teaches nothing, percent.
@@ -58,13 +63,14 @@ const PAUSE: Span = Span::from_secs(2);
 pub(crate) struct MotorOutputs {
     /// The group that has the motors: the first one that has any output.
     port: Option<u8>,
-    /// The shortest pulse on the ground.
-    lowest: [u16; JUDGED_MAX],
+    /// Motors that had the pulse of one that does not turn on the ground, and those that had one of the other scale: a bit each.
+    idle: u8,
+    other_scale: u8,
     /// Command against the average of all, percent.
     share: [Departure; JUDGED_MAX],
-    at: Option<Instant>,
-    /// What a motor stood out by over time, percent for [`SUMMED_S`].
-    sums: [f32; JUDGED_MAX],
+    at: Stamp,
+    /// The motor that has stood out over time, and by how much, percent for [`SUMMED_S`].
+    summed: (u8, f32),
     /// The motor that stands out, and how far, percent.
     alone: (u8, f32),
 }
@@ -74,17 +80,19 @@ impl MotorOutputs {
     pub(crate) const fn new() -> Self {
         Self {
             port: None,
-            lowest: [u16::MAX; JUDGED_MAX],
+            idle: 0,
+            other_scale: 0,
             share: [Departure::NEW; JUDGED_MAX],
-            at: None,
-            sums: [0.0; JUDGED_MAX],
+            at: Stamp::NONE,
+            summed: (0, 0.0),
             alone: (0, 0.0),
         }
     }
 
     /// A flight begins: nothing is usual yet.
     pub(crate) const fn begin(&mut self) {
-        *self = Self { port: self.port, lowest: self.lowest, ..Self::new() };
+        let Self { port, idle, other_scale, .. } = *self;
+        *self = Self { port, idle, other_scale, ..Self::new() };
     }
 
     pub(crate) fn take(&mut self, at: Instant, outputs: &Outputs, vehicle: &Vehicle, flight: &Flight) {
@@ -96,28 +104,26 @@ impl MotorOutputs {
         if *self.port.get_or_insert(outputs.port) != outputs.port {
             return;
         }
+        let all = u8::MAX >> (JUDGED_MAX - count);
         if !flight.airborne() {
-            for (lowest, pulse) in self.lowest.iter_mut().zip(pulses) {
-                *lowest = if *pulse > 0 { (*lowest).min(*pulse) } else { *lowest };
+            for (motor, pulse) in pulses.iter().enumerate().filter(|(_, pulse)| **pulse > 0) {
+                self.idle |= u8::from(*pulse <= IDLE_US) << motor;
+                self.other_scale |= u8::from(*pulse < ZERO_US / 2) << motor;
             }
             return;
         }
-        let lowest = &self.lowest[..count];
         // What has no idle pulse on the ground is a servo.
-        if lowest.iter().any(|lowest| *lowest > IDLE_US) || !flies_level(at, vehicle, flight) || yaws(vehicle)
-        {
+        if self.idle & all != all || !flies_level(at, vehicle, flight) || yaws(vehicle) {
             return;
         }
-        let zero_us =
-            if lowest.iter().all(|lowest| f32::from(*lowest) < ZERO_US / 2.0) { 0.0 } else { ZERO_US };
+        let zero_us = if self.other_scale & all == all { 0.0 } else { f32::from(ZERO_US) };
         let given = |pulse: &u16| (f32::from(*pulse) - zero_us).max(0.0);
         let mean = pulses.iter().map(given).sum::<f32>() / count as f32;
         if mean < CARRIES_US {
             return;
         }
-        let begins = self.at.is_none_or(|before| at.since(before) > PAUSE);
-        let step_s = if begins { 0.0 } else { self.at.map_or(0.0, |before| at.since(before).as_secs_f32()) };
-        self.at = Some(at);
+        let step_s = self.at.age(at).filter(|step| *step <= PAUSE).map_or(0.0, Span::as_secs_f32);
+        self.at = Stamp::at(at);
         for (share, pulse) in self.share.iter_mut().zip(pulses) {
             share.follow(given(pulse) / mean * 100.0 - 100.0, step_s, SMOOTHING_S);
         }
@@ -131,9 +137,13 @@ impl MotorOutputs {
         }
         let changes = &mut changes[..count];
         changes.sort_unstable_by(|one, other| other.0.total_cmp(&one.0));
-        // Of six the opposite one is lowered.
         let [first, second, .., lowest] = *changes else { return };
-        let (lowest, part) = if count == JUDGED_MAX { (changes[count - 2], 0.5) } else { (lowest, 1.0) };
+        let (lowest, part) = match count {
+            8 => (changes[3], 0.2),
+            // Of six the opposite one is lowered.
+            6 => (changes[4], 0.5),
+            _ => (lowest, 1.0),
+        };
         let spread = self.share.iter().take(count).map(Departure::spread).sum::<f32>() / count as f32;
         let alone = ((first.0 - second.0) - (second.0 - lowest.0)) / part;
         let stands_out = (alone - SPREADS * spread / part).max(self.summed(alone, first.1, step_s));
@@ -149,33 +159,37 @@ impl MotorOutputs {
         if !self.is_known() {
             return 0.0;
         }
-        for (place, sum) in (0..).zip(&mut self.sums) {
-            let beyond = if place == motor { alone } else { 0.0 } - DRIFT_PERCENT;
-            *sum = (*sum + beyond * step_s / SUMMED_S).clamp(0.0, SUM_MAX_PERCENT);
+        let (place, sum) = &mut self.summed;
+        if *sum <= 0.0 {
+            *place = motor;
         }
-        self.sums.get(usize::from(motor)).copied().unwrap_or(0.0)
+        let is_same = *place == motor;
+        // That another one stands out speaks against it.
+        let beyond = if is_same { alone } else { -alone.max(0.0) } - DRIFT_PERCENT;
+        *sum = (*sum + beyond * step_s / SUMMED_S).clamp(0.0, SUM_MAX_PERCENT);
+        if is_same { *sum } else { 0.0 }
     }
 
     /// All learn together.
     fn is_known(&self) -> bool {
-        self.share.iter().all(Departure::is_known)
+        self.share.first().is_some_and(Departure::is_known)
     }
 
     /// Whether any told something in this flight.
-    pub(crate) const fn are_told(&self) -> bool {
-        self.at.is_some()
+    pub(crate) fn are_told(&self) -> bool {
+        self.at.is_set()
     }
 
-    /// A motor's command against the average of all, percent, smoothed.
+    /// A motor's command against the average of all, percent, smoothed; of frames whose outputs have a past.
     pub(crate) fn share(&self, now: Instant, vehicle: &Vehicle, motor: u8) -> Option<f32> {
-        self.at.filter(|at| now.since(*at) <= PAUSE)?;
-        let share = self.share.get(..motors(vehicle))?.get(usize::from(motor))?;
-        Some(share.figure())
+        self.at.age(now).filter(|age| *age <= PAUSE)?;
+        let judged = Some(motors(vehicle)).filter(|count| *count <= OUTPUTS_MAX)?;
+        Some(self.share.get(..judged)?.get(usize::from(motor))?.figure())
     }
 
     /// How far a motor's command alone is above what is usual, percent of the average; 0 for those that do not stand out.
     pub(crate) fn alone(&self, now: Instant, vehicle: &Vehicle, motor: u8) -> Option<Reading> {
-        let at = self.at.filter(|at| now.since(*at) <= PAUSE && self.is_known())?;
+        let at = self.at.instant(now).filter(|at| now.since(*at) <= PAUSE && self.is_known())?;
         if usize::from(motor) >= motors(vehicle) {
             return None;
         }
@@ -191,11 +205,12 @@ fn yaws(vehicle: &Vehicle) -> bool {
 }
 
 /// Motors of a frame that is judged; 0 of any other. `MAV_TYPE`: 2 quadrotor, 13 hexarotor (a coaxial one calls itself so too, and is
-/// quiet).
+/// quiet), 14 octorotor.
 fn motors(vehicle: &Vehicle) -> usize {
     match vehicle.heartbeat.get().map(|heartbeat| heartbeat.type_number) {
         Some(2) => 4,
-        Some(13) => JUDGED_MAX,
+        Some(13) => 6,
+        Some(14) => JUDGED_MAX,
         _ => 0,
     }
 }

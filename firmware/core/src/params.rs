@@ -236,7 +236,7 @@ params! {
     MisSink "MIS_SINK" "m/s" 6.0 1.0 50.0 "above the fastest descent that PX4 (4) and ArduPilot (5) can be set to";
     MisOverturn "MIS_OVERTURN" "deg" 60.0 30.0 180.0 "tilt of what carries the vehicle; of the estimator's attitude 100 degrees at least";
     AccMismWarn "ACC_MISM_WARN" "m/s2" 1.0 0.05 100.0 "accelerometers apart beyond usual; PX4 arms up to 0.7 (COM_ARM_IMU_ACC), ArduPilot up to 0.75";
-    GyroMismWarn "GYRO_MISM_WARN" "rad/s" 0.15 0.01 10.0 "gyros apart beyond usual; PX4 arms up to 0.25 (COM_ARM_IMU_GYR), ArduPilot up to 0.09";
+    GyroMismWarn "GYRO_MISM_WARN" "rad/s" 0.1 0.01 10.0 "gyros apart beyond usual; PX4 arms up to 0.25 (COM_ARM_IMU_GYR), ArduPilot up to 0.09";
     MagMismWarn "MAG_MISM_WARN" "%" 40.0 1.0 1000.0 "compasses apart beyond usual, of the field; ArduPilot arms up to 200 mG, which is 40 % of it";
     BaroMismWarn "BARO_MISM_WARN" "m" 8.0 0.5 10_000.0 "barometers apart beyond usual; above what wind and motors do to one of them";
     VibeRiseWarn "VIBE_RISE_WARN" "" 2.2 1.1 1000.0 "times what is usual in this flight, on rotors";
@@ -256,6 +256,7 @@ params! {
     TrdCapCrit "TRD_CAP_CRIT" "%" 40.0 0.0 100.0 "battery capacity below its baseline";
     GpsHeightWarn "GPS_HEIGHT_WARN" "m" 6.0 0.5 10_000.0 "a receiver's height moves within four seconds as neither climb nor barometer do; up to 5.3 in healthy real flights";
     PosAgeWarn "POS_AGE_WARN" "s" 3.0 0.5 60.0 "position messages stop in flight, while others come: some come at 1 Hz";
+    MagHeadWarn "MAG_HEAD_WARN" "deg" 12.0 1.0 180.0 "the compass's heading apart from the estimator's beyond usual" is "Compass against estimated heading: warning above";
 }
 
 impl Param {

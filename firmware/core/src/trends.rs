@@ -23,13 +23,12 @@
 //! Nothing that wears or breaks makes a vehicle hover with less, or a battery resist less and hold more. Where a flight is better than its past
 //! beyond what was to be expected, something was changed, and a new baseline begins with it.
 
-use crate::baseline::{Baseline, Baselines, Quantity};
+use crate::baseline::{Baseline, Baselines, OUTPUTS_MAX, Quantity};
 use crate::charge::Charge;
 use crate::derived::{Derived, pack_v};
 use crate::drawn::drawn;
 use crate::flight::{Flight, FlightEvent, Phase};
 use crate::observation::{Autopilot, MOTORS_MAX, VehicleKind, VibrationScale};
-use crate::outputs::JUDGED_MAX;
 use crate::params::{Param, Params};
 use crate::time::{Instant, Span};
 use crate::trend::Resistance;
@@ -380,7 +379,7 @@ fn lift(now: Instant, vehicle: &Vehicle, derived: &Derived, params: &Params) -> 
     Some(if is_linear_in_thrust(vehicle) { lift } else { libm::sqrtf(lift.max(0.0)) })
 }
 
-const _: () = assert!(Quantity::COUNT == 3 + 2 * BATTERIES_MAX + MOTORS_MAX + JUDGED_MAX);
+const _: () = assert!(Quantity::COUNT == 3 + 2 * BATTERIES_MAX + MOTORS_MAX + OUTPUTS_MAX);
 
 #[cfg(test)]
 mod tests {

@@ -326,6 +326,33 @@ fn vibration_that_jumps_is_named_and_gusts_are_not() {
         let gust = 5.0 + 3.0 * noise(now_ms / 2_000, 1) + noise(now_ms, 2);
         fitted.quad.vibration.levels = [Some(gust); 3];
     });
+    is_quiet(|now_ms, fitted| {
+        let is_shock = (FAULT_MS..FAULT_MS + 100).contains(&now_ms);
+        fitted.quad.vibration.levels = [Some(if is_shock { 200.0 } else { 5.0 }); 3];
+    });
+}
+
+#[test]
+fn a_compass_whose_heading_leaves_the_estimators_is_named_and_declination_and_turns_are_not() {
+    let turned = |fitted: &mut Fitted, degrees: f32| {
+        let (sin, cos) = degrees.to_radians().sin_cos();
+        for field in &mut fitted.field {
+            let [x, y, z] = *field;
+            *field = [cos * x - sin * y, sin * x + cos * y, z];
+        }
+    };
+    for degrees in [-25.0, 25.0, 170.0] {
+        finds("compass_heading", 0, Level::Warning, 2_000, |_, fitted| turned(fitted, degrees));
+    }
+    is_quiet(|_, fitted| turned(fitted, 175.0));
+    is_quiet(|now_ms, fitted| turned(fitted, if now_ms < FAULT_MS { 0.0 } else { 8.0 }));
+    // While it turns the two are not of one moment.
+    is_quiet(|now_ms, fitted| {
+        if now_ms >= FAULT_MS {
+            turned(fitted, 25.0);
+            fitted.yaw_rate = 0.3;
+        }
+    });
 }
 
 #[test]
@@ -375,6 +402,51 @@ fn a_weak_motor_of_a_hexarotor_is_named() {
     let found = findings.iter().find(|one| one.level == Level::Warning).unwrap();
     assert_eq!((found.check, found.instance), ("motor_output", 0));
     assert!((FAULT_MS..FAULT_MS + 4_000).contains(&found.at.as_millis()), "{found:?}");
+}
+
+/// An octocopter's commands round the frame, or of its four arms one after the other (`arms`: two motors each, which turn against each other).
+fn octa(fitted: &mut Fitted, now_ms: u64, shift: [f32; 8]) {
+    fitted.quad.type_number = 14;
+    for (motor, pulse) in (0..8).zip(&mut fitted.pulses) {
+        let flies = 1_500.0 + 15.0 * noise(now_ms, motor + 80) + shift[motor as usize];
+        *pulse = if now_ms < OFF_MS { 1_000.0 } else { flies };
+    }
+}
+
+/// What the commands of eight motors change by where these amounts of thrust, a tilt towards an arm and yaw are to be made up for.
+fn eight(arms: bool, thrust: f32, tilt: f32, yaw: f32) -> [f32; 8] {
+    core::array::from_fn(|motor| {
+        let round = if arms { (motor / 2) as f32 / 4.0 } else { motor as f32 / 8.0 };
+        let turns = if (motor + usize::from(arms) * (motor / 2)) % 2 == 0 { 1.0 } else { -1.0 };
+        thrust / 8.0 + tilt / 4.0 * (round * core::f32::consts::TAU).cos() + yaw / 8.0 * turns
+    })
+}
+
+#[test]
+fn a_weak_motor_of_an_octocopter_is_named() {
+    for arms in [false, true] {
+        // The projection of a motor that lost thrust worth 200 us on thrust, roll, pitch and yaw.
+        let weak = eight(arms, 200.0, 200.0, 200.0);
+        for place in [0, 1, 7] {
+            let mut shift = weak;
+            shift.rotate_right(place);
+            let shift = |now_ms| if now_ms < FAULT_MS { [0.0; 8] } else { shift };
+            let findings = fly(|now_ms, fitted| octa(fitted, now_ms, shift(now_ms)));
+            let found = findings.iter().find(|one| one.level == Level::Warning).unwrap();
+            assert_eq!((found.check, usize::from(found.instance)), ("motor_output", place));
+            assert!((FAULT_MS..FAULT_MS + 5_000).contains(&found.at.as_millis()), "{found:?}");
+        }
+        for shift in [
+            eight(arms, 600.0, 0.0, 0.0),
+            eight(arms, 0.0, 400.0, 0.0),
+            eight(arms, 0.0, 0.0, 600.0),
+            eight(arms, 200.0, 400.0, 0.0),
+        ] {
+            is_quiet(|now_ms, fitted| {
+                octa(fitted, now_ms, if now_ms < FAULT_MS { [0.0; 8] } else { shift });
+            });
+        }
+    }
 }
 
 #[test]

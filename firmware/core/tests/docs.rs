@@ -49,7 +49,7 @@ const INPUTS: &[(&str, &str)] = &[
     ),
     (
         "motor_output",
-        "SERVO_OUTPUT_RAW: one motor's pulse alone above what is usual in this flight, percent of what motors are given; 100 where one gets next to nothing; quadrotors and hexarotors in level flight",
+        "SERVO_OUTPUT_RAW: one motor's pulse alone above what is usual in this flight, percent of what motors are given; 100 where one gets next to nothing; 4, 6 or 8 motors in level flight",
     ),
     ("thrust_lost", "VFR_HUD: how long throttle was full without a climb; on wings, with a sink"),
     (
@@ -95,6 +95,10 @@ const INPUTS: &[(&str, &str)] = &[
     ("ekf_compass", "EKF_STATUS_REPORT: the compass's variance"),
     ("ekf_test_ratio", "ESTIMATOR_STATUS: the largest test ratio but the compass's"),
     ("ekf_mag_ratio", "ESTIMATOR_STATUS: the compass's test ratio"),
+    (
+        "compass_heading",
+        "RAW_IMU, SCALED_IMU, HIGHRES_IMU: heading of the first compass's field, against ATTITUDE's, beyond its usual range in this flight; while it turns little",
+    ),
     ("compass_unused", "ESTIMATOR_STATUS: no test ratio of a compass that had 20 of them in this flight"),
     (
         "accel_mismatch",

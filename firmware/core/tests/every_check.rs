@@ -205,7 +205,8 @@ const FAULTS: [(&str, u8, Level, Fault); 97] = [
 
 /// Found by scripts of their own: silence, restarts and rates in `scripted_faults.rs`, what departs from a baseline in
 /// `trends.rs`, mishaps in `mishap.rs`, what departs from its usual level in a flight in `crosscheck.rs`.
-const ELSEWHERE: [&str; 38] = [
+const ELSEWHERE: [&str; 39] = [
+    "compass_heading",
     "gps_height",
     "position_silent",
     "baro_height",

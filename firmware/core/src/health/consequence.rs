@@ -36,6 +36,7 @@ const SENSORS: &[&str] = &[
     "baro_noise",
     "baro_height",
     "compass_unused",
+    "compass_heading",
     "ekf_compass",
     "ekf_mag_ratio",
 ];
@@ -66,12 +67,16 @@ const ROWS: &[(&[&str], &[&str])] = &[
     (GNSS, &["baro_height", "position_silent"]),
     (&["heartbeat", "frames_lost"], &["position_silent"]),
     (&["accel_stuck", "accel_alert"], &["accel_mismatch"]),
-    (&["gyro_stuck", "gyro_alert"], &["gyro_mismatch", "compass_unused", "ekf_compass", "ekf_mag_ratio"]),
+    (&["gyro_stuck", "gyro_alert"], &["gyro_mismatch"]),
+    (
+        &["gyro_stuck", "gyro_alert", "gyro_mismatch"],
+        &["compass_unused", "compass_heading", "ekf_compass", "ekf_mag_ratio"],
+    ),
     (
         &["compass_stuck", "compass_alert", "compass_mismatch"],
-        &["ekf_compass", "ekf_mag_ratio", "compass_unused"],
+        &["ekf_compass", "ekf_mag_ratio", "compass_unused", "compass_heading"],
     ),
-    (&["compass_unused"], &["ekf_compass", "ekf_mag_ratio"]),
+    (&["compass_unused", "compass_heading"], &["ekf_compass", "ekf_mag_ratio"]),
     (&["baro_stuck", "baro_alert"], &["baro_height", "baro_noise", "baro_mismatch"]),
     (SENSORS, ESTIMATOR),
     (SHAKING, ESTIMATOR),

@@ -122,7 +122,7 @@ pub(super) const CHECKS: &[Check] = &[
         warn: Some(Param::AlertWarn),
         // That it is used says nothing about how well it is.
         alarm_only: true,
-        read: |inputs, _| inputs.derived.crosschecks().compass_unused(),
+        read: |inputs, _| inputs.derived.crosschecks().compass_unused(inputs.now),
         ..ESTIMATOR
     },
     MISMATCH,
@@ -140,6 +140,16 @@ pub(super) const CHECKS: &[Check] = &[
         warn: Some(Param::MagMismWarn),
         hysteresis: 5.0,
         read: |inputs, sensor| mismatch(inputs, Kind::Compass, sensor),
+        ..MISMATCH
+    },
+    Check {
+        name: "compass_heading",
+        unit: "deg",
+        warn: Some(Param::MagHeadWarn),
+        hysteresis: 3.0,
+        instances: 1,
+        part: Part::Vehicle,
+        read: |inputs, _| inputs.derived.crosschecks().heading_apart(inputs.now),
         ..MISMATCH
     },
     Check {

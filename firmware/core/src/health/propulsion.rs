@@ -4,7 +4,7 @@ use super::check::{Check, Part, Side, When};
 use super::common::{STALE_SLOW, alert, departure, due, heavier, takes_more};
 use super::finding::Subsystem;
 use super::inputs::Inputs;
-use crate::baseline::Quantity;
+use crate::baseline::{OUTPUTS_MAX, Quantity};
 use crate::cause::Cause;
 use crate::latest::Reading;
 use crate::observation::MOTORS_MAX;
@@ -174,7 +174,7 @@ pub(super) const CHECKS: &[Check] = &[
 
 /// A motor's speed against the others', where its ESC tells it, or else its output.
 fn motor_departure(inputs: &Inputs<'_>, motor: u8) -> Option<Reading> {
-    let output = || (usize::from(motor) < JUDGED_MAX).then_some(Quantity::MotorOutput(motor));
+    let output = || (usize::from(motor) < OUTPUTS_MAX).then_some(Quantity::MotorOutput(motor));
     departure(inputs, Quantity::MotorSpeed(motor)).or_else(|| departure(inputs, output()?))
 }
 

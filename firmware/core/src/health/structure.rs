@@ -50,7 +50,7 @@ pub(super) const CHECKS: &[Check] = &[
         when: When::InFlight,
         // Never stale: only what flies on rotors says something.
         stale_after: None,
-        read: |inputs, _| inputs.derived.crosschecks().vibration_rise(),
+        read: |inputs, _| inputs.derived.crosschecks().vibration_rise(inputs.now),
         ..VIBRATION
     },
     Check {

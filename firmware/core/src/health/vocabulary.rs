@@ -178,7 +178,7 @@ vocabulary! {
     "motor_imbalance" Vehicle "motor balance", "motor", says "motor # speed differs", "LAND", needs "speeds of single motors in steady flight";
     "The motor's speed differed from the others' in steady flight.";
     "Check this arm: propeller, motor, its tilt, and the centre of gravity.";
-    "motor_output" Vehicle "motor output", "motor", says "motor # weak, output", "LAND NOW", needs "motor outputs of a quadrotor or hexarotor, on the ground and in flight";
+    "motor_output" Vehicle "motor output", "motor", says "motor # weak, output", "LAND NOW", needs "motor outputs of 4, 6 or 8 motors, on the ground and in flight";
     "The motor was driven far harder than the others: it or its propeller gives less thrust.";
     "Do not fly until its propeller, motor and ESC are checked.";
     "thrust_lost" Vehicle "climb with full throttle", "", says "full throttle, no climb", "", needs "throttle and climb";
@@ -261,6 +261,8 @@ vocabulary! {
     "compass_mismatch" Vehicle "compass agreement", "compass", says "compass # disagrees", "", needs "second compass";
     "Two compasses came apart in flight: one of them is wrong, or a current or magnet is near it.";
     "Check the compasses, their wiring, and currents or magnets near them.";
+    "compass_heading" Vehicle "compass heading", "", says "compass heading off", "", needs "compass of RAW_IMU and attitude in flight";
+    "The first compass's heading came apart from the estimator's in flight."; "Check the compass, its calibration and currents or magnets near it.";
     "baro_mismatch" Vehicle "barometer agreement", "barometer", says "barometer # disagrees", "", needs "second barometer";
     "Two barometers came apart in flight: one of them is wrong."; "Check the barometers, their cover and the airflow at them.";
     "baro_height" Vehicle "barometer against GPS height", "", says "barometer off GPS height", "", needs "air pressure and GPS height";

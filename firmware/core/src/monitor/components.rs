@@ -1,11 +1,10 @@
 //! What the monitor knows of the vehicle's parts, and what becomes of that when one is replaced.
 
 use super::Monitor;
-use crate::baseline::{Baselines, Quantity};
+use crate::baseline::{Baselines, OUTPUTS_MAX, Quantity};
 use crate::component::{Component, Figures, Kind, Label, Status};
 use crate::lifetime::ItemKey;
 use crate::observation::MOTORS_MAX;
-use crate::outputs::JUDGED_MAX;
 use crate::vehicle::BATTERIES_MAX;
 
 impl Monitor {
@@ -66,7 +65,7 @@ impl Monitor {
                     self.baselines.forget(Quantity::MotorSpeed(motor as u8));
                 }
                 // The share of one is of all.
-                (0..JUDGED_MAX).for_each(|motor| self.baselines.forget(Quantity::MotorOutput(motor as u8)));
+                (0..OUTPUTS_MAX).for_each(|motor| self.baselines.forget(Quantity::MotorOutput(motor as u8)));
                 self.baselines.forget(Quantity::HoverPower);
                 self.baselines.forget(Quantity::Vibration);
                 self.baselines.forget(Quantity::HoverThrottle);

@@ -86,6 +86,7 @@ pub(super) const CLASSES: &[Class] = &[
             "ekf_compass",
             "ekf_mag_ratio",
             "compass_unused",
+            "compass_heading",
             "compass_mismatch",
             "compass_stuck",
         ],
