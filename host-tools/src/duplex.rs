@@ -1,6 +1,6 @@
 //! Both directions of a live endpoint: a reader that waits a while, and a writer.
 //!
-//! UDP answers whoever spoke last (`udpin`), or its fixed peer (`udpout`); before anyone did, bytes go nowhere, as on a
+//! UDP answers whoever spoke last, or is kept to ([`Port::keep_to`]) (`udpin`), or its fixed peer (`udpout`); before anyone did, bytes go nowhere, as on a
 //! UART that nothing is plugged into.
 
 use std::io::{self, ErrorKind, Read, Write};
@@ -21,6 +21,9 @@ const DATAGRAM_BYTES_MAX: usize = 1200;
 pub trait Port: Send {
     /// As `Read::read`; silence is an error that [`is_silence`] knows.
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize>;
+
+    /// From now on what is written goes to whoever sent what was read last, whoever else speaks.
+    fn keep_to(&mut self) {}
 }
 
 /// Both directions.
@@ -74,7 +77,8 @@ fn datagrams(socket: UdpSocket, peer: Option<SocketAddr>, silence: Duration) -> 
     let fixed = peer.is_some();
     let peer = Arc::new(Mutex::new(peer));
     let writer = DatagramWriter { socket: socket.try_clone()?, peer: Arc::clone(&peer) };
-    Ok(Duplex { reader: Box::new(DatagramReader { socket, peer, fixed }), writer: Box::new(writer) })
+    let reader = DatagramReader { socket, peer, fixed, last: None, kept: false };
+    Ok(Duplex { reader: Box::new(reader), writer: Box::new(writer) })
 }
 
 struct Stream<R>(R);
@@ -93,6 +97,10 @@ struct DatagramReader {
     socket: UdpSocket,
     peer: Arc<Mutex<Option<SocketAddr>>>,
     fixed: bool,
+    /// Who sent what was read last.
+    last: Option<SocketAddr>,
+    /// Whoever else speaks does not become the peer.
+    kept: bool,
 }
 
 impl Port for DatagramReader {
@@ -102,13 +110,22 @@ impl Port for DatagramReader {
                 Err(ErrorKind::WouldBlock.into())
             }
             Ok((count, from)) => {
-                *lock(&self.peer) = Some(from);
+                self.last = Some(from);
+                if !self.kept {
+                    *lock(&self.peer) = self.last;
+                }
                 // An empty datagram is not the end of anything.
                 if count == 0 { Err(ErrorKind::WouldBlock.into()) } else { Ok(count) }
             }
             // The peer may come yet.
             Err(error) if error.kind() == ErrorKind::ConnectionRefused => Err(ErrorKind::WouldBlock.into()),
             Err(error) => Err(error),
+        }
+    }
+
+    fn keep_to(&mut self) {
+        if self.last.is_some() {
+            (*lock(&self.peer), self.kept) = (self.last, true);
         }
     }
 }
@@ -145,4 +162,30 @@ impl Write for DatagramWriter {
 fn lock(peer: &Mutex<Option<SocketAddr>>) -> std::sync::MutexGuard<'_, Option<SocketAddr>> {
     // An address is whole whatever happened to who held it.
     peer.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn who_is_kept_to_gets_the_answers_whoever_else_speaks() {
+        let here = || UdpSocket::bind("127.0.0.1:0").expect("a port");
+        let (socket, first, second) = (here(), here(), here());
+        let to = socket.local_addr().expect("an address");
+        let mut line = datagrams(socket, None, Duration::from_secs(5)).expect("a line");
+        let hear = |line: &mut Duplex, from: &UdpSocket| {
+            from.send_to(b"x", to).expect("sent");
+            line.reader.read(&mut [0; 8]).expect("it comes");
+        };
+        first.set_read_timeout(Some(Duration::from_secs(5))).expect("set");
+        hear(&mut line, &second);
+        hear(&mut line, &first);
+        line.reader.keep_to();
+        for other in [&second, &first, &second] {
+            hear(&mut line, other);
+            line.writer.write_all(b"answer").expect("sent");
+            assert_eq!(first.recv(&mut [0; 8]).expect("the answer"), 6);
+        }
+    }
 }

@@ -40,7 +40,7 @@ fn board(dir: TempDir) -> Board {
 
 fn pull(board: &Board, output: &Path, names: &[&str]) -> hums_tests::child::Outcome {
     let address = format!("udpout:127.0.0.1:{}", board.port);
-    let flags = ["pull", "--link", &address, "-o", output.to_str().unwrap()];
+    let flags = ["pull", "--link", &address, "--system", "1", "-o", output.to_str().unwrap()];
     hums(flags.into_iter().chain(names.iter().copied()))
 }
 
@@ -319,7 +319,7 @@ fn a_board_that_computes_no_checksum_is_read_whole_and_what_its_sectors_say_coun
     let output = home.path().join("logs");
     let pull = || {
         let address = format!("udpout:127.0.0.1:{port}");
-        hums(["pull", "--link", &address, LOG, "-o", output.to_str().unwrap()])
+        hums(["pull", "--link", &address, "--system", "1", LOG, "-o", output.to_str().unwrap()])
     };
     let told = pull().expect_code(&[0]).stderr;
     assert!(told.contains("the board's firmware computes no checksum"), "{told}");

@@ -12,7 +12,7 @@ use crate::utc::{When, parse_seconds};
 const PARAMS_EXAMPLES: &str = "Examples:
   hums params list --link serial:/dev/ttyUSB0:57600
   hums params get GS_BUDGET BAT_REM_WARN --link udpin:0.0.0.0:14550
-  hums params set GS_BUDGET 1000 --link tcp:192.168.1.5:5760
+  hums params set GS_BUDGET 1000 --link tcp:192.168.1.5:5760 --system 2
   hums params sign --key key.txt --link serial:/dev/ttyUSB0:57600
 
 The list is lines of NAME VALUE, which `hums sim --params` reads back.";
@@ -35,6 +35,9 @@ pub struct Link {
     /// Sign what is sent with the key in this file: 64 hexadecimal digits, or a passphrase as Mission Planner takes it
     #[arg(long, value_name = "FILE")]
     pub key: Option<PathBuf>,
+    /// Talk with the board of this system (vehicle); without it with the only one that is heard. Where several are heard, say which
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..))]
+    pub system: Option<u8>,
 }
 
 /// What to do with parameters.

@@ -25,6 +25,7 @@ const SCHEMA: Schema = Schema::first("hums-format");
 
 #[derive(Debug, Serialize)]
 struct FormattedJson {
+    system: u8,
     formatted: bool,
 }
 
@@ -59,9 +60,9 @@ pub fn run(args: &cli::FormatCard) -> Result<Outcome> {
     match told.as_deref() {
         Some("recording") => {
             if args.json {
-                output::json(SCHEMA, &FormattedJson { formatted: true })?;
+                output::json(SCHEMA, &FormattedJson { system, formatted: true })?;
             } else {
-                output::line("formatted, and recorded on")?;
+                output::line(&format!("system {system}: formatted, and recorded on"))?;
             }
             Ok(Outcome::Done)
         }

@@ -1,10 +1,12 @@
 //! Talking with a board as a ground station does: `hums params`, `hums pull` and `hums format`.
 
+#[cfg(test)]
+mod fake;
 pub mod format;
 pub mod params;
 pub mod pull;
 
-use std::collections::VecDeque;
+use std::collections::{BTreeSet, VecDeque};
 use std::path::Path;
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
@@ -27,6 +29,8 @@ const SYSTEM: u8 = 255;
 const OUR_COMPONENT: u8 = 190;
 /// How long the board may keep silent at first.
 const CONNECT: Duration = Duration::from_secs(15);
+/// How long others are listened for once one board is heard: two heartbeats of each, of which a radio may lose one.
+const LISTEN: Duration = Duration::from_millis(2_200);
 /// How often we say that we are there: radios and UDP peers learn from it where to answer.
 const PRESENCE: Duration = Duration::from_secs(1);
 const READ: Duration = Duration::from_millis(20);
@@ -43,14 +47,17 @@ pub struct Client {
     /// Signs what we send, in this PC's time.
     seal: Option<Seal>,
     begun: Instant,
-    /// The system that the board is part of.
+    /// The system that the board is part of; 0, which is no system, until it is known.
     system: u8,
     frames: VecDeque<Vec<u8>>,
     heartbeat_at: Option<Instant>,
 }
 
 impl Client {
-    /// Opens the link and waits for the board's heartbeat.
+    /// Opens the link and finds the board: the one of `--system`, or the only one that is heard. Which one it is, is said.
+    ///
+    /// # Errors
+    /// No board is heard; or more than one, and nobody said which: a usage error.
     pub fn connect(link: &Link) -> Result<Self> {
         let endpoint = &link.link;
         if !endpoint.is_live() {
@@ -59,7 +66,15 @@ impl Client {
         let seal = link.key.as_deref().map(key).transpose()?.map(|key| Seal::new(key, LINK, our_time(), 0));
         let duplex = duplex::open(endpoint, READ)?;
         interrupt::watch();
-        let mut client = Self {
+        let mut client = Self::over(duplex, seal);
+        client.find(link.system, LISTEN).with_context(|| endpoint.to_string())?;
+        note!("system {}: its board is heard", client.system);
+        Ok(client)
+    }
+
+    /// Before a board is found.
+    fn over(duplex: Duplex, seal: Option<Seal>) -> Self {
+        Self {
             duplex,
             framer: Framer::new(),
             encoder: Encoder::of(SYSTEM, OUR_COMPONENT),
@@ -68,15 +83,43 @@ impl Client {
             system: 0,
             frames: VecDeque::new(),
             heartbeat_at: None,
-        };
-        let end = Instant::now() + CONNECT;
-        let board = client.until(end, |frame| (frame.id() == HEARTBEAT).then(|| frame.system()))?;
-        client.system = board.with_context(|| {
-            format!(
-                "{endpoint}: no board of ours is heard (component {COMPONENT}); is GS_PATH as it should be?"
-            )
-        })?;
-        Ok(client)
+        }
+    }
+
+    /// Takes the board of this system, or of the only one that is heard within `listen` from the first one on.
+    fn find(&mut self, wanted: Option<u8>, listen: Duration) -> Result<()> {
+        let mut heard = BTreeSet::new();
+        let mut end = Instant::now() + CONNECT;
+        while let Some(system) = self.next(end, |frame| (frame.id() == HEARTBEAT).then(|| frame.system()))? {
+            if wanted == Some(system) {
+                self.system = system;
+                return Ok(());
+            }
+            if heard.insert(system) && heard.len() == 1 && wanted.is_none() {
+                end = Instant::now() + listen;
+            }
+        }
+        let systems = heard.iter().map(u8::to_string).collect::<Vec<_>>().join(", ");
+        match (wanted, heard.first()) {
+            (None, Some(system)) if heard.len() == 1 => {
+                self.system = *system;
+                Ok(())
+            }
+            (None, Some(_)) => {
+                Err(usage(format!("boards of the systems {systems} are heard; say which: --system N")))
+            }
+            (Some(wanted), Some(_)) => bail!(
+                "no board of system {wanted} is heard (component {COMPONENT}), but of {systems}; is --system as it should be?"
+            ),
+            (_, None) => {
+                bail!("no board of ours is heard (component {COMPONENT}); is GS_PATH as it should be?")
+            }
+        }
+    }
+
+    /// The system that the board is part of.
+    pub const fn system(&self) -> u8 {
+        self.system
     }
 
     /// System and component of the board.
@@ -95,17 +138,27 @@ impl Client {
         self.duplex.writer.write_all(frame).and_then(|()| self.duplex.writer.flush()).context("--link")
     }
 
-    /// Looks at the board's frames until `look` makes something of one, or time is up.
+    /// Looks at the board's frames until `look` makes something of one, or time is up. No other board's frames are looked at.
     pub fn until<T>(
         &mut self,
         end: Instant,
         mut look: impl FnMut(&Frame<'_>) -> Option<T>,
     ) -> Result<Option<T>> {
+        let system = self.system;
+        self.next(end, |frame| if frame.system() == system { look(frame) } else { None })
+    }
+
+    /// As [`Self::until`], of all boards.
+    fn next<T>(&mut self, end: Instant, mut look: impl FnMut(&Frame<'_>) -> Option<T>) -> Result<Option<T>> {
         loop {
             while let Some(bytes) = self.frames.pop_front() {
                 let frame =
                     Frame::again(&bytes, Check::Verified).filter(|frame| frame.component() == COMPONENT);
-                if let Some(found) = frame.and_then(|frame| look(&frame)) {
+                let Some(frame) = frame else { continue };
+                if frame.id() == HEARTBEAT && (self.system == 0 || frame.system() == self.system) {
+                    self.duplex.reader.keep_to();
+                }
+                if let Some(found) = look(&frame) {
                     return Ok(Some(found));
                 }
             }
@@ -159,6 +212,11 @@ impl Client {
     }
 }
 
+/// Whether a message that names whom it is for is for us, or for all.
+const fn is_for_us(system: u8, component: u8) -> bool {
+    (system == SYSTEM || system == 0) && (component == OUR_COMPONENT || component == 0)
+}
+
 /// What a key file holds: 64 hexadecimal digits, or a passphrase.
 pub fn key(path: &Path) -> Result<Key> {
     let text = String::from_utf8(read_short(path, KEY_FILE_BYTES_MAX).context("--key")?).map_err(|_| {
@@ -200,5 +258,28 @@ fn our_time() -> Clock {
 fn keep(frames: &mut VecDeque<Vec<u8>>, frame: &Frame<'_>) {
     if frame.check() == Check::Verified {
         frames.push_back(frame.bytes().to_vec());
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::outcome::Usage;
+
+    #[test]
+    fn of_two_boards_neither_is_taken_unless_it_is_said_which() {
+        let listen = Duration::from_millis(20);
+        let find = |systems, wanted| {
+            let mut client = fake::client(systems, |_| Vec::new());
+            client.find(wanted, listen).map(|()| client.target()).context("udpin:0.0.0.0:14550")
+        };
+        let refused = find(&[2, 1], None).expect_err("which one?");
+        let words = format!("{refused:#}");
+        assert!(refused.is::<Usage>(), "exit code 2: {words}");
+        assert!(words.contains("systems 1, 2") && words.contains("--system N"), "{words}");
+        for wanted in [1, 2] {
+            assert_eq!(find(&[1, 2], Some(wanted)).expect("it is heard"), (wanted, COMPONENT));
+        }
+        assert_eq!(find(&[7], None).expect("it is the only one"), (7, COMPONENT));
     }
 }

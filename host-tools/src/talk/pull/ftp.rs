@@ -9,7 +9,7 @@ use hums_link::messages;
 use hums_link::packet::Fields;
 
 use crate::mavlink::ids::FILE_TRANSFER_PROTOCOL;
-use crate::talk::Client;
+use crate::talk::{Client, is_for_us};
 
 const HEAD: usize = 12;
 const DATA_MAX: u8 = 239;
@@ -51,9 +51,10 @@ struct Answer {
 
 impl Answer {
     fn read(frame: &Frame<'_>) -> Option<Self> {
-        let fields = Fields(frame.payload().get(3..)?);
+        let payload = frame.payload();
+        let (whom, fields) = (Fields(payload), Fields(payload.get(3..)?));
         let size = usize::from(fields.u8(4).min(DATA_MAX));
-        (frame.id() == FILE_TRANSFER_PROTOCOL).then(|| Self {
+        (frame.id() == FILE_TRANSFER_PROTOCOL && is_for_us(whom.u8(1), whom.u8(2))).then(|| Self {
             sequence: fields.u16(0),
             opcode: fields.u8(3),
             of: fields.u8(5),
@@ -105,6 +106,11 @@ impl Ftp {
         let mut ftp = Self { client, sequence: 0 };
         ftp.ask(RESET, 0, 0, b"", TRIES)?;
         Ok(ftp)
+    }
+
+    /// The system that the board is part of.
+    pub(super) const fn system(&self) -> u8 {
+        self.client.system()
     }
 
     fn say(&mut self, opcode: u8, offset: u32, size: u8, data: &[u8]) -> Result<u16> {
@@ -261,7 +267,25 @@ impl Ftp {
 
 #[cfg(test)]
 mod tests {
+    use hums_link::packet::Packet;
+
     use super::*;
+    use crate::talk::fake;
+
+    #[test]
+    fn an_answer_counts_that_the_board_that_was_asked_gives_to_us() {
+        let client = fake::found(&[2, 1], |frame| {
+            let asked = Fields(frame.payload().get(3..).unwrap_or_default());
+            let answer = |system, station, word: u8| -> (u8, Packet) {
+                let [s0, s1] = asked.u16(0).wrapping_add(1).to_le_bytes();
+                let payload = [s0, s1, 0, ACK, 4, asked.u8(3), 0, 0, 0, 0, 0, 0, word, 0, 0, 0];
+                (system, messages::file_transfer(station, 190, &payload))
+            };
+            vec![answer(2, 255, 7), answer(1, 77, 8), answer(1, 255, 9)]
+        });
+        let mut ftp = Ftp::new(client).expect("it answers");
+        assert_eq!(ftp.open("00001_00.HUM").expect("an answer"), 9);
+    }
 
     #[test]
     fn of_a_piece_that_goes_over_the_length_at_opening_what_lies_before_it_counts() {

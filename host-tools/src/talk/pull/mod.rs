@@ -37,6 +37,8 @@ const SCHEMA: Schema = Schema::first("hums-pull");
 
 #[derive(Debug, Serialize)]
 struct PulledJson {
+    /// Whose board it is.
+    system: u8,
     logs: Vec<LogJson>,
     /// With `--around`.
     around: Option<MomentJson>,
@@ -75,7 +77,14 @@ struct LogJson {
 /// Runs `hums pull`.
 pub fn run(args: &cli::Pull) -> Result<Outcome> {
     make_directory(&args.output)?;
-    let mut ftp = Ftp::new(Client::connect(&args.at)?)?;
+    let client = Client::connect(&args.at)?;
+    let system = client.system();
+    bring(client, args).with_context(|| format!("system {system}"))
+}
+
+/// Brings the logs that are asked for.
+fn bring(client: Client, args: &cli::Pull) -> Result<Outcome> {
+    let mut ftp = Ftp::new(client)?;
     let mut logs = ftp.list()?;
     logs.sort();
     if let Some(missing) = args.names.iter().find(|name| logs.iter().all(|(log, _)| log != *name)) {
@@ -103,7 +112,7 @@ pub fn run(args: &cli::Pull) -> Result<Outcome> {
         pulled.push(LogJson { name, path, is_new, whole: verified == Outcome::Done });
     }
     if args.json {
-        output::json(SCHEMA, &PulledJson { logs: pulled, around: None })?;
+        output::json(SCHEMA, &PulledJson { system: ftp.system(), logs: pulled, around: None })?;
     }
     Ok(outcome)
 }
@@ -130,7 +139,11 @@ fn around(ftp: &mut Ftp, mut logs: Vec<String>, args: &cli::Pull, moment: &cli::
     if args.json {
         output::json(
             SCHEMA,
-            &PulledJson { logs: pulled, around: Some(MomentJson::of(brought.at, brought.found)) },
+            &PulledJson {
+                system: ftp.system(),
+                logs: pulled,
+                around: Some(MomentJson::of(brought.at, brought.found)),
+            },
         )?;
     }
     Ok(outcome)
