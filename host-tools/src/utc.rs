@@ -1,8 +1,6 @@
 //! Times as people and other tools read them: UTC in ISO 8601, and seconds since the monitor's power-on; for people hours,
 //! minutes and seconds.
 
-use std::io::Write;
-
 use hums_core::time::{Instant, Span};
 
 /// Microseconds since 1970 as `2026-11-21T10:13:42.123456Z`, appended to `out`. Years up to 9999; a later time is
@@ -14,13 +12,13 @@ pub fn push_iso8601(out: &mut Vec<u8>, utc_us: u64) {
     let (year, month, day) = civil(seconds / 86_400);
     let (hour, minute, second) = (seconds / 3600 % 24, seconds / 60 % 60, seconds % 60);
     // Digits by hand: this stands in every line of every table, and `write!` takes four times as long.
-    push_digits(out, year, 4);
+    push_digits::<4>(out, year);
     for (separator, number) in [(b'-', month), (b'-', day), (b'T', hour), (b':', minute), (b':', second)] {
         out.push(separator);
-        push_digits(out, number, 2);
+        push_digits::<2>(out, number);
     }
     out.push(b'.');
-    push_digits(out, utc_us % 1_000_000, 6);
+    push_digits::<6>(out, utc_us % 1_000_000);
     out.push(b'Z');
 }
 
@@ -55,15 +53,18 @@ pub fn clock(span: Span) -> String {
 
 /// Microseconds as seconds with all six decimals.
 pub fn push_seconds(out: &mut Vec<u8>, micros: u64) {
-    // Writing to a Vec cannot fail.
-    let _ = write!(out, "{}.", micros / 1_000_000);
-    push_digits(out, micros % 1_000_000, 6);
+    out.extend_from_slice(itoa::Buffer::new().format(micros / 1_000_000).as_bytes());
+    out.push(b'.');
+    push_digits::<6>(out, micros % 1_000_000);
 }
 
-fn push_digits(out: &mut Vec<u8>, number: u64, width: u32) {
-    for place in (0..width).rev() {
-        out.push(b'0' + (number / 10u64.pow(place) % 10) as u8);
+fn push_digits<const WIDTH: usize>(out: &mut Vec<u8>, mut number: u64) {
+    let mut digits = [0; WIDTH];
+    for digit in digits.iter_mut().rev() {
+        *digit = b'0' + (number % 10) as u8;
+        number /= 10;
     }
+    out.extend_from_slice(&digits);
 }
 
 /// Days since 1970 as year, month, day: Howard Hinnant's `civil_from_days`, for days from 1970 on.

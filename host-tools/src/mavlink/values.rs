@@ -109,19 +109,21 @@ fn value<'a>(field: &Field, bytes: &'a [u8]) -> Value<'a> {
 
 /// `bytes` are as many as the kind has; a definition cannot say otherwise.
 fn scalar(kind: Kind, bytes: &[u8]) -> Scalar {
-    let mut wide = [0; 8];
-    for (to, from) in wide.iter_mut().zip(bytes) {
-        *to = *from;
+    /// Of a known number, so that none of them is counted: a table has millions.
+    fn these<const N: usize>(bytes: &[u8]) -> [u8; N] {
+        bytes.first_chunk().copied().unwrap_or([0; N])
     }
-    let raw = u64::from_le_bytes(wide);
     match kind {
-        Kind::U8 | Kind::Char | Kind::U16 | Kind::U32 | Kind::U64 => Scalar::Unsigned(raw),
-        Kind::I8 => Scalar::Signed(i64::from(raw as i8)),
-        Kind::I16 => Scalar::Signed(i64::from(raw as i16)),
-        Kind::I32 => Scalar::Signed(i64::from(raw as i32)),
-        Kind::I64 => Scalar::Signed(raw as i64),
-        Kind::F32 => Scalar::Single(f32::from_bits(raw as u32)),
-        Kind::F64 => Scalar::Double(f64::from_bits(raw)),
+        Kind::U8 | Kind::Char => Scalar::Unsigned(u8::from_le_bytes(these(bytes)).into()),
+        Kind::U16 => Scalar::Unsigned(u16::from_le_bytes(these(bytes)).into()),
+        Kind::U32 => Scalar::Unsigned(u32::from_le_bytes(these(bytes)).into()),
+        Kind::U64 => Scalar::Unsigned(u64::from_le_bytes(these(bytes))),
+        Kind::I8 => Scalar::Signed(i8::from_le_bytes(these(bytes)).into()),
+        Kind::I16 => Scalar::Signed(i16::from_le_bytes(these(bytes)).into()),
+        Kind::I32 => Scalar::Signed(i32::from_le_bytes(these(bytes)).into()),
+        Kind::I64 => Scalar::Signed(i64::from_le_bytes(these(bytes))),
+        Kind::F32 => Scalar::Single(f32::from_le_bytes(these(bytes))),
+        Kind::F64 => Scalar::Double(f64::from_le_bytes(these(bytes))),
     }
 }
 
