@@ -18,7 +18,7 @@ use crate::names::counter_name;
 use crate::plural::are;
 use crate::progress;
 use crate::source::epochs::Epochs;
-use crate::source::item::{self, Amount, Item, MessageCount, Want};
+use crate::source::item::{self, Amount, Item, MessageCount, Take, Want};
 use crate::source::own::OwnReader;
 use crate::source::parts::{Collect, Deliver};
 use crate::source::recording::Format;
@@ -356,21 +356,28 @@ impl Overview {
     /// Reads a log through. That frames are what the monitor received is the record's own word; see
     /// [`Overview::verified`].
     pub fn of(log: &Log) -> Result<Self> {
-        Self::read(log, false)
+        Self::read(log, Want::default(), None)
+    }
+
+    /// The same, and hands on in order what the log says, of several vehicles what that with this system id does: one reading for
+    /// both.
+    pub fn told(log: &Log, system: Option<u8>, take: &mut Take<'_>) -> Result<Self> {
+        Self::read(log, Want { system, ..Want::default() }, Some(take))
     }
 
     /// Reads a log through and looks at every frame's own checksum again.
     pub fn verified(log: &Log) -> Result<Self> {
-        Self::read(log, true)
+        Self::read(log, Want { frames: true, ..Want::default() }, None)
     }
 
-    fn read(log: &Log, checks: bool) -> Result<Self> {
+    fn read(log: &Log, want: Want<'_>, take: Option<&mut Take<'_>>) -> Result<Self> {
         let bar = progress::bytes(Some(log.bytes()), &log.name);
-        let want = Want { frames: checks, ..Want::default() };
         let mut contents = Contents::default();
-        let reader = OwnReader::new(log.clone());
-        let summary =
-            reader.in_parts(want, Contents::default, &mut contents, |bytes| bar.set_position(bytes))?;
+        let (reader, seen) = (OwnReader::new(log.clone()), |bytes| bar.set_position(bytes));
+        let summary = match take {
+            Some(take) => reader.in_parts_and_order(want, Contents::default, &mut contents, take, seen)?,
+            None => reader.in_parts(want, Contents::default, &mut contents, seen)?,
+        };
         bar.finish_and_clear();
         (contents.messages, contents.other_messages) = (summary.messages, summary.other_messages);
         contents.not_frames = summary.not_frames;

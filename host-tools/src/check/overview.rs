@@ -10,7 +10,9 @@ use hums_core::Monitor;
 use super::judge::{Heard, Judge, Limits};
 use super::judged::Judged;
 use crate::ending::Ending;
-use crate::logs::reader;
+use crate::logs::board::{HEADING_GROUPS, heading};
+use crate::logs::groups::Groups;
+use crate::logs::{Log, reader};
 use crate::names::counter_name;
 use crate::progress;
 use crate::source::item::{Gap, Summary, Want};
@@ -51,14 +53,24 @@ pub(super) fn judge(place: &Place, limits: &Limits, heard: Heard, shows: bool) -
     Ok(Read { format, judged: judge.end(), summary, taken: progress.taken() })
 }
 
-/// Reads a recording through; where nobody has checked it, the monitor here does.
+/// Reads a recording through, once; where nobody has checked it, the monitor here does.
 pub fn overview(place: &Place) -> Result<Overview> {
     let limits = Limits::default();
     if let Some(log) = place.own() {
-        let mut overview = Overview::of(log)?;
+        let mut here = (!has_start(log)?).then(|| Judge::new(&limits, Format::Hums));
+        let mut overview = match &mut here {
+            Some(here) => Overview::told(log, place.system, &mut |at, item| {
+                here.item(at, item);
+                Ok(())
+            })?,
+            None => Overview::of(log)?,
+        };
         overview.ending.name.clone_from(&place.name);
         if !overview.contents.is_checked() && overview.contents.frames() > 0 {
-            let Read { judged, .. } = judge(place, &limits, Heard::Somewhere, true)?;
+            let judged = match here {
+                Some(here) => here.end(),
+                None => judge(place, &limits, Heard::Somewhere, true)?.judged,
+            };
             fill(&mut overview.contents, judged);
         }
         return Ok(overview);
@@ -92,6 +104,19 @@ pub fn overview(place: &Place) -> Result<Overview> {
         bytes_on_card: if place.is_standard() { taken } else { place.bytes() },
         contents,
     })
+}
+
+/// Whether a log begins with the record of a start: then a monitor ran, and nobody needs to judge it here.
+fn has_start(log: &Log) -> Result<bool> {
+    let mut groups = Groups::new(log);
+    for _ in 0..HEADING_GROUPS {
+        match groups.next_group()? {
+            Some(group) if heading(&group).is_some() => return Ok(true),
+            Some(_) => {}
+            None => break,
+        }
+    }
+    Ok(false)
 }
 
 /// What the monitor here makes of a recording.

@@ -70,8 +70,10 @@ pub struct Context {
     pub stamp: String,
     /// What must not be written over.
     pub inputs: Inputs,
-    /// What this program found, where the recorder ran no checks.
+    /// What this program found, where the recorder ran no checks, and it was read for that before.
     pub checked: Option<Checked>,
+    /// It is judged while it is read.
+    pub judges: bool,
     /// The tables of an autopilot's own log.
     pub tables: Tables,
 }

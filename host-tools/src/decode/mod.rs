@@ -9,7 +9,7 @@
 //! | `parquet` | typed columns, the tables of `csv` | one file a table, by vehicle, date and session |
 //! | `thesis` | the reference system's four tables | four files a log |
 //!
-//! A log is read once (twice where its vehicle must be known first); its groups are turned to text and columns in
+//! A log is read once (twice where its vehicle must be known first), and judged in the same reading where nobody has; its groups are turned to text and columns in
 //! parallel and written in order. Several logs go side by side, few enough that memory stays bounded.
 //!
 //! A log's files are named after its session ([`naming`]). What is there already is compared, and replaced only where the
@@ -53,6 +53,7 @@ use std::sync::Mutex;
 use anyhow::{Result, bail};
 use hums_core::time::Instant;
 
+use crate::check::judge::{Judge, Limits};
 use crate::cli;
 use crate::ending::Ending;
 use crate::files::{Folder, Inputs, appended, check_parent, means_standard_output, says_directory};
@@ -67,8 +68,9 @@ use crate::printable;
 use crate::source::epochs::Epochs;
 use crate::source::find::{find, sessions_of};
 use crate::source::item::{Rows, Summary, Want};
-use crate::source::recording::Place;
+use crate::source::recording::{Format, Place};
 use crate::summary::damaged_places;
+use checked::Checked;
 use collect::Collected;
 use context::{Context, Formats};
 use destination::Destination;
@@ -177,6 +179,9 @@ fn check_output(args: &cli::Decode, logs: usize, formats: Formats) -> Result<boo
     }
     Ok(standard_output)
 }
+
+/// A log that was read into its files, which are not whole yet; what this program found, where it was judged in the same reading.
+type Read<'a> = (Summary, Writers<'a>, Option<Checked>);
 
 /// What to do with each log.
 struct Task<'a> {
@@ -294,12 +299,12 @@ impl Task<'_> {
             context.epochs = Epochs::of(epoch_us);
             read = self.read(log, name, &context, parquet.as_deref());
         }
-        let (summary, mut writers) = read?;
+        let (summary, mut writers, checked) = read?;
         if writers.is_empty() && context.selection.is_part() {
             remarks.push(nothing_of(log, &summary, &context.selection));
             return Ok(Done { remarks, ..Done::of(log) });
         }
-        let not_checked = writers.checked(summary.span.map(|(_, last)| last))?;
+        let not_checked = writers.checked(summary.span.map(|(_, last)| last), checked.as_ref())?;
         remarks.extend(not_checked.map(|why| format!("{}: {why}", log.name)));
         let written = writers.finish()?;
         let mut outcome = Outcome::Done;
@@ -338,9 +343,10 @@ impl Task<'_> {
         // A box's log begins with the record of its start, and its monitor checks.
         let judges = self.formats.has_records() && !work.traits.has_board();
         match work.log.own() {
-            Some(log) if !(judges || self.formats.influx || self.formats.parquet) => {
+            Some(log) if !(self.formats.influx || self.formats.parquet) => {
                 let epoch = if self.standard_output { reader::epoch(log) } else { reader::likely_epoch(log) };
                 context.epochs = Epochs::of(epoch?);
+                context.judges = judges;
             }
             _ => {
                 (context.identity, context.checked) = identity(work.log, judges)?;
@@ -358,12 +364,12 @@ impl Task<'_> {
         &self,
         place: &Place,
         context: &Context,
-        read: &Result<(Summary, Writers<'_>)>,
+        read: &Result<Read<'_>>,
     ) -> Result<Option<Option<u64>>> {
         let epoch_us = match (read, place.own()) {
             (_, None) => return Ok(None),
             _ if self.standard_output => return Ok(None),
-            (Ok((summary, _)), _) => summary.ending.as_ref().and_then(|ending| ending.summary.epoch_us),
+            (Ok((summary, ..)), _) => summary.ending.as_ref().and_then(|ending| ending.summary.epoch_us),
             (Err(error), Some(log)) if differs(error).is_some() => reader::epoch(log)?,
             _ => return Ok(None),
         };
@@ -377,7 +383,7 @@ impl Task<'_> {
         name: &str,
         context: &'a Context,
         parquet: Option<&Path>,
-    ) -> Result<(Summary, Writers<'a>)> {
+    ) -> Result<Read<'a>> {
         let destination = if self.standard_output {
             Destination::Standard
         } else {
@@ -392,8 +398,16 @@ impl Task<'_> {
         };
         let want =
             Want { frames: true, observations: formats.influx || formats.thesis, rows, ..Want::default() };
-        let summary = place.in_parts(want, || Collected::new(context), &mut writers)?;
-        Ok((summary, writers))
+        let new = || Collected::new(context);
+        let Some(log) = place.own().filter(|_| context.judges) else {
+            return Ok((place.in_parts(want, new, &mut writers)?, writers, None));
+        };
+        let mut judge = Judge::new(&Limits::default(), Format::Hums);
+        let summary = place.in_parts_and_order(log, want, new, &mut writers, &mut |at, item| {
+            judge.item(at, item);
+            Ok(())
+        })?;
+        Ok((summary, writers, Checked::new(judge.end())))
     }
 }
 

@@ -186,15 +186,20 @@ impl<'a> Writers<'a> {
         })
     }
 
-    /// All of the log was read, up to this time: who checked the vehicle, and what this program found. Gives why nobody did, as
-    /// a part of a sentence.
-    pub fn checked(&mut self, last: Option<Instant>) -> Result<Option<&'static str>> {
+    /// All of the log was read, up to this time: who checked the vehicle, and what this program found, known before or in this
+    /// reading. Gives why nobody did, as a part of a sentence.
+    pub fn checked(
+        &mut self,
+        last: Option<Instant>,
+        checked: Option<&Checked>,
+    ) -> Result<Option<&'static str>> {
         let context = self.context;
+        let checked = context.checked.as_ref().or(checked);
         if !context.formats.has_records() {
             return Ok(None);
         }
         let mut collected = Collected::new(context);
-        for (at, row) in context.checked.iter().flat_map(Checked::findings) {
+        for (at, row) in checked.iter().flat_map(|checked| checked.findings()) {
             if context.selection.has_time(at, &context.epochs) {
                 collected.rows(at, &[row]);
             }
@@ -202,10 +207,10 @@ impl<'a> Writers<'a> {
         let is_wanted = |at| context.selection.has_time(at, &context.epochs);
         let part: Option<&dyn Fn(Instant) -> bool> =
             if context.selection.has_limits() { Some(&is_wanted) } else { None };
-        let row = context.checked.as_ref().map_or_else(|| self.on_board.row(), |checked| checked.row(part));
+        let row = checked.map_or_else(|| self.on_board.row(), |checked| checked.row(part));
         collected.rows(last.unwrap_or(Instant::ZERO), &[row]);
         self.put(collected)?;
-        Ok(context.checked.as_ref().and_then(Checked::not_checked))
+        Ok(checked.and_then(Checked::not_checked))
     }
 
     fn put(&mut self, collected: Collected<'_>) -> Result<()> {

@@ -62,6 +62,31 @@ impl OwnReader {
     }
 }
 
+impl OwnReader {
+    /// Reads it in parts, and hands on in order what [`Reader::read`] does of observations and what else is said: one reading for both.
+    pub fn in_parts_and_order<C: Collect>(
+        &self,
+        want: Want<'_>,
+        new: impl Fn() -> C + Sync,
+        deliver: &mut impl Deliver<C>,
+        take: &mut Take<'_>,
+        seen: impl FnMut(u64),
+    ) -> Result<Summary> {
+        let in_order = Want { observations: true, system: want.system, ..Want::default() };
+        let new = || Both {
+            frames: want.frames,
+            collected: new(),
+            kept: Kept { observations: true, ..Kept::default() },
+        };
+        let hand = Hand { want: in_order, take, said: Said::default() };
+        let mut both = HandBoth { deliver, hand };
+        let summary = self.in_parts(Want { frames: true, ..want }, new, &mut both, seen)?;
+        let Hand { take, mut said, .. } = both.hand;
+        said.end(take)?;
+        Ok(summary)
+    }
+}
+
 impl Reader for OwnReader {
     fn read(&mut self, want: Want<'_>, take: &mut Take<'_>) -> Result<Summary> {
         if let Some(epoch) = epoch(&self.log)? {
@@ -182,6 +207,45 @@ impl Collect for Kept {
         // Observations lie on the heap, each with what the allocator adds.
         const ITEM_BYTES: usize = size_of::<(Instant, Stored)>() + size_of::<Observation>() + 16;
         self.bytes.len() + self.items.len() * ITEM_BYTES
+    }
+}
+
+/// What is made of a part, and its items until it is their turn.
+struct Both<C> {
+    /// Frames are wanted for what is made.
+    frames: bool,
+    collected: C,
+    kept: Kept,
+}
+
+impl<C: Collect> Collect for Both<C> {
+    fn item(&mut self, at: Instant, item: Item<'_>) {
+        self.kept.item(at, item);
+        if self.frames || !matches!(item, Item::Frame(_)) {
+            self.collected.item(at, item);
+        }
+    }
+
+    fn held_bytes(&self) -> usize {
+        self.collected.held_bytes() + self.kept.held_bytes()
+    }
+}
+
+/// Hands on what was made of parts, and their items.
+struct HandBoth<'a, 'b, 'c, D> {
+    deliver: &'c mut D,
+    hand: Hand<'a, 'b>,
+}
+
+impl<C, D: Deliver<C>> Deliver<Both<C>> for HandBoth<'_, '_, '_, D> {
+    fn gap(&mut self, gap: &Gap) -> Result<()> {
+        self.hand.gap(gap)?;
+        self.deliver.gap(gap)
+    }
+
+    fn part(&mut self, part: Both<C>) -> Result<()> {
+        self.hand.part(part.kept)?;
+        self.deliver.part(part.collected)
     }
 }
 

@@ -124,6 +124,23 @@ impl Place {
         Ok(Recording { system: self.system, ..recording })
     }
 
+    /// Reads a log of ours in parts, as [`Self::in_parts`] does, and hands on in order what it says: one reading for both.
+    pub fn in_parts_and_order<C: Collect>(
+        &self,
+        log: &Log,
+        want: Want<'_>,
+        new: impl Fn() -> C + Sync,
+        deliver: &mut impl Deliver<C>,
+        take: &mut Take<'_>,
+    ) -> Result<Summary> {
+        let bar = progress::bytes(Some(log.bytes()), &self.title);
+        let want = Want { system: self.system, ..want };
+        let reader = OwnReader::new(log.clone());
+        let summary = reader.in_parts_and_order(want, new, deliver, take, |bytes| bar.set_position(bytes));
+        bar.finish_and_clear();
+        summary
+    }
+
     /// Reads it in parts: `new` makes the collector of a part, `deliver` gets them in order.
     pub fn in_parts<C: Collect>(
         &self,
