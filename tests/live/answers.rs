@@ -7,7 +7,7 @@ use serde_json::Value;
 use crate::database::Database;
 use crate::grafana::{INFLUXQL, Kind, VICTORIA, dashboards, panels};
 
-/// Of an ArduPilot vehicle without ESC_INFO there is nothing to show in these.
+/// Of an `ArduPilot` vehicle without `ESC_INFO` there is nothing to show in these.
 const OF_PX4: [&str; 3] = ["ESC Fails", "ESC currently failing", "Estimator, PX4"];
 
 /// From when to when is asked, seconds since 1970.
@@ -53,7 +53,7 @@ fn ask_all(kind: Kind, span: Span, ask: impl Fn(&Value, &dyn Fn(&str) -> String)
     asked
 }
 
-/// `InfluxDB` 1.x, which has the points of an ArduPilot flight of a moment ago, answers each query of its dashboards.
+/// `InfluxDB` 1.x, which has the points of an `ArduPilot` flight of a moment ago, answers each query of its dashboards.
 pub(crate) fn assert_answered_by_influx(database: &Database) {
     let asked = ask_all(INFLUXQL, lately(), |query, fill| {
         let series = database.ask(&fill(query["query"].as_str().unwrap()));
