@@ -200,20 +200,24 @@ fn mavproxy_lists_sets_downloads_and_signs() {
 
     // Unsigned nothing is told any longer; with the passphrase our own tool may.
     let address = format!("udpout:127.0.0.1:{}", board.port);
-    let unsigned = hums(["params", "get", "BAT_REM_WARN", "--system", "1", "--link", &address]).expect_code(&[1]);
+    let unsigned =
+        hums(["params", "get", "BAT_REM_WARN", "--system", "1", "--link", &address]).expect_code(&[1]);
     assert!(unsigned.stderr.contains("no answer"), "{}", unsigned.stderr);
     let key = folder.join("key.txt");
     fs::write(&key, "passphrase-of-this-flight\n").unwrap();
     let key = key.to_str().unwrap();
-    let got =
-        hums(["params", "get", "BAT_REM_WARN", "--key", key, "--system", "1", "--link", &address]).expect_code(&[0]).text();
+    let got = hums(["params", "get", "BAT_REM_WARN", "--key", key, "--system", "1", "--link", &address])
+        .expect_code(&[0])
+        .text();
     assert_eq!(got, "BAT_REM_WARN 34\n");
-    let gone = hums(["params", "sign", "--remove", "--key", key, "--system", "1", "--link", &address]).expect_code(&[0]);
+    let gone = hums(["params", "sign", "--remove", "--key", key, "--system", "1", "--link", &address])
+        .expect_code(&[0]);
     assert_eq!(gone.text(), "key removed\n");
     hums(["params", "get", "BAT_REM_WARN", "--system", "1", "--link", &address]).expect_code(&[0]);
     let set = hums(["params", "sign", "--key", key, "--system", "1", "--link", &address]).expect_code(&[0]);
     assert_eq!(set.text(), "key set\n");
-    hums(["params", "get", "BAT_REM_WARN", "--key", key, "--system", "1", "--link", &address]).expect_code(&[0]);
+    hums(["params", "get", "BAT_REM_WARN", "--key", key, "--system", "1", "--link", &address])
+        .expect_code(&[0]);
 }
 
 #[test]
@@ -390,11 +394,15 @@ fn the_command_line_lists_reads_and_sets_parameters_over_a_bad_link() {
     assert!(listed.stderr.contains("system 1: its board is heard"), "{}", listed.stderr);
     let list = listed.text();
     assert!(list.contains("GS_BUDGET 2000\n") && list.contains("BAT_REM_WARN 15\n"), "{list}");
-    let set = hums(["params", "set", "BAT_REM_WARN", "21.5", "--system", "1", "--link", &address]).expect_code(&[0]).text();
+    let set = hums(["params", "set", "BAT_REM_WARN", "21.5", "--system", "1", "--link", &address])
+        .expect_code(&[0])
+        .text();
     assert_eq!(set, "BAT_REM_WARN 21.5\n");
-    let got = hums(["params", "get", "BAT_REM_WARN", "--system", "1", "--link", &address]).expect_code(&[0]).text();
+    let got =
+        hums(["params", "get", "BAT_REM_WARN", "--system", "1", "--link", &address]).expect_code(&[0]).text();
     assert_eq!(got, "BAT_REM_WARN 21.5\n");
-    let refused = hums(["params", "set", "BAT_REM_WARN", "1000", "--system", "1", "--link", &address]).expect_code(&[1]);
+    let refused = hums(["params", "set", "BAT_REM_WARN", "1000", "--system", "1", "--link", &address])
+        .expect_code(&[1]);
     assert!(refused.stderr.contains("keeps 21.5"), "{}", refused.stderr);
 }
 
@@ -409,8 +417,9 @@ fn a_card_from_the_shop_is_formatted_by_command_and_one_with_logs_is_not() {
     fs::write(&image, &card).unwrap();
     let board = Board::start_in(dir, &[]);
     let address = format!("udpout:127.0.0.1:{}", board.port);
-    let format =
-        |flags: &[&str]| hums(["format", "--link", &address, "--system", "1"].into_iter().chain(flags.iter().copied()));
+    let format = |flags: &[&str]| {
+        hums(["format", "--link", &address, "--system", "1"].into_iter().chain(flags.iter().copied()))
+    };
     assert!(format(&[]).expect_code(&[2]).stderr.contains("will be lost"));
     assert_eq!(fs::read(&image).unwrap(), card, "nobody said --yes");
     let done = format(&["--yes"]).expect_code(&[0]).text();

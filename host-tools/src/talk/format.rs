@@ -3,11 +3,11 @@
 use std::time::{Duration, Instant};
 
 use anyhow::{Context as _, Result, bail};
-use hums_link::messages;
 use hums_link::packet::Fields;
+use hums_link::{Frame, messages};
 use serde::Serialize;
 
-use super::Client;
+use super::{Client, is_for_us};
 use crate::cli;
 use crate::mavlink::ids::{COMMAND_ACK, STATUSTEXT};
 use crate::outcome::{Outcome, usage};
@@ -17,8 +17,14 @@ use crate::output::{self, Schema};
 const FORMAT: u16 = 526;
 const ANSWER: Duration = Duration::from_millis(700);
 const TRIES: usize = 8;
-/// A card of 512 GB takes two minutes.
-const PATIENCE: Duration = Duration::from_mins(10);
+/// A card of 512 GB takes two minutes, one of 1 TB four.
+const LIMIT: Duration = Duration::from_mins(5);
+/// A board that says nothing for so long, no heartbeat either, is no longer there.
+const SILENCE: Duration = Duration::from_secs(15);
+
+/// `MAV_RESULT`
+const ACCEPTED: u8 = 0;
+const IN_PROGRESS: u8 = 5;
 
 /// What `hums format --json` prints.
 const SCHEMA: Schema = Schema::first("hums-format");
@@ -35,38 +41,137 @@ pub fn run(args: &cli::FormatCard) -> Result<Outcome> {
         return Err(usage("everything on the board's card will be lost; say --yes if that is meant"));
     }
     let mut client = Client::connect(&args.at)?;
+    let system = client.system();
+    format(&mut client, SILENCE, LIMIT).with_context(|| format!("system {system}"))?;
+    if args.json {
+        output::json(SCHEMA, &FormattedJson { system, formatted: true })?;
+    } else {
+        output::line(&format!("system {system}: formatted, and recorded on"))?;
+    }
+    Ok(Outcome::Done)
+}
+
+/// What a board says that is formatting.
+enum Said {
+    /// To our command: a `MAV_RESULT`.
+    Result(u8),
+    /// How its card is.
+    Card(String),
+}
+
+impl Said {
+    fn read(frame: &Frame<'_>) -> Option<Self> {
+        let fields = Fields(frame.payload());
+        match frame.id() {
+            COMMAND_ACK if fields.u16(0) == FORMAT && is_for_us(fields.u8(8), fields.u8(9)) => {
+                Some(Self::Result(fields.u8(2)))
+            }
+            STATUSTEXT => {
+                let state = fields.text(1, 50)?.strip_prefix("HUMS: card: ")?;
+                Some(Self::Card(state.to_owned()))
+            }
+            _ => None,
+        }
+    }
+}
+
+/// Has the card formatted, and waits until it is recorded on: `limit` at most, and `silence` without any word of the board's.
+fn format(client: &mut Client, silence: Duration, limit: Duration) -> Result<()> {
     let (system, component) = client.target();
     let packet = messages::command_long(FORMAT, &[1.0, 1.0], system, component);
-    let answer = client.ask(&packet, ANSWER, TRIES, |frame| {
-        let fields = Fields(frame.payload());
-        (frame.id() == COMMAND_ACK && fields.u16(0) == FORMAT).then(|| fields.u8(2))
+    let answer = client.ask(&packet, ANSWER, TRIES, |frame| match Said::read(frame) {
+        Some(Said::Result(result)) => Some(result),
+        _ => None,
     })?;
-    match answer.context("no answer; is its firmware as new as this program?")? {
-        0 => {}
-        1 => bail!("not now: the vehicle is armed"),
+    let mut result = answer.context("no answer; is its firmware as new as this program?")?;
+    check(result)?;
+    let minutes = LIMIT.as_secs() / 60;
+    output::aside(&format!(
+        "system {system}: the card is being formatted, which may take some minutes ({minutes} at most)"
+    ));
+    let end = Instant::now() + limit;
+    loop {
+        // Any frame of the board's says that it is there.
+        match client.until(end.min(Instant::now() + silence), |frame| Some(Said::read(frame)))? {
+            // What comes after it was accepted answers the command that was said again.
+            Some(Some(Said::Result(next))) if result == IN_PROGRESS => {
+                check(next)?;
+                result = next;
+            }
+            Some(Some(Said::Card(state))) if state == "recording" => return Ok(()),
+            Some(Some(Said::Card(state))) if !state.starts_with("is being") => {
+                bail!("it did not work, the board says of its card: {state}")
+            }
+            Some(_) => {}
+            None if Instant::now() < end => bail!(
+                "the board has said nothing for {} s, and not that it is done; is it switched off?",
+                silence.as_secs()
+            ),
+            None => bail!(
+                "the board has not said within {minutes} minutes that it is done; its word may be lost: say this command again, \
+                 which is refused where the card can be recorded on"
+            ),
+        }
+    }
+}
+
+/// Whether an answer to the command is no refusal.
+fn check(result: u8) -> Result<()> {
+    match result {
+        ACCEPTED | IN_PROGRESS => Ok(()),
+        1 => bail!("not now: the vehicle is armed, or too much was asked of the board at once"),
         2 => bail!(
             "the board refused: its card can be recorded on, or is full of other files, and is not formatted over \
              a link; or the command is not signed as GS_SIGN asks"
         ),
-        _ => bail!("there is no card that can be formatted"),
+        3 => bail!("the board does not know the command; is its firmware as new as this program?"),
+        4 => bail!("there is no card that can be formatted"),
+        _ => bail!("the board refused (MAV_RESULT {result})"),
     }
-    output::aside("the card is being formatted");
-    let end = Instant::now() + PATIENCE;
-    let told = client.until(end, |frame| {
-        let text = Fields(frame.payload()).text(1, 50).filter(|_| frame.id() == STATUSTEXT)?;
-        let state = text.strip_prefix("HUMS: card: ")?;
-        (!state.starts_with("is being")).then(|| state.to_owned())
-    })?;
-    match told.as_deref() {
-        Some("recording") => {
-            if args.json {
-                output::json(SCHEMA, &FormattedJson { system, formatted: true })?;
-            } else {
-                output::line(&format!("system {system}: formatted, and recorded on"))?;
-            }
-            Ok(Outcome::Done)
-        }
-        Some(state) => bail!("it did not work, the board says of its card: {state}"),
-        None => bail!("the board does not say that it is done"),
+}
+
+#[cfg(test)]
+mod tests {
+    use hums_link::messages::{command_ack, status_text};
+    use hums_link::text::Severity;
+
+    use super::*;
+    use crate::talk::fake::{self, found};
+
+    /// How it ends where the board answers the command so.
+    fn end(silence_ms: u64, limit_ms: u64, said: fn() -> fake::Said) -> Result<()> {
+        let mut client = found(&[1], move |_| said());
+        format(&mut client, Duration::from_millis(silence_ms), Duration::from_millis(limit_ms))
+    }
+
+    fn ack(result: u8, station: u8) -> (u8, hums_link::packet::Packet) {
+        (1, command_ack(FORMAT, result, station, 190))
+    }
+
+    fn recording(system: u8) -> (u8, hums_link::packet::Packet) {
+        (system, status_text(Severity::Info, "HUMS: card: recording"))
+    }
+
+    #[test]
+    fn an_answer_to_another_station_is_none_to_us() {
+        let refused = end(5_000, 5_000, || vec![ack(0, 77), ack(2, 255), recording(1)]);
+        assert!(refused.expect_err("it was refused").to_string().contains("the board refused"));
+    }
+
+    #[test]
+    fn what_is_in_progress_has_not_failed_and_may_fail_yet() {
+        end(5_000, 5_000, || vec![ack(5, 255), ack(5, 255), ack(0, 255), recording(1)]).expect("done");
+        let failed = end(5_000, 5_000, || vec![ack(5, 255), ack(4, 255), recording(1)]);
+        assert!(failed.expect_err("it failed").to_string().contains("no card that can be formatted"));
+        // The command was said twice, and the second answer is of a card that is being formatted.
+        end(5_000, 5_000, || vec![ack(0, 255), ack(2, 255), recording(1)]).expect("done");
+    }
+
+    #[test]
+    fn a_board_that_never_says_how_its_card_is_is_not_waited_for_without_end() {
+        let never = end(5_000, 50, || vec![ack(0, 255), recording(2)]);
+        assert!(never.expect_err("no word").to_string().contains("has not said within"));
+        let silent = end(50, 5_000, || vec![ack(0, 255)]);
+        assert!(silent.expect_err("no word").to_string().contains("is it switched off?"));
     }
 }
