@@ -392,7 +392,7 @@ fn there_are_as_many_of_each_check_as_there_may_be_of_what_it_watches() {
     for check in checks() {
         let instances = match check.name {
             name if name.starts_with("batt_") || name.starts_with("cell_") => 4,
-            "motor_output" => 6,
+            "motor_output" => 8,
             "gps_stuck" => 2,
             "gps_height" => 1,
             name if name.ends_with("_mismatch") || name.ends_with("_stuck") => 3,
