@@ -81,9 +81,9 @@ pub enum ParamsAction {
         /// The name
         #[arg(value_name = "NAME")]
         name: String,
-        /// The value
+        /// The value; of single precision, so that it may be rounded, which is said
         #[arg(value_name = "VALUE", allow_negative_numbers = true)]
-        value: f32,
+        value: f64,
         /// Where the board is.
         #[command(flatten)]
         at: Link,

@@ -16,6 +16,7 @@ use crate::mavlink::ids::{
 };
 use crate::outcome::{Outcome, usage};
 use crate::output::{self, Schema};
+use crate::printable;
 use crate::talk;
 
 /// A silence of this long in a list means that what is missing was lost.
@@ -38,7 +39,11 @@ pub fn run(args: &cli::Params) -> Result<Outcome> {
     match &args.action {
         ParamsAction::List { at, json } => {
             let mut client = Client::connect(at)?;
-            show(client.system(), list(&mut client)?, *json)?;
+            let system = client.system();
+            let (values, wrong) = list(&mut client)?;
+            show(system, values, *json)?;
+            wrong.iter().for_each(|wrong| note!("system {system}: {wrong}"));
+            return Ok(Outcome::lossy(!wrong.is_empty()));
         }
         ParamsAction::Get { names, at, json } => {
             let mut client = Client::connect(at)?;
@@ -60,10 +65,15 @@ pub fn run(args: &cli::Params) -> Result<Outcome> {
             }
         }
         ParamsAction::Set { name, value, at, json } => {
+            let (single, is_rounded) = single(*value).with_context(|| name.clone())?;
+            if is_rounded {
+                note!("{name}: {value} is rounded to {single}: a parameter has single precision");
+            }
+            let value = single;
             let mut client = Client::connect(at)?;
             let (system, component) = client.target();
             let packet = Packet::new(PARAM_SET)
-                .f32(0, *value)
+                .f32(0, value)
                 .u8(4, system)
                 .u8(5, component)
                 .text(6, 16, name)
@@ -95,12 +105,35 @@ struct KeyJson {
 /// Prints parameters, as lines that `hums sim --params` reads back, or as one object.
 fn show(system: u8, values: impl IntoIterator<Item = Param>, json: bool) -> Result<()> {
     if json {
-        let values = values.into_iter().map(|value| (value.name, f64::from(value.value).into()));
+        let values = values.into_iter().map(|value| (shown(&value.name), f64::from(value.value).into()));
         let object: serde_json::Map<_, _> =
             std::iter::once(("system".to_owned(), system.into())).chain(values).collect();
         return output::json(VALUES, &object);
     }
-    values.into_iter().try_for_each(|value| output::line(&format!("{} {}", value.name, value.value)))
+    values.into_iter().try_for_each(|value| output::line(&format!("{} {}", shown(&value.name), value.value)))
+}
+
+const fn is_of_names(c: char) -> bool {
+    c.is_ascii_uppercase() || c.is_ascii_digit() || c == '_'
+}
+
+/// A name as it can stand in a line of NAME VALUE, and among the members of the JSON that are ours: what no parameter's name has in it is
+/// shown by its number.
+fn shown(name: &str) -> String {
+    if name.is_empty() {
+        return '\0'.escape_unicode().to_string();
+    }
+    printable::rewritten(name, |c| !is_of_names(c), |out, c| out.extend(c.escape_unicode())).into_owned()
+}
+
+/// A number as a parameter can have it, and whether it is another one then: as it is printed, which tells no difference
+/// that single precision does not.
+fn single(wanted: f64) -> Result<(f32, bool)> {
+    let value = wanted as f32;
+    if wanted.is_finite() && value.is_infinite() {
+        return Err(usage(format!("{wanted} is more than a parameter can have: {} at most", f32::MAX)));
+    }
+    Ok((value, wanted.is_finite() && value.to_string().parse() != Ok(wanted)))
 }
 
 /// Brings the board the key, or takes it away; gives its system. The board answers with a text.
@@ -134,10 +167,16 @@ fn no_answer(system: u8, name: &str) -> String {
     format!("system {system}: {name}: no answer; is there such a parameter?")
 }
 
+/// What ends at a zero, or has 16 bytes.
+fn name_of(bytes: [u8; 16]) -> String {
+    let name = bytes.split(|byte| *byte == 0).next().unwrap_or_default();
+    String::from_utf8_lossy(name).into_owned()
+}
+
 fn value_of(frame: &Frame<'_>) -> Option<Param> {
     let fields = Fields(frame.payload());
     (frame.id() == PARAM_VALUE).then(|| Param {
-        name: fields.text(8, 16).unwrap_or_default().to_owned(),
+        name: name_of(fields.bytes(8)),
         value: fields.f32(0),
         index: fields.u16(6),
         count: fields.u16(4),
@@ -153,23 +192,37 @@ fn read(client: &mut Client, name: &str) -> Result<Param> {
     answer.with_context(|| no_answer(system, name))
 }
 
-/// The whole list; what was lost on the way is asked for one by one.
-fn list(client: &mut Client) -> Result<Vec<Param>> {
+/// The whole list, and what is wrong with it. What was lost on the way is asked for one by one.
+fn list(client: &mut Client) -> Result<(Vec<Param>, Vec<String>)> {
     let (system, component) = client.target();
     let request = Packet::new(PARAM_REQUEST_LIST).u8(0, system).u8(1, component);
-    let mut values: BTreeMap<u16, Param> = BTreeMap::new();
     let first = client
         .ask(&request, GAP, TRIES, value_of)?
         .with_context(|| format!("system {system}: no list of parameters comes"))?;
-    let count = first.count.min(COUNT_MAX);
-    values.insert(first.index, first);
-    while values.len() < usize::from(count) {
-        match client.until(Instant::now() + GAP, value_of)? {
-            Some(value) => {
-                values.insert(value.index, value);
-            }
-            None => break,
+    let said = first.count;
+    let count = said.min(COUNT_MAX);
+    let mut wrong = Vec::new();
+    if said != count {
+        wrong.push(format!("the board says that it has {said} parameters; {count} of them are here"));
+    }
+    if count == 0 {
+        wrong.push(format!("the board says that it has no parameters, and sends {}", shown(&first.name)));
+        return Ok((vec![first], wrong));
+    }
+    let mut values: BTreeMap<u16, Param> = BTreeMap::new();
+    let mut next = Some(first);
+    while let Some(value) = next {
+        if value.count != said && wrong.is_empty() {
+            wrong.push(format!("the board says that it has {said} parameters, and {}", value.count));
         }
+        // One without a place in the list answers somebody who asked for it by its name.
+        if value.index < count {
+            values.insert(value.index, value);
+        }
+        if values.len() == usize::from(count) {
+            break;
+        }
+        next = client.until(Instant::now() + GAP, value_of)?;
     }
     for index in 0..count {
         if values.contains_key(&index) {
@@ -183,7 +236,23 @@ fn list(client: &mut Client) -> Result<Vec<Param>> {
             value.with_context(|| format!("system {system}: parameter {index} of {count}: no answer"))?,
         );
     }
-    Ok(values.into_values().collect())
+    wrong.extend(strange_names(&values));
+    Ok((values.into_values().collect(), wrong))
+}
+
+/// Names that are none, and those that two parameters have.
+fn strange_names(values: &BTreeMap<u16, Param>) -> Vec<String> {
+    let mut wrong = Vec::new();
+    let mut places: BTreeMap<&str, u16> = BTreeMap::new();
+    for (index, Param { name, .. }) in values {
+        if name.is_empty() || !name.chars().all(is_of_names) {
+            wrong.push(format!("parameter {index} has a name that is none: {}", shown(name)));
+        }
+        if let Some(before) = places.insert(name, *index) {
+            wrong.push(format!("parameters {before} and {index} have one name: {}", shown(name)));
+        }
+    }
+    wrong
 }
 
 #[cfg(test)]
@@ -205,7 +274,49 @@ mod tests {
         });
         assert_eq!(read(&mut client, "GS_BUDGET").expect("an answer").value, 2000.0);
         let values: Vec<f32> =
-            list(&mut client).expect("a list").into_iter().map(|param| param.value).collect();
+            list(&mut client).expect("a list").0.into_iter().map(|param| param.value).collect();
         assert_eq!(values, [2000.0]);
+    }
+
+    #[test]
+    fn a_list_that_cannot_be_is_told_and_no_name_makes_a_line_of_its_own() {
+        let listed = |said: fn() -> fake::Said| {
+            let mut client = fake::found(&[1], move |_| said());
+            let (values, wrong) = list(&mut client).expect("a list");
+            (values.iter().map(|value| shown(&value.name)).collect::<Vec<_>>(), wrong)
+        };
+        let (names, wrong) =
+            listed(|| vec![(1, param_value("A_1", 1.0, 0, 2)), (1, param_value("B", 1.0, 1, 2))]);
+        assert_eq!((names, wrong), (vec!["A_1".to_owned(), "B".to_owned()], Vec::new()));
+        let (names, wrong) =
+            listed(|| vec![(1, param_value("A", 1.0, 0, 2)), (1, param_value("A", 2.0, 1, 2))]);
+        assert_eq!((names.len(), &wrong[..]), (2, &["parameters 0 and 1 have one name: A".to_owned()][..]));
+        let (names, wrong) = listed(|| vec![(1, param_value("A", 1.0, 0, 0))]);
+        assert!(names == ["A"] && wrong[0].contains("has no parameters"), "{wrong:?}");
+        let (_, wrong) = listed(|| vec![(1, param_value("A", 1.0, 0, 2)), (1, param_value("B", 1.0, 1, 3))]);
+        assert!(wrong[0].contains("has 2 parameters, and 3"), "{wrong:?}");
+        let (names, wrong) = listed(|| {
+            let names = ["A\nB 5", "#x", "system", "", "A B"];
+            (0..).zip(names).map(|(index, name)| (1, param_value(name, 1.0, index, 5))).collect()
+        });
+        assert!(names.iter().all(|name| !name.contains(['\n', ' ', '#']) && !name.is_empty()), "{names:?}");
+        assert!(wrong.len() == 5 && !names.contains(&"system".to_owned()), "{wrong:?}");
+    }
+
+    #[test]
+    fn a_number_that_a_parameter_cannot_have_is_told() {
+        for (wanted, kept, is_rounded) in [
+            (16_777_217.0, 16_777_216.0, true),
+            (16_777_216.0, 16_777_216.0, false),
+            (21.3, 21.3, false),
+            (-0.1, -0.1, false),
+            (0.123_456_789_1, 0.123_456_79, true),
+            (1e-60, 0.0, true),
+        ] {
+            let (value, told) = single(wanted).expect("a number");
+            assert_eq!((value.to_bits(), told), (f32::to_bits(kept), is_rounded), "{wanted}");
+        }
+        assert!(single(1e39).expect_err("too much").is::<crate::outcome::Usage>());
+        assert!(!single(f64::NAN).expect("for the board to refuse").1);
     }
 }
