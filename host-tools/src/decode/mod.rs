@@ -59,7 +59,6 @@ use crate::ending::Ending;
 use crate::files::{Folder, Inputs, appended, check_parent, means_standard_output, says_directory};
 use crate::followed::{Followed, Logged};
 use crate::logs::reader;
-use crate::logs::sessions::{Sessions, copy_words};
 use crate::logs::side_by_side::side_by_side;
 use crate::outcome::{Kept, Outcome, differs, usage as usage_error};
 use crate::output::{self, Schema};
@@ -69,7 +68,7 @@ use crate::source::epochs::Epochs;
 use crate::source::find::{find, sessions_of};
 use crate::source::item::{Rows, Summary, Want};
 use crate::source::recording::{Format, Place};
-use crate::summary::damaged_places;
+use crate::summary::{Overview, damaged_places};
 use checked::Checked;
 use collect::Collected;
 use context::{Context, Formats};
@@ -115,8 +114,8 @@ pub fn run(args: &cli::Decode) -> Result<Outcome> {
     let native = check_forms(&works, formats)?;
     let selection = Selection::new(args, native)?;
     let logs = works.len();
-    let mut followed = Followed::new(sessions.clone());
-    let task = Task { formats, selection, inputs, output: &args.output, standard_output, logs, sessions };
+    let mut followed = Followed::new(sessions);
+    let task = Task { formats, selection, inputs, output: &args.output, standard_output, logs };
     let taken = Mutex::new(BTreeSet::new());
     let mut written = works.is_empty();
     let (mut kept, mut any_kept) = (Kept::default(), false);
@@ -191,7 +190,6 @@ struct Task<'a> {
     output: &'a Path,
     standard_output: bool,
     logs: usize,
-    sessions: Sessions,
 }
 
 /// A log's outcome, to be told in the logs' order.
@@ -268,7 +266,7 @@ impl Task<'_> {
         let (name, nth) = match &work.named {
             Named::As(name, nth) => (name, *nth),
             Named::Copy(of) => {
-                return Ok(self.copy(log, all.get(*of).map_or("another log", |work| &work.log.name)));
+                return copy(log, all.get(*of).map_or("another log", |work| &work.log.name));
             }
         };
         let mut remarks = Vec::new();
@@ -321,14 +319,6 @@ impl Task<'_> {
         outcome = outcome.and(Outcome::lossy(written.rows_left_out > 0));
         let made = if self.standard_output { Vec::new() } else { written.made };
         Ok(Done { outcome, ending, written: true, made, remarks, ..Done::of(log) })
-    }
-
-    /// A log that is a copy of another one. Under two numbers of one card one of them has lost its own session.
-    fn copy(&self, log: &Place, of: &str) -> Done {
-        let mut remarks = vec![format!("{}: is a copy of {of}, which is written once", log.name)];
-        let number = log.own().and_then(|own| self.sessions.copy_of_log(&log.name, own));
-        remarks.extend(number.map(|number| format!("{}: it {}", log.name, copy_words(number))));
-        Done { written: true, outcome: Outcome::lossy(number.is_some()), remarks, ..Done::of(log) }
     }
 
     /// What must be known of a log before its first byte is written.
@@ -409,6 +399,14 @@ impl Task<'_> {
         })?;
         Ok((summary, writers, Checked::new(judge.end())))
     }
+}
+
+/// A log that is a copy of another one: nothing is written of it, and it is read for what there is to say of it.
+fn copy(log: &Place, of: &str) -> Result<Done> {
+    let remarks = vec![format!("{}: is a copy of {of}, which is written once", log.name)];
+    let ending = log.own().map(Overview::verified).transpose()?.map(|overview| overview.ending);
+    let ending = ending.map(|ending| Ending { name: log.name.clone(), ..ending });
+    Ok(Done { written: true, ending, remarks, ..Done::of(log) })
 }
 
 /// Says that nothing that was asked for is in a log, and what time it has.

@@ -116,11 +116,6 @@ impl Sessions {
         same.map(|(other, _)| *other).min()
     }
 
-    /// The same where the log was not read.
-    pub fn copy_of_log(&self, name: &str, log: &Log) -> Option<u32> {
-        self.copy_of(name, first_session(log)?)
-    }
-
     fn of_session(&self, card: &str, session: u32) -> &[(u32, u32)] {
         self.logs.get(&(card.to_owned(), session)).map_or(&[], Vec::as_slice)
     }

@@ -987,3 +987,13 @@ fn two_copies_of_one_session_have_two_pages_and_the_damaged_one_is_not_kept_alon
         assert!(pages.len() == 2 && pages[0].ends_with("-2.html"), "{pages:?}");
     }
 }
+
+#[test]
+fn what_is_wrong_with_a_copy_is_told_by_every_command() {
+    let dir = copied(1, "");
+    let at = |name: &str| dir.path().join("copied").join(name);
+    let mut damaged = fs::read(at("00001_00.HUM")).expect("there");
+    damaged[20 * BLOCK..21 * BLOCK].fill(0);
+    fs::write(at("Copy of 00001_00.HUM"), damaged).expect("written");
+    all_say(dir.path(), "copied", 3, &["1 sector had to be made again from parity"]);
+}
