@@ -9,8 +9,8 @@ use serde::Serialize;
 use crate::cli;
 use crate::colour::level;
 use crate::ending::{
-    BlocksJson, EndJson, PowerOn, SessionBefore, among_words, behind_words, copies_words, made_again_words,
-    unprotected_words,
+    BlocksJson, EndJson, Ending, PowerOn, SessionBefore, among_words, behind_words, copies_words,
+    made_again_words, unprotected_words,
 };
 use crate::followed::Followed;
 use crate::info::json::images_json;
@@ -270,7 +270,7 @@ impl LogJson {
         let copy_of = ending.again.clone();
         let is_told_only = ending.aside().is_some();
         if is_told_only {
-            checks.clear();
+            checks = beside_copy(ending);
         } else if let Some(anew) = ending.begun_anew {
             checks = vec![check("files", ending.files.len() as u64, 1, anew.words())];
         }
@@ -289,6 +289,14 @@ impl LogJson {
         let (left_over, begun_anew) = (ending.left_over, ending.begun_anew.map(|anew| anew.of.unwrap_or(0)));
         Self { name, ok, closed, copy_of, left_over, end, begun_anew, blocks, checks, verdict }
     }
+}
+
+/// What a mere copy holds that is not of the session which it copies.
+fn beside_copy(ending: &Ending) -> Vec<Check> {
+    let (besides, files) = (ending.besides_copy(), ending.files.len() as u64);
+    let check =
+        Check { name: "files", checked: files, failed: besides.len() as u64, detail: besides.join("; ") };
+    Some(check).filter(|check| check.failed > 0).into_iter().collect()
 }
 
 /// What its card has lost of it without a loss of frames.

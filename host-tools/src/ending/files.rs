@@ -89,6 +89,13 @@ impl Files<'_> {
         all
     }
 
+    /// What other logs its files hold, which are not read.
+    pub(super) fn others(&self) -> Vec<String> {
+        let is_other = |strange: &&Strange| strange.others.is_some() && !self.is_usual(strange);
+        let strange = self.summary.strange.iter().filter(is_other).map(|strange| self.strange_words(strange));
+        strange.chain(self.joined()).chain(self.newer()).collect()
+    }
+
     /// A file that the next start found empty was made when the power went; so was one that was to be written anew, which
     /// still holds what it held before.
     fn is_usual(&self, strange: &Strange) -> bool {

@@ -106,12 +106,12 @@ impl Ending {
     }
 
     /// Why it is not proved to be whole, as parts of sentences: what is lost, what is not proved, what of its files is not the
-    /// log's. What is missing in a mere copy is said of its original.
+    /// log's. What is missing in a mere copy is said of its original, and what it holds besides is said of it.
     pub fn unproved(&self) -> Vec<String> {
-        let mut all = Vec::new();
         if self.aside().is_some() {
-            return all;
+            return self.besides_copy();
         }
+        let mut all = Vec::new();
         if let Some(anew) = self.begun_anew {
             return vec![anew.words()];
         }
@@ -158,6 +158,11 @@ impl Ending {
         all.extend(self.before.gone());
         all.extend(self.power_on.wrong());
         all
+    }
+
+    /// What a mere copy holds that is not of the session which it copies: another log, which is not read.
+    pub fn besides_copy(&self) -> Vec<String> {
+        if self.again.is_some() { self.file().others() } else { Vec::new() }
     }
 
     /// The next start found sectors of this session in the log's last file. Whether that has none of the log's own, because it

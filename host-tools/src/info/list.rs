@@ -121,7 +121,8 @@ fn line(log: &Overview, width: usize) -> String {
     if let Some(aside) = log.ending.aside() {
         // Writing to a `String` cannot fail.
         let _ = write!(text, "; {}", word(&aside));
-    } else if !log.is_sound() {
+    }
+    if !log.is_sound() {
         let _ = write!(text, "; {} (hums verify says why)", warning("not proved to be whole"));
     }
     text

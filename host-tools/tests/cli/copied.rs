@@ -988,6 +988,25 @@ fn two_copies_of_one_session_have_two_pages_and_the_damaged_one_is_not_kept_alon
     }
 }
 
+/// A copy of a log with another log behind it: only the copied one is read, and it counts once. The other one is in no output.
+#[test]
+fn another_log_behind_a_copy_is_told_by_every_command() {
+    let dir = copied(2, "");
+    let at = |name: &str| dir.path().join("copied").join(name);
+    let [one, other] = ["00001_00.HUM", "00002_00.HUM"].map(|name| fs::read(at(name)).expect("there"));
+    fs::write(at("all.hum"), [&one[..], &other].concat()).expect("written");
+    fs::remove_file(at("00002_00.HUM")).expect("removed");
+    let session = u32::from_le_bytes(other[7..11].try_into().expect("four"));
+    let words = format!("of another session (session {session:08x})");
+    all_say(dir.path(), "copied", 3, &[&words, "give each by itself", "00001 once more (not counted)"]);
+    let said = text(&run(dir.path(), "verify copied", 3));
+    assert!(said.contains("FAILED  files ") && said.contains("1 session: damage"), "{said}");
+    assert!(text(&run(dir.path(), "ls copied", 3)).contains("not proved to be whole"));
+    // A copy alone is no finding.
+    fs::write(at("all.hum"), &one).expect("written");
+    all_say(dir.path(), "copied", 0, &["00001 once more (not counted)"]);
+}
+
 #[test]
 fn what_is_wrong_with_a_copy_is_told_by_every_command() {
     let dir = copied(1, "");
