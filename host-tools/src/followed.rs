@@ -100,6 +100,11 @@ impl<T: Logged> Followed<T> {
         if let Some(of) = self.sessions.copy_of(&ending.name, session) {
             return Some(Misnamed::Copy { of });
         }
+        let board = ending.summary.marks.board;
+        let named = |file: &String| Misnamed::of_name(file, session, board);
+        if let Some(misnamed) = ending.files.iter().find_map(named) {
+            return Some(misnamed);
+        }
         let (card, number) = place(&ending.name);
         let number = number?;
         if ending.summary.marks.packed && self.sessions.has_other(card, 0, u32::MAX, session) {

@@ -160,9 +160,16 @@ impl Ending {
         all
     }
 
-    /// What a mere copy holds that is not of the session which it copies: another log, which is not read.
+    /// What a mere copy holds that is not of the session which it copies: another log, which is not read; and that its name is
+    /// another session's or another box's.
     pub fn besides_copy(&self) -> Vec<String> {
-        if self.again.is_some() { self.file().others() } else { Vec::new() }
+        if self.again.is_none() {
+            return Vec::new();
+        }
+        let is_of_name =
+            |misnamed: &Misnamed| matches!(misnamed, Misnamed::Session { .. } | Misnamed::Board { .. });
+        let named = self.misnamed.filter(is_of_name).map(Misnamed::words);
+        self.file().others().into_iter().chain(named).collect()
     }
 
     /// The next start found sectors of this session in the log's last file. Whether that has none of the log's own, because it

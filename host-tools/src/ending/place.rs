@@ -1,5 +1,10 @@
 //! A log's place among the logs of its card: what its boot record and its sectors' numbers say against its name.
 
+use std::path::Path;
+
+use crate::hex::hex;
+use crate::logs::board::Board;
+use crate::logs::naming::segment_name;
 use crate::logs::sessions::copy_words;
 use crate::plural::count;
 
@@ -25,9 +30,33 @@ pub enum Misnamed {
         /// The number.
         before: u32,
     },
+    /// A file's name tells another session than its sectors.
+    Session {
+        /// As the name tells.
+        named: u32,
+        /// As the sectors tell.
+        own: u32,
+    },
+    /// A file's name tells another box than the log's boot record.
+    Board {
+        /// As the name tells.
+        named: Board,
+        /// As the record tells.
+        own: Board,
+    },
 }
 
 impl Misnamed {
+    /// What a file's name tells, of a log that a box with this id recorded, that is not so.
+    pub fn of_name(file: &str, session: u32, board: Option<Board>) -> Option<Self> {
+        let name = segment_name(Path::new(file))?;
+        if let Some(named) = name.named_session().filter(|named| *named != session) {
+            return Some(Self::Session { named, own: session });
+        }
+        let (named, own) = name.named_board().zip(board)?;
+        (named != own).then_some(Self::Board { named, own })
+    }
+
     /// What disagrees, as a part of a sentence.
     pub fn words(self) -> String {
         match self {
@@ -44,6 +73,14 @@ impl Misnamed {
             }
             Self::Ahead { before } => format!(
                 "it was recorded just after session {before:05}, so its number is not its own: files were renamed"
+            ),
+            Self::Session { named, own } => format!(
+                "its name tells session {named:08x}, and its sectors are of session {own:08x}: files were renamed or exchanged"
+            ),
+            Self::Board { named, own } => format!(
+                "its name tells box {}, and box {} recorded it: files were renamed or exchanged",
+                hex(&named),
+                hex(&own)
             ),
         }
     }
@@ -154,5 +191,25 @@ impl PowerOn {
             Self::NotRead => "the logs before it are not among what was read",
             _ => "",
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_name_is_held_against_the_session_and_the_box_where_both_are_known() {
+        let (session, board) = (0x1a2b_3c4d, [0x3f; 12]);
+        let misnamed = |file: &str, board| Misnamed::of_name(file, session, board);
+        let box_named = "00001-box3f3f3f3f3f3f3f3f3f3f3f3f-s1a2b3c4d_00.HUM";
+        assert_eq!(misnamed(box_named, Some(board)), None);
+        assert_eq!(misnamed(box_named, None), None, "nothing tells which box it was");
+        assert_eq!(misnamed("00001_00.HUM", Some(board)), None);
+        let other = Misnamed::Board { named: board, own: [7; 12] };
+        assert_eq!(misnamed(box_named, Some([7; 12])), Some(other));
+        assert!(other.words().starts_with("its name tells box 3f3f3f3f3f3f3f3f3f3f3f3f, and box 0707"));
+        let other = Misnamed::Session { named: 7, own: session };
+        assert_eq!(misnamed("00001-s00000007_00.HUM", Some(board)), Some(other));
     }
 }

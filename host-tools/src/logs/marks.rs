@@ -5,6 +5,7 @@ use hums_blackbox::Record;
 use hums_blackbox::record::{Before, Found, Resting};
 use hums_core::time::Instant;
 
+use super::board::Board;
 use crate::loss::lost;
 
 /// Numbers of the events that say that the vehicle moves.
@@ -33,6 +34,8 @@ pub struct Marks {
     pub packed: bool,
     /// A box recorded it: it says how it started.
     pub has_boot: bool,
+    /// Which box, as its first boot record tells; none where there is no board.
+    pub board: Option<Board>,
 }
 
 impl Marks {
@@ -51,6 +54,7 @@ impl Marks {
             Record::Note(note) => self.packed |= note.text == PACKED,
             Record::Boot(boot) => {
                 self.has_boot = true;
+                self.board = self.board.or(Some(boot.uid).filter(|uid| *uid != [0; 12]));
                 self.before =
                     Some(boot.before).filter(|before| before.found != Found::Unknown).or(self.before);
             }
@@ -64,6 +68,7 @@ impl Marks {
         self.wrong += next.wrong;
         self.lost = self.lost.saturating_add(next.lost);
         self.has_boot |= next.has_boot;
+        self.board = self.board.or(next.board);
         self.packed |= next.packed;
         self.before = next.before.or(self.before);
         if next.last.is_some() {

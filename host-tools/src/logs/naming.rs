@@ -60,6 +60,20 @@ impl SegmentName {
         self.of.rsplit_once('-').map_or("", |(recorder, _)| recorder)
     }
 
+    /// The session that the name tells.
+    pub fn named_session(&self) -> Option<u32> {
+        let digits = self.of.rsplit('-').next()?.strip_prefix('s')?;
+        u32::from_str_radix(digits, 16).ok()
+    }
+
+    /// The unique id of the board that the name tells.
+    pub fn named_board(&self) -> Option<Board> {
+        let digits = self.recorder().strip_prefix("box")?;
+        let byte = |at| u8::from_str_radix(digits.get(at..at + 2)?, 16).ok();
+        let bytes: Option<Vec<u8>> = (0..digits.len()).step_by(2).map(byte).collect();
+        bytes?.try_into().ok()
+    }
+
     /// The log's name for people: `00042`, behind that of its box where the name tells it.
     pub fn log(&self) -> String {
         match self.recorder() {
@@ -151,6 +165,19 @@ mod tests {
         ] {
             assert_eq!(identity_at_end(stem), expected, "{stem}");
         }
+    }
+
+    #[test]
+    fn a_name_tells_the_session_and_the_box_as_they_were_put_into_it() {
+        let told = |name: &str| {
+            let name = segment_name(Path::new(name)).expect("a segment");
+            (name.named_session(), name.named_board())
+        };
+        let whole = session_name("00042", Some(&[0x3f; 12]), Some(0x1a2b_3c4d));
+        assert_eq!(told(&format!("{whole}_00.HUM")), (Some(0x1a2b_3c4d), Some([0x3f; 12])));
+        assert_eq!(told("00042-s1A2B3C4D_00.HUM"), (Some(0x1a2b_3c4d), None));
+        assert_eq!(told("00042-box3f-s1a2b3c4d_00.HUM"), (Some(0x1a2b_3c4d), None), "no whole id");
+        assert_eq!(told("00042_00.HUM"), (None, None));
     }
 
     #[test]

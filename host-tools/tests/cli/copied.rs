@@ -1016,3 +1016,21 @@ fn what_is_wrong_with_a_copy_is_told_by_every_command() {
     fs::write(at("Copy of 00001_00.HUM"), damaged).expect("written");
     all_say(dir.path(), "copied", 3, &["1 sector had to be made again from parity"]);
 }
+
+#[test]
+fn a_name_that_tells_another_session_than_its_sectors_is_told_by_every_command() {
+    let dir = copied(1, "");
+    let at = |name: &str| dir.path().join("copied").join(name);
+    let log = fs::read(at("00001_00.HUM")).expect("there");
+    let session = u32::from_le_bytes(log[7..11].try_into().expect("four"));
+    let (right, wrong) = (format!("00001-s{session:08x}_00.HUM"), "00001-sdeadbeef_00.HUM");
+    fs::rename(at("00001_00.HUM"), at(&right)).expect("renamed");
+    all_say(dir.path(), "copied", 0, &[]);
+    fs::rename(at(&right), at(wrong)).expect("renamed");
+    let words = format!("its name tells session deadbeef, and its sectors are of session {session:08x}");
+    all_say(dir.path(), "copied", 3, &[&words]);
+    assert!(text(&run(dir.path(), "ls copied", 3)).contains("not proved to be whole"));
+    // Of a copy, too.
+    fs::write(at("00001_00.HUM"), &log).expect("written");
+    all_say(dir.path(), "copied", 3, &[&words]);
+}
