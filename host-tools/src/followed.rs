@@ -62,15 +62,18 @@ impl<T: Logged> Followed<T> {
         if let Some(ending) = next.ending() {
             has_sectors = ending.summary.session.is_some();
             ending.again = self.sessions.again(&ending.name).map(str::to_owned);
+            ending.beginning = self.sessions.beginning(&ending.name).cloned();
             ending.begun_anew = self.sessions.begun_anew(&ending.name);
             // That what a file held before has not its number is told there.
             let is_told = |misnamed: &Misnamed| {
                 ending.begun_anew.is_none() || matches!(misnamed, Misnamed::Copy { .. })
             };
             ending.misnamed = self.misnamed(ending).filter(is_told);
+            // What was cut off is at its end.
+            let is_own = ending.is_counted() || ending.beginning.is_some() && ending.copy_of().is_none();
+            let has_place = is_own && ending.begun_anew.is_none();
             if let Some(before) = ending.summary.marks.before
-                && ending.is_counted()
-                && ending.begun_anew.is_none()
+                && has_place
             {
                 if before.has_end() {
                     self.tell(&before, ending);
@@ -78,7 +81,7 @@ impl<T: Logged> Followed<T> {
                     self.tell_empty(before.number, &ending.name);
                 }
             }
-            if ending.is_counted() && ending.begun_anew.is_none() {
+            if has_place {
                 self.follow(ending);
             }
         }

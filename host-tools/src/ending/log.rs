@@ -6,7 +6,7 @@ use super::proof::Proof;
 use crate::logs::Log;
 use crate::logs::begun_anew::BegunAnew;
 use crate::logs::reader::Summary;
-use crate::logs::sessions::again_words;
+use crate::logs::sessions::{Beginning, again_words};
 use crate::logs::strangers::Strange;
 use crate::plural::{are, count, noun};
 
@@ -31,6 +31,8 @@ pub struct Ending {
     pub begun_anew: Option<BegunAnew>,
     /// The name of the log of which it is a mere copy.
     pub again: Option<String>,
+    /// All of it is in another log, which goes on.
+    pub beginning: Option<Beginning>,
     /// It is what newer sessions left of one that no file holds any more.
     pub left_over: bool,
 }
@@ -72,7 +74,7 @@ impl Ending {
 
     /// Whether it is to be counted: its session is not there under another name.
     pub const fn is_counted(&self) -> bool {
-        self.copy_of().is_none() && self.again.is_none()
+        self.copy_of().is_none() && self.again.is_none() && self.beginning.is_none()
     }
 
     /// Whether logs that were recorded before it on its card are not among what was read.
@@ -204,6 +206,7 @@ impl Ending {
     pub fn strange(&self) -> Vec<String> {
         let mut all = self.file().strange();
         all.extend(self.misnamed.map(Misnamed::words));
+        all.extend(self.beginning.as_ref().map(Beginning::words));
         all
     }
 

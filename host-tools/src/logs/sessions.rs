@@ -6,11 +6,29 @@ use std::collections::{BTreeMap, BTreeSet};
 use hums_blackbox::Header;
 
 use super::begun_anew::{self, BegunAnew, Known};
-use super::fingerprint::{Fingerprint, fingerprint};
+use super::fingerprint::{Fingerprint, fingerprint, longer_by};
 use super::places::{Log, Piece};
+use crate::plural::count;
 
 /// Blocks that are searched for a log's first sector: what is read at once.
 const LOOK_BLOCKS: usize = 128;
+
+/// Of a log that is all there in another one, which goes on.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Beginning {
+    /// The name of that one.
+    of: String,
+    /// How many sectors that one has more.
+    sectors: u32,
+}
+
+impl Beginning {
+    /// What is said of it, as a part of a sentence.
+    pub fn words(&self) -> String {
+        let more = count(self.sectors, "sector");
+        format!("it is the beginning of {}, which has {more} more: its end is missing (not counted)", self.of)
+    }
+}
 
 /// The numbers under which each session is there, by card.
 #[derive(Clone, Debug, Default)]
@@ -20,6 +38,8 @@ pub struct Sessions {
     logs: BTreeMap<(String, u32), Vec<(u32, u32)>>,
     /// Of logs that hold the same as another one: the name of that.
     again: BTreeMap<String, String>,
+    /// Of logs that hold the beginning of another one only.
+    beginnings: BTreeMap<String, Beginning>,
     /// The numbers of all logs of each card, also of those without a sector.
     numbers: BTreeMap<String, BTreeSet<u32>>,
     /// By card and number.
@@ -46,14 +66,19 @@ impl Sessions {
                 known.entry(card).or_default().push(Known { number, first, at, log });
             }
         }
-        let again = alike.into_values().flat_map(copies).collect();
+        let (mut again, mut beginnings) = (BTreeMap::new(), BTreeMap::new());
+        for logs in alike.into_values() {
+            let (copies, shorter) = copies(logs);
+            again.extend(copies);
+            beginnings.extend(shorter);
+        }
         let mut anew = BTreeMap::new();
         for (card, mut known) in known {
             known.sort_by_key(|known| known.number);
             let numbers = numbers.get(card).map_or_else(BTreeMap::new, |all| begun_anew::find(all, &known));
             anew.extend(numbers.into_iter().map(|(number, anew)| ((card.to_owned(), number), anew)));
         }
-        Self { logs: all, again, numbers, begun_anew: anew }
+        Self { logs: all, again, beginnings, numbers, begun_anew: anew }
     }
 
     /// What a log's file held when the recorder had just begun to write it anew, if it had. A full card's oldest file gets the
@@ -72,6 +97,11 @@ impl Sessions {
     /// is no number, or on another card. It is not to be counted again.
     pub fn again(&self, name: &str) -> Option<&str> {
         self.again.get(name).map(String::as_str)
+    }
+
+    /// The log of which the one of this name is the beginning only. It is not to be counted again.
+    pub fn beginning(&self, name: &str) -> Option<&Beginning> {
+        self.beginnings.get(name)
     }
 
     /// The numbers under which a session is there on a card.
@@ -143,12 +173,15 @@ impl Candidate<'_> {
     }
 }
 
+/// Something of each of some logs, by their names.
+type Named<T> = Vec<(String, T)>;
+
 /// Names of copies among the logs of one session, each with that of its original: a card's log before one of another name,
-/// one of more files before one of less.
-fn copies(mut logs: Vec<Candidate<'_>>) -> Vec<(String, String)> {
+/// one of more files before one of less. Then those that are the beginning of another one.
+fn copies(mut logs: Vec<Candidate<'_>>) -> (Named<String>, Named<Beginning>) {
     let may_be = |one: &Candidate<'_>| logs.iter().skip(1).any(|other| one.may_be_copy(other));
     if !logs.first().is_some_and(may_be) && logs.iter().all(|log| log.number.is_some()) {
-        return Vec::new();
+        return (Vec::new(), Vec::new());
     }
     logs.sort_by_key(|log| (log.number.is_none(), std::cmp::Reverse(log.log.pieces.len())));
     let (mut originals, mut copies) = (Vec::<(Candidate<'_>, Vec<Fingerprint>)>::new(), Vec::new());
@@ -162,7 +195,17 @@ fn copies(mut logs: Vec<Candidate<'_>>) -> Vec<(String, String)> {
             None => originals.push((log, all)),
         }
     }
-    copies
+    let beginning = |(log, _): &(Candidate<'_>, Vec<Fingerprint>)| {
+        let others = originals.iter().map(|(other, _)| other);
+        let others = others.filter(|other| other.name != log.name && log.may_be_copy(other));
+        let longer = others.filter_map(|other| {
+            let sectors = longer_by(log.log, other.log).ok()??;
+            Some(Beginning { of: other.name.to_owned(), sectors })
+        });
+        Some((log.name.to_owned(), longer.max_by_key(|longer| longer.sectors)?))
+    };
+    let beginnings = originals.iter().filter_map(beginning).collect();
+    (copies, beginnings)
 }
 
 /// What is said of a copy.

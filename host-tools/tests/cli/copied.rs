@@ -1034,3 +1034,24 @@ fn a_name_that_tells_another_session_than_its_sectors_is_told_by_every_command()
     fs::write(at("00001_00.HUM"), &log).expect("written");
     all_say(dir.path(), "copied", 3, &[&words]);
 }
+
+#[test]
+fn a_log_that_is_cut_beside_a_whole_copy_is_told_by_every_command_and_counts_once() {
+    let dir = copied(2, "");
+    let at = |name: &str| dir.path().join("copied").join(name);
+    let log = fs::read(at("00002_00.HUM")).expect("there");
+    fs::write(at("zcopy.hum"), &log).expect("written");
+    fs::write(at("00002_00.HUM"), &log[..20 * BLOCK]).expect("written");
+    all_say(dir.path(), "copied", 3, &["it is the beginning of ", "its end is missing (not counted)"]);
+    let said = text(&run(dir.path(), "verify copied", 3));
+    assert!(
+        said.contains("it is the beginning of zcopy, which has ") && said.contains("2 sessions: "),
+        "{said}"
+    );
+    assert!(text(&attempt(dir.path(), "check copied")).contains("2 logs checked"));
+    // The other way round, and a card's own file is whole.
+    fs::rename(at("00002_00.HUM"), at("cut")).expect("renamed");
+    fs::rename(at("zcopy.hum"), at("00002_00.HUM")).expect("renamed");
+    fs::rename(at("cut"), at("cut.hum")).expect("renamed");
+    all_say(dir.path(), "copied", 3, &["it is the beginning of ", "00002, which has "]);
+}
