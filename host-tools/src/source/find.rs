@@ -9,12 +9,13 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context as _, Result, anyhow, bail};
 
 use super::format::{KNOWN, detect, format_of, hint, is_recording, start_of};
+use super::made::is_made_of;
 use super::recording::{Place, of_one_vehicle};
 use crate::files::{FileId, content_identity, why_unread};
 use crate::logs::find::{Image, REMARKS_MAX, check_seekable};
 use crate::logs::naming::identity_at_end;
 use crate::logs::sessions::{Sessions, first_session};
-use crate::logs::{self, Content, segment_name};
+use crate::logs::{self, Content, Log, segment_name};
 use crate::outcome::usage;
 use crate::plural::count;
 use crate::printable;
@@ -95,38 +96,66 @@ impl Found {
         self.seen.extend(inside.into_keys());
     }
 
-    /// Drops tlogs that `hums decode` made of what is there too, by their names: a flight counts once.
+    /// Drops tlogs that `hums decode` made of what is there too, by their names and, of a log of ours, their first frames: a flight
+    /// counts once.
     fn drop_made(&mut self, before: usize) {
+        let found = self.places.get(before..).unwrap_or_default();
         let made = |place: &Place| {
             let path = place.path()?;
             let stem = path.file_name()?.to_str()?.strip_suffix(".tlog")?;
-            identity_at_end(stem).map(|(base, identity)| (base.to_owned(), identity.to_owned()))
+            identity_at_end(stem)
+                .map(|(base, identity)| (path.to_owned(), base.to_owned(), identity.to_owned()))
         };
-        let found = self.places.get(before..).unwrap_or_default();
-        if !found.iter().any(|place| made(place).is_some()) {
+        let made: Vec<_> = found.iter().map(made).collect();
+        if made.iter().all(Option::is_none) {
             return;
         }
-        let sessions: BTreeMap<u32, String> = found
-            .iter()
-            .filter_map(|place| Some((first_session(place.own()?)?, place.title.clone())))
-            .collect();
-        let files: Vec<PathBuf> = found.iter().filter_map(Place::path).map(Path::to_owned).collect();
-        let of = |base: &str, identity: &str| match identity.strip_prefix('s') {
-            Some(digits) => sessions.get(&u32::from_str_radix(digits, 16).ok()?).cloned(),
-            None => files
-                .iter()
-                .filter(|path| path.file_name().is_some_and(|name| name == base))
-                .find(|path| content_identity(path).is_some_and(|content| content == identity))
-                .map(|path| path.display().to_string()),
+        let mut sessions: BTreeMap<u32, Vec<(&str, &Log)>> = BTreeMap::new();
+        for (title, log) in found.iter().filter_map(|place| Some((place.title.as_str(), place.own()?))) {
+            if let Some(session) = first_session(log) {
+                sessions.entry(session).or_default().push((title, log));
+            }
+        }
+        let of_session = |tlog: &Path, digits: &str| {
+            let logs = sessions.get(&u32::from_str_radix(digits, 16).ok()?)?;
+            let original = logs.iter().find(|(_, log)| is_made_of(tlog, log));
+            let (title, _) = original.or_else(|| logs.first())?;
+            Some(((*title).to_owned(), original.is_some()))
         };
-        for place in self.places.split_off(before) {
-            match made(&place).and_then(|(base, identity)| of(&base, &identity)) {
-                Some(of) if self.remarks.len() < REMARKS_MAX => self.remarks.push(format!(
-                    "{}: was made by hums of {of}, which is read, and is passed over",
+        let of_file = |base: &str, identity: &str| {
+            let mut paths = found.iter().filter_map(Place::path);
+            paths
+                .find(|path| {
+                    path.file_name().is_some_and(|name| name == base)
+                        && content_identity(path).is_some_and(|content| content == identity)
+                })
+                .map(|path| (path.display().to_string(), true))
+        };
+        let originals: Vec<_> = made
+            .into_iter()
+            .map(|made| {
+                let (path, base, identity) = made?;
+                identity
+                    .strip_prefix('s')
+                    .map_or_else(|| of_file(&base, &identity), |digits| of_session(&path, digits))
+            })
+            .collect();
+        for (place, original) in self.places.split_off(before).into_iter().zip(originals) {
+            let remark = match &original {
+                Some((of, true)) => {
+                    format!("{}: was made by hums of {of}, which is read, and is passed over", place.title)
+                }
+                Some((of, false)) => format!(
+                    "{}: has the name of what hums makes of {of}, and begins with other frames: it is read as a recording of its own",
                     place.title
-                )),
-                Some(_) => {}
-                None => self.places.push(place),
+                ),
+                None => String::new(),
+            };
+            if !remark.is_empty() && self.remarks.len() < REMARKS_MAX {
+                self.remarks.push(remark);
+            }
+            if original.is_none_or(|(_, is_made)| !is_made) {
+                self.places.push(place);
             }
         }
     }

@@ -9,7 +9,7 @@ use hums_blackbox::parity::{Parity, Sum};
 use hums_blackbox::{Header, Sector};
 use tempfile::TempDir;
 
-use crate::support::{attempt, end_of, flight, json, px4, run, text};
+use crate::support::{attempt, end_of, flight, json, named, px4, run, text};
 
 const BLOCK: usize = 512;
 /// A segment of the cards here, with its parity at its end.
@@ -1054,4 +1054,23 @@ fn a_log_that_is_cut_beside_a_whole_copy_is_told_by_every_command_and_counts_onc
     fs::rename(at("zcopy.hum"), at("00002_00.HUM")).expect("renamed");
     fs::rename(at("cut"), at("cut.hum")).expect("renamed");
     all_say(dir.path(), "copied", 3, &["it is the beginning of ", "00002, which has "]);
+}
+
+#[test]
+fn another_flight_under_the_name_that_decode_gives_is_read() {
+    let dir = copied(1, "");
+    let at = |name: &str| dir.path().join("copied").join(name);
+    run(dir.path(), "decode copied -o copied/ --format tlog", 0);
+    let made = at(&format!("{}.tlog", named(&at("."), "00001")));
+    let said = |line: &str| String::from_utf8_lossy(&attempt(dir.path(), line).stderr).into_owned();
+    assert!(said("check copied").contains(", which is read, and is passed over"));
+    fs::copy(flight("ap_quad_faults.tlog"), &made).expect("another flight");
+    for command in ["check copied", "ls copied", "info copied", "report copied -o pages/"] {
+        let said = said(command);
+        assert!(
+            said.contains(" begins with other frames: it is read as a recording of its own"),
+            "{command}: {said}"
+        );
+    }
+    assert!(text(&attempt(dir.path(), "check copied")).contains("2 logs checked"));
 }
