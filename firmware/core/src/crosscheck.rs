@@ -63,6 +63,8 @@ const GRAIN_PX4: f32 = 1.0;
 const ATTITUDE_AGE: Span = Span::from_millis(200);
 const HEADS_RAD_S: f32 = 0.2;
 const HEADING_SMOOTHING_S: f32 = 0.5;
+/// Samples that come sooner are passed over: angles are dear.
+const HEADING_EVERY: Span = Span::from_millis(80);
 const HEADING_HOLD_DEG: f32 = 6.0;
 
 /// A kind of sensors.
@@ -243,7 +245,8 @@ impl Crosschecks {
     /// The field by the attitude's roll and pitch, and how far its heading is from the attitude's: it includes the declination, which is
     /// usual.
     fn take_heading(&mut self, at: Instant, [x, y, z]: [f32; 3], vehicle: &Vehicle, flight: &Flight) {
-        let judged = matches!(vehicle.kind(), VehicleKind::Rotorcraft | VehicleKind::Plane)
+        let judged = self.heading_at.age(at).is_none_or(|age| age >= HEADING_EVERY)
+            && matches!(vehicle.kind(), VehicleKind::Rotorcraft | VehicleKind::Plane)
             && flight.is_settled(at)
             && is_clear(at, vehicle);
         let Some(attitude) = vehicle.attitude.within(at, ATTITUDE_AGE).filter(|_| judged) else { return };
