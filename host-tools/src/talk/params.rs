@@ -42,7 +42,9 @@ pub fn run(args: &cli::Params) -> Result<Outcome> {
             let system = client.system();
             let (values, wrong) = list(&mut client)?;
             show(system, values, *json)?;
-            wrong.iter().for_each(|wrong| note!("system {system}: {wrong}"));
+            for why in &wrong {
+                note!("system {system}: {why}");
+            }
             return Ok(Outcome::lossy(!wrong.is_empty()));
         }
         ParamsAction::Get { names, at, json } => {
@@ -131,7 +133,7 @@ fn shown(name: &str) -> String {
 fn single(wanted: f64) -> Result<(f32, bool)> {
     let value = wanted as f32;
     if wanted.is_finite() && value.is_infinite() {
-        return Err(usage(format!("{wanted} is more than a parameter can have: {} at most", f32::MAX)));
+        return Err(usage(format!("{wanted:e} is more than a parameter can have: {:e} at most", f32::MAX)));
     }
     Ok((value, wanted.is_finite() && value.to_string().parse() != Ok(wanted)))
 }
@@ -217,7 +219,11 @@ fn list(client: &mut Client) -> Result<(Vec<Param>, Vec<String>)> {
         }
         // One without a place in the list answers somebody who asked for it by its name.
         if value.index < count {
-            values.insert(value.index, value);
+            let (index, name) = (value.index, shown(&value.name));
+            let before = values.insert(index, value).map(|before| shown(&before.name));
+            if let Some(before) = before.filter(|before| *before != name) {
+                wrong.push(format!("parameter {index} has two names: {before} and {name}"));
+            }
         }
         if values.len() == usize::from(count) {
             break;
@@ -272,7 +278,7 @@ mod tests {
                 Vec::new()
             }
         });
-        assert_eq!(read(&mut client, "GS_BUDGET").expect("an answer").value, 2000.0);
+        assert_eq!([read(&mut client, "GS_BUDGET").expect("an answer").value], [2000.0]);
         let values: Vec<f32> =
             list(&mut client).expect("a list").0.into_iter().map(|param| param.value).collect();
         assert_eq!(values, [2000.0]);
@@ -291,6 +297,10 @@ mod tests {
         let (names, wrong) =
             listed(|| vec![(1, param_value("A", 1.0, 0, 2)), (1, param_value("A", 2.0, 1, 2))]);
         assert_eq!((names.len(), &wrong[..]), (2, &["parameters 0 and 1 have one name: A".to_owned()][..]));
+        let (_, wrong) = listed(|| {
+            [("A", 0), ("B", 0), ("C", 1)].map(|(name, at)| (1, param_value(name, 1.0, at, 2))).to_vec()
+        });
+        assert_eq!(wrong, ["parameter 0 has two names: A and B"]);
         let (names, wrong) = listed(|| vec![(1, param_value("A", 1.0, 0, 0))]);
         assert!(names == ["A"] && wrong[0].contains("has no parameters"), "{wrong:?}");
         let (_, wrong) = listed(|| vec![(1, param_value("A", 1.0, 0, 2)), (1, param_value("B", 1.0, 1, 3))]);
