@@ -278,7 +278,8 @@ mod tests {
                 Vec::new()
             }
         });
-        assert_eq!([read(&mut client, "GS_BUDGET").expect("an answer").value], [2000.0]);
+        let value = read(&mut client, "GS_BUDGET").expect("an answer").value;
+        assert_eq!(value.to_bits(), 2000_f32.to_bits());
         let values: Vec<f32> =
             list(&mut client).expect("a list").0.into_iter().map(|param| param.value).collect();
         assert_eq!(values, [2000.0]);
