@@ -35,7 +35,7 @@ fn ask_all(kind: Kind, span: Span, ask: impl Fn(&Value, &dyn Fn(&str) -> String)
             let fill = |query: &str| filled(query, [&chosen[0], &chosen[1]], span);
             let values = ask(&variable["query"], &fill);
             let [one] = values.as_slice() else { panic!("{name}, {}: {values:?}", variable["name"]) };
-            chosen[place] = one.as_str().unwrap().to_owned();
+            one.as_str().unwrap().clone_into(&mut chosen[place]);
         }
         for panel in panels(&dashboard) {
             for target in panel["targets"].as_array().into_iter().flatten() {

@@ -199,7 +199,7 @@ impl Database {
 
 /// As an address has it.
 fn escaped(text: &str) -> String {
-    text.bytes().map(|byte| format!("%{byte:02X}")).collect()
+    text.bytes().fold(String::new(), |text, byte| text + &format!("%{byte:02X}"))
 }
 
 fn program(variable: &str, path: &str) -> PathBuf {

@@ -244,7 +244,7 @@ impl<'a, 'b> Session<'a, 'b> {
                 if time_us > 0 {
                     self.time(times::of_text(time_us), place, after)?;
                 }
-                self.text(level, tag, time_us, &text_of(words))
+                self.text(level, tag, time_us, text_of(words))
             }
             Message::Dropout(milliseconds) => self.dropout(place, milliseconds),
             Message::Beginning { time_us } => self.another(place, time_us, after),
