@@ -65,7 +65,7 @@ pub(crate) fn take() -> Parts<Board> {
     let (rx_dma, tx_dma) = (dma::Channel::new(p.DMA2_CH2, Irqs), dma::Channel::new(p.DMA2_CH7, Irqs));
     let autopilot = (
         PortRx::new(rx, (pac::USART1, AUTOPILOT_BAUD), rx_dma, RING.take(), FETCH_EVERY, USART_REQUEST),
-        PortTx::new(tx, pac::USART1, tx_dma, USART_REQUEST),
+        PortTx::new(tx, (pac::USART1, AUTOPILOT_BAUD), tx_dma, USART_REQUEST),
     );
     let (tx, rx) = Uart::new_blocking(p.USART2, p.PA3, p.PA2, line(GS_BAUD))
         .expect("the clocks allow this baud rate")
@@ -73,7 +73,7 @@ pub(crate) fn take() -> Parts<Board> {
     let (rx_dma, tx_dma) = (dma::Channel::new(p.DMA1_CH5, Irqs), dma::Channel::new(p.DMA1_CH6, Irqs));
     let gs = (
         PortRx::new(rx, (pac::USART2, GS_BAUD), rx_dma, GS_RING.take(), GS_FETCH_EVERY, USART_REQUEST),
-        PortTx::new(tx, pac::USART2, tx_dma, USART_REQUEST),
+        PortTx::new(tx, (pac::USART2, GS_BAUD), tx_dma, USART_REQUEST),
     );
 
     let mut bus = spi::Config::default();

@@ -67,7 +67,7 @@ pub(crate) fn take() -> Parts<Board> {
     let (rx_dma, tx_dma) = (dma::Channel::new(p.DMA2_CH1, Irqs), dma::Channel::new(p.DMA2_CH6, Irqs));
     let autopilot = (
         PortRx::new(rx, (pac::USART6, AUTOPILOT_BAUD), rx_dma, RING.take(), FETCH_EVERY, USART6_REQUEST),
-        PortTx::new(tx, pac::USART6, tx_dma, USART6_REQUEST),
+        PortTx::new(tx, (pac::USART6, AUTOPILOT_BAUD), tx_dma, USART6_REQUEST),
     );
     let (tx, rx) = Uart::new_blocking(p.USART2, p.PD6, p.PD5, line(GS_BAUD))
         .expect("the clocks allow this baud rate")
@@ -75,7 +75,7 @@ pub(crate) fn take() -> Parts<Board> {
     let (rx_dma, tx_dma) = (dma::Channel::new(p.DMA1_CH5, Irqs), dma::Channel::new(p.DMA1_CH6, Irqs));
     let gs = (
         PortRx::new(rx, (pac::USART2, GS_BAUD), rx_dma, GS_RING.take(), GS_FETCH_EVERY, USART2_REQUEST),
-        PortTx::new(tx, pac::USART2, tx_dma, USART2_REQUEST),
+        PortTx::new(tx, (pac::USART2, GS_BAUD), tx_dma, USART2_REQUEST),
     );
 
     let mut bus = spi::Config::default();

@@ -92,16 +92,16 @@ pub(crate) struct PortTx {
 }
 
 impl PortTx {
-    /// `channel` must be the one that serves the transmission of `registers`, which must be `port`'s own, by this
+    /// `channel` must be the one that serves the transmission of `registers`, which must be `port`'s own and set to `baud`, by this
     /// `request`.
     pub(crate) fn new(
         port: UartTx<'static, Blocking>,
-        registers: pac::usart::Usart,
+        (registers, baud): (pac::usart::Usart, u32),
         channel: dma::Channel<'static>,
         request: Request,
     ) -> Self {
         registers.cr3().modify(|w| w.set_dmat(true));
-        Self { port, registers, channel, request, baud: 0 }
+        Self { port, registers, channel, request, baud }
     }
 }
 
@@ -122,7 +122,7 @@ impl Transmit for PortTx {
     }
 
     fn set_baud(&mut self, baud: u32) {
-        // Both halves share the divider. A rate that the clock cannot give changes nothing.
+        // Both halves share the divider, and a byte that comes while it is set is lost. A rate that the clock cannot give changes nothing.
         if baud != self.baud && self.port.set_baudrate(baud).is_err() {
             defmt::warn!("a port cannot run at {=u32} baud", baud);
         }
