@@ -15,3 +15,11 @@ pub fn hex(bytes: &[u8]) -> String {
     push_hex(&mut text, bytes);
     String::from_utf8_lossy(&text).into_owned()
 }
+
+/// So many bytes of which this is the text; none where it is that of no bytes, or of more or fewer.
+pub fn bytes_of<const N: usize>(text: &str) -> Option<[u8; N]> {
+    let (pairs, rest) = text.as_bytes().as_chunks::<2>();
+    let byte = |pair: &[u8; 2]| u8::from_str_radix(std::str::from_utf8(pair).ok()?, 16).ok();
+    let bytes: Option<Vec<u8>> = pairs.iter().map(byte).collect();
+    bytes.filter(|_| rest.is_empty())?.try_into().ok()
+}

@@ -10,9 +10,8 @@ use hums_core::Monitor;
 use super::judge::{Heard, Judge, Limits};
 use super::judged::Judged;
 use crate::ending::Ending;
-use crate::logs::board::{HEADING_GROUPS, heading};
-use crate::logs::groups::Groups;
-use crate::logs::{Log, reader};
+use crate::logs::groups::at_beginning;
+use crate::logs::reader;
 use crate::names::counter_name;
 use crate::progress;
 use crate::source::item::{Gap, Summary, Want};
@@ -57,7 +56,9 @@ pub(super) fn judge(place: &Place, limits: &Limits, heard: Heard, shows: bool) -
 pub fn overview(place: &Place) -> Result<Overview> {
     let limits = Limits::default();
     if let Some(log) = place.own() {
-        let mut here = (!has_start(log)?).then(|| Judge::new(&limits, Format::Hums));
+        // Where a log begins with the record of a start a monitor ran, and nobody needs to judge it here.
+        let has_start = at_beginning(log, |_| Some(())).is_some();
+        let mut here = (!has_start).then(|| Judge::new(&limits, Format::Hums));
         let mut overview = match &mut here {
             Some(here) => Overview::told(log, place.system, &mut |at, item| {
                 here.item(at, item);
@@ -104,19 +105,6 @@ pub fn overview(place: &Place) -> Result<Overview> {
         bytes_on_card: if place.is_standard() { taken } else { place.bytes() },
         contents,
     })
-}
-
-/// Whether a log begins with the record of a start: then a monitor ran, and nobody needs to judge it here.
-fn has_start(log: &Log) -> Result<bool> {
-    let mut groups = Groups::new(log);
-    for _ in 0..HEADING_GROUPS {
-        match groups.next_group()? {
-            Some(group) if heading(&group).is_some() => return Ok(true),
-            Some(_) => {}
-            None => break,
-        }
-    }
-    Ok(false)
 }
 
 /// What the monitor here makes of a recording.

@@ -8,11 +8,10 @@
 use std::cell::Cell;
 use std::collections::{BTreeMap, BTreeSet};
 
-use hums_blackbox::record::{Before, Boot, Found};
+use hums_blackbox::record::{Before, Found};
 use hums_blackbox::{Header, Sector};
 
-use super::board::{HEADING_GROUPS, find_boot};
-use super::groups::Groups;
+use super::groups::at_beginning;
 use super::joined::HEAD;
 use super::places::Log;
 use super::reader::likely_epoch;
@@ -262,14 +261,4 @@ fn own_last(log: &Log) -> Option<Before> {
         None
     });
     last.get()
-}
-
-fn at_beginning<T>(log: &Log, wanted: impl Fn(&Boot<'_>) -> Option<T>) -> Option<T> {
-    let mut groups = Groups::new(log);
-    for _ in 0..HEADING_GROUPS {
-        if let Some(found) = find_boot(&groups.next_group().ok()??, &wanted) {
-            return Some(found);
-        }
-    }
-    None
 }

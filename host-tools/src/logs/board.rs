@@ -12,7 +12,12 @@ pub type Board = [u8; 12];
 
 /// The board's unique id, by the first record of its start in a group or in the beginning of one.
 pub fn board_of(group: &[Step]) -> Option<Board> {
-    heading(group).filter(|uid| *uid != [0; 12])
+    heading(group).and_then(known)
+}
+
+/// The id of a record of a start, where it is a board's.
+pub fn known(uid: Board) -> Option<Board> {
+    Some(uid).filter(|uid| *uid != [0; 12])
 }
 
 /// The id that the first record of a start has, which is zeros where there is no board.

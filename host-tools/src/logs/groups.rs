@@ -3,9 +3,10 @@
 use std::collections::VecDeque;
 
 use anyhow::Result;
+use hums_blackbox::record::Boot;
 use hums_blackbox::{Assembler, BlockCounts, GROUP_SECTORS, Header, Sector, Step};
 
-use super::board::{Board, HEADING_GROUPS, heading};
+use super::board::{Board, HEADING_GROUPS, find_boot, heading};
 use super::joined::{Found, Joints};
 use super::places::{BLOCK_BYTES, Blocks, Log};
 use super::repair::{Evidence, Repairs};
@@ -51,6 +52,17 @@ fn begins_at(blocks: &Blocks<'_>, mut at: u64, last: Option<Found>) -> Result<Op
         }
     }
     Ok(None)
+}
+
+/// What is wanted of the record of a start with which a log begins; none where there is none, or the log cannot be read.
+pub fn at_beginning<T>(log: &Log, wanted: impl Fn(&Boot<'_>) -> Option<T>) -> Option<T> {
+    let mut groups = Groups::new(log);
+    for _ in 0..HEADING_GROUPS {
+        if let Some(found) = find_boot(&groups.next_group().ok()??, &wanted) {
+            return Some(found);
+        }
+    }
+    None
 }
 
 /// Another log of the same power-on in the files of a log, which is not read.

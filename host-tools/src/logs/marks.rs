@@ -5,7 +5,7 @@ use hums_blackbox::Record;
 use hums_blackbox::record::{Before, Found, Resting};
 use hums_core::time::Instant;
 
-use super::board::Board;
+use super::board::{self, Board};
 use crate::loss::lost;
 
 /// Numbers of the events that say that the vehicle moves.
@@ -54,7 +54,7 @@ impl Marks {
             Record::Note(note) => self.packed |= note.text == PACKED,
             Record::Boot(boot) => {
                 self.has_boot = true;
-                self.board = self.board.or(Some(boot.uid).filter(|uid| *uid != [0; 12]));
+                self.board = self.board.or(board::known(boot.uid));
                 self.before =
                     Some(boot.before).filter(|before| before.found != Found::Unknown).or(self.before);
             }

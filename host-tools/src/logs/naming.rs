@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use hums_recorder::LogName;
 
 use super::board::Board;
-use crate::hex::hex;
+use crate::hex::{bytes_of, hex};
 
 /// The digits of a session.
 const SESSION_DIGITS: usize = 8;
@@ -62,16 +62,12 @@ impl SegmentName {
 
     /// The session that the name tells.
     pub fn named_session(&self) -> Option<u32> {
-        let digits = self.of.rsplit('-').next()?.strip_prefix('s')?;
-        u32::from_str_radix(digits, 16).ok()
+        session_of(self.of.rsplit('-').next()?)
     }
 
     /// The unique id of the board that the name tells.
     pub fn named_board(&self) -> Option<Board> {
-        let digits = self.recorder().strip_prefix("box")?;
-        let byte = |at| u8::from_str_radix(digits.get(at..at + 2)?, 16).ok();
-        let bytes: Option<Vec<u8>> = (0..digits.len()).step_by(2).map(byte).collect();
-        bytes?.try_into().ok()
+        bytes_of(self.recorder().strip_prefix("box")?)
     }
 
     /// The log's name for people: `00042`, behind that of its box where the name tells it.
@@ -126,6 +122,11 @@ pub fn identity_at_end(stem: &str) -> Option<(&str, &str)> {
     let stem = unnumbered.map(|(stem, _)| stem).filter(|stem| split(stem).is_some()).unwrap_or(stem);
     let (base, identity) = stem.split_at_checked(split(stem)?)?;
     Some((base, identity.get(1..)?))
+}
+
+/// The session that a name's end tells, `s1a2b3c4d`.
+pub fn session_of(identity: &str) -> Option<u32> {
+    u32::from_str_radix(identity.strip_prefix('s')?, 16).ok()
 }
 
 /// Whether a name ends with a session, `s1a2b3c4d`, behind a box or nothing.

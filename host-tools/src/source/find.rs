@@ -13,7 +13,7 @@ use super::made::is_made_of;
 use super::recording::{Place, of_one_vehicle};
 use crate::files::{FileId, content_identity, why_unread};
 use crate::logs::find::{Image, REMARKS_MAX, check_seekable};
-use crate::logs::naming::identity_at_end;
+use crate::logs::naming::{identity_at_end, session_of};
 use crate::logs::sessions::{Sessions, first_session};
 use crate::logs::{self, Content, Log, segment_name};
 use crate::outcome::usage;
@@ -116,8 +116,8 @@ impl Found {
                 sessions.entry(session).or_default().push((title, log));
             }
         }
-        let of_session = |tlog: &Path, digits: &str| {
-            let logs = sessions.get(&u32::from_str_radix(digits, 16).ok()?)?;
+        let of_session = |tlog: &Path, session: u32| {
+            let logs = sessions.get(&session)?;
             let original = logs.iter().find(|(_, log)| is_made_of(tlog, log));
             let (title, _) = original.or_else(|| logs.first())?;
             Some(((*title).to_owned(), original.is_some()))
@@ -135,9 +135,10 @@ impl Found {
             .into_iter()
             .map(|made| {
                 let (path, base, identity) = made?;
-                identity
-                    .strip_prefix('s')
-                    .map_or_else(|| of_file(&base, &identity), |digits| of_session(&path, digits))
+                match session_of(&identity) {
+                    Some(session) => of_session(&path, session),
+                    None => of_file(&base, &identity),
+                }
             })
             .collect();
         for (place, original) in self.places.split_off(before).into_iter().zip(originals) {

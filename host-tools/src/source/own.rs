@@ -60,9 +60,7 @@ impl OwnReader {
         let span = first.zip(last);
         Ok(Summary { messages, other_messages, not_frames, span, gaps, losses, ending: Some(ending) })
     }
-}
 
-impl OwnReader {
     /// Reads it in parts, and hands on in order what [`Reader::read`] does of observations and what else is said: one reading for both.
     pub fn in_parts_and_order<C: Collect>(
         &self,

@@ -19,6 +19,7 @@ use hums_link::{Check, Frame, Framer};
 use crate::cli::Link;
 use crate::duplex::{self, Duplex};
 use crate::files::read_short;
+use crate::hex;
 use crate::interrupt;
 use crate::mavlink::ids::HEARTBEAT;
 use crate::outcome::usage;
@@ -232,14 +233,7 @@ pub fn key(path: &Path) -> Result<Key> {
             path.display()
         )));
     }
-    let digits = text.as_bytes().as_chunks::<2>();
-    let bytes: Option<Vec<u8>> = digits
-        .0
-        .iter()
-        .map(|pair| std::str::from_utf8(pair).ok().and_then(|pair| u8::from_str_radix(pair, 16).ok()))
-        .collect();
-    let exact = bytes.filter(|_| digits.1.is_empty()).and_then(|bytes| <[u8; 32]>::try_from(bytes).ok());
-    Ok(exact.map_or_else(|| Key::of_passphrase(text), Key))
+    Ok(hex::bytes_of(text).map_or_else(|| Key::of_passphrase(text), Key))
 }
 
 /// This PC's time, as signatures count it.

@@ -67,15 +67,14 @@ pub fn run(args: &cli::Params) -> Result<Outcome> {
             }
         }
         ParamsAction::Set { name, value, at, json } => {
-            let (single, is_rounded) = single(*value).with_context(|| name.clone())?;
+            let (wanted, is_rounded) = single(*value).with_context(|| name.clone())?;
             if is_rounded {
-                note!("{name}: {value} is rounded to {single}: a parameter has single precision");
+                note!("{name}: {value} is rounded to {wanted}: a parameter has single precision");
             }
-            let value = single;
             let mut client = Client::connect(at)?;
             let (system, component) = client.target();
             let packet = Packet::new(PARAM_SET)
-                .f32(0, value)
+                .f32(0, wanted)
                 .u8(4, system)
                 .u8(5, component)
                 .text(6, 16, name)
@@ -83,8 +82,8 @@ pub fn run(args: &cli::Params) -> Result<Outcome> {
             let kept = client
                 .ask(&packet, ANSWER, TRIES, |frame| value_of(frame).filter(|value| value.name == *name))?
                 .with_context(|| no_answer(system, name))?;
-            if kept.value.to_bits() != value.to_bits() {
-                bail!("system {system}: {name}: the board refused {value} and keeps {}", kept.value);
+            if kept.value.to_bits() != wanted.to_bits() {
+                bail!("system {system}: {name}: the board refused {wanted} and keeps {}", kept.value);
             }
             show(system, [kept], *json)?;
         }

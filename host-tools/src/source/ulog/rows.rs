@@ -30,7 +30,11 @@ pub(super) fn columns(layout: &Layout) -> usize {
 }
 
 /// Names of tables that are no topic's.
-const OWN: [&str; 4] = ["default_parameters", "information", "parameters", "logged_messages"];
+pub(super) const DEFAULTS: &str = "default_parameters";
+pub(super) const INFORMATION: &str = "information";
+pub(super) const PARAMETERS: &str = "parameters";
+pub(super) const TEXTS: &str = "logged_messages";
+const OWN: [&str; 4] = [DEFAULTS, INFORMATION, PARAMETERS, TEXTS];
 
 /// Its name: the topic's, without what a file's name cannot have. No topic of PX4's has a name of those that are no topic's,
 /// or that are ours; one that does is told apart from them.

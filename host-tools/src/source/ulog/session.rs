@@ -571,7 +571,7 @@ struct OwnTables {
 }
 
 impl OwnTables {
-    fn new(rows: Rows<'_>) -> Self {
+    fn new(wanted: Rows<'_>) -> Self {
         let table = |name: &str, columns: &[(&str, Kind)]| {
             let column = |&(name, kind): &(&str, Kind)| Column {
                 name: name.to_owned(),
@@ -579,18 +579,18 @@ impl OwnTables {
                 kind,
             };
             let table = Table { name: name.to_owned(), columns: columns.iter().map(column).collect() };
-            rows.has(name).then(|| Arc::new(table))
+            wanted.has(name).then(|| Arc::new(table))
         };
         let (text, flag, number, count) = (Kind::Text, Kind::Flag, Kind::Double, Kind::Unsigned);
         Self {
             defaults: table(
-                "default_parameters",
+                rows::DEFAULTS,
                 &[("name", text), ("value", number), ("system", flag), ("configuration", flag)],
             ),
-            information: table("information", &[("key", text), ("text", text), ("number", number)]),
-            parameters: table("parameters", &[("name", text), ("value", number)]),
+            information: table(rows::INFORMATION, &[("key", text), ("text", text), ("number", number)]),
+            parameters: table(rows::PARAMETERS, &[("name", text), ("value", number)]),
             texts: table(
-                "logged_messages",
+                rows::TEXTS,
                 &[("timestamp", count), ("severity", count), ("tag", count), ("text", text)],
             ),
         }

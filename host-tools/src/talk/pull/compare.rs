@@ -10,7 +10,7 @@ use hums_blackbox::{Header, Sector, Step};
 use hums_link::ftp;
 
 use super::ftp::Ftp;
-use crate::logs::board::heading;
+use crate::logs::board::{heading, known};
 use crate::logs::naming::{segment_name, session_name};
 
 /// What is compared where the board computes no checksum: the first sector, which names its session by a random number,
@@ -88,7 +88,7 @@ pub(super) fn heading_of(ftp: &mut Ftp, name: &str, length: u32) -> Result<Headi
             break;
         }
     }
-    let board = board.filter(|board| *board != [0; 12]);
+    let board = board.and_then(known);
     let session = session_name(&format!("{:05}", segment.session), board.as_ref(), session);
     Ok(Heading { name: format!("{session}_{:02}.HUM", segment.segment), sectors })
 }
