@@ -25,12 +25,16 @@ pub(crate) fn run(check: bool) -> Result<()> {
     needs.extend([Need::WindowsTarget, Need::Mingw, Need::MacTarget]);
     needs.extend(check.then_some(Need::Wine));
     setup::ensure(&needs, false).require_all()?;
-    ensure_cyclonedx()?;
+    ensure_tool("cyclonedx", &[])?;
+    // It has little to do: building it without optimisation takes a third of the time.
+    ensure_tool("deny", &["--debug"])?;
     // `cargo xtask test` leaves out the board that none of its steps runs on.
     for board in Board::ALL {
         firmware::lint(board)?;
     }
     budgets::check(&Board::ALL)?;
+    without_std()?;
+    dependencies()?;
     lint_for(WINDOWS_TARGET)?;
     lint_for(MAC_TARGET)?;
     let commit = git(&["rev-parse", "HEAD"])?;
@@ -213,13 +217,37 @@ fn for_shells(program: &Path) -> Result<Vec<File>> {
     Ok(files)
 }
 
-/// `cargo cyclonedx`, installed if it is missing.
-fn ensure_cyclonedx() -> Result<()> {
-    if Shell::cargo().args(["cyclonedx", "--version"]).ask().is_some() {
+/// The command `cargo NAME`, installed if it is missing.
+fn ensure_tool(name: &str, options: &[&str]) -> Result<()> {
+    if Shell::cargo().args([name, "--version"]).ask().is_some() {
         return Ok(());
     }
-    eprintln!("cargo-cyclonedx is not installed: building it, once (some minutes)");
-    Shell::cargo().args(["install", "--quiet", "--locked", "cargo-cyclonedx"]).run()
+    let package = format!("cargo-{name}");
+    eprintln!("{package} is not installed: building it, once (some minutes)");
+    Shell::cargo().args(["install", "--quiet", "--locked"]).args(options).arg(package).run()
+}
+
+/// `hums-onboard` depends on all other crates that fly. The target has no std, so whatever of them or of what they
+/// depend on asks for std does not compile; and `hums-app`, which turns further features on, takes no part.
+fn without_std() -> Result<()> {
+    firmware::cargo()?
+        .args(["check", "--profile=firmware", "--target", FIRMWARE_TARGET, "--package=hums-onboard"])
+        .run()
+}
+
+/// Licences, bans and sources of the dependencies are those of deny.toml. Advisories need a network, which may be missing, and
+/// appear on their own day: told, and never a failure.
+fn dependencies() -> Result<()> {
+    let deny = || Shell::cargo().args(["deny", "--log-level", "warn"]);
+    deny().args(["check", "bans", "licenses", "sources"]).run().context("dependencies against deny.toml")?;
+    if deny().args(["fetch", "db"]).ask().is_none() {
+        eprintln!(
+            "note: advisories about dependencies were not looked at, because their database cannot be fetched"
+        );
+    } else if deny().args(["check", "--disable-fetch", "advisories"]).run().is_err() {
+        eprintln!("warning: there are advisories about dependencies, see above");
+    }
+    Ok(())
 }
 
 fn git(arguments: &[&str]) -> Result<String> {

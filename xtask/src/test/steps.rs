@@ -14,7 +14,7 @@ use crate::hums;
 use crate::oracle;
 use crate::pc;
 use crate::prove;
-use crate::repo::{self, FIRMWARE_TARGET};
+use crate::repo;
 use crate::setup::Need;
 use crate::shell::Shell;
 use crate::structure;
@@ -42,7 +42,7 @@ pub(super) enum Builds {
 
 /// In the order in which they begin, as far as what they need is there: first what fails soonest, then what others
 /// wait for, then what takes longest.
-pub(super) const STEPS: [Step; 20] = [
+pub(super) const STEPS: [Step; 18] = [
     Step {
         name: "fmt",
         about: "the formatting",
@@ -187,22 +187,6 @@ pub(super) const STEPS: [Step; 20] = [
         builds: None,
         run: demo::as_test,
     },
-    Step {
-        name: "no-std",
-        about: "the core crates build where there is no std, without what the firmware's binary turns on",
-        needs: &[Need::FirmwareTarget],
-        after: &[],
-        builds: Some(Builds::Firmware),
-        run: no_std,
-    },
-    Step {
-        name: "deny",
-        about: "licences, bans and sources of the dependencies",
-        needs: &[],
-        after: &["build"],
-        builds: None,
-        run: deny,
-    },
 ];
 
 /// The board that every change is tried for. `cargo xtask dist` looks at all of them.
@@ -210,6 +194,7 @@ const FLOWN: Board = Board::F405;
 
 fn check_budgets() -> Result<()> {
     println!("{NOT_TESTED}board f429 (cargo xtask dist lints and measures it)");
+    println!("{NOT_TESTED}licences and sources of the dependencies (cargo xtask dist)");
     budgets::check(&[FLOWN])
 }
 
@@ -241,14 +226,6 @@ fn doc() -> Result<()> {
     Shell::cargo().args(["test", "--quiet", "--doc"]).args(pc::CHOICE).run()
 }
 
-/// `hums-onboard` depends on all other crates that fly. The target has no std, so whatever of them or of what they
-/// depend on asks for std does not compile; and `hums-app`, which turns further features on, takes no part.
-fn no_std() -> Result<()> {
-    firmware::cargo()?
-        .args(["check", "--profile=firmware", "--target", FIRMWARE_TARGET, "--package=hums-onboard"])
-        .run()
-}
-
 fn sim() -> Result<()> {
     // Half of their time they wait: links are as slow as radios are.
     let threads = (2 * std::thread::available_parallelism().map_or(1, usize::from)).to_string();
@@ -261,21 +238,4 @@ fn sim() -> Result<()> {
 fn further() -> &'static [&'static str] {
     let given = std::env::var_os("HUMS_FLIGHTS").is_some_and(|folder| !folder.is_empty());
     if given { &["--include-ignored"] } else { &[] }
-}
-
-/// Advisories need a network, which may be missing, and appear on their own day: told, and never a failure.
-fn deny() -> Result<()> {
-    let deny = || Shell::cargo().args(["deny", "--log-level", "warn"]);
-    if Shell::cargo().args(["deny", "--version"]).ask().is_none() {
-        eprintln!("cargo-deny is not installed: building it, once (some minutes)");
-        // It has little to do: building it without optimisation takes a third of the time.
-        Shell::cargo().args(["install", "--quiet", "--locked", "--debug", "cargo-deny"]).run()?;
-    }
-    deny().args(["check", "bans", "licenses", "sources"]).run().context("dependencies against deny.toml")?;
-    if deny().args(["fetch", "db"]).ask().is_none() {
-        println!("{NOT_TESTED}advisories about dependencies (their database cannot be fetched here)");
-    } else if deny().args(["check", "--disable-fetch", "advisories"]).run().is_err() {
-        eprintln!("warning: there are advisories about dependencies, see above");
-    }
-    Ok(())
 }
