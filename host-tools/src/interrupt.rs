@@ -1,6 +1,6 @@
 //! Ctrl-C and SIGTERM end a run that would go on for ever in good order: what waits is written, the log is closed and
 //! the results are printed. A second one ends the program at once (with a database it ends the wait for that, and the third
-//! one the program). SIGTERM is what `systemctl stop` and `docker stop` send.
+//! one the program), unless it comes right after the first: that is the same wish. SIGTERM is what `systemctl stop` and `docker stop` send.
 //!
 //! SIGHUP keeps its default, so that `nohup` works. SIGXFSZ, which a file beyond the limit of `ulimit -f` sends, is only
 //! noted: then the write fails with an error that names the file.
@@ -27,41 +27,40 @@ static AGAIN: AtomicBool = AtomicBool::new(false);
 
 /// From now on the first Ctrl-C or SIGTERM is only noted; the second one ends the program at once.
 pub fn watch() {
-    REQUESTED.get_or_init(|| {
-        let requested = Arc::new(AtomicBool::new(false));
-        let armed = Arc::new(AtomicBool::new(false));
-        // In this order: the first one must not find the flag set.
-        note_failure(register(&armed, [&armed, &requested]));
-        requested
-    });
+    watch_for(1);
 }
 
 /// From now on the first and the second Ctrl-C or SIGTERM are only noted; the third one ends the program at once.
 pub fn watch_twice() {
+    watch_for(2);
+}
+
+/// So many are only noted.
+fn watch_for(wishes: u32) {
     REQUESTED.get_or_init(|| {
         let requested = Arc::new(AtomicBool::new(false));
         let [armed, another] = [(); 2].map(|()| Arc::new(AtomicBool::new(false)));
-        note_failure(register(&armed, [&another, &requested]));
-        let first = Arc::clone(&requested);
         let thread = std::thread::Builder::new().name("signals".to_owned());
-        note_failure(thread.spawn(move || tell_apart(&first, &another, &armed)).map(|_| ()));
+        let (heard, ready) = (Arc::clone(&another), Arc::clone(&armed));
+        let is_told_apart = thread.spawn(move || tell_apart(wishes, &heard, &ready)).is_ok();
+        // Where the system gives no thread, the second one ends the program, however soon it comes. In this order: the first one
+        // must not find the flag set.
+        let heard = if is_told_apart { &another } else { &armed };
+        note_failure(register(&armed, [heard, &requested]));
         requested
     });
 }
 
-/// Waits for the first one, and for another one, of which the next ends the program at once.
-fn tell_apart(first: &AtomicBool, another: &AtomicBool, armed: &AtomicBool) {
-    let wait_for = |flag: &AtomicBool| {
-        while !flag.load(Ordering::SeqCst) {
+/// Waits for so many, after which the next one ends the program at once.
+fn tell_apart(wishes: u32, another: &AtomicBool, armed: &AtomicBool) {
+    for wish in 1..=wishes {
+        while !another.load(Ordering::SeqCst) {
             std::thread::sleep(LOOK);
         }
-    };
-    wait_for(first);
-    std::thread::sleep(ECHO);
-    another.store(false, Ordering::SeqCst);
-    wait_for(another);
-    AGAIN.store(true, Ordering::SeqCst);
-    std::thread::sleep(ECHO);
+        AGAIN.store(wish > 1, Ordering::SeqCst);
+        std::thread::sleep(ECHO);
+        another.store(false, Ordering::SeqCst);
+    }
     armed.store(true, Ordering::SeqCst);
 }
 

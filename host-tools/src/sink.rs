@@ -159,15 +159,16 @@ pub fn open(endpoint: &Endpoint, inputs: &Inputs) -> Result<Ground> {
         _ => {
             let duplex = duplex::open(endpoint, SILENCE)?;
             let writer = Beside::new(FLAG, To::Stream(duplex.writer));
-            Ok(Ground { writer, heard: listen(duplex.reader) })
+            let heard = listen(duplex.reader).context("--gs: no thread")?;
+            Ok(Ground { writer, heard })
         }
     }
 }
 
 /// A thread reads, so that the pipeline never waits for a ground station.
-fn listen(mut port: Box<dyn Port>) -> Heard {
+fn listen(mut port: Box<dyn Port>) -> io::Result<Heard> {
     let (sender, receiver) = sync_channel(PIECES);
-    std::thread::spawn(move || {
+    std::thread::Builder::new().name("ground".to_owned()).spawn(move || {
         let mut buffer = vec![0; BUFFER_BYTES];
         loop {
             let piece = match port.read(&mut buffer) {
@@ -181,8 +182,8 @@ fn listen(mut port: Box<dyn Port>) -> Heard {
                 break;
             }
         }
-    });
-    Heard(Some(receiver))
+    })?;
+    Ok(Heard(Some(receiver)))
 }
 
 /// A writer that nobody reads.

@@ -22,7 +22,7 @@ use crate::output::{self, JsonList, Schema};
 use crate::plural::count;
 use crate::printable::{path, word};
 use crate::source::find::{besides, not_ours};
-use crate::summary::Overview;
+use crate::summary::{Contents, Overview};
 
 /// What `hums verify --json` prints.
 const SCHEMA: Schema = Schema::first("hums-verify");
@@ -70,7 +70,10 @@ pub fn run(args: &cli::Verify) -> Result<Outcome> {
         let files = overview.ending.files.join(", ");
         output::line(&format!("Session {} ({})", word(&log.name), word(&files)))?;
         print(&log.checks)?;
-        overview.ending.aside().map_or(Ok(()), |words| output::line(&format!("  {}", word(&words))))
+        for words in came_damaged(&overview.contents).into_iter().chain(overview.ending.aside()) {
+            output::line(&format!("  {}", word(&words)))?;
+        }
+        Ok(())
     })?;
     let worst = if ok && failed == 0 { worst } else { Verdict::NotProved };
     let ok = worst != Verdict::NotProved && weakened == Weakened::default();
@@ -401,6 +404,17 @@ fn newer(log: &Overview) -> String {
         return format!("{} of an older format version", count(blocks.older_version, "sector"));
     }
     if log.needs_newer_program() { "some need a newer hums".to_owned() } else { String::new() }
+}
+
+/// What came damaged over the line, and so is in no log: the log is as whole as without it.
+fn came_damaged(contents: &Contents) -> Option<String> {
+    let of = |what: Lost| contents.losses.get(what.name()).map(|loss| loss.count).filter(|count| *count > 0);
+    let frames = of(Lost::DamagedFrames).map(|frames| count(frames, "damaged frame"));
+    let bytes = of(Lost::NotFrames).map(|bytes| format!("{} of no frame", count(bytes, "byte")));
+    let what = frames.into_iter().chain(bytes).collect::<Vec<_>>().join(" and ");
+    (!what.is_empty()).then(|| {
+        format!("besides {what} came over the line, before the recorder: no damage of the log (hums info says when)")
+    })
 }
 
 fn losses_detail(log: &Overview) -> String {

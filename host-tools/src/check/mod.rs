@@ -34,11 +34,13 @@ use crate::source::find::{Found, find, sessions_of};
 use crate::source::recording::Place;
 use checked::Checked;
 use judge::{Heard, Limits};
+use overview::Read;
+use past::Past;
 use text::Table;
 
 /// Runs `hums check`.
 pub fn run(args: &cli::Check) -> Result<Outcome> {
-    let limits = past::after(Limits::new(&params::read(args.params.as_deref())?), &args.past, args.system)?;
+    let past = Past::of(Limits::new(&params::read(args.params.as_deref())?), &args.past, args.system)?;
     let (found, mut failed) = logs(args)?;
     let found = found.of_system(args.system)?;
     for remark in &found.remarks {
@@ -85,7 +87,10 @@ pub fn run(args: &cli::Check) -> Result<Outcome> {
     };
     side_by_side(
         &found.places,
-        |place| Told { name: place.title.clone(), checked: judged(place, &limits, Heard::Somewhere, !many) },
+        |place| Told {
+            name: place.title.clone(),
+            checked: past.judge(place, Heard::Somewhere, !many).map(|read| checked(place, read)),
+        },
         |told| {
             bar.inc(1);
             followed.push(told).into_iter().try_for_each(&mut done)
@@ -141,11 +146,11 @@ impl Logged for Told {
 
 /// Judges one recording, as `hums check` does.
 pub fn recording(place: &Place, limits: &Limits, heard: Heard) -> Result<Checked> {
-    judged(place, limits, heard, false)
+    overview::judge(place, limits, heard, false).map(|read| checked(place, read))
 }
 
-fn judged(place: &Place, limits: &Limits, heard: Heard, shows: bool) -> Result<Checked> {
-    let overview::Read { format, judged, summary, .. } = overview::judge(place, limits, heard, shows)?;
+fn checked(place: &Place, read: Read) -> Checked {
+    let Read { format, judged, summary, .. } = read;
     let ending = summary.ending.map(|ending| Ending { name: place.name.clone(), ..ending });
-    Ok(Checked { name: place.title.clone(), format, judged, ending })
+    Checked { name: place.title.clone(), format, judged, ending }
 }

@@ -136,7 +136,8 @@ fn fill(contents: &mut Contents, judged: Judged) {
     }
 }
 
-fn vehicle(monitor: &Monitor) -> Option<Vehicle> {
+/// The vehicle that a monitor heard; `None` where it heard none.
+pub(super) fn vehicle(monitor: &Monitor) -> Option<Vehicle> {
     let vehicle = monitor.vehicle();
     let (source, heartbeat) = vehicle.source.zip(vehicle.heartbeat.get())?;
     let identity = vehicle.identity.get().copied().unwrap_or_default();

@@ -2,38 +2,146 @@
 
 use std::path::PathBuf;
 
-use anyhow::{Context as _, Result};
+use anyhow::{Context as _, Result, bail};
+use hums_blackbox::record::Vehicle;
 use hums_core::baseline::{Baselines, FLIGHTS_MIN, Quantity};
+use hums_core::lifetime::Airframe;
 
 use super::judge::{Heard, Limits};
-use super::overview;
+use super::overview::{self, Read};
+use crate::names::type_name;
+use crate::outcome::usage;
 use crate::source::find::find;
-use crate::source::recording::Place;
+use crate::source::recording::{Format, Place};
 
-/// The limits, with what recordings of earlier flights teach of the vehicle; as they are where there are none.
-pub(super) fn after(limits: Limits, past: &[PathBuf], system: Option<u8>) -> Result<Limits> {
-    if past.is_empty() {
-        return Ok(limits);
+/// What `hums check` judges by: limits, and what earlier flights of one vehicle teach.
+pub(super) struct Past {
+    limits: Limits,
+    /// With what is normal for that vehicle, where there are earlier flights.
+    taught: Option<(Limits, Option<Vehicle>)>,
+}
+
+impl Past {
+    /// These limits, with what recordings of earlier flights teach of the vehicle.
+    ///
+    /// # Errors
+    /// A usage error where the recordings are of different vehicles.
+    pub(super) fn of(limits: Limits, past: &[PathBuf], system: Option<u8>) -> Result<Self> {
+        if past.is_empty() {
+            return Ok(Self { limits, taught: None });
+        }
+        let found = find(past, false).context("--past")?.of_system(system)?;
+        let (baselines, vehicle) = learnt(&limits, &found.places)?;
+        let flights = quantities().map(|quantity| baselines.get(quantity).flights).max().unwrap_or(0);
+        if flights < FLIGHTS_MIN {
+            note!(
+                "--past: steady flight of {flights} flights was found, and {FLIGHTS_MIN} make a baseline: trends are not judged"
+            );
+        }
+        let taught = Some((limits.clone().after(&baselines), vehicle));
+        Ok(Self { limits, taught })
     }
-    let found = find(past, false).context("--past")?.of_system(system)?;
-    let baselines = learn(&limits, &found.places)?;
-    let flights = quantities().map(|quantity| baselines.get(quantity).flights).max().unwrap_or(0);
-    if flights < FLIGHTS_MIN {
-        note!(
-            "--past: steady flight of {flights} flights was found, and {FLIGHTS_MIN} make a baseline: trends are not judged"
-        );
+
+    /// Judges a recording; `shows` how far it is. What other vehicles flew says nothing of its own: then it is judged without that,
+    /// which is said.
+    pub(super) fn judge(&self, place: &Place, heard: Heard, shows: bool) -> Result<Read> {
+        let Some((taught, past)) = &self.taught else {
+            return overview::judge(place, &self.limits, heard, shows);
+        };
+        let read = overview::judge(place, taught, heard, shows)?;
+        let Some((past, own)) = past.zip(vehicle(&read)).filter(|(past, own)| are_two(past, own)) else {
+            return Ok(read);
+        };
+        let (past, own) = (words(&past), words(&own));
+        if place.is_standard() {
+            bail!("{}: is of {own}, and --past of {past}: leave --past out", place.title);
+        }
+        let mut read = overview::judge(place, &self.limits, heard, shows)?;
+        read.judged.remarks.push(format!(
+            "trends are not judged: the flights of --past are of another vehicle ({past}; this is {own})"
+        ));
+        Ok(read)
     }
-    Ok(limits.after(&baselines))
 }
 
 /// What is normal after the flights of these recordings, in their order.
+///
+/// # Errors
+/// A usage error where they are of different vehicles.
 pub fn learn(limits: &Limits, places: &[Place]) -> Result<Baselines> {
-    places.iter().try_fold(Baselines::new(), |past, place| {
-        let read = overview::judge(place, &limits.clone().after(&past), Heard::Somewhere, false)?;
-        Ok(*read.judged.monitor.baselines())
-    })
+    learnt(limits, places).map(|(baselines, _)| baselines)
+}
+
+/// The same, and whose flights they are, where that is known.
+fn learnt(limits: &Limits, places: &[Place]) -> Result<(Baselines, Option<Vehicle>)> {
+    let (mut baselines, mut first) = (Baselines::new(), None::<(&str, Vehicle)>);
+    for place in places {
+        let read = overview::judge(place, &limits.clone().after(&baselines), Heard::Somewhere, false)?;
+        baselines = *read.judged.monitor.baselines();
+        let Some(own) = vehicle(&read) else { continue };
+        let (title, vehicle) = first.get_or_insert((&place.title, own));
+        if are_two(vehicle, &own) {
+            return Err(usage(format!(
+                "--past: {title} is of {}, and {} of {}: name flights of one vehicle",
+                words(vehicle),
+                place.title,
+                words(&own)
+            )));
+        }
+        // Who says no id in one recording may do in the next.
+        if vehicle.uid == 0 {
+            *vehicle = own;
+        }
+    }
+    Ok((baselines, first.map(|(_, vehicle)| vehicle)))
+}
+
+/// Whose flight it is, where that is known. A DataFlash log does not tell the system id.
+fn vehicle(read: &Read) -> Option<Vehicle> {
+    let vehicle = overview::vehicle(&read.judged.monitor)?;
+    let system = if read.format == Format::DataFlash { 0 } else { vehicle.system };
+    Some(Vehicle { system, ..vehicle })
+}
+
+/// Whether two recordings are certainly of two vehicles: by the autopilot's unique id, where both tell it, otherwise by its system id; and by
+/// what kind of vehicle it is, for an autopilot may have been moved to another airframe.
+fn are_two(one: &Vehicle, other: &Vehicle) -> bool {
+    let airframe = |of: &Vehicle| Airframe { system: of.system, uid: of.uid };
+    let differ = |one: u8, other: u8| one != 0 && other != 0 && one != other;
+    airframe(one).differs(airframe(other))
+        || differ(one.vehicle_type, other.vehicle_type)
+        || differ(one.autopilot, other.autopilot)
+}
+
+/// What it is, as a part of a sentence.
+fn words(of: &Vehicle) -> String {
+    let system = if of.system == 0 { String::new() } else { format!("system {}, ", of.system) };
+    let id = if of.uid == 0 { String::new() } else { format!(", uid {:016x}", of.uid) };
+    format!("{system}{}{id}", type_name(of.vehicle_type))
 }
 
 fn quantities() -> impl Iterator<Item = Quantity> {
     (0..Quantity::COUNT).filter_map(Quantity::from_index)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn two_vehicles_are_told_by_what_both_of_them_tell() {
+        let quad = Vehicle { system: 1, component: 1, autopilot: 3, vehicle_type: 2, firmware: 0, uid: 7 };
+        let with = |change: fn(&mut Vehicle)| {
+            let mut other = quad;
+            change(&mut other);
+            are_two(&quad, &other)
+        };
+        assert!(!with(|_| {}));
+        assert!(with(|other| other.uid = 8));
+        assert!(with(|other| other.vehicle_type = 13), "a hexacopter");
+        assert!(with(|other| other.autopilot = 12), "PX4");
+        assert!(!with(|other| (other.uid, other.vehicle_type, other.autopilot) = (0, 0, 0)), "who knows");
+        assert!(with(|other| (other.uid, other.system) = (0, 2)));
+        assert!(!with(|other| other.system = 2), "a system id can be set");
+    }
 }

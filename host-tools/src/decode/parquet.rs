@@ -27,12 +27,12 @@ use parquet::arrow::ArrowWriter;
 use parquet::basic::Compression;
 use parquet::file::metadata::{KeyValue, RowGroupMetaData};
 use parquet::file::properties::{EnabledStatistics, WriterProperties, WriterPropertiesBuilder};
-use rayon::prelude::*;
 
 use super::batches::{Batches, FrameColumns, Rows, frame_schema};
 use super::cells::CellColumns;
 use super::table::Table;
 use crate::files::{Folder, FolderFile, cannot_write};
+use crate::logs::in_order::{in_order, workers};
 
 /// What is held at most: some 55 MiB with all that reading takes.
 const LIMITS: Limits = Limits { pending_bytes: 12 << 20, open_bytes: 8 << 20 };
@@ -147,8 +147,9 @@ impl ParquetTables {
         for few in sizes.chunks(AT_ONCE) {
             let Self { folder, properties, tables, .. } = self;
             let is_one = |table: &Table| few.iter().any(|(_, few)| few == table);
-            let few: Vec<_> = tables.iter_mut().filter(|(table, _)| is_one(table)).collect();
-            few.into_par_iter().try_for_each(|(_, file)| file.write_group(folder, properties))?;
+            let mut few = tables.iter_mut().filter(|(table, _)| is_one(table));
+            let write = |(_, file): (&Table, &mut TableFile)| file.write_group(folder, properties);
+            in_order(workers(), AT_ONCE, || Ok(few.next()), write, |written| written)?;
             self.close_largest()?;
         }
         Ok(())
@@ -174,14 +175,12 @@ impl ParquetTables {
     pub fn finish(mut self) -> Result<(PathBuf, usize)> {
         let count = self.tables.len();
         let (folder, properties) = (&self.folder, &self.properties);
-        let mut tables: Vec<TableFile> = std::mem::take(&mut self.tables).into_values().collect();
-        while !tables.is_empty() {
-            let few = tables.split_off(tables.len().saturating_sub(AT_ONCE));
-            few.into_par_iter().try_for_each(|mut table| {
-                table.write_group(folder, properties)?;
-                table.end_file()
-            })?;
-        }
+        let mut tables = std::mem::take(&mut self.tables).into_values();
+        let write = |mut table: TableFile| {
+            table.write_group(folder, properties)?;
+            table.end_file()
+        };
+        in_order(workers(), AT_ONCE, || Ok(tables.next()), write, |written| written)?;
         let path = self.folder.path().to_owned();
         self.folder.finish()?;
         Ok((path, count))

@@ -1,6 +1,6 @@
 //! A log that was read: what tells whether it is whole.
 
-use super::files::Files;
+use super::files::{Files, behind_words};
 use super::place::{Misnamed, PowerOn, SessionBefore};
 use super::proof::Proof;
 use crate::logs::Log;
@@ -68,8 +68,18 @@ impl Ending {
             )
         };
         let begun_anew = self.begun_anew.filter(|anew| anew.is_confirmed);
-        let again = self.again.as_deref().map(again_words);
+        let again = self.again.as_deref().map(|of| again_words(of) + &self.behind_copy());
         again.or_else(|| self.left_over.then(left_over)).or_else(|| begun_anew.map(BegunAnew::words))
+    }
+
+    /// What lies behind the last sector of a mere copy and is no sector: its original may not have it there. No finding, as in a
+    /// log that is no copy.
+    fn behind_copy(&self) -> String {
+        let behind = &self.summary.behind;
+        if behind.foreign + behind.unsound == 0 {
+            return String::new();
+        }
+        format!("; behind its last sector: {}", behind_words(behind))
     }
 
     /// Whether it is to be counted: its session is not there under another name.

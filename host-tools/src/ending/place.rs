@@ -4,7 +4,7 @@ use std::path::Path;
 
 use crate::hex::hex;
 use crate::logs::board::Board;
-use crate::logs::naming::segment_name;
+use crate::logs::naming::segment_or_part;
 use crate::logs::sessions::copy_words;
 use crate::plural::count;
 
@@ -49,7 +49,7 @@ pub enum Misnamed {
 impl Misnamed {
     /// What a file's name tells, of a log that a box with this id recorded, that is not so.
     pub fn of_name(file: &str, session: u32, board: Option<Board>) -> Option<Self> {
-        let name = segment_name(Path::new(file))?;
+        let name = segment_or_part(Path::new(file))?;
         if let Some(named) = name.named_session().filter(|named| *named != session) {
             return Some(Self::Session { named, own: session });
         }

@@ -123,7 +123,9 @@ fn line(log: &Overview, width: usize) -> String {
         let _ = write!(text, "; {}", word(&aside));
     }
     if !log.is_sound() {
-        let _ = write!(text, "; {} (hums verify says why)", warning("not proved to be whole"));
+        // What is no log of ours is judged by another command.
+        let teller = if log.format.is_some() { "check says where" } else { "verify says why" };
+        let _ = write!(text, "; {} (hums {teller})", warning("not proved to be whole"));
     }
     text
 }
@@ -202,6 +204,17 @@ mod tests {
         assert_eq!(worst(&log).map(|worst| worst.level), Some("warning"));
         log.contents.findings = vec![finding("cell_voltage", "ok", 2)];
         assert!(worst(&log).is_none());
+    }
+
+    #[test]
+    fn why_a_log_is_not_whole_the_command_says_that_reads_it() {
+        let told = |format| {
+            let mut log = Overview { format, ..Overview::default() };
+            (log.ending.summary.gaps, log.ending.summary.session) = (1, Some(7));
+            line(&log, 5)
+        };
+        assert!(told(Some(Format::DataFlash)).contains("(hums check says where)"));
+        assert!(told(None).contains("(hums verify says why)"));
     }
 
     #[test]

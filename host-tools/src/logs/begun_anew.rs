@@ -237,7 +237,7 @@ fn confirm(known: &[Known<'_>], all: &mut BTreeMap<u32, BegunAnew>) {
 }
 
 /// The session before a log on its card and how it ended, where the beginning of the log tells that.
-fn before(log: &Log) -> Option<Before> {
+pub(super) fn before(log: &Log) -> Option<Before> {
     at_beginning(log, |boot| Some(boot.before).filter(Before::has_end))
 }
 

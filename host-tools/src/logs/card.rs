@@ -1,6 +1,6 @@
 //! The logs in a file and on a card: by its file system, or where that does not tell, by looking at every block.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs::File;
 use std::io;
 use std::path::Path;
@@ -16,6 +16,7 @@ use super::found::{Found, Image, belong};
 use super::places::{BLOCK_BYTES, Log, Piece};
 use super::reader::likely_epoch;
 use super::scan::{Files, Scan, scan};
+use super::sessions::first_session;
 use crate::card::{ReadOnlyImage, length};
 
 /// What a deleted name's digits count up to.
@@ -127,17 +128,7 @@ fn by_file_system(path: &Path, walk: Walk, about: &mut Image) -> Result<Vec<Card
             .damage
             .push(format!("{clusters}, with sectors of logs in them: an entry of a directory is lost"));
     }
-    // Older logs are deleted to make room; the newest one is what a card is read for. The first digit of a deleted one is
-    // lost: of the numbers that it may have had, the next one to those that are there counts.
-    let newest = walk.files.iter().filter_map(|file| Some(file.name?.session)).max();
-    let after = |deleted: &Deleted| {
-        let ahead = (deleted.name.session + DIGITS - newest? % DIGITS) % DIGITS;
-        (1..DIGITS / 2).contains(&ahead).then_some((newest? + ahead, *deleted))
-    };
-    if let Some((number, deleted)) = walk.deleted.iter().filter_map(after).max_by_key(|(number, _)| *number)
-        && let Some(first) = first_sector(path, vec![deleted.place])?
-        && !is_older_than_all(path, &deleted, first.session, &walk.files)
-    {
+    if let Some(number) = newest_deleted(path, &walk.files, &walk.deleted)? {
         about
             .damage
             .push(format!("session {number:05}, which is newer than all that are there, was deleted"));
@@ -146,17 +137,46 @@ fn by_file_system(path: &Path, walk: Walk, about: &mut Image) -> Result<Vec<Card
     Ok(walk.files)
 }
 
+/// The number of the newest deleted log that was recorded after all that are there. Older logs are deleted to make room; the newest
+/// one is what a card is read for.
+fn newest_deleted(path: &Path, files: &[CardFile], deleted: &[Deleted]) -> Result<Option<u32>> {
+    let newest = files.iter().filter_map(|file| Some(file.name?.session)).max();
+    // The first digit of a deleted one is lost: of the numbers that it may have had, the next one to those that are there counts.
+    let after = |deleted: &Deleted| {
+        let ahead = (deleted.name.session + DIGITS - newest? % DIGITS) % DIGITS;
+        (1..DIGITS / 2).contains(&ahead).then_some((newest? + ahead, *deleted))
+    };
+    let mut deleted: Vec<_> = deleted.iter().filter_map(after).collect();
+    deleted.sort_by_key(|(number, deleted)| (*number, deleted.name));
+    let logs = sessions_of(path, files);
+    let mut sessions: BTreeSet<u32> = logs.iter().filter_map(first_session).collect();
+    let (mut following, mut other) = (None, None);
+    for (number, deleted) in deleted {
+        let Some(first) = first_sector(path, vec![deleted.place])? else { continue };
+        let extent = Extent { length: deleted.bytes, ..deleted.place };
+        let log = Log { session: Some(first.session), ..lost(path, vec![extent]) };
+        // It goes on with a power-on of which a log is there, or its own beginning says that one of these was recorded just before
+        // it: whatever the clocks say, which may have been wrong.
+        let is_known = |session: u32| sessions.contains(&session);
+        if is_known(first.session) || begun_anew::before(&log).is_some_and(|before| is_known(before.session))
+        {
+            following = Some(number);
+            sessions.insert(first.session);
+        } else {
+            other = Some((number, log));
+        }
+    }
+    let other = other.filter(|(_, log)| following.is_none() && !is_older_than_all(log, &logs));
+    Ok(following.or(other.map(|(number, _)| number)))
+}
+
 /// Whether a deleted log was recorded before the first one that is there, which found none on its card, and is newer by its
 /// clock: numbers began anew after all logs had been deleted.
-fn is_older_than_all(path: &Path, deleted: &Deleted, session: u32, files: &[CardFile]) -> bool {
-    let extent = Extent { length: deleted.bytes, ..deleted.place };
-    let deleted = Log { session: Some(session), ..lost(path, vec![extent]) };
+fn is_older_than_all(deleted: &Log, logs: &[Log]) -> bool {
     let epoch = |log: &Log| likely_epoch(log).ok().flatten();
-    let logs = sessions_of(path, files);
     let first = logs.first().filter(|first| begun_anew::found_nothing(first));
-    first.is_some_and(|first| {
-        epoch(first).zip(epoch(&deleted)).is_some_and(|(first, deleted)| deleted < first)
-    })
+    first
+        .is_some_and(|first| epoch(first).zip(epoch(deleted)).is_some_and(|(first, deleted)| deleted < first))
 }
 
 /// The sessions of which there are sectors outside of the logs that the file system knows of.

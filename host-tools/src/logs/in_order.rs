@@ -11,7 +11,7 @@ use std::thread;
 use anyhow::Result;
 
 /// How many may work: as many as there are processors that this program may use, or as `RAYON_NUM_THREADS` says, which
-/// the libraries obey as well.
+/// other programs obey as well.
 pub fn workers() -> usize {
     // Asked for by each log, and a dozen files of the system's to read.
     static WORKERS: LazyLock<usize> = LazyLock::new(|| {
@@ -50,12 +50,16 @@ pub fn in_order<T: Send, R: Send>(
             if let Some(sender) = sender.take() {
                 for _ in 1..workers.min(given) {
                     let (queue, work, sender) = (&queue, &work, sender.clone());
-                    scope.spawn(move || {
+                    let worker = move || {
                         while let Some((index, item)) = queue.wait() {
                             let promise = Promise { sender: &sender, index, result: None };
                             promise.keep(work(item));
                         }
-                    });
+                    };
+                    // Where the system gives no thread, those that are there do its work.
+                    if thread::Builder::new().spawn_scoped(scope, worker).is_err() {
+                        break;
+                    }
                 }
             }
             waiting.extend(results.try_iter());

@@ -102,6 +102,13 @@ pub fn part_name(whole: &Path) -> PathBuf {
     whole.with_extension("part.HUM")
 }
 
+/// The segment that a file's name says it is, or is a part of.
+pub fn segment_or_part(path: &Path) -> Option<SegmentName> {
+    let whole = |stem: &str| Some(path.with_file_name(stem.get(..stem.len().checked_sub(PART.len())?)?));
+    let part = path.file_stem().filter(|_| is_part(path)).and_then(|stem| whole(stem.to_str()?));
+    segment_name(part.as_deref().unwrap_or(path))
+}
+
 /// Whether a file's name says that it is a part of a log.
 pub fn is_part(path: &Path) -> bool {
     let is_hum = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("hum"));
@@ -149,6 +156,8 @@ mod tests {
         let part = part_name(Path::new("logs/00042-s1a2b3c4d_07.HUM"));
         assert_eq!(part, Path::new("logs/00042-s1a2b3c4d_07.part.HUM"));
         assert!(is_part(&part) && is_part(Path::new("a.PART.hum")) && segment_name(&part).is_none());
+        let named = |path: &Path| segment_or_part(path)?.named_session();
+        assert_eq!((named(&part), named(Path::new("a.part.hum"))), (Some(0x1a2b_3c4d), None));
         for other in ["00042-s1a2b3c4d_07.HUM", "a.part", "part.HUM", "a.part.tlog"] {
             assert!(!is_part(Path::new(other)), "{other}");
         }

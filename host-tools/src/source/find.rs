@@ -15,7 +15,7 @@ use crate::files::{FileId, content_identity, why_unread};
 use crate::logs::find::{Image, REMARKS_MAX, check_seekable};
 use crate::logs::naming::{identity_at_end, session_of};
 use crate::logs::sessions::{Sessions, first_session};
-use crate::logs::{self, Content, Log, segment_name};
+use crate::logs::{self, Content, segment_name};
 use crate::outcome::usage;
 use crate::plural::count;
 use crate::printable;
@@ -96,8 +96,7 @@ impl Found {
         self.seen.extend(inside.into_keys());
     }
 
-    /// Drops tlogs that `hums decode` made of what is there too, by their names and, of a log of ours, their first frames: a flight
-    /// counts once.
+    /// Drops tlogs that `hums decode` made of what is there too, by their names and their frames: a flight counts once.
     fn drop_made(&mut self, before: usize) {
         let found = self.places.get(before..).unwrap_or_default();
         let made = |place: &Place| {
@@ -110,34 +109,32 @@ impl Found {
         if made.iter().all(Option::is_none) {
             return;
         }
-        let mut sessions: BTreeMap<u32, Vec<(&str, &Log)>> = BTreeMap::new();
-        for (title, log) in found.iter().filter_map(|place| Some((place.title.as_str(), place.own()?))) {
-            if let Some(session) = first_session(log) {
-                sessions.entry(session).or_default().push((title, log));
+        let mut sessions: BTreeMap<u32, Vec<&Place>> = BTreeMap::new();
+        for place in found {
+            if let Some(session) = place.own().and_then(first_session) {
+                sessions.entry(session).or_default().push(place);
             }
         }
-        let of_session = |tlog: &Path, session: u32| {
-            let logs = sessions.get(&session)?;
-            let original = logs.iter().find(|(_, log)| is_made_of(tlog, log));
-            let (title, _) = original.or_else(|| logs.first())?;
-            Some(((*title).to_owned(), original.is_some()))
+        // What may be the original: where none of these is it, the first one is named.
+        let of = |tlog: &Path, originals: &[&Place]| {
+            let original = originals.iter().find(|place| is_made_of(tlog, place));
+            let named = original.or_else(|| originals.first())?;
+            Some((named.title.clone(), original.is_some()))
         };
-        let of_file = |base: &str, identity: &str| {
-            let mut paths = found.iter().filter_map(Place::path);
-            paths
-                .find(|path| {
-                    path.file_name().is_some_and(|name| name == base)
-                        && content_identity(path).is_some_and(|content| content == identity)
-                })
-                .map(|path| (path.display().to_string(), true))
+        let of_file = |base: &str, identity: &str| -> Vec<&Place> {
+            let is_it = |path: &Path| {
+                path.file_name().is_some_and(|name| name == base)
+                    && content_identity(path).is_some_and(|content| content == identity)
+            };
+            found.iter().filter(|place| place.path().is_some_and(is_it)).collect()
         };
         let originals: Vec<_> = made
             .into_iter()
             .map(|made| {
                 let (path, base, identity) = made?;
                 match session_of(&identity) {
-                    Some(session) => of_session(&path, session),
-                    None => of_file(&base, &identity),
+                    Some(session) => of(&path, sessions.get(&session)?),
+                    None => of(&path, &of_file(&base, &identity)),
                 }
             })
             .collect();
@@ -147,7 +144,7 @@ impl Found {
                     format!("{}: was made by hums of {of}, which is read, and is passed over", place.title)
                 }
                 Some((of, false)) => format!(
-                    "{}: has the name of what hums makes of {of}, and begins with other frames: it is read as a recording of its own",
+                    "{}: has the name of what hums makes of {of}, and more or other frames: it is read as a recording of its own",
                     place.title
                 ),
                 None => String::new(),

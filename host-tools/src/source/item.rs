@@ -10,6 +10,7 @@
 //! **Damage** is walked over. What is missing is an [`Item::Gap`] with its place and its reason; an error is for what
 //! cannot be read at all.
 
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use anyhow::Result;
@@ -141,6 +142,19 @@ pub struct Table {
     pub name: String,
     /// Its columns.
     pub columns: Vec<Column>,
+}
+
+impl Table {
+    /// The name of a recording's next table: the first one of `name`, `name_2` and so on that none of those before has.
+    pub fn free_name(taken: &mut BTreeSet<String>, name: &str) -> String {
+        let mut free = name.to_owned();
+        let mut number = 2_u32;
+        while !taken.insert(free.clone()) {
+            free = format!("{name}_{number}");
+            number += 1;
+        }
+        free
+    }
 }
 
 /// One column. An array is a column for each element: `q[0]`, `q[1]`.

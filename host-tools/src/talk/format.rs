@@ -40,7 +40,7 @@ pub fn run(args: &cli::FormatCard) -> Result<Outcome> {
     if !args.yes {
         return Err(usage("everything on the board's card will be lost; say --yes if that is meant"));
     }
-    let mut client = Client::connect(&args.at)?;
+    let mut client = Client::connect_alone(&args.at)?;
     let system = client.system();
     format(&mut client, SILENCE, LIMIT).with_context(|| format!("system {system}"))?;
     if args.json {

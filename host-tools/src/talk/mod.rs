@@ -6,24 +6,29 @@ pub mod format;
 pub mod params;
 pub mod pull;
 
-use std::collections::{BTreeSet, VecDeque};
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::path::Path;
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result, anyhow, bail};
 use hums_link::encode::{COMPONENT, Encoder, FRAME_BYTES_MAX};
-use hums_link::packet::Packet;
+use hums_link::packet::{Fields, Packet};
 use hums_link::signing::{Clock, Key, Seal, stamp};
-use hums_link::{Check, Frame, Framer};
+use hums_link::{Check, Frame, Framer, messages};
 
 use crate::cli::Link;
 use crate::duplex::{self, Duplex};
 use crate::files::read_short;
 use crate::hex;
 use crate::interrupt;
-use crate::mavlink::ids::HEARTBEAT;
+use crate::logs::board::Board;
+use crate::mavlink::ids::{AUTOPILOT_VERSION, HEARTBEAT};
 use crate::outcome::usage;
 
+/// `MAV_CMD_REQUEST_MESSAGE`
+const REQUEST_MESSAGE: u16 = 512;
+/// Where `AUTOPILOT_VERSION` has `uid2`.
+const UID_AT: usize = 60;
 /// A ground station's usual identity.
 const SYSTEM: u8 = 255;
 /// `MAV_COMP_ID_MISSIONPLANNER`
@@ -60,6 +65,16 @@ impl Client {
     /// # Errors
     /// No board is heard; or more than one, and nobody said which: a usage error.
     pub fn connect(link: &Link) -> Result<Self> {
+        // Who says which one it is has not to wait for others.
+        Self::find_on(link, if link.system.is_some() { Duration::ZERO } else { LISTEN })
+    }
+
+    /// The same, for what cannot be undone: others are listened for also where `--system` is given.
+    pub fn connect_alone(link: &Link) -> Result<Self> {
+        Self::find_on(link, LISTEN)
+    }
+
+    fn find_on(link: &Link, listen: Duration) -> Result<Self> {
         let endpoint = &link.link;
         if !endpoint.is_live() {
             return Err(usage(format!("--link {endpoint}: a file does not answer; give udp, tcp or serial")));
@@ -68,7 +83,7 @@ impl Client {
         let duplex = duplex::open(endpoint, READ)?;
         interrupt::watch();
         let mut client = Self::over(duplex, seal);
-        client.find(link.system, LISTEN).with_context(|| endpoint.to_string())?;
+        client.find(link.system, listen).with_context(|| endpoint.to_string())?;
         note!("system {}: its board is heard", client.system);
         Ok(client)
     }
@@ -87,35 +102,37 @@ impl Client {
         }
     }
 
-    /// Takes the board of this system, or of the only one that is heard within `listen` from the first one on.
+    /// Takes the board of this system, or of the only one that is heard within `listen` from the first one on. Two boards of one system
+    /// are known by their unique ids, for which each is asked.
     fn find(&mut self, wanted: Option<u8>, listen: Duration) -> Result<()> {
-        let mut heard = BTreeSet::new();
-        let mut end = Instant::now() + CONNECT;
-        while let Some(system) = self.next(end, |frame| (frame.id() == HEARTBEAT).then(|| frame.system()))? {
-            if wanted == Some(system) {
-                self.system = system;
-                return Ok(());
+        let mut heard: BTreeMap<u8, BTreeSet<Board>> = BTreeMap::new();
+        let (mut end, mut is_found) = (Instant::now() + CONNECT, false);
+        while let Some((system, id)) = self.next(end, told)? {
+            heard.entry(system).or_default().extend(id);
+            if wanted.is_some_and(|wanted| wanted != system) || id.is_some() {
+                continue;
             }
-            if heard.insert(system) && heard.len() == 1 && wanted.is_none() {
+            if !std::mem::replace(&mut is_found, true) {
                 end = Instant::now() + listen;
             }
-        }
-        let systems = heard.iter().map(u8::to_string).collect::<Vec<_>>().join(", ");
-        match (wanted, heard.first()) {
-            (None, Some(system)) if heard.len() == 1 => {
-                self.system = *system;
-                Ok(())
-            }
-            (None, Some(_)) => {
-                Err(usage(format!("boards of the systems {systems} are heard; say which: --system N")))
-            }
-            (Some(wanted), Some(_)) => bail!(
-                "no board of system {wanted} is heard (component {COMPONENT}), but of {systems}; is --system as it should be?"
-            ),
-            (_, None) => {
-                bail!("no board of ours is heard (component {COMPONENT}); is GS_PATH as it should be?")
+            if !listen.is_zero() {
+                let about = [AUTOPILOT_VERSION as f32];
+                self.send(&messages::command_long(REQUEST_MESSAGE, &about, system, COMPONENT))?;
             }
         }
+        let meant = |system: &u8| wanted.map_or(heard.len() == 1, |wanted| wanted == *system);
+        let Some((system, ids)) = heard.iter().find(|(system, _)| meant(system)) else {
+            return Err(not_found(wanted, heard.keys()));
+        };
+        if ids.len() > 1 {
+            bail!(
+                "{} boards, by their unique ids, say that they are of system {system}, and which one would answer nobody knows; give \
+                 their vehicles different system ids, or switch all but one off",
+                ids.len()
+            );
+        }
+        self.system = *system;
+        Ok(())
     }
 
     /// The system that the board is part of.
@@ -213,6 +230,29 @@ impl Client {
     }
 }
 
+/// What a board tells of itself: its system, and its unique id where it is asked for.
+fn told(frame: &Frame<'_>) -> Option<(u8, Option<Board>)> {
+    match frame.id() {
+        HEARTBEAT => Some((frame.system(), None)),
+        AUTOPILOT_VERSION => Some((frame.system(), Some(Fields(frame.payload()).bytes(UID_AT)))),
+        _ => None,
+    }
+}
+
+/// Why there is no board to talk with, where those of these systems are heard.
+fn not_found<'a>(wanted: Option<u8>, heard: impl Iterator<Item = &'a u8>) -> anyhow::Error {
+    let systems = heard.map(u8::to_string).collect::<Vec<_>>().join(", ");
+    match wanted {
+        _ if systems.is_empty() => {
+            anyhow!("no board of ours is heard (component {COMPONENT}); is GS_PATH as it should be?")
+        }
+        None => usage(format!("boards of the systems {systems} are heard; say which: --system N")),
+        Some(wanted) => anyhow!(
+            "no board of system {wanted} is heard (component {COMPONENT}), but of {systems}; is --system as it should be?"
+        ),
+    }
+}
+
 /// Whether a message that names whom it is for is for us, or for all.
 const fn is_for_us(system: u8, component: u8) -> bool {
     (system == SYSTEM || system == 0) && (component == OUR_COMPONENT || component == 0)
@@ -275,5 +315,24 @@ mod tests {
             assert_eq!(find(&[1, 2], Some(wanted)).expect("it is heard"), (wanted, COMPONENT));
         }
         assert_eq!(find(&[7], None).expect("it is the only one"), (7, COMPONENT));
+    }
+
+    #[test]
+    fn two_boards_of_one_system_are_told_by_their_unique_ids() {
+        let find = |ids: [u8; 2], wanted, listen_ms| {
+            let version = move |id: u8| (7, messages::autopilot_version([0, 1, 0], "", &[id; 12]));
+            let mut client = fake::client(&[7, 7], move |frame| {
+                let asks = frame.id() == 76 && Fields(frame.payload()).u16(28) == REQUEST_MESSAGE;
+                if asks { ids.map(version).to_vec() } else { Vec::new() }
+            });
+            client.find(wanted, Duration::from_millis(listen_ms)).map(|()| client.target())
+        };
+        for wanted in [None, Some(7)] {
+            let refused = find([1, 2], wanted, 50).expect_err("which one?").to_string();
+            assert!(refused.starts_with("2 boards") && refused.contains("of system 7"), "{refused}");
+        }
+        // One that is heard by two ways; and who says which one it is and cannot wait gets it.
+        assert_eq!(find([3, 3], None, 50).expect("one board"), (7, COMPONENT));
+        assert_eq!(find([1, 2], Some(7), 0).expect("it is taken"), (7, COMPONENT));
     }
 }

@@ -4,7 +4,7 @@ use std::fs;
 use std::io::Write as _;
 use std::path::Path;
 
-use super::support::{attempt, flight, frames_of, json, px4, recorded, records, run, text};
+use super::support::{attempt, end_of, flight, frames_of, hums, json, px4, recorded, records, run, text};
 
 /// Checks that tell of the place on a link, which a recording of another place cannot.
 const OF_THE_WIRE: [&str; 2] = ["heartbeat", "frames_lost"];
@@ -720,4 +720,30 @@ fn a_file_that_is_no_log_has_an_object_too() {
     assert!(checked["error"].as_str().is_some_and(|error| error.contains("zeros")), "{checked}");
     let both = text(&run(dir.path(), "check --json zeros PX4", 1));
     assert_eq!(both.lines().count(), 2, "{both}");
+}
+
+#[test]
+fn what_another_vehicle_flew_teaches_nothing_and_is_said() {
+    let dir = tempfile::tempdir().expect("directory");
+    let names = ["ap_quad_guided.tlog", "px4_hil_quad_low.tlog"];
+    for name in names {
+        end_of(name, dir.path());
+    }
+    let [ardupilot, px4] = names;
+    let said = run(dir.path(), &format!("check --past {ardupilot} --past {px4} {px4}"), 2);
+    let said = String::from_utf8_lossy(&said.stderr).into_owned();
+    assert!(said.contains("name flights of one vehicle") && said.contains(px4), "{said}");
+    let told = |past: &str| text(&attempt(dir.path(), &format!("check --past {past} {px4}")));
+    let words = "trends are not judged: the flights of --past are of another vehicle (system 1, quadrotor";
+    assert!(told(ardupilot).contains(words), "{}", told(ardupilot));
+    assert!(!told(px4).contains("another vehicle"), "{}", told(px4));
+    // What cannot be read twice cannot be judged without it.
+    let refused = hums()
+        .current_dir(dir.path())
+        .args(["check", "--past", ardupilot, "-"])
+        .write_stdin(fs::read(dir.path().join(px4)).expect("there"))
+        .output()
+        .expect("it runs");
+    assert_eq!(refused.status.code(), Some(1));
+    assert!(String::from_utf8_lossy(&refused.stderr).contains("leave --past out"));
 }

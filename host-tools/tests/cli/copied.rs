@@ -617,6 +617,25 @@ fn a_wiped_card_and_a_deleted_newest_log_are_told_with_and_without_salvage() {
     assert_eq!(codes(), [3; 4]);
 }
 
+/// Order is by number and by what a log says was recorded before it: a clock may have been wrong.
+#[test]
+fn a_newest_log_that_was_deleted_is_told_whatever_its_clock_says() {
+    let dir = tempfile::tempdir().expect("directory");
+    // The clocks of the later ones are 23 minutes and more behind that of the first.
+    for name in ["ap_quad_faults.tlog", "px4_hil_quad_low.tlog", "px4_hil_quad_low.tlog"] {
+        let recording = end_of(name, dir.path());
+        run(dir.path(), &format!("sim --input {} --sd card.img --card-size 64", recording.display()), 0);
+    }
+    let path = dir.path().join("card.img");
+    let mut image = fs::read(&path).expect("an image");
+    for (gone, told) in [(b"00003_00HUM", "00003"), (b"00002_00HUM", "00003")] {
+        delete(&mut image, gone);
+        fs::write(&path, &image).expect("written");
+        let words = format!("session {told}, which is newer than all that are there, was deleted");
+        all_say(dir.path(), "card.img", 3, &[&words]);
+    }
+}
+
 #[test]
 fn a_log_under_another_name_is_read_and_one_that_only_salvage_finds_is_not_called_absent() {
     let dir = copied(3, "");
@@ -1068,9 +1087,59 @@ fn another_flight_under_the_name_that_decode_gives_is_read() {
     for command in ["check copied", "ls copied", "info copied", "report copied -o pages/"] {
         let said = said(command);
         assert!(
-            said.contains(" begins with other frames: it is read as a recording of its own"),
+            said.contains(", and more or other frames: it is read as a recording of its own"),
             "{command}: {said}"
         );
     }
     assert!(text(&attempt(dir.path(), "check copied")).contains("2 logs checked"));
+}
+
+#[test]
+fn a_flight_behind_what_decode_made_or_under_the_name_of_what_it_makes_of_a_recording_is_read() {
+    let dir = copied(1, "");
+    let at = |name: &str| dir.path().join("copied").join(name);
+    let recording = end_of("px4_hil_quad_low.tlog", &at("."));
+    let other = fs::read(end_of("ap_quad_guided.tlog", dir.path())).expect("there");
+    run(dir.path(), "decode copied -o copied/ --format tlog", 0);
+    let of_log = at(&format!("{}.tlog", named(&at("."), "00001")));
+    let of_recording = fs::read_dir(at(".")).expect("there").map(|entry| entry.expect("there").path());
+    let of_recording = of_recording
+        .filter(|path| ![&of_log, &recording].contains(&path))
+        .find(|path| path.extension().is_some_and(|ending| ending == "tlog"))
+        .expect("made of the recording");
+    let read = || {
+        let checked = attempt(dir.path(), "check copied");
+        let said = String::from_utf8_lossy(&checked.stderr).into_owned();
+        let own = said.matches(", and more or other frames: it is read as a recording of its own").count();
+        (text(&checked).contains(&format!("{} logs checked", 2 + own)), own)
+    };
+    assert_eq!(read(), (true, 0));
+    // Behind its end; and in the place of it.
+    for (path, spoiled) in [
+        (&of_log, [fs::read(&of_log).expect("there"), other.clone()].concat()),
+        (&of_recording, [fs::read(&of_recording).expect("there"), other.clone()].concat()),
+        (&of_recording, other),
+    ] {
+        let made = fs::read(path).expect("there");
+        fs::write(path, spoiled).expect("written");
+        assert_eq!(read(), (true, 1), "{}", path.display());
+        fs::write(path, made).expect("written");
+    }
+}
+
+#[test]
+fn what_lies_behind_a_mere_copy_is_said_and_a_part_with_the_name_of_another_session_too() {
+    let dir = copied(2, "");
+    let at = |name: &str| dir.path().join("copied").join(name);
+    let copy = fs::read(at("00001_00.HUM")).expect("there");
+    let recording = fs::read(end_of("ap_quad_guided.tlog", dir.path())).expect("there");
+    fs::write(at("zcopy.hum"), &copy).expect("written");
+    all_say(dir.path(), "copied", 0, &["is the same session as 00001 once more (not counted)"]);
+    fs::write(at("zcopy.hum"), [copy, recording].concat()).expect("written");
+    let words = "is the same session as 00001 once more (not counted); behind its last sector: ";
+    all_say(dir.path(), "copied", 0, &[words]);
+    fs::remove_file(at("zcopy.hum")).expect("ours");
+    let part = at("00002-sdeadbeef_00.part.HUM");
+    fs::rename(at("00002_00.HUM"), &part).expect("renamed");
+    all_say(dir.path(), "copied", 3, &["its name tells session deadbeef, and its sectors are of session "]);
 }

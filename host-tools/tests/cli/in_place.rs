@@ -142,6 +142,13 @@ fn a_damaged_store_is_told_and_one_that_cannot_be_read_is_refused_and_stays() {
         let records = String::from_utf8_lossy(&records);
         assert_eq!(records.matches("a stored item was lost: older value or anew").count(), told, "{at}");
     }
+    // Erased but for what stands first in it.
+    let mut emptied = whole.clone();
+    emptied[16..].fill(0xFF);
+    fs::write(&store, &emptied).expect("written");
+    let said = String::from_utf8_lossy(&run(dir.path(), sim, 0).stderr).into_owned();
+    assert!(said.contains("--store store: is damaged: nothing is stored in it any more"), "{said}");
+    assert!(fs::read(dir.path().join("hums-kept/5/store")).expect("kept") == emptied, "{said}");
     let mut damaged = whole;
     for at in [0, 16_384] {
         damaged[at] = 0;

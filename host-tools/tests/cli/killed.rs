@@ -279,8 +279,12 @@ fn a_demo_replaces_another_one_only_where_the_user_says_so_and_keeps_it() {
         (tlog.to_str().expect("UTF-8"), Some("--replace"), 2),
         ("demo/card.img", Some("--replace"), 2),
     ] {
-        let said = demo_ends(dir.path(), input, flag.as_slice(), code);
+        let ended =
+            demo(dir.path(), input, flag.as_slice()).stdout(Stdio::piped()).output().expect("it runs");
+        let [said, told] = [ended.stderr, ended.stdout].map(|of| String::from_utf8_lossy(&of).into_owned());
+        assert_eq!(ended.status.code(), Some(code), "{input}: {said}");
         assert!(stamps(&dir.path().join("demo")) == before, "{input}: {said}");
+        assert!(input != "two.raw" || !told.contains("1. two.raw"), "it is refused first: {told}");
         assert!(
             input != "two.raw" || said.contains("card.img: is there already") && said.contains("--replace")
         );
@@ -297,6 +301,12 @@ fn a_demo_replaces_another_one_only_where_the_user_says_so_and_keeps_it() {
         assert_eq!(fs::read(at(name)).expect("there"), b"evidence");
         fs::write(at(name), was).expect("written");
     }
+    // Without the card that a demo makes first, nothing is a demo's.
+    fs::rename(at("card.img"), at("mine.img")).expect("renamed");
+    let before = stamps(&dir.path().join("demo"));
+    let said = demo_ends(dir.path(), "two.raw", &[], 1);
+    assert!(said.contains("ground-station.bin: is there already with other content"), "{said}");
+    assert!(stamps(&dir.path().join("demo")) == before);
 }
 
 #[test]
@@ -432,6 +442,21 @@ fn a_recording_whose_writing_is_ended_says_what_of_it_is_not_in_the_database() {
     std::io::Read::read_to_string(stderr, &mut said).expect("text");
     assert_eq!(live.wait().expect("it ends").code(), Some(3), "{said}");
     assert!(said.contains("where it was ended; the rest is not in the database"), "{said}");
+}
+
+/// What sends two signals at once (a shell and `timeout`, say) means one end.
+#[test]
+fn two_signals_right_after_each_other_end_the_page_in_good_order() {
+    let mut live = Command::new(env!("CARGO_BIN_EXE_hums"));
+    live.args(["live", "--listen", "127.0.0.1:0", "--input"]).arg(flight("ap_quad_guided.tlog"));
+    let mut live = live.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("it runs");
+    // It serves, so it watches for signals.
+    let mut said = [0; 1];
+    std::io::Read::read_exact(live.stdout.as_mut().expect("piped"), &mut said).expect("it says where");
+    let twice = format!("kill -INT {0}; kill -INT {0}", live.id());
+    assert!(Command::new("sh").args(["-c", &twice]).status().expect("it runs").success());
+    let ended = live.wait_with_output().expect("it ends");
+    assert_eq!(ended.status.code(), Some(0), "{}", String::from_utf8_lossy(&ended.stderr));
 }
 
 #[test]

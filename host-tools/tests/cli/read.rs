@@ -8,7 +8,7 @@ use std::process::Stdio;
 use flate2::Compression;
 use flate2::write::GzEncoder;
 
-use crate::support::{flight, frames, frames_of, hums, json, named, px4, recorded, run, text};
+use crate::support::{contents, flight, frames, frames_of, hums, json, named, px4, recorded, run, text};
 
 /// A packed log of the PX4 flight.
 fn packed(dir: &Path) {
@@ -433,4 +433,26 @@ fn slips_of_the_command_line_are_usage_errors() {
         assert!(output.stdout.is_empty() && !output.stderr.is_empty(), "hums {line}");
     }
     assert!(!dir.path().join("c.img").exists(), "a slip left an image behind");
+}
+
+/// A process may have no room for threads (`ulimit -v`): here no stack is as large as it is asked to be.
+#[test]
+fn where_the_system_gives_no_thread_the_work_is_done_without() {
+    let dir = recorded();
+    let decoded = |folder: &str, stack: Option<&str>| {
+        let mut decode = hums();
+        decode.current_dir(dir.path()).args([
+            "decode",
+            "card.img",
+            "--format",
+            "tlog,csv,parquet",
+            "-o",
+            folder,
+        ]);
+        stack.map(|stack| decode.env("RUST_MIN_STACK", stack));
+        let ended = decode.output().expect("it runs");
+        assert_eq!(ended.status.code(), Some(0), "{}", String::from_utf8_lossy(&ended.stderr));
+        contents(&dir.path().join(folder))
+    };
+    assert!(decoded("out", None) == decoded("again", Some("140737488355328")));
 }

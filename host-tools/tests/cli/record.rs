@@ -5,7 +5,7 @@ use std::fs;
 use std::io::Write;
 use std::net::{TcpListener, UdpSocket};
 
-use crate::support::{attempt, flight, frames_of, hums, json, px4, run};
+use crate::support::{attempt, end_of, flight, frames_of, hums, json, px4, run, text};
 
 #[test]
 fn the_tap_shows_what_the_uart_got() {
@@ -153,4 +153,21 @@ fn a_full_card_keeps_its_sessions_unless_the_user_says_so_and_then_each_that_goe
     let newest = after.last().expect("sessions");
     assert!(!after.contains(&"00001".to_owned()) && !before.contains(newest));
     assert_eq!(report["log_files"], serde_json::json!([format!("{newest}_00.HUM")]));
+}
+
+#[test]
+fn what_came_damaged_over_the_line_is_said_by_verify_and_is_no_damage_of_the_log() {
+    let dir = tempfile::tempdir().expect("directory");
+    let recording = end_of("px4_hil_quad_low.tlog", dir.path());
+    for (noise, is_told) in [("", false), (" --noise 0.002", true)] {
+        let _ = fs::remove_file(dir.path().join("card.img"));
+        run(dir.path(), &format!("sim --input {} --sd card.img{noise}", recording.display()), 0);
+        let told = text(&run(dir.path(), "verify card.img", 0));
+        let words = "of no frame came over the line, before the recorder: no damage of the log";
+        assert_eq!(
+            (told.contains(words), told.contains("1 session: everything holds")),
+            (is_told, true),
+            "{told}"
+        );
+    }
 }

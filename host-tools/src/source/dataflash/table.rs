@@ -1,6 +1,6 @@
 //! The tables of rows: a name for each definition, and the same name for the same columns only.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use super::format::{ARRAY_LENGTH, FieldKind, Format};
@@ -17,30 +17,28 @@ const TABLES_MAX: usize = 1_024;
 #[derive(Debug, Default)]
 pub(super) struct Tables {
     by_name: BTreeMap<String, Vec<Arc<Table>>>,
-    count: usize,
+    /// The names that they have: those of two messages may be one, where only letters and digits are left of them.
+    taken: BTreeSet<String>,
 }
 
 impl Tables {
     /// The table of a definition whose columns have these units; `None` where there are too many already.
     /// `is_words`: of a text log.
     pub(super) fn of(&mut self, format: &Format, units: Vec<String>, is_words: bool) -> Option<Arc<Table>> {
-        let name = safe(&format.name);
         let columns = columns(format, units, is_words);
-        if self.count >= TABLES_MAX && !self.by_name.contains_key(&name) {
+        if self.taken.len() >= TABLES_MAX && !self.by_name.contains_key(&format.name) {
             return None;
         }
-        let versions = self.by_name.entry(name.clone()).or_default();
+        let versions = self.by_name.entry(format.name.clone()).or_default();
         if let Some(table) = versions.iter().find(|table| table.columns == columns) {
             return Some(Arc::clone(table));
         }
-        let number = versions.len() + 1;
-        if number > VERSIONS_MAX || self.count >= TABLES_MAX {
+        if versions.len() >= VERSIONS_MAX || self.taken.len() >= TABLES_MAX {
             return None;
         }
-        let name = if number == 1 { name } else { format!("{name}_{number}") };
+        let name = Table::free_name(&mut self.taken, &safe(&format.name));
         let table = Arc::new(Table { name, columns });
         versions.push(Arc::clone(&table));
-        self.count += 1;
         Some(table)
     }
 }
@@ -141,6 +139,19 @@ mod tests {
         let again = tables.of(&format("TimeUS,Roll"), units(), false).expect("a table");
         assert_eq!((first.name.as_str(), second.name.as_str()), ("A_B", "A_B_2"));
         assert!(Arc::ptr_eq(&first, &again));
+    }
+
+    #[test]
+    fn two_messages_whose_names_become_one_name_of_a_file_have_a_table_each() {
+        let mut tables = Tables::default();
+        let mut of = |name: &str, columns: &str| {
+            let format = Format::new(130, 13, name, b"Qc", columns);
+            tables.of(&format, vec![String::new(); 2], false).expect("a table").name.clone()
+        };
+        let names = [("A/B", "TimeUS,V"), ("A\\B", "TimeUS,V"), ("A_B_2", "TimeUS,V"), ("A/B", "TimeUS,W")];
+        let made = names.map(|(name, columns)| of(name, columns));
+        assert_eq!(made, ["A_B", "A_B_2", "A_B_2_2", "A_B_3"]);
+        assert_eq!(names.map(|(name, columns)| of(name, columns)), made, "the same once more");
     }
 
     #[test]

@@ -15,6 +15,9 @@ pub(super) const MESSAGE_BYTES_MAX: usize = HEADER_BYTES + u16::MAX as usize;
 pub(super) const FILE_HEADER_BYTES: usize = 16;
 /// How a file begins.
 pub(super) const MAGIC: [u8; 7] = [b'U', b'L', b'o', b'g', 0x01, 0x12, 0x35];
+/// Where the header has the version of the format, and the newest one that is known: PX4 writes 1, and wrote 0 before v1.8.
+pub(super) const VERSION_AT: usize = MAGIC.len();
+pub(super) const VERSION_MAX: u8 = 1;
 /// The longest message other than data that is looked for in damage: each byte may be the beginning of one, and to look
 /// through 65,536 bytes for each would take seconds a megabyte.
 const FOUND_BYTES_MAX: usize = 2_048;
@@ -47,7 +50,7 @@ pub(super) enum Message<'a> {
     /// `S`
     Sync,
     /// Another log begins: the header of a file in the middle of one.
-    Beginning { time_us: u64 },
+    Beginning { version: u8, time_us: u64 },
     /// A kind that is newer than this reader.
     Unknown,
 }
@@ -141,8 +144,8 @@ impl Parser<'_> {
     /// What stands at the beginning of `rest`, which is all there is if it is shorter than the longest message and the
     /// header after it.
     pub(super) fn look<'a>(&self, rest: &'a [u8]) -> Found<'a> {
-        if let Some(time_us) = beginning(rest) {
-            return Found::Message(Message::Beginning { time_us }, FILE_HEADER_BYTES);
+        if let Some((version, time_us)) = beginning(rest) {
+            return Found::Message(Message::Beginning { version, time_us }, FILE_HEADER_BYTES);
         }
         let Some((kind, body_bytes)) = header(rest) else {
             // Less than a header at the end is a message that was cut.
@@ -330,9 +333,9 @@ impl<'a> Iterator for DataAfter<'a> {
 }
 
 /// The time in the header of a file, where one stands.
-pub(super) fn beginning(rest: &[u8]) -> Option<u64> {
+pub(super) fn beginning(rest: &[u8]) -> Option<(u8, u64)> {
     let header = rest.first_chunk::<FILE_HEADER_BYTES>()?;
-    header.starts_with(&MAGIC).then(|| word(header.get(8..)))
+    header.starts_with(&MAGIC).then(|| (header[VERSION_AT], word(header.get(8..))))
 }
 
 fn word(bytes: Option<&[u8]>) -> u64 {

@@ -11,7 +11,8 @@ use hums_core::time::Span;
 use super::fields::Fields;
 use super::format::Formats;
 use super::message::{
-    FILE_HEADER_BYTES, Found, Keyed, MESSAGE_BYTES_MAX, Message, Parser, beginning, words as text_of,
+    FILE_HEADER_BYTES, Found, Keyed, MESSAGE_BYTES_MAX, Message, Parser, VERSION_AT, VERSION_MAX, beginning,
+    words as text_of,
 };
 use super::px4::{Px4, Said, Told};
 use super::rows;
@@ -44,13 +45,14 @@ const WORDS_BYTES_MAX: usize = 256;
 /// Reads a log from its beginning to its end.
 pub(super) fn read<R: Read>(window: &mut Window<R>, want: Want<'_>, take: &mut Take<'_>) -> Result<Summary> {
     window.fill(FILE_HEADER_BYTES);
-    let Some(time_us) = beginning(window.rest()) else {
+    let Some((version, time_us)) = beginning(window.rest()) else {
         bail!("is no PX4 log: a ULog begins with 16 bytes of header, and this does not");
     };
     window.consume(FILE_HEADER_BYTES);
     let mut session = Session::new(want, take);
     let first = times::first_in(window);
     session.begin(0, time_us, &first, window.ended());
+    session.version(0, version)?;
     loop {
         window.fill(LOOK_BYTES);
         let place = window.place();
@@ -247,9 +249,23 @@ impl<'a, 'b> Session<'a, 'b> {
                 self.text(level, tag, time_us, text_of(words))
             }
             Message::Dropout(milliseconds) => self.dropout(place, milliseconds),
-            Message::Beginning { time_us } => self.another(place, time_us, after),
+            Message::Beginning { version, time_us } => {
+                self.another(place, time_us, after)?;
+                self.version(place, version)
+            }
             Message::Sync | Message::Unknown => Ok(()),
         }
+    }
+
+    /// A newer format may mean something else by what is read as this one: that is told as damage of the log's beginning.
+    fn version(&mut self, beginning: u64, version: u8) -> Result<()> {
+        if version <= VERSION_MAX {
+            return Ok(());
+        }
+        let words = format!(
+            "a header of ULog's version {version}: it is read as version {VERSION_MAX}, the newest that is known, and what is made of it may be wrong"
+        );
+        self.gap(Cause::Damaged, Some(beginning + VERSION_AT as u64), 1, words)
     }
 
     /// Flags that nobody knows change what follows: the format says that a reader must refuse them.

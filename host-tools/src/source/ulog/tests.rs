@@ -367,6 +367,39 @@ fn a_log_that_was_joined_to_another_is_another_recording_with_its_own_definition
 }
 
 #[test]
+fn a_version_that_is_not_known_is_told_and_what_can_be_read_is() {
+    let of_version = |version| {
+        let mut log = small().bytes;
+        log[7] = version;
+        log
+    };
+    for version in [0, 1] {
+        assert_eq!(read(&of_version(version)).gaps.len(), 0, "{version}");
+    }
+    let told = read(&of_version(9));
+    assert_eq!(told.of("row position").len(), 20);
+    let gap = &told.gaps[0];
+    assert_eq!((gap.cause, gap.place, told.gaps.len()), (Cause::Damaged, Some(7), 1));
+    assert!(gap.words.contains("version 9") && gap.words.contains("read as version 1"), "{gap:?}");
+    // Of a log that was joined on, too.
+    let first = small().bytes;
+    let told = read(&[&first[..], &of_version(2)].concat());
+    assert_eq!(told.gaps.iter().map(|gap| gap.place).collect::<Vec<_>>(), [Some(first.len() as u64 + 7)]);
+}
+
+#[test]
+fn two_topics_whose_names_become_one_name_of_a_file_have_a_table_each() {
+    let fields = "uint64_t timestamp;float x;";
+    let log = ["a/b", "a_b"].into_iter().zip(0..).fold(Writer::new(SECOND), |log, (name, id)| {
+        let log = log.format(&format!("{name}:{fields}")).subscribe(id, 0, name);
+        log.data(id, 2 * SECOND, &f32::from(id).to_le_bytes())
+    });
+    let told = read(&log.bytes);
+    let rows = ["row a_b ", "row a_b_2 "].map(|table| told.of(table));
+    assert_eq!(rows, [["0,2000000,0"], ["0,2000000,1"]]);
+}
+
+#[test]
 fn truncation_at_every_byte_gives_what_came_before() {
     let log = small().bytes;
     let mut ends = Vec::new();

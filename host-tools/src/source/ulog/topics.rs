@@ -1,6 +1,6 @@
 //! Subscriptions: which topic a message of data is of, and what is to be done with it.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use super::fields::{Slot, slots};
@@ -57,6 +57,8 @@ pub(super) struct Subscriptions {
     living: usize,
     /// Tables by topic: the instances of a topic share one. In a log that was joined on it may have other columns.
     tables: BTreeMap<String, Vec<Arc<Table>>>,
+    /// The names of these: those of two topics may be one (`a/b` and `a_b`).
+    taken: BTreeSet<String>,
     columns: usize,
     counted: BTreeMap<String, (u64, u64)>,
 }
@@ -128,7 +130,7 @@ impl Subscriptions {
             return None;
         }
         let mut table = rows::table(layout);
-        let tables = self.tables.entry(table.name.clone()).or_default();
+        let tables = self.tables.entry(layout.name.clone()).or_default();
         if let Some(known) = tables.iter().find(|known| known.columns == table.columns) {
             return Some(Arc::clone(known));
         }
@@ -136,9 +138,7 @@ impl Subscriptions {
         if self.columns > COLUMNS_MAX {
             return None;
         }
-        if !tables.is_empty() {
-            table.name = format!("{}_{}", table.name, tables.len() + 1);
-        }
+        table.name = Table::free_name(&mut self.taken, &table.name);
         let table = Arc::new(table);
         tables.push(Arc::clone(&table));
         Some(table)
