@@ -2,15 +2,17 @@
 
 use std::fs;
 
-use hums_tests::program;
+use hums_tests::{child, hostile, program};
 use sha2::{Digest as _, Sha256};
 use stm32f405_model::image::{Image, Refused};
 use stm32f405_model::machine::{Board, Machine};
 use stm32f405_model::memory::FLASH;
 use stm32f405_model::time::SECOND;
 
-/// `ldr r0, [pc]; bx r0`, and where there is nothing.
-const NOWHERE: [u8; 8] = [0x00, 0x48, 0x00, 0x47, 0x01, 0x00, 0x00, 0x30];
+/// `movs r0, #3; lsls r0, r0, #28; adds r0, #1; bx r0`: where there is nothing.
+const TO_NOWHERE: [u16; 4] = [0x2003, 0x0700, 0x3001, 0x4700];
+/// `movw r0, #0xED0C; movt r0, #0xE000; movs r1, #4; movt r1, #0x05FA; str r1, [r0]; b .`: AIRCR.SYSRESETREQ.
+const RESET: [u16; 9] = [0xF64E, 0x500C, 0xF2CE, 0x0000, 0x2104, 0xF2C0, 0x51FA, 0x6001, 0xE7FE];
 
 /// The files of a release: ELF, DFU, raw image.
 fn files() -> [Vec<u8>; 3] {
@@ -56,22 +58,52 @@ fn what_is_no_image_of_this_chip_is_refused() {
     assert!(matches!(Image::parse(&other), Err(Refused::Vectors(..))));
 }
 
+/// The release's ELF file with other instructions at the beginning of `main`, and where that is.
+fn with_main(code: &[u16]) -> (Vec<u8>, u32) {
+    let [mut elf, ..] = files();
+    let machine = Machine::new(Image::parse(&elf).unwrap(), Board::default());
+    let main = machine.image().symbols.iter().find(|symbol| symbol.name == "main").unwrap();
+    let was = machine.memory(main.address, main.bytes);
+    let places: Vec<_> = elf.windows(was.len()).enumerate().filter(|(_, bytes)| *bytes == was).collect();
+    let [(at, _)] = places[..] else { panic!("main is there {} times", places.len()) };
+    let (code, main) = (code.iter().flat_map(|half| half.to_le_bytes()), main.address);
+    elf.iter_mut().skip(at).zip(code).for_each(|(byte, new)| *byte = new);
+    (elf, main)
+}
+
+/// What `hums emulate` of this image says.
+fn emulated(elf: &[u8], code: i32) -> String {
+    let dir = tempfile::tempdir().unwrap();
+    let (image, card) = (dir.path().join("hums.elf"), dir.path().join("card.img"));
+    fs::write(&image, elf).unwrap();
+    let mut command = program::command(["emulate", "--card-size", "64", "--input"]);
+    command.arg(hostile::raw_heartbeats(dir.path(), 10)).arg("--sd").arg(card).arg("--firmware").arg(image);
+    child::run(&mut command, program::LIMIT).expect_code(&[code]).stderr
+}
+
 #[test]
 fn a_jump_into_nowhere_stops_with_registers_place_and_the_last_instructions() {
-    let [elf, ..] = files();
+    let (elf, main) = with_main(&TO_NOWHERE);
+    // The image's own handler of faults would reset it, again and again.
+    let said = emulated(&elf, 1);
+    assert!(said.contains("an instruction is wanted from 0x30000000, where none may be"), "{said}");
+    assert!(said.contains(" us, in no function, come from main+0x6\n  r0  30000001"), "{said}");
+    let registers = said.split_once("  r15 30000000\n").expect("the registers");
+    assert_eq!(registers.1.lines().count(), 32, "{said}");
+    assert!(said.ends_with(&format!("  {:08x} main+0x6\n", main + 6)), "{said}");
+    // Where that handler is nowhere too, the processor is locked up.
     let mut image = Image::parse(&elf).unwrap();
-    let main = image.symbols.iter().find(|symbol| symbol.name == "main").unwrap().address;
-    for (at, bytes) in [(main, &NOWHERE[..]), (FLASH.0 + 12, &NOWHERE[4..])] {
-        let inside =
-            |(address, bytes): &&mut (u32, Vec<u8>)| (*address..*address + bytes.len() as u32).contains(&at);
-        let (address, piece) = image.pieces.iter_mut().find(inside).unwrap();
-        let offset = (at - *address) as usize;
-        piece[offset..offset + bytes.len()].copy_from_slice(bytes);
-    }
+    let (_, vectors) = image.pieces.iter_mut().find(|(address, _)| *address == FLASH.0).unwrap();
+    vectors[12..16].copy_from_slice(&0x3000_0001_u32.to_le_bytes());
     let report = Machine::new(image, Board::default()).run_until(SECOND).unwrap_err();
     assert!(report.reason.contains("locked up"), "{report}");
     assert_eq!(report.registers[15], 0x3000_0000, "{report}");
-    assert_eq!(report.trace.len(), 32);
-    let (address, name) = report.trace.last().unwrap();
-    assert_eq!((*address, &**name), (main + 2, "main+0x2"), "{report}");
+}
+
+#[test]
+fn a_board_that_resets_itself_again_and_again_is_told() {
+    let (elf, _) = with_main(&RESET);
+    let said = emulated(&elf, 3);
+    let times = said.split_once("the board reset itself ").and_then(|(_, rest)| rest.split_once(" times"));
+    assert!(times.is_some_and(|(times, _)| times.parse::<u32>().unwrap() > 50), "{said}");
 }

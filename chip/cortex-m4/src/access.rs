@@ -1,8 +1,10 @@
 //! Loads and stores of the processor: alignment, bit-band aliases, the MPU, the processor's own registers, or the bus.
 
 use crate::bus::{Bus, Fault, Size};
+use crate::exceptions::{BUS_FAULT, HARD_FAULT};
 use crate::op::Width;
 use crate::processor::Core;
+use crate::registers::{FORCED, IMPRECISERR};
 use crate::trap::Trap;
 
 /// Where an access goes.
@@ -144,8 +146,15 @@ impl Core {
         if self.control.actlr & 2 != 0 {
             return Err(Trap::Bus(address));
         }
-        self.control.cfsr |= crate::registers::IMPRECISERR;
-        if self.exceptions.pend(crate::exceptions::BUS_FAULT) {
+        self.control.cfsr |= IMPRECISERR;
+        // A `BusFault` that is enabled waits for its turn; one that is not is a `HardFault`.
+        let number = if self.exceptions.enabled.has(BUS_FAULT) {
+            BUS_FAULT
+        } else {
+            self.control.hfsr |= FORCED;
+            HARD_FAULT
+        };
+        if self.exceptions.pend(number) {
             self.deadline = 0;
         }
         Ok(())

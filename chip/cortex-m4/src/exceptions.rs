@@ -12,6 +12,11 @@ pub(crate) const DEBUG_MONITOR: u16 = 12;
 pub(crate) const PENDSV: u16 = 14;
 pub(crate) const SYSTICK: u16 = 15;
 
+/// Whether it is one of the four faults.
+pub(crate) fn is_fault(number: u16) -> bool {
+    (HARD_FAULT..=USAGE_FAULT).contains(&number)
+}
+
 /// Below all: the priority of thread mode.
 pub(crate) const THREAD: i16 = 256;
 

@@ -26,6 +26,10 @@ pub enum Outcome {
     /// BKPT with its number, if [`Core::stop_at_breakpoints`] was asked for. The program counter is at it; [`Core::skip`] goes on
     /// behind it.
     Breakpoint(u8),
+    /// A fault's handler is the next to be entered, if [`Core::stop_at_faults`] was asked for; [`Core::fault_status`] has the cause.
+    /// The program counter is where the handler would return to: what faulted, or behind a store that was told late. The stack
+    /// pointer is below the frame that the entry stacked; the other registers are as they were.
+    Fault,
     /// A register of the processor's own at this address, which the model does not have, was accessed. The instruction is done,
     /// as if it read zero and ignored writes.
     Unmodelled(u32),
@@ -92,6 +96,7 @@ pub struct Core {
     trace: [u32; TRACED],
     traced: u64,
     pub(crate) breakpoints_stop: bool,
+    pub(crate) faults_stop: bool,
     pub(crate) slept: u64,
     pub(crate) cyccnt_sleeps: bool,
     pub(crate) depths: Depths,
@@ -148,6 +153,7 @@ impl Core {
             trace: [0; TRACED],
             traced: 0,
             breakpoints_stop: false,
+            faults_stop: false,
             slept: 0,
             cyccnt_sleeps: true,
             depths: Depths::default(),
@@ -163,6 +169,7 @@ impl Core {
         self.trace = old.trace;
         self.traced = old.traced;
         self.breakpoints_stop = old.breakpoints_stop;
+        self.faults_stop = old.faults_stop;
         self.cyccnt_sleeps = old.cyccnt_sleeps;
         self.slept = old.slept;
         self.depths = old.depths;
@@ -272,6 +279,11 @@ impl Core {
     /// `HardFault`.
     pub fn stop_at_breakpoints(&mut self, on: bool) {
         self.breakpoints_stop = on;
+    }
+
+    /// Whether a fault ends a run with [`Outcome::Fault`] before its handler is entered; at first the program's own handler has it.
+    pub fn stop_at_faults(&mut self, on: bool) {
+        self.faults_stop = on;
     }
 
     /// What was decoded of these bytes is forgotten: they were changed by DMA or the flash controller.

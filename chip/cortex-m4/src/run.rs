@@ -3,7 +3,7 @@
 use crate::bus::Bus;
 use crate::cache::Entry;
 use crate::decode::{self, Place};
-use crate::exceptions::THREAD;
+use crate::exceptions::{self, THREAD};
 use crate::processor::{Core, Outcome, Sleep};
 use crate::timing;
 use crate::trap::Trap;
@@ -120,6 +120,9 @@ impl Core {
                 return Some(Outcome::Ran);
             }
             if self.entering.is_some() {
+                if self.faults_stop && self.exceptions.first().is_some_and(exceptions::is_fault) {
+                    return Some(Outcome::Fault);
+                }
                 self.enter(bus);
                 if self.single {
                     return Some(Outcome::Ran);

@@ -237,6 +237,60 @@ fn a_refused_store_is_told_late_unless_the_write_buffer_is_off() {
 }
 
 #[test]
+fn a_refused_store_without_its_handler_is_a_hard_fault() {
+    let mut rig = Rig::new(&[STR, NOP, NOP, STAY]);
+    rig.core.set_register(1, 0x3000_0000);
+    rig.until(handler(3));
+    assert_eq!(rig.core.fault_status()[..2], [1 << 10, 1 << 30]);
+    assert_eq!(rig.memory.word(rig.core.register(13) + 24), PROGRAM + 2);
+    // In its handler no other comes, and the processor is not locked up.
+    let mut rig = Rig::new(&[UDF]);
+    rig.core.set_register(1, 0x3000_0000);
+    rig.code(handler(3), &[STR, NOP, STAY]);
+    rig.until(handler(3) + 4);
+    assert_eq!(rig.exception(), 3);
+}
+
+#[test]
+fn a_fault_stops_before_its_handler_if_it_is_asked_to() {
+    /// Program, r1, where it is then.
+    type Fault = (&'static [u16], u32, u32);
+    let cases: [(&str, Fault); 5] = [
+        ("undefined", (&[NOP, UDF], 0, PROGRAM + 2)),
+        ("jump to nowhere", (&[NOP, 0x4708], 0x3000_0001, 0x3000_0000)),
+        ("refused load", (&[NOP, LDR], 0x3000_0000, PROGRAM + 2)),
+        ("refused store", (&[NOP, STR, NOP], 0x3000_0000, PROGRAM + 4)),
+        ("breakpoint", (&[NOP, 0xBE00], 0, PROGRAM + 2)),
+    ];
+    for (name, (program, r1, place)) in cases {
+        for enabled in [0x7_0000, 0] {
+            let mut rig = Rig::new(program);
+            rig.set(0xE000_ED24, enabled);
+            rig.core.stop_at_faults(true);
+            rig.core.set_register(1, r1);
+            let outcome = rig.core.run(&mut rig.memory, 1_000);
+            assert_eq!((outcome, rig.core.register(15)), (Outcome::Fault, place), "{name}");
+            assert_eq!(rig.core.register(14), u32::MAX, "{name}: nothing is entered");
+            assert_eq!(rig.core.run(&mut rig.memory, 1_000), Outcome::Fault, "{name}: for ever");
+        }
+    }
+    // What is no fault goes on.
+    let mut rig = Rig::new(&[SVC, NOP, STAY]);
+    rig.core.stop_at_faults(true);
+    rig.core.set_pending(5);
+    rig.until(handler(21));
+    rig.until(handler(11));
+    rig.until(PROGRAM + 4);
+    // A stack that is nowhere.
+    let mut rig = Rig::new(&[NOP, STAY]);
+    rig.core.stop_at_faults(true);
+    rig.core.set_register(13, 0x3000_8000);
+    rig.core.set_pending(5);
+    assert_eq!(rig.core.run(&mut rig.memory, 1_000), Outcome::Fault);
+    assert_eq!(rig.core.fault_status()[..2], [1 << 12, 1 << 30]);
+}
+
+#[test]
 fn a_vector_that_cannot_be_read_is_a_hard_fault() {
     let mut rig = Rig::new(&[NOP, STAY]);
     let table: Vec<u8> = (0..16u32).flat_map(|number| (handler(number) | 1).to_le_bytes()).collect();

@@ -143,6 +143,10 @@ impl Machine {
                 );
             }
             Outcome::Lockup => return Err(self.report("the processor is locked up: a fault within a fault")),
+            Outcome::Fault => {
+                let reason = crate::report::fault(self.core.fault_status(), self.core.register(15));
+                return Err(self.report(&reason));
+            }
             Outcome::Breakpoint(number) => {
                 return Err(self.report(&format!("breakpoint {number}, and no debugger is there")));
             }
@@ -200,16 +204,18 @@ impl Machine {
     /// Why it stops, and where it was.
     pub fn report(&self, reason: &str) -> Box<Report> {
         let registers = std::array::from_fn(|number| self.core.register(number as u8));
-        let named = |address: u32| match self.image.symbol(address) {
-            Some((name, behind)) => format!("{name}+{behind:#x}"),
-            None => "?".to_owned(),
-        };
+        let name =
+            |address: u32| self.image.symbol(address).map(|(name, behind)| format!("{name}+{behind:#x}"));
+        let named = |address: u32| name(address).unwrap_or_else(|| "?".to_owned());
+        let trace = self.core.trace();
+        let come_from = name(trace[trace.len() - 1]).map(|last| format!("no function, come from {last}"));
+        let place = name(registers[15]).or(come_from).unwrap_or_else(|| "?".to_owned());
         Box::new(Report {
             reason: reason.to_owned(),
             us: self.chip.time.ps(self.core.cycles()) / US,
             registers,
-            place: named(registers[15]),
-            trace: self.core.trace().into_iter().map(|address| (address, named(address))).collect(),
+            place,
+            trace: trace.into_iter().map(|address| (address, named(address))).collect(),
         })
     }
 

@@ -20,6 +20,28 @@ impl fmt::Display for Trouble {
     }
 }
 
+/// What the fault status says of a fault at this place (DDI 0403E, B3.2.15 and B3.2.16).
+pub(crate) fn fault([cfsr, hfsr, mmfar, bfar]: [u32; 4], at: u32) -> String {
+    let causes = [
+        (cfsr & (1 | 1 << 8), format!("an instruction is wanted from {at:#010x}, where none may be")),
+        (cfsr & 1 << 1, format!("the MPU refuses a load or store at {mmfar:#010x}")),
+        (cfsr & 1 << 9, format!("a load or store at {bfar:#010x}, where nothing answers")),
+        (cfsr & 1 << 10, "a store where nothing answers, before this".to_owned()),
+        (cfsr & (0x38 | 0x3800), "the stack is where registers cannot be kept".to_owned()),
+        (cfsr & 1 << 16, "what is there is no instruction".to_owned()),
+        (cfsr & 1 << 17, "a jump to an even address: no Thumb code".to_owned()),
+        (cfsr & 1 << 18, "a return from an exception that is none".to_owned()),
+        (cfsr & 1 << 19, "a coprocessor that is off or not there".to_owned()),
+        (cfsr & 1 << 24, "an address that is not aligned".to_owned()),
+        (cfsr & 1 << 25, "a division by zero".to_owned()),
+        (hfsr & 1 << 1, "a vector that cannot be read".to_owned()),
+        (hfsr & 1 << 31, "a breakpoint, and no debugger is there".to_owned()),
+    ];
+    let words: Vec<String> =
+        causes.into_iter().filter(|(bits, _)| *bits != 0).map(|(_, words)| words).collect();
+    format!("a fault of the processor: {}", words.join(", "))
+}
+
 /// Why a machine stopped, and where.
 #[derive(Clone, Debug)]
 pub struct Report {
@@ -29,7 +51,7 @@ pub struct Report {
     pub us: u64,
     /// R0 to R15.
     pub registers: [u32; 16],
-    /// The program counter's function.
+    /// The program counter's function; where it is in none, with the last instruction's.
     pub place: String,
     /// The addresses of the last instructions, the newest last, each with its function.
     pub trace: Vec<(u32, String)>,
@@ -37,15 +59,15 @@ pub struct Report {
 
 impl fmt::Display for Report {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        writeln!(f, "{} at {} us, in {}", self.reason, self.us, self.place)?;
+        write!(f, "{} at {} us, in {}", self.reason, self.us, self.place)?;
         for (row, registers) in self.registers.chunks(4).enumerate() {
+            writeln!(f)?;
             for (column, value) in registers.iter().enumerate() {
                 write!(f, "  r{:<2} {value:08x}", 4 * row + column)?;
             }
-            writeln!(f)?;
         }
         for (address, name) in &self.trace {
-            writeln!(f, "  {address:08x} {name}")?;
+            write!(f, "\n  {address:08x} {name}")?;
         }
         Ok(())
     }

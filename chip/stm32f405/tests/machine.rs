@@ -48,6 +48,28 @@ fn what_cannot_go_on_stops_with_the_reason_and_the_place() {
 }
 
 #[test]
+fn a_fault_stops_before_the_programs_own_handler_if_it_is_asked_to() {
+    let cases: [(&[u16], &str, u32); 3] = [
+        (&NOWHERE, "an instruction is wanted from 0x30000000, where none may be", 0x3000_0000),
+        // `ldr r0, =0x30000000; ldr r1, [r0]`
+        (
+            &[0x4800, 0x6801, 0x0000, 0x3000],
+            "a load or store at 0x30000000, where nothing answers",
+            0x0800_0042,
+        ),
+        // `udf`
+        (&[0xDE00], "what is there is no instruction", 0x0800_0040),
+    ];
+    for (program, reason, place) in cases {
+        let mut machine = machine(program, Board::default());
+        machine.core.stop_at_faults(true);
+        let report = machine.run_until(SECOND).expect_err("it cannot go on");
+        assert_eq!(report.reason, format!("a fault of the processor: {reason}"), "{report}");
+        assert_eq!(report.registers[15], place, "{report}");
+    }
+}
+
+#[test]
 fn a_watchdog_that_nobody_feeds_resets_again_and_again() {
     for (lsi_hz, period) in [(17_000, 964), (32_000, 512), (47_000, 349)] {
         let mut machine = machine(&WATCHDOG, Board { lsi_hz, ..Board::default() });

@@ -8,8 +8,9 @@ use hums_link::framer::Framer;
 use hums_sdcard::{Card, Kind, Medium, Model, Slot};
 use stm32f405_model::gpio::Pin;
 use stm32f405_model::image::Image;
-use stm32f405_model::machine::{Board as Parts, Machine as Chip};
+use stm32f405_model::machine::{Board as Parts, Machine as Chip, Reset};
 use stm32f405_model::memory::FLASH;
+use stm32f405_model::rcc::Cause;
 use stm32f405_model::time::{MS, Ps, SECOND, US};
 use stm32f405_model::usart::Usart;
 
@@ -105,6 +106,8 @@ impl Board {
     ) -> Self {
         let slot = Slot::new(Some(Model::new(Kind::Sdhc, medium.clone())));
         let mut chip = Chip::new(image, Parts { seed: u64::from(seed), ..Parts::default() });
+        // The image's own handler would reset it, again and again.
+        chip.core.stop_at_faults(true);
         chip.connect(CARD.0, CARD.1, Box::new(Card::new(&slot)));
         if let Some(flash) = chip.chip.flash.content.all_mut().get_mut(STORE) {
             flash.copy_from_slice(store);
@@ -201,6 +204,13 @@ impl Board {
             gs_frames: went.frames,
             gs_bytes: went.bytes,
         }
+    }
+
+    /// How often it reset itself, by its program or its watchdog, and when first, in seconds since the first byte.
+    pub(super) fn resets(&self) -> Option<(u64, f64)> {
+        let own = |(_, cause): &&Reset| matches!(cause, Cause::Software | Cause::Watchdog);
+        let (at, _) = self.chip.resets.iter().find(own)?;
+        Some((self.chip.resets.iter().filter(own).count() as u64, (*at as f64 - LEAD as f64) / SECOND as f64))
     }
 
     /// In percent, modelled.

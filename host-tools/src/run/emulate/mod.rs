@@ -23,6 +23,7 @@ use crate::cli;
 use crate::endpoint::Endpoint;
 use crate::files::read_short;
 use crate::outcome::{Outcome, usage};
+use crate::plural::count;
 
 /// The environment variable that names the image as `--firmware` does.
 const FIRMWARE_VARIABLE: &str = "HUMS_FIRMWARE";
@@ -73,6 +74,9 @@ pub fn run(args: &cli::Emulate) -> Result<Outcome> {
     let beside = ground.finish();
     if let Some(remark) = arrivals.remark() {
         note!("{remark}");
+    }
+    if let Some((times, first_s)) = board.resets() {
+        note!("the board reset itself {}, first at {first_s:.3} s", count(times, "time"));
     }
     let gone = in_place.gone();
     let mut report = Report::default();
