@@ -110,9 +110,10 @@ impl Flags {
 /// What the autopilot says is wrong, now. Only what is said while it is armed counts: before, it is about arming.
 #[derive(Clone, Copy, Debug)]
 pub struct Alerts {
-    /// Of each cause, how bad it was said to be, and until when what was said once holds, milliseconds.
+    /// Of each cause, how bad it was said to be, and until when what was said once holds, milliseconds; and when anything was.
     told: [Option<Urgency>; Cause::COUNT],
     until_ms: [u32; Cause::COUNT],
+    told_at: Stamp,
     sensors: Flags,
     failures: Flags,
     estimator: Flags,
@@ -129,6 +130,7 @@ impl Alerts {
         Self {
             told: [None; Cause::COUNT],
             until_ms: [0; Cause::COUNT],
+            told_at: Stamp::NONE,
             sensors: Flags::NONE,
             failures: Flags::NONE,
             estimator: Flags::NONE,
@@ -162,6 +164,7 @@ impl Alerts {
         if !self.armed && !is_last_word {
             return;
         }
+        self.told_at = Stamp::at(at);
         let held = told.filter(|_| !is_past(at, *until_ms));
         (*told, *until_ms) = match alert.urgency {
             Urgency::Over => (told.map(|_| Urgency::Over), at.as_millis() as u32),
@@ -189,19 +192,38 @@ impl Alerts {
 
     /// Whether anything was ever said.
     pub(crate) fn are_known(&self) -> bool {
-        let flags = [&self.sensors, &self.failures, &self.estimator];
-        flags.iter().any(|flags| flags.at.is_set()) || self.told.iter().any(Option::is_some)
+        self.has_flags() || self.told.iter().any(Option::is_some)
+    }
+
+    /// Whether flags were ever told: then each cause has a level.
+    pub(crate) fn has_flags(&self) -> bool {
+        self.flags().iter().any(|flags| flags.at.is_set())
+    }
+
+    const fn flags(&self) -> [&Flags; 3] {
+        [&self.sensors, &self.failures, &self.estimator]
+    }
+
+    /// Causes of which [`Self::level`] may be other than that of what is over, or of what nobody ever spoke of.
+    pub(crate) fn may_be_on(&self, now: Instant) -> Causes {
+        const LATE_MS: u64 = HOLDS.as_millis() + 1_000;
+        let set = |causes: Causes, flags: &&Flags| causes.or(flags.now.both(flags.before));
+        let flagged = self.flags().iter().fold(Causes::NONE, set);
+        if self.told_at.age_ms(now).is_none_or(|age_ms| age_ms > LATE_MS) {
+            return flagged;
+        }
+        let told = Cause::ALL.into_iter().zip(self.told).filter(|(_, told)| told.is_some());
+        told.fold(flagged, |causes, (cause, _)| causes.with(cause))
     }
 
     /// How bad the autopilot says it is, as [`Urgency`] numbers it; `None` where nothing was ever said. In a mishap flags only echo it.
     pub fn level(&self, now: Instant, cause: Cause, in_mishap: bool) -> Option<f32> {
         let (told, until_ms) = (self.told.get(cause as usize)?, self.until_ms.get(cause as usize)?);
         let told = told.map(|urgency| if is_past(now, *until_ms) { Urgency::Over } else { urgency });
-        let all = [&self.sensors, &self.failures, &self.estimator];
-        let known = all.iter().any(|flags| flags.at.is_set());
+        let known = self.has_flags();
         let flagged = self.armed
             && !in_mishap
-            && all.iter().any(|flags| flags.has(now, cause))
+            && self.flags().iter().any(|flags| flags.has(now, cause))
             && (cause != Cause::RemoteControl || self.had_remote_control);
         let flagged = known.then_some(if flagged { Urgency::Warning } else { Urgency::Over });
         told.max(flagged).map(|urgency| f32::from(urgency as u8))

@@ -176,6 +176,20 @@ impl Causes {
         Self(self.0 & other.0)
     }
 
+    pub(crate) const fn or(self, other: Self) -> Self {
+        Self(self.0 | other.0)
+    }
+
+    /// The causes that it has.
+    pub(crate) fn each(self) -> impl Iterator<Item = Cause> {
+        let mut left = self.0;
+        core::iter::from_fn(move || {
+            let cause = *Cause::ALL.get(left.trailing_zeros() as usize)?;
+            left &= left - 1;
+            Some(cause)
+        })
+    }
+
     pub(crate) fn of_bits(bits: u32, table: &[(u32, Cause)]) -> Self {
         let set = table.iter().filter(|(bit, _)| bits & bit != 0);
         set.fold(Self::NONE, |causes, (_, cause)| causes.with(*cause))

@@ -29,6 +29,9 @@ impl Instant {
     /// Power-on.
     pub const ZERO: Self = Self(NonZeroU64::MIN);
 
+    /// Later than all that there is.
+    pub(crate) const FAR: Self = Self(NonZeroU64::MAX);
+
     /// From microseconds since power-on; the last one of 64 bits is taken for the one before it.
     pub const fn from_micros(micros: u64) -> Self {
         Self(NonZeroU64::MIN.saturating_add(micros))

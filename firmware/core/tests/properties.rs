@@ -436,6 +436,41 @@ fn after_anything_at_all_a_vehicle_that_falls_silent_is_critical_and_nothing_tha
     }
 }
 
+/// What rests is left out of a step. So two monitors hear the same, of which one is made to look at all with each step.
+#[test]
+fn what_is_left_out_of_a_step_would_not_have_changed() {
+    for seed in 60..66 {
+        let mut random = Random { state: seed, values: Values::Any };
+        let mut twins = vec![Monitor::new(Params::defaults()); 2];
+        // The same again and again, as of a vehicle that hovers, so that much rests.
+        let usual: Vec<Observation> = (0..30).map(|_| random.observation()).collect();
+        let heartbeat = Heartbeat { armed: true, type_number: 2, state: 4, ..random.heartbeat() };
+        for step in 0..2_000 {
+            let now = Instant::from_millis(50 * step);
+            let mut said = vec![random.pick(&usual)];
+            said.extend((step % 20 == 0).then_some(Observation::Heartbeat(heartbeat)));
+            said.extend((random.below(40) == 0).then(|| random.observation()));
+            let silent = random.below(3) == 0 || (step / 300) % 3 == 2;
+            let found = twins.iter_mut().map(|monitor| {
+                for observation in said.iter().filter(|_| !silent) {
+                    monitor.observe(now, AUTOPILOT, observation);
+                }
+                let mut found = Vec::new();
+                monitor.tick(now, &LinkReading::default(), &RecorderStatus::default(), &mut |finding| {
+                    found.push(format!("{finding:?}"));
+                });
+                let levels =
+                    monitor.health().levels().map(|(check, instance, level)| (check.name, instance, level));
+                (found, levels.collect::<Vec<_>>())
+            });
+            let found: Vec<_> = found.collect();
+            assert_eq!(found[0], found[1], "seed {seed}, step {step}");
+            // Whoever may set parameters may have changed what is good.
+            let _ = twins[1].params_mut();
+        }
+    }
+}
+
 /// Checks of whole numbers that have no way of saying that they are unknown, of ages, and of ourselves.
 const KNOWN_ANYWAY: [&str; 8] = [
     "batt_fault",

@@ -15,8 +15,12 @@ const AHEAD_MAX: usize = 16;
 pub fn side_by_side<I: Sync, R: Send>(
     items: &[I],
     work: impl Fn(&I) -> R + Sync,
-    tell: impl FnMut(R) -> Result<()>,
+    mut tell: impl FnMut(R) -> Result<()>,
 ) -> Result<()> {
+    // One by itself needs no workers.
+    if let [item] = items {
+        return tell(work(item));
+    }
     let mut next = items.iter();
     in_order(workers().min(AT_ONCE), AHEAD_MAX, || Ok(next.next()), work, tell)
 }

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result, anyhow, bail};
 
-use super::format::{KNOWN, detect, format_of, hint, is_recording, start_of};
+use super::format::{KNOWN, begins_recording, detect, format_of, hint, is_recording, start_of};
 use super::made::is_made_of;
 use super::recording::{Place, of_one_vehicle};
 use crate::files::{FileId, content_identity, why_unread};
@@ -290,6 +290,11 @@ pub fn sessions_of(places: &[Place]) -> Sessions {
 
 /// Whether a file is a log of ours or a card's image.
 fn is_own(path: &Path) -> Result<bool> {
+    const START_BYTES: usize = 512;
+    // Nearly every recording of an autopilot: its first bytes tell, and it is not looked through for a sector or a card.
+    if start_of_bytes(path, START_BYTES).is_some_and(|start| begins_recording(&start)) {
+        return Ok(false);
+    }
     Ok(match logs::find::look(path)? {
         Content::Log | Content::Unread(_) => true,
         // A large file of anything may be a card without a partition table: what is known to be something is none.

@@ -101,6 +101,11 @@ impl Detected {
     }
 }
 
+/// Whether a file that begins so (some hundred bytes) is an autopilot's own log, whatever follows.
+pub(super) fn begins_recording(start: &[u8]) -> bool {
+    ulog::detect(start) || dataflash::begins(start).is_some()
+}
+
 /// What a file that begins so is; none where that is not known.
 pub(super) fn detect(start: &[u8]) -> Option<Detected> {
     if hint(start).is_some() {

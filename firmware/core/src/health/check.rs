@@ -21,7 +21,7 @@
 use super::finding::{Finding, Level, Subsystem};
 use super::inputs::Inputs;
 use crate::latest::Reading;
-use crate::observation::Feeds;
+use crate::observation::{Feeds, Observation};
 use crate::params::{Param, Params};
 use crate::time::{Instant, Span, Stamp};
 
@@ -64,7 +64,7 @@ pub enum Part {
     Supply,
     /// Batteries that report themselves.
     Battery,
-    /// The autopilot's board: its rails, its processor's temperature.
+    /// The autopilot's board: its rails, its processor's load and temperature.
     Board,
     /// Vibration, and what it clips.
     Vibration,
@@ -90,6 +90,59 @@ pub enum Part {
 
 impl Part {
     pub(super) const COUNT: usize = Self::Past as usize + 1;
+
+    /// The parts of which an observation says something, among those that are [told](Self::is_told); all of these where it may change
+    /// more.
+    pub(super) const fn told_by(observation: &Observation) -> &'static [Self] {
+        match observation {
+            Observation::Battery(_) => &[Self::Supply, Self::Battery],
+            Observation::SystemStatus(_) => &[Self::Supply, Self::Battery, Self::Board],
+            Observation::Rails(_) | Observation::Processor(_) => &[Self::Board],
+            Observation::Vibration(_) => &[Self::Vibration],
+            Observation::RadioControl(_) | Observation::TelemetryRadio(_) => &[Self::Radio],
+            Observation::Gnss(_) | Observation::GnssIntegrity(_) => &[Self::Receiver],
+            Observation::Estimator(_) => &[Self::Estimator],
+            Observation::Engine(_) => &[Self::Engine],
+            Observation::Imu(_)
+            | Observation::Air(_)
+            | Observation::ImuAndAir(..)
+            | Observation::Shock(_)
+            | Observation::Attitude(_)
+            | Observation::Wanted(_)
+            | Observation::ClimbWanted(_)
+            | Observation::LocalPosition(_)
+            | Observation::GlobalPosition(_)
+            | Observation::Hud(_)
+            | Observation::Outputs(_)
+            | Observation::Escs(_)
+            | Observation::SystemTime(_) => &[],
+            _ => &Self::TOLD,
+        }
+    }
+
+    const TOLD: [Self; 8] = [
+        Self::Supply,
+        Self::Battery,
+        Self::Board,
+        Self::Vibration,
+        Self::Radio,
+        Self::Receiver,
+        Self::Estimator,
+        Self::Engine,
+    ];
+
+    /// Whether its values change with an observation of it, an event of the flight or a setting only: not with time, and not with what
+    /// others say.
+    pub(super) const fn is_told(self) -> bool {
+        let mut place = 0;
+        while place < Self::TOLD.len() {
+            if Self::TOLD[place] as u8 == self as u8 {
+                return true;
+            }
+            place += 1;
+        }
+        false
+    }
 }
 
 /// How many of each [`Part`] have ever spoken.
@@ -102,18 +155,19 @@ impl Parts {
         let all = |known: bool| if known { u8::MAX } else { 0 };
         let is_known = |at: Option<Instant>| all(at.is_some());
         let batteries = vehicle.batteries_known();
+        let sensors = derived.crosschecks().sensors_known();
         let mut counts = [u8::MAX; _];
         for (part, count) in [
             (Part::Motor, vehicle.motors_known()),
             (Part::Output, all(derived.outputs().are_told())),
             (Part::Supply, batteries.max(1)),
             (Part::Battery, batteries),
-            (Part::Board, is_known(vehicle.rails.at().or(vehicle.processor.at()))),
+            (Part::Board, is_known(vehicle.rails.at().or(vehicle.processor.at()).or(vehicle.system.at()))),
             (Part::Vibration, is_known(vehicle.vibration.at())),
             (Part::Radio, is_known(vehicle.rc.at().or(vehicle.radio.at()))),
             (Part::Receiver, vehicle.receivers_known()),
-            (Part::Sensor, derived.crosschecks().sensors_known()),
-            (Part::Pair, all(derived.crosschecks().are_compared())),
+            (Part::Sensor, sensors),
+            (Part::Pair, if derived.crosschecks().are_compared() { sensors } else { 0 }),
             (Part::Estimator, is_known(vehicle.estimator.at())),
             (Part::Engine, is_known(vehicle.engine.at())),
             (Part::Alert, all(vehicle.alerts.are_known())),
@@ -134,6 +188,12 @@ impl Parts {
     pub const fn count(&self, check: &Check) -> u8 {
         let spoken = self.0[check.part as usize];
         if spoken < check.instances { spoken } else { check.instances }
+    }
+
+    /// How many of its states are stepped: what is not new is stepped, though nothing of it is known any more.
+    pub(super) const fn stepped(&self, check: &Check) -> u8 {
+        let spoken = self.0[check.part as usize];
+        if spoken == 0 || spoken > check.instances { check.instances } else { spoken }
     }
 }
 
@@ -244,6 +304,17 @@ impl Repeats {
     const fn set_looks(&mut self, looks: u8) {
         self.0 = self.0 & 0xF | looks << 4;
     }
+}
+
+/// How a check is stepped.
+#[derive(Clone, Copy)]
+pub(super) struct How {
+    /// It applies.
+    pub(super) applies: bool,
+    /// It would only echo a mishap: its level stays as it is.
+    pub(super) quiet: bool,
+    /// Levels do not fall.
+    pub(super) latched: bool,
 }
 
 /// The memory of one instance of a check.
@@ -357,17 +428,17 @@ impl State {
     }
 
     /// One step of what is good as it was for long and stays so, as nearly every step is: the time of its measurement is noted, and
-    /// nothing else changes. `false` where [`Self::step`] has more to do; nothing was changed then.
-    pub(super) fn stays_calm(
+    /// nothing else changes. Until when that goes on with the same value, which is a number; `None` where [`Self::step`] has more to do,
+    /// and nothing was changed then.
+    fn stays_calm(
         &mut self,
         check: &Check,
         now: Instant,
-        reading: Option<Reading>,
+        Reading { at, value }: Reading,
         params: &Params,
-    ) -> bool {
-        let Some(Reading { at, value }) = reading else { return false };
-        if !self.is_calm() || !value.is_finite() {
-            return false;
+    ) -> Option<Instant> {
+        if !self.is_calm() {
+            return None;
         }
         // A limit that is NaN is off: no comparison with it is true.
         let is_beyond = |limit: Option<Param>| {
@@ -377,16 +448,39 @@ impl State {
             })
         };
         if is_beyond(check.warn) || is_beyond(check.critical) {
-            return false;
+            return None;
         }
+        // When what is never stale was measured counts once it is bad: then it is noted.
+        let Some(limit) = check.stale_after else { return Some(Instant::FAR) };
         // Dividing is dear: that of now is done once for all checks, and what is younger than its limit needs none.
-        let seen = if at < now { Stamp::at(at) } else { Stamp::at(now) };
-        let is_old = |limit| now.since(at) > limit && seen.older_than(now, limit);
-        let is_stale = check.stale_after.is_some_and(is_old);
-        if !is_stale {
-            self.seen = seen;
+        let (at, seen) = if at < now { (at, Stamp::at(at)) } else { (now, Stamp::at(now)) };
+        if now.since(at) > limit && seen.older_than(now, limit) {
+            return None;
         }
-        !is_stale
+        self.seen = seen;
+        Some(at + limit)
+    }
+
+    /// Whether a step changes nothing but when it was measured, which is noted: it is good as it was for long, or it has no value, and
+    /// never had one or is never stale. Until when that goes on with the same value; `None` where [`Self::step`] has more to do.
+    #[inline]
+    pub(super) fn rests(
+        &mut self,
+        check: &Check,
+        instance: u8,
+        inputs: &Inputs<'_>,
+        how: How,
+    ) -> Option<Instant> {
+        let How { applies, quiet, latched } = how;
+        if !quiet && !latched {
+            self.held = None;
+        }
+        let reading = if applies { (check.read)(inputs, instance) } else { None };
+        match reading.filter(|reading| reading.value.is_finite()) {
+            Some(_) if quiet => None,
+            Some(reading) => self.stays_calm(check, inputs.now, reading, inputs.params),
+            None => (self.is_new() || (applies && check.stale_after.is_none())).then_some(Instant::FAR),
+        }
     }
 
     /// One step: at least every 50 ms.
@@ -409,10 +503,10 @@ impl State {
                 limit: f32::NAN,
             });
         }
-        if self.stays_calm(check, now, reading, params) {
+        let reading = reading.filter(|reading| reading.value.is_finite());
+        if reading.is_some_and(|reading| self.stays_calm(check, now, reading, params).is_some()) {
             return None;
         }
-        let reading = reading.filter(|reading| reading.value.is_finite());
         let seen = reading.map_or(self.seen, |reading| Stamp::at(reading.at.min(now)));
         let measured = core::mem::replace(&mut self.seen, seen) != seen;
         // A value that was measured once and no longer is grows old like one whose message stops.
@@ -447,21 +541,6 @@ impl State {
     /// The same as it was before a step, but for when its value was measured.
     pub(super) const fn seen_as(self, later: &Self) -> Self {
         Self { seen: later.seen, ..self }
-    }
-
-    /// Before a step: levels may fall again that are not `latched`; whether the step would change nothing more.
-    pub(super) fn rests(
-        &mut self,
-        check: &Check,
-        inputs: &Inputs<'_>,
-        reading: Option<Reading>,
-        applies: bool,
-        latched: bool,
-    ) -> bool {
-        if !latched {
-            self.held = None;
-        }
-        applies && self.stays_calm(check, inputs.now, reading, inputs.params)
     }
 
     /// How long it must be good before the level falls.

@@ -37,7 +37,7 @@ const LOAD: Check = Check {
 };
 
 pub(super) const CHECKS: &[Check] = &[
-    LOAD,
+    Check { part: Part::Board, ..LOAD },
     Check {
         name: "mcu_temperature",
         unit: "degC",

@@ -2,6 +2,11 @@
 //!
 //! Each subsystem's checks are a table in a file of its own; `tables` puts them together. A roll-up is never better than
 //! its worst part that is known, and where nothing is known it is not OK but stale.
+//!
+//! A step looks at what may change. Left out are checks that do not apply and have nothing to forget, and checks that rest: their
+//! states are good or have no value, and stay so until somebody says something of the part that they are of ([`check::Part`]), until the
+//! flight, a mishap or a setting changes what is judged, or until the first of their values grows stale. No value is kept for that. Where
+//! assertions are on, what is left out is looked at all the same, and has to rest.
 
 mod attitude;
 pub mod check;
@@ -22,8 +27,8 @@ mod structure;
 mod tables;
 mod vocabulary;
 
-use check::Change;
 pub use check::{CLEAR, CLEAR_MAX, CLEAR_MAX_ALWAYS, Check, Parts, Side, State, When};
+use check::{Change, How, Part};
 pub use consequence::{because, is_of_mishap};
 pub use finding::{Finding, Level, Subsystem};
 pub use inputs::Inputs;
@@ -31,10 +36,11 @@ pub use tables::{check_named, checks, instances};
 pub use vocabulary::{Said, Scope, VOCABULARY, Words, said, vocabulary};
 
 use crate::latest::Reading;
+use crate::observation::Observation;
 use crate::params::{Param, Params};
-use crate::time::Span;
+use crate::time::{Instant, Span};
 use exceedance::Exceedances;
-use tables::{Kinds, STATES};
+use tables::{Kinds, Places, STATES};
 
 /// A vehicle that has not been heard for so long is silent.
 const SILENT: Span = Span::from_secs(5);
@@ -49,6 +55,11 @@ pub struct Health {
     looked_at: u8,
     /// Kinds of checks whose states may not be new: of all others a step changes nothing while they do not apply.
     awake: Kinds,
+    /// Checks that are left out until something is said of them, or this time: all their states rest.
+    rest: Places,
+    rest_until: Instant,
+    /// How checks were stepped last: [`Now::mark`].
+    stepped: u8,
 }
 
 const _: () = assert!(size_of::<Health>() <= 5 * 1024);
@@ -62,14 +73,33 @@ impl Default for Health {
 impl Health {
     /// Nothing seen yet.
     pub const fn new() -> Self {
-        Self { states: [const { State::new() }; STATES], looked_at: 0, awake: Kinds::NONE }
+        Self {
+            states: [const { State::new() }; STATES],
+            looked_at: 0,
+            awake: Kinds::NONE,
+            rest: Places::NONE,
+            rest_until: Instant::FAR,
+            stepped: 0,
+        }
     }
 
     /// As if nothing had been seen.
     pub(crate) fn clear(&mut self) {
-        let Self { states, looked_at, awake } = self;
+        let Self { states, looked_at, awake, rest, rest_until: _, stepped: _ } = self;
         states.fill(State::new());
-        (*looked_at, *awake) = (0, Kinds::NONE);
+        (*looked_at, *awake, *rest) = (0, Kinds::NONE, Places::NONE);
+    }
+
+    /// An observation was taken in: what it is of is looked at again.
+    pub(crate) fn hear(&mut self, observation: &Observation) {
+        for part in Part::told_by(observation) {
+            self.rest = self.rest.without(Places::of(*part));
+        }
+    }
+
+    /// Something else changed that checks read: all of them are looked at again.
+    pub(crate) const fn look_again(&mut self) {
+        self.rest = Places::NONE;
     }
 
     /// One step of all checks, at least every 50 ms; each change of level is a finding, and so is an alarm that outlives the one that
@@ -80,32 +110,22 @@ impl Health {
         exceedances: &mut Exceedances,
         findings: &mut impl FnMut(&Finding),
     ) {
-        let Now { whens, quiet, latched } = Now::of(inputs);
+        let now = Now::of(inputs);
         let parts = Parts::of(inputs);
         debug_assert_eq!(speaks(&parts, inputs), None, "has a value, though its part never spoke");
-        let kinds = Kinds::of(parts.spoken(), whens);
+        let kinds = Kinds::of(parts.spoken(), now.times());
         let stepped = kinds.and(self.awake);
-        for (place, check, first) in stepped.checks() {
-            let (quiet, applies) = (quiet && check.when != When::Always, whens[check.when as usize]);
-            // What is not new is stepped, though it is not known any more.
-            let there = match parts.count(check) {
-                0 => check.instances,
-                there => there,
-            };
+        let restless = self.restless(stepped.places(), inputs, &parts, &now);
+        for (place, check, first) in restless.checks() {
+            let (how, there) = (now.how(check), parts.stepped(check));
             for instance in 0..there {
                 let slot = first + usize::from(instance);
                 let Some(state) = self.states.get_mut(slot) else { break };
-                // Of what is new, a step without a value changes nothing.
-                let is_new = state.is_new();
-                let reading = if is_new && !applies { None } else { (check.read)(inputs, instance) };
-                if is_new && reading.is_none()
-                    || !quiet && state.rests(check, inputs, reading, applies, latched)
-                {
+                // The only one is known not to rest.
+                if there > 1 && state.rests(check, instance, inputs, how).is_some() {
                     continue;
                 }
-                let at = (place, check, instance, slot);
-                let how = How { applies, quiet, latched };
-                if let Some(finding) = self.turn(at, inputs, reading, how, exceedances) {
+                if let Some(finding) = self.turn((place, check, instance, slot), inputs, how, exceedances) {
                     findings(&finding);
                 }
             }
@@ -115,16 +135,48 @@ impl Health {
         debug_assert_eq!(self.awake(Kinds::ALL, self.awake), self.awake, "what is left out is new");
     }
 
-    /// A step of one state that may change it. Apart, so that the many that change nothing need few registers.
+    /// Those of the checks that have a state which does not rest, as nearly all do.
+    fn restless(&mut self, places: Places, inputs: &Inputs<'_>, parts: &Parts, now: &Now) -> Places {
+        if self.stepped != now.mark() || inputs.now > self.rest_until {
+            (self.stepped, self.rest, self.rest_until) = (now.mark(), Places::NONE, Instant::FAR);
+        }
+        // What the autopilot says rests while it does not say it.
+        let on = Places::of_causes(inputs.vehicle.alerts.may_be_on(inputs.now));
+        let left_out = self.rest.without(on);
+        debug_assert!({ *self }.look(left_out, inputs, parts, now).is_empty(), "what is left out changes");
+        let restless = self.look(places.without(left_out), inputs, parts, now);
+        self.rest = places.without(restless).within(Places::of_told().and(Places::of(Part::Alert)));
+        restless
+    }
+
+    /// Looks whether the states of these checks rest: those of which one does not. Apart, so that the many looks need few registers.
+    #[inline(never)]
+    fn look(&mut self, places: Places, inputs: &Inputs<'_>, parts: &Parts, now: &Now) -> Places {
+        let (mut restless, mut until) = (Places::NONE, self.rest_until);
+        for (place, check, first) in places.checks() {
+            let how = now.how(check);
+            let states = self.states.iter_mut().skip(first).take(usize::from(parts.stepped(check)));
+            for (instance, state) in (0..).zip(states) {
+                match state.rests(check, instance, inputs, how) {
+                    Some(rests_until) => until = until.min(rests_until),
+                    None => restless.add(place),
+                }
+            }
+        }
+        self.rest_until = until;
+        restless
+    }
+
+    /// A step of one state that may change it.
     #[inline(never)]
     fn turn(
         &mut self,
         (place, check, instance, slot): (u8, &'static Check, u8, usize),
         inputs: &Inputs<'_>,
-        reading: Option<Reading>,
         How { applies, quiet, latched }: How,
         exceedances: &mut Exceedances,
     ) -> Option<Finding> {
+        let reading = (check.read)(inputs, instance);
         let state = self.states.get_mut(slot)?;
         let before = *state;
         let change = state.step(check, inputs.now, reading, applies, inputs.params);
@@ -154,7 +206,7 @@ impl Health {
 
     /// These `kinds` of checks, and of the `others` those that have a state which is not new.
     fn awake(&self, others: Kinds, kinds: Kinds) -> Kinds {
-        let others = others.checks().filter(|(_, check, _)| !kinds.has(check));
+        let others = others.places().checks().filter(|(_, check, _)| !kinds.has(check));
         others.fold(kinds, |awake, (_, check, first)| {
             let mut states = self.states.iter().skip(first).take(usize::from(check.instances));
             if states.all(State::is_new) { awake } else { awake.and(Kinds::of_check(check)) }
@@ -233,22 +285,12 @@ impl Health {
     }
 }
 
-/// How a state is stepped.
-#[derive(Clone, Copy)]
-struct How {
-    applies: bool,
-    quiet: bool,
-    latched: bool,
-}
-
 /// What is common to all checks of a step.
 struct Now {
-    /// Which checks apply, by [`When`].
-    whens: [bool; When::ALL.len()],
-    /// A mishap goes on: all but those that always apply would only echo it.
-    quiet: bool,
-    /// Levels do not fall.
-    latched: bool,
+    /// How checks are stepped, by [`When`] they apply.
+    hows: [How; When::ALL.len()],
+    /// Each cause that the autopilot may tell has a level.
+    has_flags: bool,
 }
 
 impl Now {
@@ -258,13 +300,33 @@ impl Now {
         let is_silent = || vehicle.heartbeat.within(now, SILENT).is_none();
         // What lies disarmed, or is silent, has nothing more to judge but itself.
         let over = mishap.is_going() && ((mishap.is_down() && !armed) || is_silent());
+        // A mishap goes on: all but those that always apply would only echo it.
         let quiet = mishap.is_going() && !over;
-        let whens = When::ALL.map(|when| match when {
-            When::Always => true,
-            When::Armed => quiet || (!over && armed),
-            When::InFlight => quiet || (!over && inputs.flight.airborne()),
+        let latched = armed && inputs.params.get(Param::Latch) >= 0.5;
+        let hows = When::ALL.map(|when| {
+            let applies = match when {
+                When::Always => return How { applies: true, quiet: false, latched },
+                When::Armed => armed,
+                When::InFlight => inputs.flight.airborne(),
+            };
+            How { applies: quiet || (!over && applies), quiet, latched }
         });
-        Self { whens, quiet, latched: armed && inputs.params.get(Param::Latch) >= 0.5 }
+        Self { hows, has_flags: vehicle.alerts.has_flags() }
+    }
+
+    const fn how(&self, check: &Check) -> How {
+        self.hows[check.when as usize]
+    }
+
+    fn times(&self) -> [bool; When::ALL.len()] {
+        self.hows.map(|how| how.applies)
+    }
+
+    /// All of it in a byte: checks are stepped otherwise where it differs.
+    fn mark(&self) -> u8 {
+        let [always, armed, in_flight] = self.hows;
+        let differs = [armed.applies, in_flight.applies, armed.quiet, always.latched, self.has_flags];
+        differs.into_iter().fold(0, |mark, is_so| mark << 1 | u8::from(is_so))
     }
 }
 

@@ -202,7 +202,8 @@ pub(super) const CHECKS: &[Check] = &[
     Check {
         name: "gps_stuck",
         instances: RECEIVERS_MAX as u8,
-        part: Part::Receiver,
+        // It goes by how far the vehicle moved.
+        part: Part::Vehicle,
         read: |inputs, receiver| inputs.derived.crosschecks().receiver_stuck(inputs.now, receiver),
         ..STUCK
     },
@@ -231,6 +232,8 @@ pub(super) const CHECKS: &[Check] = &[
         // Two messages at 5 Hz.
         debounce_warn: Span::from_millis(200),
         instances: 1,
+        // It goes by the barometer too.
+        part: Part::Vehicle,
         read: |inputs, _| inputs.derived.crosschecks().heights().receiver_leapt(inputs.now),
         ..GNSS
     },

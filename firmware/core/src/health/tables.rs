@@ -2,6 +2,7 @@
 
 use super::check::{Check, Part, When};
 use super::{attitude, computer, engine, link, mishap, navigation, power, propulsion, recorder, structure};
+use crate::cause::{Cause, Causes};
 
 pub(super) const TABLES: [&[Check]; 10] = [
     power::CHECKS,
@@ -64,18 +65,17 @@ static FIRST_STATES: [u8; CHECKS_COUNT] = {
 };
 
 /// A set of checks by their places: a bit each.
-type Places = [u32; CHECKS_COUNT.div_ceil(u32::BITS as usize)];
-
-const NOWHERE: Places = [0; CHECKS_COUNT.div_ceil(u32::BITS as usize)];
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Places([u32; CHECKS_COUNT.div_ceil(u32::BITS as usize)]);
 
 const _: () = assert!(CHECKS_COUNT <= STATES && STATES <= u8::MAX as usize);
 
 /// The checks whose value is from each part.
 static OF_PART: [Places; Part::COUNT] = {
-    let mut of_part = [NOWHERE; Part::COUNT];
+    let mut of_part = [Places::NONE; Part::COUNT];
     let mut place = 0;
     while place < CHECKS_COUNT {
-        of_part[CHECKS[place].part as usize][place / 32] |= 1 << (place % 32);
+        of_part[CHECKS[place].part as usize].add(place as u8);
         place += 1;
     }
     of_part
@@ -83,14 +83,50 @@ static OF_PART: [Places; Part::COUNT] = {
 
 /// The checks that apply at each time.
 static OF_WHEN: [Places; When::ALL.len()] = {
-    let mut of_when = [NOWHERE; When::ALL.len()];
+    let mut of_when = [Places::NONE; When::ALL.len()];
     let mut place = 0;
     while place < CHECKS_COUNT {
-        of_when[CHECKS[place].when as usize][place / 32] |= 1 << (place % 32);
+        of_when[CHECKS[place].when as usize].add(place as u8);
         place += 1;
     }
     of_when
 };
+
+/// The checks of parts that are [told](Part::is_told).
+static OF_TOLD: Places = {
+    let mut of_told = Places::NONE;
+    let mut place = 0;
+    while place < CHECKS_COUNT {
+        if CHECKS[place].part.is_told() {
+            of_told.add(place as u8);
+        }
+        place += 1;
+    }
+    of_told
+};
+
+/// The place of the check of what the autopilot says, by [`Cause`].
+static OF_CAUSE: [u8; Cause::COUNT] = {
+    let mut of_cause = [0; Cause::COUNT];
+    let mut cause = 0;
+    while cause < Cause::COUNT {
+        let name = Cause::ALL[cause].check();
+        while !is_same(CHECKS[of_cause[cause] as usize].name, name) {
+            of_cause[cause] += 1;
+        }
+        cause += 1;
+    }
+    of_cause
+};
+
+const fn is_same(one: &str, other: &str) -> bool {
+    let (one, other) = (one.as_bytes(), other.as_bytes());
+    let mut at = 0;
+    while at < one.len() && at < other.len() && one[at] == other[at] {
+        at += 1;
+    }
+    at == one.len() && at == other.len()
+}
 
 /// Kinds of checks: those that have their value from one of some parts, and apply at one of some times. A bit each; in bytes, so that
 /// they fit in beside another one.
@@ -129,14 +165,79 @@ impl Kinds {
         Self { parts: parts.to_le_bytes(), times: self.times | other.times }
     }
 
-    /// The checks of these kinds, in their order: the place of each, and its first state.
+    /// The checks of these kinds.
+    pub(super) fn places(self) -> Places {
+        let of_parts = Places::union(&OF_PART, u16::from_le_bytes(self.parts).into());
+        of_parts.within(Places::union(&OF_WHEN, self.times.into()))
+    }
+}
+
+impl Places {
+    /// None.
+    pub(super) const NONE: Self = Self([0; _]);
+
+    /// Adds the check at a place.
+    pub(super) const fn add(&mut self, place: u8) {
+        self.0[place as usize / 32] |= 1 << (place % 32);
+    }
+
+    /// The checks whose value is from a part.
+    pub(super) fn of(part: Part) -> Self {
+        OF_PART[part as usize]
+    }
+
+    /// The checks of parts that are [told](Part::is_told).
+    pub(super) fn of_told() -> Self {
+        OF_TOLD
+    }
+
+    /// The checks of what the autopilot says is wrong with these.
+    pub(super) fn of_causes(causes: Causes) -> Self {
+        causes.each().fold(Self::NONE, |mut places, cause| {
+            places.add(OF_CAUSE[cause as usize]);
+            places
+        })
+    }
+
+    /// Those of these that are among others.
+    pub(super) fn within(self, others: Self) -> Self {
+        let mut both = self;
+        both.0.iter_mut().zip(others.0).for_each(|(both, others)| *both &= others);
+        both
+    }
+
+    /// These and others.
+    pub(super) fn and(self, others: Self) -> Self {
+        let mut all = self;
+        all.0.iter_mut().zip(others.0).for_each(|(all, others)| *all |= others);
+        all
+    }
+
+    /// These but for others.
+    pub(super) fn without(self, others: Self) -> Self {
+        let mut left = self;
+        left.0.iter_mut().zip(others.0).for_each(|(left, others)| *left &= !others);
+        left
+    }
+
+    /// Whether there are none.
+    pub(super) fn is_empty(self) -> bool {
+        self.0.iter().all(|word| *word == 0)
+    }
+
+    /// All of those sets whose bit is set.
+    fn union(sets: &[Self], bits: u32) -> Self {
+        let set = sets.iter().enumerate().filter(|(bit, _)| bits >> bit & 1 != 0);
+        set.fold(Self::NONE, |all, (_, set)| all.and(*set))
+    }
+
+    /// The checks, in their order: the place of each, and its first state.
     pub(super) fn checks(self) -> impl Iterator<Item = (u8, &'static Check, usize)> {
-        let places = self.places();
-        let (mut word, mut left) = (0, places[0]);
+        let (mut word, mut left) = (0, self.0[0]);
         core::iter::from_fn(move || {
             while left == 0 {
                 word += 1;
-                left = *places.get(word)?;
+                left = *self.0.get(word)?;
             }
             let place = word * u32::BITS as usize + left.trailing_zeros() as usize;
             left &= left - 1;
@@ -144,22 +245,6 @@ impl Kinds {
             Some((place as u8, check, usize::from(*first)))
         })
     }
-
-    fn places(self) -> Places {
-        let parts = union(&OF_PART, u16::from_le_bytes(self.parts).into());
-        let mut places = union(&OF_WHEN, self.times.into());
-        places.iter_mut().zip(parts).for_each(|(places, parts)| *places &= parts);
-        places
-    }
-}
-
-/// All places of those sets whose bit is set.
-fn union(sets: &[Places], bits: u32) -> Places {
-    let mut all = NOWHERE;
-    for (_, set) in sets.iter().enumerate().filter(|(bit, _)| bits >> bit & 1 != 0) {
-        all.iter_mut().zip(set).for_each(|(all, places)| *all |= places);
-    }
-    all
 }
 
 /// All checks, by subsystem.

@@ -64,7 +64,7 @@ impl Ahead<'_> {
         let mut is_end = self.is_end && bytes.len() == self.bytes.len();
         let mut stamps = Vec::with_capacity(ASKED);
         let mut take = |message: &Message<'_>| {
-            stamps.extend(stamp(message, formats, week).filter(|stamp| asks(*stamp)));
+            stamps.extend(stamp(message, message.time_us(), formats, week).filter(|stamp| asks(*stamp)));
             stamps.len() < ASKED
         };
         if self.is_text {

@@ -142,6 +142,39 @@ impl Skipped {
     }
 }
 
+/// The messages of bytes that are all there, one after the other; what cannot be read between them is passed over.
+pub(super) struct Window<'a> {
+    bytes: &'a [u8],
+    at: usize,
+}
+
+impl<'a> Window<'a> {
+    /// Before the first one.
+    pub(super) const fn new(bytes: &'a [u8]) -> Self {
+        Self { bytes, at: 0 }
+    }
+
+    /// The next message: its type, what stands after its header, where it begins, and what follows it.
+    pub(super) fn next(&mut self, lengths: &mut Lengths) -> Option<(u8, &'a [u8], usize, Ahead<'a>)> {
+        loop {
+            let rest = self.bytes.get(self.at..).filter(|rest| !rest.is_empty())?;
+            let length = match look(rest, true, lengths) {
+                Look::Message(length) => length,
+                Look::Skip { bytes, .. } => {
+                    self.at += bytes;
+                    continue;
+                }
+            };
+            let (message, after) = rest.split_at_checked(length)?;
+            let place = self.at;
+            self.at += length;
+            let kind = message.get(2).copied().unwrap_or_default();
+            let payload = message.get(HEADER_BYTES..).unwrap_or_default();
+            return Some((kind, payload, place, Ahead { bytes: after, is_text: false, is_end: true }));
+        }
+    }
+}
+
 enum Look {
     /// A message of this length begins here.
     Message(usize),

@@ -102,7 +102,7 @@ impl Clock {
         {
             self.week_first_us.get_or_insert(week_us);
         }
-        let Some(stamp) = stamp(message, formats, self.week()) else {
+        let Some(stamp) = stamp(message, boot_us, formats, self.week()) else {
             return self.as_before(boot_us, Own::None);
         };
         let before = self.now();

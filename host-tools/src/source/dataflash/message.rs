@@ -51,6 +51,17 @@ impl<'a> Message<'a> {
         }
     }
 
+    /// A finite number in single precision.
+    pub(super) fn single(&self, column: usize) -> Option<f32> {
+        let single = match (self.body, self.field(column)?) {
+            (Body::Bytes(payload), Field { kind: FieldKind::Single, offset, .. }) => {
+                f32::from_le_bytes(*payload.get(*offset..)?.first_chunk()?)
+            }
+            _ => self.number(column)? as f32,
+        };
+        Some(single).filter(|single| single.is_finite())
+    }
+
     /// What stands in the place of a number in a text log and is none.
     pub(super) fn no_number(&self, column: usize) -> Option<&'a str> {
         match self.body {
@@ -90,6 +101,9 @@ impl<'a> Message<'a> {
             Body::Bytes(payload) => {
                 let bytes = payload.get(field.offset..)?;
                 match field.kind {
+                    FieldKind::U8 | FieldKind::Mode => Some(u64::from(*bytes.first()?)),
+                    FieldKind::U16 => Some(u64::from(u16::from_le_bytes(*bytes.first_chunk()?))),
+                    FieldKind::U32 => Some(u64::from(u32::from_le_bytes(*bytes.first_chunk()?))),
                     FieldKind::U64 => Some(u64::from_le_bytes(*bytes.first_chunk()?)),
                     FieldKind::I64 => u64::try_from(i64::from_le_bytes(*bytes.first_chunk()?)).ok(),
                     _ => whole(self.number(column)?).and_then(|number| u64::try_from(number).ok()),

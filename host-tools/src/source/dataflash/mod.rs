@@ -29,7 +29,7 @@ use std::collections::{BTreeSet, HashMap};
 use anyhow::{Context as _, Result, bail};
 
 use self::ahead::Ahead;
-use self::binary::{Binary, Damage, Piece};
+use self::binary::{Binary, Damage, Piece, Window};
 use self::format::{BEGINNING, FMT_TYPE, HEADER_BYTES};
 use self::message::Body;
 pub(super) use self::observe::is_firmware;
@@ -139,21 +139,17 @@ fn binary(input: impl std::io::Read, want: Want<'_>, take: &mut Take<'_>) -> Res
 /// Looks through the first part of a log.
 fn first_of_bytes(bytes: &mut Binary<impl std::io::Read>) -> Result<First> {
     let bytes = bytes.window(FIRST_BYTES).context(CONTEXT)?;
-    let (mut first, mut window, mut end) = (First::default(), Binary::new(bytes), u64::MAX);
-    while let Some(piece) = window.next(first.lengths())? {
-        if let Piece::Message { kind, payload, place, .. } = piece {
-            if first.is_another(kind, Body::Bytes(payload)) {
-                end = place;
-                break;
-            }
-            first.learn(kind, Body::Bytes(payload));
+    let (mut first, mut window, mut end) = (First::default(), Window::new(bytes), usize::MAX);
+    while let Some((kind, payload, place, _)) = window.next(first.lengths()) {
+        if first.is_another(kind, Body::Bytes(payload)) {
+            end = place;
+            break;
         }
+        first.learn(kind, Body::Bytes(payload));
     }
-    let mut window = Binary::new(bytes);
-    while let Some(piece) = window.next(first.lengths())? {
-        if let Piece::Message { kind, payload, after, place } = piece
-            && (place >= end || first.begins(kind, Body::Bytes(payload), after))
-        {
+    let mut window = Window::new(bytes);
+    while let Some((kind, payload, place, after)) = window.next(first.lengths()) {
+        if place >= end || first.begins(kind, Body::Bytes(payload), after) {
             break;
         }
     }

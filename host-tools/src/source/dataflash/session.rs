@@ -36,6 +36,8 @@ pub(super) struct First {
     state: State,
     clock: Clock,
     handlers: Handlers,
+    /// Of each type, whether the next messages tell nothing of all of the file either.
+    idle: Vec<bool>,
     /// The first time that a message tells.
     begins_us: Option<u64>,
     /// A message that has a time has come.
@@ -48,7 +50,8 @@ impl Default for First {
     fn default() -> Self {
         let (formats, state, clock) = (Formats::new(), State::default(), Clock::default());
         let handlers = Handlers::default();
-        Self { formats, state, clock, handlers, begins_us: None, timed: false, banner: None }
+        let idle = vec![false; 256];
+        Self { formats, state, clock, handlers, idle, begins_us: None, timed: false, banner: None }
     }
 }
 
@@ -83,12 +86,16 @@ impl First {
 
     /// Takes a message.
     pub(super) fn learn(&mut self, kind: u8, body: Body<'_>) {
-        let Self { formats, state, handlers, timed, .. } = self;
+        let Self { formats, state, handlers, idle, timed, .. } = self;
+        if idle.get(usize::from(kind)) == Some(&true) {
+            return;
+        }
         if formats.get(kind).is_some_and(|format| format.role != Role::Other) {
             let defined = defined_by(formats, kind, body);
             define(formats, kind, body);
             if let Some((defined, _)) = defined {
                 handlers.forget(defined);
+                idle.iter_mut().skip(defined.into()).take(1).for_each(|idle| *idle = false);
                 formats.get(defined).into_iter().for_each(|format| state.define(format));
             }
         }
@@ -97,6 +104,8 @@ impl First {
         let message = Message::new(format, body);
         if let Some(resolved) = handlers.of(format).filter(|resolved| resolved.handler.is_fact) {
             observe::take(state, resolved, &message, (Instant::ZERO, None), &mut Out::new(&mut |_| ()));
+        } else if let Some(idle) = idle.get_mut(usize::from(kind)) {
+            *idle = format.role == Role::Other;
         }
     }
 }

@@ -30,9 +30,14 @@ impl Week {
     }
 }
 
-/// What a message tells of the time.
-pub(super) fn stamp(message: &Message<'_>, formats: &Formats, week: Week) -> Option<Stamp> {
-    let us = message.time_us().or_else(|| week.since_first(week_us(message, formats)?))?;
+/// What a message tells of the time, which says itself that it is so long after power-on, microseconds.
+pub(super) fn stamp(
+    message: &Message<'_>,
+    boot_us: Option<u64>,
+    formats: &Formats,
+    week: Week,
+) -> Option<Stamp> {
+    let us = boot_us.or_else(|| week.since_first(week_us(message, formats)?))?;
     Some(Stamp { us, series: usize::from(message.format().kind) })
 }
 

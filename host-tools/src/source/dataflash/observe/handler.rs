@@ -69,7 +69,7 @@ impl Given<'_> {
 
     /// A finite number in single precision.
     pub(super) fn single(&self, slot: usize) -> Option<f32> {
-        self.number(slot).map(|number| number as f32).filter(|number| number.is_finite())
+        self.message.single(self.column(slot)?)
     }
 
     /// Numbers of slots that follow each other, all or none.

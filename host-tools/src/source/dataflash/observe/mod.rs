@@ -73,7 +73,7 @@ impl Default for Handlers {
 
 impl Handlers {
     /// The handler of a message.
-    pub(super) fn of(&mut self, format: &Format) -> Option<Resolved> {
+    pub(super) fn of(&mut self, format: &Format) -> Option<&Resolved> {
         let slot = self.by_kind.get_mut(usize::from(format.kind))?;
         if matches!(slot, Looked::NotYet) {
             *slot = handler(&format.name).map_or(Looked::Nothing, |handler| {
@@ -83,7 +83,7 @@ impl Handlers {
             });
         }
         match slot {
-            Looked::Found(resolved) => Some(*resolved),
+            Looked::Found(resolved) => Some(resolved),
             Looked::NotYet | Looked::Nothing => None,
         }
     }
@@ -99,11 +99,11 @@ impl Handlers {
 /// Gives a message to its handler.
 pub(super) fn take(
     state: &mut State,
-    resolved: Resolved,
+    resolved: &Resolved,
     message: &Message<'_>,
     (at, boot_us): (Instant, Option<u64>),
     out: &mut Out<'_>,
 ) {
     let Resolved { handler, slots, base } = resolved;
-    (handler.take)(state, &Given { message, slots: &slots, base, at, boot_us }, out);
+    (handler.take)(state, &Given { message, slots, base: *base, at, boot_us }, out);
 }

@@ -2,6 +2,8 @@
 
 use proptest::prelude::*;
 
+use super::super::binary::{Binary, Piece, Window};
+use super::super::format::Formats;
 use super::writer::Writer;
 use super::{detect, read};
 
@@ -28,6 +30,31 @@ fn a_log_that_is_cut_anywhere_is_read_up_to_there() {
         let (seen, _) = read(part).expect("damage is no failure");
         let damaged: u64 = seen.gaps.iter().map(|gap| gap.2).sum();
         assert!(damaged < 258, "cut at {length}: {:?}", seen.gaps);
+    }
+}
+
+#[test]
+fn the_first_part_of_a_log_has_the_messages_that_its_reading_has_whatever_is_damaged() {
+    let whole = small();
+    for at in 0..whole.len() {
+        let mut bytes = whole.clone();
+        bytes.iter_mut().skip(at).take(1 + at % 7).for_each(|byte| *byte ^= 0x5A);
+        let mut all = Formats::new();
+        for kind in [128, 150, 160, 161, 162] {
+            all.lengths.told[kind] = if kind == 128 { 89 } else { 27 };
+        }
+        let (mut window, mut first) = (Window::new(&bytes), Vec::new());
+        let lengths = &mut all.lengths.clone();
+        while let Some((kind, payload, place, _)) = window.next(lengths) {
+            first.push((kind, payload.to_vec(), place as u64));
+        }
+        let (mut binary, mut read) = (Binary::new(&bytes[..]), Vec::new());
+        while let Some(piece) = binary.next(&mut all.lengths).expect("memory") {
+            if let Piece::Message { kind, payload, place, .. } = piece {
+                read.push((kind, payload.to_vec(), place));
+            }
+        }
+        assert_eq!(first, read, "damaged at {at}");
     }
 }
 
