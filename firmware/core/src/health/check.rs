@@ -91,18 +91,18 @@ pub enum Part {
 impl Part {
     pub(super) const COUNT: usize = Self::Past as usize + 1;
 
-    /// The parts of which an observation says something, among those that are [told](Self::is_told); all of these where it may change
+    /// The parts of which an observation says something, among those that are [`Self::TOLD`], a bit each; all of these where it may change
     /// more.
-    pub(super) const fn told_by(observation: &Observation) -> &'static [Self] {
+    pub(super) const fn told_by(observation: &Observation) -> u16 {
         match observation {
-            Observation::Battery(_) => &[Self::Supply, Self::Battery],
-            Observation::SystemStatus(_) => &[Self::Supply, Self::Battery, Self::Board],
-            Observation::Rails(_) | Observation::Processor(_) => &[Self::Board],
-            Observation::Vibration(_) => &[Self::Vibration],
-            Observation::RadioControl(_) | Observation::TelemetryRadio(_) => &[Self::Radio],
-            Observation::Gnss(_) | Observation::GnssIntegrity(_) => &[Self::Receiver],
-            Observation::Estimator(_) => &[Self::Estimator],
-            Observation::Engine(_) => &[Self::Engine],
+            Observation::Battery(_) => Self::bits(&[Self::Supply, Self::Battery]),
+            Observation::SystemStatus(_) => Self::bits(&[Self::Supply, Self::Battery, Self::Board]),
+            Observation::Rails(_) | Observation::Processor(_) => Self::bits(&[Self::Board]),
+            Observation::Vibration(_) => Self::bits(&[Self::Vibration]),
+            Observation::RadioControl(_) | Observation::TelemetryRadio(_) => Self::bits(&[Self::Radio]),
+            Observation::Gnss(_) | Observation::GnssIntegrity(_) => Self::bits(&[Self::Receiver]),
+            Observation::Estimator(_) => Self::bits(&[Self::Estimator]),
+            Observation::Engine(_) => Self::bits(&[Self::Engine]),
             Observation::Imu(_)
             | Observation::Air(_)
             | Observation::ImuAndAir(..)
@@ -115,12 +115,14 @@ impl Part {
             | Observation::Hud(_)
             | Observation::Outputs(_)
             | Observation::Escs(_)
-            | Observation::SystemTime(_) => &[],
-            _ => &Self::TOLD,
+            | Observation::SystemTime(_) => 0,
+            _ => Self::TOLD,
         }
     }
 
-    const TOLD: [Self; 8] = [
+    /// The parts whose values change with an observation of them, an event of the flight or a setting only: not with time, and not with
+    /// what others say. A bit each.
+    pub(super) const TOLD: u16 = Self::bits(&[
         Self::Supply,
         Self::Battery,
         Self::Board,
@@ -129,19 +131,15 @@ impl Part {
         Self::Receiver,
         Self::Estimator,
         Self::Engine,
-    ];
+    ]);
 
-    /// Whether its values change with an observation of it, an event of the flight or a setting only: not with time, and not with what
-    /// others say.
-    pub(super) const fn is_told(self) -> bool {
-        let mut place = 0;
-        while place < Self::TOLD.len() {
-            if Self::TOLD[place] as u8 == self as u8 {
-                return true;
-            }
+    const fn bits(parts: &[Self]) -> u16 {
+        let (mut bits, mut place) = (0, 0);
+        while place < parts.len() {
+            bits |= 1 << parts[place] as u8;
             place += 1;
         }
-        false
+        bits
     }
 }
 

@@ -40,7 +40,7 @@ use crate::observation::Observation;
 use crate::params::{Param, Params};
 use crate::time::{Instant, Span};
 use exceedance::Exceedances;
-use tables::{Kinds, Places, STATES};
+use tables::{Kinds, MAY_REST, Places, STATES};
 
 /// A vehicle that has not been heard for so long is silent.
 const SILENT: Span = Span::from_secs(5);
@@ -58,6 +58,8 @@ pub struct Health {
     /// Checks that are left out until something is said of them, or this time: all their states rest.
     rest: Places,
     rest_until: Instant,
+    /// Parts of which something was said since the last step, a bit each.
+    heard: u16,
     /// How checks were stepped last: [`Now::mark`].
     stepped: u8,
 }
@@ -79,22 +81,21 @@ impl Health {
             awake: Kinds::NONE,
             rest: Places::NONE,
             rest_until: Instant::FAR,
+            heard: 0,
             stepped: 0,
         }
     }
 
     /// As if nothing had been seen.
     pub(crate) fn clear(&mut self) {
-        let Self { states, looked_at, awake, rest, rest_until: _, stepped: _ } = self;
+        let Self { states, looked_at, awake, rest, .. } = self;
         states.fill(State::new());
         (*looked_at, *awake, *rest) = (0, Kinds::NONE, Places::NONE);
     }
 
     /// An observation was taken in: what it is of is looked at again.
-    pub(crate) fn hear(&mut self, observation: &Observation) {
-        for part in Part::told_by(observation) {
-            self.rest = self.rest.without(Places::of(*part));
-        }
+    pub(crate) const fn hear(&mut self, observation: &Observation) {
+        self.heard |= Part::told_by(observation);
     }
 
     /// Something else changed that checks read: all of them are looked at again.
@@ -142,10 +143,11 @@ impl Health {
         }
         // What the autopilot says rests while it does not say it.
         let on = Places::of_causes(inputs.vehicle.alerts.may_be_on(inputs.now));
-        let left_out = self.rest.without(on);
+        let heard = Places::of_parts(core::mem::take(&mut self.heard));
+        let left_out = self.rest.without(heard).without(on);
         debug_assert!({ *self }.look(left_out, inputs, parts, now).is_empty(), "what is left out changes");
         let restless = self.look(places.without(left_out), inputs, parts, now);
-        self.rest = places.without(restless).within(Places::of_told().and(Places::of(Part::Alert)));
+        self.rest = places.without(restless).within(MAY_REST);
         restless
     }
 

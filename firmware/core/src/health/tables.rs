@@ -92,17 +92,17 @@ static OF_WHEN: [Places; When::ALL.len()] = {
     of_when
 };
 
-/// The checks of parts that are [told](Part::is_told).
-static OF_TOLD: Places = {
-    let mut of_told = Places::NONE;
+/// The checks that may rest: of parts that are [told](Part::TOLD), and of what the autopilot says.
+pub(super) static MAY_REST: Places = {
+    let mut may_rest = Places::NONE;
     let mut place = 0;
     while place < CHECKS_COUNT {
-        if CHECKS[place].part.is_told() {
-            of_told.add(place as u8);
+        if (Part::TOLD | 1 << Part::Alert as u16) >> CHECKS[place].part as u8 & 1 != 0 {
+            may_rest.add(place as u8);
         }
         place += 1;
     }
-    of_told
+    may_rest
 };
 
 /// The place of the check of what the autopilot says, by [`Cause`].
@@ -167,7 +167,7 @@ impl Kinds {
 
     /// The checks of these kinds.
     pub(super) fn places(self) -> Places {
-        let of_parts = Places::union(&OF_PART, u16::from_le_bytes(self.parts).into());
+        let of_parts = Places::of_parts(u16::from_le_bytes(self.parts));
         of_parts.within(Places::union(&OF_WHEN, self.times.into()))
     }
 }
@@ -181,14 +181,9 @@ impl Places {
         self.0[place as usize / 32] |= 1 << (place % 32);
     }
 
-    /// The checks whose value is from a part.
-    pub(super) fn of(part: Part) -> Self {
-        OF_PART[part as usize]
-    }
-
-    /// The checks of parts that are [told](Part::is_told).
-    pub(super) fn of_told() -> Self {
-        OF_TOLD
+    /// The checks whose value is from these parts, a bit each.
+    pub(super) fn of_parts(parts: u16) -> Self {
+        Self::union(&OF_PART, parts.into())
     }
 
     /// The checks of what the autopilot says is wrong with these.
