@@ -39,6 +39,17 @@ impl Crc32c {
         Self(!value)
     }
 
+    /// The check of what is known when this is compiled.
+    pub(crate) const fn of_constant(bytes: &[u8]) -> u32 {
+        let tables = tables();
+        let (mut crc, mut at) = (u32::MAX, 0);
+        while at < bytes.len() {
+            crc = (crc >> 8) ^ tables[0][(crc as u8 ^ bytes[at]) as usize];
+            at += 1;
+        }
+        !crc
+    }
+
     pub(crate) fn add(&mut self, bytes: &[u8]) {
         #[cfg(target_arch = "x86_64")]
         if let Some(crc) = sse42::add(self.0, bytes) {

@@ -86,7 +86,6 @@ pub struct Writer {
     chain_before: u32,
     in_group: bool,
     changed: bool,
-    layouts: Option<u32>,
     last_ms: u64,
     epoch_micros: Option<u64>,
     counters: Counters,
@@ -130,7 +129,6 @@ impl Writer {
             chain_before: 0,
             in_group: false,
             changed: false,
-            layouts: None,
             last_ms: 0,
             epoch_micros: None,
             counters: Counters { frames: 0, frame_bytes: 0, records: 0, sectors: 0, groups: 0, refused: 0 },
@@ -288,8 +286,9 @@ impl Writer {
         let before = self.coder;
         self.scratch.clear();
         self.model.encode(entry, plain, &mut self.frame, &mut self.coder, &mut self.scratch);
-        let sectors_after = GROUP_SECTORS - 1 - usize::from(self.header.since_first);
-        let room = sectors_after * BODY_BYTES + (BODY_BYTES - self.header.body_bytes);
+        // Flipped counts end the group.
+        let sectors_after = (GROUP_SECTORS - 1).saturating_sub(usize::from(self.header.since_first));
+        let room = sectors_after * BODY_BYTES + BODY_BYTES.saturating_sub(self.header.body_bytes);
         let len = self.scratch.bytes().map(<[u8]>::len).filter(|len| len + LOOKAHEAD + FLUSH_MAX <= room);
         if len.is_none() {
             self.coder = before;
@@ -301,7 +300,7 @@ impl Writer {
     #[inline(never)]
     fn add(&mut self, done: usize, len: usize) -> usize {
         let at = self.header.body_bytes;
-        let end = len.min(done + BODY_BYTES - at);
+        let end = len.min(done + BODY_BYTES.saturating_sub(at));
         let places = self.sector.body_mut().get_mut(at..);
         let bytes = self.scratch.bytes().and_then(|bytes| bytes.get(done..end));
         if let (Some(places), Some(bytes)) = (places, bytes) {
@@ -331,7 +330,7 @@ impl Writer {
 
     fn begin_group(&mut self, at_ms: u64) {
         let preamble = Preamble {
-            layouts: *self.layouts.get_or_insert_with(layouts::current),
+            layouts: layouts::CURRENT,
             start_ms: at_ms,
             frames_before: self.counters.frames as u32,
             epoch_micros: self.epoch_micros,
@@ -397,5 +396,48 @@ impl Writer {
         self.header.check = self.chain;
         self.changed = self.ended.frames != 0 || self.ended.records != 0;
         self.ended = Ended::default();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Of each sector whether it starts a group.
+    struct Starts(Vec<bool>);
+
+    impl SectorSink for Starts {
+        fn room(&self) -> usize {
+            usize::MAX
+        }
+
+        fn put(&mut self, sector: &Sector) {
+            self.0.push(sector.starts_group());
+        }
+    }
+
+    #[test]
+    fn a_flip_of_the_counts_that_end_a_group_costs_that_group_only() {
+        for flip in 0..20 {
+            let (mut writer, mut sink) = (Box::new(Writer::new()), Starts(Vec::new()));
+            for number in 0..10_000_u32 {
+                if number == 500 {
+                    match flip {
+                        0..8 => writer.header.since_first ^= 1 << flip,
+                        _ => writer.header.body_bytes ^= 1 << (flip - 8),
+                    }
+                }
+                let mut bytes = [0; 40];
+                bytes.as_chunks_mut().0.iter_mut().fold(number, |last, chunk| {
+                    let next = last.wrapping_mul(0x9E37_79B9) ^ last >> 15;
+                    *chunk = next.to_le_bytes();
+                    next
+                });
+                let at = Instant::from_millis(u64::from(number));
+                writer.frame(at, &bytes, false, &mut sink).unwrap();
+            }
+            let groups = sink.0.iter().filter(|starts| **starts).count();
+            assert!(sink.0.len() > 300 && groups > sink.0.len() / 80, "{flip}: {groups} of {}", sink.0.len());
+        }
     }
 }
