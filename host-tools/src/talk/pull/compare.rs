@@ -65,6 +65,21 @@ pub(super) struct Heading {
 /// What the board's log that is open and has so many bytes is called here: by the session that its first sectors name, and the box that
 /// its record of the start does.
 pub(super) fn heading_of(ftp: &mut Ftp, name: &str, length: u32) -> Result<Heading> {
+    heading_by(name, length, |at| bytes_of(ftp, at, SECTOR))
+}
+
+/// The same of what came of it, a file here.
+pub(super) fn heading_here(path: &Path, name: &str, length: u32) -> Result<Heading> {
+    let unread = || format!("{}: cannot be read", path.display());
+    let mut file = File::open(path).with_context(unread)?;
+    heading_by(name, length, |at| {
+        let mut bytes = vec![0; SECTOR as usize];
+        let read = file.seek(SeekFrom::Start(u64::from(at))).and_then(|_| file.read_exact(&mut bytes));
+        read.map(|()| bytes).with_context(unread)
+    })
+}
+
+fn heading_by(name: &str, length: u32, mut sector_at: impl FnMut(u32) -> Result<Vec<u8>>) -> Result<Heading> {
     let mut sectors = Vec::new();
     let Some(segment) = segment_name(Path::new(name)) else {
         return Ok(Heading { name: name.to_owned(), sectors });
@@ -72,7 +87,7 @@ pub(super) fn heading_of(ftp: &mut Ftp, name: &str, length: u32) -> Result<Headi
     let (mut session, mut board) = (None, None);
     let mut group = Vec::new();
     for at in (0..HEADING_SECTORS).map(|sector| sector * SECTOR).filter(|at| *at + SECTOR <= length) {
-        let bytes = bytes_of(ftp, at, SECTOR)?;
+        let bytes = sector_at(at)?;
         let Some(sector) = bytes.first_chunk().map(|bytes| Sector::from_bytes(*bytes)) else { break };
         sectors.push(sector);
         let Ok(header) = Header::read(sector.bytes()) else { continue };

@@ -19,7 +19,7 @@ use hums_blackbox::{Cause, Gap, SECTOR_BYTES};
 use hums_core::time::Instant;
 use serde::Serialize;
 
-use self::compare::{Likeness, compare, heading_of};
+use self::compare::{Likeness, compare, heading_here, heading_of};
 use self::ftp::Ftp;
 use self::part::Part;
 use super::Client;
@@ -128,6 +128,14 @@ fn around(ftp: &mut Ftp, mut logs: Vec<String>, args: &cli::Pull, moment: &cli::
     let brought = around::pull(ftp, &logs, &args.output, moment, args.span)?;
     let mut outcome = Outcome::Done;
     let mut pulled = Vec::new();
+    if brought.strange > 0 {
+        note!(
+            "{} of another session came and are not in the part: another log has come in its place while it was read, or the \
+             card has lost some of it",
+            count(brought.strange, "sector")
+        );
+        outcome = Outcome::Losses;
+    }
     for (name, path) in brought.parts {
         let sound = is_sound(&name, &path)?;
         outcome = outcome.and(Outcome::lossy(!sound));
@@ -170,14 +178,15 @@ fn is_sound(name: &str, path: &Path) -> Result<bool> {
 
 /// Brings a log: where it is, and whether it was not there already; none where nothing is in it.
 fn pull(ftp: &mut Ftp, name: &str, output: &Path) -> Result<Option<(PathBuf, bool)>> {
-    let length = ftp.open(name)?;
+    let mut length = ftp.open(name)?;
     if length == 0 {
         note!("{name}: nothing is recorded in it yet");
         return Ok(None);
     }
-    let path = output.join(heading_of(ftp, name, length)?.name);
+    let heading = heading_of(ftp, name, length)?;
+    let path = output.join(&heading.name);
     let there = there(ftp, name, &path, length)?;
-    let mut part = Part::there(&path, length / SECTOR_BYTES as u32)?;
+    let mut part = Part::there(&path, length / SECTOR_BYTES as u32, &heading.sectors)?;
     if there == There::Whole {
         part.map_or(Ok(()), |part| part.finish(&path))?;
         return Ok(Some((path, false)));
@@ -201,8 +210,16 @@ fn pull(ftp: &mut Ftp, name: &str, output: &Path) -> Result<Option<(PathBuf, boo
     }
     fetch(ftp, name, &mut file, have, length, part.as_mut())?;
     if !is_whole(ftp, name, &mut file, length)? {
-        note!("{name}: what came differs from the board's log; once more from its beginning");
-        file.begin_anew()?;
+        let aside = file.set_aside()?;
+        note!(
+            "{name}: what came differs from the board's log; once more from its beginning, and what came stays as {}",
+            aside.display()
+        );
+        length = ftp.open(name)?.min(length);
+        let now = output.join(heading_of(ftp, name, length)?.name);
+        if now != path {
+            return exchanged(&now);
+        }
         fetch(ftp, name, &mut file, 0, length, None)?;
         if !is_whole(ftp, name, &mut file, length)? {
             bail!(
@@ -211,9 +228,23 @@ fn pull(ftp: &mut Ftp, name: &str, output: &Path) -> Result<Option<(PathBuf, boo
             );
         }
     }
+    let came = output.join(heading_here(file.part(), name, length)?.name);
+    if came != path {
+        file.set_aside()?;
+        return exchanged(&came);
+    }
     file.finish()?;
     part.map_or(Ok(()), |part| part.finish(&path))?;
     Ok(Some((path, true)))
+}
+
+/// Nothing of one session gets the name of another one.
+fn exchanged<T>(now: &Path) -> Result<T> {
+    bail!(
+        "another log has come in its place while it was read, {}: nothing of it has the first one's name; what came is kept in \
+         hums-kept: call again",
+        now.display()
+    )
 }
 
 /// What is on this PC already under the log's name.
@@ -360,8 +391,12 @@ mod tests {
     use std::fs;
     use std::path::PathBuf;
 
+    use hums_link::messages;
+    use hums_link::packet::Fields;
+
     use super::*;
     use crate::endpoint::Endpoint;
+    use crate::talk::fake;
 
     /// The sectors of a recording of the repository, as `hums pack` makes them.
     fn packed(dir: &Path, name: &str) -> Vec<u8> {
@@ -371,6 +406,108 @@ mod tests {
             cli::Pack { input: Endpoint::File(input), output: output.clone(), replace: false, json: false };
         crate::pack::run(&pack).expect("packed");
         fs::read(output).expect("there")
+    }
+
+    const NAME: &str = "00001_00.HUM";
+
+    /// A board with this log, in whose place the other one comes with the so-many-th question for bytes.
+    fn board(mut log: Vec<u8>, other: Vec<u8>, mut reads: u32) -> Ftp {
+        let client = fake::found(&[1], move |frame| {
+            let asked = Fields(frame.payload().get(3..).unwrap_or_default());
+            let (opcode, size, at) = (asked.u8(3), usize::from(asked.u8(4)), asked.u32(8) as usize);
+            let sequence = asked.u16(0);
+            if matches!(opcode, 5 | 15) {
+                reads = reads.saturating_sub(1);
+                if reads == 0 {
+                    log.clone_from(&other);
+                }
+            }
+            let answer = |more: u16, at: usize, is_last: bool, data: &[u8]| {
+                let [s0, s1] = sequence.wrapping_add(more).to_le_bytes();
+                let head = [s0, s1, 0, 128, data.len() as u8, opcode, u8::from(is_last), 0];
+                let payload = [&head[..], &(at as u32).to_le_bytes(), data].concat();
+                (1, messages::file_transfer(255, 190, &payload))
+            };
+            match opcode {
+                4 => vec![answer(1, 0, false, &(log.len() as u32).to_le_bytes())],
+                5 => vec![answer(1, at, false, &log[at..(at + size).min(log.len())])],
+                14 => {
+                    let sum = hums_link::ftp::checksum(0, &log[..at.min(log.len())]);
+                    vec![answer(1, at, false, &sum.to_le_bytes())]
+                }
+                15 => {
+                    let pieces = log[at..].chunks(size).take(20).enumerate();
+                    let is_last = |piece: usize| piece == 19 || at + (piece + 1) * size >= log.len();
+                    pieces.map(|(n, data)| answer(n as u16 + 1, at + n * size, is_last(n), data)).collect()
+                }
+                _ => vec![answer(1, 0, false, &[])],
+            }
+        });
+        Ftp::new(client).expect("it answers")
+    }
+
+    /// The first sectors of two sessions, and what `pull` calls the first one.
+    fn two_logs(dir: &Path) -> (Vec<u8>, Vec<u8>, String) {
+        let [one, other] = ["px4_hil_quad_low.tlog", "ap_quad_guided.tlog"]
+            .map(|name| packed(dir, name).get(..80 * SECTOR_BYTES).expect("a longer log").to_vec());
+        let path = dir.join("one.HUM");
+        fs::write(&path, &one).expect("written");
+        let name = heading_here(&path, NAME, one.len() as u32).expect("it reads").name;
+        (one, other, name)
+    }
+
+    #[test]
+    fn what_was_begun_is_kept_when_the_card_loses_it_or_another_log_comes_in_its_place() {
+        let dir = tempfile::tempdir().expect("a folder");
+        let (log, other, name) = two_logs(dir.path());
+        let mut lost = log.clone();
+        lost[4096..8192].fill(0);
+        for (next, case) in [(&lost, "lost"), (&other, "exchanged")] {
+            let output = dir.path().join(case);
+            fs::create_dir(&output).expect("made");
+            let part = output.join(format!(".{name}.pull.hums-part"));
+            fs::write(&part, &log[..20_000]).expect("written");
+            // The heading is read before.
+            let mut ftp = board(log.clone(), next.clone(), 8 * 3 + 1);
+            let pulled = pull(&mut ftp, NAME, &output);
+            let kept = fs::read(output.join("hums-kept/1").join(&name)).expect("kept");
+            assert_eq!(kept[..20_000], log[..20_000], "{case}");
+            if case == "lost" {
+                let (path, is_new) = pulled.expect("it came").expect("a log");
+                assert!(is_new && fs::read(path).expect("there") == lost);
+            } else {
+                let told = pulled.expect_err("it is another one").to_string();
+                assert!(told.contains("another log has come in its place"), "{told}");
+                assert!(!output.join(&name).exists());
+            }
+        }
+        // The other one from its first byte on.
+        let output = dir.path().join("early");
+        fs::create_dir(&output).expect("made");
+        let mut ftp = board(log.clone(), other.clone(), 8 * 3 + 1);
+        let told = pull(&mut ftp, NAME, &output).expect_err("it is another one").to_string();
+        assert!(told.contains("another log has come in its place"), "{told}");
+        assert_eq!(fs::read(output.join("hums-kept/1").join(&name)).expect("kept"), other);
+    }
+
+    #[test]
+    fn a_part_has_sectors_of_one_session_also_where_the_log_is_exchanged_while_it_is_read() {
+        let dir = tempfile::tempdir().expect("a folder");
+        let (log, other, name) = two_logs(dir.path());
+        let what: cli::Around = "0".parse().expect("a time");
+        // The log's beginning is read before.
+        let mut ftp = board(log.clone(), other, 8 * 3 + 5);
+        let span = hums_core::time::Span::from_secs(9_999);
+        let names = [NAME.to_owned()];
+        let brought = around::pull(&mut ftp, &names, dir.path(), &what, span).expect("a part");
+        let [(_, path)] = &brought.parts[..] else { panic!("{brought:?}") };
+        assert_eq!(path, &crate::logs::naming::part_name(&dir.path().join(name)));
+        let part = fs::read(path).expect("there");
+        assert_eq!(part.len(), log.len());
+        for (ours, theirs) in part.chunks(SECTOR_BYTES).zip(log.chunks(SECTOR_BYTES)) {
+            assert!(ours == theirs || ours.iter().all(|byte| *byte == 0));
+        }
+        assert!(brought.strange > 10, "{brought:?}");
     }
 
     #[test]
