@@ -22,7 +22,8 @@ pub fn wrong_checksums(frames: u64) -> String {
 pub struct Checksums {
     /// Of the record at hand, whether the message is known; `None` once its frame has come.
     waits: Option<bool>,
-    /// Where the record at hand is.
+    /// How long its frame is, and where it is.
+    length: usize,
     at: Instant,
     place: u64,
     /// Frames that are damaged, and where the first one is.
@@ -36,12 +37,15 @@ impl Checksums {
     /// A record with these bytes of a frame.
     pub fn begin(&mut self, at: Instant, place: u64, bytes: &[u8]) {
         let Peek::Frame(frame) = peek(bytes) else { return };
-        (self.waits, self.at, self.place) = (Some(frame.message().is_some()), at, place);
+        (self.waits, self.length) = (Some(frame.message().is_some()), frame.bytes.len());
+        (self.at, self.place) = (at, place);
     }
 
-    /// A frame that is one.
+    /// A frame that is one: that of the record, unless it lies in one that is damaged.
     pub fn frame(&mut self, frame: &Frame<'_>) {
-        self.waits = None;
+        if frame.bytes().len() == self.length || self.waits == Some(false) {
+            self.waits = None;
+        }
         self.unchecked += u64::from(frame.check() == Check::Unverified);
     }
 

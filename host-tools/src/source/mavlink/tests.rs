@@ -184,6 +184,70 @@ fn a_frame_with_a_wrong_checksum_is_damage_and_one_of_an_unknown_message_cannot_
     );
 }
 
+/// Records of attitudes and, every third, of a heartbeat, ten a second.
+fn records_of_two_lengths(records: u32) -> Vec<Vec<u8>> {
+    let (mut encoder, mut buffer) = (Encoder::of(1, 1), [0; FRAME_BYTES_MAX]);
+    let each = |at: u32| {
+        if at.is_multiple_of(3) {
+            return record(&u64::from(at));
+        }
+        let time = (1_700_000_000 * SECOND + u64::from(at) * SECOND / 10).to_be_bytes();
+        let packet = Packet::new(30).u32(0, 60_000 + at * 100).u32(24, 1);
+        [&time[..], encoder.frame(&mut buffer, &packet)].concat()
+    };
+    (0..records).map(each).collect()
+}
+
+/// How many frames a tlog has, and its gaps.
+fn frames_and_gaps(bytes: Vec<u8>) -> (usize, Vec<(Cause, Option<u64>)>) {
+    let mut reader = TlogReader::new(Input::new(std::io::Cursor::new(bytes)).expect("memory"));
+    let (mut frames, mut gaps) = (0, Vec::new());
+    let read = reader.read(Want { frames: true, ..Want::default() }, &mut |_, item| {
+        match item {
+            Item::Frame(_) => frames += 1,
+            Item::Gap(gap) => gaps.push((gap.cause, gap.place)),
+            _ => {}
+        }
+        Ok(())
+    });
+    assert!(read.is_ok());
+    (frames, gaps)
+}
+
+#[test]
+fn a_record_whose_length_is_that_of_several_or_whose_end_is_missing_is_damage_and_those_in_it_are_found() {
+    let records = records_of_two_lengths(60);
+    let place_of = |records: &[Vec<u8>], at: usize| records[..at].concat().len() as u64;
+    let place = |at: usize| place_of(&records, at);
+    assert_eq!(frames_and_gaps(records.concat()), (60, vec![]));
+    // The byte of a frame's length, of MAVLink 1 and 2, with each other value that there is.
+    let (mut swallow, at_length) = (0, TIME_BYTES + 1);
+    for at in [20, 21, 22, 57] {
+        for length in 0..=u8::MAX {
+            let mut bytes = records.concat();
+            let byte = &mut bytes[place(at) as usize + at_length];
+            if std::mem::replace(byte, length) == length {
+                continue;
+            }
+            let longer = usize::from(length).wrapping_sub(usize::from(records[at][at_length]));
+            let ends = (at + 1..60).any(|next| place(next + 1) - place(at + 1) == longer as u64);
+            swallow += usize::from(ends);
+            let (frames, gaps) = frames_and_gaps(bytes);
+            // Of the record, or of its frame.
+            let is_told =
+                gaps.iter().any(|gap| [place(at), place(at) + TIME_BYTES as u64].map(Some).contains(&gap.1));
+            assert!(frames == 59 && is_told, "{at} {length}: {frames} {gaps:?}");
+        }
+    }
+    assert!(swallow >= 12, "{swallow}");
+    // Of a record so much is missing that its frame ends where the next one ends.
+    let mut cut = records;
+    let (keep, start) = (cut[22].len() - record(&23).len(), place_of(&cut, 22));
+    cut[22].truncate(keep);
+    cut[23] = record(&23);
+    assert_eq!(frames_and_gaps(cut.concat()), (59, vec![(Cause::Damaged, Some(start))]));
+}
+
 #[test]
 fn a_clock_that_was_set_and_a_silence_are_none() {
     let set: Vec<u64> = (1_000..1_100).chain(500..600).collect();

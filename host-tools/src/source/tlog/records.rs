@@ -152,7 +152,8 @@ impl<R: Read> Records<R> {
 }
 
 /// The time and the frame length of the record that begins here. A frame that does not check counts where the record
-/// after it, or the end of the file, stands where it should: that is another definition of the message, not damage.
+/// after it, or the end of the file, stands where it should: that is another definition of the message, not damage. One that
+/// has a whole record in it does not count: its length is damaged, or its end is missing.
 fn record_at(bytes: &[u8], ended: bool) -> Option<(u64, usize)> {
     let time_us = u64::from_be_bytes(bytes.get(..TIME_BYTES)?.try_into().ok()?);
     if time_us > TIME_US_MAX {
@@ -165,5 +166,17 @@ fn record_at(bytes: &[u8], ended: bool) -> Option<(u64, usize)> {
         None => ended && after.is_empty(),
         Some(next) => after.first() == Some(&0) && matches!(peek(next), Peek::Frame(_) | Peek::Short),
     };
-    (frame.check() == Check::Good || followed).then_some((time_us, length))
+    let counts = frame.check() == Check::Good || followed && !has_record_in(frame.bytes);
+    counts.then_some((time_us, length))
+}
+
+/// Whether a record whose frame checks lies behind the first byte of a frame.
+fn has_record_in(frame: &[u8]) -> bool {
+    (1..frame.len()).any(|at| {
+        let record = frame.get(at..).unwrap_or_default();
+        record.first() == Some(&0)
+            && record.get(TIME_BYTES..).is_some_and(
+                |inner| matches!(peek(inner), Peek::Frame(inner) if inner.check() == Check::Good),
+            )
+    })
 }
