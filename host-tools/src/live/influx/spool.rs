@@ -135,8 +135,7 @@ impl Spool {
             bail!("it is another file; name one that is not there yet");
         }
         if bytes < HEADER_BYTES {
-            // Its making was cut off, or it is an empty one of an earlier version.
-            return Ok(self.reset()?);
+            return self.begin_anew(&header, bytes);
         }
         if u32_at(&header, 8) != VERSION {
             bail!("it is of another version of this program; move it away, or name another file");
@@ -162,7 +161,7 @@ impl Spool {
                 String::from_utf8_lossy(name.unwrap_or_default())
             );
         }
-        if damaged_bytes > 0 {
+        if damaged_bytes > 0 || self.has_more(bytes, told_end)? {
             return self
                 .write_anew(told_end, true)
                 .context("what is sound in it cannot be written anew, without what is damaged");
@@ -183,6 +182,18 @@ impl Spool {
             );
         }
         Ok(())
+    }
+
+    /// Begins anew where not even the header is whole: it has lost its end, or it is an empty one, of an earlier version too.
+    fn begin_anew(&mut self, header: &[u8], bytes: u64) -> Result<()> {
+        // What is missing of a header is zero here.
+        let (version, points) = (u32_at(header, 8), u64_at(header, 48));
+        let told_empty = bytes >= NAME_AT as u64 && u64_at(header, 40) == u64_at(header, 24) && points == 0;
+        if (1..VERSION).contains(&version) || told_empty {
+            return Ok(self.reset()?);
+        }
+        self.damage = Damage { points, bytes };
+        self.write_anew(0, true).context("it has lost its end, and cannot be kept")
     }
 
     /// Finds what waits and what of it is damaged; gives how many bytes of batches that were whole are.
@@ -210,9 +221,17 @@ impl Spool {
         let bytes = if at < self.size {
             file_bytes.saturating_sub(HEADER_BYTES + at)
         } else {
-            head.map_or(0, Head::bytes)
+            head.map_or(0, Head::bytes) + file_bytes.saturating_sub(HEADER_BYTES + self.size)
         };
         Ok(Damage { points: head.map_or(0, |head| head.points.into()), bytes })
+    }
+
+    /// Whether more lies behind the newest batch than one that was cut off: another file's, that was joined on.
+    fn has_more(&mut self, file_bytes: u64, told_end: u64) -> io::Result<bool> {
+        let at = self.end.max(told_end);
+        let one = self.head(at)?.map_or(RECORD_BYTES as u64 - 1, Head::bytes);
+        let allowed = at.saturating_add(one).min(self.size);
+        Ok(file_bytes.saturating_sub(HEADER_BYTES) > allowed)
     }
 
     /// So that it is told once.

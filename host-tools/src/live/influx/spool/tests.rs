@@ -40,6 +40,41 @@ fn points_for_another_database_are_not_given_to_this_one() {
     assert!(open(&path, 3_000).is_empty());
 }
 
+#[test]
+fn a_file_that_has_lost_most_of_its_header_and_one_with_another_behind_it_are_told_and_kept() {
+    for limit in [100_000, 4_000] {
+        let dir = tempfile::tempdir().expect("a folder");
+        let path = dir.path().join("spool");
+        let mut spool = open(&path, limit);
+        (0..40).for_each(|number| {
+            spool.put(&batch(number)).expect("room");
+        });
+        let (points, expected) = (spool.points(), drain(&mut open_copy(&mut spool)));
+        drop(spool);
+        let whole = std::fs::read(&path).expect("a file");
+        let kept = |number: usize| std::fs::read(dir.path().join(format!("hums-kept/{number}/spool")));
+        for (number, bytes) in [(1, 8), (2, 40), (3, 100), (4, 511)] {
+            std::fs::write(&path, &whole[..bytes]).expect("room");
+            let spool = open(&path, limit);
+            let points = if bytes >= NAME_AT { points } else { 0 };
+            assert_eq!(spool.damage(), Damage { points, bytes: bytes as u64 });
+            assert!(spool.is_empty());
+            drop(spool);
+            assert_eq!(kept(number).expect("it is kept"), &whole[..bytes]);
+            assert_eq!(open(&path, limit).damage(), Damage::default(), "it is told once");
+        }
+        let joined = whole.repeat(2);
+        std::fs::write(&path, &joined).expect("room");
+        let mut spool = open(&path, limit);
+        assert_eq!(
+            spool.damage().bytes,
+            if limit == 4_000 { joined.len() as u64 - 4_000 - HEADER_BYTES } else { whole.len() as u64 }
+        );
+        assert!(drain(&mut open_copy(&mut spool)) == expected, "{limit}");
+        assert_eq!(kept(5).expect("it is kept"), joined);
+    }
+}
+
 fn drain(spool: &mut Spool) -> Vec<Batch> {
     let mut taken = Vec::new();
     while let Some(batch) = spool.oldest().expect("it reads") {
