@@ -31,6 +31,8 @@ pub(super) struct Brought {
     pub(super) parts: Vec<(String, PathBuf)>,
     pub(super) at: Instant,
     pub(super) found: Option<Found>,
+    /// Sectors of other sessions that came, and are in no part.
+    pub(super) strange: u32,
 }
 
 /// Brings what these logs, segments of one session in their order, have round a moment: so much before and after it.
@@ -41,11 +43,12 @@ pub(super) fn pull(
     what: &Around,
     span: Span,
 ) -> Result<Brought> {
+    let mut strange = 0;
     let (at, found) = match what {
         Around::Time(When::Seconds(micros)) => (Instant::from_micros(*micros), None),
         Around::Time(When::Utc(utc_us)) => (since_power_on(ftp, names, output, *utc_us)?, None),
         Around::Level(_) | Around::Check(_) => {
-            let found = latest(ftp, names, output, what)?;
+            let found = latest(ftp, names, output, what, &mut strange)?;
             note!("{}: {} at {}", found.check, found.level, moment(found.at));
             (found.at, Some(found))
         }
@@ -61,6 +64,7 @@ pub(super) fn pull(
         }
         let range = between(&mut log, from, to)?;
         log.bring(range.start, range.end)?;
+        strange += log.part.strange();
         parts.insert(0, (name.clone(), log.part.path().to_owned()));
         if first <= from {
             break;
@@ -69,7 +73,7 @@ pub(super) fn pull(
     if parts.is_empty() {
         bail!("what the board has of this session begins after {}", moment(to));
     }
-    Ok(Brought { parts, at, found })
+    Ok(Brought { parts, at, found, strange })
 }
 
 /// A time of day on the monitor's clock, by what the newest of these logs knows of it.
@@ -86,7 +90,7 @@ fn since_power_on(ftp: &mut Ftp, names: &[String], output: &Path, utc_us: u64) -
 }
 
 /// The latest finding that is wanted: the logs are read from their end backwards, group by group, until it comes.
-fn latest(ftp: &mut Ftp, names: &[String], output: &Path, what: &Around) -> Result<Found> {
+fn latest(ftp: &mut Ftp, names: &[String], output: &Path, what: &Around, strange: &mut u32) -> Result<Found> {
     for name in names.iter().rev() {
         let Some(mut log) = Remote::open(ftp, name, output)? else { continue };
         let mut end = log.count();
@@ -94,11 +98,13 @@ fn latest(ftp: &mut Ftp, names: &[String], output: &Path, what: &Around) -> Resu
             let Some(start) = group_of(&mut log, last)? else { break };
             log.bring(start.place, end)?;
             if let Some(found) = log.findings(start.place, end, what)?.pop() {
+                *strange += log.part.strange();
                 return Ok(found);
             }
             end = start.place;
             note!("{name}: no such finding from {} on; looking before that", moment(start.at));
         }
+        *strange += log.part.strange();
     }
     bail!("no such finding is in this session; what came stays for `hums pull`, which brings the rest")
 }
@@ -127,7 +133,7 @@ impl<'a> Remote<'a> {
                 whole.display()
             );
         }
-        let mut part = Part::open(&whole, sectors)?;
+        let mut part = Part::open(&whole, sectors, &heading.sectors)?;
         for (place, sector) in (0..).zip(&heading.sectors) {
             part.put(place, sector)?;
         }

@@ -128,6 +128,14 @@ fn around(ftp: &mut Ftp, mut logs: Vec<String>, args: &cli::Pull, moment: &cli::
     let brought = around::pull(ftp, &logs, &args.output, moment, args.span)?;
     let mut outcome = Outcome::Done;
     let mut pulled = Vec::new();
+    if brought.strange > 0 {
+        note!(
+            "{} of another session came and are not in the part: another log has come in its place while it was read, or the \
+             card has lost some of it",
+            count(brought.strange, "sector")
+        );
+        outcome = Outcome::Losses;
+    }
     for (name, path) in brought.parts {
         let sound = is_sound(&name, &path)?;
         outcome = outcome.and(Outcome::lossy(!sound));
@@ -175,9 +183,10 @@ fn pull(ftp: &mut Ftp, name: &str, output: &Path) -> Result<Option<(PathBuf, boo
         note!("{name}: nothing is recorded in it yet");
         return Ok(None);
     }
-    let path = output.join(heading_of(ftp, name, length)?.name);
+    let heading = heading_of(ftp, name, length)?;
+    let path = output.join(&heading.name);
     let there = there(ftp, name, &path, length)?;
-    let mut part = Part::there(&path, length / SECTOR_BYTES as u32)?;
+    let mut part = Part::there(&path, length / SECTOR_BYTES as u32, &heading.sectors)?;
     if there == There::Whole {
         part.map_or(Ok(()), |part| part.finish(&path))?;
         return Ok(Some((path, false)));
@@ -382,6 +391,7 @@ mod tests {
     use std::fs;
     use std::path::PathBuf;
 
+    use hums_blackbox::Header;
     use hums_link::messages;
     use hums_link::packet::Fields;
 
@@ -479,6 +489,31 @@ mod tests {
         let told = pull(&mut ftp, NAME, &output).expect_err("it is another one").to_string();
         assert!(told.contains("another log has come in its place"), "{told}");
         assert_eq!(fs::read(output.join("hums-kept/1").join(&name)).expect("kept"), other);
+    }
+
+    #[test]
+    fn a_part_has_sectors_of_one_session_also_where_the_log_is_exchanged_while_it_is_read() {
+        let dir = tempfile::tempdir().expect("a folder");
+        let (log, other, name) = two_logs(dir.path());
+        let what: cli::Around = "0".parse().expect("a time");
+        // The log's beginning is read before.
+        let mut ftp = board(log.clone(), other, 8 * 3 + 5);
+        let span = hums_core::time::Span::from_secs(9_999);
+        let names = [NAME.to_owned()];
+        let brought = around::pull(&mut ftp, &names, dir.path(), &what, span).expect("a part");
+        let [(_, path)] = &brought.parts[..] else { panic!("{brought:?}") };
+        assert_eq!(path, &crate::logs::naming::part_name(&dir.path().join(name)));
+        let part = fs::read(path).expect("there");
+        assert_eq!(part.len(), log.len());
+        let mut others = 0;
+        for (ours, theirs) in part.chunks(SECTOR_BYTES).zip(log.chunks(SECTOR_BYTES)) {
+            // One is half of each, and fails its check.
+            let is_sector = Header::read(ours.first_chunk().expect("a sector")).is_ok();
+            assert!(ours == theirs || !is_sector);
+            others += u32::from(!is_sector && ours.iter().any(|byte| *byte != 0));
+        }
+        assert!(others <= 1, "{others}");
+        assert!(brought.strange > 10, "{brought:?}");
     }
 
     #[test]

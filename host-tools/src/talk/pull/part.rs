@@ -20,43 +20,112 @@ pub(super) struct Part {
     path: PathBuf,
     /// Which sectors are in it.
     has: Vec<bool>,
+    /// The session of which it is a part, where a sector has told it.
+    session: Option<u32>,
+    /// Sectors of other sessions that came, and are not in it.
+    strange: u32,
 }
 
 impl Part {
-    /// The part beside a log's own path; made when missing. A log in work may have become longer.
-    pub(super) fn open(whole: &Path, sectors: u32) -> Result<Self> {
+    /// The part beside a log's own path; made when missing. A log in work may have become longer. What is no part of the log that
+    /// begins with these sectors is kept, and the part begins anew.
+    pub(super) fn open(whole: &Path, sectors: u32, head: &[Sector]) -> Result<Self> {
         let path = part_name(whole);
-        let mut options = File::options();
-        options.read(true).write(true).create(true).truncate(false);
-        let file = open_in_place(&mut options, &path).with_context(|| cannot_write(&path))?;
-        let about = file.metadata().with_context(|| cannot_write(&path))?;
-        check_only_name(&file, &path)?;
-        let bytes = u64::from(sectors) * SECTOR_BYTES as u64;
-        if !about.is_file() || about.len() > bytes {
-            bail!("{}: is no part of the board's log, which has {bytes} bytes; move it away", path.display());
+        if fs::symlink_metadata(&path).is_ok_and(|about| !about.is_file()) {
+            bail!(
+                "{}: is a link, or no file, and stands where a part of a log is written; nothing was written: put the file itself \
+                 in its place, or move it away",
+                path.display()
+            );
         }
-        file.set_len(bytes).with_context(|| cannot_write(&path))?;
-        let mut part = Self { file, path, has: Vec::new() };
+        let mut part = Self::at(path, head)?;
+        let bytes = u64::from(sectors) * SECTOR_BYTES as u64;
+        let there = part.file.metadata().with_context(|| cannot_write(&part.path))?.len();
+        if there > bytes {
+            bail!(
+                "{}: is no part of the board's log, which has {bytes} bytes; move it away",
+                part.path.display()
+            );
+        }
+        if !part.is_of(head, there)? {
+            let aside = settle(set_aside(&part.path, &part.path), &part.path)?;
+            note!(
+                "{}: what was there is no part of this log; it begins anew, and that stays as {}",
+                part.path.display(),
+                aside.display()
+            );
+            part = Self::at(part.path, head)?;
+        }
+        part.file.set_len(bytes).with_context(|| cannot_write(&part.path))?;
         part.look(sectors)?;
         Ok(part)
     }
 
-    /// The part beside a log's own path, where there is one.
-    pub(super) fn there(whole: &Path, sectors: u32) -> Result<Option<Self>> {
-        if part_name(whole).is_file() { Self::open(whole, sectors).map(Some) } else { Ok(None) }
+    fn at(path: PathBuf, head: &[Sector]) -> Result<Self> {
+        let session = head.iter().find_map(|sector| Header::read(sector.bytes()).ok());
+        let file = Self::opened(&path)?;
+        Ok(Self { file, path, has: Vec::new(), session: session.map(|header| header.session), strange: 0 })
     }
 
-    /// Finds out which sectors are whole, and of the session of the first one: the others are brought again.
+    fn opened(path: &Path) -> Result<File> {
+        let mut options = File::options();
+        options.read(true).write(true).create(true).truncate(false);
+        let file = open_in_place(&mut options, path).with_context(|| cannot_write(path))?;
+        check_only_name(&file, path)?;
+        Ok(file)
+    }
+
+    /// The part beside a log's own path, where there is one.
+    pub(super) fn there(whole: &Path, sectors: u32, head: &[Sector]) -> Result<Option<Self>> {
+        let is_there = fs::symlink_metadata(part_name(whole)).is_ok();
+        is_there.then(|| Self::open(whole, sectors, head)).transpose()
+    }
+
+    /// Whether what has so many bytes is a part of the log that begins with these sectors: it is empty, or has sectors of that
+    /// session and of no other one, and those that are known are the same.
+    fn is_of(&mut self, head: &[Sector], bytes: u64) -> Result<bool> {
+        let (mut is_empty, mut session) = (true, self.session);
+        let mut is_known = false;
+        self.file.rewind().with_context(|| cannot_write(&self.path))?;
+        let mut log = BufReader::new(&self.file).take(bytes);
+        for place in 0..bytes.div_ceil(SECTOR_BYTES as u64) as usize {
+            let mut block = Vec::new();
+            let read = log.by_ref().take(SECTOR_BYTES as u64).read_to_end(&mut block);
+            read.with_context(|| cannot_write(&self.path))?;
+            is_empty &= block.iter().all(|byte| *byte == 0);
+            let Some(header) = block.first_chunk::<SECTOR_BYTES>().and_then(|block| Header::read(block).ok())
+            else {
+                continue;
+            };
+            let is_other = |theirs: &Sector| {
+                let theirs_header = Header::read(theirs.bytes());
+                !header.partial
+                    && theirs_header.is_ok_and(|theirs| !theirs.partial)
+                    && *theirs.bytes() != *block
+            };
+            if *session.get_or_insert(header.session) != header.session
+                || head.get(place).is_some_and(is_other)
+            {
+                return Ok(false);
+            }
+            is_known = true;
+        }
+        Ok(is_known || is_empty)
+    }
+
+    /// Finds out which sectors are whole: the others are brought again.
     fn look(&mut self, sectors: u32) -> Result<()> {
-        let mut session = None;
         for place in 0..sectors {
             let header = Header::read(self.read(place)?.bytes()).ok();
-            let is_of_it =
-                header.is_some_and(|header| *session.get_or_insert(header.session) == header.session);
             // One in progress is written over yet.
-            self.has.push(is_of_it && header.is_some_and(|header| !header.partial));
+            self.has.push(header.is_some_and(|header| !header.partial));
         }
         Ok(())
+    }
+
+    /// Sectors of other sessions that came, and are not in it: another log has come in its place, or the card has lost some.
+    pub(super) const fn strange(&self) -> u32 {
+        self.strange
     }
 
     /// Where it is.
@@ -83,8 +152,14 @@ impl Part {
         Ok(Sector::from_bytes(bytes))
     }
 
-    /// Puts a sector at its place.
+    /// Puts a sector at its place, unless it is another session's.
     pub(super) fn put(&mut self, place: u32, sector: &Sector) -> Result<()> {
+        if let Ok(header) = Header::read(sector.bytes())
+            && *self.session.get_or_insert(header.session) != header.session
+        {
+            self.strange += 1;
+            return Ok(());
+        }
         self.seek(place)
             .and_then(|()| self.file.write_all(sector.bytes()))
             .with_context(|| cannot_write(&self.path))?;
@@ -158,16 +233,16 @@ mod tests {
     fn what_is_in_a_part_is_known_again_and_what_is_torn_is_not() {
         let dir = tempfile::tempdir().expect("a folder");
         let whole = dir.path().join("00042-s00000007_07.HUM");
-        assert!(Part::there(&whole, 8).expect("none").is_none());
-        let mut part = Part::open(&whole, 8).expect("made");
+        assert!(Part::there(&whole, 8, &[]).expect("none").is_none());
+        let mut part = Part::open(&whole, 8, &[]).expect("made");
         for place in [0, 3, 4] {
             part.put(place, &sector(place as u8)).expect("room");
         }
         part.put(6, &Sector::from_bytes([0x48; SECTOR_BYTES])).expect("room");
-        assert!(Part::open(&whole, 8).is_err(), "another run has it");
+        assert!(Part::open(&whole, 8, &[]).is_err(), "another run has it");
         drop(part);
         // The log has grown since.
-        let mut part = Part::there(&whole, 10).expect("it is").expect("there");
+        let mut part = Part::there(&whole, 10, &[]).expect("it is").expect("there");
         assert_eq!((0..10).filter(|place| part.has(*place)).collect::<Vec<_>>(), [0, 3, 4]);
         assert_eq!((part.next(1, true), part.next(3, false), part.next(5, true)), (Some(3), Some(5), None));
         assert_eq!(part.read(3).expect("a sector"), sector(3));
@@ -181,15 +256,71 @@ mod tests {
         assert_eq!(std::fs::read(&kept).expect("kept"), log);
         std::fs::rename(&kept, part_name(&whole)).expect("put back");
         std::fs::write(&whole, &log).expect("written");
-        let part = Part::there(&whole, 10).expect("it is").expect("there");
+        let part = Part::there(&whole, 10, &[]).expect("it is").expect("there");
         part.finish(&whole).expect("removed");
         assert!(!part_name(&whole).exists());
         std::fs::write(part_name(&whole), [0; 11 * SECTOR_BYTES]).expect("written");
-        assert!(Part::open(&whole, 10).is_err(), "longer than the log");
+        assert!(Part::open(&whole, 10, &[]).is_err(), "longer than the log");
         std::fs::write(part_name(&whole), [0; SECTOR_BYTES]).expect("written");
         std::fs::hard_link(part_name(&whole), dir.path().join("backup")).expect("a second name");
-        let refused = Part::open(&whole, 10).expect_err("it has two names");
+        let refused = Part::open(&whole, 10, &[]).expect_err("it has two names");
         assert!(refused.to_string().contains("has another name too"), "{refused}");
+    }
+
+    #[test]
+    fn what_is_no_part_of_the_log_is_kept_and_what_comes_of_another_one_is_not_in_it() {
+        let dir = tempfile::tempdir().expect("a folder");
+        let whole = dir.path().join("00042-s00000007_07.HUM");
+        let path = part_name(&whole);
+        let kept = |number: u32| {
+            let folder = dir.path().join("hums-kept").join(number.to_string());
+            fs::read(folder.join(path.file_name().expect("a name"))).expect("kept")
+        };
+        let other = |number: u8| {
+            let mut sector = sector(number);
+            sector.seal(8);
+            sector
+        };
+        let mut bytes = *sector(0).bytes();
+        bytes[100] ^= 1;
+        let mut changed = Sector::from_bytes(bytes);
+        changed.seal(7);
+        let head = [sector(0)];
+        let texts = b"a diary of mine, ".repeat(100);
+        let mixed = [&sector(0).bytes()[..], &other(1).bytes()[..]].concat();
+        for (number, what) in
+            (1..).zip([&texts[..], &other(0).bytes()[..], &mixed[..], &changed.bytes()[..], &b"text"[..]])
+        {
+            fs::write(&path, what).expect("written");
+            let part = Part::open(&whole, 8, &head).expect("it begins anew");
+            assert_eq!(kept(number), what, "{number}");
+            assert!((0..8).all(|place| !part.has(place)), "{number}");
+            drop(part);
+            assert_eq!(fs::read(&path).expect("a part"), [0; 8 * SECTOR_BYTES]);
+        }
+        // What comes of another session while it is read.
+        let mut part = Part::open(&whole, 8, &head).expect("it goes on");
+        part.put(0, &sector(0)).expect("room");
+        part.put(1, &other(1)).expect("room");
+        assert!(part.has(0) && !part.has(1) && part.strange() == 1);
+        assert_eq!(part.read(1).expect("nothing"), Sector::zeroed());
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn nothing_is_written_through_a_link() {
+        let dir = tempfile::tempdir().expect("a folder");
+        let whole = dir.path().join("00042-s00000007_07.HUM");
+        std::os::unix::fs::symlink("diary", part_name(&whole)).expect("a link");
+        for text in [None, Some("a diary of mine")] {
+            if let Some(text) = text {
+                fs::write(dir.path().join("diary"), text).expect("written");
+            }
+            let told = Part::there(&whole, 8, &[]).expect_err("it is a link").to_string();
+            assert!(told.contains("is a link"), "{told}");
+        }
+        assert_eq!(fs::read(dir.path().join("diary")).expect("there"), b"a diary of mine");
+        assert!(!dir.path().join("hums-kept").exists());
     }
 
     #[test]
@@ -201,7 +332,7 @@ mod tests {
         in_progress.seal(7);
         assert!(Header::read(in_progress.bytes()).is_ok_and(|header| header.partial));
         let is_kept = |theirs: &Sector| {
-            let mut part = Part::open(&whole, 1).expect("made");
+            let mut part = Part::open(&whole, 1, &[]).expect("made");
             part.put(0, &in_progress).expect("room");
             std::fs::write(&whole, theirs.bytes()).expect("written");
             part.finish(&whole).expect("finished");
