@@ -413,7 +413,9 @@ fn judge(all: &[String], pulled: &mut [LogJson]) -> Result<Outcome> {
         let is_judged = |check: &str| !BEFORE.contains(&check) && (is_all || has_end && check == END);
         for (check, why) in failed(overview).into_iter().filter(|(check, _)| is_judged(check)) {
             note!("{last}: {check}: {why}; `hums verify` says more");
-            came.iter_mut().for_each(|log| log.whole = false);
+            for log in &mut came {
+                log.whole = false;
+            }
             outcome = Outcome::Losses;
         }
         Ok(())
