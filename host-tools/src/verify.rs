@@ -175,6 +175,22 @@ pub fn verdict(log: &Overview) -> Verdict {
     if log.ok { log.verdict } else { Verdict::NotProved }
 }
 
+/// The check of where a log ends.
+pub const END: &str = "end";
+/// The checks of what came before a log, which other logs tell.
+pub const BEFORE: [&str; 2] = ["session before", "same power-on"];
+
+/// The checks that fail of a log that was read with [`Overview::verified`], with what each says.
+pub fn failed(log: &Overview) -> Vec<(&'static str, String)> {
+    let checks = LogJson::new(log).checks.into_iter().filter(|check| check.failed > 0);
+    checks
+        .map(|check| match check.detail.as_str() {
+            "" => (check.name, format!("{} failed", check.failed)),
+            _ => (check.name, check.detail),
+        })
+        .collect()
+}
+
 fn print(checks: &[Check]) -> Result<()> {
     for check in checks {
         let verdict = level(if check.failed == 0 { "ok" } else { "FAILED" });
@@ -344,6 +360,7 @@ fn ends(log: &Overview) -> [Check; 8] {
         SessionBefore::There => (1, 0),
         SessionBefore::Gone(_) | SessionBefore::Elsewhere { .. } => (1, 1),
     };
+    let [session_before, _] = BEFORE;
     let before = match ending.before {
         SessionBefore::NotNamed => "it names none".to_owned(),
         SessionBefore::NotLookedFor(number) => format!("session {number:05} is not among what was read"),
@@ -360,8 +377,8 @@ fn ends(log: &Overview) -> [Check; 8] {
         check("files", ending.files.len() as u64, strange.len() as u64, strange.join("; ")),
         check("chain", summary.groups, summary.unchained, String::new()),
         check("end marks", summary.marks.count, summary.marks.wrong, String::new()),
-        check("end", 1, u64::from(!holds), format!("{}; {behind}{among}", ending.words())),
-        check("session before", before_checked, before_failed, before),
+        check(END, 1, u64::from(!holds), format!("{}; {behind}{among}", ending.words())),
+        check(session_before, before_checked, before_failed, before),
         power_on(ending.power_on),
     ]
 }
@@ -371,7 +388,7 @@ fn power_on(power_on: PowerOn) -> Check {
     let wrong = power_on.wrong();
     let checked = u64::from(!matches!(power_on, PowerOn::First | PowerOn::NotRead));
     let detail = wrong.clone().unwrap_or_else(|| power_on.words().to_owned());
-    Check { name: "same power-on", checked, failed: u64::from(wrong.is_some()), detail }
+    Check { name: BEFORE[1], checked, failed: u64::from(wrong.is_some()), detail }
 }
 
 fn gaps_detail(log: &Overview) -> String {

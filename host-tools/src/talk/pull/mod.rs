@@ -31,6 +31,7 @@ use crate::output::{self, Schema};
 use crate::plural::count;
 use crate::printable::word;
 use crate::summary::Overview;
+use crate::verify::{BEFORE, END, failed, verify_each};
 
 /// What `hums pull --json` prints.
 const SCHEMA: Schema = Schema::first("hums-pull");
@@ -91,6 +92,7 @@ fn bring(client: Client, args: &cli::Pull) -> Result<Outcome> {
         let names: Vec<&str> = logs.iter().map(|(log, _)| log.as_str()).collect();
         bail!("{missing}: the board has no such log; it has {}", names.join(", "));
     }
+    let all: Vec<String> = logs.iter().filter(|(_, bytes)| *bytes > 0).map(|(log, _)| log.clone()).collect();
     logs.retain(|(log, _)| args.names.is_empty() || args.names.contains(log));
     if let Some(moment) = &args.around {
         return around(&mut ftp, logs.into_iter().map(|(log, _)| log).collect(), args, moment);
@@ -111,6 +113,7 @@ fn bring(client: Client, args: &cli::Pull) -> Result<Outcome> {
         }
         pulled.push(LogJson { name, path, is_new, whole: verified == Outcome::Done });
     }
+    outcome = outcome.and(judge(&all, &mut pulled)?);
     if args.json {
         output::json(SCHEMA, &PulledJson { system: ftp.system(), logs: pulled, around: None })?;
     }
@@ -386,6 +389,40 @@ fn verify(name: &str, path: &Path) -> Result<Outcome> {
     Ok(outcome)
 }
 
+/// Judges the logs together as `hums verify` does, with what they tell of each other. Of a session of which the board has more than
+/// came only the end is judged, if it came: what is missing was not asked for.
+fn judge(all: &[String], pulled: &mut [LogJson]) -> Result<Outcome> {
+    let paths: Vec<PathBuf> = pulled.iter().map(|log| log.path.clone()).collect();
+    if paths.is_empty() {
+        return Ok(Outcome::Done);
+    }
+    let named = |name: &str| segment_name(Path::new(name)).map(|name| (name.session, name.segment));
+    let mut outcome = Outcome::Done;
+    let unread = verify_each(&logs::find(&paths, false)?, |overview| {
+        let files = &overview.ending.files;
+        let is_in =
+            |log: &LogJson| files.iter().any(|file| Path::new(file).file_name() == log.path.file_name());
+        let mut came: Vec<&mut LogJson> = pulled.iter_mut().filter(|log| is_in(log)).collect();
+        // What does not hold by itself was said.
+        let is_said = came.iter().any(|log| !log.whole);
+        let Some(last) = came.last().map(|log| log.name.clone()).filter(|_| !is_said) else { return Ok(()) };
+        let session = named(&last).map(|(session, _)| session);
+        let of_it = || all.iter().filter_map(|name| named(name)).filter(|name| Some(name.0) == session);
+        let is_all = of_it().count() <= came.len() && of_it().map(|name| name.1).min().unwrap_or(0) == 0;
+        let has_end = of_it().max() <= named(&last);
+        let is_judged = |check: &str| !BEFORE.contains(&check) && (is_all || has_end && check == END);
+        for (check, why) in failed(overview).into_iter().filter(|(check, _)| is_judged(check)) {
+            note!("{last}: {check}: {why}; `hums verify` says more");
+            for log in &mut came {
+                log.whole = false;
+            }
+            outcome = Outcome::Losses;
+        }
+        Ok(())
+    })?;
+    Ok(outcome.and(Outcome::lossy(unread > 0)))
+}
+
 #[cfg(test)]
 mod tests {
     use std::fs;
@@ -489,6 +526,29 @@ mod tests {
         let told = pull(&mut ftp, NAME, &output).expect_err("it is another one").to_string();
         assert!(told.contains("another log has come in its place"), "{told}");
         assert_eq!(fs::read(output.join("hums-kept/1").join(&name)).expect("kept"), other);
+    }
+
+    #[test]
+    fn a_log_is_whole_where_verify_says_so() {
+        let dir = tempfile::tempdir().expect("a folder");
+        let whole = packed(dir.path(), "px4_hil_quad_low.tlog");
+        let path = dir.path().join("00001-s00000007_00.HUM");
+        let judged = |bytes: &[u8], all: &[&str]| {
+            fs::write(&path, bytes).expect("written");
+            let own = heading_here(&path, NAME, bytes.len() as u32).expect("it reads").name;
+            let path = dir.path().join(own);
+            fs::write(&path, bytes).expect("written");
+            let all: Vec<String> = all.iter().map(|name| (*name).to_owned()).collect();
+            let mut logs = [LogJson { name: NAME.to_owned(), path, is_new: true, whole: true }];
+            let outcome = judge(&all, &mut logs).expect("it reads");
+            (outcome, logs[0].whole)
+        };
+        assert_eq!(judged(&whole, &[NAME]), (Outcome::Done, true));
+        let cut = &whole[..80 * SECTOR_BYTES];
+        assert_eq!(judged(cut, &[NAME]), (Outcome::Losses, false), "it has no end");
+        let noisy = [cut, &[0x5a; 4096]].concat();
+        assert_eq!(judged(&noisy, &[NAME]), (Outcome::Losses, false));
+        assert_eq!(judged(cut, &[NAME, "00001_01.HUM"]), (Outcome::Done, true), "its end is in another one");
     }
 
     #[test]
