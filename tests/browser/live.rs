@@ -307,7 +307,7 @@ fn a_flight_over_udp_is_followed_until_it_stops_and_then_looks_stale() {
         agreed += 1;
         std::thread::sleep(Duration::from_millis(250));
     }
-    assert!(agreed > 3, "only {agreed} looks");
+    assert!(agreed > 10, "only {agreed} looks");
     // The box on the same link is heard, and its word on itself counts.
     page.wait("return document.querySelector('[data-subsystem=recorder] .badge').textContent === 'ok'", 20);
     let seen = page.read();
@@ -478,7 +478,7 @@ fn a_packet_changes_the_page_within_a_tenth_of_a_second() {
         seen.and_then(|one| one[0].as_f64())
     };
     let mut latencies: Vec<f64> = sent.iter().filter_map(|(text, at)| Some(changed(text)? - at)).collect();
-    assert!(latencies.len() > 30, "only {} of 60 were seen", latencies.len());
+    assert!(latencies.len() > 50, "only {} of 60 were seen", latencies.len());
     latencies.sort_by(f64::total_cmp);
     let median_ms = latencies[latencies.len() / 2];
     println!(
