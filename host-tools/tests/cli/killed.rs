@@ -319,13 +319,15 @@ fn a_demo_that_is_killed_takes_nothing_of_an_earlier_one_away_and_is_in_nobodys_
     demo_ends(dir.path(), "one.tlog", &[], 0);
     let lasts = begun.elapsed();
     // Also in the moments in which the outputs get their names, near the end.
+    let mut was = bytes_of(&dir.path().join("demo"));
     for tenth in [1, 3, 5, 7, 8, 9] {
-        let was = bytes_of(&dir.path().join("demo"));
         let mut killed = demo(dir.path(), "two.raw", &["--replace"]).spawn().expect("it runs");
         std::thread::sleep(lasts * tenth / 10);
         killed.kill().expect("it is ours");
         killed.wait().expect("it is ours");
-        assert!(bytes_of(&dir.path().join("demo")).is_superset(&was), "{tenth}");
+        let now = bytes_of(&dir.path().join("demo"));
+        assert!(now.is_superset(&was), "{tenth}");
+        was = now;
     }
     demo_ends(dir.path(), "two.raw", &["--replace"], 0);
     assert_eq!(fs::read(&mine).expect("there"), b"mine");
