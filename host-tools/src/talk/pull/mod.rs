@@ -7,6 +7,7 @@
 mod around;
 mod compare;
 mod ftp;
+mod judge;
 mod moment;
 mod part;
 
@@ -15,12 +16,13 @@ use std::io::{self, Read as _, Write as _};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result, bail};
-use hums_blackbox::{Cause, Gap, SECTOR_BYTES};
+use hums_blackbox::SECTOR_BYTES;
 use hums_core::time::Instant;
 use serde::Serialize;
 
 use self::compare::{Likeness, compare, heading_here, heading_of};
 use self::ftp::Ftp;
+use self::judge::judge;
 use self::part::Part;
 use super::Client;
 use crate::cli;
@@ -31,7 +33,6 @@ use crate::output::{self, Schema};
 use crate::plural::count;
 use crate::printable::word;
 use crate::summary::Overview;
-use crate::verify::{BEFORE, END, failed, verify_each};
 
 /// What `hums pull --json` prints.
 const SCHEMA: Schema = Schema::first("hums-pull");
@@ -71,7 +72,7 @@ struct LogJson {
     path: PathBuf,
     /// It was not there already.
     is_new: bool,
-    /// Nothing in it is damaged or missing.
+    /// `hums verify` finds no fault with it and the logs of its session that came.
     whole: bool,
 }
 
@@ -98,26 +99,37 @@ fn bring(client: Client, args: &cli::Pull) -> Result<Outcome> {
         return around(&mut ftp, logs.into_iter().map(|(log, _)| log).collect(), args, moment);
     }
     let newest = args.last.unwrap_or(logs.len()).min(logs.len());
-    let mut outcome = Outcome::Done;
     let mut pulled = Vec::new();
-    for (name, _) in logs.split_off(logs.len() - newest) {
-        let Some((path, is_new)) = pull(&mut ftp, &name, &args.output).with_context(|| name.clone())? else {
+    let came = bring_each(&mut ftp, logs.split_off(logs.len() - newest), args, &mut pulled);
+    // Also what came before an error.
+    let judged = judge(&all, &mut pulled);
+    came?;
+    let outcome = judged?;
+    if args.json {
+        output::json(SCHEMA, &PulledJson { system: ftp.system(), logs: pulled, around: None })?;
+    }
+    Ok(outcome)
+}
+
+/// Brings these logs whole, one after the other.
+fn bring_each(
+    ftp: &mut Ftp,
+    logs: Vec<(String, u32)>,
+    args: &cli::Pull,
+    pulled: &mut Vec<LogJson>,
+) -> Result<()> {
+    for (name, _) in logs {
+        let Some((path, is_new)) = pull(ftp, &name, &args.output).with_context(|| name.clone())? else {
             continue;
         };
-        let verified = verify(&name, &path)?;
-        outcome = outcome.and(verified);
         if !is_new {
             note!("{name}: is there already as {}: the same by its checksum", path.display());
         } else if !args.json {
             output::line(&word(&path.display().to_string()))?;
         }
-        pulled.push(LogJson { name, path, is_new, whole: verified == Outcome::Done });
+        pulled.push(LogJson { name, path, is_new, whole: true });
     }
-    outcome = outcome.and(judge(&all, &mut pulled)?);
-    if args.json {
-        output::json(SCHEMA, &PulledJson { system: ftp.system(), logs: pulled, around: None })?;
-    }
-    Ok(outcome)
+    Ok(())
 }
 
 /// Brings a moment of the newest session of these logs.
@@ -348,81 +360,6 @@ fn is_whole(ftp: &mut Ftp, name: &str, file: &mut Output, length: u32) -> Result
     Ok(likeness != Likeness::Other)
 }
 
-/// Reads a segment through, and says what is wrong with it. What is natural is not: behind its last sector a file has what
-/// it held before, a further segment does not begin with the session, and each of them alone proves no end.
-fn verify(name: &str, path: &Path) -> Result<Outcome> {
-    let found = logs::find(&[path.to_owned()], false)?;
-    let mut outcome = Outcome::Done;
-    for log in &found.logs {
-        let mut overview = Overview::verified(log)?;
-        // It was asked for alone.
-        overview.ending.summary.files_gone = 0;
-        let (blocks, behind) = (overview.ending.summary.blocks, overview.ending.summary.behind);
-        let is_further = segment_name(path).is_some_and(|name| name.segment > 0);
-        // What is missing before it, unless it was left out on purpose, which is no gap.
-        let is_before = |gap: &Gap| gap.from.is_none() && gap.cause != Cause::Disarmed;
-        let begins_later = overview.contents.gaps.first().is_some_and(is_before);
-        let gaps = overview.ending.summary.gaps - u64::from(is_further && begins_later);
-        let wrong = [
-            (blocks.damaged, "damaged sectors"),
-            (overview.ending.made_again(), "sectors that had to be made again from parity"),
-            (overview.ending.unprotected(), "parity sectors that are missing"),
-            (blocks.misplaced.saturating_sub(behind.misplaced), "sectors where others belong"),
-            (blocks.stale.saturating_sub(behind.stale), "sectors of another session"),
-            (blocks.foreign.saturating_sub(behind.foreign), "blocks that are no sectors"),
-            (
-                blocks.unsound.saturating_sub(behind.unsound),
-                "blocks that begin as a sector and fail its check",
-            ),
-            (gaps, "gaps"),
-            (overview.contents.bad_frames, "frames that fail their checksum"),
-        ];
-        for why in overview.ending.strange() {
-            note!("{name}: {why}");
-            outcome = Outcome::Losses;
-        }
-        for (number, what) in wrong.into_iter().filter(|(number, _)| *number > 0) {
-            note!("{name}: {what}: {number}; `hums verify` says more");
-            outcome = Outcome::Losses;
-        }
-    }
-    Ok(outcome)
-}
-
-/// Judges the logs together as `hums verify` does, with what they tell of each other. Of a session of which the board has more than
-/// came only the end is judged, if it came: what is missing was not asked for.
-fn judge(all: &[String], pulled: &mut [LogJson]) -> Result<Outcome> {
-    let paths: Vec<PathBuf> = pulled.iter().map(|log| log.path.clone()).collect();
-    if paths.is_empty() {
-        return Ok(Outcome::Done);
-    }
-    let named = |name: &str| segment_name(Path::new(name)).map(|name| (name.session, name.segment));
-    let mut outcome = Outcome::Done;
-    let unread = verify_each(&logs::find(&paths, false)?, |overview| {
-        let files = &overview.ending.files;
-        let is_in =
-            |log: &LogJson| files.iter().any(|file| Path::new(file).file_name() == log.path.file_name());
-        let mut came: Vec<&mut LogJson> = pulled.iter_mut().filter(|log| is_in(log)).collect();
-        // What does not hold by itself was said.
-        let is_said = came.iter().any(|log| !log.whole);
-        let Some(last) = came.last().map(|log| log.name.clone()).filter(|_| !is_said) else { return Ok(()) };
-        let session = named(&last).map(|(session, _)| session);
-        let of_it = || all.iter().filter_map(|name| named(name)).filter(|name| Some(name.0) == session);
-        let is_all = of_it().count() <= came.len() && of_it().map(|name| name.1).min().unwrap_or(0) == 0;
-        let has_end = of_it().max() <= named(&last);
-        let is_judged = |check: &str| !BEFORE.contains(&check) && (is_all || has_end && check == END);
-        for (check, why) in failed(overview).into_iter().filter(|(check, _)| is_judged(check)) {
-            note!("{last}: {check}: {why}; `hums verify` says more");
-            for log in &mut came {
-                log.whole = false;
-            }
-            outcome = Outcome::Losses;
-        }
-        Ok(())
-    })?;
-    Ok(outcome.and(Outcome::lossy(unread > 0)))
-}
-
 #[cfg(test)]
 mod tests {
     use std::fs;
@@ -437,7 +374,7 @@ mod tests {
     use crate::talk::fake;
 
     /// The sectors of a recording of the repository, as `hums pack` makes them.
-    fn packed(dir: &Path, name: &str) -> Vec<u8> {
+    pub(super) fn packed(dir: &Path, name: &str) -> Vec<u8> {
         let input = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../tests/flights").join(name);
         let output = dir.join(name);
         let pack =
@@ -529,29 +466,6 @@ mod tests {
     }
 
     #[test]
-    fn a_log_is_whole_where_verify_says_so() {
-        let dir = tempfile::tempdir().expect("a folder");
-        let whole = packed(dir.path(), "px4_hil_quad_low.tlog");
-        let path = dir.path().join("00001-s00000007_00.HUM");
-        let judged = |bytes: &[u8], all: &[&str]| {
-            fs::write(&path, bytes).expect("written");
-            let own = heading_here(&path, NAME, bytes.len() as u32).expect("it reads").name;
-            let path = dir.path().join(own);
-            fs::write(&path, bytes).expect("written");
-            let all: Vec<String> = all.iter().map(|name| (*name).to_owned()).collect();
-            let mut logs = [LogJson { name: NAME.to_owned(), path, is_new: true, whole: true }];
-            let outcome = judge(&all, &mut logs).expect("it reads");
-            (outcome, logs[0].whole)
-        };
-        assert_eq!(judged(&whole, &[NAME]), (Outcome::Done, true));
-        let cut = &whole[..80 * SECTOR_BYTES];
-        assert_eq!(judged(cut, &[NAME]), (Outcome::Losses, false), "it has no end");
-        let noisy = [cut, &[0x5a; 4096]].concat();
-        assert_eq!(judged(&noisy, &[NAME]), (Outcome::Losses, false));
-        assert_eq!(judged(cut, &[NAME, "00001_01.HUM"]), (Outcome::Done, true), "its end is in another one");
-    }
-
-    #[test]
     fn a_part_has_sectors_of_one_session_also_where_the_log_is_exchanged_while_it_is_read() {
         let dir = tempfile::tempdir().expect("a folder");
         let (log, other, name) = two_logs(dir.path());
@@ -574,29 +488,5 @@ mod tests {
         }
         assert!(others <= 1, "{others}");
         assert!(brought.strange > 10, "{brought:?}");
-    }
-
-    #[test]
-    fn what_a_recycled_file_held_before_is_no_damage_and_what_is_in_the_middle_is() {
-        let dir = tempfile::tempdir().expect("a folder");
-        let new = packed(dir.path(), "px4_hil_quad_low.tlog");
-        let old = packed(dir.path(), "ap_quad_guided.tlog");
-        let verified = |name: &str, bytes: &[u8]| {
-            let path = dir.path().join(name);
-            fs::write(&path, bytes).expect("written");
-            verify(name, &path).expect("it reads")
-        };
-        let recycled = [&new[..], &old[new.len()..]].concat();
-        assert_eq!(verified("00007_00.HUM", &recycled), Outcome::Done);
-        // A further segment does not begin with the session's first sector; a first one does.
-        let group = 64 * 512;
-        assert_eq!(verified("00007_01.HUM", &new[2 * group..]), Outcome::Done);
-        assert_eq!(verified("00007_00.HUM", &new[2 * group..]), Outcome::Losses);
-        let middle = new.len() / 1024 * 512;
-        let mut mixed = new.clone();
-        mixed[middle..middle + group].copy_from_slice(&old[middle..middle + group]);
-        assert_eq!(verified("00007_00.HUM", &mixed), Outcome::Losses);
-        mixed[middle..middle + group].fill(0);
-        assert_eq!(verified("00007_00.HUM", &mixed), Outcome::Losses);
     }
 }
