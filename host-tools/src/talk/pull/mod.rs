@@ -20,7 +20,7 @@ use hums_blackbox::SECTOR_BYTES;
 use hums_core::time::Instant;
 use serde::Serialize;
 
-use self::compare::{Likeness, compare, heading_here, heading_of};
+use self::compare::{Heading, Likeness, compare, heading_here, heading_of};
 use self::ftp::Ftp;
 use self::judge::judge;
 use self::part::Part;
@@ -231,10 +231,7 @@ fn pull(ftp: &mut Ftp, name: &str, output: &Path) -> Result<Option<(PathBuf, boo
             aside.display()
         );
         length = ftp.open(name)?.min(length);
-        let now = output.join(heading_of(ftp, name, length)?.name);
-        if now != path {
-            return exchanged(&now);
-        }
+        check_same(&heading, &heading_of(ftp, name, length)?)?;
         fetch(ftp, name, &mut file, 0, length, None)?;
         if !is_whole(ftp, name, &mut file, length)? {
             bail!(
@@ -243,10 +240,9 @@ fn pull(ftp: &mut Ftp, name: &str, output: &Path) -> Result<Option<(PathBuf, boo
             );
         }
     }
-    let came = output.join(heading_here(file.part(), name, length)?.name);
-    if came != path {
+    if let Err(other) = check_same(&heading, &heading_here(file.part(), name, length)?) {
         file.set_aside()?;
-        return exchanged(&came);
+        return Err(other);
     }
     file.finish()?;
     part.map_or(Ok(()), |part| part.finish(&path))?;
@@ -254,12 +250,19 @@ fn pull(ftp: &mut Ftp, name: &str, output: &Path) -> Result<Option<(PathBuf, boo
 }
 
 /// Nothing of one session gets the name of another one.
-fn exchanged<T>(now: &Path) -> Result<T> {
-    bail!(
-        "another log has come in its place while it was read, {}: nothing of it has the first one's name; what came is kept in \
-         hums-kept: call again",
-        now.display()
-    )
+fn check_same(first: &Heading, now: &Heading) -> Result<()> {
+    match (first.session, now.session) {
+        (first, now) if first == now => Ok(()),
+        (_, Some(_)) => bail!(
+            "another log has come in its place while it was read, {}: nothing of it has the first one's name; what came is kept in \
+             hums-kept: call again",
+            now.name
+        ),
+        (_, None) => bail!(
+            "its beginning can no longer be read on the board, so nothing tells whether it is the same log still; what came is \
+             kept in hums-kept: call again"
+        ),
+    }
 }
 
 /// What is on this PC already under the log's name.
@@ -274,6 +277,12 @@ enum There {
 
 fn there(ftp: &mut Ftp, name: &str, path: &Path, length: u32) -> Result<There> {
     let Ok(about) = path.metadata() else { return Ok(There::Nothing) };
+    if !about.is_file() {
+        bail!(
+            "{}: is no file, and stands where the log is to be: move it away, or name another directory with -o",
+            path.display()
+        );
+    }
     let bytes = u32::try_from(about.len()).unwrap_or(u32::MAX);
     if bytes == 0 {
         return Ok(There::Nothing);
@@ -385,6 +394,15 @@ mod tests {
 
     const NAME: &str = "00001_00.HUM";
 
+    /// The names in a folder.
+    fn names_in(folder: &Path) -> Vec<String> {
+        let entries = fs::read_dir(folder).expect("there");
+        let mut names: Vec<String> =
+            entries.map(|entry| entry.expect("there").file_name().to_string_lossy().into_owned()).collect();
+        names.sort();
+        names
+    }
+
     /// A board with this log, in whose place the other one comes with the so-many-th question for bytes.
     fn board(mut log: Vec<u8>, other: Vec<u8>, mut reads: u32) -> Ftp {
         let client = fake::found(&[1], move |frame| {
@@ -405,7 +423,7 @@ mod tests {
             };
             match opcode {
                 4 => vec![answer(1, 0, false, &(log.len() as u32).to_le_bytes())],
-                5 => vec![answer(1, at, false, &log[at..(at + size).min(log.len())])],
+                5 => vec![answer(1, at, false, &log[at.min(log.len())..(at + size).min(log.len())])],
                 14 => {
                     let sum = hums_link::ftp::checksum(0, &log[..at.min(log.len())]);
                     vec![answer(1, at, false, &sum.to_le_bytes())]
@@ -453,7 +471,8 @@ mod tests {
             } else {
                 let told = pulled.expect_err("it is another one").to_string();
                 assert!(told.contains("another log has come in its place"), "{told}");
-                assert!(!output.join(&name).exists());
+                // Nothing is left of what was begun.
+                assert_eq!(names_in(&output), ["hums-kept"]);
             }
         }
         // The other one from its first byte on.
@@ -463,6 +482,61 @@ mod tests {
         let told = pull(&mut ftp, NAME, &output).expect_err("it is another one").to_string();
         assert!(told.contains("another log has come in its place"), "{told}");
         assert_eq!(fs::read(output.join("hums-kept/1").join(&name)).expect("kept"), other);
+        assert_eq!(names_in(&output), ["hums-kept"]);
+    }
+
+    #[test]
+    fn a_card_that_loses_the_beginning_of_a_log_is_not_called_another_log() {
+        let dir = tempfile::tempdir().expect("a folder");
+        let (log, _, name) = two_logs(dir.path());
+        // The first sector alone, of which the others tell the session; the whole first page.
+        let without = |bytes: usize| [&vec![0; bytes][..], &log[bytes..]].concat();
+        for (next, words) in [
+            (without(SECTOR_BYTES), None),
+            (without(8 * SECTOR_BYTES), Some("its beginning can no longer be read on the board")),
+        ] {
+            let output = tempfile::tempdir().expect("a folder");
+            let mut ftp = board(log.clone(), next.clone(), 8 * 3 + 5);
+            let pulled = pull(&mut ftp, NAME, output.path());
+            let Some(words) = words else {
+                let (path, _) = pulled.expect("it came").expect("a log");
+                assert_eq!(
+                    (path.file_name().expect("a name"), fs::read(&path).expect("there")),
+                    (name.as_ref(), next)
+                );
+                continue;
+            };
+            let told = pulled.expect_err("nothing tells what it is").to_string();
+            assert!(told.contains(words), "{told}");
+            assert_eq!(names_in(output.path()), ["hums-kept"]);
+        }
+    }
+
+    #[test]
+    fn what_is_no_file_in_the_place_of_a_log_is_told_and_left() {
+        let dir = tempfile::tempdir().expect("a folder");
+        let (log, other, name) = two_logs(dir.path());
+        let output = dir.path().join("logs");
+        fs::create_dir_all(output.join(&name)).expect("made");
+        let mut ftp = board(log, other, u32::MAX);
+        let told = pull(&mut ftp, NAME, &output).expect_err("a folder").to_string();
+        assert!(told.contains("is no file, and stands where the log is to be: move it away"), "{told}");
+        assert_eq!(names_in(&output), [name]);
+    }
+
+    #[test]
+    fn a_part_that_has_what_the_card_has_lost_since_is_not_written_over() {
+        let dir = tempfile::tempdir().expect("a folder");
+        let (log, _, name) = two_logs(dir.path());
+        let part = crate::logs::naming::part_name(&dir.path().join(&name));
+        fs::write(&part, &log).expect("written");
+        let mut lost = log.clone();
+        lost[..SECTOR_BYTES].fill(0);
+        let mut ftp = board(lost.clone(), lost, u32::MAX);
+        let what: cli::Around = "0".parse().expect("a time");
+        around::pull(&mut ftp, &[NAME.to_owned()], dir.path(), &what, hums_core::time::Span::from_secs(1))
+            .expect("a part");
+        assert_eq!(fs::read(&part).expect("there"), log);
     }
 
     #[test]
