@@ -1,8 +1,10 @@
 //! `hums verify`: every check there is, each with what it looked at and what failed.
 
+use std::borrow::Cow;
+
 use anyhow::{Result, bail};
-use hums_blackbox::Cause;
 use hums_blackbox::record::Lost;
+use hums_blackbox::{BlockCounts, Cause, Gap};
 use hums_core::time::Instant;
 use serde::Serialize;
 
@@ -176,19 +178,57 @@ pub fn verdict(log: &Overview) -> Verdict {
 }
 
 /// The check of where a log ends.
-pub const END: &str = "end";
-/// The checks of what came before a log, which other logs tell.
-pub const BEFORE: [&str; 2] = ["session before", "same power-on"];
+const END: &str = "end";
+/// The check of the session that was recorded before a log.
+const SESSION_BEFORE: &str = "session before";
+/// The check of how a log follows the one before it of the same power-on.
+const SAME_POWER_ON: &str = "same power-on";
 
-/// The checks that fail of a log that was read with [`Overview::verified`], with what each says.
-pub fn failed(log: &Overview) -> Vec<(&'static str, String)> {
-    let checks = LogJson::new(log).checks.into_iter().filter(|check| check.failed > 0);
+/// What of a session is to be judged: what is missing before or after that was left out on purpose.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Extent {
+    /// It begins with the session.
+    pub from_start: bool,
+    /// It goes to the session's end.
+    pub to_end: bool,
+}
+
+/// The checks that fail of a log that was read with [`Overview::verified`], with what each says. What other logs tell of those before
+/// it is not judged.
+pub fn failed(log: &Overview, extent: Extent) -> Vec<(&'static str, String)> {
+    let log = if extent.from_start { Cow::Borrowed(log) } else { Cow::Owned(without_before(log.clone())) };
+    let is_judged = |check: &Check| {
+        check.failed > 0
+            && ![SESSION_BEFORE, SAME_POWER_ON].contains(&check.name)
+            && (extent.to_end || check.name != END)
+    };
+    let checks = LogJson::new(&log).checks.into_iter().filter(is_judged);
     checks
         .map(|check| match check.detail.as_str() {
             "" => (check.name, format!("{} failed", check.failed)),
-            _ => (check.name, check.detail),
+            detail => (check.name, format!("{} failed; {detail}", check.failed)),
         })
         .collect()
+}
+
+/// The same log, of which nothing was asked for that comes before it. Where its only file does not begin with a sector of it, what is
+/// missing is missing in that.
+fn without_before(mut log: Overview) -> Overview {
+    let ending = &mut log.ending;
+    let summary = &mut ending.summary;
+    summary.files_gone = 0;
+    let (all, behind) = (&summary.blocks, &summary.behind);
+    let others = |of: &BlockCounts| of.stale + of.unsound + of.foreign + of.empty + of.erased;
+    let is_in_file = ending.files.len() == 1 && others(all) > others(behind);
+    // What was left out on purpose is no gap.
+    let is_before = |gap: &Gap| gap.from.is_none() && gap.sectors_skipped == 0 && gap.cause == Cause::Missing;
+    if log.contents.gaps.first().is_some_and(is_before) && !is_in_file {
+        let gap = log.contents.gaps.remove(0);
+        summary.gaps -= 1;
+        summary.frames_missing -= u64::from(gap.frames.unwrap_or(0));
+        summary.gaps_uncounted -= u64::from(gap.frames.is_none());
+    }
+    log
 }
 
 fn print(checks: &[Check]) -> Result<()> {
@@ -360,7 +400,6 @@ fn ends(log: &Overview) -> [Check; 8] {
         SessionBefore::There => (1, 0),
         SessionBefore::Gone(_) | SessionBefore::Elsewhere { .. } => (1, 1),
     };
-    let [session_before, _] = BEFORE;
     let before = match ending.before {
         SessionBefore::NotNamed => "it names none".to_owned(),
         SessionBefore::NotLookedFor(number) => format!("session {number:05} is not among what was read"),
@@ -378,7 +417,7 @@ fn ends(log: &Overview) -> [Check; 8] {
         check("chain", summary.groups, summary.unchained, String::new()),
         check("end marks", summary.marks.count, summary.marks.wrong, String::new()),
         check(END, 1, u64::from(!holds), format!("{}; {behind}{among}", ending.words())),
-        check(session_before, before_checked, before_failed, before),
+        check(SESSION_BEFORE, before_checked, before_failed, before),
         power_on(ending.power_on),
     ]
 }
@@ -388,7 +427,7 @@ fn power_on(power_on: PowerOn) -> Check {
     let wrong = power_on.wrong();
     let checked = u64::from(!matches!(power_on, PowerOn::First | PowerOn::NotRead));
     let detail = wrong.clone().unwrap_or_else(|| power_on.words().to_owned());
-    Check { name: BEFORE[1], checked, failed: u64::from(wrong.is_some()), detail }
+    Check { name: SAME_POWER_ON, checked, failed: u64::from(wrong.is_some()), detail }
 }
 
 fn gaps_detail(log: &Overview) -> String {

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use anyhow::{Context as _, Result, bail};
+use anyhow::{Context as _, Result};
 use hums_blackbox::record::Vehicle;
 use hums_core::baseline::{Baselines, FLIGHTS_MIN, Quantity};
 use hums_core::lifetime::Airframe;
@@ -48,18 +48,18 @@ impl Past {
         let Some((taught, past)) = &self.taught else {
             return overview::judge(place, &self.limits, heard, shows);
         };
-        let read = overview::judge(place, taught, heard, shows)?;
-        let Some((past, own)) = past.zip(vehicle(&read)).filter(|(past, own)| are_two(past, own)) else {
-            return Ok(read);
-        };
-        let (past, own) = (words(&past), words(&own));
-        if place.is_standard() {
-            bail!("{}: is of {own}, and --past of {past}: leave --past out", place.title);
+        let (mut read, without) = overview::judge_twice(place, taught, Some(&self.limits), heard, shows)?;
+        let own = vehicle(&read);
+        if let (Some(past), Some(own), Some(without)) = (past, own, without)
+            && are_two(past, &own)
+        {
+            read.judged = without;
+            read.judged.remarks.push(format!(
+                "trends are not judged: the flights of --past are of another vehicle ({}; this is {})",
+                words(past),
+                words(&own)
+            ));
         }
-        let mut read = overview::judge(place, &self.limits, heard, shows)?;
-        read.judged.remarks.push(format!(
-            "trends are not judged: the flights of --past are of another vehicle ({past}; this is {own})"
-        ));
         Ok(read)
     }
 }

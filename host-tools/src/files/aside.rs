@@ -27,11 +27,13 @@ pub fn set_aside(from: &Path, target: &Path) -> io::Result<PathBuf> {
     }
     loop {
         let folder = kept.join(number.to_string());
-        fs::create_dir_all(&folder)?;
         let aside = folder.join(name);
-        match rename_new(from, &aside) {
+        match make_folder(&folder).and_then(|()| rename_new(from, &aside)) {
+            // Of this name something is kept there, or it is no folder.
             Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {
-                number = number.checked_add(1).ok_or(error)?;
+                let none =
+                    || io::Error::other(format!("{}: no number is left in it; move it away", kept.display()));
+                number = number.checked_add(1).ok_or_else(none)?;
             }
             Err(error) => {
                 remove_empty(&aside);
@@ -42,6 +44,15 @@ pub fn set_aside(from: &Path, target: &Path) -> io::Result<PathBuf> {
                 return Ok(aside);
             }
         }
+    }
+}
+
+/// Makes a folder with those above it, unless it is there; [`io::ErrorKind::AlreadyExists`] where something else is, also a link.
+fn make_folder(folder: &Path) -> io::Result<()> {
+    match fs::symlink_metadata(folder) {
+        Ok(about) if about.is_dir() => Ok(()),
+        Ok(_) => Err(io::ErrorKind::AlreadyExists.into()),
+        Err(_) => fs::create_dir_all(folder),
     }
 }
 

@@ -130,7 +130,7 @@ impl Output {
     }
 
     /// Goes on with what an earlier run has left of a file, and says how many bytes that is. Dropped before its end it
-    /// stays for the next one. In the end it completes a file that is its beginning, and replaces no other. Only for regular files.
+    /// stays for the next one, unless nothing is in it. In the end it completes a file that is its beginning, and replaces no other. Only for regular files.
     pub fn resume(path: &Path) -> Result<(Self, u64)> {
         let target = target_of(path)?;
         if let Ok(about) = fs::metadata(path) {
@@ -143,6 +143,7 @@ impl Output {
         if fs::symlink_metadata(&part.path).is_ok_and(|about| !about.is_file()) {
             bail!("{}: is no file of ours, and stands where one is begun; move it away", part.path.display());
         }
+        let _beginning = lock_folder_of(&part.target);
         let file = open_to_go_on(&part.path, path)?;
         let about = file.metadata().with_context(|| cannot_write(path))?;
         check_only_name(&file, &part.path)?;
@@ -445,7 +446,10 @@ impl Part {
     }
 
     fn abandon(&self) {
-        if !self.resumed {
+        let _ending = lock_folder_of(&self.target);
+        // In one with nothing in it nothing can be gone on with.
+        let is_empty = || fs::symlink_metadata(&self.path).is_ok_and(|about| about.len() == 0);
+        if !self.resumed || is_empty() {
             // Where it cannot be removed either, it is in nobody's way.
             let _ = fs::remove_file(&self.path);
         }

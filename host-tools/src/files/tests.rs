@@ -81,6 +81,32 @@ fn a_file_is_the_old_one_until_the_new_one_is_whole_and_then_it_is_kept() {
 }
 
 #[test]
+fn what_is_replaced_is_kept_under_the_next_number_where_one_is_no_folder() {
+    let dir = furnished();
+    let path = dir.path().join("old");
+    let folder = dir.path().join("hums-kept");
+    fs::create_dir(&folder).expect("made");
+    fs::write(folder.join("1"), "a file").expect("written");
+    set_aside(&path, &path).expect("kept");
+    assert_eq!(kept(dir.path(), 2, "old"), "what was there");
+    assert_eq!(fs::read(folder.join("1")).expect("there"), b"a file");
+    #[cfg(unix)]
+    {
+        std::os::unix::fs::symlink("elsewhere", folder.join("3")).expect("a link");
+        fs::write(&path, "newer").expect("written");
+        set_aside(&path, &path).expect("kept");
+        assert_eq!(kept(dir.path(), 4, "old"), "newer");
+        assert!(!dir.path().join("elsewhere").exists());
+    }
+    // No number is left.
+    fs::write(folder.join(u64::MAX.to_string()), "a file").expect("written");
+    fs::write(&path, "newest").expect("written");
+    let refused = set_aside(&path, &path).expect_err("there is no place").to_string();
+    assert!(refused.contains("hums-kept: no number is left in it; move it away"), "{refused}");
+    assert_eq!(fs::read(&path).expect("there"), b"newest");
+}
+
+#[test]
 fn a_replacement_that_fails_or_is_killed_loses_nothing() {
     let dir = furnished();
     let (path, part) = (dir.path().join("old"), dir.path().join("part"));

@@ -112,12 +112,44 @@ pub struct Clock {
     /// A message has told a time that counts.
     begun: bool,
     series: Vec<Series>,
+    steps: Steps,
+}
+
+/// How far the last times that counted are apart, microseconds: a ring.
+#[derive(Clone, Copy, Debug, Default)]
+struct Steps {
+    last_us: [u64; RUN as usize],
+    count: u64,
+}
+
+impl Steps {
+    fn add(&mut self, step_us: u64) {
+        let place = (self.count % RUN as u64) as usize;
+        if let Some(last) = self.last_us.get_mut(place) {
+            *last = step_us;
+        }
+        self.count += 1;
+    }
+
+    /// How far times are apart now: as the last ones are at most. Where there are few, as most of them and of those that follow.
+    fn usual_us(&self, before: Option<u64>, times: &[Time]) -> u64 {
+        let last = self.last_us.get(..self.count as usize).unwrap_or(&self.last_us);
+        if self.count >= RUN as u64 {
+            return last.iter().copied().max().unwrap_or(0);
+        }
+        let times = || before.into_iter().chain(times.iter().map(|time| time.us));
+        let follow = times().zip(times().skip(1)).map(|(one, next)| next.saturating_sub(one));
+        let mut all: Vec<u64> = last.iter().copied().chain(follow).collect();
+        all.sort_unstable();
+        all.get(all.len().saturating_sub(1) / 2).copied().unwrap_or(0)
+    }
 }
 
 impl Clock {
     /// Before the first time.
     pub const fn new(rules: Rules) -> Self {
-        Self { rules, timeline: Timeline::new(), begun: false, series: Vec::new() }
+        let steps = Steps { last_us: [0; RUN as usize], count: 0 };
+        Self { rules, timeline: Timeline::new(), begun: false, series: Vec::new(), steps }
     }
 
     /// The first message is known to tell this time: it has been looked for.
@@ -161,7 +193,8 @@ impl Clock {
         let time = |stamp: &Stamp| Time { us: stamp.us, steady: self.is_steady(stamp.series) };
         let times: Vec<Time> = std::iter::once(&stamp).chain(&ahead.stamps).map(time).collect();
         let before = self.timeline.recorded_us();
-        let question = Question { before, times: &times, is_end: ahead.is_end, ends: self.rules.ends };
+        let (ends, usual_us) = (self.rules.ends, self.steps.usual_us(before, &times));
+        let question = Question { before, times: &times, is_end: ahead.is_end, ends, usual_us };
         if !question.is_wrong() {
             return Reading::Sound(self.count(stamp, passed()));
         }
@@ -178,12 +211,16 @@ impl Clock {
         if self.rules.from_first && !self.begun {
             self.timeline = Timeline::from_first(stamp.us);
         }
+        let before = self.timeline.recorded_us();
         let moment = match passed_us {
             Some(passed_us) => self.timeline.set(stamp.us, passed_us),
             None => self.timeline.at(stamp.us),
         };
         if moment.restarted {
             self.series.clear();
+            self.steps = Steps::default();
+        } else if let Some(before) = before.filter(|_| self.begun) {
+            self.steps.add(stamp.us.saturating_sub(before));
         }
         self.begun = true;
         if let Some(series) = self.note(stamp) {

@@ -62,6 +62,8 @@ pub struct Question<'a> {
     pub is_end: bool,
     /// How the recording's ends are judged.
     pub ends: Ends,
+    /// How far its times are apart, microseconds, as far as that is known.
+    pub usual_us: u64,
 }
 
 impl Question<'_> {
@@ -132,7 +134,7 @@ impl Question<'_> {
             (true, _) | (_, None) => seldom_us,
             (false, Some(_)) => u64::MAX,
         };
-        if step > longest { self.fall() } else { PAUSE }
+        if step > longest.max(self.usual_us.saturating_mul(2)) { self.fall() } else { PAUSE }
     }
 
     /// Where few times follow although the recording goes on, most of them decide.
@@ -154,7 +156,7 @@ mod tests {
         let us = |seconds: f64| (seconds * SECOND).round() as u64;
         let times: Vec<Time> =
             seconds.iter().take(1 + ASKED).map(|&seconds| Time { us: us(seconds), steady }).collect();
-        Question { before: before.map(us), times: &times, is_end, ends: ENDS }.is_wrong()
+        Question { before: before.map(us), times: &times, is_end, ends: ENDS, usual_us: 0 }.is_wrong()
     }
 
     fn going_on(from: f64, times: usize, every: f64) -> Vec<f64> {

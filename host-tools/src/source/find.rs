@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context as _, Result, anyhow, bail};
 
 use super::format::{KNOWN, begins_recording, detect, format_of, hint, is_recording, start_of};
-use super::made::is_made_of;
+use super::made::{Made, made_of};
 use super::recording::{Place, of_one_vehicle};
 use crate::files::{FileId, content_identity, why_unread};
 use crate::logs::find::{Image, REMARKS_MAX, check_seekable};
@@ -115,11 +115,14 @@ impl Found {
                 sessions.entry(session).or_default().push(place);
             }
         }
-        // What may be the original: where none of these is it, the first one is named.
+        // Those of which it is made as far as can be told, or else those of which it has the name.
         let of = |tlog: &Path, originals: &[&Place]| {
-            let original = originals.iter().find(|place| is_made_of(tlog, place));
-            let named = original.or_else(|| originals.first())?;
-            Some((named.title.clone(), original.is_some()))
+            let likeness: Vec<Made> = originals.iter().map(|place| made_of(tlog, place)).collect();
+            let best =
+                [Made::Of, Made::OtherTimes, Made::No].into_iter().find(|made| likeness.contains(made))?;
+            let named = originals.iter().zip(&likeness).filter(|(_, made)| **made == best);
+            let named: Vec<&str> = named.map(|(place, _)| place.title.as_str()).collect();
+            Some((named.join(" or "), best))
         };
         let of_file = |base: &str, identity: &str| -> Vec<&Place> {
             let is_it = |path: &Path| {
@@ -140,19 +143,20 @@ impl Found {
             .collect();
         for (place, original) in self.places.split_off(before).into_iter().zip(originals) {
             let remark = match &original {
-                Some((of, true)) => {
+                Some((of, Made::Of)) => {
                     format!("{}: was made by hums of {of}, which is read, and is passed over", place.title)
                 }
-                Some((of, false)) => format!(
-                    "{}: has the name of what hums makes of {of}, and more or other frames: it is read as a recording of its own",
-                    place.title
+                Some((of, made)) => format!(
+                    "{}: has the name of what hums makes of {of}, and {}: it is read as a recording of its own",
+                    place.title,
+                    if *made == Made::No { "more or other frames" } else { "its frames at other times" }
                 ),
                 None => String::new(),
             };
             if !remark.is_empty() && self.remarks.len() < REMARKS_MAX {
                 self.remarks.push(remark);
             }
-            if original.is_none_or(|(_, is_made)| !is_made) {
+            if original.is_none_or(|(_, made)| made != Made::Of) {
                 self.places.push(place);
             }
         }

@@ -3,11 +3,17 @@
 
 mod check;
 mod copied;
+mod copies;
+mod damaged;
+mod folders;
 mod help;
+mod images;
 mod in_place;
 mod inputs;
 mod json;
 mod killed;
+mod made;
+mod mixed;
 mod pairs;
 mod read;
 mod record;

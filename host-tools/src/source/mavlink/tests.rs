@@ -47,6 +47,26 @@ fn one_wrong_time_is_damage_and_changes_no_other_time() {
     }
 }
 
+/// A tracker's records are minutes or hours apart: its last ones are as good as those before.
+#[test]
+fn records_that_are_far_apart_have_right_times_and_a_wrong_one_at_the_end_is_seen() {
+    for apart in [610, 30_000, 400_000] {
+        for number in [2, 3, 60] {
+            let times: Vec<u64> = (0..number).map(|record| 1_000 + record * apart).collect();
+            assert_eq!(told(&times), (vec![], 0, (number - 1) * apart), "{apart} {number}");
+        }
+        let times: Vec<u64> = (0..60).map(|record| 1_000 + record * apart).collect();
+        let end = 59 * apart;
+        // In twos, too.
+        let twos: Vec<u64> = times.iter().flat_map(|time| [*time, time + 1]).collect();
+        assert_eq!(told(&twos), (vec![], 0, end + 1), "{apart}");
+        for wrong in [1_000 + end + 3 * apart, 100] {
+            let times = [&times[..], &[wrong]].concat();
+            assert_eq!(told(&times), (vec![(Cause::Damaged, Some(60 * 29))], 0, end), "{apart} {wrong}");
+        }
+    }
+}
+
 #[test]
 fn a_wrong_time_at_either_end_moves_no_other_time() {
     for count in [1, 2, 8] {

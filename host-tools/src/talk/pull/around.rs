@@ -135,7 +135,10 @@ impl<'a> Remote<'a> {
         }
         let mut part = Part::open(&whole, sectors, &heading.sectors)?;
         for (place, sector) in (0..).zip(&heading.sectors) {
-            part.put(place, sector)?;
+            // The card may have lost since what is here.
+            if !part.has(place) {
+                part.put(place, sector)?;
+            }
         }
         Ok(Some(Self { ftp, name, part, sectors }))
     }

@@ -58,6 +58,8 @@ pub(super) fn compare(ftp: &mut Ftp, name: &str, path: &Path, bytes: u32) -> Res
 pub(super) struct Heading {
     /// What the log is called here.
     pub(super) name: String,
+    /// The session that its first sectors name, where one of them can be read.
+    pub(super) session: Option<u32>,
     /// The first sectors, as far as they were looked at.
     pub(super) sectors: Vec<Sector>,
 }
@@ -82,7 +84,7 @@ pub(super) fn heading_here(path: &Path, name: &str, length: u32) -> Result<Headi
 fn heading_by(name: &str, length: u32, mut sector_at: impl FnMut(u32) -> Result<Vec<u8>>) -> Result<Heading> {
     let mut sectors = Vec::new();
     let Some(segment) = segment_name(Path::new(name)) else {
-        return Ok(Heading { name: name.to_owned(), sectors });
+        return Ok(Heading { name: name.to_owned(), session: None, sectors });
     };
     let (mut session, mut board) = (None, None);
     let mut group = Vec::new();
@@ -104,8 +106,8 @@ fn heading_by(name: &str, length: u32, mut sector_at: impl FnMut(u32) -> Result<
         }
     }
     let board = board.and_then(known);
-    let session = session_name(&format!("{:05}", segment.session), board.as_ref(), session);
-    Ok(Heading { name: format!("{session}_{:02}.HUM", segment.segment), sectors })
+    let of = session_name(&format!("{:05}", segment.session), board.as_ref(), session);
+    Ok(Heading { name: format!("{of}_{:02}.HUM", segment.segment), session, sectors })
 }
 
 /// These bytes of the board's log that is open.

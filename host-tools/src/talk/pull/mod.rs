@@ -7,6 +7,7 @@
 mod around;
 mod compare;
 mod ftp;
+mod judge;
 mod moment;
 mod part;
 
@@ -15,12 +16,13 @@ use std::io::{self, Read as _, Write as _};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result, bail};
-use hums_blackbox::{Cause, Gap, SECTOR_BYTES};
+use hums_blackbox::SECTOR_BYTES;
 use hums_core::time::Instant;
 use serde::Serialize;
 
-use self::compare::{Likeness, compare, heading_here, heading_of};
+use self::compare::{Heading, Likeness, compare, heading_here, heading_of};
 use self::ftp::Ftp;
+use self::judge::judge;
 use self::part::Part;
 use super::Client;
 use crate::cli;
@@ -31,7 +33,6 @@ use crate::output::{self, Schema};
 use crate::plural::count;
 use crate::printable::word;
 use crate::summary::Overview;
-use crate::verify::{BEFORE, END, failed, verify_each};
 
 /// What `hums pull --json` prints.
 const SCHEMA: Schema = Schema::first("hums-pull");
@@ -71,7 +72,7 @@ struct LogJson {
     path: PathBuf,
     /// It was not there already.
     is_new: bool,
-    /// Nothing in it is damaged or missing.
+    /// `hums verify` finds no fault with it and the logs of its session that came.
     whole: bool,
 }
 
@@ -98,26 +99,37 @@ fn bring(client: Client, args: &cli::Pull) -> Result<Outcome> {
         return around(&mut ftp, logs.into_iter().map(|(log, _)| log).collect(), args, moment);
     }
     let newest = args.last.unwrap_or(logs.len()).min(logs.len());
-    let mut outcome = Outcome::Done;
     let mut pulled = Vec::new();
-    for (name, _) in logs.split_off(logs.len() - newest) {
-        let Some((path, is_new)) = pull(&mut ftp, &name, &args.output).with_context(|| name.clone())? else {
+    let came = bring_each(&mut ftp, logs.split_off(logs.len() - newest), args, &mut pulled);
+    // Also what came before an error.
+    let judged = judge(&all, &mut pulled);
+    came?;
+    let outcome = judged?;
+    if args.json {
+        output::json(SCHEMA, &PulledJson { system: ftp.system(), logs: pulled, around: None })?;
+    }
+    Ok(outcome)
+}
+
+/// Brings these logs whole, one after the other.
+fn bring_each(
+    ftp: &mut Ftp,
+    logs: Vec<(String, u32)>,
+    args: &cli::Pull,
+    pulled: &mut Vec<LogJson>,
+) -> Result<()> {
+    for (name, _) in logs {
+        let Some((path, is_new)) = pull(ftp, &name, &args.output).with_context(|| name.clone())? else {
             continue;
         };
-        let verified = verify(&name, &path)?;
-        outcome = outcome.and(verified);
         if !is_new {
             note!("{name}: is there already as {}: the same by its checksum", path.display());
         } else if !args.json {
             output::line(&word(&path.display().to_string()))?;
         }
-        pulled.push(LogJson { name, path, is_new, whole: verified == Outcome::Done });
+        pulled.push(LogJson { name, path, is_new, whole: true });
     }
-    outcome = outcome.and(judge(&all, &mut pulled)?);
-    if args.json {
-        output::json(SCHEMA, &PulledJson { system: ftp.system(), logs: pulled, around: None })?;
-    }
-    Ok(outcome)
+    Ok(())
 }
 
 /// Brings a moment of the newest session of these logs.
@@ -219,10 +231,7 @@ fn pull(ftp: &mut Ftp, name: &str, output: &Path) -> Result<Option<(PathBuf, boo
             aside.display()
         );
         length = ftp.open(name)?.min(length);
-        let now = output.join(heading_of(ftp, name, length)?.name);
-        if now != path {
-            return exchanged(&now);
-        }
+        check_same(&heading, &heading_of(ftp, name, length)?)?;
         fetch(ftp, name, &mut file, 0, length, None)?;
         if !is_whole(ftp, name, &mut file, length)? {
             bail!(
@@ -231,10 +240,9 @@ fn pull(ftp: &mut Ftp, name: &str, output: &Path) -> Result<Option<(PathBuf, boo
             );
         }
     }
-    let came = output.join(heading_here(file.part(), name, length)?.name);
-    if came != path {
+    if let Err(other) = check_same(&heading, &heading_here(file.part(), name, length)?) {
         file.set_aside()?;
-        return exchanged(&came);
+        return Err(other);
     }
     file.finish()?;
     part.map_or(Ok(()), |part| part.finish(&path))?;
@@ -242,12 +250,19 @@ fn pull(ftp: &mut Ftp, name: &str, output: &Path) -> Result<Option<(PathBuf, boo
 }
 
 /// Nothing of one session gets the name of another one.
-fn exchanged<T>(now: &Path) -> Result<T> {
-    bail!(
-        "another log has come in its place while it was read, {}: nothing of it has the first one's name; what came is kept in \
-         hums-kept: call again",
-        now.display()
-    )
+fn check_same(first: &Heading, now: &Heading) -> Result<()> {
+    match (first.session, now.session) {
+        (first, now) if first == now => Ok(()),
+        (_, Some(_)) => bail!(
+            "another log has come in its place while it was read, {}: nothing of it has the first one's name; what came is kept in \
+             hums-kept: call again",
+            now.name
+        ),
+        (_, None) => bail!(
+            "its beginning can no longer be read on the board, so nothing tells whether it is the same log still; what came is \
+             kept in hums-kept: call again"
+        ),
+    }
 }
 
 /// What is on this PC already under the log's name.
@@ -262,6 +277,12 @@ enum There {
 
 fn there(ftp: &mut Ftp, name: &str, path: &Path, length: u32) -> Result<There> {
     let Ok(about) = path.metadata() else { return Ok(There::Nothing) };
+    if !about.is_file() {
+        bail!(
+            "{}: is no file, and stands where the log is to be: move it away, or name another directory with -o",
+            path.display()
+        );
+    }
     let bytes = u32::try_from(about.len()).unwrap_or(u32::MAX);
     if bytes == 0 {
         return Ok(There::Nothing);
@@ -348,81 +369,6 @@ fn is_whole(ftp: &mut Ftp, name: &str, file: &mut Output, length: u32) -> Result
     Ok(likeness != Likeness::Other)
 }
 
-/// Reads a segment through, and says what is wrong with it. What is natural is not: behind its last sector a file has what
-/// it held before, a further segment does not begin with the session, and each of them alone proves no end.
-fn verify(name: &str, path: &Path) -> Result<Outcome> {
-    let found = logs::find(&[path.to_owned()], false)?;
-    let mut outcome = Outcome::Done;
-    for log in &found.logs {
-        let mut overview = Overview::verified(log)?;
-        // It was asked for alone.
-        overview.ending.summary.files_gone = 0;
-        let (blocks, behind) = (overview.ending.summary.blocks, overview.ending.summary.behind);
-        let is_further = segment_name(path).is_some_and(|name| name.segment > 0);
-        // What is missing before it, unless it was left out on purpose, which is no gap.
-        let is_before = |gap: &Gap| gap.from.is_none() && gap.cause != Cause::Disarmed;
-        let begins_later = overview.contents.gaps.first().is_some_and(is_before);
-        let gaps = overview.ending.summary.gaps - u64::from(is_further && begins_later);
-        let wrong = [
-            (blocks.damaged, "damaged sectors"),
-            (overview.ending.made_again(), "sectors that had to be made again from parity"),
-            (overview.ending.unprotected(), "parity sectors that are missing"),
-            (blocks.misplaced.saturating_sub(behind.misplaced), "sectors where others belong"),
-            (blocks.stale.saturating_sub(behind.stale), "sectors of another session"),
-            (blocks.foreign.saturating_sub(behind.foreign), "blocks that are no sectors"),
-            (
-                blocks.unsound.saturating_sub(behind.unsound),
-                "blocks that begin as a sector and fail its check",
-            ),
-            (gaps, "gaps"),
-            (overview.contents.bad_frames, "frames that fail their checksum"),
-        ];
-        for why in overview.ending.strange() {
-            note!("{name}: {why}");
-            outcome = Outcome::Losses;
-        }
-        for (number, what) in wrong.into_iter().filter(|(number, _)| *number > 0) {
-            note!("{name}: {what}: {number}; `hums verify` says more");
-            outcome = Outcome::Losses;
-        }
-    }
-    Ok(outcome)
-}
-
-/// Judges the logs together as `hums verify` does, with what they tell of each other. Of a session of which the board has more than
-/// came only the end is judged, if it came: what is missing was not asked for.
-fn judge(all: &[String], pulled: &mut [LogJson]) -> Result<Outcome> {
-    let paths: Vec<PathBuf> = pulled.iter().map(|log| log.path.clone()).collect();
-    if paths.is_empty() {
-        return Ok(Outcome::Done);
-    }
-    let named = |name: &str| segment_name(Path::new(name)).map(|name| (name.session, name.segment));
-    let mut outcome = Outcome::Done;
-    let unread = verify_each(&logs::find(&paths, false)?, |overview| {
-        let files = &overview.ending.files;
-        let is_in =
-            |log: &LogJson| files.iter().any(|file| Path::new(file).file_name() == log.path.file_name());
-        let mut came: Vec<&mut LogJson> = pulled.iter_mut().filter(|log| is_in(log)).collect();
-        // What does not hold by itself was said.
-        let is_said = came.iter().any(|log| !log.whole);
-        let Some(last) = came.last().map(|log| log.name.clone()).filter(|_| !is_said) else { return Ok(()) };
-        let session = named(&last).map(|(session, _)| session);
-        let of_it = || all.iter().filter_map(|name| named(name)).filter(|name| Some(name.0) == session);
-        let is_all = of_it().count() <= came.len() && of_it().map(|name| name.1).min().unwrap_or(0) == 0;
-        let has_end = of_it().max() <= named(&last);
-        let is_judged = |check: &str| !BEFORE.contains(&check) && (is_all || has_end && check == END);
-        for (check, why) in failed(overview).into_iter().filter(|(check, _)| is_judged(check)) {
-            note!("{last}: {check}: {why}; `hums verify` says more");
-            for log in &mut came {
-                log.whole = false;
-            }
-            outcome = Outcome::Losses;
-        }
-        Ok(())
-    })?;
-    Ok(outcome.and(Outcome::lossy(unread > 0)))
-}
-
 #[cfg(test)]
 mod tests {
     use std::fs;
@@ -437,7 +383,7 @@ mod tests {
     use crate::talk::fake;
 
     /// The sectors of a recording of the repository, as `hums pack` makes them.
-    fn packed(dir: &Path, name: &str) -> Vec<u8> {
+    pub(super) fn packed(dir: &Path, name: &str) -> Vec<u8> {
         let input = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../tests/flights").join(name);
         let output = dir.join(name);
         let pack =
@@ -447,6 +393,15 @@ mod tests {
     }
 
     const NAME: &str = "00001_00.HUM";
+
+    /// The names in a folder.
+    fn names_in(folder: &Path) -> Vec<String> {
+        let entries = fs::read_dir(folder).expect("there");
+        let mut names: Vec<String> =
+            entries.map(|entry| entry.expect("there").file_name().to_string_lossy().into_owned()).collect();
+        names.sort();
+        names
+    }
 
     /// A board with this log, in whose place the other one comes with the so-many-th question for bytes.
     fn board(mut log: Vec<u8>, other: Vec<u8>, mut reads: u32) -> Ftp {
@@ -468,7 +423,7 @@ mod tests {
             };
             match opcode {
                 4 => vec![answer(1, 0, false, &(log.len() as u32).to_le_bytes())],
-                5 => vec![answer(1, at, false, &log[at..(at + size).min(log.len())])],
+                5 => vec![answer(1, at, false, &log[at.min(log.len())..(at + size).min(log.len())])],
                 14 => {
                     let sum = hums_link::ftp::checksum(0, &log[..at.min(log.len())]);
                     vec![answer(1, at, false, &sum.to_le_bytes())]
@@ -516,7 +471,8 @@ mod tests {
             } else {
                 let told = pulled.expect_err("it is another one").to_string();
                 assert!(told.contains("another log has come in its place"), "{told}");
-                assert!(!output.join(&name).exists());
+                // Nothing is left of what was begun.
+                assert_eq!(names_in(&output), ["hums-kept"]);
             }
         }
         // The other one from its first byte on.
@@ -526,29 +482,61 @@ mod tests {
         let told = pull(&mut ftp, NAME, &output).expect_err("it is another one").to_string();
         assert!(told.contains("another log has come in its place"), "{told}");
         assert_eq!(fs::read(output.join("hums-kept/1").join(&name)).expect("kept"), other);
+        assert_eq!(names_in(&output), ["hums-kept"]);
     }
 
     #[test]
-    fn a_log_is_whole_where_verify_says_so() {
+    fn a_card_that_loses_the_beginning_of_a_log_is_not_called_another_log() {
         let dir = tempfile::tempdir().expect("a folder");
-        let whole = packed(dir.path(), "px4_hil_quad_low.tlog");
-        let path = dir.path().join("00001-s00000007_00.HUM");
-        let judged = |bytes: &[u8], all: &[&str]| {
-            fs::write(&path, bytes).expect("written");
-            let own = heading_here(&path, NAME, bytes.len() as u32).expect("it reads").name;
-            let path = dir.path().join(own);
-            fs::write(&path, bytes).expect("written");
-            let all: Vec<String> = all.iter().map(|name| (*name).to_owned()).collect();
-            let mut logs = [LogJson { name: NAME.to_owned(), path, is_new: true, whole: true }];
-            let outcome = judge(&all, &mut logs).expect("it reads");
-            (outcome, logs[0].whole)
-        };
-        assert_eq!(judged(&whole, &[NAME]), (Outcome::Done, true));
-        let cut = &whole[..80 * SECTOR_BYTES];
-        assert_eq!(judged(cut, &[NAME]), (Outcome::Losses, false), "it has no end");
-        let noisy = [cut, &[0x5a; 4096]].concat();
-        assert_eq!(judged(&noisy, &[NAME]), (Outcome::Losses, false));
-        assert_eq!(judged(cut, &[NAME, "00001_01.HUM"]), (Outcome::Done, true), "its end is in another one");
+        let (log, _, name) = two_logs(dir.path());
+        // The first sector alone, of which the others tell the session; the whole first page.
+        let without = |bytes: usize| [&vec![0; bytes][..], &log[bytes..]].concat();
+        for (next, words) in [
+            (without(SECTOR_BYTES), None),
+            (without(8 * SECTOR_BYTES), Some("its beginning can no longer be read on the board")),
+        ] {
+            let output = tempfile::tempdir().expect("a folder");
+            let mut ftp = board(log.clone(), next.clone(), 8 * 3 + 5);
+            let pulled = pull(&mut ftp, NAME, output.path());
+            let Some(words) = words else {
+                let (path, _) = pulled.expect("it came").expect("a log");
+                assert_eq!(
+                    (path.file_name().expect("a name"), fs::read(&path).expect("there")),
+                    (name.as_ref(), next)
+                );
+                continue;
+            };
+            let told = pulled.expect_err("nothing tells what it is").to_string();
+            assert!(told.contains(words), "{told}");
+            assert_eq!(names_in(output.path()), ["hums-kept"]);
+        }
+    }
+
+    #[test]
+    fn what_is_no_file_in_the_place_of_a_log_is_told_and_left() {
+        let dir = tempfile::tempdir().expect("a folder");
+        let (log, other, name) = two_logs(dir.path());
+        let output = dir.path().join("logs");
+        fs::create_dir_all(output.join(&name)).expect("made");
+        let mut ftp = board(log, other, u32::MAX);
+        let told = pull(&mut ftp, NAME, &output).expect_err("a folder").to_string();
+        assert!(told.contains("is no file, and stands where the log is to be: move it away"), "{told}");
+        assert_eq!(names_in(&output), [name]);
+    }
+
+    #[test]
+    fn a_part_that_has_what_the_card_has_lost_since_is_not_written_over() {
+        let dir = tempfile::tempdir().expect("a folder");
+        let (log, _, name) = two_logs(dir.path());
+        let part = crate::logs::naming::part_name(&dir.path().join(&name));
+        fs::write(&part, &log).expect("written");
+        let mut lost = log.clone();
+        lost[..SECTOR_BYTES].fill(0);
+        let mut ftp = board(lost.clone(), lost, u32::MAX);
+        let what: cli::Around = "0".parse().expect("a time");
+        around::pull(&mut ftp, &[NAME.to_owned()], dir.path(), &what, hums_core::time::Span::from_secs(1))
+            .expect("a part");
+        assert_eq!(fs::read(&part).expect("there"), log);
     }
 
     #[test]
@@ -574,29 +562,5 @@ mod tests {
         }
         assert!(others <= 1, "{others}");
         assert!(brought.strange > 10, "{brought:?}");
-    }
-
-    #[test]
-    fn what_a_recycled_file_held_before_is_no_damage_and_what_is_in_the_middle_is() {
-        let dir = tempfile::tempdir().expect("a folder");
-        let new = packed(dir.path(), "px4_hil_quad_low.tlog");
-        let old = packed(dir.path(), "ap_quad_guided.tlog");
-        let verified = |name: &str, bytes: &[u8]| {
-            let path = dir.path().join(name);
-            fs::write(&path, bytes).expect("written");
-            verify(name, &path).expect("it reads")
-        };
-        let recycled = [&new[..], &old[new.len()..]].concat();
-        assert_eq!(verified("00007_00.HUM", &recycled), Outcome::Done);
-        // A further segment does not begin with the session's first sector; a first one does.
-        let group = 64 * 512;
-        assert_eq!(verified("00007_01.HUM", &new[2 * group..]), Outcome::Done);
-        assert_eq!(verified("00007_00.HUM", &new[2 * group..]), Outcome::Losses);
-        let middle = new.len() / 1024 * 512;
-        let mut mixed = new.clone();
-        mixed[middle..middle + group].copy_from_slice(&old[middle..middle + group]);
-        assert_eq!(verified("00007_00.HUM", &mixed), Outcome::Losses);
-        mixed[middle..middle + group].fill(0);
-        assert_eq!(verified("00007_00.HUM", &mixed), Outcome::Losses);
     }
 }

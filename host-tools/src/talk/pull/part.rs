@@ -1,16 +1,19 @@
 //! A part of a log: a file in which each sector that was brought stands at its own place, and zeros stand for the others.
 //!
+//! What is in it and differs from what the board sends in its place (a sector that was changed, or that its card has lost since) is
+//! kept: the part as it was stays in `hums-kept`.
+//!
 //! Its name says that it is a part, `00042-..._07.part.HUM`, and every reader says so too ([`crate::logs::naming::is_part`]). What is
 //! in it is not brought again, neither by `--around` nor when all of the log is.
 
 use std::fs::{self, File};
-use std::io::{BufReader, Read as _, Seek as _, SeekFrom, Write as _};
+use std::io::{self, BufReader, Read as _, Seek as _, SeekFrom, Write as _};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result, bail};
 use hums_blackbox::{Header, SECTOR_BYTES, Sector};
 
-use crate::files::{cannot_write, check_only_name, open_in_place, set_aside, settle};
+use crate::files::{cannot_write, check_only_name, open_in_place, remake_in_place, set_aside, settle};
 use crate::logs::naming::part_name;
 
 /// The part of one log.
@@ -24,6 +27,8 @@ pub(super) struct Part {
     session: Option<u32>,
     /// Sectors of other sessions that came, and are not in it.
     strange: u32,
+    /// What was in it before is kept.
+    is_kept: bool,
 }
 
 impl Part {
@@ -64,7 +69,14 @@ impl Part {
     fn at(path: PathBuf, head: &[Sector]) -> Result<Self> {
         let session = head.iter().find_map(|sector| Header::read(sector.bytes()).ok());
         let file = Self::opened(&path)?;
-        Ok(Self { file, path, has: Vec::new(), session: session.map(|header| header.session), strange: 0 })
+        Ok(Self {
+            file,
+            path,
+            has: Vec::new(),
+            session: session.map(|header| header.session),
+            strange: 0,
+            is_kept: false,
+        })
     }
 
     fn opened(path: &Path) -> Result<File> {
@@ -152,7 +164,7 @@ impl Part {
         Ok(Sector::from_bytes(bytes))
     }
 
-    /// Puts a sector at its place, unless it is another session's.
+    /// Puts a sector at its place, unless it is another session's. Where something else stands there, the part as it is is kept.
     pub(super) fn put(&mut self, place: u32, sector: &Sector) -> Result<()> {
         if let Ok(header) = Header::read(sector.bytes())
             && *self.session.get_or_insert(header.session) != header.session
@@ -160,12 +172,38 @@ impl Part {
             self.strange += 1;
             return Ok(());
         }
+        if !self.is_kept && self.would_lose(place, sector)? {
+            self.keep()?;
+        }
         self.seek(place)
             .and_then(|()| self.file.write_all(sector.bytes()))
             .with_context(|| cannot_write(&self.path))?;
         if let Some(has) = self.has.get_mut(place as usize) {
             *has = true;
         }
+        Ok(())
+    }
+
+    /// Whether something stands at a place that this sector has not, nor the one before.
+    fn would_lose(&mut self, place: u32, sector: &Sector) -> Result<bool> {
+        let there = self.read(place)?;
+        let before = place.checked_sub(1).map(|before| self.read(before)).transpose()?;
+        let full = [before.as_ref(), Some(sector)].map(|full| Header::read(full?.bytes()).ok());
+        Ok(!is_in(&there, sector, full))
+    }
+
+    /// Keeps all that was in it, and goes on in a copy.
+    fn keep(&mut self) -> Result<()> {
+        note!(
+            "{}: has a sector that differs from what the board sends in its place, which is taken",
+            self.path.display()
+        );
+        self.file.rewind().with_context(|| cannot_write(&self.path))?;
+        self.file = remake_in_place(&self.path, true, |copy| {
+            let (mut from, mut to) = (&self.file, copy);
+            settle(io::copy(&mut from, &mut to).map(|_| ()), &self.path)
+        })?;
+        self.is_kept = true;
         Ok(())
     }
 
@@ -190,31 +228,32 @@ impl Part {
         Ok(())
     }
 
-    /// Whether the whole log has all that is in it. Copies of a sector in progress are at its own place and the one after: the
-    /// full one, where it can be read, has what they have.
+    /// Whether the whole log has all that is in it.
     fn is_in(&mut self, whole: &Path) -> Result<bool> {
         let mut log = BufReader::new(settle(File::open(whole), whole)?);
         let (mut theirs, mut before) = ([0; SECTOR_BYTES], None);
         for place in 0..self.has.len() as u32 {
             settle(log.read_exact(&mut theirs), whole)?;
-            let ours = self.read(place)?;
-            let is_nothing = ours.bytes().iter().all(|byte| *byte == 0);
-            let (here, copy) = (Header::read(&theirs).ok(), Header::read(ours.bytes()).ok());
-            let is_full_one = |full: &Header| {
-                copy.is_some_and(|copy| {
-                    copy.partial
-                        && !full.partial
-                        && (copy.session, copy.number) == (full.session, full.number)
-                })
-            };
-            let became = [before, here].iter().flatten().any(is_full_one);
-            if *ours.bytes() != theirs && !is_nothing && !became {
+            let here = Header::read(&theirs).ok();
+            if !is_in(&self.read(place)?, &Sector::from_bytes(theirs), [before, here]) {
                 return Ok(false);
             }
             before = here;
         }
         Ok(true)
     }
+}
+
+/// Whether all that is in a sector of a part is in the one that takes its place, or in the one before that: nothing is in it, or it is the
+/// same. Copies of a sector in progress are at its own place and the one after: the full one, where it can be read, has what they have.
+fn is_in(ours: &Sector, theirs: &Sector, [before, here]: [Option<Header>; 2]) -> bool {
+    let is_nothing = ours.bytes().iter().all(|byte| *byte == 0);
+    let copy = Header::read(ours.bytes()).ok().filter(|copy| copy.partial);
+    let is_full_one = |full: &Header| {
+        copy.as_ref()
+            .is_some_and(|copy| !full.partial && (copy.session, copy.number) == (full.session, full.number))
+    };
+    is_nothing || ours == theirs || [before, here].iter().flatten().any(is_full_one)
 }
 
 #[cfg(test)]
@@ -304,6 +343,44 @@ mod tests {
         part.put(1, &other(1)).expect("room");
         assert!(part.has(0) && !part.has(1) && part.strange() == 1);
         assert_eq!(part.read(1).expect("nothing"), Sector::zeroed());
+    }
+
+    #[test]
+    fn what_stands_where_the_board_sends_something_else_is_kept_once() {
+        let dir = tempfile::tempdir().expect("a folder");
+        let whole = dir.path().join("00042-s00000007_07.HUM");
+        let path = part_name(&whole);
+        let kept = |number: u32| {
+            let folder = dir.path().join("hums-kept").join(number.to_string());
+            fs::read(folder.join(path.file_name().expect("a name"))).ok()
+        };
+        let mut changed = *sector(1).bytes();
+        changed[300] ^= 1;
+        let mut in_progress = sector(2);
+        in_progress.set_partial(true);
+        in_progress.seal(7);
+        let there = [*sector(0).bytes(), changed, *in_progress.bytes(), *sector(3).bytes(), changed].concat();
+        fs::write(&path, &there).expect("written");
+        let mut part = Part::open(&whole, 6, &[]).expect("it goes on");
+        assert_eq!((0..6).filter(|place| part.has(*place)).collect::<Vec<_>>(), [0, 3]);
+        // The full one has what was in progress, and nothing was at the last place.
+        for place in [2, 5] {
+            part.put(place, &sector(place as u8)).expect("room");
+        }
+        assert_eq!(kept(1), None);
+        part.put(1, &sector(1)).expect("room");
+        part.put(4, &sector(4)).expect("room");
+        let before = [&there[..1024], sector(2).bytes(), &there[1536..], &sector(5).bytes()[..]].concat();
+        assert_eq!((kept(1), kept(2)), (Some(before), None));
+        let all: Vec<u8> = (0..6).flat_map(|number| *sector(number).bytes()).collect();
+        assert_eq!(fs::read(&path).expect("there"), all);
+        assert!(Part::open(&whole, 6, &[]).is_err(), "this run has it still");
+        // What the card has lost since is no less worth keeping.
+        drop(part);
+        fs::write(&path, in_progress.bytes()).expect("written");
+        let mut part = Part::open(&whole, 1, &[]).expect("it goes on");
+        part.put(0, &Sector::zeroed()).expect("room");
+        assert_eq!(kept(2), Some(in_progress.bytes().to_vec()));
     }
 
     #[cfg(unix)]

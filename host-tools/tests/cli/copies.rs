@@ -1,0 +1,160 @@
+//! Copies of one session beside each other: each flight counts once, and what is wrong with a copy is told.
+
+use std::fs;
+
+use crate::copied::{BLOCK, all_say, copied, without};
+use crate::support::{attempt, end_of, run, text};
+
+#[test]
+fn one_session_under_two_names_is_told_by_every_command_and_counted_once() {
+    let dir = copied(3, "");
+    let at = |name: &str| dir.path().join("copied").join(name);
+    fs::copy(at("00001_00.HUM"), at("00003_00.HUM")).expect("copied");
+    let words = "is session 00001 once more; its own log is not there";
+    all_say(dir.path(), "copied", 3, &[words]);
+    let said = text(&run(dir.path(), "verify copied", 3));
+    assert!(said.contains("\n2 sessions: "), "{said}");
+    let said = text(&attempt(dir.path(), "check copied"));
+    assert!(said.contains("2 logs checked") && said.contains("1  the same session once more"), "{said}");
+    // A damaged copy is one as well.
+    let mut copy = fs::read(at("00003_00.HUM")).expect("there");
+    copy[20 * BLOCK + 100] ^= 1;
+    fs::write(at("00003_00.HUM"), copy).expect("written");
+    all_say(dir.path(), "copied", 3, &[words]);
+    // In a folder of its own a copy is nothing strange.
+    fs::create_dir(dir.path().join("other")).expect("made");
+    fs::remove_file(at("00003_00.HUM")).expect("removed");
+    fs::copy(at("00001_00.HUM"), dir.path().join("other/00001_00.HUM")).expect("copied");
+    all_say(dir.path(), "copied other", 0, &[]);
+}
+
+#[test]
+fn a_mere_copy_is_told_and_its_flight_counted_once() {
+    let dir = copied(1, "");
+    let log = dir.path().join("copied/00001_00.HUM");
+    for name in ["Copy of 00001_00.HUM", "00001_00 (1).HUM", "flight.hum"] {
+        fs::copy(&log, dir.path().join("copied").join(name)).expect("copied");
+    }
+    // The same card three times.
+    fs::copy(dir.path().join("card.img"), dir.path().join("again.img")).expect("copied");
+    for (inputs, out) in [("copied", "a"), ("card.img again.img copied", "b")] {
+        let (decode, report) = (format!("-o {out}/ --format csv"), format!("-o {out}-pages/"));
+        let commands =
+            [("verify", ""), ("info", ""), ("check", ""), ("decode", &decode), ("report", &report)];
+        for (command, flags) in commands {
+            let said = attempt(dir.path(), &format!("{command} {inputs} {flags}"));
+            let told = text(&said) + &String::from_utf8_lossy(&said.stderr);
+            assert!(matches!(said.status.code(), Some(0 | 4)), "{command}: {told}");
+            let words = ["is the same session as", "is a copy of"];
+            assert!(words.iter().any(|words| told.contains(words)), "{command}: {told}");
+        }
+        let said = text(&run(dir.path(), &format!("verify {inputs}"), 0));
+        assert!(said.contains("\n1 session: "), "{said}");
+        let said = text(&attempt(dir.path(), &format!("check {inputs}")));
+        assert!(said.contains("1 log checked") && said.contains("the same session once more"), "{said}");
+    }
+    // One that differs is a log as any other.
+    let mut copy = without(&fs::read(&log).expect("there"), usize::MAX, 0);
+    copy[20 * BLOCK + 100] ^= 1;
+    fs::write(dir.path().join("copied/flight.hum"), copy).expect("written");
+    let said = text(&run(dir.path(), "verify copied", 3));
+    assert!(said.contains("\n2 sessions: "), "{said}");
+}
+
+#[test]
+fn two_copies_of_one_session_have_two_pages_and_the_damaged_one_is_not_kept_alone() {
+    let dir = copied(1, "");
+    let whole = fs::read(dir.path().join("copied/00001_00.HUM")).expect("a log");
+    for (folder, spoiled) in [("damaged", true), ("same", false)] {
+        let mut log = whole.clone();
+        if spoiled {
+            log = without(&log, usize::MAX, 0);
+            log[20 * BLOCK + 100] ^= 1;
+        }
+        fs::create_dir(dir.path().join(folder)).expect("made");
+        fs::write(dir.path().join(folder).join("00001_00.HUM"), log).expect("written");
+    }
+    for flags in ["", "--replace"] {
+        let said = run(dir.path(), &format!("report damaged copied same -o pages/ {flags}"), 3);
+        let lines = text(&said);
+        let (tables, pages): (Vec<_>, Vec<_>) =
+            lines.lines().partition(|line| line.contains("table of 2 pages"));
+        assert_eq!((pages.len(), tables.len()), (2, 1), "{lines}");
+        let told = String::from_utf8_lossy(&said.stderr).into_owned();
+        assert!(told.contains("is a copy of copied/00001, whose page is written once"), "{told}");
+        let mut pages: Vec<String> = fs::read_dir(dir.path().join("pages"))
+            .expect("pages")
+            .map(|page| page.expect("a page").file_name().to_string_lossy().into_owned())
+            .filter(|name| name != "index.html" && name != "hums-kept")
+            .collect();
+        pages.sort();
+        assert!(pages.len() == 2 && pages[0].ends_with("-2.html"), "{pages:?}");
+    }
+}
+
+/// A copy of a log with another log behind it: only the copied one is read, and it counts once. The other one is in no output.
+#[test]
+fn another_log_behind_a_copy_is_told_by_every_command() {
+    let dir = copied(2, "");
+    let at = |name: &str| dir.path().join("copied").join(name);
+    let [one, other] = ["00001_00.HUM", "00002_00.HUM"].map(|name| fs::read(at(name)).expect("there"));
+    fs::write(at("all.hum"), [&one[..], &other].concat()).expect("written");
+    fs::remove_file(at("00002_00.HUM")).expect("removed");
+    let session = u32::from_le_bytes(other[7..11].try_into().expect("four"));
+    let words = format!("of another session (session {session:08x})");
+    all_say(dir.path(), "copied", 3, &[&words, "give each by itself", "00001 once more (not counted)"]);
+    let said = text(&run(dir.path(), "verify copied", 3));
+    assert!(said.contains("FAILED  files ") && said.contains("1 session: damage"), "{said}");
+    assert!(text(&run(dir.path(), "ls copied", 3)).contains("not proved to be whole"));
+    // A copy alone is no finding.
+    fs::write(at("all.hum"), &one).expect("written");
+    all_say(dir.path(), "copied", 0, &["00001 once more (not counted)"]);
+}
+
+#[test]
+fn what_is_wrong_with_a_copy_is_told_by_every_command() {
+    let dir = copied(1, "");
+    let at = |name: &str| dir.path().join("copied").join(name);
+    let mut damaged = fs::read(at("00001_00.HUM")).expect("there");
+    damaged[20 * BLOCK..21 * BLOCK].fill(0);
+    fs::write(at("Copy of 00001_00.HUM"), damaged).expect("written");
+    all_say(dir.path(), "copied", 3, &["1 sector had to be made again from parity"]);
+}
+
+#[test]
+fn a_log_that_is_cut_beside_a_whole_copy_is_told_by_every_command_and_counts_once() {
+    let dir = copied(2, "");
+    let at = |name: &str| dir.path().join("copied").join(name);
+    let log = fs::read(at("00002_00.HUM")).expect("there");
+    fs::write(at("zcopy.hum"), &log).expect("written");
+    fs::write(at("00002_00.HUM"), &log[..20 * BLOCK]).expect("written");
+    all_say(dir.path(), "copied", 3, &["it is the beginning of ", "its end is missing (not counted)"]);
+    let said = text(&run(dir.path(), "verify copied", 3));
+    assert!(
+        said.contains("it is the beginning of zcopy, which has ") && said.contains("2 sessions: "),
+        "{said}"
+    );
+    assert!(text(&attempt(dir.path(), "check copied")).contains("2 logs checked"));
+    // The other way round, and a card's own file is whole.
+    fs::rename(at("00002_00.HUM"), at("cut")).expect("renamed");
+    fs::rename(at("zcopy.hum"), at("00002_00.HUM")).expect("renamed");
+    fs::rename(at("cut"), at("cut.hum")).expect("renamed");
+    all_say(dir.path(), "copied", 3, &["it is the beginning of ", "00002, which has "]);
+}
+
+#[test]
+fn what_lies_behind_a_mere_copy_is_said_and_a_part_with_the_name_of_another_session_too() {
+    let dir = copied(2, "");
+    let at = |name: &str| dir.path().join("copied").join(name);
+    let copy = fs::read(at("00001_00.HUM")).expect("there");
+    let recording = fs::read(end_of("ap_quad_guided.tlog", dir.path())).expect("there");
+    fs::write(at("zcopy.hum"), &copy).expect("written");
+    all_say(dir.path(), "copied", 0, &["is the same session as 00001 once more (not counted)"]);
+    fs::write(at("zcopy.hum"), [copy, recording].concat()).expect("written");
+    let words = "is the same session as 00001 once more (not counted); behind its last sector: ";
+    all_say(dir.path(), "copied", 0, &[words]);
+    fs::remove_file(at("zcopy.hum")).expect("ours");
+    let part = at("00002-sdeadbeef_00.part.HUM");
+    fs::rename(at("00002_00.HUM"), &part).expect("renamed");
+    all_say(dir.path(), "copied", 3, &["its name tells session deadbeef, and its sectors are of session "]);
+}
