@@ -7,12 +7,24 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use anyhow::Result;
+use serde::Serialize;
 
-use super::LogJson;
 use crate::logs::{self, segment_name};
 use crate::outcome::Outcome;
 use crate::summary::Overview;
 use crate::verify::{Extent, failed, verify_each};
+
+/// A log that came, or was there already.
+#[derive(Debug, Serialize)]
+pub(super) struct LogJson {
+    /// As the board calls it.
+    pub(super) name: String,
+    pub(super) path: PathBuf,
+    /// It was not there already.
+    pub(super) is_new: bool,
+    /// `hums verify` finds no fault with the logs of its session that came and follow each other.
+    pub(super) whole: bool,
+}
 
 /// Logs of a session that follow each other.
 #[derive(Debug)]
