@@ -115,14 +115,22 @@ pub(crate) fn is_root() -> bool {
     *ROOT.get_or_init(|| Shell::new("id").arg("-u").ask().is_some_and(|id| id.trim() == "0"))
 }
 
-/// In single quotes where a shell would otherwise read it differently.
+/// In quotes where a shell would otherwise read it differently. A control character (cargo's flags have such between them) is shown as
+/// its number: a file into which this is sent stays a text.
 fn quoted(word: &str) -> String {
     let plain = |c: char| c.is_ascii_alphanumeric() || "-_./=:,+@%".contains(c);
     if !word.is_empty() && word.chars().all(plain) {
-        word.to_owned()
-    } else {
-        format!("'{}'", word.replace('\'', r"'\''"))
+        return word.to_owned();
     }
+    if !word.chars().any(|c| c.is_ascii_control()) {
+        return format!("'{}'", word.replace('\'', r"'\''"));
+    }
+    let shown = word.chars().fold(String::new(), |shown, c| match c {
+        '\'' | '\\' => format!("{shown}\\{c}"),
+        c if c.is_ascii_control() => format!("{shown}\\x{:02x}", u32::from(c)),
+        c => format!("{shown}{c}"),
+    });
+    format!("$'{shown}'")
 }
 
 #[cfg(test)]
@@ -133,6 +141,11 @@ mod tests {
     fn what_is_shown_can_be_typed() {
         let shell = Shell::new("printf").arg("%s").arg("it's here").env("A", "b c");
         assert_eq!(shell.shown, r"A='b c' printf %s 'it'\''s here'");
+        // The character between cargo's flags would make a file of what is shown no text.
+        let shell = Shell::new("printf").arg("%s").arg("it's\u{1f}a\\b");
+        assert_eq!(shell.shown, r"printf %s $'it\'s\x1fa\\b'");
+        let typed = Command::new("bash").args(["-c", &shell.shown]).output().unwrap();
+        assert_eq!(typed.stdout, b"it's\x1fa\\b");
     }
 
     #[test]

@@ -7,12 +7,24 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use anyhow::Result;
+use serde::Serialize;
 
-use super::LogJson;
 use crate::logs::{self, segment_name};
 use crate::outcome::Outcome;
 use crate::summary::Overview;
 use crate::verify::{Extent, failed, verify_each};
+
+/// A log that came, or was there already.
+#[derive(Debug, Serialize)]
+pub(super) struct LogJson {
+    /// As the board calls it.
+    pub(super) name: String,
+    pub(super) path: PathBuf,
+    /// It was not there already.
+    pub(super) is_new: bool,
+    /// `hums verify` finds no fault with the logs of its session that came and follow each other.
+    pub(super) whole: bool,
+}
 
 /// Logs of a session that follow each other.
 #[derive(Debug)]
@@ -31,17 +43,11 @@ pub(super) fn judge(all: &[String], pulled: &mut [LogJson]) -> Result<Outcome> {
     let mut outcome = Outcome::Done;
     // Of a session only one run at once: what is missing between two would be missing in it.
     while !rest.is_empty() {
-        let (now, later): (Vec<_>, Vec<_>) =
-            rest.into_iter().fold(Default::default(), |(mut now, mut later), run: Run| {
-                let is_second =
-                    now.iter().any(|other: &Run| run.session.is_some() && other.session == run.session);
-                if is_second {
-                    later.push(run)
-                } else {
-                    now.push(run)
-                }
-                (now, later)
-            });
+        let (mut now, mut later) = (Vec::<Run>::new(), Vec::new());
+        for run in rest {
+            let is_second = run.session.is_some() && now.iter().any(|other| other.session == run.session);
+            if is_second { &mut later } else { &mut now }.push(run);
+        }
         outcome = outcome.and(judge_at_once(&now, pulled)?);
         rest = later;
     }
@@ -110,13 +116,12 @@ fn runs(all: &[String], pulled: &[LogJson]) -> Vec<Run> {
         });
         before = name;
         let to_end = name.is_none_or(|name| last_of(name.0) <= Some(name));
-        match runs.last_mut().filter(|_| is_next) {
-            Some(run) => (run.logs.end, run.extent.to_end) = (at + 1, to_end),
-            None => {
-                let from_start = name.is_none_or(|name| name.1 == 0);
-                let (session, extent) = (name.map(|name| name.0), Extent { from_start, to_end });
-                runs.push(Run { session, logs: at..at + 1, extent });
-            }
+        if let Some(run) = runs.last_mut().filter(|_| is_next) {
+            (run.logs.end, run.extent.to_end) = (at + 1, to_end);
+        } else {
+            let from_start = name.is_none_or(|name| name.1 == 0);
+            let (session, extent) = (name.map(|name| name.0), Extent { from_start, to_end });
+            runs.push(Run { session, logs: at..at + 1, extent });
         }
     }
     runs
@@ -175,7 +180,7 @@ mod tests {
         assert_eq!(further(&new[2 * GROUP..]), HOLDS);
         assert_eq!(first(&new[2 * GROUP..]), FAILS);
         let middle = new.len() / 1024 * SECTOR;
-        for spoiled in [&old[middle..middle + GROUP], &[0; GROUP]] {
+        for spoiled in [&old[middle..middle + GROUP], &vec![0; GROUP]] {
             let mut mixed = new.clone();
             mixed[middle..middle + GROUP].copy_from_slice(spoiled);
             assert_eq!(first(&mixed), FAILS);

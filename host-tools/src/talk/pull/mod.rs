@@ -22,7 +22,7 @@ use serde::Serialize;
 
 use self::compare::{Heading, Likeness, compare, heading_here, heading_of};
 use self::ftp::Ftp;
-use self::judge::judge;
+use self::judge::{LogJson, judge};
 use self::part::Part;
 use super::Client;
 use crate::cli;
@@ -63,17 +63,6 @@ impl MomentJson {
             });
         Self { time_s: at.as_secs_f64(), check, instance, level }
     }
-}
-
-#[derive(Debug, Serialize)]
-struct LogJson {
-    /// As the board calls it.
-    name: String,
-    path: PathBuf,
-    /// It was not there already.
-    is_new: bool,
-    /// `hums verify` finds no fault with it and the logs of its session that came.
-    whole: bool,
 }
 
 /// Runs `hums pull`.
