@@ -33,8 +33,7 @@ const PAIRS: [(usize, usize); SENSORS_MAX] = [(0, 1), (0, 2), (1, 2)];
 const EVERY: Span = Span::from_millis(100);
 /// Older samples are not compared, and older comparisons say nothing.
 const FRESH: Span = Span::from_secs(1);
-/// Time constants of the samples: sensors are not sampled at the same moment. The longer one is for what turns little and does not hover.
-const SMOOTHING_S: f32 = 0.5;
+/// Time constant of the samples of what turns little and does not hover: sensors are not sampled at the same moment.
 const ROUGH_S: f32 = 2.0;
 /// What does not hover is compared once it has turned little for so long.
 const CALM: Span = Span::from_secs(3);
@@ -54,6 +53,8 @@ const TREMBLES_RAD: f32 = 0.01;
 const IDLE_THROTTLE: f32 = 0.1;
 /// Vibration comes at 1 Hz or faster; what comes after a longer pause is not of the same hover.
 const VIBRATION_PAUSE: Span = Span::from_secs(3);
+/// Of the lower of two messages: a shock is in one.
+const VIBRATION_SMOOTHING_S: f32 = 0.25;
 /// Vibration that rises by less did not rise: per axis, and PX4's metric, m/s2.
 const GRAIN_PER_AXIS: f32 = 2.5;
 const GRAIN_PX4: f32 = 1.0;
@@ -90,6 +91,14 @@ impl Kind {
             Self::Gyro => 0.05,
             Self::Compass => 20.0,
             Self::Barometer => 4.0,
+        }
+    }
+
+    /// Time constant of the samples, and of how far they are apart. Motors shake accelerometers more than they turn gyros.
+    const fn smoothing_s(self) -> f32 {
+        match self {
+            Self::Gyro => 0.25,
+            Self::Accelerometer | Self::Compass | Self::Barometer => 0.5,
         }
     }
 
@@ -226,18 +235,17 @@ impl Crosschecks {
         let turned = flight.airborne().then_some(self.moved.turned_rad);
         // A gyro that stands still may measure zeros, but not beside an accelerometer that does.
         let is_fitted = force != Some([0.0; 3]);
-        let [rough_force, rough_rate] = self.rough.map(|rough| if rough { ROUGH_S } else { SMOOTHING_S });
         let field = field.filter(|field| field.iter().any(|axis| axis.abs() > 0.0));
         if let (Some(field), 0) = (field, imu.instance) {
             self.take_heading(at, field, vehicle, flight);
         }
-        for (kind, sample, smoothing_s) in [
-            (Kind::Accelerometer, force.filter(|_| is_fitted), rough_force),
-            (Kind::Gyro, rate.filter(|_| is_fitted), rough_rate),
-            (Kind::Compass, field, SMOOTHING_S),
+        for (kind, sample, is_rough) in [
+            (Kind::Accelerometer, force.filter(|_| is_fitted), self.rough[0]),
+            (Kind::Gyro, rate.filter(|_| is_fitted), self.rough[1]),
+            (Kind::Compass, field, false),
         ] {
             if let (Some(sample), Some(sensor)) = (sample, self.sensor(kind, imu.instance)) {
-                sensor.take(at, sample, smoothing_s, turned);
+                sensor.take(at, sample, if is_rough { ROUGH_S } else { kind.smoothing_s() }, turned);
             }
         }
     }
@@ -275,7 +283,7 @@ impl Crosschecks {
         let pressure = air.pressure.filter(|pressure| pressure.0 > 0.0);
         let climbed = flight.airborne().then_some(self.moved.climbed_m);
         if let (Some(pressure), Some(sensor)) = (pressure, self.sensor(Kind::Barometer, air.instance)) {
-            sensor.take(at, [pressure.0, 0.0, 0.0], SMOOTHING_S, climbed);
+            sensor.take(at, [pressure.0, 0.0, 0.0], Kind::Barometer.smoothing_s(), climbed);
             if air.instance == 0 {
                 self.heights.take_pressure(at, pressure, vehicle, flight);
             }
@@ -331,7 +339,7 @@ impl Crosschecks {
         // A shock is in one message: what is in two counts.
         let lasting = level.min(core::mem::replace(&mut self.vibration_before, level));
         if let Some(step) = step {
-            self.vibration.take(lasting, step.as_secs_f32(), self.vibration_grain);
+            self.vibration.take(lasting, step.as_secs_f32(), VIBRATION_SMOOTHING_S, self.vibration_grain);
         }
     }
 
@@ -380,7 +388,7 @@ impl Crosschecks {
         let fresh = self.sensors[kind as usize].map(|sensor| sensor.fresh(now));
         for ((one, other), pair) in PAIRS.into_iter().zip(&mut self.pairs[kind as usize]) {
             if let (Some(one), Some(other)) = (fresh[one], fresh[other]) {
-                pair.take(kind.apart(one, other), EVERY.as_secs_f32(), kind.hold());
+                pair.take(kind.apart(one, other), EVERY.as_secs_f32(), kind.smoothing_s(), kind.hold());
                 self.compared_at[kind as usize] = Stamp::at(now);
             }
         }

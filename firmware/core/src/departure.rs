@@ -4,8 +4,6 @@
 //! [`SPREADS`] times the mean distance from it. What is beyond the range by as much as the caller names teaches nothing, so
 //! that a fault does not become usual; what is so from the beginning of a flight is usual.
 
-/// Time constant of the figure that is judged, s.
-const SMOOTHING_S: f32 = 0.5;
 /// The usual level is known after so long, s, and looks back over so long.
 const KNOWN_S: f32 = 8.0;
 const MEMORY_S: f32 = 60.0;
@@ -48,8 +46,8 @@ impl Departure {
     }
 
     /// Both at once, of a figure that is wrong where it is large: further above its usual range than `hold` it teaches nothing.
-    pub(crate) fn take(&mut self, figure: f32, step_s: f32, hold: f32) {
-        self.follow(figure, step_s, SMOOTHING_S);
+    pub(crate) fn take(&mut self, figure: f32, step_s: f32, smoothing_s: f32, hold: f32) {
+        self.follow(figure, step_s, smoothing_s);
         let is_garbage = !(-FIGURE_MAX..=FIGURE_MAX).contains(&figure);
         if !is_garbage && self.beyond().is_none_or(|beyond| beyond <= hold) {
             self.learn(step_s);
@@ -102,7 +100,7 @@ mod tests {
     /// Takes figures ten times a second.
     fn taken(figures: impl Iterator<Item = f32>) -> Departure {
         let mut departure = Departure::NEW;
-        figures.for_each(|figure| departure.take(figure, 0.1, 1.0));
+        figures.for_each(|figure| departure.take(figure, 0.1, 0.5, 1.0));
         departure
     }
 

@@ -42,7 +42,7 @@ const HDOP: f32 = 2.5;
 const RECEIVER_LATE_S: f32 = 1.0;
 /// Heights and climb are summed over this time, s, when they vote.
 const VOTE_S: f32 = 4.0;
-/// Time constants of the difference of heights, of climbs, and of usual height and speed, s.
+/// Time constants of noise and the difference of heights, of climbs, and of usual height and speed, s.
 const SMOOTHING_S: f32 = 0.5;
 const CLIMBS_S: f32 = 1.0;
 const AIR_S: f32 = 30.0;
@@ -157,7 +157,7 @@ impl Heights {
                 let step_s = step.as_secs_f32();
                 let off_m = libm::fabsf(height_m - before_m - climb_mps * step_s);
                 let late_m = LATE_S * libm::fabsf(climb_mps) + step_s * libm::fabsf(climb_mps - climbed_mps);
-                self.noise.take((off_m - late_m).max(0.0), step_s, NOISE_HOLD_M);
+                self.noise.take((off_m - late_m).max(0.0), step_s, SMOOTHING_S, NOISE_HOLD_M);
             }
         }
     }

@@ -33,8 +33,8 @@ use crate::vehicle::Vehicle;
 
 /// Motors of the largest frame that is judged.
 pub(crate) const JUDGED_MAX: usize = 8;
-/// Time constant of the commands, s: gusts and corrections of course are over sooner.
-const SMOOTHING_S: f32 = 4.0;
+/// Time constant of the commands, s: gusts and corrections of course that last longer are in what commands vary by ([`SPREADS`]).
+const SMOOTHING_S: f32 = 2.0;
 /// Pulses of a motor that does not turn are not longer than this, us.
 const IDLE_US: u16 = 1_150;
 /// Pulses begin here, us. What is shorter than half of that on the ground is on another scale, which begins at nothing.
@@ -44,7 +44,7 @@ const CARRIES_US: f32 = 100.0;
 /// Further above the others a change teaches nothing, percent.
 const HOLD_PERCENT: f32 = 4.0;
 /// Where commands vary much, a change must be larger: by so many of their mean distances from what is usual.
-const SPREADS: f32 = 1.5;
+const SPREADS: f32 = 3.0;
 /// A third of what a motor that gives 85 % of its command stands out by, percent: no healthy one does so on the average.
 const DRIFT_PERCENT: f32 = 3.0;
 /// What is beyond for so long, s, counts in full.

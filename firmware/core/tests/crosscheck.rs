@@ -195,13 +195,13 @@ fn of_three_sensors_the_one_that_comes_apart_is_named() {
     for sensor in 0..3_u8 {
         let place = usize::from(sensor);
         finds("accel_mismatch", sensor, Level::Warning, 3_000, |_, fitted| fitted.force[place][2] += 3.0);
-        finds("gyro_mismatch", sensor, Level::Warning, 3_000, |_, fitted| fitted.rate[place][0] += 0.4);
-        finds("compass_mismatch", sensor, Level::Warning, 3_000, |_, fitted| {
+        finds("gyro_mismatch", sensor, Level::Warning, 1_000, |_, fitted| fitted.rate[place][0] += 0.4);
+        finds("compass_mismatch", sensor, Level::Warning, 1_000, |_, fitted| {
             fitted.field[place] = [0.5, 0.1 * fitted.field[place][2], -0.1];
         });
         // The first one leaves the height of GPS too.
         if sensor > 0 {
-            finds("baro_mismatch", sensor, Level::Warning, 3_000, |_, fitted| fitted.pressure[place] += 2.5);
+            finds("baro_mismatch", sensor, Level::Warning, 1_300, |_, fitted| fitted.pressure[place] += 2.5);
         }
     }
 }
@@ -319,7 +319,7 @@ fn of_two_heights_the_one_that_leapt_is_named() {
 
 #[test]
 fn vibration_that_jumps_is_named_and_gusts_are_not() {
-    finds("vibration_rise", 0, Level::Warning, 2_500, |_, fitted| {
+    finds("vibration_rise", 0, Level::Warning, 1_000, |_, fitted| {
         fitted.quad.vibration.levels = [Some(5.0), Some(18.0), Some(5.0)];
     });
     is_quiet(|now_ms, fitted| {
@@ -342,7 +342,7 @@ fn a_compass_whose_heading_leaves_the_estimators_is_named_and_declination_and_tu
         }
     };
     for degrees in [-25.0, 25.0, 170.0] {
-        finds("compass_heading", 0, Level::Warning, 2_000, |_, fitted| turned(fitted, degrees));
+        finds("compass_heading", 0, Level::Warning, 1_000, |_, fitted| turned(fitted, degrees));
     }
     is_quiet(|_, fitted| turned(fitted, 175.0));
     is_quiet(|now_ms, fitted| turned(fitted, if now_ms < FAULT_MS { 0.0 } else { 8.0 }));
@@ -358,7 +358,7 @@ fn a_compass_whose_heading_leaves_the_estimators_is_named_and_declination_and_tu
 #[test]
 fn a_weak_motor_of_a_quadrotor_is_named() {
     for motor in 0..4_u8 {
-        finds("motor_output", motor, Level::Warning, 4_000, |_, fitted| {
+        finds("motor_output", motor, Level::Warning, 1_500, |_, fitted| {
             fitted.pulses[usize::from(motor)] += 150.0;
         });
         finds("motor_output", motor, Level::Critical, 5_000, |_, fitted| {
@@ -579,7 +579,7 @@ fn weather_a_warm_day_and_the_wind_of_the_flight_move_a_healthy_barometer() {
 
 #[test]
 fn a_noisy_barometer_is_named() {
-    finds("baro_noise", 0, Level::Warning, 3_000, |now_ms, fitted| {
+    finds("baro_noise", 0, Level::Warning, 2_000, |now_ms, fitted| {
         fitted.pressure[0] += 0.6 * noise(now_ms, 80);
     });
 }

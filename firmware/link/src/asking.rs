@@ -67,23 +67,23 @@ type Wanted = (u32, By, u8, u8);
 
 /// What the checks need, the most needed first.
 const WANTED: [Wanted; 32] = [
-    (1, By::Both, 2, 43),            // SYS_STATUS
+    (1, By::Both, 5, 43),            // SYS_STATUS
     (30, By::Both, 10, 40),          // ATTITUDE
     (33, By::Both, 5, 40),           // GLOBAL_POSITION_INT
-    (24, By::Both, 2, 64),           // GPS_RAW_INT
+    (24, By::Both, 5, 64),           // GPS_RAW_INT
     (147, By::Both, 1, 66),          // BATTERY_STATUS
     (74, By::Both, 4, 32),           // VFR_HUD
-    (241, By::Both, 2, 44),          // VIBRATION
+    (241, By::Both, 5, 44),          // VIBRATION
     (2, By::Both, 1, 24),            // SYSTEM_TIME
     (65, By::Both, 2, 54),           // RC_CHANNELS
     (245, By::Both, 2, 14),          // EXTENDED_SYS_STATE
     (36, By::Both, 5, 49),           // SERVO_OUTPUT_RAW
-    (83, By::Both, 4, 49),           // ATTITUDE_TARGET
-    (230, By::Px4, 2, 54),           // ESTIMATOR_STATUS
+    (83, By::Both, 8, 49),           // ATTITUDE_TARGET
+    (230, By::Px4, 5, 54),           // ESTIMATOR_STATUS
     (291, By::Px4, 5, 69),           // ESC_STATUS
     (290, By::Px4, 1, 58),           // ESC_INFO
     (105, By::Px4, 20, 75),          // HIGHRES_IMU
-    (193, By::ArduPilot, 2, 34),     // EKF_STATUS_REPORT
+    (193, By::ArduPilot, 5, 34),     // EKF_STATUS_REPORT
     (62, By::ArduPilot, 2, 38),      // NAV_CONTROLLER_OUTPUT
     (125, By::ArduPilot, 1, 18),     // POWER_STATUS
     (11_030, By::ArduPilot, 5, 112), // ESC_TELEMETRY_1_TO_4, and 5_TO_8 with it
@@ -91,11 +91,11 @@ const WANTED: [Wanted; 32] = [
     (226, By::ArduPilot, 2, 20),     // RPM
     (225, By::ArduPilot, 2, 82),     // EFI_STATUS
     (11_039, By::ArduPilot, 1, 22),  // MCU_STATUS
-    (29, By::ArduPilot, 1, 28),      // SCALED_PRESSURE
-    (116, By::Both, 4, 36),          // SCALED_IMU2
-    (129, By::Both, 4, 36),          // SCALED_IMU3
-    (137, By::Both, 1, 28),          // SCALED_PRESSURE2
-    (143, By::Both, 1, 28),          // SCALED_PRESSURE3
+    (29, By::ArduPilot, 5, 28),      // SCALED_PRESSURE
+    (116, By::Both, 8, 36),          // SCALED_IMU2
+    (129, By::Both, 8, 36),          // SCALED_IMU3
+    (137, By::Both, 5, 28),          // SCALED_PRESSURE2
+    (143, By::Both, 2, 28),          // SCALED_PRESSURE3
     (124, By::Both, 1, 69),          // GPS2_RAW
     (85, By::Both, 2, 63),           // POSITION_TARGET_LOCAL_NED
     (32, By::Both, 5, 40),           // LOCAL_POSITION_NED

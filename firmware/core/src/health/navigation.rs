@@ -12,6 +12,10 @@ use crate::params::Param;
 use crate::time::Span;
 use crate::vehicle::RECEIVERS_MAX;
 
+/// Of values that are smoothed and beyond their usual range: three comparisons.
+const SMOOTHED: Span = Span::from_millis(200);
+/// Four messages of a receiver at 5 Hz, two at 2 Hz. Dilutions of precision leap as satellites come and go, and wait longer.
+const RECEIVER_SAYS: Span = Span::from_millis(600);
 /// So far on the good side of its limit a value is good again.
 const MARGIN: f32 = 0.5;
 
@@ -131,6 +135,7 @@ pub(super) const CHECKS: &[Check] = &[
         unit: "rad/s",
         warn: Some(Param::GyroMismWarn),
         hysteresis: 0.02,
+        debounce_warn: SMOOTHED,
         read: |inputs, sensor| mismatch(inputs, Kind::Gyro, sensor),
         ..MISMATCH
     },
@@ -139,6 +144,7 @@ pub(super) const CHECKS: &[Check] = &[
         unit: "%",
         warn: Some(Param::MagMismWarn),
         hysteresis: 5.0,
+        debounce_warn: SMOOTHED,
         read: |inputs, sensor| mismatch(inputs, Kind::Compass, sensor),
         ..MISMATCH
     },
@@ -147,6 +153,7 @@ pub(super) const CHECKS: &[Check] = &[
         unit: "deg",
         warn: Some(Param::MagHeadWarn),
         hysteresis: 3.0,
+        debounce_warn: SMOOTHED,
         instances: 1,
         part: Part::Vehicle,
         read: |inputs, _| inputs.derived.crosschecks().heading_apart(inputs.now),
@@ -157,6 +164,7 @@ pub(super) const CHECKS: &[Check] = &[
         unit: "m",
         warn: Some(Param::BaroMismWarn),
         hysteresis: 1.0,
+        debounce_warn: SMOOTHED,
         read: |inputs, sensor| mismatch(inputs, Kind::Barometer, sensor),
         ..MISMATCH
     },
@@ -176,7 +184,7 @@ pub(super) const CHECKS: &[Check] = &[
         unit: "m",
         warn: Some(Param::BaroNoiseWarn),
         hysteresis: 0.5,
-        debounce_warn: Span::from_secs(1),
+        debounce_warn: Span::from_millis(500),
         instances: 1,
         part: Part::Sensor,
         read: |inputs, _| inputs.derived.crosschecks().heights().noise(),
@@ -207,7 +215,7 @@ pub(super) const CHECKS: &[Check] = &[
         read: |inputs, receiver| inputs.derived.crosschecks().receiver_stuck(inputs.now, receiver),
         ..STUCK
     },
-    GNSS,
+    Check { debounce_warn: RECEIVER_SAYS, ..GNSS },
     Check {
         name: "gps_speed",
         unit: "m/s",
@@ -256,6 +264,7 @@ pub(super) const CHECKS: &[Check] = &[
         side: Side::Above,
         warn: Some(Param::GpsHaccWarn),
         hysteresis: 0.1,
+        debounce_warn: RECEIVER_SAYS,
         read: |inputs, receiver| gnss(inputs, receiver, |gnss| gnss.accuracy.map(|accuracy| accuracy.0)),
         ..GNSS
     },

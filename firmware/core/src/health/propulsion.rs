@@ -134,7 +134,7 @@ pub(super) const CHECKS: &[Check] = &[
         warn: Some(Param::MotOutWarn),
         critical: Some(Param::MotOutCrit),
         hysteresis: 5.0,
-        debounce_warn: Span::from_secs(1),
+        debounce_warn: Span::from_millis(500),
         debounce_critical: Span::from_secs(1),
         when: When::InFlight,
         instances: JUDGED_MAX as u8,

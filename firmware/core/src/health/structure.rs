@@ -46,7 +46,8 @@ pub(super) const CHECKS: &[Check] = &[
         warn: Some(Param::VibeRiseWarn),
         critical: None,
         hysteresis: 0.5,
-        debounce_warn: Span::from_millis(500),
+        // Two messages at 5 Hz.
+        debounce_warn: Span::from_millis(200),
         when: When::InFlight,
         // Never stale: only what flies on rotors says something.
         stale_after: None,

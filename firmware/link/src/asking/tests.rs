@@ -115,7 +115,7 @@ fn a_px4_is_asked_for_what_is_missing_and_left_alone_with_the_rest() {
     assert_eq!(px4.asked, [], "first it listens");
     px4.run(&mut asking, 5, 60);
     assert_eq!((px4.rate(30), px4.rate(105)), (Some(50), Some(50)), "never made slower");
-    assert_eq!((px4.rate(1), px4.rate(230), px4.rate(33)), (Some(2), Some(2), Some(5)));
+    assert_eq!((px4.rate(1), px4.rate(230), px4.rate(33)), (Some(5), Some(5), Some(5)));
     assert!(px4.identified);
     assert_eq!(px4.count(SET_MESSAGE_INTERVAL, 193), 0, "that is ArduPilot's");
     assert_eq!(px4.count(SET_MESSAGE_INTERVAL, 33), 1, "what comes is not asked for again");
@@ -169,7 +169,7 @@ fn what_is_refused_is_not_asked_for_again_until_a_reboot() {
     px4.run(&mut asking, 0, 1_000);
     assert_eq!((px4.count(SET_MESSAGE_INTERVAL, 129), px4.count(SET_MESSAGE_INTERVAL, 143)), (1, 1));
     assert_eq!(px4.count(REQUEST_MESSAGE, 129), 0, "PX4 refuses in silence");
-    assert_eq!(px4.rate(230), Some(2));
+    assert_eq!(px4.rate(230), Some(5));
     px4.reboots = 1;
     px4.run(&mut asking, 1_000, 1_100);
     assert_eq!(px4.count(SET_MESSAGE_INTERVAL, 129), 2);
@@ -201,7 +201,7 @@ fn an_ardupilot_is_asked_for_no_interval_of_what_it_does_not_have() {
 fn an_ardupilot_that_knows_no_single_messages_is_asked_for_intervals() {
     let mut copter = Script { no_single: true, ..Script::new(Autopilot::ArduPilot) };
     copter.run(&mut Asking::new(), 0, 120);
-    assert_eq!((copter.rate(30), copter.rate(193)), (Some(10), Some(2)));
+    assert_eq!((copter.rate(30), copter.rate(193)), (Some(10), Some(5)));
 }
 
 #[test]
@@ -217,6 +217,17 @@ fn an_old_ardupilot_is_asked_for_groups() {
         assert_eq!(old.rate(30), Some(8));
         let commands = old.asked.iter().filter(|(_, what, _)| *what == SET_MESSAGE_INTERVAL).count();
         assert!(commands <= 9, "{commands} commands that it does not know");
+    }
+}
+
+#[test]
+fn what_decides_comes_five_times_a_second_on_a_line_of_115_200_baud() {
+    for (autopilot, estimator) in [(Autopilot::Px4, 230), (Autopilot::ArduPilot, 193)] {
+        let mut script = Script { baud: 115_200, ..Script::new(autopilot) };
+        script.run(&mut Asking::new(), 0, 120);
+        for id in [1, 24, 241, estimator] {
+            assert_eq!(script.rate(id), Some(5), "{id} of {autopilot:?}");
+        }
     }
 }
 
