@@ -22,6 +22,13 @@ pub trait Port: Send {
     /// As `Read::read`; silence is an error that [`is_silence`] knows.
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize>;
 
+    /// As [`Port::read`], and with it all else that has come already; the buffer has room for [`ALL_BYTES`]. What is
+    /// written meanwhile may be lost.
+    fn read_all(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        // A stream gives what it has.
+        self.read(buffer)
+    }
+
     /// From now on what is written goes to whoever sent what was read last, whoever else speaks.
     fn keep_to(&mut self) {}
 }
@@ -103,24 +110,54 @@ struct DatagramReader {
     kept: bool,
 }
 
-impl Port for DatagramReader {
-    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+/// The largest UDP datagram.
+const LARGEST_BYTES: usize = 65_536;
+/// What [`Port::read_all`] needs room for: as long as another datagram fits for sure, it is taken.
+pub const ALL_BYTES: usize = 2 * LARGEST_BYTES;
+/// Datagrams that are taken at once at most: whoever floods the port keeps nobody for ever.
+const AT_ONCE_MAX: usize = 4_096;
+
+impl DatagramReader {
+    /// The next datagram's bytes; none where it is of no use.
+    fn next(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         match self.socket.recv_from(buffer) {
-            Ok((_, from)) if self.fixed && Some(from) != *lock(&self.peer) => {
-                Err(ErrorKind::WouldBlock.into())
-            }
+            Ok((_, from)) if self.fixed && Some(from) != *lock(&self.peer) => Ok(0),
             Ok((count, from)) => {
                 self.last = Some(from);
                 if !self.kept {
                     *lock(&self.peer) = self.last;
                 }
-                // An empty datagram is not the end of anything.
-                if count == 0 { Err(ErrorKind::WouldBlock.into()) } else { Ok(count) }
+                Ok(count)
             }
             // The peer may come yet.
-            Err(error) if error.kind() == ErrorKind::ConnectionRefused => Err(ErrorKind::WouldBlock.into()),
+            Err(error) if error.kind() == ErrorKind::ConnectionRefused => Ok(0),
             Err(error) => Err(error),
         }
+    }
+}
+
+impl Port for DatagramReader {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        match self.next(buffer)? {
+            // An empty datagram is not the end of anything.
+            0 => Err(ErrorKind::WouldBlock.into()),
+            count => Ok(count),
+        }
+    }
+
+    fn read_all(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        let mut count = self.read(buffer)?;
+        self.socket.set_nonblocking(true)?;
+        for _ in 0..AT_ONCE_MAX {
+            let Some(room) = buffer.get_mut(count..).filter(|room| room.len() >= LARGEST_BYTES) else {
+                break;
+            };
+            // What is wrong with the port shows at the next read.
+            let Ok(more) = self.next(room) else { break };
+            count += more;
+        }
+        self.socket.set_nonblocking(false)?;
+        Ok(count)
     }
 
     fn keep_to(&mut self) {
@@ -187,5 +224,35 @@ mod tests {
             line.writer.write_all(b"answer").expect("sent");
             assert_eq!(first.recv(&mut [0; 8]).expect("the answer"), 6);
         }
+    }
+
+    #[test]
+    fn all_that_has_come_is_read_at_once_and_then_nothing_is_there() {
+        let here = || UdpSocket::bind("127.0.0.1:0").expect("a port");
+        let (socket, peer, stranger) = (here(), here(), here());
+        let to = socket.local_addr().expect("an address");
+        let fixed = Some(peer.local_addr().expect("an address"));
+        let mut line = datagrams(socket, fixed, Duration::from_millis(20)).expect("a line");
+        let mut buffer = vec![0; ALL_BYTES];
+        let large = vec![7; 40_000];
+        for (from, bytes) in [
+            (&peer, &b"one"[..]),
+            (&stranger, b"foreign"),
+            (&peer, b""),
+            (&peer, b"two"),
+            (&peer, &large),
+            (&peer, &large),
+            (&peer, &large),
+        ] {
+            from.send_to(bytes, to).expect("sent");
+        }
+        // The third large one might not have fitted.
+        let got = line.reader.read_all(&mut buffer).expect("they came");
+        assert_eq!((got, &buffer[..6]), (6 + 2 * large.len(), &b"onetwo"[..]));
+        assert_eq!(line.reader.read_all(&mut buffer).expect("it came"), large.len());
+        let silence = line.reader.read_all(&mut buffer).expect_err("nothing more");
+        assert!(is_silence(&silence), "{silence}");
+        peer.send_to(b"later", to).expect("sent");
+        assert_eq!(line.reader.read(&mut buffer).expect("it came"), 5);
     }
 }

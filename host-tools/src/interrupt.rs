@@ -8,7 +8,7 @@
 use std::io;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, OnceLock};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use signal_hook::consts::{SIGINT, SIGTERM};
 use signal_hook::flag;
@@ -18,7 +18,8 @@ const EXIT_CODE: i32 = 130;
 
 /// Signals that come within so long after one are the same wish: `timeout -s INT` sends two.
 const ECHO: Duration = Duration::from_millis(50);
-/// How often it is looked whether one has come.
+/// How often it is looked whether one has come, where the system cannot wait for one.
+#[cfg(not(unix))]
 const LOOK: Duration = Duration::from_millis(20);
 
 static REQUESTED: OnceLock<Arc<AtomicBool>> = OnceLock::new();
@@ -38,34 +39,60 @@ pub fn watch_twice() {
 /// So many are only noted.
 fn watch_for(wishes: u32) {
     REQUESTED.get_or_init(|| {
-        let requested = Arc::new(AtomicBool::new(false));
-        let [armed, another] = [(); 2].map(|()| Arc::new(AtomicBool::new(false)));
+        let [requested, armed] = [(); 2].map(|()| Arc::new(AtomicBool::new(false)));
         let thread = std::thread::Builder::new().name("signals".to_owned());
-        let (heard, ready) = (Arc::clone(&another), Arc::clone(&armed));
-        let is_told_apart = thread.spawn(move || tell_apart(wishes, &heard, &ready)).is_ok();
+        let ready = Arc::clone(&armed);
+        let is_told_apart =
+            next().and_then(|next| thread.spawn(move || tell_apart(wishes, next, &ready))).is_ok();
         // Where the system gives no thread, the second one ends the program, however soon it comes. In this order: the first one
         // must not find the flag set.
-        let heard = if is_told_apart { &another } else { &armed };
-        note_failure(register(&armed, [heard, &requested]));
+        let set = if is_told_apart { vec![&requested] } else { vec![&armed, &requested] };
+        note_failure(register(&armed, &set));
         requested
     });
 }
 
 /// Waits for so many, after which the next one ends the program at once.
-fn tell_apart(wishes: u32, another: &AtomicBool, armed: &AtomicBool) {
+fn tell_apart(wishes: u32, mut next: impl FnMut(), armed: &AtomicBool) {
+    let mut last: Option<Instant> = None;
     for wish in 1..=wishes {
-        while !another.load(Ordering::SeqCst) {
-            std::thread::sleep(LOOK);
+        next();
+        while last.is_some_and(|last| last.elapsed() < ECHO) {
+            next();
         }
+        last = Some(Instant::now());
         AGAIN.store(wish > 1, Ordering::SeqCst);
-        std::thread::sleep(ECHO);
-        another.store(false, Ordering::SeqCst);
     }
+    std::thread::sleep(ECHO);
     armed.store(true, Ordering::SeqCst);
 }
 
+/// What returns when the next signal has come.
+#[cfg(unix)]
+fn next() -> io::Result<impl FnMut() + Send + 'static> {
+    let (mut heard, tell) = io::pipe()?;
+    for signal in [SIGINT, SIGTERM] {
+        signal_hook::low_level::pipe::register(signal, std::os::fd::OwnedFd::from(tell.try_clone()?))?;
+    }
+    Ok(move || while !matches!(io::Read::read(&mut heard, &mut [0]), Ok(1)) {})
+}
+
+/// What returns when the next signal has come.
+#[cfg(not(unix))]
+fn next() -> io::Result<impl FnMut() + Send + 'static> {
+    let heard = Arc::new(AtomicBool::new(false));
+    for signal in [SIGINT, SIGTERM] {
+        flag::register(signal, Arc::clone(&heard))?;
+    }
+    Ok(move || {
+        while !heard.swap(false, Ordering::SeqCst) {
+            std::thread::sleep(LOOK);
+        }
+    })
+}
+
 /// Each signal sets these, and ends the program at once where it finds `armed` set.
-fn register(armed: &Arc<AtomicBool>, set: [&Arc<AtomicBool>; 2]) -> io::Result<()> {
+fn register(armed: &Arc<AtomicBool>, set: &[&Arc<AtomicBool>]) -> io::Result<()> {
     for signal in [SIGINT, SIGTERM] {
         flag::register_conditional_shutdown(signal, EXIT_CODE, Arc::clone(armed))?;
         for each in set {

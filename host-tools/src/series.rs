@@ -3,7 +3,6 @@
 //! joined and the intervals become twice as long: memory and page are bounded, however long the flight is.
 
 use std::collections::BTreeMap;
-use std::collections::btree_map::Entry;
 use std::ops::RangeInclusive;
 
 use hums_core::time::Instant;
@@ -56,8 +55,56 @@ impl Extremes {
 /// One quantity.
 #[derive(Clone, Debug, Default)]
 struct Series {
-    /// By interval; a map, because slow quantities fill few of them.
-    values: BTreeMap<u16, Extremes>,
+    /// By interval, in their order; slow quantities fill few of them.
+    values: Vec<(u16, Extremes)>,
+    /// The number of its last value among those of all series.
+    last: u64,
+}
+
+impl Series {
+    /// What it has in these intervals.
+    fn part(&self, intervals: RangeInclusive<u16>) -> Option<Part> {
+        // Most have nothing new at a look.
+        let (last, _) = self.values.last()?;
+        if last < intervals.start() {
+            return None;
+        }
+        let place = |number: u16| self.values.partition_point(|(before, _)| *before < number);
+        let (from, to) = (place(*intervals.start()), intervals.end().checked_add(1).map(place));
+        let some = self.values.get(from..to.unwrap_or(self.values.len())).filter(|some| !some.is_empty())?;
+        let pair = |extremes: &Extremes| {
+            if extremes.rises { [extremes.low, extremes.high] } else { [extremes.high, extremes.low] }
+        };
+        let numbers = some.iter().map(|(number, _)| *number).collect();
+        Some((numbers, some.iter().flat_map(|(_, extremes)| pair(extremes)).collect()))
+    }
+
+    /// Takes a value; whether it is the first one in its interval.
+    fn push(&mut self, interval: u16, value: f32) -> bool {
+        let first = (interval, Extremes { low: value, high: value, rises: true });
+        match self.values.last_mut() {
+            // Nearly all values come in the order of their time.
+            Some((last, extremes)) if *last == interval => *extremes = extremes.with(value),
+            Some((last, _)) if *last > interval => {
+                match self.values.binary_search_by_key(&interval, |(number, _)| *number) {
+                    Ok(place) => {
+                        if let Some((_, extremes)) = self.values.get_mut(place) {
+                            *extremes = extremes.with(value);
+                        }
+                    }
+                    Err(place) => {
+                        self.values.insert(place, first);
+                        return true;
+                    }
+                }
+            }
+            _ => {
+                self.values.push(first);
+                return true;
+            }
+        }
+        false
+    }
 }
 
 /// A line of a plot: the plot, and the line's number: a motor, a cell, an axis.
@@ -71,6 +118,8 @@ pub struct Store<P> {
     /// Intervals that have a value, of all series.
     filled: usize,
     series_max: usize,
+    /// Values taken so far, of all series.
+    taken: u64,
 }
 
 /// What a series has in some of the intervals: their numbers, and the values of each in their order, a pair each.
@@ -86,7 +135,7 @@ impl<P> Store<P> {
     /// With room for so many series; they have the filled intervals of all together.
     pub fn of(series_max: usize) -> Self {
         let grid = Grid { start_ms: None, interval_ms: INTERVAL_MS };
-        Self { grid, series: BTreeMap::new(), filled: 0, series_max }
+        Self { grid, series: BTreeMap::new(), filled: 0, series_max, taken: 0 }
     }
 }
 
@@ -103,13 +152,9 @@ impl<P: Copy + Ord> Store<P> {
             None if has_room => self.series.entry(line).or_default(),
             None => return,
         };
-        match series.values.entry(interval) {
-            Entry::Occupied(mut known) => *known.get_mut() = known.get().with(value),
-            Entry::Vacant(place) => {
-                place.insert(Extremes { low: value, high: value, rises: true });
-                self.filled += 1;
-            }
-        }
+        self.taken += 1;
+        series.last = self.taken;
+        self.filled += usize::from(series.push(interval, value));
     }
 
     /// The interval of a time; makes room for it first. What is before the first one counts to it.
@@ -127,13 +172,17 @@ impl<P: Copy + Ord> Store<P> {
         self.grid.interval_ms = self.grid.interval_ms.saturating_mul(2);
         self.filled = 0;
         for series in self.series.values_mut() {
-            let mut joined: BTreeMap<u16, Extremes> = BTreeMap::new();
-            for (interval, later) in std::mem::take(&mut series.values) {
-                let into = joined.entry(interval / 2);
-                into.and_modify(|extremes| *extremes = extremes.joined(later)).or_insert(later);
+            for (interval, _) in &mut series.values {
+                *interval /= 2;
             }
-            self.filled += joined.len();
-            series.values = joined;
+            series.values.dedup_by(|(number, later), (before, extremes)| {
+                let same = number == before;
+                if same {
+                    *extremes = extremes.joined(*later);
+                }
+                same
+            });
+            self.filled += series.values.len();
         }
     }
 
@@ -142,23 +191,23 @@ impl<P: Copy + Ord> Store<P> {
         Some((self.grid.start_ms?, self.grid.interval_ms))
     }
 
+    /// Values taken so far, of all series.
+    pub fn taken(&self) -> u64 {
+        self.taken
+    }
+
     /// What all series have in these intervals, for those that have anything.
     pub fn part(&self, intervals: RangeInclusive<u16>) -> impl Iterator<Item = (Line<P>, Part)> {
-        // An empty range is one that ends before it begins, which a map refuses.
-        let some = intervals.start() <= intervals.end();
-        self.series.iter().filter(move |_| some).filter_map(move |(line, series)| {
-            // Most series have nothing new at a look.
-            let (last, _) = series.values.last_key_value()?;
-            if last < intervals.start() {
-                return None;
-            }
-            let (mut numbers, mut values) = (Vec::new(), Vec::new());
-            for (&number, extremes) in series.values.range(intervals.clone()) {
-                numbers.push(number);
-                let (low, high) = (extremes.low, extremes.high);
-                values.extend(if extremes.rises { [low, high] } else { [high, low] });
-            }
-            (!numbers.is_empty()).then_some((*line, (numbers, values)))
+        self.series.iter().filter_map(move |(line, series)| Some((*line, series.part(intervals.clone())?)))
+    }
+
+    /// The same for who has seen the first of these intervals when so many values were taken: that one again only of the
+    /// series that had another value since.
+    pub fn news(&self, intervals: RangeInclusive<u16>, seen: u64) -> impl Iterator<Item = (Line<P>, Part)> {
+        let (from, to) = intervals.into_inner();
+        self.series.iter().filter_map(move |(line, series)| {
+            let from = if series.last > seen { from } else { from.saturating_add(1) };
+            Some((*line, series.part(from..=to)?))
         })
     }
 
@@ -224,6 +273,24 @@ mod tests {
         let (numbers, values) = whole(&store);
         assert!(numbers.iter().all(|number| usize::from(*number) < INTERVALS_MAX));
         assert_eq!(values.len(), 2 * numbers.len());
+    }
+
+    #[test]
+    fn who_has_seen_an_interval_gets_it_again_only_of_the_series_that_changed() {
+        let mut store = Store::default();
+        let at = |interval: u64| Instant::from_millis(interval * INTERVAL_MS);
+        store.push(at(0), (HEIGHT, 0), 1.0);
+        store.push(at(0), (HEIGHT, 1), 2.0);
+        let seen = store.taken();
+        assert_eq!(store.news(0..=1, seen).count(), 0);
+        store.push(at(0), (HEIGHT, 1), 3.0);
+        let news: Vec<_> = store.news(0..=1, seen).collect();
+        assert_eq!(news, [((HEIGHT, 1), (vec![0], vec![2.0, 3.0]))]);
+        // What a recording holds is there before it is looked at.
+        let seen = store.taken();
+        store.push(at(1), (HEIGHT, 0), 4.0);
+        let news: Vec<_> = store.news(0..=1, seen + 1).collect();
+        assert_eq!(news, [((HEIGHT, 0), (vec![1], vec![4.0, 4.0]))]);
     }
 
     #[test]

@@ -34,33 +34,63 @@ pub struct Part {
     reason: String,
 }
 
-/// The whole vehicle's level, by whoever knows best.
-pub fn overall(craft: &Craft, now: Instant) -> &'static str {
-    let here = || {
-        if is_silent(craft, now) { Level::Stale } else { craft.monitor.health().overall() }
-    };
-    craft.companion.overall(now).unwrap_or_else(here).name()
+/// The health board.
+#[derive(Debug)]
+pub struct Board {
+    /// The whole vehicle's level, by whoever knows best.
+    pub overall: &'static str,
+    /// All subsystems, in the order of [`Subsystem::ALL`].
+    pub parts: Vec<Part>,
 }
 
-/// All subsystems, in the order of [`Subsystem::ALL`].
-pub fn of(craft: &Craft, now: Instant) -> Vec<Part> {
-    Subsystem::ALL.into_iter().map(|subsystem| part(craft, now, subsystem)).collect()
+/// What the checks here say of a subsystem.
+#[derive(Clone, Copy)]
+struct Known {
+    level: Level,
+    /// Whether any has something to say.
+    is_heard: bool,
+    /// Checks that are good.
+    good: usize,
 }
 
-fn part(craft: &Craft, now: Instant, subsystem: Subsystem) -> Part {
+impl Board {
+    /// Of a vehicle. The checks, which are some hundred, are gone through once: this is done as often as pages are told.
+    pub fn of(craft: &Craft, now: Instant) -> Self {
+        let mut known = [Known { level: Level::Stale, is_heard: false, good: 0 }; Subsystem::ALL.len()];
+        for (check, _, level) in craft.monitor.health().levels() {
+            let Some(known) = known.get_mut(check.subsystem as usize) else { continue };
+            known.good += usize::from(level == Level::Ok);
+            // Silence of a check that only raises an alarm is no news.
+            if !check.alarm_only || level != Level::Ok {
+                if !known.is_heard || rank(level) > rank(known.level) {
+                    known.level = level;
+                }
+                known.is_heard = true;
+            }
+        }
+        let here = || {
+            if is_silent(craft, now) { Level::Stale } else { craft.monitor.health().overall() }
+        };
+        let overall = craft.companion.overall(now).unwrap_or_else(here).name();
+        let all = Subsystem::ALL.into_iter().zip(&known);
+        Self { overall, parts: all.map(|(subsystem, known)| part(craft, now, subsystem, known)).collect() }
+    }
+}
+
+fn part(craft: &Craft, now: Instant, subsystem: Subsystem, known: &Known) -> Part {
     let onboard = craft.companion.level(now, subsystem);
     let recorder = subsystem == Subsystem::Recorder;
     let silent = is_silent(craft, now);
     // Of a vehicle that is silent one thing is known: that it is.
     let unknown = recorder || (silent && subsystem != Subsystem::Link);
-    let here = if unknown { Level::Stale } else { craft.monitor.health().subsystem(subsystem) };
+    let here = if unknown { Level::Stale } else { known.level };
     let level = onboard.unwrap_or(here);
     let by = match onboard {
         Some(_) => "on board",
         None if recorder => "nobody",
         None => "here",
     };
-    let unknown = level == Level::Stale && !recorder && is_unheard(craft, subsystem);
+    let unknown = level == Level::Stale && !recorder && !known.is_heard;
     let absent = subsystem == Subsystem::Engine && craft.monitor.vehicle().engine.get().is_none();
     let (calm, reason) = if unknown && !absent && waits(craft, subsystem) {
         (Some("idle"), waits_for(subsystem).to_owned())
@@ -69,7 +99,7 @@ fn part(craft: &Craft, now: Instant, subsystem: Subsystem) -> Part {
     } else if silent && level == Level::Stale && !recorder {
         (None, format!("silent for {} s", now.since(craft.heard).as_millis() / 1000))
     } else {
-        (None, reason(craft, subsystem, level, here))
+        (None, reason(craft, subsystem, level, here, known.good))
     };
     Part { subsystem: subsystem.name(), level: level.name(), by, calm, reason }
 }
@@ -77,15 +107,6 @@ fn part(craft: &Craft, now: Instant, subsystem: Subsystem) -> Part {
 /// Whether nothing at all has been heard of the vehicle for a while.
 fn is_silent(craft: &Craft, now: Instant) -> bool {
     now.since(craft.heard) > SILENT
-}
-
-/// Whether none of its checks has anything to say.
-fn is_unheard(craft: &Craft, subsystem: Subsystem) -> bool {
-    !craft
-        .monitor
-        .health()
-        .levels()
-        .any(|(check, _, level)| check.subsystem == subsystem && !(check.alarm_only && level == Level::Ok))
 }
 
 /// Whether some of its checks begin when it is armed, or flies.
@@ -108,14 +129,12 @@ fn waits_for(subsystem: Subsystem) -> &'static str {
 }
 
 /// The worst finding, or why there is none.
-fn reason(craft: &Craft, subsystem: Subsystem, level: Level, here: Level) -> String {
+fn reason(craft: &Craft, subsystem: Subsystem, level: Level, here: Level, good: usize) -> String {
     let findings = craft.worries.values().filter(|finding| finding.subsystem == subsystem);
     let worst = findings.max_by_key(|finding| (rank(finding.level), finding.at));
     if let Some(finding) = worst.filter(|_| level != Level::Ok) {
         return words(finding);
     }
-    let checks = craft.monitor.health().levels().filter(|(check, ..)| check.subsystem == subsystem);
-    let good = checks.filter(|(.., level)| *level == Level::Ok).count();
     match (subsystem, level) {
         (Subsystem::Recorder, Level::Ok) => "it records".to_owned(),
         (Subsystem::Recorder, Level::Stale) => "no recorder is heard on this link".to_owned(),

@@ -235,6 +235,9 @@ impl Craft {
         // Nobody takes these here, and they are made anew.
         while self.monitor.take_snapshot(now).is_some() {}
         self.texts.pass(now, &mut |text| say(history, text));
+        if let Some(history) = history {
+            history.pass(now);
+        }
         if self.limits_at.is_none_or(|at| now.since(at) >= LIMITS_EVERY) {
             self.limits_at = Some(now);
             if let Some(history) = history {

@@ -5,8 +5,8 @@
 //!                                       \-> points -> InfluxDB
 //! ```
 //!
-//! Three threads: one follows the vehicle (`feed` on this PC's clock, `playback` on a recording's), one serves the pages,
-//! one writes to a database where that is wanted. The first waits for neither of the others: pages take the newest state
+//! One thread follows the vehicle (`feed` on this PC's clock, `playback` on a recording's), the first one serves the pages,
+//! one writes to a database where that is wanted. Who follows waits for neither of the others: pages take the newest state
 //! and what they lack of the history (`hub`), points wait in memory and on disk (`influx`).
 
 pub mod assets;
@@ -30,6 +30,7 @@ pub mod told;
 pub mod values;
 pub mod world;
 
+use std::convert::Infallible;
 use std::io::IsTerminal as _;
 use std::net::{IpAddr, SocketAddr, TcpListener, ToSocketAddrs};
 use std::path::PathBuf;
@@ -41,6 +42,7 @@ use std::time::SystemTime;
 
 use anyhow::{Context as _, Result, anyhow};
 use serde::Serialize;
+use tokio::sync::oneshot;
 
 use self::feed::Feed;
 use self::guard::Guard;
@@ -48,7 +50,6 @@ use self::hub::Hub;
 use self::influx::Influx;
 use self::influx::target::Target;
 use self::playback::Player;
-use self::rate::PUBLISH;
 use self::told::Limits;
 use crate::cli;
 use crate::files::Inputs;
@@ -71,25 +72,16 @@ pub fn run(args: &cli::Live) -> Result<Outcome> {
     let host = args.listen.rsplit_once(':').map_or("", |(host, _)| host);
     let (guard, token) = Guard::new(address, host, args.listen_token.as_deref())?;
     let (hub, commands) = Hub::new();
-    let follower = follow(args, &limits, &hub, commands, influx)?;
+    let (follower, followed) = follow(args, &limits, &hub, commands, influx)?;
     let pages = page_addresses(address, token.as_deref(), others());
     tell(args, &pages)?;
     if let Some(page) = pages.first().filter(|_| args.open) {
         open(page);
     }
-    let server = std::thread::Builder::new().name("pages".to_owned());
-    let server = server.spawn(move || server::serve(listener, hub, guard)).context("no thread")?;
-    // Whichever fails ends the program; both end with Ctrl-C and SIGTERM.
-    while !server.is_finished() && !follower.is_finished() {
-        std::thread::sleep(PUBLISH);
-    }
-    if follower.is_finished() || interrupt::requested() {
-        let influx =
-            follower.join().map_err(|_| anyhow!("the thread that follows the vehicle has failed"))??;
-        return Ok(influx.zip(spool).map_or(Outcome::Done, |(influx, spool)| finish(influx, &spool)));
-    }
-    server.join().map_err(|_| anyhow!("the server has failed"))??;
-    Ok(Outcome::Done)
+    // Whichever fails ends the program; with Ctrl-C and SIGTERM the follower ends, and with it the server.
+    server::serve(listener, hub, guard, followed)?;
+    let influx = follower.join().map_err(|_| anyhow!("the thread that follows the vehicle has failed"))??;
+    Ok(influx.zip(spool).map_or(Outcome::Done, |(influx, spool)| finish(influx, &spool)))
 }
 
 /// What `hums live --json` prints.
@@ -121,14 +113,16 @@ fn is_here_only(page: &str) -> bool {
 
 type Follower = JoinHandle<Result<Option<Influx>>>;
 
-/// Starts the thread that follows the vehicle; what is wrong with the source is told at once.
+/// Starts the thread that follows the vehicle; what is wrong with the source is told at once. What is given besides never
+/// comes, and is cut off when the thread ends.
 fn follow(
     args: &cli::Live,
     limits: &Limits,
     hub: &Arc<Hub>,
     commands: Receiver<hub::Command>,
     influx: Option<Influx>,
-) -> Result<Follower> {
+) -> Result<(Follower, oneshot::Receiver<Infallible>)> {
+    let (follows, followed) = oneshot::channel();
     let thread = std::thread::Builder::new().name("vehicle".to_owned());
     let hub = Arc::clone(hub);
     let started = if args.input.is_live() {
@@ -136,14 +130,20 @@ fn follow(
             return Err(usage("--session is for what was recorded: a log, a card or a folder"));
         }
         let feed = Feed::open(&args.input, limits.clone(), hub, influx)?;
-        thread.spawn(move || Ok(feed.run()))
+        thread.spawn(move || {
+            let _follows = follows;
+            Ok(feed.run())
+        })
     } else {
         let opened = recording::open(&args.input, args.session.as_deref())?;
         let name = opened.name.clone();
         let player = Player::new(&name, limits.clone(), hub, commands, influx);
-        thread.spawn(move || player.run(opened))
+        thread.spawn(move || {
+            let _follows = follows;
+            player.run(opened)
+        })
     };
-    started.context("no thread")
+    Ok((started.context("no thread")?, followed))
 }
 
 /// The database, and the file of what waits for it.

@@ -230,10 +230,8 @@ impl Player {
             if frames.is_multiple_of(LOOK_EVERY) && shown.elapsed() >= PUBLISH {
                 shown = Wall::now();
                 let around = Around { source, epoch_us: None, frames_s: 0.0, influx: None };
-                hub.publish(Published {
-                    head: show::head(&World::new(Limits::default()), Instant::ZERO, &around),
-                    ..Published::default()
-                });
+                let (head, _) = show::all(&World::new(Limits::default()), Instant::ZERO, &around);
+                hub.publish(Published { head, ..Published::default() });
             }
             Ok(!interrupt::requested())
         })?;
@@ -383,13 +381,9 @@ impl Player {
             frames_s: self.rate.frames_s,
             influx: self.influx.as_mut().map(Influx::figures) as Option<Figures>,
         };
-        self.hub.publish(Published {
-            epoch: self.epoch,
-            now,
-            head: show::head(world, now, &around),
-            timeline: Arc::clone(&self.timeline),
-            crafts: show::crafts(world, now),
-        });
+        let (head, crafts) = show::all(world, now, &around);
+        let timeline = Arc::clone(&self.timeline);
+        self.hub.publish(Published { epoch: self.epoch, now, head, timeline, crafts });
     }
 }
 

@@ -3,6 +3,7 @@
 //! Each page has a task that looks at the newest state when it can send, so a slow one skips states; a page that takes
 //! nothing for `PATIENCE` is dropped.
 
+use std::convert::Infallible;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Duration;
@@ -18,22 +19,21 @@ use axum::routing::get;
 use futures_util::SinkExt as _;
 use serde::Deserialize;
 use tokio::net::TcpListener;
+use tokio::sync::oneshot;
 
 use super::assets;
 use super::guard::Guard;
 use super::hub::{Command, Hub, Published};
-use crate::interrupt;
 use crate::page::history::Cursor;
 use crate::page::json;
 
 /// Pages at once.
 const PAGES_MAX: usize = 16;
-/// What a page may send at once: its commands are short.
+/// What a page may send at once: its commands are short. Also the room that is cleared for it before each look whether it
+/// has sent something, which is done as often as the page is told something.
 const COMMAND_BYTES_MAX: usize = 1_024;
 /// A page that takes nothing for so long is gone.
 const PATIENCE: Duration = Duration::from_secs(10);
-/// How soon the end of the program is noticed.
-const LOOK: Duration = Duration::from_millis(100);
 
 /// Only what is our own, nothing written into the page, no foreign frame around it.
 const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; img-src 'self'; \
@@ -64,8 +64,13 @@ impl Drop for Place {
     }
 }
 
-/// Serves pages until Ctrl-C.
-pub fn serve(listener: std::net::TcpListener, hub: Arc<Hub>, guard: Guard) -> Result<()> {
+/// Serves pages until nobody follows the vehicle any more, as after Ctrl-C: then the other end of `followed` is gone.
+pub fn serve(
+    listener: std::net::TcpListener,
+    hub: Arc<Hub>,
+    guard: Guard,
+    followed: oneshot::Receiver<Infallible>,
+) -> Result<()> {
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().context("no runtime")?;
     runtime.block_on(async move {
         listener.set_nonblocking(true)?;
@@ -79,15 +84,9 @@ pub fn serve(listener: std::net::TcpListener, hub: Arc<Hub>, guard: Guard) -> Re
             .with_state(shared);
         tokio::select! {
             served = async { axum::serve(listener, router).await } => served.context("the server has ended"),
-            () = interrupted() => Ok(()),
+            _ = followed => Ok(()),
         }
     })
-}
-
-async fn interrupted() {
-    while !interrupt::requested() {
-        tokio::time::sleep(LOOK).await;
-    }
 }
 
 /// What holds for every request and every answer.
@@ -141,12 +140,14 @@ async fn connect(
     let Some(place) = Place::take(&shared.pages) else {
         return (StatusCode::SERVICE_UNAVAILABLE, "Too many pages are open.\n").into_response();
     };
-    upgrade.max_message_size(COMMAND_BYTES_MAX).max_frame_size(COMMAND_BYTES_MAX).on_upgrade(
-        async move |socket| {
-            let _place = place;
-            Page::new(&shared.hub).run(socket, &shared.hub).await;
-        },
-    )
+    let upgrade = upgrade
+        .read_buffer_size(COMMAND_BYTES_MAX)
+        .max_message_size(COMMAND_BYTES_MAX)
+        .max_frame_size(COMMAND_BYTES_MAX);
+    upgrade.on_upgrade(async move |socket| {
+        let _place = place;
+        Page::new(&shared.hub).run(socket, &shared.hub).await;
+    })
 }
 
 /// Sends them as one write: each of its own would wake the page and the network once more.

@@ -1,14 +1,13 @@
 //! What is known now as the text that pages take.
 
 use std::borrow::Cow;
-use std::collections::BTreeMap;
 
 use hums_core::component::COMPONENTS_MAX;
 use hums_core::time::Instant;
 use hums_core::usage::UsageCounter;
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 
-use super::board;
+use super::board::{self, Board};
 use super::companion::CompanionJson;
 use super::craft::Craft;
 use super::values::{Motors, Values};
@@ -74,15 +73,17 @@ pub struct Around<'a> {
     pub influx: Option<super::influx::Figures>,
 }
 
-/// Source, time and vehicles.
-pub fn head(world: &World, now: Instant, around: &Around<'_>) -> String {
-    let vehicles = world.crafts.iter().map(|(system, craft)| VehicleJson {
+/// Source, time and vehicles; then each vehicle by system id.
+pub fn all(world: &World, now: Instant, around: &Around<'_>) -> (String, Vec<(u8, String)>) {
+    let boards: Vec<_> = world.crafts.values().map(|craft| Board::of(craft, now)).collect();
+    let crafts = || world.crafts.iter().zip(&boards);
+    let vehicles = crafts().map(|((system, craft), board)| VehicleJson {
         system: *system,
         name: name(craft),
-        overall: board::overall(craft, now),
+        overall: board.overall,
         heard_ms: now.since(craft.heard).as_millis(),
     });
-    json(&Head {
+    let head = json(&Head {
         t: "head",
         source: around.source,
         now_s: now.as_secs_f64(),
@@ -93,12 +94,8 @@ pub fn head(world: &World, now: Instant, around: &Around<'_>) -> String {
         refused: world.refused,
         vehicles: vehicles.collect(),
         influx: around.influx.as_ref(),
-    })
-}
-
-/// Each vehicle by system id.
-pub fn crafts(world: &World, now: Instant) -> Vec<(u8, String)> {
-    world.crafts.iter().map(|(system, craft)| (*system, state(*system, craft, now))).collect()
+    });
+    (head, crafts().map(|((system, craft), board)| (*system, state(*system, craft, board, now))).collect())
 }
 
 #[derive(Serialize)]
@@ -118,8 +115,8 @@ struct State<'a> {
     values: Values<'a>,
     motors: Motors<'a>,
     cells: Vec<f32>,
-    board: Vec<board::Part>,
-    usage: BTreeMap<&'static str, f64>,
+    board: &'a [board::Part],
+    usage: Usage<'a>,
     components: Vec<ComponentJson>,
     link: LinkJson,
     companion: Option<CompanionJson>,
@@ -147,7 +144,7 @@ struct ComponentJson {
     life: bool,
 }
 
-fn state(system: u8, craft: &Craft, now: Instant) -> String {
+fn state(system: u8, craft: &Craft, board: &Board, now: Instant) -> String {
     let vehicle = craft.monitor.vehicle();
     let heartbeat = vehicle.heartbeat.get().copied().unwrap_or_default();
     let px4 = heartbeat.autopilot == hums_core::observation::Autopilot::Px4;
@@ -163,7 +160,7 @@ fn state(system: u8, craft: &Craft, now: Instant) -> String {
         airborne: craft.monitor.flight().airborne(),
         phase: craft.phase(now).name(),
         mode: modes::name(&heartbeat),
-        overall: board::overall(craft, now),
+        overall: board.overall,
         heard_ms: now.since(craft.heard).as_millis(),
         px4,
         values: Values::of(craft, now),
@@ -172,8 +169,8 @@ fn state(system: u8, craft: &Craft, now: Instant) -> String {
             .get()
             .map(|battery| battery.cells.iter().flatten().map(|volts| volts.0).collect())
             .unwrap_or_default(),
-        board: board::of(craft, now),
-        usage: usage(craft),
+        board: &board.parts,
+        usage: Usage(craft),
         components: components(craft),
         link: LinkJson {
             frames: craft.frames,
@@ -191,9 +188,14 @@ fn name(craft: &Craft) -> String {
 }
 
 /// The counters of this session that have something to say.
-fn usage(craft: &Craft) -> BTreeMap<&'static str, f64> {
-    let value = |counter: &UsageCounter| Some((counter.name(), craft.monitor.usage().value(*counter)?));
-    UsageCounter::ALL.iter().filter_map(value).collect()
+struct Usage<'a>(&'a Craft);
+
+impl Serialize for Usage<'_> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let usage = self.0.monitor.usage();
+        let value = |counter: &UsageCounter| Some((counter.name(), usage.value(*counter)?));
+        serializer.collect_map(UsageCounter::ALL.iter().filter_map(value))
+    }
 }
 
 fn components(craft: &Craft) -> Vec<ComponentJson> {

@@ -249,6 +249,7 @@ mod tests {
 
     use super::*;
     use crate::mavlink::ids::HEARTBEAT;
+    use crate::page::history::Cursor;
 
     /// HEARTBEAT of an `ArduPilot` quadrotor, disarmed.
     fn heartbeat(system: u8) -> Vec<u8> {
@@ -272,6 +273,25 @@ mod tests {
         assert!(world.crafts.iter().all(|(system, craft)| {
             craft.monitor.vehicle().source.is_some_and(|source| source.system == *system)
         }));
+    }
+
+    /// How many frames came in a second is known at its end, which a page that looks all the time has just seen.
+    #[test]
+    fn a_page_is_told_how_many_frames_came_in_each_second() {
+        let (mut world, mut histories) = (World::new(Limits::default()), Histories::new());
+        let (mut cursor, mut told) = (Cursor::default(), Vec::new());
+        for turn in 0..500_u64 {
+            let now = Instant::from_micros(13_000 + turn * 11_700);
+            if turn % 10 == 0 {
+                hear(&mut world, &mut histories, now, &heartbeat(1));
+            }
+            world.advance(now, Some(&mut histories));
+            let part = histories.get(&1).and_then(|history| history.since(1, &mut cursor, now));
+            let part = serde_json::to_value(part).expect("JSON");
+            told.extend(part["series"]["Frames:0"][1].as_array().into_iter().flatten().cloned());
+        }
+        // Each twice, as the lowest and the highest of its moment.
+        assert_eq!(told, [9.0, 9.0, 8.0, 8.0, 9.0, 9.0, 9.0, 9.0, 8.0, 8.0]);
     }
 
     /// What an autopilot's own log lost is no silence of the vehicle: nothing is stale or lost for it.

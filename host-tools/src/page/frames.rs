@@ -27,18 +27,10 @@ pub struct Frames {
 }
 
 impl Frames {
-    /// Takes the next frame; a second that has ended goes to the plot.
+    /// Takes the next frame.
     pub fn take(&mut self, sign: &Sign, vehicle: Option<Source>, store: &mut Store<Plot>) {
-        let second = sign.at.as_micros() / 1_000_000;
-        if let Some(before) = self.second.filter(|before| *before != second) {
-            // The middle of that second.
-            let at = Instant::from_millis(before.saturating_mul(1000).saturating_add(500));
-            for (line, count) in (0..).zip([self.received, self.missing]) {
-                store.push(at, (Plot::Frames, line), count as f32);
-            }
-            (self.received, self.missing) = (0, 0);
-        }
-        self.second = Some(second);
+        self.pass(sign.at, store);
+        self.second.get_or_insert(sign.at.as_micros() / 1_000_000);
         self.received += 1;
         if vehicle == Some(sign.source) {
             let missing = self.last.map_or(0, |last| sign.sequence.wrapping_sub(last).wrapping_sub(1));
@@ -46,6 +38,17 @@ impl Frames {
             self.missing += if missing < 128 { u32::from(missing) } else { 0 };
             self.last = Some(sign.sequence);
         }
+    }
+
+    /// A second that has ended goes to the plot, at its end: a page that was shown what came until then has no place for
+    /// anything earlier.
+    pub fn pass(&mut self, now: Instant, store: &mut Store<Plot>) {
+        let end = |second: u64| Instant::from_millis(second.saturating_add(1).saturating_mul(1_000));
+        let Some(at) = self.second.map(end).filter(|end| *end <= now) else { return };
+        for (line, count) in (0..).zip([self.received, self.missing]) {
+            store.push(at, (Plot::Frames, line), count as f32);
+        }
+        (self.second, self.received, self.missing) = (None, 0, 0);
     }
 
     /// What follows a gap follows no number before it.

@@ -9,6 +9,7 @@
 
 use std::borrow::Cow;
 use std::collections::VecDeque;
+use std::fmt::Write as _;
 
 use hums_core::observation::{Autopilot, Observation, Source};
 use hums_core::params::Params;
@@ -31,6 +32,8 @@ use crate::track::Point;
 
 /// Notes kept at most; older ones go.
 const NOTES_MAX: usize = 2_000;
+/// A page draws its plots so often, and is told as often what is new in them.
+const DRAWN_EVERY: Span = Span::from_millis(100);
 /// A phase that lasts less is part of the one before.
 const PHASE_MIN: Span = Span::from_secs(2);
 
@@ -57,8 +60,9 @@ pub struct Cursor {
     thinned: u64,
     /// The row of intervals.
     spacing_ms: Option<(u64, u64)>,
-    /// The interval from which on it may miss something; `None` before the first part.
-    interval: Option<u16>,
+    /// The interval from which on it may miss something, and how many values were taken when it was seen; `None` before the
+    /// first part.
+    interval: Option<(u16, u64)>,
     /// Lines and their words.
     described: (usize, u64),
     notes: u64,
@@ -66,6 +70,8 @@ pub struct Cursor {
     phases: Seen,
     modes: Seen,
     until: Option<Instant>,
+    /// When it was told of its series last.
+    drawn: Option<Instant>,
 }
 
 /// The part of a history that a page does not have yet.
@@ -167,6 +173,11 @@ impl History {
         }
     }
 
+    /// Time passes: to be told before a page is shown what came until then.
+    pub fn pass(&mut self, now: Instant) {
+        self.frames.pass(now, &mut self.samples.store);
+    }
+
     /// What follows a gap of the recording follows no frame before it.
     pub fn gap(&mut self) {
         self.frames.gap();
@@ -225,13 +236,18 @@ impl History {
         let (start_ms, step_ms) = spacing_ms.unwrap_or((until.as_millis(), 1));
         let newest = until.as_millis().saturating_sub(start_ms) / step_ms.max(1);
         let newest = u16::try_from(newest).unwrap_or(u16::MAX - 1);
-        let from = cursor.interval.unwrap_or(0);
-        let decimals = |plot: Plot| plots::about(plot, self.autopilot).decimals;
-        let name = |(plot, line): Line| format!("{plot:?}:{line}");
-        let parts = store.part(from..=newest).map(|(line, part)| (name(line), decimals(line.0), part));
-        let series: Vec<_> = parts.collect();
-        // The newest interval may still change.
-        cursor.interval = Some(newest.max(from));
+        let mut series = Vec::new();
+        // Where time stands, nothing more comes.
+        let stands = cursor.until == Some(until);
+        if stands || cursor.drawn.is_none_or(|drawn| until.since(drawn) >= DRAWN_EVERY) {
+            cursor.drawn = Some(until);
+            let (from, seen) = cursor.interval.unwrap_or((0, 0));
+            let about = |plot| plots::about(plot, self.autopilot);
+            let parts = store.news(from..=newest, seen);
+            series.extend(parts.map(|(line, part)| (name(line), about(line.0).decimals, part)));
+            // The newest interval may still change.
+            cursor.interval = Some((newest.max(from), store.taken()));
+        }
 
         let described = (store.lines().count(), self.words);
         let plots = (reset || cursor.described != described).then(|| self.plots());
@@ -297,6 +313,15 @@ impl History {
     }
 }
 
+/// A line's name.
+fn name((plot, line): Line) -> String {
+    // Room for the longest: it is made ten times a second for each line.
+    let mut name = String::with_capacity(24);
+    // Writing to a `String` cannot fail.
+    let _ = write!(name, "{plot:?}:{line}");
+    name
+}
+
 /// A place, at its time since `from`.
 pub(super) fn told(place: &Point, from: Instant) -> Place {
     let height_m = place.height_m.filter(|height_m| height_m.is_finite());
@@ -328,8 +353,11 @@ mod tests {
 
     /// The vehicle tells of its air speed, and of nothing else.
     fn tell(history: &mut History, second: u64) {
-        let hud = Hud { airspeed: Some(MetresPerSecond(1.0)), ..Hud::default() };
-        history.sample(seconds(second), &Reference::new(), &Observation::Hud(hud));
+        history.sample(seconds(second), &Reference::new(), &airspeed());
+    }
+
+    fn airspeed() -> Observation {
+        Observation::Hud(Hud { airspeed: Some(MetresPerSecond(1.0)), ..Hud::default() })
     }
 
     /// All values that the parts of a history told, the newest of each interval.
@@ -347,10 +375,31 @@ mod tests {
             history.note(seconds(second), note(seconds(second)));
         }
         assert_eq!(follow(&mut cursor, &history, seconds(9)), (true, 10, 10));
+        assert_eq!(follow(&mut cursor, &history, seconds(9)), (false, 0, 0), "nothing is new");
+        tell(&mut history, 9);
         assert_eq!(follow(&mut cursor, &history, seconds(9)), (false, 1, 0), "the newest interval is open");
         tell(&mut history, 10);
         history.note(seconds(10), note(seconds(10)));
         assert_eq!(follow(&mut cursor, &history, seconds(10)), (false, 2, 1));
+    }
+
+    #[test]
+    fn a_page_is_told_of_its_plots_as_often_as_it_draws_them_and_of_notes_at_once() {
+        let (mut history, mut cursor) = (History::default(), Cursor::default());
+        let at = |ms: u64| Instant::from_millis(10_000 + ms);
+        tell(&mut history, 10);
+        assert_eq!(follow(&mut cursor, &history, at(0)), (true, 1, 0));
+        history.sample(at(60), &Reference::new(), &airspeed());
+        history.note(at(60), note(at(60)));
+        assert_eq!(follow(&mut cursor, &history, at(60)), (false, 0, 1));
+        assert_eq!(
+            follow(&mut cursor, &history, at(60)),
+            (false, 2, 0),
+            "a recording is paused: that is all"
+        );
+        history.sample(at(120), &Reference::new(), &airspeed());
+        assert_eq!(follow(&mut cursor, &history, at(120)), (false, 0, 0));
+        assert_eq!(follow(&mut cursor, &history, at(160)), (false, 2, 0));
     }
 
     #[test]

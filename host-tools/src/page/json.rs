@@ -10,6 +10,9 @@ use serde::Serialize;
 
 use crate::printable::{redirects, rewritten};
 
+/// Most texts fit in this: they are made many times a second.
+const ROOM_BYTES: usize = 4_096;
+
 /// A value as JSON that may stand in a `script` element: it ends none and begins none. `<`, `>` and `&` stand in strings only,
 /// where an escape is the same; the two line separators are no JavaScript.
 pub fn embedded(value: &impl Serialize) -> String {
@@ -26,7 +29,15 @@ pub fn embedded(value: &impl Serialize) -> String {
 
 /// A value as JSON; empty where it has no form in JSON, which no type of the pages lacks.
 pub fn json(value: &impl Serialize) -> String {
-    let text = serde_json::to_string(value).unwrap_or_default();
+    let mut text = Vec::with_capacity(ROOM_BYTES);
+    let text = match serde_json::to_writer(&mut text, value) {
+        Ok(()) => String::from_utf8(text).unwrap_or_default(),
+        Err(_) => String::new(),
+    };
+    // None of them is in ASCII, and nearly all is: that is seen many bytes at a time.
+    if text.is_ascii() {
+        return text;
+    }
     // Writing to a `String` cannot fail.
     rewritten(&text, redirects, |out, c| {
         let _ = write!(out, "<U+{:04X}>", u32::from(c));

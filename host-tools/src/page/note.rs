@@ -46,7 +46,7 @@ pub struct Found {
     pub state: Option<&'static str>,
     /// What it crossed.
     pub limit: Option<f32>,
-    /// The unit of both.
+    /// The unit of both, as people write it.
     pub unit: String,
     /// What is so, as a sentence.
     pub meaning: &'static str,
@@ -71,6 +71,18 @@ impl Cause {
         let words =
             vocabulary(check).map_or_else(|| check.replace('_', " "), |known| known.said.name.to_owned());
         Self { check: check.to_owned(), words }
+    }
+}
+
+/// A unit as people write it; logs and programs have it in ASCII.
+fn written(unit: &str) -> &str {
+    match unit {
+        "degC" => "\u{b0}C",
+        "deg" => "\u{b0}",
+        "deg/s" => "\u{b0}/s",
+        "m/s2" => "m/s\u{b2}",
+        "1/min" => "rpm",
+        other => other,
     }
 }
 
@@ -100,7 +112,7 @@ impl Note {
                 value,
                 state,
                 limit,
-                unit: finding.unit.clone(),
+                unit: written(&finding.unit).to_owned(),
                 meaning: known.filter(|_| is_worry).map_or("", |known| known.meaning),
                 action: known.filter(|_| is_worry).map_or("", |known| known.action),
                 because: because.map(Cause::of),

@@ -193,7 +193,7 @@ pub fn about(plot: Plot, autopilot: Autopilot) -> About {
         Plot::SpeedSensors => ("Motors", "Speed sensors", "rpm", 0, |line| numbered("Sensor", line)),
         Plot::EngineRpm => ("Engine", "Engine speed", "rpm", 0, |_| "Speed".into()),
         Plot::EngineLoad => ("Engine", "Engine load", "%", 1, |_| "Load".into()),
-        Plot::EngineFuelFlow => ("Engine", "Fuel flow", "", 2, |_| "Fuel flow".into()),
+        Plot::EngineFuelFlow => ("Engine", "Fuel flow", "cm\u{b3}/min", 2, |_| "Fuel flow".into()),
         Plot::EngineCelsius => ("Engine", "Cylinder head", "\u{b0}C", 1, |_| "Cylinder head".into()),
         Plot::Vibration => ("Structure", "Vibration", vibration, 3, axes),
         Plot::Clips => ("Structure", "Clipped samples", "count", 0, |line| numbered("Accelerometer", line)),

@@ -7,7 +7,7 @@ import { bar, cells, rows, section } from "./layout.js";
 import { extent, map } from "./map.js";
 import { charts } from "./plot.js";
 import { plots } from "./plots.js";
-import { clock, fixed, plural, short, span } from "./text.js";
+import { clock, counted, fixed, plural, short, span } from "./text.js";
 import { back, cursorTime, home, usually } from "./view.js";
 
 const data = JSON.parse(document.getElementById("data").textContent);
@@ -127,7 +127,7 @@ const FACTS = [
     "Findings",
     (f) =>
       ["critical", "warning"]
-        .map((level) => (count(f, level) ? `${count(f, level)} ${level}` : ""))
+        .map((level) => (count(f, level) ? counted(count(f, level), level) : ""))
         .filter(Boolean)
         .join(", ") || "none",
   ],

@@ -99,8 +99,8 @@ export const condition = () => {
     [
       ["engine_rpm", "Speed", "rpm", 0],
       ["engine_load", "Load", "%", 0],
-      ["engine_fuel_flow", "Fuel flow", "", 2],
-      ["engine_fuel_consumed", "Fuel consumed", "", 1],
+      ["engine_fuel_flow", "Fuel flow", "cm\u00b3/min", 2],
+      ["engine_fuel_consumed", "Fuel consumed", "cm\u00b3", 1],
       ["engine_head_celsius", "Cylinder head", "\u00b0C", 0],
       ["speed_sensor_0", "Sensor 1", "rpm", 0],
       ["speed_sensor_1", "Sensor 2", "rpm", 0],

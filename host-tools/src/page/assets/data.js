@@ -10,7 +10,8 @@ flight.epoch_ms = data.epoch_us == null ? null : data.epoch_us / 1000;
 // Seconds since the monitor's power-on.
 flight.start = log.start_s ?? 0;
 flight.end = Math.max(log.end_s ?? 0, flight.start + 1);
-flight.gaps = log.gaps.map((gap) => [gap.from_s ?? flight.start, gap.to_s ?? flight.end]);
+// One whose length is not known is a place; one that is nowhere is told in the table alone.
+flight.gaps = log.gaps.map(({ from_s: from, to_s: to }) => [from ?? to, to ?? from]).filter(([from]) => from != null);
 flight.flights = data.flights;
 
 const vehicle = log.vehicle;

@@ -2,7 +2,7 @@
 
 import { el } from "./elements.js";
 import { bar, main } from "./layout.js";
-import { fixed, plural, span } from "./text.js";
+import { counted, fixed, plural, span } from "./text.js";
 
 const { pages, comparisons, version } = JSON.parse(document.getElementById("data").textContent);
 const root = document.documentElement;
@@ -16,8 +16,10 @@ const when = (utc) => (utc == null ? "time not known" : `${utc.slice(0, 10)} ${u
 const RANK = { critical: 3, warning: 2, "not checked": 1, ok: 0 };
 const worst = ({ critical, warning, checked }) => (critical ? "critical" : warning ? "warning" : checked ? "ok" : "not checked");
 const verdict = (page) =>
-  [page.critical ? `${page.critical} critical` : "", page.warning ? plural(page.warning, "warning") : ""].filter(Boolean).join(", ") ||
-  (page.checked ? "no findings" : "not checked");
+  ["critical", "warning"]
+    .filter((level) => page[level])
+    .map((level) => counted(page[level], level))
+    .join(", ") || (page.checked ? "no findings" : "not checked");
 // Title, kind of cell, what it is sorted by, what stands there.
 const COLUMNS = [
   ["Begin, UTC", "t", ({ start_utc }) => start_utc ?? "", ({ start_utc }) => when(start_utc)],

@@ -174,7 +174,7 @@ export const map = ({ id = "map", whose = flight, frame = null, name = "Track ov
     ctx.fillText(square >= 1000 ? `${square / 1000} km` : `${square} m`, 20, height - 18);
     const away = metres([0, ...(here?.place ?? track[track.length - 1].slice(1, 3))]);
     legend.replaceChildren(
-      el("span", {}, "from the start ", el("b", {}, fixed(Math.hypot(...away), 0)), " m"),
+      el("span", {}, "from the start", el("b", {}, `${fixed(Math.hypot(...away), 0)} m`)),
       Number.isFinite(low) ? el("span", {}, `height ${fixed(low, 0)} to ${fixed(high, 0)} m, from blue to yellow`) : "",
       el("span", {}, `begins at ${fixed(lat0, 7)}\u00b0, ${fixed(lon0, 7)}\u00b0`),
       el("span", { class: "dim" }, "north is up"),

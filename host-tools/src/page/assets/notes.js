@@ -7,7 +7,7 @@ import { flight } from "./flight.js";
 import { clock, plural, short } from "./text.js";
 import { utc } from "./view.js";
 
-const quantity = (value, unit) => `${short(value)} ${unit}`.trim();
+const quantity = (value, unit) => `${short(value)}${unit === "\u00b0" ? "" : " "}${unit}`.trim();
 // What a check measured, and against what.
 const measured = ({ value, state, limit, unit, previous }) =>
   [state ?? (value == null ? "" : quantity(value, unit)), limit == null ? "" : `limit ${quantity(limit, unit)}`, `was ${previous}`]

@@ -11,14 +11,16 @@ import { home, look, moveCursor, view, whenCursorMoves, whenViewChanges } from "
 const EVERY_MS = 100,
   HEIGHT = 176;
 const STEPS = [0.1, 0.2, 0.5, 1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 900, 1800, 3600, 7200, 14400, 36000, 86400, 604800];
+// Nobody counts nine and a half satellites.
+const WHOLE_STEPS = [0, 1, 2, 3, 4, 5, 6, 7, 8].flatMap((power) => [1, 2, 5].map((digit) => digit * 10 ** power));
 const sync = uPlot.sync("time");
 export const charts = [];
 
 // Room above and below; a line that hardly moves is not blown up to a storm; a limit that is near is seen.
-const range = (low, high, limits) => {
+const range = (low, high, { limits, decimals } = {}) => {
   if (low == null || high == null || (low === 0 && high === 0)) return [0, 1];
   const size = Math.max(Math.abs(low), Math.abs(high), 1e-3),
-    span = Math.max(high - low, size * 0.05);
+    span = Math.max(high - low, size * 0.05, decimals === 0 ? 1 : 0);
   for (const limit of (limits ?? []).flat()) {
     if (limit == null) continue;
     if (limit < low && limit > low - span) low = limit;
@@ -140,15 +142,17 @@ export const chart = (id, name = null) => {
       {
         width: Math.max(body.clientWidth, 200),
         height: HEIGHT,
-        padding: [8, 6, 0, 0],
+        // Half of the last time stands beyond the edge.
+        padding: [8, 18, 0, 0],
         cursor: { sync: { key: sync.key, setSeries: false }, drag: { x: true, y: false, setScale: false }, points: { size: 6 } },
         legend: { show: false },
-        scales: { x: { time: false, auto: false }, y: { range: (_u, low, high) => range(low, high, info()?.limits) } },
+        scales: { x: { time: false, auto: false }, y: { range: (_u, low, high) => range(low, high, info()) } },
         axes: [
           axis({ values: times, space: 62, size: 28, incrs: STEPS }),
           axis({
             size: 54,
             space: 28,
+            ...(plot.decimals === 0 ? { incrs: WHOLE_STEPS } : {}),
             values: (_u, splits) => splits.map((v) => grouped(String(Number(v.toPrecision(6)))).replace("-", "\u2212")),
           }),
         ],

@@ -12,7 +12,7 @@ import { charts } from "./plot.js";
 import { plots } from "./plots.js";
 import { recorderSection } from "./recorder.js";
 import { summary } from "./summary.js";
-import { fixed, plural, span, whole } from "./text.js";
+import { counted, fixed, plural, span, whole } from "./text.js";
 import { timeline } from "./timeline.js";
 import { trendSection } from "./trend.js";
 import { usageSection } from "./usage.js";
@@ -34,7 +34,7 @@ const verdict =
       ? "No findings"
       : ["critical", "warning", "stale", "advisory"]
           .filter(count)
-          .map((level) => `${count(level)} ${level}`)
+          .map((level) => counted(count(level), level))
           .join(", ");
 const when = log.start_utc ? `${log.start_utc.slice(0, 10)} ${log.start_utc.slice(11, 19)} UTC` : "time of day unknown";
 const session = log.format === "hums" ? "session " : "";

@@ -30,6 +30,7 @@ export const age = (ms) =>
   ms < 60000 ? `${Math.floor(ms / 1000)} s` : ms < 3600000 ? `${Math.floor(ms / 60000)} min` : `${Math.floor(ms / 3600000)} h`;
 export const bytes = (n) => (n >= 1e6 ? `${fixed(n / 1e6, 1)} MB` : n >= 1e3 ? `${fixed(n / 1e3, 1)} kB` : `${n} B`);
 export const plural = (n, one, many) => `${whole(n)} ${n === 1 ? one : many || `${one}s`}`;
+export const counted = (n, level) => (level === "warning" ? plural(n, level) : `${whole(n)} ${level}`);
 export const words = (name) => name.replace(/_/g, " ");
 
 // As many digits as tell something.
