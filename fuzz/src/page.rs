@@ -120,8 +120,8 @@ fn live(path: &Path) {
     let now = last.unwrap_or_default();
     let source = SourceJson::default();
     let around = Around { source: &source, epoch_us: Some(1), frames_s: 1.0, influx: None };
-    let texts = show::crafts(&world, now).into_iter().map(|(_, text)| text);
-    for text in texts.chain([show::head(&world, now, &around)]) {
+    let (head, crafts) = show::all(&world, now, &around);
+    for text in crafts.into_iter().map(|(_, text)| text).chain([head]) {
         serde_json::from_str::<Value>(&text).expect("JSON");
     }
     for (system, history) in &histories {
