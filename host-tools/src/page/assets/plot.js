@@ -148,7 +148,7 @@ export const chart = (id, name = null) => {
         legend: { show: false },
         scales: { x: { time: false, auto: false }, y: { range: (_u, low, high) => range(low, high, info()) } },
         axes: [
-          axis({ values: times, space: 62, size: 28, incrs: STEPS }),
+          axis({ values: times, space: 54, size: 28, incrs: STEPS }),
           axis({
             size: 54,
             space: 28,

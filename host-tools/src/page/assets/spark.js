@@ -17,7 +17,7 @@ export const stat = (id, title, { unit = "", decimals = 2, line = null, numbers 
   const box = panel(id, title, [el("p", { class: "stat" }, number, unit ? el("small", {}, unit) : null), line ? canvas : ""], {
     class: "instrument",
   });
-  let drawn = -1,
+  let drawn = "",
     drawnAt = 0;
   const draw = (now) => {
     const ctx = canvas.getContext("2d");
@@ -55,9 +55,10 @@ export const stat = (id, title, { unit = "", decimals = 2, line = null, numbers 
       box.fresh(shown);
       say(number, format(shown?.[0], decimals));
       for (const name of ["warning", "critical"]) toggle(box.node, `is-${name}`, level === name);
-      const time = performance.now();
-      if (line && flight.version !== drawn && time - drawnAt >= EVERY_MS) {
-        drawn = flight.version;
+      const time = performance.now(),
+        key = `${flight.version} ${now}`;
+      if (line && key !== drawn && time - drawnAt >= EVERY_MS) {
+        drawn = key;
         drawnAt = time;
         draw(now);
       }
