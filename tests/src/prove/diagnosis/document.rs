@@ -87,27 +87,25 @@ in it): of 49 faults **46 told (94 %, at least 85 %), the cause of 46 named (94 
 noise that repeat their values while a quad hovers and yaws by 2 degrees (`compass_stuck`; the checks before say the same). The other 2 and both criticals are of one octocopter whose simulator has other directions of its motors than its parameters: four of its motors stand at idle and four at their end all the flight. Not told: a twist that leans a hexacopter by 10 degrees for a second as
 gusts do, noise of a gyro (its messages have it filtered: 0.03 rad/s from message to message, half of what turns make), and noise of the receiver's velocity.
 
-What the delay is made of, by the check that told first (how many, and their median in seconds; ArduPilot only):
+What the delay is made of, by the check that told first: how many and within what median of seconds in A to E with the checks before, in A to E with those of now, and in F and H at the new rates; and what it waits for.
 
-| told by | A to E, before | A to E, now | F and H, at the new rates | what it waits for |
-|---|---|---|---|---|
-| ekf_alert | 28: 0.8 | 26: 0.6 | 4: 0.9 | the autopilot changes its estimator and says so; told within 0.1 s of that |
-| gps_height | 15: 1.0 | 15: 1.0 | 3: 0.4 | two messages of the receiver |
-| gps_fix | 12: 1.0 | 12: 1.0 | 6: 0.6 | two messages of the receiver; the autopilot notes after some tenths |
-| compass_heading | 10: 1.5 | 14: 0.9 | 7: 0.7 | 0.5 s of smoothing, 0.2 s beyond the limit |
-| motor_output | 12: 4.2 | 13: 2.6 | 4: 1.2 | 2 s of smoothing, 0.5 s beyond the limit; a small loss is summed for longer |
-| compass_alert, baro_alert, accel_alert, gyro_alert, battery_alert | 26: 0.9 | 26: 0.9 | 5: 0.3 | the autopilot's own time (0.5 s of a compass), two messages |
-| rc_alert | 10: 1.0 | 10: 1.0 | 5: 1.0 | ArduPilot waits 1 s for a pulse, then says so |
-| ekf_compass, ekf_variance | 23: 0.9 | 17: 0.9 | 2: 0.9 | 0.5 s above the limit |
-| vibration_rise | 6: 1.6 | 7: 1.4 | 2: 0.8 | two messages, a quarter of a second of smoothing, 0.2 s above |
-| gps_satellites, gps_accuracy | 6: 2.6 | 6: 1.2 | 1: 1.3 | 0.6 s beyond the limit |
-| accel_mismatch | 5: 2.4 | 5: 2.4 | 1: 2.7 | a second of smoothing, 0.5 s beyond the limit: motors shake accelerometers |
-| baro_noise | 3: 1.8 | 3: 1.8 | 2: 0.8 | some messages, 0.5 s beyond the limit |
-| disarmed_in_air | 6: 1.2 | 6: 1.2 | - | the heartbeat, one a second, and then a fall of 0.2 s |
-| heartbeat, position_silent, frames_lost | 15: 3.4 | 15: 3.4 | 5: 3.6 | 3.5 s and 3 s of age; a share of frames |
-| gcs_alert | 5: 5.0 | 5: 5.0 | 1: 4.7 | the autopilot's own 5 s |
-| cell_voltage | 9: 40 | 9: 40 | 3: 5.5 | 5 s below the limit, which a load's sag does not last; a pack that runs empty |
-| baro_height, of drifts | 8: 14 | 8: 14 | 2: 11 | 8 m at 0.4 to 1.5 m/s |
+* ekf_alert: 28 in 0.8; 26 in 0.6; 4 in 0.9. The autopilot changes its estimator and says so; told within 0.1 s of that.
+* gps_height: 15 in 1.0; 15 in 1.0; 3 in 0.4. Two messages of the receiver.
+* gps_fix: 12 in 1.0; 12 in 1.0; 6 in 0.6. Two messages of the receiver; the autopilot notes after some tenths.
+* compass_heading: 10 in 1.5; 14 in 0.9; 7 in 0.7. 0.5 s of smoothing, 0.2 s beyond the limit.
+* motor_output: 12 in 4.2; 13 in 2.6; 4 in 1.2. 2 s of smoothing, 0.5 s beyond the limit; a small loss is summed for longer.
+* compass_alert, baro_alert, accel_alert, gyro_alert, battery_alert: 26 in 0.9; 26 in 0.9; 5 in 0.3. The autopilot's own time (0.5 s of a compass), two messages.
+* rc_alert: 10 in 1.0; 10 in 1.0; 5 in 1.0. ArduPilot waits 1 s for a pulse, then says so.
+* ekf_compass, ekf_variance: 23 in 0.9; 17 in 0.9; 2 in 0.9. 0.5 s above the limit.
+* vibration_rise: 6 in 1.6; 7 in 1.4; 2 in 0.8. Two messages, a quarter of a second of smoothing, 0.2 s above.
+* gps_satellites, gps_accuracy: 6 in 2.6; 6 in 1.2; 1 in 1.3. 0.6 s beyond the limit.
+* accel_mismatch: 5 in 2.4; 5 in 2.4; 1 in 2.7. A second of smoothing, 0.5 s beyond the limit: motors shake accelerometers.
+* baro_noise: 3 in 1.8; 3 in 1.8; 2 in 0.8. Some messages, 0.5 s beyond the limit.
+* disarmed_in_air: 6 in 1.2; 6 in 1.2; -. The heartbeat, one a second, and then a fall of 0.2 s.
+* heartbeat, position_silent, frames_lost: 15 in 3.3; 15 in 3.3; 5 in 3.6. 3.5 s and 3 s of age; a share of frames.
+* gcs_alert: 5 in 5.0; 5 in 5.0; 1 in 4.7. The autopilot's own 5 s.
+* cell_voltage: 9 in 40; 9 in 40; 3 in 5.5. 5 s below the limit, which a load's sag does not last; a pack that runs empty.
+* baro_height, of drifts: 8 in 14; 8 in 14; 2 in 11. 8 m at 0.4 to 1.5 m/s.
 
 Of the 46 in F 17 are of kinds that cannot be told within a second: what the autopilot itself waits for (radio 1 s, ground station 5 s), ages of links, a pack's sag, drifts, full throttle that must last, sensors that stand still until the vehicle has moved, control that hides a weak motor at first.
 
