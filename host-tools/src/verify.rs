@@ -227,6 +227,13 @@ fn without_before(mut log: Overview) -> Overview {
         summary.gaps -= 1;
         summary.frames_missing -= u64::from(gap.frames.unwrap_or(0));
         summary.gaps_uncounted -= u64::from(gap.frames.is_none());
+    } else if let Some(gap) = log.contents.gaps.first_mut().filter(|gap| gap.from.is_none()) {
+        // Of what is missing before the first sector only that counts which has a place here.
+        gap.sectors_lost = gap.sectors_lost.min(u32::try_from(others(all) + all.damaged).unwrap_or(u32::MAX));
+        if let Some(frames) = gap.frames.take() {
+            summary.frames_missing -= u64::from(frames);
+            summary.gaps_uncounted += 1;
+        }
     }
     log
 }

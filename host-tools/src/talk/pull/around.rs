@@ -1,41 +1,38 @@
 //! `hums pull --around`: over a slow radio a crash's minute first. The moment is found by random access ([`super::moment`]), and
-//! what was recorded round it becomes a part of the log ([`super::part`]).
+//! what was recorded round it becomes a part of the log ([`super::part`]). What cannot be read of it, or of what was searched, is told.
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result, bail};
-use hums_blackbox::{Entry, GroupDecoder, Header, Record, SECTOR_BYTES, Sector};
 use hums_core::health::Level;
 use hums_core::time::{Instant, Span};
 
-use super::compare::{bytes_of, heading_of};
 use super::ftp::Ftp;
-use super::moment::{Sectors, Start, between, group_of};
-use super::part::Part;
+use super::moment::{Sectors as _, between, first_group, group_before, group_of};
+use super::remote::Remote;
+use super::stretch::{Reading, Stretch, Unread, by_number};
 use crate::cli::Around;
-use crate::utc::{When, moment};
-
-/// A finding as a log tells it.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) struct Found {
-    pub(super) at: Instant,
-    pub(super) check: String,
-    pub(super) instance: u8,
-    pub(super) level: &'static str,
-}
+use crate::outcome::Outcome;
+use crate::summary::FindingLine;
+use crate::utc::{When, date_and_time, moment};
 
 /// What was brought.
 #[derive(Debug)]
 pub(super) struct Brought {
     /// The log's name on the board, and the part.
     pub(super) parts: Vec<(String, PathBuf)>,
-    pub(super) at: Instant,
-    pub(super) found: Option<Found>,
+    /// None where no finding that is wanted is in what could be read.
+    pub(super) at: Option<Instant>,
+    /// The finding, where one was asked for.
+    pub(super) found: Option<FindingLine>,
     /// Sectors of other sessions that came, and are in no part.
-    pub(super) strange: u32,
+    pub(super) strange: u64,
+    /// Whether all that was asked for could be read. What could not is told.
+    pub(super) outcome: Outcome,
 }
 
-/// Brings what these logs, segments of one session in their order, have round a moment: so much before and after it.
+/// Brings what these logs, those of one session in their order, have round a moment: so much before and after it.
 pub(super) fn pull(
     ftp: &mut Ftp,
     names: &[String],
@@ -43,176 +40,219 @@ pub(super) fn pull(
     what: &Around,
     span: Span,
 ) -> Result<Brought> {
-    let mut strange = 0;
-    let (at, found) = match what {
-        Around::Time(When::Seconds(micros)) => (Instant::from_micros(*micros), None),
-        Around::Time(When::Utc(utc_us)) => (since_power_on(ftp, names, output, *utc_us)?, None),
+    let mut board = Board { ftp, names, output, strange: BTreeSet::new() };
+    let (mut outcome, mut found, mut epoch_us) = (Outcome::Done, None, None);
+    let at = match what {
+        Around::Time(When::Seconds(micros)) => Instant::from_micros(*micros),
+        Around::Time(When::Utc(utc_us)) => {
+            let began = board.epoch_us()?;
+            epoch_us = Some(began);
+            let micros = utc_us.checked_sub(began).with_context(|| {
+                format!(
+                    "the newest session began later, {} UTC; name the logs of another one",
+                    date_and_time(began)
+                )
+            })?;
+            Instant::from_micros(micros)
+        }
         Around::Level(_) | Around::Check(_) => {
-            let found = latest(ftp, names, output, what, &mut strange)?;
-            note!("{}: {} at {}", found.check, found.level, moment(found.at));
-            (found.at, Some(found))
+            let searched = board.latest(what)?;
+            outcome = searched.tell();
+            let Some(latest) = searched.found else {
+                let parts = parts_of(&searched.stretches);
+                return Ok(Brought {
+                    parts,
+                    at: None,
+                    found: None,
+                    strange: board.strange.len() as u64,
+                    outcome,
+                });
+            };
+            found.insert(latest).at
         }
     };
-    let from = Instant::from_micros(at.as_micros().saturating_sub(span.as_micros()));
-    let to = at + span;
-    let mut parts = Vec::new();
-    for name in names.iter().rev() {
-        let Some(mut log) = Remote::open(ftp, name, output)? else { continue };
-        let first = group_of(&mut log, 0)?.map_or(Instant::ZERO, |start| start.at);
-        if first > to {
-            continue;
-        }
-        let range = between(&mut log, from, to)?;
-        log.bring(range.start, range.end)?;
-        strange += log.part.strange();
-        parts.insert(0, (name.clone(), log.part.path().to_owned()));
-        if first <= from {
-            break;
-        }
-    }
-    if parts.is_empty() {
+    let (from, to) = (Instant::from_micros(at.as_micros().saturating_sub(span.as_micros())), at + span);
+    let stretches = board.bring(from, to)?;
+    if stretches.is_empty() {
         bail!("what the board has of this session begins after {}", moment(to));
     }
-    Ok(Brought { parts, at, found, strange })
-}
-
-/// A time of day on the monitor's clock, by what the newest of these logs knows of it.
-fn since_power_on(ftp: &mut Ftp, names: &[String], output: &Path, utc_us: u64) -> Result<Instant> {
-    for name in names.iter().rev() {
-        let Some(mut log) = Remote::open(ftp, name, output)? else { continue };
-        let last = log.count().saturating_sub(1);
-        let Some(Start { epoch_us: Some(epoch_us), .. }) = group_of(&mut log, last)? else { continue };
-        let micros =
-            utc_us.checked_sub(epoch_us).with_context(|| format!("{name}: the session began later"))?;
-        return Ok(Instant::from_micros(micros));
-    }
-    bail!("nothing told this session the time of day; say the time since its beginning, as --around 4:20")
-}
-
-/// The latest finding that is wanted: the logs are read from their end backwards, group by group, until it comes.
-fn latest(ftp: &mut Ftp, names: &[String], output: &Path, what: &Around, strange: &mut u32) -> Result<Found> {
-    for name in names.iter().rev() {
-        let Some(mut log) = Remote::open(ftp, name, output)? else { continue };
-        let mut end = log.count();
-        while let Some(last) = end.checked_sub(1) {
-            let Some(start) = group_of(&mut log, last)? else { break };
-            log.bring(start.place, end)?;
-            if let Some(found) = log.findings(start.place, end, what)?.pop() {
-                *strange += log.part.strange();
-                return Ok(found);
-            }
-            end = start.place;
-            note!("{name}: no such finding from {} on; looking before that", moment(start.at));
+    let readings = by_number(&stretches).map(Reading::of).collect::<Result<Vec<_>>>()?;
+    outcome = outcome.and(check_recorded(at, &readings, names, epoch_us)?);
+    for reading in &readings {
+        // The moment goes on behind all that the board has.
+        let to_end = reading.is_to_end(names) && reading.span().is_none_or(|(_, end)| end < to);
+        for fault in reading.faults(to_end) {
+            note!("{}: of the moment: {fault}; `hums verify` says more", reading.name());
+            outcome = Outcome::Losses;
         }
-        *strange += log.part.strange();
     }
-    bail!("no such finding is in this session; what came stays for `hums pull`, which brings the rest")
+    Ok(Brought {
+        parts: parts_of(&stretches),
+        at: Some(at),
+        found,
+        strange: board.strange.len() as u64,
+        outcome,
+    })
 }
 
-/// A log on the board, and the part of it that is here.
-struct Remote<'a> {
+fn parts_of(stretches: &[Stretch]) -> Vec<(String, PathBuf)> {
+    stretches.iter().map(|stretch| (stretch.name.clone(), stretch.path.clone())).collect()
+}
+
+/// Refuses a moment at which nothing was recorded. Where something cannot be read, it may be that: then it is told.
+fn check_recorded(
+    at: Instant,
+    readings: &[Reading],
+    names: &[String],
+    epoch_us: Option<u64>,
+) -> Result<Outcome> {
+    let spans = || readings.iter().filter_map(|reading| Some((reading.span()?, reading.goes_on(names))));
+    if spans().any(|((first, last), goes_on)| first <= at && (at <= last || goes_on)) {
+        return Ok(Outcome::Done);
+    }
+    let words = |at: Instant| {
+        let utc = epoch_us.map(|epoch_us| format!(" ({} UTC)", date_and_time(epoch_us + at.as_micros())));
+        moment(at) + &utc.unwrap_or_default()
+    };
+    let before = spans().map(|((_, last), _)| last).filter(|last| *last < at).max();
+    let after = spans().map(|((first, _), _)| first).filter(|first| *first > at).min();
+    let why = match (before, after) {
+        (Some(end), None) => format!("what the board has of this session ends at {}", words(end)),
+        (None, Some(start)) => format!("what the board has of this session begins at {}", words(start)),
+        (Some(end), Some(start)) => {
+            format!("nothing is recorded between {} and {}", words(end), words(start))
+        }
+        (None, None) => "nothing of the moment can be read".to_owned(),
+    };
+    if readings.iter().all(|reading| reading.unread().is_none()) {
+        bail!("{why}; for another session name its logs");
+    }
+    note!("nothing that can be read was recorded at {}: {why}", words(at));
+    Ok(Outcome::Losses)
+}
+
+/// What a search has found.
+struct Searched {
+    found: Option<FindingLine>,
+    /// What was looked at and could not be read.
+    unread: Option<Unread>,
+    /// All that was looked at.
+    stretches: Vec<Stretch>,
+}
+
+impl Searched {
+    /// Says what was found, and what it does not know.
+    fn tell(&self) -> Outcome {
+        let unread = self.unread.as_ref().map(Unread::words);
+        if let Some(FindingLine { check, level, at, .. }) = &self.found {
+            note!("{check}: {level} at {}", moment(*at));
+        }
+        if let Some(unread) = &unread {
+            let what = if self.found.is_some() { "that is the latest" } else { "no such finding is" };
+            note!("{what} in what could be read: {unread}, where one may be");
+        }
+        Outcome::lossy(unread.is_some())
+    }
+}
+
+/// The logs of a session on a board.
+struct Board<'a> {
     ftp: &'a mut Ftp,
-    name: &'a str,
-    part: Part,
-    sectors: u32,
+    names: &'a [String],
+    output: &'a Path,
+    /// Sectors of other sessions that came, by their logs and places.
+    strange: BTreeSet<(String, u32)>,
 }
 
-impl<'a> Remote<'a> {
-    /// Opens a log; none where nothing is in it yet.
-    fn open(ftp: &'a mut Ftp, name: &'a str, output: &Path) -> Result<Option<Self>> {
-        let length = ftp.open(name)?;
-        let sectors = length / SECTOR_BYTES as u32;
-        if sectors == 0 {
-            return Ok(None);
-        }
-        let heading = heading_of(ftp, name, length)?;
-        let whole = output.join(&heading.name);
-        if whole.exists() {
-            bail!(
-                "{} is there already: `hums decode --from --to` shows a moment of it, and `hums pull` brings what it lacks",
-                whole.display()
-            );
-        }
-        let mut part = Part::open(&whole, sectors, &heading.sectors)?;
-        for (place, sector) in (0..).zip(&heading.sectors) {
-            // The card may have lost since what is here.
-            if !part.has(place) {
-                part.put(place, sector)?;
+impl Board<'_> {
+    /// Brings what was recorded from one time to the other.
+    fn bring(&mut self, from: Instant, to: Instant) -> Result<Vec<Stretch>> {
+        let mut stretches = Vec::new();
+        for name in self.names.iter().rev() {
+            let mut log = Remote::open(self.ftp, name, self.output)?;
+            let first = first_group(&mut log)?;
+            // A group may begin in the log before: the first sectors of this one are its last ones.
+            if first.is_some_and(|first| first.place == 0 && first.at > to) && stretches.is_empty() {
+                continue;
             }
-        }
-        Ok(Some(Self { ftp, name, part, sectors }))
-    }
-
-    /// Brings sectors that are not here yet.
-    fn bring(&mut self, from: u32, to: u32) -> Result<()> {
-        let mut place = from;
-        while let Some(first) = self.part.next(place, false).filter(|first| *first < to) {
-            let end = self.part.next(first, true).unwrap_or(to).min(to);
-            let Self { ftp, part, .. } = self;
-            let (mut next, mut waiting) = (first, Vec::new());
-            let size = SECTOR_BYTES as u32;
-            ftp.bring(first * size, end * size, |bytes| {
-                waiting.extend_from_slice(bytes);
-                while let Some((sector, rest)) = waiting.split_first_chunk::<SECTOR_BYTES>() {
-                    part.put(next, &Sector::from_bytes(*sector))?;
-                    next += 1;
-                    waiting = rest.to_vec();
-                }
-                Ok(())
-            })?;
-            note!("{}: {} of {} sectors of the moment", self.name, end - from, to - from);
-            place = end;
-        }
-        Ok(())
-    }
-
-    /// The findings that are wanted in a group, in order.
-    fn findings(&mut self, from: u32, to: u32, what: &Around) -> Result<Vec<Found>> {
-        let mut decoder = Box::new(GroupDecoder::new());
-        let mut found = Vec::new();
-        for place in from..to {
-            let sector = self.part.read(place)?;
-            let Ok(header) = Header::read(sector.bytes()) else { break };
-            if decoder.push(&header, &sector).is_err() {
+            let places = between(&mut log, from, to)?;
+            stretches.insert(0, log.bring(places)?);
+            log.add_strange(&mut self.strange);
+            if first.is_some_and(|first| first.at <= from) {
                 break;
             }
-            while let Some(Ok(entry)) = decoder.next_entry() {
-                if let Entry::Record { record: Record::Finding(finding), .. } = entry
-                    && is_wanted(what, finding.check, finding.level)
-                {
-                    let (check, instance) = (finding.check.to_owned(), finding.instance);
-                    found.push(Found { at: finding.at, check, instance, level: finding.level.name() });
-                }
+        }
+        Ok(stretches)
+    }
+
+    /// UTC at power-on, microseconds since 1970, by what the newest of the logs that knows it learned last.
+    fn epoch_us(&mut self) -> Result<u64> {
+        for name in self.names.iter().rev() {
+            let mut log = Remote::open(self.ftp, name, self.output)?;
+            let count = log.count();
+            let start = group_of(&mut log, count.saturating_sub(1))?;
+            if let Some(epoch_us) = start.and_then(|start| start.epoch_us) {
+                return Ok(epoch_us);
+            }
+            // It may have been learned since the group began.
+            let Some(start) = start else { continue };
+            let group = log.bring(start.place..count)?;
+            if let Some(epoch_us) = Reading::of(&[group])?.epoch_us() {
+                return Ok(epoch_us);
             }
         }
-        Ok(found)
+        bail!(
+            "nothing that can be read told this session the time of day; say the time since its beginning, as --around 4:20"
+        )
     }
+
+    /// The latest finding that is wanted: the logs are read from their end backwards, group by group, until it comes.
+    fn latest(&mut self, what: &Around) -> Result<Searched> {
+        let (mut found, mut stretches) = (None, Vec::new());
+        for name in self.names.iter().rev() {
+            let mut log = Remote::open(self.ftp, name, self.output)?;
+            let count = log.count();
+            let mut end = count;
+            while end > 0 && found.is_none() {
+                let place = group_before(&mut log, end)?;
+                let group = Reading::of(&[log.bring(place..end)?])?;
+                found = wanted(&group, what);
+                end = place;
+                if let (None, Some((first, _))) = (&found, group.span()) {
+                    note!("{name}: none in what can be read from {} on; looking before that", moment(first));
+                }
+            }
+            stretches.insert(0, log.stretch(end..count));
+            log.add_strange(&mut self.strange);
+            if found.is_some() {
+                break;
+            }
+        }
+        // All of it once more: a group may begin in one log and end in the next one.
+        let mut unread: Option<Unread> = None;
+        for stretches in by_number(&stretches) {
+            let reading = Reading::of(stretches)?;
+            unread =
+                unread.map_or(reading.unread(), |all| Some(reading.unread().map_or(all, |one| all.and(one))));
+            found = found.into_iter().chain(wanted(&reading, what)).max_by_key(|found| found.at);
+        }
+        Ok(Searched { found, unread, stretches })
+    }
+}
+
+/// The latest finding in what was read that is asked for.
+fn wanted(reading: &Reading, what: &Around) -> Option<FindingLine> {
+    reading.findings().iter().rfind(|finding| is_wanted(what, &finding.check, finding.level)).cloned()
 }
 
 /// Whether a change of level is one that is asked for: that all is well again is none.
-fn is_wanted(what: &Around, check: &str, level: Level) -> bool {
-    let is_bad = matches!(level, Level::Warning | Level::Critical);
+fn is_wanted(what: &Around, check: &str, level: &str) -> bool {
+    let is_bad = [Level::Warning, Level::Critical].map(Level::name).contains(&level);
     match what {
-        Around::Level(Level::Critical) => level == Level::Critical,
+        Around::Level(Level::Critical) => level == Level::Critical.name(),
         Around::Level(_) => is_bad,
         Around::Check(name) => is_bad && check == name,
         Around::Time(_) => false,
-    }
-}
-
-impl Sectors for Remote<'_> {
-    fn count(&self) -> u32 {
-        self.sectors
-    }
-
-    fn sector(&mut self, place: u32) -> Result<Option<(Header, Sector)>> {
-        if !self.part.has(place) {
-            let bytes = bytes_of(self.ftp, place * SECTOR_BYTES as u32, SECTOR_BYTES as u32)?;
-            let sector = bytes.first_chunk().map_or(Sector::zeroed(), |bytes| Sector::from_bytes(*bytes));
-            self.part.put(place, &sector)?;
-        }
-        let sector = self.part.read(place)?;
-        Ok(Header::read(sector.bytes()).ok().map(|header| (header, sector)))
     }
 }
 
@@ -233,10 +273,10 @@ mod tests {
             (Level::Stale, [false, false, false]),
         ] {
             assert_eq!(
-                [&critical, &warning, &check].map(|what| is_wanted(what, "motor_loss", level)),
+                [&critical, &warning, &check].map(|what| is_wanted(what, "motor_loss", level.name())),
                 wanted
             );
         }
-        assert!(!is_wanted(&check, "cell_voltage", Level::Critical));
+        assert!(!is_wanted(&check, "cell_voltage", Level::Critical.name()));
     }
 }

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
-use anyhow::{Context as _, Result, bail};
+use anyhow::{Context as _, Error, Result, anyhow, bail};
 use hums_link::Frame;
 use hums_link::messages;
 use hums_link::packet::Fields;
@@ -23,7 +23,7 @@ const GAP: Duration = Duration::from_millis(2_500);
 
 /// More logs than a card has: its directory has 65,536 entries at most.
 const LOGS_MAX: usize = 100_000;
-/// Pieces of a burst that are held: boards send far fewer in one. What comes after them is asked for again.
+/// Pieces of a burst that are taken, and so are held at most: boards send far fewer in one. What comes after them is asked for again.
 const PIECES_MAX: usize = 4_096;
 
 /// `MAV_FTP_OPCODE`
@@ -38,6 +38,7 @@ const NAK: u8 = 129;
 /// `MAV_FTP_ERR`
 const END_OF_FILE: u8 = 6;
 const UNKNOWN_COMMAND: u8 = 7;
+const FILE_NOT_FOUND: u8 = 10;
 
 /// An answer.
 struct Answer {
@@ -86,12 +87,15 @@ impl Answer {
     }
 }
 
-/// The log that was open is no longer there.
-fn gone<T>() -> Result<T> {
-    bail!(
-        "the board no longer has this log: its card made room for later flights, or is another one; what came is good \
-         as far as it goes"
-    )
+/// What a refusal of something that was asked says, and no more.
+fn refused(answer: &Answer, what: &str) -> Error {
+    if answer.is_nak(FILE_NOT_FOUND) {
+        return anyhow!(
+            "the board no longer has this log: its card made room for later flights, or is another one"
+        );
+    }
+    let why = answer.data.first().map_or_else(String::new, |error| format!(" (MAVLink FTP error {error})"));
+    anyhow!("the board refuses {what} of this log{why}; call again")
 }
 
 /// A conversation with a board's file server.
@@ -184,11 +188,11 @@ impl Ftp {
             // Another server: of the whole file, whatever was asked for.
             ACK => Ok(None),
             _ if answer.is_nak(UNKNOWN_COMMAND) => Ok(None),
-            _ => gone(),
+            _ => Err(refused(&answer, "the checksum")),
         }
     }
 
-    /// Brings these bytes of the log that is open, in order, in pieces as they come.
+    /// Brings these bytes of the log that is open, in order. Each piece is handed on as it comes, once all before it has.
     pub(super) fn bring(
         &mut self,
         from: u32,
@@ -198,53 +202,69 @@ impl Ftp {
         let mut have = from;
         let mut silent = 0;
         while have < to {
-            let pieces = self.burst(have, to)?;
-            silent = if pieces.is_empty() { silent + 1 } else { 0 };
+            let (before, mut pieces) = (have, BTreeMap::new());
+            let came = self.burst(have, to, |at, data| {
+                // What lies behind a piece that was lost waits for it.
+                if at >= have {
+                    pieces.insert(at, data);
+                }
+                while let Some(data) = pieces.remove(&have) {
+                    have += data.len() as u32;
+                    take(&data)?;
+                }
+                Ok(())
+            })?;
+            silent = if came { 0 } else { silent + 1 };
             if silent >= TRIES {
                 bail!("nothing more comes; to go on, call again");
             }
-            let (before, mut came) = (have, Vec::new());
-            let end = pieces.iter().map(|(at, data)| *at + data.len() as u32).max().unwrap_or(have);
+            let ends = pieces.range(have..).map(|(at, data)| *at + data.len() as u32);
+            let end = ends.max().unwrap_or(have);
             while have < end {
-                let data = if let Some(data) = pieces.get(&have) {
-                    data.clone()
+                let data = if let Some(data) = pieces.remove(&have) {
+                    data
                 } else {
                     // Up to the next piece that came.
                     let next = pieces.range(have..).next().map_or(end, |(at, _)| *at);
                     self.piece(have, next - have)?
                 };
                 have += data.len() as u32;
-                came.extend(data);
+                take(&data)?;
             }
-            take(&came)?;
-            if have == before && silent == 0 {
+            if have == before && came {
                 bail!("the board sends nothing new");
             }
         }
         Ok(())
     }
 
-    /// What a burst from `offset` brings, by offset, as much of it as came.
-    pub(super) fn burst(&mut self, offset: u32, length: u32) -> Result<BTreeMap<u32, Vec<u8>>> {
+    /// Hands on what a burst from `offset` brings, each piece with its offset. Whether anything came.
+    fn burst(
+        &mut self,
+        offset: u32,
+        length: u32,
+        mut take: impl FnMut(u32, Vec<u8>) -> Result<()>,
+    ) -> Result<bool> {
         self.say(BURST, offset, DATA_MAX, b"")?;
-        let mut pieces = BTreeMap::new();
+        let mut pieces = 0;
         loop {
             let answer = self.client.until(Instant::now() + GAP, |frame| {
                 Answer::read(frame).filter(|answer| answer.of == BURST)
             })?;
-            let Some(answer) = answer else { return Ok(pieces) };
+            let Some(answer) = answer else { return Ok(pieces > 0) };
             if answer.opcode == NAK && !answer.is_nak(END_OF_FILE) {
-                return gone();
+                return Err(refused(&answer, "bytes"));
             }
             let is_last = answer.opcode != ACK || answer.complete || answer.end() >= length;
             if answer.opcode == ACK && answer.offset >= offset {
                 let (at, data) = answer.before(length);
                 if !data.is_empty() {
-                    pieces.insert(at, data);
+                    pieces += 1;
+                    take(at, data)?;
                 }
             }
-            if is_last || pieces.len() >= PIECES_MAX {
-                return Ok(pieces);
+            if is_last || pieces >= PIECES_MAX {
+                return Ok(pieces > 0);
             }
         }
     }
@@ -254,7 +274,7 @@ impl Ftp {
         let size = bytes.min(u32::from(DATA_MAX)) as u8;
         let mut answer = self.ask(READ, offset, size, b"", TRIES)?;
         if answer.opcode == NAK && !answer.is_nak(END_OF_FILE) {
-            return gone();
+            return Err(refused(&answer, "bytes"));
         }
         if answer.opcode != ACK || answer.offset != offset || answer.data.is_empty() {
             bail!("the board gives no bytes at {offset}");

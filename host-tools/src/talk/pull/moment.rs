@@ -15,7 +15,7 @@ pub(super) trait Sectors {
     /// How many it has.
     fn count(&self) -> u32;
 
-    /// The sector at this place; `None` where it is damaged.
+    /// The sector that belongs at this place; `None` where it is damaged, or another one is there.
     fn sector(&mut self, place: u32) -> Result<Option<(Header, Sector)>>;
 }
 
@@ -49,6 +49,28 @@ pub(super) fn group_of(log: &mut impl Sectors, place: u32) -> Result<Option<Star
         };
     }
     Ok(None)
+}
+
+/// The first group that begins in a log: before it lie the last sectors of one that began in the log before.
+pub(super) fn first_group(log: &mut impl Sectors) -> Result<Option<Start>> {
+    for place in 0..log.count().min(STEPS_BACK_MAX) {
+        if log.sector(place)?.is_some_and(|(header, _)| header.starts_group()) {
+            return group_of(log, place);
+        }
+    }
+    Ok(None)
+}
+
+/// The group that the sector before this place is in; where none can be read, as far back as one can, or the log's beginning.
+pub(super) fn group_before(log: &mut impl Sectors, place: u32) -> Result<u32> {
+    let mut place = place;
+    while let Some(last) = place.checked_sub(1) {
+        if let Some(start) = group_of(log, last)? {
+            return Ok(start.place);
+        }
+        place = place.saturating_sub(STEPS_BACK_MAX);
+    }
+    Ok(0)
 }
 
 /// Sectors among which is all that was recorded from one time to the other, and no more than a group before and behind it.

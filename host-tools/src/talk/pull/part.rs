@@ -6,6 +6,7 @@
 //! Its name says that it is a part, `00042-..._07.part.HUM`, and every reader says so too ([`crate::logs::naming::is_part`]). What is
 //! in it is not brought again, neither by `--around` nor when all of the log is.
 
+use std::collections::BTreeSet;
 use std::fs::{self, File};
 use std::io::{self, BufReader, Read as _, Seek as _, SeekFrom, Write as _};
 use std::path::{Path, PathBuf};
@@ -25,8 +26,10 @@ pub(super) struct Part {
     has: Vec<bool>,
     /// The session of which it is a part, where a sector has told it.
     session: Option<u32>,
-    /// Sectors of other sessions that came, and are not in it.
-    strange: u32,
+    /// The number of the sector that belongs at its beginning, where the first ones tell it.
+    base: Option<u32>,
+    /// The places of sectors of other sessions that came, and are not in it.
+    strange: BTreeSet<u32>,
     /// What was in it before is kept.
     is_kept: bool,
 }
@@ -67,16 +70,15 @@ impl Part {
     }
 
     fn at(path: PathBuf, head: &[Sector]) -> Result<Self> {
-        let session = head.iter().find_map(|sector| Header::read(sector.bytes()).ok());
+        let headers =
+            || (0..).zip(head).filter_map(|(at, sector)| Some((at, Header::read(sector.bytes()).ok()?)));
+        let session = headers().next().map(|(_, header)| header.session);
+        let is_whole = |header: &Header| Some(header.session) == session && !header.partial;
+        let base = headers()
+            .find(|(_, header)| is_whole(header))
+            .and_then(|(at, header): (u32, _)| header.number.checked_sub(at));
         let file = Self::opened(&path)?;
-        Ok(Self {
-            file,
-            path,
-            has: Vec::new(),
-            session: session.map(|header| header.session),
-            strange: 0,
-            is_kept: false,
-        })
+        Ok(Self { file, path, has: Vec::new(), session, base, strange: BTreeSet::new(), is_kept: false })
     }
 
     fn opened(path: &Path) -> Result<File> {
@@ -130,19 +132,27 @@ impl Part {
         for place in 0..sectors {
             let header = Header::read(self.read(place)?.bytes()).ok();
             // One in progress is written over yet.
-            self.has.push(header.is_some_and(|header| !header.partial));
+            let has = |header: Header| !header.partial && self.belongs(place, &header);
+            self.has.push(header.is_some_and(has));
         }
         Ok(())
     }
 
-    /// Sectors of other sessions that came, and are not in it: another log has come in its place, or the card has lost some.
-    pub(super) const fn strange(&self) -> u32 {
-        self.strange
+    /// The places of sectors of other sessions that came, and are not in it: another log has come in its place, or the card has lost
+    /// some.
+    pub(super) const fn strange(&self) -> &BTreeSet<u32> {
+        &self.strange
     }
 
     /// Where it is.
     pub(super) fn path(&self) -> &Path {
         &self.path
+    }
+
+    /// Whether a sector is the one that belongs there. A copy of one in progress may lie one place further.
+    pub(super) fn belongs(&self, place: u32, header: &Header) -> bool {
+        let number = self.base.map_or(header.number, |base| base.wrapping_add(place));
+        header.number == number || header.partial && header.number.wrapping_add(1) == number
     }
 
     /// Whether a sector is in it.
@@ -169,7 +179,7 @@ impl Part {
         if let Ok(header) = Header::read(sector.bytes())
             && *self.session.get_or_insert(header.session) != header.session
         {
-            self.strange += 1;
+            self.strange.insert(place);
             return Ok(());
         }
         if !self.is_kept && self.would_lose(place, sector)? {
@@ -341,7 +351,7 @@ mod tests {
         let mut part = Part::open(&whole, 8, &head).expect("it goes on");
         part.put(0, &sector(0)).expect("room");
         part.put(1, &other(1)).expect("room");
-        assert!(part.has(0) && !part.has(1) && part.strange() == 1);
+        assert!(part.has(0) && !part.has(1) && part.strange().len() == 1);
         assert_eq!(part.read(1).expect("nothing"), Sector::zeroed());
     }
 

@@ -1,0 +1,57 @@
+//! Which of a board's logs are those of one session: what was recorded from one power-on to the next. A vehicle that is recorded by
+//! arming has several logs of different numbers in it; a longer log has several files of one number. All of them name the same session.
+
+use std::path::Path;
+
+use anyhow::{Result, bail};
+
+use super::compare::heading_of;
+use super::ftp::Ftp;
+use crate::logs::segment_name;
+use crate::outcome::usage;
+
+/// The logs of a session, in their order.
+#[derive(Debug, Default, PartialEq, Eq)]
+pub(super) struct Session {
+    pub(super) logs: Vec<String>,
+    /// Logs among them, or newer ones, of whose beginnings nothing can be read: nobody knows whose they are.
+    pub(super) unknown: Vec<String>,
+}
+
+/// The newest session of these logs, which are in their order. Where the logs were named, all must be of it.
+pub(super) fn newest(ftp: &mut Ftp, logs: &[String], are_named: bool) -> Result<Session> {
+    let (mut of, mut found) = (None, Session::default());
+    for name in logs.iter().rev() {
+        let number = |name: &String| segment_name(Path::new(name)).map(|name| name.session);
+        let Some(own) = number(name) else { continue };
+        if found.logs.first().and_then(number) == Some(own) {
+            found.logs.insert(0, name.clone());
+            continue;
+        }
+        let length = ftp.open(name)?;
+        match (heading_of(ftp, name, length)?.session, of) {
+            (None, _) => found.unknown.insert(0, name.clone()),
+            (Some(session), of) if session != of.unwrap_or(session) => {
+                if !are_named {
+                    break;
+                }
+                let other = found.logs.first().map_or("", String::as_str);
+                return Err(usage(format!(
+                    "{name} and {other} are of two sessions, and a moment is of one: name only the logs of one"
+                )));
+            }
+            (session, _) => {
+                of = session;
+                found.logs.insert(0, name.clone());
+            }
+        }
+    }
+    if found.logs.is_empty() {
+        // Perhaps what is behind its beginning can be read.
+        found.logs.extend(found.unknown.pop());
+    }
+    if found.logs.is_empty() {
+        bail!("the board has no log");
+    }
+    Ok(found)
+}

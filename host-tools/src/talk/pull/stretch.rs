@@ -1,0 +1,176 @@
+//! Sectors of a log that were asked for, as they came, though the rest of it did not: read and judged as `hums verify` does a log.
+//! Each place of them is to hold the sector that belongs there. Where one does not, what was recorded then is not known, and what was
+//! looked for may be there.
+
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+
+use anyhow::Result;
+use hums_blackbox::{BlockCounts, Gap, Header, SECTOR_BYTES};
+use hums_core::time::Instant;
+
+use crate::logs::fat::Extent as Bytes;
+use crate::logs::{Log, Piece, segment_name};
+use crate::plural::count;
+use crate::summary::{FindingLine, Overview};
+use crate::utc::moment;
+use crate::verify::{Extent, failed};
+
+/// Places of a log that were asked for.
+#[derive(Clone, Debug)]
+pub(super) struct Stretch {
+    /// As the board calls the log.
+    pub(super) name: String,
+    /// Where they are here.
+    pub(super) path: PathBuf,
+    pub(super) places: Range<u32>,
+    /// How many places the log has.
+    pub(super) sectors: u32,
+}
+
+/// What was read of stretches that follow each other.
+pub(super) struct Reading {
+    overview: Overview,
+    from_start: bool,
+    /// The first place holds a sector.
+    begins: bool,
+    /// The last one.
+    last: Option<Stretch>,
+}
+
+impl Reading {
+    /// Reads stretches of the logs of one number, in their order, each of which goes on where the one before ends.
+    pub(super) fn of(stretches: &[Stretch]) -> Result<Self> {
+        const SECTOR: u64 = SECTOR_BYTES as u64;
+        let piece = |stretch: &Stretch| {
+            let Range { start, end } = stretch.places;
+            let bytes = Bytes {
+                start: u64::from(start) * SECTOR,
+                length: u64::from(end.saturating_sub(start)) * SECTOR,
+            };
+            Piece { path: stretch.path.clone(), extents: vec![bytes] }
+        };
+        let name = stretches.first().map_or_else(String::new, |first| first.name.clone());
+        let pieces = stretches.iter().map(piece).collect();
+        let log = Log { name, files: Vec::new(), pieces, session: None, left_over: false };
+        let is_first = |name: &str| segment_name(Path::new(name)).is_none_or(|name| name.segment == 0);
+        Ok(Self {
+            from_start: stretches
+                .first()
+                .is_some_and(|first| first.places.start == 0 && is_first(&first.name)),
+            begins: log.blocks().next_block()?.is_some_and(|block| Header::read(&block).is_ok()),
+            last: stretches.last().cloned(),
+            overview: Overview::verified(&log)?,
+        })
+    }
+
+    /// When the first and the last entry came that could be read. What came before the first entry of a session is nothing.
+    pub(super) fn span(&self) -> Option<(Instant, Instant)> {
+        let summary = &self.overview.ending.summary;
+        let first =
+            summary.first.map(|first| if summary.first_number == Some(0) { Instant::ZERO } else { first });
+        first.zip(summary.last)
+    }
+
+    /// The board's name of the last one.
+    pub(super) fn name(&self) -> &str {
+        self.last.as_ref().map_or("", |last| &last.name)
+    }
+
+    /// Whether the log has more than these; `names` are those of the session's files.
+    pub(super) fn goes_on(&self, names: &[String]) -> bool {
+        let number = |name: &str| segment_name(Path::new(name)).map(|name| name.session);
+        let is_later = |name: &&String| number(name) == number(self.name()) && name.as_str() > self.name();
+        self.last.as_ref().is_some_and(|last| last.places.end < last.sectors)
+            || names.iter().any(|name| is_later(&name))
+    }
+
+    /// Whether nothing of the session is behind them.
+    pub(super) fn is_to_end(&self, names: &[String]) -> bool {
+        !self.goes_on(names) && names.last().is_some_and(|newest| newest == self.name())
+    }
+
+    /// UTC at power-on, microseconds since 1970, by what was learned last.
+    pub(super) fn epoch_us(&self) -> Option<u64> {
+        self.overview.ending.summary.epoch_us
+    }
+
+    /// The changes of level, in order.
+    pub(super) fn findings(&self) -> &[FindingLine] {
+        &self.overview.contents.findings
+    }
+
+    /// What is wrong with them, as parts of sentences; with `to_end` also that nothing proves that the log ends with them.
+    pub(super) fn faults(&self, to_end: bool) -> Vec<String> {
+        let unread = self.unread().as_ref().map(Unread::words);
+        let failed = failed(&self.overview, Extent { from_start: self.from_start, to_end });
+        unread.into_iter().chain(failed.into_iter().map(|(check, why)| format!("{check}: {why}"))).collect()
+    }
+
+    /// Places of which the sector is not there, or cannot be decoded.
+    pub(super) fn unread(&self) -> Option<Unread> {
+        let summary = &self.overview.ending.summary;
+        let mut lost = not_ours(&summary.blocks);
+        let mut is_lost_behind = not_ours(&summary.behind) > 0;
+        if summary.closed {
+            // What lies behind the end of a log is none of it.
+            (lost, is_lost_behind) = (lost - not_ours(&summary.behind), false);
+        }
+        // That what is before them was not asked for is no gap.
+        let is_within = |gap: &&Gap| gap.from.is_some() || gap.sectors_skipped > 0;
+        let gaps: Vec<&Gap> = self.overview.contents.gaps.iter().filter(is_within).collect();
+        let missing =
+            gaps.iter().filter(|gap| gap.from.is_some()).map(|gap| u64::from(gap.sectors_lost)).sum();
+        let useless: u64 = gaps.iter().map(|gap| u64::from(gap.sectors_skipped)).sum();
+        if lost == 0 && gaps.is_empty() {
+            return None;
+        }
+        let from = match gaps.first() {
+            _ if !self.begins => None,
+            Some(gap) => gap.from,
+            None => summary.last,
+        };
+        let to = match gaps.last() {
+            _ if is_lost_behind => None,
+            Some(gap) => gap.to,
+            None => summary.first,
+        };
+        // A gap in which nobody knows how many are missing is one at least.
+        Some(Unread { sectors: lost.max(missing).saturating_add(useless).max(1), from, to })
+    }
+}
+
+/// Blocks that are no sector of the log, or not at their places.
+const fn not_ours(blocks: &BlockCounts) -> u64 {
+    let BlockCounts { misplaced, damaged, stale, unsound, empty, erased, foreign, .. } = *blocks;
+    misplaced + damaged + stale + unsound + empty + erased + foreign
+}
+
+/// Stretches of logs of one number each, in their order.
+pub(super) fn by_number(stretches: &[Stretch]) -> impl Iterator<Item = &[Stretch]> {
+    let number = |stretch: &Stretch| segment_name(Path::new(&stretch.name)).map(|name| name.session);
+    stretches.chunk_by(move |one, next| number(one) == number(next))
+}
+
+/// Sectors that were asked for and cannot be read.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Unread {
+    pub(super) sectors: u64,
+    /// The last entry before them, and the first one behind them.
+    from: Option<Instant>,
+    to: Option<Instant>,
+}
+
+impl Unread {
+    /// These and later ones.
+    pub(super) const fn and(self, later: Self) -> Self {
+        Self { sectors: self.sectors.saturating_add(later.sectors), from: self.from, to: later.to }
+    }
+
+    /// `2 sectors between 3:47.3 and the end cannot be read`.
+    pub(super) fn words(&self) -> String {
+        let from = self.from.map_or_else(|| "the beginning".to_owned(), moment);
+        let to = self.to.map_or_else(|| "the end".to_owned(), moment);
+        format!("{} between {from} and {to} cannot be read", count(self.sectors, "sector"))
+    }
+}

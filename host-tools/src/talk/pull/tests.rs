@@ -1,0 +1,522 @@
+use std::fs;
+use std::path::PathBuf;
+
+use hums_blackbox::record::{Clock, FindingRecord, Note};
+use hums_blackbox::{Header, Record, Sector, SectorSink, Writer};
+use hums_core::health::{Level, Subsystem};
+use hums_link::messages;
+use hums_link::packet::Fields;
+use hums_recorder::card::SEGMENT_BYTES_MAX;
+
+use super::*;
+use crate::endpoint::Endpoint;
+use crate::talk::fake;
+
+/// The sectors of a recording of the repository, as `hums pack` makes them.
+pub(super) fn packed(dir: &Path, name: &str) -> Vec<u8> {
+    let input = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../tests/flights").join(name);
+    let output = dir.join(name);
+    let pack =
+        cli::Pack { input: Endpoint::File(input), output: output.clone(), replace: false, json: false };
+    crate::pack::run(&pack).expect("packed");
+    fs::read(output).expect("there")
+}
+
+const NAME: &str = "00001_00.HUM";
+
+/// The names in a folder.
+fn names_in(folder: &Path) -> Vec<String> {
+    let entries = fs::read_dir(folder).expect("there");
+    let mut names: Vec<String> =
+        entries.map(|entry| entry.expect("there").file_name().to_string_lossy().into_owned()).collect();
+    names.sort();
+    names
+}
+
+/// What a board has.
+type Files = Vec<(String, Vec<u8>)>;
+
+/// A board with these logs. Before each answer `change` gets them, with the opcode, and may give an error that is answered.
+fn board_of(
+    mut files: Files,
+    mut change: impl FnMut(&mut Files, u8) -> Option<u8> + Send + 'static,
+) -> Client {
+    let mut open = 0;
+    fake::found(&[1], move |frame| {
+        let asked = Fields(frame.payload().get(3..).unwrap_or_default());
+        let (opcode, size, at) = (asked.u8(3), usize::from(asked.u8(4)), asked.u32(8) as usize);
+        let sequence = asked.u16(0);
+        let error = change(&mut files, opcode);
+        let said = |more: u16, kind: u8, at: usize, is_last: bool, data: &[u8]| {
+            let [s0, s1] = sequence.wrapping_add(more).to_le_bytes();
+            let head = [s0, s1, 0, kind, data.len() as u8, opcode, u8::from(is_last), 0];
+            let payload = [&head[..], &(at as u32).to_le_bytes(), data].concat();
+            (1, messages::file_transfer(255, 190, &payload))
+        };
+        if let Some(error) = error {
+            return vec![said(1, 129, 0, false, &[error])];
+        }
+        if opcode == 4 {
+            let path: Vec<u8> = (0..size).map(|byte| asked.u8(12 + byte)).collect();
+            let is_it = |(name, _): &(String, Vec<u8>)| format!("/{name}").as_bytes() == path;
+            open = files.iter().position(is_it).expect("a log of the board");
+        }
+        let log = &files[open].1;
+        let answer = |more: u16, at: usize, is_last: bool, data: &[u8]| said(more, 128, at, is_last, data);
+        match opcode {
+            3 if at >= files.len() => vec![said(1, 129, 0, false, &[6])],
+            3 => {
+                let (name, log) = &files[at];
+                vec![answer(1, at, false, format!("F{name}\t{}\0", log.len()).as_bytes())]
+            }
+            4 => vec![answer(1, 0, false, &(log.len() as u32).to_le_bytes())],
+            5 => vec![answer(1, at, false, &log[at.min(log.len())..(at + size).min(log.len())])],
+            14 => {
+                let sum = hums_link::ftp::checksum(0, &log[..at.min(log.len())]);
+                vec![answer(1, at, false, &sum.to_le_bytes())]
+            }
+            15 => {
+                let pieces = log[at..].chunks(size).take(20).enumerate();
+                let is_last = |piece: usize| piece == 19 || at + (piece + 1) * size >= log.len();
+                pieces.map(|(n, data)| answer(n as u16 + 1, at + n * size, is_last(n), data)).collect()
+            }
+            _ => vec![answer(1, 0, false, &[])],
+        }
+    })
+}
+
+/// A board with this log, in whose place the other one comes with the so-many-th question for bytes.
+fn board(log: Vec<u8>, other: Vec<u8>, mut reads: u32) -> Ftp {
+    let client = board_of(vec![(NAME.to_owned(), log)], move |files, opcode| {
+        if matches!(opcode, 5 | 15) {
+            reads = reads.saturating_sub(1);
+            if reads == 0 {
+                files[0].1.clone_from(&other);
+            }
+        }
+        None
+    });
+    Ftp::new(client).expect("it answers")
+}
+
+/// The first sectors of two sessions, and what `pull` calls the first one.
+fn two_logs(dir: &Path) -> (Vec<u8>, Vec<u8>, String) {
+    let [one, other] = ["px4_hil_quad_low.tlog", "ap_quad_guided.tlog"]
+        .map(|name| packed(dir, name).get(..80 * SECTOR_BYTES).expect("a longer log").to_vec());
+    let path = dir.join("one.HUM");
+    fs::write(&path, &one).expect("written");
+    let name = heading_here(&path, NAME, one.len() as u32).expect("it reads").name;
+    (one, other, name)
+}
+
+#[test]
+fn what_was_begun_is_kept_when_the_card_loses_it_or_another_log_comes_in_its_place() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let (log, other, name) = two_logs(dir.path());
+    let mut lost = log.clone();
+    lost[4096..8192].fill(0);
+    for (next, case) in [(&lost, "lost"), (&other, "exchanged")] {
+        let output = dir.path().join(case);
+        fs::create_dir(&output).expect("made");
+        let part = output.join(format!(".{name}.pull.hums-part"));
+        fs::write(&part, &log[..20_000]).expect("written");
+        // The heading is read before.
+        let mut ftp = board(log.clone(), next.clone(), 8 * 3 + 1);
+        let pulled = pull(&mut ftp, NAME, &output);
+        let kept = fs::read(output.join("hums-kept/1").join(&name)).expect("kept");
+        assert_eq!(kept[..20_000], log[..20_000], "{case}");
+        if case == "lost" {
+            let (path, is_new) = pulled.expect("it came").expect("a log");
+            assert!(is_new && fs::read(path).expect("there") == lost);
+        } else {
+            let told = pulled.expect_err("it is another one").to_string();
+            assert!(told.contains("another log has come in its place"), "{told}");
+            // Nothing is left of what was begun.
+            assert_eq!(names_in(&output), ["hums-kept"]);
+        }
+    }
+    // The other one from its first byte on.
+    let output = dir.path().join("early");
+    fs::create_dir(&output).expect("made");
+    let mut ftp = board(log.clone(), other.clone(), 8 * 3 + 1);
+    let told = pull(&mut ftp, NAME, &output).expect_err("it is another one").to_string();
+    assert!(told.contains("another log has come in its place"), "{told}");
+    assert_eq!(fs::read(output.join("hums-kept/1").join(&name)).expect("kept"), other);
+    assert_eq!(names_in(&output), ["hums-kept"]);
+}
+
+#[test]
+fn a_card_that_loses_the_beginning_of_a_log_is_not_called_another_log() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let (log, _, name) = two_logs(dir.path());
+    // The first sector alone, of which the others tell the session; the whole first page.
+    let without = |bytes: usize| [&vec![0; bytes][..], &log[bytes..]].concat();
+    for (next, words) in [
+        (without(SECTOR_BYTES), None),
+        (without(8 * SECTOR_BYTES), Some("its beginning can no longer be read on the board")),
+    ] {
+        let output = tempfile::tempdir().expect("a folder");
+        let mut ftp = board(log.clone(), next.clone(), 8 * 3 + 5);
+        let pulled = pull(&mut ftp, NAME, output.path());
+        let Some(words) = words else {
+            let (path, _) = pulled.expect("it came").expect("a log");
+            assert_eq!(
+                (path.file_name().expect("a name"), fs::read(&path).expect("there")),
+                (name.as_ref(), next)
+            );
+            continue;
+        };
+        let told = pulled.expect_err("nothing tells what it is").to_string();
+        assert!(told.contains(words), "{told}");
+        assert_eq!(names_in(output.path()), ["hums-kept"]);
+    }
+}
+
+#[test]
+fn what_is_no_file_in_the_place_of_a_log_is_told_and_left() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let (log, other, name) = two_logs(dir.path());
+    let output = dir.path().join("logs");
+    fs::create_dir_all(output.join(&name)).expect("made");
+    let mut ftp = board(log, other, u32::MAX);
+    let told = pull(&mut ftp, NAME, &output).expect_err("a folder").to_string();
+    assert!(told.contains("is no file, and stands where the log is to be: move it away"), "{told}");
+    assert_eq!(names_in(&output), [name]);
+}
+
+#[test]
+fn a_part_that_has_what_the_card_has_lost_since_is_not_written_over() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let (log, _, name) = two_logs(dir.path());
+    let part = crate::logs::naming::part_name(&dir.path().join(&name));
+    fs::write(&part, &log).expect("written");
+    let mut lost = log.clone();
+    lost[..SECTOR_BYTES].fill(0);
+    let mut ftp = board(lost.clone(), lost, u32::MAX);
+    let what: cli::Around = "0".parse().expect("a time");
+    around::pull(&mut ftp, &[NAME.to_owned()], dir.path(), &what, hums_core::time::Span::from_secs(1))
+        .expect("a part");
+    assert_eq!(fs::read(&part).expect("there"), log);
+}
+
+#[test]
+fn a_part_has_sectors_of_one_session_also_where_the_log_is_exchanged_while_it_is_read() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let (log, other, name) = two_logs(dir.path());
+    let what: cli::Around = "0".parse().expect("a time");
+    // The log's beginning is read before.
+    let mut ftp = board(log.clone(), other, 8 * 3 + 5);
+    let span = hums_core::time::Span::from_secs(9_999);
+    let names = [NAME.to_owned()];
+    let brought = around::pull(&mut ftp, &names, dir.path(), &what, span).expect("a part");
+    let [(_, path)] = &brought.parts[..] else { panic!("{brought:?}") };
+    assert_eq!(path, &crate::logs::naming::part_name(&dir.path().join(name)));
+    let part = fs::read(path).expect("there");
+    assert_eq!(part.len(), log.len());
+    let mut others = 0;
+    for (ours, theirs) in part.chunks(SECTOR_BYTES).zip(log.chunks(SECTOR_BYTES)) {
+        // One is half of each, and fails its check.
+        let is_sector = Header::read(ours.first_chunk().expect("a sector")).is_ok();
+        assert!(ours == theirs || !is_sector);
+        others += u32::from(!is_sector && ours.iter().any(|byte| *byte != 0));
+    }
+    assert!(others <= 1, "{others}");
+    assert!(brought.strange > 10, "{brought:?}");
+}
+
+/// Seconds of what [`recorded`] records, and the criticals in it.
+const SECONDS: u64 = 1_500;
+const CRITICALS_S: [u64; 2] = [200, 1_000];
+/// UTC at its power-on, microseconds since 1970.
+const EPOCH_US: u64 = 1_790_000_000_000_000;
+
+#[derive(Default)]
+struct Memory {
+    sectors: Vec<u8>,
+    session: u32,
+}
+
+impl SectorSink for Memory {
+    fn room(&self) -> usize {
+        usize::MAX
+    }
+
+    fn put(&mut self, sector: &Sector) {
+        let mut sector = *sector;
+        sector.seal(self.session);
+        self.sectors.extend_from_slice(sector.bytes());
+    }
+}
+
+/// A session that ends in order: a note each tenth of a second, two criticals, and the time of day, which is learned at once.
+fn recorded(session: u32, seconds: u64) -> Vec<u8> {
+    let mut memory = Memory { session, ..Memory::default() };
+    let mut writer = Box::new(Writer::new());
+    for tenth in 0..seconds * 10 {
+        let at = Instant::from_millis(tenth * 100);
+        let mut record = |record: Record<'_>| writer.record(at, &record, &mut memory).expect("there is room");
+        let random = tenth.wrapping_mul(0x9E37_79B9_7F4A_7C15) ^ u64::from(session);
+        let text = format!("{random:016x}{:016x}", random.rotate_left(29) ^ tenth);
+        record(Record::Note(Note { severity: 6, text: &text }));
+        if tenth == 10 {
+            record(Record::Clock(Clock { boot: at, utc_micros: EPOCH_US + at.as_micros(), source: 3 }));
+        }
+        if CRITICALS_S.contains(&(tenth / 10)) && tenth % 10 == 0 {
+            record(Record::Finding(FindingRecord {
+                at,
+                subsystem: Subsystem::Propulsion,
+                check: "motor_loss",
+                instance: 1,
+                level: Level::Critical,
+                previous: Level::Ok,
+                value: 1.0,
+                limit: 0.5,
+                unit: "",
+            }));
+        }
+    }
+    writer.finish(&mut memory);
+    memory.sectors
+}
+
+/// A command line with only `hums pull`'s arguments.
+#[derive(clap::Parser)]
+struct Line {
+    #[command(flatten)]
+    pull: cli::Pull,
+}
+
+/// Brings what is asked for of these logs.
+fn brought(files: &Files, args: &[&str]) -> Result<Outcome> {
+    brought_of(board_of(files.clone(), |_, _| None), args)
+}
+
+fn brought_of(board: Client, args: &[&str]) -> Result<Outcome> {
+    let output = tempfile::tempdir().expect("a folder");
+    let folder = output.path().to_str().expect("a name");
+    let line = ["pull", "--link", "udpin:127.0.0.1:14550", "--json", "-o", folder];
+    let line = <Line as clap::Parser>::try_parse_from(line.iter().chain(args)).expect("good");
+    bring(board, &line.pull)
+}
+
+fn named(log: Vec<u8>) -> Files {
+    vec![(NAME.to_owned(), log)]
+}
+
+/// The group that is recorded at this time: its first place, and the one behind it.
+fn group_at(log: &[u8], second: u64) -> std::ops::Range<usize> {
+    let starts = (0..).zip(log.chunks(SECTOR_BYTES)).filter_map(|(place, sector)| {
+        let sector = Sector::from_bytes(*sector.first_chunk().expect("a sector"));
+        Some((place, sector.preamble()?.start_ms))
+    });
+    let (before, after): (Vec<_>, Vec<_>) = starts.partition(|(_, start_ms)| *start_ms <= second * 1_000);
+    before.last().expect("it begins").0..after.first().map_or(log.len() / SECTOR_BYTES, |(place, _)| *place)
+}
+
+/// The log with this sector lost, in all the ways in which a card loses one.
+fn spoiled(log: &[u8], place: usize) -> Vec<Files> {
+    let at = place * SECTOR_BYTES;
+    let with = |sector: &[u8]| {
+        let mut log = log.to_vec();
+        log[at..at + SECTOR_BYTES].copy_from_slice(sector);
+        named(log)
+    };
+    let mut flipped = log[at..at + SECTOR_BYTES].to_vec();
+    flipped[100] ^= 1;
+    let other = recorded(8, 10);
+    let elsewhere = (place + 7) * SECTOR_BYTES % log.len();
+    vec![
+        with(&[0; SECTOR_BYTES]),
+        with(&[0xff; SECTOR_BYTES]),
+        with(&[b'x'; SECTOR_BYTES]),
+        with(&flipped),
+        with(&other[SECTOR_BYTES..2 * SECTOR_BYTES]),
+        with(&log[elsewhere..elsewhere + SECTOR_BYTES]),
+    ]
+}
+
+#[test]
+fn a_moment_of_which_a_sector_is_lost_is_told() {
+    let log = recorded(7, SECONDS);
+    let moment = ["--around", "10:00", "--span", "1"];
+    assert_eq!(brought(&named(log.clone()), &moment).expect("it comes"), Outcome::Done);
+    let (here, before) = (group_at(&log, 600), group_at(&log, 100));
+    assert!(before.end < here.start, "{before:?} {here:?}");
+    for place in [here.start, here.start + 5, here.end - 1] {
+        for files in spoiled(&log, place) {
+            assert_eq!(brought(&files, &moment).expect("it comes"), Outcome::Losses, "{place}");
+        }
+    }
+    for files in spoiled(&log, before.start + 20) {
+        assert_eq!(brought(&files, &moment).expect("it comes"), Outcome::Done);
+    }
+}
+
+#[test]
+fn a_search_tells_what_it_could_not_read() {
+    let log = recorded(7, SECONDS);
+    let search = ["--around", "critical", "--span", "1"];
+    assert_eq!(brought(&named(log.clone()), &search).expect("found"), Outcome::Done);
+    let short = recorded(7, 100);
+    for files in [named(short.clone()), named(short[..short.len() - SECTOR_BYTES].to_vec())] {
+        let told = brought(&files, &search).expect_err("there is none").to_string();
+        assert!(told.contains("no such finding is in what the board has of this session"), "{told}");
+    }
+    for files in spoiled(&recorded(7, 199), 5) {
+        assert_eq!(brought(&files, &search).expect("it may be there"), Outcome::Losses);
+    }
+    let [first, last] = CRITICALS_S.map(|second| group_at(&log, second));
+    let later = group_at(&log, SECONDS - 50);
+    assert!(first.end < last.start && last.end <= later.start, "{first:?} {last:?} {later:?}");
+    for place in [last.start, last.start + 1, later.start, later.start + 5, log.len() / SECTOR_BYTES - 2] {
+        for files in spoiled(&log, place) {
+            assert_eq!(brought(&files, &search).expect("one is found"), Outcome::Losses, "{place}");
+        }
+    }
+    for files in spoiled(&log, first.start + 20) {
+        assert_eq!(brought(&files, &search).expect("found"), Outcome::Done);
+    }
+}
+
+#[test]
+fn a_moment_at_which_nothing_was_recorded_is_refused() {
+    let log = recorded(7, 30);
+    let files = named(log.clone());
+    for (moment, words) in [
+        ("0:30", "ends at 0:29.9; for another session name its logs"),
+        ("9:10", "ends at 0:29.9"),
+        ("99999:00", "ends at 0:29.9"),
+        ("2030-01-01T00:00:00Z", "ends at 0:29.9 (2026-09-21 14:13:49 UTC)"),
+        ("2026-09-21T14:13:19Z", "began later, 2026-09-21 14:13:20 UTC"),
+    ] {
+        let told = brought(&files, &["--around", moment]).expect_err("there is none").to_string();
+        assert!(told.contains(words), "{moment}: {told}");
+    }
+    // The time of day was learned in the only group.
+    for moment in ["0", "0:29.9", "2026-09-21T14:13:20Z", "2026-09-21T14:13:49Z"] {
+        assert_eq!(brought(&files, &["--around", moment]).expect("it comes"), Outcome::Done, "{moment}");
+    }
+    // It may be in what cannot be read.
+    for files in spoiled(&log, log.len() / SECTOR_BYTES - 1).into_iter().take(4) {
+        assert_eq!(brought(&files, &["--around", "0:29.9"]).expect("it comes"), Outcome::Losses);
+    }
+}
+
+#[test]
+fn a_session_is_all_that_was_recorded_from_one_power_on() {
+    let log = recorded(7, SECONDS);
+    let place = group_at(&log, 1_100).start * SECTOR_BYTES;
+    let (one, two) = (log[..place].to_vec(), log[place..].to_vec());
+    let file = |name: &str, log: &[u8]| (name.to_owned(), log.to_vec());
+    let older = file("00003_00.HUM", &recorded(6, 20));
+    let files = vec![older, file("00004_00.HUM", &one), file("00005_00.HUM", &two)];
+    let done = |files: &Files, args: &[&str]| brought(files, args).expect("it comes");
+    for args in [
+        &["--around", "critical"][..],
+        &["--around", "16:40"],
+        &["--around", "24:00"],
+        &["--around", "critical", "00004_00.HUM", "00005_00.HUM"],
+    ] {
+        assert_eq!(done(&files, args), Outcome::Done, "{args:?}");
+    }
+    // What was just begun when the power went.
+    let with = |log: &[u8]| [&files[..], &[file("00006_00.HUM", log)]].concat();
+    assert_eq!(done(&with(&[]), &["--around", "critical"]), Outcome::Done);
+    for newest in [vec![0; 4096], vec![0x5a; 3000]] {
+        assert_eq!(done(&with(&newest), &["--around", "critical"]), Outcome::Losses);
+        let none = ["--around", "autopilot_state"];
+        assert_eq!(done(&with(&newest), &none), Outcome::Losses, "it may be there");
+    }
+    let told =
+        brought(&files, &["--around", "0:10", "00003_00.HUM", "00004_00.HUM"]).expect_err("two sessions");
+    assert!(told.is::<crate::outcome::Usage>(), "{told:#}");
+    assert!(told.to_string().contains("00003_00.HUM and 00004_00.HUM are of two sessions"), "{told}");
+}
+
+#[test]
+fn a_sector_of_a_part_that_belongs_elsewhere_is_brought_anew() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let log = recorded(7, 300);
+    let around = |ftp: &mut Ftp| {
+        let what: cli::Around = "1:00".parse().expect("a time");
+        let names = [NAME.to_owned()];
+        around::pull(ftp, &names, dir.path(), &what, hums_core::time::Span::from_secs(9_999)).expect("a part")
+    };
+    let mut ftp = board(log.clone(), Vec::new(), u32::MAX);
+    let (_, path) = around(&mut ftp).parts.remove(0);
+    let mut part = fs::read(&path).expect("there");
+    assert_eq!(part, log);
+    part.copy_within(5 * SECTOR_BYTES..6 * SECTOR_BYTES, 9 * SECTOR_BYTES);
+    fs::write(&path, &part).expect("written");
+    let mut ftp = board(log.clone(), Vec::new(), u32::MAX);
+    assert_eq!(around(&mut ftp).outcome, Outcome::Done);
+    assert_eq!(fs::read(&path).expect("there"), log);
+    let kept = dir.path().join("hums-kept/1").join(path.file_name().expect("a name"));
+    assert_eq!(fs::read(kept).expect("kept"), part);
+}
+
+#[test]
+fn a_board_that_contradicts_itself_is_told() {
+    let log = recorded(7, 30);
+    // Its directory has a log in which nothing is when it is opened.
+    let emptied = |files: &mut Files, opcode| {
+        if opcode == 4 {
+            files[0].1.clear();
+        }
+        None
+    };
+    assert_eq!(brought_of(board_of(named(log.clone()), emptied), &[]).expect("told"), Outcome::Losses);
+    let told =
+        brought_of(board_of(named(log), emptied), &["--around", "0:01"]).expect_err("nothing").to_string();
+    assert!(told.contains("nothing is in it, though the board's directory says so"), "{told}");
+    let long = named(vec![0; 2 * SEGMENT_BYTES_MAX as usize + 1]);
+    let told = brought(&long, &["--around", "0:01"]).expect_err("no recorder's").root_cause().to_string();
+    assert!(told.contains("no recorder makes a log of 16777217 bytes"), "{told}");
+}
+
+#[test]
+fn what_comes_of_a_burst_is_handed_on_before_its_end() {
+    let mut ftp = board(vec![7; 10_000], Vec::new(), u32::MAX);
+    ftp.open(NAME).expect("a log");
+    let mut came = Vec::new();
+    let told = ftp.bring(0, 10_000, |bytes| {
+        came.push(bytes.len());
+        (came.len() < 3).then_some(()).context("the link ends")
+    });
+    assert_eq!((told.expect_err("it ends").to_string().as_str(), came), ("the link ends", vec![239; 3]));
+    let mut ftp = board((0..200).cycle().take(10_000).collect(), Vec::new(), u32::MAX);
+    ftp.open(NAME).expect("a log");
+    let mut all = Vec::new();
+    ftp.bring(100, 9_000, |bytes| {
+        all.extend_from_slice(bytes);
+        Ok(())
+    })
+    .expect("it comes");
+    assert_eq!(all, (0..200).cycle().take(9_000).skip(100).collect::<Vec<u8>>());
+}
+
+#[test]
+fn a_refusal_says_no_more_than_is_known() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let log = recorded(7, 30);
+    for (error, words) in [
+        (10, "the board no longer has this log: its card made room for later flights, or is another one"),
+        (1, "the board refuses the checksum of this log (MAVLink FTP error 1); call again"),
+    ] {
+        let refuse = move |_: &mut Files, opcode| (opcode == 14).then_some(error);
+        let mut ftp = Ftp::new(board_of(named(log.clone()), refuse)).expect("it answers");
+        let output = dir.path().join(error.to_string());
+        fs::create_dir(&output).expect("made");
+        let told = pull(&mut ftp, NAME, &output).expect_err("not confirmed").to_string();
+        assert_eq!(told, words);
+        let begun = output.join(&names_in(&output)[0]);
+        assert_eq!(fs::read(&begun).expect("kept"), log);
+        assert_eq!(faults_of(NAME, &begun).expect("it reads"), Vec::<String>::new());
+        // What came damaged is not called good.
+        let mut damaged = log.clone();
+        damaged[SECTOR_BYTES * 3..SECTOR_BYTES * 4].fill(0);
+        fs::write(&begun, &damaged).expect("written");
+        let faults = faults_of(NAME, &begun).expect("it reads");
+        assert!(faults[0].contains("cannot be read"), "{faults:?}");
+    }
+}
