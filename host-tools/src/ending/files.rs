@@ -65,7 +65,8 @@ impl Files<'_> {
         let parts = self.names.iter().filter(|name| is_part(Path::new(name)));
         let part_words = |name: &String| {
             format!(
-                "{name} is a part of its log, as `hums pull --around` brings it: what it lacks was not brought, and `hums pull` brings it"
+                "{name} is a part of its log, as `hums pull --around` brings it: what it lacks was not brought, or came damaged; `hums pull` \
+                 brings what the card has"
             )
         };
         let parts: Vec<_> = parts.map(part_words).collect();

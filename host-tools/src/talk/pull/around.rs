@@ -74,7 +74,7 @@ pub(super) fn pull(
     let (from, to) = (Instant::from_micros(at.as_micros().saturating_sub(span.as_micros())), at + span);
     let stretches = board.bring(from, to)?;
     if stretches.is_empty() {
-        bail!("what the board has of this session begins after {}", moment(to));
+        bail!("what the board gives of this session begins after {}", moment(to));
     }
     let readings = by_number(&stretches).map(Reading::of).collect::<Result<Vec<_>>>()?;
     outcome = outcome.and(check_recorded(at, &readings, names, epoch_us)?);
@@ -117,8 +117,8 @@ fn check_recorded(
     let before = spans().map(|((_, last), _)| last).filter(|last| *last < at).max();
     let after = spans().map(|((first, _), _)| first).filter(|first| *first > at).min();
     let why = match (before, after) {
-        (Some(end), None) => format!("what the board has of this session ends at {}", words(end)),
-        (None, Some(start)) => format!("what the board has of this session begins at {}", words(start)),
+        (Some(end), None) => format!("what the board gives of this session ends at {}", words(end)),
+        (None, Some(start)) => format!("what the board gives of this session begins at {}", words(start)),
         (Some(end), Some(start)) => {
             format!("nothing is recorded between {} and {}", words(end), words(start))
         }

@@ -40,6 +40,9 @@ use crate::summary::FindingLine;
 /// How much comes before it is said again how far it is.
 const TOLD_BYTES: u32 = 8 * 1024;
 
+/// What a log without bytes is. A board does not know a log whose first sector is lost.
+const NOTHING: &str = "nothing is recorded in it yet, or its first sector cannot be read";
+
 /// What `hums pull --json` prints.
 const SCHEMA: Schema = Schema::first("hums-pull");
 
@@ -141,9 +144,15 @@ fn around(
     args: &cli::Pull,
     moment: &cli::Around,
 ) -> Result<Outcome> {
-    let has_sectors = |(name, bytes): (String, u32)| (bytes >= SECTOR_BYTES as u32).then_some(name);
-    let logs: Vec<String> = logs.into_iter().filter_map(has_sectors).collect();
-    let session = session::newest(ftp, &logs, !args.names.is_empty())?;
+    let mut names = Vec::new();
+    for (name, bytes) in logs {
+        if bytes < SECTOR_BYTES as u32 && ftp.open(&name)? < SECTOR_BYTES as u32 {
+            note!("{name}: {NOTHING}");
+        } else {
+            names.push(name);
+        }
+    }
+    let session = session::newest(ftp, &names, !args.names.is_empty())?;
     let mut outcome = Outcome::Done;
     for name in &session.unknown {
         note!(
@@ -164,7 +173,7 @@ fn around(
     outcome = outcome.and(brought.outcome);
     if brought.at.is_none() && outcome == Outcome::Done {
         bail!(
-            "no such finding is in what the board has of this session; what came stays for `hums pull`, which brings the rest"
+            "no such finding is in what the board gives of this session; what came stays for `hums pull`, which brings the rest"
         );
     }
     let mut pulled = Vec::new();
@@ -185,7 +194,7 @@ fn around(
 fn pull(ftp: &mut Ftp, name: &str, output: &Path) -> Result<Option<(PathBuf, bool)>> {
     let length = ftp.open(name)?;
     if length == 0 {
-        note!("{name}: nothing is recorded in it yet");
+        note!("{name}: {NOTHING}");
         return Ok(None);
     }
     let heading = heading_of(ftp, name, length)?;
@@ -265,12 +274,9 @@ fn tell_begun(name: &str, begun: &Path) -> Result<()> {
     }
     let kept =
         format!("{name}: what came of it so far, {}, is kept as {}", count(bytes, "byte"), begun.display());
-    let faults = faults_of(name, begun)?;
-    if faults.is_empty() {
-        note!("{kept}; its sectors are sound and follow each other");
-    }
-    for fault in faults {
-        note!("{kept}, and is damaged: {fault}");
+    match faults_of(name, begun)?.join("; ").as_str() {
+        "" => note!("{kept}; its sectors are sound and follow each other"),
+        faults => note!("{kept}, and is damaged: {faults}"),
     }
     Ok(())
 }

@@ -360,7 +360,7 @@ fn a_search_tells_what_it_could_not_read() {
     let short = recorded(7, 100);
     for files in [named(short.clone()), named(short[..short.len() - SECTOR_BYTES].to_vec())] {
         let told = brought(&files, &search).expect_err("there is none").to_string();
-        assert!(told.contains("no such finding is in what the board has of this session"), "{told}");
+        assert!(told.contains("no such finding is in what the board gives of this session"), "{told}");
     }
     for files in spoiled(&recorded(7, 199), 5) {
         assert_eq!(brought(&files, &search).expect("it may be there"), Outcome::Losses);
