@@ -6,6 +6,7 @@ use anyhow::Result;
 use hums_blackbox::record::{Loss, Moment, Stats, Vehicle, Why};
 use hums_blackbox::{Cause, Gap, Record};
 use hums_core::component::Figures;
+use hums_core::health::Level;
 use hums_core::health::exceedance::Crossings;
 use hums_core::time::Instant;
 use hums_link as link;
@@ -51,6 +52,13 @@ pub struct FindingLine {
     pub limit: f32,
     /// The unit of both.
     pub unit: String,
+}
+
+impl FindingLine {
+    /// Whether the check no longer applies, as after landing: what was bad is not known to be good.
+    pub fn is_unjudged(&self) -> bool {
+        self.level == Level::Ok.name() && self.value.is_nan()
+    }
 }
 
 impl From<Finding> for FindingLine {

@@ -6,7 +6,8 @@
 //! * A critical finding is never delayed. It is told where it asks for something that the event's texts did not ask for yet: the
 //!   fourth motor that is lost, or the pitch beside the roll, does not say LAND NOW again.
 //! * A warning, which needs nothing at once, waits for [`HOLD`]: where it becomes critical only that is told. Then it is the first text
-//!   of an event, or waits for the event's end, and is told if it is still so. So is what has no data, or is good again.
+//!   of an event, or waits for the event's end, and is told if it is still so. So is what has no data, or is good again. That a check no longer applies, as after landing, is no news: nobody knows
+//!   whether what was bad is good.
 //! * Of a mishap its first kind is told, and one more that asks for something else where nothing led to it; that it is down, and
 //!   where, comes by itself. What is mild and waits is a consequence, and is not told any longer.
 //! * That something is over is told only of what was told; that there are no data, only while no alarm is open.
@@ -95,6 +96,10 @@ impl Telling {
             Level::Ok if finding.subsystem == Subsystem::Mishap => {
                 // It flies on, which is told by itself, or something new begins.
                 self.events[Subsystem::Mishap as usize] = Event::NONE;
+                false
+            }
+            Level::Ok if finding.is_unjudged() => {
+                self.open.retain(|open| *open != key);
                 false
             }
             Level::Ok => self.open.contains(&key),

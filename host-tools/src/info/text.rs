@@ -165,7 +165,7 @@ fn findings_text(text: &mut String, log: &Overview) {
             text,
             "    {:>11}  {:<8}  {}",
             moment(finding.at),
-            level(finding.level),
+            level(if finding.is_unjudged() { "ended" } else { finding.level }),
             word(&sentence(finding))
         );
     }
@@ -192,7 +192,8 @@ fn sentence(finding: &FindingLine) -> String {
     if let Some(limit) = limit {
         let _ = write!(sentence, " (limit {})", short(limit.into()));
     }
-    let _ = write!(sentence, "; was {previous} [{check}]");
+    let ended = if finding.is_unjudged() { "; no longer judged (on the ground or disarmed)" } else { "" };
+    let _ = write!(sentence, "{ended}; was {previous} [{check}]");
     sentence
 }
 
@@ -339,5 +340,24 @@ mod tests {
         assert_eq!(charge, "computer: autopilot: battery 1 low, low or unhealthy; was ok [batt_state]");
         let load = sentence(&finding("load", 97.0, 95.0, "%"));
         assert!(load.contains(", 97 % (limit 95); was ok"), "{load}");
+    }
+
+    #[test]
+    fn what_no_longer_applies_is_not_called_good() {
+        let finding = |value| FindingLine {
+            at: Instant::ZERO,
+            subsystem: "power",
+            check: "cell_voltage".to_owned(),
+            instance: 0,
+            level: "ok",
+            previous: "critical",
+            value,
+            limit: f32::NAN,
+            unit: "V".to_owned(),
+        };
+        let ended = finding(f32::NAN);
+        assert!(ended.is_unjudged() && !finding(4.0).is_unjudged());
+        let words = "power: battery 1 cell low; no longer judged (on the ground or disarmed); was critical [cell_voltage]";
+        assert_eq!(sentence(&ended), words);
     }
 }

@@ -90,10 +90,13 @@ impl Note {
     /// A finding of a check, and the check that explains it.
     pub fn found(finding: &FindingLine, because: Option<&str>) -> Self {
         let known = vocabulary(&finding.check);
-        let words = match known {
+        let mut words = match known {
             Some(known) => known.said.name_of(finding.instance).to_string(),
             None => finding.check.replace('_', " "),
         };
+        if finding.is_unjudged() {
+            words.push_str(": no longer judged (on the ground or disarmed)");
+        }
         let is_worry = matches!(finding.level, "warning" | "critical");
         let (state, value, limit) = match shown(&finding.check, finding.value, finding.limit) {
             Shown::State(state) => (state, None, None),

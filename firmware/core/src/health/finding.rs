@@ -125,7 +125,7 @@ pub struct Finding {
     pub level: Level,
     /// The level before.
     pub previous: Level,
-    /// The value that decided, in the check's unit; NaN where the input stopped.
+    /// The value that decided, in the check's unit; NaN where the input stopped, and where the check no longer applies.
     pub value: f32,
     /// The limit that it crossed, in the same unit; NaN where there is none (stale).
     pub limit: f32,
@@ -135,6 +135,13 @@ pub struct Finding {
     pub feeds: Feeds,
     /// The check whose alarm explains this one; empty where none does. Such a finding is recorded and not told to the ground.
     pub because: &'static str,
+}
+
+impl Finding {
+    /// Whether its check no longer applies, as after landing: what was bad is not known to be good.
+    pub fn is_unjudged(&self) -> bool {
+        self.level == Level::Ok && self.value.is_nan()
+    }
 }
 
 #[cfg(test)]

@@ -251,7 +251,7 @@ fn told_because(findings: &[Comes], because: &'static str) -> Vec<(u64, String)>
                 instance: *instance,
                 previous: *previous,
                 unit: "",
-                value: f32::NAN,
+                value: if *level == Level::Ok { 0.0 } else { f32::NAN },
                 because,
                 ..finding(*level)
             };
@@ -362,6 +362,20 @@ fn what_another_one_explains_is_not_told_nor_that_it_is_over() {
     assert_eq!(told_because(&explained, "heartbeat"), []);
     let expected = [(10, "GPS 1 position lost, FLY MANUALLY"), (110, "ok: GPS 1 fix")];
     assert_eq!(texts(&told(&explained)), expected, "where nothing explains it, both");
+}
+
+#[test]
+fn that_a_check_no_longer_applies_is_not_told_as_good() {
+    let mut telling = Telling::new();
+    let critical = Finding { previous: Level::Warning, ..finding(Level::Critical) };
+    let good = Finding { previous: Level::Critical, value: 40.0, ..finding(Level::Ok) };
+    let landed = Finding { value: f32::NAN, ..good };
+    let now = Instant::from_millis(100_000);
+    for (over, is_told) in [(good, true), (landed, false)] {
+        telling.told(now, &critical);
+        assert_eq!(telling.is_news(&over), is_told);
+    }
+    assert!(!telling.is_news(&good), "the alarm is over");
 }
 
 #[test]
