@@ -45,6 +45,9 @@ const RATIOS_KNOWN: u8 = 20;
 const CLIMBED_M: f32 = 0.3;
 const TRAVELLED_M: f32 = 0.5;
 const TURNED_RAD: f32 = 0.02;
+/// So many times as far a vehicle must have turned where all of its compasses repeat their values at once: an estimator's yaw drifts by 0.02
+/// rad in 3 s while a vehicle holds still, and a compass's digit of a milligauss may hide its noise.
+const ALL_REPEAT_TIMES: f32 = 10.0;
 /// Less is no move, m/s and rad: an estimator trembles and has offsets where a simulator without noise hangs still, and the last digits
 /// of its sensors do not change.
 const HANGS_MPS: f32 = 0.3;
@@ -422,7 +425,22 @@ impl Crosschecks {
             Kind::Barometer => (self.moved.climbed_m, CLIMBED_M),
             Kind::Accelerometer | Kind::Gyro | Kind::Compass => (self.moved.turned_rad, TURNED_RAD),
         };
-        self.sensors[kind as usize].get(usize::from(sensor))?.stuck.lasts(now, moved, least)
+        let stuck = &self.sensors[kind as usize].get(usize::from(sensor))?.stuck;
+        let times =
+            if kind == Kind::Compass && self.all_repeat(now, kind, sensor) { ALL_REPEAT_TIMES } else { 1.0 };
+        stuck.lasts(now, moved, least * times)
+    }
+
+    /// Whether there are others of a sensor's kind, and none of them changed while it repeated its value.
+    fn all_repeat(&self, now: Instant, kind: Kind, sensor: u8) -> bool {
+        let sensors = &self.sensors[kind as usize];
+        let is_other = |(place, other): &(usize, &Sensor)| {
+            *place != usize::from(sensor) && other.fresh(now).is_some() && other.stuck.is_known()
+        };
+        let mut others = sensors.iter().enumerate().filter(is_other).peekable();
+        let stuck = sensors.get(usize::from(sensor)).map(|sensor| &sensor.stuck);
+        others.peek().is_some()
+            && !others.any(|(_, other)| stuck.is_some_and(|stuck| other.stuck.changed_during(stuck)))
     }
 
     /// The same of a receiver.

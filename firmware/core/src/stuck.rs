@@ -3,7 +3,8 @@
 //! In flight the noise of a sensor is far above the last digit of its messages, so that the same value seldom comes twice. How often it
 //! does depends on the sensor, on the message and on how fast it is sent, and is learnt in each flight: the longest time that a value has
 //! been repeated so far is usual. What lasts [`TIMES`] as long is stuck, and is told from [`REPEATS_MIN`] repeats on, once the vehicle has
-//! moved so that the value must have changed: a simulator without noise, and a vehicle on a string, may hold still.
+//! moved so that the value must have changed: a simulator without noise, and a vehicle on a string, may hold still. Whether it moved is an
+//! estimator's word, which drifts; others of the sensor's kind are better witnesses ([`Stuck::changed_during`]).
 //!
 //! Two messages may tell of the same sensor in digits of their own, so a value counts as repeated where it is one of the last two.
 
@@ -62,6 +63,17 @@ impl Stuck {
         self.at_ms.wrapping_sub(self.since_ms)
     }
 
+    /// Whether a sensor's values differ in this flight.
+    pub(crate) const fn is_known(&self) -> bool {
+        self.changes >= CHANGES_KNOWN
+    }
+
+    /// Whether this one took a new value in the second half of the time for which another has repeated its own: what changed both last
+    /// comes in two messages, one after the other.
+    pub(crate) const fn changed_during(&self, other: &Self) -> bool {
+        self.since_ms.wrapping_sub(other.since_ms) as i32 > (other.lasts_ms() / 2) as i32
+    }
+
     /// For how long it has been stuck, s; 0 while it is not. The vehicle has moved so far, and must have moved by `least`
     /// meanwhile, and again by as much each [`MOVES_MS`].
     pub(crate) fn lasts(&self, now: Instant, moved: f32, least: f32) -> Option<Reading> {
@@ -69,7 +81,7 @@ impl Stuck {
             && self.lasts_ms() > self.usual_ms.saturating_mul(TIMES)
             && moved - self.moved >= least * (self.lasts_ms() as f32 / MOVES_MS).max(1.0);
         let value = if stuck { self.lasts_ms() as f32 / 1_000.0 } else { 0.0 };
-        (self.changes >= CHANGES_KNOWN).then_some(Reading { at: now, value })
+        self.is_known().then_some(Reading { at: now, value })
     }
 }
 
@@ -99,6 +111,21 @@ mod tests {
         let slow = || (0..300).map(|tenth| tenth / 10);
         assert_eq!(taken(slow()), Some(0.0));
         assert!(taken(slow().chain([99; 61])).is_some_and(|lasts_s| (lasts_s - 6.0).abs() < 0.01));
+    }
+
+    #[test]
+    fn a_witness_changes_while_another_repeats_and_not_at_its_last_change() {
+        let taken = |values: &mut dyn Iterator<Item = u32>| {
+            let mut stuck = Stuck::NEW;
+            for (tenth, value) in (0_u64..).zip(values) {
+                stuck.take(Instant::from_millis(u64::from(u32::MAX) - 3_000 + tenth * 100), [value], 0.0);
+            }
+            stuck
+        };
+        let stuck = taken(&mut (0..30).chain([99; 20]));
+        assert!(taken(&mut (0..50)).changed_during(&stuck));
+        assert!(!taken(&mut (0..33).chain([99; 17])).changed_during(&stuck), "a message later");
+        assert!(!taken(&mut (0..20).chain([99; 30])).changed_during(&stuck), "stuck before it");
     }
 
     #[test]

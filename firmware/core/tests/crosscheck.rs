@@ -539,6 +539,29 @@ fn a_sensor_that_repeats_one_value_is_named() {
 }
 
 #[test]
+fn compasses_that_all_repeat_their_values_are_stuck_once_the_vehicle_turns() {
+    let held = Fitted::healthy(FAULT_MS);
+    // What holds still, and whose estimator drifts.
+    is_quiet(|now_ms, fitted| {
+        if now_ms >= FAULT_MS {
+            (fitted.field, fitted.attitude_noise) = (held.field, 0.0);
+            fitted.quad.roll = (now_ms - FAULT_MS).min(5_000) as f32 * 0.008 / 1_000.0;
+        }
+    });
+    let findings = fly(|now_ms, fitted| {
+        if now_ms >= FAULT_MS {
+            fitted.field = held.field;
+            fitted.attitude_noise = 0.05;
+        }
+    });
+    for part in 0..3 {
+        let told = |finding: &Finding| finding.check == "compass_stuck" && finding.instance == part;
+        let at_ms = findings.iter().find(|finding| told(finding)).map(|finding| finding.at.as_millis());
+        assert!(at_ms.is_some_and(|at_ms| at_ms < FAULT_MS + 3_000), "{part}: {findings:?}");
+    }
+}
+
+#[test]
 fn a_slow_sensor_and_one_that_always_says_the_same_are_not_stuck() {
     is_quiet(|now_ms, fitted| {
         let slow = Fitted::healthy(now_ms / 2_000 * 2_000);

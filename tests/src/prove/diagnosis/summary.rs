@@ -15,16 +15,21 @@ pub(super) const TITLE: &str = "## In short";
 
 /// The section.
 pub(super) fn section(sets: &[Judged]) -> String {
-    let labelled = |known| sets.iter().filter(move |set| set.is_labelled && set.known == known);
-    let (known, words) = match labelled(Known::No).next() {
-        Some(_) => (Known::No, "seen by nobody who chose the limits"),
-        None => (Known::Yes, "known to whoever chose the limits"),
+    let labelled = |known| {
+        let of_it = sets.iter().filter(move |set| set.is_labelled && set.known == known);
+        (of_it.flat_map(|set| &set.outcomes).collect::<Vec<&Outcome>>(), words(known))
     };
-    let flights: Vec<&Outcome> = labelled(known).flat_map(|set| &set.outcomes).collect();
+    let best = |is_enough: fn(&[&Outcome]) -> bool| {
+        Some(labelled(Known::No))
+            .filter(|(flights, _)| is_enough(flights))
+            .unwrap_or_else(|| labelled(Known::Yes))
+    };
+    let (faulty, who) = best(|flights| flights.iter().any(|one| one.fault.is_some()));
+    let (quiet, whose) = best(|flights| !flights.is_empty());
     let further: Vec<&Outcome> =
         sets.iter().filter(|set| !set.is_labelled).flat_map(|set| &set.outcomes).collect();
-    let mut text = format!("{TITLE}\n\n* Simulator flights, {words}: {}", found(&flights));
-    let _ = write!(text, "* In the same flights, while nothing was wrong: {}", alarms(&flights));
+    let mut text = format!("{TITLE}\n\n* Simulator flights, {who}: {}", found(&faulty));
+    let _ = write!(text, "* Simulator flights, {whose}, while nothing was wrong: {}", alarms(&quiet));
     let flown: Vec<&Outcome> = further.iter().copied().filter(|one| by_hand::is_vehicle(one)).collect();
     if !flown.is_empty() {
         let alarms = by_hand::alarms(&flown);
@@ -39,6 +44,13 @@ pub(super) fn section(sets: &[Judged]) -> String {
         let _ = write!(text, "* {words}: {}", alarms(&rest));
     }
     text
+}
+
+const fn words(known: Known) -> &'static str {
+    match known {
+        Known::No => "seen by nobody who chose the limits",
+        Known::Yes | Known::Seen => "known to whoever chose the limits",
+    }
 }
 
 fn found(flights: &[&Outcome]) -> String {
