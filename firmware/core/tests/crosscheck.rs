@@ -548,6 +548,18 @@ fn compasses_that_all_repeat_their_values_are_stuck_once_the_vehicle_turns() {
             fitted.quad.roll = (now_ms - FAULT_MS).min(5_000) as f32 * 0.008 / 1_000.0;
         }
     });
+    // Of what changes all of them the first one's message tells 0.2 s later.
+    is_quiet(|now_ms, fitted| {
+        let late_ms = [200, 0, 0];
+        for (field, late_ms) in fitted.field.iter_mut().zip(late_ms) {
+            let is_changed = now_ms >= FAULT_MS + 3_000 + late_ms;
+            let still_ms = if is_changed { FAULT_MS + 3_000 } else { now_ms.min(FAULT_MS) };
+            field[2] = 0.4 + 0.01 * noise(still_ms, 40);
+        }
+        fitted.attitude_noise = if now_ms < FAULT_MS { 0.01 } else { 0.0 };
+        let drifts_ms = now_ms.clamp(FAULT_MS, FAULT_MS + 5_000) - FAULT_MS;
+        fitted.quad.roll = drifts_ms as f32 * 0.008 / 1_000.0;
+    });
     let findings = fly(|now_ms, fitted| {
         if now_ms >= FAULT_MS {
             fitted.field = held.field;

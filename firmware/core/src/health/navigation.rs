@@ -205,7 +205,13 @@ pub(super) const CHECKS: &[Check] = &[
     },
     STUCK,
     Check { name: "gyro_stuck", read: |inputs, sensor| stuck(inputs, Kind::Gyro, sensor), ..STUCK },
-    Check { name: "compass_stuck", read: |inputs, sensor| stuck(inputs, Kind::Compass, sensor), ..STUCK },
+    Check {
+        name: "compass_stuck",
+        // What changed all compasses is in one message up to 0.2 s before another.
+        debounce_warn: Span::from_millis(300),
+        read: |inputs, sensor| stuck(inputs, Kind::Compass, sensor),
+        ..STUCK
+    },
     Check { name: "baro_stuck", read: |inputs, sensor| stuck(inputs, Kind::Barometer, sensor), ..STUCK },
     Check {
         name: "gps_stuck",
