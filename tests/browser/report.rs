@@ -360,8 +360,8 @@ fn a_folder_of_pages_has_a_table_and_flights_stand_side_by_side() {
     let rows = table(&mut page, "#pages");
     assert_eq!(rows.len(), 2);
     // The headings sort, also from the keyboard.
-    let air = |rows: &[Vec<String>]| rows.iter().map(|row| row[6].clone()).collect::<Vec<_>>();
-    page.run("document.querySelectorAll('#pages .sort')[6].focus()");
+    let air = |rows: &[Vec<String>]| rows.iter().map(|row| row[7].clone()).collect::<Vec<_>>();
+    page.run("document.querySelectorAll('#pages .sort')[7].focus()");
     page.press(&["ENTER"]);
     let (falling, other) = (air(&table(&mut page, "#pages")), {
         page.press(&["ENTER"]);
@@ -375,6 +375,7 @@ fn a_folder_of_pages_has_a_table_and_flights_stand_side_by_side() {
     // Each row leads to its page, which says what changed since the flight before.
     page.run("document.querySelector('#pages a').click()");
     page.wait("return document.title.includes('ap_quad_faults') && document.documentElement.dataset.ready === 'true'", 20);
+    assert_times(&mut page, &flights[1]);
     let [before, now] = [0, 1].map(|flight: usize| parameters(&flights[flight], true));
     let first = parameters(&flights[1], false);
     let differ: Vec<&String> = first
@@ -396,6 +397,11 @@ fn a_folder_of_pages_has_a_table_and_flights_stand_side_by_side() {
     page.wait("return document.documentElement.dataset.ready === 'true'", 20);
     let width = page.run("return [document.documentElement.scrollWidth, innerWidth]");
     assert!(width[0].as_f64() <= width[1].as_f64(), "{width}");
+    let found = page.run(
+        "return [...document.querySelectorAll('#pages .badge')].map((badge) => badge.getBoundingClientRect().right)",
+    );
+    let found: Vec<f64> = found.as_array().unwrap().iter().map(|right| right.as_f64().unwrap()).collect();
+    assert!(found.len() == 2 && found.iter().all(|right| *right < 390.0), "out of view: {found:?}");
     page.run("document.querySelector('#comparisons a').click()");
     page.wait(
         "return document.title.includes('side by side') && document.documentElement.dataset.ready === 'true'",
@@ -404,6 +410,19 @@ fn a_folder_of_pages_has_a_table_and_flights_stand_side_by_side() {
     page.open(page_of(&pages, "compare-").as_str(), "light", 1280, 900);
     page.wait("return document.documentElement.dataset.ready === 'true'", 20);
     assert_compared(&mut page, &pages, &now, &before);
+}
+
+/// Findings stand at the times that `hums check` and `hums info` tell.
+#[track_caller]
+fn assert_times(page: &mut LivePage, recording: &Path) {
+    let info = json(&hums(["info".as_ref(), "--json".as_ref(), recording.as_os_str()]).text());
+    let findings = info["logs"][0]["findings"].as_array().unwrap();
+    let seconds = findings.iter().map(|finding| finding["time_s"].as_f64().unwrap() as u64);
+    let expected: Vec<String> = seconds.map(|s| format!("{}:{:02}", s / 60, s % 60)).collect();
+    let shown = page
+        .run("return [...document.querySelectorAll('.notes .finding time')].map((time) => time.textContent)");
+    assert!(!expected.is_empty());
+    assert_eq!(shown, serde_json::json!(expected));
 }
 
 fn page_of(pages: &Path, begins: &str) -> String {
@@ -565,6 +584,25 @@ for (let text = walk.nextNode(); text; text = walk.nextNode()) {
 return worst;
 ";
 
+/// Also from a wide window all plots are drawn for paper, as wide as A4 within its margins, before they are laid out there.
+#[track_caller]
+fn assert_fits_on_paper(page: &mut LivePage, address: &str) {
+    page.open(address, "light", 1920, 1000);
+    page.wait("return document.documentElement.dataset.ready === 'true'", 20);
+    let beyond = "
+        const right = document.querySelector('main').getBoundingClientRect().left + 704;
+        return [...document.querySelectorAll('.plot .uplot, #timeline')].filter((plot) => {
+          const [own, around] = [plot, plot.parentElement].map((node) => node.getBoundingClientRect());
+          return own.right > right || own.right > around.right + 1;
+        }).length";
+    let plots = page.run("return document.querySelectorAll('.plot .uplot').length");
+    assert!(plots.as_u64() > Some(10) && page.run(beyond).as_u64() > Some(0), "{plots} plots are wide");
+    page.run("dispatchEvent(new Event('beforeprint'))");
+    assert_eq!(page.run(beyond), 0);
+    page.run("dispatchEvent(new Event('afterprint'))");
+    assert!(page.run(beyond).as_u64() > Some(0), "as it was");
+}
+
 #[test]
 fn a_report_is_read_on_paper_in_the_dark_with_high_contrast_on_a_phone_and_from_the_keyboard() {
     let recording = Recording::make(Machine::Sim, &own("ap_quad_faults.tlog"), &[]);
@@ -607,6 +645,7 @@ fn a_report_is_read_on_paper_in_the_dark_with_high_contrast_on_a_phone_and_from_
     // Nothing that can be clicked is out of its reach.
     let mute = page.run("return [...document.querySelectorAll('[onclick], tr.go, .notes li, canvas[role=slider]')].filter((node) => node.tabIndex < 0).length");
     assert_eq!(mute, 0);
+    assert_fits_on_paper(&mut page, &address);
     let pdf = dir.path().join("report.pdf");
     page.pdf(&pdf);
     let bytes = fs::read(&pdf).unwrap();

@@ -89,6 +89,8 @@ enum State {
     Damaged,
     /// The recorder says itself, or it is seen, that it did not write all.
     Lossy,
+    /// All that came was written, and some of it is no frame: noise on the line, or words before the first frame.
+    NotFrames,
     /// A log of ours without damage, of which nothing proves that it is whole.
     NotProved,
     /// A log of ours that lacks nothing, because sectors that a card had lost were made again from parity.
@@ -104,6 +106,7 @@ impl State {
             Self::Cut => "cut at its end",
             Self::Damaged => "part of it is missing or damaged",
             Self::Lossy => "part of it was not recorded",
+            Self::NotFrames => "bytes of no frame are in it",
             Self::NotProved => "not proved to be whole",
             Self::MadeAgain => "damaged, and made whole from its parity",
             Self::Unprotected => "whole, without all of its parity",
@@ -116,6 +119,9 @@ fn state(checked: &Checked) -> State {
     let mut damages = judged.gaps.iter().filter(|gap| gap.cause.is_damage());
     match judged.damages {
         0 if checked.ending.as_ref().is_some_and(|ending| !ending.unproved().is_empty()) => State::NotProved,
+        0 if judged.losses > 0 && !judged.gaps.is_empty() && judged.gaps.iter().all(is_noise) => {
+            State::NotFrames
+        }
         0 if judged.losses > 0 => State::Lossy,
         0 if checked.ending.as_ref().is_some_and(|ending| ending.made_again() > 0) => State::MadeAgain,
         0 if checked.ending.as_ref().is_some_and(|ending| ending.unprotected() > 0) => State::Unprotected,
@@ -123,6 +129,11 @@ fn state(checked: &Checked) -> State {
         _ if damages.all(|gap| gap.cause == Cause::Cut) => State::Cut,
         _ => State::Damaged,
     }
+}
+
+/// Whether nothing is missing there: bytes are in the recording that are no frame.
+fn is_noise(gap: &Gap) -> bool {
+    gap.cause == Cause::Lost && gap.bytes > 0
 }
 
 /// What the verdict is not about: the end of its line.
@@ -133,6 +144,7 @@ fn but(checked: &Checked) -> String {
         State::Cut => "; the log is cut at its end".to_owned(),
         State::Damaged => "; part of the log is missing or damaged, and was not judged".to_owned(),
         State::Lossy => "; part of the time was not recorded".to_owned(),
+        State::NotFrames => "; bytes of no frame are in it".to_owned(),
         State::NotProved => "; the log is not proved to be whole".to_owned(),
         State::MadeAgain => "; the log was damaged, and made whole from its parity".to_owned(),
         State::Unprotected => "; the log is whole, without all of its parity".to_owned(),

@@ -10,6 +10,7 @@ use super::page::whole;
 use super::replay::Replay;
 use super::trend::airframe;
 use crate::names::{autopilot_name, type_name};
+use crate::plural;
 use crate::summary::Overview;
 use crate::utc::iso8601;
 
@@ -83,6 +84,16 @@ impl Pages {
     }
 }
 
+/// Why a recording is not whole; of that of another program also what its recorder did not write.
+fn faults(log: &Overview) -> Vec<String> {
+    let mut faults = log.faults();
+    let losses = log.ending.summary.losses;
+    if log.format.is_some() && losses > 0 {
+        faults.push(format!("{} of loss or noise; hums check says what", plural::count(losses, "place")));
+    }
+    faults
+}
+
 impl Row {
     /// Of a page.
     pub fn new(file: String, log: &Overview, replay: &Replay) -> Self {
@@ -110,7 +121,7 @@ impl Row {
             checked: contents.checked_by() != "nobody" && (vehicle.is_some() || log.format.is_none()),
             critical: count("critical"),
             warning: count("warning"),
-            faults: log.faults(),
+            faults: faults(log),
         }
     }
 }

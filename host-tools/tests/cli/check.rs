@@ -748,3 +748,15 @@ fn what_another_vehicle_flew_teaches_nothing_and_is_said() {
     let alone = attempt(dir.path(), &format!("check {px4}"));
     assert_eq!(piped.status.code(), alone.status.code());
 }
+
+#[test]
+fn bytes_of_no_frame_are_told_as_that_and_not_as_time_that_is_missing() {
+    let dir = tempfile::tempdir().expect("directory");
+    fs::copy(flight("ap_quad_signed.raw"), dir.path().join("signed.raw")).expect("a copy");
+    let checked = text(&run(dir.path(), "check signed.raw", 0));
+    assert!(checked.contains("; bytes of no frame are in it"), "{checked}");
+    assert!(!checked.contains("not recorded"), "{checked}");
+    run(dir.path(), "report signed.raw -o pages/", 0);
+    let table = fs::read_to_string(dir.path().join("pages/index.html")).expect("a table");
+    assert!(table.contains("\"faults\":[\"1 place of loss or noise; hums check says what\"]"));
+}

@@ -7,7 +7,7 @@ export const log = data.log;
 
 if (data.flight) flight.take(data.flight);
 flight.epoch_ms = data.epoch_us == null ? null : data.epoch_us / 1000;
-// Seconds since the monitor's power-on.
+// Seconds of the recording's own clock, whose zero is that of `hums check`, `hums info` and `hums decode`.
 flight.start = log.start_s ?? 0;
 flight.end = Math.max(log.end_s ?? 0, flight.start + 1);
 // One whose length is not known is a place; one that is nowhere is told in the table alone.

@@ -47,6 +47,8 @@ export const flight = {
   version: 0,
   begin: 0,
   step: 1,
+  // What times count from, and where the flight's own time begins.
+  zero: 0,
   start: 0,
   end: 1,
   last: 0,

@@ -3,7 +3,7 @@
 import { badge } from "./badge.js";
 import { say, attribute, toggle, panel } from "./dom.js";
 import { el } from "./elements.js";
-import { fixed, whole, clock, age } from "./text.js";
+import { fixed, whole, span, age } from "./text.js";
 
 const SUBSYSTEMS = ["power", "propulsion", "engine", "structure", "navigation", "link", "computer", "attitude", "recorder", "mishap"];
 
@@ -40,9 +40,9 @@ export const board = () => {
 
 const DUE = { green: ["ok", "good"], yellow: ["warning", "soon"], red: ["critical", "due"] };
 const USAGE = [
-  ["flight_time_s", "In the air", clock, ""],
+  ["flight_time_s", "In the air", span, ""],
   ["flights", "Flights", whole, ""],
-  ["armed_time_s", "Armed", clock, ""],
+  ["armed_time_s", "Armed", span, ""],
   ["distance_m", "Distance", whole, "m"],
   ["height_max_m", "Greatest height", (v) => fixed(v, 1), "m"],
   ["speed_max_m_s", "Greatest speed", (v) => fixed(v, 1), "m/s"],
@@ -159,7 +159,7 @@ export const link = () => {
           companion.recorder == null ? "not told" : companion.recorder === "ok" ? "recording" : companion.recorder,
         );
         const counted = [
-          companion.flight_s == null ? "" : `${clock(companion.flight_s)} in the air`,
+          companion.flight_s == null ? "" : `${span(companion.flight_s)} in the air`,
           companion.flights == null ? "" : companion.flights === 1 ? "1 flight" : `${whole(companion.flights)} flights`,
         ].filter(Boolean);
         say(told, counted.length ? `on board: ${counted.join(", ")}` : "");

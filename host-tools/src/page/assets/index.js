@@ -29,6 +29,12 @@ const COLUMNS = [
     ({ name }) => name,
     ({ name, file }) => el("a", { href: encodeURIComponent(file) }, name.length > 48 ? `\u2026${name.slice(-47)}` : name),
   ],
+  [
+    "Findings",
+    "t",
+    (page) => RANK[worst(page)] * 1e6 + page.critical * 1e3 + page.warning,
+    (page) => el("span", { class: `badge ${worst(page) === "not checked" ? "stale" : worst(page)}` }, verdict(page)),
+  ],
   ["Vehicle", "words", ({ vehicle }) => vehicle ?? "", ({ vehicle }) => vehicle ?? "not known"],
   ["Airframe", "words", ({ airframe }) => airframe ?? "", ({ airframe }) => airframe ?? ""],
   ["Length", "n", ({ duration_s }) => duration_s ?? -1, ({ duration_s }) => span(duration_s)],
@@ -45,12 +51,6 @@ const COLUMNS = [
     "n",
     ({ speed_max_m_s }) => speed_max_m_s ?? -1,
     ({ speed_max_m_s }) => (speed_max_m_s == null ? "" : `${fixed(speed_max_m_s, 1)} m/s`),
-  ],
-  [
-    "Findings",
-    "t",
-    (page) => RANK[worst(page)] * 1e6 + page.critical * 1e3 + page.warning,
-    (page) => el("span", { class: `badge ${worst(page) === "not checked" ? "stale" : worst(page)}` }, verdict(page)),
   ],
   ["Recording is", "words", ({ faults }) => faults.length, ({ faults }) => faults.join("; ") || "whole"],
 ];

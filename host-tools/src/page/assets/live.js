@@ -214,7 +214,7 @@ const drawState = () => {
   if (connected) overall.set(state.overall);
   if (!begun) {
     begun = true;
-    flight.start = head.source.recording ? head.source.start_s : flight.begin;
+    flight.zero = flight.start = head.source.recording ? head.source.start_s : flight.begin;
   }
   // The moment that the instruments show.
   const shown = time.held ?? state;

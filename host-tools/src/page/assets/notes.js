@@ -65,7 +65,7 @@ export const notes = ({ go, newestFirst, rows = Infinity }) => {
     return el(
       "li",
       { class: `${note.kind} ${note.level}`, tabindex: 0, "data-at": note.at_s, "data-check": found?.check },
-      el("time", { title: utc(note.at_s) && `${utc(note.at_s)} UTC` }, clock(note.at_s - flight.start)),
+      el("time", { title: utc(note.at_s) && `${utc(note.at_s)} UTC` }, clock(note.at_s - flight.zero)),
       level.node,
       el("span", { class: "words" }, note.words),
       el("small", {}, [from, found && measured(found)].filter(Boolean).join(" \u00b7 ")),

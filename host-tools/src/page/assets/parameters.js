@@ -7,7 +7,7 @@ import { cells, rows } from "./layout.js";
 import { clock, plural, short } from "./text.js";
 
 const course = (values) =>
-  values.map(([at, value], i) => (i ? `${short(value)} at ${clock(at - flight.start)}` : short(value))).join(" \u2192 ");
+  values.map(([at, value], i) => (i ? `${short(value)} at ${clock(at - flight.zero)}` : short(value))).join(" \u2192 ");
 const last = ({ values }) => values[values.length - 1][1];
 // A parameter is of single precision on the wire.
 const same = (one, other) => Math.fround(one) === Math.fround(other);

@@ -31,7 +31,7 @@ const range = (low, high, { limits, decimals } = {}) => {
 };
 const times = (_u, splits) => {
   const fine = splits.length > 1 && splits[1] - splits[0] < 1;
-  return splits.map((s) => (fine ? fixed(s - flight.start, 1) : clock(Math.round(s - flight.start))));
+  return splits.map((s) => (fine ? fixed(s - flight.zero, 1) : clock(Math.round(s - flight.zero))));
 };
 const dashed = (ctx, name, dash, points) => {
   ctx.strokeStyle = colour(name);

@@ -58,8 +58,8 @@ export const recorderSection = () => {
                   cells(
                     [
                       own ? `gap: ${g.cause}, ${plural(g.sectors_lost + g.sectors_skipped, "sector")}` : `gap: ${g.cause}`,
-                      g.from_s == null ? "the beginning" : `${fixed(g.from_s - flight.start, 3)} s`,
-                      g.to_s == null ? "the end" : `${fixed(g.to_s - flight.start, 3)} s`,
+                      g.from_s == null ? "the beginning" : `${fixed(g.from_s - flight.zero, 3)} s`,
+                      g.to_s == null ? "the end" : `${fixed(g.to_s - flight.zero, 3)} s`,
                       g.frames_missing == null ? "unknown" : plural(g.frames_missing, "frame"),
                     ],
                     ["", "n", "n", "n"],
@@ -70,8 +70,8 @@ export const recorderSection = () => {
                   cells(
                     [
                       `lost: ${words(l.what)}`,
-                      `${fixed(l.from_s - flight.start, 3)} s`,
-                      `${fixed(l.to_s - flight.start, 3)} s`,
+                      `${fixed(l.from_s - flight.zero, 3)} s`,
+                      `${fixed(l.to_s - flight.zero, 3)} s`,
                       whole(l.count),
                     ],
                     ["", "n", "n", "n"],

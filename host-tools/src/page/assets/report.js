@@ -36,6 +36,9 @@ const verdict =
           .filter(count)
           .map((level) => counted(count(level), level))
           .join(", ");
+// Of a recording of frames alone it is the first of them.
+const POWER_ON = "the autopilot's power-on";
+const ZEROS = { hums: "the monitor's power-on", dataflash: POWER_ON, ulog: POWER_ON };
 const when = log.start_utc ? `${log.start_utc.slice(0, 10)} ${log.start_utc.slice(11, 19)} UTC` : "time of day unknown";
 const session = log.format === "hums" ? "session " : "";
 document.title = `${name}, ${session}${log.name}, ${when}`;
@@ -126,7 +129,7 @@ section("sent", "Messages sent").append(
 document
   .getElementById("foot")
   .append(
-    `Made by hums ${data.version}. Times count from the session's start; intervals of ${
+    `Made by hums ${data.version}. Times count from ${ZEROS[log.format] ?? "the first frame"}, as in hums check and hums info; intervals of ${
       flight.step >= 1 ? `${flight.step} s` : `${flight.step * 1000} ms`
     } keep their lowest and highest value. Plots: uPlot, MIT.`,
   );

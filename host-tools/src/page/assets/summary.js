@@ -52,7 +52,7 @@ const identity = () =>
 
 // When it landed, or how the flight ended otherwise.
 const landing = (f) => {
-  const at = utc(f.to_s) || span(f.to_s - flight.start);
+  const at = utc(f.to_s) || span(f.to_s - flight.zero);
   if (f.landed) return at;
   if (f.disarmed_in_air) return `disarmed in the air, ${at}`;
   return flight.end - f.to_s < 5 ? "in the air at the end" : `not seen, last in the air ${at}`;
@@ -66,7 +66,7 @@ const flights = (go) =>
           cells(
             [
               i + 1,
-              utc(f.from_s) || span(f.from_s - flight.start),
+              utc(f.from_s) || span(f.from_s - flight.zero),
               landing(f),
               span(f.air_s),
               `${fixed(f.height_max_m, 1)} m`,

@@ -46,7 +46,7 @@ export const timeline = (go = lookAt) => {
     attribute(strip, "aria-valuemin", String(Math.round(flight.start)));
     attribute(strip, "aria-valuemax", String(Math.round(flight.end)));
     attribute(strip, "aria-valuenow", String(Math.round(here)));
-    attribute(strip, "aria-valuetext", clock(here - flight.start));
+    attribute(strip, "aria-valuetext", clock(here - flight.zero));
     const ctx = canvas(strip, width(), HEIGHT);
     ctx.fillStyle = colour("soft");
     ctx.fillRect(0, PHASE_TOP, width(), MODE_TOP + ROW - PHASE_TOP);
@@ -71,8 +71,8 @@ export const timeline = (go = lookAt) => {
     }
     const step = STEPS.find((s) => (flight.end - flight.start) / s <= width() / 90) ?? STEPS[STEPS.length - 1];
     ctx.fillStyle = colour("dim");
-    for (let at = flight.start; at <= flight.end; at += step) {
-      const text = clock(Math.round(at - flight.start)),
+    for (let at = flight.zero + Math.ceil((flight.start - flight.zero) / step) * step; at <= flight.end; at += step) {
+      const text = clock(Math.round(at - flight.zero)),
         wide = ctx.measureText(text).width;
       ctx.fillRect(x(at), AXIS_TOP, 1, 4);
       ctx.fillText(text, Math.min(Math.max(x(at) - wide / 2, 0), width() - wide), AXIS_TOP + 18);

@@ -53,7 +53,7 @@ export const moveCursor = (at) => {
   view.cursor = at;
   cursorTime.hidden = at == null;
   if (at != null) {
-    time.textContent = `${clock(at - flight.start)}.${Math.floor(Math.abs(at - flight.start) * 10) % 10}`;
+    time.textContent = `${clock(at - flight.zero)}.${Math.floor(Math.abs(at - flight.zero) * 10) % 10}`;
     day.textContent = utc(at) ? `${utc(at)} UTC` : "";
   }
   for (const follower of cursorFollowers) follower();
