@@ -92,13 +92,16 @@ fn bring(client: Client, args: &cli::Pull) -> Result<Outcome> {
         bail!("{missing}: the board has no such log; it has {}", names.join(", "));
     }
     let all: Vec<String> = logs.iter().filter(|(_, bytes)| *bytes > 0).map(|(log, _)| log.clone()).collect();
+    let begun = logs.last().map(|(log, _)| log.clone());
     logs.retain(|(log, _)| args.names.is_empty() || args.names.contains(log));
     if let Some(moment) = &args.around {
         return around(&mut ftp, logs, args, moment);
     }
+    // One that was begun just now may have nothing in it yet.
+    let begun = begun.filter(|_| args.names.is_empty());
     let newest = args.last.unwrap_or(logs.len()).min(logs.len());
     let mut pulled = Vec::new();
-    let came = bring_each(&mut ftp, logs.split_off(logs.len() - newest), args, &mut pulled);
+    let came = bring_each(&mut ftp, logs.split_off(logs.len() - newest), begun.as_deref(), args, &mut pulled);
     // Also what came before an error.
     let judged = judge(&all, &mut pulled);
     let outcome = came?.and(judged?);
@@ -108,10 +111,11 @@ fn bring(client: Client, args: &cli::Pull) -> Result<Outcome> {
     Ok(outcome)
 }
 
-/// Brings these logs whole, one after the other.
+/// Brings these logs whole, one after the other. Of `begun` it is no loss that nothing is in it.
 fn bring_each(
     ftp: &mut Ftp,
     logs: Vec<(String, u32)>,
+    begun: Option<&str>,
     args: &cli::Pull,
     pulled: &mut Vec<LogJson>,
 ) -> Result<Outcome> {
@@ -122,6 +126,11 @@ fn bring_each(
                 note!(
                     "{name}: has {} by the board's directory, and none when it is opened; call again",
                     count(bytes, "byte")
+                );
+                outcome = Outcome::Losses;
+            } else if begun != Some(name.as_str()) {
+                note!(
+                    "{name}: nothing of it came, and it may have a flight in it: read the card itself, or an image of it"
                 );
                 outcome = Outcome::Losses;
             }

@@ -475,6 +475,21 @@ fn a_board_that_contradicts_itself_is_told() {
 }
 
 #[test]
+fn a_log_of_which_nothing_came_is_a_loss_unless_it_is_begun_just_now() {
+    let two = |first: Vec<u8>, second: Vec<u8>| -> Files {
+        vec![("00001_00.HUM".to_owned(), first), ("00002_00.HUM".to_owned(), second)]
+    };
+    let first_lost = two(Vec::new(), recorded(7, 30));
+    let begun = two(recorded(7, 30), Vec::new());
+    let code = |files: &Files, args: &[&str]| brought(files, args).expect("told");
+    let alone = code(&two(recorded(7, 30), recorded(8, 30)), &["--last", "1"]);
+    assert_eq!(code(&first_lost, &[]), Outcome::Losses);
+    assert_eq!(code(&begun, &["--last", "1"]), Outcome::Done);
+    assert_eq!(code(&begun, &["00002_00.HUM"]), Outcome::Losses, "it was asked for by its name");
+    assert_eq!(code(&first_lost, &["--last", "1"]), alone, "and what was not asked for is none");
+}
+
+#[test]
 fn what_comes_of_a_burst_is_handed_on_before_its_end() {
     let mut ftp = board(vec![7; 10_000], Vec::new(), u32::MAX);
     ftp.open(NAME).expect("a log");
