@@ -55,6 +55,9 @@ pub struct FindingLine {
 }
 
 impl FindingLine {
+    /// What people read of a check that no longer applies.
+    pub const UNJUDGED: &str = "no longer judged (on the ground or disarmed)";
+
     /// Whether the check no longer applies, as after landing: what was bad is not known to be good.
     pub fn is_unjudged(&self) -> bool {
         self.level == Level::Ok.name() && self.value.is_nan()

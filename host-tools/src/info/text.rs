@@ -192,8 +192,10 @@ fn sentence(finding: &FindingLine) -> String {
     if let Some(limit) = limit {
         let _ = write!(sentence, " (limit {})", short(limit.into()));
     }
-    let ended = if finding.is_unjudged() { "; no longer judged (on the ground or disarmed)" } else { "" };
-    let _ = write!(sentence, "{ended}; was {previous} [{check}]");
+    if finding.is_unjudged() {
+        let _ = write!(sentence, "; {}", FindingLine::UNJUDGED);
+    }
+    let _ = write!(sentence, "; was {previous} [{check}]");
     sentence
 }
 

@@ -95,7 +95,7 @@ impl Note {
             None => finding.check.replace('_', " "),
         };
         if finding.is_unjudged() {
-            words.push_str(": no longer judged (on the ground or disarmed)");
+            words = format!("{words}: {}", FindingLine::UNJUDGED);
         }
         let is_worry = matches!(finding.level, "warning" | "critical");
         let (state, value, limit) = match shown(&finding.check, finding.value, finding.limit) {

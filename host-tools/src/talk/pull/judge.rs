@@ -65,8 +65,9 @@ fn judge_at_once(runs: &[Run], pulled: &mut [LogJson]) -> Result<Outcome> {
             return Ok(tell(run, pulled, &[]));
         }
         (Err(_), _) => {
-            let each = runs.iter().map(|run| judge_at_once(std::slice::from_ref(run), pulled));
-            return each.into_iter().try_fold(Outcome::Done, |all, one| Ok(all.and(one?)));
+            return runs.iter().try_fold(Outcome::Done, |all, run| {
+                Ok(all.and(judge_at_once(std::slice::from_ref(run), pulled)?))
+            });
         }
     };
     let mut outcome = Outcome::Done;

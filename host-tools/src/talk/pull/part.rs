@@ -278,6 +278,12 @@ mod tests {
         sector
     }
 
+    /// What is kept of a part under this number.
+    fn kept(part: &Path, number: u32) -> Option<Vec<u8>> {
+        let folder = part.with_file_name("hums-kept").join(number.to_string());
+        fs::read(folder.join(part.file_name().expect("a name"))).ok()
+    }
+
     #[test]
     fn what_is_in_a_part_is_known_again_and_what_is_torn_is_not() {
         let dir = tempfile::tempdir().expect("a folder");
@@ -321,10 +327,6 @@ mod tests {
         let dir = tempfile::tempdir().expect("a folder");
         let whole = dir.path().join("00042-s00000007_07.HUM");
         let path = part_name(&whole);
-        let kept = |number: u32| {
-            let folder = dir.path().join("hums-kept").join(number.to_string());
-            fs::read(folder.join(path.file_name().expect("a name"))).expect("kept")
-        };
         let other = |number: u8| {
             let mut sector = sector(number);
             sector.seal(8);
@@ -342,7 +344,7 @@ mod tests {
         {
             fs::write(&path, what).expect("written");
             let part = Part::open(&whole, 8, &head).expect("it begins anew");
-            assert_eq!(kept(number), what, "{number}");
+            assert_eq!(kept(&path, number).as_deref(), Some(what), "{number}");
             assert!((0..8).all(|place| !part.has(place)), "{number}");
             drop(part);
             assert_eq!(fs::read(&path).expect("a part"), [0; 8 * SECTOR_BYTES]);
@@ -360,10 +362,6 @@ mod tests {
         let dir = tempfile::tempdir().expect("a folder");
         let whole = dir.path().join("00042-s00000007_07.HUM");
         let path = part_name(&whole);
-        let kept = |number: u32| {
-            let folder = dir.path().join("hums-kept").join(number.to_string());
-            fs::read(folder.join(path.file_name().expect("a name"))).ok()
-        };
         let mut changed = *sector(1).bytes();
         changed[300] ^= 1;
         let mut in_progress = sector(2);
@@ -377,11 +375,11 @@ mod tests {
         for place in [2, 5] {
             part.put(place, &sector(place as u8)).expect("room");
         }
-        assert_eq!(kept(1), None);
+        assert_eq!(kept(&path, 1), None);
         part.put(1, &sector(1)).expect("room");
         part.put(4, &sector(4)).expect("room");
         let before = [&there[..1024], sector(2).bytes(), &there[1536..], &sector(5).bytes()[..]].concat();
-        assert_eq!((kept(1), kept(2)), (Some(before), None));
+        assert_eq!((kept(&path, 1), kept(&path, 2)), (Some(before), None));
         let all: Vec<u8> = (0..6).flat_map(|number| *sector(number).bytes()).collect();
         assert_eq!(fs::read(&path).expect("there"), all);
         assert!(Part::open(&whole, 6, &[]).is_err(), "this run has it still");
@@ -390,7 +388,7 @@ mod tests {
         fs::write(&path, in_progress.bytes()).expect("written");
         let mut part = Part::open(&whole, 1, &[]).expect("it goes on");
         part.put(0, &Sector::zeroed()).expect("room");
-        assert_eq!(kept(2), Some(in_progress.bytes().to_vec()));
+        assert_eq!(kept(&path, 2), Some(in_progress.bytes().to_vec()));
     }
 
     #[cfg(unix)]

@@ -18,13 +18,17 @@ pub(super) struct Session {
     pub(super) unknown: Vec<String>,
 }
 
+/// The session's number in the name that a board's log has there.
+pub(super) fn number(log: &str) -> Option<u32> {
+    segment_name(Path::new(log)).map(|name| name.session)
+}
+
 /// The newest session of these logs, which are in their order. Where the logs were named, all must be of it.
 pub(super) fn newest(ftp: &mut Ftp, logs: &[String], are_named: bool) -> Result<Session> {
     let (mut of, mut found) = (None, Session::default());
     for name in logs.iter().rev() {
-        let number = |name: &String| segment_name(Path::new(name)).map(|name| name.session);
         let Some(own) = number(name) else { continue };
-        if found.logs.first().and_then(number) == Some(own) {
+        if found.logs.first().and_then(|log| number(log)) == Some(own) {
             found.logs.insert(0, name.clone());
             continue;
         }

@@ -9,6 +9,7 @@ use anyhow::Result;
 use hums_blackbox::{BlockCounts, Gap, Header, SECTOR_BYTES};
 use hums_core::time::Instant;
 
+use super::session::number;
 use crate::logs::fat::Extent as Bytes;
 use crate::logs::{Log, Piece, segment_name};
 use crate::plural::count;
@@ -79,7 +80,6 @@ impl Reading {
 
     /// Whether the log has more than these; `names` are those of the session's files.
     pub(super) fn goes_on(&self, names: &[String]) -> bool {
-        let number = |name: &str| segment_name(Path::new(name)).map(|name| name.session);
         let is_later = |name: &&String| number(name) == number(self.name()) && name.as_str() > self.name();
         self.last.as_ref().is_some_and(|last| last.places.end < last.sectors)
             || names.iter().any(|name| is_later(&name))
@@ -148,8 +148,7 @@ const fn not_ours(blocks: &BlockCounts) -> u64 {
 
 /// Stretches of logs of one number each, in their order.
 pub(super) fn by_number(stretches: &[Stretch]) -> impl Iterator<Item = &[Stretch]> {
-    let number = |stretch: &Stretch| segment_name(Path::new(&stretch.name)).map(|name| name.session);
-    stretches.chunk_by(move |one, next| number(one) == number(next))
+    stretches.chunk_by(|one, next| number(&one.name) == number(&next.name))
 }
 
 /// Sectors that were asked for and cannot be read.
