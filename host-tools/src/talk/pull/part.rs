@@ -9,6 +9,7 @@
 use std::collections::BTreeSet;
 use std::fs::{self, File};
 use std::io::{self, BufReader, Read as _, Seek as _, SeekFrom, Write as _};
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result, bail};
@@ -24,6 +25,8 @@ pub(super) struct Part {
     path: PathBuf,
     /// Which sectors are in it.
     has: Vec<bool>,
+    /// Those of them that came now: the others were here before, and may have been changed.
+    came: BTreeSet<u32>,
     /// The session of which it is a part, where a sector has told it.
     session: Option<u32>,
     /// The number of the sector that belongs at its beginning, where the first ones tell it.
@@ -78,7 +81,8 @@ impl Part {
             .find(|(_, header)| is_whole(header))
             .and_then(|(at, header): (u32, _)| header.number.checked_sub(at));
         let file = Self::opened(&path)?;
-        Ok(Self { file, path, has: Vec::new(), session, base, strange: BTreeSet::new(), is_kept: false })
+        let (has, came, strange) = (Vec::new(), BTreeSet::new(), BTreeSet::new());
+        Ok(Self { file, path, has, came, session, base, strange, is_kept: false })
     }
 
     fn opened(path: &Path) -> Result<File> {
@@ -144,6 +148,20 @@ impl Part {
         &self.strange
     }
 
+    /// The number of the sector that belongs at its beginning, where one tells it.
+    pub(super) const fn base(&self) -> Option<u32> {
+        self.base
+    }
+
+    /// Takes the sectors of these places that were here before for missing: they are brought again. Whether there are any.
+    pub(super) fn doubt(&mut self, places: Range<u32>) -> bool {
+        let mut any = false;
+        for place in places.filter(|place| !self.came.contains(place)) {
+            any |= self.has.get_mut(place as usize).is_some_and(std::mem::take);
+        }
+        any
+    }
+
     /// Where it is.
     pub(super) fn path(&self) -> &Path {
         &self.path
@@ -176,11 +194,12 @@ impl Part {
 
     /// Puts a sector at its place, unless it is another session's. Where something else stands there, the part as it is is kept.
     pub(super) fn put(&mut self, place: u32, sector: &Sector) -> Result<()> {
-        if let Ok(header) = Header::read(sector.bytes())
-            && *self.session.get_or_insert(header.session) != header.session
-        {
-            self.strange.insert(place);
-            return Ok(());
+        if let Ok(header) = Header::read(sector.bytes()) {
+            if *self.session.get_or_insert(header.session) != header.session {
+                self.strange.insert(place);
+                return Ok(());
+            }
+            self.base = self.base.or_else(|| header.number.checked_sub(place).filter(|_| !header.partial));
         }
         if !self.is_kept && self.would_lose(place, sector)? {
             self.keep()?;
@@ -191,6 +210,7 @@ impl Part {
         if let Some(has) = self.has.get_mut(place as usize) {
             *has = true;
         }
+        self.came.insert(place);
         Ok(())
     }
 
