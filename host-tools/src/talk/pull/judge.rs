@@ -59,7 +59,8 @@ impl Asked {
         Self(names.iter().filter_map(|name| place(name)).map(|place| (place, place)).collect())
     }
 
-    fn has(&self, wanted: Place) -> bool {
+    /// Whether this one was.
+    pub(super) fn has(&self, wanted: Place) -> bool {
         self.0.iter().any(|(first, last)| (first..=last).contains(&&wanted))
     }
 

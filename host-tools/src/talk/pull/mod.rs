@@ -23,7 +23,7 @@ use hums_blackbox::SECTOR_BYTES;
 use hums_core::time::Instant;
 use serde::Serialize;
 
-use self::compare::{Heading, Likeness, compare, heading_here, heading_of};
+use self::compare::{Heading, Likeness, beginning_of, compare, heading_here, heading_of};
 use self::ftp::Ftp;
 use self::judge::{Asked, LogJson, judge};
 use self::part::Part;
@@ -34,7 +34,7 @@ use crate::cli;
 use crate::files::{Output, make_directory, settle};
 use crate::outcome::Outcome;
 use crate::output::{self, Schema};
-use crate::plural::count;
+use crate::plural::{are, count};
 use crate::printable::word;
 use crate::summary::FindingLine;
 
@@ -113,7 +113,7 @@ fn bring(client: Client, args: &cli::Pull) -> Result<Outcome> {
     let came = bring_each(&mut ftp, logs, begun.as_deref(), args, &mut pulled);
     // Also what came before an error.
     let judged = judge(&all, &asked, &mut pulled);
-    let outcome = came?.and(judged?);
+    let outcome = came?.and(judged?).and(hold_against_next(&mut ftp, &all, &asked, &mut pulled)?);
     if args.json {
         output::json(SCHEMA, &PulledJson { system: ftp.system(), logs: pulled, around: None })?;
     }
@@ -170,6 +170,42 @@ fn bring_each(
         }
     }
     failed.map_or(Ok(outcome), Err)
+}
+
+/// Whether each of these logs has all that was recorded before the next file of its session, where that was not asked for: the number with
+/// which that begins tells.
+fn hold_against_next(
+    ftp: &mut Ftp,
+    board: &[String],
+    asked: &Asked,
+    pulled: &mut [LogJson],
+) -> Result<Outcome> {
+    let mut outcome = Outcome::Done;
+    for log in pulled {
+        let Some(own) = place(&log.name) else { continue };
+        let next = board.iter().find_map(|name| Some((name, place(name).filter(|next| *next > own)?)));
+        let Some((next, _)) = next.filter(|(_, next)| next.session == own.session && !asked.has(*next))
+        else {
+            continue;
+        };
+        let bytes = log.path.metadata().map_or(0, |about| about.len());
+        let sectors = u32::try_from(bytes / SECTOR_BYTES as u64).unwrap_or(u32::MAX);
+        let length = ftp.open(next)?;
+        let here = heading_here(&log.path, &log.name, sectors.saturating_mul(SECTOR_BYTES as u32))?;
+        let begins = [here, heading_of(ftp, next, length)?].map(|heading| beginning_of(&heading.sectors).1);
+        if let [Some(first), Some(next_first)] = begins
+            && let missing @ 1.. = next_first.saturating_sub(first.saturating_add(sectors))
+        {
+            note!(
+                "{}: {} missing at its end: {next} begins after them",
+                log.name,
+                are(missing.into(), "sector")
+            );
+            log.whole = false;
+            outcome = Outcome::Losses;
+        }
+    }
+    Ok(outcome)
 }
 
 /// Brings a moment of the newest session of these logs.

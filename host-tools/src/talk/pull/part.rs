@@ -15,6 +15,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context as _, Result, bail};
 use hums_blackbox::{Header, SECTOR_BYTES, Sector};
 
+use super::compare::beginning_of;
 use crate::files::{cannot_write, check_only_name, open_in_place, remake_in_place, set_aside, settle};
 use crate::logs::naming::part_name;
 
@@ -73,13 +74,7 @@ impl Part {
     }
 
     fn at(path: PathBuf, head: &[Sector]) -> Result<Self> {
-        let headers =
-            || (0..).zip(head).filter_map(|(at, sector)| Some((at, Header::read(sector.bytes()).ok()?)));
-        let session = headers().next().map(|(_, header)| header.session);
-        let is_whole = |header: &Header| Some(header.session) == session && !header.partial;
-        let base = headers()
-            .find(|(_, header)| is_whole(header))
-            .and_then(|(at, header): (u32, _)| header.number.checked_sub(at));
+        let (session, base) = beginning_of(head);
         let file = Self::opened(&path)?;
         let (has, came, strange) = (Vec::new(), BTreeSet::new(), BTreeSet::new());
         Ok(Self { file, path, has, came, session, base, strange, is_kept: false })

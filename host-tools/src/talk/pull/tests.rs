@@ -596,6 +596,9 @@ fn all_logs_of_a_board_are_judged_as_verify_judges_their_folder() {
     let code = |args: &[&str]| brought(&files, args).expect("they come");
     assert_eq!(code(&["--last", "2"]), Outcome::Done);
     assert_eq!(code(&["00001_01.HUM", "00001_03.HUM", &files[last].0]), Outcome::Done);
+    let mut cut = files.clone();
+    cut[1].1.truncate(SECTOR_BYTES);
+    assert_eq!(brought(&cut, &["00001_01.HUM"]).expect("it comes"), Outcome::Losses, "the next one tells");
 }
 
 #[test]
