@@ -191,24 +191,35 @@ pub struct Extent {
     pub from_start: bool,
     /// It goes to the session's end.
     pub to_end: bool,
+    /// What was recorded just before it is judged too.
+    pub follows: bool,
 }
 
-/// The checks that fail of a log that was read with [`Overview::verified`], with what each says. What other logs tell of those before
-/// it is not judged.
+impl Extent {
+    /// All of it, with what the logs tell of each other, as `hums verify` judges.
+    pub const ALL: Self = Self { from_start: true, to_end: true, follows: true };
+}
+
+/// The checks that fail of a log that was read with [`Overview::verified`], with what each says.
 pub fn failed(log: &Overview, extent: Extent) -> Vec<(&'static str, String)> {
     let log = if extent.from_start { Cow::Borrowed(log) } else { Cow::Owned(without_before(log.clone())) };
+    let judged = LogJson::new(&log);
     let is_judged = |check: &Check| {
         check.failed > 0
-            && ![SESSION_BEFORE, SAME_POWER_ON].contains(&check.name)
+            && (extent.follows || ![SESSION_BEFORE, SAME_POWER_ON].contains(&check.name))
             && (extent.to_end || check.name != END)
     };
-    let checks = LogJson::new(&log).checks.into_iter().filter(is_judged);
-    checks
+    let checks = judged.checks.into_iter().filter(is_judged);
+    let failed: Vec<_> = checks
         .map(|check| match check.detail.as_str() {
             "" => (check.name, format!("{} failed", check.failed)),
             detail => (check.name, format!("{} failed; {detail}", check.failed)),
         })
-        .collect()
+        .collect();
+    if failed.is_empty() && extent == Extent::ALL && !judged.ok {
+        return vec![("log", log.faults().join("; "))];
+    }
+    failed
 }
 
 /// The same log, of which nothing was asked for that comes before it. Where its only file does not begin with a sector of it, what is
@@ -227,7 +238,9 @@ fn without_before(mut log: Overview) -> Overview {
         summary.gaps -= 1;
         summary.frames_missing -= u64::from(gap.frames.unwrap_or(0));
         summary.gaps_uncounted -= u64::from(gap.frames.is_none());
-    } else if let Some(gap) = log.contents.gaps.first_mut().filter(|gap| gap.from.is_none()) {
+    } else if let Some(gap) =
+        log.contents.gaps.first_mut().filter(|gap| gap.from.is_none() && gap.cause != Cause::Disarmed)
+    {
         // Of what is missing before the first sector only that counts which has a place here.
         gap.sectors_lost = gap.sectors_lost.min(u32::try_from(others(all) + all.damaged).unwrap_or(u32::MAX));
         if let Some(frames) = gap.frames.take() {

@@ -70,6 +70,15 @@ impl Parity {
         self.since.get_or_insert(now);
     }
 
+    /// The block of the file behind the last sector that is on the card.
+    pub(crate) fn end(&self) -> u32 {
+        let of = |(column, rows): (u32, u8)| {
+            rows.checked_sub(1).map(|row| u32::from(row) * COLUMNS as u32 + column + 1)
+        };
+        let in_stretch = (0..).zip(self.rows).filter_map(of).max().unwrap_or(0);
+        self.stretch.wrapping_mul(STRETCH_SECTORS).wrapping_add(in_stretch)
+    }
+
     /// Whether there is anything to write.
     pub(crate) const fn is_due(&self) -> bool {
         self.since.is_some()

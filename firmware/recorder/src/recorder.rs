@@ -52,6 +52,20 @@ pub enum Written {
     Later,
 }
 
+/// The segment in work.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct InWork {
+    /// Its name.
+    pub name: LogName,
+    /// What seals its sectors.
+    pub session: u32,
+    /// The number of its first sector; 0 where it has none.
+    pub first: u32,
+    /// How many blocks, from its first one on, hold sectors that are whole. Copies of the sector in progress, behind them, are still
+    /// written over.
+    pub blocks: u32,
+}
+
 /// The storage task's state.
 pub struct Recorder<'a, D: CardDevice> {
     status: &'a CardStatus,
@@ -231,10 +245,11 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
         self.segments.log.filter(|_| self.slot.is_mounted() && self.segments.is_open).map(|log| log.name)
     }
 
-    /// The session that seals the sectors of the segment in work: what its block 0 holds until the first of them is
-    /// written there is left over from an earlier session.
-    pub fn log_session(&self) -> Option<u32> {
-        self.segments.log.filter(|_| self.slot.is_mounted() && self.segments.is_open).map(|log| log.session)
+    /// What of the segment in work no longer changes. What lies behind it, also where it has nothing yet, is left over.
+    pub fn in_work(&self) -> Option<InWork> {
+        let log = self.segments.log.filter(|_| self.slot.is_mounted() && self.segments.is_open)?;
+        let blocks = log.base.map_or(0, |_| self.held.parity.borrow().end());
+        Some(InWork { name: log.name, session: log.session, first: log.base.unwrap_or(0), blocks })
     }
 
     /// The card, for serving stored logs; `None` while there is none.

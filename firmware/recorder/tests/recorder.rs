@@ -621,7 +621,7 @@ fn wait(device: &MemCard) -> u32 {
             assert_eq!(put(&mut recorder, now, &partial), Written::Done);
         }
     }
-    recorder.log_session().expect("it records")
+    recorder.in_work().expect("it records").session
 }
 
 fn leaked() -> &'static CardStatus {

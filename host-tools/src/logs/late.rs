@@ -26,17 +26,17 @@ const CARD: [u8; 2] = [6, 7];
 
 /// What a log lacks that begins with another sector than the first one of its session.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Late {
+pub struct Late {
     /// The sector from which on only the last while was kept. Those before it are another log's.
-    pub(super) from: u32,
+    pub from: u32,
     /// All from there on was left out on purpose.
-    pub(super) is_wanted: bool,
+    pub is_wanted: bool,
     /// Nothing is missing, and yet its first file has not the name of a first one.
-    pub(super) is_renamed: bool,
+    pub is_renamed: bool,
 }
 
 /// `None` where the log begins with its session in a file of that name, or its first group does not say that only the last while is kept.
-pub(super) fn late(log: &Log) -> Result<Option<Late>> {
+pub fn late(log: &Log) -> Result<Option<Late>> {
     let mut groups = Groups::new(log);
     let Some(group) = groups.next_group()? else { return Ok(None) };
     let first = group.first().map(|step| step.header);

@@ -16,7 +16,7 @@ mod found;
 pub mod groups;
 pub mod in_order;
 mod joined;
-mod late;
+pub mod late;
 mod look;
 pub mod marks;
 pub mod naming;

@@ -2,6 +2,8 @@
 
 mod rig;
 
+use embedded_sdmmc::Block;
+use hums_blackbox::Header;
 use hums_recorder::{Card, CardState, CardStatus, HeldBlocks, LogName};
 use hums_sdcard::{Event, Kind, MS, Medium, Model};
 use rig::{FILE_TRANSFER_PROTOCOL, LOG_DATA, LOG_ENTRY, Rig, read as read_card};
@@ -278,6 +280,59 @@ fn a_checksum_is_of_what_was_recorded_and_nothing_is_lost_while_it_is_computed()
     assert_eq!(rig.status.read().frames_lost, 0);
     drop(rig);
     assert_eq!(read_card(&medium).gaps, []);
+}
+
+/// Where the blocks of a segment lie, and how many of them hold what was recorded.
+fn places(medium: &Medium, name: LogName) -> (u32, u32) {
+    let (status, held) = (CardStatus::new(), HeldBlocks::new());
+    let mounted = Card::mount(medium.clone(), &status, &held);
+    let card = mounted.map_err(|(_, error)| error.to_string()).expect("it is in order");
+    let mut segment = card.segment(name).expect("it is there");
+    let mut block = Block::new();
+    card.read(&mut segment, 0, &mut block).expect("it reads");
+    let content = medium.content();
+    let first =
+        content.iter().find(|(_, there)| **there == block.contents).map(|(at, _)| *at).expect("there");
+    let is_recorded = |at: &u32| Header::read(&medium.get(first + at)).is_ok();
+    (first, (0..segment.blocks()).take_while(is_recorded).count() as u32)
+}
+
+#[test]
+fn what_a_card_has_lost_of_a_log_hides_nothing_of_the_rest() {
+    /// Sectors in a row that may be lost anywhere.
+    const LOST_MAX: u32 = 64;
+    let medium = with_two_sessions(40, 60);
+    let (first, sectors) = places(&medium, VICTIM);
+    assert!(sectors > 250, "{sectors}");
+    let mut rig = recording(&medium);
+    let pages = (0..sectors - 8).step_by(8).map(|at| (at, 8));
+    let rows = [0, 1, sectors / 2, sectors - LOST_MAX - 1].map(|at| (at, LOST_MAX));
+    // More than that, where parity tells how far the log goes: the last ten seconds it does not cover.
+    let more = [(1, 150), (30, sectors - 100)];
+    let whole = medium.content();
+    let (other, _) = places(&medium, LogName { session: 1, segment: 0 });
+    let text = b"0123456789abcdef".repeat(32);
+    let fills = [[0; 512], [0xff; 512], *text.first_chunk().expect("a block"), whole[&(other + 9)]];
+    for (at, lost) in pages.chain(rows).chain(more) {
+        // A log is the one whose sector is its first sound one.
+        let fills = if at == 0 { &fills[..3] } else { &fills[..] };
+        for fill in fills {
+            (at..at + lost).for_each(|at| medium.set(first + at, fill));
+            assert_eq!(
+                open(&mut rig, VICTIM),
+                sectors * 512,
+                "{lost} from {at} on of {sectors}: {:?}",
+                &fill[..2]
+            );
+        }
+        // It is offered as it reads.
+        if at == 8 {
+            let came = read(&mut rig, 12 * 512);
+            assert_eq!(came[11 * 512..][..512], fills[3], "a sector of another session");
+            assert!(came[7 * 512..8 * 512] == whole[&(first + 7)]);
+        }
+        (at..at + lost).for_each(|at| medium.set(first + at, &whole[&(first + at)]));
+    }
 }
 
 #[test]

@@ -20,7 +20,7 @@ mod on_card;
 
 use bbqueue::nicknames::Churrasco;
 use bbqueue::prod_cons::framed::{FramedConsumer, FramedProducer};
-use embedded_sdmmc::{Block, BlockDevice};
+use embedded_sdmmc::Block;
 use heapless::spsc;
 use hums_link::ftp;
 use hums_recorder::card::Segment;
@@ -28,7 +28,7 @@ use hums_recorder::{Card, CardDevice, Recorder};
 
 use asked::HEAD;
 pub use asked::{Answer, DATA_MAX, LogId, Want, What, Which};
-use on_card::{Read, for_each_part, is_same, measure};
+use on_card::{for_each_part, in_work, is_same, measure};
 
 /// The longest answer in one piece, with the queue's own two bytes, wherever the last one ended: twice its length.
 pub const ANSWER_BYTES: usize = 2 * (HEAD + DATA_MAX + 2) + 8;
@@ -156,10 +156,7 @@ impl Server<'_> {
                 What::Data(offset) => {
                     answer.offset = offset;
                     let to = grant.get_mut(HEAD..).unwrap_or_default();
-                    match copy(card, &mut segment, &answer, to) {
-                        Some(count) => data = count,
-                        None => answer = Answer { ticket: want.ticket, ..log.answer.without() },
-                    }
+                    data = copy(card, &mut segment, &answer, to);
                 }
                 What::Checksum(bytes) => {
                     let bytes = if bytes == 0 { answer.bytes } else { bytes.min(answer.bytes) };
@@ -192,7 +189,7 @@ impl Server<'_> {
         let is_read = recorder.card().is_some_and(|card| {
             let add = |part: &[u8]| so_far = ftp::checksum(so_far, part);
             is_same(card, &mut segment, &answer.log)
-                && for_each_part(card, &mut segment, &answer.log, done..end, add) == Read::All
+                && for_each_part(card, &mut segment, &answer.log, done..end, add)
         });
         done = end;
         if is_read && done < answer.offset {
@@ -234,7 +231,7 @@ struct Looked {
 /// The log that is wanted, from the directory unless it is the one that was read last.
 fn find<D: CardDevice>(recorder: &mut Recorder<'_, D>, want: &Want, last: Option<Found>) -> Looked {
     let none = Looked { answer: Answer::none(want.ticket), segment: None };
-    let in_work = recorder.log_name().zip(recorder.log_session());
+    let recorded = recorder.in_work();
     let Some(card) = recorder.card() else { return none };
     let name = match want.which {
         Which::Settings => {
@@ -273,8 +270,10 @@ fn find<D: CardDevice>(recorder: &mut Recorder<'_, D>, want: &Want, last: Option
     let Some((place, name, mut segment)) = place.filter(|_| listed.is_ok()) else {
         return Looked { answer, segment: None };
     };
-    let in_work = in_work.filter(|(in_work, _)| *in_work == name).map(|(_, session)| session);
-    let (log, blocks) = measure(card, &mut segment, name, in_work);
+    let (log, blocks) = match recorded.filter(|recorded| recorded.name == name) {
+        Some(recorded) => in_work(&recorded),
+        None => measure(card, &mut segment, name),
+    };
     (answer.log, answer.bytes) = (log, blocks * Block::LEN_U32);
     if matches!(want.which, Which::Same(wanted) if wanted != log) {
         return Looked { answer: answer.without(), segment: None };
@@ -283,20 +282,15 @@ fn find<D: CardDevice>(recorder: &mut Recorder<'_, D>, want: &Want, last: Option
     Looked { answer, segment: Some(segment) }
 }
 
-/// Copies what there is from the answer's offset on; how many bytes, or `None` where it is another log's by now.
-fn copy<D: BlockDevice>(
-    card: &Card<'_, D>,
-    segment: &mut Segment,
-    answer: &Answer,
-    to: &mut [u8],
-) -> Option<usize> {
+/// Copies what there is from the answer's offset on; how many bytes.
+fn copy<D: CardDevice>(card: &Card<'_, D>, segment: &mut Segment, answer: &Answer, to: &mut [u8]) -> usize {
     let end = answer.offset.saturating_add(to.len().min(DATA_MAX) as u32).min(answer.bytes);
     let mut done = 0;
-    let read = for_each_part(card, segment, &answer.log, answer.offset..end, |part| {
+    for_each_part(card, segment, &answer.log, answer.offset..end, |part| {
         if let Some(to) = to.get_mut(done..done + part.len()) {
             to.copy_from_slice(part);
             done += part.len();
         }
     });
-    (read != Read::Gone).then_some(done)
+    done
 }

@@ -26,7 +26,7 @@ use crc::{CRC_32_ISCSI, Crc};
 
 use super::batch::Batch;
 use super::target::Database;
-use crate::files::{open_in_place, remake_in_place};
+use crate::files::{check_only_name, open_in_place, remake_in_place};
 use crate::plural::are;
 use crate::source::format::SPOOL_MAGIC as MAGIC;
 
@@ -102,6 +102,7 @@ impl Spool {
             Err(error) if error.kind() == io::ErrorKind::ResourceBusy => return Ok(None),
             opened => opened.with_context(context)?,
         };
+        check_only_name(&file, path)?;
         let path = path.to_owned();
         let mut spool = Self {
             file,

@@ -3,16 +3,21 @@
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
+use std::slice;
 
 use anyhow::{Context as _, Result, bail};
+use hums_blackbox::GROUP_SECTORS;
 use hums_core::health::Level;
 use hums_core::time::{Instant, Span};
 
 use super::ftp::Ftp;
 use super::moment::{Sectors as _, between, first_group, group_before, group_of};
 use super::remote::Remote;
+use super::session::number as number_of;
 use super::stretch::{Reading, Stretch, Unread, by_number};
 use crate::cli::Around;
+use crate::logs::Log;
+use crate::logs::late::late;
 use crate::outcome::Outcome;
 use crate::summary::FindingLine;
 use crate::utc::{When, date_and_time, moment};
@@ -32,15 +37,16 @@ pub(super) struct Brought {
     pub(super) outcome: Outcome,
 }
 
-/// Brings what these logs, those of one session in their order, have round a moment: so much before and after it.
+/// Brings what these logs, those of one session in their order, have round a moment: so much before and after it. Others that the board
+/// has were left out on purpose.
 pub(super) fn pull(
     ftp: &mut Ftp,
     names: &[String],
+    left_out: &[String],
     output: &Path,
-    what: &Around,
-    span: Span,
+    (what, span): (&Around, Span),
 ) -> Result<Brought> {
-    let mut board = Board { ftp, names, output, strange: BTreeSet::new() };
+    let mut board = Board { ftp, names, left_out, output, strange: BTreeSet::new(), missing: None };
     let (mut outcome, mut found, mut epoch_us) = (Outcome::Done, None, None);
     let at = match what {
         Around::Time(When::Seconds(micros)) => Instant::from_micros(*micros),
@@ -77,13 +83,20 @@ pub(super) fn pull(
         bail!("what the board gives of this session begins after {}", moment(to));
     }
     let readings = by_number(&stretches).map(Reading::of).collect::<Result<Vec<_>>>()?;
-    outcome = outcome.and(check_recorded(at, &readings, names, epoch_us)?);
+    outcome = outcome.and(check_recorded(at, &readings, board.missing, names, epoch_us)?);
+    if let Some(missing) = board.missing {
+        note!("of the moment: {}: no log that the board gives has them", missing.words());
+        outcome = Outcome::Losses;
+    }
     for reading in &readings {
         // The moment goes on behind all that the board has.
         let to_end = reading.is_to_end(names) && reading.span().is_none_or(|(_, end)| end < to);
         for fault in reading.faults(to_end) {
             note!("{}: of the moment: {fault}; `hums verify` says more", reading.name());
             outcome = Outcome::Losses;
+        }
+        if let Some(words) = reading.unproved_end().filter(|_| to_end) {
+            note!("{}: {words}", reading.name());
         }
     }
     Ok(Brought {
@@ -103,6 +116,7 @@ fn parts_of(stretches: &[Stretch]) -> Vec<(String, PathBuf)> {
 fn check_recorded(
     at: Instant,
     readings: &[Reading],
+    missing: Option<Unread>,
     names: &[String],
     epoch_us: Option<u64>,
 ) -> Result<Outcome> {
@@ -120,11 +134,15 @@ fn check_recorded(
         (Some(end), None) => format!("what the board gives of this session ends at {}", words(end)),
         (None, Some(start)) => format!("what the board gives of this session begins at {}", words(start)),
         (Some(end), Some(start)) => {
-            format!("nothing is recorded between {} and {}", words(end), words(start))
+            format!(
+                "what the board gives of this session has nothing between {} and {}",
+                words(end),
+                words(start)
+            )
         }
         (None, None) => "nothing of the moment can be read".to_owned(),
     };
-    if readings.iter().all(|reading| reading.unread().is_none()) {
+    if missing.is_none() && readings.iter().all(|reading| reading.unread().is_none()) {
         bail!("{why}; for another session name its logs");
     }
     note!("nothing that can be read was recorded at {}: {why}", words(at));
@@ -159,30 +177,107 @@ impl Searched {
 struct Board<'a> {
     ftp: &'a mut Ftp,
     names: &'a [String],
+    left_out: &'a [String],
     output: &'a Path,
     /// Sectors of other sessions that came, by their logs and places.
     strange: BTreeSet<(String, u32)>,
+    /// What was recorded between the logs that were looked at, or before them, and is in none: their sectors' numbers tell.
+    missing: Option<Unread>,
+}
+
+/// Where a log of the session begins.
+struct Begin<'a> {
+    name: &'a str,
+    /// The number of its first sector.
+    number: Option<u32>,
+    at: Option<Instant>,
+    /// Its beginning was brought: what is missing between it and a log of the same number is seen when they are read.
+    is_read: bool,
 }
 
 impl Board<'_> {
     /// Brings what was recorded from one time to the other.
     fn bring(&mut self, from: Instant, to: Instant) -> Result<Vec<Stretch>> {
-        let mut stretches = Vec::new();
+        let (mut stretches, mut later) = (Vec::new(), None);
         for name in self.names.iter().rev() {
             let mut log = Remote::open(self.ftp, name, self.output)?;
             let first = first_group(&mut log)?;
+            let (at, number) = (first.map(|first| first.at), log.first_number());
             // A group may begin in the log before: the first sectors of this one are its last ones.
             if first.is_some_and(|first| first.place == 0 && first.at > to) && stretches.is_empty() {
+                later = Some(Begin { name, number, at, is_read: false });
                 continue;
             }
             let places = between(&mut log, from, to)?;
-            stretches.insert(0, log.bring(places)?);
+            let begin = Begin { name, number, at, is_read: places.start == 0 };
+            let stretch = log.bring(places)?;
             log.add_strange(&mut self.strange);
-            if first.is_some_and(|first| first.at <= from) {
-                break;
+            if let Some(later) = &later {
+                self.hold_against(Some(&stretch), number, later, to)?;
             }
+            stretches.insert(0, stretch);
+            if at.is_some_and(|at| at <= from) {
+                return Ok(stretches);
+            }
+            later = Some(begin);
+        }
+        if let Some(first) = later.filter(|_| !stretches.is_empty()) {
+            self.hold_against(None, None, &first, to)?;
         }
         Ok(stretches)
+    }
+
+    /// Notes what is missing between the end of a log, of which this was brought and whose first sector has this number, and the one after
+    /// it; without a log, what is missing before that. What was recorded after the time `to` is not wanted.
+    fn hold_against(
+        &mut self,
+        before: Option<&Stretch>,
+        number: Option<u32>,
+        later: &Begin<'_>,
+        to: Instant,
+    ) -> Result<()> {
+        let is_between =
+            |name: &String| before.is_none_or(|before| *name > before.name) && name.as_str() < later.name;
+        if self.left_out.iter().any(is_between) {
+            return Ok(());
+        }
+        let is_one_log = before.is_some_and(|before| number_of(&before.name) == number_of(later.name));
+        let end = match before {
+            Some(before) if before.places.end < before.sectors || is_one_log && later.is_read => {
+                return Ok(());
+            }
+            Some(before) => number.map(|number| number.saturating_add(before.sectors)),
+            None => Some(0),
+        };
+        let Some((end, mut begins)) = end.zip(later.number).filter(|(end, begins)| begins > end) else {
+            return Ok(());
+        };
+        if !is_one_log {
+            begins = self.kept_from(later.name)?.map_or(begins, |kept| kept.min(begins));
+        }
+        let last = before.map(|before| Reading::of(slice::from_ref(before))).transpose()?;
+        let last = last.and_then(|last| last.span()).map(|(_, last)| last);
+        if begins > end && last.is_none_or(|last| last < to) {
+            let sectors = u64::from(begins - end);
+            self.missing = Unread::all(Some(Unread { sectors, from: last, to: later.at }), self.missing);
+        }
+        Ok(())
+    }
+
+    /// The sector from which on all was kept that was to be, as the log says that begins with the file of this name.
+    fn kept_from(&mut self, name: &str) -> Result<Option<u32>> {
+        let is_of_it = |other: &&String| number_of(other) == number_of(name) && other.as_str() >= name;
+        let (mut files, mut pieces) = (Vec::new(), Vec::new());
+        for other in self.names.iter().filter(is_of_it) {
+            let mut file = Remote::open(self.ftp, other, self.output)?;
+            if other == name {
+                file.bring(0..file.count().min(GROUP_SECTORS as u32))?;
+            }
+            files.push(other.clone());
+            pieces.push(file.stretch(0..file.count()).piece());
+        }
+        let log = Log { name: name.to_owned(), files, pieces, session: None, left_over: false };
+        Ok(late(&log)?.filter(|late| late.is_wanted).map(|late| late.from))
     }
 
     /// UTC at power-on, microseconds since 1970, by what the newest of the logs that knows it learned last.
@@ -208,7 +303,8 @@ impl Board<'_> {
 
     /// The latest finding that is wanted: the logs are read from their end backwards, group by group, until it comes.
     fn latest(&mut self, what: &Around) -> Result<Searched> {
-        let (mut found, mut stretches) = (None, Vec::new());
+        let (mut found, mut stretches, mut later) = (None, Vec::new(), None);
+        let never = Instant::from_micros(u64::MAX);
         for name in self.names.iter().rev() {
             let mut log = Remote::open(self.ftp, name, self.output)?;
             let count = log.count();
@@ -222,21 +318,30 @@ impl Board<'_> {
                     note!("{name}: none in what can be read from {} on; looking before that", moment(first));
                 }
             }
-            stretches.insert(0, log.stretch(end..count));
+            let stretch = log.stretch(end..count);
             log.add_strange(&mut self.strange);
+            let (at, number) = (first_group(&mut log)?.map(|first| first.at), log.first_number());
+            if let Some(later) = &later {
+                self.hold_against(Some(&stretch), number, later, never)?;
+            }
+            stretches.insert(0, stretch);
             if found.is_some() {
+                later = None;
                 break;
             }
+            later = Some(Begin { name, number, at, is_read: true });
+        }
+        if let Some(first) = &later {
+            self.hold_against(None, None, first, never)?;
         }
         // All of it once more: a group may begin in one log and end in the next one.
-        let mut unread: Option<Unread> = None;
+        let mut unread = None;
         for stretches in by_number(&stretches) {
             let reading = Reading::of(stretches)?;
-            unread =
-                unread.map_or(reading.unread(), |all| Some(reading.unread().map_or(all, |one| all.and(one))));
+            unread = Unread::all(unread, reading.unread());
             found = found.into_iter().chain(wanted(&reading, what)).max_by_key(|found| found.at);
         }
-        Ok(Searched { found, unread, stretches })
+        Ok(Searched { found, unread: Unread::all(unread, self.missing.take()), stretches })
     }
 }
 

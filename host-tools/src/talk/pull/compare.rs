@@ -64,6 +64,16 @@ pub(super) struct Heading {
     pub(super) sectors: Vec<Sector>,
 }
 
+/// The session of the log that begins with these sectors, and the number of its first one, as far as they tell.
+pub(super) fn beginning_of(head: &[Sector]) -> (Option<u32>, Option<u32>) {
+    let headers =
+        || (0..).zip(head).filter_map(|(at, sector)| Some((at, Header::read(sector.bytes()).ok()?)));
+    let session = headers().next().map(|(_, header)| header.session);
+    let is_whole = |header: &Header| Some(header.session) == session && !header.partial;
+    let whole = headers().find(|(_, header)| is_whole(header));
+    (session, whole.and_then(|(at, header): (u32, _)| header.number.checked_sub(at)))
+}
+
 /// What the board's log that is open and has so many bytes is called here: by the session that its first sectors name, and the box that
 /// its record of the start does.
 pub(super) fn heading_of(ftp: &mut Ftp, name: &str, length: u32) -> Result<Heading> {

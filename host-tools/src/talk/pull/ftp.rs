@@ -1,6 +1,7 @@
 //! A client of MAVLink FTP (<https://mavlink.io/en/services/ftp.html>), as far as downloads need it.
 
 use std::collections::BTreeMap;
+use std::io;
 use std::time::{Duration, Instant};
 
 use anyhow::{Context as _, Error, Result, anyhow, bail};
@@ -87,6 +88,11 @@ impl Answer {
     }
 }
 
+/// That nothing comes, which is so with every log: as an error of the link.
+fn silence(words: &'static str) -> Error {
+    io::Error::new(io::ErrorKind::TimedOut, words).into()
+}
+
 /// What a refusal of something that was asked says, and no more.
 fn refused(answer: &Answer, what: &str) -> Error {
     if answer.is_nak(FILE_NOT_FOUND) {
@@ -140,7 +146,7 @@ impl Ftp {
                 return Ok(answer);
             }
         }
-        bail!("the board does not answer over MAVLink FTP; is GS_BUDGET less than 500 B/s?")
+        Err(silence("the board does not answer over MAVLink FTP; is GS_BUDGET less than 500 B/s?"))
     }
 
     /// Names and lengths of all logs.
@@ -216,7 +222,7 @@ impl Ftp {
             })?;
             silent = if came { 0 } else { silent + 1 };
             if silent >= TRIES {
-                bail!("nothing more comes; to go on, call again");
+                return Err(silence("nothing more comes; to go on, call again"));
             }
             let ends = pieces.range(have..).map(|(at, data)| *at + data.len() as u32);
             let end = ends.max().unwrap_or(have);

@@ -1,15 +1,18 @@
-//! What came, judged as `hums verify` judges it, in one reading.
+//! What came, judged as `hums verify` judges the folder that it makes, in one reading: by the same function, of which all checks count
+//! where all of the board's logs were asked for.
 //!
-//! Of a session of which only some logs were asked for, those that follow each other are one log: what is missing before it and
-//! after it was left out on purpose.
+//! Of what was not asked for nothing is missing: files of a session between which others were left out are logs of their own
+//! here, each without what comes before and after it.
 
-use std::ops::Range;
 use std::path::{Path, PathBuf};
+use std::slice;
 
 use anyhow::Result;
 use serde::Serialize;
 
-use crate::logs::{self, segment_name};
+use super::session::{Place, place};
+use crate::ending::EndJson;
+use crate::logs::{self, Log};
 use crate::outcome::Outcome;
 use crate::summary::Overview;
 use crate::verify::{Extent, failed, verify_each};
@@ -22,110 +25,142 @@ pub(super) struct LogJson {
     pub(super) path: PathBuf,
     /// It was not there already.
     pub(super) is_new: bool,
-    /// `hums verify` finds no fault with the logs of its session that came and follow each other.
+    /// `hums verify` finds no fault with the logs of its session that were asked for and follow each other; and of the last one the end is
+    /// proved, or was not asked for.
     pub(super) whole: bool,
+    /// What is known of the end of the last one of these.
+    pub(super) end: Option<EndJson>,
 }
 
-/// Logs of a session that follow each other.
-#[derive(Debug)]
-struct Run {
-    /// The session's number on its card, where they have the names of a card's logs.
-    session: Option<u32>,
-    /// Which of those that came.
-    logs: Range<usize>,
-    extent: Extent,
-}
-
-/// Judges logs, in the order of their names, with what they tell of each other, and says what is wrong with them; `all` are those of
-/// the board.
-pub(super) fn judge(all: &[String], pulled: &mut [LogJson]) -> Result<Outcome> {
-    let mut rest = runs(all, pulled);
-    let mut outcome = Outcome::Done;
-    // Of a session only one run at once: what is missing between two would be missing in it.
-    while !rest.is_empty() {
-        let (mut now, mut later) = (Vec::<Run>::new(), Vec::new());
-        for run in rest {
-            let is_second = run.session.is_some() && now.iter().any(|other| other.session == run.session);
-            if is_second { &mut later } else { &mut now }.push(run);
-        }
-        outcome = outcome.and(judge_at_once(&now, pulled)?);
-        rest = later;
+impl LogJson {
+    /// What came; all else is for [`judge`].
+    pub(super) const fn new(name: String, path: PathBuf, is_new: bool) -> Self {
+        Self { name, path, is_new, whole: false, end: None }
     }
-    Ok(outcome)
 }
 
-fn judge_at_once(runs: &[Run], pulled: &mut [LogJson]) -> Result<Outcome> {
-    let of = |run: &Run| pulled.get(run.logs.clone()).unwrap_or_default().iter().map(|log| log.path.clone());
-    let paths: Vec<PathBuf> = runs.iter().flat_map(of).collect();
-    let found = match (logs::find(&paths, false), runs) {
-        (Ok(found), _) => found,
-        // One of them is no log.
-        (Err(error), [run]) => {
-            note!("{error:#}");
-            return Ok(tell(run, pulled, &[]));
+/// Which of a board's logs were asked for: all from one to another, some times.
+#[derive(Debug)]
+pub(super) struct Asked(Vec<(Place, Place)>);
+
+impl Asked {
+    /// All that there are.
+    pub(super) fn all() -> Self {
+        Self(vec![(Place::default(), Place::MAX)])
+    }
+
+    /// All from this one on.
+    pub(super) fn from(first: Option<&str>) -> Self {
+        Self(first.and_then(place).map(|first| (first, Place::MAX)).into_iter().collect())
+    }
+
+    /// These.
+    pub(super) fn named(names: &[String]) -> Self {
+        Self(names.iter().filter_map(|name| place(name)).map(|place| (place, place)).collect())
+    }
+
+    /// Whether this one was.
+    pub(super) fn has(&self, wanted: Place) -> bool {
+        self.0.iter().any(|(first, last)| (first..=last).contains(&&wanted))
+    }
+
+    /// Whether any of a log's files was.
+    fn has_log(&self, session: u32) -> bool {
+        self.0.iter().any(|(first, last)| (first.session..=last.session).contains(&session))
+    }
+
+    /// What of a session these files of it are, on a board that has these logs.
+    fn extent(&self, files: &[String], board: &[Place]) -> Extent {
+        let ends = files.first().and_then(|file| place(file)).zip(files.last().and_then(|file| place(file)));
+        let Some((first, last)) = ends else { return Extent::ALL };
+        let is_left_out = |other: &Place| other.session == last.session && *other > last && !self.has(*other);
+        let before = first.segment.checked_sub(1).map(|segment| Place { segment, ..first });
+        Extent {
+            from_start: before.is_none_or(|before| self.has(before)),
+            to_end: !board.iter().any(is_left_out),
+            follows: first.session.checked_sub(1).is_none_or(|session| self.has_log(session)),
         }
-        (Err(_), _) => {
-            return runs.iter().try_fold(Outcome::Done, |all, run| {
-                Ok(all.and(judge_at_once(std::slice::from_ref(run), pulled)?))
-            });
+    }
+
+    /// The files of a log, parted where files between them were left out.
+    fn parted(&self, log: Log) -> Vec<Log> {
+        let Log { name, files, pieces, session, left_over } = log;
+        let mut parts: Vec<Log> = Vec::new();
+        for (file, piece) in files.into_iter().zip(pieces) {
+            let between = |last: &Log| {
+                let (before, here) = (place(last.files.last()?)?, place(&file)?);
+                let mut between = before.segment + 1..here.segment;
+                (!between.is_empty()).then(|| between.any(|segment| self.has(Place { segment, ..here })))
+            };
+            match parts.last_mut().filter(|last| between(last) != Some(false)) {
+                Some(last) => {
+                    last.files.push(file);
+                    last.pieces.push(piece);
+                }
+                None => parts.push(Log {
+                    name: name.clone(),
+                    files: vec![file],
+                    pieces: vec![piece],
+                    session,
+                    left_over,
+                }),
+            }
         }
-    };
-    let mut outcome = Outcome::Done;
+        parts
+    }
+}
+
+/// Judges logs with what they tell of each other, and says what is wrong with them, and what is not proved; `board` are those that the
+/// board has something of.
+pub(super) fn judge(board: &[String], asked: &Asked, pulled: &mut [LogJson]) -> Result<Outcome> {
+    let board: Vec<Place> = board.iter().filter_map(|name| place(name)).collect();
+    let (mut outcome, mut paths) = (Outcome::Done, Vec::new());
+    for log in &*pulled {
+        match logs::find(slice::from_ref(&log.path), false) {
+            Ok(_) => paths.push(log.path.clone()),
+            Err(error) => {
+                note!("{error:#}");
+                outcome = Outcome::Losses;
+            }
+        }
+    }
+    let mut found = logs::find(&paths, false)?;
+    found.logs = std::mem::take(&mut found.logs).into_iter().flat_map(|log| asked.parted(log)).collect();
     let unread = verify_each(&found, |overview| {
-        let Some(run) = runs.iter().find(|run| is_of(overview, run, pulled)) else { return Ok(()) };
-        let failed = failed(overview, run.extent);
-        if !failed.is_empty() {
-            outcome = tell(run, pulled, &failed);
-        }
+        outcome = outcome.and(tell(overview, asked.extent(&overview.ending.files, &board), pulled));
         Ok(())
     })?;
     Ok(outcome.and(Outcome::lossy(unread > 0)))
 }
 
-/// Whether a log that was read is this run.
-fn is_of(overview: &Overview, run: &Run, pulled: &[LogJson]) -> bool {
-    let names = || overview.ending.files.iter().map(|file| Path::new(file).file_name());
-    pulled
-        .get(run.logs.clone())
-        .unwrap_or_default()
-        .iter()
-        .any(|log| names().any(|name| name == log.path.file_name()))
-}
-
-/// Says what is wrong with a run.
-fn tell(run: &Run, pulled: &mut [LogJson], failed: &[(&'static str, String)]) -> Outcome {
-    let logs = pulled.get_mut(run.logs.clone()).unwrap_or_default();
-    let name = logs.last().map_or("", |log| &log.name);
-    for (check, why) in failed {
-        note!("{name}: {check}: {why}; `hums verify` says more");
+/// Says of a log that was read what is wrong with it, or not proved.
+fn tell(overview: &Overview, extent: Extent, pulled: &mut [LogJson]) -> Outcome {
+    let ending = &overview.ending;
+    let failed = failed(overview, extent);
+    let is_of = |log: &&mut LogJson| {
+        let mut names = ending.files.iter().map(|file| Path::new(file).file_name());
+        names.any(|name| name == log.path.file_name())
+    };
+    if extent.follows && ending.is_without_earlier() {
+        note!("{}: the logs that were recorded before it on this card did not come", ending.name);
     }
-    for log in logs {
-        log.whole = false;
+    let mut last = None;
+    for log in pulled.iter_mut().filter(is_of) {
+        log.whole = failed.is_empty();
+        last = Some(log);
     }
-    Outcome::Losses
-}
-
-fn runs(all: &[String], pulled: &[LogJson]) -> Vec<Run> {
-    let named = |name: &str| segment_name(Path::new(name)).map(|name| (name.session, name.segment));
-    let last_of = |session| all.iter().filter_map(|name| named(name)).filter(|name| name.0 == session).max();
-    let mut runs: Vec<Run> = Vec::new();
-    let mut before = None;
-    for (at, log) in pulled.iter().enumerate() {
-        let name = named(&log.name);
-        let is_next = before.zip(name).is_some_and(|(before, name): ((u32, u32), (u32, u32))| {
-            before.0 == name.0 && before.1.checked_add(1) == Some(name.1)
-        });
-        before = name;
-        let to_end = name.is_none_or(|name| last_of(name.0) <= Some(name));
-        if let Some(run) = runs.last_mut().filter(|_| is_next) {
-            (run.logs.end, run.extent.to_end) = (at + 1, to_end);
-        } else {
-            let from_start = name.is_none_or(|name| name.1 == 0);
-            let (session, extent) = (name.map(|name| name.0), Extent { from_start, to_end });
-            runs.push(Run { session, logs: at..at + 1, extent });
+    let Some(last) = last else { return Outcome::lossy(!failed.is_empty()) };
+    for (check, why) in &failed {
+        note!("{}: {check}: {why}; `hums verify` says more", last.name);
+    }
+    if extent.to_end {
+        last.end = Some(EndJson::new(ending));
+        if failed.is_empty() && !ending.proof.is_whole() && ending.aside().is_none() {
+            note!("{}: {}", last.name, ending.words());
+            last.whole = false;
         }
     }
-    runs
+    Outcome::lossy(!failed.is_empty())
 }
 
 #[cfg(test)]
@@ -135,6 +170,7 @@ mod tests {
     use super::super::compare::heading_here;
     use super::super::tests::packed;
     use super::*;
+    use crate::logs::Piece;
 
     const NAME: &str = "00001_00.HUM";
     const SECTOR: usize = 512;
@@ -149,8 +185,8 @@ mod tests {
         let path = dir.path().join(own);
         fs::rename(&came, &path).expect("renamed");
         let all: Vec<String> = [name].iter().chain(others).map(|name| (*name).to_owned()).collect();
-        let mut logs = [LogJson { name: name.to_owned(), path, is_new: true, whole: true }];
-        let outcome = judge(&all, &mut logs).expect("it reads");
+        let mut logs = [LogJson::new(name.to_owned(), path, true)];
+        let outcome = judge(&all, &Asked::named(&all[..1]), &mut logs).expect("it reads");
         (outcome, logs[0].whole)
     }
 
@@ -194,19 +230,34 @@ mod tests {
     }
 
     #[test]
-    fn logs_of_a_session_that_follow_each_other_are_one_run() {
+    fn what_was_not_asked_for_parts_a_log_and_what_did_not_come_does_not() {
+        let board = ["00001_00.HUM", "00001_01.HUM", "00001_02.HUM", "00001_03.HUM", "00002_04.HUM"];
         let named = |names: &[&str]| -> Vec<String> { names.iter().map(|name| (*name).to_owned()).collect() };
-        let all =
-            named(&["00001_00.HUM", "00001_01.HUM", "00001_02.HUM", "00001_03.HUM", "00002_04.HUM", "x"]);
-        let runs_of = |names: &[&str]| -> Vec<_> {
-            let log = |name| LogJson { path: PathBuf::from(&name), name, is_new: true, whole: true };
-            let logs: Vec<_> = named(names).into_iter().map(log).collect();
-            let extent = |run: Run| (run.logs, run.extent.from_start, run.extent.to_end);
-            runs(&all, &logs).into_iter().map(extent).collect()
+        let places: Vec<Place> = board.iter().filter_map(|name| place(name)).collect();
+        let parts = |asked: &Asked, came: &[&str]| -> Vec<_> {
+            let piece = |_: &&str| Piece { path: PathBuf::new(), extents: Vec::new() };
+            let pieces = came.iter().map(piece).collect();
+            let log =
+                Log { name: "00001".to_owned(), files: named(came), pieces, session: None, left_over: false };
+            let part = |log: Log| {
+                let Extent { from_start, to_end, follows } = asked.extent(&log.files, &places);
+                (log.files.len(), from_start, to_end, follows)
+            };
+            asked.parted(log).into_iter().map(part).collect()
         };
-        let whole = ["00001_00.HUM", "00001_01.HUM", "00001_02.HUM", "00001_03.HUM", "00002_04.HUM", "x"];
-        assert_eq!(runs_of(&whole), [(0..4, true, true), (4..5, false, true), (5..6, true, true)]);
         let some = ["00001_00.HUM", "00001_02.HUM", "00001_03.HUM"];
-        assert_eq!(runs_of(&some), [(0..1, true, false), (1..3, false, true)]);
+        assert_eq!(parts(&Asked::all(), &some), [(3, true, true, true)]);
+        assert_eq!(parts(&Asked::from(Some(some[0])), &some[1..]), [(2, true, true, false)]);
+        assert_eq!(parts(&Asked::from(Some(some[1])), &some[1..]), [(2, false, true, false)]);
+        assert_eq!(
+            parts(&Asked::named(&named(&some)), &some),
+            [(1, true, false, false), (2, false, true, false)]
+        );
+        assert_eq!(parts(&Asked::named(&named(&board[..4])), &some), [(3, true, true, false)]);
+        assert_eq!(parts(&Asked::named(&named(&board[..2])), &board[..2]), [(2, true, false, false)]);
+        let later = ["00002_04.HUM"];
+        assert_eq!(parts(&Asked::named(&named(&later)), &later), [(1, false, true, false)]);
+        assert_eq!(parts(&Asked::named(&named(&board[3..])), &later), [(1, false, true, true)]);
+        assert_eq!(parts(&Asked::all(), &["x"]), [(1, true, true, true)]);
     }
 }

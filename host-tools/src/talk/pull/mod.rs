@@ -23,17 +23,18 @@ use hums_blackbox::SECTOR_BYTES;
 use hums_core::time::Instant;
 use serde::Serialize;
 
-use self::compare::{Heading, Likeness, compare, heading_here, heading_of};
+use self::compare::{Heading, Likeness, beginning_of, compare, heading_here, heading_of};
 use self::ftp::Ftp;
-use self::judge::{LogJson, judge};
+use self::judge::{Asked, LogJson, judge};
 use self::part::Part;
+use self::session::place;
 use self::stretch::{Reading, Stretch};
 use super::Client;
 use crate::cli;
 use crate::files::{Output, make_directory, settle};
 use crate::outcome::Outcome;
 use crate::output::{self, Schema};
-use crate::plural::count;
+use crate::plural::{are, count};
 use crate::printable::word;
 use crate::summary::FindingLine;
 
@@ -95,23 +96,32 @@ fn bring(client: Client, args: &cli::Pull) -> Result<Outcome> {
     let begun = logs.last().map(|(log, _)| log.clone());
     logs.retain(|(log, _)| args.names.is_empty() || args.names.contains(log));
     if let Some(moment) = &args.around {
-        return around(&mut ftp, logs, args, moment);
+        let left_out: Vec<String> =
+            all.into_iter().filter(|log| !args.names.is_empty() && !args.names.contains(log)).collect();
+        return around(&mut ftp, logs, &left_out, args, moment);
     }
     // One that was begun just now may have nothing in it yet.
     let begun = begun.filter(|_| args.names.is_empty());
     let newest = args.last.unwrap_or(logs.len()).min(logs.len());
+    let logs = logs.split_off(logs.len() - newest);
+    let asked = match args.last {
+        _ if !args.names.is_empty() => Asked::named(&args.names),
+        Some(_) => Asked::from(logs.first().map(|(log, _)| log.as_str())),
+        None => Asked::all(),
+    };
     let mut pulled = Vec::new();
-    let came = bring_each(&mut ftp, logs.split_off(logs.len() - newest), begun.as_deref(), args, &mut pulled);
+    let came = bring_each(&mut ftp, logs, begun.as_deref(), args, &mut pulled);
     // Also what came before an error.
-    let judged = judge(&all, &mut pulled);
-    let outcome = came?.and(judged?);
+    let judged = judge(&all, &asked, &mut pulled);
+    let outcome = came?.and(judged?).and(hold_against_next(&mut ftp, &all, &asked, &mut pulled)?);
     if args.json {
         output::json(SCHEMA, &PulledJson { system: ftp.system(), logs: pulled, around: None })?;
     }
     Ok(outcome)
 }
 
-/// Brings these logs whole, one after the other. Of `begun` it is no loss that nothing is in it.
+/// Brings these logs whole, one after the other. Of `begun` it is no loss that nothing is in it. What is wrong with one of them keeps no
+/// other from coming: it is the error in the end.
 fn bring_each(
     ftp: &mut Ftp,
     logs: Vec<(String, u32)>,
@@ -119,29 +129,81 @@ fn bring_each(
     args: &cli::Pull,
     pulled: &mut Vec<LogJson>,
 ) -> Result<Outcome> {
-    let mut outcome = Outcome::Done;
+    let (mut outcome, mut failed) = (Outcome::Done, None);
     for (name, bytes) in logs {
-        let Some((path, is_new)) = pull(ftp, &name, &args.output).with_context(|| name.clone())? else {
-            if bytes > 0 {
+        let brought = match pull(ftp, &name, &args.output).with_context(|| name.clone()) {
+            Ok(brought) => brought,
+            // Of the link or of the disk: so it would be with the others.
+            Err(error) if error.root_cause().is::<io::Error>() => return Err(error),
+            Err(error) if failed.is_none() => {
+                failed = Some(error);
+                continue;
+            }
+            Err(error) => {
+                note!("{error:#}");
+                continue;
+            }
+        };
+        match brought {
+            Some((path, is_new)) => {
+                if !is_new {
+                    note!("{name}: is there already as {}: the same by its checksum", path.display());
+                } else if !args.json {
+                    output::line(&word(&path.display().to_string()))?;
+                }
+                pulled.push(LogJson::new(name, path, is_new));
+            }
+            None if bytes > 0 => {
                 note!(
                     "{name}: has {} by the board's directory, and none when it is opened; call again",
                     count(bytes, "byte")
                 );
                 outcome = Outcome::Losses;
-            } else if begun != Some(name.as_str()) {
+            }
+            None if begun == Some(name.as_str()) => {}
+            None => {
                 note!(
                     "{name}: nothing of it came, and it may have a flight in it: read the card itself, or an image of it"
                 );
                 outcome = Outcome::Losses;
             }
+        }
+    }
+    failed.map_or(Ok(outcome), Err)
+}
+
+/// Whether each of these logs has all that was recorded before the next file of its session, where that was not asked for: the number with
+/// which that begins tells.
+fn hold_against_next(
+    ftp: &mut Ftp,
+    board: &[String],
+    asked: &Asked,
+    pulled: &mut [LogJson],
+) -> Result<Outcome> {
+    let mut outcome = Outcome::Done;
+    for log in pulled {
+        let Some(own) = place(&log.name) else { continue };
+        let next = board.iter().find_map(|name| Some((name, place(name).filter(|next| *next > own)?)));
+        let Some((next, _)) = next.filter(|(_, next)| next.session == own.session && !asked.has(*next))
+        else {
             continue;
         };
-        if !is_new {
-            note!("{name}: is there already as {}: the same by its checksum", path.display());
-        } else if !args.json {
-            output::line(&word(&path.display().to_string()))?;
+        let bytes = log.path.metadata().map_or(0, |about| about.len());
+        let sectors = u32::try_from(bytes / SECTOR_BYTES as u64).unwrap_or(u32::MAX);
+        let length = ftp.open(next)?;
+        let here = heading_here(&log.path, &log.name, sectors.saturating_mul(SECTOR_BYTES as u32))?;
+        let begins = [here, heading_of(ftp, next, length)?].map(|heading| beginning_of(&heading.sectors).1);
+        if let [Some(first), Some(next_first)] = begins
+            && let missing @ 1.. = next_first.saturating_sub(first.saturating_add(sectors))
+        {
+            note!(
+                "{}: {} missing at its end: {next} begins after them",
+                log.name,
+                are(missing.into(), "sector")
+            );
+            log.whole = false;
+            outcome = Outcome::Losses;
         }
-        pulled.push(LogJson { name, path, is_new, whole: true });
     }
     Ok(outcome)
 }
@@ -150,19 +212,29 @@ fn bring_each(
 fn around(
     ftp: &mut Ftp,
     logs: Vec<(String, u32)>,
+    left_out: &[String],
     args: &cli::Pull,
     moment: &cli::Around,
 ) -> Result<Outcome> {
-    let mut names = Vec::new();
+    let (mut names, mut empty) = (Vec::new(), Vec::new());
     for (name, bytes) in logs {
         if bytes < SECTOR_BYTES as u32 && ftp.open(&name)? < SECTOR_BYTES as u32 {
             note!("{name}: {NOTHING}");
+            empty.push(name);
         } else {
             names.push(name);
         }
     }
     let session = session::newest(ftp, &names, !args.names.is_empty())?;
-    let mut outcome = Outcome::Done;
+    // What is between two logs is known by their sectors' numbers. Of the last one's further files a search must say that they were not read.
+    let last = session.logs.last().and_then(|log| place(log));
+    let is_further =
+        |log: &&String| place(log) > last && place(log).map(|log| log.session) == last.map(|log| log.session);
+    let further = empty.iter().find(is_further).filter(|_| !matches!(moment, cli::Around::Time(_)));
+    let mut outcome = Outcome::lossy(further.is_some() || !args.names.is_empty() && !empty.is_empty());
+    if let Some(name) = further {
+        note!("{name}: is a further file of this session, and may have what is looked for, and later");
+    }
     for name in &session.unknown {
         note!(
             "{name}: its beginning cannot be read, so that nothing tells whether it is of this session; it is not looked at: \
@@ -170,7 +242,7 @@ fn around(
         );
         outcome = Outcome::Losses;
     }
-    let brought = around::pull(ftp, &session.logs, &args.output, moment, args.span)?;
+    let brought = around::pull(ftp, &session.logs, left_out, &args.output, (moment, args.span))?;
     if brought.strange > 0 {
         note!(
             "{} of another session came and are not in the part: another log has come in its place while it was read, or the \
@@ -190,7 +262,7 @@ fn around(
         if !args.json {
             output::line(&word(&path.display().to_string()))?;
         }
-        pulled.push(LogJson { name, path, is_new: true, whole: false });
+        pulled.push(LogJson::new(name, path, true));
     }
     if args.json {
         let around = brought.at.map(|at| MomentJson::of(at, brought.found));

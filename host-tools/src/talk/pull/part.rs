@@ -9,11 +9,13 @@
 use std::collections::BTreeSet;
 use std::fs::{self, File};
 use std::io::{self, BufReader, Read as _, Seek as _, SeekFrom, Write as _};
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result, bail};
 use hums_blackbox::{Header, SECTOR_BYTES, Sector};
 
+use super::compare::beginning_of;
 use crate::files::{cannot_write, check_only_name, open_in_place, remake_in_place, set_aside, settle};
 use crate::logs::naming::part_name;
 
@@ -24,6 +26,8 @@ pub(super) struct Part {
     path: PathBuf,
     /// Which sectors are in it.
     has: Vec<bool>,
+    /// Those of them that came now: the others were here before, and may have been changed.
+    came: BTreeSet<u32>,
     /// The session of which it is a part, where a sector has told it.
     session: Option<u32>,
     /// The number of the sector that belongs at its beginning, where the first ones tell it.
@@ -70,15 +74,10 @@ impl Part {
     }
 
     fn at(path: PathBuf, head: &[Sector]) -> Result<Self> {
-        let headers =
-            || (0..).zip(head).filter_map(|(at, sector)| Some((at, Header::read(sector.bytes()).ok()?)));
-        let session = headers().next().map(|(_, header)| header.session);
-        let is_whole = |header: &Header| Some(header.session) == session && !header.partial;
-        let base = headers()
-            .find(|(_, header)| is_whole(header))
-            .and_then(|(at, header): (u32, _)| header.number.checked_sub(at));
+        let (session, base) = beginning_of(head);
         let file = Self::opened(&path)?;
-        Ok(Self { file, path, has: Vec::new(), session, base, strange: BTreeSet::new(), is_kept: false })
+        let (has, came, strange) = (Vec::new(), BTreeSet::new(), BTreeSet::new());
+        Ok(Self { file, path, has, came, session, base, strange, is_kept: false })
     }
 
     fn opened(path: &Path) -> Result<File> {
@@ -144,6 +143,20 @@ impl Part {
         &self.strange
     }
 
+    /// The number of the sector that belongs at its beginning, where one tells it.
+    pub(super) const fn base(&self) -> Option<u32> {
+        self.base
+    }
+
+    /// Takes the sectors of these places that were here before for missing: they are brought again. Whether there are any.
+    pub(super) fn doubt(&mut self, places: Range<u32>) -> bool {
+        let mut any = false;
+        for place in places.filter(|place| !self.came.contains(place)) {
+            any |= self.has.get_mut(place as usize).is_some_and(std::mem::take);
+        }
+        any
+    }
+
     /// Where it is.
     pub(super) fn path(&self) -> &Path {
         &self.path
@@ -176,11 +189,12 @@ impl Part {
 
     /// Puts a sector at its place, unless it is another session's. Where something else stands there, the part as it is is kept.
     pub(super) fn put(&mut self, place: u32, sector: &Sector) -> Result<()> {
-        if let Ok(header) = Header::read(sector.bytes())
-            && *self.session.get_or_insert(header.session) != header.session
-        {
-            self.strange.insert(place);
-            return Ok(());
+        if let Ok(header) = Header::read(sector.bytes()) {
+            if *self.session.get_or_insert(header.session) != header.session {
+                self.strange.insert(place);
+                return Ok(());
+            }
+            self.base = self.base.or_else(|| header.number.checked_sub(place).filter(|_| !header.partial));
         }
         if !self.is_kept && self.would_lose(place, sector)? {
             self.keep()?;
@@ -191,6 +205,7 @@ impl Part {
         if let Some(has) = self.has.get_mut(place as usize) {
             *has = true;
         }
+        self.came.insert(place);
         Ok(())
     }
 

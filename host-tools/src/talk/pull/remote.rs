@@ -3,6 +3,7 @@
 use std::collections::BTreeSet;
 use std::ops::Range;
 use std::path::Path;
+use std::slice;
 
 use anyhow::{Result, bail};
 use hums_blackbox::{Header, SECTOR_BYTES, Sector};
@@ -12,7 +13,7 @@ use super::compare::{bytes_of, heading_of};
 use super::ftp::Ftp;
 use super::moment::Sectors;
 use super::part::Part;
-use super::stretch::Stretch;
+use super::stretch::{Reading, Stretch};
 
 /// Twice the longest log that a recorder makes: of a longer one a part would fill the disk.
 const LOG_BYTES_MAX: u64 = 2 * SEGMENT_BYTES_MAX as u64;
@@ -65,9 +66,25 @@ impl<'a> Remote<'a> {
         Stretch { name, path, places, sectors: self.sectors }
     }
 
-    /// Brings the sectors of these places that are not here yet.
+    /// The number of its first sector, where one tells it.
+    pub(super) const fn first_number(&self) -> Option<u32> {
+        self.part.base()
+    }
+
+    /// Brings the sectors of these places that are not here yet. Where those that are make no sound log with them, they are brought
+    /// again too.
     pub(super) fn bring(&mut self, places: Range<u32>) -> Result<Stretch> {
-        let Range { start: mut place, end: to } = places;
+        self.bring_missing(&places)?;
+        let stretch = self.stretch(places.clone());
+        let is_sound = Reading::of(slice::from_ref(&stretch))?.faults(false).is_empty();
+        if !is_sound && self.part.doubt(places.clone()) {
+            self.bring_missing(&places)?;
+        }
+        Ok(stretch)
+    }
+
+    fn bring_missing(&mut self, places: &Range<u32>) -> Result<()> {
+        let Range { start: mut place, end: to } = *places;
         while let Some(first) = self.part.next(place, false).filter(|first| *first < to) {
             let end = self.part.next(first, true).unwrap_or(to).min(to);
             let Self { ftp, part, .. } = self;
@@ -85,7 +102,7 @@ impl<'a> Remote<'a> {
             note!("{}: {} of {} sectors came", self.name, end - places.start, to - places.start);
             place = end;
         }
-        Ok(self.stretch(places))
+        Ok(())
     }
 }
 

@@ -18,9 +18,26 @@ pub(super) struct Session {
     pub(super) unknown: Vec<String>,
 }
 
+/// A log's place among those of its card, as its name tells: the session's number there, and which of its files it is.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) struct Place {
+    pub(super) session: u32,
+    pub(super) segment: u32,
+}
+
+impl Place {
+    /// Behind all others.
+    pub(super) const MAX: Self = Self { session: u32::MAX, segment: u32::MAX };
+}
+
+/// The place of a log that has a card's name, on the board or here.
+pub(super) fn place(log: &str) -> Option<Place> {
+    segment_name(Path::new(log)).map(|name| Place { session: name.session, segment: name.segment })
+}
+
 /// The session's number in the name that a board's log has there.
 pub(super) fn number(log: &str) -> Option<u32> {
-    segment_name(Path::new(log)).map(|name| name.session)
+    place(log).map(|place| place.session)
 }
 
 /// The newest session of these logs, which are in their order. Where the logs were named, all must be of it.

@@ -3,7 +3,7 @@
 //! looked for may be there.
 
 use std::ops::Range;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use anyhow::Result;
 use hums_blackbox::{BlockCounts, Gap, Header, SECTOR_BYTES};
@@ -11,7 +11,7 @@ use hums_core::time::Instant;
 
 use super::session::number;
 use crate::logs::fat::Extent as Bytes;
-use crate::logs::{Log, Piece, segment_name};
+use crate::logs::{Log, Piece};
 use crate::plural::count;
 use crate::summary::{FindingLine, Overview};
 use crate::utc::moment;
@@ -29,10 +29,19 @@ pub(super) struct Stretch {
     pub(super) sectors: u32,
 }
 
+impl Stretch {
+    /// All of it, for readers of logs.
+    pub(super) fn piece(&self) -> Piece {
+        const SECTOR: u64 = SECTOR_BYTES as u64;
+        let Range { start, end } = self.places;
+        let length = u64::from(end.saturating_sub(start)) * SECTOR;
+        Piece { path: self.path.clone(), extents: vec![Bytes { start: u64::from(start) * SECTOR, length }] }
+    }
+}
+
 /// What was read of stretches that follow each other.
 pub(super) struct Reading {
     overview: Overview,
-    from_start: bool,
     /// The first place holds a sector.
     begins: bool,
     /// The last one.
@@ -42,23 +51,10 @@ pub(super) struct Reading {
 impl Reading {
     /// Reads stretches of the logs of one number, in their order, each of which goes on where the one before ends.
     pub(super) fn of(stretches: &[Stretch]) -> Result<Self> {
-        const SECTOR: u64 = SECTOR_BYTES as u64;
-        let piece = |stretch: &Stretch| {
-            let Range { start, end } = stretch.places;
-            let bytes = Bytes {
-                start: u64::from(start) * SECTOR,
-                length: u64::from(end.saturating_sub(start)) * SECTOR,
-            };
-            Piece { path: stretch.path.clone(), extents: vec![bytes] }
-        };
         let name = stretches.first().map_or_else(String::new, |first| first.name.clone());
-        let pieces = stretches.iter().map(piece).collect();
+        let pieces = stretches.iter().map(Stretch::piece).collect();
         let log = Log { name, files: Vec::new(), pieces, session: None, left_over: false };
-        let is_first = |name: &str| segment_name(Path::new(name)).is_none_or(|name| name.segment == 0);
         Ok(Self {
-            from_start: stretches
-                .first()
-                .is_some_and(|first| first.places.start == 0 && is_first(&first.name)),
             begins: log.blocks().next_block()?.is_some_and(|block| Header::read(&block).is_ok()),
             last: stretches.last().cloned(),
             overview: Overview::verified(&log)?,
@@ -100,10 +96,18 @@ impl Reading {
         &self.overview.contents.findings
     }
 
+    /// How they end, where nothing is wrong with that and all of it is not proved.
+    pub(super) fn unproved_end(&self) -> Option<String> {
+        let ending = &self.overview.ending;
+        (ending.proof.holds() && !ending.proof.is_whole()).then(|| ending.words())
+    }
+
     /// What is wrong with them, as parts of sentences; with `to_end` also that nothing proves that the log ends with them.
     pub(super) fn faults(&self, to_end: bool) -> Vec<String> {
         let unread = self.unread().as_ref().map(Unread::words);
-        let failed = failed(&self.overview, Extent { from_start: self.from_start, to_end });
+        // What is missing before them is known by their numbers.
+        let extent = Extent { from_start: false, to_end, follows: false };
+        let failed = failed(&self.overview, extent);
         unread.into_iter().chain(failed.into_iter().map(|(check, why)| format!("{check}: {why}"))).collect()
     }
 
@@ -156,14 +160,15 @@ pub(super) fn by_number(stretches: &[Stretch]) -> impl Iterator<Item = &[Stretch
 pub(super) struct Unread {
     pub(super) sectors: u64,
     /// The last entry before them, and the first one behind them.
-    from: Option<Instant>,
-    to: Option<Instant>,
+    pub(super) from: Option<Instant>,
+    pub(super) to: Option<Instant>,
 }
 
 impl Unread {
-    /// These and later ones.
-    pub(super) const fn and(self, later: Self) -> Self {
-        Self { sectors: self.sectors.saturating_add(later.sectors), from: self.from, to: later.to }
+    /// All of these: some, and later ones.
+    pub(super) fn all(earlier: Option<Self>, later: Option<Self>) -> Option<Self> {
+        let (Some(one), Some(other)) = (earlier, later) else { return earlier.or(later) };
+        Some(Self { sectors: one.sectors.saturating_add(other.sectors), from: one.from, to: other.to })
     }
 
     /// `2 sectors between 3:47.3 and the end cannot be read`.

@@ -1,7 +1,7 @@
 use std::fs;
 use std::path::PathBuf;
 
-use hums_blackbox::record::{Clock, FindingRecord, Note};
+use hums_blackbox::record::{Clock, FindingRecord, Keep, Mark, Note, Resting};
 use hums_blackbox::{Header, Record, Sector, SectorSink, Writer};
 use hums_core::health::{Level, Subsystem};
 use hums_link::messages;
@@ -194,7 +194,7 @@ fn a_part_that_has_what_the_card_has_lost_since_is_not_written_over() {
     lost[..SECTOR_BYTES].fill(0);
     let mut ftp = board(lost.clone(), lost, u32::MAX);
     let what: cli::Around = "0".parse().expect("a time");
-    around::pull(&mut ftp, &[NAME.to_owned()], dir.path(), &what, hums_core::time::Span::from_secs(1))
+    around::pull(&mut ftp, &[NAME.to_owned()], &[], dir.path(), (&what, hums_core::time::Span::from_secs(1)))
         .expect("a part");
     assert_eq!(fs::read(&part).expect("there"), log);
 }
@@ -208,7 +208,7 @@ fn a_part_has_sectors_of_one_session_also_where_the_log_is_exchanged_while_it_is
     let mut ftp = board(log.clone(), other, 8 * 3 + 5);
     let span = hums_core::time::Span::from_secs(9_999);
     let names = [NAME.to_owned()];
-    let brought = around::pull(&mut ftp, &names, dir.path(), &what, span).expect("a part");
+    let brought = around::pull(&mut ftp, &names, &[], dir.path(), (&what, span)).expect("a part");
     let [(_, path)] = &brought.parts[..] else { panic!("{brought:?}") };
     assert_eq!(path, &crate::logs::naming::part_name(&dir.path().join(name)));
     let part = fs::read(path).expect("there");
@@ -292,8 +292,11 @@ fn brought(files: &Files, args: &[&str]) -> Result<Outcome> {
 }
 
 fn brought_of(board: Client, args: &[&str]) -> Result<Outcome> {
-    let output = tempfile::tempdir().expect("a folder");
-    let folder = output.path().to_str().expect("a name");
+    brought_into(tempfile::tempdir().expect("a folder").path(), board, args)
+}
+
+fn brought_into(output: &Path, board: Client, args: &[&str]) -> Result<Outcome> {
+    let folder = output.to_str().expect("a name");
     let line = ["pull", "--link", "udpin:127.0.0.1:14550", "--json", "-o", folder];
     let line = <Line as clap::Parser>::try_parse_from(line.iter().chain(args)).expect("good");
     bring(board, &line.pull)
@@ -440,7 +443,8 @@ fn a_sector_of_a_part_that_belongs_elsewhere_is_brought_anew() {
     let around = |ftp: &mut Ftp| {
         let what: cli::Around = "1:00".parse().expect("a time");
         let names = [NAME.to_owned()];
-        around::pull(ftp, &names, dir.path(), &what, hums_core::time::Span::from_secs(9_999)).expect("a part")
+        around::pull(ftp, &names, &[], dir.path(), (&what, hums_core::time::Span::from_secs(9_999)))
+            .expect("a part")
     };
     let mut ftp = board(log.clone(), Vec::new(), u32::MAX);
     let (_, path) = around(&mut ftp).parts.remove(0);
@@ -534,4 +538,218 @@ fn a_refusal_says_no_more_than_is_known() {
         let faults = faults_of(NAME, &begun).expect("it reads");
         assert!(faults[0].contains("cannot be read"), "{faults:?}");
     }
+}
+
+/// A log in files of so many groups each, by the board's names.
+fn files_of(log: &[u8], groups: usize) -> Files {
+    let starts: Vec<usize> = (0..log.len() / SECTOR_BYTES)
+        .filter(|place| {
+            Sector::from_bytes(*log[place * SECTOR_BYTES..].first_chunk().expect("one")).starts_group()
+        })
+        .collect();
+    let cuts = starts.iter().copied().step_by(groups).map(|place| place * SECTOR_BYTES);
+    let ends = cuts.clone().skip(1).chain([log.len()]);
+    (0..)
+        .zip(cuts.zip(ends))
+        .map(|(n, (start, end))| (format!("00001_{n:02}.HUM"), log[start..end].to_vec()))
+        .collect()
+}
+
+/// What `hums verify` says of a folder.
+fn verified(folder: &Path) -> Outcome {
+    let found = crate::logs::find::find_in(folder, false).expect("a folder");
+    let mut outcome = Outcome::Done;
+    crate::verify::verify_each(&found, |log| {
+        outcome =
+            outcome.and(Outcome::lossy(!crate::verify::failed(log, crate::verify::Extent::ALL).is_empty()));
+        Ok(())
+    })
+    .expect("they read");
+    outcome
+}
+
+#[test]
+fn all_logs_of_a_board_are_judged_as_verify_judges_their_folder() {
+    let files = files_of(&recorded(7, SECONDS), 2);
+    assert!(files.len() > 4, "{}", files.len());
+    let last = files.len() - 1;
+    let mut boards = vec![(files.clone(), Outcome::Done)];
+    for at in [0, 1, last - 1] {
+        let (mut absent, mut empty, mut cut, mut lost) =
+            (files.clone(), files.clone(), files.clone(), files.clone());
+        absent.remove(at);
+        empty[at].1.clear();
+        cut[at].1.truncate(20 * SECTOR_BYTES);
+        lost[at].1[..SECTOR_BYTES].fill(0);
+        boards.extend([absent, empty, cut, lost].map(|files| (files, Outcome::Losses)));
+    }
+    boards.push((files[2..].to_vec(), Outcome::Losses));
+    boards.push((files[..last].to_vec(), Outcome::Losses));
+    for (files, expected) in boards {
+        let folder = tempfile::tempdir().expect("a folder");
+        let names: Vec<_> = files.iter().map(|(name, log)| (name, log.len())).collect();
+        let pulled =
+            brought_into(folder.path(), board_of(files.clone(), |_, _| None), &[]).expect("they come");
+        assert_eq!((pulled, verified(folder.path())), (expected, expected), "{names:?}");
+    }
+    // What was not asked for is no loss.
+    let code = |args: &[&str]| brought(&files, args).expect("they come");
+    assert_eq!(code(&["--last", "2"]), Outcome::Done);
+    assert_eq!(code(&["00001_01.HUM", "00001_03.HUM", &files[last].0]), Outcome::Done);
+    let mut cut = files.clone();
+    cut[1].1.truncate(SECTOR_BYTES);
+    assert_eq!(brought(&cut, &["00001_01.HUM"]).expect("it comes"), Outcome::Losses, "the next one tells");
+}
+
+#[test]
+fn an_end_that_is_not_proved_is_told_and_the_log_is_not_called_whole() {
+    let mut memory = Memory { session: 7, ..Memory::default() };
+    let mut writer = Box::new(Writer::new());
+    for tenth in 0..3_000_u64 {
+        let at = Instant::from_millis(tenth * 100);
+        let mut record = |record: Record<'_>| writer.record(at, &record, &mut memory).expect("there is room");
+        let text = format!("{:016x}", tenth.wrapping_mul(0x9E37_79B9_7F4A_7C15));
+        record(Record::Note(Note { severity: 6, text: &text }));
+        if tenth == 1_000 {
+            let sector = writer.counters().sectors as u32;
+            let mark = Record::Mark(Mark { why: Resting::Disarmed, sector, frames: 0 });
+            writer.record(at, &mark, &mut memory).expect("there is room");
+        }
+    }
+    let dir = tempfile::tempdir().expect("a folder");
+    let path = dir.path().join("00001-s00000007_00.HUM");
+    fs::write(&path, &memory.sectors).expect("written");
+    let mut logs = [LogJson::new(NAME.to_owned(), path, true)];
+    assert_eq!(judge(&[NAME.to_owned()], &Asked::all(), &mut logs).expect("it reads"), Outcome::Done);
+    assert!(!logs[0].whole);
+    let end = serde_json::to_value(&logs[0].end).expect("JSON");
+    let words = end["words"].as_str().expect("words");
+    assert!(
+        words.starts_with("whole to the disarming at") && words.ends_with("whose end cannot be proved"),
+        "{words}"
+    );
+}
+
+#[test]
+fn what_no_file_of_a_session_has_is_told_of_a_moment_and_of_a_search() {
+    let log = recorded(7, SECONDS);
+    let files = files_of(&log, 1);
+    let after = |second: u64| {
+        let place = group_at(&log, second).start * SECTOR_BYTES;
+        let mut end = 0;
+        files.iter().position(|(_, file)| {
+            end += file.len();
+            place < end
+        })
+    };
+    let moment = |files: &Files, second: u64| {
+        let second = second.to_string();
+        brought(files, &["--around", &second, "--span", "5"]).expect("it comes")
+    };
+    let search = |files: &Files| brought(files, &["--around", "critical", "--span", "1"]).expect("found");
+    let at = after(600).expect("a file");
+    assert!(at > 0 && at < after(1_000).expect("a file"), "{at}");
+    assert_eq!((moment(&files, 600), search(&files)), (Outcome::Done, Outcome::Done));
+    let changed = |change: &dyn Fn(&mut Files)| {
+        let mut files = files.clone();
+        change(&mut files);
+        files
+    };
+    let absent = changed(&|files| drop(files.remove(at)));
+    let empty = changed(&|files| files[at].1.clear());
+    let cut = changed(&|files| files[at].1.truncate(SECTOR_BYTES));
+    let first = changed(&|files| drop(files.drain(..=at)));
+    for files in [&absent, &empty, &cut, &first] {
+        assert_eq!(moment(files, 600), Outcome::Losses);
+        assert_eq!(moment(files, 1_400), Outcome::Done, "nothing of that moment is missing");
+        assert_eq!(search(files), Outcome::Done, "nor what comes after the latest one");
+    }
+    let later = after(1_300).expect("a file");
+    assert!(later > after(1_000).expect("a file") && later + 1 < files.len());
+    for files in [
+        changed(&|files| drop(files.remove(later))),
+        changed(&|files| files[later].1.clear()),
+        changed(&|files| files[later].1.truncate(SECTOR_BYTES)),
+        changed(&|files| files.last_mut().expect("one").1.clear()),
+    ] {
+        assert_eq!(search(&files), Outcome::Losses);
+    }
+    // By arming a power-on has logs of several numbers, whose sectors are numbered on.
+    let by_arming = |files: &Files| -> Files {
+        let name = |(n, (_, log)): (usize, &(String, Vec<u8>))| (format!("{:05}_00.HUM", n + 1), log.clone());
+        files.iter().enumerate().map(name).collect()
+    };
+    assert_eq!(search(&by_arming(&files)), Outcome::Done);
+    let mut files = by_arming(&files);
+    files.remove(later);
+    assert_eq!((search(&files), moment(&files, 1_300)), (Outcome::Losses, Outcome::Losses));
+    assert_eq!(moment(&files, 600), Outcome::Done);
+}
+
+#[test]
+fn a_search_reads_what_was_recorded_while_only_the_last_while_was_kept() {
+    let mut memory = Memory { session: 7, ..Memory::default() };
+    let (mut writer, mut groups) = (Box::new(Writer::new()), 0);
+    for tenth in 0..SECONDS * 10 {
+        let at = Instant::from_millis(tenth * 100);
+        let random = tenth.wrapping_mul(0x9E37_79B9_7F4A_7C15);
+        let text = format!("{random:016x}{:016x}", random.rotate_left(29) ^ tenth);
+        writer
+            .record(at, &Record::Note(Note { severity: 6, text: &text }), &mut memory)
+            .expect("there is room");
+        // Each group says so.
+        if std::mem::replace(&mut groups, writer.counters().groups) != groups {
+            let keep = Record::Keep(Keep { all: false, from: 0, seconds: 30 });
+            writer.record(at, &keep, &mut memory).expect("there is room");
+        }
+    }
+    writer.finish(&mut memory);
+    let log = &memory.sectors[group_at(&memory.sectors, 400).start * SECTOR_BYTES..];
+    assert_eq!(brought(&named(log.to_vec()), &["--around", "critical"]).expect("none"), Outcome::Losses);
+    assert_eq!(brought(&named(log.to_vec()), &["--around", "1000"]).expect("it comes"), Outcome::Done);
+}
+
+#[test]
+fn one_log_that_cannot_come_keeps_no_other_from_coming() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let files: Files = (1..4).map(|n| (format!("{n:05}_00.HUM"), recorded(n, 20))).collect();
+    let mut changed = files[0].1.clone();
+    changed[700] ^= 1;
+    let [one, two, three] = [1, 2, 3].map(|n| dir.path().join(format!("{n:05}-s{n:08x}_00.HUM")));
+    fs::write(&one, &changed).expect("written");
+    let long = [&files[1].1[..], &[0; SECTOR_BYTES]].concat();
+    fs::write(crate::logs::naming::part_name(&two), &long).expect("written");
+    let board = || board_of(files.clone(), |_, _| None);
+    let told = brought_into(dir.path(), board(), &[]).expect_err("one differs");
+    assert!(format!("{told:#}").contains("differs from the board's log of the same session"), "{told:#}");
+    assert_eq!(fs::read(&one).expect("there"), changed);
+    assert!(!two.exists());
+    assert_eq!(fs::read(&three).expect("it came"), files[2].1);
+}
+
+#[test]
+fn what_was_forged_in_a_part_comes_once_more() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let log = recorded(7, 300);
+    let around = || {
+        brought_into(
+            dir.path(),
+            board_of(named(log.clone()), |_, _| None),
+            &["--around", "1:00", "--span", "999"],
+        )
+    };
+    assert_eq!(around().expect("it comes"), Outcome::Done);
+    let path = dir.path().join("00001-s00000007_00.part.HUM");
+    let mut part = fs::read(&path).expect("there");
+    assert_eq!(part, log);
+    let place = 9 * SECTOR_BYTES..10 * SECTOR_BYTES;
+    let mut bytes: [u8; SECTOR_BYTES] = *part[place.clone()].first_chunk().expect("a sector");
+    bytes[100] ^= 1;
+    let mut forged = Sector::from_bytes(bytes);
+    forged.seal(7);
+    part[place].copy_from_slice(forged.bytes());
+    fs::write(&path, &part).expect("written");
+    assert_eq!(around().expect("it comes"), Outcome::Done);
+    assert_eq!(fs::read(&path).expect("there"), log);
+    assert_eq!(fs::read(dir.path().join("hums-kept/1/00001-s00000007_00.part.HUM")).expect("kept"), part);
 }

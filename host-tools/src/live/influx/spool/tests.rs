@@ -356,3 +356,20 @@ fn what_is_no_file_is_refused() {
         format!("{:#}", Spool::open(Path::new("/dev/null"), 3_000, &database(1)).expect_err("no file"));
     assert!(refused.contains("is no regular file"), "{refused}");
 }
+
+#[test]
+fn one_with_a_second_name_is_not_written() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("a.spool");
+    let mut spool = open(&path, 10_000);
+    spool.put(&batch(1)).expect("room");
+    drop(spool);
+    let before = std::fs::read(&path).expect("there");
+    std::fs::hard_link(&path, folder.path().join("backup")).expect("a second name");
+    let refused = Spool::open(&path, 10_000, &database(1)).expect_err("it has two names");
+    assert!(
+        format!("{refused:#}").contains("has another name too (a hard link, of a backup perhaps)"),
+        "{refused:#}"
+    );
+    assert_eq!(std::fs::read(&path).expect("there"), before);
+}
