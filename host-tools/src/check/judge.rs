@@ -247,7 +247,7 @@ impl Judge {
                 self.monitor.learn_parameter(parameter.name, parameter.value as f32);
             }
             Item::Text(Text { source, words, alert: Some(alert), .. }) => {
-                self.said(at, source, alert, words.to_owned());
+                self.said(at, source, alert, format!("\"{words}\""));
             }
             Item::Event(Event { source, number, words, alert: Some(alert), .. }) => {
                 let words = if words.is_empty() { format!("event {number}") } else { words.to_owned() };
@@ -602,8 +602,9 @@ impl Judge {
             flew: !flights.is_empty(),
             problems: &worst_first,
         });
-        let unchecked = self.facts.remove(&About::Unchecked);
-        let remarks = joined(&self.joints).into_iter().chain(of_vehicles).chain(unchecked).collect();
+        let of_file = [About::Beginning, About::Unchecked].map(|about| self.facts.remove(&about));
+        let of_file = of_file.into_iter().flatten();
+        let remarks = joined(&self.joints).into_iter().chain(of_vehicles).chain(of_file).collect();
         let judged = Judged {
             by,
             monitor: self.monitor,

@@ -473,7 +473,8 @@ fn sentence(group: &[&Problem]) -> String {
         Shown::State(state) => (state, None, None),
         Shown::Quantity(value, limit) => (None, value, limit),
     };
-    if let Some(state) = state {
+    // Of what the autopilot says its words are there, and the level stands before them.
+    if let Some(state) = state.filter(|_| first.details.is_empty() || !first.check.ends_with("_alert")) {
         let _ = write!(text, ": {state}");
     }
     match value {

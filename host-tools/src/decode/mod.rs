@@ -312,8 +312,8 @@ impl Task<'_> {
             remarks.push(format!("{}: {}", log.name, damaged_places(summary.gaps)));
         }
         if ending.is_none() && summary.losses > 0 {
-            let times = count(summary.losses, "time");
-            remarks.push(format!("{}: what recorded it lost something {times}, and says so", log.name));
+            let places = count(summary.losses, "place");
+            remarks.push(format!("{}: {places} of loss or noise; hums check says what", log.name));
         }
         remarks.extend(written.left_out().map(|words| format!("{}: {words}", log.name)));
         outcome = outcome.and(Outcome::lossy(written.rows_left_out > 0));

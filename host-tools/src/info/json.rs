@@ -5,7 +5,7 @@ use serde::Serialize;
 
 use crate::ending::{BlocksJson, EndJson};
 use crate::logs;
-use crate::names::{autopilot_name, type_name};
+use crate::names::{autopilot_name, check_name, type_name};
 use crate::source::item::MessageCount;
 use crate::source::recording::Format;
 use crate::states;
@@ -160,6 +160,8 @@ struct FindingJson {
 struct ExceedanceJson {
     check: String,
     instance: u8,
+    /// For people.
+    name: String,
     unit: String,
     session: CrossingsJson,
     lifetime: CrossingsJson,
@@ -172,6 +174,8 @@ struct CrossingsJson {
     warning_s: f64,
     critical_s: f64,
     peak: Option<f32>,
+    /// The state that the peak is, where it is no quantity.
+    state: Option<&'static str>,
 }
 
 #[derive(Debug, Serialize)]
@@ -193,7 +197,8 @@ struct ComponentJson {
 }
 
 fn exceedances(contents: &Contents) -> Vec<ExceedanceJson> {
-    let crossings = |of: &hums_core::health::exceedance::Crossings| CrossingsJson {
+    let crossings = |check: &str, of: &hums_core::health::exceedance::Crossings| CrossingsJson {
+        state: states::name(check, of.peak),
         warnings: of.warnings,
         criticals: of.criticals,
         warning_s: f64::from(of.warning_tenths) / 10.0,
@@ -203,9 +208,10 @@ fn exceedances(contents: &Contents) -> Vec<ExceedanceJson> {
     let json = |((check, instance), line): (&(String, u8), &crate::summary::ExceedanceLine)| ExceedanceJson {
         check: check.clone(),
         instance: *instance,
+        name: check_name(check, *instance),
         unit: line.unit.clone(),
-        session: crossings(&line.session),
-        lifetime: crossings(&line.lifetime),
+        session: crossings(check, &line.session),
+        lifetime: crossings(check, &line.lifetime),
     };
     contents.exceedances.iter().map(json).collect()
 }

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use anyhow::Result;
-use hums_core::health::{Level, vocabulary};
+use hums_core::health::Level;
 use hums_core::time::{Instant, Span};
 use hums_core::usage::UsageCounter;
 use indicatif::BinaryBytes;
@@ -14,6 +14,7 @@ use super::json::{duration_s, images_json};
 use super::text::image_text;
 use crate::cli;
 use crate::colour::{level, warning};
+use crate::names::check_name;
 use crate::outcome::Outcome;
 use crate::output::{self, JsonList, Schema};
 use crate::printable::word;
@@ -136,8 +137,7 @@ fn found(log: &Overview) -> String {
         let checked = log.contents.checked_by() != "nobody";
         return if checked { format!("{}", level("ok")) } else { "not checked".to_owned() };
     };
-    let name = vocabulary(&finding.check).map_or(finding.check.as_str(), |words| words.said.name);
-    format!("{}: {}", level(finding.level), word(name))
+    format!("{}: {}", level(finding.level), word(&check_name(&finding.check, finding.instance)))
 }
 
 /// The first finding of the worst level; good news is none.

@@ -6,6 +6,7 @@ use hums_core::time::Instant;
 use hums_link::encode::COMPONENT;
 use serde::Serialize;
 
+use crate::names::check_name;
 use crate::states::{Shown, shown};
 use crate::statustext::Text;
 use crate::summary::FindingLine;
@@ -69,7 +70,7 @@ impl Cause {
     /// Of the check of this name.
     fn of(check: &str) -> Self {
         let words =
-            vocabulary(check).map_or_else(|| check.replace('_', " "), |known| known.said.name.to_owned());
+            vocabulary(check).map_or_else(|| check_name(check, 0), |known| known.said.name.to_owned());
         Self { check: check.to_owned(), words }
     }
 }
@@ -90,10 +91,7 @@ impl Note {
     /// A finding of a check, and the check that explains it.
     pub fn found(finding: &FindingLine, because: Option<&str>) -> Self {
         let known = vocabulary(&finding.check);
-        let mut words = match known {
-            Some(known) => known.said.name_of(finding.instance).to_string(),
-            None => finding.check.replace('_', " "),
-        };
+        let mut words = check_name(&finding.check, finding.instance);
         if finding.is_unjudged() {
             words = format!("{words}: {}", FindingLine::UNJUDGED);
         }

@@ -67,7 +67,7 @@ fn a_screen_says_what_it_was_what_it_means_and_what_to_do_and_what_was_not_judge
         "quadrotor, ArduPilot",
         "in 1 flight",
         "not fit to fly before this is cleared up: 2 critical findings, 3 warnings",
-        "CRITICAL    4:20.7  battery 1 cell voltage: 3.4 V (limit 3.5 V), for 1:36",
+        "CRITICAL    4:20.8  battery 1 cell voltage: 3.4 V (limit 3.5 V), for 1:36",
         "The weakest cell was close to empty",
         "Check the pack under load",
         "no battery temperature: batt_temperature",
@@ -76,7 +76,7 @@ fn a_screen_says_what_it_was_what_it_means_and_what_to_do_and_what_was_not_judge
         assert!(screen.contains(words), "{words}\n{screen}");
     }
     let first =
-        screen.find("cell voltage").expect("the worst") < screen.find("alert: battery").expect("a warning");
+        screen.find("cell voltage").expect("the worst") < screen.find("battery alert").expect("a warning");
     assert!(first, "worst first: {screen}");
     assert!(screen.lines().count() < 45, "one screen: {screen}");
 }
@@ -505,13 +505,13 @@ fn what_a_logger_itself_lost_is_said_and_is_no_damage_to_any_command() {
     let checked = json(&super::support::attempt(dir.path(), "check --json drop.ulg"));
     assert_eq!((checked["loss_count"].as_u64(), checked["damaged"].as_bool()), (Some(1), Some(false)));
     let info = text(&run(dir.path(), "info drop.ulg", 0));
-    assert!(info.contains("1 that the recorder itself lost"), "{info}");
+    assert!(info.contains("1 place of loss or noise"), "{info}");
     run(dir.path(), "report drop.ulg -o page.html", 0);
     // It is of one vehicle.
     run(dir.path(), "check --system 1 drop.ulg", 2);
     let output = run(dir.path(), "decode drop.ulg -o out --format csv", 0);
     let told = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert!(told.contains("lost something 1 time"), "{told}");
+    assert!(told.contains("1 place of loss or noise; hums check says what"), "{told}");
 }
 
 #[test]
@@ -752,11 +752,49 @@ fn what_another_vehicle_flew_teaches_nothing_and_is_said() {
 #[test]
 fn bytes_of_no_frame_are_told_as_that_and_not_as_time_that_is_missing() {
     let dir = tempfile::tempdir().expect("directory");
-    fs::copy(flight("ap_quad_signed.raw"), dir.path().join("signed.raw")).expect("a copy");
+    let signed = fs::read(flight("ap_quad_signed.raw")).expect("there");
+    fs::write(dir.path().join("signed.raw"), &signed).expect("a copy");
+    // What an autopilot says while it boots is no loss.
     let checked = text(&run(dir.path(), "check signed.raw", 0));
-    assert!(checked.contains("; bytes of no frame are in it"), "{checked}");
-    assert!(!checked.contains("not recorded"), "{checked}");
+    assert!(
+        !checked.contains("of no frame") && checked.contains("160 bytes at its beginning are words"),
+        "{checked}"
+    );
+    let info = text(&run(dir.path(), "info signed.raw", 0));
+    assert!(info.contains("gaps     none"), "{info}");
     run(dir.path(), "report signed.raw -o pages/", 0);
     let table = fs::read_to_string(dir.path().join("pages/index.html")).expect("a table");
+    assert!(table.contains("\"faults\":[]"));
+    // Noise stands where it came.
+    let (before, after) = signed.split_at(signed.len() / 2);
+    let noisy = [before, &[0x80; 300], after].concat();
+    fs::write(dir.path().join("noisy.raw"), noisy).expect("a copy");
+    let checked = text(&run(dir.path(), "check noisy.raw", 0));
+    assert!(checked.contains("; bytes of no frame are in it"), "{checked}");
+    assert!(!checked.contains("not recorded"), "{checked}");
+    let gaps = json(&run(dir.path(), "info --json noisy.raw", 0))["logs"][0]["gaps"].clone();
+    let from_s = gaps[0]["from_s"].as_f64().expect("a time");
+    assert!((40.0..120.0).contains(&from_s) && gaps[0]["to_s"].is_null() && gaps[1].is_null(), "{gaps}");
+    run(dir.path(), "report noisy.raw -o pages/", 0);
+    let table = fs::read_to_string(dir.path().join("pages/index.html")).expect("a table");
     assert!(table.contains("\"faults\":[\"1 place of loss or noise; hums check says what\"]"));
+}
+
+/// `SYSTEM_TIME` tells the time of day of bytes without recorded times, as the box learns it of the same.
+#[test]
+fn raw_bytes_have_the_time_of_day_that_their_autopilot_tells() {
+    let dir = tempfile::tempdir().expect("directory");
+    fs::copy(flight("ap_quad_signed.raw"), dir.path().join("signed.raw")).expect("a copy");
+    let log = json(&run(dir.path(), "info --json signed.raw", 0))["logs"][0].clone();
+    assert!(
+        log["start_utc"].as_str().is_some_and(|utc| utc.starts_with("2026-11-20T21:29:46")),
+        "{}",
+        log["start_utc"]
+    );
+    for command in ["check signed.raw", "ls signed.raw"] {
+        let said = text(&run(dir.path(), command, 0));
+        assert!(said.contains("2026-11-20") && said.contains("21:29:46"), "{said}");
+    }
+    let said = text(&run(dir.path(), "decode signed.raw -o out/ --format csv", 0));
+    assert!(!said.contains("time of day"), "{said}");
 }
