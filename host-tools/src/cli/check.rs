@@ -8,6 +8,7 @@ const EXAMPLES: &str = "Examples:
   hums check flight.tlog
   hums check --json flight.tlog
   hums check cards/
+  hums check card.img --session 00001
   hums check --params hums.param flight.tlog card.img
   hums check --past flights/may flights/june.bin
 
@@ -31,6 +32,9 @@ pub struct Check {
     /// Earlier flights of the same vehicle, three or more, in which it was well: trends are judged against them. May be given several times
     #[arg(long, value_name = "LOG")]
     pub past: Vec<PathBuf>,
+    /// Only this session of a card or folder, by the name that `hums ls` gives
+    #[arg(long, value_name = "NAME")]
+    pub session: Option<String>,
     /// Of several vehicles in a recording only this one, by its system id
     #[arg(long, value_name = "ID")]
     pub system: Option<u8>,

@@ -76,6 +76,9 @@ pub struct LogJson {
     losses: Vec<LossJson>,
     /// Who checked the vehicle's health: `board`; `hums` (this program, when it read the log); `nobody`.
     checked_by: &'static str,
+    checks_judged: Option<usize>,
+    checks_all: Option<usize>,
+    ends_in_air: Option<String>,
     findings_count: u64,
     findings: Vec<FindingJson>,
     usage: serde_json::Map<String, serde_json::Value>,
@@ -84,7 +87,8 @@ pub struct LogJson {
     components: Vec<ComponentJson>,
     log_bytes: u64,
     tlog_bytes: u64,
-    ratio: f64,
+    /// `null` where it is no log of ours.
+    ratio: Option<f64>,
     bytes_on_card: u64,
     sectors: u64,
     sectors_damaged: u64,
@@ -164,7 +168,8 @@ struct ExceedanceJson {
     name: String,
     unit: String,
     session: CrossingsJson,
-    lifetime: CrossingsJson,
+    /// `null` where no life is known.
+    lifetime: Option<CrossingsJson>,
 }
 
 #[derive(Debug, Serialize)]
@@ -211,7 +216,7 @@ fn exceedances(contents: &Contents) -> Vec<ExceedanceJson> {
         name: check_name(check, *instance),
         unit: line.unit.clone(),
         session: crossings(check, &line.session),
-        lifetime: crossings(check, &line.lifetime),
+        lifetime: (!contents.checked_here).then(|| crossings(check, &line.lifetime)),
     };
     contents.exceedances.iter().map(json).collect()
 }
@@ -276,6 +281,9 @@ impl LogJson {
             gaps: gaps(contents),
             losses: losses(contents),
             checked_by: contents.checked_by(),
+            checks_judged: contents.judged.map(|checks| checks.judged),
+            checks_all: contents.judged.map(|checks| checks.all),
+            ends_in_air: contents.ends_in_air.map(|end| end.to_string()),
             findings_count: contents.findings_count,
             findings: findings(log),
             usage: contents.usage.iter().map(|(name, value)| (name.clone(), (*value).into())).collect(),

@@ -73,6 +73,9 @@ fn heading(text: &mut String, log: &Overview) {
     if log.format.is_none() {
         ending(text, log);
     }
+    if let Some(end) = &contents.ends_in_air {
+        let _ = writeln!(text, "  the end  {:>12}  {end}", moment(end.at));
+    }
     if let Some(vehicle) = vehicle(log) {
         let firmware = vehicle.firmware.map_or_else(String::new, |version| format!(" {version}"));
         let uid = vehicle.uid.map_or_else(String::new, |uid| format!(", uid {uid}"));
@@ -98,7 +101,8 @@ fn heading(text: &mut String, log: &Overview) {
     }
     let _ = write!(text, "  frames   {frames} in {} bytes, {records} records", log.log_bytes());
     if frames > 0 {
-        let _ = write!(text, "; as a tlog {} bytes: {:.2} times smaller", contents.tlog_bytes(), log.ratio());
+        let ratio = log.ratio().unwrap_or(f64::NAN);
+        let _ = write!(text, "; as a tlog {} bytes: {ratio:.2} times smaller", contents.tlog_bytes());
     }
     text.push('\n');
 }
@@ -148,12 +152,20 @@ fn findings_text(text: &mut String, log: &Overview) {
     let contents = &log.contents;
     // A recorder that ran no checks found nothing, which says nothing.
     let by = match contents.checked_by() {
+        "hums" if contents.is_little() => "",
         "hums" => " (checked here: what recorded this ran no checks)",
         "board" => "",
         _ => " (not checked)",
     };
     if contents.findings_count == 0 {
-        let _ = writeln!(text, "  findings none{by}");
+        let none = match contents.judged {
+            Some(checks) if contents.is_little() => {
+                format!("not enough to judge: {checks} had something to judge")
+            }
+            Some(checks) => format!("none in {checks}; the others had nothing to judge"),
+            None => "none".to_owned(),
+        };
+        let _ = writeln!(text, "  findings {none}{by}");
         return;
     }
     let _ = writeln!(text, "  findings {}{by}", contents.findings_count);

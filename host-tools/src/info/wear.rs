@@ -23,7 +23,8 @@ pub(super) fn text(text: &mut String, log: &Overview) {
     }
     for ((check, instance), line) in &contents.exceedances {
         for (of, crossings) in [("session", &line.session), ("life", &line.lifetime)] {
-            if of == "session" && !crossings.happened() {
+            // What was checked here is of this recording alone.
+            if of == "session" && !crossings.happened() || of == "life" && contents.checked_here {
                 continue;
             }
             let Crossings { warnings, criticals, warning_tenths, critical_tenths, peak } = *crossings;

@@ -4,6 +4,9 @@ use std::fs;
 use std::io::Write as _;
 use std::path::Path;
 
+use hums_link::encode::{Encoder, FRAME_BYTES_MAX};
+use hums_link::packet::Packet;
+
 use super::support::{attempt, end_of, flight, frames_of, hums, json, px4, recorded, records, run, text};
 
 /// Checks that tell of the place on a link, which a recording of another place cannot.
@@ -797,4 +800,87 @@ fn raw_bytes_have_the_time_of_day_that_their_autopilot_tells() {
     }
     let said = text(&run(dir.path(), "decode signed.raw -o out/ --format csv", 0));
     assert!(!said.contains("time of day"), "{said}");
+}
+
+/// The records of a recording of the repository that `keep` takes, by number and message id, in a file of this folder.
+fn filtered(name: &str, dir: &Path, file: &str, keep: impl Fn(usize, usize, u32) -> bool) {
+    let log = fs::read(flight(name)).expect("a recording");
+    let records = records(&log);
+    let id = |frame: &[u8]| match frame[0] {
+        0xFD => u32::from_le_bytes([frame[7], frame[8], frame[9], 0]),
+        _ => u32::from(frame[5]),
+    };
+    let all = records.len();
+    let kept = records.iter().enumerate().filter(|(place, (_, frame))| keep(*place, all, id(frame)));
+    let bytes: Vec<u8> = kept.flat_map(|(_, (us, frame))| [&us.to_be_bytes()[..], frame].concat()).collect();
+    fs::write(dir.join(file), bytes).expect("written");
+}
+
+/// Heartbeats and texts alone: nobody knows whether it flew, how high, or whether anything was wrong.
+#[test]
+fn what_nothing_tells_is_told_neither_as_good_nor_as_zero() {
+    let dir = tempfile::tempdir().expect("directory");
+    filtered("ap_quad_guided.tlog", dir.path(), "beats.tlog", |_, _, id| matches!(id, 0 | 253));
+    let checked = text(&run(dir.path(), "check beats.tlog", 0));
+    assert!(
+        checked.contains("in air   not known") && checked.contains("not enough to judge: 3 of 86"),
+        "{checked}"
+    );
+    let info = text(&run(dir.path(), "info beats.tlog", 0));
+    assert!(info.contains("findings not enough to judge: 3 of 86 checks"), "{info}");
+    assert!(!info.contains("On the ground") && info.contains("Armed"), "{info}");
+    let listed = text(&run(dir.path(), "ls beats.tlog", 0));
+    assert!(listed.contains("not enough to judge (3 of 86 checks)"), "{listed}");
+    let log = json(&run(dir.path(), "ls --json beats.tlog", 0))["logs"][0].clone();
+    assert_eq!((log["flight_s"].is_null(), log["checks_judged"].as_u64()), (true, Some(3)), "{log}");
+    run(dir.path(), "report beats.tlog -o pages/", 0);
+    let table = fs::read_to_string(dir.path().join("pages/index.html")).expect("a table");
+    assert!(table.contains("\"little\":true") && table.contains("\"flight_unknown\":true"));
+    // A box that checks knows no more of a vehicle that says nothing else.
+    let (mut encoder, mut buffer) = (Encoder::of(1, 1), [0; FRAME_BYTES_MAX]);
+    let beat = Packet::new(0).u8(4, 2).u8(5, 3).u8(7, 3).u8(8, 3);
+    let mut beats = Vec::new();
+    for second in 0..60_u64 {
+        beats.extend((1_800_000_000_000_000 + second * 1_000_000).to_be_bytes());
+        beats.extend(encoder.frame(&mut buffer, &beat));
+    }
+    fs::write(dir.path().join("alone.tlog"), beats).expect("written");
+    run(dir.path(), "sim --input alone.tlog --sd card.img", 0);
+    let listed = text(&run(dir.path(), "ls card.img", 0));
+    assert!(listed.contains("not enough to judge"), "{listed}");
+}
+
+#[test]
+fn a_recording_that_ends_in_the_air_says_so_everywhere_and_where_it_was_heard_last() {
+    let dir = tempfile::tempdir().expect("directory");
+    filtered("ap_quad_faults.tlog", dir.path(), "cut.tlog", |place, all, _| place < all / 3 * 2);
+    for command in ["check cut.tlog", "info cut.tlog"] {
+        let said = text(&attempt(dir.path(), command));
+        assert!(said.contains("the recording ends in the air: ") && said.contains("m above home"), "{said}");
+        assert!(said.contains("over ground, at ") && said.contains("what became of the vehicle"), "{said}");
+    }
+    let listed = text(&attempt(dir.path(), "ls cut.tlog"));
+    assert!(listed.contains("; ends in the air"), "{listed}");
+    run(dir.path(), "report cut.tlog -o pages/", 0);
+    let table = fs::read_to_string(dir.path().join("pages/index.html")).expect("a table");
+    assert!(table.contains("\"ends_in_air\":true"));
+    let end = json(&attempt(dir.path(), "check --json cut.tlog"))["ends_in_air"].clone();
+    assert!(end["latitude_deg"].as_f64().is_some_and(|north| north.abs() > 1.0), "{end}");
+}
+
+/// What the box found has the worst value of the flight, and not that of the moment in which it found it.
+#[test]
+fn a_card_tells_the_worst_value_of_what_the_box_found() {
+    let dir = tempfile::tempdir().expect("directory");
+    faults(dir.path());
+    run(dir.path(), "sim --input faults.tlog --sd card.img", 0);
+    let rise = |log: &str| {
+        let checked = json(&attempt(dir.path(), &format!("check --json {log}")));
+        let problems = checked["problems"].as_array().expect("an array").clone();
+        let rise =
+            problems.iter().find(|problem| problem["check"] == "vibration_rise").expect("found").clone();
+        rise["value"].as_f64().expect("a number")
+    };
+    let (tlog, card) = (rise("faults.tlog"), rise("card.img"));
+    assert!((tlog - card).abs() < 0.1 * tlog, "{tlog} {card}");
 }
