@@ -283,8 +283,8 @@ fn when(judged: &Judged, format: Format) -> String {
     };
     let since = match format {
         Format::DataFlash | Format::Ulog => "; times count from the autopilot's power-on",
-        Format::Hums => "; times count from the monitor's power-on",
-        Format::Tlog | Format::Raw => "",
+        Format::Hums if judged.by == JudgedBy::Board => "; times count from the monitor's power-on",
+        Format::Hums | Format::Tlog | Format::Raw => "",
     };
     format!("{utc}, {} recorded{restarts}{since}", clock(last.since(first)))
 }

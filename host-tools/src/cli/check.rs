@@ -16,8 +16,8 @@ Reads a ground station's tlog, raw MAVLink, ArduPilot's logs (.bin, .log), PX4's
 HUMS, cards and their images; told apart by what is in them. The checks and their limits are those of the monitor on
 board. A log of HUMS is shown with what the monitor on board found, unless --params or --past asks for another judgement.
 Exit codes: 0 nothing wrong in what could be judged (a log with too little in it says so: \"not enough to judge\"); 4 something
-wrong (a warning or worse); 3 the log has losses or damage, no times, or an end that nothing proves to be its end, whatever was found; 1 failed; 2 usage.
-Of several logs: the first of 1, 3, 4, 0 that is the code of one of them. Where no autopilot was heard, nothing is judged: 0.";
+wrong (a warning or worse); 3 the log has losses or damage, or no times, or nothing proves that it has its end, whatever was found; 1 failed; 2 usage.
+Of several logs: 1 where one failed, otherwise 3 where one has losses, otherwise 4 where one has findings. Where no autopilot was heard, nothing is judged: 0.";
 
 /// `hums check`
 #[derive(Args, Clone, Debug)]

@@ -62,21 +62,25 @@ struct Known {
     level: Level,
     /// Whether any has something to say.
     is_heard: bool,
-    /// Checks that are good.
+    /// Checks that are good, each once, however many parts it is of.
     good: usize,
+    last: &'static str,
 }
 
 impl Board {
     /// Of a vehicle. The checks, which are some hundred, are gone through once: this is done as often as pages are told.
     pub fn of(craft: &Craft, now: Instant) -> Self {
-        let mut known = [Known { level: Level::Stale, is_heard: false, good: 0 }; Subsystem::ALL.len()];
+        let none = Known { level: Level::Stale, is_heard: false, good: 0, last: "" };
+        let mut known = [none; Subsystem::ALL.len()];
         for (check, _, level) in craft.monitor.health().levels() {
             let Some(known) = known.get_mut(check.subsystem as usize) else { continue };
             // What is bad on another link than the autopilot's wire is that link's.
             if rank(level) > 0 && !craft.on_the_wire && is_of_wire(check.name) {
                 continue;
             }
-            known.good += usize::from(level == Level::Ok);
+            if level == Level::Ok && known.last != check.name {
+                (known.good, known.last) = (known.good + 1, check.name);
+            }
             // Silence of a check that only raises an alarm is no news.
             if !check.alarm_only || level != Level::Ok {
                 if !known.is_heard || rank(level) > rank(known.level) {

@@ -33,7 +33,7 @@ use crate::followed::{Followed, HELD_MAX};
 use crate::logs::sessions::Sessions;
 use crate::logs::side_by_side::side_by_side;
 use crate::logs::{Log, segment_name};
-use crate::outcome::{Kept, Outcome};
+use crate::outcome::{Kept, Outcome, usage};
 use crate::output::{self, Schema};
 use crate::plural::count;
 use crate::printable::{path as shown, word};
@@ -73,6 +73,12 @@ pub fn run(args: &cli::Report) -> Result<Outcome> {
     }
     let sessions = sessions_of(&found.places);
     let wanted = wanted(args, &found, &sessions)?;
+    if args.output.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("pdf")) {
+        return Err(usage(format!(
+            "-o {}: a page is HTML: give it that name, and print it from a browser",
+            shown(&args.output)
+        )));
+    }
     let inputs = Inputs::of(given.iter().map(PathBuf::as_path).chain(found.paths())).replacing(args.replace);
     inputs.refuse(&args.output)?;
     if wanted.directory {
