@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use hums_core::baseline::Quantity;
 use hums_core::usage::{CounterName, UsageCounter, counter_name as meaning};
+use hums_core::vehicle::Vehicle;
 use serde::Serialize;
 
 use crate::names::counter_name;
@@ -62,6 +63,36 @@ pub struct Ranges {
 /// From, to (`null` where there is no end), seconds.
 pub type Band = (Option<f32>, Option<f32>, f64);
 
+/// Whether anything of the vehicle's told what a counter counts: otherwise its zero is no zero. Counters of motors, ranges and the past
+/// have no zero that is shown.
+pub fn is_told(name: &str, vehicle: &Vehicle) -> bool {
+    use UsageCounter as U;
+    let Some(counter) = UsageCounter::ALL.iter().find(|counter| counter.name() == name) else { return true };
+    let moves = tells_flight(vehicle);
+    match counter {
+        U::Powered | U::Armed | U::AutopilotReboots | U::Mishaps => true,
+        U::LoadFactorMax
+        | U::LoadCycles0
+        | U::LoadCycles1
+        | U::LoadCycles2
+        | U::LoadCycles3
+        | U::LoadCycles4
+        | U::LoadCycles5
+        | U::LoadCycles6 => vehicle.imu.get().is_some(),
+        U::Charge | U::Energy | U::CurrentMax | U::VoltageMin | U::BatteryCycles => {
+            vehicle.system.get().is_some() || vehicle.batteries.iter().any(|battery| battery.get().is_some())
+        }
+        U::VibrationMax => vehicle.vibration.get().is_some(),
+        _ => moves,
+    }
+}
+
+/// Whether anything tells if the vehicle flies.
+pub fn tells_flight(vehicle: &Vehicle) -> bool {
+    let Vehicle { landed, global, local, hud, .. } = vehicle;
+    landed.get().is_some() || global.get().is_some() || local.get().is_some() || hud.get().is_some()
+}
+
 /// Title, unit and decimals of a counter of the vehicle.
 const fn about(counter: UsageCounter) -> (&'static str, &'static str, u8) {
     use UsageCounter as U;
@@ -80,7 +111,7 @@ const fn about(counter: UsageCounter) -> (&'static str, &'static str, u8) {
         U::CurrentMax => ("Highest current", "A", 2),
         U::VoltageMin => ("Lowest battery voltage", "V", 2),
         U::VibrationMax => ("Highest vibration", "m/s\u{b2}", 2),
-        U::AutopilotReboots => ("Reboots of the autopilot", "", 0),
+        U::AutopilotReboots => ("Restarts of the autopilot", "", 0),
         U::HardLandings => ("Hard landings", "", 0),
         U::TouchdownMax => ("Fastest touchdown", "m/s", 2),
         U::BatteryCycles => ("Battery cycles", "", 2),

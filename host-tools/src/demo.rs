@@ -154,6 +154,7 @@ fn is_card_of(card: &Path, flight: &Endpoint) -> bool {
 fn tables_of(args: &cli::Demo, card: &Path, decoded: &Path) -> cli::Decode {
     cli::Decode {
         salvage: false,
+        session: None,
         inputs: vec![card.to_owned()],
         output: decoded.to_owned(),
         format: vec![Format::Tlog, Format::Csv],

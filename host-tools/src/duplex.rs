@@ -8,7 +8,7 @@ use std::net::{SocketAddr, TcpStream, UdpSocket};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result, anyhow, bail};
 
 use crate::endpoint::Endpoint;
 
@@ -51,7 +51,9 @@ pub fn open(endpoint: &Endpoint, silence: Duration) -> Result<Duplex> {
     let context = || format!("{endpoint}: cannot be opened");
     Ok(match endpoint {
         Endpoint::UdpIn(address) => {
-            let socket = UdpSocket::bind(address.resolve()?).with_context(context)?;
+            let bound = UdpSocket::bind(address.resolve()?);
+            let socket =
+                bound.map_err(|error| anyhow!("{endpoint}: cannot be opened: {}", why_not_bound(&error)))?;
             datagrams(socket, None, silence).with_context(context)?
         }
         Endpoint::UdpOut(address) => {
@@ -77,6 +79,19 @@ pub fn open(endpoint: &Endpoint, silence: Duration) -> Result<Duplex> {
         }
         Endpoint::File(_) | Endpoint::Standard => bail!("{endpoint} is not live: nobody there answers"),
     })
+}
+
+/// Why a port cannot be listened on, and what to do.
+fn why_not_bound(error: &io::Error) -> String {
+    match error.kind() {
+        ErrorKind::AddrInUse => "another program, perhaps a ground station, has this port: close it, or let it forward the vehicle's \
+             messages to another port and name that one"
+            .to_owned(),
+        ErrorKind::AddrNotAvailable => {
+            "that is no address of this computer: 0.0.0.0 listens on all that it has".to_owned()
+        }
+        _ => error.to_string(),
+    }
 }
 
 fn datagrams(socket: UdpSocket, peer: Option<SocketAddr>, silence: Duration) -> io::Result<Duplex> {

@@ -65,7 +65,11 @@ impl FromStr for Address {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let wrong = || format!("`{text}` is not ADDR:PORT, for instance 127.0.0.1:14550");
+        let wrong = || {
+            format!(
+                "`{text}` is not ADDR:PORT, for instance 0.0.0.0:14550 to listen on all addresses of this computer"
+            )
+        };
         let (host, port) = text.rsplit_once(':').ok_or_else(wrong)?;
         let host = host.strip_prefix('[').and_then(|host| host.strip_suffix(']')).unwrap_or(host);
         if host.is_empty() {

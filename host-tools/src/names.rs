@@ -3,6 +3,7 @@
 use std::borrow::Cow;
 
 use hums_core::baseline::Quantity;
+use hums_core::health::vocabulary;
 use hums_core::usage::{self, CounterName};
 
 /// The name of a message, `UNKNOWN_12345` where the dialect has none.
@@ -11,6 +12,12 @@ pub fn message_name(id: u32) -> Cow<'static, str> {
         Some(message) => Cow::Borrowed(message.name),
         None => Cow::Owned(format!("UNKNOWN_{id}")),
     }
+}
+
+/// What a check of one part is called wherever people read of it: `battery 1 cell voltage`. What a pilot is told is in other words.
+pub fn check_name(check: &str, instance: u8) -> String {
+    vocabulary(check)
+        .map_or_else(|| check.replace('_', " "), |words| words.said.name_of(instance).to_string())
 }
 
 /// The name of a counter, for instance `flight_time_s`, `motor0_run_time_s` or `esc_temperature_45_to_60_degc_s`;

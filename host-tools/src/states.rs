@@ -64,7 +64,7 @@ pub fn name(check: &str, value: f32) -> Option<&'static str> {
         "batt_fault" if value >= 2.0 => return Some("several faults"),
         "batt_fault" => &["no fault", "one fault"],
         // `hums_core::cause::Urgency`
-        alert if alert.ends_with("_alert") => &["over", "worth knowing", "to be acted on at once"],
+        alert if alert.ends_with("_alert") => &["over", "a warning", "critical"],
         _ => return None,
     };
     // What no state has is no number of one.

@@ -1,6 +1,7 @@
 //! What is in a log, in one pass: for `info`, `verify` and `demo`.
 
 use std::collections::BTreeMap;
+use std::fmt::{self, Display, Formatter};
 
 use anyhow::Result;
 use hums_blackbox::record::{Loss, Moment, Stats, Vehicle, Why};
@@ -8,7 +9,7 @@ use hums_blackbox::{Cause, Gap, Record};
 use hums_core::component::Figures;
 use hums_core::health::Level;
 use hums_core::health::exceedance::Crossings;
-use hums_core::time::Instant;
+use hums_core::time::{Instant, Span};
 use hums_link as link;
 
 use crate::ending::Ending;
@@ -27,6 +28,9 @@ use crate::source::told::Finding;
 
 /// Findings, gaps and losses that are kept one by one; beyond this they are only counted, so that memory is bounded.
 pub const LISTED_MAX: usize = 10_000;
+
+/// The airframe's life and the counters of a session are stored together within this.
+const STORED_WITH: Span = Span::from_secs(5);
 
 /// Checks with exceedances that are kept: four times those that there are, with all their instances.
 const EXCEEDANCES_MAX: usize = 1_000;
@@ -95,6 +99,65 @@ pub struct BootLine {
     pub boots: u32,
 }
 
+/// How many checks had something to judge, of those that are meant for the vehicle.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct JudgedChecks {
+    /// These had.
+    pub judged: usize,
+    /// So many of them tell of the box, its card and its wire alone.
+    pub of_box: usize,
+    /// All.
+    pub all: usize,
+}
+
+impl JudgedChecks {
+    /// Whether those of the vehicle are so few that nothing found is no good news: fewer than one in ten.
+    pub const fn is_little(self) -> bool {
+        self.judged.saturating_sub(self.of_box) * 10 < self.all
+    }
+}
+
+impl Display for JudgedChecks {
+    fn fmt(&self, formatter: &mut Formatter<'_>) -> fmt::Result {
+        write!(formatter, "{} of {} checks", self.judged, self.all)
+    }
+}
+
+/// The vehicle as it was heard last, where a recording ends in the air.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct EndsInAir {
+    /// When.
+    pub at: Instant,
+    /// Height above home, or above the local origin, m.
+    pub height_m: Option<f32>,
+    /// Climb rate, m/s; negative where it sank.
+    pub climb_mps: Option<f32>,
+    /// Speed over ground, m/s.
+    pub speed_mps: Option<f32>,
+    /// Degrees north and east, as they were told last.
+    pub place_deg: Option<(f64, f64)>,
+}
+
+impl Display for EndsInAir {
+    /// As a sentence. A number that no sensor can have is left out.
+    fn fmt(&self, formatter: &mut Formatter<'_>) -> fmt::Result {
+        const IMPOSSIBLE: f32 = 1e9;
+        let possible = |value: &f32| value.abs() < IMPOSSIBLE;
+        let mut known = Vec::new();
+        known.extend(self.height_m.filter(possible).map(|height_m| format!("{height_m:.1} m above home")));
+        known.extend(self.climb_mps.filter(possible).map(|climb_mps| {
+            let way = if climb_mps < 0.0 { "sinking" } else { "climbing" };
+            format!("{way} at {:.1} m/s", climb_mps.abs())
+        }));
+        known.extend(
+            self.speed_mps.filter(possible).map(|speed_mps| format!("{speed_mps:.1} m/s over ground")),
+        );
+        known.extend(self.place_deg.map(|(north, east)| format!("at {north:.7}, {east:.7}")));
+        let known = if known.is_empty() { String::new() } else { format!(": {}", known.join(", ")) };
+        write!(formatter, "the recording ends in the air{known}; what became of the vehicle is not in it")
+    }
+}
+
 /// Limits of a check that were crossed.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ExceedanceLine {
@@ -153,10 +216,18 @@ pub struct Contents {
     pub findings_count: u64,
     /// They were found by this program when it read the log, because its recorder ran no checks.
     pub checked_here: bool,
-    /// The latest values of the usage counters.
+    /// How much was judged, where that was looked at: of a log that its recorder checked only where few kinds of messages are in it.
+    pub judged: Option<JudgedChecks>,
+    /// The last flight goes on at its end, in a recording that was judged here.
+    pub ends_in_air: Option<EndsInAir>,
+    /// The latest values of the usage counters, and when they were so.
     pub usage: BTreeMap<String, f64>,
-    /// The airframe's life, as recorded last.
+    /// See [`Self::usage`]; `None` where this program counted them.
+    pub usage_at: Option<Instant>,
+    /// The airframe's life, as recorded last, and when that was.
     pub lifetime: BTreeMap<String, f64>,
+    /// See [`Self::lifetime`].
+    pub lifetime_at: Option<Instant>,
     /// Limits that were crossed, by check and instance, as recorded last.
     pub exceedances: BTreeMap<(String, u8), ExceedanceLine>,
     /// Components by place, from 1, as recorded last.
@@ -216,7 +287,18 @@ impl Contents {
         self.frame_bytes() + 8 * self.frames()
     }
 
-    fn record(&mut self, record: &Record<'_>) {
+    /// Whether little was judged, and nothing was found there: that is no good news.
+    pub fn is_little(&self) -> bool {
+        let is_worry = |finding: &FindingLine| matches!(finding.level, "warning" | "critical");
+        self.judged.is_some_and(JudgedChecks::is_little) && !self.findings.iter().any(is_worry)
+    }
+
+    /// Whether the airframe's life was stored before the counters of this session: it is without them.
+    pub fn is_life_before(&self) -> bool {
+        self.lifetime_at.zip(self.usage_at).is_some_and(|(life, usage)| usage.since(life) >= STORED_WITH)
+    }
+
+    fn record(&mut self, at: Instant, record: &Record<'_>) {
         self.records += 1;
         match record {
             Record::Boot(boot) => {
@@ -238,8 +320,10 @@ impl Contents {
             // The counters at the start are those of the sessions before.
             Record::Usage(snapshot) if snapshot.moment != Moment::Start || self.usage.is_empty() => {
                 self.usage.extend(named(snapshot.iter()));
+                self.usage_at = Some(at);
             }
             Record::Lifetime(life) => {
+                self.lifetime_at = Some(at);
                 self.lifetime.extend(named(life.iter()));
                 self.lifetime.insert("boots".to_owned(), f64::from(life.boots));
                 self.lifetime.insert("sessions".to_owned(), f64::from(life.sessions));
@@ -287,7 +371,9 @@ impl Contents {
         let room = LISTED_MAX.saturating_sub(self.findings.len());
         self.findings.extend(next.findings.into_iter().take(room));
         self.usage.extend(next.usage);
+        self.usage_at = next.usage_at.or(self.usage_at);
         self.lifetime.extend(next.lifetime);
+        self.lifetime_at = next.lifetime_at.or(self.lifetime_at);
         next.exceedances.into_iter().for_each(|(key, line)| self.exceeded(key, line));
         self.components.extend(next.components);
         for loss in next.losses.values() {
@@ -310,9 +396,9 @@ fn add_loss(losses: &mut BTreeMap<&'static str, Loss>, loss: &Loss) {
 }
 
 impl Collect for Contents {
-    fn item(&mut self, _at: Instant, item: Item<'_>) {
+    fn item(&mut self, at: Instant, item: Item<'_>) {
         match item {
-            Item::Record(record) => self.record(record),
+            Item::Record(record) => self.record(at, record),
             Item::Frame(frame) if frame.check() == link::Check::Verified => {
                 let is_bad = matches!(peek(frame.bytes()), Peek::Frame(frame) if frame.check() == Check::Bad);
                 self.bad_frames += u64::from(is_bad);
@@ -423,9 +509,16 @@ impl Overview {
         self.ending.summary.blocks.sectors * 512
     }
 
-    /// How many times smaller than the same frames as a tlog.
-    pub fn ratio(&self) -> f64 {
-        self.contents.tlog_bytes() as f64 / self.log_bytes().max(1) as f64
+    /// How many times smaller than the same frames as a tlog, of a log of ours.
+    pub fn ratio(&self) -> Option<f64> {
+        let bytes = self.log_bytes();
+        (self.format.is_none() && bytes > 0).then(|| self.contents.tlog_bytes() as f64 / bytes as f64)
+    }
+
+    /// When the counters of its session were stored, where the recording goes on for a while after that: they are of the time until then.
+    pub fn counted_until(&self) -> Option<Instant> {
+        let last = self.ending.summary.last?;
+        self.contents.usage_at.filter(|at| last.since(*at) >= STORED_WITH)
     }
 
     /// Whether a group could not be read because this program is too old for it.

@@ -34,9 +34,15 @@ pub fn date_and_time(utc_us: u64) -> String {
     iso8601(utc_us).chars().take(19).map(|c| if c == 'T' { ' ' } else { c }).collect()
 }
 
-/// A time in a recording for people, to a tenth of a second: `4:20.8`, `1:04:20.8`.
+/// To the millisecond, for people, as clocks on a link are known: `2026-11-21T10:13:42.123Z`.
+pub fn iso8601_ms(utc_us: u64) -> String {
+    let text = iso8601(utc_us / 1_000 * 1_000);
+    text.strip_suffix("000Z").map_or_else(|| text.clone(), |text| format!("{text}Z"))
+}
+
+/// A time in a recording for people, to the nearest tenth of a second: `4:20.8`, `1:04:20.8`.
 pub fn moment(at: Instant) -> String {
-    let tenths = at.as_micros() / 100_000;
+    let tenths = at.as_micros().saturating_add(50_000) / 100_000;
     let (hours, minutes, seconds) = (tenths / 36_000, tenths / 600 % 60, tenths / 10 % 60);
     let hours = if hours > 0 { format!("{hours}:{minutes:02}") } else { minutes.to_string() };
     format!("{hours}:{seconds:02}.{}", tenths % 10)
@@ -144,6 +150,9 @@ mod tests {
     #[test]
     fn times_are_read_at_a_glance() {
         assert_eq!(moment(Instant::from_millis(260_849)), "4:20.8");
+        assert_eq!(moment(Instant::from_millis(260_750)), "4:20.8", "as docs/cli.md has it");
+        assert_eq!(moment(Instant::from_millis(3_599_950)), "1:00:00.0");
+        assert_eq!(iso8601_ms(1_795_256_022_926_899), "2026-11-21T10:13:42.926Z");
         assert_eq!(moment(Instant::from_millis(3_860_000)), "1:04:20.0");
         assert_eq!(clock(Span::from_millis(59_600)), "1:00");
         assert_eq!(clock(Span::from_secs(3_861)), "1:04:21");

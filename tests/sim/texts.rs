@@ -77,7 +77,8 @@ fn family(text: &str) -> Subsystem {
             return good.starts_with(&said.name_of(0).to_string())
                 || (1..9).any(|n| good == said.name_of(n).to_string());
         }
-        let (before, after) = said.alarm.split_once('#').unwrap_or((said.alarm, ""));
+        let alarm = said.alarm.split('|').next().unwrap();
+        let (before, after) = alarm.split_once('#').unwrap_or((alarm, ""));
         words.starts_with(before) && words.contains(after)
     };
     let found = health::checks().filter(|check| fits(check.name));

@@ -305,6 +305,12 @@ impl Monitor {
         self.wear_next = (self.wear_next + 1) % COMPONENTS_MAX as u8;
     }
 
+    /// How many cells the first battery has; 0 where that is not known, or is not asked for because there are several.
+    pub fn cell_count(&self) -> u8 {
+        let several = self.vehicle.batteries.iter().skip(1).any(|battery| battery.get().is_some());
+        if several { 0 } else { self.derived.cell_count(&self.vehicle, 0, &self.params) }
+    }
+
     /// Keeps the cells that are known for the next power-on, and tells once where they are not.
     fn step_cells(&mut self, now: Instant) {
         let Self { vehicle, derived, params, before, saving, happenings, cells_told, .. } = self;

@@ -390,14 +390,17 @@ fn every_text_of_a_check_is_in_the_runbook() {
             continue;
         }
         told.push(alarm);
-        let alarm = alarm.replace('#', "*n*");
-        let value = match check.unit {
-            _ if check.is_flag => String::new(),
-            "" => ": *value*".to_owned(),
-            "degC" => ": *value* C".to_owned(),
-            "1/min" => ": *value* per min".to_owned(),
-            unit => format!(": *value* {unit}"),
+        let unit = match check.unit {
+            "" => String::new(),
+            "degC" => " C".to_owned(),
+            "1/min" => " per min".to_owned(),
+            "times" => " x".to_owned(),
+            unit => format!(" {unit}"),
         };
+        let value = words.said.around_value(check.unit);
+        let value =
+            value.map_or_else(String::new, |(before, after)| format!(": {before}*value*{unit}{after}"));
+        let alarm = alarm.split('|').next().unwrap().replace('#', "*n*");
         let _ = writeln!(table, "| {alarm}{value} | {advice} | {} | {} |", words.meaning, words.action);
     }
     let found = fs::read_to_string(path("runbook.md")).unwrap();

@@ -436,9 +436,10 @@ pub fn text(finding: &Finding) -> Text {
     // Nobody lands because of a camera's battery.
     let is_told = level == Level::Critical && !said.advice.is_empty() && feeds != Feeds::Payload;
     let advice = if is_told { Text::new(format_args!(", {}", said.advice)) } else { Text::default() };
-    let is_flag = health::check_named(check).is_some_and(|check| check.is_flag);
-    if !is_flag && value.is_finite() {
-        let value = quantity(value, finding.unit);
+    if let Some((before, after)) = said.around_value(finding.unit)
+        && value.is_finite()
+    {
+        let value = Text::new(format_args!(": {before}{}{after}", quantity(value, finding.unit).as_str()));
         // What to do says more than how much.
         if text.as_str().len() + value.as_str().len() + advice.as_str().len() <= TEXT_BYTES_MAX {
             let _ = text.write_str(value.as_str());
@@ -448,20 +449,21 @@ pub fn text(finding: &Finding) -> Text {
     text
 }
 
-/// `: 14.9 %`, as exact as a pilot needs it.
+/// `14.9 %`, as exact as a pilot needs it.
 fn quantity(value: f32, unit: &str) -> Text {
     let (unit, digits) = match unit {
         "degC" => ("C", 0),
         "V" => ("V", 2),
         "1/min" => ("per min", 0),
+        "times" => ("x", 1),
         unit => (unit, u32::from(value.abs() < 100.0)),
     };
     let space = if unit.is_empty() { "" } else { " " };
     let (sign, scaled) = (if value.is_sign_negative() { "-" } else { "" }, scaled(value, digits));
     let (whole, part) = (scaled / 10_u64.pow(digits), scaled % 10_u64.pow(digits));
-    match digits {
-        0 => Text::new(format_args!(": {sign}{whole}{space}{unit}")),
-        _ => Text::new(format_args!(": {sign}{whole}.{part:0width$}{space}{unit}", width = digits as usize)),
+    match (digits, part) {
+        (0, _) | (1, 0) => Text::new(format_args!("{sign}{whole}{space}{unit}")),
+        _ => Text::new(format_args!("{sign}{whole}.{part:0width$}{space}{unit}", width = digits as usize)),
     }
 }
 

@@ -202,7 +202,8 @@ impl Details {
         let Some(cause) = Cause::ALL.into_iter().find(|cause| cause.check() == check) else { return };
         let of = |bit: &u32| self.sensors & bit != 0 && Causes::of_sensors(*bit).has(cause);
         for bit in (0..u32::BITS).map(|bit| 1 << bit).filter(of) {
-            states::sensors(bit).for_each(|name| problems.detail(check, name));
+            states::sensors(bit)
+                .for_each(|name| problems.detail(check, &format!("{name} unhealthy, by its flags")));
         }
         let flag = match cause {
             Cause::Gnss => "a glitch, by the estimator's flags",

@@ -75,6 +75,8 @@ struct EndsInAirJson {
     height_m: Option<f32>,
     climb_mps: Option<f32>,
     speed_mps: Option<f32>,
+    latitude_deg: Option<f64>,
+    longitude_deg: Option<f64>,
 }
 
 #[derive(Serialize)]
@@ -88,9 +90,9 @@ struct ProblemJson<'a> {
     seconds: f64,
     times: u32,
     to_the_end: bool,
-    value: Option<f64>,
+    value: Option<f32>,
     state: Option<&'static str>,
-    limit: Option<f64>,
+    limit: Option<f32>,
     unit: &'a str,
     because: Option<&'a str>,
     detail: Option<String>,
@@ -105,7 +107,7 @@ struct FindingJson<'a> {
     instance: u8,
     level: &'static str,
     time_s: f64,
-    value: Option<f64>,
+    value: Option<f32>,
     unit: &'a str,
 }
 
@@ -164,6 +166,8 @@ pub fn line(checked: &Checked) -> serde_json::Result<String> {
             height_m: end.height_m,
             climb_mps: end.climb_mps,
             speed_mps: end.speed_mps,
+            latitude_deg: end.place_deg.map(|(north, _)| north),
+            longitude_deg: end.place_deg.map(|(_, east)| east),
         }),
         clock_restarts: judged.restarts,
         problems: judged.problems.iter().map(|problem| self::problem(problem, utc(problem.at))).collect(),
@@ -189,8 +193,8 @@ fn seconds(span: hums_core::time::Span) -> f64 {
 }
 
 /// A number that JSON has.
-fn known(value: f32) -> Option<f64> {
-    value.is_finite().then_some(f64::from(value))
+fn known(value: f32) -> Option<f32> {
+    value.is_finite().then_some(value)
 }
 
 fn vehicle(judged: &Judged) -> Option<VehicleJson> {

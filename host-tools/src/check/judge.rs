@@ -19,18 +19,20 @@ use hums_core::params::Params;
 use hums_core::status::{LinkReading, RecorderStatus};
 use hums_core::time::{Instant, Span};
 use hums_core::usage::UsageCounter;
+use hums_core::vehicle::Vehicle;
 use hums_link::sequence::Sequences;
 
 use super::clock::{Clock, SETTLE};
 use super::coverage::{Coverage, Recording};
 use super::details::{self, Details};
 use super::flights::Flights;
-use super::judged::{EndsInAir, Judged, JudgedBy};
+use super::judged::{Judged, JudgedBy};
 use super::problem::{LISTED_MAX, Problems};
 use crate::source::epochs::Epochs;
 use crate::source::item::{About, Cause as Why, Event, Fact, Gap, Item, Text};
 use crate::source::recording::Format;
 use crate::source::told::{Finding, Told};
+use crate::summary::EndsInAir;
 
 /// Silence that is stepped through: longer than each debounce and each time after which a value is stale.
 const SILENCE_MAX: Span = Span::from_secs(75);
@@ -201,6 +203,11 @@ impl Judge {
         self.monitor.params()
     }
 
+    /// How many cells the one battery has; 0 where that is not known.
+    pub fn cell_count(&self) -> u8 {
+        self.monitor.cell_count()
+    }
+
     /// Takes the next item.
     pub fn item(&mut self, at: Instant, item: Item<'_>) {
         self.epochs.take(at, &item);
@@ -247,7 +254,7 @@ impl Judge {
                 self.monitor.learn_parameter(parameter.name, parameter.value as f32);
             }
             Item::Text(Text { source, words, alert: Some(alert), .. }) => {
-                self.said(at, source, alert, words.to_owned());
+                self.said(at, source, alert, format!("\"{words}\""));
             }
             Item::Event(Event { source, number, words, alert: Some(alert), .. }) => {
                 let words = if words.is_empty() { format!("event {number}") } else { words.to_owned() };
@@ -535,7 +542,9 @@ impl Judge {
     fn peaks(&mut self, at: Instant) {
         let steps = self.clock.monitor(at);
         for exceedance in self.monitor.exceedances().iter(steps) {
-            self.here.peak(exceedance.check.name, exceedance.instance, exceedance.session.peak);
+            for problems in [&mut self.here, &mut self.board] {
+                problems.peak(exceedance.check.name, exceedance.instance, exceedance.session.peak);
+            }
         }
     }
 
@@ -549,6 +558,7 @@ impl Judge {
             height_m: height_m(steps, vehicle),
             climb_mps: climb_mps(steps, vehicle),
             speed_mps: ground_speed_mps(steps, vehicle),
+            place_deg: place_deg(vehicle),
         })
     }
 
@@ -602,8 +612,9 @@ impl Judge {
             flew: !flights.is_empty(),
             problems: &worst_first,
         });
-        let unchecked = self.facts.remove(&About::Unchecked);
-        let remarks = joined(&self.joints).into_iter().chain(of_vehicles).chain(unchecked).collect();
+        let of_file = [About::Beginning, About::Unchecked].map(|about| self.facts.remove(&about));
+        let of_file = of_file.into_iter().flatten();
+        let remarks = joined(&self.joints).into_iter().chain(of_vehicles).chain(of_file).collect();
         let judged = Judged {
             by,
             monitor: self.monitor,
@@ -627,6 +638,13 @@ impl Judge {
         };
         judged.what_is_known(self.no_times, &self.joints, &self.restarted)
     }
+}
+
+/// Where it was heard to be last, by its estimator or else by its first receiver.
+fn place_deg(vehicle: &Vehicle) -> Option<(f64, f64)> {
+    let estimated = vehicle.global.get().and_then(|global| global.position);
+    let received = || vehicle.gnss.first()?.get()?.position;
+    estimated.or_else(received).map(|position| (position.latitude_deg, position.longitude_deg))
 }
 
 /// How long the vehicle was armed, as the usage counts it: without gaps.

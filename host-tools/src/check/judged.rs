@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use hums_core::Monitor;
-use hums_core::health::Level;
+use hums_core::health::{Level, Scope, vocabulary};
 use hums_core::time::{Instant, Span};
 use hums_core::vehicle::Vehicle;
 
@@ -12,6 +12,7 @@ use super::problem::Problem;
 use crate::source::epochs::Epochs;
 use crate::source::item::{About, Gap};
 use crate::source::told::Finding;
+use crate::summary::{EndsInAir, JudgedChecks};
 
 /// The verdict where few checks had something to judge.
 pub const TOO_LITTLE: &str = "too_little";
@@ -23,19 +24,6 @@ pub enum JudgedBy {
     Board,
     /// This program.
     Here,
-}
-
-/// The vehicle as it was heard last, where the recording ends in the air.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct EndsInAir {
-    /// When.
-    pub at: Instant,
-    /// Height above home, or above the local origin, m.
-    pub height_m: Option<f32>,
-    /// Climb rate, m/s; negative where it sank.
-    pub climb_mps: Option<f32>,
-    /// Speed over ground, m/s.
-    pub speed_mps: Option<f32>,
 }
 
 /// What came of a recording.
@@ -99,9 +87,19 @@ impl Judged {
         }
     }
 
-    /// Whether so few checks had something to judge that nothing found is no good news: fewer than one in ten.
+    /// How many checks had something to judge.
+    pub fn checks(&self) -> JudgedChecks {
+        let is_of_box = |check: &&&str| {
+            vocabulary(check)
+                .is_some_and(|words| matches!(words.scope, Scope::Wire | Scope::Recorder | Scope::Stored))
+        };
+        let (judged, of_box) = (self.judged.len(), self.judged.iter().filter(is_of_box).count());
+        JudgedChecks { judged, of_box, all: judged + self.not_judged.len() }
+    }
+
+    /// Whether so few had that nothing found is no good news.
     pub fn is_little(&self) -> bool {
-        self.judged.len() * 10 < self.judged.len() + self.not_judged.len()
+        self.checks().is_little()
     }
 
     /// The verdict in a word, for scripts and tables: the worst level; what says that there was too little, or nothing, to

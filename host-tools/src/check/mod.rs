@@ -43,22 +43,20 @@ pub fn run(args: &cli::Check) -> Result<Outcome> {
     let past = Past::of(Limits::new(&params::read(args.params.as_deref())?), &args.past, args.system)?;
     let (found, mut failed) = logs(args)?;
     let found = found.of_system(args.system)?;
-    for remark in &found.remarks {
-        note!("{remark}");
-    }
-    for image in found.images.iter().filter(|image| !image.damage.is_empty()) {
-        note!("{}: {}", image.path.display(), image.damage.join("; "));
-    }
+    let wanted = found.name_of(args.session.as_deref())?;
+    found.tell();
     let mut outcome = Outcome::lossy(found.is_lossy());
-    let many = found.places.len() > 1;
+    let many = found.places.len() > 1 && wanted.is_none();
     let (bar, mut table) = (progress::logs(found.places.len()), Table::default());
     let mut followed = Followed::new(sessions_of(&found.places));
-    let mut done = |Told { name, checked }: Told| match checked {
+    // What lies beside the one that is wanted tells how it ends.
+    let is_beside = |of: &str| wanted.as_ref().is_some_and(|wanted| wanted != of);
+    let mut done = |Told { name, of, checked }: Told| match checked {
+        _ if is_beside(&of) => Ok(()),
         Ok(checked) => {
             outcome = outcome.and(checked.outcome());
-            let json = args.json.then(|| json::line(&checked)).transpose()?;
-            let text = if json.is_some() {
-                String::new()
+            let text = if args.json {
+                json::line(&checked)?
             } else if many {
                 table.add(&checked);
                 text::line(&checked)
@@ -67,12 +65,10 @@ pub fn run(args: &cli::Check) -> Result<Outcome> {
             };
             bar.suspend(|| {
                 checked.aside().iter().chain(&checked.faults()).for_each(|why| note!("{name}: {why}"));
-                match &json {
-                    Some(json) => output::json_line(json),
-                    None => output::line(text.trim_end()),
-                }
+                if args.json { output::json_line(&text) } else { output::line(text.trim_end()) }
             })
         }
+        Err(error) if error.is::<Usage>() => Err(error),
         Err(error) => {
             failed += 1;
             if args.json {
@@ -89,7 +85,11 @@ pub fn run(args: &cli::Check) -> Result<Outcome> {
         &found.places,
         |place| Told {
             name: place.title.clone(),
-            checked: past.judge(place, Heard::Somewhere, !many).map(|read| checked(place, read)),
+            of: place.name.clone(),
+            checked: past.judge(place, Heard::Somewhere, !many).and_then(|read| {
+                overview::is_heard(place, read.judged.vehicle().source.is_some())?;
+                Ok(checked(place, read))
+            }),
         },
         |told| {
             bar.inc(1);
@@ -135,6 +135,8 @@ fn logs(args: &cli::Check) -> Result<(Found, usize)> {
 /// A recording that was judged, or why it was not.
 struct Told {
     name: String,
+    /// The name of its place.
+    of: String,
     checked: Result<Checked>,
 }
 

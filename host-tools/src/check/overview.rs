@@ -3,21 +3,28 @@
 //! A log of ours tells what the monitor on board found. Where no monitor ran (a packed recording, the log of an autopilot
 //! or a ground station) the one here checks it when it is read: "not checked" is not "good".
 
+use std::collections::BTreeSet;
+
 use anyhow::Result;
 use hums_blackbox::record::Vehicle;
 use hums_core::Monitor;
+use hums_core::observation::Observation;
 
 use super::judge::{Heard, Judge, Limits};
 use super::judged::Judged;
+use crate::counters::is_told;
 use crate::ending::Ending;
 use crate::logs::groups::at_beginning;
 use crate::logs::reader;
 use crate::names::counter_name;
+use crate::outcome::usage;
 use crate::progress;
-use crate::source::item::{Gap, Summary, Want};
+use crate::source::item::{Gap, Item, Summary, Want};
 use crate::source::recording::{Format, Place};
 use crate::summary::{Contents, ExceedanceLine, FindingLine, Overview};
 
+/// A log with fewer kinds of messages may have too little in it to be judged, though a recorder that checks wrote it.
+const FEW_KINDS: usize = 16;
 /// Items between two looks at how far the reading is.
 const LOOK_EVERY: u32 = 4_096;
 
@@ -83,16 +90,23 @@ pub fn overview(place: &Place) -> Result<Overview> {
             None => Overview::of(log)?,
         };
         overview.ending.name.clone_from(&place.name);
-        if !overview.contents.is_checked() && overview.contents.frames() > 0 {
+        let contents = &overview.contents;
+        let is_checked = contents.is_checked();
+        if contents.frames() > 0 && (!is_checked || contents.messages.len() < FEW_KINDS) {
             let judged = match here {
                 Some(here) => here.end(),
                 None => judge(place, &limits, Heard::Somewhere, true)?.judged,
             };
-            fill(&mut overview.contents, judged);
+            if is_checked {
+                look(&mut overview.contents, &judged);
+            } else {
+                fill(&mut overview.contents, judged);
+            }
         }
         return Ok(overview);
     }
     let Read { format, judged, summary, taken } = judge(place, &limits, Heard::Somewhere, true)?;
+    is_heard(place, judged.vehicle().source.is_some())?;
     let mut contents = Contents {
         messages: summary.messages,
         other_messages: summary.other_messages,
@@ -123,9 +137,37 @@ pub fn overview(place: &Place) -> Result<Overview> {
     })
 }
 
+/// An error where the system that is asked for is not in the recording: it says which are.
+pub(super) fn is_heard(place: &Place, heard: bool) -> Result<()> {
+    let Some(wanted) = place.system.filter(|_| !heard) else { return Ok(()) };
+    let mut systems = BTreeSet::new();
+    if !place.is_standard() {
+        let mut all = place.clone();
+        all.system = None;
+        all.open()?.read(Want { observations: true, ..Want::default() }, &mut |_, item| {
+            if let Item::Observation(source, Observation::Heartbeat(_)) = item {
+                systems.insert(source.system);
+            }
+            Ok(())
+        })?;
+    }
+    let systems: Vec<String> = systems.iter().map(u8::to_string).collect();
+    let there = if systems.is_empty() { String::new() } else { format!("; there is {}", systems.join(", ")) };
+    Err(usage(format!("--system {wanted}: no autopilot of this system is in {}{there}", place.title)))
+}
+
+/// How much was judged, and which counters counted what nobody told.
+fn look(contents: &mut Contents, judged: &Judged) {
+    contents.judged = Some(judged.checks());
+    let vehicle = judged.vehicle();
+    contents.usage.retain(|name, _| is_told(name, vehicle));
+}
+
 /// What the monitor here makes of a recording.
 fn fill(contents: &mut Contents, judged: Judged) {
     contents.unheard = judged.unheard();
+    contents.judged = Some(judged.checks());
+    contents.ends_in_air = judged.ends_in_air;
     let is_judged = judged.worst().is_some();
     let Judged { monitor, findings, findings_count, span, remarks, .. } = judged;
     contents.remarks = remarks;
@@ -138,7 +180,10 @@ fn fill(contents: &mut Contents, judged: Judged) {
     contents.findings_count = findings_count;
     contents.findings = findings.into_iter().map(FindingLine::from).collect();
     monitor.for_each_counter(|number, value| {
-        contents.usage.insert(counter_name(number), value);
+        let name = counter_name(number);
+        if is_told(&name, monitor.vehicle()) {
+            contents.usage.insert(name, value);
+        }
     });
     if let Some((_, last)) = span {
         for exceedance in monitor.exceedances().iter(last) {

@@ -35,7 +35,7 @@ impl Past {
         let flights = quantities().map(|quantity| baselines.get(quantity).flights).max().unwrap_or(0);
         if flights < FLIGHTS_MIN {
             note!(
-                "--past: steady flight of {flights} flights was found, and {FLIGHTS_MIN} make a baseline: trends are not judged"
+                "--past: {flights} of them have a steady flight in them, and a baseline needs {FLIGHTS_MIN}: trends are not judged"
             );
         }
         let taught = Some((limits.clone().after(&baselines), vehicle));

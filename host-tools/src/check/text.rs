@@ -10,9 +10,10 @@ use hums_core::health::{Level, Side, Subsystem, vocabulary};
 use hums_core::time::Span;
 
 use super::checked::Checked;
-use super::judged::{EndsInAir, Judged, JudgedBy};
+use super::judged::{Judged, JudgedBy};
 use super::problem::{Problem, side};
 use crate::colour::level as coloured;
+use crate::counters::tells_flight;
 use crate::names::{autopilot_name, type_name};
 use crate::plural::count;
 use crate::printable::word;
@@ -41,7 +42,7 @@ pub fn screen(checked: &Checked) -> String {
     not_judged(&mut text, judged);
     damage(&mut text, judged);
     if let Some(end) = &judged.ends_in_air {
-        let _ = writeln!(text, "  the end  {:>9}  {}", moment(end.at), ends_in_air(end));
+        let _ = writeln!(text, "  the end  {:>9}  {}", moment(end.at), end);
     }
     for remark in &judged.remarks {
         let _ = writeln!(text, "  besides  {remark}");
@@ -282,8 +283,8 @@ fn when(judged: &Judged, format: Format) -> String {
     };
     let since = match format {
         Format::DataFlash | Format::Ulog => "; times count from the autopilot's power-on",
-        Format::Hums => "; times count from the monitor's power-on",
-        Format::Tlog | Format::Raw => "",
+        Format::Hums if judged.by == JudgedBy::Board => "; times count from the monitor's power-on",
+        Format::Hums | Format::Tlog | Format::Raw => "",
     };
     format!("{utc}, {} recorded{restarts}{since}", clock(last.since(first)))
 }
@@ -300,6 +301,9 @@ fn in_air(judged: &Judged) -> String {
         return "not known".to_owned();
     }
     let text = match judged.flights.as_slice() {
+        [] if !tells_flight(judged.vehicle()) => {
+            format!("not known: nothing in it tells of height, speed or landing; armed {armed}")
+        }
         [] if judged.armed == Span::ZERO => return told.unwrap_or("never armed").to_owned(),
         [] => format!("never; armed {armed}"),
         [flight] if flight.disarmed_at_m.is_some() => {
@@ -309,7 +313,7 @@ fn in_air(judged: &Judged) -> String {
             )
         }
         [flight] if !flight.landed => {
-            format!("{} in 1 flight, which the log does not see land; armed {armed}", clock(flown(judged)))
+            format!("{} in 1 flight, whose landing is not in the log; armed {armed}", clock(flown(judged)))
         }
         [_] => format!("{} in 1 flight; armed {armed}", clock(flown(judged))),
         flights => {
@@ -317,7 +321,7 @@ fn in_air(judged: &Judged) -> String {
                 Some(flight) if flight.disarmed_at_m.is_some() => {
                     ", the last of which ended by disarming in the air"
                 }
-                Some(flight) if !flight.landed => ", of which the log does not see the last one land",
+                Some(flight) if !flight.landed => "; the landing of the last one is not in the log",
                 _ => "",
             };
             format!("{} in {} flights{last}; armed {armed}", clock(flown(judged)), flights.len())
@@ -334,7 +338,7 @@ fn verdict(judged: &Judged) -> String {
         count => format!("{count} {one}s"),
     };
     let (critical, warnings) = (count(Level::Critical), count(Level::Warning));
-    let all = judged.judged.len() + judged.not_judged.len();
+    let checks = judged.checks();
     match judged.worst() {
         None if judged.is_timeless || judged.gaps.iter().any(|gap| gap.cause == Cause::NoTimes) => {
             "unknown: the log has no times, and nothing was judged".to_owned()
@@ -354,14 +358,10 @@ fn verdict(judged: &Judged) -> String {
         Some(Level::Warning) => {
             format!("look at this before the next flight: {}", plural(warnings, "warning"))
         }
-        Some(_) if judged.is_little() => format!(
-            "not enough to judge: {} of {all} checks had something to judge, and nothing was wrong there",
-            judged.judged.len()
-        ),
-        Some(_) => format!(
-            "nothing wrong in {} of {all} checks; the others had nothing to judge",
-            judged.judged.len()
-        ),
+        Some(_) if judged.is_little() => {
+            format!("not enough to judge: {checks} had something to judge, and nothing was wrong there")
+        }
+        Some(_) => format!("nothing wrong in {checks}; the others had nothing to judge"),
     }
 }
 
@@ -473,7 +473,8 @@ fn sentence(group: &[&Problem]) -> String {
         Shown::State(state) => (state, None, None),
         Shown::Quantity(value, limit) => (None, value, limit),
     };
-    if let Some(state) = state {
+    // Of what the autopilot says its words are there, and the level stands before them.
+    if let Some(state) = state.filter(|_| first.details.is_empty() || !first.check.ends_with("_alert")) {
         let _ = write!(text, ": {state}");
     }
     match value {
@@ -563,19 +564,6 @@ fn how_bad(gap: &Gap) -> (bool, bool, Reverse<u64>, Reverse<Span>) {
     (!gap.cause.is_damage(), gap.bytes > 0, Reverse(gap.bytes), Reverse(lasts))
 }
 
-/// How the recording ends, as a sentence.
-fn ends_in_air(end: &EndsInAir) -> String {
-    let mut known = Vec::new();
-    known.extend(end.height_m.filter(possible).map(|height_m| format!("{height_m:.1} m above home")));
-    known.extend(end.climb_mps.filter(possible).map(|climb_mps| {
-        let way = if climb_mps < 0.0 { "sinking" } else { "climbing" };
-        format!("{way} at {:.1} m/s", climb_mps.abs())
-    }));
-    known.extend(end.speed_mps.filter(possible).map(|speed_mps| format!("{speed_mps:.1} m/s over ground")));
-    let known = if known.is_empty() { String::new() } else { format!(": {}", known.join(", ")) };
-    format!("the recording ends in the air{known}; what became of the vehicle is not in it")
-}
-
 /// With as many digits as a limit has.
 fn short(value: f32) -> String {
     if value.abs() >= IMPOSSIBLE {
@@ -595,6 +583,7 @@ mod tests {
     use hums_core::time::Instant;
 
     use super::*;
+    use crate::summary::EndsInAir;
 
     #[test]
     fn of_several_parts_the_worst_value_is_shown() {
@@ -631,10 +620,11 @@ mod tests {
             ("3e38".into(), "-3e9".into(), "999999".into())
         );
         let (height_m, climb_mps) = (Some(-3e38), Some(1.0));
-        let end = EndsInAir { at: Instant::ZERO, height_m, climb_mps, speed_mps: Some(f32::INFINITY) };
-        let words =
-            "the recording ends in the air: climbing at 1.0 m/s; what became of the vehicle is not in it";
-        assert_eq!(ends_in_air(&end), words);
+        let speed_mps = Some(f32::INFINITY);
+        let place_deg = Some((47.397_742, -8.545_594));
+        let end = EndsInAir { at: Instant::ZERO, height_m, climb_mps, speed_mps, place_deg };
+        let words = "the recording ends in the air: climbing at 1.0 m/s, at 47.3977420, -8.5455940; what became of the vehicle is not in it";
+        assert_eq!(end.to_string(), words);
     }
 
     #[test]

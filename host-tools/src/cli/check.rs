@@ -8,6 +8,7 @@ const EXAMPLES: &str = "Examples:
   hums check flight.tlog
   hums check --json flight.tlog
   hums check cards/
+  hums check card.img --session 00001
   hums check --params hums.param flight.tlog card.img
   hums check --past flights/may flights/june.bin
 
@@ -15,8 +16,8 @@ Reads a ground station's tlog, raw MAVLink, ArduPilot's logs (.bin, .log), PX4's
 HUMS, cards and their images; told apart by what is in them. The checks and their limits are those of the monitor on
 board. A log of HUMS is shown with what the monitor on board found, unless --params or --past asks for another judgement.
 Exit codes: 0 nothing wrong in what could be judged (a log with too little in it says so: \"not enough to judge\"); 4 something
-wrong (a warning or worse); 3 the log has losses or damage, no times, or an end that nothing proves to be its end, whatever was found; 1 failed; 2 usage.
-Of several logs: the first of 1, 3, 4, 0 that is the code of one of them. Where no autopilot was heard, nothing is judged: 0.";
+wrong (a warning or worse); 3 the log has losses or damage, or no times, or nothing proves that it has its end, whatever was found; 1 failed; 2 usage.
+Of several logs: 1 where one failed, otherwise 3 where one has losses, otherwise 4 where one has findings. Where no autopilot was heard, nothing is judged: 0.";
 
 /// `hums check`
 #[derive(Args, Clone, Debug)]
@@ -31,6 +32,9 @@ pub struct Check {
     /// Earlier flights of the same vehicle, three or more, in which it was well: trends are judged against them. May be given several times
     #[arg(long, value_name = "LOG")]
     pub past: Vec<PathBuf>,
+    /// Only this session of a card or folder, by the name that `hums ls` gives
+    #[arg(long, value_name = "NAME")]
+    pub session: Option<String>,
     /// Of several vehicles in a recording only this one, by its system id
     #[arg(long, value_name = "ID")]
     pub system: Option<u8>,

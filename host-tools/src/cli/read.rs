@@ -8,12 +8,12 @@ use crate::endpoint::Endpoint;
 use crate::utc::When;
 
 const DECODE_EXAMPLES: &str = "Examples:
-  hums decode card.img -o 00001.tlog --format tlog
+  hums decode card.img --session 00001 -o 00001.tlog --format tlog
   hums decode card.img -o out --format tlog,csv,jsonl
   hums decode cards/ -o some --format csv --message ATTITUDE --message GPS_RAW_INT
   hums decode 00001_00.HUM -o - --format jsonl --from 60 --to 2026-11-21T10:20:00Z | head
   hums decode cards/ -o fleet --format parquet
-  hums decode card.img -o - --format influx | curl --data-binary @- http://localhost:8428/write
+  hums decode card.img --session 00001 -o - --format influx | curl --data-binary @- http://localhost:8428/write
 
 Where files go: -o names the file where there is one log and one format of a single file (tlog, jsonl, influx), unless
 it is a directory; otherwise it is a directory with OUT/LOG.tlog, OUT/LOG.jsonl, OUT/LOG.lp and, for tables,
@@ -34,6 +34,9 @@ pub struct Decode {
     /// Look at every block of an image: finds logs that were deleted, and what is left of overwritten ones
     #[arg(long)]
     pub salvage: bool,
+    /// Only this session of a card or folder, by the name that `hums ls` gives
+    #[arg(long, value_name = "NAME")]
+    pub session: Option<String>,
     /// The file or directory to write
     #[arg(short, long, value_name = "OUT")]
     pub output: PathBuf,

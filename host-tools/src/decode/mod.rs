@@ -53,6 +53,7 @@ use std::sync::Mutex;
 use anyhow::{Result, bail};
 use hums_core::time::Instant;
 
+use crate::check;
 use crate::check::judge::{Judge, Limits};
 use crate::cli;
 use crate::ending::Ending;
@@ -103,6 +104,7 @@ pub fn run(args: &cli::Decode) -> Result<Outcome> {
     let mut inputs =
         Inputs::of(given.iter().map(PathBuf::as_path).chain(found.paths())).replacing(args.replace);
     let sessions = sessions_of(&found.places);
+    let wanted = found.name_of(args.session.as_deref())?;
     let Works { works, earlier } =
         Works::of(&found.places, &sessions, |name| appended(&args.output.join(name), "tlog"))?;
     for (made, of) in &earlier {
@@ -110,10 +112,12 @@ pub fn run(args: &cli::Decode) -> Result<Outcome> {
         inputs.compare_only(made);
     }
     inputs.refuse(&args.output)?;
-    let standard_output = check_output(args, works.len(), formats)?;
+    let is_wanted = |name: &String| wanted.as_ref().is_none_or(|wanted| wanted == name);
+    let asked = works.iter().filter(|work| is_wanted(&work.log.name)).count();
+    let standard_output = check_output(args, asked, formats)?;
     let native = check_forms(&works, formats)?;
     let selection = Selection::new(args, native)?;
-    let logs = works.len();
+    let logs = asked;
     let mut followed = Followed::new(sessions);
     let task = Task { formats, selection, inputs, output: &args.output, standard_output, logs };
     let taken = Mutex::new(BTreeSet::new());
@@ -121,13 +125,18 @@ pub fn run(args: &cli::Decode) -> Result<Outcome> {
     let (mut kept, mut any_kept) = (Kept::default(), false);
     let mut json = args.json.then(MadeJson::default);
     let mut tell = |done: Done| {
+        if !is_wanted(&done.name) {
+            return Ok(());
+        }
         outcome = outcome.and(done.outcome());
         written |= done.written;
         done.tell(json.as_mut())
     };
     side_by_side(
         &works,
-        |work| task.decode(work, &works, &taken),
+        |work| {
+            if is_wanted(&work.log.name) { task.decode(work, &works, &taken) } else { beside(work) }
+        },
         |done| {
             let done = kept.pass(done)?;
             any_kept |= done.is_none();
@@ -143,6 +152,15 @@ pub fn run(args: &cli::Decode) -> Result<Outcome> {
     Ok(outcome)
 }
 
+/// What lies beside the one log that is asked for: it tells how that ends.
+fn beside(work: &Work<'_>) -> Result<Done> {
+    let ending = match work.log.own() {
+        Some(_) => Some(check::overview(work.log)?.ending),
+        None => None,
+    };
+    Ok(Done { ending, ..Done::of(work.log) })
+}
+
 /// Endings of the files that are made: no folder is made of such a name by mistake.
 const FILE_NAMES: [&str; 5] = ["tlog", "jsonl", "lp", "csv", "parquet"];
 
@@ -153,7 +171,7 @@ fn check_output(args: &cli::Decode, logs: usize, formats: Formats) -> Result<boo
     if standard_output && (logs != 1 || !formats.is_single_file()) {
         let why = match logs {
             1 => "these formats are more than that".to_owned(),
-            count => format!("there are {count} logs"),
+            count => format!("there are {count} logs: --session NAME takes one"),
         };
         return Err(usage_error(format!(
             "-o -: standard output takes one log in one format of a single file (tlog, jsonl or influx), and {why}; \
@@ -163,7 +181,7 @@ fn check_output(args: &cli::Decode, logs: usize, formats: Formats) -> Result<boo
     let one_file = logs == 1 && formats.is_single_file();
     if args.output.is_file() && !one_file {
         return Err(usage_error(format!(
-            "-o {}: is a file, but tables, several formats and several logs need a directory; name one, or a new name",
+            "-o {}: is a file, but tables, several formats and several logs need a directory; name one, or a new name, or one log by --session NAME",
             args.output.display()
         )));
     }
@@ -171,8 +189,8 @@ fn check_output(args: &cli::Decode, logs: usize, formats: Formats) -> Result<boo
     let is_file_name = extension.is_some_and(|extension| FILE_NAMES.contains(&extension.as_str()));
     if !one_file && logs > 0 && is_file_name && !says_directory(&args.output) {
         return Err(usage_error(format!(
-            "-o {0}: is the name of a file, but tables, several formats and several logs need a directory; name one, or \
-             say {0}/",
+            "-o {0}: is the name of a file, but tables, several formats and several logs need a directory; name one log by \
+             --session NAME, or say {0}/",
             args.output.display()
         )));
     }
@@ -312,8 +330,8 @@ impl Task<'_> {
             remarks.push(format!("{}: {}", log.name, damaged_places(summary.gaps)));
         }
         if ending.is_none() && summary.losses > 0 {
-            let times = count(summary.losses, "time");
-            remarks.push(format!("{}: what recorded it lost something {times}, and says so", log.name));
+            let places = count(summary.losses, "place");
+            remarks.push(format!("{}: {places} of loss or noise; hums check says what", log.name));
         }
         remarks.extend(written.left_out().map(|words| format!("{}: {words}", log.name)));
         outcome = outcome.and(Outcome::lossy(written.rows_left_out > 0));

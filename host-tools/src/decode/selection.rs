@@ -29,6 +29,14 @@ impl Selection {
         // A name of its own is no id: none at all is not every one.
         let other = |id: Result<u32>| id.or_else(|error| if native { Ok(u32::MAX) } else { Err(error) });
         let ids = ids.map(other).collect::<Result<_>>()?;
+        let is_backwards = match (args.from, args.to) {
+            (Some(When::Seconds(from)), Some(When::Seconds(to)))
+            | (Some(When::Utc(from)), Some(When::Utc(to))) => from > to,
+            _ => false,
+        };
+        if is_backwards {
+            return Err(usage("--from is later than --to: nothing lies between them"));
+        }
         Ok(Self { from: args.from, to: args.to, ids, names: args.message.clone() })
     }
 

@@ -5,7 +5,7 @@ use serde::Serialize;
 
 use crate::ending::{BlocksJson, EndJson};
 use crate::logs;
-use crate::names::{autopilot_name, type_name};
+use crate::names::{autopilot_name, check_name, type_name};
 use crate::source::item::MessageCount;
 use crate::source::recording::Format;
 use crate::states;
@@ -76,6 +76,9 @@ pub struct LogJson {
     losses: Vec<LossJson>,
     /// Who checked the vehicle's health: `board`; `hums` (this program, when it read the log); `nobody`.
     checked_by: &'static str,
+    checks_judged: Option<usize>,
+    checks_all: Option<usize>,
+    ends_in_air: Option<String>,
     findings_count: u64,
     findings: Vec<FindingJson>,
     usage: serde_json::Map<String, serde_json::Value>,
@@ -84,7 +87,8 @@ pub struct LogJson {
     components: Vec<ComponentJson>,
     log_bytes: u64,
     tlog_bytes: u64,
-    ratio: f64,
+    /// `null` where it is no log of ours.
+    ratio: Option<f64>,
     bytes_on_card: u64,
     sectors: u64,
     sectors_damaged: u64,
@@ -160,9 +164,12 @@ struct FindingJson {
 struct ExceedanceJson {
     check: String,
     instance: u8,
+    /// For people.
+    name: String,
     unit: String,
     session: CrossingsJson,
-    lifetime: CrossingsJson,
+    /// `null` where no life is known.
+    lifetime: Option<CrossingsJson>,
 }
 
 #[derive(Debug, Serialize)]
@@ -172,6 +179,8 @@ struct CrossingsJson {
     warning_s: f64,
     critical_s: f64,
     peak: Option<f32>,
+    /// The state that the peak is, where it is no quantity.
+    state: Option<&'static str>,
 }
 
 #[derive(Debug, Serialize)]
@@ -193,7 +202,8 @@ struct ComponentJson {
 }
 
 fn exceedances(contents: &Contents) -> Vec<ExceedanceJson> {
-    let crossings = |of: &hums_core::health::exceedance::Crossings| CrossingsJson {
+    let crossings = |check: &str, of: &hums_core::health::exceedance::Crossings| CrossingsJson {
+        state: states::name(check, of.peak),
         warnings: of.warnings,
         criticals: of.criticals,
         warning_s: f64::from(of.warning_tenths) / 10.0,
@@ -203,9 +213,10 @@ fn exceedances(contents: &Contents) -> Vec<ExceedanceJson> {
     let json = |((check, instance), line): (&(String, u8), &crate::summary::ExceedanceLine)| ExceedanceJson {
         check: check.clone(),
         instance: *instance,
+        name: check_name(check, *instance),
         unit: line.unit.clone(),
-        session: crossings(&line.session),
-        lifetime: crossings(&line.lifetime),
+        session: crossings(check, &line.session),
+        lifetime: (!contents.checked_here).then(|| crossings(check, &line.lifetime)),
     };
     contents.exceedances.iter().map(json).collect()
 }
@@ -270,6 +281,9 @@ impl LogJson {
             gaps: gaps(contents),
             losses: losses(contents),
             checked_by: contents.checked_by(),
+            checks_judged: contents.judged.map(|checks| checks.judged),
+            checks_all: contents.judged.map(|checks| checks.all),
+            ends_in_air: contents.ends_in_air.map(|end| end.to_string()),
             findings_count: contents.findings_count,
             findings: findings(log),
             usage: contents.usage.iter().map(|(name, value)| (name.clone(), (*value).into())).collect(),

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use anyhow::Result;
-use hums_core::health::{Level, vocabulary};
+use hums_core::health::Level;
 use hums_core::time::{Instant, Span};
 use hums_core::usage::UsageCounter;
 use indicatif::BinaryBytes;
@@ -14,6 +14,7 @@ use super::json::{duration_s, images_json};
 use super::text::image_text;
 use crate::cli;
 use crate::colour::{level, warning};
+use crate::names::check_name;
 use crate::outcome::Outcome;
 use crate::output::{self, JsonList, Schema};
 use crate::printable::word;
@@ -66,6 +67,12 @@ struct LogJson {
     findings_count: u64,
     /// `null` where no check has found anything.
     worst: Option<WorstJson>,
+    /// `null` where that was not looked at.
+    checks_judged: Option<usize>,
+    /// Of so many.
+    checks_all: Option<usize>,
+    /// It ends in the air, as far as that was looked at.
+    ends_in_air: bool,
     bytes: u64,
     /// Nothing is lost, damaged or not proved.
     whole: bool,
@@ -97,6 +104,9 @@ impl LogJson {
             checked_by: log.contents.checked_by(),
             findings_count: log.contents.findings_count,
             worst,
+            checks_judged: log.contents.judged.map(|checks| checks.judged),
+            checks_all: log.contents.judged.map(|checks| checks.all),
+            ends_in_air: log.contents.ends_in_air.is_some(),
             bytes: bytes(log),
             whole: log.is_sound(),
         }
@@ -114,13 +124,19 @@ fn heading(width: usize) -> String {
 fn line(log: &Overview, width: usize) -> String {
     let date = start_utc_us(log).map_or_else(|| "unknown".to_owned(), date_and_time);
     let length = clock(span(duration_s(log)));
-    let air = flight_s(log).map_or_else(|| "-".to_owned(), |seconds| clock(span(seconds)));
+    // What the box counted until it stored it is the least.
+    let least = if log.counted_until().is_some() { ">" } else { "" };
+    let air =
+        flight_s(log).map_or_else(|| "-".to_owned(), |seconds| format!("{least}{}", clock(span(seconds))));
     let size = BinaryBytes(bytes(log)).to_string();
     let name = word(&log.ending.name);
     let mut text = format!("{name:<width$}  {date:<19}  {length:>8}  {air:>8}  {size:>10}  {}", found(log));
     if let Some(aside) = log.ending.aside() {
         // Writing to a `String` cannot fail.
         let _ = write!(text, "; {}", word(&aside));
+    }
+    if log.contents.ends_in_air.is_some() {
+        let _ = write!(text, "; {}", warning("ends in the air"));
     }
     if !log.is_sound() {
         // What is no log of ours is judged by another command.
@@ -134,10 +150,13 @@ fn line(log: &Overview, width: usize) -> String {
 fn found(log: &Overview) -> String {
     let Some(finding) = worst(log) else {
         let checked = log.contents.checked_by() != "nobody";
-        return if checked { format!("{}", level("ok")) } else { "not checked".to_owned() };
+        return match log.contents.judged.filter(|_| log.contents.is_little()) {
+            Some(checks) => format!("not enough to judge ({checks})"),
+            None if checked => format!("{}", level("ok")),
+            None => "not checked".to_owned(),
+        };
     };
-    let name = vocabulary(&finding.check).map_or(finding.check.as_str(), |words| words.said.name);
-    format!("{}: {}", level(finding.level), word(name))
+    format!("{}: {}", level(finding.level), word(&check_name(&finding.check, finding.instance)))
 }
 
 /// The first finding of the worst level; good news is none.

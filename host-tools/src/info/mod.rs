@@ -11,9 +11,9 @@ mod wear;
 use anyhow::Result;
 
 use crate::cli;
-use crate::outcome::{Outcome, usage as usage_error};
+use crate::outcome::Outcome;
 use crate::output::{self, JsonList, Schema};
-use crate::source::find::{Found, find};
+use crate::source::find::find;
 use each::each;
 use json::{LogJson, images_json};
 use text::{image_text, text};
@@ -24,7 +24,7 @@ const SCHEMA: Schema = Schema::first("hums-info");
 /// Runs `hums info`.
 pub fn run(args: &cli::Info) -> Result<Outcome> {
     let found = find(&args.inputs, args.salvage)?.of_system(args.system)?;
-    let wanted = args.session.as_deref().map(|name| index_of(name, &found)).transpose()?;
+    let wanted = args.session.as_deref().map(|name| found.session(name)).transpose()?;
     let mut list =
         args.json.then(|| JsonList::begin(SCHEMA, &images_json(&found.images), "logs")).transpose()?;
     if list.is_none() {
@@ -43,12 +43,4 @@ pub fn run(args: &cli::Info) -> Result<Outcome> {
         output::line("no log is on it")?;
     }
     outcome.end()
-}
-
-/// Which of the sessions has this name.
-fn index_of(name: &str, found: &Found) -> Result<usize> {
-    found.places.iter().position(|place| place.name == name).ok_or_else(|| {
-        let names: Vec<&str> = found.places.iter().map(|place| place.name.as_str()).collect();
-        usage_error(format!("--session {name}: there is no such session; there is {}", names.join(", ")))
-    })
 }

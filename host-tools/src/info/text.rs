@@ -6,8 +6,6 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use hums_blackbox::Cause;
-use hums_core::health;
-use hums_core::observation::Feeds;
 use hums_core::time::Instant;
 
 use super::json::{duration_s, vehicle};
@@ -18,12 +16,13 @@ use crate::ending::{among_words, behind_words, copies_words, made_again_words, u
 use crate::logs;
 use crate::logs::begun_anew::BegunAnew;
 use crate::logs::naming::is_part;
+use crate::names::check_name;
 use crate::plural::count;
 use crate::printable::{path, word};
 use crate::source::item::MessageCount;
 use crate::states::{Shown, shown};
 use crate::summary::{FindingLine, LISTED_MAX, Overview};
-use crate::utc::{clock, iso8601, moment};
+use crate::utc::{clock, iso8601_ms, moment};
 
 /// Findings and gaps that people are shown; the rest is counted, and is in `--json` and `hums decode`.
 const SHOWN_MAX: usize = 40;
@@ -63,9 +62,7 @@ fn heading(text: &mut String, log: &Overview) {
     };
     match (summary.first, summary.last) {
         (Some(first), Some(last)) => {
-            let utc = |at| {
-                log.utc_us(at).map_or_else(|| "UTC unknown".to_owned(), |utc| iso8601(utc / 1000 * 1000))
-            };
+            let utc = |at| log.utc_us(at).map_or_else(|| "UTC unknown".to_owned(), iso8601_ms);
             let _ = writeln!(text, "  from     {:>12}  {}", moment(first), utc(first));
             let _ = writeln!(text, "  to       {:>12}  {}", moment(last), utc(last));
             let _ = writeln!(text, "  length   {:>12}", clock(last.since(first)));
@@ -75,6 +72,9 @@ fn heading(text: &mut String, log: &Overview) {
     }
     if log.format.is_none() {
         ending(text, log);
+    }
+    if let Some(end) = &contents.ends_in_air {
+        let _ = writeln!(text, "  the end  {:>12}  {end}", moment(end.at));
     }
     if let Some(vehicle) = vehicle(log) {
         let firmware = vehicle.firmware.map_or_else(String::new, |version| format!(" {version}"));
@@ -101,7 +101,8 @@ fn heading(text: &mut String, log: &Overview) {
     }
     let _ = write!(text, "  frames   {frames} in {} bytes, {records} records", log.log_bytes());
     if frames > 0 {
-        let _ = write!(text, "; as a tlog {} bytes: {:.2} times smaller", contents.tlog_bytes(), log.ratio());
+        let ratio = log.ratio().unwrap_or(f64::NAN);
+        let _ = write!(text, "; as a tlog {} bytes: {ratio:.2} times smaller", contents.tlog_bytes());
     }
     text.push('\n');
 }
@@ -151,12 +152,20 @@ fn findings_text(text: &mut String, log: &Overview) {
     let contents = &log.contents;
     // A recorder that ran no checks found nothing, which says nothing.
     let by = match contents.checked_by() {
+        "hums" if contents.is_little() => "",
         "hums" => " (checked here: what recorded this ran no checks)",
         "board" => "",
         _ => " (not checked)",
     };
     if contents.findings_count == 0 {
-        let _ = writeln!(text, "  findings none{by}");
+        let none = match contents.judged {
+            Some(checks) if contents.is_little() => {
+                format!("not enough to judge: {checks} had something to judge")
+            }
+            Some(checks) => format!("none in {checks}; the others had nothing to judge"),
+            None => "none".to_owned(),
+        };
+        let _ = writeln!(text, "  findings {none}{by}");
         return;
     }
     let _ = writeln!(text, "  findings {}{by}", contents.findings_count);
@@ -172,12 +181,10 @@ fn findings_text(text: &mut String, log: &Overview) {
     more(text, contents.findings_count, contents.findings.len());
 }
 
-/// What was found, in the words that the pilot saw, and the check that found it.
+/// What was found, and the check that found it.
 fn sentence(finding: &FindingLine) -> String {
     let FindingLine { subsystem, check, instance, previous, value, limit, unit, .. } = finding;
-    let words = health::said(check)
-        .map_or_else(|| check.clone(), |said| said.alarm_of(*instance, Feeds::Unsaid).to_string());
-    let mut sentence = format!("{subsystem}: {words}");
+    let mut sentence = format!("{subsystem}: {}", check_name(check, *instance));
     let (state, value, limit) = match shown(check, *value, *limit) {
         Shown::State(state) => (state, None, None),
         Shown::Quantity(value, limit) => (None, value, limit),
@@ -220,9 +227,9 @@ fn gaps_text(text: &mut String, log: &Overview) {
     } else if !own {
         let _ = writeln!(
             text,
-            "  gaps     {} damaged or cut, {} that the recorder itself lost (hums check tells where and why)",
+            "  gaps     {} damaged or cut, {} of loss or noise (hums check tells where and why)",
             count(summary.gaps, "place"),
-            summary.losses
+            count(summary.losses, "place")
         );
     } else {
         let _ = writeln!(
@@ -274,7 +281,7 @@ fn foreign_gaps(text: &mut String, log: &Overview) {
         };
         let place = place.map_or_else(String::new, |place| format!("byte {place}: "));
         let what = match gap.cause {
-            Cause::Missing => "lost by the recorder: ",
+            Cause::Missing => "lost: ",
             Cause::Disarmed => "",
             _ => "damaged or cut short: ",
         };
@@ -337,9 +344,9 @@ mod tests {
             unit: unit.to_owned(),
         };
         let state = sentence(&finding("autopilot_state", 6.0, 4.5, ""));
-        assert_eq!(state, "computer: autopilot in failsafe, emergency; was ok [autopilot_state]");
+        assert_eq!(state, "computer: autopilot failsafe, emergency; was ok [autopilot_state]");
         let charge = sentence(&finding("batt_state", 1.0, 0.5, ""));
-        assert_eq!(charge, "computer: autopilot: battery 1 low, low or unhealthy; was ok [batt_state]");
+        assert_eq!(charge, "computer: battery 1 charge state, low or unhealthy; was ok [batt_state]");
         let load = sentence(&finding("load", 97.0, 95.0, "%"));
         assert!(load.contains(", 97 % (limit 95); was ok"), "{load}");
     }
@@ -359,7 +366,7 @@ mod tests {
         };
         let ended = finding(f32::NAN);
         assert!(ended.is_unjudged() && !finding(4.0).is_unjudged());
-        let words = "power: battery 1 cell low; no longer judged (on the ground or disarmed); was critical [cell_voltage]";
+        let words = "power: battery 1 cell voltage; no longer judged (on the ground or disarmed); was critical [cell_voltage]";
         assert_eq!(sentence(&ended), words);
     }
 }

@@ -8,7 +8,7 @@ use super::number::short;
 use crate::counters::{self, Band, Motor, Plain};
 use crate::plural::count;
 use crate::summary::Overview;
-use crate::utc::clock;
+use crate::utc::{clock, moment};
 
 /// The usage counters of a log.
 pub(super) fn text(text: &mut String, log: &Overview) {
@@ -22,7 +22,12 @@ pub(super) fn text(text: &mut String, log: &Overview) {
     }
     lines.extend(counters.motors.iter().flat_map(motor));
     if !lines.is_empty() {
-        text.push_str("  usage                                     session           life\n");
+        let life = if log.contents.is_life_before() { "life before" } else { "life" };
+        let _ = writeln!(text, "  usage                                     session {life:>14}");
+        if let Some(at) = log.counted_until() {
+            let _ =
+                writeln!(text, "    (as the box stored it at {}: the log goes on after that)", moment(at));
+        }
     }
     for [title, session, life] in lines {
         let _ = writeln!(text, "{}", format!("    {title:<34} {session:>14} {life:>14}").trim_end());

@@ -6,6 +6,10 @@ use hums_core::health::exceedance::Crossings;
 use hums_core::time::Instant;
 
 use super::json::finite;
+use super::number::short;
+use crate::names::check_name;
+use crate::printable::word;
+use crate::states::{Shown, shown};
 use crate::summary::Overview;
 use crate::utc::moment;
 
@@ -14,23 +18,30 @@ pub(super) fn text(text: &mut String, log: &Overview) {
     let contents = &log.contents;
     if !contents.exceedances.is_empty() {
         text.push_str(
-            "  exceeded                 of         warnings      for  criticals      for        peak\n",
+            "  exceeded                             of        warnings      for  criticals      for  worst\n",
         );
     }
     for ((check, instance), line) in &contents.exceedances {
         for (of, crossings) in [("session", &line.session), ("life", &line.lifetime)] {
-            if of == "session" && !crossings.happened() {
+            // What was checked here is of this recording alone.
+            if of == "session" && !crossings.happened() || of == "life" && contents.checked_here {
                 continue;
             }
             let Crossings { warnings, criticals, warning_tenths, critical_tenths, peak } = *crossings;
             let seconds = |tenths: u32| moment(Instant::from_millis(u64::from(tenths) * 100));
-            let peak = finite(peak).map_or_else(String::new, |peak| format!("{peak:.6} {}", line.unit));
+            let worst = match shown(check, peak, f32::NAN) {
+                Shown::State(state) => state.unwrap_or_default().to_owned(),
+                Shown::Quantity(peak, _) => {
+                    peak.map_or_else(String::new, |peak| format!("{} {}", short(peak.into()), line.unit))
+                }
+            };
             let _ = writeln!(
                 text,
-                "    {:<22} {of:<8} {warnings:>10} {:>8} {criticals:>10} {:>8}  {peak:>10}",
-                format!("{check}[{instance}]"),
+                "    {:<34} {of:<8} {warnings:>9} {:>8} {criticals:>10} {:>8}  {}",
+                word(&check_name(check, *instance)),
                 seconds(warning_tenths),
                 seconds(critical_tenths),
+                word(worst.trim_end()),
             );
         }
     }

@@ -3,12 +3,13 @@
 //! A HUMS on board of the vehicle hears every frame; where one speaks, its level counts, and the reason is what these
 //! checks see of the same. Its recorder is its own to judge.
 
-use hums_core::health::{self, EXPECTED, Finding, Level, Subsystem, When};
+use hums_core::health::{self, EXPECTED, Finding, Level, Subsystem, When, vocabulary};
 use hums_core::time::{Instant, Span};
 use hums_link::summary;
 use serde::Serialize;
 
-use super::craft::Craft;
+use super::craft::{Craft, is_of_wire};
+use crate::page::note::CELLS_UNKNOWN;
 
 /// As long as a heartbeat may be missed.
 const SILENT: Span = Span::from_secs(5);
@@ -19,6 +20,16 @@ const OURS: &str = "HUMS: ";
 /// A finding in words.
 fn words(finding: &Finding) -> String {
     summary::text(finding).as_str().trim_start_matches(OURS).to_owned()
+}
+
+/// The same, without what is to be done.
+fn without_advice(finding: &Finding) -> String {
+    words(&Finding { level: Level::Warning, ..*finding })
+}
+
+/// A check's name.
+fn name(check: &str) -> &str {
+    vocabulary(check).map_or(check, |words| words.said.name)
 }
 
 /// One subsystem.
@@ -39,6 +50,8 @@ pub struct Part {
 pub struct Board {
     /// The whole vehicle's level, by whoever knows best.
     pub overall: &'static str,
+    /// What stands in the place of that where it is not known any more: `was critical`, `was warning`.
+    pub said: Option<&'static str>,
     /// All subsystems, in the order of [`Subsystem::ALL`].
     pub parts: Vec<Part>,
 }
@@ -49,17 +62,25 @@ struct Known {
     level: Level,
     /// Whether any has something to say.
     is_heard: bool,
-    /// Checks that are good.
+    /// Checks that are good, each once, however many parts it is of.
     good: usize,
+    last: &'static str,
 }
 
 impl Board {
     /// Of a vehicle. The checks, which are some hundred, are gone through once: this is done as often as pages are told.
     pub fn of(craft: &Craft, now: Instant) -> Self {
-        let mut known = [Known { level: Level::Stale, is_heard: false, good: 0 }; Subsystem::ALL.len()];
+        let none = Known { level: Level::Stale, is_heard: false, good: 0, last: "" };
+        let mut known = [none; Subsystem::ALL.len()];
         for (check, _, level) in craft.monitor.health().levels() {
             let Some(known) = known.get_mut(check.subsystem as usize) else { continue };
-            known.good += usize::from(level == Level::Ok);
+            // What is bad on another link than the autopilot's wire is that link's.
+            if rank(level) > 0 && !craft.on_the_wire && is_of_wire(check.name) {
+                continue;
+            }
+            if level == Level::Ok && known.last != check.name {
+                (known.good, known.last) = (known.good + 1, check.name);
+            }
             // Silence of a check that only raises an alarm is no news.
             if !check.alarm_only || level != Level::Ok {
                 if !known.is_heard || rank(level) > rank(known.level) {
@@ -68,13 +89,31 @@ impl Board {
                 known.is_heard = true;
             }
         }
-        let here = || {
-            if is_silent(craft, now) { Level::Stale } else { craft.monitor.health().overall() }
-        };
-        let overall = craft.companion.overall(now).unwrap_or_else(here).name();
+        let overall = craft.companion.overall(now).unwrap_or_else(|| overall(craft, now, &known));
         let all = Subsystem::ALL.into_iter().zip(&known);
-        Self { overall, parts: all.map(|(subsystem, known)| part(craft, now, subsystem, known)).collect() }
+        Self {
+            overall: overall.name(),
+            said: was(craft).filter(|_| overall == Level::Stale && !is_silent(craft, now)),
+            parts: all.map(|(subsystem, known)| part(craft, now, subsystem, known)).collect(),
+        }
     }
+}
+
+/// The worst that is known of any part; not known, where nothing is of one that every vehicle has, where the vehicle is silent, or where what
+/// was bad is not judged any more.
+fn overall(craft: &Craft, now: Instant, known: &[Known]) -> Level {
+    let unknown = is_silent(craft, now)
+        || EXPECTED.into_iter().any(|part| known.get(part as usize).is_none_or(|known| !known.is_heard))
+        || !craft.unjudged.is_empty();
+    let heard =
+        known.iter().filter(|known| known.is_heard && !is_silent(craft, now)).map(|known| known.level);
+    heard.chain(unknown.then_some(Level::Stale)).max_by_key(|level| rank(*level)).unwrap_or(Level::Stale)
+}
+
+/// What the worst was of what is not judged any more.
+fn was(craft: &Craft) -> Option<&'static str> {
+    let worst = craft.unjudged.values().map(|finding| rank(finding.level)).max()?;
+    Some(if worst == rank(Level::Critical) { "was critical" } else { "was warning" })
 }
 
 fn part(craft: &Craft, now: Instant, subsystem: Subsystem, known: &Known) -> Part {
@@ -82,17 +121,30 @@ fn part(craft: &Craft, now: Instant, subsystem: Subsystem, known: &Known) -> Par
     let recorder = subsystem == Subsystem::Recorder;
     let silent = is_silent(craft, now);
     // Of a vehicle that is silent one thing is known: that it is.
-    let unknown = recorder || (silent && subsystem != Subsystem::Link);
+    let unknown = recorder || (silent && (subsystem != Subsystem::Link || !craft.on_the_wire));
     let here = if unknown { Level::Stale } else { known.level };
+    let ended = craft.unjudged.values().filter(|finding| finding.subsystem == subsystem);
+    let ended = ended.max_by_key(|finding| rank(finding.level));
+    let ended = ended.filter(|_| !matches!(here, Level::Warning | Level::Critical));
+    let doubt = subsystem == Subsystem::Power && craft.cells_unknown;
+    let here = match here {
+        _ if ended.is_some() => Level::Stale,
+        Level::Ok if doubt => Level::Advisory,
+        here => here,
+    };
     let level = onboard.unwrap_or(here);
     let by = match onboard {
         Some(_) => "on board",
         None if recorder => "nobody",
         None => "here",
     };
-    let unknown = level == Level::Stale && !recorder && !known.is_heard;
+    let is_link = silent && subsystem == Subsystem::Link;
+    let unknown = level == Level::Stale && !recorder && !known.is_heard && !is_link;
     let absent = subsystem == Subsystem::Engine && craft.monitor.vehicle().engine.get().is_none();
-    let (calm, reason) = if unknown && !absent && waits(craft, subsystem) {
+    let (calm, reason) = if let Some(finding) = ended.filter(|_| level == Level::Stale && !silent) {
+        let calm = if finding.level == Level::Critical { "was critical" } else { "was warning" };
+        (Some(calm), format!("{}; not judged on the ground or disarmed", without_advice(finding)))
+    } else if unknown && !absent && waits(craft, subsystem) {
         (Some("idle"), waits_for(subsystem).to_owned())
     } else if unknown && !EXPECTED.contains(&subsystem) {
         (Some("none"), "nothing is heard of any".to_owned())
@@ -101,6 +153,7 @@ fn part(craft: &Craft, now: Instant, subsystem: Subsystem, known: &Known) -> Par
     } else {
         (None, reason(craft, subsystem, level, here, known.good))
     };
+    let reason = if doubt && !silent { format!("{reason}; {CELLS_UNKNOWN}") } else { reason };
     Part { subsystem: subsystem.name(), level: level.name(), by, calm, reason }
 }
 
@@ -133,11 +186,18 @@ fn reason(craft: &Craft, subsystem: Subsystem, level: Level, here: Level, good: 
     let findings = craft.worries.values().filter(|finding| finding.subsystem == subsystem);
     let worst = findings.max_by_key(|finding| (rank(finding.level), finding.at));
     if let Some(finding) = worst.filter(|_| level != Level::Ok) {
-        return words(finding);
+        let alarms = craft.worries.values().map(|worry| (worry.check, worry.level));
+        // One cause has one order: its own.
+        return match health::because(finding.check, finding.level, alarms) {
+            Some(cause) => format!("{}, because of: {}", without_advice(finding), name(cause)),
+            None => words(finding),
+        };
     }
     match (subsystem, level) {
         (Subsystem::Recorder, Level::Ok) => "it records".to_owned(),
+        (Subsystem::Recorder, Level::Stale) if craft.on_the_wire => "it recorded this".to_owned(),
         (Subsystem::Recorder, Level::Stale) => "no recorder is heard on this link".to_owned(),
+        (Subsystem::Power, Level::Advisory) if here == level => format!("{good} checks good"),
         (Subsystem::Recorder, _) => "see what the box says below".to_owned(),
         (_, Level::Stale) => "nothing is heard of it".to_owned(),
         (_, Level::Ok) if good == 1 => "its check is good".to_owned(),
@@ -157,5 +217,87 @@ fn rank(level: Level) -> u8 {
         Level::Warning => 2,
         Level::Stale => 3,
         Level::Critical => 4,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use hums_core::observation::{Feeds, Heartbeat, Observation, Source};
+    use hums_core::params::Params;
+
+    use super::*;
+
+    fn finding(check: &'static str, subsystem: Subsystem, level: Level) -> Finding {
+        Finding {
+            at: Instant::from_millis(900),
+            subsystem,
+            check,
+            instance: 0,
+            level,
+            previous: Level::Ok,
+            value: 3.4,
+            limit: 3.5,
+            unit: "V",
+            feeds: Feeds::Vehicle,
+            because: "",
+        }
+    }
+
+    /// A vehicle that is heard, with these worries.
+    fn craft(worries: &[Finding]) -> Craft {
+        let at = Instant::from_millis(1_000);
+        let mut craft = Craft::new(at, &Params::defaults(), false);
+        let beat =
+            Observation::Heartbeat(Heartbeat { autopilot_number: 3, type_number: 2, ..Heartbeat::default() });
+        craft.observe(at, Source { system: 1, component: 1 }, &beat, &mut None);
+        craft.worries = worries.iter().map(|finding| ((finding.check, 0), *finding)).collect();
+        craft
+    }
+
+    fn parts(craft: &Craft, now_ms: u64) -> (Board, impl Fn(&Board, Subsystem) -> String) {
+        let board = Board::of(craft, Instant::from_millis(now_ms));
+        (board, |board, part| {
+            let part = &board.parts[part as usize];
+            format!("{}: {}", part.calm.unwrap_or(part.level), part.reason)
+        })
+    }
+
+    #[test]
+    fn one_cause_has_one_order() {
+        let battery = finding("cell_voltage", Subsystem::Power, Level::Critical);
+        let failsafe =
+            Finding { unit: "", ..finding("autopilot_state", Subsystem::Computer, Level::Critical) };
+        let mut craft = craft(&[battery, failsafe]);
+        let reason =
+            |craft: &Craft, of: Subsystem| self::reason(craft, of, Level::Critical, Level::Critical, 0);
+        assert_eq!(reason(&craft, Subsystem::Power), "battery 1 cell low: 3.40 V, LAND NOW");
+        let words = "autopilot in failsafe, because of: battery cell voltage";
+        assert_eq!(reason(&craft, Subsystem::Computer), words);
+        craft.worries.remove(&("cell_voltage", 0));
+        assert_eq!(reason(&craft, Subsystem::Computer), "autopilot in failsafe, WATCH IT");
+    }
+
+    #[test]
+    fn what_was_bad_and_is_judged_no_more_is_not_called_good() {
+        let mut craft = craft(&[]);
+        let battery = finding("cell_voltage", Subsystem::Power, Level::Critical);
+        craft.unjudged.insert(("cell_voltage", 0), battery);
+        let (board, part) = parts(&craft, 1_100);
+        assert_eq!((board.overall, board.said), ("stale", Some("was critical")));
+        let words = "was critical: battery 1 cell low: 3.40 V; not judged on the ground or disarmed";
+        assert_eq!(part(&board, Subsystem::Power), words);
+    }
+
+    /// Between a radio and a PC there is no wire of the autopilot's.
+    #[test]
+    fn the_silence_of_a_link_is_no_finding_of_the_wire_and_nothing_is_called_well() {
+        let mut craft = craft(&[]);
+        for tick in 0..200 {
+            craft.tick(Instant::from_millis(1_000 + tick * 50), &mut None, &mut |_| {});
+        }
+        assert!(craft.worries.is_empty(), "{:?}", craft.worries);
+        let (board, part) = parts(&craft, 11_000);
+        assert_eq!(board.overall, "stale");
+        assert_eq!(part(&board, Subsystem::Link), "stale: silent for 10 s");
     }
 }

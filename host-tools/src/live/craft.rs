@@ -3,11 +3,13 @@
 //! Small, and all of it can be copied: playback keeps copies to go back to. What grows is in [`crate::page::history`].
 
 use std::collections::BTreeMap;
+use std::sync::LazyLock;
 
 use hums_core::Monitor;
 use hums_core::component::{COMPONENTS_MAX, Component};
 use hums_core::flight::Phase;
-use hums_core::health::{Finding, Level, Subsystem};
+use hums_core::happening::Happening;
+use hums_core::health::{Finding, Level, Scope, Subsystem, VOCABULARY};
 use hums_core::observation::{Autopilot, Observation, Source};
 use hums_core::params::Params;
 use hums_core::status::{RecorderStatus, Recording};
@@ -30,11 +32,16 @@ const SETTLE: Span = Span::from_secs(5);
 const SILENT: Span = Span::from_secs(1);
 /// The check of that.
 const ESC_SILENT: &str = "esc_silent";
+/// The check of the autopilot's silence on its wire.
+const HEARTBEAT: &str = "heartbeat";
+/// What is so within this time of the vehicle's first heartbeat was so before: that it is in the air is seen a moment later.
+const JOINED: Span = Span::from_secs(5);
 /// How often the limits are looked at.
 const LIMITS_EVERY: Span = Span::from_secs(1);
 
 /// What is known of a vehicle.
 #[derive(Clone, Debug)]
+#[expect(clippy::struct_excessive_bools, reason = "facts that have nothing to do with each other")]
 pub struct Craft {
     /// Vehicle, flight, health, usage.
     pub monitor: Monitor,
@@ -48,6 +55,14 @@ pub struct Craft {
     pub speed_sensors: [Option<(Instant, f32)>; 2],
     /// The last finding of each check that is not well.
     pub worries: BTreeMap<(&'static str, u8), Finding>,
+    /// Of those that were not well, and are not judged any more: until it is armed again, or they are good.
+    pub unjudged: BTreeMap<(&'static str, u8), Finding>,
+    /// Nobody tells how many cells its battery has.
+    pub cells_unknown: bool,
+    /// The frames come from the autopilot's own wire: a box recorded them. What is missing on another link tells of that link.
+    pub on_the_wire: bool,
+    /// It was armed when it was first heard.
+    joined: bool,
     /// When its autopilot was heard last.
     pub heard: Instant,
     /// Frames of its system, and how many of them are missing by their own count.
@@ -69,7 +84,7 @@ pub struct Craft {
 
 impl Craft {
     /// A vehicle whose autopilot has just been heard.
-    pub fn new(at: Instant, params: &Params) -> Self {
+    pub fn new(at: Instant, params: &Params, on_the_wire: bool) -> Self {
         Self {
             monitor: Monitor::new(*params),
             reference: Reference::new(),
@@ -77,6 +92,10 @@ impl Craft {
             companion: Companion::default(),
             speed_sensors: [None; 2],
             worries: BTreeMap::new(),
+            unjudged: BTreeMap::new(),
+            cells_unknown: false,
+            on_the_wire,
+            joined: false,
             heard: at,
             frames: 0,
             missing: 0,
@@ -155,6 +174,9 @@ impl Craft {
             return;
         }
         self.heard = at;
+        if let Observation::Heartbeat(heartbeat) = observation {
+            self.joined |= heartbeat.armed && at == self.began;
+        }
         self.barometer |= matches!(observation, Observation::Air(_));
         let other = self.barometer && matches!(observation, Observation::ImuAndAir(..));
         for (_, quantities) in self.reference.told_by(observation) {
@@ -208,27 +230,47 @@ impl Craft {
         // A HUMS on board passes on what the radio can carry: that a stream is thin here says nothing of the vehicle.
         let thin = self.companion.present(now);
         let cut_off = now.since(self.heard) >= SILENT;
-        let Self { monitor, worries, .. } = self;
+        let Self { monitor, worries, unjudged, on_the_wire, .. } = self;
         monitor.tick(now, &link, &recorder, &mut |finding| {
             let silence = finding.level == Level::Stale
                 || (finding.level == Level::Ok && finding.previous == Level::Stale);
-            if finding.subsystem == Subsystem::Recorder || (thin && silence) {
+            if finding.subsystem == Subsystem::Recorder
+                || (thin && silence)
+                || (!*on_the_wire && is_of_wire(finding.check))
+            {
                 return;
             }
             if cut_off && finding.check == ESC_SILENT {
                 return;
             }
             let key = (finding.check, finding.instance);
-            if finding.level == Level::Ok {
-                worries.remove(&key)
-            } else {
-                worries.insert(key, *finding)
+            // That a link is silent is said once, of the link.
+            let echo = match finding.level {
+                Level::Stale => finding.because == HEARTBEAT,
+                _ => silence && !worries.contains_key(&key),
             };
+            if !*on_the_wire && echo {
+                return;
+            }
+            unjudged.remove(&key);
+            let before = worries.remove(&key);
+            match finding.level {
+                Level::Ok if finding.value.is_nan() => unjudged.extend(before.map(|before| (key, before))),
+                Level::Ok => {}
+                _ => {
+                    worries.insert(key, *finding);
+                }
+            }
             keep(history, now, Note::finding(finding));
             findings(finding);
         });
         while let Some(happening) = self.monitor.take_happening() {
-            if let Some(note) = Note::event(now, happening) {
+            let joined = self.joined && now.since(self.began) <= JOINED;
+            self.cells_unknown |= happening == Happening::CellsUnknown;
+            if happening == Happening::Armed {
+                self.unjudged.clear();
+            }
+            if let Some(note) = Note::event(now, happening, joined) {
                 keep(history, now, note);
             }
         }
@@ -241,7 +283,7 @@ impl Craft {
         if self.limits_at.is_none_or(|at| now.since(at) >= LIMITS_EVERY) {
             self.limits_at = Some(now);
             if let Some(history) = history {
-                history.judged_by(self.monitor.params());
+                history.judged_by(self.monitor.params(), self.monitor.cell_count());
             }
         }
     }
@@ -250,6 +292,15 @@ impl Craft {
     pub fn phase(&self, now: Instant) -> Phase {
         self.monitor.flight().phase(now, self.monitor.vehicle())
     }
+}
+
+/// Whether a check tells of the autopilot's own wire.
+pub fn is_of_wire(check: &str) -> bool {
+    static WIRE: LazyLock<Vec<&str>> = LazyLock::new(|| {
+        let of_wire = VOCABULARY.iter().filter(|words| words.scope == Scope::Wire);
+        of_wire.map(|words| words.said.check).collect()
+    });
+    WIRE.contains(&check)
 }
 
 fn keep(history: &mut Option<&mut History>, at: Instant, note: Note) {

@@ -139,6 +139,8 @@ pub struct Player {
     /// How much of the recording was read, 0 to 1, where the user ended the reading.
     read_to: Option<f64>,
     rate: Rate,
+    /// See [`World::on_the_wire`].
+    is_of_box: bool,
     /// Counts how often the time went back.
     epoch: u64,
     timeline: Arc<str>,
@@ -161,8 +163,8 @@ impl Player {
             ..SourceJson::default()
         };
         let (rate, timeline) = (Rate::default(), Arc::default());
-        let (epoch_us, read_to) = (None, None);
-        Self { hub, commands, limits, source, epoch_us, influx, read_to, rate, epoch: 0, timeline }
+        let (epoch_us, read_to, is_of_box) = (None, None, false);
+        Self { hub, commands, limits, source, epoch_us, influx, read_to, rate, is_of_box, epoch: 0, timeline }
     }
 
     /// Runs until Ctrl-C; gives what is still to be written. A recording that cannot be read is told on the page too.
@@ -176,16 +178,22 @@ impl Player {
         Ok(self.influx)
     }
 
+    /// Nothing heard yet.
+    fn world(&self) -> World {
+        World::new(self.limits.clone()).on_the_wire(self.is_of_box)
+    }
+
     /// Reads it through.
     fn load(&mut self, opened: &mut Opened) -> Result<Loaded> {
-        let mut world = World::new(self.limits.clone());
+        self.is_of_box = opened.is_of_box();
+        let mut world = self.world();
         let mut writer = SpoolWriter::new()?;
         let (mut copies, mut copy_every, mut told) = (Vec::new(), COPY_EVERY, Vec::new());
         let (mut start, mut end, mut frames) = (None, Instant::ZERO, 0_u64);
         let mut shown = Wall::now();
         let Self { hub, source, epoch_us, influx, .. } = self;
         // `Ctrl-C` ends a long reading too.
-        recording::each(opened, &mut |at, epoch, progress, heard| -> io::Result<bool> {
+        let ending = recording::each(opened, &mut |at, epoch, progress, heard| -> io::Result<bool> {
             *epoch_us = epoch.or(*epoch_us);
             source.progress = progress;
             if start.is_none() {
@@ -235,6 +243,7 @@ impl Player {
             }
             Ok(!interrupt::requested())
         })?;
+        source.log_end = ending.map(|ending| ending.words());
         if let Some(influx) = influx {
             influx.know(&world);
         }
@@ -253,7 +262,7 @@ impl Player {
     fn write(&mut self, loaded: &mut Loaded) -> io::Result<()> {
         let Some(influx) = &mut self.influx else { return Ok(()) };
         let epoch_us = self.epoch_us.unwrap_or(0);
-        let mut world = World::new(self.limits.clone());
+        let mut world = World::new(self.limits.clone()).on_the_wire(self.is_of_box);
         world.begin(loaded.start);
         let (end, mut given_to) = (loaded.end, loaded.start);
         loaded.follow(&mut world, end, &mut |at, frame, world| {
@@ -281,7 +290,7 @@ impl Player {
 
     /// Plays it, as the pages ask.
     fn play(&mut self, loaded: &mut Loaded) -> Result<()> {
-        let mut world = World::new(self.limits.clone());
+        let mut world = self.world();
         world.begin(loaded.start);
         let mut now = loaded.start;
         self.source.phase = if loaded.frames == 0 { "ended" } else { "playing" };
@@ -362,7 +371,7 @@ impl Player {
                 loaded.seek(offset, told)?;
             }
             None => {
-                *world = World::new(self.limits.clone());
+                *world = self.world();
                 world.begin(loaded.start);
                 loaded.seek(0, 0)?;
             }

@@ -10,7 +10,9 @@ use hums_link::Frame;
 
 use super::native::{self, Entry, Native};
 use super::told::Told;
+use crate::ending::Ending;
 use crate::endpoint::Endpoint;
+use crate::logs::groups::at_beginning;
 use crate::outcome::usage;
 use crate::source::find::find;
 use crate::source::item::{Item, Stop, Want};
@@ -26,9 +28,15 @@ pub struct Opened {
     recording: Option<Recording>,
     /// Where it is, of one without frames.
     native: Option<Place>,
+    is_of_box: bool,
 }
 
 impl Opened {
+    /// Whether a box recorded it, on the autopilot's own wire.
+    pub fn is_of_box(&self) -> bool {
+        self.is_of_box
+    }
+
     /// An autopilot's own log, which is read again to be played.
     pub fn native(&self) -> Option<Native> {
         self.native.clone().map(Native::new)
@@ -56,22 +64,21 @@ pub fn open(endpoint: &Endpoint, session: Option<&str>) -> Result<Opened> {
         Some(log) => format!("{endpoint}, session {}", log.name),
         None => endpoint.to_string(),
     };
-    Ok(Opened { name, recording: Some(recording), native })
+    // A packed recording has no start of a box, and may be of any link.
+    let is_of_box = place.own().is_some_and(|log| at_beginning(log, |_| Some(())).is_some());
+    Ok(Opened { name, recording: Some(recording), native, is_of_box })
 }
 
 /// What is to be played of all that a path holds.
 fn chosen(path: &Path, session: Option<&str>) -> Result<Place> {
-    let mut places = find(&[path.to_owned()], false)?.places;
-    let names: Vec<String> = places.iter().map(|place| place.name.clone()).collect();
+    let mut found = find(&[path.to_owned()], false)?;
+    let names: Vec<String> = found.places.iter().map(|place| place.name.clone()).collect();
     let Some(newest) = names.last() else { bail!("{}: there is no log in it", path.display()) };
-    let wanted = session.unwrap_or(newest);
-    let Some(index) = names.iter().position(|name| name == wanted) else {
-        return Err(usage(format!("{} has no session {wanted}; it has {}", path.display(), listed(&names))));
-    };
+    let index = session.map(|name| found.session(name)).transpose()?.unwrap_or(names.len() - 1);
     if session.is_none() && names.len() > 1 {
         note!("{newest} is played, the newest; --session NAME plays another: {}", listed(&names));
     }
-    Ok(places.swap_remove(index))
+    Ok(found.places.swap_remove(index))
 }
 
 /// Some names, the newest first.
@@ -97,15 +104,15 @@ pub enum Heard<'a> {
 /// is. `false` ends the reading.
 pub type Take<'a> = dyn FnMut(Instant, Option<u64>, f64, Heard<'_>) -> io::Result<bool> + 'a;
 
-/// Reads it from its beginning to its end, once.
-pub fn each(opened: &mut Opened, take: &mut Take<'_>) -> Result<()> {
-    let Some(recording) = opened.recording.take() else { return Ok(()) };
+/// Reads it from its beginning to its end, once; gives how a log of ours ends.
+pub fn each(opened: &mut Opened, take: &mut Take<'_>) -> Result<Option<Ending>> {
+    let Some(recording) = opened.recording.take() else { return Ok(None) };
     let progress = recording.progress.clone();
     let mut epoch_us = None;
     let want =
         if opened.native.is_some() { native::want() } else { Want { frames: true, ..Want::default() } };
     let native = opened.native.is_some();
-    recording.read(want, &mut |at, item| {
+    let summary = recording.read(want, &mut |at, item| {
         let entry = if native { Entry::of(at, &item) } else { None };
         let told = if let Item::Record(record) = item { Told::of(record) } else { None };
         let heard = match item {
@@ -126,5 +133,5 @@ pub fn each(opened: &mut Opened, take: &mut Take<'_>) -> Result<()> {
         };
         if take(at, epoch_us, progress.part(), heard)? { Ok(()) } else { Err(Stop.into()) }
     })?;
-    Ok(())
+    Ok(summary.ending)
 }

@@ -12,6 +12,7 @@ use super::companion::CompanionJson;
 use super::craft::Craft;
 use super::values::{Motors, Values};
 use super::world::World;
+use crate::counters::is_told;
 use crate::names::{autopilot_name, type_name};
 use crate::page::json::json;
 use crate::page::modes;
@@ -27,6 +28,8 @@ pub struct SourceJson {
     pub phase: &'static str,
     /// More about it, in words.
     pub words: String,
+    /// Of a log of ours: how it ends, in words.
+    pub log_end: Option<String>,
     /// Of reading, 0 to 1.
     pub progress: f64,
     /// A recording's beginning and end, seconds.
@@ -110,6 +113,7 @@ struct State<'a> {
     phase: &'static str,
     mode: Cow<'static, str>,
     overall: &'static str,
+    overall_said: Option<&'static str>,
     heard_ms: u64,
     px4: bool,
     values: Values<'a>,
@@ -161,6 +165,7 @@ fn state(system: u8, craft: &Craft, board: &Board, now: Instant) -> String {
         phase: craft.phase(now).name(),
         mode: modes::name(&heartbeat),
         overall: board.overall,
+        overall_said: board.said,
         heard_ms: now.since(craft.heard).as_millis(),
         px4,
         values: Values::of(craft, now),
@@ -193,7 +198,11 @@ struct Usage<'a>(&'a Craft);
 impl Serialize for Usage<'_> {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let usage = self.0.monitor.usage();
-        let value = |counter: &UsageCounter| Some((counter.name(), usage.value(*counter)?));
+        let vehicle = self.0.monitor.vehicle();
+        let value = |counter: &UsageCounter| {
+            let value = usage.value(*counter)?;
+            is_told(counter.name(), vehicle).then_some((counter.name(), value))
+        };
         serializer.collect_map(UsageCounter::ALL.iter().filter_map(value))
     }
 }

@@ -43,6 +43,8 @@ pub struct World {
     /// Findings since this was cleared, with whose they are; what nobody clears stops at `FOUND_MAX`.
     pub found: Vec<(u8, Finding)>,
     limits: Limits,
+    /// See [`Craft::on_the_wire`].
+    on_the_wire: bool,
     /// The vehicle that a log is of: the first one heard in it.
     owner: Option<u8>,
     /// What the log told of its parts before that.
@@ -63,10 +65,17 @@ impl World {
             refused: 0,
             found: Vec::new(),
             limits,
+            on_the_wire: false,
             owner: None,
             parts: [None; COMPONENTS_MAX],
             next_tick: Instant::ZERO,
         }
+    }
+
+    /// What a box recorded: its frames come from the autopilot's own wire.
+    #[must_use]
+    pub fn on_the_wire(self, on_the_wire: bool) -> Self {
+        Self { on_the_wire, ..self }
     }
 
     /// Time begins here: a HUMS log's first frame may come long after power-on.
@@ -113,7 +122,7 @@ impl World {
             self.refused += 1;
             return;
         }
-        let mut craft = Craft::new(at, self.limits.params());
+        let mut craft = Craft::new(at, self.limits.params(), self.on_the_wire);
         if self.owner.is_none() {
             self.owner = Some(system);
             for (place, part) in self.parts.iter().enumerate() {
@@ -301,7 +310,7 @@ mod tests {
         let beat = Heartbeat { armed: true, ..Heartbeat::default() };
         let beat = Entry::Observation(source, Box::new(Observation::Heartbeat(beat)));
         let found = |gap: bool| {
-            let mut world = World::new(Limits::default());
+            let mut world = World::new(Limits::default()).on_the_wire(true);
             world.begin(Instant::ZERO);
             for second in (0..20).chain(40..60) {
                 if gap && second == 40 {
@@ -314,6 +323,32 @@ mod tests {
         };
         assert!(found(false) > 0, "a silence is found");
         assert_eq!(found(true), 0);
+    }
+
+    /// What is so when the vehicle is first heard has not happened then.
+    #[test]
+    fn a_vehicle_that_is_first_heard_in_the_air_has_not_just_taken_off() {
+        let mut encoder = Encoder::of(1, 1);
+        let mut frame = |packet: &Packet| {
+            let mut buffer = [0; FRAME_BYTES_MAX];
+            encoder.frame(&mut buffer, packet).to_vec()
+        };
+        let armed = frame(&Packet::new(HEARTBEAT).u8(4, 2).u8(5, 3).u8(6, 128).u8(7, 4).u8(8, 3));
+        let position = frame(&Packet::new(33).u32(16, 25_000));
+        let hud = frame(&Packet::new(74).f32(8, 25.0).u8(18, 40));
+        let (mut world, mut histories) = (World::new(Limits::default()), Histories::new());
+        for second in 0..8 {
+            for bytes in [&armed, &position, &hud] {
+                hear(&mut world, &mut histories, Instant::from_millis(second * 1_000), bytes);
+            }
+        }
+        world.advance(Instant::from_millis(7_500), Some(&mut histories));
+        assert!(world.crafts[&1].monitor.flight().airborne());
+        let part = histories[&1].since(1, &mut Cursor::default(), Instant::from_millis(8_000));
+        let part = serde_json::to_value(part).expect("JSON");
+        let words: Vec<_> =
+            part["notes"].as_array().into_iter().flatten().map(|note| &note["words"]).collect();
+        assert_eq!(words, ["armed when it was first heard", "in the air when it was first heard"]);
     }
 
     #[test]

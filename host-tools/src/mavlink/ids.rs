@@ -11,6 +11,7 @@ macro_rules! ids {
 
 ids! {
     HEARTBEAT 0;
+    SYSTEM_TIME 2;
     PARAM_REQUEST_READ 20;
     PARAM_REQUEST_LIST 21;
     PARAM_VALUE 22;

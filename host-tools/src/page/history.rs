@@ -50,6 +50,8 @@ pub struct History {
     parameters: Parameters,
     autopilot: Autopilot,
     params: Option<Box<Params>>,
+    /// Cells of the one battery.
+    cells: u8,
     /// Counts the changes of what plots are called and of their limits.
     words: u64,
 }
@@ -136,8 +138,13 @@ impl Serialize for Series {
 }
 
 impl History {
-    /// Keeps something said or found.
+    /// Keeps something said or found: once, where a HUMS on board and the checks here found the same.
     pub fn note(&mut self, at: Instant, note: Note) {
+        /// Notes that are looked at: more are no event.
+        const LOOKED_AT: usize = 64;
+        if self.notes.iter().rev().take(LOOKED_AT).any(|(_, known)| known.is_again(&note)) {
+            return;
+        }
         if self.notes.len() >= NOTES_MAX {
             self.notes.pop_front();
             self.notes_gone += 1;
@@ -200,10 +207,11 @@ impl History {
         self.parameters.take(at, name, value);
     }
 
-    /// Takes the limits that hold.
-    pub fn judged_by(&mut self, params: &Params) {
-        if self.params.as_deref() != Some(params) {
+    /// Takes the limits that hold, and how many cells the one battery has, if that is known.
+    pub fn judged_by(&mut self, params: &Params, cells: u8) {
+        if self.params.as_deref() != Some(params) || self.cells != cells {
             self.params = Some(Box::new(*params));
+            self.cells = cells;
             self.words += 1;
         }
     }
@@ -304,7 +312,9 @@ impl History {
                 continue;
             }
             let params = self.params.as_deref();
-            let limits = params.map(|params| plots::limits(plot, self.autopilot, params)).unwrap_or_default();
+            let limits = params
+                .map(|params| plots::limits(plot, self.autopilot, params, self.cells))
+                .unwrap_or_default();
             let plots::About { group, title, unit, decimals, .. } = about;
             let (id, title) = (format!("{plot:?}"), title.to_owned());
             all.push((plot, PlotJson { id, group, title, unit, decimals, limits, lines: vec![named] }));

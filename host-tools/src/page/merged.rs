@@ -145,7 +145,7 @@ fn about((plot, _, of_px4): Quantity) -> plots::About {
 fn limits((plot, _, of_px4): Quantity, flights: &[Flight<'_>]) -> Vec<Limits> {
     let params = flights.iter().find_map(|flight| flight.history.drawn().2);
     let autopilot = if of_px4 { Autopilot::Px4 } else { Autopilot::ArduPilot };
-    params.map(|params| plots::limits(plot, autopilot, params)).unwrap_or_default()
+    params.map(|params| plots::limits(plot, autopilot, params, 0)).unwrap_or_default()
 }
 
 /// Safe as an element's name.

@@ -1,17 +1,22 @@
 //! What stands in the list of a page: findings, texts, events.
 
 use hums_core::happening::Happening;
-use hums_core::health::{Finding, vocabulary};
+use hums_core::health::{Finding, VOCABULARY, instances, vocabulary};
+use hums_core::observation::Feeds;
 use hums_core::time::Instant;
 use hums_link::encode::COMPONENT;
 use serde::Serialize;
 
+use crate::names::check_name;
 use crate::states::{Shown, shown};
 use crate::statustext::Text;
 use crate::summary::FindingLine;
 
 /// What a finding of a HUMS begins with.
 const OURS: &str = "HUMS: ";
+
+/// What there is to say of a battery whose number of cells nobody tells.
+pub const CELLS_UNKNOWN: &str = "cells not known: the battery's voltage raises no alarm; set BAT_CELLS";
 
 /// Something that was found, said, or happened.
 #[derive(Clone, Debug, Serialize)]
@@ -38,6 +43,8 @@ pub struct Note {
 pub struct Found {
     /// The check's stable name.
     pub check: String,
+    /// Which one of several, from 0.
+    pub instance: u8,
     /// The level before.
     pub previous: &'static str,
     /// What decided; `null` where the input stopped, and where it is no quantity.
@@ -69,7 +76,7 @@ impl Cause {
     /// Of the check of this name.
     fn of(check: &str) -> Self {
         let words =
-            vocabulary(check).map_or_else(|| check.replace('_', " "), |known| known.said.name.to_owned());
+            vocabulary(check).map_or_else(|| check_name(check, 0), |known| known.said.name.to_owned());
         Self { check: check.to_owned(), words }
     }
 }
@@ -82,18 +89,40 @@ fn written(unit: &str) -> &str {
         "deg/s" => "\u{b0}/s",
         "m/s2" => "m/s\u{b2}",
         "1/min" => "rpm",
+        "times" => "times its usual",
         other => other,
     }
 }
+
+/// A box tells three texts of half a minute at most, and a warning at the end of its event.
+const AGAIN_S: f64 = 45.0;
+
+/// Which check and which part of it the words of a HUMS's text are of, and what they say besides.
+fn told_check(words: &str) -> Option<(&'static str, u8, &str)> {
+    let good = words.strip_prefix("ok: ").or_else(|| words.strip_prefix("no data: "));
+    let each = VOCABULARY
+        .iter()
+        .flat_map(|words| (0..instances(words.said.check)).map(move |part| (words.said, part)));
+    let told = each.filter_map(|(said, part)| {
+        let rest = match good {
+            Some(good) => good.strip_prefix(said.name_of(part).to_string().as_str()),
+            None => FEEDS
+                .iter()
+                .find_map(|feeds| words.strip_prefix(said.alarm_of(part, *feeds).to_string().as_str())),
+        }?;
+        (rest.is_empty() || rest.starts_with([':', ','])).then_some((said.check, part, rest))
+    });
+    // The longest words that fit; of two scales of one fault the first.
+    told.reduce(|best, other| if other.2.len() < best.2.len() { other } else { best })
+}
+
+const FEEDS: [Feeds; 3] = [Feeds::Vehicle, Feeds::Avionics, Feeds::Payload];
 
 impl Note {
     /// A finding of a check, and the check that explains it.
     pub fn found(finding: &FindingLine, because: Option<&str>) -> Self {
         let known = vocabulary(&finding.check);
-        let mut words = match known {
-            Some(known) => known.said.name_of(finding.instance).to_string(),
-            None => finding.check.replace('_', " "),
-        };
+        let mut words = check_name(&finding.check, finding.instance);
         if finding.is_unjudged() {
             words = format!("{words}: {}", FindingLine::UNJUDGED);
         }
@@ -111,6 +140,7 @@ impl Note {
             words,
             found: Some(Found {
                 check: finding.check.clone(),
+                instance: finding.instance,
                 previous: finding.previous,
                 value,
                 state,
@@ -139,9 +169,12 @@ impl Note {
         Self::found(&line, Some(finding.because).filter(|because| !because.is_empty()))
     }
 
-    /// What a component said; a HUMS on board says findings.
+    /// What a component said; a HUMS on board says findings, which have the names that they have here.
     pub fn text(text: Text) -> Self {
         let ours = text.source.component == COMPONENT && text.words.starts_with(OURS);
+        if ours && let Some(note) = Self::on_board(&text) {
+            return note;
+        }
         let from = match text.source.component {
             COMPONENT if ours => "on board".to_owned(),
             1 => "autopilot".to_owned(),
@@ -153,24 +186,118 @@ impl Note {
         Self { at_s: text.at.as_secs_f64(), kind, level, from, subsystem: "", words, found: None }
     }
 
-    /// What a pilot wants to see on the time line; `None` for all else that happens.
-    pub fn event(now: Instant, happening: Happening) -> Option<Self> {
+    /// What a HUMS on board found, by the words in which it tells it.
+    fn on_board(text: &Text) -> Option<Self> {
+        let words = text.words.trim_start_matches(OURS);
+        let (check, instance, rest) = told_check(words)?;
+        let known = vocabulary(check)?;
+        let level = if words.starts_with("ok: ") { "ok" } else { text.level() };
+        let is_worry = matches!(level, "warning" | "critical");
+        let rest = rest.trim_start_matches([':', ',', ' ']);
+        let name = check_name(check, instance);
+        Some(Self {
+            at_s: text.at.as_secs_f64(),
+            kind: "finding",
+            level,
+            from: "on board".to_owned(),
+            subsystem: "",
+            words: if rest.is_empty() { name } else { format!("{name}: {rest}") },
+            found: Some(Found {
+                check: check.to_owned(),
+                instance,
+                previous: "",
+                value: None,
+                state: None,
+                limit: None,
+                unit: String::new(),
+                meaning: if is_worry { known.meaning } else { "" },
+                action: if is_worry { known.action } else { "" },
+                because: None,
+            }),
+        })
+    }
+
+    /// Whether it is the same finding as another one: of the same check and part, to the same level, within the time that a box waits before
+    /// it tells one, and a radio until it brings it.
+    pub fn is_again(&self, other: &Self) -> bool {
+        let (Some(one), Some(two)) = (&self.found, &other.found) else { return false };
+        (&one.check, one.instance, self.level) == (&two.check, two.instance, other.level)
+            && self.from != other.from
+            && (self.at_s - other.at_s).abs() <= AGAIN_S
+    }
+
+    /// What a pilot wants to see on the time line; `None` for all else that happens. What is so when the vehicle is first heard has not happened
+    /// then: `joined`.
+    pub fn event(now: Instant, happening: Happening, joined: bool) -> Option<Self> {
         let words = match happening {
+            Happening::Armed if joined => "armed when it was first heard",
+            Happening::TakeOff | Happening::FlightResumed if joined => "in the air when it was first heard",
             Happening::Armed => "armed",
             Happening::Disarmed => "disarmed",
             Happening::TakeOff => "take-off",
+            Happening::FlightResumed => "in the air",
             Happening::Landing => "landing",
-            Happening::AutopilotReboot => "the autopilot has rebooted",
+            Happening::AutopilotReboot => "the autopilot has restarted",
+            Happening::CellsUnknown => CELLS_UNKNOWN,
             _ => return None,
         };
+        let is_warning = happening == Happening::CellsUnknown;
         Some(Self {
             at_s: now.as_secs_f64(),
-            kind: "event",
-            level: "ok",
+            kind: if is_warning { "text" } else { "event" },
+            level: if is_warning { "warning" } else { "ok" },
             from: "here".to_owned(),
             subsystem: "",
             words: words.to_owned(),
             found: None,
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use hums_core::health::{Level, Subsystem, checks};
+    use hums_link::summary;
+
+    use super::*;
+
+    /// Each text of a box is known for the check and the part that it is of, whatever its level.
+    #[test]
+    fn what_a_box_tells_has_the_name_that_it_has_here() {
+        // The same fault on another autopilot's scale, and after another time.
+        let twins = [("vibration_px4", "vibration"), ("cell_dev_lasting", "cell_deviation")];
+        for check in checks() {
+            for level in [Level::Warning, Level::Critical, Level::Ok, Level::Stale] {
+                let instance = check.instances - 1;
+                let feeds = if check.subsystem == Subsystem::Power { Feeds::Payload } else { Feeds::Unsaid };
+                let finding = Finding {
+                    at: Instant::ZERO,
+                    subsystem: check.subsystem,
+                    check: check.name,
+                    instance,
+                    level,
+                    previous: Level::Ok,
+                    value: 12.0,
+                    limit: 1.0,
+                    unit: check.unit,
+                    feeds,
+                    because: "",
+                };
+                let text = summary::text(&finding);
+                let words = text.as_str().trim_start_matches(OURS);
+                let known = told_check(words).map(|(check, part, _)| (check, part));
+                let twin = twins.iter().find(|(twin, _)| *twin == check.name);
+                let name = twin
+                    .filter(|_| level != Level::Ok && level != Level::Stale)
+                    .map_or(check.name, |(_, of)| of);
+                let same_name = vocabulary(check.name).map(|words| words.said.name);
+                let is_it = known.is_some_and(|(told, part)| {
+                    part == instance
+                        && (told == name || vocabulary(told).map(|words| words.said.name) == same_name)
+                });
+                assert!(is_it, "{words}: {known:?}");
+            }
+        }
+        assert_eq!(told_check("cells not known, set BAT_CELLS"), None);
     }
 }

@@ -165,12 +165,12 @@ pub fn about(plot: Plot, autopilot: Autopilot) -> About {
         Plot::Height => ("Motion", "Height above home", "m", 2, |line| {
             named(&["Height", "Wanted, above the origin"], line)
         }),
-        Plot::Altitude => ("Motion", "Altitude above sea level", "m", 1, |line| {
-            named(&["GNSS", "Estimator", "Wanted"], line)
-        }),
-        Plot::Speed => ("Motion", "Speed", "m/s", 2, |line| named(&["Ground", "Air", "GNSS"], line)),
+        Plot::Altitude => {
+            ("Motion", "Altitude above sea level", "m", 1, |line| named(&["GPS", "EKF", "Wanted"], line))
+        }
+        Plot::Speed => ("Motion", "Speed", "m/s", 2, |line| named(&["Ground", "Air", "GPS"], line)),
         Plot::Vertical => ("Motion", "Climb rate", "m/s", 2, |line| named(&["Climb", "Climb, wanted"], line)),
-        Plot::Velocity => ("Motion", "NED velocity", "m/s", 2, velocity),
+        Plot::Velocity => ("Motion", "Velocity north, east, down", "m/s", 2, velocity),
         Plot::Attitude => ("Motion", "Attitude", "\u{b0}", 1, attitude),
         Plot::Heading => ("Motion", "Heading", "\u{b0}", 0, heading),
         Plot::Rates => ("Motion", "Body rates", "\u{b0}/s", 1, rates),
@@ -197,13 +197,13 @@ pub fn about(plot: Plot, autopilot: Autopilot) -> About {
         Plot::EngineCelsius => ("Engine", "Cylinder head", "\u{b0}C", 1, |_| "Cylinder head".into()),
         Plot::Vibration => ("Structure", "Vibration", vibration, 3, axes),
         Plot::Clips => ("Structure", "Clipped samples", "count", 0, |line| numbered("Accelerometer", line)),
-        Plot::Acceleration => ("Structure", "Acceleration", "m/s\u{b2}", 2, |_| "Module".into()),
-        Plot::Estimator => ("Navigation", "Estimator", estimator, 3, |line| {
+        Plot::Acceleration => ("Structure", "Acceleration", "m/s\u{b2}", 2, |_| "Total".into()),
+        Plot::Estimator => ("Navigation", "EKF", estimator, 3, |line| {
             named(&["Velocity", "Horizontal position", "Vertical position", "Compass"], line)
         }),
         Plot::Satellites => ("Navigation", "Satellites", "count", 0, receiver),
-        Plot::Fix => ("Navigation", "Fix type", "2 2D, 3 3D, 4 DGPS, 5 and 6 RTK", 0, receiver),
-        Plot::Hdop => ("Navigation", "HDOP", "", 2, receiver),
+        Plot::Fix => ("Navigation", "GPS fix", "type: 2 is 2D, 3 is 3D, more is better", 0, receiver),
+        Plot::Hdop => ("Navigation", "HDOP", "1 is good", 2, receiver),
         Plot::Accuracy => ("Navigation", "Horizontal accuracy", "m", 2, receiver),
         Plot::Link => ("Link", "Signal strength", "device units", 0, |line| {
             named(&["RC", "Radio", "Radio, far end", "Noise", "Noise, far end"], line)
@@ -217,7 +217,7 @@ pub fn about(plot: Plot, autopilot: Autopilot) -> About {
         Plot::Pressure => {
             ("Computer", "Air pressure", "hPa", 1, |line| named(&["Barometer", "Air, by HIGHRES_IMU"], line))
         }
-        Plot::Load => ("Computer", "Autopilot load", "%", 1, |_| "Load".into()),
+        Plot::Load => ("Computer", "Processor load", "%", 1, |_| "Load".into()),
     };
     About { group, title, unit, decimals, name }
 }
@@ -227,12 +227,15 @@ pub type Limits = [Option<f32>; 2];
 
 /// The limits that hold for every line of a plot; of both sides, where there are two. Where the second is the lower one, what is
 /// below is bad.
-pub fn limits(plot: Plot, autopilot: Autopilot, params: &Params) -> Vec<Limits> {
+pub fn limits(plot: Plot, autopilot: Autopilot, params: &Params, cells: u8) -> Vec<Limits> {
     let px4 = autopilot == Autopilot::Px4;
     let both = |warning, critical| [Some(params.get(warning)), Some(params.get(critical))];
     let warning = |param| [Some(params.get(param)), None];
     let pair = match plot {
         Plot::CellVolts => both(Param::CellVoltWarn, Param::CellVoltCrit),
+        // Those of a cell, where the pack alone is told.
+        Plot::PackVolts if cells > 0 => both(Param::CellVoltWarn, Param::CellVoltCrit)
+            .map(|volts| volts.map(|volts| volts * f32::from(cells))),
         Plot::PackPercent => both(Param::BatRemWarn, Param::BatRemCrit),
         Plot::PackCelsius => both(Param::BatTempWarn, Param::BatTempCrit),
         Plot::Rail => {

@@ -44,7 +44,8 @@ impl Samples {
                         .zip([north, east, down])
                         .for_each(|(axis, speed)| push(Plot::Velocity, axis, Some(speed)));
                 }
-                push(Plot::Altitude, 1, Some(global.altitude.0));
+                // Before it knows where it is, its altitude is 0.
+                push(Plot::Altitude, 1, global.position.map(|_| global.altitude.0));
                 if let Some(position) = global.position {
                     self.place(at, position, Some(global.relative_altitude.0));
                 }

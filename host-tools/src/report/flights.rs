@@ -17,8 +17,9 @@ pub struct Flight {
     pub(super) landed: bool,
     /// Disarmed in the air, which is no landing.
     pub(super) disarmed_in_air: bool,
-    pub(super) height_max_m: f32,
-    pub(super) speed_max_m_s: f32,
+    /// `None` where nothing told it.
+    pub(super) height_max_m: Option<f32>,
+    pub(super) speed_max_m_s: Option<f32>,
     pub(super) percent_from: Option<f32>,
     pub(super) percent_to: Option<f32>,
 }
@@ -37,8 +38,8 @@ pub struct Extents(Vec<Extent>);
 
 #[derive(Clone, Copy, Debug, Default)]
 struct Extent {
-    height_max_m: f32,
-    speed_max_m_s: f32,
+    height_max_m: Option<f32>,
+    speed_max_m_s: Option<f32>,
     percent_from: Option<f32>,
     percent_to: Option<f32>,
 }
@@ -54,8 +55,8 @@ impl Extents {
         let vehicle = reference.vehicle();
         let height_m = vehicle.global.get().map(|global| global.relative_altitude.0);
         let percent = percent(at, reference);
-        extent.height_max_m = extent.height_max_m.max(height_m.unwrap_or(0.0));
-        extent.speed_max_m_s = extent.speed_max_m_s.max(ground_speed_mps(at, vehicle).unwrap_or(0.0));
+        extent.height_max_m = most(extent.height_max_m, height_m);
+        extent.speed_max_m_s = most(extent.speed_max_m_s, ground_speed_mps(at, vehicle));
         extent.percent_from = extent.percent_from.or(percent);
         extent.percent_to = percent.or(extent.percent_to);
     }
@@ -78,6 +79,11 @@ impl Extents {
         };
         judged.iter().enumerate().map(flight).collect()
     }
+}
+
+/// The greater of what is known.
+fn most(one: Option<f32>, other: Option<f32>) -> Option<f32> {
+    [one, other].into_iter().flatten().reduce(f32::max)
 }
 
 /// What is left of the battery.

@@ -11,7 +11,7 @@ use super::replay::Replay;
 use super::trend::airframe;
 use crate::names::{autopilot_name, type_name};
 use crate::plural;
-use crate::summary::Overview;
+use crate::summary::{JudgedChecks, Overview};
 use crate::utc::iso8601;
 
 /// The file of the table.
@@ -19,6 +19,7 @@ pub const FILE: &str = "index.html";
 
 /// A page.
 #[derive(Debug, Serialize, Deserialize)]
+#[expect(clippy::struct_excessive_bools, reason = "facts that have nothing to do with each other")]
 pub struct Row {
     /// Its file, in the same folder.
     file: String,
@@ -35,6 +36,14 @@ pub struct Row {
     checked: bool,
     critical: usize,
     warning: usize,
+    /// Too few checks had something to judge.
+    #[serde(default)]
+    little: bool,
+    #[serde(default)]
+    ends_in_air: bool,
+    /// Nothing in it tells whether the vehicle flew.
+    #[serde(default)]
+    flight_unknown: bool,
     /// Why the recording is not whole, as parts of sentences.
     faults: Vec<String>,
 }
@@ -100,7 +109,8 @@ impl Row {
         let (summary, contents) = (&log.ending.summary, &log.contents);
         let count = |level| contents.findings.iter().filter(|finding| finding.level == level).count();
         let flights = &replay.flights;
-        let most = |of: fn(&super::flights::Flight) -> f32| flights.iter().map(of).reduce(f32::max);
+        let most =
+            |of: fn(&super::flights::Flight) -> Option<f32>| flights.iter().filter_map(of).reduce(f32::max);
         let vehicle = contents.vehicle.as_ref();
         Self {
             file,
@@ -121,6 +131,9 @@ impl Row {
             checked: contents.checked_by() != "nobody" && (vehicle.is_some() || log.format.is_none()),
             critical: count("critical"),
             warning: count("warning"),
+            little: replay.judged.is_some_and(JudgedChecks::is_little),
+            ends_in_air: replay.ends_in_air.is_some(),
+            flight_unknown: !replay.tells_flight,
             faults: faults(log),
         }
     }

@@ -37,7 +37,7 @@ use crate::outcome::{Kept, Outcome, usage};
 use crate::output::{self, Schema};
 use crate::plural::count;
 use crate::printable::{path as shown, word};
-use crate::source::find::{find, sessions_of};
+use crate::source::find::{Found, find, sessions_of};
 use crate::source::recording::Place;
 use crate::summary::Overview;
 
@@ -72,7 +72,13 @@ pub fn run(args: &cli::Report) -> Result<Outcome> {
         bail!("{}: is read twice for a page; give a file", place.title)
     }
     let sessions = sessions_of(&found.places);
-    let wanted = wanted(args, &found.places, &sessions)?;
+    let wanted = wanted(args, &found, &sessions)?;
+    if args.output.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("pdf")) {
+        return Err(usage(format!(
+            "-o {}: a page is HTML: give it that name, and print it from a browser",
+            shown(&args.output)
+        )));
+    }
     let inputs = Inputs::of(given.iter().map(PathBuf::as_path).chain(found.paths())).replacing(args.replace);
     inputs.refuse(&args.output)?;
     if wanted.directory {
@@ -342,20 +348,15 @@ struct Wanted {
     pages: bool,
 }
 
-fn wanted(args: &cli::Report, logs: &[Place], sessions: &Sessions) -> Result<Wanted> {
+fn wanted(args: &cli::Report, found: &Found, sessions: &Sessions) -> Result<Wanted> {
+    let logs = &found.places;
     let Some(last) = logs.len().checked_sub(1) else {
         bail!("no log is in there, so there is nothing to report")
     };
     let directory = says_directory(&args.output);
     let sessions = match &args.session {
         Some(name) => {
-            let Some(index) = logs.iter().position(|log| log.name == *name) else {
-                let names: Vec<&str> = logs.iter().map(|log| log.name.as_str()).collect();
-                return Err(usage(format!(
-                    "--session {name}: there is no such session; there is {}",
-                    names.join(", ")
-                )));
-            };
+            let index = found.session(name)?;
             index..=index
         }
         None if directory => 0..=last,

@@ -15,7 +15,7 @@ use crate::info::json::LogJson;
 use crate::page::history::{Cursor, Part};
 use crate::page::json::embedded;
 use crate::page::program::{STYLE, UPLOT, program};
-use crate::summary::Overview;
+use crate::summary::{JudgedChecks, Overview};
 
 const TEMPLATE: &str = include_str!("../page/assets/report.html");
 
@@ -29,7 +29,18 @@ struct Data<'a> {
     flight: Option<Part>,
     flights: &'a [Flight],
     texts_count: u64,
+    /// How many checks had something to judge, and of how many; `null` where nothing was judged.
+    judged: Option<(usize, usize)>,
+    /// They are so few that nothing found is no good news.
+    little: bool,
+    tells_flight: bool,
+    /// When and how, as a sentence.
+    ends_in_air: Option<(f64, String)>,
     counters: Counters,
+    /// The counters and what the recorder tells of itself are of the time until then, where the recording goes on.
+    counted_until_s: Option<f64>,
+    /// The airframe's life is without this session.
+    life_before: bool,
     stats: Option<StatsJson>,
     trend: &'a Trend,
     /// The flight before of the same airframe.
@@ -93,6 +104,12 @@ pub fn html(log: &Overview, replay: &Replay, trend: &Trend, before: Option<&Befo
         flight: replay.history.since(0, &mut Cursor::default(), Instant::from_micros(u64::MAX)),
         flights: &replay.flights,
         texts_count: replay.texts_count,
+        judged: replay.judged.map(|checks| (checks.judged, checks.all)),
+        little: replay.judged.is_some_and(JudgedChecks::is_little),
+        tells_flight: replay.tells_flight,
+        ends_in_air: replay.ends_in_air.map(|end| (end.at.as_secs_f64(), end.to_string())),
+        counted_until_s: log.counted_until().map(Instant::as_secs_f64),
+        life_before: log.contents.is_life_before(),
         counters: counters::of(&log.contents.usage, &log.contents.lifetime),
         stats: log.contents.stats.as_ref().map(StatsJson::from),
         trend,

@@ -7,6 +7,7 @@ use hums_core::time::Instant;
 use super::causes::causes;
 use super::flights::{Extents, Flight};
 use crate::check::judge::{Judge, Limits};
+use crate::counters::tells_flight;
 use crate::decode::reference::Reference;
 use crate::page::history::History;
 use crate::page::more::{More, rows};
@@ -15,7 +16,7 @@ use crate::page::parameters::Parameters;
 use crate::source::item::{Item, Text, Want};
 use crate::source::recording::Place;
 use crate::statustext;
-use crate::summary::Overview;
+use crate::summary::{EndsInAir, JudgedChecks, Overview};
 
 /// Texts kept at most; beyond this they are only counted.
 const TEXTS_MAX: usize = 1_000;
@@ -29,6 +30,12 @@ pub struct Replay {
     pub flights: Vec<Flight>,
     /// How often the vehicle said something in words.
     pub texts_count: u64,
+    /// How many checks had something to judge; `None` where nothing was judged.
+    pub judged: Option<JudgedChecks>,
+    /// Something in it tells whether the vehicle flew.
+    pub tells_flight: bool,
+    /// How the vehicle was last, where its last flight goes on at the end.
+    pub ends_in_air: Option<EndsInAir>,
     /// What it said.
     notes: Vec<(Instant, Note)>,
     reference: Reference,
@@ -59,8 +66,12 @@ impl Replay {
             replay.item(at, item, judge.flight());
             Ok(())
         })?;
-        replay.history.judged_by(judge.params());
-        replay.flights = replay.extents.flights(&judge.end().flights);
+        replay.history.judged_by(judge.params(), judge.cell_count());
+        let judged = judge.end();
+        replay.flights = replay.extents.flights(&judged.flights);
+        replay.judged = judged.worst().map(|_| judged.checks());
+        replay.tells_flight = tells_flight(judged.vehicle());
+        replay.ends_in_air = judged.ends_in_air;
         let findings = &overview.contents.findings;
         let causes = causes(findings);
         let found = findings.iter().zip(&causes);

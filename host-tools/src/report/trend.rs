@@ -3,7 +3,7 @@
 use hums_blackbox::record::Vehicle;
 use serde::Serialize;
 
-use crate::names::type_name;
+use crate::names::{autopilot_name, type_name};
 use crate::summary::Overview;
 use crate::utc::iso8601;
 
@@ -86,13 +86,14 @@ impl Session {
     }
 }
 
-/// The airframe, as a part of a file's name: by the autopilot's unique id, and where that is not told by system and type.
+/// The airframe, as a part of a file's name: by the autopilot's unique id, and where that is not told by system, autopilot and type.
 pub fn airframe(vehicle: &Vehicle) -> String {
     if vehicle.uid != 0 {
         return format!("uid-{:016x}", vehicle.uid);
     }
-    let kind = type_name(vehicle.vehicle_type).to_lowercase();
-    let kind: String = kind.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '-' }).collect();
+    let kind = format!("{} {}", autopilot_name(vehicle.autopilot), type_name(vehicle.vehicle_type));
+    let kind: String =
+        kind.to_lowercase().chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '-' }).collect();
     format!("system-{}-{kind}", vehicle.system)
 }
 

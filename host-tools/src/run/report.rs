@@ -6,15 +6,18 @@ use std::path::Path;
 use anyhow::Result;
 use hums_blackbox::record::Stats;
 use hums_core::health;
+use hums_core::time::Instant;
 use serde::Serialize;
 
 use super::earlier::EarlierSessions;
 use crate::endpoint::Endpoint;
 use crate::logs;
+use crate::names::check_name;
 use crate::outcome::Outcome;
 use crate::output::{self, Schema};
 use crate::plural::count;
 use crate::summary::{FindingLine, Overview};
+use crate::utc::moment;
 
 /// What `hums sim --json` and `hums emulate --json` print.
 const SCHEMA: Schema = Schema::first("hums-run");
@@ -255,7 +258,9 @@ impl Report {
         }
         for finding in &self.findings {
             let Finding { subsystem, check, instance, level, time_s, .. } = finding;
-            let _ = writeln!(text, "finding  {time_s:>9.3} s  {level:<8}  {subsystem} {check}[{instance}]");
+            let at = moment(Instant::from_micros((time_s * 1e6).round() as u64));
+            let name = check_name(check, *instance);
+            let _ = writeln!(text, "finding  {at:>9}  {level:<8}  {subsystem}: {name} [{check}]");
         }
         if self.findings_left_out > 0 {
             let _ = writeln!(text, "finding  and {} more, which the log has", self.findings_left_out);

@@ -44,6 +44,11 @@ impl BootTimes {
         (self.timeline.map_or(line, |timeline| self.after_base(timeline.now())), None)
     }
 
+    /// Whether this frame is of the system whose times count.
+    pub fn is_of(&self, frame: &hums_link::Frame<'_>) -> bool {
+        self.system == Some(frame.system())
+    }
+
     /// Whether an autopilot has told its time.
     const fn is_known(&self) -> bool {
         self.timeline.is_some()

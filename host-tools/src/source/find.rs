@@ -180,6 +180,34 @@ impl Found {
         Ok(self)
     }
 
+    /// Which of the sessions has this name, or this number.
+    pub fn session(&self, name: &str) -> Result<usize> {
+        let number = |name: &str| name.parse::<u32>().ok();
+        let is_it = |place: &Place| {
+            place.name == name || number(name).is_some_and(|wanted| number(&place.name) == Some(wanted))
+        };
+        self.places.iter().position(is_it).ok_or_else(|| {
+            let names: Vec<&str> = self.places.iter().map(|place| place.name.as_str()).collect();
+            usage(format!("--session {name}: there is no such session; there is {}", names.join(", ")))
+        })
+    }
+
+    /// Says what there is to say of what was found.
+    pub fn tell(&self) {
+        for remark in &self.remarks {
+            note!("{remark}");
+        }
+        for image in self.images.iter().filter(|image| !image.damage.is_empty()) {
+            note!("{}: {}", image.path.display(), image.damage.join("; "));
+        }
+    }
+
+    /// The name of the session that is asked for, as it is here; `None` where none is.
+    pub fn name_of(&self, asked: Option<&str>) -> Result<Option<String>> {
+        let index = asked.map(|name| self.session(name)).transpose()?;
+        Ok(index.and_then(|index| self.places.get(index)).map(|place| place.name.clone()))
+    }
+
     /// Every file that any of it is in.
     pub fn paths(&self) -> impl Iterator<Item = &Path> {
         let pieces = self.places.iter().filter_map(Place::own).flat_map(|log| &log.pieces);

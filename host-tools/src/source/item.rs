@@ -132,6 +132,8 @@ pub enum About {
     Arming,
     /// What of the recording nobody can say whether it is damaged: a sentence.
     Unchecked,
+    /// What stands before the first frame without being one, where nothing is lost by it: a sentence.
+    Beginning,
 }
 
 /// The columns of the rows of one name. In one recording a name has one table for ever: a definition that changes its

@@ -1,13 +1,16 @@
 //! MAVLink recordings, a ground station's tlog and the raw bytes of a port, as the one stream.
 
+use std::collections::VecDeque;
+
 use anyhow::Result;
-use hums_core::time::Instant;
-use hums_link::framer::Framer;
+use hums_core::time::{Instant, Span};
+use hums_link::framer::{Framer, FramerCounts};
 
 use super::blocks::Blocks;
 use super::booted::BootTimes;
 use super::checksums::Checksums;
 use super::counts::Counts;
+use super::daytime::Daytime;
 use super::input::Input;
 use super::item::{About, Cause, Fact, Gap, Item, Reader, Summary, Take, Want};
 use super::pace::Pace;
@@ -18,6 +21,7 @@ use super::stream::Source as _;
 use super::tlog::records::{Record, Records, TIME_BYTES};
 use super::tlog::times::{Begins, Times};
 use crate::plural::count;
+use crate::utc::moment;
 
 /// What was counted; a message that has a definition here counts as verified.
 fn summary(counts: Counts) -> Summary {
@@ -146,14 +150,15 @@ impl RawReader {
 impl Reader for RawReader {
     fn read(&mut self, want: Want<'_>, take: &mut Take<'_>) -> Result<Summary> {
         let (mut framer, mut said, mut counts) = (Framer::new(), Said::default(), Counts::new());
-        let mut now = Instant::ZERO;
         let mut line = Instant::ZERO;
         let (mut times, mut blocks) = (BootTimes::default(), Blocks::default());
         let (mut pace, mut bytes) = (Pace::default(), 0);
+        let (mut daytime, mut strays) = (Daytime::default(), Strays::default());
+        let now = std::cell::Cell::new(Instant::ZERO);
         let mut each = |line, frame: hums_link::Frame<'_>, take: &mut Take<'_>| {
             counts.add(frame.id(), true, frame.bytes().len());
             let (at, begins) = times.at(line, &frame);
-            now = at;
+            now.set(at);
             match begins {
                 Some(Begins::Recording) => {
                     said.end(take)?;
@@ -167,6 +172,14 @@ impl Reader for RawReader {
                 }
                 None => {}
             }
+            if begins.is_some() {
+                daytime = Daytime::default();
+            }
+            if times.is_of(&frame)
+                && let Some(epoch_us) = daytime.of(at, &frame)
+            {
+                take(at, Item::Epoch(epoch_us))?;
+            }
             pace.at(at, bytes, frame.bytes().len() as u64);
             bytes += frame.bytes().len() as u64;
             said.frame(at, &frame, want, take)
@@ -174,10 +187,13 @@ impl Reader for RawReader {
         while let Some(chunk) = self.bytes.next()? {
             line = Instant::from_micros(chunk.at_us);
             push(&mut framer, &chunk.bytes, false, &mut |frame| each(line, frame, take))?;
+            strays.take(now.get(), blocks.place, &chunk.bytes, framer.counts());
             blocks.take(&chunk.bytes, framer.counts().frames);
         }
         let (held, frames) = (framer.held(), framer.counts().frames);
         push(&mut framer, &[], true, &mut |frame| each(line, frame, take))?;
+        strays.take(now.get(), blocks.place, &[], framer.counts());
+        let now = now.get();
         said.end(take)?;
         if let Some(gap) = pace.gap() {
             take(now, Item::Gap(&gap))?;
@@ -193,21 +209,82 @@ impl Reader for RawReader {
             let words = format!("a frame that the end cuts off: {}", count(held, "byte"));
             take(now, Item::Gap(&gap(now, Cause::Cut, place, held, words)))?;
         }
-        let noise = framer.counts().bytes_not_frames.saturating_sub(blocks.bytes() + cut as u64);
-        if noise > 0 {
-            // Noise on the line and damage of the file look alike here.
-            let words = format!("of no frame, noise on the line: {}", count(noise, "byte"));
-            let lost = Gap {
-                from: Some(Instant::ZERO),
-                to: Some(now),
-                place: None,
-                bytes: noise,
-                ..gap(now, Cause::Lost, 0, 0, words)
-            };
-            take(now, Item::Gap(&lost))?;
-        }
+        strays.tell(now, blocks.bytes() + cut as u64, take)?;
         Ok(summary(counts))
     }
+}
+
+/// Bytes of no frame: what an autopilot says in words while it boots, and noise.
+#[derive(Default)]
+struct Strays {
+    /// The latest bytes; until a frame has come, the first ones.
+    latest: VecDeque<u8>,
+    /// When the first frame came.
+    begun: Option<Instant>,
+    /// Bytes of no frame until now, and how many of them are words by which nothing is lost.
+    bytes: u64,
+    words: u64,
+    /// When and where the first noise came, and when the last did.
+    noise: Option<(Instant, u64, Instant)>,
+}
+
+/// More in a row are no words of a boot, which is over so soon after its first frame.
+const WORDS_BYTES_MAX: usize = 16 * 1024;
+const BOOTS: Span = Span::from_secs(2);
+/// What a framer may hold before it says that bytes are of no frame.
+const HELD_BYTES: usize = 512;
+
+impl Strays {
+    /// These bytes have come, with so many of no frame in all.
+    fn take(&mut self, at: Instant, place: u64, bytes: &[u8], counts: FramerCounts) {
+        self.latest.extend(bytes);
+        let kept = if self.begun.is_none() { WORDS_BYTES_MAX } else { HELD_BYTES };
+        self.latest.drain(..self.latest.len().saturating_sub(kept));
+        let new = counts.bytes_not_frames - self.bytes;
+        let is_boot = match self.begun {
+            None if counts.frames == 0 => return,
+            None => true,
+            Some(begun) => self.words > 0 && at.since(begun) <= BOOTS,
+        };
+        self.begun.get_or_insert(at);
+        self.bytes = counts.bytes_not_frames;
+        if new > 0 && is_boot && has_words(&self.latest, new) {
+            self.words += new;
+        } else if new > 0 {
+            let (first, place, _) = self.noise.unwrap_or((at, place, at));
+            self.noise = Some((first, place, at));
+        }
+    }
+
+    /// Tells of them, without those that are told otherwise.
+    fn tell(self, now: Instant, others: u64, take: &mut Take<'_>) -> Result<()> {
+        if self.words > 0 {
+            let words = format!(
+                "{} at its beginning are words and no frame, as of an autopilot that boots: nothing is lost",
+                count(self.words, "byte")
+            );
+            take(now, Item::Fact(Fact { about: About::Beginning, words: &words }))?;
+        }
+        let noise = self.bytes.saturating_sub(self.words + others);
+        if noise > 0 {
+            // Noise on the line and damage of the file look alike here.
+            let (first, place, last) = self.noise.unwrap_or((now, 0, now));
+            let until = if last > first { format!(", the last at {}", moment(last)) } else { String::new() };
+            let words = format!("of no frame, noise on the line: {}{until}", count(noise, "byte"));
+            let lost = Gap { bytes: noise, ..gap(first, Cause::Lost, place, 0, words) };
+            take(now, Item::Gap(&lost))?;
+        }
+        Ok(())
+    }
+}
+
+/// Whether so many bytes in a row are words.
+fn has_words(bytes: &VecDeque<u8>, wanted: u64) -> bool {
+    let mut run = 0;
+    bytes.iter().any(|byte| {
+        run = if matches!(byte, b' '..=b'~' | b'\r' | b'\n' | b'\t') { run + 1 } else { 0 };
+        run >= wanted
+    })
 }
 
 fn gap(at: Instant, cause: Cause, place: u64, bytes: usize, words: String) -> Gap {

@@ -30,6 +30,7 @@ pub mod clock;
 mod compressed;
 mod counts;
 pub mod dataflash;
+mod daytime;
 pub mod doubt;
 pub mod epochs;
 pub mod find;

@@ -244,7 +244,10 @@ fn not_found<'a>(wanted: Option<u8>, heard: impl Iterator<Item = &'a u8>) -> any
     let systems = heard.map(u8::to_string).collect::<Vec<_>>().join(", ");
     match wanted {
         _ if systems.is_empty() => {
-            anyhow!("no board of ours is heard (component {COMPONENT}); is GS_PATH as it should be?")
+            anyhow!(
+                "no HUMS box is heard on this link: is it powered, are address, port or baud rate of --link right, and does the box talk \
+                 on this link (its parameter GS_PATH)?"
+            )
         }
         None => usage(format!("boards of the systems {systems} are heard; say which: --system N")),
         Some(wanted) => anyhow!(

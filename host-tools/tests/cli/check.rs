@@ -4,6 +4,9 @@ use std::fs;
 use std::io::Write as _;
 use std::path::Path;
 
+use hums_link::encode::{Encoder, FRAME_BYTES_MAX};
+use hums_link::packet::Packet;
+
 use super::support::{attempt, end_of, flight, frames_of, hums, json, px4, recorded, records, run, text};
 
 /// Checks that tell of the place on a link, which a recording of another place cannot.
@@ -67,7 +70,7 @@ fn a_screen_says_what_it_was_what_it_means_and_what_to_do_and_what_was_not_judge
         "quadrotor, ArduPilot",
         "in 1 flight",
         "not fit to fly before this is cleared up: 2 critical findings, 3 warnings",
-        "CRITICAL    4:20.7  battery 1 cell voltage: 3.4 V (limit 3.5 V), for 1:36",
+        "CRITICAL    4:20.8  battery 1 cell voltage: 3.4 V (limit 3.5 V), for 1:36",
         "The weakest cell was close to empty",
         "Check the pack under load",
         "no battery temperature: batt_temperature",
@@ -76,7 +79,7 @@ fn a_screen_says_what_it_was_what_it_means_and_what_to_do_and_what_was_not_judge
         assert!(screen.contains(words), "{words}\n{screen}");
     }
     let first =
-        screen.find("cell voltage").expect("the worst") < screen.find("alert: battery").expect("a warning");
+        screen.find("cell voltage").expect("the worst") < screen.find("battery alert").expect("a warning");
     assert!(first, "worst first: {screen}");
     assert!(screen.lines().count() < 45, "one screen: {screen}");
 }
@@ -505,13 +508,13 @@ fn what_a_logger_itself_lost_is_said_and_is_no_damage_to_any_command() {
     let checked = json(&super::support::attempt(dir.path(), "check --json drop.ulg"));
     assert_eq!((checked["loss_count"].as_u64(), checked["damaged"].as_bool()), (Some(1), Some(false)));
     let info = text(&run(dir.path(), "info drop.ulg", 0));
-    assert!(info.contains("1 that the recorder itself lost"), "{info}");
+    assert!(info.contains("1 place of loss or noise"), "{info}");
     run(dir.path(), "report drop.ulg -o page.html", 0);
     // It is of one vehicle.
     run(dir.path(), "check --system 1 drop.ulg", 2);
     let output = run(dir.path(), "decode drop.ulg -o out --format csv", 0);
     let told = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert!(told.contains("lost something 1 time"), "{told}");
+    assert!(told.contains("1 place of loss or noise; hums check says what"), "{told}");
 }
 
 #[test]
@@ -752,11 +755,132 @@ fn what_another_vehicle_flew_teaches_nothing_and_is_said() {
 #[test]
 fn bytes_of_no_frame_are_told_as_that_and_not_as_time_that_is_missing() {
     let dir = tempfile::tempdir().expect("directory");
-    fs::copy(flight("ap_quad_signed.raw"), dir.path().join("signed.raw")).expect("a copy");
+    let signed = fs::read(flight("ap_quad_signed.raw")).expect("there");
+    fs::write(dir.path().join("signed.raw"), &signed).expect("a copy");
+    // What an autopilot says while it boots is no loss.
     let checked = text(&run(dir.path(), "check signed.raw", 0));
-    assert!(checked.contains("; bytes of no frame are in it"), "{checked}");
-    assert!(!checked.contains("not recorded"), "{checked}");
+    assert!(
+        !checked.contains("of no frame") && checked.contains("160 bytes at its beginning are words"),
+        "{checked}"
+    );
+    let info = text(&run(dir.path(), "info signed.raw", 0));
+    assert!(info.contains("gaps     none"), "{info}");
     run(dir.path(), "report signed.raw -o pages/", 0);
     let table = fs::read_to_string(dir.path().join("pages/index.html")).expect("a table");
+    assert!(table.contains("\"faults\":[]"));
+    // Noise stands where it came.
+    let (before, after) = signed.split_at(signed.len() / 2);
+    let noisy = [before, &[0x80; 300], after].concat();
+    fs::write(dir.path().join("noisy.raw"), noisy).expect("a copy");
+    let checked = text(&run(dir.path(), "check noisy.raw", 0));
+    assert!(checked.contains("; bytes of no frame are in it"), "{checked}");
+    assert!(!checked.contains("not recorded"), "{checked}");
+    let gaps = json(&run(dir.path(), "info --json noisy.raw", 0))["logs"][0]["gaps"].clone();
+    let from_s = gaps[0]["from_s"].as_f64().expect("a time");
+    assert!((40.0..120.0).contains(&from_s) && gaps[0]["to_s"].is_null() && gaps[1].is_null(), "{gaps}");
+    run(dir.path(), "report noisy.raw -o pages/", 0);
+    let table = fs::read_to_string(dir.path().join("pages/index.html")).expect("a table");
     assert!(table.contains("\"faults\":[\"1 place of loss or noise; hums check says what\"]"));
+}
+
+/// `SYSTEM_TIME` tells the time of day of bytes without recorded times, as the box learns it of the same.
+#[test]
+fn raw_bytes_have_the_time_of_day_that_their_autopilot_tells() {
+    let dir = tempfile::tempdir().expect("directory");
+    fs::copy(flight("ap_quad_signed.raw"), dir.path().join("signed.raw")).expect("a copy");
+    let log = json(&run(dir.path(), "info --json signed.raw", 0))["logs"][0].clone();
+    assert!(
+        log["start_utc"].as_str().is_some_and(|utc| utc.starts_with("2026-11-20T21:29:46")),
+        "{}",
+        log["start_utc"]
+    );
+    for command in ["check signed.raw", "ls signed.raw"] {
+        let said = text(&run(dir.path(), command, 0));
+        assert!(said.contains("2026-11-20") && said.contains("21:29:46"), "{said}");
+    }
+    let said = text(&run(dir.path(), "decode signed.raw -o out/ --format csv", 0));
+    assert!(!said.contains("time of day"), "{said}");
+}
+
+/// The records of a recording of the repository that `keep` takes, by number and message id, in a file of this folder.
+fn filtered(name: &str, dir: &Path, file: &str, keep: impl Fn(usize, usize, u32) -> bool) {
+    let log = fs::read(flight(name)).expect("a recording");
+    let records = records(&log);
+    let id = |frame: &[u8]| match frame[0] {
+        0xFD => u32::from_le_bytes([frame[7], frame[8], frame[9], 0]),
+        _ => u32::from(frame[5]),
+    };
+    let all = records.len();
+    let kept = records.iter().enumerate().filter(|(place, (_, frame))| keep(*place, all, id(frame)));
+    let bytes: Vec<u8> = kept.flat_map(|(_, (us, frame))| [&us.to_be_bytes()[..], frame].concat()).collect();
+    fs::write(dir.join(file), bytes).expect("written");
+}
+
+/// Heartbeats and texts alone: nobody knows whether it flew, how high, or whether anything was wrong.
+#[test]
+fn what_nothing_tells_is_told_neither_as_good_nor_as_zero() {
+    let dir = tempfile::tempdir().expect("directory");
+    filtered("ap_quad_guided.tlog", dir.path(), "beats.tlog", |_, _, id| matches!(id, 0 | 253));
+    let checked = text(&run(dir.path(), "check beats.tlog", 0));
+    assert!(
+        checked.contains("in air   not known") && checked.contains("not enough to judge: 3 of 86"),
+        "{checked}"
+    );
+    let info = text(&run(dir.path(), "info beats.tlog", 0));
+    assert!(info.contains("findings not enough to judge: 3 of 86 checks"), "{info}");
+    assert!(!info.contains("On the ground") && info.contains("Armed"), "{info}");
+    let listed = text(&run(dir.path(), "ls beats.tlog", 0));
+    assert!(listed.contains("not enough to judge (3 of 86 checks)"), "{listed}");
+    let log = json(&run(dir.path(), "ls --json beats.tlog", 0))["logs"][0].clone();
+    assert_eq!((log["flight_s"].is_null(), log["checks_judged"].as_u64()), (true, Some(3)), "{log}");
+    run(dir.path(), "report beats.tlog -o pages/", 0);
+    let table = fs::read_to_string(dir.path().join("pages/index.html")).expect("a table");
+    assert!(table.contains("\"little\":true") && table.contains("\"flight_unknown\":true"));
+    // A box that checks knows no more of a vehicle that says nothing else.
+    let (mut encoder, mut buffer) = (Encoder::of(1, 1), [0; FRAME_BYTES_MAX]);
+    let beat = Packet::new(0).u8(4, 2).u8(5, 3).u8(7, 3).u8(8, 3);
+    let mut beats = Vec::new();
+    for second in 0..60_u64 {
+        beats.extend((1_800_000_000_000_000 + second * 1_000_000).to_be_bytes());
+        beats.extend(encoder.frame(&mut buffer, &beat));
+    }
+    fs::write(dir.path().join("alone.tlog"), beats).expect("written");
+    run(dir.path(), "sim --input alone.tlog --sd card.img", 0);
+    let listed = text(&run(dir.path(), "ls card.img", 0));
+    assert!(listed.contains("not enough to judge"), "{listed}");
+}
+
+#[test]
+fn a_recording_that_ends_in_the_air_says_so_everywhere_and_where_it_was_heard_last() {
+    let dir = tempfile::tempdir().expect("directory");
+    filtered("ap_quad_faults.tlog", dir.path(), "cut.tlog", |place, all, _| place < all / 3 * 2);
+    for command in ["check cut.tlog", "info cut.tlog"] {
+        let said = text(&attempt(dir.path(), command));
+        assert!(said.contains("the recording ends in the air: ") && said.contains("m above home"), "{said}");
+        assert!(said.contains("over ground, at ") && said.contains("what became of the vehicle"), "{said}");
+    }
+    let listed = text(&attempt(dir.path(), "ls cut.tlog"));
+    assert!(listed.contains("; ends in the air"), "{listed}");
+    run(dir.path(), "report cut.tlog -o pages/", 0);
+    let table = fs::read_to_string(dir.path().join("pages/index.html")).expect("a table");
+    assert!(table.contains("\"ends_in_air\":true"));
+    let end = json(&attempt(dir.path(), "check --json cut.tlog"))["ends_in_air"].clone();
+    assert!(end["latitude_deg"].as_f64().is_some_and(|north| north.abs() > 1.0), "{end}");
+}
+
+/// What the box found has the worst value of the flight, and not that of the moment in which it found it.
+#[test]
+fn a_card_tells_the_worst_value_of_what_the_box_found() {
+    let dir = tempfile::tempdir().expect("directory");
+    faults(dir.path());
+    run(dir.path(), "sim --input faults.tlog --sd card.img", 0);
+    let rise = |log: &str| {
+        let checked = json(&attempt(dir.path(), &format!("check --json {log}")));
+        let problems = checked["problems"].as_array().expect("an array").clone();
+        let rise =
+            problems.iter().find(|problem| problem["check"] == "vibration_rise").expect("found").clone();
+        rise["value"].as_f64().expect("a number")
+    };
+    let (tlog, card) = (rise("faults.tlog"), rise("card.img"));
+    assert!((tlog - card).abs() < 0.1 * tlog, "{tlog} {card}");
 }

@@ -58,7 +58,7 @@ fn texts_are_told_by_what_they_mean() {
         (4, "Crash check disabled", None),
         (4, "Terrain: clamping offset -22 to -15", None),
         (2, "HUMS: battery 1 low: 6.8 %, LAND NOW", None),
-        (2, "SRC=1/191:HUMS: motor 3 lost, current: 2 %, LAND NOW", None),
+        (2, "SRC=1/191:HUMS: motor 3 lost: 2 % of normal amps, LAND NOW", None),
         (2, "GCS:battery low", None),
         (2, "Flux capacitor drained", warn(Cause::Other)),
         (2, "script error", warn(Cause::Other)),

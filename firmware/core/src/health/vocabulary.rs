@@ -37,7 +37,8 @@ pub struct Said {
     pub name: &'static str,
     /// What there may be several of, as the autopilot counts them from 1; empty where there is one.
     pub part: &'static str,
-    /// What is wrong, in a few words; `#` stands for the number of the part.
+    /// What is wrong, in a few words; `#` stands for the number of the part. Behind a bar stands how the value is told, with `~` for the value and
+    /// its unit.
     pub alarm: &'static str,
     /// What a pilot does at once where it is critical; empty where it never is.
     pub advice: &'static str,
@@ -46,7 +47,8 @@ pub struct Said {
 impl Said {
     /// What is wrong with one part, which is counted from 0: `battery 2 (payload) low`.
     pub fn alarm_of(&self, instance: u8, feeds: Feeds) -> impl fmt::Display {
-        let (before, after) = self.alarm.split_once('#').unwrap_or((self.alarm, ""));
+        let (alarm, _) = self.alarm.split_once('|').unwrap_or((self.alarm, ""));
+        let (before, after) = alarm.split_once('#').unwrap_or((alarm, ""));
         let number = Number { instance, feeds };
         let several = !self.part.is_empty();
         fmt::from_fn(
@@ -54,6 +56,15 @@ impl Said {
                 if several { write!(f, "{before}{number}{after}") } else { f.write_str(before) }
             },
         )
+    }
+
+    /// What stands before and after the value where that is told. A number that has no unit tells a pilot nothing: `None`, where the words do not
+    /// say what it counts.
+    pub fn around_value(&self, unit: &str) -> Option<(&'static str, &'static str)> {
+        match self.alarm.split_once('|') {
+            Some((_, value)) => value.split_once('~'),
+            None => (!unit.is_empty()).then_some(("", "")),
+        }
     }
 
     /// The name of one part, which is counted from 0: `battery 2 cell voltage`.
@@ -142,9 +153,9 @@ vocabulary! {
     "The cells of the battery differed in voltage."; "Balance the pack; replace it if it happens again.";
     "cell_dev_lasting" Vehicle "battery cell balance, lasting", "battery", says "battery # cells uneven", "LAND", needs "voltages of single cells";
     "The cells of the battery differed in voltage for more than a minute."; "Replace the pack.";
-    "batt_resistance" Stored "battery resistance", "battery", says "battery # worn", "REPLACE IT", needs "resistance of earlier flights to compare with";
+    "batt_resistance" Stored "battery resistance", "battery", says "battery # worn|+~", "REPLACE IT", needs "resistance of earlier flights to compare with";
     "The battery's internal resistance has risen since it was new."; "Replace the pack soon.";
-    "batt_capacity" Stored "battery capacity", "battery", says "battery # holds less", "REPLACE IT", needs "charge and cell voltage of earlier flights to compare with";
+    "batt_capacity" Stored "battery capacity", "battery", says "battery # holds less|-~", "REPLACE IT", needs "charge and cell voltage of earlier flights to compare with";
     "The battery gave less charge for the voltage that it lost than in earlier flights."; "Replace the pack soon.";
     "batt_fault" Vehicle "battery fault", "battery", says "battery # fault", "", needs "battery status";
     "The battery reported a fault of its own."; "Do not use the battery until its fault is known.";
@@ -157,10 +168,10 @@ vocabulary! {
     "Check the power module and its wiring; take loads off the 5 V supply.";
     "rail_5v_high" Vehicle "5 V supply, high", "", says "5 V supply high", "", needs "voltage of the 5 V supply";
     "The autopilot's 5 V supply was too high: it can be damaged."; "Check the power module before the next flight.";
-    "battery_due" Stored "battery life", "", says "battery life used", "REPLACE IT", needs "battery registered with the monitor on board";
+    "battery_due" Stored "battery life", "", says "a battery's life used|~", "REPLACE IT", needs "battery registered with the monitor on board";
     "A battery has reached the end of its life."; "Replace it, and tell the monitor.";
 
-    "battery_alert" Said "autopilot's alert: battery", "", says "autopilot warns: battery", "LAND", needs "texts, events or health flags of the autopilot";
+    "battery_alert" Said "autopilot's battery alert", "", says "autopilot warns: battery", "LAND", needs "texts, events or health flags of the autopilot";
     "The autopilot said that a battery or a supply was low or had failed.";
     "Read its messages of that time; check pack, power module and wiring.";
 
@@ -172,13 +183,13 @@ vocabulary! {
     "The ESC of this motor reported a failure."; "Do not fly until the ESC and the motor are checked.";
     "esc_errors" Vehicle "ESC errors", "ESC", says "ESC # errors", "", needs "error counts of ESCs";
     "The ESC of this motor counted many errors."; "Check its signal and telemetry wiring.";
-    "motor_loss" Vehicle "motor current", "motor", says "motor # lost, current", "LAND NOW", needs "current of single motors";
+    "motor_loss" Vehicle "motor current", "motor", says "motor # lost|~ of normal amps", "LAND NOW", needs "current of single motors";
     "The motor took almost no current while the others worked: it or its propeller was lost.";
     "Do not fly until motor, propeller and ESC are checked.";
     "motor_imbalance" Vehicle "motor balance", "motor", says "motor # speed differs", "LAND", needs "speeds of single motors in steady flight";
     "The motor's speed differed from the others' in steady flight.";
     "Check this arm: propeller, motor, its tilt, and the centre of gravity.";
-    "motor_output" Vehicle "motor output", "motor", says "motor # weak, output", "LAND NOW", needs "motor outputs of 4, 6 or 8 motors, on the ground and in flight";
+    "motor_output" Vehicle "motor output", "motor", says "motor # weak|output +~", "LAND NOW", needs "motor outputs of 4, 6 or 8 motors, on the ground and in flight";
     "The motor was driven far harder than the others: it or its propeller gives less thrust.";
     "Do not fly until its propeller, motor and ESC are checked.";
     "thrust_lost" Vehicle "climb with full throttle", "", says "full throttle, no climb", "", needs "throttle and climb";
@@ -190,18 +201,18 @@ vocabulary! {
     "pitch_rate" Vehicle "pitch rate against what is wanted", "", says "pitch does not follow", "LAND NOW", needs "body rates that the autopilot wants";
     "The vehicle did not pitch as the autopilot wanted: a motor, propeller, servo or surface failed.";
     "Do not fly until motors, propellers, servos and control surfaces are checked.";
-    "motor_trend" Stored "motor balance trend", "motor", says "motor # not as before", "CHECK IT", needs "speeds or outputs of single motors in earlier flights to compare with";
+    "motor_trend" Stored "motor balance trend", "motor", says "motor # not as before|~ off", "CHECK IT", needs "speeds or outputs of single motors in earlier flights to compare with";
     "The motor's speed or output has changed against the others since earlier flights."; "Check its propeller and bearings, and what is loaded on one side.";
-    "throttle_trend" Stored "hover throttle trend", "", says "more throttle to hover", "CHECK MOTORS", needs "throttle of earlier flights to compare with";
+    "throttle_trend" Stored "hover throttle trend", "", says "hover throttle up|+~", "CHECK MOTORS", needs "throttle of earlier flights to compare with";
     "Hovering took more throttle than in earlier flights, and not as more weight does."; "Check propellers and motors; and the weight, where power is not measured.";
-    "power_trend" Stored "hover power trend", "", says "more power to hover", "CHECK MOTORS", needs "power of earlier flights to compare with";
+    "power_trend" Stored "hover power trend", "", says "hover power up|+~", "CHECK MOTORS", needs "power of earlier flights to compare with";
     "Hovering took more power than in earlier flights."; "Check propellers, motors, bearings and weight.";
-    "weight_trend" Stored "weight trend", "", says "heavier than usual", "", needs "throttle and power of earlier flights to compare with";
+    "weight_trend" Stored "weight trend", "", says "heavier than usual|+~", "", needs "throttle and power of earlier flights to compare with";
     "Hovering took as much more throttle and power as a heavier vehicle takes."; "Check the load. Without more load: check propellers and motors.";
     "drive_due" Stored "life of motors, propellers, ESCs", "", says "motor/prop/ESC life used", "REPLACE IT", needs "motor, propeller or ESC registered with the monitor on board";
     "A motor, propeller or ESC has reached the end of its life."; "Replace it, and tell the monitor.";
 
-    "drive_alert" Said "autopilot's alert: motors", "", says "autopilot warns: motor", "LAND NOW", needs "texts, events or health flags of the autopilot";
+    "drive_alert" Said "autopilot's motor alert", "", says "autopilot warns: motor", "LAND NOW", needs "texts, events or health flags of the autopilot";
     "The autopilot said that a motor, propeller or ESC had failed or gave too little thrust.";
     "Do not fly until motors, propellers and ESCs are checked.";
 
@@ -215,63 +226,63 @@ vocabulary! {
     "The engine is due for maintenance."; "Do the maintenance, and tell the monitor.";
 
     "vibration" ArduPilot "vibration", "", says "vibration high", "LAND", needs "vibration levels";
-    "Vibration was strong enough to disturb the estimator.";
+    "Vibration was strong enough to disturb the autopilot's estimator (EKF).";
     "Balance propellers and motors, and check the autopilot's mounting.";
     "vibration_px4" Px4 "vibration", "", says "vibration high", "LAND", needs "vibration metrics";
-    "Vibration was strong enough to disturb the estimator.";
+    "Vibration was strong enough to disturb the autopilot's estimator (EKF).";
     "Balance propellers and motors, and check the autopilot's mounting.";
-    "vibration_rise" Vehicle "vibration within the flight", "", says "vibration rose", "", needs "vibration levels of what flies on rotors";
+    "vibration_rise" Vehicle "vibration rise", "", says "vibration up|~ usual", "", needs "vibration levels of what flies on rotors";
     "Vibration rose to a multiple of what it was before in the same flight.";
     "Check propellers, motor bearings and mounting before the next flight.";
     "clipping" Vehicle "accelerometer clipping", "", says "accelerometer clipping", "LAND", needs "clipping counts";
-    "The accelerometers were at the end of their range: the estimator flew partly blind.";
+    "The accelerometers were at the end of their range: the EKF flew partly blind.";
     "Find the source of vibration or shock, and check the mounting.";
     "load_factor" Vehicle "load factor", "", says "load factor high", "EASE OFF", needs "acceleration";
     "The airframe carried a high load: a hard manoeuvre, a shock or a landing.";
     "Inspect the airframe and the landing gear.";
-    "vibration_trend" Stored "vibration trend", "", says "vibration changed", "CHECK PROPS", needs "vibration of earlier flights to compare with";
+    "vibration_trend" Stored "vibration trend", "", says "vibration changed|by ~", "CHECK PROPS", needs "vibration of earlier flights to compare with";
     "Vibration has changed against earlier flights; a cut propeller can lower it.";
     "Check propellers, bearings and mounting.";
     "airframe_due" Stored "airframe life", "", says "airframe life used", "SERVICE IT", needs "airframe registered with the monitor on board";
     "The airframe or a part of it is due for maintenance."; "Do the maintenance, and tell the monitor.";
 
-    "vibration_alert" Said "autopilot's alert: vibration", "", says "autopilot warns: vibration", "LAND", needs "texts, events or health flags of the autopilot";
+    "vibration_alert" Said "autopilot's vibration alert", "", says "autopilot warns: vibration", "LAND", needs "texts, events or health flags of the autopilot";
     "The autopilot said that vibration or clipping disturbed it.";
     "Balance propellers and motors, and check the autopilot's mounting.";
 
-    "ekf_variance" ArduPilot "estimator variance", "", says "EKF doubts a sensor", "", needs "variances of the estimator that it flies by";
-    "The estimator did not trust one of its sensors."; "Look at compass, GNSS and vibration at that time.";
-    "ekf_failsafe" ArduPilot "estimator, two sensors", "", says "EKF failing", "LAND, MANUAL", needs "variances of the estimator that it flies by, of no plane";
-    "The estimator did not trust two of compass, velocity and position: it could lose its position.";
-    "Do not fly until compass and GNSS are checked.";
-    "ekf_compass" ArduPilot "estimator variance of the compass", "", says "EKF doubts compass", "", needs "compass variance of the estimator that it flies by";
-    "The estimator did not trust the compass."; "Check the compass, its calibration and currents or magnets near it.";
-    "ekf_test_ratio" Px4 "estimator test ratio", "", says "EKF rejects a sensor", "LAND", needs "estimator test ratios";
-    "The estimator rejected, or nearly rejected, a sensor."; "Look at compass, GNSS and vibration at that time.";
-    "ekf_mag_ratio" Px4 "estimator test ratio of the compass", "", says "EKF rejects compass", "LAND", needs "estimator test ratios";
-    "The estimator rejected, or nearly rejected, the compass.";
+    "ekf_variance" ArduPilot "EKF variance", "", says "EKF doubts position or speed", "", needs "variances of the EKF that it flies by";
+    "The EKF did not trust what it was told of position, height or speed."; "Look at compass, GPS and vibration at that time.";
+    "ekf_failsafe" ArduPilot "EKF variance of two sensors", "", says "EKF failing", "LAND, MANUAL", needs "variances of the EKF that it flies by, of no plane";
+    "The EKF did not trust two of compass, velocity and position: it could lose its position.";
+    "Do not fly until compass and GPS are checked.";
+    "ekf_compass" ArduPilot "EKF variance of the compass", "", says "EKF doubts compass", "", needs "compass variance of the EKF that it flies by";
+    "The EKF did not trust the compass."; "Check the compass, its calibration and currents or magnets near it.";
+    "ekf_test_ratio" Px4 "EKF test ratio", "", says "EKF rejects position or speed", "LAND", needs "EKF test ratios";
+    "The EKF rejected, or nearly rejected, what it was told of position, height or speed."; "Look at compass, GPS and vibration at that time.";
+    "ekf_mag_ratio" Px4 "EKF test ratio of the compass", "", says "EKF rejects compass", "LAND", needs "EKF test ratios";
+    "The EKF rejected, or nearly rejected, the compass.";
     "Check the compass, its calibration and currents or magnets near it.";
-    "compass_unused" Px4 "compass in use", "", says "EKF dropped compass", "", needs "estimator test ratio of the compass";
-    "The estimator stopped using the compass."; "Check the compass, its calibration and currents or magnets near it.";
-    "accel_mismatch" Vehicle "accelerometer agreement", "accelerometer", says "accelerometer # disagrees", "", needs "second accelerometer on rotors";
-    "Two accelerometers came apart in flight: one of them is wrong.";
+    "compass_unused" Px4 "compass in use", "", says "EKF dropped compass", "", needs "EKF test ratio of the compass";
+    "The EKF stopped using the compass."; "Check the compass, its calibration and currents or magnets near it.";
+    "accel_mismatch" Vehicle "accelerometer agreement", "accelerometer", says "accelerometer # and others differ", "", needs "second accelerometer on rotors";
+    "Two accelerometers came apart in flight. Which one is wrong is known only where there are three.";
     "Do not fly until the autopilot's accelerometers are checked.";
-    "gyro_mismatch" Vehicle "gyro agreement", "gyro", says "gyro # disagrees", "", needs "second gyro in flight";
-    "Two gyros came apart in flight: one of them is wrong."; "Do not fly until the autopilot's gyros are checked.";
-    "compass_mismatch" Vehicle "compass agreement", "compass", says "compass # disagrees", "", needs "second compass";
-    "Two compasses came apart in flight: one of them is wrong, or a current or magnet is near it.";
+    "gyro_mismatch" Vehicle "gyro agreement", "gyro", says "gyro # and others differ", "", needs "second gyro in flight";
+    "Two gyros came apart in flight. Which one is wrong is known only where there are three."; "Do not fly until the autopilot's gyros are checked.";
+    "compass_mismatch" Vehicle "compass agreement", "compass", says "compass # and others differ", "", needs "second compass";
+    "Compasses came apart in flight: one is wrong, of two either, or a current or magnet is near it.";
     "Check the compasses, their wiring, and currents or magnets near them.";
     "compass_heading" Vehicle "compass heading", "", says "compass heading off", "", needs "compass of RAW_IMU and attitude in flight";
-    "The first compass's heading came apart from the estimator's in flight."; "Check the compass, its calibration and currents or magnets near it.";
-    "baro_mismatch" Vehicle "barometer agreement", "barometer", says "barometer # disagrees", "", needs "second barometer";
-    "Two barometers came apart in flight: one of them is wrong."; "Check the barometers, their cover and the airflow at them.";
+    "The first compass's heading came apart from the EKF's in flight."; "Check the compass, its calibration and currents or magnets near it.";
+    "baro_mismatch" Vehicle "barometer agreement", "barometer", says "barometer # and others differ", "", needs "second barometer";
+    "Two barometers came apart in flight. Which one is wrong is known only where there are three."; "Check the barometers, their cover and the airflow at them.";
     "baro_height" Vehicle "barometer against GPS height", "", says "barometer off GPS height", "", needs "air pressure and GPS height";
     "The heights of barometer and GPS came apart in flight: one of them is wrong.";
     "Check the barometer, its cover and the airflow at it, and the GPS antenna's view.";
     "baro_noise" Vehicle "barometer noise", "", says "barometer noisy", "", needs "air pressure and climb rate";
     "The barometer became noisy in flight."; "Check the barometer, its cover and the airflow at it.";
-    "ekf_climb" Vehicle "estimator's climb", "", says "EKF climb off baro", "LAND, MANUAL", needs "air pressure and climb rate on rotors";
-    "The estimator's climb was not that of the barometer: height control may run away.";
+    "ekf_climb" Vehicle "EKF climb", "", says "EKF climb off baro", "LAND, MANUAL", needs "air pressure and climb rate on rotors";
+    "The EKF's climb was not that of the barometer: height control may run away.";
     "Do not fly until vibration, accelerometers, the barometer and its cover are checked.";
     "accel_stuck" Vehicle "accelerometer activity", "accelerometer", says "accelerometer # frozen", "", needs "acceleration in flight";
     "The accelerometer repeated one value: it has failed."; "Do not fly until the autopilot's accelerometers are checked.";
@@ -283,14 +294,14 @@ vocabulary! {
     "The barometer repeated one value: it has failed, or its port is closed."; "Check the barometer and its port.";
     "gps_stuck" Vehicle "GPS activity", "GPS", says "GPS # frozen", "", needs "GPS position in flight";
     "The receiver repeated one position: it has failed."; "Check the receiver, its wiring and its firmware.";
-    "gps_satellites" Vehicle "GPS satellites", "GPS", says "GPS # few satellites", "", needs "GPS satellite count";
+    "gps_satellites" Vehicle "GPS satellites", "GPS", says "GPS # few satellites|~", "", needs "GPS satellite count";
     "Few satellites were in use: the position was not exact."; "Wait for more satellites; check the antenna's view.";
     "gps_speed" Vehicle "GPS speed against its positions", "GPS", says "GPS # speed wrong", "", needs "GPS speed and position in flight";
     "The receiver's speed and course were not those of its positions: one of both is wrong."; "Check the antenna's view, sources of interference and the receiver's firmware.";
     "gps_height" Vehicle "GPS height against climb", "", says "GPS height wrong", "", needs "GPS height, air pressure and climb in flight";
     "The receiver's height moved as neither the barometer nor the climb did: it is wrong."; "Check the antenna's view, sources of interference and the receiver's firmware.";
-    "gps_hdop" Vehicle "GPS dilution of precision", "GPS", says "GPS # poor geometry", "", needs "GPS dilution of precision";
-    "The satellites stood badly: the position was not exact."; "Wait for more satellites; check the antenna's view.";
+    "gps_hdop" Vehicle "GPS HDOP", "GPS", says "GPS # poor geometry|HDOP ~", "", needs "GPS HDOP";
+    "The satellites stood badly (HDOP): the position was not exact."; "Wait for more satellites; check the antenna's view.";
     "gps_accuracy" Vehicle "GPS accuracy", "GPS", says "GPS # inaccurate", "", needs "GPS accuracy";
     "The receiver estimated its own position as not exact."; "Check the antenna's view and sources of interference.";
     "gps_fix" Vehicle "GPS fix", "GPS", says "GPS # position lost", "FLY MANUALLY", needs "GPS fix";
@@ -300,39 +311,39 @@ vocabulary! {
     "gps_spoofing" Vehicle "GPS spoofing", "GPS", says "GPS # spoofed", "FLY MANUALLY", needs "jamming or spoofing state of a GPS receiver";
     "The receiver detected false signals: its position could be wrong."; "Do not depend on GPS there.";
 
-    "gyro_alert" Said "autopilot's alert: gyro", "", says "autopilot warns: gyro", "LAND", needs "texts, events or health flags of the autopilot";
+    "gyro_alert" Said "autopilot's gyro alert", "", says "autopilot warns: gyro", "LAND", needs "texts, events or health flags of the autopilot";
     "The autopilot said that a gyro had failed or could not be trusted."; "Do not fly until the autopilot's gyros are checked.";
-    "accel_alert" Said "autopilot's alert: accelerometer", "", says "autopilot warns: accelerometer", "LAND", needs "texts, events or health flags of the autopilot";
+    "accel_alert" Said "autopilot's accelerometer alert", "", says "autopilot warns: accelerometer", "LAND", needs "texts, events or health flags of the autopilot";
     "The autopilot said that an accelerometer had failed or could not be trusted.";
     "Do not fly until the autopilot's accelerometers are checked.";
-    "compass_alert" Said "autopilot's alert: compass", "", says "autopilot warns: compass", "LAND", needs "texts, events or health flags of the autopilot";
+    "compass_alert" Said "autopilot's compass alert", "", says "autopilot warns: compass", "LAND", needs "texts, events or health flags of the autopilot";
     "The autopilot said that a compass had failed or could not be trusted.";
     "Check the compass, its wiring, its calibration and currents or magnets near it.";
-    "baro_alert" Said "autopilot's alert: barometer", "", says "autopilot warns: barometer", "LAND", needs "texts, events or health flags of the autopilot";
+    "baro_alert" Said "autopilot's barometer alert", "", says "autopilot warns: barometer", "LAND", needs "texts, events or health flags of the autopilot";
     "The autopilot said that a barometer had failed or could not be trusted.";
     "Check the barometer, its cover and the airflow at it.";
-    "airspeed_alert" Said "autopilot's alert: airspeed", "", says "autopilot warns: airspeed", "LAND", needs "texts, events or health flags of the autopilot";
+    "airspeed_alert" Said "autopilot's airspeed alert", "", says "autopilot warns: airspeed", "LAND", needs "texts, events or health flags of the autopilot";
     "The autopilot said that an airspeed sensor had failed or could not be trusted.";
     "Check the pitot tube for water and dirt, its hoses and its calibration.";
-    "gnss_alert" Said "autopilot's alert: GPS", "", says "autopilot warns: GPS", "FLY MANUALLY", needs "texts, events or health flags of the autopilot";
+    "gnss_alert" Said "autopilot's GPS alert", "", says "autopilot warns: GPS", "FLY MANUALLY", needs "texts, events or health flags of the autopilot";
     "The autopilot said that GPS was lost or not to be trusted: a glitch, jamming or spoofing.";
     "Check the antenna's view, wiring and sources of interference.";
-    "ranging_alert" Said "autopilot's alert: rangefinder", "", says "autopilot warns: rangefinder", "LAND", needs "texts, events or health flags of the autopilot";
+    "ranging_alert" Said "autopilot's rangefinder alert", "", says "autopilot warns: rangefinder", "LAND", needs "texts, events or health flags of the autopilot";
     "The autopilot said that a rangefinder, optical flow, vision or proximity sensor had failed.";
     "Check that sensor and its wiring.";
-    "terrain_alert" Said "autopilot's alert: terrain data", "", says "autopilot warns: terrain", "CLIMB", needs "texts, events or health flags of the autopilot";
+    "terrain_alert" Said "autopilot's terrain data alert", "", says "autopilot warns: terrain", "CLIMB", needs "texts, events or health flags of the autopilot";
     "The autopilot said that it lacked the heights of the ground, or could hit it.";
     "Load terrain data before the flight; check the mission's heights.";
-    "ekf_alert" Said "autopilot's alert: estimator", "", says "autopilot warns: EKF", "LAND, MANUAL", needs "texts, events or health flags of the autopilot";
-    "The autopilot said that its estimator doubted or had lost attitude, velocity, position or height.";
+    "ekf_alert" Said "autopilot's EKF alert", "", says "autopilot warns: EKF", "LAND, MANUAL", needs "texts, events or health flags of the autopilot";
+    "The autopilot said that its EKF doubted or had lost attitude, velocity, position or height.";
     "Look at compass, GPS, barometer and vibration at that time.";
 
     "heartbeat" Wire "autopilot's heartbeat", "", says "autopilot silent", "LAND", needs "monitor on the autopilot's wire";
     "The autopilot fell silent."; "Check the wire between autopilot and monitor, and the autopilot's supply.";
     "frames_lost" Wire "frames lost on the wire", "", says "autopilot's data lost", "CHECK WIRE", needs "monitor on the autopilot's wire";
     "Messages of the autopilot were lost on the way."; "Check the wire, and lower the message rates or raise the baud rate.";
-    "position_silent" Wire "position messages", "", says "no position heard", "", needs "position of the estimator in flight";
-    "The autopilot stopped telling its position: it has none, or its link is set otherwise."; "Check the receiver and the estimator; check the rates of the autopilot's messages.";
+    "position_silent" Wire "position messages", "", says "no position heard", "", needs "position of the EKF in flight";
+    "The autopilot stopped telling its position: it has none, or its link is set otherwise."; "Check the receiver and the EKF; check the rates of the autopilot's messages.";
     "rc_rssi" Vehicle "remote control signal", "", says "RC signal weak", "FLY BACK", needs "signal strength of the remote control";
     "The remote control's signal was weak."; "Check antennas and range.";
     "radio_rssi" Vehicle "telemetry signal", "", says "telemetry signal weak", "", needs "telemetry radio status";
@@ -340,29 +351,29 @@ vocabulary! {
     "radio_margin" Vehicle "telemetry signal above noise", "", says "telemetry signal near noise", "", needs "telemetry radio status";
     "The telemetry radio's signal was hardly above the noise."; "Check antennas, range and sources of interference.";
 
-    "rc_alert" Said "autopilot's alert: remote control", "", says "autopilot warns: RC lost", "FLY BACK", needs "texts, events or health flags of the autopilot";
+    "rc_alert" Said "autopilot's remote control alert", "", says "autopilot: remote control lost", "FLY BACK", needs "texts, events or health flags of the autopilot";
     "The autopilot said that the remote control was lost."; "Check transmitter, receiver, antennas and range.";
-    "gcs_alert" Said "autopilot's alert: ground station", "", says "autopilot warns: GCS lost", "FLY BACK", needs "texts, events or health flags of the autopilot";
+    "gcs_alert" Said "autopilot's ground station alert", "", says "autopilot: ground station lost", "FLY BACK", needs "texts, events or health flags of the autopilot";
     "The autopilot said that the ground station or a companion was lost."; "Check the telemetry link and its range.";
 
-    "load" Vehicle "processor load", "", says "autopilot CPU full", "LAND", needs "processor load";
+    "load" Vehicle "processor load", "", says "autopilot processor full", "LAND", needs "processor load";
     "The autopilot's processor was nearly full."; "Switch off what is not needed; lower logging and stream rates.";
-    "mcu_temperature" Vehicle "processor temperature", "", says "autopilot hot", "LAND", needs "processor temperature";
+    "mcu_temperature" Vehicle "processor temperature", "", says "autopilot processor hot", "LAND", needs "processor temperature";
     "The autopilot's processor was too hot."; "Check cooling and placement.";
     "autopilot_reboot" Vehicle "autopilot restart", "", says "autopilot restarted", "LAND NOW", needs "heartbeat";
     "The autopilot restarted."; "In flight: do not fly until the supply and the firmware are checked.";
-    "autopilot_state" Vehicle "autopilot failsafe", "", says "autopilot in failsafe", "TAKE OVER", needs "state of the autopilot";
-    "The autopilot declared a failsafe or an emergency."; "Read its messages of that time; mend the cause they name.";
-    "processor_alert" Said "autopilot's alert: processor", "", says "autopilot warns: processor", "LAND", needs "texts, events or health flags of the autopilot";
+    "autopilot_state" Vehicle "autopilot failsafe", "", says "autopilot in failsafe", "WATCH IT", needs "state of the autopilot";
+    "The autopilot declared a failsafe or an emergency: it returns, lands or stops by itself."; "Read its messages of that time; mend the cause they name.";
+    "processor_alert" Said "autopilot's processor alert", "", says "autopilot warns: processor", "LAND", needs "texts, events or health flags of the autopilot";
     "The autopilot said that its processor or firmware had a problem.";
     "Keep its log and tell the firmware's makers; lower logging and stream rates.";
-    "logging_alert" Said "autopilot's alert: its log", "", says "autopilot does not log", "CHECK CARD", needs "texts, events or health flags of the autopilot";
+    "logging_alert" Said "autopilot's log alert", "", says "autopilot does not log", "CHECK CARD", needs "texts, events or health flags of the autopilot";
     "The autopilot said that it could not write its own log."; "Check the autopilot's card.";
-    "fence_alert" Said "autopilot's alert: geofence", "", says "geofence breached", "FLY BACK", needs "texts, events or health flags of the autopilot";
+    "fence_alert" Said "autopilot's geofence alert", "", says "geofence breached", "FLY BACK", needs "texts, events or health flags of the autopilot";
     "The autopilot said that the geofence was breached."; "Check the fence and the flight at that time.";
-    "failsafe_alert" Said "autopilot's alert: failsafe", "", says "autopilot's failsafe acts", "TAKE OVER", needs "texts, events or health flags of the autopilot";
-    "The autopilot said that a failsafe acted."; "Read its messages of that time; mend the cause they name.";
-    "autopilot_alert" Said "autopilot's alert", "", says "autopilot: severe message", "READ IT", needs "texts, events or health flags of the autopilot";
+    "failsafe_alert" Said "autopilot's failsafe alert", "", says "autopilot's failsafe acts", "WATCH IT", needs "texts, events or health flags of the autopilot";
+    "The autopilot said that a failsafe acted: it returns, lands or stops by itself."; "Read its messages of that time; mend the cause they name.";
+    "autopilot_alert" Said "autopilot's other alert", "", says "autopilot: severe message", "READ IT", needs "texts, events or health flags of the autopilot";
     "The autopilot gave a severe message that no table here knows."; "Read its messages of that time.";
 
     "roll" Vehicle "roll angle", "", says "banks too far", "LEVEL OUT", needs "attitude of a vehicle on rotors";
@@ -370,16 +381,16 @@ vocabulary! {
     "pitch" Vehicle "pitch angle", "", says "pitches too far", "LEVEL OUT", needs "attitude of a vehicle on rotors";
     "The vehicle pitched further than it should."; "Look at the flight at that time: wind, a manoeuvre, or lost control.";
 
-    "attitude_alert" Said "autopilot's alert: attitude", "", says "autopilot warns: attitude", "TAKE OVER", needs "texts, events or health flags of the autopilot";
+    "attitude_alert" Said "autopilot's attitude alert", "", says "autopilot warns: attitude", "TAKE OVER", needs "texts, events or health flags of the autopilot";
     "The autopilot said that it had lost control of attitude or height.";
     "Do not fly until motors, propellers and sensors are checked.";
 
     "recording" Recorder "recording", "", says "not recording", "CHECK CARD", needs "monitor's own recorder";
     "The monitor did not record."; "Check its card.";
-    "record_queue" Recorder "recorder's queue", "", says "card slow", "CHANGE CARD", needs "monitor's own recorder";
+    "record_queue" Recorder "recorder's queue", "", says "card slow|buffer ~ full", "CHANGE CARD", needs "monitor's own recorder";
     "The card was too slow for a while."; "Take a faster card.";
-    "record_lost" Recorder "frames lost by the recorder", "", says "log frames lost", "", needs "monitor's own recorder";
-    "The recorder lost frames."; "Take a faster card.";
+    "record_lost" Recorder "frames lost by the recorder", "", says "frames not recorded|~", "", needs "monitor's own recorder";
+    "The recorder lost frames: they are not in the log."; "Take a faster card.";
     "card_stall" Recorder "card stall", "", says "card stalls", "CHANGE CARD", needs "monitor's own recorder";
     "The card kept the recorder waiting."; "Take a faster card.";
     "card_errors" Recorder "card errors", "", says "card refuses writes", "", needs "monitor's own recorder";
@@ -392,19 +403,19 @@ vocabulary! {
     "free_fall" Vehicle "free fall", "", says "falling", "KEEP CLEAR", needs "acceleration of a vehicle on rotors";
     "Nothing carried the vehicle though its throttle asked for thrust.";
     "Inspect the vehicle; look for lost power, ESCs or propellers in the seconds before.";
-    "impact" Vehicle "impact", "", says "impact", "DISARM", needs "acceleration";
+    "impact" Vehicle "impact", "", says "impact", "DISARM IF DOWN", needs "acceleration";
     "The vehicle hit the ground or something else."; "Do not fly until the whole vehicle is inspected.";
     "tumbling" Vehicle "tumbling", "", says "tumbling", "KEEP CLEAR", needs "body rates";
     "The vehicle turned over and over: it was out of control.";
     "Do not fly until motors, propellers and sensors are checked.";
     "disarmed_in_air" Vehicle "disarmed in the air", "", says "disarmed in the air", "KEEP CLEAR", needs "arming";
     "The vehicle was disarmed in the air, and fell."; "Look for who or what disarmed it; inspect the vehicle.";
-    "sinking" Vehicle "sinking", "", says "sinking fast", "ADD THRUST", needs "climb rate of a vehicle on rotors";
-    "The vehicle sank fast without being told to."; "Look for lost thrust, an empty battery or a wrong height.";
-    "overturned" Vehicle "overturned", "", says "overturned", "DISARM", needs "attitude of a vehicle on rotors";
+    "sinking" Vehicle "sinking", "", says "sinking fast", "FLY FORWARD, CLIMB", needs "climb rate of a vehicle on rotors";
+    "The vehicle sank fast without being told to."; "Look for lost thrust, vortex ring state, an empty battery or a wrong height.";
+    "overturned" Vehicle "overturned", "", says "overturned", "DISARM IF DOWN", needs "attitude of a vehicle on rotors";
     "The vehicle turned over, or lay over, while its motors ran.";
     "Inspect the vehicle; check motor order, propellers and calibration.";
-    "crash_alert" Said "autopilot's alert: crash", "", says "autopilot reports a crash", "DISARM", needs "texts, events or health flags of the autopilot";
+    "crash_alert" Said "autopilot's crash alert", "", says "autopilot reports a crash", "DISARM IF DOWN", needs "texts, events or health flags of the autopilot";
     "The autopilot said that it crashed, released its parachute or ended the flight.";
     "Do not fly until the whole vehicle is inspected.";
 }

@@ -104,6 +104,36 @@ fn a_finding_is_told_in_the_words_of_a_pilot_and_fits() {
     assert_eq!(told(Finding { check: "of_later", ..motor }), "HUMS: of_later");
 }
 
+/// What more or less of something is, no number without a unit, and what a pilot does who may still fly.
+#[test]
+fn a_value_says_what_it_is_of_or_is_not_told() {
+    let told = |check, value, level| {
+        let check = health::check_named(check).expect("a check");
+        text(&Finding { check: check.name, unit: check.unit, value, ..finding(level) }).as_str().to_owned()
+    };
+    let (warning, critical) = (Level::Warning, Level::Critical);
+    for (check, value, level, text) in [
+        ("batt_capacity", 25.0, critical, "battery 1 holds less: -25 %, REPLACE IT"),
+        ("batt_resistance", 160.0, critical, "battery 1 worn: +160 %, REPLACE IT"),
+        ("motor_loss", 4.2, critical, "motor 1 lost: 4.2 % of normal amps, LAND NOW"),
+        ("motor_output", 12.3, critical, "motor 1 weak: output +12.3 %, LAND NOW"),
+        ("throttle_trend", 25.0, critical, "hover throttle up: +25 %, CHECK MOTORS"),
+        ("vibration_rise", 10.2, warning, "vibration up: 10.2 x usual"),
+        ("gps_satellites", 5.0, warning, "GPS 1 few satellites: 5"),
+        ("gps_hdop", 2.8, warning, "GPS 1 poor geometry: HDOP 2.8"),
+        ("rc_rssi", 45.0, critical, "RC signal weak, FLY BACK"),
+        ("ekf_variance", 0.85, warning, "EKF doubts position or speed"),
+        ("clipping", 12.0, critical, "accelerometer clipping, LAND"),
+        ("compass_mismatch", 40.0, warning, "compass 1 and others differ: 40 %"),
+        ("impact", 5.0, critical, "impact: 5 g, DISARM IF DOWN"),
+        ("sinking", 12.3, critical, "sinking fast: 12.3 m/s, FLY FORWARD, CLIMB"),
+        ("autopilot_state", 5.0, critical, "autopilot in failsafe, WATCH IT"),
+    ] {
+        assert_eq!(told(check, value, level), format!("HUMS: {text}"));
+    }
+    assert!(health::checks().all(|check| !check.is_flag || check.unit.is_empty()), "a state is no quantity");
+}
+
 #[test]
 fn no_text_is_cut_whatever_part_and_level() {
     for check in health::checks() {
@@ -122,14 +152,18 @@ fn no_text_is_cut_whatever_part_and_level() {
             };
             let told = text(&finding);
             let told = told.as_str();
-            let quantity = quantity(finding.value, check.unit);
-            let has_value = !check.is_flag && feeds != Feeds::Avionics;
+            let around = health::said(check.name).and_then(|said| said.around_value(check.unit));
+            let value =
+                around.filter(|_| feeds != Feeds::Avionics).map_or_else(String::new, |(before, after)| {
+                    format!(": {before}{}{after}", quantity(finding.value, check.unit).as_str())
+                });
             let end = match level {
                 Level::Critical => advice,
-                Level::Warning if has_value => quantity.as_str(),
+                Level::Warning => &value,
                 _ => "",
             };
             assert!(told.len() <= TEXT_BYTES_MAX && told.ends_with(end), "{told}");
+            assert!(!told.contains(['|', '~', '#']), "{told}");
             let whole = health::said(check.name).map(|said| said.name_of(finding.instance).to_string());
             let is_good = matches!(level, Level::Ok | Level::Stale);
             assert!(!is_good || told.ends_with(&whole.unwrap()), "{told}");
@@ -309,7 +343,7 @@ fn warnings_wait_for_their_events_end_and_three_are_told_in_half_a_minute() {
     let told = told(&warnings.map(|check| comes(0, check, 0, WARNING)));
     let expected = [
         (10, "GPS 1 poor geometry"),
-        (10, "vibration rose"),
+        (10, "vibration up"),
         (10, "ESC 1 errors"),
         // When the first ones are half a minute ago.
         (310, "GPS 1 few satellites"),
@@ -322,7 +356,7 @@ fn warnings_wait_for_their_events_end_and_three_are_told_in_half_a_minute() {
 #[test]
 fn what_is_not_critical_waits_for_the_end_of_what_is() {
     let told = told(&[comes(0, "gps_fix", 0, CRITICAL), comes(5, "vibration_rise", 0, WARNING)]);
-    assert_eq!(texts(&told), [(0, "GPS 1 position lost, FLY MANUALLY"), (100, "vibration rose")]);
+    assert_eq!(texts(&told), [(0, "GPS 1 position lost, FLY MANUALLY"), (100, "vibration up")]);
 }
 
 #[test]
@@ -340,18 +374,18 @@ fn a_mishap_is_told_once_and_what_waits_is_its_consequence() {
     let led_to = [
         (10, "EKF dropped compass"),
         (15, "roll does not follow, LAND NOW"),
-        (20, "sinking fast, ADD THRUST"),
+        (20, "sinking fast, FLY FORWARD, CLIMB"),
     ];
     assert_eq!(texts(&told(&mishap)), led_to, "one kind, where something led to it");
     let alone = &mishap[3..7];
-    let expected = [(20, "sinking fast, ADD THRUST"), (25, "impact, DISARM")];
+    let expected = [(20, "sinking fast, FLY FORWARD, CLIMB"), (25, "impact, DISARM IF DOWN")];
     assert_eq!(texts(&told(alone)), expected, "and one that asks for something else");
     let again = [
         comes(0, "sinking", 0, CRITICAL),
         comes(300, "sinking", 0, (Level::Ok, Level::Critical)),
         comes(400, "sinking", 0, CRITICAL),
     ];
-    let expected = [(0, "sinking fast, ADD THRUST"), (400, "sinking fast, ADD THRUST")];
+    let expected = [(0, "sinking fast, FLY FORWARD, CLIMB"), (400, "sinking fast, FLY FORWARD, CLIMB")];
     assert_eq!(texts(&told(&again)), expected, "and the next one as the first");
 }
 
@@ -393,7 +427,7 @@ fn that_there_are_no_data_is_told_while_nothing_is_wrong() {
         comes(250, "gps_accuracy", 0, stale),
         comes(260, "batt_remaining", 0, stale),
     ]);
-    let expected = [(0, "no data: GPS 1 dilution of precision"), (200, "GPS 1 position lost, FLY MANUALLY")];
+    let expected = [(0, "no data: GPS 1 HDOP"), (200, "GPS 1 position lost, FLY MANUALLY")];
     assert_eq!(texts(&told), expected);
 }
 
@@ -412,10 +446,12 @@ fn quantities_are_printed_as_the_formatting_of_numbers_does() {
             [("V", 2, " V"), ("degC", 0, " C"), ("%", usize::from(value.abs() < 100.0), " %"), ("", 0, "")]
         {
             let digits = if unit.is_empty() { usize::from(value.abs() < 100.0) } else { digits };
-            assert_eq!(quantity(value, unit).as_str(), format!(": {value:.digits$}{shown}"), "{value:e}");
+            let number = format!("{value:.digits$}");
+            let number = if digits == 1 { number.trim_end_matches(".0") } else { &number };
+            assert_eq!(quantity(value, unit).as_str(), format!("{number}{shown}"), "{value:e}");
         }
     }
-    assert_eq!(quantity(f32::MAX, "V").as_str(), ": 1099511627776.00 V", "no quantity");
+    assert_eq!(quantity(f32::MAX, "V").as_str(), "1099511627776.00 V", "no quantity");
 }
 
 #[test]

@@ -570,7 +570,7 @@ fn a_finding_names_the_text_or_the_event_that_raised_it_whatever_the_words_of_it
     let text = |source| Item::Text(Text { source, severity: 6, words: "it hums no more", alert });
     let event = |words| Item::Event(Event { source: AUTOPILOT, number: 4711, severity: 7, words, alert });
     for (item, named) in [
-        (text(AUTOPILOT), Some("it hums no more")),
+        (text(AUTOPILOT), Some("\"it hums no more\"")),
         (event("a name"), Some("a name")),
         (event(""), Some("event 4711")),
         (text(stranger), None),
@@ -611,7 +611,7 @@ fn what_the_board_found_is_named_too() {
     let judged = judge.end();
     assert_eq!(
         (judged.by, judged.problems[0].details.clone()),
-        (JudgedBy::Board, vec!["Battery 1 is low".to_owned()])
+        (JudgedBy::Board, vec!["\"Battery 1 is low\"".to_owned()])
     );
 }
 

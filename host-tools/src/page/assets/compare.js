@@ -99,6 +99,9 @@ const lowest = (plot) => (number) => {
   const values = [...flight.plots.keys()].filter((id) => id.startsWith(`${plot}-`)).map((id) => low(id)(number));
   return values.some((value) => value != null) ? Math.min(...values.filter((value) => value != null)) : null;
 };
+// Two autopilots measure these on different scales.
+const autopilots = new Set(flights.map(({ vehicle }) => vehicle?.split(" ")[0]));
+const unit = (plot) => [...flight.plots.values()].find(({ id }) => id.startsWith(`${plot}-`) || id === plot)?.unit ?? "";
 const FIGURES = [
   ["Greatest height", "m", 1, (number) => flights[number].height_max_m],
   ["Farthest from take-off", "m", 0, (number) => extents[number]?.far],
@@ -110,10 +113,10 @@ const FIGURES = [
   ["Hottest battery", "\u00b0C", 1, highest("PackCelsius")],
   ["Fastest motor", "rpm", 0, highest("MotorRpm")],
   ["Hottest ESC", "\u00b0C", 1, highest("MotorCelsius")],
-  ["Highest vibration", "", 2, highest("Vibration")],
-  ["Estimator, worst figure", "", 2, highest("Estimator")],
-  ["Fewest satellites, receiver 1", "", 0, low("Satellites-0")],
-  ["Highest load of the autopilot", "%", 0, high("Load-0")],
+  ["Highest vibration", unit("Vibration"), 2, highest("Vibration")],
+  ["EKF, worst figure", unit("Estimator"), 2, highest("Estimator")],
+  ["Fewest satellites, GPS 1", "", 0, low("Satellites-0")],
+  ["Highest processor load", "%", 0, high("Load-0")],
 ];
 const ended = ({ landed, disarmed_in_air: disarmed }) => (landed ? "landed" : disarmed ? "disarmed in the air" : "landing not seen");
 const count = ({ findings }, level) => findings.filter(([, known]) => known === level).length;
@@ -133,11 +136,13 @@ const FACTS = [
   ],
 ];
 const columns = (first) => [[first], ...flights.map((f, i) => [el("span", { class: "column" }, mark(i), title(f)), "n"])];
-const figures = FIGURES.map(([name, unit, decimals, of]) => [name, flights.map((_, i) => of(i)), unit, decimals]).filter(([, values]) =>
-  values.some((value) => value != null && Number.isFinite(value)),
+const figures = FIGURES.map(([name, unit, decimals, of]) => [name, flights.map((_, i) => of(i)), unit, decimals]).filter(
+  ([name, values]) =>
+    values.some((value) => value != null && Number.isFinite(value)) && (autopilots.size === 1 || !/vibration|EKF/.test(name)),
 );
 const table = section("figures", "Figures");
 table.append(
+  el("p", { class: "dim" }, "From take-off to the flight's end; the page of a recording tells those of all of it."),
   el(
     "div",
     { class: "panel scroll" },

@@ -46,10 +46,10 @@ export const condition = () => {
     figure("ekf_vertical", "Vertical"),
     figure("ekf_compass", "Compass"),
   ]);
-  const estimator = panel("estimator", "Estimator (EKF)", figures.node);
+  const estimator = panel("estimator", "EKF (estimator)", figures.node);
   const gnss = facts(
     "gnss",
-    "GNSS",
+    "GPS",
     [
       ["fix", "Fix", "", 0, (fix) => FIXES[fix] ?? String(fix)],
       ["satellites", "Satellites", "", 0],
@@ -75,10 +75,10 @@ export const condition = () => {
     "Battery and computer",
     [
       ["battery_amperes", "Current", "A", 2],
-      ["battery_consumed", "Consumed", "Ah", 3],
-      ["battery_celsius", "Battery", "\u00b0C", 1],
-      ["rail_5v", "5 V rail", "V", 2],
-      ["load", "Autopilot load", "%", 0],
+      ["battery_consumed", "Charge taken", "Ah", 3],
+      ["battery_celsius", "Battery temperature", "\u00b0C", 1],
+      ["rail_5v", "5 V supply", "V", 2],
+      ["load", "Processor load", "%", 0],
     ],
     ["battery_amperes", "load"],
   );

@@ -13,6 +13,7 @@ flight.end = Math.max(log.end_s ?? 0, flight.start + 1);
 // One whose length is not known is a place; one that is nowhere is told in the table alone.
 flight.gaps = log.gaps.map(({ from_s: from, to_s: to }) => [from ?? to, to ?? from]).filter(([from]) => from != null);
 flight.flights = data.flights;
+flight.endsInAir = Boolean(data.ends_in_air);
 
 const vehicle = log.vehicle;
 export const name = vehicle ? `${vehicle.autopilot}${vehicle.firmware ? ` ${vehicle.firmware}` : ""} ${vehicle.type}` : "Vehicle unknown";

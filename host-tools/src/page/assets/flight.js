@@ -64,6 +64,7 @@ export const flight = {
   tellsDefaults: false,
   gaps: [],
   flights: [],
+  endsInAir: false,
   // Takes a part; returns the notes that are new since the page looks.
   take(part) {
     const anew = part.reset || part.vehicle !== flight.vehicle;

@@ -8,10 +8,15 @@ import { clock } from "./text.js";
 
 export const general = () => {
   const time = stat("flight_time", "Flight time", { format: clock });
-  const percent = gauge("battery_percent", "Battery", { unit: "%", high: 100 });
+  const percent = gauge("battery_percent", "Battery remaining", { unit: "%", high: 100 });
   const volts = stat("battery_volts", "Battery voltage", { unit: "V", line: "PackVolts" });
   const pressure = gauge("pressure", "Air pressure", { unit: "hPa", low: 500, high: 1100 });
-  const celsius = stat("temperature", "Barometer", { unit: "\u00b0C", decimals: 1, line: "Temperature", numbers: [0, 3] });
+  const celsius = stat("temperature", "Temperature at the barometer", {
+    unit: "\u00b0C",
+    decimals: 1,
+    line: "Temperature",
+    numbers: [0, 3],
+  });
   return {
     node: el(
       "section",

@@ -43,15 +43,15 @@ const USAGE = [
   ["flight_time_s", "In the air", span, ""],
   ["flights", "Flights", whole, ""],
   ["armed_time_s", "Armed", span, ""],
-  ["distance_m", "Distance", whole, "m"],
+  ["distance_m", "Distance over ground", whole, "m"],
   ["height_max_m", "Greatest height", (v) => fixed(v, 1), "m"],
-  ["speed_max_m_s", "Greatest speed", (v) => fixed(v, 1), "m/s"],
+  ["speed_max_m_s", "Greatest ground speed", (v) => fixed(v, 1), "m/s"],
   ["charge_ah", "Charge taken", (v) => fixed(v, 2), "Ah"],
   ["energy_wh", "Energy taken", (v) => fixed(v, 1), "Wh"],
-  ["voltage_min_v", "Lowest voltage", (v) => fixed(v, 2), "V"],
+  ["voltage_min_v", "Lowest battery voltage", (v) => fixed(v, 2), "V"],
   ["current_max_a", "Highest current", (v) => fixed(v, 1), "A"],
   ["hard_landings", "Hard landings", whole, ""],
-  ["load_factor_max_g", "Load factor", (v) => fixed(v, 2), "g"],
+  ["load_factor_max_g", "Greatest load factor", (v) => fixed(v, 2), "g"],
 ];
 
 export const usage = () => {
@@ -128,7 +128,7 @@ export const link = () => {
     ["link:loss", "Lost, last 10 s"],
     ["link:missing", "Missing in all"],
     ["link:heard", "Autopilot heard"],
-    ["link:reboots", "Autopilot reboots"],
+    ["link:reboots", "Restarts of the autopilot"],
   ]);
   const recorder = badge(),
     told = el("span", { class: "reason" });
@@ -147,9 +147,12 @@ export const link = () => {
     node: box.node,
     update(state, head) {
       const { link: figures, companion } = state;
-      if (!companion) {
+      if (!companion && head.source.log_end) {
+        recorder.set("ok", "recorded this");
+        say(told, head.source.log_end);
+      } else if (!companion) {
         recorder.set("stale", "not heard");
-        say(told, "no HUMS speaks on this link");
+        say(told, head.source.recording ? "no HUMS is heard in this recording" : "no HUMS speaks on this link");
       } else if (companion.gone) {
         recorder.set("stale", "gone");
         say(told, `last heard ${age(companion.heard_ms)} ago`);

@@ -13,33 +13,33 @@ document
 bar.parentElement.hidden = true;
 
 const when = (utc) => (utc == null ? "time not known" : `${utc.slice(0, 10)} ${utc.slice(11, 19)}`);
-const RANK = { critical: 3, warning: 2, "not checked": 1, ok: 0 };
-const worst = ({ critical, warning, checked }) => (critical ? "critical" : warning ? "warning" : checked ? "ok" : "not checked");
-const verdict = (page) =>
+const RANK = { critical: 3, warning: 2, stale: 1, ok: 0 };
+const worst = ({ critical, warning, checked, little }) =>
+  critical ? "critical" : warning ? "warning" : checked && !little ? "ok" : "stale";
+const found = (page) =>
   ["critical", "warning"]
     .filter((level) => page[level])
     .map((level) => counted(page[level], level))
-    .join(", ") || (page.checked ? "no findings" : "not checked");
+    .join(", ") || (!page.checked ? "not checked" : page.little ? "not enough to judge" : "no findings");
+const verdict = (page) => `${found(page)}${page.ends_in_air ? "; ends in the air" : ""}`;
+// Sessions of two cards may have one name: the file's names the box too.
+const called = ({ name, file }) => (pages.filter((page) => page.name === name).length > 1 ? file.replace(/\.html$/, "") : name);
+const brief = (name) => (name.length > 48 ? `\u2026${name.slice(-47)}` : name);
 // Title, kind of cell, what it is sorted by, what stands there.
 const COLUMNS = [
   ["Begin, UTC", "t", ({ start_utc }) => start_utc ?? "", ({ start_utc }) => when(start_utc)],
-  [
-    "Recording",
-    "words",
-    ({ name }) => name,
-    ({ name, file }) => el("a", { href: encodeURIComponent(file) }, name.length > 48 ? `\u2026${name.slice(-47)}` : name),
-  ],
+  ["Recording", "words", called, (page) => el("a", { href: encodeURIComponent(page.file) }, brief(called(page)))],
   [
     "Findings",
     "t",
     (page) => RANK[worst(page)] * 1e6 + page.critical * 1e3 + page.warning,
-    (page) => el("span", { class: `badge ${worst(page) === "not checked" ? "stale" : worst(page)}` }, verdict(page)),
+    (page) => el("span", { class: `badge ${worst(page)}` }, verdict(page)),
   ],
   ["Vehicle", "words", ({ vehicle }) => vehicle ?? "", ({ vehicle }) => vehicle ?? "not known"],
   ["Airframe", "words", ({ airframe }) => airframe ?? "", ({ airframe }) => airframe ?? ""],
   ["Length", "n", ({ duration_s }) => duration_s ?? -1, ({ duration_s }) => span(duration_s)],
-  ["Flights", "n", ({ flights }) => flights, ({ flights }) => String(flights)],
-  ["In the air", "n", ({ air_s }) => air_s, ({ air_s }) => span(air_s)],
+  ["Flights", "n", ({ flights }) => flights, (page) => (page.flight_unknown ? "not known" : String(page.flights))],
+  ["In the air", "n", ({ air_s }) => air_s, (page) => (page.flight_unknown ? "" : span(page.air_s))],
   [
     "Height",
     "n",

@@ -102,7 +102,10 @@ main.append(body, el("aside", {}, sides[0].node, log.node, sides[2].node, sides[
 section("time", "Timeline", body).append(strip.node);
 const last = section("parameters", "Parameters", body);
 last.append(told.node);
-const others = plots((group) => section(group.toLowerCase(), group, body, last), ["MotorAmperes", "MotorVolts", "Height", "Velocity"]);
+const others = plots(
+  (group, next) => section(group.toLowerCase(), group, body, next ?? last),
+  ["MotorAmperes", "MotorVolts", "Height", "Velocity"],
+);
 
 const loud = () => {
   speaker.toggle();
@@ -157,9 +160,17 @@ const SOURCES = {
 
 const NO_ANSWER = "hums does not answer, or wants the token that stands in the address that it printed.";
 
+// What a recording does not have is not good news.
+const endsInAir = () => head.source.phase === "ended" && state?.airborne;
+
 const drawHead = () => {
   const { source } = head;
-  const said = source.phase === "reading" ? `reading ${whole(source.progress * 100)} %` : source.phase;
+  const said =
+    source.phase === "reading"
+      ? `reading ${whole(source.progress * 100)} %`
+      : source.phase === "live" && time.held
+        ? "paused"
+        : source.phase;
   picture.set(connected ? (SOURCES[source.phase] ?? "stale") : "critical", connected ? said : "no connection");
   const utc = head.utc_ms == null ? "" : ` \u00b7 ${new Date(head.utc_ms).toISOString().slice(0, 19).replace("T", " ")} UTC`;
   say(facts, `${source.name}${utc}`);
@@ -190,14 +201,16 @@ const drawHead = () => {
         : source.words
           ? source.words
           : source.phase === "waiting"
-            ? `Waiting for the first frame on ${source.name}.`
+            ? `Waiting for the first frame on ${source.name}. If none comes: is the vehicle's telemetry sent there, and does the firewall let it in?`
             : !state
               ? "Frames come, but no autopilot's heartbeat yet."
               : silent
                 ? `The autopilot has been silent for ${age(state.heard_ms)}: values are its last ones.`
-                : time.held
-                  ? "Paused: instruments and plots show an earlier moment. Level, findings and link are of now."
-                  : "";
+                : endsInAir()
+                  ? `The recording ends in the air: what became of the vehicle is not in it.${source.log_end ? ` The log: ${source.log_end}.` : ""}`
+                  : time.held
+                    ? "Paused: instruments and plots show an earlier moment. Level, findings and link are of now."
+                    : "";
   notice.hidden = !text;
   say(notice, text);
   // What was last heard of the vehicle is not known to be so any longer.
@@ -205,13 +218,15 @@ const drawHead = () => {
     overall.set("stale", "not known");
     document.title = "NO CONNECTION \u00b7 HUMS live";
   }
+  for (const chip of [armed, phase]) toggle(chip, "stale", !connected || Boolean(silent));
   toggle(root, "cut", !connected || Boolean(silent) || source.phase === "lost");
 };
 
 const drawState = () => {
   say(name, `${state.name}${state.firmware ? ` ${state.firmware}` : ""}`);
   if (connected) document.title = `${state.overall === "ok" ? "" : `${state.overall.toUpperCase()} \u00b7 `}${state.name} \u00b7 HUMS live`;
-  if (connected) overall.set(state.overall);
+  if (connected && endsInAir()) overall.set("stale", "ends in the air");
+  else if (connected) overall.set(state.overall, state.overall_said ?? (state.overall === "stale" ? "not known" : state.overall));
   if (!begun) {
     begun = true;
     flight.zero = flight.start = head.source.recording ? head.source.start_s : flight.begin;

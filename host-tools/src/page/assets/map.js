@@ -28,6 +28,8 @@ const shade = (part) => {
 const bounds = (row) =>
   row.reduce(([low, high], v) => (v == null ? [low, high] : [Math.min(low, v), Math.max(high, v)]), [Infinity, -Infinity]);
 
+// As a search engine and a map take it.
+const degrees = ([, north, east]) => `${north.toFixed(7)}, ${east.toFixed(7)}`;
 // Places as metres east and north of one.
 const around = ([, lat0, lon0]) => {
   const shrink = Math.cos((lat0 * Math.PI) / 180);
@@ -60,8 +62,7 @@ export const map = ({ id = "map", whose = flight, frame = null, name = "Track ov
       { track } = whose;
     const ctx = canvas(surface, width, height);
     if (!track.length) return;
-    const [, lat0, lon0] = track[0],
-      metres = around(track[0]);
+    const metres = around(track[0]);
     const points = track.map(metres);
     if (here) points.push(metres([0, ...here.place]));
     const [[west, east], [south, north]] = edges(points),
@@ -138,6 +139,12 @@ export const map = ({ id = "map", whose = flight, frame = null, name = "Track ov
         label(near(f.to_s), `landing${number}`, false);
       }
     });
+    // Where whoever looks for it begins.
+    if (whose.endsInAir) {
+      const last = points[track.length - 1];
+      spot(last, colour("critical"), 7);
+      label(last, "last heard, in the air", false);
+    }
     if (view.cursor != null) spot(near(view.cursor), colour("accent"), 7);
     if (here) {
       const [e, n] = points[points.length - 1];
@@ -176,7 +183,14 @@ export const map = ({ id = "map", whose = flight, frame = null, name = "Track ov
     legend.replaceChildren(
       el("span", {}, "from the start", el("b", {}, `${fixed(Math.hypot(...away), 0)} m`)),
       Number.isFinite(low) ? el("span", {}, `height ${fixed(low, 0)} to ${fixed(high, 0)} m, from blue to yellow`) : "",
-      el("span", {}, `begins at ${fixed(lat0, 7)}\u00b0, ${fixed(lon0, 7)}\u00b0`),
+      el("span", {}, `begins at ${degrees(track[0])}`),
+      el(
+        "span",
+        {},
+        whose.endsInAir
+          ? el("b", {}, `ends in the air at ${degrees(track[track.length - 1])}`)
+          : `ends at ${degrees(track[track.length - 1])}`,
+      ),
       el("span", { class: "dim" }, "north is up"),
     );
   };

@@ -45,7 +45,7 @@ const acceleration = () => {
   const part = (id, title) => ({ id, title, size: 20, both: true, unit: "m/s\u00b2" });
   const three = bars([part("accel_front", "Front"), part("accel_right", "Right"), part("accel_down", "Down")]);
   const module = el("b", { "data-value": "accel_module" });
-  const sum = el("p", { class: "pair" }, el("span", {}, "Module ", module, " m/s\u00b2"));
+  const sum = el("p", { class: "pair" }, el("span", {}, "Total ", module, " m/s\u00b2"));
   const box = panel("acceleration", "Acceleration", [three.node, sum], { class: "instrument" });
   return {
     node: box.node,
@@ -62,7 +62,7 @@ export const movement = () => {
   const speeds = [
     ["airspeed", gauge("airspeed", "Air speed", { unit: "m/s", scale, decimals: 1 })],
     ["groundspeed", gauge("groundspeed", "Ground speed", { unit: "m/s", scale, decimals: 1 })],
-    ["velocity_module", gauge("velocity_module", "Velocity module", { unit: "m/s", scale, decimals: 1 })],
+    ["velocity_module", gauge("velocity_module", "Speed, all directions", { unit: "m/s", scale, decimals: 1 })],
     ["climb", gauge("climb", "Climb rate", { unit: "m/s", low: -10, high: 10, decimals: 1 })],
     ["throttle", gauge("throttle", "Throttle", { unit: "%", high: 100 })],
   ];

@@ -4,7 +4,7 @@ import { badge } from "./badge.js";
 import { panel, toggle } from "./dom.js";
 import { el } from "./elements.js";
 import { flight } from "./flight.js";
-import { clock, plural, short } from "./text.js";
+import { moment, plural, short } from "./text.js";
 import { utc } from "./view.js";
 
 const quantity = (value, unit) => `${short(value)}${unit === "\u00b0" ? "" : " "}${unit}`.trim();
@@ -65,7 +65,7 @@ export const notes = ({ go, newestFirst, rows = Infinity }) => {
     return el(
       "li",
       { class: `${note.kind} ${note.level}`, tabindex: 0, "data-at": note.at_s, "data-check": found?.check },
-      el("time", { title: utc(note.at_s) && `${utc(note.at_s)} UTC` }, clock(note.at_s - flight.zero)),
+      el("time", { title: utc(note.at_s) && `${utc(note.at_s)} UTC` }, moment(note.at_s - flight.zero)),
       level.node,
       el("span", { class: "words" }, note.words),
       el("small", {}, [from, found && measured(found)].filter(Boolean).join(" \u00b7 ")),

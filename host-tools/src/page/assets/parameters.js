@@ -4,10 +4,10 @@
 import { el } from "./elements.js";
 import { flight } from "./flight.js";
 import { cells, rows } from "./layout.js";
-import { clock, plural, short } from "./text.js";
+import { moment, plural, short } from "./text.js";
 
 const course = (values) =>
-  values.map(([at, value], i) => (i ? `${short(value)} at ${clock(at - flight.zero)}` : short(value))).join(" \u2192 ");
+  values.map(([at, value], i) => (i ? `${short(value)} at ${moment(at - flight.zero)}` : short(value))).join(" \u2192 ");
 const last = ({ values }) => values[values.length - 1][1];
 // A parameter is of single precision on the wire.
 const same = (one, other) => Math.fround(one) === Math.fround(other);
@@ -24,17 +24,20 @@ const table = (parameters) =>
   );
 
 const NO_DEFAULTS =
-  "What is not at its default is not known: this recording does not tell defaults. ArduPilot's own log (.bin) does since 4.3, and PX4's ULog since 1.12.";
+  "This recording does not tell which parameters are at their defaults. ArduPilot's own log (.bin) does since 4.3, and PX4's ULog since 1.12.";
 
-// What is other than in the flight before, where that is known: names with their values then.
+// What the autopilot counts, measures or stores itself is nothing that somebody changed.
+const OWN = /^(STAT_|BARO\d*_GND_PRESS|SYS_NUM_RESETS|COM_FLIGHT_UUID|LND_FLIGHT_T_|_HASH_CHECK)/;
+// What is other than in the flight before at the end of both, where that is known: names with their values then.
 const compared = ({ name, values }) => {
   const before = new Map(values);
-  const other = [...flight.parameters].filter(([key, one]) => before.has(key) && !same(before.get(key), one.values[0][1]));
+  const other = [...flight.parameters].filter(([key, one]) => before.has(key) && !same(before.get(key), last(one)) && !OWN.test(key));
   const gone = values.filter(([key]) => !flight.parameters.has(key)).length;
   const added = [...flight.parameters].filter(([key]) => !before.has(key)).length;
   const rest = [
-    added ? `${plural(added, "parameter is", "parameters are")} told here and not there.` : "",
-    gone ? `${plural(gone, "is", "are")} told there and not here.` : "",
+    added ? `${plural(added, "parameter")} of this recording ${added === 1 ? "is" : "are"} not in that one.` : "",
+    gone ? `${plural(gone, "parameter")} of that one ${gone === 1 ? "is" : "are"} not in this recording.` : "",
+    "What the autopilot itself counts or measures (STAT_, ground pressure) is left out.",
   ];
   return [
     other.length

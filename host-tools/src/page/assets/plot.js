@@ -144,7 +144,7 @@ export const chart = (id, name = null) => {
         height: HEIGHT,
         // Half of the last time stands beyond the edge.
         padding: [8, 18, 0, 0],
-        cursor: { sync: { key: sync.key, setSeries: false }, drag: { x: true, y: false, setScale: false }, points: { size: 6 } },
+        cursor: { y: false, sync: { key: sync.key, setSeries: false }, drag: { x: true, y: false, setScale: false }, points: { size: 6 } },
         legend: { show: false },
         scales: { x: { time: false, auto: false }, y: { range: (_u, low, high) => range(low, high, info()) } },
         axes: [

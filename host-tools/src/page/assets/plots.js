@@ -4,7 +4,7 @@ import { el } from "./elements.js";
 import { flight } from "./flight.js";
 import { chart } from "./plot.js";
 
-// `place` gives a group's section; what is shown elsewhere is left out.
+// `place` gives a group's section, before that of the next group where there is one already; what is shown elsewhere is left out.
 export const plots = (place, elsewhere = []) => {
   const groups = new Map(),
     made = new Map();
@@ -14,8 +14,10 @@ export const plots = (place, elsewhere = []) => {
       for (const { id, group } of flight.plots.values()) {
         if (made.has(id) || elsewhere.includes(id) || !flight.lines(id).length) continue;
         if (!groups.has(group)) {
+          const all = [...new Set([...flight.plots.values()].map((plot) => plot.group))],
+            next = all.slice(all.indexOf(group) + 1).find((later) => groups.has(later));
           groups.set(group, el("div", { class: "plots" }));
-          place(group).append(groups.get(group));
+          place(group, next ? groups.get(next).parentElement : null).append(groups.get(group));
         }
         const one = chart(id),
           order = [...flight.plots.keys()];

@@ -4,7 +4,7 @@ import { data, log } from "./data.js";
 import { el } from "./elements.js";
 import { flight } from "./flight.js";
 import { cells, facts, rows, section } from "./layout.js";
-import { bytes, fixed, plural, whole, words } from "./text.js";
+import { bytes, fixed, moment, plural, whole, words } from "./text.js";
 
 export const recorderSection = () => {
   const recorder = section("recorder", "Recorder");
@@ -32,7 +32,7 @@ export const recorderSection = () => {
           ["Sectors", own ? `${whole(log.sectors)}, ${whole(log.sectors_damaged)} damaged` : null],
           ["Ending", log.end?.words],
           [
-            "Received",
+            data.counted_until_s == null ? "Received" : `Received until ${moment(data.counted_until_s - flight.zero)}`,
             stats && `${whole(stats.frames_in)} frames, ${bytes(stats.bytes_in)}, of which ${bytes(stats.bytes_not_frames)} were no frame`,
           ],
           ["Queue, fullest", part && `${bytes(stats.queue_bytes_max)} of ${bytes(stats.queue_bytes_capacity)} (${part} %)`],
@@ -58,8 +58,8 @@ export const recorderSection = () => {
                   cells(
                     [
                       own ? `gap: ${g.cause}, ${plural(g.sectors_lost + g.sectors_skipped, "sector")}` : `gap: ${g.cause}`,
-                      g.from_s == null ? "the beginning" : `${fixed(g.from_s - flight.zero, 3)} s`,
-                      g.to_s == null ? "the end" : `${fixed(g.to_s - flight.zero, 3)} s`,
+                      g.from_s == null ? "the beginning" : moment(g.from_s - flight.zero),
+                      g.to_s == null ? (own ? "the end" : "") : moment(g.to_s - flight.zero),
                       g.frames_missing == null ? "unknown" : plural(g.frames_missing, "frame"),
                     ],
                     ["", "n", "n", "n"],
@@ -68,12 +68,7 @@ export const recorderSection = () => {
                 ),
                 ...log.losses.map((l) =>
                   cells(
-                    [
-                      `lost: ${words(l.what)}`,
-                      `${fixed(l.from_s - flight.zero, 3)} s`,
-                      `${fixed(l.to_s - flight.zero, 3)} s`,
-                      whole(l.count),
-                    ],
+                    [`lost: ${words(l.what)}`, moment(l.from_s - flight.zero), moment(l.to_s - flight.zero), whole(l.count)],
                     ["", "n", "n", "n"],
                   ),
                 ),

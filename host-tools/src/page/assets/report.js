@@ -12,7 +12,7 @@ import { charts } from "./plot.js";
 import { plots } from "./plots.js";
 import { recorderSection } from "./recorder.js";
 import { summary } from "./summary.js";
-import { counted, fixed, plural, span, whole } from "./text.js";
+import { counted, fixed, moment, plural, span, whole } from "./text.js";
 import { timeline } from "./timeline.js";
 import { trendSection } from "./trend.js";
 import { usageSection } from "./usage.js";
@@ -27,15 +27,21 @@ const findings = flight.notes.filter(({ kind, found }) => kind === "finding" && 
 const worst = findings.reduce((worst, { level }) => (LEVELS.indexOf(level) > LEVELS.indexOf(worst) ? level : worst), "ok");
 const count = (level) => findings.filter((note) => note.level === level).length;
 const unjudged = log.format !== "hums" && !log.vehicle;
+// Nothing found is good news where enough was judged.
+const little = data.little && worst === "ok";
 const verdict =
   log.checked_by === "nobody" || unjudged
     ? "Not checked"
-    : worst === "ok"
-      ? "No findings"
-      : ["critical", "warning", "stale", "advisory"]
-          .filter(count)
-          .map((level) => counted(count(level), level))
-          .join(", ");
+    : little
+      ? `Not enough to judge: ${data.judged[0]} of ${data.judged[1]} checks`
+      : worst === "ok"
+        ? data.judged
+          ? `No findings in ${data.judged[0]} of ${data.judged[1]} checks`
+          : "No findings"
+        : ["critical", "warning", "stale", "advisory"]
+            .filter(count)
+            .map((level) => counted(count(level), level))
+            .join(", ");
 // Of a recording of frames alone it is the first of them.
 const POWER_ON = "the autopilot's power-on";
 const ZEROS = { hums: "the monitor's power-on", dataflash: POWER_ON, ulog: POWER_ON };
@@ -51,7 +57,10 @@ document
       { class: "dim" },
       [`${session}${log.name}`, when, span(log.duration_s), log.format === "hums" ? log.end.words : ""].filter(Boolean).join(" \u00b7 "),
     ),
-    el("p", { class: `verdict ${worst}`, id: "verdict" }, verdict),
+    el("p", { class: `verdict ${little ? "stale" : worst}`, id: "verdict" }, verdict),
+    data.ends_in_air
+      ? el("p", { class: "verdict warning", id: "ends" }, `${moment(data.ends_in_air[0] - flight.zero)}: ${data.ends_in_air[1]}`)
+      : "",
   );
 bar.append(back);
 
@@ -81,10 +90,12 @@ found.append(
         ? "Nothing was judged: no autopilot was heard in this recording."
         : log.checked_by === "nobody"
           ? "Not checked: what recorded this ran no checks."
-          : "Every check stayed within its limits, or had nothing to look at.",
+          : data.judged
+            ? `${data.judged[0]} of ${data.judged[1]} checks had something to judge, and nothing was wrong there; hums check says why the others had not.`
+            : "Nothing was found.",
     unlisted > 0 ? `And ${plural(unlisted, "finding")} more.` : "",
     unsaid > 0 ? `And ${plural(unsaid, "text")} more.` : "",
-    log.checked_by === "hums" ? "Checked when this page was made: what recorded this ran no checks." : "",
+    log.checked_by === "hums" ? "These checks were made with this page: what recorded the flight ran none." : "",
   ]
     .filter(Boolean)
     .map((text) => el("p", { class: "dim" }, text)),

@@ -4,7 +4,7 @@ import { data, log, name } from "./data.js";
 import { el } from "./elements.js";
 import { flight } from "./flight.js";
 import { cells, facts, rows, section } from "./layout.js";
-import { fixed, plural, span, whole } from "./text.js";
+import { fixed, moment, plural, span, whole } from "./text.js";
 import { utc } from "./view.js";
 
 const { usage, vehicle } = log;
@@ -19,12 +19,16 @@ const tiles = () => {
   return el(
     "div",
     { class: "tiles" },
-    tile(span(flown), "", plural(data.flights.length, "flight")),
+    tile(
+      data.flights.length || data.tells_flight ? span(flown) : "\u2013",
+      "",
+      data.tells_flight ? plural(data.flights.length, "flight") : "in the air: not known",
+    ),
     tile(of(usage.distance_m, 0), "m", "over ground in the air"),
     tile(of(usage.height_max_m ?? peak("Height"), 1), "m", "greatest height"),
     tile(of(usage.speed_max_m_s ?? peak("Speed"), 1), "m/s", "greatest ground speed"),
     tile(of(low("PackVolts"), 2), "V", "lowest battery voltage"),
-    tile(of(peak("PackAmperes"), 1), "A", "highest battery current"),
+    tile(of(peak("PackAmperes"), 1), "A", "highest battery current, on the ground too"),
     battery && battery.percent_to != null && data.flights[0].percent_from != null
       ? tile(`${of(data.flights[0].percent_from, 0)} \u2192 ${of(battery.percent_to, 0)}`, "%", "battery in flight")
       : null,
@@ -34,13 +38,17 @@ const tiles = () => {
   );
 };
 
+// To the second: a card and a ground station's log of one flight tell it by two clocks.
+const day = (utc) =>
+  utc ? `\u00b7 ${utc.slice(0, 10)} ${utc.slice(11, 19)} UTC by the ${log.format === "tlog" ? "ground station's" : "vehicle's"} clock` : "";
+
 const identity = () =>
   facts([
     ["Vehicle", name],
     ["System", vehicle && `${vehicle.system}, component ${vehicle.component}`],
     ["Autopilot's id", vehicle?.uid],
-    ["From", log.start_utc ?? `${fixed(flight.start, 3)} s after power-on`],
-    ["To", log.end_utc ?? `${fixed(flight.end, 3)} s after power-on`],
+    ["From", `${moment(flight.start - flight.zero)} ${day(log.start_utc)}`],
+    ["To", `${moment(flight.end - flight.zero)} ${day(log.end_utc)}`],
     [
       "Monitor",
       log.monitor &&
@@ -52,7 +60,7 @@ const identity = () =>
 
 // When it landed, or how the flight ended otherwise.
 const landing = (f) => {
-  const at = utc(f.to_s) || span(f.to_s - flight.zero);
+  const at = utc(f.to_s) || moment(f.to_s - flight.zero);
   if (f.landed) return at;
   if (f.disarmed_in_air) return `disarmed in the air, ${at}`;
   return flight.end - f.to_s < 5 ? "in the air at the end" : `not seen, last in the air ${at}`;
@@ -66,11 +74,11 @@ const flights = (go) =>
           cells(
             [
               i + 1,
-              utc(f.from_s) || span(f.from_s - flight.zero),
+              utc(f.from_s) || moment(f.from_s - flight.zero),
               landing(f),
               span(f.air_s),
-              `${fixed(f.height_max_m, 1)} m`,
-              `${fixed(f.speed_max_m_s, 1)} m/s`,
+              f.height_max_m == null ? "" : `${fixed(f.height_max_m, 1)} m`,
+              f.speed_max_m_s == null ? "" : `${fixed(f.speed_max_m_s, 1)} m/s`,
               f.percent_from != null && f.percent_to != null ? `${fixed(f.percent_from, 0)} \u2192 ${fixed(f.percent_to, 0)} %` : "",
             ],
             ["n", "t", "t", "n", "n", "n", "n"],
@@ -83,7 +91,13 @@ const flights = (go) =>
           ),
         ),
       )
-    : el("p", { class: "dim" }, "The vehicle was not in the air.");
+    : el(
+        "p",
+        { class: "dim" },
+        data.tells_flight
+          ? "The vehicle was not in the air."
+          : "Whether it was in the air is not known: nothing in this recording tells of height, speed or landing.",
+      );
 
 export const summary = (go) => {
   const host = section("summary", "Summary");

@@ -25,6 +25,11 @@ export const clock = (seconds) => {
     sign + (s >= 3600 ? `${Math.floor(s / 3600)}:${two(Math.floor(s / 60) % 60)}:${two(s % 60)}` : `${Math.floor(s / 60)}:${two(s % 60)}`)
   );
 };
+// A time of a recording, to the nearest tenth of a second, as hums check has it: 4:20.8.
+export const moment = (seconds) => {
+  const tenths = Math.round(Math.abs(seconds) * 10);
+  return `${clock(Math.sign(seconds) * Math.floor(tenths / 10))}.${tenths % 10}`;
+};
 export const span = (seconds) => clock(Math.round(seconds));
 export const age = (ms) =>
   ms < 60000 ? `${Math.floor(ms / 1000)} s` : ms < 3600000 ? `${Math.floor(ms / 60000)} min` : `${Math.floor(ms / 3600000)} h`;

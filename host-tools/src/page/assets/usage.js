@@ -3,8 +3,9 @@
 import { colour } from "./colours.js";
 import { data, log } from "./data.js";
 import { el } from "./elements.js";
+import { flight } from "./flight.js";
 import { cells, rows, section } from "./layout.js";
-import { fixed, span, whole, words } from "./text.js";
+import { fixed, moment, span, whole, words } from "./text.js";
 
 const COMPONENT = { green: "ok", yellow: "warning", red: "critical" };
 const meter = (percent, status) => {
@@ -48,10 +49,12 @@ const parts = (wear) => {
 };
 
 const exceeded = (wear) => {
-  const exceeded = log.exceedances.filter((e) => e.session.warnings || e.session.criticals || e.lifetime.warnings || e.lifetime.criticals);
+  const exceeded = log.exceedances.filter((e) => [e.session, e.lifetime].some((of) => of?.warnings || of?.criticals));
   if (!exceeded.length) return;
   const times = (count, seconds) => (count ? `${whole(count)} \u00d7, ${fixed(seconds, 1)} s` : "");
-  const peak = (e, of) => (e[of].peak == null ? "" : `${Number(e[of].peak.toPrecision(4))} ${e.unit}`);
+  const worst = (e, of) => of.state ?? (of.peak == null ? "" : `${Number(of.peak.toPrecision(4))} ${e.unit}`);
+  const lived = exceeded.some(({ lifetime }) => lifetime);
+  const crossings = (e, of) => (of ? [times(of.warnings, of.warning_s), times(of.criticals, of.critical_s), worst(e, of)] : ["", "", ""]);
   wear.append(
     el("h3", { class: "above" }, "Limits exceeded"),
     el(
@@ -62,24 +65,17 @@ const exceeded = (wear) => {
           ["Check"],
           ["Warning", "n"],
           ["Critical", "n"],
-          ["Peak", "n"],
-          ["Warning, in its life", "n"],
-          ["Critical, in its life", "n"],
-          ["Peak, in its life", "n"],
+          ["Worst", "n"],
+          ...(lived
+            ? [
+                ["Warning, in its life", "n"],
+                ["Critical, in its life", "n"],
+                ["Worst, in its life", "n"],
+              ]
+            : []),
         ],
         exceeded.map((e) =>
-          cells(
-            [
-              `${words(e.check)}${e.instance ? ` ${e.instance + 1}` : ""}`,
-              times(e.session.warnings, e.session.warning_s),
-              times(e.session.criticals, e.session.critical_s),
-              peak(e, "session"),
-              times(e.lifetime.warnings, e.lifetime.warning_s),
-              times(e.lifetime.criticals, e.lifetime.critical_s),
-              peak(e, "lifetime"),
-            ],
-            ["", "n", "n", "n", "n", "n", "n"],
-          ),
+          cells([e.name, ...crossings(e, e.session), ...(lived ? crossings(e, e.lifetime) : [])], ["", "n", "n", "n", "n", "n", "n"]),
         ),
       ),
     ),
@@ -128,8 +124,16 @@ const counters = (wear, { plain, motors, ranges }) => {
       return el("div", { class: "panel scroll" }, el("h3", {}, words(title)), el("table", {}, el("tbody", {}, body)));
     })
     .filter(Boolean);
+  const life = data.life_before ? "In its life before" : "In its life";
   wear.append(
     el("h3", { class: "above" }, "Counters"),
+    data.counted_until_s == null
+      ? ""
+      : el(
+          "p",
+          { class: "dim" },
+          `As the box stored them at ${moment(data.counted_until_s - flight.zero)}: the recording goes on after that.`,
+        ),
     el(
       "div",
       { class: "split" },
@@ -137,7 +141,7 @@ const counters = (wear, { plain, motors, ranges }) => {
         "div",
         { class: "panel scroll tall" },
         rows(
-          [["Counter"], ["This session", "n"], ...ever([["In its life", "n"]])],
+          [["Counter"], ["This session", "n"], ...ever([[life, "n"]])],
           plain.map((c) =>
             cells([c.title, shown(c.session, c.unit, c.decimals), ...ever([shown(c.life, c.unit, c.decimals)])], ["", "n", "n"]),
           ),
@@ -155,6 +159,6 @@ export const usageSection = () => {
   exceeded(wear);
   if (data.counters.plain.length) counters(wear, data.counters);
   else {
-    wear.append(el("p", { class: "dim" }, "This log has no usage counters: it was packed from a recording, or it ended before the first."));
+    wear.append(el("p", { class: "dim" }, "This recording has no usage counters."));
   }
 };

@@ -2,7 +2,7 @@
 
 import { el } from "./elements.js";
 import { flight } from "./flight.js";
-import { clock } from "./text.js";
+import { moment } from "./text.js";
 
 // `away` once the user has looked closer: what is looked at stays, also while the flight goes on.
 export const view = { from: 0, to: 1, cursor: null, away: false };
@@ -53,7 +53,7 @@ export const moveCursor = (at) => {
   view.cursor = at;
   cursorTime.hidden = at == null;
   if (at != null) {
-    time.textContent = `${clock(at - flight.zero)}.${Math.floor(Math.abs(at - flight.zero) * 10) % 10}`;
+    time.textContent = moment(at - flight.zero);
     day.textContent = utc(at) ? `${utc(at)} UTC` : "";
   }
   for (const follower of cursorFollowers) follower();
