@@ -137,15 +137,25 @@ fn velocity(line: u8) -> String {
 }
 
 fn attitude(line: u8) -> String {
-    named(&["Roll", "Pitch", "Roll, wanted", "Pitch, wanted"], line)
+    named(
+        &[
+            "Roll",
+            "Pitch",
+            "Roll, wanted",
+            "Pitch, wanted",
+            "Roll, second estimator",
+            "Pitch, second estimator",
+        ],
+        line,
+    )
 }
 
 fn heading(line: u8) -> String {
-    named(&["Heading", "Wanted by attitude control", "Wanted by navigation"], line)
+    named(&["Heading", "Wanted by attitude control", "Wanted by navigation", "Second estimator"], line)
 }
 
 fn rates(line: u8) -> String {
-    named(&["Roll", "Pitch", "Yaw", "Roll, wanted", "Pitch, wanted"], line)
+    named(&["Roll", "Pitch", "Yaw", "Roll, wanted", "Pitch, wanted", "Yaw, wanted"], line)
 }
 
 fn receiver(line: u8) -> String {
@@ -166,7 +176,7 @@ pub fn about(plot: Plot, autopilot: Autopilot) -> About {
             named(&["Height", "Wanted, above the origin"], line)
         }),
         Plot::Altitude => ("Motion", "Altitude above sea level", "m", 1, |line| {
-            named(&["GNSS", "Estimator", "Wanted"], line)
+            named(&["GNSS", "Estimator", "Wanted", "Second estimator"], line)
         }),
         Plot::Speed => ("Motion", "Speed", "m/s", 2, |line| named(&["Ground", "Air", "GNSS"], line)),
         Plot::Vertical => ("Motion", "Climb rate", "m/s", 2, |line| named(&["Climb", "Climb, wanted"], line)),
