@@ -95,8 +95,7 @@ impl Samples {
             Observation::Wanted(wanted) => {
                 push(Plot::Attitude, 2, Some(wanted.roll.0.to_degrees()));
                 push(Plot::Attitude, 3, Some(wanted.pitch.0.to_degrees()));
-                let rates = wanted.rates.map(|rates| rates.about);
-                for (axis, rate) in (3..).zip(rates.into_iter().flatten()) {
+                for (axis, rate) in (3..).zip(wanted.rates.into_iter().flat_map(|rates| rates.about)) {
                     push(Plot::Rates, axis, Some(rate.0.to_degrees()));
                 }
             }
