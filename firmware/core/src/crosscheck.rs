@@ -10,14 +10,19 @@
 //! nothing but zeros is not fitted.
 //!
 //! Each sensor by itself: whether it is stuck ([`crate::stuck`]); the first barometer against the height of GPS ([`crate::heights`]); a
-//! receiver's velocity against the way between its positions ([`crate::travel`]).
+//! receiver's velocity against the way between its positions ([`crate::travel`]), and its satellites against their usual number
+//! ([`crate::geometry`]). The estimator that flies against the second one: [`crate::second`].
 
 use crate::departure::Departure;
 use crate::flight::Flight;
+use crate::geometry::Geometry;
 use crate::heights::{Heights, SCALE_HEIGHT_M};
 use crate::latest::Reading;
 use crate::motion::{climb_mps, ground_speed_mps, throttle};
-use crate::observation::{Air, Estimator, EstimatorScale, Gnss, Imu, VehicleKind, VibrationScale};
+use crate::observation::{
+    Air, Estimator, EstimatorScale, Gnss, Imu, SecondEstimate, VehicleKind, VibrationScale,
+};
+use crate::second::Second;
 use crate::steady::{TURNED, hovers, is_clear};
 use crate::stuck::Stuck;
 use crate::time::{Instant, Span, Stamp};
@@ -183,6 +188,8 @@ pub(crate) struct Crosschecks {
     pairs: [[Departure; SENSORS_MAX]; Kind::ALL.len()],
     receivers: [Stuck; RECEIVERS_MAX],
     travels: [Travel; RECEIVERS_MAX],
+    geometries: [Geometry; RECEIVERS_MAX],
+    second: Second,
     moved: Moved,
     heights: Heights,
     /// When sensors of a kind were compared last, and when that was tried.
@@ -211,6 +218,8 @@ impl Crosschecks {
             pairs: [[Departure::NEW; SENSORS_MAX]; Kind::ALL.len()],
             receivers: [Stuck::NEW; RECEIVERS_MAX],
             travels: [Travel::NEW; RECEIVERS_MAX],
+            geometries: [Geometry::NEW; RECEIVERS_MAX],
+            second: Second::NEW,
             moved: Moved::NONE,
             heights: Heights::new(),
             compared_at: [Stamp::NONE; Kind::ALL.len()],
@@ -306,9 +315,24 @@ impl Crosschecks {
         if let Some(travel) = self.travels.get_mut(usize::from(gnss.instance)) {
             travel.take(gnss, flight.airborne());
         }
+        if let Some(geometry) =
+            self.geometries.get_mut(usize::from(gnss.instance)).filter(|_| flight.airborne())
+        {
+            geometry.take(at, gnss);
+        }
         if gnss.instance == 0 {
             self.heights.take_gnss(at, gnss, vehicle, flight);
         }
+    }
+
+    pub(crate) fn take_second(
+        &mut self,
+        at: Instant,
+        second: &SecondEstimate,
+        vehicle: &Vehicle,
+        flight: &Flight,
+    ) {
+        self.second.take(at, second, vehicle, flight);
     }
 
     /// PX4 tells no ratio of what it does not fuse.
@@ -457,6 +481,16 @@ impl Crosschecks {
     /// How far a receiver's velocity is from that of its positions, m/s.
     pub(crate) fn speed_apart(&self, receiver: u8) -> Option<f32> {
         self.travels.get(usize::from(receiver))?.speed_apart()
+    }
+
+    /// A receiver's satellites and dilution of precision against what is usual.
+    pub(crate) fn geometry(&self, receiver: u8) -> Option<&Geometry> {
+        self.geometries.get(usize::from(receiver))
+    }
+
+    /// The estimator that flies against the second one.
+    pub(crate) const fn second(&self) -> &Second {
+        &self.second
     }
 
     /// The barometer against GPS, and its noise.

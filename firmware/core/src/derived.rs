@@ -170,7 +170,10 @@ impl Derived {
                 self.crosschecks.take_air(at, air, vehicle, flight);
             }
             Observation::Attitude(attitude) => self.response.take_attitude(at, attitude, vehicle, flight),
-            Observation::Wanted(wanted) => self.response.take_wanted(at, wanted.rates),
+            Observation::Wanted(wanted) => self.response.take_wanted(at, wanted.rates, vehicle),
+            Observation::SecondEstimate(second) => {
+                self.crosschecks.take_second(at, second, vehicle, flight);
+            }
             Observation::Hud(hud) => self.response.take_hud(at, hud, vehicle, flight),
             Observation::Estimator(estimator) => self.crosschecks.take_estimator(at, estimator, flight),
             // On the scale that the vehicle knows.
@@ -368,7 +371,7 @@ impl Derived {
         let lowest = slot
             .get()
             .filter(|known| known.cells_reported() > 1)
-            .and_then(|known| known.cells.iter().flatten().map(|cell| cell.0).reduce(f32::min));
+            .and_then(|known| known.cells.iter().flatten().map(|cell| cell.volts().0).reduce(f32::min));
         let share = || {
             let cells = self.cell_count(vehicle, index, params);
             pack_v(vehicle, index).filter(|_| cells > 0).map(|pack_v| pack_v / f32::from(cells))

@@ -35,9 +35,6 @@ const SCALE_PART: f32 = 0.1;
 const LATE_S: f32 = 0.3;
 /// Receivers are some tenths of a second late: faster than this, m/s, the two heights are not of the same moment.
 const CLIMB_MPS: f32 = 2.0;
-/// Less exact positions are not compared: accuracy in metres, dilution of precision.
-const ACCURACY_M: f32 = 3.0;
-const HDOP: f32 = 2.5;
 /// A receiver's height is so old, s: 1 of those of 2013.
 const RECEIVER_LATE_S: f32 = 1.0;
 /// Heights and climb are summed over this time, s, when they vote.
@@ -185,9 +182,7 @@ impl Heights {
     pub(crate) fn take_gnss(&mut self, at: Instant, gnss: &Gnss, vehicle: &Vehicle, flight: &Flight) {
         let before = self.apart_at;
         let height = self.height.filter(|(measured, ..)| at.since(*measured) <= PAUSE);
-        let good = gnss.fix >= 3
-            && gnss.accuracy.is_none_or(|accuracy| accuracy.0 <= ACCURACY_M)
-            && gnss.hdop.is_none_or(|hdop| hdop <= HDOP);
+        let good = gnss.is_exact();
         if let Some(altitude) = gnss.altitude.filter(|_| good && flight.is_settled(at)) {
             self.leaps[1].take(at, altitude.0, climb_mps(at, vehicle));
         }

@@ -4,7 +4,7 @@
 //! extension fields that read as zero); from here on nobody needs to know where a value came from, but for the few
 //! quantities that the two autopilots define differently, which say so ([`VibrationScale`], [`EstimatorScale`]).
 
-use core::num::NonZeroU32;
+use core::num::{NonZeroU16, NonZeroU32};
 
 use crate::cause::{Alert, Causes};
 use crate::units::{
@@ -133,6 +133,16 @@ pub struct Gnss {
     pub measured_ms: Option<NonZeroU32>,
 }
 
+impl Gnss {
+    /// A 3D fix that is exact enough to hold other sensors against: accuracy and dilution within what PX4 flies with (`EKF2_REQ_EPH` 3 m,
+    /// `EKF2_REQ_PDOP` 2.5), as far as they are told.
+    pub(crate) fn is_exact(&self) -> bool {
+        self.fix >= 3
+            && self.accuracy.is_none_or(|accuracy| accuracy.0 <= 3.0)
+            && self.hdop.is_none_or(|hdop| hdop <= 2.5)
+    }
+}
+
 /// Interference that a GNSS receiver reports.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct GnssIntegrity {
@@ -185,6 +195,17 @@ pub struct Attitude {
     pub boot_ms: Option<u32>,
 }
 
+/// What an estimator says that flies beside the one that is used: `ArduPilot`'s DCM where an EKF is used, an EKF where DCM is.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct SecondEstimate {
+    /// Roll, pitch and yaw, as in [`Attitude`].
+    pub attitude: Option<[Radians; 3]>,
+    /// Where it is.
+    pub position: Option<Position>,
+    /// Above mean sea level.
+    pub altitude: Option<Metres>,
+}
+
 /// The attitude that the autopilot wants: what the mission, its own loops or the pilot's sticks ask for.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Wanted {
@@ -192,8 +213,19 @@ pub struct Wanted {
     pub roll: Radians,
     /// Nose up is positive.
     pub pitch: Radians,
-    /// Body rates that it wants, about roll and pitch, where they are told.
-    pub rates: Option<[RadiansPerSecond; 2]>,
+    /// The rates that it wants, where they are told.
+    pub rates: Option<WantedRates>,
+}
+
+/// The rates that the autopilot wants.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct WantedRates {
+    /// About roll, pitch and yaw.
+    pub about: [RadiansPerSecond; 3],
+    /// The attitude that is wanted, as a quaternion from the wanted body to north, east, down, real part first, where the rates may be
+    /// about its axes: those of `ArduPilot`'s `ATTITUDE_TARGET` are (`AC_AttitudeControl::get_attitude_target_ang_vel`), those of PX4's
+    /// (`vehicle_rates_setpoint`) are about the body's.
+    pub of: Option<[f32; 4]>,
 }
 
 impl Wanted {
@@ -295,7 +327,7 @@ pub struct Battery {
     /// Which one.
     pub id: u8,
     /// Voltage of each cell, where the battery measures them.
-    pub cells: [Option<Volts>; CELLS_MAX],
+    pub cells: [Option<CellVoltage>; CELLS_MAX],
     /// Of the whole battery.
     pub voltage: Option<Volts>,
     /// Negative charges.
@@ -317,6 +349,25 @@ pub struct Battery {
     /// What the autopilot calls it: `MAV_BATTERY_CHARGE_STATE` (0 not said, 1 ok, 2 low, 3 critical, 4 emergency, 5 failed,
     /// 6 unhealthy, 7 charging).
     pub charge: u8,
+}
+
+/// The voltage of a cell in whole millivolts, as messages have it: two bytes, of which each battery has [`CELLS_MAX`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct CellVoltage(NonZeroU16);
+
+impl CellVoltage {
+    /// `None` of 0.
+    pub const fn from_millivolts(millivolts: u16) -> Option<Self> {
+        match NonZeroU16::new(millivolts) {
+            Some(millivolts) => Some(Self(millivolts)),
+            None => None,
+        }
+    }
+
+    /// The same in volts.
+    pub fn volts(self) -> Volts {
+        Volts(f32::from(self.0.get()) / 1e3)
+    }
 }
 
 /// What a battery feeds: `MAV_BATTERY_FUNCTION`.
@@ -551,6 +602,8 @@ pub enum Observation {
     ImuAndAir(Imu, Air),
     /// `ATTITUDE`
     Attitude(Attitude),
+    /// `AHRS2`
+    SecondEstimate(SecondEstimate),
     /// `ATTITUDE_TARGET`, `NAV_CONTROLLER_OUTPUT`
     Wanted(Wanted),
     /// `POSITION_TARGET_LOCAL_NED`: the climb that the autopilot wants, up is positive.

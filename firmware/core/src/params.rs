@@ -257,6 +257,11 @@ params! {
     GpsHeightWarn "GPS_HEIGHT_WARN" "m" 6.0 0.5 10_000.0 "a receiver's height moves within four seconds as neither climb nor barometer do; up to 5.3 in healthy real flights";
     PosAgeWarn "POS_AGE_WARN" "s" 3.0 0.5 60.0 "position messages stop in flight, while others come: some come at 1 Hz";
     MagHeadWarn "MAG_HEAD_WARN" "deg" 12.0 1.0 180.0 "the compass's heading apart from the estimator's beyond usual" is "Compass against estimated heading: warning above";
+    GpsSatsFall "GPS_SATS_FALL" "%" 30.0 5.0 100.0 "satellites fewer than usual in the flight; up to 18 in healthy real flights" is "GPS satellites lost of those usual in the flight: warning above";
+    GpsHdopRise "GPS_HDOP_RISE" "" 1.8 1.1 100.0 "dilution of precision times the usual one of the flight; up to 1.3 in healthy real flights" is "GPS dilution of precision times the usual one: warning above";
+    Ahrs2TiltWarn "AHRS2_TILT_WARN" "deg" 30.0 1.0 180.0 "two estimators' attitudes apart; up to 22 in hard manoeuvres of healthy flights";
+    Ahrs2HgtWarn "AHRS2_HGT_WARN" "m" 8.0 0.5 10_000.0 "two estimators' heights apart beyond usual; up to 3.5 in healthy real flights";
+    Ahrs2PosWarn "AHRS2_POS_WARN" "m" 10.0 0.5 10_000.0 "two estimators' positions apart beyond half a second of flight; up to 2.6 with it in healthy real flights";
 }
 
 impl Param {

@@ -2,13 +2,15 @@
 //!
 //! Control makes the body's rates those that it wants, within a fraction of a second. Where a motor, a propeller, a servo or a surface
 //! does not do as it is told, they stay apart. The difference is smoothed with its sign, so that delay and noise cancel, and less a
-//! part of the rates that were wanted: who is told to turn fast may be late by much.
+//! part of the rates that were wanted: who is told to turn fast may be late by much. Rates that are told about the axes of the wanted
+//! attitude are turned to the body's first: what is yawed fast lags that attitude by a quarter of a turn.
 
 use crate::flight::Flight;
 use crate::latest::{Latest, Reading};
 use crate::modes::has_pilots_throttle;
 use crate::motion::climb_mps;
-use crate::observation::{Attitude, Hud, VehicleKind};
+use crate::observation::{Attitude, Hud, VehicleKind, WantedRates};
+use crate::rotation;
 use crate::time::{Instant, Span};
 use crate::units::RadiansPerSecond;
 use crate::vehicle::Vehicle;
@@ -57,10 +59,16 @@ impl Response {
         }
     }
 
-    pub(crate) fn take_wanted(&mut self, at: Instant, rates: Option<[RadiansPerSecond; AXES]>) {
-        if let Some(rates) = rates {
-            self.wanted.set(at, rates);
-        }
+    pub(crate) fn take_wanted(&mut self, at: Instant, rates: Option<WantedRates>, vehicle: &Vehicle) {
+        let Some(WantedRates { about, of }) = rates else { return };
+        let [roll, pitch, _] = match of.filter(|_| vehicle.is_ardupilot()) {
+            Some(of) => {
+                let Some(attitude) = vehicle.attitude.within(at, FRESH) else { return };
+                rotation::from_axes_of(of, about.map(|rate| rate.0), attitude).map(RadiansPerSecond)
+            }
+            None => about,
+        };
+        self.wanted.set(at, [roll, pitch]);
     }
 
     pub(crate) fn take_attitude(

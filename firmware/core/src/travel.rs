@@ -19,9 +19,6 @@ const MEMORY_S: f32 = 4.0;
 const PAUSE_MS: u32 = 2_000;
 /// One of the two may be older by so much, s.
 const LATE_S: f32 = 0.3;
-/// Less exact positions are not compared: accuracy in metres, dilution of precision.
-const ACCURACY_M: f32 = 3.0;
-const HDOP: f32 = 2.5;
 /// Positions are compared in units of 1e-7 degrees of latitude, in metres.
 const UNIT_M: f32 = 0.011_132;
 /// Nothing jumps further, m: garbage, or the date line.
@@ -108,11 +105,8 @@ fn length([north, east]: [f32; 2]) -> f32 {
 
 /// What is said of where it is and how it moves, where that is exact.
 fn fix(gnss: &Gnss) -> Option<Fix> {
-    let good = gnss.fix >= 3
-        && gnss.accuracy.is_none_or(|accuracy| accuracy.0 <= ACCURACY_M)
-        && gnss.hdop.is_none_or(|hdop| hdop <= HDOP);
     let speed_mps = gnss.speed.map(|speed| speed.0).filter(|speed| (0.0..=SPEED_MAX_MPS).contains(speed))?;
-    let course = gnss.course.map(|course| course.0).filter(|course| course.is_finite() && good)?;
+    let course = gnss.course.map(|course| course.0).filter(|course| course.is_finite() && gnss.is_exact())?;
     let Position { latitude_deg, longitude_deg } = gnss.position?;
     Some(Fix {
         place: [latitude_deg, longitude_deg].map(|degrees| (degrees * 1e7) as i32),

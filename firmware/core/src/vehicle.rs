@@ -15,7 +15,7 @@ use crate::observation::{
     VehicleKind, Vibration, VibrationScale, VtolState, Wanted,
 };
 use crate::time::{Instant, Span};
-use crate::units::MetresPerSecond;
+use crate::units::{MetresPerSecond, Radians};
 
 /// Batteries that are monitored.
 pub const BATTERIES_MAX: usize = 4;
@@ -75,8 +75,8 @@ pub struct Vehicle {
     pub air: Latest<Air>,
     /// Attitude.
     pub attitude: Latest<Attitude>,
-    /// The attitude that the autopilot wants.
-    pub wanted: Latest<Wanted>,
+    /// Roll and pitch that the autopilot wants.
+    pub wanted: Latest<[Radians; 2]>,
     /// When the attitude was another one than that last.
     led_at: Option<Instant>,
     /// Position from the local origin.
@@ -246,6 +246,11 @@ impl Vehicle {
         }
     }
 
+    /// Whether its autopilot is an `ArduPilot`.
+    pub(crate) fn is_ardupilot(&self) -> bool {
+        self.heartbeat.get().is_some_and(|heartbeat| heartbeat.autopilot == Autopilot::ArduPilot)
+    }
+
     /// Whether it hangs on several like rotors: only there are motors to be compared with each other. A helicopter's tail,
     /// a VTOL's pusher and a plane's two engines turn as they need to.
     pub fn is_multicopter(&self) -> bool {
@@ -356,7 +361,7 @@ impl Vehicle {
                 self.note_led(at, &attitude);
                 self.attitude.set(at, attitude);
             }
-            Observation::Wanted(wanted) => self.wanted.set(at, wanted),
+            Observation::Wanted(Wanted { roll, pitch, .. }) => self.wanted.set(at, [roll, pitch]),
             Observation::ClimbWanted(climb) => self.climb_wanted.set(at, climb),
             Observation::LocalPosition(local) => self.local.set(at, local),
             Observation::GlobalPosition(global) => self.take_global(at, global),
@@ -384,6 +389,7 @@ impl Vehicle {
             Observation::Failing(causes) => self.alerts.take_failures(at, causes),
             Observation::MissionReached(item) => self.mission_reached.set(at, item),
             Observation::SpeedSensors(_)
+            | Observation::SecondEstimate(_)
             | Observation::Outputs(_)
             | Observation::MissionCurrent(_)
             | Observation::Parameter(..)
@@ -442,9 +448,8 @@ impl Vehicle {
         const MOST: i8 = 3 * SURE;
         /// Versions are bytes from the top down.
         const COUNTS_DOWN_SINCE: u32 = 0x0400_0000;
-        let is_old =
-            self.heartbeat.get().is_some_and(|heartbeat| heartbeat.autopilot == Autopilot::ArduPilot)
-                && self.identity.get().is_none_or(|identity| identity.firmware < COUNTS_DOWN_SINCE);
+        let is_old = self.is_ardupilot()
+            && self.identity.get().is_none_or(|identity| identity.firmware < COUNTS_DOWN_SINCE);
         let [.., down] = &mut global.velocity;
         let told = self.hud.within(at, FRESH).and_then(|hud| hud.climb).map(|climb| climb.0);
         if let Some(climb_mps) = told
@@ -463,7 +468,7 @@ impl Vehicle {
     fn note_led(&mut self, at: Instant, attitude: &Attitude) {
         /// 0.6 degrees, which is more than rounding.
         const COPY_RAD: f32 = 0.01;
-        if let Some(Wanted { roll, pitch, .. }) = self.wanted.within(at, LED)
+        if let Some([roll, pitch]) = self.wanted.within(at, LED)
             && ((roll.0 - attitude.roll.0).abs() > COPY_RAD || (pitch.0 - attitude.pitch.0).abs() > COPY_RAD)
         {
             self.led_at = Some(at);

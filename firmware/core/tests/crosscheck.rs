@@ -8,8 +8,8 @@ use common::{AUTOPILOT, Quad};
 use hums_core::Monitor;
 use hums_core::health::{Finding, Level};
 use hums_core::observation::{
-    Air, Attitude, Autopilot, Estimator, EstimatorScale, Imu, MOTORS_MAX, Observation, Outputs, VehicleKind,
-    Wanted,
+    Air, Attitude, Autopilot, Estimator, EstimatorScale, Imu, MOTORS_MAX, Observation, Outputs,
+    SecondEstimate, VehicleKind, Wanted, WantedRates,
 };
 use hums_core::params::Params;
 use hums_core::status::LinkReading;
@@ -37,6 +37,8 @@ struct Fitted {
     /// Body rates about roll and pitch, and those that are wanted, rad/s.
     turns: [f32; 2],
     wanted: [f32; 2],
+    /// The attitude about whose axes these are.
+    wanted_of: Option<[f32; 4]>,
     /// Whether it tells what is wanted now.
     wants: bool,
     /// How far GPS is above sea level, m.
@@ -51,6 +53,8 @@ struct Fitted {
     speed: f32,
     /// Whether it tells its position now.
     places: bool,
+    /// How far the second estimator is apart: in roll, rad, in height and north, m.
+    second: Option<[f32; 3]>,
 }
 
 /// A number between -1 and 1 for a moment and a sensor: the same one each time.
@@ -90,6 +94,7 @@ impl Fitted {
             yaw_rate: 0.0,
             turns,
             wanted: [0.0; 2],
+            wanted_of: None,
             wants: true,
             altitude,
             attitude_noise: 0.01,
@@ -97,6 +102,7 @@ impl Fitted {
             gps_until_ms: u64::MAX,
             speed: 1.0,
             places: true,
+            second: None,
         }
     }
 
@@ -110,6 +116,8 @@ impl Fitted {
         for observation in &mut said {
             if let Observation::GlobalPosition(global) = observation {
                 global.velocity[0] = MetresPerSecond(self.speed);
+                global.position = Some(Position { latitude_deg: 47.0, longitude_deg: 8.0 });
+                global.altitude = Metres(120.0);
             }
             if let Observation::Hud(hud) = observation {
                 hud.climb = self.hud_climb.map(MetresPerSecond);
@@ -124,8 +132,10 @@ impl Fitted {
         let [roll, pitch] = self.turns;
         let rates = Some([roll, pitch, self.yaw_rate].map(RadiansPerSecond));
         if self.wants {
-            let wanted = Some(self.wanted.map(RadiansPerSecond));
-            said.push(Observation::Wanted(Wanted { rates: wanted, ..Wanted::default() }));
+            let [roll, pitch] = self.wanted;
+            let about = [roll, pitch, 0.0].map(RadiansPerSecond);
+            let rates = Some(WantedRates { about, of: self.wanted_of });
+            said.push(Observation::Wanted(Wanted { rates, ..Wanted::default() }));
         }
         said.push(Observation::Attitude(Attitude {
             roll: Radians(self.quad.roll + self.attitude_noise * noise(now_ms, 74)),
@@ -144,6 +154,14 @@ impl Fitted {
             }));
             let pressure = Some(Hectopascals(self.pressure[sensor]));
             said.push(Observation::Air(Air { instance, pressure, temperature: None }));
+        }
+        if let Some([roll, up, north]) = self.second {
+            let latitude_deg = 47.0 + f64::from(north) / 111_320.0;
+            said.push(Observation::SecondEstimate(SecondEstimate {
+                attitude: Some([roll, 0.0, 2.0].map(Radians)),
+                position: Some(Position { latitude_deg, longitude_deg: 8.0 }),
+                altitude: Some(Metres(170.0 + up)),
+            }));
         }
         let pulses = self.pulses.map(|pulse| pulse as u16);
         said.push(Observation::Outputs(Outputs { port: 0, pulses }));
@@ -315,6 +333,83 @@ fn of_two_heights_the_one_that_leapt_is_named() {
     assert!(drifts.iter().all(|one| one.check == "baro_height"), "{drifts:?}");
     let leaps = fly(|_, fitted| fitted.pressure.iter_mut().for_each(|pressure| *pressure -= 1.8));
     assert!(leaps.iter().all(|one| one.check == "baro_height"), "{leaps:?}");
+}
+
+#[test]
+fn an_estimator_that_leaves_the_second_one_is_named() {
+    const POSITION_ABSOLUTE: u16 = 16;
+    let fly = |flags: u16, apart: [f32; 3], kind: VehicleKind| {
+        fly(|now_ms, fitted| {
+            (fitted.quad.estimator.flags, fitted.quad.kind) = (flags, kind);
+            fitted.second = Some(if now_ms >= FAULT_MS { apart } else { [0.2, 0.0, 2.0] });
+        })
+    };
+    let rotors = VehicleKind::Rotorcraft;
+    for (apart, check) in [
+        ([0.7, 0.0, 0.0], "ahrs2_tilt"),
+        ([0.0, -15.0, 0.0], "ahrs2_height"),
+        ([0.0, 0.0, 25.0], "ahrs2_position"),
+    ] {
+        let findings = fly(POSITION_ABSOLUTE, apart, rotors);
+        let [found] = findings[..] else { panic!("{findings:?}") };
+        assert_eq!((found.check, found.level), (check, Level::Warning));
+        assert!((FAULT_MS + 1_000..FAULT_MS + 2_500).contains(&found.at.as_millis()), "{found:?}");
+        assert_eq!(fly(POSITION_ABSOLUTE, apart, VehicleKind::Vtol), [], "it has two sets of axes");
+    }
+    assert_eq!(
+        fly(POSITION_ABSOLUTE, [0.4, 5.0, 8.0], rotors),
+        [],
+        "as manoeuvres, weather and a receiver do"
+    );
+    assert_eq!(fly(0, [0.0, 0.0, 25.0], rotors), [], "it flies by optical flow");
+}
+
+#[test]
+fn a_second_estimator_without_an_exact_receiver_is_no_witness() {
+    let inexact = |until_ms: u64| {
+        move |now_ms: u64, fitted: &mut Fitted| {
+            fitted.second = Some([0.7, 15.0, 0.0]);
+            // A receiver that does not say how exact it is has its dilution only.
+            (fitted.quad.gnss.accuracy, fitted.quad.gnss.hdop) = (None, Some(1.0));
+            if (20_000..until_ms).contains(&now_ms) {
+                fitted.quad.gnss.fix = 1;
+            }
+        }
+    };
+    let checks = |findings: Vec<Finding>| findings.into_iter().map(|one| one.check).collect::<Vec<_>>();
+    let tilts = checks(fly(inexact(0)));
+    assert_eq!(tilts, ["ahrs2_tilt"], "and a height that was so from the beginning is usual");
+    let none = checks(fly(|now_ms, fitted| {
+        inexact(0)(now_ms, fitted);
+        fitted.quad.gnss.fix = 1;
+    }));
+    assert_eq!(none, [""; 0], "it never had a fix");
+    // It takes a while to level out.
+    let late = fly(|now_ms, fitted| {
+        inexact(30_000)(now_ms, fitted);
+        fitted.second = fitted.second.filter(|_| now_ms >= 20_000);
+    });
+    let tilt = late.iter().find(|one| one.check == "ahrs2_tilt").expect("found");
+    assert!((45_000..48_000).contains(&tilt.at.as_millis()), "{late:?}");
+}
+
+#[test]
+fn satellites_that_go_are_told_while_the_receiver_is_still_exact() {
+    finds("gps_sats_fall", 0, Level::Warning, 2_500, |_, fitted| fitted.quad.gnss.satellites = Some(9));
+    finds("gps_hdop_rise", 0, Level::Warning, 2_500, |_, fitted| fitted.quad.gnss.hdop = Some(2.2));
+    is_quiet(|now_ms, fitted| {
+        // Few, and now and then one or two fewer.
+        fitted.quad.gnss.satellites = Some(if now_ms / 3_000 % 2 == 0 { 9 } else { 7 });
+        fitted.quad.gnss.hdop = Some(if now_ms / 3_000 % 2 == 0 { 1.5 } else { 2.0 });
+    });
+    // What is too few in any flight says so.
+    let findings = fly(|now_ms, fitted| {
+        if now_ms >= FAULT_MS {
+            (fitted.quad.gnss.satellites, fitted.quad.gnss.accuracy) = (Some(5), Some(Metres(2.0)));
+        }
+    });
+    let told: Vec<(&str, &str)> = findings.iter().map(|one| (one.check, one.because)).collect();
+    assert_eq!(told, [("gps_satellites", ""), ("gps_sats_fall", "gps_satellites")]);
 }
 
 #[test]
@@ -649,6 +744,24 @@ fn what_does_not_turn_as_it_is_told_is_named_and_what_turns_fast_is_not() {
         fitted.turns = [if fitted.wants { 3.0 } else { -1.0 }, 0.0];
         fitted.wanted = fitted.turns;
     });
+}
+
+#[test]
+fn rates_about_the_axes_of_the_wanted_attitude_are_turned_to_the_bodys() {
+    // A quarter of a turn behind the wanted heading: to pitch is to roll to the left, a tenth of a second late.
+    let lags = |now_ms: u64, fitted: &mut Fitted| {
+        let turning = |now_ms: u64| 3.0 * (now_ms as f32 / 2_000.0).sin();
+        let half = core::f32::consts::FRAC_1_SQRT_2;
+        fitted.wanted_of = Some([half, 0.0, 0.0, half]);
+        (fitted.wanted, fitted.turns) = ([0.0, turning(now_ms)], [-turning(now_ms.saturating_sub(100)), 0.0]);
+    };
+    is_quiet(lags);
+    // PX4's are about the body's own axes.
+    let findings = fly(|now_ms, fitted| {
+        lags(now_ms, fitted);
+        fitted.quad.autopilot = Autopilot::Px4;
+    });
+    assert!(findings.iter().any(|one| one.check == "roll_rate"), "{findings:?}");
 }
 
 #[test]

@@ -128,6 +128,15 @@ const INPUTS: &[(&str, &str)] = &[
         "ekf_climb",
         "the same messages: climb by that height against VFR_HUD's, over a second, less the change of the dynamic pressure of the speed; on rotors",
     ),
+    ("ahrs2_tilt", "AHRS2 against ATTITUDE: angle between the two verticals; with an exact receiver"),
+    (
+        "ahrs2_height",
+        "AHRS2 against GLOBAL_POSITION_INT: difference of the altitudes, beyond what is usual in this flight; with an exact receiver",
+    ),
+    (
+        "ahrs2_position",
+        "AHRS2 against GLOBAL_POSITION_INT: distance, less half a second of flight; with an exact receiver, where EKF_STATUS_REPORT calls the position absolute",
+    ),
     (
         "accel_stuck",
         "RAW_IMU, SCALED_IMU, SCALED_IMU2, SCALED_IMU3, HIGHRES_IMU: how long forces were the same",
@@ -151,7 +160,15 @@ const INPUTS: &[(&str, &str)] = &[
         "gps_satellites",
         "GPS_RAW_INT, GPS2_RAW, where the receiver does not tell an accuracy within half of GPS_HACC_WARN",
     ),
+    (
+        "gps_sats_fall",
+        "GPS_RAW_INT, GPS2_RAW: satellites fewer than usual in this flight, in percent of these; with a 3D fix",
+    ),
     ("gps_hdop", "the same messages, likewise"),
+    (
+        "gps_hdop_rise",
+        "GPS_RAW_INT, GPS2_RAW: dilution as a multiple of the usual one of this flight, which is 1 at least",
+    ),
     ("gps_accuracy", "GPS_RAW_INT, GPS2_RAW: horizontal accuracy"),
     ("gps_fix", "GPS_RAW_INT, GPS2_RAW: fix type, of a receiver that had one"),
     ("gps_jamming", "GNSS_INTEGRITY"),

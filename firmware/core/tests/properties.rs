@@ -7,10 +7,11 @@ use hums_core::Monitor;
 use hums_core::health::{EXPECTED, Level, Subsystem};
 use hums_core::lifetime::{ITEM_BYTES_MAX, Room};
 use hums_core::observation::{
-    Air, Attitude, Autopilot, AutopilotIdentity, Battery, CELLS_MAX, CommandAck, Engine, Esc, EscGroup,
-    Estimator, EstimatorScale, GlobalPosition, Gnss, GnssIntegrity, Heartbeat, Hud, Imu, LandedState,
-    LocalPosition, MOTORS_MAX, Observation, Outputs, Processor, RadioControl, Rails, Source, SpeedSensor,
-    SystemStatus, SystemTime, TelemetryRadio, VehicleKind, Vibration, VibrationScale, VtolState,
+    Air, Attitude, Autopilot, AutopilotIdentity, Battery, CELLS_MAX, CellVoltage, CommandAck, Engine, Esc,
+    EscGroup, Estimator, EstimatorScale, GlobalPosition, Gnss, GnssIntegrity, Heartbeat, Hud, Imu,
+    LandedState, LocalPosition, MOTORS_MAX, Observation, Outputs, Processor, RadioControl, Rails,
+    SecondEstimate, Source, SpeedSensor, SystemStatus, SystemTime, TelemetryRadio, VehicleKind, Vibration,
+    VibrationScale, VtolState, Wanted, WantedRates,
 };
 use hums_core::params::{Params, TABLE};
 use hums_core::status::{LinkReading, RecorderStatus, Recording};
@@ -118,7 +119,7 @@ impl Random {
     fn battery(&mut self) -> Battery {
         Battery {
             id: self.pick(&[0, 0, 1, 2, 255]),
-            cells: [(); CELLS_MAX].map(|()| self.float(Volts)),
+            cells: [(); CELLS_MAX].map(|()| CellVoltage::from_millivolts(self.u32() as u16)),
             voltage: self.float(Volts),
             current: self.float(Amperes),
             consumed: self.float(AmpereHours),
@@ -289,7 +290,21 @@ impl Random {
     }
 
     fn rare(&mut self) -> Observation {
-        match self.below(6) {
+        match self.below(8) {
+            7 => {
+                let of = self.maybe(|random| [(); 4].map(|()| random.f32()));
+                let about = self.vector(RadiansPerSecond);
+                let [roll, pitch, _] = self.vector(Radians);
+                Observation::Wanted(Wanted { roll, pitch, rates: Some(WantedRates { about, of }) })
+            }
+            6 => Observation::SecondEstimate(SecondEstimate {
+                attitude: self.maybe(|random| random.vector(Radians)),
+                position: self.maybe(|random| Position {
+                    latitude_deg: random.f32().into(),
+                    longitude_deg: random.f32().into(),
+                }),
+                altitude: self.float(Metres),
+            }),
             5 => Observation::ClimbWanted(MetresPerSecond(self.f32())),
             4 => Observation::Parameter(self.below(20) as u8, self.f32()),
             0 => Observation::Identity(AutopilotIdentity { uid: self.below(3), firmware: self.u32() }),

@@ -172,7 +172,7 @@ fn state(system: u8, craft: &Craft, board: &Board, now: Instant) -> String {
         motors: Motors(Values::of(craft, now)),
         cells: vehicle.batteries[0]
             .get()
-            .map(|battery| battery.cells.iter().flatten().map(|volts| volts.0).collect())
+            .map(|battery| battery.cells.iter().flatten().map(|cell| cell.volts().0).collect())
             .unwrap_or_default(),
         board: &board.parts,
         usage: Usage(craft),

@@ -137,15 +137,25 @@ fn velocity(line: u8) -> String {
 }
 
 fn attitude(line: u8) -> String {
-    named(&["Roll", "Pitch", "Roll, wanted", "Pitch, wanted"], line)
+    named(
+        &[
+            "Roll",
+            "Pitch",
+            "Roll, wanted",
+            "Pitch, wanted",
+            "Roll, AHRS2",
+            "Pitch, AHRS2",
+        ],
+        line,
+    )
 }
 
 fn heading(line: u8) -> String {
-    named(&["Heading", "Wanted by attitude control", "Wanted by navigation"], line)
+    named(&["Heading", "Wanted by attitude control", "Wanted by navigation", "AHRS2"], line)
 }
 
 fn rates(line: u8) -> String {
-    named(&["Roll", "Pitch", "Yaw", "Roll, wanted", "Pitch, wanted"], line)
+    named(&["Roll", "Pitch", "Yaw", "Roll, wanted", "Pitch, wanted", "Yaw, wanted"], line)
 }
 
 fn receiver(line: u8) -> String {
@@ -165,9 +175,9 @@ pub fn about(plot: Plot, autopilot: Autopilot) -> About {
         Plot::Height => ("Motion", "Height above home", "m", 2, |line| {
             named(&["Height", "Wanted, above the origin"], line)
         }),
-        Plot::Altitude => {
-            ("Motion", "Altitude above sea level", "m", 1, |line| named(&["GPS", "EKF", "Wanted"], line))
-        }
+        Plot::Altitude => ("Motion", "Altitude above sea level", "m", 1, |line| {
+            named(&["GPS", "EKF", "Wanted", "AHRS2"], line)
+        }),
         Plot::Speed => ("Motion", "Speed", "m/s", 2, |line| named(&["Ground", "Air", "GPS"], line)),
         Plot::Vertical => ("Motion", "Climb rate", "m/s", 2, |line| named(&["Climb", "Climb, wanted"], line)),
         Plot::Velocity => ("Motion", "Velocity north, east, down", "m/s", 2, velocity),

@@ -85,10 +85,18 @@ impl Samples {
                     push(Plot::Rates, axis, Some(rate.0.to_degrees()));
                 }
             }
+            Observation::SecondEstimate(second) => {
+                if let Some([roll, pitch, yaw]) = second.attitude {
+                    push(Plot::Attitude, 4, Some(roll.0.to_degrees()));
+                    push(Plot::Attitude, 5, Some(pitch.0.to_degrees()));
+                    push(Plot::Heading, 3, Some(compass_deg(yaw.0)));
+                }
+                push(Plot::Altitude, 3, second.altitude.map(|metres| metres.0));
+            }
             Observation::Wanted(wanted) => {
                 push(Plot::Attitude, 2, Some(wanted.roll.0.to_degrees()));
                 push(Plot::Attitude, 3, Some(wanted.pitch.0.to_degrees()));
-                for (axis, rate) in (3..).zip(wanted.rates.into_iter().flatten()) {
+                for (axis, rate) in (3..).zip(wanted.rates.into_iter().flat_map(|rates| rates.about)) {
                     push(Plot::Rates, axis, Some(rate.0.to_degrees()));
                 }
             }
@@ -226,7 +234,7 @@ impl Samples {
         let first = battery.id.checked_mul(CELLS_MAX as u8);
         let lines = first.into_iter().flat_map(|first| first..=u8::MAX);
         for (line, volts) in lines.zip(battery.cells) {
-            self.put(at, (Plot::CellVolts, line), volts.map(|volts| volts.0));
+            self.put(at, (Plot::CellVolts, line), volts.map(|cell| cell.volts().0));
         }
     }
 

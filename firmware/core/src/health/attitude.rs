@@ -1,7 +1,7 @@
 //! Roll and pitch of what hangs on rotors. A plane banks as it needs to, and so does a VTOL while it flies on its wings.
 //!
 //! An angle that the autopilot wants is none that it lost: pilots bank a multicopter steeply, and the autopilot turns their sticks
-//! into an attitude that it wants ([`Wanted`]). So an angle counts only where the vehicle is further than [`FOLLOWS_RAD`] from the
+//! into an attitude that it wants ([`crate::vehicle::Vehicle::wanted`]). So an angle counts only where the vehicle is further than [`FOLLOWS_RAD`] from the
 //! wanted one. Where nobody says what is wanted, it counts but in modes in which the pilot banks as far as he likes. What is said to
 //! be wanted and is the attitude itself, sample by sample, is no word about what is wanted.
 
@@ -12,7 +12,7 @@ use super::inputs::Inputs;
 use crate::cause::Cause;
 use crate::latest::Reading;
 use crate::modes::{is_banked_by_hand, is_made_to_turn};
-use crate::observation::{Attitude, VehicleKind, Wanted};
+use crate::observation::{Attitude, VehicleKind};
 use crate::params::Param;
 use crate::time::Span;
 use crate::units::Radians;
@@ -40,30 +40,22 @@ const ROLL: Check = Check {
     alarm_only: false,
     is_flag: false,
     part: Part::Vehicle,
-    read: |inputs, _| degrees(inputs, |attitude| attitude.roll, |wanted| wanted.roll),
+    read: |inputs, _| degrees(inputs, |attitude| attitude.roll, 0),
 };
 
 pub(super) const CHECKS: &[Check] = &[
     ROLL,
-    Check {
-        name: "pitch",
-        read: |inputs, _| degrees(inputs, |attitude| attitude.pitch, |wanted| wanted.pitch),
-        ..ROLL
-    },
+    Check { name: "pitch", read: |inputs, _| degrees(inputs, |attitude| attitude.pitch, 1), ..ROLL },
     alert::<{ Cause::Attitude as usize }>(Subsystem::Attitude),
 ];
 
-fn degrees(
-    inputs: &Inputs<'_>,
-    angle: fn(&Attitude) -> Radians,
-    wanted: fn(&Wanted) -> Radians,
-) -> Option<Reading> {
+fn degrees(inputs: &Inputs<'_>, angle: fn(&Attitude) -> Radians, axis: usize) -> Option<Reading> {
     let Inputs { now, vehicle, .. } = *inputs;
     if !matches!(vehicle.kind(), VehicleKind::Rotorcraft | VehicleKind::Vtol) {
         return None;
     }
     let told = vehicle.wanted.within(now, WANTED_AGE).filter(|_| vehicle.is_led(now));
-    let told = told.map(|told| wanted(told).0);
+    let told = told.map(|told| told[axis].0);
     let degrees = |attitude: &Attitude| {
         let is = angle(attitude).0;
         let asked = is_made_to_turn(vehicle)

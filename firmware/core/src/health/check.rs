@@ -108,6 +108,7 @@ impl Part {
             | Observation::ImuAndAir(..)
             | Observation::Shock(_)
             | Observation::Attitude(_)
+            | Observation::SecondEstimate(_)
             | Observation::Wanted(_)
             | Observation::ClimbWanted(_)
             | Observation::LocalPosition(_)

@@ -18,6 +18,8 @@ const GNSS: &[&str] = &[
     "gps_accuracy",
     "gps_satellites",
     "gps_hdop",
+    "gps_sats_fall",
+    "gps_hdop_rise",
 ];
 const SENSORS: &[&str] = &[
     "accel_stuck",
@@ -47,6 +49,7 @@ const BATTERY: &[&str] =
     &["cell_voltage", "batt_remaining", "batt_fault", "batt_state", "battery_alert", "cell_deviation"];
 const LINKS: &[&str] = &["rc_alert", "gcs_alert", "heartbeat"];
 const ESTIMATOR: &[&str] = &["ekf_variance", "ekf_failsafe", "ekf_test_ratio", "ekf_climb", "ekf_alert"];
+const SECOND: &[&str] = &["ahrs2_tilt", "ahrs2_height", "ahrs2_position"];
 /// What the autopilot does because of anything. A text that no table knows (`autopilot_alert`) may be of anything else, as of a kill switch.
 const ACTS: &[&str] = &["failsafe_alert", "autopilot_state"];
 
@@ -60,8 +63,10 @@ const ROWS: &[(&[&str], &[&str])] = &[
     (&["roll_rate", "pitch_rate"], &["roll", "pitch", "attitude_alert", "thrust_lost"]),
     (
         &["gps_fix", "gps_jamming", "gps_spoofing"],
-        &["gnss_alert", "gps_accuracy", "gps_satellites", "gps_hdop"],
+        &["gnss_alert", "gps_accuracy", "gps_satellites", "gps_hdop", "gps_sats_fall", "gps_hdop_rise"],
     ),
+    (&["gps_satellites", "gps_hdop", "gps_accuracy"], &["gps_sats_fall", "gps_hdop_rise"]),
+    (&["gps_sats_fall"], &["gps_hdop_rise"]),
     (&["gps_stuck", "gnss_alert"], &["gps_speed", "gps_height"]),
     (GNSS, ESTIMATOR),
     (GNSS, &["baro_height", "position_silent"]),
@@ -80,6 +85,10 @@ const ROWS: &[(&[&str], &[&str])] = &[
     (&["baro_stuck", "baro_alert"], &["baro_height", "baro_noise", "baro_mismatch"]),
     (SENSORS, ESTIMATOR),
     (SHAKING, ESTIMATOR),
+    (GNSS, SECOND),
+    (SENSORS, SECOND),
+    (SHAKING, SECOND),
+    (ESTIMATOR, SECOND),
     (SHAKING, &["accel_mismatch", "gyro_mismatch"]),
     // Height control follows the estimator.
     (&["ekf_climb"], &["ekf_variance", "ekf_failsafe", "ekf_test_ratio", "ekf_alert", "thrust_lost"]),

@@ -6,6 +6,7 @@ use super::finding::Subsystem;
 use super::inputs::Inputs;
 use crate::cause::Cause;
 use crate::crosscheck::{Kind, SENSORS_MAX};
+use crate::geometry::Geometry;
 use crate::latest::Reading;
 use crate::observation::{Estimator, EstimatorScale, Gnss, VehicleKind};
 use crate::params::Param;
@@ -82,6 +83,20 @@ const STUCK: Check = Check {
     alarm_only: true,
     part: Part::Sensor,
     read: |inputs, sensor| stuck(inputs, Kind::Accelerometer, sensor),
+    ..MISMATCH
+};
+
+/// The estimator that flies against the second one ([`crate::second`]).
+const SECOND: Check = Check {
+    name: "ahrs2_tilt",
+    unit: "deg",
+    warn: Some(Param::Ahrs2TiltWarn),
+    hysteresis: 2.0,
+    // Who names the sensor is heard first.
+    debounce_warn: Span::from_secs(1),
+    instances: 1,
+    part: Part::Vehicle,
+    read: |inputs, _| inputs.derived.crosschecks().second().tilt(inputs.now),
     ..MISMATCH
 };
 
@@ -203,6 +218,23 @@ pub(super) const CHECKS: &[Check] = &[
         read: |inputs, _| inputs.derived.crosschecks().heights().climbs_apart(),
         ..MISMATCH
     },
+    SECOND,
+    Check {
+        name: "ahrs2_height",
+        unit: "m",
+        warn: Some(Param::Ahrs2HgtWarn),
+        hysteresis: 1.0,
+        read: |inputs, _| inputs.derived.crosschecks().second().height(inputs.now),
+        ..SECOND
+    },
+    Check {
+        name: "ahrs2_position",
+        unit: "m",
+        warn: Some(Param::Ahrs2PosWarn),
+        hysteresis: 2.0,
+        read: |inputs, _| inputs.derived.crosschecks().second().place(inputs.now),
+        ..SECOND
+    },
     STUCK,
     Check { name: "gyro_stuck", read: |inputs, sensor| stuck(inputs, Kind::Gyro, sensor), ..STUCK },
     Check {
@@ -222,6 +254,17 @@ pub(super) const CHECKS: &[Check] = &[
         ..STUCK
     },
     Check { debounce_warn: RECEIVER_SAYS, ..GNSS },
+    Check {
+        name: "gps_sats_fall",
+        unit: "%",
+        stale_after: None,
+        side: Side::Above,
+        warn: Some(Param::GpsSatsFall),
+        hysteresis: 5.0,
+        debounce_warn: Span::from_secs(1),
+        read: |inputs, receiver| geometry(inputs, receiver, Geometry::satellites_lost),
+        ..GNSS
+    },
     Check {
         name: "gps_speed",
         unit: "m/s",
@@ -262,6 +305,17 @@ pub(super) const CHECKS: &[Check] = &[
                 gnss.hdop.map(|hdop| if is_exact(inputs, gnss) { hdop.min(little) } else { hdop })
             })
         },
+        ..GNSS
+    },
+    Check {
+        name: "gps_hdop_rise",
+        unit: "times",
+        stale_after: None,
+        side: Side::Above,
+        warn: Some(Param::GpsHdopRise),
+        hysteresis: 0.1,
+        debounce_warn: Span::from_secs(1),
+        read: |inputs, receiver| geometry(inputs, receiver, Geometry::hdop_rise),
         ..GNSS
     },
     Check {
@@ -356,6 +410,11 @@ fn gnss(inputs: &Inputs<'_>, receiver: u8, value: impl FnOnce(&Gnss) -> Option<f
     let slot = inputs.vehicle.gnss.get(usize::from(receiver))?;
     let known = slot.get().filter(|_| inputs.derived.had_fix(receiver))?;
     Reading::new(slot.at(), value(known))
+}
+
+fn geometry(inputs: &Inputs<'_>, receiver: u8, value: fn(&Geometry) -> Option<f32>) -> Option<Reading> {
+    let geometry = inputs.derived.crosschecks().geometry(receiver)?;
+    Reading::new(inputs.vehicle.gnss.get(usize::from(receiver))?.at(), value(geometry))
 }
 
 /// A receiver that knows where it is within half of what its accuracy may be does so with however few satellites: its own word is better than

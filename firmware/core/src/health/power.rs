@@ -205,7 +205,7 @@ fn remaining_percent(inputs: &Inputs<'_>, battery: u8) -> Option<Reading> {
 
 fn cell_deviation_v(inputs: &Inputs<'_>, battery: u8) -> Option<Reading> {
     let slot = inputs.vehicle.batteries.get(usize::from(battery))?;
-    let cells = slot.get()?.cells.iter().flatten().map(|cell| cell.0);
+    let cells = slot.get()?.cells.iter().flatten().map(|cell| cell.volts().0);
     let lowest = cells.clone().fold(f32::INFINITY, f32::min);
     let highest = cells.fold(f32::NEG_INFINITY, f32::max);
     Reading::new(slot.at(), Some(highest - lowest))

@@ -288,9 +288,10 @@ fn is_told_to_sink(at: Instant, sink_mps: f32, limit_mps: f32, vehicle: &Vehicle
 
 /// Whether the autopilot wants a bank in which all the thrust of a multicopter may not carry it.
 fn is_told_to_bank(at: Instant, vehicle: &Vehicle) -> bool {
-    vehicle.wanted.within(at, WANTED_AGE).is_some_and(|wanted| {
-        vehicle.is_multicopter() && wanted.roll.0.abs().max(wanted.pitch.0.abs()) > BANKS_RAD
-    })
+    vehicle
+        .wanted
+        .within(at, WANTED_AGE)
+        .is_some_and(|[roll, pitch]| vehicle.is_multicopter() && roll.0.abs().max(pitch.0.abs()) > BANKS_RAD)
 }
 
 /// Whether the display sinks too; so it is where no climb is displayed, or nothing but zeros. A receiver that loses its satellites tells

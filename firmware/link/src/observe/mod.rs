@@ -44,6 +44,7 @@ fn by_id(id: u32, payload: &[u8]) -> Option<Observation> {
         65 => Observation::RadioControl(system::rc(payload)?),
         74 => Observation::Hud(motion::hud(payload)?),
         77 => Observation::CommandAck(system::command_ack(payload)),
+        178 => Observation::SecondEstimate(motion::second_estimate(payload)),
         83 => Observation::Wanted(motion::attitude_target(payload)?),
         85 => Observation::ClimbWanted(motion::climb_wanted(payload)?),
         105 => {

@@ -4,7 +4,7 @@ use core::num::NonZeroU32;
 
 use hums_core::observation::{
     Air, Attitude, Estimator, EstimatorScale, GlobalPosition, Gnss, GnssIntegrity, Hud, Imu, LocalPosition,
-    MOTORS_MAX, Outputs, Vibration, VibrationScale, Wanted,
+    MOTORS_MAX, Outputs, SecondEstimate, Vibration, VibrationScale, Wanted, WantedRates,
 };
 use hums_core::units::{
     Celsius, Fraction, Gauss, Hectopascals, Metres, MetresPerSecond, MetresPerSecond2, Position, Radians,
@@ -205,19 +205,33 @@ pub(super) fn attitude(payload: &[u8]) -> Option<Attitude> {
     Some(Attitude { roll, pitch, yaw, rates, boot_ms: Some(attitude.time_boot_ms) })
 }
 
+/// `AHRS2`: zeros are what it does not know.
+pub(super) fn second_estimate(payload: &[u8]) -> SecondEstimate {
+    let angles = vector([0, 4, 8].map(|at| float(payload, at)));
+    let angles = angles.filter(|angles| angles.iter().any(|angle| angle.abs() > 0.0));
+    let [latitude, longitude] = [16, 20].map(|at| Fields(payload).u32(at).cast_signed());
+    let position = position(latitude, longitude);
+    SecondEstimate {
+        attitude: angles.map(|angles| angles.map(Radians)),
+        position,
+        altitude: Metres(float(payload, 12)).finite().filter(|_| position.is_some()),
+    }
+}
+
 /// `ArduPilot`: whole degrees in old versions.
 pub(super) fn nav_controller_output(payload: &[u8]) -> Option<Wanted> {
     let [roll, pitch] = [0, 4].map(|at| Radians(float(payload, at).to_radians()));
     (roll.0.is_finite() && pitch.0.is_finite()).then_some(Wanted { roll, pitch, rates: None })
 }
 
-/// `type_mask` names what is to be ignored: the rate of roll 1, of pitch 2.
+/// `type_mask` names what is to be ignored: the rates of roll 1, pitch 2, yaw 4.
 pub(super) fn attitude_target(payload: &[u8]) -> Option<Wanted> {
-    const RATES: u8 = 3;
-    let [roll, pitch] = [20, 24].map(|at| float(payload, at));
-    let told = Fields(payload).u8(36) & RATES == 0 && roll.is_finite() && pitch.is_finite();
-    let rates = told.then_some([RadiansPerSecond(roll), RadiansPerSecond(pitch)]);
-    Some(Wanted { rates, ..Wanted::from_quaternion([4, 8, 12, 16].map(|at| float(payload, at)))? })
+    const RATES: u8 = 7;
+    let of = [4, 8, 12, 16].map(|at| float(payload, at));
+    let about = vector([20, 24, 28].map(|at| float(payload, at)));
+    let about = about.filter(|_| Fields(payload).u8(36) & RATES == 0);
+    let rates = about.map(|about| WantedRates { about: about.map(RadiansPerSecond), of: Some(of) });
+    Some(Wanted { rates, ..Wanted::from_quaternion(of)? })
 }
 
 /// `POSITION_TARGET_LOCAL_NED`: `type_mask` 32 says that the vertical speed is to be ignored.

@@ -1,6 +1,6 @@
 //! Batteries and rails.
 
-use hums_core::observation::{Battery, CELLS_MAX, Feeds, Rails};
+use hums_core::observation::{Battery, CELLS_MAX, CellVoltage, Feeds, Rails};
 use hums_core::units::{AmpereHours, Celsius, Volts, WattHours};
 use mavlink::dialects::ardupilotmega as ap;
 
@@ -49,7 +49,7 @@ pub(super) fn battery(payload: &[u8]) -> Option<Battery> {
 
 /// The sum, and the cells where they are known one by one. A sender that knows only the sum puts it into the first
 /// place, and what does not fit there into the next; an unused place is 65535, in the extension 0.
-fn cells(base: &[u16; 10], extension: [u16; 4]) -> (Option<Volts>, [Option<Volts>; CELLS_MAX]) {
+fn cells(base: &[u16; 10], extension: [u16; 4]) -> (Option<Volts>, [Option<CellVoltage>; CELLS_MAX]) {
     let mut cells = [None; CELLS_MAX];
     let mut sum_mv = 0_u32;
     let mut singly = true;
@@ -58,7 +58,7 @@ fn cells(base: &[u16; 10], extension: [u16; 4]) -> (Option<Volts>, [Option<Volts
         .filter(|&&mv| mv != u16::MAX)
         .chain(extension.iter().filter(|&&mv| mv != 0 && mv != u16::MAX));
     for (cell, &mv) in cells.iter_mut().zip(used) {
-        *cell = Some(Volts(f32::from(mv) / 1e3));
+        *cell = CellVoltage::from_millivolts(mv);
         sum_mv += u32::from(mv);
         singly &= mv <= CELL_MAX_MV;
     }

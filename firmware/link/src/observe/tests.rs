@@ -1,10 +1,10 @@
 //! The traps, one by one. Payloads are built by the typed encoders.
 use hums_core::cause::{Alert, Cause, Causes, Urgency};
 use hums_core::observation::{
-    Autopilot, EstimatorScale, LandedState, Observation, SystemTime, VehicleKind, VtolState,
+    Autopilot, CellVoltage, EstimatorScale, LandedState, Observation, SystemTime, VehicleKind, VtolState,
 };
 use hums_core::units::{
-    Amperes, Celsius, Fraction, Gauss, Hectopascals, MetresPerSecond, MetresPerSecond2, Volts,
+    Amperes, Celsius, Fraction, Gauss, Hectopascals, Metres, MetresPerSecond, MetresPerSecond2, Volts,
 };
 use mavlink::dialects::ardupilotmega as ap;
 use mavlink::{MavlinkVersion, MessageData};
@@ -56,6 +56,49 @@ fn the_wanted_attitude_is_told_in_degrees_and_as_a_quaternion() {
     let [roll, pitch] = wanted(said(&target)).unwrap();
     assert!(roll.abs() < 1e-3 && (pitch + 30.0).abs() < 1e-3, "{roll} {pitch}");
     assert_eq!(wanted(said(&ap::ATTITUDE_TARGET_DATA { q: [0.0; 4], ..target })), None, "nothing yet");
+}
+
+#[test]
+fn wanted_rates_come_with_the_attitude_about_whose_axes_they_may_be() {
+    let q = [1.0, 0.0, 0.0, 0.0];
+    let target = ap::ATTITUDE_TARGET_DATA {
+        q,
+        type_mask: ap::AttitudeTargetTypemask::empty(),
+        body_roll_rate: 0.5,
+        body_pitch_rate: -1.0,
+        body_yaw_rate: 2.0,
+        ..Default::default()
+    };
+    let rates = |target: &ap::ATTITUDE_TARGET_DATA| match said(target) {
+        Some(Observation::Wanted(wanted)) => wanted.rates,
+        _ => panic!(),
+    };
+    let told = rates(&target).expect("told");
+    assert_eq!((told.about.map(|rate| rate.0), told.of), ([0.5, -1.0, 2.0], Some(q)));
+    assert_eq!(rates(&ap::ATTITUDE_TARGET_DATA { body_yaw_rate: f32::NAN, ..target }), None);
+}
+
+#[test]
+fn zeros_of_a_second_estimator_are_what_it_does_not_know() {
+    let second = |message: &ap::AHRS2_DATA| match said(message) {
+        Some(Observation::SecondEstimate(second)) => second,
+        _ => panic!(),
+    };
+    let told = ap::AHRS2_DATA {
+        roll: 0.1,
+        pitch: -0.2,
+        yaw: 3.0,
+        altitude: 584.5,
+        lat: -353_632_620,
+        lng: 1_491_652_370,
+    };
+    let all = second(&told);
+    assert_eq!(all.attitude.map(|angles| angles.map(|angle| angle.0)), Some([0.1, -0.2, 3.0]));
+    assert_eq!(all.altitude, Some(Metres(584.5)));
+    assert!(all.position.is_some_and(|place| (place.latitude_deg + 35.363_262).abs() < 1e-9));
+    let nowhere = second(&ap::AHRS2_DATA { lat: 0, lng: 0, ..told.clone() });
+    assert_eq!((nowhere.position, nowhere.altitude), (None, None));
+    assert_eq!(second(&ap::AHRS2_DATA { roll: 0.0, pitch: 0.0, yaw: 0.0, ..told }).attitude, None);
 }
 
 #[test]
@@ -126,7 +169,7 @@ fn cells_reach_into_the_extension() {
     let battery = battery([4_000; 10], [4_000, 3_900, 0, 0]);
     assert_eq!(battery.cells_reported(), 12);
     assert!((battery.voltage.expect("known").0 - 47.9).abs() < 1e-3);
-    assert!(battery.cells[11] == Some(Volts(3.9)));
+    assert!(battery.cells[11].map(CellVoltage::volts) == Some(Volts(3.9)));
 }
 
 #[test]

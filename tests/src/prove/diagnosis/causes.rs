@@ -68,6 +68,8 @@ pub(super) const CLASSES: &[Class] = &[
         checks: &[
             "gps_satellites",
             "gps_hdop",
+            "gps_sats_fall",
+            "gps_hdop_rise",
             "gps_accuracy",
             "gps_fix",
             "gps_jamming",

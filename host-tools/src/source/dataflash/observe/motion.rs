@@ -4,7 +4,7 @@ use std::num::NonZeroU32;
 
 use hums_core::observation::{
     Air, Attitude, Estimator, EstimatorScale, GlobalPosition, Gnss, Hud, Imu, LocalPosition, MOTORS_MAX,
-    Observation, Outputs, SystemTime, Vibration, VibrationScale, Wanted,
+    Observation, Outputs, SecondEstimate, SystemTime, Vibration, VibrationScale, Wanted, WantedRates,
 };
 use hums_core::time::Span;
 use hums_core::units::{
@@ -35,6 +35,8 @@ const TOGETHER: Span = Span::from_secs(2);
 const SHOCK_MIN: f32 = 2.0 * GRAVITY;
 /// Sensors that feel the same shock say so within this.
 const AT_ONCE: Span = Span::from_millis(100);
+/// An angle that is further round than this is none, whatever the file says.
+const TURN_DEG: f32 = 360.0;
 /// Rates go with an attitude within this.
 const RATES_AGE: Span = Span::from_millis(500);
 
@@ -49,8 +51,14 @@ pub(super) const HANDLERS: &[Handler] = &[
         ..MOTION
     },
     Handler {
+        names: &[("AHR2", 0)],
+        columns: &[&["Roll"], &["Pitch"], &["Yaw"], &["Alt"], &["Lat"], &["Lng"]],
+        take: second_estimate,
+        ..MOTION
+    },
+    Handler {
         names: &[("RATE", 0)],
-        columns: &[&["RDes"], &["PDes"], &["R"], &["P"], &["Y"]],
+        columns: &[&["RDes"], &["PDes"], &["YDes"], &["R"], &["P"], &["Y"]],
         take: rates,
         ..MOTION
     },
@@ -178,39 +186,55 @@ pub(super) const HANDLERS: &[Handler] = &[
 ];
 
 fn attitude(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
-    /// An angle that is further round than this is none, whatever the file says.
-    const TURN_DEG: f32 = 360.0;
     let Some([roll, pitch, yaw]) = given.singles(0) else { return };
     if [roll, pitch, yaw].into_iter().any(|degrees: f32| degrees.abs() > TURN_DEG) {
         return;
     }
     state.heading_deg.set(given.at, yaw.rem_euclid(360.0));
-    // 0 to 360 degrees in the log, -180 to 180 in ATTITUDE.
-    let yaw = (yaw + 180.0).rem_euclid(360.0) - 180.0;
-    let [roll, pitch, yaw] = [roll, pitch, yaw].map(|degrees| Radians(degrees.to_radians()));
+    let [roll, pitch, yaw] = [roll, pitch, signed(yaw)].map(|degrees| Radians(degrees.to_radians()));
     let known = state.rates.within(given.at, RATES_AGE);
     if let Some([roll, pitch]) = given.singles(3)
         && [roll, pitch].into_iter().all(|degrees: f32| degrees.abs() <= TURN_DEG)
     {
         let [roll, pitch] = [roll, pitch].map(|degrees| Radians(degrees.to_radians()));
-        out.observe(&Observation::Wanted(Wanted { roll, pitch, rates: known.map(|known| known.wanted) }));
+        let rates = known.map(|known| WantedRates { about: known.wanted, of: None });
+        out.observe(&Observation::Wanted(Wanted { roll, pitch, rates }));
     }
     let rates = known.map(|known| known.flown);
     out.observe(&Observation::Attitude(Attitude { roll, pitch, yaw, rates, boot_ms: boot_ms(given) }));
 }
 
+/// Where the log has no place of the estimator that flies, it has none of the second one either: what stands for the first is then the
+/// receiver's.
+fn second_estimate(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
+    let angles =
+        given.singles(0).filter(|angles: &[f32; 3]| angles.iter().all(|angle| angle.abs() <= TURN_DEG));
+    let position = given.number(4).zip(given.number(5)).filter(|_| state.facts.has_positions);
+    let position = position.and_then(|(north, east)| place(north, east));
+    out.observe(&Observation::SecondEstimate(SecondEstimate {
+        attitude: angles
+            .map(|[roll, pitch, yaw]| [roll, pitch, signed(yaw)].map(|angle| Radians(angle.to_radians()))),
+        position,
+        altitude: given.single(3).map(Metres).filter(|_| position.is_some()),
+    }));
+}
+
+/// 0 to 360 degrees in the log, -180 to 180 in MAVLink.
+fn signed(yaw_deg: f32) -> f32 {
+    (yaw_deg + 180.0).rem_euclid(360.0) - 180.0
+}
+
 /// The body's rates and those that are wanted, of one moment: degrees a second, until 3.3 hundredths of them (`Log_Write_Rate` of
 /// `ArduCopter`). Where the version does not tell, the gyro does.
 fn rates(state: &mut State, given: &Given<'_>, _: &mut Out<'_>) {
-    let Some(rates) = given.singles::<5>(0) else { return };
-    let [_, _, flown @ ..] = rates;
+    let Some(rates) = given.singles::<6>(0) else { return };
+    let [_, _, _, flown @ ..] = rates;
     if let Some(gyro) = state.gyro.within(given.at, AT_ONCE) {
         state.rate_unit.take(norm(flown), gyro.to_degrees());
     }
     let Some(unit_deg) = state.facts.rate_unit_deg().or(state.rate_unit.degrees()) else { return };
-    let [wanted_roll, wanted_pitch, flown @ ..] =
-        rates.map(|rate| RadiansPerSecond((rate * unit_deg).to_radians()));
-    state.rates.set(given.at, Rates { wanted: [wanted_roll, wanted_pitch], flown });
+    let [roll, pitch, yaw, flown @ ..] = rates.map(|rate| RadiansPerSecond((rate * unit_deg).to_radians()));
+    state.rates.set(given.at, Rates { wanted: [roll, pitch, yaw], flown });
 }
 
 fn boot_ms(given: &Given<'_>) -> Option<u32> {

@@ -1,7 +1,7 @@
 //! Batteries, rails, ESCs.
 
 use hums_core::observation::{
-    Battery, CELLS_MAX, ESC_GROUP, Esc, EscGroup, Observation, Processor, Rails, SpeedSensor,
+    Battery, CELLS_MAX, CellVoltage, ESC_GROUP, Esc, EscGroup, Observation, Processor, Rails, SpeedSensor,
 };
 use hums_core::units::{AmpereHours, Amperes, Celsius, Fraction, Rpm, Volts, WattHours};
 
@@ -133,7 +133,7 @@ fn cells(state: &mut State, given: &Given<'_>, _: &mut Out<'_>) {
     let mut cells = [None; CELLS_MAX];
     for (slot, cell) in (1..).zip(&mut cells) {
         let millivolts = given.unsigned(slot).filter(|millivolts| *millivolts > 1 && *millivolts < 65_535);
-        *cell = millivolts.map(|millivolts| Volts((millivolts - 1) as f32 / 1e3));
+        *cell = millivolts.and_then(|millivolts| CellVoltage::from_millivolts((millivolts - 1) as u16));
     }
     let id = given.instance(0);
     // BCL2 of today has the cells beyond the twelfth, that of before 2021 a second battery.

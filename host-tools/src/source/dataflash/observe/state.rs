@@ -2,8 +2,8 @@
 //! log's, and some of them are told by nothing but events.
 
 use hums_core::observation::{
-    Autopilot, AutopilotIdentity, Battery, CELLS_MAX, Heartbeat, LandedState, Observation, SystemStatus,
-    VehicleKind, VtolState,
+    Autopilot, AutopilotIdentity, Battery, CELLS_MAX, CellVoltage, Heartbeat, LandedState, Observation,
+    SystemStatus, VehicleKind, VtolState,
 };
 use hums_core::time::{Instant, Span};
 use hums_core::units::{Amperes, Fraction, Gauss, Metres, RadiansPerSecond, Volts};
@@ -46,8 +46,8 @@ impl<T: Copy> Dated<T> {
 /// Body rates.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Rates {
-    /// About roll and pitch, as the autopilot wants them.
-    pub(super) wanted: [RadiansPerSecond; 2],
+    /// About the body's roll, pitch and yaw, as the autopilot wants them.
+    pub(super) wanted: [RadiansPerSecond; 3],
     /// About roll, pitch and yaw, as they are.
     pub(super) flown: [RadiansPerSecond; 3],
 }
@@ -187,7 +187,7 @@ pub(in crate::source::dataflash) struct State {
     /// Height of home.
     pub(super) home_altitude: Option<f32>,
     pub(super) clips: [u32; 3],
-    pub(super) cells: [Dated<[Option<Volts>; CELLS_MAX]>; INSTANCES],
+    pub(super) cells: [Dated<[Option<CellVoltage>; CELLS_MAX]>; INSTANCES],
     pub(super) messages_lost: Option<u64>,
     /// When UTC was said last.
     pub(super) utc_said: Option<Instant>,
@@ -492,7 +492,7 @@ impl State {
     }
 
     /// A battery's cells that were told lately.
-    pub(super) fn cells_of(&self, now: Instant, id: u8) -> [Option<Volts>; CELLS_MAX] {
+    pub(super) fn cells_of(&self, now: Instant, id: u8) -> [Option<CellVoltage>; CELLS_MAX] {
         let known = self.cells.get(usize::from(id)).and_then(|cells| cells.within(now, Span::from_secs(3)));
         known.unwrap_or(Battery::default().cells)
     }

@@ -336,6 +336,33 @@ fn the_attitude_that_is_wanted_stands_beside_the_one_that_is() {
 }
 
 #[test]
+fn the_second_estimator_has_a_place_where_the_first_one_is_logged_with_one() {
+    let second = |with_positions: bool| {
+        let mut log = Writer::new();
+        log.format(150, "AHR2", "QccCfLL", "TimeUS,Roll,Pitch,Yaw,Alt,Lat,Lng");
+        log.format(151, "POS", "QLLff", "TimeUS,Lat,Lng,Alt,RelHomeAlt");
+        let place = [-353_632_620_i32, 1_491_652_370].map(i32::to_le_bytes).concat();
+        let heights = [590.0_f32, 6.0].map(f32::to_le_bytes).concat();
+        if with_positions {
+            log.raw(151, &[&1_000_000_u64.to_le_bytes(), &place, &heights]);
+        }
+        let angles = [1_250_i16, -330].map(i16::to_le_bytes).concat();
+        let (yaw, altitude) = (35_000_u16.to_le_bytes(), 588.5_f32.to_le_bytes());
+        log.raw(150, &[&1_100_000_u64.to_le_bytes(), &angles, &yaw, &altitude, &place]);
+        let found = seen(&log.bytes).find(|seen| match seen {
+            Observation::SecondEstimate(second) => Some(*second),
+            _ => None,
+        });
+        let [second] = found[..] else { panic!("{found:?}") };
+        let degrees = second.attitude.map(|angles| angles.map(|angle| (angle.0.to_degrees() * 10.0).round()));
+        assert_eq!(degrees, Some([125.0, -33.0, -100.0]));
+        (second.altitude.map(|metres| metres.0), second.position.map(|place| place.latitude_deg))
+    };
+    assert_eq!(second(true), (Some(588.5), Some(-35.363_262)));
+    assert_eq!(second(false), (None, None));
+}
+
+#[test]
 fn the_climb_that_is_wanted_is_in_centimetres_where_it_is_whole() {
     let wanted = |kind: &str, value: &[u8]| {
         let mut log = Writer::new();

@@ -115,7 +115,7 @@ fn body_rates_and_those_that_are_wanted_are_in_degrees_since_3_4_and_in_hundredt
         let degrees = |rate: hums_core::units::RadiansPerSecond| rate.0.to_degrees().round();
         let seen = seen(log.as_bytes());
         let wanted = seen.find(|observation| match observation {
-            Observation::Wanted(wanted) => Some(wanted.rates.map(|rates| rates.map(degrees))),
+            Observation::Wanted(wanted) => Some(wanted.rates.map(|rates| rates.about.map(degrees))),
             _ => None,
         });
         let flown = seen.find(|observation| match observation {
@@ -124,7 +124,7 @@ fn body_rates_and_those_that_are_wanted_are_in_degrees_since_3_4_and_in_hundredt
         });
         (wanted, flown)
     };
-    let known = (vec![Some([20.0, 0.0]), None], vec![Some([10.0, 10.0, 0.0]), None]);
+    let known = (vec![Some([20.0, 0.0, 0.0]), None], vec![Some([10.0, 10.0, 0.0]), None]);
     assert_eq!(rates("ArduCopter V4.6.3 (3fc7011a)", 10.0), known);
     assert_eq!(rates("ArduCopter V3.3.3 (acf2e10c)", 1_000.0), known);
     let unknown = (vec![None; 2], vec![None; 2]);

@@ -2,7 +2,7 @@
 
 use hums_core::observation::{
     Air, Attitude, Estimator, EstimatorScale, GlobalPosition, Hud, Imu, LocalPosition, MOTORS_MAX,
-    Observation, Outputs, Vibration, VibrationScale, Wanted,
+    Observation, Outputs, Vibration, VibrationScale, Wanted, WantedRates,
 };
 use hums_core::units::{
     Celsius, Fraction, GRAVITY, Gauss, Hectopascals, Metres, MetresPerSecond, MetresPerSecond2, Position,
@@ -78,11 +78,13 @@ pub(super) const TOPICS: &[Topic] = &[
         name: "vehicle_rates_setpoint",
         instances: 1,
         every_us: FAST_US,
-        fields: &["roll", "pitch"],
+        fields: &["roll", "pitch", "yaw"],
         take: |px4, said| {
-            let rates = [said.fields.finite(0), said.fields.finite(1)];
+            let rates = [0, 1, 2].map(|axis| said.fields.finite(axis));
             px4.motion.rates_wanted = match rates {
-                [Some(roll), Some(pitch)] => Some((said.recorded_us, [roll, pitch].map(RadiansPerSecond))),
+                [Some(roll), Some(pitch), Some(yaw)] => {
+                    Some((said.recorded_us, [roll, pitch, yaw].map(RadiansPerSecond)))
+                }
                 _ => None,
             };
         },
@@ -359,7 +361,8 @@ fn attitude_setpoint(px4: &mut Px4, said: &Said<'_>) {
     let wanted = said.fields.vector::<4>(0).and_then(Wanted::from_quaternion).or_else(angles);
     if let Some(wanted) = wanted {
         let fresh = |(us, _): &(u64, _)| said.recorded_us.abs_diff(*us) <= RATES_AGE_US;
-        let rates = px4.motion.rates_wanted.filter(fresh).map(|(_, rates)| rates);
+        let rates = px4.motion.rates_wanted.filter(fresh);
+        let rates = rates.map(|(_, about)| WantedRates { about, of: None });
         px4.observe(Observation::Wanted(Wanted { rates, ..wanted }));
     }
 }

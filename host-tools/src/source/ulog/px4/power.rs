@@ -1,7 +1,7 @@
 //! Batteries, rails, the processor's load, motors.
 
 use hums_core::observation::{
-    Battery, CELLS_MAX, ESC_GROUP, Esc, EscGroup, MOTORS_MAX, Observation, Rails, SystemStatus,
+    Battery, CELLS_MAX, CellVoltage, ESC_GROUP, Esc, EscGroup, MOTORS_MAX, Observation, Rails, SystemStatus,
 };
 use hums_core::units::{AmpereHours, Amperes, Celsius, Fraction, Rpm, Volts};
 
@@ -78,7 +78,9 @@ fn battery(px4: &mut Px4, said: &Said<'_>) {
     let battery = Battery {
         // PX4 counts from 1; versions without a number, and those that leave it at 0, have instances.
         id: fields.byte(11).and_then(|id| id.checked_sub(1)).unwrap_or(said.instance),
-        cells: cells.unwrap_or([None; CELLS_MAX]),
+        cells: cells
+            .unwrap_or([None; CELLS_MAX])
+            .map(|cell| cell.and_then(|volts| CellVoltage::from_millivolts((volts.0 * 1e3).round() as u16))),
         voltage: voltage.map(Volts),
         current: current.map(Amperes),
         consumed: when(fields.finite(6)).filter(|mah| *mah >= 0.0).map(|mah| AmpereHours(mah / 1e3)),

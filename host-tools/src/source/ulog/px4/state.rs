@@ -142,7 +142,7 @@ pub(super) struct Motion {
     pub(super) force_us: Option<u64>,
     pub(super) rate: Option<[f32; 3]>,
     /// The body rates that are wanted, about roll and pitch, and when, microseconds.
-    pub(super) rates_wanted: Option<(u64, [RadiansPerSecond; 2])>,
+    pub(super) rates_wanted: Option<(u64, [RadiansPerSecond; 3])>,
     /// What each compass measured last, until an inertial sensor's observation takes it along.
     pub(super) fields: [Option<[Gauss; 3]>; 3],
     pub(super) local: Option<Local>,

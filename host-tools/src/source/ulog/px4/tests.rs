@@ -110,7 +110,7 @@ fn a_battery_without_cells_has_the_voltage_of_the_whole_and_unknown_is_not_minus
     let with = whole([3.5, 3.75, 4.0, 4.0]);
     assert!(
         with.contains(
-            "cells: [Some(Volts(3.5)), Some(Volts(3.75)), Some(Volts(4.0)), Some(Volts(4.0)), None"
+            "cells: [Some(CellVoltage(3500)), Some(CellVoltage(3750)), Some(CellVoltage(4000)), Some(CellVoltage(4000)), None"
         ),
         "{with}"
     );
@@ -225,7 +225,7 @@ fn the_wanted_rates_go_with_the_wanted_attitude() {
     let log = log.data(0, 3 * SECOND, &floats(&[1.0, 0.0, 0.0, 0.0]));
     let wanted = observations(&read(&log.bytes), "Wanted(");
     assert!(
-        wanted[0].contains("rates: Some([RadiansPerSecond(0.5), RadiansPerSecond(-0.25)])"),
+        wanted[0].contains("about: [RadiansPerSecond(0.5), RadiansPerSecond(-0.25), RadiansPerSecond(0.0)]"),
         "{wanted:?}"
     );
     assert!(wanted[1].contains("rates: None"), "they are old: {wanted:?}");
