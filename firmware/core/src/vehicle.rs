@@ -23,7 +23,7 @@ pub const BATTERIES_MAX: usize = 4;
 pub const RECEIVERS_MAX: usize = 2;
 /// `EXTENDED_SYS_STATE` comes at 1 Hz or faster where it comes at all.
 pub(crate) const LANDED_STATE_AGE: Span = Span::from_secs(5);
-/// An attitude that was the wanted one at each sample for so long follows none.
+/// An attitude that was the wanted one at each sample for so long, and turned, follows none.
 const LED: Span = Span::from_secs(5);
 /// `MAV_COMP_ID_BATTERY`, `MAV_COMP_ID_BATTERY2`
 const BATTERY_COMPONENTS: [u8; 2] = [180, 181];
@@ -468,9 +468,15 @@ impl Vehicle {
     fn note_led(&mut self, at: Instant, attitude: &Attitude) {
         /// 0.6 degrees, which is more than rounding.
         const COPY_RAD: f32 = 0.01;
-        if let Some([roll, pitch]) = self.wanted.within(at, LED)
-            && ((roll.0 - attitude.roll.0).abs() > COPY_RAD || (pitch.0 - attitude.pitch.0).abs() > COPY_RAD)
-        {
+        /// What turns slower than this, rad/s, lags the attitude that leads it, by 0.1 s and more, by no more than that: it may well be
+        /// where it is wanted, as a fast multicopter on its straight way.
+        const HOLDS: f32 = 0.1;
+        let Some([roll, pitch]) = self.wanted.within(at, LED) else { return };
+        let leads =
+            (roll.0 - attitude.roll.0).abs() > COPY_RAD || (pitch.0 - attitude.pitch.0).abs() > COPY_RAD;
+        let holds =
+            attitude.rates.is_some_and(|[roll, pitch, _]| roll.0.abs() < HOLDS && pitch.0.abs() < HOLDS);
+        if leads || holds && self.is_led(at) {
             self.led_at = Some(at);
         }
     }

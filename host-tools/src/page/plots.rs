@@ -137,17 +137,7 @@ fn velocity(line: u8) -> String {
 }
 
 fn attitude(line: u8) -> String {
-    named(
-        &[
-            "Roll",
-            "Pitch",
-            "Roll, wanted",
-            "Pitch, wanted",
-            "Roll, AHRS2",
-            "Pitch, AHRS2",
-        ],
-        line,
-    )
+    named(&["Roll", "Pitch", "Roll, wanted", "Pitch, wanted", "Roll, AHRS2", "Pitch, AHRS2"], line)
 }
 
 fn heading(line: u8) -> String {
