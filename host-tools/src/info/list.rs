@@ -236,6 +236,18 @@ mod tests {
         assert!(told(None).contains("(hums verify says why)"));
     }
 
+    /// What the box had counted when power went in the air is the least.
+    #[test]
+    fn a_time_in_the_air_that_was_stored_before_the_records_end_says_so() {
+        let mut log = Overview::default();
+        log.contents.usage.insert(UsageCounter::Flight.name().to_owned(), 192.0);
+        log.contents.usage_at = Some(Instant::from_millis(240_000));
+        log.ending.summary.last = Some(Instant::from_millis(244_700));
+        assert!(line(&log, 5).contains("   3:12 "), "on the ground nothing is counted after that");
+        log.ending.summary.marks.moved = Some(Instant::from_millis(40_000));
+        assert!(line(&log, 5).contains("  >3:12 "), "{}", line(&log, 5));
+    }
+
     #[test]
     fn columns_stand_under_their_heading() {
         let line = crate::colour::shown(&line(&Overview::default(), 5), false).into_owned();
