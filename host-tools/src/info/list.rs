@@ -137,6 +137,9 @@ fn line(log: &Overview, width: usize) -> String {
     }
     if log.contents.ends_in_air.is_some() {
         let _ = write!(text, "; {}", warning("ends in the air"));
+    } else if log.ending.summary.marks.moved.is_some() && !log.is_sound() {
+        // The box marks arming, take-off and landing.
+        let _ = write!(text, "; {}", warning("ends armed or in the air"));
     }
     if !log.is_sound() {
         // What is no log of ours is judged by another command.
