@@ -20,6 +20,19 @@ pub fn check_name(check: &str, instance: u8) -> String {
         .map_or_else(|| check.replace('_', " "), |words| words.said.name_of(instance).to_string())
 }
 
+/// A unit as people write it; logs and programs have it in ASCII.
+pub fn unit_name(unit: &str) -> &str {
+    match unit {
+        "degC" => "\u{b0}C",
+        "deg" => "\u{b0}",
+        "deg/s" => "\u{b0}/s",
+        "m/s2" => "m/s\u{b2}",
+        "1/min" => "per min",
+        "times" => "\u{d7} usual",
+        other => other,
+    }
+}
+
 /// The name of a counter, for instance `flight_time_s`, `motor0_run_time_s` or `esc_temperature_45_to_60_degc_s`;
 /// `counter_123` where this program does not know it.
 pub fn counter_name(number: u8) -> String {

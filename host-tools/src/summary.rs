@@ -32,6 +32,9 @@ pub const LISTED_MAX: usize = 10_000;
 /// The airframe's life and the counters of a session are stored together within this.
 const STORED_WITH: Span = Span::from_secs(5);
 
+/// What is counted after the counters were stored is worth telling from here on.
+const COUNTED_LATE: Span = Span::from_secs(1);
+
 /// Checks with exceedances that are kept: four times those that there are, with all their instances.
 const EXCEEDANCES_MAX: usize = 1_000;
 
@@ -515,10 +518,11 @@ impl Overview {
         (self.format.is_none() && bytes > 0).then(|| self.contents.tlog_bytes() as f64 / bytes as f64)
     }
 
-    /// When the counters of its session were stored, where the recording goes on for a while after that: they are of the time until then.
+    /// When the counters of its session were stored, where the vehicle was armed or in the air after that: they are of the time until then.
     pub fn counted_until(&self) -> Option<Instant> {
-        let last = self.ending.summary.last?;
-        self.contents.usage_at.filter(|at| last.since(*at) >= STORED_WITH)
+        let summary = &self.ending.summary;
+        let last = summary.last.filter(|_| summary.marks.moved.is_some())?;
+        self.contents.usage_at.filter(|at| last.since(*at) >= COUNTED_LATE)
     }
 
     /// Whether a group could not be read because this program is too old for it.

@@ -14,7 +14,7 @@ use super::judged::{Judged, JudgedBy};
 use super::problem::{Problem, side};
 use crate::colour::level as coloured;
 use crate::counters::tells_flight;
-use crate::names::{autopilot_name, type_name};
+use crate::names::{autopilot_name, type_name, unit_name};
 use crate::plural::count;
 use crate::printable::word;
 use crate::source::item::{About, Cause, Gap};
@@ -468,7 +468,7 @@ fn sentence(group: &[&Problem]) -> String {
         }
         _ => name.to_owned(),
     };
-    let unit = if first.unit.is_empty() { String::new() } else { format!(" {}", first.unit) };
+    let unit = if first.unit.is_empty() { String::new() } else { format!(" {}", unit_name(&first.unit)) };
     let (state, value, limit) = match shown(&first.check, first.value, first.limit) {
         Shown::State(state) => (state, None, None),
         Shown::Quantity(value, limit) => (None, value, limit),

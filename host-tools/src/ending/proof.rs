@@ -5,7 +5,7 @@ use hums_core::time::Instant;
 
 use crate::logs::reader::Summary;
 use crate::plural::count;
-use crate::utc::iso8601;
+use crate::utc::iso8601_ms;
 
 /// What proves how a log ends.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -175,7 +175,7 @@ pub(super) fn seconds_after(summary: &Summary, at: Instant) -> Option<f64> {
 /// A time in UTC where it is known, otherwise in seconds since power-on.
 fn moment(summary: &Summary, at: Instant) -> String {
     let utc = summary.epoch_us.map(|epoch| epoch.saturating_add(at.as_micros()));
-    utc.map_or_else(|| format!("{:.3} s", at.as_secs_f64()), |utc| iso8601(utc / 1000 * 1000))
+    utc.map_or_else(|| crate::utc::moment(at), iso8601_ms)
 }
 
 #[cfg(test)]

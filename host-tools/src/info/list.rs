@@ -137,6 +137,9 @@ fn line(log: &Overview, width: usize) -> String {
     }
     if log.contents.ends_in_air.is_some() {
         let _ = write!(text, "; {}", warning("ends in the air"));
+    } else if log.ending.summary.marks.moved.is_some() && !log.is_sound() {
+        // The box marks arming, take-off and landing.
+        let _ = write!(text, "; {}", warning("ends armed or in the air"));
     }
     if !log.is_sound() {
         // What is no log of ours is judged by another command.
@@ -234,6 +237,18 @@ mod tests {
         };
         assert!(told(Some(Format::DataFlash)).contains("(hums check says where)"));
         assert!(told(None).contains("(hums verify says why)"));
+    }
+
+    /// What the box had counted when power went in the air is the least.
+    #[test]
+    fn a_time_in_the_air_that_was_stored_before_the_records_end_says_so() {
+        let mut log = Overview::default();
+        log.contents.usage.insert(UsageCounter::Flight.name().to_owned(), 192.0);
+        log.contents.usage_at = Some(Instant::from_millis(240_000));
+        log.ending.summary.last = Some(Instant::from_millis(244_700));
+        assert!(line(&log, 5).contains("   3:12 "), "on the ground nothing is counted after that");
+        log.ending.summary.marks.moved = Some(Instant::from_millis(40_000));
+        assert!(line(&log, 5).contains("  >3:12 "), "{}", line(&log, 5));
     }
 
     #[test]

@@ -16,7 +16,7 @@ use crate::ending::{among_words, behind_words, copies_words, made_again_words, u
 use crate::logs;
 use crate::logs::begun_anew::BegunAnew;
 use crate::logs::naming::is_part;
-use crate::names::check_name;
+use crate::names::{check_name, unit_name};
 use crate::plural::count;
 use crate::printable::{path, word};
 use crate::source::item::MessageCount;
@@ -193,7 +193,7 @@ fn sentence(finding: &FindingLine) -> String {
         let _ = write!(sentence, ", {state}");
     }
     if let Some(value) = value {
-        let _ = write!(sentence, ", {} {unit}", short(value.into()));
+        let _ = write!(sentence, ", {} {}", short(value.into()), unit_name(unit));
         sentence.truncate(sentence.trim_end().len());
     }
     if let Some(limit) = limit {

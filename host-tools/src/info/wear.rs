@@ -7,7 +7,7 @@ use hums_core::time::Instant;
 
 use super::json::finite;
 use super::number::short;
-use crate::names::check_name;
+use crate::names::{check_name, unit_name};
 use crate::printable::word;
 use crate::states::{Shown, shown};
 use crate::summary::Overview;
@@ -31,9 +31,9 @@ pub(super) fn text(text: &mut String, log: &Overview) {
             let seconds = |tenths: u32| moment(Instant::from_millis(u64::from(tenths) * 100));
             let worst = match shown(check, peak, f32::NAN) {
                 Shown::State(state) => state.unwrap_or_default().to_owned(),
-                Shown::Quantity(peak, _) => {
-                    peak.map_or_else(String::new, |peak| format!("{} {}", short(peak.into()), line.unit))
-                }
+                Shown::Quantity(peak, _) => peak.map_or_else(String::new, |peak| {
+                    format!("{} {}", short(peak.into()), unit_name(&line.unit))
+                }),
             };
             let _ = writeln!(
                 text,

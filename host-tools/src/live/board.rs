@@ -146,6 +146,8 @@ fn part(craft: &Craft, now: Instant, subsystem: Subsystem, known: &Known) -> Par
         (Some(calm), format!("{}; not judged on the ground or disarmed", without_advice(finding)))
     } else if unknown && !absent && waits(craft, subsystem) {
         (Some("idle"), waits_for(subsystem).to_owned())
+    } else if recorder && level == Level::Stale && craft.on_the_wire {
+        (Some("recorded"), "it recorded this; hums verify says how well".to_owned())
     } else if unknown && !EXPECTED.contains(&subsystem) {
         (Some("none"), "nothing is heard of any".to_owned())
     } else if silent && level == Level::Stale && !recorder {
@@ -195,7 +197,6 @@ fn reason(craft: &Craft, subsystem: Subsystem, level: Level, here: Level, good: 
     }
     match (subsystem, level) {
         (Subsystem::Recorder, Level::Ok) => "it records".to_owned(),
-        (Subsystem::Recorder, Level::Stale) if craft.on_the_wire => "it recorded this".to_owned(),
         (Subsystem::Recorder, Level::Stale) => "no recorder is heard on this link".to_owned(),
         (Subsystem::Power, Level::Advisory) if here == level => format!("{good} checks good"),
         (Subsystem::Recorder, _) => "see what the box says below".to_owned(),

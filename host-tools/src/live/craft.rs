@@ -146,9 +146,16 @@ impl Craft {
         }
         if let Some(history) = history {
             history.frame(at, frame, self.monitor.vehicle().source);
-            if let Some((name, value)) = parameter(frame, self.autopilot()) {
-                history.parameter(at, &name, value);
-            }
+        }
+        self.parameter(at, frame, history);
+    }
+
+    /// Takes a parameter that its autopilot tells.
+    pub fn parameter(&self, at: Instant, frame: &Frame<'_>, history: &mut Option<&mut History>) {
+        if let Some(history) = history
+            && let Some((name, value)) = parameter(frame, self.autopilot())
+        {
+            history.parameter(at, &name, value);
         }
     }
 

@@ -379,6 +379,7 @@ impl Player {
         }
         *now = to;
         loaded.go(world, to)?;
+        self.rate.jump(world.frames);
         Ok(())
     }
 

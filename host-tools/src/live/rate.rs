@@ -22,6 +22,11 @@ impl Default for Rate {
 }
 
 impl Rate {
+    /// It goes on from so many frames, elsewhere: what lies between did not come now.
+    pub fn jump(&mut self, frames: u64) {
+        (self.frames, self.since) = (frames, Wall::now());
+    }
+
     /// So many frames there were until now.
     pub fn count(&mut self, frames: u64) {
         let passed = self.since.elapsed().as_secs_f64();

@@ -13,6 +13,7 @@ use super::craft::Craft;
 use super::native::Entry;
 use super::told::{Limits, Told, parameter, place_of};
 use crate::check::SETTLE;
+use crate::mavlink::ids::PARAM_VALUE;
 use crate::page::history::History;
 use crate::page::more::More;
 
@@ -47,10 +48,15 @@ pub struct World {
     on_the_wire: bool,
     /// The vehicle that a log is of: the first one heard in it.
     owner: Option<u8>,
+    /// Parameters that autopilots told before their first heartbeat: system and frame.
+    early: Vec<(u8, Vec<u8>)>,
     /// What the log told of its parts before that.
     parts: [Option<Component>; COMPONENTS_MAX],
     next_tick: Instant,
 }
+
+/// Parameters that are kept until their autopilot's heartbeat comes, of all systems.
+const EARLY_MAX: usize = 2_048;
 
 /// More in one step than all checks together could change is not possible.
 const FOUND_MAX: usize = 4_096;
@@ -67,6 +73,7 @@ impl World {
             limits,
             on_the_wire: false,
             owner: None,
+            early: Vec::new(),
             parts: [None; COMPONENTS_MAX],
             next_tick: Instant::ZERO,
         }
@@ -105,11 +112,21 @@ impl World {
                     craft.observe(at, source, &radio, &mut history);
                 }
             }
+            _ if !known && frame.id() == PARAM_VALUE && self.early.len() < EARLY_MAX => {
+                self.early.push((system, frame.bytes().to_vec()));
+            }
             _ => {}
         }
         if let Some(craft) = self.crafts.get_mut(&system) {
             let mut history = histories.map(|histories| histories.entry(system).or_default());
             craft.frame(at, frame, &mut history);
+            if !known {
+                let told = self.early.extract_if(.., |(of, _)| *of == system);
+                let told: Vec<_> = told.collect();
+                told.iter()
+                    .filter_map(|(_, bytes)| Frame::again(bytes, Check::Verified))
+                    .for_each(|frame| craft.parameter(at, &frame, &mut history));
+            }
             if let Some((name, value)) = parameter(frame) {
                 self.limits.take(craft.monitor.params_mut(), &name, value);
             }
@@ -349,6 +366,21 @@ mod tests {
         let words: Vec<_> =
             part["notes"].as_array().into_iter().flatten().map(|note| &note["words"]).collect();
         assert_eq!(words, ["armed when it was first heard", "in the air when it was first heard"]);
+    }
+
+    #[test]
+    fn parameters_that_come_before_the_first_heartbeat_are_told() {
+        let (mut world, mut histories) = (World::new(Limits::default()), Histories::new());
+        let mut encoder = Encoder::of(1, 1);
+        for name in ["RTL_ALT", "PILOT_SPEED_UP"] {
+            let mut buffer = [0; FRAME_BYTES_MAX];
+            let frame = encoder.frame(&mut buffer, &messages::param_value(name, 15.0, 0, 2)).to_vec();
+            hear(&mut world, &mut histories, Instant::from_millis(1), &frame);
+        }
+        hear(&mut world, &mut histories, Instant::from_millis(900), &heartbeat(1));
+        let told: Vec<_> = histories[&1].last_parameters().map(|(name, _)| name.to_owned()).collect();
+        assert_eq!(told, ["PILOT_SPEED_UP", "RTL_ALT"]);
+        assert!(world.early.is_empty());
     }
 
     #[test]

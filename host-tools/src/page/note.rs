@@ -7,7 +7,7 @@ use hums_core::time::Instant;
 use hums_link::encode::COMPONENT;
 use serde::Serialize;
 
-use crate::names::check_name;
+use crate::names::{check_name, unit_name};
 use crate::states::{Shown, shown};
 use crate::statustext::Text;
 use crate::summary::FindingLine;
@@ -81,19 +81,6 @@ impl Cause {
     }
 }
 
-/// A unit as people write it; logs and programs have it in ASCII.
-fn written(unit: &str) -> &str {
-    match unit {
-        "degC" => "\u{b0}C",
-        "deg" => "\u{b0}",
-        "deg/s" => "\u{b0}/s",
-        "m/s2" => "m/s\u{b2}",
-        "1/min" => "rpm",
-        "times" => "times its usual",
-        other => other,
-    }
-}
-
 /// A box tells three texts of half a minute at most, and a warning at the end of its event.
 const AGAIN_S: f64 = 45.0;
 
@@ -145,7 +132,7 @@ impl Note {
                 value,
                 state,
                 limit,
-                unit: written(&finding.unit).to_owned(),
+                unit: unit_name(&finding.unit).to_owned(),
                 meaning: known.filter(|_| is_worry).map_or("", |known| known.meaning),
                 action: known.filter(|_| is_worry).map_or("", |known| known.action),
                 because: because.map(Cause::of),

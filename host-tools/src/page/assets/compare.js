@@ -7,7 +7,7 @@ import { bar, cells, rows, section } from "./layout.js";
 import { extent, map } from "./map.js";
 import { charts } from "./plot.js";
 import { plots } from "./plots.js";
-import { clock, counted, fixed, plural, short, span } from "./text.js";
+import { counted, fixed, moment, plural, short, span } from "./text.js";
 import { back, cursorTime, home, usually } from "./view.js";
 
 const data = JSON.parse(document.getElementById("data").textContent);
@@ -178,7 +178,7 @@ found.append(
               "ol",
               { class: "found" },
               f.findings.map(([at, level, words]) =>
-                el("li", {}, el("time", {}, clock(at)), el("span", { class: `badge ${level}` }, level), words),
+                el("li", {}, el("time", {}, moment(at)), el("span", { class: `badge ${level}` }, level), words),
               ),
             )
           : el("p", { class: "dim" }, "No warning, nothing critical."),

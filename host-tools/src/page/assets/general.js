@@ -11,7 +11,7 @@ export const general = () => {
   const percent = gauge("battery_percent", "Battery remaining", { unit: "%", high: 100 });
   const volts = stat("battery_volts", "Battery voltage", { unit: "V", line: "PackVolts" });
   const pressure = gauge("pressure", "Air pressure", { unit: "hPa", low: 500, high: 1100 });
-  const celsius = stat("temperature", "Temperature at the barometer", {
+  const celsius = stat("temperature", "Baro temperature", {
     unit: "\u00b0C",
     decimals: 1,
     line: "Temperature",

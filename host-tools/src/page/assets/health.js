@@ -167,7 +167,7 @@ export const link = () => {
         ].filter(Boolean);
         say(told, counted.length ? `on board: ${counted.join(", ")}` : "");
       }
-      say(numbers[0], `${fixed(head.frames_s, 0)} /s, ${whole(figures.frames)} in all`);
+      say(numbers[0], `${fixed(head.frames_s, 0)} /s, ${whole(figures.frames)} of this vehicle`);
       say(numbers[1], figures.loss_percent == null ? "not known yet" : `${fixed(figures.loss_percent, 1)} %`);
       say(numbers[2], whole(figures.missing));
       say(numbers[3], state.heard_ms < 1500 ? "now" : `${age(state.heard_ms)} ago`);

@@ -52,7 +52,11 @@ const exceeded = (wear) => {
   const exceeded = log.exceedances.filter((e) => [e.session, e.lifetime].some((of) => of?.warnings || of?.criticals));
   if (!exceeded.length) return;
   const times = (count, seconds) => (count ? `${whole(count)} \u00d7, ${fixed(seconds, 1)} s` : "");
-  const worst = (e, of) => of.state ?? (of.peak == null ? "" : `${Number(of.peak.toPrecision(4))} ${e.unit}`);
+  const worst = (e, of) =>
+    of.state ??
+    (of.peak == null
+      ? ""
+      : `${Number(of.peak.toPrecision(4))} ${e.unit.replace("m/s2", "m/s\u00b2").replace("deg", "\u00b0").replace("times", "\u00d7 usual")}`);
   const lived = exceeded.some(({ lifetime }) => lifetime);
   const crossings = (e, of) => (of ? [times(of.warnings, of.warning_s), times(of.criticals, of.critical_s), worst(e, of)] : ["", "", ""]);
   wear.append(
