@@ -281,7 +281,7 @@ vocabulary! {
     "Check the barometer, its cover and the airflow at it, and the GPS antenna's view.";
     "baro_noise" Vehicle "barometer noise", "", says "barometer noisy", "", needs "air pressure and climb rate";
     "The barometer became noisy in flight."; "Check the barometer, its cover and the airflow at it.";
-    "ekf_climb" Vehicle "EKF climb", "", says "EKF climb off baro", "LAND, MANUAL", needs "air pressure and climb rate on rotors";
+    "ekf_climb" Vehicle "EKF climb", "", says "EKF climb off baro", "LAND BY HAND", needs "air pressure and climb rate on rotors";
     "The EKF's climb was not that of the barometer: height control may run away.";
     "Do not fly until vibration, accelerometers, the barometer and its cover are checked.";
     "ahrs2_tilt" ArduPilot "attitudes of EKF and AHRS2", "", says "EKF and AHRS2 attitudes differ", "", needs "attitude of AHRS2 in flight";
@@ -362,7 +362,7 @@ vocabulary! {
     "radio_margin" Vehicle "telemetry signal above noise", "", says "telemetry signal near noise", "", needs "telemetry radio status";
     "The telemetry radio's signal was hardly above the noise."; "Check antennas, range and sources of interference.";
 
-    "rc_alert" Said "autopilot's remote control alert", "", says "autopilot: remote control lost", "FLY BACK", needs "texts, events or health flags of the autopilot";
+    "rc_alert" Said "autopilot's remote control alert", "", says "autopilot: remote control lost", "WATCH IT", needs "texts, events or health flags of the autopilot";
     "The autopilot said that the remote control was lost."; "Check transmitter, receiver, antennas and range.";
     "gcs_alert" Said "autopilot's ground station alert", "", says "autopilot: ground station lost", "FLY BACK", needs "texts, events or health flags of the autopilot";
     "The autopilot said that the ground station or a companion was lost."; "Check the telemetry link and its range.";
