@@ -47,6 +47,8 @@ pub struct Found {
     pub instance: u8,
     /// The level before.
     pub previous: &'static str,
+    /// The check no longer applies: what was bad is not known to be good.
+    pub ended: bool,
     /// What decided; `null` where the input stopped, and where it is no quantity.
     pub value: Option<f32>,
     /// The state that the value is, where it is no quantity.
@@ -129,6 +131,7 @@ impl Note {
                 check: finding.check.clone(),
                 instance: finding.instance,
                 previous: finding.previous,
+                ended: finding.is_unjudged(),
                 value,
                 state,
                 limit,
@@ -193,6 +196,7 @@ impl Note {
                 check: check.to_owned(),
                 instance,
                 previous: "",
+                ended: false,
                 value: None,
                 state: None,
                 limit: None,

@@ -60,7 +60,8 @@ export const notes = ({ go, newestFirst, rows = Infinity }) => {
       { found } = note;
     // What is only said is no level of anything.
     const plain = note.kind === "event" || (note.kind === "text" && note.level === "ok");
-    level.set(plain ? "event" : note.level, note.kind === "event" ? "event" : plain ? "says" : note.level);
+    if (found?.ended) level.set("stale", "ended");
+    else level.set(plain ? "event" : note.level, note.kind === "event" ? "event" : plain ? "says" : note.level);
     const from = note.from === "here" ? note.subsystem : note.from;
     return el(
       "li",
