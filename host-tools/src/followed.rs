@@ -26,6 +26,10 @@ const FILE_AGE_MIN: Span = Span::from_secs(5);
 pub trait Logged {
     /// What is known of its end, where it is a log of ours.
     fn ending(&mut self) -> Option<&mut Ending>;
+
+    /// The log before it of the same power-on, whose end was read, has so many sectors and frames of that: what is missing before this
+    /// one is counted from there on.
+    fn follows(&mut self, _sectors: u32, _frames: Option<u32>) {}
 }
 
 /// Holds logs back for as long as a later one may say something of their end.
@@ -58,7 +62,7 @@ impl<T: Logged> Followed<T> {
 
     /// Takes the next log; gives those of which nothing more will be said, in order.
     pub fn push(&mut self, mut next: T) -> Vec<T> {
-        let mut has_sectors = false;
+        let (mut has_sectors, mut earlier) = (false, None);
         if let Some(ending) = next.ending() {
             has_sectors = ending.summary.session.is_some();
             ending.again = self.sessions.again(&ending.name).map(str::to_owned);
@@ -82,8 +86,11 @@ impl<T: Logged> Followed<T> {
                 }
             }
             if has_place {
-                self.follow(ending);
+                earlier = self.follow(ending);
             }
+        }
+        if let Some(earlier) = earlier {
+            next.follows(earlier.end, earlier.frames_end);
         }
         self.held.push_back(next);
         // Only the newest that has sectors can be what the next start found.
@@ -142,14 +149,14 @@ impl<T: Logged> Followed<T> {
         (is_absent || is_far || is_of_clone).then_some(Misnamed::Ahead { before: before.number })
     }
 
-    /// How a log follows the one before it of the same power-on.
-    fn follow(&mut self, next: &mut Ending) {
-        let (card, Some(number)) = place(&next.name) else { return };
+    /// How a log follows the one before it of the same power-on, which is given where it ends before this one.
+    fn follow(&mut self, next: &mut Ending) -> Option<Latest> {
+        let (card, Some(number)) = place(&next.name) else { return None };
         let summary = &next.summary;
         let (Some(session), Some(first), Some(last)) =
             (summary.session, summary.first_number, summary.last_number)
         else {
-            return;
+            return None;
         };
         let key = (card.to_owned(), session);
         // Where the card was out for a moment, the next log has all of the sector that was in progress.
@@ -165,6 +172,7 @@ impl<T: Logged> Followed<T> {
         let latest = Latest { number, end, frames_end: summary.frames_end, check_end, last: summary.last };
         let latest = earlier.filter(|earlier| earlier.end > end).unwrap_or(latest);
         self.latest.insert(key, Latest { number, ..latest });
+        earlier.filter(|earlier| earlier.end <= first)
     }
 
     /// Of a log that is not the first one of its power-on.
@@ -228,9 +236,9 @@ impl<T: Logged> Followed<T> {
         }
     }
 
-    /// The end of the log before `next` is missing; whether that log is at hand.
+    /// The end of the log before `next` is missing; whether that log is at hand. Of one that ended in order none is.
     fn shorten(&mut self, next: &Ending, sectors: u32, frames: Option<u32>) -> bool {
-        let Some(log) = self.before(next) else { return false };
+        let Some(log) = self.before(next).filter(|log| log.proof != Proof::Closed) else { return false };
         log.proof = Proof::Short { sectors, frames, by: Teller::NextLog };
         true
     }
@@ -393,6 +401,33 @@ mod tests {
         done.extend(followed.finish());
         assert_eq!(done[0].strange(), Vec::<String>::new());
         assert_eq!(done[1].before, SessionBefore::There);
+    }
+
+    #[test]
+    fn what_is_missing_after_a_log_that_ended_in_order_is_not_its_own() {
+        let logs = |proof| {
+            let [mut one, mut two] = [("00001", 0, 99), ("00002", 628, 900)].map(|(name, first, last)| {
+                let mut log = Ending { name: name.to_owned(), ..Ending::default() };
+                (log.summary.session, log.summary.first_number, log.summary.last_number) =
+                    (Some(7), Some(first), Some(last));
+                log
+            });
+            (one.proof, one.summary.frames_end, two.summary.frames_before) = (proof, Some(50), Some(70));
+            two.proof = Proof::Closed;
+            let mut followed = Followed::new(Sessions::default());
+            let mut done = followed.push(one);
+            done.extend(followed.push(two));
+            done.extend(followed.finish());
+            (done[0].proof, done[1].power_on)
+        };
+        let (proof, power_on) = logs(Proof::Closed);
+        assert_eq!(proof, Proof::Closed);
+        assert!(
+            matches!(power_on, PowerOn::Missing { after: Some(1), sectors: 528, frames: Some(20), .. }),
+            "{power_on:?}"
+        );
+        let short = Proof::Short { sectors: 528, frames: Some(20), by: Teller::NextLog };
+        assert_eq!(logs(Proof::None), (short, PowerOn::Follows));
     }
 
     #[test]

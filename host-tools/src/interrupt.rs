@@ -38,18 +38,27 @@ pub fn watch_twice() {
 
 /// So many are only noted.
 fn watch_for(wishes: u32) {
-    REQUESTED.get_or_init(|| {
-        let [requested, armed] = [(); 2].map(|()| Arc::new(AtomicBool::new(false)));
-        let thread = std::thread::Builder::new().name("signals".to_owned());
-        let ready = Arc::clone(&armed);
-        let is_told_apart =
-            next().and_then(|next| thread.spawn(move || tell_apart(wishes, next, &ready))).is_ok();
+    REQUESTED.get_or_init(|| watched(wishes, next));
+}
+
+/// What is set once one has come. From the first thing on that keeps a signal from ending the program it is set: none is passed over.
+fn watched<N: FnMut() + Send + 'static>(
+    wishes: u32,
+    next: impl FnOnce() -> io::Result<N>,
+) -> Arc<AtomicBool> {
+    let [requested, armed] = [(); 2].map(|()| Arc::new(AtomicBool::new(false)));
+    note_failure(set_by_signals(&requested));
+    let thread = std::thread::Builder::new().name("signals".to_owned());
+    let ready = Arc::clone(&armed);
+    let is_told_apart =
+        next().and_then(|next| thread.spawn(move || tell_apart(wishes, next, &ready))).is_ok();
+    note_failure(end_once(&armed));
+    if !is_told_apart {
         // Where the system gives no thread, the second one ends the program, however soon it comes. In this order: the first one
         // must not find the flag set.
-        let set = if is_told_apart { vec![&requested] } else { vec![&armed, &requested] };
-        note_failure(register(&armed, &set));
-        requested
-    });
+        note_failure(set_by_signals(&armed));
+    }
+    requested
 }
 
 /// Waits for so many, after which the next one ends the program at once.
@@ -91,15 +100,16 @@ fn next() -> io::Result<impl FnMut() + Send + 'static> {
     })
 }
 
-/// Each signal sets these, and ends the program at once where it finds `armed` set.
-fn register(armed: &Arc<AtomicBool>, set: &[&Arc<AtomicBool>]) -> io::Result<()> {
-    for signal in [SIGINT, SIGTERM] {
-        flag::register_conditional_shutdown(signal, EXIT_CODE, Arc::clone(armed))?;
-        for each in set {
-            flag::register(signal, Arc::clone(each))?;
-        }
-    }
-    Ok(())
+/// Each signal sets this.
+fn set_by_signals(set: &Arc<AtomicBool>) -> io::Result<()> {
+    [SIGINT, SIGTERM].into_iter().try_for_each(|signal| flag::register(signal, Arc::clone(set)).map(|_| ()))
+}
+
+/// Each signal ends the program at once where it finds `armed` set.
+fn end_once(armed: &Arc<AtomicBool>) -> io::Result<()> {
+    [SIGINT, SIGTERM].into_iter().try_for_each(|signal| {
+        flag::register_conditional_shutdown(signal, EXIT_CODE, Arc::clone(armed)).map(|_| ())
+    })
 }
 
 /// Without a handler the signal simply ends the program, as before.
@@ -124,4 +134,19 @@ pub fn requested() -> bool {
 /// Whether that was asked a second time, after [`watch_twice`].
 pub fn requested_again() -> bool {
     AGAIN.load(Ordering::SeqCst)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_signal_that_comes_while_the_program_begins_to_watch_is_noted() {
+        let requested = watched(1, || {
+            let next = next();
+            signal_hook::low_level::raise(SIGTERM)?;
+            next
+        });
+        assert!(requested.load(Ordering::SeqCst));
+    }
 }

@@ -450,6 +450,22 @@ impl Logged for Overview {
     fn ending(&mut self) -> Option<&mut Ending> {
         Some(&mut self.ending)
     }
+
+    fn follows(&mut self, sectors: u32, frames: Option<u32>) {
+        let summary = &mut self.ending.summary;
+        // Counted from the power-on on, because nothing in the log tells where it began.
+        let is_all = |gap: &&mut Gap| {
+            gap.from.is_none()
+                && gap.cause != Cause::Disarmed
+                && summary.first_number.is_some_and(|first| sectors <= first && first <= gap.sectors_lost)
+        };
+        let Some(gap) = self.contents.gaps.first_mut().filter(is_all) else { return };
+        gap.sectors_lost -= sectors;
+        let Some(all) = gap.frames else { return };
+        gap.frames = frames.and_then(|frames| all.checked_sub(frames));
+        summary.frames_missing -= u64::from(all - gap.frames.unwrap_or(0));
+        summary.gaps_uncounted += u64::from(gap.frames.is_none());
+    }
 }
 
 impl Overview {

@@ -511,9 +511,74 @@ fn losses_detail(log: &Overview) -> String {
 mod tests {
     use std::fs;
 
-    use hums_blackbox::Sector;
+    use hums_blackbox::record::{Keep, Note};
+    use hums_blackbox::{GROUP_SECTORS, Record, Sector, SectorSink, Writer};
 
     use super::*;
+    use crate::followed::Logged;
+
+    #[derive(Default)]
+    struct Memory(Vec<u8>);
+
+    impl SectorSink for Memory {
+        fn room(&self) -> usize {
+            usize::MAX
+        }
+
+        fn put(&mut self, sector: &Sector) {
+            let mut sector = *sector;
+            sector.seal(7);
+            self.0.extend_from_slice(sector.bytes());
+        }
+    }
+
+    /// A power-on from its second group on, which says from which of its sectors on all was kept.
+    fn second_log(before: u32) -> Overview {
+        let (mut memory, mut writer) = (Memory::default(), Box::new(Writer::new()));
+        let (mut groups, mut starts) = (0, Vec::new());
+        for tenth in 0..3_000_u64 {
+            let at = Instant::from_millis(tenth * 100);
+            let random = tenth.wrapping_mul(0x9E37_79B9_7F4A_7C15);
+            let text = format!("{random:016x}{:016x}", random.rotate_left(29));
+            writer.record(at, &Record::Note(Note { severity: 6, text: &text }), &mut memory).expect("room");
+            if std::mem::replace(&mut groups, writer.counters().groups) != groups {
+                let start = writer.counters().sectors as u32;
+                starts.push(start as usize);
+                let keep = Record::Keep(Keep { all: true, from: start.saturating_sub(before), seconds: 30 });
+                writer.record(at, &keep, &mut memory).expect("room");
+            }
+        }
+        writer.finish(&mut memory);
+        let sectors: Vec<_> = memory.0.as_chunks::<512>().0.to_vec();
+        let start = starts.iter().copied().find(|start| *start >= GROUP_SECTORS / 2).expect("a second group");
+        assert!(Sector::from_bytes(sectors[start]).starts_group());
+        let dir = tempfile::tempdir().expect("a folder");
+        fs::write(dir.path().join("00002_00.HUM"), sectors[start..].concat()).expect("room");
+        let found = logs::find(&[dir.path().to_owned()], false).expect("a log");
+        Overview::verified(&found.logs[0]).expect("it reads")
+    }
+
+    #[test]
+    fn what_the_logs_before_have_of_a_power_on_is_not_missing() {
+        let whole = second_log(0);
+        assert_eq!((whole.contents.gaps.len(), whole.ending.summary.not_kept), (0, 0));
+        // Of what is, nothing tells how many frames it had.
+        let late = second_log(5);
+        let gap = late.contents.gaps[0];
+        assert_eq!((gap.sectors_lost, gap.frames, late.ending.summary.gaps_uncounted), (5, None, 1));
+        // Where nothing tells where it began, the log before does.
+        let mut lost = Overview::default();
+        lost.contents.gaps.push(Gap { sectors_lost: 628, frames: Some(70), ..gap });
+        let summary = &mut lost.ending.summary;
+        (summary.first_number, summary.gaps, summary.frames_missing) = (Some(628), 1, 70);
+        for (frames, expected) in [(Some(50), (Some(20), 20, 0)), (None, (None, 0, 1))] {
+            let mut lost = lost.clone();
+            Logged::follows(&mut lost, 100, frames);
+            let (gap, summary) = (&lost.contents.gaps[0], &lost.ending.summary);
+            assert_eq!(gap.sectors_lost, 528);
+            assert_eq!((gap.frames, summary.frames_missing, summary.gaps_uncounted), expected);
+        }
+    }
 
     #[test]
     fn a_log_that_cannot_be_read_keeps_no_other_from_being_read() {

@@ -245,8 +245,13 @@ fn gaps_text(text: &mut String, log: &Overview) {
     }
     for gap in contents.gaps.iter().filter(|gap| gap.cause == Cause::Disarmed).take(SHOWN_MAX) {
         let time = |at: Option<Instant>| moment(at.unwrap_or(Instant::ZERO));
-        let (from, to) = (time(gap.from), time(gap.to));
-        let _ = writeln!(text, "    from {from} to {to}: not recorded: disarmed");
+        // Before a later log of a power-on are the logs before.
+        let is_later = summary.keep.is_some_and(|keep| keep.from > 0);
+        let from = match gap.from {
+            None if is_later => "since the log before".to_owned(),
+            from => format!("from {}", time(from)),
+        };
+        let _ = writeln!(text, "    {from} to {}: not recorded: disarmed", time(gap.to));
     }
     for gap in contents.gaps.iter().filter(|gap| gap.cause != Cause::Disarmed).take(SHOWN_MAX) {
         let time = |at: Option<Instant>, none: &str| at.map_or_else(|| none.to_owned(), moment);

@@ -10,7 +10,7 @@ use super::card::{image, whole_file};
 use super::folder::directory;
 pub use super::found::{Found, Image, REMARKS_MAX};
 pub use super::look::{Content, look};
-use super::naming::{SegmentName, segment_name};
+use super::naming::{SegmentName, is_part, segment_or_part};
 use super::places::Log;
 use crate::files::{is_seekable, why_unread};
 
@@ -47,10 +47,10 @@ fn search(inputs: &[PathBuf], salvage: bool, none: impl Fn(&Path) -> Result<()>)
             let images = found.images.len();
             named_file(input, salvage, &mut found)?;
             if let (Some(name), true) =
-                (segment_name(input), images == found.images.len() && before < found.logs.len())
+                (segment_or_part(input), images == found.images.len() && before < found.logs.len())
                 && let Some(log) = found.logs.pop()
             {
-                segments.entry(folder_of(input)).or_default().push((name, log));
+                segments.entry(folder_of(input)).or_default().push((!is_part(input), name, log));
                 continue;
             }
         }
@@ -106,8 +106,8 @@ fn named_file(path: &Path, salvage: bool, found: &mut Found) -> Result<()> {
     Ok(())
 }
 
-/// The segments that were named one by one, by folder.
-type Segments = BTreeMap<PathBuf, Vec<(SegmentName, Log)>>;
+/// The segments that were named one by one, by folder, and whether each is whole, or a part of one.
+type Segments = BTreeMap<PathBuf, Vec<(bool, SegmentName, Log)>>;
 
 /// The folder in which a file is, however that is spelled.
 fn folder_of(path: &Path) -> PathBuf {
@@ -129,11 +129,13 @@ fn as_in_folders(segments: Segments) -> Vec<Log> {
             1 => format!("{name}/"),
             count => format!("{name}-{count}/"),
         };
-        segments.sort_by(|(one, _), (other, _)| one.cmp(other));
+        segments.sort_by(|(is_whole, one, _), (other_is, other, _)| (is_whole, one).cmp(&(other_is, other)));
         let mut before = None;
-        for (segment, mut log) in segments {
-            log.name = format!("{prefix}{}", segment.log());
-            let session = Some((segment.of, segment.session));
+        for (is_whole, segment, mut log) in segments {
+            if is_whole {
+                log.name = format!("{prefix}{}", segment.log());
+            }
+            let session = Some((is_whole, segment.of, segment.session));
             let is_same = before == session;
             before = session;
             match logs.last_mut().filter(|_| is_same) {

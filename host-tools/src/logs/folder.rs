@@ -11,7 +11,7 @@ use anyhow::{Context as _, Result, bail};
 use super::card::{image, is_card, whole_file};
 use super::found::{Found, LOGS_MAX};
 use super::look::{Content, look};
-use super::naming::{SegmentName, segment_name};
+use super::naming::{SegmentName, is_part, segment_name, segment_or_part};
 use super::places::Log;
 use crate::files::why_unread;
 
@@ -30,8 +30,8 @@ const PACKED: [&str; 5] = [".gz", ".xz", ".zst", ".bz2", ".zip"];
 /// What lies in a folder and may be ours.
 #[derive(Default)]
 struct Entries {
-    /// Segments by session, which its first one's name stands for.
-    sessions: BTreeMap<SegmentName, Vec<(SegmentName, PathBuf)>>,
+    /// Segments by session, which its first one's name stands for; parts of them, which are whole no log, by themselves.
+    sessions: BTreeMap<(bool, SegmentName), Vec<(SegmentName, PathBuf)>>,
     segments: usize,
     /// Logs and images.
     files: Vec<PathBuf>,
@@ -69,10 +69,14 @@ pub(super) fn directory(root: &Path, salvage: bool, found: &mut Found) -> Result
             }
         }
         let prefix = dir.strip_prefix(root).unwrap_or(Path::new("")).to_string_lossy().into_owned();
-        for mut segments in sessions.into_values() {
+        for ((is_whole, name), mut segments) in sessions {
             segments.sort();
-            let name = segments.first().map_or_else(String::new, |(segment, _)| segment.log());
-            let name = if prefix.is_empty() { name } else { format!("{prefix}/{name}") };
+            let part = segments.first().filter(|_| !is_whole).and_then(|(_, path)| path.file_stem());
+            let name = match part {
+                Some(part) => part.to_string_lossy().into_owned(),
+                None if prefix.is_empty() => name.log(),
+                None => format!("{prefix}/{}", name.log()),
+            };
             let mut log =
                 Log { name, files: Vec::new(), pieces: Vec::new(), session: None, left_over: false };
             for (_, path) in segments {
@@ -123,14 +127,17 @@ impl Entries {
     /// A file of a folder.
     fn file(&mut self, path: PathBuf, found: &mut Found) {
         let shown = path.display();
-        match (look(&path), segment_name(&path)) {
+        let content = look(&path);
+        let is_log = matches!(content, Ok(Content::Log));
+        match (content, segment_name(&path).or_else(|| segment_or_part(&path).filter(|_| is_log))) {
             (Err(error), _) => found.leave_out(format!("{error:#}")),
             (Ok(Content::Unread(unread)), _) => found.leave_out(format!("{shown}: {unread}")),
             // Whatever is in it: that it holds nothing of ours is told with its log.
             (Ok(content), Some(_)) if content != Content::Log && path.extension().is_none() => {}
             (Ok(_), Some(name)) if self.segments < SEGMENTS_MAX => {
                 self.segments += 1;
-                self.sessions.entry(name.first()).or_default().push((name, path));
+                let session = (!is_part(&path), name.first());
+                self.sessions.entry(session).or_default().push((name, path));
             }
             (Ok(_), Some(_)) => {
                 found.leave_out(format!("{shown}: is left out: there are too many segments"));

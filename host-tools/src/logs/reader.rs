@@ -410,9 +410,14 @@ impl Stitch {
         deliver: &mut impl Deliver<C>,
     ) -> Result<()> {
         let begins_late = self.summary.groups == 0 && self.open.is_none() && group.number > 0;
+        // A later log of a power-on of which all is there: what its sectors count before it is the logs' before.
+        let lacks_none =
+            begins_late && !group.damaged && self.late.is_some_and(|late| late.from == group.number);
         let cut = std::mem::replace(&mut self.cut, group.ends_partial);
         self.damaged_partial = group.damaged_partial;
-        if group.missing > 0 || cut || begins_late {
+        if lacks_none {
+            self.expected = group.begun.map(|(_, frames_before)| frames_before);
+        } else if group.missing > 0 || cut || begins_late {
             let cause = match group.damaged {
                 true => Cause::Damaged,
                 false if self.is_wanted(&group, begins_late) => Cause::Disarmed,
@@ -436,8 +441,7 @@ impl Stitch {
         match group.begun {
             None => self.skip(&group),
             Some((start, frames_before)) => {
-                let missing = frames_before.wrapping_sub(self.expected.unwrap_or(0));
-                let missing = Some(missing).filter(|&missing| missing < 1 << 31);
+                let missing = self.frames_missing(frames_before);
                 if missing != Some(0) {
                     self.gap(Cause::Missing);
                 }
@@ -486,6 +490,14 @@ impl Stitch {
             return self.late.is_some_and(|late| late.is_wanted);
         }
         self.gathered && group.keep.is_some_and(|keep| keep.from <= self.next_number)
+    }
+
+    /// Frames that are missing before a group before which so many came. Of those before a later log of a power-on most are the
+    /// logs' before it: how many are not, nothing here tells.
+    fn frames_missing(&self, before: u32) -> Option<u32> {
+        let is_later = self.summary.groups == 0 && self.late.is_some_and(|late| late.from > 0);
+        let missing = before.wrapping_sub(self.expected.unwrap_or(0));
+        Some(missing).filter(|missing| *missing < 1 << 31 && (self.expected.is_some() || !is_later))
     }
 
     /// Nothing of a group is given out.

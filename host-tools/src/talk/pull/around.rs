@@ -11,7 +11,7 @@ use hums_core::health::Level;
 use hums_core::time::{Instant, Span};
 
 use super::ftp::Ftp;
-use super::moment::{Sectors as _, between, first_group, group_before, group_of};
+use super::moment::{Sectors as _, between, first_group, group_before};
 use super::remote::Remote;
 use super::session::number as number_of;
 use super::stretch::{Reading, Stretch, Unread, by_number};
@@ -51,12 +51,13 @@ pub(super) fn pull(
     let at = match what {
         Around::Time(When::Seconds(micros)) => Instant::from_micros(*micros),
         Around::Time(When::Utc(utc_us)) => {
-            let began = board.epoch_us()?;
-            epoch_us = Some(began);
-            let micros = utc_us.checked_sub(began).with_context(|| {
+            let clock = board.clock(*utc_us)?;
+            outcome = clock.tell();
+            epoch_us = Some(clock.epoch_us);
+            let micros = utc_us.checked_sub(clock.epoch_us).with_context(|| {
                 format!(
                     "the newest session began later, {} UTC; name the logs of another one",
-                    date_and_time(began)
+                    date_and_time(clock.epoch_us)
                 )
             })?;
             Instant::from_micros(micros)
@@ -125,7 +126,8 @@ fn check_recorded(
         return Ok(Outcome::Done);
     }
     let words = |at: Instant| {
-        let utc = epoch_us.map(|epoch_us| format!(" ({} UTC)", date_and_time(epoch_us + at.as_micros())));
+        let utc = epoch_us
+            .map(|epoch_us| format!(" ({} UTC)", date_and_time(epoch_us.saturating_add(at.as_micros()))));
         moment(at) + &utc.unwrap_or_default()
     };
     let before = spans().map(|((_, last), _)| last).filter(|last| *last < at).max();
@@ -173,6 +175,29 @@ impl Searched {
     }
 }
 
+/// UTC at power-on, as a log knows it.
+#[derive(Clone, Copy)]
+struct Clock {
+    /// Microseconds since 1970.
+    epoch_us: u64,
+    /// What is behind the record that told it and cannot be read: there it may have been set anew.
+    unread: Option<Unread>,
+}
+
+impl Clock {
+    /// Says what it does not know.
+    fn tell(&self) -> Outcome {
+        if let Some(unread) = &self.unread {
+            note!(
+                "UTC goes by the last clock record that could be read (power-on at {}): {}, where one may be",
+                date_and_time(self.epoch_us),
+                unread.words()
+            );
+        }
+        Outcome::lossy(self.unread.is_some())
+    }
+}
+
 /// The logs of a session on a board.
 struct Board<'a> {
     ftp: &'a mut Ftp,
@@ -193,6 +218,8 @@ struct Begin<'a> {
     at: Option<Instant>,
     /// Its beginning was brought: what is missing between it and a log of the same number is seen when they are read.
     is_read: bool,
+    /// Sectors before its first group, which are not brought yet: of a group that began in the log before.
+    tail: u32,
 }
 
 impl Board<'_> {
@@ -203,16 +230,29 @@ impl Board<'_> {
             let mut log = Remote::open(self.ftp, name, self.output)?;
             let first = first_group(&mut log)?;
             let (at, number) = (first.map(|first| first.at), log.first_number());
+            let is_further =
+                self.names.iter().any(|other| other < name && number_of(other) == number_of(name));
             // A group may begin in the log before: the first sectors of this one are its last ones.
-            if first.is_some_and(|first| first.place == 0 && first.at > to) && stretches.is_empty() {
-                later = Some(Begin { name, number, at, is_read: false });
+            if let Some(first) = first.filter(|first| first.at > to && (first.place == 0 || is_further))
+                && stretches.is_empty()
+            {
+                later = Some(Begin { name, number, at, is_read: false, tail: first.place });
                 continue;
             }
             let places = between(&mut log, from, to)?;
-            let begin = Begin { name, number, at, is_read: places.start == 0 };
+            let begin = Begin { name, number, at, is_read: places.start == 0, tail: 0 };
             let stretch = log.bring(places)?;
             log.add_strange(&mut self.strange);
-            if let Some(later) = &later {
+            if let Some(later) = &mut later {
+                if later.tail > 0
+                    && stretch.places.end == stretch.sectors
+                    && number_of(name) == number_of(later.name)
+                {
+                    let mut log = Remote::open(self.ftp, later.name, self.output)?;
+                    stretches.insert(0, log.bring(0..later.tail)?);
+                    log.add_strange(&mut self.strange);
+                    later.is_read = true;
+                }
                 self.hold_against(Some(&stretch), number, later, to)?;
             }
             stretches.insert(0, stretch);
@@ -280,25 +320,39 @@ impl Board<'_> {
         Ok(late(&log)?.filter(|late| late.is_wanted).map(|late| late.from))
     }
 
-    /// UTC at power-on, microseconds since 1970, by what the newest of the logs that knows it learned last.
-    fn epoch_us(&mut self) -> Result<u64> {
-        for name in self.names.iter().rev() {
-            let mut log = Remote::open(self.ftp, name, self.output)?;
-            let count = log.count();
-            let start = group_of(&mut log, count.saturating_sub(1))?;
-            if let Some(epoch_us) = start.and_then(|start| start.epoch_us) {
-                return Ok(epoch_us);
-            }
-            // It may have been learned since the group began.
-            let Some(start) = start else { continue };
-            let group = log.bring(start.place..count)?;
-            if let Some(epoch_us) = Reading::of(&[group])?.epoch_us() {
-                return Ok(epoch_us);
+    /// The clock of the log in which a time of day is, as every reader dates that log: by the last clock record of all that are in it. That
+    /// is the newest log that began by its own clock before that time; a log that has no clock goes by the one of the next log.
+    fn clock(&mut self, utc_us: u64) -> Result<Clock> {
+        let mut clock = None;
+        for logs in self.names.chunk_by(|one, next| number_of(one) == number_of(next)).rev() {
+            clock = self.last_clock(logs)?.or(clock);
+            let Some(found) = clock else { continue };
+            let mut first = Remote::open(self.ftp, &logs[0], self.output)?;
+            let began = first_group(&mut first)?.map(|first| first.at);
+            if began.is_some_and(|began| found.epoch_us.saturating_add(began.as_micros()) <= utc_us) {
+                break;
             }
         }
-        bail!(
-            "nothing that can be read told this session the time of day; say the time since its beginning, as --around 4:20"
+        clock.context(
+            "nothing that can be read told this session the time of day; say the time since its beginning, as --around 4:20",
         )
+    }
+
+    /// What the clock of a log was at last: its last group tells that can be read.
+    fn last_clock(&mut self, names: &[String]) -> Result<Option<Clock>> {
+        let mut stretches = Vec::new();
+        for name in names.iter().rev() {
+            let mut log = Remote::open(self.ftp, name, self.output)?;
+            let count = log.count();
+            let place = group_before(&mut log, count)?;
+            stretches.insert(0, log.bring(place..count)?);
+            log.add_strange(&mut self.strange);
+            let reading = Reading::of(&stretches)?;
+            if let Some(epoch_us) = reading.epoch_us() {
+                return Ok(Some(Clock { epoch_us, unread: reading.unread() }));
+            }
+        }
+        Ok(None)
     }
 
     /// The latest finding that is wanted: the logs are read from their end backwards, group by group, until it comes.
@@ -329,7 +383,7 @@ impl Board<'_> {
                 later = None;
                 break;
             }
-            later = Some(Begin { name, number, at, is_read: true });
+            later = Some(Begin { name, number, at, is_read: true, tail: 0 });
         }
         if let Some(first) = &later {
             self.hold_against(None, None, first, never)?;

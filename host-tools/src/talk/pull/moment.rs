@@ -26,8 +26,6 @@ pub(super) struct Start {
     pub(super) place: u32,
     /// When it begins, on the monitor's clock.
     pub(super) at: Instant,
-    /// UTC at power-on, microseconds since 1970, where it was known by then.
-    pub(super) epoch_us: Option<u64>,
 }
 
 /// The group that a sector is in; where that cannot be read, the last one before it that can.
@@ -37,12 +35,10 @@ pub(super) fn group_of(log: &mut impl Sectors, place: u32) -> Result<Option<Star
         let Some(place) = next else { break };
         next = match log.sector(place)? {
             Some((header, sector)) if header.starts_group() => {
-                let start = |preamble: hums_blackbox::Preamble| Start {
-                    place,
-                    at: Instant::from_millis(preamble.start_ms),
-                    epoch_us: preamble.epoch_micros,
-                };
-                return Ok(sector.preamble().map(start));
+                let preamble = sector.preamble();
+                return Ok(
+                    preamble.map(|preamble| Start { place, at: Instant::from_millis(preamble.start_ms) })
+                );
             }
             Some((header, _)) => place.checked_sub(u32::from(header.since_first)),
             None => place.checked_sub(1),

@@ -250,6 +250,11 @@ impl SectorSink for Memory {
 
 /// A session that ends in order: a note each tenth of a second, two criticals, and the time of day, which is learned at once.
 fn recorded(session: u32, seconds: u64) -> Vec<u8> {
+    recorded_by(session, seconds, &[(10, EPOCH_US)])
+}
+
+/// The same with these clocks: from which tenth of a second on, and UTC at power-on.
+fn recorded_by(session: u32, seconds: u64, clocks: &[(u64, u64)]) -> Vec<u8> {
     let mut memory = Memory { session, ..Memory::default() };
     let mut writer = Box::new(Writer::new());
     for tenth in 0..seconds * 10 {
@@ -258,8 +263,8 @@ fn recorded(session: u32, seconds: u64) -> Vec<u8> {
         let random = tenth.wrapping_mul(0x9E37_79B9_7F4A_7C15) ^ u64::from(session);
         let text = format!("{random:016x}{:016x}", random.rotate_left(29) ^ tenth);
         record(Record::Note(Note { severity: 6, text: &text }));
-        if tenth == 10 {
-            record(Record::Clock(Clock { boot: at, utc_micros: EPOCH_US + at.as_micros(), source: 3 }));
+        for (_, epoch_us) in clocks.iter().filter(|(from, _)| *from == tenth) {
+            record(Record::Clock(Clock { boot: at, utc_micros: epoch_us + at.as_micros(), source: 3 }));
         }
         if CRITICALS_S.contains(&(tenth / 10)) && tenth % 10 == 0 {
             record(Record::Finding(FindingRecord {
@@ -402,6 +407,79 @@ fn a_moment_at_which_nothing_was_recorded_is_refused() {
     // It may be in what cannot be read.
     for files in spoiled(&log, log.len() / SECTOR_BYTES - 1).into_iter().take(4) {
         assert_eq!(brought(&files, &["--around", "0:29.9"]).expect("it comes"), Outcome::Losses);
+    }
+}
+
+#[test]
+fn a_time_of_day_goes_by_the_last_clock_record_of_its_log() {
+    const HOUR_US: u64 = 3_600_000_000;
+    // The clock is set in the last group.
+    let log = recorded_by(7, 400, &[(10, EPOCH_US), (3_900, EPOCH_US + HOUR_US)]);
+    let last = group_at(&log, 390);
+    assert!(last.start > 0 && last.end == log.len() / SECTOR_BYTES, "{last:?}");
+    let around = |files: &Files, utc: &str| brought(files, &["--around", utc, "--span", "5"]);
+    let (begin, end) = log.split_at(group_at(&log, 200).start * SECTOR_BYTES);
+    let of = |names: [&str; 2], logs: [&[u8]; 2]| -> Files {
+        names.into_iter().map(str::to_owned).zip(logs.map(<[u8]>::to_vec)).collect()
+    };
+    let in_group = log.len() - 5 * SECTOR_BYTES;
+    for files in [
+        named(log.clone()),
+        of(["00001_00.HUM", "00001_01.HUM"], [begin, end]),
+        // A further file begins in the middle of that group.
+        of(["00001_00.HUM", "00001_01.HUM"], [&log[..in_group], &log[in_group..]]),
+    ] {
+        assert_eq!(around(&files, "2026-09-21T15:14:20Z").expect("it comes"), Outcome::Done);
+        let told = around(&files, "2026-09-21T14:19:30Z").expect_err("by no clock").to_string();
+        assert!(told.contains("began later, 2026-09-21 15:13:20 UTC"), "{told}");
+    }
+    // Where it cannot be read, that is told.
+    let mut lost = log.clone();
+    lost[in_group..in_group + 512].fill(0);
+    assert_eq!(around(&named(lost), "2026-09-21T14:14:20Z").expect("it comes"), Outcome::Losses);
+    // By arming each log has its own clock, as everywhere.
+    let names = ["00001_00.HUM", "00002_00.HUM"];
+    let by_arming = of(names, [begin, end]);
+    for utc in ["2026-09-21T14:14:20Z", "2026-09-21T15:19:30Z"] {
+        assert_eq!(around(&by_arming, utc).expect("it comes"), Outcome::Done, "{utc}");
+    }
+    assert!(around(&by_arming, "2026-09-21T15:14:20Z").is_err(), "nothing was recorded then");
+}
+
+#[test]
+fn a_file_that_begins_in_the_middle_of_a_group_is_read_with_the_one_before_it() {
+    let log = recorded(7, 400);
+    let cut = log.len() - 5 * SECTOR_BYTES;
+    let files = |cut: usize| -> Files {
+        let names = ["00001_00.HUM", "00001_01.HUM"].map(str::to_owned);
+        names.into_iter().zip([log[..cut].to_vec(), log[cut..].to_vec()]).collect()
+    };
+    let middle = (group_at(&log, 200).start + 9) * SECTOR_BYTES;
+    for (cut, at_it) in [(cut, "399"), (middle, "200")] {
+        // Before the change of files, at it, and perhaps behind it.
+        for at in ["20", at_it, "399"] {
+            let dir = tempfile::tempdir().expect("a folder");
+            let board = board_of(files(cut), |_, _| None);
+            let args = ["--around", at, "--span", "1"];
+            assert_eq!(brought_into(dir.path(), board, &args).expect("it comes"), Outcome::Done, "{at}");
+            let found = crate::logs::find::find_in(dir.path(), false).expect("parts");
+            let paths: Vec<PathBuf> = found.paths().map(Path::to_owned).collect();
+            let named = crate::logs::find(&paths, false).expect("parts");
+            for found in [found, named] {
+                // Parts of one log are read as one.
+                let [log] = &found.logs[..] else { panic!("{at}: {:?}", found.logs) };
+                if at != at_it {
+                    continue;
+                }
+                let overview = crate::summary::Overview::verified(log).expect("it reads");
+                let useless: u32 = overview.contents.gaps.iter().map(|gap| gap.sectors_skipped).sum();
+                assert_eq!(useless, 0, "{at}: {:?}", overview.contents.gaps);
+            }
+        }
+        assert_eq!(
+            brought(&files(cut), &["--around", "critical", "--span", "1"]).expect("found"),
+            Outcome::Done
+        );
     }
 }
 
