@@ -63,7 +63,7 @@ pub struct FindingLine {
 
 impl FindingLine {
     /// What people read of a check that no longer applies.
-    pub const UNJUDGED: &str = "no longer judged (on the ground or disarmed)";
+    pub const UNJUDGED: &str = "no longer judged (on the ground, disarmed, or no longer told)";
 
     /// Whether the check no longer applies, as after landing: what was bad is not known to be good.
     pub fn is_unjudged(&self) -> bool {

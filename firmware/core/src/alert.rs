@@ -23,6 +23,9 @@ const DISARMED: Span = Span::from_secs(2);
 /// Flags come at 1 Hz or faster where they come at all.
 const FLAGS_AGE: Span = Span::from_secs(5);
 
+/// In place of an [`Urgency`]: what was said is no longer said, and nothing says that it is good.
+pub const ENDED: f32 = -1.0;
+
 /// What a text of the autopilot says is wrong. `severity` is a `MAV_SEVERITY`: what is only a notice, or less, says nothing is
 /// wrong. `None` where a log keeps none: then only texts count that are known and tell by themselves that they are severe.
 ///
@@ -216,17 +219,32 @@ impl Alerts {
         told.fold(flagged, |causes, (cause, _)| causes.with(cause))
     }
 
-    /// How bad the autopilot says it is, as [`Urgency`] numbers it; `None` where nothing was ever said. In a mishap flags only echo it.
+    /// How bad the autopilot says it is, as [`Urgency`] numbers it: 0 where it says that it is over, and where flags that tell of it come
+    /// and have none; [`ENDED`] where it says nothing more of it; `None` where nothing was ever said. In a mishap flags only echo it.
     pub fn level(&self, now: Instant, cause: Cause, in_mishap: bool) -> Option<f32> {
         let (told, until_ms) = (self.told.get(cause as usize)?, self.until_ms.get(cause as usize)?);
-        let told = told.map(|urgency| if is_past(now, *until_ms) { Urgency::Over } else { urgency });
-        let known = self.has_flags();
-        let flagged = self.armed
-            && !in_mishap
+        let is_judged = self.armed && !in_mishap;
+        let is_flagged = is_judged
             && self.flags().iter().any(|flags| flags.has(now, cause))
             && (cause != Cause::RemoteControl || self.had_remote_control);
-        let flagged = known.then_some(if flagged { Urgency::Warning } else { Urgency::Over });
-        told.max(flagged).map(|urgency| f32::from(urgency as u8))
+        let held = told.filter(|urgency| *urgency != Urgency::Over && !is_past(now, *until_ms));
+        let wrong = held.max(is_flagged.then_some(Urgency::Warning));
+        let is_over = *told == Some(Urgency::Over) || is_judged && self.is_cleared(now, cause);
+        let good = if is_over { f32::from(Urgency::Over as u8) } else { ENDED };
+        let was_said = self.has_flags() || told.is_some();
+        wrong.map(|urgency| f32::from(urgency as u8)).or(was_said.then_some(good))
+    }
+
+    /// Whether flags come that would tell of it, and have none.
+    fn is_cleared(&self, now: Instant, cause: Cause) -> bool {
+        let comes = |flags: &Flags| {
+            let has = flags.now.both(flags.before).has(cause);
+            !has && flags.at.age(now).is_some_and(|age| age <= FLAGS_AGE)
+        };
+        let by_estimator = matches!(cause, Cause::Estimator | Cause::Gnss | Cause::Accelerometer);
+        (Causes::of_sensors(u32::MAX).has(cause) && comes(&self.sensors))
+            || (Causes::of_failure_flags(u16::MAX).has(cause) && comes(&self.failures))
+            || (by_estimator && comes(&self.estimator))
     }
 }
 

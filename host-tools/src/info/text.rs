@@ -371,7 +371,7 @@ mod tests {
         };
         let ended = finding(f32::NAN);
         assert!(ended.is_unjudged() && !finding(4.0).is_unjudged());
-        let words = "power: battery 1 cell voltage; no longer judged (on the ground or disarmed); was critical [cell_voltage]";
+        let words = "power: battery 1 cell voltage; no longer judged (on the ground, disarmed, or no longer told); was critical [cell_voltage]";
         assert_eq!(sentence(&ended), words);
     }
 }

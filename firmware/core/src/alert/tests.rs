@@ -129,7 +129,7 @@ fn what_was_said_holds_for_a_while_and_only_while_armed() {
     alerts.take_armed(T0, true);
     alerts.tell(T0, Alert::critical(Cause::Gnss));
     alerts.tell(after(5), Alert::warning(Cause::Gnss));
-    for (seconds, level) in [(0, 2.0), (14, 2.0), (15, 2.0), (16, 0.0)] {
+    for (seconds, level) in [(0, 2.0), (14, 2.0), (15, 2.0), (16, ENDED)] {
         assert_eq!(alerts.level(after(seconds), Cause::Gnss, false), Some(level), "{seconds} s");
     }
     assert_eq!(alerts.level(after(5), Cause::Gyro, false), None, "of the gyro nothing was said");
@@ -174,7 +174,12 @@ fn flags_count_when_two_messages_have_them_and_while_they_come() {
         assert_eq!(alerts.level(after(seconds), Cause::Compass, false), Some(level), "{seconds} s");
     }
     assert_eq!(alerts.level(after(10), Cause::Compass, false), Some(1.0));
-    assert_eq!(alerts.level(after(11), Cause::Compass, false), Some(0.0), "no message for more than 5 s");
+    assert_eq!(alerts.level(after(11), Cause::Compass, false), Some(ENDED), "no message for more than 5 s");
+    alerts.take_sensors(after(12), 0);
+    assert_eq!(alerts.level(after(12), Cause::Compass, false), Some(0.0));
+    assert_eq!(alerts.level(after(12), Cause::Crash, false), Some(ENDED), "no flag tells of a crash");
+    alerts.take_armed(after(13), false);
+    assert_eq!(alerts.level(after(13), Cause::Compass, false), Some(ENDED), "disarmed");
 }
 
 #[test]
@@ -185,7 +190,7 @@ fn a_remote_control_is_lost_only_where_there_was_one() {
         alerts.take_sensors(after(second), bits);
         alerts.level(after(second), Cause::RemoteControl, false)
     };
-    assert_eq!([says(0, RECEIVER), says(1, RECEIVER)], [Some(0.0); 2], "never switched on");
+    assert_eq!([says(0, RECEIVER), says(1, RECEIVER)], [Some(0.0), Some(ENDED)], "never switched on");
     assert_eq!([says(2, 0), says(3, RECEIVER), says(4, RECEIVER)], [Some(0.0), Some(0.0), Some(1.0)]);
 }
 

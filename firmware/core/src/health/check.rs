@@ -365,7 +365,12 @@ impl Check {
             instance,
             level: change.level,
             previous: change.previous,
-            value: change.value,
+            // What is no longer said is not known to be good.
+            value: if matches!(self.part, Part::Alert) && change.value < 0.0 {
+                f32::NAN
+            } else {
+                change.value
+            },
             limit: change.limit,
             unit: self.unit,
             feeds,

@@ -125,7 +125,8 @@ pub struct Finding {
     pub level: Level,
     /// The level before.
     pub previous: Level,
-    /// The value that decided, in the check's unit; NaN where the input stopped, and where the check no longer applies.
+    /// The value that decided, in the check's unit; NaN where the input stopped, where the check no longer applies, and where the
+    /// autopilot no longer says what it said.
     pub value: f32,
     /// The limit that it crossed, in the same unit; NaN where there is none (stale).
     pub limit: f32,
@@ -138,7 +139,7 @@ pub struct Finding {
 }
 
 impl Finding {
-    /// Whether its check no longer applies, as after landing: what was bad is not known to be good.
+    /// Whether its check no longer applies, as after landing, or nobody says it any more: what was bad is not known to be good.
     pub fn is_unjudged(&self) -> bool {
         self.level == Level::Ok && self.value.is_nan()
     }
