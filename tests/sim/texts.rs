@@ -68,14 +68,15 @@ fn listen(recording: &Path) -> (Vec<Said>, Vec<f64>) {
 /// What a text is of: attitude goes with what turns the motors.
 fn family(text: &str) -> Subsystem {
     let words = text.strip_prefix("HUMS: ").unwrap_or(text);
+    let words = words.strip_prefix("over: ").unwrap_or(words);
     if words.starts_with("down at") || words.starts_with("mishap over") {
         return Subsystem::Mishap;
     }
     let fits = |name: &str| {
         let said = health::said(name).unwrap();
-        if let Some(good) = words.strip_prefix("ok: ").or(words.strip_prefix("no data: ")) {
-            return good.starts_with(&said.name_of(0).to_string())
-                || (1..9).any(|n| good == said.name_of(n).to_string());
+        if let Some(silent) = words.strip_prefix("no data: ") {
+            return silent.starts_with(&said.name_of(0).to_string())
+                || (1..9).any(|n| silent == said.name_of(n).to_string());
         }
         let alarm = said.alarm.split('|').next().unwrap();
         let (before, after) = alarm.split_once('#').unwrap_or((alarm, ""));

@@ -421,14 +421,14 @@ fn urgency(finding: &Finding) -> u8 {
 }
 
 /// A finding in words a pilot understands: what is wrong with which part, the value, and what to do where it is critical, for
-/// instance `HUMS: battery 1 low: 6.8 %, LAND NOW`. What is good again is called by what is watched, not by what was wrong.
+/// instance `HUMS: battery 1 low: 6.8 %, LAND NOW`. What is good again is called as it was told: `HUMS: over: battery 1 low`.
 // Not in its callers: the deepest of them needs the stack.
 #[inline(never)]
 pub fn text(finding: &Finding) -> Text {
     let Finding { check, instance, level, value, feeds, .. } = *finding;
     let Some(said) = health::said(check) else { return Text::new(format_args!("HUMS: {check}")) };
     match level {
-        Level::Ok => return Text::new(format_args!("HUMS: ok: {}", said.name_of(instance))),
+        Level::Ok => return Text::new(format_args!("HUMS: over: {}", said.alarm_of(instance, feeds))),
         Level::Stale => return Text::new(format_args!("HUMS: no data: {}", said.name_of(instance))),
         Level::Advisory | Level::Warning | Level::Critical => {}
     }

@@ -85,16 +85,19 @@ impl Cause {
 
 /// A box tells three texts of half a minute at most, and a warning at the end of its event.
 const AGAIN_S: f64 = 45.0;
+/// Before the words of what is good again.
+const OVER: &str = "over: ";
 
 /// Which check and which part of it the words of a HUMS's text are of, and what they say besides.
 fn told_check(words: &str) -> Option<(&'static str, u8, &str)> {
-    let good = words.strip_prefix("ok: ").or_else(|| words.strip_prefix("no data: "));
+    let silent = words.strip_prefix("no data: ");
+    let words = words.strip_prefix(OVER).unwrap_or(words);
     let each = VOCABULARY
         .iter()
         .flat_map(|words| (0..instances(words.said.check)).map(move |part| (words.said, part)));
     let told = each.filter_map(|(said, part)| {
-        let rest = match good {
-            Some(good) => good.strip_prefix(said.name_of(part).to_string().as_str()),
+        let rest = match silent {
+            Some(silent) => silent.strip_prefix(said.name_of(part).to_string().as_str()),
             None => FEEDS
                 .iter()
                 .find_map(|feeds| words.strip_prefix(said.alarm_of(part, *feeds).to_string().as_str())),
@@ -181,7 +184,7 @@ impl Note {
         let words = text.words.trim_start_matches(OURS);
         let (check, instance, rest) = told_check(words)?;
         let known = vocabulary(check)?;
-        let level = if words.starts_with("ok: ") { "ok" } else { text.level() };
+        let level = if words.starts_with(OVER) { "ok" } else { text.level() };
         let is_worry = matches!(level, "warning" | "critical");
         let rest = rest.trim_start_matches([':', ',', ' ']);
         let name = check_name(check, instance);

@@ -225,16 +225,16 @@ vocabulary! {
     "engine_due" Stored "engine life", "", says "engine life used", "SERVICE IT", needs "engine registered with the monitor on board";
     "The engine is due for maintenance."; "Do the maintenance, and tell the monitor.";
 
-    "vibration" ArduPilot "vibration", "", says "vibration high", "LAND", needs "vibration levels";
+    "vibration" ArduPilot "vibration", "", says "vibration high", "LAND BY HAND", needs "vibration levels";
     "Vibration was strong enough to disturb the autopilot's estimator (EKF).";
     "Balance propellers and motors, and check the autopilot's mounting.";
-    "vibration_px4" Px4 "vibration", "", says "vibration high", "LAND", needs "vibration metrics";
+    "vibration_px4" Px4 "vibration", "", says "vibration high", "LAND BY HAND", needs "vibration metrics";
     "Vibration was strong enough to disturb the autopilot's estimator (EKF).";
     "Balance propellers and motors, and check the autopilot's mounting.";
     "vibration_rise" Vehicle "vibration rise", "", says "vibration up|~ usual", "", needs "vibration levels of what flies on rotors";
     "Vibration rose to a multiple of what it was before in the same flight.";
     "Check propellers, motor bearings and mounting before the next flight.";
-    "clipping" Vehicle "accelerometer clipping", "", says "accelerometer clipping", "LAND", needs "clipping counts";
+    "clipping" Vehicle "accelerometer clipping", "", says "accelerometer clipping", "LAND BY HAND", needs "clipping counts";
     "The accelerometers were at the end of their range: the EKF flew partly blind.";
     "Find the source of vibration or shock, and check the mounting.";
     "load_factor" Vehicle "load factor", "", says "load factor high", "EASE OFF", needs "acceleration";
@@ -246,7 +246,7 @@ vocabulary! {
     "airframe_due" Stored "airframe life", "", says "airframe life used", "SERVICE IT", needs "airframe registered with the monitor on board";
     "The airframe or a part of it is due for maintenance."; "Do the maintenance, and tell the monitor.";
 
-    "vibration_alert" Said "autopilot's vibration alert", "", says "autopilot warns: vibration", "LAND", needs "texts, events or health flags of the autopilot";
+    "vibration_alert" Said "autopilot's vibration alert", "", says "autopilot warns: vibration", "LAND BY HAND", needs "texts, events or health flags of the autopilot";
     "The autopilot said that vibration or clipping disturbed it.";
     "Balance propellers and motors, and check the autopilot's mounting.";
 
@@ -257,9 +257,9 @@ vocabulary! {
     "Do not fly until compass and GPS are checked.";
     "ekf_compass" ArduPilot "EKF variance of the compass", "", says "EKF doubts compass", "", needs "compass variance of the EKF that it flies by";
     "The EKF did not trust the compass."; "Check the compass, its calibration and currents or magnets near it.";
-    "ekf_test_ratio" Px4 "EKF test ratio", "", says "EKF rejects position or speed", "LAND", needs "EKF test ratios";
+    "ekf_test_ratio" Px4 "EKF test ratio", "", says "EKF rejects position or speed", "LAND, MANUAL", needs "EKF test ratios";
     "The EKF rejected, or nearly rejected, what it was told of position, height or speed."; "Look at compass, GPS and vibration at that time.";
-    "ekf_mag_ratio" Px4 "EKF test ratio of the compass", "", says "EKF rejects compass", "LAND", needs "EKF test ratios";
+    "ekf_mag_ratio" Px4 "EKF test ratio of the compass", "", says "EKF rejects compass", "LAND, MANUAL", needs "EKF test ratios";
     "The EKF rejected, or nearly rejected, the compass.";
     "Check the compass, its calibration and currents or magnets near it.";
     "compass_unused" Px4 "compass in use", "", says "EKF dropped compass", "", needs "EKF test ratio of the compass";
@@ -327,7 +327,7 @@ vocabulary! {
     "accel_alert" Said "autopilot's accelerometer alert", "", says "autopilot warns: accelerometer", "LAND", needs "texts, events or health flags of the autopilot";
     "The autopilot said that an accelerometer had failed or could not be trusted.";
     "Do not fly until the autopilot's accelerometers are checked.";
-    "compass_alert" Said "autopilot's compass alert", "", says "autopilot warns: compass", "LAND", needs "texts, events or health flags of the autopilot";
+    "compass_alert" Said "autopilot's compass alert", "", says "autopilot warns: compass", "LAND, MANUAL", needs "texts, events or health flags of the autopilot";
     "The autopilot said that a compass had failed or could not be trusted.";
     "Check the compass, its wiring, its calibration and currents or magnets near it.";
     "baro_alert" Said "autopilot's barometer alert", "", says "autopilot warns: barometer", "LAND", needs "texts, events or health flags of the autopilot";

@@ -94,7 +94,7 @@ fn a_finding_is_told_in_the_words_of_a_pilot_and_fits() {
         told(Finding { value: 6.8, ..finding(Level::Critical) }),
         "HUMS: battery 1 low: 6.8 %, LAND NOW"
     );
-    assert_eq!(told(finding(Level::Ok)), "HUMS: ok: battery 1 remaining");
+    assert_eq!(told(finding(Level::Ok)), "HUMS: over: battery 1 low");
     assert_eq!(told(finding(Level::Stale)), "HUMS: no data: battery 1 remaining");
     let flag = |check| told(Finding { check, instance: 2, unit: "", value: 1.0, ..finding(Level::Warning) });
     assert_eq!(flag("gnss_alert"), "HUMS: autopilot warns: GPS");
@@ -123,7 +123,7 @@ fn a_value_says_what_it_is_of_or_is_not_told() {
         ("gps_hdop", 2.8, warning, "GPS 1 poor geometry: HDOP 2.8"),
         ("rc_rssi", 45.0, critical, "RC signal weak, FLY BACK"),
         ("ekf_variance", 0.85, warning, "EKF doubts position or speed"),
-        ("clipping", 12.0, critical, "accelerometer clipping, LAND"),
+        ("clipping", 12.0, critical, "accelerometer clipping, LAND BY HAND"),
         ("compass_mismatch", 40.0, warning, "compass 1 and others differ: 40 %"),
         ("impact", 5.0, critical, "impact: 5 g, DISARM IF DOWN"),
         ("sinking", 12.3, critical, "sinking fast: 12.3 m/s, FLY FORWARD, CLIMB"),
@@ -164,9 +164,13 @@ fn no_text_is_cut_whatever_part_and_level() {
             };
             assert!(told.len() <= TEXT_BYTES_MAX && told.ends_with(end), "{told}");
             assert!(!told.contains(['|', '~', '#']), "{told}");
-            let whole = health::said(check.name).map(|said| said.name_of(finding.instance).to_string());
-            let is_good = matches!(level, Level::Ok | Level::Stale);
-            assert!(!is_good || told.ends_with(&whole.unwrap()), "{told}");
+            let said = health::said(check.name).expect("its words");
+            let whole = match level {
+                Level::Ok => said.alarm_of(finding.instance, feeds).to_string(),
+                Level::Stale => said.name_of(finding.instance).to_string(),
+                _ => String::new(),
+            };
+            assert!(told.ends_with(&whole), "{told}");
         }
     }
 }
@@ -183,7 +187,7 @@ fn a_battery_that_does_not_keep_the_vehicle_up_is_called_what_it_is() {
     let long =
         Finding { check: "cell_deviation", unit: "V", feeds: Feeds::Avionics, ..finding(Level::Critical) };
     assert_eq!(text(&long).as_str(), "HUMS: battery 1 (avionics) cells uneven, LAND");
-    assert_eq!(told(Feeds::Avionics, Level::Ok), "HUMS: ok: battery 2 remaining");
+    assert_eq!(told(Feeds::Avionics, Level::Ok), "HUMS: over: battery 2 (avionics) low");
 }
 
 #[test]
@@ -394,7 +398,7 @@ fn what_another_one_explains_is_not_told_nor_that_it_is_over() {
     let explained =
         [comes(10, "gps_fix", 0, CRITICAL), comes(50, "gps_fix", 0, (Level::Ok, Level::Critical))];
     assert_eq!(told_because(&explained, "heartbeat"), []);
-    let expected = [(10, "GPS 1 position lost, FLY MANUALLY"), (110, "ok: GPS 1 fix")];
+    let expected = [(10, "GPS 1 position lost, FLY MANUALLY"), (110, "over: GPS 1 position lost")];
     assert_eq!(texts(&told(&explained)), expected, "where nothing explains it, both");
 }
 
