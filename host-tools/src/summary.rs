@@ -10,6 +10,7 @@ use hums_core::component::Figures;
 use hums_core::health::Level;
 use hums_core::health::exceedance::Crossings;
 use hums_core::time::{Instant, Span};
+use hums_core::usage::UsageCounter;
 use hums_link as link;
 
 use crate::ending::Ending;
@@ -223,6 +224,8 @@ pub struct Contents {
     pub judged: Option<JudgedChecks>,
     /// The last flight goes on at its end, in a recording that was judged here.
     pub ends_in_air: Option<EndsInAir>,
+    /// Seconds in the air that the box had counted where it began a log, as the first counters tell.
+    pub flight_before_s: Option<f64>,
     /// The latest values of the usage counters, and when they were so.
     pub usage: BTreeMap<String, f64>,
     /// See [`Self::usage`]; `None` where this program counted them.
@@ -324,6 +327,8 @@ impl Contents {
             Record::Usage(snapshot) if snapshot.moment != Moment::Start || self.usage.is_empty() => {
                 self.usage.extend(named(snapshot.iter()));
                 self.usage_at = Some(at);
+                let flight_s = self.usage.get(UsageCounter::Flight.name()).copied();
+                self.flight_before_s = self.flight_before_s.or(flight_s);
             }
             Record::Lifetime(life) => {
                 self.lifetime_at = Some(at);
@@ -373,6 +378,7 @@ impl Contents {
         self.findings_count += next.findings_count;
         let room = LISTED_MAX.saturating_sub(self.findings.len());
         self.findings.extend(next.findings.into_iter().take(room));
+        self.flight_before_s = self.flight_before_s.or(next.flight_before_s);
         self.usage.extend(next.usage);
         self.usage_at = next.usage_at.or(self.usage_at);
         self.lifetime.extend(next.lifetime);

@@ -176,9 +176,12 @@ fn start_utc_us(log: &Overview) -> Option<u64> {
     log.ending.summary.first.and_then(|first: Instant| log.utc_us(first))
 }
 
-/// How long it was in the air by the usage counters.
+/// How long it was in the air by the usage counters, which count from the power-on on: a later log of one begins with those of the logs
+/// before it.
 fn flight_s(log: &Overview) -> Option<f64> {
-    log.contents.usage.get(UsageCounter::Flight.name()).copied()
+    let is_later = log.ending.summary.first_number.is_some_and(|first| first > 0);
+    let before = log.contents.flight_before_s.filter(|_| is_later).unwrap_or(0.0);
+    log.contents.usage.get(UsageCounter::Flight.name()).map(|all| (all - before).max(0.0))
 }
 
 /// What is recorded of it, without the room that is set aside for it on a card.
@@ -226,6 +229,17 @@ mod tests {
         assert_eq!(worst(&log).map(|worst| worst.level), Some("warning"));
         log.contents.findings = vec![finding("cell_voltage", "ok", 2)];
         assert!(worst(&log).is_none());
+    }
+
+    #[test]
+    fn a_later_log_of_a_power_on_was_in_the_air_for_what_was_counted_since_it_began() {
+        let mut log = Overview::default();
+        log.contents.usage.insert(UsageCounter::Flight.name().to_owned(), 526.0);
+        log.contents.flight_before_s = Some(308.0);
+        for (first, expected) in [(None, 526.0), (Some(0), 526.0), (Some(700), 218.0)] {
+            log.ending.summary.first_number = first;
+            assert_eq!(flight_s(&log), Some(expected), "{first:?}");
+        }
     }
 
     #[test]

@@ -218,14 +218,14 @@ struct Begin<'a> {
     at: Option<Instant>,
     /// Its beginning was brought: what is missing between it and a log of the same number is seen when they are read.
     is_read: bool,
-    /// Sectors before its first group, which are not brought yet: of a group that began in the log before.
-    tail: u32,
 }
 
 impl Board<'_> {
     /// Brings what was recorded from one time to the other.
     fn bring(&mut self, from: Instant, to: Instant) -> Result<Vec<Stretch>> {
         let (mut stretches, mut later) = (Vec::new(), None);
+        // Sectors of a group of which the beginning was not looked for yet, with their logs.
+        let mut tails: Vec<(&String, u32)> = Vec::new();
         for name in self.names.iter().rev() {
             let mut log = Remote::open(self.ftp, name, self.output)?;
             let first = first_group(&mut log)?;
@@ -233,25 +233,28 @@ impl Board<'_> {
             let is_further =
                 self.names.iter().any(|other| other < name && number_of(other) == number_of(name));
             // A group may begin in the log before: the first sectors of this one are its last ones.
-            if let Some(first) = first.filter(|first| first.at > to && (first.place == 0 || is_further))
-                && stretches.is_empty()
-            {
-                later = Some(Begin { name, number, at, is_read: false, tail: first.place });
+            let is_later =
+                first.map_or(is_further, |first| first.at > to && (first.place == 0 || is_further));
+            if is_later && stretches.is_empty() {
+                if first.is_some() {
+                    tails.clear();
+                }
+                tails.insert(0, (name, first.map_or(log.count(), |first| first.place)));
+                later = Some(Begin { name, number, at, is_read: false });
                 continue;
             }
             let places = between(&mut log, from, to)?;
-            let begin = Begin { name, number, at, is_read: places.start == 0, tail: 0 };
+            let begin = Begin { name, number, at, is_read: places.start == 0 };
             let stretch = log.bring(places)?;
             log.add_strange(&mut self.strange);
             if let Some(later) = &mut later {
-                if later.tail > 0
-                    && stretch.places.end == stretch.sectors
-                    && number_of(name) == number_of(later.name)
-                {
-                    let mut log = Remote::open(self.ftp, later.name, self.output)?;
-                    stretches.insert(0, log.bring(0..later.tail)?);
-                    log.add_strange(&mut self.strange);
-                    later.is_read = true;
+                for (name, end) in std::mem::take(&mut tails) {
+                    if end > 0 && stretch.places.end == stretch.sectors {
+                        let mut log = Remote::open(self.ftp, name, self.output)?;
+                        stretches.push(log.bring(0..end)?);
+                        log.add_strange(&mut self.strange);
+                        later.is_read = true;
+                    }
                 }
                 self.hold_against(Some(&stretch), number, later, to)?;
             }
@@ -383,7 +386,7 @@ impl Board<'_> {
                 later = None;
                 break;
             }
-            later = Some(Begin { name, number, at, is_read: true, tail: 0 });
+            later = Some(Begin { name, number, at, is_read: true });
         }
         if let Some(first) = &later {
             self.hold_against(None, None, first, never)?;
