@@ -16,6 +16,7 @@ use super::said::Said;
 use crate::ending::Ending;
 use crate::logs::Log;
 use crate::logs::reader::{self, epoch};
+use crate::loss;
 use crate::mavlink::ids::{HEARTBEAT, PARAM_VALUE, STATUSTEXT};
 use crate::plural::count;
 
@@ -291,6 +292,10 @@ impl Hand<'_, '_> {
             Record::Loss(loss @ Loss { what: Lost::WrongChecksums | Lost::DamagedPlaces, .. }) => {
                 (self.take)(at, Item::Gap(&of_packed(loss)))
             }
+            Record::Loss(loss) => match not_recorded(loss) {
+                Some(gap) => (self.take)(at, Item::Gap(&gap)),
+                None => Ok(()),
+            },
             _ => Ok(()),
         }
     }
@@ -304,6 +309,13 @@ fn of_packed(loss: &Loss) -> Gap {
         _ => (format!("{} in the recording that was packed", count(loss.count, "damaged place")), None),
     };
     Gap { from: Some(loss.from), to, cause: Cause::Lost, place: None, bytes: 0, words, own: None }
+}
+
+/// What the recorder counted as lost.
+fn not_recorded(loss: &Loss) -> Option<Gap> {
+    let (from, to) = (Some(loss.from), Some(loss.to));
+    let words = loss::words(loss)?;
+    Some(Gap { from, to, cause: Cause::Lost, place: None, bytes: 0, words, own: None })
 }
 
 /// A gap in the stream's words.
