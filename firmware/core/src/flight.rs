@@ -189,6 +189,11 @@ impl Flight {
         self.flew_at.is_some()
     }
 
+    /// Whether it was ever seen on the ground: a flight that goes on without that began before the vehicle was heard.
+    pub const fn was_on_ground(&self) -> bool {
+        self.seen_on_ground
+    }
+
     /// Whether it is known to stand on the ground.
     pub(crate) const fn stands(&self) -> bool {
         self.seen_on_ground && !self.is_open()

@@ -10,6 +10,7 @@ use hums_core::time::{Instant, Span};
 
 use super::judged::JudgedBy;
 use super::problem::Problem;
+use crate::counters::tells_flight;
 
 /// Checks of a receiver that the monitor leaves alone until the receiver has had a fix.
 const OF_A_FIX: [&str; 4] = ["gps_satellites", "gps_hdop", "gps_accuracy", "gps_fix"];
@@ -160,6 +161,9 @@ impl Recording<'_> {
         match check.when {
             When::Armed | When::InFlight if self.armed == Span::ZERO => {
                 not(self.arming.unwrap_or("never armed"))
+            }
+            When::InFlight if !self.flew && !tells_flight(self.monitor.vehicle()) => {
+                not("not known whether it was in the air")
             }
             When::InFlight if !self.flew => not("never in the air"),
             _ if seen.value => not("only for a moment in this recording"),

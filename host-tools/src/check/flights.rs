@@ -17,6 +17,8 @@ pub struct Flight {
     pub to: Instant,
     /// How long it was in the air: without what lies on the ground between, and without the recording's gaps.
     pub air: Span,
+    /// It was seen on the ground before; otherwise it was in the air when it was heard first, and nobody knows since when.
+    pub took_off: bool,
     /// It landed.
     pub landed: bool,
     /// It was disarmed in the air, at this height above home, m.
@@ -56,12 +58,12 @@ const SILENT: Span = Span::from_secs(5);
 const STILL_FLIES: Span = Span::from_secs(3);
 
 impl Flights {
-    /// The vehicle took off.
-    pub(super) fn take_off(&mut self, now: Instant, from: Instant) {
+    /// The vehicle took off, or is seen to be in the air.
+    pub(super) fn take_off(&mut self, now: Instant, from: Instant, took_off: bool) {
         self.open = self.list.len() < LISTED_MAX;
         if self.open {
             let air = now.since(from);
-            self.list.push(Flight { from, to: now, air, landed: false, disarmed_at_m: None });
+            self.list.push(Flight { from, to: now, air, took_off, landed: false, disarmed_at_m: None });
         }
     }
 

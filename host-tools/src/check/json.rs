@@ -65,6 +65,7 @@ struct FlightJson {
     from_s: f64,
     to_s: f64,
     air_s: f64,
+    took_off: bool,
     landed: bool,
     disarmed_at_m: Option<f32>,
 }
@@ -218,6 +219,7 @@ fn flight(flight: &Flight) -> FlightJson {
         from_s: flight.from.as_secs_f64(),
         to_s: flight.to.as_secs_f64(),
         air_s: flight.air.as_micros() as f64 / 1e6,
+        took_off: flight.took_off,
         landed: flight.landed,
         disarmed_at_m: flight.disarmed_at_m,
     }

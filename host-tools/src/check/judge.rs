@@ -26,7 +26,7 @@ use super::clock::{Clock, SETTLE};
 use super::coverage::{Coverage, Recording};
 use super::details::{self, Details};
 use super::flights::Flights;
-use super::judged::{Judged, JudgedBy};
+use super::judged::{Holes, Judged, JudgedBy};
 use super::problem::{LISTED_MAX, Problems};
 use crate::source::epochs::Epochs;
 use crate::source::item::{About, Cause as Why, Event, Fact, Gap, Item, Text};
@@ -133,6 +133,8 @@ pub struct Judge {
     clock: Clock,
     first: Option<Instant>,
     last: Instant,
+    /// The last record of a box, which goes on where nothing is heard.
+    recorded_to: Instant,
     last_heard: Option<Last>,
     silence: Option<Silence>,
     coverage: Coverage,
@@ -145,6 +147,7 @@ pub struct Judge {
     details: Details,
     epochs: Epochs,
     gaps: Vec<Gap>,
+    holes: Holes,
     damages: u64,
     losses: u64,
     restarts: u64,
@@ -167,6 +170,7 @@ impl Judge {
             clock: Clock::default(),
             first: None,
             last: Instant::ZERO,
+            recorded_to: Instant::ZERO,
             last_heard: None,
             silence: None,
             coverage: Coverage::new(),
@@ -178,6 +182,7 @@ impl Judge {
             details: Details::default(),
             epochs: Epochs::default(),
             gaps: Vec::new(),
+            holes: Holes::default(),
             damages: 0,
             losses: 0,
             restarts: 0,
@@ -236,6 +241,7 @@ impl Judge {
                 self.facts.insert(fact.about, fact.words.to_owned());
             }
             Item::Record(record) => {
+                self.recorded_to = self.recorded_to.max(at);
                 if let Some(told) = Told::of(record) {
                     self.told(&told);
                 }
@@ -299,6 +305,7 @@ impl Judge {
             // The logger wrote nothing: that is no silence of the vehicle.
             self.gap(&gap);
         } else {
+            self.holes.silence(from, at);
             let place = self.list(&gap);
             self.doubt(place, at, airborne, length);
         }
@@ -378,8 +385,9 @@ impl Judge {
                 self.board.take(finding, Span::ZERO);
                 self.details.tell(&finding.check, &mut self.board);
             }
+            Told::Peak { check, instance, value } => self.board.peak(check, *instance, *value),
             Told::Checked => self.checked_on_board = true,
-            Told::Parameter { .. } | Told::Part { .. } => {}
+            Told::Parameter { .. } | Told::Part { .. } | Told::Missing { .. } => {}
         }
     }
 
@@ -452,6 +460,7 @@ impl Judge {
                 self.tick(from);
             }
             self.clock.pause(from, to);
+            self.holes.pause(from, to);
             let place = self.list(gap);
             if gap.cause == Why::Lost && airborne && length >= NOT_WRITTEN {
                 self.doubt(place, to, airborne, length);
@@ -508,10 +517,10 @@ impl Judge {
         }
         while let Some(happening) = self.monitor.take_happening() {
             match happening {
-                Happening::TakeOff => {
+                Happening::TakeOff | Happening::FlightResumed => {
                     let since = self.monitor.flight().airborne_since();
                     let from = since.map_or(now, |since| Clock::recording(now, steps, since));
-                    self.flights.take_off(now, from);
+                    self.flights.take_off(now, from, self.monitor.flight().was_on_ground());
                 }
                 Happening::Landing => self.flights.landing(),
                 Happening::OtherVehicle => self.flights.break_off(),
@@ -590,12 +599,11 @@ impl Judge {
             self.here.drop_checks(|check| vocabulary(check).is_some_and(|words| words.scope == Scope::Wire));
         }
         let last = self.last;
-        let mut problems = match by {
-            JudgedBy::Board => self.board,
-            JudgedBy::Here => self.here,
+        let (mut problems, end, behind) = match by {
+            JudgedBy::Board => (self.board, last.max(self.recorded_to), Span::ZERO),
+            JudgedBy::Here => (self.here, last, self.clock.behind()),
         };
-        let behind = if by == JudgedBy::Board { Span::ZERO } else { self.clock.behind() };
-        problems.end(last, behind);
+        problems.end(end, behind);
         let (mut findings, findings_count) =
             (std::mem::take(&mut problems.findings), problems.findings_count);
         // An impact is told once what hit something lies still.
@@ -631,6 +639,7 @@ impl Judge {
             not_judged,
             remarks,
             gaps: self.gaps,
+            holes: self.holes,
             damages: self.damages,
             losses: self.losses,
             restarts: self.restarts,

@@ -8,7 +8,7 @@ use hums_core::time::{Instant, Span};
 use hums_core::vehicle::Vehicle;
 
 use super::flights::Flight;
-use super::problem::Problem;
+use super::problem::{LISTED_MAX, Problem};
 use crate::source::epochs::Epochs;
 use crate::source::item::{About, Gap};
 use crate::source::told::Finding;
@@ -24,6 +24,40 @@ pub enum JudgedBy {
     Board,
     /// This program.
     Here,
+}
+
+/// Where a recording has nothing of the vehicle, from and to: up to [`LISTED_MAX`].
+#[derive(Clone, Debug, Default)]
+pub struct Holes {
+    pauses: Vec<(Instant, Instant)>,
+    silences: Vec<(Instant, Instant)>,
+}
+
+impl Holes {
+    /// The recording says so: time stands still over it.
+    pub(super) fn pause(&mut self, from: Instant, to: Instant) {
+        if self.pauses.len() < LISTED_MAX {
+            self.pauses.push((from, to));
+        }
+    }
+
+    /// The vehicle was silent, as far as is known.
+    pub(super) fn silence(&mut self, from: Instant, to: Instant) {
+        if self.silences.len() < LISTED_MAX {
+            self.silences.push((from, to));
+        }
+    }
+
+    /// Whether it has nothing just there: a gap that is none of these is a place, or a count over much of it.
+    pub fn is_one(&self, span: &(Instant, Instant)) -> bool {
+        self.pauses.contains(span) || self.silences.contains(span)
+    }
+
+    /// How much of this it does not have.
+    pub fn within(&self, from: Instant, to: Instant) -> Span {
+        let parts = self.pauses.iter().map(|(begin, end)| (*end).min(to).since((*begin).max(from)));
+        parts.fold(Span::ZERO, |sum, part| sum + part)
+    }
 }
 
 /// What came of a recording.
@@ -59,6 +93,8 @@ pub struct Judged {
     pub remarks: Vec<String>,
     /// What is missing, in order, up to [`super::problem::LISTED_MAX`].
     pub gaps: Vec<Gap>,
+    /// Where it has nothing from here to there.
+    pub holes: Holes,
     /// How many gaps are damage.
     pub damages: u64,
     /// How many gaps are what the recorder lost while it recorded.

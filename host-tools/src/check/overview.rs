@@ -9,6 +9,7 @@ use anyhow::Result;
 use hums_blackbox::record::Vehicle;
 use hums_core::Monitor;
 use hums_core::observation::Observation;
+use hums_core::usage::UsageCounter;
 
 use super::judge::{Heard, Judge, Limits};
 use super::judged::Judged;
@@ -25,6 +26,8 @@ use crate::summary::{Contents, ExceedanceLine, FindingLine, Overview};
 
 /// A log with fewer kinds of messages may have too little in it to be judged, though a recorder that checks wrote it.
 const FEW_KINDS: usize = 16;
+/// That a vehicle is in the air is seen so much later than it is heard first, s.
+const SEEN_LATE_S: f64 = 3.0;
 /// Items between two looks at how far the reading is.
 const LOOK_EVERY: u32 = 4_096;
 
@@ -169,6 +172,8 @@ fn fill(contents: &mut Contents, judged: Judged) {
     contents.judged = Some(judged.checks());
     contents.ends_in_air = judged.ends_in_air;
     let is_judged = judged.worst().is_some();
+    // What was in the air when it was heard first was taken to stand until that was seen.
+    let begins_in_air = judged.flights.first().is_some_and(|flight| !flight.took_off);
     let Judged { monitor, findings, findings_count, span, remarks, .. } = judged;
     contents.remarks = remarks;
     contents.vehicle = vehicle(&monitor);
@@ -181,7 +186,8 @@ fn fill(contents: &mut Contents, judged: Judged) {
     contents.findings = findings.into_iter().map(FindingLine::from).collect();
     monitor.for_each_counter(|number, value| {
         let name = counter_name(number);
-        if is_told(&name, monitor.vehicle()) {
+        let seen_late = begins_in_air && name == UsageCounter::Ground.name() && value < SEEN_LATE_S;
+        if is_told(&name, monitor.vehicle()) && !seen_late {
             contents.usage.insert(name, value);
         }
     });

@@ -10,6 +10,7 @@ use hums_core::health::{Level, Side, Subsystem, vocabulary};
 use hums_core::time::Span;
 
 use super::checked::Checked;
+use super::flights::Flight;
 use super::judged::{Judged, JudgedBy};
 use super::problem::{Problem, side};
 use crate::colour::level as coloured;
@@ -34,7 +35,7 @@ pub fn screen(checked: &Checked) -> String {
     let judged = &checked.judged;
     let mut text = format!("{}: {}\n", word(&checked.name), checked.format.words());
     let _ = writeln!(text, "  vehicle  {}", word(&vehicle(judged)));
-    let _ = writeln!(text, "  when     {}", when(judged, checked.format));
+    let _ = writeln!(text, "  when     {}", when(checked));
     let _ = writeln!(text, "  in air   {}", in_air(judged));
     let _ = writeln!(text, "  verdict  {}{}", verdict(judged), but(checked));
     text.push('\n');
@@ -132,6 +133,11 @@ fn state(checked: &Checked) -> State {
     }
 }
 
+/// Whether the recorder says itself, or it is seen, that it did not write all.
+fn is_lossy(judged: &Judged) -> bool {
+    judged.gaps.iter().any(|gap| gap.cause == Cause::Lost && !is_noise(gap))
+}
+
 /// Whether nothing is missing there: bytes are in the recording that are no frame.
 fn is_noise(gap: &Gap) -> bool {
     gap.cause == Cause::Lost && gap.bytes > 0
@@ -146,6 +152,9 @@ fn but(checked: &Checked) -> String {
         State::Damaged => "; part of the log is missing or damaged, and was not judged".to_owned(),
         State::Lossy => "; part of the time was not recorded".to_owned(),
         State::NotFrames => "; bytes of no frame are in it".to_owned(),
+        State::NotProved if is_lossy(&checked.judged) => {
+            "; part of the time was not recorded; the log is not proved to be whole".to_owned()
+        }
         State::NotProved => "; the log is not proved to be whole".to_owned(),
         State::MadeAgain => "; the log was damaged, and made whole from its parity".to_owned(),
         State::Unprotected => "; the log is whole, without all of its parity".to_owned(),
@@ -270,8 +279,13 @@ pub(super) fn firmware(version: u32) -> Option<String> {
     (version != 0).then(|| format!("{major}.{minor}.{patch}"))
 }
 
-fn when(judged: &Judged, format: Format) -> String {
-    let Some((first, last)) = judged.span else { return "nothing of a vehicle is in it".to_owned() };
+fn when(checked: &Checked) -> String {
+    let (judged, format) = (&checked.judged, checked.format);
+    // A log of ours goes on while nothing is heard of the vehicle.
+    let of_log = checked.ending.as_ref().and_then(|ending| ending.summary.first.zip(ending.summary.last));
+    let Some((first, last)) = judged.span.map(|span| of_log.unwrap_or(span)) else {
+        return "nothing of a vehicle is in it".to_owned();
+    };
     let utc = judged.epochs.utc_us(first).map_or_else(
         || "time of day unknown".to_owned(),
         |utc_us| iso8601(utc_us / 1_000_000 * 1_000_000).replace(".000000", ""),
@@ -306,28 +320,44 @@ fn in_air(judged: &Judged) -> String {
         }
         [] if judged.armed == Span::ZERO => return told.unwrap_or("never armed").to_owned(),
         [] => format!("never; armed {armed}"),
-        [flight] if flight.disarmed_at_m.is_some() => {
-            format!(
-                "{} in 1 flight, which ended by disarming in the air; armed {armed}",
-                clock(flown(judged))
-            )
-        }
-        [flight] if !flight.landed => {
-            format!("{} in 1 flight, whose landing is not in the log; armed {armed}", clock(flown(judged)))
-        }
-        [_] => format!("{} in 1 flight; armed {armed}", clock(flown(judged))),
         flights => {
-            let last = match flights.last() {
-                Some(flight) if flight.disarmed_at_m.is_some() => {
-                    ", the last of which ended by disarming in the air"
-                }
-                Some(flight) if !flight.landed => "; the landing of the last one is not in the log",
-                _ => "",
+            let lacks = flights.iter().map(|flight| judged.holes.within(flight.from, flight.to));
+            let lacks = lacks.fold(Span::ZERO, |sum, lack| sum + lack);
+            let lacks = if lacks >= Span::from_secs(1) {
+                format!(" (without {} that is not in the log)", clock(lacks))
+            } else {
+                String::new()
             };
-            format!("{} in {} flights{last}; armed {armed}", clock(flown(judged)), flights.len())
+            let time = format!("{}{lacks}", clock(flown(judged)));
+            format!("{time} in {}{}; armed {armed}", count(flights.len(), "flight"), not_seen(flights))
         }
     };
     told.map_or(text.clone(), |told| format!("{text} ({told})"))
+}
+
+/// What of flights the log does not have, and how the last one ended otherwise.
+fn not_seen(flights: &[Flight]) -> String {
+    let disarmed = flights.last().is_some_and(|flight| flight.disarmed_at_m.is_some());
+    let took_off = flights.first().is_none_or(|flight| flight.took_off);
+    let landed = disarmed || flights.last().is_none_or(|flight| flight.landed);
+    let of = |one, many| if flights.len() == 1 { one } else { many };
+    let parts = [
+        (took_off, of("whose take-off", "the take-off of the first one")),
+        (landed, of("whose landing", "the landing of the last one")),
+    ];
+    let missing: Vec<&str> = parts.into_iter().filter(|(seen, _)| !seen).map(|(_, part)| part).collect();
+    let mut text = match missing.as_slice() {
+        [] => String::new(),
+        [part] => format!(", {part} is not in the log"),
+        parts => format!(", {} are not in the log", parts.join(" and ")),
+    };
+    if disarmed {
+        text.push_str(of(
+            ", which ended by disarming in the air",
+            ", the last of which ended by disarming in the air",
+        ));
+    }
+    text
 }
 
 /// The verdict, as a line.
@@ -644,6 +674,26 @@ mod tests {
         let mut all = [&short, &small, &long, &large, &count];
         all.sort_by_key(|gap| how_bad(gap));
         assert_eq!(all, [&count, &large, &small, &long, &short]);
+    }
+
+    #[test]
+    fn a_flight_of_which_a_part_is_not_in_the_log_says_which() {
+        let flight = |took_off, landed| Flight {
+            from: Instant::ZERO,
+            to: Instant::ZERO,
+            air: Span::ZERO,
+            took_off,
+            landed,
+            disarmed_at_m: None,
+        };
+        assert_eq!(not_seen(&[flight(true, true)]), "");
+        assert_eq!(not_seen(&[flight(true, false)]), ", whose landing is not in the log");
+        let both = ", whose take-off and whose landing are not in the log";
+        assert_eq!(not_seen(&[flight(false, false)]), both);
+        let first = ", the take-off of the first one is not in the log";
+        assert_eq!(not_seen(&[flight(false, true), flight(true, true)]), first);
+        let crashed = Flight { disarmed_at_m: Some(9.0), ..flight(true, false) };
+        assert_eq!(not_seen(&[crashed]), ", which ended by disarming in the air");
     }
 
     #[test]

@@ -29,6 +29,10 @@ pub(super) fn text(text: &mut String, log: &Overview) {
                 writeln!(text, "    (as the box stored it at {}: the log goes on after that)", moment(at));
         }
     }
+    let number = |name: &str| session.get(name).copied().unwrap_or(0.0);
+    if number("landings") + number("mishaps") > number("flights") {
+        text.push_str("    (it was in the air at its start: that flight is counted in the log before)\n");
+    }
     for [title, session, life] in lines {
         let _ = writeln!(text, "{}", format!("    {title:<34} {session:>14} {life:>14}").trim_end());
     }

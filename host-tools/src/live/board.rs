@@ -9,6 +9,7 @@ use hums_link::summary;
 use serde::Serialize;
 
 use super::craft::{Craft, is_of_wire};
+use crate::counters::tells_flight;
 use crate::page::note::CELLS_UNKNOWN;
 
 /// As long as a heartbeat may be missed.
@@ -50,8 +51,10 @@ pub struct Part {
 pub struct Board {
     /// The whole vehicle's level, by whoever knows best.
     pub overall: &'static str,
-    /// What stands in the place of that where it is not known any more: `was critical`, `was warning`.
-    pub said: Option<&'static str>,
+    /// What stands in the place of that where it is not known any more: `was critical`, and of a vehicle that is silent with what.
+    pub said: Option<String>,
+    /// The level that it had, where it is not known any more.
+    pub was: Option<&'static str>,
     /// All subsystems, in the order of [`Subsystem::ALL`].
     pub parts: Vec<Part>,
 }
@@ -91,9 +94,22 @@ impl Board {
         }
         let overall = craft.companion.overall(now).unwrap_or_else(|| overall(craft, now, &known));
         let all = Subsystem::ALL.into_iter().zip(&known);
+        let silent = is_silent(craft, now);
+        let worst = was(craft, silent).filter(|_| overall == Level::Stale);
+        let said = match worst {
+            Some(worst) if silent => Some(format!(
+                "silent for {}; {}: {}",
+                seconds(craft, now),
+                was_level(worst),
+                without_advice(worst)
+            )),
+            None if silent => Some(format!("silent for {}", seconds(craft, now))),
+            worst => worst.map(|worst| was_level(worst).to_owned()),
+        };
         Self {
             overall: overall.name(),
-            said: was(craft).filter(|_| overall == Level::Stale && !is_silent(craft, now)),
+            said,
+            was: worst.map(|worst| worst.level.name()),
             parts: all.map(|(subsystem, known)| part(craft, now, subsystem, known)).collect(),
         }
     }
@@ -110,10 +126,23 @@ fn overall(craft: &Craft, now: Instant, known: &[Known]) -> Level {
     heard.chain(unknown.then_some(Level::Stale)).max_by_key(|level| rank(*level)).unwrap_or(Level::Stale)
 }
 
-/// What the worst was of what is not judged any more.
-fn was(craft: &Craft) -> Option<&'static str> {
-    let worst = craft.unjudged.values().map(|finding| rank(finding.level)).max()?;
-    Some(if worst == rank(Level::Critical) { "was critical" } else { "was warning" })
+/// The worst of what was so when it was judged last.
+fn was(craft: &Craft, silent: bool) -> Option<&Finding> {
+    let all = craft.unjudged.values().chain(craft.worries.values().filter(|_| silent));
+    all.filter(|finding| is_bad(finding)).max_by_key(|finding| (rank(finding.level), finding.at))
+}
+
+fn is_bad(finding: &Finding) -> bool {
+    matches!(finding.level, Level::Warning | Level::Critical)
+}
+
+fn was_level(finding: &Finding) -> &'static str {
+    if finding.level == Level::Critical { "was critical" } else { "was warning" }
+}
+
+/// How long nothing has been heard of the vehicle.
+fn seconds(craft: &Craft, now: Instant) -> String {
+    format!("{} s", now.since(craft.heard).as_millis() / 1000)
 }
 
 fn part(craft: &Craft, now: Instant, subsystem: Subsystem, known: &Known) -> Part {
@@ -123,7 +152,8 @@ fn part(craft: &Craft, now: Instant, subsystem: Subsystem, known: &Known) -> Par
     // Of a vehicle that is silent one thing is known: that it is.
     let unknown = recorder || (silent && (subsystem != Subsystem::Link || !craft.on_the_wire));
     let here = if unknown { Level::Stale } else { known.level };
-    let ended = craft.unjudged.values().filter(|finding| finding.subsystem == subsystem);
+    let before = craft.worries.values().filter(|finding| silent && is_bad(finding));
+    let ended = craft.unjudged.values().chain(before).filter(|finding| finding.subsystem == subsystem);
     let ended = ended.max_by_key(|finding| rank(finding.level));
     let ended = ended.filter(|_| !matches!(here, Level::Warning | Level::Critical));
     let doubt = subsystem == Subsystem::Power && craft.cells_unknown;
@@ -141,17 +171,23 @@ fn part(craft: &Craft, now: Instant, subsystem: Subsystem, known: &Known) -> Par
     let is_link = silent && subsystem == Subsystem::Link;
     let unknown = level == Level::Stale && !recorder && !known.is_heard && !is_link;
     let absent = subsystem == Subsystem::Engine && craft.monitor.vehicle().engine.get().is_none();
-    let (calm, reason) = if let Some(finding) = ended.filter(|_| level == Level::Stale && !silent) {
-        let calm = if finding.level == Level::Critical { "was critical" } else { "was warning" };
-        (Some(calm), format!("{}; not judged on the ground or disarmed", without_advice(finding)))
-    } else if unknown && !absent && waits(craft, subsystem) {
-        (Some("idle"), waits_for(subsystem).to_owned())
+    let (calm, reason) = if let Some(finding) = ended.filter(|_| level == Level::Stale && !is_link) {
+        let why = if silent {
+            format!("silent for {}", seconds(craft, now))
+        } else {
+            "not judged on the ground or disarmed".to_owned()
+        };
+        (Some(was_level(finding)), format!("{}; {why}", without_advice(finding)))
+    } else if unknown && !absent && !silent && waits(craft, subsystem) {
+        (Some("idle"), waits_for(craft, subsystem).to_owned())
     } else if recorder && level == Level::Stale && craft.on_the_wire {
         (Some("recorded"), "it recorded this; hums verify says how well".to_owned())
     } else if unknown && !EXPECTED.contains(&subsystem) {
         (Some("none"), "nothing is heard of any".to_owned())
     } else if silent && level == Level::Stale && !recorder {
-        (None, format!("silent for {} s", now.since(craft.heard).as_millis() / 1000))
+        (None, format!("silent for {}", seconds(craft, now)))
+    } else if recorder && level == Level::Stale && craft.companion.known() {
+        (None, "it was heard before, and is silent now".to_owned())
     } else {
         (None, reason(craft, subsystem, level, here, known.good))
     };
@@ -174,10 +210,13 @@ fn waits(craft: &Craft, subsystem: Subsystem) -> bool {
     health::checks().any(|check| check.subsystem == subsystem && later(check.when))
 }
 
-fn waits_for(subsystem: Subsystem) -> &'static str {
+fn waits_for(craft: &Craft, subsystem: Subsystem) -> &'static str {
     let mut checks = health::checks().filter(|check| check.subsystem == subsystem);
-    if checks.any(|check| check.when == When::Armed) {
+    let vehicle = craft.monitor.vehicle();
+    if !vehicle.armed() && checks.any(|check| check.when == When::Armed) {
         "is checked once it is armed"
+    } else if !tells_flight(vehicle) {
+        "is checked in the air, and nothing tells whether it is there"
     } else {
         "is checked in the air"
     }
@@ -197,7 +236,7 @@ fn reason(craft: &Craft, subsystem: Subsystem, level: Level, here: Level, good: 
     }
     match (subsystem, level) {
         (Subsystem::Recorder, Level::Ok) => "it records".to_owned(),
-        (Subsystem::Recorder, Level::Stale) => "no recorder is heard on this link".to_owned(),
+        (Subsystem::Recorder, Level::Stale) => "no recorder is heard".to_owned(),
         (Subsystem::Power, Level::Advisory) if here == level => format!("{good} checks good"),
         (Subsystem::Recorder, _) => "see what the box says below".to_owned(),
         (_, Level::Stale) => "nothing is heard of it".to_owned(),
@@ -225,6 +264,7 @@ fn rank(level: Level) -> u8 {
 mod tests {
     use hums_core::observation::{Feeds, Heartbeat, Observation, Source};
     use hums_core::params::Params;
+    use hums_core::status::{LinkReading, RecorderStatus};
 
     use super::*;
 
@@ -284,8 +324,25 @@ mod tests {
         let battery = finding("cell_voltage", Subsystem::Power, Level::Critical);
         craft.unjudged.insert(("cell_voltage", 0), battery);
         let (board, part) = parts(&craft, 1_100);
-        assert_eq!((board.overall, board.said), ("stale", Some("was critical")));
+        assert_eq!((board.overall, board.said.as_deref()), ("stale", Some("was critical")));
         let words = "was critical: battery 1 cell low: 3.40 V; not judged on the ground or disarmed";
+        assert_eq!(part(&board, Subsystem::Power), words);
+    }
+
+    /// That nothing is heard any more heals nothing.
+    #[test]
+    fn what_was_bad_when_the_link_fell_silent_is_still_said() {
+        let mut craft = craft(&[finding("cell_voltage", Subsystem::Power, Level::Critical)]);
+        craft.monitor.tick(
+            Instant::from_millis(1_050),
+            &LinkReading::default(),
+            &RecorderStatus::default(),
+            &mut |_| {},
+        );
+        let (board, part) = parts(&craft, 14_100);
+        let words = "silent for 13 s; was critical: battery 1 cell low: 3.40 V";
+        assert_eq!((board.said.as_deref(), board.was), (Some(words), Some("critical")));
+        let words = "was critical: battery 1 cell low: 3.40 V; silent for 13 s";
         assert_eq!(part(&board, Subsystem::Power), words);
     }
 

@@ -150,6 +150,12 @@ impl Craft {
         self.parameter(at, frame, history);
     }
 
+    /// So many of its frames are not in the recording: what follows them follows none before.
+    pub fn miss(&mut self, frames: u64) {
+        self.missing = self.missing.saturating_add(frames);
+        self.sequences = Sequences::new();
+    }
+
     /// Takes a parameter that its autopilot tells.
     pub fn parameter(&self, at: Instant, frame: &Frame<'_>, history: &mut Option<&mut History>) {
         if let Some(history) = history
@@ -251,6 +257,11 @@ impl Craft {
                 return;
             }
             let key = (finding.check, finding.instance);
+            // Whoever hears nothing hears of nothing that is good again.
+            if cut_off && finding.level == Level::Ok {
+                unjudged.extend(worries.remove(&key).map(|before| (key, before)));
+                return;
+            }
             // That a link is silent is said once, of the link.
             let echo = match finding.level {
                 Level::Stale => finding.because == HEARTBEAT,
@@ -272,7 +283,10 @@ impl Craft {
             findings(finding);
         });
         while let Some(happening) = self.monitor.take_happening() {
-            let joined = self.joined && now.since(self.began) <= JOINED;
+            let joined = match happening {
+                Happening::TakeOff => !self.monitor.flight().was_on_ground(),
+                _ => self.joined && now.since(self.began) <= JOINED,
+            };
             self.cells_unknown |= happening == Happening::CellsUnknown;
             if happening == Happening::Armed {
                 self.unjudged.clear();

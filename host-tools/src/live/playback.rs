@@ -120,6 +120,17 @@ fn copied(copies: &[Copy]) -> usize {
     copies.iter().map(|copy| copy.world.crafts.len()).sum()
 }
 
+/// Keeps what else was told. That something is missing is known behind it: copies that were made meanwhile take it too.
+fn keep(told: &mut Vec<(Instant, Told)>, copies: &mut [Copy], at: Instant, what: &Told) {
+    let at = if let Told::Missing { from, .. } = what { at.min(*from) } else { at };
+    let place = told.partition_point(|(known, _)| *known <= at);
+    told.insert(place, (at, what.clone()));
+    for copy in copies.iter_mut().filter(|copy| copy.at > at) {
+        copy.world.told(at, what, None);
+        copy.told += 1;
+    }
+}
+
 /// What else was told by then.
 fn tell(told: &[(Instant, Told)], next: &mut usize, by: Instant, world: &mut World) {
     while let Some((at, what)) = told.get(*next).filter(|(at, _)| *at <= by) {
@@ -206,8 +217,8 @@ impl Player {
                 Heard::Entry(_) => None,
                 Heard::Told(what) => {
                     if told.len() < TOLD_MAX {
-                        told.push((at, what.clone()));
                         world.told(at, what, Some(&mut hub.histories()));
+                        keep(&mut told, &mut copies, at, what);
                     }
                     return Ok(!interrupt::requested());
                 }

@@ -114,16 +114,20 @@ pub fn each(opened: &mut Opened, take: &mut Take<'_>) -> Result<Option<Ending>> 
     let native = opened.native.is_some();
     let summary = recording.read(want, &mut |at, item| {
         let entry = if native { Entry::of(at, &item) } else { None };
-        let told = if let Item::Record(record) = item { Told::of(record) } else { None };
+        let told = match item {
+            Item::Record(record) => Told::of(record),
+            Item::Gap(gap) if !native => Told::missing(gap),
+            _ => None,
+        };
         let heard = match item {
             Item::Epoch(epoch) => {
                 epoch_us = Some(epoch);
                 return Ok(());
             }
             Item::Frame(frame) => Heard::Frame(frame),
-            Item::Record(_) => match &told {
-                Some(told @ (Told::Parameter { .. } | Told::Part { .. })) => Heard::Told(told),
-                _ => return Ok(()),
+            Item::Record(_) | Item::Gap(_) if !native => match &told {
+                Some(Told::Checked | Told::Peak { .. }) | None => return Ok(()),
+                Some(told) => Heard::Told(told),
             },
             // Each that the player counts when it goes to a place.
             _ => match &entry {

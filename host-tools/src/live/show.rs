@@ -12,7 +12,7 @@ use super::companion::CompanionJson;
 use super::craft::Craft;
 use super::values::{Motors, Values};
 use super::world::World;
-use crate::counters::is_told;
+use crate::counters::{is_told, tells_flight};
 use crate::names::{autopilot_name, type_name};
 use crate::page::json::json;
 use crate::page::modes;
@@ -102,6 +102,7 @@ pub fn all(world: &World, now: Instant, around: &Around<'_>) -> (String, Vec<(u8
 }
 
 #[derive(Serialize)]
+#[expect(clippy::struct_excessive_bools, reason = "facts that have nothing to do with each other")]
 struct State<'a> {
     t: &'static str,
     vehicle: u8,
@@ -110,10 +111,14 @@ struct State<'a> {
     firmware: Option<String>,
     armed: bool,
     airborne: bool,
+    /// Something tells whether it is in the air.
+    tells_flight: bool,
     phase: &'static str,
     mode: Cow<'static, str>,
     overall: &'static str,
-    overall_said: Option<&'static str>,
+    overall_said: Option<&'a str>,
+    /// The level that it had, where it is not known any more.
+    overall_was: Option<&'static str>,
     heard_ms: u64,
     px4: bool,
     values: Values<'a>,
@@ -162,10 +167,12 @@ fn state(system: u8, craft: &Craft, board: &Board, now: Instant) -> String {
         firmware: identity.map(|_| format!("{major}.{minor}.{patch}")),
         armed: heartbeat.armed,
         airborne: craft.monitor.flight().airborne(),
+        tells_flight: tells_flight(vehicle),
         phase: craft.phase(now).name(),
         mode: modes::name(&heartbeat),
         overall: board.overall,
-        overall_said: board.said,
+        overall_said: board.said.as_deref(),
+        overall_was: board.was,
         heard_ms: now.since(craft.heard).as_millis(),
         px4,
         values: Values::of(craft, now),

@@ -7,6 +7,7 @@ use serde::ser::{SerializeMap, SerializeTuple, Serializer};
 
 use super::craft::Craft;
 use super::latest::{ESC, MOTION, QUANTITIES, SLOW};
+use crate::counters::tells_flight;
 use crate::decode::reference::Quantity;
 use crate::mavlink::values::Scalar;
 
@@ -58,7 +59,8 @@ impl<'a> Values<'a> {
     fn each(&self, mut each: impl FnMut(&'static str, Shown)) {
         let (craft, now) = (self.craft, self.now);
         for (name, quantity, limit) in &QUANTITIES {
-            if let Some((at, value)) = craft.latest.get(*quantity) {
+            let is_known = *quantity != Quantity::FlightTime || tells_flight(craft.monitor.vehicle());
+            if let Some((at, value)) = craft.latest.get(*quantity).filter(|_| is_known) {
                 // The time in the air goes on between heartbeats.
                 let running = *quantity == Quantity::FlightTime && now.since(at) <= *limit;
                 let value =

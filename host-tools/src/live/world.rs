@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use hums_core::component::{COMPONENTS_MAX, Component};
-use hums_core::health::Finding;
+use hums_core::health::{Finding, Subsystem};
 use hums_core::monitor::TICK;
 use hums_core::observation::Observation;
 use hums_core::time::{Instant, Span};
@@ -16,6 +16,8 @@ use crate::check::SETTLE;
 use crate::mavlink::ids::PARAM_VALUE;
 use crate::page::history::History;
 use crate::page::more::More;
+use crate::page::note::Note;
+use crate::summary::FindingLine;
 
 /// Vehicles that are told apart; later ones are counted.
 pub const VEHICLES_MAX: usize = 8;
@@ -206,8 +208,11 @@ impl World {
     }
 
     /// Takes what a log tells besides frames.
-    pub fn told(&mut self, at: Instant, told: &Told, histories: Option<&mut Histories>) {
-        self.advance(at, histories);
+    pub fn told(&mut self, at: Instant, told: &Told, mut histories: Option<&mut Histories>) {
+        if let Told::Missing { from, to, frames } = told {
+            return self.miss(*from, *to, *frames, histories);
+        }
+        self.advance(at, histories.as_deref_mut());
         match told {
             Told::Parameter { name, value, start } => {
                 self.limits.learn(name, *value);
@@ -222,8 +227,26 @@ impl World {
                 }
             }
             Told::Part { place, component } => self.part(*place, *component),
+            // What it said of itself nobody else can find.
+            Told::Finding(finding) if finding.subsystem == Subsystem::Recorder => {
+                if let (Some(histories), Some(owner)) = (histories, self.owner) {
+                    let note = Note::told(&FindingLine::from(finding.as_ref().clone()));
+                    histories.entry(owner).or_default().note(finding.at, note);
+                }
+            }
             // The monitor here finds its own.
-            Told::Finding(_) | Told::Checked => {}
+            Told::Finding(_) | Told::Checked | Told::Peak { .. } | Told::Missing { .. } => {}
+        }
+    }
+
+    /// The log has nothing from here to there, which is no silence of the vehicle.
+    fn miss(&mut self, from: Instant, to: Instant, frames: u64, mut histories: Option<&mut Histories>) {
+        self.pass(from, to, histories.as_deref_mut());
+        for (system, craft) in &mut self.crafts {
+            craft.miss(if self.owner == Some(*system) { frames } else { 0 });
+            if let Some(histories) = histories.as_deref_mut() {
+                histories.entry(*system).or_default().gap(Some((from, to)));
+            }
         }
     }
 
@@ -340,6 +363,29 @@ mod tests {
         };
         assert!(found(false) > 0, "a silence is found");
         assert_eq!(found(true), 0);
+    }
+
+    /// What the box counted as lost is missing here too, and is no silence of the vehicle.
+    #[test]
+    fn what_a_box_lost_is_counted_and_is_a_gap_of_the_page() {
+        let (mut world, mut histories) = (World::new(Limits::default()).on_the_wire(true), Histories::new());
+        world.begin(Instant::ZERO);
+        let at = Instant::from_millis;
+        for second in 0..20 {
+            hear(&mut world, &mut histories, at(second * 1_000), &heartbeat(1));
+        }
+        let lost = Told::Missing { from: at(19_100), to: at(39_900), frames: 3_591 };
+        world.told(at(39_950), &lost, Some(&mut histories));
+        for second in 40..60 {
+            hear(&mut world, &mut histories, at(second * 1_000), &heartbeat(1));
+        }
+        assert_eq!(world.crafts[&1].missing, 3_591);
+        assert!(world.found.iter().all(|(_, finding)| finding.level == Level::Ok), "{:?}", world.found);
+        let part = |until_s: u64| {
+            let part = histories[&1].since(1, &mut Cursor::default(), at(until_s * 1_000)).expect("a part");
+            serde_json::to_value(part).expect("JSON")["gaps"].clone()
+        };
+        assert_eq!((part(19), part(60)), (serde_json::json!([]), serde_json::json!([[19.1, 39.9]])));
     }
 
     /// What is so when the vehicle is first heard has not happened then.

@@ -36,6 +36,8 @@ const NOTES_MAX: usize = 2_000;
 const DRAWN_EVERY: Span = Span::from_millis(100);
 /// A phase that lasts less is part of the one before.
 const PHASE_MIN: Span = Span::from_secs(2);
+/// Gaps kept at most.
+const GAPS_MAX: usize = 2_000;
 
 /// Everything that is kept.
 #[derive(Clone, Debug, Default)]
@@ -48,6 +50,8 @@ pub struct History {
     phases: Spans,
     modes: Spans,
     parameters: Parameters,
+    /// Where the recording has nothing.
+    gaps: Vec<(Instant, Instant)>,
     autopilot: Autopilot,
     params: Option<Box<Params>>,
     /// Cells of the one battery.
@@ -71,6 +75,7 @@ pub struct Cursor {
     places: usize,
     phases: Seen,
     modes: Seen,
+    gaps: usize,
     until: Option<Instant>,
     /// When it was told of its series last.
     drawn: Option<Instant>,
@@ -94,6 +99,8 @@ pub struct Part {
     pub(super) track: Vec<Place>,
     pub(super) phases: Option<Rest>,
     pub(super) modes: Option<Rest>,
+    /// All gaps of the record, where there is a new one: from and to, seconds.
+    pub(super) gaps: Option<Vec<(f64, f64)>>,
     pub(super) parameters: Vec<ParameterJson>,
     pub(super) parameters_left_out: u64,
     /// The log tells what parameters are by default: one without a default is at it.
@@ -185,9 +192,13 @@ impl History {
         self.frames.pass(now, &mut self.samples.store);
     }
 
-    /// What follows a gap of the recording follows no frame before it.
-    pub fn gap(&mut self) {
+    /// What follows a gap of the recording follows no frame before it. Some have a beginning and an end.
+    pub fn gap(&mut self, span: Option<(Instant, Instant)>) {
         self.frames.gap();
+        if let Some(span) = span.filter(|_| self.gaps.len() < GAPS_MAX) {
+            let place = self.gaps.partition_point(|known| *known < span);
+            self.gaps.insert(place, span);
+        }
     }
 
     /// Takes what an observation told; `reference` has taken it before.
@@ -197,7 +208,12 @@ impl History {
             self.autopilot = heartbeat.autopilot;
             self.modes.extend(at, modes::name(heartbeat), Span::ZERO);
         }
-        let phase = reference.flight().phase(at, reference.vehicle()).name();
+        let flight = reference.flight();
+        let phase = flight.phase(at, reference.vehicle()).name();
+        if flight.airborne() && !flight.was_on_ground() {
+            // It was so before that was seen.
+            self.phases.begin_as(Cow::Borrowed(phase));
+        }
         self.phases.extend(at, Cow::Borrowed(phase), PHASE_MIN);
         self.samples.take(at, reference, observation);
     }
@@ -276,12 +292,17 @@ impl History {
             (self.phases.since(&mut cursor.phases, until), self.modes.since(&mut cursor.modes, until));
         let parameters = self.parameters.since(cursor.until, until);
         cursor.until = Some(until);
+        let gaps = self.gaps.get(..self.gaps.partition_point(|(from, _)| *from <= until)).unwrap_or_default();
+        let is_new = std::mem::replace(&mut cursor.gaps, gaps.len()) != gaps.len();
+        let seconds = |(from, to): &(Instant, Instant)| (from.as_secs_f64(), to.as_secs_f64());
+        let gaps = (reset || is_new).then(|| gaps.iter().map(seconds).collect());
 
         let something = reset
             || plots.is_some()
             || !(series.is_empty() && notes.is_empty() && track.is_empty() && parameters.is_empty())
             || phases.is_some()
-            || modes.is_some();
+            || modes.is_some()
+            || gaps.is_some();
         something.then(|| Part {
             t: "history",
             vehicle,
@@ -295,6 +316,7 @@ impl History {
             track,
             phases,
             modes,
+            gaps,
             parameters,
             parameters_left_out: self.parameters.left_out(),
             tells_defaults: self.parameters.tells_defaults(),

@@ -77,6 +77,7 @@ pub fn merged(flights: &[Flight<'_>]) -> Part {
         track: Vec::new(),
         phases: None,
         modes: None,
+        gaps: None,
         parameters: Vec::new(),
         parameters_left_out: 0,
         tells_defaults: false,

@@ -146,6 +146,11 @@ impl Note {
         }
     }
 
+    /// A finding that a box recorded.
+    pub fn told(finding: &FindingLine) -> Self {
+        Self { from: "on board".to_owned(), ..Self::found(finding, None) }
+    }
+
     /// A finding of the checks here.
     pub fn finding(finding: &Finding) -> Self {
         let line = FindingLine {

@@ -42,6 +42,16 @@ impl Spans {
         }
     }
 
+    /// The first one, while it is the only one, was this one.
+    pub fn begin_as(&mut self, name: Cow<'static, str>) {
+        if let [(_, first)] = self.begun.as_mut_slice()
+            && *first != name
+        {
+            self.revision += 1;
+            *first = name;
+        }
+    }
+
     /// What a page that has this much lacks of the time up to `until`; `None` where that is nothing.
     pub fn since(&self, seen: &mut Seen, until: Instant) -> Option<Rest> {
         let count = self.begun.partition_point(|(at, _)| *at <= until);
@@ -63,6 +73,18 @@ mod tests {
 
     fn seconds(second: u64) -> Instant {
         Instant::from_millis(second * 1000)
+    }
+
+    #[test]
+    fn what_it_was_in_before_that_was_seen_is_the_first_one() {
+        let mut spans = Spans::default();
+        spans.extend(seconds(0), "ground".into(), Span::from_secs(2));
+        spans.begin_as("hover".into());
+        spans.extend(seconds(1), "hover".into(), Span::from_secs(2));
+        spans.extend(seconds(9), "climb".into(), Span::from_secs(2));
+        spans.begin_as("cruise".into());
+        let (_, whole) = spans.since(&mut Seen::default(), seconds(100)).expect("all of it");
+        assert_eq!(whole, [(0.0, "hover".into()), (9.0, "climb".into())]);
     }
 
     #[test]

@@ -14,6 +14,8 @@ pub struct Flight {
     pub(super) to_s: f64,
     /// In the air, without stops on the ground and gaps of the record.
     pub(super) air_s: f64,
+    /// It was on the ground before; otherwise it was in the air when it was heard first.
+    pub(super) took_off: bool,
     pub(super) landed: bool,
     /// Disarmed in the air, which is no landing.
     pub(super) disarmed_in_air: bool,
@@ -69,6 +71,7 @@ impl Extents {
                 from_s: flight.from.as_secs_f64(),
                 to_s: flight.to.as_secs_f64(),
                 air_s: flight.air.as_micros() as f64 / 1e6,
+                took_off: flight.took_off,
                 landed: flight.landed,
                 disarmed_in_air: flight.disarmed_at_m.is_some(),
                 height_max_m: extent.height_max_m,

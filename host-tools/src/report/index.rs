@@ -40,6 +40,8 @@ pub struct Row {
     #[serde(default)]
     little: bool,
     #[serde(default)]
+    begins_in_air: bool,
+    #[serde(default)]
     ends_in_air: bool,
     /// Nothing in it tells whether the vehicle flew.
     #[serde(default)]
@@ -107,7 +109,6 @@ impl Row {
     /// Of a page.
     pub fn new(file: String, log: &Overview, replay: &Replay) -> Self {
         let (summary, contents) = (&log.ending.summary, &log.contents);
-        let count = |level| contents.findings.iter().filter(|finding| finding.level == level).count();
         let flights = &replay.flights;
         let most =
             |of: fn(&super::flights::Flight) -> Option<f32>| flights.iter().filter_map(of).reduce(f32::max);
@@ -129,9 +130,10 @@ impl Row {
             height_max_m: most(|flight| flight.height_max_m),
             speed_max_m_s: most(|flight| flight.speed_max_m_s),
             checked: contents.checked_by() != "nobody" && (vehicle.is_some() || log.format.is_none()),
-            critical: count("critical"),
-            warning: count("warning"),
+            critical: replay.found.0,
+            warning: replay.found.1,
             little: replay.judged.is_some_and(JudgedChecks::is_little),
+            begins_in_air: flights.first().is_some_and(|flight| !flight.took_off),
             ends_in_air: replay.ends_in_air.is_some(),
             flight_unknown: !replay.tells_flight,
             faults: faults(log),

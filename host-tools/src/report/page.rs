@@ -8,7 +8,7 @@ use serde::Serialize;
 use sha2::{Digest as _, Sha256};
 
 use super::flights::Flight;
-use super::replay::Replay;
+use super::replay::{Missing, Replay};
 use super::trend::Trend;
 use crate::counters::{self, Counters};
 use crate::info::json::LogJson;
@@ -28,6 +28,11 @@ struct Data<'a> {
     /// All of the flight.
     flight: Option<Part>,
     flights: &'a [Flight],
+    /// What was not recorded.
+    missing: &'a [Missing],
+    /// How many checks were critical at their worst, and how many warned.
+    critical: usize,
+    warning: usize,
     texts_count: u64,
     /// How many checks had something to judge, and of how many; `null` where nothing was judged.
     judged: Option<(usize, usize)>,
@@ -103,6 +108,9 @@ pub fn html(log: &Overview, replay: &Replay, trend: &Trend, before: Option<&Befo
         epoch_us: log.contents.epoch_us,
         flight: replay.history.since(0, &mut Cursor::default(), Instant::from_micros(u64::MAX)),
         flights: &replay.flights,
+        missing: &replay.missing,
+        critical: replay.found.0,
+        warning: replay.found.1,
         texts_count: replay.texts_count,
         judged: replay.judged.map(|checks| (checks.judged, checks.all)),
         little: replay.judged.is_some_and(JudgedChecks::is_little),

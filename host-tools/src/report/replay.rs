@@ -1,25 +1,37 @@
 //! A recording read in order: what the vehicle told becomes the history of its flight, and flights.
 
 use anyhow::Result;
+use hums_core::health::Level;
 use hums_core::observation::{Observation, Source};
 use hums_core::time::Instant;
+use serde::Serialize;
 
 use super::causes::causes;
 use super::flights::{Extents, Flight};
 use crate::check::judge::{Judge, Limits};
+use crate::check::judged::Judged;
 use crate::counters::tells_flight;
 use crate::decode::reference::Reference;
 use crate::page::history::History;
 use crate::page::more::{More, rows};
 use crate::page::note::Note;
 use crate::page::parameters::Parameters;
-use crate::source::item::{Item, Text, Want};
+use crate::source::item::{Cause, Item, Text, Want};
 use crate::source::recording::Place;
 use crate::statustext;
 use crate::summary::{EndsInAir, JudgedChecks, Overview};
 
 /// Texts kept at most; beyond this they are only counted.
 const TEXTS_MAX: usize = 1_000;
+
+/// A part of the flight that is not in the record.
+#[derive(Debug, Serialize)]
+pub struct Missing {
+    /// Since when, where that is known.
+    from_s: Option<f64>,
+    /// What, and why.
+    words: String,
+}
 
 /// What a log told.
 #[derive(Debug, Default)]
@@ -36,6 +48,10 @@ pub struct Replay {
     pub tells_flight: bool,
     /// How the vehicle was last, where its last flight goes on at the end.
     pub ends_in_air: Option<EndsInAir>,
+    /// What was not recorded, and where.
+    pub missing: Vec<Missing>,
+    /// How many checks were critical at their worst, and how many warned.
+    pub found: (usize, usize),
     /// What it said.
     notes: Vec<(Instant, Note)>,
     reference: Reference,
@@ -72,6 +88,9 @@ impl Replay {
         replay.judged = judged.worst().map(|_| judged.checks());
         replay.tells_flight = tells_flight(judged.vehicle());
         replay.ends_in_air = judged.ends_in_air;
+        replay.gaps(&judged);
+        let count = |level| judged.problems.iter().filter(|problem| problem.level == level).count();
+        replay.found = (count(Level::Critical), count(Level::Warning));
         let findings = &overview.contents.findings;
         let causes = causes(findings);
         let found = findings.iter().zip(&causes);
@@ -82,6 +101,22 @@ impl Replay {
             replay.history.note(at, note);
         }
         Ok(replay)
+    }
+
+    /// Takes what the recording does not have.
+    fn gaps(&mut self, judged: &Judged) {
+        for gap in &judged.gaps {
+            let span = gap.from.or(gap.to).zip(gap.to.or(gap.from));
+            // One whose length is not known is a place, as is a count over much of it; one that is nowhere is told in the table alone.
+            let is_empty = span.is_some_and(|span| judged.holes.is_one(&span));
+            self.history.gap(span.map(|(from, to)| (from, if is_empty { to } else { from })));
+            // Bytes of no frame lack nothing.
+            let is_noise = gap.cause == Cause::Lost && gap.bytes > 0;
+            if gap.cause != Cause::NotKept && !is_noise {
+                let from_s = gap.from.map(Instant::as_secs_f64);
+                self.missing.push(Missing { from_s, words: gap.words.clone() });
+            }
+        }
     }
 
     /// Takes the next item, while the vehicle is in this flight.
@@ -96,7 +131,7 @@ impl Replay {
                     self.history.more(at, &more);
                 }
             }
-            Item::Gap(_) => self.history.gap(),
+            Item::Gap(_) => self.history.gap(None),
             _ => {}
         }
     }

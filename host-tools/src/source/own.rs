@@ -16,6 +16,7 @@ use super::said::Said;
 use crate::ending::Ending;
 use crate::logs::Log;
 use crate::logs::reader::{self, epoch};
+use crate::loss;
 use crate::mavlink::ids::{HEARTBEAT, PARAM_VALUE, STATUSTEXT};
 use crate::plural::count;
 
@@ -76,11 +77,10 @@ impl OwnReader {
             collected: new(),
             kept: Kept { observations: true, ..Kept::default() },
         };
-        let hand = Hand { want: in_order, take, said: Said::default() };
+        let hand = Hand { want: in_order, take, said: Said::default(), lost: None };
         let mut both = HandBoth { deliver, hand };
         let summary = self.in_parts(Want { frames: true, ..want }, new, &mut both, seen)?;
-        let Hand { take, mut said, .. } = both.hand;
-        said.end(take)?;
+        both.hand.end()?;
         Ok(summary)
     }
 }
@@ -90,11 +90,11 @@ impl Reader for OwnReader {
         if let Some(epoch) = epoch(&self.log)? {
             take(Instant::ZERO, Item::Epoch(epoch))?;
         }
-        let mut hand = Hand { want, take, said: Said::default() };
+        let mut hand = Hand { want, take, said: Said::default(), lost: None };
         let new = || Kept { frames: want.frames, observations: want.observations, ..Kept::default() };
         let all = Want { frames: true, ..Want::default() };
         let summary = self.in_parts(all, new, &mut hand, |bytes| self.progress.set_taken(bytes))?;
-        hand.said.end(hand.take)?;
+        hand.end()?;
         Ok(summary)
     }
 }
@@ -252,10 +252,13 @@ struct Hand<'a, 'b> {
     want: Want<'a>,
     take: &'a mut Take<'b>,
     said: Said,
+    /// What the recorder lost, until something was recorded again: it has a record for each second.
+    lost: Option<(Instant, Loss)>,
 }
 
 impl Deliver<Kept> for Hand<'_, '_> {
     fn gap(&mut self, gap: &Gap) -> Result<()> {
+        self.tell_lost()?;
         (self.take)(gap.from.unwrap_or(Instant::ZERO), Item::Gap(gap))
     }
 
@@ -263,6 +266,9 @@ impl Deliver<Kept> for Hand<'_, '_> {
         let mut start = 0;
         let mut bytes = |end| part.bytes.get(std::mem::replace(&mut start, end)..end).unwrap_or_default();
         for (at, stored) in &part.items {
+            if !matches!(stored, Stored::Record(_)) {
+                self.tell_lost()?;
+            }
             match stored {
                 Stored::Frame(check, end) => {
                     if let Some(frame) = Frame::again(bytes(*end), *check) {
@@ -283,6 +289,9 @@ impl Hand<'_, '_> {
     /// A record, and what it says of the recording that was packed.
     fn record(&mut self, at: Instant, record: &Record<'_>) -> Result<()> {
         (self.take)(at, Item::Record(record))?;
+        if let Some((last, _)) = &mut self.lost {
+            *last = at;
+        }
         match record {
             Record::Note(Note { text: JOINED, .. }) => {
                 std::mem::take(&mut self.said).end(self.take)?;
@@ -291,8 +300,35 @@ impl Hand<'_, '_> {
             Record::Loss(loss @ Loss { what: Lost::WrongChecksums | Lost::DamagedPlaces, .. }) => {
                 (self.take)(at, Item::Gap(&of_packed(loss)))
             }
+            Record::Loss(loss) if loss::words(loss).is_some() => match &mut self.lost {
+                Some((last, lost)) if lost.what == loss.what => {
+                    (*last, lost.to) = (at, lost.to.max(loss.to));
+                    lost.count = lost.count.saturating_add(loss.count);
+                    Ok(())
+                }
+                _ => {
+                    self.tell_lost()?;
+                    self.lost = Some((at, *loss));
+                    Ok(())
+                }
+            },
             _ => Ok(()),
         }
+    }
+
+    /// Hands on what the recorder lost until now.
+    fn tell_lost(&mut self) -> Result<()> {
+        let Some((at, lost)) = self.lost.take() else { return Ok(()) };
+        match not_recorded(&lost) {
+            Some(gap) => (self.take)(at, Item::Gap(&gap)),
+            None => Ok(()),
+        }
+    }
+
+    /// Nothing follows.
+    fn end(mut self) -> Result<()> {
+        self.tell_lost()?;
+        self.said.end(self.take)
     }
 }
 
@@ -304,6 +340,13 @@ fn of_packed(loss: &Loss) -> Gap {
         _ => (format!("{} in the recording that was packed", count(loss.count, "damaged place")), None),
     };
     Gap { from: Some(loss.from), to, cause: Cause::Lost, place: None, bytes: 0, words, own: None }
+}
+
+/// What the recorder counted as lost.
+fn not_recorded(loss: &Loss) -> Option<Gap> {
+    let (from, to) = (Some(loss.from), Some(loss.to));
+    let words = loss::words(loss)?;
+    Some(Gap { from, to, cause: Cause::Lost, place: None, bytes: 0, words, own: None })
 }
 
 /// A gap in the stream's words.

@@ -1,10 +1,13 @@
 //! What a log of ours tells besides frames, as far as a command that reads recordings takes it.
 
 use hums_blackbox::Record;
-use hums_blackbox::record::{FindingRecord, Why};
+use hums_blackbox::record::{FindingRecord, Lost, Why};
 use hums_core::component::{COMPONENTS_MAX, Component, Label};
 use hums_core::health::{self, Level, Subsystem};
 use hums_core::time::Instant;
+
+use super::item::Gap;
+use crate::loss;
 
 /// One of the monitor's own records.
 #[derive(Clone, Debug, PartialEq)]
@@ -27,6 +30,24 @@ pub enum Told {
     },
     /// A check changed its level.
     Finding(Box<Finding>),
+    /// The worst value of a check of this session so far.
+    Peak {
+        /// The check's stable name.
+        check: String,
+        /// Which one of several, from 0.
+        instance: u8,
+        /// In the check's unit.
+        value: f32,
+    },
+    /// The log has nothing from here to there.
+    Missing {
+        /// The first of what is missing.
+        from: Instant,
+        /// The last.
+        to: Instant,
+        /// Frames that are missing, where it is known how many.
+        frames: u64,
+    },
     /// What only a monitor writes that checks the vehicle's health: its findings are all that there were.
     Checked,
 }
@@ -77,6 +98,12 @@ impl From<&FindingRecord<'_>> for Finding {
 }
 
 impl Told {
+    /// What sectors that cannot be read had; `None` where nobody knows from when to when they are.
+    pub fn missing(gap: &Gap) -> Option<Self> {
+        let (own, (from, to)) = (gap.own?, gap.from.zip(gap.to)?);
+        Some(Self::Missing { from, to, frames: u64::from(own.frames.unwrap_or(0)) })
+    }
+
     /// What a record tells, where it is of use here.
     pub fn of(record: &Record<'_>) -> Option<Self> {
         match record {
@@ -100,6 +127,15 @@ impl Told {
                 (place < COMPONENTS_MAX).then_some(Self::Part { place, component })
             }
             Record::Finding(finding) => Some(Self::Finding(Box::new(Finding::from(finding)))),
+            Record::Exceedance(exceedance) => Some(Self::Peak {
+                check: exceedance.check.to_owned(),
+                instance: exceedance.instance,
+                value: exceedance.session.peak,
+            }),
+            Record::Loss(loss) => {
+                let frames = if loss.what == Lost::QueueFull { loss.count } else { 0 };
+                loss::words(loss).map(|_| Self::Missing { from: loss.from, to: loss.to, frames })
+            }
             Record::Boot(_) | Record::Usage(_) => Some(Self::Checked),
             _ => None,
         }

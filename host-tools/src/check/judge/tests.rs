@@ -87,7 +87,11 @@ fn each_check_is_judged_or_says_why_not() {
         reason.map_or("", |(_, why)| why.as_str())
     };
     assert_eq!(why("esc_silent"), "no ESC telemetry");
-    assert_eq!(why("ekf_variance"), "never in the air");
+    assert_eq!(
+        why("ekf_variance"),
+        "not known whether it was in the air",
+        "nothing tells of height or speed"
+    );
     assert_eq!(why("frames_lost"), "the autopilot recorded this itself, without a link");
     assert_eq!(why("record_lost"), "no monitor recorded this");
     assert_eq!(why("rc_rssi"), "its limit is off");
@@ -164,6 +168,53 @@ fn a_recording_that_ends_on_the_ground_shortly_after_the_landing_has_the_whole_f
         assert!((59_000..=60_100).contains(&air), "{ground_ms}: {flights:?}");
         assert!(flights[0].to <= Instant::from_millis(65_100), "{ground_ms}: {flights:?}");
     }
+}
+
+#[test]
+fn a_vehicle_that_is_in_the_air_when_it_is_heard_first_did_not_take_off() {
+    let took_off = |ground_ms: u64| {
+        let mut judge = Judge::new(&Limits::default(), Format::Tlog);
+        half_seconds(&mut judge, 0, ground_ms, true, LandedState::OnGround);
+        half_seconds(&mut judge, ground_ms, 60_000, true, LandedState::InAir);
+        let flights = judge.end().flights;
+        let [flight] = flights.as_slice() else { panic!("{flights:?}") };
+        flight.took_off
+    };
+    assert!(took_off(10_000));
+    assert!(!took_off(0));
+}
+
+/// A check of the box itself: what it exceeded is in its record alone.
+#[test]
+fn the_worst_value_of_a_check_of_the_box_is_that_of_its_record() {
+    use hums_blackbox::record::Exceedance;
+    use hums_core::health::exceedance::Crossings;
+    let mut judge = Judge::new(&Limits::default(), Format::Hums);
+    let at = Instant::from_millis(1_000);
+    let finding = FindingRecord {
+        at,
+        subsystem: hums_core::health::Subsystem::Recorder,
+        check: "record_lost",
+        instance: 0,
+        level: Level::Warning,
+        previous: Level::Ok,
+        value: 19.0,
+        limit: 1.0,
+        unit: "frames",
+    };
+    let session = Crossings { warnings: 1, peak: 3_591.0, ..Crossings::default() };
+    let exceeded = Exceedance { check: "record_lost", unit: "frames", session, ..Exceedance::default() };
+    judge.item(at, Item::Record(&CHECKED));
+    judge.item(at, Item::Record(&Record::Finding(finding)));
+    judge.item(at, Item::Record(&Record::Exceedance(exceeded)));
+    fly(&mut judge, 2, 4, 10, 0.9);
+    judge.item(Instant::from_millis(60_000), Item::Record(&CHECKED));
+    let [problem] = &judge.end().problems[..] else { panic!("one") };
+    assert_eq!(
+        (problem.value, problem.lasted),
+        (3_591.0, Span::from_secs(59)),
+        "it goes on to the end of the log"
+    );
 }
 
 #[test]

@@ -10,8 +10,6 @@ flight.epoch_ms = data.epoch_us == null ? null : data.epoch_us / 1000;
 // Seconds of the recording's own clock, whose zero is that of `hums check`, `hums info` and `hums decode`.
 flight.start = log.start_s ?? 0;
 flight.end = Math.max(log.end_s ?? 0, flight.start + 1);
-// One whose length is not known is a place; one that is nowhere is told in the table alone.
-flight.gaps = log.gaps.map(({ from_s: from, to_s: to }) => [from ?? to, to ?? from]).filter(([from]) => from != null);
 flight.flights = data.flights;
 flight.endsInAir = Boolean(data.ends_in_air);
 

@@ -71,11 +71,12 @@ export const flight = {
     if (anew) {
       lines.clear();
       flight.parameters.clear();
-      Object.assign(flight, { vehicle: part.vehicle, notes: [], track: [], phases: [], modes: [], last: 0 });
+      Object.assign(flight, { vehicle: part.vehicle, notes: [], track: [], phases: [], modes: [], gaps: [], last: 0 });
     }
     flight.begin = part.start_s;
     flight.step = part.step_s;
     flight.version++;
+    if (part.gaps) flight.gaps = part.gaps;
     if (part.plots) flight.plots = new Map(part.plots.map((plot) => [plot.id, plot]));
     for (const [key, told] of Object.entries(part.series)) takeLine(key, told);
     for (const note of part.notes) flight.notes.push(note);
@@ -126,11 +127,23 @@ export const flight = {
     });
     const times = [],
       columns = numbers.map(() => []);
+    // The record has nothing in between: nobody knows how a line goes on there.
+    const missing = (last, next) => {
+      const [before, behind] = [flight.begin + (last + 1) * flight.step, flight.begin + next * flight.step];
+      return flight.gaps.some(([from, to]) => to - from >= flight.step && from <= behind && to >= before);
+    };
+    let row = null;
     for (;;) {
       let next = Infinity;
       for (const part of parts)
         if (part && part.at < Math.min(part.stop, part.line.numbers.length)) next = Math.min(next, part.line.numbers[part.at]);
       if (next === Infinity) break;
+      if (row != null && (next - row > 6 || missing(row, next))) {
+        // A place for a break where no line has anything.
+        times.push(flight.begin + ((row + 1 + next) / 2) * flight.step);
+        for (const column of columns) column.push(undefined);
+      }
+      row = next;
       times.push(flight.begin + (next + 0.25) * flight.step, flight.begin + (next + 0.75) * flight.step);
       parts.forEach((part, i) => {
         const column = columns[i];
@@ -138,7 +151,7 @@ export const flight = {
           column.push(undefined, undefined);
           return;
         }
-        if (part.last != null && next - part.last > part.silence) {
+        if (part.last != null && (next - part.last > part.silence || missing(part.last, next))) {
           // The line breaks where nothing was heard: null in the last place that has no value.
           for (let k = column.length - 1; k >= 0 && column[k] === undefined; k--) column[k] = null;
         }

@@ -21,7 +21,7 @@ const found = (page) =>
     .filter((level) => page[level])
     .map((level) => counted(page[level], level))
     .join(", ") || (!page.checked ? "not checked" : page.little ? "not enough to judge" : "no findings");
-const verdict = (page) => `${found(page)}${page.ends_in_air ? "; ends in the air" : ""}`;
+const verdict = (page) => `${found(page)}${page.begins_in_air ? "; begins in the air" : ""}${page.ends_in_air ? "; ends in the air" : ""}`;
 // Sessions of two cards may have one name: the file's names the box too.
 const called = ({ name, file }) => (pages.filter((page) => page.name === name).length > 1 ? file.replace(/\.html$/, "") : name);
 const brief = (name) => (name.length > 48 ? `\u2026${name.slice(-47)}` : name);

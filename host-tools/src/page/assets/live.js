@@ -225,8 +225,14 @@ const drawHead = () => {
 const drawState = () => {
   say(name, `${state.name}${state.firmware ? ` ${state.firmware}` : ""}`);
   if (connected) document.title = `${state.overall === "ok" ? "" : `${state.overall.toUpperCase()} \u00b7 `}${state.name} \u00b7 HUMS live`;
-  if (connected && endsInAir()) overall.set("stale", "ends in the air");
-  else if (connected) overall.set(state.overall, state.overall_said ?? (state.overall === "stale" ? "not known" : state.overall));
+  if (connected) {
+    const words = state.overall_said ?? (state.overall === "stale" ? "not known" : state.overall),
+      // What is good at the end of a recording in the air is not known to be good.
+      isLast = endsInAir(),
+      isCalm = ["ok", "stale", "advisory"].includes(state.overall) && !state.overall_said;
+    const level = state.overall_was ?? (isLast && state.overall === "ok" ? "stale" : state.overall);
+    overall.set(level, isLast ? `${isCalm ? "" : `${words}; `}ends in the air` : words);
+  }
   if (!begun) {
     begun = true;
     flight.zero = flight.start = head.source.recording ? head.source.start_s : flight.begin;
@@ -235,7 +241,8 @@ const drawState = () => {
   const shown = time.held ?? state;
   say(armed, shown.armed ? "armed" : "disarmed");
   toggle(armed, "hot", shown.armed);
-  say(phase, [shown.airborne ? words(shown.phase) : "on the ground", shown.mode].filter(Boolean).join(" \u00b7 "));
+  const where = shown.airborne ? words(shown.phase) : shown.tells_flight === false ? "not known whether in the air" : "on the ground";
+  say(phase, [where, shown.mode].filter(Boolean).join(" \u00b7 "));
   flight.end = Math.max(state.now_s, flight.start + 1);
   shownAt = shown.now_s;
   follow();

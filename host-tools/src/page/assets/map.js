@@ -133,7 +133,7 @@ export const map = ({ id = "map", whose = flight, frame = null, name = "Track ov
     whose.flights.slice(0, 9).forEach((f, i) => {
       const number = whose.flights.length > 1 ? ` ${i + 1}` : "";
       spot(near(f.from_s), PHASES.take_off, 5);
-      label(near(f.from_s), `take-off${number}`, true);
+      label(near(f.from_s), `${f.took_off === false ? "first heard, in the air" : "take-off"}${number}`, true);
       if (f.landed) {
         spot(near(f.to_s), PHASES.landing, 5);
         label(near(f.to_s), `landing${number}`, false);

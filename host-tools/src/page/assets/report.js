@@ -25,7 +25,8 @@ const LEVELS = ["ok", "advisory", "stale", "warning", "critical"];
 // ---- Who flew, when, and the verdict.
 const findings = flight.notes.filter(({ kind, found }) => kind === "finding" && found);
 const worst = findings.reduce((worst, { level }) => (LEVELS.indexOf(level) > LEVELS.indexOf(worst) ? level : worst), "ok");
-const count = (level) => findings.filter((note) => note.level === level).length;
+// A check that warned before it was critical is one finding, as in hums check.
+const count = (level) => data[level] ?? findings.filter((note) => note.level === level).length;
 const unjudged = log.format !== "hums" && !log.vehicle;
 // Nothing found is good news where enough was judged.
 const little = data.little && worst === "ok";
@@ -38,7 +39,7 @@ const verdict =
         ? data.judged
           ? `No findings in ${data.judged[0]} of ${data.judged[1]} checks`
           : "No findings"
-        : ["critical", "warning", "stale", "advisory"]
+        : (data.critical + data.warning ? ["critical", "warning"] : ["stale", "advisory"])
             .filter(count)
             .map((level) => counted(count(level), level))
             .join(", ");
@@ -58,6 +59,14 @@ document
       [`${session}${log.name}`, when, span(log.duration_s), log.format === "hums" ? log.end.words : ""].filter(Boolean).join(" \u00b7 "),
     ),
     el("p", { class: `verdict ${little ? "stale" : worst}`, id: "verdict" }, verdict),
+    data.missing.length
+      ? el(
+          "p",
+          { class: "verdict warning", id: "missing" },
+          `${data.missing[0].from_s == null ? "" : `${moment(data.missing[0].from_s - flight.zero)}: `}${data.missing[0].words}`,
+          data.missing.length > 1 ? `; and ${plural(data.missing.length - 1, "more place")}, see hums check` : "",
+        )
+      : "",
     data.ends_in_air
       ? el("p", { class: "verdict warning", id: "ends" }, `${moment(data.ends_in_air[0] - flight.zero)}: ${data.ends_in_air[1]}`)
       : "",
