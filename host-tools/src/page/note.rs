@@ -286,9 +286,7 @@ mod tests {
                 let words = text.as_str().trim_start_matches(OURS);
                 let known = told_check(words).map(|(check, part, _)| (check, part));
                 let twin = twins.iter().find(|(twin, _)| *twin == check.name);
-                let name = twin
-                    .filter(|_| level != Level::Ok && level != Level::Stale)
-                    .map_or(check.name, |(_, of)| of);
+                let name = twin.filter(|_| level != Level::Stale).map_or(check.name, |(_, of)| of);
                 let same_name = vocabulary(check.name).map(|words| words.said.name);
                 let is_it = known.is_some_and(|(told, part)| {
                     part == instance
