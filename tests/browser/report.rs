@@ -107,7 +107,7 @@ fn a_flights_page_shows_the_flight() {
     // The defaults of docs/parameters.md.
     assert_eq!(shown["limits"]["Vibration"], serde_json::json!([[30, 60]]));
     assert_eq!(shown["limits"]["Attitude"], serde_json::json!([[45, 60], [-45, -60]]));
-    assert_eq!(shown["plots"]["Altitude"]["lines"], 3, "receiver, estimator and what is wanted are apart");
+    assert_eq!(shown["plots"]["Altitude"]["lines"], 4, "receiver, EKF, what is wanted and AHRS2 are apart");
     assert!(!shown["why"].as_array().unwrap().is_empty(), "no finding says what it means");
 }
 
