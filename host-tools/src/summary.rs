@@ -142,19 +142,23 @@ pub struct EndsInAir {
     pub place_deg: Option<(f64, f64)>,
 }
 
+/// A number that a sensor can have, in whatever unit: another one is damaged.
+pub fn is_possible(value: &f32) -> bool {
+    const IMPOSSIBLE: f32 = 1e9;
+    value.abs() < IMPOSSIBLE
+}
+
 impl Display for EndsInAir {
     /// As a sentence. A number that no sensor can have is left out.
     fn fmt(&self, formatter: &mut Formatter<'_>) -> fmt::Result {
-        const IMPOSSIBLE: f32 = 1e9;
-        let possible = |value: &f32| value.abs() < IMPOSSIBLE;
         let mut known = Vec::new();
-        known.extend(self.height_m.filter(possible).map(|height_m| format!("{height_m:.1} m above home")));
-        known.extend(self.climb_mps.filter(possible).map(|climb_mps| {
+        known.extend(self.height_m.filter(is_possible).map(|height_m| format!("{height_m:.1} m above home")));
+        known.extend(self.climb_mps.filter(is_possible).map(|climb_mps| {
             let way = if climb_mps < 0.0 { "sinking" } else { "climbing" };
             format!("{way} at {:.1} m/s", climb_mps.abs())
         }));
         known.extend(
-            self.speed_mps.filter(possible).map(|speed_mps| format!("{speed_mps:.1} m/s over ground")),
+            self.speed_mps.filter(is_possible).map(|speed_mps| format!("{speed_mps:.1} m/s over ground")),
         );
         known.extend(self.place_deg.map(|(north, east)| format!("at {north:.7}, {east:.7}")));
         let known = if known.is_empty() { String::new() } else { format!(": {}", known.join(", ")) };

@@ -240,14 +240,19 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
         self.slot.release();
     }
 
+    /// The segment in work.
+    fn open_segment(&self) -> Option<Log> {
+        self.segments.log.filter(|_| self.slot.is_mounted() && self.segments.is_open)
+    }
+
     /// The name of the segment in work.
     pub fn log_name(&self) -> Option<LogName> {
-        self.segments.log.filter(|_| self.slot.is_mounted() && self.segments.is_open).map(|log| log.name)
+        self.open_segment().map(|log| log.name)
     }
 
     /// What of the segment in work no longer changes. What lies behind it, also where it has nothing yet, is left over.
     pub fn in_work(&self) -> Option<InWork> {
-        let log = self.segments.log.filter(|_| self.slot.is_mounted() && self.segments.is_open)?;
+        let log = self.open_segment()?;
         let blocks = log.base.map_or(0, |_| self.held.parity.borrow().end());
         Some(InWork { name: log.name, session: log.session, first: log.base.unwrap_or(0), blocks })
     }

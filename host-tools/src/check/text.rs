@@ -21,12 +21,11 @@ use crate::printable::word;
 use crate::source::item::{About, Cause, Gap};
 use crate::source::recording::Format;
 use crate::states::{Shown, shown};
+use crate::summary::is_possible;
 use crate::utc::{clock, iso8601, moment};
 
 /// Problems that are shown with their words; the rest gets a line.
 const SHOWN_MAX: usize = 6;
-/// No sensor has such a number, in whatever unit: it is damaged, and shown as that.
-const IMPOSSIBLE: f32 = 1e9;
 /// Reasons and places that are shown; `--json` has them all.
 const LINES_MAX: usize = 8;
 
@@ -121,7 +120,7 @@ fn state(checked: &Checked) -> State {
     let mut damages = judged.gaps.iter().filter(|gap| gap.cause.is_damage());
     match judged.damages {
         0 if checked.ending.as_ref().is_some_and(|ending| !ending.unproved().is_empty()) => State::NotProved,
-        0 if judged.losses > 0 && !judged.gaps.is_empty() && judged.gaps.iter().all(is_noise) => {
+        0 if judged.losses > 0 && !judged.gaps.is_empty() && judged.gaps.iter().all(Gap::is_noise) => {
             State::NotFrames
         }
         0 if judged.losses > 0 => State::Lossy,
@@ -135,12 +134,7 @@ fn state(checked: &Checked) -> State {
 
 /// Whether the recorder says itself, or it is seen, that it did not write all.
 fn is_lossy(judged: &Judged) -> bool {
-    judged.gaps.iter().any(|gap| gap.cause == Cause::Lost && !is_noise(gap))
-}
-
-/// Whether nothing is missing there: bytes are in the recording that are no frame.
-fn is_noise(gap: &Gap) -> bool {
-    gap.cause == Cause::Lost && gap.bytes > 0
+    judged.gaps.iter().any(|gap| gap.cause == Cause::Lost && !gap.is_noise())
 }
 
 /// What the verdict is not about: the end of its line.
@@ -508,7 +502,7 @@ fn sentence(group: &[&Problem]) -> String {
         let _ = write!(text, ": {state}");
     }
     match value {
-        Some(value) if possible(&value) => {
+        Some(value) if is_possible(&value) => {
             let _ = write!(text, ": {}{unit}", short(value));
         }
         Some(value) => {
@@ -594,18 +588,13 @@ fn how_bad(gap: &Gap) -> (bool, bool, Reverse<u64>, Reverse<Span>) {
     (!gap.cause.is_damage(), gap.bytes > 0, Reverse(gap.bytes), Reverse(lasts))
 }
 
-/// With as many digits as a limit has.
+/// With as many digits as a limit has; what is damaged is shown as that.
 fn short(value: f32) -> String {
-    if value.abs() >= IMPOSSIBLE {
+    if !is_possible(&value) {
         return format!("{value:.0e}");
     }
     let text = format!("{value:.2}");
     text.trim_end_matches('0').trim_end_matches('.').to_owned()
-}
-
-/// A number that a sensor can have.
-fn possible(value: &f32) -> bool {
-    value.abs() < IMPOSSIBLE
 }
 
 #[cfg(test)]

@@ -110,9 +110,7 @@ impl Replay {
             // One whose length is not known is a place, as is a count over much of it; one that is nowhere is told in the table alone.
             let is_empty = span.is_some_and(|span| judged.holes.is_one(&span));
             self.history.gap(span.map(|(from, to)| (from, if is_empty { to } else { from })));
-            // Bytes of no frame lack nothing.
-            let is_noise = gap.cause == Cause::Lost && gap.bytes > 0;
-            if gap.cause != Cause::NotKept && !is_noise {
+            if gap.cause != Cause::NotKept && !gap.is_noise() {
                 let from_s = gap.from.map(Instant::as_secs_f64);
                 self.missing.push(Missing { from_s, words: gap.words.clone() });
             }

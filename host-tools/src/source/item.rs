@@ -246,6 +246,11 @@ impl Gap {
         Self { from, to: None, cause: Cause::Damaged, place, bytes: 0, words, own: None }
     }
 
+    /// Whether nothing is missing there: bytes are in the recording that are no frame.
+    pub fn is_noise(&self) -> bool {
+        self.cause == Cause::Lost && self.bytes > 0
+    }
+
     /// As logs of ours have it, which know neither place nor words.
     pub fn to_own(&self) -> hums_blackbox::Gap {
         if let Some(own) = self.own {
