@@ -34,6 +34,7 @@ export const bars = (rows) => {
         const [warning, critical] = limits ?? [Infinity, Infinity];
         toggle(row.fill, "critical", v > critical);
         toggle(row.fill, "warning", v > warning && !(v > critical));
+        toggle(row.node, "none", v == null);
         toggle(row.node, "stale", Boolean(shown?.[2]));
       });
     },

@@ -91,14 +91,14 @@ const title = ({ name, page }) =>
 // ---- Figures: what is of the flight, and the extremes of what it told.
 const low = (id) => (number) => flight.extremes(id, number)?.[0];
 const high = (id) => (number) => flight.extremes(id, number)?.[1];
-const highest = (plot) => (number) => {
-  const values = [...flight.plots.keys()].filter((id) => id.startsWith(`${plot}-`)).map((id) => high(id)(number));
-  return values.some((value) => value != null) ? Math.max(...values.filter((value) => value != null)) : null;
+// Of all that a plot is of: of the motors the fastest.
+const most = (best, of) => (plot) => (number) => {
+  const ids = [...flight.plots.keys()].filter((id) => id.startsWith(`${plot}-`));
+  const values = ids.map((id) => of(id)(number)).filter((value) => value != null);
+  return values.length ? best(...values) : null;
 };
-const lowest = (plot) => (number) => {
-  const values = [...flight.plots.keys()].filter((id) => id.startsWith(`${plot}-`)).map((id) => low(id)(number));
-  return values.some((value) => value != null) ? Math.min(...values.filter((value) => value != null)) : null;
-};
+const highest = most(Math.max, high);
+const lowest = most(Math.min, low);
 // Two autopilots measure these on different scales.
 const autopilots = new Set(flights.map(({ vehicle }) => vehicle?.split(" ")[0]));
 const unit = (plot) => [...flight.plots.values()].find(({ id }) => id.startsWith(`${plot}-`) || id === plot)?.unit ?? "";

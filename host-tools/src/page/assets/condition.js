@@ -59,16 +59,14 @@ export const condition = () => {
     ],
     "fix",
   );
-  const wind = ["wind", "wind_from"].map((id) => el("b", { "data-value": id }));
-  const blows = panel(
+  const wind = facts(
     "wind",
     "Wind, by the autopilot",
-    el(
-      "dl",
-      { class: "facts" },
-      el("div", { class: "fact" }, el("dt", {}, "Speed"), el("dd", {}, wind[0], " m/s")),
-      el("div", { class: "fact" }, el("dt", {}, "From"), el("dd", {}, wind[1], "\u00b0")),
-    ),
+    [
+      ["wind", "Speed", "m/s", 1],
+      ["wind_from", "From", "\u00b0", 0],
+    ],
+    "wind",
   );
   const battery = facts(
     "battery",
@@ -107,7 +105,7 @@ export const condition = () => {
     ],
     ["engine_rpm", "speed_sensor_0"],
   );
-  const parts = [vibration.node, estimator.node, gnss.node, blows.node, battery.node, radio.node, engine.node];
+  const parts = [vibration.node, estimator.node, gnss.node, wind.node, battery.node, radio.node, engine.node];
   return {
     node: el("section", { class: "row", id: "condition" }, el("h2", {}, "Condition"), el("div", { class: "conditions" }, parts)),
     update({ values, px4, now_s: now }) {
@@ -121,12 +119,9 @@ export const condition = () => {
       estimator.fresh(values.ekf_velocity);
       figures.update([values.ekf_velocity, values.ekf_horizontal, values.ekf_vertical, values.ekf_compass], flight.limits("Estimator"));
       for (const part of [gnss, battery, radio, engine]) part.update(values);
-      const speed = flight.value("Wind", 0, now),
-        from = flight.value("WindFrom", 0, now);
-      blows.node.hidden = flight.value("Wind", 0) == null;
-      blows.fresh(speed == null ? null : [speed, 0, 0]);
-      say(wind[0], fixed(speed, 1));
-      say(wind[1], fixed(from, 0));
+      const blown = (plot) => [flight.value(plot, 0, now)].filter((value) => value != null).map((value) => [value, 0, 0])[0];
+      wind.node.hidden = flight.value("Wind", 0) == null;
+      wind.update({ wind: blown("Wind"), wind_from: blown("WindFrom") });
       engine.node.hidden = !values.engine_rpm && !values.speed_sensor_0;
       radio.node.hidden = !values.rc_rssi && !values.radio_rssi;
     },

@@ -1,6 +1,5 @@
 // The page of a flight that is whole, from top to bottom.
 
-import { colour, whenColoursChange } from "./colours.js";
 import { data, log, name } from "./data.js";
 import { el } from "./elements.js";
 import { flight } from "./flight.js";
@@ -163,7 +162,4 @@ const draw = () => {
   track.update(null, true);
 };
 draw();
-whenColoursChange(() => {
-  for (const meter of document.querySelectorAll("[data-colour]")) meter.style.background = colour(meter.dataset.colour);
-});
 root.dataset.ready = String(main.children.length > 0);

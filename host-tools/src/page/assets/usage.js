@@ -1,20 +1,15 @@
 // What the vehicle was used for, and what is due.
 
-import { colour } from "./colours.js";
 import { data, log } from "./data.js";
 import { el } from "./elements.js";
-import { flight } from "./flight.js";
 import { cells, rows, section } from "./layout.js";
-import { fixed, moment, span, whole, words } from "./text.js";
+import { fixed, span, whole, words } from "./text.js";
 
 const COMPONENT = { green: "ok", yellow: "warning", red: "critical" };
-const meter = (percent, status) => {
-  const inner = el("i"),
-    outer = el("span", { class: "meter" }, inner);
-  inner.dataset.colour = COMPONENT[status] ?? "stale";
+const meter = (percent, kind) => {
+  const inner = el("i");
   inner.style.width = `${Math.min(Math.max(percent, 0), 100)}%`;
-  inner.style.background = colour(inner.dataset.colour);
-  return outer;
+  return el("span", { class: `meter ${kind}` }, inner);
 };
 
 const parts = (wear) => {
@@ -33,7 +28,12 @@ const parts = (wear) => {
                 c.serial,
                 c.used_percent == null
                   ? "no limit"
-                  : el("span", { class: "used" }, meter(c.used_percent, c.status), `${fixed(c.used_percent, 1)} %`),
+                  : el(
+                      "span",
+                      { class: "used" },
+                      meter(c.used_percent, COMPONENT[c.status] ?? "stale"),
+                      `${fixed(c.used_percent, 1)} %${c.limit ? ` of ${c.limit}` : ""}`,
+                    ),
                 el("span", { class: `badge ${COMPONENT[c.status] ?? "stale"}` }, c.used_percent >= 100 ? "due" : c.status),
                 `${fixed(c.flight_s / 3600, 2)} h`,
                 `${fixed(c.motor_s / 3600, 2)} h`,
@@ -120,10 +120,10 @@ const counters = (wear, { plain, motors, ranges }) => {
       if (sum === 0) return null;
       const body = bands.map(([from, to, s]) => {
         const text = from == null ? `below ${to} ${unit}` : to == null ? `from ${from} ${unit}` : `${from} to ${to} ${unit}`;
-        const inner = el("i"),
-          meter = el("span", { class: "meter wide" }, inner);
-        inner.style.width = `${(s / sum) * 100}%`;
-        return cells([text, meter, s ? `${fixed((s / sum) * 100, s / sum < 0.1 ? 1 : 0)} %` : "", s ? span(s) : ""], ["t", "", "n", "n"]);
+        return cells(
+          [text, meter((s / sum) * 100, "wide"), s ? `${fixed((s / sum) * 100, s / sum < 0.1 ? 1 : 0)} %` : "", s ? span(s) : ""],
+          ["t", "", "n", "n"],
+        );
       });
       return el("div", { class: "panel scroll" }, el("h3", {}, words(title)), el("table", {}, el("tbody", {}, body)));
     })
@@ -131,13 +131,9 @@ const counters = (wear, { plain, motors, ranges }) => {
   const life = data.life_before ? "In its life before" : "In its life";
   wear.append(
     el("h3", { class: "above" }, "Counters"),
-    data.counted_until_s == null
-      ? ""
-      : el(
-          "p",
-          { class: "dim" },
-          `As the box stored them at ${moment(data.counted_until_s - flight.zero)}: the recording goes on after that.`,
-        ),
+    ...[data.counted, data.counters.remark]
+      .filter(Boolean)
+      .map((words) => el("p", { class: "dim" }, `${words[0].toUpperCase()}${words.slice(1)}.`)),
     el(
       "div",
       { class: "split" },
