@@ -18,6 +18,8 @@ pub struct Counters {
     pub motors: Vec<Motor>,
     /// By quantity.
     pub ranges: Vec<Ranges>,
+    /// What there is to say of them.
+    pub remark: Option<&'static str>,
 }
 
 /// One of the vehicle.
@@ -159,14 +161,23 @@ fn of_baseline(quantity: Quantity) -> (String, &'static str, u8) {
     }
 }
 
+const FLIGHTS: &str = UsageCounter::Flights.name();
+/// Of a session that begins in a flight, which a session before has counted.
+const BEGUN_BEFORE: &str = "it was in the air at its start: that flight is counted in the log before";
+
 /// By what the counters mean; those that this program does not know have their names.
 pub fn of(session: &BTreeMap<String, f64>, life: &BTreeMap<String, f64>) -> Counters {
     let mut all = Counters::default();
+    let number = |counter: UsageCounter| session.get(counter.name()).copied().unwrap_or(0.0);
+    let ended = number(UsageCounter::Landings) + number(UsageCounter::Mishaps);
+    all.remark = (ended > number(UsageCounter::Flights)).then_some(BEGUN_BEFORE);
     for number in 0..=u8::MAX {
         let name = counter_name(number);
         let Some(&value) = session.get(&name) else { continue };
         let lived = life.get(&name).copied();
         let (title, unit, decimals) = match meaning(number) {
+            // None in it, one landing: no contradiction.
+            Some(CounterName::Vehicle(FLIGHTS)) if all.remark.is_some() => ("Take-offs".to_owned(), "", 0),
             Some(CounterName::Vehicle(name)) => of_vehicle(name),
             Some(CounterName::Baseline(quantity)) => of_baseline(quantity),
             Some(CounterName::Motor(what, motor)) => {
@@ -234,5 +245,17 @@ mod tests {
         assert_eq!(shown, session.len());
         let charge = all.plain.iter().find(|plain| plain.title == "Charge taken").expect("it is");
         assert_eq!(charge.unit, "Ah");
+    }
+
+    #[test]
+    fn a_session_that_begins_in_the_air_has_a_landing_and_no_take_off() {
+        let of = |flights: f64| {
+            let counted = [("flights", flights), ("landings", 1.0)];
+            let session = counted.map(|(name, value)| (name.to_owned(), value)).into();
+            let all = of(&session, &BTreeMap::new());
+            (all.plain[0].title.clone(), all.remark)
+        };
+        assert_eq!(of(1.0), ("Flights".to_owned(), None));
+        assert_eq!(of(0.0), ("Take-offs".to_owned(), Some(BEGUN_BEFORE)));
     }
 }

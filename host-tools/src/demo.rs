@@ -55,7 +55,7 @@ pub fn run(args: &cli::Demo) -> Result<Outcome> {
     let read = decode::run(&tables_of(args, &card, &decoded))?;
     let page_of = cli::Report {
         inputs: vec![card.clone()],
-        output: page.clone(),
+        output: Some(page.clone()),
         session: None,
         system: None,
         compare: false,

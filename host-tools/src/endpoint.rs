@@ -89,6 +89,12 @@ impl Endpoint {
     }
 }
 
+/// A path as its user means it: a slash behind the name of a file is none of it.
+pub fn without_slash(path: PathBuf) -> PathBuf {
+    let bare: PathBuf = path.components().collect();
+    if bare.is_file() { bare } else { path }
+}
+
 impl FromStr for Endpoint {
     type Err = String;
 
@@ -109,7 +115,7 @@ impl FromStr for Endpoint {
                 scheme @ ("udp" | "udpbcast" | "tcpin" | "tcpout" | "com" | "uart" | "file" | "http"),
                 _,
             )) if !PathBuf::from(text).exists() => Err(format!("there is no `{scheme}:` here: give {FORMS}")),
-            _ => Ok(Self::File(PathBuf::from(text))),
+            _ => Ok(Self::File(without_slash(PathBuf::from(text)))),
         }
     }
 }
@@ -141,6 +147,17 @@ impl fmt::Display for Endpoint {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_slash_behind_the_name_of_a_file_is_no_part_of_it() {
+        let dir = tempfile::tempdir().expect("a folder");
+        let slash = |name: &str| PathBuf::from(format!("{}/", dir.path().join(name).display()));
+        std::fs::write(dir.path().join("card.img"), "").expect("room");
+        assert_eq!(without_slash(slash("card.img")), dir.path().join("card.img"));
+        for other in [slash(""), slash("nosuch"), PathBuf::from("-")] {
+            assert_eq!(without_slash(other.clone()), other);
+        }
+    }
 
     #[test]
     fn every_form_reads_and_prints_alike() {

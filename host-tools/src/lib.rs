@@ -37,6 +37,7 @@ pub mod outcome;
 pub mod output;
 pub mod pack;
 pub mod page;
+pub mod part;
 pub mod plural;
 pub mod printable;
 pub mod progress;

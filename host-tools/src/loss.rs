@@ -1,8 +1,10 @@
-//! What of the losses that a log records counts as lost.
+//! What of the losses that a log records counts as lost, and why a log does not have something.
 
 use hums_blackbox::record::{Loss, Lost};
+use hums_blackbox::{Cause, Gap};
 
 use crate::plural::count;
+use crate::utc::moment;
 
 /// How much a loss record says the recorder lost. Noise on the line is not the recorder's loss: it was no frame.
 pub fn lost(loss: &Loss) -> u64 {
@@ -18,18 +20,48 @@ pub fn lost(loss: &Loss) -> u64 {
     }
 }
 
+/// The queue was full: it lasts for 2.5 s of a card that stalls or is out of its slot.
+const CARD_LATE: &str = "the card took nothing for too long";
+
 /// What a loss record says was not recorded, as the end of a sentence; `None` where it says nothing of the recorder.
 pub fn words(loss: &Loss) -> Option<String> {
     let (one, why) = match loss.what {
         Lost::NotFrames | Lost::DamagedFrames | Lost::WrongChecksums | Lost::DamagedPlaces => return None,
         Lost::UartOverrun => ("byte", "came faster than the recorder took them"),
-        Lost::QueueFull => ("frame", "found the recorder's queue full"),
+        Lost::QueueFull => ("frame", CARD_LATE),
         Lost::Card => ("sector", "could not be written to the card"),
-        Lost::Records => ("record", "found the recorder's queue full"),
+        Lost::Records => ("record", CARD_LATE),
         Lost::Other => ("unit", "for a reason that this program does not know"),
     };
     let was = if loss.count == 1 { "was" } else { "were" };
     Some(format!("{} {was} not recorded: {why}", count(loss.count, one)))
+}
+
+/// The likeliest reason why a log does not have something.
+pub const fn why(gap: &Gap) -> &'static str {
+    match (gap.cause, gap.from, gap.to) {
+        (Cause::Missing, None, _) => "the first sectors are not there: newer logs took their place",
+        (Cause::Missing, _, None) => "the last sectors are not there: they were never written",
+        (Cause::Missing, Some(_), Some(_)) => "the card has lost sectors",
+        (Cause::Damaged, ..) => "sectors are damaged",
+        (Cause::UnknownLayouts(_), ..) => {
+            "written with message layouts that this program does not know; take a newer hums"
+        }
+        (Cause::Corrupt, ..) => "sectors hold what no recorder writes",
+        (Cause::Altered, ..) => "the recorder's memory had changed: what it wrote is not what came",
+        (Cause::Disarmed, ..) => "not recorded: disarmed",
+    }
+}
+
+/// All that a loss record says, and when.
+pub fn told(loss: &Loss) -> String {
+    let words = words(loss).unwrap_or_else(|| match loss.what {
+        Lost::NotFrames => format!("{} of no frame came over the line", count(loss.count, "byte")),
+        Lost::DamagedFrames => format!("{} came over the line", count(loss.count, "damaged frame")),
+        Lost::WrongChecksums => format!("{} with a wrong checksum came", count(loss.count, "frame")),
+        _ => format!("{} of what was packed", count(loss.count, "damaged place")),
+    });
+    format!("{words}, between {} and {}", moment(loss.from), moment(loss.to))
 }
 
 #[cfg(test)]
@@ -46,11 +78,30 @@ mod tests {
     }
 
     #[test]
+    fn what_a_log_does_not_have_is_told_with_its_likeliest_reason() {
+        let at = |ms: Option<u64>| ms.map(Instant::from_millis);
+        let why = |from, to| {
+            let (sectors_lost, sectors_skipped, frames) = (9, 0, None);
+            why(&Gap {
+                from: at(from),
+                to: at(to),
+                cause: Cause::Missing,
+                sectors_lost,
+                sectors_skipped,
+                frames,
+            })
+        };
+        assert!(why(None, Some(9)).ends_with("newer logs took their place"));
+        assert!(why(Some(9), None).ends_with("they were never written"));
+        assert_eq!(why(Some(1), Some(9)), "the card has lost sectors");
+    }
+
+    #[test]
     fn what_was_not_recorded_is_said_with_its_reason() {
         let of = |what, count| words(&Loss { what, count, from: Instant::ZERO, to: Instant::ZERO });
         assert_eq!(
             of(Lost::QueueFull, 3_591).as_deref(),
-            Some("3591 frames were not recorded: found the recorder's queue full")
+            Some("3591 frames were not recorded: the card took nothing for too long")
         );
         assert_eq!(of(Lost::NotFrames, 7), None);
     }

@@ -6,7 +6,7 @@ use std::fmt::{self, Display, Formatter};
 use anyhow::Result;
 use hums_blackbox::record::{Loss, Moment, Stats, Vehicle, Why};
 use hums_blackbox::{Cause, Gap, Record};
-use hums_core::component::Figures;
+use hums_core::component::{COMPONENTS_MAX, Figures, Kind};
 use hums_core::health::Level;
 use hums_core::health::exceedance::Crossings;
 use hums_core::time::{Instant, Span};
@@ -18,6 +18,7 @@ use crate::followed::Logged;
 use crate::logs::Log;
 use crate::mavlink::frame::{Check, Peek, peek};
 use crate::names::counter_name;
+use crate::part;
 use crate::plural::are;
 use crate::progress;
 use crate::source::epochs::Epochs;
@@ -26,6 +27,7 @@ use crate::source::own::OwnReader;
 use crate::source::parts::{Collect, Deliver};
 use crate::source::recording::Format;
 use crate::source::told::Finding;
+use crate::utc::moment;
 
 /// Findings, gaps and losses that are kept one by one; beyond this they are only counted, so that memory is bounded.
 pub const LISTED_MAX: usize = 10_000;
@@ -234,6 +236,8 @@ pub struct Contents {
     pub usage: BTreeMap<String, f64>,
     /// See [`Self::usage`]; `None` where this program counted them.
     pub usage_at: Option<Instant>,
+    /// The log breaks off, and this program counted the usage on to its end.
+    pub is_recounted: bool,
     /// The airframe's life, as recorded last, and when that was.
     pub lifetime: BTreeMap<String, f64>,
     /// See [`Self::lifetime`].
@@ -242,6 +246,8 @@ pub struct Contents {
     pub exceedances: BTreeMap<(String, u8), ExceedanceLine>,
     /// Components by place, from 1, as recorded last.
     pub components: BTreeMap<u8, ComponentLine>,
+    /// What each may run at most, by place from 0.
+    pub part_limits: [part::Limits; COMPONENTS_MAX],
     /// Losses by what was lost: how many, the first and the last time.
     pub losses: BTreeMap<&'static str, Loss>,
     /// The recorder's last statistics.
@@ -303,6 +309,35 @@ impl Contents {
         self.judged.is_some_and(JudgedChecks::is_little) && !self.findings.iter().any(is_worry)
     }
 
+    /// What a part is called, and the limit that it reaches first, by its place from 1.
+    pub fn part(&self, place: u8, line: &ComponentLine) -> (String, Option<String>) {
+        let limits = self.part_limits.get(usize::from(place).wrapping_sub(1)).copied().unwrap_or_default();
+        let name = part::name(line.kind, line.number, &line.name);
+        (name, part::limit(line.kind, &line.figures, &limits))
+    }
+
+    /// The part that a finding is of which tells that one is due; `None` for another check.
+    pub fn due(&self, finding: &FindingLine) -> Option<(String, Option<String>)> {
+        let of = |line: &ComponentLine| {
+            let kind = Kind::ALL.into_iter().find(|kind| kind.name() == line.kind);
+            kind.and_then(Kind::subsystem).is_some_and(|of| of.name() == finding.subsystem)
+        };
+        let mine = self.components.iter().filter(|(_, line)| part::is_due(&finding.check) && of(line));
+        let (place, line) =
+            mine.max_by(|(_, one), (_, other)| one.used_percent.total_cmp(&other.used_percent))?;
+        Some(self.part(*place, line))
+    }
+
+    /// Whether the box says that it was not recording somewhere in a gap.
+    pub fn did_not_record(&self, gap: &Gap) -> bool {
+        let (from, to) = (gap.from.unwrap_or(Instant::ZERO), gap.to);
+        let is_ok = |finding: &FindingLine| finding.level == Level::Ok.name();
+        let mut changes = self.findings.iter().filter(|finding| finding.check == "recording");
+        let before = changes.clone().rfind(|change| change.at <= from);
+        before.is_some_and(|change| !is_ok(change))
+            || changes.any(|change| !is_ok(change) && change.at > from && to.is_none_or(|to| change.at <= to))
+    }
+
     /// Whether the airframe's life was stored before the counters of this session: it is without them.
     pub fn is_life_before(&self) -> bool {
         self.lifetime_at.zip(self.usage_at).is_some_and(|(life, usage)| usage.since(life) >= STORED_WITH)
@@ -362,6 +397,13 @@ impl Contents {
                 };
                 self.components.insert(record.place.saturating_add(1), line);
             }
+            Record::Parameter(parameter) => {
+                if let Some((place, which)) = part::limit_of(parameter.name)
+                    && let Some(limit) = self.part_limits.get_mut(place).and_then(|of| of.get_mut(which))
+                {
+                    *limit = parameter.value;
+                }
+            }
             Record::Loss(loss) => add_loss(&mut self.losses, loss),
             Record::Stats(stats) => self.stats = Some(*stats),
             _ => {}
@@ -389,6 +431,9 @@ impl Contents {
         self.lifetime_at = next.lifetime_at.or(self.lifetime_at);
         next.exceedances.into_iter().for_each(|(key, line)| self.exceeded(key, line));
         self.components.extend(next.components);
+        for (known, next) in self.part_limits.iter_mut().zip(next.part_limits) {
+            *known = if next.iter().any(|limit| *limit > 0.0) { next } else { *known };
+        }
         for loss in next.losses.values() {
             add_loss(&mut self.losses, loss);
         }
@@ -549,6 +594,16 @@ impl Overview {
         let summary = &self.ending.summary;
         let last = summary.last.filter(|_| summary.marks.moved.is_some())?;
         self.contents.usage_at.filter(|at| last.since(*at) >= COUNTED_LATE)
+    }
+
+    /// Of which time the counters are, as a sentence; `None` where they are of all of it.
+    pub fn counted_words(&self) -> Option<String> {
+        let at = moment(self.counted_until()?);
+        Some(if self.contents.is_recounted {
+            format!("counted here to the end of the log; the box had stored its own last at {at}")
+        } else {
+            format!("as the box stored it at {at}: the log goes on after that")
+        })
     }
 
     /// Whether a group could not be read because this program is too old for it.

@@ -5,7 +5,6 @@ use std::borrow::Cow;
 use anyhow::{Result, bail};
 use hums_blackbox::record::Lost;
 use hums_blackbox::{BlockCounts, Cause, Gap};
-use hums_core::time::Instant;
 use serde::Serialize;
 
 use crate::cli;
@@ -19,6 +18,7 @@ use crate::info::json::images_json;
 use crate::logs::sessions::{Sessions, place};
 use crate::logs::side_by_side::side_by_side;
 use crate::logs::{self, Found, find::Image};
+use crate::loss;
 use crate::outcome::Outcome;
 use crate::output::{self, JsonList, Schema};
 use crate::plural::count;
@@ -494,17 +494,7 @@ fn came_damaged(contents: &Contents) -> Option<String> {
 }
 
 fn losses_detail(log: &Overview) -> String {
-    let losses = log.contents.losses.values();
-    let words = losses.map(|loss| {
-        let told = format!("{} {}", loss.count, loss.what.name());
-        // The processor stood still: nobody counted what came meanwhile.
-        if loss.what != Lost::UartOverrun {
-            return told;
-        }
-        let seconds = |at: Instant| at.as_millis() as f64 / 1e3;
-        format!("{told} of unknown frames, {:.3} to {:.3} s", seconds(loss.from), seconds(loss.to))
-    });
-    words.collect::<Vec<_>>().join(", ")
+    log.contents.losses.values().map(loss::told).collect::<Vec<_>>().join("; ")
 }
 
 #[cfg(test)]
@@ -513,6 +503,7 @@ mod tests {
 
     use hums_blackbox::record::{Keep, Note};
     use hums_blackbox::{GROUP_SECTORS, Record, Sector, SectorSink, Writer};
+    use hums_core::time::Instant;
 
     use super::*;
     use crate::followed::Logged;

@@ -504,6 +504,11 @@ impl Crosschecks {
         Reading::new(at.instant(now), Some(f32::from(u8::from(unused))))
     }
 
+    /// From which figure on vibration is more than so many times what is usual in this flight.
+    pub(crate) fn vibration_limit(&self, times: f32) -> Option<f32> {
+        self.vibration.limit(times, self.vibration_grain)
+    }
+
     /// Vibration as a multiple of what is usual in this flight.
     pub(crate) fn vibration_rise(&self, now: Instant) -> Option<Reading> {
         Reading::new(self.vibration_at.instant(now), self.vibration.multiple(self.vibration_grain))

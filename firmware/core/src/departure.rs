@@ -91,11 +91,26 @@ impl Departure {
         let beyond = self.beyond()?;
         Some(if beyond > grain { self.smooth / self.mean.max(f32::MIN_POSITIVE) } else { 1.0 })
     }
+
+    /// From which figure on that is more than so many times; `None` until its usual level is known.
+    pub(crate) fn limit(&self, times: f32, grain: f32) -> Option<f32> {
+        let usual = self.mean + SPREADS * self.spread;
+        self.is_known().then_some((times * self.mean).max(usual + grain))
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_figure_is_so_many_times_the_usual_one_from_its_limit_on() {
+        let steady = taken((0..400).map(|_| 2.0));
+        let limit = steady.limit(2.2, 0.5).expect("known");
+        assert!((limit - 4.4).abs() < 0.1, "{limit}");
+        assert!(steady.limit(2.2, 6.0).expect("known") > 7.5, "by less than the grain nothing rises");
+        assert_eq!(taken((0..5).map(|_| 2.0)).limit(2.2, 0.5), None);
+    }
 
     /// Takes figures ten times a second.
     fn taken(figures: impl Iterator<Item = f32>) -> Departure {

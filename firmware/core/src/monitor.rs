@@ -19,7 +19,7 @@ use crate::latest::Latest;
 use crate::lifetime::{ItemKey, Lifetime, Saving};
 use crate::mishap::{Change, Fate, Mishap};
 use crate::observation::{Feeds, Observation, Source};
-use crate::params::Params;
+use crate::params::{Param, Params};
 use crate::protect::{Protect, Request, Situation};
 use crate::snapshot::{Snapshot, Snapshots};
 use crate::status::{LinkReading, RecorderStatus};
@@ -92,6 +92,12 @@ const PHASE_LASTS: Span = Span::from_secs(1);
 const CELLS_COME: Span = Span::from_secs(45);
 
 const _: () = assert!(size_of::<Monitor>() <= 16 * 1024);
+
+/// Whether a battery keeps the vehicle up: where none tells of itself, the first one does.
+fn carries(vehicle: &Vehicle, battery: usize) -> bool {
+    let known = vehicle.batteries.get(battery).and_then(Latest::get);
+    known.map_or(battery == 0, |known| known.lithium && known.feeds == Feeds::Vehicle)
+}
 
 impl Monitor {
     /// Before the first observation.
@@ -311,15 +317,28 @@ impl Monitor {
         if several { 0 } else { self.derived.cell_count(&self.vehicle, 0, &self.params) }
     }
 
+    /// From which figure on vibration counts as risen, by what is usual in this flight; `None` until that is known.
+    pub fn vibration_limit(&self) -> Option<f32> {
+        self.derived.crosschecks().vibration_limit(self.params.get(Param::VibeRiseWarn))
+    }
+
+    /// Whether nothing tells how many cells a battery has that carries the vehicle: then its voltage raises no alarm.
+    pub fn lacks_cells(&self) -> bool {
+        let Self { vehicle, derived, params, .. } = self;
+        (0..BATTERIES_MAX).any(|battery| {
+            carries(vehicle, battery)
+                && derived.cells().has_voltage(battery)
+                && derived.cell_count(vehicle, battery, params) == 0
+        })
+    }
+
     /// Keeps the cells that are known for the next power-on, and tells once where they are not.
     fn step_cells(&mut self, now: Instant) {
         let Self { vehicle, derived, params, before, saving, happenings, cells_told, .. } = self;
         let come = self.parameters_asked || vehicle.known_for(now) >= CELLS_COME;
         for (battery, kept) in before.cells.iter_mut().enumerate() {
             let count = derived.cell_count(vehicle, battery, params);
-            let known = vehicle.batteries.get(battery).and_then(Latest::get);
-            let counts = known.map_or(battery == 0, |known| known.lithium && known.feeds == Feeds::Vehicle);
-            let unknown = count == 0 && counts && derived.cells().has_voltage(battery);
+            let unknown = count == 0 && carries(vehicle, battery) && derived.cells().has_voltage(battery);
             if unknown && come && !*cells_told {
                 *cells_told = true;
                 happenings.push(Happening::CellsUnknown);

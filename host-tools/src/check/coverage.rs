@@ -14,6 +14,8 @@ use crate::counters::tells_flight;
 
 /// Checks of a receiver that the monitor leaves alone until the receiver has had a fix.
 const OF_A_FIX: [&str; 4] = ["gps_satellites", "gps_hdop", "gps_accuracy", "gps_fix"];
+/// The check of a cell's voltage.
+const CELL_VOLTAGE: &str = "cell_voltage";
 /// How often it is noted.
 const NOTE_EVERY: Span = Span::from_millis(500);
 
@@ -88,6 +90,7 @@ impl Coverage {
 }
 
 /// What is known of a recording at its end.
+#[expect(clippy::struct_excessive_bools, reason = "facts that have nothing to do with each other")]
 pub(super) struct Recording<'a> {
     pub(super) by: JudgedBy,
     pub(super) monitor: &'a Monitor,
@@ -103,6 +106,8 @@ pub(super) struct Recording<'a> {
     pub(super) arming: Option<&'a str>,
     /// It was in the air.
     pub(super) flew: bool,
+    /// Nothing told how many cells its battery has.
+    pub(super) cells_unknown: bool,
     /// What was found.
     pub(super) problems: &'a [Problem],
 }
@@ -119,6 +124,7 @@ impl Recording<'_> {
         let Some(words) = vocabulary(check.name) else { return Verdict::NotMeant };
         let autopilot = self.monitor.vehicle().heartbeat.get().map(|Heartbeat { autopilot, .. }| *autopilot);
         let not = |why: &str| Verdict::NotJudged(why.to_owned());
+        let is_found = self.problems.iter().any(|problem| problem.check == check.name);
         if self.by == JudgedBy::Board && matches!(words.scope, Scope::Wire | Scope::Recorder | Scope::Stored)
         {
             // The board had its own wire and card; what it had stored is not in the log.
@@ -130,9 +136,7 @@ impl Recording<'_> {
         }
         match words.scope {
             // The autopilot's silence says nothing, good or bad.
-            Scope::Said if self.problems.iter().any(|problem| problem.check == check.name) => {
-                return Verdict::Judged;
-            }
+            Scope::Said if is_found => return Verdict::Judged,
             Scope::Said => return Verdict::NotMeant,
             Scope::ArduPilot if autopilot == Some(Autopilot::Px4) => return Verdict::NotMeant,
             Scope::Px4 if autopilot == Some(Autopilot::ArduPilot) => return Verdict::NotMeant,
@@ -155,7 +159,16 @@ impl Recording<'_> {
                 "only a monitor on board knows earlier flights and parts that wear (--past gives it flights)",
             );
         }
-        if seen.level {
+        if check.name == CELL_VOLTAGE && !is_found {
+            if self.cells_unknown {
+                return not("how many cells the battery has is not known");
+            }
+            // The box had it of its last flight.
+            if self.by == JudgedBy::Board && self.monitor.lacks_cells() {
+                return Verdict::Judged;
+            }
+        }
+        if seen.level || is_found {
             return Verdict::Judged;
         }
         match check.when {
@@ -233,6 +246,7 @@ mod tests {
                 armed: Span::from_secs(60),
                 arming: None,
                 flew: true,
+                cells_unknown: false,
                 problems: &[],
             };
             let (_, not_judged) = Coverage::new().lists(&recording);

@@ -8,7 +8,7 @@ use super::checked::Checked;
 use super::flights::Flight;
 use super::judged::{Judged, JudgedBy};
 use super::problem::Problem;
-use super::text::{firmware, flown};
+use super::text::firmware;
 use crate::names::{autopilot_name, type_name};
 use crate::source::item::{About, Gap};
 use crate::source::told::Finding;
@@ -160,7 +160,7 @@ pub fn line(checked: &Checked) -> serde_json::Result<String> {
         from_s: judged.span.map(|(first, _)| first.as_secs_f64()),
         to_s: judged.span.map(|(_, last)| last.as_secs_f64()),
         armed_s: seconds(judged.armed),
-        flight_s: seconds(flown(judged)),
+        flight_s: seconds(judged.flown()),
         flights: judged.flights.iter().map(flight).collect(),
         ends_in_air: judged.ends_in_air.map(|end| EndsInAirJson {
             time_s: end.at.as_secs_f64(),

@@ -25,14 +25,16 @@ use hums_link::sequence::Sequences;
 use super::clock::{Clock, SETTLE};
 use super::coverage::{Coverage, Recording};
 use super::details::{self, Details};
-use super::flights::Flights;
+use super::flights::{Flight, Flights};
 use super::judged::{Holes, Judged, JudgedBy};
 use super::problem::{LISTED_MAX, Problems};
+use crate::part;
 use crate::source::epochs::Epochs;
 use crate::source::item::{About, Cause as Why, Event, Fact, Gap, Item, Text};
 use crate::source::recording::Format;
 use crate::source::told::{Finding, Told};
 use crate::summary::EndsInAir;
+use crate::utc::moment;
 
 /// Silence that is stepped through: longer than each debounce and each time after which a value is stale.
 const SILENCE_MAX: Span = Span::from_secs(75);
@@ -45,6 +47,9 @@ const NOT_WRITTEN: Span = Span::from_secs(2);
 const HIDES_FLIGHT: Span = Span::from_secs(10);
 /// What flies on is seen to fly so long after the silence: longer than a landing needs to be seen.
 const SEEN: Span = Span::from_secs(3);
+
+/// Parameters that tell of cells come within this, where a recording begins in the air.
+const CELLS_COME: Span = Span::from_secs(2);
 
 /// The check of disarming in the air.
 const DISARMED: &str = "disarmed_in_air";
@@ -112,6 +117,42 @@ struct Last {
     airborne: bool,
 }
 
+/// What is known of how many cells a battery has that carries the vehicle.
+#[derive(Clone, Copy, Debug, Default)]
+struct Cells {
+    /// In the air nothing told it here: from and to.
+    unknown: Option<(Instant, Instant)>,
+    /// Nothing told it to the box.
+    unknown_on_board: bool,
+}
+
+impl Cells {
+    /// Whether no alarm came from the voltage for that.
+    fn are_unknown(&self, by: JudgedBy) -> bool {
+        match by {
+            JudgedBy::Board => self.unknown_on_board,
+            JudgedBy::Here => self.unknown.is_some_and(|(from, to)| to.since(from) >= CELLS_COME),
+        }
+    }
+
+    /// As a sentence; `None` where there is nothing to say of it.
+    fn words(&self, by: JudgedBy, begins_in_air: bool) -> Option<String> {
+        if self.are_unknown(by) {
+            let when = self
+                .unknown
+                .map_or_else(String::new, |(from, to)| format!(" from {} to {}", moment(from), moment(to)));
+            return Some(format!(
+                "cells not known{when}: the battery's voltage raised no alarm; a file with BAT_CELLS (--params) tells how many"
+            ));
+        }
+        let is_guess = by == JudgedBy::Board && begins_in_air && self.unknown.is_some();
+        is_guess.then(|| {
+            "the box was started in the air, and took the number of cells from its last flight: a guess; BAT_CELLS makes it sure"
+                .to_owned()
+        })
+    }
+}
+
 /// A silence of which is not known yet what it hides.
 #[derive(Clone, Copy, Debug)]
 struct Silence {
@@ -142,6 +183,7 @@ pub struct Judge {
     here: Problems,
     board: Problems,
     checked_on_board: bool,
+    cells: Cells,
     flights: Flights,
     facts: BTreeMap<About, String>,
     details: Details,
@@ -177,6 +219,7 @@ impl Judge {
             here: Problems::default(),
             board: Problems::default(),
             checked_on_board: false,
+            cells: Cells::default(),
             flights: Flights::default(),
             facts: BTreeMap::new(),
             details: Details::default(),
@@ -206,6 +249,11 @@ impl Judge {
     /// The limits that hold now.
     pub fn params(&self) -> &Params {
         self.monitor.params()
+    }
+
+    /// From which figure on vibration counts as risen.
+    pub fn vibration_limit(&self) -> Option<f32> {
+        self.monitor.vibration_limit()
     }
 
     /// How many cells the one battery has; 0 where that is not known.
@@ -387,7 +435,9 @@ impl Judge {
             }
             Told::Peak { check, instance, value } => self.board.peak(check, *instance, *value),
             Told::Checked => self.checked_on_board = true,
-            Told::Parameter { .. } | Told::Part { .. } | Told::Missing { .. } => {}
+            Told::CellsUnknown => self.cells.unknown_on_board = true,
+            Told::Part { place, component } => self.monitor.learn_component(*place, *component),
+            Told::Parameter { .. } | Told::Missing { .. } => {}
         }
     }
 
@@ -528,6 +578,10 @@ impl Judge {
                 _ => {}
             }
         }
+        if self.monitor.flight().airborne() && self.monitor.lacks_cells() {
+            let (from, _) = *self.cells.unknown.get_or_insert((now, now));
+            self.cells.unknown = Some((from, now));
+        }
         let heard_at = self.monitor.vehicle().heartbeat.at();
         self.flights.step(now, steps, steps.since(heard_at.unwrap_or(steps)), &self.monitor);
         self.coverage.note(now, steps, &self.monitor, &link, &recorder);
@@ -557,6 +611,13 @@ impl Judge {
         }
     }
 
+    /// Which parts are due.
+    fn parts_due(&mut self) {
+        for problems in [&mut self.here, &mut self.board] {
+            problems.name_parts(|subsystem| part::due(&self.monitor, subsystem));
+        }
+    }
+
     /// How the vehicle was when the recording ended in the air.
     fn ends_in_air(&mut self) -> Option<EndsInAir> {
         self.flights.going_on().filter(|_| self.monitor.flight().airborne())?;
@@ -569,6 +630,16 @@ impl Judge {
             speed_mps: ground_speed_mps(steps, vehicle),
             place_deg: place_deg(vehicle),
         })
+    }
+
+    /// What else there is to say of the recording, as sentences.
+    fn remarks(&mut self, by: JudgedBy, flights: &[Flight]) -> Vec<String> {
+        let begins_in_air = flights.first().is_some_and(|flight| !flight.took_off);
+        let (of_cells, of_vehicles) =
+            (self.cells.words(by, begins_in_air), self.details.remarks(self.system()));
+        let of_file = [About::Beginning, About::Unchecked].map(|about| self.facts.remove(&about));
+        let remarks = joined(&self.joints).into_iter().chain(of_cells).chain(of_vehicles);
+        remarks.chain(of_file.into_iter().flatten()).collect()
     }
 
     /// The recording has ended.
@@ -589,8 +660,8 @@ impl Judge {
             self.monitor = earlier;
         }
         self.peaks(self.last);
-        let of_vehicles = self.details.remarks(self.system());
-        let flights = self.flights.end(&self.monitor);
+        self.parts_due();
+        let flights = std::mem::take(&mut self.flights).end(&self.monitor);
         let armed = armed(&self.monitor);
         let by =
             if self.checked_on_board && !self.limits.is_given() { JudgedBy::Board } else { JudgedBy::Here };
@@ -598,6 +669,7 @@ impl Judge {
             // Nobody knows where it was heard: a packed recording may be that of a ground station.
             self.here.drop_checks(|check| vocabulary(check).is_some_and(|words| words.scope == Scope::Wire));
         }
+        let remarks = self.remarks(by, &flights);
         let last = self.last;
         let (mut problems, end, behind) = match by {
             JudgedBy::Board => (self.board, last.max(self.recorded_to), Span::ZERO),
@@ -618,11 +690,9 @@ impl Judge {
             armed,
             arming: self.facts.get(&About::Arming).map(String::as_str).filter(|words| !words.is_empty()),
             flew: !flights.is_empty(),
+            cells_unknown: self.cells.are_unknown(by),
             problems: &worst_first,
         });
-        let of_file = [About::Beginning, About::Unchecked].map(|about| self.facts.remove(&about));
-        let of_file = of_file.into_iter().flatten();
-        let remarks = joined(&self.joints).into_iter().chain(of_vehicles).chain(of_file).collect();
         let judged = Judged {
             by,
             monitor: self.monitor,
@@ -638,6 +708,7 @@ impl Judge {
             judged,
             not_judged,
             remarks,
+            cells_unknown: self.cells.unknown.filter(|_| self.cells.are_unknown(by)).map(|(from, _)| from),
             gaps: self.gaps,
             holes: self.holes,
             damages: self.damages,

@@ -91,6 +91,8 @@ pub struct Judged {
     pub not_judged: Vec<(&'static str, String)>,
     /// What else the monitor has not judged, as sentences.
     pub remarks: Vec<String>,
+    /// Since when in the air nothing told how many cells its battery has, so that no voltage raised an alarm.
+    pub cells_unknown: Option<Instant>,
     /// What is missing, in order, up to [`super::problem::LISTED_MAX`].
     pub gaps: Vec<Gap>,
     /// Where it has nothing from here to there.
@@ -109,6 +111,11 @@ impl Judged {
     /// The vehicle, as it was known at the end.
     pub fn vehicle(&self) -> &Vehicle {
         self.monitor.vehicle()
+    }
+
+    /// How long it was in the air, in all flights together.
+    pub fn flown(&self) -> Span {
+        self.flights.iter().fold(Span::ZERO, |sum, flight| sum + flight.air)
     }
 
     /// Why nothing is known of the vehicle, as words in its place; `None` where an autopilot was heard.

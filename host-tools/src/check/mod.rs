@@ -3,6 +3,7 @@
 //! [`judge`] runs the monitor of the board over the stream of a recording; [`problem`] puts its findings together, [`flights`]
 //! its flights; [`judged`](mod@judged) is what came of it, which [`text`] and [`json`] say.
 
+pub mod causes;
 pub mod checked;
 mod clock;
 mod coverage;

@@ -94,16 +94,20 @@ pub fn overview(place: &Place) -> Result<Overview> {
         };
         overview.ending.name.clone_from(&place.name);
         let contents = &overview.contents;
-        let is_checked = contents.is_checked();
-        if contents.frames() > 0 && (!is_checked || contents.messages.len() < FEW_KINDS) {
+        let (is_checked, is_little) = (contents.is_checked(), contents.messages.len() < FEW_KINDS);
+        let breaks_off = overview.ending.summary.marks.moved.is_some();
+        if contents.frames() > 0 && (!is_checked || is_little || breaks_off) {
             let judged = match here {
                 Some(here) => here.end(),
                 None => judge(place, &limits, Heard::Somewhere, true)?.judged,
             };
-            if is_checked {
-                look(&mut overview.contents, &judged);
-            } else {
+            if is_checked && breaks_off {
+                go_on(&mut overview, &judged);
+            }
+            if !is_checked {
                 fill(&mut overview.contents, judged);
+            } else if is_little {
+                look(&mut overview.contents, &judged);
             }
         }
         return Ok(overview);
@@ -166,14 +170,51 @@ fn look(contents: &mut Contents, judged: &Judged) {
     contents.usage.retain(|name, _| is_told(name, vehicle));
 }
 
+/// How a log ends that breaks off while the vehicle is armed or in the air. What its box had counted is of the time until it stored that: it
+/// is counted here to the end.
+fn go_on(overview: &mut Overview, judged: &Judged) {
+    let is_whole = overview.ending.summary.first_number == Some(0);
+    let is_stored = overview.counted_until().is_some();
+    let contents = &mut overview.contents;
+    contents.ends_in_air = judged.ends_in_air;
+    contents.is_recounted = is_whole && is_stored;
+    if !contents.is_recounted {
+        return;
+    }
+    for (name, value) in counters(judged) {
+        let is_least = name == UsageCounter::VoltageMin.name();
+        let stored = contents.usage.entry(name).or_insert(value);
+        // What the box counted while it lost frames is not in the log.
+        *stored = if is_least { stored.min(value) } else { stored.max(value) };
+    }
+}
+
+/// What the monitor here counted.
+fn counters(judged: &Judged) -> Vec<(String, f64)> {
+    // What was in the air when it was heard first was taken to stand until that was seen.
+    let begins_in_air = judged.flights.first().is_some_and(|flight| !flight.took_off);
+    let monitor = &judged.monitor;
+    let mut counters = Vec::new();
+    monitor.for_each_counter(|number, value| {
+        let name = counter_name(number);
+        let seen_late = begins_in_air && name == UsageCounter::Ground.name() && value < SEEN_LATE_S;
+        // One time in the air, however it is told.
+        let value =
+            if name == UsageCounter::Flight.name() { judged.flown().as_micros() as f64 / 1e6 } else { value };
+        if is_told(&name, monitor.vehicle()) && !seen_late {
+            counters.push((name, value));
+        }
+    });
+    counters
+}
+
 /// What the monitor here makes of a recording.
 fn fill(contents: &mut Contents, judged: Judged) {
     contents.unheard = judged.unheard();
     contents.judged = Some(judged.checks());
     contents.ends_in_air = judged.ends_in_air;
     let is_judged = judged.worst().is_some();
-    // What was in the air when it was heard first was taken to stand until that was seen.
-    let begins_in_air = judged.flights.first().is_some_and(|flight| !flight.took_off);
+    let counters = counters(&judged);
     let Judged { monitor, findings, findings_count, span, remarks, .. } = judged;
     contents.remarks = remarks;
     contents.vehicle = vehicle(&monitor);
@@ -184,13 +225,7 @@ fn fill(contents: &mut Contents, judged: Judged) {
     }
     contents.findings_count = findings_count;
     contents.findings = findings.into_iter().map(FindingLine::from).collect();
-    monitor.for_each_counter(|number, value| {
-        let name = counter_name(number);
-        let seen_late = begins_in_air && name == UsageCounter::Ground.name() && value < SEEN_LATE_S;
-        if is_told(&name, monitor.vehicle()) && !seen_late {
-            contents.usage.insert(name, value);
-        }
-    });
+    contents.usage.extend(counters);
     if let Some((_, last)) = span {
         for exceedance in monitor.exceedances().iter(last) {
             let line = ExceedanceLine {

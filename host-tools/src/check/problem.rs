@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use hums_core::health::{Level, Side, Subsystem, because, checks};
 use hums_core::time::{Instant, Span};
 
+use crate::part;
 use crate::source::told::Finding;
 
 /// What is kept one by one of findings, flights, gaps; the rest is counted.
@@ -204,6 +205,13 @@ impl Problems {
         let Some(Followed { problem, .. }) = known else { return };
         if problem.details.len() < DETAILS_MAX && !problem.details.iter().any(|known| known == name) {
             problem.details.push(name.to_owned());
+        }
+    }
+
+    /// Names the part that each check is of which tells that one is due.
+    pub(super) fn name_parts(&mut self, due: impl Fn(Subsystem) -> Option<(String, Option<String>)>) {
+        for Followed { problem, .. } in self.open.values_mut().filter(|of| part::is_due(&of.problem.check)) {
+            problem.details.extend(due(problem.subsystem).map(|due| part::due_words(&due)));
         }
     }
 

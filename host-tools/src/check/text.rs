@@ -73,7 +73,7 @@ pub fn line(checked: &Checked) -> String {
         .into_iter()
         .filter(|words| !words.is_empty())
         .collect();
-    let air = clock(flown(judged));
+    let air = clock(judged.flown());
     format!("{:<8}  {air:>8}  {}  {}", coloured(level), word(&checked.name), what.join("; "))
         .trim_end()
         .to_owned()
@@ -189,7 +189,7 @@ impl Table {
         self.not_proved += u64::from(state == State::NotProved);
         self.made_again += u64::from(state == State::MadeAgain);
         self.unprotected += u64::from(state == State::Unprotected);
-        self.flown_us = self.flown_us.saturating_add(flown(judged).as_micros());
+        self.flown_us = self.flown_us.saturating_add(judged.flown().as_micros());
         let level = judged.worst().map_or("unknown", Level::name);
         self.little += u64::from(judged.worst() == Some(Level::Ok) && judged.is_little());
         *self.levels.entry(level).or_default() += 1;
@@ -297,11 +297,6 @@ fn when(checked: &Checked) -> String {
     format!("{utc}, {} recorded{restarts}{since}", clock(last.since(first)))
 }
 
-/// All flights together.
-pub(super) fn flown(judged: &Judged) -> Span {
-    judged.flights.iter().fold(Span::ZERO, |sum, flight| sum + flight.air)
-}
-
 fn in_air(judged: &Judged) -> String {
     let told = judged.facts.get(&About::Arming).map(String::as_str).filter(|words| !words.is_empty());
     let armed = clock(judged.armed);
@@ -322,7 +317,7 @@ fn in_air(judged: &Judged) -> String {
             } else {
                 String::new()
             };
-            let time = format!("{}{lacks}", clock(flown(judged)));
+            let time = format!("{}{lacks}", clock(judged.flown()));
             format!("{time} in {}{}; armed {armed}", count(flights.len(), "flight"), not_seen(flights))
         }
     };
@@ -409,7 +404,9 @@ fn problems(text: &mut String, judged: &Judged) {
         {
             let at = effect.first().map(|effect| moment(effect.at)).unwrap_or_default();
             let _ = writeln!(text, "                      with it {at}  {}", word(&sentence(effect)));
-            if let Some(words) = vocabulary(check_of(effect)).filter(|_| place < SHOWN_MAX) {
+            // What a card that is out looks like besides has no meaning of its own.
+            let has_meaning = place < SHOWN_MAX && first.subsystem != Subsystem::Recorder;
+            if let Some(words) = vocabulary(check_of(effect)).filter(|_| has_meaning) {
                 let _ = writeln!(text, "                              {}", words.meaning);
             }
         }
@@ -538,6 +535,7 @@ fn name(check: &str) -> &str {
 fn not_judged(text: &mut String, judged: &Judged) {
     let mut reasons: Vec<(&str, Vec<&str>)> = Vec::new();
     for (check, why) in &judged.not_judged {
+        let check = &name(check);
         match reasons.iter_mut().find(|(reason, _)| reason == why) {
             Some((_, checks)) => checks.push(check),
             None => reasons.push((why, vec![check])),
@@ -550,7 +548,7 @@ fn not_judged(text: &mut String, judged: &Judged) {
     let _ = writeln!(text, "  not judged: {} of {all} checks", judged.not_judged.len());
     reasons.sort_by_key(|(_, checks)| std::cmp::Reverse(checks.len()));
     for (reason, checks) in reasons.iter().take(LINES_MAX) {
-        let _ = writeln!(text, "    {reason}: {}", checks.join(", "));
+        let _ = writeln!(text, "    {reason}: {}", checks.join("; "));
     }
     let rest: Vec<&str> = reasons.iter().skip(LINES_MAX).map(|(reason, _)| *reason).collect();
     if !rest.is_empty() {

@@ -4,6 +4,8 @@ use std::path::PathBuf;
 
 use clap::Args;
 
+use super::read::input;
+
 const EXAMPLES: &str = "Examples:
   hums check flight.tlog
   hums check --json flight.tlog
@@ -24,13 +26,13 @@ Of several logs: 1 where one failed, otherwise 3 where one has losses, otherwise
 #[command(after_help = EXAMPLES)]
 pub struct Check {
     /// Recordings, logs, cards, images, or directories with such; `-` is standard input
-    #[arg(required = true, value_name = "LOG")]
+    #[arg(required = true, value_name = "LOG", value_parser = input())]
     pub inputs: Vec<PathBuf>,
     /// Limits other than the defaults: a parameter file, as a ground station writes it
     #[arg(long, value_name = "FILE")]
     pub params: Option<PathBuf>,
     /// Earlier flights of the same vehicle, three or more, in which it was well: trends are judged against them. May be given several times
-    #[arg(long, value_name = "LOG")]
+    #[arg(long, value_name = "LOG", value_parser = input())]
     pub past: Vec<PathBuf>,
     /// Only this session of a card or folder, by the name that `hums ls` gives
     #[arg(long, value_name = "NAME")]

@@ -2,9 +2,10 @@
 
 use std::path::PathBuf;
 
+use clap::builder::{PathBufValueParser, TypedValueParser};
 use clap::{Args, ValueEnum};
 
-use crate::endpoint::Endpoint;
+use crate::endpoint::{Endpoint, without_slash};
 use crate::utc::When;
 
 const DECODE_EXAMPLES: &str = "Examples:
@@ -24,12 +25,17 @@ well; if not, the command fails. With --replace the new one takes its name, once
 is kept in the folder hums-kept beside it.
 Times: boot time counts from the monitor's power-on; UTC is known for a whole session once any frame told it.";
 
+/// What is read: a file whose name a slash stands behind is that file.
+pub(super) fn input() -> impl TypedValueParser<Value = PathBuf> {
+    PathBufValueParser::new().map(without_slash)
+}
+
 /// `hums decode`
 #[derive(Args, Clone, Debug)]
 #[command(after_help = DECODE_EXAMPLES)]
 pub struct Decode {
     /// Logs, card images, recordings of any kind that `hums check` reads, or directories with such
-    #[arg(required = true, value_name = "LOG|IMAGE|DIR")]
+    #[arg(required = true, value_name = "LOG|IMAGE|DIR", value_parser = input())]
     pub inputs: Vec<PathBuf>,
     /// Look at every block of an image: finds logs that were deleted, and what is left of overwritten ones
     #[arg(long)]
@@ -82,7 +88,7 @@ const LS_EXAMPLES: &str = "Examples:
   hums ls cards/ flight.tlog
   hums ls --json 00001_00.HUM
 
-A line for each flight: when it began, how long it is, how long the vehicle was in the air, how large it is, and the worst
+A line for each flight, in the order in which they began: when that was, how long it is, how long the vehicle was in the air, how large it is, and the worst
 finding. `hums info --session NAME` shows all of one. Exit code 3: one of them has losses or damage.";
 
 /// `hums ls`
@@ -90,7 +96,7 @@ finding. `hums info --session NAME` shows all of one. Exit code 3: one of them h
 #[command(after_help = LS_EXAMPLES)]
 pub struct Ls {
     /// Logs, card images, recordings of any kind that `hums check` reads, or directories with such
-    #[arg(required = true, value_name = "LOG|IMAGE|DIR")]
+    #[arg(required = true, value_name = "LOG|IMAGE|DIR", value_parser = input())]
     pub inputs: Vec<PathBuf>,
     /// Look at every block of an image: finds logs that were deleted, and what is left of overwritten ones
     #[arg(long)]
@@ -111,7 +117,7 @@ const INFO_EXAMPLES: &str = "Examples:
 #[command(after_help = INFO_EXAMPLES)]
 pub struct Info {
     /// Logs, card images, recordings of any kind that `hums check` reads, or directories with such
-    #[arg(required = true, value_name = "LOG|IMAGE|DIR")]
+    #[arg(required = true, value_name = "LOG|IMAGE|DIR", value_parser = input())]
     pub inputs: Vec<PathBuf>,
     /// Only this session, by the name that `hums ls` gives
     #[arg(long, value_name = "NAME")]
@@ -139,7 +145,7 @@ checksum and the order of times. Exit code 3 means damage or losses were found."
 #[command(after_help = VERIFY_EXAMPLES)]
 pub struct Verify {
     /// Logs, card images, or directories with such
-    #[arg(required = true, value_name = "LOG|IMAGE|DIR")]
+    #[arg(required = true, value_name = "LOG|IMAGE|DIR", value_parser = input())]
     pub inputs: Vec<PathBuf>,
     /// Look at every block of an image: finds logs that were deleted, and what is left of overwritten ones
     #[arg(long)]
@@ -161,14 +167,14 @@ newest session gets a page. A page compares with the sessions before on the same
 
 /// `hums report`
 #[derive(Args, Clone, Debug)]
-#[command(after_help = REPORT_EXAMPLES)]
+#[command(after_help = REPORT_EXAMPLES, override_usage = "hums report [OPTIONS] -o <OUT> <LOG|IMAGE|DIR>...")]
 pub struct Report {
     /// Logs, card images, recordings of any kind that `hums check` reads, or directories with such
-    #[arg(required = true, value_name = "LOG|IMAGE|DIR")]
+    #[arg(required = true, value_name = "LOG|IMAGE|DIR", value_parser = input())]
     pub inputs: Vec<PathBuf>,
     /// The page to write, or a directory for a page a session
     #[arg(short, long, value_name = "OUT")]
-    pub output: PathBuf,
+    pub output: Option<PathBuf>,
     /// Only this session, by the name that `hums ls` gives
     #[arg(long, value_name = "NAME")]
     pub session: Option<String>,

@@ -130,22 +130,19 @@ impl Proof {
                     moment(at)
                 ),
             },
-            Self::None => match (summary.marks.moved, summary.marks.last) {
-                (Some(moved), Some((at, why))) => format!(
-                    "not proved to its end: armed or in the air since {}, without a landing or a disarming after it \
-                     (the last was the {} at {})",
-                    moment(moved),
-                    why.words(),
-                    moment(at)
-                ),
-                (Some(moved), None) => format!(
-                    "not proved to its end: armed or in the air since {}, without a landing or a disarming after it",
-                    moment(moved)
-                ),
-                (None, _) => {
-                    "not proved to its end: it has no landing, no disarming and no orderly end".to_owned()
+            Self::None => {
+                let after = |(at, why): (Instant, Resting)| {
+                    format!(" (the last {} was at {})", why.words(), moment(at))
+                };
+                let after = summary.marks.last.map_or_else(String::new, after);
+                match summary.marks.moved {
+                    Some(moved) => format!(
+                        "not proved to its end: armed or in the air since {}{after} when power went or the card was pulled",
+                        moment(moved)
+                    ),
+                    None => "not proved to its end: power went or the card was pulled while it recorded".to_owned(),
                 }
-            },
+            }
             Self::Differs => "what came after it on the card went on from other entries than these: it is another log, or a \
                               part of one"
                 .to_owned(),
@@ -181,6 +178,19 @@ fn moment(summary: &Summary, at: Instant) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_log_that_breaks_off_is_told_with_its_likeliest_reason_alone() {
+        let words = |moved: Option<u64>| {
+            let mut summary = Summary::default();
+            summary.marks.moved = moved.map(Instant::from_millis);
+            Proof::None.words(&summary)
+        };
+        assert_eq!(words(None), "not proved to its end: power went or the card was pulled while it recorded");
+        let flown =
+            "not proved to its end: armed or in the air since 0:40.0 when power went or the card was pulled";
+        assert_eq!(words(Some(40_000)), flown);
+    }
 
     #[test]
     fn an_older_copy_of_the_last_sector_is_a_missing_end() {

@@ -193,6 +193,8 @@ struct ComponentJson {
     status: &'static str,
     /// `null` where it has no limit.
     used_percent: Option<f32>,
+    /// That which it reaches first.
+    limit: Option<String>,
     powered_s: f64,
     flight_s: f64,
     motor_s: f64,
@@ -230,6 +232,7 @@ fn components(contents: &Contents) -> Vec<ComponentJson> {
         serial: line.serial.clone(),
         status: line.status,
         used_percent: finite(line.used_percent),
+        limit: contents.part(*place, line).1,
         powered_s: line.figures.powered_s,
         flight_s: line.figures.flight_s,
         motor_s: line.figures.motor_s,

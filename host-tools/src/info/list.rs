@@ -40,10 +40,20 @@ pub fn run(args: &cli::Ls) -> Result<Outcome> {
             output::line(&heading(width))?;
         }
     }
-    let read = each(&found, None, |overview| match &mut list {
-        Some(list) => list.element(&LogJson::of(overview)),
-        None => output::line(&line(overview, width)),
+    // In the order in which they began; what does not tell stays behind the one before it.
+    let (mut rows, mut begun_us) = (Vec::new(), 0);
+    let read = each(&found, None, |overview| {
+        begun_us = start_utc_us(overview).unwrap_or(begun_us);
+        rows.push((begun_us, LogJson::of(overview), line(overview, width)));
+        Ok(())
     })?;
+    rows.sort_by_key(|(begun_us, ..)| *begun_us);
+    for (_, json, line) in &rows {
+        match &mut list {
+            Some(list) => list.element(json)?,
+            None => output::line(line)?,
+        }
+    }
     if let Some(list) = list {
         list.end()?;
     } else if found.places.is_empty() {
@@ -125,7 +135,8 @@ fn line(log: &Overview, width: usize) -> String {
     let date = start_utc_us(log).map_or_else(|| "unknown".to_owned(), date_and_time);
     let length = clock(span(duration_s(log)));
     // What the box counted until it stored it is the least.
-    let least = if log.counted_until().is_some() { ">" } else { "" };
+    let is_least = log.counted_until().is_some() && !log.contents.is_recounted;
+    let least = if is_least { ">" } else { "" };
     let air =
         flight_s(log).map_or_else(|| "-".to_owned(), |seconds| format!("{least}{}", clock(span(seconds))));
     let size = BinaryBytes(bytes(log)).to_string();

@@ -5,18 +5,21 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
-use hums_blackbox::Cause;
+use hums_blackbox::{Cause, Gap};
 use hums_core::time::Instant;
 
 use super::json::{duration_s, vehicle};
 use super::number::short;
 use super::{usage, wear};
+use crate::check::causes::causes;
 use crate::colour::level;
 use crate::ending::{among_words, behind_words, copies_words, made_again_words, unprotected_words};
 use crate::logs;
 use crate::logs::begun_anew::BegunAnew;
 use crate::logs::naming::is_part;
+use crate::loss;
 use crate::names::{check_name, unit_name};
+use crate::part;
 use crate::plural::count;
 use crate::printable::{path, word};
 use crate::source::item::MessageCount;
@@ -169,22 +172,26 @@ fn findings_text(text: &mut String, log: &Overview) {
         return;
     }
     let _ = writeln!(text, "  findings {}{by}", contents.findings_count);
-    for finding in contents.findings.iter().take(SHOWN_MAX) {
+    let causes = causes(&contents.findings);
+    for (finding, cause) in contents.findings.iter().zip(&causes).take(SHOWN_MAX) {
         let _ = writeln!(
             text,
             "    {:>11}  {:<8}  {}",
             moment(finding.at),
             level(if finding.is_unjudged() { "ended" } else { finding.level }),
-            word(&sentence(finding))
+            word(&sentence(finding, contents.due(finding).as_ref(), cause.as_deref()))
         );
     }
     more(text, contents.findings_count, contents.findings.len());
 }
 
-/// What was found, and the check that found it.
-fn sentence(finding: &FindingLine) -> String {
+/// What was found, the check that found it, the part that is due, and what explains it.
+fn sentence(finding: &FindingLine, due: Option<&(String, Option<String>)>, cause: Option<&str>) -> String {
     let FindingLine { subsystem, check, instance, previous, value, limit, unit, .. } = finding;
     let mut sentence = format!("{subsystem}: {}", check_name(check, *instance));
+    if let Some(due) = due {
+        let _ = write!(sentence, ": {}", part::due_words(due));
+    }
     let (state, value, limit) = match shown(check, *value, *limit) {
         Shown::State(state) => (state, None, None),
         Shown::Quantity(value, limit) => (None, value, limit),
@@ -201,6 +208,9 @@ fn sentence(finding: &FindingLine) -> String {
     }
     if finding.is_unjudged() {
         let _ = write!(sentence, "; {}", FindingLine::UNJUDGED);
+    }
+    if let Some(cause) = cause {
+        let _ = write!(sentence, "; because of {}", check_name(cause, 0));
     }
     let _ = write!(sentence, "; was {previous} [{check}]");
     sentence
@@ -263,15 +273,14 @@ fn gaps_text(text: &mut String, log: &Overview) {
             "    from {} to {}: {}, {} lost, {} more of no use, {frames} missing",
             time(gap.from, "the beginning"),
             time(gap.to, "the end"),
-            if is_part && gap.cause == Cause::Missing { "not brought yet" } else { words(gap.cause) },
+            if is_part && gap.cause == Cause::Missing { "not brought yet" } else { why(log, gap) },
             count(gap.sectors_lost, "sector"),
             gap.sectors_skipped
         );
     }
     more(text, (summary.gaps + summary.losses).max(contents.gaps.len() as u64), contents.gaps.len());
     for loss in contents.losses.values() {
-        let (from, to) = (moment(loss.from), moment(loss.to));
-        let _ = writeln!(text, "  lost     {} {} between {from} and {to}", loss.count, loss.what.name());
+        let _ = writeln!(text, "  lost     {}", loss::told(loss));
     }
 }
 
@@ -295,18 +304,12 @@ fn foreign_gaps(text: &mut String, log: &Overview) {
     more(text, (summary.gaps + summary.losses).max(contents.gaps.len() as u64), contents.gaps.len());
 }
 
-/// Why something is missing.
-fn words(cause: Cause) -> &'static str {
-    match cause {
-        Cause::Missing => "sectors are not there (never written, overwritten or lost)",
-        Cause::Damaged => "sectors are damaged",
-        Cause::UnknownLayouts(_) => {
-            "written with message layouts that this program does not know; take a newer hums"
-        }
-        Cause::Corrupt => "sectors hold what no recorder writes",
-        Cause::Altered => "the recorder's memory had changed: what it wrote is not what came",
-        Cause::Disarmed => "not recorded: disarmed",
+/// The likeliest reason why something is missing.
+fn why(log: &Overview, gap: &Gap) -> &'static str {
+    if gap.cause == Cause::Missing && log.contents.did_not_record(gap) {
+        return "not written: the box did not record then; most likely its card was out";
     }
+    loss::why(gap)
 }
 
 fn messages_text(text: &mut String, log: &Overview) {
@@ -348,11 +351,12 @@ mod tests {
             limit,
             unit: unit.to_owned(),
         };
-        let state = sentence(&finding("autopilot_state", 6.0, 4.5, ""));
+        let sentence = |finding: FindingLine| sentence(&finding, None, None);
+        let state = sentence(finding("autopilot_state", 6.0, 4.5, ""));
         assert_eq!(state, "computer: autopilot failsafe, emergency; was ok [autopilot_state]");
-        let charge = sentence(&finding("batt_state", 1.0, 0.5, ""));
+        let charge = sentence(finding("batt_state", 1.0, 0.5, ""));
         assert_eq!(charge, "computer: battery 1 charge state, low or unhealthy; was ok [batt_state]");
-        let load = sentence(&finding("load", 97.0, 95.0, "%"));
+        let load = sentence(finding("load", 97.0, 95.0, "%"));
         assert!(load.contains(", 97 % (limit 95); was ok"), "{load}");
     }
 
@@ -372,6 +376,6 @@ mod tests {
         let ended = finding(f32::NAN);
         assert!(ended.is_unjudged() && !finding(4.0).is_unjudged());
         let words = "power: battery 1 cell voltage; no longer judged (on the ground, disarmed, or no longer told); was critical [cell_voltage]";
-        assert_eq!(sentence(&ended), words);
+        assert_eq!(sentence(&ended, None, None), words);
     }
 }

@@ -8,7 +8,7 @@ use super::number::short;
 use crate::counters::{self, Band, Motor, Plain};
 use crate::plural::count;
 use crate::summary::Overview;
-use crate::utc::{clock, moment};
+use crate::utc::clock;
 
 /// The usage counters of a log.
 pub(super) fn text(text: &mut String, log: &Overview) {
@@ -24,14 +24,12 @@ pub(super) fn text(text: &mut String, log: &Overview) {
     if !lines.is_empty() {
         let life = if log.contents.is_life_before() { "life before" } else { "life" };
         let _ = writeln!(text, "  usage                                     session {life:>14}");
-        if let Some(at) = log.counted_until() {
-            let _ =
-                writeln!(text, "    (as the box stored it at {}: the log goes on after that)", moment(at));
+        if let Some(words) = log.counted_words() {
+            let _ = writeln!(text, "    ({words})");
         }
     }
-    let number = |name: &str| session.get(name).copied().unwrap_or(0.0);
-    if number("landings") + number("mishaps") > number("flights") {
-        text.push_str("    (it was in the air at its start: that flight is counted in the log before)\n");
+    if let Some(remark) = counters.remark {
+        let _ = writeln!(text, "    ({remark})");
     }
     for [title, session, life] in lines {
         let _ = writeln!(text, "{}", format!("    {title:<34} {session:>14} {life:>14}").trim_end());

@@ -8,6 +8,7 @@ use hums_core::time::Instant;
 use super::json::finite;
 use super::number::short;
 use crate::names::{check_name, unit_name};
+use crate::plural::count;
 use crate::printable::word;
 use crate::states::{Shown, shown};
 use crate::summary::Overview;
@@ -49,14 +50,18 @@ pub(super) fn text(text: &mut String, log: &Overview) {
         text.push_str("  components\n");
     }
     for (place, line) in &contents.components {
-        let number = if line.number == 0 { String::new() } else { format!(" {}", line.number) };
+        let (name, limit) = contents.part(*place, line);
+        let limit = limit.map_or_else(String::new, |limit| format!(" of {limit}"));
         let used = finite(line.used_percent)
-            .map_or_else(|| "no limit".to_owned(), |percent| format!("{percent:.1} % used"));
+            .map_or_else(|| "no limit".to_owned(), |percent| format!("{percent:.1} % used{limit}"));
         let (hours, motor_hours) = (line.figures.flight_s / 3_600.0, line.figures.motor_s / 3_600.0);
         let _ = writeln!(
             text,
-            "    {place} {}{number} {} {}: {}, {used}; {hours:.2} h in the air, {motor_hours:.2} h turning, {} flights, {:.2} cycles",
-            line.kind, line.name, line.serial, line.status, line.figures.flights, line.figures.cycles
+            "    {place} {}: {}, {used}; {hours:.2} h in the air, {motor_hours:.2} h turning, {}, {:.2} cycles",
+            word(format!("{name} {}", line.serial).trim_end()),
+            line.status,
+            count(line.figures.flights as u64, "flight"),
+            line.figures.cycles
         );
     }
 }

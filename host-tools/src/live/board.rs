@@ -11,6 +11,7 @@ use serde::Serialize;
 use super::craft::{Craft, is_of_wire};
 use crate::counters::tells_flight;
 use crate::page::note::CELLS_UNKNOWN;
+use crate::part;
 
 /// As long as a heartbeat may be missed.
 const SILENT: Span = Span::from_secs(5);
@@ -90,6 +91,14 @@ impl Board {
                     known.level = level;
                 }
                 known.is_heard = true;
+            }
+        }
+        // What the box found that recorded it is no level here.
+        for worry in craft.worries.values().filter(|worry| !craft.judges(worry.check, worry.instance)) {
+            if let Some(known) = known.get_mut(worry.subsystem as usize)
+                && (!known.is_heard || rank(worry.level) > rank(known.level))
+            {
+                (known.level, known.is_heard) = (worry.level, true);
             }
         }
         let overall = craft.companion.overall(now).unwrap_or_else(|| overall(craft, now, &known));
@@ -231,7 +240,10 @@ fn reason(craft: &Craft, subsystem: Subsystem, level: Level, here: Level, good: 
         // One cause has one order: its own.
         return match health::because(finding.check, finding.level, alarms) {
             Some(cause) => format!("{}, because of: {}", without_advice(finding), name(cause)),
-            None => words(finding),
+            None => match craft.due(finding) {
+                Some(due) => format!("{}: {}", part::due_words(&due), words(finding)),
+                None => words(finding),
+            },
         };
     }
     match (subsystem, level) {

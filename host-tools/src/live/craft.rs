@@ -9,8 +9,8 @@ use hums_core::Monitor;
 use hums_core::component::{COMPONENTS_MAX, Component};
 use hums_core::flight::Phase;
 use hums_core::happening::Happening;
-use hums_core::health::{Finding, Level, Scope, Subsystem, VOCABULARY};
-use hums_core::observation::{Autopilot, Observation, Source};
+use hums_core::health::{Finding, Level, Scope, Subsystem, VOCABULARY, check_named};
+use hums_core::observation::{Autopilot, Feeds, Observation, Source};
 use hums_core::params::Params;
 use hums_core::status::{RecorderStatus, Recording};
 use hums_core::time::{Instant, Span};
@@ -23,7 +23,9 @@ use crate::decode::reference::{Quantity, Reference};
 use crate::mavlink::ids::STATUSTEXT;
 use crate::page::history::History;
 use crate::page::note::Note;
+use crate::part;
 use crate::source::parameter;
+use crate::source::told;
 use crate::statustext::{Text, Texts};
 
 /// By then a HUMS on board has told of itself.
@@ -57,8 +59,10 @@ pub struct Craft {
     pub worries: BTreeMap<(&'static str, u8), Finding>,
     /// Of those that were not well, and are not judged any more: until it is armed again, or they are good.
     pub unjudged: BTreeMap<(&'static str, u8), Finding>,
-    /// Nobody tells how many cells its battery has.
+    /// Nobody tells how many cells its battery has, and it flies or they will not be told.
     pub cells_unknown: bool,
+    /// That was said.
+    cells_said: bool,
     /// The frames come from the autopilot's own wire: a box recorded them. What is missing on another link tells of that link.
     pub on_the_wire: bool,
     /// It was armed when it was first heard.
@@ -94,6 +98,7 @@ impl Craft {
             worries: BTreeMap::new(),
             unjudged: BTreeMap::new(),
             cells_unknown: false,
+            cells_said: false,
             on_the_wire,
             joined: false,
             heard: at,
@@ -209,6 +214,9 @@ impl Craft {
         }
         if let Some(history) = history {
             history.sample(at, &self.reference, observation);
+            if let Observation::Vibration(_) = observation {
+                history.vibration_limit(at, self.monitor.vibration_limit());
+            }
         }
     }
 
@@ -244,6 +252,7 @@ impl Craft {
         let thin = self.companion.present(now);
         let cut_off = now.since(self.heard) >= SILENT;
         let Self { monitor, worries, unjudged, on_the_wire, .. } = self;
+        let mut found = Vec::new();
         monitor.tick(now, &link, &recorder, &mut |finding| {
             let silence = finding.level == Level::Stale
                 || (finding.level == Level::Ok && finding.previous == Level::Stale);
@@ -279,22 +288,13 @@ impl Craft {
                     worries.insert(key, *finding);
                 }
             }
-            keep(history, now, Note::finding(finding));
+            found.push(*finding);
             findings(finding);
         });
-        while let Some(happening) = self.monitor.take_happening() {
-            let joined = match happening {
-                Happening::TakeOff => !self.monitor.flight().was_on_ground(),
-                _ => self.joined && now.since(self.began) <= JOINED,
-            };
-            self.cells_unknown |= happening == Happening::CellsUnknown;
-            if happening == Happening::Armed {
-                self.unjudged.clear();
-            }
-            if let Some(note) = Note::event(now, happening, joined) {
-                keep(history, now, note);
-            }
+        for finding in found {
+            keep(history, now, Note::finding(&finding).of_part(self.due(&finding).as_ref()));
         }
+        self.happenings(now, history);
         // Nobody takes these here, and they are made anew.
         while self.monitor.take_snapshot(now).is_some() {}
         self.texts.pass(now, &mut |text| say(history, text));
@@ -307,6 +307,87 @@ impl Craft {
                 history.judged_by(self.monitor.params(), self.monitor.cell_count());
             }
         }
+    }
+
+    /// What has happened since the last tick.
+    fn happenings(&mut self, now: Instant, history: &mut Option<&mut History>) {
+        let mut cells_come = self.cells_said;
+        while let Some(happening) = self.monitor.take_happening() {
+            let joined = match happening {
+                Happening::TakeOff => !self.monitor.flight().was_on_ground(),
+                _ => self.joined && now.since(self.began) <= JOINED,
+            };
+            if happening == Happening::CellsUnknown {
+                cells_come = true;
+                continue;
+            }
+            if happening == Happening::Armed {
+                self.unjudged.clear();
+            }
+            if let Some(note) = Note::event(now, happening, joined) {
+                keep(history, now, note);
+            }
+        }
+        // A box may know more of them, and says where it does not.
+        if !self.on_the_wire {
+            let flies = self.monitor.flight().airborne();
+            self.cells_unknown = self.monitor.lacks_cells() && (flies || cells_come);
+            if self.cells_unknown {
+                self.say_cells_unknown(now, history);
+            }
+        }
+    }
+
+    /// Nothing tells how many cells its battery has: said once.
+    pub fn say_cells_unknown(&mut self, now: Instant, history: &mut Option<&mut History>) {
+        self.cells_unknown = true;
+        if !std::mem::replace(&mut self.cells_said, true)
+            && let Some(note) = Note::event(now, Happening::CellsUnknown, false)
+        {
+            keep(history, now, note);
+        }
+    }
+
+    /// The part that a finding is of which tells that one is due, and its limit; `None` for another check.
+    pub fn due(&self, finding: &Finding) -> Option<(String, Option<String>)> {
+        part::is_due(finding.check).then(|| part::due(&self.monitor, finding.subsystem)).flatten()
+    }
+
+    /// Whether the monitor here has had something to judge in a check of a part.
+    pub fn judges(&self, check: &str, instance: u8) -> bool {
+        self.monitor.health().levels().any(|(known, of, _)| known.name == check && of == instance)
+    }
+
+    /// What the box found that recorded this, and nobody here can: what its store, or its count of cells, told it.
+    pub fn found_on_board(&mut self, finding: &told::Finding) -> bool {
+        let Some(check) = check_named(&finding.check) else { return false };
+        if self.judges(check.name, finding.instance) {
+            return false;
+        }
+        let key = (check.name, finding.instance);
+        let before = self.worries.remove(&key);
+        match finding.level {
+            Level::Ok if finding.value.is_nan() => self.unjudged.extend(before.map(|before| (key, before))),
+            Level::Ok => {}
+            _ => {
+                self.unjudged.remove(&key);
+                let finding = Finding {
+                    at: finding.at,
+                    subsystem: check.subsystem,
+                    check: check.name,
+                    instance: finding.instance,
+                    level: finding.level,
+                    previous: finding.previous,
+                    value: finding.value,
+                    limit: finding.limit,
+                    unit: check.unit,
+                    feeds: Feeds::Unsaid,
+                    because: "",
+                };
+                self.worries.insert(key, finding);
+            }
+        }
+        true
     }
 
     /// What it is doing.

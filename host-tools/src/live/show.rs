@@ -16,6 +16,7 @@ use crate::counters::{is_told, tells_flight};
 use crate::names::{autopilot_name, type_name};
 use crate::page::json::json;
 use crate::page::modes;
+use crate::part;
 
 /// Where the bytes come from, and what they are doing.
 #[derive(Clone, Debug, Default, Serialize)]
@@ -146,6 +147,8 @@ struct ComponentJson {
     name: String,
     status: &'static str,
     used_percent: Option<f32>,
+    /// The limit that it reaches first.
+    limit: Option<String>,
     flight_h: f64,
     motor_h: f64,
     flights: f64,
@@ -224,6 +227,7 @@ fn components(craft: &Craft) -> Vec<ComponentJson> {
             name: component.name.as_str().to_owned(),
             status: status.name(),
             used_percent: craft.monitor.component_used_percent(place).filter(|percent| percent.is_finite()),
+            limit: part::of(&craft.monitor, place).and_then(|(_, limit)| limit),
             flight_h: figures.flight_s / 3_600.0,
             motor_h: figures.motor_s / 3_600.0,
             flights: figures.flights,

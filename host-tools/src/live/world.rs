@@ -17,6 +17,7 @@ use crate::mavlink::ids::PARAM_VALUE;
 use crate::page::history::History;
 use crate::page::more::More;
 use crate::page::note::Note;
+use crate::source::told::Finding as BoxFinding;
 use crate::summary::FindingLine;
 
 /// Vehicles that are told apart; later ones are counted.
@@ -227,15 +228,15 @@ impl World {
                 }
             }
             Told::Part { place, component } => self.part(*place, *component),
-            // What it said of itself nobody else can find.
-            Told::Finding(finding) if finding.subsystem == Subsystem::Recorder => {
-                if let (Some(histories), Some(owner)) = (histories, self.owner) {
-                    let note = Note::told(&FindingLine::from(finding.as_ref().clone()));
-                    histories.entry(owner).or_default().note(finding.at, note);
+            Told::Finding(finding) => self.found_on_board(finding, histories),
+            Told::CellsUnknown => {
+                let owner = self.owner.and_then(|owner| Some((owner, self.crafts.get_mut(&owner)?)));
+                if let Some((owner, craft)) = owner {
+                    let mut history = histories.map(|histories| histories.entry(owner).or_default());
+                    craft.say_cells_unknown(at, &mut history);
                 }
             }
-            // The monitor here finds its own.
-            Told::Finding(_) | Told::Checked | Told::Peak { .. } | Told::Missing { .. } => {}
+            Told::Checked | Told::Peak { .. } | Told::Missing { .. } => {}
         }
     }
 
@@ -247,6 +248,17 @@ impl World {
             if let Some(histories) = histories.as_deref_mut() {
                 histories.entry(*system).or_default().gap(Some((from, to)));
             }
+        }
+    }
+
+    /// What the box found: the monitor here finds the same, where the frames tell it. What it said of itself nobody else can find.
+    fn found_on_board(&mut self, finding: &BoxFinding, histories: Option<&mut Histories>) {
+        let Some(owner) = self.owner else { return };
+        let is_new = finding.subsystem == Subsystem::Recorder
+            || self.crafts.get_mut(&owner).is_some_and(|craft| craft.found_on_board(finding));
+        if let Some(histories) = histories.filter(|_| is_new) {
+            let note = Note::told(&FindingLine::from(finding.clone()));
+            histories.entry(owner).or_default().note(finding.at, note);
         }
     }
 
@@ -291,12 +303,14 @@ impl World {
 mod tests {
     use hums_core::component::{Figures, Kind, Status};
     use hums_core::health::Level;
-    use hums_core::observation::{Heartbeat, Source};
+    use hums_core::observation::{Battery, Heartbeat, LandedState, Source, VtolState};
+    use hums_core::units::Volts;
     use hums_link::encode::{Encoder, FRAME_BYTES_MAX};
     use hums_link::messages;
     use hums_link::packet::Packet;
 
     use super::*;
+    use crate::live::board::Board;
     use crate::mavlink::ids::HEARTBEAT;
     use crate::page::history::Cursor;
 
@@ -412,6 +426,62 @@ mod tests {
         let words: Vec<_> =
             part["notes"].as_array().into_iter().flatten().map(|note| &note["words"]).collect();
         assert_eq!(words, ["armed when it was first heard", "in the air when it was first heard"]);
+    }
+
+    /// A vehicle that is joined in the air, whose pack of 20.4 V has five cells or six.
+    #[test]
+    fn cells_that_are_not_known_are_said_at_once_in_the_air_and_a_box_that_knew_them_has_its_word() {
+        let source = Source { system: 1, component: 1 };
+        let flying = [
+            Observation::Heartbeat(Heartbeat { armed: true, ..Heartbeat::default() }),
+            Observation::Landed(LandedState::InAir, VtolState::Unknown),
+            Observation::Battery(Battery { voltage: Some(Volts(20.4)), ..Battery::default() }),
+        ];
+        let entries = flying.map(|seen| Entry::Observation(source, Box::new(seen)));
+        let told = |on_the_wire: bool| {
+            let (mut world, mut histories) =
+                (World::new(Limits::default()).on_the_wire(on_the_wire), Histories::new());
+            for tenth in 0..50 {
+                for entry in &entries {
+                    world.entry(Instant::from_millis(tenth * 100), entry, Some(&mut histories));
+                }
+                if on_the_wire && tenth == 30 {
+                    let at = Instant::from_millis(2_950);
+                    let finding = BoxFinding {
+                        at,
+                        subsystem: Subsystem::Power,
+                        check: "cell_voltage".to_owned(),
+                        instance: 0,
+                        level: Level::Critical,
+                        previous: Level::Ok,
+                        value: 3.4,
+                        limit: 3.5,
+                        unit: "V".to_owned(),
+                    };
+                    world.told(at, &Told::Finding(Box::new(finding)), Some(&mut histories));
+                }
+            }
+            let now = Instant::from_millis(5_000);
+            let part = histories[&1].since(1, &mut Cursor::default(), now).expect("a part");
+            let notes = serde_json::to_value(part).expect("JSON")["notes"].clone();
+            let notes: Vec<String> = notes
+                .as_array()
+                .into_iter()
+                .flatten()
+                .map(|note| format!("{} {}", note["from"], note["words"]))
+                .collect();
+            let board = serde_json::to_value(&Board::of(&world.crafts[&1], now).parts[0]).expect("JSON");
+            (notes.join("; "), format!("{}: {}", board["level"], board["reason"]))
+        };
+        let (notes, power) = told(false);
+        assert!(
+            notes.contains("cells not known: ") && power.contains("cells not known: "),
+            "{notes}, {power}"
+        );
+        let (notes, power) = told(true);
+        assert!(!notes.contains("cells not known"), "the box may know them: {notes}");
+        assert!(notes.contains("\"on board\" \"battery 1 cell voltage\""), "{notes}");
+        assert!(power.contains("critical") && power.contains("battery 1 cell low: 3.40 V"), "{power}");
     }
 
     #[test]

@@ -218,6 +218,13 @@ impl History {
         self.samples.take(at, reference, observation);
     }
 
+    /// Takes the limit of the vibration, which moves with what is usual in the flight.
+    pub fn vibration_limit(&mut self, at: Instant, limit: Option<f32>) {
+        if let Some(limit) = limit {
+            self.samples.store.push(at, (Plot::Vibration, plots::RISE), limit);
+        }
+    }
+
     /// Takes a parameter of the autopilot.
     pub fn parameter(&mut self, at: Instant, name: &str, value: f64) {
         self.parameters.take(at, name, value);

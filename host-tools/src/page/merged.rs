@@ -32,6 +32,7 @@ pub struct Flight<'a> {
 const fn is_compared(plot: Plot, line: u8) -> bool {
     match plot {
         Plot::Height | Plot::Vertical => line == 0,
+        Plot::Vibration => line != plots::RISE,
         Plot::Velocity
         | Plot::Heading
         | Plot::Rates

@@ -8,6 +8,7 @@ use hums_link::encode::COMPONENT;
 use serde::Serialize;
 
 use crate::names::{check_name, unit_name};
+use crate::part;
 use crate::states::{Shown, shown};
 use crate::statustext::Text;
 use crate::summary::FindingLine;
@@ -144,6 +145,13 @@ impl Note {
                 because: because.map(Cause::of),
             }),
         }
+    }
+
+    /// With the part that it is of, where it tells that one is due.
+    #[must_use]
+    pub fn of_part(self, due: Option<&(String, Option<String>)>) -> Self {
+        let Some(due) = due else { return self };
+        Self { words: format!("{}: {}", self.words, part::due_words(due)), ..self }
     }
 
     /// A finding that a box recorded.

@@ -156,9 +156,9 @@ fn receiver(line: u8) -> String {
 pub fn about(plot: Plot, autopilot: Autopilot) -> About {
     let px4 = autopilot == Autopilot::Px4;
     let axes: fn(u8) -> String = if px4 {
-        |line| named(&["Coning", "Gyro, high frequency", "Accelerometer, high frequency"], line)
+        |line| named(&["Coning", "Gyro, high frequency", "Accelerometer, high frequency", LIMIT], line)
     } else {
-        |line| named(&["Forward", "Right", "Down"], line)
+        |line| named(&["Forward", "Right", "Down", LIMIT], line)
     };
     let (vibration, estimator) = if px4 { ("PX4 metrics", "test ratio") } else { ("m/s\u{b2}", "variance") };
     let (group, title, unit, decimals, name): (_, _, _, _, fn(u8) -> String) = match plot {
@@ -221,6 +221,10 @@ pub fn about(plot: Plot, autopilot: Autopilot) -> About {
     };
     About { group, title, unit, decimals, name }
 }
+
+/// The line of vibration that is no axis: from there on it counts as risen.
+pub(super) const RISE: u8 = 3;
+const LIMIT: &str = "Limit of the rise";
 
 /// A limit of warning and one of critical, where there are such.
 pub type Limits = [Option<f32>; 2];

@@ -8,7 +8,6 @@
 //! Nothing that a vehicle sent becomes markup: text goes into the page as data, and only as text onto it. The page's
 //! own policy lets no other script run and loads nothing.
 
-pub mod causes;
 pub mod compare;
 pub mod flights;
 pub mod index;
@@ -60,6 +59,11 @@ struct PageJson {
 
 /// Runs `hums report`.
 pub fn run(args: &cli::Report) -> Result<Outcome> {
+    let Some(output) = &args.output else {
+        return Err(usage(
+            "-o is missing: say where the page goes, for instance -o flight.html, or -o pages/ for a page of each flight",
+        ));
+    };
     let (given, remarks) = without_made(&args.inputs);
     let found = find(&given, false)?.of_system(args.system)?;
     for remark in remarks.iter().chain(&found.remarks) {
@@ -72,18 +76,18 @@ pub fn run(args: &cli::Report) -> Result<Outcome> {
         bail!("{}: is read twice for a page; give a file", place.title)
     }
     let sessions = sessions_of(&found.places);
-    let wanted = wanted(args, &found, &sessions)?;
-    if args.output.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("pdf")) {
+    let wanted = wanted(args, output, &found, &sessions)?;
+    if output.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("pdf")) {
         return Err(usage(format!(
             "-o {}: a page is HTML: give it that name, and print it from a browser",
-            shown(&args.output)
+            shown(output)
         )));
     }
     let inputs = Inputs::of(given.iter().map(PathBuf::as_path).chain(found.paths())).replacing(args.replace);
-    inputs.refuse(&args.output)?;
+    inputs.refuse(output)?;
     if wanted.directory {
         // Before any page is written. That of a session is refused by itself, when its name is known.
-        inputs.refuse(&args.output.join(index::FILE))?;
+        inputs.refuse(&output.join(index::FILE))?;
     }
     // The next start on the card tells how a session ended.
     let end = found.places.len().min(*wanted.sessions.end() + 1 + HELD_MAX);
@@ -348,12 +352,12 @@ struct Wanted {
     pages: bool,
 }
 
-fn wanted(args: &cli::Report, found: &Found, sessions: &Sessions) -> Result<Wanted> {
+fn wanted(args: &cli::Report, output: &Path, found: &Found, sessions: &Sessions) -> Result<Wanted> {
     let logs = &found.places;
     let Some(last) = logs.len().checked_sub(1) else {
         bail!("no log is in there, so there is nothing to report")
     };
-    let directory = says_directory(&args.output);
+    let directory = says_directory(output);
     let sessions = match &args.session {
         Some(name) => {
             let index = found.session(name)?;
@@ -368,7 +372,7 @@ fn wanted(args: &cli::Report, found: &Found, sessions: &Sessions) -> Result<Want
         }
     };
     let pages = directory || !args.compare;
-    Ok(Wanted { sessions, output: args.output.clone(), directory, pages })
+    Ok(Wanted { sessions, output: output.to_owned(), directory, pages })
 }
 
 impl Wanted {

@@ -42,7 +42,9 @@ struct Data<'a> {
     /// When and how, as a sentence.
     ends_in_air: Option<(f64, String)>,
     counters: Counters,
-    /// The counters and what the recorder tells of itself are of the time until then, where the recording goes on.
+    /// Of which time the counters are, where that is not all of it.
+    counted: Option<String>,
+    /// What the recorder tells of itself is of the time until then, where the recording goes on.
     counted_until_s: Option<f64>,
     /// The airframe's life is without this session.
     life_before: bool,
@@ -116,6 +118,7 @@ pub fn html(log: &Overview, replay: &Replay, trend: &Trend, before: Option<&Befo
         little: replay.judged.is_some_and(JudgedChecks::is_little),
         tells_flight: replay.tells_flight,
         ends_in_air: replay.ends_in_air.map(|end| (end.at.as_secs_f64(), end.to_string())),
+        counted: log.counted_words(),
         counted_until_s: log.counted_until().map(Instant::as_secs_f64),
         life_before: log.contents.is_life_before(),
         counters: counters::of(&log.contents.usage, &log.contents.lifetime),

@@ -1,13 +1,14 @@
 //! A recording read in order: what the vehicle told becomes the history of its flight, and flights.
 
 use anyhow::Result;
+use hums_core::happening::Happening;
 use hums_core::health::Level;
 use hums_core::observation::{Observation, Source};
 use hums_core::time::Instant;
 use serde::Serialize;
 
-use super::causes::causes;
 use super::flights::{Extents, Flight};
+use crate::check::causes::causes;
 use crate::check::judge::{Judge, Limits};
 use crate::check::judged::Judged;
 use crate::counters::tells_flight;
@@ -79,7 +80,7 @@ impl Replay {
         let mut judge = Judge::new(&Limits::default(), recording.format);
         recording.read(want, &mut |at, item| {
             judge.item(at, item);
-            replay.item(at, item, judge.flight());
+            replay.item(at, item, &judge);
             Ok(())
         })?;
         replay.history.judged_by(judge.params(), judge.cell_count());
@@ -94,8 +95,14 @@ impl Replay {
         let findings = &overview.contents.findings;
         let causes = causes(findings);
         let found = findings.iter().zip(&causes);
-        let found = found.map(|(finding, cause)| (finding.at, Note::found(finding, cause.as_deref())));
+        let found = found.map(|(finding, cause)| {
+            let note = Note::found(finding, cause.as_deref());
+            (finding.at, note.of_part(overview.contents.due(finding).as_ref()))
+        });
         replay.notes.extend(found);
+        if let Some(at) = judged.cells_unknown {
+            replay.notes.extend(Note::event(at, Happening::CellsUnknown, false).map(|note| (at, note)));
+        }
         replay.notes.sort_by_key(|(at, _)| *at);
         for (at, note) in replay.notes.drain(..) {
             replay.history.note(at, note);
@@ -117,11 +124,11 @@ impl Replay {
         }
     }
 
-    /// Takes the next item, while the vehicle is in this flight.
-    fn item(&mut self, at: Instant, item: Item<'_>, flight: Option<usize>) {
+    /// Takes the next item, which was judged.
+    fn item(&mut self, at: Instant, item: Item<'_>, judge: &Judge) {
         match item {
             Item::Frame(frame) => self.history.frame(at, frame, self.reference.vehicle().source),
-            Item::Observation(source, observation) => self.observe(at, source, observation, flight),
+            Item::Observation(source, observation) => self.observe(at, source, observation, judge),
             Item::Text(text) => self.keep(at, text),
             Item::Parameter(parameter) => self.history.parameter(at, parameter.name, parameter.value),
             Item::Row(row) => {
@@ -134,10 +141,13 @@ impl Replay {
         }
     }
 
-    fn observe(&mut self, at: Instant, source: Source, observation: &Observation, flight: Option<usize>) {
+    fn observe(&mut self, at: Instant, source: Source, observation: &Observation, judge: &Judge) {
         if self.reference.observe(at, source, observation) {
             self.history.sample(at, &self.reference, observation);
-            self.extents.take(at, flight, &self.reference);
+            self.extents.take(at, judge.flight(), &self.reference);
+            if let Observation::Vibration(_) = observation {
+                self.history.vibration_limit(at, judge.vibration_limit());
+            }
         }
     }
 

@@ -18,7 +18,7 @@ use crate::logs::Log;
 use crate::logs::reader::{self, epoch};
 use crate::loss;
 use crate::mavlink::ids::{HEARTBEAT, PARAM_VALUE, STATUSTEXT};
-use crate::plural::count;
+use crate::plural::{are, count};
 
 /// The note in a packed log behind which another recording goes on: the input was joined of several.
 pub const JOINED: &str = "another recording begins here: the input was joined of several";
@@ -351,16 +351,21 @@ fn not_recorded(loss: &Loss) -> Option<Gap> {
 
 /// A gap in the stream's words.
 fn gap(own: &OwnGap) -> Gap {
-    let cause = if own.cause == OwnCause::Disarmed { Cause::NotKept } else { Cause::Damaged };
+    let is_kept = own.cause != OwnCause::Disarmed;
+    let cause = if is_kept { Cause::Damaged } else { Cause::NotKept };
+    let why = loss::why(own);
     let sectors = u64::from(own.sectors_lost.saturating_add(own.sectors_skipped));
-    let frames = own.frames.map_or_else(|| "an unknown number of".to_owned(), |frames| frames.to_string());
+    let frames = own.frames.map_or_else(
+        || "an unknown number of frames is".to_owned(),
+        |frames| are(u64::from(frames), "frame"),
+    );
     Gap {
         from: own.from,
         to: own.to,
         cause,
         place: None,
         bytes: sectors * SECTOR_BYTES as u64,
-        words: format!("{frames} frames are missing: {}", own.cause.name()),
+        words: if is_kept { format!("{frames} missing: {why}") } else { why.to_owned() },
         own: Some(*own),
     }
 }

@@ -5,6 +5,7 @@ use hums_blackbox::record::{FindingRecord, Lost, Why};
 use hums_core::component::{COMPONENTS_MAX, Component, Label};
 use hums_core::health::{self, Level, Subsystem};
 use hums_core::time::Instant;
+use hums_onboard::monitoring::CELLS_UNKNOWN;
 
 use super::item::Gap;
 use crate::loss;
@@ -48,6 +49,8 @@ pub enum Told {
         /// Frames that are missing, where it is known how many.
         frames: u64,
     },
+    /// Nothing told the box how many cells a battery has.
+    CellsUnknown,
     /// What only a monitor writes that checks the vehicle's health: its findings are all that there were.
     Checked,
 }
@@ -136,6 +139,7 @@ impl Told {
                 let frames = if loss.what == Lost::QueueFull { loss.count } else { 0 };
                 loss::words(loss).map(|_| Self::Missing { from: loss.from, to: loss.to, frames })
             }
+            Record::Note(note) if note.text == CELLS_UNKNOWN => Some(Self::CellsUnknown),
             Record::Boot(_) | Record::Usage(_) => Some(Self::Checked),
             _ => None,
         }

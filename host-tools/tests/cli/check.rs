@@ -73,7 +73,7 @@ fn a_screen_says_what_it_was_what_it_means_and_what_to_do_and_what_was_not_judge
         "CRITICAL    4:20.8  battery 1 cell voltage: 3.4 V (limit 3.5 V), for 1:36",
         "The weakest cell was close to empty",
         "Check the pack under load",
-        "no battery temperature: batt_temperature",
+        "no battery temperature: battery temperature",
         "no failure flags of ESCs",
     ] {
         assert!(screen.contains(words), "{words}\n{screen}");

@@ -456,3 +456,38 @@ fn where_the_system_gives_no_thread_the_work_is_done_without() {
     };
     assert!(decoded("out", None) == decoded("again", Some("140737488355328")));
 }
+
+/// A box that is restarted in flight: the first log breaks off in the air, the second one begins there.
+#[test]
+fn a_log_that_breaks_off_in_the_air_has_one_time_in_the_air_and_logs_stand_in_the_order_in_which_they_began()
+{
+    let dir = tempfile::tempdir().expect("directory");
+    let input = flight("ap_quad_faults.tlog");
+    run(
+        dir.path(),
+        &format!("sim --input {} --sd z.img --store store.bin --reboot-at 244.7", input.display()),
+        3,
+    );
+    fs::copy(flight("ap_quad_guided.tlog"), dir.path().join("y.tlog")).expect("copied");
+    let lines = text(&run(dir.path(), "ls .", 3));
+    let name = |line: &str| line.split_whitespace().next().unwrap_or_default().to_owned();
+    let names: Vec<String> = lines.lines().skip(1).map(name).collect();
+    assert_eq!(names, ["y.tlog", "z/00001", "z/00002"], "{lines}");
+    let broken = lines.lines().find(|line| line.starts_with("z/00001")).expect("it is there");
+    assert!(broken.contains("  3:16  ") && broken.contains("; ends in the air; "), "{lines}");
+    let checked = text(&run(dir.path(), "check z.img --session 1", 3));
+    assert!(checked.contains("  in air   3:16 in 1 flight, whose landing is not in the log"), "{checked}");
+    let info = text(&run(dir.path(), "info z.img/ --session 1", 3));
+    let counted = "(counted here to the end of the log; the box had stored its own last at 4:00.0)";
+    assert!(info.contains(counted), "{info}");
+    let counter = |info: &str, title: &str| {
+        let line = info.lines().find(|line| line.trim_start().starts_with(title));
+        line.and_then(|line| line.split_whitespace().rev().nth(1)).map(str::to_owned)
+    };
+    assert_eq!(counter(&info, "In the air").as_deref(), Some("3:16"), "{info}");
+    let next = text(&run(dir.path(), "info z.img --session 2", 0));
+    assert_eq!(counter(&next, "Take-offs").as_deref(), Some("0"), "{next}");
+    assert_eq!(counter(&next, "Landings").as_deref(), Some("1"), "{next}");
+    let report = run(dir.path(), "report y.tlog", 2);
+    assert!(String::from_utf8_lossy(&report.stderr).contains("-o is missing"));
+}

@@ -104,6 +104,8 @@ const ROWS: &[(&[&str], &[&str])] = &[
     (&["failsafe_alert"], &["autopilot_state"]),
     (&["motor_trend"], &["throttle_trend", "power_trend"]),
     (&["throttle_trend"], &["power_trend"]),
+    // What a card that is out of its slot, or dead, looks like before and while nothing is recorded.
+    (&["recording"], &["card_errors", "card_stall", "record_queue", "record_lost"]),
 ];
 
 /// Whether a mishap explains what a part says.
@@ -194,6 +196,10 @@ mod tests {
         assert_eq!(why("autopilot_alert", Level::Warning), None, "nobody knows what it says");
         assert_eq!(why("cell_voltage", Level::Stale), Some("heartbeat"));
         assert_eq!(why("ekf_failsafe", Level::Ok), None);
+        for looks in ["card_errors", "card_stall", "record_queue", "record_lost"] {
+            let out = [("recording", Level::Critical)].into_iter();
+            assert_eq!(because(looks, Level::Warning, out), Some("recording"), "a card that is out");
+        }
     }
 
     #[test]

@@ -397,7 +397,7 @@ vocabulary! {
     "Do not fly until motors, propellers and sensors are checked.";
 
     "recording" Recorder "recording", "", says "not recording", "CHECK CARD", needs "monitor's own recorder";
-    "The monitor did not record."; "Check its card.";
+    "The monitor did not record."; "Push its card in, which was most likely out of the slot; replace it where that does not help.";
     "record_queue" Recorder "recorder's queue", "", says "card slow|buffer ~ full", "CHANGE CARD", needs "monitor's own recorder";
     "The card was too slow for a while."; "Take a faster card.";
     "record_lost" Recorder "frames lost by the recorder", "", says "frames not recorded|~", "", needs "monitor's own recorder";

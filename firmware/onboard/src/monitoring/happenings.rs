@@ -14,6 +14,8 @@ use crate::records::Recorded;
 
 /// `MAV_SEVERITY_WARNING`
 const WARNING: u8 = 4;
+/// What is told where nothing tells how many cells a battery has.
+pub const CELLS_UNKNOWN: &str = "HUMS: cells not known, set BAT_CELLS";
 /// The number of the event that marks a critical finding. The others are in [`record`].
 pub(super) const CRITICAL: u8 = 8;
 
@@ -43,8 +45,7 @@ pub(super) fn record(
                 continue;
             }
             Happening::CellsUnknown => {
-                let text = "HUMS: cells not known, set BAT_CELLS";
-                notices.note(now, WARNING, text, &mut book.journal, sectors);
+                notices.note(now, WARNING, CELLS_UNKNOWN, &mut book.journal, sectors);
                 continue;
             }
             Happening::Mishap(change) => {

@@ -31,6 +31,7 @@ use crate::records::Recorded;
 use crate::supervisor::Task;
 use figures::Figures;
 pub use figures::Machine;
+pub use happenings::CELLS_UNKNOWN;
 use happenings::CRITICAL;
 use marks::Marks;
 use slot::Slot;

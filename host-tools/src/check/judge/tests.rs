@@ -184,6 +184,39 @@ fn a_vehicle_that_is_in_the_air_when_it_is_heard_first_did_not_take_off() {
     assert!(!took_off(0));
 }
 
+/// Nine or ten volts in the air may be of two cells or of three.
+#[test]
+fn cells_that_nothing_tells_in_the_air_are_said_and_no_check_of_their_voltage_counts_as_judged() {
+    let judged = |named: bool, on_board: bool| {
+        let mut judge = Judge::new(&Limits::default(), if on_board { Format::Hums } else { Format::Tlog });
+        if on_board {
+            judge.item(Instant::ZERO, Item::Record(&CHECKED));
+        }
+        for second in 0..60 {
+            let from_ms = second * 1_000;
+            half_seconds(&mut judge, from_ms, from_ms + 1_000, true, LandedState::InAir);
+            judge.item(Instant::from_millis(from_ms + 600), Item::Observation(AUTOPILOT, &battery(0.5)));
+            if named && second == 1 {
+                let place = hums_core::cells::known("BATT_LOW_VOLT").expect("it is");
+                let told = Observation::Parameter(place, 10.8);
+                judge.item(Instant::from_millis(from_ms + 700), Item::Observation(AUTOPILOT, &told));
+            }
+        }
+        let judged = judge.end();
+        let why = judged.not_judged.iter().find(|(check, _)| *check == "cell_voltage");
+        (judged.cells_unknown.is_some(), why.map(|(_, why)| why.clone()), judged.remarks.join("; "))
+    };
+    let (unknown, why, remarks) = judged(false, false);
+    assert!(unknown && remarks.starts_with("cells not known from 0:00."), "{remarks}");
+    assert_eq!(why.as_deref(), Some("how many cells the battery has is not known"));
+    assert_eq!(judged(true, false), (false, None, String::new()), "the parameter came within two seconds");
+    let (unknown, why, remarks) = judged(false, true);
+    assert!(
+        !unknown && why.is_none() && remarks.contains("took the number of cells from its last flight"),
+        "{remarks}"
+    );
+}
+
 /// A check of the box itself: what it exceeded is in its record alone.
 #[test]
 fn the_worst_value_of_a_check_of_the_box_is_that_of_its_record() {

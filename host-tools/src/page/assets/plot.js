@@ -42,6 +42,9 @@ const dashed = (ctx, name, dash, points) => {
   ctx.lineTo(...points[1]);
   ctx.stroke();
 };
+// A limit that moves is a line of its plot.
+const isLimit = (text) => text.startsWith("Limit");
+const inColour = (number, text) => (isLimit(text) ? colour("warning") : line(number));
 // Behind the lines.
 const ground = (u, limits) => {
   const { ctx, bbox } = u,
@@ -125,8 +128,8 @@ export const chart = (id, name = null) => {
     const mark = el("i"),
       value = el("b", { "data-value": `${id}:${number}` });
     const node = el("button", { type: "button", title: "show or hide" }, mark, text, value);
-    const one = { number, node, value, shown: labels.find((known) => known.number === number)?.shown ?? true };
-    mark.style.borderColor = line(number);
+    const one = { number, text, node, value, shown: labels.find((known) => known.number === number)?.shown ?? true };
+    mark.style.borderColor = inColour(number, text);
     node.addEventListener("click", () => self.show(number, !one.shown));
     return one;
   };
@@ -158,8 +161,9 @@ export const chart = (id, name = null) => {
         ],
         series: [
           {},
-          ...labels.map(({ number, shown }) => ({
-            stroke: line(number),
+          ...labels.map(({ number, text, shown }) => ({
+            stroke: inColour(number, text),
+            dash: isLimit(text) ? [7, 3] : undefined,
             width: 1.5,
             points: { show: false },
             spanGaps: false,

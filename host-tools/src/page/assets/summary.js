@@ -17,8 +17,6 @@ const tiles = () => {
   const peak = (id) => flight.extremes(id, 0)?.[1];
   const low = (id) => flight.extremes(id, 0)?.[0];
   const of = (value, decimals) => (value == null || !Number.isFinite(value) ? null : fixed(value, decimals));
-  // What the box had counted when it stored it, where the recording goes on after that.
-  const until = data.counted_until_s == null ? "" : `, counted until ${moment(data.counted_until_s - flight.zero)}`;
   const battery = data.flights.length ? data.flights[data.flights.length - 1] : null;
   return el(
     "div",
@@ -30,15 +28,15 @@ const tiles = () => {
         ? plural(data.flights.length, "flight") + (lacks >= 1 ? `, without ${span(lacks)} not in the record` : "")
         : "in the air: not known",
     ),
-    tile(of(usage.distance_m, 0), "m", `over ground in the air${until}`),
-    tile(of(usage.height_max_m ?? peak("Height"), 1), "m", `greatest height${usage.height_max_m == null ? "" : until}`),
-    tile(of(usage.speed_max_m_s ?? peak("Speed"), 1), "m/s", `greatest ground speed${usage.speed_max_m_s == null ? "" : until}`),
+    tile(of(usage.distance_m, 0), "m", "over ground in the air"),
+    tile(of(usage.height_max_m ?? peak("Height"), 1), "m", "greatest height"),
+    tile(of(usage.speed_max_m_s ?? peak("Speed"), 1), "m/s", "greatest ground speed"),
     tile(of(low("PackVolts"), 2), "V", "lowest battery voltage"),
     tile(of(peak("PackAmperes"), 1), "A", "highest battery current, on the ground too"),
     battery && battery.percent_to != null && data.flights[0].percent_from != null
       ? tile(`${of(data.flights[0].percent_from, 0)} \u2192 ${of(battery.percent_to, 0)}`, "%", "battery in flight")
       : null,
-    tile(of(usage.vibration_max_m_s2, 1), "m/s\u00b2", `highest vibration${until}`),
+    tile(of(usage.vibration_max_m_s2, 1), "m/s\u00b2", "highest vibration"),
     log.frames ? tile(whole(log.frames), "", "frames recorded") : null,
     log.format === "hums" && log.frames ? tile(fixed(log.ratio, 1), "\u00d7", "smaller than a tlog") : null,
   );

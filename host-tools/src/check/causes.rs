@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use hums_core::health::Level;
 use hums_core::time::Instant;
 
-use crate::check::problem::cause;
+use super::problem::cause;
 use crate::summary::FindingLine;
 
 /// A check of a part that is not well.

@@ -1,0 +1,98 @@
+//! Parts that wear: what they are called, and the limit that each reaches first.
+
+use hums_core::Monitor;
+use hums_core::component::{COMPONENTS_MAX, Figures, Kind};
+use hums_core::health::Subsystem;
+
+/// What a part may run at most, as its parameters have it: hours, flights, battery cycles, hours that its motor turned; 0 where there is no limit.
+pub type Limits = [f64; 4];
+
+/// How the names of their parameters end.
+const ENDS: [&str; 4] = ["_HOURS", "_FLIGHTS", "_CYCLES", "_MOT_HOURS"];
+
+/// The place of a part, from 0, and which of its limits a parameter is: of `CMP1_FLIGHTS` 0 and 1.
+pub fn limit_of(parameter: &str) -> Option<(usize, usize)> {
+    let (number, end) = parameter.strip_prefix("CMP")?.split_at_checked(1)?;
+    let place = number.parse::<usize>().ok()?.checked_sub(1).filter(|place| *place < COMPONENTS_MAX)?;
+    Some((place, ENDS.iter().position(|known| *known == end)?))
+}
+
+/// What a part is called: `motor 3`, with the name that its operator gave it.
+pub fn name(kind: &str, number: u8, given: &str) -> String {
+    let number = if number == 0 { String::new() } else { format!(" {number}") };
+    let given = if given.is_empty() { String::new() } else { format!(" \"{given}\"") };
+    format!("{kind}{number}{given}")
+}
+
+/// The limit that a part reaches first, in words; `None` where it has none.
+pub fn limit(kind: &str, figures: &Figures, limits: &Limits) -> Option<String> {
+    let [hours, flights, cycles, motor_hours] = *limits;
+    let is_powered = [Kind::Card, Kind::Other].iter().any(|of| of.name() == kind);
+    let (run_s, how) =
+        if is_powered { (figures.powered_s, "powered") } else { (figures.flight_s, "in the air") };
+    let all = [
+        (run_s / 3_600.0, hours, "h ", how),
+        (figures.flights, flights, "flights", ""),
+        (figures.cycles, cycles, "cycles", ""),
+        (figures.motor_s / 3_600.0, motor_hours, "h ", "turning"),
+    ];
+    let used = |(run, limit, ..): &(f64, f64, &str, &str)| run / limit;
+    let first = all.into_iter().filter(|(_, limit, ..)| *limit > 0.0);
+    let (_, limit, unit, how) = first.max_by(|one, other| used(one).total_cmp(&used(other)))?;
+    // A parameter has single precision.
+    Some(format!("{} {unit}{how}", limit as f32))
+}
+
+/// Of the parts of a subsystem that of which most is used, as a check of them judges it: its name, and its limit.
+pub fn due(monitor: &Monitor, subsystem: Subsystem) -> Option<(String, Option<String>)> {
+    let used = |place: &usize| monitor.component_used_percent(*place).unwrap_or(f32::NEG_INFINITY);
+    let mine = |place: &usize| {
+        monitor.components().get(*place).is_some_and(|part| part.kind.subsystem() == Some(subsystem))
+    };
+    of(monitor, (0..COMPONENTS_MAX).filter(mine).max_by(|one, other| used(one).total_cmp(&used(other)))?)
+}
+
+/// What a part is called, and the limit that it reaches first, by its place from 0.
+pub fn of(monitor: &Monitor, place: usize) -> Option<(String, Option<String>)> {
+    let part = monitor.components().get(place)?;
+    let (figures, _) = monitor.component_figures(place)?;
+    let mut limits = Limits::default();
+    for (spec, value) in monitor.params().iter() {
+        if let Some((of, which)) = limit_of(spec.name)
+            && let Some(limit) = limits.get_mut(which).filter(|_| of == place)
+        {
+            *limit = f64::from(value);
+        }
+    }
+    let kind = part.kind.name();
+    Some((name(kind, part.number, part.name.as_str()), limit(kind, &figures, &limits)))
+}
+
+/// What a check that a part is due is of, in words: `motor 3 (limit 25 h turning)`.
+pub fn due_words((name, limit): &(String, Option<String>)) -> String {
+    limit.as_ref().map_or_else(|| name.clone(), |limit| format!("{name} (limit {limit})"))
+}
+
+/// Whether a check tells that a part is due.
+pub fn is_due(check: &str) -> bool {
+    check.ends_with("_due")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_part_is_named_with_the_limit_that_it_reaches_first() {
+        let figures = Figures { flight_s: 3_600.0, motor_s: 7_200.0, flights: 3.0, ..Figures::ZERO };
+        let limit = |kind, limits| limit(kind, &figures, &limits);
+        assert_eq!(limit("motor", [10.0, 50.0, 0.0, 4.0]).as_deref(), Some("4 h turning"));
+        assert_eq!(limit("airframe", [1.5, 50.0, 0.0, 0.0]).as_deref(), Some("1.5 h in the air"));
+        assert_eq!(limit("airframe", [100.0, 5.0, 0.0, 0.0]).as_deref(), Some("5 flights"));
+        assert_eq!(limit("card", [0.0; 4]), None);
+        assert_eq!(name("motor", 3, ""), "motor 3");
+        assert_eq!(name("battery", 0, "blue"), "battery \"blue\"");
+        assert_eq!(limit_of("CMP2_MOT_HOURS"), Some((1, 3)));
+        assert_eq!((limit_of("CMP9_HOURS"), limit_of("CMP1_KIND"), limit_of("CMP")), (None, None, None));
+    }
+}
