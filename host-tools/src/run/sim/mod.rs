@@ -271,9 +271,10 @@ impl World<'_> {
         if self.overwritten {
             // What came first may be gone again.
             report.frames_logged = frames.min(report.frames_in);
-            report.frames_lost = match self.released {
-                true => report.frames_lost.max(on_card.frames_missing),
-                false => report.frames_in - report.frames_logged,
+            report.frames_lost = if self.released {
+                report.frames_lost.max(on_card.frames_missing)
+            } else {
+                report.frames_in - report.frames_logged
             };
         } else if !self.frames_on_card && !self.released {
             // Frames were left in memory: only the card tells which made it.
