@@ -92,7 +92,7 @@ fn begun(log: &Log, first: &Header) -> Result<Vec<Option<Instant>>> {
     let mut all = Vec::new();
     for piece in &log.pieces {
         let one = Log { pieces: vec![piece.clone()], ..log.clone() };
-        all.push(one.blocks().next_block()?.and_then(|block| start_of(&block, first)));
+        all.push(one.blocks().next_block()?.and_then(|block| start_of(block, first)));
     }
     Ok(all)
 }
@@ -110,7 +110,7 @@ fn start_of(block: &[u8; BLOCK_BYTES], first: &Header) -> Option<Instant> {
 fn begins_with(log: &Log, first: &Header) -> Result<bool> {
     let mut blocks = log.blocks();
     for is_second in [false, true] {
-        let header = blocks.next_block()?.and_then(|block| Header::read(&block).ok());
+        let header = blocks.next_block()?.and_then(|block| Header::read(block).ok());
         let header = header.filter(|header| header.partial || !is_second);
         if header.is_some_and(|header| (header.session, header.number) == (first.session, first.number)) {
             return Ok(true);
