@@ -222,18 +222,34 @@ pub fn failed(log: &Overview, extent: Extent) -> Vec<(&'static str, String)> {
     failed
 }
 
+/// Sectors at the beginning of a log, of which what comes before was not asked for, that are the rest of a group which began there.
+pub fn rest_of_group(log: &Overview, extent: Extent) -> Option<u32> {
+    let summary = &log.ending.summary;
+    let BlockCounts { damaged, misplaced, .. } = summary.blocks;
+    let is_as_written = damaged + misplaced == 0 && others(&summary.blocks) == others(&summary.behind);
+    let first = log.contents.gaps.first().filter(|_| is_as_written && !extent.from_start)?;
+    // None is missing behind them.
+    let is_rest = first.sectors_skipped > 0 && Some(first.sectors_lost) <= summary.first_number;
+    (is_rest && first.from.is_none() && first.cause == Cause::Missing).then_some(first.sectors_skipped)
+}
+
+/// Blocks that are no sectors of the log.
+const fn others(of: &BlockCounts) -> u64 {
+    of.stale + of.unsound + of.foreign + of.empty + of.erased
+}
+
 /// The same log, of which nothing was asked for that comes before it. Where its only file does not begin with a sector of it, what is
 /// missing is missing in that.
 fn without_before(mut log: Overview) -> Overview {
+    let is_rest = rest_of_group(&log, Extent { from_start: false, ..Extent::ALL }).is_some();
     let ending = &mut log.ending;
     let summary = &mut ending.summary;
     summary.files_gone = 0;
     let (all, behind) = (&summary.blocks, &summary.behind);
-    let others = |of: &BlockCounts| of.stale + of.unsound + of.foreign + of.empty + of.erased;
     let is_in_file = ending.files.len() == 1 && others(all) > others(behind);
     // What was left out on purpose is no gap.
     let is_before = |gap: &Gap| gap.from.is_none() && gap.sectors_skipped == 0 && gap.cause == Cause::Missing;
-    if log.contents.gaps.first().is_some_and(is_before) && !is_in_file {
+    if is_rest || log.contents.gaps.first().is_some_and(is_before) && !is_in_file {
         let gap = log.contents.gaps.remove(0);
         summary.gaps -= 1;
         summary.frames_missing -= u64::from(gap.frames.unwrap_or(0));

@@ -140,6 +140,30 @@ fn a_vehicle_that_is_never_armed_leaves_the_last_while() {
     assert_keeps_the_end(&recording, manifest, &disarmed, &(10.0..35.0));
 }
 
+/// The card is out for a moment while the vehicle waits, or until it was armed: what was in work goes on behind it, and the card is
+/// sound.
+#[test]
+fn a_card_that_is_out_while_the_vehicle_waits_costs_nothing() {
+    let manifest = Manifest::own();
+    let data = fs::read(own(FLIGHT)).unwrap();
+    let input = manifest.frames_of(&own(FLIGHT), &data);
+    for out in ["20..21.5", "40..43.5", "43..44"] {
+        let dir = tempfile::tempdir().unwrap();
+        let params = dir.path().join("params");
+        fs::write(&params, "REC_MODE 1\nREC_BEFORE 5\n").unwrap();
+        let flags = ["--card-size", "64", "--params", &params.display().to_string(), "--card-out", out];
+        let recording = Recording::make(Machine::Sim, &own(FLIGHT), &flags);
+        hums(["verify".as_ref(), recording.image().as_os_str()]).expect_code(&[0]);
+        let logs = tlogs(&recording.image(), dir.path());
+        let last = frames::of_tlog(logs.last().unwrap(), &manifest.seeds, true);
+        let from = input.len() - last.len();
+        assert!(last.iter().zip(&input[from..]).all(|(a, b)| a.bytes == b.bytes), "{out}: not its end");
+        let arming = input.iter().position(|frame| armed(frame) == Some(true)).unwrap();
+        let before_us = input[arming].time_us.unwrap() - input[from].time_us.unwrap();
+        assert!(before_us >= 5_000_000, "{out}: {before_us} us before arming are kept");
+    }
+}
+
 /// Each command that reads logs ends with this code; what all of them say.
 #[track_caller]
 fn readers(log: &Path, code: i32) -> String {

@@ -57,6 +57,13 @@ fn a_card_that_is_taken_out_and_put_back_misses_only_that_time() {
 }
 
 #[test]
+fn a_run_that_writes_over_its_own_first_files_counts_their_frames_as_lost() {
+    let flags = ["--write-error", "0.75", "--seed", "3", "--card-size", "40"];
+    let (recording, lost) = assert_accounted(&flags);
+    assert!(lost > 0 && recording.number("frames_logged") > 0, "{lost} lost");
+}
+
+#[test]
 fn a_card_that_never_comes_back_holds_what_was_written_and_the_pilot_is_told() {
     let (recording, lost) = assert_accounted(&["--card-out", "60..100000", "--card-size", "64"]);
     assert!(lost > 0 && recording.number("frames_logged") > 0);

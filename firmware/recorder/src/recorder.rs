@@ -189,7 +189,7 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
             }
         }
         // A new segment may lie where the card still works.
-        let moved = self.next_segment(now).and_then(|()| {
+        let moved = self.next_segment(now, None).and_then(|()| {
             self.status.want_group();
             self.try_write(now, &first, 1)
         });
@@ -293,12 +293,11 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
         let keep = self.status.waiting().filter(|(from, _)| number >= *from).map(|(_, keep)| keep);
         self.segments.ring.keep(keep);
         if self.must_move(now, first)? {
-            self.next_segment(now)?;
+            self.next_segment(now, Some(first))?;
         }
         let mut log = self.segments.log.ok_or(CardError::NotOpen)?;
-        if self.segments.ring.is_empty() {
-            // The segment of the power-on is the first that may go.
-            self.segments.ring.begin(log.name, now);
+        if log.base.is_none() {
+            self.segments.begin_segment(now, log.name, first);
         }
         let mut at = number.wrapping_sub(*log.base.get_or_insert(number));
         let blocks = data_blocks(self.mounted()?.open_blocks());
@@ -394,6 +393,9 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
 
     /// Whether this sector belongs into a new segment.
     fn must_move(&mut self, now: Instant, sector: &Sector) -> Result<bool, CardError<D::Error>> {
+        if self.segments.begins_log(sector) {
+            return Ok(true);
+        }
         let Some(Log { base: Some(base), .. }) = self.segments.log else { return Ok(false) };
         let blocks = data_blocks(self.mounted()?.open_blocks());
         let at = sector.number().wrapping_sub(base);
@@ -437,9 +439,10 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
         Ok(())
     }
 
-    fn next_segment(&mut self, now: Instant) -> Result<(), CardError<D::Error>> {
+    /// Leaves the open segment for the next one, which begins with this sector; without one it goes on with whatever comes.
+    fn next_segment(&mut self, now: Instant, sector: Option<&Sector>) -> Result<(), CardError<D::Error>> {
         self.write_parity();
-        let next = self.segments.next(now, self.slot.card().ok_or(CardError::NotOpen)?);
+        let next = self.segments.next(now, sector, self.slot.card().ok_or(CardError::NotOpen)?);
         self.held.parity.borrow_mut().begin(0);
         next
     }

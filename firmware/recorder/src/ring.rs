@@ -76,11 +76,11 @@ impl Ring {
         self.is_due(now) && !core::mem::replace(&mut self.group_asked, true)
     }
 
-    /// Gives away the oldest segment where those after it hold enough.
-    pub(crate) fn release(&mut self, now: Instant) -> Option<LogName> {
+    /// The oldest segment, where those after it hold enough, or there is no room for one more.
+    pub(crate) fn oldest(&self, now: Instant) -> Option<LogName> {
         let keep = self.keep?;
         let enough = self.segments.get(1).is_some_and(|second| now.since(second.began) >= keep);
-        (enough || self.segments.is_full()).then(|| self.segments.remove(0).name)
+        self.segments.first().filter(|_| enough || self.segments.is_full()).map(|oldest| oldest.name)
     }
 
     /// This segment is gone.
@@ -103,12 +103,14 @@ mod tests {
         ring.keep(Some(Span::from_secs(30)));
         for segment in 0..4 {
             let now = Instant::from_millis(u64::from(segment) * 12_000);
-            assert_eq!(ring.release(now), None, "segment {segment}");
+            assert_eq!(ring.oldest(now), None, "segment {segment}");
             ring.begin(name(segment), now);
         }
-        assert_eq!(ring.release(Instant::from_millis(41_999)), None, "29.999 s without it");
-        assert_eq!(ring.release(Instant::from_millis(42_000)), Some(name(0)));
-        assert_eq!(ring.release(Instant::from_millis(42_000)), None);
+        assert_eq!(ring.oldest(Instant::from_millis(41_999)), None, "29.999 s without it");
+        assert_eq!(ring.oldest(Instant::from_millis(42_000)), Some(name(0)));
+        assert_eq!(ring.oldest(Instant::from_millis(42_000)), Some(name(0)), "it is not written anew yet");
+        ring.forget(name(0));
+        assert_eq!(ring.oldest(Instant::from_millis(42_000)), None);
     }
 
     #[test]
@@ -116,10 +118,10 @@ mod tests {
         let mut ring = Ring::new();
         ring.keep(Some(Span::from_secs(120)));
         (0..SEGMENTS_MAX as u32).for_each(|segment| ring.begin(name(segment), Instant::ZERO));
-        assert_eq!(ring.release(Instant::ZERO), Some(name(0)));
+        assert_eq!(ring.oldest(Instant::ZERO), Some(name(0)));
         ring.keep(None);
         assert!(ring.is_empty() && !ring.is_due(Instant::from_millis(1_000_000)));
-        assert_eq!(ring.release(Instant::from_millis(1_000_000)), None);
+        assert_eq!(ring.oldest(Instant::from_millis(1_000_000)), None);
     }
 
     #[test]

@@ -3,6 +3,7 @@
 mod common;
 
 use std::cell::RefCell;
+use std::collections::VecDeque;
 use std::rc::Rc;
 
 use common::{MIB_BLOCKS, MemCard, held};
@@ -456,6 +457,70 @@ fn while_waiting_only_the_last_while_is_kept() {
     assert!((30.0..100.0).contains(&before_s), "{before_s} s before arming are kept");
     let segments = stored(&device).iter().map(|(name, ..)| *name).collect::<std::collections::BTreeSet<_>>();
     assert!(segments.len() <= 5, "{segments:?}");
+}
+
+/// The card of a vehicle that waits is out for a moment, or refuses what is written, in the middle of a group: the rest of that is in
+/// a file of the log that it began in, the next log begins with a group, and no log has a hole, so that all of it can be read.
+#[test]
+fn while_waiting_a_group_ends_in_the_log_in_which_it_began() {
+    for (case, trouble) in [(0, 20_000..20_600), (1, 20_000..20_600), (0, 31_000..33_000), (1, 3_000..3_400)]
+    {
+        let device = MemCard::formatted(64 * MIB_BLOCKS);
+        let status = CardStatus::new();
+        status.wait_from(0, Span::from_secs(5));
+        let mut recorder = Recorder::new(device.clone(), &status, held(), 7);
+        let (mut writer, mut sink) = (Box::new(Writer::new()), Sink(Vec::new()));
+        let (mut state, mut waiting) = (1_u32, VecDeque::new());
+        let (mut armed_from, mut retry_ms) = (0, 0);
+        for index in 0..1_000_u64 {
+            let now_ms = index * 50;
+            let noise: [u8; 100] = std::array::from_fn(|_| {
+                state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+                (state >> 24) as u8
+            });
+            if index == 680 {
+                status.keep_all();
+                armed_from = writer.counters().sectors as u32;
+            }
+            if status.take_group_wanted() {
+                assert!(writer.restart(&mut sink));
+            }
+            writer.frame(Instant::from_millis(now_ms), &noise, false, &mut sink).expect("there is room");
+            waiting.extend(sink.0.drain(..));
+            device.broken.set(case == 0 && trouble.contains(&now_ms));
+            // A sector that is refused eight times, once: then the segment is left.
+            if case == 1 && now_ms == trouble.start {
+                device.refusals.set(8);
+            }
+            while now_ms >= retry_ms
+                && let Some(sector) = waiting.front()
+            {
+                match put(&mut recorder, Instant::from_millis(now_ms), sector) {
+                    Written::Later => retry_ms = now_ms + 100,
+                    _ => drop(waiting.pop_front()),
+                }
+            }
+        }
+        assert!(waiting.is_empty() && status.read().write_errors > 0, "{trouble:?}");
+        assert_eq!(status.read().frames_lost, 0);
+        let (mut last, mut newest) = (None::<(LogName, Header)>, 0);
+        for (name, _, header) in stored(&device).into_iter().filter(|(.., header)| !header.partial) {
+            match &last {
+                // Older sectors, which the file held before.
+                Some((_, last)) if header.number <= last.number => continue,
+                Some((before, last)) if before.session == name.session => {
+                    assert_eq!(header.number, last.number + 1, "{trouble:?}: a hole in {name}");
+                }
+                _ => assert!(header.starts_group(), "{trouble:?}: {name} begins with the rest of a group"),
+            }
+            newest = header.number;
+            last = Some((name, header));
+        }
+        assert!(
+            armed_from > 0 && u64::from(newest) + 1 == writer.counters().sectors,
+            "{trouble:?}: to the end"
+        );
+    }
 }
 
 /// Whatever the session before wrote, the next start finds where it ended.

@@ -9,11 +9,11 @@
 
 use anyhow::Result;
 use hums_blackbox::record::{Keep, Lost};
-use hums_blackbox::{Entry, GroupDecoder, Header, Outline, Record, Sector};
+use hums_blackbox::{Entry, GROUP_SECTORS, GroupDecoder, Header, Outline, Record, Sector};
 use hums_core::time::{Instant, Span};
 
 use super::groups::{Group, Groups};
-use super::places::{BLOCK_BYTES, Log};
+use super::places::Log;
 
 /// Files of a full ring but for one, of which the oldest goes however little the others hold.
 const RING_FILES: usize = 15;
@@ -87,23 +87,26 @@ fn was_written_anew(
     Ok(armed.is_none_or(|armed| at <= armed))
 }
 
-/// When the first group of each file began, where that is known.
+/// When the first group of each file began, where that is known. One that was begun when the card was back begins with the rest of
+/// the group before.
 fn begun(log: &Log, first: &Header) -> Result<Vec<Option<Instant>>> {
     let mut all = Vec::new();
     for piece in &log.pieces {
         let one = Log { pieces: vec![piece.clone()], ..log.clone() };
-        all.push(one.blocks().next_block()?.and_then(|block| start_of(block, first)));
+        let (mut blocks, mut start) = (one.blocks(), None);
+        for _ in 0..=GROUP_SECTORS {
+            let Some(block) = blocks.next_block()? else { break };
+            // What a file held before is of another session, or older.
+            let is_own = |header: &Header| header.session == first.session && header.number >= first.number;
+            let Some(header) = Header::read(block).ok().filter(is_own) else { break };
+            if header.starts_group() {
+                start = Sector::from_bytes(*block).preamble();
+                break;
+            }
+        }
+        all.push(start.map(|start| Instant::from_millis(start.start_ms)));
     }
     Ok(all)
-}
-
-/// When the group began whose first sector this is. What a file held before is of another session, or older.
-fn start_of(block: &[u8; BLOCK_BYTES], first: &Header) -> Option<Instant> {
-    let header = Header::read(block).ok().filter(Header::starts_group)?;
-    if header.session != first.session || header.number < first.number {
-        return None;
-    }
-    Some(Instant::from_millis(Sector::from_bytes(*block).preamble()?.start_ms))
 }
 
 /// Whether this sector lies where a log's first one does: in the first block, or a copy of it in the second one.

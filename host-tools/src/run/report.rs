@@ -92,6 +92,8 @@ pub struct Report {
 pub struct OnCard {
     /// Bytes of log.
     pub bytes: u64,
+    /// Frames that were recorded and are not there: of each stretch of which nothing tells how many, one.
+    pub frames_missing: u64,
     /// The recorder's last figures, where it has told any.
     pub stats: Option<Stats>,
 }
@@ -185,6 +187,8 @@ impl Report {
         for log in logs.iter().filter(|log| !earlier.has(log)) {
             let overview = Overview::of(log)?;
             frames += overview.contents.frames();
+            let summary = &overview.ending.summary;
+            on_card.frames_missing += summary.frames_missing + summary.gaps_uncounted;
             on_card.bytes += overview.log_bytes();
             on_card.stats = overview.contents.stats.or(on_card.stats);
             self.log_files.extend(log.files.iter().cloned());

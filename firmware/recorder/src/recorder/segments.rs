@@ -1,7 +1,7 @@
 //! Which segment is written: the session's next one, made where there is room and else in the place of the oldest.
 
 use hums_blackbox::record::{Before, Found};
-use hums_blackbox::{GROUP_SECTORS, SECTOR_BYTES};
+use hums_blackbox::{GROUP_SECTORS, SECTOR_BYTES, Sector};
 use hums_core::time::Instant;
 
 use super::before;
@@ -71,6 +71,8 @@ impl<'a> Segments<'a> {
         let log = if let Some(log) = resumed {
             log
         } else {
+            // What is in the ring is on another card.
+            self.ring.clear();
             self.earlier = newest;
             if newest.is_none() {
                 self.status.set_before(&Before { found: Found::Nothing, ..Before::default() });
@@ -82,9 +84,11 @@ impl<'a> Segments<'a> {
             Log { name, session, volume_id, base: None, partial_further: false, copy_in_place: false }
         };
         let before = self.log.replace(log);
-        self.ring.clear();
-        let opened =
-            if Some(log.name) == newest { self.next(now, card) } else { self.open(now, log.name, card) };
+        let opened = if Some(log.name) == newest {
+            self.next(now, None, card)
+        } else {
+            self.open(now, log.name, false, card)
+        };
         if let Err(error) = opened {
             self.log = before;
             return Err(error);
@@ -122,17 +126,35 @@ impl<'a> Segments<'a> {
         self.log.is_some_and(|log| log.base.is_some())
     }
 
-    /// Opens the one after it.
+    /// Whether a log of its own begins with this sector: what is recorded around one arming is one, and its first group is whole.
+    pub(super) fn begins_log(&self, sector: &Sector) -> bool {
+        let is_first = |log: Log| log.base.is_none() && log.name.segment == 0;
+        let waits_anew = self.ring.is_on() && self.ring.is_empty() && sector.starts_group();
+        waits_anew && !self.log.is_some_and(is_first)
+    }
+
+    /// Opens the segment after it, which begins with this sector: of the next log, where that begins a log. Without one it is a short
+    /// one for what the segment before did not take: a card that goes away or refuses again and again is not used up by what is begun.
     pub(super) fn next<D: CardDevice>(
         &mut self,
         now: Instant,
+        sector: Option<&Sector>,
         card: &mut Card<'_, D>,
     ) -> Result<(), CardError<D::Error>> {
         let log = self.log.ok_or(CardError::NotOpen)?;
-        // What is recorded around one arming is a log of its own.
-        let begins_waiting = self.ring.is_on() && self.ring.is_empty() && log.base.is_some();
-        let name = if begins_waiting { log.name.next_session() } else { log.name.next_segment() };
-        self.open(now, name.ok_or(CardError::Full)?, card)
+        let begins_log = sector.is_some_and(|sector| self.begins_log(sector));
+        let name = if begins_log { log.name.next_session() } else { log.name.next_segment() };
+        self.open(now, name.ok_or(CardError::Full)?, sector.is_none(), card)
+    }
+
+    /// The first sector of the open segment is to be written. Where the group before goes on in it, all that is in the ring stays:
+    /// without that no reader could do anything with it. The next group then begins a log.
+    pub(super) fn begin_segment(&mut self, now: Instant, name: LogName, sector: &Sector) {
+        if sector.starts_group() {
+            self.ring.begin(name, now);
+        } else {
+            self.ring.clear();
+        }
     }
 
     /// Makes a segment, or overwrites the oldest one when the card has no room, or the oldest one of those that are
@@ -141,11 +163,13 @@ impl<'a> Segments<'a> {
         &mut self,
         now: Instant,
         name: LogName,
+        is_short: bool,
         card: &mut Card<'_, D>,
     ) -> Result<(), CardError<D::Error>> {
-        let overwrote = match self.ring.release(now) {
-            Some(old) => self.recycle(&old, name, card)?,
-            None => self.create_or_overwrite(name, card)?,
+        let bytes_max = if is_short || self.ring.is_on() { ring::SEGMENT_BYTES } else { SEGMENT_BYTES_MAX };
+        let overwrote = match self.ring.oldest(now) {
+            Some(old) => self.recycle(old, name, card, bytes_max)?,
+            None => self.create_or_overwrite(name, card, bytes_max)?,
         };
         if let Some(log) = &mut self.log {
             log.name = name;
@@ -154,42 +178,45 @@ impl<'a> Segments<'a> {
             log.partial_further = false;
             log.copy_in_place = false;
         }
-        self.ring.begin(name, now);
         self.is_dated = self.status.is_utc_known();
         self.status.begin_segment(name.session, overwrote);
         self.status.set_state(CardState::Recording);
         Ok(())
     }
 
-    /// Overwrites the segment `old`, which no longer counts; makes a new one where it is gone.
+    /// Overwrites the segment `old` of the ring, which no longer counts; makes a new one where it is gone.
     fn recycle<D: CardDevice>(
         &mut self,
-        old: &LogName,
+        old: LogName,
         name: LogName,
         card: &mut Card<'_, D>,
+        bytes_max: u32,
     ) -> Result<bool, CardError<D::Error>> {
         let mut found = None;
         card.logs(|entry| {
-            if entry.name == *old {
+            if entry.name == old {
                 found = Some(entry);
             }
         })?;
-        match found {
+        let overwrote = match found {
             Some(entry) => {
                 card.recycle(&entry, name)?;
                 self.status.count_released();
-                Ok(false)
+                false
             }
-            None => self.create_or_overwrite(name, card),
-        }
+            None => self.create_or_overwrite(name, card, bytes_max)?,
+        };
+        // Not before: where it fails, the segment is still the first one that may go.
+        self.ring.forget(old);
+        Ok(overwrote)
     }
 
     fn create_or_overwrite<D: CardDevice>(
         &mut self,
         name: LogName,
         card: &mut Card<'_, D>,
+        bytes_max: u32,
     ) -> Result<bool, CardError<D::Error>> {
-        let bytes_max = if self.ring.is_on() { ring::SEGMENT_BYTES } else { SEGMENT_BYTES_MAX };
         let bytes = (card.layout().data_bytes() / SEGMENTS_MIN).min(u64::from(bytes_max)) as u32;
         match card.create(name, bytes) {
             Ok(()) => return Ok(false),

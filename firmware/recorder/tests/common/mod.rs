@@ -40,6 +40,8 @@ pub struct MemCard {
     pub reads: Rc<Cell<u32>>,
     /// After so many more blocks one write fails.
     pub fail_after: Rc<Cell<Option<u32>>>,
+    /// So many write commands are refused from now on.
+    pub refusals: Rc<Cell<u32>>,
     /// So many of a thousand block writes are refused, at random.
     pub refused_permille: Rc<Cell<u64>>,
     random: Rc<Cell<u64>>,
@@ -62,6 +64,7 @@ impl MemCard {
             writes: Rc::default(),
             reads: Rc::default(),
             fail_after: Rc::default(),
+            refusals: Rc::default(),
             refused_permille: Rc::default(),
             random: Rc::default(),
             keeps_logs: Rc::default(),
@@ -92,6 +95,10 @@ impl BlockDevice for MemCard {
 
     fn write(&self, blocks: &[Block], start: BlockIdx) -> Result<(), Broken> {
         self.writes.set(self.writes.get() + 1);
+        if let Some(left) = self.refusals.get().checked_sub(1) {
+            self.refusals.set(left);
+            return Err(Broken);
+        }
         for (at, block) in (start.0..).zip(blocks) {
             if self.broken.get() || at >= self.size {
                 return Err(Broken);

@@ -46,7 +46,8 @@ pub(super) fn pull(
     output: &Path,
     (what, span): (&Around, Span),
 ) -> Result<Brought> {
-    let mut board = Board { ftp, names, left_out, output, strange: BTreeSet::new(), missing: None };
+    let mut board =
+        Board { ftp, names, left_out, output, strange: BTreeSet::new(), missing: None, next: None };
     let (mut outcome, mut found, mut epoch_us) = (Outcome::Done, None, None);
     let at = match what {
         Around::Time(When::Seconds(micros)) => Instant::from_micros(*micros),
@@ -84,7 +85,7 @@ pub(super) fn pull(
         bail!("what the board gives of this session begins after {}", moment(to));
     }
     let readings = by_number(&stretches).map(Reading::of).collect::<Result<Vec<_>>>()?;
-    outcome = outcome.and(check_recorded(at, &readings, board.missing, names, epoch_us)?);
+    outcome = outcome.and(check_recorded(at, &readings, &board, epoch_us)?);
     if let Some(missing) = board.missing {
         note!("of the moment: {}: no log that the board gives has them", missing.words());
         outcome = Outcome::Losses;
@@ -117,12 +118,12 @@ fn parts_of(stretches: &[Stretch]) -> Vec<(String, PathBuf)> {
 fn check_recorded(
     at: Instant,
     readings: &[Reading],
-    missing: Option<Unread>,
-    names: &[String],
+    board: &Board<'_>,
     epoch_us: Option<u64>,
 ) -> Result<Outcome> {
-    let spans = || readings.iter().filter_map(|reading| Some((reading.span()?, reading.goes_on(names))));
-    if spans().any(|((first, last), goes_on)| first <= at && (at <= last || goes_on)) {
+    let Board { names, left_out, missing, next, .. } = board;
+    let spans = || readings.iter().filter_map(|reading| Some((reading, reading.span()?)));
+    if spans().any(|(log, (first, last))| first <= at && (at <= last || log.goes_on(names))) {
         return Ok(Outcome::Done);
     }
     let words = |at: Instant| {
@@ -130,21 +131,31 @@ fn check_recorded(
             .map(|epoch_us| format!(" ({} UTC)", date_and_time(epoch_us.saturating_add(at.as_micros()))));
         moment(at) + &utc.unwrap_or_default()
     };
-    let before = spans().map(|((_, last), _)| last).filter(|last| *last < at).max();
-    let after = spans().map(|((first, _), _)| first).filter(|first| *first > at).min();
+    let before = spans().map(|(log, (_, last))| (last, log.name())).filter(|(last, _)| *last < at).max();
+    let starts = spans().map(|(log, (first, _))| (first, log.first_name()));
+    let starts = starts.chain(next.iter().map(|(name, first)| (*first, name.as_str())));
+    let after = starts.filter(|(first, _)| *first > at).min();
+    let is_read = missing.is_none() && readings.iter().all(|reading| reading.unread().is_none());
     let why = match (before, after) {
-        (Some(end), None) => format!("what the board gives of this session ends at {}", words(end)),
-        (None, Some(start)) => format!("what the board gives of this session begins at {}", words(start)),
-        (Some(end), Some(start)) => {
-            format!(
-                "what the board gives of this session has nothing between {} and {}",
-                words(end),
-                words(start)
-            )
+        (Some((end, earlier)), Some((start, later))) => {
+            let is_between = |name: &String| (earlier..later).contains(&name.as_str());
+            if is_read && !left_out.iter().any(is_between) {
+                bail!(
+                    "nothing was recorded between {}, where {earlier} ends, and {}, where {later} begins",
+                    words(end),
+                    words(start)
+                );
+            }
+            let between = format!("nothing between {} and {}", words(end), words(start));
+            format!("what the board gives of this session, as far as it was asked for, has {between}")
+        }
+        (Some((end, _)), None) => format!("what the board gives of this session ends at {}", words(end)),
+        (None, Some((start, _))) => {
+            format!("what the board gives of this session begins at {}", words(start))
         }
         (None, None) => "nothing of the moment can be read".to_owned(),
     };
-    if missing.is_none() && readings.iter().all(|reading| reading.unread().is_none()) {
+    if is_read {
         bail!("{why}; for another session name its logs");
     }
     note!("nothing that can be read was recorded at {}: {why}", words(at));
@@ -208,6 +219,8 @@ struct Board<'a> {
     strange: BTreeSet<(String, u32)>,
     /// What was recorded between the logs that were looked at, or before them, and is in none: their sectors' numbers tell.
     missing: Option<Unread>,
+    /// The first log that begins after all that was wanted, and when it does.
+    next: Option<(String, Instant)>,
 }
 
 /// Where a log of the session begins.
@@ -236,8 +249,9 @@ impl Board<'_> {
             let is_later =
                 first.map_or(is_further, |first| first.at > to && (first.place == 0 || is_further));
             if is_later && stretches.is_empty() {
-                if first.is_some() {
+                if let Some(first) = first {
                     tails.clear();
+                    self.next = Some((name.clone(), first.at));
                 }
                 tails.insert(0, (name, first.map_or(log.count(), |first| first.place)));
                 later = Some(Begin { name, number, at, is_read: false });

@@ -14,8 +14,9 @@ use super::session::{Place, place};
 use crate::ending::EndJson;
 use crate::logs::{self, Log};
 use crate::outcome::Outcome;
+use crate::plural::count;
 use crate::summary::Overview;
-use crate::verify::{Extent, failed, verify_each};
+use crate::verify::{Extent, failed, rest_of_group, verify_each};
 
 /// A log that came, or was there already.
 #[derive(Debug, Serialize)]
@@ -137,6 +138,8 @@ pub(super) fn judge(board: &[String], asked: &Asked, pulled: &mut [LogJson]) -> 
 fn tell(overview: &Overview, extent: Extent, pulled: &mut [LogJson]) -> Outcome {
     let ending = &overview.ending;
     let failed = failed(overview, extent);
+    let rest = rest_of_group(overview, extent);
+    let outcome = Outcome::lossy(!failed.is_empty() || rest.is_some());
     let is_of = |log: &&mut LogJson| {
         let mut names = ending.files.iter().map(|file| Path::new(file).file_name());
         names.any(|name| name == log.path.file_name())
@@ -146,10 +149,16 @@ fn tell(overview: &Overview, extent: Extent, pulled: &mut [LogJson]) -> Outcome 
     }
     let mut last = None;
     for log in pulled.iter_mut().filter(is_of) {
-        log.whole = failed.is_empty();
+        log.whole = outcome == Outcome::Done;
         last = Some(log);
     }
-    let Some(last) = last else { return Outcome::lossy(!failed.is_empty()) };
+    let Some(last) = last else { return outcome };
+    if let (Some(sectors), Some(first)) = (rest, ending.files.first()) {
+        note!(
+            "{first}: begins with the rest of a group, {}, that can be read only with the file before it, which was not asked for",
+            count(sectors, "sector")
+        );
+    }
     for (check, why) in &failed {
         note!("{}: {check}: {why}; `hums verify` says more", last.name);
     }
@@ -160,7 +169,7 @@ fn tell(overview: &Overview, extent: Extent, pulled: &mut [LogJson]) -> Outcome 
             last.whole = false;
         }
     }
-    Outcome::lossy(!failed.is_empty())
+    outcome
 }
 
 #[cfg(test)]
@@ -216,6 +225,23 @@ mod tests {
         let further = |bytes: &[u8]| judged(bytes, "00001_01.HUM", &[NAME]);
         assert_eq!(further(&new[2 * GROUP..]), HOLDS);
         assert_eq!(first(&new[2 * GROUP..]), FAILS);
+        // One that begins in the middle of a group: what is in that can be read only with the file before.
+        let middle = 2 * GROUP + 55 * SECTOR;
+        assert_eq!(further(&new[middle..]), FAILS);
+        let extent = Extent { from_start: false, ..Extent::ALL };
+        let read = |bytes: &[u8]| {
+            let path = dir.path().join("00001_01.HUM");
+            fs::write(&path, bytes).expect("written");
+            let log = logs::find(&[path], false).expect("a log").logs.remove(0);
+            let overview = Overview::verified(&log).expect("it reads");
+            (rest_of_group(&overview, extent), failed(&overview, extent))
+        };
+        assert_eq!(read(&new[middle..]), (Some(9), Vec::new()), "nothing else is wrong with it");
+        // Where a group's first sector is lost, that is another matter.
+        let mut lost = new[2 * GROUP..].to_vec();
+        lost[..SECTOR].fill(0);
+        let (rest, failed) = read(&lost);
+        assert!(rest.is_none() && failed.iter().any(|(check, _)| *check == "group decoding"), "{failed:?}");
         let middle = new.len() / 1024 * SECTOR;
         for spoiled in [&old[middle..middle + GROUP], &vec![0; GROUP]] {
             let mut mixed = new.clone();

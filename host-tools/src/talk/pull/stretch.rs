@@ -69,6 +69,11 @@ impl Reading {
         first.zip(summary.last)
     }
 
+    /// The board's name of the first one.
+    pub(super) fn first_name(&self) -> &str {
+        &self.overview.ending.name
+    }
+
     /// The board's name of the last one.
     pub(super) fn name(&self) -> &str {
         self.last.as_ref().map_or("", |last| &last.name)

@@ -447,6 +447,60 @@ fn a_time_of_day_goes_by_the_last_clock_record_of_its_log() {
 }
 
 #[test]
+fn a_moment_between_two_logs_of_a_power_on_is_a_pause_of_which_both_ends_are_told() {
+    let mut memory = Memory { session: 7, ..Memory::default() };
+    let (mut writer, mut groups, mut from) = (Box::new(Writer::new()), 0, 0);
+    for tenth in 0..4_000_u64 {
+        let at = Instant::from_millis(tenth * 100);
+        if tenth == 1_000 {
+            // From the disarming on the last while is kept.
+            writer.finish(&mut memory);
+            from = writer.counters().sectors as u32;
+        }
+        if tenth % 300 == 0 {
+            writer.restart(&mut memory);
+        }
+        let random = tenth.wrapping_mul(0x9E37_79B9_7F4A_7C15);
+        let text = format!("{random:016x}{:016x}", random.rotate_left(29) ^ tenth);
+        let note = Record::Note(Note { severity: 6, text: &text });
+        writer.record(at, &note, &mut memory).expect("there is room");
+        if std::mem::replace(&mut groups, writer.counters().groups) != groups && from > 0 {
+            let keep = Record::Keep(Keep { all: false, from, seconds: 30 });
+            writer.record(at, &keep, &mut memory).expect("there is room");
+        }
+    }
+    writer.finish(&mut memory);
+    let log = memory.sectors;
+    let [second, third] = [300, 370].map(|second| group_at(&log, second).start * SECTOR_BYTES);
+    let earlier = from as usize * SECTOR_BYTES;
+    assert!(earlier < second && second < third, "{earlier}, {second}, {third}");
+    let files: Files = [
+        ("00001_00.HUM", &log[..earlier]),
+        ("00002_03.HUM", &log[second..third]),
+        ("00002_04.HUM", &log[third..]),
+    ]
+    .map(|(name, bytes)| (name.to_owned(), bytes.to_vec()))
+    .into();
+    let told = |files: &Files, args: &[&str]| {
+        brought(files, &[&["--around"], args].concat()).expect_err("nothing was recorded then").to_string()
+    };
+    let first = Sector::from_bytes(*log[second..].first_chunk().expect("a sector")).preamble().expect("one");
+    let start = crate::utc::moment(Instant::from_millis(first.start_ms));
+    let words = format!("between 1:39.9, where 00001_00.HUM ends, and {start}, where 00002_03.HUM begins");
+    // With a span that reaches into none of them, and into both.
+    for (at, span) in [("101", "0.5"), ("200", "1"), ("200", "190")] {
+        let told = told(&files, &[at, "--span", span]);
+        assert_eq!(told, format!("nothing was recorded {words}"), "{at}, {span}");
+    }
+    assert!(told(&files, &["30000"]).contains("ends at 6:39.9; for another session"), "no pause");
+    // Of a log between them that was left out nobody said what is in it.
+    let mut more = files.clone();
+    more.insert(1, ("00001_01.HUM".to_owned(), recorded(7, 10)));
+    let told = told(&more, &["200", "--span", "1", "00001_00.HUM", "00002_03.HUM", "00002_04.HUM"]);
+    assert!(told.contains("as far as it was asked for, has nothing between 1:39.9 and"), "{told}");
+}
+
+#[test]
 fn a_file_that_begins_in_the_middle_of_a_group_is_read_with_the_one_before_it() {
     let log = recorded(7, 400);
     let cut = log.len() - 5 * SECTOR_BYTES;

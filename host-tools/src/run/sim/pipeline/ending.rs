@@ -75,10 +75,14 @@ impl Pipeline<'_, '_> {
         self.slot_status.read().state == CardState::Full
     }
 
-    /// Whether the card no longer holds all that was logged: old segments were overwritten.
+    /// Whether the card had no room, so that the oldest segments were overwritten.
     pub(in crate::run::sim) fn has_overwritten(&self) -> bool {
-        let card = self.slot_status.read();
-        card.segments_overwritten + card.segments_released > 0
+        self.slot_status.read().segments_overwritten > 0
+    }
+
+    /// Whether segments of this power-on were not kept, because the vehicle was disarmed.
+    pub(in crate::run::sim) fn has_released(&self) -> bool {
+        self.slot_status.read().segments_released > 0
     }
 }
 
