@@ -201,7 +201,7 @@ fn held(one: &Known<'_>, lower: &Lower<'_>, card: &Card) -> Held {
 /// the card has nothing else, and fails its check; behind it the older log goes on. A head that went wrong differs in some bytes of the
 /// session only, or has zeros or ones there.
 fn is_torn(one: &Known<'_>, card: &Card) -> bool {
-    let first = || one.log.blocks().next_block().ok().flatten();
+    let first = || one.log.blocks().next_block().ok().flatten().copied();
     let Some(block) = (one.at == 1).then(first).flatten() else { return false };
     let torn = Sector::from_bytes(block);
     let (new, old) = (torn.session().to_le_bytes(), one.first.session.to_le_bytes());

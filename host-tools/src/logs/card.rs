@@ -238,7 +238,7 @@ fn first_block<T>(
     let lost = lost(path, extents);
     let mut blocks = lost.blocks();
     while let Some(block) = blocks.next_block()? {
-        if let Some(made) = look(&block) {
+        if let Some(made) = look(block) {
             return Ok(Some(made));
         }
     }

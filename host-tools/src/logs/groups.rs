@@ -34,7 +34,7 @@ fn begins_at(blocks: &Blocks<'_>, mut at: u64, last: Option<Found>) -> Result<Op
         let blocks = std::iter::from_fn(|| {
             let block = rest.next_block().transpose()?;
             at += 1;
-            Some(block.map(|block| (at - 1, block)))
+            Some(block.map(|block| (at - 1, *block)))
         });
         if last.is_resumed(blocks)? {
             return Ok(None);
@@ -226,7 +226,7 @@ impl<'a> Groups<'a> {
         if let Some(beside) = self.beside.take() {
             return Ok(Some(beside));
         }
-        let (Some(block), (file, at)) = (self.blocks.next_block()?, self.blocks.place()) else {
+        let (Some(block), (file, at)) = (self.blocks.next_block()?.copied(), self.blocks.place()) else {
             return Ok(None);
         };
         let Some((of, repairs)) = &mut self.repairs else { return Ok(Some(block)) };

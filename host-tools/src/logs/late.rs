@@ -98,9 +98,9 @@ fn begun(log: &Log, first: &Header) -> Result<Vec<Option<Instant>>> {
             let Some(block) = blocks.next_block()? else { break };
             // What a file held before is of another session, or older.
             let is_own = |header: &Header| header.session == first.session && header.number >= first.number;
-            let Some(header) = Header::read(&block).ok().filter(is_own) else { break };
+            let Some(header) = Header::read(block).ok().filter(is_own) else { break };
             if header.starts_group() {
-                start = Sector::from_bytes(block).preamble();
+                start = Sector::from_bytes(*block).preamble();
                 break;
             }
         }
@@ -113,7 +113,7 @@ fn begun(log: &Log, first: &Header) -> Result<Vec<Option<Instant>>> {
 fn begins_with(log: &Log, first: &Header) -> Result<bool> {
     let mut blocks = log.blocks();
     for is_second in [false, true] {
-        let header = blocks.next_block()?.and_then(|block| Header::read(&block).ok());
+        let header = blocks.next_block()?.and_then(|block| Header::read(block).ok());
         let header = header.filter(|header| header.partial || !is_second);
         if header.is_some_and(|header| (header.session, header.number) == (first.session, first.number)) {
             return Ok(true);

@@ -85,16 +85,14 @@ impl<'a> Blocks<'a> {
     }
 
     /// The next block; `None` at the end.
-    pub fn next_block(&mut self) -> Result<Option<[u8; BLOCK_BYTES]>> {
-        loop {
-            if let Some(block) = self.buffer.get(self.at..self.at + BLOCK_BYTES) {
-                self.at += BLOCK_BYTES;
-                return Ok(block.try_into().ok());
-            }
+    pub fn next_block(&mut self) -> Result<Option<&[u8; BLOCK_BYTES]>> {
+        while self.at + BLOCK_BYTES > self.buffer.len() {
             if !self.refill()? {
                 return Ok(None);
             }
         }
+        self.at += BLOCK_BYTES;
+        Ok(self.buffer.get(self.at - BLOCK_BYTES..).and_then(|rest| rest.first_chunk()))
     }
 
     /// Where the last block lies: its piece, and its place in that, in blocks.

@@ -84,7 +84,7 @@ impl Repairs {
             if let Some(number) = found.in_place(base, at)
                 && let Some((column, _)) = columns.get_mut(&column_of(at))
             {
-                column.sector(number, &block);
+                column.sector(number, block);
             }
             at += 1;
         }
@@ -141,7 +141,7 @@ impl Found {
         let (mut bases, mut begins, mut closed) = (BTreeMap::<u32, u32>::new(), None, None);
         let (mut blocks, mut at) = (file.blocks(), 0_u32);
         while let Some(block) = blocks.next_block()? {
-            let header = Header::read(&block).ok();
+            let header = Header::read(block).ok();
             if let Some(header) = header {
                 session.get_or_insert(header.session);
             }
@@ -154,9 +154,9 @@ impl Found {
                 *bases.entry(own.number.wrapping_sub(at)).or_default() += 1;
                 closed = closed.or(own.closed.then_some(own.number));
             } else if header.is_none()
-                && let Some(one) = Parity::read(&block)
+                && let Some(one) = Parity::read(block)
             {
-                parity.push((one, block));
+                parity.push((one, *block));
             }
             numbers.push(own.map(|own| own.number));
             at = at.saturating_add(1);

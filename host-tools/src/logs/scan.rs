@@ -135,7 +135,7 @@ pub(super) fn scan(path: &Path, length: u64, files: &Files) -> Result<Scan> {
     let bar = progress::bytes(Some(length), &format!("{}: looking at every block", path.display()));
     let mut at: u64 = 0;
     while let Some(block) = blocks.next_block()? {
-        if let Ok(header) = Header::read(&block)
+        if let Ok(header) = Header::read(block)
             && !files.has(header.session, at)
         {
             sessions.sector(&header, at);

@@ -233,7 +233,7 @@ pub fn first_session(log: &Log) -> Option<u32> {
 fn first_sector(log: &Log) -> Option<(usize, Header)> {
     let mut blocks = log.blocks();
     for at in 0..LOOK_BLOCKS {
-        if let Ok(header) = Header::read(&blocks.next_block().ok()??) {
+        if let Ok(header) = Header::read(blocks.next_block().ok()??) {
             return Some((at, header));
         }
     }

@@ -43,6 +43,8 @@ struct Inner {
     counts: Counts,
     at_time: Vec<(u64, Event)>,
     at_byte: Vec<(u64, Event)>,
+    /// The soonest of each: looked at for every byte.
+    soonest: (u64, u64),
     violations: BTreeMap<String, u32>,
     /// The processor has stopped once so many bytes went over the bus: no more of them do.
     stop_at: Option<u64>,
@@ -63,6 +65,7 @@ impl Slot {
             counts: Counts::default(),
             at_time: Vec::new(),
             at_byte: Vec::new(),
+            soonest: (u64::MAX, u64::MAX),
             violations: BTreeMap::new(),
             stop_at: None,
         })))
@@ -70,12 +73,16 @@ impl Slot {
 
     /// At this moment this happens.
     pub fn at(&self, ns: u64, event: Event) {
-        self.0.borrow_mut().at_time.push((ns, event));
+        let mut inner = self.0.borrow_mut();
+        inner.at_time.push((ns, event));
+        inner.find_soonest();
     }
 
     /// When so many bytes went over the bus this happens.
     pub fn at_byte(&self, bytes: u64, event: Event) {
-        self.0.borrow_mut().at_byte.push((bytes, event));
+        let mut inner = self.0.borrow_mut();
+        inner.at_byte.push((bytes, event));
+        inner.find_soonest();
     }
 
     /// From so many bytes on nothing goes over the bus any more, as when the processor restarts; `None`: it does again.
@@ -153,9 +160,14 @@ impl Inner {
         }
     }
 
+    fn find_soonest(&mut self) {
+        let soonest = |events: &[(u64, Event)]| events.iter().map(|(at, _)| *at).min().unwrap_or(u64::MAX);
+        self.soonest = (soonest(&self.at_time), soonest(&self.at_byte));
+    }
+
     fn happen_what_is_due(&mut self) {
         let (now_ns, bytes) = (self.now_ns, self.counts.bytes);
-        if self.at_time.is_empty() && self.at_byte.is_empty() {
+        if now_ns < self.soonest.0 && bytes < self.soonest.1 {
             return;
         }
         let (mut due, later): (Vec<_>, Vec<_>) =
@@ -164,6 +176,7 @@ impl Inner {
         let (now, later): (Vec<_>, Vec<_>) =
             std::mem::take(&mut self.at_byte).into_iter().partition(|(at, _)| *at <= bytes);
         self.at_byte = later;
+        self.find_soonest();
         due.sort_by_key(|(at, _)| *at);
         for (_, event) in due.into_iter().chain(now) {
             self.happen(event);

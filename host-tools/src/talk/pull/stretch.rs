@@ -55,7 +55,7 @@ impl Reading {
         let pieces = stretches.iter().map(Stretch::piece).collect();
         let log = Log { name, files: Vec::new(), pieces, session: None, left_over: false };
         Ok(Self {
-            begins: log.blocks().next_block()?.is_some_and(|block| Header::read(&block).is_ok()),
+            begins: log.blocks().next_block()?.is_some_and(|block| Header::read(block).is_ok()),
             last: stretches.last().cloned(),
             overview: Overview::verified(&log)?,
         })
