@@ -104,7 +104,7 @@ export const usage = () => {
         const [known, word] = DUE[component.status];
         level.set(partial ? "stale" : known, partial ? "life unknown" : word);
         const since = component.life ? "" : " in this session",
-          part = used == null ? "no limit" : `${fixed(used, 0)} % of ${component.limit} used`;
+          part = used == null ? "no limit" : `${fixed(used, 0)} % used of ${component.limit}`;
         say(text, `${part}, ${fixed(component.flight_h, 2)} h, ${whole(component.flights)} flights${since}`);
       });
     },
