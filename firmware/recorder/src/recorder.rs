@@ -290,8 +290,7 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
     /// Writes the sector that waits first, and of those behind it so many as belong there, `most` in all.
     fn try_write(&mut self, now: Instant, first: &Sector, most: usize) -> Result<(), CardError<D::Error>> {
         let number = first.number();
-        let keep = self.status.waiting().filter(|(from, _)| number >= *from).map(|(_, keep)| keep);
-        self.segments.ring.keep(keep);
+        self.segments.ring.keep(self.status.waiting().filter(|(from, _)| number >= *from));
         if self.must_move(now, first)? {
             self.next_segment(now, Some(first))?;
         }
@@ -319,7 +318,9 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
         let written = self.write_sealed(&log, at, count)?;
         self.status.count_blocks(written as u32);
         self.segments.log = Some(log);
+        self.segments.ring.has_begun();
         let is_closed = self.add_to_parity(now, at, written);
+        self.segments.is_over |= is_closed;
         self.drop_written(written);
         if is_closed || self.held.parity.borrow().is_overdue(now) {
             self.write_parity();

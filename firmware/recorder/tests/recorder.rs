@@ -4,6 +4,7 @@ mod common;
 
 use std::cell::RefCell;
 use std::collections::VecDeque;
+use std::ops::Range;
 use std::rc::Rc;
 
 use common::{MIB_BLOCKS, MemCard, held};
@@ -524,6 +525,81 @@ fn while_waiting_a_group_ends_in_the_log_in_which_it_began() {
 }
 
 /// Whatever the session before wrote, the next start finds where it ended.
+/// Records 50 s of a vehicle of which the last 5 s before each arming are kept, while the card is out for a time; when which sector was
+/// begun.
+fn by_arming(device: &MemCard, armed: &[Range<u64>], out: &Range<u64>) -> Vec<u64> {
+    let status = CardStatus::new();
+    status.wait_from(0, Span::from_secs(5));
+    let mut recorder = Recorder::new(device.clone(), &status, held(), 7);
+    let (mut writer, mut sink) = (Box::new(Writer::new()), Sink(Vec::new()));
+    let (mut begun, mut waiting, mut retry_ms) = (Vec::new(), VecDeque::new(), 0);
+    for now_ms in (0..50_000).step_by(50) {
+        if armed.iter().any(|armed| armed.start == now_ms) {
+            status.keep_all();
+        }
+        if armed.iter().any(|armed| armed.end == now_ms) {
+            assert!(writer.finish(&mut sink));
+            status.wait_from(writer.counters().sectors as u32, Span::from_secs(5));
+        }
+        if status.take_group_wanted() {
+            assert!(writer.restart(&mut sink));
+        }
+        let noise = std::array::from_fn::<u8, 100, _>(|at| (now_ms * 31 + at as u64 * 7) as u8);
+        writer.frame(Instant::from_millis(now_ms), &noise, false, &mut sink).expect("there is room");
+        begun.resize(writer.counters().sectors as usize + 1, now_ms);
+        waiting.extend(sink.0.drain(..));
+        device.broken.set(out.contains(&now_ms));
+        while now_ms >= retry_ms
+            && let Some(sector) = waiting.front()
+        {
+            match put(&mut recorder, Instant::from_millis(now_ms), sector) {
+                Written::Later => retry_ms = now_ms + 100,
+                _ => drop(waiting.pop_front()),
+            }
+        }
+    }
+    assert!(waiting.is_empty() && status.read().frames_lost == 0);
+    begun
+}
+
+/// A vehicle is armed again before the end of the log before is on the card: the next log begins there all the same.
+#[test]
+fn behind_the_end_of_a_log_another_one_begins_also_where_the_vehicle_is_armed_again() {
+    for out in [20_000..21_000, 22_000..33_000, 24_000..31_000, 24_000..29_000] {
+        let device = MemCard::formatted(64 * MIB_BLOCKS);
+        by_arming(&device, &[18_000..25_000, 30_000..40_000], &out);
+        let all = stored(&device);
+        let closed: Vec<_> = all.iter().filter(|(.., header)| header.closed && !header.partial).collect();
+        assert_eq!(closed.len(), 2, "{out:?}");
+        for (name, _, header) in closed {
+            let next = all.iter().filter(|(.., next)| next.number == header.number + 1);
+            let next: Vec<_> = next.map(|(name, at, _)| (*name, *at)).collect();
+            let begins = LogName { session: name.session + 1, segment: 0 };
+            assert_eq!(next.first(), Some(&(begins, 0)), "{out:?}: {next:?}");
+            let end = all.iter().filter(|(other, ..)| other.session == name.session);
+            assert!(end.filter(|(.., other)| other.number > header.number).count() == 0, "{out:?}");
+        }
+    }
+}
+
+/// The card comes back when the vehicle is armed already, or was disarmed again: what came last before the arming stays.
+#[test]
+fn what_came_last_before_the_arming_stays_where_the_card_is_out_meanwhile() {
+    for armed in [30_000..49_000, 30_000..33_000] {
+        for out in [29_000..29_500, 28_000..31_000, 29_900..36_000, 28_000..42_000] {
+            let device = MemCard::formatted(64 * MIB_BLOCKS);
+            let begun = by_arming(&device, std::slice::from_ref(&armed), &out);
+            let mut found = numbers(&device);
+            found.sort_unstable();
+            found.dedup();
+            let last = begun.partition_point(|at| *at < armed.start) as u32 - 1;
+            let before = (0..last).rev().take_while(|number| found.binary_search(number).is_ok()).last();
+            let kept = before.map(|number| armed.start - begun[number as usize]);
+            assert!(kept >= Some(5_000), "{armed:?}, out {out:?}: {kept:?} ms are kept");
+        }
+    }
+}
+
 #[test]
 fn the_next_start_finds_where_the_session_before_ended() {
     for count in [0_u32, 1, 7, 100, 2_000, 30_000] {

@@ -42,6 +42,8 @@ pub(super) struct Segments<'a> {
     pub(super) is_open: bool,
     /// The segments of a disarmed vehicle.
     pub(super) ring: Ring,
+    /// The log ended in order with the sector that was written last.
+    pub(super) is_over: bool,
     /// The newest segment that was on the card before the session, until it was looked at.
     earlier: Option<LogName>,
     /// The open segment has a date in its directory entry, or there was trouble with it.
@@ -50,7 +52,17 @@ pub(super) struct Segments<'a> {
 
 impl<'a> Segments<'a> {
     pub(super) const fn new(status: &'a CardStatus, entropy: u32) -> Self {
-        Self { status, entropy, log: None, is_open: false, ring: Ring::new(), earlier: None, is_dated: false }
+        let ring = Ring::new();
+        Self {
+            status,
+            entropy,
+            log: None,
+            is_open: false,
+            ring,
+            is_over: false,
+            earlier: None,
+            is_dated: false,
+        }
     }
 
     /// A number for a card that is formatted now.
@@ -126,11 +138,12 @@ impl<'a> Segments<'a> {
         self.log.is_some_and(|log| log.base.is_some())
     }
 
-    /// Whether a log of its own begins with this sector: what is recorded around one arming is one, and its first group is whole.
+    /// Whether a log of its own begins with this sector: what is recorded around one arming is one, and its first group is whole. That
+    /// is so too where the vehicle was armed again before the end of the log before was on the card.
     pub(super) fn begins_log(&self, sector: &Sector) -> bool {
         let is_first = |log: Log| log.base.is_none() && log.name.segment == 0;
-        let waits_anew = self.ring.is_on() && self.ring.is_empty() && sector.starts_group();
-        waits_anew && !self.log.is_some_and(is_first)
+        let waits_anew = self.ring.is_on() && self.ring.is_empty();
+        (waits_anew || self.is_over) && sector.starts_group() && !self.log.is_some_and(is_first)
     }
 
     /// Opens the segment after it, which begins with this sector: of the next log, where that begins a log. Without one it is a short
@@ -151,6 +164,7 @@ impl<'a> Segments<'a> {
     /// without that no reader could do anything with it. The next group then begins a log.
     pub(super) fn begin_segment(&mut self, now: Instant, name: LogName, sector: &Sector) {
         if sector.starts_group() {
+            self.is_over = false;
             self.ring.begin(name, now);
         } else {
             self.ring.clear();
@@ -167,7 +181,7 @@ impl<'a> Segments<'a> {
         card: &mut Card<'_, D>,
     ) -> Result<(), CardError<D::Error>> {
         let bytes_max = if is_short || self.ring.is_on() { ring::SEGMENT_BYTES } else { SEGMENT_BYTES_MAX };
-        let overwrote = match self.ring.oldest(now) {
+        let overwrote = match self.ring.oldest(now, self.status.waiting()) {
             Some(old) => self.recycle(old, name, card, bytes_max)?,
             None => self.create_or_overwrite(name, card, bytes_max)?,
         };
