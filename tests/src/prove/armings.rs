@@ -314,7 +314,7 @@ fn files_of(log: &Log) -> Result<Vec<(String, Vec<u8>)>> {
         let (mut blocks, mut bytes, mut end, mut base) = (one.blocks(), Vec::new(), 0, None);
         while let Some(block) = blocks.next_block()? {
             let at = (bytes.len() / BLOCK) as u32;
-            bytes.extend_from_slice(&block);
+            bytes.extend_from_slice(block);
             // What the file held before lies in another order.
             if let Ok(header) = Header::read(&block)
                 && *base.get_or_insert(header.number) + at == header.number

@@ -203,10 +203,10 @@ impl Subject {
         let (mut bytes, mut parity) = (Vec::new(), Vec::new());
         let mut blocks = log.blocks();
         while let Some(block) = blocks.next_block()? {
-            if Header::read(&block).is_ok() {
-                bytes.extend_from_slice(&block);
-            } else if Parity::read(&block).is_some() {
-                parity.extend_from_slice(&block);
+            if Header::read(block).is_ok() {
+                bytes.extend_from_slice(block);
+            } else if Parity::read(block).is_some() {
+                parity.extend_from_slice(block);
             }
         }
         ensure!(!parity.is_empty(), "there is no parity");
