@@ -316,7 +316,7 @@ fn files_of(log: &Log) -> Result<Vec<(String, Vec<u8>)>> {
             let at = (bytes.len() / BLOCK) as u32;
             bytes.extend_from_slice(block);
             // What the file held before lies in another order.
-            if let Ok(header) = Header::read(&block)
+            if let Ok(header) = Header::read(block)
                 && *base.get_or_insert(header.number) + at == header.number
             {
                 end = bytes.len();
