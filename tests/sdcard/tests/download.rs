@@ -43,10 +43,10 @@ fn full() -> Medium {
     let (status, held) = (CardStatus::new(), HeldBlocks::new());
     let mounted = Card::mount(medium.clone(), &status, &held);
     let mut card = mounted.map_err(|(_, error)| error.to_string()).expect("it is in order");
-    for segment in 0.. {
-        if card.create(LogName { session: 3, segment }, 2 * 1024 * 1024).is_err() {
-            break;
-        }
+    // The short ones too with which the recorder goes on when a card is back.
+    let mut segments = (0..).map(|segment| LogName { session: 3, segment });
+    for kib in [2 * 1024, 128] {
+        while segments.next().is_some_and(|name| card.create(name, kib * 1024).is_ok()) {}
     }
     medium
 }
