@@ -15,7 +15,7 @@ use hums_link as link;
 
 use crate::ending::Ending;
 use crate::followed::Logged;
-use crate::logs::Log;
+use crate::logs::{Log, marks};
 use crate::mavlink::frame::{Check, Peek, peek};
 use crate::names::counter_name;
 use crate::part;
@@ -228,8 +228,12 @@ pub struct Contents {
     pub checked_here: bool,
     /// How much was judged, where that was looked at: of a log that its recorder checked only where few kinds of messages are in it.
     pub judged: Option<JudgedChecks>,
+    /// The vehicle was in the air when it was heard first.
+    pub begins_in_air: bool,
     /// The last flight goes on at its end, in a recording that was judged here.
     pub ends_in_air: Option<EndsInAir>,
+    /// Part of the time was not recorded, as its recorder says or as is seen, in a recording of another program.
+    pub is_lossy: bool,
     /// Seconds in the air that the box had counted where it began a log, as the first counters tell.
     pub flight_before_s: Option<f64>,
     /// The latest values of the usage counters, and when they were so.
@@ -356,6 +360,7 @@ impl Contents {
                 });
             }
             Record::Vehicle(vehicle) => self.vehicle = Some(*vehicle),
+            Record::Event(event) if event.number == marks::RESUMED => self.begins_in_air = true,
             Record::Finding(finding) => {
                 self.findings_count += 1;
                 if self.findings.len() < LISTED_MAX {
@@ -421,6 +426,7 @@ impl Contents {
         self.records += next.records;
         self.boot = self.boot.take().or(next.boot);
         self.vehicle = next.vehicle.or(self.vehicle);
+        self.begins_in_air |= next.begins_in_air;
         self.findings_count += next.findings_count;
         let room = LISTED_MAX.saturating_sub(self.findings.len());
         self.findings.extend(next.findings.into_iter().take(room));

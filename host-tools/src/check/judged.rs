@@ -10,7 +10,7 @@ use hums_core::vehicle::Vehicle;
 use super::flights::Flight;
 use super::problem::{LISTED_MAX, Problem};
 use crate::source::epochs::Epochs;
-use crate::source::item::{About, Gap};
+use crate::source::item::{About, Cause, Gap};
 use crate::source::told::Finding;
 use crate::summary::{EndsInAir, JudgedChecks};
 
@@ -111,6 +111,16 @@ impl Judged {
     /// The vehicle, as it was known at the end.
     pub fn vehicle(&self) -> &Vehicle {
         self.monitor.vehicle()
+    }
+
+    /// Whether the vehicle was in the air when it was heard first.
+    pub fn begins_in_air(&self) -> bool {
+        self.flights.first().is_some_and(|flight| !flight.took_off)
+    }
+
+    /// Whether the recorder says itself, or it is seen, that it did not write all.
+    pub fn is_lossy(&self) -> bool {
+        self.gaps.iter().any(|gap| gap.cause == Cause::Lost && !gap.is_noise())
     }
 
     /// How long it was in the air, in all flights together.

@@ -192,7 +192,7 @@ fn go_on(overview: &mut Overview, judged: &Judged) {
 /// What the monitor here counted.
 fn counters(judged: &Judged) -> Vec<(String, f64)> {
     // What was in the air when it was heard first was taken to stand until that was seen.
-    let begins_in_air = judged.flights.first().is_some_and(|flight| !flight.took_off);
+    let begins_in_air = judged.begins_in_air();
     let monitor = &judged.monitor;
     let mut counters = Vec::new();
     monitor.for_each_counter(|number, value| {
@@ -212,7 +212,9 @@ fn counters(judged: &Judged) -> Vec<(String, f64)> {
 fn fill(contents: &mut Contents, judged: Judged) {
     contents.unheard = judged.unheard();
     contents.judged = Some(judged.checks());
+    contents.begins_in_air = judged.begins_in_air();
     contents.ends_in_air = judged.ends_in_air;
+    contents.is_lossy = judged.is_lossy();
     let is_judged = judged.worst().is_some();
     let counters = counters(&judged);
     let Judged { monitor, findings, findings_count, span, remarks, .. } = judged;

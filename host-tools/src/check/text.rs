@@ -132,11 +132,6 @@ fn state(checked: &Checked) -> State {
     }
 }
 
-/// Whether the recorder says itself, or it is seen, that it did not write all.
-fn is_lossy(judged: &Judged) -> bool {
-    judged.gaps.iter().any(|gap| gap.cause == Cause::Lost && !gap.is_noise())
-}
-
 /// What the verdict is not about: the end of its line.
 fn but(checked: &Checked) -> String {
     let ends = if checked.judged.ends_in_air.is_some() { "; the log ends in the air" } else { "" };
@@ -146,7 +141,7 @@ fn but(checked: &Checked) -> String {
         State::Damaged => "; part of the log is missing or damaged, and was not judged".to_owned(),
         State::Lossy => "; part of the time was not recorded".to_owned(),
         State::NotFrames => "; bytes of no frame are in it".to_owned(),
-        State::NotProved if is_lossy(&checked.judged) => {
+        State::NotProved if checked.judged.is_lossy() => {
             "; part of the time was not recorded; the log is not proved to be whole".to_owned()
         }
         State::NotProved => "; the log is not proved to be whole".to_owned(),

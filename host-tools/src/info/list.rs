@@ -41,18 +41,23 @@ pub fn run(args: &cli::Ls) -> Result<Outcome> {
         }
     }
     // In the order in which they began; what does not tell stays behind the one before it.
-    let (mut rows, mut begun_us) = (Vec::new(), 0);
+    let (mut lines, mut elements, mut begun_us) = (Vec::new(), Vec::new(), 0);
     let read = each(&found, None, |overview| {
         begun_us = start_utc_us(overview).unwrap_or(begun_us);
-        rows.push((begun_us, LogJson::of(overview), line(overview, width)));
+        if args.json {
+            elements.push((begun_us, LogJson::of(overview)));
+        } else {
+            lines.push((begun_us, line(overview, width)));
+        }
         Ok(())
     })?;
-    rows.sort_by_key(|(begun_us, ..)| *begun_us);
-    for (_, json, line) in &rows {
-        match &mut list {
-            Some(list) => list.element(json)?,
-            None => output::line(line)?,
-        }
+    lines.sort_by_key(|(begun_us, _)| *begun_us);
+    elements.sort_by_key(|(begun_us, _)| *begun_us);
+    for (_, line) in &lines {
+        output::line(line)?;
+    }
+    for (_, element) in &elements {
+        list.as_mut().map_or(Ok(()), |list| list.element(element))?;
     }
     if let Some(list) = list {
         list.end()?;
@@ -81,8 +86,12 @@ struct LogJson {
     checks_judged: Option<usize>,
     /// Of so many.
     checks_all: Option<usize>,
+    /// The vehicle was in the air when it was heard first.
+    begins_in_air: bool,
     /// It ends in the air, as far as that was looked at.
     ends_in_air: bool,
+    /// Part of the time was not recorded, in a recording of another program.
+    lossy: bool,
     bytes: u64,
     /// Nothing is lost, damaged or not proved.
     whole: bool,
@@ -116,7 +125,9 @@ impl LogJson {
             worst,
             checks_judged: log.contents.judged.map(|checks| checks.judged),
             checks_all: log.contents.judged.map(|checks| checks.all),
+            begins_in_air: log.contents.begins_in_air,
             ends_in_air: log.contents.ends_in_air.is_some(),
+            lossy: log.contents.is_lossy,
             bytes: bytes(log),
             whole: log.is_sound(),
         }
@@ -146,11 +157,17 @@ fn line(log: &Overview, width: usize) -> String {
         // Writing to a `String` cannot fail.
         let _ = write!(text, "; {}", word(&aside));
     }
+    if log.contents.begins_in_air {
+        let _ = write!(text, "; {}", warning("begins in the air"));
+    }
     if log.contents.ends_in_air.is_some() {
         let _ = write!(text, "; {}", warning("ends in the air"));
     } else if log.ending.summary.marks.moved.is_some() && !log.is_sound() {
         // The box marks arming, take-off and landing.
         let _ = write!(text, "; {}", warning("ends armed or in the air"));
+    }
+    if log.contents.is_lossy {
+        let _ = write!(text, "; {}", warning("part of the time was not recorded"));
     }
     if !log.is_sound() {
         // What is no log of ours is judged by another command.
@@ -274,6 +291,14 @@ mod tests {
         assert!(line(&log, 5).contains("   3:12 "), "on the ground nothing is counted after that");
         log.ending.summary.marks.moved = Some(Instant::from_millis(40_000));
         assert!(line(&log, 5).contains("  >3:12 "), "{}", line(&log, 5));
+    }
+
+    #[test]
+    fn what_is_missing_at_its_beginning_or_within_it_stands_in_its_line() {
+        let mut log = Overview { format: Some(Format::Tlog), ..Overview::default() };
+        (log.contents.begins_in_air, log.contents.is_lossy) = (true, true);
+        let line = crate::colour::shown(&line(&log, 5), false).into_owned();
+        assert!(line.ends_with("; begins in the air; part of the time was not recorded"), "{line}");
     }
 
     #[test]

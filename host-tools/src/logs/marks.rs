@@ -11,6 +11,8 @@ use crate::loss::lost;
 /// Numbers of the events that say that the vehicle moves.
 const ARMED: u8 = 1;
 const TAKE_OFF: u8 = 3;
+/// The box was started in the air.
+pub const RESUMED: u8 = 14;
 
 /// The note that a packed log begins with.
 pub const PACKED: &str = "packed on a PC by hums pack";
@@ -47,7 +49,7 @@ impl Marks {
                 self.wrong += u64::from(mark.frames != frames);
                 (self.last, self.moved) = (Some((at, mark.why)), None);
             }
-            Record::Event(event) if matches!(event.number, ARMED | TAKE_OFF) => {
+            Record::Event(event) if matches!(event.number, ARMED | TAKE_OFF | RESUMED) => {
                 self.moved = self.moved.or(Some(at));
             }
             Record::Loss(loss) => self.lost = self.lost.saturating_add(lost(loss)),

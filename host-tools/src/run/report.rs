@@ -5,7 +5,7 @@ use std::path::Path;
 
 use anyhow::Result;
 use hums_blackbox::record::Stats;
-use hums_core::health;
+use hums_core::health::{self, Level};
 use hums_core::time::Instant;
 use serde::Serialize;
 
@@ -122,6 +122,13 @@ pub struct Finding {
     pub value: Option<f64>,
     /// Its unit.
     pub unit: String,
+}
+
+impl Finding {
+    /// What people read of its level: what no value tells is not good, it has ended.
+    fn word(&self) -> &str {
+        if self.level == Level::Ok.name() && self.value.is_none() { "ended" } else { &self.level }
+    }
 }
 
 impl From<&health::Finding> for Finding {
@@ -261,7 +268,8 @@ impl Report {
             let _ = writeln!(text, "power    was cut, as asked");
         }
         for finding in &self.findings {
-            let Finding { subsystem, check, instance, level, time_s, .. } = finding;
+            let Finding { subsystem, check, instance, time_s, .. } = finding;
+            let level = finding.word();
             let at = moment(Instant::from_micros((time_s * 1e6).round() as u64));
             let name = check_name(check, *instance);
             let _ = writeln!(text, "finding  {at:>9}  {level:<8}  {subsystem}: {name} [{check}]");
