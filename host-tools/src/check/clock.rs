@@ -50,6 +50,11 @@ impl Clock {
         self.next = Some(next.max(whole(to + if length >= SETTLE { SETTLE } else { TICK })));
     }
 
+    /// The monitor's time now.
+    pub(super) const fn now(&self) -> Instant {
+        self.reached
+    }
+
     /// The monitor's time at a time of the recording; it never falls.
     pub(super) fn monitor(&mut self, at: Instant) -> Instant {
         let behind = Instant::from_micros(at.as_micros().saturating_sub(self.behind.as_micros()));

@@ -10,6 +10,7 @@ use std::collections::BTreeMap;
 use hums_core::Monitor;
 use hums_core::baseline::Baselines;
 use hums_core::cause::{Alert, Cause};
+use hums_core::flight::{Flight as FlightState, Phase};
 use hums_core::happening::Happening;
 use hums_core::health::{Level, Scope, vocabulary};
 use hums_core::monitor::TICK;
@@ -244,6 +245,12 @@ impl Judge {
     /// Which flight the vehicle is in, counted from 0 as in [`Judged::flights`].
     pub fn flight(&self) -> Option<usize> {
         self.flights.going_on()
+    }
+
+    /// What the vehicle was doing at the last item.
+    pub fn phase(&self) -> (&FlightState, Phase) {
+        let flight = self.monitor.flight();
+        (flight, flight.phase(self.clock.now(), self.monitor.vehicle()))
     }
 
     /// The limits that hold now.

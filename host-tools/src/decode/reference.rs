@@ -178,11 +178,6 @@ impl Reference {
         &self.vehicle
     }
 
-    /// Whether it flies, and since when.
-    pub const fn flight(&self) -> &Flight {
-        &self.flight
-    }
-
     /// When the vehicle was heard last.
     pub const fn heard(&self) -> Option<Instant> {
         self.heard

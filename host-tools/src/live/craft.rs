@@ -214,6 +214,7 @@ impl Craft {
         }
         if let Some(history) = history {
             history.sample(at, &self.reference, observation);
+            history.phase(at, self.monitor.flight(), self.phase(at));
             if let Observation::Vibration(_) = observation {
                 history.vibration_limit(at, self.monitor.vibration_limit());
             }

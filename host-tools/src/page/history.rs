@@ -11,6 +11,7 @@ use std::borrow::Cow;
 use std::collections::VecDeque;
 use std::fmt::Write as _;
 
+use hums_core::flight::{Flight, Phase};
 use hums_core::observation::{Autopilot, Observation, Source};
 use hums_core::params::Params;
 use hums_core::time::{Instant, Span};
@@ -208,14 +209,17 @@ impl History {
             self.autopilot = heartbeat.autopilot;
             self.modes.extend(at, modes::name(heartbeat), Span::ZERO);
         }
-        let flight = reference.flight();
-        let phase = flight.phase(at, reference.vehicle()).name();
+        self.samples.take(at, reference, observation);
+    }
+
+    /// Takes what the vehicle is doing, as its monitor sees it.
+    pub fn phase(&mut self, at: Instant, flight: &Flight, phase: Phase) {
+        let phase = Cow::Borrowed(phase.name());
         if flight.airborne() && !flight.was_on_ground() {
             // It was so before that was seen.
-            self.phases.begin_as(Cow::Borrowed(phase));
+            self.phases.begin_as(phase.clone());
         }
-        self.phases.extend(at, Cow::Borrowed(phase), PHASE_MIN);
-        self.samples.take(at, reference, observation);
+        self.phases.extend(at, phase, PHASE_MIN);
     }
 
     /// Takes the limit of the vibration, which moves with what is usual in the flight.

@@ -91,7 +91,12 @@ impl Samples {
                     push(Plot::Attitude, 5, Some(pitch.0.to_degrees()));
                     push(Plot::Heading, 3, Some(compass_deg(yaw.0)));
                 }
-                push(Plot::Altitude, 3, second.altitude.map(|metres| metres.0));
+                // Before it knows its altitude, it is 0.
+                push(
+                    Plot::Altitude,
+                    3,
+                    second.altitude.map(|metres| metres.0).filter(|metres| metres.abs() > 0.0),
+                );
             }
             Observation::Wanted(wanted) => {
                 push(Plot::Attitude, 2, Some(wanted.roll.0.to_degrees()));

@@ -144,6 +144,8 @@ impl Replay {
     fn observe(&mut self, at: Instant, source: Source, observation: &Observation, judge: &Judge) {
         if self.reference.observe(at, source, observation) {
             self.history.sample(at, &self.reference, observation);
+            let (flight, phase) = judge.phase();
+            self.history.phase(at, flight, phase);
             self.extents.take(at, judge.flight(), &self.reference);
             if let Observation::Vibration(_) = observation {
                 self.history.vibration_limit(at, judge.vibration_limit());
