@@ -6,6 +6,7 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use hums_blackbox::{Cause, Gap};
+use hums_core::health::Level;
 use hums_core::time::Instant;
 
 use super::json::{duration_s, vehicle};
@@ -173,16 +174,39 @@ fn findings_text(text: &mut String, log: &Overview) {
     }
     let _ = writeln!(text, "  findings {}{by}", contents.findings_count);
     let causes = causes(&contents.findings);
-    for (finding, cause) in contents.findings.iter().zip(&causes).take(SHOWN_MAX) {
-        let _ = writeln!(
-            text,
-            "    {:>11}  {:<8}  {}",
-            moment(finding.at),
-            level(if finding.is_unjudged() { "ended" } else { finding.level }),
-            word(&sentence(finding, contents.due(finding).as_ref(), cause.as_deref()))
-        );
+    let found: Vec<_> = contents.findings.iter().zip(&causes).collect();
+    let (mut lines, mut told) = (0, 0);
+    for row in found.chunk_by(|(one, _), (next, _)| silence(one).is_some() && silence(one) == silence(next)) {
+        let silence = row.first().filter(|_| row.len() >= ROW_MIN).and_then(|(first, _)| silence(first));
+        // One line for the row, or one for each.
+        let (each, size) =
+            if silence.is_some() { (row.get(..1).unwrap_or(row), row.len()) } else { (row, 1) };
+        for (finding, cause) in each.iter().take(SHOWN_MAX - lines) {
+            let words = match silence {
+                Some(words) => format!("{} checks {words}", row.len()),
+                None => sentence(finding, contents.due(finding).as_ref(), cause.as_deref()),
+            };
+            let level = level(if finding.is_unjudged() { "ended" } else { finding.level });
+            let _ = writeln!(text, "    {:>11}  {level:<8}  {}", moment(finding.at), word(&words));
+            (lines, told) = (lines + 1, told + size);
+        }
     }
-    more(text, contents.findings_count, contents.findings.len());
+    more(text, contents.findings_count, told);
+}
+
+/// So many changes in a row that say nothing but that data stopped, or came again, are told in a line.
+const ROW_MIN: usize = 4;
+
+/// What a change says that says nothing else.
+fn silence(finding: &FindingLine) -> Option<&'static str> {
+    let [ok, stale] = [Level::Ok.name(), Level::Stale.name()];
+    match (finding.previous, finding.level) {
+        (previous, level) if (previous, level) == (ok, stale) => Some("that were ok have no data"),
+        (previous, level) if (previous, level) == (stale, ok) && !finding.is_unjudged() => {
+            Some("have data again, and are ok")
+        }
+        _ => None,
+    }
 }
 
 /// What was found, the check that found it, the part that is due, and what explains it.
@@ -216,8 +240,8 @@ fn sentence(finding: &FindingLine, due: Option<&(String, Option<String>)>, cause
     sentence
 }
 
-fn more(text: &mut String, count: u64, listed: usize) {
-    let shown = listed.min(SHOWN_MAX) as u64;
+fn more(text: &mut String, count: u64, shown: usize) {
+    let shown = shown as u64;
     if count > shown {
         let _ = writeln!(
             text,
@@ -278,7 +302,11 @@ fn gaps_text(text: &mut String, log: &Overview) {
             gap.sectors_skipped
         );
     }
-    more(text, (summary.gaps + summary.losses).max(contents.gaps.len() as u64), contents.gaps.len());
+    more(
+        text,
+        (summary.gaps + summary.losses).max(contents.gaps.len() as u64),
+        contents.gaps.len().min(SHOWN_MAX),
+    );
     for loss in contents.losses.values() {
         let _ = writeln!(text, "  lost     {}", loss::told(loss));
     }
@@ -301,7 +329,11 @@ fn foreign_gaps(text: &mut String, log: &Overview) {
         };
         let _ = writeln!(text, "    {when}: {what}{place}{}", word(found));
     }
-    more(text, (summary.gaps + summary.losses).max(contents.gaps.len() as u64), contents.gaps.len());
+    more(
+        text,
+        (summary.gaps + summary.losses).max(contents.gaps.len() as u64),
+        contents.gaps.len().min(SHOWN_MAX),
+    );
 }
 
 /// The likeliest reason why something is missing.
@@ -358,6 +390,42 @@ mod tests {
         assert_eq!(charge, "computer: battery 1 charge state, low or unhealthy; was ok [batt_state]");
         let load = sentence(finding("load", 97.0, 95.0, "%"));
         assert!(load.contains(", 97 % (limit 95); was ok"), "{load}");
+    }
+
+    #[test]
+    fn a_silence_of_many_checks_is_a_line_and_what_was_wrong_then_another_one() {
+        let finding = |at_s: u64, check: &str, previous, level, value| FindingLine {
+            at: Instant::from_millis(at_s * 1_000),
+            subsystem: "structure",
+            check: check.to_owned(),
+            instance: 0,
+            level,
+            previous,
+            value,
+            limit: 1.0,
+            unit: String::new(),
+        };
+        let checks = ["vibration", "clipping", "load_factor", "roll", "pitch"];
+        let mut log = Overview::default();
+        let silent = checks.map(|check| finding(84, check, "ok", "stale", f32::NAN));
+        let heard = checks.map(|check| finding(95, check, "stale", "ok", 0.5));
+        log.contents.findings.extend(silent);
+        log.contents.findings.push(finding(90, "cell_voltage", "critical", "stale", f32::NAN));
+        log.contents.findings.extend(heard);
+        log.contents.findings_count = log.contents.findings.len() as u64;
+        let mut text = String::new();
+        findings_text(&mut text, &log);
+        let text = crate::colour::shown(&text, false);
+        let lines: Vec<&str> = text.lines().map(str::trim).collect();
+        let [_, silent, wrong, heard] = lines.as_slice() else { panic!("{text}") };
+        assert_eq!(*silent, "1:24.0  stale     5 checks that were ok have no data");
+        assert!(wrong.starts_with("1:30.0  stale     structure: battery 1 cell voltage;"), "{wrong}");
+        assert_eq!(*heard, "1:35.0  ok        5 checks have data again, and are ok");
+        // Three in a row are told one by one.
+        log.contents.findings.truncate(3);
+        let mut text = String::new();
+        findings_text(&mut text, &log);
+        assert!(text.contains("structure: vibration") && text.contains("… and 8 more"), "{text}");
     }
 
     #[test]
