@@ -596,9 +596,11 @@ impl Overview {
     }
 
     /// When the counters of its session were stored, where the vehicle was armed or in the air after that: they are of the time until then.
+    /// A log that ends soon after a touch-down may lack the landing, with which they are stored.
     pub fn counted_until(&self) -> Option<Instant> {
         let summary = &self.ending.summary;
-        let last = summary.last.filter(|_| summary.marks.moved.is_some())?;
+        let flew = summary.marks.moved.is_some() || summary.marks.took_off == Some(true);
+        let last = summary.last.filter(|_| flew)?;
         self.contents.usage_at.filter(|at| last.since(*at) >= COUNTED_LATE)
     }
 

@@ -164,6 +164,40 @@ fn a_card_that_is_out_while_the_vehicle_waits_costs_nothing() {
     }
 }
 
+/// The card is out twice while the vehicle waits: each log says which one of the power-on it follows, together and alone.
+#[test]
+fn logs_between_which_the_card_was_out_follow_each_other() {
+    let dir = tempfile::tempdir().unwrap();
+    let params = dir.path().join("params");
+    fs::write(&params, "REC_MODE 1\nREC_BEFORE 30\n").unwrap();
+    let params = params.display().to_string();
+    let out = ["--card-out", "20..21.5", "--card-out", "30..30.5"];
+    let flags = [&["--card-size", "64", "--params", &params], &out[..]].concat();
+    let recording = Recording::make(Machine::Sim, &own(FLIGHT), &flags);
+    let said = readers(&recording.image(), 0);
+    assert_eq!(said.matches("it goes on where the one before it ends").count(), 2, "{said}");
+    assert_eq!(said.matches("disarmed").count(), 1, "what log 1 lacks of the beginning: {said}");
+    let folder = dir.path().join("copy");
+    fs::create_dir(&folder).unwrap();
+    fat::copy_files(&recording.image(), &folder);
+    for (number, other) in [("3", "00003_"), ("2", "00002_")] {
+        let out = dir.path().join("one/");
+        let decode =
+            ["decode".as_ref(), recording.image().as_os_str(), "--session".as_ref(), number.as_ref()];
+        let to = ["--format".as_ref(), "tlog".as_ref(), "-o".as_ref(), out.as_os_str()];
+        hums(decode.into_iter().chain(to)).expect_code(&[0]);
+        let alone = dir.path().join(number);
+        fs::create_dir(&alone).unwrap();
+        for file in fs::read_dir(&folder).unwrap().map(|file| file.unwrap().path()) {
+            let name = file.file_name().unwrap();
+            if name.to_string_lossy().starts_with(other) {
+                fs::copy(&file, alone.join(name)).unwrap();
+            }
+        }
+        readers(&alone, 0);
+    }
+}
+
 /// Each command that reads logs ends with this code; what all of them say.
 #[track_caller]
 fn readers(log: &Path, code: i32) -> String {

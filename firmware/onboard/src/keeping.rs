@@ -61,7 +61,7 @@ impl Keeping {
         let (before, all) = (span(Param::RecBefore), !by_arming || lately);
         match self.state {
             State::Fresh | State::All if all => self.state = State::All,
-            State::Fresh | State::All => {
+            State::Fresh | State::All if self.due.is_none() => {
                 // The file ends here in order; what comes begins another one, and says first what it is.
                 let is_fresh = self.state == State::Fresh;
                 if is_fresh || sectors.with_reserve(|sink| writer.finish(sink)) {
@@ -72,15 +72,17 @@ impl Keeping {
                     self.due = Some(Keep { all: false, from, seconds });
                 }
             }
-            State::Last { from, seconds } if all => {
+            // Storage has ended the wait itself where a group goes on in a further file, because the card was out or refused: then the log
+            // ends here, as after an arming.
+            State::Last { from, seconds } if all || !card.is_waiting() => {
                 card.keep_all();
                 self.state = State::All;
-                self.due = Some(Keep { all, from, seconds });
+                self.due = Some(Keep { all: true, from, seconds });
             }
             State::Last { from, seconds } if writer.counters().groups != self.group => {
-                self.due = Some(Keep { all, from, seconds });
+                self.due = Some(Keep { all: false, from, seconds });
             }
-            State::Last { .. } => {}
+            _ => {}
         }
         if let Some(due) = self.due
             && sectors.with_reserve(|sink| writer.record(now, &Record::Keep(due), sink)).is_ok()
@@ -104,29 +106,54 @@ mod tests {
     use super::*;
     use crate::queues::Queues;
 
-    #[test]
-    fn the_record_says_what_storage_was_told_also_where_the_parameter_was_changed_meanwhile() {
+    /// What the record says is kept, of a vehicle that is armed or not at each tick, with what is done before it; and how many of its
+    /// sectors end a log.
+    fn said(ticks: &[(bool, &dyn Fn(&CardStatus, &mut Params))]) -> (Vec<Keep>, usize) {
         let (mut queues, mut writer) = (Box::new(Queues::new()), Box::new(Writer::new()));
         let mut ends = queues.split();
         let (card, mut params, mut keeping) = (CardStatus::new(), Params::defaults(), Keeping::new());
         params.set("REC_MODE", 1.0).expect("a parameter");
-        for (ms, armed, before) in [(0, false, 15.0), (50, false, 60.0), (100, true, 60.0)] {
-            params.set("REC_BEFORE", before).expect("a parameter");
-            let now = Instant::from_millis(ms);
-            keeping.tick(now, &params, armed, &card, &mut writer, &mut ends.sectors_in);
+        for (tick, (armed, act)) in (0..).zip(ticks) {
+            act(&card, &mut params);
+            let now = Instant::from_millis(tick * 50);
+            keeping.tick(now, &params, *armed, &card, &mut writer, &mut ends.sectors_in);
         }
-        assert!(ends.sectors_in.with_reserve(|sink| writer.finish(sink)));
-        let (mut decoder, mut said) = (Box::new(GroupDecoder::new()), Vec::new());
+        assert!(ends.sectors_in.with_reserve(|sink| writer.restart(sink)));
+        let (mut decoder, mut said, mut closed) = (Box::new(GroupDecoder::new()), Vec::new(), 0);
         while let Some(sector) = ends.sectors_out.oldest() {
             let mut sector = *sector;
             sector.seal(1);
             let header = Header::read(sector.bytes()).expect("a sector");
+            closed += usize::from(header.closed);
             decoder.push(&header, &sector).expect("in order");
             while let Some(Ok(Entry::Record { record: Record::Keep(keep), .. })) = decoder.next_entry() {
-                said.push((keep.all, keep.seconds));
+                said.push(keep);
             }
             ends.sectors_out.drop_oldest();
         }
+        (said, closed)
+    }
+
+    #[test]
+    fn the_record_says_what_storage_was_told_also_where_the_parameter_was_changed_meanwhile() {
+        let before = |seconds| {
+            move |_: &CardStatus, params: &mut Params| {
+                params.set("REC_BEFORE", seconds).expect("a parameter");
+            }
+        };
+        let (said, _) = said(&[(false, &before(15.0)), (false, &before(60.0)), (true, &before(60.0))]);
+        let said: Vec<_> = said.iter().map(|keep| (keep.all, keep.seconds)).collect();
         assert_eq!(said, [(false, 15), (true, 15)]);
+    }
+
+    /// The card was out in the middle of a group, and all that it has of the wait stays: what follows is a log of its own, which says
+    /// with which sector it begins.
+    #[test]
+    fn a_wait_that_storage_has_ended_begins_anew_behind_the_end_of_the_log() {
+        let (said, closed) =
+            said(&[(false, &|_, _| {}), (false, &|card, _| card.keep_all()), (false, &|_, _| {})]);
+        let keep = |all, from| Keep { all, from, seconds: 30 };
+        assert_eq!(said, [keep(false, 0), keep(true, 0), keep(false, 1)]);
+        assert_eq!(closed, 1);
     }
 }

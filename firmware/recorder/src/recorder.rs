@@ -31,7 +31,7 @@ use crate::format::FormatError;
 use crate::gate::HeldBlocks;
 use crate::name::LogName;
 use crate::status::{CardState, CardStatus};
-use segments::{Log, Segments};
+use segments::{Log, Segments, group_start};
 use slot::Slot;
 use trouble::may_work_elsewhere;
 
@@ -120,7 +120,7 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
         if self.segments.is_open {
             return Written::Done;
         }
-        match self.begin(now) {
+        match self.begin() {
             Ok(()) => Written::Done,
             Err(CardError::Searching) => Written::Searching,
             Err(error) => {
@@ -189,7 +189,7 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
             }
         }
         // A new segment may lie where the card still works.
-        let moved = self.next_segment(now, None).and_then(|()| {
+        let moved = self.next_segment(None).and_then(|()| {
             self.status.want_group();
             self.try_write(now, &first, 1)
         });
@@ -292,12 +292,10 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
         let number = first.number();
         self.segments.ring.keep(self.status.waiting().filter(|(from, _)| number >= *from));
         if self.must_move(now, first)? {
-            self.next_segment(now, Some(first))?;
+            self.next_segment(Some(first))?;
         }
         let mut log = self.segments.log.ok_or(CardError::NotOpen)?;
-        if log.base.is_none() {
-            self.segments.begin_segment(now, log.name, first);
-        }
+        let begins = log.base.is_none();
         let mut at = number.wrapping_sub(*log.base.get_or_insert(number));
         let blocks = data_blocks(self.mounted()?.open_blocks());
         let has_next = at + 1 < blocks;
@@ -318,7 +316,9 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
         let written = self.write_sealed(&log, at, count)?;
         self.status.count_blocks(written as u32);
         self.segments.log = Some(log);
-        self.segments.ring.has_begun();
+        if begins {
+            self.segments.begin_segment(log.name, first);
+        }
         let is_closed = self.add_to_parity(now, at, written);
         self.segments.is_over |= is_closed;
         self.drop_written(written);
@@ -408,7 +408,7 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
             self.status.want_group();
         }
         let fits = at.saturating_add(GROUP_SECTORS as u32) <= blocks;
-        Ok(sector.starts_group() && at > 0 && (!fits || self.segments.ring.is_due(now)))
+        Ok(at > 0 && group_start(sector).is_some_and(|begins| !fits || self.segments.ring.is_due(begins)))
     }
 
     /// How many of the sectors that wait, the first one being sector `number`, go right behind each other: full ones,
@@ -432,18 +432,18 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
     }
 
     /// Opens a segment on a card just mounted.
-    fn begin(&mut self, now: Instant) -> Result<(), CardError<D::Error>> {
+    fn begin(&mut self) -> Result<(), CardError<D::Error>> {
         let card = self.slot.card().ok_or(CardError::NotOpen)?;
-        let begun = self.segments.begin(now, card);
+        let begun = self.segments.begin(card);
         self.held.parity.borrow_mut().begin(0);
         self.await_group = begun?;
         Ok(())
     }
 
     /// Leaves the open segment for the next one, which begins with this sector; without one it goes on with whatever comes.
-    fn next_segment(&mut self, now: Instant, sector: Option<&Sector>) -> Result<(), CardError<D::Error>> {
+    fn next_segment(&mut self, sector: Option<&Sector>) -> Result<(), CardError<D::Error>> {
         self.write_parity();
-        let next = self.segments.next(now, sector, self.slot.card().ok_or(CardError::NotOpen)?);
+        let next = self.segments.next(sector, self.slot.card().ok_or(CardError::NotOpen)?);
         self.held.parity.borrow_mut().begin(0);
         next
     }

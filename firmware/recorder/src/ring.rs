@@ -6,9 +6,9 @@ use hums_core::time::{Instant, Span};
 
 use crate::name::LogName;
 
-/// Bytes of a segment in the ring: 10 s of the busiest vehicle.
-pub(crate) const SEGMENT_BYTES: u32 = 256 * 1024;
-/// Segments at most: two minutes of the busiest vehicle, and one to write.
+/// Bytes of a segment in the ring: 11 s of a full line (921,600 baud) whose frames cannot be compressed.
+pub(crate) const SEGMENT_BYTES: u32 = 1024 * 1024;
+/// Segments at most: the most that is promised (`REC_BEFORE`, two minutes) of such a line, and one to write.
 const SEGMENTS_MAX: usize = 16;
 /// A segment is not left sooner than this, however little is to be kept.
 const AGE_MIN: Span = Span::from_secs(5);
@@ -20,27 +20,32 @@ pub(crate) struct Ring {
     segments: Vec<Segment, SEGMENTS_MAX>,
     /// A group was asked for, so that the next segment can begin.
     group_asked: bool,
-    /// Nothing of the last segment is on the card yet: where that fails, another one takes its place.
-    is_last_empty: bool,
 }
 
 struct Segment {
     name: LogName,
-    /// When it was begun.
+    /// When its first group was begun, as its first sector tells.
     began: Instant,
 }
 
 impl Ring {
     pub(crate) const fn new() -> Self {
-        Self { keep: None, segments: Vec::new(), group_asked: false, is_last_empty: false }
+        Self { keep: None, segments: Vec::new(), group_asked: false }
     }
 
-    /// Keeps so much of what comes from that sector on; `None`: everything, what is in the ring included.
+    /// Keeps so much of what comes from that sector on; `None`: everything. Once it is something else, what is in the ring stays.
     pub(crate) fn keep(&mut self, keep: Option<(u32, Span)>) {
-        self.keep = keep;
-        if keep.is_none() {
+        if self.keep != keep {
+            self.keep = keep;
             self.clear();
         }
+    }
+
+    /// Keeps everything; from which sector on only the last while was kept until now.
+    pub(crate) fn stop(&mut self) -> Option<u32> {
+        let (from, _) = self.keep?;
+        self.keep(None);
+        Some(from)
     }
 
     /// Whether not everything is kept.
@@ -48,35 +53,21 @@ impl Ring {
         self.keep.is_some()
     }
 
-    /// Whether no segment is in it yet.
-    pub(crate) fn is_empty(&self) -> bool {
-        self.segments.is_empty()
-    }
-
     /// All that is in it stays.
     pub(crate) fn clear(&mut self) {
-        self.is_last_empty = false;
         self.segments.clear();
     }
 
-    /// A segment was begun, which goes when its time is over.
-    pub(crate) fn begin(&mut self, name: LogName, now: Instant) {
+    /// A segment has its first sector on the card, of a group that was begun then. It goes when its time is over.
+    pub(crate) fn begin(&mut self, name: LogName, began: Instant) {
         self.group_asked = false;
         if self.is_on() {
-            if core::mem::replace(&mut self.is_last_empty, true) {
-                self.segments.pop();
-            }
             // There is room: a full ring gave one away before.
-            let _ = self.segments.push(Segment { name, began: now });
+            let _ = self.segments.push(Segment { name, began });
         }
     }
 
-    /// What the segment begins with is on the card.
-    pub(crate) fn has_begun(&mut self) {
-        self.is_last_empty = false;
-    }
-
-    /// Whether the next group is to begin the next segment.
+    /// Whether a group that is begun now is to begin the next segment.
     pub(crate) fn is_due(&self, now: Instant) -> bool {
         let age = |open: &Segment| now.since(open.began);
         self.keep
@@ -88,17 +79,19 @@ impl Ring {
         self.is_due(now) && !core::mem::replace(&mut self.group_asked, true)
     }
 
-    /// The oldest segment, where those after it hold enough, or there is no room for one more. None goes any more once something
-    /// else is `wanted` than the ring keeps: the vehicle was armed, though what came before that may still wait for the card.
-    pub(crate) fn oldest(&self, now: Instant, wanted: Option<(u32, Span)>) -> Option<LogName> {
+    /// The oldest segment, where those after it hold enough before the group that begins the next one, or there is no room for one
+    /// more. Readers do the same sum of the times in the segments. None goes any more once something else is `wanted` than the ring
+    /// keeps: the vehicle was armed, though what came before that may still wait for the card.
+    pub(crate) fn oldest(&self, group: Option<Instant>, wanted: Option<(u32, Span)>) -> Option<LogName> {
         let (_, keep) = self.keep.filter(|keep| Some(*keep) == wanted)?;
-        let enough = self.segments.get(1).is_some_and(|second| now.since(second.began) >= keep);
+        let holds_enough = |group: Instant, second: &Segment| group.since(second.began) >= keep;
+        let enough =
+            group.zip(self.segments.get(1)).is_some_and(|(group, second)| holds_enough(group, second));
         self.segments.first().filter(|_| enough || self.segments.is_full()).map(|oldest| oldest.name)
     }
 
     /// This segment is gone.
     pub(crate) fn forget(&mut self, name: LogName) {
-        self.is_last_empty &= self.segments.last().is_some_and(|last| last.name != name);
         self.segments.retain(|segment| segment.name != name);
     }
 }
@@ -114,40 +107,55 @@ mod tests {
     const LAST_30_S: (u32, Span) = (7, Span::from_secs(30));
     const LAST_120_S: (u32, Span) = (7, Span::from_secs(120));
 
-    fn begin(ring: &mut Ring, segment: u32, now: Instant) {
-        ring.begin(name(segment), now);
-        ring.has_begun();
-    }
-
     #[test]
     fn the_oldest_goes_once_those_after_it_hold_enough() {
         let mut ring = Ring::new();
         ring.keep(Some(LAST_30_S));
         for segment in 0..4 {
             let now = Instant::from_millis(u64::from(segment) * 12_000);
-            assert_eq!(ring.oldest(now, Some(LAST_30_S)), None, "segment {segment}");
-            begin(&mut ring, segment, now);
+            assert_eq!(ring.oldest(Some(now), Some(LAST_30_S)), None, "segment {segment}");
+            ring.begin(name(segment), now);
         }
-        assert_eq!(ring.oldest(Instant::from_millis(41_999), Some(LAST_30_S)), None, "29.999 s without it");
-        assert_eq!(ring.oldest(Instant::from_millis(42_000), Some(LAST_30_S)), Some(name(0)));
+        let oldest = |ring: &Ring, at_ms| ring.oldest(Some(Instant::from_millis(at_ms)), Some(LAST_30_S));
+        assert_eq!(oldest(&ring, 41_999), None, "29.999 s without it");
+        assert_eq!(oldest(&ring, 42_000), Some(name(0)));
+        assert_eq!(oldest(&ring, 42_000), Some(name(0)), "it is not written anew yet");
         assert_eq!(
-            ring.oldest(Instant::from_millis(42_000), Some(LAST_30_S)),
-            Some(name(0)),
-            "it is not written anew yet"
+            ring.oldest(None, Some(LAST_30_S)),
+            None,
+            "what the next segment begins with is not known"
         );
         ring.forget(name(0));
-        assert_eq!(ring.oldest(Instant::from_millis(42_000), Some(LAST_30_S)), None);
+        assert_eq!(oldest(&ring, 42_000), None);
     }
 
     #[test]
     fn a_full_ring_gives_its_oldest_away_and_one_that_is_off_none() {
         let mut ring = Ring::new();
         ring.keep(Some(LAST_120_S));
-        (0..SEGMENTS_MAX as u32).for_each(|segment| begin(&mut ring, segment, Instant::ZERO));
-        assert_eq!(ring.oldest(Instant::ZERO, Some(LAST_120_S)), Some(name(0)));
+        (0..SEGMENTS_MAX as u32).for_each(|segment| ring.begin(name(segment), Instant::ZERO));
+        assert_eq!(ring.oldest(None, Some(LAST_120_S)), Some(name(0)));
         ring.keep(None);
-        assert!(ring.is_empty() && !ring.is_due(Instant::from_millis(1_000_000)));
-        assert_eq!(ring.oldest(Instant::from_millis(1_000_000), Some(LAST_120_S)), None);
+        let later = Instant::from_millis(1_000_000);
+        assert!(ring.segments.is_empty() && !ring.is_due(later));
+        assert_eq!(ring.oldest(Some(later), Some(LAST_120_S)), None);
+    }
+
+    #[test]
+    fn what_was_kept_stays_once_something_else_is_kept() {
+        for next in [None, Some((8, Span::from_secs(30)))] {
+            let mut ring = Ring::new();
+            ring.keep(Some(LAST_30_S));
+            ring.begin(name(0), Instant::ZERO);
+            ring.keep(Some(LAST_30_S));
+            assert_eq!(ring.segments.len(), 1);
+            ring.keep(next);
+            assert!(ring.segments.is_empty(), "{next:?}");
+        }
+        let mut ring = Ring::new();
+        assert_eq!(ring.stop(), None);
+        ring.keep(Some(LAST_30_S));
+        assert_eq!((ring.stop(), ring.is_on()), (Some(7), false));
     }
 
     #[test]
@@ -155,30 +163,11 @@ mod tests {
         let mut ring = Ring::new();
         ring.keep(Some(LAST_30_S));
         (0..3)
-            .for_each(|segment| begin(&mut ring, segment, Instant::from_millis(u64::from(segment) * 12_000)));
-        let later = Instant::from_millis(60_000);
+            .for_each(|segment| ring.begin(name(segment), Instant::from_millis(u64::from(segment) * 12_000)));
+        let later = Some(Instant::from_millis(60_000));
         assert_eq!(ring.oldest(later, Some(LAST_30_S)), Some(name(0)));
         assert_eq!(ring.oldest(later, None), None, "armed");
         assert_eq!(ring.oldest(later, Some((8, Span::from_secs(30)))), None, "armed, and disarmed again");
-    }
-
-    #[test]
-    fn a_segment_that_got_nothing_holds_nothing_of_the_last_while() {
-        let mut ring = Ring::new();
-        ring.keep(Some(LAST_30_S));
-        begin(&mut ring, 0, Instant::ZERO);
-        // Refused again and again, in one segment and in the next ones.
-        for segment in [1, 1, 1, 2, 3] {
-            ring.begin(name(segment), Instant::from_millis(10_000));
-        }
-        ring.begin(name(4), Instant::from_millis(20_000));
-        ring.has_begun();
-        assert_eq!(
-            ring.segments.iter().map(|segment| segment.name.segment).collect::<std::vec::Vec<_>>(),
-            [0, 4]
-        );
-        assert_eq!(ring.oldest(Instant::from_millis(49_999), Some(LAST_30_S)), None);
-        assert_eq!(ring.oldest(Instant::from_millis(50_000), Some(LAST_30_S)), Some(name(0)));
     }
 
     #[test]

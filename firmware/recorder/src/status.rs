@@ -300,6 +300,18 @@ impl CardStatus {
         self.waiting_from.store(KEEP_ALL, Ordering::Release);
     }
 
+    /// What is kept from sector `number` on stays, and so does all that comes, until the monitor says anew what is kept.
+    pub(crate) fn stay(&self, number: u32) {
+        let (now, all) = (Ordering::AcqRel, Ordering::Relaxed);
+        // Where the monitor has said something else meanwhile, that is so.
+        let _ = self.waiting_from.compare_exchange(number, KEEP_ALL, now, all);
+    }
+
+    /// Whether only the last while is kept. Storage ends that where it must ([`Self::wait_from`] begins it anew).
+    pub fn is_waiting(&self) -> bool {
+        self.waiting_from.load(Ordering::Acquire) != KEEP_ALL
+    }
+
     /// From which sector on how much is kept; `None`: everything.
     pub(crate) fn waiting(&self) -> Option<(u32, Span)> {
         let from = self.waiting_from.load(Ordering::Acquire);

@@ -291,6 +291,11 @@ mod tests {
         assert!(line(&log, 5).contains("   3:12 "), "on the ground nothing is counted after that");
         log.ending.summary.marks.moved = Some(Instant::from_millis(40_000));
         assert!(line(&log, 5).contains("  >3:12 "), "{}", line(&log, 5));
+        // It was disarmed, and its log ended, before its landing was known.
+        (log.ending.summary.marks.moved, log.ending.summary.marks.took_off) = (None, Some(true));
+        assert!(line(&log, 5).contains("  >3:12 "), "{}", line(&log, 5));
+        log.ending.summary.marks.took_off = Some(false);
+        assert!(line(&log, 5).contains("   3:12 "), "its landing is there");
     }
 
     #[test]

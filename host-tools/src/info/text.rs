@@ -14,7 +14,7 @@ use super::number::short;
 use super::{usage, wear};
 use crate::check::causes::causes;
 use crate::colour::level;
-use crate::ending::{among_words, behind_words, copies_words, made_again_words, unprotected_words};
+use crate::ending::{PowerOn, among_words, behind_words, copies_words, made_again_words, unprotected_words};
 use crate::logs;
 use crate::logs::begun_anew::BegunAnew;
 use crate::logs::naming::is_part;
@@ -280,7 +280,8 @@ fn gaps_text(text: &mut String, log: &Overview) {
     for gap in contents.gaps.iter().filter(|gap| gap.cause == Cause::Disarmed).take(SHOWN_MAX) {
         let time = |at: Option<Instant>| moment(at.unwrap_or(Instant::ZERO));
         // Before a later log of a power-on are the logs before.
-        let is_later = summary.keep.is_some_and(|keep| keep.from > 0);
+        let is_later =
+            summary.keep.is_some_and(|keep| keep.from > 0) || log.ending.power_on == PowerOn::Follows;
         let from = match gap.from {
             None if is_later => "since the log before".to_owned(),
             from => format!("from {}", time(from)),

@@ -1,25 +1,26 @@
 //! Whether what a log lacks before its first sector was left out on purpose.
 //!
 //! While a vehicle that is recorded by arming is disarmed, the recorder keeps the last while in a ring of files. When it
-//! begins a file, it writes the oldest one anew, if the second oldest began long enough ago (`hums_recorder::ring`). So a log
-//! that lacks its first files may be whole: then a later file of the ring was begun, and when that was, the first one that is
-//! left held the last while. Where no file says so, somebody else took one. The first file of a log is never left out before
+//! begins a file, it writes the oldest one anew, if the second oldest began long enough ago (`hums_recorder::ring`): by the times
+//! of the groups that they begin with, which are in the files. So a log that lacks its first files may be whole: then a later file
+//! of the ring was begun, and when that was, the first one that is left held the last while. Where no file says so, somebody else
+//! took one. The first file of a log is never left out before
 //! others are: a log that has it and begins later was recorded on a card that came later, and says so.
 //! Between a log's first sector and its last one nothing is ever left out: after an arming the next log begins.
 
 use anyhow::Result;
 use hums_blackbox::record::{Keep, Lost};
-use hums_blackbox::{Entry, GROUP_SECTORS, GroupDecoder, Header, Outline, Record, Sector};
+use hums_blackbox::{Entry, GroupDecoder, Header, Outline, Record, Sector};
 use hums_core::time::{Instant, Span};
 
+use super::board::HEADING_GROUPS;
 use super::groups::{Group, Groups};
 use super::places::Log;
 
 /// Files of a full ring but for one, of which the oldest goes however little the others hold.
 const RING_FILES: usize = 15;
-/// The ring counts from when a file is begun on the card, and the log tells when its first group began. Between both lie the
-/// time in which a sector fills, of which a copy is written each 150 ms, and the longest pause of a card that is not given
-/// up (8 s: `hums_recorder::spi`).
+/// Where power went as a file was begun, of which nothing is there, nothing tells when that was: at most so long after the last
+/// entry, of a vehicle that sends a heartbeat each second.
 const SLACK: Span = Span::from_secs(10);
 /// Numbers of the events that say that a card came or went.
 const CARD: [u8; 2] = [6, 7];
@@ -31,6 +32,8 @@ pub struct Late {
     pub from: u32,
     /// All from there on was left out on purpose.
     pub is_wanted: bool,
+    /// The ring was full before its files held the while that was to be kept.
+    pub is_cut: bool,
     /// Nothing is missing, and yet its first file has not the name of a first one.
     pub is_renamed: bool,
 }
@@ -44,69 +47,102 @@ pub fn late(log: &Log) -> Result<Option<Late>> {
     let Some(first) = first.filter(Header::starts_group) else { return Ok(None) };
     let is_further = segment.is_some_and(|segment| segment > 0);
     if first.number == 0 {
-        return Ok(is_further.then_some(Late { from: 0, is_wanted: true, is_renamed: true }));
+        return Ok(is_further.then_some(Late { from: 0, is_wanted: true, is_cut: false, is_renamed: true }));
     }
     let mut seen = Seen::default();
     seen.take(&group);
+    // A file may begin just before the group that was asked for: then that one has the record.
+    for _ in 1..HEADING_GROUPS {
+        if seen.keep.is_none()
+            && !seen.is_broken
+            && let Some(group) = groups.next_group()?
+        {
+            seen.take(&group);
+        }
+    }
     let Some(keep) = seen.keep.filter(|keep| keep.from <= first.number) else { return Ok(None) };
-    let late = |is_wanted| Some(Late { from: keep.from, is_wanted, is_renamed: false });
+    let late = |is_wanted| Late { from: keep.from, is_wanted, is_cut: false, is_renamed: false };
     let lacks_none = keep.from == first.number;
     if log.session.is_some() || lacks_none {
-        return Ok(Some(Late { from: keep.from, is_wanted: true, is_renamed: is_further }));
+        return Ok(Some(Late { is_renamed: is_further, ..late(true) }));
     }
     if !begins_with(log, &first)? {
-        return Ok(late(false));
+        return Ok(Some(late(false)));
     }
     let is_wanted = match segment {
         Some(0) => seen.go_on(&mut groups, |seen| seen.card)?.card,
-        Some(_) => was_written_anew(log, &first, &mut groups, &mut seen, keep)?,
+        Some(_) => {
+            let anew = was_written_anew(log, &first, &mut groups, &mut seen, keep)?;
+            return Ok(Some(Late { is_cut: anew == Some(false), ..late(anew.is_some()) }));
+        }
         // Of one file of another name nobody knows where others were begun.
         None => seen.go_on(&mut groups, |seen| seen.seconds() >= keep.seconds)?.seconds() >= keep.seconds,
     };
-    Ok(late(is_wanted))
+    Ok(Some(late(is_wanted)))
 }
 
-/// Whether the ring gave away a file before the first one that is left.
+/// Whether the ring gave away a file before the first one that is left, and then whether those after it held enough.
 fn was_written_anew(
     log: &Log,
     first: &Header,
     groups: &mut Groups<'_>,
     seen: &mut Seen,
     keep: Keep,
-) -> Result<bool> {
-    let Some(start) = seen.start else { return Ok(false) };
-    let enough = Span::from_secs(u64::from(keep.seconds));
-    let is_enough = |at: Option<Instant>| at.is_none_or(|at| at.since(start) + SLACK >= enough);
-    let mut begun = begun(log, first)?.into_iter().skip(1).enumerate();
-    let Some((_, at)) = begun.find(|(nth, at)| is_enough(*at) || nth + 1 >= RING_FILES) else {
-        return Ok(false);
-    };
-    // Files that were begun after the arming are none of the ring's. One without a sector was begun when power went.
-    let at = at.unwrap_or(Instant::from_micros(u64::MAX));
-    let armed = seen.go_on(groups, |seen| seen.last.is_some_and(|last| last > at))?.all;
-    Ok(armed.is_none_or(|armed| at <= armed))
+) -> Result<Option<bool>> {
+    let Some(start) = seen.start else { return Ok(None) };
+    let begun = begun(log, first)?;
+    let later = begun.times.iter().skip(1).enumerate();
+    let mut later = later.map(|(nth, at)| (nth, *at, at.since(start).as_millis() / 1000));
+    let gone = later.find(|(nth, _, seconds)| *seconds >= u64::from(keep.seconds) || nth + 1 >= RING_FILES);
+    // Files that were begun after the arming are none of the ring's.
+    Ok(match gone {
+        Some((_, at, seconds)) => {
+            let armed = seen.go_on(groups, |seen| seen.last.is_some_and(|last| last > at))?.all;
+            armed.is_none_or(|armed| at <= armed).then_some(seconds >= u64::from(keep.seconds))
+        }
+        None if begun.ends_hollow => seen.go_on(groups, |_| false)?.all.is_none().then_some(true),
+        None => None,
+    })
 }
 
-/// When the first group of each file began, where that is known. One that was begun when the card was back begins with the rest of
-/// the group before.
-fn begun(log: &Log, first: &Header) -> Result<Vec<Option<Instant>>> {
-    let mut all = Vec::new();
+/// When files of a log were begun.
+struct Begun {
+    /// When the first group of each of the ring's began.
+    times: Vec<Instant>,
+    /// The last one has no sector: it was begun when power went.
+    ends_hollow: bool,
+}
+
+/// When the files of a log were begun, up to the first one that begins with the rest of a group: it is the last one that may have taken
+/// another's place, of a full ring, and what lies behind it is none of the ring's.
+fn begun(log: &Log, first: &Header) -> Result<Begun> {
+    let mut begun = Begun { times: Vec::new(), ends_hollow: false };
     for piece in &log.pieces {
         let one = Log { pieces: vec![piece.clone()], ..log.clone() };
-        let (mut blocks, mut start) = (one.blocks(), None);
-        for _ in 0..=GROUP_SECTORS {
+        // What a file held before is of another session, or older.
+        let is_own = |header: &Header| header.session == first.session && header.number >= first.number;
+        let mut blocks = one.blocks();
+        let mut begins = None;
+        // Of its first sector there may be no more than a copy in the second place.
+        for is_second in [false, true] {
             let Some(block) = blocks.next_block()? else { break };
-            // What a file held before is of another session, or older.
-            let is_own = |header: &Header| header.session == first.session && header.number >= first.number;
-            let Some(header) = Header::read(block).ok().filter(is_own) else { break };
-            if header.starts_group() {
-                start = Sector::from_bytes(*block).preamble();
+            let header = Header::read(block).ok().filter(is_own);
+            if let Some(header) = header.filter(|header| header.partial || !is_second) {
+                begins = Some((header, Sector::from_bytes(*block).preamble()));
                 break;
             }
         }
-        all.push(start.map(|start| Instant::from_millis(start.start_ms)));
+        begun.ends_hollow = begins.is_none();
+        match begins {
+            Some((_, Some(group))) => begun.times.push(Instant::from_millis(group.start_ms)),
+            Some(_) => {
+                begun.times.extend(begun.times.last().copied());
+                break;
+            }
+            None => {}
+        }
     }
-    Ok(all)
+    Ok(begun)
 }
 
 /// Whether this sector lies where a log's first one does: in the first block, or a copy of it in the second one.
@@ -192,5 +228,86 @@ impl Seen {
         let end = self.all.or(self.last.map(|last| last + SLACK));
         let span = self.start.zip(end).map_or(Span::ZERO, |(start, end)| end.since(start));
         u32::try_from(span.as_millis() / 1000).unwrap_or(u32::MAX)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+
+    use hums_blackbox::record::Note;
+    use hums_blackbox::{SectorSink, Writer};
+
+    use super::*;
+    use crate::logs::find;
+
+    struct Memory(Vec<[u8; 512]>);
+
+    impl SectorSink for Memory {
+        fn room(&self) -> usize {
+            usize::MAX
+        }
+
+        fn put(&mut self, sector: &Sector) {
+            let mut sector = *sector;
+            sector.seal(7);
+            self.0.push(*sector.bytes());
+        }
+    }
+
+    /// What a log lacks whose first file is gone, the others being begun at these times. Each of them begins with a short group that says
+    /// nothing, and says in the next one that the last 30 s are kept, until the vehicle is armed.
+    fn read(begun_ms: &[u64], armed_ms: u64) -> Option<Late> {
+        let (mut memory, mut writer) = (Memory(Vec::new()), Box::new(Writer::new()));
+        let note = Record::Note(Note { severity: 6, text: "a word" });
+        let keep = |all| Record::Keep(Keep { all, from: 0, seconds: 30 });
+        let put = |at_ms, record: &Record<'_>, memory: &mut Memory, writer: &mut Writer| {
+            writer.record(Instant::from_millis(at_ms), record, memory).expect("room");
+        };
+        put(0, &note, &mut memory, &mut writer);
+        let (mut starts, mut is_armed) = (Vec::new(), false);
+        for at_ms in begun_ms {
+            if !is_armed && *at_ms > armed_ms {
+                is_armed = true;
+                put(armed_ms, &keep(true), &mut memory, &mut writer);
+            }
+            assert!(writer.restart(&mut memory));
+            starts.push(memory.0.len());
+            put(*at_ms, &note, &mut memory, &mut writer);
+            assert!(writer.restart(&mut memory));
+            put(at_ms + 20, &keep(is_armed), &mut memory, &mut writer);
+        }
+        if !is_armed {
+            put(armed_ms, &keep(true), &mut memory, &mut writer);
+        }
+        assert!(writer.finish(&mut memory));
+        let dir = tempfile::tempdir().expect("a folder");
+        starts.push(memory.0.len());
+        for (nth, file) in starts.windows(2).enumerate() {
+            let name = format!("00001_{:02}.HUM", 13 + nth);
+            fs::write(dir.path().join(name), memory.0[file[0]..file[1]].concat()).expect("room");
+        }
+        let found = find(&[dir.path().to_owned()], false).expect("a log");
+        late(&found.logs[0]).expect("it reads")
+    }
+
+    #[test]
+    fn box_and_reader_count_the_rings_age_by_the_times_of_the_groups_that_its_files_begin_with() {
+        let wanted =
+            |begun: &[u64], armed_ms| read(begun, armed_ms).map(|late| (late.is_wanted, late.is_cut));
+        let (gone, taken) = (Some((true, false)), Some((false, false)));
+        assert_eq!(wanted(&[90_070, 120_070], 125_000), gone);
+        assert_eq!(wanted(&[90_070, 120_069], 125_000), taken, "a millisecond too soon");
+        assert_eq!(wanted(&[90_070, 100_000, 110_000, 120_093], 125_000), gone);
+        assert_eq!(wanted(&[90_070, 100_000, 120_093], 110_000), taken, "after the arming nothing goes");
+        assert_eq!(wanted(&[90_070], 125_000), taken, "no other file is there");
+    }
+
+    #[test]
+    fn a_ring_that_was_full_before_it_held_enough_says_so() {
+        let begun = |files: u64| (0..files).map(|nth| 90_000 + nth * 1_000).collect::<Vec<_>>();
+        let is_cut = |files| read(&begun(files), 125_000).map(|late| (late.is_wanted, late.is_cut));
+        assert_eq!(is_cut(16), Some((true, true)));
+        assert_eq!(is_cut(15), Some((false, false)));
     }
 }

@@ -11,6 +11,7 @@ use crate::loss::lost;
 /// Numbers of the events that say that the vehicle moves.
 const ARMED: u8 = 1;
 const TAKE_OFF: u8 = 3;
+const LANDING: u8 = 4;
 /// The box was started in the air.
 pub const RESUMED: u8 = 14;
 
@@ -28,6 +29,8 @@ pub struct Marks {
     pub last: Option<(Instant, Resting)>,
     /// The first time after it that the vehicle was armed or took off.
     pub moved: Option<Instant>,
+    /// Whether the last of its take-offs and landings is a take-off: what the box counts of a flight it stores at the landing.
+    pub took_off: Option<bool>,
     /// Frames and records that the recorder says it lost.
     pub lost: u64,
     /// The log before on the card, as the last boot record found it.
@@ -51,7 +54,9 @@ impl Marks {
             }
             Record::Event(event) if matches!(event.number, ARMED | TAKE_OFF | RESUMED) => {
                 self.moved = self.moved.or(Some(at));
+                self.took_off = (event.number != ARMED).then_some(true).or(self.took_off);
             }
+            Record::Event(event) if event.number == LANDING => self.took_off = Some(false),
             Record::Loss(loss) => self.lost = self.lost.saturating_add(lost(loss)),
             Record::Note(note) => self.packed |= note.text == PACKED,
             Record::Boot(boot) => {
@@ -72,6 +77,7 @@ impl Marks {
         self.has_boot |= next.has_boot;
         self.board = self.board.or(next.board);
         self.packed |= next.packed;
+        self.took_off = next.took_off.or(self.took_off);
         self.before = next.before.or(self.before);
         if next.last.is_some() {
             (self.last, self.moved) = (next.last, next.moved);

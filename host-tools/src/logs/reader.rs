@@ -13,6 +13,7 @@ use hums_blackbox::record::Keep;
 use hums_blackbox::{BlockCounts, Cause, Entry, Gap, GroupDecoder, GroupError, Outline, Record};
 use hums_core::time::Instant;
 
+use super::board::HEADING_GROUPS;
 use super::groups::{Group, Groups, Joined};
 use super::in_order::{in_order, workers};
 use super::late::{Late, late};
@@ -119,6 +120,8 @@ pub struct Summary {
     pub strange: Vec<Strange>,
     /// Files that are missing before its first one, where nothing proves that they were left out on purpose.
     pub files_gone: u32,
+    /// What it lacks before its first sector went when the ring was full: it may have less than the while that was to be kept.
+    pub is_cut: bool,
     /// None of its first sectors is missing, and its first file has not the name of a first one.
     pub is_renamed: bool,
     /// A later log of the same power-on, which was joined to it.
@@ -181,6 +184,7 @@ pub fn read<C: Collect>(
     let first = summary.first_number.unwrap_or(0);
     summary.strange = groups.strange(first, late.is_some_and(|late| late.from == first));
     summary.joined = groups.joined();
+    summary.is_cut = late.is_some_and(|late| late.is_wanted && late.is_cut);
     summary.is_renamed = late.is_some_and(|late| late.is_renamed);
     Ok(summary)
 }
@@ -460,8 +464,10 @@ impl Stitch {
                 self.expected = Some(frames_before.wrapping_add(group.frames));
                 self.summary.first = self.summary.first.or(Some(start));
                 self.summary.frames_before.get_or_insert(frames_before);
-                if self.summary.groups == 0 {
-                    self.summary.keep = group.keep;
+                if self.summary.groups < HEADING_GROUPS as u64 {
+                    let first = self.summary.first_number.unwrap_or(0);
+                    let keep = group.keep.filter(|keep| keep.from <= first);
+                    self.summary.keep = self.summary.keep.or(keep);
                 }
                 self.summary.last = group.last.or(self.summary.last);
                 self.summary.groups += 1;

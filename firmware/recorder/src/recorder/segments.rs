@@ -14,6 +14,9 @@ use crate::status::{CardState, CardStatus};
 /// Segments that even a small card should hold, so that overwriting the oldest loses little.
 const SEGMENTS_MIN: u64 = 16;
 
+/// Bytes of a segment for what another one did not take.
+const SHORT_BYTES: u32 = 256 * 1024;
+
 /// Logs without their clusters that are passed by for one that can be written anew: each takes a walk over the directory.
 const UNCHAINED_MAX: usize = 8;
 
@@ -74,7 +77,6 @@ impl<'a> Segments<'a> {
     /// another card. Whether it is another one than the group's beginning was written to.
     pub(super) fn begin<D: CardDevice>(
         &mut self,
-        now: Instant,
         card: &mut Card<'_, D>,
     ) -> Result<bool, CardError<D::Error>> {
         let volume_id = card.layout().volume_id;
@@ -83,8 +85,9 @@ impl<'a> Segments<'a> {
         let log = if let Some(log) = resumed {
             log
         } else {
-            // What is in the ring is on another card.
+            // What is in the ring is on another card, and so is the end of the log.
             self.ring.clear();
+            self.is_over = false;
             self.earlier = newest;
             if newest.is_none() {
                 self.status.set_before(&Before { found: Found::Nothing, ..Before::default() });
@@ -97,9 +100,9 @@ impl<'a> Segments<'a> {
         };
         let before = self.log.replace(log);
         let opened = if Some(log.name) == newest {
-            self.next(now, None, card)
+            self.next(None, card)
         } else {
-            self.open(now, log.name, false, card)
+            self.open(log.name, None, false, card)
         };
         if let Err(error) = opened {
             self.log = before;
@@ -138,50 +141,55 @@ impl<'a> Segments<'a> {
         self.log.is_some_and(|log| log.base.is_some())
     }
 
-    /// Whether a log of its own begins with this sector: what is recorded around one arming is one, and its first group is whole. That
-    /// is so too where the vehicle was armed again before the end of the log before was on the card.
+    /// Whether a log of its own begins with this sector: the first group behind the end of the log before, also where the vehicle was
+    /// armed again before that end was on the card.
     pub(super) fn begins_log(&self, sector: &Sector) -> bool {
-        let is_first = |log: Log| log.base.is_none() && log.name.segment == 0;
-        let waits_anew = self.ring.is_on() && self.ring.is_empty();
-        (waits_anew || self.is_over) && sector.starts_group() && !self.log.is_some_and(is_first)
+        self.is_over && sector.starts_group()
     }
 
     /// Opens the segment after it, which begins with this sector: of the next log, where that begins a log. Without one it is a short
     /// one for what the segment before did not take: a card that goes away or refuses again and again is not used up by what is begun.
     pub(super) fn next<D: CardDevice>(
         &mut self,
-        now: Instant,
         sector: Option<&Sector>,
         card: &mut Card<'_, D>,
     ) -> Result<(), CardError<D::Error>> {
         let log = self.log.ok_or(CardError::NotOpen)?;
         let begins_log = sector.is_some_and(|sector| self.begins_log(sector));
         let name = if begins_log { log.name.next_session() } else { log.name.next_segment() };
-        self.open(now, name.ok_or(CardError::Full)?, sector.is_none(), card)
+        self.open(name.ok_or(CardError::Full)?, sector.and_then(group_start), sector.is_none(), card)?;
+        self.is_over &= !begins_log;
+        Ok(())
     }
 
-    /// The first sector of the open segment is to be written. Where the group before goes on in it, all that is in the ring stays:
-    /// without that no reader could do anything with it. The next group then begins a log.
-    pub(super) fn begin_segment(&mut self, now: Instant, name: LogName, sector: &Sector) {
-        if sector.starts_group() {
-            self.is_over = false;
-            self.ring.begin(name, now);
-        } else {
-            self.ring.clear();
+    /// The first sector of the open segment is on the card. Where the group before goes on in it, all stays that is in the ring:
+    /// without that no reader could do anything with it. The monitor sees that, ends the log, and waits anew.
+    pub(super) fn begin_segment(&mut self, name: LogName, sector: &Sector) {
+        match group_start(sector) {
+            Some(began) => self.ring.begin(name, began),
+            None => {
+                if let Some(from) = self.ring.stop() {
+                    self.status.stay(from);
+                }
+            }
         }
     }
 
     /// Makes a segment, or overwrites the oldest one when the card has no room, or the oldest one of those that are
-    /// kept only for a while when that while is over.
+    /// kept only for a while when that while is over before the group that it begins with.
     fn open<D: CardDevice>(
         &mut self,
-        now: Instant,
         name: LogName,
+        group: Option<Instant>,
         is_short: bool,
         card: &mut Card<'_, D>,
     ) -> Result<(), CardError<D::Error>> {
-        let bytes_max = if is_short || self.ring.is_on() { ring::SEGMENT_BYTES } else { SEGMENT_BYTES_MAX };
-        let overwrote = match self.ring.oldest(now, self.status.waiting()) {
+        let bytes_max = match (is_short, self.ring.is_on()) {
+            (true, _) => SHORT_BYTES,
+            (false, true) => ring::SEGMENT_BYTES,
+            (false, false) => SEGMENT_BYTES_MAX,
+        };
+        let overwrote = match self.ring.oldest(group, self.status.waiting()) {
             Some(old) => self.recycle(old, name, card, bytes_max)?,
             None => self.create_or_overwrite(name, card, bytes_max)?,
         };
@@ -244,6 +252,11 @@ impl<'a> Segments<'a> {
         card.recycle(&oldest, name)?;
         Ok(true)
     }
+}
+
+/// When the group was begun that begins with this sector.
+pub(super) fn group_start(sector: &Sector) -> Option<Instant> {
+    sector.preamble().map(|group| Instant::from_millis(group.start_ms))
 }
 
 /// The oldest log that may be overwritten. A few whose clusters are no longer chained are passed by.

@@ -90,13 +90,17 @@ pub(super) fn pull(
         note!("of the moment: {}: no log that the board gives has them", missing.words());
         outcome = Outcome::Losses;
     }
+    let mut is_over = false;
     for reading in &readings {
+        // What comes after a log that goes beyond the moment is not of it.
+        let is_of_it = |unread: &Unread| !is_over && unread.is_within(from, to);
         // The moment goes on behind all that the board has.
         let to_end = reading.is_to_end(names) && reading.span().is_none_or(|(_, end)| end < to);
-        for fault in reading.faults(to_end) {
+        for fault in reading.faults_of(is_of_it, to_end) {
             note!("{}: of the moment: {fault}; `hums verify` says more", reading.name());
             outcome = Outcome::Losses;
         }
+        is_over |= reading.span().is_some_and(|(_, end)| end > to);
         if let Some(words) = reading.unproved_end().filter(|_| to_end) {
             note!("{}: {words}", reading.name());
         }

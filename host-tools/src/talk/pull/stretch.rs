@@ -109,7 +109,12 @@ impl Reading {
 
     /// What is wrong with them, as parts of sentences; with `to_end` also that nothing proves that the log ends with them.
     pub(super) fn faults(&self, to_end: bool) -> Vec<String> {
-        let unread = self.unread().as_ref().map(Unread::words);
+        self.faults_of(|_| true, to_end)
+    }
+
+    /// The same, of what cannot be read only what `is_wanted`.
+    pub(super) fn faults_of(&self, is_wanted: impl FnOnce(&Unread) -> bool, to_end: bool) -> Vec<String> {
+        let unread = self.unread().filter(is_wanted).as_ref().map(Unread::words);
         // What is missing before them is known by their numbers.
         let extent = Extent { from_start: false, to_end, follows: false };
         let failed = failed(&self.overview, extent);
@@ -174,6 +179,11 @@ impl Unread {
     pub(super) fn all(earlier: Option<Self>, later: Option<Self>) -> Option<Self> {
         let (Some(one), Some(other)) = (earlier, later) else { return earlier.or(later) };
         Some(Self { sectors: one.sectors.saturating_add(other.sectors), from: one.from, to: other.to })
+    }
+
+    /// Whether any of them may be of this time: where nothing was read before or behind them, they may be of any.
+    pub(super) fn is_within(&self, from: Instant, to: Instant) -> bool {
+        self.to.is_none_or(|behind| behind >= from) && self.from.is_none_or(|before| before <= to)
     }
 
     /// `2 sectors between 3:47.3 and the end cannot be read`.
