@@ -42,11 +42,11 @@ use crate::latest::Reading;
 use crate::motion::{climb_mps, ground_speed_mps, height_m};
 use crate::observation::{LandedState, VehicleKind};
 use crate::params::{Param, Params};
-use crate::time::{Instant, Span};
+use crate::time::{Instant, Span, Stamp};
 use crate::vehicle::{LANDED_STATE_AGE, Vehicle};
 use evidence::{
     BREAKS_OFF, Doubt, FRESH, FULL_THROTTLE, IDLE_THROTTLE, Lasting, Pressure, Recent, Shock, THRUST_PART,
-    is_known, is_tilted, on_rotors, throttle,
+    is_believed, is_known, is_tilted, on_rotors, throttle,
 };
 
 /// How long after disarming it is watched.
@@ -142,6 +142,8 @@ pub struct Mishap {
     driven_at: Instant,
     /// It was level while it was armed.
     stood: bool,
+    /// When it leaned by more than 60 degrees last, while armed.
+    tilted_at: Stamp,
     /// Where it began, or ended.
     place: Place,
 }
@@ -186,6 +188,7 @@ impl Mishap {
             hover_throttle: 0.0,
             driven_at: Instant::ZERO,
             stood: false,
+            tilted_at: Stamp::NONE,
             place: Place { position: None, height_m: 0 },
         }
     }
@@ -252,7 +255,7 @@ impl Mishap {
         params: &Params,
     ) -> Option<Change> {
         self.note_arming(now, vehicle, flight, params);
-        self.note_rest(now, vehicle);
+        self.note_rest(now, vehicle, params);
         self.doubted(now, vehicle, params);
         self.shocked(now, vehicle);
         let seen = self.seen.take();
@@ -325,7 +328,7 @@ impl Mishap {
     }
 
     /// Since when it has been still, and since when it has moved as what flies.
-    fn note_rest(&mut self, now: Instant, vehicle: &Vehicle) {
+    fn note_rest(&mut self, now: Instant, vehicle: &Vehicle, params: &Params) {
         let speed_mps =
             ground_speed_mps(now, vehicle).unwrap_or(0.0).max(climb_mps(now, vehicle).map_or(0.0, f32::abs));
         // Of what was disarmed, lies on its back or has hit something, the sensors are believed and not the estimate.
@@ -339,10 +342,14 @@ impl Mishap {
         // What is carried home may be armed still, and no motor turns.
         let thrust =
             !on_rotors(now, vehicle) || throttle(now, vehicle).is_none_or(|part| part > IDLE_THROTTLE);
-        let lies = is_tilted(now, vehicle) || self.lies_on_its_back(vehicle);
         let lay_at_m = f32::from(self.place.height_m);
         let rose = height_m(now, vehicle).is_some_and(|height_m| height_m > lay_at_m + ROSE_M);
-        let flies = self.armed && (speed_mps > 2.0 * STILL_MPS || rose) && !lies && thrust;
+        // What sinks where it lies is an estimate that is lost.
+        let moves = speed_mps > 2.0 * STILL_MPS
+            && (!on_rotors(now, vehicle)
+                || (is_believed(vehicle, params)
+                    && climb_mps(now, vehicle).is_none_or(|climb_mps| climb_mps > -2.0 * STILL_MPS)));
+        let flies = self.armed && (moves || rose) && !self.lies(now, vehicle) && thrust;
         self.flies_since = if flies { self.flies_since.or(Some(now)) } else { None };
     }
 
@@ -363,6 +370,16 @@ impl Mishap {
 
     fn was_driven(&self, now: Instant) -> bool {
         self.driven_at > Instant::ZERO && now.since(self.driven_at) <= DRIVEN
+    }
+
+    /// Whether it leaned so far in the last seconds that thrust did not carry it.
+    pub(crate) fn has_tilted(&self, now: Instant) -> bool {
+        self.tilted_at.age(now).is_some_and(|age| age <= RECOVERED)
+    }
+
+    /// Whether it lies on its side or its back.
+    fn lies(&self, now: Instant, vehicle: &Vehicle) -> bool {
+        is_tilted(now, vehicle) || self.lies_on_its_back(vehicle)
     }
 
     fn lies_on_its_back(&self, vehicle: &Vehicle) -> bool {
@@ -437,7 +454,10 @@ impl Mishap {
         let dances = near_ground
             && on_rotors(now, vehicle)
             && throttle(now, vehicle).is_some_and(|part| part >= FULL_THROTTLE);
-        let down = (dances && long && self.speed.greatest() < 2.0 * STILL_MPS)
+        let slow = self.speed.greatest() < 2.0 * STILL_MPS;
+        let struck = self.worst[Kind::Impact as usize] > 0.0;
+        let lies = self.lies(now, vehicle);
+        let down = (long && near_ground && (lies || (slow && (dances || struck))))
             || (self.is_still(now) && (self.is_idle(now, vehicle) || (long && near_ground)))
             || (long && silent)
             || self.disarmed_at.is_some_and(|since| !self.armed && now.since(since) >= WATCHED);
@@ -447,7 +467,8 @@ impl Mishap {
             self.place = Place::of(now, vehicle);
             return Some(Change::Down);
         }
-        if long && self.armed && !dances {
+        // What lies over does not fly, nor does what has not moved since it hit something.
+        if long && self.armed && !dances && !lies && !(struck && slow) {
             self.calm();
             return Some(Change::FliesOn);
         }
@@ -462,6 +483,11 @@ impl Mishap {
     /// When the first shock of the latest impact was.
     pub const fn hit_at(&self) -> Instant {
         self.hit_at
+    }
+
+    /// When it first hit something in this mishap; `None` where it did not.
+    pub fn struck_at(&self) -> Option<Instant> {
+        (self.worst[Kind::Impact as usize] > 0.0).then_some(self.hit_at)
     }
 
     /// The height above home of the last place that was told, metres.

@@ -99,6 +99,11 @@ fn carries(vehicle: &Vehicle, battery: usize) -> bool {
     known.map_or(battery == 0, |known| known.lithium && known.feeds == Feeds::Vehicle)
 }
 
+/// Whether nothing tells the cells of a battery that carries the vehicle, whose count is this one: then its voltage raises no alarm.
+fn lacks_cells(vehicle: &Vehicle, derived: &Derived, battery: usize, count: u8) -> bool {
+    count == 0 && carries(vehicle, battery) && derived.cells().has_voltage(battery)
+}
+
 impl Monitor {
     /// Before the first observation.
     pub fn new(params: Params) -> Self {
@@ -325,11 +330,8 @@ impl Monitor {
     /// Whether nothing tells how many cells a battery has that carries the vehicle: then its voltage raises no alarm.
     pub fn lacks_cells(&self) -> bool {
         let Self { vehicle, derived, params, .. } = self;
-        (0..BATTERIES_MAX).any(|battery| {
-            carries(vehicle, battery)
-                && derived.cells().has_voltage(battery)
-                && derived.cell_count(vehicle, battery, params) == 0
-        })
+        let count = |battery| derived.cell_count(vehicle, battery, params);
+        (0..BATTERIES_MAX).any(|battery| lacks_cells(vehicle, derived, battery, count(battery)))
     }
 
     /// Keeps the cells that are known for the next power-on, and tells once where they are not.
@@ -338,7 +340,7 @@ impl Monitor {
         let come = self.parameters_asked || vehicle.known_for(now) >= CELLS_COME;
         for (battery, kept) in before.cells.iter_mut().enumerate() {
             let count = derived.cell_count(vehicle, battery, params);
-            let unknown = count == 0 && carries(vehicle, battery) && derived.cells().has_voltage(battery);
+            let unknown = lacks_cells(vehicle, derived, battery, count);
             if unknown && come && !*cells_told {
                 *cells_told = true;
                 happenings.push(Happening::CellsUnknown);

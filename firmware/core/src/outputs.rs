@@ -53,6 +53,10 @@ const SUMMED_S: f32 = 6.0;
 const SUM_MAX_PERCENT: f32 = 12.0;
 /// Below this part of the average, percent, a motor was taken out.
 const OUT_PERCENT: f32 = -70.0;
+/// What is told of one that was, and of no other, percent.
+pub(crate) const OFF_PERCENT: f32 = 100.0;
+/// Least above what does not turn, us, of a motor that is given anything.
+const OFF_US: f32 = 50.0;
 /// 30 degrees a second: a pilot yaws faster, and gusts do not turn a vehicle so fast for long.
 const YAWS_RAD_S: f32 = 0.5;
 /// Messages that are further apart are not of the same hover.
@@ -66,6 +70,9 @@ pub(crate) struct MotorOutputs {
     /// Motors that had the pulse of one that does not turn on the ground, and those that had one of the other scale: a bit each.
     idle: u8,
     other_scale: u8,
+    /// Outputs that carried in this flight, and those of them that are given next to nothing now: a bit each.
+    carried: u8,
+    off: u8,
     /// Command against the average of all, percent.
     share: [Departure; JUDGED_MAX],
     at: Stamp,
@@ -82,6 +89,8 @@ impl MotorOutputs {
             port: None,
             idle: 0,
             other_scale: 0,
+            carried: 0,
+            off: 0,
             share: [Departure::NEW; JUDGED_MAX],
             at: Stamp::NONE,
             summed: (0, 0.0),
@@ -112,6 +121,7 @@ impl MotorOutputs {
             }
             return;
         }
+        self.note_off(&outputs.pulses);
         // What has no idle pulse on the ground is a servo.
         if self.idle & all != all || !flies_level(at, vehicle, flight) || yaws(vehicle) {
             return;
@@ -128,6 +138,22 @@ impl MotorOutputs {
             share.follow(given(pulse) / mean * 100.0 - 100.0, step_s, SMOOTHING_S);
         }
         self.judge(count, step_s);
+    }
+
+    /// Which outputs are given next to nothing: also those beyond the motors of the frame that the vehicle says it is.
+    fn note_off(&mut self, pulses: &[u16]) {
+        self.off = 0;
+        for (output, pulse) in pulses.iter().take(JUDGED_MAX).enumerate() {
+            let given = f32::from(pulse.saturating_sub(ZERO_US));
+            self.carried |= u8::from(given > CARRIES_US) << output;
+            self.off |= u8::from(given < OFF_US) << output;
+        }
+        self.off &= self.carried;
+    }
+
+    /// Whether a motor that carried in this flight is given next to nothing: that it does not turn is no fault of its own.
+    pub(crate) fn is_off(&self, motor: u8) -> bool {
+        self.off.checked_shr(u32::from(motor)).is_some_and(|off| off & 1 != 0)
     }
 
     fn judge(&mut self, count: usize, step_s: f32) {
@@ -150,8 +176,11 @@ impl MotorOutputs {
         if !self.is_known() || stands_out < HOLD_PERCENT {
             self.share.iter_mut().for_each(|share| share.learn(step_s));
         }
+        // Opposite to one that is driven alone, one idles: that is the balance, and no fault of its own.
         let out = (0_u8..).zip(&self.share).take(count).find(|(_, share)| share.figure() < OUT_PERCENT);
-        self.alone = out.map_or((first.1, stands_out), |(place, _)| (place, 100.0));
+        let out = out.filter(|_| !self.is_known() || stands_out < HOLD_PERCENT);
+        let weak = (first.1, stands_out.min(OFF_PERCENT.next_down()));
+        self.alone = out.map_or(weak, |(place, _)| (place, OFF_PERCENT));
     }
 
     /// What the motor that stands out most has stood out by over time.

@@ -6,7 +6,7 @@ mod common;
 
 use common::{AUTOPILOT, Quad};
 use hums_core::Monitor;
-use hums_core::health::{Finding, Level};
+use hums_core::health::{Finding, Level, is_off};
 use hums_core::observation::{
     Air, Attitude, Autopilot, Estimator, EstimatorScale, Imu, MOTORS_MAX, Observation, Outputs,
     SecondEstimate, VehicleKind, Wanted, WantedRates,
@@ -497,6 +497,28 @@ fn a_weak_motor_of_a_hexarotor_is_named() {
     let found = findings.iter().find(|one| one.level == Level::Warning).unwrap();
     assert_eq!((found.check, found.instance), ("motor_output", 0));
     assert!((FAULT_MS..FAULT_MS + 4_000).contains(&found.at.as_millis()), "{found:?}");
+}
+
+#[test]
+fn a_dead_motor_at_its_end_stop_stays_the_weak_one_while_the_one_opposite_idles() {
+    let findings = fly(|now_ms, fitted| {
+        let dead = [-350.0, 450.0, 130.0, 130.0, 130.0, 130.0];
+        hexa(fitted, now_ms, if now_ms < FAULT_MS { [0.0; 6] } else { dead });
+    });
+    let told: Vec<_> = findings.iter().filter(|one| one.check == "motor_output").collect();
+    let last = told.last().expect("it is dead");
+    assert!(told.iter().all(|one| one.instance == 1), "{told:?}");
+    assert_eq!((last.level, is_off(last.check, last.value)), (Level::Critical, false));
+}
+
+#[test]
+fn a_motor_that_is_given_nothing_is_off_and_not_weak() {
+    let findings = fly(|now_ms, fitted| {
+        let cut = [125.0, 125.0, -500.0, 125.0, 125.0, -480.0];
+        hexa(fitted, now_ms, if now_ms < FAULT_MS { [0.0; 6] } else { cut });
+    });
+    let found = findings.iter().find(|one| one.check == "motor_output").expect("it is off");
+    assert_eq!((found.instance, is_off(found.check, found.value)), (2, true), "{found:?}");
 }
 
 /// An octocopter's commands round the frame, or of its four arms one after the other (`arms`: two motors each, which turn against each other).

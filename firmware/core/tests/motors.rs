@@ -4,7 +4,9 @@ mod common;
 
 use common::{AUTOPILOT, Quad};
 use hums_core::Monitor;
-use hums_core::observation::{Attitude, Esc, EscGroup, LandedState, Observation, VehicleKind, VtolState};
+use hums_core::observation::{
+    Attitude, Esc, EscGroup, LandedState, MOTORS_MAX, Observation, Outputs, VehicleKind, VtolState,
+};
 use hums_core::params::Params;
 use hums_core::status::LinkReading;
 use hums_core::time::Instant;
@@ -12,6 +14,14 @@ use hums_core::units::{Amperes, Radians, RadiansPerSecond, Rpm};
 
 /// A minute of flight; what is told of motors. `script` gives the vehicle, its ESCs and its yaw rate.
 fn told(script: impl Fn(u64) -> (Quad, Vec<Esc>, f32)) -> Vec<(&'static str, u8)> {
+    told_given(script, |_| None)
+}
+
+/// The same, with the pulses that the motors are given.
+fn told_given(
+    script: impl Fn(u64) -> (Quad, Vec<Esc>, f32),
+    given: impl Fn(u64) -> Option<[u16; MOTORS_MAX]>,
+) -> Vec<(&'static str, u8)> {
     let mut monitor = Monitor::new(Params::defaults());
     let mut findings = Vec::new();
     for now_ms in (0..60_000).step_by(100) {
@@ -26,7 +36,8 @@ fn told(script: impl Fn(u64) -> (Quad, Vec<Esc>, f32)) -> Vec<(&'static str, u8)
         let attitude = Attitude { roll: Radians(0.02), rates: Some(rates), ..Attitude::default() };
         let more =
             [Observation::Attitude(attitude), Observation::Escs(group(0)), Observation::Escs(group(4))];
-        for said in quad.says(now_ms).into_iter().filter(own).chain(more) {
+        let given = given(now_ms).map(|pulses| Observation::Outputs(Outputs { port: 0, pulses }));
+        for said in quad.says(now_ms).into_iter().filter(own).chain(more).chain(given) {
             monitor.observe(now, AUTOPILOT, &said);
         }
         let link = LinkReading { frames_lost: Some(0.0), at: now };
@@ -157,4 +168,28 @@ fn motors_that_the_autopilot_stops_to_turn_are_not_lost_and_a_vehicle_that_lost_
     assert_eq!(turns(0.3, [0.05, 0.2, 9.0, 8.0]), []);
     assert_eq!(turns(2.0, [0.05, 0.2, 9.0, 8.0]).len(), 2, "two of four are lost");
     assert_eq!(turns(0.3, [0.05, 4.0, 9.0, 8.0]), [("motor_loss", 0)], "one is lost");
+}
+
+#[test]
+fn a_motor_that_is_idled_opposite_to_a_dead_one_is_not_a_second_dead_one() {
+    let dead = |idled: u16| {
+        let script = |now_ms: u64| {
+            let quad = Quad { height: if now_ms < 4_000 { 0.0 } else { 20.0 }, ..Quad::healthy() };
+            let currents = if now_ms < 20_000 { [5.0; 6] } else { [6.0, 0.05, 6.0, 6.0, 0.05, 6.0] };
+            (quad, escs_of(&currents), 0.3)
+        };
+        told_given(script, |now_ms| {
+            let mut pulses = [900; MOTORS_MAX];
+            pulses[..6].copy_from_slice(&match now_ms {
+                0..4_000 => [1_000; 6],
+                4_000..20_000 => [1_500; 6],
+                _ => [1_550, 2_000, 1_550, 1_550, idled, 1_550],
+            });
+            Some(pulses)
+        })
+    };
+    let lost =
+        |idled| dead(idled).into_iter().filter(|(check, _)| *check == "motor_loss").collect::<Vec<_>>();
+    assert_eq!(lost(1_000), [("motor_loss", 1)], "the autopilot gives it nothing");
+    assert_eq!(lost(1_500), [("motor_loss", 1), ("motor_loss", 4)], "it is given as much as the others");
 }

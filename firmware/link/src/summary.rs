@@ -432,12 +432,19 @@ pub fn text(finding: &Finding) -> Text {
         Level::Stale => return Text::new(format_args!("HUMS: no data: {}", said.name_of(instance))),
         Level::Advisory | Level::Warning | Level::Critical => {}
     }
-    let mut text = Text::new(format_args!("HUMS: {}", said.alarm_of(instance, feeds)));
+    let is_off = health::is_off(check, value);
+    let mut text = if is_off {
+        Text::new(format_args!("HUMS: {}", health::off_alarm(instance)))
+    } else {
+        Text::new(format_args!("HUMS: {}", said.alarm_of(instance, feeds)))
+    };
     // Nobody lands because of a camera's battery.
-    let is_told = level == Level::Critical && !said.advice.is_empty() && feeds != Feeds::Payload;
+    let is_told =
+        level == Level::Critical && !said.advice.is_empty() && feeds != Feeds::Payload && finding.orders;
     let advice = if is_told { Text::new(format_args!(", {}", said.advice)) } else { Text::default() };
     if let Some((before, after)) = said.around_value(finding.unit)
         && value.is_finite()
+        && !is_off
     {
         let value = Text::new(format_args!(": {before}{}{after}", quantity(value, finding.unit).as_str()));
         // What to do says more than how much.

@@ -9,7 +9,8 @@
 //!   of an event, or waits for the event's end, and is told if it is still so. So is what has no data, or is good again. That a check no longer applies, as after landing, is no news: nobody knows
 //!   whether what was bad is good.
 //! * Of a mishap its first kind is told, and one more that asks for something else where nothing led to it; that it is down, and
-//!   where, comes by itself. What is mild and waits is a consequence, and is not told any longer.
+//!   where, comes by itself. One whose order does not fit the vehicle ([`Finding::orders`]) is told without it, and
+//!   what led to it is not counted. What is mild, began with it or after it, and waits is a consequence, and is not told any longer.
 //! * That something is over is told only of what was told; that there are no data, only while no alarm is open.
 //! * What is not critical waits while an event goes on of which something critical was told, and at most [`MILD_MAX`] are told in any
 //!   [`SPAN`], the worst first.
@@ -115,7 +116,8 @@ impl Telling {
         if finding.level == Level::Critical {
             let is_running = if is_mishap { event.told > 0 } else { event.is_running(now) };
             let advice = health::said(finding.check).map_or("", |said| said.advice);
-            let is_told = is_running && (event.asked_for(advice) || (is_mishap && event.told >= MISHAP_MAX));
+            let is_asked_for = finding.orders && event.asked_for(advice);
+            let is_told = is_running && (is_asked_for || (is_mishap && event.told >= MISHAP_MAX));
             return if is_told { Fate::Never } else { Fate::Now };
         }
         if is_mishap {
@@ -135,12 +137,13 @@ impl Telling {
         told.subsystem == Subsystem::Mishap
             && waits.level != Level::Critical
             && health::is_of_mishap(waits.subsystem)
+            && health::is_with_mishap(waits.at, told.at)
     }
 
     /// It went.
     pub(crate) fn told(&mut self, now: Instant, finding: &Finding) {
         let is_mishap = finding.subsystem == Subsystem::Mishap;
-        let is_led_to = is_mishap && self.events.iter().any(|event| event.is_running(now));
+        let is_led_to = is_mishap && finding.orders && self.events.iter().any(|event| event.is_running(now));
         let now_ms = now.as_millis() as u32;
         let event = &mut self.events[family(finding.subsystem) as usize];
         let goes_on = if is_mishap { event.told > 0 } else { event.is_running(now) };
@@ -149,11 +152,11 @@ impl Telling {
         }
         event.told = event.told.saturating_add(1);
         let key = key(finding);
-        if finding.level == Level::Critical {
+        if finding.level == Level::Critical && finding.orders {
             if let Some(free) = event.critical.iter_mut().find(|number| number.is_none()) {
                 *free = key.map(|(number, _)| number);
             }
-        } else {
+        } else if finding.level != Level::Critical {
             // There was room.
             let _ = self.mild.push_back(now_ms);
         }

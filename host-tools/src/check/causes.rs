@@ -2,10 +2,10 @@
 
 use std::collections::BTreeMap;
 
-use hums_core::health::Level;
+use hums_core::health::{Level, because};
 use hums_core::time::Instant;
 
-use super::problem::cause;
+use super::problem::began;
 use crate::summary::FindingLine;
 
 /// A check of a part that is not well.
@@ -38,9 +38,9 @@ pub fn causes(findings: &[FindingLine]) -> Vec<Option<String>> {
         one.unexplained.push(place);
         // Also what came before: the consequence may be seen first.
         let alarms: Vec<(Instant, &str, Level)> =
-            open.values().map(|one| (one.since, one.check, one.level)).collect();
+            open.values().map(|one| (began(one.check, one.since), one.check, one.level)).collect();
         for one in open.values_mut().filter(|one| !one.unexplained.is_empty()) {
-            if let Some(cause) = cause(one.check, one.level, one.since, alarms.iter().copied()) {
+            if let Some(cause) = because(one.check, one.level, one.since, alarms.iter().copied()) {
                 for place in one.unexplained.drain(..) {
                     if let Some(known) = causes.get_mut(place) {
                         *known = Some(cause.to_owned());
@@ -93,5 +93,25 @@ mod tests {
             (0..).zip(&causes).filter_map(|(at, cause)| cause.as_ref().map(|_| at)).collect();
         assert_eq!(explained, [1, 4], "the last one had stood for twenty seconds: {causes:?}");
         assert_eq!(causes[1].as_deref(), Some("gps_fix"));
+    }
+
+    #[test]
+    fn a_mishap_explains_what_begins_with_it_and_nothing_from_before() {
+        let findings = [
+            finding(10, "airspeed_alert", "warning"),
+            finding(11, "sinking", "critical"),
+            finding(12, "ekf_test_ratio", "warning"),
+            finding(20, "sinking", "ok"),
+            finding(20, "ekf_test_ratio", "ok"),
+            finding(30, "compass_heading", "warning"),
+            finding(32, "clipping", "warning"),
+            // A second after what hit something came to rest.
+            finding(33, "impact", "critical"),
+        ];
+        let causes = causes(&findings);
+        let explained: Vec<Option<&str>> = causes.iter().map(Option::as_deref).collect();
+        let none = None;
+        let expected = [none, none, Some("sinking"), none, none, none, Some("impact"), none];
+        assert_eq!(explained, expected);
     }
 }

@@ -23,6 +23,17 @@ pub struct Flight {
     pub landed: bool,
     /// It was disarmed in the air, at this height above home, m.
     pub disarmed_at_m: Option<f32>,
+    /// A mishap ended it: when the vehicle was down, or hit something.
+    pub mishap: Option<Mishap>,
+}
+
+/// How a mishap ended a flight.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Mishap {
+    /// When it hit something first, or was down.
+    pub at: Instant,
+    /// It hit something.
+    pub is_impact: bool,
 }
 
 /// Flights as they come, up to [`LISTED_MAX`].
@@ -63,7 +74,15 @@ impl Flights {
         self.open = self.list.len() < LISTED_MAX;
         if self.open {
             let air = now.since(from);
-            self.list.push(Flight { from, to: now, air, took_off, landed: false, disarmed_at_m: None });
+            self.list.push(Flight {
+                from,
+                to: now,
+                air,
+                took_off,
+                landed: false,
+                disarmed_at_m: None,
+                mishap: None,
+            });
         }
     }
 
@@ -131,14 +150,25 @@ impl Flights {
     }
 
     /// A mishap began or ended.
-    pub(super) fn mishap(&mut self, change: Change, monitor: &Monitor) {
+    pub(super) fn mishap(
+        &mut self,
+        change: Change,
+        now: Instant,
+        hit_at: Option<Instant>,
+        monitor: &Monitor,
+    ) {
         match change {
             Change::Began(Kind::Disarmed) => {
                 if let Some(flight) = self.list.last_mut() {
                     flight.disarmed_at_m = Some(f32::from(monitor.mishap().height_m()));
                 }
             }
-            Change::Down => self.crashed = self.open,
+            Change::Down => {
+                self.crashed = self.open;
+                if let Some(flight) = self.list.last_mut().filter(|_| self.open) {
+                    flight.mishap = Some(Mishap { at: hit_at.unwrap_or(now), is_impact: hit_at.is_some() });
+                }
+            }
             Change::Began(_) | Change::FliesOn | Change::OnBench(_) => {}
         }
     }

@@ -68,6 +68,8 @@ struct FlightJson {
     took_off: bool,
     landed: bool,
     disarmed_at_m: Option<f32>,
+    impact_s: Option<f64>,
+    down_s: Option<f64>,
 }
 
 #[derive(Serialize)]
@@ -215,6 +217,7 @@ fn vehicle(judged: &Judged) -> Option<VehicleJson> {
 }
 
 fn flight(flight: &Flight) -> FlightJson {
+    let mishap = |is_impact| flight.mishap.filter(|mishap| mishap.is_impact == is_impact);
     FlightJson {
         from_s: flight.from.as_secs_f64(),
         to_s: flight.to.as_secs_f64(),
@@ -222,6 +225,8 @@ fn flight(flight: &Flight) -> FlightJson {
         took_off: flight.took_off,
         landed: flight.landed,
         disarmed_at_m: flight.disarmed_at_m,
+        impact_s: mishap(true).map(|mishap| mishap.at.as_secs_f64()),
+        down_s: mishap(false).map(|mishap| mishap.at.as_secs_f64()),
     }
 }
 
@@ -243,7 +248,7 @@ fn problem(problem: &Problem, time_utc: Option<String>) -> ProblemJson<'_> {
         unit: &problem.unit,
         because: problem.because.as_deref(),
         detail: (!problem.details.is_empty()).then(|| problem.details.join(", ")),
-        meaning: words.map_or("", |words| words.meaning),
+        meaning: states::meaning(&problem.check, problem.value),
         action: words.map_or("", |words| words.action),
     }
 }

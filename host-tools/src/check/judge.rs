@@ -23,6 +23,7 @@ use hums_core::usage::UsageCounter;
 use hums_core::vehicle::Vehicle;
 use hums_link::sequence::Sequences;
 
+use super::cells::Cells;
 use super::clock::{Clock, SETTLE};
 use super::coverage::{Coverage, Recording};
 use super::details::{self, Details};
@@ -35,7 +36,6 @@ use crate::source::item::{About, Cause as Why, Event, Fact, Gap, Item, Text};
 use crate::source::recording::Format;
 use crate::source::told::{Finding, Told};
 use crate::summary::EndsInAir;
-use crate::utc::moment;
 
 /// Silence that is stepped through: longer than each debounce and each time after which a value is stale.
 const SILENCE_MAX: Span = Span::from_secs(75);
@@ -49,14 +49,11 @@ const HIDES_FLIGHT: Span = Span::from_secs(10);
 /// What flies on is seen to fly so long after the silence: longer than a landing needs to be seen.
 const SEEN: Span = Span::from_secs(3);
 
-/// Parameters that tell of cells come within this, where a recording begins in the air.
-const CELLS_COME: Span = Span::from_secs(2);
-
 /// The check of disarming in the air.
 const DISARMED: &str = "disarmed_in_air";
 
 /// The check of an impact.
-const IMPACT: &str = "impact";
+pub(super) const IMPACT: &str = "impact";
 
 /// Where a recording was heard.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -116,42 +113,6 @@ impl Limits {
 struct Last {
     at: Instant,
     airborne: bool,
-}
-
-/// What is known of how many cells a battery has that carries the vehicle.
-#[derive(Clone, Copy, Debug, Default)]
-struct Cells {
-    /// In the air nothing told it here: from and to.
-    unknown: Option<(Instant, Instant)>,
-    /// Nothing told it to the box.
-    unknown_on_board: bool,
-}
-
-impl Cells {
-    /// Whether no alarm came from the voltage for that.
-    fn are_unknown(&self, by: JudgedBy) -> bool {
-        match by {
-            JudgedBy::Board => self.unknown_on_board,
-            JudgedBy::Here => self.unknown.is_some_and(|(from, to)| to.since(from) >= CELLS_COME),
-        }
-    }
-
-    /// As a sentence; `None` where there is nothing to say of it.
-    fn words(&self, by: JudgedBy, begins_in_air: bool) -> Option<String> {
-        if self.are_unknown(by) {
-            let when = self
-                .unknown
-                .map_or_else(String::new, |(from, to)| format!(" from {} to {}", moment(from), moment(to)));
-            return Some(format!(
-                "cells not known{when}: the battery's voltage raised no alarm; a file with BAT_CELLS (--params) tells how many"
-            ));
-        }
-        let is_guess = by == JudgedBy::Board && begins_in_air && self.unknown.is_some();
-        is_guess.then(|| {
-            "the box was started in the air, and took the number of cells from its last flight: a guess; BAT_CELLS makes it sure"
-                .to_owned()
-        })
-    }
 }
 
 /// A silence of which is not known yet what it hides.
@@ -218,7 +179,7 @@ impl Judge {
             silence: None,
             coverage: Coverage::new(),
             here: Problems::default(),
-            board: Problems::default(),
+            board: Problems::of_box(),
             checked_on_board: false,
             cells: Cells::default(),
             flights: Flights::default(),
@@ -442,7 +403,8 @@ impl Judge {
             }
             Told::Peak { check, instance, value } => self.board.peak(check, *instance, *value),
             Told::Checked => self.checked_on_board = true,
-            Told::CellsUnknown => self.cells.unknown_on_board = true,
+            Told::CellsUnknown => self.cells.told_unknown(),
+            Told::StoreNew => self.cells.nothing_stored(),
             Told::Part { place, component } => self.monitor.learn_component(*place, *component),
             Told::Parameter { .. } | Told::Missing { .. } => {}
         }
@@ -581,13 +543,16 @@ impl Judge {
                 }
                 Happening::Landing => self.flights.landing(),
                 Happening::OtherVehicle => self.flights.break_off(),
-                Happening::Mishap(change) => self.flights.mishap(change, &self.monitor),
+                Happening::Mishap(change) => {
+                    let hit_at = self.monitor.mishap().struck_at();
+                    let hit_at = hit_at.map(|hit_at| Clock::recording(now, steps, hit_at));
+                    self.flights.mishap(change, now, hit_at, &self.monitor);
+                }
                 _ => {}
             }
         }
         if self.monitor.flight().airborne() && self.monitor.lacks_cells() {
-            let (from, _) = *self.cells.unknown.get_or_insert((now, now));
-            self.cells.unknown = Some((from, now));
+            self.cells.lack(now);
         }
         let heard_at = self.monitor.vehicle().heartbeat.at();
         self.flights.step(now, steps, steps.since(heard_at.unwrap_or(steps)), &self.monitor);
@@ -715,7 +680,7 @@ impl Judge {
             judged,
             not_judged,
             remarks,
-            cells_unknown: self.cells.unknown.filter(|_| self.cells.are_unknown(by)).map(|(from, _)| from),
+            cells_unknown: self.cells.unknown_since(by),
             gaps: self.gaps,
             holes: self.holes,
             damages: self.damages,

@@ -4,6 +4,7 @@
 //! its flights; [`judged`](mod@judged) is what came of it, which [`text`] and [`json`] say.
 
 pub mod causes;
+mod cells;
 pub mod checked;
 mod clock;
 mod coverage;

@@ -33,7 +33,8 @@ impl Judged {
         self.findings_count -= (findings - self.findings.len()) as u64;
         self.flights.retain(|flight| !is_out(flight.from));
         for flight in self.flights.iter_mut().filter(|flight| flight.from < from && flight.to >= from) {
-            (flight.to, flight.landed, flight.disarmed_at_m) = (from, false, None);
+            (flight.to, flight.landed) = (from, false);
+            (flight.disarmed_at_m, flight.mishap) = (None, None);
             flight.air = flight.air.min(from.since(flight.from));
         }
         self.ends_in_air = self.ends_in_air.filter(|end| !is_out(end.at));

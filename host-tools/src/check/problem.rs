@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use hums_core::health::{Level, Side, Subsystem, because, checks};
 use hums_core::time::{Instant, Span};
 
+use super::judge::IMPACT;
 use crate::part;
 use crate::source::told::Finding;
 
@@ -13,8 +14,8 @@ pub const LISTED_MAX: usize = 10_000;
 /// Parts that are followed at most: there are 140 of them, and a log may name what it likes.
 const FOLLOWED_MAX: usize = 1_000;
 
-/// A cause may be seen so much later than what it explains: figures are smoothed over 4 s, and limits are passed for 3 s and more.
-const SEEN_LATE: Span = Span::from_secs(10);
+/// A box finds an impact once what hit something has lain still for so long.
+const LIES_STILL: Span = Span::from_secs(1);
 
 /// Names of what a check was of: there are 32 sensors.
 const DETAILS_MAX: usize = 32;
@@ -46,7 +47,7 @@ pub struct Problem {
     pub unit: String,
     /// What it was of, where the check is of several: failsafes, sensors. By their names.
     pub details: Vec<String>,
-    /// The check that explains it: one whose alarm was as bad, each time that it was wrong.
+    /// The check that explains it: one whose alarm was as bad when it was found, each time that it was wrong.
     pub because: Option<String>,
 }
 
@@ -84,6 +85,8 @@ pub(super) struct Problems {
     pub findings_count: u64,
     /// By check and part.
     open: BTreeMap<(String, u8), Followed>,
+    /// A box found them, when it did ([`began`]).
+    of_box: bool,
 }
 
 /// One check of one part.
@@ -110,6 +113,11 @@ impl Followed {
 }
 
 impl Problems {
+    /// Of what a box found.
+    pub(super) fn of_box() -> Self {
+        Self { of_box: true, ..Self::default() }
+    }
+
     /// Takes the next change; `gaps` is the sum of the recording's gaps until then.
     pub(super) fn take(&mut self, finding: &Finding, gaps: Span) {
         self.findings_count += 1;
@@ -167,12 +175,16 @@ impl Problems {
         let alarms: Vec<(Instant, String, Level)> = self
             .open
             .values()
-            .filter_map(|followed| Some((followed.since?.0, followed.problem.check.clone(), followed.level)))
+            .filter_map(|followed| {
+                let (since, check) = (followed.since?.0, &followed.problem.check);
+                let since = if self.of_box { began(check, since) } else { since };
+                Some((since, check.clone(), followed.level))
+            })
             .collect();
         for followed in self.open.values_mut().filter(|followed| followed.unexplained) {
             let Some((since, _)) = followed.since else { continue };
             let alarms = alarms.iter().map(|(since, check, level)| (*since, check.as_str(), *level));
-            if let Some(cause) = cause(&followed.problem.check, followed.level, since, alarms) {
+            if let Some(cause) = because(&followed.problem.check, followed.level, since, alarms) {
                 // Of several times the one counts that had its worst level first.
                 if followed.problem.because.is_none() || followed.problem.at >= since {
                     followed.problem.because = Some(cause.to_owned());
@@ -251,15 +263,13 @@ impl Problems {
     }
 }
 
-/// Which of the checks that have an alarm, each since a time, explains that of `effect`: also one that was seen a little later.
-pub fn cause<'a>(
-    effect: &str,
-    level: Level,
-    since: Instant,
-    alarms: impl Iterator<Item = (Instant, &'a str, Level)>,
-) -> Option<&'a str> {
-    let in_time = alarms.filter(|(cause_since, ..)| cause_since.since(since) <= SEEN_LATE);
-    because(effect, level, in_time.map(|(_, check, level)| (check, level)))
+/// When what a box found began: a check of which it found an alarm at this time.
+pub fn began(check: &str, found_at: Instant) -> Instant {
+    if check == IMPACT {
+        Instant::from_micros(found_at.as_micros().saturating_sub(LIES_STILL.as_micros()))
+    } else {
+        found_at
+    }
 }
 
 /// From a time, with the sum of the gaps until then, to another.
@@ -354,7 +364,8 @@ pub(super) mod tests {
             found.iter().find(|one| one.check == "vibration").and_then(|one| one.because.clone())
         };
         assert_eq!(because(8), Some("sinking".to_owned()));
-        assert_eq!(because(15), Some("sinking".to_owned()), "seen late");
+        assert_eq!(because(10), Some("sinking".to_owned()));
+        assert_eq!(because(15), None, "it shook, and then it sank");
         assert_eq!(because(72), None);
     }
 

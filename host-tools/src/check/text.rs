@@ -10,7 +10,7 @@ use hums_core::health::{Level, Side, Subsystem, vocabulary};
 use hums_core::time::Span;
 
 use super::checked::Checked;
-use super::flights::Flight;
+use super::flights::{Flight, Mishap};
 use super::judged::{Judged, JudgedBy};
 use super::problem::{Problem, side};
 use crate::colour::level as coloured;
@@ -20,7 +20,7 @@ use crate::plural::count;
 use crate::printable::word;
 use crate::source::item::{About, Cause, Gap};
 use crate::source::recording::Format;
-use crate::states::{Shown, shown};
+use crate::states::{Shown, meaning, shown};
 use crate::summary::is_possible;
 use crate::utc::{clock, iso8601, moment};
 
@@ -28,6 +28,9 @@ use crate::utc::{clock, iso8601, moment};
 const SHOWN_MAX: usize = 6;
 /// Reasons and places that are shown; `--json` has them all.
 const LINES_MAX: usize = 8;
+
+/// The word of the worst level, as it stands before a line.
+const CRITICAL: &str = "CRITICAL";
 
 /// One log, as a screen.
 pub fn screen(checked: &Checked) -> String {
@@ -38,7 +41,10 @@ pub fn screen(checked: &Checked) -> String {
     let _ = writeln!(text, "  in air   {}", in_air(judged));
     let _ = writeln!(text, "  verdict  {}{}", verdict(judged), but(checked));
     text.push('\n');
-    problems(&mut text, judged);
+    problems(&mut text, &judged.problems);
+    if judged.by == JudgedBy::Board && judged.findings_count > 0 {
+        text.push_str("  (found by the monitor on board)\n");
+    }
     not_judged(&mut text, judged);
     damage(&mut text, judged);
     if let Some(end) = &judged.ends_in_air {
@@ -321,9 +327,16 @@ fn in_air(judged: &Judged) -> String {
 
 /// What of flights the log does not have, and how the last one ended otherwise.
 fn not_seen(flights: &[Flight]) -> String {
-    let disarmed = flights.last().is_some_and(|flight| flight.disarmed_at_m.is_some());
+    let last = flights.last();
+    let ended = match last {
+        Some(Flight { disarmed_at_m: Some(_), .. }) => Some("disarming in the air".to_owned()),
+        Some(Flight { mishap: Some(Mishap { at, is_impact }), .. }) => {
+            Some(format!("{}, {}", if *is_impact { "an impact" } else { "a mishap" }, moment(*at)))
+        }
+        _ => None,
+    };
     let took_off = flights.first().is_none_or(|flight| flight.took_off);
-    let landed = disarmed || flights.last().is_none_or(|flight| flight.landed);
+    let landed = ended.is_some() || last.is_none_or(|flight| flight.landed);
     let of = |one, many| if flights.len() == 1 { one } else { many };
     let parts = [
         (took_off, of("whose take-off", "the take-off of the first one")),
@@ -335,11 +348,8 @@ fn not_seen(flights: &[Flight]) -> String {
         [part] => format!(", {part} is not in the log"),
         parts => format!(", {} are not in the log", parts.join(" and ")),
     };
-    if disarmed {
-        text.push_str(of(
-            ", which ended by disarming in the air",
-            ", the last of which ended by disarming in the air",
-        ));
+    if let Some(ended) = ended {
+        let _ = write!(text, "{}{ended}", of(", which ended by ", ", the last of which ended by "));
     }
     text
 }
@@ -379,30 +389,48 @@ fn verdict(judged: &Judged) -> String {
     }
 }
 
-fn problems(text: &mut String, judged: &Judged) {
-    let groups = groups(&judged.problems);
-    let (causes, effects): (Vec<_>, Vec<_>) =
+fn problems(text: &mut String, problems: &[Problem]) {
+    let groups = groups(problems);
+    let (mut causes, effects): (Vec<_>, Vec<_>) =
         groups.iter().partition(|group| cause(group, &groups).is_none());
+    let explained = |check: &str| {
+        let of_it = effects.iter().filter(|effect| cause(effect, &groups) == Some(check));
+        of_it.copied().collect::<Vec<_>>()
+    };
+    // What a check explains may be worse than itself by now.
+    let is_any_critical =
+        |group: &[&Problem]| explained(check_of(group)).into_iter().any(|effect| is_critical(effect));
+    causes.sort_by_key(|group| {
+        let is_critical = is_critical(group) || is_any_critical(group);
+        (Reverse(is_critical), group.first().map(|first| first.at))
+    });
     for (place, group) in causes.iter().enumerate() {
         let Some(first) = group.first() else { continue };
-        let words = vocabulary(&first.check);
-        let level = if first.level == Level::Critical { "CRITICAL" } else { "warning" };
-        let _ =
-            writeln!(text, "  {:<8} {:>9}  {}", coloured(level), moment(first.at), word(&sentence(group)));
-        if let Some(words) = words.filter(|_| place < SHOWN_MAX) {
-            let _ = writeln!(text, "                      {}", words.meaning);
-            let _ = writeln!(text, "                      {}", words.action);
-        }
         // The first of its groups has what it explains.
         let is_first = causes.iter().position(|group| check_of(group) == first.check) == Some(place);
-        for effect in effects.iter().filter(|effect| is_first && cause(effect, &groups) == Some(&first.check))
-        {
-            let at = effect.first().map(|effect| moment(effect.at)).unwrap_or_default();
-            let _ = writeln!(text, "                      with it {at}  {}", word(&sentence(effect)));
+        let effects = if is_first { explained(&first.check) } else { Vec::new() };
+        let is_raised = is_first && !is_critical(group) && is_any_critical(group);
+        let level = if is_raised { CRITICAL } else { level_of(group) };
+        let itself = if is_raised { " (itself a warning)" } else { "" };
+        let sentence_of_it = sentence(group);
+        let line = word(&sentence_of_it);
+        let _ = writeln!(text, "  {:<8} {:>9}  {line}{itself}", coloured(level), moment(first.at));
+        if place < SHOWN_MAX {
+            let _ = writeln!(text, "                      {}", meaning(&first.check, first.value));
+            let _ = writeln!(text, "                      {}", action(first));
+        }
+        for effect in effects {
+            let Some(of_it) = effect.first() else { continue };
+            let (at, level) = (moment(of_it.at), level_of(effect));
+            let _ =
+                writeln!(text, "                      with it {at}  {level}: {}", word(&sentence(effect)));
             // What a card that is out looks like besides has no meaning of its own.
-            let has_meaning = place < SHOWN_MAX && first.subsystem != Subsystem::Recorder;
-            if let Some(words) = vocabulary(check_of(effect)).filter(|_| has_meaning) {
-                let _ = writeln!(text, "                              {}", words.meaning);
+            if place < SHOWN_MAX && first.subsystem != Subsystem::Recorder {
+                let _ =
+                    writeln!(text, "                              {}", meaning(&of_it.check, of_it.value));
+                if is_raised && is_critical(effect) {
+                    let _ = writeln!(text, "                              {}", action(of_it));
+                }
             }
         }
         if place < SHOWN_MAX {
@@ -412,9 +440,20 @@ fn problems(text: &mut String, judged: &Judged) {
     if causes.len() > SHOWN_MAX {
         text.push('\n');
     }
-    if judged.by == JudgedBy::Board && judged.findings_count > 0 {
-        text.push_str("  (found by the monitor on board)\n");
-    }
+}
+
+/// All of a group have one level.
+fn is_critical(group: &[&Problem]) -> bool {
+    group.first().is_some_and(|first| first.level == Level::Critical)
+}
+
+fn level_of(group: &[&Problem]) -> &'static str {
+    if is_critical(group) { CRITICAL } else { "warning" }
+}
+
+/// What to do, as a sentence.
+fn action(problem: &Problem) -> &'static str {
+    vocabulary(&problem.check).map_or("", |words| words.action)
 }
 
 /// The check of a group.
@@ -597,9 +636,8 @@ mod tests {
     use super::*;
     use crate::summary::EndsInAir;
 
-    #[test]
-    fn of_several_parts_the_worst_value_is_shown() {
-        let problem = |check: &str, instance, value| Problem {
+    fn problem(check: &str, instance: u8, value: f32) -> Problem {
+        Problem {
             subsystem: hums_core::health::Subsystem::Propulsion,
             check: check.to_owned(),
             instance,
@@ -613,7 +651,33 @@ mod tests {
             unit: String::new(),
             details: Vec::new(),
             because: None,
+        }
+    }
+
+    #[test]
+    fn a_warning_that_explains_what_became_critical_stands_as_critical_with_both_their_words() {
+        let ratio = Problem {
+            level: Level::Critical,
+            because: Some("gps_stuck".to_owned()),
+            ..problem("ekf_test_ratio", 0, 2.0)
         };
+        let tilt = Problem { because: Some("gps_stuck".to_owned()), ..problem("ahrs2_tilt", 0, 12.0) };
+        let mut text = String::new();
+        problems(&mut text, &[ratio, problem("vibration", 0, 40.0), problem("gps_stuck", 0, 3.0), tilt]);
+        let lines: Vec<&str> = text.lines().map(str::trim_start).collect();
+        assert!(lines[0].starts_with("CRITICAL"), "{text}");
+        assert!(lines[0].ends_with("[gps_stuck] (itself a warning)"), "{text}");
+        let has = |words: &str| lines.iter().any(|line| line.starts_with(words));
+        assert!(has("with it 0:00.0  CRITICAL: EKF test ratio"), "{text}");
+        assert!(has("with it 0:00.0  warning: attitudes of EKF and AHRS2"), "{text}");
+        let advice = vocabulary("ekf_test_ratio").map_or("", |words| words.action);
+        assert!(has(advice), "{text}");
+        let place = |words: &str| lines.iter().position(|line| line.contains(words));
+        assert!(place("[gps_stuck]") < place("[vibration]"), "{text}");
+    }
+
+    #[test]
+    fn of_several_parts_the_worst_value_is_shown() {
         let shown = |check: &str, values: [f32; 3]| {
             let all: Vec<Problem> =
                 (0..).zip(values).map(|(instance, value)| problem(check, instance, value)).collect();
@@ -667,6 +731,7 @@ mod tests {
             took_off,
             landed,
             disarmed_at_m: None,
+            mishap: None,
         };
         assert_eq!(not_seen(&[flight(true, true)]), "");
         assert_eq!(not_seen(&[flight(true, false)]), ", whose landing is not in the log");
@@ -676,6 +741,14 @@ mod tests {
         assert_eq!(not_seen(&[flight(false, true), flight(true, true)]), first);
         let crashed = Flight { disarmed_at_m: Some(9.0), ..flight(true, false) };
         assert_eq!(not_seen(&[crashed]), ", which ended by disarming in the air");
+        let hit = Some(Mishap { at: Instant::from_millis(91_500), is_impact: true });
+        let hit = Flight { mishap: hit, ..flight(true, false) };
+        assert_eq!(not_seen(&[hit]), ", which ended by an impact, 1:31.5");
+        let two = [
+            flight(true, true),
+            Flight { mishap: hit.mishap.map(|it| Mishap { is_impact: false, ..it }), ..hit },
+        ];
+        assert_eq!(not_seen(&two), ", the last of which ended by a mishap, 1:31.5");
     }
 
     #[test]

@@ -183,6 +183,8 @@ fn part(craft: &Craft, now: Instant, subsystem: Subsystem, known: &Known) -> Par
     let (calm, reason) = if let Some(finding) = ended.filter(|_| level == Level::Stale && !is_link) {
         let why = if silent {
             format!("silent for {}", seconds(craft, now))
+        } else if subsystem == Subsystem::Mishap {
+            "over; inspect the vehicle".to_owned()
         } else {
             "not judged on the ground or disarmed".to_owned()
         };
@@ -236,9 +238,9 @@ fn reason(craft: &Craft, subsystem: Subsystem, level: Level, here: Level, good: 
     let findings = craft.worries.values().filter(|finding| finding.subsystem == subsystem);
     let worst = findings.max_by_key(|finding| (rank(finding.level), finding.at));
     if let Some(finding) = worst.filter(|_| level != Level::Ok) {
-        let alarms = craft.worries.values().map(|worry| (worry.check, worry.level));
+        let alarms = craft.worries.values().map(|worry| (worry.at, worry.check, worry.level));
         // One cause has one order: its own.
-        return match health::because(finding.check, finding.level, alarms) {
+        return match health::because(finding.check, finding.level, finding.at, alarms) {
             Some(cause) => format!("{}, because of: {}", without_advice(finding), name(cause)),
             None => match craft.due(finding) {
                 Some(due) => format!("{}: {}", part::due_words(&due), words(finding)),
@@ -293,6 +295,7 @@ mod tests {
             unit: "V",
             feeds: Feeds::Vehicle,
             because: "",
+            orders: true,
         }
     }
 

@@ -14,6 +14,7 @@ use hums_core::observation::{Autopilot, Feeds, Observation, Source};
 use hums_core::params::Params;
 use hums_core::status::{RecorderStatus, Recording};
 use hums_core::time::{Instant, Span};
+use hums_core::usage::UsageCounter;
 use hums_link::sequence::Sequences;
 use hums_link::{Check, Frame, observe};
 
@@ -84,6 +85,9 @@ pub struct Craft {
     barometer: bool,
     /// Of which parts it is known what they ran before this session.
     lives: [bool; COMPONENTS_MAX],
+    /// Seconds in the air, by the usage: on the ground last, and before the last flight.
+    grounded_s: f64,
+    before_flight_s: f64,
 }
 
 impl Craft {
@@ -111,7 +115,18 @@ impl Craft {
             limits_at: None,
             barometer: false,
             lives: [false; COMPONENTS_MAX],
+            grounded_s: 0.0,
+            before_flight_s: 0.0,
         }
+    }
+
+    /// How long it has been in the air in the last flight, which may go on, in seconds: as the usage counts it.
+    pub fn flown_s(&self) -> f64 {
+        self.airborne_s() - self.before_flight_s
+    }
+
+    fn airborne_s(&self) -> f64 {
+        self.monitor.usage().value(UsageCounter::Flight).unwrap_or(0.0)
     }
 
     /// A log has told of a part, with all that it has run.
@@ -318,6 +333,9 @@ impl Craft {
                 Happening::TakeOff => !self.monitor.flight().was_on_ground(),
                 _ => self.joined && now.since(self.began) <= JOINED,
             };
+            if matches!(happening, Happening::TakeOff | Happening::FlightResumed) {
+                self.before_flight_s = self.grounded_s;
+            }
             if happening == Happening::CellsUnknown {
                 cells_come = true;
                 continue;
@@ -328,6 +346,9 @@ impl Craft {
             if let Some(note) = Note::event(now, happening, joined) {
                 keep(history, now, note);
             }
+        }
+        if !self.monitor.flight().airborne() {
+            self.grounded_s = self.airborne_s();
         }
         // A box may know more of them, and says where it does not.
         if !self.on_the_wire {
@@ -384,6 +405,7 @@ impl Craft {
                     unit: check.unit,
                     feeds: Feeds::Unsaid,
                     because: "",
+                    orders: true,
                 };
                 self.worries.insert(key, finding);
             }

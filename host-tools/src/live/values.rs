@@ -61,10 +61,8 @@ impl<'a> Values<'a> {
         for (name, quantity, limit) in &QUANTITIES {
             let is_known = *quantity != Quantity::FlightTime || tells_flight(craft.monitor.vehicle());
             if let Some((at, value)) = craft.latest.get(*quantity).filter(|_| is_known) {
-                // The time in the air goes on between heartbeats.
-                let running = *quantity == Quantity::FlightTime && now.since(at) <= *limit;
-                let value =
-                    if running { craft.reference.value(now, *quantity).unwrap_or(value) } else { value };
+                let is_flown = *quantity == Quantity::FlightTime;
+                let value = if is_flown { Scalar::Double(craft.flown_s()) } else { value };
                 each(name, Shown::new(now, at, value, *limit));
             }
         }

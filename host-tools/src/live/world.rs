@@ -236,7 +236,7 @@ impl World {
                     craft.say_cells_unknown(at, &mut history);
                 }
             }
-            Told::Checked | Told::Peak { .. } | Told::Missing { .. } => {}
+            Told::Checked | Told::StoreNew | Told::Peak { .. } | Told::Missing { .. } => {}
         }
     }
 

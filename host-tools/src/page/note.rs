@@ -1,7 +1,7 @@
 //! What stands in the list of a page: findings, texts, events.
 
 use hums_core::happening::Happening;
-use hums_core::health::{Finding, VOCABULARY, instances, vocabulary};
+use hums_core::health::{Finding, OFF_MEANING, VOCABULARY, instances, off_alarm, vocabulary};
 use hums_core::observation::Feeds;
 use hums_core::time::Instant;
 use hums_link::encode::COMPONENT;
@@ -9,7 +9,7 @@ use serde::Serialize;
 
 use crate::names::{check_name, unit_name};
 use crate::part;
-use crate::states::{Shown, shown};
+use crate::states::{Shown, meaning, shown};
 use crate::statustext::Text;
 use crate::summary::FindingLine;
 
@@ -88,6 +88,8 @@ impl Cause {
 const AGAIN_S: f64 = 45.0;
 /// Before the words of what is good again.
 const OVER: &str = "over: ";
+/// The check of motors by what they are given, which has words of its own for one that is given nothing.
+const OUTPUT: &str = "motor_output";
 
 /// Which check and which part of it the words of a HUMS's text are of, and what they say besides.
 fn told_check(words: &str) -> Option<(&'static str, u8, &str)> {
@@ -101,7 +103,10 @@ fn told_check(words: &str) -> Option<(&'static str, u8, &str)> {
             Some(silent) => silent.strip_prefix(said.name_of(part).to_string().as_str()),
             None => FEEDS
                 .iter()
-                .find_map(|feeds| words.strip_prefix(said.alarm_of(part, *feeds).to_string().as_str())),
+                .find_map(|feeds| words.strip_prefix(said.alarm_of(part, *feeds).to_string().as_str()))
+                .or_else(|| {
+                    words.strip_prefix(off_alarm(part).to_string().as_str()).filter(|_| said.check == OUTPUT)
+                }),
         }?;
         (rest.is_empty() || rest.starts_with([':', ','])).then_some((said.check, part, rest))
     });
@@ -140,7 +145,7 @@ impl Note {
                 state,
                 limit,
                 unit: unit_name(&finding.unit).to_owned(),
-                meaning: known.filter(|_| is_worry).map_or("", |known| known.meaning),
+                meaning: if is_worry { meaning(&finding.check, finding.value) } else { "" },
                 action: known.filter(|_| is_worry).map_or("", |known| known.action),
                 because: because.map(Cause::of),
             }),
@@ -198,6 +203,7 @@ impl Note {
         let (check, instance, rest) = told_check(words)?;
         let known = vocabulary(check)?;
         let level = if words.starts_with(OVER) { "ok" } else { text.level() };
+        let is_off = check == OUTPUT && words.starts_with(off_alarm(instance).to_string().as_str());
         let is_worry = matches!(level, "warning" | "critical");
         let rest = rest.trim_start_matches([':', ',', ' ']);
         let name = check_name(check, instance);
@@ -207,7 +213,11 @@ impl Note {
             level,
             from: "on board".to_owned(),
             subsystem: "",
-            words: if rest.is_empty() { name } else { format!("{name}: {rest}") },
+            words: match rest {
+                _ if is_off => format!("{name}: no output"),
+                "" => name,
+                rest => format!("{name}: {rest}"),
+            },
             found: Some(Found {
                 check: check.to_owned(),
                 instance,
@@ -217,7 +227,11 @@ impl Note {
                 state: None,
                 limit: None,
                 unit: String::new(),
-                meaning: if is_worry { known.meaning } else { "" },
+                meaning: match is_worry {
+                    true if is_off => OFF_MEANING,
+                    true => known.meaning,
+                    false => "",
+                },
                 action: if is_worry { known.action } else { "" },
                 because: None,
             }),
@@ -289,6 +303,7 @@ mod tests {
                     unit: check.unit,
                     feeds,
                     because: "",
+                    orders: true,
                 };
                 let text = summary::text(&finding);
                 let words = text.as_str().trim_start_matches(OURS);

@@ -19,6 +19,10 @@ pub struct Flight {
     pub(super) landed: bool,
     /// Disarmed in the air, which is no landing.
     pub(super) disarmed_in_air: bool,
+    /// When it hit what ended it.
+    pub(super) impact_s: Option<f64>,
+    /// When it was down, where a mishap without an impact ended it.
+    pub(super) down_s: Option<f64>,
     /// `None` where nothing told it.
     pub(super) height_max_m: Option<f32>,
     pub(super) speed_max_m_s: Option<f32>,
@@ -67,6 +71,7 @@ impl Extents {
     pub fn flights(&self, judged: &[Judged]) -> Vec<Flight> {
         let flight = |(index, flight): (usize, &Judged)| {
             let extent = self.0.get(index).copied().unwrap_or_default();
+            let mishap = |is_impact| flight.mishap.filter(|mishap| mishap.is_impact == is_impact);
             Flight {
                 from_s: flight.from.as_secs_f64(),
                 to_s: flight.to.as_secs_f64(),
@@ -74,6 +79,8 @@ impl Extents {
                 took_off: flight.took_off,
                 landed: flight.landed,
                 disarmed_in_air: flight.disarmed_at_m.is_some(),
+                impact_s: mishap(true).map(|mishap| mishap.at.as_secs_f64()),
+                down_s: mishap(false).map(|mishap| mishap.at.as_secs_f64()),
                 height_max_m: extent.height_max_m,
                 speed_max_m_s: extent.speed_max_m_s,
                 percent_from: extent.percent_from,

@@ -6,6 +6,7 @@ use hums_core::component::{COMPONENTS_MAX, Component, Label};
 use hums_core::health::{self, Level, Subsystem};
 use hums_core::time::Instant;
 use hums_onboard::monitoring::CELLS_UNKNOWN;
+use hums_onboard::persist::STORE_NEW;
 
 use super::item::Gap;
 use crate::loss;
@@ -51,6 +52,8 @@ pub enum Told {
     },
     /// Nothing told the box how many cells a battery has.
     CellsUnknown,
+    /// The box knows nothing of earlier flights.
+    StoreNew,
     /// What only a monitor writes that checks the vehicle's health: its findings are all that there were.
     Checked,
 }
@@ -140,6 +143,7 @@ impl Told {
                 loss::words(loss).map(|_| Self::Missing { from: loss.from, to: loss.to, frames })
             }
             Record::Note(note) if note.text == CELLS_UNKNOWN => Some(Self::CellsUnknown),
+            Record::Note(note) if note.text == STORE_NEW => Some(Self::StoreNew),
             Record::Boot(_) | Record::Usage(_) => Some(Self::Checked),
             _ => None,
         }

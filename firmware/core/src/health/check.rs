@@ -365,8 +365,10 @@ impl Check {
             instance,
             level: change.level,
             previous: change.previous,
-            // What is no longer said is not known to be good.
-            value: if matches!(self.part, Part::Alert) && change.value < 0.0 {
+            // What is no longer said is not known to be good, nor is what a mishap left.
+            value: if (matches!(self.part, Part::Alert) && change.value < 0.0)
+                || (matches!(self.subsystem, Subsystem::Mishap) && matches!(change.level, Level::Ok))
+            {
                 f32::NAN
             } else {
                 change.value
@@ -375,6 +377,7 @@ impl Check {
             unit: self.unit,
             feeds,
             because: "",
+            orders: true,
         }
     }
 }

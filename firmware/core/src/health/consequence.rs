@@ -3,9 +3,17 @@
 //! A dead motor tips the vehicle over, a receiver without a fix makes the estimator doubt, and what is silent has no data at all. Who
 //! hears of all of it at once does not hear the cause. So a finding names the check that explains it, where that has an alarm which is
 //! as bad or worse; it is recorded like any other, and not told to the ground. Where it outlives that alarm it is told by itself.
+//!
+//! A mishap explains only what begins with it or after it ([`is_with_mishap`]): what came before may be its cause, and stands by itself.
 
 use super::finding::{Level, Subsystem};
 use super::tables::check_named;
+use crate::time::{Instant, Span};
+
+/// A cause may be seen so much later than what it explains: figures are smoothed over 4 s, and limits are passed for 3 s and more.
+const SEEN_LATE: Span = Span::from_secs(10);
+/// What begins so shortly before a mishap begins with it: both are seen at a step, and by samples.
+const WITH_MISHAP: Span = Span::from_millis(200);
 
 const GNSS: &[&str] = &[
     "gps_fix",
@@ -120,15 +128,23 @@ pub const fn is_of_mishap(part: Subsystem) -> bool {
     )
 }
 
-/// Which of the checks that have an alarm (a warning, or critical) explains that of `effect`, which went to `level`.
+/// Whether what is wrong since a time begins with a mishap or after it, and not before.
+pub fn is_with_mishap(since: Instant, mishap_since: Instant) -> bool {
+    mishap_since.since(since) <= WITH_MISHAP
+}
+
+/// Which of the checks that have an alarm (a warning, or critical), each since a time, explains that of `effect`, which went to `level` and is
+/// wrong since a time. A cause may be seen a little later than what it explains.
 pub fn because<'a>(
     effect: &str,
     level: Level,
-    mut alarms: impl Iterator<Item = (&'a str, Level)>,
+    since: Instant,
+    alarms: impl Iterator<Item = (Instant, &'a str, Level)>,
 ) -> Option<&'a str> {
+    let mut alarms = alarms.filter(|(cause_since, ..)| cause_since.since(since) <= SEEN_LATE);
     let at_least = match level {
         // What is silent has no data.
-        Level::Stale => return alarms.any(|(cause, _)| cause == "heartbeat").then_some("heartbeat"),
+        Level::Stale => return alarms.any(|(_, cause, _)| cause == "heartbeat").then_some("heartbeat"),
         Level::Warning | Level::Critical => level as u8,
         Level::Ok | Level::Advisory => return None,
     };
@@ -136,17 +152,17 @@ pub fn because<'a>(
     let is_mishap =
         |cause: &str| check_named(cause).is_some_and(|check| check.subsystem == Subsystem::Mishap);
     // A mishap before all, then by row.
-    let place = |cause: &str| {
+    let place = |cause_since: Instant, cause: &str| {
         if by_mishap && is_mishap(cause) {
-            return Some(0);
+            return is_with_mishap(since, cause_since).then_some(0);
         }
         let explains =
             |(causes, effects): &(&[&str], &[&str])| effects.contains(&effect) && causes.contains(&cause);
         ROWS.iter().position(explains).map(|row| row + 1)
     };
     alarms
-        .filter(|(_, level)| *level as u8 >= at_least)
-        .filter_map(|(cause, _)| Some((place(cause)?, cause)))
+        .filter(|(.., level)| *level as u8 >= at_least)
+        .filter_map(|(since, cause, _)| Some((place(since, cause)?, cause)))
         .min_by_key(|(place, _)| *place)
         .map(|(_, cause)| cause)
 }
@@ -159,7 +175,13 @@ mod tests {
         [("gps_fix", Level::Critical), ("vibration", Level::Warning), ("heartbeat", Level::Warning)];
 
     fn why(effect: &'static str, level: Level) -> Option<&'static str> {
-        because(effect, level, ALARMS.into_iter())
+        why_of(effect, level, &ALARMS)
+    }
+
+    /// Of what is wrong since the beginning, as its alarms are.
+    fn why_of(effect: &str, level: Level, alarms: &[(&'static str, Level)]) -> Option<&'static str> {
+        let alarms = alarms.iter().map(|(cause, level)| (Instant::ZERO, *cause, *level));
+        because(effect, level, Instant::ZERO, alarms)
     }
 
     #[test]
@@ -197,17 +219,31 @@ mod tests {
         assert_eq!(why("cell_voltage", Level::Stale), Some("heartbeat"));
         assert_eq!(why("ekf_failsafe", Level::Ok), None);
         for looks in ["card_errors", "card_stall", "record_queue", "record_lost"] {
-            let out = [("recording", Level::Critical)].into_iter();
-            assert_eq!(because(looks, Level::Warning, out), Some("recording"), "a card that is out");
+            let out = [("recording", Level::Critical)];
+            assert_eq!(why_of(looks, Level::Warning, &out), Some("recording"), "a card that is out");
         }
     }
 
     #[test]
     fn a_mishap_comes_before_all_but_the_battery_and_the_links() {
-        let alarms = || [("gps_fix", Level::Critical), ("overturned", Level::Critical)].into_iter();
-        assert_eq!(because("ekf_failsafe", Level::Critical, alarms()), Some("overturned"));
-        assert_eq!(because("load_factor", Level::Warning, alarms()), Some("overturned"));
-        assert_eq!(because("cell_voltage", Level::Warning, alarms()), None);
-        assert_eq!(because("impact", Level::Critical, alarms()), None);
+        let alarms = [("gps_fix", Level::Critical), ("overturned", Level::Critical)];
+        assert_eq!(why_of("ekf_failsafe", Level::Critical, &alarms), Some("overturned"));
+        assert_eq!(why_of("load_factor", Level::Warning, &alarms), Some("overturned"));
+        assert_eq!(why_of("cell_voltage", Level::Warning, &alarms), None);
+        assert_eq!(why_of("impact", Level::Critical, &alarms), None);
+    }
+
+    #[test]
+    fn a_mishap_explains_nothing_that_was_so_before_it() {
+        let at = |ms: u64| Instant::from_millis(60_000 + ms);
+        let why = |effect, mishap_ms: u64| {
+            let alarms =
+                [(at(mishap_ms), "sinking", Level::Critical), (at(3_000), "gps_fix", Level::Critical)];
+            because(effect, Level::Critical, at(0), alarms.into_iter())
+        };
+        assert_eq!(why("motor_loss", 0), Some("sinking"));
+        assert_eq!(why("motor_loss", 200), Some("sinking"), "at the same time, by samples");
+        assert_eq!(why("motor_loss", 400), None, "it lost a motor, and then it sank");
+        assert_eq!(why("ekf_failsafe", 400), Some("gps_fix"), "seen late");
     }
 }

@@ -4,6 +4,7 @@
 use super::check::{Check, Part, Side, When};
 use super::common::{STALE, alert};
 use super::finding::Subsystem;
+use super::inputs::Inputs;
 use crate::cause::Cause;
 use crate::mishap::Kind;
 use crate::params::Param;
@@ -68,3 +69,17 @@ pub(super) const CHECKS: &[Check] = &[
     },
     alert::<{ Cause::Crash as usize }>(Subsystem::Mishap),
 ];
+
+/// Whether what the text of a check orders fits the vehicle: DISARM while it is armed, and FLY FORWARD, CLIMB what hangs upright on rotors
+/// and has not tried in vain with full throttle.
+pub(super) fn orders(check: &Check, inputs: &Inputs<'_>) -> bool {
+    let Inputs { now, vehicle, derived, mishap, .. } = *inputs;
+    if check.subsystem != Subsystem::Mishap {
+        return true;
+    }
+    if check.name == Kind::Sinking.name() {
+        let in_vain = derived.response().full_in_vain().is_some_and(|full| full.value > 0.0);
+        return vehicle.hovers(now) == Some(true) && !mishap.has_tilted(now) && !in_vain;
+    }
+    vehicle.armed() || matches!(check.name, "free_fall" | "tumbling" | "disarmed_in_air")
+}

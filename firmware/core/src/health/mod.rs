@@ -29,8 +29,8 @@ mod vocabulary;
 
 pub use check::{CLEAR, CLEAR_MAX, CLEAR_MAX_ALWAYS, Check, Parts, Side, State, When};
 use check::{Change, How, Part};
-pub use consequence::{because, is_of_mishap};
-pub use finding::{Finding, Level, Subsystem};
+pub use consequence::{because, is_of_mishap, is_with_mishap};
+pub use finding::{Finding, Level, OFF_MEANING, Subsystem, is_off, off_alarm};
 pub use inputs::Inputs;
 pub use tables::{check_named, checks, instances};
 pub use vocabulary::{Said, Scope, VOCABULARY, Words, said, vocabulary};
@@ -199,7 +199,8 @@ impl Health {
             None => return None,
         };
         let feeds = power::feeds(check, inputs, instance);
-        let finding = Finding { because, ..check.finding(instance, inputs.now, told, feeds) };
+        let orders = mishap::orders(check, inputs);
+        let finding = Finding { because, orders, ..check.finding(instance, inputs.now, told, feeds) };
         if change.is_some() {
             exceedances.change(place, check.side, &finding);
         }
@@ -242,8 +243,9 @@ impl Health {
     /// The check whose alarm explains another one's change to a level; empty where none does.
     fn because(&self, effect: &Check, level: Level) -> &'static str {
         let alarms = self.levels().filter(|(.., level)| matches!(level, Level::Warning | Level::Critical));
-        let alarms = alarms.map(|(check, _, level)| (check.name, level));
-        consequence::because(effect.name, level, alarms).unwrap_or_default()
+        // All of them were found before.
+        let alarms = alarms.map(|(check, _, level)| (Instant::ZERO, check.name, level));
+        consequence::because(effect.name, level, Instant::ZERO, alarms).unwrap_or_default()
     }
 
     /// Whether nothing has explained an alarm any more for a while, though something did.

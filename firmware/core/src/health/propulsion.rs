@@ -109,7 +109,10 @@ pub(super) const CHECKS: &[Check] = &[
         hysteresis: 5.0,
         debounce_critical: Span::from_millis(500),
         when: When::InFlight,
-        read: |inputs, motor| inputs.derived.currents().percent(inputs.now, inputs.vehicle, motor),
+        read: |inputs, motor| {
+            let percent = inputs.derived.currents().percent(inputs.now, inputs.vehicle, motor);
+            percent.filter(|_| !inputs.derived.outputs().is_off(motor))
+        },
         ..ESC
     },
     Check {
@@ -124,7 +127,8 @@ pub(super) const CHECKS: &[Check] = &[
         // Never stale: only steady flight says something, and ESCs that stop talking are `esc_silent`.
         read: |inputs, motor| {
             let Inputs { now, vehicle, flight, derived, .. } = *inputs;
-            derived.motor_imbalance(now, vehicle, flight, motor)
+            let imbalance = derived.motor_imbalance(now, vehicle, flight, motor);
+            imbalance.filter(|_| !derived.outputs().is_off(motor))
         },
         ..ESC
     },

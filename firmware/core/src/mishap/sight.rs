@@ -10,7 +10,7 @@ use crate::modes::{has_pilots_throttle, is_made_to_turn, is_thrown};
 use crate::motion::{climb_mps, ground_speed_mps, height_m};
 use crate::observation::{Air, Attitude, Imu, Observation, VehicleKind};
 use crate::params::{Param, Params};
-use crate::time::{Instant, Span};
+use crate::time::{Instant, Span, Stamp};
 use crate::units::{GRAVITY, MetresPerSecond2, RadiansPerSecond, norm};
 use crate::vehicle::Vehicle;
 
@@ -40,6 +40,8 @@ const LOST_M: f32 = 7.0;
 const GLIDES_MPS: f32 = 1.0;
 /// A bank in which all the thrust may not carry what hangs on rotors, rad.
 const BANKS_RAD: f32 = 0.6;
+/// 60 degrees: what leans so far is not carried by its thrust.
+const LEANS_RAD: f32 = 1.047;
 /// All the throttle of a plane, which may need most of it on a steep path against the wind.
 const FULL_ON_WINGS: f32 = 0.97;
 /// Wings pull out of a dive with so much at most: the limit of CS-23 for the aerobatic category.
@@ -190,8 +192,12 @@ impl Mishap {
     /// Rotors that pull downwards carry nothing: in no mode but those made for it does an autopilot or a pilot ask for that.
     fn take_attitude(&mut self, at: Instant, attitude: &Attitude, vehicle: &Vehicle, params: &Params) {
         let Attitude { roll, pitch, .. } = attitude;
+        let most = libm::fabsf(roll.0).max(libm::fabsf(pitch.0));
+        if most > LEANS_RAD && self.armed {
+            self.tilted_at = Stamp::at(at);
+        }
         // Below 86 degrees of each, no cosine is asked for: this is done with each attitude.
-        let tilts = libm::fabsf(roll.0).max(libm::fabsf(pitch.0)) > 1.5;
+        let tilts = most > 1.5;
         let tilt_deg =
             if tilts { libm::acosf(libm::cosf(roll.0) * libm::cosf(pitch.0)).to_degrees() } else { 0.0 };
         let over = tilt_deg > OVERTURNED_DEG.max(params.get(Param::MisOverturn))

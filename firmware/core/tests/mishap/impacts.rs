@@ -200,3 +200,64 @@ fn a_shock_between_two_samples_of_what_fell_is_an_impact_at_its_own_time() {
     assert_eq!(outcome.monitor.mishap().hit_at(), Instant::from_millis(AT_MS + 450));
     assert_eq!(fly(&hovering(ROTORS[0]), drop_low).told(), [""; 0]);
 }
+
+/// Sinks from 60 m and hits the ground with 12 m/s, and its rotors run on.
+fn hits_and_runs_on(ms: u64, quad: &mut Quad, motion: &mut Motion) {
+    let seconds = ms as f32 / 1_000.0;
+    quad.throttle = if ms < 5_000 { 0.95 } else { 0.5 };
+    if ms < 5_000 {
+        (quad.climb, quad.height) = (-12.0, 60.0 - 12.0 * seconds);
+    } else {
+        (quad.climb, quad.height) = (0.0, 0.0);
+        motion.load_g = if ms < 5_100 { 15.0 } else { 1.4 };
+        motion.rates = [1.5, 0.7, 0.4];
+    }
+}
+
+#[test]
+fn what_lies_over_with_running_motors_never_flies_on() {
+    for of in &ROTORS[..4] {
+        // On its side, and by turns on its back.
+        let outcome = fly(&hovering(*of), |ms, quad, motion| {
+            hits_and_runs_on(ms, quad, motion);
+            if ms >= 5_000 {
+                (quad.roll, motion.ground_mps) = (if ms % 6_000 < 1_500 { 2.4 } else { 1.3 }, 3.0);
+            }
+        });
+        assert!(outcome.told().starts_with(&["sinking", "impact"]), "{of:?}: {:?}", outcome.told());
+        let is_over = outcome.changes.iter().any(|(_, change)| *change == Change::FliesOn);
+        assert!(!is_over, "{of:?}: {:?}", outcome.changes);
+        assert_eq!(outcome.flights(), (1, 0, 1), "{of:?}: {:?}", outcome.changes);
+        // Upright, and where it fell.
+        let upright = fly(&hovering(*of), hits_and_runs_on);
+        assert_eq!(upright.flights(), (1, 0, 1), "{of:?}: {:?}", upright.changes);
+    }
+}
+
+#[test]
+fn what_is_disarmed_is_not_to_be_disarmed() {
+    for armed in [true, false] {
+        let script: Script = if armed {
+            fall
+        } else {
+            |ms, quad, motion| {
+                fall(ms, quad, motion);
+                quad.armed = false;
+            }
+        };
+        let outcome = fly(&hovering(ROTORS[0]), script);
+        let impact = outcome.findings.iter().find(|one| one.check == "impact").expect("hit");
+        assert_eq!(impact.orders, armed);
+    }
+}
+
+#[test]
+fn what_a_mishap_was_is_no_value_of_now() {
+    let outcome = fly(&hovering(ROTORS[0]), |ms, quad, motion| {
+        fall(ms, quad, motion);
+        quad.armed = ms < 10_000;
+    });
+    let over =
+        outcome.findings.iter().filter(|one| one.subsystem == Subsystem::Mishap && one.level == Level::Ok);
+    assert!(over.clone().all(Finding::is_unjudged), "{:?}", over.collect::<Vec<_>>());
+}

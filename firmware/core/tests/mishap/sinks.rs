@@ -193,3 +193,34 @@ fn a_sink_that_the_autopilot_wants_and_follows_is_none() {
         assert_eq!(wants_little.told(), ["sinking"], "{of:?}");
     }
 }
+
+#[test]
+fn only_what_hangs_upright_on_rotors_is_told_to_climb() {
+    let orders = |vehicle: &Quad, script| {
+        let outcome = fly(vehicle, script);
+        let sinking = outcome.findings.iter().find(|one| one.check == "sinking").copied();
+        sinking.map(|one| one.orders)
+    };
+    let sinks: Script = |ms, quad, _| {
+        if ms < 2_000 {
+            (quad.climb, quad.height) = (-8.0, 200.0 - ms as f32 / 125.0);
+        }
+    };
+    assert_eq!(orders(&hovering(ROTORS[0]), sinks), Some(true));
+    let rolled: Script = |ms, quad, _| {
+        if ms < 3_000 {
+            (quad.climb, quad.height) = (if ms < 600 { 0.0 } else { -8.0 }, 200.0 - ms as f32 / 125.0);
+        }
+        quad.roll = if ms < 500 { 1.9 } else { 0.1 };
+    };
+    assert_eq!(orders(&hovering(ROTORS[0]), rolled), Some(false), "it was on its side a second before");
+    let in_vain: Script = |ms, quad, _| {
+        quad.throttle = 1.0;
+        if ms < 6_000 {
+            (quad.climb, quad.height) = (if ms < 3_000 { -2.0 } else { -8.0 }, 200.0 - ms as f32 / 250.0);
+        }
+    };
+    assert_eq!(orders(&hovering(ROTORS[0]), in_vain), Some(false), "all the throttle does not do it");
+    // A plane with all its throttle, and a dead motor.
+    assert_eq!(orders(&on_wings(WINGS[0]), in_vain), Some(false));
+}

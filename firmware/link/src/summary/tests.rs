@@ -17,6 +17,7 @@ fn finding(level: Level) -> Finding {
         unit: "%",
         feeds: Feeds::Vehicle,
         because: "",
+        orders: true,
     }
 }
 
@@ -269,6 +270,11 @@ fn told(findings: &[Comes]) -> Vec<(u64, String)> {
 }
 
 fn told_because(findings: &[Comes], because: &'static str) -> Vec<(u64, String)> {
+    told_where(findings, because, |_| true)
+}
+
+/// What is told where the orders of some checks do not fit the vehicle.
+fn told_where(findings: &[Comes], because: &'static str, orders: fn(&str) -> bool) -> Vec<(u64, String)> {
     let mut summary = Summary::new(&Params::defaults());
     let monitor = Monitor::new(Params::defaults());
     let mut told = Vec::new();
@@ -291,6 +297,7 @@ fn told_because(findings: &[Comes], because: &'static str) -> Vec<(u64, String)>
                 unit: "",
                 value: if *level == Level::Ok { 0.0 } else { f32::NAN },
                 because,
+                orders: orders(check.name),
                 ..finding(*level)
             };
             summary.finding(now, &finding, &mut out);
@@ -367,8 +374,8 @@ fn what_is_not_critical_waits_for_the_end_of_what_is() {
 fn a_mishap_is_told_once_and_what_waits_is_its_consequence() {
     let mishap = [
         comes(0, "compass_unused", 0, WARNING),
-        comes(9, "baro_noise", 0, WARNING),
         comes(15, "roll_rate", 0, CRITICAL),
+        comes(19, "baro_noise", 0, WARNING),
         comes(20, "sinking", 0, CRITICAL),
         comes(25, "impact", 0, CRITICAL),
         comes(30, "overturned", 0, CRITICAL),
@@ -391,6 +398,34 @@ fn a_mishap_is_told_once_and_what_waits_is_its_consequence() {
     ];
     let expected = [(0, "sinking fast, FLY FORWARD, CLIMB"), (400, "sinking fast, FLY FORWARD, CLIMB")];
     assert_eq!(texts(&told(&again)), expected, "and the next one as the first");
+}
+
+#[test]
+fn a_warning_that_came_before_a_mishap_is_no_consequence_of_it() {
+    let told = told(&[comes(6, "airspeed_alert", 0, WARNING), comes(10, "sinking", 0, CRITICAL)]);
+    let expected = [(10, "sinking fast, FLY FORWARD, CLIMB"), (110, "autopilot warns: airspeed")];
+    assert_eq!(texts(&told), expected, "it may be its cause");
+}
+
+#[test]
+fn an_order_that_does_not_fit_the_vehicle_is_not_given_and_the_next_one_is() {
+    let mishap = [
+        comes(10, "roll_rate", 0, CRITICAL),
+        comes(20, "sinking", 0, CRITICAL),
+        comes(40, "impact", 0, CRITICAL),
+        comes(60, "overturned", 0, CRITICAL),
+    ];
+    let told = told_where(&mishap, "", |check| check != "sinking");
+    let expected =
+        [(10, "roll does not follow, LAND NOW"), (20, "sinking fast"), (40, "impact, DISARM IF DOWN")];
+    assert_eq!(texts(&told), expected);
+}
+
+#[test]
+fn a_motor_that_is_given_nothing_is_not_called_weak() {
+    let weak = Finding { check: "motor_output", instance: 2, value: 99.0, ..finding(Level::Critical) };
+    assert_eq!(text(&weak).as_str(), "HUMS: motor 3 weak: output +99 %, LAND NOW");
+    assert_eq!(text(&Finding { value: 100.0, ..weak }).as_str(), "HUMS: motor 3 off: no output, LAND NOW");
 }
 
 #[test]

@@ -9,6 +9,9 @@ use hums_store::{Key, param_value};
 use super::mailbox::MailboxIn;
 use super::status::{Calm, StoreReading, StoreState, StoreStatus};
 
+/// What is said where nothing of earlier flights is known.
+pub const STORE_NEW: &str = "HUMS: the store is new, all counters begin";
+
 /// No frame for this long, and disarmed: nothing will be missed while the processor stands still for an erase.
 pub const QUIET: Span = Span::from_secs(5);
 
@@ -86,7 +89,7 @@ impl<'a> Handover<'a> {
             return match now.state {
                 StoreState::Kept => None,
                 StoreState::Absent => news(5, "HUMS: no store, counters end with the power"),
-                StoreState::New => news(6, "HUMS: the store is new, all counters begin"),
+                StoreState::New => news(6, STORE_NEW),
                 StoreState::Remade => news(3, "HUMS: store unreadable, counters begin anew"),
                 StoreState::Failed => news(3, "HUMS: store broken, counters end with the power"),
             };

@@ -54,7 +54,7 @@ pub mod status;
 #[cfg(test)]
 mod tests;
 
-pub use handover::{Handover, News};
+pub use handover::{Handover, News, STORE_NEW};
 pub use keeper::{Keeper, Kept};
 pub use mailbox::Mailbox;
 pub use status::{Calm, StoreState, StoreStatus};

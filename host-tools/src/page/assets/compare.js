@@ -118,7 +118,11 @@ const FIGURES = [
   ["Fewest satellites, GPS 1", "", 0, low("Satellites-0")],
   ["Highest processor load", "%", 0, high("Load-0")],
 ];
-const ended = ({ landed, disarmed_in_air: disarmed }) => (landed ? "landed" : disarmed ? "disarmed in the air" : "landing not seen");
+const ended = ({ landed, disarmed_in_air: disarmed, impact_s: impact, down_s: down }) => {
+  if (landed) return "landed";
+  if (disarmed) return "disarmed in the air";
+  return impact != null ? "an impact" : down != null ? "a mishap" : "landing not seen";
+};
 const count = ({ findings }, level) => findings.filter(([, known]) => known === level).length;
 const FACTS = [
   ["Take-off, UTC", ({ start_utc: utc }) => (utc == null ? "not known" : `${utc.slice(0, 10)} ${utc.slice(11, 19)}`)],

@@ -64,9 +64,12 @@ const identity = () =>
 
 // When it landed, or how the flight ended otherwise.
 const landing = (f) => {
-  const at = utc(f.to_s) || moment(f.to_s - flight.zero);
+  const time = (s) => utc(s) || moment(s - flight.zero),
+    at = time(f.to_s);
   if (f.landed) return at;
   if (f.disarmed_in_air) return `disarmed in the air, ${at}`;
+  if (f.impact_s != null) return `ended by an impact, ${time(f.impact_s)}`;
+  if (f.down_s != null) return `ended by a mishap, ${time(f.down_s)}`;
   return flight.end - f.to_s < 5 ? "in the air at the end" : `not seen, last in the air ${at}`;
 };
 

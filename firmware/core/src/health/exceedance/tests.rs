@@ -19,6 +19,7 @@ fn finding(at_ms: u64, previous: Level, level: Level, value: f32) -> Finding {
         unit: "deg",
         feeds: Feeds::Vehicle,
         because: "",
+        orders: true,
     }
 }
 

@@ -1,0 +1,88 @@
+//! Whether it was known how many cells the battery has: without that its voltage raises no alarm.
+
+use hums_core::time::{Instant, Span};
+
+use super::judged::JudgedBy;
+use crate::utc::moment;
+
+/// Parameters that tell of cells come within this, where a recording begins in the air.
+const CELLS_COME: Span = Span::from_secs(2);
+
+/// What is known of how many cells a battery has that carries the vehicle.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Cells {
+    /// In the air nothing told it here: from and to.
+    unknown: Option<(Instant, Instant)>,
+    /// Nothing told it to the box, which said so.
+    unknown_on_board: bool,
+    /// The box had no store, and so none from its last flight.
+    nothing_stored: bool,
+}
+
+impl Cells {
+    /// The box says that nothing told it.
+    pub(super) const fn told_unknown(&mut self) {
+        self.unknown_on_board = true;
+    }
+
+    /// The box says that its store is new.
+    pub(super) const fn nothing_stored(&mut self) {
+        self.nothing_stored = true;
+    }
+
+    /// In the air nothing tells it now.
+    pub(super) fn lack(&mut self, now: Instant) {
+        let (from, _) = *self.unknown.get_or_insert((now, now));
+        self.unknown = Some((from, now));
+    }
+
+    /// Since when in the air nothing told it, where no alarm came from the voltage for that.
+    pub(super) fn unknown_since(&self, by: JudgedBy) -> Option<Instant> {
+        self.unknown.filter(|_| self.are_unknown(by)).map(|(from, _)| from)
+    }
+
+    /// Whether no alarm came from the voltage for that.
+    pub(super) fn are_unknown(&self, by: JudgedBy) -> bool {
+        let lasts = || self.unknown.is_some_and(|(from, to)| to.since(from) >= CELLS_COME);
+        match by {
+            // It says so once it has waited for them: a log may end before.
+            JudgedBy::Board => self.unknown_on_board || (self.nothing_stored && lasts()),
+            JudgedBy::Here => lasts(),
+        }
+    }
+
+    /// As a sentence; `None` where there is nothing to say of it.
+    pub(super) fn words(&self, by: JudgedBy, begins_in_air: bool) -> Option<String> {
+        if self.are_unknown(by) {
+            let when = self
+                .unknown
+                .map_or_else(String::new, |(from, to)| format!(" from {} to {}", moment(from), moment(to)));
+            return Some(format!(
+                "cells not known{when}: the battery's voltage raised no alarm; a file with BAT_CELLS (--params) tells how many"
+            ));
+        }
+        let is_guess =
+            by == JudgedBy::Board && begins_in_air && self.unknown.is_some() && !self.nothing_stored;
+        is_guess.then(|| {
+            "the box was started in the air, and took the number of cells from its last flight: a guess; BAT_CELLS makes it sure"
+                .to_owned()
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_box_without_a_store_guesses_no_cells() {
+        let mut cells = Cells::default();
+        [70, 90].map(|at_s| cells.lack(Instant::from_millis(at_s * 1000)));
+        let words = |cells: Cells| cells.words(JudgedBy::Board, true).unwrap_or_default();
+        assert!(!cells.are_unknown(JudgedBy::Board));
+        assert!(words(cells).contains("from its last flight: a guess"), "{}", words(cells));
+        cells.nothing_stored();
+        assert!(cells.are_unknown(JudgedBy::Board), "the log ends before the box says so");
+        assert!(words(cells).starts_with("cells not known from 1:10.0 to 1:30.0"), "{}", words(cells));
+    }
+}
