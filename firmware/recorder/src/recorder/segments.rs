@@ -165,13 +165,10 @@ impl<'a> Segments<'a> {
     /// The first sector of the open segment is on the card. Where the group before goes on in it, all stays that is in the ring:
     /// without that no reader could do anything with it. The monitor sees that, ends the log, and waits anew.
     pub(super) fn begin_segment(&mut self, name: LogName, sector: &Sector) {
-        match group_start(sector) {
-            Some(began) => self.ring.begin(name, began),
-            None => {
-                if let Some(from) = self.ring.stop() {
-                    self.status.stay(from);
-                }
-            }
+        if let Some(began) = group_start(sector) {
+            self.ring.begin(name, began);
+        } else if let Some(from) = self.ring.stop() {
+            self.status.stay(from);
         }
     }
 
