@@ -482,14 +482,14 @@ fn gaps_detail(log: &Overview) -> String {
 /// What is known of where a log begins that lacks what came before.
 fn kept_words(log: &Overview) -> String {
     let summary = &log.ending.summary;
-    summary.keep.map_or_else(String::new, |keep| match summary.is_cut {
-        true => {
-            format!(" (all files of the ring were full: less than the last {} s may be kept)", keep.seconds)
-        }
-        false => {
-            format!(" (the last {} s at least are kept; whether more was kept, nothing tells)", keep.seconds)
-        }
-    })
+    let Some(keep) = summary.keep else { return String::new() };
+    if summary.is_cut {
+        return format!(
+            " (all files of the ring were full: less than the last {} s may be kept)",
+            keep.seconds
+        );
+    }
+    format!(" (the last {} s at least are kept; whether more was kept, nothing tells)", keep.seconds)
 }
 
 fn newer(log: &Overview) -> String {

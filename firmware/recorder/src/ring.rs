@@ -6,9 +6,12 @@ use hums_core::time::{Instant, Span};
 
 use crate::name::LogName;
 
-/// Bytes of a segment in the ring: 11 s of a full line (921,600 baud) whose frames cannot be compressed.
-pub(crate) const SEGMENT_BYTES: u32 = 1024 * 1024;
-/// Segments at most: the most that is promised (`REC_BEFORE`, two minutes) of such a line, and one to write.
+/// Bytes of a segment in the ring at least: so many of them hold [`HELD_SECS`] of a full line (921,600 baud) whose frames cannot be
+/// compressed.
+pub(crate) const SEGMENT_BYTES: u32 = 256 * 1024;
+/// Seconds that a ring of such segments holds; where more are to be kept, they are larger.
+const HELD_SECS: u32 = 30;
+/// Segments at most, of which one is to be written.
 const SEGMENTS_MAX: usize = 16;
 /// A segment is not left sooner than this, however little is to be kept.
 const AGE_MIN: Span = Span::from_secs(5);
@@ -51,6 +54,13 @@ impl Ring {
     /// Whether not everything is kept.
     pub(crate) const fn is_on(&self) -> bool {
         self.keep.is_some()
+    }
+
+    /// Bytes of its segments; `None`: there is no ring.
+    pub(crate) fn segment_bytes(&self) -> Option<u32> {
+        let (_, keep) = self.keep?;
+        let secs = (keep.as_millis() / 1000) as u32;
+        Some(SEGMENT_BYTES.max((SEGMENT_BYTES / HELD_SECS).saturating_mul(secs)))
     }
 
     /// All that is in it stays.
@@ -139,6 +149,20 @@ mod tests {
         let later = Instant::from_millis(1_000_000);
         assert!(ring.segments.is_empty() && !ring.is_due(later));
         assert_eq!(ring.oldest(Some(later), Some(LAST_120_S)), None);
+    }
+
+    /// A full line fills a segment but for its parity and a group that no longer fits.
+    #[test]
+    fn a_full_ring_holds_what_is_to_be_kept_of_a_full_line() {
+        const BYTES_A_SECOND: u64 = 921_600 / 10;
+        for secs in [5, 30, 60, 120] {
+            let mut ring = Ring::new();
+            assert_eq!(ring.segment_bytes(), None);
+            ring.keep(Some((0, Span::from_secs(secs))));
+            let blocks = ring.segment_bytes().expect("it is on") / 512;
+            let data = u64::from(hums_blackbox::parity::data_blocks(blocks)) - 64;
+            assert!((SEGMENTS_MAX as u64 - 1) * data * 489 >= secs * BYTES_A_SECOND, "{secs} s");
+        }
     }
 
     #[test]

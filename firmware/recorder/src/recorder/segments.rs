@@ -14,9 +14,6 @@ use crate::status::{CardState, CardStatus};
 /// Segments that even a small card should hold, so that overwriting the oldest loses little.
 const SEGMENTS_MIN: u64 = 16;
 
-/// Bytes of a segment for what another one did not take.
-const SHORT_BYTES: u32 = 256 * 1024;
-
 /// Logs without their clusters that are passed by for one that can be written anew: each takes a walk over the directory.
 const UNCHAINED_MAX: usize = 8;
 
@@ -165,13 +162,10 @@ impl<'a> Segments<'a> {
     /// The first sector of the open segment is on the card. Where the group before goes on in it, all stays that is in the ring:
     /// without that no reader could do anything with it. The monitor sees that, ends the log, and waits anew.
     pub(super) fn begin_segment(&mut self, name: LogName, sector: &Sector) {
-        match group_start(sector) {
-            Some(began) => self.ring.begin(name, began),
-            None => {
-                if let Some(from) = self.ring.stop() {
-                    self.status.stay(from);
-                }
-            }
+        if let Some(began) = group_start(sector) {
+            self.ring.begin(name, began);
+        } else if let Some(from) = self.ring.stop() {
+            self.status.stay(from);
         }
     }
 
@@ -184,11 +178,8 @@ impl<'a> Segments<'a> {
         is_short: bool,
         card: &mut Card<'_, D>,
     ) -> Result<(), CardError<D::Error>> {
-        let bytes_max = match (is_short, self.ring.is_on()) {
-            (true, _) => SHORT_BYTES,
-            (false, true) => ring::SEGMENT_BYTES,
-            (false, false) => SEGMENT_BYTES_MAX,
-        };
+        let short = is_short.then_some(ring::SEGMENT_BYTES);
+        let bytes_max = short.or_else(|| self.ring.segment_bytes()).unwrap_or(SEGMENT_BYTES_MAX);
         let overwrote = match self.ring.oldest(group, self.status.waiting()) {
             Some(old) => self.recycle(old, name, card, bytes_max)?,
             None => self.create_or_overwrite(name, card, bytes_max)?,
