@@ -46,7 +46,7 @@ use crate::time::{Instant, Span, Stamp};
 use crate::vehicle::{LANDED_STATE_AGE, Vehicle};
 use evidence::{
     BREAKS_OFF, Doubt, FRESH, FULL_THROTTLE, IDLE_THROTTLE, Lasting, Pressure, Recent, Shock, THRUST_PART,
-    is_believed, is_known, is_tilted, on_rotors, throttle,
+    is_known, is_tilted, on_rotors, throttle,
 };
 
 /// How long after disarming it is watched.
@@ -255,7 +255,7 @@ impl Mishap {
         params: &Params,
     ) -> Option<Change> {
         self.note_arming(now, vehicle, flight, params);
-        self.note_rest(now, vehicle, params);
+        self.note_rest(now, vehicle);
         self.doubted(now, vehicle, params);
         self.shocked(now, vehicle);
         let seen = self.seen.take();
@@ -328,7 +328,7 @@ impl Mishap {
     }
 
     /// Since when it has been still, and since when it has moved as what flies.
-    fn note_rest(&mut self, now: Instant, vehicle: &Vehicle, params: &Params) {
+    fn note_rest(&mut self, now: Instant, vehicle: &Vehicle) {
         let speed_mps =
             ground_speed_mps(now, vehicle).unwrap_or(0.0).max(climb_mps(now, vehicle).map_or(0.0, f32::abs));
         // Of what was disarmed, lies on its back or has hit something, the sensors are believed and not the estimate.
@@ -343,12 +343,10 @@ impl Mishap {
         let thrust =
             !on_rotors(now, vehicle) || throttle(now, vehicle).is_none_or(|part| part > IDLE_THROTTLE);
         let lay_at_m = f32::from(self.place.height_m);
-        let rose = height_m(now, vehicle).is_some_and(|height_m| height_m > lay_at_m + ROSE_M);
-        // What sinks where it lies is an estimate that is lost.
-        let moves = speed_mps > 2.0 * STILL_MPS
-            && (!on_rotors(now, vehicle)
-                || (is_believed(vehicle, params)
-                    && climb_mps(now, vehicle).is_none_or(|climb_mps| climb_mps > -2.0 * STILL_MPS)));
+        let moves = speed_mps > 2.0 * STILL_MPS;
+        // What moves and does not rise may be a wreck whose estimate is lost.
+        let rose = height_m(now, vehicle).map_or(moves, |height_m| height_m > lay_at_m + ROSE_M);
+        let moves = moves && !on_rotors(now, vehicle);
         let flies = self.armed && (moves || rose) && !self.lies(now, vehicle) && thrust;
         self.flies_since = if flies { self.flies_since.or(Some(now)) } else { None };
     }
@@ -457,7 +455,9 @@ impl Mishap {
         let slow = self.speed.greatest() < 2.0 * STILL_MPS;
         let struck = self.worst[Kind::Impact as usize] > 0.0;
         let lies = self.lies(now, vehicle);
-        let down = (long && near_ground && (lies || (slow && (dances || struck))))
+        // Where it hit the ground on rotors its speed is not asked: an estimate may be lost.
+        let stays = lies || (struck && on_rotors(now, vehicle)) || (slow && (dances || struck));
+        let down = (long && near_ground && stays)
             || (self.is_still(now) && (self.is_idle(now, vehicle) || (long && near_ground)))
             || (long && silent)
             || self.disarmed_at.is_some_and(|since| !self.armed && now.since(since) >= WATCHED);

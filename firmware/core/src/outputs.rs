@@ -70,7 +70,7 @@ pub(crate) struct MotorOutputs {
     /// Motors that had the pulse of one that does not turn on the ground, and those that had one of the other scale: a bit each.
     idle: u8,
     other_scale: u8,
-    /// Outputs that carried in this flight, and those of them that are given next to nothing now: a bit each.
+    /// Outputs that carried in any flight, and those of them that are given next to nothing now: a bit each.
     carried: u8,
     off: u8,
     /// Command against the average of all, percent.
@@ -100,8 +100,8 @@ impl MotorOutputs {
 
     /// A flight begins: nothing is usual yet.
     pub(crate) const fn begin(&mut self) {
-        let Self { port, idle, other_scale, .. } = *self;
-        *self = Self { port, idle, other_scale, ..Self::new() };
+        let Self { port, idle, other_scale, carried, .. } = *self;
+        *self = Self { port, idle, other_scale, carried, ..Self::new() };
     }
 
     pub(crate) fn take(&mut self, at: Instant, outputs: &Outputs, vehicle: &Vehicle, flight: &Flight) {
@@ -151,7 +151,7 @@ impl MotorOutputs {
         self.off &= self.carried;
     }
 
-    /// Whether a motor that carried in this flight is given next to nothing: that it does not turn is no fault of its own.
+    /// Whether a motor that carried before is given next to nothing: that it does not turn is no fault of its own.
     pub(crate) fn is_off(&self, motor: u8) -> bool {
         self.off.checked_shr(u32::from(motor)).is_some_and(|off| off & 1 != 0)
     }

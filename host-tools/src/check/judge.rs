@@ -29,7 +29,7 @@ use super::coverage::{Coverage, Recording};
 use super::details::{self, Details};
 use super::flights::{Flight, Flights};
 use super::judged::{Holes, Judged, JudgedBy};
-use super::problem::{LISTED_MAX, Problems};
+use super::problem::{IMPACT, LISTED_MAX, Problems};
 use crate::part;
 use crate::source::epochs::Epochs;
 use crate::source::item::{About, Cause as Why, Event, Fact, Gap, Item, Text};
@@ -51,9 +51,6 @@ const SEEN: Span = Span::from_secs(3);
 
 /// The check of disarming in the air.
 const DISARMED: &str = "disarmed_in_air";
-
-/// The check of an impact.
-pub(super) const IMPACT: &str = "impact";
 
 /// Where a recording was heard.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -5,7 +5,6 @@ use std::collections::BTreeMap;
 use hums_core::health::{Level, Side, Subsystem, because, checks};
 use hums_core::time::{Instant, Span};
 
-use super::judge::IMPACT;
 use crate::part;
 use crate::source::told::Finding;
 
@@ -14,6 +13,8 @@ pub const LISTED_MAX: usize = 10_000;
 /// Parts that are followed at most: there are 140 of them, and a log may name what it likes.
 const FOLLOWED_MAX: usize = 1_000;
 
+/// The check of an impact.
+pub(super) const IMPACT: &str = "impact";
 /// A box finds an impact once what hit something has lain still for so long.
 const LIES_STILL: Span = Span::from_secs(1);
 
