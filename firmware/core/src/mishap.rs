@@ -343,10 +343,10 @@ impl Mishap {
         let thrust =
             !on_rotors(now, vehicle) || throttle(now, vehicle).is_none_or(|part| part > IDLE_THROTTLE);
         let lay_at_m = f32::from(self.place.height_m);
-        let moves = speed_mps > 2.0 * STILL_MPS;
-        // What moves and does not rise may be a wreck whose estimate is lost.
-        let rose = height_m(now, vehicle).map_or(moves, |height_m| height_m > lay_at_m + ROSE_M);
-        let moves = moves && !on_rotors(now, vehicle);
+        let rose = height_m(now, vehicle).is_some_and(|height_m| height_m > lay_at_m + ROSE_M);
+        // On rotors what moves and does not climb may be a wreck whose estimate is lost.
+        let climbs = climb_mps(now, vehicle).is_none_or(|climb_mps| climb_mps > STILL_MPS);
+        let moves = speed_mps > 2.0 * STILL_MPS && (climbs || !on_rotors(now, vehicle));
         let flies = self.armed && (moves || rose) && !self.lies(now, vehicle) && thrust;
         self.flies_since = if flies { self.flies_since.or(Some(now)) } else { None };
     }
