@@ -7,8 +7,8 @@ use anyhow::Result;
 use hums_blackbox::record::{Loss, Moment, Stats, Vehicle, Why};
 use hums_blackbox::{Cause, Gap, Record};
 use hums_core::component::{COMPONENTS_MAX, Figures, Kind};
-use hums_core::health::Level;
 use hums_core::health::exceedance::Crossings;
+use hums_core::health::{Level, Subsystem};
 use hums_core::time::{Instant, Span};
 use hums_core::usage::UsageCounter;
 use hums_link as link;
@@ -86,6 +86,24 @@ impl From<Finding> for FindingLine {
             value: finding.value,
             limit: finding.limit,
             unit: finding.unit,
+        }
+    }
+}
+
+impl From<&FindingLine> for Finding {
+    fn from(line: &FindingLine) -> Self {
+        let level = |name| Level::ALL.into_iter().find(|level| level.name() == name).unwrap_or(Level::Ok);
+        let subsystem = Subsystem::ALL.into_iter().find(|subsystem| subsystem.name() == line.subsystem);
+        Self {
+            at: line.at,
+            subsystem: subsystem.unwrap_or(Subsystem::Recorder),
+            check: line.check.clone(),
+            instance: line.instance,
+            level: level(line.level),
+            previous: level(line.previous),
+            value: line.value,
+            limit: line.limit,
+            unit: line.unit.clone(),
         }
     }
 }

@@ -10,6 +10,7 @@ mod clock;
 mod coverage;
 mod details;
 pub mod flights;
+pub mod grouped;
 pub mod json;
 pub mod judge;
 pub mod judged;

@@ -7,6 +7,7 @@ use hums_core::time::{Instant, Span};
 
 use crate::part;
 use crate::source::told::Finding;
+use crate::summary::FindingLine;
 
 /// What is kept one by one of findings, flights, gaps; the rest is counted.
 pub const LISTED_MAX: usize = 10_000;
@@ -50,6 +51,14 @@ pub struct Problem {
     pub details: Vec<String>,
     /// The check that explains it: one whose alarm was as bad when it was found, each time that it was wrong.
     pub because: Option<String>,
+}
+
+impl Problem {
+    /// What comes first of what is as bad: a mishap, behind all others parts that are due, and otherwise what came first.
+    pub(super) fn order(&self) -> (bool, bool, Instant) {
+        let is_mishap = self.subsystem == Subsystem::Mishap && self.level == Level::Critical;
+        (!is_mishap, part::is_due(&self.check), self.at)
+    }
 }
 
 /// How bad a level is as a problem; stale is not known, and so is none.
@@ -249,7 +258,7 @@ impl Problems {
         }
     }
 
-    /// What was wrong, worst first, and of the same level what came first.
+    /// What was wrong, worst first, and of the same level by [`Problem::order`].
     pub(super) fn worst_first(self) -> Vec<Problem> {
         let mut problems: Vec<_> = self
             .open
@@ -259,9 +268,18 @@ impl Problems {
                 ..problem
             })
             .collect();
-        problems.sort_by_key(|problem| (std::cmp::Reverse(rank(problem.level)), problem.at));
+        problems.sort_by_key(|problem| (std::cmp::Reverse(rank(problem.level)), problem.order()));
         problems
     }
+}
+
+/// What was wrong by a log's findings, worst first; a box found them, or this program.
+pub fn problems(findings: &[FindingLine], of_box: bool) -> Vec<Problem> {
+    let mut problems = if of_box { Problems::of_box() } else { Problems::default() };
+    for finding in findings {
+        problems.take(&finding.into(), Span::ZERO);
+    }
+    problems.worst_first()
 }
 
 /// When what a box found began: a check of which it found an alarm at this time.

@@ -11,6 +11,7 @@ use hums_core::time::Span;
 
 use super::checked::Checked;
 use super::flights::{Flight, Mishap};
+use super::grouped::{grouped, is_critical};
 use super::judged::{Judged, JudgedBy};
 use super::problem::{Problem, side};
 use crate::colour::level as coloured;
@@ -67,10 +68,12 @@ pub fn line(checked: &Checked) -> String {
         (verdict, _) => verdict,
     };
     let mut names: Vec<&str> = Vec::new();
-    for problem in &judged.problems {
-        let name = name(&problem.check);
-        if !names.contains(&name) {
-            names.push(name);
+    for group in grouped(&judged.problems) {
+        for problem in group.members.iter().chain(group.effects.iter().flatten()) {
+            let name = name(&problem.check);
+            if !names.contains(&name) {
+                names.push(name);
+            }
         }
     }
     let found = names.join(", ");
@@ -235,7 +238,7 @@ impl Table {
             let _ = writeln!(text, "\n  logs with  critical  warning");
         }
         let mut checks: Vec<_> = self.checks.iter().collect();
-        checks.sort_by_key(|(_, (critical, warning))| std::cmp::Reverse((*critical, *warning)));
+        checks.sort_by_key(|(_, (critical, warning))| Reverse((*critical, *warning)));
         for (check, (critical, warning)) in checks {
             let _ = writeln!(text, "             {critical:>8}  {warning:>7}  {} [{check}]", name(check));
         }
@@ -390,45 +393,28 @@ fn verdict(judged: &Judged) -> String {
 }
 
 fn problems(text: &mut String, problems: &[Problem]) {
-    let groups = groups(problems);
-    let (mut causes, effects): (Vec<_>, Vec<_>) =
-        groups.iter().partition(|group| cause(group, &groups).is_none());
-    let explained = |check: &str| {
-        let of_it = effects.iter().filter(|effect| cause(effect, &groups) == Some(check));
-        of_it.copied().collect::<Vec<_>>()
-    };
-    // What a check explains may be worse than itself by now.
-    let is_any_critical =
-        |group: &[&Problem]| explained(check_of(group)).into_iter().any(|effect| is_critical(effect));
-    causes.sort_by_key(|group| {
-        let is_critical = is_critical(group) || is_any_critical(group);
-        (Reverse(is_critical), group.first().map(|first| first.at))
-    });
-    for (place, group) in causes.iter().enumerate() {
+    let groups = grouped(problems);
+    for (place, group) in groups.iter().enumerate() {
         let Some(first) = group.first() else { continue };
-        // The first of its groups has what it explains.
-        let is_first = causes.iter().position(|group| check_of(group) == first.check) == Some(place);
-        let effects = if is_first { explained(&first.check) } else { Vec::new() };
-        let is_raised = is_first && !is_critical(group) && is_any_critical(group);
-        let level = if is_raised { CRITICAL } else { level_of(group) };
-        let itself = if is_raised { " (itself a warning)" } else { "" };
-        let sentence_of_it = sentence(group);
+        let itself = if group.is_raised { " (itself a warning)" } else { "" };
+        let sentence_of_it = sentence(&group.members);
         let line = word(&sentence_of_it);
+        let level = level_of(group.is_critical());
         let _ = writeln!(text, "  {:<8} {:>9}  {line}{itself}", coloured(level), moment(first.at));
         if place < SHOWN_MAX {
             let _ = writeln!(text, "                      {}", meaning(&first.check, first.value));
             let _ = writeln!(text, "                      {}", action(first));
         }
-        for effect in effects {
+        for effect in &group.effects {
             let Some(of_it) = effect.first() else { continue };
-            let (at, level) = (moment(of_it.at), level_of(effect));
+            let (at, level) = (moment(of_it.at), level_of(is_critical(effect)));
             let _ =
                 writeln!(text, "                      with it {at}  {level}: {}", word(&sentence(effect)));
             // What a card that is out looks like besides has no meaning of its own.
             if place < SHOWN_MAX && first.subsystem != Subsystem::Recorder {
                 let _ =
                     writeln!(text, "                              {}", meaning(&of_it.check, of_it.value));
-                if is_raised && is_critical(effect) {
+                if group.is_raised && is_critical(effect) {
                     let _ = writeln!(text, "                              {}", action(of_it));
                 }
             }
@@ -437,61 +423,18 @@ fn problems(text: &mut String, problems: &[Problem]) {
             text.push('\n');
         }
     }
-    if causes.len() > SHOWN_MAX {
+    if groups.len() > SHOWN_MAX {
         text.push('\n');
     }
 }
 
-/// All of a group have one level.
-fn is_critical(group: &[&Problem]) -> bool {
-    group.first().is_some_and(|first| first.level == Level::Critical)
-}
-
-fn level_of(group: &[&Problem]) -> &'static str {
-    if is_critical(group) { CRITICAL } else { "warning" }
+const fn level_of(is_critical: bool) -> &'static str {
+    if is_critical { CRITICAL } else { "warning" }
 }
 
 /// What to do, as a sentence.
 fn action(problem: &Problem) -> &'static str {
     vocabulary(&problem.check).map_or("", |words| words.action)
-}
-
-/// The check of a group.
-fn check_of<'a>(group: &[&'a Problem]) -> &'a str {
-    group.first().map_or("", |problem| &problem.check)
-}
-
-/// The check that explains all of a group, and is explained by none; `None` where there is none among these groups.
-fn cause<'a>(group: &[&'a Problem], groups: &[Vec<&'a Problem>]) -> Option<&'a str> {
-    let explains = |group: &[&'a Problem]| {
-        let cause = group.first()?.because.as_deref()?;
-        let of_all = group.iter().all(|problem| problem.because.as_deref() == Some(cause));
-        groups.iter().find(|group| of_all && check_of(group) == cause)
-    };
-    let mut cause = explains(group)?;
-    // No more steps than there are groups: a circle has no beginning.
-    for _ in groups {
-        match explains(cause) {
-            Some(deeper) => cause = deeper,
-            None => return Some(check_of(cause)),
-        }
-    }
-    None
-}
-
-/// Problems of one check and level, which differ in the part alone, together; in the order of the first of each.
-fn groups(problems: &[Problem]) -> Vec<Vec<&Problem>> {
-    let mut groups: Vec<Vec<&Problem>> = Vec::new();
-    for problem in problems {
-        let same = |group: &&mut Vec<&Problem>| {
-            group.first().is_some_and(|first| first.check == problem.check && first.level == problem.level)
-        };
-        match groups.iter_mut().find(same) {
-            Some(group) => group.push(problem),
-            None => groups.push(vec![problem]),
-        }
-    }
-    groups
 }
 
 /// The one with the worst value; the first one of several, and where no value is known.
@@ -580,7 +523,7 @@ fn not_judged(text: &mut String, judged: &Judged) {
     }
     let all = judged.judged.len() + judged.not_judged.len();
     let _ = writeln!(text, "  not judged: {} of {all} checks", judged.not_judged.len());
-    reasons.sort_by_key(|(_, checks)| std::cmp::Reverse(checks.len()));
+    reasons.sort_by_key(|(_, checks)| Reverse(checks.len()));
     for (reason, checks) in reasons.iter().take(LINES_MAX) {
         let _ = writeln!(text, "    {reason}: {}", checks.join("; "));
     }

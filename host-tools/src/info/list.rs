@@ -12,6 +12,8 @@ use serde::Serialize;
 use super::each::each;
 use super::json::{duration_s, images_json};
 use super::text::image_text;
+use crate::check::grouped::grouped;
+use crate::check::problem::problems;
 use crate::cli;
 use crate::colour::{level, warning};
 use crate::names::check_name;
@@ -20,7 +22,7 @@ use crate::output::{self, JsonList, Schema};
 use crate::printable::word;
 use crate::source::find::find;
 use crate::source::recording::Format;
-use crate::summary::{FindingLine, Overview};
+use crate::summary::Overview;
 use crate::utc::{clock, date_and_time, iso8601};
 
 /// What `hums ls --json` prints.
@@ -107,12 +109,6 @@ struct WorstJson {
 
 impl LogJson {
     fn of(log: &Overview) -> Self {
-        let worst = worst(log).map(|finding| WorstJson {
-            level: finding.level,
-            check: finding.check.clone(),
-            instance: finding.instance,
-            time_s: finding.at.as_secs_f64(),
-        });
         Self {
             name: log.ending.name.clone(),
             format: log.format.map_or("hums", Format::name),
@@ -122,7 +118,7 @@ impl LogJson {
             flight_s: flight_s(log),
             checked_by: log.contents.checked_by(),
             findings_count: log.contents.findings_count,
-            worst,
+            worst: worst(log),
             checks_judged: log.contents.judged.map(|checks| checks.judged),
             checks_all: log.contents.judged.map(|checks| checks.all),
             begins_in_air: log.contents.begins_in_air,
@@ -179,7 +175,7 @@ fn line(log: &Overview, width: usize) -> String {
 
 /// The worst that was found, and how much there is besides.
 fn found(log: &Overview) -> String {
-    let Some(finding) = worst(log) else {
+    let Some(worst) = worst(log) else {
         let checked = log.contents.checked_by() != "nobody";
         return match log.contents.judged.filter(|_| log.contents.is_little()) {
             Some(checks) => format!("not enough to judge ({checks})"),
@@ -187,17 +183,22 @@ fn found(log: &Overview) -> String {
             None => "not checked".to_owned(),
         };
     };
-    format!("{}: {}", level(finding.level), word(&check_name(&finding.check, finding.instance)))
+    format!("{}: {}", level(worst.level), word(&check_name(&worst.check, worst.instance)))
 }
 
-/// The first finding of the worst level; good news is none.
-fn worst(log: &Overview) -> Option<&FindingLine> {
-    let rank = |finding: &&FindingLine| {
-        let levels = [Level::Advisory, Level::Warning, Level::Critical];
-        levels.iter().position(|level| level.name() == finding.level)
-    };
-    let findings = log.contents.findings.iter().filter(|finding| rank(finding).is_some());
-    findings.reduce(|worst, finding| if rank(&finding) > rank(&worst) { finding } else { worst })
+/// What `hums check` says first; good news is none.
+fn worst(log: &Overview) -> Option<WorstJson> {
+    let contents = &log.contents;
+    let problems = problems(&contents.findings, contents.checked_by() == "board");
+    let groups = grouped(&problems);
+    let group = groups.first()?;
+    let first = group.first()?;
+    Some(WorstJson {
+        level: if group.is_critical() { Level::Critical } else { Level::Warning }.name(),
+        check: first.check.clone(),
+        instance: first.instance,
+        time_s: first.at.as_secs_f64(),
+    })
 }
 
 fn start_utc_us(log: &Overview) -> Option<u64> {
@@ -225,6 +226,7 @@ fn span(seconds: f64) -> Span {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::summary::FindingLine;
 
     fn finding(check: &str, level: &'static str, at_s: u64) -> FindingLine {
         FindingLine {
@@ -252,11 +254,29 @@ mod tests {
             finding("motor_loss", "critical", 3),
             finding("motor_loss", "ok", 4),
         ];
-        assert_eq!(worst(&log).map(|worst| worst.at), Some(Instant::from_millis(2000)));
+        assert_eq!(worst(&log).map(|worst| worst.time_s), Some(2.0));
         log.contents.findings.truncate(1);
         assert_eq!(worst(&log).map(|worst| worst.level), Some("warning"));
         log.contents.findings = vec![finding("cell_voltage", "ok", 2)];
         assert!(worst(&log).is_none());
+    }
+
+    #[test]
+    fn a_mishap_comes_before_what_was_found_earlier_and_a_part_that_is_due_behind_all() {
+        let mut log = Overview::default();
+        let mishap = FindingLine { subsystem: "mishap", ..finding("tumbling", "critical", 9) };
+        log.contents.findings = vec![
+            finding("airframe_due", "critical", 1),
+            finding("cell_voltage", "critical", 2),
+            mishap,
+            finding("gps_satellites", "warning", 1),
+        ];
+        let first = |log: &Overview| worst(log).map(|worst| worst.check);
+        assert_eq!(first(&log).as_deref(), Some("tumbling"));
+        log.contents.findings.remove(2);
+        assert_eq!(first(&log).as_deref(), Some("cell_voltage"));
+        log.contents.findings.remove(1);
+        assert_eq!(first(&log).as_deref(), Some("airframe_due"));
     }
 
     #[test]

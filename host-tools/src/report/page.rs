@@ -33,6 +33,8 @@ struct Data<'a> {
     /// How many checks were critical at their worst, and how many warned.
     critical: usize,
     warning: usize,
+    /// When and what the worst of them was.
+    first: Option<(f64, String)>,
     texts_count: u64,
     /// How many checks had something to judge, and of how many; `null` where nothing was judged.
     judged: Option<(usize, usize)>,
@@ -113,6 +115,7 @@ pub fn html(log: &Overview, replay: &Replay, trend: &Trend, before: Option<&Befo
         missing: &replay.missing,
         critical: replay.found.0,
         warning: replay.found.1,
+        first: replay.first.clone(),
         texts_count: replay.texts_count,
         judged: replay.judged.map(|checks| (checks.judged, checks.all)),
         little: replay.judged.is_some_and(JudgedChecks::is_little),

@@ -9,10 +9,12 @@ use serde::Serialize;
 
 use super::flights::{Extents, Flight};
 use crate::check::causes::causes;
+use crate::check::grouped::{Group, grouped};
 use crate::check::judge::{Judge, Limits};
 use crate::check::judged::Judged;
 use crate::counters::tells_flight;
 use crate::decode::reference::Reference;
+use crate::names::check_name;
 use crate::page::history::History;
 use crate::page::more::{More, rows};
 use crate::page::note::Note;
@@ -53,6 +55,8 @@ pub struct Replay {
     pub missing: Vec<Missing>,
     /// How many checks were critical at their worst, and how many warned.
     pub found: (usize, usize),
+    /// When and what `hums check` says first.
+    pub first: Option<(f64, String)>,
     /// What it said.
     notes: Vec<(Instant, Note)>,
     reference: Reference,
@@ -92,6 +96,10 @@ impl Replay {
         replay.gaps(&judged);
         let count = |level| judged.problems.iter().filter(|problem| problem.level == level).count();
         replay.found = (count(Level::Critical), count(Level::Warning));
+        replay.first = grouped(&judged.problems)
+            .first()
+            .and_then(Group::first)
+            .map(|first| (first.at.as_secs_f64(), check_name(&first.check, first.instance)));
         let findings = &overview.contents.findings;
         let causes = causes(findings);
         let found = findings.iter().zip(&causes);

@@ -41,7 +41,7 @@ const verdict =
         : (data.critical + data.warning ? ["critical", "warning"] : ["stale", "advisory"])
             .filter(count)
             .map((level) => counted(count(level), level))
-            .join(", ");
+            .join(", ") + (data.first ? `; worst: ${data.first[1]}, ${moment(data.first[0] - flight.zero)}` : "");
 // Of a recording of frames alone it is the first of them.
 const POWER_ON = "the autopilot's power-on";
 const ZEROS = { hums: "the monitor's power-on", dataflash: POWER_ON, ulog: POWER_ON };
