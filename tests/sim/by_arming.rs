@@ -174,16 +174,16 @@ fn logs_between_which_the_card_was_out_follow_each_other() {
     let out = ["--card-out", "20..21.5", "--card-out", "30..30.5"];
     let flags = [&["--card-size", "64", "--params", &params], &out[..]].concat();
     let recording = Recording::make(Machine::Sim, &own(FLIGHT), &flags);
-    let said = readers(&recording.image(), 0);
+    let image = recording.image();
+    let said = readers(&image, 0);
     assert_eq!(said.matches("it goes on where the one before it ends").count(), 2, "{said}");
-    assert_eq!(said.matches("disarmed").count(), 1, "what log 1 lacks of the beginning: {said}");
+    assert!(!said.contains("not recorded"), "all of it is there: {said}");
     let folder = dir.path().join("copy");
     fs::create_dir(&folder).unwrap();
-    fat::copy_files(&recording.image(), &folder);
+    fat::copy_files(&image, &folder);
     for (number, other) in [("3", "00003_"), ("2", "00002_")] {
         let out = dir.path().join("one/");
-        let decode =
-            ["decode".as_ref(), recording.image().as_os_str(), "--session".as_ref(), number.as_ref()];
+        let decode = ["decode".as_ref(), image.as_os_str(), "--session".as_ref(), number.as_ref()];
         let to = ["--format".as_ref(), "tlog".as_ref(), "-o".as_ref(), out.as_os_str()];
         hums(decode.into_iter().chain(to)).expect_code(&[0]);
         let alone = dir.path().join(number);
