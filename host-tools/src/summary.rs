@@ -225,6 +225,7 @@ pub fn damaged_places(count: u64) -> String {
 
 /// All that a log holds, counted.
 #[derive(Clone, Debug, Default)]
+#[expect(clippy::struct_excessive_bools, reason = "facts that have nothing to do with each other")]
 pub struct Contents {
     /// Messages by their ids, or by their names where they have none.
     pub messages: Vec<MessageCount>,

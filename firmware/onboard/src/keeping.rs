@@ -106,9 +106,12 @@ mod tests {
     use super::*;
     use crate::queues::Queues;
 
+    /// What is done before a tick.
+    type Act<'a> = &'a dyn Fn(&CardStatus, &mut Params);
+
     /// What the record says is kept, of a vehicle that is armed or not at each tick, with what is done before it; and how many of its
     /// sectors end a log.
-    fn said(ticks: &[(bool, &dyn Fn(&CardStatus, &mut Params))]) -> (Vec<Keep>, usize) {
+    fn said(ticks: &[(bool, Act<'_>)]) -> (Vec<Keep>, usize) {
         let (mut queues, mut writer) = (Box::new(Queues::new()), Box::new(Writer::new()));
         let mut ends = queues.split();
         let (card, mut params, mut keeping) = (CardStatus::new(), Params::defaults(), Keeping::new());

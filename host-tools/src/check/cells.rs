@@ -77,7 +77,9 @@ mod tests {
     #[test]
     fn a_box_without_a_store_guesses_no_cells() {
         let mut cells = Cells::default();
-        [70, 90].into_iter().for_each(|at_s| cells.lack(Instant::from_millis(at_s * 1000)));
+        for at_s in [70, 90] {
+            cells.lack(Instant::from_millis(at_s * 1000));
+        }
         let words = |cells: Cells| cells.words(JudgedBy::Board, true).unwrap_or_default();
         assert!(!cells.are_unknown(JudgedBy::Board));
         assert!(words(cells).contains("from its last flight: a guess"), "{}", words(cells));

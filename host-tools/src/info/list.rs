@@ -71,6 +71,7 @@ pub fn run(args: &cli::Ls) -> Result<Outcome> {
 
 /// A log; names carry their units.
 #[derive(Debug, Serialize)]
+#[expect(clippy::struct_excessive_bools, reason = "facts that have nothing to do with each other")]
 struct LogJson {
     name: String,
     format: &'static str,

@@ -2,13 +2,18 @@
 
 use hums_core::observation::{Air, Battery, CELLS_MAX, Esc, Imu, MOTORS_MAX, Observation};
 use hums_core::time::Instant;
-use hums_core::units::Position;
+use hums_core::units::{Metres, Position};
 
 use super::more::{self, compass_deg};
 use super::plots::{Line, Plot};
 use crate::decode::reference::Reference;
 use crate::series::Store;
 use crate::track::Track;
+
+/// An altitude; before an estimator knows it, it is 0.
+fn told(altitude: Option<Metres>) -> Option<f32> {
+    altitude.map(|metres| metres.0).filter(|metres| metres.abs() > 0.0)
+}
 
 /// Series and track.
 #[derive(Clone, Debug, Default)]
@@ -91,12 +96,7 @@ impl Samples {
                     push(Plot::Attitude, 5, Some(pitch.0.to_degrees()));
                     push(Plot::Heading, 3, Some(compass_deg(yaw.0)));
                 }
-                // Before it knows its altitude, it is 0.
-                push(
-                    Plot::Altitude,
-                    3,
-                    second.altitude.map(|metres| metres.0).filter(|metres| metres.abs() > 0.0),
-                );
+                push(Plot::Altitude, 3, told(second.altitude));
             }
             Observation::Wanted(wanted) => {
                 push(Plot::Attitude, 2, Some(wanted.roll.0.to_degrees()));
