@@ -541,9 +541,12 @@ impl Logged for Overview {
         };
         let Some(gap) = self.contents.gaps.first_mut().filter(is_all) else { return };
         gap.sectors_lost -= sectors;
-        let Some(all) = gap.frames else { return };
-        gap.frames = frames.and_then(|frames| all.checked_sub(frames));
-        summary.frames_missing -= u64::from(all - gap.frames.unwrap_or(0));
+        let all = gap.frames.or(summary.frames_before);
+        let before = gap.frames;
+        gap.frames = all.zip(frames).and_then(|(all, frames)| all.checked_sub(frames));
+        summary.frames_missing -= u64::from(before.unwrap_or(0));
+        summary.frames_missing += u64::from(gap.frames.unwrap_or(0));
+        summary.gaps_uncounted -= u64::from(before.is_none());
         summary.gaps_uncounted += u64::from(gap.frames.is_none());
     }
 }

@@ -111,6 +111,8 @@ pub enum Reply {
     LogGone,
     /// A log is asked for by its place in a list that is no longer so, as a text.
     LogsChanged,
+    /// The card did not give some of the logs, or the directory, for a list, as a text.
+    LogsUnread,
     /// A signing key was set (or, `false`, removed), as a text.
     Keyed(bool),
 }

@@ -14,7 +14,7 @@ use hums_blackbox::{Entry, GroupDecoder, Header, Outline, Record, Sector};
 use hums_core::time::{Instant, Span};
 
 use super::board::HEADING_GROUPS;
-use super::groups::{Group, Groups};
+use super::groups::{Group, Groups, at_beginning};
 use super::places::Log;
 
 /// Files of a full ring but for one, of which the oldest goes however little the others hold.
@@ -79,6 +79,22 @@ pub fn late(log: &Log) -> Result<Option<Late>> {
         None => seen.go_on(&mut groups, |seen| seen.seconds() >= keep.seconds)?.seconds() >= keep.seconds,
     };
     Ok(Some(late(is_wanted)))
+}
+
+/// Whether nothing tells where a log began of which [`late`] knows nothing: its first sector lies elsewhere than in a log that begins
+/// with its session, and the records with which each file of a log begins are lost.
+pub fn is_begun_unknown(log: &Log) -> Result<bool> {
+    if log.session.is_some() {
+        return Ok(false);
+    }
+    let mut blocks = log.blocks();
+    while let Some(block) = blocks.next_block()? {
+        if let Ok(header) = Header::read(block) {
+            let is_of_power_on = blocks.place() == (0, u64::from(header.number));
+            return Ok(!is_of_power_on && header.number > 0 && at_beginning(log, |_| Some(())).is_none());
+        }
+    }
+    Ok(false)
 }
 
 /// Whether the ring gave away a file before the first one that is left, and then whether those after it held enough.
@@ -253,6 +269,39 @@ mod tests {
             sector.seal(7);
             self.0.push(*sector.bytes());
         }
+    }
+
+    #[test]
+    fn of_a_log_whose_beginning_is_lost_nothing_tells_where_it_began() {
+        use hums_blackbox::record::Boot;
+
+        let (mut memory, mut writer) = (Memory(Vec::new()), Box::new(Writer::new()));
+        let boot = Record::Boot(Boot { version: "1.2.3", ..Boot::default() });
+        let mut starts = Vec::new();
+        // Two files of five groups each, each of which begins with the record of a start.
+        for file in 0..2 {
+            for group in 0..5 {
+                assert!(writer.restart(&mut memory));
+                starts.push(memory.0.len());
+                let at = Instant::from_millis(1_000 * (10 * file + group));
+                let record =
+                    if group == 0 { boot } else { Record::Note(Note { severity: 6, text: "a word" }) };
+                writer.record(at, &record, &mut memory).expect("room");
+            }
+        }
+        assert!(writer.finish(&mut memory));
+        let second = starts[5];
+        let is_unknown = |from: usize, lost: usize| {
+            let mut sectors = memory.0[from..].to_vec();
+            sectors[..lost].fill([0x5a; 512]);
+            let dir = tempfile::tempdir().expect("a folder");
+            fs::write(dir.path().join("00002_00.HUM"), sectors.concat()).expect("room");
+            let found = find(&[dir.path().to_owned()], false).expect("a log");
+            is_begun_unknown(&found.logs[0]).expect("it reads")
+        };
+        assert!(!is_unknown(0, 0) && !is_unknown(0, 3), "its places tell that it began with the power-on");
+        assert!(!is_unknown(second, 0), "its first file is not there, and this one begins as one does");
+        assert!(is_unknown(second, 1) && is_unknown(second, 3));
     }
 
     /// What a log lacks whose first file is gone, the others being begun at these times. Each of them begins with a short group that says

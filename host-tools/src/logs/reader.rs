@@ -16,7 +16,7 @@ use hums_core::time::Instant;
 use super::board::HEADING_GROUPS;
 use super::groups::{Group, Groups, Joined};
 use super::in_order::{in_order, workers};
-use super::late::{Late, late};
+use super::late::{Late, is_begun_unknown, late};
 pub use super::marks::Marks;
 use super::places::Log;
 pub use super::repair::Evidence;
@@ -153,6 +153,7 @@ pub fn read<C: Collect>(
     let late = late(log)?;
     let mut stitch = Stitch {
         late,
+        is_begun_unknown: late.is_none() && is_begun_unknown(log)?,
         gathered: log.session.is_some(),
         first_file: log.first_segment(),
         ..Stitch::default()
@@ -401,6 +402,8 @@ struct Stitch {
     damaged_partial: u32,
     /// What is missing before the first group.
     late: Option<Late>,
+    /// Nothing tells where the log began.
+    is_begun_unknown: bool,
     /// The sectors of a session were searched for on a card: what is left of several logs may be among them.
     gathered: bool,
     /// The number of the log's first file.
@@ -500,9 +503,10 @@ impl Stitch {
     }
 
     /// Frames that are missing before a group before which so many came. Of those before a later log of a power-on most are the
-    /// logs' before it: how many are not, nothing here tells.
+    /// logs' before it: how many are not, nothing here tells; and also where nothing tells whether it is a later one.
     fn frames_missing(&self, before: u32) -> Option<u32> {
-        let is_later = self.summary.groups == 0 && self.late.is_some_and(|late| late.from > 0);
+        let may_be_later = self.is_begun_unknown || self.late.is_some_and(|late| late.from > 0);
+        let is_later = self.summary.groups == 0 && may_be_later;
         let missing = before.wrapping_sub(self.expected.unwrap_or(0));
         Some(missing).filter(|missing| *missing < 1 << 31 && (self.expected.is_some() || !is_later))
     }

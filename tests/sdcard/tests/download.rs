@@ -5,7 +5,7 @@ mod rig;
 use embedded_sdmmc::Block;
 use hums_blackbox::Header;
 use hums_recorder::{Card, CardState, CardStatus, HeldBlocks, LogName};
-use hums_sdcard::{Event, Kind, MS, Medium, Model};
+use hums_sdcard::{Event, Fault, Kind, MS, Medium, Model, Plan};
 use rig::{FILE_TRANSFER_PROTOCOL, LOG_DATA, LOG_ENTRY, Rig, read as read_card};
 
 const MIB: u32 = 2_048;
@@ -13,12 +13,14 @@ const S: u64 = 1_000;
 /// What is downloaded: the second of the full card's logs, which is the next to make room.
 const VICTIM: LogName = LogName { session: 2, segment: 0 };
 
+const LIST: u8 = 3;
 const OPEN: u8 = 4;
 const READ: u8 = 5;
 const CHECKSUM: u8 = 14;
 const BURST: u8 = 15;
 const ACK: u8 = 128;
 const NAK: u8 = 129;
+const FAIL: u8 = 1;
 const END_OF_FILE: u8 = 6;
 const FILE_NOT_FOUND: u8 = 10;
 
@@ -371,4 +373,40 @@ fn a_burst_has_the_size_that_was_asked_for_and_is_complete_before_the_end_only_w
         }
     }
     assert!(bursts > 1, "one burst shows nothing");
+}
+
+#[test]
+fn a_log_that_the_card_refuses_slowly_is_left_out_of_a_list_and_never_called_empty() {
+    let medium = with_two_sessions(40, 20);
+    // From then on, and after so many blocks that it still gives, it keeps whoever reads waiting.
+    let refusing = |skip| {
+        let plan = Plan::always(Fault::NoBlock).from(20 * S * MS).until(60 * S * MS).skip(skip);
+        let mut rig = Rig::new(model(&medium).with(plan));
+        rig.run_to(20 * S);
+        rig.assert_state(CardState::Recording);
+        rig
+    };
+    for (skip, said) in [(0, (NAK, &[FAIL][..])), (1, (ACK, b"S\0"))] {
+        let mut rig = refusing(skip);
+        let answers = ftp(&mut rig, LIST, 1, 0, b"/", 10_000);
+        let [(kind, LIST, _, _, data)] = &answers[..] else { panic!("after {skip} blocks: {answers:?}") };
+        assert_eq!((*kind, &data[..]), said, "the directory, and a log of it");
+        // It is no more gone than it is empty.
+        let opened = ftp(&mut rig, OPEN, 0, 0, &path(VICTIM), 10_000);
+        assert!(opened.iter().all(|answer| (answer.0, &answer.4[..]) == (NAK, &[FAIL])), "{opened:?}");
+        rig.run_to(60 * S);
+        assert!(open(&mut rig, VICTIM) > 20_000, "once the card gives it");
+    }
+    for skip in [0, 1] {
+        let mut rig = refusing(skip);
+        rig.logs.clear();
+        rig.ask(117, &[0, 0, 255, 255, 1, 191]);
+        rig.run_to(66 * S);
+        rig.assert_told("HUMS: card did not give all logs: list again", 20 * S);
+        let entries: Vec<_> = rig.logs.iter().filter(|(id, _)| *id == LOG_ENTRY).collect();
+        let word = |entry: &[u8], at: usize| u32::from_le_bytes(entry[at..at + 4].try_into().expect("four"));
+        assert!(entries.iter().all(|(_, entry)| word(entry, 4) > 0), "neither empty nor none: {entries:?}");
+        let listed = entries.len();
+        assert!(list(&mut rig) > listed);
+    }
 }

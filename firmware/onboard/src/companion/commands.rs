@@ -229,6 +229,9 @@ pub(crate) fn packet(now: Instant, reply: Reply, monitor: &Monitor, identity: &B
         Reply::LogsChanged => {
             messages::status_text(Severity::Notice, "HUMS: logs have changed: list them again")
         }
+        Reply::LogsUnread => {
+            messages::status_text(Severity::Warning, "HUMS: card did not give all logs: list again")
+        }
         Reply::Stopped => messages::status_text(Severity::Warning, "HUMS: recording stopped by command"),
     }
 }

@@ -59,15 +59,28 @@ pub struct Want {
     pub what: What,
 }
 
+/// Why an answer is of no log.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum NoLog {
+    /// There is no such log.
+    Absent,
+    /// The card did not give it, or not the directory: nothing is known of it, also not that nothing is in it.
+    Unread,
+}
+
+/// What an answer's head has in a place's stead.
+const ABSENT: u16 = u16::MAX;
+const UNREAD: u16 = u16::MAX - 1;
+
 /// What storage answers, without the data.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Answer {
     /// The want's.
     pub ticket: u16,
-    /// How many logs there are; 0 also where there is no card.
+    /// How many logs there are; 0 also where there is no card, and where the card did not give the directory.
     pub count: u16,
-    /// The log's place; `None` where there is no such log.
-    pub found: Option<u16>,
+    /// The log's place.
+    pub found: Result<u16, NoLog>,
     /// Which log it is.
     pub log: LogId,
     /// The log's length in bytes.
@@ -81,19 +94,25 @@ pub struct Answer {
 impl Answer {
     /// That there is no such log.
     pub(super) const fn none(ticket: u16) -> Self {
-        Self { ticket, count: 0, found: None, log: LogId::NONE, bytes: 0, offset: 0, directory: 0 }
+        let found = Err(NoLog::Absent);
+        Self { ticket, count: 0, found, log: LogId::NONE, bytes: 0, offset: 0, directory: 0 }
     }
 
-    /// The same, but that the log is not there any longer.
-    pub(super) const fn without(self) -> Self {
-        Self { found: None, bytes: 0, ..self }
+    /// The same of no log.
+    pub(super) const fn without(self, why: NoLog) -> Self {
+        Self { found: Err(why), bytes: 0, ..self }
     }
 
     pub(super) fn write(&self) -> [u8; HEAD] {
         let mut head = [0; HEAD];
         head[..2].copy_from_slice(&self.ticket.to_le_bytes());
         head[2..4].copy_from_slice(&self.count.to_le_bytes());
-        head[4..6].copy_from_slice(&self.found.unwrap_or(u16::MAX).to_le_bytes());
+        let found = match self.found {
+            Ok(place) => place,
+            Err(NoLog::Absent) => ABSENT,
+            Err(NoLog::Unread) => UNREAD,
+        };
+        head[4..6].copy_from_slice(&found.to_le_bytes());
         head[6] = self.log.name.segment as u8;
         let words = [
             self.log.name.session,
@@ -119,7 +138,11 @@ impl Answer {
         Self {
             ticket: u16_at(0),
             count: u16_at(2),
-            found: Some(u16_at(4)).filter(|index| *index != u16::MAX),
+            found: match u16_at(4) {
+                ABSENT => Err(NoLog::Absent),
+                UNREAD => Err(NoLog::Unread),
+                place => Ok(place),
+            },
             log: LogId { name, session: word(3), first: word(4) },
             bytes: word(1),
             offset: word(2),

@@ -27,8 +27,8 @@ use hums_recorder::card::Segment;
 use hums_recorder::{Card, CardDevice, Recorder};
 
 use asked::HEAD;
-pub use asked::{Answer, DATA_MAX, LogId, Want, What, Which};
-use on_card::{for_each_part, in_work, is_same, measure};
+pub use asked::{Answer, DATA_MAX, LogId, NoLog, Want, What, Which};
+use on_card::{for_each_part, holds, in_work, measure};
 
 /// The longest answer in one piece, with the queue's own two bytes, wherever the last one ended: twice its length.
 pub const ANSWER_BYTES: usize = 2 * (HEAD + DATA_MAX + 2) + 8;
@@ -166,7 +166,7 @@ impl Server<'_> {
                 What::Length | What::Erase => {}
             }
             self.last = Some(Found { answer, segment })
-                .filter(|found| want.which != Which::Settings && found.answer.found.is_some());
+                .filter(|found| want.which != Which::Settings && found.answer.found.is_ok());
         }
         if self.sum.is_some() && matches!(want.what, What::Checksum(_)) {
             // Its answer comes when it is done; what is not committed is given back.
@@ -186,10 +186,14 @@ impl Server<'_> {
         };
         let Ok(mut grant) = self.answers.grant((HEAD + DATA_MAX) as u16) else { return false };
         let end = answer.offset.min(done.saturating_add(SUM_BLOCKS * Block::LEN_U32));
+        let mut why = NoLog::Unread;
         let is_read = recorder.card().is_some_and(|card| {
             let add = |part: &[u8]| so_far = ftp::checksum(so_far, part);
-            is_same(card, &mut segment, &answer.log)
-                && for_each_part(card, &mut segment, &answer.log, done..end, add)
+            let is_same = holds(card, &mut segment, &answer.log);
+            if is_same == Some(false) {
+                why = NoLog::Absent;
+            }
+            is_same == Some(true) && for_each_part(card, &mut segment, &answer.log, done..end, add)
         });
         done = end;
         if is_read && done < answer.offset {
@@ -198,7 +202,7 @@ impl Server<'_> {
         }
         self.sum = None;
         if !is_read {
-            answer = answer.without();
+            answer = answer.without(why);
         }
         if let Some((head, to)) = grant.split_first_chunk_mut::<HEAD>() {
             *head = answer.write();
@@ -236,12 +240,12 @@ fn find<D: CardDevice>(recorder: &mut Recorder<'_, D>, want: &Want, last: Option
     let name = match want.which {
         Which::Settings => {
             let Ok((segment, bytes)) = card.text(b"PARAMS", b"TXT") else { return none };
-            let answer = Answer { found: Some(0), bytes, ..none.answer };
+            let answer = Answer { found: Ok(0), bytes, ..none.answer };
             return Looked { answer, segment: Some(segment) };
         }
         Which::Same(log) => {
             if let Some(Found { answer, mut segment }) = last.filter(|last| last.answer.log == log)
-                && is_same(card, &mut segment, &log)
+                && holds(card, &mut segment, &log) == Some(true)
             {
                 return Looked { answer, segment: Some(segment) };
             }
@@ -266,19 +270,21 @@ fn find<D: CardDevice>(recorder: &mut Recorder<'_, D>, want: &Want, last: Option
         }
         answer.count = answer.count.saturating_add(1);
     });
-    let place = found.and_then(|(place, name)| Some((place, name, card.segment(name).ok()?)));
-    let Some((place, name, mut segment)) = place.filter(|_| listed.is_ok()) else {
-        return Looked { answer, segment: None };
-    };
-    let (log, blocks) = match recorded.filter(|recorded| recorded.name == name) {
-        Some(recorded) => in_work(&recorded),
+    let of_none = |why| Looked { answer: answer.without(why), segment: None };
+    if listed.is_err() {
+        return Looked { answer: none.answer.without(NoLog::Unread), segment: None };
+    }
+    let Some((place, name)) = found else { return of_none(NoLog::Absent) };
+    let Ok(mut segment) = card.segment(name) else { return of_none(NoLog::Unread) };
+    let measured = match recorded.filter(|recorded| recorded.name == name) {
+        Some(recorded) => Some(in_work(&recorded)),
         None => measure(card, &mut segment, name),
     };
-    (answer.log, answer.bytes) = (log, blocks * Block::LEN_U32);
+    let Some((log, blocks)) = measured else { return of_none(NoLog::Unread) };
     if matches!(want.which, Which::Same(wanted) if wanted != log) {
-        return Looked { answer: answer.without(), segment: None };
+        return of_none(NoLog::Absent);
     }
-    answer.found = Some(place);
+    (answer.log, answer.bytes, answer.found) = (log, blocks * Block::LEN_U32, Ok(place));
     Looked { answer, segment: Some(segment) }
 }
 

@@ -106,22 +106,26 @@ impl<'r, 'a, D: CardDevice> Blocks<'r, 'a, D> {
     }
 }
 
-/// Whether the segment still holds this log.
-pub(super) fn is_same<D: CardDevice>(card: &Card<'_, D>, segment: &mut Segment, log: &LogId) -> bool {
-    Blocks::of(card, segment).begin().unwrap_or((0, 0)) == (log.session, log.first)
+/// Whether the segment still holds this log; `None` where the card does not tell.
+pub(super) fn holds<D: CardDevice>(card: &Card<'_, D>, segment: &mut Segment, log: &LogId) -> Option<bool> {
+    let mut blocks = Blocks::of(card, segment);
+    let begin = blocks.begin().or((!blocks.has_lost).then_some((0, 0)))?;
+    Some(begin == (log.session, log.first))
 }
 
-/// Which log a segment holds, and how many blocks of it were recorded.
+/// Which log a segment holds, and how many blocks of it were recorded; `None` where the card does not tell.
 pub(super) fn measure<D: CardDevice>(
     card: &Card<'_, D>,
     segment: &mut Segment,
     name: LogName,
-) -> (LogId, u32) {
+) -> Option<(LogId, u32)> {
     let mut blocks = Blocks::of(card, segment);
-    let found = blocks
-        .begin()
-        .map(|(session, first)| (LogId { name, session, first }, blocks.recorded(session, first)));
-    found.filter(|_| !blocks.is_gone).unwrap_or((LogId { name, ..LogId::NONE }, 0))
+    let Some((session, first)) = blocks.begin() else {
+        // What was not read may have been a sector.
+        return (!blocks.has_lost).then_some((LogId { name, ..LogId::NONE }, 0));
+    };
+    let recorded = blocks.recorded(session, first);
+    (!blocks.is_gone).then_some((LogId { name, session, first }, recorded))
 }
 
 /// The same of the log in work: what no longer changes. What was there before is none of it.

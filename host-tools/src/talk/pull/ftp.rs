@@ -149,16 +149,17 @@ impl Ftp {
         Err(silence("the board does not answer over MAVLink FTP; is GS_BUDGET less than 500 B/s?"))
     }
 
-    /// Names and lengths of all logs.
-    pub(super) fn list(&mut self) -> Result<Vec<(String, u32)>> {
-        let mut logs = Vec::new();
+    /// Names and lengths of all logs, and how many more there are that the board's card did not give.
+    pub(super) fn list(&mut self) -> Result<(Vec<(String, u32)>, usize)> {
+        let (mut logs, mut skipped) = (Vec::new(), 0);
         loop {
-            let answer = self.ask(LIST, logs.len() as u32, 0, b"/", TRIES)?;
+            let before = logs.len() + skipped;
+            let answer = self.ask(LIST, before as u32, 0, b"/", TRIES)?;
             if answer.is_nak(END_OF_FILE) {
-                return Ok(logs);
+                return Ok((logs, skipped));
             }
             let text = String::from_utf8_lossy(&answer.data).into_owned();
-            let before = logs.len();
+            skipped += text.split('\0').filter(|entry| entry.starts_with('S')).count();
             for entry in text.split('\0').filter_map(|entry| entry.strip_prefix('F')) {
                 let (name, bytes) = entry.split_once('\t').context("a directory entry without a length")?;
                 // A name is a file's in our directory, and nothing else.
@@ -167,10 +168,10 @@ impl Ftp {
                 }
                 logs.push((name.to_owned(), bytes.parse().context("a directory entry's length")?));
             }
-            if answer.opcode != ACK || logs.len() == before {
+            if answer.opcode != ACK || logs.len() + skipped == before {
                 bail!("the board's directory cannot be read");
             }
-            if logs.len() > LOGS_MAX {
+            if logs.len() + skipped > LOGS_MAX {
                 bail!("the board's directory has no end: more than {LOGS_MAX} logs are no card's");
             }
         }

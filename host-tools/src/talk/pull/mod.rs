@@ -86,19 +86,28 @@ pub fn run(args: &cli::Pull) -> Result<Outcome> {
 /// Brings the logs that are asked for.
 fn bring(client: Client, args: &cli::Pull) -> Result<Outcome> {
     let mut ftp = Ftp::new(client)?;
-    let mut logs = ftp.list()?;
+    let (mut logs, skipped) = ftp.list()?;
     logs.sort();
+    if skipped > 0 {
+        note!(
+            "the board's card does not give {} now, with names that are not known: call again, or read the card itself",
+            count(skipped, "more log")
+        );
+    }
     if let Some(missing) = args.names.iter().find(|name| logs.iter().all(|(log, _)| log != *name)) {
         let names: Vec<&str> = logs.iter().map(|(log, _)| log.as_str()).collect();
-        bail!("{missing}: the board has no such log; it has {}", names.join(", "));
+        let such = if skipped > 0 { "lists no such log now" } else { "has no such log" };
+        bail!("{missing}: the board {such}; it has {}", names.join(", "));
     }
+    // Whoever names logs does not miss others.
+    let listed = Outcome::lossy(skipped > 0 && args.names.is_empty());
     let all: Vec<String> = logs.iter().filter(|(_, bytes)| *bytes > 0).map(|(log, _)| log.clone()).collect();
     let begun = logs.last().map(|(log, _)| log.clone());
     logs.retain(|(log, _)| args.names.is_empty() || args.names.contains(log));
     if let Some(moment) = &args.around {
         let left_out: Vec<String> =
             all.into_iter().filter(|log| !args.names.is_empty() && !args.names.contains(log)).collect();
-        return around(&mut ftp, logs, &left_out, args, moment);
+        return Ok(around(&mut ftp, logs, &left_out, args, moment)?.and(listed));
     }
     // One that was begun just now may have nothing in it yet.
     let begun = begun.filter(|_| args.names.is_empty());
@@ -113,7 +122,7 @@ fn bring(client: Client, args: &cli::Pull) -> Result<Outcome> {
     let came = bring_each(&mut ftp, logs, begun.as_deref(), args, &mut pulled);
     // Also what came before an error.
     let judged = judge(&all, &asked, &mut pulled);
-    let outcome = came?.and(judged?).and(hold_against_next(&mut ftp, &all, &asked, &mut pulled)?);
+    let outcome = came?.and(judged?).and(hold_against_next(&mut ftp, &all, &asked, &mut pulled)?).and(listed);
     if args.json {
         output::json(SCHEMA, &PulledJson { system: ftp.system(), logs: pulled, around: None })?;
     }

@@ -37,8 +37,14 @@ fn names_in(folder: &Path) -> Vec<String> {
 type Files = Vec<(String, Vec<u8>)>;
 
 /// A board with these logs. Before each answer `change` gets them, with the opcode, and may give an error that is answered.
-fn board_of(
+fn board_of(files: Files, change: impl FnMut(&mut Files, u8) -> Option<u8> + Send + 'static) -> Client {
+    board_with(files, None, change)
+}
+
+/// The same, the card of which does not give the log of this name.
+fn board_with(
     mut files: Files,
+    skipped: Option<&'static str>,
     mut change: impl FnMut(&mut Files, u8) -> Option<u8> + Send + 'static,
 ) -> Client {
     let mut open = 0;
@@ -65,6 +71,7 @@ fn board_of(
         let answer = |more: u16, at: usize, is_last: bool, data: &[u8]| said(more, 128, at, is_last, data);
         match opcode {
             3 if at >= files.len() => vec![said(1, 129, 0, false, &[6])],
+            3 if Some(files[at].0.as_str()) == skipped => vec![answer(1, at, false, b"S\0")],
             3 => {
                 let (name, log) = &files[at];
                 vec![answer(1, at, false, format!("F{name}\t{}\0", log.len()).as_bytes())]
@@ -539,6 +546,16 @@ fn a_file_that_begins_in_the_middle_of_a_group_is_read_with_the_one_before_it() 
             Outcome::Done
         );
     }
+}
+
+#[test]
+fn a_log_that_the_boards_card_does_not_give_is_told() {
+    let files: Files = vec![(NAME.to_owned(), recorded(7, 20)), ("00002_00.HUM".to_owned(), Vec::new())];
+    let board = || board_with(files.clone(), Some("00002_00.HUM"), |_, _| None);
+    assert_eq!(brought_of(board(), &[]).expect("it comes"), Outcome::Losses);
+    assert_eq!(brought_of(board(), &[NAME]).expect("it comes"), Outcome::Done, "no other was asked for");
+    let told = brought_of(board(), &["00002_00.HUM"]).expect_err("it is not given").to_string();
+    assert!(told.contains("lists no such log now"), "{told}");
 }
 
 #[test]

@@ -13,7 +13,7 @@ use hums_recorder::LogName;
 
 use super::held::Held;
 use super::step::{Out, Step};
-use crate::shelf::{Answer, LogId, What, Which};
+use crate::shelf::{Answer, LogId, NoLog, What, Which};
 
 /// Bytes of one burst, in messages of the longest data; the client then asks on, and so one that has gone is not sent a
 /// whole log.
@@ -140,7 +140,15 @@ impl Job {
         match (*kind, answer) {
             (Kind::Say(None), _) => out.file(reply.ack(&[], &mut buffer), Step::Done),
             (Kind::Say(Some(error)), _) => out.file(reply.nak(error, &mut buffer), Step::Done),
-            (Kind::List(_), Some((answer, _))) if answer.found.is_none() => {
+            // An entry without a name has its place in the list; without a directory there is none.
+            (Kind::List(_), Some((answer, _))) if answer.found == Err(NoLog::Unread) && answer.count > 0 => {
+                out.file(reply.ack(b"S\0", &mut buffer), Step::Done)
+            }
+            // The card does not give it now. Who wants it asks again.
+            (_, Some((answer, _))) if answer.found == Err(NoLog::Unread) => {
+                out.file(reply.nak(Error::Fail, &mut buffer), Step::Done)
+            }
+            (Kind::List(_), Some((answer, _))) if answer.found.is_err() => {
                 out.file(reply.nak(Error::EndOfFile, &mut buffer), Step::Done)
             }
             (Kind::List(_), Some((answer, _))) => {
@@ -149,7 +157,7 @@ impl Job {
                 let _ = write!(text, "F{}\t{}\0", answer.log.name, answer.bytes);
                 out.file(reply.ack(text.as_bytes(), &mut buffer), Step::Done)
             }
-            (Kind::Open(_) | Kind::Checksum { .. }, Some((answer, _))) if answer.found.is_none() => {
+            (Kind::Open(_) | Kind::Checksum { .. }, Some((answer, _))) if answer.found.is_err() => {
                 out.file(reply.nak(Error::FileNotFound, &mut buffer), Step::Done)
             }
             (Kind::Open(_), Some((answer, _))) => {
@@ -166,7 +174,7 @@ impl Job {
             (Kind::Checksum { sum: Some(sum), .. } | Kind::Number(sum), _) => {
                 out.file(reply.ack(&sum.to_le_bytes(), &mut buffer), Step::Done)
             }
-            (Kind::Read { of, .. } | Kind::Burst { of, .. }, Some((answer, _))) if answer.found.is_none() => {
+            (Kind::Read { of, .. } | Kind::Burst { of, .. }, Some((answer, _))) if answer.found.is_err() => {
                 let step = out.file(reply.nak(Error::FileNotFound, &mut buffer), Step::End(Reply::LogGone));
                 if step != Step::Wait && *open == Some(of) {
                     *open = None;

@@ -9,7 +9,7 @@ use hums_link::messages;
 use hums_link::request::Reply;
 
 use super::step::{Out, Step};
-use crate::shelf::{Answer, LogId, What, Which};
+use crate::shelf::{Answer, LogId, NoLog, What, Which};
 
 /// Bytes in one `LOG_DATA`.
 const DATA_BYTES: usize = 90;
@@ -79,33 +79,50 @@ impl Places {
 pub(super) struct List {
     next: u16,
     last: u16,
+    /// The card did not give one, which is left out.
+    lacks: bool,
 }
 
 impl List {
     /// Of the numbers from `first` to `last`.
     pub(super) fn new(first: u16, last: u16) -> Self {
-        Self { next: first.saturating_sub(1), last: last.saturating_sub(1) }
+        Self { next: first.saturating_sub(1), last: last.saturating_sub(1), lacks: false }
     }
 
     pub(super) const fn want(&self) -> (Which, What) {
         (Which::At(self.next), What::Length)
     }
 
+    /// The end of it, which is told where a log was left out.
+    const fn end(&self) -> Step {
+        if self.lacks { Step::End(Reply::LogsUnread) } else { Step::Done }
+    }
+
     /// `LOG_ENTRY`
     pub(super) fn step(&mut self, answer: &Answer, places: &mut Places, out: &mut Out<'_, '_, '_>) -> Step {
+        let count = answer.count;
+        if answer.found == Err(NoLog::Unread) {
+            self.lacks = true;
+            if count == 0 {
+                return self.end();
+            }
+        }
         if self.next == 0 || places.listed.is_none() {
             // The rest is of the same directory, or no longer right.
             (places.listed, places.told) = (Some(answer.directory), false);
         }
-        let count = answer.count;
-        if answer.found.is_none() {
+        if answer.found == Err(NoLog::Absent) {
             // "There are none" is an answer; past the last one there is nothing to say.
             let none = messages::log_entry(0, 0, 0, 0, 0);
-            return if count == 0 { out.say(&none, Step::Done) } else { Step::Done };
+            return if count == 0 { out.say(&none, self.end()) } else { self.end() };
         }
         let is_last = self.next >= self.last || self.next + 1 >= count;
-        let entry = messages::log_entry(self.next + 1, count, count, answer.bytes, 0);
-        let step = out.say(&entry, if is_last { Step::Done } else { Step::Next });
+        let then = if is_last { self.end() } else { Step::Next };
+        let step = match answer.found {
+            Ok(_) => out.say(&messages::log_entry(self.next + 1, count, count, answer.bytes, 0), then),
+            // It has a length that nobody knows.
+            Err(_) => then,
+        };
         if step == Step::Next {
             self.next += 1;
         }
@@ -141,14 +158,16 @@ impl Data {
         out: &mut Out<'_, '_, '_>,
     ) -> Step {
         match self.which {
-            Which::Same(_) if answer.found.is_none() => {
+            // The card does not give it now. Who wants it asks again.
+            _ if answer.found == Err(NoLog::Unread) => return Step::Done,
+            Which::Same(_) if answer.found.is_err() => {
                 places.lose(self.id);
                 return Step::End(Reply::LogGone);
             }
             Which::Same(_) => {}
             _ if !places.is_listed(self.offset, answer.directory) => return places.refuse(),
             // There never was such a log: it ends before it begins.
-            _ if answer.found.is_none() => {
+            _ if answer.found.is_err() => {
                 return out.say(&messages::log_data(self.id, self.offset, &[]), Step::Done);
             }
             _ => {
@@ -157,7 +176,7 @@ impl Data {
             }
         }
         if data.is_empty() && self.offset < answer.bytes {
-            // The card does not give it now. Who wants it asks again.
+            // The same.
             return Step::Done;
         }
         self.send(answer, data, out)
