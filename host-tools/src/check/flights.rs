@@ -7,6 +7,7 @@ use hums_core::time::{Instant, Span};
 
 use super::clock::SETTLE;
 use super::problem::LISTED_MAX;
+use crate::source::told::Finding;
 
 /// A flight.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -63,10 +64,29 @@ struct Silence {
 
 /// Steps are no further apart than this, behind a gap of the recording too ([`SETTLE`]); the rest of a longer silence was left out.
 const STEP_MAX: Span = Span::from_millis(SETTLE.as_millis() + 2 * TICK.as_millis());
+/// An impact is found so late at most: once what hit something lies still.
+const FOUND_LATE: Span = Span::from_secs(5);
 /// Without a heartbeat for so long it is silent.
 const SILENT: Span = Span::from_secs(5);
 /// What is heard for so long and flies is on its flight still: longer than a landing needs to be seen.
 const STILL_FLIES: Span = Span::from_secs(3);
+
+impl Flight {
+    /// The impact that ended it is told once, when the box found it, as these findings of it say.
+    pub(super) fn was_hit<'a>(&mut self, mut found: impl Iterator<Item = &'a Finding>) {
+        if let Some(Mishap { at, is_impact: true }) = &mut self.mishap
+            && let Some(finding) =
+                found.find(|finding| finding.at >= *at && finding.at.since(*at) <= FOUND_LATE)
+        {
+            *at = finding.at;
+        }
+    }
+}
+
+/// Whether a flight that goes on is in the air: also where it was disarmed, and may fall.
+pub(super) fn is_in_air(monitor: &Monitor) -> bool {
+    monitor.flight().airborne() || monitor.mishap().is_doubted()
+}
 
 impl Flights {
     /// The vehicle took off, or is seen to be in the air.
@@ -175,7 +195,7 @@ impl Flights {
 
     /// A recording has ended, and perhaps another one begins.
     pub(super) fn end_of_recording(&mut self, monitor: &Monitor) {
-        if !monitor.flight().airborne() {
+        if !is_in_air(monitor) {
             // On the ground, still armed: what is over is the recording, and the flight too.
             self.landing();
         }
