@@ -215,3 +215,30 @@ impl Flights {
         self.list
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use hums_core::health::Level;
+
+    use super::super::problem::tests::change;
+    use super::*;
+
+    #[test]
+    fn an_impact_that_ended_a_flight_has_the_time_of_its_finding() {
+        let at = Instant::from_millis(67_100);
+        let mut flight = Flight {
+            from: Instant::ZERO,
+            to: at,
+            air: Span::ZERO,
+            took_off: true,
+            landed: false,
+            disarmed_at_m: None,
+            mishap: Some(Mishap { at, is_impact: true }),
+        };
+        let found = [60, 80, 69, 70].map(|at_s| change(at_s, Level::Critical, 9.9));
+        flight.was_hit(found[..2].iter());
+        assert_eq!(flight.mishap.map(|mishap| mishap.at), Some(at), "long before and long after");
+        flight.was_hit(found.iter());
+        assert_eq!(flight.mishap.map(|mishap| mishap.at), Some(Instant::from_millis(69_000)));
+    }
+}

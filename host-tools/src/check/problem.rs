@@ -328,6 +328,17 @@ pub(super) mod tests {
     }
 
     #[test]
+    fn what_a_box_found_to_lie_still_hit_something_before_and_in_a_mishap_that_goes_on_just_then() {
+        let at = Instant::from_millis(90_000);
+        assert_eq!(began(IMPACT, at, std::iter::empty()), Instant::from_millis(89_000));
+        let open = [(Instant::from_millis(89_500), "tumbling"), (at, IMPACT)];
+        assert_eq!(began(IMPACT, at, open.into_iter()), at);
+        let open = [(Instant::from_millis(89_500), "pitch_rate"), (at, IMPACT)];
+        assert_eq!(began(IMPACT, at, open.into_iter()), Instant::from_millis(89_000));
+        assert_eq!(began("pitch_rate", at, std::iter::empty()), at);
+    }
+
+    #[test]
     fn a_dip_that_came_back_twice_is_one_problem_with_its_worst() {
         let mut problems = Problems::default();
         for (at, level, value) in [
