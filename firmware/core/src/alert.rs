@@ -13,7 +13,7 @@ mod texts;
 pub use events::name as event_name;
 
 use crate::cause::{Alert, Cause, Causes, Meaning, Urgency};
-use crate::observation::{Estimator, EstimatorScale};
+use crate::observation::{Estimator, EstimatorScale, Sensors};
 use crate::time::{Instant, Span, Stamp};
 
 /// How long a text or an event is said to be so. PX4 tells its failing checks again when they change, some 2 s apart.
@@ -122,8 +122,10 @@ pub struct Alerts {
     estimator: Flags,
     armed: bool,
     armed_at: Stamp,
-    /// The receiver of the remote control was healthy once: one that never was is not fitted or not switched on.
-    had_remote_control: bool,
+    /// What a flag called healthy once: what never was is not fitted or not switched on.
+    had: Causes,
+    /// What the flags of the last `SYS_STATUS` call healthy or not.
+    spoken_of: Causes,
     /// The estimator had attitude and position.
     had_both: bool,
 }
@@ -139,7 +141,8 @@ impl Alerts {
             estimator: Flags::NONE,
             armed: false,
             armed_at: Stamp::NONE,
-            had_remote_control: false,
+            had: Causes::NONE,
+            spoken_of: Causes::NONE,
             had_both: false,
         }
     }
@@ -147,8 +150,8 @@ impl Alerts {
     /// A heartbeat: with each arming all begins anew.
     pub(crate) const fn take_armed(&mut self, at: Instant, armed: bool) {
         if armed && !self.armed {
-            let Self { had_remote_control, had_both, .. } = *self;
-            *self = Self { had_remote_control, had_both, ..Self::new() };
+            let Self { had, had_both, .. } = *self;
+            *self = Self { had, had_both, ..Self::new() };
         }
         self.armed = armed;
         if armed {
@@ -175,11 +178,14 @@ impl Alerts {
         };
     }
 
-    /// `SYS_STATUS`: sensors that are present and enabled and not healthy.
-    pub(crate) fn take_sensors(&mut self, at: Instant, unhealthy: u32) {
-        let causes = Causes::of_sensors(unhealthy);
-        self.had_remote_control |= !causes.has(Cause::RemoteControl);
-        self.sensors.take(at, causes);
+    /// `SYS_STATUS`: sensors that are not healthy. PX4 calls one that it lost no longer present.
+    pub(crate) fn take_sensors(&mut self, at: Instant, sensors: &Sensors) {
+        let healthy = Causes::of_sensors(sensors.healthy);
+        self.had = self.had.or(healthy);
+        let lost = Causes::of_sensors(sensors.lost).both(self.had);
+        let wrong = Causes::of_sensors(sensors.unhealthy).or(lost);
+        self.spoken_of = healthy.or(wrong);
+        self.sensors.take(at, wrong);
     }
 
     /// `HIGH_LATENCY2`
@@ -219,14 +225,14 @@ impl Alerts {
         told.fold(flagged, |causes, (cause, _)| causes.with(cause))
     }
 
-    /// How bad the autopilot says it is, as [`Urgency`] numbers it: 0 where it says that it is over, and where flags that tell of it come
-    /// and have none; [`ENDED`] where it says nothing more of it; `None` where nothing was ever said. In a mishap flags only echo it.
+    /// How bad the autopilot says it is, as [`Urgency`] numbers it: 0 where it says that it is over, and where flags come that call it
+    /// healthy; [`ENDED`] where it says nothing more of it; `None` where nothing was ever said. In a mishap flags only echo it.
     pub fn level(&self, now: Instant, cause: Cause, in_mishap: bool) -> Option<f32> {
         let (told, until_ms) = (self.told.get(cause as usize)?, self.until_ms.get(cause as usize)?);
         let is_judged = self.armed && !in_mishap;
         let is_flagged = is_judged
             && self.flags().iter().any(|flags| flags.has(now, cause))
-            && (cause != Cause::RemoteControl || self.had_remote_control);
+            && (cause != Cause::RemoteControl || self.had.has(cause));
         let held = told.filter(|urgency| *urgency != Urgency::Over && !is_past(now, *until_ms));
         let wrong = held.max(is_flagged.then_some(Urgency::Warning));
         let is_over = *told == Some(Urgency::Over) || is_judged && self.is_cleared(now, cause);
@@ -235,14 +241,14 @@ impl Alerts {
         wrong.map(|urgency| f32::from(urgency as u8)).or(was_said.then_some(good))
     }
 
-    /// Whether flags come that would tell of it, and have none.
+    /// Whether flags come that would tell of it, and have none: those of `SYS_STATUS` call it healthy.
     fn is_cleared(&self, now: Instant, cause: Cause) -> bool {
         let comes = |flags: &Flags| {
             let has = flags.now.both(flags.before).has(cause);
             !has && flags.at.age(now).is_some_and(|age| age <= FLAGS_AGE)
         };
         let by_estimator = matches!(cause, Cause::Estimator | Cause::Gnss | Cause::Accelerometer);
-        (Causes::of_sensors(u32::MAX).has(cause) && comes(&self.sensors))
+        (self.spoken_of.has(cause) && comes(&self.sensors))
             || (Causes::of_failure_flags(u16::MAX).has(cause) && comes(&self.failures))
             || (by_estimator && comes(&self.estimator))
     }

@@ -195,9 +195,9 @@ impl Causes {
         set.fold(Self::NONE, |causes, (_, cause)| causes.with(*cause))
     }
 
-    /// What bits of `MAV_SYS_STATUS_SENSOR` that are not healthy say (source: `common.xml`). Pre-arm checks (28) say nothing in
+    /// What bits of `MAV_SYS_STATUS_SENSOR` say (source: `common.xml`). Pre-arm checks (28) say nothing in
     /// flight, the heights of the ground (22) come from a card or a ground station, and an autopilot that needs them says so itself.
-    pub fn of_sensors(unhealthy: u32) -> Self {
+    pub fn of_sensors(sensors: u32) -> Self {
         const SENSORS: &[(u32, Cause)] = &[
             (1 | 1 << 17, Cause::Gyro),
             (1 << 1 | 1 << 18, Cause::Accelerometer),
@@ -217,7 +217,7 @@ impl Causes {
             (1 << 25, Cause::Power),
             (1 << 27, Cause::GroundStation),
         ];
-        Self::of_bits(unhealthy, SENSORS)
+        Self::of_bits(sensors, SENSORS)
     }
 
     /// What `HIGH_LATENCY2.failure_flags` say (`HL_FAILURE_FLAG` of `common.xml`).

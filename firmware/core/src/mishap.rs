@@ -11,7 +11,7 @@
 //! | | a shock, and within 4 s it is overturned | on rotors |
 //! | | what comes down slowly without throttle lands and skids | on wings |
 //! | tumbling | body rates above `MIS_TUMBLE` for half a second, on wings for 1.5 s; not in modes made for it | everywhere |
-//! | disarmed in the air | disarmed above `MIS_DISARM_H` or while it sinks; then it falls, sinks or goes on moving | everywhere |
+//! | disarmed in the air | disarmed or terminated above `MIS_DISARM_H` or while it sinks; then it falls, sinks or goes on moving | everywhere |
 //! | overturned | its top looks down, by more than 100 degrees of tilt, for 0.7 s; not in modes made for it | on rotors |
 //! | | it lies over by more than `MIS_OVERTURN`, by the force that carries it, within 5 s of throttle, and is slower than 12 m/s | on rotors |
 //! | sinking | faster than `MIS_SINK` for half a second; where the pilot has the throttle, at nearly full throttle only | on rotors |
@@ -79,6 +79,8 @@ const FALLEN_M: f32 = 2.0;
 /// What was disarmed and moves so fast is in the air: sinking, and on wings over ground.
 const FALLING_MPS: f32 = 2.5;
 const GLIDING_MPS: f32 = 8.0;
+/// What was terminated falls so fast some seconds later, by the air pressure alone.
+const DROPS_MPS: f32 = 10.0;
 
 /// What becomes of the flight.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -142,7 +144,7 @@ pub struct Mishap {
     driven_at: Instant,
     /// It was level while it was armed.
     stood: bool,
-    /// When it leaned by more than 60 degrees last, while armed.
+    /// When it leaned by more than 45 degrees, or turned fast, last, while armed.
     tilted_at: Stamp,
     /// Where it began, or ended.
     place: Place,
@@ -206,6 +208,11 @@ impl Mishap {
     /// Whether other checks would only echo it.
     pub(crate) fn is_going(&self) -> bool {
         self.fate() != Fate::Own
+    }
+
+    /// Whether it was disarmed out of a flight, and that it falls is not seen yet.
+    pub const fn is_doubted(&self) -> bool {
+        self.doubt.is_some()
     }
 
     /// Whether it is over: the vehicle lies where it came down.
@@ -283,7 +290,7 @@ impl Mishap {
             (State::Going(last), _) => self.goes(now, last, vehicle),
             (State::Down, _) if self.flies_since.is_some_and(|since| now.since(since) >= RECOVERED) => {
                 self.calm();
-                Some(Change::FliesOn)
+                Some(Change::FliesAgain)
             }
             _ => None,
         }
@@ -302,7 +309,8 @@ impl Mishap {
     }
 
     fn note_arming(&mut self, now: Instant, vehicle: &Vehicle, flight: &Flight, params: &Params) {
-        let armed = vehicle.armed();
+        // Terminated, its motors are off, though it stays armed.
+        let armed = vehicle.armed() && vehicle.terminated_since.is_none();
         if armed && !self.armed && self.state != State::Quiet && self.disarmed_at.is_some() {
             // Armed again in the air it flies on; on the ground another flight begins.
             if self.state == State::Down {
@@ -370,7 +378,7 @@ impl Mishap {
         self.driven_at > Instant::ZERO && now.since(self.driven_at) <= DRIVEN
     }
 
-    /// Whether it leaned so far in the last seconds that thrust did not carry it.
+    /// Whether it leaned so far or turned so fast in the last seconds that thrust did not carry it.
     pub(crate) fn has_tilted(&self, now: Instant) -> bool {
         self.tilted_at.age(now).is_some_and(|age| age <= RECOVERED)
     }
@@ -401,7 +409,10 @@ impl Mishap {
         let glides = !on_rotors(now, vehicle)
             && now.since(since) > BREAKS_OFF
             && ground_speed_mps(now, vehicle).is_some_and(|speed_mps| speed_mps > GLIDING_MPS);
-        if uncarried || sinks || glides || altitude_m.is_some_and(fallen) {
+        // An autopilot that lost its estimate terminates the flight, and tells no more of heights and speeds.
+        let drops =
+            vehicle.armed() && now.since(since) > FRESH && self.pressure.agrees(now, DROPS_MPS) == Some(true);
+        if uncarried || sinks || glides || drops || altitude_m.is_some_and(fallen) {
             self.see(now, Kind::Disarmed, height_m.max(params.get(Param::MisDisarm).next_up()));
         } else if now.since(since) > FALL_SHOWS {
             self.doubt = None;

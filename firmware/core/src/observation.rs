@@ -94,9 +94,27 @@ pub struct SystemStatus {
     pub current: Option<Amperes>,
     /// What is left of the battery.
     pub remaining: Option<Fraction>,
-    /// Sensors present and enabled that report themselves unhealthy (`MAV_SYS_STATUS_SENSOR` bits); `None` where nothing is
-    /// said of sensors (a log of PX4 since v1.14).
-    pub unhealthy: Option<u32>,
+    /// What it says of sensors; `None` where it says nothing of them (a log of PX4 since v1.14).
+    pub sensors: Option<Sensors>,
+}
+
+/// Sensors by their health, as `MAV_SYS_STATUS_SENSOR` bits.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Sensors {
+    /// Present, enabled and not healthy.
+    pub unhealthy: u32,
+    /// Enabled, not healthy and not present: PX4 says so of a sensor that it lost, and of one that it never had.
+    pub lost: u32,
+    /// Present and healthy.
+    pub healthy: u32,
+}
+
+impl Sensors {
+    /// Of the three fields of `SYS_STATUS`.
+    pub const fn of(present: u32, enabled: u32, health: u32) -> Self {
+        let bad = enabled & !health;
+        Self { unhealthy: bad & present, lost: bad & !present, healthy: present & health }
+    }
 }
 
 /// Time: `SYSTEM_TIME`.

@@ -30,6 +30,8 @@ const FULL: f32 = 0.95;
 const CLIMBS_MPS: f32 = 0.3;
 const TILT_RAD: f32 = 0.52;
 const SINKS_MPS: f32 = -0.5;
+/// So long in vain is what `THRUST_WARN` tells of.
+const IN_VAIN: Span = Span::from_secs(2);
 
 /// Roll and pitch.
 const AXES: usize = 2;
@@ -103,7 +105,10 @@ impl Response {
             .attitude
             .get()
             .is_none_or(|attitude| attitude.roll.0.abs() < TILT_RAD && attitude.pitch.0.abs() < TILT_RAD);
+        // Once it was so for long, it is until it climbs.
+        let was_long = self.full_since.is_some_and(|since| at.since(since) >= IN_VAIN);
         let in_vain = match vehicle.hovers(at) {
+            Some(_) if was_long => climb_mps < CLIMBS_MPS,
             Some(true) => level && climb_mps < CLIMBS_MPS,
             // A pilot may dive with all his throttle.
             Some(false) => climb_mps < SINKS_MPS && !has_pilots_throttle(vehicle),

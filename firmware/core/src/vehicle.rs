@@ -336,8 +336,8 @@ impl Vehicle {
                 self.heartbeat.set(at, heartbeat);
             }
             Observation::SystemStatus(system) => {
-                if let Some(unhealthy) = system.unhealthy {
-                    self.alerts.take_sensors(at, unhealthy);
+                if let Some(sensors) = &system.sensors {
+                    self.alerts.take_sensors(at, sensors);
                 }
                 self.system.set(at, system);
             }

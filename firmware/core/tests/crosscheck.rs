@@ -796,6 +796,22 @@ fn full_throttle_without_a_climb_is_named() {
     });
 }
 
+#[test]
+fn full_throttle_that_was_in_vain_is_until_it_climbs() {
+    let findings = fly(|now_ms, fitted| {
+        if now_ms >= FAULT_MS {
+            fitted.quad.throttle = 1.0;
+            fitted.quad.roll = if now_ms < FAULT_MS + 5_000 { 0.02 } else { 0.6 };
+            fitted.quad.climb = if now_ms < FAULT_MS + 15_000 { 0.1 } else { 1.0 };
+        }
+    });
+    let mine = findings.iter().filter(|one| one.check == "thrust_lost");
+    let told: Vec<_> = mine.map(|one| (one.level, one.at.as_millis().div_ceil(1_000) * 1_000)).collect();
+    let over_ms = FAULT_MS + 17_000;
+    assert_eq!(told.first().map(|one| one.0), Some(Level::Warning), "{told:?}");
+    assert!(told[1..].iter().all(|(_, at_ms)| *at_ms >= over_ms) && told.len() == 2, "{told:?}");
+}
+
 /// Pressures and the pilot's display of what climbs with so many m/s by each.
 fn climbs(fitted: &mut Fitted, seconds: f32, by_pressure: f32, by_estimator: f32) {
     fitted.pressure.iter_mut().for_each(|pressure| *pressure -= 0.12 * by_pressure * seconds);

@@ -233,7 +233,10 @@ const INPUTS: &[(&str, &str)] = &[
         "the same: a shock, with the speed of GLOBAL_POSITION_INT breaking off or the vehicle on its side, then stillness",
     ),
     ("tumbling", "ATTITUDE, or the inertial messages: body rates for 0.5 s, on wings for 1.5 s"),
-    ("disarmed_in_air", "HEARTBEAT: disarmed out of a flight, and then it falls, sinks or glides"),
+    (
+        "disarmed_in_air",
+        "HEARTBEAT: disarmed or terminated out of a flight, and then it falls, sinks or glides",
+    ),
     (
         "sinking",
         "GLOBAL_POSITION_INT, LOCAL_POSITION_NED, VFR_HUD: for 0.5 s where the autopilot flies and does not want it (POSITION_TARGET_LOCAL_NED); or a loss of 7 m with full throttle",

@@ -366,11 +366,14 @@ fn the_autopilots_figure_of_the_battery_counts_where_no_battery_reports_itself()
 fn each_kind_of_component_is_due_in_its_own_subsystem() {
     for (name, kind) in DUE {
         let limits = [("CMP1_KIND", kind), ("CMP1_FLIGHTS", 1.0)];
-        let findings = fly(&limits, |_, _| {});
+        // It is disarmed on the ground, and its flight is over.
+        let findings = fly(&limits, |quad, _| (quad.armed, quad.height) = (false, 0.0));
         let found: Vec<_> = findings.iter().map(|finding| (finding.check, finding.level)).collect();
-        assert_eq!(found, [(name, Level::Critical)], "kind {kind}: {findings:?}");
+        assert_eq!(found, [(name, Level::Warning), (name, Level::Critical)], "kind {kind}: {findings:?}");
         // In the air after 2.5 s; one component is looked at a tick, and the debounce is a second.
         assert!((3_500..=4_000).contains(&findings[0].at.as_millis()), "{findings:?}");
+        let due_ms = findings[1].at.as_millis() - FAULT_MS;
+        assert!((1_000..=5_000).contains(&due_ms), "critical on the ground only: {findings:?}");
     }
 }
 

@@ -10,8 +10,8 @@ use hums_core::observation::{
     Air, Attitude, Autopilot, AutopilotIdentity, Battery, CELLS_MAX, CellVoltage, CommandAck, Engine, Esc,
     EscGroup, Estimator, EstimatorScale, GlobalPosition, Gnss, GnssIntegrity, Heartbeat, Hud, Imu,
     LandedState, LocalPosition, MOTORS_MAX, Observation, Outputs, Processor, RadioControl, Rails,
-    SecondEstimate, Source, SpeedSensor, SystemStatus, SystemTime, TelemetryRadio, VehicleKind, Vibration,
-    VibrationScale, VtolState, Wanted, WantedRates,
+    SecondEstimate, Sensors, Source, SpeedSensor, SystemStatus, SystemTime, TelemetryRadio, VehicleKind,
+    Vibration, VibrationScale, VtolState, Wanted, WantedRates,
 };
 use hums_core::params::{Params, TABLE};
 use hums_core::status::{LinkReading, RecorderStatus, Recording};
@@ -195,7 +195,7 @@ impl Random {
                 voltage: self.float(Volts),
                 current: self.float(Amperes),
                 remaining: self.float(Fraction),
-                unhealthy: Some(self.u32()),
+                sensors: Some(Sensors::of(self.u32(), self.u32(), self.u32())),
             }),
             4 => Observation::SystemTime(SystemTime {
                 utc_micros: self.maybe(Self::next),

@@ -7,7 +7,7 @@ mod common;
 use common::{AUTOPILOT, Quad};
 use hums_core::Monitor;
 use hums_core::health::{CLEAR, Finding, Level, Subsystem};
-use hums_core::observation::{Observation, SystemTime};
+use hums_core::observation::{Observation, Sensors, SystemTime};
 use hums_core::params::Params;
 use hums_core::status::{LinkReading, Recording};
 use hums_core::time::{Instant, Span};
@@ -305,7 +305,10 @@ fn a_recorder_that_stops_on_the_ground_is_a_warning() {
 
 #[test]
 fn what_is_checked_before_arming_and_heights_of_the_ground_are_no_sensors() {
-    assert_eq!(fly(|_, quad| quad.system.unhealthy = Some(1 << 28 | 1 << 22)), []);
+    assert_eq!(
+        fly(|_, quad| quad.system.sensors = Some(Sensors::of(u32::MAX, u32::MAX, !(1 << 28 | 1 << 22)))),
+        []
+    );
 }
 
 #[test]

@@ -37,8 +37,12 @@ pub fn causes(findings: &[FindingLine]) -> Vec<Option<String>> {
         one.level = level;
         one.unexplained.push(place);
         // Also what came before: the consequence may be seen first.
+        let since = |one: &Open<'_>| {
+            let others = open.values().map(|other| (other.since, other.check));
+            began(one.check, one.since, others)
+        };
         let alarms: Vec<(Instant, &str, Level)> =
-            open.values().map(|one| (began(one.check, one.since), one.check, one.level)).collect();
+            open.values().map(|one| (since(one), one.check, one.level)).collect();
         for one in open.values_mut().filter(|one| !one.unexplained.is_empty()) {
             if let Some(cause) = because(one.check, one.level, one.since, alarms.iter().copied()) {
                 for place in one.unexplained.drain(..) {

@@ -94,7 +94,8 @@ impl Details {
 
     /// The vehicle says which of its sensors are not healthy.
     pub(super) fn sensors(&mut self, status: &SystemStatus) -> bool {
-        let is_new = status.unhealthy.filter(|unhealthy| *unhealthy != self.sensors);
+        let unhealthy = status.sensors.map(|sensors| sensors.unhealthy | sensors.lost);
+        let is_new = unhealthy.filter(|unhealthy| *unhealthy != self.sensors);
         self.sensors = is_new.unwrap_or(self.sensors);
         is_new.is_some()
     }

@@ -7,6 +7,7 @@ use hums_core::time::{Instant, Span};
 
 use super::clock::SETTLE;
 use super::problem::LISTED_MAX;
+use crate::source::told::Finding;
 
 /// A flight.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -63,10 +64,29 @@ struct Silence {
 
 /// Steps are no further apart than this, behind a gap of the recording too ([`SETTLE`]); the rest of a longer silence was left out.
 const STEP_MAX: Span = Span::from_millis(SETTLE.as_millis() + 2 * TICK.as_millis());
+/// An impact is found so late at most: once what hit something lies still.
+const FOUND_LATE: Span = Span::from_secs(5);
 /// Without a heartbeat for so long it is silent.
 const SILENT: Span = Span::from_secs(5);
 /// What is heard for so long and flies is on its flight still: longer than a landing needs to be seen.
 const STILL_FLIES: Span = Span::from_secs(3);
+
+impl Flight {
+    /// The impact that ended it is told once, when the box found it, as these findings of it say.
+    pub(super) fn was_hit<'a>(&mut self, mut found: impl Iterator<Item = &'a Finding>) {
+        if let Some(Mishap { at, is_impact: true }) = &mut self.mishap
+            && let Some(finding) =
+                found.find(|finding| finding.at >= *at && finding.at.since(*at) <= FOUND_LATE)
+        {
+            *at = finding.at;
+        }
+    }
+}
+
+/// Whether a flight that goes on is in the air: also where it was disarmed, and may fall.
+pub(super) fn is_in_air(monitor: &Monitor) -> bool {
+    monitor.flight().airborne() || monitor.mishap().is_doubted()
+}
 
 impl Flights {
     /// The vehicle took off, or is seen to be in the air.
@@ -169,13 +189,13 @@ impl Flights {
                     flight.mishap = Some(Mishap { at: hit_at.unwrap_or(now), is_impact: hit_at.is_some() });
                 }
             }
-            Change::Began(_) | Change::FliesOn | Change::OnBench(_) => {}
+            Change::Began(_) | Change::FliesOn | Change::FliesAgain | Change::OnBench(_) => {}
         }
     }
 
     /// A recording has ended, and perhaps another one begins.
     pub(super) fn end_of_recording(&mut self, monitor: &Monitor) {
-        if !monitor.flight().airborne() {
+        if !is_in_air(monitor) {
             // On the ground, still armed: what is over is the recording, and the flight too.
             self.landing();
         }
@@ -193,5 +213,32 @@ impl Flights {
     pub(super) fn end(mut self, monitor: &Monitor) -> Vec<Flight> {
         self.end_of_recording(monitor);
         self.list
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use hums_core::health::Level;
+
+    use super::super::problem::tests::change;
+    use super::*;
+
+    #[test]
+    fn an_impact_that_ended_a_flight_has_the_time_of_its_finding() {
+        let at = Instant::from_millis(67_100);
+        let mut flight = Flight {
+            from: Instant::ZERO,
+            to: at,
+            air: Span::ZERO,
+            took_off: true,
+            landed: false,
+            disarmed_at_m: None,
+            mishap: Some(Mishap { at, is_impact: true }),
+        };
+        let found = [60, 80, 69, 70].map(|at_s| change(at_s, Level::Critical, 9.9));
+        flight.was_hit(found[..2].iter());
+        assert_eq!(flight.mishap.map(|mishap| mishap.at), Some(at), "long before and long after");
+        flight.was_hit(found.iter());
+        assert_eq!(flight.mishap.map(|mishap| mishap.at), Some(Instant::from_millis(69_000)));
     }
 }

@@ -27,7 +27,7 @@ use super::cells::Cells;
 use super::clock::{Clock, SETTLE};
 use super::coverage::{Coverage, Recording};
 use super::details::{self, Details};
-use super::flights::{Flight, Flights};
+use super::flights::{Flight, Flights, is_in_air};
 use super::judged::{Holes, Judged, JudgedBy};
 use super::problem::{IMPACT, LISTED_MAX, Problems};
 use crate::part;
@@ -523,9 +523,7 @@ impl Judge {
         for finding in found {
             if is_of(&finding.check, self.format, self.wire.is_some(), self.limits.past.is_some()) {
                 // What hit something is seen to lie still seconds later.
-                let is_hit =
-                    finding.check == IMPACT && matches!(finding.level, Level::Warning | Level::Critical);
-                let hit_at = if is_hit { self.monitor.mishap().hit_at() } else { finding.at };
+                let hit_at = if is_hit(&finding) { self.monitor.mishap().hit_at() } else { finding.at };
                 let at = Clock::recording(now, steps, hit_at.min(finding.at));
                 self.here.take(&Finding { at, ..finding.clone() }, self.clock.behind());
                 self.details.tell(&finding.check, &mut self.here);
@@ -589,7 +587,7 @@ impl Judge {
 
     /// How the vehicle was when the recording ended in the air.
     fn ends_in_air(&mut self) -> Option<EndsInAir> {
-        self.flights.going_on().filter(|_| self.monitor.flight().airborne())?;
+        self.flights.going_on().filter(|_| is_in_air(&self.monitor))?;
         let steps = self.clock.monitor(self.last);
         let vehicle = self.monitor.vehicle();
         Some(EndsInAir {
@@ -630,13 +628,18 @@ impl Judge {
         }
         self.peaks(self.last);
         self.parts_due();
-        let flights = std::mem::take(&mut self.flights).end(&self.monitor);
+        let mut flights = std::mem::take(&mut self.flights).end(&self.monitor);
         let armed = armed(&self.monitor);
         let by =
             if self.checked_on_board && !self.limits.is_given() { JudgedBy::Board } else { JudgedBy::Here };
         if !self.checked_on_board && self.wire.is_none() {
             // Nobody knows where it was heard: a packed recording may be that of a ground station.
             self.here.drop_checks(|check| vocabulary(check).is_some_and(|words| words.scope == Scope::Wire));
+        }
+        if by == JudgedBy::Board {
+            for flight in &mut flights {
+                flight.was_hit(self.board.findings.iter().filter(|finding| is_hit(finding)));
+            }
         }
         let remarks = self.remarks(by, &flights);
         let last = self.last;
@@ -721,6 +724,11 @@ fn joined(joints: &[Instant]) -> Option<String> {
             named.join(", ")
         )
     })
+}
+
+/// Whether it tells of an impact.
+fn is_hit(finding: &Finding) -> bool {
+    finding.check == IMPACT && matches!(finding.level, Level::Warning | Level::Critical)
 }
 
 /// Whether a check says anything in a recording of this format, judged here: one recording tells neither of earlier flights, unless

@@ -95,7 +95,9 @@ pub fn overview(place: &Place) -> Result<Overview> {
         overview.ending.name.clone_from(&place.name);
         let contents = &overview.contents;
         let (is_checked, is_little) = (contents.is_checked(), contents.messages.len() < FEW_KINDS);
-        let breaks_off = overview.ending.summary.marks.moved.is_some();
+        // A box may end its log in order while the vehicle flies.
+        let marks = &overview.ending.summary.marks;
+        let breaks_off = marks.moved.is_some() || marks.took_off == Some(true);
         if contents.frames() > 0 && (!is_checked || is_little || breaks_off) {
             let judged = match here {
                 Some(here) => here.end(),
@@ -170,7 +172,7 @@ fn look(contents: &mut Contents, judged: &Judged) {
     contents.usage.retain(|name, _| is_told(name, vehicle));
 }
 
-/// How a log ends that breaks off while the vehicle is armed or in the air. What its box had counted is of the time until it stored that: it
+/// How a log ends whose landing is not in it, or that breaks off while the vehicle is armed. What its box had counted is of the time until it stored that: it
 /// is counted here to the end.
 fn go_on(overview: &mut Overview, judged: &Judged) {
     let is_whole = overview.ending.summary.first_number == Some(0);

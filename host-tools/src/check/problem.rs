@@ -182,15 +182,20 @@ impl Problems {
 
     /// Looks for what explains what is wrong now: also what came a little later, since the consequence may be seen first.
     fn explain(&mut self) {
-        let alarms: Vec<(Instant, String, Level)> = self
-            .open
-            .values()
-            .filter_map(|followed| {
-                let (since, check) = (followed.since?.0, &followed.problem.check);
-                let since = if self.of_box { began(check, since) } else { since };
-                Some((since, check.clone(), followed.level))
-            })
-            .collect();
+        let open = || {
+            self.open
+                .values()
+                .filter_map(|followed| Some((followed.since?.0, &*followed.problem.check, followed.level)))
+        };
+        let since_of = |since, check| {
+            if self.of_box {
+                began(check, since, open().map(|(since, check, _)| (since, check)))
+            } else {
+                since
+            }
+        };
+        let alarms: Vec<(Instant, String, Level)> =
+            open().map(|(since, check, level)| (since_of(since, check), check.to_owned(), level)).collect();
         for followed in self.open.values_mut().filter(|followed| followed.unexplained) {
             let Some((since, _)) = followed.since else { continue };
             let alarms = alarms.iter().map(|(since, check, level)| (*since, check.as_str(), *level));
@@ -282,9 +287,15 @@ pub fn problems(findings: &[FindingLine], of_box: bool) -> Vec<Problem> {
     problems.worst_first()
 }
 
-/// When what a box found began: a check of which it found an alarm at this time.
-pub fn began(check: &str, found_at: Instant) -> Instant {
-    if check == IMPACT {
+/// When what a box found began: a check of which it found an alarm at this time, while others are `open` since theirs. In a mishap that goes
+/// on it finds an impact at once.
+pub fn began<'a>(
+    check: &str,
+    found_at: Instant,
+    mut open: impl Iterator<Item = (Instant, &'a str)>,
+) -> Instant {
+    let is_mishap = |name| checks().any(|check| check.name == name && check.subsystem == Subsystem::Mishap);
+    if check == IMPACT && !open.any(|(since, other)| since < found_at && is_mishap(other)) {
         Instant::from_micros(found_at.as_micros().saturating_sub(LIES_STILL.as_micros()))
     } else {
         found_at
@@ -314,6 +325,17 @@ pub(super) mod tests {
             limit: if level == Level::Critical { 3.5 } else { 3.6 },
             unit: "V".to_owned(),
         }
+    }
+
+    #[test]
+    fn what_a_box_found_to_lie_still_hit_something_before_and_in_a_mishap_that_goes_on_just_then() {
+        let at = Instant::from_millis(90_000);
+        assert_eq!(began(IMPACT, at, std::iter::empty()), Instant::from_millis(89_000));
+        let open = [(Instant::from_millis(89_500), "tumbling"), (at, IMPACT)];
+        assert_eq!(began(IMPACT, at, open.into_iter()), at);
+        let open = [(Instant::from_millis(89_500), "pitch_rate"), (at, IMPACT)];
+        assert_eq!(began(IMPACT, at, open.into_iter()), Instant::from_millis(89_000));
+        assert_eq!(began("pitch_rate", at, std::iter::empty()), at);
     }
 
     #[test]

@@ -420,7 +420,10 @@ mod tests {
         let lines: Vec<&str> = text.lines().map(str::trim).collect();
         let [_, silent, wrong, heard] = lines.as_slice() else { panic!("{text}") };
         assert_eq!(*silent, "1:24.0  stale     5 checks that were ok have no data");
-        assert!(wrong.starts_with("1:30.0  stale     structure: battery 1 cell voltage (limit 1);"), "{wrong}");
+        assert!(
+            wrong.starts_with("1:30.0  stale     structure: battery 1 cell voltage (limit 1);"),
+            "{wrong}"
+        );
         assert_eq!(*heard, "1:35.0  ok        5 checks have data again, and are ok");
         // Three in a row are told one by one.
         log.contents.findings.truncate(3);

@@ -163,6 +163,11 @@ fn a_crash_is_heard_though_the_autopilot_disarms_with_the_word() {
     assert_eq!(alerts.level(after(5), Cause::Crash, false), None, "long after");
 }
 
+/// All sensors are there, and these are not healthy.
+const fn unhealthy(bits: u32) -> Sensors {
+    Sensors::of(u32::MAX, u32::MAX, !bits)
+}
+
 #[test]
 fn flags_count_when_two_messages_have_them_and_while_they_come() {
     const COMPASS: u32 = 1 << 2;
@@ -170,12 +175,12 @@ fn flags_count_when_two_messages_have_them_and_while_they_come() {
     for (seconds, bits, level) in
         [(0, 0, 0.0), (1, COMPASS, 0.0), (2, COMPASS, 1.0), (3, 0, 0.0), (4, COMPASS, 0.0), (5, COMPASS, 1.0)]
     {
-        alerts.take_sensors(after(seconds), bits);
+        alerts.take_sensors(after(seconds), &unhealthy(bits));
         assert_eq!(alerts.level(after(seconds), Cause::Compass, false), Some(level), "{seconds} s");
     }
     assert_eq!(alerts.level(after(10), Cause::Compass, false), Some(1.0));
     assert_eq!(alerts.level(after(11), Cause::Compass, false), Some(ENDED), "no message for more than 5 s");
-    alerts.take_sensors(after(12), 0);
+    alerts.take_sensors(after(12), &unhealthy(0));
     assert_eq!(alerts.level(after(12), Cause::Compass, false), Some(0.0));
     assert_eq!(alerts.level(after(12), Cause::Crash, false), Some(ENDED), "no flag tells of a crash");
     alerts.take_armed(after(13), false);
@@ -187,11 +192,36 @@ fn a_remote_control_is_lost_only_where_there_was_one() {
     const RECEIVER: u32 = 1 << 16;
     let mut alerts = armed();
     let mut says = |second, bits| {
-        alerts.take_sensors(after(second), bits);
+        alerts.take_sensors(after(second), &unhealthy(bits));
         alerts.level(after(second), Cause::RemoteControl, false)
     };
     assert_eq!([says(0, RECEIVER), says(1, RECEIVER)], [Some(0.0), Some(ENDED)], "never switched on");
     assert_eq!([says(2, 0), says(3, RECEIVER), says(4, RECEIVER)], [Some(0.0), Some(0.0), Some(1.0)]);
+}
+
+#[test]
+fn a_sensor_that_is_lost_heals_with_the_word_that_it_is_healthy() {
+    const RECEIVER: u32 = 1 << 16;
+    const GNSS: u32 = 1 << 5;
+    let mut alerts = armed();
+    let mut says = |second, [unhealthy, lost, healthy]: [u32; 3]| {
+        alerts.take_sensors(after(second), &Sensors { unhealthy, lost, healthy });
+        [Cause::Gnss, Cause::RemoteControl].map(|cause| alerts.level(after(second), cause, false))
+    };
+    let good = [Some(0.0), Some(0.0)];
+    assert_eq!(says(0, [0, RECEIVER, GNSS]), [Some(0.0), Some(ENDED)]);
+    assert_eq!(
+        says(1, [0, RECEIVER, GNSS]),
+        [Some(0.0), Some(ENDED)],
+        "never switched on: not lost, and not good"
+    );
+    assert_eq!(says(2, [0, 0, GNSS | RECEIVER]), good);
+    assert_eq!(says(3, [GNSS, RECEIVER, 0]), good, "one message is no alarm");
+    for second in 4..20 {
+        assert_eq!(says(second, [0, GNSS | RECEIVER, 0]), [Some(1.0), Some(1.0)], "PX4 calls it not present");
+    }
+    assert_eq!(says(20, [0, 0, 0]), [Some(ENDED), Some(ENDED)], "nothing is said of them");
+    assert_eq!(says(21, [0, 0, GNSS | RECEIVER]), good);
 }
 
 #[test]

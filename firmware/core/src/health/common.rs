@@ -75,8 +75,11 @@ pub(super) const fn due(subsystem: Subsystem) -> Check {
 
 fn used(inputs: &Inputs<'_>, subsystem: Subsystem) -> Option<Reading> {
     let mine = inputs.wear.iter().flatten().filter(|(of, _)| *of == subsystem);
+    // A part is replaced on the ground, and a flight counts when it is over: until then it is due soon.
+    let most = if inputs.flight.is_open() { inputs.params.get(Param::CompRed) } else { f32::INFINITY };
     // What has reached its limit is due, while a check's value must be beyond it.
-    Reading::new(Some(inputs.now), mine.map(|(_, percent)| percent.next_up()).reduce(f32::max))
+    let percent = mine.map(|(_, percent)| percent.next_up()).reduce(f32::max);
+    Reading::new(Some(inputs.now), percent.map(|percent| percent.min(most)))
 }
 
 /// How much heavier than normal for this airframe it hovers, percent.

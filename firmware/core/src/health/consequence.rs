@@ -116,6 +116,11 @@ const ROWS: &[(&[&str], &[&str])] = &[
     (&["recording"], &["card_errors", "card_stall", "record_queue", "record_lost"]),
 ];
 
+/// Whether a check is of what drives the vehicle: its alarm tells better what to do than that the vehicle sinks.
+pub(super) fn is_of_drive(check: &str) -> bool {
+    DRIVE.contains(&check)
+}
+
 /// Whether a mishap explains what a part says.
 pub const fn is_of_mishap(part: Subsystem) -> bool {
     matches!(

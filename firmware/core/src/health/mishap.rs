@@ -70,16 +70,16 @@ pub(super) const CHECKS: &[Check] = &[
     alert::<{ Cause::Crash as usize }>(Subsystem::Mishap),
 ];
 
-/// Whether what the text of a check orders fits the vehicle: DISARM while it is armed, and FLY FORWARD, CLIMB what hangs upright on rotors
-/// and has not tried in vain with full throttle.
-pub(super) fn orders(check: &Check, inputs: &Inputs<'_>) -> bool {
+/// Whether what the text of a check orders fits the vehicle: DISARM while it is armed, and FLY FORWARD, CLIMB what hangs upright on rotors,
+/// has not lost one, and has not tried in vain with full throttle.
+pub(super) fn orders(check: &Check, inputs: &Inputs<'_>, has_lost_drive: impl FnOnce() -> bool) -> bool {
     let Inputs { now, vehicle, derived, mishap, .. } = *inputs;
     if check.subsystem != Subsystem::Mishap {
         return true;
     }
     if check.name == Kind::Sinking.name() {
         let in_vain = derived.response().full_in_vain().is_some_and(|full| full.value > 0.0);
-        return vehicle.hovers(now) == Some(true) && !mishap.has_tilted(now) && !in_vain;
+        return vehicle.hovers(now) == Some(true) && !mishap.has_tilted(now) && !in_vain && !has_lost_drive();
     }
     vehicle.armed() || matches!(check.name, "free_fall" | "tumbling" | "disarmed_in_air")
 }

@@ -199,7 +199,7 @@ impl Health {
             None => return None,
         };
         let feeds = power::feeds(check, inputs, instance);
-        let orders = mishap::orders(check, inputs);
+        let orders = mishap::orders(check, inputs, || self.has_lost_drive());
         let finding = Finding { because, orders, ..check.finding(instance, inputs.now, told, feeds) };
         if change.is_some() {
             exceedances.change(place, check.side, &finding);
@@ -252,6 +252,12 @@ impl Health {
     fn outlives(&mut self, slot: usize, check: &Check, level: Level) -> bool {
         let explained = !self.because(check, level).is_empty();
         self.states.get_mut(slot).is_some_and(|state| state.outlives(explained))
+    }
+
+    /// Whether something that drives the vehicle has a critical alarm.
+    fn has_lost_drive(&self) -> bool {
+        self.levels()
+            .any(|(check, _, level)| level == Level::Critical && consequence::is_of_drive(check.name))
     }
 
     /// Every check instance that has had something to say, with its level.

@@ -40,8 +40,9 @@ const LOST_M: f32 = 7.0;
 const GLIDES_MPS: f32 = 1.0;
 /// A bank in which all the thrust may not carry what hangs on rotors, rad.
 const BANKS_RAD: f32 = 0.6;
-/// 60 degrees: what leans so far is not carried by its thrust.
-const LEANS_RAD: f32 = 1.047;
+/// 45 degrees, and about 90 degrees a second: what leans so far, or turns so fast, is not carried by its thrust.
+const LEANS_RAD: f32 = 0.785;
+const TURNS_RADPS: f32 = 1.5;
 /// All the throttle of a plane, which may need most of it on a steep path against the wind.
 const FULL_ON_WINGS: f32 = 0.97;
 /// Wings pull out of a dive with so much at most: the limit of CS-23 for the aerobatic category.
@@ -193,7 +194,7 @@ impl Mishap {
     fn take_attitude(&mut self, at: Instant, attitude: &Attitude, vehicle: &Vehicle, params: &Params) {
         let Attitude { roll, pitch, .. } = attitude;
         let most = libm::fabsf(roll.0).max(libm::fabsf(pitch.0));
-        if most > LEANS_RAD && self.armed {
+        if (most > LEANS_RAD || self.rate > TURNS_RADPS) && self.armed {
             self.tilted_at = Stamp::at(at);
         }
         // Below 86 degrees of each, no cosine is asked for: this is done with each attitude.

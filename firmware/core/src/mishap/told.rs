@@ -70,6 +70,8 @@ pub enum Change {
     Down,
     /// It flies on.
     FliesOn,
+    /// What was down flies again.
+    FliesAgain,
     /// It was seen, but not in a flight.
     OnBench(Kind),
 }
@@ -96,7 +98,9 @@ impl Report {
         let words = match change {
             Change::Began(_) => "mishap at",
             Change::Down => "down at",
-            Change::FliesOn => return String::try_from("mishap over, it flies on").unwrap_or_default(),
+            Change::FliesOn | Change::FliesAgain => {
+                return String::try_from("mishap over, it flies on").unwrap_or_default();
+            }
             Change::OnBench(kind) => return String::try_from(kind.name()).unwrap_or_default(),
         };
         let degrees = |e7: i32| {

@@ -3,7 +3,7 @@
 
 use hums_core::observation::{
     Attitude, Autopilot, Battery, Esc, EscGroup, Estimator, EstimatorScale, GlobalPosition, Gnss,
-    GnssIntegrity, Heartbeat, Hud, Imu, LandedState, Observation, Source, SystemStatus, SystemTime,
+    GnssIntegrity, Heartbeat, Hud, Imu, LandedState, Observation, Sensors, Source, SystemStatus, SystemTime,
     VehicleKind, Vibration, VtolState,
 };
 use hums_core::status::{RecorderStatus, Recording};
@@ -94,7 +94,11 @@ impl Quad {
             vibration: Vibration { levels: [Some(5.0); 3], clips: [7; 3], ..Vibration::default() },
             acceleration_down: -9.8,
             roll: 0.02,
-            system: SystemStatus { load: Some(Fraction(0.3)), unhealthy: Some(0), ..SystemStatus::default() },
+            system: SystemStatus {
+                load: Some(Fraction(0.3)),
+                sensors: Some(Sensors::of(u32::MAX, u32::MAX, u32::MAX)),
+                ..SystemStatus::default()
+            },
             recorder: RecorderStatus {
                 recording: Recording::Running,
                 room: Some(0.9),

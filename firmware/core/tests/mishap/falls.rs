@@ -197,13 +197,36 @@ fn a_kill_switch_at_the_touch_down_is_no_alarm_and_in_the_air_it_is_one() {
             fall(ms, quad, motion);
             quad.state = 8;
         });
-        assert_eq!(falls.told().first(), Some(&"free_fall"), "{of:?}");
+        assert_eq!(falls.told().get(..2), Some(&["disarmed_in_air", "free_fall"][..]), "{of:?}");
         let parachute = fly(&Quad { height: 100.0, ..hovering(of) }, |ms, quad, motion| {
             let sunk_m = 5.0 * ms as f32 / 1_000.0;
             (quad.state, quad.throttle) = (8, 0.0);
             (quad.climb, quad.height) = if sunk_m < 100.0 { (-5.0, 100.0 - sunk_m) } else { (0.0, 0.0) };
             motion.rates = [0.1, 0.0, 0.0];
         });
-        assert!(tells_state(&parachute), "{of:?}: {:?}", parachute.findings);
+        assert_eq!(parachute.told().first(), Some(&"disarmed_in_air"), "{of:?}: {:?}", parachute.findings);
+        assert_eq!(parachute.flights(), (1, 0, 1), "{of:?}: its flight is over");
     }
+}
+
+#[test]
+fn a_flight_that_is_terminated_without_an_estimate_falls_by_the_air_pressure() {
+    // Position, speed and specific force stay as they were.
+    let terminated = |script| {
+        let outcome = fly(&hovering(ROTORS[1]), script);
+        let at_ms = outcome.changes.first().map(|(at_ms, _)| *at_ms - AT_MS);
+        (outcome.told(), at_ms, outcome.flights())
+    };
+    let (told, at_ms, flights) = terminated(|ms, quad, motion| {
+        let seconds = (ms as f32 / 1_000.0).min(2.5);
+        quad.state = 8;
+        motion.pressure_hpa = Some(980.0 + 0.12 * 4.9 * seconds * seconds + (ms / 50 % 3) as f32 * 0.01);
+    });
+    assert_eq!((told, flights), (vec!["disarmed_in_air"], (1, 0, 1)));
+    assert!(at_ms.is_some_and(|at_ms| (2_000..=2_700).contains(&at_ms)), "{at_ms:?}");
+    let (told, ..) = terminated(|ms, quad, motion| {
+        quad.state = 8;
+        motion.pressure_hpa = Some(980.0 + (ms / 50 % 3) as f32 * 0.01);
+    });
+    assert!(told.is_empty(), "killed on a hill: {told:?}");
 }

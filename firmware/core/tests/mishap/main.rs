@@ -20,7 +20,7 @@ use hums_core::params::Params;
 use hums_core::status::LinkReading;
 use hums_core::time::Instant;
 use hums_core::units::{
-    Fraction, Hectopascals, MetresPerSecond, MetresPerSecond2, Position, Radians, RadiansPerSecond,
+    Amperes, Fraction, Hectopascals, MetresPerSecond, MetresPerSecond2, Position, Radians, RadiansPerSecond,
 };
 use hums_core::usage::UsageCounter;
 

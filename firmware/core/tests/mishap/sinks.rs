@@ -214,6 +214,29 @@ fn only_what_hangs_upright_on_rotors_is_told_to_climb() {
         quad.roll = if ms < 500 { 1.9 } else { 0.1 };
     };
     assert_eq!(orders(&hovering(ROTORS[0]), rolled), Some(false), "it was on its side a second before");
+    let leans: Script = |ms, quad, _| {
+        if ms < 2_000 {
+            (quad.climb, quad.height) = (-8.0, 200.0 - ms as f32 / 125.0);
+        }
+        quad.roll = 0.87;
+    };
+    assert_eq!(orders(&hovering(ROTORS[0]), leans), Some(false), "50 degrees");
+    let turns: Script = |ms, quad, motion| {
+        if ms < 2_000 {
+            (quad.climb, quad.height) = (-8.0, 200.0 - ms as f32 / 125.0);
+        }
+        motion.rates = [2.6, 0.0, 0.0];
+    };
+    assert_eq!(orders(&hovering(ROTORS[0]), turns), Some(false), "150 degrees a second");
+    let motor: Script = |ms, quad, _| {
+        if let Some(esc) = &mut quad.escs[1] {
+            esc.current = Some(Amperes(0.0));
+        }
+        if (2_000..4_000).contains(&ms) {
+            (quad.climb, quad.height) = (-8.0, 200.0 - ms as f32 / 125.0);
+        }
+    };
+    assert_eq!(orders(&hovering(ROTORS[0]), motor), Some(false), "it has lost a motor");
     let in_vain: Script = |ms, quad, _| {
         quad.throttle = 1.0;
         if ms < 6_000 {

@@ -5,7 +5,7 @@ use hums_core::cause::{Alert, Causes};
 use hums_core::cells;
 use hums_core::observation::{
     Autopilot, AutopilotIdentity, CommandAck, Heartbeat, LandedState, Observation, Processor, RadioControl,
-    Source, SystemStatus, SystemTime, TelemetryRadio, VehicleKind, VtolState,
+    Sensors, Source, SystemStatus, SystemTime, TelemetryRadio, VehicleKind, VtolState,
 };
 use hums_core::units::{Celsius, Fraction};
 use mavlink::dialects::ardupilotmega as ap;
@@ -47,15 +47,17 @@ pub(super) fn heartbeat(payload: &[u8]) -> Option<Heartbeat> {
 
 pub(super) fn status(payload: &[u8]) -> Option<SystemStatus> {
     let status = read::<ap::SYS_STATUS_DATA>(payload, &[])?;
-    let unhealthy = status.onboard_control_sensors_present.bits()
-        & status.onboard_control_sensors_enabled.bits()
-        & !status.onboard_control_sensors_health.bits();
+    let sensors = Sensors::of(
+        status.onboard_control_sensors_present.bits(),
+        status.onboard_control_sensors_enabled.bits(),
+        status.onboard_control_sensors_health.bits(),
+    );
     Some(SystemStatus {
         load: (status.load <= 1_000).then(|| Fraction(f32::from(status.load) / 1e3)),
         voltage: voltage(status.voltage_battery),
         current: current(status.current_battery),
         remaining: percent(status.battery_remaining),
-        unhealthy: Some(unhealthy),
+        sensors: Some(sensors),
     })
 }
 

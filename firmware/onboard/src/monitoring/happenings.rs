@@ -84,7 +84,7 @@ fn mishap(
     let number = match change {
         Change::Began(_) => 15,
         Change::Down => 16,
-        Change::FliesOn => 17,
+        Change::FliesOn | Change::FliesAgain => 17,
         Change::OnBench(kind) => {
             let event = Event { number: 18, text: kind.name() };
             book.journal.record(now, &Record::Event(event), sectors);
@@ -93,8 +93,8 @@ fn mishap(
     };
     let report = book.monitor.mishap().report(change);
     book.journal.record(now, &Record::Event(Event { number, text: &report.text() }), sectors);
-    // That it began is told as a finding.
-    if !matches!(change, Change::Began(_)) {
+    // That it began is told as a finding. Nobody can be sure of what flies again after it was told as down: its estimator may be lost.
+    if !matches!(change, Change::Began(_) | Change::FliesAgain) {
         notices.announce(Notice::Mishap(report));
     }
     marks.at_once(Resting::Mishap);

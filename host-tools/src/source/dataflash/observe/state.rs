@@ -3,7 +3,7 @@
 
 use hums_core::observation::{
     Autopilot, AutopilotIdentity, Battery, CELLS_MAX, CellVoltage, Heartbeat, LandedState, Observation,
-    SystemStatus, VehicleKind, VtolState,
+    Sensors, SystemStatus, VehicleKind, VtolState,
 };
 use hums_core::time::{Instant, Span};
 use hums_core::units::{Amperes, Fraction, Gauss, Metres, RadiansPerSecond, Volts};
@@ -480,7 +480,7 @@ impl State {
             voltage,
             current: self.current.within(now, AGE).map(Amperes),
             remaining: self.remaining.within(now, AGE).map(Fraction),
-            unhealthy: Some(unhealthy),
+            sensors: Some(Sensors::of(u32::MAX, u32::MAX, !unhealthy)),
         })
     }
 

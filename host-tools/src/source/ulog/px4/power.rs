@@ -142,7 +142,7 @@ fn system_status(px4: &mut Px4) {
         voltage: lowest.and_then(|pack| pack.voltage),
         current: lowest.and_then(|pack| pack.current),
         remaining: lowest.and_then(|pack| pack.remaining),
-        unhealthy: px4.system.unhealthy(),
+        sensors: px4.system.sensors(),
     };
     px4.observe(Observation::SystemStatus(status));
 }

@@ -1,6 +1,6 @@
 //! What topics said so far, as far as one message needs what others said.
 
-use hums_core::observation::{Observation, Source};
+use hums_core::observation::{Observation, Sensors, Source};
 use hums_core::time::Instant;
 use hums_core::units::{Amperes, Fraction, Gauss, RadiansPerSecond, Volts};
 
@@ -130,7 +130,7 @@ pub(super) struct Status {
     pub(super) hil: bool,
     pub(super) calibrating: bool,
     pub(super) takeoff_us: Option<u64>,
-    pub(super) unhealthy: Option<u32>,
+    pub(super) sensors: Option<Sensors>,
 }
 
 /// What topics said of motion.

@@ -1,8 +1,8 @@
 //! The autopilot itself: what it is, whether it is armed, its mode, where it stands, its words.
 
 use hums_core::observation::{
-    Autopilot, AutopilotIdentity, CommandAck, Heartbeat, LandedState, Observation, RadioControl, SpeedSensor,
-    SystemTime, TelemetryRadio, VehicleKind, VtolState,
+    Autopilot, AutopilotIdentity, CommandAck, Heartbeat, LandedState, Observation, RadioControl, Sensors,
+    SpeedSensor, SystemTime, TelemetryRadio, VehicleKind, VtolState,
 };
 use hums_core::units::Rpm;
 
@@ -188,9 +188,9 @@ impl System {
         self.status.is_some_and(|status| status.arming == ARMED)
     }
 
-    /// Sensors that are present and enabled and not healthy, where the log says so (until v1.13).
-    pub(super) fn unhealthy(&self) -> Option<u32> {
-        self.status?.unhealthy
+    /// What is said of sensors, where the log says it (until v1.13).
+    pub(super) fn sensors(&self) -> Option<Sensors> {
+        self.status?.sensors
     }
 
     pub(super) fn utc(&mut self, utc_us: u64, recorded_us: u64) {
@@ -314,7 +314,7 @@ fn custom_mode(nav: u8) -> u32 {
 fn status(px4: &mut Px4, said: &Said<'_>) {
     let fields = &said.fields;
     let bits = |field| Some(fields.count(field)? as u32);
-    let sensors = || Some(bits(6)? & bits(7)? & !bits(8)?);
+    let sensors = || Some(Sensors::of(bits(6)?, bits(7)?, bits(8)?));
     let before = px4.system.status;
     let status = Status {
         arming: fields.byte(0).unwrap_or(0),
@@ -323,7 +323,7 @@ fn status(px4: &mut Px4, said: &Said<'_>) {
         type_number: fields.byte(3).unwrap_or(0),
         hil: fields.flag(4),
         takeoff_us: fields.count(5),
-        unhealthy: sensors(),
+        sensors: sensors(),
         calibrating: fields.flag(9),
         meant: fields.byte(10),
     };
