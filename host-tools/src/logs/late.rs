@@ -34,8 +34,6 @@ pub struct Late {
     pub is_wanted: bool,
     /// The ring was full before its files held the while that was to be kept.
     pub is_cut: bool,
-    /// Nothing is missing, and yet its first file has not the name of a first one.
-    pub is_renamed: bool,
 }
 
 /// `None` where the log begins with its session in a file of that name, or its first group does not say that only the last while is kept.
@@ -45,9 +43,9 @@ pub fn late(log: &Log) -> Result<Option<Late>> {
     let first = group.first().map(|step| step.header);
     let segment = log.first_segment();
     let Some(first) = first.filter(Header::starts_group) else { return Ok(None) };
-    let is_further = segment.is_some_and(|segment| segment > 0);
+    // Also in a file with another number than that of a first one: the card went while the box wrote that, and it began again in the next.
     if first.number == 0 {
-        return Ok(is_further.then_some(Late { from: 0, is_wanted: true, is_cut: false, is_renamed: true }));
+        return Ok(None);
     }
     let mut seen = Seen::default();
     seen.take(&group);
@@ -61,10 +59,10 @@ pub fn late(log: &Log) -> Result<Option<Late>> {
         }
     }
     let Some(keep) = seen.keep.filter(|keep| keep.from <= first.number) else { return Ok(None) };
-    let late = |is_wanted| Late { from: keep.from, is_wanted, is_cut: false, is_renamed: false };
+    let late = |is_wanted| Late { from: keep.from, is_wanted, is_cut: false };
     let lacks_none = keep.from == first.number;
     if log.session.is_some() || lacks_none {
-        return Ok(Some(Late { is_renamed: is_further, ..late(true) }));
+        return Ok(Some(late(true)));
     }
     if !begins_with(log, &first)? {
         return Ok(Some(late(false)));
