@@ -124,8 +124,10 @@ pub struct Alerts {
     armed_at: Stamp,
     /// What a flag called healthy once: what never was is not fitted or not switched on.
     had: Causes,
-    /// What the flags of the last `SYS_STATUS` call healthy or not.
+    /// What the last `SYS_STATUS` said, and what that calls healthy or not, and wrong: it says the same nearly each time.
+    said: Sensors,
     spoken_of: Causes,
+    wrong: Causes,
     /// The estimator had attitude and position.
     had_both: bool,
 }
@@ -142,7 +144,9 @@ impl Alerts {
             armed: false,
             armed_at: Stamp::NONE,
             had: Causes::NONE,
+            said: Sensors::NONE,
             spoken_of: Causes::NONE,
+            wrong: Causes::NONE,
             had_both: false,
         }
     }
@@ -180,12 +184,15 @@ impl Alerts {
 
     /// `SYS_STATUS`: sensors that are not healthy. PX4 calls one that it lost no longer present.
     pub(crate) fn take_sensors(&mut self, at: Instant, sensors: &Sensors) {
-        let healthy = Causes::of_sensors(sensors.healthy);
-        self.had = self.had.or(healthy);
-        let lost = Causes::of_sensors(sensors.lost).both(self.had);
-        let wrong = Causes::of_sensors(sensors.unhealthy).or(lost);
-        self.spoken_of = healthy.or(wrong);
-        self.sensors.take(at, wrong);
+        if *sensors != self.said {
+            self.said = *sensors;
+            let healthy = Causes::of_sensors(sensors.healthy);
+            self.had = self.had.or(healthy);
+            let lost = Causes::of_sensors(sensors.lost).both(self.had);
+            self.wrong = Causes::of_sensors(sensors.unhealthy).or(lost);
+            self.spoken_of = healthy.or(self.wrong);
+        }
+        self.sensors.take(at, self.wrong);
     }
 
     /// `HIGH_LATENCY2`

@@ -75,6 +75,8 @@ const HEADING_SMOOTHING_S: f32 = 0.5;
 /// Samples that come sooner are passed over: angles are dear.
 const HEADING_EVERY: Span = Span::from_millis(80);
 const HEADING_HOLD_DEG: f32 = 6.0;
+/// What a compass that is not used has moved away at least, where something is wrong with it.
+const HEADING_MOVES_DEG: f32 = 2.0;
 
 /// A kind of sensors.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -344,7 +346,10 @@ impl Crosschecks {
         // An estimator that tells nothing at all says nothing about its compass.
         let tells = estimator.velocity.is_some() || estimator.position_horizontal.is_some();
         if tells && self.ratios >= RATIOS_KNOWN {
-            self.unused = (Stamp::at(at), estimator.compass.is_none());
+            // It pauses the use of a sound one too, for half a minute at a time (in 7 of 20 healthy flights of PX4's simulator).
+            let moved =
+                self.heading.beyond_either_way().is_some_and(|beyond_deg| beyond_deg > HEADING_MOVES_DEG);
+            self.unused = (Stamp::at(at), estimator.compass.is_none() && moved);
         }
     }
 
@@ -498,7 +503,7 @@ impl Crosschecks {
         &self.heights
     }
 
-    /// Whether the estimator stopped using a compass that it used in this flight.
+    /// Whether the estimator stopped using a compass that it used in this flight, and whose heading moved away from its own.
     pub(crate) fn compass_unused(&self, now: Instant) -> Option<Reading> {
         let (at, unused) = self.unused;
         Reading::new(at.instant(now), Some(f32::from(u8::from(unused))))

@@ -427,15 +427,17 @@ fn vibration_that_jumps_is_named_and_gusts_are_not() {
     });
 }
 
+/// All compasses are turned by so much.
+fn turned(fitted: &mut Fitted, degrees: f32) {
+    let (sin, cos) = degrees.to_radians().sin_cos();
+    for field in &mut fitted.field {
+        let [x, y, z] = *field;
+        *field = [cos * x - sin * y, sin * x + cos * y, z];
+    }
+}
+
 #[test]
 fn a_compass_whose_heading_leaves_the_estimators_is_named_and_declination_and_turns_are_not() {
-    let turned = |fitted: &mut Fitted, degrees: f32| {
-        let (sin, cos) = degrees.to_radians().sin_cos();
-        for field in &mut fitted.field {
-            let [x, y, z] = *field;
-            *field = [cos * x - sin * y, sin * x + cos * y, z];
-        }
-    };
     for degrees in [-25.0, 25.0, 170.0] {
         finds("compass_heading", 0, Level::Warning, 1_000, |_, fitted| turned(fitted, degrees));
     }
@@ -616,14 +618,21 @@ fn px4_that_stops_using_its_compass_is_named() {
         compass,
         ..Estimator::default()
     };
-    let findings = fly(|now_ms, fitted| {
-        fitted.quad.estimator = px4(if now_ms < FAULT_MS { Some(0.1) } else { None });
-    });
+    let stops = |degrees: f32| {
+        fly(move |now_ms, fitted| {
+            fitted.quad.estimator = px4(if now_ms < FAULT_MS { Some(0.1) } else { None });
+            turned(fitted, if now_ms < FAULT_MS { 0.0 } else { degrees });
+        })
+    };
+    // It pauses the use of sound ones too.
+    let paused = stops(0.0);
+    assert!(paused.iter().all(|finding| finding.level == Level::Stale), "{paused:?}");
+    let findings = stops(11.0);
     // Its test ratio is not sent any more.
     let told: Vec<_> = findings.iter().filter(|finding| finding.level != Level::Stale).collect();
     let [found] = told[..] else { panic!("{findings:?}") };
     assert_eq!((found.check, found.level), ("compass_unused", Level::Warning));
-    assert!((FAULT_MS + 500..FAULT_MS + 700).contains(&found.at.as_millis()), "{found:?}");
+    assert!((FAULT_MS + 500..FAULT_MS + 900).contains(&found.at.as_millis()), "{found:?}");
     // One that was never used is none that was lost.
     is_quiet(|_, fitted| {
         (fitted.quad.autopilot, fitted.quad.estimator) = (Autopilot::Px4, px4(None));
