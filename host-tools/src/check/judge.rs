@@ -609,15 +609,19 @@ impl Judge {
         remarks.chain(of_file.into_iter().flatten()).collect()
     }
 
-    /// The recording has ended.
-    pub fn end(mut self) -> Judged {
+    /// Steps to the last item, which counts: a landing, a disarming.
+    fn step_to_end(&mut self) {
         if self.first.is_some() {
             self.advance(self.last);
             if self.flights.going_on().is_some() {
-                // What came last counts: a landing, a disarming.
                 self.tick(self.last);
             }
         }
+    }
+
+    /// The recording has ended.
+    pub fn end(mut self) -> Judged {
+        self.step_to_end();
         self.settle();
         let ends_in_air = self.ends_in_air();
         self.distrust_disarming();

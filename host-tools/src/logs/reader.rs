@@ -57,7 +57,6 @@ pub trait Deliver<C> {
 
 /// What was read, in all.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-#[expect(clippy::struct_excessive_bools, reason = "facts that have nothing to do with each other")]
 pub struct Summary {
     /// The session that the sectors name.
     pub session: Option<u32>,

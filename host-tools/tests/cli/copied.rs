@@ -34,7 +34,7 @@ pub(crate) fn readers(dir: &Path, inputs: &str) -> Vec<(&'static str, i32, Strin
 
 /// Whether some part of a sentence tells of damage, other than that there is none.
 fn has_reason(said: &str) -> bool {
-    const WORDS: [&str; 16] = [
+    const WORDS: [&str; 22] = [
         "FAILED",
         "lost",
         "missing",
@@ -51,6 +51,12 @@ fn has_reason(said: &str) -> bool {
         "once more",
         "not its own",
         "more than one",
+        "is not read",
+        "is not known",
+        "no partition table",
+        "was deleted",
+        "were deleted",
+        "is cut short",
     ];
     said.split([',', ';', '\n', '('])
         .map(str::trim)
