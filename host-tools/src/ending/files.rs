@@ -139,14 +139,18 @@ impl Files<'_> {
     /// be missing.
     fn misnumbered(&self) -> Option<String> {
         let segment = |name: &String| segment_name(Path::new(name)).map(|name| name.segment);
-        self.names.iter().zip(self.names.iter().skip(1)).find_map(|(before, after)| {
-            let follows = segment(before)?.checked_add(1)? == segment(after)?;
-            (!follows).then(|| {
-                format!(
-                    "no file is there between {before} and {after}: one was taken away, or files were renamed"
-                )
+        let first = self.names.first().filter(|_| self.summary.is_renamed).map(|file| {
+            format!("{file} begins as the first file of its log, and has not the number of one: files were renamed")
+        });
+        let jump = || {
+            self.names.iter().zip(self.names.iter().skip(1)).find_map(|(before, after)| {
+                let follows = segment(before)?.checked_add(1)? == segment(after)?;
+                (!follows).then(|| {
+                    format!("no file is there between {before} and {after}: one was taken away, or files were renamed")
+                })
             })
-        })
+        };
+        first.or_else(jump)
     }
 
     fn strange_words(&self, strange: &Strange) -> String {

@@ -34,6 +34,8 @@ pub struct Late {
     pub is_wanted: bool,
     /// The ring was full before its files held the while that was to be kept.
     pub is_cut: bool,
+    /// Nothing is missing, and yet its first file has not the name of a first one.
+    pub is_renamed: bool,
 }
 
 /// `None` where the log begins with its session in a file of that name, or its first group does not say that only the last while is kept.
@@ -43,9 +45,10 @@ pub fn late(log: &Log) -> Result<Option<Late>> {
     let first = group.first().map(|step| step.header);
     let segment = log.first_segment();
     let Some(first) = first.filter(Header::starts_group) else { return Ok(None) };
-    // Also in a file with another number than that of a first one: the card went while the box wrote that, and it began again in the next.
+    // Where the card goes for a moment while the box writes its first file, it begins again in the second one.
+    let is_further = segment.is_some_and(|segment| segment > 1);
     if first.number == 0 {
-        return Ok(None);
+        return Ok(is_further.then_some(Late { from: 0, is_wanted: true, is_cut: false, is_renamed: true }));
     }
     let mut seen = Seen::default();
     seen.take(&group);
@@ -59,10 +62,10 @@ pub fn late(log: &Log) -> Result<Option<Late>> {
         }
     }
     let Some(keep) = seen.keep.filter(|keep| keep.from <= first.number) else { return Ok(None) };
-    let late = |is_wanted| Late { from: keep.from, is_wanted, is_cut: false };
+    let late = |is_wanted| Late { from: keep.from, is_wanted, is_cut: false, is_renamed: false };
     let lacks_none = keep.from == first.number;
     if log.session.is_some() || lacks_none {
-        return Ok(Some(late(true)));
+        return Ok(Some(Late { is_renamed: is_further, ..late(true) }));
     }
     if !begins_with(log, &first)? {
         return Ok(Some(late(false)));

@@ -57,6 +57,7 @@ pub trait Deliver<C> {
 
 /// What was read, in all.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[expect(clippy::struct_excessive_bools, reason = "facts that have nothing to do with each other")]
 pub struct Summary {
     /// The session that the sectors name.
     pub session: Option<u32>,
@@ -122,6 +123,8 @@ pub struct Summary {
     pub files_gone: u32,
     /// What it lacks before its first sector went when the ring was full: it may have less than the while that was to be kept.
     pub is_cut: bool,
+    /// None of its first sectors is missing, and its first file has not the name of a first one.
+    pub is_renamed: bool,
     /// A later log of the same power-on, which was joined to it.
     pub joined: Option<Joined>,
 }
@@ -184,6 +187,7 @@ pub fn read<C: Collect>(
     summary.strange = groups.strange(first, late.is_some_and(|late| late.from == first));
     summary.joined = groups.joined();
     summary.is_cut = late.is_some_and(|late| late.is_wanted && late.is_cut);
+    summary.is_renamed = late.is_some_and(|late| late.is_renamed);
     Ok(summary)
 }
 
