@@ -97,10 +97,10 @@ fn events(said: &[Said]) -> Vec<Vec<&Said>> {
     for one in said {
         let family = family(&one.text);
         let event = running.entry(family as u8).or_default();
-        // A mishap lasts until it is over.
+        // A mishap lasts until it is over, or the vehicle is down: that it flies again after that is no text.
+        let ends = |one: &&Said| one.text.contains("mishap over") || one.text.starts_with("HUMS: down at");
         let goes_on = event.first().is_some_and(|first| {
-            family == Subsystem::Mishap && !event.iter().any(|one| one.text.contains("mishap over"))
-                || one.at_s - first.at_s < EVENT_S
+            family == Subsystem::Mishap && !event.iter().any(ends) || one.at_s - first.at_s < EVENT_S
         });
         if !goes_on {
             over.push(std::mem::take(event));
