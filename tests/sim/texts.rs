@@ -72,6 +72,9 @@ fn family(text: &str) -> Subsystem {
     if words.starts_with("down at") || words.starts_with("mishap over") {
         return Subsystem::Mishap;
     }
+    if words.contains("off: no output") {
+        return Subsystem::Propulsion;
+    }
     let fits = |name: &str| {
         let said = health::said(name).unwrap();
         if let Some(silent) = words.strip_prefix("no data: ") {
