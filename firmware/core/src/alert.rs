@@ -124,10 +124,8 @@ pub struct Alerts {
     armed_at: Stamp,
     /// What a flag called healthy once: what never was is not fitted or not switched on.
     had: Causes,
-    /// What the last `SYS_STATUS` said, and what that calls healthy or not, and wrong: it says the same nearly each time.
-    said: Sensors,
+    /// What the flags of the last `SYS_STATUS` call healthy or not.
     spoken_of: Causes,
-    wrong: Causes,
     /// The estimator had attitude and position.
     had_both: bool,
 }
@@ -144,9 +142,7 @@ impl Alerts {
             armed: false,
             armed_at: Stamp::NONE,
             had: Causes::NONE,
-            said: Sensors::NONE,
             spoken_of: Causes::NONE,
-            wrong: Causes::NONE,
             had_both: false,
         }
     }
@@ -184,15 +180,12 @@ impl Alerts {
 
     /// `SYS_STATUS`: sensors that are not healthy. PX4 calls one that it lost no longer present.
     pub(crate) fn take_sensors(&mut self, at: Instant, sensors: &Sensors) {
-        if *sensors != self.said {
-            self.said = *sensors;
-            let healthy = Causes::of_sensors(sensors.healthy);
-            self.had = self.had.or(healthy);
-            let lost = Causes::of_sensors(sensors.lost).both(self.had);
-            self.wrong = Causes::of_sensors(sensors.unhealthy).or(lost);
-            self.spoken_of = healthy.or(self.wrong);
-        }
-        self.sensors.take(at, self.wrong);
+        let healthy = Causes::of_sensors(sensors.healthy);
+        self.had = self.had.or(healthy);
+        let lost = Causes::of_sensors(sensors.lost).both(self.had);
+        let wrong = Causes::of_sensors(sensors.unhealthy).or(lost);
+        self.spoken_of = healthy.or(wrong);
+        self.sensors.take(at, wrong);
     }
 
     /// `HIGH_LATENCY2`

@@ -191,6 +191,10 @@ impl Causes {
     }
 
     pub(crate) fn of_bits(bits: u32, table: &[(u32, Cause)]) -> Self {
+        // Nearly always: flags come with each status.
+        if bits == 0 {
+            return Self::NONE;
+        }
         let set = table.iter().filter(|(bit, _)| bits & bit != 0);
         set.fold(Self::NONE, |causes, (_, cause)| causes.with(*cause))
     }

@@ -110,9 +110,6 @@ pub struct Sensors {
 }
 
 impl Sensors {
-    /// Nothing is said of any.
-    pub const NONE: Self = Self { unhealthy: 0, lost: 0, healthy: 0 };
-
     /// Of the three fields of `SYS_STATUS`.
     pub const fn of(present: u32, enabled: u32, health: u32) -> Self {
         let bad = enabled & !health;
