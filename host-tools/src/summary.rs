@@ -64,7 +64,17 @@ pub struct FindingLine {
     pub unit: String,
 }
 
+/// A level by its name; `ok` for what is none.
+fn level_named(name: &str) -> Level {
+    Level::ALL.into_iter().find(|level| level.name() == name).unwrap_or(Level::Ok)
+}
+
 impl FindingLine {
+    /// The new level.
+    pub fn to_level(&self) -> Level {
+        level_named(self.level)
+    }
+
     /// What people read of a check that no longer applies.
     pub const UNJUDGED: &str = "no longer judged (on the ground, disarmed, or no longer told)";
 
@@ -92,15 +102,14 @@ impl From<Finding> for FindingLine {
 
 impl From<&FindingLine> for Finding {
     fn from(line: &FindingLine) -> Self {
-        let level = |name| Level::ALL.into_iter().find(|level| level.name() == name).unwrap_or(Level::Ok);
         let subsystem = Subsystem::ALL.into_iter().find(|subsystem| subsystem.name() == line.subsystem);
         Self {
             at: line.at,
             subsystem: subsystem.unwrap_or(Subsystem::Recorder),
             check: line.check.clone(),
             instance: line.instance,
-            level: level(line.level),
-            previous: level(line.previous),
+            level: line.to_level(),
+            previous: level_named(line.previous),
             value: line.value,
             limit: line.limit,
             unit: line.unit.clone(),

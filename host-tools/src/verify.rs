@@ -524,26 +524,12 @@ mod tests {
     use std::fs;
 
     use hums_blackbox::record::{Keep, Note};
-    use hums_blackbox::{GROUP_SECTORS, Record, Sector, SectorSink, Writer};
+    use hums_blackbox::{GROUP_SECTORS, Record, Sector, Writer};
     use hums_core::time::Instant;
 
     use super::*;
     use crate::followed::Logged;
-
-    #[derive(Default)]
-    struct Memory(Vec<u8>);
-
-    impl SectorSink for Memory {
-        fn room(&self) -> usize {
-            usize::MAX
-        }
-
-        fn put(&mut self, sector: &Sector) {
-            let mut sector = *sector;
-            sector.seal(7);
-            self.0.extend_from_slice(sector.bytes());
-        }
-    }
+    use crate::logs::memory::Memory;
 
     /// A power-on from its second group on, which says from which of its sectors on all was kept.
     fn second_log(before: u32) -> Overview {
@@ -562,7 +548,7 @@ mod tests {
             }
         }
         writer.finish(&mut memory);
-        let sectors: Vec<_> = memory.0.as_chunks::<512>().0.to_vec();
+        let sectors = memory.0;
         let start = starts.iter().copied().find(|start| *start >= GROUP_SECTORS / 2).expect("a second group");
         assert!(Sector::from_bytes(sectors[start]).starts_group());
         let dir = tempfile::tempdir().expect("a folder");

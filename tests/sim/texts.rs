@@ -72,7 +72,7 @@ fn family(text: &str) -> Subsystem {
     if words.starts_with("down at") || words.starts_with("mishap over") {
         return Subsystem::Mishap;
     }
-    if words.contains("off: no output") {
+    if (0..8).any(|motor| words.starts_with(health::off_alarm(motor).to_string().as_str())) {
         return Subsystem::Propulsion;
     }
     let fits = |name: &str| {

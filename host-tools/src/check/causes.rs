@@ -23,7 +23,7 @@ pub fn causes(findings: &[FindingLine]) -> Vec<Option<String>> {
     let mut open: BTreeMap<(&str, u8), Open<'_>> = BTreeMap::new();
     for (place, finding) in findings.iter().enumerate() {
         let key = (finding.check.as_str(), finding.instance);
-        let level = level_of(finding.level);
+        let level = finding.to_level();
         if !matches!(level, Level::Warning | Level::Critical | Level::Stale) {
             open.remove(&key);
             continue;
@@ -54,10 +54,6 @@ pub fn causes(findings: &[FindingLine]) -> Vec<Option<String>> {
         }
     }
     causes
-}
-
-fn level_of(name: &str) -> Level {
-    (0..=4).filter_map(Level::from_number).find(|level| level.name() == name).unwrap_or(Level::Ok)
 }
 
 #[cfg(test)]

@@ -72,6 +72,11 @@ const SILENT: Span = Span::from_secs(5);
 const STILL_FLIES: Span = Span::from_secs(3);
 
 impl Flight {
+    /// When a mishap ended it in which it hit something, or in which it did not, in seconds.
+    pub fn mishap_s(&self, is_impact: bool) -> Option<f64> {
+        self.mishap.filter(|mishap| mishap.is_impact == is_impact).map(|mishap| mishap.at.as_secs_f64())
+    }
+
     /// The impact that ended it is told once, when the box found it, as these findings of it say.
     pub(super) fn was_hit<'a>(&mut self, mut found: impl Iterator<Item = &'a Finding>) {
         if let Some(Mishap { at, is_impact: true }) = &mut self.mishap
@@ -81,6 +86,11 @@ impl Flight {
             *at = finding.at;
         }
     }
+}
+
+/// Whether the vehicle was in the air when it was heard first.
+pub(super) fn begin_in_air(flights: &[Flight]) -> bool {
+    flights.first().is_some_and(|flight| !flight.took_off)
 }
 
 /// Whether a flight that goes on is in the air: also where it was disarmed, and may fall.

@@ -1,6 +1,7 @@
 //! What was wrong, as people read it: the parts of one check together, under each cause what it explains, and first what matters most.
 
 use std::cmp::Reverse;
+use std::collections::BTreeSet;
 
 use hums_core::health::Level;
 
@@ -33,25 +34,25 @@ impl<'a> Group<'a> {
 /// first.
 pub fn grouped(problems: &[Problem]) -> Vec<Group<'_>> {
     let alike = alike(problems);
-    let (mut causes, effects): (Vec<_>, Vec<_>) = alike.iter().partition(|one| cause(one, &alike).is_none());
-    let explained = |one: &[&Problem]| -> Vec<_> {
-        let check = check_of(one);
-        effects.iter().filter(|effect| cause(effect, &alike) == Some(check)).copied().cloned().collect()
-    };
-    let is_raised = |one: &[&Problem]| !is_critical(one) && explained(one).iter().any(|one| is_critical(one));
-    causes.sort_by_key(|one| {
-        let is_critical = is_critical(one) || is_raised(one);
-        (Reverse(is_critical), one.first().map(|first| first.order()))
-    });
+    let causes: Vec<_> = alike.iter().map(|one| cause(one, &alike)).collect();
     let mut groups: Vec<Group<'_>> = Vec::new();
-    for one in causes {
-        // The first of a check's groups has what it explains.
-        let is_first = groups.iter().all(|group| check_of(&group.members) != check_of(one));
+    for (one, _) in alike.iter().zip(&causes).filter(|(_, cause)| cause.is_none()) {
+        let check = check_of(one);
+        let explained =
+            || alike.iter().zip(&causes).filter(|(_, cause)| **cause == Some(check)).map(|(one, _)| one);
         groups.push(Group {
             members: one.clone(),
-            effects: if is_first { explained(one) } else { Vec::new() },
-            is_raised: is_first && is_raised(one),
+            effects: explained().cloned().collect(),
+            is_raised: !is_critical(one) && explained().any(|one| is_critical(one)),
         });
+    }
+    groups.sort_by_key(|group| (Reverse(group.is_critical()), group.first().map(Problem::order)));
+    // The first of a check's groups has what it explains.
+    let mut seen = BTreeSet::new();
+    for group in &mut groups {
+        if !seen.insert(check_of(&group.members)) {
+            (group.effects, group.is_raised) = (Vec::new(), false);
+        }
     }
     groups
 }

@@ -217,7 +217,6 @@ fn vehicle(judged: &Judged) -> Option<VehicleJson> {
 }
 
 fn flight(flight: &Flight) -> FlightJson {
-    let mishap = |is_impact| flight.mishap.filter(|mishap| mishap.is_impact == is_impact);
     FlightJson {
         from_s: flight.from.as_secs_f64(),
         to_s: flight.to.as_secs_f64(),
@@ -225,8 +224,8 @@ fn flight(flight: &Flight) -> FlightJson {
         took_off: flight.took_off,
         landed: flight.landed,
         disarmed_at_m: flight.disarmed_at_m,
-        impact_s: mishap(true).map(|mishap| mishap.at.as_secs_f64()),
-        down_s: mishap(false).map(|mishap| mishap.at.as_secs_f64()),
+        impact_s: flight.mishap_s(true),
+        down_s: flight.mishap_s(false),
     }
 }
 

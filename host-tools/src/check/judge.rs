@@ -27,7 +27,7 @@ use super::cells::Cells;
 use super::clock::{Clock, SETTLE};
 use super::coverage::{Coverage, Recording};
 use super::details::{self, Details};
-use super::flights::{Flight, Flights, is_in_air};
+use super::flights::{Flight, Flights, begin_in_air, is_in_air};
 use super::judged::{Holes, Judged, JudgedBy};
 use super::problem::{IMPACT, LISTED_MAX, Problems};
 use crate::part;
@@ -601,9 +601,8 @@ impl Judge {
 
     /// What else there is to say of the recording, as sentences.
     fn remarks(&mut self, by: JudgedBy, flights: &[Flight]) -> Vec<String> {
-        let begins_in_air = flights.first().is_some_and(|flight| !flight.took_off);
         let (of_cells, of_vehicles) =
-            (self.cells.words(by, begins_in_air), self.details.remarks(self.system()));
+            (self.cells.words(by, begin_in_air(flights)), self.details.remarks(self.system()));
         let of_file = [About::Beginning, About::Unchecked].map(|about| self.facts.remove(&about));
         let remarks = joined(&self.joints).into_iter().chain(of_cells).chain(of_vehicles);
         remarks.chain(of_file.into_iter().flatten()).collect()

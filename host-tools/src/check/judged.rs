@@ -7,7 +7,7 @@ use hums_core::health::{Level, Scope, vocabulary};
 use hums_core::time::{Instant, Span};
 use hums_core::vehicle::Vehicle;
 
-use super::flights::Flight;
+use super::flights::{Flight, begin_in_air};
 use super::problem::{LISTED_MAX, Problem};
 use crate::source::epochs::Epochs;
 use crate::source::item::{About, Cause, Gap};
@@ -115,7 +115,7 @@ impl Judged {
 
     /// Whether the vehicle was in the air when it was heard first.
     pub fn begins_in_air(&self) -> bool {
-        self.flights.first().is_some_and(|flight| !flight.took_off)
+        begin_in_air(&self.flights)
     }
 
     /// Whether the recorder says itself, or it is seen, that it did not write all.

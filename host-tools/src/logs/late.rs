@@ -252,31 +252,18 @@ impl Seen {
 mod tests {
     use std::fs;
 
+    use hums_blackbox::Writer;
     use hums_blackbox::record::Note;
-    use hums_blackbox::{SectorSink, Writer};
 
     use super::*;
     use crate::logs::find;
-
-    struct Memory(Vec<[u8; 512]>);
-
-    impl SectorSink for Memory {
-        fn room(&self) -> usize {
-            usize::MAX
-        }
-
-        fn put(&mut self, sector: &Sector) {
-            let mut sector = *sector;
-            sector.seal(7);
-            self.0.push(*sector.bytes());
-        }
-    }
+    use crate::logs::memory::Memory;
 
     #[test]
     fn of_a_log_whose_beginning_is_lost_nothing_tells_where_it_began() {
         use hums_blackbox::record::Boot;
 
-        let (mut memory, mut writer) = (Memory(Vec::new()), Box::new(Writer::new()));
+        let (mut memory, mut writer) = (Memory::default(), Box::new(Writer::new()));
         let boot = Record::Boot(Boot { version: "1.2.3", ..Boot::default() });
         let mut starts = Vec::new();
         // Two files of five groups each, each of which begins with the record of a start.
@@ -308,7 +295,7 @@ mod tests {
     /// What a log lacks whose first file is gone, the others being begun at these times. Each of them begins with a short group that says
     /// nothing, and says in the next one that the last 30 s are kept, until the vehicle is armed.
     fn read(begun_ms: &[u64], armed_ms: u64) -> Option<Late> {
-        let (mut memory, mut writer) = (Memory(Vec::new()), Box::new(Writer::new()));
+        let (mut memory, mut writer) = (Memory::default(), Box::new(Writer::new()));
         let note = Record::Note(Note { severity: 6, text: "a word" });
         let keep = |all| Record::Keep(Keep { all, from: 0, seconds: 30 });
         let put = |at_ms, record: &Record<'_>, memory: &mut Memory, writer: &mut Writer| {

@@ -19,6 +19,8 @@ mod joined;
 pub mod late;
 mod look;
 pub mod marks;
+#[cfg(test)]
+pub(crate) mod memory;
 pub mod naming;
 pub mod places;
 pub mod reader;

@@ -71,7 +71,6 @@ impl Extents {
     pub fn flights(&self, judged: &[Judged]) -> Vec<Flight> {
         let flight = |(index, flight): (usize, &Judged)| {
             let extent = self.0.get(index).copied().unwrap_or_default();
-            let mishap = |is_impact| flight.mishap.filter(|mishap| mishap.is_impact == is_impact);
             Flight {
                 from_s: flight.from.as_secs_f64(),
                 to_s: flight.to.as_secs_f64(),
@@ -79,8 +78,8 @@ impl Extents {
                 took_off: flight.took_off,
                 landed: flight.landed,
                 disarmed_in_air: flight.disarmed_at_m.is_some(),
-                impact_s: mishap(true).map(|mishap| mishap.at.as_secs_f64()),
-                down_s: mishap(false).map(|mishap| mishap.at.as_secs_f64()),
+                impact_s: flight.mishap_s(true),
+                down_s: flight.mishap_s(false),
                 height_max_m: extent.height_max_m,
                 speed_max_m_s: extent.speed_max_m_s,
                 percent_from: extent.percent_from,
