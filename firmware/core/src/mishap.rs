@@ -53,6 +53,8 @@ use evidence::{
 const WATCHED: Span = Span::from_secs(10);
 /// A vehicle that still flies so long after the last thing seen goes on with its flight.
 const RECOVERED: Span = Span::from_secs(5);
+/// What was down and moves so long as what flies has taken off again.
+const TAKEN_OFF: Span = Span::from_secs(4);
 /// A shock stops something that was this fast.
 const IMPACT_MPS: f32 = 3.5;
 /// Legs take this from what comes down upright, at the fastest landing speeds that are set (2.5 m/s): harder is no landing.
@@ -288,7 +290,7 @@ impl Mishap {
                 (!told).then_some(Change::OnBench(kind))
             }
             (State::Going(last), _) => self.goes(now, last, vehicle),
-            (State::Down, _) if self.flies_since.is_some_and(|since| now.since(since) >= RECOVERED) => {
+            (State::Down, _) if self.flies_since.is_some_and(|since| now.since(since) >= TAKEN_OFF) => {
                 self.calm();
                 Some(Change::FliesAgain)
             }
