@@ -12,7 +12,7 @@ pub enum Happening {
     Disarmed,
     /// It left the ground.
     TakeOff,
-    /// We were restarted in the air: the flight that began before goes on.
+    /// It was in the air when it was first heard: we were started, or started again, in the air.
     FlightResumed,
     /// The flight is over: it is back on the ground, or disarmed.
     Landing,

@@ -385,8 +385,8 @@ impl Monitor {
             happenings.push(Happening::Armed);
         }
         match event {
-            Some(FlightEvent::TakeOff) => happenings.push(Happening::TakeOff),
-            Some(FlightEvent::Resumed) => happenings.push(Happening::FlightResumed),
+            Some(FlightEvent::TakeOff) if flight.was_on_ground() => happenings.push(Happening::TakeOff),
+            Some(FlightEvent::TakeOff | FlightEvent::Resumed) => happenings.push(Happening::FlightResumed),
             Some(FlightEvent::Landing) => happenings.push(Happening::Landing),
             None => {}
         }

@@ -329,10 +329,7 @@ impl Craft {
     fn happenings(&mut self, now: Instant, history: &mut Option<&mut History>) {
         let mut cells_come = self.cells_said;
         while let Some(happening) = self.monitor.take_happening() {
-            let joined = match happening {
-                Happening::TakeOff => !self.monitor.flight().was_on_ground(),
-                _ => self.joined && now.since(self.began) <= JOINED,
-            };
+            let joined = self.joined && now.since(self.began) <= JOINED;
             if matches!(happening, Happening::TakeOff | Happening::FlightResumed) {
                 self.before_flight_s = self.grounded_s;
             }

@@ -252,11 +252,10 @@ impl Note {
     pub fn event(now: Instant, happening: Happening, joined: bool) -> Option<Self> {
         let words = match happening {
             Happening::Armed if joined => "armed when it was first heard",
-            Happening::TakeOff | Happening::FlightResumed if joined => "in the air when it was first heard",
             Happening::Armed => "armed",
             Happening::Disarmed => "disarmed",
             Happening::TakeOff => "take-off",
-            Happening::FlightResumed => "in the air",
+            Happening::FlightResumed => "in the air when it was first heard",
             Happening::Landing => "landing",
             Happening::AutopilotReboot => "the autopilot has restarted",
             Happening::CellsUnknown => CELLS_UNKNOWN,

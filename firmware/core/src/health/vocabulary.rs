@@ -420,7 +420,7 @@ vocabulary! {
     "The vehicle turned over and over: it was out of control.";
     "Do not fly until motors, propellers and sensors are checked.";
     "disarmed_in_air" Vehicle "disarmed in the air", "", says "disarmed in the air", "KEEP CLEAR", needs "arming";
-    "The vehicle was disarmed in the air, and fell."; "Look for who or what disarmed it; inspect the vehicle.";
+    "The vehicle was disarmed, or its flight was terminated, in the air, and it fell."; "Look for who or what did it; inspect the vehicle.";
     "sinking" Vehicle "sinking", "", says "sinking fast", "FLY FORWARD, CLIMB", needs "climb rate of a vehicle on rotors";
     "The vehicle sank fast without being told to."; "Look for lost thrust, vortex ring state, an empty battery or a wrong height.";
     "overturned" Vehicle "overturned", "", says "overturned", "DISARM IF DOWN", needs "attitude of a vehicle on rotors";

@@ -55,7 +55,7 @@ pub(super) fn record(
         };
         book.journal.record(now, &Record::Event(Event { number, text }), sectors);
         match happening {
-            Happening::Armed | Happening::TakeOff => marks.moves(),
+            Happening::Armed | Happening::TakeOff | Happening::FlightResumed => marks.moves(),
             Happening::Landing => {
                 recorded.usage(now, Moment::End, book, sectors);
                 marks.rests(Resting::Landed);
