@@ -866,6 +866,12 @@ fn a_recording_that_ends_in_the_air_says_so_everywhere_and_where_it_was_heard_la
     assert!(table.contains("\"ends_in_air\":true"));
     let end = json(&attempt(dir.path(), "check --json cut.tlog"))["ends_in_air"].clone();
     assert!(end["latitude_deg"].as_f64().is_some_and(|north| north.abs() > 1.0), "{end}");
+    // What a box recorded that was started in the air says so too.
+    let later = |place: usize, all: usize| place > all / 2 && place < all / 3 * 2;
+    filtered("ap_quad_faults.tlog", dir.path(), "later.tlog", |place, all, _| later(place, all));
+    run(dir.path(), "sim --input later.tlog --sd later.img", 0);
+    let listed = text(&attempt(dir.path(), "ls later.img"));
+    assert!(listed.contains("; begins in the air; ends in the air"), "{listed}");
 }
 
 /// What the box found has the worst value of the flight, and not that of the moment in which it found it.
