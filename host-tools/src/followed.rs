@@ -381,8 +381,14 @@ mod tests {
     #[test]
     fn a_last_file_that_was_to_be_written_anew_is_no_finding_once_the_next_start_found_it_so() {
         let others = Others { sectors: 9, first: 0, last: 8, session: 7, board: None, several: false };
-        let strange =
-            vec![Strange { file: 1, hollow: true, older: false, others: Some(others), shift: None }];
+        let strange = vec![Strange {
+            file: 1,
+            hollow: true,
+            passed: false,
+            older: false,
+            others: Some(others),
+            shift: None,
+        }];
         let mut log = Ending {
             name: "00006".to_owned(),
             files: vec!["00006_00.HUM".to_owned(), "00006_01.HUM".to_owned()],
@@ -440,8 +446,14 @@ mod tests {
             });
             let [one, empty, next] = &mut logs;
             (one.summary.session, one.summary.last_number) = (Some(7), Some(8));
-            empty.summary.strange =
-                vec![Strange { file: 0, hollow: true, older: false, others: None, shift: None }];
+            empty.summary.strange = vec![Strange {
+                file: 0,
+                hollow: true,
+                passed: false,
+                older: false,
+                others: None,
+                shift: None,
+            }];
             next.summary.session = Some(9);
             next.summary.keep = Some(Keep { from, ..Keep::default() });
             let before =
@@ -459,7 +471,8 @@ mod tests {
     #[test]
     fn an_empty_file_is_no_finding_once_the_next_start_found_nothing_to_read() {
         let ending = |damaged, number| {
-            let strange = Strange { file: 0, hollow: true, older: false, others: None, shift: None };
+            let strange =
+                Strange { file: 0, hollow: true, passed: false, older: false, others: None, shift: None };
             let mut log =
                 Ending { name: "00001".into(), files: vec!["00001_00.HUM".into()], ..Ending::default() };
             log.summary.strange = vec![strange];

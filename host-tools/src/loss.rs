@@ -37,6 +37,13 @@ pub fn words(loss: &Loss) -> Option<String> {
     Some(format!("{} {was} not recorded: {why}", count(loss.count, one)))
 }
 
+/// How many sectors are missing in a gap; none before the first sector of a log where nothing tells where the log began.
+pub fn sectors_lost(gap: &Gap) -> Option<u32> {
+    let is_known =
+        gap.from.is_some() || gap.sectors_lost > 0 || gap.sectors_skipped > 0 || gap.frames.is_some();
+    is_known.then_some(gap.sectors_lost)
+}
+
 /// The likeliest reason why a log does not have something.
 pub const fn why(gap: &Gap) -> &'static str {
     match (gap.cause, gap.from, gap.to) {

@@ -11,7 +11,7 @@ use crate::cli;
 use crate::colour::level;
 use crate::ending::{
     BlocksJson, EndJson, Ending, PowerOn, SessionBefore, among_words, behind_words, copies_words,
-    made_again_words, unprotected_words,
+    made_again_words, not_taken_words, unprotected_words,
 };
 use crate::followed::Followed;
 use crate::info::json::images_json;
@@ -62,6 +62,7 @@ pub fn run(args: &cli::Verify) -> Result<Outcome> {
         worst = worst.max(log.verdict);
         weakened.made_again += overview.ending.made_again();
         weakened.unprotected += overview.ending.unprotected();
+        weakened.not_taken += overview.ending.not_taken();
         logs += u64::from(overview.ending.is_counted());
         if overview.ending.is_without_earlier() {
             without_earlier.add(&overview.ending.name);
@@ -78,7 +79,7 @@ pub fn run(args: &cli::Verify) -> Result<Outcome> {
         Ok(())
     })?;
     let worst = if ok && failed == 0 { worst } else { Verdict::NotProved };
-    let ok = worst != Verdict::NotProved && weakened == Weakened::default();
+    let ok = worst != Verdict::NotProved && !weakened.is_damage();
     if let Some(list) = list {
         list.end_with("ok", &ok)?;
     } else {
@@ -97,6 +98,15 @@ pub fn run(args: &cli::Verify) -> Result<Outcome> {
 struct Weakened {
     made_again: u64,
     unprotected: u64,
+    /// Parity that its card may have refused.
+    not_taken: u64,
+}
+
+impl Weakened {
+    /// Whether a card has lost any of it.
+    const fn is_damage(self) -> bool {
+        self.made_again + self.unprotected > 0
+    }
 }
 
 /// The first log of each card of which those before it were not read: the first one's name, and how many more there are.
@@ -128,7 +138,11 @@ impl WithoutEarlier {
             (Verdict::ToMark, ..) => "whole to the last end marks; what came after them cannot be proved",
             (Verdict::NotProved, ..) => "damage, losses or an end that is not proved: see above",
         };
-        let weakened = [made_again_words(weakened.made_again), unprotected_words(weakened.unprotected)];
+        let weakened = [
+            made_again_words(weakened.made_again),
+            unprotected_words(weakened.unprotected),
+            not_taken_words(weakened.not_taken),
+        ];
         let weakened = weakened.into_iter().flatten().fold(String::new(), |all, words| all + "; " + &words);
         let more = match self.more {
             0 => String::new(),
@@ -331,7 +345,8 @@ impl LogJson {
             .sum::<u64>()
             + contents.other_messages.count;
         let gaps = || contents.gaps.iter().filter(|gap| gap.cause != Cause::Disarmed);
-        let missing: u64 = gaps().map(|gap| u64::from(gap.sectors_lost)).sum();
+        // Where nobody knows how many are missing it is one at least.
+        let missing: u64 = gaps().map(|gap| u64::from(loss::sectors_lost(gap).unwrap_or(1))).sum();
         let useless: u64 = gaps().map(|gap| u64::from(gap.sectors_skipped)).sum();
         // A gap in which nobody knows how many are missing is one at least.
         let frames_missing = summary.frames_missing + summary.gaps_uncounted;
@@ -413,7 +428,9 @@ fn weakened(log: &Overview) -> Vec<Check> {
     let words = "parity is missing: what the card loses of these files cannot be made again";
     // What was packed on a PC has none.
     let written = if summary.marks.has_boot { summary.parity.written } else { 0 };
-    vec![intact, check("sectors protected", written, ending.unprotected(), words)]
+    let mut protected = check("sectors protected", written, ending.unprotected(), words);
+    protected.detail.extend(not_taken_words(ending.not_taken()));
+    vec![intact, protected]
 }
 
 /// What the log says of its end and of its place.
@@ -570,7 +587,19 @@ mod tests {
         lost.contents.gaps.push(Gap { sectors_lost: 628, frames: Some(70), ..gap });
         let summary = &mut lost.ending.summary;
         (summary.first_number, summary.gaps, summary.frames_missing) = (Some(628), 1, 70);
-        for (frames, expected) in [(Some(50), (Some(20), 20, 0)), (None, (None, 0, 1))] {
+        let unknown = |lost: &Overview| {
+            let mut lost = lost.clone();
+            (lost.contents.gaps[0].sectors_lost, lost.contents.gaps[0].frames) = (0, None);
+            let summary = &mut lost.ending.summary;
+            (summary.frames_before, summary.frames_missing, summary.gaps_uncounted) = (Some(70), 0, 1);
+            assert_eq!(loss::sectors_lost(&lost.contents.gaps[0]), None);
+            lost
+        };
+        for (lost, frames, expected) in [
+            (lost.clone(), Some(50), (Some(20), 20, 0)),
+            (lost.clone(), None, (None, 0, 1)),
+            (unknown(&lost), Some(50), (Some(20), 20, 0)),
+        ] {
             let mut lost = lost.clone();
             Logged::follows(&mut lost, 100, frames);
             let (gap, summary) = (&lost.contents.gaps[0], &lost.ending.summary);

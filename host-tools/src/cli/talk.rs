@@ -119,7 +119,7 @@ pub struct Pull {
     /// Only these, by the names that the board has for them
     #[arg(value_name = "NAME")]
     pub names: Vec<String>,
-    /// Only the newest N logs
+    /// Only the newest N logs, each with all of its files; what a box keeps before an arming, while it waits for that, is none of them
     #[arg(long, value_name = "N", conflicts_with = "around")]
     pub last: Option<usize>,
     /// First what matters: of the newest session only what was recorded around a time (4:20 after power-on, or UTC), around the

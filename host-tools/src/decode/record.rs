@@ -8,6 +8,7 @@ use hums_core::time::Instant;
 use super::checked::{BOARD, finding_row};
 use super::row::{Cell, CellType, Row};
 use super::wear;
+use crate::loss;
 use crate::names::{clock_source_name, counter_name, event_name, fault_name};
 use crate::source::told::Finding;
 
@@ -194,16 +195,18 @@ fn stats_cells(stats: &Stats) -> Vec<(&'static str, Cell)> {
 /// A gap as a row.
 pub fn gap_row(gap: &Gap) -> Row {
     let time = |at: Option<Instant>| at.map_or(Cell::Unknown(CellType::Time), Cell::Time);
-    let frames = gap.frames.map_or(Cell::Unknown(CellType::Count), |frames| Cell::Count(u64::from(frames)));
+    let number = |known: Option<u32>| {
+        known.map_or(Cell::Unknown(CellType::Count), |known| Cell::Count(u64::from(known)))
+    };
     Row::new(
         "HUMS_GAP",
         vec![
             ("from[s]", time(gap.from)),
             ("to[s]", time(gap.to)),
             ("cause", Cell::Text(gap.cause.name().to_owned())),
-            ("sectors_lost", Cell::Count(u64::from(gap.sectors_lost))),
+            ("sectors_lost", number(loss::sectors_lost(gap))),
             ("sectors_skipped", Cell::Count(u64::from(gap.sectors_skipped))),
-            ("frames_missing", frames),
+            ("frames_missing", number(gap.frames)),
         ],
     )
 }

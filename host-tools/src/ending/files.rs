@@ -98,13 +98,15 @@ impl Files<'_> {
     }
 
     /// A file that the next start found empty was made when the power went; so was one that was to be written anew, which
-    /// still holds what it held before.
+    /// still holds what it held before. One between sectors that follow each other got nothing: the card refused it, or was out.
     fn is_usual(&self, strange: &Strange) -> bool {
         let is_empty = strange.hollow && matches!(self.proof, Proof::NextStart(None) | Proof::NextLog);
         match strange.others {
             Some(others) => is_empty && self.is_begun_anew(strange, &others),
             None if strange.shift.is_some() => false,
-            None => is_empty || strange.older && self.is_last(strange) && !self.summary.closed,
+            None => {
+                is_empty || strange.passed || strange.older && self.is_last(strange) && !self.summary.closed
+            }
         }
     }
 
@@ -140,11 +142,17 @@ impl Files<'_> {
     fn misnumbered(&self) -> Option<String> {
         let segment = |name: &String| segment_name(Path::new(name)).map(|name| name.segment);
         let first = self.names.first().filter(|_| self.summary.is_renamed).map(|file| {
-            format!("{file} begins as the first file of its log, and has not the number of one: files were renamed")
+            format!(
+                "{file} begins as the first file of its log, and has not the number of one: files were renamed, or nothing came into \
+                 those before it"
+            )
         });
+        // Where the card was out, or refused what came, a file may have been begun into which nothing came: it is not copied.
+        let is_passed = self.summary.gaps == 0 && self.summary.marks.has_card_trouble();
         let jump = || {
             self.names.iter().zip(self.names.iter().skip(1)).find_map(|(before, after)| {
-                let follows = segment(before)?.checked_add(1)? == segment(after)?;
+                let (before_number, number) = (segment(before)?, segment(after)?);
+                let follows = before_number.checked_add(1)? == number || is_passed && before_number < number;
                 (!follows).then(|| {
                     format!("no file is there between {before} and {after}: one was taken away, or files were renamed")
                 })
@@ -276,7 +284,14 @@ mod tests {
             several: false,
         };
         let words = |hollow| {
-            let strange = vec![Strange { file: 0, hollow, older: false, others: Some(others), shift: None }];
+            let strange = vec![Strange {
+                file: 0,
+                hollow,
+                passed: false,
+                older: false,
+                others: Some(others),
+                shift: None,
+            }];
             let summary = Summary { strange, ..Summary::default() };
             Files { names: &["00001_00.HUM".to_owned()], summary: &summary, proof: Proof::None }
                 .strange()
@@ -286,6 +301,18 @@ mod tests {
         let whom = "of another session (box 3f3f3f3f3f3f3f3f3f3f3f3f, session 1a2b3c4d)";
         assert!(joined.starts_with(&format!("sectors 400 to 699 of 00001_00.HUM are {whom}: ")), "{joined}");
         assert!(hollow.ends_with(&format!("holds 300 sectors {whom}")), "{hollow}");
+    }
+
+    #[test]
+    fn a_number_that_no_file_has_is_no_finding_where_the_card_took_nothing_and_nothing_is_missing() {
+        let strange = |second: &str, card_out, gaps| {
+            let mut summary = Summary { gaps, ..Summary::default() };
+            summary.marks.card_out = card_out;
+            let names = ["00001_00.HUM", second].map(str::to_owned);
+            Files { names: &names, summary: &summary, proof: Proof::None }.strange().len()
+        };
+        assert_eq!([strange("00001_01.HUM", false, 0), strange("00001_03.HUM", false, 0)], [0, 1]);
+        assert_eq!([strange("00001_03.HUM", true, 0), strange("00001_03.HUM", true, 1)], [0, 1]);
     }
 
     #[test]

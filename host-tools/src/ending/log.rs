@@ -97,6 +97,11 @@ impl Ending {
         self.faults().is_empty()
     }
 
+    /// The same of a log whose recorder found that the card refused blocks: these may be among them, so that it is no fault of the log.
+    pub fn not_taken(&self) -> u64 {
+        if self.has_parity() && self.summary.marks.refused { self.summary.parity.missing } else { 0 }
+    }
+
     /// Why it is not, as parts of sentences: why it is not proved to be whole, that sectors had to be made again, and that its parity is
     /// missing.
     pub fn faults(&self) -> Vec<String> {
@@ -111,10 +116,15 @@ impl Ending {
     }
 
     /// Parity sectors that its recorder wrote and that are not there: nothing is lost, and what its card loses next cannot be made
-    /// again. Of what is no log of its own, or is gone with its sectors, that is no news.
+    /// again. One that the card refuses is not written again: where the recorder found that the card refused blocks, nothing tells that
+    /// it has lost any ([`Self::not_taken`]).
     pub fn unprotected(&self) -> u64 {
-        let counts = self.begun_anew.is_none() && self.aside().is_none() && self.summary.marks.has_boot;
-        if counts { self.summary.parity.missing } else { 0 }
+        if self.has_parity() && !self.summary.marks.refused { self.summary.parity.missing } else { 0 }
+    }
+
+    /// Whether its parity is to be there. Of what is no log of its own, or is gone with its sectors, it is no news that it is not.
+    fn has_parity(&self) -> bool {
+        self.begun_anew.is_none() && self.aside().is_none() && self.summary.marks.has_boot
     }
 
     /// Why it is not proved to be whole, as parts of sentences: what is lost, what is not proved, what of its files is not the
@@ -246,9 +256,31 @@ pub fn unprotected_words(sectors: u64) -> Option<String> {
     })
 }
 
+/// That so many parity sectors are not there, of a log whose recorder found that the card refused blocks; none where none is.
+pub fn not_taken_words(sectors: u64) -> Option<String> {
+    (sectors > 0).then(|| {
+        format!(
+            "{} not there: the card refused blocks while it recorded (card_errors), and these may be among them; what the card loses of these \
+             files cannot be made again",
+            are(sectors, "parity sector")
+        )
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn parity_is_missing_where_no_record_says_that_the_card_refused_blocks() {
+        let of = |refused| {
+            let mut summary = Summary { session: Some(7), closed: true, ..Summary::default() };
+            (summary.marks.has_boot, summary.marks.refused, summary.parity.missing) = (true, refused, 3);
+            let ending = Ending { proof: Proof::of(&summary, None), summary, ..Ending::default() };
+            (ending.unprotected(), ending.not_taken(), ending.is_sound())
+        };
+        assert_eq!([of(false), of(true)], [(3, 0, false), (0, 3, true)]);
+    }
 
     #[test]
     fn a_log_whose_times_fall_back_is_not_proved() {

@@ -5,6 +5,7 @@ use serde::Serialize;
 
 use crate::ending::{BlocksJson, EndJson};
 use crate::logs;
+use crate::loss;
 use crate::names::{autopilot_name, check_name, type_name};
 use crate::source::item::MessageCount;
 use crate::source::recording::Format;
@@ -130,7 +131,7 @@ struct GapJson {
     from_s: Option<f64>,
     to_s: Option<f64>,
     cause: &'static str,
-    sectors_lost: u32,
+    sectors_lost: Option<u32>,
     sectors_skipped: u32,
     frames_missing: Option<u32>,
 }
@@ -320,7 +321,7 @@ fn gaps(contents: &Contents) -> Vec<GapJson> {
         from_s: gap.from.map(Instant::as_secs_f64),
         to_s: gap.to.map(Instant::as_secs_f64),
         cause: gap.cause.name(),
-        sectors_lost: gap.sectors_lost,
+        sectors_lost: loss::sectors_lost(gap),
         sectors_skipped: gap.sectors_skipped,
         frames_missing: gap.frames,
     };

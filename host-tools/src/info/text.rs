@@ -14,7 +14,9 @@ use super::number::short;
 use super::{usage, wear};
 use crate::check::causes::causes;
 use crate::colour::level;
-use crate::ending::{PowerOn, among_words, behind_words, copies_words, made_again_words, unprotected_words};
+use crate::ending::{
+    PowerOn, among_words, behind_words, copies_words, made_again_words, not_taken_words, unprotected_words,
+};
 use crate::logs;
 use crate::logs::begun_anew::BegunAnew;
 use crate::logs::naming::is_part;
@@ -142,7 +144,11 @@ fn ending(text: &mut String, log: &Overview) {
     for strange in ending.contradicted().into_iter().chain(ending.noise()).chain(ending.strange()) {
         let _ = writeln!(text, "  files    {strange}");
     }
-    let weakened = [made_again_words(ending.made_again()), unprotected_words(ending.unprotected())];
+    let weakened = [
+        made_again_words(ending.made_again()),
+        unprotected_words(ending.unprotected()),
+        not_taken_words(ending.not_taken()),
+    ];
     for words in weakened.into_iter().flatten() {
         let _ = writeln!(text, "  parity   {words}");
     }
@@ -293,13 +299,14 @@ fn gaps_text(text: &mut String, log: &Overview) {
         let frames = gap
             .frames
             .map_or_else(|| "an unknown number of frames".to_owned(), |frames| count(frames, "frame"));
+        let lost = loss::sectors_lost(gap)
+            .map_or_else(|| "an unknown number of sectors".to_owned(), |lost| count(lost, "sector"));
         let _ = writeln!(
             text,
-            "    from {} to {}: {}, {} lost, {} more of no use, {frames} missing",
+            "    from {} to {}: {}, {lost} lost, {} more of no use, {frames} missing",
             time(gap.from, "the beginning"),
             time(gap.to, "the end"),
             if is_part && gap.cause == Cause::Missing { "not brought yet" } else { why(log, gap) },
-            count(gap.sectors_lost, "sector"),
             gap.sectors_skipped
         );
     }

@@ -6,7 +6,12 @@
 //! of the ring was begun, and when that was, the first one that is left held the last while. Where no file says so, somebody else
 //! took one. The first file of a log is never left out before
 //! others are: a log that has it and begins later was recorded on a card that came later, and says so.
-//! Between a log's first sector and its last one nothing is ever left out: after an arming the next log begins.
+//! Where nobody was armed and the log did not end in order, one more file may have been begun behind its last entry, which is not there.
+//! Between a log's first sector and its last one nothing is ever left out: after an arming the next log begins. But files that were
+//! copied while the vehicle waited, and files of the same log that were copied later, are no whole together: what the ring gave away
+//! between the two copies is in neither, and what is before that is none of the log's any more ([`leftovers`]).
+
+use std::ops::Range;
 
 use anyhow::Result;
 use hums_blackbox::record::{Keep, Lost};
@@ -15,6 +20,7 @@ use hums_core::time::{Instant, Span};
 
 use super::board::HEADING_GROUPS;
 use super::groups::{Group, Groups, at_beginning};
+use super::marks::{CARD_OUT, REFUSED};
 use super::places::Log;
 
 /// Files of a full ring but for one, of which the oldest goes however little the others hold.
@@ -23,7 +29,9 @@ const RING_FILES: usize = 15;
 /// entry, of a vehicle that sends a heartbeat each second.
 const SLACK: Span = Span::from_secs(10);
 /// Numbers of the events that say that a card came or went.
-const CARD: [u8; 2] = [6, 7];
+const CARD: [u8; 2] = [6, CARD_OUT];
+/// While the first files of a log got nothing, what comes waits in the sector queue: that they did is said within so many groups.
+const TROUBLE_GROUPS: usize = 4;
 
 /// What a log lacks that begins with another sector than the first one of its session.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -34,7 +42,8 @@ pub struct Late {
     pub is_wanted: bool,
     /// The ring was full before its files held the while that was to be kept.
     pub is_cut: bool,
-    /// Nothing is missing, and yet its first file has not the name of a first one.
+    /// Nothing is missing, and yet its first file has not the name of a first one, and no record says that the card took nothing into
+    /// those before it.
     pub is_renamed: bool,
 }
 
@@ -45,13 +54,17 @@ pub fn late(log: &Log) -> Result<Option<Late>> {
     let first = group.first().map(|step| step.header);
     let segment = log.first_segment();
     let Some(first) = first.filter(Header::starts_group) else { return Ok(None) };
-    // Where the card goes for a moment while the box writes its first file, it begins again in the second one.
+    // Where the card goes for a moment while the box writes its first file, it begins again in the second one; and so on.
     let is_further = segment.is_some_and(|segment| segment > 1);
-    if first.number == 0 {
-        return Ok(is_further.then_some(Late { from: 0, is_wanted: true, is_cut: false, is_renamed: true }));
+    if first.number == 0 && !is_further {
+        return Ok(None);
     }
     let mut seen = Seen::default();
     seen.take(&group);
+    if first.number == 0 {
+        let is_renamed = !seen.has_trouble(&mut groups)?;
+        return Ok(is_renamed.then_some(Late { from: 0, is_wanted: true, is_cut: false, is_renamed }));
+    }
     // A file may begin just before the group that was asked for: then that one has the record.
     for _ in 1..HEADING_GROUPS {
         if seen.keep.is_none()
@@ -65,7 +78,8 @@ pub fn late(log: &Log) -> Result<Option<Late>> {
     let late = |is_wanted| Late { from: keep.from, is_wanted, is_cut: false, is_renamed: false };
     let lacks_none = keep.from == first.number;
     if log.session.is_some() || lacks_none {
-        return Ok(Some(Late { is_renamed: is_further, ..late(true) }));
+        let is_renamed = is_further && !seen.has_trouble(&mut groups)?;
+        return Ok(Some(Late { is_renamed, ..late(true) }));
     }
     if !begins_with(log, &first)? {
         return Ok(Some(late(false)));
@@ -98,6 +112,70 @@ pub fn is_begun_unknown(log: &Log) -> Result<bool> {
     Ok(false)
 }
 
+/// How many of a log's first files are none of it any more: they were copied while the vehicle waited, and the ring has given them
+/// away since, with others that were copied never. So it is where sectors are missing between two files, and those from the second on
+/// say that what is missing before them was left out on purpose.
+pub fn leftovers(log: &Log) -> Result<usize> {
+    if log.session.is_some() || log.pieces.len() < 2 || log.first_segment().is_none() {
+        return Ok(0);
+    }
+    let only = |files: Range<usize>| Log {
+        files: log.files.get(files.clone()).unwrap_or_default().to_vec(),
+        pieces: log.pieces.get(files).unwrap_or_default().to_vec(),
+        ..log.clone()
+    };
+    let mut groups = Groups::new(log);
+    let mut seen = Seen::default();
+    for _ in 0..HEADING_GROUPS {
+        groups.next_group()?.iter().for_each(|group| seen.take(group));
+    }
+    // All was kept from the beginning on.
+    if seen.keep.is_none() {
+        return Ok(0);
+    }
+    // With the number of the sector of its session that each file begins with.
+    let (mut begins, mut session) = (Vec::new(), None);
+    for file in 0..log.pieces.len() {
+        let of = only(file..file + 1);
+        let Some(header) = first_header(&of)? else { continue };
+        if header.session == *session.get_or_insert(header.session) {
+            begins.push((file, header.number, of));
+        }
+    }
+    let lowest = begins.first().map_or(0, |(_, number, _)| *number);
+    for pair in begins.windows(2).rev() {
+        let [(_, number, before), (file, next, _)] = pair else { continue };
+        if *next > *number && !ends_before(before, *number, *next)? {
+            let late = late(&only(*file..log.pieces.len()))?;
+            if late.is_some_and(|late| late.is_wanted && late.from <= lowest) {
+                return Ok(*file);
+            }
+        }
+    }
+    Ok(0)
+}
+
+/// The sector with which a file begins: in its first block, or a copy of it in the second one.
+fn first_header(file: &Log) -> Result<Option<Header>> {
+    let mut blocks = file.blocks();
+    for _ in 0..2 {
+        let Some(block) = blocks.next_block()? else { break };
+        if let Ok(header) = Header::read(block) {
+            return Ok(Some(header));
+        }
+    }
+    Ok(None)
+}
+
+/// Whether a file that begins with the sector of one number has the last one before another.
+fn ends_before(file: &Log, begins: u32, next: u32) -> Result<bool> {
+    let at = u64::from(next - begins - 1);
+    let last = file.blocks().from(at, 1);
+    let mut last = last.blocks();
+    let header = last.next_block()?.and_then(|block| Header::read(block).ok());
+    Ok(header.is_some_and(|header| header.number == next - 1))
+}
+
 /// Whether the ring gave away a file before the first one that is left, and then whether those after it held enough.
 fn was_written_anew(
     log: &Log,
@@ -110,15 +188,23 @@ fn was_written_anew(
     let begun = begun(log, first)?;
     let later = begun.times.iter().skip(1).enumerate();
     let mut later = later.map(|(nth, at)| (nth, *at, at.since(start).as_millis() / 1000));
-    let gone = later.find(|(nth, _, seconds)| *seconds >= u64::from(keep.seconds) || nth + 1 >= RING_FILES);
+    let is_enough = |nth: usize, seconds: u64| seconds >= u64::from(keep.seconds) || nth + 1 >= RING_FILES;
+    let gone = later.find(|(nth, _, seconds)| is_enough(*nth, *seconds));
     // Files that were begun after the arming are none of the ring's.
     Ok(match gone {
         Some((_, at, seconds)) => {
             let armed = seen.go_on(groups, |seen| seen.last.is_some_and(|last| last > at))?.all;
             armed.is_none_or(|armed| at <= armed).then_some(seconds >= u64::from(keep.seconds))
         }
-        None if begun.ends_hollow => seen.go_on(groups, |_| false)?.all.is_none().then_some(true),
-        None => None,
+        // One more may have been begun behind the last entry.
+        None => {
+            let seen = seen.go_on(groups, |_| false)?;
+            let seconds = u64::from(seen.seconds());
+            let is_begun =
+                !seen.is_closed && !seen.is_broken && is_enough(begun.times.len().saturating_sub(1), seconds);
+            let holds_enough = begun.ends_hollow || seconds >= u64::from(keep.seconds);
+            (seen.all.is_none() && (begun.ends_hollow || is_begun)).then_some(holds_enough)
+        }
     })
 }
 
@@ -177,6 +263,7 @@ fn begins_with(log: &Log, first: &Header) -> Result<bool> {
 
 /// What was read of the time before the arming.
 #[derive(Default)]
+#[expect(clippy::struct_excessive_bools, reason = "facts that have nothing to do with each other")]
 struct Seen {
     decoder: Box<GroupDecoder>,
     start: Option<Instant>,
@@ -187,6 +274,10 @@ struct Seen {
     all: Option<Instant>,
     /// A card came or went, or there was none.
     card: bool,
+    /// A card went, or took nothing.
+    trouble: bool,
+    /// The log ended in order.
+    is_closed: bool,
     is_broken: bool,
 }
 
@@ -202,12 +293,25 @@ impl Seen {
         Ok(self)
     }
 
+    /// Whether a record in the first groups says that the card went, or refused something: then a file may have been begun into which
+    /// nothing came.
+    fn has_trouble(&mut self, groups: &mut Groups<'_>) -> Result<bool> {
+        for _ in 1..TROUBLE_GROUPS {
+            match groups.next_group()?.filter(|_| !self.trouble) {
+                Some(group) => self.take(&group),
+                None => break,
+            }
+        }
+        Ok(self.trouble)
+    }
+
     /// Takes the next group.
     fn take(&mut self, group: &Group) {
         self.is_broken |= self.start.is_some() && group.first().is_some_and(|step| step.missing > 0);
         if self.is_broken {
             return;
         }
+        self.is_closed = group.last().is_some_and(|step| step.header.closed);
         for step in group {
             if self.decoder.push(&step.header, &step.sector).is_err() {
                 self.is_broken = true;
@@ -231,8 +335,15 @@ impl Seen {
                             self.all.get_or_insert(at);
                         }
                     }
-                    Some(Record::Event(event)) => self.card |= CARD.contains(&event.number),
-                    Some(Record::Loss(loss)) => self.card |= loss.what == Lost::Card,
+                    Some(Record::Event(event)) => {
+                        self.card |= CARD.contains(&event.number);
+                        self.trouble |= event.number == CARD_OUT;
+                    }
+                    Some(Record::Loss(loss)) => {
+                        self.card |= loss.what == Lost::Card;
+                        self.trouble |= loss.what == Lost::Card;
+                    }
+                    Some(Record::Finding(finding)) => self.trouble |= finding.check == REFUSED,
                     _ => {}
                 }
             }
@@ -256,8 +367,12 @@ mod tests {
     use hums_blackbox::record::Note;
 
     use super::*;
+    use crate::logs::fat::Extent;
     use crate::logs::find;
     use crate::logs::memory::Memory;
+    use crate::logs::places::Piece;
+    use crate::loss;
+    use crate::summary::Overview;
 
     #[test]
     fn of_a_log_whose_beginning_is_lost_nothing_tells_where_it_began() {
@@ -285,7 +400,11 @@ mod tests {
             let dir = tempfile::tempdir().expect("a folder");
             fs::write(dir.path().join("00002_00.HUM"), sectors.concat()).expect("room");
             let found = find(&[dir.path().to_owned()], false).expect("a log");
-            is_begun_unknown(&found.logs[0]).expect("it reads")
+            let is_unknown = is_begun_unknown(&found.logs[0]).expect("it reads");
+            let overview = Overview::of(&found.logs[0]).expect("it reads");
+            let lost: Option<u32> = overview.contents.gaps.first().map(loss::sectors_lost).unwrap_or(Some(0));
+            assert_eq!(lost.is_none(), is_unknown, "{:?}", overview.contents.gaps);
+            is_unknown
         };
         assert!(!is_unknown(0, 0) && !is_unknown(0, 3), "its places tell that it began with the power-on");
         assert!(!is_unknown(second, 0), "its first file is not there, and this one begins as one does");
@@ -295,18 +414,46 @@ mod tests {
     /// What a log lacks whose first file is gone, the others being begun at these times. Each of them begins with a short group that says
     /// nothing, and says in the next one that the last 30 s are kept, until the vehicle is armed.
     fn read(begun_ms: &[u64], armed_ms: u64) -> Option<Late> {
+        of_log(&files_of(begun_ms, armed_ms, true), late)
+    }
+
+    /// The same of one that waits until then, and does not end in order.
+    fn waited(begun_ms: &[u64], last_ms: u64) -> Option<Late> {
+        of_log(&files_of(begun_ms, last_ms, false), late)
+    }
+
+    /// A file of a log: the number in its name, and what is in it.
+    type File = (u32, Vec<u8>);
+
+    /// What is said of the log of these files.
+    fn of_log<T>(files: &[File], say: impl Fn(&Log) -> Result<T>) -> T {
+        let dir = tempfile::tempdir().expect("a folder");
+        let name = |(number, _): &File| format!("00001_{number:02}.HUM");
+        let piece = |file: &File| {
+            let path = dir.path().join(name(file));
+            fs::write(&path, &file.1).expect("room");
+            Piece { path, extents: vec![Extent { start: 0, length: file.1.len() as u64 }] }
+        };
+        let pieces = files.iter().map(piece).collect();
+        let (name, files) = ("00001".to_owned(), files.iter().map(name).collect());
+        say(&Log { name, files, pieces, session: None, left_over: false }).expect("it reads")
+    }
+
+    /// Files that were begun at these times, the first one with the number 13.
+    fn files_of(begun_ms: &[u64], end_ms: u64, is_armed_then: bool) -> Vec<File> {
         let (mut memory, mut writer) = (Memory::default(), Box::new(Writer::new()));
         let note = Record::Note(Note { severity: 6, text: "a word" });
         let keep = |all| Record::Keep(Keep { all, from: 0, seconds: 30 });
+        let all = keep(true);
         let put = |at_ms, record: &Record<'_>, memory: &mut Memory, writer: &mut Writer| {
             writer.record(Instant::from_millis(at_ms), record, memory).expect("room");
         };
         put(0, &note, &mut memory, &mut writer);
         let (mut starts, mut is_armed) = (Vec::new(), false);
         for at_ms in begun_ms {
-            if !is_armed && *at_ms > armed_ms {
+            if !is_armed && *at_ms > end_ms {
                 is_armed = true;
-                put(armed_ms, &keep(true), &mut memory, &mut writer);
+                put(end_ms, &keep(true), &mut memory, &mut writer);
             }
             assert!(writer.restart(&mut memory));
             starts.push(memory.0.len());
@@ -315,17 +462,11 @@ mod tests {
             put(at_ms + 20, &keep(is_armed), &mut memory, &mut writer);
         }
         if !is_armed {
-            put(armed_ms, &keep(true), &mut memory, &mut writer);
+            put(end_ms, if is_armed_then { &all } else { &note }, &mut memory, &mut writer);
         }
-        assert!(writer.finish(&mut memory));
-        let dir = tempfile::tempdir().expect("a folder");
+        assert!(if is_armed_then { writer.finish(&mut memory) } else { writer.restart(&mut memory) });
         starts.push(memory.0.len());
-        for (nth, file) in starts.windows(2).enumerate() {
-            let name = format!("00001_{:02}.HUM", 13 + nth);
-            fs::write(dir.path().join(name), memory.0[file[0]..file[1]].concat()).expect("room");
-        }
-        let found = find(&[dir.path().to_owned()], false).expect("a log");
-        late(&found.logs[0]).expect("it reads")
+        (13..).zip(starts.windows(2)).map(|(nth, file)| (nth, memory.0[file[0]..file[1]].concat())).collect()
     }
 
     #[test]
@@ -338,6 +479,79 @@ mod tests {
         assert_eq!(wanted(&[90_070, 100_000, 110_000, 120_093], 125_000), gone);
         assert_eq!(wanted(&[90_070, 100_000, 120_093], 110_000), taken, "after the arming nothing goes");
         assert_eq!(wanted(&[90_070], 125_000), taken, "no other file is there");
+    }
+
+    /// The same of one that never was armed and did not end in order: power went, or it was copied while it waited.
+    #[test]
+    fn the_file_that_was_begun_last_and_is_not_there_may_have_taken_the_oldest_ones_place() {
+        let late = |begun: &[u64], last_ms| waited(begun, last_ms).map(|late| (late.is_wanted, late.is_cut));
+        assert_eq!(late(&[90_070, 100_000, 110_000], 119_000), Some((true, false)));
+        assert_eq!(
+            late(&[90_070, 100_000, 105_000], 109_000),
+            Some((false, false)),
+            "it has not what was to be kept"
+        );
+        let full = (0..15).map(|nth| 90_000 + nth * 1_000).collect::<Vec<_>>();
+        assert_eq!(late(&full, 104_900), Some((true, true)));
+    }
+
+    #[test]
+    fn what_the_ring_has_given_away_since_is_none_of_the_log() {
+        let left = |files: &[File]| of_log(files, leftovers);
+        // Of 13 to 19 the ring holds 16, which was begun at 120 s, and those after it; the vehicle is armed at 160 s.
+        let begun = [90_000, 100_000, 110_000, 120_000, 130_000, 140_000, 150_000];
+        let all = files_of(&begun, 160_000, true);
+        assert_eq!(left(&all), 0, "nothing is missing between them");
+        let without = |gone: std::ops::Range<usize>| {
+            let mut some = all.clone();
+            drop(some.drain(gone));
+            some
+        };
+        assert_eq!(left(&without(1..3)), 1, "copied while it waited");
+        assert_eq!(left(&without(2..3)), 2);
+        // Of what was copied first the last file was in work.
+        let mut cut = all.clone();
+        cut[2].1.truncate(512);
+        assert_eq!(left(&cut), 3);
+        for taken in [3..4, 4..5, 5..6, 2..5] {
+            assert_eq!(left(&without(taken.clone())), 0, "somebody took {taken:?}");
+        }
+        // Files after the arming.
+        let mut taken = files_of(&[90_000, 120_000, 130_000, 140_000, 150_000], 125_000, true);
+        drop(taken.remove(3));
+        assert_eq!(left(&taken), 0, "somebody took one of what was kept");
+    }
+
+    #[test]
+    fn a_log_whose_first_files_got_nothing_is_not_called_renamed_where_a_record_says_why() {
+        use hums_blackbox::record::Event;
+
+        let is_renamed = |segment: u32, number: u8, from: u32| {
+            let (mut memory, mut writer) = (Memory::default(), Box::new(Writer::new()));
+            let at = Instant::from_millis(700);
+            if from > 0 {
+                let note = Record::Note(Note { severity: 6, text: "a word" });
+                writer.record(Instant::ZERO, &note, &mut memory).expect("room");
+                assert!(writer.restart(&mut memory));
+            }
+            let begins = memory.0.len();
+            let event = Record::Event(Event { number, text: "HUMS: card: none found, push one in" });
+            let keep = Record::Keep(Keep { all: false, from, seconds: 30 });
+            for record in [keep, event] {
+                writer.record(at, &record, &mut memory).expect("room");
+            }
+            assert!(writer.finish(&mut memory));
+            let files = [(segment, memory.0[begins..].concat())];
+            of_log(&files, late).is_some_and(|late| late.is_renamed)
+        };
+        for from in [0, 1] {
+            assert!(!is_renamed(0, 6, from) && !is_renamed(1, 6, from), "{from}");
+            assert!(
+                is_renamed(2, 6, from) && is_renamed(7, 6, from),
+                "{from}: nothing says that the card went"
+            );
+            assert!(!is_renamed(2, 7, from) && !is_renamed(7, 7, from), "{from}");
+        }
     }
 
     #[test]

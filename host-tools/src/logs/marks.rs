@@ -12,6 +12,10 @@ use crate::loss::lost;
 const ARMED: u8 = 1;
 const TAKE_OFF: u8 = 3;
 const LANDING: u8 = 4;
+/// The number of the event that says that there is no card, or none that can be used.
+pub(super) const CARD_OUT: u8 = 7;
+/// The check that finds that the card refused blocks.
+pub(super) const REFUSED: &str = "card_errors";
 /// The box was started in the air.
 pub const RESUMED: u8 = 14;
 
@@ -20,6 +24,7 @@ pub const PACKED: &str = "packed on a PC by hums pack";
 
 /// What the records of a part of a log say of the log.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[expect(clippy::struct_excessive_bools, reason = "facts that have nothing to do with each other")]
 pub struct Marks {
     /// How many end marks there are.
     pub count: u64,
@@ -39,6 +44,10 @@ pub struct Marks {
     pub packed: bool,
     /// A box recorded it: it says how it started.
     pub has_boot: bool,
+    /// The card refused blocks: its recorder found that.
+    pub refused: bool,
+    /// There was no card for a while, or none that could be used.
+    pub card_out: bool,
     /// Which box, as its first boot record tells; none where there is no board.
     pub board: Option<Board>,
 }
@@ -57,6 +66,8 @@ impl Marks {
                 self.took_off = (event.number != ARMED).then_some(true).or(self.took_off);
             }
             Record::Event(event) if event.number == LANDING => self.took_off = Some(false),
+            Record::Event(event) if event.number == CARD_OUT => self.card_out = true,
+            Record::Finding(finding) => self.refused |= finding.check == REFUSED,
             Record::Loss(loss) => self.lost = self.lost.saturating_add(lost(loss)),
             Record::Note(note) => self.packed |= note.text == PACKED,
             Record::Boot(boot) => {
@@ -69,12 +80,19 @@ impl Marks {
         }
     }
 
+    /// Whether the card took nothing for a while, as the records say: then a file may have been begun into which nothing came.
+    pub const fn has_card_trouble(&self) -> bool {
+        self.refused || self.card_out
+    }
+
     /// Adds those of what follows.
     pub(super) fn add(&mut self, next: &Self) {
         self.count += next.count;
         self.wrong += next.wrong;
         self.lost = self.lost.saturating_add(next.lost);
         self.has_boot |= next.has_boot;
+        self.refused |= next.refused;
+        self.card_out |= next.card_out;
         self.board = self.board.or(next.board);
         self.packed |= next.packed;
         self.took_off = next.took_off.or(self.took_off);

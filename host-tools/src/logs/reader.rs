@@ -437,6 +437,8 @@ impl Stitch {
             let missing = match self.late {
                 _ if !begins_late => group.missing.max(u32::from(cut)),
                 Some(late) => group.number.saturating_sub(late.from),
+                // Which of those since the power-on were the logs' before it, nothing tells.
+                None if self.is_begun_unknown => 0,
                 None => group.number,
             };
             let gap = self.gap(cause);

@@ -22,6 +22,8 @@ pub struct Strange {
     pub file: usize,
     /// It holds none of the log's sectors.
     pub hollow: bool,
+    /// And none is missing: those before it and behind it follow each other. The card took nothing into it.
+    pub passed: bool,
     /// All sectors of the log in it are older than its first one.
     pub older: bool,
     /// Sectors of other sessions: all of a hollow file, otherwise those that a recycled file cannot have.
@@ -178,9 +180,23 @@ impl Strangers {
             let begins = file.begins.filter(|(number, at)| is_first && *number == first && *at > 0);
             let shift = file.shift.or_else(|| begins.map(|(_, at)| Shift { at, blocks: at }));
             let is_strange = hollow || older || others.is_some() || shift.is_some();
-            is_strange.then_some(Strange { file: index, hollow, older, others, shift })
+            let passed = hollow && self.is_passed(index, first, is_first);
+            is_strange.then_some(Strange { file: index, hollow, passed, older, others, shift })
         };
         self.files.iter().enumerate().filter_map(strange).collect()
+    }
+
+    /// Whether the log's sectors go on behind this file, of which it has none, where they end before it.
+    fn is_passed(&self, index: usize, first: u32, is_first: bool) -> bool {
+        let (before, behind) = self.files.split_at(index.min(self.files.len()));
+        let end = before.iter().filter_map(|file| file.own).max();
+        // A copy of the sector in progress is there, and the sector itself is in the next file.
+        let follows = |next: u32| match end {
+            Some(end) => next == end || next == end.wrapping_add(1),
+            None => next == first && (is_first || first == 0),
+        };
+        let next = behind.iter().find_map(|file| file.begins);
+        next.is_some_and(|(number, _)| follows(number))
     }
 }
 
@@ -237,6 +253,19 @@ mod tests {
         // The first sector of a log that was recorded by arming, before which there is none.
         let (strange, _) = look(&["- - 70 71"], 70);
         assert_eq!(strange.first().and_then(|one| one.shift), Some(Shift { at: 2, blocks: 2 }));
+    }
+
+    #[test]
+    fn a_file_into_which_the_card_took_nothing_lies_between_sectors_that_follow_each_other() {
+        let passed = |files: &[&str], first| -> Vec<bool> {
+            look(files, first).0.iter().map(|strange| strange.hollow && strange.passed).collect()
+        };
+        assert_eq!(passed(&["0 1 2", "- -", "3 4"], 0), [true]);
+        assert_eq!(passed(&["0 1 2p", "-", "-", "2 3"], 0), [true, true], "the sector in progress once more");
+        assert_eq!(passed(&["-", "0 1"], 0), [true], "the log begins behind it");
+        assert_eq!(passed(&["-", "70 71"], 70), [true], "by arming");
+        assert_eq!(passed(&["0 1 2", "- -", "4 5"], 0), [false], "one is missing");
+        assert_eq!(passed(&["0 1 2", "- -"], 0), [false], "nothing tells what was in it");
     }
 
     #[test]

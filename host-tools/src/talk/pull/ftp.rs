@@ -181,7 +181,8 @@ impl Ftp {
     pub(super) fn open(&mut self, name: &str) -> Result<u32> {
         let opened = self.ask(OPEN, 0, 0, format!("/{name}").as_bytes(), TRIES)?;
         if opened.opcode != ACK {
-            bail!("the board cannot open it");
+            let why = if opened.is_nak(FILE_NOT_FOUND) { ": it no longer has this log" } else { "" };
+            bail!("the board cannot open it{why}");
         }
         Ok(opened.word())
     }

@@ -45,14 +45,9 @@ impl LogJson {
 pub(super) struct Asked(Vec<(Place, Place)>);
 
 impl Asked {
-    /// All that there are.
-    pub(super) fn all() -> Self {
-        Self(vec![(Place::default(), Place::MAX)])
-    }
-
-    /// All from this one on.
-    pub(super) fn from(first: Option<&str>) -> Self {
-        Self(first.and_then(place).map(|first| (first, Place::MAX)).into_iter().collect())
+    /// All from this one to that one.
+    pub(super) fn between(first: Place, last: Place) -> Self {
+        Self(vec![(first, last)])
     }
 
     /// These.
@@ -126,6 +121,9 @@ pub(super) fn judge(board: &[String], asked: &Asked, pulled: &mut [LogJson]) -> 
         }
     }
     let mut found = logs::find(&paths, false)?;
+    for remark in &found.remarks {
+        note!("{remark}");
+    }
     found.logs = std::mem::take(&mut found.logs).into_iter().flat_map(|log| asked.parted(log)).collect();
     let unread = verify_each(&found, |overview| {
         outcome = outcome.and(tell(overview, asked.extent(&overview.ending.files, &board), pulled));
@@ -272,9 +270,11 @@ mod tests {
             asked.parted(log).into_iter().map(part).collect()
         };
         let some = ["00001_00.HUM", "00001_02.HUM", "00001_03.HUM"];
-        assert_eq!(parts(&Asked::all(), &some), [(3, true, true, true)]);
-        assert_eq!(parts(&Asked::from(Some(some[0])), &some[1..]), [(2, true, true, false)]);
-        assert_eq!(parts(&Asked::from(Some(some[1])), &some[1..]), [(2, false, true, false)]);
+        let from = |first| Asked::between(place(first).expect("a place"), Place::MAX);
+        let all = || Asked::between(Place::default(), Place::MAX);
+        assert_eq!(parts(&all(), &some), [(3, true, true, true)]);
+        assert_eq!(parts(&from(some[0]), &some[1..]), [(2, true, true, false)]);
+        assert_eq!(parts(&from(some[1]), &some[1..]), [(2, false, true, false)]);
         assert_eq!(
             parts(&Asked::named(&named(&some)), &some),
             [(1, true, false, false), (2, false, true, false)]
@@ -284,6 +284,6 @@ mod tests {
         let later = ["00002_04.HUM"];
         assert_eq!(parts(&Asked::named(&named(&later)), &later), [(1, false, true, false)]);
         assert_eq!(parts(&Asked::named(&named(&board[3..])), &later), [(1, false, true, true)]);
-        assert_eq!(parts(&Asked::all(), &["x"]), [(1, true, true, true)]);
+        assert_eq!(parts(&all(), &["x"]), [(1, true, true, true)]);
     }
 }

@@ -13,6 +13,7 @@ mod part;
 mod remote;
 mod session;
 mod stretch;
+mod waiting;
 
 use std::fs::File;
 use std::io::{self, Read as _, Write as _};
@@ -27,7 +28,7 @@ use self::compare::{Heading, Likeness, beginning_of, compare, heading_here, head
 use self::ftp::Ftp;
 use self::judge::{Asked, LogJson, judge};
 use self::part::Part;
-use self::session::place;
+use self::session::{Place, place};
 use self::stretch::{Reading, Stretch};
 use super::Client;
 use crate::cli;
@@ -101,7 +102,8 @@ fn bring(client: Client, args: &cli::Pull) -> Result<Outcome> {
     }
     // Whoever names logs does not miss others.
     let listed = Outcome::lossy(skipped > 0 && args.names.is_empty());
-    let all: Vec<String> = logs.iter().filter(|(_, bytes)| *bytes > 0).map(|(log, _)| log.clone()).collect();
+    let mut all: Vec<String> =
+        logs.iter().filter(|(_, bytes)| *bytes > 0).map(|(log, _)| log.clone()).collect();
     let begun = logs.last().map(|(log, _)| log.clone());
     logs.retain(|(log, _)| args.names.is_empty() || args.names.contains(log));
     if let Some(moment) = &args.around {
@@ -111,74 +113,164 @@ fn bring(client: Client, args: &cli::Pull) -> Result<Outcome> {
     }
     // One that was begun just now may have nothing in it yet.
     let begun = begun.filter(|_| args.names.is_empty());
-    let newest = args.last.unwrap_or(logs.len()).min(logs.len());
-    let logs = logs.split_off(logs.len() - newest);
-    let asked = match args.last {
-        _ if !args.names.is_empty() => Asked::named(&args.names),
-        Some(_) => Asked::from(logs.first().map(|(log, _)| log.as_str())),
-        None => Asked::all(),
+    let asked = if args.names.is_empty() {
+        newest(&mut ftp, &mut logs, args.last)?
+    } else {
+        Asked::named(&args.names)
     };
-    let mut pulled = Vec::new();
-    let came = bring_each(&mut ftp, logs, begun.as_deref(), args, &mut pulled);
+    let mut bringing = Bringing { begun, args, pulled: Vec::new(), gone: Vec::new() };
+    let came = bringing.all(&mut ftp, logs, &mut all, &asked);
+    let Bringing { mut pulled, gone, .. } = bringing;
     // Also what came before an error.
     let judged = judge(&all, &asked, &mut pulled);
-    let outcome = came?.and(judged?).and(hold_against_next(&mut ftp, &all, &asked, &mut pulled)?).and(listed);
+    let outcome = came?
+        .and(judged?)
+        .and(waiting::tell_gone(&gone, &pulled)?)
+        .and(hold_against_next(&mut ftp, &all, &asked, &mut pulled)?)
+        .and(listed);
     if args.json {
         output::json(SCHEMA, &PulledJson { system: ftp.system(), logs: pulled, around: None })?;
     }
     Ok(outcome)
 }
 
-/// Brings these logs whole, one after the other. Of `begun` it is no loss that nothing is in it. What is wrong with one of them keeps no
-/// other from coming: it is the error in the end.
-fn bring_each(
-    ftp: &mut Ftp,
-    logs: Vec<(String, u32)>,
-    begun: Option<&str>,
-    args: &cli::Pull,
-    pulled: &mut Vec<LogJson>,
-) -> Result<Outcome> {
-    let (mut outcome, mut failed) = (Outcome::Done, None);
-    for (name, bytes) in logs {
-        let brought = match pull(ftp, &name, &args.output).with_context(|| name.clone()) {
-            Ok(brought) => brought,
-            // Of the link or of the disk: so it would be with the others.
-            Err(error) if error.root_cause().is::<io::Error>() => return Err(error),
-            Err(error) if failed.is_none() => {
-                failed = Some(error);
-                continue;
+/// Leaves the newest so many logs, or all, each with all of its files. A vehicle that is recorded by arming waits for that in a log of
+/// its own, of which nothing is kept unless it is armed.
+fn newest(ftp: &mut Ftp, logs: &mut Vec<(String, u32)>, most: Option<usize>) -> Result<Asked> {
+    let waits = waiting::newest(ftp, logs)?;
+    if let Some(number) = waits {
+        let before = logs.len();
+        logs.retain(|(log, _)| session::number(log) != Some(number));
+        note!(
+            "log {number:05}, {}, is left out: the vehicle is not armed, and the box keeps of it what was recorded last; by name its files come",
+            count((before - logs.len()) as u64, "file")
+        );
+    }
+    let last =
+        waits.map_or(Place::MAX, |number| Place { session: number.saturating_sub(1), segment: u32::MAX });
+    let Some(most) = most else { return Ok(Asked::between(Place::default(), last)) };
+    // One that was begun just now and has nothing yet is no log to be counted, and comes with them.
+    let mut numbers: Vec<u32> =
+        logs.iter().filter(|(_, bytes)| *bytes > 0).filter_map(|(log, _)| session::number(log)).collect();
+    numbers.dedup();
+    if most == 0 {
+        logs.clear();
+        return Ok(Asked::named(&[]));
+    }
+    let first = numbers.len().checked_sub(most).and_then(|at| numbers.get(at));
+    let first = Place { session: first.copied().unwrap_or(0), segment: 0 };
+    logs.retain(|(log, _)| place(log).is_none_or(|place| place >= first));
+    Ok(Asked::between(first, last))
+}
+
+/// How often the board's list is asked again, where it gave files away while others came.
+const LISTS_MAX: usize = 8;
+
+/// What comes.
+struct Bringing<'a> {
+    /// Of this one it is no loss that nothing is in it.
+    begun: Option<String>,
+    args: &'a cli::Pull,
+    pulled: Vec<LogJson>,
+    /// Files that the board had in its list, and gave away before they came.
+    gone: Vec<String>,
+}
+
+impl Bringing<'_> {
+    /// Brings these logs whole. Those that the board has given away meanwhile are none of it any more: then its list is asked again, and
+    /// what it has instead comes too; `board` are the files that it has something of.
+    fn all(
+        &mut self,
+        ftp: &mut Ftp,
+        mut logs: Vec<(String, u32)>,
+        board: &mut Vec<String>,
+        asked: &Asked,
+    ) -> Result<Outcome> {
+        let mut outcome = Outcome::Done;
+        for nth in 1.. {
+            let (brought, mut failed) = self.each(ftp, logs)?;
+            outcome = outcome.and(brought);
+            let is_again = !failed.is_empty() && self.args.names.is_empty() && nth < LISTS_MAX;
+            let now = if is_again { ftp.list()?.0 } else { Vec::new() };
+            let is_gone = |name: &String| is_again && now.iter().all(|(log, _)| log != name);
+            self.gone.extend(failed.iter().map(|(name, _)| name.clone()).filter(is_gone));
+            failed.retain(|(name, _)| !is_gone(name));
+            let mut failed = failed.into_iter().map(|(_, error)| error);
+            if let Some(first) = failed.next() {
+                failed.for_each(|error| note!("{error:#}"));
+                return Err(first);
             }
-            Err(error) => {
-                note!("{error:#}");
-                continue;
+            if !is_again {
+                break;
             }
-        };
-        match brought {
-            Some((path, is_new)) => {
-                if !is_new {
-                    note!("{name}: is there already as {}: the same by its checksum", path.display());
-                } else if !args.json {
-                    output::line(&word(&path.display().to_string()))?;
+            *board = now.iter().filter(|(_, bytes)| *bytes > 0).map(|(log, _)| log.clone()).collect();
+            board.sort();
+            self.begun = now.iter().map(|(log, _)| log).max().cloned();
+            let wanted = |(name, bytes): &(String, u32)| {
+                let came = self.pulled.iter().find(|log| log.name == *name);
+                let has = came.and_then(|log| log.path.metadata().ok()).map_or(0, |about| about.len());
+                place(name).is_some_and(|place| asked.has(place))
+                    && (came.is_none() || has != u64::from(*bytes))
+            };
+            logs = now.into_iter().filter(wanted).collect();
+            logs.sort();
+        }
+        Ok(outcome)
+    }
+
+    /// Brings these logs whole, one after the other. What is wrong with one of them keeps no other from coming: with the names of those
+    /// that did not.
+    fn each(
+        &mut self,
+        ftp: &mut Ftp,
+        logs: Vec<(String, u32)>,
+    ) -> Result<(Outcome, Vec<(String, anyhow::Error)>)> {
+        let (mut outcome, mut failed) = (Outcome::Done, Vec::new());
+        let filled: Vec<_> =
+            logs.iter().filter(|(_, bytes)| *bytes > 0).map(|(log, _)| log.clone()).collect();
+        for (name, bytes) in logs {
+            let brought = match pull(ftp, &name, &self.args.output).with_context(|| name.clone()) {
+                Ok(brought) => brought,
+                // Of the link or of the disk: so it would be with the others.
+                Err(error) if error.root_cause().is::<io::Error>() => return Err(error),
+                Err(error) => {
+                    failed.push((name, error));
+                    continue;
                 }
-                pulled.push(LogJson::new(name, path, is_new));
-            }
-            None if bytes > 0 => {
-                note!(
-                    "{name}: has {} by the board's directory, and none when it is opened; call again",
-                    count(bytes, "byte")
-                );
-                outcome = Outcome::Losses;
-            }
-            None if begun == Some(name.as_str()) => {}
-            None => {
-                note!(
-                    "{name}: nothing of it came, and it may have a flight in it: read the card itself, or an image of it"
-                );
-                outcome = Outcome::Losses;
+            };
+            // Whether anything was to be in it, those of the same log behind it tell.
+            let is_followed = || {
+                filled.iter().any(|other| *other > name && session::number(other) == session::number(&name))
+            };
+            match brought {
+                Some((path, is_new)) => {
+                    if !is_new {
+                        note!("{name}: is there already as {}: the same by its checksum", path.display());
+                    } else if !self.args.json {
+                        output::line(&word(&path.display().to_string()))?;
+                    }
+                    self.pulled.retain(|log| log.name != name);
+                    self.pulled.push(LogJson::new(name, path, is_new));
+                }
+                None if bytes > 0 => {
+                    note!(
+                        "{name}: has {} by the board's directory, and none when it is opened; call again",
+                        count(bytes, "byte")
+                    );
+                    outcome = Outcome::Losses;
+                }
+                None if self.begun.as_deref() == Some(name.as_str()) => {}
+                None if self.args.names.is_empty() && is_followed() => {}
+                None => {
+                    note!(
+                        "{name}: nothing of it came, and it may have a flight in it: read the card itself, or an image of it"
+                    );
+                    outcome = Outcome::Losses;
+                }
             }
         }
+        Ok((outcome, failed))
     }
-    failed.map_or(Ok(outcome), Err)
 }
 
 /// Whether each of these logs has all that was recorded before the next file of its session, where that was not asked for: the number with

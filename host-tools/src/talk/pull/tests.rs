@@ -1,4 +1,5 @@
 use std::fs;
+use std::ops::Range;
 use std::path::PathBuf;
 
 use hums_blackbox::record::{Clock, FindingRecord, Keep, Mark, Note, Resting};
@@ -65,7 +66,10 @@ fn board_with(
         if opcode == 4 {
             let path: Vec<u8> = (0..size).map(|byte| asked.u8(12 + byte)).collect();
             let is_it = |(name, _): &(String, Vec<u8>)| format!("/{name}").as_bytes() == path;
-            open = files.iter().position(is_it).expect("a log of the board");
+            let Some(found) = files.iter().position(is_it) else {
+                return vec![said(1, 129, 0, false, &[10])];
+            };
+            open = found;
         }
         let log = &files[open].1;
         let answer = |more: u16, at: usize, is_last: bool, data: &[u8]| said(more, 128, at, is_last, data);
@@ -773,7 +777,11 @@ fn an_end_that_is_not_proved_is_told_and_the_log_is_not_called_whole() {
     let path = dir.path().join("00001-s00000007_00.HUM");
     fs::write(&path, &memory.sectors).expect("written");
     let mut logs = [LogJson::new(NAME.to_owned(), path, true)];
-    assert_eq!(judge(&[NAME.to_owned()], &Asked::all(), &mut logs).expect("it reads"), Outcome::Done);
+    assert_eq!(
+        judge(&[NAME.to_owned()], &Asked::between(Place::default(), Place::MAX), &mut logs)
+            .expect("it reads"),
+        Outcome::Done
+    );
     assert!(!logs[0].whole);
     let end = serde_json::to_value(&logs[0].end).expect("JSON");
     let words = end["words"].as_str().expect("words");
@@ -905,4 +913,119 @@ fn what_was_forged_in_a_part_comes_once_more() {
     assert_eq!(around().expect("it comes"), Outcome::Done);
     assert_eq!(fs::read(&path).expect("there"), log);
     assert_eq!(fs::read(dir.path().join("hums-kept/1/00001-s00000007_00.part.HUM")).expect("kept"), part);
+}
+
+/// A board that is recorded by arming: a flight of two files, and what it keeps while it waits again, in files of 10 s each, of which
+/// these are there; each group says that only the last 30 s are kept.
+fn by_arming(ring: Range<usize>) -> Files {
+    let (mut memory, mut writer) = (Memory { session: 7, ..Memory::default() }, Box::new(Writer::new()));
+    let mut files = Files::new();
+    let mut put = |names: &[String], all: bool, ends: bool, from: u32, first_s: u64| {
+        for (nth, name) in (0..).zip(names) {
+            let start = memory.sectors.len();
+            for second in 0..10 {
+                let at = Instant::from_millis((first_s + nth * 10 + second) * 1_000);
+                let keep = Record::Keep(Keep { all, from, seconds: 30 });
+                let note = Record::Note(Note { severity: 6, text: "a second" });
+                for record in [keep, note].iter().skip(usize::from(second > 0)) {
+                    writer.record(at, record, &mut memory).expect("there is room");
+                }
+            }
+            let is_last = ends && nth + 1 == names.len() as u64;
+            assert!(if is_last { writer.finish(&mut memory) } else { writer.restart(&mut memory) });
+            files.push((name.clone(), memory.sectors[start..].to_vec()));
+        }
+        (writer.counters().sectors as u32, first_s + names.len() as u64 * 10)
+    };
+    let flight = ["00001_00.HUM", "00001_01.HUM"].map(str::to_owned);
+    let (from, first_s) = put(&flight, true, true, 0, 0);
+    let names: Vec<String> = (0..ring.end).map(|nth| format!("00002_{nth:02}.HUM")).collect();
+    put(&names, false, false, from, first_s);
+    drop(files.drain(2..2 + ring.start));
+    files
+}
+
+#[test]
+fn the_newest_logs_are_flights_and_not_what_a_vehicle_that_waits_for_one_keeps() {
+    let names = |args: &[&str], files: &Files| {
+        let folder = tempfile::tempdir().expect("a folder");
+        let outcome =
+            brought_into(folder.path(), board_of(files.clone(), |_, _| None), args).expect("they come");
+        let on_card = |name: String| name.replace("-s00000007", "").replace(".HUM", "");
+        (outcome, names_in(folder.path()).into_iter().map(on_card).collect::<Vec<_>>())
+    };
+    let files = by_arming(2..6);
+    let flight = (Outcome::Done, vec!["00001_00".to_owned(), "00001_01".to_owned()]);
+    assert_eq!(names(&["--last", "1"], &files), flight);
+    assert_eq!(names(&["--last", "9"], &files), flight);
+    assert_eq!(names(&[], &files), flight);
+    // Armed meanwhile: that is a log to be counted.
+    let mut armed = files.clone();
+    armed.push(("00003_00.HUM".to_owned(), recorded(8, 30)));
+    assert_eq!(names(&["--last", "1"], &armed).1, ["00003-s00000008_00"]);
+    assert_eq!(names(&["--last", "0"], &files).1, Vec::<String>::new());
+    // It was asked for by name.
+    assert_eq!(names(&["00002_05.HUM"], &files).1, ["00002_05"]);
+}
+
+#[test]
+fn what_the_recorder_gave_away_while_it_was_brought_is_no_error_and_a_flight_is_a_loss() {
+    let ring = by_arming(4..8).split_off(2);
+    let folder = tempfile::tempdir().expect("a folder");
+    let write = |(name, log): &(String, Vec<u8>)| {
+        let path = folder.path().join(name.replace('_', "-s00000007_"));
+        fs::write(&path, log).expect("written");
+        LogJson::new(name.clone(), path, true)
+    };
+    let pulled: Vec<LogJson> = ring.iter().map(write).collect();
+    let gone = ["00002_02.HUM", "00002_03.HUM"].map(str::to_owned);
+    assert_eq!(waiting::tell_gone(&gone, &pulled).expect("they read"), Outcome::Done);
+    let flight = ["00001_00.HUM".to_owned()];
+    assert_eq!(
+        waiting::tell_gone(&flight, &pulled).expect("they read"),
+        Outcome::Losses,
+        "nothing of it is there"
+    );
+    // What was copied before is none of the log any more.
+    by_arming(0..2)[2..].iter().for_each(|file| drop(write(file)));
+    assert_eq!(names_in(folder.path()).len(), 6);
+    let found = crate::logs::find::find_in(folder.path(), false).expect("a folder");
+    assert_eq!((found.logs.len(), found.logs[0].files.len(), found.remarks.len()), (1, 4, 1));
+    // A file of a flight is a loss: its card makes room after the list was asked for.
+    let flight = board_of(files_of(&recorded(7, SECONDS), 2), |files, opcode| {
+        if opcode == 4 && files[0].0 == NAME {
+            drop(files.remove(0));
+        }
+        None
+    });
+    assert_eq!(brought_of(flight, &[]).expect("the others come"), Outcome::Losses);
+}
+
+#[test]
+fn what_cannot_be_read_far_from_a_moment_is_not_told_with_it() {
+    let log = recorded(7, SECONDS);
+    let far = group_at(&log, 1_000);
+    let spoiled = |lost: Range<usize>| {
+        let mut log = log.clone();
+        log[lost.start * SECTOR_BYTES..lost.end * SECTOR_BYTES].fill(0);
+        named(log)
+    };
+    let around =
+        |files: &Files, at: &str| brought(files, &["--around", at, "--span", "5"]).expect("it comes");
+    // What comes round a moment is whole groups, which begin before it and end behind it.
+    let near = group_at(&log, 600);
+    let lost = spoiled(near.start..near.end);
+    assert_eq!(around(&lost, "600"), Outcome::Losses);
+    assert_eq!(around(&spoiled(far), "600"), Outcome::Done, "another moment");
+    // In the group of the moment, but not in the moment.
+    let starts = Sector::from_bytes(*log[near.start * SECTOR_BYTES..].first_chunk().expect("one"));
+    let begins_s = starts.preamble().expect("a group").start_ms / 1_000;
+    let ends = group_at(&log, begins_s + 1).end;
+    let last = spoiled(ends - 1..ends);
+    let at = (begins_s + 6).to_string();
+    assert_eq!(
+        around(&last, &at),
+        Outcome::Done,
+        "the end of the group is lost, and is no part of the moment"
+    );
 }
