@@ -26,6 +26,8 @@ struct Second {
 struct Sender {
     source: Source,
     sequence: u8,
+    /// The most frames of a window since the last loss: a loss is no larger part because less is sent after it.
+    of: u16,
     /// One entry a second of the window, by second modulo its length.
     seconds: [Second; WINDOW_SECS],
     newest_s: u64,
@@ -43,6 +45,9 @@ impl Sender {
 
     fn count(&mut self, now_s: u64, lost: u8) {
         self.advance(now_s);
+        if lost > 0 {
+            self.of = 0;
+        }
         let second = &mut self.seconds[(self.newest_s % WINDOW_SECS as u64) as usize];
         second.received = second.received.saturating_add(1);
         second.lost = second.lost.saturating_add(u16::from(lost));
@@ -83,7 +88,8 @@ impl Sequences {
             sender.advance(now_s);
             let received: u32 = sender.seconds.iter().map(|second| u32::from(second.received)).sum();
             let lost: u32 = sender.seconds.iter().map(|second| u32::from(second.lost)).sum();
-            (received + lost >= FRAMES_MIN).then(|| lost as f32 / (received + lost) as f32)
+            sender.of = sender.of.max(u16::try_from(received + lost).unwrap_or(u16::MAX));
+            (received + lost >= FRAMES_MIN).then(|| lost as f32 / f32::from(sender.of))
         });
         LinkReading { frames_lost, at: now }
     }
@@ -121,6 +127,24 @@ mod tests {
         let mut sequences = Sequences::new();
         assert_eq!(heartbeats(&mut sequences, 0, [200, 201, 0, 1]), 54);
         assert_eq!(heartbeats(&mut sequences, 0, [0, 1]), 0, "a step back counts for nothing");
+    }
+
+    #[test]
+    fn a_loss_is_no_larger_part_because_less_is_sent_after_it() {
+        let part = |sequences: &mut Sequences, ms| {
+            sequences.reading(Instant::from_millis(ms), Some(SOURCE)).frames_lost.expect("enough frames")
+        };
+        let mut sequences = Sequences::new();
+        heartbeats(&mut sequences, 0, 0..200);
+        heartbeats(&mut sequences, 7_000, (200..255_u8).filter(|number| !(240..250).contains(number)));
+        let before = part(&mut sequences, 8_000);
+        assert!((before - 10.0 / 255.0).abs() < 0.001, "{before}");
+        // Those of the first seconds leave the window, and few come.
+        heartbeats(&mut sequences, 14_000, [255]);
+        let after = part(&mut sequences, 14_500);
+        assert!((after - before).abs() < 0.001, "{after}");
+        heartbeats(&mut sequences, 17_000, 0..30);
+        assert!(part(&mut sequences, 17_500) < 0.001, "its second has passed");
     }
 
     #[test]

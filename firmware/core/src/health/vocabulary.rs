@@ -351,7 +351,7 @@ vocabulary! {
 
     "heartbeat" Wire "autopilot's heartbeat", "", says "autopilot silent", "LAND", needs "monitor on the autopilot's wire";
     "The autopilot fell silent."; "Check the wire between autopilot and monitor, and the autopilot's supply.";
-    "frames_lost" Wire "frames lost on the wire", "", says "autopilot's data lost", "CHECK WIRE", needs "monitor on the autopilot's wire";
+    "frames_lost" Wire "frames lost on the wire", "", says "autopilot's data lost", "WATCH IT", needs "monitor on the autopilot's wire";
     "Messages of the autopilot were lost on the way."; "Check the wire, and lower the message rates or raise the baud rate.";
     "position_silent" Wire "position messages", "", says "no position heard", "", needs "position of the EKF in flight";
     "The autopilot stopped telling its position: it has none, or its link is set otherwise."; "Check the receiver and the EKF; check the rates of the autopilot's messages.";
