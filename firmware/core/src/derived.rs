@@ -399,6 +399,29 @@ impl Derived {
         Some(Reading { at: now, value: if missed { silence_s } else { 0.0 } })
     }
 
+    /// 0 % of a motor that turned and stands while it is given all there is: control asks it for thrust, and nothing comes. Its ESC's speed
+    /// alone may be wrong. `None` of any other.
+    pub(crate) fn stopped(&self, vehicle: &Vehicle, motor: u8) -> Option<Reading> {
+        if !self.outputs.is_full(motor) {
+            return None;
+        }
+        let place = usize::from(motor);
+        let turned = self.motors.get(place).is_some_and(|track| track.highest_rpm > TURNING_RPM);
+        let told = vehicle.motors.get(place).filter(|told| turned && told.esc.rpm.is_some())?;
+        let stands = !Self::turns(vehicle, place) && (0..MOTORS_MAX).any(|other| Self::turns(vehicle, other));
+        Reading::new(told.moved_at.filter(|_| stands), Some(0.0))
+    }
+
+    /// Whether all ESCs that told anything, of several, are silent at once: motors that carry the vehicle do not fail so, and the wire of
+    /// their telemetry does.
+    pub(crate) fn are_escs_silent(&self, now: Instant) -> bool {
+        let told = (0_u8..).zip(&self.motors).filter(|(_, track)| track.interval_s > 0.0);
+        let (count, silent) = told.fold((0_u8, true), |(count, silent), (motor, _)| {
+            (count + 1, silent && self.esc_silence(now, motor).is_some_and(|silence| silence.value > 0.0))
+        });
+        count > 1 && silent
+    }
+
     /// How far a motor's speed is from the middle one of all and from that of each other motor, in percent of the middle one, in
     /// steady flight; 0 for all but the motor that is furthest from the middle one: where one is lost the others turn as they must
     /// to make up for it.

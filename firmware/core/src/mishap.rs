@@ -148,6 +148,11 @@ pub struct Mishap {
     stood: bool,
     /// When it leaned by more than 45 degrees, or turned fast, last, while armed.
     tilted_at: Stamp,
+    /// When its estimate moved last while the receiver stood.
+    strayed_at: Stamp,
+    /// When the receiver did not stand last, as far as it is known, and its altitude then.
+    moved_at: Stamp,
+    stood_at_m: f32,
     /// Where it began, or ended.
     place: Place,
 }
@@ -193,6 +198,9 @@ impl Mishap {
             driven_at: Instant::ZERO,
             stood: false,
             tilted_at: Stamp::NONE,
+            strayed_at: Stamp::NONE,
+            moved_at: Stamp::NONE,
+            stood_at_m: 0.0,
             place: Place { position: None, height_m: 0 },
         }
     }
@@ -306,6 +314,9 @@ impl Mishap {
             hover_throttle: self.hover_throttle,
             driven_at: self.driven_at,
             stood: self.stood,
+            strayed_at: self.strayed_at,
+            moved_at: self.moved_at,
+            stood_at_m: self.stood_at_m,
             ..Self::new()
         };
     }
@@ -339,8 +350,9 @@ impl Mishap {
 
     /// Since when it has been still, and since when it has moved as what flies.
     fn note_rest(&mut self, now: Instant, vehicle: &Vehicle) {
-        let speed_mps =
-            ground_speed_mps(now, vehicle).unwrap_or(0.0).max(climb_mps(now, vehicle).map_or(0.0, f32::abs));
+        let ground_mps = ground_speed_mps(now, vehicle).unwrap_or(0.0);
+        let speed_mps = ground_mps.max(climb_mps(now, vehicle).map_or(0.0, f32::abs));
+        self.note_receiver(now, vehicle, ground_mps);
         // Of what was disarmed, lies on its back or has hit something, the sensors are believed and not the estimate.
         let slow = speed_mps < STILL_MPS
             || (!self.armed && on_rotors(now, vehicle))
@@ -357,7 +369,8 @@ impl Mishap {
         // On rotors what moves and does not climb may be a wreck whose estimate is lost.
         let climbs = climb_mps(now, vehicle).is_none_or(|climb_mps| climb_mps > STILL_MPS);
         let moves = speed_mps > 2.0 * STILL_MPS && (climbs || !on_rotors(now, vehicle));
-        let flies = self.armed && (moves || rose) && !self.lies(now, vehicle) && thrust;
+        let flies =
+            self.armed && (moves || rose) && !self.lies(now, vehicle) && thrust && !self.has_strayed(now);
         self.flies_since = if flies { self.flies_since.or(Some(now)) } else { None };
     }
 
@@ -383,6 +396,33 @@ impl Mishap {
     /// Whether it leaned so far or turned so fast in the last seconds that thrust did not carry it.
     pub(crate) fn has_tilted(&self, now: Instant) -> bool {
         self.tilted_at.age(now).is_some_and(|age| age <= RECOVERED)
+    }
+
+    /// A receiver measures its speed by Doppler, to some tenths of a metre a second, and its height to some metres; an estimate that is lost
+    /// drifts.
+    fn note_receiver(&mut self, now: Instant, vehicle: &Vehicle, ground_mps: f32) {
+        let receiver = vehicle.gnss[0].within(now, FRESH).filter(|gnss| gnss.is_exact());
+        let slow = receiver.and_then(|gnss| gnss.speed).filter(|speed| speed.0 < STILL_MPS);
+        let height_m = receiver.and_then(|gnss| gnss.altitude).map_or(0.0, |altitude| altitude.0);
+        let Some(speed) = slow.filter(|_| (height_m - self.stood_at_m).abs() <= ROSE_M) else {
+            (self.moved_at, self.stood_at_m, self.strayed_at) = (Stamp::at(now), height_m, Stamp::NONE);
+            return;
+        };
+        let stands = self.moved_at.age(now).is_some_and(|age| age >= FALL_SHOWS);
+        if stands && ground_mps > speed.0 + 2.0 * STILL_MPS {
+            self.strayed_at = Stamp::at(now);
+        }
+    }
+
+    /// Whether its estimate moved within the last seconds while the receiver stood: it is lost.
+    fn has_strayed(&self, now: Instant) -> bool {
+        self.strayed_at.age(now).is_some_and(|age| age <= RECOVERED)
+    }
+
+    /// Whether the receiver has stood for a while, and the air pressure does not rise as in a fall.
+    fn rests(&self, now: Instant) -> bool {
+        self.moved_at.age(now).is_some_and(|age| age >= STILL)
+            && self.pressure.agrees(now, FALLING_MPS) == Some(false)
     }
 
     /// Whether it lies on its side or its back.
@@ -470,18 +510,22 @@ impl Mishap {
         let lies = self.lies(now, vehicle);
         // Where it hit the ground on rotors its speed is not asked: an estimate may be lost.
         let stays = lies || (struck && on_rotors(now, vehicle)) || (slow && (dances || struck));
+        let strayed = self.has_strayed(now);
         let down = (long && near_ground && stays)
+            || (self.rests(now) && on_rotors(now, vehicle) && ((struck && lies) || (long && strayed)))
             || (self.is_still(now) && (self.is_idle(now, vehicle) || (long && near_ground)))
             || (long && silent)
             || self.disarmed_at.is_some_and(|since| !self.armed && now.since(since) >= WATCHED);
         if down {
             (self.state, self.flies_since) = (State::Down, None);
-            self.touch_mps = self.touch_mps.max(self.sink.greatest());
+            if !strayed {
+                self.touch_mps = self.touch_mps.max(self.sink.greatest());
+            }
             self.place = Place::of(now, vehicle);
             return Some(Change::Down);
         }
         // What lies over does not fly, nor does what has not moved since it hit something.
-        if long && self.armed && !dances && !lies && !(struck && slow) {
+        if long && self.armed && !dances && !lies && !strayed && !(struck && slow) {
             self.calm();
             return Some(Change::FliesOn);
         }

@@ -18,6 +18,8 @@
 //! stands out by beyond [`DRIFT_PERCENT`] is summed over time, and what falls short of that is taken off again (a CUSUM: E. S. Page,
 //! Continuous inspection schemes, Biometrika 41, 1954). The sum of [`SUMMED_S`] seconds counts as what stands out at once.
 //!
+//! A motor that alone is at the end of its range while no other one is near it gives less than is asked of it, however the vehicle falls.
+//!
 //! A motor that is given next to nothing while the others carry the vehicle was taken out.
 //!
 //! Other frames are not judged: three motors have no such pattern, and of three arms with two motors each none stands out.
@@ -40,7 +42,7 @@ const IDLE_US: u16 = 1_150;
 /// Pulses begin here, us. What is shorter than half of that on the ground is on another scale, which begins at nothing.
 const ZERO_US: u16 = 1_000;
 /// Motors that carry a vehicle are given so much more on the average.
-const CARRIES_US: f32 = 100.0;
+const CARRIES_US: u16 = 100;
 /// Further above the others a change teaches nothing, percent.
 const HOLD_PERCENT: f32 = 4.0;
 /// Where commands vary much, a change must be larger: by so many of their mean distances from what is usual.
@@ -56,7 +58,11 @@ const OUT_PERCENT: f32 = -70.0;
 /// What is told of one that was, and of no other, percent.
 pub(crate) const OFF_PERCENT: f32 = 100.0;
 /// Least above what does not turn, us, of a motor that is given anything.
-const OFF_US: f32 = 50.0;
+const OFF_US: u16 = 50;
+/// Outputs end here or beyond, us: `MOT_PWM_MAX` of ArduPilot is 1950, `PWM_MAIN_MAX` of PX4 2000.
+const FULL_US: u16 = 1_940;
+/// Two thirds of the range: what is above shares the load with what is at its end, as in a turn or a climb.
+const SHARES_US: u16 = 1_667;
 /// 30 degrees a second: a pilot yaws faster, and gusts do not turn a vehicle so fast for long.
 const YAWS_RAD_S: f32 = 0.5;
 /// Messages that are further apart are not of the same hover.
@@ -73,6 +79,8 @@ pub(crate) struct MotorOutputs {
     /// Outputs that carried in any flight, and those of them that are given next to nothing now: a bit each.
     carried: u8,
     off: u8,
+    /// Outputs that are at the end of their range: a bit each.
+    full: u8,
     /// Command against the average of all, percent.
     share: [Departure; JUDGED_MAX],
     at: Stamp,
@@ -91,6 +99,7 @@ impl MotorOutputs {
             other_scale: 0,
             carried: 0,
             off: 0,
+            full: 0,
             share: [Departure::NEW; JUDGED_MAX],
             at: Stamp::NONE,
             summed: (0, 0.0),
@@ -123,13 +132,23 @@ impl MotorOutputs {
         }
         self.note_off(&outputs.pulses);
         // What has no idle pulse on the ground is a servo.
-        if self.idle & all != all || !flies_level(at, vehicle, flight) || yaws(vehicle) {
+        let known = self.idle & all == all;
+        let full = self.full & all;
+        if known && full.is_power_of_two() {
+            let place = full.trailing_zeros();
+            let mut others = (0..).zip(pulses).filter(|(motor, _)| *motor != place);
+            if others.all(|(_, pulse)| (IDLE_US..SHARES_US).contains(pulse)) {
+                (self.at, self.alone) = (Stamp::at(at), (place as u8, OFF_PERCENT - 1.0));
+                return;
+            }
+        }
+        if !known || !flies_level(at, vehicle, flight) || yaws(vehicle) {
             return;
         }
         let zero_us = if self.other_scale & all == all { 0.0 } else { f32::from(ZERO_US) };
         let given = |pulse: &u16| (f32::from(*pulse) - zero_us).max(0.0);
         let mean = pulses.iter().map(given).sum::<f32>() / count as f32;
-        if mean < CARRIES_US {
+        if mean < f32::from(CARRIES_US) {
             return;
         }
         let step_s = self.at.age(at).filter(|step| *step <= PAUSE).map_or(0.0, Span::as_secs_f32);
@@ -142,11 +161,12 @@ impl MotorOutputs {
 
     /// Which outputs are given next to nothing: also those beyond the motors of the frame that the vehicle says it is.
     fn note_off(&mut self, pulses: &[u16]) {
-        self.off = 0;
+        (self.off, self.full) = (0, 0);
         for (output, pulse) in pulses.iter().take(JUDGED_MAX).enumerate() {
-            let given = f32::from(pulse.saturating_sub(ZERO_US));
+            let given = pulse.saturating_sub(ZERO_US);
             self.carried |= u8::from(given > CARRIES_US) << output;
             self.off |= u8::from(given < OFF_US) << output;
+            self.full |= u8::from(*pulse >= FULL_US) << output;
         }
         self.off &= self.carried;
     }
@@ -154,6 +174,11 @@ impl MotorOutputs {
     /// Whether a motor that carried before is given next to nothing: that it does not turn is no fault of its own.
     pub(crate) fn is_off(&self, motor: u8) -> bool {
         self.off.checked_shr(u32::from(motor)).is_some_and(|off| off & 1 != 0)
+    }
+
+    /// Whether it is at the end of its range.
+    pub(crate) fn is_full(&self, motor: u8) -> bool {
+        self.full.checked_shr(u32::from(motor)).is_some_and(|full| full & 1 != 0)
     }
 
     fn judge(&mut self, count: usize, step_s: f32) {

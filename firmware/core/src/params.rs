@@ -261,6 +261,7 @@ params! {
     GpsHdopRise "GPS_HDOP_RISE" "" 1.8 1.1 100.0 "dilution of precision times the usual one of the flight; up to 1.3 in healthy real flights" is "GPS dilution of precision times the usual one: warning above";
     Ahrs2TiltWarn "AHRS2_TILT_WARN" "deg" 30.0 1.0 180.0 "two estimators' attitudes apart; up to 22 in hard manoeuvres of healthy flights";
     Ahrs2HgtWarn "AHRS2_HGT_WARN" "m" 8.0 0.5 10_000.0 "two estimators' heights apart beyond usual; up to 3.5 in healthy real flights";
+    Ahrs2HgtCrit "AHRS2_HGT_CRIT" "m" 12.0 0.5 10_000.0 "two estimators' heights apart so far that the height that is held may be wrong";
     Ahrs2PosWarn "AHRS2_POS_WARN" "m" 10.0 0.5 10_000.0 "two estimators' positions apart beyond half a second of flight; up to 2.6 with it in healthy real flights";
 }
 

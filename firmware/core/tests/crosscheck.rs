@@ -347,7 +347,7 @@ fn an_estimator_that_leaves_the_second_one_is_named() {
     let rotors = VehicleKind::Rotorcraft;
     for (apart, check) in [
         ([0.7, 0.0, 0.0], "ahrs2_tilt"),
-        ([0.0, -15.0, 0.0], "ahrs2_height"),
+        ([0.0, -11.0, 0.0], "ahrs2_height"),
         ([0.0, 0.0, 25.0], "ahrs2_position"),
     ] {
         let findings = fly(POSITION_ABSOLUTE, apart, rotors);
@@ -356,6 +356,8 @@ fn an_estimator_that_leaves_the_second_one_is_named() {
         assert!((FAULT_MS + 1_000..FAULT_MS + 2_500).contains(&found.at.as_millis()), "{found:?}");
         assert_eq!(fly(POSITION_ABSOLUTE, apart, VehicleKind::Vtol), [], "it has two sets of axes");
     }
+    let falls = fly(POSITION_ABSOLUTE, [0.0, -20.0, 0.0], rotors);
+    assert!(falls.iter().any(|one| (one.check, one.level) == ("ahrs2_height", Level::Critical)), "{falls:?}");
     assert_eq!(
         fly(POSITION_ABSOLUTE, [0.4, 5.0, 8.0], rotors),
         [],

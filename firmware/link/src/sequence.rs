@@ -26,24 +26,29 @@ struct Second {
 struct Sender {
     source: Source,
     sequence: u8,
+    /// The most frames of a window since the last loss: a loss is no larger part because less is sent after it.
+    of: u16,
     /// One entry a second of the window, by second modulo its length.
     seconds: [Second; WINDOW_SECS],
-    newest_s: u64,
+    newest_s: u32,
 }
 
 impl Sender {
     /// Clears the seconds that passed since the newest one.
-    fn advance(&mut self, now_s: u64) {
-        let passed = now_s.saturating_sub(self.newest_s).min(WINDOW_SECS as u64);
+    fn advance(&mut self, now_s: u32) {
+        let passed = now_s.saturating_sub(self.newest_s).min(WINDOW_SECS as u32);
         for second in 0..passed {
-            self.seconds[((now_s - second) % WINDOW_SECS as u64) as usize] = Second::default();
+            self.seconds[(now_s - second) as usize % WINDOW_SECS] = Second::default();
         }
         self.newest_s = self.newest_s.max(now_s);
     }
 
-    fn count(&mut self, now_s: u64, lost: u8) {
+    fn count(&mut self, now_s: u32, lost: u8) {
         self.advance(now_s);
-        let second = &mut self.seconds[(self.newest_s % WINDOW_SECS as u64) as usize];
+        if lost > 0 {
+            self.of = 0;
+        }
+        let second = &mut self.seconds[self.newest_s as usize % WINDOW_SECS];
         second.received = second.received.saturating_add(1);
         second.lost = second.lost.saturating_add(u16::from(lost));
     }
@@ -64,7 +69,7 @@ impl Sequences {
     /// Takes a frame; how many frames of its sender were lost right before it.
     pub fn frame(&mut self, at: Instant, frame: &Frame<'_>) -> u8 {
         let source = frame.source();
-        let now_s = at.as_micros() / Span::from_secs(1).as_micros();
+        let now_s = seconds(at);
         let known = |slot: &Option<Sender>| slot.is_none_or(|sender| sender.source == source);
         let Some(slot) = self.senders.iter_mut().find(|slot| known(slot)) else { return 0 };
         let lost = slot.map_or(0, |sender| frame.sequence().wrapping_sub(sender.sequence).wrapping_sub(1));
@@ -77,16 +82,22 @@ impl Sequences {
 
     /// What part of one sender's frames was lost in the last ten seconds.
     pub fn reading(&mut self, now: Instant, source: Option<Source>) -> LinkReading {
-        let now_s = now.as_micros() / Span::from_secs(1).as_micros();
+        let now_s = seconds(now);
         let sender = self.senders.iter_mut().flatten().find(|sender| Some(sender.source) == source);
         let frames_lost = sender.and_then(|sender| {
             sender.advance(now_s);
             let received: u32 = sender.seconds.iter().map(|second| u32::from(second.received)).sum();
             let lost: u32 = sender.seconds.iter().map(|second| u32::from(second.lost)).sum();
-            (received + lost >= FRAMES_MIN).then(|| lost as f32 / (received + lost) as f32)
+            sender.of = sender.of.max(u16::try_from(received + lost).unwrap_or(u16::MAX));
+            (received + lost >= FRAMES_MIN).then(|| lost as f32 / f32::from(sender.of))
         });
         LinkReading { frames_lost, at: now }
     }
+}
+
+/// Whole seconds since power-on; 136 years fit.
+fn seconds(at: Instant) -> u32 {
+    (at.as_micros() / Span::from_secs(1).as_micros()) as u32
 }
 
 #[cfg(test)]
@@ -121,6 +132,24 @@ mod tests {
         let mut sequences = Sequences::new();
         assert_eq!(heartbeats(&mut sequences, 0, [200, 201, 0, 1]), 54);
         assert_eq!(heartbeats(&mut sequences, 0, [0, 1]), 0, "a step back counts for nothing");
+    }
+
+    #[test]
+    fn a_loss_is_no_larger_part_because_less_is_sent_after_it() {
+        let part = |sequences: &mut Sequences, ms| {
+            sequences.reading(Instant::from_millis(ms), Some(SOURCE)).frames_lost.expect("enough frames")
+        };
+        let mut sequences = Sequences::new();
+        heartbeats(&mut sequences, 0, 0..200);
+        heartbeats(&mut sequences, 7_000, (200..255_u8).filter(|number| !(240..250).contains(number)));
+        let before = part(&mut sequences, 8_000);
+        assert!((before - 10.0 / 255.0).abs() < 0.001, "{before}");
+        // Those of the first seconds leave the window, and few come.
+        heartbeats(&mut sequences, 14_000, [255]);
+        let after = part(&mut sequences, 14_500);
+        assert!((after - before).abs() < 0.001, "{after}");
+        heartbeats(&mut sequences, 17_000, 0..30);
+        assert!(part(&mut sequences, 17_500) < 0.001, "its second has passed");
     }
 
     #[test]

@@ -12,7 +12,7 @@ use core::fmt::Write as _;
 
 use hums_core::Monitor;
 use hums_core::health::Subsystem;
-use hums_core::health::{self, Finding, Level};
+use hums_core::health::{self, Finding, Health, Level};
 use hums_core::observation::{Feeds, Source};
 use hums_core::params::{Param, Params};
 use hums_core::time::{Instant, Span};
@@ -23,7 +23,7 @@ use crate::frame::Frame;
 use crate::messages::{self, ComputerStatus};
 use crate::outlet::{Class, Outlet};
 use crate::packet::Packet;
-use crate::telling::{Fate, Telling};
+use crate::telling::{Fate, Telling, order};
 use crate::text::{Severity, TEXT_BYTES_MAX, Text};
 
 /// Forwarded messages: id and how long between two, in milliseconds (0: every one).
@@ -260,13 +260,21 @@ impl Summary {
         let place = self.waiting.iter().position(|other| urgency(other) < urgency(finding));
         // There is room: one was taken out.
         let _ = self.waiting.insert(place.unwrap_or(self.waiting.len()), *finding);
-        self.tell(now, out);
+        self.tell(now, None, out);
     }
 
-    fn tell(&mut self, now: Instant, out: &mut impl FnMut(&[u8])) {
+    /// Tells what waits and has its turn; only what is critical where it is not known what is so now.
+    fn tell(&mut self, now: Instant, health: Option<&Health>, out: &mut impl FnMut(&[u8])) {
         let mut place = 0;
         while let Some(finding) = self.waiting.get(place) {
-            match self.telling.fate(now, finding) {
+            let is_critical = finding.level == Level::Critical;
+            let is_so = |health: &Health| !health.gets_better(finding.check, finding.instance);
+            let fate = if is_critical || health.is_some_and(is_so) {
+                self.telling.fate(now, finding)
+            } else {
+                Fate::Later
+            };
+            match fate {
                 Fate::Now => {}
                 Fate::Later => {
                     place += 1;
@@ -277,7 +285,7 @@ impl Summary {
                     continue;
                 }
             }
-            let class = if finding.level == Level::Critical { Class::Critical } else { Class::Finding };
+            let class = if is_critical { Class::Critical } else { Class::Finding };
             let severity = severity(finding).unwrap_or(Severity::Notice);
             let packet = messages::status_text(severity, text(finding).as_str());
             if !self.outlet.send(now, class, &packet, out) {
@@ -298,7 +306,7 @@ impl Summary {
         }
         let params = monitor.params();
         self.outlet.set(now, params.get(Param::GsBudget) as u32, params.get(Param::GsBaud) as u32);
-        self.tell(now, out);
+        self.tell(now, Some(monitor.health()), out);
         if self.heartbeat_at.is_none_or(|at| now.since(at) >= HEARTBEAT)
             && self.outlet.send(now, Class::Own, &heartbeat(monitor), out)
         {
@@ -435,13 +443,15 @@ pub fn text(finding: &Finding) -> Text {
     let is_off = health::is_off(check, value);
     let mut text = if is_off {
         Text::new(format_args!("HUMS: {}", health::off_alarm(instance)))
+    } else if check == "esc_silent" && !finding.orders {
+        Text::new(format_args!("HUMS: ESC {} and all others silent", u16::from(instance) + 1))
     } else {
         Text::new(format_args!("HUMS: {}", said.alarm_of(instance, feeds)))
     };
     // Nobody lands because of a camera's battery.
-    let is_told =
-        level == Level::Critical && !said.advice.is_empty() && feeds != Feeds::Payload && finding.orders;
-    let advice = if is_told { Text::new(format_args!(", {}", said.advice)) } else { Text::default() };
+    let is_told = level == Level::Critical && feeds != Feeds::Payload;
+    let order = if is_told { order(finding) } else { "" };
+    let advice = if order.is_empty() { Text::default() } else { Text::new(format_args!(", {order}")) };
     if let Some((before, after)) = said.around_value(finding.unit)
         && value.is_finite()
         && !is_off

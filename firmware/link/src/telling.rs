@@ -9,9 +9,11 @@
 //!   of an event, or waits for the event's end, and is told if it is still so. So is what has no data, or is good again. That a check no longer applies, as after landing, is no news: nobody knows
 //!   whether what was bad is good.
 //! * Of a mishap its first kind is told, and one more that asks for something else where nothing led to it; that it is down, and
-//!   where, comes by itself. One whose order does not fit the vehicle ([`Finding::orders`]) is told without it, and
+//!   where, comes by itself. One whose order does not fit the vehicle is told with the one that does ([`order`]); where none does,
 //!   what led to it is not counted. What is mild, began with it or after it, and waits is a consequence, and is not told any longer.
-//! * That something is over is told only of what was told; that there are no data, only while no alarm is open.
+//! * What is good again just now waits until it is over, or bad again: a text that was held is true when it goes.
+//! * That something is over is told only of what was told, and not while what explains it goes on; that there are no data, only while no
+//!   alarm is open.
 //! * What is not critical waits while an event goes on of which something critical was told, and at most [`MILD_MAX`] are told in any
 //!   [`SPAN`], the worst first.
 
@@ -65,8 +67,8 @@ impl Event {
         self.told > 0 && since(now, self.begun_ms) < EVENT.as_millis()
     }
 
-    fn asked_for(&self, advice: &str) -> bool {
-        self.critical.iter().flatten().any(|number| self::advice(*number) == advice)
+    fn asked_for(&self, order: &str) -> bool {
+        self.critical.iter().flatten().any(|number| advice(*number) == order)
     }
 }
 
@@ -103,10 +105,17 @@ impl Telling {
                 self.open.retain(|open| *open != key);
                 false
             }
-            Level::Ok => self.open.contains(&key),
+            Level::Ok => self.open.contains(&key) && !self.is_explained(finding),
             Level::Stale => finding.because.is_empty() && self.open.is_empty(),
             _ => finding.because.is_empty(),
         }
+    }
+
+    /// Whether an alarm that was told explains it: a sensor that is dead agrees with others by chance.
+    fn is_explained(&self, finding: &Finding) -> bool {
+        let open = self.open.iter().filter_map(|(number, _)| health::checks().nth(usize::from(*number)));
+        let alarms = open.map(|check| (Instant::ZERO, check.name, Level::Warning));
+        health::because(finding.check, Level::Warning, Instant::ZERO, alarms).is_some()
     }
 
     /// What becomes of it now.
@@ -115,8 +124,8 @@ impl Telling {
         let is_mishap = finding.subsystem == Subsystem::Mishap;
         if finding.level == Level::Critical {
             let is_running = if is_mishap { event.told > 0 } else { event.is_running(now) };
-            let advice = health::said(finding.check).map_or("", |said| said.advice);
-            let is_asked_for = finding.orders && event.asked_for(advice);
+            let order = order(finding);
+            let is_asked_for = !order.is_empty() && event.asked_for(order);
             let is_told = is_running && (is_asked_for || (is_mishap && event.told >= MISHAP_MAX));
             return if is_told { Fate::Never } else { Fate::Now };
         }
@@ -143,7 +152,9 @@ impl Telling {
     /// It went.
     pub(crate) fn told(&mut self, now: Instant, finding: &Finding) {
         let is_mishap = finding.subsystem == Subsystem::Mishap;
-        let is_led_to = is_mishap && finding.orders && self.events.iter().any(|event| event.is_running(now));
+        let ordering = number(ordering(finding));
+        let is_led_to =
+            is_mishap && ordering.is_some() && self.events.iter().any(|event| event.is_running(now));
         let now_ms = now.as_millis() as u32;
         let event = &mut self.events[family(finding.subsystem) as usize];
         let goes_on = if is_mishap { event.told > 0 } else { event.is_running(now) };
@@ -151,16 +162,13 @@ impl Telling {
             *event = Event { begun_ms: now_ms, told: u8::from(is_led_to), ..Event::NONE };
         }
         event.told = event.told.saturating_add(1);
-        let key = key(finding);
-        if finding.level == Level::Critical && finding.orders {
-            if let Some(free) = event.critical.iter_mut().find(|number| number.is_none()) {
-                *free = key.map(|(number, _)| number);
-            }
-        } else if finding.level != Level::Critical {
+        if finding.level != Level::Critical {
             // There was room.
             let _ = self.mild.push_back(now_ms);
+        } else if let Some(free) = event.critical.iter_mut().find(|number| number.is_none()) {
+            *free = ordering;
         }
-        let Some(key) = key else { return };
+        let Some(key) = key(finding) else { return };
         self.open.retain(|open| *open != key);
         if is_mishap {
             self.open.retain(|(number, _)| !part(*number).is_some_and(health::is_of_mishap));
@@ -178,10 +186,30 @@ const fn since(now: Instant, at_ms: u32) -> u64 {
     (now.as_millis() as u32).wrapping_sub(at_ms) as u64
 }
 
-/// The number of a finding's check in the tables, and its instance.
+/// The number of a check in the tables.
+fn number(check: &str) -> Option<u8> {
+    Some(health::checks().position(|known| known.name == check)? as u8)
+}
+
+/// The number of a finding's check, and its instance.
 fn key(finding: &Finding) -> Option<(u8, u8)> {
-    let number = health::checks().position(|check| check.name == finding.check)?;
-    Some((number as u8, finding.instance))
+    Some((number(finding.check)?, finding.instance))
+}
+
+/// The check whose order a finding gives; empty for none. What sinks and is not carried by its thrust comes down, and what is silent of
+/// all ESCs at once is their telemetry.
+fn ordering(finding: &Finding) -> &'static str {
+    match finding.check {
+        check if finding.orders => check,
+        "sinking" => "overturned",
+        "esc_silent" => "failsafe_alert",
+        _ => "",
+    }
+}
+
+/// What a finding orders where it is critical, as it fits the vehicle; empty for nothing.
+pub(crate) fn order(finding: &Finding) -> &'static str {
+    health::said(ordering(finding)).map_or("", |said| said.advice)
 }
 
 /// The part that a check is of, by its number.

@@ -402,6 +402,11 @@ impl State {
         self.level
     }
 
+    /// Whether it is a warning or critical, and its value is good just now.
+    pub(super) const fn gets_better(&self) -> bool {
+        matches!(self.level, Some(Level::Warning | Level::Critical)) && self.better.is_set()
+    }
+
     /// Another check's alarm explains its level, or does not, at the change to it.
     pub(super) const fn explain(&mut self, explained: bool) {
         self.repeats.set_looks(explained as u8);

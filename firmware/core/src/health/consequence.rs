@@ -61,7 +61,7 @@ const SECOND: &[&str] = &["ahrs2_tilt", "ahrs2_height", "ahrs2_position"];
 /// What the autopilot does because of anything. A text that no table knows (`autopilot_alert`) may be of anything else, as of a kill switch.
 const ACTS: &[&str] = &["failsafe_alert", "autopilot_state"];
 
-/// What explains, and what it explains: the nearest to the cause first.
+/// What explains, and what it explains: the nearest to the cause first, in each row too.
 const ROWS: &[(&[&str], &[&str])] = &[
     (&["heartbeat"], &["frames_lost", "esc_silent", "gcs_alert"]),
     (&["autopilot_reboot"], &["esc_silent", "ekf_alert"]),
@@ -80,6 +80,7 @@ const ROWS: &[(&[&str], &[&str])] = &[
     (GNSS, &["baro_height", "position_silent"]),
     (&["heartbeat", "frames_lost"], &["position_silent"]),
     (&["accel_stuck", "accel_alert"], &["accel_mismatch"]),
+    (&["compass_stuck", "compass_alert"], &["compass_mismatch"]),
     (&["gyro_stuck", "gyro_alert"], &["gyro_mismatch"]),
     (
         &["gyro_stuck", "gyro_alert", "gyro_mismatch"],
@@ -159,11 +160,12 @@ pub fn because<'a>(
     // A mishap before all, then by row.
     let place = |cause_since: Instant, cause: &str| {
         if by_mishap && is_mishap(cause) {
-            return is_with_mishap(since, cause_since).then_some(0);
+            return is_with_mishap(since, cause_since).then_some((0, 0));
         }
-        let explains =
-            |(causes, effects): &(&[&str], &[&str])| effects.contains(&effect) && causes.contains(&cause);
-        ROWS.iter().position(explains).map(|row| row + 1)
+        let of_effect = (1..).zip(ROWS).filter(|(_, (_, effects))| effects.contains(&effect));
+        let mut places = of_effect
+            .filter_map(|(row, (causes, _))| Some((row, causes.iter().position(|known| *known == cause)?)));
+        places.next()
     };
     alarms
         .filter(|(.., level)| *level as u8 >= at_least)

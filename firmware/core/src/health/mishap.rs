@@ -71,9 +71,12 @@ pub(super) const CHECKS: &[Check] = &[
 ];
 
 /// Whether what the text of a check orders fits the vehicle: DISARM while it is armed, and FLY FORWARD, CLIMB what hangs upright on rotors,
-/// has not lost one, and has not tried in vain with full throttle.
+/// has not lost one, and has not tried in vain with full throttle. Nobody lands at once because telemetry alone is silent, of all ESCs.
 pub(super) fn orders(check: &Check, inputs: &Inputs<'_>, has_lost_drive: impl FnOnce() -> bool) -> bool {
     let Inputs { now, vehicle, derived, mishap, .. } = *inputs;
+    if check.name == "esc_silent" {
+        return !derived.are_escs_silent(now);
+    }
     if check.subsystem != Subsystem::Mishap {
         return true;
     }

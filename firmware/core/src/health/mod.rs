@@ -268,6 +268,14 @@ impl Health {
             .filter_map(|((check, instance), state)| state.level().map(|level| (check, instance, level)))
     }
 
+    /// Whether an alarm's value is good just now, and its level about to fall.
+    pub fn gets_better(&self, check: &str, instance: u8) -> bool {
+        let places = checks().flat_map(|check| (0..check.instances).map(move |instance| (check, instance)));
+        let mut states = places.zip(&self.states);
+        let mine = states.find(|((of, number), _)| of.name == check && *number == instance);
+        mine.is_some_and(|(_, state)| state.gets_better())
+    }
+
     /// Of each check, in the order of [`checks`], the levels of its instances.
     pub fn by_check(&self) -> impl Iterator<Item = impl Iterator<Item = Level>> {
         let mut states = &self.states[..];

@@ -223,6 +223,7 @@ pub(super) const CHECKS: &[Check] = &[
         name: "ahrs2_height",
         unit: "m",
         warn: Some(Param::Ahrs2HgtWarn),
+        critical: Some(Param::Ahrs2HgtCrit),
         hysteresis: 1.0,
         read: |inputs, _| inputs.derived.crosschecks().second().height(inputs.now),
         ..SECOND

@@ -110,8 +110,10 @@ pub(super) const CHECKS: &[Check] = &[
         debounce_critical: Span::from_millis(500),
         when: When::InFlight,
         read: |inputs, motor| {
-            let percent = inputs.derived.currents().percent(inputs.now, inputs.vehicle, motor);
-            percent.filter(|_| !inputs.derived.outputs().is_off(motor))
+            let Inputs { now, vehicle, derived, .. } = *inputs;
+            let percent = || derived.currents().percent(now, vehicle, motor);
+            let taken = || percent().filter(|_| !derived.outputs().is_off(motor));
+            derived.stopped(vehicle, motor).or_else(taken)
         },
         ..ESC
     },

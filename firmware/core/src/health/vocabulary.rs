@@ -287,7 +287,7 @@ vocabulary! {
     "ahrs2_tilt" ArduPilot "attitudes of EKF and AHRS2", "", says "EKF and AHRS2 attitudes differ", "", needs "attitude of AHRS2 in flight";
     "The autopilot's two estimators, EKF and AHRS2, told different attitudes: one of them is wrong.";
     "Do not fly until accelerometers, gyros and vibration are checked.";
-    "ahrs2_height" ArduPilot "heights of EKF and AHRS2", "", says "EKF and AHRS2 heights differ", "", needs "height of AHRS2 in flight";
+    "ahrs2_height" ArduPilot "heights of EKF and AHRS2", "", says "two heights differ", "LAND BY HAND", needs "height of AHRS2 in flight";
     "The autopilot's two estimators, EKF and AHRS2, told different heights: one of them is wrong."; "Check the barometer, its cover, GPS and vibration.";
     "ahrs2_position" ArduPilot "positions of EKF and AHRS2", "", says "EKF and AHRS2 positions differ", "", needs "position of AHRS2 in flight";
     "The autopilot's two estimators, EKF and AHRS2, told different positions: one of them is wrong."; "Check GPS, compass and vibration at that time.";
@@ -351,7 +351,7 @@ vocabulary! {
 
     "heartbeat" Wire "autopilot's heartbeat", "", says "autopilot silent", "LAND", needs "monitor on the autopilot's wire";
     "The autopilot fell silent."; "Check the wire between autopilot and monitor, and the autopilot's supply.";
-    "frames_lost" Wire "frames lost on the wire", "", says "autopilot's data lost", "CHECK WIRE", needs "monitor on the autopilot's wire";
+    "frames_lost" Wire "frames lost on the wire", "", says "autopilot's data lost", "WATCH IT", needs "monitor on the autopilot's wire";
     "Messages of the autopilot were lost on the way."; "Check the wire, and lower the message rates or raise the baud rate.";
     "position_silent" Wire "position messages", "", says "no position heard", "", needs "position of the EKF in flight";
     "The autopilot stopped telling its position: it has none, or its link is set otherwise."; "Check the receiver and the EKF; check the rates of the autopilot's messages.";

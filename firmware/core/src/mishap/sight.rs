@@ -227,12 +227,16 @@ impl Mishap {
         if vehicle.armed() {
             self.height_m = height_m(at, vehicle).unwrap_or(0.0);
         }
-        // What breaks off in a mishap is the touch.
-        if -climb_mps < BROKEN_OFF * self.sink.greatest() && matches!(self.state, State::Going(_)) {
+        // What breaks off in a mishap is the touch, where the estimate is not lost.
+        let goes = matches!(self.state, State::Going(_));
+        let lost = goes && self.has_strayed(at);
+        if goes && !lost && -climb_mps < BROKEN_OFF * self.sink.greatest() {
             self.touch_mps = self.touch_mps.max(self.sink.greatest());
         }
         self.sink.take(at, -climb_mps);
-        self.take_sink(at, -climb_mps, vehicle, params);
+        if !lost {
+            self.take_sink(at, -climb_mps, vehicle, params);
+        }
     }
 
     fn take_sink(&mut self, at: Instant, sink_mps: f32, vehicle: &Vehicle, params: &Params) {

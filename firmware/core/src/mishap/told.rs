@@ -117,6 +117,7 @@ impl Report {
             None => write!(text, "{words} unknown place"),
         };
         let _ = match change {
+            Change::Down if *touch == 0 => Ok(()),
             Change::Down => write!(text, " {}.{} m/s", touch / 10, touch % 10),
             _ => write!(text, " {} m", place.height_m),
         };

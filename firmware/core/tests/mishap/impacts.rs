@@ -235,6 +235,32 @@ fn what_lies_over_with_running_motors_never_flies_on() {
     }
 }
 
+/// It fell, and its estimate moves on while the receiver, where it tells a speed, says that it stands.
+fn strays(ms: u64, quad: &mut Quad, motion: &mut Motion, receiver_mps: Option<f32>) {
+    hits_and_runs_on(ms, quad, motion);
+    if ms >= 5_000 {
+        (quad.height, motion.ground_mps) = (4.0 + 0.1 * (ms as f32 / 1_000.0), 3.5);
+        (quad.climb, motion.load_g) = (0.2, if ms < 5_100 { 15.0 } else { 1.0 });
+    }
+    quad.gnss.speed = receiver_mps.map(MetresPerSecond);
+    motion.pressure_hpa =
+        Some(955.0 + 0.12 * (ms as f32 / 1_000.0).min(5.0) * 12.0 + (ms % 300) as f32 * 1e-5);
+}
+
+#[test]
+fn what_an_estimate_moves_and_the_receiver_does_not_never_flies_on() {
+    let moves = |outcome: &Outcome| {
+        outcome.changes.iter().any(|(_, change)| matches!(change, Change::FliesOn | Change::FliesAgain))
+    };
+    for of in &ROTORS[..2] {
+        let rests = fly(&hovering(*of), |ms, quad, motion| strays(ms, quad, motion, Some(0.1)));
+        assert!(!moves(&rests), "{of:?}: {:?}", rests.changes);
+        assert_eq!(rests.flights(), (1, 0, 1), "{of:?}: {:?}", rests.changes);
+        let flies = fly(&hovering(*of), |ms, quad, motion| strays(ms, quad, motion, Some(3.4)));
+        assert!(moves(&flies), "{of:?}: {:?}", flies.changes);
+    }
+}
+
 #[test]
 fn what_is_disarmed_is_not_to_be_disarmed() {
     for armed in [true, false] {

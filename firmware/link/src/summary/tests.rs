@@ -408,7 +408,7 @@ fn a_warning_that_came_before_a_mishap_is_no_consequence_of_it() {
 }
 
 #[test]
-fn an_order_that_does_not_fit_the_vehicle_is_not_given_and_the_next_one_is() {
+fn an_order_that_does_not_fit_the_vehicle_is_given_as_the_one_that_does_and_not_again() {
     let mishap = [
         comes(10, "roll_rate", 0, CRITICAL),
         comes(20, "sinking", 0, CRITICAL),
@@ -416,9 +416,29 @@ fn an_order_that_does_not_fit_the_vehicle_is_not_given_and_the_next_one_is() {
         comes(60, "overturned", 0, CRITICAL),
     ];
     let told = told_where(&mishap, "", |check| check != "sinking");
-    let expected =
-        [(10, "roll does not follow, LAND NOW"), (20, "sinking fast"), (40, "impact, DISARM IF DOWN")];
+    let expected = [(10, "roll does not follow, LAND NOW"), (20, "sinking fast, DISARM IF DOWN")];
     assert_eq!(texts(&told), expected);
+}
+
+#[test]
+fn telemetry_of_all_escs_that_is_silent_at_once_is_one_text_and_no_order_to_land() {
+    let silent = [0, 1, 2, 3].map(|motor| comes(10, "esc_silent", motor, CRITICAL));
+    let all = told_where(&silent, "", |_| false);
+    assert_eq!(texts(&all), [(10, "ESC 1 and all others silent, WATCH IT")]);
+    assert_eq!(texts(&told(&silent[2..3])), [(10, "ESC 3 silent, LAND")], "one alone");
+}
+
+#[test]
+fn what_a_dead_sensor_says_is_not_over_while_it_is_dead() {
+    let findings = [
+        comes(0, "compass_stuck", 0, WARNING),
+        comes(200, "compass_mismatch", 0, WARNING),
+        comes(400, "compass_mismatch", 0, (Level::Ok, Level::Warning)),
+        comes(600, "compass_stuck", 0, (Level::Ok, Level::Warning)),
+    ];
+    let expected =
+        [(10, "compass 1 frozen"), (210, "compass 1 and others differ"), (600, "over: compass 1 frozen")];
+    assert_eq!(texts(&told(&findings)), expected);
 }
 
 #[test]
