@@ -20,6 +20,11 @@ pub fn check_name(check: &str, instance: u8) -> String {
         .map_or_else(|| check.replace('_', " "), |words| words.said.name_of(instance).to_string())
 }
 
+/// What a check is called where it is not known of which part it is: `battery cell voltage`.
+pub fn check_kind(check: &str) -> &str {
+    vocabulary(check).map_or(check, |words| words.said.name)
+}
+
 /// A unit as people write it; logs and programs have it in ASCII.
 pub fn unit_name(unit: &str) -> &str {
     match unit {

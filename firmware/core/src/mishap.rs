@@ -525,7 +525,8 @@ impl Mishap {
             return Some(Change::Down);
         }
         // What lies over does not fly, nor does what has not moved since it hit something.
-        if long && self.armed && !dances && !lies && !strayed && !(struck && slow) {
+        let moves = !(dances || lies || strayed || struck && slow);
+        if long && self.armed && moves {
             self.calm();
             return Some(Change::FliesOn);
         }

@@ -61,6 +61,8 @@ pub(crate) const OFF_PERCENT: f32 = 100.0;
 const OFF_US: u16 = 50;
 /// Outputs end here or beyond, us: `MOT_PWM_MAX` of ArduPilot is 1950, `PWM_MAIN_MAX` of PX4 2000.
 const FULL_US: u16 = 1_940;
+/// What stands for a motor that alone is at the end of its range.
+const AT_END_PERCENT: f32 = OFF_PERCENT - 1.0;
 /// Two thirds of the range: what is above shares the load with what is at its end, as in a turn or a climb.
 const SHARES_US: u16 = 1_667;
 /// 30 degrees a second: a pilot yaws faster, and gusts do not turn a vehicle so fast for long.
@@ -138,9 +140,12 @@ impl MotorOutputs {
             let place = full.trailing_zeros();
             let mut others = (0..).zip(pulses).filter(|(motor, _)| *motor != place);
             if others.all(|(_, pulse)| (IDLE_US..SHARES_US).contains(pulse)) {
-                (self.at, self.alone) = (Stamp::at(at), (place as u8, OFF_PERCENT - 1.0));
+                (self.at, self.alone) = (Stamp::at(at), (place as u8, AT_END_PERCENT));
                 return;
             }
+        }
+        if (AT_END_PERCENT..OFF_PERCENT).contains(&self.alone.1) {
+            (self.at, self.alone.1) = (Stamp::at(at), 0.0);
         }
         if !known || !flies_level(at, vehicle, flight) || yaws(vehicle) {
             return;

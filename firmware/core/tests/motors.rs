@@ -194,8 +194,8 @@ fn a_motor_that_is_idled_opposite_to_a_dead_one_is_not_a_second_dead_one() {
     assert_eq!(lost(1_500), [("motor_loss", 1), ("motor_loss", 4)], "it is given as much as the others");
 }
 
-/// A quad that is given these pulses and turns so fast from 20 s on, and sinks then.
-fn quad_given(speeds: [f32; 4], given: [u16; 4]) -> Vec<(&'static str, u8)> {
+/// A quad that is given these pulses from 20 s on, for so long, and turns so fast and sinks from then on.
+fn quad_given(speeds: [f32; 4], given: [u16; 4], for_ms: u64) -> Vec<(&'static str, u8)> {
     let esc = Quad::healthy().escs[0].unwrap_or_default();
     let script = |now_ms: u64| {
         let begun = now_ms >= 20_000;
@@ -211,8 +211,8 @@ fn quad_given(speeds: [f32; 4], given: [u16; 4]) -> Vec<(&'static str, u8)> {
         pulses[5] = 2_000;
         pulses[..4].copy_from_slice(&match now_ms {
             0..4_000 => [1_000; 4],
-            4_000..20_000 => [1_500; 4],
-            _ => given,
+            at if (20_000..20_000 + for_ms).contains(&at) => given,
+            _ => [1_500; 4],
         });
         Some(pulses)
     })
@@ -220,8 +220,9 @@ fn quad_given(speeds: [f32; 4], given: [u16; 4]) -> Vec<(&'static str, u8)> {
 
 #[test]
 fn a_motor_that_stands_while_it_is_given_all_is_lost_whatever_current_is_told() {
-    let lost =
-        |speeds, given| quad_given(speeds, given).into_iter().find(|(check, _)| *check == "motor_loss");
+    let lost = |speeds, given| {
+        quad_given(speeds, given, 60_000).into_iter().find(|(check, _)| *check == "motor_loss")
+    };
     assert_eq!(lost([5_600.0, 0.0, 5_400.0, 5_300.0], [1_700, 1_950, 1_700, 1_700]), Some(("motor_loss", 1)));
     let hovers = [1_500; 4];
     assert_eq!(lost([5_600.0, 0.0, 5_400.0, 5_300.0], hovers), None, "it carries: its speed is not told");
@@ -231,10 +232,12 @@ fn a_motor_that_stands_while_it_is_given_all_is_lost_whatever_current_is_told() 
 
 #[test]
 fn a_motor_that_alone_is_given_all_is_weak_also_while_the_vehicle_sinks() {
-    let weak = |given| {
-        let told = quad_given([5_000.0; 4], given);
+    let weak_for = |given, for_ms| {
+        let told = quad_given([5_000.0; 4], given, for_ms);
         told.into_iter().filter(|(check, _)| *check == "motor_output").collect::<Vec<_>>()
     };
+    let weak = |given| weak_for(given, 60_000);
+    assert_eq!(weak_for([2_000, 1_300, 1_350, 1_350], 100), [], "a moment");
     assert_eq!(weak([2_000, 1_300, 1_350, 1_350])[..1], [("motor_output", 0)]);
     assert_eq!(weak([2_000, 1_800, 1_350, 1_350]), [], "two share a turn");
     assert_eq!(weak([2_000, 2_000, 2_000, 2_000]), [], "all the thrust");

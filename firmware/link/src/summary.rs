@@ -12,7 +12,7 @@ use core::fmt::Write as _;
 
 use hums_core::Monitor;
 use hums_core::health::Subsystem;
-use hums_core::health::{self, Finding, Health, Level};
+use hums_core::health::{self, Finding, Health, Level, Orders};
 use hums_core::observation::{Feeds, Source};
 use hums_core::params::{Param, Params};
 use hums_core::time::{Instant, Span};
@@ -443,7 +443,7 @@ pub fn text(finding: &Finding) -> Text {
     let is_off = health::is_off(check, value);
     let mut text = if is_off {
         Text::new(format_args!("HUMS: {}", health::off_alarm(instance)))
-    } else if check == "esc_silent" && !finding.orders {
+    } else if check == "esc_silent" && finding.orders != Orders::Own {
         Text::new(format_args!("HUMS: ESC {} and all others silent", u16::from(instance) + 1))
     } else {
         Text::new(format_args!("HUMS: {}", said.alarm_of(instance, feeds)))

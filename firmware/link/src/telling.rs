@@ -113,9 +113,8 @@ impl Telling {
 
     /// Whether an alarm that was told explains it: a sensor that is dead agrees with others by chance.
     fn is_explained(&self, finding: &Finding) -> bool {
-        let open = self.open.iter().filter_map(|(number, _)| health::checks().nth(usize::from(*number)));
-        let alarms = open.map(|check| (Instant::ZERO, check.name, Level::Warning));
-        health::because(finding.check, Level::Warning, Instant::ZERO, alarms).is_some()
+        let mut open = self.open.iter().filter_map(|(number, _)| health::checks().nth(usize::from(*number)));
+        open.any(|check| health::explains(check.name, finding.check))
     }
 
     /// What becomes of it now.
@@ -152,7 +151,7 @@ impl Telling {
     /// It went.
     pub(crate) fn told(&mut self, now: Instant, finding: &Finding) {
         let is_mishap = finding.subsystem == Subsystem::Mishap;
-        let ordering = number(ordering(finding));
+        let ordering = number(finding.ordering());
         let is_led_to =
             is_mishap && ordering.is_some() && self.events.iter().any(|event| event.is_running(now));
         let now_ms = now.as_millis() as u32;
@@ -196,20 +195,9 @@ fn key(finding: &Finding) -> Option<(u8, u8)> {
     Some((number(finding.check)?, finding.instance))
 }
 
-/// The check whose order a finding gives; empty for none. What sinks and is not carried by its thrust comes down, and what is silent of
-/// all ESCs at once is their telemetry.
-fn ordering(finding: &Finding) -> &'static str {
-    match finding.check {
-        check if finding.orders => check,
-        "sinking" => "overturned",
-        "esc_silent" => "failsafe_alert",
-        _ => "",
-    }
-}
-
 /// What a finding orders where it is critical, as it fits the vehicle; empty for nothing.
 pub(crate) fn order(finding: &Finding) -> &'static str {
-    health::said(ordering(finding)).map_or("", |said| said.advice)
+    health::said(finding.ordering()).map_or("", |said| said.advice)
 }
 
 /// The part that a check is of, by its number.

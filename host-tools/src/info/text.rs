@@ -21,7 +21,7 @@ use crate::logs;
 use crate::logs::begun_anew::BegunAnew;
 use crate::logs::naming::is_part;
 use crate::loss;
-use crate::names::{check_name, unit_name};
+use crate::names::{check_kind, check_name, unit_name};
 use crate::part;
 use crate::plural::count;
 use crate::printable::{path, word};
@@ -240,7 +240,7 @@ fn sentence(finding: &FindingLine, due: Option<&(String, Option<String>)>, cause
         let _ = write!(sentence, "; {}", FindingLine::UNJUDGED);
     }
     if let Some(cause) = cause {
-        let _ = write!(sentence, "; because of {}", check_name(cause, 0));
+        let _ = write!(sentence, "; because of {}", check_kind(cause));
     }
     let _ = write!(sentence, "; was {previous} [{check}]");
     sentence

@@ -3,13 +3,14 @@
 //! A HUMS on board of the vehicle hears every frame; where one speaks, its level counts, and the reason is what these
 //! checks see of the same. Its recorder is its own to judge.
 
-use hums_core::health::{self, EXPECTED, Finding, Level, Subsystem, When, vocabulary};
+use hums_core::health::{self, EXPECTED, Finding, Level, Subsystem, When};
 use hums_core::time::{Instant, Span};
 use hums_link::summary;
 use serde::Serialize;
 
 use super::craft::{Craft, is_of_wire};
 use crate::counters::tells_flight;
+use crate::names::check_kind;
 use crate::page::note::CELLS_UNKNOWN;
 use crate::part;
 
@@ -27,11 +28,6 @@ fn words(finding: &Finding) -> String {
 /// The same, without what is to be done.
 fn without_advice(finding: &Finding) -> String {
     words(&Finding { level: Level::Warning, ..*finding })
-}
-
-/// A check's name.
-fn name(check: &str) -> &str {
-    vocabulary(check).map_or(check, |words| words.said.name)
 }
 
 /// One subsystem.
@@ -241,7 +237,7 @@ fn reason(craft: &Craft, subsystem: Subsystem, level: Level, here: Level, good: 
         let alarms = craft.worries.values().map(|worry| (worry.at, worry.check, worry.level));
         // One cause has one order: its own.
         return match health::because(finding.check, finding.level, finding.at, alarms) {
-            Some(cause) => format!("{}, because of: {}", without_advice(finding), name(cause)),
+            Some(cause) => format!("{}, because of: {}", without_advice(finding), check_kind(cause)),
             None => match craft.due(finding) {
                 Some(due) => format!("{}: {}", part::due_words(&due), words(finding)),
                 None => words(finding),
@@ -276,6 +272,7 @@ fn rank(level: Level) -> u8 {
 
 #[cfg(test)]
 mod tests {
+    use hums_core::health::Orders;
     use hums_core::observation::{Feeds, Heartbeat, Observation, Source};
     use hums_core::params::Params;
     use hums_core::status::{LinkReading, RecorderStatus};
@@ -295,7 +292,7 @@ mod tests {
             unit: "V",
             feeds: Feeds::Vehicle,
             because: "",
-            orders: true,
+            orders: Orders::Own,
         }
     }
 

@@ -9,7 +9,7 @@ use hums_core::Monitor;
 use hums_core::component::{COMPONENTS_MAX, Component};
 use hums_core::flight::Phase;
 use hums_core::happening::Happening;
-use hums_core::health::{Finding, Level, Scope, Subsystem, VOCABULARY, check_named};
+use hums_core::health::{Finding, Level, Orders, Scope, Subsystem, VOCABULARY, check_named};
 use hums_core::observation::{Autopilot, Feeds, Observation, Source};
 use hums_core::params::Params;
 use hums_core::status::{RecorderStatus, Recording};
@@ -402,7 +402,7 @@ impl Craft {
                     unit: check.unit,
                     feeds: Feeds::Unsaid,
                     because: "",
-                    orders: true,
+                    orders: Orders::Own,
                 };
                 self.worries.insert(key, finding);
             }

@@ -172,7 +172,9 @@ fn set_leftovers_aside(found: &mut Found) -> Result<()> {
             ));
         }
     }
-    words.into_iter().for_each(|words| found.remark(words));
+    for words in words {
+        found.remark(words);
+    }
     Ok(())
 }
 

@@ -191,21 +191,17 @@ fn was_written_anew(
     let is_enough = |nth: usize, seconds: u64| seconds >= u64::from(keep.seconds) || nth + 1 >= RING_FILES;
     let gone = later.find(|(nth, _, seconds)| is_enough(*nth, *seconds));
     // Files that were begun after the arming are none of the ring's.
-    Ok(match gone {
-        Some((_, at, seconds)) => {
-            let armed = seen.go_on(groups, |seen| seen.last.is_some_and(|last| last > at))?.all;
-            armed.is_none_or(|armed| at <= armed).then_some(seconds >= u64::from(keep.seconds))
-        }
-        // One more may have been begun behind the last entry.
-        None => {
-            let seen = seen.go_on(groups, |_| false)?;
-            let seconds = u64::from(seen.seconds());
-            let is_begun =
-                !seen.is_closed && !seen.is_broken && is_enough(begun.times.len().saturating_sub(1), seconds);
-            let holds_enough = begun.ends_hollow || seconds >= u64::from(keep.seconds);
-            (seen.all.is_none() && (begun.ends_hollow || is_begun)).then_some(holds_enough)
-        }
-    })
+    if let Some((_, at, seconds)) = gone {
+        let armed = seen.go_on(groups, |seen| seen.last.is_some_and(|last| last > at))?.all;
+        return Ok(armed.is_none_or(|armed| at <= armed).then_some(seconds >= u64::from(keep.seconds)));
+    }
+    // One more may have been begun behind the last entry.
+    let seen = seen.go_on(groups, |_| false)?;
+    let seconds = u64::from(seen.seconds());
+    let is_begun =
+        !seen.is_closed && !seen.is_broken && is_enough(begun.times.len().saturating_sub(1), seconds);
+    let holds_enough = begun.ends_hollow || seconds >= u64::from(keep.seconds);
+    Ok((seen.all.is_none() && (begun.ends_hollow || is_begun)).then_some(holds_enough))
 }
 
 /// When files of a log were begun.
@@ -402,7 +398,7 @@ mod tests {
             let found = find(&[dir.path().to_owned()], false).expect("a log");
             let is_unknown = is_begun_unknown(&found.logs[0]).expect("it reads");
             let overview = Overview::of(&found.logs[0]).expect("it reads");
-            let lost: Option<u32> = overview.contents.gaps.first().map(loss::sectors_lost).unwrap_or(Some(0));
+            let lost: Option<u32> = overview.contents.gaps.first().map_or(Some(0), loss::sectors_lost);
             assert_eq!(lost.is_none(), is_unknown, "{:?}", overview.contents.gaps);
             is_unknown
         };

@@ -434,12 +434,10 @@ impl Stitch {
             if begins_late && cause == Cause::Missing {
                 self.summary.files_gone = self.first_file.unwrap_or(0);
             }
-            let missing = match self.late {
-                _ if !begins_late => group.missing.max(u32::from(cut)),
-                Some(late) => group.number.saturating_sub(late.from),
-                // Which of those since the power-on were the logs' before it, nothing tells.
-                None if self.is_begun_unknown => 0,
-                None => group.number,
+            let missing = if begins_late {
+                self.missing_before(group.number)
+            } else {
+                group.missing.max(u32::from(cut))
             };
             let gap = self.gap(cause);
             gap.sectors_lost = gap.sectors_lost.saturating_add(missing);
@@ -493,6 +491,16 @@ impl Stitch {
         self.summary.entries_fell += group.fell;
         self.summary.epoch_us = group.epoch_us.or(self.summary.epoch_us);
         Ok(())
+    }
+
+    /// The sectors of this log that are missing before its first one that is there.
+    fn missing_before(&self, number: u32) -> u32 {
+        match self.late {
+            Some(late) => number.saturating_sub(late.from),
+            // Which of those since the power-on were the logs' before it, nothing tells.
+            None if self.is_begun_unknown => 0,
+            None => number,
+        }
     }
 
     /// Whether what is missing before this group was not kept, on purpose. Within a log nothing is; where sectors were

@@ -302,7 +302,7 @@ mod tests {
                     unit: check.unit,
                     feeds,
                     because: "",
-                    orders: true,
+                    orders: hums_core::health::Orders::Own,
                 };
                 let text = summary::text(&finding);
                 let words = text.as_str().trim_start_matches(OURS);

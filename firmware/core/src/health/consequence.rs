@@ -139,6 +139,11 @@ pub fn is_with_mishap(since: Instant, mishap_since: Instant) -> bool {
     mishap_since.since(since) <= WITH_MISHAP
 }
 
+/// Whether an alarm of one check explains one of another, by their rows alone.
+pub fn explains(cause: &str, effect: &str) -> bool {
+    ROWS.iter().any(|(causes, effects)| effects.contains(&effect) && causes.contains(&cause))
+}
+
 /// Which of the checks that have an alarm (a warning, or critical), each since a time, explains that of `effect`, which went to `level` and is
 /// wrong since a time. A cause may be seen a little later than what it explains.
 pub fn because<'a>(

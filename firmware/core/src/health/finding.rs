@@ -139,11 +139,35 @@ pub struct Finding {
     pub feeds: Feeds,
     /// The check whose alarm explains this one; empty where none does. Such a finding is recorded and not told to the ground.
     pub because: &'static str,
-    /// Whether what its text orders where it is critical fits the vehicle as it is: what is disarmed is not to be disarmed.
-    pub orders: bool,
+    /// What its text orders where it is critical, as it fits the vehicle.
+    pub orders: Orders,
+}
+
+/// What the text of a finding orders.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Orders {
+    /// What its check's words say.
+    Own,
+    /// DISARM IF DOWN.
+    Disarm,
+    /// WATCH IT.
+    Watch,
+    /// Nothing: what is disarmed is not to be disarmed.
+    Nothing,
 }
 
 impl Finding {
+    /// The check whose order its text gives; empty for none.
+    #[inline(never)]
+    pub const fn ordering(&self) -> &'static str {
+        match self.orders {
+            Orders::Own => self.check,
+            Orders::Disarm => "overturned",
+            Orders::Watch => "failsafe_alert",
+            Orders::Nothing => "",
+        }
+    }
+
     /// Whether its check no longer applies, as after landing, or nobody says it any more: what was bad is not known to be good.
     pub fn is_unjudged(&self) -> bool {
         self.level == Level::Ok && self.value.is_nan()

@@ -3,7 +3,7 @@
 
 use super::check::{Check, Part, Side, When};
 use super::common::{STALE, alert};
-use super::finding::Subsystem;
+use super::finding::{Orders, Subsystem};
 use super::inputs::Inputs;
 use crate::cause::Cause;
 use crate::mishap::Kind;
@@ -70,19 +70,26 @@ pub(super) const CHECKS: &[Check] = &[
     alert::<{ Cause::Crash as usize }>(Subsystem::Mishap),
 ];
 
-/// Whether what the text of a check orders fits the vehicle: DISARM while it is armed, and FLY FORWARD, CLIMB what hangs upright on rotors,
-/// has not lost one, and has not tried in vain with full throttle. Nobody lands at once because telemetry alone is silent, of all ESCs.
-pub(super) fn orders(check: &Check, inputs: &Inputs<'_>, has_lost_drive: impl FnOnce() -> bool) -> bool {
+/// What the text of a check orders. DISARM is ordered while it is armed, and FLY FORWARD, CLIMB of what hangs upright on rotors, has
+/// not lost one, and has not tried in vain with full throttle: what rotors do not carry comes down. Wings glide. Nobody lands at once because
+/// telemetry alone is silent, of all ESCs.
+pub(super) fn orders(check: &Check, inputs: &Inputs<'_>, has_lost_drive: impl FnOnce() -> bool) -> Orders {
     let Inputs { now, vehicle, derived, mishap, .. } = *inputs;
-    if check.name == "esc_silent" {
-        return !derived.are_escs_silent(now);
-    }
-    if check.subsystem != Subsystem::Mishap {
-        return true;
+    if check.name == "esc_silent" && derived.are_escs_silent(now) {
+        return Orders::Watch;
     }
     if check.name == Kind::Sinking.name() {
         let in_vain = derived.response().full_in_vain().is_some_and(|full| full.value > 0.0);
-        return vehicle.hovers(now) == Some(true) && !mishap.has_tilted(now) && !in_vain && !has_lost_drive();
+        return match vehicle.hovers(now) {
+            Some(true) if !mishap.has_tilted(now) && !in_vain && !has_lost_drive() => Orders::Own,
+            Some(true) => Orders::Disarm,
+            _ => Orders::Nothing,
+        };
     }
-    vehicle.armed() || matches!(check.name, "free_fall" | "tumbling" | "disarmed_in_air")
+    let of_any = matches!(check.name, "free_fall" | "tumbling" | "disarmed_in_air");
+    if check.subsystem != Subsystem::Mishap || vehicle.armed() || of_any {
+        Orders::Own
+    } else {
+        Orders::Nothing
+    }
 }

@@ -29,8 +29,8 @@ mod vocabulary;
 
 pub use check::{CLEAR, CLEAR_MAX, CLEAR_MAX_ALWAYS, Check, Parts, Side, State, When};
 use check::{Change, How, Part};
-pub use consequence::{because, is_of_mishap, is_with_mishap};
-pub use finding::{Finding, Level, OFF_MEANING, Subsystem, is_off, off_alarm};
+pub use consequence::{because, explains, is_of_mishap, is_with_mishap};
+pub use finding::{Finding, Level, OFF_MEANING, Orders, Subsystem, is_off, off_alarm};
 pub use inputs::Inputs;
 pub use tables::{check_named, checks, instances};
 pub use vocabulary::{Said, Scope, VOCABULARY, Words, said, vocabulary};

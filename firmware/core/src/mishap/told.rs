@@ -98,11 +98,13 @@ impl Report {
         let words = match change {
             Change::Began(_) => "mishap at",
             Change::Down => "down at",
-            Change::FliesOn | Change::FliesAgain => {
-                return String::try_from("mishap over, it flies on").unwrap_or_default();
-            }
-            Change::OnBench(kind) => return String::try_from(kind.name()).unwrap_or_default(),
+            Change::FliesOn => "mishap over, it flies on",
+            Change::FliesAgain => "it flies again, KEEP CLEAR",
+            Change::OnBench(kind) => kind.name(),
         };
+        if !matches!(change, Change::Began(_) | Change::Down) {
+            return String::try_from(words).unwrap_or_default();
+        }
         let degrees = |e7: i32| {
             let micros = e7 / 10;
             let sign = if micros < 0 { "-" } else { "" };

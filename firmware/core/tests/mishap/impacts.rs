@@ -274,7 +274,7 @@ fn what_is_disarmed_is_not_to_be_disarmed() {
         };
         let outcome = fly(&hovering(ROTORS[0]), script);
         let impact = outcome.findings.iter().find(|one| one.check == "impact").expect("hit");
-        assert_eq!(impact.orders, armed);
+        assert_eq!(impact.orders, if armed { Orders::Own } else { Orders::Nothing });
     }
 }
 

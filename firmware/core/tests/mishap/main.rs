@@ -10,7 +10,7 @@ mod turns;
 use common::{AUTOPILOT, Quad};
 use hums_core::Monitor;
 use hums_core::happening::Happening;
-use hums_core::health::{Finding, Level, Subsystem};
+use hums_core::health::{Finding, Level, Orders, Subsystem};
 use hums_core::mishap::{Change, Kind, Place, Report};
 use hums_core::observation::{
     Air, Attitude, Autopilot, GlobalPosition, Hud, Imu, LandedState, Observation, VehicleKind, VtolState,

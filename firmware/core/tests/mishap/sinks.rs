@@ -206,28 +206,32 @@ fn only_what_hangs_upright_on_rotors_is_told_to_climb() {
             (quad.climb, quad.height) = (-8.0, 200.0 - ms as f32 / 125.0);
         }
     };
-    assert_eq!(orders(&hovering(ROTORS[0]), sinks), Some(true));
+    assert_eq!(orders(&hovering(ROTORS[0]), sinks), Some(Orders::Own));
     let rolled: Script = |ms, quad, _| {
         if ms < 3_000 {
             (quad.climb, quad.height) = (if ms < 600 { 0.0 } else { -8.0 }, 200.0 - ms as f32 / 125.0);
         }
         quad.roll = if ms < 500 { 1.9 } else { 0.1 };
     };
-    assert_eq!(orders(&hovering(ROTORS[0]), rolled), Some(false), "it was on its side a second before");
+    assert_eq!(
+        orders(&hovering(ROTORS[0]), rolled),
+        Some(Orders::Disarm),
+        "it was on its side a second before"
+    );
     let leans: Script = |ms, quad, _| {
         if ms < 2_000 {
             (quad.climb, quad.height) = (-8.0, 200.0 - ms as f32 / 125.0);
         }
         quad.roll = 0.87;
     };
-    assert_eq!(orders(&hovering(ROTORS[0]), leans), Some(false), "50 degrees");
+    assert_eq!(orders(&hovering(ROTORS[0]), leans), Some(Orders::Disarm), "50 degrees");
     let turns: Script = |ms, quad, motion| {
         if ms < 2_000 {
             (quad.climb, quad.height) = (-8.0, 200.0 - ms as f32 / 125.0);
         }
         motion.rates = [2.6, 0.0, 0.0];
     };
-    assert_eq!(orders(&hovering(ROTORS[0]), turns), Some(false), "150 degrees a second");
+    assert_eq!(orders(&hovering(ROTORS[0]), turns), Some(Orders::Disarm), "150 degrees a second");
     let motor: Script = |ms, quad, _| {
         if let Some(esc) = &mut quad.escs[1] {
             esc.current = Some(Amperes(0.0));
@@ -236,14 +240,18 @@ fn only_what_hangs_upright_on_rotors_is_told_to_climb() {
             (quad.climb, quad.height) = (-8.0, 200.0 - ms as f32 / 125.0);
         }
     };
-    assert_eq!(orders(&hovering(ROTORS[0]), motor), Some(false), "it has lost a motor");
+    assert_eq!(orders(&hovering(ROTORS[0]), motor), Some(Orders::Disarm), "it has lost a motor");
     let in_vain: Script = |ms, quad, _| {
         quad.throttle = 1.0;
         if ms < 6_000 {
             (quad.climb, quad.height) = (if ms < 3_000 { -2.0 } else { -8.0 }, 200.0 - ms as f32 / 250.0);
         }
     };
-    assert_eq!(orders(&hovering(ROTORS[0]), in_vain), Some(false), "all the throttle does not do it");
-    // A plane with all its throttle, and a dead motor.
-    assert_eq!(orders(&on_wings(WINGS[0]), in_vain), Some(false));
+    assert_eq!(
+        orders(&hovering(ROTORS[0]), in_vain),
+        Some(Orders::Disarm),
+        "all the throttle does not do it"
+    );
+    // A plane with all its throttle, and a dead motor: it glides.
+    assert_eq!(orders(&on_wings(WINGS[0]), in_vain), Some(Orders::Nothing));
 }

@@ -17,8 +17,13 @@ fn finding(level: Level) -> Finding {
         unit: "%",
         feeds: Feeds::Vehicle,
         because: "",
-        orders: true,
+        orders: Orders::Own,
     }
+}
+
+/// The same of another check.
+fn of(check: &'static str, level: Level) -> Finding {
+    Finding { check, ..finding(level) }
 }
 
 fn params(budget: f32) -> Params {
@@ -100,7 +105,7 @@ fn a_finding_is_told_in_the_words_of_a_pilot_and_fits() {
     let flag = |check| told(Finding { check, instance: 2, unit: "", value: 1.0, ..finding(Level::Warning) });
     assert_eq!(flag("gnss_alert"), "HUMS: autopilot warns: GPS");
     assert_eq!(flag("esc_failure"), "HUMS: ESC 3 failed");
-    let motor = Finding { check: "motor_imbalance", instance: 2, value: 44.07, ..finding(Level::Critical) };
+    let motor = Finding { instance: 2, value: 44.07, ..of("motor_imbalance", Level::Critical) };
     assert_eq!(told(motor), "HUMS: motor 3 speed differs: 44.1 %, LAND");
     assert_eq!(told(Finding { check: "of_later", ..motor }), "HUMS: of_later");
 }
@@ -110,7 +115,7 @@ fn a_finding_is_told_in_the_words_of_a_pilot_and_fits() {
 fn a_value_says_what_it_is_of_or_is_not_told() {
     let told = |check, value, level| {
         let check = health::check_named(check).expect("a check");
-        text(&Finding { check: check.name, unit: check.unit, value, ..finding(level) }).as_str().to_owned()
+        text(&Finding { unit: check.unit, value, ..of(check.name, level) }).as_str().to_owned()
     };
     let (warning, critical) = (Level::Warning, Level::Critical);
     for (check, value, level, text) in [
@@ -144,12 +149,11 @@ fn no_text_is_cut_whatever_part_and_level() {
         {
             let feeds = if check.subsystem == Subsystem::Power { feeds } else { Feeds::Unsaid };
             let finding = Finding {
-                check: check.name,
                 instance: check.instances - 1,
                 unit: check.unit,
                 value: -234.5,
                 feeds,
-                ..finding(level)
+                ..of(check.name, level)
             };
             let told = text(&finding);
             let told = told.as_str();
@@ -185,8 +189,7 @@ fn a_battery_that_does_not_keep_the_vehicle_up_is_called_what_it_is() {
     assert_eq!(told(Feeds::Payload, Level::Warning), "HUMS: battery 2 (payload) low: 14.9 %");
     let warned = told(Feeds::Payload, Level::Warning);
     assert_eq!(told(Feeds::Payload, Level::Critical), warned, "nobody lands because of a camera's battery");
-    let long =
-        Finding { check: "cell_deviation", unit: "V", feeds: Feeds::Avionics, ..finding(Level::Critical) };
+    let long = Finding { unit: "V", feeds: Feeds::Avionics, ..of("cell_deviation", Level::Critical) };
     assert_eq!(text(&long).as_str(), "HUMS: battery 1 (avionics) cells uneven, LAND");
     assert_eq!(told(Feeds::Avionics, Level::Ok), "HUMS: over: battery 2 (avionics) low");
 }
@@ -270,11 +273,11 @@ fn told(findings: &[Comes]) -> Vec<(u64, String)> {
 }
 
 fn told_because(findings: &[Comes], because: &'static str) -> Vec<(u64, String)> {
-    told_where(findings, because, |_| true)
+    told_where(findings, because, |_| Orders::Own)
 }
 
-/// What is told where the orders of some checks do not fit the vehicle.
-fn told_where(findings: &[Comes], because: &'static str, orders: fn(&str) -> bool) -> Vec<(u64, String)> {
+/// What is told where some checks give other orders than their own.
+fn told_where(findings: &[Comes], because: &'static str, orders: fn(&str) -> Orders) -> Vec<(u64, String)> {
     let mut summary = Summary::new(&Params::defaults());
     let monitor = Monitor::new(Params::defaults());
     let mut told = Vec::new();
@@ -415,7 +418,7 @@ fn an_order_that_does_not_fit_the_vehicle_is_given_as_the_one_that_does_and_not_
         comes(40, "impact", 0, CRITICAL),
         comes(60, "overturned", 0, CRITICAL),
     ];
-    let told = told_where(&mishap, "", |check| check != "sinking");
+    let told = told_where(&mishap, "", |check| if check == "sinking" { Orders::Disarm } else { Orders::Own });
     let expected = [(10, "roll does not follow, LAND NOW"), (20, "sinking fast, DISARM IF DOWN")];
     assert_eq!(texts(&told), expected);
 }
@@ -423,7 +426,7 @@ fn an_order_that_does_not_fit_the_vehicle_is_given_as_the_one_that_does_and_not_
 #[test]
 fn telemetry_of_all_escs_that_is_silent_at_once_is_one_text_and_no_order_to_land() {
     let silent = [0, 1, 2, 3].map(|motor| comes(10, "esc_silent", motor, CRITICAL));
-    let all = told_where(&silent, "", |_| false);
+    let all = told_where(&silent, "", |_| Orders::Watch);
     assert_eq!(texts(&all), [(10, "ESC 1 and all others silent, WATCH IT")]);
     assert_eq!(texts(&told(&silent[2..3])), [(10, "ESC 3 silent, LAND")], "one alone");
 }
@@ -443,7 +446,7 @@ fn what_a_dead_sensor_says_is_not_over_while_it_is_dead() {
 
 #[test]
 fn a_motor_that_is_given_nothing_is_not_called_weak() {
-    let weak = Finding { check: "motor_output", instance: 2, value: 99.0, ..finding(Level::Critical) };
+    let weak = Finding { instance: 2, value: 99.0, ..of("motor_output", Level::Critical) };
     assert_eq!(text(&weak).as_str(), "HUMS: motor 3 weak: output +99 %, LAND NOW");
     assert_eq!(text(&Finding { value: 100.0, ..weak }).as_str(), "HUMS: motor 3 off: no output, LAND NOW");
 }

@@ -93,8 +93,8 @@ fn mishap(
     };
     let report = book.monitor.mishap().report(change);
     book.journal.record(now, &Record::Event(Event { number, text: &report.text() }), sectors);
-    // That it began is told as a finding. Nobody can be sure of what flies again after it was told as down: its estimator may be lost.
-    if !matches!(change, Change::Began(_) | Change::FliesAgain) {
+    // That it began is told as a finding.
+    if !matches!(change, Change::Began(_)) {
         notices.announce(Notice::Mishap(report));
     }
     marks.at_once(Resting::Mishap);

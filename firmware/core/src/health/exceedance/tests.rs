@@ -1,7 +1,7 @@
 //! What is counted of a crossing, what is kept of it, and how it is stored.
 
 use super::*;
-use crate::health::Subsystem;
+use crate::health::{Orders, Subsystem};
 use crate::observation::Feeds;
 
 const TILT: u8 = 3;
@@ -19,7 +19,7 @@ fn finding(at_ms: u64, previous: Level, level: Level, value: f32) -> Finding {
         unit: "deg",
         feeds: Feeds::Vehicle,
         because: "",
-        orders: true,
+        orders: Orders::Own,
     }
 }
 
