@@ -237,6 +237,7 @@ params! {
     MisOverturn "MIS_OVERTURN" "deg" 60.0 30.0 180.0 "tilt of what carries the vehicle; of the estimator's attitude 100 degrees at least";
     AccMismWarn "ACC_MISM_WARN" "m/s2" 1.0 0.05 100.0 "accelerometers apart beyond usual; PX4 arms up to 0.7 (COM_ARM_IMU_ACC), ArduPilot up to 0.75";
     GyroMismWarn "GYRO_MISM_WARN" "rad/s" 0.1 0.01 10.0 "gyros apart beyond usual; PX4 arms up to 0.25 (COM_ARM_IMU_GYR), ArduPilot up to 0.09";
+    GyroNoiseWarn "GYRO_NOISE_WARN" "rad/s" 0.5 0.01 1000.0 "PX4's gyro metric; 0.01 to 0.12 in healthy flights, 0.16 on a vehicle that shakes beyond Flight Review's red";
     MagMismWarn "MAG_MISM_WARN" "%" 40.0 1.0 1000.0 "compasses apart beyond usual, of the field; ArduPilot arms up to 200 mG, which is 40 % of it";
     BaroMismWarn "BARO_MISM_WARN" "m" 8.0 0.5 10_000.0 "barometers apart beyond usual; above what wind and motors do to one of them";
     VibeRiseWarn "VIBE_RISE_WARN" "" 2.2 1.1 1000.0 "times what is usual in this flight, on rotors";

@@ -108,6 +108,7 @@ const INPUTS: &[(&str, &str)] = &[
         "gyro_mismatch",
         "the same messages: difference of the rates, likewise; of multicopters in a hover only, on wings too",
     ),
+    ("gyro_noise", "VIBRATION of PX4: the gyro metric"),
     (
         "compass_mismatch",
         "the same messages: difference of the fields, percent of their length, likewise; not of VTOLs, not in fast turns",

@@ -32,6 +32,18 @@ const LIMITS: [(&str, f32); 5] = [
     ("RADIO_RSSI_WARN", 60.0),
 ];
 
+/// Which scale vibration has, the heartbeat tells.
+fn px4() -> Observation {
+    let kind = VehicleKind::Rotorcraft;
+    Observation::Heartbeat(Heartbeat {
+        autopilot: Autopilot::Px4,
+        kind,
+        armed: true,
+        state: 4,
+        ..Heartbeat::default()
+    })
+}
+
 fn fly(settings: &[(&str, f32)], fault: Fault) -> Vec<Finding> {
     let mut params = Params::defaults();
     for (name, value) in settings {
@@ -56,7 +68,7 @@ fn fly(settings: &[(&str, f32)], fault: Fault) -> Vec<Finding> {
     findings
 }
 
-const FAULTS: [(&str, u8, Level, Fault); 97] = [
+const FAULTS: [(&str, u8, Level, Fault); 98] = [
     ("batt_remaining", 0, Level::Critical, |quad, _| quad.battery.remaining = Some(Fraction(0.05))),
     ("batt_remaining", 1, Level::Critical, |_, more| {
         let remaining = Some(Fraction(0.05));
@@ -98,12 +110,12 @@ const FAULTS: [(&str, u8, Level, Fault); 97] = [
     }),
     ("vibration", 0, Level::Critical, |quad, _| quad.vibration.levels[0] = Some(70.0)),
     ("vibration_px4", 0, Level::Critical, |quad, more| {
-        // Which scale it is, the heartbeat tells.
-        let kind = VehicleKind::Rotorcraft;
-        let px4 =
-            Heartbeat { autopilot: Autopilot::Px4, kind, armed: true, state: 4, ..Heartbeat::default() };
-        more.push(Observation::Heartbeat(px4));
+        more.push(px4());
         quad.vibration.levels = [Some(0.0), Some(0.0), Some(12.0)];
+    }),
+    ("gyro_noise", 0, Level::Warning, |quad, more| {
+        more.push(px4());
+        quad.vibration.levels = [Some(0.0), Some(0.7), Some(2.0)];
     }),
     ("clipping", 0, Level::Critical, |quad, _| quad.vibration.clips = [200; 3]),
     ("load_factor", 0, Level::Critical, |quad, _| quad.acceleration_down = -45.0),

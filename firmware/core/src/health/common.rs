@@ -6,6 +6,7 @@ use super::inputs::Inputs;
 use crate::baseline::Quantity;
 use crate::cause::Cause;
 use crate::latest::Reading;
+use crate::observation::VibrationScale;
 use crate::params::Param;
 use crate::time::Span;
 
@@ -98,4 +99,11 @@ pub(super) fn takes_more(inputs: &Inputs<'_>, quantity: Quantity) -> Option<Read
 /// How far a quantity is from what is normal for this airframe.
 pub(super) fn departure(inputs: &Inputs<'_>, quantity: Quantity) -> Option<Reading> {
     Reading::new(Some(inputs.now), inputs.trends.departure(quantity, inputs.baselines, inputs.params))
+}
+
+/// One of VIBRATION's three as PX4 means them: coning of the gyro, high-frequency rate (rad/s), high-frequency acceleration (m/s2).
+pub(super) fn px4_metric(inputs: &Inputs<'_>, place: usize) -> Option<Reading> {
+    let slot = &inputs.vehicle.vibration;
+    let vibration = slot.get().filter(|vibration| vibration.scale == VibrationScale::Px4Metrics)?;
+    Reading::new(slot.at(), *vibration.levels.get(place)?)
 }

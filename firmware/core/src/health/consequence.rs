@@ -41,6 +41,7 @@ const SENSORS: &[&str] = &[
     "airspeed_alert",
     "accel_mismatch",
     "gyro_mismatch",
+    "gyro_noise",
     "compass_mismatch",
     "baro_mismatch",
     "baro_noise",
@@ -83,7 +84,7 @@ const ROWS: &[(&[&str], &[&str])] = &[
     (&["compass_stuck", "compass_alert"], &["compass_mismatch"]),
     (&["gyro_stuck", "gyro_alert"], &["gyro_mismatch"]),
     (
-        &["gyro_stuck", "gyro_alert", "gyro_mismatch"],
+        &["gyro_stuck", "gyro_alert", "gyro_mismatch", "gyro_noise"],
         &["compass_unused", "compass_heading", "ekf_compass", "ekf_mag_ratio"],
     ),
     (

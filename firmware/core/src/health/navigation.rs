@@ -1,7 +1,7 @@
 //! Estimator and GNSS.
 
 use super::check::{Check, Part, Side, When};
-use super::common::{STALE, alert};
+use super::common::{STALE, alert, px4_metric};
 use super::finding::Subsystem;
 use super::inputs::Inputs;
 use crate::cause::Cause;
@@ -152,6 +152,18 @@ pub(super) const CHECKS: &[Check] = &[
         hysteresis: 0.02,
         debounce_warn: SMOOTHED,
         read: |inputs, sensor| mismatch(inputs, Kind::Gyro, sensor),
+        ..MISMATCH
+    },
+    Check {
+        name: "gyro_noise",
+        unit: "rad/s",
+        warn: Some(Param::GyroNoiseWarn),
+        hysteresis: 0.05,
+        debounce_warn: Span::from_millis(500),
+        instances: 1,
+        stale_after: STALE,
+        part: Part::Vibration,
+        read: |inputs, _| px4_metric(inputs, 1),
         ..MISMATCH
     },
     Check {

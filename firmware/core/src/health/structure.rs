@@ -1,7 +1,7 @@
 //! Vibration, clipping and load factor.
 
 use super::check::{Check, Part, Side, When};
-use super::common::{STALE, alert, departure, due};
+use super::common::{STALE, alert, departure, due, px4_metric};
 use super::finding::Subsystem;
 use super::inputs::Inputs;
 use crate::baseline::Quantity;
@@ -37,7 +37,7 @@ pub(super) const CHECKS: &[Check] = &[
         warn: Some(Param::VibePx4Warn),
         critical: Some(Param::VibePx4Crit),
         hysteresis: 0.5,
-        read: px4_metric,
+        read: |inputs, _| px4_metric(inputs, 2),
         ..VIBRATION
     },
     Check {
@@ -103,11 +103,4 @@ fn per_axis(inputs: &Inputs<'_>, _: u8) -> Option<Reading> {
     let slot = &inputs.vehicle.vibration;
     let vibration = slot.get().filter(|vibration| vibration.scale == VibrationScale::PerAxis)?;
     Reading::new(slot.at(), vibration.levels.into_iter().flatten().reduce(f32::max))
-}
-
-/// The third of PX4's metrics: high-frequency acceleration.
-fn px4_metric(inputs: &Inputs<'_>, _: u8) -> Option<Reading> {
-    let slot = &inputs.vehicle.vibration;
-    let vibration = slot.get().filter(|vibration| vibration.scale == VibrationScale::Px4Metrics)?;
-    Reading::new(slot.at(), vibration.levels[2])
 }
