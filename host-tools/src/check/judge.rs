@@ -396,7 +396,7 @@ impl Judge {
             Told::Finding(finding) => {
                 self.checked_on_board = true;
                 let at = self.hit_at(finding);
-                self.board.take(&Finding { at, ..finding.clone() }, Span::ZERO);
+                self.board.take(&Finding { at, ..Finding::clone(finding) }, Span::ZERO);
                 self.details.tell(&finding.check, &mut self.board);
             }
             Told::Peak { check, instance, value } => self.board.peak(check, *instance, *value),
