@@ -18,7 +18,7 @@
 //! | sinking | faster than `MIS_SINK` for half a second; where the pilot has the throttle, at nearly full throttle only | on rotors |
 //! | | 7 m lost, faster than 1 m/s, at full throttle, where the autopilot has it and wants no steep bank | everywhere |
 //!
-//! What came down while it was not heard for 5 s or more is told within 3 s after that: it lies over (overturned); it does not rise with
+//! What came down while it was not heard for 5 s or more is told within 2.4 s after that: it lies over (overturned); it does not rise with
 //! all its throttle, far below where it was heard last, or it came down faster than anything lands (impact, of which no shock is known).
 //!
 //! ```text
@@ -53,6 +53,7 @@ use evidence::{
     BREAKS_OFF, Doubt, FRESH, FULL_THROTTLE, IDLE_THROTTLE, Lasting, Pressure, Recent, Shock, THRUST_PART,
     Unheard, is_known, is_tilted, on_rotors, throttle,
 };
+use sight::UNCARRIED;
 
 /// How long after disarming it is watched.
 const WATCHED: Span = Span::from_secs(10);
@@ -93,7 +94,7 @@ const DROPS_MPS: f32 = 10.0;
 const UNHEARD: Span = Span::from_secs(5);
 const BEATS: Span = Span::from_millis(2_500);
 /// So long after that it is seen whether it lies; and so long it does what only what lies does.
-const LYING_SHOWS: Span = Span::from_secs(3);
+const LYING_SHOWS: Span = Span::from_millis(2_400);
 const LIES_FOR: Span = Span::from_millis(1_500);
 /// What came down so far is not where it flew.
 const CAME_DOWN_M: f32 = 3.0;
@@ -126,8 +127,9 @@ pub struct Mishap {
     seen: Option<Kind>,
     armed: bool,
     disarmed_at: Option<Instant>,
-    /// The latest heartbeat, and when anything that is watched was heard.
+    /// The latest heartbeat, the height above home then, and when anything that is watched was heard.
     beat_at: Instant,
+    beat_height_m: f32,
     heard_at: Instant,
     /// It was not heard in the air: whether it lies is to be seen.
     unheard: Option<Unheard>,
@@ -196,6 +198,7 @@ impl Mishap {
             armed: false,
             disarmed_at: None,
             beat_at: Instant::ZERO,
+            beat_height_m: 0.0,
             heard_at: Instant::ZERO,
             unheard: None,
             unheard_from: None,
@@ -353,6 +356,7 @@ impl Mishap {
             moved_at: self.moved_at,
             stood_at_m: self.stood_at_m,
             beat_at: self.beat_at,
+            beat_height_m: self.beat_height_m,
             heard_at: self.heard_at,
             felt_at: self.felt_at,
             ..Self::new()
@@ -372,8 +376,13 @@ impl Mishap {
             (self.on_bench, self.disarmed_at, self.doubt, self.stood) = (false, None, None, false);
         }
         let beat_at = vehicle.heartbeat.at().unwrap_or(self.beat_at);
-        let unseen = vehicle.terminated_since.is_some()
-            && beat_at.since(core::mem::replace(&mut self.beat_at, beat_at)) > BEATS;
+        let mut before_m = self.beat_height_m;
+        let mut unseen = false;
+        if beat_at != self.beat_at {
+            unseen = vehicle.terminated_since.is_some() && beat_at.since(self.beat_at) > BEATS;
+            before_m = core::mem::replace(&mut self.beat_height_m, self.height_m);
+            self.beat_at = beat_at;
+        }
         // Terminated before it was heard: it is in the air by its own word, and was never seen elsewhere.
         let ended =
             vehicle.armed() && !self.armed && self.disarmed_at.is_none() && self.state == State::Quiet;
@@ -385,12 +394,14 @@ impl Mishap {
         if self.armed && !armed {
             self.disarmed_at = Some(now);
             // The height of before: PX4's is 0 from the disarming on.
-            let high = self.height_m > params.get(Param::MisDisarm) || self.sink.greatest() > FALLING_MPS;
+            let height_m = if unseen { before_m } else { self.height_m };
+            let high = height_m > params.get(Param::MisDisarm) || self.sink.greatest() > FALLING_MPS;
             // The autopilot may have called it landed because it is disarmed.
             if high && flight.is_open() && self.state == State::Quiet {
                 let altitude_m = vehicle.global.within(now, FRESH).map(|global| global.altitude.0);
-                let doubt = Doubt::unseen(now, self.height_m);
-                self.doubt = Some(Doubt { altitude_m, unseen, ..doubt });
+                let doubt = Doubt::unseen(now, height_m);
+                let uncarried = self.is_uncarried() && now.since(self.uncarried.since) >= UNCARRIED;
+                self.doubt = Some(Doubt { altitude_m, unseen, uncarried, ..doubt });
             }
         }
         self.armed = armed;

@@ -18,7 +18,7 @@ use crate::vehicle::Vehicle;
 const FALL_G: f32 = 0.3;
 /// A vehicle that was disarmed and is carried by less than this for so long falls; a bounce is shorter.
 const UNCARRIED_G: f32 = 0.5;
-const UNCARRIED: Span = Span::from_millis(200);
+pub(super) const UNCARRIED: Span = Span::from_millis(200);
 /// What falls is carried by less than this for so long: nobody asks a multicopter to sink so hard, and so short before a touch.
 const DROPS_G: f32 = 0.65;
 const DROPS: Span = Span::from_millis(300);

@@ -63,10 +63,10 @@ fn what_lands_in_a_silence_has_landed_and_what_flies_on_flies_on() {
                     (quad.throttle, quad.armed, quad.landed) = (0.0, false, Some(LandedState::OnGround));
                 })
             };
-            assert_eq!((landed.told(), landed.flights()), (vec![], (1, 1, 0)), "{of:?}");
+            assert!(landed.told().is_empty() && landed.flights() == (1, 1, 0), "{of:?}: {:?}", landed.told());
         }
         let flies = unheard(of, 15_000, |_, _| ());
-        assert_eq!((flies.told(), flies.flights().2), (vec![], 0), "{of:?}");
+        assert!(flies.told().is_empty() && flies.flights().2 == 0, "{of:?}: {:?}", flies.told());
         let climbs =
             unheard(of, 15_000, |quad, _| (quad.height, quad.climb, quad.throttle) = (12.0, 3.0, 1.0));
         assert!(climbs.told().is_empty(), "{of:?}: {:?}", climbs.told());
