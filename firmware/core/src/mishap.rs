@@ -401,7 +401,7 @@ impl Mishap {
                 let altitude_m = vehicle.global.within(now, FRESH).map(|global| global.altitude.0);
                 let doubt = Doubt::unseen(now, height_m);
                 let uncarried = self.is_uncarried() && now.since(self.uncarried.since) >= UNCARRIED;
-                self.doubt = Some(Doubt { altitude_m, unseen, uncarried, ..doubt });
+                self.doubt = Some(Doubt { altitude_m, uncarried, unseen, ..doubt });
             }
         }
         self.armed = armed;
