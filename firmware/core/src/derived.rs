@@ -406,7 +406,9 @@ impl Derived {
             return None;
         }
         let place = usize::from(motor);
-        let turned = self.motors.get(place).is_some_and(|track| track.highest_rpm > TURNING_RPM);
+        // One that stood before it was heard never turned.
+        let turned = self.outputs.began_unseen()
+            || self.motors.get(place).is_some_and(|track| track.highest_rpm > TURNING_RPM);
         let told = vehicle.motors.get(place).filter(|told| turned && told.esc.rpm.is_some())?;
         let stands = !Self::turns(vehicle, place) && (0..MOTORS_MAX).any(|other| Self::turns(vehicle, other));
         Reading::new(told.moved_at.filter(|_| stands), Some(0.0))

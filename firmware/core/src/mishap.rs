@@ -12,10 +12,14 @@
 //! | | what comes down slowly without throttle lands and skids | on wings |
 //! | tumbling | body rates above `MIS_TUMBLE` for half a second, on wings for 1.5 s; not in modes made for it | everywhere |
 //! | disarmed in the air | disarmed or terminated above `MIS_DISARM_H` or while it sinks; then it falls, sinks or goes on moving | everywhere |
+//! | | terminated before it was heard, or in a silence, and nothing says that it stands | everywhere |
 //! | overturned | its top looks down, by more than 100 degrees of tilt, for 0.7 s; not in modes made for it | on rotors |
 //! | | it lies over by more than `MIS_OVERTURN`, by the force that carries it, within 5 s of throttle, and is slower than 12 m/s | on rotors |
 //! | sinking | faster than `MIS_SINK` for half a second; where the pilot has the throttle, at nearly full throttle only | on rotors |
 //! | | 7 m lost, faster than 1 m/s, at full throttle, where the autopilot has it and wants no steep bank | everywhere |
+//!
+//! What came down while it was not heard for 5 s or more is told within 2.4 s after that: it lies over (overturned); it does not rise with
+//! all its throttle, far below where it was heard last, or it came down faster than anything lands (impact, of which no shock is known).
 //!
 //! ```text
 //!        seen in a flight            it lies still, or 10 s after disarming
@@ -39,6 +43,7 @@ pub use told::{Change, Kind, Place, Report};
 
 use crate::flight::Flight;
 use crate::latest::Reading;
+use crate::modes::has_pilots_throttle;
 use crate::motion::{climb_mps, ground_speed_mps, height_m};
 use crate::observation::{LandedState, VehicleKind};
 use crate::params::{Param, Params};
@@ -46,8 +51,9 @@ use crate::time::{Instant, Span, Stamp};
 use crate::vehicle::{LANDED_STATE_AGE, Vehicle};
 use evidence::{
     BREAKS_OFF, Doubt, FRESH, FULL_THROTTLE, IDLE_THROTTLE, Lasting, Pressure, Recent, Shock, THRUST_PART,
-    is_known, is_tilted, on_rotors, throttle,
+    Unheard, is_known, is_tilted, on_rotors, throttle,
 };
+use sight::UNCARRIED;
 
 /// How long after disarming it is watched.
 const WATCHED: Span = Span::from_secs(10);
@@ -84,6 +90,15 @@ const GLIDING_MPS: f32 = 8.0;
 /// What was terminated falls so fast some seconds later, by the air pressure alone.
 const DROPS_MPS: f32 = 10.0;
 
+/// Nothing heard for so long hides a fall, and heartbeats so far apart a disarming.
+const UNHEARD: Span = Span::from_secs(5);
+const BEATS: Span = Span::from_millis(2_500);
+/// So long after that it is seen whether it lies; and so long it does what only what lies does.
+const LYING_SHOWS: Span = Span::from_millis(2_400);
+const LIES_FOR: Span = Span::from_millis(1_500);
+/// What came down so far is not where it flew.
+const CAME_DOWN_M: f32 = 3.0;
+
 /// What becomes of the flight.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Fate {
@@ -112,6 +127,16 @@ pub struct Mishap {
     seen: Option<Kind>,
     armed: bool,
     disarmed_at: Option<Instant>,
+    /// The latest heartbeat, the height above home then, and when anything that is watched was heard.
+    beat_at: Instant,
+    beat_height_m: f32,
+    heard_at: Instant,
+    /// It was not heard in the air: whether it lies is to be seen.
+    unheard: Option<Unheard>,
+    /// It came down in a silence, which began then.
+    unheard_from: Option<Instant>,
+    /// When the force changed last: a sensor that says the same for ever says nothing.
+    felt_at: Instant,
     /// Disarmed out of a flight: whether it falls is to be seen.
     doubt: Option<Doubt>,
     uncarried: Lasting,
@@ -172,6 +197,12 @@ impl Mishap {
             seen: None,
             armed: false,
             disarmed_at: None,
+            beat_at: Instant::ZERO,
+            beat_height_m: 0.0,
+            heard_at: Instant::ZERO,
+            unheard: None,
+            unheard_from: None,
+            felt_at: Instant::ZERO,
             doubt: None,
             uncarried: Lasting::NOT,
             on_bench: false,
@@ -211,18 +242,24 @@ impl Mishap {
             State::Down => Fate::Over,
             State::Going(_) => Fate::Held,
             State::Quiet if self.doubt.is_some() => Fate::Held,
+            State::Quiet if matches!(self.unheard, Some(Unheard { to: Some(_), .. })) => Fate::Held,
             State::Quiet => Fate::Own,
         }
     }
 
     /// Whether other checks would only echo it.
     pub(crate) fn is_going(&self) -> bool {
-        self.fate() != Fate::Own
+        self.state != State::Quiet || self.doubt.is_some()
     }
 
     /// Whether it was disarmed out of a flight, and that it falls is not seen yet.
     pub const fn is_doubted(&self) -> bool {
         self.doubt.is_some()
+    }
+
+    /// Whether nothing carries it just now: what flew and is so is in the air, though its autopilot may call it landed.
+    pub const fn is_uncarried(&self) -> bool {
+        self.uncarried.samples >= 2
     }
 
     /// Whether it is over: the vehicle lies where it came down.
@@ -274,6 +311,7 @@ impl Mishap {
         self.note_arming(now, vehicle, flight, params);
         self.note_rest(now, vehicle);
         self.doubted(now, vehicle, params);
+        self.note_silence(now, vehicle, flight, params);
         self.shocked(now, vehicle);
         let seen = self.seen.take();
         match (self.state, seen) {
@@ -287,7 +325,7 @@ impl Mishap {
                 self.place = place;
                 // What turned over right after a shock hit something first.
                 if let Some(shock) = self.shock.filter(|_| kind == Kind::Overturned) {
-                    self.touch_mps = self.touch_mps.max(shock.sink_mps);
+                    self.touch(now, shock.sink_mps);
                     self.see(now, Kind::Impact, shock.load_g);
                 }
                 Some(Change::Began(kind))
@@ -317,6 +355,10 @@ impl Mishap {
             strayed_at: self.strayed_at,
             moved_at: self.moved_at,
             stood_at_m: self.stood_at_m,
+            beat_at: self.beat_at,
+            beat_height_m: self.beat_height_m,
+            heard_at: self.heard_at,
+            felt_at: self.felt_at,
             ..Self::new()
         };
     }
@@ -333,16 +375,33 @@ impl Mishap {
         if armed && !self.armed {
             (self.on_bench, self.disarmed_at, self.doubt, self.stood) = (false, None, None, false);
         }
+        let beat_at = vehicle.heartbeat.at().unwrap_or(self.beat_at);
+        let mut before_m = self.beat_height_m;
+        let mut unseen = false;
+        if beat_at != self.beat_at {
+            unseen = vehicle.terminated_since.is_some() && beat_at.since(self.beat_at) > BEATS;
+            before_m = core::mem::replace(&mut self.beat_height_m, self.height_m);
+            self.beat_at = beat_at;
+        }
+        // Terminated before it was heard: it is in the air by its own word, and was never seen elsewhere.
+        let ended =
+            vehicle.armed() && !self.armed && self.disarmed_at.is_none() && self.state == State::Quiet;
+        if ended && vehicle.terminated_since.is_some() && flight.is_open() && !flight.was_on_ground() {
+            self.disarmed_at = Some(now);
+            self.doubt = Some(Doubt::unseen(now, height_m(now, vehicle).unwrap_or(0.0)));
+        }
         self.stood |= armed && vehicle.inertial.is_level(now);
         if self.armed && !armed {
             self.disarmed_at = Some(now);
             // The height of before: PX4's is 0 from the disarming on.
-            let high = self.height_m > params.get(Param::MisDisarm) || self.sink.greatest() > FALLING_MPS;
+            let height_m = if unseen { before_m } else { self.height_m };
+            let high = height_m > params.get(Param::MisDisarm) || self.sink.greatest() > FALLING_MPS;
             // The autopilot may have called it landed because it is disarmed.
             if high && flight.is_open() && self.state == State::Quiet {
                 let altitude_m = vehicle.global.within(now, FRESH).map(|global| global.altitude.0);
-                self.doubt =
-                    Some(Doubt { since: now, height_m: self.height_m, altitude_m, uncarried: false });
+                let doubt = Doubt::unseen(now, height_m);
+                let uncarried = self.is_uncarried() && now.since(self.uncarried.since) >= UNCARRIED;
+                self.doubt = Some(Doubt { altitude_m, uncarried, unseen, ..doubt });
             }
         }
         self.armed = armed;
@@ -440,7 +499,7 @@ impl Mishap {
 
     /// Disarmed out of a flight: what falls, sinks or glides on was disarmed in the air.
     fn doubted(&mut self, now: Instant, vehicle: &Vehicle, params: &Params) {
-        let Some(Doubt { since, height_m, altitude_m, uncarried }) = self.doubt else { return };
+        let Some(Doubt { since, height_m, altitude_m, uncarried, unseen }) = self.doubt else { return };
         // An estimator is shaken by the touch, and may fall on while the vehicle stands.
         let air = |sink_mps: f32| self.pressure.agrees(now, sink_mps) != Some(false);
         let fallen = |before: f32| {
@@ -454,10 +513,73 @@ impl Mishap {
         // An autopilot that lost its estimate terminates the flight, and tells no more of heights and speeds.
         let drops =
             vehicle.armed() && now.since(since) > FRESH && self.pressure.agrees(now, DROPS_MPS) == Some(true);
-        if uncarried || sinks || glides || drops || altitude_m.is_some_and(fallen) {
+        let lost = unseen && now.since(since) >= LIES_FOR && !self.stands(now, vehicle);
+        if uncarried || sinks || glides || drops || lost || altitude_m.is_some_and(fallen) {
             self.see(now, Kind::Disarmed, height_m.max(params.get(Param::MisDisarm).next_up()));
         } else if now.since(since) > FALL_SHOWS {
             self.doubt = None;
+        }
+    }
+
+    /// Whether its sensors say that it stands upright and still, and they are alive.
+    fn stands(&self, now: Instant, vehicle: &Vehicle) -> bool {
+        let slow = |speed_mps: Option<f32>| speed_mps.is_some_and(|speed_mps| speed_mps.abs() < STILL_MPS);
+        now.since(self.felt_at) <= STILL
+            && vehicle.inertial.is_level_for(now, STILL)
+            && slow(climb_mps(now, vehicle))
+            && slow(ground_speed_mps(now, vehicle))
+    }
+
+    /// What flew, was not heard, and is heard again: whether it came down meanwhile as nothing lands.
+    fn note_silence(&mut self, now: Instant, vehicle: &Vehicle, flight: &Flight, params: &Params) {
+        let Some(unheard) = &mut self.unheard else {
+            let flies = self.armed && flight.airborne() && self.state == State::Quiet && self.doubt.is_none();
+            if flies && now.since(self.heard_at) >= UNHEARD {
+                let (from, height_m, sink_mps) = (self.heard_at, self.height_m, self.sink.greatest());
+                self.unheard = Some(Unheard { from, to: None, well_at: now, height_m, sink_mps });
+            }
+            return;
+        };
+        if self.heard_at == unheard.from {
+            return;
+        }
+        let to = *unheard.to.get_or_insert(now);
+        let unheard = *unheard;
+        // Its states of before it was silent say nothing.
+        if now.since(to) < STILL {
+            if let Some(unheard) = &mut self.unheard {
+                unheard.well_at = now;
+            }
+            return;
+        }
+        if self.state != State::Quiet || now.since(to) > LYING_SHOWS {
+            self.unheard = None;
+            return;
+        }
+        if !on_rotors(now, vehicle) {
+            return;
+        }
+        let limit_deg = params.get(Param::MisOverturn);
+        let over_deg = vehicle.inertial.lies_over(now).map(f32::to_degrees).filter(|deg| *deg > limit_deg);
+        let lost_m = height_m(now, vehicle).map_or(0.0, |height_m| unheard.height_m - height_m);
+        let slow =
+            climb_mps(now, vehicle).is_none_or(|climb_mps| climb_mps.abs() < STILL_MPS) || self.rests(now);
+        let full = throttle(now, vehicle).is_some_and(|part| part >= FULL_THROTTLE);
+        let by_hand = has_pilots_throttle(vehicle);
+        let least_s = unheard.least_s(lost_m, params.get(Param::MisSink));
+        let fell = !by_hand && lost_m > CAME_DOWN_M && to.since(unheard.from).as_secs_f32() < least_s;
+        let down = slow && ((self.armed && full && lost_m > CAME_DOWN_M) || fell);
+        let is_still = self.rate < STILL_RATE;
+        if !(down || (over_deg.is_some() && is_still)) {
+            if let Some(unheard) = &mut self.unheard {
+                unheard.well_at = now;
+            }
+        } else if now.since(unheard.well_at) + STILL >= LIES_FOR {
+            (self.hit_at, self.unheard_from) = (to, Some(unheard.from));
+            match over_deg {
+                Some(over_deg) if is_still => self.see(now, Kind::Overturned, over_deg),
+                _ => self.see(now, Kind::Impact, params.get(Param::MisImpact).next_up()),
+            }
         }
     }
 
@@ -519,7 +641,7 @@ impl Mishap {
         if down {
             (self.state, self.flies_since) = (State::Down, None);
             if !strayed {
-                self.touch_mps = self.touch_mps.max(self.sink.greatest());
+                self.touch(now, self.sink.greatest());
             }
             self.place = Place::of(now, vehicle);
             return Some(Change::Down);
@@ -541,6 +663,11 @@ impl Mishap {
     /// When the first shock of the latest impact was.
     pub const fn hit_at(&self) -> Instant {
         self.hit_at
+    }
+
+    /// When it was heard last before it came down, where nobody heard it meanwhile.
+    pub const fn unheard_from(&self) -> Option<Instant> {
+        self.unheard_from
     }
 
     /// When it first hit something in this mishap; `None` where it did not.

@@ -67,6 +67,8 @@ const AT_END_PERCENT: f32 = OFF_PERCENT - 1.0;
 const SHARES_US: u16 = 1_667;
 /// 30 degrees a second: a pilot yaws faster, and gusts do not turn a vehicle so fast for long.
 const YAWS_RAD_S: f32 = 0.5;
+/// What nobody saw begin is believed after so long.
+const LASTS: Span = Span::from_secs(3);
 /// Messages that are further apart are not of the same hover.
 const PAUSE: Span = Span::from_secs(2);
 
@@ -90,6 +92,9 @@ pub(crate) struct MotorOutputs {
     summed: (u8, f32),
     /// The motor that stands out, and how far, percent.
     alone: (u8, f32),
+    /// The flight began before it was heard, and since when one output alone is at an end of its range.
+    began_unseen: bool,
+    at_end_since: Stamp,
 }
 
 impl MotorOutputs {
@@ -106,6 +111,8 @@ impl MotorOutputs {
             at: Stamp::NONE,
             summed: (0, 0.0),
             alone: (0, 0.0),
+            began_unseen: false,
+            at_end_since: Stamp::NONE,
         }
     }
 
@@ -135,6 +142,19 @@ impl MotorOutputs {
         self.note_off(&outputs.pulses);
         // What has no idle pulse on the ground is a servo.
         let known = self.idle & all == all;
+        self.began_unseen = !flight.was_on_ground();
+        if !known && self.began_unseen {
+            self.at = Stamp::at(at);
+            let (place, percent) = self.alone;
+            // The one opposite may idle then.
+            let stays = percent >= OFF_PERCENT && pulses.get(usize::from(place)).is_some_and(Self::is_out);
+            if !stays {
+                let at_end = Self::at_an_end(pulses).filter(|_| flies_level(at, vehicle, flight));
+                let lasts = self.at_end_since.run(at_end.is_some(), at, LASTS);
+                self.alone = at_end.filter(|_| lasts).unwrap_or_default();
+            }
+            return;
+        }
         let full = self.full & all;
         if known && full.is_power_of_two() {
             let place = full.trailing_zeros();
@@ -162,6 +182,31 @@ impl MotorOutputs {
             share.follow(given(pulse) / mean * 100.0 - 100.0, step_s, SMOOTHING_S);
         }
         self.judge(count, step_s);
+    }
+
+    /// The one output that is given next to nothing while all others carry, or is full while no other one is near that: what no flight
+    /// from before has to be known for. A pulse of nothing is of an output that is not used.
+    fn at_an_end(pulses: &[u16]) -> Option<(u8, f32)> {
+        let carries = |pulse: &u16| *pulse > ZERO_US + CARRIES_US;
+        let is_full = |pulse: &u16| *pulse >= FULL_US;
+        let shares = |pulse: &u16| (IDLE_US..SHARES_US).contains(pulse);
+        let used = pulses.iter().all(|pulse| *pulse > 0);
+        let only = |is: &dyn Fn(&u16) -> bool, others: &dyn Fn(&u16) -> bool| {
+            let place = pulses.iter().position(is).filter(|_| used)?;
+            let mut rest = pulses.iter().enumerate().filter(|(other, _)| *other != place);
+            rest.all(|(_, pulse)| others(pulse)).then_some(place as u8)
+        };
+        let out = only(&Self::is_out, &carries).map(|place| (place, OFF_PERCENT));
+        out.or_else(|| Some((only(&is_full, &shares)?, AT_END_PERCENT)))
+    }
+
+    const fn is_out(pulse: &u16) -> bool {
+        *pulse < ZERO_US + OFF_US
+    }
+
+    /// Whether the flight began before it was heard: how motors turned before is not known.
+    pub(crate) const fn began_unseen(&self) -> bool {
+        self.began_unseen
     }
 
     /// Which outputs are given next to nothing: also those beyond the motors of the frame that the vehicle says it is.
@@ -248,7 +293,10 @@ impl MotorOutputs {
 
     /// How far a motor's command alone is above what is usual, percent of the average; 0 for those that do not stand out.
     pub(crate) fn alone(&self, now: Instant, vehicle: &Vehicle, motor: u8) -> Option<Reading> {
-        let at = self.at.instant(now).filter(|at| now.since(*at) <= PAUSE && self.is_known())?;
+        let at = self
+            .at
+            .instant(now)
+            .filter(|at| now.since(*at) <= PAUSE && (self.is_known() || self.at_end_since.is_set()))?;
         if usize::from(motor) >= motors(vehicle) {
             return None;
         }

@@ -35,6 +35,8 @@ pub struct Mishap {
     pub at: Instant,
     /// It hit something.
     pub is_impact: bool,
+    /// Nobody heard it come down: when it was heard last before.
+    pub unheard_from: Option<Instant>,
 }
 
 /// Flights as they come, up to [`LISTED_MAX`].
@@ -77,9 +79,14 @@ impl Flight {
         self.mishap.filter(|mishap| mishap.is_impact == is_impact).map(|mishap| mishap.at.as_secs_f64())
     }
 
+    /// When it was heard last before a mishap that nobody heard, in seconds.
+    pub fn unheard_s(&self) -> Option<f64> {
+        Some(self.mishap?.unheard_from?.as_secs_f64())
+    }
+
     /// The impact that ended it is told once, when the box found it, as these findings of it say.
     pub(super) fn was_hit<'a>(&mut self, mut found: impl Iterator<Item = &'a Finding>) {
-        if let Some(Mishap { at, is_impact: true }) = &mut self.mishap
+        if let Some(Mishap { at, is_impact: true, .. }) = &mut self.mishap
             && let Some(finding) =
                 found.find(|finding| finding.at >= *at && finding.at.since(*at) <= FOUND_LATE)
         {
@@ -93,9 +100,10 @@ pub(super) fn begin_in_air(flights: &[Flight]) -> bool {
     flights.first().is_some_and(|flight| !flight.took_off)
 }
 
-/// Whether a flight that goes on is in the air: also where it was disarmed, and may fall.
+/// Whether a flight that goes on is in the air: also where it was disarmed, and may fall, or nothing carries it.
 pub(super) fn is_in_air(monitor: &Monitor) -> bool {
-    monitor.flight().airborne() || monitor.mishap().is_doubted()
+    let falls = || monitor.flight().is_open() && monitor.mishap().is_uncarried();
+    monitor.flight().airborne() || monitor.mishap().is_doubted() || falls()
 }
 
 impl Flights {
@@ -185,6 +193,7 @@ impl Flights {
         change: Change,
         now: Instant,
         hit_at: Option<Instant>,
+        unheard_from: Option<Instant>,
         monitor: &Monitor,
     ) {
         match change {
@@ -196,7 +205,8 @@ impl Flights {
             Change::Down => {
                 self.crashed = self.open;
                 if let Some(flight) = self.list.last_mut().filter(|_| self.open) {
-                    flight.mishap = Some(Mishap { at: hit_at.unwrap_or(now), is_impact: hit_at.is_some() });
+                    let (at, is_impact) = (hit_at.unwrap_or(now), hit_at.is_some());
+                    flight.mishap = Some(Mishap { at, is_impact, unheard_from });
                 }
             }
             Change::Began(_) | Change::FliesOn | Change::FliesAgain | Change::OnBench(_) => {}
@@ -243,7 +253,7 @@ mod tests {
             took_off: true,
             landed: false,
             disarmed_at_m: None,
-            mishap: Some(Mishap { at, is_impact: true }),
+            mishap: Some(Mishap { at, is_impact: true, unheard_from: None }),
         };
         let found = [60, 80, 69, 70].map(|at_s| change(at_s, Level::Critical, 9.9));
         flight.was_hit(found[..2].iter());

@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 
 use hums_core::health::Level;
 
-use super::problem::Problem;
+use super::problem::{Problem, mishap_at};
 
 /// A cause with what it explains.
 #[derive(Debug)]
@@ -30,8 +30,8 @@ impl<'a> Group<'a> {
     }
 }
 
-/// Problems by their causes: what is critical before warnings, there a mishap before all else and parts that are due behind it, then what came
-/// first.
+/// Problems by their causes: what is critical before warnings, there a mishap with what led to it (a warning too) before all else and parts
+/// that are due behind it, then what came first.
 pub fn grouped(problems: &[Problem]) -> Vec<Group<'_>> {
     let alike = alike(problems);
     let causes: Vec<_> = alike.iter().map(|one| cause(one, &alike)).collect();
@@ -46,7 +46,11 @@ pub fn grouped(problems: &[Problem]) -> Vec<Group<'_>> {
             is_raised: !is_critical(one) && explained().any(|one| is_critical(one)),
         });
     }
-    groups.sort_by_key(|group| (Reverse(group.is_critical()), group.first().map(Problem::order)));
+    let first = mishap_at(problems.iter());
+    groups.sort_by_key(|group| {
+        let leads = group.first().is_some_and(|problem| problem.leads_to(first));
+        (Reverse(group.is_critical() || leads), group.first().map(|problem| problem.order(first)))
+    });
     // The first of a check's groups has what it explains.
     let mut seen = BTreeSet::new();
     for group in &mut groups {

@@ -70,6 +70,7 @@ struct FlightJson {
     disarmed_at_m: Option<f32>,
     impact_s: Option<f64>,
     down_s: Option<f64>,
+    unheard_from_s: Option<f64>,
 }
 
 #[derive(Serialize)]
@@ -226,6 +227,7 @@ fn flight(flight: &Flight) -> FlightJson {
         disarmed_at_m: flight.disarmed_at_m,
         impact_s: flight.mishap_s(true),
         down_s: flight.mishap_s(false),
+        unheard_from_s: flight.unheard_s(),
     }
 }
 

@@ -395,7 +395,8 @@ impl Judge {
             }
             Told::Finding(finding) => {
                 self.checked_on_board = true;
-                self.board.take(finding, Span::ZERO);
+                let at = self.hit_at(finding);
+                self.board.take(&Finding { at, ..Finding::clone(finding) }, Span::ZERO);
                 self.details.tell(&finding.check, &mut self.board);
             }
             Told::Peak { check, instance, value } => self.board.peak(check, *instance, *value),
@@ -405,6 +406,19 @@ impl Judge {
             Told::Part { place, component } => self.monitor.learn_component(*place, *component),
             Told::Parameter { .. } | Told::Missing { .. } => {}
         }
+    }
+
+    /// When what a box found began: it finds an impact once what hit something lies still, and the shock is in its recording.
+    fn hit_at(&mut self, finding: &Finding) -> Instant {
+        const LIES_STILL: Span = Span::from_secs(5);
+        if !is_hit(finding) {
+            return finding.at;
+        }
+        self.advance(finding.at);
+        let steps = self.clock.monitor(finding.at);
+        let hit_at = self.monitor.mishap().hit_at();
+        let is_its = hit_at > Instant::ZERO && steps.since(hit_at) <= LIES_STILL;
+        if is_its { Clock::recording(finding.at, steps, hit_at).min(finding.at) } else { finding.at }
     }
 
     /// The autopilot's clock began again: another power-on in the same recording. Its own log begins anew with each, and raw frames have no
@@ -540,8 +554,10 @@ impl Judge {
                 Happening::OtherVehicle => self.flights.break_off(),
                 Happening::Mishap(change) => {
                     let hit_at = self.monitor.mishap().struck_at();
-                    let hit_at = hit_at.map(|hit_at| Clock::recording(now, steps, hit_at));
-                    self.flights.mishap(change, now, hit_at, &self.monitor);
+                    let unheard_from = self.monitor.mishap().unheard_from();
+                    let [hit_at, unheard_from] =
+                        [hit_at, unheard_from].map(|at| at.map(|at| Clock::recording(now, steps, at)));
+                    self.flights.mishap(change, now, hit_at, unheard_from, &self.monitor);
                 }
                 _ => {}
             }

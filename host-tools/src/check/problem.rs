@@ -54,11 +54,29 @@ pub struct Problem {
 }
 
 impl Problem {
-    /// What comes first of what is as bad: a mishap, behind all others parts that are due, and otherwise what came first.
-    pub(super) fn order(&self) -> (bool, bool, Instant) {
-        let is_mishap = self.subsystem == Subsystem::Mishap && self.level == Level::Critical;
-        (!is_mishap, part::is_due(&self.check), self.at)
+    /// What comes first of what is as bad: a mishap with what led to it, behind all others parts that are due, and otherwise what came first.
+    pub(super) fn order(&self, mishap_at: Option<Instant>) -> (bool, bool, Instant) {
+        (!self.is_mishap() && !self.leads_to(mishap_at), part::is_due(&self.check), self.at)
     }
+
+    /// Whether it is a mishap.
+    pub(super) fn is_mishap(&self) -> bool {
+        self.subsystem == Subsystem::Mishap && self.level == Level::Critical
+    }
+
+    /// Whether it is of what drives and holds the vehicle, and began shortly before a mishap.
+    pub(super) fn leads_to(&self, mishap_at: Option<Instant>) -> bool {
+        let is_of_flight = matches!(self.subsystem, Subsystem::Propulsion | Subsystem::Attitude);
+        is_of_flight && mishap_at.is_some_and(|at| self.at <= at && at.since(self.at) <= LEADS)
+    }
+}
+
+/// What leads to a mishap begins so shortly before it.
+const LEADS: Span = Span::from_secs(10);
+
+/// When the first mishap of some problems began.
+pub(super) fn mishap_at<'a>(mut problems: impl Iterator<Item = &'a Problem>) -> Option<Instant> {
+    problems.by_ref().filter(|problem| problem.is_mishap()).map(|problem| problem.at).min()
 }
 
 /// How bad a level is as a problem; stale is not known, and so is none.
@@ -273,7 +291,8 @@ impl Problems {
                 ..problem
             })
             .collect();
-        problems.sort_by_key(|problem| (std::cmp::Reverse(rank(problem.level)), problem.order()));
+        let first = mishap_at(problems.iter());
+        problems.sort_by_key(|problem| (std::cmp::Reverse(rank(problem.level)), problem.order(first)));
         problems
     }
 }

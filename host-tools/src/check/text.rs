@@ -333,8 +333,14 @@ fn not_seen(flights: &[Flight]) -> String {
     let last = flights.last();
     let ended = match last {
         Some(Flight { disarmed_at_m: Some(_), .. }) => Some("disarming in the air".to_owned()),
-        Some(Flight { mishap: Some(Mishap { at, is_impact }), .. }) => {
-            Some(format!("{}, {}", if *is_impact { "an impact" } else { "a mishap" }, moment(*at)))
+        Some(Flight { mishap: Some(Mishap { at, is_impact, unheard_from }), .. }) => {
+            let what = if *is_impact { "an impact" } else { "a mishap" };
+            Some(match unheard_from {
+                Some(from) => {
+                    format!("{what} that nobody heard, between {} and {}", moment(*from), moment(*at))
+                }
+                None => format!("{what}, {}", moment(*at)),
+            })
         }
         _ => None,
     };
@@ -684,7 +690,7 @@ mod tests {
         assert_eq!(not_seen(&[flight(false, true), flight(true, true)]), first);
         let crashed = Flight { disarmed_at_m: Some(9.0), ..flight(true, false) };
         assert_eq!(not_seen(&[crashed]), ", which ended by disarming in the air");
-        let hit = Some(Mishap { at: Instant::from_millis(91_500), is_impact: true });
+        let hit = Some(Mishap { at: Instant::from_millis(91_500), is_impact: true, unheard_from: None });
         let hit = Flight { mishap: hit, ..flight(true, false) };
         assert_eq!(not_seen(&[hit]), ", which ended by an impact, 1:31.5");
         let two = [
@@ -692,6 +698,10 @@ mod tests {
             Flight { mishap: hit.mishap.map(|it| Mishap { is_impact: false, ..it }), ..hit },
         ];
         assert_eq!(not_seen(&two), ", the last of which ended by a mishap, 1:31.5");
+        let unheard_from = Some(Instant::from_millis(85_000));
+        let unheard = Flight { mishap: hit.mishap.map(|it| Mishap { unheard_from, ..it }), ..hit };
+        let words = ", which ended by an impact that nobody heard, between 1:25.0 and 1:31.5";
+        assert_eq!(not_seen(&[unheard]), words);
     }
 
     #[test]

@@ -64,7 +64,8 @@ const ACTS: &[&str] = &["failsafe_alert", "autopilot_state"];
 
 /// What explains, and what it explains: the nearest to the cause first, in each row too.
 const ROWS: &[(&[&str], &[&str])] = &[
-    (&["heartbeat"], &["frames_lost", "esc_silent", "gcs_alert"]),
+    // An ESC's silence is counted while others are heard: a heartbeat that is late explains none.
+    (&["heartbeat"], &["frames_lost", "gcs_alert"]),
     (&["autopilot_reboot"], &["esc_silent", "ekf_alert"]),
     (DRIVE, &["roll_rate", "pitch_rate", "roll", "pitch", "attitude_alert", "thrust_lost", "vibration_rise"]),
     (&["motor_loss"], &["motor_output", "motor_imbalance", "drive_alert"]),

@@ -78,6 +78,10 @@ pub(super) fn orders(check: &Check, inputs: &Inputs<'_>, has_lost_drive: impl Fn
     if check.name == "esc_silent" && derived.are_escs_silent(now) {
         return Orders::Watch;
     }
+    // It comes down, or lies, whatever it still says.
+    if check.name == "autopilot_state" && vehicle.terminated_since.is_some() {
+        return Orders::Disarm;
+    }
     if check.name == Kind::Sinking.name() {
         let in_vain = derived.response().full_in_vain().is_some_and(|full| full.value > 0.0);
         return match vehicle.hovers(now) {

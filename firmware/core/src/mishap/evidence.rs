@@ -152,6 +152,42 @@ pub(super) struct Doubt {
     pub(super) altitude_m: Option<f32>,
     /// Nothing has carried it since.
     pub(super) uncarried: bool,
+    /// Its flight was terminated while nobody listened: the fall may be over.
+    pub(super) unseen: bool,
+}
+
+/// The vehicle was not heard, in the air.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Unheard {
+    /// When it was heard last.
+    pub(super) from: Instant,
+    /// When it was heard again.
+    pub(super) to: Option<Instant>,
+    /// When it did last what is no sign of a crash, since it is heard again.
+    pub(super) well_at: Instant,
+    /// Its height above home, and its sink, when it was heard last.
+    pub(super) height_m: f32,
+    pub(super) sink_mps: f32,
+}
+
+impl Unheard {
+    /// The shortest time in which what flies by itself comes down so far, stands and is disarmed: from its sink to the fastest descent that
+    /// can be set, as gently as autopilots do, and the last metres no faster than legs take.
+    pub(super) fn least_s(&self, lost_m: f32, limit_mps: f32) -> f32 {
+        const LAST_M: f32 = 5.0;
+        const LAST_MPS: f32 = 2.5;
+        const GENTLY_MPS2: f32 = 2.0;
+        let last_m = lost_m.min(LAST_M);
+        let faster_mps = (limit_mps - self.sink_mps).max(0.0);
+        last_m / LAST_MPS + (lost_m - last_m) / limit_mps + faster_mps / (2.0 * GENTLY_MPS2)
+    }
+}
+
+impl Doubt {
+    /// Of what was terminated while nobody listened.
+    pub(super) const fn unseen(since: Instant, height_m: f32) -> Self {
+        Self { since, height_m, altitude_m: None, uncarried: false, unseen: true }
+    }
 }
 
 pub(super) fn is_known(vector: [f32; 3]) -> bool {

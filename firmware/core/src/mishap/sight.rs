@@ -18,7 +18,7 @@ use crate::vehicle::Vehicle;
 const FALL_G: f32 = 0.3;
 /// A vehicle that was disarmed and is carried by less than this for so long falls; a bounce is shorter.
 const UNCARRIED_G: f32 = 0.5;
-const UNCARRIED: Span = Span::from_millis(200);
+pub(super) const UNCARRIED: Span = Span::from_millis(200);
 /// What falls is carried by less than this for so long: nobody asks a multicopter to sink so hard, and so short before a touch.
 const DROPS_G: f32 = 0.65;
 const DROPS: Span = Span::from_millis(300);
@@ -63,6 +63,7 @@ impl Mishap {
         if !watched || vehicle.kind() == VehicleKind::Surface {
             return;
         }
+        self.heard_at = at;
         match observation {
             Observation::Imu(imu) if imu.instance == 0 => self.take_imu(at, imu, vehicle, params),
             Observation::ImuAndAir(imu, air) => {
@@ -120,6 +121,7 @@ impl Mishap {
             return;
         }
         self.take_shock(at, load_g, vehicle, params);
+        self.felt_at = at;
         (self.load_g, self.from_above_g) = (load_g, force[2].0 / GRAVITY);
         if load_g >= DROPS_G {
             self.carried_at = at;
@@ -131,7 +133,7 @@ impl Mishap {
         {
             self.see(at, Kind::FreeFall, span.as_secs_f32().max(least_s.next_up()));
         }
-        self.uncarried.take(at, load_g < UNCARRIED_G && self.doubt.is_some());
+        self.uncarried.take(at, load_g < UNCARRIED_G);
         if self.uncarried.samples >= 2
             && at.since(self.uncarried.since) >= UNCARRIED
             && let Some(doubt) = &mut self.doubt
@@ -231,11 +233,18 @@ impl Mishap {
         let goes = matches!(self.state, State::Going(_));
         let lost = goes && self.has_strayed(at);
         if goes && !lost && -climb_mps < BROKEN_OFF * self.sink.greatest() {
-            self.touch_mps = self.touch_mps.max(self.sink.greatest());
+            self.touch(at, self.sink.greatest());
         }
         self.sink.take(at, -climb_mps);
         if !lost {
             self.take_sink(at, -climb_mps, vehicle, params);
+        }
+    }
+
+    /// It touched with this sink, where the air pressure does not contradict it: an estimate that is lost has any speed.
+    pub(super) fn touch(&mut self, at: Instant, sink_mps: f32) {
+        if self.pressure.agrees(at, sink_mps) != Some(false) {
+            self.touch_mps = self.touch_mps.max(sink_mps);
         }
     }
 

@@ -212,7 +212,7 @@ fn a_kill_switch_at_the_touch_down_is_no_alarm_and_in_the_air_it_is_one() {
 #[test]
 fn a_flight_that_is_terminated_without_an_estimate_falls_by_the_air_pressure() {
     // Position, speed and specific force stay as they were.
-    let terminated = |script| {
+    let terminated = |script: Script| {
         let outcome = fly(&hovering(ROTORS[1]), script);
         let at_ms = outcome.changes.first().map(|(at_ms, _)| *at_ms - AT_MS);
         (outcome.told(), at_ms, outcome.flights())

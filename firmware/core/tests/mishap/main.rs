@@ -4,6 +4,7 @@
 mod common;
 mod falls;
 mod impacts;
+mod silences;
 mod sinks;
 mod turns;
 
@@ -44,6 +45,8 @@ struct Motion {
     displayed_mps: Option<f32>,
     /// The roll that the autopilot wants, where it says so.
     roll_wanted: Option<f32>,
+    /// Nothing of it is heard.
+    unheard: bool,
 }
 
 const CALM: Motion = Motion {
@@ -56,6 +59,7 @@ const CALM: Motion = Motion {
     shock_g: None,
     displayed_mps: None,
     roll_wanted: None,
+    unheard: false,
 };
 
 type Script = fn(u64, &mut Quad, &mut Motion);
@@ -87,7 +91,7 @@ impl Outcome {
 }
 
 /// A minute; `script` gets the time since it goes wrong.
-fn fly(vehicle: &Quad, script: Script) -> Outcome {
+fn fly(vehicle: &Quad, script: impl Fn(u64, &mut Quad, &mut Motion)) -> Outcome {
     let mut monitor = Monitor::new(Params::defaults());
     let (mut findings, mut changes, mut reports) = (Vec::new(), Vec::new(), Vec::new());
     for now_ms in (0..60_000).step_by(50) {
@@ -105,8 +109,10 @@ fn fly(vehicle: &Quad, script: Script) -> Outcome {
         if let Some(shock_g) = motion.shock_g {
             monitor.observe(now, AUTOPILOT, &Observation::Shock(MetresPerSecond2(shock_g * 9.806_65)));
         }
-        monitor.observe(now, AUTOPILOT, &Observation::Imu(imu));
-        if now_ms.is_multiple_of(100) {
+        if !motion.unheard {
+            monitor.observe(now, AUTOPILOT, &Observation::Imu(imu));
+        }
+        if now_ms.is_multiple_of(100) && !motion.unheard {
             let (roll, pitch) = (Radians(quad.roll), Radians(motion.pitch));
             let attitude = Attitude { roll, pitch, rates, ..Attitude::default() };
             let height = if now_ms < 2_000 { quad.start_height } else { quad.height };
