@@ -146,6 +146,16 @@ pub(super) const CHECKS: &[Check] = &[
     },
     MISMATCH,
     Check {
+        name: "imu_gps",
+        warn: Some(Param::ImuGpsWarn),
+        hysteresis: 0.3,
+        instances: 1,
+        // It goes by the attitude and a receiver too.
+        part: Part::Vehicle,
+        read: |inputs, _| inputs.derived.crosschecks().pull().apart(inputs.now),
+        ..MISMATCH
+    },
+    Check {
         name: "gyro_mismatch",
         unit: "rad/s",
         warn: Some(Param::GyroMismWarn),

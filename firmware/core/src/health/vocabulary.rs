@@ -269,6 +269,9 @@ vocabulary! {
     "Do not fly until the autopilot's accelerometers are checked.";
     "gyro_mismatch" Vehicle "gyro agreement", "gyro", says "gyro # and others differ", "", needs "second gyro in flight";
     "Two gyros came apart in flight. Which one is wrong is known only where there are three."; "Do not fly until the autopilot's gyros are checked.";
+    "imu_gps" Vehicle "IMU against GPS velocity", "", says "IMU off GPS velocity", "", needs "acceleration, attitude and GPS velocity in flight";
+    "What the accelerometers measured was not the change of velocity that GPS saw: an accelerometer is wrong, or a gyro that led the attitude astray.";
+    "Do not fly until the autopilot's accelerometers and gyros are checked.";
     "compass_mismatch" Vehicle "compass agreement", "compass", says "compass # and others differ", "", needs "second compass";
     "Compasses came apart in flight: one is wrong, of two either, or a current or magnet is near it.";
     "Check the compasses, their wiring, and currents or magnets near them.";

@@ -107,6 +107,7 @@ pub(super) const CLASSES: &[Class] = &[
             "airspeed_alert",
             "accel_mismatch",
             "gyro_mismatch",
+            "imu_gps",
             "accel_stuck",
             "gyro_stuck",
         ],
