@@ -71,7 +71,8 @@ pub struct Derived {
     crosschecks: Crosschecks,
     outputs: MotorOutputs,
     response: Response,
-    load_factor: Latest<f32>,
+    /// Of the last sample, and smoothed.
+    load_factor: Latest<[f32; 2]>,
     /// When anything at all was heard of the vehicle.
     heard: Option<Instant>,
     /// When it was heard again after a silence.
@@ -220,11 +221,11 @@ impl Derived {
         let shakes =
             |vibration: &Vibration| vibration.levels.iter().flatten().any(|level| *level >= SHAKES_MPS2);
         if imu.instance == 0
-            && imu.acceleration.is_some()
             && !vehicle.vibration.within(at, SHAKEN).is_some_and(shakes)
-            && let Some(load_g) = load_factor_of(vehicle.inertial.force())
+            && let Some(sample_g) = imu.acceleration.and_then(load_factor_g)
+            && let Some(smooth_g) = load_factor_of(vehicle.inertial.force())
         {
-            self.load_factor.set(at, load_g);
+            self.load_factor.set(at, [sample_g, smooth_g]);
         }
     }
 
@@ -540,14 +541,14 @@ impl Derived {
         Reading::new(vehicle.vibration.at(), Some(self.clips.lately()))
     }
 
-    /// Magnitude of the specific force, smoothed by axis ([`crate::inertial`]), in units of gravity: 1 at rest and in steady flight.
+    /// Magnitude of the specific force in units of gravity: 1 at rest and in steady flight.
     pub(crate) fn load_factor(&self) -> Option<Reading> {
-        Reading::new(self.load_factor.at(), self.load_factor.get().copied())
+        Reading::new(self.load_factor.at(), self.load_factor.get().map(|[sample_g, _]| *sample_g))
     }
 
-    /// The latest load factor, in units of gravity.
+    /// The same of the force as it is smoothed by axis ([`crate::inertial`]): a load that counts.
     pub(crate) fn load_factor_g(&self) -> Option<f32> {
-        self.load_factor.get().copied()
+        self.load_factor.get().map(|[_, smooth_g]| *smooth_g)
     }
 
     /// Whether a receiver has had a 3D fix since power-on.

@@ -88,7 +88,7 @@ const INPUTS: &[(&str, &str)] = &[
     ("clipping", "VIBRATION: clipped samples of a flight, since ten seconds without any"),
     (
         "load_factor",
-        "SCALED_IMU, RAW_IMU, HIGHRES_IMU: specific force over gravity, each axis smoothed over 0.3 s, while VIBRATION is below 60",
+        "SCALED_IMU, RAW_IMU, HIGHRES_IMU: specific force over gravity, while VIBRATION is below 60",
     ),
     ("vibration_trend", "VIBRATION in steady flight, above or below its baseline"),
     ("airframe_due", "components of kind airframe, other"),

@@ -146,6 +146,15 @@ pub(super) const CHECKS: &[Check] = &[
     },
     MISMATCH,
     Check {
+        name: "gyro_mismatch",
+        unit: "rad/s",
+        warn: Some(Param::GyroMismWarn),
+        hysteresis: 0.02,
+        debounce_warn: SMOOTHED,
+        read: |inputs, sensor| mismatch(inputs, Kind::Gyro, sensor),
+        ..MISMATCH
+    },
+    Check {
         name: "imu_gps",
         warn: Some(Param::ImuGpsWarn),
         hysteresis: 0.3,
@@ -153,15 +162,6 @@ pub(super) const CHECKS: &[Check] = &[
         // It goes by the attitude and a receiver too.
         part: Part::Vehicle,
         read: |inputs, _| inputs.derived.crosschecks().pull().apart(inputs.now),
-        ..MISMATCH
-    },
-    Check {
-        name: "gyro_mismatch",
-        unit: "rad/s",
-        warn: Some(Param::GyroMismWarn),
-        hysteresis: 0.02,
-        debounce_warn: SMOOTHED,
-        read: |inputs, sensor| mismatch(inputs, Kind::Gyro, sensor),
         ..MISMATCH
     },
     Check {
