@@ -12,7 +12,8 @@ The figures are those of docs/usage.md, worked out after the flight with the who
   charge_ah, energy_wh      BATTERY_STATUS of all batteries, else SYS_STATUS, else (no current there) ESC_STATUS of all
                             motors, each figure until the next one, 5 s at most (ESC 2 s)
   current_max_a, voltage_min_v, vibration_max_m_s2        of the same messages and of VIBRATION, while armed
-  load_factor_max_g         the norm of the first accelerometer, in the air
+  load_factor_max_g         the norm of the first accelerometer, each axis through a first-order filter of 0.3 s, in the air and where
+                            VIBRATION is below 60
 
 A recording without times (raw) is taken as what a line at 115,200 baud carries.
 """
@@ -28,6 +29,9 @@ BATTERY_HOLD_S, ESC_HOLD_S, MOTION_HOLD_S, STATE_HOLD_S = 5.0, 2.0, 3.0, 5.0
 LINE_BYTES_PER_S = 11_520
 INVALID_AUTOPILOT = 8
 GRAVITY = 9.80665
+# What a manoeuvre is, and what no sensor measures; vibration that leaves no load factor, and how long a word of it holds.
+LOAD_FILTER_S, LOAD_MAX_G = 0.3, 60.0
+SHAKES_M_S2, SHAKEN_S = 60.0, 3.0
 # BATTERY_STATUS and SYS_STATUS: -1, and what PX4 makes of its own -1 A.
 UNKNOWN_CURRENT = (-1, -100)
 ON_GROUND, IN_AIR, TAKING_OFF, LANDING = 1, 2, 3, 4
@@ -235,8 +239,7 @@ def figures(messages):
         max(message.vibration_x, message.vibration_y, message.vibration_z)
         for time_s, message in messages if message.get_type() == "VIBRATION" and within(time_s, armed))
     found["load_factor_max_g"] = most(
-        load_factor(message) for time_s, message in messages
-        if message.get_type() in ("RAW_IMU", "SCALED_IMU", "HIGHRES_IMU") and within(time_s, air))
+        load_g for time_s, load_g in load_factors(messages) if within(time_s, air))
     return found
 
 
@@ -251,13 +254,36 @@ def current_max(sources, armed):
     return most
 
 
-def load_factor(message):
-    if getattr(message, "id", 0) != 0:
-        return 0.0
-    norm = math.sqrt(message.xacc ** 2 + message.yacc ** 2 + message.zacc ** 2)
+def load_factors(messages):
+    """The time and the load factor of each sample, where vibration leaves one."""
+    force, before_s, shaken_s = None, None, -math.inf
+    for time_s, message in messages:
+        if message.get_type() == "VIBRATION":
+            most = max(message.vibration_x, message.vibration_y, message.vibration_z)
+            shaken_s = time_s if most >= SHAKES_M_S2 else -math.inf
+        sample = specific_force(message)
+        if sample is None or norm(sample) > LOAD_MAX_G * GRAVITY:
+            continue
+        step_s = math.inf if force is None else time_s - before_s
+        if step_s > 0:
+            weight = step_s / (LOAD_FILTER_S + step_s) if step_s < 1 else 1.0
+            force = sample if force is None else [old + weight * (new - old) for old, new in zip(force, sample)]
+            before_s = time_s
+        if time_s - shaken_s > SHAKEN_S:
+            yield time_s, norm(force) / GRAVITY
+
+
+def specific_force(message):
+    if message.get_type() not in ("RAW_IMU", "SCALED_IMU", "HIGHRES_IMU") or getattr(message, "id", 0) != 0:
+        return None
+    force = [message.xacc, message.yacc, message.zacc]
     if message.get_type() == "HIGHRES_IMU":
-        return norm / GRAVITY if message.fields_updated & 7 == 7 else 0.0
-    return norm / 1000
+        return force if message.fields_updated & 7 == 7 else None
+    return [axis * GRAVITY / 1000 for axis in force]
+
+
+def norm(vector):
+    return math.sqrt(sum(axis * axis for axis in vector))
 
 
 def main():

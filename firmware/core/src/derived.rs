@@ -6,7 +6,7 @@ use crate::crosscheck::Crosschecks;
 use crate::currents::Currents;
 use crate::flight::{Flight, FlightEvent};
 use crate::latest::{Latest, Reading};
-use crate::observation::{Battery, EscGroup, Imu, MOTORS_MAX, Observation};
+use crate::observation::{Battery, EscGroup, Imu, MOTORS_MAX, Observation, Vibration};
 use crate::outputs::MotorOutputs;
 use crate::params::{Param, Params};
 use crate::response::Response;
@@ -18,6 +18,9 @@ use crate::vehicle::{BATTERIES_MAX, RECEIVERS_MAX, Vehicle};
 
 /// No sensor that autopilots have measures more than 32 g an axis: beyond this it is garbage.
 const LOAD_MAX_G: f32 = 60.0;
+/// Vibration, m/s2 an axis, that is above all that a vehicle flies with: `ArduPilot`'s own limit for too much (wiki, "Measuring Vibration").
+const SHAKES_MPS2: f32 = 60.0;
+const SHAKEN: Span = Span::from_secs(3);
 /// So much of a cell's voltage may be its sag under the load, V. A cell that sags further is near its end, whatever its charge.
 const SAG_MAX_V: f32 = 0.3;
 /// A motor that never turned faster is not fitted.
@@ -68,7 +71,8 @@ pub struct Derived {
     crosschecks: Crosschecks,
     outputs: MotorOutputs,
     response: Response,
-    load_factor: Latest<f32>,
+    /// Of the last sample, and smoothed.
+    load_factor: Latest<[f32; 2]>,
     /// When anything at all was heard of the vehicle.
     heard: Option<Instant>,
     /// When it was heard again after a silence.
@@ -213,10 +217,15 @@ impl Derived {
 
     fn take_imu(&mut self, at: Instant, imu: &Imu, vehicle: &Vehicle, flight: &Flight) {
         self.crosschecks.take_imu(at, imu, vehicle, flight);
+        // What shakes so has no load factor: its samples are of the vibration, and too few to average that out.
+        let shakes =
+            |vibration: &Vibration| vibration.levels.iter().flatten().any(|level| *level >= SHAKES_MPS2);
         if imu.instance == 0
-            && let Some(load_g) = imu.acceleration.and_then(load_factor_g)
+            && !vehicle.vibration.within(at, SHAKEN).is_some_and(shakes)
+            && let Some(sample_g) = imu.acceleration.and_then(load_factor_g)
+            && let Some(smooth_g) = load_factor_of(vehicle.inertial.force())
         {
-            self.load_factor.set(at, load_g);
+            self.load_factor.set(at, [sample_g, smooth_g]);
         }
     }
 
@@ -536,12 +545,12 @@ impl Derived {
 
     /// Magnitude of the specific force in units of gravity: 1 at rest and in steady flight.
     pub(crate) fn load_factor(&self) -> Option<Reading> {
-        Reading::new(self.load_factor.at(), self.load_factor.get().copied())
+        Reading::new(self.load_factor.at(), self.load_factor.get().map(|[sample_g, _]| *sample_g))
     }
 
-    /// The latest load factor, in units of gravity.
+    /// The same of the force as it is smoothed by axis ([`crate::inertial`]): a load that counts.
     pub(crate) fn load_factor_g(&self) -> Option<f32> {
-        self.load_factor.get().copied()
+        self.load_factor.get().map(|[_, smooth_g]| *smooth_g)
     }
 
     /// Whether a receiver has had a 3D fix since power-on.
@@ -565,9 +574,13 @@ impl Derived {
     }
 }
 
-/// The specific force in units of gravity; `None` where it was not measured.
+/// A sample of the specific force in units of gravity; `None` where it was not measured.
 pub(crate) fn load_factor_g(force: [MetresPerSecond2; 3]) -> Option<f32> {
-    Some(norm(force.map(|axis| axis.0)) / GRAVITY).filter(|load_g| *load_g <= LOAD_MAX_G)
+    load_factor_of(force.map(|axis| axis.0))
+}
+
+fn load_factor_of(force: [f32; 3]) -> Option<f32> {
+    Some(norm(force) / GRAVITY).filter(|load_g| *load_g <= LOAD_MAX_G)
 }
 
 /// A battery's voltage; the autopilot's figure for the first one where no battery reports itself.

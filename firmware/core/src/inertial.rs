@@ -15,7 +15,10 @@ use crate::observation::Imu;
 use crate::time::{Instant, Span, Stamp};
 use crate::units::{GRAVITY, MetresPerSecond2, Radians, RadiansPerSecond, norm};
 
-/// Time constant of the force.
+/// No sensor that autopilots have measures more than 32 g an axis: beyond this, m/s2, it is garbage.
+const FORCE_MAX: f32 = 60.0 * GRAVITY;
+/// Time constant of the force: what lasts for less than two seconds up and down is taken for a gust and no manoeuvre, by the reports of
+/// loads in operation (DOT/FAA/AR-04/44), and 0.53 Hz is where this filter begins.
 const SMOOTHING_S: f32 = 0.3;
 /// It has been level and still for so long.
 const LASTS: Span = Span::from_millis(1_500);
@@ -134,7 +137,9 @@ impl Inertial {
 
     fn take_force(&mut self, at: Instant, force: [f32; 3]) {
         let step_s = self.at.map_or(f32::INFINITY, |before| at.since(before).as_secs_f32());
-        if step_s == 0.0 {
+        let [x, y, z] = force;
+        let is_measured = x * x + y * y + z * z <= FORCE_MAX * FORCE_MAX;
+        if step_s == 0.0 || !is_measured {
             return;
         }
         let weight = weight(self.at.map(|before| at.since(before)), SMOOTHING_S);
@@ -143,9 +148,6 @@ impl Inertial {
             *smooth += weight * (axis - *smooth);
         }
         self.take_step(at, step_s, force[2]);
-        if !self.force.iter().all(|axis| axis.is_finite()) {
-            (self.force, self.at) = ([0.0; 3], None);
-        }
         let [x, y, z] = self.force;
         let square = x * x + y * y + z * z;
         let rests =
@@ -188,6 +190,16 @@ impl Inertial {
     /// Whether it shakes less than what is carried by rotors. What has no noise, as simulators have none, is calm too.
     pub(crate) fn is_calm(&self, now: Instant) -> bool {
         self.has_steps(now) && self.step < CALM_MPS2
+    }
+
+    /// The specific force, smoothed, m/s2.
+    pub(crate) const fn force(&self) -> [f32; 3] {
+        self.force
+    }
+
+    /// How far the force steps from sample to sample, m/s2.
+    pub(crate) const fn shakes_mps2(&self) -> f32 {
+        self.step
     }
 
     fn is_fresh(&self, now: Instant) -> bool {

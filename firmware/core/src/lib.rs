@@ -35,6 +35,7 @@ mod outputs;
 pub mod param_words;
 pub mod params;
 pub mod protect;
+mod pull;
 mod rainflow;
 mod response;
 mod rotation;

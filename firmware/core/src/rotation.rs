@@ -28,6 +28,11 @@ pub(crate) fn from_axes_of(other: [f32; 4], vector: [f32; 3], attitude: &Attitud
     turn([w, -x, -y, -z], turn(other, vector))
 }
 
+/// A vector about the body's axes, in north, east, down.
+pub(crate) fn to_earth(attitude: &Attitude, vector: [f32; 3]) -> [f32; 3] {
+    turn(of([attitude.roll.0, attitude.pitch.0, attitude.yaw.0]), vector)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -51,6 +51,9 @@ struct Fitted {
     gps_until_ms: u64,
     /// How fast it flies north, m/s.
     speed: f32,
+    /// The receiver's speed north, m/s, where it tells one, and how far north that has brought it, m.
+    gps_speed: Option<f32>,
+    gps_north: f32,
     /// Whether it tells its position now.
     places: bool,
     /// How far the second estimator is apart: in roll, rad, in height and north, m.
@@ -101,6 +104,8 @@ impl Fitted {
             hud_climb: None,
             gps_until_ms: u64::MAX,
             speed: 1.0,
+            gps_speed: None,
+            gps_north: 0.0,
             places: true,
             second: None,
         }
@@ -124,7 +129,10 @@ impl Fitted {
             }
             if let Observation::Gnss(gnss) = observation {
                 let moment = now_ms.min(self.gps_until_ms);
-                let latitude_deg = 47.0 + f64::from(noise(moment, 73)) * 1e-6;
+                let latitude_deg =
+                    47.0 + f64::from(noise(moment, 73)) * 1e-6 + f64::from(self.gps_north) / 111_320.0;
+                gnss.speed = self.gps_speed.map(MetresPerSecond);
+                gnss.course = self.gps_speed.map(|_| Radians(0.0));
                 gnss.position = Some(Position { latitude_deg, longitude_deg: 8.0 });
                 gnss.altitude = Some(Metres(if moment == now_ms { self.altitude } else { 120.0 }));
             }
@@ -206,6 +214,48 @@ fn finds(check: &str, instance: u8, level: Level, within_ms: u64, fault: impl Fn
 #[track_caller]
 fn is_quiet(script: impl Fn(u64, &mut Fitted)) {
     assert_eq!(fly(script), []);
+}
+
+#[test]
+fn accelerometers_that_are_wrong_alike_are_told_by_the_velocity_of_gps() {
+    let finds = |fault: fn(&mut Fitted)| {
+        let findings = fly(|now_ms, fitted| {
+            fitted.gps_speed = Some(0.0);
+            if now_ms >= FAULT_MS {
+                fault(fitted);
+            }
+        });
+        let found = findings.first().map(|found| (found.check, found.level));
+        assert_eq!(found, Some(("imu_gps", Level::Warning)), "{findings:?}");
+        let after_ms = findings[0].at.as_millis() - FAULT_MS;
+        assert!((500..=3_000).contains(&after_ms), "{after_ms} ms");
+        assert_eq!(findings.len(), 1, "{findings:?}");
+    };
+    finds(|fitted| fitted.force.iter_mut().for_each(|force| force[2] += 4.0));
+    finds(|fitted| fitted.force.iter_mut().for_each(|force| force[0] -= 4.0));
+    // A gyro that led the attitude astray.
+    finds(|fitted| {
+        fitted.quad.roll += 0.4;
+        // Near the equator, where a lean that is none does not turn the compass's heading.
+        fitted.field.iter_mut().for_each(|field| field[2] -= 0.4);
+    });
+}
+
+#[test]
+fn a_force_that_changes_the_velocity_is_no_fault_and_a_leap_of_the_velocity_is_none_of_the_force() {
+    is_quiet(|now_ms, fitted| {
+        let pulled_s = (now_ms.saturating_sub(FAULT_MS) as f32 / 1e3).min(6.0);
+        let coasted_s = (now_ms.saturating_sub(FAULT_MS) as f32 / 1e3) - pulled_s;
+        fitted.gps_speed = Some(3.0 * pulled_s);
+        fitted.gps_north = 3.0 * pulled_s * (pulled_s / 2.0 + coasted_s);
+        if pulled_s > 0.0 && coasted_s <= 0.0 {
+            fitted.force.iter_mut().for_each(|force| force[0] += 3.0);
+        }
+    });
+    let leaps = fly(|now_ms, fitted| {
+        fitted.gps_speed = Some(if now_ms >= FAULT_MS { 8.0 } else { 0.0 });
+    });
+    assert!(leaps.iter().all(|finding| finding.check == "gps_speed"), "{leaps:?}");
 }
 
 #[test]

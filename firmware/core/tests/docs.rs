@@ -86,7 +86,10 @@ const INPUTS: &[(&str, &str)] = &[
         "VIBRATION: the worst axis, or PX4's accelerometer metric, over what is usual in this flight; on rotors away from the ground",
     ),
     ("clipping", "VIBRATION: clipped samples of a flight, since ten seconds without any"),
-    ("load_factor", "SCALED_IMU, RAW_IMU, HIGHRES_IMU: specific force over gravity"),
+    (
+        "load_factor",
+        "SCALED_IMU, RAW_IMU, HIGHRES_IMU: specific force over gravity, while VIBRATION is below 60",
+    ),
     ("vibration_trend", "VIBRATION in steady flight, above or below its baseline"),
     ("airframe_due", "components of kind airframe, other"),
     ("vibration_alert", "STATUSTEXT, EVENT"),
@@ -103,6 +106,10 @@ const INPUTS: &[(&str, &str)] = &[
     (
         "accel_mismatch",
         "RAW_IMU, SCALED_IMU, SCALED_IMU2, SCALED_IMU3, HIGHRES_IMU: difference of the forces beyond its usual range in this flight; on rotors, in a hover or turning little",
+    ),
+    (
+        "imu_gps",
+        "RAW_IMU, SCALED_IMU, HIGHRES_IMU: force of the first sensor, turned by ATTITUDE, less the change of GPS_RAW_INT's velocity and of the climb, beyond its own steps; of planes without the climb; not of VTOLs, not in fast turns",
     ),
     (
         "gyro_mismatch",

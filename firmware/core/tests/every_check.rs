@@ -217,7 +217,7 @@ const FAULTS: [(&str, u8, Level, Fault); 98] = [
 
 /// Found by scripts of their own: silence, restarts and rates in `scripted_faults.rs`, what departs from a baseline in
 /// `trends.rs`, mishaps in `mishap.rs`, what departs from its usual level in a flight in `crosscheck.rs`.
-const ELSEWHERE: [&str; 44] = [
+const ELSEWHERE: [&str; 45] = [
     "ahrs2_tilt",
     "ahrs2_height",
     "ahrs2_position",
@@ -239,6 +239,7 @@ const ELSEWHERE: [&str; 44] = [
     "pitch_rate",
     "accel_mismatch",
     "gyro_mismatch",
+    "imu_gps",
     "compass_mismatch",
     "baro_mismatch",
     "compass_unused",

@@ -316,7 +316,7 @@ fn out_and_back(
     vehicle.roll = if (20_000..25_000).contains(&now_ms) { 1.2 } else { 0.02 };
     let pack_v = if (30_000..70_000).contains(&now_ms) { 13.2 } else { 15.6 };
     vehicle.battery.voltage = Some(Volts(pack_v));
-    vehicle.vibration.levels = [Some(1.0); 3];
+    vehicle.vibration.levels = [Some(0.1), Some(0.1), Some(1.0)];
     vehicle
 }
 

@@ -42,6 +42,7 @@ const SENSORS: &[&str] = &[
     "accel_mismatch",
     "gyro_mismatch",
     "gyro_noise",
+    "imu_gps",
     "compass_mismatch",
     "baro_mismatch",
     "baro_noise",
@@ -82,10 +83,16 @@ const ROWS: &[(&[&str], &[&str])] = &[
     (GNSS, &["baro_height", "position_silent"]),
     (&["heartbeat", "frames_lost"], &["position_silent"]),
     (&["accel_stuck", "accel_alert"], &["accel_mismatch"]),
+    (&["gps_fix", "gps_jamming", "gps_spoofing", "gps_stuck", "gps_speed", "gps_height"], &["imu_gps"]),
+    (
+        &["accel_stuck", "gyro_stuck", "accel_alert", "gyro_alert", "accel_mismatch", "gyro_mismatch"],
+        &["imu_gps"],
+    ),
+    (&["imu_gps"], &["gnss_alert", "baro_noise"]),
     (&["compass_stuck", "compass_alert"], &["compass_mismatch"]),
     (&["gyro_stuck", "gyro_alert"], &["gyro_mismatch"]),
     (
-        &["gyro_stuck", "gyro_alert", "gyro_mismatch", "gyro_noise"],
+        &["gyro_stuck", "gyro_alert", "gyro_mismatch", "gyro_noise", "imu_gps"],
         &["compass_unused", "compass_heading", "ekf_compass", "ekf_mag_ratio"],
     ),
     (
@@ -100,7 +107,7 @@ const ROWS: &[(&[&str], &[&str])] = &[
     (SENSORS, SECOND),
     (SHAKING, SECOND),
     (ESTIMATOR, SECOND),
-    (SHAKING, &["accel_mismatch", "gyro_mismatch"]),
+    (SHAKING, &["accel_mismatch", "gyro_mismatch", "imu_gps", "load_factor"]),
     // Height control follows the estimator.
     (&["ekf_climb"], &["ekf_variance", "ekf_failsafe", "ekf_test_ratio", "ekf_alert", "thrust_lost"]),
     (&["vibration", "vibration_px4"], &["vibration_rise", "clipping", "vibration_alert"]),

@@ -64,7 +64,7 @@ pub struct Health {
     stepped: u8,
 }
 
-const _: () = assert!(size_of::<Health>() <= 5 * 1024);
+const _: () = assert!(size_of::<Health>() <= 5 * 1024 + 128);
 
 impl Default for Health {
     fn default() -> Self {

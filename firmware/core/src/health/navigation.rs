@@ -167,6 +167,16 @@ pub(super) const CHECKS: &[Check] = &[
         ..MISMATCH
     },
     Check {
+        name: "imu_gps",
+        warn: Some(Param::ImuGpsWarn),
+        hysteresis: 0.3,
+        instances: 1,
+        // It goes by the attitude and a receiver too.
+        part: Part::Vehicle,
+        read: |inputs, _| inputs.derived.crosschecks().pull().apart(inputs.now),
+        ..MISMATCH
+    },
+    Check {
         name: "compass_mismatch",
         unit: "%",
         warn: Some(Param::MagMismWarn),

@@ -76,6 +76,8 @@ pub(super) const CHECKS: &[Check] = &[
         debounce_warn: Span::from_millis(500),
         debounce_critical: Span::from_millis(500),
         when: When::InFlight,
+        // Never stale: what shakes has none.
+        stale_after: None,
         part: Part::Vehicle,
         read: |inputs, _| inputs.derived.load_factor(),
         ..VIBRATION

@@ -271,6 +271,9 @@ vocabulary! {
     "Two gyros came apart in flight. Which one is wrong is known only where there are three."; "Do not fly until the autopilot's gyros are checked.";
     "gyro_noise" Px4 "gyro noise", "", says "gyro noisy", "", needs "vibration metrics";
     "The autopilot's gyro was noisy, or shaken fast: it steers by it."; "Do not fly until the gyro, and the autopilot's mounting, are checked.";
+    "imu_gps" Vehicle "IMU against GPS velocity", "", says "IMU off GPS velocity", "", needs "acceleration, attitude and GPS velocity in flight";
+    "The measured force was not the change of GPS velocity: an accelerometer or a gyro is wrong.";
+    "Do not fly until the autopilot's accelerometers and gyros are checked.";
     "compass_mismatch" Vehicle "compass agreement", "compass", says "compass # and others differ", "", needs "second compass";
     "Compasses came apart in flight: one is wrong, of two either, or a current or magnet is near it.";
     "Check the compasses, their wiring, and currents or magnets near them.";

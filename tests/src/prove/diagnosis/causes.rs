@@ -108,6 +108,7 @@ pub(super) const CLASSES: &[Class] = &[
             "accel_mismatch",
             "gyro_mismatch",
             "gyro_noise",
+            "imu_gps",
             "accel_stuck",
             "gyro_stuck",
         ],
