@@ -143,10 +143,11 @@ impl<'a> Blocks<'a> {
                 none => none.insert(File::open(&piece.path).with_context(context)?),
             };
             self.begun += self.buffer.len() as u64;
-            self.buffer.clear();
+            // What is overwritten is not filled with zeros before.
             self.buffer.resize((length as usize).next_multiple_of(BLOCK_BYTES), 0);
-            let bytes = self.buffer.get_mut(..length as usize).unwrap_or_default();
+            let (bytes, behind) = self.buffer.split_at_mut(length as usize);
             file.read_at(extent.start + self.offset, bytes).with_context(context)?;
+            behind.fill(0);
             self.offset += length;
             self.at = 0;
             return Ok(true);
