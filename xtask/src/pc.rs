@@ -6,7 +6,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result, bail};
-use cargo_metadata::{Artifact, Message, MetadataCommand, TargetKind};
+use cargo_metadata::{Artifact, Message, Metadata, MetadataCommand, TargetKind};
 use serde::{Deserialize, Serialize};
 
 use crate::firmware::Board;
@@ -36,15 +36,36 @@ pub(crate) struct TestProgram {
     path: PathBuf,
 }
 
+/// What is built one after the other: programs with their tests; each crate's own tests; and those of `hums`, the largest crate, without
+/// optimisation, which costs more than what they run faster by.
+const PARTS: [(&[&str], &[&str]); 3] = [
+    (&CHOICE, &["--test=*", "--bin=hums", "--bin=hums-fuzz", "--bin=xtask"]),
+    (&CHOICE, &["--lib", "--exclude=hums"]),
+    (&["--package=hums"], &["--lib", "--config=profile.test.package.hums.opt-level=0"]),
+];
+
 /// Builds `hums`, the campaigns and all tests.
 pub(crate) fn build() -> Result<()> {
-    let text = Shell::cargo()
-        .args(["test", "--no-run", "--message-format=json-render-diagnostics"])
-        .args(CHOICE)
-        .output()?;
     let metadata = MetadataCommand::new().no_deps().current_dir(repo::root()).exec()?;
     let mut programs = Vec::new();
-    for message in Message::parse_stream(text.as_bytes()) {
+    for (choice, targets) in PARTS {
+        let text = Shell::cargo()
+            .args(["test", "--no-run", "--message-format=json-render-diagnostics"])
+            .args(choice)
+            .args(targets)
+            .output()?;
+        note_programs(&text, &metadata, &mut programs)?;
+    }
+    programs.sort_by(|a, b| (&a.package, &a.name).cmp(&(&b.package, &b.name)));
+    fs::create_dir_all(list().parent().unwrap_or(Path::new(".")))?;
+    fs::write(list(), serde_json::to_vec(&programs)?)?;
+    println!("{} test programs", programs.len());
+    Ok(())
+}
+
+/// The test programs of which cargo says that it built them.
+fn note_programs(said: &str, metadata: &Metadata, programs: &mut Vec<TestProgram>) -> Result<()> {
+    for message in Message::parse_stream(said.as_bytes()) {
         let Message::CompilerArtifact(Artifact { package_id, target, profile, executable, .. }) = message?
         else {
             continue;
@@ -60,10 +81,6 @@ pub(crate) fn build() -> Result<()> {
             path: path.into(),
         });
     }
-    programs.sort_by(|a, b| (&a.package, &a.name).cmp(&(&b.package, &b.name)));
-    fs::create_dir_all(list().parent().unwrap_or(Path::new(".")))?;
-    fs::write(list(), serde_json::to_vec(&programs)?)?;
-    println!("{} test programs", programs.len());
     Ok(())
 }
 

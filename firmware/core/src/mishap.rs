@@ -51,9 +51,8 @@ use crate::time::{Instant, Span, Stamp};
 use crate::vehicle::{LANDED_STATE_AGE, Vehicle};
 use evidence::{
     BREAKS_OFF, Doubt, FRESH, FULL_THROTTLE, IDLE_THROTTLE, Lasting, Pressure, Recent, Shock, THRUST_PART,
-    Unheard, is_known, is_tilted, on_rotors, throttle,
+    UNCARRIED, Unheard, is_known, is_tilted, on_rotors, throttle,
 };
-use sight::UNCARRIED;
 
 /// How long after disarming it is watched.
 const WATCHED: Span = Span::from_secs(10);

@@ -5,6 +5,9 @@ use crate::params::{Param, Params};
 use crate::time::{Instant, Span};
 use crate::vehicle::Vehicle;
 
+/// So long what falls is carried by next to nothing; a bounce is shorter.
+pub(super) const UNCARRIED: Span = Span::from_millis(200);
+
 /// Samples, one after the other, before anything is believed.
 const SAMPLES: u8 = 3;
 /// 45 degrees: what rests at a greater tilt than that does not fly.

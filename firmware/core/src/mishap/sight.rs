@@ -1,8 +1,8 @@
 //! What each observation shows of a mishap.
 
 use super::evidence::{
-    BREAKS_OFF, BROKEN_OFF, FRESH, FULL_THROTTLE, IDLE_THROTTLE, Shock, THRUST_PART, is_believed, on_rotors,
-    throttle,
+    BREAKS_OFF, BROKEN_OFF, FRESH, FULL_THROTTLE, IDLE_THROTTLE, Shock, THRUST_PART, UNCARRIED, is_believed,
+    on_rotors, throttle,
 };
 use super::{Kind, Mishap, State, WATCHED};
 use crate::derived::load_factor_g;
@@ -16,9 +16,8 @@ use crate::vehicle::Vehicle;
 
 /// Below this load factor nothing carries the vehicle. A fall with the drag of a quad at its end speed is above it.
 const FALL_G: f32 = 0.3;
-/// A vehicle that was disarmed and is carried by less than this for so long falls; a bounce is shorter.
+/// A vehicle that was disarmed and is carried by less than this for [`UNCARRIED`] falls.
 const UNCARRIED_G: f32 = 0.5;
-pub(super) const UNCARRIED: Span = Span::from_millis(200);
 /// What falls is carried by less than this for so long: nobody asks a multicopter to sink so hard, and so short before a touch.
 const DROPS_G: f32 = 0.65;
 const DROPS: Span = Span::from_millis(300);
