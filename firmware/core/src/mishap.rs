@@ -399,7 +399,9 @@ impl Mishap {
             if high && flight.is_open() && self.state == State::Quiet {
                 let altitude_m = vehicle.global.within(now, FRESH).map(|global| global.altitude.0);
                 let doubt = Doubt::unseen(now, height_m);
-                let uncarried = self.is_uncarried() && now.since(self.uncarried.since) >= UNCARRIED;
+                let uncarried = self.is_uncarried()
+                    && now.since(self.felt_at) <= STILL
+                    && now.since(self.uncarried.since) >= UNCARRIED;
                 self.doubt = Some(Doubt { altitude_m, uncarried, unseen, ..doubt });
             }
         }
@@ -512,7 +514,11 @@ impl Mishap {
         // An autopilot that lost its estimate terminates the flight, and tells no more of heights and speeds.
         let drops =
             vehicle.armed() && now.since(since) > FRESH && self.pressure.agrees(now, DROPS_MPS) == Some(true);
-        let lost = unseen && now.since(since) >= LIES_FOR && !self.stands(now, vehicle);
+        let stands = self.stands(now, vehicle);
+        if stands && let Some(doubt) = &mut self.doubt {
+            doubt.unseen = false;
+        }
+        let lost = unseen && now.since(since) >= LIES_FOR && !stands;
         if uncarried || sinks || glides || drops || lost || altitude_m.is_some_and(fallen) {
             self.see(now, Kind::Disarmed, height_m.max(params.get(Param::MisDisarm).next_up()));
         } else if now.since(since) > FALL_SHOWS {
@@ -559,14 +565,24 @@ impl Mishap {
             return;
         }
         let limit_deg = params.get(Param::MisOverturn);
-        let over_deg = vehicle.inertial.lies_over(now).map(f32::to_degrees).filter(|deg| *deg > limit_deg);
+        // What never stood hangs so in its hover (tail-sitters), and what is fast leans.
+        let flies = ground_speed_mps(now, vehicle).is_some_and(|speed_mps| speed_mps > DRAGS_MPS);
+        let over_deg = vehicle
+            .inertial
+            .lies_over(now)
+            .filter(|_| self.stood && !flies)
+            .map(f32::to_degrees)
+            .filter(|deg| *deg > limit_deg);
         let lost_m = height_m(now, vehicle).map_or(0.0, |height_m| unheard.height_m - height_m);
         let slow =
             climb_mps(now, vehicle).is_none_or(|climb_mps| climb_mps.abs() < STILL_MPS) || self.rests(now);
         let full = throttle(now, vehicle).is_some_and(|part| part >= FULL_THROTTLE);
         let by_hand = has_pilots_throttle(vehicle);
         let least_s = unheard.least_s(lost_m, params.get(Param::MisSink));
-        let fell = !by_hand && lost_m > CAME_DOWN_M && to.since(unheard.from).as_secs_f32() < least_s;
+        let fell = !by_hand
+            && self.is_idle(now, vehicle)
+            && lost_m > CAME_DOWN_M
+            && to.since(unheard.from).as_secs_f32() < least_s;
         let down = slow && ((self.armed && full && lost_m > CAME_DOWN_M) || fell);
         let is_still = self.rate < STILL_RATE;
         if !(down || (over_deg.is_some() && is_still)) {

@@ -117,12 +117,13 @@ impl Pull {
         if !on_rotors {
             self.missing[2] = 0.0;
         }
-        let shakes_mps2 = SHAKE_PART * vehicle.inertial.shakes_mps2();
-        let apart = (norm(self.missing) - shakes_mps2).max(0.0);
-        self.apart = Some(apart).filter(|_| vehicle.inertial.turns_little(at, TURNED));
-        if !apart.is_finite() {
-            (self.at, self.apart, self.missing) = (Stamp::NONE, None, [0.0; 3]);
+        let missing = norm(self.missing);
+        if !missing.is_finite() {
+            (self.at, self.gained, self.missing, self.apart) = (Stamp::NONE, [[0.0; 3]; 2], [0.0; 3], None);
+            return;
         }
+        let apart = (missing - SHAKE_PART * vehicle.inertial.shakes_mps2()).max(0.0);
+        self.apart = Some(apart).filter(|_| vehicle.inertial.turns_little(at, TURNED));
     }
 
     /// How far the force is from the change of velocity, m/s2.
