@@ -36,19 +36,21 @@ pub(crate) struct TestProgram {
     path: PathBuf,
 }
 
-/// What is built one after the other: programs with their tests; each crate's own tests; and those of `hums`, the largest crate, without
-/// optimisation, which costs more than what they run faster by.
-const PARTS: [(&[&str], &[&str]); 3] = [
-    (&CHOICE, &["--test=*", "--bin=hums", "--bin=hums-fuzz", "--bin=xtask"]),
+/// Each crate's own tests; those of `hums`, the largest crate, without optimisation, which costs more than what they run faster by.
+const OWN_TESTS: [(&[&str], &[&str]); 2] = [
     (&CHOICE, &["--lib", "--exclude=hums"]),
     (&["--package=hums"], &["--lib", "--config=profile.test.package.hums.opt-level=0"]),
 ];
 
-/// Builds `hums`, the campaigns and all tests.
+/// Builds `hums`, the campaigns and all tests: first what is in `tests/` with the programs that it runs, and programs with tests of their own.
 pub(crate) fn build() -> Result<()> {
     let metadata = MetadataCommand::new().no_deps().current_dir(repo::root()).exec()?;
+    let targets = metadata.packages.iter().flat_map(|package| &package.targets);
+    let tested = targets.filter(|target| target.is_bin() && target.test);
+    let bins: Vec<String> = tested.map(|target| format!("--bin={}", target.name)).collect();
+    let outer: Vec<&str> = bins.iter().map(String::as_str).chain(["--test=*"]).collect();
     let mut programs = Vec::new();
-    for (choice, targets) in PARTS {
+    for (choice, targets) in [(&CHOICE[..], &outer[..])].into_iter().chain(OWN_TESTS) {
         let text = Shell::cargo()
             .args(["test", "--no-run", "--message-format=json-render-diagnostics"])
             .args(choice)

@@ -5,6 +5,7 @@ use crate::cells::Cells;
 use crate::crosscheck::Crosschecks;
 use crate::currents::Currents;
 use crate::flight::{Flight, FlightEvent};
+use crate::inertial::FORCE_MAX;
 use crate::latest::{Latest, Reading};
 use crate::observation::{Battery, EscGroup, Imu, MOTORS_MAX, Observation, Vibration};
 use crate::outputs::MotorOutputs;
@@ -16,8 +17,6 @@ use crate::trend::{Rate, Resistance};
 use crate::units::{GRAVITY, MetresPerSecond2, norm};
 use crate::vehicle::{BATTERIES_MAX, RECEIVERS_MAX, Vehicle};
 
-/// No sensor that autopilots have measures more than 32 g an axis: beyond this it is garbage.
-const LOAD_MAX_G: f32 = 60.0;
 /// Vibration, m/s2 an axis, that is above all that a vehicle flies with: `ArduPilot`'s own limit for too much (wiki, "Measuring Vibration").
 const SHAKES_MPS2: f32 = 60.0;
 const SHAKEN: Span = Span::from_secs(3);
@@ -223,9 +222,8 @@ impl Derived {
         if imu.instance == 0
             && !vehicle.vibration.within(at, SHAKEN).is_some_and(shakes)
             && let Some(sample_g) = imu.acceleration.and_then(load_factor_g)
-            && let Some(smooth_g) = load_factor_of(vehicle.inertial.force())
         {
-            self.load_factor.set(at, [sample_g, smooth_g]);
+            self.load_factor.set(at, [sample_g, norm(vehicle.inertial.force()) / GRAVITY]);
         }
     }
 
@@ -576,11 +574,7 @@ impl Derived {
 
 /// A sample of the specific force in units of gravity; `None` where it was not measured.
 pub(crate) fn load_factor_g(force: [MetresPerSecond2; 3]) -> Option<f32> {
-    load_factor_of(force.map(|axis| axis.0))
-}
-
-fn load_factor_of(force: [f32; 3]) -> Option<f32> {
-    Some(norm(force) / GRAVITY).filter(|load_g| *load_g <= LOAD_MAX_G)
+    Some(norm(force.map(|axis| axis.0))).filter(|force| *force <= FORCE_MAX).map(|force| force / GRAVITY)
 }
 
 /// A battery's voltage; the autopilot's figure for the first one where no battery reports itself.

@@ -16,9 +16,8 @@ use crate::time::{Instant, Span, Stamp};
 use crate::units::{GRAVITY, MetresPerSecond2, Radians, RadiansPerSecond, norm};
 
 /// No sensor that autopilots have measures more than 32 g an axis: beyond this, m/s2, it is garbage.
-const FORCE_MAX: f32 = 60.0 * GRAVITY;
-/// Time constant of the force: what lasts for less than two seconds up and down is taken for a gust and no manoeuvre, by the reports of
-/// loads in operation (DOT/FAA/AR-04/44), and 0.53 Hz is where this filter begins.
+pub(crate) const FORCE_MAX: f32 = 60.0 * GRAVITY;
+/// Time constant of the force, of 0.53 Hz: one shock counts for little, a turn that is held for nearly all.
 const SMOOTHING_S: f32 = 0.3;
 /// It has been level and still for so long.
 const LASTS: Span = Span::from_millis(1_500);

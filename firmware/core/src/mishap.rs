@@ -387,7 +387,8 @@ impl Mishap {
             vehicle.armed() && !self.armed && self.disarmed_at.is_none() && self.state == State::Quiet;
         if ended && vehicle.terminated_since.is_some() && flight.is_open() && !flight.was_on_ground() {
             self.disarmed_at = Some(now);
-            self.doubt = Some(Doubt::unseen(now, height_m(now, vehicle).unwrap_or(0.0)));
+            let doubt = Doubt::new(now, height_m(now, vehicle).unwrap_or(0.0));
+            self.doubt = Some(Doubt { unseen: true, ..doubt });
         }
         self.stood |= armed && vehicle.inertial.is_level(now);
         if self.armed && !armed {
@@ -398,7 +399,7 @@ impl Mishap {
             // The autopilot may have called it landed because it is disarmed.
             if high && flight.is_open() && self.state == State::Quiet {
                 let altitude_m = vehicle.global.within(now, FRESH).map(|global| global.altitude.0);
-                let doubt = Doubt::unseen(now, height_m);
+                let doubt = Doubt::new(now, height_m);
                 let uncarried = self.is_uncarried()
                     && now.since(self.felt_at) <= STILL
                     && now.since(self.uncarried.since) >= UNCARRIED;
@@ -537,7 +538,7 @@ impl Mishap {
 
     /// What flew, was not heard, and is heard again: whether it came down meanwhile as nothing lands.
     fn note_silence(&mut self, now: Instant, vehicle: &Vehicle, flight: &Flight, params: &Params) {
-        let Some(unheard) = &mut self.unheard else {
+        let Some(mut unheard) = self.unheard else {
             let flies = self.armed && flight.airborne() && self.state == State::Quiet && self.doubt.is_none();
             if flies && now.since(self.heard_at) >= UNHEARD {
                 let (from, height_m, sink_mps) = (self.heard_at, self.height_m, self.sink.greatest());
@@ -549,53 +550,55 @@ impl Mishap {
             return;
         }
         let to = *unheard.to.get_or_insert(now);
-        let unheard = *unheard;
+        let mut sign = None;
         // Its states of before it was silent say nothing.
-        if now.since(to) < STILL {
-            if let Some(unheard) = &mut self.unheard {
-                unheard.well_at = now;
+        if now.since(to) >= STILL {
+            if self.state != State::Quiet || now.since(to) > LYING_SHOWS {
+                self.unheard = None;
+                return;
             }
-            return;
+            if !on_rotors(now, vehicle) {
+                return;
+            }
+            sign = self.came_down(now, vehicle, params, &unheard);
         }
-        if self.state != State::Quiet || now.since(to) > LYING_SHOWS {
-            self.unheard = None;
-            return;
+        match sign {
+            None => unheard.well_at = now,
+            Some((kind, value)) if now.since(unheard.well_at) + STILL >= LIES_FOR => {
+                (self.hit_at, self.unheard_from) = (to, Some(unheard.from));
+                self.see(now, kind, value);
+            }
+            Some(_) => {}
         }
-        if !on_rotors(now, vehicle) {
-            return;
-        }
-        let limit_deg = params.get(Param::MisOverturn);
+        self.unheard = Some(unheard);
+    }
+
+    /// What it does, after a silence, that only what came down as nothing lands does: as what that is told, and with which value.
+    fn came_down(
+        &self,
+        now: Instant,
+        vehicle: &Vehicle,
+        params: &Params,
+        unheard: &Unheard,
+    ) -> Option<(Kind, f32)> {
         // What never stood hangs so in its hover (tail-sitters), and what is fast leans.
         let flies = ground_speed_mps(now, vehicle).is_some_and(|speed_mps| speed_mps > DRAGS_MPS);
-        let over_deg = vehicle
-            .inertial
-            .lies_over(now)
-            .filter(|_| self.stood && !flies)
-            .map(f32::to_degrees)
-            .filter(|deg| *deg > limit_deg);
+        let limit_deg = params.get(Param::MisOverturn);
+        let over_deg = vehicle.inertial.lies_over(now).map(f32::to_degrees);
+        let lies = self.stood && !flies && self.rate < STILL_RATE;
+        if let Some(over_deg) = over_deg.filter(|over_deg| lies && *over_deg > limit_deg) {
+            return Some((Kind::Overturned, over_deg));
+        }
         let lost_m = height_m(now, vehicle).map_or(0.0, |height_m| unheard.height_m - height_m);
         let slow =
             climb_mps(now, vehicle).is_none_or(|climb_mps| climb_mps.abs() < STILL_MPS) || self.rests(now);
-        let full = throttle(now, vehicle).is_some_and(|part| part >= FULL_THROTTLE);
-        let by_hand = has_pilots_throttle(vehicle);
-        let least_s = unheard.least_s(lost_m, params.get(Param::MisSink));
-        let fell = !by_hand
+        let in_vain = self.armed && throttle(now, vehicle).is_some_and(|part| part >= FULL_THROTTLE);
+        let took_s = unheard.to.unwrap_or(now).since(unheard.from).as_secs_f32();
+        let fell = !has_pilots_throttle(vehicle)
             && self.is_idle(now, vehicle)
-            && lost_m > CAME_DOWN_M
-            && to.since(unheard.from).as_secs_f32() < least_s;
-        let down = slow && ((self.armed && full && lost_m > CAME_DOWN_M) || fell);
-        let is_still = self.rate < STILL_RATE;
-        if !(down || (over_deg.is_some() && is_still)) {
-            if let Some(unheard) = &mut self.unheard {
-                unheard.well_at = now;
-            }
-        } else if now.since(unheard.well_at) + STILL >= LIES_FOR {
-            (self.hit_at, self.unheard_from) = (to, Some(unheard.from));
-            match over_deg {
-                Some(over_deg) if is_still => self.see(now, Kind::Overturned, over_deg),
-                _ => self.see(now, Kind::Impact, params.get(Param::MisImpact).next_up()),
-            }
-        }
+            && took_s < unheard.least_s(lost_m, params.get(Param::MisSink));
+        let is_down = slow && lost_m > CAME_DOWN_M && (in_vain || fell);
+        is_down.then(|| (Kind::Impact, params.get(Param::MisImpact).next_up()))
     }
 
     /// A shock after which it is still, and does not hang in the air.

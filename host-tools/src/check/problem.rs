@@ -75,8 +75,8 @@ impl Problem {
 const LEADS: Span = Span::from_secs(10);
 
 /// When the first mishap of some problems began.
-pub(super) fn mishap_at<'a>(mut problems: impl Iterator<Item = &'a Problem>) -> Option<Instant> {
-    problems.by_ref().filter(|problem| problem.is_mishap()).map(|problem| problem.at).min()
+pub(super) fn mishap_at<'a>(problems: impl Iterator<Item = &'a Problem>) -> Option<Instant> {
+    problems.filter(|problem| problem.is_mishap()).map(|problem| problem.at).min()
 }
 
 /// How bad a level is as a problem; stale is not known, and so is none.

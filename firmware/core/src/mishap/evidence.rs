@@ -187,9 +187,8 @@ impl Unheard {
 }
 
 impl Doubt {
-    /// Of what was terminated while nobody listened.
-    pub(super) const fn unseen(since: Instant, height_m: f32) -> Self {
-        Self { since, height_m, altitude_m: None, uncarried: false, unseen: true }
+    pub(super) const fn new(since: Instant, height_m: f32) -> Self {
+        Self { since, height_m, altitude_m: None, uncarried: false, unseen: false }
     }
 }
 
