@@ -414,7 +414,7 @@ impl Derived {
         }
         let place = usize::from(motor);
         // One that stood before it was heard never turned.
-        let turned = self.outputs.began_unseen()
+        let turned = self.outputs.was_found_at_end(motor)
             || self.motors.get(place).is_some_and(|track| track.highest_rpm > TURNING_RPM);
         let told = vehicle.motors.get(place).filter(|told| turned && told.esc.rpm.is_some())?;
         let stands = !Self::turns(vehicle, place) && (0..MOTORS_MAX).any(|other| Self::turns(vehicle, other));

@@ -67,6 +67,8 @@ const AT_END_PERCENT: f32 = OFF_PERCENT - 1.0;
 const SHARES_US: u16 = 1_667;
 /// 30 degrees a second: a pilot yaws faster, and gusts do not turn a vehicle so fast for long.
 const YAWS_RAD_S: f32 = 0.5;
+/// A motor's command varies by more than this in flight, us; a servo that holds its place, as a landing gear's, does not.
+const MOVES_US: u16 = 20;
 /// What nobody saw begin is believed after so long.
 const LASTS: Span = Span::from_secs(3);
 /// Messages that are further apart are not of the same hover.
@@ -92,8 +94,11 @@ pub(crate) struct MotorOutputs {
     summed: (u8, f32),
     /// The motor that stands out, and how far, percent.
     alone: (u8, f32),
-    /// The flight began before it was heard, and since when one output alone is at an end of its range.
+    /// The flight began before it was heard: the pulses that were heard first, which outputs moved since (a bit each), and since when
+    /// one output alone is at an end of its range.
     began_unseen: bool,
+    first_us: [u16; JUDGED_MAX],
+    moved: u8,
     at_end_since: Stamp,
 }
 
@@ -112,6 +117,8 @@ impl MotorOutputs {
             summed: (0, 0.0),
             alone: (0, 0.0),
             began_unseen: false,
+            first_us: [0; JUDGED_MAX],
+            moved: 0,
             at_end_since: Stamp::NONE,
         }
     }
@@ -145,11 +152,14 @@ impl MotorOutputs {
         self.began_unseen = !flight.was_on_ground();
         if !known && self.began_unseen {
             self.at = Stamp::at(at);
+            self.note_moved(pulses);
             let (place, percent) = self.alone;
             // The one opposite may idle then.
             let stays = percent >= OFF_PERCENT && pulses.get(usize::from(place)).is_some_and(Self::is_out);
             if !stays {
-                let at_end = Self::at_an_end(pulses).filter(|_| flies_level(at, vehicle, flight));
+                let at_end = Self::at_an_end(pulses).filter(|(place, _)| {
+                    (self.moved | 1 << place) & all == all && flies_level(at, vehicle, flight)
+                });
                 let lasts = self.at_end_since.run(at_end.is_some(), at, LASTS);
                 self.alone = at_end.filter(|_| lasts).unwrap_or_default();
             }
@@ -204,9 +214,20 @@ impl MotorOutputs {
         *pulse < ZERO_US + OFF_US
     }
 
-    /// Whether the flight began before it was heard: how motors turned before is not known.
-    pub(crate) const fn began_unseen(&self) -> bool {
-        self.began_unseen
+    /// Which outputs are not where they were when they were heard first.
+    fn note_moved(&mut self, pulses: &[u16]) {
+        for (output, (pulse, first_us)) in pulses.iter().zip(&mut self.first_us).enumerate() {
+            if *first_us == 0 {
+                *first_us = *pulse;
+            }
+            self.moved |= u8::from(pulse.abs_diff(*first_us) > MOVES_US) << output;
+        }
+    }
+
+    /// Whether this output alone is at an end of its range in a flight that began before it was heard: how its motor turned before is
+    /// not known.
+    pub(crate) fn was_found_at_end(&self, motor: u8) -> bool {
+        self.began_unseen && self.alone.0 == motor && self.alone.1 > 0.0
     }
 
     /// Which outputs are given next to nothing: also those beyond the motors of the frame that the vehicle says it is.
@@ -293,11 +314,11 @@ impl MotorOutputs {
 
     /// How far a motor's command alone is above what is usual, percent of the average; 0 for those that do not stand out.
     pub(crate) fn alone(&self, now: Instant, vehicle: &Vehicle, motor: u8) -> Option<Reading> {
-        let at = self
-            .at
-            .instant(now)
-            .filter(|at| now.since(*at) <= PAUSE && (self.is_known() || self.at_end_since.is_set()))?;
-        if usize::from(motor) >= motors(vehicle) {
+        let at = self.at.instant(now).filter(|at| now.since(*at) <= PAUSE)?;
+        let count = motors(vehicle);
+        // Where all but one moved they are motors, heard in a flight that nobody saw begin.
+        if usize::from(motor) >= count || !(self.is_known() || self.moved.count_ones() as usize + 1 >= count)
+        {
             return None;
         }
         let (place, percent) = self.alone;

@@ -243,26 +243,40 @@ fn a_motor_that_alone_is_given_all_is_weak_also_while_the_vehicle_sinks() {
     assert_eq!(weak([2_000, 2_000, 2_000, 2_000]), [], "all the thrust");
 }
 
-/// What is told of a hexarotor that is heard first in the air, with these pulses and speeds.
-fn heard_in_the_air(pulses: [u16; 6], speeds: [f32; 6]) -> Vec<(&'static str, u8)> {
+/// What is told of a hexarotor that is heard first in the air, with these pulses and speeds; pulses within the range vary by as much.
+fn heard_in_the_air(pulses: [u16; 6], varies_us: u16, speeds: [f32; 6]) -> Vec<(&'static str, u8)> {
     let hexa =
         Quad { type_number: 13, start_height: 20.0, landed: Some(LandedState::InAir), ..Quad::healthy() };
     let esc = hexa.escs[0].unwrap_or_default();
-    let mut given = [0; MOTORS_MAX];
-    given[..6].copy_from_slice(&pulses);
     let escs: Vec<Esc> = speeds.iter().map(|speed| Esc { rpm: Some(Rpm(*speed)), ..esc }).collect();
-    told_given(|_| (hexa.clone(), escs.clone(), 0.0), |_| Some(given))
+    let given = |now_ms: u64| {
+        let mut given = [0; MOTORS_MAX];
+        given[..6].copy_from_slice(&pulses);
+        let more = if (now_ms / 1_000).is_multiple_of(2) { 0 } else { varies_us };
+        given.iter_mut().filter(|pulse| (1_000..1_900).contains(*pulse)).for_each(|pulse| *pulse += more);
+        Some(given)
+    };
+    told_given(|_| (hexa.clone(), escs.clone(), 0.0), given)
 }
 
 #[test]
 fn a_motor_that_was_dead_before_the_vehicle_was_heard_is_found_by_its_output() {
     let turns = [5_000.0; 6];
-    assert_eq!(heard_in_the_air([1_500, 1_480, 900, 1_510, 1_530, 1_600], turns), [("motor_output", 2)]);
-    assert_eq!(heard_in_the_air([1_500, 1_480, 1_950, 1_510, 1_530, 1_600], turns), [("motor_output", 2)]);
+    assert_eq!(heard_in_the_air([1_500, 1_480, 900, 1_510, 1_530, 1_600], 30, turns), [("motor_output", 2)]);
+    assert_eq!(
+        heard_in_the_air([1_500, 1_480, 1_950, 1_510, 1_530, 1_600], 30, turns),
+        [("motor_output", 2)]
+    );
     let stands = [5_000.0, 5_000.0, 0.0, 5_000.0, 5_000.0, 5_000.0];
-    let told = heard_in_the_air([1_500, 1_480, 1_950, 1_510, 1_530, 1_600], stands);
+    let told = heard_in_the_air([1_500, 1_480, 1_950, 1_510, 1_530, 1_600], 30, stands);
     assert!(told.contains(&("motor_loss", 2)), "{told:?}");
-    assert_eq!(heard_in_the_air([1_500, 1_480, 1_520, 1_510, 1_530, 1_600], turns), []);
-    assert_eq!(heard_in_the_air([1_500, 1_480, 0, 1_510, 1_530, 1_600], turns), [], "it is not used");
-    assert_eq!(heard_in_the_air([1_500, 1_480, 1_950, 1_700, 1_750, 1_600], turns), [], "others are near it");
+    assert_eq!(heard_in_the_air([1_500, 1_480, 1_520, 1_510, 1_530, 1_600], 30, turns), []);
+    let gimbal_and_gear = heard_in_the_air([1_500, 1_480, 1_950, 1_510, 1_530, 1_600], 0, turns);
+    assert_eq!(gimbal_and_gear, [], "what stands still is a servo");
+    assert_eq!(heard_in_the_air([1_500, 1_480, 0, 1_510, 1_530, 1_600], 30, turns), [], "it is not used");
+    assert_eq!(
+        heard_in_the_air([1_500, 1_480, 1_950, 1_700, 1_750, 1_600], 30, turns),
+        [],
+        "others are near it"
+    );
 }

@@ -19,7 +19,6 @@ use crate::observation::Observation;
 use crate::params::{Param, Params};
 use crate::rainflow::Rainflow;
 use crate::time::{Instant, Span};
-use crate::units::GRAVITY;
 use crate::vehicle::{BATTERIES_MAX, Vehicle};
 use touchdown::Touchdown;
 
@@ -113,9 +112,6 @@ impl Usage {
                 if load_factor_g <= ACCELERATION_MAX {
                     self.load_cycles.take(load_factor_g);
                 }
-            }
-            Observation::Shock(force) if flight.airborne() => {
-                self.extend(UsageCounter::LoadFactorMax, force.0 / GRAVITY, ACCELERATION_MAX);
             }
             Observation::GlobalPosition(global) if flight.airborne() => {
                 self.extend(UsageCounter::HeightMax, global.relative_altitude.0, HEIGHT_MAX_M);
