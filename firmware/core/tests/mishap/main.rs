@@ -14,12 +14,12 @@ use hums_core::happening::Happening;
 use hums_core::health::{Finding, Level, Orders, Subsystem};
 use hums_core::mishap::{Change, Kind, Place, Report};
 use hums_core::observation::{
-    Air, Attitude, Autopilot, GlobalPosition, Hud, Imu, LandedState, Observation, VehicleKind, VtolState,
-    Wanted,
+    Air, Attitude, Autopilot, GlobalPosition, Hud, Imu, LandedState, Observation, Source, TelemetryRadio,
+    VehicleKind, VtolState, Wanted,
 };
 use hums_core::params::Params;
 use hums_core::status::LinkReading;
-use hums_core::time::Instant;
+use hums_core::time::{Instant, Span};
 use hums_core::units::{
     Amperes, Fraction, Hectopascals, MetresPerSecond, MetresPerSecond2, Position, Radians, RadiansPerSecond,
 };
@@ -27,6 +27,9 @@ use hums_core::usage::UsageCounter;
 
 /// When it goes wrong.
 const AT_MS: u64 = 20_000;
+
+/// The radio that the ground station hears it by.
+const RADIO: Source = Source { system: 51, component: 68 };
 
 /// How the vehicle moves besides what a [`Quad`] says.
 #[derive(Clone, Copy)]
@@ -45,8 +48,10 @@ struct Motion {
     displayed_mps: Option<f32>,
     /// The roll that the autopilot wants, where it says so.
     roll_wanted: Option<f32>,
-    /// Nothing of it is heard.
+    /// Nothing of it is heard, but of its radio.
     unheard: bool,
+    /// So much was lost of the recording, in which no time passed here.
+    lost_s: Option<u64>,
 }
 
 const CALM: Motion = Motion {
@@ -60,6 +65,7 @@ const CALM: Motion = Motion {
     displayed_mps: None,
     roll_wanted: None,
     unheard: false,
+    lost_s: None,
 };
 
 type Script = fn(u64, &mut Quad, &mut Motion);
@@ -92,13 +98,23 @@ impl Outcome {
 
 /// A minute; `script` gets the time since it goes wrong.
 fn fly(vehicle: &Quad, script: impl Fn(u64, &mut Quad, &mut Motion)) -> Outcome {
+    fly_from(AT_MS, vehicle, script)
+}
+
+fn fly_from(at_ms: u64, vehicle: &Quad, script: impl Fn(u64, &mut Quad, &mut Motion)) -> Outcome {
     let mut monitor = Monitor::new(Params::defaults());
     let (mut findings, mut changes, mut reports) = (Vec::new(), Vec::new(), Vec::new());
     for now_ms in (0..60_000).step_by(50) {
         let now = Instant::from_millis(now_ms);
         let (mut quad, mut motion) = (vehicle.clone(), CALM);
-        if now_ms >= AT_MS {
-            script(now_ms - AT_MS, &mut quad, &mut motion);
+        if now_ms >= at_ms {
+            script(now_ms - at_ms, &mut quad, &mut motion);
+        }
+        if let Some(lost_s) = motion.lost_s {
+            monitor.lose(Span::from_secs(lost_s));
+        }
+        if motion.unheard {
+            monitor.observe(now, RADIO, &Observation::TelemetryRadio(TelemetryRadio::default()));
         }
         // No sensor says the same for ever.
         let noise = (now_ms / 50 % 7) as f32 * 0.002;
