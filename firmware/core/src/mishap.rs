@@ -96,6 +96,11 @@ const BEATS: Span = Span::from_millis(2_500);
 /// So long after that it is seen whether it lies; and so long it does what only what lies does.
 const LYING_SHOWS: Span = Span::from_millis(2_400);
 const LIES_FOR: Span = Span::from_millis(1_500);
+const SIGN_LASTS: Span = Span::from_millis(500);
+/// A restarted autopilot tells its forces and its place no later than this.
+const STARTS: Span = Span::from_secs(20);
+/// What was disarmed in a longer silence may have been carried off in it.
+const CARRIED_OFF: Span = Span::from_secs(30);
 /// What came down so far is not where it flew.
 const CAME_DOWN_M: f32 = 3.0;
 
@@ -381,7 +386,7 @@ impl Mishap {
             }
         }
         if armed && !self.armed {
-            (self.on_bench, self.disarmed_at, self.stood) = (false, None, false);
+            (self.on_bench, self.disarmed_at, self.stood, self.heard_at) = (false, None, false, now);
             (self.doubt, self.first_at) = (None, None);
         }
         let beat_at = vehicle.heartbeat.at().unwrap_or(self.beat_at);
@@ -534,10 +539,16 @@ impl Mishap {
         if stands && let Some(doubt) = &mut self.doubt {
             doubt.unseen = false;
         }
-        // What was terminated stays armed. Where its sensors are not heard, only its speeds say where it is.
-        let ended = vehicle.armed() && self.felt_at > Instant::ZERO && on_rotors(now, vehicle);
+        // What was terminated stays armed. What does not tell how it lies and how fast it is, or never stood level (tail-sitters), may stand.
+        let is_seen = self.stood
+            && vehicle.inertial.is_fresh(now)
+            && on_rotors(now, vehicle)
+            && climb_mps(now, vehicle).is_some()
+            && ground_speed_mps(now, vehicle).is_some();
+        let ended = vehicle.armed();
         let over = now.since(since) > FALL_SHOWS;
-        let lost = !is_first && !stands && ((unseen && now.since(since) >= LIES_FOR) || (ended && over));
+        let lost =
+            !is_first && is_seen && !stands && ((unseen && now.since(since) >= LIES_FOR) || (ended && over));
         if uncarried || sinks || glides || drops || lost || altitude_m.is_some_and(fallen) {
             self.disarmed_at.get_or_insert(now);
             self.see(now, Kind::Disarmed, height_m.max(params.get(Param::MisDisarm).next_up()));
@@ -558,7 +569,7 @@ impl Mishap {
     fn note_silence(&mut self, now: Instant, vehicle: &Vehicle, flight: &Flight, params: &Params) {
         let Some(mut unheard) = self.unheard else {
             if now.since(self.heard_at) >= UNHEARD {
-                self.begin_silence(self.heard_at, flight);
+                self.begin_silence(self.heard_at, vehicle, flight);
             }
             return;
         };
@@ -566,12 +577,20 @@ impl Mishap {
             return;
         }
         let to = *unheard.to.get_or_insert(now);
+        let tells = |at: Option<Instant>| at.is_none_or(|at| at > unheard.from);
+        if unheard.seen_at.is_none() && tells(vehicle.imu.at()) && tells(vehicle.global.at()) {
+            unheard.seen_at = Some(now);
+        }
+        let (since, shows) = match unheard.seen_at {
+            Some(seen_at) => (seen_at, LYING_SHOWS),
+            None => (to, if self.armed { LYING_SHOWS } else { STARTS }),
+        };
         unheard.lies =
             !self.armed || vehicle.landed.within(now, LANDED_STATE_AGE) == Some(&LandedState::OnGround);
         let mut sign = None;
         // Its states of before it was silent say nothing.
         if now.since(to) >= STILL {
-            if self.state != State::Quiet || now.since(to) > LYING_SHOWS {
+            if self.state != State::Quiet || now.since(since) > shows {
                 self.unheard = None;
                 return;
             }
@@ -582,7 +601,7 @@ impl Mishap {
         }
         match sign {
             None => unheard.well_at = now,
-            Some((kind, value)) if now.since(unheard.well_at) + STILL >= LIES_FOR => {
+            Some((kind, value)) if now.since(unheard.well_at) >= SIGN_LASTS => {
                 (self.hit_at, self.unheard_from) = (to, Some(unheard.from));
                 self.see(now, kind, value);
             }
@@ -592,19 +611,28 @@ impl Mishap {
     }
 
     /// What flies is not heard, since then.
-    fn begin_silence(&mut self, from: Instant, flight: &Flight) {
+    fn begin_silence(&mut self, from: Instant, vehicle: &Vehicle, flight: &Flight) {
         if self.armed && flight.airborne() && self.state == State::Quiet && self.doubt.is_none() {
-            let (height_m, sink_mps) = (self.height_m, self.sink.greatest());
-            self.unheard =
-                Some(Unheard { from, to: None, lies: false, well_at: self.heard_at, height_m, sink_mps });
+            let altitude_m = vehicle.global.get().map(|global| global.altitude.0);
+            let sink_mps = self.sink.greatest();
+            let silence = Unheard {
+                from,
+                to: None,
+                seen_at: None,
+                lies: false,
+                well_at: self.heard_at,
+                altitude_m,
+                sink_mps,
+            };
+            self.unheard = Some(silence);
         }
     }
 
     /// Its recording lost what it said for so long, and no time passed here meanwhile.
-    pub(crate) fn lose(&mut self, span: Span, flight: &Flight) {
+    pub(crate) fn lose(&mut self, span: Span, vehicle: &Vehicle, flight: &Flight) {
         if span >= UNHEARD && self.unheard.is_none() {
             let from_us = self.heard_at.as_micros().saturating_sub(span.as_micros());
-            self.begin_silence(Instant::from_micros(from_us), flight);
+            self.begin_silence(Instant::from_micros(from_us), vehicle, flight);
         }
     }
 
@@ -620,21 +648,25 @@ impl Mishap {
         let flies = ground_speed_mps(now, vehicle).is_some_and(|speed_mps| speed_mps > DRAGS_MPS);
         let limit_deg = params.get(Param::MisOverturn);
         let over_deg = vehicle.inertial.lies_over(now).map(f32::to_degrees);
-        let lies = self.stood && !flies && self.rate < STILL_RATE;
+        // What landed unheard may have been laid down by somebody since.
+        let by_itself = self.armed || unheard.lasted(now) <= CARRIED_OFF;
+        let lies = self.stood && !flies && self.rate < STILL_RATE && by_itself;
         if let Some(over_deg) = over_deg.filter(|over_deg| lies && *over_deg > limit_deg) {
             return Some((Kind::Overturned, over_deg));
         }
-        let lost_m = height_m(now, vehicle).map_or(0.0, |height_m| unheard.height_m - height_m);
+        // Above the sea: home is another one once it is disarmed.
+        let altitude_m = vehicle.global.within(now, FRESH).map(|global| global.altitude.0);
+        let lost_m = unheard.altitude_m.zip(altitude_m).map_or(0.0, |(before_m, now_m)| before_m - now_m);
         let slow =
             climb_mps(now, vehicle).is_none_or(|climb_mps| climb_mps.abs() < STILL_MPS) || self.rests(now);
         // With all its thrust it may hover, but not near the ground.
         let in_vain = self.armed
             && (self.lies(now, vehicle) || is_near_ground(now, vehicle))
             && throttle(now, vehicle).is_some_and(|part| part >= FULL_THROTTLE);
-        let took_s = unheard.to.unwrap_or(now).since(unheard.from).as_secs_f32();
         let fell = !has_pilots_throttle(vehicle)
             && self.is_idle(now, vehicle)
-            && took_s < unheard.least_s(lost_m, params.get(Param::MisSink), self.armed);
+            && unheard.lasted(now).as_secs_f32()
+                < unheard.least_s(lost_m, params.get(Param::MisSink), self.armed);
         let is_down = slow && lost_m > CAME_DOWN_M && (in_vain || fell);
         is_down.then(|| (Kind::Impact, params.get(Param::MisImpact).next_up()))
     }

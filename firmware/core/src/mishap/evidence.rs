@@ -167,18 +167,25 @@ pub(super) struct Unheard {
     pub(super) from: Instant,
     /// When it was heard again.
     pub(super) to: Option<Instant>,
+    /// When its forces and its place were heard again, or the first of them where it tells no other.
+    pub(super) seen_at: Option<Instant>,
     /// It is disarmed, or calls itself landed, since.
     pub(super) lies: bool,
     /// When it did last what is no sign of a crash, since it is heard again.
     pub(super) well_at: Instant,
-    /// Its height above home, and its sink, when it was heard last.
-    pub(super) height_m: f32,
+    /// Its height above mean sea level, and its sink, when it was heard last.
+    pub(super) altitude_m: Option<f32>,
     pub(super) sink_mps: f32,
 }
 
 impl Unheard {
+    /// How long it was not heard.
+    pub(super) fn lasted(&self, now: Instant) -> Span {
+        self.to.unwrap_or(now).since(self.from)
+    }
+
     /// The shortest time in which what flies by itself comes down so far, stands and is disarmed: from its sink to the fastest descent that
-    /// can be set, as gently as autopilots do, the last metres no faster than legs take, and disarmed when its autopilot has seen for so
+    /// can be set, or its own if that was faster, as gently as autopilots do, the last metres no faster than legs take, and disarmed when its autopilot has seen for so
     /// long that it stands (`ArduPilot` 1 s, PX4 longer).
     pub(super) fn least_s(&self, lost_m: f32, limit_mps: f32, armed: bool) -> f32 {
         const SEES_S: f32 = 1.0;
@@ -186,9 +193,10 @@ impl Unheard {
         const LAST_MPS: f32 = 2.5;
         const GENTLY_MPS2: f32 = 2.0;
         let last_m = lost_m.min(LAST_M);
-        let faster_mps = (limit_mps - self.sink_mps).max(0.0);
+        let fastest_mps = limit_mps.max(self.sink_mps);
+        let faster_mps = fastest_mps - self.sink_mps.max(0.0);
         let sees_s = if armed { 0.0 } else { SEES_S };
-        last_m / LAST_MPS + (lost_m - last_m) / limit_mps + faster_mps / (2.0 * GENTLY_MPS2) + sees_s
+        last_m / LAST_MPS + (lost_m - last_m) / fastest_mps + faster_mps / (2.0 * GENTLY_MPS2) + sees_s
     }
 }
 

@@ -21,7 +21,8 @@ use hums_core::params::Params;
 use hums_core::status::LinkReading;
 use hums_core::time::{Instant, Span};
 use hums_core::units::{
-    Amperes, Fraction, Hectopascals, MetresPerSecond, MetresPerSecond2, Position, Radians, RadiansPerSecond,
+    Amperes, Fraction, Hectopascals, Metres, MetresPerSecond, MetresPerSecond2, Position, Radians,
+    RadiansPerSecond,
 };
 use hums_core::usage::UsageCounter;
 
@@ -50,6 +51,10 @@ struct Motion {
     roll_wanted: Option<f32>,
     /// Nothing of it is heard, but of its radio.
     unheard: bool,
+    /// Of its autopilot only heartbeats are.
+    beats_only: bool,
+    /// Home is so much lower than before.
+    home_sank_m: f32,
     /// So much was lost of the recording, in which no time passed here.
     lost_s: Option<u64>,
 }
@@ -65,6 +70,8 @@ const CALM: Motion = Motion {
     displayed_mps: None,
     roll_wanted: None,
     unheard: false,
+    beats_only: false,
+    home_sank_m: 0.0,
     lost_s: None,
 };
 
@@ -125,7 +132,7 @@ fn fly_from(at_ms: u64, vehicle: &Quad, script: impl Fn(u64, &mut Quad, &mut Mot
         if let Some(shock_g) = motion.shock_g {
             monitor.observe(now, AUTOPILOT, &Observation::Shock(MetresPerSecond2(shock_g * 9.806_65)));
         }
-        if !motion.unheard {
+        if !motion.unheard && !motion.beats_only {
             monitor.observe(now, AUTOPILOT, &Observation::Imu(imu));
         }
         if now_ms.is_multiple_of(100) && !motion.unheard {
@@ -134,16 +141,20 @@ fn fly_from(at_ms: u64, vehicle: &Quad, script: impl Fn(u64, &mut Quad, &mut Mot
             let height = if now_ms < 2_000 { quad.start_height } else { quad.height };
             let global = GlobalPosition {
                 position: Some(Position { latitude_deg: 47.397_742, longitude_deg: -8.545_594 }),
-                relative_altitude: hums_core::units::Metres(height),
+                relative_altitude: Metres(height),
+                altitude: Metres(480.0 + height - motion.home_sank_m),
                 velocity: [motion.ground_mps, 0.0, -quad.climb].map(MetresPerSecond),
                 ..GlobalPosition::default()
             };
-            let said = quad.says(now_ms).into_iter().filter(|said| {
-                !matches!(
-                    said,
-                    Observation::Imu(_) | Observation::Attitude(_) | Observation::GlobalPosition(_)
-                )
-            });
+            let beats = |said: &Observation| matches!(said, Observation::Heartbeat(_));
+            let said = quad.says(now_ms).into_iter().filter(|said| !motion.beats_only || beats(said)).filter(
+                |said| {
+                    !matches!(
+                        said,
+                        Observation::Imu(_) | Observation::Attitude(_) | Observation::GlobalPosition(_)
+                    )
+                },
+            );
             let air = Air { pressure: motion.pressure_hpa.map(Hectopascals), ..Air::default() };
             let own =
                 [Observation::Air(air), Observation::Attitude(attitude), Observation::GlobalPosition(global)];
@@ -154,6 +165,7 @@ fn fly_from(at_ms: u64, vehicle: &Quad, script: impl Fn(u64, &mut Quad, &mut Mot
             let wanted = motion
                 .roll_wanted
                 .map(|roll| Observation::Wanted(Wanted { roll: Radians(roll), ..Wanted::default() }));
+            let own = own.into_iter().filter(|_| !motion.beats_only);
             for said in said.chain(hud).chain(wanted).chain(own) {
                 monitor.observe(now, AUTOPILOT, &said);
             }

@@ -163,3 +163,92 @@ fn what_falls_disarmed_when_it_is_heard_first_is_a_mishap_and_what_is_carried_do
         assert!(carried.told().is_empty() && carried.changes.is_empty(), "{of:?}: {:?}", carried.told());
     }
 }
+
+/// It stands, and is disarmed.
+fn has_landed(quad: &mut Quad, motion: &mut Motion) {
+    stands(quad, motion);
+    (quad.throttle, quad.armed, quad.landed) = (0.0, false, Some(LandedState::OnGround));
+}
+
+#[test]
+fn a_home_that_is_set_anew_is_no_fall() {
+    for of in ROTORS {
+        // It was 20 m above home and 4 m above a hill.
+        let landed = unheard(of, 6_200, |quad, motion| {
+            has_landed(quad, motion);
+            motion.home_sank_m = -16.0;
+        });
+        assert!(landed.told().is_empty() && landed.flights() == (1, 1, 0), "{of:?}: {:?}", landed.told());
+    }
+}
+
+#[test]
+fn what_was_in_a_dive_comes_down_as_fast() {
+    for of in ROTORS {
+        let dives = fly(&hovering(of), |ms, quad, motion| {
+            motion.unheard = (2_000..10_000).contains(&ms);
+            match ms {
+                0..2_000 => {
+                    (quad.climb, quad.height, quad.throttle) = (-5.5, 100.0 - 0.0055 * ms as f32, 0.2)
+                }
+                _ => has_landed(quad, motion),
+            }
+        });
+        assert_eq!(dives.told(), ["impact"], "{of:?}: as fast as it may be told to");
+        let dives = fly(&hovering(of), |ms, quad, motion| {
+            motion.unheard = (4_000..12_000).contains(&ms);
+            motion.displayed_mps = Some(quad.climb);
+            match ms {
+                0..4_000 => {
+                    (quad.climb, quad.height, quad.throttle) = (-18.0, 160.0 - 0.018 * ms as f32, 0.2)
+                }
+                _ => has_landed(quad, motion),
+            }
+        });
+        assert!(!dives.told().contains(&"impact"), "{of:?}: {:?}", dives.told());
+    }
+}
+
+#[test]
+fn what_was_carried_home_on_its_side_did_not_turn_over() {
+    for of in ROTORS {
+        let on_its_side = |quad: &mut Quad, motion: &mut Motion| {
+            has_landed(quad, motion);
+            (quad.roll, motion.load_g, motion.drag_g) = (1.6, 0.05, 1.0);
+        };
+        let carried = unheard(of, 35_000, on_its_side);
+        assert!(carried.told().is_empty() && carried.flights() == (1, 1, 0), "{of:?}: {:?}", carried.told());
+        let crashed = unheard(of, 12_000, on_its_side);
+        assert_eq!(crashed.told().first(), Some(&"overturned"), "{of:?}");
+    }
+}
+
+#[test]
+fn an_autopilot_that_starts_again_tells_later_how_it_lies() {
+    for of in ROTORS {
+        let lies = fly(&hovering(of), |ms, quad, motion| {
+            motion.unheard = ms < 12_000;
+            motion.beats_only = ms < 20_000;
+            if !motion.unheard {
+                has_landed(quad, motion);
+                (quad.roll, motion.load_g, motion.drag_g) = (1.6, 0.05, 1.0);
+            }
+        });
+        assert_eq!((lies.told().first(), lies.flights()), (Some(&"overturned"), (1, 0, 1)), "{of:?}");
+    }
+}
+
+#[test]
+fn what_is_killed_after_a_landing_and_does_not_tell_how_it_stands_is_no_mishap() {
+    for of in ROTORS {
+        let killed = fly(&hovering(of), |ms, quad, motion| {
+            motion.unheard = ms < 12_000;
+            motion.beats_only = true;
+            if !motion.unheard {
+                has_landed(quad, motion);
+                (quad.armed, quad.state) = (true, 8);
+            }
+        });
+        assert!(killed.told().is_empty(), "{of:?}: {:?}", killed.told());
+    }
+}
