@@ -223,8 +223,10 @@ impl Flight {
         let word = Self::autopilot_says(now, vehicle);
         self.weigh(now, vehicle, word, idles);
         let says = word.filter(|flies| if *flies { !idles } else { !self.overruled });
+        // What was terminated before it was heard falls or lies.
         let flies = self.armed
             && can_fly(vehicle)
+            && (self.is_open() || vehicle.terminated_since.is_none())
             && says.unwrap_or_else(|| !idles && self.seems_to_fly(now, vehicle));
         let debounce = match (says, self.airborne()) {
             // What is on the ground is judged as such at once: motors that stop are no fault there. One wrong word ends no

@@ -12,7 +12,8 @@
 //! | | what comes down slowly without throttle lands and skids | on wings |
 //! | tumbling | body rates above `MIS_TUMBLE` for half a second, on wings for 1.5 s; not in modes made for it | everywhere |
 //! | disarmed in the air | disarmed or terminated above `MIS_DISARM_H` or while it sinks; then it falls, sinks or goes on moving | everywhere |
-//! | | terminated before it was heard, or in a silence, and nothing says that it stands | everywhere |
+//! | | terminated, in a silence too, and does not stand after it | on rotors; after a silence everywhere |
+//! | | disarmed or terminated when it is heard first, and falls | everywhere |
 //! | overturned | its top looks down, by more than 100 degrees of tilt, for 0.7 s; not in modes made for it | on rotors |
 //! | | it lies over by more than `MIS_OVERTURN`, by the force that carries it, within 5 s of throttle, and is slower than 12 m/s | on rotors |
 //! | sinking | faster than `MIS_SINK` for half a second; where the pilot has the throttle, at nearly full throttle only | on rotors |
@@ -51,7 +52,7 @@ use crate::time::{Instant, Span, Stamp};
 use crate::vehicle::{LANDED_STATE_AGE, Vehicle};
 use evidence::{
     BREAKS_OFF, Doubt, FRESH, FULL_THROTTLE, IDLE_THROTTLE, Lasting, Pressure, Recent, Shock, THRUST_PART,
-    UNCARRIED, Unheard, is_known, is_tilted, on_rotors, throttle,
+    UNCARRIED, Unheard, is_known, is_near_ground, is_tilted, on_rotors, throttle,
 };
 
 /// How long after disarming it is watched.
@@ -95,6 +96,11 @@ const BEATS: Span = Span::from_millis(2_500);
 /// So long after that it is seen whether it lies; and so long it does what only what lies does.
 const LYING_SHOWS: Span = Span::from_millis(2_400);
 const LIES_FOR: Span = Span::from_millis(1_500);
+const SIGN_LASTS: Span = Span::from_millis(500);
+/// A restarted autopilot tells its forces and its place no later than this.
+const STARTS: Span = Span::from_secs(20);
+/// What was disarmed in a longer silence may have been carried off in it.
+const CARRIED_OFF: Span = Span::from_secs(30);
 /// What came down so far is not where it flew.
 const CAME_DOWN_M: f32 = 3.0;
 
@@ -126,10 +132,12 @@ pub struct Mishap {
     seen: Option<Kind>,
     armed: bool,
     disarmed_at: Option<Instant>,
-    /// The latest heartbeat, the height above home then, and when anything that is watched was heard.
+    /// The latest heartbeat, the height above home then, and when the autopilot was heard last.
     beat_at: Instant,
     beat_height_m: f32,
     heard_at: Instant,
+    /// Disarmed or terminated when it was heard first, which was then: whether it falls is to be seen.
+    first_at: Option<Instant>,
     /// It was not heard in the air: whether it lies is to be seen.
     unheard: Option<Unheard>,
     /// It came down in a silence, which began then.
@@ -199,6 +207,7 @@ impl Mishap {
             beat_at: Instant::ZERO,
             beat_height_m: 0.0,
             heard_at: Instant::ZERO,
+            first_at: None,
             unheard: None,
             unheard_from: None,
             felt_at: Instant::ZERO,
@@ -248,7 +257,8 @@ impl Mishap {
 
     /// Whether other checks would only echo it.
     pub(crate) fn is_going(&self) -> bool {
-        self.state != State::Quiet || self.doubt.is_some()
+        let lies = matches!(self.unheard, Some(Unheard { to: Some(_), lies: true, .. }));
+        self.state != State::Quiet || self.doubt.is_some() || lies
     }
 
     /// Whether it was disarmed out of a flight, and that it falls is not seen yet.
@@ -314,13 +324,17 @@ impl Mishap {
         self.shocked(now, vehicle);
         let seen = self.seen.take();
         match (self.state, seen) {
-            (State::Quiet, Some(kind)) if flight.is_open() || self.is_turned_over(now, vehicle, kind) => {
+            (State::Quiet, Some(kind))
+                if flight.is_open()
+                    || (kind == Kind::Disarmed && self.first_at.is_some())
+                    || self.is_turned_over(now, vehicle, kind) =>
+            {
                 self.state = State::Going(now);
                 let mut place = Place::of(now, vehicle);
                 if let (Kind::Disarmed, Some(doubt)) = (kind, self.doubt.take()) {
                     place.height_m = doubt.height_m as i16;
                 }
-                self.doubt = None;
+                (self.doubt, self.first_at) = (None, None);
                 self.place = place;
                 // What turned over right after a shock hit something first.
                 if let Some(shock) = self.shock.filter(|_| kind == Kind::Overturned) {
@@ -330,7 +344,7 @@ impl Mishap {
                 Some(Change::Began(kind))
             }
             (State::Quiet, Some(kind)) => {
-                self.worst = [0.0; Kind::COUNT];
+                (self.worst, self.unheard_from) = ([0.0; Kind::COUNT], None);
                 let told = core::mem::replace(&mut self.on_bench, true);
                 (!told).then_some(Change::OnBench(kind))
             }
@@ -372,29 +386,25 @@ impl Mishap {
             }
         }
         if armed && !self.armed {
-            (self.on_bench, self.disarmed_at, self.doubt, self.stood) = (false, None, None, false);
+            (self.on_bench, self.disarmed_at, self.stood, self.heard_at) = (false, None, false, now);
+            (self.doubt, self.first_at) = (None, None);
         }
         let beat_at = vehicle.heartbeat.at().unwrap_or(self.beat_at);
         let mut before_m = self.beat_height_m;
-        let mut unseen = false;
+        let mut unheard = false;
         if beat_at != self.beat_at {
-            unseen = vehicle.terminated_since.is_some() && beat_at.since(self.beat_at) > BEATS;
+            if self.beat_at == Instant::ZERO && !armed {
+                self.first_at = Some(now);
+            }
+            unheard = beat_at.since(self.beat_at) > BEATS;
             before_m = core::mem::replace(&mut self.beat_height_m, self.height_m);
             self.beat_at = beat_at;
-        }
-        // Terminated before it was heard: it is in the air by its own word, and was never seen elsewhere.
-        let ended =
-            vehicle.armed() && !self.armed && self.disarmed_at.is_none() && self.state == State::Quiet;
-        if ended && vehicle.terminated_since.is_some() && flight.is_open() && !flight.was_on_ground() {
-            self.disarmed_at = Some(now);
-            let doubt = Doubt::new(now, height_m(now, vehicle).unwrap_or(0.0));
-            self.doubt = Some(Doubt { unseen: true, ..doubt });
         }
         self.stood |= armed && vehicle.inertial.is_level(now);
         if self.armed && !armed {
             self.disarmed_at = Some(now);
-            // The height of before: PX4's is 0 from the disarming on.
-            let height_m = if unseen { before_m } else { self.height_m };
+            // The height of before: PX4's is 0 from the disarming on, and home may be another one.
+            let height_m = if unheard { before_m } else { self.height_m };
             let high = height_m > params.get(Param::MisDisarm) || self.sink.greatest() > FALLING_MPS;
             // The autopilot may have called it landed because it is disarmed.
             if high && flight.is_open() && self.state == State::Quiet {
@@ -403,6 +413,7 @@ impl Mishap {
                 let uncarried = self.is_uncarried()
                     && now.since(self.felt_at) <= STILL
                     && now.since(self.uncarried.since) >= UNCARRIED;
+                let unseen = unheard && vehicle.terminated_since.is_some();
                 self.doubt = Some(Doubt { altitude_m, uncarried, unseen, ..doubt });
             }
         }
@@ -499,17 +510,26 @@ impl Mishap {
         self.still_since.is_some_and(|since| now.since(since) >= STILL)
     }
 
-    /// Disarmed out of a flight: what falls, sinks or glides on was disarmed in the air.
+    /// Disarmed out of a flight: what falls, sinks or glides on was disarmed in the air, and what was terminated there, if it does not
+    /// stand. What is disarmed when it is heard first must fall faster than anything is carried down.
     fn doubted(&mut self, now: Instant, vehicle: &Vehicle, params: &Params) {
-        let Some(Doubt { since, height_m, altitude_m, uncarried, unseen }) = self.doubt else { return };
+        let first = || self.first_at.map(|at| Doubt::new(at, height_m(now, vehicle).unwrap_or(0.0)));
+        let Some(doubt) = self.doubt.or_else(first) else { return };
+        let Doubt { since, height_m, altitude_m, uncarried, unseen } = doubt;
+        let is_first = self.doubt.is_none();
+        let is_carried = is_first && !vehicle.armed();
         // An estimator is shaken by the touch, and may fall on while the vehicle stands.
         let air = |sink_mps: f32| self.pressure.agrees(now, sink_mps) != Some(false);
         let fallen = |before: f32| {
             vehicle.global.get().is_some_and(|global| global.altitude.0 < before - FALLEN_M)
                 && air(FALLING_MPS)
         };
-        let sinks = self.sink.now > FALLING_MPS && now.since(since) > Recent::WINDOW && air(self.sink.now);
+        let falls = self.pressure.agrees(now, self.sink.now) == Some(true)
+            && self.sink.now > params.get(Param::MisSink);
+        let sinks = if is_carried { falls } else { self.sink.now > FALLING_MPS && air(self.sink.now) }
+            && now.since(since) > Recent::WINDOW;
         let glides = !on_rotors(now, vehicle)
+            && !is_carried
             && now.since(since) > BREAKS_OFF
             && ground_speed_mps(now, vehicle).is_some_and(|speed_mps| speed_mps > GLIDING_MPS);
         // An autopilot that lost its estimate terminates the flight, and tells no more of heights and speeds.
@@ -519,11 +539,21 @@ impl Mishap {
         if stands && let Some(doubt) = &mut self.doubt {
             doubt.unseen = false;
         }
-        let lost = unseen && now.since(since) >= LIES_FOR && !stands;
+        // What was terminated stays armed. What does not tell how it lies and how fast it is, or never stood level (tail-sitters), may stand.
+        let is_seen = self.stood
+            && vehicle.inertial.is_fresh(now)
+            && on_rotors(now, vehicle)
+            && climb_mps(now, vehicle).is_some()
+            && ground_speed_mps(now, vehicle).is_some();
+        let ended = vehicle.armed();
+        let over = now.since(since) > FALL_SHOWS;
+        let lost =
+            !is_first && is_seen && !stands && ((unseen && now.since(since) >= LIES_FOR) || (ended && over));
         if uncarried || sinks || glides || drops || lost || altitude_m.is_some_and(fallen) {
+            self.disarmed_at.get_or_insert(now);
             self.see(now, Kind::Disarmed, height_m.max(params.get(Param::MisDisarm).next_up()));
-        } else if now.since(since) > FALL_SHOWS {
-            self.doubt = None;
+        } else if over {
+            (self.doubt, self.first_at) = (None, None);
         }
     }
 
@@ -532,17 +562,14 @@ impl Mishap {
         let slow = |speed_mps: Option<f32>| speed_mps.is_some_and(|speed_mps| speed_mps.abs() < STILL_MPS);
         now.since(self.felt_at) <= STILL
             && vehicle.inertial.is_level_for(now, STILL)
-            && slow(climb_mps(now, vehicle))
-            && slow(ground_speed_mps(now, vehicle))
+            && (self.rests(now) || (slow(climb_mps(now, vehicle)) && slow(ground_speed_mps(now, vehicle))))
     }
 
     /// What flew, was not heard, and is heard again: whether it came down meanwhile as nothing lands.
     fn note_silence(&mut self, now: Instant, vehicle: &Vehicle, flight: &Flight, params: &Params) {
         let Some(mut unheard) = self.unheard else {
-            let flies = self.armed && flight.airborne() && self.state == State::Quiet && self.doubt.is_none();
-            if flies && now.since(self.heard_at) >= UNHEARD {
-                let (from, height_m, sink_mps) = (self.heard_at, self.height_m, self.sink.greatest());
-                self.unheard = Some(Unheard { from, to: None, well_at: now, height_m, sink_mps });
+            if now.since(self.heard_at) >= UNHEARD {
+                self.begin_silence(self.heard_at, vehicle, flight);
             }
             return;
         };
@@ -550,10 +577,20 @@ impl Mishap {
             return;
         }
         let to = *unheard.to.get_or_insert(now);
+        let tells = |at: Option<Instant>| at.is_none_or(|at| at > unheard.from);
+        if unheard.seen_at.is_none() && tells(vehicle.imu.at()) && tells(vehicle.global.at()) {
+            unheard.seen_at = Some(now);
+        }
+        let (since, shows) = match unheard.seen_at {
+            Some(seen_at) => (seen_at, LYING_SHOWS),
+            None => (to, if self.armed { LYING_SHOWS } else { STARTS }),
+        };
+        unheard.lies =
+            !self.armed || vehicle.landed.within(now, LANDED_STATE_AGE) == Some(&LandedState::OnGround);
         let mut sign = None;
         // Its states of before it was silent say nothing.
         if now.since(to) >= STILL {
-            if self.state != State::Quiet || now.since(to) > LYING_SHOWS {
+            if self.state != State::Quiet || now.since(since) > shows {
                 self.unheard = None;
                 return;
             }
@@ -564,13 +601,39 @@ impl Mishap {
         }
         match sign {
             None => unheard.well_at = now,
-            Some((kind, value)) if now.since(unheard.well_at) + STILL >= LIES_FOR => {
+            Some((kind, value)) if now.since(unheard.well_at) >= SIGN_LASTS => {
                 (self.hit_at, self.unheard_from) = (to, Some(unheard.from));
                 self.see(now, kind, value);
             }
             Some(_) => {}
         }
         self.unheard = Some(unheard);
+    }
+
+    /// What flies is not heard, since then.
+    fn begin_silence(&mut self, from: Instant, vehicle: &Vehicle, flight: &Flight) {
+        if self.armed && flight.airborne() && self.state == State::Quiet && self.doubt.is_none() {
+            let altitude_m = vehicle.global.get().map(|global| global.altitude.0);
+            let sink_mps = self.sink.greatest();
+            let silence = Unheard {
+                from,
+                to: None,
+                seen_at: None,
+                lies: false,
+                well_at: self.heard_at,
+                altitude_m,
+                sink_mps,
+            };
+            self.unheard = Some(silence);
+        }
+    }
+
+    /// Its recording lost what it said for so long, and no time passed here meanwhile.
+    pub(crate) fn lose(&mut self, span: Span, vehicle: &Vehicle, flight: &Flight) {
+        if span >= UNHEARD && self.unheard.is_none() {
+            let from_us = self.heard_at.as_micros().saturating_sub(span.as_micros());
+            self.begin_silence(Instant::from_micros(from_us), vehicle, flight);
+        }
     }
 
     /// What it does, after a silence, that only what came down as nothing lands does: as what that is told, and with which value.
@@ -585,18 +648,25 @@ impl Mishap {
         let flies = ground_speed_mps(now, vehicle).is_some_and(|speed_mps| speed_mps > DRAGS_MPS);
         let limit_deg = params.get(Param::MisOverturn);
         let over_deg = vehicle.inertial.lies_over(now).map(f32::to_degrees);
-        let lies = self.stood && !flies && self.rate < STILL_RATE;
+        // What landed unheard may have been laid down by somebody since.
+        let by_itself = self.armed || unheard.lasted(now) <= CARRIED_OFF;
+        let lies = self.stood && !flies && self.rate < STILL_RATE && by_itself;
         if let Some(over_deg) = over_deg.filter(|over_deg| lies && *over_deg > limit_deg) {
             return Some((Kind::Overturned, over_deg));
         }
-        let lost_m = height_m(now, vehicle).map_or(0.0, |height_m| unheard.height_m - height_m);
+        // Above the sea: home is another one once it is disarmed.
+        let altitude_m = vehicle.global.within(now, FRESH).map(|global| global.altitude.0);
+        let lost_m = unheard.altitude_m.zip(altitude_m).map_or(0.0, |(before_m, now_m)| before_m - now_m);
         let slow =
             climb_mps(now, vehicle).is_none_or(|climb_mps| climb_mps.abs() < STILL_MPS) || self.rests(now);
-        let in_vain = self.armed && throttle(now, vehicle).is_some_and(|part| part >= FULL_THROTTLE);
-        let took_s = unheard.to.unwrap_or(now).since(unheard.from).as_secs_f32();
+        // With all its thrust it may hover, but not near the ground.
+        let in_vain = self.armed
+            && (self.lies(now, vehicle) || is_near_ground(now, vehicle))
+            && throttle(now, vehicle).is_some_and(|part| part >= FULL_THROTTLE);
         let fell = !has_pilots_throttle(vehicle)
             && self.is_idle(now, vehicle)
-            && took_s < unheard.least_s(lost_m, params.get(Param::MisSink));
+            && unheard.lasted(now).as_secs_f32()
+                < unheard.least_s(lost_m, params.get(Param::MisSink), self.armed);
         let is_down = slow && lost_m > CAME_DOWN_M && (in_vain || fell);
         is_down.then(|| (Kind::Impact, params.get(Param::MisImpact).next_up()))
     }
@@ -640,7 +710,7 @@ impl Mishap {
     fn goes(&mut self, now: Instant, last: Instant, vehicle: &Vehicle) -> Option<Change> {
         let long = now.since(last) >= RECOVERED;
         let silent = vehicle.heartbeat.within(now, RECOVERED).is_none();
-        let near_ground = height_m(now, vehicle).is_some_and(|height_m| height_m < 2.0);
+        let near_ground = is_near_ground(now, vehicle);
         // With all its thrust it would climb: it dances on the ground.
         let dances = near_ground
             && on_rotors(now, vehicle)

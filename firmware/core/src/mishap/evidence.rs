@@ -1,5 +1,6 @@
 //! What a mishap is seen by: how long something lasts, what was greatest of late, what the vehicle hangs on and who flies it.
 
+use crate::motion::height_m;
 use crate::observation::EstimatorScale;
 use crate::params::{Param, Params};
 use crate::time::{Instant, Span};
@@ -166,23 +167,36 @@ pub(super) struct Unheard {
     pub(super) from: Instant,
     /// When it was heard again.
     pub(super) to: Option<Instant>,
+    /// When its forces and its place were heard again, or the first of them where it tells no other.
+    pub(super) seen_at: Option<Instant>,
+    /// It is disarmed, or calls itself landed, since.
+    pub(super) lies: bool,
     /// When it did last what is no sign of a crash, since it is heard again.
     pub(super) well_at: Instant,
-    /// Its height above home, and its sink, when it was heard last.
-    pub(super) height_m: f32,
+    /// Its height above mean sea level, and its sink, when it was heard last.
+    pub(super) altitude_m: Option<f32>,
     pub(super) sink_mps: f32,
 }
 
 impl Unheard {
+    /// How long it was not heard.
+    pub(super) fn lasted(&self, now: Instant) -> Span {
+        self.to.unwrap_or(now).since(self.from)
+    }
+
     /// The shortest time in which what flies by itself comes down so far, stands and is disarmed: from its sink to the fastest descent that
-    /// can be set, as gently as autopilots do, and the last metres no faster than legs take.
-    pub(super) fn least_s(&self, lost_m: f32, limit_mps: f32) -> f32 {
+    /// can be set, or its own if that was faster, as gently as autopilots do, the last metres no faster than legs take, and disarmed when its autopilot has seen for so
+    /// long that it stands (`ArduPilot` 1 s, PX4 longer).
+    pub(super) fn least_s(&self, lost_m: f32, limit_mps: f32, armed: bool) -> f32 {
+        const SEES_S: f32 = 1.0;
         const LAST_M: f32 = 5.0;
         const LAST_MPS: f32 = 2.5;
         const GENTLY_MPS2: f32 = 2.0;
         let last_m = lost_m.min(LAST_M);
-        let faster_mps = (limit_mps - self.sink_mps).max(0.0);
-        last_m / LAST_MPS + (lost_m - last_m) / limit_mps + faster_mps / (2.0 * GENTLY_MPS2)
+        let fastest_mps = limit_mps.max(self.sink_mps);
+        let faster_mps = fastest_mps - self.sink_mps.max(0.0);
+        let sees_s = if armed { 0.0 } else { SEES_S };
+        last_m / LAST_MPS + (lost_m - last_m) / fastest_mps + faster_mps / (2.0 * GENTLY_MPS2) + sees_s
     }
 }
 
@@ -199,6 +213,11 @@ pub(super) fn is_known(vector: [f32; 3]) -> bool {
 /// Whether it hangs on rotors now.
 pub(super) fn on_rotors(now: Instant, vehicle: &Vehicle) -> bool {
     vehicle.hovers(now) == Some(true)
+}
+
+/// Whether it is not above where it took off, but for a step.
+pub(super) fn is_near_ground(now: Instant, vehicle: &Vehicle) -> bool {
+    height_m(now, vehicle).is_some_and(|height_m| height_m < 2.0)
 }
 
 /// Whether it lies on its side or its back, by an attitude that the sensors do not contradict.

@@ -59,23 +59,33 @@ impl Mishap {
         params: &Params,
     ) {
         let watched = self.armed || self.disarmed_at.is_some_and(|since| at.since(since) <= WATCHED);
-        if !watched || vehicle.kind() == VehicleKind::Surface {
+        if !(watched || self.first_at.is_some()) || vehicle.kind() == VehicleKind::Surface {
             return;
         }
-        self.heard_at = at;
+        // A radio, a battery or an engine may be heard while the autopilot is not.
+        let of_others = matches!(
+            observation,
+            Observation::TelemetryRadio(_)
+                | Observation::Battery(_)
+                | Observation::Escs(_)
+                | Observation::Engine(_)
+        );
+        if !of_others {
+            self.heard_at = at;
+        }
         match observation {
-            Observation::Imu(imu) if imu.instance == 0 => self.take_imu(at, imu, vehicle, params),
+            Observation::Imu(imu) if imu.instance == 0 && watched => self.take_imu(at, imu, vehicle, params),
             Observation::ImuAndAir(imu, air) => {
                 if air.instance == 0 {
                     self.take_pressure(at, air);
                 }
-                if imu.instance == 0 {
+                if imu.instance == 0 && watched {
                     self.take_imu(at, imu, vehicle, params);
                 }
             }
-            Observation::Shock(force) => self.take_shock(at, force.0 / GRAVITY, vehicle, params),
+            Observation::Shock(force) if watched => self.take_shock(at, force.0 / GRAVITY, vehicle, params),
             Observation::Air(air) if air.instance == 0 => self.take_pressure(at, air),
-            Observation::Attitude(attitude) => {
+            Observation::Attitude(attitude) if watched => {
                 self.take_attitude(at, attitude, vehicle, params);
                 if let Some(rates) = attitude.rates {
                     self.take_rates(at, rates, vehicle, params);
@@ -114,7 +124,11 @@ impl Mishap {
     }
 
     fn take_force(&mut self, at: Instant, force: [MetresPerSecond2; 3], vehicle: &Vehicle, params: &Params) {
-        let Some(load_g) = load_factor_g(force) else { return };
+        let Some(load_g) = load_factor_g(force) else {
+            // What is no force is no rest either.
+            self.load_g = f32::INFINITY;
+            return;
+        };
         // A sensor that says the same again, or nothing but zeros, is no sensor that flies.
         if load_g == 0.0 || load_g.to_bits() == self.load_g.to_bits() {
             return;
@@ -165,7 +179,7 @@ impl Mishap {
                         && on_rotors(at, vehicle)),
             });
             if self.shock.is_none() && self.worst[Kind::Impact as usize] == 0.0 {
-                self.hit_at = at;
+                (self.hit_at, self.unheard_from) = (at, None);
             }
             // The greatest of several: what hits something bounces.
             let greatest_g = self.shock.map_or(load_g, |before| before.load_g.max(load_g));

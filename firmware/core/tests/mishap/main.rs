@@ -14,19 +14,23 @@ use hums_core::happening::Happening;
 use hums_core::health::{Finding, Level, Orders, Subsystem};
 use hums_core::mishap::{Change, Kind, Place, Report};
 use hums_core::observation::{
-    Air, Attitude, Autopilot, GlobalPosition, Hud, Imu, LandedState, Observation, VehicleKind, VtolState,
-    Wanted,
+    Air, Attitude, Autopilot, GlobalPosition, Hud, Imu, LandedState, Observation, Source, TelemetryRadio,
+    VehicleKind, VtolState, Wanted,
 };
 use hums_core::params::Params;
 use hums_core::status::LinkReading;
-use hums_core::time::Instant;
+use hums_core::time::{Instant, Span};
 use hums_core::units::{
-    Amperes, Fraction, Hectopascals, MetresPerSecond, MetresPerSecond2, Position, Radians, RadiansPerSecond,
+    Amperes, Fraction, Hectopascals, Metres, MetresPerSecond, MetresPerSecond2, Position, Radians,
+    RadiansPerSecond,
 };
 use hums_core::usage::UsageCounter;
 
 /// When it goes wrong.
 const AT_MS: u64 = 20_000;
+
+/// The radio that the ground station hears it by.
+const RADIO: Source = Source { system: 51, component: 68 };
 
 /// How the vehicle moves besides what a [`Quad`] says.
 #[derive(Clone, Copy)]
@@ -45,8 +49,14 @@ struct Motion {
     displayed_mps: Option<f32>,
     /// The roll that the autopilot wants, where it says so.
     roll_wanted: Option<f32>,
-    /// Nothing of it is heard.
+    /// Nothing of it is heard, but of its radio.
     unheard: bool,
+    /// Of its autopilot only heartbeats are.
+    beats_only: bool,
+    /// Home is so much lower than before.
+    home_sank_m: f32,
+    /// So much was lost of the recording, in which no time passed here.
+    lost_s: Option<u64>,
 }
 
 const CALM: Motion = Motion {
@@ -60,6 +70,9 @@ const CALM: Motion = Motion {
     displayed_mps: None,
     roll_wanted: None,
     unheard: false,
+    beats_only: false,
+    home_sank_m: 0.0,
+    lost_s: None,
 };
 
 type Script = fn(u64, &mut Quad, &mut Motion);
@@ -92,13 +105,23 @@ impl Outcome {
 
 /// A minute; `script` gets the time since it goes wrong.
 fn fly(vehicle: &Quad, script: impl Fn(u64, &mut Quad, &mut Motion)) -> Outcome {
+    fly_from(AT_MS, vehicle, script)
+}
+
+fn fly_from(at_ms: u64, vehicle: &Quad, script: impl Fn(u64, &mut Quad, &mut Motion)) -> Outcome {
     let mut monitor = Monitor::new(Params::defaults());
     let (mut findings, mut changes, mut reports) = (Vec::new(), Vec::new(), Vec::new());
     for now_ms in (0..60_000).step_by(50) {
         let now = Instant::from_millis(now_ms);
         let (mut quad, mut motion) = (vehicle.clone(), CALM);
-        if now_ms >= AT_MS {
-            script(now_ms - AT_MS, &mut quad, &mut motion);
+        if now_ms >= at_ms {
+            script(now_ms - at_ms, &mut quad, &mut motion);
+        }
+        if let Some(lost_s) = motion.lost_s {
+            monitor.lose(Span::from_secs(lost_s));
+        }
+        if motion.unheard {
+            monitor.observe(now, RADIO, &Observation::TelemetryRadio(TelemetryRadio::default()));
         }
         // No sensor says the same for ever.
         let noise = (now_ms / 50 % 7) as f32 * 0.002;
@@ -109,7 +132,7 @@ fn fly(vehicle: &Quad, script: impl Fn(u64, &mut Quad, &mut Motion)) -> Outcome 
         if let Some(shock_g) = motion.shock_g {
             monitor.observe(now, AUTOPILOT, &Observation::Shock(MetresPerSecond2(shock_g * 9.806_65)));
         }
-        if !motion.unheard {
+        if !motion.unheard && !motion.beats_only {
             monitor.observe(now, AUTOPILOT, &Observation::Imu(imu));
         }
         if now_ms.is_multiple_of(100) && !motion.unheard {
@@ -118,16 +141,20 @@ fn fly(vehicle: &Quad, script: impl Fn(u64, &mut Quad, &mut Motion)) -> Outcome 
             let height = if now_ms < 2_000 { quad.start_height } else { quad.height };
             let global = GlobalPosition {
                 position: Some(Position { latitude_deg: 47.397_742, longitude_deg: -8.545_594 }),
-                relative_altitude: hums_core::units::Metres(height),
+                relative_altitude: Metres(height),
+                altitude: Metres(480.0 + height - motion.home_sank_m),
                 velocity: [motion.ground_mps, 0.0, -quad.climb].map(MetresPerSecond),
                 ..GlobalPosition::default()
             };
-            let said = quad.says(now_ms).into_iter().filter(|said| {
-                !matches!(
-                    said,
-                    Observation::Imu(_) | Observation::Attitude(_) | Observation::GlobalPosition(_)
-                )
-            });
+            let beats = |said: &Observation| matches!(said, Observation::Heartbeat(_));
+            let said = quad.says(now_ms).into_iter().filter(|said| !motion.beats_only || beats(said)).filter(
+                |said| {
+                    !matches!(
+                        said,
+                        Observation::Imu(_) | Observation::Attitude(_) | Observation::GlobalPosition(_)
+                    )
+                },
+            );
             let air = Air { pressure: motion.pressure_hpa.map(Hectopascals), ..Air::default() };
             let own =
                 [Observation::Air(air), Observation::Attitude(attitude), Observation::GlobalPosition(global)];
@@ -138,6 +165,7 @@ fn fly(vehicle: &Quad, script: impl Fn(u64, &mut Quad, &mut Motion)) -> Outcome 
             let wanted = motion
                 .roll_wanted
                 .map(|roll| Observation::Wanted(Wanted { roll: Radians(roll), ..Wanted::default() }));
+            let own = own.into_iter().filter(|_| !motion.beats_only);
             for said in said.chain(hud).chain(wanted).chain(own) {
                 monitor.observe(now, AUTOPILOT, &said);
             }

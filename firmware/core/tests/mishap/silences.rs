@@ -40,11 +40,20 @@ fn what_stands_with_all_its_throttle_after_a_silence_or_came_down_too_fast_crash
             quad.throttle = 1.0;
         });
         assert_eq!((driven.told().first(), driven.flights()), (Some(&"impact"), (1, 0, 1)), "{of:?}");
-        let fell = unheard(of, 5_200, |quad, motion| {
+        // The autopilot takes its time to see that it stands.
+        for silent_ms in [5_200, 6_200] {
+            let fell = unheard(of, silent_ms, |quad, motion| {
+                stands(quad, motion);
+                (quad.throttle, quad.armed, quad.landed) = (0.0, false, Some(LandedState::OnGround));
+            });
+            assert_eq!((fell.told(), fell.flights()), (vec!["impact"], (1, 0, 1)), "{of:?}");
+        }
+        let lost = fly(&hovering(of), |ms, quad, motion| {
             stands(quad, motion);
             (quad.throttle, quad.armed, quad.landed) = (0.0, false, Some(LandedState::OnGround));
+            motion.lost_s = (ms == 0).then_some(6);
         });
-        assert_eq!((fell.told(), fell.flights()), (vec!["impact"], (1, 0, 1)), "{of:?}");
+        assert_eq!((lost.told(), lost.flights()), (vec!["impact"], (1, 0, 1)), "{of:?}");
     }
 }
 
@@ -70,6 +79,8 @@ fn what_lands_in_a_silence_has_landed_and_what_flies_on_flies_on() {
         let climbs =
             unheard(of, 15_000, |quad, _| (quad.height, quad.climb, quad.throttle) = (12.0, 3.0, 1.0));
         assert!(climbs.told().is_empty(), "{of:?}: {:?}", climbs.told());
+        let hovers = unheard(of, 15_000, |quad, _| (quad.height, quad.throttle) = (12.0, 1.0));
+        assert!(hovers.told().is_empty(), "{of:?}: {:?}", hovers.told());
     }
 }
 
@@ -99,5 +110,145 @@ fn a_flight_that_was_terminated_before_it_was_heard_is_a_mishap() {
         let moves = fly(&Quad { climb: -4.0, ..terminated }, |_, _, _| ());
         let told = moves.findings.iter().find(|finding| finding.check == "disarmed_in_air");
         assert_eq!(told.map(|finding| finding.orders), Some(Orders::Own), "{of:?}: {:?}", moves.told());
+    }
+}
+
+#[test]
+fn what_is_terminated_in_the_air_and_neither_stands_nor_falls_at_once_is_a_mishap() {
+    for of in ROTORS {
+        // Its motors go on for a while; it calls itself armed and in the air to the end.
+        let drifts = fly(&hovering(of), |ms, quad, motion| {
+            (quad.state, motion.ground_mps) = (8, 4.0);
+            if ms > 7_000 {
+                stands(quad, motion);
+                (motion.load_g, motion.drag_g) = (0.05, 1.0);
+            }
+        });
+        assert_eq!(
+            (drifts.told().first(), drifts.flights()),
+            (Some(&"disarmed_in_air"), (1, 0, 1)),
+            "{of:?}"
+        );
+        let at_ms = drifts.changes.first().map(|(at_ms, _)| *at_ms);
+        assert!(at_ms.is_some_and(|at_ms| at_ms < AT_MS + 4_500), "{of:?}: {at_ms:?}");
+    }
+}
+
+#[test]
+fn what_lies_terminated_when_it_is_heard_first_neither_flies_nor_falls() {
+    for of in ROTORS {
+        let lies = fly_from(0, &Quad { state: 8, start_height: 0.0, ..hovering(of) }, |_, quad, motion| {
+            stands(quad, motion);
+            (motion.load_g, motion.drag_g) = (0.05, 1.0);
+        });
+        assert!(lies.told().is_empty() && lies.flights() == (0, 0, 0), "{of:?}: {:?}", lies.told());
+    }
+}
+
+/// Disarmed when it is heard first, it goes down so fast for three seconds, and the air pressure says so; then it lies.
+fn goes_down(of: (Autopilot, VehicleKind, u8), sink_mps: f32) -> Outcome {
+    fly_from(0, &Quad { armed: false, throttle: 0.0, ..hovering(of) }, |ms, quad, motion| {
+        let down_m = sink_mps * ms.min(3_000) as f32 / 1_000.0;
+        (quad.climb, quad.height) = if ms < 3_000 { (-sink_mps, 30.0 - down_m) } else { (0.0, 0.0) };
+        motion.pressure_hpa = Some(980.0 + 0.12 * down_m + (ms / 50 % 3) as f32 * 0.01);
+    })
+}
+
+#[test]
+fn what_falls_disarmed_when_it_is_heard_first_is_a_mishap_and_what_is_carried_down_is_none() {
+    for of in ROTORS {
+        let falls = goes_down(of, 9.0);
+        assert_eq!(falls.told().first(), Some(&"disarmed_in_air"), "{of:?}");
+        let carried = goes_down(of, 4.0);
+        assert!(carried.told().is_empty() && carried.changes.is_empty(), "{of:?}: {:?}", carried.told());
+    }
+}
+
+/// It stands, and is disarmed.
+fn has_landed(quad: &mut Quad, motion: &mut Motion) {
+    stands(quad, motion);
+    (quad.throttle, quad.armed, quad.landed) = (0.0, false, Some(LandedState::OnGround));
+}
+
+#[test]
+fn a_home_that_is_set_anew_is_no_fall() {
+    for of in ROTORS {
+        // It was 20 m above home and 4 m above a hill.
+        let landed = unheard(of, 6_200, |quad, motion| {
+            has_landed(quad, motion);
+            motion.home_sank_m = -16.0;
+        });
+        assert!(landed.told().is_empty() && landed.flights() == (1, 1, 0), "{of:?}: {:?}", landed.told());
+    }
+}
+
+#[test]
+fn what_was_in_a_dive_comes_down_as_fast() {
+    for of in ROTORS {
+        let dives = fly(&hovering(of), |ms, quad, motion| {
+            motion.unheard = (2_000..10_000).contains(&ms);
+            match ms {
+                0..2_000 => {
+                    (quad.climb, quad.height, quad.throttle) = (-5.5, 100.0 - 0.0055 * ms as f32, 0.2)
+                }
+                _ => has_landed(quad, motion),
+            }
+        });
+        assert_eq!(dives.told(), ["impact"], "{of:?}: as fast as it may be told to");
+        let dives = fly(&hovering(of), |ms, quad, motion| {
+            motion.unheard = (4_000..12_000).contains(&ms);
+            motion.displayed_mps = Some(quad.climb);
+            match ms {
+                0..4_000 => {
+                    (quad.climb, quad.height, quad.throttle) = (-18.0, 160.0 - 0.018 * ms as f32, 0.2)
+                }
+                _ => has_landed(quad, motion),
+            }
+        });
+        assert!(!dives.told().contains(&"impact"), "{of:?}: {:?}", dives.told());
+    }
+}
+
+#[test]
+fn what_was_carried_home_on_its_side_did_not_turn_over() {
+    for of in ROTORS {
+        let on_its_side = |quad: &mut Quad, motion: &mut Motion| {
+            has_landed(quad, motion);
+            (quad.roll, motion.load_g, motion.drag_g) = (1.6, 0.05, 1.0);
+        };
+        let carried = unheard(of, 35_000, on_its_side);
+        assert!(carried.told().is_empty() && carried.flights() == (1, 1, 0), "{of:?}: {:?}", carried.told());
+        let crashed = unheard(of, 12_000, on_its_side);
+        assert_eq!(crashed.told().first(), Some(&"overturned"), "{of:?}");
+    }
+}
+
+#[test]
+fn an_autopilot_that_starts_again_tells_later_how_it_lies() {
+    for of in ROTORS {
+        let lies = fly(&hovering(of), |ms, quad, motion| {
+            motion.unheard = ms < 12_000;
+            motion.beats_only = ms < 20_000;
+            if !motion.unheard {
+                has_landed(quad, motion);
+                (quad.roll, motion.load_g, motion.drag_g) = (1.6, 0.05, 1.0);
+            }
+        });
+        assert_eq!((lies.told().first(), lies.flights()), (Some(&"overturned"), (1, 0, 1)), "{of:?}");
+    }
+}
+
+#[test]
+fn what_is_killed_after_a_landing_and_does_not_tell_how_it_stands_is_no_mishap() {
+    for of in ROTORS {
+        let killed = fly(&hovering(of), |ms, quad, motion| {
+            motion.unheard = ms < 12_000;
+            motion.beats_only = true;
+            if !motion.unheard {
+                has_landed(quad, motion);
+                (quad.armed, quad.state) = (true, 8);
+            }
+        });
+        assert!(killed.told().is_empty(), "{of:?}: {:?}", killed.told());
     }
 }
