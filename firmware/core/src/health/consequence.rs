@@ -78,6 +78,7 @@ const ROWS: &[(&[&str], &[&str])] = &[
     ),
     (&["gps_satellites", "gps_hdop", "gps_accuracy"], &["gps_sats_fall", "gps_hdop_rise"]),
     (&["gps_sats_fall"], &["gps_hdop_rise"]),
+    (&["gps_stuck"], &["gnss_alert"]),
     (&["gps_stuck", "gnss_alert"], &["gps_speed", "gps_height"]),
     (GNSS, ESTIMATOR),
     (GNSS, &["baro_height", "position_silent"]),
@@ -88,7 +89,9 @@ const ROWS: &[(&[&str], &[&str])] = &[
         &["accel_stuck", "gyro_stuck", "accel_alert", "gyro_alert", "accel_mismatch", "gyro_mismatch"],
         &["imu_gps"],
     ),
-    (&["imu_gps"], &["gnss_alert", "baro_noise"]),
+    // ArduPilot's word on vibration goes by the same innovations.
+    (&["vibration", "vibration_px4", "clipping"], &["imu_gps"]),
+    (&["imu_gps"], &["gnss_alert", "baro_noise", "vibration_alert"]),
     (&["compass_stuck", "compass_alert"], &["compass_mismatch"]),
     (&["gyro_stuck", "gyro_alert"], &["gyro_mismatch"]),
     (
@@ -107,7 +110,7 @@ const ROWS: &[(&[&str], &[&str])] = &[
     (SENSORS, SECOND),
     (SHAKING, SECOND),
     (ESTIMATOR, SECOND),
-    (SHAKING, &["accel_mismatch", "gyro_mismatch", "imu_gps", "load_factor"]),
+    (SHAKING, &["accel_mismatch", "gyro_mismatch", "load_factor"]),
     // Height control follows the estimator.
     (&["ekf_climb"], &["ekf_variance", "ekf_failsafe", "ekf_test_ratio", "ekf_alert", "thrust_lost"]),
     (&["vibration", "vibration_px4"], &["vibration_rise", "clipping", "vibration_alert"]),
