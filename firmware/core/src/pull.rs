@@ -12,6 +12,7 @@
 //! samples are few, and fold vibration into an offset. What repeats a place bit for bit says nothing new.
 
 use crate::flight::Flight;
+use crate::inertial::FORCE_MAX;
 use crate::latest::Reading;
 use crate::motion::climb_within;
 use crate::observation::{Gnss, VehicleKind};
@@ -72,6 +73,9 @@ impl Pull {
     };
 
     pub(crate) fn take_force(&mut self, force: [f32; 3]) {
+        if !force.iter().all(|axis| axis.abs() <= FORCE_MAX) {
+            return;
+        }
         for (sum, axis) in self.sum.iter_mut().zip(force) {
             *sum += axis;
         }
@@ -191,5 +195,14 @@ mod tests {
         let mut take = |step| pull.take_velocity(step, [3.0, 0.0, 0.0], 3);
         let step = Some(Span::from_millis(200));
         assert_eq!([take(None), take(step), take(step)], [None, None, Some(0.0)]);
+    }
+
+    #[test]
+    fn garbage_is_no_force() {
+        let mut pull = Pull::NEW;
+        for force in [f32::NAN, f32::INFINITY, 1e9, 3.0] {
+            pull.take_force([force, 0.0, -9.8]);
+        }
+        assert_eq!((pull.count, pull.sum[0]), (1, 3.0));
     }
 }

@@ -249,6 +249,17 @@ mod tests {
     }
 
     #[test]
+    fn an_accelerometer_explains_what_the_autopilot_says_of_vibration_and_a_receiver_that_hangs_comes_before_it()
+     {
+        let imu = ("imu_gps", Level::Warning);
+        assert_eq!(why_of("vibration_alert", Level::Warning, &[imu]), Some("imu_gps"));
+        assert_eq!(why_of("imu_gps", Level::Warning, &[("vibration_alert", Level::Warning)]), None);
+        assert_eq!(why_of("imu_gps", Level::Warning, &[("vibration", Level::Warning)]), Some("vibration"));
+        let both = [imu, ("gps_stuck", Level::Warning)];
+        assert_eq!(why_of("gnss_alert", Level::Warning, &both), Some("gps_stuck"));
+    }
+
+    #[test]
     fn a_mishap_comes_before_all_but_the_battery_and_the_links() {
         let alarms = [("gps_fix", Level::Critical), ("overturned", Level::Critical)];
         assert_eq!(why_of("ekf_failsafe", Level::Critical, &alarms), Some("overturned"));
