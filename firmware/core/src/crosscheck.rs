@@ -331,7 +331,9 @@ impl Crosschecks {
         }
         if gnss.instance == 0 {
             self.heights.take_gnss(at, gnss, vehicle, flight);
-            self.pull.take_gnss(at, gnss, vehicle, flight);
+            if !self.receivers[0].repeats() {
+                self.pull.take_gnss(at, gnss, vehicle, flight);
+            }
         }
     }
 
@@ -464,6 +466,7 @@ impl Crosschecks {
             Kind::Accelerometer | Kind::Gyro | Kind::Compass => (self.moved.turned_rad, TURNED_RAD),
         };
         let stuck = &self.sensors[kind as usize].get(usize::from(sensor))?.stuck;
+        let least = if kind == Kind::Barometer && stuck.fell_silent() { 0.0 } else { least };
         let times =
             if kind == Kind::Compass && self.all_repeat(now, kind, sensor) { ALL_REPEAT_TIMES } else { 1.0 };
         stuck.lasts(now, moved, least * times)

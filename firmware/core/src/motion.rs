@@ -37,9 +37,14 @@ pub(crate) fn altitude_m(now: Instant, vehicle: &Vehicle) -> Option<f32> {
 
 /// Speed upwards from the best source that is fresh, in m/s.
 pub fn climb_mps(now: Instant, vehicle: &Vehicle) -> Option<f32> {
-    let global = vehicle.global.within(now, MOTION_AGE).map(|global| -global.velocity[2].0);
-    let local = || vehicle.local.within(now, MOTION_AGE).map(|local| -local.velocity[2].0);
-    let hud = || vehicle.hud.within(now, MOTION_AGE).and_then(|hud| hud.climb).map(|climb| climb.0);
+    climb_within(now, vehicle, MOTION_AGE)
+}
+
+/// The same, of what is no older.
+pub(crate) fn climb_within(now: Instant, vehicle: &Vehicle, age: Span) -> Option<f32> {
+    let global = vehicle.global.within(now, age).map(|global| -global.velocity[2].0);
+    let local = || vehicle.local.within(now, age).map(|local| -local.velocity[2].0);
+    let hud = || vehicle.hud.within(now, age).and_then(|hud| hud.climb).map(|climb| climb.0);
     global.or_else(local).or_else(hud).filter(|climb| climb.abs() <= SPEED_MAX_MPS)
 }
 

@@ -7,12 +7,14 @@
 //! a gust change it too fast.
 //!
 //! Velocities of a receiver are late by about half of the time between two of them (of simulators; at 2 Hz and at 5 Hz): forces wait for so
-//! long. A leap of them counts for little ([`LEAP_MPS2`]), and of what shakes the force is known the less: samples are few, and fold
-//! vibration into an offset.
+//! long. A receiver may be later by [`LATE_S`], and nobody knows by how much: what that may make of a force that changes is taken off, and of
+//! a force that stays nothing is. A leap of velocity counts for little ([`LEAP_MPS2`]), and of what shakes the force is known the less:
+//! samples are few, and fold vibration into an offset. What repeats a place bit for bit says nothing new.
 
 use crate::flight::Flight;
+use crate::inertial::FORCE_MAX;
 use crate::latest::Reading;
-use crate::motion::climb_mps;
+use crate::motion::climb_within;
 use crate::observation::{Gnss, VehicleKind};
 use crate::rotation::to_earth;
 use crate::steady::{TURNED, is_clear};
@@ -22,10 +24,13 @@ use crate::vehicle::Vehicle;
 
 /// An attitude, and forces, that are older are not of one moment.
 const FRESH: Span = Span::from_millis(300);
-/// Velocities further apart are not compared.
+/// Velocities further apart are not compared, and a climb that is older is of another moment.
 const PAUSE: Span = Span::from_secs(1);
+const CLIMB_AGE: Span = Span::from_millis(500);
 /// Time constant, s.
-const SMOOTHING_S: f32 = 1.5;
+const SMOOTHING_S: f32 = 1.0;
+/// A receiver may be later than forces are by so much, s.
+const LATE_S: f32 = 0.6;
 /// A change of velocity without a force counts as this much at most, m/s2.
 const LEAP_MPS2: f32 = 6.0;
 /// Of the steps of the force from sample to sample so much may be an offset.
@@ -40,11 +45,13 @@ pub(crate) struct Pull {
     mean: [f32; 3],
     mean_at: Stamp,
     /// What they made of the velocity since the receiver's last one, and between the two before, m/s.
-    gained: [[f32; 3]; 2],
-    /// The last velocity, m/s.
+    gained: [f32; 3],
+    gained_before: Option<[f32; 3]>,
+    /// The last velocity, m/s; when it came, where it is compared.
     velocity: [f32; 3],
     at: Stamp,
-    /// What is missing, smoothed, m/s2.
+    /// The force, and what of it is missing in the velocity, both smoothed, m/s2.
+    force: [f32; 3],
     missing: [f32; 3],
     apart: Option<f32>,
 }
@@ -56,14 +63,19 @@ impl Pull {
         count: 0,
         mean: [0.0; 3],
         mean_at: Stamp::NONE,
-        gained: [[0.0; 3]; 2],
+        gained: [0.0; 3],
+        gained_before: None,
         velocity: [0.0; 3],
         at: Stamp::NONE,
+        force: [0.0; 3],
         missing: [0.0; 3],
         apart: None,
     };
 
     pub(crate) fn take_force(&mut self, force: [f32; 3]) {
+        if !force.iter().all(|axis| axis.abs() <= FORCE_MAX) {
+            return;
+        }
         for (sum, axis) in self.sum.iter_mut().zip(force) {
             *sum += axis;
         }
@@ -75,59 +87,122 @@ impl Pull {
             self.mean = core::mem::take(&mut self.sum).map(|sum| sum / f32::from(self.count));
             (self.count, self.mean_at) = (0, Stamp::at(now));
         }
+        // Turning forces is dear: nothing waits for them while velocities are not compared.
+        if !self.at.is_set() {
+            return;
+        }
         let is_fresh = self.mean_at.age(now).is_some_and(|age| age <= FRESH);
         let Some(attitude) = vehicle.attitude.within(now, FRESH).filter(|_| is_fresh) else {
-            (self.at, self.missing) = (Stamp::NONE, [0.0; 3]);
+            self.at = Stamp::NONE;
             return;
         };
         let [north, east, down] = to_earth(attitude, self.mean);
-        for (gained, axis) in self.gained[0].iter_mut().zip([north, east, down + GRAVITY]) {
+        for (gained, axis) in self.gained.iter_mut().zip([north, east, down + GRAVITY]) {
             *gained += axis * step_s;
         }
     }
 
+    /// What a receiver says that does not repeat itself.
     pub(crate) fn take_gnss(&mut self, at: Instant, gnss: &Gnss, vehicle: &Vehicle, flight: &Flight) {
         let on_rotors = vehicle.kind() == VehicleKind::Rotorcraft;
         let judged = gnss.is_exact()
             && (on_rotors || vehicle.kind() == VehicleKind::Plane)
             && flight.is_settled(at)
             && is_clear(at, vehicle);
-        let (Some(speed), Some(course), Some(climb_mps), true) =
-            (gnss.speed, gnss.course, climb_mps(at, vehicle), judged)
+        let climb_mps = if on_rotors { climb_within(at, vehicle, CLIMB_AGE) } else { Some(0.0) };
+        let (Some(speed), Some(course), Some(climb_mps), true) = (gnss.speed, gnss.course, climb_mps, judged)
         else {
-            (self.at, self.gained, self.missing, self.apart) = (Stamp::NONE, [[0.0; 3]; 2], [0.0; 3], None);
+            (self.at, self.apart) = (Stamp::NONE, None);
             return;
         };
         let velocity = [speed.0 * libm::cosf(course.0), speed.0 * libm::sinf(course.0), -climb_mps];
-        let before = core::mem::replace(&mut self.velocity, velocity);
-        let gained_now = self.gained[0];
-        let gained = core::mem::replace(&mut self.gained, [[0.0; 3], gained_now]);
         let step = self.at.age(at).filter(|step| *step > Span::ZERO && *step <= PAUSE);
         self.at = Stamp::at(at);
+        let missing = self.take_velocity(step, velocity, if on_rotors { 3 } else { 2 });
+        let shaken = SHAKE_PART * vehicle.inertial.shakes_mps2();
+        self.apart = missing.map(|missing| (missing - shaken).max(0.0));
+        if self.apart.is_some_and(|apart| !apart.is_finite()) {
+            (self.at, self.apart) = (Stamp::NONE, None);
+        }
+        self.apart = self.apart.filter(|_| vehicle.inertial.turns_little(at, TURNED));
+    }
+
+    /// A velocity, and the time since the one before, where it is compared with that: what is missing in so many of the axes north, east,
+    /// down, m/s2.
+    fn take_velocity(&mut self, step: Option<Span>, velocity: [f32; 3], axes: usize) -> Option<f32> {
+        let before = core::mem::replace(&mut self.velocity, velocity);
+        let gained_now = core::mem::take(&mut self.gained);
         let Some(step_s) = step.map(Span::as_secs_f32) else {
-            self.missing = [0.0; 3];
-            return;
+            // Nobody knows since when the forces before it were summed.
+            (self.gained_before, self.force, self.missing) = (None, [0.0; 3], [0.0; 3]);
+            return None;
         };
-        for axis in 0..3 {
-            let gained = f32::midpoint(gained[0][axis], gained[1][axis]);
-            let missing = (gained - (velocity[axis] - before[axis])) / step_s;
-            let missing = missing.clamp(-LEAP_MPS2, LEAP_MPS2) - self.missing[axis];
-            self.missing[axis] += step_s / (SMOOTHING_S + step_s) * missing;
+        let Some(gained_before) = self.gained_before.replace(gained_now) else {
+            self.force = gained_now.map(|gained| gained / step_s);
+            return None;
+        };
+        let weight = step_s / (SMOOTHING_S + step_s);
+        let mut changes = [0.0; 3];
+        for axis in 0..axes {
+            let force = f32::midpoint(gained_before[axis], gained_now[axis]) / step_s;
+            let missing = (force - (velocity[axis] - before[axis]) / step_s).clamp(-LEAP_MPS2, LEAP_MPS2);
+            self.missing[axis] += weight * (missing - self.missing[axis]);
+            self.force[axis] += weight * (force - self.force[axis]);
+            changes[axis] = (force - self.force[axis]) / SMOOTHING_S;
         }
-        if !on_rotors {
-            self.missing[2] = 0.0;
-        }
-        let missing = norm(self.missing);
-        if !missing.is_finite() {
-            (self.at, self.gained, self.missing, self.apart) = (Stamp::NONE, [[0.0; 3]; 2], [0.0; 3], None);
-            return;
-        }
-        let apart = (missing - SHAKE_PART * vehicle.inertial.shakes_mps2()).max(0.0);
-        self.apart = Some(apart).filter(|_| vehicle.inertial.turns_little(at, TURNED));
+        Some(norm(self.missing) - LATE_S * norm(changes))
     }
 
     /// How far the force is from the change of velocity, m/s2.
     pub(crate) fn apart(&self, now: Instant) -> Option<Reading> {
         Reading::new(self.at.instant(now), self.apart)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const STEP_S: f32 = 0.2;
+
+    /// The most that is missing in flights of 20 s: of a force that swings, without and with a part that no velocity has, and of a receiver
+    /// that is late by so much.
+    fn most(swings_mps2: f32, untrue_mps2: f32, late_s: f32) -> f32 {
+        // One swing in 5 s, and the velocity that it makes.
+        let turns = |time_s: f32| time_s * core::f32::consts::TAU / 5.0;
+        let velocity = |time_s: f32| -swings_mps2 * 5.0 / core::f32::consts::TAU * libm::cosf(turns(time_s));
+        let mut pull = Pull::NEW;
+        let missing = (0_u16..100).filter_map(|step| {
+            let time_s = f32::from(step) * STEP_S;
+            pull.gained[0] += velocity(time_s) - velocity(time_s - STEP_S) + untrue_mps2 * STEP_S;
+            let told = velocity(time_s - STEP_S / 2.0 - late_s);
+            pull.take_velocity((step > 0).then_some(Span::from_millis(200)), [told, 0.0, 0.0], 3)
+        });
+        missing.fold(0.0, f32::max)
+    }
+
+    #[test]
+    fn a_receiver_that_is_late_is_no_force_and_one_that_lasts_is() {
+        assert!(most(3.0, 0.0, 0.0) < 0.2);
+        assert!(most(3.0, 0.0, 0.6) < 0.4, "late by what a receiver may be");
+        assert!(most(0.0, 2.0, 0.0) > 1.9);
+        assert!(most(0.0, 2.0, 0.6) > 1.9);
+    }
+
+    #[test]
+    fn what_was_summed_before_the_first_velocity_is_of_no_step() {
+        let mut pull = Pull { gained: [30.0; 3], missing: [5.0; 3], ..Pull::NEW };
+        let mut take = |step| pull.take_velocity(step, [3.0, 0.0, 0.0], 3);
+        let step = Some(Span::from_millis(200));
+        assert_eq!([take(None), take(step), take(step)], [None, None, Some(0.0)]);
+    }
+
+    #[test]
+    fn garbage_is_no_force() {
+        let mut pull = Pull::NEW;
+        for force in [f32::NAN, f32::INFINITY, 1e9, 3.0] {
+            pull.take_force([force, 0.0, -9.8]);
+        }
+        assert_eq!((pull.count, pull.sum[0]), (1, 3.0));
     }
 }

@@ -6,6 +6,9 @@
 //! moved so that the value must have changed: a simulator without noise, and a vehicle on a string, may hold still. Whether it moved is an
 //! estimator's word, which drifts; others of the sensor's kind are better witnesses ([`Stuck::changed_during`]).
 //!
+//! A barometer's value trembles where nothing moves too. One that did so, and then repeats one value for so long as [`SILENT_MS`], is stuck
+//! whether the vehicle moves or not ([`Stuck::fell_silent`]).
+//!
 //! Two messages may tell of the same sensor in digits of their own, so a value counts as repeated where it is one of the last two.
 
 use crate::latest::Reading;
@@ -18,6 +21,9 @@ const REPEATS_MIN: u8 = 3;
 /// What lasts so many times what is usual is none of it.
 const TIMES: u32 = 4;
 
+/// What trembled is silent once it has repeated one value for so long, ms, and for so many times what is usual.
+const SILENT_MS: u32 = 10_000;
+const SILENT_TIMES: u32 = 20;
 /// Each so long, ms, it must have moved again.
 const MOVES_MS: f32 = 3_000.0;
 
@@ -34,12 +40,22 @@ pub(crate) struct Stuck {
     moved: f32,
     repeats: u8,
     changes: u8,
+    /// Changes for which the vehicle had not moved.
+    trembles: u8,
 }
 
 impl Stuck {
     /// Nothing seen.
-    pub(crate) const NEW: Self =
-        Self { values: [0; 2], since_ms: 0, at_ms: 0, usual_ms: 0, moved: 0.0, repeats: 0, changes: 0 };
+    pub(crate) const NEW: Self = Self {
+        values: [0; 2],
+        since_ms: 0,
+        at_ms: 0,
+        usual_ms: 0,
+        moved: 0.0,
+        repeats: 0,
+        changes: 0,
+        trembles: 0,
+    };
 
     /// Takes a value, as the bits of all it consists of, while the vehicle flies; and how far it has moved in this flight.
     pub(crate) fn take(&mut self, at: Instant, bits: impl IntoIterator<Item = u32>, moved: f32) {
@@ -52,6 +68,7 @@ impl Stuck {
             if self.changes > 0 {
                 self.usual_ms = self.usual_ms.max(self.lasts_ms());
             }
+            self.trembles = self.trembles.saturating_add(u8::from(moved.to_bits() == self.moved.to_bits()));
             self.values = [value, self.values[0]];
             (self.since_ms, self.moved, self.repeats) = (at.as_millis() as u32, moved, 0);
             self.changes = self.changes.saturating_add(1);
@@ -63,6 +80,11 @@ impl Stuck {
         self.at_ms.wrapping_sub(self.since_ms)
     }
 
+    /// Whether the last value is not a new one.
+    pub(crate) const fn repeats(&self) -> bool {
+        self.repeats > 0
+    }
+
     /// Whether a sensor's values differ in this flight.
     pub(crate) const fn is_known(&self) -> bool {
         self.changes >= CHANGES_KNOWN
@@ -72,6 +94,12 @@ impl Stuck {
     /// comes in two messages, one after the other.
     pub(crate) const fn changed_during(&self, other: &Self) -> bool {
         self.since_ms.wrapping_sub(other.since_ms) as i32 > (other.lasts_ms() / 2) as i32
+    }
+
+    /// Whether it trembled while nothing moved, and does not any more.
+    pub(crate) fn fell_silent(&self) -> bool {
+        self.trembles >= CHANGES_KNOWN
+            && self.lasts_ms() > self.usual_ms.saturating_mul(SILENT_TIMES).max(SILENT_MS)
     }
 
     /// For how long it has been stuck, s; 0 while it is not. The vehicle has moved so far, and must have moved by `least`
@@ -104,6 +132,21 @@ mod tests {
         assert_eq!(taken(0..60), Some(0.0));
         assert!(taken((0..60).chain([99; 21])).is_some_and(|lasts_s| (lasts_s - 2.0).abs() < 0.01));
         assert_eq!(taken([5; 600]), None);
+    }
+
+    #[test]
+    fn what_trembled_where_nothing_moved_is_silent_after_a_while() {
+        let silent = |moves: f32, repeats: u64| {
+            let mut stuck = Stuck::NEW;
+            for tenth in 0_u64..100 + repeats {
+                let moved = moves * tenth as f32;
+                stuck.take(Instant::from_millis(tenth * 100), [tenth.min(100) as u32], moved);
+            }
+            stuck.fell_silent()
+        };
+        assert!(silent(0.0, 103));
+        assert!(!silent(0.0, 95), "not for long enough");
+        assert!(!silent(0.1, 300), "it changed because it moved");
     }
 
     #[test]

@@ -109,7 +109,7 @@ const INPUTS: &[(&str, &str)] = &[
     ),
     (
         "imu_gps",
-        "RAW_IMU, SCALED_IMU, HIGHRES_IMU: force of the first sensor, turned by ATTITUDE, less the change of GPS_RAW_INT's velocity and of the climb, beyond its own steps; of planes without the climb; not of VTOLs, not in fast turns",
+        "RAW_IMU, SCALED_IMU, HIGHRES_IMU: force of the first sensor, turned by ATTITUDE, less the change of GPS_RAW_INT's velocity and of the climb, beyond its own steps and what a late receiver makes of it; of planes without the climb; not of VTOLs, not in fast turns",
     ),
     (
         "gyro_mismatch",
@@ -153,7 +153,7 @@ const INPUTS: &[(&str, &str)] = &[
     ("compass_stuck", "the same messages: fields"),
     (
         "baro_stuck",
-        "SCALED_PRESSURE, SCALED_PRESSURE2, SCALED_PRESSURE3, HIGHRES_IMU: how long the pressure was the same",
+        "SCALED_PRESSURE, SCALED_PRESSURE2, SCALED_PRESSURE3, HIGHRES_IMU: how long the pressure was the same, while it climbed or sank; or for 10 s where it trembled before",
     ),
     ("gps_stuck", "GPS_RAW_INT, GPS2_RAW: how long position, height and speed were the same"),
     (

@@ -78,6 +78,7 @@ const ROWS: &[(&[&str], &[&str])] = &[
     ),
     (&["gps_satellites", "gps_hdop", "gps_accuracy"], &["gps_sats_fall", "gps_hdop_rise"]),
     (&["gps_sats_fall"], &["gps_hdop_rise"]),
+    (&["gps_stuck"], &["gnss_alert"]),
     (&["gps_stuck", "gnss_alert"], &["gps_speed", "gps_height"]),
     (GNSS, ESTIMATOR),
     (GNSS, &["baro_height", "position_silent"]),
@@ -88,7 +89,9 @@ const ROWS: &[(&[&str], &[&str])] = &[
         &["accel_stuck", "gyro_stuck", "accel_alert", "gyro_alert", "accel_mismatch", "gyro_mismatch"],
         &["imu_gps"],
     ),
-    (&["imu_gps"], &["gnss_alert", "baro_noise"]),
+    // ArduPilot's word on vibration goes by the same innovations.
+    (&["vibration", "vibration_px4", "clipping"], &["imu_gps"]),
+    (&["imu_gps"], &["gnss_alert", "baro_noise", "vibration_alert"]),
     (&["compass_stuck", "compass_alert"], &["compass_mismatch"]),
     (&["gyro_stuck", "gyro_alert"], &["gyro_mismatch"]),
     (
@@ -107,7 +110,7 @@ const ROWS: &[(&[&str], &[&str])] = &[
     (SENSORS, SECOND),
     (SHAKING, SECOND),
     (ESTIMATOR, SECOND),
-    (SHAKING, &["accel_mismatch", "gyro_mismatch", "imu_gps", "load_factor"]),
+    (SHAKING, &["accel_mismatch", "gyro_mismatch", "load_factor"]),
     // Height control follows the estimator.
     (&["ekf_climb"], &["ekf_variance", "ekf_failsafe", "ekf_test_ratio", "ekf_alert", "thrust_lost"]),
     (&["vibration", "vibration_px4"], &["vibration_rise", "clipping", "vibration_alert"]),
@@ -243,6 +246,17 @@ mod tests {
             let out = [("recording", Level::Critical)];
             assert_eq!(why_of(looks, Level::Warning, &out), Some("recording"), "a card that is out");
         }
+    }
+
+    #[test]
+    fn an_accelerometer_explains_what_the_autopilot_says_of_vibration_and_a_receiver_that_hangs_comes_before_it()
+     {
+        let imu = ("imu_gps", Level::Warning);
+        assert_eq!(why_of("vibration_alert", Level::Warning, &[imu]), Some("imu_gps"));
+        assert_eq!(why_of("imu_gps", Level::Warning, &[("vibration_alert", Level::Warning)]), None);
+        assert_eq!(why_of("imu_gps", Level::Warning, &[("vibration", Level::Warning)]), Some("vibration"));
+        let both = [imu, ("gps_stuck", Level::Warning)];
+        assert_eq!(why_of("gnss_alert", Level::Warning, &both), Some("gps_stuck"));
     }
 
     #[test]
