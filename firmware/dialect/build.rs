@@ -1,5 +1,5 @@
-//! Generates the layout table from the message definitions (XML) that the `mavlink` crate carries, so that the
-//! definitions that the typed decoders use and the ones that the framer and the recorder use are the same ones.
+//! Generates the layout table from the message definitions (XML) that the `mavlink` crate carries, and from the same
+//! definitions, by the generator of that crate, the structures of the messages that are read field by field.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::error::Error;
@@ -7,6 +7,7 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::{env, fs};
 
+use mavlink_bindgen::XmlDefinitions;
 use roxmltree::{Document, Node};
 
 #[path = "src/crc.rs"]
@@ -20,6 +21,51 @@ type Result<T> = std::result::Result<T, Box<dyn Error>>;
 
 /// The root of the definitions: everything that is published, ArduPilot's and PX4's dialects included.
 const ROOT: &str = "all.xml";
+
+/// The dialect whose messages are read field by field.
+const READ_FROM: &str = "ardupilotmega.xml";
+
+/// Those that are. A structure is generated for each; all of a dialect would take a compiler half a minute.
+const READ: [&str; 38] = [
+    "AHRS2",
+    "ATTITUDE",
+    "ATTITUDE_TARGET",
+    "AUTOPILOT_VERSION",
+    "BATTERY_STATUS",
+    "EFI_STATUS",
+    "EKF_STATUS_REPORT",
+    "ESC_INFO",
+    "ESC_STATUS",
+    "ESC_TELEMETRY_1_TO_4",
+    "ESC_TELEMETRY_5_TO_8",
+    "ESTIMATOR_STATUS",
+    "FLIGHT_INFORMATION",
+    "GLOBAL_POSITION_INT",
+    "GPS2_RAW",
+    "GPS_RAW_INT",
+    "HIGHRES_IMU",
+    "LOCAL_POSITION_NED",
+    "MCU_STATUS",
+    "MISSION_CURRENT",
+    "MISSION_ITEM_REACHED",
+    "NAV_CONTROLLER_OUTPUT",
+    "POWER_STATUS",
+    "RADIO_STATUS",
+    "RAW_IMU",
+    "RAW_RPM",
+    "RC_CHANNELS",
+    "RPM",
+    "SCALED_IMU",
+    "SCALED_IMU2",
+    "SCALED_IMU3",
+    "SCALED_PRESSURE",
+    "SCALED_PRESSURE2",
+    "SERVO_OUTPUT_RAW",
+    "SYSTEM_TIME",
+    "SYS_STATUS",
+    "VFR_HUD",
+    "VIBRATION",
+];
 
 struct Field {
     name: String,
@@ -48,12 +94,54 @@ fn main() -> Result<()> {
         println!("cargo::rerun-if-changed={ours}");
     }
     println!("cargo::rerun-if-changed=../../Cargo.lock");
+    // What is generated asks for these features; we have none of them.
+    println!("cargo::rustc-check-cfg=cfg(feature, values(\"arbitrary\", \"serde\", \"ts-rs\"))");
     let definitions = mavlink_crate_dir()?.join("mavlink/message_definitions/v1.0");
     let mut messages = BTreeMap::new();
     read_file(&definitions, ROOT, &mut BTreeSet::new(), &mut messages)?;
     let out = PathBuf::from(env::var("OUT_DIR")?).join("table.rs");
     fs::write(out, render(&messages)?)?;
+    write_structures(&definitions)
+}
+
+/// Structures of what is in [`READ`]: the definitions without all other messages, bound as those of the `mavlink` crate are.
+fn write_structures(definitions: &Path) -> Result<()> {
+    let out = PathBuf::from(env::var("OUT_DIR")?);
+    let (mut files, mut messages) = (BTreeSet::new(), BTreeMap::new());
+    read_file(definitions, READ_FROM, &mut files, &mut messages)?;
+    let read: Vec<&Message> =
+        messages.values().filter(|message| READ.contains(&message.name.as_str())).collect();
+    if read.len() != READ.len() {
+        return Err(
+            format!("{READ_FROM} defines only {} of the {} messages read", read.len(), READ.len()).into()
+        );
+    }
+    let enumerations =
+        read.iter().flat_map(|message| &message.fields).map(|field| field.enumeration.as_str());
+    let kept: BTreeSet<&str> = READ.into_iter().chain(enumerations).collect();
+    let folder = out.join("definitions");
+    fs::create_dir_all(&folder)?;
+    for name in &files {
+        let text = fs::read_to_string(definitions.join(name))?;
+        fs::write(folder.join(name), only(&text, &kept)?)?;
+    }
+    mavlink_bindgen::generate(XmlDefinitions::Files(vec![folder.join(READ_FROM)]), &out)?;
+    fs::write(out.join("structures.rs"), "pub mod ardupilotmega;\n")?;
     Ok(())
+}
+
+/// A file of definitions without the messages and enumerations that are not in `kept`.
+fn only(text: &str, kept: &BTreeSet<&str>) -> Result<String> {
+    let document = Document::parse(text)?;
+    let (mut out, mut from) = (String::new(), 0);
+    for node in document.descendants().filter(|node| matches!(node.tag_name().name(), "message" | "enum")) {
+        if !kept.contains(attribute(node, "name")?) {
+            out.push_str(&text[from..node.range().start]);
+            from = node.range().end;
+        }
+    }
+    out.push_str(&text[from..]);
+    Ok(out)
 }
 
 /// Where cargo unpacked the `mavlink` crate that `Cargo.lock` names.

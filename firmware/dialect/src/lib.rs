@@ -4,10 +4,23 @@
 //! Three readers share it: the framer (length and checksum seed), the black box (the kind of each field, for its
 //! prediction) and, with the feature `names`, the host tools (names and units of every column). What all messages have in
 //! common stands beside it: the parts of a frame ([`wire`]) and its checksum ([`crc`]).
+//!
+//! The messages that are read field by field are structures of the `mavlink` crate's making ([`ardupilotmega`]).
 #![cfg_attr(not(test), no_std)]
 
 pub mod crc;
 pub mod wire;
+
+// What is generated names the part that `mavlink` hands on.
+extern crate mavlink as mavlink_core;
+
+pub use mavlink::{MavlinkVersion, MessageData};
+pub use structures::ardupilotmega;
+
+#[allow(warnings, clippy::all, clippy::pedantic, rustdoc::all, reason = "it is generated")]
+mod structures {
+    include!(concat!(env!("OUT_DIR"), "/structures.rs"));
+}
 
 /// The type of one field, or of each element of an array field.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

@@ -2,11 +2,11 @@
 
 use hums_core::units::{Amperes, Fraction, Volts};
 use hums_dialect::wire::PAYLOAD_BYTES_MAX;
-use mavlink::MavlinkVersion;
+use hums_dialect::{MavlinkVersion, MessageData};
 
 /// Decodes a payload. `enumerations` are the offsets of the bytes that hold enumerations: where a sender uses a number
 /// that ours lacks, they are read as zero.
-pub(super) fn read<M: mavlink::MessageData>(payload: &[u8], enumerations: &[usize]) -> Option<M> {
+pub(super) fn read<M: MessageData>(payload: &[u8], enumerations: &[usize]) -> Option<M> {
     if let Ok(message) = M::deser(MavlinkVersion::V2, payload) {
         return Some(message);
     }

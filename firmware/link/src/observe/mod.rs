@@ -1,7 +1,7 @@
 //! From a frame to what it says, in SI units. One function a message; the traps of each stand beside it.
 //!
-//! The payload is decoded by the `mavlink` crate's own structures, message by message, so that only those used are
-//! linked. Their decoders refuse a message whole when one field has a number that their enumeration lacks; a newer
+//! The payload is decoded by structures that the `mavlink` crate's generator makes of its definitions, message by message, so
+//! that only those used are linked. Their decoders refuse a message whole when one field has a number that their enumeration lacks; a newer
 //! sender's HEARTBEAT must not vanish for that, so such fields are set to zero and the rest is read.
 
 mod fields;
@@ -11,7 +11,7 @@ mod propulsion;
 mod system;
 
 use hums_core::observation::{Observation, Source};
-use mavlink::dialects::ardupilotmega as ap;
+use hums_dialect::ardupilotmega as ap;
 
 use crate::frame::{Check, Frame};
 use fields::read;

@@ -10,7 +10,7 @@ use hums_core::units::{
     Celsius, Fraction, Gauss, Hectopascals, Metres, MetresPerSecond, MetresPerSecond2, Position, Radians,
     RadiansPerSecond,
 };
-use mavlink::dialects::ardupilotmega as ap;
+use hums_dialect::ardupilotmega as ap;
 
 use super::fields::{read, unless};
 use crate::packet::Fields;

@@ -2,7 +2,7 @@
 
 use hums_core::observation::{Battery, CELLS_MAX, CellVoltage, Feeds, Rails};
 use hums_core::units::{AmpereHours, Celsius, Volts, WattHours};
-use mavlink::dialects::ardupilotmega as ap;
+use hums_dialect::ardupilotmega as ap;
 
 use super::fields::{current, percent, read, voltage};
 use crate::packet::Fields;

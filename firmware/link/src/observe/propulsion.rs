@@ -2,7 +2,7 @@
 
 use hums_core::observation::{ESC_GROUP, Engine, Esc, EscGroup, SpeedSensor};
 use hums_core::units::{Amperes, Celsius, Fraction, Hectopascals, Rpm, Volts};
-use mavlink::dialects::ardupilotmega as ap;
+use hums_dialect::ardupilotmega as ap;
 
 use super::fields::{read, unless};
 use crate::packet::Fields;

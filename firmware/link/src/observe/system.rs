@@ -8,7 +8,7 @@ use hums_core::observation::{
     Sensors, Source, SystemStatus, SystemTime, TelemetryRadio, VehicleKind, VtolState,
 };
 use hums_core::units::{Celsius, Fraction};
-use mavlink::dialects::ardupilotmega as ap;
+use hums_dialect::ardupilotmega as ap;
 
 use super::fields::{current, percent, read, unix_time, unless, voltage};
 use crate::packet::Fields;

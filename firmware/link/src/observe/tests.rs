@@ -6,8 +6,8 @@ use hums_core::observation::{
 use hums_core::units::{
     Amperes, Celsius, Fraction, Gauss, Hectopascals, Metres, MetresPerSecond, MetresPerSecond2, Volts,
 };
-use mavlink::dialects::ardupilotmega as ap;
-use mavlink::{MavlinkVersion, MessageData};
+use hums_dialect::ardupilotmega as ap;
+use hums_dialect::{MavlinkVersion, MessageData};
 use proptest::prelude::*;
 
 use super::fields::unix_time;
