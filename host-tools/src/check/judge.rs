@@ -36,6 +36,7 @@ use crate::source::item::{About, Cause as Why, Event, Fact, Gap, Item, Text};
 use crate::source::recording::Format;
 use crate::source::told::{Finding, Told};
 use crate::summary::EndsInAir;
+use crate::utc::moment;
 
 /// Silence that is stepped through: longer than each debounce and each time after which a value is stale.
 const SILENCE_MAX: Span = Span::from_secs(75);
@@ -339,7 +340,9 @@ impl Judge {
     /// have it counts as damage.
     fn settle(&mut self) {
         let Some(Silence { airborne, gap, .. }) = self.silence.take() else { return };
-        if airborne && self.monitor.flight().airborne() {
+        // What was disarmed meanwhile, and may fall, is not seen to fly.
+        let flies = self.monitor.vehicle().armed() && !self.monitor.mishap().is_doubted();
+        if airborne && flies && self.monitor.flight().airborne() {
             self.flights.silent(false);
         } else if let Some(gap) = self.gaps.get_mut(gap).filter(|gap| !gap.cause.is_damage()) {
             self.losses = self.losses.saturating_sub(u64::from(gap.cause == Why::Lost));
@@ -490,6 +493,9 @@ impl Judge {
                 self.tick(from);
             }
             self.clock.pause(from, to);
+            if gap.cause == Why::Lost {
+                self.monitor.lose(length);
+            }
             self.holes.pause(from, to);
             let place = self.list(gap);
             if gap.cause == Why::Lost && airborne && length >= NOT_WRITTEN {
@@ -541,6 +547,11 @@ impl Judge {
                 let at = Clock::recording(now, steps, hit_at.min(finding.at));
                 self.here.take(&Finding { at, ..finding.clone() }, self.clock.behind());
                 self.details.tell(&finding.check, &mut self.here);
+                if let Some(from) = self.monitor.mishap().unheard_from().filter(|_| is_hit(&finding)) {
+                    let from = Clock::recording(now, steps, from);
+                    let words = format!("not heard, between {} and {}", moment(from), moment(at));
+                    self.here.detail(IMPACT, &words);
+                }
             }
         }
         while let Some(happening) = self.monitor.take_happening() {

@@ -101,6 +101,12 @@ fn worse(known: f32, value: f32, check: &str) -> f32 {
     }
 }
 
+/// What nobody heard hit the ground has no value: a monitor tells the least one that is beyond the limit.
+fn measured(check: &str, value: f32, limit: f32) -> f32 {
+    let is_least = check == IMPACT && value.to_bits() == limit.next_up().to_bits();
+    if is_least { f32::NAN } else { value }
+}
+
 /// Since when, and the sum of the recording's gaps until then.
 type Since = (Instant, Span);
 
@@ -148,6 +154,8 @@ impl Problems {
 
     /// Takes the next change; `gaps` is the sum of the recording's gaps until then.
     pub(super) fn take(&mut self, finding: &Finding, gaps: Span) {
+        let value = measured(&finding.check, finding.value, finding.limit);
+        let finding = &Finding { value, ..finding.clone() };
         self.findings_count += 1;
         if self.findings.len() < LISTED_MAX {
             self.findings.push(finding.clone());
@@ -230,7 +238,7 @@ impl Problems {
     /// The worst value of a part, where more is known of it than its changes tell.
     pub(super) fn peak(&mut self, check: &str, instance: u8, value: f32) {
         if let Some(Followed { problem, .. }) = self.open.get_mut(&(check.to_owned(), instance)) {
-            problem.value = worse(problem.value, value, check);
+            problem.value = worse(problem.value, measured(check, value, problem.limit), check);
         }
     }
 
@@ -355,6 +363,19 @@ pub(super) mod tests {
         let open = [(Instant::from_millis(89_500), "pitch_rate"), (at, IMPACT)];
         assert_eq!(began(IMPACT, at, open.into_iter()), Instant::from_millis(89_000));
         assert_eq!(began("pitch_rate", at, std::iter::empty()), at);
+    }
+
+    #[test]
+    fn an_impact_that_nobody_heard_has_no_value() {
+        let hit = |value: f32| {
+            let mut problems = Problems::default();
+            let at = Finding { check: IMPACT.to_owned(), ..change(10, Level::Critical, value) };
+            problems.take(&at, Span::ZERO);
+            problems.peak(IMPACT, 0, value);
+            problems.open[&(IMPACT.to_owned(), 0)].problem.value
+        };
+        assert!(hit(3.5_f32.next_up()).is_nan());
+        assert!((hit(12.6) - 12.6).abs() < 0.01);
     }
 
     #[test]
