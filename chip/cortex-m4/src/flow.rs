@@ -192,8 +192,8 @@ impl Core {
             self.control.actlr = actlr;
             stored?;
         }
-        debug_assert_eq!(imprecise, self.control.cfsr & crate::registers::IMPRECISERR);
-        debug_assert_eq!(pending, self.exceptions.pending.has(BUS_FAULT));
+        assert_eq!(imprecise, self.control.cfsr & crate::registers::IMPRECISERR);
+        assert_eq!(pending, self.exceptions.pending.has(BUS_FAULT));
         Ok(())
     }
 

@@ -26,16 +26,24 @@ const NONE: u32 = u32::MAX;
 /// A store of lines, the least recently used one first to go.
 #[derive(Clone)]
 struct Lines<const N: usize> {
-    /// The line in each place, and when it was used last.
-    places: [(u32, u64); N],
+    /// The line in each place.
+    lines: [u32; N],
     /// For each line of the flash its place and one, 0 where it is in none.
     place_of: Box<[u8]>,
-    uses: u64,
+    /// The places in a ring, in the order in which they were used: the one before each, and the one behind it.
+    ring: [(u8, u8); N],
+    /// The place that was used last; behind it is the one that is the first to go.
+    newest: u8,
 }
 
 impl<const N: usize> Lines<N> {
     fn new() -> Self {
-        Self { places: [(NONE, 0); N], place_of: vec![0; FLASH_LINES].into(), uses: 0 }
+        let last = (N - 1) as u8;
+        let ring = std::array::from_fn(|place| {
+            let place = place as u8;
+            (place.checked_sub(1).unwrap_or(last), if place == last { 0 } else { place + 1 })
+        });
+        Self { lines: [NONE; N], place_of: vec![0; FLASH_LINES].into(), ring, newest: last }
     }
 
     fn clear(&mut self) {
@@ -50,20 +58,29 @@ impl<const N: usize> Lines<N> {
     /// The place of a line that is used now.
     fn used(&mut self, line: u32) -> Option<usize> {
         let place = self.find(line)?;
-        self.uses += 1;
-        self.places[place].1 = self.uses;
+        let oldest = self.ring[self.newest as usize].1;
+        if place as u8 == oldest {
+            self.newest = oldest;
+        } else if place as u8 != self.newest {
+            let (before, behind) = self.ring[place];
+            self.ring[before as usize].1 = behind;
+            self.ring[behind as usize].0 = before;
+            self.ring[place] = (self.newest, oldest);
+            self.ring[self.newest as usize].1 = place as u8;
+            self.ring[oldest as usize].0 = place as u8;
+            self.newest = place as u8;
+        }
         Some(place)
     }
 
     /// Takes a line in; gives its place.
     fn keep(&mut self, line: u32) -> usize {
-        let oldest = (0..N).min_by_key(|place| self.places[*place].1).unwrap_or(0);
-        let (gone, _) = self.places[oldest];
-        if gone != NONE {
-            self.place_of[gone as usize] = 0;
+        self.newest = self.ring[self.newest as usize].1;
+        let oldest = self.newest as usize;
+        if let Some(place) = self.place_of.get_mut(self.lines[oldest] as usize) {
+            *place = 0;
         }
-        self.uses += 1;
-        self.places[oldest] = (line, self.uses);
+        self.lines[oldest] = line;
         if let Some(place) = self.place_of.get_mut(line as usize) {
             *place = oldest as u8 + 1;
         }
@@ -239,6 +256,27 @@ impl Art {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Against a list of lines in the order of their use.
+    #[test]
+    fn the_least_recently_used_line_goes_first() {
+        const PLACES: usize = 8;
+        let (mut lines, mut order) = (Lines::<PLACES>::new(), Vec::<u32>::new());
+        let mut state = 1_u32;
+        for _ in 0..20_000 {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            let line = state >> 28;
+            let there = order.iter().position(|one| *one == line);
+            assert_eq!(lines.used(line).is_some(), there.is_some());
+            match there {
+                Some(at) => drop(order.remove(at)),
+                None => _ = lines.keep(line),
+            }
+            order.push(line);
+            order.drain(..order.len().saturating_sub(PLACES));
+            assert!((0..16).all(|line| lines.find(line).is_some() == order.contains(&line)));
+        }
+    }
 
     /// Wait states of a loop of three lines, the first and the third time round, and of straight code.
     fn waits(prefetch: bool, cache: bool) -> (u32, u32, u32) {
