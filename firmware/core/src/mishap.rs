@@ -535,20 +535,19 @@ impl Mishap {
         // An autopilot that lost its estimate terminates the flight, and tells no more of heights and speeds.
         let drops =
             vehicle.armed() && now.since(since) > FRESH && self.pressure.agrees(now, DROPS_MPS) == Some(true);
-        let stands = self.stands(now, vehicle);
+        // What was terminated stays armed, and its autopilot's word that it stands is not of that.
+        let says_so = vehicle.armed()
+            && vehicle.landed.at() > Some(since)
+            && vehicle.landed.within(now, LANDED_STATE_AGE) == Some(&LandedState::OnGround);
+        let stands = says_so || self.stands(now, vehicle);
         if stands && let Some(doubt) = &mut self.doubt {
             doubt.unseen = false;
         }
-        // What was terminated stays armed. What does not tell how it lies and how fast it is, or never stood level (tail-sitters), may stand.
-        let is_seen = self.stood
-            && vehicle.inertial.is_fresh(now)
-            && on_rotors(now, vehicle)
-            && climb_mps(now, vehicle).is_some()
-            && ground_speed_mps(now, vehicle).is_some();
-        let ended = vehicle.armed();
+        // Sensors and speeds that were told and are no more are no word that it stands.
         let over = now.since(since) > FALL_SHOWS;
+        let watched = !is_first && self.felt_at > Instant::ZERO && on_rotors(now, vehicle);
         let lost =
-            !is_first && is_seen && !stands && ((unseen && now.since(since) >= LIES_FOR) || (ended && over));
+            watched && !stands && ((unseen && now.since(since) >= LIES_FOR) || (vehicle.armed() && over));
         if uncarried || sinks || glides || drops || lost || altitude_m.is_some_and(fallen) {
             self.disarmed_at.get_or_insert(now);
             self.see(now, Kind::Disarmed, height_m.max(params.get(Param::MisDisarm).next_up()));

@@ -51,7 +51,7 @@ struct Motion {
     roll_wanted: Option<f32>,
     /// Nothing of it is heard, but of its radio.
     unheard: bool,
-    /// Of its autopilot only heartbeats are.
+    /// Of its autopilot only heartbeats are, and whether it calls itself landed.
     beats_only: bool,
     /// Home is so much lower than before.
     home_sank_m: f32,
@@ -146,7 +146,8 @@ fn fly_from(at_ms: u64, vehicle: &Quad, script: impl Fn(u64, &mut Quad, &mut Mot
                 velocity: [motion.ground_mps, 0.0, -quad.climb].map(MetresPerSecond),
                 ..GlobalPosition::default()
             };
-            let beats = |said: &Observation| matches!(said, Observation::Heartbeat(_));
+            let beats =
+                |said: &Observation| matches!(said, Observation::Heartbeat(_) | Observation::Landed(..));
             let said = quad.says(now_ms).into_iter().filter(|said| !motion.beats_only || beats(said)).filter(
                 |said| {
                     !matches!(

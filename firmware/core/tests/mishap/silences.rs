@@ -239,7 +239,7 @@ fn an_autopilot_that_starts_again_tells_later_how_it_lies() {
 }
 
 #[test]
-fn what_is_killed_after_a_landing_and_does_not_tell_how_it_stands_is_no_mishap() {
+fn what_is_killed_after_a_landing_and_calls_itself_landed_is_no_mishap() {
     for of in ROTORS {
         let killed = fly(&hovering(of), |ms, quad, motion| {
             motion.unheard = ms < 12_000;
