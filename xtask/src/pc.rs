@@ -1,14 +1,15 @@
-//! What is built for this PC: one choice of packages, features and profile, so that lints, tests and campaigns share
-//! what they compile. Test programs are run as they lie there, without asking cargo again: its lock on the build folder
+//! What is built for this PC: one choice of packages, features and profile, so that tests, campaigns, lints and
+//! documentation share what is compiled ([`Compiled`]). Test programs are run as they lie there, without asking cargo again: its lock on the build folder
 //! would make a test wait for the lints.
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result, bail};
-use cargo_metadata::{Artifact, Message, Metadata, MetadataCommand, TargetKind};
+use cargo_metadata::{Artifact, Metadata, MetadataCommand, TargetKind};
 use serde::{Deserialize, Serialize};
 
+use crate::compiled::Compiled;
 use crate::firmware::Board;
 use crate::hums;
 use crate::oracle;
@@ -20,6 +21,9 @@ pub(crate) const CHOICE: [&str; 4] = ["--workspace", "--exclude=hums-app", "--fe
 
 /// All of the end-to-end tests.
 const FEATURES: &str = "hums-tests/chip,hums-tests/browser,hums-tests/databases";
+
+/// What it compiled.
+const COMPILED: Compiled = Compiled("pc");
 
 /// The package of the end-to-end tests and of the campaigns.
 const END_TO_END: &str = "hums-tests";
@@ -42,36 +46,37 @@ const OWN_TESTS: [(&[&str], &[&str]); 2] = [
     (&["--package=hums"], &["--lib", "--config=profile.test.package.hums.opt-level=0"]),
 ];
 
-/// Builds `hums`, the campaigns and all tests: first what is in `tests/` with the programs that it runs, and programs with tests of their own.
+/// Builds `hums`, the campaigns, all tests and the examples; a warning is an error. First what is in `tests/` with the programs that it runs, and programs with tests of their own.
 pub(crate) fn build() -> Result<()> {
     let metadata = MetadataCommand::new().no_deps().current_dir(repo::root()).exec()?;
     let targets = metadata.packages.iter().flat_map(|package| &package.targets);
     let tested = targets.filter(|target| target.is_bin() && target.test);
     let bins: Vec<String> = tested.map(|target| format!("--bin={}", target.name)).collect();
     let outer: Vec<&str> = bins.iter().map(String::as_str).chain(["--test=*"]).collect();
-    let mut programs = Vec::new();
-    for (choice, targets) in [(&CHOICE[..], &outer[..])].into_iter().chain(OWN_TESTS) {
-        let text = Shell::cargo()
-            .args(["test", "--no-run", "--message-format=json-render-diagnostics"])
-            .args(choice)
-            .args(targets)
-            .output()?;
-        note_programs(&text, &metadata, &mut programs)?;
+    let tests = [(&CHOICE[..], &outer[..])].into_iter().chain(OWN_TESTS);
+    let tests = tests.map(|(choice, targets)| (&["test", "--no-run"][..], choice, targets));
+    let (mut artifacts, mut warned) = (Vec::new(), false);
+    for (command, choice, targets) in tests.chain([(&["build"][..], &CHOICE[..], &["--examples"][..])]) {
+        let said = COMPILED.by(Shell::cargo().args(command).args(choice).args(targets))?;
+        artifacts.extend(said.artifacts);
+        warned |= said.warned;
     }
+    COMPILED.keep(&artifacts)?;
+    let mut programs = test_programs(artifacts, &metadata)?;
     programs.sort_by(|a, b| (&a.package, &a.name).cmp(&(&b.package, &b.name)));
     fs::create_dir_all(list().parent().unwrap_or(Path::new(".")))?;
     fs::write(list(), serde_json::to_vec(&programs)?)?;
     println!("{} test programs", programs.len());
+    if warned {
+        bail!("the compiler has warnings");
+    }
     Ok(())
 }
 
-/// The test programs of which cargo says that it built them.
-fn note_programs(said: &str, metadata: &Metadata, programs: &mut Vec<TestProgram>) -> Result<()> {
-    for message in Message::parse_stream(said.as_bytes()) {
-        let Message::CompilerArtifact(Artifact { package_id, target, profile, executable, .. }) = message?
-        else {
-            continue;
-        };
+/// The test programs among what cargo built.
+fn test_programs(artifacts: Vec<Artifact>, metadata: &Metadata) -> Result<Vec<TestProgram>> {
+    let mut programs = Vec::new();
+    for Artifact { package_id, target, profile, executable, .. } in artifacts {
         let (Some(path), true) = (executable, profile.test) else { continue };
         let package = metadata.packages.iter().find(|package| package.id == package_id);
         let package = package.with_context(|| format!("cargo built {package_id}, which it does not know"))?;
@@ -83,7 +88,7 @@ fn note_programs(said: &str, metadata: &Metadata, programs: &mut Vec<TestProgram
             path: path.into(),
         });
     }
-    Ok(())
+    Ok(programs)
 }
 
 fn list() -> PathBuf {
@@ -112,6 +117,26 @@ pub(crate) fn end_to_end(name: &str, options: &[&str]) -> Result<()> {
         Some(program) => run(program, options),
         None => bail!("{END_TO_END} has no tests named {name}"),
     }
+}
+
+/// Lints all of it; a warning is an error.
+pub(crate) fn lint() -> Result<()> {
+    if COMPILED.lint()? {
+        return Ok(());
+    }
+    Shell::cargo().arg("clippy").args(CHOICE).args(["--all-targets", "--", "-D", "warnings"]).run()
+}
+
+/// Builds the documentation, in which a warning is an error, and runs its examples.
+pub(crate) fn document() -> Result<()> {
+    if !COMPILED.document()? {
+        Shell::cargo()
+            .env("RUSTDOCFLAGS", "-D warnings")
+            .args(["doc", "--quiet", "--lib", "--no-deps", "--document-private-items"])
+            .args(CHOICE)
+            .run()?;
+    }
+    Shell::cargo().args(["test", "--quiet", "--doc"]).args(CHOICE).run()
 }
 
 /// The campaigns in their short form.

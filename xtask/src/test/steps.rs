@@ -69,7 +69,7 @@ pub(super) const STEPS: [Step; 18] = [
     },
     Step {
         name: "build",
-        about: "hums, the campaigns and all tests of this PC compile",
+        about: "hums, the campaigns, all tests and the examples of this PC compile",
         needs: &[],
         after: &[],
         builds: Some(Builds::Pc),
@@ -95,7 +95,7 @@ pub(super) const STEPS: [Step; 18] = [
         name: "clippy-firmware",
         about: "lints of the firmware for the board f405, warnings as errors",
         needs: &[Need::Clippy, Need::FirmwareTarget],
-        after: &[],
+        after: &["budgets"],
         builds: Some(Builds::Firmware),
         run: || firmware::lint(FLOWN),
     },
@@ -105,7 +105,7 @@ pub(super) const STEPS: [Step; 18] = [
         needs: &[Need::Clippy],
         after: &["build"],
         builds: Some(Builds::Pc),
-        run: clippy,
+        run: pc::lint,
     },
     Step {
         name: "unit",
@@ -129,7 +129,7 @@ pub(super) const STEPS: [Step; 18] = [
         needs: &[],
         after: &["build"],
         builds: Some(Builds::Pc),
-        run: doc,
+        run: pc::document,
     },
     Step {
         name: "page",
@@ -211,19 +211,6 @@ fn chip() -> Result<()> {
     let files = firmware::files(FLOWN, fs::read(&elf).with_context(|| elf.display().to_string())?)?;
     print!("{}", dist::sums(&files));
     pc::end_to_end("chip", &[])
-}
-
-fn clippy() -> Result<()> {
-    Shell::cargo().arg("clippy").args(pc::CHOICE).args(["--all-targets", "--", "-D", "warnings"]).run()
-}
-
-fn doc() -> Result<()> {
-    Shell::cargo()
-        .env("RUSTDOCFLAGS", "-D warnings")
-        .args(["doc", "--quiet", "--lib", "--no-deps", "--document-private-items"])
-        .args(pc::CHOICE)
-        .run()?;
-    Shell::cargo().args(["test", "--quiet", "--doc"]).args(pc::CHOICE).run()
 }
 
 fn sim() -> Result<()> {
