@@ -24,7 +24,15 @@ use crate::shell::Shell;
 const FOLDER: &str = "HUMS_NOTES";
 
 /// What cargo and build scripts of ours say in the environment begins so.
-const SAID: [&str; 6] = ["CARGO_BIN_", "CARGO_CRATE_", "CARGO_MANIFEST_", "CARGO_PKG_", "HUMS_", "OUT_DIR"];
+const SAID: [&str; 7] = [
+    "CARGO_BIN_",
+    "CARGO_CRATE_",
+    "CARGO_MANIFEST_",
+    "CARGO_PKG_",
+    "CARGO_TARGET_TMPDIR",
+    "HUMS_",
+    "OUT_DIR",
+];
 
 /// The builds of one folder and choice.
 #[derive(Debug, Clone, Copy)]

@@ -150,6 +150,13 @@ pub fn push_json_number(out: &mut Vec<u8>, scalar: Scalar) {
 
 /// Text as a JSON string.
 pub fn push_json_text(out: &mut Vec<u8>, text: &[u8]) {
+    // Names of fields and most texts need no escape; looking for one takes less than writing byte by byte.
+    if text.iter().all(|byte| matches!(byte, b' '..=b'~') && *byte != b'"' && *byte != b'\\') {
+        out.push(b'"');
+        out.extend_from_slice(text);
+        out.push(b'"');
+        return;
+    }
     // Writing a string to a Vec cannot fail.
     let _ = serde_json::to_writer(out, &String::from_utf8_lossy(text));
 }
@@ -199,6 +206,15 @@ mod tests {
         assert_eq!(quoted(b"EKF3 IMU0"), "EKF3 IMU0");
         assert_eq!(quoted(b"a,\"b\"\n"), "\"a,\"\"b\"\"\n\"");
         assert_eq!(quoted(b"\xff"), "\u{fffd}");
+    }
+
+    #[test]
+    fn any_text_reads_back_from_json() {
+        for byte in 0..=u8::MAX {
+            let (text, mut out) = ([b'a', byte, b'z'], Vec::new());
+            push_json_text(&mut out, &text);
+            assert_eq!(serde_json::from_slice::<String>(&out).expect("JSON"), String::from_utf8_lossy(&text));
+        }
     }
 
     #[test]

@@ -358,7 +358,7 @@ fn text(kind: u8, body: &[u8]) -> Option<Belief<'_>> {
     };
     let (time, words) = rest.split_first_chunk()?;
     let message = Message::Text { level, tag, time_us: u64::from_le_bytes(*time), words };
-    let plain = std::str::from_utf8(words)
-        .is_ok_and(|words| !words.contains(|letter: char| letter < ' ' && !"\n\r\t\u{1b}".contains(letter)));
+    let is_odd = |byte: &u8| *byte < b' ' && !b"\n\r\t\x1b".contains(byte);
+    let plain = std::str::from_utf8(words).is_ok() && !words.iter().any(is_odd);
     Some(if plain && !words.is_empty() { Belief::Sure(message) } else { Belief::Likely(message) })
 }
