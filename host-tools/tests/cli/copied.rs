@@ -7,7 +7,7 @@ use hums_blackbox::Header;
 use hums_blackbox::parity::Parity;
 use tempfile::TempDir;
 
-use crate::support::{attempt, end_of};
+use crate::support::{attempt, end_of, made_once};
 
 pub(crate) const BLOCK: usize = 512;
 /// A segment of the cards here, with its parity at its end.
@@ -42,14 +42,17 @@ pub(crate) fn all_say(dir: &Path, inputs: &str, code: i32, words: &[&str]) {
 }
 
 /// A folder `copied` with the first segments of a card's sessions, as a copy has them: each as long as it was allocated.
-pub(crate) fn copied(sessions: usize, flags: &str) -> TempDir {
-    let dir = tempfile::tempdir().expect("directory");
-    let recordings = ["px4_hil_quad_low.tlog", "ap_quad_guided.tlog"].map(|name| end_of(name, dir.path()));
+pub(crate) fn copied(sessions: usize) -> TempDir {
+    made_once(&format!("copied {sessions}"), |dir| copy(dir, sessions))
+}
+
+fn copy(dir: &Path, sessions: usize) {
+    let recordings = ["px4_hil_quad_low.tlog", "ap_quad_guided.tlog"].map(|name| end_of(name, dir));
     for session in 0..sessions {
         let recording = recordings[session % 2].display();
-        attempt(dir.path(), &format!("sim --input {recording} --sd card.img --card-size 64 {flags}"));
+        attempt(dir, &format!("sim --input {recording} --sd card.img --card-size 64"));
     }
-    let image = fs::read(dir.path().join("card.img")).expect("an image");
+    let image = fs::read(dir.join("card.img")).expect("an image");
     let mut starts: Vec<usize> = Vec::new();
     let mut last = None;
     for (at, block) in image.as_chunks::<BLOCK>().0.iter().enumerate() {
@@ -60,12 +63,11 @@ pub(crate) fn copied(sessions: usize, flags: &str) -> TempDir {
         }
     }
     assert_eq!(starts.len(), sessions);
-    fs::create_dir(dir.path().join("copied")).expect("made");
+    fs::create_dir(dir.join("copied")).expect("made");
     for (session, start) in (1..).zip(starts) {
         let name = format!("copied/{session:05}_00.HUM");
-        fs::write(dir.path().join(name), &image[start..start + SEGMENT]).expect("written");
+        fs::write(dir.join(name), &image[start..start + SEGMENT]).expect("written");
     }
-    dir
 }
 
 /// Deletes a file as an operating system does it: its entry and its chain in the FAT.
@@ -83,13 +85,13 @@ pub(crate) fn delete(image: &mut [u8], name: &[u8; 11]) {
     }
 }
 
-/// The file of the only log on the card, up to the parity of its first stretch, which ends it.
-pub(crate) fn with_parity(dir: &TempDir) -> Vec<u8> {
-    let image = fs::read(dir.path().join("card.img")).expect("an image");
-    let all = image.as_chunks::<BLOCK>().0;
+/// The only log of a card's image or of a copy, up to the last of its parity, which ends it.
+pub(crate) fn with_parity(file: &Path) -> Vec<u8> {
+    let bytes = fs::read(file).expect("a log");
+    let all = bytes.as_chunks::<BLOCK>().0;
     let begin = all.iter().position(|block| Header::read(block).is_ok()).expect("a sector");
     let end = all.iter().rposition(|block| Parity::read(block).is_some()).expect("parity") + 1;
-    image[begin * BLOCK..end * BLOCK].to_vec()
+    bytes[begin * BLOCK..end * BLOCK].to_vec()
 }
 
 /// A file in which so many parity sectors are overwritten.

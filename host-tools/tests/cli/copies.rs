@@ -7,7 +7,7 @@ use crate::support::{attempt, end_of, run, text};
 
 #[test]
 fn one_session_under_two_names_is_told_by_every_command_and_counted_once() {
-    let dir = copied(3, "");
+    let dir = copied(3);
     let at = |name: &str| dir.path().join("copied").join(name);
     fs::copy(at("00001_00.HUM"), at("00003_00.HUM")).expect("copied");
     let words = "is session 00001 once more; its own log is not there";
@@ -30,7 +30,7 @@ fn one_session_under_two_names_is_told_by_every_command_and_counted_once() {
 
 #[test]
 fn a_mere_copy_is_told_and_its_flight_counted_once() {
-    let dir = copied(1, "");
+    let dir = copied(1);
     let log = dir.path().join("copied/00001_00.HUM");
     for name in ["Copy of 00001_00.HUM", "00001_00 (1).HUM", "flight.hum"] {
         fs::copy(&log, dir.path().join("copied").join(name)).expect("copied");
@@ -63,7 +63,7 @@ fn a_mere_copy_is_told_and_its_flight_counted_once() {
 
 #[test]
 fn two_copies_of_one_session_have_two_pages_and_the_damaged_one_is_not_kept_alone() {
-    let dir = copied(1, "");
+    let dir = copied(1);
     let whole = fs::read(dir.path().join("copied/00001_00.HUM")).expect("a log");
     for (folder, spoiled) in [("damaged", true), ("same", false)] {
         let mut log = whole.clone();
@@ -95,7 +95,7 @@ fn two_copies_of_one_session_have_two_pages_and_the_damaged_one_is_not_kept_alon
 /// A copy of a log with another log behind it: only the copied one is read, and it counts once. The other one is in no output.
 #[test]
 fn another_log_behind_a_copy_is_told_by_every_command() {
-    let dir = copied(2, "");
+    let dir = copied(2);
     let at = |name: &str| dir.path().join("copied").join(name);
     let [one, other] = ["00001_00.HUM", "00002_00.HUM"].map(|name| fs::read(at(name)).expect("there"));
     fs::write(at("all.hum"), [&one[..], &other].concat()).expect("written");
@@ -113,7 +113,7 @@ fn another_log_behind_a_copy_is_told_by_every_command() {
 
 #[test]
 fn what_is_wrong_with_a_copy_is_told_by_every_command() {
-    let dir = copied(1, "");
+    let dir = copied(1);
     let at = |name: &str| dir.path().join("copied").join(name);
     let mut damaged = fs::read(at("00001_00.HUM")).expect("there");
     damaged[20 * BLOCK..21 * BLOCK].fill(0);
@@ -123,7 +123,7 @@ fn what_is_wrong_with_a_copy_is_told_by_every_command() {
 
 #[test]
 fn a_log_that_is_cut_beside_a_whole_copy_is_told_by_every_command_and_counts_once() {
-    let dir = copied(2, "");
+    let dir = copied(2);
     let at = |name: &str| dir.path().join("copied").join(name);
     let log = fs::read(at("00002_00.HUM")).expect("there");
     fs::write(at("zcopy.hum"), &log).expect("written");
@@ -144,7 +144,7 @@ fn a_log_that_is_cut_beside_a_whole_copy_is_told_by_every_command_and_counts_onc
 
 #[test]
 fn what_lies_behind_a_mere_copy_is_said_and_a_part_with_the_name_of_another_session_too() {
-    let dir = copied(2, "");
+    let dir = copied(2);
     let at = |name: &str| dir.path().join("copied").join(name);
     let copy = fs::read(at("00001_00.HUM")).expect("there");
     let recording = fs::read(end_of("ap_quad_guided.tlog", dir.path())).expect("there");

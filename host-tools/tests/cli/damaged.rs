@@ -32,7 +32,7 @@ fn a_log_that_is_cut_in_flight_is_told_in_the_same_words_by_every_command() {
 /// A header with a right check, of which frames and records are not what comes out: an entry that is none, or one that is lost.
 #[test]
 fn a_header_that_counts_what_is_not_there_is_told_by_every_command() {
-    let dir = copied(1, "");
+    let dir = copied(1);
     let path = dir.path().join("copied/00001_00.HUM");
     let whole = fs::read(&path).expect("a log");
     let blocks = || whole.as_chunks::<BLOCK>().0.iter();
@@ -62,9 +62,9 @@ fn a_header_that_counts_what_is_not_there_is_told_by_every_command() {
 /// that fits.
 #[test]
 fn what_parity_contradicts_is_told_by_every_command() {
-    let dir = copied(1, "");
+    let dir = copied(1);
     let path = dir.path().join("copied/00001_00.HUM");
-    let whole = with_parity(&dir);
+    let whole = with_parity(&path);
     let blocks = || whole.as_chunks::<BLOCK>().0.iter();
     let header = |block: &[u8; BLOCK]| Header::read(block).ok();
     let closed =
@@ -108,9 +108,9 @@ fn what_parity_contradicts_is_told_by_every_command() {
 /// Nothing is lost of them, and a card that damaged them will damage others: no reader calls such a log good.
 #[test]
 fn sectors_that_parity_made_again_are_told_by_every_command() {
-    let dir = copied(1, "");
+    let dir = copied(1);
     let path = dir.path().join("copied/00001_00.HUM");
-    let whole = with_parity(&dir);
+    let whole = with_parity(&path);
     let sector = |at: usize| at * BLOCK..(at + 1) * BLOCK;
     let frames = |said: &str| said.lines().find(|line| line.contains("  frames ")).map(str::to_owned);
     let before = frames(&text(&run(dir.path(), "info copied", 0)));
@@ -162,9 +162,9 @@ fn sectors_that_parity_made_again_are_told_by_every_command() {
 /// The log is whole, and nothing can be made again of what its card loses next.
 #[test]
 fn parity_that_is_gone_is_told_by_every_command() {
-    let dir = copied(1, "");
+    let dir = copied(1);
     let path = dir.path().join("copied/00001_00.HUM");
-    let whole = with_parity(&dir);
+    let whole = with_parity(&path);
     let is_parity = |block: &[u8; BLOCK]| Parity::read(block).is_some();
     let all = whole.as_chunks::<BLOCK>().0.iter().filter(|block| is_parity(block)).count();
     for (most, with, words) in [
@@ -186,8 +186,7 @@ fn parity_that_is_gone_is_told_by_every_command() {
     // Of a log whose power went: that of each stretch but the last was written.
     let long = flight("ap_quad_guided.tlog");
     run(dir.path(), &format!("sim --input {} --sd long.img --card-size 64", long.display()), 0);
-    fs::rename(dir.path().join("long.img"), dir.path().join("card.img")).expect("renamed");
-    let mut long = with_parity(&dir);
+    let mut long = with_parity(&dir.path().join("long.img"));
     let blocks = long.as_chunks_mut::<BLOCK>().0;
     let end = blocks.iter().rposition(|block| Header::read(block).is_ok()).expect("a sector");
     assert!(end > 540, "{end}");
@@ -204,9 +203,9 @@ fn parity_that_is_gone_is_told_by_every_command() {
 /// What follows lies in other blocks then, and parity makes some of it again: what lies in the place of that is read too.
 #[test]
 fn a_sector_that_was_put_between_others_costs_no_frame() {
-    let dir = copied(1, "");
+    let dir = copied(1);
     let path = dir.path().join("copied/00001_00.HUM");
-    let whole = with_parity(&dir);
+    let whole = with_parity(&path);
     let blocks = whole.as_chunks::<BLOCK>().0;
     let closed = blocks.iter().rposition(|block| Header::read(block).is_ok()).expect("a sector");
     let frames = || {
@@ -229,7 +228,7 @@ fn a_sector_that_was_put_between_others_costs_no_frame() {
 /// What of a log's file is superseded, of another session or no sector is counted by `verify` as by `info`.
 #[test]
 fn blocks_that_do_not_count_are_counted_by_verify_and_info() {
-    let dir = copied(1, "");
+    let dir = copied(1);
     let path = dir.path().join("copied/00001_00.HUM");
     let mut log = fs::read(&path).expect("there");
     let last =
@@ -265,7 +264,7 @@ fn blocks_that_do_not_count_are_counted_by_verify_and_info() {
 
 #[test]
 fn noise_behind_the_last_end_mark_is_told_by_every_command() {
-    let dir = copied(1, "");
+    let dir = copied(1);
     let path = dir.path().join("copied/00001_00.HUM");
     let log = without(&fs::read(&path).expect("a log"), usize::MAX, 0);
     let last = log

@@ -9,7 +9,7 @@ use crate::support::{px4, run, text};
 
 #[test]
 fn a_copied_card_is_whole_and_each_file_that_holds_nothing_of_ours_is_told_by_every_command() {
-    let dir = copied(2, "");
+    let dir = copied(2);
     all_say(dir.path(), "copied", 0, &[]);
     let noise: Vec<u8> = (0..SEGMENT as u32).map(|n| (n.wrapping_mul(2_654_435_761) >> 21) as u8).collect();
     let names = ["00001_01.HUM", "00002_01.HUM", "00003_00.HUM"];
@@ -36,7 +36,7 @@ fn a_copied_card_is_whole_and_each_file_that_holds_nothing_of_ours_is_told_by_ev
 
 #[test]
 fn a_recording_in_a_folder_that_holds_nothing_is_told() {
-    let dir = copied(1, "");
+    let dir = copied(1);
     for (name, content) in [("a.tlog", &b""[..]), ("b.bin", b"no log"), ("c.ulg", b""), ("d.tlog.gz", b"no")]
     {
         let path = dir.path().join("copied").join(name);
@@ -65,7 +65,7 @@ fn a_recording_in_a_folder_that_holds_nothing_is_told() {
 
 #[test]
 fn not_everything_holds_where_something_was_passed_over() {
-    let dir = copied(2, "");
+    let dir = copied(2);
     let verdict = || {
         let said = text(&run(dir.path(), "verify copied", 0));
         said.lines().last().expect("a verdict").to_owned()
@@ -78,7 +78,7 @@ fn not_everything_holds_where_something_was_passed_over() {
 
 #[test]
 fn files_that_are_named_one_by_one_are_judged_as_their_folder_is() {
-    let dir = copied(3, "");
+    let dir = copied(3);
     let at = |name: &str| dir.path().join("copied").join(name);
     let named = "copied/00003_00.HUM copied/00001_00.HUM";
     let all = format!("{named} ./copied/00002_00.HUM");
@@ -99,7 +99,7 @@ fn files_that_are_named_one_by_one_are_judged_as_their_folder_is() {
 /// Power went before the second session had a sector; the third one found none there.
 #[test]
 fn a_file_that_the_next_start_found_empty_is_no_loss() {
-    let dir = copied(2, "");
+    let dir = copied(2);
     let at = |name: &str| dir.path().join("copied").join(name);
     fs::rename(at("00002_00.HUM"), at("00003_00.HUM")).expect("renamed");
     fs::write(at("00002_00.HUM"), vec![0; SEGMENT]).expect("written");
@@ -113,7 +113,7 @@ fn a_file_that_the_next_start_found_empty_is_no_loss() {
 
 #[test]
 fn a_folder_that_cannot_be_read_keeps_nothing_else_from_being_read() {
-    let dir = copied(1, "");
+    let dir = copied(1);
     // No system reads a path this long: it is made of two halves.
     let half = |name: &str| {
         let root = dir.path().join(name);
@@ -157,7 +157,7 @@ fn a_pipe_or_a_device_as_a_recording_is_refused_at_once_and_nothing_is_left() {
 
 #[test]
 fn the_name_of_a_file_does_not_become_a_folder() {
-    let dir = copied(2, "");
+    let dir = copied(2);
     for line in
         ["decode card.img -o out.tlog --format tlog", "decode copied/00001_00.HUM -o out.csv --format csv"]
     {

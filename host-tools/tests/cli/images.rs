@@ -8,7 +8,7 @@ use crate::support::{attempt, end_of, flight, json, px4, run, text};
 
 #[test]
 fn numbers_begin_anew_where_all_logs_were_deleted() {
-    let dir = copied(2, "");
+    let dir = copied(2);
     let path = dir.path().join("card.img");
     let rewrite = |names: &[&[u8; 11]]| {
         let mut image = fs::read(&path).expect("an image");
@@ -39,7 +39,7 @@ fn numbers_begin_anew_where_all_logs_were_deleted() {
 
 #[test]
 fn a_wiped_card_and_a_deleted_newest_log_are_told_with_and_without_salvage() {
-    let dir = copied(2, "");
+    let dir = copied(2);
     let path = dir.path().join("card.img");
     let image = fs::read(&path).expect("an image");
     let codes = || -> Vec<i32> {
@@ -101,7 +101,7 @@ fn a_newest_log_that_was_deleted_is_told_whatever_its_clock_says() {
 
 #[test]
 fn a_log_under_another_name_is_read_and_one_that_only_salvage_finds_is_not_called_absent() {
-    let dir = copied(3, "");
+    let dir = copied(3);
     let path = dir.path().join("card.img");
     let image = fs::read(&path).expect("an image");
     let entry = |name: &[u8]| image.windows(11).position(|bytes| bytes == name).expect("an entry");
@@ -151,7 +151,7 @@ fn a_log_under_another_name_is_read_and_one_that_only_salvage_finds_is_not_calle
 
 #[test]
 fn a_report_of_the_newest_session_tells_that_an_older_one_on_the_card_is_damaged() {
-    let dir = copied(2, "");
+    let dir = copied(2);
     let path = dir.path().join("card.img");
     let mut image = fs::read(&path).expect("an image");
     let blocks = image.as_chunks_mut::<BLOCK>().0;
@@ -168,7 +168,7 @@ fn a_report_of_the_newest_session_tells_that_an_older_one_on_the_card_is_damaged
 
 #[test]
 fn a_report_compares_sessions_of_one_card_only() {
-    let dir = copied(3, "");
+    let dir = copied(3);
     let sessions = |line: &str| {
         run(dir.path(), &format!("{line} -o page.html"), 0);
         let page = fs::read_to_string(dir.path().join("page.html")).expect("text");
@@ -186,7 +186,7 @@ fn a_report_compares_sessions_of_one_card_only() {
 
 #[test]
 fn an_image_of_a_partition_alone_is_read_like_its_cards() {
-    let dir = copied(2, "");
+    let dir = copied(2);
     let image = fs::read(dir.path().join("card.img")).expect("an image");
     let word = |at: usize| u32::from_le_bytes(image[at..at + 4].try_into().expect("four")) as usize;
     let partition = &image[word(446 + 8) * BLOCK..][..word(446 + 12) * BLOCK];
@@ -200,7 +200,7 @@ fn an_image_of_a_partition_alone_is_read_like_its_cards() {
 
 #[test]
 fn an_image_that_was_cut_short_is_told_as_that() {
-    let dir = copied(1, "");
+    let dir = copied(1);
     let path = dir.path().join("card.img");
     let image = fs::read(&path).expect("an image");
     let half = image.len() / 2;
@@ -214,7 +214,7 @@ fn an_image_that_was_cut_short_is_told_as_that() {
 
 #[test]
 fn a_damaged_image_in_a_folder_is_read_as_where_it_is_named() {
-    let dir = copied(1, "");
+    let dir = copied(1);
     let cards = dir.path().join("cards");
     fs::create_dir(&cards).expect("a folder");
     let mut image = fs::read(dir.path().join("card.img")).expect("an image");

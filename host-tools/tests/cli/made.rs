@@ -8,7 +8,7 @@ use crate::support::{attempt, end_of, flight, named, run, text};
 /// What `decode` made is read where what it was made of is not there.
 #[test]
 fn a_tlog_that_was_made_of_a_log_counts_its_flight_once_beside_it() {
-    let dir = copied(1, "");
+    let dir = copied(1);
     let recording = end_of("px4_hil_quad_low.tlog", &dir.path().join("copied"));
     run(dir.path(), "decode copied -o copied/ --format tlog", 0);
     let made: Vec<_> = fs::read_dir(dir.path().join("copied"))
@@ -32,7 +32,7 @@ fn a_tlog_that_was_made_of_a_log_counts_its_flight_once_beside_it() {
 
 #[test]
 fn another_flight_under_the_name_that_decode_gives_is_read() {
-    let dir = copied(1, "");
+    let dir = copied(1);
     let at = |name: &str| dir.path().join("copied").join(name);
     run(dir.path(), "decode copied -o copied/ --format tlog", 0);
     let made = at(&format!("{}.tlog", named(&at("."), "00001")));
@@ -51,7 +51,7 @@ fn another_flight_under_the_name_that_decode_gives_is_read() {
 
 #[test]
 fn a_flight_behind_what_decode_made_or_under_the_name_of_what_it_makes_of_a_recording_is_read() {
-    let dir = copied(1, "");
+    let dir = copied(1);
     let at = |name: &str| dir.path().join("copied").join(name);
     let recording = end_of("px4_hil_quad_low.tlog", &at("."));
     let other = fs::read(end_of("ap_quad_guided.tlog", dir.path())).expect("there");
@@ -104,7 +104,7 @@ fn put_on(tlog: &mut [u8], places: &[usize], by_us: u64) {
 
 #[test]
 fn a_tlog_whose_times_were_edited_is_read() {
-    let dir = copied(1, "");
+    let dir = copied(1);
     let at = |name: &str| dir.path().join("copied").join(name);
     let recording = end_of("px4_hil_quad_low.tlog", &at("."));
     run(dir.path(), "decode copied -o copied/ --format tlog", 0);

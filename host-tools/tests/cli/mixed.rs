@@ -7,7 +7,7 @@ use crate::support::{end_of, run, text};
 
 #[test]
 fn another_session_under_the_number_of_the_session_before_is_told_by_every_command() {
-    let dir = copied(3, "");
+    let dir = copied(3);
     all_say(dir.path(), "copied", 0, &[]);
     let at = |name: &str| dir.path().join("copied").join(name);
     fs::rename(at("00001_00.HUM"), at("00002_00.HUM")).expect("renamed");
@@ -42,7 +42,7 @@ fn two_logs_in_one_file_are_told_by_every_command_in_both_orders() {
         all_say(dir.path(), "joined.hum", 3, &[&words, "give each by itself"]);
     }
     // Segments off a card, with the room behind their sectors.
-    let dir = copied(2, "");
+    let dir = copied(2);
     let [one, other] = ["00001_00.HUM", "00002_00.HUM"]
         .map(|name| fs::read(dir.path().join("copied").join(name)).expect("there"));
     fs::write(dir.path().join("joined.hum"), [&one[..], &other].concat()).expect("written");
@@ -57,7 +57,7 @@ fn two_logs_in_one_file_are_told_by_every_command_in_both_orders() {
 
 #[test]
 fn segments_of_two_boxes_under_one_sessions_name_are_told_by_every_command() {
-    let dir = copied(2, "");
+    let dir = copied(2);
     let at = |name: &str| dir.path().join("copied").join(name);
     fs::rename(at("00002_00.HUM"), at("00001_01.HUM")).expect("renamed");
     all_say(
@@ -70,7 +70,7 @@ fn segments_of_two_boxes_under_one_sessions_name_are_told_by_every_command() {
 
 #[test]
 fn logs_that_were_renamed_or_exchanged_are_told_by_every_command() {
-    let dir = copied(3, "");
+    let dir = copied(3);
     let at = |name: &str| dir.path().join("copied").join(name);
     fs::rename(at("00001_00.HUM"), at("00009_00.HUM")).expect("renamed");
     let words = |session, name| {
@@ -114,7 +114,7 @@ fn logs_that_were_renamed_or_exchanged_are_told_by_every_command() {
 
 #[test]
 fn a_name_that_tells_another_session_than_its_sectors_is_told_by_every_command() {
-    let dir = copied(1, "");
+    let dir = copied(1);
     let at = |name: &str| dir.path().join("copied").join(name);
     let log = fs::read(at("00001_00.HUM")).expect("there");
     let session = u32::from_le_bytes(log[7..11].try_into().expect("four"));

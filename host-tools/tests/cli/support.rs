@@ -1,10 +1,11 @@
 //! What the tests of the program share.
 
+use std::collections::BTreeMap;
 use std::fs;
-use std::os::unix::fs::MetadataExt as _;
-use std::os::unix::fs::symlink;
+use std::os::unix::fs::{FileExt as _, MetadataExt as _, symlink};
 use std::path::{Path, PathBuf};
 use std::process::Output;
+use std::sync::{Arc, Mutex, OnceLock};
 use std::time::{Duration, Instant};
 
 use assert_cmd::Command;
@@ -88,8 +89,49 @@ pub(crate) fn json(output: &Output) -> serde_json::Value {
 
 /// A directory with a card on which the PX4 flight was recorded.
 pub(crate) fn recorded() -> TempDir {
+    made_once("recorded", |dir| {
+        run(dir, "sim --input PX4 --sd card.img", 0);
+    })
+}
+
+/// A file that is made once. A card is nearly empty: only what is on it is kept.
+struct Made {
+    name: String,
+    long: u64,
+    /// Where they lie in it, and what is there.
+    parts: Vec<(u64, Vec<u8>)>,
+}
+
+impl Made {
+    fn of((name, bytes): (String, Vec<u8>)) -> Self {
+        const PART: usize = 4_096;
+        let parts = (0..).step_by(PART).zip(bytes.chunks(PART));
+        let parts = parts.filter(|(_, part)| part.iter().any(|byte| *byte != 0));
+        Self { name, long: bytes.len() as u64, parts: parts.map(|(at, part)| (at, part.to_vec())).collect() }
+    }
+
+    fn write(&self, dir: &Path) {
+        let path = dir.join(&self.name);
+        fs::create_dir_all(path.parent().expect("a folder")).expect("made");
+        let file = fs::File::create(path).expect("a file");
+        for (at, part) in &self.parts {
+            file.write_all_at(part, *at).expect("written");
+        }
+        file.set_len(self.long).expect("as long as it was");
+    }
+}
+
+/// A new directory with these files, which the first test that asks for them makes.
+pub(crate) fn made_once(what: &str, make: impl FnOnce(&Path)) -> TempDir {
+    static MADE: Mutex<BTreeMap<String, Arc<OnceLock<Vec<Made>>>>> = Mutex::new(BTreeMap::new());
+    let slot = MADE.lock().expect("nothing fails under it").entry(what.to_owned()).or_default().clone();
+    let files = slot.get_or_init(|| {
+        let dir = tempfile::tempdir().expect("directory");
+        make(dir.path());
+        contents(dir.path()).into_iter().map(Made::of).collect()
+    });
     let dir = tempfile::tempdir().expect("directory");
-    run(dir.path(), "sim --input PX4 --sd card.img", 0);
+    files.iter().for_each(|file| file.write(dir.path()));
     dir
 }
 
