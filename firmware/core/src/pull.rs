@@ -10,6 +10,9 @@
 //! long. A receiver may be later by [`LATE_S`], and nobody knows by how much: what that may make of a force that changes is taken off, and of
 //! a force that stays nothing is. A leap of velocity counts for little ([`LEAP_MPS2`]), and of what shakes the force is known the less:
 //! samples are few, and fold vibration into an offset. What repeats a place bit for bit says nothing new.
+//!
+//! Horizontally lengths are compared: a heading that is wrong turns a force, and makes it neither longer nor shorter. So a compass that led
+//! the attitude astray does not show here.
 
 use crate::flight::Flight;
 use crate::inertial::FORCE_MAX;
@@ -25,7 +28,7 @@ use crate::vehicle::Vehicle;
 /// An attitude, and forces, that are older are not of one moment.
 const FRESH: Span = Span::from_millis(300);
 /// Velocities further apart are not compared, and a climb that is older is of another moment.
-const PAUSE: Span = Span::from_secs(1);
+const PAUSE: Span = Span::from_millis(1_500);
 const CLIMB_AGE: Span = Span::from_millis(500);
 /// Time constant, s.
 const SMOOTHING_S: f32 = 1.0;
@@ -150,7 +153,11 @@ impl Pull {
             self.force[axis] += weight * (force - self.force[axis]);
             changes[axis] = (force - self.force[axis]) / SMOOTHING_S;
         }
-        Some(norm(self.missing) - LATE_S * norm(changes))
+        let [north, east, down] = self.missing;
+        let [force_north, force_east, _] = self.force;
+        let felt = norm([force_north, force_east, 0.0]);
+        let flown = norm([force_north - north, force_east - east, 0.0]);
+        Some(norm([felt - flown, down, 0.0]) - LATE_S * norm(changes))
     }
 
     /// How far the force is from the change of velocity, m/s2.
@@ -179,6 +186,22 @@ mod tests {
             pull.take_velocity((step > 0).then_some(Span::from_millis(200)), [told, 0.0, 0.0], 3)
         });
         missing.fold(0.0, f32::max)
+    }
+
+    #[test]
+    fn a_heading_that_is_wrong_is_no_force() {
+        let mut pull = Pull::NEW;
+        let mut most = 0.0_f32;
+        for step in 0..100 {
+            let (time_s, velocity) = (f32::from(step as u8) * STEP_S, 2.5 * STEP_S);
+            // It brakes and turns back at 2.5 m/s2; the force is turned by 40 degrees.
+            let told = velocity * f32::from(step as u8);
+            pull.gained = [velocity * 0.766, velocity * 0.643, 0.0];
+            let missing =
+                pull.take_velocity((time_s > 0.0).then_some(Span::from_millis(200)), [told, 0.0, 0.0], 3);
+            most = most.max(missing.unwrap_or(0.0));
+        }
+        assert!(most < 0.2, "{most}");
     }
 
     #[test]
