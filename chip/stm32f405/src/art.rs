@@ -27,7 +27,7 @@ const NONE: u32 = u32::MAX;
 #[derive(Clone)]
 struct Lines<const N: usize> {
     /// The line in each place.
-    lines: [u32; N],
+    kept: [u32; N],
     /// For each line of the flash its place and one, 0 where it is in none.
     place_of: Box<[u8]>,
     /// The places in a ring, in the order in which they were used: the one before each, and the one behind it.
@@ -43,7 +43,7 @@ impl<const N: usize> Lines<N> {
             let place = place as u8;
             (place.checked_sub(1).unwrap_or(last), if place == last { 0 } else { place + 1 })
         });
-        Self { lines: [NONE; N], place_of: vec![0; FLASH_LINES].into(), ring, newest: last }
+        Self { kept: [NONE; N], place_of: vec![0; FLASH_LINES].into(), ring, newest: last }
     }
 
     fn clear(&mut self) {
@@ -77,10 +77,10 @@ impl<const N: usize> Lines<N> {
     fn keep(&mut self, line: u32) -> usize {
         self.newest = self.ring[self.newest as usize].1;
         let oldest = self.newest as usize;
-        if let Some(place) = self.place_of.get_mut(self.lines[oldest] as usize) {
+        if let Some(place) = self.place_of.get_mut(self.kept[oldest] as usize) {
             *place = 0;
         }
-        self.lines[oldest] = line;
+        self.kept[oldest] = line;
         if let Some(place) = self.place_of.get_mut(line as usize) {
             *place = oldest as u8 + 1;
         }

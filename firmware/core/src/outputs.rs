@@ -24,6 +24,8 @@
 //!
 //! Other frames are not judged: three motors have no such pattern, and of three arms with two motors each none stands out.
 
+use core::ops::RangeInclusive;
+
 use crate::baseline::OUTPUTS_MAX;
 use crate::departure::Departure;
 use crate::flight::Flight;
@@ -41,6 +43,9 @@ const SMOOTHING_S: f32 = 2.0;
 const IDLE_US: u16 = 1_150;
 /// Pulses begin here, us. What is shorter than half of that on the ground is on another scale, which begins at nothing.
 const ZERO_US: u16 = 1_000;
+/// Parts of what the others are given: what idled on the ground and is given so much in level flight is a motor too. A frame that is put
+/// together by parameters may still call itself a quadrotor.
+const LIKE_OTHERS: RangeInclusive<f32> = 0.5..=1.5;
 /// Motors that carry a vehicle are given so much more on the average.
 const CARRIES_US: u16 = 100;
 /// Further above the others a change teaches nothing, percent.
@@ -79,6 +84,8 @@ const PAUSE: Span = Span::from_secs(2);
 pub(crate) struct MotorOutputs {
     /// The group that has the motors: the first one that has any output.
     port: Option<u8>,
+    /// How many motors there are in this flight; 0 before it is known.
+    count: u8,
     /// Motors that had the pulse of one that does not turn on the ground, and those that had one of the other scale: a bit each.
     idle: u8,
     other_scale: u8,
@@ -107,6 +114,7 @@ impl MotorOutputs {
     pub(crate) const fn new() -> Self {
         Self {
             port: None,
+            count: 0,
             idle: 0,
             other_scale: 0,
             carried: 0,
@@ -130,23 +138,22 @@ impl MotorOutputs {
     }
 
     pub(crate) fn take(&mut self, at: Instant, outputs: &Outputs, vehicle: &Vehicle, flight: &Flight) {
-        let count = motors(vehicle);
-        let Some(pulses) = outputs.pulses.get(..count).filter(|pulses| pulses.iter().any(|pulse| *pulse > 0))
-        else {
+        let told = motors(vehicle);
+        if !outputs.pulses.iter().take(told).any(|pulse| *pulse > 0) {
             return;
-        };
+        }
         if *self.port.get_or_insert(outputs.port) != outputs.port {
             return;
         }
-        let all = u8::MAX >> (JUDGED_MAX - count);
         if !flight.airborne() {
-            for (motor, pulse) in pulses.iter().enumerate().filter(|(_, pulse)| **pulse > 0) {
-                self.idle |= u8::from(*pulse <= IDLE_US) << motor;
-                self.other_scale |= u8::from(*pulse < ZERO_US / 2) << motor;
-            }
+            self.note_idle(&outputs.pulses);
             return;
         }
         self.note_off(&outputs.pulses);
+        let count = if self.count > 0 { self.count.into() } else { told };
+        let (all, Some(pulses)) = (u8::MAX >> (JUDGED_MAX - count), outputs.pulses.get(..count)) else {
+            return;
+        };
         // What has no idle pulse on the ground is a servo.
         let known = self.idle & all == all;
         self.began_unseen = !flight.was_on_ground();
@@ -184,6 +191,16 @@ impl MotorOutputs {
         let given = |pulse: &u16| (f32::from(*pulse) - zero_us).max(0.0);
         let mean = pulses.iter().map(given).sum::<f32>() / count as f32;
         if mean < f32::from(CARRIES_US) {
+            return;
+        }
+        if self.count == 0 {
+            let is_like = |pulse: u16| LIKE_OTHERS.contains(&(given(&pulse) / mean));
+            let outputs = (0..JUDGED_MAX).zip(&outputs.pulses);
+            let motors =
+                outputs.take_while(|(place, pulse)| self.idle >> place & 1 != 0 && is_like(**pulse)).count();
+            self.count = if matches!(motors, 6 | JUDGED_MAX) { motors.max(count) } else { count } as u8;
+        }
+        if usize::from(self.count) != count {
             return;
         }
         let step_s = self.at.age(at).filter(|step| *step <= PAUSE).map_or(0.0, Span::as_secs_f32);
@@ -228,6 +245,14 @@ impl MotorOutputs {
     /// not known.
     pub(crate) fn was_found_at_end(&self, motor: u8) -> bool {
         self.began_unseen && self.alone.0 == motor && self.alone.1 > 0.0
+    }
+
+    /// What the outputs are given on the ground.
+    fn note_idle(&mut self, pulses: &[u16]) {
+        for (output, pulse) in pulses.iter().take(JUDGED_MAX).enumerate().filter(|(_, pulse)| **pulse > 0) {
+            self.idle |= u8::from(*pulse <= IDLE_US) << output;
+            self.other_scale |= u8::from(*pulse < ZERO_US / 2) << output;
+        }
     }
 
     /// Which outputs are given next to nothing: also those beyond the motors of the frame that the vehicle says it is.
@@ -300,6 +325,11 @@ impl MotorOutputs {
         self.share.first().is_some_and(Departure::is_known)
     }
 
+    /// How many motors are judged; 0 of what is no such frame now.
+    fn judged(&self, vehicle: &Vehicle) -> usize {
+        motors(vehicle).max(self.count.into()) * usize::from(motors(vehicle) > 0)
+    }
+
     /// Whether any told something in this flight.
     pub(crate) fn are_told(&self) -> bool {
         self.at.is_set()
@@ -308,14 +338,14 @@ impl MotorOutputs {
     /// A motor's command against the average of all, percent, smoothed; of frames whose outputs have a past.
     pub(crate) fn share(&self, now: Instant, vehicle: &Vehicle, motor: u8) -> Option<f32> {
         self.at.age(now).filter(|age| *age <= PAUSE)?;
-        let judged = Some(motors(vehicle)).filter(|count| *count <= OUTPUTS_MAX)?;
+        let judged = Some(self.judged(vehicle)).filter(|count| *count <= OUTPUTS_MAX)?;
         Some(self.share.get(..judged)?.get(usize::from(motor))?.figure())
     }
 
     /// How far a motor's command alone is above what is usual, percent of the average; 0 for those that do not stand out.
     pub(crate) fn alone(&self, now: Instant, vehicle: &Vehicle, motor: u8) -> Option<Reading> {
         let at = self.at.instant(now).filter(|at| now.since(*at) <= PAUSE)?;
-        let count = motors(vehicle);
+        let count = self.judged(vehicle);
         // Where all but one moved they are motors, heard in a flight that nobody saw begin.
         if usize::from(motor) >= count || !(self.is_known() || self.moved.count_ones() as usize + 1 >= count)
         {

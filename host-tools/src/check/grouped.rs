@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 
 use hums_core::health::Level;
 
-use super::problem::{Problem, mishap_at};
+use super::problem::{Problem, mishaps};
 
 /// A cause with what it explains.
 #[derive(Debug)]
@@ -46,10 +46,10 @@ pub fn grouped(problems: &[Problem]) -> Vec<Group<'_>> {
             is_raised: !is_critical(one) && explained().any(|one| is_critical(one)),
         });
     }
-    let first = mishap_at(problems.iter());
+    let mishaps = mishaps(problems);
     groups.sort_by_key(|group| {
-        let leads = group.first().is_some_and(|problem| problem.leads_to(first));
-        (Reverse(group.is_critical() || leads), group.first().map(|problem| problem.order(first)))
+        let leads = group.first().is_some_and(|problem| problem.leads_to(&mishaps));
+        (Reverse(group.is_critical() || leads), group.first().map(|problem| problem.order(&mishaps)))
     });
     // The first of a check's groups has what it explains.
     let mut seen = BTreeSet::new();

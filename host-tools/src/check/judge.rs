@@ -36,7 +36,6 @@ use crate::source::item::{About, Cause as Why, Event, Fact, Gap, Item, Text};
 use crate::source::recording::Format;
 use crate::source::told::{Finding, Told};
 use crate::summary::EndsInAir;
-use crate::utc::moment;
 
 /// Silence that is stepped through: longer than each debounce and each time after which a value is stale.
 const SILENCE_MAX: Span = Span::from_secs(75);
@@ -548,9 +547,7 @@ impl Judge {
                 self.here.take(&Finding { at, ..finding.clone() }, self.clock.behind());
                 self.details.tell(&finding.check, &mut self.here);
                 if let Some(from) = self.monitor.mishap().unheard_from().filter(|_| is_hit(&finding)) {
-                    let from = Clock::recording(now, steps, from);
-                    let words = format!("not heard, between {} and {}", moment(from), moment(at));
-                    self.here.detail(IMPACT, &words);
+                    self.here.unheard(&finding.check, Clock::recording(now, steps, from), at);
                 }
             }
         }

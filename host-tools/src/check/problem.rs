@@ -8,6 +8,7 @@ use hums_core::time::{Instant, Span};
 use crate::part;
 use crate::source::told::Finding;
 use crate::summary::FindingLine;
+use crate::utc::moment;
 
 /// What is kept one by one of findings, flights, gaps; the rest is counted.
 pub const LISTED_MAX: usize = 10_000;
@@ -49,14 +50,16 @@ pub struct Problem {
     pub unit: String,
     /// What it was of, where the check is of several: failsafes, sensors. By their names.
     pub details: Vec<String>,
+    /// A mishap that nobody heard: when the vehicle was heard last before it.
+    pub unheard_from: Option<Instant>,
     /// The check that explains it: one whose alarm was as bad when it was found, each time that it was wrong.
     pub because: Option<String>,
 }
 
 impl Problem {
     /// What comes first of what is as bad: a mishap with what led to it, behind all others parts that are due, and otherwise what came first.
-    pub(super) fn order(&self, mishap_at: Option<Instant>) -> (bool, bool, Instant) {
-        (!self.is_mishap() && !self.leads_to(mishap_at), part::is_due(&self.check), self.at)
+    pub(super) fn order(&self, mishaps: &[Instant]) -> (bool, bool, Instant) {
+        (!self.is_mishap() && !self.leads_to(mishaps), part::is_due(&self.check), self.at)
     }
 
     /// Whether it is a mishap.
@@ -64,19 +67,20 @@ impl Problem {
         self.subsystem == Subsystem::Mishap && self.level == Level::Critical
     }
 
-    /// Whether it is of what drives and holds the vehicle, and began shortly before a mishap.
-    pub(super) fn leads_to(&self, mishap_at: Option<Instant>) -> bool {
+    /// Whether it is of what drives and holds the vehicle, and began shortly before one of the mishaps.
+    pub(super) fn leads_to(&self, mishaps: &[Instant]) -> bool {
         let is_of_flight = matches!(self.subsystem, Subsystem::Propulsion | Subsystem::Attitude);
-        is_of_flight && mishap_at.is_some_and(|at| self.at <= at && at.since(self.at) <= LEADS)
+        is_of_flight && mishaps.iter().any(|at| self.at <= *at && at.since(self.at) <= LEADS)
     }
 }
 
 /// What leads to a mishap begins so shortly before it.
 const LEADS: Span = Span::from_secs(10);
 
-/// When the first mishap of some problems began.
-pub(super) fn mishap_at<'a>(problems: impl Iterator<Item = &'a Problem>) -> Option<Instant> {
-    problems.filter(|problem| problem.is_mishap()).map(|problem| problem.at).min()
+/// When each mishap of some problems began: where nobody heard it, when the vehicle was heard last.
+pub(super) fn mishaps(problems: &[Problem]) -> Vec<Instant> {
+    let mishaps = problems.iter().filter(|problem| problem.is_mishap());
+    mishaps.map(|problem| problem.unheard_from.unwrap_or(problem.at)).collect()
 }
 
 /// How bad a level is as a problem; stale is not known, and so is none.
@@ -179,6 +183,7 @@ impl Problems {
             limit: finding.limit,
             unit: finding.unit.clone(),
             details: Vec::new(),
+            unheard_from: None,
             because: None,
         };
         let followed = self.open.entry(key).or_insert_with(|| Followed {
@@ -261,6 +266,14 @@ impl Problems {
         }
     }
 
+    /// A mishap of this check was not heard: it was between two times.
+    pub(super) fn unheard(&mut self, check: &str, from: Instant, to: Instant) {
+        self.detail(check, &format!("not heard, between {} and {}", moment(from), moment(to)));
+        if let Some(Followed { problem, .. }) = self.open.get_mut(&(check.to_owned(), 0)) {
+            problem.unheard_from = Some(from);
+        }
+    }
+
     /// Names the part that each check is of which tells that one is due.
     pub(super) fn name_parts(&mut self, due: impl Fn(Subsystem) -> Option<(String, Option<String>)>) {
         for Followed { problem, .. } in self.open.values_mut().filter(|of| part::is_due(&of.problem.check)) {
@@ -299,8 +312,8 @@ impl Problems {
                 ..problem
             })
             .collect();
-        let first = mishap_at(problems.iter());
-        problems.sort_by_key(|problem| (std::cmp::Reverse(rank(problem.level)), problem.order(first)));
+        let mishaps = mishaps(&problems);
+        problems.sort_by_key(|problem| (std::cmp::Reverse(rank(problem.level)), problem.order(&mishaps)));
         problems
     }
 }
@@ -363,6 +376,34 @@ pub(super) mod tests {
         let open = [(Instant::from_millis(89_500), "pitch_rate"), (at, IMPACT)];
         assert_eq!(began(IMPACT, at, open.into_iter()), Instant::from_millis(89_000));
         assert_eq!(began("pitch_rate", at, std::iter::empty()), at);
+    }
+
+    #[test]
+    fn what_leads_to_a_mishap_that_nobody_heard_begins_before_the_silence() {
+        let mut problems = Problems::default();
+        let lost = Finding { subsystem: Subsystem::Propulsion, ..change(20, Level::Warning, 0.0) };
+        problems.take(&lost, Span::ZERO);
+        let hit = Finding {
+            check: IMPACT.to_owned(),
+            subsystem: Subsystem::Mishap,
+            ..change(40, Level::Critical, 9.0)
+        };
+        problems.take(&hit, Span::ZERO);
+        let leads = |problems: &[Problem]| {
+            let mishaps = mishaps(problems);
+            problems.iter().any(|problem| problem.leads_to(&mishaps))
+        };
+        assert!(!leads(&problems.worst_first()));
+        let mut problems = Problems::default();
+        problems.take(&lost, Span::ZERO);
+        problems.take(&hit, Span::ZERO);
+        problems.unheard(IMPACT, Instant::from_millis(25_000), Instant::from_millis(40_000));
+        let found = problems.worst_first();
+        assert!(leads(&found));
+        assert!(
+            found.iter().any(|problem| problem.details == ["not heard, between 0:25.0 and 0:40.0"]),
+            "{found:?}"
+        );
     }
 
     #[test]

@@ -599,6 +599,7 @@ mod tests {
             limit: 10.0,
             unit: String::new(),
             details: Vec::new(),
+            unheard_from: None,
             because: None,
         }
     }

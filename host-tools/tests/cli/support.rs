@@ -131,7 +131,9 @@ pub(crate) fn made_once(what: &str, make: impl FnOnce(&Path)) -> TempDir {
         contents(dir.path()).into_iter().map(Made::of).collect()
     });
     let dir = tempfile::tempdir().expect("directory");
-    files.iter().for_each(|file| file.write(dir.path()));
+    for file in files {
+        file.write(dir.path());
+    }
     dir
 }
 

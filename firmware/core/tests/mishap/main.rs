@@ -103,6 +103,14 @@ impl Outcome {
     }
 }
 
+/// Whether a vehicle says this besides what [`fly_from`] makes of its motion.
+fn said_besides(said: &Observation, beats_only: bool) -> bool {
+    let beats = matches!(said, Observation::Heartbeat(_) | Observation::Landed(..));
+    let made =
+        matches!(said, Observation::Imu(_) | Observation::Attitude(_) | Observation::GlobalPosition(_));
+    if beats_only { beats } else { !made }
+}
+
 /// A minute; `script` gets the time since it goes wrong.
 fn fly(vehicle: &Quad, script: impl Fn(u64, &mut Quad, &mut Motion)) -> Outcome {
     fly_from(AT_MS, vehicle, script)
@@ -144,18 +152,8 @@ fn fly_from(at_ms: u64, vehicle: &Quad, script: impl Fn(u64, &mut Quad, &mut Mot
                 relative_altitude: Metres(height),
                 altitude: Metres(480.0 + height - motion.home_sank_m),
                 velocity: [motion.ground_mps, 0.0, -quad.climb].map(MetresPerSecond),
-                ..GlobalPosition::default()
             };
-            let beats =
-                |said: &Observation| matches!(said, Observation::Heartbeat(_) | Observation::Landed(..));
-            let said = quad.says(now_ms).into_iter().filter(|said| !motion.beats_only || beats(said)).filter(
-                |said| {
-                    !matches!(
-                        said,
-                        Observation::Imu(_) | Observation::Attitude(_) | Observation::GlobalPosition(_)
-                    )
-                },
-            );
+            let said = quad.says(now_ms).into_iter().filter(|said| said_besides(said, motion.beats_only));
             let air = Air { pressure: motion.pressure_hpa.map(Hectopascals), ..Air::default() };
             let own =
                 [Observation::Air(air), Observation::Attitude(attitude), Observation::GlobalPosition(global)];

@@ -185,27 +185,21 @@ fn a_home_that_is_set_anew_is_no_fall() {
 #[test]
 fn what_was_in_a_dive_comes_down_as_fast() {
     for of in ROTORS {
-        let dives = fly(&hovering(of), |ms, quad, motion| {
-            motion.unheard = (2_000..10_000).contains(&ms);
-            match ms {
-                0..2_000 => {
-                    (quad.climb, quad.height, quad.throttle) = (-5.5, 100.0 - 0.0055 * ms as f32, 0.2)
+        // From so high, so fast for so long before the silence.
+        let dives = |from_m: f32, sink_mps: f32, heard_ms: u64| {
+            fly(&hovering(of), move |ms, quad, motion| {
+                motion.unheard = (heard_ms..heard_ms + 8_000).contains(&ms);
+                if ms < heard_ms {
+                    quad.height = from_m - sink_mps * ms as f32 / 1_000.0;
+                    (quad.climb, quad.throttle) = (-sink_mps, 0.2);
+                } else {
+                    has_landed(quad, motion);
                 }
-                _ => has_landed(quad, motion),
-            }
-        });
-        assert_eq!(dives.told(), ["impact"], "{of:?}: as fast as it may be told to");
-        let dives = fly(&hovering(of), |ms, quad, motion| {
-            motion.unheard = (4_000..12_000).contains(&ms);
-            motion.displayed_mps = Some(quad.climb);
-            match ms {
-                0..4_000 => {
-                    (quad.climb, quad.height, quad.throttle) = (-18.0, 160.0 - 0.018 * ms as f32, 0.2)
-                }
-                _ => has_landed(quad, motion),
-            }
-        });
-        assert!(!dives.told().contains(&"impact"), "{of:?}: {:?}", dives.told());
+            })
+        };
+        assert_eq!(dives(100.0, 5.5, 2_000).told(), ["impact"], "{of:?}: as fast as it may be told to");
+        let fast = dives(160.0, 18.0, 4_000);
+        assert!(!fast.told().contains(&"impact"), "{of:?}: {:?}", fast.told());
     }
 }
 
