@@ -99,8 +99,6 @@ const LIES_FOR: Span = Span::from_millis(1_500);
 const SIGN_LASTS: Span = Span::from_millis(500);
 /// A restarted autopilot tells its forces and its place no later than this.
 const STARTS: Span = Span::from_secs(20);
-/// What was disarmed in a longer silence may have been carried off in it.
-const CARRIED_OFF: Span = Span::from_secs(30);
 /// What came down so far is not where it flew.
 const CAME_DOWN_M: f32 = 3.0;
 
@@ -643,29 +641,30 @@ impl Mishap {
         params: &Params,
         unheard: &Unheard,
     ) -> Option<(Kind, f32)> {
-        // What never stood hangs so in its hover (tail-sitters), and what is fast leans.
-        let flies = ground_speed_mps(now, vehicle).is_some_and(|speed_mps| speed_mps > DRAGS_MPS);
-        let limit_deg = params.get(Param::MisOverturn);
-        let over_deg = vehicle.inertial.lies_over(now).map(f32::to_degrees);
-        // What landed unheard may have been laid down by somebody since.
-        let by_itself = self.armed || unheard.lasted(now) <= CARRIED_OFF;
-        let lies = self.stood && !flies && self.rate < STILL_RATE && by_itself;
-        if let Some(over_deg) = over_deg.filter(|over_deg| lies && *over_deg > limit_deg) {
-            return Some((Kind::Overturned, over_deg));
-        }
         // Above the sea: home is another one once it is disarmed.
         let altitude_m = vehicle.global.within(now, FRESH).map(|global| global.altitude.0);
         let lost_m = unheard.altitude_m.zip(altitude_m).map_or(0.0, |(before_m, now_m)| before_m - now_m);
+        let least_s = unheard.least_s(lost_m.max(0.0), params.get(Param::MisSink), self.armed);
+        let had_time = unheard.lasted(now).as_secs_f32() >= least_s;
+        // What never stood hangs so in its hover (tail-sitters), and what is fast leans. What had the time to land and is off may have been
+        // laid down by somebody.
+        let flies = ground_speed_mps(now, vehicle).is_some_and(|speed_mps| speed_mps > DRAGS_MPS);
+        let is_off = !self.armed
+            || vehicle.landed.within(now, LANDED_STATE_AGE) == Some(&LandedState::OnGround)
+            || throttle(now, vehicle).is_some_and(|part| part < IDLE_THROTTLE);
+        let limit_deg = params.get(Param::MisOverturn);
+        let over_deg = vehicle.inertial.lies_over(now).map(f32::to_degrees);
+        let lies = self.stood && !flies && self.rate < STILL_RATE && !(is_off && had_time);
+        if let Some(over_deg) = over_deg.filter(|over_deg| lies && *over_deg > limit_deg) {
+            return Some((Kind::Overturned, over_deg));
+        }
         let slow =
             climb_mps(now, vehicle).is_none_or(|climb_mps| climb_mps.abs() < STILL_MPS) || self.rests(now);
         // With all its thrust it may hover, but not near the ground.
         let in_vain = self.armed
             && (self.lies(now, vehicle) || is_near_ground(now, vehicle))
             && throttle(now, vehicle).is_some_and(|part| part >= FULL_THROTTLE);
-        let fell = !has_pilots_throttle(vehicle)
-            && self.is_idle(now, vehicle)
-            && unheard.lasted(now).as_secs_f32()
-                < unheard.least_s(lost_m, params.get(Param::MisSink), self.armed);
+        let fell = !has_pilots_throttle(vehicle) && self.is_idle(now, vehicle) && !had_time;
         let is_down = slow && lost_m > CAME_DOWN_M && (in_vain || fell);
         is_down.then(|| (Kind::Impact, params.get(Param::MisImpact).next_up()))
     }

@@ -11,8 +11,8 @@
 //! a force that stays nothing is. A leap of velocity counts for little ([`LEAP_MPS2`]), and of what shakes the force is known the less:
 //! samples are few, and fold vibration into an offset. What repeats a place bit for bit says nothing new.
 //!
-//! Horizontally lengths are compared: a heading that is wrong turns a force, and makes it neither longer nor shorter. So a compass that led
-//! the attitude astray does not show here.
+//! A heading that is wrong turns a horizontal force, and makes it neither longer nor shorter: where the lengths agree, what 30 degrees make
+//! of the change of velocity is taken off. So a compass that led the attitude astray hardly shows here.
 
 use crate::flight::Flight;
 use crate::inertial::FORCE_MAX;
@@ -34,6 +34,8 @@ const CLIMB_AGE: Span = Span::from_millis(500);
 const SMOOTHING_S: f32 = 1.0;
 /// A receiver may be later than forces are by so much, s.
 const LATE_S: f32 = 0.6;
+/// A heading that is wrong by 30 degrees turns so much of a force aside: 2 sin 15.
+const HEADING_PART: f32 = 0.52;
 /// A change of velocity without a force counts as this much at most, m/s2.
 const LEAP_MPS2: f32 = 6.0;
 /// Of the steps of the force from sample to sample so much may be an offset.
@@ -153,11 +155,11 @@ impl Pull {
             self.force[axis] += weight * (force - self.force[axis]);
             changes[axis] = (force - self.force[axis]) / SMOOTHING_S;
         }
-        let [north, east, down] = self.missing;
-        let [force_north, force_east, _] = self.force;
+        let ([north, east, down], [force_north, force_east, _]) = (self.missing, self.force);
         let felt = norm([force_north, force_east, 0.0]);
         let flown = norm([force_north - north, force_east - east, 0.0]);
-        Some(norm([felt - flown, down, 0.0]) - LATE_S * norm(changes))
+        let level = (norm([north, east, 0.0]) - HEADING_PART * flown).max((felt - flown).abs());
+        Some(norm([level, down, 0.0]) - LATE_S * norm(changes))
     }
 
     /// How far the force is from the change of velocity, m/s2.
@@ -201,7 +203,7 @@ mod tests {
                 pull.take_velocity((time_s > 0.0).then_some(Span::from_millis(200)), [told, 0.0, 0.0], 3);
             most = most.max(missing.unwrap_or(0.0));
         }
-        assert!(most < 0.2, "{most}");
+        assert!(most < 0.6, "{most}");
     }
 
     #[test]

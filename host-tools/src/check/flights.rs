@@ -103,7 +103,7 @@ pub(super) fn begin_in_air(flights: &[Flight]) -> bool {
 /// Whether a flight that goes on is in the air: also where it was disarmed, and may fall, or nothing carries it.
 pub(super) fn is_in_air(monitor: &Monitor) -> bool {
     let falls = || monitor.flight().is_open() && monitor.mishap().is_uncarried();
-    monitor.flight().airborne() || monitor.mishap().is_doubted() || falls()
+    (monitor.flight().airborne() && monitor.vehicle().armed()) || monitor.mishap().is_doubted() || falls()
 }
 
 impl Flights {

@@ -204,16 +204,16 @@ fn what_was_in_a_dive_comes_down_as_fast() {
 }
 
 #[test]
-fn what_was_carried_home_on_its_side_did_not_turn_over() {
+fn what_had_the_time_to_land_and_lies_over_may_have_been_laid_down() {
     for of in ROTORS {
         let on_its_side = |quad: &mut Quad, motion: &mut Motion| {
             has_landed(quad, motion);
             (quad.roll, motion.load_g, motion.drag_g) = (1.6, 0.05, 1.0);
         };
-        let carried = unheard(of, 35_000, on_its_side);
+        let carried = unheard(of, 12_000, on_its_side);
         assert!(carried.told().is_empty() && carried.flights() == (1, 1, 0), "{of:?}: {:?}", carried.told());
-        let crashed = unheard(of, 12_000, on_its_side);
-        assert_eq!(crashed.told().first(), Some(&"overturned"), "{of:?}");
+        let crashed = unheard(of, 6_000, on_its_side);
+        assert!(crashed.told().contains(&"overturned"), "{of:?}: {:?}", crashed.told());
     }
 }
 
@@ -221,14 +221,18 @@ fn what_was_carried_home_on_its_side_did_not_turn_over() {
 fn an_autopilot_that_starts_again_tells_later_how_it_lies() {
     for of in ROTORS {
         let lies = fly(&hovering(of), |ms, quad, motion| {
-            motion.unheard = ms < 12_000;
-            motion.beats_only = ms < 20_000;
+            motion.unheard = ms < 6_000;
+            motion.beats_only = ms < 14_000;
             if !motion.unheard {
                 has_landed(quad, motion);
                 (quad.roll, motion.load_g, motion.drag_g) = (1.6, 0.05, 1.0);
             }
         });
-        assert_eq!((lies.told().first(), lies.flights()), (Some(&"overturned"), (1, 0, 1)), "{of:?}");
+        assert!(
+            lies.told().contains(&"overturned") && lies.flights() == (1, 0, 1),
+            "{of:?}: {:?}",
+            lies.told()
+        );
     }
 }
 
