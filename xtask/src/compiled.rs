@@ -65,6 +65,14 @@ struct Call {
     environment: BTreeMap<String, String>,
 }
 
+/// Variables by which somebody has a wrapper of the compiler of his own. (One of cargo's configuration gives way to ours.)
+const WRAPPERS: [&str; 4] = [
+    "RUSTC_WRAPPER",
+    "CARGO_BUILD_RUSTC_WRAPPER",
+    "RUSTC_WORKSPACE_WRAPPER",
+    "CARGO_BUILD_RUSTC_WORKSPACE_WRAPPER",
+];
+
 impl Compiled {
     fn folder(self) -> PathBuf {
         repo::target().join("test").join(self.0)
@@ -73,7 +81,8 @@ impl Compiled {
     /// Runs cargo, so that it notes what it compiles. Notes are not kept for who has a wrapper of his own.
     pub(crate) fn by(self, cargo: Shell) -> Result<Said> {
         let mut cargo = cargo.arg("--message-format=json");
-        if env::var_os("RUSTC_WRAPPER").is_none() {
+        let is_free = |name: &&str| env::var_os(name).is_none_or(|wrapper| wrapper.is_empty());
+        if WRAPPERS.iter().all(is_free) {
             fs::create_dir_all(self.folder())?;
             // A copy: the build may replace the file of this program.
             let (this, stand_in) = (Path::new("/proc/self/exe"), self.folder().join("rustc"));
@@ -242,12 +251,10 @@ pub(crate) fn stand_in() -> Option<ExitCode> {
     let folder = env::var_os(FOLDER)?;
     let mut arguments = env::args_os().skip(1);
     let compiler = PathBuf::from(arguments.next()?);
-    compiler.file_stem().is_some_and(|name| name == "rustc").then(|| {
-        compile(&compiler, &arguments.collect::<Vec<_>>(), Path::new(&folder)).unwrap_or_else(|error| {
-            eprintln!("error: {error:#}");
-            ExitCode::FAILURE
-        })
-    })
+    Some(compile(&compiler, &arguments.collect::<Vec<_>>(), Path::new(&folder)).unwrap_or_else(|error| {
+        eprintln!("error: {error:#}");
+        ExitCode::FAILURE
+    }))
 }
 
 fn compile(compiler: &Path, arguments: &[OsString], folder: &Path) -> Result<ExitCode> {
@@ -256,7 +263,10 @@ fn compile(compiler: &Path, arguments: &[OsString], folder: &Path) -> Result<Exi
         return Ok(ExitCode::FAILURE);
     }
     let arguments: Option<Vec<String>> = arguments.iter().map(|one| Some(one.to_str()?.to_owned())).collect();
-    let Some(arguments) = arguments else { return Ok(ExitCode::SUCCESS) };
+    let Some(arguments) = arguments.filter(|_| compiler.file_stem().is_some_and(|name| name == "rustc"))
+    else {
+        return Ok(ExitCode::SUCCESS);
+    };
     // Build scripts of others try the compiler too.
     let is_ours =
         env::var_os("CARGO_MANIFEST_DIR").is_some_and(|of| Path::new(&of).starts_with(repo::root()));

@@ -12,7 +12,7 @@
 //! | | what comes down slowly without throttle lands and skids | on wings |
 //! | tumbling | body rates above `MIS_TUMBLE` for half a second, on wings for 1.5 s; not in modes made for it | everywhere |
 //! | disarmed in the air | disarmed or terminated above `MIS_DISARM_H` or while it sinks; then it falls, sinks or goes on moving | everywhere |
-//! | | terminated, in a silence too, and does not stand after it | on rotors; after a silence everywhere |
+//! | | terminated, in a silence too, and does not stand after it | on rotors |
 //! | | disarmed or terminated when it is heard first, and falls | everywhere |
 //! | overturned | its top looks down, by more than 100 degrees of tilt, for 0.7 s; not in modes made for it | on rotors |
 //! | | it lies over by more than `MIS_OVERTURN`, by the force that carries it, within 5 s of throttle, and is slower than 12 m/s | on rotors |
@@ -255,7 +255,7 @@ impl Mishap {
 
     /// Whether other checks would only echo it.
     pub(crate) fn is_going(&self) -> bool {
-        let lies = matches!(self.unheard, Some(Unheard { to: Some(_), lies: true, .. }));
+        let lies = matches!(self.unheard, Some(Unheard { to: Some(_), calls_itself_down: true, .. }));
         self.state != State::Quiet || self.doubt.is_some() || lies
     }
 
@@ -385,16 +385,16 @@ impl Mishap {
         }
         if armed && !self.armed {
             (self.on_bench, self.disarmed_at, self.stood, self.heard_at) = (false, None, false, now);
-            (self.doubt, self.first_at) = (None, None);
+            (self.doubt, self.first_at, self.unheard) = (None, None, None);
         }
         let beat_at = vehicle.heartbeat.at().unwrap_or(self.beat_at);
         let mut before_m = self.beat_height_m;
-        let mut unheard = false;
+        let mut beats_missed = false;
         if beat_at != self.beat_at {
             if self.beat_at == Instant::ZERO && !armed {
                 self.first_at = Some(now);
             }
-            unheard = beat_at.since(self.beat_at) > BEATS;
+            beats_missed = beat_at.since(self.beat_at) > BEATS;
             before_m = core::mem::replace(&mut self.beat_height_m, self.height_m);
             self.beat_at = beat_at;
         }
@@ -402,7 +402,7 @@ impl Mishap {
         if self.armed && !armed {
             self.disarmed_at = Some(now);
             // The height of before: PX4's is 0 from the disarming on, and home may be another one.
-            let height_m = if unheard { before_m } else { self.height_m };
+            let height_m = if beats_missed { before_m } else { self.height_m };
             let high = height_m > params.get(Param::MisDisarm) || self.sink.greatest() > FALLING_MPS;
             // The autopilot may have called it landed because it is disarmed.
             if high && flight.is_open() && self.state == State::Quiet {
@@ -411,7 +411,7 @@ impl Mishap {
                 let uncarried = self.is_uncarried()
                     && now.since(self.felt_at) <= STILL
                     && now.since(self.uncarried.since) >= UNCARRIED;
-                let unseen = unheard && vehicle.terminated_since.is_some();
+                let unseen = beats_missed && vehicle.terminated_since.is_some();
                 self.doubt = Some(Doubt { altitude_m, uncarried, unseen, ..doubt });
             }
         }
@@ -513,7 +513,7 @@ impl Mishap {
     fn doubted(&mut self, now: Instant, vehicle: &Vehicle, params: &Params) {
         let first = || self.first_at.map(|at| Doubt::new(at, height_m(now, vehicle).unwrap_or(0.0)));
         let Some(doubt) = self.doubt.or_else(first) else { return };
-        let Doubt { since, height_m, altitude_m, uncarried, unseen } = doubt;
+        let Doubt { since, height_m, altitude_m, uncarried, unseen, stood } = doubt;
         let is_first = self.doubt.is_none();
         let is_carried = is_first && !vehicle.armed();
         // An estimator is shaken by the touch, and may fall on while the vehicle stands.
@@ -540,10 +540,12 @@ impl Mishap {
         let stands = says_so || self.stands(now, vehicle);
         if stands && let Some(doubt) = &mut self.doubt {
             doubt.unseen = false;
+            // A hover just before the word is level and slow too.
+            doubt.stood |= now.since(since) >= STILL;
         }
         // Sensors and speeds that were told and are no more are no word that it stands.
         let over = now.since(since) > FALL_SHOWS;
-        let watched = !is_first && self.felt_at > Instant::ZERO && on_rotors(now, vehicle);
+        let watched = !is_first && !stood && self.felt_at > Instant::ZERO && on_rotors(now, vehicle);
         let lost =
             watched && !stands && ((unseen && now.since(since) >= LIES_FOR) || (vehicle.armed() && over));
         if uncarried || sinks || glides || drops || lost || altitude_m.is_some_and(fallen) {
@@ -570,11 +572,11 @@ impl Mishap {
             }
             return;
         };
-        if self.heard_at == unheard.from {
+        if self.heard_at == unheard.last_at {
             return;
         }
         let to = *unheard.to.get_or_insert(now);
-        let tells = |at: Option<Instant>| at.is_none_or(|at| at > unheard.from);
+        let tells = |at: Option<Instant>| at.is_none_or(|at| at > unheard.last_at);
         if unheard.seen_at.is_none() && tells(vehicle.imu.at()) && tells(vehicle.global.at()) {
             unheard.seen_at = Some(now);
         }
@@ -582,7 +584,7 @@ impl Mishap {
             Some(seen_at) => (seen_at, LYING_SHOWS),
             None => (to, if self.armed { LYING_SHOWS } else { STARTS }),
         };
-        unheard.lies =
+        unheard.calls_itself_down =
             !self.armed || vehicle.landed.within(now, LANDED_STATE_AGE) == Some(&LandedState::OnGround);
         let mut sign = None;
         // Its states of before it was silent say nothing.
@@ -592,6 +594,7 @@ impl Mishap {
                 return;
             }
             if !on_rotors(now, vehicle) {
+                self.unheard = Some(unheard);
                 return;
             }
             sign = self.came_down(now, vehicle, params, &unheard);
@@ -614,9 +617,10 @@ impl Mishap {
             let sink_mps = self.sink.greatest();
             let silence = Unheard {
                 from,
+                last_at: self.heard_at,
                 to: None,
                 seen_at: None,
-                lies: false,
+                calls_itself_down: false,
                 well_at: self.heard_at,
                 altitude_m,
                 sink_mps,
@@ -660,11 +664,12 @@ impl Mishap {
         }
         let slow =
             climb_mps(now, vehicle).is_none_or(|climb_mps| climb_mps.abs() < STILL_MPS) || self.rests(now);
-        // With all its thrust it may hover, but not near the ground.
+        // With all its thrust it may hover, but not where it took off.
+        let is_home = height_m(now, vehicle).is_some_and(|height_m| (-2.0..2.0).contains(&height_m));
         let in_vain = self.armed
-            && (self.lies(now, vehicle) || is_near_ground(now, vehicle))
+            && (self.lies(now, vehicle) || is_home)
             && throttle(now, vehicle).is_some_and(|part| part >= FULL_THROTTLE);
-        let fell = !has_pilots_throttle(vehicle) && self.is_idle(now, vehicle) && !had_time;
+        let fell = !has_pilots_throttle(vehicle) && is_off && !had_time;
         let is_down = slow && lost_m > CAME_DOWN_M && (in_vain || fell);
         is_down.then(|| (Kind::Impact, params.get(Param::MisImpact).next_up()))
     }

@@ -146,7 +146,7 @@ impl MotorOutputs {
             return;
         }
         if !flight.airborne() {
-            self.note_idle(&outputs.pulses);
+            self.note_idle(&outputs.pulses, vehicle.armed());
             return;
         }
         self.note_off(&outputs.pulses);
@@ -247,9 +247,12 @@ impl MotorOutputs {
         self.began_unseen && self.alone.0 == motor && self.alone.1 > 0.0
     }
 
-    /// What the outputs are given on the ground.
-    fn note_idle(&mut self, pulses: &[u16]) {
+    /// What the outputs are given on the ground. One that is given more while the vehicle is disarmed is a servo, or a motor in a test.
+    fn note_idle(&mut self, pulses: &[u16], armed: bool) {
         for (output, pulse) in pulses.iter().take(JUDGED_MAX).enumerate().filter(|(_, pulse)| **pulse > 0) {
+            if !armed && *pulse > IDLE_US {
+                self.idle &= !(1 << output);
+            }
             self.idle |= u8::from(*pulse <= IDLE_US) << output;
             self.other_scale |= u8::from(*pulse < ZERO_US / 2) << output;
         }

@@ -125,11 +125,12 @@ impl Pull {
         self.at = Stamp::at(at);
         let missing = self.take_velocity(step, velocity, if on_rotors { 3 } else { 2 });
         let shaken = SHAKE_PART * vehicle.inertial.shakes_mps2();
-        self.apart = missing.map(|missing| (missing - shaken).max(0.0));
-        if self.apart.is_some_and(|apart| !apart.is_finite()) {
+        if missing.is_some_and(|missing| !missing.is_finite()) {
             (self.at, self.apart) = (Stamp::NONE, None);
+            return;
         }
-        self.apart = self.apart.filter(|_| vehicle.inertial.turns_little(at, TURNED));
+        let turns_little = vehicle.inertial.turns_little(at, TURNED);
+        self.apart = missing.filter(|_| turns_little).map(|missing| (missing - shaken).max(0.0));
     }
 
     /// A velocity, and the time since the one before, where it is compared with that: what is missing in so many of the axes north, east,

@@ -158,19 +158,23 @@ pub(super) struct Doubt {
     pub(super) uncarried: bool,
     /// Its flight was terminated while nobody listened: the fall may be over.
     pub(super) unseen: bool,
+    /// It stood still and level since.
+    pub(super) stood: bool,
 }
 
 /// The vehicle was not heard, in the air.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Unheard {
-    /// When it was heard last.
+    /// When it was heard last; with what a recording lost meanwhile, in which no time passed here, taken off.
     pub(super) from: Instant,
+    /// The same without that.
+    pub(super) last_at: Instant,
     /// When it was heard again.
     pub(super) to: Option<Instant>,
     /// When its forces and its place were heard again, or the first of them where it tells no other.
     pub(super) seen_at: Option<Instant>,
     /// It is disarmed, or calls itself landed, since.
-    pub(super) lies: bool,
+    pub(super) calls_itself_down: bool,
     /// When it did last what is no sign of a crash, since it is heard again.
     pub(super) well_at: Instant,
     /// Its height above mean sea level, and its sink, when it was heard last.
@@ -202,7 +206,7 @@ impl Unheard {
 
 impl Doubt {
     pub(super) const fn new(since: Instant, height_m: f32) -> Self {
-        Self { since, height_m, altitude_m: None, uncarried: false, unseen: false }
+        Self { since, height_m, altitude_m: None, uncarried: false, unseen: false, stood: false }
     }
 }
 
