@@ -664,10 +664,9 @@ impl Mishap {
         }
         let slow =
             climb_mps(now, vehicle).is_none_or(|climb_mps| climb_mps.abs() < STILL_MPS) || self.rests(now);
-        // With all its thrust it may hover, but not where it took off.
-        let is_home = height_m(now, vehicle).is_some_and(|height_m| (-2.0..2.0).contains(&height_m));
+        // With all its thrust it may hover, but not near the ground.
         let in_vain = self.armed
-            && (self.lies(now, vehicle) || is_home)
+            && (self.lies(now, vehicle) || is_near_ground(now, vehicle))
             && throttle(now, vehicle).is_some_and(|part| part >= FULL_THROTTLE);
         let fell = !has_pilots_throttle(vehicle) && is_off && !had_time;
         let is_down = slow && lost_m > CAME_DOWN_M && (in_vain || fell);

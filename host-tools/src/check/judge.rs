@@ -15,7 +15,7 @@ use hums_core::happening::Happening;
 use hums_core::health::{Level, Scope, vocabulary};
 use hums_core::monitor::TICK;
 use hums_core::motion::{climb_mps, ground_speed_mps, height_m};
-use hums_core::observation::{Estimator, Observation, Source, SystemStatus, VehicleKind};
+use hums_core::observation::{Estimator, LandedState, Observation, Source, SystemStatus, VehicleKind};
 use hums_core::params::Params;
 use hums_core::status::{LinkReading, RecorderStatus};
 use hums_core::time::{Instant, Span};
@@ -339,8 +339,11 @@ impl Judge {
     /// have it counts as damage.
     fn settle(&mut self) {
         let Some(Silence { airborne, gap, .. }) = self.silence.take() else { return };
-        // What was disarmed meanwhile, and may fall, is not seen to fly.
-        let flies = self.monitor.vehicle().armed() && !self.monitor.mishap().is_doubted();
+        // What was disarmed meanwhile, and may fall, is not seen to fly, nor is what calls itself on the ground.
+        let vehicle = self.monitor.vehicle();
+        let flies = vehicle.armed()
+            && vehicle.landed.get() != Some(&LandedState::OnGround)
+            && !self.monitor.mishap().is_doubted();
         if airborne && flies && self.monitor.flight().airborne() {
             self.flights.silent(false);
         } else if let Some(gap) = self.gaps.get_mut(gap).filter(|gap| !gap.cause.is_damage()) {
