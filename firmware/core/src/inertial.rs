@@ -201,7 +201,7 @@ impl Inertial {
         self.step
     }
 
-    pub(crate) fn is_fresh(&self, now: Instant) -> bool {
+    fn is_fresh(&self, now: Instant) -> bool {
         self.at.is_some_and(|at| now.since(at) <= FRESH)
             && self.rates_at.age(now).is_some_and(|age| age <= FRESH)
     }

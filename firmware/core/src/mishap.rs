@@ -46,13 +46,13 @@ use crate::flight::Flight;
 use crate::latest::Reading;
 use crate::modes::has_pilots_throttle;
 use crate::motion::{climb_mps, ground_speed_mps, height_m};
-use crate::observation::{LandedState, VehicleKind};
+use crate::observation::VehicleKind;
 use crate::params::{Param, Params};
 use crate::time::{Instant, Span, Stamp};
-use crate::vehicle::{LANDED_STATE_AGE, Vehicle};
+use crate::vehicle::Vehicle;
 use evidence::{
     BREAKS_OFF, Doubt, FRESH, FULL_THROTTLE, IDLE_THROTTLE, Lasting, Pressure, Recent, Shock, THRUST_PART,
-    UNCARRIED, Unheard, is_known, is_near_ground, is_tilted, on_rotors, throttle,
+    UNCARRIED, Unheard, calls_itself_landed, is_known, is_near_ground, is_tilted, on_rotors, throttle,
 };
 
 /// How long after disarming it is watched.
@@ -534,9 +534,8 @@ impl Mishap {
         let drops =
             vehicle.armed() && now.since(since) > FRESH && self.pressure.agrees(now, DROPS_MPS) == Some(true);
         // What was terminated stays armed, and its autopilot's word that it stands is not of that.
-        let says_so = vehicle.armed()
-            && vehicle.landed.at() > Some(since)
-            && vehicle.landed.within(now, LANDED_STATE_AGE) == Some(&LandedState::OnGround);
+        let says_so =
+            vehicle.armed() && vehicle.landed.at() > Some(since) && calls_itself_landed(now, vehicle);
         let stands = says_so || self.stands(now, vehicle);
         if stands && let Some(doubt) = &mut self.doubt {
             doubt.unseen = false;
@@ -584,8 +583,7 @@ impl Mishap {
             Some(seen_at) => (seen_at, LYING_SHOWS),
             None => (to, if self.armed { LYING_SHOWS } else { STARTS }),
         };
-        unheard.calls_itself_down =
-            !self.armed || vehicle.landed.within(now, LANDED_STATE_AGE) == Some(&LandedState::OnGround);
+        unheard.calls_itself_down = !self.armed || calls_itself_landed(now, vehicle);
         let mut sign = None;
         // Its states of before it was silent say nothing.
         if now.since(to) >= STILL {
@@ -653,9 +651,8 @@ impl Mishap {
         // What never stood hangs so in its hover (tail-sitters), and what is fast leans. What had the time to land and is off may have been
         // laid down by somebody.
         let flies = ground_speed_mps(now, vehicle).is_some_and(|speed_mps| speed_mps > DRAGS_MPS);
-        let is_off = !self.armed
-            || vehicle.landed.within(now, LANDED_STATE_AGE) == Some(&LandedState::OnGround)
-            || throttle(now, vehicle).is_some_and(|part| part < IDLE_THROTTLE);
+        let is_off =
+            unheard.calls_itself_down || throttle(now, vehicle).is_some_and(|part| part < IDLE_THROTTLE);
         let limit_deg = params.get(Param::MisOverturn);
         let over_deg = vehicle.inertial.lies_over(now).map(f32::to_degrees);
         let lies = self.stood && !flies && self.rate < STILL_RATE && !(is_off && had_time);
@@ -699,7 +696,7 @@ impl Mishap {
     /// Whether what is still does not hang in the air: disarmed, on the ground, on its side, without throttle or with all of it.
     fn is_idle(&self, now: Instant, vehicle: &Vehicle) -> bool {
         !self.armed
-            || vehicle.landed.within(now, LANDED_STATE_AGE) == Some(&LandedState::OnGround)
+            || calls_itself_landed(now, vehicle)
             || is_tilted(now, vehicle)
             || self.lies_on_its_back(vehicle)
             || throttle(now, vehicle).is_some_and(|part| {

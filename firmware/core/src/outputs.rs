@@ -150,7 +150,7 @@ impl MotorOutputs {
             return;
         }
         self.note_off(&outputs.pulses);
-        let count = if self.count > 0 { self.count.into() } else { told };
+        let count = self.judged(vehicle);
         let (all, Some(pulses)) = (u8::MAX >> (JUDGED_MAX - count), outputs.pulses.get(..count)) else {
             return;
         };

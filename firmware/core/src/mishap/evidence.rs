@@ -1,10 +1,10 @@
 //! What a mishap is seen by: how long something lasts, what was greatest of late, what the vehicle hangs on and who flies it.
 
 use crate::motion::height_m;
-use crate::observation::EstimatorScale;
+use crate::observation::{EstimatorScale, LandedState};
 use crate::params::{Param, Params};
 use crate::time::{Instant, Span};
-use crate::vehicle::Vehicle;
+use crate::vehicle::{LANDED_STATE_AGE, Vehicle};
 
 /// So long what falls is carried by next to nothing; a bounce is shorter.
 pub(super) const UNCARRIED: Span = Span::from_millis(200);
@@ -189,8 +189,8 @@ impl Unheard {
     }
 
     /// The shortest time in which what flies by itself comes down so far, stands and is disarmed: from its sink to the fastest descent that
-    /// can be set, or its own if that was faster, as gently as autopilots do, the last metres no faster than legs take, and disarmed when its autopilot has seen for so
-    /// long that it stands (`ArduPilot` 1 s, PX4 longer).
+    /// can be set, or its own if that was faster, as gently as autopilots do, the last metres no faster than legs take, and disarmed when
+    /// its autopilot has seen for so long that it stands (`ArduPilot` 1 s, PX4 longer).
     pub(super) fn least_s(&self, lost_m: f32, limit_mps: f32, armed: bool) -> f32 {
         const SEES_S: f32 = 1.0;
         const LAST_M: f32 = 5.0;
@@ -217,6 +217,11 @@ pub(super) fn is_known(vector: [f32; 3]) -> bool {
 /// Whether it hangs on rotors now.
 pub(super) fn on_rotors(now: Instant, vehicle: &Vehicle) -> bool {
     vehicle.hovers(now) == Some(true)
+}
+
+/// Whether its autopilot says that it is on the ground.
+pub(super) fn calls_itself_landed(now: Instant, vehicle: &Vehicle) -> bool {
+    vehicle.landed.within(now, LANDED_STATE_AGE) == Some(&LandedState::OnGround)
 }
 
 /// Whether it is not above where it took off, but for a step.
