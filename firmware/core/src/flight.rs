@@ -216,10 +216,10 @@ impl Flight {
         open.then_some(FlightEvent::Landing)
     }
 
-    /// One step, at least every 50 ms.
-    pub fn step(&mut self, now: Instant, vehicle: &Vehicle) -> Option<FlightEvent> {
+    /// One step, at least every 50 ms. `is_supported`: it is known to stand on something, whatever its estimator says.
+    pub fn step(&mut self, now: Instant, vehicle: &Vehicle, is_supported: bool) -> Option<FlightEvent> {
         self.note_arming(now, vehicle);
-        let idles = self.idles(now, vehicle);
+        let idles = is_supported || self.idles(now, vehicle);
         let word = Self::autopilot_says(now, vehicle);
         self.weigh(now, vehicle, word, idles);
         let says = word.filter(|flies| if *flies { !idles } else { !self.overruled });

@@ -50,6 +50,8 @@ const SHAKES_MPS2: f32 = 0.01;
 /// Rotors that carry a vehicle make the steps larger than this, m/s2: 0.11 is the least of real flights (5 % of 13 logs), 0.09 the
 /// most of boards that stood (95 % of 6 logs, but for where they were handled). Simulators have no noise.
 const CALM_MPS2: f32 = 0.1;
+/// What is not felt for so long is not known to have lasted, s.
+const GAP_S: f32 = 2.0;
 /// It lies over for so long before that is believed.
 const LIES: Span = Span::from_millis(700);
 
@@ -154,6 +156,9 @@ impl Inertial {
         // No root: squares of cosines, with the sign of z, which is negative in what is upright.
         let level = rests && self.still && z < 0.0 && z * z > LEVEL * LEVEL * square;
         let over = rests && (z > 0.0 || z * z < OVER * OVER * square);
+        if step_s >= GAP_S {
+            (self.rests_since, self.level_since, self.over_since) = (Stamp::NONE, Stamp::NONE, Stamp::NONE);
+        }
         self.rests_since.run(rests && self.still, at, Span::ZERO);
         self.level_since.run(level, at, Span::ZERO);
         self.over_since.run(over, at, Span::ZERO);

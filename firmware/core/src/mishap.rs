@@ -36,41 +36,50 @@
 //! An estimator may be wrong. No attitude counts which the accelerometer and the gyros contradict ([`crate::inertial`]), and no
 //! vertical speed which the air pressure contradicts.
 
+mod disarming;
 mod evidence;
 mod sight;
+mod silence;
+mod support;
 mod told;
 
 pub use told::{Change, Kind, Place, Report};
 
 use crate::flight::Flight;
 use crate::latest::Reading;
-use crate::modes::has_pilots_throttle;
-use crate::motion::{climb_mps, ground_speed_mps, height_m};
+use crate::motion::{climb_mps, ground_speed_mps, height_m, throttle};
 use crate::observation::VehicleKind;
-use crate::params::{Param, Params};
+use crate::params::Params;
 use crate::time::{Instant, Span, Stamp};
 use crate::vehicle::Vehicle;
+use disarming::{Doubt, FALL_SHOWS, FALLING_MPS};
 use evidence::{
-    BREAKS_OFF, Doubt, FRESH, FULL_THROTTLE, IDLE_THROTTLE, Lasting, Pressure, Recent, Shock, THRUST_PART,
-    UNCARRIED, Unheard, calls_itself_landed, is_known, is_near_ground, is_tilted, on_rotors, throttle,
+    FRESH, FULL_THROTTLE, IDLE_THROTTLE, Lasting, Pressure, Recent, Shock, UNCARRIED, calls_itself_landed,
+    is_known, is_near_ground, is_tilted, on_rotors,
 };
+use silence::Unheard;
+use support::Support;
 
 /// How long after disarming it is watched.
 const WATCHED: Span = Span::from_secs(10);
 /// A vehicle that still flies so long after the last thing seen goes on with its flight.
 const RECOVERED: Span = Span::from_secs(5);
+/// What lies over for so long after that, with its motors running, is down.
+const GIVEN_UP: Span = Span::from_secs(30);
 /// What was down and moves so long as what flies has taken off again.
 const TAKEN_OFF: Span = Span::from_secs(4);
-/// A shock stops something that was this fast.
-const IMPACT_MPS: f32 = 3.5;
 /// Legs take this from what comes down upright, at the fastest landing speeds that are set (2.5 m/s): harder is no landing.
 const LEGS_G: f32 = 4.0;
 const LEGS_MPS: f32 = 3.0;
 /// What comes down on wings without throttle, and sinks slower than this, lands and skids.
 const FLARED_MPS: f32 = 2.0;
+/// What skids slows down by 8 m/s2 at most: faster, it does not stop within [`evidence::BREAKS_OFF`].
+const SKIDS_MPS: f32 = 15.0;
 /// It is still for [`STILL`] within this time after a shock.
 const AFTER_SHOCK: Span = Span::from_secs(4);
 const STILL: Span = Span::from_secs(1);
+/// What is told this often is of now.
+const STILL_SHOWS: Span = Span::from_millis(300);
 const STILL_MPS: f32 = 1.0;
 const STILL_RATE: f32 = 0.3;
 /// What is so far above the place where it lay flies again, though it hovers.
@@ -81,26 +90,10 @@ const ON_BACK_G: f32 = 0.5;
 const DRIVEN: Span = Span::from_secs(5);
 /// What is faster than this over ground flies, and the air carries it from ahead besides its rotors, m/s.
 const DRAGS_MPS: f32 = 12.0;
-/// How long it is seen whether what was disarmed falls.
-const FALL_SHOWS: Span = Span::from_secs(3);
-const FALLEN_M: f32 = 2.0;
-/// What was disarmed and moves so fast is in the air: sinking, and on wings over ground.
-const FALLING_MPS: f32 = 2.5;
-const GLIDING_MPS: f32 = 8.0;
-/// What was terminated falls so fast some seconds later, by the air pressure alone.
-const DROPS_MPS: f32 = 10.0;
-
-/// Nothing heard for so long hides a fall, and heartbeats so far apart a disarming.
-const UNHEARD: Span = Span::from_secs(5);
+/// Heartbeats so far apart hide a disarming.
 const BEATS: Span = Span::from_millis(2_500);
-/// So long after that it is seen whether it lies; and so long it does what only what lies does.
-const LYING_SHOWS: Span = Span::from_millis(2_400);
+/// A sign of what lies lasts so long.
 const LIES_FOR: Span = Span::from_millis(1_500);
-const SIGN_LASTS: Span = Span::from_millis(500);
-/// A restarted autopilot tells its forces and its place no later than this.
-const STARTS: Span = Span::from_secs(20);
-/// What came down so far is not where it flew.
-const CAME_DOWN_M: f32 = 3.0;
 
 /// What becomes of the flight.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -129,12 +122,14 @@ pub struct Mishap {
     worst: [f32; Kind::COUNT],
     seen: Option<Kind>,
     armed: bool,
+    /// It is in the air.
+    flies: bool,
     disarmed_at: Option<Instant>,
     /// The latest heartbeat, the height above home then, and when the autopilot was heard last.
     beat_at: Instant,
-    beat_height_m: f32,
+    beat_height_m: Option<f32>,
     heard_at: Instant,
-    /// Disarmed or terminated when it was heard first, which was then: whether it falls is to be seen.
+    /// Disarmed when it was heard first, which was then: whether it falls is to be seen.
     first_at: Option<Instant>,
     /// It was not heard in the air: whether it lies is to be seen.
     unheard: Option<Unheard>,
@@ -142,7 +137,7 @@ pub struct Mishap {
     unheard_from: Option<Instant>,
     /// When the force changed last: a sensor that says the same for ever says nothing.
     felt_at: Instant,
-    /// Disarmed out of a flight: whether it falls is to be seen.
+    /// Disarmed or terminated out of a flight: whether it falls is to be seen.
     doubt: Option<Doubt>,
     uncarried: Lasting,
     on_bench: bool,
@@ -170,8 +165,8 @@ pub struct Mishap {
     peak_at: Instant,
     rate: f32,
     /// The last height above home while it was armed.
-    height_m: f32,
-    hover_throttle: f32,
+    height_m: Option<f32>,
+    support: Support,
     /// When it was armed with throttle last; zero for never.
     driven_at: Instant,
     /// It was level while it was armed.
@@ -201,9 +196,10 @@ impl Mishap {
             worst: [0.0; Kind::COUNT],
             seen: None,
             armed: false,
+            flies: false,
             disarmed_at: None,
             beat_at: Instant::ZERO,
-            beat_height_m: 0.0,
+            beat_height_m: None,
             heard_at: Instant::ZERO,
             first_at: None,
             unheard: None,
@@ -230,33 +226,38 @@ impl Mishap {
             peak_m: f32::NEG_INFINITY,
             peak_at: Instant::ZERO,
             rate: 0.0,
-            height_m: 0.0,
-            hover_throttle: 0.0,
+            height_m: None,
+            support: Support::NOTHING,
             driven_at: Instant::ZERO,
             stood: false,
             tilted_at: Stamp::NONE,
             strayed_at: Stamp::NONE,
             moved_at: Stamp::NONE,
             stood_at_m: 0.0,
-            place: Place { position: None, height_m: 0 },
+            place: Place::UNKNOWN,
         }
     }
 
     /// What becomes of the flight while this is so.
-    pub(crate) const fn fate(&self) -> Fate {
+    pub(crate) fn fate(&self) -> Fate {
         match self.state {
             State::Down => Fate::Over,
             State::Going(_) => Fate::Held,
-            State::Quiet if self.doubt.is_some() => Fate::Held,
-            State::Quiet if matches!(self.unheard, Some(Unheard { to: Some(_), .. })) => Fate::Held,
+            State::Quiet if self.is_judged() => Fate::Held,
             State::Quiet => Fate::Own,
         }
     }
 
+    /// Whether it is to be seen within seconds if something happened: it was disarmed in the air, its speed broke off with a shock, or it
+    /// is heard again after a silence.
+    fn is_judged(&self) -> bool {
+        self.doubt.is_some() || self.shock.is_some_and(|shock| shock.stops_flight()) || self.is_heard_again()
+    }
+
     /// Whether other checks would only echo it.
     pub(crate) fn is_going(&self) -> bool {
-        let lies = matches!(self.unheard, Some(Unheard { to: Some(_), calls_itself_down: true, .. }));
-        self.state != State::Quiet || self.doubt.is_some() || lies
+        let calls_itself_down = self.unheard.is_some_and(|unheard| unheard.calls_itself_down);
+        self.state != State::Quiet || self.doubt.is_some() || calls_itself_down
     }
 
     /// Whether it was disarmed out of a flight, and that it falls is not seen yet.
@@ -265,8 +266,8 @@ impl Mishap {
     }
 
     /// Whether nothing carries it just now: what flew and is so is in the air, though its autopilot may call it landed.
-    pub const fn is_uncarried(&self) -> bool {
-        self.uncarried.samples >= 2
+    pub fn is_uncarried(&self) -> bool {
+        self.uncarried.lasts(self.heard_at, UNCARRIED)
     }
 
     /// Whether it is over: the vehicle lies where it came down.
@@ -316,28 +317,32 @@ impl Mishap {
         params: &Params,
     ) -> Option<Change> {
         self.note_arming(now, vehicle, flight, params);
+        self.flies = flight.airborne() && self.state == State::Quiet;
+        self.note_support(now, vehicle);
         self.note_rest(now, vehicle);
-        self.doubted(now, vehicle, params);
+        self.judge_disarming(now, vehicle, params);
         self.note_silence(now, vehicle, flight, params);
-        self.shocked(now, vehicle);
+        self.shocked(now, vehicle, params);
         let seen = self.seen.take();
         match (self.state, seen) {
             (State::Quiet, Some(kind))
                 if flight.is_open()
-                    || (kind == Kind::Disarmed && self.first_at.is_some())
+                    || kind == Kind::Disarmed
+                    || (kind == Kind::Impact && self.first_at.is_some())
                     || self.is_turned_over(now, vehicle, kind) =>
             {
                 self.state = State::Going(now);
                 let mut place = Place::of(now, vehicle);
-                if let (Kind::Disarmed, Some(doubt)) = (kind, self.doubt.take()) {
-                    place.height_m = doubt.height_m as i16;
+                let before_m = self.doubt.take().and_then(|doubt| doubt.height_m);
+                if let Some(height_m) = before_m.filter(|_| kind == Kind::Disarmed) {
+                    place.height_m = height_m as i16;
                 }
-                (self.doubt, self.first_at) = (None, None);
+                self.first_at = None;
                 self.place = place;
                 // What turned over right after a shock hit something first.
                 if let Some(shock) = self.shock.filter(|_| kind == Kind::Overturned) {
                     self.touch(now, shock.sink_mps);
-                    self.see(now, Kind::Impact, shock.load_g);
+                    self.see(now, Kind::Impact, shock.load_g, params);
                 }
                 Some(Change::Began(kind))
             }
@@ -355,44 +360,32 @@ impl Mishap {
         }
     }
 
+    /// It flies on, or is armed again: what was seen is over.
     fn calm(&mut self) {
-        *self = Self {
-            armed: self.armed,
-            disarmed_at: self.disarmed_at,
-            on_bench: self.on_bench,
-            hover_throttle: self.hover_throttle,
-            driven_at: self.driven_at,
-            stood: self.stood,
-            strayed_at: self.strayed_at,
-            moved_at: self.moved_at,
-            stood_at_m: self.stood_at_m,
-            beat_at: self.beat_at,
-            beat_height_m: self.beat_height_m,
-            heard_at: self.heard_at,
-            felt_at: self.felt_at,
-            ..Self::new()
-        };
+        (self.state, self.worst, self.seen) = (State::Quiet, [0.0; Kind::COUNT], None);
+        (self.doubt, self.first_at, self.unheard, self.unheard_from) = (None, None, None, None);
+        (self.shock, self.touch_mps, self.still_since, self.flies_since) = (None, 0.0, None, None);
+        self.place = Place::UNKNOWN;
     }
 
     fn note_arming(&mut self, now: Instant, vehicle: &Vehicle, flight: &Flight, params: &Params) {
         // Terminated, its motors are off, though it stays armed.
         let armed = vehicle.armed() && vehicle.terminated_since.is_none();
-        if armed && !self.armed && self.state != State::Quiet && self.disarmed_at.is_some() {
+        if armed && !self.armed {
             // Armed again in the air it flies on; on the ground another flight begins.
-            if self.state == State::Down {
+            if self.state == State::Down && self.disarmed_at.is_some() {
                 self.calm();
             }
-        }
-        if armed && !self.armed {
             (self.on_bench, self.disarmed_at, self.stood, self.heard_at) = (false, None, false, now);
             (self.doubt, self.first_at, self.unheard) = (None, None, None);
         }
         let beat_at = vehicle.heartbeat.at().unwrap_or(self.beat_at);
+        // The height of the beat before: PX4's is 0 from the disarming on, and home may be another one.
         let mut before_m = self.beat_height_m;
         let mut beats_missed = false;
         if beat_at != self.beat_at {
             if self.beat_at == Instant::ZERO && !armed {
-                self.first_at = Some(now);
+                self.note_disarmed_first(now, vehicle);
             }
             beats_missed = beat_at.since(self.beat_at) > BEATS;
             before_m = core::mem::replace(&mut self.beat_height_m, self.height_m);
@@ -401,18 +394,9 @@ impl Mishap {
         self.stood |= armed && vehicle.inertial.is_level(now);
         if self.armed && !armed {
             self.disarmed_at = Some(now);
-            // The height of before: PX4's is 0 from the disarming on, and home may be another one.
-            let height_m = if beats_missed { before_m } else { self.height_m };
-            let high = height_m > params.get(Param::MisDisarm) || self.sink.greatest() > FALLING_MPS;
             // The autopilot may have called it landed because it is disarmed.
-            if high && flight.is_open() && self.state == State::Quiet {
-                let altitude_m = vehicle.global.within(now, FRESH).map(|global| global.altitude.0);
-                let doubt = Doubt::new(now, height_m);
-                let uncarried = self.is_uncarried()
-                    && now.since(self.felt_at) <= STILL
-                    && now.since(self.uncarried.since) >= UNCARRIED;
-                let unseen = beats_missed && vehicle.terminated_since.is_some();
-                self.doubt = Some(Doubt { altitude_m, uncarried, unseen, ..doubt });
+            if flight.is_open() && self.state == State::Quiet {
+                self.note_disarming(now, vehicle, params, before_m, beats_missed);
             }
         }
         self.armed = armed;
@@ -429,7 +413,9 @@ impl Mishap {
             || self.lies_on_its_back(vehicle)
             || (self.worst[Kind::Impact as usize] > 0.0 && self.rate < STILL_RATE / 3.0)
             || (self.shock.is_some_and(|shock| shock.dropped) && self.rate < STILL_RATE / 3.0);
-        let still = slow && self.rate < STILL_RATE && (0.7..1.3).contains(&self.load_g);
+        // Under a parachute it is carried, and goes down.
+        let descends = self.pressure.steady_for(now).is_some_and(|span| span < STILL_SHOWS);
+        let still = slow && !descends && self.rate < STILL_RATE && (0.7..1.3).contains(&self.load_g);
         self.still_since = if still { self.still_since.or(Some(now)) } else { None };
         // What is carried home may be armed still, and no motor turns.
         let thrust =
@@ -439,8 +425,8 @@ impl Mishap {
         // On rotors what moves and does not climb may be a wreck whose estimate is lost.
         let climbs = climb_mps(now, vehicle).is_none_or(|climb_mps| climb_mps > STILL_MPS);
         let moves = speed_mps > 2.0 * STILL_MPS && (climbs || !on_rotors(now, vehicle));
-        let flies =
-            self.armed && (moves || rose) && !self.lies(now, vehicle) && thrust && !self.has_strayed(now);
+        let rests = self.lies(now, vehicle) || self.has_strayed(now) || self.is_supported(now);
+        let flies = self.armed && (moves || rose) && thrust && !rests;
         self.flies_since = if flies { self.flies_since.or(Some(now)) } else { None };
     }
 
@@ -454,9 +440,8 @@ impl Mishap {
 
     /// How far it lies over, in radians, what stood level while it was armed and turned since.
     fn lies_turned(&self, now: Instant, vehicle: &Vehicle) -> Option<f32> {
-        let flies = || ground_speed_mps(now, vehicle).is_some_and(|speed_mps| speed_mps > DRAGS_MPS);
         let turned = self.stood && !vehicle.inertial.turns_little(now, DRIVEN);
-        vehicle.inertial.lies_over(now).filter(|_| turned && !flies())
+        vehicle.inertial.lies_over(now).filter(|_| turned && !is_fast(now, vehicle))
     }
 
     fn was_driven(&self, now: Instant) -> bool {
@@ -495,9 +480,10 @@ impl Mishap {
             && self.pressure.agrees(now, FALLING_MPS) == Some(false)
     }
 
-    /// Whether it lies on its side or its back.
+    /// Whether it lies on its side or its back. What hangs on wings banks, and tail-sitters look up.
     fn lies(&self, now: Instant, vehicle: &Vehicle) -> bool {
-        is_tilted(now, vehicle) || self.lies_on_its_back(vehicle)
+        let flies = vehicle.hovers(now) == Some(false) && is_fast(now, vehicle);
+        (is_tilted(now, vehicle) && !flies) || self.lies_on_its_back(vehicle)
     }
 
     fn lies_on_its_back(&self, vehicle: &Vehicle) -> bool {
@@ -508,170 +494,8 @@ impl Mishap {
         self.still_since.is_some_and(|since| now.since(since) >= STILL)
     }
 
-    /// Disarmed out of a flight: what falls, sinks or glides on was disarmed in the air, and what was terminated there, if it does not
-    /// stand. What is disarmed when it is heard first must fall faster than anything is carried down.
-    fn doubted(&mut self, now: Instant, vehicle: &Vehicle, params: &Params) {
-        let first = || self.first_at.map(|at| Doubt::new(at, height_m(now, vehicle).unwrap_or(0.0)));
-        let Some(doubt) = self.doubt.or_else(first) else { return };
-        let Doubt { since, height_m, altitude_m, uncarried, unseen, stood } = doubt;
-        let is_first = self.doubt.is_none();
-        let is_carried = is_first && !vehicle.armed();
-        // An estimator is shaken by the touch, and may fall on while the vehicle stands.
-        let air = |sink_mps: f32| self.pressure.agrees(now, sink_mps) != Some(false);
-        let fallen = |before: f32| {
-            vehicle.global.get().is_some_and(|global| global.altitude.0 < before - FALLEN_M)
-                && air(FALLING_MPS)
-        };
-        let falls = self.pressure.agrees(now, self.sink.now) == Some(true)
-            && self.sink.now > params.get(Param::MisSink);
-        let sinks = if is_carried { falls } else { self.sink.now > FALLING_MPS && air(self.sink.now) }
-            && now.since(since) > Recent::WINDOW;
-        let glides = !on_rotors(now, vehicle)
-            && !is_carried
-            && now.since(since) > BREAKS_OFF
-            && ground_speed_mps(now, vehicle).is_some_and(|speed_mps| speed_mps > GLIDING_MPS);
-        // An autopilot that lost its estimate terminates the flight, and tells no more of heights and speeds.
-        let drops =
-            vehicle.armed() && now.since(since) > FRESH && self.pressure.agrees(now, DROPS_MPS) == Some(true);
-        // What was terminated stays armed, and its autopilot's word that it stands is not of that.
-        let says_so =
-            vehicle.armed() && vehicle.landed.at() > Some(since) && calls_itself_landed(now, vehicle);
-        let stands = says_so || self.stands(now, vehicle);
-        if stands && let Some(doubt) = &mut self.doubt {
-            doubt.unseen = false;
-            // A hover just before the word is level and slow too.
-            doubt.stood |= now.since(since) >= STILL;
-        }
-        // Sensors and speeds that were told and are no more are no word that it stands.
-        let over = now.since(since) > FALL_SHOWS;
-        let watched = !is_first && !stood && self.felt_at > Instant::ZERO && on_rotors(now, vehicle);
-        let lost =
-            watched && !stands && ((unseen && now.since(since) >= LIES_FOR) || (vehicle.armed() && over));
-        if uncarried || sinks || glides || drops || lost || altitude_m.is_some_and(fallen) {
-            self.disarmed_at.get_or_insert(now);
-            self.see(now, Kind::Disarmed, height_m.max(params.get(Param::MisDisarm).next_up()));
-        } else if over {
-            (self.doubt, self.first_at) = (None, None);
-        }
-    }
-
-    /// Whether its sensors say that it stands upright and still, and they are alive.
-    fn stands(&self, now: Instant, vehicle: &Vehicle) -> bool {
-        let slow = |speed_mps: Option<f32>| speed_mps.is_some_and(|speed_mps| speed_mps.abs() < STILL_MPS);
-        now.since(self.felt_at) <= STILL
-            && vehicle.inertial.is_level_for(now, STILL)
-            && (self.rests(now) || (slow(climb_mps(now, vehicle)) && slow(ground_speed_mps(now, vehicle))))
-    }
-
-    /// What flew, was not heard, and is heard again: whether it came down meanwhile as nothing lands.
-    fn note_silence(&mut self, now: Instant, vehicle: &Vehicle, flight: &Flight, params: &Params) {
-        let Some(mut unheard) = self.unheard else {
-            if now.since(self.heard_at) >= UNHEARD {
-                self.begin_silence(self.heard_at, vehicle, flight);
-            }
-            return;
-        };
-        if self.heard_at == unheard.last_at {
-            return;
-        }
-        let to = *unheard.to.get_or_insert(now);
-        let tells = |at: Option<Instant>| at.is_none_or(|at| at > unheard.last_at);
-        if unheard.seen_at.is_none() && tells(vehicle.imu.at()) && tells(vehicle.global.at()) {
-            unheard.seen_at = Some(now);
-        }
-        let (since, shows) = match unheard.seen_at {
-            Some(seen_at) => (seen_at, LYING_SHOWS),
-            None => (to, if self.armed { LYING_SHOWS } else { STARTS }),
-        };
-        unheard.calls_itself_down = !self.armed || calls_itself_landed(now, vehicle);
-        let mut sign = None;
-        // Its states of before it was silent say nothing.
-        if now.since(to) >= STILL {
-            if self.state != State::Quiet || now.since(since) > shows {
-                self.unheard = None;
-                return;
-            }
-            if !on_rotors(now, vehicle) {
-                self.unheard = Some(unheard);
-                return;
-            }
-            sign = self.came_down(now, vehicle, params, &unheard);
-        }
-        match sign {
-            None => unheard.well_at = now,
-            Some((kind, value)) if now.since(unheard.well_at) >= SIGN_LASTS => {
-                (self.hit_at, self.unheard_from) = (to, Some(unheard.from));
-                self.see(now, kind, value);
-            }
-            Some(_) => {}
-        }
-        self.unheard = Some(unheard);
-    }
-
-    /// What flies is not heard, since then.
-    fn begin_silence(&mut self, from: Instant, vehicle: &Vehicle, flight: &Flight) {
-        if self.armed && flight.airborne() && self.state == State::Quiet && self.doubt.is_none() {
-            let altitude_m = vehicle.global.get().map(|global| global.altitude.0);
-            let sink_mps = self.sink.greatest();
-            let silence = Unheard {
-                from,
-                last_at: self.heard_at,
-                to: None,
-                seen_at: None,
-                calls_itself_down: false,
-                well_at: self.heard_at,
-                altitude_m,
-                sink_mps,
-            };
-            self.unheard = Some(silence);
-        }
-    }
-
-    /// Its recording lost what it said for so long, and no time passed here meanwhile.
-    pub(crate) fn lose(&mut self, span: Span, vehicle: &Vehicle, flight: &Flight) {
-        if span >= UNHEARD && self.unheard.is_none() {
-            let from_us = self.heard_at.as_micros().saturating_sub(span.as_micros());
-            self.begin_silence(Instant::from_micros(from_us), vehicle, flight);
-        }
-    }
-
-    /// What it does, after a silence, that only what came down as nothing lands does: as what that is told, and with which value.
-    fn came_down(
-        &self,
-        now: Instant,
-        vehicle: &Vehicle,
-        params: &Params,
-        unheard: &Unheard,
-    ) -> Option<(Kind, f32)> {
-        // Above the sea: home is another one once it is disarmed.
-        let altitude_m = vehicle.global.within(now, FRESH).map(|global| global.altitude.0);
-        let lost_m = unheard.altitude_m.zip(altitude_m).map_or(0.0, |(before_m, now_m)| before_m - now_m);
-        let least_s = unheard.least_s(lost_m.max(0.0), params.get(Param::MisSink), self.armed);
-        let had_time = unheard.lasted(now).as_secs_f32() >= least_s;
-        // What never stood hangs so in its hover (tail-sitters), and what is fast leans. What had the time to land and is off may have been
-        // laid down by somebody.
-        let flies = ground_speed_mps(now, vehicle).is_some_and(|speed_mps| speed_mps > DRAGS_MPS);
-        let is_off =
-            unheard.calls_itself_down || throttle(now, vehicle).is_some_and(|part| part < IDLE_THROTTLE);
-        let limit_deg = params.get(Param::MisOverturn);
-        let over_deg = vehicle.inertial.lies_over(now).map(f32::to_degrees);
-        let lies = self.stood && !flies && self.rate < STILL_RATE && !(is_off && had_time);
-        if let Some(over_deg) = over_deg.filter(|over_deg| lies && *over_deg > limit_deg) {
-            return Some((Kind::Overturned, over_deg));
-        }
-        let slow =
-            climb_mps(now, vehicle).is_none_or(|climb_mps| climb_mps.abs() < STILL_MPS) || self.rests(now);
-        // With all its thrust it may hover, but not near the ground.
-        let in_vain = self.armed
-            && (self.lies(now, vehicle) || is_near_ground(now, vehicle))
-            && throttle(now, vehicle).is_some_and(|part| part >= FULL_THROTTLE);
-        let fell = !has_pilots_throttle(vehicle) && is_off && !had_time;
-        let is_down = slow && lost_m > CAME_DOWN_M && (in_vain || fell);
-        is_down.then(|| (Kind::Impact, params.get(Param::MisImpact).next_up()))
-    }
-
     /// A shock after which it is still, and does not hang in the air.
-    fn shocked(&mut self, now: Instant, vehicle: &Vehicle) {
+    fn shocked(&mut self, now: Instant, vehicle: &Vehicle, params: &Params) {
         let Some(shock) = self.shock else { return };
         if now.since(shock.at) > AFTER_SHOCK {
             self.shock = None;
@@ -679,16 +503,17 @@ impl Mishap {
         }
         let lands = !on_rotors(now, vehicle)
             && shock.sink_mps < FLARED_MPS
+            && shock.speed_mps < SKIDS_MPS
             && throttle(now, vehicle).is_none_or(|part| part < IDLE_THROTTLE);
         let hard = shock.load_g > LEGS_G || shock.sink_mps > LEGS_MPS;
-        let hit = (shock.speed_mps >= IMPACT_MPS && shock.stopped && hard && !lands)
+        let hit = (shock.stops_flight() && hard && !lands)
             || (shock.dropped && shock.load_g > LEGS_G)
             || (on_rotors(now, vehicle) && is_tilted(now, vehicle))
             || self.lies_on_its_back(vehicle);
         let rests = self.still_since.is_some_and(|since| since >= shock.at && now.since(since) >= STILL);
         if hit && rests && self.is_idle(now, vehicle) {
             self.touch_mps = self.touch_mps.max(shock.sink_mps);
-            self.see(now, Kind::Impact, shock.load_g);
+            self.see(now, Kind::Impact, shock.load_g, params);
             self.shock = None;
         }
     }
@@ -697,11 +522,10 @@ impl Mishap {
     fn is_idle(&self, now: Instant, vehicle: &Vehicle) -> bool {
         !self.armed
             || calls_itself_landed(now, vehicle)
-            || is_tilted(now, vehicle)
-            || self.lies_on_its_back(vehicle)
+            || self.lies(now, vehicle)
             || throttle(now, vehicle).is_some_and(|part| {
                 // What is carried by less than half of the throttle that it hovers with stands on the ground.
-                let stands = on_rotors(now, vehicle) && part < THRUST_PART * self.hover_throttle;
+                let stands = on_rotors(now, vehicle) && self.support.is_little(part);
                 !(IDLE_THROTTLE..FULL_THROTTLE).contains(&part) || stands
             })
     }
@@ -714,7 +538,7 @@ impl Mishap {
         let dances = near_ground
             && on_rotors(now, vehicle)
             && throttle(now, vehicle).is_some_and(|part| part >= FULL_THROTTLE);
-        let slow = self.speed.greatest() < 2.0 * STILL_MPS;
+        let slow = self.speed.greatest(now) < 2.0 * STILL_MPS;
         let struck = self.worst[Kind::Impact as usize] > 0.0;
         let lies = self.lies(now, vehicle);
         // Where it hit the ground on rotors its speed is not asked: an estimate may be lost.
@@ -723,12 +547,13 @@ impl Mishap {
         let down = (long && near_ground && stays)
             || (self.rests(now) && on_rotors(now, vehicle) && ((struck && lies) || (long && strayed)))
             || (self.is_still(now) && (self.is_idle(now, vehicle) || (long && near_ground)))
-            || (long && silent)
-            || self.disarmed_at.is_some_and(|since| !self.armed && now.since(since) >= WATCHED);
+            || (long && (silent || self.is_supported(now)))
+            || (lies && on_rotors(now, vehicle) && now.since(last) >= GIVEN_UP)
+            || self.disarmed_at.is_some_and(|since| !self.armed && self.has_come_down(now, since, vehicle));
         if down {
             (self.state, self.flies_since) = (State::Down, None);
             if !strayed {
-                self.touch(now, self.sink.greatest());
+                self.touch(now, self.sink.greatest(now));
             }
             self.place = Place::of(now, vehicle);
             return Some(Change::Down);
@@ -740,6 +565,16 @@ impl Mishap {
             return Some(Change::FliesOn);
         }
         None
+    }
+
+    /// Whether what was disarmed then has come down, by the air pressure: without thrust nothing stays where it is.
+    fn has_come_down(&self, now: Instant, since: Instant, vehicle: &Vehicle) -> bool {
+        let passed = now.since(since);
+        let steady_for = self.pressure.steady_for(now).map(|span| if span < passed { span } else { passed });
+        match steady_for {
+            Some(span) => span >= if on_rotors(now, vehicle) { FALL_SHOWS } else { WATCHED },
+            None => passed >= WATCHED,
+        }
     }
 
     /// What the ground is told of a change, at the tick of it.
@@ -771,4 +606,9 @@ impl Mishap {
     pub(crate) const fn touch_mps(&self) -> f32 {
         self.touch_mps
     }
+}
+
+/// Whether it is faster than what lies, or is dragged along: the air carries it from ahead besides its rotors.
+fn is_fast(now: Instant, vehicle: &Vehicle) -> bool {
+    ground_speed_mps(now, vehicle).is_some_and(|speed_mps| speed_mps > DRAGS_MPS)
 }

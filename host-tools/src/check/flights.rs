@@ -170,7 +170,7 @@ impl Flights {
     pub(super) fn landing(&mut self) {
         let crashed = std::mem::take(&mut self.crashed);
         if let Some(flight) = self.list.last_mut().filter(|_| self.open) {
-            flight.landed = !crashed && !self.unseen;
+            flight.landed = !crashed && !self.unseen && flight.disarmed_at_m.is_none();
         }
         self.close();
     }
@@ -198,7 +198,7 @@ impl Flights {
     ) {
         match change {
             Change::Began(Kind::Disarmed) => {
-                if let Some(flight) = self.list.last_mut() {
+                if let Some(flight) = self.list.last_mut().filter(|_| self.open) {
                     flight.disarmed_at_m = Some(f32::from(monitor.mishap().height_m()));
                 }
             }
@@ -209,7 +209,13 @@ impl Flights {
                     flight.mishap = Some(Mishap { at, is_impact, unheard_from });
                 }
             }
-            Change::Began(_) | Change::FliesOn | Change::FliesAgain | Change::OnBench(_) => {}
+            // It was caught in time.
+            Change::FliesOn => {
+                if let Some(flight) = self.list.last_mut().filter(|_| self.open) {
+                    flight.disarmed_at_m = None;
+                }
+            }
+            Change::Began(_) | Change::FliesAgain | Change::OnBench(_) => {}
         }
     }
 

@@ -164,7 +164,7 @@ impl Reference {
         }
         self.heard = Some(at);
         let since = self.flight.airborne_since();
-        self.flight.step(at, &self.vehicle);
+        self.flight.step(at, &self.vehicle, false);
         match (since, self.flight.airborne_since()) {
             (Some(since), None) => self.flown = at.since(since),
             (None, Some(_)) => self.flown = Span::ZERO,

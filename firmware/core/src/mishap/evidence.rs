@@ -3,7 +3,7 @@
 use crate::motion::height_m;
 use crate::observation::{EstimatorScale, LandedState};
 use crate::params::{Param, Params};
-use crate::time::{Instant, Span};
+use crate::time::{Instant, Span, Stamp};
 use crate::vehicle::{LANDED_STATE_AGE, Vehicle};
 
 /// So long what falls is carried by next to nothing; a bounce is shorter.
@@ -19,6 +19,10 @@ pub(super) const FRESH: Span = Span::from_secs(2);
 /// A speed has broken off when it is below this part of it within [`BREAKS_OFF`].
 pub(super) const BROKEN_OFF: f32 = 0.4;
 pub(super) const BREAKS_OFF: Span = Span::from_secs(1);
+/// Near the ground.
+const HPA_PER_METRE: f32 = 0.12;
+/// A shock stops something that was this fast.
+const IMPACT_MPS: f32 = 3.5;
 /// Below this throttle nothing flies; above [`FULL_THROTTLE`] nobody asks to sink, and what is still does not fly.
 pub(super) const IDLE_THROTTLE: f32 = 0.1;
 pub(super) const FULL_THROTTLE: f32 = 0.9;
@@ -29,12 +33,13 @@ pub(super) const THRUST_PART: f32 = 0.5;
 /// How long something has been so, and in how many samples.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Lasting {
-    pub(super) since: Instant,
-    pub(super) samples: u8,
+    since: Instant,
+    samples: u8,
+    last: Stamp,
 }
 
 impl Lasting {
-    pub(super) const NOT: Self = Self { since: Instant::ZERO, samples: 0 };
+    pub(super) const NOT: Self = Self { since: Instant::ZERO, samples: 0, last: Stamp::NONE };
 
     /// For how long it has been so, once there were enough samples.
     pub(super) fn take(&mut self, at: Instant, so: bool) -> Option<Span> {
@@ -42,20 +47,29 @@ impl Lasting {
             self.samples = 0;
             return None;
         }
-        if self.samples == 0 {
-            self.since = at;
+        let goes_on = self.last.age(at).is_some_and(|age| age <= FRESH);
+        if self.samples == 0 || !goes_on {
+            (self.since, self.samples) = (at, 0);
         }
+        self.last = Stamp::at(at);
         self.samples = self.samples.saturating_add(1);
         (self.samples >= SAMPLES).then(|| at.since(self.since))
+    }
+
+    /// Whether it was so in the last samples, for so long.
+    pub(super) fn lasts(&self, now: Instant, span: Span) -> bool {
+        self.samples >= 2
+            && self.last.age(now).is_some_and(|age| age <= FRESH)
+            && now.since(self.since) >= span
     }
 }
 
 /// The greatest of the last half to whole second.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Recent {
-    pub(super) now: f32,
-    pub(super) before: f32,
-    pub(super) window: Instant,
+    now: f32,
+    before: f32,
+    window: Instant,
 }
 
 impl Recent {
@@ -64,13 +78,19 @@ impl Recent {
 
     pub(super) fn take(&mut self, at: Instant, value: f32) {
         if at.since(self.window) >= Self::WINDOW {
-            (self.before, self.now, self.window) = (self.now, 0.0, at);
+            (self.before, self.now, self.window) = (self.now(at), 0.0, at);
         }
         self.now = self.now.max(value);
     }
 
-    pub(super) const fn greatest(&self) -> f32 {
-        self.now.max(self.before)
+    /// The greatest of this window; nothing that was told long ago.
+    pub(super) fn now(&self, at: Instant) -> f32 {
+        if at.since(self.window) <= FRESH { self.now } else { 0.0 }
+    }
+
+    /// The greatest of this window and the one before.
+    pub(super) fn greatest(&self, at: Instant) -> f32 {
+        if at.since(self.window) <= FRESH { self.now.max(self.before) } else { 0.0 }
     }
 }
 
@@ -82,16 +102,21 @@ pub(super) struct Pressure {
     now_hpa: f32,
     window: Instant,
     changed_at: Instant,
+    /// When it rose last as it does under a parachute.
+    rose_at: Instant,
 }
 
 impl Pressure {
     const WINDOW: Span = Span::from_secs(1);
+    /// Parachutes of drones let them down at 4 to 6 m/s (ASTM F3322 leaves it to the impact's energy).
+    const PARACHUTE_MPS: f32 = 4.0;
     pub(super) const NOTHING: Self = Self {
         before_hpa: 0.0,
         began_hpa: 0.0,
         now_hpa: 0.0,
         window: Instant::ZERO,
         changed_at: Instant::ZERO,
+        rose_at: Instant::ZERO,
     };
 
     pub(super) fn take(&mut self, at: Instant, hpa: f32) {
@@ -102,20 +127,34 @@ impl Pressure {
             self.changed_at = at;
         }
         self.now_hpa = hpa;
+        // The pressure before is at least a second old.
+        if self.before_hpa > 0.0 && hpa > self.before_hpa + HPA_PER_METRE * Self::PARACHUTE_MPS {
+            self.rose_at = at;
+        }
+    }
+
+    /// How long it has not risen as it does under a parachute; `None` where there is no pressure, or one that never changes.
+    pub(super) fn steady_for(&self, now: Instant) -> Option<Span> {
+        self.now(now).map(|_| now.since(self.rose_at))
+    }
+
+    /// What it is, where it is told and changes at all.
+    pub(super) fn now(&self, at: Instant) -> Option<f32> {
+        let known = at.since(self.window) <= FRESH && at.since(self.changed_at) <= FRESH;
+        known.then_some(self.now_hpa)
     }
 
     /// Whether it rises as it does in a vehicle that sinks so fast, or began to within the last second; `None` where there is no
     /// pressure, or one that never changes.
     pub(super) fn agrees(&self, at: Instant, sink_mps: f32) -> Option<bool> {
-        const HPA_PER_METRE: f32 = 0.12;
         /// Of the height that is lost in a second: it may have begun to sink within it, and its pressures are as old as their
         /// stream is slow.
         const PART_S: f32 = 0.3;
         /// Wind and propellers make as much.
         const NOISE_M: f32 = 0.8;
-        let known = at.since(self.window) <= FRESH && at.since(self.changed_at) <= FRESH;
         let least_hpa = HPA_PER_METRE * (PART_S * sink_mps).max(NOISE_M);
-        (known && self.before_hpa > 0.0).then_some(self.now_hpa > self.before_hpa + least_hpa)
+        let now_hpa = self.now(at).filter(|_| self.before_hpa > 0.0)?;
+        Some(now_hpa > self.before_hpa + least_hpa)
     }
 }
 
@@ -146,67 +185,10 @@ pub(super) struct Shock {
     pub(super) dropped: bool,
 }
 
-/// Disarmed out of a flight.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Doubt {
-    pub(super) since: Instant,
-    /// Above home.
-    pub(super) height_m: f32,
-    /// Above mean sea level.
-    pub(super) altitude_m: Option<f32>,
-    /// Nothing has carried it since.
-    pub(super) uncarried: bool,
-    /// Its flight was terminated while nobody listened: the fall may be over.
-    pub(super) unseen: bool,
-    /// It stood still and level since.
-    pub(super) stood: bool,
-}
-
-/// The vehicle was not heard, in the air.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Unheard {
-    /// When it was heard last; with what a recording lost meanwhile, in which no time passed here, taken off.
-    pub(super) from: Instant,
-    /// The same without that.
-    pub(super) last_at: Instant,
-    /// When it was heard again.
-    pub(super) to: Option<Instant>,
-    /// When its forces and its place were heard again, or the first of them where it tells no other.
-    pub(super) seen_at: Option<Instant>,
-    /// It is disarmed, or calls itself landed, since.
-    pub(super) calls_itself_down: bool,
-    /// When it did last what is no sign of a crash, since it is heard again.
-    pub(super) well_at: Instant,
-    /// Its height above mean sea level, and its sink, when it was heard last.
-    pub(super) altitude_m: Option<f32>,
-    pub(super) sink_mps: f32,
-}
-
-impl Unheard {
-    /// How long it was not heard.
-    pub(super) fn lasted(&self, now: Instant) -> Span {
-        self.to.unwrap_or(now).since(self.from)
-    }
-
-    /// The shortest time in which what flies by itself comes down so far, stands and is disarmed: from its sink to the fastest descent that
-    /// can be set, or its own if that was faster, as gently as autopilots do, the last metres no faster than legs take, and disarmed when
-    /// its autopilot has seen for so long that it stands (`ArduPilot` 1 s, PX4 longer).
-    pub(super) fn least_s(&self, lost_m: f32, limit_mps: f32, armed: bool) -> f32 {
-        const SEES_S: f32 = 1.0;
-        const LAST_M: f32 = 5.0;
-        const LAST_MPS: f32 = 2.5;
-        const GENTLY_MPS2: f32 = 2.0;
-        let last_m = lost_m.min(LAST_M);
-        let fastest_mps = limit_mps.max(self.sink_mps);
-        let faster_mps = fastest_mps - self.sink_mps.max(0.0);
-        let sees_s = if armed { 0.0 } else { SEES_S };
-        last_m / LAST_MPS + (lost_m - last_m) / fastest_mps + faster_mps / (2.0 * GENTLY_MPS2) + sees_s
-    }
-}
-
-impl Doubt {
-    pub(super) const fn new(since: Instant, height_m: f32) -> Self {
-        Self { since, height_m, altitude_m: None, uncarried: false, unseen: false, stood: false }
+impl Shock {
+    /// It stopped what was too fast for a landing.
+    pub(super) fn stops_flight(&self) -> bool {
+        self.stopped && self.speed_mps >= IMPACT_MPS
     }
 }
 
@@ -234,11 +216,6 @@ pub(super) fn is_tilted(now: Instant, vehicle: &Vehicle) -> bool {
     !vehicle.inertial.contradicts(now)
         && vehicle
             .attitude
-            .get()
+            .within(now, FRESH)
             .is_some_and(|attitude| attitude.roll.0.abs() > TILTED_RAD || attitude.pitch.0.abs() > TILTED_RAD)
-}
-
-/// The part of the throttle that the autopilot gives.
-pub(super) fn throttle(at: Instant, vehicle: &Vehicle) -> Option<f32> {
-    vehicle.hud.within(at, FRESH).and_then(|hud| hud.throttle).map(|throttle| throttle.0)
 }

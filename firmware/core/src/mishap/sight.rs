@@ -1,13 +1,12 @@
 //! What each observation shows of a mishap.
 
 use super::evidence::{
-    BREAKS_OFF, BROKEN_OFF, FRESH, FULL_THROTTLE, IDLE_THROTTLE, Shock, THRUST_PART, UNCARRIED, is_believed,
-    on_rotors, throttle,
+    BREAKS_OFF, BROKEN_OFF, FRESH, FULL_THROTTLE, IDLE_THROTTLE, Shock, UNCARRIED, is_believed, on_rotors,
 };
 use super::{Kind, Mishap, State, WATCHED};
 use crate::derived::load_factor_g;
 use crate::modes::{has_pilots_throttle, is_made_to_turn, is_thrown};
-use crate::motion::{climb_mps, ground_speed_mps, height_m};
+use crate::motion::{climb_mps, ground_speed_mps, height_m, throttle};
 use crate::observation::{Air, Attitude, Imu, Observation, VehicleKind};
 use crate::params::{Param, Params};
 use crate::time::{Instant, Span, Stamp};
@@ -46,8 +45,6 @@ const TURNS_RADPS: f32 = 1.5;
 const FULL_ON_WINGS: f32 = 0.97;
 /// Wings pull out of a dive with so much at most: the limit of CS-23 for the aerobatic category.
 const PULL_OUT_G: f32 = 6.0;
-/// Time constant of the throttle that it hovers with.
-const HOVER_S: f32 = 10.0;
 
 impl Mishap {
     /// Takes an observation that the vehicle took.
@@ -58,8 +55,11 @@ impl Mishap {
         observation: &Observation,
         params: &Params,
     ) {
-        let watched = self.armed || self.disarmed_at.is_some_and(|since| at.since(since) <= WATCHED);
-        if !(watched || self.first_at.is_some()) || vehicle.kind() == VehicleKind::Surface {
+        let watched = self.armed
+            || self.unheard.is_some()
+            || matches!(self.state, State::Going(_))
+            || self.disarmed_at.is_some_and(|since| at.since(since) <= WATCHED);
+        if !watched || vehicle.kind() == VehicleKind::Surface {
             return;
         }
         // A radio, a battery or an engine may be heard while the autopilot is not.
@@ -74,18 +74,18 @@ impl Mishap {
             self.heard_at = at;
         }
         match observation {
-            Observation::Imu(imu) if imu.instance == 0 && watched => self.take_imu(at, imu, vehicle, params),
+            Observation::Imu(imu) if imu.instance == 0 => self.take_imu(at, imu, vehicle, params),
             Observation::ImuAndAir(imu, air) => {
                 if air.instance == 0 {
                     self.take_pressure(at, air);
                 }
-                if imu.instance == 0 && watched {
+                if imu.instance == 0 {
                     self.take_imu(at, imu, vehicle, params);
                 }
             }
-            Observation::Shock(force) if watched => self.take_shock(at, force.0 / GRAVITY, vehicle, params),
+            Observation::Shock(force) => self.take_shock(at, force.0 / GRAVITY, vehicle, params),
             Observation::Air(air) if air.instance == 0 => self.take_pressure(at, air),
-            Observation::Attitude(attitude) if watched => {
+            Observation::Attitude(attitude) => {
                 self.take_attitude(at, attitude, vehicle, params);
                 if let Some(rates) = attitude.rates {
                     self.take_rates(at, rates, vehicle, params);
@@ -94,7 +94,7 @@ impl Mishap {
             Observation::GlobalPosition(_) | Observation::LocalPosition(_) => {
                 self.take_motion(at, vehicle, params);
             }
-            Observation::Hud(_) => self.take_throttle(at, vehicle),
+            Observation::Hud(_) => self.note_throttle(at, vehicle),
             _ => {}
         }
     }
@@ -114,7 +114,9 @@ impl Mishap {
         }
     }
 
-    pub(super) fn see(&mut self, at: Instant, kind: Kind, value: f32) {
+    /// It was seen, with such a value, which is above the limit.
+    pub(super) fn see(&mut self, at: Instant, kind: Kind, value: f32, params: &Params) {
+        let value = value.max(params.get(kind.limit()).next_up());
         let worst = &mut self.worst[kind as usize];
         *worst = worst.max(value);
         self.seen.get_or_insert(kind);
@@ -144,11 +146,10 @@ impl Mishap {
         if let Some(span) = self.falls.take(at, falls)
             && span.as_secs_f32() >= least_s
         {
-            self.see(at, Kind::FreeFall, span.as_secs_f32().max(least_s.next_up()));
+            self.see(at, Kind::FreeFall, span.as_secs_f32(), params);
         }
         self.uncarried.take(at, load_g < UNCARRIED_G);
-        if self.uncarried.samples >= 2
-            && at.since(self.uncarried.since) >= UNCARRIED
+        if self.uncarried.lasts(at, UNCARRIED)
             && let Some(doubt) = &mut self.doubt
         {
             doubt.uncarried = true;
@@ -159,19 +160,23 @@ impl Mishap {
             && self.was_driven(at)
             && on_rotors(at, vehicle)
         {
-            self.see(at, Kind::Overturned, tilt_deg);
+            self.see(at, Kind::Overturned, tilt_deg, params);
         }
     }
 
     /// A shock, which may come between two samples.
     fn take_shock(&mut self, at: Instant, load_g: f32, vehicle: &Vehicle, params: &Params) {
         if load_g.is_finite() && load_g > params.get(Param::MisImpact) {
-            let before = self.shock.filter(|shock| at.since(shock.at) <= BREAKS_OFF);
+            // What broke off a speed goes on while it bounces, or thrashes about.
+            let before = self.shock.and_then(|shock| match at.since(shock.at) <= BREAKS_OFF {
+                true => Some(shock),
+                false => shock.stopped.then_some(Shock { at, ..shock }),
+            });
             let shock = before.unwrap_or(Shock {
                 at,
                 load_g,
-                speed_mps: if is_believed(vehicle, params) { self.speed.greatest() } else { 0.0 },
-                sink_mps: self.sink.greatest(),
+                speed_mps: if is_believed(vehicle, params) { self.speed.greatest(at) } else { 0.0 },
+                sink_mps: self.sink.greatest(at),
                 stopped: false,
                 dropped: self.shock.is_some_and(|shock| shock.dropped)
                     || (self.load_g < DROPS_G
@@ -186,7 +191,7 @@ impl Mishap {
             self.shock = Some(Shock { load_g: greatest_g, ..shock });
             let pulled_out = !on_rotors(at, vehicle) && load_g <= PULL_OUT_G;
             if matches!(self.state, State::Going(_)) && !pulled_out {
-                self.see(at, Kind::Impact, load_g);
+                self.see(at, Kind::Impact, load_g, params);
             }
         }
     }
@@ -201,7 +206,7 @@ impl Mishap {
         let tumbles = rate_dps > params.get(Param::MisTumble) && !is_made_to_turn(vehicle);
         let least = if on_rotors(at, vehicle) { TUMBLES } else { TUMBLES_ON_WINGS };
         if self.tumbles.take(at, tumbles).is_some_and(|span| span >= least) {
-            self.see(at, Kind::Tumbling, rate_dps);
+            self.see(at, Kind::Tumbling, rate_dps, params);
         }
     }
 
@@ -223,7 +228,7 @@ impl Mishap {
             && !vehicle.inertial.contradicts(at)
             && !vehicle.inertial.is_level_for(at, LEVEL);
         if self.overturned.take(at, over).is_some_and(|span| span >= TURNS_OVER) {
-            self.see(at, Kind::Overturned, tilt_deg);
+            self.see(at, Kind::Overturned, tilt_deg, params);
         }
     }
 
@@ -240,13 +245,13 @@ impl Mishap {
         }
         self.speed.take(at, speed_mps);
         if vehicle.armed() {
-            self.height_m = height_m(at, vehicle).unwrap_or(0.0);
+            self.height_m = height_m(at, vehicle);
         }
         // What breaks off in a mishap is the touch, where the estimate is not lost.
         let goes = matches!(self.state, State::Going(_));
         let lost = goes && self.has_strayed(at);
-        if goes && !lost && -climb_mps < BROKEN_OFF * self.sink.greatest() {
-            self.touch(at, self.sink.greatest());
+        if goes && !lost && -climb_mps < BROKEN_OFF * self.sink.greatest(at) {
+            self.touch(at, self.sink.greatest(at));
         }
         self.sink.take(at, -climb_mps);
         if !lost {
@@ -279,7 +284,7 @@ impl Mishap {
         let believed = || self.pressure.agrees(at, sink_mps).unwrap_or_else(by_display);
         let sinks = sinks && self.armed && believed();
         if self.sinks.take(at, sinks).is_some_and(|span| span >= SINKS) {
-            self.see(at, Kind::Sinking, sink_mps.max(limit_mps.next_up()));
+            self.see(at, Kind::Sinking, sink_mps, params);
         }
     }
 
@@ -292,23 +297,10 @@ impl Mishap {
         height_m.map_or(0.0, |height_m| self.peak_m - height_m)
     }
 
-    /// The throttle that it hovers with, smoothed.
-    fn take_throttle(&mut self, at: Instant, vehicle: &Vehicle) {
-        let throttle = throttle(at, vehicle).unwrap_or(0.0);
-        if self.armed && throttle > IDLE_THROTTLE {
-            self.driven_at = at;
-        }
-        let hovers = climb_mps(at, vehicle).is_some_and(|climb_mps| climb_mps.abs() < 1.0);
-        if hovers && throttle > IDLE_THROTTLE && self.state == State::Quiet && self.shock.is_none() {
-            let weight = if self.hover_throttle > 0.0 { 0.25 / HOVER_S } else { 1.0 };
-            self.hover_throttle += weight * (throttle - self.hover_throttle);
-        }
-    }
-
     /// Whether the throttle asks for thrust; not known is yes. Thrown into the air to start (`ArduCopter`'s THROW), it falls.
     fn asks_for_thrust(&self, at: Instant, vehicle: &Vehicle) -> bool {
-        let least = (THRUST_PART * self.hover_throttle).max(IDLE_THROTTLE);
-        !is_thrown(vehicle) && throttle(at, vehicle).is_none_or(|part| part > least)
+        let asks = |part: f32| part > IDLE_THROTTLE && !self.support.is_little(part);
+        !is_thrown(vehicle) && throttle(at, vehicle).is_none_or(asks)
     }
 }
 

@@ -5,6 +5,7 @@ use core::fmt::Write as _;
 use heapless::String;
 
 use crate::motion::height_m;
+use crate::params::Param;
 use crate::time::Instant;
 use crate::vehicle::Vehicle;
 
@@ -30,6 +31,18 @@ impl Kind {
     /// How many there are.
     pub(super) const COUNT: usize = 6;
 
+    /// The limit that it is above.
+    pub(super) const fn limit(self) -> Param {
+        match self {
+            Self::FreeFall => Param::MisFallTime,
+            Self::Impact => Param::MisImpact,
+            Self::Tumbling => Param::MisTumble,
+            Self::Disarmed => Param::MisDisarm,
+            Self::Sinking => Param::MisSink,
+            Self::Overturned => Param::MisOverturn,
+        }
+    }
+
     /// The name of its check.
     pub const fn name(self) -> &'static str {
         match self {
@@ -53,6 +66,8 @@ pub struct Place {
 }
 
 impl Place {
+    pub(super) const UNKNOWN: Self = Self { position: None, height_m: 0 };
+
     pub(super) fn of(now: Instant, vehicle: &Vehicle) -> Self {
         let e7 = |degrees: f64| (degrees * 1e7) as i32;
         let global = vehicle.global.get().and_then(|global| global.position);

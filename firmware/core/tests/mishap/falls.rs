@@ -230,3 +230,69 @@ fn a_flight_that_is_terminated_without_an_estimate_falls_by_the_air_pressure() {
     });
     assert!(told.is_empty(), "killed on a hill: {told:?}");
 }
+
+#[test]
+fn what_is_disarmed_below_home_falls_too() {
+    for of in ROTORS {
+        let outcome = fly(&Quad { start_height: -10.0, ..hovering(of) }, |ms, quad, motion| {
+            fall(ms, quad, motion);
+            quad.height -= 30.0;
+            (quad.armed, quad.throttle) = (false, 0.0);
+        });
+        assert!(outcome.told().contains(&"disarmed_in_air"), "{of:?}: {:?}", outcome.told());
+        let valley = fly(&hovering(of), |ms, quad, motion| {
+            let landed = ms >= 8_000;
+            let height_m = if landed { -12.0 } else { 20.0 - 0.004 * ms as f32 };
+            (quad.height, quad.climb) = (height_m, if landed { 0.0 } else { -4.0 });
+            if landed {
+                (motion.rates, motion.ground_mps) = ([0.0; 3], 0.0);
+                (quad.throttle, quad.armed) = (0.0, ms < 10_000);
+            }
+        });
+        assert!(valley.told().is_empty() && valley.flights() == (1, 1, 0), "{of:?}: {:?}", valley.told());
+    }
+}
+
+#[test]
+fn what_stands_after_its_disarming_has_landed_within_two_seconds() {
+    for of in ROTORS {
+        let landed = fly_until(AT_MS + 2_600, &hovering(of), |ms, quad, motion| {
+            (motion.rates, motion.ground_mps) = ([0.0; 3], 0.0);
+            (quad.armed, quad.throttle) = (ms < 1_000, 0.0);
+        });
+        assert!(landed.told().is_empty() && landed.flights() == (1, 1, 0), "{of:?}: {:?}", landed.flights());
+    }
+}
+
+#[test]
+fn what_comes_down_under_a_parachute_is_down_when_it_is_on_the_ground() {
+    for of in ROTORS {
+        let outcome = fly(&hovering(of), |ms, quad, motion| {
+            let seconds = ms as f32 / 1_000.0;
+            (quad.armed, quad.throttle) = (false, 0.0);
+            motion.rates = [0.0; 3];
+            let down_m = if ms < 1_000 { 4.9 * seconds * seconds } else { 4.9 + 5.0 * (seconds - 1.0) };
+            motion.load_g = if ms < 1_000 { 0.05 } else { 1.0 };
+            let lands = down_m >= 80.0;
+            quad.climb = if lands { 0.0 } else { -5.0 };
+            quad.height = 20.0 - down_m.min(80.0);
+            motion.pressure_hpa = Some(950.0 + 0.12 * down_m.min(80.0) + (ms / 50 % 3) as f32 * 0.01);
+        });
+        assert_eq!(outcome.told().first(), Some(&"disarmed_in_air"), "{of:?}");
+        let down_ms = outcome.changes.iter().find(|(_, change)| *change == Change::Down).map(|(ms, _)| *ms);
+        let lands_ms = AT_MS + 16_000;
+        assert!(down_ms.is_some_and(|ms| (lands_ms..lands_ms + 5_000).contains(&ms)), "{of:?}: {down_ms:?}");
+    }
+}
+
+#[test]
+fn what_is_heard_too_seldom_is_no_fall() {
+    for of in ROTORS {
+        let outcome = fly(&hovering(of), |ms, _, motion| {
+            // A sample without weight, a gap of three seconds, and two more.
+            motion.load_g = if ms < 50 || (3_000..3_100).contains(&ms) { 0.05 } else { 1.0 };
+            motion.unheard = (50..3_000).contains(&ms);
+        });
+        assert!(outcome.told().is_empty(), "{of:?}: {:?}", outcome.told());
+    }
+}

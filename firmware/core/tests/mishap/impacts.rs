@@ -288,3 +288,90 @@ fn what_a_mishap_was_is_no_value_of_now() {
         outcome.findings.iter().filter(|one| one.subsystem == Subsystem::Mishap && one.level == Level::Ok);
     assert!(over.clone().all(Finding::is_unjudged), "{:?}", over.collect::<Vec<_>>());
 }
+
+#[test]
+fn what_hits_the_ground_and_is_disarmed_before_it_lies_still_has_crashed() {
+    for of in ROTORS {
+        let outcome = fly(&hovering(of), |ms, quad, motion| {
+            let hits = 3_300;
+            if ms < hits {
+                (quad.climb, quad.height) = (-6.0, 20.0 - 0.006 * ms as f32);
+            } else {
+                (quad.climb, quad.height, motion.ground_mps) = (0.0, 0.3, 0.0);
+                motion.load_g = if ms < hits + 100 { 10.0 } else { 1.0 };
+                // It rocks for a while.
+                let still = ms >= hits + 2_600;
+                motion.rates = if still { [0.0; 3] } else { [0.5, 0.0, 0.0] };
+                let off = ms >= hits + 2_000;
+                (quad.armed, quad.throttle) = (!off, if off { 0.0 } else { 0.4 });
+            }
+        });
+        assert_eq!(
+            (outcome.told(), outcome.flights()),
+            (vec!["impact"], (1, 0, 1)),
+            "{of:?}: {:?}",
+            outcome.changes
+        );
+    }
+}
+
+#[test]
+fn a_second_shock_does_not_hide_the_first() {
+    for of in ROTORS {
+        let outcome = fly(&hovering(of), |ms, quad, motion| {
+            if ms < 500 {
+                motion.ground_mps = 15.0;
+            } else {
+                (motion.ground_mps, quad.throttle, quad.height) = (0.2, 0.4, 0.3);
+                motion.load_g = match ms {
+                    500..600 => 6.0,
+                    1_800..1_900 => 4.5,
+                    _ => 1.0,
+                };
+                motion.rates = if ms < 2_000 { [0.5, 0.0, 0.0] } else { [0.0; 3] };
+                quad.throttle = if ms < 2_000 { 0.4 } else { 0.0 };
+            }
+        });
+        assert_eq!(outcome.told(), ["impact"], "{of:?}: {:?}", outcome.changes);
+        assert_eq!(outcome.monitor.mishap().hit_at(), Instant::from_millis(AT_MS + 500), "{of:?}");
+    }
+}
+
+#[test]
+fn what_is_too_fast_to_skid_and_stops_has_hit_something() {
+    for of in WINGS {
+        let stops_from = |mps: f32| {
+            fly(&on_wings(of), move |ms, quad, motion| {
+                (motion.ground_mps, quad.throttle) = (mps, 0.0);
+                if ms >= 1_000 {
+                    motion.load_g = if ms < 1_100 { 6.0 } else { 1.0 };
+                    (motion.ground_mps, quad.height, motion.rates) = (0.0, 0.5, [0.0; 3]);
+                }
+            })
+        };
+        assert_eq!(stops_from(20.0).told(), ["impact"], "{of:?}");
+        assert!(stops_from(12.0).told().is_empty(), "{of:?}");
+    }
+}
+
+/// Upright on the ground, with a throttle far below that of a hover, while its estimate climbs away.
+fn stands_with_a_lost_estimate(ms: u64, quad: &mut Quad, motion: &mut Motion, throttle: f32) {
+    let seconds = ms as f32 / 1_000.0;
+    (quad.throttle, quad.height, quad.climb) = (throttle, 20.0 + 3.0 * seconds, 3.0);
+    (motion.ground_mps, motion.rates) = (4.0, [0.0; 3]);
+    motion.pressure_hpa = Some(955.0 + (ms / 50 % 3) as f32 * 0.01);
+}
+
+#[test]
+fn what_stands_with_little_throttle_flies_no_more_whatever_its_estimate_says() {
+    for of in ROTORS {
+        let is_multicopter = matches!(of.2, 2 | 13);
+        let stands =
+            fly(&hovering(of), |ms, quad, motion| stands_with_a_lost_estimate(ms, quad, motion, 0.12));
+        assert!(stands.told().is_empty(), "{of:?}: {:?}", stands.told());
+        assert_eq!(stands.flights(), (1, u32::from(is_multicopter), 0), "{of:?}");
+        let hovers =
+            fly(&hovering(of), |ms, quad, motion| stands_with_a_lost_estimate(ms, quad, motion, 0.3));
+        assert_eq!(hovers.flights(), (1, 0, 0), "{of:?}");
+    }
+}

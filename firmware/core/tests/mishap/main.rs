@@ -117,9 +117,23 @@ fn fly(vehicle: &Quad, script: impl Fn(u64, &mut Quad, &mut Motion)) -> Outcome 
 }
 
 fn fly_from(at_ms: u64, vehicle: &Quad, script: impl Fn(u64, &mut Quad, &mut Motion)) -> Outcome {
+    fly_between(at_ms, 60_000, vehicle, script)
+}
+
+/// The same, of a recording that ends then.
+fn fly_until(end_ms: u64, vehicle: &Quad, script: impl Fn(u64, &mut Quad, &mut Motion)) -> Outcome {
+    fly_between(AT_MS, end_ms, vehicle, script)
+}
+
+fn fly_between(
+    at_ms: u64,
+    end_ms: u64,
+    vehicle: &Quad,
+    script: impl Fn(u64, &mut Quad, &mut Motion),
+) -> Outcome {
     let mut monitor = Monitor::new(Params::defaults());
     let (mut findings, mut changes, mut reports) = (Vec::new(), Vec::new(), Vec::new());
-    for now_ms in (0..60_000).step_by(50) {
+    for now_ms in (0..end_ms).step_by(50) {
         let now = Instant::from_millis(now_ms);
         let (mut quad, mut motion) = (vehicle.clone(), CALM);
         if now_ms >= at_ms {

@@ -263,3 +263,33 @@ fn a_plane_whose_streams_come_back_late_lands_as_ever() {
         flown.flights()
     );
 }
+
+#[test]
+fn a_sink_of_before_the_silence_is_no_sink_of_now() {
+    for of in ROTORS {
+        // It came down, its battery was changed, and for a while it tells no more than heartbeats.
+        let outcome = fly(&hovering(of), |ms, quad, motion| {
+            motion.unheard = (4_000..24_000).contains(&ms);
+            motion.beats_only = ms >= 24_000 && ms < 27_000;
+            if ms < 4_000 {
+                (quad.climb, quad.height) = (-3.0, 20.0 - 0.003 * ms as f32);
+            } else {
+                has_landed(quad, motion);
+            }
+        });
+        assert!(outcome.told().is_empty() && outcome.flights() == (1, 1, 0), "{of:?}: {:?}", outcome.told());
+    }
+}
+
+#[test]
+fn what_hits_the_ground_disarmed_when_it_is_heard_first_is_an_impact() {
+    for of in ROTORS {
+        let hits = fly_from(0, &Quad { armed: false, throttle: 0.0, ..hovering(of) }, |ms, quad, motion| {
+            (quad.climb, quad.height) = if ms < 900 { (-9.0, 8.0 - 0.009 * ms as f32) } else { (0.0, 0.0) };
+            motion.load_g = if (900..1_000).contains(&ms) { 12.0 } else { 1.0 };
+            motion.rates = [0.0; 3];
+            motion.ground_mps = 0.0;
+        });
+        assert_eq!(hits.told(), ["impact"], "{of:?}: {:?}", hits.changes);
+    }
+}
