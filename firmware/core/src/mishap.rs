@@ -9,9 +9,9 @@
 //! | impact | a shock above `MIS_IMPACT`, and the speed breaks off harder than legs take it or the vehicle lies on its side; then it is still | everywhere |
 //! | | a shock above 4 g of what little had carried for 0.3 s (it fell) | on rotors |
 //! | | a shock, and within 4 s it is overturned | on rotors |
-//! | | what comes down slowly without throttle lands and skids | on wings |
+//! | | what comes down slowly without throttle, slower than 15 m/s, lands and skids | on wings |
 //! | tumbling | body rates above `MIS_TUMBLE` for half a second, on wings for 1.5 s; not in modes made for it | everywhere |
-//! | disarmed in the air | disarmed or terminated above `MIS_DISARM_H` or while it sinks; then it falls, sinks or goes on moving | everywhere |
+//! | disarmed in the air | disarmed or terminated further than `MIS_DISARM_H` from home or while it sinks; then it falls, sinks or goes on moving | everywhere |
 //! | | terminated, in a silence too, and does not stand after it | on rotors |
 //! | | disarmed or terminated when it is heard first, and falls | everywhere |
 //! | overturned | its top looks down, by more than 100 degrees of tilt, for 0.7 s; not in modes made for it | on rotors |
@@ -23,7 +23,7 @@
 //! all its throttle, far below where it was heard last, or it came down faster than anything lands (impact, of which no shock is known).
 //!
 //! ```text
-//!        seen in a flight            it lies still, or 10 s after disarming
+//!        seen in a flight         it lies still, or is disarmed and sinks no more
 //! Quiet ------------------> Going ------------------------------------------> Down
 //!   ^                         |  still armed and flying, nothing seen for 5 s  |
 //!   |<------------------------+------------------------------------------------+
@@ -122,8 +122,6 @@ pub struct Mishap {
     worst: [f32; Kind::COUNT],
     seen: Option<Kind>,
     armed: bool,
-    /// It is in the air.
-    flies: bool,
     disarmed_at: Option<Instant>,
     /// The latest heartbeat, the height above home then, and when the autopilot was heard last.
     beat_at: Instant,
@@ -196,7 +194,6 @@ impl Mishap {
             worst: [0.0; Kind::COUNT],
             seen: None,
             armed: false,
-            flies: false,
             disarmed_at: None,
             beat_at: Instant::ZERO,
             beat_height_m: None,
@@ -317,7 +314,7 @@ impl Mishap {
         params: &Params,
     ) -> Option<Change> {
         self.note_arming(now, vehicle, flight, params);
-        self.flies = flight.airborne() && self.state == State::Quiet;
+        self.support.flies = flight.airborne() && self.state == State::Quiet;
         self.note_support(now, vehicle);
         self.note_rest(now, vehicle);
         self.judge_disarming(now, vehicle, params);

@@ -168,9 +168,9 @@ impl Mishap {
     fn take_shock(&mut self, at: Instant, load_g: f32, vehicle: &Vehicle, params: &Params) {
         if load_g.is_finite() && load_g > params.get(Param::MisImpact) {
             // What broke off a speed goes on while it bounces, or thrashes about.
-            let before = self.shock.and_then(|shock| match at.since(shock.at) <= BREAKS_OFF {
-                true => Some(shock),
-                false => shock.stopped.then_some(Shock { at, ..shock }),
+            let before = self.shock.and_then(|shock| {
+                let goes_on = at.since(shock.at) <= BREAKS_OFF;
+                if goes_on { Some(shock) } else { shock.stopped.then_some(Shock { at, ..shock }) }
             });
             let shock = before.unwrap_or(Shock {
                 at,

@@ -30,6 +30,8 @@ const STEP_MAX_S: f32 = 2.0;
 /// What is known of what carries it.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Support {
+    /// It is in the air.
+    pub(super) flies: bool,
     /// The part of the throttle that it hovers with, smoothed; 0 where it is not known.
     pub(super) hover_throttle: f32,
     /// How long it has hovered.
@@ -42,6 +44,7 @@ pub(super) struct Support {
 
 impl Support {
     pub(super) const NOTHING: Self = Self {
+        flies: false,
         hover_throttle: 0.0,
         hovered_s: 0.0,
         throttle_at: Instant::ZERO,
@@ -77,7 +80,7 @@ impl Mishap {
             self.driven_at = at;
         }
         let level = climb_mps(at, vehicle).is_some_and(|climb_mps| climb_mps.abs() < 1.0);
-        let hovers = level && part > IDLE_THROTTLE && self.flies && self.shock.is_none();
+        let hovers = level && part > IDLE_THROTTLE && self.support.flies && self.shock.is_none();
         self.support.take_throttle(at, part, hovers);
     }
 

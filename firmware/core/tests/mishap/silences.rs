@@ -270,7 +270,7 @@ fn a_sink_of_before_the_silence_is_no_sink_of_now() {
         // It came down, its battery was changed, and for a while it tells no more than heartbeats.
         let outcome = fly(&hovering(of), |ms, quad, motion| {
             motion.unheard = (4_000..24_000).contains(&ms);
-            motion.beats_only = ms >= 24_000 && ms < 27_000;
+            motion.beats_only = (24_000..27_000).contains(&ms);
             if ms < 4_000 {
                 (quad.climb, quad.height) = (-3.0, 20.0 - 0.003 * ms as f32);
             } else {
