@@ -254,7 +254,7 @@ impl Inertial {
 
     /// How far it lies over, in radians, once it has lain so for a moment: by the force that carries it.
     pub(crate) fn lies_over(&self, now: Instant) -> Option<f32> {
-        let lasts = self.is_fresh(now) && self.over_since.age(now).is_some_and(|age| age >= LIES);
+        let lasts = self.over_since.age(now).is_some_and(|age| age >= LIES) && self.is_fresh(now);
         let [x, y, z] = self.force;
         lasts.then(|| libm::atan2f(libm::sqrtf(x * x + y * y), -z))
     }

@@ -52,22 +52,23 @@ use crate::observation::VehicleKind;
 use crate::params::Params;
 use crate::time::{Instant, Span, Stamp};
 use crate::vehicle::Vehicle;
-use disarming::{Doubt, FALL_SHOWS, FALLING_MPS};
 use evidence::{
-    FRESH, FULL_THROTTLE, IDLE_THROTTLE, Lasting, Pressure, Recent, Shock, UNCARRIED, calls_itself_landed,
-    is_known, is_near_ground, is_tilted, on_rotors,
+    Doubt, FALL_SHOWS, FALLING_MPS, FRESH, FULL_THROTTLE, IDLE_THROTTLE, Lasting, Pressure, Recent, Shock,
+    Support, UNCARRIED, Unheard, calls_itself_landed, is_known, is_near_ground, is_tilted, on_rotors,
 };
-use silence::Unheard;
-use support::Support;
 
 /// How long after disarming it is watched.
 const WATCHED: Span = Span::from_secs(10);
+/// From 500 m at 4 m/s.
+const FALLS_AT_MOST: Span = Span::from_secs(120);
 /// A vehicle that still flies so long after the last thing seen goes on with its flight.
 const RECOVERED: Span = Span::from_secs(5);
 /// What lies over for so long after that, with its motors running, is down.
 const GIVEN_UP: Span = Span::from_secs(30);
 /// What was down and moves so long as what flies has taken off again.
 const TAKEN_OFF: Span = Span::from_secs(4);
+/// A shock stops something that was this fast.
+const IMPACT_MPS: f32 = 3.5;
 /// Legs take this from what comes down upright, at the fastest landing speeds that are set (2.5 m/s): harder is no landing.
 const LEGS_G: f32 = 4.0;
 const LEGS_MPS: f32 = 3.0;
@@ -162,8 +163,6 @@ pub struct Mishap {
     peak_m: f32,
     peak_at: Instant,
     rate: f32,
-    /// The last height above home while it was armed.
-    height_m: Option<f32>,
     support: Support,
     /// When it was armed with throttle last; zero for never.
     driven_at: Instant,
@@ -223,7 +222,6 @@ impl Mishap {
             peak_m: f32::NEG_INFINITY,
             peak_at: Instant::ZERO,
             rate: 0.0,
-            height_m: None,
             support: Support::NOTHING,
             driven_at: Instant::ZERO,
             stood: false,
@@ -248,7 +246,7 @@ impl Mishap {
     /// Whether it is to be seen within seconds if something happened: it was disarmed in the air, its speed broke off with a shock, or it
     /// is heard again after a silence.
     fn is_judged(&self) -> bool {
-        self.doubt.is_some() || self.shock.is_some_and(|shock| shock.stops_flight()) || self.is_heard_again()
+        self.doubt.is_some() || self.shock.is_some_and(|shock| shock.hit) || self.is_heard_again()
     }
 
     /// Whether other checks would only echo it.
@@ -315,7 +313,7 @@ impl Mishap {
     ) -> Option<Change> {
         self.note_arming(now, vehicle, flight, params);
         self.support.flies = flight.airborne() && self.state == State::Quiet;
-        self.note_support(now, vehicle);
+        self.note_support(now, vehicle, params);
         self.note_rest(now, vehicle);
         self.judge_disarming(now, vehicle, params);
         self.note_silence(now, vehicle, flight, params);
@@ -345,6 +343,9 @@ impl Mishap {
             }
             (State::Quiet, Some(kind)) => {
                 (self.worst, self.unheard_from) = ([0.0; Kind::COUNT], None);
+                if !self.armed {
+                    return None;
+                }
                 let told = core::mem::replace(&mut self.on_bench, true);
                 (!told).then_some(Change::OnBench(kind))
             }
@@ -374,6 +375,7 @@ impl Mishap {
                 self.calm();
             }
             (self.on_bench, self.disarmed_at, self.stood, self.heard_at) = (false, None, false, now);
+            self.support.forget();
             (self.doubt, self.first_at, self.unheard) = (None, None, None);
         }
         let beat_at = vehicle.heartbeat.at().unwrap_or(self.beat_at);
@@ -385,10 +387,10 @@ impl Mishap {
                 self.note_disarmed_first(now, vehicle);
             }
             beats_missed = beat_at.since(self.beat_at) > BEATS;
-            before_m = core::mem::replace(&mut self.beat_height_m, self.height_m);
+            before_m = core::mem::replace(&mut self.beat_height_m, height_m(now, vehicle));
             self.beat_at = beat_at;
         }
-        self.stood |= armed && vehicle.inertial.is_level(now);
+        self.stood = self.stood || (armed && vehicle.inertial.is_level(now));
         if self.armed && !armed {
             self.disarmed_at = Some(now);
             // The autopilot may have called it landed because it is disarmed.
@@ -437,8 +439,9 @@ impl Mishap {
 
     /// How far it lies over, in radians, what stood level while it was armed and turned since.
     fn lies_turned(&self, now: Instant, vehicle: &Vehicle) -> Option<f32> {
+        let over = vehicle.inertial.lies_over(now)?;
         let turned = self.stood && !vehicle.inertial.turns_little(now, DRIVEN);
-        vehicle.inertial.lies_over(now).filter(|_| turned && !is_fast(now, vehicle))
+        (turned && !is_fast(now, vehicle)).then_some(over)
     }
 
     fn was_driven(&self, now: Instant) -> bool {
@@ -503,10 +506,14 @@ impl Mishap {
             && shock.speed_mps < SKIDS_MPS
             && throttle(now, vehicle).is_none_or(|part| part < IDLE_THROTTLE);
         let hard = shock.load_g > LEGS_G || shock.sink_mps > LEGS_MPS;
-        let hit = (shock.stops_flight() && hard && !lands)
-            || (shock.dropped && shock.load_g > LEGS_G)
-            || (on_rotors(now, vehicle) && is_tilted(now, vehicle))
-            || self.lies_on_its_back(vehicle);
+        let stopped = shock.stopped && shock.speed_mps >= IMPACT_MPS && hard && !lands;
+        // What is disarmed when it is heard first may be knocked, and lie on its back for its battery.
+        let hit = stopped
+            || (self.first_at.is_none()
+                && ((shock.dropped && shock.load_g > LEGS_G)
+                    || (on_rotors(now, vehicle) && is_tilted(now, vehicle))
+                    || self.lies_on_its_back(vehicle)));
+        self.shock = Some(Shock { hit, ..shock });
         let rests = self.still_since.is_some_and(|since| since >= shock.at && now.since(since) >= STILL);
         if hit && rests && self.is_idle(now, vehicle) {
             self.touch_mps = self.touch_mps.max(shock.sink_mps);
@@ -545,7 +552,7 @@ impl Mishap {
             || (self.rests(now) && on_rotors(now, vehicle) && ((struck && lies) || (long && strayed)))
             || (self.is_still(now) && (self.is_idle(now, vehicle) || (long && near_ground)))
             || (long && (silent || self.is_supported(now)))
-            || (lies && on_rotors(now, vehicle) && now.since(last) >= GIVEN_UP)
+            || ((lies || (struck && slow)) && on_rotors(now, vehicle) && now.since(last) >= GIVEN_UP)
             || self.disarmed_at.is_some_and(|since| !self.armed && self.has_come_down(now, since, vehicle));
         if down {
             (self.state, self.flies_since) = (State::Down, None);
@@ -567,6 +574,9 @@ impl Mishap {
     /// Whether what was disarmed then has come down, by the air pressure: without thrust nothing stays where it is.
     fn has_come_down(&self, now: Instant, since: Instant, vehicle: &Vehicle) -> bool {
         let passed = now.since(since);
+        if passed >= FALLS_AT_MOST {
+            return true;
+        }
         let steady_for = self.pressure.steady_for(now).map(|span| if span < passed { span } else { passed });
         match steady_for {
             Some(span) => span >= if on_rotors(now, vehicle) { FALL_SHOWS } else { WATCHED },

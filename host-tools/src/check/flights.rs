@@ -170,7 +170,7 @@ impl Flights {
     pub(super) fn landing(&mut self) {
         let crashed = std::mem::take(&mut self.crashed);
         if let Some(flight) = self.list.last_mut().filter(|_| self.open) {
-            flight.landed = !crashed && !self.unseen && flight.disarmed_at_m.is_none();
+            flight.landed = !crashed && !self.unseen;
         }
         self.close();
     }
@@ -238,6 +238,10 @@ impl Flights {
     /// All has ended.
     pub(super) fn end(mut self, monitor: &Monitor) -> Vec<Flight> {
         self.end_of_recording(monitor);
+        // Its fall may go on after the recording.
+        for flight in self.list.iter_mut().filter(|flight| flight.disarmed_at_m.is_some()) {
+            flight.landed = false;
+        }
         self.list
     }
 }

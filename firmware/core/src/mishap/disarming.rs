@@ -1,36 +1,20 @@
 //! Whether what was disarmed, or terminated, was so in the air.
 
-use super::evidence::{BREAKS_OFF, FRESH, Recent, calls_itself_landed, on_rotors};
-use super::{Kind, LIES_FOR, Mishap, STILL, STILL_MPS};
+use super::evidence::{
+    BREAKS_OFF, Doubt, FALL_SHOWS, FALLING_MPS, FRESH, Recent, calls_itself_landed, on_rotors,
+};
+use super::{BEATS, Kind, LIES_FOR, Mishap, STILL, STILL_MPS};
 use crate::motion::{climb_mps, ground_speed_mps};
 use crate::params::{Param, Params};
-use crate::time::{Instant, Span};
+use crate::time::Instant;
 use crate::vehicle::Vehicle;
 
-/// How long it is seen whether what was disarmed falls.
-pub(super) const FALL_SHOWS: Span = Span::from_secs(3);
+/// What is lower by so much fell.
 const FALLEN_M: f32 = 2.0;
-/// What was disarmed and moves so fast is in the air: sinking, and on wings over ground.
-pub(super) const FALLING_MPS: f32 = 2.5;
+/// On wings, over ground.
 const GLIDING_MPS: f32 = 8.0;
 /// What was terminated falls so fast some seconds later, by the air pressure alone.
 const DROPS_MPS: f32 = 10.0;
-
-/// Disarmed or terminated out of a flight, or terminated when it was heard first.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Doubt {
-    since: Instant,
-    /// Above home, where that is known.
-    pub(super) height_m: Option<f32>,
-    /// Above mean sea level.
-    altitude_m: Option<f32>,
-    /// Nothing has carried it since.
-    pub(super) uncarried: bool,
-    /// Its flight was terminated while nobody listened: the fall may be over.
-    unseen: bool,
-    /// It stood still and level since, or nobody saw it fly.
-    stood: bool,
-}
 
 impl Mishap {
     /// Its motors went off, by a heartbeat before which others may have been missed; its height was this.
@@ -45,7 +29,11 @@ impl Mishap {
         // Below home there is air too, over a valley. A height that nobody knows may be any, but on wings a landing rolls on.
         let limit_m = params.get(Param::MisDisarm);
         let high = height_m.map_or(on_rotors(now, vehicle), |height_m| height_m.abs() > limit_m);
-        if high || self.sink.greatest(now) > FALLING_MPS {
+        // What has landed idles for a while before an autopilot disarms it.
+        let had_thrust = self.driven_at == Instant::ZERO || now.since(self.driven_at) <= BEATS;
+        if (high && (had_thrust || beats_missed || self.is_uncarried()))
+            || self.sink.greatest(now) > FALLING_MPS
+        {
             self.doubt = Some(Doubt {
                 since: now,
                 height_m,
@@ -87,7 +75,7 @@ impl Mishap {
         if stands {
             doubt.unseen = false;
             // A hover just before the word is level and slow too.
-            doubt.stood |= now.since(since) >= STILL;
+            doubt.stood |= self.felt_at.since(since) >= STILL;
         }
         let doubt = *doubt;
         let over = now.since(since) > FALL_SHOWS;
@@ -105,7 +93,7 @@ impl Mishap {
         let falls =
             sink_mps > params.get(Param::MisSink) && self.pressure.agrees(now, sink_mps) == Some(true);
         if falls && now.since(since) > Recent::WINDOW {
-            self.see(now, Kind::Disarmed, self.height_m.unwrap_or(0.0), params);
+            self.see(now, Kind::Disarmed, 0.0, params);
         } else if now.since(since) > FALL_SHOWS {
             self.first_at = None;
         }

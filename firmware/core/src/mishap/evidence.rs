@@ -21,11 +21,20 @@ pub(super) const BROKEN_OFF: f32 = 0.4;
 pub(super) const BREAKS_OFF: Span = Span::from_secs(1);
 /// Near the ground.
 const HPA_PER_METRE: f32 = 0.12;
-/// A shock stops something that was this fast.
-const IMPACT_MPS: f32 = 3.5;
 /// Below this throttle nothing flies; above [`FULL_THROTTLE`] nobody asks to sink, and what is still does not fly.
 pub(super) const IDLE_THROTTLE: f32 = 0.1;
 pub(super) const FULL_THROTTLE: f32 = 0.9;
+
+/// How long it is seen whether what was disarmed falls.
+pub(super) const FALL_SHOWS: Span = Span::from_secs(3);
+/// What was disarmed and moves so fast sinks through the air.
+pub(super) const FALLING_MPS: f32 = 2.5;
+
+/// The throttle of a hover is known after so long in it, s; and its time constant, s.
+pub(super) const LEARNT_S: f32 = 10.0;
+const HOVER_S: f32 = 10.0;
+/// Throttles come more often than this, s.
+const STEP_MAX_S: f32 = 2.0;
 
 /// Below this part of the throttle that it hovers with, a fall is what the throttle asks for, and what does not fall stands.
 pub(super) const THRUST_PART: f32 = 0.5;
@@ -121,7 +130,9 @@ impl Pressure {
 
     pub(super) fn take(&mut self, at: Instant, hpa: f32) {
         if at.since(self.window) >= Self::WINDOW {
-            (self.before_hpa, self.began_hpa, self.window) = (self.began_hpa, hpa, at);
+            let goes_on = at.since(self.window) <= FRESH;
+            let before_hpa = if goes_on { self.began_hpa } else { 0.0 };
+            (self.before_hpa, self.began_hpa, self.window) = (before_hpa, hpa, at);
         }
         if hpa.to_bits() != self.now_hpa.to_bits() {
             self.changed_at = at;
@@ -131,6 +142,11 @@ impl Pressure {
         if self.before_hpa > 0.0 && hpa > self.before_hpa + HPA_PER_METRE * Self::PARACHUTE_MPS {
             self.rose_at = at;
         }
+    }
+
+    /// When it rose last as it does under a parachute.
+    pub(super) const fn rose_at(&self) -> Instant {
+        self.rose_at
     }
 
     /// How long it has not risen as it does under a parachute; `None` where there is no pressure, or one that never changes.
@@ -181,14 +197,113 @@ pub(super) struct Shock {
     pub(super) sink_mps: f32,
     /// The speed broke off.
     pub(super) stopped: bool,
+    /// It hit something, if it lies still soon.
+    pub(super) hit: bool,
     /// Little carried it just before.
     pub(super) dropped: bool,
 }
 
-impl Shock {
-    /// It stopped what was too fast for a landing.
-    pub(super) fn stops_flight(&self) -> bool {
-        self.stopped && self.speed_mps >= IMPACT_MPS
+/// Disarmed or terminated out of a flight, or terminated when it was heard first.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Doubt {
+    pub(super) since: Instant,
+    /// Above home, where that is known.
+    pub(super) height_m: Option<f32>,
+    /// Above mean sea level.
+    pub(super) altitude_m: Option<f32>,
+    /// Nothing has carried it since.
+    pub(super) uncarried: bool,
+    /// Its flight was terminated while nobody listened: the fall may be over.
+    pub(super) unseen: bool,
+    /// It stood still and level since, or nobody saw it fly.
+    pub(super) stood: bool,
+}
+
+/// The vehicle was not heard, in the air.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Unheard {
+    /// When it was heard last; with what a recording lost meanwhile, in which no time passed here, taken off.
+    pub(super) from: Instant,
+    /// The same without that.
+    pub(super) last_heard_at: Instant,
+    /// When it was heard again.
+    pub(super) again_at: Option<Instant>,
+    /// When its forces and its place were heard again, or the first of them where it tells no other.
+    pub(super) state_known_at: Option<Instant>,
+    /// It is disarmed, or calls itself landed, since.
+    pub(super) calls_itself_down: bool,
+    /// When it did last what is no sign of a crash, since it is heard again.
+    pub(super) no_sign_at: Instant,
+    /// Its height above mean sea level, and its sink, when it was heard last.
+    pub(super) altitude_m: Option<f32>,
+    pub(super) sink_mps: f32,
+}
+
+impl Unheard {
+    /// How long it was not heard.
+    pub(super) fn lasted(&self, now: Instant) -> Span {
+        self.again_at.unwrap_or(now).since(self.from)
+    }
+
+    /// The shortest time in which what flies by itself comes down so far, stands and is disarmed: from its sink to the fastest descent that
+    /// can be set, or its own if that was faster, as gently as autopilots do, the last metres no faster than legs take, and disarmed when
+    /// its autopilot has seen for so long that it stands (`ArduPilot` 1 s, PX4 longer).
+    pub(super) fn least_s(&self, lost_m: f32, limit_mps: f32, armed: bool) -> f32 {
+        const SEES_S: f32 = 1.0;
+        const LAST_M: f32 = 5.0;
+        const LAST_MPS: f32 = 2.5;
+        const GENTLY_MPS2: f32 = 2.0;
+        let last_m = lost_m.min(LAST_M);
+        let fastest_mps = limit_mps.max(self.sink_mps);
+        let faster_mps = fastest_mps - self.sink_mps.max(0.0);
+        let sees_s = if armed { 0.0 } else { SEES_S };
+        last_m / LAST_MPS + (lost_m - last_m) / fastest_mps + faster_mps / (2.0 * GENTLY_MPS2) + sees_s
+    }
+}
+
+/// What is known of what carries it.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Support {
+    /// It is in the air.
+    pub(super) flies: bool,
+    /// The part of the throttle that it hovers with, smoothed; 0 where it is not known.
+    pub(super) hover_throttle: f32,
+    /// How long it has hovered.
+    pub(super) hovered_s: f32,
+    pub(super) throttle_at: Instant,
+    /// Since when something carries it that is not its rotors, and the pressure then, hPa.
+    pub(super) since: Stamp,
+    pub(super) hpa: f32,
+}
+
+impl Support {
+    pub(super) const NOTHING: Self = Self {
+        flies: false,
+        hover_throttle: 0.0,
+        hovered_s: 0.0,
+        throttle_at: Instant::ZERO,
+        since: Stamp::NONE,
+        hpa: 0.0,
+    };
+
+    /// It is armed anew, perhaps with another payload.
+    pub(super) fn forget(&mut self) {
+        self.hovered_s = 0.0;
+    }
+
+    /// A throttle came, while it hovers or not.
+    pub(super) fn take_throttle(&mut self, at: Instant, part: f32, hovers: bool) {
+        let step_s = at.since(core::mem::replace(&mut self.throttle_at, at)).as_secs_f32().min(STEP_MAX_S);
+        if hovers {
+            let weight = if self.hover_throttle > 0.0 { step_s / (HOVER_S + step_s) } else { 1.0 };
+            self.hover_throttle += weight * (part - self.hover_throttle);
+            self.hovered_s += step_s;
+        }
+    }
+
+    /// Whether this throttle carries less than half of the weight.
+    pub(super) fn is_little(&self, part: f32) -> bool {
+        part < THRUST_PART * self.hover_throttle
     }
 }
 

@@ -20,6 +20,8 @@ const UNCARRIED_G: f32 = 0.5;
 /// What falls is carried by less than this for so long: nobody asks a multicopter to sink so hard, and so short before a touch.
 const DROPS_G: f32 = 0.65;
 const DROPS: Span = Span::from_millis(300);
+/// What broke off a speed thrashes about for so long at most.
+const THRASHES: Span = Span::from_secs(8);
 /// Tumbling and sinking last so long at least.
 const TUMBLES: Span = Span::from_millis(500);
 const TUMBLES_ON_WINGS: Span = Span::from_millis(1_500);
@@ -119,7 +121,10 @@ impl Mishap {
         let value = value.max(params.get(kind.limit()).next_up());
         let worst = &mut self.worst[kind as usize];
         *worst = worst.max(value);
-        self.seen.get_or_insert(kind);
+        // What was disarmed in the air may tumble.
+        if self.seen.is_none() || kind == Kind::Disarmed {
+            self.seen = Some(kind);
+        }
         if let State::Going(last) = &mut self.state {
             *last = at;
         }
@@ -170,7 +175,8 @@ impl Mishap {
             // What broke off a speed goes on while it bounces, or thrashes about.
             let before = self.shock.and_then(|shock| {
                 let goes_on = at.since(shock.at) <= BREAKS_OFF;
-                if goes_on { Some(shock) } else { shock.stopped.then_some(Shock { at, ..shock }) }
+                let thrashes = shock.stopped && at.since(self.hit_at) <= THRASHES;
+                if goes_on { Some(shock) } else { thrashes.then_some(Shock { at, ..shock }) }
             });
             let shock = before.unwrap_or(Shock {
                 at,
@@ -178,6 +184,7 @@ impl Mishap {
                 speed_mps: if is_believed(vehicle, params) { self.speed.greatest(at) } else { 0.0 },
                 sink_mps: self.sink.greatest(at),
                 stopped: false,
+                hit: false,
                 dropped: self.shock.is_some_and(|shock| shock.dropped)
                     || (self.load_g < DROPS_G
                         && at.since(self.carried_at) >= DROPS
@@ -244,9 +251,6 @@ impl Mishap {
             shock.stopped |= speed_mps < BROKEN_OFF * shock.speed_mps;
         }
         self.speed.take(at, speed_mps);
-        if vehicle.armed() {
-            self.height_m = height_m(at, vehicle);
-        }
         // What breaks off in a mishap is the touch, where the estimate is not lost.
         let goes = matches!(self.state, State::Going(_));
         let lost = goes && self.has_strayed(at);
@@ -272,11 +276,11 @@ impl Mishap {
         let least = if on_wings { FULL_ON_WINGS } else { FULL_THROTTLE };
         let full = throttle(at, vehicle).is_some_and(|part| part >= least);
         let by_hand = has_pilots_throttle(vehicle);
-        let told_to = by_hand || is_told_to_sink(at, sink_mps, limit_mps, vehicle);
+        let told_to = || by_hand || is_told_to_sink(at, sink_mps, limit_mps, vehicle);
         let lost_m = self.lose_height(at, full && !by_hand && !is_told_to_bank(at, vehicle), vehicle);
         let sinks = match vehicle.hovers(at) {
             // It descends as it is told to, but not with all its thrust.
-            Some(true) => (sink_mps > limit_mps && (full || !told_to)) || lost_m > LOST_M,
+            Some(true) => (sink_mps > limit_mps && (full || !told_to())) || lost_m > LOST_M,
             Some(false) => lost_m > LOST_M,
             None => false,
         };

@@ -1,6 +1,8 @@
 //! What flew, was not heard for a while, and is heard again: whether it came down meanwhile as nothing lands.
 
-use super::evidence::{FRESH, FULL_THROTTLE, IDLE_THROTTLE, calls_itself_landed, is_near_ground, on_rotors};
+use super::evidence::{
+    FRESH, FULL_THROTTLE, IDLE_THROTTLE, Unheard, calls_itself_landed, is_near_ground, on_rotors,
+};
 use super::{Kind, Mishap, STILL, STILL_MPS, STILL_RATE, State, is_fast};
 use crate::flight::Flight;
 use crate::modes::has_pilots_throttle;
@@ -18,48 +20,6 @@ const SIGN_LASTS: Span = Span::from_millis(500);
 const STARTS: Span = Span::from_secs(20);
 /// What came down so far is not where it flew.
 const CAME_DOWN_M: f32 = 3.0;
-
-/// The vehicle was not heard, in the air.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Unheard {
-    /// When it was heard last; with what a recording lost meanwhile, in which no time passed here, taken off.
-    from: Instant,
-    /// The same without that.
-    last_heard_at: Instant,
-    /// When it was heard again.
-    pub(super) again_at: Option<Instant>,
-    /// When its forces and its place were heard again, or the first of them where it tells no other.
-    state_known_at: Option<Instant>,
-    /// It is disarmed, or calls itself landed, since.
-    pub(super) calls_itself_down: bool,
-    /// When it did last what is no sign of a crash, since it is heard again.
-    no_sign_at: Instant,
-    /// Its height above mean sea level, and its sink, when it was heard last.
-    altitude_m: Option<f32>,
-    sink_mps: f32,
-}
-
-impl Unheard {
-    /// How long it was not heard.
-    fn lasted(&self, now: Instant) -> Span {
-        self.again_at.unwrap_or(now).since(self.from)
-    }
-
-    /// The shortest time in which what flies by itself comes down so far, stands and is disarmed: from its sink to the fastest descent that
-    /// can be set, or its own if that was faster, as gently as autopilots do, the last metres no faster than legs take, and disarmed when
-    /// its autopilot has seen for so long that it stands (`ArduPilot` 1 s, PX4 longer).
-    fn least_s(&self, lost_m: f32, limit_mps: f32, armed: bool) -> f32 {
-        const SEES_S: f32 = 1.0;
-        const LAST_M: f32 = 5.0;
-        const LAST_MPS: f32 = 2.5;
-        const GENTLY_MPS2: f32 = 2.0;
-        let last_m = lost_m.min(LAST_M);
-        let fastest_mps = limit_mps.max(self.sink_mps);
-        let faster_mps = fastest_mps - self.sink_mps.max(0.0);
-        let sees_s = if armed { 0.0 } else { SEES_S };
-        last_m / LAST_MPS + (lost_m - last_m) / fastest_mps + faster_mps / (2.0 * GENTLY_MPS2) + sees_s
-    }
-}
 
 impl Mishap {
     /// Whether it is heard again after a silence, and not yet seen how it is.

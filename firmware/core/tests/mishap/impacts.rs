@@ -370,8 +370,40 @@ fn what_stands_with_little_throttle_flies_no_more_whatever_its_estimate_says() {
             fly(&hovering(of), |ms, quad, motion| stands_with_a_lost_estimate(ms, quad, motion, 0.12));
         assert!(stands.told().is_empty(), "{of:?}: {:?}", stands.told());
         assert_eq!(stands.flights(), (1, u32::from(is_multicopter), 0), "{of:?}");
+        // It came down at 7 m/s for five seconds.
+        let flew_into_it = fly(&hovering(of), |ms, quad, motion| {
+            stands_with_a_lost_estimate(ms, quad, motion, 0.12);
+            let falls_m = 0.007 * ms.min(5_000) as f32;
+            motion.load_g = 1.4;
+            motion.pressure_hpa = motion.pressure_hpa.map(|hpa| hpa + 0.12 * falls_m);
+        });
+        let told = if is_multicopter { vec!["impact"] } else { Vec::new() };
+        assert_eq!(
+            (flew_into_it.told(), flew_into_it.flights().2),
+            (told, u32::from(is_multicopter)),
+            "{of:?}"
+        );
         let hovers =
             fly(&hovering(of), |ms, quad, motion| stands_with_a_lost_estimate(ms, quad, motion, 0.3));
         assert_eq!(hovers.flights(), (1, 0, 0), "{of:?}");
+    }
+}
+
+#[test]
+fn shaking_that_goes_on_is_no_impact_that_goes_on() {
+    for of in ROTORS {
+        let outcome = fly(&hovering(of), |ms, quad, motion| {
+            // It brakes with a jolt, shakes on, and lands half a minute later.
+            motion.ground_mps = if ms < 500 { 4.0 } else { 1.0 };
+            let jolts = ms >= 500 && ms < 31_000 && ms % 2_000 < 50;
+            motion.load_g = if jolts { 4.2 } else { 1.0 };
+            if ms >= 30_000 {
+                (quad.height, quad.throttle, quad.climb) = (0.1, 0.0, 0.0);
+                (motion.ground_mps, motion.rates) = (0.0, [0.0; 3]);
+                quad.landed = Some(LandedState::OnGround);
+                quad.armed = ms < 33_000;
+            }
+        });
+        assert!(outcome.told().is_empty() && outcome.flights() == (1, 1, 0), "{of:?}: {:?}", outcome.changes);
     }
 }

@@ -293,3 +293,29 @@ fn what_hits_the_ground_disarmed_when_it_is_heard_first_is_an_impact() {
         assert_eq!(hits.told(), ["impact"], "{of:?}: {:?}", hits.changes);
     }
 }
+
+#[test]
+fn what_tumbles_and_falls_disarmed_when_it_is_heard_first_is_told_as_disarmed() {
+    for of in ROTORS {
+        let falls = fly_from(0, &Quad { armed: false, throttle: 0.0, ..hovering(of) }, |ms, quad, motion| {
+            let down_m = 9.0 * ms.min(3_000) as f32 / 1_000.0;
+            (quad.climb, quad.height) = if ms < 3_000 { (-9.0, 30.0 - down_m) } else { (0.0, 0.0) };
+            motion.rates = if ms < 3_000 { [7.0, 0.0, 0.0] } else { [0.0; 3] };
+            motion.pressure_hpa = Some(980.0 + 0.12 * down_m + (ms / 50 % 3) as f32 * 0.01);
+        });
+        assert!(falls.told().contains(&"disarmed_in_air"), "{of:?}: {:?}", falls.told());
+    }
+}
+
+#[test]
+fn what_is_knocked_about_on_its_back_when_it_is_heard_first_is_none() {
+    for of in ROTORS {
+        let bench = Quad { armed: false, throttle: 0.0, start_height: 0.0, height: 0.0, ..hovering(of) };
+        let knocked = fly_from(0, &bench, |ms, quad, motion| {
+            quad.height = 0.0;
+            motion.load_g = if (1_000..1_050).contains(&ms) { 5.0 } else { -1.0 };
+            (motion.ground_mps, motion.rates) = (0.0, [0.0; 3]);
+        });
+        assert!(knocked.told().is_empty() && knocked.changes.is_empty(), "{of:?}: {:?}", knocked.changes);
+    }
+}
