@@ -49,9 +49,9 @@ pub(crate) struct Pull {
     count: u16,
     mean: [f32; 3],
     mean_at: Stamp,
-    /// What they made of the velocity since the receiver's last one, and between the two before, m/s.
+    /// What they made of the velocity since the receiver's last one, m/s, and their mean between the two before, m/s2.
     gained: [f32; 3],
-    gained_before: Option<[f32; 3]>,
+    force_before: Option<[f32; 3]>,
     /// The last velocity, m/s; when it came, where it is compared.
     velocity: [f32; 3],
     at: Stamp,
@@ -69,7 +69,7 @@ impl Pull {
         mean: [0.0; 3],
         mean_at: Stamp::NONE,
         gained: [0.0; 3],
-        gained_before: None,
+        force_before: None,
         velocity: [0.0; 3],
         at: Stamp::NONE,
         force: [0.0; 3],
@@ -81,10 +81,12 @@ impl Pull {
         if !force.iter().all(|axis| axis.abs() <= FORCE_MAX) {
             return;
         }
+        // On the ground nothing takes them.
+        let Some(count) = self.count.checked_add(1) else { return };
+        self.count = count;
         for (sum, axis) in self.sum.iter_mut().zip(force) {
             *sum += axis;
         }
-        self.count = self.count.saturating_add(1);
     }
 
     pub(crate) fn step(&mut self, now: Instant, step_s: f32, vehicle: &Vehicle) {
@@ -137,20 +139,22 @@ impl Pull {
     /// down, m/s2.
     fn take_velocity(&mut self, step: Option<Span>, velocity: [f32; 3], axes: usize) -> Option<f32> {
         let before = core::mem::replace(&mut self.velocity, velocity);
-        let gained_now = core::mem::take(&mut self.gained);
+        let gained = core::mem::take(&mut self.gained);
         let Some(step_s) = step.map(Span::as_secs_f32) else {
             // Nobody knows since when the forces before it were summed.
-            (self.gained_before, self.force, self.missing) = (None, [0.0; 3], [0.0; 3]);
+            (self.force_before, self.force, self.missing) = (None, [0.0; 3], [0.0; 3]);
             return None;
         };
-        let Some(gained_before) = self.gained_before.replace(gained_now) else {
-            self.force = gained_now.map(|gained| gained / step_s);
+        // Steps are not alike: messages are lost, and what repeats itself is left out.
+        let force_now = gained.map(|gained| gained / step_s);
+        let Some(force_before) = self.force_before.replace(force_now) else {
+            self.force = force_now;
             return None;
         };
         let weight = step_s / (SMOOTHING_S + step_s);
         let mut changes = [0.0; 3];
         for axis in 0..axes {
-            let force = f32::midpoint(gained_before[axis], gained_now[axis]) / step_s;
+            let force = f32::midpoint(force_before[axis], force_now[axis]);
             let missing = (force - (velocity[axis] - before[axis]) / step_s).clamp(-LEAP_MPS2, LEAP_MPS2);
             self.missing[axis] += weight * (missing - self.missing[axis]);
             self.force[axis] += weight * (force - self.force[axis]);
@@ -205,6 +209,32 @@ mod tests {
             most = most.max(missing.unwrap_or(0.0));
         }
         assert!(most < 0.6, "{most}");
+    }
+
+    #[test]
+    fn velocities_that_come_in_unequal_steps_show_as_much_as_others() {
+        let missing = |untrue_mps2: f32| {
+            let mut pull = Pull::NEW;
+            // Some are lost, or repeat themselves; it speeds up by 5 m/s2 throughout.
+            let missing = (0..60_usize).map(|step| {
+                let step_s = [0.2, 0.4, 0.2][step % 3];
+                pull.gained = [(5.0 + untrue_mps2) * step_s, 0.0, 0.0];
+                let told = pull.velocity[0] + 5.0 * step_s;
+                let step = (step > 0).then_some(Span::from_millis((step_s * 1_000.0) as u64));
+                pull.take_velocity(step, [told, 0.0, 0.0], 3)
+            });
+            missing.skip(30).flatten().collect::<Vec<_>>()
+        };
+        assert!(missing(0.0).iter().all(|missing| *missing < 0.01), "{:?}", missing(0.0));
+        assert!(missing(2.0).iter().all(|missing| (1.9..2.1).contains(missing)), "{:?}", missing(2.0));
+    }
+
+    #[test]
+    fn forces_that_nothing_takes_for_hours_are_summed_no_more() {
+        let mut pull = Pull::NEW;
+        (0..200_000).for_each(|_| pull.take_force([0.0, 0.0, -9.8]));
+        let mean = pull.sum[2] / f32::from(pull.count);
+        assert!((-9.9..-9.7).contains(&mean), "{mean}");
     }
 
     #[test]
