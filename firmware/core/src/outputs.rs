@@ -296,31 +296,31 @@ impl MotorOutputs {
         };
         let spread = self.share.iter().take(count).map(Departure::spread).sum::<f32>() / count as f32;
         let alone = ((first.0 - second.0) - (second.0 - lowest.0)) / part;
-        let stands_out = (alone - SPREADS * spread / part).max(self.summed(alone, first.1, step_s));
+        let (now, (summed, sum)) = (alone - SPREADS * spread / part, self.sum(alone, first.1, step_s));
+        // What stands out over time goes on doing so while another one does for a moment.
+        let (place, stands_out) = if sum > now { (summed, sum) } else { (first.1, now) };
         if !self.is_known() || stands_out < HOLD_PERCENT {
             self.share.iter_mut().for_each(|share| share.learn(step_s));
         }
         // Opposite to one that is driven alone, one idles: that is the balance, and no fault of its own.
         let out = (0_u8..).zip(&self.share).take(count).find(|(_, share)| share.figure() < OUT_PERCENT);
         let out = out.filter(|_| !self.is_known() || stands_out < HOLD_PERCENT);
-        let weak = (first.1, stands_out.min(OFF_PERCENT.next_down()));
+        let weak = (place, stands_out.min(OFF_PERCENT.next_down()));
         self.alone = out.map_or(weak, |(place, _)| (place, OFF_PERCENT));
     }
 
-    /// What the motor that stands out most has stood out by over time.
-    fn summed(&mut self, alone: f32, motor: u8, step_s: f32) -> f32 {
-        if !self.is_known() {
-            return 0.0;
+    /// The motor that has stood out over time, and by how much.
+    fn sum(&mut self, alone: f32, motor: u8, step_s: f32) -> (u8, f32) {
+        if self.is_known() {
+            let (place, sum) = &mut self.summed;
+            if *sum <= 0.0 {
+                *place = motor;
+            }
+            // That another one stands out speaks against it.
+            let beyond = if *place == motor { alone } else { -alone.max(0.0) } - DRIFT_PERCENT;
+            *sum = (*sum + beyond * step_s / SUMMED_S).clamp(0.0, SUM_MAX_PERCENT);
         }
-        let (place, sum) = &mut self.summed;
-        if *sum <= 0.0 {
-            *place = motor;
-        }
-        let is_same = *place == motor;
-        // That another one stands out speaks against it.
-        let beyond = if is_same { alone } else { -alone.max(0.0) } - DRIFT_PERCENT;
-        *sum = (*sum + beyond * step_s / SUMMED_S).clamp(0.0, SUM_MAX_PERCENT);
-        if is_same { *sum } else { 0.0 }
+        self.summed
     }
 
     /// All learn together.
@@ -377,3 +377,41 @@ fn motors(vehicle: &Vehicle) -> usize {
 }
 
 const _: () = assert!(JUDGED_MAX <= MOTORS_MAX);
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const STEP_S: f32 = 0.2;
+
+    /// What is said of the motors of a flat octocopter whose first motor lost so much of its thrust, percent, in 60 s; another one is given
+    /// more for one message of seven.
+    fn octocopter(lost: f32) -> Vec<(u8, f32)> {
+        let mut outputs = MotorOutputs::new();
+        let steps = 0..350_usize;
+        let judged = steps.map(|step| {
+            let mut figures = [0.0; JUDGED_MAX];
+            if step >= 50 {
+                // The projection of one motor on thrust, roll, pitch and yaw.
+                figures = [0.5, 0.177, 0.25, -0.177, 0.0, -0.177, 0.25, 0.177].map(|part| part * lost);
+                if step.is_multiple_of(7) {
+                    figures[3] = 0.6 * lost;
+                }
+            }
+            for (share, figure) in outputs.share.iter_mut().zip(figures) {
+                share.follow(figure, STEP_S, 0.0);
+            }
+            outputs.judge(JUDGED_MAX, STEP_S);
+            outputs.alone
+        });
+        judged.skip(50).collect()
+    }
+
+    #[test]
+    fn a_motor_that_was_weak_for_long_is_weak_while_another_one_stands_out_for_a_moment() {
+        let judged = octocopter(8.0);
+        let last = &judged[150..];
+        assert!(last.iter().all(|(motor, percent)| *motor == 0 && *percent > 8.0), "{last:?}");
+        assert!(octocopter(2.0).iter().all(|(_, percent)| *percent < 4.0), "it is hardly weak");
+    }
+}
