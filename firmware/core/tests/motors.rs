@@ -4,6 +4,7 @@ mod common;
 
 use common::{AUTOPILOT, Quad};
 use hums_core::Monitor;
+use hums_core::health::Level;
 use hums_core::observation::{
     Attitude, Esc, EscGroup, LandedState, MOTORS_MAX, Observation, Outputs, VehicleKind, VtolState,
 };
@@ -65,6 +66,32 @@ fn flies(vehicle: &Quad, speeds: &[f32], yaw_rate: f32) -> Vec<(&'static str, u8
 /// What ESCs say that tell nothing but their currents.
 fn escs_of(currents: &[f32]) -> Vec<Esc> {
     currents.iter().map(|current| Esc { current: Some(Amperes(*current)), ..Esc::default() }).collect()
+}
+
+#[test]
+fn an_esc_whose_messages_come_once_a_second_is_silent_after_five_of_them() {
+    let told = |lost: u64| {
+        let mut monitor = Monitor::new(Params::defaults());
+        let mut findings = Vec::new();
+        for now_ms in (0..60_000).step_by(100) {
+            let now = Instant::from_millis(now_ms);
+            let quad = Quad::healthy();
+            let second = |escs| Observation::Escs(EscGroup { first: 4, escs });
+            let is_heard = now_ms % 1_000 == 0 && !(30_000..30_000 + 1_000 * lost).contains(&now_ms);
+            for said in quad.says(now_ms).into_iter().chain(is_heard.then_some(second(quad.escs))) {
+                monitor.observe(now, AUTOPILOT, &said);
+            }
+            let link = LinkReading { frames_lost: Some(0.0), at: now };
+            monitor.tick(now, &link, &quad.recorder, &mut |finding| {
+                if finding.check == "esc_silent" && finding.level == Level::Critical {
+                    findings.push(((now_ms - 29_000) / 1_000, finding.instance));
+                }
+            });
+        }
+        findings
+    };
+    assert_eq!(told(4), []);
+    assert_eq!(told(6), [(5, 4), (5, 5), (5, 6), (5, 7)]);
 }
 
 #[test]
