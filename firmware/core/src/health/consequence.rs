@@ -93,10 +93,10 @@ const ROWS: &[(&[&str], &[&str])] = &[
     (&["gps_fix", "gps_jamming", "gps_spoofing", "gps_stuck", "gps_speed", "gps_height"], &["imu_gps"]),
     (
         &["accel_stuck", "gyro_stuck", "accel_alert", "gyro_alert", "accel_mismatch", "gyro_mismatch"],
-        &["imu_gps"],
+        &["imu_gps", "gnss_alert", "vibration_alert"],
     ),
     // ArduPilot's word on vibration goes by the same innovations.
-    (&["vibration", "vibration_px4", "clipping"], &["imu_gps"]),
+    (&["vibration", "vibration_px4", "clipping"], &["imu_gps", "gnss_alert"]),
     (&["imu_gps"], &["gnss_alert", "baro_noise", "vibration_alert"]),
     (&["compass_stuck", "compass_alert"], &["compass_mismatch"]),
     (&["gyro_stuck", "gyro_alert"], &["gyro_mismatch"]),
@@ -310,6 +310,13 @@ mod tests {
         assert_eq!(why_of("imu_gps", Level::Warning, &[("vibration", Level::Warning)]), Some("vibration"));
         let both = [imu, ("gps_stuck", Level::Warning)];
         assert_eq!(why_of("gnss_alert", Level::Warning, &both), Some("gps_stuck"));
+    }
+
+    #[test]
+    fn what_moves_the_estimator_explains_that_the_autopilot_doubts_its_receiver() {
+        for cause in ["accel_alert", "gyro_stuck", "vibration", "imu_gps"] {
+            assert_eq!(why_of("gnss_alert", Level::Warning, &[(cause, Level::Warning)]), Some(cause));
+        }
     }
 
     #[test]
