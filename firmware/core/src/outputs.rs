@@ -109,12 +109,13 @@ impl Range {
 
     /// Which part of it an output is.
     fn part(self, output: u16) -> f32 {
-        let (zero, whole) = match self {
-            Self::Pulses => (1_000, 1_000.0),
-            Self::DShot => (0, 1_999.0),
-            Self::Can => (0, 8_191.0),
+        // Dividing is dear.
+        let (zero, of_whole) = match self {
+            Self::Pulses => (1_000, 1.0 / 1_000.0),
+            Self::DShot => (0, 1.0 / 1_999.0),
+            Self::Can => (0, 1.0 / 8_191.0),
         };
-        f32::from(output.saturating_sub(zero)) / whole
+        f32::from(output.saturating_sub(zero)) * of_whole
     }
 }
 
@@ -139,10 +140,10 @@ pub(crate) struct MotorOutputs {
     /// The motor that has stood out over time, and by how much, percent for [`SUMMED_S`].
     summed: (u8, f32),
     /// The motor that stands out, and how far, percent.
-    alone: (u8, f32),
+    excess: (u8, f32),
     /// The flight began before it was heard, or its outputs were: what was heard first, which outputs moved since (a bit each), and since
     /// when one output alone is at an end of its range.
-    began_unseen: bool,
+    takeoff_not_recorded: bool,
     first: [u16; JUDGED_MAX],
     moved: u8,
     at_end_since: Stamp,
@@ -162,8 +163,8 @@ impl MotorOutputs {
             share: [Departure::NEW; JUDGED_MAX],
             at: Stamp::NONE,
             summed: (0, 0.0),
-            alone: (0, 0.0),
-            began_unseen: false,
+            excess: (0, 0.0),
+            takeoff_not_recorded: false,
             first: [0; JUDGED_MAX],
             moved: 0,
             at_end_since: Stamp::NONE,
@@ -185,7 +186,7 @@ impl MotorOutputs {
             return;
         }
         let Some((outputs, _)) = outputs.pulses.split_first_chunk::<JUDGED_MAX>() else { return };
-        self.range = self.range.seen(outputs, !flight.airborne());
+        self.range = self.range.seen(outputs.get(..told).unwrap_or_default(), !flight.airborne());
         let parts = outputs.map(|output| self.range.part(output));
         if !flight.airborne() {
             self.note_idle(outputs, &parts, vehicle.armed());
@@ -198,11 +199,11 @@ impl MotorOutputs {
         };
         // What does not idle on the ground is a servo.
         let known = self.idle & all == all;
-        self.began_unseen = self.idle == 0 || !flight.was_on_ground();
-        if !known && self.began_unseen {
+        self.takeoff_not_recorded = self.idle == 0 || !flight.was_on_ground();
+        if !known && self.takeoff_not_recorded {
             self.at = Stamp::at(at);
             self.note_moved(outputs);
-            let (place, percent) = self.alone;
+            let (place, percent) = self.excess;
             // The one opposite may idle then.
             let stays = percent >= OFF_PERCENT && given.get(usize::from(place)).is_some_and(is_off);
             if !stays {
@@ -214,16 +215,16 @@ impl MotorOutputs {
                     (self.moved | 1 << place) & all == all && flies_level(at, vehicle, flight)
                 });
                 let lasts = self.at_end_since.run(at_end.is_some(), at, LASTS);
-                self.alone = at_end.filter(|_| lasts).unwrap_or_default();
+                self.excess = at_end.filter(|_| lasts).unwrap_or_default();
             }
             return;
         }
         if let Some(place) = full_alone(given).filter(|_| known) {
-            (self.at, self.alone) = (Stamp::at(at), (place, AT_END_PERCENT));
+            (self.at, self.excess) = (Stamp::at(at), (place, AT_END_PERCENT));
             return;
         }
-        if (AT_END_PERCENT..OFF_PERCENT).contains(&self.alone.1) {
-            (self.at, self.alone.1) = (Stamp::at(at), 0.0);
+        if (AT_END_PERCENT..OFF_PERCENT).contains(&self.excess.1) {
+            (self.at, self.excess.1) = (Stamp::at(at), 0.0);
         }
         if !known || !flies_level(at, vehicle, flight) || yaws(vehicle) {
             return;
@@ -264,7 +265,7 @@ impl MotorOutputs {
     /// Whether this output alone is at an end of its range in a flight that began before it was heard: how its motor turned before is
     /// not known.
     pub(crate) fn was_found_at_end(&self, motor: u8) -> bool {
-        self.began_unseen && self.alone.0 == motor && self.alone.1 > 0.0
+        self.takeoff_not_recorded && self.excess.0 == motor && self.excess.1 > 0.0
     }
 
     /// What the outputs are given on the ground. One that is given more while the vehicle is disarmed is a servo, or a motor in a test.
@@ -316,8 +317,8 @@ impl MotorOutputs {
             _ => (lowest, 1.0),
         };
         let spread = self.share.iter().take(count).map(Departure::spread).sum::<f32>() / count as f32;
-        let alone = ((first.0 - second.0) - (second.0 - lowest.0)) / part;
-        let (now, (summed, sum)) = (alone - SPREADS * spread / part, self.sum(alone, first.1, step_s));
+        let excess = ((first.0 - second.0) - (second.0 - lowest.0)) / part;
+        let (now, (summed, sum)) = (excess - SPREADS * spread / part, self.sum(excess, first.1, step_s));
         // What stands out over time goes on doing so while another one does for a moment.
         let (place, stands_out) = if sum > now { (summed, sum) } else { (first.1, now) };
         if !self.is_known() || stands_out < HOLD_PERCENT {
@@ -327,18 +328,18 @@ impl MotorOutputs {
         let out = (0_u8..).zip(&self.share).take(count).find(|(_, share)| share.figure() < OUT_PERCENT);
         let out = out.filter(|_| !self.is_known() || stands_out < HOLD_PERCENT);
         let weak = (place, stands_out.min(OFF_PERCENT.next_down()));
-        self.alone = out.map_or(weak, |(place, _)| (place, OFF_PERCENT));
+        self.excess = out.map_or(weak, |(place, _)| (place, OFF_PERCENT));
     }
 
     /// The motor that has stood out over time, and by how much.
-    fn sum(&mut self, alone: f32, motor: u8, step_s: f32) -> (u8, f32) {
+    fn sum(&mut self, excess: f32, motor: u8, step_s: f32) -> (u8, f32) {
         if self.is_known() {
             let (place, sum) = &mut self.summed;
             if *sum <= 0.0 {
                 *place = motor;
             }
             // That another one stands out speaks against it.
-            let beyond = if *place == motor { alone } else { -alone.max(0.0) } - DRIFT_PERCENT;
+            let beyond = if *place == motor { excess } else { -excess.max(0.0) } - DRIFT_PERCENT;
             *sum = (*sum + beyond * step_s / SUMMED_S).clamp(0.0, SUM_MAX_PERCENT);
         }
         self.summed
@@ -367,7 +368,7 @@ impl MotorOutputs {
     }
 
     /// How far a motor's command alone is above what is usual, percent of the average; 0 for those that do not stand out.
-    pub(crate) fn alone(&self, now: Instant, vehicle: &Vehicle, motor: u8) -> Option<Reading> {
+    pub(crate) fn excess(&self, now: Instant, vehicle: &Vehicle, motor: u8) -> Option<Reading> {
         let at = self.at.instant(now).filter(|at| now.since(*at) <= PAUSE)?;
         let count = self.judged(vehicle);
         // Where all but one moved they are motors, heard in a flight that nobody saw begin.
@@ -375,7 +376,7 @@ impl MotorOutputs {
         {
             return None;
         }
-        let (place, percent) = self.alone;
+        let (place, percent) = self.excess;
         Some(Reading { at, value: if place == motor { percent.max(0.0) } else { 0.0 } })
     }
 }
@@ -447,7 +448,7 @@ mod tests {
                 share.follow(figure, STEP_S, 0.0);
             }
             outputs.judge(JUDGED_MAX, STEP_S);
-            outputs.alone
+            outputs.excess
         });
         judged.skip(50).collect()
     }

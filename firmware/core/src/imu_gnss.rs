@@ -43,14 +43,14 @@ const SHAKE_PART: f32 = 0.5;
 
 /// The memory of the comparison.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Pull {
+pub(crate) struct ImuGnssResidual {
     /// Forces since the last step, their number, their mean, and when there was one.
     sum: [f32; 3],
     count: u16,
     mean: [f32; 3],
     mean_at: Stamp,
     /// What they made of the velocity since the receiver's last one, m/s, and their mean between the two before, m/s2.
-    gained: [f32; 3],
+    delta_v: [f32; 3],
     force_before: Option<[f32; 3]>,
     /// The last velocity, m/s; when it came, where it is compared.
     velocity: [f32; 3],
@@ -58,23 +58,23 @@ pub(crate) struct Pull {
     /// The force, and what of it is missing in the velocity, both smoothed, m/s2.
     force: [f32; 3],
     missing: [f32; 3],
-    apart: Option<f32>,
+    residual: Option<f32>,
 }
 
-impl Pull {
+impl ImuGnssResidual {
     /// Nothing seen.
     pub(crate) const NEW: Self = Self {
         sum: [0.0; 3],
         count: 0,
         mean: [0.0; 3],
         mean_at: Stamp::NONE,
-        gained: [0.0; 3],
+        delta_v: [0.0; 3],
         force_before: None,
         velocity: [0.0; 3],
         at: Stamp::NONE,
         force: [0.0; 3],
         missing: [0.0; 3],
-        apart: None,
+        residual: None,
     };
 
     pub(crate) fn take_force(&mut self, force: [f32; 3]) {
@@ -104,8 +104,8 @@ impl Pull {
             return;
         };
         let [north, east, down] = to_earth(attitude, self.mean);
-        for (gained, axis) in self.gained.iter_mut().zip([north, east, down + GRAVITY]) {
-            *gained += axis * step_s;
+        for (delta_v, axis) in self.delta_v.iter_mut().zip([north, east, down + GRAVITY]) {
+            *delta_v += axis * step_s;
         }
     }
 
@@ -119,7 +119,7 @@ impl Pull {
         let climb_mps = if on_rotors { climb_within(at, vehicle, CLIMB_AGE) } else { Some(0.0) };
         let (Some(speed), Some(course), Some(climb_mps), true) = (gnss.speed, gnss.course, climb_mps, judged)
         else {
-            (self.at, self.apart) = (Stamp::NONE, None);
+            (self.at, self.residual) = (Stamp::NONE, None);
             return;
         };
         let velocity = [speed.0 * libm::cosf(course.0), speed.0 * libm::sinf(course.0), -climb_mps];
@@ -128,25 +128,25 @@ impl Pull {
         let missing = self.take_velocity(step, velocity, if on_rotors { 3 } else { 2 });
         let shaken = SHAKE_PART * vehicle.inertial.shakes_mps2();
         if missing.is_some_and(|missing| !missing.is_finite()) {
-            (self.at, self.apart) = (Stamp::NONE, None);
+            (self.at, self.residual) = (Stamp::NONE, None);
             return;
         }
         let turns_little = vehicle.inertial.turns_little(at, TURNED);
-        self.apart = missing.filter(|_| turns_little).map(|missing| (missing - shaken).max(0.0));
+        self.residual = missing.filter(|_| turns_little).map(|missing| (missing - shaken).max(0.0));
     }
 
     /// A velocity, and the time since the one before, where it is compared with that: what is missing in so many of the axes north, east,
     /// down, m/s2.
     fn take_velocity(&mut self, step: Option<Span>, velocity: [f32; 3], axes: usize) -> Option<f32> {
         let before = core::mem::replace(&mut self.velocity, velocity);
-        let gained = core::mem::take(&mut self.gained);
+        let delta_v = core::mem::take(&mut self.delta_v);
         let Some(step_s) = step.map(Span::as_secs_f32) else {
             // Nobody knows since when the forces before it were summed.
             (self.force_before, self.force, self.missing) = (None, [0.0; 3], [0.0; 3]);
             return None;
         };
         // Steps are not alike: messages are lost, and what repeats itself is left out.
-        let force_now = gained.map(|gained| gained / step_s);
+        let force_now = delta_v.map(|delta_v| delta_v / step_s);
         let Some(force_before) = self.force_before.replace(force_now) else {
             self.force = force_now;
             return None;
@@ -161,15 +161,16 @@ impl Pull {
             changes[axis] = (force - self.force[axis]) / SMOOTHING_S;
         }
         let ([north, east, down], [force_north, force_east, _]) = (self.missing, self.force);
-        let felt = norm([force_north, force_east, 0.0]);
-        let flown = norm([force_north - north, force_east - east, 0.0]);
-        let level = (norm([north, east, 0.0]) - HEADING_PART * flown).max((felt - flown).abs());
+        let specific_force = norm([force_north, force_east, 0.0]);
+        let kinematic_acceleration = norm([force_north - north, force_east - east, 0.0]);
+        let level = (norm([north, east, 0.0]) - HEADING_PART * kinematic_acceleration)
+            .max((specific_force - kinematic_acceleration).abs());
         Some(norm([level, down, 0.0]) - LATE_S * norm(changes))
     }
 
     /// How far the force is from the change of velocity, m/s2.
-    pub(crate) fn apart(&self, now: Instant) -> Option<Reading> {
-        Reading::new(self.at.instant(now), self.apart)
+    pub(crate) fn residual(&self, now: Instant) -> Option<Reading> {
+        Reading::new(self.at.instant(now), self.residual)
     }
 }
 
@@ -185,27 +186,27 @@ mod tests {
         // One swing in 5 s, and the velocity that it makes.
         let turns = |time_s: f32| time_s * core::f32::consts::TAU / 5.0;
         let velocity = |time_s: f32| -swings_mps2 * 5.0 / core::f32::consts::TAU * libm::cosf(turns(time_s));
-        let mut pull = Pull::NEW;
+        let mut residual = ImuGnssResidual::NEW;
         let missing = (0_u16..100).filter_map(|step| {
             let time_s = f32::from(step) * STEP_S;
-            pull.gained[0] += velocity(time_s) - velocity(time_s - STEP_S) + untrue_mps2 * STEP_S;
+            residual.delta_v[0] += velocity(time_s) - velocity(time_s - STEP_S) + untrue_mps2 * STEP_S;
             let told = velocity(time_s - STEP_S / 2.0 - late_s);
-            pull.take_velocity((step > 0).then_some(Span::from_millis(200)), [told, 0.0, 0.0], 3)
+            residual.take_velocity((step > 0).then_some(Span::from_millis(200)), [told, 0.0, 0.0], 3)
         });
         missing.fold(0.0, f32::max)
     }
 
     #[test]
     fn a_heading_that_is_wrong_is_no_force() {
-        let mut pull = Pull::NEW;
+        let mut residual = ImuGnssResidual::NEW;
         let mut most = 0.0_f32;
         for step in 0..100 {
             let (time_s, velocity) = (f32::from(step as u8) * STEP_S, 2.5 * STEP_S);
             // It brakes and turns back at 2.5 m/s2; the force is turned by 40 degrees.
             let told = velocity * f32::from(step as u8);
-            pull.gained = [velocity * 0.766, velocity * 0.643, 0.0];
+            residual.delta_v = [velocity * 0.766, velocity * 0.643, 0.0];
             let missing =
-                pull.take_velocity((time_s > 0.0).then_some(Span::from_millis(200)), [told, 0.0, 0.0], 3);
+                residual.take_velocity((time_s > 0.0).then_some(Span::from_millis(200)), [told, 0.0, 0.0], 3);
             most = most.max(missing.unwrap_or(0.0));
         }
         assert!(most < 0.6, "{most}");
@@ -214,14 +215,14 @@ mod tests {
     #[test]
     fn velocities_that_come_in_unequal_steps_show_as_much_as_others() {
         let missing = |untrue_mps2: f32| {
-            let mut pull = Pull::NEW;
+            let mut residual = ImuGnssResidual::NEW;
             // Some are lost, or repeat themselves; it speeds up by 5 m/s2 throughout.
             let missing = (0..60_usize).map(|step| {
                 let step_s = [0.2, 0.4, 0.2][step % 3];
-                pull.gained = [(5.0 + untrue_mps2) * step_s, 0.0, 0.0];
-                let told = pull.velocity[0] + 5.0 * step_s;
+                residual.delta_v = [(5.0 + untrue_mps2) * step_s, 0.0, 0.0];
+                let told = residual.velocity[0] + 5.0 * step_s;
                 let step = (step > 0).then_some(Span::from_millis((step_s * 1_000.0) as u64));
-                pull.take_velocity(step, [told, 0.0, 0.0], 3)
+                residual.take_velocity(step, [told, 0.0, 0.0], 3)
             });
             missing.skip(30).flatten().collect::<Vec<_>>()
         };
@@ -231,9 +232,9 @@ mod tests {
 
     #[test]
     fn forces_that_nothing_takes_for_hours_are_summed_no_more() {
-        let mut pull = Pull::NEW;
-        (0..200_000).for_each(|_| pull.take_force([0.0, 0.0, -9.8]));
-        let mean = pull.sum[2] / f32::from(pull.count);
+        let mut residual = ImuGnssResidual::NEW;
+        (0..200_000).for_each(|_| residual.take_force([0.0, 0.0, -9.8]));
+        let mean = residual.sum[2] / f32::from(residual.count);
         assert!((-9.9..-9.7).contains(&mean), "{mean}");
     }
 
@@ -247,18 +248,18 @@ mod tests {
 
     #[test]
     fn what_was_summed_before_the_first_velocity_is_of_no_step() {
-        let mut pull = Pull { gained: [30.0; 3], missing: [5.0; 3], ..Pull::NEW };
-        let mut take = |step| pull.take_velocity(step, [3.0, 0.0, 0.0], 3);
+        let mut residual = ImuGnssResidual { delta_v: [30.0; 3], missing: [5.0; 3], ..ImuGnssResidual::NEW };
+        let mut take = |step| residual.take_velocity(step, [3.0, 0.0, 0.0], 3);
         let step = Some(Span::from_millis(200));
         assert_eq!([take(None), take(step), take(step)], [None, None, Some(0.0)]);
     }
 
     #[test]
     fn garbage_is_no_force() {
-        let mut pull = Pull::NEW;
+        let mut residual = ImuGnssResidual::NEW;
         for force in [f32::NAN, f32::INFINITY, 1e9, 3.0] {
-            pull.take_force([force, 0.0, -9.8]);
+            residual.take_force([force, 0.0, -9.8]);
         }
-        assert_eq!((pull.count, pull.sum[0]), (1, 3.0));
+        assert_eq!((residual.count, residual.sum[0]), (1, 3.0));
     }
 }
