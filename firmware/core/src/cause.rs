@@ -1,108 +1,74 @@
 //! Causes: what is wrong, as an autopilot sees it, in terms that people know; and the flags that say so by themselves.
 
-/// What is wrong, as the autopilot sees it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-#[repr(u8)]
-pub enum Cause {
-    /// Gyro.
-    Gyro,
-    /// Accelerometer.
-    Accelerometer,
-    /// Compass.
-    Compass,
-    /// Barometer.
-    Barometer,
-    /// Airspeed sensor.
-    Airspeed,
-    /// Satellite navigation: no fix, glitches, jamming, spoofing.
-    Gnss,
-    /// Rangefinder, optical flow, vision, proximity.
-    Ranging,
-    /// Heights of the ground.
-    Terrain,
-    /// The estimator: it doubts or has lost attitude, velocity, position or height.
-    Estimator,
-    /// The attitude is not what it should be.
-    Attitude,
-    /// Motors, propellers, ESCs, engine.
-    Propulsion,
-    /// Batteries and supplies.
-    Power,
-    /// The pilot's remote control.
-    RemoteControl,
-    /// Ground station or companion computer.
-    GroundStation,
-    /// The geofence is breached.
-    Fence,
-    /// Vibration or clipping.
-    Vibration,
-    /// The autopilot's own log or storage.
-    Logging,
-    /// The autopilot's processor or firmware.
-    Processor,
-    /// A crash, a parachute, flight termination.
-    Crash,
-    /// A failsafe whose cause is not said.
-    Failsafe,
-    /// Something severe that no table knows.
-    Other,
+macro_rules! causes {
+    ($($(#[$doc:meta])* $name:ident, $check:literal;)*) => {
+        /// What is wrong, as the autopilot sees it.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+        #[repr(u8)]
+        pub enum Cause {
+            $($(#[$doc])* $name,)*
+        }
+
+        impl Cause {
+            /// All causes, by number.
+            pub const ALL: [Self; [$($check),*].len()] = [$(Self::$name),*];
+
+            /// How many there are.
+            pub const COUNT: usize = Self::ALL.len();
+
+            /// The name of the check that tells it.
+            pub const fn check(self) -> &'static str {
+                match self {
+                    $(Self::$name => $check,)*
+                }
+            }
+        }
+    };
 }
 
-impl Cause {
-    /// How many there are.
-    pub const COUNT: usize = 21;
-
-    /// All causes, by number.
-    pub const ALL: [Self; Self::COUNT] = [
-        Self::Gyro,
-        Self::Accelerometer,
-        Self::Compass,
-        Self::Barometer,
-        Self::Airspeed,
-        Self::Gnss,
-        Self::Ranging,
-        Self::Terrain,
-        Self::Estimator,
-        Self::Attitude,
-        Self::Propulsion,
-        Self::Power,
-        Self::RemoteControl,
-        Self::GroundStation,
-        Self::Fence,
-        Self::Vibration,
-        Self::Logging,
-        Self::Processor,
-        Self::Crash,
-        Self::Failsafe,
-        Self::Other,
-    ];
-
-    /// The name of the check that tells it.
-    pub const fn check(self) -> &'static str {
-        match self {
-            Self::Gyro => "gyro_alert",
-            Self::Accelerometer => "accel_alert",
-            Self::Compass => "compass_alert",
-            Self::Barometer => "baro_alert",
-            Self::Airspeed => "airspeed_alert",
-            Self::Gnss => "gnss_alert",
-            Self::Ranging => "ranging_alert",
-            Self::Terrain => "terrain_alert",
-            Self::Estimator => "ekf_alert",
-            Self::Attitude => "attitude_alert",
-            Self::Propulsion => "drive_alert",
-            Self::Power => "battery_alert",
-            Self::RemoteControl => "rc_alert",
-            Self::GroundStation => "gcs_alert",
-            Self::Fence => "fence_alert",
-            Self::Vibration => "vibration_alert",
-            Self::Logging => "logging_alert",
-            Self::Processor => "processor_alert",
-            Self::Crash => "crash_alert",
-            Self::Failsafe => "failsafe_alert",
-            Self::Other => "autopilot_alert",
-        }
-    }
+causes! {
+    /// Gyro.
+    Gyro, "gyro_alert";
+    /// Accelerometer.
+    Accelerometer, "accel_alert";
+    /// Compass.
+    Compass, "compass_alert";
+    /// Barometer.
+    Barometer, "baro_alert";
+    /// Airspeed sensor.
+    Airspeed, "airspeed_alert";
+    /// Satellite navigation: no fix, glitches, jamming, spoofing.
+    Gnss, "gnss_alert";
+    /// Rangefinder, optical flow, vision, proximity.
+    Ranging, "ranging_alert";
+    /// Heights of the ground.
+    Terrain, "terrain_alert";
+    /// The estimator: it doubts or has lost attitude, velocity, position or height.
+    Estimator, "ekf_alert";
+    /// The attitude is not what it should be.
+    Attitude, "attitude_alert";
+    /// Motors, propellers, ESCs, engine.
+    Propulsion, "drive_alert";
+    /// Batteries and supplies.
+    Power, "battery_alert";
+    /// The pilot's remote control.
+    RemoteControl, "rc_alert";
+    /// Ground station or companion computer.
+    GroundStation, "gcs_alert";
+    /// The geofence is breached.
+    Fence, "fence_alert";
+    /// Vibration or clipping.
+    Vibration, "vibration_alert";
+    /// The autopilot's own log or storage.
+    Logging, "logging_alert";
+    /// The autopilot's processor or firmware.
+    Processor, "processor_alert";
+    /// A crash, a parachute, flight termination.
+    Crash, "crash_alert";
+    /// A failsafe whose cause is not said.
+    Failsafe, "failsafe_alert";
+    /// Something severe that no table knows.
+    Other, "autopilot_alert";
 }
 
 /// What the autopilot says once, in a text or an event.

@@ -12,18 +12,18 @@
 //! Each sensor by itself: whether it is stuck ([`crate::stuck`]); the first barometer against the height of GPS ([`crate::heights`]); a
 //! receiver's velocity against the way between its positions ([`crate::travel`]), and its satellites against their usual number
 //! ([`crate::geometry`]). The estimator that flies against the second one: [`crate::second`].
-//! Accelerometers, and the attitude that gyros make, against the receiver's velocity: [`crate::pull`].
+//! Accelerometers, and the attitude that gyros make, against the receiver's velocity: [`crate::imu_gnss`].
 
 use crate::departure::Departure;
 use crate::flight::Flight;
 use crate::geometry::Geometry;
 use crate::heights::{Heights, SCALE_HEIGHT_M};
+use crate::imu_gnss::ImuGnssResidual;
 use crate::latest::Reading;
 use crate::motion::{climb_mps, ground_speed_mps, throttle};
 use crate::observation::{
     Air, Estimator, EstimatorScale, Gnss, Imu, SecondEstimate, VehicleKind, VibrationScale,
 };
-use crate::pull::Pull;
 use crate::second::Second;
 use crate::steady::{TURNED, hovers, is_clear};
 use crate::stuck::Stuck;
@@ -194,7 +194,7 @@ pub(crate) struct Crosschecks {
     travels: [Travel; RECEIVERS_MAX],
     geometries: [Geometry; RECEIVERS_MAX],
     second: Second,
-    pull: Pull,
+    imu_gnss: ImuGnssResidual,
     moved: Moved,
     heights: Heights,
     /// When sensors of a kind were compared last, and when that was tried.
@@ -225,7 +225,7 @@ impl Crosschecks {
             travels: [Travel::NEW; RECEIVERS_MAX],
             geometries: [Geometry::NEW; RECEIVERS_MAX],
             second: Second::NEW,
-            pull: Pull::NEW,
+            imu_gnss: ImuGnssResidual::NEW,
             moved: Moved::NONE,
             heights: Heights::new(),
             compared_at: [Stamp::NONE; Kind::ALL.len()],
@@ -255,7 +255,7 @@ impl Crosschecks {
         let is_fitted = force != Some([0.0; 3]);
         let field = field.filter(|field| field.iter().any(|axis| axis.abs() > 0.0));
         if let (Some(force), 0, true) = (force, imu.instance, is_fitted) {
-            self.pull.take_force(force);
+            self.imu_gnss.take_force(force);
         }
         if let (Some(field), 0) = (field, imu.instance) {
             self.take_heading(at, field, vehicle, flight);
@@ -332,7 +332,7 @@ impl Crosschecks {
         if gnss.instance == 0 {
             self.heights.take_gnss(at, gnss, vehicle, flight);
             if !self.receivers[0].repeats() {
-                self.pull.take_gnss(at, gnss, vehicle, flight);
+                self.imu_gnss.take_gnss(at, gnss, vehicle, flight);
             }
         }
     }
@@ -399,7 +399,7 @@ impl Crosschecks {
         }
         let step_s = step.map_or(0.0, |step| step.min(FRESH).as_secs_f32());
         self.stepped_at = Stamp::at(now);
-        self.pull.step(now, step_s, vehicle);
+        self.imu_gnss.step(now, step_s, vehicle);
         // What stands does not move, whatever an estimator makes of the touch-down.
         let idles = throttle(now, vehicle).is_some_and(|throttle| throttle < IDLE_THROTTLE);
         if !(idles && vehicle.hovers(now) == Some(true) && vehicle.inertial.is_level(now)) {
@@ -511,8 +511,8 @@ impl Crosschecks {
     }
 
     /// The first inertial sensor against the first receiver.
-    pub(crate) const fn pull(&self) -> &Pull {
-        &self.pull
+    pub(crate) const fn imu_gnss(&self) -> &ImuGnssResidual {
+        &self.imu_gnss
     }
 
     /// The barometer against GPS, and its noise.

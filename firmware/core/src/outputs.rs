@@ -22,6 +22,10 @@
 //!
 //! A motor that is given next to nothing while the others carry the vehicle was taken out.
 //!
+//! Outputs are pulses of 1000 to 2000 us, or `PX4`'s numbers for its drivers: 0 to 1999 for `DShot`, 0 to 8191 for ESCs on CAN (`DShot.h`,
+//! `actuators/esc.hpp`; `SERVO_OUTPUT_RAW` has `actuator_outputs` as they are). What they are of is seen on the ground, and each becomes a part
+//! of its range.
+//!
 //! Other frames are not judged: three motors have no such pattern, and of three arms with two motors each none stands out.
 
 use core::ops::RangeInclusive;
@@ -39,15 +43,13 @@ use crate::vehicle::Vehicle;
 pub(crate) const JUDGED_MAX: usize = 8;
 /// Time constant of the commands, s: gusts and corrections of course that last longer are in what commands vary by ([`SPREADS`]).
 const SMOOTHING_S: f32 = 2.0;
-/// Pulses of a motor that does not turn are not longer than this, us.
-const IDLE_US: u16 = 1_150;
-/// Pulses begin here, us. What is shorter than half of that on the ground is on another scale, which begins at nothing.
-const ZERO_US: u16 = 1_000;
+/// What motors are given is a part of their range. One that does not turn is given no more than this.
+const IDLE: f32 = 0.15;
 /// Parts of what the others are given: what idled on the ground and is given so much in level flight is a motor too. A frame that is put
 /// together by parameters may still call itself a quadrotor.
 const LIKE_OTHERS: RangeInclusive<f32> = 0.5..=1.5;
-/// Motors that carry a vehicle are given so much more on the average.
-const CARRIES_US: u16 = 100;
+/// Motors that carry a vehicle are given more on the average.
+const CARRIES: f32 = 0.1;
 /// Further above the others a change teaches nothing, percent.
 const HOLD_PERCENT: f32 = 4.0;
 /// Where commands vary much, a change must be larger: by so many of their mean distances from what is usual.
@@ -62,22 +64,60 @@ const SUM_MAX_PERCENT: f32 = 12.0;
 const OUT_PERCENT: f32 = -70.0;
 /// What is told of one that was, and of no other, percent.
 pub(crate) const OFF_PERCENT: f32 = 100.0;
-/// Least above what does not turn, us, of a motor that is given anything.
-const OFF_US: u16 = 50;
-/// Outputs end here or beyond, us: `MOT_PWM_MAX` of ArduPilot is 1950, `PWM_MAIN_MAX` of PX4 2000.
-const FULL_US: u16 = 1_940;
+/// A motor that is given less is given nothing.
+const OFF: f32 = 0.05;
+/// Outputs end here or beyond: `MOT_PWM_MAX` of ArduPilot is 1950 us, `PWM_MAIN_MAX` of PX4 2000.
+const FULL: f32 = 0.94;
 /// What stands for a motor that alone is at the end of its range.
 const AT_END_PERCENT: f32 = OFF_PERCENT - 1.0;
 /// Two thirds of the range: what is above shares the load with what is at its end, as in a turn or a climb.
-const SHARES_US: u16 = 1_667;
+const SHARES: f32 = 0.667;
 /// 30 degrees a second: a pilot yaws faster, and gusts do not turn a vehicle so fast for long.
 const YAWS_RAD_S: f32 = 0.5;
-/// A motor's command varies by more than this in flight, us; a servo that holds its place, as a landing gear's, does not.
-const MOVES_US: u16 = 20;
+/// A motor's command varies by more than this in flight; a servo that holds its place, as a landing gear's, does not.
+const MOVES: f32 = 0.02;
 /// What nobody saw begin is believed after so long.
 const LASTS: Span = Span::from_secs(3);
 /// Messages that are further apart are not of the same hover.
 const PAUSE: Span = Span::from_secs(2);
+
+/// What an output's range is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Range {
+    /// Pulses of 1000 to 2000 us.
+    Pulses,
+    /// Numbers for `DShot`.
+    DShot,
+    /// Numbers for ESCs on CAN.
+    Can,
+}
+
+impl Range {
+    /// No pulse is as short as this, nor as long, us.
+    const SHORTEST_US: u16 = 500;
+    const LONGEST_US: u16 = 2_500;
+
+    /// What these show it to be: it begins at nothing where one that is given next to nothing on the ground says so.
+    fn seen(self, outputs: &[u16], on_ground: bool) -> Self {
+        let begins = |output: &u16| (1..Self::SHORTEST_US).contains(output);
+        match self {
+            Self::Pulses if on_ground && outputs.iter().any(begins) => Self::DShot,
+            Self::DShot if outputs.iter().any(|output| *output > Self::LONGEST_US) => Self::Can,
+            known => known,
+        }
+    }
+
+    /// Which part of it an output is.
+    fn part(self, output: u16) -> f32 {
+        // Dividing is dear.
+        let (zero, of_whole) = match self {
+            Self::Pulses => (1_000, 1.0 / 1_000.0),
+            Self::DShot => (0, 1.0 / 1_999.0),
+            Self::Can => (0, 1.0 / 8_191.0),
+        };
+        f32::from(output.saturating_sub(zero)) * of_whole
+    }
+}
 
 /// The memory of the motors' commands.
 #[derive(Clone, Copy, Debug)]
@@ -86,9 +126,9 @@ pub(crate) struct MotorOutputs {
     port: Option<u8>,
     /// How many motors there are in this flight; 0 before it is known.
     count: u8,
-    /// Motors that had the pulse of one that does not turn on the ground, and those that had one of the other scale: a bit each.
+    range: Range,
+    /// Motors that were given as little on the ground as one that does not turn: a bit each.
     idle: u8,
-    other_scale: u8,
     /// Outputs that carried in any flight, and those of them that are given next to nothing now: a bit each.
     carried: u8,
     off: u8,
@@ -100,11 +140,11 @@ pub(crate) struct MotorOutputs {
     /// The motor that has stood out over time, and by how much, percent for [`SUMMED_S`].
     summed: (u8, f32),
     /// The motor that stands out, and how far, percent.
-    alone: (u8, f32),
-    /// The flight began before it was heard: the pulses that were heard first, which outputs moved since (a bit each), and since when
-    /// one output alone is at an end of its range.
-    began_unseen: bool,
-    first_us: [u16; JUDGED_MAX],
+    excess: (u8, f32),
+    /// The flight began before it was heard, or its outputs were: what was heard first, which outputs moved since (a bit each), and since
+    /// when one output alone is at an end of its range.
+    takeoff_not_recorded: bool,
+    first: [u16; JUDGED_MAX],
     moved: u8,
     at_end_since: Stamp,
 }
@@ -115,17 +155,17 @@ impl MotorOutputs {
         Self {
             port: None,
             count: 0,
+            range: Range::Pulses,
             idle: 0,
-            other_scale: 0,
             carried: 0,
             off: 0,
             full: 0,
             share: [Departure::NEW; JUDGED_MAX],
             at: Stamp::NONE,
             summed: (0, 0.0),
-            alone: (0, 0.0),
-            began_unseen: false,
-            first_us: [0; JUDGED_MAX],
+            excess: (0, 0.0),
+            takeoff_not_recorded: false,
+            first: [0; JUDGED_MAX],
             moved: 0,
             at_end_since: Stamp::NONE,
         }
@@ -133,8 +173,8 @@ impl MotorOutputs {
 
     /// A flight begins: nothing is usual yet.
     pub(crate) const fn begin(&mut self) {
-        let Self { port, idle, other_scale, carried, .. } = *self;
-        *self = Self { port, idle, other_scale, carried, ..Self::new() };
+        let Self { port, range, idle, carried, .. } = *self;
+        *self = Self { port, range, idle, carried, ..Self::new() };
     }
 
     pub(crate) fn take(&mut self, at: Instant, outputs: &Outputs, vehicle: &Vehicle, flight: &Flight) {
@@ -145,59 +185,59 @@ impl MotorOutputs {
         if *self.port.get_or_insert(outputs.port) != outputs.port {
             return;
         }
+        let Some((outputs, _)) = outputs.pulses.split_first_chunk::<JUDGED_MAX>() else { return };
+        self.range = self.range.seen(outputs.get(..told).unwrap_or_default(), !flight.airborne());
+        let parts = outputs.map(|output| self.range.part(output));
         if !flight.airborne() {
-            self.note_idle(&outputs.pulses, vehicle.armed());
+            self.note_idle(outputs, &parts, vehicle.armed());
             return;
         }
-        self.note_off(&outputs.pulses);
+        self.note_off(&parts);
         let count = self.judged(vehicle);
-        let (all, Some(pulses)) = (u8::MAX >> (JUDGED_MAX - count), outputs.pulses.get(..count)) else {
+        let (all, Some(given)) = (u8::MAX >> (JUDGED_MAX - count), parts.get(..count)) else {
             return;
         };
-        // What has no idle pulse on the ground is a servo.
+        // What does not idle on the ground is a servo.
         let known = self.idle & all == all;
-        self.began_unseen = !flight.was_on_ground();
-        if !known && self.began_unseen {
+        self.takeoff_not_recorded = self.idle == 0 || !flight.was_on_ground();
+        if !known && self.takeoff_not_recorded {
             self.at = Stamp::at(at);
-            self.note_moved(pulses);
-            let (place, percent) = self.alone;
+            self.note_moved(outputs);
+            let (place, percent) = self.excess;
             // The one opposite may idle then.
-            let stays = percent >= OFF_PERCENT && pulses.get(usize::from(place)).is_some_and(Self::is_out);
+            let stays = percent >= OFF_PERCENT && given.get(usize::from(place)).is_some_and(is_off);
             if !stays {
-                let at_end = Self::at_an_end(pulses).filter(|(place, _)| {
+                // An output of nothing is not used.
+                let used = outputs.iter().take(count).all(|output| *output > 0);
+                let out = only(given, is_off, carries).filter(|_| used).map(|place| (place, OFF_PERCENT));
+                let full = || Some((full_alone(given)?, AT_END_PERCENT));
+                let at_end = out.or_else(full).filter(|(place, _)| {
                     (self.moved | 1 << place) & all == all && flies_level(at, vehicle, flight)
                 });
                 let lasts = self.at_end_since.run(at_end.is_some(), at, LASTS);
-                self.alone = at_end.filter(|_| lasts).unwrap_or_default();
+                self.excess = at_end.filter(|_| lasts).unwrap_or_default();
             }
             return;
         }
-        let full = self.full & all;
-        if known && full.is_power_of_two() {
-            let place = full.trailing_zeros();
-            let mut others = (0..).zip(pulses).filter(|(motor, _)| *motor != place);
-            if others.all(|(_, pulse)| (IDLE_US..SHARES_US).contains(pulse)) {
-                (self.at, self.alone) = (Stamp::at(at), (place as u8, AT_END_PERCENT));
-                return;
-            }
+        if let Some(place) = full_alone(given).filter(|_| known) {
+            (self.at, self.excess) = (Stamp::at(at), (place, AT_END_PERCENT));
+            return;
         }
-        if (AT_END_PERCENT..OFF_PERCENT).contains(&self.alone.1) {
-            (self.at, self.alone.1) = (Stamp::at(at), 0.0);
+        if (AT_END_PERCENT..OFF_PERCENT).contains(&self.excess.1) {
+            (self.at, self.excess.1) = (Stamp::at(at), 0.0);
         }
         if !known || !flies_level(at, vehicle, flight) || yaws(vehicle) {
             return;
         }
-        let zero_us = if self.other_scale & all == all { 0.0 } else { f32::from(ZERO_US) };
-        let given = |pulse: &u16| (f32::from(*pulse) - zero_us).max(0.0);
-        let mean = pulses.iter().map(given).sum::<f32>() / count as f32;
-        if mean < f32::from(CARRIES_US) {
+        let mean = given.iter().sum::<f32>() / count as f32;
+        if mean < CARRIES {
             return;
         }
         if self.count == 0 {
-            let is_like = |pulse: u16| LIKE_OTHERS.contains(&(given(&pulse) / mean));
-            let outputs = (0..JUDGED_MAX).zip(&outputs.pulses);
+            let is_like = |given: &f32| LIKE_OTHERS.contains(&(given / mean));
+            let places = (0..).zip(&parts);
             let motors =
-                outputs.take_while(|(place, pulse)| self.idle >> place & 1 != 0 && is_like(**pulse)).count();
+                places.take_while(|(place, given)| self.idle >> place & 1 != 0 && is_like(given)).count();
             self.count = if matches!(motors, 6 | JUDGED_MAX) { motors.max(count) } else { count } as u8;
         }
         if usize::from(self.count) != count {
@@ -205,67 +245,49 @@ impl MotorOutputs {
         }
         let step_s = self.at.age(at).filter(|step| *step <= PAUSE).map_or(0.0, Span::as_secs_f32);
         self.at = Stamp::at(at);
-        for (share, pulse) in self.share.iter_mut().zip(pulses) {
-            share.follow(given(pulse) / mean * 100.0 - 100.0, step_s, SMOOTHING_S);
+        for (share, given) in self.share.iter_mut().zip(given) {
+            share.follow(given / mean * 100.0 - 100.0, step_s, SMOOTHING_S);
         }
         self.judge(count, step_s);
     }
 
-    /// The one output that is given next to nothing while all others carry, or is full while no other one is near that: what no flight
-    /// from before has to be known for. A pulse of nothing is of an output that is not used.
-    fn at_an_end(pulses: &[u16]) -> Option<(u8, f32)> {
-        let carries = |pulse: &u16| *pulse > ZERO_US + CARRIES_US;
-        let is_full = |pulse: &u16| *pulse >= FULL_US;
-        let shares = |pulse: &u16| (IDLE_US..SHARES_US).contains(pulse);
-        let used = pulses.iter().all(|pulse| *pulse > 0);
-        let only = |is: &dyn Fn(&u16) -> bool, others: &dyn Fn(&u16) -> bool| {
-            let place = pulses.iter().position(is).filter(|_| used)?;
-            let mut rest = pulses.iter().enumerate().filter(|(other, _)| *other != place);
-            rest.all(|(_, pulse)| others(pulse)).then_some(place as u8)
-        };
-        let out = only(&Self::is_out, &carries).map(|place| (place, OFF_PERCENT));
-        out.or_else(|| Some((only(&is_full, &shares)?, AT_END_PERCENT)))
-    }
-
-    const fn is_out(pulse: &u16) -> bool {
-        *pulse < ZERO_US + OFF_US
-    }
-
     /// Which outputs are not where they were when they were heard first.
-    fn note_moved(&mut self, pulses: &[u16]) {
-        for (output, (pulse, first_us)) in pulses.iter().zip(&mut self.first_us).enumerate() {
-            if *first_us == 0 {
-                *first_us = *pulse;
+    fn note_moved(&mut self, outputs: &[u16; JUDGED_MAX]) {
+        for (place, (output, first)) in outputs.iter().zip(&mut self.first).enumerate() {
+            if *first == 0 {
+                *first = *output;
             }
-            self.moved |= u8::from(pulse.abs_diff(*first_us) > MOVES_US) << output;
+            let moved = (self.range.part(*output) - self.range.part(*first)).abs();
+            self.moved |= u8::from(moved > MOVES) << place;
         }
     }
 
     /// Whether this output alone is at an end of its range in a flight that began before it was heard: how its motor turned before is
     /// not known.
     pub(crate) fn was_found_at_end(&self, motor: u8) -> bool {
-        self.began_unseen && self.alone.0 == motor && self.alone.1 > 0.0
+        self.takeoff_not_recorded && self.excess.0 == motor && self.excess.1 > 0.0
     }
 
     /// What the outputs are given on the ground. One that is given more while the vehicle is disarmed is a servo, or a motor in a test.
-    fn note_idle(&mut self, pulses: &[u16], armed: bool) {
-        for (output, pulse) in pulses.iter().take(JUDGED_MAX).enumerate().filter(|(_, pulse)| **pulse > 0) {
-            if !armed && *pulse > IDLE_US {
-                self.idle &= !(1 << output);
+    fn note_idle(&mut self, outputs: &[u16; JUDGED_MAX], parts: &[f32; JUDGED_MAX], armed: bool) {
+        for (place, (output, given)) in outputs.iter().zip(parts).enumerate() {
+            if *output == 0 {
+                continue;
             }
-            self.idle |= u8::from(*pulse <= IDLE_US) << output;
-            self.other_scale |= u8::from(*pulse < ZERO_US / 2) << output;
+            if !armed && *given > IDLE {
+                self.idle &= !(1 << place);
+            }
+            self.idle |= u8::from(*given <= IDLE) << place;
         }
     }
 
     /// Which outputs are given next to nothing: also those beyond the motors of the frame that the vehicle says it is.
-    fn note_off(&mut self, pulses: &[u16]) {
+    fn note_off(&mut self, parts: &[f32; JUDGED_MAX]) {
         (self.off, self.full) = (0, 0);
-        for (output, pulse) in pulses.iter().take(JUDGED_MAX).enumerate() {
-            let given = pulse.saturating_sub(ZERO_US);
-            self.carried |= u8::from(given > CARRIES_US) << output;
-            self.off |= u8::from(given < OFF_US) << output;
-            self.full |= u8::from(*pulse >= FULL_US) << output;
+        for (place, given) in parts.iter().enumerate() {
+            self.carried |= u8::from(carries(given)) << place;
+            self.off |= u8::from(is_off(given)) << place;
+            self.full |= u8::from(is_full(given)) << place;
         }
         self.off &= self.carried;
     }
@@ -295,32 +317,32 @@ impl MotorOutputs {
             _ => (lowest, 1.0),
         };
         let spread = self.share.iter().take(count).map(Departure::spread).sum::<f32>() / count as f32;
-        let alone = ((first.0 - second.0) - (second.0 - lowest.0)) / part;
-        let stands_out = (alone - SPREADS * spread / part).max(self.summed(alone, first.1, step_s));
+        let excess = ((first.0 - second.0) - (second.0 - lowest.0)) / part;
+        let (now, (summed, sum)) = (excess - SPREADS * spread / part, self.sum(excess, first.1, step_s));
+        // What stands out over time goes on doing so while another one does for a moment.
+        let (place, stands_out) = if sum > now { (summed, sum) } else { (first.1, now) };
         if !self.is_known() || stands_out < HOLD_PERCENT {
             self.share.iter_mut().for_each(|share| share.learn(step_s));
         }
         // Opposite to one that is driven alone, one idles: that is the balance, and no fault of its own.
         let out = (0_u8..).zip(&self.share).take(count).find(|(_, share)| share.figure() < OUT_PERCENT);
         let out = out.filter(|_| !self.is_known() || stands_out < HOLD_PERCENT);
-        let weak = (first.1, stands_out.min(OFF_PERCENT.next_down()));
-        self.alone = out.map_or(weak, |(place, _)| (place, OFF_PERCENT));
+        let weak = (place, stands_out.min(OFF_PERCENT.next_down()));
+        self.excess = out.map_or(weak, |(place, _)| (place, OFF_PERCENT));
     }
 
-    /// What the motor that stands out most has stood out by over time.
-    fn summed(&mut self, alone: f32, motor: u8, step_s: f32) -> f32 {
-        if !self.is_known() {
-            return 0.0;
+    /// The motor that has stood out over time, and by how much.
+    fn sum(&mut self, excess: f32, motor: u8, step_s: f32) -> (u8, f32) {
+        if self.is_known() {
+            let (place, sum) = &mut self.summed;
+            if *sum <= 0.0 {
+                *place = motor;
+            }
+            // That another one stands out speaks against it.
+            let beyond = if *place == motor { excess } else { -excess.max(0.0) } - DRIFT_PERCENT;
+            *sum = (*sum + beyond * step_s / SUMMED_S).clamp(0.0, SUM_MAX_PERCENT);
         }
-        let (place, sum) = &mut self.summed;
-        if *sum <= 0.0 {
-            *place = motor;
-        }
-        let is_same = *place == motor;
-        // That another one stands out speaks against it.
-        let beyond = if is_same { alone } else { -alone.max(0.0) } - DRIFT_PERCENT;
-        *sum = (*sum + beyond * step_s / SUMMED_S).clamp(0.0, SUM_MAX_PERCENT);
-        if is_same { *sum } else { 0.0 }
+        self.summed
     }
 
     /// All learn together.
@@ -346,7 +368,7 @@ impl MotorOutputs {
     }
 
     /// How far a motor's command alone is above what is usual, percent of the average; 0 for those that do not stand out.
-    pub(crate) fn alone(&self, now: Instant, vehicle: &Vehicle, motor: u8) -> Option<Reading> {
+    pub(crate) fn excess(&self, now: Instant, vehicle: &Vehicle, motor: u8) -> Option<Reading> {
         let at = self.at.instant(now).filter(|at| now.since(*at) <= PAUSE)?;
         let count = self.judged(vehicle);
         // Where all but one moved they are motors, heard in a flight that nobody saw begin.
@@ -354,9 +376,33 @@ impl MotorOutputs {
         {
             return None;
         }
-        let (place, percent) = self.alone;
+        let (place, percent) = self.excess;
         Some(Reading { at, value: if place == motor { percent.max(0.0) } else { 0.0 } })
     }
+}
+
+fn is_off(given: &f32) -> bool {
+    *given < OFF
+}
+
+fn is_full(given: &f32) -> bool {
+    *given >= FULL
+}
+
+fn carries(given: &f32) -> bool {
+    *given > CARRIES
+}
+
+/// The only motor of which this is so, while that is so of all others.
+fn only(given: &[f32], is: fn(&f32) -> bool, others: fn(&f32) -> bool) -> Option<u8> {
+    let place = given.iter().position(is)?;
+    let mut rest = given.iter().enumerate().filter(|(other, _)| *other != place);
+    rest.all(|(_, given)| others(given)).then_some(place as u8)
+}
+
+/// The one that is at the end of its range while no other one is near that, and none idles.
+fn full_alone(given: &[f32]) -> Option<u8> {
+    only(given, is_full, |given| (IDLE..SHARES).contains(given))
 }
 
 /// Whether it turns about its upright axis: then wind and load go round it, and two motors are given more.
@@ -377,3 +423,41 @@ fn motors(vehicle: &Vehicle) -> usize {
 }
 
 const _: () = assert!(JUDGED_MAX <= MOTORS_MAX);
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const STEP_S: f32 = 0.2;
+
+    /// What is said of the motors of a flat octocopter whose first motor lost so much of its thrust, percent, in 60 s; another one is given
+    /// more for one message of seven.
+    fn octocopter(lost: f32) -> Vec<(u8, f32)> {
+        let mut outputs = MotorOutputs::new();
+        let steps = 0..350_usize;
+        let judged = steps.map(|step| {
+            let mut figures = [0.0; JUDGED_MAX];
+            if step >= 50 {
+                // The projection of one motor on thrust, roll, pitch and yaw.
+                figures = [0.5, 0.177, 0.25, -0.177, 0.0, -0.177, 0.25, 0.177].map(|part| part * lost);
+                if step.is_multiple_of(7) {
+                    figures[3] = 0.6 * lost;
+                }
+            }
+            for (share, figure) in outputs.share.iter_mut().zip(figures) {
+                share.follow(figure, STEP_S, 0.0);
+            }
+            outputs.judge(JUDGED_MAX, STEP_S);
+            outputs.excess
+        });
+        judged.skip(50).collect()
+    }
+
+    #[test]
+    fn a_motor_that_was_weak_for_long_is_weak_while_another_one_stands_out_for_a_moment() {
+        let judged = octocopter(8.0);
+        let last = &judged[150..];
+        assert!(last.iter().all(|(motor, percent)| *motor == 0 && *percent > 8.0), "{last:?}");
+        assert!(octocopter(2.0).iter().all(|(_, percent)| *percent < 4.0), "it is hardly weak");
+    }
+}

@@ -35,7 +35,10 @@ const INPUTS: &[(&str, &str)] = &[
     ("rail_5v_high", "POWER_STATUS"),
     ("battery_due", "components of kind battery: percent of the limit that trips first"),
     ("battery_alert", "STATUSTEXT, EVENT; SYS_STATUS: battery; HIGH_LATENCY2"),
-    ("esc_silent", "ESC_STATUS, ESC_INFO, ESC_TELEMETRY: silence beyond three of its own intervals"),
+    (
+        "esc_silent",
+        "ESC_STATUS, ESC_INFO, ESC_TELEMETRY: silence beyond three of its own intervals, or five of more than 0.7 s",
+    ),
     ("esc_temperature", "ESC_INFO, ESC_TELEMETRY"),
     ("esc_failure", "ESC_INFO: failure flags; 1 any, 2 motor stuck or ESC failed"),
     ("esc_errors", "ESC_INFO: error count, a minute; wraps are no errors"),

@@ -4,6 +4,7 @@ mod common;
 
 use common::{AUTOPILOT, Quad};
 use hums_core::Monitor;
+use hums_core::health::Level;
 use hums_core::observation::{
     Attitude, Esc, EscGroup, LandedState, MOTORS_MAX, Observation, Outputs, VehicleKind, VtolState,
 };
@@ -65,6 +66,32 @@ fn flies(vehicle: &Quad, speeds: &[f32], yaw_rate: f32) -> Vec<(&'static str, u8
 /// What ESCs say that tell nothing but their currents.
 fn escs_of(currents: &[f32]) -> Vec<Esc> {
     currents.iter().map(|current| Esc { current: Some(Amperes(*current)), ..Esc::default() }).collect()
+}
+
+#[test]
+fn an_esc_whose_messages_come_once_a_second_is_silent_after_five_of_them() {
+    let told = |lost: u64| {
+        let mut monitor = Monitor::new(Params::defaults());
+        let mut findings = Vec::new();
+        for now_ms in (0..60_000).step_by(100) {
+            let now = Instant::from_millis(now_ms);
+            let quad = Quad::healthy();
+            let second = |escs| Observation::Escs(EscGroup { first: 4, escs });
+            let is_heard = now_ms % 1_000 == 0 && !(30_000..30_000 + 1_000 * lost).contains(&now_ms);
+            for said in quad.says(now_ms).into_iter().chain(is_heard.then_some(second(quad.escs))) {
+                monitor.observe(now, AUTOPILOT, &said);
+            }
+            let link = LinkReading { frames_lost: Some(0.0), at: now };
+            monitor.tick(now, &link, &quad.recorder, &mut |finding| {
+                if finding.check == "esc_silent" && finding.level == Level::Critical {
+                    findings.push(((now_ms - 29_000) / 1_000, finding.instance));
+                }
+            });
+        }
+        findings
+    };
+    assert_eq!(told(4), []);
+    assert_eq!(told(6), [(5, 4), (5, 5), (5, 6), (5, 7)]);
 }
 
 #[test]
@@ -196,6 +223,16 @@ fn a_motor_that_is_idled_opposite_to_a_dead_one_is_not_a_second_dead_one() {
 
 /// A quad that is given these pulses from 20 s on, for so long, and turns so fast and sinks from then on.
 fn quad_given(speeds: [f32; 4], given: [u16; 4], for_ms: u64) -> Vec<(&'static str, u8)> {
+    quad_given_on(|pulse| pulse, speeds, given, for_ms)
+}
+
+/// The same, by a driver whose range is another one.
+fn quad_given_on(
+    driver: fn(u16) -> u16,
+    speeds: [f32; 4],
+    given: [u16; 4],
+    for_ms: u64,
+) -> Vec<(&'static str, u8)> {
     let esc = Quad::healthy().escs[0].unwrap_or_default();
     let script = |now_ms: u64| {
         let begun = now_ms >= 20_000;
@@ -214,9 +251,15 @@ fn quad_given(speeds: [f32; 4], given: [u16; 4], for_ms: u64) -> Vec<(&'static s
             at if (20_000..20_000 + for_ms).contains(&at) => given,
             _ => [1_500; 4],
         });
-        Some(pulses)
+        Some(pulses.map(driver))
     })
 }
+
+/// `PX4`'s numbers for `DShot` and for ESCs on CAN, whose motors idle with a little.
+const NUMBERS: [fn(u16) -> u16; 2] = [
+    |pulse| ((f32::from(pulse) - 1_000.0) * 1.999).max(if pulse < 1_000 { 0.0 } else { 110.0 }) as u16,
+    |pulse| ((f32::from(pulse) - 1_000.0) * 8.191).max(if pulse < 1_000 { 0.0 } else { 1.0 }) as u16,
+];
 
 #[test]
 fn a_motor_that_stands_while_it_is_given_all_is_lost_whatever_current_is_told() {
@@ -243,6 +286,21 @@ fn a_motor_that_alone_is_given_all_is_weak_also_while_the_vehicle_sinks() {
     assert_eq!(weak([2_000, 2_000, 2_000, 2_000]), [], "all the thrust");
 }
 
+#[test]
+fn what_a_driver_calls_its_outputs_changes_nothing() {
+    for driver in NUMBERS {
+        let told = |speeds, given| quad_given_on(driver, speeds, given, 60_000);
+        let turns = [5_000.0; 4];
+        assert_eq!(told(turns, [1_950, 1_300, 1_350, 1_350])[..1], [("motor_output", 0)], "alone at its end");
+        assert_eq!(told(turns, [2_000, 1_800, 1_350, 1_350]), [], "two share a turn");
+        assert_eq!(told(turns, [1_525; 4]), [], "it hovers with about 1000 of DShot");
+        let stands = [5_600.0, 0.0, 5_400.0, 5_300.0];
+        assert!(told(stands, [1_650, 1_950, 1_650, 1_650]).contains(&("motor_loss", 1)));
+        let out = told(stands, [1_525, 900, 1_525, 1_525]);
+        assert!(!out.contains(&("motor_loss", 1)) && !out.contains(&("motor_imbalance", 1)), "{out:?}");
+    }
+}
+
 /// What is told of a hexarotor that is heard first in the air, with these pulses and speeds; pulses within the range vary by as much.
 fn heard_in_the_air(pulses: [u16; 6], varies_us: u16, speeds: [f32; 6]) -> Vec<(&'static str, u8)> {
     let hexa =
@@ -257,6 +315,25 @@ fn heard_in_the_air(pulses: [u16; 6], varies_us: u16, speeds: [f32; 6]) -> Vec<(
         Some(given)
     };
     told_given(|_| (hexa.clone(), escs.clone(), 0.0), given)
+}
+
+#[test]
+fn a_motor_is_found_by_outputs_that_are_heard_in_the_air_first() {
+    let told = |pulses: [u16; 6]| {
+        let script = |now_ms: u64| {
+            let height = if now_ms < 4_000 { 0.0 } else { 20.0 };
+            (Quad { type_number: 13, height, ..Quad::healthy() }, Vec::new(), 0.0)
+        };
+        told_given(script, |now_ms| {
+            let mut given = [0; MOTORS_MAX];
+            given[..6].copy_from_slice(&pulses);
+            let more = if (now_ms / 1_000).is_multiple_of(2) { 0 } else { 30 };
+            given.iter_mut().filter(|pulse| (1_000..1_900).contains(*pulse)).for_each(|pulse| *pulse += more);
+            (now_ms >= 10_000).then_some(given)
+        })
+    };
+    assert_eq!(told([1_500, 1_480, 1_950, 1_510, 1_530, 1_600]), [("motor_output", 2)]);
+    assert_eq!(told([1_500, 1_480, 1_520, 1_510, 1_530, 1_600]), []);
 }
 
 #[test]

@@ -71,6 +71,11 @@ const ROWS: &[(&[&str], &[&str])] = &[
     (DRIVE, &["roll_rate", "pitch_rate", "roll", "pitch", "attitude_alert", "thrust_lost", "vibration_rise"]),
     (&["motor_loss"], &["motor_output", "motor_imbalance", "drive_alert"]),
     (&["motor_output", "motor_imbalance"], &["drive_alert"]),
+    // Control follows the attitude, and that the gyros. One that is noisy turns nothing over.
+    (
+        &["gyro_stuck", "gyro_alert", "gyro_mismatch", "imu_gps"],
+        &["roll_rate", "pitch_rate", "roll", "pitch", "attitude_alert"],
+    ),
     (&["roll_rate", "pitch_rate"], &["roll", "pitch", "attitude_alert", "thrust_lost"]),
     (
         &["gps_fix", "gps_jamming", "gps_spoofing"],
@@ -78,8 +83,9 @@ const ROWS: &[(&[&str], &[&str])] = &[
     ),
     (&["gps_satellites", "gps_hdop", "gps_accuracy"], &["gps_sats_fall", "gps_hdop_rise"]),
     (&["gps_sats_fall"], &["gps_hdop_rise"]),
-    (&["gps_stuck"], &["gnss_alert"]),
-    (&["gps_stuck", "gnss_alert"], &["gps_speed", "gps_height"]),
+    (&["gps_stuck"], &["gps_speed", "gps_height", "gnss_alert"]),
+    // The autopilot's word goes by its innovations, which sensors make as well: it explains no measurement.
+    (&["gps_speed", "gps_height"], &["gnss_alert"]),
     (GNSS, ESTIMATOR),
     (GNSS, &["baro_height", "position_silent"]),
     (&["heartbeat", "frames_lost"], &["position_silent"]),
@@ -87,16 +93,16 @@ const ROWS: &[(&[&str], &[&str])] = &[
     (&["gps_fix", "gps_jamming", "gps_spoofing", "gps_stuck", "gps_speed", "gps_height"], &["imu_gps"]),
     (
         &["accel_stuck", "gyro_stuck", "accel_alert", "gyro_alert", "accel_mismatch", "gyro_mismatch"],
-        &["imu_gps"],
+        &["imu_gps", "gnss_alert", "vibration_alert"],
     ),
     // ArduPilot's word on vibration goes by the same innovations.
-    (&["vibration", "vibration_px4", "clipping"], &["imu_gps"]),
+    (&["vibration", "vibration_px4", "clipping"], &["imu_gps", "gnss_alert"]),
     (&["imu_gps"], &["gnss_alert", "baro_noise", "vibration_alert"]),
     (&["compass_stuck", "compass_alert"], &["compass_mismatch"]),
     (&["gyro_stuck", "gyro_alert"], &["gyro_mismatch"]),
     (
         &["gyro_stuck", "gyro_alert", "gyro_mismatch", "gyro_noise", "imu_gps"],
-        &["compass_unused", "compass_heading", "ekf_compass", "ekf_mag_ratio"],
+        &["compass_alert", "compass_unused", "compass_heading", "ekf_compass", "ekf_mag_ratio"],
     ),
     (
         &["compass_stuck", "compass_alert", "compass_mismatch"],
@@ -110,7 +116,9 @@ const ROWS: &[(&[&str], &[&str])] = &[
     (SENSORS, SECOND),
     (SHAKING, SECOND),
     (ESTIMATOR, SECOND),
-    (SHAKING, &["accel_mismatch", "gyro_mismatch", "load_factor"]),
+    // ArduPilot's word on vibration is what `imu_gps` explains, and a mismatch that.
+    (&["vibration", "vibration_px4", "vibration_rise", "clipping"], &["accel_mismatch", "gyro_mismatch"]),
+    (SHAKING, &["load_factor"]),
     // Height control follows the estimator.
     (&["ekf_climb"], &["ekf_variance", "ekf_failsafe", "ekf_test_ratio", "ekf_alert", "thrust_lost"]),
     (&["vibration", "vibration_px4"], &["vibration_rise", "clipping", "vibration_alert"]),
@@ -157,12 +165,12 @@ pub fn explains(cause: &str, effect: &str) -> bool {
 }
 
 /// Which of the checks that have an alarm (a warning, or critical), each since a time, explains that of `effect`, which went to `level` and is
-/// wrong since a time. A cause may be seen a little later than what it explains.
+/// wrong since a time. A cause may be seen a little later than what it explains. What another cause of `effect` explains is none.
 pub fn because<'a>(
     effect: &str,
     level: Level,
     since: Instant,
-    alarms: impl Iterator<Item = (Instant, &'a str, Level)>,
+    alarms: impl Iterator<Item = (Instant, &'a str, Level)> + Clone,
 ) -> Option<&'a str> {
     let mut alarms = alarms.filter(|(cause_since, ..)| cause_since.since(since) <= SEEN_LATE);
     let at_least = match level {
@@ -184,11 +192,17 @@ pub fn because<'a>(
             .filter_map(|(row, (causes, _))| Some((row, causes.iter().position(|known| *known == cause)?)));
         places.next()
     };
-    alarms
+    let causes = alarms
         .filter(|(.., level)| *level as u8 >= at_least)
-        .filter_map(|(since, cause, _)| Some((place(since, cause)?, cause)))
-        .min_by_key(|(place, _)| *place)
-        .map(|(_, cause)| cause)
+        .filter_map(|(since, cause, _)| Some((place(since, cause)?, since, cause)));
+    let (_, mut since, mut cause) = causes.clone().min_by_key(|(place, ..)| *place)?;
+    // Nothing explains itself by way of others, so this ends.
+    while let Some((_, deeper_since, deeper)) =
+        causes.clone().find(|(_, before, deeper)| before.since(since) <= SEEN_LATE && explains(deeper, cause))
+    {
+        (since, cause) = (deeper_since, deeper);
+    }
+    Some(cause)
 }
 
 #[cfg(test)]
@@ -219,17 +233,56 @@ mod tests {
     }
 
     #[test]
-    fn no_two_explain_each_other() {
-        let explains = |cause: &str, effect: &str| {
-            ROWS.iter().any(|(causes, effects)| causes.contains(&cause) && effects.contains(&effect))
+    fn nothing_explains_itself_by_way_of_others() {
+        let mut left: Vec<&str> =
+            ROWS.iter().flat_map(|(causes, effects)| causes.iter().chain(*effects)).copied().collect();
+        // What nothing that is left explains goes: of a circle all stay.
+        loop {
+            let explained = |name: &&str| left.iter().any(|cause| explains(cause, name));
+            let still: Vec<&str> = left.iter().copied().filter(explained).collect();
+            if still.len() == left.len() {
+                break;
+            }
+            left = still;
+        }
+        assert!(left.is_empty(), "each of these is explained by another one: {left:?}");
+    }
+
+    #[test]
+    fn what_is_explained_itself_is_named_as_no_cause_beside_its_own() {
+        let why = |effect, alarms: &[&'static str]| {
+            let alarms: Vec<_> = alarms.iter().map(|check| (*check, Level::Warning)).collect();
+            why_of(effect, Level::Warning, &alarms)
         };
-        for (causes, effects) in ROWS {
-            for (cause, effect) in
-                causes.iter().flat_map(|cause| effects.iter().map(move |effect| (cause, effect)))
-            {
-                assert!(!explains(effect, cause), "{cause} and {effect}");
+        assert_eq!(why("ekf_alert", &["gnss_alert", "imu_gps"]), Some("imu_gps"));
+        assert_eq!(why("ekf_alert", &["gnss_alert", "imu_gps", "gps_stuck"]), Some("gps_stuck"));
+        assert_eq!(why("ekf_alert", &["compass_alert", "gyro_mismatch"]), Some("gyro_mismatch"));
+        assert_eq!(why("gnss_alert", &["gps_speed"]), Some("gps_speed"));
+        assert_eq!(why("gps_speed", &["gnss_alert"]), None, "who measures is not explained by who says so");
+    }
+
+    #[test]
+    fn a_cause_that_was_seen_long_after_another_one_does_not_explain_it() {
+        let at = |s: u64| Instant::from_millis(60_000 + 1_000 * s);
+        let why = |gyro_s: u64| {
+            let alarms =
+                [(at(0), "compass_alert", Level::Warning), (at(gyro_s), "gyro_mismatch", Level::Warning)];
+            because("ekf_alert", Level::Warning, at(30), alarms.into_iter())
+        };
+        assert_eq!([why(5), why(20)], [Some("gyro_mismatch"), Some("compass_alert")]);
+    }
+
+    #[test]
+    fn a_gyro_turns_a_vehicle_over_and_a_motor_comes_before_it() {
+        for effect in ["roll", "pitch", "roll_rate", "pitch_rate", "attitude_alert", "compass_alert"] {
+            for gyro in ["gyro_stuck", "gyro_alert", "gyro_mismatch", "imu_gps"] {
+                assert_eq!(why_of(effect, Level::Warning, &[(gyro, Level::Warning)]), Some(gyro), "{effect}");
             }
         }
+        let both = [("gyro_mismatch", Level::Warning), ("motor_loss", Level::Critical)];
+        assert_eq!(why_of("roll", Level::Warning, &both), Some("motor_loss"));
+        let turned = [("roll_rate", Level::Warning), ("gyro_stuck", Level::Warning)];
+        assert_eq!(why_of("roll", Level::Warning, &turned), Some("gyro_stuck"));
     }
 
     #[test]
@@ -257,6 +310,13 @@ mod tests {
         assert_eq!(why_of("imu_gps", Level::Warning, &[("vibration", Level::Warning)]), Some("vibration"));
         let both = [imu, ("gps_stuck", Level::Warning)];
         assert_eq!(why_of("gnss_alert", Level::Warning, &both), Some("gps_stuck"));
+    }
+
+    #[test]
+    fn what_moves_the_estimator_explains_that_the_autopilot_doubts_its_receiver() {
+        for cause in ["accel_alert", "gyro_stuck", "vibration", "imu_gps"] {
+            assert_eq!(why_of("gnss_alert", Level::Warning, &[(cause, Level::Warning)]), Some(cause));
+        }
     }
 
     #[test]

@@ -39,14 +39,7 @@ impl Level {
 
     /// The level of a stored number.
     pub const fn from_number(number: u8) -> Option<Self> {
-        match number {
-            0 => Some(Self::Ok),
-            1 => Some(Self::Advisory),
-            2 => Some(Self::Warning),
-            3 => Some(Self::Critical),
-            4 => Some(Self::Stale),
-            _ => None,
-        }
+        if (number as usize) < Self::ALL.len() { Some(Self::ALL[number as usize]) } else { None }
     }
 }
 

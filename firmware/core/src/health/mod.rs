@@ -261,7 +261,7 @@ impl Health {
     }
 
     /// Every check instance that has had something to say, with its level.
-    pub fn levels(&self) -> impl Iterator<Item = (&'static Check, u8, Level)> {
+    pub fn levels(&self) -> impl Iterator<Item = (&'static Check, u8, Level)> + Clone {
         checks()
             .flat_map(|check| (0..check.instances).map(move |instance| (check, instance)))
             .zip(&self.states)

@@ -173,7 +173,7 @@ pub(super) const CHECKS: &[Check] = &[
         instances: 1,
         // It goes by the attitude and a receiver too.
         part: Part::Vehicle,
-        read: |inputs, _| inputs.derived.crosschecks().pull().apart(inputs.now),
+        read: |inputs, _| inputs.derived.crosschecks().imu_gnss().residual(inputs.now),
         ..MISMATCH
     },
     Check {

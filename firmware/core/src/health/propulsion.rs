@@ -145,7 +145,7 @@ pub(super) const CHECKS: &[Check] = &[
         when: When::InFlight,
         instances: JUDGED_MAX as u8,
         part: Part::Output,
-        read: |inputs, motor| inputs.derived.outputs().alone(inputs.now, inputs.vehicle, motor),
+        read: |inputs, motor| inputs.derived.outputs().excess(inputs.now, inputs.vehicle, motor),
         ..ESC
     },
     Check {

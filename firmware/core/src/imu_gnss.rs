@@ -43,48 +43,50 @@ const SHAKE_PART: f32 = 0.5;
 
 /// The memory of the comparison.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Pull {
+pub(crate) struct ImuGnssResidual {
     /// Forces since the last step, their number, their mean, and when there was one.
     sum: [f32; 3],
     count: u16,
     mean: [f32; 3],
     mean_at: Stamp,
-    /// What they made of the velocity since the receiver's last one, and between the two before, m/s.
-    gained: [f32; 3],
-    gained_before: Option<[f32; 3]>,
+    /// What they made of the velocity since the receiver's last one, m/s, and their mean between the two before, m/s2.
+    delta_v: [f32; 3],
+    force_before: Option<[f32; 3]>,
     /// The last velocity, m/s; when it came, where it is compared.
     velocity: [f32; 3],
     at: Stamp,
     /// The force, and what of it is missing in the velocity, both smoothed, m/s2.
     force: [f32; 3],
     missing: [f32; 3],
-    apart: Option<f32>,
+    residual: Option<f32>,
 }
 
-impl Pull {
+impl ImuGnssResidual {
     /// Nothing seen.
     pub(crate) const NEW: Self = Self {
         sum: [0.0; 3],
         count: 0,
         mean: [0.0; 3],
         mean_at: Stamp::NONE,
-        gained: [0.0; 3],
-        gained_before: None,
+        delta_v: [0.0; 3],
+        force_before: None,
         velocity: [0.0; 3],
         at: Stamp::NONE,
         force: [0.0; 3],
         missing: [0.0; 3],
-        apart: None,
+        residual: None,
     };
 
     pub(crate) fn take_force(&mut self, force: [f32; 3]) {
         if !force.iter().all(|axis| axis.abs() <= FORCE_MAX) {
             return;
         }
+        // On the ground nothing takes them.
+        let Some(count) = self.count.checked_add(1) else { return };
+        self.count = count;
         for (sum, axis) in self.sum.iter_mut().zip(force) {
             *sum += axis;
         }
-        self.count = self.count.saturating_add(1);
     }
 
     pub(crate) fn step(&mut self, now: Instant, step_s: f32, vehicle: &Vehicle) {
@@ -102,8 +104,8 @@ impl Pull {
             return;
         };
         let [north, east, down] = to_earth(attitude, self.mean);
-        for (gained, axis) in self.gained.iter_mut().zip([north, east, down + GRAVITY]) {
-            *gained += axis * step_s;
+        for (delta_v, axis) in self.delta_v.iter_mut().zip([north, east, down + GRAVITY]) {
+            *delta_v += axis * step_s;
         }
     }
 
@@ -117,7 +119,7 @@ impl Pull {
         let climb_mps = if on_rotors { climb_within(at, vehicle, CLIMB_AGE) } else { Some(0.0) };
         let (Some(speed), Some(course), Some(climb_mps), true) = (gnss.speed, gnss.course, climb_mps, judged)
         else {
-            (self.at, self.apart) = (Stamp::NONE, None);
+            (self.at, self.residual) = (Stamp::NONE, None);
             return;
         };
         let velocity = [speed.0 * libm::cosf(course.0), speed.0 * libm::sinf(course.0), -climb_mps];
@@ -126,46 +128,49 @@ impl Pull {
         let missing = self.take_velocity(step, velocity, if on_rotors { 3 } else { 2 });
         let shaken = SHAKE_PART * vehicle.inertial.shakes_mps2();
         if missing.is_some_and(|missing| !missing.is_finite()) {
-            (self.at, self.apart) = (Stamp::NONE, None);
+            (self.at, self.residual) = (Stamp::NONE, None);
             return;
         }
         let turns_little = vehicle.inertial.turns_little(at, TURNED);
-        self.apart = missing.filter(|_| turns_little).map(|missing| (missing - shaken).max(0.0));
+        self.residual = missing.filter(|_| turns_little).map(|missing| (missing - shaken).max(0.0));
     }
 
     /// A velocity, and the time since the one before, where it is compared with that: what is missing in so many of the axes north, east,
     /// down, m/s2.
     fn take_velocity(&mut self, step: Option<Span>, velocity: [f32; 3], axes: usize) -> Option<f32> {
         let before = core::mem::replace(&mut self.velocity, velocity);
-        let gained_now = core::mem::take(&mut self.gained);
+        let delta_v = core::mem::take(&mut self.delta_v);
         let Some(step_s) = step.map(Span::as_secs_f32) else {
             // Nobody knows since when the forces before it were summed.
-            (self.gained_before, self.force, self.missing) = (None, [0.0; 3], [0.0; 3]);
+            (self.force_before, self.force, self.missing) = (None, [0.0; 3], [0.0; 3]);
             return None;
         };
-        let Some(gained_before) = self.gained_before.replace(gained_now) else {
-            self.force = gained_now.map(|gained| gained / step_s);
+        // Steps are not alike: messages are lost, and what repeats itself is left out.
+        let force_now = delta_v.map(|delta_v| delta_v / step_s);
+        let Some(force_before) = self.force_before.replace(force_now) else {
+            self.force = force_now;
             return None;
         };
         let weight = step_s / (SMOOTHING_S + step_s);
         let mut changes = [0.0; 3];
         for axis in 0..axes {
-            let force = f32::midpoint(gained_before[axis], gained_now[axis]) / step_s;
+            let force = f32::midpoint(force_before[axis], force_now[axis]);
             let missing = (force - (velocity[axis] - before[axis]) / step_s).clamp(-LEAP_MPS2, LEAP_MPS2);
             self.missing[axis] += weight * (missing - self.missing[axis]);
             self.force[axis] += weight * (force - self.force[axis]);
             changes[axis] = (force - self.force[axis]) / SMOOTHING_S;
         }
         let ([north, east, down], [force_north, force_east, _]) = (self.missing, self.force);
-        let felt = norm([force_north, force_east, 0.0]);
-        let flown = norm([force_north - north, force_east - east, 0.0]);
-        let level = (norm([north, east, 0.0]) - HEADING_PART * flown).max((felt - flown).abs());
+        let specific_force = norm([force_north, force_east, 0.0]);
+        let kinematic_acceleration = norm([force_north - north, force_east - east, 0.0]);
+        let level = (norm([north, east, 0.0]) - HEADING_PART * kinematic_acceleration)
+            .max((specific_force - kinematic_acceleration).abs());
         Some(norm([level, down, 0.0]) - LATE_S * norm(changes))
     }
 
     /// How far the force is from the change of velocity, m/s2.
-    pub(crate) fn apart(&self, now: Instant) -> Option<Reading> {
-        Reading::new(self.at.instant(now), self.apart)
+    pub(crate) fn residual(&self, now: Instant) -> Option<Reading> {
+        Reading::new(self.at.instant(now), self.residual)
     }
 }
 
@@ -181,30 +186,56 @@ mod tests {
         // One swing in 5 s, and the velocity that it makes.
         let turns = |time_s: f32| time_s * core::f32::consts::TAU / 5.0;
         let velocity = |time_s: f32| -swings_mps2 * 5.0 / core::f32::consts::TAU * libm::cosf(turns(time_s));
-        let mut pull = Pull::NEW;
+        let mut residual = ImuGnssResidual::NEW;
         let missing = (0_u16..100).filter_map(|step| {
             let time_s = f32::from(step) * STEP_S;
-            pull.gained[0] += velocity(time_s) - velocity(time_s - STEP_S) + untrue_mps2 * STEP_S;
+            residual.delta_v[0] += velocity(time_s) - velocity(time_s - STEP_S) + untrue_mps2 * STEP_S;
             let told = velocity(time_s - STEP_S / 2.0 - late_s);
-            pull.take_velocity((step > 0).then_some(Span::from_millis(200)), [told, 0.0, 0.0], 3)
+            residual.take_velocity((step > 0).then_some(Span::from_millis(200)), [told, 0.0, 0.0], 3)
         });
         missing.fold(0.0, f32::max)
     }
 
     #[test]
     fn a_heading_that_is_wrong_is_no_force() {
-        let mut pull = Pull::NEW;
+        let mut residual = ImuGnssResidual::NEW;
         let mut most = 0.0_f32;
         for step in 0..100 {
             let (time_s, velocity) = (f32::from(step as u8) * STEP_S, 2.5 * STEP_S);
             // It brakes and turns back at 2.5 m/s2; the force is turned by 40 degrees.
             let told = velocity * f32::from(step as u8);
-            pull.gained = [velocity * 0.766, velocity * 0.643, 0.0];
+            residual.delta_v = [velocity * 0.766, velocity * 0.643, 0.0];
             let missing =
-                pull.take_velocity((time_s > 0.0).then_some(Span::from_millis(200)), [told, 0.0, 0.0], 3);
+                residual.take_velocity((time_s > 0.0).then_some(Span::from_millis(200)), [told, 0.0, 0.0], 3);
             most = most.max(missing.unwrap_or(0.0));
         }
         assert!(most < 0.6, "{most}");
+    }
+
+    #[test]
+    fn velocities_that_come_in_unequal_steps_show_as_much_as_others() {
+        let missing = |untrue_mps2: f32| {
+            let mut residual = ImuGnssResidual::NEW;
+            // Some are lost, or repeat themselves; it speeds up by 5 m/s2 throughout.
+            let missing = (0..60_usize).map(|step| {
+                let step_s = [0.2, 0.4, 0.2][step % 3];
+                residual.delta_v = [(5.0 + untrue_mps2) * step_s, 0.0, 0.0];
+                let told = residual.velocity[0] + 5.0 * step_s;
+                let step = (step > 0).then_some(Span::from_millis((step_s * 1_000.0) as u64));
+                residual.take_velocity(step, [told, 0.0, 0.0], 3)
+            });
+            missing.skip(30).flatten().collect::<Vec<_>>()
+        };
+        assert!(missing(0.0).iter().all(|missing| *missing < 0.01), "{:?}", missing(0.0));
+        assert!(missing(2.0).iter().all(|missing| (1.9..2.1).contains(missing)), "{:?}", missing(2.0));
+    }
+
+    #[test]
+    fn forces_that_nothing_takes_for_hours_are_summed_no_more() {
+        let mut residual = ImuGnssResidual::NEW;
+        (0..200_000).for_each(|_| residual.take_force([0.0, 0.0, -9.8]));
+        let mean = residual.sum[2] / f32::from(residual.count);
+        assert!((-9.9..-9.7).contains(&mean), "{mean}");
     }
 
     #[test]
@@ -217,18 +248,18 @@ mod tests {
 
     #[test]
     fn what_was_summed_before_the_first_velocity_is_of_no_step() {
-        let mut pull = Pull { gained: [30.0; 3], missing: [5.0; 3], ..Pull::NEW };
-        let mut take = |step| pull.take_velocity(step, [3.0, 0.0, 0.0], 3);
+        let mut residual = ImuGnssResidual { delta_v: [30.0; 3], missing: [5.0; 3], ..ImuGnssResidual::NEW };
+        let mut take = |step| residual.take_velocity(step, [3.0, 0.0, 0.0], 3);
         let step = Some(Span::from_millis(200));
         assert_eq!([take(None), take(step), take(step)], [None, None, Some(0.0)]);
     }
 
     #[test]
     fn garbage_is_no_force() {
-        let mut pull = Pull::NEW;
+        let mut residual = ImuGnssResidual::NEW;
         for force in [f32::NAN, f32::INFINITY, 1e9, 3.0] {
-            pull.take_force([force, 0.0, -9.8]);
+            residual.take_force([force, 0.0, -9.8]);
         }
-        assert_eq!((pull.count, pull.sum[0]), (1, 3.0));
+        assert_eq!((residual.count, residual.sum[0]), (1, 3.0));
     }
 }
