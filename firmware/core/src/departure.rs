@@ -23,23 +23,33 @@ pub(crate) struct Departure {
 
 impl Departure {
     /// Nothing learnt.
-    pub(crate) const NEW: Self = Self { smooth: 0.0, mean: 0.0, spread: 0.0, learnt_s: 0.0 };
+    pub(crate) const NEW: Self = Self::after(0.0);
+
+    /// Nothing learnt, and nothing to be for so long: the figure has to settle first.
+    pub(crate) const fn after(settles_s: f32) -> Self {
+        Self { smooth: 0.0, mean: 0.0, spread: 0.0, learnt_s: -settles_s }
+    }
 
     /// Takes the figure, `step_s` after the one before, with the time constant of its kind; learns nothing.
     pub(crate) fn follow(&mut self, figure: f32, step_s: f32, smoothing_s: f32) {
         if !(-FIGURE_MAX..=FIGURE_MAX).contains(&figure) {
             return;
         }
-        if self.learnt_s == 0.0 {
+        if self.learnt_s <= 0.0 {
             (self.smooth, self.mean) = (figure, figure);
         }
         self.smooth += step_s / (smoothing_s + step_s) * (figure - self.smooth);
     }
 
+    /// Of what comes round after so much: it is taken round to the side of its usual level.
+    pub(crate) fn wrap(&mut self, round: f32) {
+        self.smooth -= round * libm::roundf(self.departed() / round);
+    }
+
     /// What it follows is usual.
     pub(crate) fn learn(&mut self, step_s: f32) {
         self.learnt_s = (self.learnt_s + step_s).min(MEMORY_S);
-        let weight = if self.learnt_s > 0.0 { step_s / self.learnt_s } else { 1.0 };
+        let weight = if self.learnt_s > step_s { step_s / self.learnt_s } else { 1.0 };
         let off = self.departed();
         self.mean += weight * off;
         self.spread += weight * (libm::fabsf(off) - self.spread);
@@ -89,13 +99,18 @@ impl Departure {
     /// The figure as a multiple of what is usual, where it is beyond its usual range by more than `grain`; 1 where it is not.
     pub(crate) fn multiple(&self, grain: f32) -> Option<f32> {
         let beyond = self.beyond()?;
-        Some(if beyond > grain { self.smooth / self.mean.max(f32::MIN_POSITIVE) } else { 1.0 })
+        Some(if beyond > grain { self.smooth / self.base(grain) } else { 1.0 })
     }
 
     /// From which figure on that is more than so many times; `None` until its usual level is known.
     pub(crate) fn limit(&self, times: f32, grain: f32) -> Option<f32> {
         let usual = self.mean + SPREADS * self.spread;
-        self.is_known().then_some((times * self.mean).max(usual + grain))
+        self.is_known().then_some((times * self.base(grain)).max(usual + grain))
+    }
+
+    /// What multiples are of: a simulator's figure may be exactly 0.
+    fn base(&self, grain: f32) -> f32 {
+        self.mean.max(grain / 10.0)
     }
 }
 
@@ -144,6 +159,25 @@ mod tests {
         assert_eq!(taken(noise(50.0, 300)).beyond(), Some(0.0));
         let slowly = taken(noise(5.0, 200).chain((0..6_000).map(|step| 5.0 + step as f32 / 600.0)));
         assert_eq!(slowly.beyond(), Some(0.0));
+    }
+
+    #[test]
+    fn a_figure_that_was_nothing_rises_by_a_number_of_times() {
+        let risen = taken(core::iter::repeat_n(0.0, 200).chain([5.0; 20]));
+        let multiple = risen.multiple(1.0).unwrap();
+        assert!((10.0..100.0).contains(&multiple), "{multiple}");
+        assert!(risen.limit(2.2, 1.0).is_some_and(|limit| limit <= 5.0));
+    }
+
+    #[test]
+    fn a_figure_that_comes_round_is_as_far_as_the_short_way() {
+        let mut turning = taken((0..200).map(|_| 10.0));
+        for figure in (10..=370).step_by(2) {
+            turning.follow(figure as f32, 1.0, 0.0);
+            turning.wrap(360.0);
+            assert!(turning.departed().abs() <= 181.0, "{figure}");
+        }
+        assert_eq!(turning.beyond_either_way(), Some(0.0));
     }
 
     #[test]

@@ -50,6 +50,10 @@ const NOISE_HOLD_M: f32 = 1.0;
 const CLIMB_MAX_MPS: f32 = 200.0;
 /// Samples further apart are not compared.
 const PAUSE: Span = Span::from_secs(2);
+/// A sample that leaps by more is one wrong message unless the next one leaps too: what no vehicle climbs, m/s, and more noise, m, than
+/// the default limits tell of.
+const LEAPS_MPS: f32 = 50.0;
+const LEAPS_M: f32 = 5.0;
 
 /// What a height has moved of late that the climb does not have.
 #[derive(Clone, Copy, Debug)]
@@ -94,13 +98,15 @@ pub(crate) struct Heights {
     first_hpa: f32,
     /// Height above that, the dynamic pressure of the speed over ground as a height, both in m; the climb, m/s; and when they were
     /// measured.
-    height: Option<(Instant, f32, f32, f32)>,
+    height: (Stamp, f32, f32, f32),
+    /// The last sample leapt, and was passed over.
+    doubted: bool,
     noise: Departure,
     /// The climb that is missing in the estimator's, smoothed, m/s.
     climbs_mps: Option<f32>,
     apart: Departure,
     /// When they were compared last.
-    apart_at: Option<Instant>,
+    apart_at: Stamp,
     /// Height and a half of the dynamic pressure, both in m; the means of the last minute; and what they explain.
     air: [f32; 2],
     taken_off_m: f32,
@@ -113,11 +119,12 @@ impl Heights {
     pub(crate) const fn new() -> Self {
         Self {
             first_hpa: 0.0,
-            height: None,
+            height: (Stamp::NONE, 0.0, 0.0, 0.0),
+            doubted: false,
             noise: Departure::NEW,
             climbs_mps: None,
             apart: Departure::NEW,
-            apart_at: None,
+            apart_at: Stamp::NONE,
             air: [0.0; 2],
             taken_off_m: 0.0,
             leaps: [Leap::NONE; 2],
@@ -138,61 +145,61 @@ impl Heights {
             self.first_hpa = pressure.0;
         }
         let height_m = SCALE_HEIGHT_M * libm::logf(self.first_hpa / pressure.0);
+        let (before, before_m, wind_before_m, climbed_mps) = self.height;
+        let step = before.age(at).filter(|step| *step <= PAUSE);
+        let leaps = step
+            .is_some_and(|step| libm::fabsf(height_m - before_m) > LEAPS_M + LEAPS_MPS * step.as_secs_f32());
+        self.doubted = leaps && !self.doubted;
+        if self.doubted {
+            return;
+        }
         let speed_mps = ground_speed_mps(at, vehicle).unwrap_or(0.0);
         let wind_m = speed_mps * speed_mps / (2.0 * GRAVITY);
         let climb = climb_mps(at, vehicle);
         self.leaps[0].take(at, height_m, climb);
-        let before = self.height.replace((at, height_m, wind_m, climb.unwrap_or(0.0)));
-        if let Some((before, before_m, wind_before_m, _)) = before {
-            let by_wind_m = libm::fabsf(wind_m - wind_before_m);
-            self.take_climb(at, at.since(before), height_m - before_m, by_wind_m, vehicle);
-        }
+        self.height = (Stamp::at(at), height_m, wind_m, climb.unwrap_or(0.0));
+        let Some(step) = step.filter(|step| *step > Span::ZERO) else { return };
+        let step_s = step.as_secs_f32();
+        self.take_climb(at, step_s, height_m - before_m, libm::fabsf(wind_m - wind_before_m), vehicle);
         let calm = is_clear(at, vehicle) && vehicle.inertial.turns_little(at, TURNED);
-        if let (Some((before, before_m, _, climbed_mps)), Some(climb_mps), true) = (before, climb, calm) {
-            let step = at.since(before);
-            if step > Span::ZERO && step <= PAUSE {
-                let step_s = step.as_secs_f32();
-                let off_m = libm::fabsf(height_m - before_m - climb_mps * step_s);
-                let late_m = LATE_S * libm::fabsf(climb_mps) + step_s * libm::fabsf(climb_mps - climbed_mps);
-                self.noise.take((off_m - late_m).max(0.0), step_s, SMOOTHING_S, NOISE_HOLD_M);
-            }
+        if let Some(climb_mps) = climb.filter(|_| calm) {
+            let off_m = libm::fabsf(height_m - before_m - climb_mps * step_s);
+            let late_m = LATE_S * libm::fabsf(climb_mps) + step_s * libm::fabsf(climb_mps - climbed_mps);
+            self.noise.take((off_m - late_m).max(0.0), step_s, SMOOTHING_S, NOISE_HOLD_M);
         }
     }
 
     /// Takes how far it climbed by the barometer in a step, and what the wind may have made of it.
-    fn take_climb(&mut self, at: Instant, step: Span, climbed_m: f32, by_wind_m: f32, vehicle: &Vehicle) {
+    fn take_climb(&mut self, at: Instant, step_s: f32, climbed_m: f32, by_wind_m: f32, vehicle: &Vehicle) {
         let told = vehicle.hud.within(at, PAUSE).and_then(|hud| hud.climb).map(|climb| climb.0);
         // Nothing but zeros is what is sent where no climb is known.
         let told = told.filter(|climb| climb.abs() > 0.0 && climb.abs() <= CLIMB_MAX_MPS);
         let Some(climb_mps) = told.filter(|_| vehicle.hovers(at) == Some(true)) else { return };
-        if step > Span::ZERO && step <= PAUSE {
-            let step_s = step.as_secs_f32();
-            let missing_m = climbed_m - step_s * climb_mps;
-            let beyond_m = libm::copysignf((libm::fabsf(missing_m) - by_wind_m).max(0.0), missing_m);
-            let climbs_mps = self.climbs_mps.get_or_insert(0.0);
-            *climbs_mps += (beyond_m - step_s * *climbs_mps) / (CLIMBS_S + step_s);
-        }
+        let missing_m = climbed_m - step_s * climb_mps;
+        let beyond_m = libm::copysignf((libm::fabsf(missing_m) - by_wind_m).max(0.0), missing_m);
+        let climbs_mps = self.climbs_mps.get_or_insert(0.0);
+        *climbs_mps += (beyond_m - step_s * *climbs_mps) / (CLIMBS_S + step_s);
     }
 
     /// How far the estimator's climb is from that of the barometer, m/s.
-    pub(crate) fn climbs_apart(&self) -> Option<Reading> {
-        Reading::new(self.height.map(|(at, ..)| at), self.climbs_mps.map(libm::fabsf))
+    pub(crate) fn climbs_apart(&self, now: Instant) -> Option<Reading> {
+        Reading::new(self.height.0.instant(now), self.climbs_mps.map(libm::fabsf))
     }
 
     pub(crate) fn take_gnss(&mut self, at: Instant, gnss: &Gnss, vehicle: &Vehicle, flight: &Flight) {
-        let before = self.apart_at;
-        let height = self.height.filter(|(measured, ..)| at.since(*measured) <= PAUSE);
+        let (measured, height_m, ..) = self.height;
+        let known = measured.age(at).is_some_and(|age| age <= PAUSE);
         let good = gnss.is_exact();
         if let Some(altitude) = gnss.altitude.filter(|_| good && flight.is_settled(at)) {
             self.leaps[1].take(at, altitude.0, climb_mps(at, vehicle));
         }
         let climbs = climb_mps(at, vehicle).is_none_or(|climb| libm::fabsf(climb) > CLIMB_MPS);
-        let (Some((_, height_m, ..)), Some(altitude)) = (height, gnss.altitude) else { return };
+        let Some(altitude) = gnss.altitude.filter(|_| known) else { return };
         if !good || climbs || !is_clear(at, vehicle) || !flight.airborne() {
             return;
         }
-        self.apart_at = Some(at);
-        let step_s = before.map_or(0.0, |before| at.since(before).min(PAUSE).as_secs_f32());
+        let before = core::mem::replace(&mut self.apart_at, Stamp::at(at)).age(at);
+        let step_s = before.map_or(0.0, |step| step.min(PAUSE).as_secs_f32());
         let airspeed = vehicle.hud.get().and_then(|hud| hud.airspeed).map_or(0.0, |speed| speed.0);
         let speed_mps = ground_speed_mps(at, vehicle).unwrap_or(0.0).max(airspeed);
         let air = [height_m, speed_mps * speed_mps / (4.0 * GRAVITY)];
@@ -216,8 +223,8 @@ impl Heights {
     }
 
     /// How far the barometer is apart from GPS, beyond what is usual, m.
-    pub(crate) fn apart(&self) -> Option<Reading> {
-        Reading::new(self.apart_at, self.apart.is_known().then(|| self.apart_m()))
+    pub(crate) fn apart(&self, now: Instant) -> Option<Reading> {
+        Reading::new(self.apart_at.instant(now), self.apart.is_known().then(|| self.apart_m()))
     }
 
     /// How far the receiver's height has leapt alone, m.
@@ -228,7 +235,7 @@ impl Heights {
     }
 
     /// How far the barometer's height steps, beyond what is usual, m.
-    pub(crate) fn noise(&self) -> Option<Reading> {
-        Reading::new(self.height.map(|(at, ..)| at), self.noise.beyond())
+    pub(crate) fn noise(&self, now: Instant) -> Option<Reading> {
+        Reading::new(self.height.0.instant(now), self.noise.beyond())
     }
 }

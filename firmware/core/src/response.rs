@@ -20,6 +20,8 @@ const SMOOTHING_S: f32 = 1.0;
 /// What is wanted is as old as this at most: an agile vehicle turns otherwise after it. Between comparisons, [`PAUSE`] at most counts.
 const FRESH: Span = Span::from_millis(150);
 const PAUSE: Span = Span::from_millis(500);
+/// What was not heard for longer begins anew.
+const HOLE: Span = Span::from_millis(1_500);
 /// This part of the rates that are wanted may be missing.
 const LATE_PART: f32 = 0.3;
 /// No vehicle turns faster, rad/s: garbage.
@@ -89,6 +91,9 @@ impl Response {
         if !judged || !flight.is_settled(at) || !wanted.iter().chain(&[roll, pitch]).all(sane) {
             return;
         }
+        if self.compared_at.is_none_or(|before| at.since(before) > HOLE) {
+            (self.missing, self.asked, self.compared_at) = ([0.0; AXES], [0.0; AXES], None);
+        }
         let step_s = self.compared_at.map_or(0.0, |before| at.since(before).min(PAUSE).as_secs_f32());
         let weight = step_s / (SMOOTHING_S + step_s);
         for (axis, (wanted, flown)) in wanted.iter().zip([roll, pitch]).enumerate() {
@@ -105,6 +110,9 @@ impl Response {
             .attitude
             .get()
             .is_none_or(|attitude| attitude.roll.0.abs() < TILT_RAD && attitude.pitch.0.abs() < TILT_RAD);
+        if self.full_at.is_none_or(|before| at.since(before) > HOLE) {
+            self.full_since = None;
+        }
         // Once it was so for long, it is until it climbs.
         let was_long = self.full_since.is_some_and(|since| at.since(since) >= IN_VAIN);
         let in_vain = match vehicle.hovers(at) {

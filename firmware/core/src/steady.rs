@@ -10,9 +10,8 @@ use crate::vehicle::{LANDED_STATE_AGE, Vehicle};
 pub(crate) const TURNED: Span = Span::from_secs(1);
 /// Older motion says nothing.
 const FRESH: Span = Span::from_secs(1);
-/// A hover, m: above this height over home; m/s: over ground, and up or down.
+/// Above this height over home, m; slower up or down, m/s.
 const LOW_M: f32 = 1.5;
-const SLOW_MPS: f32 = 6.0;
 const LEVEL_MPS: f32 = 2.0;
 /// Further it does not lean steadily, rad.
 const LEANS_RAD: f32 = 0.6;
@@ -27,18 +26,6 @@ pub(crate) fn flies_level(now: Instant, vehicle: &Vehicle, flight: &Flight) -> b
         && !vehicle.attitude.get().is_some_and(leans)
         && flight.is_settled(now)
         && is_clear(now, vehicle)
-}
-
-/// Whether it does so, and is level and slow.
-pub(crate) fn hovers(now: Instant, vehicle: &Vehicle, flight: &Flight) -> bool {
-    let slow = vehicle.global.within(now, FRESH).is_none_or(|global| {
-        let [north, east, _] = global.velocity.map(|speed| speed.0);
-        north * north + east * east < SLOW_MPS * SLOW_MPS
-    });
-    // Contact, and the propellers' wash near the ground, set sensors apart too.
-    slow && flight.is_steady(now, vehicle)
-        && flies_level(now, vehicle, flight)
-        && vehicle.inertial.turns_little(now, TURNED)
 }
 
 /// Whether it is away from the ground, as far as that is known.

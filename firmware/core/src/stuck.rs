@@ -21,6 +21,9 @@ const REPEATS_MIN: u8 = 3;
 /// What lasts so many times what is usual is none of it.
 const TIMES: u32 = 4;
 
+/// What was not heard for longer, ms, was not seen to repeat anything meanwhile.
+const HOLE_MS: u32 = 2_000;
+
 /// What trembled is silent once it has repeated one value for so long, ms, and for so many times what is usual.
 const SILENT_MS: u32 = 10_000;
 const SILENT_TIMES: u32 = 20;
@@ -31,11 +34,12 @@ const MOVES_MS: f32 = 3_000.0;
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Stuck {
     /// Check sums of the last two values that differed.
-    values: [u32; 2],
-    /// When the last one came first, and when any came last: milliseconds modulo 2^32.
+    values: [u16; 2],
+    /// When the last one came first: milliseconds modulo 2^32.
     since_ms: u32,
-    at_ms: u32,
-    usual_ms: u32,
+    /// For how long it has come, and the longest that one did before: up to 65.5 s.
+    lasts_ms: u16,
+    usual_ms: u16,
     /// How far the vehicle had moved when the last one came first.
     moved: f32,
     repeats: u8,
@@ -49,7 +53,7 @@ impl Stuck {
     pub(crate) const NEW: Self = Self {
         values: [0; 2],
         since_ms: 0,
-        at_ms: 0,
+        lasts_ms: 0,
         usual_ms: 0,
         moved: 0.0,
         repeats: 0,
@@ -60,24 +64,23 @@ impl Stuck {
     /// Takes a value, as the bits of all it consists of, while the vehicle flies; and how far it has moved in this flight.
     pub(crate) fn take(&mut self, at: Instant, bits: impl IntoIterator<Item = u32>, moved: f32) {
         // FNV-1a, of words.
-        let value =
-            bits.into_iter().fold(0x811C_9DC5_u32, |sum, word| (sum ^ word).wrapping_mul(0x0100_0193));
+        let sum = bits.into_iter().fold(0x811C_9DC5_u32, |sum, word| (sum ^ word).wrapping_mul(0x0100_0193));
+        let value = (sum ^ sum >> 16) as u16;
+        let at_ms = at.as_millis() as u32;
+        let unheard_ms = at_ms.wrapping_sub(self.since_ms).saturating_sub(u32::from(self.lasts_ms));
+        if unheard_ms > HOLE_MS {
+            self.since_ms = self.since_ms.wrapping_add(unheard_ms);
+        }
         if self.values.contains(&value) {
             self.repeats = self.repeats.saturating_add(1);
+            self.lasts_ms = at_ms.wrapping_sub(self.since_ms).min(u16::MAX.into()) as u16;
         } else {
-            if self.changes > 0 {
-                self.usual_ms = self.usual_ms.max(self.lasts_ms());
-            }
+            self.usual_ms = self.usual_ms.max(self.lasts_ms);
             self.trembles = self.trembles.saturating_add(u8::from(moved.to_bits() == self.moved.to_bits()));
             self.values = [value, self.values[0]];
-            (self.since_ms, self.moved, self.repeats) = (at.as_millis() as u32, moved, 0);
+            (self.since_ms, self.moved, self.repeats, self.lasts_ms) = (at_ms, moved, 0, 0);
             self.changes = self.changes.saturating_add(1);
         }
-        self.at_ms = at.as_millis() as u32;
-    }
-
-    const fn lasts_ms(&self) -> u32 {
-        self.at_ms.wrapping_sub(self.since_ms)
     }
 
     /// Whether the last value is not a new one.
@@ -92,23 +95,23 @@ impl Stuck {
 
     /// Whether this one took a new value in the second half of the time for which another has repeated its own: what changed both last
     /// comes in two messages, one after the other.
-    pub(crate) const fn changed_during(&self, other: &Self) -> bool {
-        self.since_ms.wrapping_sub(other.since_ms) as i32 > (other.lasts_ms() / 2) as i32
+    pub(crate) fn changed_during(&self, other: &Self) -> bool {
+        self.since_ms.wrapping_sub(other.since_ms) as i32 > i32::from(other.lasts_ms / 2)
     }
 
     /// Whether it trembled while nothing moved, and does not any more.
     pub(crate) fn fell_silent(&self) -> bool {
         self.trembles >= CHANGES_KNOWN
-            && self.lasts_ms() > self.usual_ms.saturating_mul(SILENT_TIMES).max(SILENT_MS)
+            && u32::from(self.lasts_ms) > (u32::from(self.usual_ms) * SILENT_TIMES).max(SILENT_MS)
     }
 
     /// For how long it has been stuck, s; 0 while it is not. The vehicle has moved so far, and must have moved by `least`
     /// meanwhile, and again by as much each [`MOVES_MS`].
     pub(crate) fn lasts(&self, now: Instant, moved: f32, least: f32) -> Option<Reading> {
         let stuck = self.repeats >= REPEATS_MIN
-            && self.lasts_ms() > self.usual_ms.saturating_mul(TIMES)
-            && moved - self.moved >= least * (self.lasts_ms() as f32 / MOVES_MS).max(1.0);
-        let value = if stuck { self.lasts_ms() as f32 / 1_000.0 } else { 0.0 };
+            && u32::from(self.lasts_ms) > u32::from(self.usual_ms) * TIMES
+            && moved - self.moved >= least * (f32::from(self.lasts_ms) / MOVES_MS).max(1.0);
+        let value = if stuck { f32::from(self.lasts_ms) / 1_000.0 } else { 0.0 };
         self.is_known().then_some(Reading { at: now, value })
     }
 }
@@ -147,6 +150,20 @@ mod tests {
         assert!(silent(0.0, 103));
         assert!(!silent(0.0, 95), "not for long enough");
         assert!(!silent(0.1, 300), "it changed because it moved");
+    }
+
+    #[test]
+    fn a_hole_is_no_repetition() {
+        let after = |repeats: u64| {
+            let mut stuck = Stuck::NEW;
+            for tenth in 0..60 + repeats {
+                let hole_ms = if tenth > 60 { 8_000 } else { 0 };
+                stuck.take(Instant::from_millis(tenth * 100 + hole_ms), [tenth.min(60) as u32], 0.0);
+            }
+            stuck.lasts(Instant::from_millis(999_999), 100.0, 0.5).map(|reading| reading.value)
+        };
+        assert!(after(10).is_some_and(|lasts_s| lasts_s < 1.1), "{:?}", after(10));
+        assert!(after(40).is_some_and(|lasts_s| lasts_s > 3.5), "it is stuck after it too");
     }
 
     #[test]

@@ -58,6 +58,12 @@ struct Fitted {
     places: bool,
     /// How far the second estimator is apart: in roll, rad, in height and north, m.
     second: Option<[f32; 3]>,
+    /// The sensors whose messages come now.
+    speaks: [bool; 3],
+    /// The first sensor's message is `HIGHRES_IMU`.
+    selects: bool,
+    /// Nothing comes from here to there, ms.
+    silence: core::ops::Range<u64>,
 }
 
 /// A number between -1 and 1 for a moment and a sensor: the same one each time.
@@ -108,10 +114,19 @@ impl Fitted {
             gps_north: 0.0,
             places: true,
             second: None,
+            speaks: [true; 3],
+            selects: false,
+            silence: 0..0,
         }
     }
 
     fn says(&self, now_ms: u64) -> Vec<Observation> {
+        if self.silence.contains(&now_ms) {
+            return Vec::new();
+        }
+        if !now_ms.is_multiple_of(100) {
+            return self.sensors_say().collect();
+        }
         let mut said = self.quad.says(now_ms);
         said.retain(|said| match said {
             Observation::Imu(_) | Observation::Attitude(_) => false,
@@ -151,18 +166,7 @@ impl Fitted {
             boot_ms: Some((now_ms + 100_000) as u32),
             ..Attitude::default()
         }));
-        for instance in 0..3_u8 {
-            let sensor = usize::from(instance);
-            said.push(Observation::Imu(Imu {
-                instance,
-                acceleration: Some(self.force[sensor].map(MetresPerSecond2)),
-                rate: Some(self.rate[sensor].map(RadiansPerSecond)),
-                field: Some(self.field[sensor].map(Gauss)),
-                temperature: None,
-            }));
-            let pressure = Some(Hectopascals(self.pressure[sensor]));
-            said.push(Observation::Air(Air { instance, pressure, temperature: None }));
-        }
+        said.extend(self.sensors_say());
         if let Some([roll, up, north]) = self.second {
             let latitude_deg = 47.0 + f64::from(north) / 111_320.0;
             said.push(Observation::SecondEstimate(SecondEstimate {
@@ -175,20 +179,43 @@ impl Fitted {
         said.push(Observation::Outputs(Outputs { port: 0, pulses }));
         said
     }
+
+    fn sensors_say(&self) -> impl Iterator<Item = Observation> + '_ {
+        (0..3_u8).filter(|instance| self.speaks[usize::from(*instance)]).flat_map(|instance| {
+            let sensor = usize::from(instance);
+            let imu = Imu {
+                instance,
+                acceleration: Some(self.force[sensor].map(MetresPerSecond2)),
+                rate: Some(self.rate[sensor].map(RadiansPerSecond)),
+                field: Some(self.field[sensor].map(Gauss)),
+                temperature: None,
+            };
+            let pressure = Some(Hectopascals(self.pressure[sensor]));
+            let air = Air { instance, pressure, temperature: None };
+            let selected = self.selects && instance == 0;
+            let apart = [Observation::Imu(imu), Observation::Air(air)];
+            let both = selected.then_some(Observation::ImuAndAir(imu, air));
+            both.into_iter().chain(apart.into_iter().filter(move |_| !selected))
+        })
+    }
 }
 
 /// Flies; the script changes what it says, from the beginning on.
 fn fly(script: impl Fn(u64, &mut Fitted)) -> Vec<Finding> {
+    fly_with([(100, 0); 3], script)
+}
+
+/// The same with sensors of which each tells every so many milliseconds, from so many on.
+fn fly_with(rhythm: [(u64, u64); 3], script: impl Fn(u64, &mut Fitted)) -> Vec<Finding> {
     let mut monitor = Monitor::new(Params::defaults());
     let mut findings = Vec::new();
-    for now_ms in (0..END_MS).step_by(50) {
+    for now_ms in (0..END_MS).step_by(if rhythm == [(100, 0); 3] { 50 } else { 25 }) {
         let now = Instant::from_millis(now_ms);
         let mut fitted = Fitted::healthy(now_ms);
+        fitted.speaks = rhythm.map(|(every_ms, from_ms)| now_ms % every_ms == from_ms);
         script(now_ms, &mut fitted);
-        if now_ms.is_multiple_of(100) {
-            for observation in fitted.says(now_ms) {
-                monitor.observe(now, AUTOPILOT, &observation);
-            }
+        for observation in fitted.says(now_ms) {
+            monitor.observe(now, AUTOPILOT, &observation);
         }
         let link = LinkReading { frames_lost: Some(0.0), at: now };
         monitor.tick(now, &link, &fitted.quad.recorder, &mut |finding| findings.push(*finding));
@@ -262,7 +289,7 @@ fn a_force_that_changes_the_velocity_is_no_fault_and_a_leap_of_the_velocity_is_n
 fn of_three_sensors_the_one_that_comes_apart_is_named() {
     for sensor in 0..3_u8 {
         let place = usize::from(sensor);
-        finds("accel_mismatch", sensor, Level::Warning, 3_000, |_, fitted| fitted.force[place][2] += 3.0);
+        finds("accel_mismatch", sensor, Level::Warning, 3_200, |_, fitted| fitted.force[place][2] += 3.0);
         finds("gyro_mismatch", sensor, Level::Warning, 1_000, |_, fitted| fitted.rate[place][0] += 0.4);
         finds("compass_mismatch", sensor, Level::Warning, 1_000, |_, fitted| {
             fitted.field[place] = [0.5, 0.1 * fitted.field[place][2], -0.1];
@@ -294,6 +321,196 @@ fn of_two_sensors_the_second_stands_for_both() {
     }
 }
 
+/// All sensors feel how it turns and is pushed: a little, and in gusts after a while.
+fn gusts(now_ms: u64, fitted: &mut Fitted) {
+    let strong = if now_ms < FAULT_MS { 0.05 } else { 1.0 };
+    let wave = |period_ms: f32| (now_ms as f32 / period_ms).sin();
+    fitted.rate.iter_mut().for_each(|rate| rate[0] += strong * 0.4 * wave(70.0));
+    fitted.force.iter_mut().for_each(|force| force[1] += strong * 3.0 * wave(110.0));
+}
+
+#[test]
+fn sensors_that_are_not_sampled_at_one_moment_are_not_apart_in_gusts() {
+    let slow = [(1_000, 0), (1_000, 500), (1_000, 250)];
+    for rhythm in [[(100, 0), (125, 0), (125, 25)], [(50, 0), (250, 25), (250, 25)], slow] {
+        assert_eq!(fly_with(rhythm, gusts), [], "{rhythm:?}");
+    }
+}
+
+#[test]
+fn sensors_that_are_sampled_at_one_moment_are_compared_however_slow_they_are() {
+    for (every_ms, within_ms) in [(500, 4_000), (1_000, 6_000)] {
+        let findings = fly_with([(every_ms, 0), (every_ms, 25), (every_ms, 25)], |now_ms, fitted| {
+            for (force, seed) in fitted.force.iter_mut().zip(10..) {
+                *force = [0.0, 0.4 * noise(now_ms, seed), -9.8 + 0.4 * noise(now_ms, seed + 10)];
+            }
+            if now_ms >= FAULT_MS {
+                fitted.force[2][0] += 3.0;
+            }
+        });
+        let [found] = findings[..] else { panic!("{findings:?}") };
+        assert_eq!((found.check, found.instance), ("accel_mismatch", 2));
+        assert!(found.at.as_millis() <= FAULT_MS + within_ms, "{found:?}");
+    }
+}
+
+#[test]
+fn one_wrong_sample_is_no_mismatch() {
+    for every_ms in [100, 500, 1_000] {
+        for sensor in 0..3 {
+            let findings = fly_with([(every_ms, 0); 3], |now_ms, fitted| {
+                if now_ms == FAULT_MS {
+                    fitted.force[sensor] = [314.0; 3];
+                    fitted.rate[sensor] = [30.0; 3];
+                    fitted.field[sensor] = [-3.0; 3];
+                    if sensor > 0 {
+                        fitted.pressure[sensor] = 700.0;
+                    }
+                }
+            });
+            assert_eq!(findings, [], "{sensor} every {every_ms} ms");
+        }
+    }
+}
+
+#[test]
+fn where_one_of_three_sensors_falls_silent_the_other_two_are_compared_as_two() {
+    for silent in 0..3 {
+        let (first, second) = ([1, 0, 0][silent], [2, 2, 1][silent]);
+        for wrong in [first, second] {
+            let findings = fly(|now_ms, fitted| {
+                fitted.speaks[silent] = now_ms < 20_000;
+                if now_ms >= FAULT_MS {
+                    fitted.force[wrong][1] += 3.0;
+                    fitted.pressure[wrong] += 2.5;
+                }
+            });
+            for check in ["accel_mismatch", "baro_mismatch"] {
+                let mut told =
+                    findings.iter().filter(|one| one.check == check && one.at.as_millis() > FAULT_MS);
+                let found = told.next().unwrap_or_else(|| panic!("{check} without {silent}: {findings:?}"));
+                assert_eq!((usize::from(found.instance), found.level), (second, Level::Warning));
+                assert!(found.at.as_millis() < FAULT_MS + 3_000, "{found:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_hole_is_no_mismatch() {
+    for speaks in [[false; 3], [true, false, false]] {
+        let findings = fly(|now_ms, fitted| {
+            gusts(now_ms, fitted);
+            if (FAULT_MS..FAULT_MS + 8_000).contains(&now_ms) {
+                fitted.speaks = speaks;
+            }
+        });
+        assert!(findings.iter().all(|one| !one.check.ends_with("mismatch")), "{findings:?}");
+    }
+}
+
+#[test]
+fn what_px4_has_selected_and_taken_an_offset_off_is_no_measure_of_the_other_sensors() {
+    let px4 = |_: u64, fitted: &mut Fitted| {
+        (fitted.selects, fitted.quad.autopilot) = (true, Autopilot::Px4);
+        fitted.quad.vibration.levels = [Some(0.0), Some(0.0), Some(1.0)];
+    };
+    is_quiet(|now_ms, fitted| {
+        px4(now_ms, fitted);
+        if now_ms >= FAULT_MS {
+            fitted.rate[0][0] += 0.3;
+            fitted.force[0][0] += 2.0;
+            // Their own axes lie otherwise, and the vehicle has turned.
+            let [_, [_, y, z], [.., down]] = fitted.field;
+            (fitted.field[1], fitted.field[2]) = ([-0.3, y, z], [0.3, -0.2, -down]);
+        }
+    });
+    let findings = fly(|now_ms, fitted| {
+        px4(now_ms, fitted);
+        if now_ms >= FAULT_MS {
+            fitted.rate[2][0] += 0.4;
+        }
+    });
+    let [found] = findings[..] else { panic!("{findings:?}") };
+    assert_eq!((found.check, found.instance), ("gyro_mismatch", 2));
+    assert!(found.at.as_millis() < FAULT_MS + 1_500, "{found:?}");
+}
+
+#[test]
+fn gyros_that_become_noisy_are_apart_though_they_seem_to_turn_fast() {
+    for kind in [(VehicleKind::Plane, 1), (VehicleKind::Rotorcraft, 2)] {
+        let findings = fly(|now_ms, fitted| {
+            ((fitted.quad.kind, fitted.quad.type_number), fitted.speed) = (kind, 15.0);
+            (fitted.force[2], fitted.rate[2], fitted.field[2], fitted.pressure[2]) =
+                ([0.0; 3], [0.0; 3], [0.0; 3], 0.0);
+            if now_ms >= FAULT_MS {
+                for (rate, seed) in fitted.rate.iter_mut().zip(90..) {
+                    *rate = [0, 10, 20].map(|axis| 1.6 * noise(now_ms, seed + axis));
+                }
+            }
+        });
+        let found = findings.iter().find(|one| one.check == "gyro_mismatch");
+        let found = found.unwrap_or_else(|| panic!("{findings:?}"));
+        assert_eq!((found.instance, found.level), (1, Level::Warning));
+        assert!(found.at.as_millis() < FAULT_MS + 4_000, "{found:?}");
+    }
+    // Hard turns at one moment are no difference, also where one gyro's scale is off by a hundredth.
+    is_quiet(|now_ms, fitted| {
+        let turns = if now_ms < FAULT_MS { 0.0 } else { 4.0 * (now_ms as f32 / 300.0).sin() };
+        for (rate, scale) in fitted.rate.iter_mut().zip([1.0, 1.01, 0.99]) {
+            rate[0] += scale * turns;
+        }
+        fitted.turns = [turns, 0.0];
+        fitted.wanted = fitted.turns;
+    });
+}
+
+#[test]
+fn one_wrong_pressure_is_no_climb_and_no_noise() {
+    for every_ms in [100, 500, 1_000] {
+        for wrong_hpa in [980.0, 1_020.0, 500.0] {
+            let findings = fly_with([(every_ms, 0); 3], |now_ms, fitted| {
+                fitted.hud_climb = Some(0.02);
+                if now_ms == FAULT_MS || now_ms == FAULT_MS + 10_000 {
+                    fitted.pressure[0] = wrong_hpa;
+                }
+            });
+            assert_eq!(findings, [], "{wrong_hpa} hPa every {every_ms} ms");
+        }
+    }
+}
+
+#[test]
+fn a_plane_that_stands_after_a_hole_has_no_stuck_sensors() {
+    let still = Fitted::healthy(0);
+    let findings = fly(|now_ms, fitted| {
+        (fitted.quad.kind, fitted.quad.type_number, fitted.speed) = (VehicleKind::Plane, 1, 15.0);
+        fitted.silence = FAULT_MS..FAULT_MS + 6_000;
+        if now_ms >= FAULT_MS + 6_000 {
+            // A simulator without noise.
+            (fitted.force, fitted.rate, fitted.field) = (still.force, still.rate, still.field);
+            (fitted.attitude_noise, fitted.quad.roll) = (0.0, 0.3);
+        }
+    });
+    assert!(findings.iter().all(|one| !one.check.ends_with("_stuck")), "{findings:?}");
+}
+
+#[test]
+fn what_was_so_before_a_hole_is_not_held_through_it() {
+    let findings = fly(|now_ms, fitted| {
+        let since_ms = now_ms.saturating_sub(FAULT_MS);
+        fitted.silence = FAULT_MS + 500..FAULT_MS + 5_500;
+        if (1..500).contains(&since_ms) || (5_500..5_900).contains(&since_ms) {
+            fitted.quad.throttle = 1.0;
+        }
+        if (1..500).contains(&since_ms) {
+            fitted.wanted[0] = -2.5;
+        }
+    });
+    let held = |one: &&Finding| matches!(one.check, "thrust_lost" | "roll_rate");
+    assert_eq!(findings.iter().find(held), None, "{findings:?}");
+}
+
 #[test]
 fn what_is_so_from_the_beginning_is_usual() {
     is_quiet(|_, fitted| {
@@ -311,7 +528,6 @@ fn a_fast_turn_and_a_vtol_say_nothing_about_sensors() {
     let apart = |now_ms: u64, fitted: &mut Fitted| {
         if now_ms >= FAULT_MS {
             fitted.force[1][0] += 3.0;
-            fitted.rate[1][0] += 0.4;
             fitted.field[1] = [0.5, 0.1 * fitted.field[1][2], -0.1];
         }
     };
@@ -321,6 +537,7 @@ fn a_fast_turn_and_a_vtol_say_nothing_about_sensors() {
     });
     is_quiet(|now_ms, fitted| {
         apart(now_ms, fitted);
+        fitted.rate[1][0] += if now_ms >= FAULT_MS { 0.4 } else { 0.0 };
         (fitted.quad.kind, fitted.quad.type_number) = (VehicleKind::Vtol, 20);
     });
 }
@@ -502,6 +719,17 @@ fn a_compass_whose_heading_leaves_the_estimators_is_named_and_declination_and_tu
             fitted.yaw_rate = 0.3;
         }
     });
+}
+
+#[test]
+fn a_compass_that_stood_still_for_a_whole_turn_is_good_again() {
+    let findings = fly(|now_ms, fitted| {
+        let turned_s = (now_ms.clamp(FAULT_MS, FAULT_MS + 20_000) - FAULT_MS) as f32 / 1e3;
+        turned(fitted, 18.0 * turned_s);
+    });
+    let mine = findings.iter().filter(|one| one.check == "compass_heading");
+    let told: Vec<_> = mine.map(|one| one.level).collect();
+    assert_eq!(told, [Level::Warning, Level::Ok], "{findings:?}");
 }
 
 #[test]

@@ -108,7 +108,7 @@ const INPUTS: &[(&str, &str)] = &[
     ("compass_unused", "ESTIMATOR_STATUS: no test ratio of a compass that had 20 of them in this flight"),
     (
         "accel_mismatch",
-        "RAW_IMU, SCALED_IMU, SCALED_IMU2, SCALED_IMU3, HIGHRES_IMU: difference of the forces beyond its usual range in this flight; on rotors, in a hover or turning little",
+        "RAW_IMU, SCALED_IMU, SCALED_IMU2, SCALED_IMU3 of one moment: difference of the forces beyond its usual range in this flight; on rotors, away from the ground, turning little",
     ),
     (
         "imu_gps",
@@ -116,12 +116,12 @@ const INPUTS: &[(&str, &str)] = &[
     ),
     (
         "gyro_mismatch",
-        "the same messages: difference of the rates, likewise; of multicopters in a hover only, on wings too",
+        "the same messages: difference of the rates, likewise; on wings too, and in fast turns where they come within 5 ms; not of VTOLs",
     ),
     ("gyro_noise", "VIBRATION of PX4: the gyro metric"),
     (
         "compass_mismatch",
-        "the same messages: difference of the fields, percent of their length, likewise; not of VTOLs, not in fast turns",
+        "the same messages: difference of the fields, percent of their length, likewise; not of VTOLs, not in fast turns, not where HIGHRES_IMU comes",
     ),
     (
         "baro_mismatch",

@@ -5,10 +5,11 @@ use super::common::{STALE, alert, px4_metric};
 use super::finding::Subsystem;
 use super::inputs::Inputs;
 use crate::cause::Cause;
-use crate::crosscheck::{Kind, SENSORS_MAX};
+
 use crate::geometry::Geometry;
 use crate::latest::Reading;
 use crate::observation::{Estimator, EstimatorScale, Gnss, VehicleKind};
+use crate::pairs::{Kind, SENSORS_MAX};
 use crate::params::Param;
 use crate::time::Span;
 use crate::vehicle::RECEIVERS_MAX;
@@ -141,7 +142,7 @@ pub(super) const CHECKS: &[Check] = &[
         warn: Some(Param::AlertWarn),
         // That it is used says nothing about how well it is.
         alarm_only: true,
-        read: |inputs, _| inputs.derived.crosschecks().compass_unused(inputs.now),
+        read: |inputs, _| inputs.derived.crosschecks().heading().unused(inputs.now),
         ..ESTIMATOR
     },
     MISMATCH,
@@ -193,7 +194,7 @@ pub(super) const CHECKS: &[Check] = &[
         debounce_warn: SMOOTHED,
         instances: 1,
         part: Part::Vehicle,
-        read: |inputs, _| inputs.derived.crosschecks().heading_apart(inputs.now),
+        read: |inputs, _| inputs.derived.crosschecks().heading().apart(inputs.now),
         ..MISMATCH
     },
     Check {
@@ -213,7 +214,7 @@ pub(super) const CHECKS: &[Check] = &[
         debounce_warn: Span::from_secs(1),
         instances: 1,
         part: Part::Sensor,
-        read: |inputs, _| inputs.derived.crosschecks().heights().apart(),
+        read: |inputs, _| inputs.derived.crosschecks().heights().apart(inputs.now),
         ..MISMATCH
     },
     Check {
@@ -224,7 +225,7 @@ pub(super) const CHECKS: &[Check] = &[
         debounce_warn: Span::from_millis(500),
         instances: 1,
         part: Part::Sensor,
-        read: |inputs, _| inputs.derived.crosschecks().heights().noise(),
+        read: |inputs, _| inputs.derived.crosschecks().heights().noise(inputs.now),
         ..MISMATCH
     },
     Check {
@@ -237,7 +238,7 @@ pub(super) const CHECKS: &[Check] = &[
         debounce_critical: Span::from_millis(500),
         instances: 1,
         part: Part::Sensor,
-        read: |inputs, _| inputs.derived.crosschecks().heights().climbs_apart(),
+        read: |inputs, _| inputs.derived.crosschecks().heights().climbs_apart(inputs.now),
         ..MISMATCH
     },
     SECOND,
