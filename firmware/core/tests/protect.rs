@@ -317,8 +317,8 @@ fn one_cancel_holds_for_the_flight_and_the_next_flight_is_protected_again() {
         if (27_000..30_000).contains(&now_ms) {
             quad.battery.remaining = Some(Fraction(0.5));
         }
-        if (38_000..42_000).contains(&now_ms) {
-            (quad.height, quad.armed) = (0.0, now_ms >= 40_000);
+        if (36_000..42_000).contains(&now_ms) {
+            (quad.height, quad.armed) = (0.0, !(38_000..40_000).contains(&now_ms));
         }
     });
     let announced = outcome.steps.iter().filter(|(_, stage, _)| *stage == Stage::Announced);
