@@ -128,7 +128,7 @@ pub struct Mishap {
     beat_at: Instant,
     beat_height_m: Option<f32>,
     heard_at: Instant,
-    /// Disarmed when it was heard first, which was then: whether it falls is to be seen.
+    /// It was heard first then, and has not flown since: if it is disarmed, whether it falls is to be seen.
     first_at: Option<Instant>,
     /// It was not heard in the air: whether it lies is to be seen.
     unheard: Option<Unheard>,
@@ -323,7 +323,7 @@ impl Mishap {
             (State::Quiet, Some(kind))
                 if flight.is_open()
                     || kind == Kind::Disarmed
-                    || (kind == Kind::Impact && self.first_at.is_some())
+                    || (kind == Kind::Impact && self.first_at.is_some() && !self.armed)
                     || self.is_turned_over(now, vehicle, kind) =>
             {
                 self.state = State::Going(now);
@@ -383,8 +383,8 @@ impl Mishap {
         let mut before_m = self.beat_height_m;
         let mut beats_missed = false;
         if beat_at != self.beat_at {
-            if self.beat_at == Instant::ZERO && !armed {
-                self.note_disarmed_first(now, vehicle);
+            if self.beat_at == Instant::ZERO {
+                self.note_first(now, vehicle, armed);
             }
             beats_missed = beat_at.since(self.beat_at) > BEATS;
             before_m = core::mem::replace(&mut self.beat_height_m, height_m(now, vehicle));
@@ -395,7 +395,8 @@ impl Mishap {
             self.disarmed_at = Some(now);
             // The autopilot may have called it landed because it is disarmed.
             if flight.is_open() && self.state == State::Quiet {
-                self.note_disarming(now, vehicle, params, before_m, beats_missed);
+                let height_m = before_m.or_else(|| height_m(now, vehicle));
+                self.note_disarming(now, vehicle, params, height_m, beats_missed);
             }
         }
         self.armed = armed;
@@ -507,7 +508,7 @@ impl Mishap {
             && throttle(now, vehicle).is_none_or(|part| part < IDLE_THROTTLE);
         let hard = shock.load_g > LEGS_G || shock.sink_mps > LEGS_MPS;
         let stopped = shock.stopped && shock.speed_mps >= IMPACT_MPS && hard && !lands;
-        // What is disarmed when it is heard first may be knocked, and lie on its back for its battery.
+        // What was not seen to fly may be knocked, and lie on its back for its battery.
         let hit = stopped
             || (self.first_at.is_none()
                 && ((shock.dropped && shock.load_g > LEGS_G)

@@ -3,7 +3,7 @@
 use super::evidence::{
     BREAKS_OFF, Doubt, FALL_SHOWS, FALLING_MPS, FRESH, Recent, calls_itself_landed, on_rotors,
 };
-use super::{BEATS, Kind, LIES_FOR, Mishap, STILL, STILL_MPS};
+use super::{BEATS, Kind, LIES_FOR, Mishap, STILL, STILL_MPS, WATCHED};
 use crate::motion::{climb_mps, ground_speed_mps};
 use crate::params::{Param, Params};
 use crate::time::Instant;
@@ -45,10 +45,12 @@ impl Mishap {
         }
     }
 
-    /// It was disarmed, or terminated, when it was heard first.
-    pub(super) fn note_disarmed_first(&mut self, now: Instant, vehicle: &Vehicle) {
-        self.disarmed_at = Some(now);
-        if vehicle.armed() {
+    /// It is heard first.
+    pub(super) fn note_first(&mut self, now: Instant, vehicle: &Vehicle, armed: bool) {
+        self.disarmed_at = (!armed).then_some(now);
+        self.first_at = Some(now);
+        // Terminated.
+        if vehicle.armed() && !armed {
             let doubt = Doubt {
                 since: now,
                 height_m: None,
@@ -58,8 +60,6 @@ impl Mishap {
                 stood: true,
             };
             self.doubt = Some(doubt);
-        } else {
-            self.first_at = Some(now);
         }
     }
 
@@ -86,15 +86,16 @@ impl Mishap {
         }
     }
 
-    /// What is disarmed when it is heard first must fall faster than anything is carried down.
+    /// What is disarmed and was not seen to fly must fall faster than anything is carried down.
     fn judge_first(&mut self, now: Instant, params: &Params) {
         let Some(since) = self.first_at else { return };
         let sink_mps = self.sink.now(now);
-        let falls =
-            sink_mps > params.get(Param::MisSink) && self.pressure.agrees(now, sink_mps) == Some(true);
+        let falls = !self.armed
+            && sink_mps > params.get(Param::MisSink)
+            && self.pressure.agrees(now, sink_mps) == Some(true);
         if falls && now.since(since) > Recent::WINDOW {
             self.see(now, Kind::Disarmed, 0.0, params);
-        } else if now.since(since) > FALL_SHOWS {
+        } else if self.support.flies || now.since(since) > WATCHED {
             self.first_at = None;
         }
     }

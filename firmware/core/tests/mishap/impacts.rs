@@ -395,7 +395,7 @@ fn shaking_that_goes_on_is_no_impact_that_goes_on() {
         let outcome = fly(&hovering(of), |ms, quad, motion| {
             // It brakes with a jolt, shakes on, and lands half a minute later.
             motion.ground_mps = if ms < 500 { 4.0 } else { 1.0 };
-            let jolts = ms >= 500 && ms < 31_000 && ms % 2_000 < 50;
+            let jolts = (500..31_000).contains(&ms) && ms % 2_000 < 50;
             motion.load_g = if jolts { 4.2 } else { 1.0 };
             if ms >= 30_000 {
                 (quad.height, quad.throttle, quad.climb) = (0.1, 0.0, 0.0);

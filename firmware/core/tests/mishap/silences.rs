@@ -319,3 +319,16 @@ fn what_is_knocked_about_on_its_back_when_it_is_heard_first_is_none() {
         assert!(knocked.told().is_empty() && knocked.changes.is_empty(), "{of:?}: {:?}", knocked.changes);
     }
 }
+
+#[test]
+fn what_is_disarmed_right_after_it_is_heard_first_and_falls_is_told() {
+    for of in ROTORS {
+        let falls = fly_from(0, &hovering(of), |ms, quad, motion| {
+            (quad.armed, quad.throttle) = (ms < 500, 0.0);
+            let down_m = 9.0 * ms.min(4_000) as f32 / 1_000.0;
+            (quad.climb, quad.height) = if ms < 4_000 { (-9.0, 40.0 - down_m) } else { (0.0, 4.0) };
+            motion.pressure_hpa = Some(980.0 + 0.12 * down_m + (ms / 50 % 3) as f32 * 0.01);
+        });
+        assert_eq!(falls.told().first(), Some(&"disarmed_in_air"), "{of:?}: {:?}", falls.told());
+    }
+}
