@@ -37,6 +37,8 @@ const FLYING_PART: f32 = 0.2;
 const LOST_PART: f32 = 0.4;
 /// Nothing hovers with less throttle.
 const IDLE_THROTTLE: f32 = 0.1;
+/// A plane with less throttle glides: autopilots let its motor idle from some percents on.
+const OFF_THROTTLE: f32 = 0.03;
 /// What turns fast, or did of late, drives each motor as it needs to.
 const TURNED: Span = Span::from_secs(2);
 /// Time constant of the motor speeds that are compared.
@@ -77,7 +79,7 @@ pub struct Derived {
     load_factor: Latest<[f32; 2]>,
     /// When anything at all was heard of the vehicle.
     heard: Option<Instant>,
-    /// When it was heard again after a silence.
+    /// When it was heard again after a silence, or a plane had no throttle last.
     resumed: Instant,
     /// The longest pause of late between two observations, s.
     pause_s: f32,
@@ -181,7 +183,14 @@ impl Derived {
             Observation::SecondEstimate(second) => {
                 self.crosschecks.take_second(at, second, vehicle, flight);
             }
-            Observation::Hud(hud) => self.response.take_hud(at, hud, vehicle, flight),
+            Observation::Hud(hud) => {
+                // On wings a motor is off without throttle, and its ESC may fall silent.
+                let is_off = hud.throttle.is_some_and(|throttle| throttle.0 < OFF_THROTTLE);
+                if is_off && vehicle.hovers(at) == Some(false) {
+                    self.resumed = at;
+                }
+                self.response.take_hud(at, hud, vehicle, flight);
+            }
             Observation::Estimator(estimator) => self.crosschecks.take_estimator(at, estimator, flight),
             // On the scale that the vehicle knows.
             Observation::Vibration(_) => self.crosschecks.take_vibration(at, vehicle, flight),

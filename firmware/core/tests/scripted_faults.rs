@@ -7,7 +7,7 @@ mod common;
 use common::{AUTOPILOT, Quad};
 use hums_core::Monitor;
 use hums_core::health::{CLEAR, Finding, Level, Subsystem};
-use hums_core::observation::{Observation, Sensors, SystemTime};
+use hums_core::observation::{Observation, Sensors, SystemTime, VehicleKind};
 use hums_core::params::Params;
 use hums_core::status::{LinkReading, Recording};
 use hums_core::time::{Instant, Span};
@@ -442,4 +442,17 @@ fn an_alarm_that_outlives_the_one_that_explained_it_is_told_by_itself_once() {
     assert!((end_ms + 6_000..end_ms + 17_000).contains(&at_ms), "{at_ms} after {end_ms}");
     let (_, told) = of_estimator(END_MS);
     assert_eq!(told.len(), 1, "{told:?}");
+}
+
+#[test]
+fn an_esc_of_a_plane_that_glides_may_fall_silent() {
+    let told = |throttle: f32| {
+        let findings = fly(|_, quad| {
+            (quad.kind, quad.type_number, quad.throttle) = (VehicleKind::Plane, 1, throttle);
+            quad.escs[3] = None;
+        });
+        findings.iter().any(|finding| finding.check == "esc_silent" && finding.level != Level::Ok)
+    };
+    assert!(told(0.5));
+    assert!(!told(0.0));
 }

@@ -26,9 +26,11 @@ impl Mishap {
         height_m: Option<f32>,
         beats_missed: bool,
     ) {
-        // Below home there is air too, over a valley. A height that nobody knows may be any, but on wings a landing rolls on.
+        // Below home there is air too, over a valley. A height that nobody knows may be any, where
+        // forces say what becomes of it; but on wings a landing rolls on.
         let limit_m = params.get(Param::MisDisarm);
-        let high = height_m.map_or(on_rotors(now, vehicle), |height_m| height_m.abs() > limit_m);
+        let is_felt = self.felt_at > Instant::ZERO && on_rotors(now, vehicle);
+        let high = height_m.map_or(is_felt, |height_m| height_m.abs() > limit_m);
         // What has landed idles for a while before an autopilot disarms it.
         let had_thrust = self.driven_at == Instant::ZERO || now.since(self.driven_at) <= BEATS;
         if (high && (had_thrust || beats_missed || self.is_uncarried()))
