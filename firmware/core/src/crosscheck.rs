@@ -74,7 +74,10 @@ impl Moved {
             return;
         };
         // Round north it jumps once a turn, which is a turn anyway.
-        let apart = |(axis, before): (f32, f32)| libm::fabsf(axis - before).min(core::f32::consts::PI);
+        let apart = |(axis, before): (f32, f32)| {
+            let apart = libm::fabsf(axis - before);
+            libm::fminf(apart, libm::fabsf(core::f32::consts::TAU - apart))
+        };
         let turned_rad: f32 = now.into_iter().zip(before).map(apart).sum();
         if turned_rad >= TREMBLES_RAD {
             (self.turned_rad, self.attitude) = (self.turned_rad + turned_rad, Some(now));
@@ -140,9 +143,9 @@ impl Crosschecks {
         }
     }
 
-    /// `HIGHRES_IMU` comes.
-    pub(crate) const fn select(&mut self) {
-        self.selects = true;
+    /// `HIGHRES_IMU` comes. Of `ArduPilot` it is the first sensor as any.
+    pub(crate) fn select(&mut self, vehicle: &Vehicle) {
+        self.selects = !vehicle.is_ardupilot();
     }
 
     pub(crate) fn take_imu(&mut self, at: Instant, imu: &Imu, vehicle: &Vehicle, flight: &Flight) {
@@ -234,7 +237,11 @@ impl Crosschecks {
     /// One step, at least every 50 ms.
     pub(crate) fn step(&mut self, now: Instant, vehicle: &Vehicle, flight: &Flight) {
         let step = self.stepped_at.age(now);
-        if step.is_some_and(|step| step < EVERY) || !flight.airborne() {
+        if !flight.airborne() {
+            self.moments_ms = [0; Kind::COUNT];
+            return;
+        }
+        if step.is_some_and(|step| step < EVERY) {
             return;
         }
         let step_s = step.map_or(0.0, |step| step.min(STEP_MAX).as_secs_f32());

@@ -174,7 +174,7 @@ impl Derived {
             Observation::Imu(imu) => self.take_imu(at, imu, vehicle, flight),
             Observation::Air(air) => self.crosschecks.take_air(at, air, vehicle, flight),
             Observation::ImuAndAir(imu, air) => {
-                self.crosschecks.select();
+                self.crosschecks.select(vehicle);
                 self.take_imu(at, imu, vehicle, flight);
                 self.crosschecks.take_air(at, air, vehicle, flight);
             }

@@ -158,7 +158,8 @@ impl Heights {
         let climb = climb_mps(at, vehicle);
         self.leaps[0].take(at, height_m, climb);
         self.height = (Stamp::at(at), height_m, wind_m, climb.unwrap_or(0.0));
-        let Some(step) = step.filter(|step| *step > Span::ZERO) else { return };
+        // One that leaps like the one before it is a step of the barometer, and no climb.
+        let Some(step) = step.filter(|step| *step > Span::ZERO && !leaps) else { return };
         let step_s = step.as_secs_f32();
         self.take_climb(at, step_s, height_m - before_m, libm::fabsf(wind_m - wind_before_m), vehicle);
         let calm = is_clear(at, vehicle) && vehicle.inertial.turns_little(at, TURNED);

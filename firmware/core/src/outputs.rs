@@ -50,6 +50,7 @@ const IDLE: f32 = 0.15;
 const LIKE_OTHERS: RangeInclusive<f32> = 0.5..=1.5;
 /// Motors that carry a vehicle are given more on the average.
 const CARRIES: f32 = 0.1;
+const SURELY_CARRIES: f32 = 0.3;
 /// Further above the others a change teaches nothing, percent.
 const HOLD_PERCENT: f32 = 4.0;
 /// Where commands vary much, a change must be larger: by so many of their mean distances from what is usual.
@@ -97,11 +98,12 @@ impl Range {
     const SHORTEST_US: u16 = 500;
     const LONGEST_US: u16 = 2_500;
 
-    /// What these show it to be: it begins at nothing where one that is given next to nothing on the ground says so.
+    /// What these show it to be: it begins at nothing where all that are given next to nothing on the ground say so.
     fn seen(self, outputs: &[u16], on_ground: bool) -> Self {
-        let begins = |output: &u16| (1..Self::SHORTEST_US).contains(output);
+        let used = || outputs.iter().filter(|output| **output > 0);
+        let begins = || used().count() > 1 && used().all(|output| *output < Self::SHORTEST_US);
         match self {
-            Self::Pulses if on_ground && outputs.iter().any(begins) => Self::DShot,
+            Self::Pulses if on_ground && begins() => Self::DShot,
             Self::DShot if outputs.iter().any(|output| *output > Self::LONGEST_US) => Self::Can,
             known => known,
         }
@@ -186,7 +188,9 @@ impl MotorOutputs {
             return;
         }
         let Some((outputs, _)) = outputs.pulses.split_first_chunk::<JUDGED_MAX>() else { return };
-        self.range = self.range.seen(outputs.get(..told).unwrap_or_default(), !flight.airborne());
+        // `ArduPilot` tells of pulses, whatever its drivers make of them.
+        let drivers = outputs.get(..told).filter(|_| !vehicle.is_ardupilot()).unwrap_or_default();
+        self.range = self.range.seen(drivers, !flight.airborne());
         let parts = outputs.map(|output| self.range.part(output));
         if !flight.airborne() {
             self.note_idle(outputs, &parts, vehicle.armed());
@@ -209,7 +213,8 @@ impl MotorOutputs {
             if !stays {
                 // An output of nothing is not used.
                 let used = outputs.iter().take(count).all(|output| *output > 0);
-                let out = only(given, is_off, carries).filter(|_| used).map(|place| (place, OFF_PERCENT));
+                let out =
+                    only(given, is_off, surely_carries).filter(|_| used).map(|place| (place, OFF_PERCENT));
                 let full = || Some((full_alone(given)?, AT_END_PERCENT));
                 let at_end = out.or_else(full).filter(|(place, _)| {
                     (self.moved | 1 << place) & all == all && flies_level(at, vehicle, flight)
@@ -371,13 +376,15 @@ impl MotorOutputs {
     pub(crate) fn excess(&self, now: Instant, vehicle: &Vehicle, motor: u8) -> Option<Reading> {
         let at = self.at.instant(now).filter(|at| now.since(*at) <= PAUSE)?;
         let count = self.judged(vehicle);
-        // Where all but one moved they are motors, heard in a flight that nobody saw begin.
-        if usize::from(motor) >= count || !(self.is_known() || self.moved.count_ones() as usize + 1 >= count)
-        {
+        // Where all idled on the ground, or all but one moved in a flight that nobody saw begin, they are motors.
+        let are_motors = |seen: u8, all_but: u32| (seen.count_ones() + all_but) as usize >= count;
+        if usize::from(motor) >= count || !(are_motors(self.idle, 0) || are_motors(self.moved, 1)) {
             return None;
         }
         let (place, percent) = self.excess;
-        Some(Reading { at, value: if place == motor { percent.max(0.0) } else { 0.0 } })
+        // What is usual is known after a while in level flight; one that is alone at an end needs none of it.
+        let is_told = place == motor && (self.is_known() || percent >= AT_END_PERCENT);
+        Some(Reading { at, value: if is_told { percent.max(0.0) } else { 0.0 } })
     }
 }
 
@@ -391,6 +398,11 @@ fn is_full(given: &f32) -> bool {
 
 fn carries(given: &f32) -> bool {
     *given > CARRIES
+}
+
+/// Numbers for `DShot` that were not seen on the ground look like pulses: a motor among such is given less of both.
+fn surely_carries(given: &f32) -> bool {
+    *given > SURELY_CARRIES
 }
 
 /// The only motor of which this is so, while that is so of all others.

@@ -79,7 +79,13 @@ impl Kind {
             Self::Compass => 200.0 / (norm(one) + norm(other)),
             Self::Barometer => SCALE_HEIGHT_M / one[0].max(other[0]),
         };
-        [0, 1, 2].map(|axis| (one[axis] - other[axis]) * scale)
+        let difference = [0, 1, 2].map(|axis| (one[axis] - other[axis]) * scale);
+        if self != Self::Gyro {
+            return difference;
+        }
+        let (apart, scales) = (norm(difference), GYRO_SCALE * norm(one).max(norm(other)));
+        let beyond = if apart > scales { (apart - scales) / apart } else { 0.0 };
+        difference.map(|axis| axis * beyond)
     }
 }
 
@@ -89,6 +95,11 @@ struct Sample {
     at: Stamp,
     axes: [f32; 3],
 }
+
+/// Gyros differ so in scale, and autopilots calibrate their offsets only (MPU-6000: 3 %, data sheet).
+const GYRO_SCALE: f32 = 0.05;
+/// Before what is usual is known, one sample moves the difference by so many times what it may later.
+const UNKNOWN_TIMES: f32 = 4.0;
 
 /// Two sensors of a kind.
 #[derive(Clone, Copy, Debug)]
@@ -110,7 +121,11 @@ impl Pair {
         let learnt_s = self.at.age(at).unwrap_or(LEARNT_MAX).min(LEARNT_MAX).as_secs_f32();
         let step_s = learnt_s.min(STEP_MAX_S);
         let weight = if self.at.is_set() { step_s / (kind.smoothing_s() + step_s) } else { 1.0 };
-        let most = if self.usual.is_known() { kind.hold() } else { f32::INFINITY };
+        let most = match (self.usual.is_known(), self.at.is_set()) {
+            (true, _) => kind.hold(),
+            (false, true) => UNKNOWN_TIMES * kind.hold(),
+            (false, false) => f32::INFINITY,
+        };
         for (smooth, axis) in self.difference.iter_mut().zip(difference) {
             *smooth += (weight * (axis - *smooth)).clamp(-most, most);
         }

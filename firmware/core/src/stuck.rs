@@ -26,6 +26,8 @@ const HOLE_MS: u32 = 2_000;
 
 /// What trembled is silent once it has repeated one value for so long, ms, and for so many times what is usual.
 const SILENT_MS: u32 = 10_000;
+/// Longer is not counted, ms: what repeats for so long is stuck, whatever it did before.
+const LASTS_MAX_MS: u32 = 60_000;
 const SILENT_TIMES: u32 = 20;
 /// Each so long, ms, it must have moved again.
 const MOVES_MS: f32 = 3_000.0;
@@ -102,14 +104,15 @@ impl Stuck {
     /// Whether it trembled while nothing moved, and does not any more.
     pub(crate) fn fell_silent(&self) -> bool {
         self.trembles >= CHANGES_KNOWN
-            && u32::from(self.lasts_ms) > (u32::from(self.usual_ms) * SILENT_TIMES).max(SILENT_MS)
+            && u32::from(self.lasts_ms)
+                > (u32::from(self.usual_ms) * SILENT_TIMES).clamp(SILENT_MS, LASTS_MAX_MS)
     }
 
     /// For how long it has been stuck, s; 0 while it is not. The vehicle has moved so far, and must have moved by `least`
     /// meanwhile, and again by as much each [`MOVES_MS`].
     pub(crate) fn lasts(&self, now: Instant, moved: f32, least: f32) -> Option<Reading> {
         let stuck = self.repeats >= REPEATS_MIN
-            && u32::from(self.lasts_ms) > u32::from(self.usual_ms) * TIMES
+            && u32::from(self.lasts_ms) > (u32::from(self.usual_ms) * TIMES).min(LASTS_MAX_MS)
             && moved - self.moved >= least * (f32::from(self.lasts_ms) / MOVES_MS).max(1.0);
         let value = if stuck { f32::from(self.lasts_ms) / 1_000.0 } else { 0.0 };
         self.is_known().then_some(Reading { at: now, value })

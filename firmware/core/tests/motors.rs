@@ -6,7 +6,7 @@ use common::{AUTOPILOT, Quad};
 use hums_core::Monitor;
 use hums_core::health::Level;
 use hums_core::observation::{
-    Attitude, Esc, EscGroup, LandedState, MOTORS_MAX, Observation, Outputs, VehicleKind, VtolState,
+    Attitude, Autopilot, Esc, EscGroup, LandedState, MOTORS_MAX, Observation, Outputs, VehicleKind, VtolState,
 };
 use hums_core::params::Params;
 use hums_core::status::LinkReading;
@@ -240,7 +240,7 @@ fn quad_given_on(
         let climb = if begun { -4.0 } else { 0.0 };
         let speeds = if begun { speeds } else { [5_000.0; 4] };
         let escs = speeds.map(|speed| Esc { rpm: Some(Rpm(speed)), ..esc }).to_vec();
-        (Quad { height, climb, ..Quad::healthy() }, escs, 0.3)
+        (Quad { height, climb, autopilot: Autopilot::Px4, ..Quad::healthy() }, escs, 0.3)
     };
     told_given(script, |now_ms| {
         let mut pulses = [900; MOTORS_MAX];
@@ -356,4 +356,23 @@ fn a_motor_that_was_dead_before_the_vehicle_was_heard_is_found_by_its_output() {
         [],
         "others are near it"
     );
+}
+
+#[test]
+fn a_motor_that_alone_is_given_all_in_wind_that_tilts_the_vehicle_is_weak() {
+    // It never flies level, so that nothing is usual.
+    let script = |now_ms: u64| {
+        let height = if now_ms < 4_000 { 0.0 } else { 40.0 };
+        (Quad { height, roll: 0.6, ..Quad::healthy() }, Vec::new(), 0.0)
+    };
+    let told = told_given(script, |now_ms| {
+        let mut pulses = [900; MOTORS_MAX];
+        pulses[..4].copy_from_slice(&match now_ms {
+            0..4_000 => [1_000; 4],
+            4_000..30_000 => [1_620, 1_600, 1_610, 1_630],
+            _ => [1_620, 1_600, 1_610, 2_000],
+        });
+        Some(pulses)
+    });
+    assert!(told.contains(&("motor_output", 3)), "{told:?}");
 }
