@@ -79,8 +79,8 @@ const SKIDS_MPS: f32 = 15.0;
 /// It is still for [`STILL`] within this time after a shock.
 const AFTER_SHOCK: Span = Span::from_secs(4);
 const STILL: Span = Span::from_secs(1);
-/// What is told this often is of now.
-const STILL_SHOWS: Span = Span::from_millis(300);
+/// A pressure that rose no longer ago rises still.
+const RISES: Span = Span::from_millis(300);
 const STILL_MPS: f32 = 1.0;
 const STILL_RATE: f32 = 0.3;
 /// What is so far above the place where it lay flies again, though it hovers.
@@ -414,7 +414,7 @@ impl Mishap {
             || (self.worst[Kind::Impact as usize] > 0.0 && self.rate < STILL_RATE / 3.0)
             || (self.shock.is_some_and(|shock| shock.dropped) && self.rate < STILL_RATE / 3.0);
         // Under a parachute it is carried, and goes down.
-        let descends = self.pressure.steady_for(now).is_some_and(|span| span < STILL_SHOWS);
+        let descends = self.pressure.steady_for(now).is_some_and(|span| span < RISES);
         let still = slow && !descends && self.rate < STILL_RATE && (0.7..1.3).contains(&self.load_g);
         self.still_since = if still { self.still_since.or(Some(now)) } else { None };
         // What is carried home may be armed still, and no motor turns.

@@ -27,6 +27,10 @@ const LEARNT_MAX: Span = Span::from_millis(500);
 const SETTLES_S: f32 = 2.0;
 /// No sensor measures so much, in any of the units.
 const GARBAGE: f32 = 1e6;
+/// Gyros differ so in scale, and autopilots calibrate their offsets only (MPU-6000: 3 %, data sheet).
+const GYRO_SCALE: f32 = 0.05;
+/// Before what is usual is known, one sample moves the difference by so many times what it may later.
+const UNKNOWN_TIMES: f32 = 4.0;
 
 /// A kind of sensors.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -95,11 +99,6 @@ struct Sample {
     at: Stamp,
     axes: [f32; 3],
 }
-
-/// Gyros differ so in scale, and autopilots calibrate their offsets only (MPU-6000: 3 %, data sheet).
-const GYRO_SCALE: f32 = 0.05;
-/// Before what is usual is known, one sample moves the difference by so many times what it may later.
-const UNKNOWN_TIMES: f32 = 4.0;
 
 /// Two sensors of a kind.
 #[derive(Clone, Copy, Debug)]

@@ -267,10 +267,10 @@ pub(super) struct Support {
     /// It is in the air.
     pub(super) flies: bool,
     /// The part of the throttle that it hovers with, smoothed; 0 where it is not known.
-    pub(super) hover_throttle: f32,
+    hover_throttle: f32,
     /// How long it has hovered.
     pub(super) hovered_s: f32,
-    pub(super) throttle_at: Instant,
+    throttle_at: Instant,
     /// Since when something carries it that is not its rotors, and the pressure then, hPa.
     pub(super) since: Stamp,
     pub(super) hpa: f32,
