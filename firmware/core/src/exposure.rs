@@ -78,7 +78,7 @@ impl Quantity {
         match self {
             Self::EscTemperature => {
                 let motors = vehicle.motors.iter();
-                let fresh = motors.filter(|motor| motor.at.is_some_and(|at| now.since(at) <= FRESH));
+                let fresh = motors.filter(|motor| motor.state_at.is_some_and(|at| now.since(at) <= FRESH));
                 fresh.fold(None, |hot, motor| hottest(motor.esc.temperature, hot))
             }
             Self::BatteryTemperature => {

@@ -51,7 +51,8 @@ const KEPT: [Quantity; 24] = [
     Quantity("rpm_lowest", |inputs| speeds(inputs).reduce(f32::min)),
     Quantity("rpm_highest", |inputs| speeds(inputs).reduce(f32::max)),
     Quantity("esc_hottest_degc", |inputs| {
-        let motors = inputs.vehicle.motors.iter();
+        let fresh = |at: Instant| inputs.now.since(at) <= FRESH;
+        let motors = inputs.vehicle.motors.iter().filter(|motor| motor.state_at.is_some_and(fresh));
         motors.filter_map(|motor| Some(motor.esc.temperature?.0)).reduce(f32::max)
     }),
     Quantity("engine_rpm", |inputs| Some(inputs.vehicle.engine.within(inputs.now, FRESH)?.rpm?.0)),

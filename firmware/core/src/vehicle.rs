@@ -34,15 +34,40 @@ const REBOOT_US: i64 = 3_000_000;
 /// nobody knows what passed meanwhile: a landing, a disarming, another battery.
 const OFF: Span = Span::from_secs(10);
 
-/// One motor, put together from whichever ESC messages the vehicle sends.
+/// One motor, put together from two kinds of ESC messages: PX4 sends both, ArduPilot's one message is of both kinds. The fields of a kind
+/// are those of its last message.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Motor {
-    /// What its ESC said last, field by field.
+    /// The fields of the last message of each kind.
     pub esc: Esc,
-    /// When it said anything.
-    pub at: Option<Instant>,
-    /// When `rpm` or `current` came.
+    /// When `rpm`, `voltage` and `current` came (`ESC_STATUS`).
     pub moved_at: Option<Instant>,
+    /// When `temperature`, `failures` and `errors` came (`ESC_INFO`).
+    pub state_at: Option<Instant>,
+}
+
+impl Motor {
+    const UNKNOWN: Self = Self {
+        esc: Esc { rpm: None, voltage: None, current: None, temperature: None, failures: None, errors: None },
+        moved_at: None,
+        state_at: None,
+    };
+
+    fn take(&mut self, at: Instant, esc: Esc) {
+        let Esc { rpm, voltage, current, temperature, failures, errors } = esc;
+        if rpm.is_some() || voltage.is_some() || current.is_some() {
+            self.esc = Esc { rpm, voltage, current, ..self.esc };
+            self.moved_at = Some(at);
+        }
+        if temperature.is_some() || failures.is_some() || errors.is_some() {
+            self.esc = Esc { temperature, failures, errors, ..self.esc };
+            self.state_at = Some(at);
+        }
+    }
+
+    const fn is_known(&self) -> bool {
+        self.moved_at.is_some() || self.state_at.is_some()
+    }
 }
 
 /// The places up to the last one that is known.
@@ -176,18 +201,7 @@ impl Vehicle {
             told_battery: None,
             estimator: Latest::nothing(),
             vibration: Latest::nothing(),
-            motors: [Motor {
-                esc: Esc {
-                    rpm: None,
-                    voltage: None,
-                    current: None,
-                    temperature: None,
-                    failures: None,
-                    errors: None,
-                },
-                at: None,
-                moved_at: None,
-            }; MOTORS_MAX],
+            motors: [Motor::UNKNOWN; MOTORS_MAX],
             engine: Latest::nothing(),
             landed: Latest::nothing(),
             vtol: VtolState::Unknown,
@@ -211,7 +225,7 @@ impl Vehicle {
 
     /// Motors up to the last one whose ESC has said anything.
     pub(crate) fn motors_known(&self) -> u8 {
-        known(self.motors.iter().map(|motor| motor.at.is_some()))
+        known(self.motors.iter().map(Motor::is_known))
     }
 
     /// Batteries up to the last one that has reported itself.
@@ -530,22 +544,8 @@ impl Vehicle {
 
     fn take_escs(&mut self, at: Instant, group: &EscGroup) {
         for (offset, esc) in group.escs.iter().enumerate() {
-            let (Some(esc), Some(motor)) = (esc, self.motors.get_mut(usize::from(group.first) + offset))
-            else {
-                continue;
-            };
-            let moved = esc.rpm.is_some() || esc.current.is_some();
-            motor.esc = Esc {
-                rpm: esc.rpm.or(motor.esc.rpm),
-                voltage: esc.voltage.or(motor.esc.voltage),
-                current: esc.current.or(motor.esc.current),
-                temperature: esc.temperature.or(motor.esc.temperature),
-                failures: esc.failures.or(motor.esc.failures),
-                errors: esc.errors.or(motor.esc.errors),
-            };
-            motor.at = Some(at);
-            if moved {
-                motor.moved_at = Some(at);
+            if let (Some(esc), Some(motor)) = (esc, self.motors.get_mut(usize::from(group.first) + offset)) {
+                motor.take(at, *esc);
             }
         }
     }
@@ -595,7 +595,7 @@ mod tests {
         let motor = vehicle.motors[11];
         assert_eq!((motor.esc.rpm, motor.esc.errors), (Some(Rpm(5_000.0)), Some(3)));
         assert_eq!(motor.moved_at, Some(Instant::from_millis(1)));
-        assert_eq!(motor.at, Some(Instant::from_millis(2)));
+        assert_eq!(motor.state_at, Some(Instant::from_millis(2)));
     }
 
     /// The climb that is known of an autopilot after so many positions with this vertical speed, beside a displayed climb.

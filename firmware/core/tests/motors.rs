@@ -4,14 +4,14 @@ mod common;
 
 use common::{AUTOPILOT, Quad};
 use hums_core::Monitor;
-use hums_core::health::Level;
+use hums_core::health::{Finding, Level};
 use hums_core::observation::{
     Attitude, Autopilot, Esc, EscGroup, LandedState, MOTORS_MAX, Observation, Outputs, VehicleKind, VtolState,
 };
 use hums_core::params::Params;
 use hums_core::status::LinkReading;
 use hums_core::time::Instant;
-use hums_core::units::{Amperes, Radians, RadiansPerSecond, Rpm};
+use hums_core::units::{Amperes, Celsius, Radians, RadiansPerSecond, Rpm};
 
 /// A minute of flight; what is told of motors. `script` gives the vehicle, its ESCs and its yaw rate.
 fn told(script: impl Fn(u64) -> (Quad, Vec<Esc>, f32)) -> Vec<(&'static str, u8)> {
@@ -375,4 +375,68 @@ fn a_motor_that_alone_is_given_all_in_wind_that_tilts_the_vehicle_is_weak() {
         Some(pulses)
     });
     assert!(told.contains(&("motor_output", 3)), "{told:?}");
+}
+
+/// What is told of ESCs of which PX4 tells by two messages: speeds ten times a second, and their state by `info` at a time in ms.
+fn px4_escs(info: impl Fn(u64) -> Option<Esc>) -> Vec<Finding> {
+    let mut monitor = Monitor::new(Params::defaults());
+    let mut findings = Vec::new();
+    let quad = Quad { autopilot: Autopilot::Px4, ..Quad::healthy() };
+    let status = quad.escs.map(|esc| Some(Esc { temperature: None, failures: None, errors: None, ..esc? }));
+    let quad = Quad { escs: status, ..quad };
+    for now_ms in (0..90_000).step_by(100) {
+        let now = Instant::from_millis(now_ms);
+        let info = info(now_ms).map(|esc| Observation::Escs(EscGroup { first: 0, escs: [Some(esc); 4] }));
+        for said in quad.says(now_ms).into_iter().chain(info) {
+            monitor.observe(now, AUTOPILOT, &said);
+        }
+        let link = LinkReading { frames_lost: Some(0.0), at: now };
+        monitor.tick(now, &link, &quad.recorder, &mut |finding| {
+            if finding.check.starts_with("esc") {
+                findings.push(*finding);
+            }
+        });
+    }
+    findings
+}
+
+#[test]
+fn the_state_of_an_esc_is_as_old_as_its_own_message_however_often_its_speed_comes() {
+    let good = Esc { temperature: Some(Celsius(45.0)), failures: Some(0), errors: Some(0), ..Esc::default() };
+    let bad = [
+        ("esc_failure", Esc { failures: Some(32), ..good }),
+        ("esc_failure", Esc { failures: Some(4), ..good }),
+        ("esc_temperature", Esc { temperature: Some(Celsius(140.0)), ..good }),
+    ];
+    for every_ms in [200, 1_000, 2_000, 4_000] {
+        for (check, bad) in bad {
+            let told = |messages: u64, last_ms: u64| {
+                px4_escs(|now_ms| {
+                    let is_bad = (30_000..30_000 + messages * every_ms).contains(&now_ms);
+                    let is_sent = now_ms.is_multiple_of(every_ms) && now_ms < last_ms;
+                    is_sent.then_some(if is_bad { bad } else { good })
+                })
+            };
+            assert_eq!(told(1, 90_000), [], "one message is no alarm: {check} every {every_ms} ms");
+            let more = told(2 + 2_000 / every_ms, 90_000);
+            let alarms =
+                |one: &&Finding| one.check == check && matches!(one.level, Level::Warning | Level::Critical);
+            assert_eq!(more.iter().filter(alarms).count(), 4, "{check} every {every_ms} ms: {more:?}");
+            let ends = told(0, 40_000);
+            let mut stale = ends.iter().filter(|one| one.check == "esc_temperature");
+            assert!(stale.all(|one| one.level == Level::Stale && one.at.as_millis() < 53_000), "{ends:?}");
+            assert!(ends.iter().any(|one| one.check == "esc_temperature"), "stale every {every_ms} ms");
+        }
+    }
+}
+
+#[test]
+fn a_temperature_that_is_no_longer_in_the_message_is_no_longer_known() {
+    let info = |now_ms: u64| {
+        let temperature = (now_ms < 30_000).then_some(Celsius(45.0));
+        let esc = Esc { temperature, failures: Some(0), errors: Some(0), ..Esc::default() };
+        now_ms.is_multiple_of(1_000).then_some(esc)
+    };
+    let told: Vec<_> = px4_escs(info).iter().map(|one| (one.check, one.level)).collect();
+    assert_eq!(told, [("esc_temperature", Level::Stale); 4]);
 }

@@ -10,7 +10,7 @@ use hums_core::flight::Flight;
 use hums_core::observation::{Esc, Observation, Source};
 use hums_core::time::{Instant, Span};
 use hums_core::units::{MetresPerSecond, MetresPerSecond2};
-use hums_core::vehicle::Vehicle;
+use hums_core::vehicle::{Motor, Vehicle};
 
 use crate::mavlink::values::Scalar;
 
@@ -192,6 +192,8 @@ impl Reference {
         let hud = || vehicle.hud.within(now, AGE_MAX);
         let air = || vehicle.air.within(now, AGE_MAX);
         let position = || gnss().and_then(|gnss| gnss.position).or_else(|| global()?.position);
+        let moves = |motor| self.esc(now, motor, |motor| motor.moved_at);
+        let state = |motor| self.esc(now, motor, |motor| motor.state_at);
         match quantity {
             Quantity::FlightTime => {
                 let flown = self.flight.airborne_since().map_or(self.flown, |since| now.since(since));
@@ -217,12 +219,12 @@ impl Reference {
             Quantity::Throttle => single(percent(hud()?.throttle?.0)),
             Quantity::HudAltitude => single(hud()?.altitude?.0),
             Quantity::ClimbRate => single(hud()?.climb?.0),
-            Quantity::EscRpm(motor) => single(self.esc(now, motor)?.rpm?.0),
-            Quantity::EscVoltage(motor) => single(self.esc(now, motor)?.voltage?.0),
-            Quantity::EscCurrent(motor) => single(self.esc(now, motor)?.current?.0),
-            Quantity::EscFailures(motor) => Some(Scalar::Unsigned(self.esc(now, motor)?.failures?.into())),
-            Quantity::EscErrors(motor) => Some(Scalar::Unsigned(self.esc(now, motor)?.errors?.into())),
-            Quantity::EscTemperature(motor) => single(self.esc(now, motor)?.temperature?.0),
+            Quantity::EscRpm(motor) => single(moves(motor)?.rpm?.0),
+            Quantity::EscVoltage(motor) => single(moves(motor)?.voltage?.0),
+            Quantity::EscCurrent(motor) => single(moves(motor)?.current?.0),
+            Quantity::EscFailures(motor) => Some(Scalar::Unsigned(state(motor)?.failures?.into())),
+            Quantity::EscErrors(motor) => Some(Scalar::Unsigned(state(motor)?.errors?.into())),
+            Quantity::EscTemperature(motor) => single(state(motor)?.temperature?.0),
         }
     }
 
@@ -247,9 +249,10 @@ impl Reference {
         Some(Scalar::Single(percent(remaining?.0)))
     }
 
-    fn esc(&self, now: Instant, motor: usize) -> Option<&Esc> {
+    /// The fields of a motor's ESC, where its last message of that kind is young enough.
+    fn esc(&self, now: Instant, motor: usize, at: fn(&Motor) -> Option<Instant>) -> Option<&Esc> {
         let motor = self.vehicle.motors.get(motor)?;
-        motor.at.filter(|at| now.since(*at) <= AGE_MAX).map(|_| &motor.esc)
+        at(motor).filter(|at| now.since(*at) <= AGE_MAX).map(|_| &motor.esc)
     }
 
     /// The quantities that an observation has just told anew. A motor is `Some` where all of them are that motor's.

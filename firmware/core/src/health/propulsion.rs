@@ -189,12 +189,12 @@ fn motor(inputs: &Inputs<'_>, motor: u8) -> Option<Motor> {
 }
 
 fn errors_per_minute(inputs: &Inputs<'_>, number: u8) -> Option<Reading> {
-    Reading::new(motor(inputs, number)?.at, inputs.derived.esc_errors(number))
+    Reading::new(motor(inputs, number)?.state_at, inputs.derived.esc_errors(number))
 }
 
 fn temperature_c(inputs: &Inputs<'_>, number: u8) -> Option<Reading> {
     let motor = motor(inputs, number)?;
-    Reading::new(motor.at, motor.esc.temperature.map(|temperature| temperature.0))
+    Reading::new(motor.state_at, motor.esc.temperature.map(|temperature| temperature.0))
 }
 
 /// `ESC_FAILURE_FLAGS`: over current 1, over voltage 2, over temperature 4, over rpm 8, inconsistent command 16, motor
@@ -207,5 +207,5 @@ fn failure_rank(inputs: &Inputs<'_>, number: u8) -> Option<Reading> {
         flags if flags & STUCK_OR_FAILED != 0 => 2.0,
         _ => 1.0,
     };
-    Reading::new(motor.at, motor.esc.failures.map(rank))
+    Reading::new(motor.state_at, motor.esc.failures.map(rank))
 }
