@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::Path;
 
-use hums_core::lifetime::{ItemKey, Lifetime, Session};
+use hums_core::lifetime::{Item as _, ItemKey, Lifetime, Session};
 use hums_store::sim::SimFlash;
 use hums_store::{Found, Store, param};
 

@@ -11,7 +11,7 @@
 //! test for a changed mean (Lehmann and Romano, Testing Statistical Hypotheses, 5.2), so its rate of false words can be set
 //! ([`Baseline::reach`]).
 
-use crate::bytes::{Put, Take, Unreadable};
+use crate::bytes::{Fields, Item, Unreadable, fields};
 use crate::half;
 use crate::observation::MOTORS_MAX;
 use crate::vehicle::BATTERIES_MAX;
@@ -162,12 +162,6 @@ fn student_t(rarely: f32, degrees: f32) -> f32 {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Baselines([Baseline; Quantity::COUNT]);
 
-const VERSION: u8 = 3;
-/// Before there were power, outputs and capacity.
-const FEWER: u8 = 2;
-/// Before there were spreads.
-const WITHOUT_SPREADS: u8 = 1;
-
 impl Default for Baselines {
     fn default() -> Self {
         Self::new()
@@ -175,9 +169,6 @@ impl Default for Baselines {
 }
 
 impl Baselines {
-    /// Length of the stored form: version, then value, variance (f32) and flights (u16) of each quantity by [`Quantity::index`].
-    pub const BYTES: usize = 1 + Quantity::COUNT * 10;
-
     /// Nothing learned.
     pub const fn new() -> Self {
         Self([Baseline::NONE; Quantity::COUNT])
@@ -206,39 +197,27 @@ impl Baselines {
             *baseline = Baseline::NONE;
         }
     }
+}
 
-    /// Writes the stored form.
-    pub fn encode(&self, out: &mut [u8; Self::BYTES]) {
-        let mut put = Put::new(out);
-        put.u8(VERSION);
-        for baseline in &self.0 {
-            put.f32(baseline.value).f32(baseline.variance()).u16(baseline.flights);
-        }
-    }
+/// Version; value, variance and flights of each quantity by [`Quantity::index`]; version 2 lacks the last ones. Version 1 had no
+/// variances.
+impl Item for Baselines {
+    const VERSION: u8 = 3;
+    const OLDEST: u8 = 2;
+    const BYTES: usize = 1 + Quantity::COUNT * 10;
+    const EMPTY: Self = Self::new();
 
-    /// Reads the stored form, of any version.
-    pub fn decode(stored: &[u8]) -> Result<Self, Unreadable> {
-        let mut take = Take::new(stored);
-        let mut baselines = Self::new();
-        let version = take.u8()?;
-        if version < WITHOUT_SPREADS {
-            return Err(Unreadable);
+    fn fields(&mut self, fields: &mut Fields<'_>) -> Result<(), Unreadable> {
+        for baseline in &mut self.0 {
+            let mut variance = baseline.variance();
+            fields!(fields: baseline.value, variance, baseline.flights);
+            baseline.spread = half::to_bits(libm::sqrtf(variance));
+            // The root of a negative number is none.
+            if !(baseline.value.is_finite() && baseline.variance().is_finite()) {
+                *baseline = Baseline::NONE;
+            }
         }
-        let stored = if version <= FEWER { FIRST } else { Quantity::COUNT };
-        for baseline in baselines.0.iter_mut().take(stored) {
-            let value = take.f32()?;
-            let variance = if version == WITHOUT_SPREADS { 0.0 } else { take.f32()? };
-            let stored =
-                Baseline { value, spread: half::to_bits(libm::sqrtf(variance)), flights: take.u16()? };
-            // Of a negative one the root is no number.
-            let sane = value.is_finite() && stored.variance().is_finite();
-            *baseline = if sane { stored } else { Baseline::NONE };
-        }
-        if version == WITHOUT_SPREADS {
-            // It was the throttle as it is, and is now that of a set voltage at sea level.
-            baselines.forget(Quantity::HoverThrottle);
-        }
-        Ok(baselines)
+        Ok(())
     }
 }
 
@@ -303,25 +282,12 @@ mod tests {
     }
 
     #[test]
-    fn baselines_of_before_there_were_spreads_are_read() {
-        let mut stored = vec![1];
-        for quantity in 0..FIRST {
-            stored.extend((quantity as f32).to_le_bytes());
-            stored.extend(5_u16.to_le_bytes());
-        }
-        let baselines = Baselines::decode(&stored).expect("readable");
-        let known = baselines.get(Quantity::Resistance(1));
-        assert_eq!(known, Baseline { value: 3.0, spread: 0, flights: 5 });
-        assert_eq!(baselines.get(Quantity::HoverThrottle), Baseline::NONE, "it meant another thing");
-    }
-
-    #[test]
     fn baselines_of_before_there_were_power_and_outputs_are_read() {
         let mut known = Baselines::new();
         known.learn(Quantity::HoverThrottle, 0.4);
         let mut stored = [0; Baselines::BYTES];
         known.encode(&mut stored);
-        stored[0] = FEWER;
+        stored[0] = 2;
         assert_eq!(Baselines::decode(&stored[..=10 * FIRST]), Ok(known));
     }
 
@@ -335,6 +301,8 @@ mod tests {
         baselines.encode(&mut stored);
         assert_eq!(Baselines::decode(&stored), Ok(baselines));
         assert_eq!(Baselines::decode(&[0xFF; Baselines::BYTES]), Ok(Baselines::new()));
+        stored[0] = 1;
+        assert_eq!(Baselines::decode(&stored), Err(Unreadable), "a version without spreads");
         assert_eq!(Baselines::decode(&stored[1..]), Err(Unreadable));
     }
 }

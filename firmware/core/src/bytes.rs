@@ -1,18 +1,218 @@
-//! Stored items: little-endian fields, written one after the other and read likewise.
+//! Stored items: a version byte, then fields, little endian. One list of fields serves for writing and for reading.
 
-/// An item that cannot be read: too short, or of no version.
+use crate::usage::Form;
+
+/// An item that cannot be read: too short, or of no version that this one knows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Unreadable;
 
-/// To the nearest tenth of a second; a cast saturates.
-pub(crate) fn tenths(seconds: f64) -> u32 {
-    libm::round(seconds * 10.0) as u32
+/// An item that outlives power.
+///
+/// A later version only appends fields: an earlier one leaves them out, and fields that an item of an earlier version lacks stay
+/// as they are in [`Self::EMPTY`].
+pub trait Item: Sized {
+    /// The stored form's version, from 1.
+    const VERSION: u8;
+    /// The earliest version that can be read.
+    const OLDEST: u8 = 1;
+    /// Bytes of the stored form at most.
+    const BYTES: usize;
+    /// Whether numbers take only as many bytes as they need.
+    const SHORT: bool = false;
+    /// Nothing counted.
+    const EMPTY: Self;
+
+    /// Every field in its stored order.
+    ///
+    /// # Errors
+    /// [`Unreadable`] where the stored form ends too early; writing has none.
+    fn fields(&mut self, fields: &mut Fields<'_>) -> Result<(), Unreadable>;
+
+    /// Writes the stored form; gives its length. `out` has [`Self::BYTES`] at least.
+    fn encode(mut self, out: &mut [u8]) -> usize {
+        let mut fields = Fields::write(out, Self::VERSION);
+        fields.short = Self::SHORT;
+        let written = self.fields(&mut fields);
+        debug_assert!(written.is_ok() && fields.at <= Self::BYTES);
+        fields.at
+    }
+
+    /// Reads the stored form, of this version or a later one, or of an earlier one from [`Self::OLDEST`] on.
+    ///
+    /// # Errors
+    /// [`Unreadable`] where it ends too early, or is of no such version.
+    fn decode(stored: &[u8]) -> Result<Self, Unreadable> {
+        let mut item = Self::EMPTY;
+        let mut fields = Fields::read(stored, Self::OLDEST, Self::VERSION)?;
+        fields.short = Self::SHORT;
+        item.fields(&mut fields)?;
+        Ok(item)
+    }
 }
 
-/// Sums are never negative, and never without end.
-pub(crate) fn amount(value: f64) -> f64 {
-    if value.is_finite() && value >= 0.0 { value } else { 0.0 }
+enum Way<'a> {
+    Write(&'a mut [u8]),
+    Read(&'a [u8]),
 }
+
+/// The stored form of an item that is being written or read, field by field.
+pub struct Fields<'a> {
+    way: Way<'a>,
+    at: usize,
+    short: bool,
+    /// It was written by an earlier version: fields are missing at its end.
+    lacks: bool,
+}
+
+impl<'a> Fields<'a> {
+    /// Writes an item of this version. Bytes that do not fit are left out: the length is checked by each item's test.
+    pub(crate) fn write(out: &'a mut [u8], version: u8) -> Self {
+        if let Some(first) = out.first_mut() {
+            *first = version;
+        }
+        Self { way: Way::Write(out), at: 1, short: false, lacks: false }
+    }
+
+    /// Reads an item of at least the oldest version.
+    pub(crate) fn read(stored: &'a [u8], oldest: u8, newest: u8) -> Result<Self, Unreadable> {
+        let version = *stored.first().filter(|version| **version >= oldest).ok_or(Unreadable)?;
+        Ok(Self { way: Way::Read(stored), at: 1, short: false, lacks: version < newest })
+    }
+
+    /// Bytes written or read.
+    pub(crate) const fn len(&self) -> usize {
+        self.at
+    }
+
+    /// Whether all bytes were read.
+    pub(crate) const fn is_read(&self) -> bool {
+        matches!(self.way, Way::Read(stored) if stored.len() <= self.at)
+    }
+
+    /// Whether numbers take only as many bytes as they need.
+    pub(crate) const fn is_short(&self) -> bool {
+        self.short
+    }
+
+    fn bytes<const N: usize>(&mut self, bytes: &mut [u8; N]) -> Result<(), Unreadable> {
+        let range = self.at..self.at + N;
+        match &mut self.way {
+            Way::Write(out) => {
+                if let Some(place) = out.get_mut(range) {
+                    place.copy_from_slice(bytes);
+                }
+            }
+            Way::Read(stored) if self.lacks && stored.len() == self.at => return Ok(()),
+            Way::Read(stored) => {
+                bytes.copy_from_slice(stored.get(range).ok_or(Unreadable)?);
+            }
+        }
+        self.at += N;
+        Ok(())
+    }
+
+    /// A count; where numbers are short, LEB128: seven bits a byte, the lowest first, the last byte with the top bit clear.
+    pub(crate) fn count(&mut self, count: &mut u32) -> Result<(), Unreadable> {
+        if !self.short || (self.lacks && self.is_read()) {
+            return count.code(self);
+        }
+        let (reads, mut left, mut value) = (matches!(self.way, Way::Read(_)), *count, 0);
+        for shift in (0..u32::BITS).step_by(7) {
+            let mut byte = left as u8 & 0x7F | if left >= 0x80 { 0x80 } else { 0 };
+            byte.code(self)?;
+            let bits = u32::from(byte & 0x7F);
+            if bits << shift >> shift != bits {
+                return Err(Unreadable);
+            }
+            (left, value) = (left >> 7, value | bits << shift);
+            if byte & 0x80 == 0 {
+                *count = if reads { value } else { *count };
+                return Ok(());
+            }
+        }
+        Err(Unreadable)
+    }
+
+    /// A counter by its form; read, none is negative, and no sum or maximum is without end.
+    pub(crate) fn counter(&mut self, form: Form, value: &mut f64) -> Result<(), Unreadable> {
+        let parts = match form {
+            Form::Tenths => 10.0,
+            Form::Halves => 2.0,
+            Form::Count => 1.0,
+            Form::Amount | Form::Highest | Form::Lowest => {
+                if form == Form::Amount && !self.short {
+                    value.code(self)?;
+                } else {
+                    let mut single = *value as f32;
+                    single.code(self)?;
+                    *value = f64::from(single);
+                }
+                if !(*value >= 0.0 && (value.is_finite() || form == Form::Lowest)) {
+                    *value = form.nothing();
+                }
+                return Ok(());
+            }
+        };
+        // To the nearest tenth; a cast saturates.
+        let whole = *value * parts;
+        let mut count = if form == Form::Tenths { libm::round(whole) } else { whole } as u32;
+        self.count(&mut count)?;
+        *value = f64::from(count) / parts;
+        Ok(())
+    }
+
+    /// A list; where numbers are short, with how many of it are used, and no more than these.
+    pub(crate) fn list<T>(
+        &mut self,
+        list: &mut [T],
+        is_used: fn(&T) -> bool,
+        mut member: impl FnMut(&mut Self, &mut T) -> Result<(), Unreadable>,
+    ) -> Result<(), Unreadable> {
+        let mut used = list.len() as u8;
+        if self.short {
+            used = list.iter().rposition(is_used).map_or(0, |last| last + 1) as u8;
+            used.code(self)?;
+        }
+        let members = list.get_mut(..usize::from(used)).ok_or(Unreadable)?;
+        members.iter_mut().try_for_each(|one| member(self, one))
+    }
+}
+
+/// A field of fixed length.
+pub(crate) trait Field {
+    /// Writes or reads it.
+    fn code(&mut self, fields: &mut Fields<'_>) -> Result<(), Unreadable>;
+}
+
+macro_rules! numbers {
+    ($($number:ty)*) => {$(
+        impl Field for $number {
+            fn code(&mut self, fields: &mut Fields<'_>) -> Result<(), Unreadable> {
+                let mut bytes = self.to_le_bytes();
+                fields.bytes(&mut bytes)?;
+                *self = Self::from_le_bytes(bytes);
+                Ok(())
+            }
+        }
+    )*};
+}
+
+numbers! { u8 u16 u32 i32 u64 f32 f64 }
+
+impl<T: Field, const N: usize> Field for [T; N] {
+    fn code(&mut self, fields: &mut Fields<'_>) -> Result<(), Unreadable> {
+        self.iter_mut().try_for_each(|member| member.code(fields))
+    }
+}
+
+/// Fields in their order.
+macro_rules! fields {
+    ($fields:ident: $($field:expr),* $(,)?) => {{
+        use $crate::bytes::Field as _;
+        $($field.code($fields)?;)*
+    }};
+}
+pub(crate) use fields;
 
 /// FNV-1a (draft-eastlake-fnv, 32 bits): a name in four bytes.
 pub(crate) const fn fnv1a(name: &str) -> u32 {
@@ -23,122 +223,4 @@ pub(crate) const fn fnv1a(name: &str) -> u32 {
         index += 1;
     }
     hash
-}
-
-/// Writes fields; what no longer fits is left out, which the callers' const-asserted lengths rule out.
-pub(crate) struct Put<'a> {
-    out: &'a mut [u8],
-    at: usize,
-}
-
-impl<'a> Put<'a> {
-    pub(crate) const fn new(out: &'a mut [u8]) -> Self {
-        Self { out, at: 0 }
-    }
-
-    pub(crate) fn bytes(&mut self, bytes: &[u8]) -> &mut Self {
-        if let Some(place) = self.out.get_mut(self.at..self.at + bytes.len()) {
-            place.copy_from_slice(bytes);
-        }
-        self.at += bytes.len();
-        self
-    }
-
-    /// Bytes written.
-    pub(crate) const fn len(&self) -> usize {
-        self.at
-    }
-
-    pub(crate) fn u8(&mut self, value: u8) -> &mut Self {
-        self.bytes(&[value])
-    }
-
-    pub(crate) fn u16(&mut self, value: u16) -> &mut Self {
-        self.bytes(&value.to_le_bytes())
-    }
-
-    pub(crate) fn u32(&mut self, value: u32) -> &mut Self {
-        self.bytes(&value.to_le_bytes())
-    }
-
-    pub(crate) fn u64(&mut self, value: u64) -> &mut Self {
-        self.bytes(&value.to_le_bytes())
-    }
-
-    /// LEB128: seven bits a byte, the lowest first; the last one has the top bit clear.
-    pub(crate) fn variable(&mut self, mut value: u32) -> &mut Self {
-        while value >= 0x80 {
-            self.u8(value as u8 | 0x80);
-            value >>= 7;
-        }
-        self.u8(value as u8)
-    }
-
-    pub(crate) fn f32(&mut self, value: f32) -> &mut Self {
-        self.bytes(&value.to_le_bytes())
-    }
-
-    pub(crate) fn f64(&mut self, value: f64) -> &mut Self {
-        self.bytes(&value.to_le_bytes())
-    }
-}
-
-/// Reads fields.
-pub(crate) struct Take<'a>(&'a [u8]);
-
-impl<'a> Take<'a> {
-    pub(crate) const fn new(stored: &'a [u8]) -> Self {
-        Self(stored)
-    }
-
-    pub(crate) const fn is_empty(&self) -> bool {
-        self.0.is_empty()
-    }
-
-    pub(crate) fn array<const N: usize>(&mut self) -> Result<[u8; N], Unreadable> {
-        let (field, rest) = self.0.split_first_chunk().ok_or(Unreadable)?;
-        self.0 = rest;
-        Ok(*field)
-    }
-
-    pub(crate) fn u8(&mut self) -> Result<u8, Unreadable> {
-        self.array().map(|[byte]| byte)
-    }
-
-    pub(crate) fn u16(&mut self) -> Result<u16, Unreadable> {
-        self.array().map(u16::from_le_bytes)
-    }
-
-    pub(crate) fn u32(&mut self) -> Result<u32, Unreadable> {
-        self.array().map(u32::from_le_bytes)
-    }
-
-    pub(crate) fn u64(&mut self) -> Result<u64, Unreadable> {
-        self.array().map(u64::from_le_bytes)
-    }
-
-    /// As [`Put::variable`]; what is too large for 32 bits is not of ours.
-    pub(crate) fn variable(&mut self) -> Result<u32, Unreadable> {
-        let mut value = 0;
-        for shift in (0..u32::BITS).step_by(7) {
-            let byte = self.u8()?;
-            let bits = u32::from(byte & 0x7F);
-            if bits << shift >> shift != bits {
-                return Err(Unreadable);
-            }
-            value |= bits << shift;
-            if byte & 0x80 == 0 {
-                return Ok(value);
-            }
-        }
-        Err(Unreadable)
-    }
-
-    pub(crate) fn f32(&mut self) -> Result<f32, Unreadable> {
-        self.array().map(f32::from_le_bytes)
-    }
-
-    pub(crate) fn f64(&mut self) -> Result<f64, Unreadable> {
-        self.array().map(f64::from_le_bytes)
-    }
 }

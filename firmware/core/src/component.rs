@@ -4,7 +4,7 @@
 //! has run, are an item that outlives power. It is green, from [`Param::CompYellow`] percent of whichever limit trips
 //! first yellow, and from [`Param::CompRed`] percent red. Replacing one is recorded with the old part's figures.
 
-use crate::bytes::{Put, Take, Unreadable};
+use crate::bytes::{Fields, Item, Unreadable, fields};
 use crate::health::finding::Subsystem;
 use crate::observation::MOTORS_MAX;
 use crate::params::{Param, Params};
@@ -269,14 +269,7 @@ pub struct Component {
     as_of: u32,
 }
 
-const VERSION: u8 = 2;
-
 impl Component {
-    /// Length of the stored form: version, kind, number, replaced, name, serial, then powered, flight and motor time in
-    /// tenths of a second (i32), flights (i32) and cycles (f64), which may be negative: what the session had counted
-    /// when it came into it; and, since version 2, which power-on it is as of (u32).
-    pub const BYTES: usize = 1 + 1 + 1 + 2 + 2 * LABEL_BYTES + 4 * 4 + 8 + 4;
-
     /// No component.
     pub const NONE: Self = Self {
         name: Label::EMPTY,
@@ -377,44 +370,31 @@ impl Component {
         }
     }
 
-    /// Writes the stored form, as of the beginning of this power-on.
-    pub fn encode(&self, boots: u32, out: &mut [u8; Self::BYTES]) {
-        let Figures { powered_s, flight_s, motor_s, flights, cycles } = self.base;
-        let tenths = |seconds: f64| libm::round(seconds * 10.0) as i32 as u32;
-        let mut put = Put::new(out);
-        put.u8(VERSION).u8(self.kind as u8).u8(self.number).u16(self.replaced);
-        put.bytes(&self.name.0).bytes(&self.serial.0);
-        put.u32(tenths(powered_s)).u32(tenths(flight_s)).u32(tenths(motor_s));
-        put.u32(flights as i32 as u32).f64(cycles).u32(boots);
+    /// As it is stored: as of the beginning of this power-on.
+    pub(crate) const fn as_of(self, boots: u32) -> Self {
+        Self { as_of: boots, ..self }
     }
+}
 
-    /// Reads the stored form, of this version or another one, at the start of a session.
-    pub fn decode(stored: &[u8]) -> Result<Self, Unreadable> {
-        let mut take = Take::new(stored);
-        let version = take.u8()?;
-        if version == 0 {
-            return Err(Unreadable);
-        }
-        let signed = |number: u32| f64::from(number as i32);
-        let mut component = Self {
-            kind: Kind::from_number(take.u8()?),
-            number: take.u8()?,
-            replaced: take.u16()?,
-            name: Label::of(take.array::<LABEL_BYTES>()?.into_iter()),
-            serial: Label::of(take.array::<LABEL_BYTES>()?.into_iter()),
-            base: Figures {
-                powered_s: signed(take.u32()?) / 10.0,
-                flight_s: signed(take.u32()?) / 10.0,
-                motor_s: signed(take.u32()?) / 10.0,
-                flights: signed(take.u32()?),
-                cycles: Some(take.f64()?).filter(|cycles| cycles.is_finite()).unwrap_or(0.0),
-            },
-            as_of: 0,
-        };
-        if version >= VERSION {
-            component.as_of = take.u32()?;
-        }
-        Ok(component)
+/// Version, kind, number, replaced, name, serial; powered, flight and motor time in tenths of a second, flights, and cycles, which
+/// are negative where the session had counted before the component came into it; since version 2 which power-on it is as of.
+impl Item for Component {
+    const VERSION: u8 = 2;
+    const BYTES: usize = 65;
+    const EMPTY: Self = Self::NONE;
+
+    fn fields(&mut self, fields: &mut Fields<'_>) -> Result<(), Unreadable> {
+        let Figures { powered_s, flight_s, motor_s, flights, cycles } = &mut self.base;
+        let mut kind = self.kind as u8;
+        let mut ran = [*powered_s, *flight_s, *motor_s].map(|seconds| libm::round(seconds * 10.0) as i32);
+        let mut flown = *flights as i32;
+        fields!(fields: kind, self.number, self.replaced, self.name.0, self.serial.0, ran, flown, cycles, self.as_of);
+        self.kind = Kind::from_number(kind);
+        [self.name, self.serial] = [self.name, self.serial].map(|label| Label::of(label.0.into_iter()));
+        [*powered_s, *flight_s, *motor_s] = ran.map(|tenths| f64::from(tenths) / 10.0);
+        *flights = f64::from(flown);
+        *cycles = Some(*cycles).filter(|cycles| cycles.is_finite()).unwrap_or(0.0);
+        Ok(())
     }
 }
 

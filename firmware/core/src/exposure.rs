@@ -1,6 +1,6 @@
 //! Exposure: how long each quantity that ages a part stood in which range, in this session and over the airframe's life.
 
-use crate::bytes::{Put, Take, Unreadable};
+use crate::bytes::{Fields, Item, Unreadable, fields};
 use crate::time::{Instant, Span};
 use crate::units::Celsius;
 use crate::vehicle::Vehicle;
@@ -100,6 +100,7 @@ impl Quantity {
 
 /// Tenths of a second in each range of each quantity.
 pub(crate) type Tenths = [[u32; BINS]; Quantity::ALL.len()];
+pub(crate) const NOTHING: Tenths = [[0; BINS]; Quantity::ALL.len()];
 
 /// Time in ranges.
 #[derive(Clone, Copy, Debug)]
@@ -115,7 +116,6 @@ pub struct Exposure {
 const EVERY: Span = Span::from_millis(100);
 /// Longer steps are gaps: nothing is known of what happened in them.
 const STEP_MAX: Span = Span::from_secs(2);
-const VERSION: u8 = 2;
 
 impl Default for Exposure {
     fn default() -> Self {
@@ -124,14 +124,9 @@ impl Default for Exposure {
 }
 
 impl Exposure {
-    /// Length of the stored form: version, then tenths of a second (u32) in each range of each quantity, and, since
-    /// version 2, which power-on it is as of (u32).
-    pub const BYTES: usize = 1 + 4 * BINS * Quantity::ALL.len() + 4;
-
     /// No time at all.
     pub const fn new() -> Self {
-        let none = [[0; BINS]; Quantity::ALL.len()];
-        Self { last: None, session: none, before: none, as_of: 0 }
+        Self { last: None, session: NOTHING, before: NOTHING, as_of: 0 }
     }
 
     /// One step; `current_a` is what all batteries together give, where that is known.
@@ -167,15 +162,13 @@ impl Exposure {
 
     fn lifetime(&self) -> Tenths {
         let mut both = self.before;
-        for (sum, session) in both.iter_mut().flatten().zip(self.session.iter().flatten()) {
-            *sum = sum.saturating_add(*session);
-        }
+        add(&mut both, &self.session);
         both
     }
 
     /// It is another airframe: what was before this session was not its own.
     pub(crate) fn forget_life(&mut self) {
-        self.before = [[0; BINS]; Quantity::ALL.len()];
+        self.before = NOTHING;
     }
 
     /// What this session has counted.
@@ -186,37 +179,31 @@ impl Exposure {
     /// Adds the session of power-on `boots`, if it is not in it already.
     pub(crate) fn add(&mut self, boots: u32, session: &Tenths) {
         if boots == self.as_of {
-            for (sum, tenths) in self.before.iter_mut().flatten().zip(session.iter().flatten()) {
-                *sum = sum.saturating_add(*tenths);
-            }
+            add(&mut self.before, session);
         }
     }
 
-    /// Writes the stored form, as of the beginning of this power-on.
-    pub fn encode(&self, boots: u32, out: &mut [u8; Self::BYTES]) {
-        let mut put = Put::new(out);
-        put.u8(VERSION);
-        self.before.iter().flatten().for_each(|tenths| {
-            put.u32(*tenths);
-        });
-        put.u32(boots);
+    /// As it is stored: as of the beginning of this power-on.
+    pub(crate) const fn as_of(self, boots: u32) -> Self {
+        Self { as_of: boots, ..self }
     }
+}
 
-    /// Reads the stored form, of this version or another one.
-    pub fn decode(stored: &[u8]) -> Result<Self, Unreadable> {
-        let mut take = Take::new(stored);
-        let version = take.u8()?;
-        if version == 0 {
-            return Err(Unreadable);
-        }
-        let mut exposure = Self::new();
-        for tenths in exposure.before.iter_mut().flatten() {
-            *tenths = take.u32()?;
-        }
-        if version >= VERSION {
-            exposure.as_of = take.u32()?;
-        }
-        Ok(exposure)
+/// Version; tenths of a second in each range of each quantity; since version 2 which power-on it is as of.
+impl Item for Exposure {
+    const VERSION: u8 = 2;
+    const BYTES: usize = 165;
+    const EMPTY: Self = Self::new();
+
+    fn fields(&mut self, fields: &mut Fields<'_>) -> Result<(), Unreadable> {
+        fields!(fields: self.before, self.as_of);
+        Ok(())
+    }
+}
+
+fn add(sums: &mut Tenths, more: &Tenths) {
+    for (sum, more) in sums.iter_mut().flatten().zip(more.iter().flatten()) {
+        *sum = sum.saturating_add(*more);
     }
 }
 
@@ -266,7 +253,7 @@ mod tests {
         assert_eq!(seen(&exposure), [(0, 10.0), (3, 10.0), (7, 0.4)]);
         let session = *exposure.session();
         let mut stored = [0; Exposure::BYTES];
-        exposure.encode(8, &mut stored);
+        exposure.as_of(8).encode(&mut stored);
         let mut exposure = Exposure::decode(&stored).expect("readable");
         exposure.add(7, &session);
         assert_eq!(seen(&exposure), [], "it is in it");

@@ -7,7 +7,7 @@ use common::{AUTOPILOT, Quad};
 use hums_core::Monitor;
 use hums_core::happening::Happening;
 use hums_core::health::{Finding, Level};
-use hums_core::lifetime::{ITEM_BYTES_MAX, ItemKey, Lifetime};
+use hums_core::lifetime::{ITEM_BYTES_MAX, Item as _, ItemKey, Lifetime};
 use hums_core::observation::{Battery, Feeds, Observation, SystemStatus};
 use hums_core::params::{Param, Params};
 use hums_core::status::LinkReading;

@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use hums_core::Monitor;
 use hums_core::baseline::{Baselines, Quantity};
 use hums_core::component::{Kind, Label, Status};
-use hums_core::lifetime::{EVERY, EVERY_ARMED, ITEM_BYTES_MAX, ItemKey, Room};
+use hums_core::lifetime::{EVERY, EVERY_ARMED, ITEM_BYTES_MAX, Item as _, ItemKey, Room};
 use hums_core::observation::{
     AutopilotIdentity, Battery, Esc, EscGroup, GlobalPosition, Heartbeat, Observation, Source, VehicleKind,
 };

@@ -7,7 +7,7 @@ use common::{AUTOPILOT, Quad};
 use hums_core::Monitor;
 use hums_core::happening::Happening;
 use hums_core::health::Finding;
-use hums_core::lifetime::{Airframe, ItemKey, Lifetime};
+use hums_core::lifetime::{Airframe, Item as _, ItemKey, Lifetime};
 use hums_core::observation::{
     Autopilot, AutopilotIdentity, Esc, EscGroup, Heartbeat, LandedState, Observation, Source, VehicleKind,
     VtolState,

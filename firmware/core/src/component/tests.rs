@@ -67,7 +67,7 @@ fn a_component_reads_back_and_the_session_is_added_once() {
         [(component, 5, ran), (component, 6, Figures::ZERO), (replaced, 5, Figures::ZERO)]
     {
         let mut stored = [0; Component::BYTES];
-        component.encode(boots, &mut stored);
+        component.as_of(boots).encode(&mut stored);
         let mut read = Component::decode(&stored).expect("readable");
         assert_eq!((read.name.as_str(), read.kind, read.number), ("pack A", Kind::Battery, 1));
         read.add(5, &wear);

@@ -7,7 +7,7 @@
 use super::check::{Check, Side};
 use super::finding::{Finding, Level};
 use super::tables::checks;
-use crate::bytes::{Put, Take, Unreadable, fnv1a};
+use crate::bytes::{Fields, Unreadable, fields, fnv1a};
 use crate::time::Instant;
 
 /// Checks and instances that are kept.
@@ -51,6 +51,13 @@ impl Crossings {
             critical_tenths: self.critical_tenths.saturating_add(other.critical_tenths),
             peak: worse(self.peak, other.peak, side),
         }
+    }
+
+    /// The stored form: the hash of the check's name, the instance, and these.
+    fn code(&mut self, name: &mut u32, instance: &mut u8, fields: &mut Fields<'_>) -> Result<(), Unreadable> {
+        let Self { warnings, criticals, warning_tenths, critical_tenths, peak } = self;
+        fields!(fields: name, instance, warnings, criticals, warning_tenths, critical_tenths, peak);
+        Ok(())
     }
 
     fn extend(&mut self, level: Level, tenths: u32) {
@@ -225,37 +232,28 @@ impl Exceedances {
     }
 
     /// Writes the stored form; gives its length, which is that of the entries in use.
-    pub fn encode(&self, now: Instant, out: &mut [u8; Self::BYTES]) -> usize {
-        let mut put = Put::new(out);
-        put.u8(VERSION);
-        for exceedance in self.iter(now) {
-            let Crossings { warnings, criticals, warning_tenths, critical_tenths, peak } =
-                exceedance.lifetime;
-            put.u32(fnv1a(exceedance.check.name)).u8(exceedance.instance).u16(warnings).u16(criticals);
-            put.u32(warning_tenths).u32(critical_tenths).f32(peak);
+    pub fn encode(&self, now: Instant, out: &mut [u8]) -> usize {
+        let mut fields = Fields::write(out, VERSION);
+        for Exceedance { check, mut instance, mut lifetime, .. } in self.iter(now) {
+            // Writing has no errors.
+            let _ = lifetime.code(&mut fnv1a(check.name), &mut instance, &mut fields);
         }
-        put.len()
+        fields.len()
     }
 
     /// Reads the stored form, of this version or a later one. A check that there is no longer is left out.
+    ///
+    /// # Errors
+    /// [`Unreadable`] where it ends within an entry, or has no version.
     pub fn decode(stored: &[u8]) -> Result<Self, Unreadable> {
-        let mut take = Take::new(stored);
-        if take.u8()? < VERSION {
-            return Err(Unreadable);
-        }
+        let mut fields = Fields::read(stored, VERSION, VERSION)?;
         let mut exceedances = Self::new();
         for place in &mut exceedances.entries {
-            if take.is_empty() {
+            if fields.is_read() {
                 break;
             }
-            let (name, instance) = (take.u32()?, take.u8()?);
-            let before = Crossings {
-                warnings: take.u16()?,
-                criticals: take.u16()?,
-                warning_tenths: take.u32()?,
-                critical_tenths: take.u32()?,
-                peak: take.f32()?,
-            };
+            let (mut name, mut instance, mut before) = (0, 0, Crossings::NONE);
+            before.code(&mut name, &mut instance, &mut fields)?;
             let check = checks().position(|check| fnv1a(check.name) == name && instance < check.instances);
             *place = check.map(|check| Entry {
                 check: check as u8,

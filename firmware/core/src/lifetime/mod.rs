@@ -19,8 +19,11 @@ mod session;
 pub use saving::{EVERY, EVERY_ARMED, Room, Saving};
 pub use session::Session;
 
+use core::ops::Range;
+
 use crate::baseline::Baselines;
-use crate::bytes::{Put, Take, Unreadable, amount, tenths};
+use crate::bytes::{Fields, fields};
+pub use crate::bytes::{Item, Unreadable};
 use crate::component::{COMPONENTS_MAX, Component};
 use crate::exposure::Exposure;
 use crate::health::exceedance::Exceedances;
@@ -30,11 +33,21 @@ use crate::vehicle::BATTERIES_MAX;
 /// The longest item. Each has its own length.
 pub const ITEM_BYTES_MAX: usize = 512;
 
-const _: () = assert!(Lifetime::BYTES <= ITEM_BYTES_MAX);
-const _: () = assert!(Baselines::BYTES <= ITEM_BYTES_MAX);
-const _: () = assert!(Exceedances::BYTES <= ITEM_BYTES_MAX);
-const _: () = assert!(Exposure::BYTES <= ITEM_BYTES_MAX);
-const _: () = assert!(Component::BYTES <= ITEM_BYTES_MAX);
+const _: () = {
+    let lengths = [
+        Lifetime::BYTES,
+        Baselines::BYTES,
+        Exceedances::BYTES,
+        Exposure::BYTES,
+        Component::BYTES,
+        Session::BYTES,
+    ];
+    let mut place = 0;
+    while place < lengths.len() {
+        assert!(lengths[place] <= ITEM_BYTES_MAX);
+        place += 1;
+    }
+};
 
 /// What a stored item is. The numbers are stored and never change meaning.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -159,25 +172,33 @@ pub struct Lifetime {
     pub totals: Totals,
 }
 
-/// Counters of version 1: the first of [`UsageCounter::ALL`]. A later version's are appended at the item's end.
+/// Counters of version 1: the first of [`UsageCounter::ALL`]. Those of later versions stand at the item's end.
 const COUNTERS_V1: usize = 32;
-/// Version 2 appends the counters that came since.
-const VERSION: u8 = 2;
+
+/// Counters of an item, by their places in [`UsageCounter::ALL`].
+fn counters(totals: &mut Totals, places: Range<usize>, fields: &mut Fields<'_>) -> Result<(), Unreadable> {
+    for counter in &UsageCounter::ALL[places] {
+        let mut value = totals.raw(*counter);
+        fields.counter(counter.form(), &mut value)?;
+        totals.set(*counter, value);
+    }
+    Ok(())
+}
+
+/// Run time and revolutions of each motor; short, whole revolutions.
+fn motors(totals: &mut Totals, fields: &mut Fields<'_>) -> Result<(), Unreadable> {
+    let revolutions = if fields.is_short() { Form::Count } else { Form::Amount };
+    fields.list(
+        &mut totals.motors,
+        |motor| motor.seconds > 0.0,
+        |fields, motor| {
+            fields.counter(Form::Tenths, &mut motor.seconds)?;
+            fields.counter(revolutions, &mut motor.revolutions)
+        },
+    )
+}
 
 impl Lifetime {
-    /// Length of the stored form: version, system id, unique id, boots, sessions, counters in the order of
-    /// [`UsageCounter::ALL`] as their [`Form`] says, then seconds (tenths, u32) and revolutions (f64) of each motor, then (since version 2) the
-    /// counters after the first 32, and the cells of each battery.
-    pub const BYTES: usize = {
-        let mut bytes = 1 + 1 + 8 + 4 + 4 + crate::observation::MOTORS_MAX * (4 + 8) + BATTERIES_MAX;
-        let mut place = 0;
-        while place < UsageCounter::ALL.len() {
-            bytes += UsageCounter::ALL[place].form().bytes();
-            place += 1;
-        }
-        bytes
-    };
-
     /// Nothing lived yet.
     pub const fn new() -> Self {
         Self {
@@ -188,158 +209,152 @@ impl Lifetime {
             totals: Totals::nothing(),
         }
     }
-
-    /// Writes the stored form.
-    pub fn encode(&self, out: &mut [u8; Self::BYTES]) {
-        let mut put = Put::new(out);
-        put.u8(VERSION).u8(self.airframe.system).u64(self.airframe.uid).u32(self.boots).u32(self.sessions);
-        for counter in &UsageCounter::ALL[..COUNTERS_V1] {
-            put_counter(&mut put, counter.form(), self.totals.raw(*counter));
-        }
-        for motor in &self.totals.motors {
-            put.u32(tenths(motor.seconds)).f64(motor.revolutions);
-        }
-        for counter in &UsageCounter::ALL[COUNTERS_V1..] {
-            put_counter(&mut put, counter.form(), self.totals.raw(*counter));
-        }
-        put.bytes(&self.cells);
-    }
-
-    /// Reads the stored form, of this version or a later one.
-    pub fn decode(stored: &[u8]) -> Result<Self, Unreadable> {
-        let mut take = Take::new(stored);
-        let mut lifetime = Self::new();
-        let version = take.u8()?;
-        if version == 0 {
-            return Err(Unreadable);
-        }
-        lifetime.airframe = Airframe { system: take.u8()?, uid: take.u64()? };
-        (lifetime.boots, lifetime.sessions) = (take.u32()?, take.u32()?);
-        for counter in &UsageCounter::ALL[..COUNTERS_V1] {
-            let value = take_counter(&mut take, counter.form())?;
-            lifetime.totals.set(*counter, value);
-        }
-        for motor in &mut lifetime.totals.motors {
-            motor.seconds = f64::from(take.u32()?) / 10.0;
-            motor.revolutions = amount(take.f64()?);
-        }
-        for counter in UsageCounter::ALL[COUNTERS_V1..].iter().filter(|_| version >= VERSION) {
-            let value = take_counter(&mut take, counter.form())?;
-            lifetime.totals.set(*counter, value);
-        }
-        if version >= VERSION {
-            lifetime.cells = take.array()?;
-        }
-        Ok(lifetime)
-    }
 }
 
-fn put_counter(put: &mut Put<'_>, form: Form, value: f64) {
-    match form {
-        Form::Tenths => put.u32(tenths(value)),
-        Form::Count => put.u32(value as u32),
-        Form::Halves => put.u32((2.0 * value) as u32),
-        Form::Amount => put.f64(value),
-        Form::Highest | Form::Lowest => put.f32(value as f32),
-    };
-}
+/// Version, system id, unique id, boots, sessions; counters by their [`Form`]; seconds and revolutions of each motor; since
+/// version 2 the counters after the first 32, and the cells of each battery.
+impl Item for Lifetime {
+    const VERSION: u8 = 2;
+    const BYTES: usize = 314;
+    const EMPTY: Self = Self::new();
 
-fn take_counter(take: &mut Take<'_>, form: Form) -> Result<f64, Unreadable> {
-    Ok(match form {
-        Form::Tenths => f64::from(take.u32()?) / 10.0,
-        Form::Count => f64::from(take.u32()?),
-        Form::Halves => f64::from(take.u32()?) / 2.0,
-        Form::Amount => amount(take.f64()?),
-        Form::Highest => amount(f64::from(take.f32()?)),
-        Form::Lowest => {
-            let value = f64::from(take.f32()?);
-            if value >= 0.0 { value } else { f64::INFINITY }
-        }
-    })
+    fn fields(&mut self, fields: &mut Fields<'_>) -> Result<(), Unreadable> {
+        let Self { airframe, boots, sessions, cells, totals } = self;
+        fields!(fields: airframe.system, airframe.uid, boots, sessions);
+        counters(totals, 0..COUNTERS_V1, fields)?;
+        motors(totals, fields)?;
+        counters(totals, COUNTERS_V1..UsageCounter::ALL.len(), fields)?;
+        fields!(fields: cells);
+        Ok(())
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::usage::MotorTotals;
 
-    /// What version 2 appends: a later version appends its own.
-    const V2_BYTES: usize = 4 + BATTERIES_MAX;
-    const _: () = assert!(UsageCounter::ALL.len() == COUNTERS_V1 + 1, "a later version appends its counters");
-
-    /// 10,000 hours of hard work.
-    fn old() -> Lifetime {
-        let mut lifetime = Lifetime {
-            airframe: Airframe { system: 3, uid: 0x0102_0304_0506_0708 },
-            boots: 40_000,
-            sessions: 39_000,
-            cells: [6, 3, 0, 0],
-            ..Lifetime::new()
-        };
+    fn life(cells: [u8; BATTERIES_MAX], value: fn(Form) -> f64, motor: (f64, f64)) -> Lifetime {
+        let airframe = Airframe { system: 3, uid: 0x0102_0304_0506_0708 };
+        let mut lifetime = Lifetime { airframe, boots: 40_000, sessions: 39_000, cells, ..Lifetime::new() };
         for counter in UsageCounter::ALL {
-            let value = match counter.form() {
-                Form::Tenths => 36_000_000.3,
-                Form::Count => 123_456.0,
-                Form::Halves => 4_000_000.5,
-                Form::Amount => 123_456_789.123_456,
-                Form::Highest | Form::Lowest => 14.25,
-            };
-            lifetime.totals.set(*counter, value);
+            lifetime.totals.set(*counter, value(counter.form()));
         }
-        for motor in &mut lifetime.totals.motors {
-            (motor.seconds, motor.revolutions) = (36_000_000.7, 6e9 + 0.001);
+        for of in &mut lifetime.totals.motors {
+            (of.seconds, of.revolutions) = motor;
         }
         lifetime
     }
 
-    #[test]
-    fn ten_thousand_hours_read_back_to_the_last_digit() {
-        let mut stored = [0; Lifetime::BYTES];
-        old().encode(&mut stored);
-        assert_eq!(Lifetime::decode(&stored), Ok(old()));
-        let mut empty = [0xFF; Lifetime::BYTES];
-        Lifetime::new().encode(&mut empty);
-        assert_eq!(Lifetime::decode(&empty), Ok(Lifetime::new()));
+    /// 10,000 hours of hard work.
+    fn old() -> Lifetime {
+        let value = |form| match form {
+            Form::Tenths => 36_000_000.3,
+            Form::Count => 123_456.0,
+            Form::Halves => 4_000_000.5,
+            Form::Amount => 123_456_789.123_456,
+            Form::Highest | Form::Lowest => 14.25,
+        };
+        life([6, 3, 0, 0], value, (36_000_000.7, 6e9 + 0.001))
     }
 
-    #[test]
-    fn the_stored_layout_of_version_1_stays_what_it_is() {
-        let mut stored = [0; Lifetime::BYTES];
-        old().encode(&mut stored);
-        assert_eq!(stored.len(), 306 + V2_BYTES);
-        assert_eq!(stored[0], 2);
-        stored[0] = 1;
-        let stored = &stored[..306];
-        assert_eq!(stored[..14], [1, 3, 8, 7, 6, 5, 4, 3, 2, 1, 0x40, 0x9C, 0, 0]);
-        let sum = stored.iter().fold(0_u32, |sum, byte| sum.wrapping_mul(31).wrapping_add(u32::from(*byte)));
-        assert_eq!(sum, 1_761_518_064, "a published layout never changes");
-        let mut read = Lifetime::decode(stored).expect("version 1 reads");
-        assert!(read.totals.raw(UsageCounter::Mishaps) <= 0.0, "what it did not know is not counted");
-        assert_eq!(read.cells, [0; BATTERIES_MAX]);
-        read.totals.set(UsageCounter::Mishaps, 123_456.0);
-        read.cells = old().cells;
-        assert_eq!(read, old());
+    /// Half an hour of a quad.
+    fn half_an_hour() -> Session {
+        let value = |form| match form {
+            Form::Tenths => 1_800.5,
+            Form::Count => 1.0,
+            Form::Halves => 120.5,
+            Form::Amount | Form::Highest | Form::Lowest => 14.25,
+        };
+        let mut totals = life([0; BATTERIES_MAX], value, (1_790.0, 150_000.0)).totals;
+        totals.motors[4..].fill(MotorTotals::default());
+        Session::of(70_000, &totals, [0.0, 0.5, 0.0, 0.0], [[0, 0, 12_000, 6_000, 0, 0, 0, 0]; 5])
     }
 
-    #[test]
-    fn a_later_version_reads_and_a_cut_one_does_not() {
-        let mut stored = [0xEE; Lifetime::BYTES + 9];
-        let (known, _) = stored.split_first_chunk_mut().expect("long enough");
-        old().encode(known);
-        stored[0] = 3;
-        assert_eq!(Lifetime::decode(&stored), Ok(old()));
-        for cut in 0..Lifetime::BYTES {
-            assert_eq!(Lifetime::decode(&stored[..cut]), Err(Unreadable), "{cut}");
+    fn longest() -> Session {
+        let totals = life([0; BATTERIES_MAX], |_| f64::MAX, (f64::MAX, f64::MAX)).totals;
+        Session::of(u32::MAX, &totals, [f64::MAX; BATTERIES_MAX], [[u32::MAX; 8]; 5])
+    }
+
+    fn stored(item: impl Item) -> Vec<u8> {
+        let mut out = [0xEE; ITEM_BYTES_MAX];
+        let length = item.encode(&mut out);
+        out[..length].to_vec()
+    }
+
+    fn sum(stored: &[u8]) -> u32 {
+        stored.iter().fold(0, |sum, byte| sum.wrapping_mul(31).wrapping_add(u32::from(*byte)))
+    }
+
+    /// Reads back, also what a later version appended to, but not cut, nor without a version.
+    fn reads_back<T: Item + Copy + PartialEq + core::fmt::Debug>(item: T) -> Vec<u8> {
+        let known = stored(item);
+        assert_eq!(T::decode(&known), Ok(item));
+        let mut later = known.clone();
+        later[0] += 1;
+        later.extend([0xEE; 9]);
+        assert_eq!(T::decode(&later), Ok(item), "of a later version");
+        for cut in 0..known.len() {
+            assert_eq!(T::decode(&known[..cut]), Err(Unreadable), "{cut}");
         }
-        stored[0] = 0;
-        assert_eq!(Lifetime::decode(&stored), Err(Unreadable));
+        later[0] = 0;
+        assert_eq!(T::decode(&later), Err(Unreadable));
+        known
+    }
+
+    #[test]
+    fn what_was_lived_reads_back_to_the_last_digit_and_is_as_long_as_the_sums_say() {
+        assert_eq!(reads_back(old()).len(), Lifetime::BYTES);
+        assert_eq!(reads_back(Lifetime::new()).len(), Lifetime::BYTES);
+        assert!(reads_back(half_an_hour()).len() <= Session::BYTES_TYPICAL);
+        assert_eq!(stored(longest()).len(), Session::BYTES);
+    }
+
+    #[test]
+    fn a_published_layout_never_changes_and_what_version_1_did_not_know_is_not_counted() {
+        // Version 2 appends mishaps, and cells.
+        assert_eq!(UsageCounter::ALL.len(), COUNTERS_V1 + 1, "a later version appends its counters");
+        let mut first = stored(old());
+        first.truncate(306);
+        first[0] = 1;
+        assert_eq!(sum(&first), 1_761_518_064);
+        let mut read = Lifetime::decode(&first).expect("version 1 reads");
+        assert_eq!((read.totals.raw(UsageCounter::Mishaps) as u32, read.cells), (0, [0; BATTERIES_MAX]));
+        read.totals.set(UsageCounter::Mishaps, 123_456.0);
+        assert_eq!(Lifetime { cells: old().cells, ..read }, old());
+        let mut first = stored(half_an_hour());
+        first.pop();
+        first[0] = 1;
+        let mut read = Session::decode(&first).expect("version 1 reads");
+        read.totals.set(UsageCounter::Mishaps, 1.0);
+        assert_eq!(read, half_an_hour());
+        first.resize(498, 0);
+        assert_eq!(sum(&first), 2_790_154_667);
     }
 
     #[test]
     fn no_stored_bytes_make_nonsense() {
-        let lifetime = Lifetime::decode(&[0xFF; Lifetime::BYTES]).expect("long enough");
-        lifetime
-            .totals
-            .for_each(|number, value| assert!(value.is_finite() && value >= 0.0, "{number} {value}"));
+        for byte in 0..=255 {
+            let life = Lifetime::decode(&[byte; ITEM_BYTES_MAX]).map(|life| life.totals);
+            let session = Session::decode(&[byte; ITEM_BYTES_MAX]).map(|session| session.totals);
+            for totals in [life, session, Session::decode(&stored(longest())).map(|session| session.totals)] {
+                let sane =
+                    |number, value: f64| assert!(value.is_finite() && value >= 0.0, "{number} {value}");
+                if let Ok(totals) = totals {
+                    totals.for_each(sane);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_session_is_added_once() {
+        for (boots, sum) in [(70_000, (10, 11)), (70_001, (9, 10))] {
+            let mut life = Lifetime { boots, sessions: 9, ..Lifetime::new() };
+            life.totals.set(UsageCounter::Flights, 10.0);
+            life.add(&half_an_hour());
+            assert_eq!((life.sessions, life.totals.raw(UsageCounter::Flights) as u32), sum);
+        }
     }
 
     #[test]

@@ -2,13 +2,12 @@
 
 use super::Monitor;
 use crate::baseline::Baselines;
-use crate::bytes::Unreadable;
 use crate::component::Component;
 use crate::exposure::Exposure;
 use crate::flight::FlightEvent;
 use crate::happening::Happening;
 use crate::health::exceedance::Exceedances;
-use crate::lifetime::{Airframe, ITEM_BYTES_MAX, ItemKey, Lifetime, Room, Session};
+use crate::lifetime::{Airframe, ITEM_BYTES_MAX, Item as _, ItemKey, Lifetime, Room, Session, Unreadable};
 use crate::time::{Instant, Span};
 
 /// `AUTOPILOT_VERSION` is asked for and answered long before: whoever has said no unique id by then says none.
@@ -111,22 +110,19 @@ impl Monitor {
 
     /// Writes an item as it is to be saved; gives its length.
     pub fn encode_item(&self, key: ItemKey, out: &mut [u8; ITEM_BYTES_MAX]) -> usize {
+        let boots = self.boots();
         match key {
-            ItemKey::Lifetime => {
-                encoded(out, |out| Lifetime { boots: self.boots(), ..self.before }.encode(out))
-            }
-            ItemKey::Baselines => encoded(out, |out| self.baselines.encode(out)),
-            ItemKey::Exceedances => {
-                out.first_chunk_mut().map_or(0, |out| self.exceedances.encode(self.usage.until(), out))
-            }
-            ItemKey::Exposure => encoded(out, |out| self.exposure.encode(self.boots(), out)),
+            ItemKey::Lifetime => Lifetime { boots, ..self.before }.encode(out),
+            ItemKey::Baselines => self.baselines.encode(out),
+            ItemKey::Exceedances => self.exceedances.encode(self.usage.until(), out),
+            ItemKey::Exposure => self.exposure.as_of(boots).encode(out),
             ItemKey::Component(place) => {
                 let component = self.components.get(usize::from(place)).unwrap_or(&Component::NONE);
-                encoded(out, |out| component.encode(self.boots(), out))
+                component.as_of(boots).encode(out)
             }
             ItemKey::Session => {
                 let (totals, wear) = (self.usage.totals(), self.usage.wear());
-                Session::now(self.boots(), self.heard(), &totals, &wear, &self.exposure).encode(out)
+                Session::now(boots, self.heard(), &totals, &wear, &self.exposure).encode(out)
             }
         }
     }
@@ -135,13 +131,4 @@ impl Monitor {
     pub const fn saved(&mut self, key: ItemKey) {
         self.saving.saved(key);
     }
-}
-
-/// Writes at the start of the buffer; gives the length.
-fn encoded<const N: usize>(out: &mut [u8; ITEM_BYTES_MAX], encode: impl FnOnce(&mut [u8; N])) -> usize {
-    const { assert!(N <= ITEM_BYTES_MAX) };
-    out.first_chunk_mut().map_or(0, |out| {
-        encode(out);
-        N
-    })
 }
