@@ -13,7 +13,7 @@
 //! entered (5 bytes), and of these tenths of a second, variable length. Version 2 appends the counters that came since, as the
 //! others.
 //!
-//! Of a quad with four ESCs after half an hour that is some 155 bytes; at most [`Session::BYTES_MAX`].
+//! Of a quad with four ESCs after half an hour that is some 155 bytes; at most [`Session::BYTES`](super::Item::BYTES).
 
 use super::{COUNTERS_V1, Item, Lifetime, Unreadable, counters, motors};
 use crate::bytes::{Fields, fields};
