@@ -29,11 +29,10 @@ use hums_core::Monitor;
 use hums_core::params::Params;
 use hums_onboard::persist::mailbox::MailboxOut;
 use hums_onboard::queues::{Ends, Queues};
-use hums_onboard::{Handover, Keeper, Monitoring};
+use hums_onboard::{Handover, Keeper, Monitoring, ResetCause};
 use static_cell::{ConstStaticCell, StaticCell};
 
 use boards::board;
-use boards::machine::ResetCause;
 use tasks::monitor;
 
 static QUEUES: ConstStaticCell<Queues> = ConstStaticCell::new(Queues::new());
@@ -60,7 +59,7 @@ fn start() -> board::Idle {
     unsafe { memory::init() };
     let boots = fault::count_start();
     let parts = board::take();
-    defmt::info!("start {=u32}, {}, id {=[u8]:02x}", boots, parts.boot.cause, parts.boot.id);
+    defmt::info!("start {=u32}, {=str}, id {=[u8]:02x}", boots, parts.boot.cause.name(), parts.boot.id);
 
     let queues = QUEUES.take().split();
     let Ends { frames_in, frames_out, sectors_in, sectors_out, gs_in, gs_out, .. } = queues;

@@ -1,6 +1,7 @@
 //! What every board is made of: the types of its parts, and what is known of its start.
 
 use embedded_storage::nor_flash::NorFlash;
+use hums_onboard::ResetCause;
 use hums_recorder::CardDevice;
 
 /// What `SysTick` begins again with: all of its bits, 0.1 s at 168 MHz.
@@ -60,39 +61,6 @@ pub(crate) trait Transmit {
 
     /// The port's baud rate, both ways, from the next frame on.
     fn set_baud(&mut self, baud: u32);
-}
-
-/// Why the machine started.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, defmt::Format)]
-pub(crate) enum ResetCause {
-    /// Power came.
-    PowerOn,
-    /// The supply sagged.
-    BrownOut,
-    /// The reset button or the debugger.
-    Pin,
-    /// The firmware itself, after a fault.
-    Software,
-    /// The watchdog was not fed.
-    Watchdog,
-}
-
-impl ResetCause {
-    /// Whether it may have come in flight. Power that comes on its own is a pilot's.
-    pub(crate) const fn may_be_in_flight(self) -> bool {
-        !matches!(self, Self::PowerOn | Self::Pin)
-    }
-
-    /// As the log names it.
-    pub(crate) const fn name(self) -> &'static str {
-        match self {
-            Self::PowerOn => "power-on",
-            Self::BrownOut => "brown-out",
-            Self::Pin => "pin",
-            Self::Software => "software",
-            Self::Watchdog => "watchdog",
-        }
-    }
 }
 
 /// What is known about this machine and this start of it.

@@ -7,12 +7,12 @@ use embassy_futures::select::{Either3, select3};
 use embassy_time::{Duration, Ticker, Timer};
 use hums_onboard::monitoring::{Machine, Monitoring, Step, TICK};
 use hums_onboard::queues::{FramesOut, GsIn, SectorsIn, UplinkOut};
-use hums_onboard::{Handover, Task};
+use hums_onboard::{Handover, ResetCause, Task};
 use hums_recorder::CardState;
 
 use super::downlink::{AUTOPILOT_STOOD_STILL, BAUD_AUTOPILOT, BAUD_GS, GS_STOOD_STILL};
 use crate::boards::board;
-use crate::boards::machine::{Boot, ResetCause};
+use crate::boards::machine::Boot;
 use crate::costs::{self, Stage, measure};
 use crate::fault::{self, Fault};
 use crate::links::{self, now};

@@ -18,6 +18,7 @@ use std::time::Instant as WallClock;
 use anyhow::{Context, Result, bail};
 use hums_blackbox::record::{Boot, Stats};
 use hums_core::params::Params;
+use hums_onboard::ResetCause;
 use hums_recorder::status::CardReading;
 use outside::{Memory, Outside};
 use pipeline::Pipeline;
@@ -168,7 +169,7 @@ fn identity(boots: u32) -> Boot<'static> {
     Boot {
         version: env!("CARGO_PKG_VERSION"),
         board: "sim",
-        reset_name: "power-on",
+        reset_name: ResetCause::PowerOn.name(),
         boots,
         ..Boot::default()
     }

@@ -1,8 +1,7 @@
 //! Why the machine started, and how it starts anew.
 
 use embassy_stm32::pac;
-
-use crate::boards::machine::ResetCause;
+use hums_onboard::ResetCause;
 
 /// Reads why the machine started, and clears it for the next time.
 pub(crate) fn reset_cause() -> (ResetCause, u32) {
