@@ -5,6 +5,7 @@ use std::ffi::OsStr;
 use std::fs;
 use std::io::ErrorKind;
 use std::net::UdpSocket;
+use std::path::Path;
 use std::process::Command;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
@@ -12,7 +13,7 @@ use std::time::Duration;
 
 use hums_tests::flights::{own, root};
 use hums_tests::oracle;
-use hums_tests::program::hums;
+use hums_tests::program::{hums, records};
 use serde_json::Value;
 use tempfile::TempDir;
 
@@ -246,6 +247,39 @@ fn mavproxy_shows_what_the_box_says_with_the_module_and_nothing_without_it() {
     assert!(level.contains("HUMS level: ") && !level.contains("not heard"), "{said}");
 }
 
+/// Puts `PARAMS.TXT` on a card.
+fn put_parameters(image: &Path, lines: &str) {
+    let text = image.with_file_name("PARAMS.TXT");
+    fs::write(&text, lines).unwrap();
+    let card = fs::read(image).unwrap();
+    let start = u32::from_le_bytes(card[454..458].try_into().unwrap()) * 512;
+    let drive = format!("{}@@{start}", image.display());
+    let copied = Command::new("mcopy").args(["-i", &drive]).arg(&text).arg("::PARAMS.TXT").status().unwrap();
+    assert!(copied.success());
+}
+
+/// The ground before a flight, its air, and the ground after it: only the first start may read the file.
+#[test]
+fn a_box_that_restarts_in_the_air_reads_no_parameters() {
+    let dir = tempfile::tempdir().unwrap();
+    let image = dir.path().join("card.img");
+    let flight = own("ap_quad_faults.tlog");
+    let record = |further: &[&str]| {
+        let command =
+            ["sim".as_ref(), "--input".as_ref(), flight.as_os_str(), "--sd".as_ref(), image.as_os_str()];
+        hums(command.into_iter().chain(further.iter().map(AsRef::as_ref))).expect_code(&[0]);
+    };
+    record(&[]);
+    put_parameters(&image, "PROT_ACTION 1\nAP_BAUD 57600\n");
+    record(&["--reboot-at", "60"]);
+    let set: Vec<String> = records(&image, &[0])
+        .iter()
+        .filter(|record| record["record"] == "HUMS_PARAM" && record["fields"]["changed"] == true)
+        .map(|record| format!("{} {}", record["fields"]["name"], record["session"]))
+        .collect();
+    assert_eq!(set, Vec::<String>::new());
+}
+
 #[test]
 fn parameters_on_the_card_are_set_and_recorded_and_wrong_ones_are_told() {
     let dir = tempfile::tempdir().unwrap();
@@ -257,18 +291,12 @@ fn parameters_on_the_card_are_set_and_recorded_and_wrong_ones_are_told() {
             .expect_code(expected);
     };
     record(&[0]);
-    let text = dir.path().join("PARAMS.TXT");
     let long = "x".repeat(300);
     let lines = format!(
         "# of this airframe {long}\nBAT_REM_WARN,31\r\nSIGN_PORT 2\n1\t1\tARMING_CHECK\t1\t6\nNO_SUCH 1\n\
          BAT_REM_CRIT 1000\n{long}\nCELL_VOLT_CRIT 3.25"
     );
-    fs::write(&text, lines).unwrap();
-    let card = fs::read(&image).unwrap();
-    let start = u32::from_le_bytes(card[454..458].try_into().unwrap()) * 512;
-    let drive = format!("{}@@{start}", image.display());
-    let copied = Command::new("mcopy").args(["-i", &drive]).arg(&text).arg("::PARAMS.TXT").status().unwrap();
-    assert!(copied.success());
+    put_parameters(&image, &lines);
     record(&[0]);
     let out = dir.path().join("out");
     hums([

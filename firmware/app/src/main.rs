@@ -78,7 +78,7 @@ fn start() -> board::Idle {
     let keeper = restore(parts.store, items_out, parts.boot.cause, monitor);
     let entropy = parts.boot.entropy.unwrap_or_else(|| counted(keeper.mounts(), &identity));
     let handover = HANDOVER.init_with(|| Handover::new(items_in, &status::STORE_STATUS, monitor));
-    let monitoring = monitoring(monitor, identity);
+    let monitoring = monitoring(monitor, identity, parts.boot.cause);
     monitoring.restore_signing(keeper);
 
     let on = executors::start();
@@ -124,8 +124,12 @@ fn restore(
 }
 
 #[inline(never)]
-fn monitoring(monitor: &'static mut Monitor, identity: Boot<'static>) -> &'static mut Monitoring<'static> {
+fn monitoring(
+    monitor: &'static mut Monitor,
+    identity: Boot<'static>,
+    cause: ResetCause,
+) -> &'static mut Monitoring<'static> {
     MONITORING.init_with(|| {
-        Monitoring::new(monitor, WRITER.take(), identity, &status::CARD_STATUS, &status::PORT_STATUS)
+        Monitoring::new(monitor, WRITER.take(), identity, cause, &status::CARD_STATUS, &status::PORT_STATUS)
     })
 }

@@ -6,15 +6,20 @@ use core::fmt::{Arguments, Write as _};
 use hums_blackbox::record::{Event, Loss, Lost, Parameter, Record, Resting};
 use hums_blackbox::{Counters, Sector, SectorSink as _, Writer};
 use hums_core::Monitor;
-use hums_core::time::Instant;
+use hums_core::params::Param;
+use hums_core::time::{Instant, Span};
 use hums_link::text::Text;
 use hums_recorder::status::CardStatus;
 
+use crate::ResetCause;
 use crate::loss::Losses;
 use crate::queues::SectorsIn;
 
 /// Number of the event that records what somebody did over a link.
 const BY_HAND: u8 = 12;
+
+/// Autopilots send a heartbeat each second; a link that lost this many says nothing of now.
+const HEARTBEAT_AGE_MAX: Span = Span::from_secs(3);
 
 /// Who did something: MAVLink system and component id; 0, 0 is the monitor itself.
 pub(crate) type By = (u8, u8);
@@ -113,10 +118,46 @@ pub(crate) struct Logbook<'a> {
     pub(crate) monitor: &'a mut Monitor,
     pub(crate) journal: Journal<'a>,
     pub(crate) card: &'a CardStatus,
+    /// How this start came.
+    pub(crate) cause: ResetCause,
+}
+
+/// Whether motors may turn, by the vehicle's heartbeats since this start.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Arming {
+    /// No heartbeat within the last 3 s, and none that said armed.
+    Unknown,
+    Disarmed,
+    /// By the last heartbeat, however old it is: a vehicle whose link fell silent flies on.
+    Armed,
 }
 
 impl Logbook<'_> {
-    /// Sets a parameter because somebody asked for it: recorded, and in force at once. `false` where it is refused.
+    /// Whether motors may turn.
+    pub(crate) fn arming(&self, now: Instant) -> Arming {
+        let heartbeat = &self.monitor.vehicle().heartbeat;
+        match (heartbeat.get(), heartbeat.within(now, HEARTBEAT_AGE_MAX)) {
+            (Some(last), _) if last.armed => Arming::Armed,
+            (_, Some(_)) => Arming::Disarmed,
+            _ => Arming::Unknown,
+        }
+    }
+
+    /// Whether the vehicle may be in flight: it is armed, or nothing is known of it after a reset that may have come in flight.
+    pub(crate) fn may_fly(&self, now: Instant) -> bool {
+        match self.arming(now) {
+            Arming::Unknown => self.cause.may_be_in_flight(),
+            arming => arming == Arming::Armed,
+        }
+    }
+
+    /// Whether a parameter may be set now, whoever asks: with another rate at its port nothing is recorded any longer.
+    fn may_set(&self, now: Instant, param: Param) -> bool {
+        param != Param::ApBaud || !self.may_fly(now)
+    }
+
+    /// Sets a parameter because a ground station or the card's file asks for it: recorded, and in force at once. `false` where it is
+    /// refused.
     pub(crate) fn set_parameter(
         &mut self,
         now: Instant,
@@ -125,6 +166,9 @@ impl Logbook<'_> {
         by: By,
         sectors: &mut SectorsIn,
     ) -> bool {
+        if !Param::find(name).is_some_and(|param| self.may_set(now, param)) {
+            return false;
+        }
         let params = self.monitor.params_mut();
         let before = params.iter().find(|(spec, _)| spec.name == name).map(|(_, value)| value.to_bits());
         if params.set(name, value).is_err() {

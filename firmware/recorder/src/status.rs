@@ -212,7 +212,8 @@ impl CardStatus {
         }
     }
 
-    pub(crate) fn set_state(&self, state: CardState) {
+    /// Storage has found this out.
+    pub fn set_state(&self, state: CardState) {
         self.state.store(state as u8, Ordering::Relaxed);
     }
 

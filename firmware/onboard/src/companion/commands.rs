@@ -129,7 +129,7 @@ impl Commands {
                 book.journal.by_hand(now, format_args!("cancel by {}/{}", by.0, by.1), sectors);
                 if cancelled { ACCEPTED } else { FAILED }
             }
-            STOP | FORMAT | REPLACED if book.monitor.vehicle().armed() => TEMPORARILY_REJECTED,
+            STOP | FORMAT | REPLACED if book.may_fly(now) => TEMPORARILY_REJECTED,
             FORMAT => format(now, by, book, sectors),
             REPLACED if number == 0 => {
                 book.monitor.forget_past();

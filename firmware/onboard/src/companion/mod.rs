@@ -274,7 +274,7 @@ impl Companion {
         if !self.commands.allows(now, port) {
             return;
         }
-        let may = !book.monitor.vehicle().armed();
+        let may = !book.may_fly(now);
         let what = if may { "logs erased" } else { "erasing refused in flight, asked" };
         book.journal.by_hand(now, format_args!("{what} by {}/{}", by.0, by.1), sectors);
         if may {

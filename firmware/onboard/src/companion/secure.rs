@@ -174,18 +174,15 @@ impl Secure {
         }
     }
 
-    /// Whether a request that is worth so much may set a parameter.
+    /// Whether a request that is worth so much may set a parameter. When one may be set is [`Logbook`](crate::journal::Logbook)'s.
     pub(crate) fn may_set(&self, monitor: &Monitor, port: Port, param: Param, trust: Trust) -> bool {
         let guards = match param {
             Param::SignPort => true,
             Param::GsSign | Param::ApSign => self.signing.key().is_some(),
             _ => false,
         };
-        // With another rate at its port nothing is recorded any longer.
-        let deafens = param == Param::ApBaud && monitor.vehicle().armed();
         match trust {
             Trust::Refused => false,
-            _ if deafens => false,
             Trust::Signed => true,
             Trust::Open => !guards || is_trusted(monitor.params(), port),
         }

@@ -1,15 +1,20 @@
 //! `PARAMS.TXT` on the card: parameters for whoever has the card in hand, in the form that ground stations keep them.
 //!
-//! Read once when a card is found, unless the vehicle is armed by then; each line is set, recorded and kept as if a
-//! ground station had set it, at every power-on as long as the file is there. A line that cannot be set is an event in
-//! the record and a text for the ground station. [`BYTES_MAX`] of the file are read, [`LINE_MAX`] of a line.
+//! Nothing of it is set in flight. The file waits for a heartbeat that says disarmed; after a reset that may have come in
+//! flight ([`ResetCause::may_be_in_flight`](crate::ResetCause::may_be_in_flight)) and once the vehicle is armed it is not
+//! read, or not further, until another card is put in. If heartbeats stop, reading begins anew with the next one. Which
+//! parameters may be set in flight is one rule for the file and for ground stations ([`Logbook::set_parameter`]).
+//!
+//! Each line is set, recorded and stored as if a ground station had set it, at every power-on as long as the file is there.
+//! A refused line is an event in the record and a text for the ground station. [`BYTES_MAX`] of the file are read,
+//! [`LINE_MAX`] of a line.
 
 use hums_core::time::Instant;
 use hums_link::param_line::{self, Line};
 use hums_recorder::CardState;
 
 use super::library::Library;
-use crate::journal::Logbook;
+use crate::journal::{Arming, Logbook};
 use crate::notices::Notices;
 use crate::queues::SectorsIn;
 use crate::shelf::{DATA_MAX, Reader, Want, What, Which};
@@ -23,9 +28,11 @@ const LINE_MAX: usize = 64;
 enum State {
     /// There is no card.
     NoCard,
+    /// There is a card, and no heartbeat yet.
+    Waiting,
     /// The bytes from here on are asked for.
     Reading(u32),
-    /// It was read, or there is none.
+    /// It was read, there is none, or the vehicle was armed.
     Done,
 }
 
@@ -78,21 +85,21 @@ impl Settings {
         shelf: &mut Reader<'_>,
     ) {
         let has_card = book.card.read().state == CardState::Recording;
-        match self.state {
-            State::NoCard if has_card => {
-                let armed = book.monitor.vehicle().armed();
-                let state = if armed { State::Done } else { State::Reading(0) };
-                *self = Self { state, ..Self::new() };
-            }
-            State::Done if !has_card => self.state = State::NoCard,
-            State::Reading(offset) => {
+        match (self.state, book.arming(now)) {
+            _ if !has_card => self.state = State::NoCard,
+            (State::NoCard, _) => self.state = State::Waiting,
+            (State::Done, _) => {}
+            (_, Arming::Armed) => self.state = State::Done,
+            _ if book.cause.may_be_in_flight() => self.state = State::Done,
+            (_, Arming::Unknown) => self.state = State::Waiting,
+            (State::Waiting, Arming::Disarmed) => *self = Self { state: State::Reading(0), ..Self::new() },
+            (State::Reading(offset), Arming::Disarmed) => {
                 self.read_on(now, offset, library, book, sectors, shelf);
                 if self.state == State::Done && self.refused > 0 {
                     let text = "HUMS: PARAMS.TXT: lines refused, correct them";
                     notices.note(now, 4, text, &mut book.journal, sectors);
                 }
             }
-            State::NoCard | State::Done => {}
         }
     }
 
@@ -156,3 +163,6 @@ impl Settings {
         }
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -20,6 +20,7 @@ use hums_link::sequence::Sequences;
 use hums_link::summary::Summary;
 use hums_recorder::status::CardStatus;
 
+use crate::ResetCause;
 use crate::companion::{self, Companion};
 use crate::journal::{Journal, Logbook};
 use crate::keeping::Keeping;
@@ -84,17 +85,19 @@ pub struct Monitoring<'a> {
 
 impl<'a> Monitoring<'a> {
     /// Before the first frame. `identity` is what the board knows of itself: the first record of each file.
+    /// `cause` is why it started.
     pub fn new(
         monitor: &'a mut Monitor,
         writer: &'a mut Writer,
         identity: Boot<'a>,
+        cause: ResetCause,
         card: &'a CardStatus,
         port: &'a PortStatus,
     ) -> Self {
         Self {
             summary: Summary::new(monitor.params()),
             companion: Companion::new(monitor.params()),
-            book: Logbook { monitor, journal: Journal::new(writer), card },
+            book: Logbook { monitor, journal: Journal::new(writer), card, cause },
             sequences: Sequences::new(),
             identity,
             recorded: Recorded::new(),

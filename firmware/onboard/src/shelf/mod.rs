@@ -122,6 +122,22 @@ impl Server<'_> {
         self.erases || self.sum.is_some() || self.wants.ready()
     }
 
+    /// Answers what is wanted of `PARAMS.TXT`, whose text this is.
+    #[cfg(test)]
+    pub(crate) fn serve_text(&mut self, text: &[u8]) {
+        let Some(Want { ticket, which: Which::Settings, what: What::Data(offset) }) = self.wants.dequeue()
+        else {
+            return;
+        };
+        let data = &text[(offset as usize).min(text.len())..];
+        let data = &data[..data.len().min(DATA_MAX)];
+        let answer = Answer { found: Ok(0), bytes: text.len() as u32, offset, ..Answer::none(ticket) };
+        let mut grant = self.answers.grant((HEAD + data.len()) as u16).expect("room for one answer");
+        grant[..HEAD].copy_from_slice(&answer.write());
+        grant[HEAD..HEAD + data.len()].copy_from_slice(data);
+        grant.commit((HEAD + data.len()) as u16);
+    }
+
     /// Does a little of what is wanted, if there is something and room for its answer; whether there was.
     pub fn serve<D: CardDevice>(&mut self, recorder: &mut Recorder<'_, D>) -> bool {
         if self.erases {

@@ -11,7 +11,7 @@ use hums_onboard::monitoring::TICK;
 use hums_onboard::persist::Kept;
 use hums_onboard::queues::{Ends, FRAME_BYTES_MAX};
 use hums_onboard::uplink::{self, Uplink};
-use hums_onboard::{Handover, Keeper, Monitoring, PortStatus, Reception, Service, Storage};
+use hums_onboard::{Handover, Keeper, Monitoring, PortStatus, Reception, ResetCause, Service, Storage};
 use hums_recorder::CardStatus;
 
 use super::outside::{Memory, Outside, Slot};
@@ -111,7 +111,8 @@ impl<'a, 'w> Pipeline<'a, 'w> {
         keeper.turn_ahead();
         keeper.load(monitor);
         let handover = Handover::new(items_in, store_status, monitor);
-        let mut monitoring = Monitoring::new(monitor, writer, identity, card_status, port_status);
+        let mut monitoring =
+            Monitoring::new(monitor, writer, identity, ResetCause::PowerOn, card_status, port_status);
         monitoring.restore_signing(&mut keeper);
         Self {
             slot_status: card_status,

@@ -17,7 +17,7 @@ use hums_core::time::{Instant, Span};
 use hums_link::frame::{Check, Frame};
 use hums_onboard::queues::{Ends, FRAME_BYTES_MAX, Queues};
 use hums_onboard::storage::NO_CARD_RETRY;
-use hums_onboard::{Monitoring, PortStatus, Service, Storage, Supervisor, Task};
+use hums_onboard::{Monitoring, PortStatus, ResetCause, Service, Storage, Supervisor, Task};
 use hums_recorder::{Card, CardState, CardStatus, HeldBlocks, LogName, SpiCard};
 use hums_sdcard::{MS, Medium, Model, SimPort, Slot};
 
@@ -89,7 +89,7 @@ impl Rig {
             longest: Span::ZERO,
             supervisor: Supervisor::new(),
             ends: queues.split(),
-            monitoring: Monitoring::new(monitor, writer, identity, status, port),
+            monitoring: Monitoring::new(monitor, writer, identity, ResetCause::PowerOn, status, port),
             storage: Storage::new(SpiCard::new(slot.port()), status, held, 77),
             frame_at: Instant::ZERO,
             tick_at: Instant::ZERO + TICK,

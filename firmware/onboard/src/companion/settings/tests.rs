@@ -1,0 +1,166 @@
+//! `PARAMS.TXT` and settings over a link, by what is known of the vehicle.
+
+use hums_blackbox::Writer;
+use hums_blackbox::record::Boot;
+use hums_core::Monitor;
+use hums_core::params::{Param, Params};
+use hums_core::time::{Instant, Span};
+use hums_link::encode::{Encoder, FRAME_BYTES_MAX};
+use hums_link::packet::Packet;
+use hums_recorder::{CardState, CardStatus};
+
+use crate::monitoring::TICK;
+use crate::queues::Queues;
+use crate::{Monitoring, PortStatus, ResetCause};
+
+/// What comes at one second.
+#[derive(Clone, Copy, Debug)]
+enum Comes {
+    Heartbeat {
+        armed: bool,
+    },
+    /// `PARAM_SET` of `AP_BAUD` at the ground station's port.
+    Baud(f32),
+    /// A card is put in; it answers after 0.1 s.
+    Card,
+    NoCard,
+}
+use Comes::{Baud, Card, Heartbeat, NoCard};
+
+const ARMED: Comes = Heartbeat { armed: true };
+const DISARMED: Comes = Heartbeat { armed: false };
+
+/// `BAT_REM_WARN` 31 in the first piece, `PROT_ACTION` 1 and `AP_BAUD` in the last one.
+fn text() -> String {
+    let comment = "# of this airframe\n".repeat(40);
+    format!("BAT_REM_WARN 31\n{comment}PROT_ACTION 1\nAP_BAUD 57600\n")
+}
+
+/// Runs a start with what comes at each second since it; whether the file's first and last lines are in force 10 s after the last,
+/// and the port's rate.
+fn run(cause: ResetCause, comes: &[(u64, Comes)]) -> ([bool; 2], f32) {
+    run_slowly(cause, 1, comes)
+}
+
+/// The same of a card that answers at one tick in so many.
+fn run_slowly(cause: ResetCause, ticks_an_answer: u64, comes: &[(u64, Comes)]) -> ([bool; 2], f32) {
+    let (card, port) = (CardStatus::new(), PortStatus::new());
+    let (mut monitor, mut writer) = (Box::new(Monitor::new(Params::defaults())), Box::new(Writer::new()));
+    let mut queues = Box::new(Queues::new());
+    let mut ends = queues.split();
+    let mut body = Monitoring::new(&mut monitor, &mut writer, Boot::default(), cause, &card, &port);
+    body.start(Instant::ZERO, &mut ends.sectors_in);
+    let mut encoder = Encoder::of(1, 1);
+    let mut station = Encoder::of(255, 190);
+    let last_s = comes.last().map_or(0, |(at_s, _)| *at_s);
+    let mut comes = comes.iter().peekable();
+    for tick in 1..(last_s + 10) * 20 {
+        let now = Instant::ZERO + Span::from_micros(TICK.as_micros() * tick);
+        let mut out = [0; FRAME_BYTES_MAX];
+        while let Some((_, come)) = comes.next_if(|(at_s, _)| at_s * 20 < tick) {
+            match *come {
+                Heartbeat { armed } => {
+                    let mode = if armed { 0x80 } else { 0 };
+                    let packet = Packet::new(0).u8(4, 2).u8(5, 3).u8(6, mode).u8(7, 4).u8(8, 3);
+                    ends.frames_in.put(now.as_micros(), true, encoder.frame(&mut out, &packet));
+                }
+                Baud(value) => {
+                    let packet = Packet::new(23).f32(0, value).u8(4, 1).u8(5, 191).text(6, 16, "AP_BAUD");
+                    ends.uplink_in.put(now.as_micros(), true, station.frame(&mut out, &packet.u8(22, 9)));
+                }
+                Card => card.set_state(CardState::Recording),
+                NoCard => card.set_state(CardState::Absent),
+            }
+        }
+        while body.drain(&mut ends.frames_out, &mut ends.sectors_in, &mut ends.gs_in) {}
+        while body.uplink(now, &mut ends.uplink_out, &mut ends.sectors_in, &mut ends.gs_in) {}
+        body.tick(now, &mut ends.sectors_in, &mut ends.gs_in, &mut |_| {});
+        if tick % ticks_an_answer == 0 {
+            ends.shelf.serve_text(text().as_bytes());
+        }
+        while ends.gs_out.take(&mut out).is_some() {}
+        while ends.autopilot_out.take(&mut out).is_some() {}
+        while ends.sectors_out.oldest().is_some() {
+            ends.sectors_out.drop_oldest();
+        }
+    }
+    let params = body.monitor().params();
+    let is = |param, value: f32| params.get(param).to_bits() == value.to_bits();
+    let set = [is(Param::BatRemWarn, 31.0), is(Param::ProtAction, 1.0)];
+    (set, params.get(Param::ApBaud))
+}
+
+const DEFAULT: f32 = 921_600.0;
+const NOTHING: ([bool; 2], f32) = ([false, false], DEFAULT);
+const ALL: ([bool; 2], f32) = ([true, true], 57_600.0);
+const IN_FLIGHT: [ResetCause; 3] = [ResetCause::BrownOut, ResetCause::Software, ResetCause::Watchdog];
+const BY_HAND: [ResetCause; 2] = [ResetCause::PowerOn, ResetCause::Pin];
+
+#[test]
+fn a_box_on_the_ground_reads_its_parameters_whichever_comes_first_card_or_heartbeat() {
+    for cause in BY_HAND {
+        assert_eq!(run(cause, &[(0, Card), (5, DISARMED)]), ALL, "{cause:?}");
+        assert_eq!(run(cause, &[(1, DISARMED), (2, DISARMED), (3, Card)]), ALL, "{cause:?}");
+        assert_eq!(run(cause, &[(1, DISARMED), (60, Card), (65, DISARMED)]), ALL, "{cause:?}");
+    }
+}
+
+#[test]
+fn a_box_that_restarts_in_the_air_reads_no_parameters() {
+    for cause in IN_FLIGHT {
+        for heartbeat in [ARMED, DISARMED] {
+            let comes = [(0, Card), (1, heartbeat), (2, heartbeat), (3, DISARMED), (4, DISARMED)];
+            assert_eq!(run(cause, &comes), NOTHING, "{cause:?}, {heartbeat:?}");
+        }
+    }
+    // Power that was gone for a moment: the first heartbeat tells.
+    for cause in BY_HAND {
+        assert_eq!(run(cause, &[(0, Card), (1, ARMED), (2, ARMED)]), NOTHING, "{cause:?}");
+    }
+}
+
+#[test]
+fn a_box_that_was_armed_before_reads_no_parameters_until_another_card_is_put_in() {
+    let flown = [(0, Card), (1, ARMED), (2, ARMED), (3, DISARMED), (4, DISARMED)];
+    assert_eq!(run(ResetCause::PowerOn, &flown), NOTHING);
+    let exchanged = [&flown[..], &[(5, NoCard), (7, DISARMED), (7, Card), (8, DISARMED)]].concat();
+    assert_eq!(run(ResetCause::PowerOn, &exchanged), ALL);
+    // A card that is lost for a moment in flight, and after it.
+    let lost = [&flown[..2], &[(2, NoCard), (3, Card), (4, ARMED)]].concat();
+    assert_eq!(run(ResetCause::PowerOn, &lost), NOTHING);
+}
+
+#[test]
+fn without_a_heartbeat_no_parameters_are_read_nor_long_after_the_last_one() {
+    assert_eq!(run(ResetCause::PowerOn, &[(0, Card), (60, Card)]), NOTHING);
+    assert_eq!(run(ResetCause::PowerOn, &[(1, DISARMED), (10, Card)]), NOTHING);
+    assert_eq!(run(ResetCause::PowerOn, &[(1, ARMED), (10, Card), (60, Card)]), NOTHING);
+}
+
+#[test]
+fn reading_stops_where_the_vehicle_is_armed_and_begins_anew_after_silence() {
+    let ([first, last], baud) = run_slowly(ResetCause::PowerOn, 15, &[(0, Card), (1, DISARMED), (2, ARMED)]);
+    assert!(first && !last, "{first}, {last}");
+    assert_eq!(baud.to_bits(), DEFAULT.to_bits());
+    let silence = [(0, Card), (1, DISARMED), (20, DISARMED), (21, DISARMED), (22, DISARMED), (23, DISARMED)];
+    assert_eq!(run_slowly(ResetCause::PowerOn, 30, &silence[..2]).0, [true, false]);
+    assert_eq!(run_slowly(ResetCause::PowerOn, 15, &silence), ALL);
+}
+
+#[test]
+fn the_port_s_rate_is_set_over_a_link_unless_the_vehicle_may_be_in_flight() {
+    let set = |cause, comes: &[(u64, Comes)]| run(cause, comes).1.to_bits() == 115_200.0_f32.to_bits();
+    let baud = Baud(115_200.0);
+    for cause in BY_HAND {
+        // With a wrong rate there is no heartbeat.
+        assert!(set(cause, &[(2, baud)]), "{cause:?}");
+        assert!(set(cause, &[(1, DISARMED), (2, baud)]), "{cause:?}");
+        assert!(!set(cause, &[(1, ARMED), (2, baud)]), "{cause:?}");
+        assert!(!set(cause, &[(1, ARMED), (60, baud)]), "{cause:?}: whose link fell silent flies on");
+    }
+    for cause in IN_FLIGHT {
+        assert!(!set(cause, &[(0, baud)]), "{cause:?}");
+        assert!(!set(cause, &[(1, ARMED), (2, baud)]), "{cause:?}");
+        assert!(set(cause, &[(1, DISARMED), (2, baud)]), "{cause:?}");
+    }
+}
