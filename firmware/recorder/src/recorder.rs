@@ -31,7 +31,7 @@ use crate::format::FormatError;
 use crate::gate::HeldBlocks;
 use crate::name::LogName;
 use crate::status::{CardState, CardStatus};
-use segments::{Log, Segments, group_start};
+use segments::{Log, NewestCopy, Segments, group_start};
 use slot::Slot;
 use trouble::may_work_elsewhere;
 
@@ -300,18 +300,20 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
         let blocks = data_blocks(self.mounted()?.open_blocks());
         let has_next = at + 1 < blocks;
         let count = if first.is_partial() {
-            let further = log.partial_further && has_next;
+            let further = log.newest_copy != NewestCopy::Further && has_next;
             at += u32::from(further);
-            (log.partial_further, log.copy_in_place) = (!log.partial_further, !further);
+            log.newest_copy = if further { NewestCopy::Further } else { NewestCopy::InPlace };
             1
         } else {
-            if log.copy_in_place && has_next {
+            if log.newest_copy == NewestCopy::InPlace && has_next {
                 self.write_copy(log.session, at + 1)?;
             }
-            (log.partial_further, log.copy_in_place) = (true, false);
+            // A card may erase the blocks of a command before they come (SD specification, 4.3.4), and a copy lies in the second.
+            let alone = core::mem::replace(&mut log.newest_copy, NewestCopy::None) != NewestCopy::None;
             self.begin_stretch(at / STRETCH_SECTORS);
             let in_stretch = STRETCH_SECTORS - at % STRETCH_SECTORS;
-            self.count_in_row(number, most.min((blocks - at).min(in_stretch) as usize))
+            let most = if alone { 1 } else { most.min((blocks - at).min(in_stretch) as usize) };
+            self.count_in_row(number, most)
         };
         let written = self.write_sealed(&log, at, count)?;
         self.status.count_blocks(written as u32);

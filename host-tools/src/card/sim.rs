@@ -60,6 +60,8 @@ pub struct Written {
     pub block: u32,
     /// Its new content.
     pub bytes: [u8; Block::LEN],
+    /// Blocks behind it that the same command writes: undefined while it goes on (SD specification, 4.3.4).
+    pub behind: u32,
 }
 
 /// A card in an image file. The methods take `&self`, as the block device's do; one thread uses it.
@@ -168,14 +170,20 @@ impl SimCard {
     }
 
     /// One block write; false where power went with it.
-    fn write_block(&self, bytes: &[u8; Block::LEN], block: u32, at_us: u64) -> Result<(), CardError> {
+    fn write_block(
+        &self,
+        bytes: &[u8; Block::LEN],
+        block: u32,
+        behind: u32,
+        at_us: u64,
+    ) -> Result<(), CardError> {
         if self.rng.borrow_mut().chance(self.faults.write_error) {
             return Err(CardError::WriteRefused);
         }
         let count = self.writes.get() + 1;
         self.writes.set(count);
         if let Some(trace) = self.trace.borrow_mut().as_mut() {
-            trace.push(Written { at_us, block, bytes: *bytes });
+            trace.push(Written { at_us, block, bytes: *bytes, behind });
         }
         let cut = self.faults.cuts.iter().filter(|cut| cut.write <= count).min_by_key(|cut| cut.write);
         let bytes = match cut {
@@ -187,6 +195,11 @@ impl SimCard {
             image.seek(SeekFrom::Start(BlockIdx(block).into_bytes())).and_then(|_| image.write_all(bytes));
         result.map_err(|error| self.keep(error))?;
         if cut.is_some() {
+            for block in block + 1..=block + behind {
+                let at = SeekFrom::Start(BlockIdx(block).into_bytes());
+                let erased = image.seek(at).and_then(|_| image.write_all(&[0; Block::LEN]));
+                erased.map_err(|error| self.keep(error))?;
+            }
             self.dead.set(true);
             return Err(CardError::PowerGone);
         }
@@ -229,8 +242,9 @@ impl BlockDevice for SimCard {
             return Err(CardError::WriteRefused);
         }
         for (index, block) in (0..).zip(blocks) {
-            let before_end = BLOCK_US * (blocks.len() as u64 - u64::from(index));
-            self.write_block(&block.contents, start.0 + index, self.clock().saturating_sub(before_end))?;
+            let left = blocks.len() as u32 - index;
+            let at_us = self.clock().saturating_sub(BLOCK_US * u64::from(left));
+            self.write_block(&block.contents, start.0 + index, left - 1, at_us)?;
         }
         Ok(())
     }
@@ -269,16 +283,17 @@ mod tests {
     #[test]
     fn power_goes_within_a_write_of_several_blocks() {
         for torn in [false, true] {
-            let card = card(Faults { cuts: vec![Cut { write: 3, torn }], ..Faults::default() });
+            let card = card(Faults { cuts: vec![Cut { write: 4, torn }], ..Faults::default() });
             card.write(&[block(1)], BlockIdx(0)).expect("first");
+            card.write(&[block(9)], BlockIdx(3)).expect("before");
             let cut = card.write(&[block(2), block(3), block(4)], BlockIdx(1));
             assert!(matches!(cut, Err(CardError::PowerGone)));
             assert_eq!(content(&card, 1), [2; 512]);
             assert_eq!(content(&card, 2)[..256], [3; 256]);
             assert_eq!(content(&card, 2)[256..], [if torn { 0 } else { 3 }; 256]);
-            assert_eq!(content(&card, 3), [0; 512], "nothing after the cut");
+            assert_eq!(content(&card, 3), [0; 512], "erased before it came");
             assert!(card.is_dead() && card.write(&[block(5)], BlockIdx(0)).is_err());
-            assert_eq!(card.writes(), 3);
+            assert_eq!(card.writes(), 4);
         }
     }
 

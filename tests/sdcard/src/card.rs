@@ -51,6 +51,8 @@ pub(crate) struct SdCard {
     started_ns: Option<u64>,
     knows_conditions: bool,
     app: bool,
+    /// Blocks that the next write of many may erase before they come (ACMD23).
+    erases: u32,
     checks: bool,
     status: u8,
     command: Vec<u8>,
@@ -74,6 +76,7 @@ impl SdCard {
             started_ns: None,
             knows_conditions: false,
             app: false,
+            erases: 0,
             checks: false,
             status: 0,
             command: Vec::new(),
@@ -254,7 +257,10 @@ impl SdCard {
                 self.answer_with(0, &[ready | high, 0xFF, 0x80, 0]);
             }
             (true, 41) => self.start(now_ns, argument),
-            (true, 23) if !is_idle => self.answer_with(0, &[]),
+            (true, 23) if !is_idle => {
+                self.erases = argument & 0x7F_FFFF;
+                self.answer_with(0, &[]);
+            }
             (false, _) if !is_idle => self.data_command(now_ns, number, argument),
             _ => self.answer_with(ILLEGAL, &[]),
         }
@@ -288,6 +294,10 @@ impl SdCard {
             17 => self.send(now_ns, &self.model.medium.get(at), self.model.read_ns),
             24 | 25 => {
                 self.answer_with(0, &[]);
+                // Undefined until they are written (4.3.4): here they are erased.
+                let count = if number == 25 { std::mem::take(&mut self.erases) } else { 0 };
+                let end = at.saturating_add(count).min(self.model.medium.size());
+                (at..end).for_each(|at| self.model.medium.erase(at));
                 self.transfer = Transfer::Write { many: number == 25, at, block: None, failed: false };
             }
             _ => self.answer_with(ILLEGAL, &[]),

@@ -90,6 +90,11 @@ impl Medium {
         self.blocks.borrow_mut().insert(at, *block);
     }
 
+    /// Erases one block.
+    pub(crate) fn erase(&self, at: u32) {
+        self.blocks.borrow_mut().insert(at, [0xFF; 512]);
+    }
+
     /// Writes into one block.
     ///
     /// # Panics

@@ -44,6 +44,26 @@ fn every_kind_of_card_is_recorded_on() {
     }
 }
 
+/// A line so slow that a copy of the sector in progress is all that is known of seconds; then the card stands still until full
+/// sectors wait behind it, and is pulled while they are written.
+#[test]
+fn a_card_that_erases_ahead_never_holds_less_than_was_on_it() {
+    for step in 0..60 {
+        let medium = medium();
+        let stall_ns = 10 * S + step * 23 * MS;
+        let stall = Plan::always(Fault::Busy(2_000 * MS)).from(stall_ns).times(1);
+        let mut rig = recording(sdhc(&medium).with(stall));
+        rig.run_to(stall_ns / MS + 1_000);
+        let known = read(&medium).frames.len();
+        rig.slot.at_byte(rig.slot.counts().bytes + 300 + step * 211, Event::Pull);
+        while rig.slot.has_card() {
+            rig.run_to(rig.slot.now_ns() / MS + 1);
+        }
+        let left = read(&medium).frames.len();
+        assert!(left >= known, "{step}: {left} of {known} frames");
+    }
+}
+
 #[test]
 fn a_card_that_starts_slowly_misses_nothing() {
     let medium = medium();

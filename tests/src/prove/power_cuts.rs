@@ -368,8 +368,13 @@ impl Session {
             let old = self.card.read_block(write.block)?;
             self.card.write_block(write.block, &tear.apply(&old, &write.bytes))?;
             let what = || format!("cut at write {index}, {tear:?}, block {}", write.block);
+            let behind = write.block + 1..=write.block + write.behind;
+            let held: Vec<_> =
+                behind.clone().map(|block| self.card.read_block(block)).collect::<Result<_>>()?;
+            behind.clone().try_for_each(|block| self.card.write_block(block, &[0; BLOCK]))?;
             self.look(index, &mut outcome).with_context(what)?;
             self.card.write_block(write.block, &old)?;
+            behind.zip(&held).try_for_each(|(block, held)| self.card.write_block(block, held))?;
             outcome.cuts += 1;
             outcome.torn += u64::from(tear != Tear::Whole);
             outcome.metadata += u64::from(self.is_metadata(&write));

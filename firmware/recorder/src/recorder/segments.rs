@@ -26,10 +26,19 @@ pub(super) struct Log {
     volume_id: u32,
     /// The sector number at block 0 of the open segment; `None` before the first sector.
     pub(super) base: Option<u32>,
-    /// Where the next partial sector goes: at its own place, or one further.
-    pub(super) partial_further: bool,
-    /// The newest partial copy lies at the place of its sector, which would be written over it.
-    pub(super) copy_in_place: bool,
+    /// Where the newest copy of the sector in progress lies.
+    pub(super) newest_copy: NewestCopy,
+}
+
+/// Where the newest copy of the sector in progress lies. The sector's number less that of the segment's first one is its place.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum NewestCopy {
+    /// There is none.
+    None,
+    /// At the sector's own place.
+    InPlace,
+    /// At the place after it. A segment begins as if there were one, so that its first block is the first one written.
+    Further,
 }
 
 /// The session's segments on whatever card is there.
@@ -93,7 +102,7 @@ impl<'a> Segments<'a> {
             // The numbers end at 99,999; the last session number then goes on with its segments.
             let name = name.or_else(|| newest.and_then(LogName::next_segment)).ok_or(CardError::Full)?;
             let session = mix(mix(volume_id, name.session), self.entropy);
-            Log { name, session, volume_id, base: None, partial_further: false, copy_in_place: false }
+            Log { name, session, volume_id, base: None, newest_copy: NewestCopy::Further }
         };
         let before = self.log.replace(log);
         let opened = if Some(log.name) == newest {
@@ -187,9 +196,7 @@ impl<'a> Segments<'a> {
         if let Some(log) = &mut self.log {
             log.name = name;
             log.base = None;
-            // Of a file that is written anew the first block is the first one that is the new file's.
-            log.partial_further = false;
-            log.copy_in_place = false;
+            log.newest_copy = NewestCopy::Further;
         }
         self.is_dated = self.status.is_utc_known();
         self.status.begin_segment(name.session, overwrote);
