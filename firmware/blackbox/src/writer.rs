@@ -85,6 +85,7 @@ pub struct Writer {
     /// What it was at the end of the group before.
     chain_before: u32,
     in_group: bool,
+    /// The sector in progress has an entry that no copy of it has.
     changed: bool,
     last_ms: u64,
     epoch_micros: Option<u64>,
@@ -181,10 +182,10 @@ impl Writer {
         self.record(at, &Record::Mark(mark), sink)
     }
 
-    /// A copy of the sector in progress that decodes up to the last entry; `false` where nothing is new since the
-    /// last full sector. The full sector, with the same number, supersedes it.
-    pub fn partial(&self, out: &mut Sector) -> bool {
-        if !self.changed {
+    /// A copy of the sector in progress that decodes up to the last entry; `false` if the sector has no entry that is not in a
+    /// full sector or an earlier copy. The full sector, with the same number, supersedes the copy.
+    pub fn partial(&mut self, out: &mut Sector) -> bool {
+        if !core::mem::take(&mut self.changed) {
             return false;
         }
         *out = self.sector;

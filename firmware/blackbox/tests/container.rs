@@ -200,6 +200,17 @@ fn partial_copies_in_both_places_are_superseded_or_complete_the_log() {
 }
 
 #[test]
+fn a_copy_is_made_only_of_a_sector_with_something_new() {
+    let (mut writer, mut queue, mut copy) = (Box::new(Writer::new()), queue(), Sector::zeroed());
+    for (at, bytes, verified) in frames(50, 4) {
+        writer.frame(Instant::from_millis(at), &bytes, verified, &mut queue).expect("room");
+        let sectors = queue.sectors.len();
+        assert!(writer.partial(&mut copy) || sectors > 0);
+        assert!(!writer.partial(&mut copy), "nothing came since the last copy");
+    }
+}
+
+#[test]
 fn stale_sectors_and_zeros_after_the_end_are_no_part_of_the_log() {
     let (old, new) = (frames(300, 5), frames(100, 6));
     let mut old = write(&old, true);

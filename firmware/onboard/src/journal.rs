@@ -102,11 +102,11 @@ impl<'a> Journal<'a> {
         self.writer
     }
 
-    /// Gives storage a copy of the sector in progress.
+    /// Gives storage a copy of the sector in progress, if the queue has room and the sector has a new entry.
     #[inline(never)]
-    pub(crate) fn partial(&self, sectors: &mut SectorsIn) {
+    pub(crate) fn partial(&mut self, sectors: &mut SectorsIn) {
         let mut copy = Sector::zeroed();
-        if self.writer.partial(&mut copy) {
+        if sectors.with_reserve(|sink| sink.room()) > 0 && self.writer.partial(&mut copy) {
             sectors.put(&copy);
         }
     }

@@ -44,6 +44,20 @@ fn every_kind_of_card_is_recorded_on() {
     }
 }
 
+/// What the box records of itself, every 10 s, and its parity.
+#[test]
+fn a_silent_line_wears_no_card() {
+    let medium = medium();
+    let mut rig = recording(sdhc(&medium));
+    rig.is_silent = true;
+    rig.run_to(20_000);
+    let before = medium.writes();
+    rig.run_to(620_000);
+    let writes = medium.writes() - before;
+    assert!(writes < 600, "{writes} blocks in 10 minutes");
+    rig.finish_whole(&medium);
+}
+
 /// A line so slow that a copy of the sector in progress is all that is known of seconds; then the card stands still until full
 /// sectors wait behind it, and is pulled while they are written.
 #[test]
