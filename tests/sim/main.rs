@@ -7,7 +7,6 @@
 mod any_log;
 mod board;
 mod budget;
-mod by_arming;
 mod card_trouble;
 mod companion;
 mod downlink;

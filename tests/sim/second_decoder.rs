@@ -94,7 +94,7 @@ fn recordings_of_each_kind_read_the_same() {
         fs::write(&short, &data[..RECORDING_BYTES.min(data.len())]).unwrap();
         // A parameter that is not at its default, so that there is one in the record.
         let params = dir.path().join("params.txt");
-        fs::write(&params, "REC_BEFORE 20\n").unwrap();
+        fs::write(&params, "BAT_REM_WARN 25\n").unwrap();
         let flags = ["--params", params.to_str().unwrap()];
         // A tlog may be cut in the middle of a record.
         let recording = Recording::attempt(Machine::Sim, &short, &flags).expect_code(&[0, 3]);

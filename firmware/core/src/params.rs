@@ -224,9 +224,6 @@ params! {
     ApStreams "AP_STREAMS" "" 1.0 0.0 1.0 "SET_MESSAGE_INTERVAL, REQUEST_DATA_STREAM" is "The autopilot is asked for what the checks need" of "no" | "yes";
     ApSign "AP_SIGN" "" 0.0 0.0 2.0 "as GS_SIGN, for what comes through the autopilot" is "Signing at the autopilot's port" of "no" | "our frames are signed" | "and unsigned requests are refused";
     SignPort "SIGN_PORT" "" 0.0 0.0 2.0 "docs/companion.md" is "The port that may bring a key" of "none" | "ground station's" | "autopilot's";
-    RecMode "REC_MODE" "" 0.0 0.0 1.0 "as PX4 SDLOG_MODE and ArduPilot LOG_DISARMED" is "When is recorded" of "from power-on" | "by arming";
-    RecBefore "REC_BEFORE" "s" 30.0 5.0 120.0 "by arming: what is kept of the time before" is "Recording by arming: time before it that is kept";
-    RecAfter "REC_AFTER" "s" 15.0 0.0 600.0 "by arming: ArduPilot records 15 s on after disarming (HAL_LOGGER_ARM_PERSIST)" is "Recording by arming: time after disarming";
     MisFallTime "MIS_FALL_TIME" "s" 0.3 0.1 5.0 "a fall of half a metre, below 0.3 g";
     MisImpact "MIS_IMPACT" "g" 3.0 1.5 50.0 "a shock; landings at 2 m/s and less stay below";
     MisTumble "MIS_TUMBLE" "deg/s" 300.0 60.0 3000.0 "above the rates that angle modes fly with (PX4 220, ArduPilot 200)";

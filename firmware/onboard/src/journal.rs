@@ -97,7 +97,7 @@ impl<'a> Journal<'a> {
         self.writer.counters()
     }
 
-    /// The writer itself, for [`crate::keeping`].
+    /// The writer itself.
     pub(crate) const fn writer(&mut self) -> &mut Writer {
         self.writer
     }

@@ -12,7 +12,6 @@
 
 mod companion;
 mod journal;
-mod keeping;
 mod loss;
 pub mod monitoring;
 mod notices;

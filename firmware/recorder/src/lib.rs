@@ -11,8 +11,6 @@
 //!
 //! * What a card loses of a segment is made again from parity, at the segment's end (`hums_blackbox::parity`).
 //! * Sectors that wait together and lie in a row are written with one command (`chain::Chain`).
-//! * Of a vehicle that is recorded by arming, while it is disarmed, only the last while is kept: small segments that are
-//!   renamed and overwritten in turn.
 //!
 //! [`spi`] is the driver of a real card; the PC's cards are files.
 //!
@@ -30,7 +28,6 @@ pub mod layout;
 mod name;
 mod parity;
 pub mod recorder;
-mod ring;
 mod room;
 pub mod spi;
 pub mod status;

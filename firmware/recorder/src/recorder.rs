@@ -8,10 +8,6 @@
 //! Each stretch of a segment has its parity at the segment's end: written when it is full, when the segment is left, when the
 //! log ends in order, and every 10 s meanwhile. It may fail without consequence: the sectors themselves are there.
 //!
-//! Of what a disarmed vehicle sends, when it is recorded by arming, only the last while is kept: small segments in a
-//! ring, of which the oldest is renamed and written anew once those after it hold enough. The monitor says when
-//! ([`CardStatus::wait_from`]) and says so in the record.
-//!
 //! What fails is tried again, then given a new segment, then the card is given up and looked for once a second. A
 //! sector is only counted lost when it can never be written: the caller keeps it until then.
 
@@ -31,7 +27,7 @@ use crate::format::FormatError;
 use crate::gate::HeldBlocks;
 use crate::name::LogName;
 use crate::status::{CardState, CardStatus};
-use segments::{Log, NewestCopy, Segments, group_start};
+use segments::{Log, NewestCopy, Segments};
 use slot::Slot;
 use trouble::may_work_elsewhere;
 
@@ -189,7 +185,7 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
             }
         }
         // A new segment may lie where the card still works.
-        let moved = self.next_segment(None).and_then(|()| {
+        let moved = self.next_segment(true).and_then(|()| {
             self.status.want_group();
             self.try_write(now, &first, 1)
         });
@@ -290,12 +286,10 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
     /// Writes the sector that waits first, and of those behind it so many as belong there, `most` in all.
     fn try_write(&mut self, now: Instant, first: &Sector, most: usize) -> Result<(), CardError<D::Error>> {
         let number = first.number();
-        self.segments.ring.keep(self.status.waiting().filter(|(from, _)| number >= *from));
-        if self.must_move(now, first)? {
-            self.next_segment(Some(first))?;
+        if self.must_move(first)? {
+            self.next_segment(false)?;
         }
         let mut log = self.segments.log.ok_or(CardError::NotOpen)?;
-        let begins = log.base.is_none();
         let mut at = number.wrapping_sub(*log.base.get_or_insert(number));
         let blocks = data_blocks(self.mounted()?.open_blocks());
         let has_next = at + 1 < blocks;
@@ -318,11 +312,7 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
         let written = self.write_sealed(&log, at, count)?;
         self.status.count_blocks(written as u32);
         self.segments.log = Some(log);
-        if begins {
-            self.segments.begin_segment(log.name, first);
-        }
         let is_closed = self.add_to_parity(now, at, written);
-        self.segments.is_over |= is_closed;
         self.drop_written(written);
         if is_closed || self.held.parity.borrow().is_overdue(now) {
             self.write_parity();
@@ -395,10 +385,7 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
     }
 
     /// Whether this sector belongs into a new segment.
-    fn must_move(&mut self, now: Instant, sector: &Sector) -> Result<bool, CardError<D::Error>> {
-        if self.segments.begins_log(sector) {
-            return Ok(true);
-        }
+    fn must_move(&mut self, sector: &Sector) -> Result<bool, CardError<D::Error>> {
         let Some(Log { base: Some(base), .. }) = self.segments.log else { return Ok(false) };
         let blocks = data_blocks(self.mounted()?.open_blocks());
         let at = sector.number().wrapping_sub(base);
@@ -406,11 +393,8 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
             // Also a number from before this segment (a restarted count) gets a segment of its own.
             return Ok(true);
         }
-        if self.segments.ring.asks_for_group(now) {
-            self.status.want_group();
-        }
         let fits = at.saturating_add(GROUP_SECTORS as u32) <= blocks;
-        Ok(at > 0 && group_start(sector).is_some_and(|begins| !fits || self.segments.ring.is_due(begins)))
+        Ok(at > 0 && !fits && sector.starts_group())
     }
 
     /// How many of the sectors that wait, the first one being sector `number`, go right behind each other: full ones,
@@ -442,10 +426,10 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
         Ok(())
     }
 
-    /// Leaves the open segment for the next one, which begins with this sector; without one it goes on with whatever comes.
-    fn next_segment(&mut self, sector: Option<&Sector>) -> Result<(), CardError<D::Error>> {
+    /// Leaves the open segment for the next one, a short one where the open one did not take a sector.
+    fn next_segment(&mut self, is_short: bool) -> Result<(), CardError<D::Error>> {
         self.write_parity();
-        let next = self.segments.next(sector, self.slot.card().ok_or(CardError::NotOpen)?);
+        let next = self.segments.next(is_short, self.slot.card().ok_or(CardError::NotOpen)?);
         self.held.parity.borrow_mut().begin(0);
         next
     }

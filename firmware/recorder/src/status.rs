@@ -6,8 +6,6 @@ use embedded_sdmmc::{TimeSource, Timestamp};
 use hums_blackbox::record::{Before, Found};
 use hums_core::time::{Instant, Span};
 
-/// Every sector is kept: what [`CardStatus`] says while a recording is to stay.
-const KEEP_ALL: u32 = u32::MAX;
 /// No service of the card is going on.
 const IDLE: u32 = u32::MAX;
 /// How much room there is was not counted yet.
@@ -76,7 +74,6 @@ pub struct CardStatus {
     session: AtomicU32,
     segments: AtomicU32,
     segments_overwritten: AtomicU32,
-    segments_released: AtomicU32,
     blocks_written: AtomicU32,
     writes: AtomicU32,
     write_errors: AtomicU32,
@@ -91,10 +88,6 @@ pub struct CardStatus {
     total_mib: AtomicU32,
     group_wanted: AtomicBool,
     format_wanted: AtomicBool,
-    /// From this sector on only the latest are kept; [`KEEP_ALL`]: all are.
-    waiting_from: AtomicU32,
-    /// How much of them, in milliseconds.
-    waiting_ms: AtomicU32,
     fat_time: AtomicU32,
     /// The session before on this card: whether it is news, and what was found.
     before_news: AtomicBool,
@@ -128,8 +121,6 @@ pub struct CardReading {
     pub segments: u32,
     /// Segments of earlier sessions that were overwritten because the card is full.
     pub segments_overwritten: u32,
-    /// Segments of this session that were overwritten because the vehicle was disarmed and is recorded by arming.
-    pub segments_released: u32,
     /// Blocks of 512 bytes of log data that the card took.
     pub blocks_written: u32,
     /// Write commands that took them: fewer, because sectors that wait together are written together.
@@ -163,7 +154,6 @@ impl CardStatus {
             session: AtomicU32::new(0),
             segments: AtomicU32::new(0),
             segments_overwritten: AtomicU32::new(0),
-            segments_released: AtomicU32::new(0),
             blocks_written: AtomicU32::new(0),
             writes: AtomicU32::new(0),
             write_errors: AtomicU32::new(0),
@@ -176,8 +166,6 @@ impl CardStatus {
             total_mib: AtomicU32::new(0),
             group_wanted: AtomicBool::new(false),
             format_wanted: AtomicBool::new(false),
-            waiting_from: AtomicU32::new(KEEP_ALL),
-            waiting_ms: AtomicU32::new(0),
             fat_time: AtomicU32::new(0),
             before_news: AtomicBool::new(false),
             before_found: AtomicU8::new(Found::Unknown as u8),
@@ -196,7 +184,6 @@ impl CardStatus {
             session: self.session.load(Ordering::Relaxed),
             segments: self.segments.load(Ordering::Relaxed),
             segments_overwritten: self.segments_overwritten.load(Ordering::Relaxed),
-            segments_released: self.segments_released.load(Ordering::Relaxed),
             blocks_written: self.blocks_written.load(Ordering::Relaxed),
             writes: self.writes.load(Ordering::Relaxed),
             write_errors: self.write_errors.load(Ordering::Relaxed),
@@ -221,10 +208,6 @@ impl CardStatus {
         self.session.store(session, Ordering::Relaxed);
         self.segments.fetch_add(1, Ordering::Relaxed);
         self.segments_overwritten.fetch_add(u32::from(overwrote), Ordering::Relaxed);
-    }
-
-    pub(crate) fn count_released(&self) {
-        self.segments_released.fetch_add(1, Ordering::Relaxed);
     }
 
     pub(crate) fn count_blocks(&self, blocks: u32) {
@@ -287,37 +270,6 @@ impl CardStatus {
     /// Whether somebody asked since the last call.
     pub(crate) fn take_format_wanted(&self) -> bool {
         self.format_wanted.swap(false, Ordering::Acquire)
-    }
-
-    /// From sector `number` on, at the next group, only the last `keep` are kept: the vehicle is disarmed, and is
-    /// recorded by arming. What is older is overwritten.
-    pub fn wait_from(&self, number: u32, keep: Span) {
-        self.waiting_ms.store(keep.as_millis().min(u64::from(u32::MAX)) as u32, Ordering::Relaxed);
-        self.waiting_from.store(number.min(KEEP_ALL - 1), Ordering::Release);
-    }
-
-    /// Everything that is on the card now and all that comes is kept.
-    pub fn keep_all(&self) {
-        self.waiting_from.store(KEEP_ALL, Ordering::Release);
-    }
-
-    /// What is kept from sector `number` on stays, and so does all that comes, until the monitor says anew what is kept.
-    pub(crate) fn stay(&self, number: u32) {
-        let (now, all) = (Ordering::AcqRel, Ordering::Relaxed);
-        // Where the monitor has said something else meanwhile, that is so.
-        let _ = self.waiting_from.compare_exchange(number, KEEP_ALL, now, all);
-    }
-
-    /// Whether only the last while is kept. Storage ends that where it must ([`Self::wait_from`] begins it anew).
-    pub fn is_waiting(&self) -> bool {
-        self.waiting_from.load(Ordering::Acquire) != KEEP_ALL
-    }
-
-    /// From which sector on how much is kept; `None`: everything.
-    pub(crate) fn waiting(&self) -> Option<(u32, Span)> {
-        let from = self.waiting_from.load(Ordering::Acquire);
-        let keep = Span::from_millis(u64::from(self.waiting_ms.load(Ordering::Relaxed)));
-        (from != KEEP_ALL).then_some((from, keep))
     }
 
     /// Tells which session was recorded before on the card that is in.

@@ -5,7 +5,6 @@
 //! file here and one line in [`CAMPAIGNS`]; `cargo xtask prove` runs them and writes `docs/proof.md`, whose labels are held
 //! against those of the campaigns by a test.
 
-mod armings;
 mod card;
 mod damage;
 pub mod diagnosis;
@@ -67,13 +66,6 @@ pub const CAMPAIGNS: &[Campaign] = &[
                 noticed or told for what it is, no wrong frame comes out, and at most the groups that were touched are lost",
         labels: damage::LABELS,
         run: damage::run,
-    },
-    Campaign {
-        name: "by-arming",
-        about: "files of the logs of one power-on of a vehicle that is recorded by arming are taken away, exchanged, renamed, \
-                copied or joined, and pages of them go wrong: each is noticed, or what is said is so",
-        labels: armings::LABELS,
-        run: armings::run,
     },
     Campaign {
         name: "stalls",

@@ -52,12 +52,8 @@ struct Scenario {
     seconds: f64,
     /// How fast it comes, in baud.
     baud: u64,
-    /// Seconds before those in which the vehicle is not armed yet.
-    disarmed_s: f64,
     /// When the card is out, in seconds.
     out: Option<(f64, f64)>,
-    /// Parameters that are not at their defaults.
-    params: &'static [(&'static str, f32)],
 }
 
 const PX4: &str = "px4_hil_quad_low.tlog";
@@ -72,9 +68,7 @@ const NEW_CARD: Scenario = Scenario {
     earlier: 0,
     seconds: 20.0,
     baud: FULL_RATE,
-    disarmed_s: 0.0,
     out: None,
-    params: &[],
 };
 const LATER: Scenario = Scenario { name: "a session after others", earlier: 3, ..NEW_CARD };
 const FULL: Scenario = Scenario { name: "a session on a full card", card_mib: 34, earlier: 18, ..NEW_CARD };
@@ -84,13 +78,6 @@ const SPLIT_FULL: Scenario = Scenario { name: "a log that is split on a full car
 const SLOW: Scenario = Scenario { name: "a session at 57,600 baud", baud: 57_600, seconds: 50.0, ..LATER };
 const RETURN: Scenario =
     Scenario { name: "a card that was taken out and put back", out: Some((5.0, 6.5)), ..LATER };
-
-const BY_ARMING: Scenario = Scenario {
-    name: "a log by arming",
-    disarmed_s: 25.0,
-    params: &[("REC_MODE", 1.0), ("REC_BEFORE", 5.0), ("REC_AFTER", 0.0)],
-    ..LATER
-};
 
 const SCENARIOS: &[Scenario] = &[
     NEW_CARD,
@@ -110,10 +97,6 @@ const SCENARIOS: &[Scenario] = &[
     RETURN,
     Scenario { flight: PX4, ..RETURN },
     Scenario { flight: FAULTS, ..RETURN },
-    BY_ARMING,
-    Scenario { flight: SIGNED, ..BY_ARMING },
-    Scenario { flight: FAULTS, seconds: 60.0, ..BY_ARMING },
-    Scenario { name: "a log by arming on a full card", card_mib: 34, earlier: 18, ..BY_ARMING },
 ];
 
 /// What it prints.
@@ -240,26 +223,16 @@ impl Session {
         }
         let (before, files) = (card.content()?, card.walk()?.files);
         let logs_before: BTreeSet<_> = on_card(&card.path()).into_iter().map(|log| log.name).collect();
-        let stream = Stream::of_flight(&own(scenario.flight), scenario.baud)?;
-        let stream = if scenario.disarmed_s > 0.0 {
-            stream.after_waiting(scenario.disarmed_s, scenario.seconds)?
-        } else {
-            stream.for_seconds(scenario.seconds)
-        };
+        let stream = Stream::of_flight(&own(scenario.flight), scenario.baud)?.for_seconds(scenario.seconds);
 
         let micros = |seconds: f64| (seconds * 1e6) as u64;
         let out = scenario.out.map(|(from, to)| CardOut { from_us: micros(from), to_us: micros(to) });
         let device = card.device(Faults { outs: out.into_iter().collect(), ..Faults::default() })?;
         device.start_trace();
-        let mut params = Params::defaults();
-        for (name, value) in scenario.params {
-            params.set(name, *value).map_err(|error| anyhow::anyhow!("{name}: {error:?}"))?;
-        }
+        let params = Params::defaults();
         let boots = scenario.earlier + 1;
         let done = power_on(&device, &params, boots, &mut std::io::sink(), stream.chunks(), |_| Ok(()))?;
         ensure!(done.stats.frames_lost == 0 && done.frames_left == 0, "frames were lost: {:?}", done.stats);
-        let drops = done.card.segments_released > 0;
-        ensure!(drops == (scenario.disarmed_s > 0.0), "{} segments dropped", done.card.segments_released);
         let trace = device.take_trace();
         ensure!(trace.len() > 200, "only {} block writes", trace.len());
 

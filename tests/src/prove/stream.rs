@@ -60,19 +60,6 @@ impl Stream {
         Self { bytes, frames: places, is_signed: self.is_signed, baud: self.baud }
     }
 
-    /// So many seconds of what the vehicle sends before it is armed, and then these seconds of everything.
-    pub(super) fn after_waiting(&self, waiting_s: f64, seconds: f64) -> Result<Self> {
-        let armed = self.frames.iter().position(|frame| is_armed(&self.bytes[frame.clone()]));
-        let armed = armed.context("it is never armed")?;
-        let places = self.frames[..armed].to_vec();
-        let mut both = Self { bytes: self.bytes.clone(), frames: places, ..*self }.for_seconds(waiting_s);
-        let all = self.for_seconds(seconds);
-        let start = both.bytes.len();
-        both.bytes.extend_from_slice(&all.bytes);
-        both.frames.extend(all.frames.iter().map(|frame| start + frame.start..start + frame.end));
-        Ok(both)
-    }
-
     /// So many seconds of everything and then so many of what the vehicle sends before it is armed, in turn.
     pub(super) fn flying_and_resting(&self, seconds: &[(f64, f64)]) -> Result<Self> {
         let armed = self.frames.iter().position(|frame| is_armed(&self.bytes[frame.clone()]));

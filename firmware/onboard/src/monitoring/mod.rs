@@ -23,7 +23,6 @@ use hums_recorder::status::CardStatus;
 use crate::ResetCause;
 use crate::companion::{self, Companion};
 use crate::journal::{Journal, Logbook};
-use crate::keeping::Keeping;
 use crate::notices::{Notice, Notices};
 use crate::persist::{Handover, Keeper};
 use crate::port::PortStatus;
@@ -76,7 +75,8 @@ pub struct Monitoring<'a> {
     recorded: Recorded,
     notices: Notices,
     slot: Slot,
-    keeping: Keeping,
+    /// Files that storage had begun at the last tick.
+    files: u32,
     figures: Figures<'a>,
     marks: Marks,
     partial_at: Instant,
@@ -103,7 +103,7 @@ impl<'a> Monitoring<'a> {
             recorded: Recorded::new(),
             notices: Notices::new(),
             slot: Slot::new(),
-            keeping: Keeping::new(),
+            files: 0,
             figures: Figures::new(port, card),
             marks: Marks::new(),
             partial_at: Instant::ZERO,
@@ -113,17 +113,15 @@ impl<'a> Monitoring<'a> {
 
     /// Writes what a log begins with: who records, and every parameter that is not at its default.
     pub fn start(&mut self, now: Instant, sectors: &mut SectorsIn) {
-        self.keep(now, sectors);
         self.recorded.heading(now, &self.identity, &mut self.book, sectors);
         self.recorded.usage(now, Moment::Start, &mut self.book, sectors);
     }
 
-    /// What of the record is to be kept, by whether the vehicle is armed.
-    fn keep(&mut self, now: Instant, sectors: &mut SectorsIn) {
-        let Self { book, keeping, recorded, identity, .. } = self;
-        let armed = book.monitor.vehicle().armed();
-        keeping.tick(now, book.monitor.params(), armed, book.card, book.journal.writer(), sectors);
-        if keeping.takes_new_file(book.card) {
+    /// Begins each file of the log but the first one with what a log begins with.
+    fn head_file(&mut self, now: Instant, sectors: &mut SectorsIn) {
+        let Self { book, recorded, identity, files, .. } = self;
+        let before = core::mem::replace(files, book.card.read().segments);
+        if before != 0 && before != *files {
             recorded.heading(now, identity, book, sectors);
             recorded.usage_anew(now, book, sectors);
         }
@@ -248,7 +246,7 @@ impl<'a> Monitoring<'a> {
             card.want_group();
         }
         self.tell_before(now, sectors);
-        self.keep(now, sectors);
+        self.head_file(now, sectors);
         let Self { book, figures, slot, notices, .. } = self;
         figures.count(now, book.card, &mut book.journal, sectors);
         slot.tick(now, book.card.read().state, &mut book.journal, notices, sectors);

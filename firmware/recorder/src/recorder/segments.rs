@@ -1,18 +1,20 @@
 //! Which segment is written: the session's next one, made where there is room and else in the place of the oldest.
 
 use hums_blackbox::record::{Before, Found};
-use hums_blackbox::{GROUP_SECTORS, SECTOR_BYTES, Sector};
+use hums_blackbox::{GROUP_SECTORS, SECTOR_BYTES};
 use hums_core::time::Instant;
 
 use super::before;
 use crate::CardDevice;
 use crate::card::{Card, CardError, LogEntry, SEGMENT_BYTES_MAX};
 use crate::name::LogName;
-use crate::ring::{self, Ring};
 use crate::status::{CardState, CardStatus};
 
 /// Segments that even a small card should hold, so that overwriting the oldest loses little.
 const SEGMENTS_MIN: u64 = 16;
+
+/// Bytes of a segment for what another one did not take: 30 s of a full line (921,600 baud).
+const SHORT_SEGMENT_BYTES: u32 = 256 * 1024;
 
 /// Logs without their clusters that are passed by for one that can be written anew: each takes a walk over the directory.
 const UNCHAINED_MAX: usize = 8;
@@ -49,10 +51,6 @@ pub(super) struct Segments<'a> {
     pub(super) log: Option<Log>,
     /// The card in the slot has a segment of it.
     pub(super) is_open: bool,
-    /// The segments of a disarmed vehicle.
-    pub(super) ring: Ring,
-    /// The log ended in order with the sector that was written last.
-    pub(super) is_over: bool,
     /// The newest segment that was on the card before the session, until it was looked at.
     earlier: Option<LogName>,
     /// The open segment has a date in its directory entry, or there was trouble with it.
@@ -61,17 +59,7 @@ pub(super) struct Segments<'a> {
 
 impl<'a> Segments<'a> {
     pub(super) const fn new(status: &'a CardStatus, entropy: u32) -> Self {
-        let ring = Ring::new();
-        Self {
-            status,
-            entropy,
-            log: None,
-            is_open: false,
-            ring,
-            is_over: false,
-            earlier: None,
-            is_dated: false,
-        }
+        Self { status, entropy, log: None, is_open: false, earlier: None, is_dated: false }
     }
 
     /// A number for a card that is formatted now.
@@ -91,9 +79,6 @@ impl<'a> Segments<'a> {
         let log = if let Some(log) = resumed {
             log
         } else {
-            // What is in the ring is on another card, and so is the end of the log.
-            self.ring.clear();
-            self.is_over = false;
             self.earlier = newest;
             if newest.is_none() {
                 self.status.set_before(&Before { found: Found::Nothing, ..Before::default() });
@@ -105,11 +90,8 @@ impl<'a> Segments<'a> {
             Log { name, session, volume_id, base: None, newest_copy: NewestCopy::Further }
         };
         let before = self.log.replace(log);
-        let opened = if Some(log.name) == newest {
-            self.next(None, card)
-        } else {
-            self.open(log.name, None, false, card)
-        };
+        let opened =
+            if Some(log.name) == newest { self.next(true, card) } else { self.open(log.name, false, card) };
         if let Err(error) = opened {
             self.log = before;
             return Err(error);
@@ -147,52 +129,26 @@ impl<'a> Segments<'a> {
         self.log.is_some_and(|log| log.base.is_some())
     }
 
-    /// Whether a log of its own begins with this sector: the first group behind the end of the log before, also where the vehicle was
-    /// armed again before that end was on the card.
-    pub(super) fn begins_log(&self, sector: &Sector) -> bool {
-        self.is_over && sector.starts_group()
-    }
-
-    /// Opens the segment after it, which begins with this sector: of the next log, where that begins a log. Without one it is a short
-    /// one for what the segment before did not take: a card that goes away or refuses again and again is not used up by what is begun.
+    /// Opens the segment after it. A short one is for what the segment before did not take: a card that goes away or refuses again and
+    /// again is not used up by what is begun.
     pub(super) fn next<D: CardDevice>(
         &mut self,
-        sector: Option<&Sector>,
-        card: &mut Card<'_, D>,
-    ) -> Result<(), CardError<D::Error>> {
-        let log = self.log.ok_or(CardError::NotOpen)?;
-        let begins_log = sector.is_some_and(|sector| self.begins_log(sector));
-        let name = if begins_log { log.name.next_session() } else { log.name.next_segment() };
-        self.open(name.ok_or(CardError::Full)?, sector.and_then(group_start), sector.is_none(), card)?;
-        self.is_over &= !begins_log;
-        Ok(())
-    }
-
-    /// The first sector of the open segment is on the card. Where the group before goes on in it, all stays that is in the ring:
-    /// without that no reader could do anything with it. The monitor sees that, ends the log, and waits anew.
-    pub(super) fn begin_segment(&mut self, name: LogName, sector: &Sector) {
-        if let Some(began) = group_start(sector) {
-            self.ring.begin(name, began);
-        } else if let Some(from) = self.ring.stop() {
-            self.status.stay(from);
-        }
-    }
-
-    /// Makes a segment, or overwrites the oldest one when the card has no room, or the oldest one of those that are
-    /// kept only for a while when that while is over before the group that it begins with.
-    fn open<D: CardDevice>(
-        &mut self,
-        name: LogName,
-        group: Option<Instant>,
         is_short: bool,
         card: &mut Card<'_, D>,
     ) -> Result<(), CardError<D::Error>> {
-        let short = is_short.then_some(ring::SEGMENT_BYTES);
-        let bytes_max = short.or_else(|| self.ring.segment_bytes()).unwrap_or(SEGMENT_BYTES_MAX);
-        let overwrote = match self.ring.oldest(group, self.status.waiting()) {
-            Some(old) => self.recycle(old, name, card, bytes_max)?,
-            None => self.create_or_overwrite(name, card, bytes_max)?,
-        };
+        let log = self.log.ok_or(CardError::NotOpen)?;
+        self.open(log.name.next_segment().ok_or(CardError::Full)?, is_short, card)
+    }
+
+    /// Makes a segment, or overwrites the oldest one when the card has no room.
+    fn open<D: CardDevice>(
+        &mut self,
+        name: LogName,
+        is_short: bool,
+        card: &mut Card<'_, D>,
+    ) -> Result<(), CardError<D::Error>> {
+        let bytes_max = if is_short { SHORT_SEGMENT_BYTES } else { SEGMENT_BYTES_MAX };
+        let overwrote = self.create_or_overwrite(name, card, bytes_max)?;
         if let Some(log) = &mut self.log {
             log.name = name;
             log.base = None;
@@ -202,33 +158,6 @@ impl<'a> Segments<'a> {
         self.status.begin_segment(name.session, overwrote);
         self.status.set_state(CardState::Recording);
         Ok(())
-    }
-
-    /// Overwrites the segment `old` of the ring, which no longer counts; makes a new one where it is gone.
-    fn recycle<D: CardDevice>(
-        &mut self,
-        old: LogName,
-        name: LogName,
-        card: &mut Card<'_, D>,
-        bytes_max: u32,
-    ) -> Result<bool, CardError<D::Error>> {
-        let mut found = None;
-        card.logs(|entry| {
-            if entry.name == old {
-                found = Some(entry);
-            }
-        })?;
-        let overwrote = match found {
-            Some(entry) => {
-                card.recycle(&entry, name)?;
-                self.status.count_released();
-                false
-            }
-            None => self.create_or_overwrite(name, card, bytes_max)?,
-        };
-        // Not before: where it fails, the segment is still the first one that may go.
-        self.ring.forget(old);
-        Ok(overwrote)
     }
 
     fn create_or_overwrite<D: CardDevice>(
@@ -246,15 +175,9 @@ impl<'a> Segments<'a> {
         let of = card.device(D::keeps_logs).unwrap_or_default().then_some(name.session);
         let oldest = oldest(card, name, of)?;
         self.look_before(card);
-        self.ring.forget(oldest.name);
         card.recycle(&oldest, name)?;
         Ok(true)
     }
-}
-
-/// When the group was begun that begins with this sector.
-pub(super) fn group_start(sector: &Sector) -> Option<Instant> {
-    sector.preamble().map(|group| Instant::from_millis(group.start_ms))
 }
 
 /// The oldest log that may be overwritten. A few whose clusters are no longer chained are passed by.

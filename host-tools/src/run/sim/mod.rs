@@ -72,7 +72,6 @@ pub fn run(args: &cli::Sim) -> Result<Outcome> {
         power_on_us: 0,
         frames_on_card: true,
         overwritten: false,
-        released: false,
     };
     world.reboots.sort_unstable();
     let start = WallClock::now();
@@ -191,8 +190,6 @@ struct World<'a> {
     frames_on_card: bool,
     /// The oldest segments were overwritten: those of this run may be among them.
     overwritten: bool,
-    /// Not all that was logged was kept.
-    released: bool,
 }
 
 impl World<'_> {
@@ -232,7 +229,6 @@ impl World<'_> {
         }
         let stats = pipeline.stats();
         self.overwritten |= pipeline.has_overwritten();
-        self.released |= pipeline.has_released();
         self.report.card_full |= pipeline.is_full();
         self.add(&stats, lost);
         let cut = self.card.is_dead() || self.flash.is_dead();
@@ -266,18 +262,14 @@ impl World<'_> {
         let mut report = self.report;
         report.blocks_written = self.card.writes();
         let findings = std::mem::take(&mut report.findings);
-        let (frames, on_card) = report.read_card(card, earlier)?;
+        let (frames, _) = report.read_card(card, earlier)?;
         // What the monitor said at the time, also where the card did not take it.
         report.findings = findings;
         if self.overwritten {
             // What came first may be gone again.
             report.frames_logged = frames.min(report.frames_in);
-            report.frames_lost = if self.released {
-                report.frames_lost.max(on_card.frames_missing)
-            } else {
-                report.frames_in - report.frames_logged
-            };
-        } else if !self.frames_on_card && !self.released {
+            report.frames_lost = report.frames_in - report.frames_logged;
+        } else if !self.frames_on_card {
             // Frames were left in memory: only the card tells which made it.
             report.frames_logged = frames.min(report.frames_in);
             report.frames_lost = report.frames_in - report.frames_logged;

@@ -20,7 +20,7 @@ use hums_core::params::Params;
 use hums_recorder::status::CardState;
 use rayon::prelude::*;
 
-use super::{BLOCK, BY_ARMING, FULL, GUIDED, LATER, NEW_CARD, PX4, Scenario, Session};
+use super::{BLOCK, FULL, GUIDED, LATER, NEW_CARD, PX4, Scenario, Session};
 use crate::damage::Random;
 use crate::flights::own;
 use crate::prove::figures::{Figures, Labels};
@@ -43,7 +43,6 @@ const SCENARIOS: &[Scenario] = &[
     Scenario { seconds: 10.0, ..FULL },
     Scenario { seconds: 10.0, ..NEW_CARD },
     Scenario { flight: PX4, card_mib: 300, ..SHORT },
-    Scenario { seconds: 10.0, ..BY_ARMING },
 ];
 /// Cases that are told in words.
 const NOTES_MAX: usize = 40;

@@ -79,11 +79,6 @@ impl Pipeline<'_, '_> {
     pub(in crate::run::sim) fn has_overwritten(&self) -> bool {
         self.slot_status.read().segments_overwritten > 0
     }
-
-    /// Whether segments of this power-on were not kept, because the vehicle was disarmed.
-    pub(in crate::run::sim) fn has_released(&self) -> bool {
-        self.slot_status.read().segments_released > 0
-    }
 }
 
 /// The monitor adds up the port's counters at each tick; power may have gone since the last one.
