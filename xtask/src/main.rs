@@ -22,7 +22,6 @@ mod prove;
 mod repo;
 mod setup;
 mod shell;
-mod structure;
 mod test;
 mod wine;
 
@@ -61,7 +60,6 @@ cargo xtask COMMAND
   size                           flash and RAM of all boards against budgets.toml
   costs                          cycles, load and stack, on the model of the chip, against budgets.toml
   setup [--dry-run]              install what demo and test need, or only say what is missing
-  structure                      draw docs/modules.svg from the code, and count; a circle of imports is an error
   manifest                       make tests/flights/manifest.json anew with pymavlink
   help                           this text
 
@@ -114,7 +112,6 @@ enum Command {
     Setup {
         dry_run: bool,
     },
-    Structure,
     Manifest,
     Help,
 }
@@ -155,12 +152,11 @@ impl Command {
                 ["--dry-run"] => Ok(Self::Setup { dry_run: true }),
                 _ => bail!("setup takes nothing or --dry-run"),
             },
-            "size" | "costs" | "structure" | "manifest" | "help" | "--help" | "-h" if !rest.is_empty() => {
+            "size" | "costs" | "manifest" | "help" | "--help" | "-h" if !rest.is_empty() => {
                 bail!("{name} takes nothing")
             }
             "size" => Ok(Self::Size),
             "costs" => Ok(Self::Costs),
-            "structure" => Ok(Self::Structure),
             "manifest" => Ok(Self::Manifest),
             "help" | "--help" | "-h" => Ok(Self::Help),
             other => bail!("there is no command {other}"),
@@ -199,7 +195,6 @@ impl Command {
                 }
                 outcome.require_all()
             }
-            Self::Structure => structure::draw(),
             Self::Manifest => {
                 setup::ensure(&[Need::PythonVenv], false).require_all()?;
                 oracle::write_manifest()

@@ -42,11 +42,10 @@ pub(crate) enum Need {
     Influx,
     Victoria,
     Chromium,
-    Graphviz,
 }
 
 impl Need {
-    pub(crate) const ALL: [Self; 16] = [
+    pub(crate) const ALL: [Self; 15] = [
         Self::Linker,
         Self::FirmwareTarget,
         Self::StaticTarget,
@@ -62,7 +61,6 @@ impl Need {
         Self::Influx,
         Self::Victoria,
         Self::Chromium,
-        Self::Graphviz,
     ];
 
     /// What it is and what it is for.
@@ -83,7 +81,6 @@ impl Need {
             Self::Influx => "influxdb, which takes the line protocol",
             Self::Victoria => "victoria-metrics, another database that takes the line protocol",
             Self::Chromium => "chromium and its driver, which look at the pages",
-            Self::Graphviz => "graphviz (dot), which draws the picture of the modules",
         }
     }
 
@@ -105,7 +102,6 @@ impl Need {
             Self::Influx => find_program("influxd").is_some(),
             Self::Victoria => find_program("victoria-metrics").is_some(),
             Self::Chromium => find_program("chromium").is_some() && find_program("chromedriver").is_some(),
-            Self::Graphviz => find_program("dot").is_some(),
         }
     }
 
@@ -134,7 +130,6 @@ impl Need {
             Self::Influx => &["influxdb"],
             Self::Victoria => &["victoria-metrics"],
             Self::Chromium => &["chromium", "chromium-driver", "fonts-dejavu-core"],
-            Self::Graphviz => &["graphviz"],
             Self::FirmwareTarget
             | Self::StaticTarget
             | Self::WindowsTarget
@@ -272,9 +267,9 @@ mod tests {
 
     #[test]
     fn a_missing_thing_is_named_and_fails_only_what_needs_it() {
-        let outcome = Outcome { missing: [Need::Graphviz].into() };
-        assert!(!outcome.has(Need::Graphviz) && outcome.has(Need::Mtools));
-        assert!(outcome.require_all().unwrap_err().to_string().contains("graphviz"));
+        let outcome = Outcome { missing: [Need::Dosfstools].into() };
+        assert!(!outcome.has(Need::Dosfstools) && outcome.has(Need::Mtools));
+        assert!(outcome.require_all().unwrap_err().to_string().contains("dosfstools"));
         Outcome::default().require_all().unwrap();
     }
 

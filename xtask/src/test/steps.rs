@@ -17,7 +17,6 @@ use crate::prove;
 use crate::repo;
 use crate::setup::Need;
 use crate::shell::Shell;
-use crate::structure;
 
 /// One thing that is checked.
 pub(super) struct Step {
@@ -42,7 +41,7 @@ pub(super) enum Builds {
 
 /// In the order in which they begin, as far as what they need is there: first what fails soonest, then what others
 /// wait for, then what takes longest.
-pub(super) const STEPS: [Step; 18] = [
+pub(super) const STEPS: [Step; 17] = [
     Step {
         name: "fmt",
         about: "the formatting",
@@ -50,14 +49,6 @@ pub(super) const STEPS: [Step; 18] = [
         after: &[],
         builds: None,
         run: || Shell::cargo().args(["fmt", "--all", "--", "--check"]).run(),
-    },
-    Step {
-        name: "structure",
-        about: "no import goes in a circle, and docs/modules.dot is of this code",
-        needs: &[],
-        after: &[],
-        builds: None,
-        run: structure::check,
     },
     Step {
         name: "oracle",
