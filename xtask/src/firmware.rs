@@ -6,7 +6,6 @@ use std::{env, fs, io};
 
 use anyhow::{Context as _, Result, bail};
 
-use crate::compiled::Compiled;
 use crate::dfu;
 use crate::image;
 use crate::repo::{self, FIRMWARE_TARGET};
@@ -65,11 +64,6 @@ impl Board {
             .collect()
     }
 
-    /// What [`build`] compiled for it.
-    fn compiled(self) -> Compiled {
-        Compiled(self.name())
-    }
-
     /// Where [`build`] leaves the image: one file a board, so that building one does not replace the other.
     pub(crate) fn image(self) -> PathBuf {
         repo::target().join("firmware").join(format!("hums-{}.elf", self.name()))
@@ -101,8 +95,7 @@ pub(crate) fn cargo() -> Result<Shell> {
 
 /// Builds the firmware for `board` as a release does and returns where its ELF file lies; beside it are the other files of a release.
 pub(crate) fn build(board: Board) -> Result<PathBuf> {
-    let said = board.compiled().by(cargo()?.arg("build").args(board.cargo_arguments()))?;
-    board.compiled().keep(&said.artifacts)?;
+    cargo()?.arg("build").args(board.cargo_arguments()).run()?;
     let built = repo::target().join(FIRMWARE_TARGET).join("firmware/hums-firmware");
     let elf = fs::read(&built).with_context(|| format!("cannot read {}", built.display()))?;
     let image = board.image();
@@ -126,9 +119,6 @@ pub(crate) fn files(board: Board, elf: Vec<u8>) -> Result<[(String, Vec<u8>); 3]
 
 /// Lints the firmware for `board`, which is built; a warning is an error.
 pub(crate) fn lint(board: Board) -> Result<()> {
-    if board.compiled().lint()? {
-        return Ok(());
-    }
     cargo()?.arg("clippy").args(board.cargo_arguments()).args(["--", "-D", "warnings"]).run()
 }
 

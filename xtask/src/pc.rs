@@ -1,15 +1,14 @@
-//! What is built for this PC: one choice of packages, features and profile, so that tests, campaigns, lints and
-//! documentation share what is compiled ([`Compiled`]). Test programs are run as they lie there, without asking cargo again: its lock on the build folder
-//! would make a test wait for the lints.
+//! What is built for this PC: one choice of packages, features and profile, so that tests and campaigns share
+//! what is compiled. Test programs are run as they lie there, without asking cargo again.
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result, bail};
-use cargo_metadata::{Artifact, Metadata, MetadataCommand, TargetKind};
+use cargo_metadata::diagnostic::DiagnosticLevel;
+use cargo_metadata::{Artifact, Message, Metadata, MetadataCommand, TargetKind};
 use serde::{Deserialize, Serialize};
 
-use crate::compiled::Compiled;
 use crate::firmware::Board;
 use crate::hums;
 use crate::oracle;
@@ -21,9 +20,6 @@ pub(crate) const CHOICE: [&str; 4] = ["--workspace", "--exclude=hums-app", "--fe
 
 /// All of the end-to-end tests.
 const FEATURES: &str = "hums-tests/chip,hums-tests/browser,hums-tests/databases";
-
-/// What it compiled.
-const COMPILED: Compiled = Compiled("pc");
 
 /// The package of the end-to-end tests and of the campaigns.
 const END_TO_END: &str = "hums-tests";
@@ -57,11 +53,22 @@ pub(crate) fn build() -> Result<()> {
     let tests = tests.map(|(choice, targets)| (&["test", "--no-run"][..], choice, targets));
     let (mut artifacts, mut warned) = (Vec::new(), false);
     for (command, choice, targets) in tests.chain([(&["build"][..], &CHOICE[..], &["--examples"][..])]) {
-        let said = COMPILED.by(Shell::cargo().args(command).args(choice).args(targets))?;
-        artifacts.extend(said.artifacts);
-        warned |= said.warned;
+        let cargo = Shell::cargo().args(command).args(choice).args(targets).arg("--message-format=json");
+        let (messages, code) = cargo.output_and_code()?;
+        for message in Message::parse_stream(messages.as_bytes()) {
+            match message? {
+                Message::CompilerArtifact(artifact) => artifacts.push(artifact),
+                Message::CompilerMessage(message) => {
+                    eprintln!("{}", message.message.rendered.unwrap_or(message.message.message));
+                    warned |= message.message.level == DiagnosticLevel::Warning;
+                }
+                _ => {}
+            }
+        }
+        if code != 0 {
+            bail!("cargo ended with exit code {code}");
+        }
     }
-    COMPILED.keep(&artifacts)?;
     let mut programs = test_programs(artifacts, &metadata)?;
     programs.sort_by(|a, b| (&a.package, &a.name).cmp(&(&b.package, &b.name)));
     fs::create_dir_all(list().parent().unwrap_or(Path::new(".")))?;
@@ -121,21 +128,16 @@ pub(crate) fn end_to_end(name: &str, options: &[&str]) -> Result<()> {
 
 /// Lints all of it; a warning is an error.
 pub(crate) fn lint() -> Result<()> {
-    if COMPILED.lint()? {
-        return Ok(());
-    }
     Shell::cargo().arg("clippy").args(CHOICE).args(["--all-targets", "--", "-D", "warnings"]).run()
 }
 
 /// Builds the documentation, in which a warning is an error, and runs its examples.
 pub(crate) fn document() -> Result<()> {
-    if !COMPILED.document()? {
-        Shell::cargo()
-            .env("RUSTDOCFLAGS", "-D warnings")
-            .args(["doc", "--quiet", "--lib", "--no-deps", "--document-private-items"])
-            .args(CHOICE)
-            .run()?;
-    }
+    Shell::cargo()
+        .env("RUSTDOCFLAGS", "-D warnings")
+        .args(["doc", "--quiet", "--lib", "--no-deps", "--document-private-items"])
+        .args(CHOICE)
+        .run()?;
     Shell::cargo().args(["test", "--quiet", "--doc"]).args(CHOICE).run()
 }
 
