@@ -90,8 +90,6 @@ enum Command {
         only: Vec<String>,
         list: bool,
     },
-    /// One step, in this process: what `test` starts for each.
-    Step(String),
     Prove(Vec<String>),
     Firmware(Board),
     Flash(flash::Options),
@@ -123,10 +121,6 @@ impl Command {
         match name {
             "demo" => Ok(Self::Demo(demo::Options::parse(&rest)?)),
             "test" => parse_test(&rest),
-            "step" => match rest.as_slice() {
-                [step] => Ok(Self::Step((*step).to_owned())),
-                _ => bail!("step takes the name of one"),
-            },
             // The campaigns know their names and flags themselves.
             "prove" => Ok(Self::Prove(rest.iter().map(|word| (*word).to_owned()).collect())),
             "bench" => Ok(Self::Bench(bench::Bench::parse(&rest)?)),
@@ -167,7 +161,6 @@ impl Command {
                 Ok(())
             }
             Self::Test { only, list: false } => test::run(&only),
-            Self::Step(name) => test::run_step(&name),
             Self::Prove(arguments) => prove::run(&arguments),
             Self::Firmware(board) => {
                 setup::ensure(&[Need::Linker, Need::FirmwareTarget], false).require_all()?;

@@ -1,21 +1,16 @@
 //! Everything that CI checks, as named steps that can be run alone.
 //!
-//! Steps run side by side, as many as there are cores and one more: some of them wait for links, databases and pages.
-//! Each is a process of this program ([`lanes`]), whose output is shown when it ends, so that no two mix. A step whose
-//! tool is missing and cannot be installed is left out, and the run fails at its end.
+//! Steps run one after the other, and a table at the end has the seconds of each. A step whose tool is missing and cannot be
+//! installed is left out, and the run fails at its end.
 
-mod lanes;
 mod steps;
-mod table;
 
 use std::time::Instant;
 
 use anyhow::{Result, bail};
 
 use crate::setup::{self, Need};
-use lanes::{Lanes, Outcome};
 use steps::{STEPS, Step};
-use table::End;
 
 pub(crate) fn list() {
     for step in &STEPS {
@@ -32,14 +27,6 @@ pub(crate) fn check_names(names: &[String]) -> Result<()> {
 
 fn find(name: &str) -> Option<&'static Step> {
     STEPS.iter().find(|step| step.name == name)
-}
-
-/// Runs one step in this process: what [`run`] starts for each of them.
-pub(crate) fn run_step(name: &str) -> Result<()> {
-    match find(name) {
-        Some(step) => (step.run)(),
-        None => bail!("there is no step {name}"),
-    }
 }
 
 /// Those named, in the order of the table, with what they need before them; all, where none is named.
@@ -62,18 +49,25 @@ pub(crate) fn run(only: &[String]) -> Result<()> {
     needs.sort_unstable();
     needs.dedup();
     let there = setup::ensure(&needs, false);
-    let Outcome { rows, failed } =
-        Lanes::new(&chosen, |step| step.needs.iter().all(|need| there.has(*need))).run()?;
-
-    print!("\n{}", table::text(&rows, start.elapsed(), &[]));
-    if let Some(name) = failed {
-        bail!("step {name} failed; alone: cargo xtask test --only {name}");
+    let mut rows = String::new();
+    let mut failed = None;
+    for step in chosen {
+        if !step.needs.iter().all(|need| there.has(*need)) {
+            rows += &format!("{:<16} {:>8}  a tool is missing\n", step.name, "-");
+            continue;
+        }
+        println!("\n=== {}: {}", step.name, step.about);
+        let begun = Instant::now();
+        let ended = (step.run)();
+        let word = if ended.is_ok() { "" } else { "  FAILED" };
+        rows += &format!("{:<16} {:>8.1}{word}\n", step.name, begun.elapsed().as_secs_f64());
+        if let Err(error) = ended {
+            failed = Some(error.context(format!("step {0}; alone: cargo xtask test --only {0}", step.name)));
+            break;
+        }
     }
-    if rows.iter().any(|row| row.end != End::Passed) {
-        there.require_all()?;
-        bail!("not every step ran");
-    }
-    Ok(())
+    println!("\n{:<16} {:>8}\n{rows}{:<16} {:>8.1}", "step", "seconds", "in all", start.elapsed().as_secs_f64());
+    failed.map_or_else(|| there.require_all(), Err)
 }
 
 #[cfg(test)]

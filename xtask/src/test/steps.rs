@@ -4,7 +4,6 @@ use std::fs;
 
 use anyhow::{Context as _, Result};
 
-use super::table::NOT_TESTED;
 use crate::budgets;
 use crate::costs;
 use crate::demo;
@@ -25,29 +24,16 @@ pub(super) struct Step {
     pub(super) needs: &'static [Need],
     /// Steps whose results it uses.
     pub(super) after: &'static [&'static str],
-    /// The build folder whose lock it holds: cargo would let two such steps wait for each other.
-    pub(super) builds: Option<Builds>,
     pub(super) run: fn() -> Result<()>,
 }
 
-/// A build folder of cargo's, with a lock of its own.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Builds {
-    /// `target/debug`.
-    Pc,
-    /// `target/firmware`.
-    Firmware,
-}
-
-/// In the order in which they begin, as far as what they need is there: first what fails soonest, then what others
-/// wait for, then what takes longest.
+/// In this order: first the steps that fail soonest, and each after those that it needs.
 pub(super) const STEPS: [Step; 17] = [
     Step {
         name: "fmt",
         about: "the formatting",
         needs: &[Need::Rustfmt],
         after: &[],
-        builds: None,
         run: || Shell::cargo().args(["fmt", "--all", "--", "--check"]).run(),
     },
     Step {
@@ -55,7 +41,6 @@ pub(super) const STEPS: [Step; 17] = [
         about: "pymavlink and the other readers that the tests compare with are there",
         needs: &[Need::PythonVenv],
         after: &[],
-        builds: None,
         run: oracle::prepare,
     },
     Step {
@@ -63,7 +48,6 @@ pub(super) const STEPS: [Step; 17] = [
         about: "hums, the campaigns, all tests and the examples of this PC compile",
         needs: &[],
         after: &[],
-        builds: Some(Builds::Pc),
         run: pc::build,
     },
     Step {
@@ -71,7 +55,6 @@ pub(super) const STEPS: [Step; 17] = [
         about: "the firmware builds for the board f405, within budgets.toml",
         needs: &[Need::FirmwareTarget],
         after: &[],
-        builds: Some(Builds::Firmware),
         run: check_budgets,
     },
     Step {
@@ -79,7 +62,6 @@ pub(super) const STEPS: [Step; 17] = [
         about: "end to end with the image that is flashed, on the model of its chip",
         needs: &[Need::FirmwareTarget, Need::PythonVenv, Need::Dosfstools],
         after: &["oracle", "build", "budgets"],
-        builds: None,
         run: chip,
     },
     Step {
@@ -87,7 +69,6 @@ pub(super) const STEPS: [Step; 17] = [
         about: "lints of the firmware for the board f405, warnings as errors",
         needs: &[Need::Clippy, Need::FirmwareTarget],
         after: &["budgets"],
-        builds: Some(Builds::Firmware),
         run: || firmware::lint(FLOWN),
     },
     Step {
@@ -95,7 +76,6 @@ pub(super) const STEPS: [Step; 17] = [
         about: "lints of what runs on this PC, warnings as errors",
         needs: &[Need::Clippy],
         after: &["build"],
-        builds: Some(Builds::Pc),
         run: pc::lint,
     },
     Step {
@@ -103,7 +83,6 @@ pub(super) const STEPS: [Step; 17] = [
         about: "tests of each crate on this PC",
         needs: &[],
         after: &["build"],
-        builds: None,
         run: pc::unit_tests,
     },
     Step {
@@ -111,7 +90,6 @@ pub(super) const STEPS: [Step; 17] = [
         about: "end to end on this PC, against pymavlink",
         needs: &[Need::Mtools, Need::Dosfstools, Need::PythonVenv],
         after: &["oracle", "build"],
-        builds: None,
         run: sim,
     },
     Step {
@@ -119,7 +97,6 @@ pub(super) const STEPS: [Step; 17] = [
         about: "the documentation builds without a warning, and its examples run",
         needs: &[],
         after: &["build"],
-        builds: Some(Builds::Pc),
         run: pc::document,
     },
     Step {
@@ -127,7 +104,6 @@ pub(super) const STEPS: [Step; 17] = [
         about: "formatting and lints of the page's scripts and style, by Biome",
         needs: &[Need::PythonVenv],
         after: &["oracle"],
-        builds: None,
         run: page,
     },
     Step {
@@ -135,7 +111,6 @@ pub(super) const STEPS: [Step; 17] = [
         about: "the report and the live page in Chromium",
         needs: &[Need::PythonVenv, Need::Chromium],
         after: &["oracle", "build"],
-        builds: None,
         run: || pc::end_to_end("browser", &[]),
     },
     Step {
@@ -143,7 +118,6 @@ pub(super) const STEPS: [Step; 17] = [
         about: "the campaigns in their short form",
         needs: prove::NEEDS,
         after: &["build"],
-        builds: None,
         run: pc::short_campaigns,
     },
     Step {
@@ -151,7 +125,6 @@ pub(super) const STEPS: [Step; 17] = [
         about: "every format against pymavlink, with pyarrow, DuckDB and InfluxDB as readers",
         needs: &[Need::PythonVenv, Need::Influx],
         after: &["oracle", "build"],
-        builds: None,
         run: || pc::end_to_end("answer", further()),
     },
     Step {
@@ -159,7 +132,6 @@ pub(super) const STEPS: [Step; 17] = [
         about: "live writing to InfluxDB and VictoriaMetrics, and the Grafana dashboards",
         needs: &[Need::PythonVenv, Need::Influx, Need::Victoria],
         after: &["oracle", "build"],
-        builds: None,
         run: || pc::end_to_end("live", &[]),
     },
     Step {
@@ -167,7 +139,6 @@ pub(super) const STEPS: [Step; 17] = [
         about: "cycles, load and stack of the firmware against budgets.toml",
         needs: &[Need::FirmwareTarget],
         after: &["build", "budgets"],
-        builds: None,
         run: || costs::check_built(&hums::program(), &FLOWN.image()),
     },
     Step {
@@ -175,7 +146,6 @@ pub(super) const STEPS: [Step; 17] = [
         about: "cargo xtask demo",
         needs: &[Need::FirmwareTarget],
         after: &["build", "budgets"],
-        builds: None,
         run: demo::as_test,
     },
 ];
@@ -184,8 +154,8 @@ pub(super) const STEPS: [Step; 17] = [
 const FLOWN: Board = Board::F405;
 
 fn check_budgets() -> Result<()> {
-    println!("{NOT_TESTED}board f429 (cargo xtask dist lints and measures it)");
-    println!("{NOT_TESTED}licences and sources of the dependencies (cargo xtask dist)");
+    println!("NOT TESTED: board f429 (cargo xtask dist lints and measures it)");
+    println!("NOT TESTED: licences and sources of the dependencies (cargo xtask dist)");
     budgets::check(&[FLOWN])
 }
 
