@@ -26,7 +26,7 @@ pub(crate) const MAC_TARGET: &str = "aarch64-apple-darwin";
 /// Something that a command needs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Need {
-    /// `cc`: rustc links with it. (`.cargo/linker` sees to it before this program can run at all.)
+    /// `cc`: rustc links with it.
     Linker,
     FirmwareTarget,
     StaticTarget,
