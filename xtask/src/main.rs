@@ -178,7 +178,7 @@ impl Command {
                 budgets::check(&Board::ALL)
             }
             Self::Setup { dry_run } => {
-                let outcome = setup::ensure(&Need::ALL, dry_run);
+                let outcome = setup::ensure(&Need::all(), dry_run);
                 if !dry_run && outcome.has(Need::PythonVenv) {
                     oracle::prepare()?;
                 }

@@ -28,11 +28,6 @@ impl Shell {
         shell
     }
 
-    /// As root: as it is for root, through `sudo -n` for anyone else.
-    pub(crate) fn as_root(program: &str) -> Self {
-        if is_root() { Self::new(program) } else { Self::new("sudo").args(["-n", program]) }
-    }
-
     /// In `folder`; elsewhere it is the root.
     pub(crate) fn within(mut self, folder: &Path) -> Self {
         self.command.current_dir(folder);
