@@ -6,7 +6,6 @@ use hums_blackbox::Record;
 use hums_blackbox::record::Vehicle;
 use hums_core::observation::Observation;
 use hums_core::time::Instant;
-use sha2::{Digest as _, Sha256};
 
 use super::checked::Checked;
 use crate::check::judge::{Judge, Limits};
@@ -25,15 +24,16 @@ pub struct Identity {
     pub vehicle: String,
     /// The day of its first entry, UTC: `2026-11-21`; `None` where nobody told it.
     pub date: Option<String>,
-    /// `s1a2b3c4d`: the session that the sectors name, which is as good as unique.
+    /// `s1a2b3c4d`: the session number of a HUMS log; `r1a2b3c4d`: a number made of a recording's bytes.
     pub session: String,
     /// UTC by the clock of each part.
     pub epochs: Epochs,
 }
 
 /// Who flew and when, and UTC; where it is asked for, what the monitor here says of it, as `hums check` does, unless the one on
-/// board did. The recording is read through for it.
-pub fn identity(place: &Place, judges: bool) -> Result<(Identity, Option<Checked>)> {
+/// board did. The recording is read through for it. Its `session` is that of its files' names, so that another version of this
+/// program, which understands other messages, gives the same.
+pub fn identity(place: &Place, session: String, judges: bool) -> Result<(Identity, Option<Checked>)> {
     let (mut known, mut epochs) = (Known::default(), Epochs::default());
     let want = Want { observations: true, ..Want::default() };
     let recording = place.open()?;
@@ -47,17 +47,17 @@ pub fn identity(place: &Place, judges: bool) -> Result<(Identity, Option<Checked
         Ok(())
     })?;
     let vehicle = known.vehicle();
-    let (first, session) = match &summary.ending {
+    let first = match &summary.ending {
         Some(Ending { summary, .. }) => {
             // One power-on has one clock, also where a recording that was packed has several.
             epochs = Epochs::of(summary.epoch_us);
-            (summary.first, summary.session.map(|session| format!("s{session:08x}")))
+            summary.first
         }
-        None => (known.first, Some(known.session())),
+        None => known.first,
     };
-    let utc_us = first.and_then(|first| epochs.utc_us(first));
+    // A recording without an observation begins at time zero.
+    let utc_us = epochs.utc_us(first.unwrap_or(Instant::ZERO));
     let date = utc_us.map(|utc| iso8601(utc).chars().take(10).collect());
-    let session = session.unwrap_or_else(|| "unknown".to_owned());
     let checked = judge.and_then(|judge| Checked::new(judge.end()));
     Ok((Identity { vehicle, date, session, epochs }, checked))
 }
@@ -72,9 +72,8 @@ struct Known {
     /// The first system whose autopilot sends a heartbeat.
     heard: Option<u8>,
     uid: Option<u64>,
-    /// The time of the first observation, and of all of them.
+    /// The time of the first observation.
     first: Option<Instant>,
-    times: Sha256,
 }
 
 impl Known {
@@ -86,7 +85,6 @@ impl Known {
             }
             Item::Observation(source, observation) => {
                 self.first.get_or_insert(at);
-                self.times.update(at.as_micros().to_le_bytes());
                 match observation {
                     Observation::Heartbeat(_) => {
                         self.heard.get_or_insert(source.system);
@@ -110,11 +108,5 @@ impl Known {
             (None, None, Some(system)) => format!("system-{system}"),
             (None, None, None) => "unknown".to_owned(),
         }
-    }
-
-    /// Of a recording that no recorder gave a number: the times in it are its own.
-    fn session(self) -> String {
-        let number: [u8; 4] = self.times.finalize().first_chunk().copied().unwrap_or_default();
-        format!("r{:08x}", u32::from_be_bytes(number))
     }
 }

@@ -357,7 +357,8 @@ impl Task<'_> {
                 context.judges = judges;
             }
             _ => {
-                (context.identity, context.checked) = identity(work.log, judges)?;
+                (context.identity, context.checked) =
+                    identity(work.log, work.traits.identity(work.log), judges)?;
                 context.tags = Tags::new(&context.identity.session, &context.identity.vehicle);
                 context.epochs = context.identity.epochs.clone();
             }

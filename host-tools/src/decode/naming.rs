@@ -61,21 +61,18 @@ impl Traits {
     /// The name of the log's files.
     pub fn name(&self, place: &Place) -> String {
         let Some(log) = place.own() else {
-            return self
-                .identity(place)
-                .map_or_else(|| place.name.clone(), |of| format!("{}-{of}", file_name(place)));
+            return format!("{}-{}", file_name(place), self.identity(place));
         };
         session_name(&base(log), self.board.as_ref(), self.session)
     }
 
-    /// What the names of its files end with: the session of a log of ours, `s1a2b3c4d`; of another recording a number made
-    /// of its content, `r1a2b3c4d`.
-    pub fn identity(&self, place: &Place) -> Option<String> {
-        match (place.own(), place.path()) {
-            (Some(_), _) => self.session.map(|session| format!("s{session:08x}")),
-            (None, Some(path)) => content_identity(path),
-            (None, None) => None,
-        }
+    /// The session by which tables and points name it, and at the end of its files' names: of a HUMS log the number in its
+    /// sectors, `s1a2b3c4d`; of any other recording a number made of its bytes, `r1a2b3c4d`.
+    pub fn identity(&self, place: &Place) -> String {
+        let number = self.session.map(|session| format!("s{session:08x}"));
+        let content = || place.path().and_then(content_identity);
+        let [a, b, c, d, ..] = self.fingerprint;
+        number.or_else(content).unwrap_or_else(|| format!("r{:08x}", u32::from_be_bytes([a, b, c, d])))
     }
 
     /// A line for the stamp of a folder that is made of the log.

@@ -147,7 +147,8 @@ pub struct Table {
 }
 
 impl Table {
-    /// The name of a recording's next table: the first one of `name`, `name_2` and so on that none of those before has.
+    /// The name of a recording's next table, or of a table's next column: the first one of `name`, `name_2` and so on that
+    /// none of those before has.
     pub fn free_name(taken: &mut BTreeSet<String>, name: &str) -> String {
         let mut free = name.to_owned();
         let mut number = 2_u32;
@@ -168,6 +169,26 @@ pub struct Column {
     pub unit: String,
     /// The type of its values.
     pub kind: Kind,
+}
+
+/// The columns of a table that is being made. Their names differ: a label that comes twice in a recording gets a number.
+#[derive(Debug, Default)]
+pub struct Columns {
+    columns: Vec<Column>,
+    taken: BTreeSet<String>,
+}
+
+impl Columns {
+    /// Adds a column.
+    pub fn push(&mut self, name: &str, unit: &str, kind: Kind) {
+        let name = Table::free_name(&mut self.taken, name);
+        self.columns.push(Column { name, unit: unit.to_owned(), kind });
+    }
+
+    /// All of them, in order.
+    pub fn finish(self) -> Vec<Column> {
+        self.columns
+    }
 }
 
 /// The type of a column.

@@ -491,3 +491,54 @@ fn a_log_that_breaks_off_in_the_air_has_one_time_in_the_air_and_logs_stand_in_th
     let report = run(dir.path(), "report y.tlog", 2);
     assert!(String::from_utf8_lossy(&report.stderr).contains("-o is missing"));
 }
+
+/// An input of these tests.
+fn input(name: &str) -> String {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/inputs").join(name).display().to_string()
+}
+
+/// The line protocol's tag `session` of the only file of points in a folder.
+fn session_of_points(folder: &Path, recording: &str) -> String {
+    let files = fs::read_dir(folder).expect("a folder").map(|entry| entry.expect("an entry").path());
+    let of = |path: &PathBuf| {
+        path.extension().is_some_and(|lp| lp == "lp") && path.display().to_string().contains(recording)
+    };
+    let points = fs::read_to_string(files.into_iter().find(of).expect("points")).expect("text");
+    let tag = points.split_once(",session=").expect("a tag").1;
+    tag.split([',', ' ']).next().expect("a name").to_owned()
+}
+
+/// A companion computer alone sends nothing that the monitor knows; its recordings are told apart by their bytes.
+#[test]
+fn recordings_without_a_known_message_are_sessions_with_dates_of_their_own() {
+    let dir = tempfile::tempdir().expect("a directory");
+    let inputs = ["comp0.tlog", "comp1.tlog"].map(input);
+    run(dir.path(), &format!("decode {} -o fleet --format parquet,influx", inputs.join(" ")), 0);
+    let vehicle = dir.path().join("fleet/vehicle=unknown");
+    let mut tables: Vec<(String, String)> = Vec::new();
+    for date in fs::read_dir(&vehicle).expect("a vehicle").map(|entry| entry.expect("an entry")) {
+        for session in fs::read_dir(date.path()).expect("a date").map(|entry| entry.expect("an entry")) {
+            let name = |entry: &fs::DirEntry| entry.file_name().to_string_lossy().into_owned();
+            tables.push((name(&date), name(&session)));
+        }
+    }
+    tables.sort();
+    let dates: Vec<&str> = tables.iter().map(|(date, _)| date.as_str()).collect();
+    assert_eq!(dates, ["date=2026-09-21", "date=2026-09-27"]);
+    for (name, (_, session)) in ["comp0.tlog", "comp1.tlog"].iter().zip(&tables) {
+        assert_eq!(*session, format!("session={}", session_of_points(&dir.path().join("fleet"), name)));
+    }
+    assert_ne!(tables[0].1, tables[1].1);
+}
+
+#[test]
+fn a_ulog_with_a_field_twice_has_a_column_for_each() {
+    let dir = tempfile::tempdir().expect("a directory");
+    run(dir.path(), &format!("decode {} -o out --format jsonl,csv,parquet", input("dup.ulg")), 0);
+    let lines = fs::read_dir(dir.path().join("out")).expect("a folder");
+    let lines = lines
+        .map(|entry| entry.expect("an entry").path())
+        .find(|path| path.extension().is_some_and(|e| e == "jsonl"));
+    let lines = fs::read_to_string(lines.expect("lines")).expect("text");
+    assert!(lines.lines().any(|line| line.contains("\"a\":") && line.contains("\"a_2\":")), "{lines}");
+}

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use super::format::{ARRAY_LENGTH, FieldKind, Format};
 use super::message::Message;
-use crate::source::item::{Column, Kind, Table, Value};
+use crate::source::item::{Column, Columns, Kind, Table, Value};
 
 /// Tables of one name at most: a file that redefines a name for ever does not fill the memory.
 const VERSIONS_MAX: usize = 16;
@@ -54,23 +54,17 @@ pub(super) fn safe(name: &str) -> String {
 }
 
 fn columns(format: &Format, units: Vec<String>, is_words: bool) -> Vec<Column> {
-    let mut columns: Vec<Column> = Vec::new();
-    let mut push = |name: String, unit: String, kind: Kind| {
-        // A label that comes twice gets its number: a table's columns differ.
-        let twice = columns.iter().any(|column| column.name == name);
-        let name = if twice { format!("{name}_{}", columns.len() + 1) } else { name };
-        columns.push(Column { name, unit, kind });
-    };
+    let mut columns = Columns::default();
     for (field, unit) in format.fields.iter().zip(units) {
         if field.kind == FieldKind::Array {
             for element in 0..ARRAY_LENGTH {
-                push(format!("{}[{element}]", field.name), unit.clone(), Kind::Signed);
+                columns.push(&format!("{}[{element}]", field.name), &unit, Kind::Signed);
             }
         } else {
-            push(field.name.clone(), unit, kind(format, field.kind, is_words));
+            columns.push(&field.name, &unit, kind(format, field.kind, is_words));
         }
     }
-    columns
+    columns.finish()
 }
 
 /// The name of the message that holds files: its text is their content, which may be anything.
@@ -155,9 +149,10 @@ mod tests {
     }
 
     #[test]
-    fn a_label_that_comes_twice_gets_a_number() {
-        let format = Format::new(130, 0, "X", b"BB", "A,A");
-        let table = Tables::default().of(&format, vec![String::new(); 2], false).expect("a table");
-        assert_eq!(table.columns.iter().map(|column| column.name.as_str()).collect::<Vec<_>>(), ["A", "A_2"]);
+    fn labels_that_come_twice_get_numbers_that_no_other_label_has() {
+        let format = Format::new(130, 0, "X", b"BBBB", "A,A_2,A,A");
+        let table = Tables::default().of(&format, vec![String::new(); 4], false).expect("a table");
+        let names: Vec<&str> = table.columns.iter().map(|column| column.name.as_str()).collect();
+        assert_eq!(names, ["A", "A_2", "A_3", "A_4"]);
     }
 }

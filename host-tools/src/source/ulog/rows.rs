@@ -4,24 +4,26 @@
 
 use super::format::{Field, Layout, Number};
 use super::message::words;
-use crate::source::item::{Column, Kind, Table, Value};
+use crate::source::item::{Columns, Kind, Table, Value};
 
 /// The column that tells the instances of a topic apart: the first one, as there may be two batteries.
 pub(super) const INSTANCE: &str = "multi_id";
 
 /// The table of a topic's rows.
 pub(super) fn table(layout: &Layout) -> Table {
-    let column = |name: String, unit: &str, kind| Column { name, unit: unit.to_owned(), kind };
-    let mut columns = vec![column(INSTANCE.to_owned(), "", Kind::Unsigned)];
+    let mut columns = Columns::default();
+    columns.push(INSTANCE, "", Kind::Unsigned);
     for field in &layout.fields {
         let (unit, kind) = (unit(&field.name), kind(field.number));
         match elements(field) {
-            None => columns.push(column(field.name.clone(), unit, kind)),
-            Some(count) => columns
-                .extend((0..count).map(|element| column(format!("{}[{element}]", field.name), unit, kind))),
+            None => columns.push(&field.name, unit, kind),
+            Some(count) => {
+                (0..count)
+                    .for_each(|element| columns.push(&format!("{}[{element}]", field.name), unit, kind));
+            }
         }
     }
-    Table { name: table_name(layout), columns }
+    Table { name: table_name(layout), columns: columns.finish() }
 }
 
 /// How many columns it has.
@@ -176,6 +178,18 @@ mod tests {
             "timestamp",
         ];
         assert_eq!(units.map(unit), ["V", "m/s", "m/s2", "rpm", "", "", "us"]);
+    }
+
+    #[test]
+    fn names_that_come_twice_get_numbers() {
+        let mut formats = Formats::default();
+        formats
+            .define(b"t:uint64_t timestamp;float a;float a;uint8_t multi_id;int8_t[2] b;int8_t[2] b;")
+            .expect("defined");
+        let columns = table(&formats.layout("t").expect("resolved")).columns;
+        let names: Vec<&str> = columns.iter().map(|column| column.name.as_str()).collect();
+        let twice = [INSTANCE, "timestamp", "a", "a_2", "multi_id_2", "b[0]", "b[1]", "b[0]_2", "b[1]_2"];
+        assert_eq!(names, twice);
     }
 
     #[test]
