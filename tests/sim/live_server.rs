@@ -1,7 +1,7 @@
 //! `hums live` as a server and as a service: pages that break off, addresses, and how it ends.
 
 use std::io::{BufRead as _, BufReader, Read as _, Write as _};
-use std::net::TcpStream;
+use std::net::{TcpListener, TcpStream};
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
@@ -39,6 +39,25 @@ fn two_hundred_broken_off_handshakes_take_no_pages_place() {
         assert!(Instant::now() < end, "no page opens any longer: {line}");
         std::thread::sleep(Duration::from_millis(50));
     }
+}
+
+/// A vehicle by TCP that goes out of range: the connection ends, and later ones get no answer.
+#[test]
+fn a_link_that_is_gone_keeps_neither_the_page_nor_the_end_waiting() {
+    let vehicle = TcpListener::bind("127.0.0.1:0").unwrap();
+    let address = vehicle.local_addr().unwrap();
+    let mut live = Live::start(&["--input", &format!("tcp:{address}")]);
+    // A queue of one that is full: the system drops further connections' first packets.
+    rustix::net::listen(&vehicle, 0).unwrap();
+    drop(vehicle.accept().unwrap());
+    let fill = || TcpStream::connect_timeout(&address, Duration::from_millis(300));
+    let queued: Vec<_> = (0..16).map_while(|_| fill().ok()).collect();
+    assert!(queued.len() < 16, "connections are still taken");
+    std::thread::sleep(Duration::from_millis(1_500));
+    let host = live.address.trim_start_matches("http://").trim_end_matches('/');
+    assert!(answer(handshake(host)).contains("101"), "no page opens");
+    live.program.signal("INT");
+    assert_eq!(live.program.end(Duration::from_secs(2)), Some(0));
 }
 
 #[test]
@@ -106,7 +125,7 @@ fn a_recording_that_is_broken_off_is_not_called_whole() {
 
 #[test]
 fn a_server_that_takes_no_point_loses_none() {
-    let server = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
+    let server = TcpListener::bind("127.0.0.1:0").unwrap();
     let url = format!("http://{}", server.local_addr().unwrap());
     // It says of everything what a database says of a bad point.
     std::thread::spawn(move || {

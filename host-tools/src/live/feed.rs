@@ -1,9 +1,11 @@
 //! A live source: bytes as they come, on this PC's clock, until Ctrl-C.
 //!
 //! The thread waits for bytes at most `SILENCE`, takes them through the framer into the world, and publishes twenty
-//! to twenty-five times a second, at once what comes after a pause; between that it rests for moments (`GATHER`). A connection that breaks is opened again; meanwhile the values grow old, and the page says so.
+//! to twenty-five times a second, at once what comes after a pause; between that it rests for moments (`GATHER`). A connection that breaks is
+//! opened again by a thread of its own, as that may take ten seconds; meanwhile the values grow old, and the page says so.
 
 use std::sync::Arc;
+use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
 use std::time::{Duration, Instant as Wall, SystemTime, UNIX_EPOCH};
 
 use anyhow::Result;
@@ -40,14 +42,14 @@ const SILENT: Duration = Duration::from_secs(3);
 /// Follows a live source until Ctrl-C.
 pub struct Feed {
     endpoint: Endpoint,
-    port: Option<Box<dyn Port>>,
-    again_at: Wall,
+    link: Link,
     hub: Arc<Hub>,
     world: World,
     framer: Framer,
     influx: Option<Influx>,
     source: SourceJson,
     start: Wall,
+    /// UTC at `start`, see [`epoch_us`].
     epoch_us: u64,
     heard: Option<Wall>,
     /// When the port was looked at last.
@@ -55,22 +57,42 @@ pub struct Feed {
     rate: Rate,
 }
 
+/// The connection to the source.
+enum Link {
+    Open(Box<dyn Port>),
+    /// It is tried again at this time.
+    Lost(Wall),
+    /// A thread opens it and sends it, or why that failed.
+    Opening(Receiver<Result<Box<dyn Port>>>),
+}
+
+impl Link {
+    /// Starts to open it. A thread that still waits for an answer at the end of the program ends with it.
+    fn opening(endpoint: &Endpoint) -> Result<Self> {
+        let (opened, link) = sync_channel(1);
+        let endpoint = endpoint.clone();
+        std::thread::Builder::new().name("opening".to_owned()).spawn(move || {
+            // Nobody waits for it any longer at the end of the program.
+            let _ = opened.send(duplex::open(&endpoint, SILENCE).map(|duplex| duplex.reader));
+        })?;
+        Ok(Self::Opening(link))
+    }
+}
+
 impl Feed {
     /// Opens the source: a slip in its name is told at once.
     pub fn open(endpoint: &Endpoint, limits: Limits, hub: Arc<Hub>, influx: Option<Influx>) -> Result<Self> {
         let port = duplex::open(endpoint, SILENCE)?.reader;
-        let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
         Ok(Self {
             endpoint: endpoint.clone(),
-            port: Some(port),
-            again_at: Wall::now(),
+            link: Link::Open(port),
             hub,
             world: World::new(limits),
             framer: Framer::new(),
             influx,
             source: SourceJson { name: endpoint.to_string(), phase: "waiting", ..SourceJson::default() },
             start: Wall::now(),
-            epoch_us: u64::try_from(now.as_micros()).unwrap_or(0),
+            epoch_us: epoch_us(SystemTime::now(), Instant::ZERO),
             heard: None,
             looked: Instant::ZERO,
             rate: Rate::default(),
@@ -85,6 +107,7 @@ impl Feed {
             let frames = self.world.frames;
             let got = self.read(&mut buffer);
             let now = self.now();
+            self.epoch_us = epoch_us(SystemTime::now(), now);
             self.pass(now);
             news |= self.world.frames != frames;
             if (news && shown.elapsed() >= SOON) || published.elapsed() >= PUBLISH {
@@ -107,7 +130,7 @@ impl Feed {
 
     /// Takes what has come, or waits for it a while; gives how many bytes there were.
     fn read(&mut self, buffer: &mut [u8]) -> usize {
-        let Some(port) = &mut self.port else {
+        let Link::Open(port) = &mut self.link else {
             self.open_again();
             return 0;
         };
@@ -126,9 +149,9 @@ impl Feed {
         };
         let now = self.now();
         let Self { hub, world, framer, influx, epoch_us, .. } = self;
-        let mut histories = hub.histories();
         let mut take = |at, frame: hums_link::Frame<'_>| {
-            world.frame(at, &frame, Some(&mut histories));
+            // Pages wait for the histories only as long as a frame takes, and never for the database's queue.
+            world.frame(at, &frame, Some(&mut hub.histories()));
             if let Some(influx) = influx {
                 influx.frame(at, *epoch_us, &frame, world);
             }
@@ -158,27 +181,33 @@ impl Feed {
     }
 
     fn lose(&mut self, why: String) {
-        self.port = None;
-        self.again_at = Wall::now() + AGAIN;
+        self.link = Link::Lost(Wall::now() + AGAIN);
         (self.source.phase, self.source.words) = ("lost", why);
     }
 
+    /// Waits a moment for the connection to be opened, or for the time to try that.
     fn open_again(&mut self) {
-        if Wall::now() >= self.again_at {
-            match duplex::open(&self.endpoint, SILENCE) {
-                Ok(duplex) => {
-                    self.port = Some(duplex.reader);
-                    self.source.words = String::new();
-                }
-                Err(error) => self.lose(format!("{error:#}")),
+        let opened = match &self.link {
+            Link::Opening(link) => link.recv_timeout(SILENCE),
+            Link::Lost(again_at) if Wall::now() >= *again_at => match Link::opening(&self.endpoint) {
+                Ok(opening) => return self.link = opening,
+                Err(error) => Ok(Err(error)),
+            },
+            _ => return std::thread::sleep(SILENCE),
+        };
+        match opened {
+            Ok(Ok(port)) => {
+                self.link = Link::Open(port);
+                self.source.words = String::new();
             }
-        } else {
-            std::thread::sleep(SILENCE);
+            Ok(Err(error)) => self.lose(format!("{error:#}")),
+            Err(RecvTimeoutError::Timeout) => {}
+            Err(RecvTimeoutError::Disconnected) => self.lose("opening it has failed".to_owned()),
         }
     }
 
     fn publish(&mut self, now: Instant) {
-        if self.port.is_some() {
+        if matches!(self.link, Link::Open(_)) {
             self.source.phase = match self.heard {
                 None => "waiting",
                 Some(heard) if heard.elapsed() > SILENT => "silent",
@@ -197,6 +226,13 @@ impl Feed {
     }
 }
 
+/// UTC at time zero of the monotonic clock, microseconds since 1970, by UTC now. It is asked for again and again: the
+/// monotonic clock stands while the PC sleeps, and UTC may be set meanwhile.
+fn epoch_us(utc: SystemTime, now: Instant) -> u64 {
+    let utc_us = utc.duration_since(UNIX_EPOCH).unwrap_or_default().as_micros();
+    u64::try_from(utc_us).unwrap_or(0).saturating_sub(now.as_micros())
+}
+
 /// What came between two looks, in pieces, each with the time at which it counts as having come.
 fn evenly(bytes: &[u8], from: Instant, to: Instant) -> impl Iterator<Item = (Instant, &[u8])> {
     let pieces = bytes.chunks(bytes.len().div_ceil(PIECES).max(1));
@@ -209,6 +245,15 @@ fn evenly(bytes: &[u8], from: Instant, to: Instant) -> impl Iterator<Item = (Ins
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn utc_is_right_after_the_computer_has_slept() {
+        let at = |seconds| UNIX_EPOCH + Duration::from_secs(seconds);
+        let (start, later) = (Instant::ZERO, Instant::from_millis(5_000));
+        assert_eq!(epoch_us(at(1_000), start), epoch_us(at(1_005), later));
+        // The lid was closed for an hour.
+        assert_eq!(epoch_us(at(4_605), later) + later.as_micros(), 4_605_000_000);
+    }
 
     #[test]
     fn what_was_gathered_came_evenly_and_the_last_of_it_now() {
