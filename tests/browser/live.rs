@@ -149,6 +149,12 @@ fn every_panel_shows_the_recorded_flight_at_that_moment_and_seeking_goes_there()
     page.press(&[" "]);
     page.wait("return document.getElementById('source').textContent === 'paused'", 10);
 
+    // The help is shown by a key, and Esc closes it.
+    page.press(&["?"]);
+    page.wait("return document.querySelector('dialog').open", 10);
+    page.press(&["ESCAPE"]);
+    page.wait("return !document.querySelector('dialog').open", 10);
+
     // On, back, and on again; each time all of it is of that moment.
     for to_s in [60.0, 90.0, 45.0, 75.0] {
         assert_shows(&seek(&mut page, to_s), &frames);

@@ -304,6 +304,28 @@ fn each_battery_has_its_own_lines_and_two_barometers_are_two() {
 }
 
 #[test]
+fn a_track_across_the_180th_meridian_is_as_wide_as_the_flight() {
+    // GLOBAL_POSITION_INT: 20 m each second at the equator, eastwards from 179.9990 E.
+    let place = |second: u8| {
+        let degrees = 179.9990 + f64::from(second) * 20.0 / 111_320.0;
+        let longitude = (if degrees > 180.0 { degrees - 360.0 } else { degrees } * 1e7) as i32;
+        let mut payload = vec![0; 28];
+        payload[8..12].copy_from_slice(&longitude.to_le_bytes());
+        payload[16..20].copy_from_slice(&50_000_i32.to_le_bytes());
+        payload
+    };
+    let dir = tempfile::tempdir().unwrap();
+    let file = dir.path().join("east.tlog");
+    fs::write(&file, standing(20, |second| vec![(33, place(second))])).unwrap();
+    let (_dir, path) = report(&file, &[0]);
+    let mut page = LivePage::start();
+    page.open(&format!("file://{}", path.display()), "light", 1280, 900);
+    page.wait("return document.querySelector('.legend')?.textContent.includes('from the start')", 20);
+    let legend = page.run("return document.querySelector('.legend').textContent");
+    assert!(legend.as_str().unwrap().contains("380 m"), "{legend}");
+}
+
+#[test]
 fn a_finding_stands_with_its_cause_and_with_its_consequences() {
     let (_dir, page) = report(&labelled("f10_gps_off.tlog.gz"), &[0]);
     let shown = oracle::browser(&page, &[0.5]);

@@ -86,26 +86,17 @@ fn main() -> ExitCode {
 #[derive(Debug, PartialEq, Eq)]
 enum Command {
     Demo(demo::Options),
-    Test {
-        only: Vec<String>,
-        list: bool,
-    },
+    Test { only: Vec<String>, list: bool },
     Prove(Vec<String>),
     Firmware(Board),
     Flash(flash::Options),
     Attach(flash::Options),
     Bench(Vec<bench::Bench>),
-    Fuzz {
-        seconds: u32,
-    },
-    Dist {
-        check: bool,
-    },
+    Fuzz { seconds: u32 },
+    Dist { check: bool },
     Size,
     Costs,
-    Setup {
-        dry_run: bool,
-    },
+    Setup { dry_run: bool },
     Manifest,
     Help,
 }

@@ -59,7 +59,11 @@ const TABLE: [(Need, &str, Source); 15] = {
         (Need::Linker, "a C linker, for all that rustc builds", Packages("command -v cc", "gcc libc6-dev")),
         (Need::FirmwareTarget, "Rust's target of the firmware", Target(FIRMWARE_TARGET)),
         (Need::StaticTarget, "Rust's musl target, for the hums of a release", Target(STATIC_TARGET)),
-        (Need::WindowsTarget, "Rust's target for Windows, for the hums.exe of a release", Target(WINDOWS_TARGET)),
+        (
+            Need::WindowsTarget,
+            "Rust's target for Windows, for the hums.exe of a release",
+            Target(WINDOWS_TARGET),
+        ),
         (
             Need::Mingw,
             "MinGW's linker for Windows, for the same",
@@ -69,8 +73,16 @@ const TABLE: [(Need, &str, Source); 15] = {
         (Need::MacTarget, "Rust's target for macOS, for which hums is type-checked", Target(MAC_TARGET)),
         (Need::Rustfmt, "rustfmt, for the check of the formatting", Component("fmt", "rustfmt")),
         (Need::Clippy, "clippy, for the lints", Component("clippy", "clippy")),
-        (Need::Mtools, "mtools, an independent reader of card images", Packages("command -v mcopy", "mtools")),
-        (Need::Dosfstools, "fsck.vfat, which checks a card's files", Packages("command -v fsck.vfat", "dosfstools")),
+        (
+            Need::Mtools,
+            "mtools, an independent reader of card images",
+            Packages("command -v mcopy", "mtools"),
+        ),
+        (
+            Need::Dosfstools,
+            "fsck.vfat, which checks a card's files",
+            Packages("command -v fsck.vfat", "dosfstools"),
+        ),
         (
             Need::PythonVenv,
             "Python with venv, for pymavlink, the independent reader of MAVLink",
@@ -85,7 +97,10 @@ const TABLE: [(Need, &str, Source); 15] = {
         (
             Need::Chromium,
             "Chromium and its driver, which look at the pages",
-            Packages("command -v chromium && command -v chromedriver", "chromium chromium-driver fonts-dejavu-core"),
+            Packages(
+                "command -v chromium && command -v chromedriver",
+                "chromium chromium-driver fonts-dejavu-core",
+            ),
         ),
     ]
 };
@@ -191,7 +206,10 @@ mod tests {
     #[test]
     fn every_need_has_a_line_that_installs_it() {
         for need in Need::all() {
-            assert!(need.install().contains(" install ") || need.install().starts_with("rustup "), "{need:?}");
+            assert!(
+                need.install().contains(" install ") || need.install().starts_with("rustup "),
+                "{need:?}"
+            );
         }
     }
 

@@ -66,7 +66,13 @@ pub(crate) fn run(only: &[String]) -> Result<()> {
             break;
         }
     }
-    println!("\n{:<16} {:>8}\n{rows}{:<16} {:>8.1}", "step", "seconds", "in all", start.elapsed().as_secs_f64());
+    println!(
+        "\n{:<16} {:>8}\n{rows}{:<16} {:>8.1}",
+        "step",
+        "seconds",
+        "in all",
+        start.elapsed().as_secs_f64()
+    );
     failed.map_or_else(|| there.require_all(), Err)
 }
 

@@ -5,35 +5,32 @@ import { say, attribute, toggle, panel } from "./dom.js";
 import { el } from "./elements.js";
 import { fixed, whole, span, age } from "./text.js";
 
-const SUBSYSTEMS = ["power", "propulsion", "engine", "structure", "navigation", "link", "computer", "attitude", "recorder", "mishap"];
-
 export const board = () => {
-  const rows = SUBSYSTEMS.map((name) => {
-    const level = badge(),
-      reason = el("span", { class: "reason" }),
-      by = el("small");
-    const node = el("li", { "data-subsystem": name }, el("b", {}, name), level.node, el("div", {}, by, reason));
-    return { node, level, reason, by };
-  });
-  const box = panel(
-    "board",
-    "Health",
-    el(
-      "ul",
-      { class: "board" },
-      rows.map((row) => row.node),
-    ),
-  );
+  const list = el("ul", { class: "board" });
+  const box = panel("board", "Health", list);
+  const rows = new Map();
+  // A subsystem has its row from its first report on, in the order of the reports.
+  const row = (name) => {
+    if (!rows.has(name)) {
+      const level = badge(),
+        reason = el("span", { class: "reason" }),
+        by = el("small");
+      const node = el("li", { "data-subsystem": name }, el("b", {}, name), level.node, el("div", {}, by, reason));
+      rows.set(name, { node, level, reason, by });
+      list.append(node);
+    }
+    return rows.get(name);
+  };
   return {
     node: box.node,
     update({ board: parts }) {
-      parts.forEach((part, i) => {
-        const row = rows[i];
-        row.level.set(part.level, part.calm ?? part.level);
-        say(row.reason, part.reason);
-        say(row.by, part.by === "on board" ? "on board" : "");
-        attribute(row.node, "class", part.level);
-      });
+      for (const part of parts) {
+        const { node, level, reason, by } = row(part.subsystem);
+        level.set(part.level, part.calm ?? part.level);
+        say(reason, part.reason);
+        say(by, part.by === "on board" ? "on board" : "");
+        attribute(node, "class", part.level);
+      }
     },
   };
 };

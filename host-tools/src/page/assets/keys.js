@@ -53,11 +53,13 @@ export const keys = ({ player, sound, window: nextWindow, vehicle }) => {
     w: nextWindow,
     m: sound,
     "?": help,
-    Escape: () => dialog.open || home(),
+    Escape: home,
   };
   addEventListener("keydown", (event) => {
     if (event.ctrlKey || event.metaKey || event.altKey || event.target.matches?.("select, input[type=search]")) return;
     if (event.key === " " && event.target.matches?.("button")) return;
+    // An open help takes Esc itself: the browser closes it.
+    if (event.key === "Escape" && dialog.open) return;
     const one = does[event.key] ?? does[event.key.toLowerCase()];
     if (one) {
       event.preventDefault();

@@ -33,7 +33,9 @@ const degrees = ([, north, east]) => `${north.toFixed(7)}, ${east.toFixed(7)}`;
 // Places as metres east and north of one.
 const around = ([, lat0, lon0]) => {
   const shrink = Math.cos((lat0 * Math.PI) / 180);
-  return ([, lat, lon]) => [(lon - lon0) * METRES * shrink, (lat - lat0) * METRES];
+  // The short way round the earth: a track may cross the 180th meridian.
+  const east = (degrees) => degrees - 360 * Math.round(degrees / 360);
+  return ([, lat, lon]) => [east(lon - lon0) * METRES * shrink, (lat - lat0) * METRES];
 };
 const edges = (points) => [bounds(points.map(([e]) => e)), bounds(points.map(([, n]) => n))];
 // How wide and how tall a track is, how far it leads from its beginning, and between which heights: metres.
