@@ -20,6 +20,8 @@ use crate::time::{Instant, Span, Stamp};
 pub const HOLDS: Span = Span::from_secs(10);
 /// What the autopilot says of a crash, or that is critical, comes at most so long after it disarmed: heartbeats are a second apart.
 const DISARMED: Span = Span::from_secs(2);
+/// `MAV_STATE_CRITICAL`; `MAV_STATE_EMERGENCY` and what is worse have larger numbers.
+const CRITICAL_STATE: u8 = 5;
 /// Flags come at 1 Hz or faster where they come at all.
 const FLAGS_AGE: Span = Span::from_secs(5);
 
@@ -117,6 +119,9 @@ pub struct Alerts {
     told: [Option<Urgency>; Cause::COUNT],
     until_ms: [u32; Cause::COUNT],
     told_at: Stamp,
+    /// When a cause was reported last that was not reported just before, or the autopilot's state became an emergency.
+    began_at: Stamp,
+    emergency: bool,
     sensors: Flags,
     failures: Flags,
     estimator: Flags,
@@ -136,6 +141,8 @@ impl Alerts {
             told: [None; Cause::COUNT],
             until_ms: [0; Cause::COUNT],
             told_at: Stamp::NONE,
+            began_at: Stamp::NONE,
+            emergency: false,
             sensors: Flags::NONE,
             failures: Flags::NONE,
             estimator: Flags::NONE,
@@ -159,6 +166,20 @@ impl Alerts {
         }
     }
 
+    /// The `MAV_STATE` of a heartbeat.
+    pub(crate) const fn take_state(&mut self, at: Instant, state: u8) {
+        let emergency = state >= CRITICAL_STATE;
+        if emergency && !self.emergency {
+            self.began_at = Stamp::at(at);
+        }
+        self.emergency = emergency;
+    }
+
+    /// Whether the autopilot reported a new problem within this time.
+    pub(crate) fn have_begun_within(&self, now: Instant, span: Span) -> bool {
+        self.began_at.age(now).is_some_and(|age| age <= span)
+    }
+
     /// A text or an event. An autopilot that crashes disarms with the word; what broke then is told right behind it.
     pub(crate) fn tell(&mut self, at: Instant, alert: Alert) {
         let is_last_word = (alert.cause == Cause::Crash || alert.urgency == Urgency::Critical)
@@ -172,6 +193,9 @@ impl Alerts {
         }
         self.told_at = Stamp::at(at);
         let held = told.filter(|_| !is_past(at, *until_ms));
+        if held.is_none() && alert.urgency != Urgency::Over {
+            self.began_at = Stamp::at(at);
+        }
         (*told, *until_ms) = match alert.urgency {
             Urgency::Over => (told.map(|_| Urgency::Over), at.as_millis() as u32),
             urgency => (Some(held.unwrap_or(urgency).max(urgency)), (at + HOLDS).as_millis() as u32),

@@ -231,7 +231,7 @@ impl Monitor {
             self.saving.change(ItemKey::Exceedances);
         }
         self.exposure.step(now, &self.vehicle, self.usage.current_a());
-        self.step_protect(now, event);
+        self.step_protect(now);
         self.step_cells(now);
         self.step_life(now, event);
         self.step_happenings(now, event);
@@ -375,10 +375,10 @@ impl Monitor {
         self.parameters_asked = true;
     }
 
-    fn step_protect(&mut self, now: Instant, event: Option<FlightEvent>) {
+    fn step_protect(&mut self, now: Instant) {
         let Self { vehicle, flight, mishap, health, params, protect, happenings, .. } = self;
         let situation = Situation { now, vehicle, flight, mishap: mishap.is_going(), health, params };
-        if let Some(step) = protect.step(&situation, event) {
+        if let Some(step) = protect.step(&situation) {
             happenings.push(Happening::Protect(step));
         }
     }

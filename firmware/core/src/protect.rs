@@ -1,25 +1,38 @@
 //! Protective action, off by default: a critical finding asks the autopilot to return or to land, once a flight.
 //!
-//! ```text
-//!        critical, in flight          PROT_DELAY over              COMMAND_ACK
-//! Idle ----------------------> Counting -------------> Asking ------------------> Done
-//!   ^  <-----------------------  |                       \--- 3 times unanswered --> Done
-//!   |     clear again            \-- mode changed, disarmed, cancelled, already on its way: Done
-//!   \--- landed: the next flight ---------------------------------------------------/
-//! ```
-//! Only in flight and armed. It is announced with a countdown; the pilot cancels it by changing the flight mode, by
-//! disarming, or by a command, and one cancel holds for the flight. Each step is a record, with the autopilot's answer.
+//! | state | what happens | next |
+//! |---|---|---|
+//! | Idle | in flight, and critical; a return or landing is under way | `OnItsWay` |
+//! | | in flight, and critical | Counting, announced |
+//! | Counting | `PROT_DELAY` is over | Asking |
+//! | | no longer critical | Idle |
+//! | Asking | accepted; refused; no answer to 3 requests | `OnItsWay`; Refused or Done; Done |
+//! | Refused | | Asking for a landing |
+//! | Counting, Asking, Refused | cancelled by command | Done |
+//! | | the autopilot returns or lands | `OnItsWay` |
+//! | | the pilot changes the mode | `ModeChanged`, Done after 2 s |
+//! | Counting, Refused, `ModeChanged` | the autopilot changes the mode | Idle |
+//! | `OnItsWay` | the pilot leaves the returning mode | `ModeChanged` |
+//! | | the autopilot leaves it, or the vehicle no longer sinks to land | Idle |
+//! | any | the flight is over | Idle |
+//!
+//! Only in flight and armed. While the vehicle is on the ground for a moment, or in a mishap, the countdown and the requests pause.
+//! Each step is a record, with the autopilot's answer.
+//!
+//! A mode change is the autopilot's own if the autopilot reports a new problem within [`SIGN`] of it, if it enters a mode in which
+//! failsafes wait, or if a mission ended. Any other mode change is the pilot's, and cancels the action for the flight.
 //!
 //! A return that is refused (no position) is followed by a landing, where the vehicle can land as it hangs: multicopters,
 //! helicopters, and a VTOL that says that it hovers. Nothing is asked of a vehicle that returns or lands already, by its mode, by its
 //! landed state or because it sinks close above the ground. `ArduPlane` and PX4 tell a mission's landing by none of these:
-//! while the mission sinks in the last `APPROACH_M` it is waited (`approaches`). The control structure and what could go wrong with it are in docs/safety.md.
+//! a mission that sinks in the last `APPROACH_M` is one (`approaches`). The control structure and what could go wrong with it are in
+//! docs/safety.md.
 
 use core::fmt::Write as _;
 
 use heapless::String;
 
-use crate::flight::{Flight, FlightEvent, Phase};
+use crate::flight::{Flight, Phase};
 use crate::health::{Health, Level, Subsystem};
 use crate::latest::Latest;
 use crate::motion;
@@ -27,7 +40,7 @@ use crate::observation::{
     Autopilot, CommandAck, Feeds, LandedState, OUR_COMPONENT, Source, VehicleKind, VtolState,
 };
 use crate::params::{Param, Params};
-use crate::time::{Instant, Span};
+use crate::time::{Instant, Span, Stamp};
 use crate::vehicle::{BATTERIES_MAX, LANDED_STATE_AGE, Vehicle};
 
 /// Bytes of a text that a ground station shows to the pilot as it comes: those of one `STATUSTEXT`.
@@ -41,10 +54,13 @@ const ATTEMPTS_MAX: u8 = 3;
 const PROGRESS: Span = Span::from_secs(10);
 /// A mission's last item is reached this long before the autopilot leaves the mission by itself.
 const MISSION_ENDS: Span = Span::from_secs(3);
-/// A mission that sinks faster than this below this height, or did so of late (it flares), may be landing.
+/// A mission that sinks faster than this below this height may be landing.
 const APPROACH_MPS: f32 = 0.5;
 const APPROACH_M: f32 = 40.0;
-const APPROACH_LASTS: Span = Span::from_secs(15);
+/// A vehicle that showed a sign of landing so lately is landing: it may flare.
+const LANDING_LASTS: Span = Span::from_secs(15);
+/// A mode change is the autopilot's own if a sign of that comes within this time, before or after.
+const SIGN: Span = Span::from_secs(2);
 /// `MAV_RESULT_ACCEPTED`
 const ACCEPTED: u8 = 0;
 /// `MAV_RESULT_TEMPORARILY_REJECTED`: asked again.
@@ -99,7 +115,7 @@ pub enum Stage {
     Counting = 2,
     /// The pilot changed the flight mode.
     CancelledByMode = 3,
-    /// It was disarmed or landed.
+    /// The flight is over: it was disarmed, landed, or lies where it came down.
     CancelledOnGround = 4,
     /// Somebody sent the command to cancel.
     CancelledByCommand = 5,
@@ -208,8 +224,7 @@ enum State {
     Idle,
     Counting {
         action: Action,
-        until: Instant,
-        mode: u32,
+        left_ms: u32,
         told_s: u8,
     },
     Asking {
@@ -221,8 +236,33 @@ enum State {
     },
     /// A return was refused: a landing is asked for next.
     Refused,
+    /// The autopilot returns or lands.
+    OnItsWay {
+        action: Action,
+        way: Way,
+    },
+    /// The pilot cancelled by the mode, unless a sign comes that it was the autopilot.
+    ModeChanged,
     /// Nothing more in this flight.
     Done,
+}
+
+/// By which sign the autopilot returns or lands.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Way {
+    /// It accepted the request.
+    Accepted,
+    /// Its mode.
+    Mode,
+    /// It sinks as in a landing, or calls it one.
+    Landing,
+}
+
+/// Who changed the flight mode.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Changed {
+    Pilot,
+    Autopilot,
 }
 
 /// The protective action's memory.
@@ -231,8 +271,12 @@ pub struct Protect {
     state: State,
     request: Option<Request>,
     cancelled: bool,
-    /// When it came down as a mission's landing does.
-    approached_at: Option<Instant>,
+    /// The autopilot's own mode number, and when it changed last.
+    mode: Option<u32>,
+    changed_at: Stamp,
+    stepped_at: Stamp,
+    /// When the vehicle showed a sign of landing last.
+    landing_at: Stamp,
 }
 
 /// What a step looks at.
@@ -259,7 +303,15 @@ impl Situation<'_> {
 impl Protect {
     /// Nothing to do.
     pub const fn new() -> Self {
-        Self { state: State::Idle, request: None, cancelled: false, approached_at: None }
+        Self {
+            state: State::Idle,
+            request: None,
+            cancelled: false,
+            mode: None,
+            changed_at: Stamp::NONE,
+            stepped_at: Stamp::NONE,
+            landing_at: Stamp::NONE,
+        }
     }
 
     /// What is to be sent to the autopilot now, once.
@@ -269,96 +321,143 @@ impl Protect {
 
     /// Somebody sent the command to cancel; `true` where there is something to cancel.
     pub(crate) const fn cancel(&mut self) -> bool {
-        self.cancelled = matches!(self.state, State::Counting { .. } | State::Asking { .. } | State::Refused);
+        self.cancelled = self.pending().is_some();
         self.cancelled
     }
 
-    /// One step, after the checks'.
-    pub(crate) fn step(&mut self, situation: &Situation<'_>, event: Option<FlightEvent>) -> Option<Step> {
-        let Situation { now, health, params, vehicle, .. } = *situation;
-        if event.is_some_and(|event| event != FlightEvent::Landing) && self.state == State::Done {
-            self.state = State::Idle;
-        }
-        let cancelled = core::mem::take(&mut self.cancelled);
-        if approaches(situation) {
-            self.approached_at = Some(now);
-        }
-        let lands =
-            in_mission(vehicle) && self.approached_at.is_some_and(|at| now.since(at) < APPROACH_LASTS);
+    /// The action that is counted down or requested.
+    const fn pending(&self) -> Option<Action> {
         match self.state {
-            State::Done => None,
-            State::Idle => {
-                let action = Action::from_number(params.get(Param::ProtAction) as u8)?;
-                let starts = !lands && situation.flies() && concerned(vehicle, health, params);
-                starts.then(|| self.announce(situation, action)).flatten()
+            State::Counting { action, .. } | State::Asking { action, .. } => Some(action),
+            State::Refused => Some(Action::Land),
+            _ => None,
+        }
+    }
+
+    /// One step, after the checks'.
+    pub(crate) fn step(&mut self, situation: &Situation<'_>) -> Option<Step> {
+        let Situation { now, vehicle, .. } = *situation;
+        let step_ms = self.stepped_at.age_ms(now).unwrap_or(0) as u32;
+        self.stepped_at = Stamp::at(now);
+        let cancelled = core::mem::take(&mut self.cancelled);
+        let left = self.mode.is_some_and(|mode| returns(vehicle, mode));
+        let changed = self.note_mode(now, vehicle);
+        if is_landing(situation) {
+            self.landing_at = Stamp::at(now);
+        }
+        let pending = self.pending();
+        if !situation.flight.is_open() {
+            (self.state, self.landing_at) = (State::Idle, Stamp::NONE);
+            return pending.map(|action| Step { action, stage: Stage::CancelledOnGround, detail: 0 });
+        }
+        if let State::Asking { action, attempt, at, .. } = self.state
+            && let Some(step) = self.hear(situation, action, attempt, at)
+        {
+            return Some(step);
+        }
+        let way = self.way(now, vehicle);
+        if let Some(action) = pending {
+            if cancelled {
+                return Some(self.become_with(State::Done, action, Stage::CancelledByCommand));
             }
-            State::Counting { action, until, mode, told_s } => {
-                if let Some(stage) = Self::ends(situation, cancelled) {
-                    return Some(self.done(action, stage));
-                }
-                let mode_now = vehicle.heartbeat.get().map_or(mode, |heartbeat| heartbeat.mode);
-                if mode_now != mode && !mission_ended(now, vehicle, mode, mode_now) {
-                    return Some(self.done(action, Stage::CancelledByMode));
-                }
-                if lands {
-                    // Should it fly on, it is announced anew.
-                    self.state = State::Idle;
-                    return Some(Step { action, stage: Stage::AlreadyDone, detail: 0 });
-                }
-                if !concerned(vehicle, health, params) {
-                    self.state = State::Idle;
-                    return Some(Step { action, stage: Stage::CancelledClear, detail: 0 });
-                }
-                if now >= until {
-                    return Some(self.ask(now, action, 1));
-                }
-                let left_s = until.since(now).as_millis().div_ceil(1_000).min(255) as u8;
-                let tells = left_s < told_s && (left_s.is_multiple_of(5) || left_s <= 3);
-                let told_s = if tells { left_s } else { told_s };
-                self.state = State::Counting { action, until, mode: mode_now, told_s };
-                tells.then_some(Step { action, stage: Stage::Counting, detail: left_s })
+            if let Some(way) = way {
+                return Some(self.become_with(State::OnItsWay { action, way }, action, Stage::AlreadyDone));
             }
-            State::Asking { action, attempt, at, .. } => self
-                .hear(situation, action, attempt, at)
-                .or_else(|| Self::ends(situation, cancelled).map(|stage| self.done(action, stage)))
-                .or_else(
-                    || if lands { Some(self.done(action, Stage::AlreadyDone)) } else { self.insist(now) },
-                ),
-            State::Refused => match Self::ends(situation, cancelled) {
-                Some(stage) => Some(self.done(Action::Land, stage)),
-                None => Some(self.ask(now, Action::Land, 1)),
+            if changed == Some(Changed::Pilot) {
+                return Some(self.become_with(State::ModeChanged, action, Stage::CancelledByMode));
+            }
+        }
+        let flies = situation.flies();
+        match self.state {
+            State::Idle if flies => self.start(situation, way),
+            State::Counting { .. } | State::Refused if changed.is_some() => self.become_idle(),
+            State::Counting { action, left_ms, .. } if !flies => {
+                self.state = State::Counting { action, left_ms, told_s: u8::MAX };
+                None
+            }
+            State::Counting { action, left_ms, told_s } => {
+                self.count(situation, action, left_ms.saturating_sub(step_ms), told_s)
+            }
+            State::Asking { .. } if flies => self.insist(now),
+            State::Refused if flies => Some(self.ask(now, Action::Land, 1)),
+            State::OnItsWay { action, way: before } => match way {
+                Some(way) => {
+                    self.state = State::OnItsWay { action, way };
+                    None
+                }
+                None if left && changed == Some(Changed::Pilot) => {
+                    Some(self.become_with(State::ModeChanged, action, Stage::CancelledByMode))
+                }
+                None if before == Way::Accepted => None,
+                None => self.become_idle(),
             },
+            State::ModeChanged if self.changed_at.older_than(now, SIGN) => {
+                self.state = State::Done;
+                None
+            }
+            State::ModeChanged if vehicle.alerts.have_begun_within(now, SIGN) => self.become_idle(),
+            _ => None,
         }
     }
 
-    /// What ends it before the autopilot has answered.
-    fn ends(situation: &Situation<'_>, cancelled: bool) -> Option<Stage> {
-        if !situation.flies() {
-            Some(Stage::CancelledOnGround)
-        } else if cancelled {
-            Some(Stage::CancelledByCommand)
-        } else if on_its_way(situation) {
-            Some(Stage::AlreadyDone)
-        } else {
-            None
-        }
+    /// Whether the mode has changed since the last step, and who changed it.
+    fn note_mode(&mut self, now: Instant, vehicle: &Vehicle) -> Option<Changed> {
+        let after = vehicle.heartbeat.get()?.mode;
+        let before = self.mode.replace(after).filter(|before| *before != after)?;
+        (self.changed_at, self.landing_at) = (Stamp::at(now), Stamp::NONE);
+        let by_itself = vehicle.alerts.have_begun_within(now, SIGN)
+            || waits(vehicle, after)
+            || mission_ended(now, vehicle, before, after);
+        Some(if by_itself { Changed::Autopilot } else { Changed::Pilot })
     }
 
-    fn done(&mut self, action: Action, stage: Stage) -> Step {
-        self.state = State::Done;
+    /// By which sign the autopilot returns or lands, if it does.
+    fn way(&self, now: Instant, vehicle: &Vehicle) -> Option<Way> {
+        if self.mode.is_some_and(|mode| returns(vehicle, mode)) {
+            return Some(Way::Mode);
+        }
+        let lands = self.landing_at.age(now).is_some_and(|age| age < LANDING_LASTS);
+        lands.then_some(Way::Landing)
+    }
+
+    fn become_with(&mut self, state: State, action: Action, stage: Stage) -> Step {
+        self.state = state;
         Step { action, stage, detail: 0 }
     }
 
-    fn announce(&mut self, situation: &Situation<'_>, action: Action) -> Option<Step> {
-        let Situation { now, vehicle, params, .. } = *situation;
-        if on_its_way(situation) {
-            return Some(self.done(action, Stage::AlreadyDone));
+    /// Should it be critical still, it is announced anew.
+    const fn become_idle(&mut self) -> Option<Step> {
+        self.state = State::Idle;
+        None
+    }
+
+    /// Announces the action, once something is critical.
+    fn start(&mut self, situation: &Situation<'_>, way: Option<Way>) -> Option<Step> {
+        let Situation { vehicle, health, params, .. } = *situation;
+        let action = Action::from_number(params.get(Param::ProtAction) as u8)?;
+        if self.mode.is_none() || !concerned(vehicle, health, params) {
+            return None;
         }
-        let mode = vehicle.heartbeat.get()?.mode;
+        if let Some(way) = way {
+            return Some(self.become_with(State::OnItsWay { action, way }, action, Stage::AlreadyDone));
+        }
         let delay_s = params.get(Param::ProtDelay).clamp(0.0, 250.0) as u8;
-        let until = now + Span::from_secs(u64::from(delay_s));
-        self.state = State::Counting { action, until, mode, told_s: delay_s };
+        self.state = State::Counting { action, left_ms: u32::from(delay_s) * 1_000, told_s: delay_s };
         Some(Step { action, stage: Stage::Announced, detail: delay_s })
+    }
+
+    fn count(&mut self, situation: &Situation<'_>, action: Action, left_ms: u32, told_s: u8) -> Option<Step> {
+        let Situation { now, vehicle, health, params, .. } = *situation;
+        if !concerned(vehicle, health, params) {
+            return Some(self.become_with(State::Idle, action, Stage::CancelledClear));
+        }
+        if left_ms == 0 {
+            return Some(self.ask(now, action, 1));
+        }
+        let left_s = left_ms.div_ceil(1_000).min(255) as u8;
+        let tells = left_s < told_s && (left_s.is_multiple_of(5) || left_s <= 3);
+        self.state = State::Counting { action, left_ms, told_s: if tells { left_s } else { told_s } };
+        tells.then_some(Step { action, stage: Stage::Counting, detail: left_s })
     }
 
     fn ask(&mut self, now: Instant, action: Action, attempt: u8) -> Step {
@@ -379,7 +478,7 @@ impl Protect {
                 self.state = State::Asking { action, attempt, at: answered_at, progress: true };
                 return None;
             }
-            ACCEPTED => self.state = State::Done,
+            ACCEPTED => self.state = State::OnItsWay { action, way: Way::Accepted },
             _ => {
                 let lands = action == Action::Return && hovers(situation);
                 self.state = if lands { State::Refused } else { State::Done };
@@ -451,46 +550,56 @@ fn concerned(vehicle: &Vehicle, health: &Health, params: &Params) -> bool {
     })
 }
 
-/// Whether the autopilot left a mission by itself because it was flown to its end: then nobody has cancelled anything.
+/// Whether the autopilot left a mission by itself because it was flown to its end.
 fn mission_ended(now: Instant, vehicle: &Vehicle, before: u32, after: u32) -> bool {
     let Some(heartbeat) = vehicle.heartbeat.get() else { return false };
     let left = match (heartbeat.autopilot, heartbeat.kind) {
-        // PX4: AUTO (4) from MISSION (4) to LOITER (3).
-        (Autopilot::Px4, _) => {
-            let main_and_sub = |mode: u32| (mode >> 16) as u16;
-            (main_and_sub(before), main_and_sub(after)) == (0x0404, 0x0304)
-        }
         // ArduPlane: from AUTO to LOITER. A mission's end in RTL is a return.
         (Autopilot::ArduPilot, VehicleKind::Plane | VehicleKind::Vtol) => (before, after) == (10, 12),
         // ArduCopter: from AUTO to LOITER or BRAKE.
         (Autopilot::ArduPilot, _) => before == 3 && matches!(after, 5 | 17),
-        (Autopilot::Other, _) => false,
+        _ => false,
     };
     left && vehicle.mission_reached.within(now, MISSION_ENDS).is_some()
 }
 
-/// Whether the autopilot returns or lands already: by its own mode number, by its landed state, or because it sinks close
-/// above the ground.
-fn on_its_way(situation: &Situation<'_>) -> bool {
+/// Whether failsafes wait in this mode, and PX4 at the end of a mission: a pilot who chooses it has not cancelled.
+fn waits(vehicle: &Vehicle, mode: u32) -> bool {
+    vehicle.heartbeat.get().is_some_and(|heartbeat| match (heartbeat.autopilot, heartbeat.kind) {
+        // PX4: HOLD, which is AUTO (4), LOITER (3).
+        (Autopilot::Px4, _) => (mode >> 16) as u16 == 0x0304,
+        // ArduPlane: CIRCLE.
+        (Autopilot::ArduPilot, VehicleKind::Plane | VehicleKind::Vtol) => mode == 1,
+        // ArduCopter: BRAKE.
+        (Autopilot::ArduPilot, _) => mode == 17,
+        (Autopilot::Other, _) => false,
+    })
+}
+
+/// Whether the vehicle shows a sign of landing: by its landed state, because it sinks close to the ground, or in a mission.
+fn is_landing(situation: &Situation<'_>) -> bool {
     let Situation { now, vehicle, flight, .. } = *situation;
-    let Some(heartbeat) = vehicle.heartbeat.get() else { return false };
-    let lands = vehicle.landed.within(now, LANDED_STATE_AGE) == Some(&LandedState::Landing)
-        || flight.phase(now, vehicle) == Phase::Landing;
-    lands
-        || match (heartbeat.autopilot, heartbeat.kind) {
-            // PX4: main mode AUTO (4), sub modes RTL (5), LAND (6), PRECLAND (9).
-            (Autopilot::Px4, _) => {
-                let [_, _, main, sub] = heartbeat.mode.to_le_bytes();
-                main == 4 && matches!(sub, 5 | 6 | 9)
-            }
-            // ArduPlane: RTL, QLAND, QRTL, LOITER_ALT_QLAND, AUTOLAND.
-            (Autopilot::ArduPilot, VehicleKind::Plane | VehicleKind::Vtol) => {
-                matches!(heartbeat.mode, 11 | 20 | 21 | 25 | 26)
-            }
-            // ArduCopter: RTL, LAND, SMART_RTL, AUTO_RTL.
-            (Autopilot::ArduPilot, _) => matches!(heartbeat.mode, 6 | 9 | 21 | 27),
-            (Autopilot::Other, _) => false,
+    vehicle.landed.within(now, LANDED_STATE_AGE) == Some(&LandedState::Landing)
+        || flight.phase(now, vehicle) == Phase::Landing
+        || approaches(situation)
+}
+
+/// Whether the autopilot returns or lands in this mode.
+fn returns(vehicle: &Vehicle, mode: u32) -> bool {
+    vehicle.heartbeat.get().is_some_and(|heartbeat| match (heartbeat.autopilot, heartbeat.kind) {
+        // PX4: main mode AUTO (4), sub modes RTL (5), LAND (6), PRECLAND (9).
+        (Autopilot::Px4, _) => {
+            let [_, _, main, sub] = mode.to_le_bytes();
+            main == 4 && matches!(sub, 5 | 6 | 9)
         }
+        // ArduPlane: RTL, QLAND, QRTL, LOITER_ALT_QLAND, AUTOLAND.
+        (Autopilot::ArduPilot, VehicleKind::Plane | VehicleKind::Vtol) => {
+            matches!(mode, 11 | 20 | 21 | 25 | 26)
+        }
+        // ArduCopter: RTL, LAND, SMART_RTL, AUTO_RTL.
+        (Autopilot::ArduPilot, _) => matches!(mode, 6 | 9 | 21 | 27),
+        (Autopilot::Other, _) => false,
+    })
 }
 
 #[cfg(test)]

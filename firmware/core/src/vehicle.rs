@@ -345,6 +345,7 @@ impl Vehicle {
         match *observation {
             Observation::Heartbeat(heartbeat) => {
                 self.alerts.take_armed(at, heartbeat.armed);
+                self.alerts.take_state(at, heartbeat.state);
                 let terminated = heartbeat.state == Heartbeat::TERMINATED;
                 self.terminated_since = terminated.then(|| self.terminated_since.unwrap_or(at));
                 self.heartbeat.set(at, heartbeat);

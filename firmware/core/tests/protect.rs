@@ -5,15 +5,16 @@ mod common;
 
 use common::{AUTOPILOT, Quad};
 use hums_core::Monitor;
+use hums_core::cause::{Alert, Cause, Urgency};
 use hums_core::happening::Happening;
 use hums_core::observation::{
-    Autopilot, Battery, CommandAck, Feeds, LandedState, Observation, Source, VehicleKind, VtolState,
+    Autopilot, Battery, CommandAck, Feeds, Imu, LandedState, Observation, Source, VehicleKind, VtolState,
 };
 use hums_core::params::Params;
 use hums_core::protect::{Action, Request, Stage};
 use hums_core::status::LinkReading;
 use hums_core::time::Instant;
-use hums_core::units::Fraction;
+use hums_core::units::{Fraction, MetresPerSecond2, RadiansPerSecond};
 
 /// The battery is empty from here on; two seconds of debounce.
 const EMPTY_MS: u64 = 20_000;
@@ -203,14 +204,18 @@ fn any_landing_under_way_is_left_alone() {
 fn a_mission_that_ends_during_the_countdown_cancels_nothing_and_a_pilot_who_leaves_it_does() {
     use Autopilot::{ArduPilot, Px4};
     use VehicleKind::{Plane, Rotorcraft};
-    for (autopilot, kind, mission, after) in [
-        (Px4, Rotorcraft, 0x0404_0000, 0x0304_0000),
-        (Px4, Plane, 0x0404_0000, 0x0304_0000),
-        (ArduPilot, Plane, 10, 12),
-        (ArduPilot, Rotorcraft, 3, 5),
-        (ArduPilot, Rotorcraft, 3, 17),
+    // Failsafes wait in HOLD and in BRAKE too: a pilot who chooses them has not cancelled.
+    for (autopilot, kind, mission, after, waits) in [
+        (Px4, Rotorcraft, 0x0404_0000, 0x0304_0000, true),
+        (Px4, Plane, 0x0404_0000, 0x0304_0000, true),
+        (Px4, Plane, 0x0404_0000, 0x0003_0000, false),
+        (ArduPilot, Plane, 10, 12, false),
+        (ArduPilot, Rotorcraft, 3, 5, false),
+        (ArduPilot, Rotorcraft, 3, 17, true),
     ] {
-        for (reached, requests) in [(true, 3), (false, 0)] {
+        for reached in [true, false] {
+            let is_end = reached && after != 0x0003_0000;
+            let requests = if is_end || waits { 3 } else { 0 };
             let outcome = fly(&params(Action::Return), |now_ms, quad, monitor| {
                 (quad.autopilot, quad.kind) = (autopilot, kind);
                 quad.landed = Some(if now_ms < 2_000 { LandedState::OnGround } else { LandedState::InAir });
@@ -271,7 +276,9 @@ fn a_mission_that_only_goes_lower_is_waited_for_and_protected_where_it_flies_on(
         quad.landed = Some(if now_ms < 2_000 { LandedState::OnGround } else { LandedState::InAir });
         (quad.height, quad.climb) = if now_ms < 30_000 { (35.0, -1.0) } else { (20.0, 0.0) };
     });
-    assert!(matches!(outcome.steps[0], (44_900..45_300, Stage::Announced, 10)), "{:?}", outcome.steps);
+    let [waits, announced, ..] = outcome.steps[..] else { panic!("{:?}", outcome.steps) };
+    assert_eq!(waits, (FOUND_MS, Stage::AlreadyDone, 0));
+    assert!(matches!(announced, (44_900..45_300, Stage::Announced, 10)), "{announced:?}");
     assert_eq!(outcome.requests.len(), 3);
 }
 
@@ -462,4 +469,214 @@ fn a_chosen_subsystem_triggers_it_and_others_do_not() {
     });
     assert_eq!(vibration.steps[0], (EMPTY_MS + 1_000, Stage::Announced, 10));
     assert_eq!(vibration.requests.len(), 3);
+}
+
+/// Who flies: autopilot, kind, `MAV_TYPE`, and a mode that neither returns nor waits.
+const VEHICLES: [(Autopilot, VehicleKind, u8, u32); 5] = [
+    (Autopilot::ArduPilot, VehicleKind::Rotorcraft, 2, 4),
+    (Autopilot::ArduPilot, VehicleKind::Plane, 1, 5),
+    (Autopilot::ArduPilot, VehicleKind::Vtol, 22, 5),
+    (Autopilot::Px4, VehicleKind::Rotorcraft, 13, 0x0003_0000),
+    (Autopilot::Px4, VehicleKind::Plane, 1, 0x0003_0000),
+];
+
+/// As [`fly`], with each vehicle of [`VEHICLES`], whose landed state is sent.
+fn fly_each(script: impl Fn(u64, &mut Quad, &mut Monitor)) -> Vec<Outcome> {
+    let each = VEHICLES.into_iter().map(|(autopilot, kind, type_number, mode)| {
+        fly(&params(Action::Return), |now_ms, quad, monitor| {
+            (quad.autopilot, quad.kind, quad.type_number, quad.mode) = (autopilot, kind, type_number, mode);
+            quad.landed = Some(if now_ms < 2_000 { LandedState::OnGround } else { LandedState::InAir });
+            script(now_ms, quad, monitor);
+        })
+    });
+    each.collect()
+}
+
+/// The return is requested of every vehicle, at this time or up to so much later.
+fn all_ask(outcomes: &[Outcome], at_ms: u64, late_ms: u64, what: &dyn std::fmt::Debug) {
+    for (outcome, vehicle) in outcomes.iter().zip(VEHICLES) {
+        let first = outcome.requests.first().map(|(asked_ms, request)| (*asked_ms, request.command));
+        let in_time = matches!(first, Some((asked_ms, 20)) if (at_ms..=at_ms + late_ms).contains(&asked_ms));
+        assert!(in_time, "{what:?} {vehicle:?}: {:?}", outcome.steps);
+    }
+}
+
+#[test]
+fn a_wrong_landed_state_delays_the_action_by_no_more_than_it_lasts() {
+    for height in [3.0, 20.0, 300.0, -15.0] {
+        for from_ms in [FOUND_MS - 3_000, FOUND_MS - 500, FOUND_MS + 4_000, ASKED_MS - 500] {
+            for lasts_ms in [500, 2_000, 4_000] {
+                let outcomes = fly_each(|now_ms, quad, _| {
+                    quad.height = height;
+                    if (from_ms..from_ms + lasts_ms).contains(&now_ms) {
+                        quad.landed = Some(LandedState::OnGround);
+                    }
+                });
+                // The vehicle is in the air again 0.6 s after its autopilot says so, twice a second.
+                all_ask(&outcomes, ASKED_MS, lasts_ms + 1_200, &(height, from_ms, lasts_ms));
+            }
+        }
+    }
+}
+
+#[test]
+fn a_touch_and_go_in_the_countdown_pauses_it() {
+    let outcomes = fly_each(|now_ms, quad, _| {
+        if (FOUND_MS + 4_000..FOUND_MS + 8_000).contains(&now_ms) {
+            (quad.landed, quad.height, quad.throttle) = (Some(LandedState::OnGround), 0.0, 0.05);
+        }
+    });
+    all_ask(&outcomes, ASKED_MS + 4_000, 2_000, &"touch and go");
+}
+
+#[test]
+fn what_sinks_and_flies_on_is_protected_below_home_and_close_to_the_ground() {
+    // Height where it begins, and how fast it sinks for four seconds as the battery turns critical. Within 3 m of the height of the
+    // take-off it may be a landing, for 15 s.
+    for (height, sink, late_ms) in [
+        (-10.0, 0.6, 0),
+        (-30.0, 0.6, 0),
+        (-30.0, 2.0, 0),
+        (-200.0, 1.5, 0),
+        (60.0, 1.5, 0),
+        (4.0, 0.6, 16_000),
+        (1.0, 0.5, 16_000),
+    ] {
+        let outcomes = fly_each(|now_ms, quad, _| {
+            let sunk_ms = now_ms.clamp(FOUND_MS - 2_000, FOUND_MS + 2_000) - (FOUND_MS - 2_000);
+            let sinks = (1..4_000).contains(&sunk_ms);
+            (quad.height, quad.climb) =
+                (height - sink * sunk_ms as f32 / 1_000.0, if sinks { -sink } else { 0.0 });
+        });
+        let until = if late_ms > 0 { late_ms + 2_000 } else { 100 };
+        all_ask(&outcomes, ASKED_MS, until, &(height, sink));
+    }
+}
+
+#[test]
+fn a_tumble_that_is_survived_pauses_the_countdown() {
+    for from_ms in [FOUND_MS - 1_000, FOUND_MS + 3_000, ASKED_MS - 200] {
+        for lasts_ms in [600, 800, 1_200] {
+            for load_g in [0.5_f32, 1.0, 5.0] {
+                let outcome = fly(&params(Action::Return), |now_ms, quad, monitor| {
+                    quad.landed =
+                        Some(if now_ms < 2_000 { LandedState::OnGround } else { LandedState::InAir });
+                    let tumbles = (from_ms..from_ms + lasts_ms).contains(&now_ms);
+                    let force = if tumbles { load_g } else { 1.0 + (now_ms % 7) as f32 * 0.002 };
+                    quad.acceleration_down = -9.806_65 * force;
+                    let imu = Imu {
+                        acceleration: Some([0.0, 0.0, quad.acceleration_down].map(MetresPerSecond2)),
+                        rate: Some([if tumbles { 6.2 } else { 0.01 }, 0.0, 0.0].map(RadiansPerSecond)),
+                        ..Imu::default()
+                    };
+                    monitor.observe(Instant::from_millis(now_ms), AUTOPILOT, &Observation::Imu(imu));
+                });
+                let first = outcome.requests.first().map(|(at_ms, _)| *at_ms);
+                let at_most = ASKED_MS + lasts_ms + 6_000;
+                assert!(
+                    first.is_some_and(|at_ms| (ASKED_MS..=at_most).contains(&at_ms)),
+                    "{from_ms} {lasts_ms} {load_g}: {:?}",
+                    outcome.steps
+                );
+            }
+        }
+    }
+}
+
+/// The stages of an outcome up to the first request.
+fn stages(outcome: &Outcome) -> Vec<Stage> {
+    let all = outcome.steps.iter().map(|(_, stage, _)| *stage).filter(|stage| *stage != Stage::Counting);
+    all.take_while(|stage| *stage != Stage::Asked).collect()
+}
+
+#[test]
+fn the_autopilots_own_change_of_mode_is_announced_anew_and_a_pilot_still_cancels() {
+    const CHANGED_MS: u64 = FOUND_MS + 4_000;
+    let text = Alert { cause: Cause::RemoteControl, urgency: Urgency::Warning };
+    // A mode that a failsafe enters and a pilot could too; how long before or after the change the autopilot speaks, and whether it
+    // does so by a text or by its state. PX4's ALTCTL, ArduCopter's ALT_HOLD, ArduPlane's FBWA.
+    for (autopilot, kind, before, after) in [
+        (Autopilot::Px4, VehicleKind::Rotorcraft, 0x0003_0000, 0x0002_0000),
+        (Autopilot::ArduPilot, VehicleKind::Rotorcraft, 5, 2),
+        (Autopilot::ArduPilot, VehicleKind::Plane, 12, 5),
+    ] {
+        for spoken_ms in [CHANGED_MS - 1_500, CHANGED_MS, CHANGED_MS + 1_500] {
+            for by_text in [true, false] {
+                for pilot in [false, true] {
+                    let outcome = fly(&params(Action::Return), |now_ms, quad, monitor| {
+                        (quad.autopilot, quad.kind) = (autopilot, kind);
+                        quad.mode = if now_ms < CHANGED_MS { before } else { after };
+                        if pilot && now_ms >= CHANGED_MS + 6_000 {
+                            quad.mode = before;
+                        }
+                        if by_text && now_ms == spoken_ms {
+                            let now = Instant::from_millis(now_ms);
+                            monitor.observe(now, AUTOPILOT, &Observation::Alert(text));
+                        }
+                        if !by_text && now_ms >= spoken_ms {
+                            quad.state = 5;
+                        }
+                    });
+                    let what = (autopilot, kind, spoken_ms, by_text, pilot);
+                    let stages = stages(&outcome);
+                    let announced = stages.iter().filter(|stage| **stage == Stage::Announced).count();
+                    assert_eq!(announced, 2, "{what:?}: {stages:?}");
+                    assert_eq!(outcome.requests.is_empty(), pilot, "{what:?}: {stages:?}");
+                }
+            }
+        }
+    }
+    // A failsafe that began long before says nothing of who changed the mode.
+    let outcome = fly(&params(Action::Return), |now_ms, quad, _| {
+        quad.state = if now_ms < FOUND_MS { 4 } else { 5 };
+        quad.mode = if now_ms < CHANGED_MS { 4 } else { 5 };
+    });
+    assert_eq!(stages(&outcome), [Stage::Announced, Stage::CancelledByMode]);
+}
+
+#[test]
+fn a_mode_in_which_failsafes_wait_is_no_cancel_and_another_one_after_it_is() {
+    for (autopilot, kind, before, waits) in [
+        (Autopilot::Px4, VehicleKind::Rotorcraft, 0x0003_0000, 0x0304_0000),
+        (Autopilot::Px4, VehicleKind::Plane, 0x0001_0000, 0x0304_0000),
+        (Autopilot::ArduPilot, VehicleKind::Rotorcraft, 5, 17),
+        (Autopilot::ArduPilot, VehicleKind::Plane, 5, 1),
+    ] {
+        for pilot in [false, true] {
+            let outcome = fly(&params(Action::Return), |now_ms, quad, _| {
+                (quad.autopilot, quad.kind) = (autopilot, kind);
+                quad.mode = match now_ms {
+                    0..26_000 => before,
+                    30_000.. if pilot => before,
+                    _ => waits,
+                };
+            });
+            assert_eq!(outcome.requests.is_empty(), pilot, "{autopilot:?} {kind:?}: {:?}", outcome.steps);
+        }
+    }
+}
+
+#[test]
+fn a_return_under_way_that_the_autopilot_gives_up_is_announced_anew_and_a_pilots_is_not() {
+    let text = Alert { cause: Cause::Gnss, urgency: Urgency::Warning };
+    for by_itself in [true, false] {
+        let outcome = fly(&params(Action::Return), |now_ms, quad, monitor| {
+            quad.mode = if (15_000..30_000).contains(&now_ms) { 6 } else { 2 };
+            if by_itself && now_ms == 30_000 {
+                monitor.observe(Instant::from_millis(now_ms), AUTOPILOT, &Observation::Alert(text));
+            }
+        });
+        let (last, asked) = if by_itself { (Stage::Announced, 3) } else { (Stage::CancelledByMode, 0) };
+        assert_eq!(stages(&outcome), [Stage::AlreadyDone, last]);
+        assert_eq!(outcome.requests.len(), asked, "{:?}", outcome.steps);
+    }
+}
+
+#[test]
+fn a_pilot_who_changes_the_mode_while_it_is_asked_is_not_asked_against() {
+    let outcome = fly(&params(Action::Return), |now_ms, quad, _| {
+        quad.mode = if now_ms < ASKED_MS + 500 { 4 } else { 5 };
+    });
+    assert_eq!(outcome.requests.len(), 1, "{:?}", outcome.steps);
+    assert_eq!(outcome.steps.last().map(|(_, stage, _)| *stage), Some(Stage::CancelledByMode));
 }
