@@ -175,8 +175,9 @@ impl Crosschecks {
 
     pub(crate) fn take_air(&mut self, at: Instant, air: &Air, vehicle: &Vehicle, flight: &Flight) {
         let pressure = air.pressure.filter(|pressure| pressure.0 > 0.0);
-        let climbed = flight.airborne().then_some(self.moved.climbed_m);
         if let Some(pressure) = pressure {
+            // A barometer trembles on the ground too: one that freezes there is stuck in the air.
+            let climbed = Some(self.moved.climbed_m);
             self.take(at, Kind::Barometer, air.instance, [pressure.0, 0.0, 0.0], climbed);
             if air.instance == 0 {
                 self.heights.take_pressure(at, pressure, vehicle, flight);
@@ -231,7 +232,9 @@ impl Crosschecks {
     /// A flight begins: nothing is usual yet.
     pub(crate) fn begin(&mut self) {
         self.pairs.iter_mut().for_each(Pairs::begin);
-        *self = Self { pairs: self.pairs, selects: self.selects, ..Self::new() };
+        let mut stuck = [[Stuck::NEW; SENSORS_MAX]; Kind::COUNT];
+        stuck[Kind::Barometer as usize] = self.stuck[Kind::Barometer as usize].map(Stuck::begun);
+        *self = Self { pairs: self.pairs, selects: self.selects, stuck, ..Self::new() };
     }
 
     /// One step, at least every 50 ms.
@@ -295,9 +298,12 @@ impl Crosschecks {
             Kind::Accelerometer | Kind::Gyro | Kind::Compass => (self.moved.turned_rad, TURNED_RAD),
         };
         let stuck = self.stuck[kind as usize].get(usize::from(sensor))?;
-        let least = if kind == Kind::Barometer && stuck.fell_silent() { 0.0 } else { least };
-        let times =
-            if kind == Kind::Compass && self.all_repeat(now, kind, sensor) { ALL_REPEAT_TIMES } else { 1.0 };
+        let times = match kind {
+            // Where the accelerometer repeats its values too, a simulator without noise hovers.
+            Kind::Barometer if stuck.fell_silent() && !self.stuck[0][0].repeats() => 0.0,
+            Kind::Compass if self.all_repeat(now, kind, sensor) => ALL_REPEAT_TIMES,
+            _ => 1.0,
+        };
         stuck.lasts(now, moved, least * times)
     }
 

@@ -37,9 +37,8 @@ const STEADY_TILT_RAD: f32 = 0.26;
 const TAKEOFF_HEIGHT_M: f32 = 1.0;
 const LANDED_HEIGHT_M: f32 = 0.5;
 const PLANE_FLYING_MPS: f32 = 8.0;
-/// A multicopter hovers at a quarter to three quarters of its throttle and idles on the ground below a tenth.
-const FLYING_THROTTLE: f32 = 0.2;
-const IDLE_THROTTLE: f32 = 0.1;
+/// A multicopter hovers at a quarter to three quarters of its throttle, where nothing better is known.
+pub(crate) const FLYING_THROTTLE: f32 = 0.2;
 const FULL_THROTTLE: f32 = 0.95;
 /// Near the ground.
 const HPA_PER_METRE: f32 = 0.12;
@@ -111,8 +110,29 @@ pub enum FlightEvent {
     Landing,
 }
 
+/// What others than the autopilot's estimator know of the ground.
+#[derive(Clone, Copy, Debug)]
+pub struct Support {
+    /// Something carries it that is not its rotors.
+    pub is_supported: bool,
+    /// The throttle from which on rotors may carry it. It idles below half of that.
+    pub flying_throttle: f32,
+    /// The barometer works: its pressure changed just now.
+    pub has_pressure: bool,
+}
+
+impl Support {
+    /// Nothing known.
+    pub const UNKNOWN: Self =
+        Self { is_supported: false, flying_throttle: FLYING_THROTTLE, has_pressure: true };
+
+    const fn idle_throttle(&self) -> f32 {
+        self.flying_throttle / 2.0
+    }
+}
+
 /// Whether the vehicle flies.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 #[expect(clippy::struct_excessive_bools, reason = "facts that have nothing to do with each other")]
 pub struct Flight {
     airborne_since: Option<Instant>,
@@ -125,10 +145,10 @@ pub struct Flight {
     armed: bool,
     /// Height where it was armed.
     armed_height_m: Option<f32>,
-    /// The pressure where it was armed, hPa; whether it changed since, and by more than a take-off does.
+    /// The pressure where it was armed, hPa; whether it changed since by more than a take-off does.
     armed_hpa: Option<f32>,
-    pressure_changed: bool,
     rose: bool,
+    support: Support,
     /// The pilot's display of the altitude while it stood without thrust.
     idle_altitude_m: Option<f32>,
     /// It had throttle to fly with since its arming: what is told of the throttle means something.
@@ -151,8 +171,8 @@ impl Flight {
             armed: false,
             armed_height_m: None,
             armed_hpa: None,
-            pressure_changed: false,
             rose: false,
+            support: Support::UNKNOWN,
             idle_altitude_m: None,
             driven: false,
             changing_since: None,
@@ -216,13 +236,16 @@ impl Flight {
         open.then_some(FlightEvent::Landing)
     }
 
-    /// One step, at least every 50 ms. `is_supported`: it is known to stand on something, whatever its estimator says.
-    pub fn step(&mut self, now: Instant, vehicle: &Vehicle, is_supported: bool) -> Option<FlightEvent> {
+    /// One step, at least every 50 ms.
+    pub fn step(&mut self, now: Instant, vehicle: &Vehicle, support: Support) -> Option<FlightEvent> {
+        self.support = support;
         self.note_arming(now, vehicle);
-        let idles = is_supported || self.idles(now, vehicle);
+        let idles = support.is_supported || self.idles(now, vehicle);
         let word = Self::autopilot_says(now, vehicle);
         self.weigh(now, vehicle, word, idles);
-        let says = word.filter(|flies| if *flies { !idles } else { !self.overruled });
+        // That it stands needs a second witness: one wrong landed state ends nothing that is high and has thrust or speed.
+        let stands = |this: &Self| !(this.overruled || this.airborne() && this.surely_flies(now, vehicle));
+        let says = word.filter(|flies| if *flies { !idles } else { stands(self) });
         // What was terminated before it was heard falls or lies.
         let flies = self.armed
             && can_fly(vehicle)
@@ -269,15 +292,20 @@ impl Flight {
         }
     }
 
-    /// Whether it flies by all that is seen: high, and with the thrust or the speed of flight.
+    /// Whether it flies by all that is seen: above or below the ground where it was armed, and with the thrust or the speed of flight.
+    /// Once in the air, moving without idling is flight too.
     fn surely_flies(&self, now: Instant, vehicle: &Vehicle) -> bool {
         let height_m = self.height_above_start_m(now, vehicle).or_else(|| self.rise_m(now, vehicle));
         let is_driven = if vehicle.hovers(now) == Some(true) {
-            throttle(now, vehicle).is_some_and(|throttle| throttle >= FLYING_THROTTLE)
+            let Support { flying_throttle, .. } = self.support;
+            let moves = || self.airborne() && moves(now, vehicle);
+            throttle(now, vehicle).is_some_and(|throttle| {
+                throttle >= flying_throttle || (throttle >= self.support.idle_throttle() && moves())
+            })
         } else {
             is_fast(ground_speed_mps(now, vehicle)) || is_fast(airspeed_mps(now, vehicle))
         };
-        can_fly(vehicle) && is_driven && height_m.is_some_and(|height_m| height_m > STANDS_M)
+        can_fly(vehicle) && is_driven && height_m.is_some_and(|height_m| height_m.abs() > STANDS_M)
     }
 
     fn note_arming(&mut self, now: Instant, vehicle: &Vehicle) {
@@ -291,15 +319,15 @@ impl Flight {
         let pressure =
             vehicle.air.get().and_then(|air| air.pressure).filter(|pressure| pressure.0.is_finite());
         if !self.armed {
-            (self.armed_hpa, self.pressure_changed, self.rose) = (None, false, false);
+            (self.armed_hpa, self.rose) = (None, false);
         } else if let Some(pressure) = pressure {
             let off_hpa = libm::fabsf(pressure.0 - *self.armed_hpa.get_or_insert(pressure.0));
-            self.pressure_changed |= off_hpa > 0.0;
             self.rose |= off_hpa >= TAKEOFF_HEIGHT_M * HPA_PER_METRE;
         }
-        let flying = |throttle| throttle >= FLYING_THROTTLE;
+        let flying = |throttle| throttle >= self.support.flying_throttle;
         self.driven = self.armed && (self.driven || throttle(now, vehicle).is_some_and(flying));
-        let idles = !self.armed || throttle(now, vehicle).is_some_and(|throttle| throttle < IDLE_THROTTLE);
+        let idle = self.support.idle_throttle();
+        let idles = !self.armed || throttle(now, vehicle).is_some_and(|throttle| throttle < idle);
         if idles && !self.airborne() {
             self.idle_altitude_m = altitude_m(now, vehicle).or(self.idle_altitude_m);
         }
@@ -335,7 +363,7 @@ impl Flight {
         }
         let climb_mps = climb_mps(now, vehicle).unwrap_or(0.0);
         let near_ground =
-            self.height_above_start_m(now, vehicle).is_some_and(|height_m| height_m < NEAR_GROUND_M);
+            self.height_above_start_m(now, vehicle).is_some_and(|height_m| height_m.abs() < NEAR_GROUND_M);
         if near_ground && climb_mps > VERTICAL_MPS / 2.0 {
             Phase::TakeOff
         } else if near_ground && climb_mps < -VERTICAL_MPS / 2.0 {
@@ -369,18 +397,18 @@ impl Flight {
             return true;
         }
         let throttle = throttle(now, vehicle);
-        let enough = if self.airborne() { IDLE_THROTTLE } else { FLYING_THROTTLE };
+        let (idle, flying) = (self.support.idle_throttle(), self.support.flying_throttle);
+        let enough = if self.airborne() { idle } else { flying };
         let little = throttle.is_some_and(|throttle| throttle < enough);
         let low =
             self.height_above_start_m(now, vehicle).is_some_and(|height_m| height_m.abs() < TAKEOFF_HEIGHT_M);
         // Of what stands, an estimator may drift away while its sensors rest.
-        let off = throttle.is_some_and(|throttle| throttle < IDLE_THROTTLE);
+        let off = throttle.is_some_and(|throttle| throttle < idle);
         let rests = !self.airborne() && off && vehicle.inertial.is_level(now);
         if ((little && low) || rests) && vehicle.hovers(now) == Some(true) {
             return true;
         }
-        let moves = |speed_mps: Option<f32>| speed_mps.is_some_and(|speed_mps| speed_mps.abs() > MOVES_MPS);
-        if moves(climb_mps(now, vehicle)) || moves(ground_speed_mps(now, vehicle)) {
+        if moves(now, vehicle) {
             return false;
         }
         let height_m = self.height_above_start_m(now, vehicle).or_else(|| self.rise_m(now, vehicle));
@@ -390,11 +418,13 @@ impl Flight {
                 let shakes = vehicle.inertial.shakes(now);
                 // Some logs tell a throttle that says nothing.
                 let told = throttle.filter(|_| self.driven || shakes != Some(true));
-                let off = told.is_some_and(|throttle| throttle < IDLE_THROTTLE);
+                let off = told.is_some_and(|throttle| throttle < idle);
                 if self.airborne() {
-                    let idles = throttle.is_some_and(|throttle| throttle < FLYING_THROTTLE);
-                    let calm = shakes == Some(false) && within(STANDS_M);
-                    return (off && (self.driven || within(DRIFT_M))) || (idles && calm);
+                    // Little throttle alone is no landing: the height or the vibration must be that of the ground.
+                    let idles = throttle.is_some_and(|throttle| throttle < flying);
+                    let near = within(if shakes == Some(true) { STANDS_M } else { DRIFT_M });
+                    let rests = shakes == Some(false);
+                    return (off && (near || (rests && self.driven))) || (idles && rests && within(STANDS_M));
                 }
                 // With all its thrust it would climb.
                 let low = height_m.is_some() && within(TAKEOFF_HEIGHT_M);
@@ -406,22 +436,23 @@ impl Flight {
             Some(false) => {
                 let air_mps = airspeed_mps(now, vehicle).unwrap_or(0.0);
                 let slow = air_mps < PLANE_FLYING_MPS / 2.0 && ground_speed_mps(now, vehicle).is_some();
-                let off = throttle.is_some_and(|throttle| throttle < FLYING_THROTTLE);
+                let off = throttle.is_some_and(|throttle| throttle < flying);
                 off && slow && height_m.is_some_and(|height_m| height_m < TAKEOFF_HEIGHT_M)
             }
             None => false,
         }
     }
 
-    /// Whether the air pressure has stayed that of the place of arming, though it changes at all. What is heard first in the air
-    /// was not seen there.
-    fn never_rose(&self) -> bool {
-        self.seen_on_ground && self.pressure_changed && !self.rose
+    /// Whether the air pressure has stayed that of the place of arming, by a barometer that works. A vehicle that is heard first in the
+    /// air was not seen there.
+    const fn never_rose(&self) -> bool {
+        self.seen_on_ground && self.support.has_pressure && self.armed_hpa.is_some() && !self.rose
     }
 
     /// Whether it stands without thrust.
     pub(crate) fn is_at_rest(&self, now: Instant, vehicle: &Vehicle) -> bool {
-        let off = throttle(now, vehicle).map_or(!vehicle.armed(), |throttle| throttle < IDLE_THROTTLE / 2.0);
+        let off =
+            throttle(now, vehicle).map_or(!vehicle.armed(), |throttle| throttle < FLYING_THROTTLE / 4.0);
         !self.is_open() && off && vehicle.heartbeat.get().is_some()
     }
 
@@ -434,26 +465,33 @@ impl Flight {
         let speed_mps = ground_speed_mps(now, vehicle);
         let throttle = throttle(now, vehicle);
         let has_thrust = |least: f32| throttle.is_some_and(|throttle| throttle > least);
+        let (idle, flying) = (self.support.idle_throttle(), self.support.flying_throttle);
         // Wind alone shows an airspeed on the ground.
-        let by_air = is_fast(airspeed_mps(now, vehicle)) && (self.airborne() || has_thrust(FLYING_THROTTLE));
+        let by_air = is_fast(airspeed_mps(now, vehicle)) && (self.airborne() || has_thrust(flying));
         let fast = has_wings(vehicle) && (is_fast(speed_mps) || by_air);
         let Some(height_m) = self.height_above_start_m(now, vehicle) else {
             // Without any word about height, speed or thrust it goes on with what it does.
             if self.airborne() {
-                return fast || throttle.is_none_or(|throttle| throttle > IDLE_THROTTLE);
+                return fast || throttle.is_none_or(|throttle| throttle > idle);
             }
             // Motors are tried on the bench: the barometer says so.
             let rose = self.rise_m(now, vehicle).is_none_or(|rise_m| rise_m > TAKEOFF_HEIGHT_M);
-            return fast || (has_thrust(FLYING_THROTTLE) && rose && !has_wings(vehicle));
+            return fast || (has_thrust(flying) && rose && !has_wings(vehicle));
         };
         if self.airborne() {
-            // It hovers over a valley.
-            let hangs =
-                height_m < -STANDS_M && vehicle.hovers(now) == Some(true) && has_thrust(FLYING_THROTTLE);
+            // It hovers over a valley, unless it idles there.
+            let thrust = throttle.is_none_or(|throttle| throttle > flying);
+            let hangs = height_m < -STANDS_M && vehicle.hovers(now) == Some(true) && thrust;
             return height_m > LANDED_HEIGHT_M || speed_mps.unwrap_or(0.0) > STILL_MPS || by_air || hangs;
         }
         height_m > TAKEOFF_HEIGHT_M || fast
     }
+}
+
+/// Whether it climbs, sinks or goes faster than what stands.
+fn moves(now: Instant, vehicle: &Vehicle) -> bool {
+    let moves = |speed_mps: Option<f32>| speed_mps.is_some_and(|speed_mps| speed_mps.abs() > MOVES_MPS);
+    moves(climb_mps(now, vehicle)) || moves(ground_speed_mps(now, vehicle))
 }
 
 /// A speed at which wings carry.

@@ -53,8 +53,8 @@ use crate::params::Params;
 use crate::time::{Instant, Span, Stamp};
 use crate::vehicle::Vehicle;
 use evidence::{
-    Doubt, FALL_SHOWS, FALLING_MPS, FRESH, FULL_THROTTLE, IDLE_THROTTLE, Lasting, Pressure, Recent, Shock,
-    Support, UNCARRIED, Unheard, calls_itself_landed, is_known, is_near_ground, is_tilted, on_rotors,
+    Doubt, FALL_SHOWS, FALLING_MPS, FRESH, FULL_THROTTLE, Lasting, Pressure, Recent, Shock, Support,
+    UNCARRIED, Unheard, calls_itself_landed, is_known, is_near_ground, is_off_ground, is_tilted, on_rotors,
 };
 
 /// How long after disarming it is watched.
@@ -418,15 +418,15 @@ impl Mishap {
         let still = slow && !descends && self.rate < STILL_RATE && (0.7..1.3).contains(&self.load_g);
         self.still_since = if still { self.still_since.or(Some(now)) } else { None };
         // What is carried home may be armed still, and no motor turns.
-        let thrust =
-            !on_rotors(now, vehicle) || throttle(now, vehicle).is_none_or(|part| part > IDLE_THROTTLE);
+        let thrust = !on_rotors(now, vehicle)
+            || throttle(now, vehicle).is_none_or(|part| part > self.support.idle_throttle());
         let lay_at_m = f32::from(self.place.height_m);
         let rose = height_m(now, vehicle).is_some_and(|height_m| height_m > lay_at_m + ROSE_M);
         // On rotors what moves and does not climb may be a wreck whose estimate is lost.
         let climbs = climb_mps(now, vehicle).is_none_or(|climb_mps| climb_mps > STILL_MPS);
         let moves = speed_mps > 2.0 * STILL_MPS && (climbs || !on_rotors(now, vehicle));
         let rests = self.lies(now, vehicle) || self.has_strayed(now) || self.is_supported(now);
-        let flies = self.armed && (moves || rose) && thrust && !rests;
+        let flies = self.armed && (moves || rose || self.hangs(now, vehicle)) && thrust && !rests;
         self.flies_since = if flies { self.flies_since.or(Some(now)) } else { None };
     }
 
@@ -505,7 +505,7 @@ impl Mishap {
         let lands = !on_rotors(now, vehicle)
             && shock.sink_mps < FLARED_MPS
             && shock.speed_mps < SKIDS_MPS
-            && throttle(now, vehicle).is_none_or(|part| part < IDLE_THROTTLE);
+            && throttle(now, vehicle).is_none_or(|part| part < self.support.idle_throttle());
         let hard = shock.load_g > LEGS_G || shock.sink_mps > LEGS_MPS;
         let stopped = shock.stopped && shock.speed_mps >= IMPACT_MPS && hard && !lands;
         // What was not seen to fly may be knocked, and lie on its back for its battery.
@@ -526,13 +526,26 @@ impl Mishap {
     /// Whether what is still does not hang in the air: disarmed, on the ground, on its side, without throttle or with all of it.
     fn is_idle(&self, now: Instant, vehicle: &Vehicle) -> bool {
         !self.armed
-            || calls_itself_landed(now, vehicle)
+            || (calls_itself_landed(now, vehicle) && !self.hangs(now, vehicle))
             || self.lies(now, vehicle)
             || throttle(now, vehicle).is_some_and(|part| {
                 // What is carried by less than half of the throttle that it hovers with stands on the ground.
                 let stands = on_rotors(now, vehicle) && self.support.is_little(part);
-                !(IDLE_THROTTLE..FULL_THROTTLE).contains(&part) || stands
+                !(self.support.idle_throttle()..FULL_THROTTLE).contains(&part) || stands
             })
+    }
+
+    /// Whether its rotors carry it away from the ground: by its height, its throttle and its vibration.
+    fn hangs(&self, now: Instant, vehicle: &Vehicle) -> bool {
+        let carries = |part: f32| {
+            (self.support.flying_throttle()..FULL_THROTTLE).contains(&part) && !self.support.is_little(part)
+        };
+        self.armed
+            && on_rotors(now, vehicle)
+            && is_off_ground(now, vehicle)
+            && throttle(now, vehicle).is_some_and(carries)
+            && vehicle.inertial.shakes(now) != Some(false)
+            && !(self.lies(now, vehicle) || self.has_strayed(now) || self.is_supported(now))
     }
 
     fn goes(&mut self, now: Instant, last: Instant, vehicle: &Vehicle) -> Option<Change> {
@@ -546,6 +559,7 @@ impl Mishap {
         let slow = self.speed.greatest(now) < 2.0 * STILL_MPS;
         let struck = self.worst[Kind::Impact as usize] > 0.0;
         let lies = self.lies(now, vehicle);
+        let stuck = struck && slow && !self.hangs(now, vehicle);
         // Where it hit the ground on rotors its speed is not asked: an estimate may be lost.
         let stays = lies || (struck && on_rotors(now, vehicle)) || (slow && (dances || struck));
         let strayed = self.has_strayed(now);
@@ -553,7 +567,7 @@ impl Mishap {
             || (self.rests(now) && on_rotors(now, vehicle) && ((struck && lies) || (long && strayed)))
             || (self.is_still(now) && (self.is_idle(now, vehicle) || (long && near_ground)))
             || (long && (silent || self.is_supported(now)))
-            || ((lies || (struck && slow)) && on_rotors(now, vehicle) && now.since(last) >= GIVEN_UP)
+            || ((lies || stuck) && on_rotors(now, vehicle) && now.since(last) >= GIVEN_UP)
             || self.disarmed_at.is_some_and(|since| !self.armed && self.has_come_down(now, since, vehicle));
         if down {
             (self.state, self.flies_since) = (State::Down, None);
@@ -564,7 +578,7 @@ impl Mishap {
             return Some(Change::Down);
         }
         // What lies over does not fly, nor does what has not moved since it hit something.
-        let moves = !(dances || lies || strayed || struck && slow);
+        let moves = !(dances || lies || strayed || stuck);
         if long && self.armed && moves {
             self.calm();
             return Some(Change::FliesOn);

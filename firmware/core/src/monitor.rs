@@ -273,7 +273,7 @@ impl Monitor {
                 if flight.is_at_rest(now, vehicle) {
                     vehicle.inertial.rest(now);
                 }
-                flight.step(now, vehicle, mishap.is_supported(now))
+                flight.step(now, vehicle, mishap.support(now))
             }
             Fate::Over => flight.end(now, vehicle),
             Fate::Held => {

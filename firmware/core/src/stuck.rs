@@ -63,7 +63,7 @@ impl Stuck {
         trembles: 0,
     };
 
-    /// Takes a value, as the bits of all it consists of, while the vehicle flies; and how far it has moved in this flight.
+    /// Takes a value, as the bits of all it consists of; and how far it has moved in this flight.
     pub(crate) fn take(&mut self, at: Instant, bits: impl IntoIterator<Item = u32>, moved: f32) {
         // FNV-1a, of words.
         let sum = bits.into_iter().fold(0x811C_9DC5_u32, |sum, word| (sum ^ word).wrapping_mul(0x0100_0193));
@@ -83,6 +83,11 @@ impl Stuck {
             (self.since_ms, self.moved, self.repeats, self.lasts_ms) = (at_ms, moved, 0, 0);
             self.changes = self.changes.saturating_add(1);
         }
+    }
+
+    /// The same, as another flight begins, in which nothing is usual yet.
+    pub(crate) const fn begun(self) -> Self {
+        Self { moved: 0.0, usual_ms: 0, ..self }
     }
 
     /// Whether the last value is not a new one.

@@ -18,7 +18,7 @@ fn fly(kind: VehicleKind, heights_m: &[(u64, f32)]) -> Vec<(u64, FlightEvent)> {
             vehicle.observe(now, AUTOPILOT, &Observation::Heartbeat(heartbeat));
             let global = GlobalPosition { relative_altitude: Metres(*height_m), ..GlobalPosition::default() };
             vehicle.observe(now, AUTOPILOT, &Observation::GlobalPosition(global));
-            events.extend(flight.step(now, &vehicle, false).map(|event| (now_ms, event)));
+            events.extend(flight.step(now, &vehicle, Support::UNKNOWN).map(|event| (now_ms, event)));
             now_ms += 50;
         }
     }
@@ -65,7 +65,7 @@ fn told(kind: VehicleKind, words: &[(u64, LandedState)]) -> Vec<(u64, FlightEven
             if now_ms % 500 == 0 {
                 vehicle.observe(now, AUTOPILOT, &Observation::Landed(*landed, VtolState::Unknown));
             }
-            events.extend(flight.step(now, &vehicle, false).map(|event| (now_ms, event)));
+            events.extend(flight.step(now, &vehicle, Support::UNKNOWN).map(|event| (now_ms, event)));
             now_ms += 50;
         }
     }
@@ -111,7 +111,7 @@ fn a_landed_state_that_is_lost_leaves_the_decision_to_what_else_is_known() {
         if (5_000..20_000).contains(&now_ms) {
             vehicle.observe(now, AUTOPILOT, &Observation::Landed(LandedState::InAir, VtolState::Unknown));
         }
-        events.extend(flight.step(now, &vehicle, false));
+        events.extend(flight.step(now, &vehicle, Support::UNKNOWN));
     }
     assert_eq!(events, [FlightEvent::TakeOff, FlightEvent::Landing]);
 }
@@ -126,7 +126,7 @@ fn who_is_heard_first_in_the_air_goes_on_in_the_air_at_once() {
         vehicle.observe(now, AUTOPILOT, &Observation::Heartbeat(heartbeat));
         let global = GlobalPosition { relative_altitude: Metres(50.0), ..GlobalPosition::default() };
         vehicle.observe(now, AUTOPILOT, &Observation::GlobalPosition(global));
-        events.extend(flight.step(now, &vehicle, false).map(|event| (now_ms, event)));
+        events.extend(flight.step(now, &vehicle, Support::UNKNOWN).map(|event| (now_ms, event)));
     }
     assert_eq!(events, [(500, FlightEvent::Resumed)]);
 }
@@ -154,7 +154,7 @@ fn fly_by_hud(kind: VehicleKind, said: &[(u64, f32, f32)], height_m: Option<f32>
                 let global = GlobalPosition { relative_altitude, ..GlobalPosition::default() };
                 vehicle.observe(now, AUTOPILOT, &Observation::GlobalPosition(global));
             }
-            events.extend(flight.step(now, &vehicle, false));
+            events.extend(flight.step(now, &vehicle, Support::UNKNOWN));
             now_ms += 50;
         }
     }
@@ -203,7 +203,7 @@ fn told_and_seen(
             ] {
                 vehicle.observe(now, AUTOPILOT, &observation);
             }
-            events.extend(flight.step(now, &vehicle, false));
+            events.extend(flight.step(now, &vehicle, Support::UNKNOWN));
             now_ms += 50;
         }
     }

@@ -1,5 +1,6 @@
 //! What a mishap is seen by: how long something lasts, what was greatest of late, what the vehicle hangs on and who flies it.
 
+use crate::flight::FLYING_THROTTLE;
 use crate::motion::height_m;
 use crate::observation::{EstimatorScale, LandedState};
 use crate::params::{Param, Params};
@@ -21,8 +22,7 @@ pub(super) const BROKEN_OFF: f32 = 0.4;
 pub(super) const BREAKS_OFF: Span = Span::from_secs(1);
 /// Near the ground.
 const HPA_PER_METRE: f32 = 0.12;
-/// Below this throttle nothing flies; above [`FULL_THROTTLE`] nobody asks to sink, and what is still does not fly.
-pub(super) const IDLE_THROTTLE: f32 = 0.1;
+/// Above this nobody asks to sink, and what is still does not fly.
 pub(super) const FULL_THROTTLE: f32 = 0.9;
 
 /// How long it is seen whether what was disarmed falls.
@@ -38,6 +38,9 @@ const STEP_MAX_S: f32 = 2.0;
 
 /// Below this part of the throttle that it hovers with, a fall is what the throttle asks for, and what does not fall stands.
 pub(super) const THRUST_PART: f32 = 0.5;
+
+/// The ground is no flatter than this, m.
+const STEP_M: f32 = 2.0;
 
 /// How long something has been so, and in how many samples.
 #[derive(Clone, Copy, Debug)]
@@ -301,6 +304,17 @@ impl Support {
         }
     }
 
+    /// The throttle from which on rotors may carry it: half of what it hovers with, once that is known.
+    pub(super) fn flying_throttle(&self) -> f32 {
+        let is_known = self.hovered_s >= LEARNT_S;
+        if is_known { FLYING_THROTTLE.min(THRUST_PART * self.hover_throttle) } else { FLYING_THROTTLE }
+    }
+
+    /// Below this throttle nothing flies.
+    pub(super) fn idle_throttle(&self) -> f32 {
+        self.flying_throttle() / 2.0
+    }
+
     /// Whether this throttle carries less than half of the weight.
     pub(super) fn is_little(&self, part: f32) -> bool {
         part < THRUST_PART * self.hover_throttle
@@ -321,9 +335,14 @@ pub(super) fn calls_itself_landed(now: Instant, vehicle: &Vehicle) -> bool {
     vehicle.landed.within(now, LANDED_STATE_AGE) == Some(&LandedState::OnGround)
 }
 
-/// Whether it is not above where it took off, but for a step.
+/// Whether it is as high as where it took off, but for a step. Below that there may be a valley.
 pub(super) fn is_near_ground(now: Instant, vehicle: &Vehicle) -> bool {
-    height_m(now, vehicle).is_some_and(|height_m| height_m < 2.0)
+    height_m(now, vehicle).is_some_and(|height_m| height_m.abs() < STEP_M)
+}
+
+/// Whether it is known to be above or below the place where it took off.
+pub(super) fn is_off_ground(now: Instant, vehicle: &Vehicle) -> bool {
+    height_m(now, vehicle).is_some_and(|height_m| height_m.abs() >= STEP_M)
 }
 
 /// Whether it lies on its side or its back, by an attitude that the sensors do not contradict.

@@ -1,7 +1,7 @@
 //! What each observation shows of a mishap.
 
 use super::evidence::{
-    BREAKS_OFF, BROKEN_OFF, FRESH, FULL_THROTTLE, IDLE_THROTTLE, Shock, UNCARRIED, is_believed, on_rotors,
+    BREAKS_OFF, BROKEN_OFF, FRESH, FULL_THROTTLE, Shock, UNCARRIED, is_believed, on_rotors,
 };
 use super::{Kind, Mishap, State, WATCHED};
 use crate::derived::load_factor_g;
@@ -303,7 +303,7 @@ impl Mishap {
 
     /// Whether the throttle asks for thrust; not known is yes. Thrown into the air to start (`ArduCopter`'s THROW), it falls.
     fn asks_for_thrust(&self, at: Instant, vehicle: &Vehicle) -> bool {
-        let asks = |part: f32| part > IDLE_THROTTLE && !self.support.is_little(part);
+        let asks = |part: f32| part > self.support.idle_throttle() && !self.support.is_little(part);
         !is_thrown(vehicle) && throttle(at, vehicle).is_none_or(asks)
     }
 }

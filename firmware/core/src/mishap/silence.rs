@@ -1,8 +1,6 @@
 //! What flew, was not heard for a while, and is heard again: whether it came down meanwhile as nothing lands.
 
-use super::evidence::{
-    FRESH, FULL_THROTTLE, IDLE_THROTTLE, Unheard, calls_itself_landed, is_near_ground, on_rotors,
-};
+use super::evidence::{FRESH, FULL_THROTTLE, Unheard, calls_itself_landed, is_near_ground, on_rotors};
 use super::{Kind, Mishap, STILL, STILL_MPS, STILL_RATE, State, is_fast};
 use crate::flight::Flight;
 use crate::modes::has_pilots_throttle;
@@ -113,8 +111,8 @@ impl Mishap {
         let had_time = unheard.lasted(now).as_secs_f32() >= least_s;
         // What never stood hangs so in its hover (tail-sitters), and what is fast leans. What had the time to land and is off may have been
         // laid down by somebody.
-        let is_off =
-            unheard.calls_itself_down || throttle(now, vehicle).is_some_and(|part| part < IDLE_THROTTLE);
+        let is_off = unheard.calls_itself_down
+            || throttle(now, vehicle).is_some_and(|part| part < self.support.idle_throttle());
         let limit_deg = params.get(Param::MisOverturn);
         let over_deg = vehicle.inertial.lies_over(now).map(f32::to_degrees);
         let lies = self.stood && !is_fast(now, vehicle) && self.rate < STILL_RATE && !(is_off && had_time);

@@ -5,8 +5,9 @@
 //! half of the weight. An accelerometer that feels all of the weight then feels the ground, or the drag of a fall, which the pressure
 //! shows. A flare takes that from the speed over ground, for less than [`SHOWS`].
 
-use super::evidence::{FRESH, IDLE_THROTTLE, LEARNT_S, Support, on_rotors};
+use super::evidence::{FRESH, LEARNT_S, Support, is_near_ground, on_rotors};
 use super::{Kind, Mishap, STILL_RATE};
+use crate::flight;
 use crate::modes::is_made_to_turn;
 use crate::motion::{climb_mps, throttle};
 use crate::params::Params;
@@ -31,14 +32,24 @@ impl Mishap {
         self.support.since.age(now).is_some_and(|age| age >= SHOWS)
     }
 
+    /// What is known of the ground without an estimator.
+    pub(crate) fn support(&self, now: Instant) -> flight::Support {
+        flight::Support {
+            is_supported: self.is_supported(now),
+            flying_throttle: self.support.flying_throttle(),
+            has_pressure: self.pressure.now(now).is_some(),
+        }
+    }
+
     pub(super) fn note_throttle(&mut self, at: Instant, vehicle: &Vehicle) {
         let part = throttle(at, vehicle).unwrap_or(0.0);
-        if self.armed && part > IDLE_THROTTLE {
+        if self.armed && part > self.support.idle_throttle() {
             self.driven_at = at;
         }
         let level = climb_mps(at, vehicle).is_some_and(|climb_mps| climb_mps.abs() < 1.0);
         let hovers = level
-            && part > IDLE_THROTTLE
+            && part > 0.0
+            && !is_near_ground(at, vehicle)
             && self.support.flies
             && on_rotors(at, vehicle)
             && self.shock.is_none();

@@ -407,3 +407,107 @@ fn shaking_that_goes_on_is_no_impact_that_goes_on() {
         assert!(outcome.told().is_empty() && outcome.flights() == (1, 1, 0), "{of:?}: {:?}", outcome.changes);
     }
 }
+
+/// Knocked with so many g while it tumbles for 0.8 s; then it holds its place.
+fn is_knocked(ms: u64, motion: &mut Motion, knock_g: f32) {
+    if ms < 800 {
+        (motion.load_g, motion.rates) = (knock_g, [6.2, 0.0, 0.0]);
+    }
+}
+
+#[test]
+fn what_holds_its_place_in_the_air_after_a_knock_flies_on() {
+    for (height, throttle) in [(3.0, 0.45), (20.0, 0.45), (20.0, 0.25), (300.0, 0.7), (-25.0, 0.45)] {
+        for knock_g in [3.5, 5.0, 9.0] {
+            // Nobody sees it leave the ground downwards, but its autopilot.
+            let words = [Some(LandedState::InAir), None];
+            for landed in words.into_iter().take(if height > 0.0 { 2 } else { 1 }) {
+                let quad = Quad { height, throttle, climb: 0.0, landed, ..Quad::healthy() };
+                let outcome = fly(&quad, |ms, quad, motion| {
+                    // The autopilot is wrong once.
+                    if landed.is_some() && (10_000..10_500).contains(&ms) {
+                        quad.landed = Some(LandedState::OnGround);
+                    }
+                    is_knocked(ms, motion, knock_g);
+                });
+                let what = (height, throttle, knock_g, landed, &outcome.changes);
+                assert_eq!(outcome.flights(), (1, 0, 0), "{what:?}");
+                assert!(matches!(outcome.changes.last(), Some((_, Change::FliesOn))), "{what:?}");
+                assert!(outcome.monitor.flight().airborne(), "{what:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_silence_after_a_knock_ends_no_flight_of_what_hangs_in_the_air() {
+    let quad = Quad { climb: 0.0, ..Quad::healthy() };
+    let outcome = fly(&quad, |ms, _, motion| {
+        is_knocked(ms, motion, 5.0);
+        motion.unheard = (1_000..9_000).contains(&ms);
+    });
+    assert!(
+        matches!(outcome.changes.last(), Some((_, Change::FliesOn | Change::FliesAgain))),
+        "{:?}",
+        outcome.changes
+    );
+    assert!(outcome.monitor.flight().airborne());
+}
+
+#[test]
+fn little_throttle_alone_is_no_landing() {
+    for height in [3.0, 7.0, 20.0, 300.0, -25.0] {
+        for throttle in [0.04, 0.07, 0.09, 0.12, 0.19] {
+            for (autopilot, type_number) in [(Autopilot::ArduPilot, 2), (Autopilot::Px4, 13)] {
+                let quad = Quad { autopilot, type_number, ..Quad::healthy() };
+                let outcome = fly_from(0, &quad, |ms, quad, motion| {
+                    // It stands without thrust, climbs with three times its hover throttle, hovers and goes at 3 m/s.
+                    let hovers = ms >= 20_000;
+                    quad.landed = Some(if ms < 8_000 { LandedState::OnGround } else { LandedState::InAir });
+                    quad.throttle = if ms < 8_000 {
+                        0.0
+                    } else if hovers {
+                        throttle
+                    } else {
+                        3.0 * throttle
+                    };
+                    let climbed = ms.saturating_sub(8_000).min(12_000) as f32 / 12_000.0;
+                    quad.height = height * climbed;
+                    quad.climb = if ms < 8_000 || hovers { 0.0 } else { height / 12.0 };
+                    motion.ground_mps = if ms < 30_000 { 0.1 } else { 3.0 };
+                    if ms >= 8_000 {
+                        motion.load_g += 0.02 * (ms / 50 % 3) as f32;
+                    }
+                });
+                let what = (height, throttle, autopilot);
+                assert_eq!(outcome.flights(), (1, 0, 0), "{what:?}");
+                assert!(outcome.monitor.flight().airborne(), "{what:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_barometer_that_freezes_before_the_take_off_hides_no_flight() {
+    for (frozen_ms, height) in [(3_000, 5.0), (7_000, 20.0), (7_900, 300.0), (30_000, 20.0)] {
+        for ground_mps in [0.1, 6.0] {
+            let outcome = fly_from(0, &Quad::healthy(), |ms, quad, motion| {
+                let flies = ms >= 8_000;
+                quad.armed = ms >= 2_000;
+                quad.landed = Some(if flies { LandedState::InAir } else { LandedState::OnGround });
+                (quad.throttle, quad.height) = if flies { (0.4, height) } else { (0.0, 0.0) };
+                let noise = (ms.min(frozen_ms) / 100 * 37 % 11) as f32 * 0.002;
+                let high_m = if ms.min(frozen_ms) >= 8_000 { height } else { 0.0 };
+                motion.pressure_hpa = Some(957.0 - 0.12 * high_m + noise);
+                // It moves up and down by its estimator.
+                if flies {
+                    quad.climb = if ms / 2_000 % 2 == 0 { 1.0 } else { -1.0 };
+                    motion.ground_mps = ground_mps;
+                }
+            });
+            let what = (frozen_ms, height, ground_mps);
+            assert_eq!(outcome.flights(), (1, 0, 0), "{what:?}");
+            assert!(outcome.findings.iter().any(|finding| finding.check == "baro_stuck"), "{what:?}");
+        }
+    }
+}
