@@ -6,7 +6,7 @@
 //! the battery from `BATTERY_STATUS` or, where that is silent, `SYS_STATUS`, and so on.
 //! A value older than `AGE_MAX` is no value: better an empty cell than a stale number.
 
-use hums_core::flight::Flight;
+use hums_core::flight::{Flight, Support};
 use hums_core::observation::{Esc, Observation, Source};
 use hums_core::time::{Instant, Span};
 use hums_core::units::{MetresPerSecond, MetresPerSecond2};
@@ -164,7 +164,7 @@ impl Reference {
         }
         self.heard = Some(at);
         let since = self.flight.airborne_since();
-        self.flight.step(at, &self.vehicle, false);
+        self.flight.step(at, &self.vehicle, Support::UNKNOWN);
         match (since, self.flight.airborne_since()) {
             (Some(since), None) => self.flown = at.since(since),
             (None, Some(_)) => self.flown = Span::ZERO,
