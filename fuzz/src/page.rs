@@ -16,7 +16,7 @@ use hums::source::recording::Place;
 use hums::summary::Overview;
 use hums_blackbox::record::Note;
 use hums_blackbox::{FRAME_BYTES_MAX, Record, Sector, SectorSink, Writer};
-use hums_core::time::Instant;
+use hums_core::clock::Instant;
 use hums_link::encode::Encoder;
 use hums_link::packet::Packet;
 use serde_json::Value;

@@ -1,7 +1,7 @@
 //! Any pieces of bytes, most of them no frames, through writer and reader: they come back as they were.
 
 use hums_blackbox::{FRAME_BYTES_MAX, Item, LogReader, Sector, SectorSink, Writer};
-use hums_core::time::Instant;
+use hums_core::clock::Instant;
 
 /// The sectors written, sealed.
 #[derive(Default)]

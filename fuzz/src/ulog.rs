@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use hums::source::item::{Item, Reader as _, Rows, Want};
 use hums::source::ulog::Ulog;
-use hums_core::time::Instant;
+use hums_core::clock::Instant;
 
 /// Columns of all tables at most: `COLUMNS_MAX` of the reader, and its own tables.
 const COLUMNS_MAX: usize = 65_536 + 7;

@@ -7,7 +7,7 @@ use std::collections::{BTreeMap, VecDeque};
 
 use hums_blackbox::GROUP_SECTORS;
 use hums_blackbox::record::{Before, Found};
-use hums_core::time::{Instant, Span};
+use hums_core::clock::{Instant, Span};
 
 use crate::ending::{Ending, Misnamed, PowerOn, Proof, SessionBefore, Teller};
 use crate::logs::begun_anew::LOOKED_AT_MAX;

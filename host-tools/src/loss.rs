@@ -73,7 +73,7 @@ pub fn told(loss: &Loss) -> String {
 
 #[cfg(test)]
 mod tests {
-    use hums_core::time::Instant;
+    use hums_core::clock::Instant;
 
     use super::*;
 

@@ -8,7 +8,7 @@ use std::path::Path;
 use anyhow::{Context, Result};
 use hums_blackbox::record::{Clock, Loss, Lost, Note};
 use hums_blackbox::{Full, Record, Sector, SectorSink, Writer};
-use hums_core::time::Instant;
+use hums_core::clock::Instant;
 use hums_link::{Check, Framer};
 use serde::Serialize;
 use sha2::{Digest as _, Sha256};

@@ -5,7 +5,7 @@
 use std::collections::BTreeMap;
 use std::ops::RangeInclusive;
 
-use hums_core::time::Instant;
+use hums_core::clock::Instant;
 
 /// Intervals at most: as many as a large screen has columns.
 const INTERVALS_MAX: usize = 2048;

@@ -1,8 +1,8 @@
 //! What a vehicle's components say in words: `STATUSTEXT`, long ones put together from their parts.
 
 use hums_core::cause::Alert;
+use hums_core::clock::{Instant, Span};
 use hums_core::observation::Source;
-use hums_core::time::{Instant, Span};
 
 use crate::mavlink::ids::STATUSTEXT;
 use crate::mavlink::values::{Payload, Value};

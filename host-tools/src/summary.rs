@@ -6,10 +6,10 @@ use std::fmt::{self, Display, Formatter};
 use anyhow::Result;
 use hums_blackbox::record::{Loss, Moment, Stats, Vehicle, Why};
 use hums_blackbox::{Cause, Gap, Record};
+use hums_core::clock::{Instant, Span};
 use hums_core::component::{COMPONENTS_MAX, Figures, Kind};
 use hums_core::health::exceedance::Crossings;
 use hums_core::health::{Level, Subsystem};
-use hums_core::time::{Instant, Span};
 use hums_core::usage::UsageCounter;
 use hums_link as link;
 

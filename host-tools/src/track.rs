@@ -1,6 +1,6 @@
 //! Where a vehicle was: a bounded track, as dense as its length allows.
 
-use hums_core::time::{Instant, Span};
+use hums_core::clock::{Instant, Span};
 use hums_core::units::Position;
 
 /// Points at most: when it is full every second one goes.

@@ -1,7 +1,7 @@
 //! Times as people and other tools read them: UTC in ISO 8601, and seconds since the monitor's power-on; for people hours,
 //! minutes and seconds.
 
-use hums_core::time::{Instant, Span};
+use hums_core::clock::{Instant, Span};
 
 /// Microseconds since 1970 as `2026-11-21T10:13:42.123456Z`, appended to `out`. Years up to 9999; a later time is
 /// damage and reads as the last one.

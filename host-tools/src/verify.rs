@@ -542,7 +542,7 @@ mod tests {
 
     use hums_blackbox::record::{Keep, Note};
     use hums_blackbox::{GROUP_SECTORS, Record, Sector, Writer};
-    use hums_core::time::Instant;
+    use hums_core::clock::Instant;
 
     use super::*;
     use crate::followed::Logged;

@@ -8,12 +8,12 @@ use std::path::Path;
 use hums::source::item::{Item, Rows, Want};
 use hums::source::recording::Place;
 use hums_core::Monitor;
+use hums_core::clock::Instant;
 use hums_core::health::Level;
-use hums_core::monitor::TICK;
 use hums_core::observation::Observation;
 use hums_core::params::Params;
 use hums_core::status::{LinkReading, RecorderStatus, Recording};
-use hums_core::time::Instant;
+use hums_onboard::monitoring::TICK;
 
 /// What was found: check, instance, level, seconds since the autopilot's boot.
 type Found = Vec<(&'static str, u8, Level, f64)>;
@@ -27,11 +27,11 @@ fn found(name: &str) -> Found {
     let summary = recording.read(want, &mut |at, item| {
         let mut now = *next.get_or_insert(at);
         while now <= at {
-            let link = LinkReading { frames_lost: Some(0.0), at: now };
+            let link = LinkReading { frames_lost: Some(0.0), at: now.into() };
             let recorder = RecorderStatus { recording: Recording::Running, ..RecorderStatus::default() };
-            monitor.tick(now, &link, &recorder, &mut |finding| {
+            monitor.tick(now.into(), &link, &recorder, &mut |finding| {
                 if !matches!(finding.level, Level::Stale) {
-                    found.push((finding.check, finding.instance, finding.level, finding.at.as_secs_f64()));
+                    found.push((finding.check, finding.instance, finding.level, now.as_secs_f64()));
                 }
             });
             now = now + TICK;
@@ -43,7 +43,7 @@ fn found(name: &str) -> Found {
             {
                 boot_s.get_or_insert(f64::from(boot_ms) / 1e3 - at.as_secs_f64());
             }
-            monitor.observe(at, source, observation);
+            monitor.observe(at.into(), source, observation);
         }
         assert!(!matches!(item, Item::Gap(_)), "{name}: {item:?}");
         Ok(())

@@ -7,7 +7,7 @@ use core::cell::Cell;
 
 use cortex_m::peripheral::DWT;
 use critical_section::{CriticalSection, Mutex};
-use hums_core::time::Instant;
+use hums_core::clock::Instant;
 
 /// The parts that are measured apart; `hums emulate --costs` has their names in this order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -12,7 +12,7 @@ use core::sync::atomic::{AtomicU32, Ordering};
 use cortex_m_rt::ExceptionFrame;
 use heapless::String;
 use hums_blackbox::record;
-use hums_core::time::Instant;
+use hums_core::clock::Instant;
 use hums_onboard::Task;
 
 use crate::exceptions;

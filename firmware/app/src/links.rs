@@ -3,7 +3,7 @@
 
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::signal::Signal;
-use hums_core::time::Instant;
+use hums_core::clock::Instant;
 
 type Link<T = ()> = Signal<CriticalSectionRawMutex, T>;
 
@@ -24,6 +24,6 @@ pub(crate) fn now() -> Instant {
 }
 
 /// A span of ours as the executor counts time.
-pub(crate) const fn wait(span: hums_core::time::Span) -> embassy_time::Duration {
+pub(crate) const fn wait(span: hums_core::clock::Span) -> embassy_time::Duration {
     embassy_time::Duration::from_micros(span.as_micros())
 }

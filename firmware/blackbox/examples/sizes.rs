@@ -19,7 +19,7 @@ use std::process::{Command, ExitCode, Stdio};
 use card::Card;
 use hums_blackbox::record::{Boot, Clock, Stats, Vehicle};
 use hums_blackbox::{Item, LogReader, Record, SECTOR_BYTES, Writer};
-use hums_core::time::Instant;
+use hums_core::clock::Instant;
 
 type Result<T> = std::result::Result<T, Box<dyn Error>>;
 

@@ -1,6 +1,6 @@
 //! Decoding one group: sectors in, entries out. Groups know nothing of each other, so a host decodes many at once.
 
-use hums_core::time::Instant;
+use hums_core::clock::Instant;
 
 use crate::chain;
 use crate::codec::{self, Decoded, Frame, Kind, Model, Recall, SLOTS};

@@ -7,7 +7,7 @@
 //! What cannot be read is an item too: a `Gap` with its times and its cause. After a gap reading goes on at the next
 //! group's start, never before. A gap with [`Cause::Altered`] says that up to a sector's entries before it may be wrong.
 
-use hums_core::time::Instant;
+use hums_core::clock::Instant;
 
 use crate::assemble::{Assembler, BlockCounts, Step};
 use crate::group::{Entry, GroupDecoder, GroupError};

@@ -5,7 +5,7 @@
 //! returns `Full` and its state is as before. *Groups* end after `GROUP_SECTORS`: the entry that does not fit any more is
 //! taken back (the coder's state before it is kept) and becomes the first one of the next group.
 
-use hums_core::time::Instant;
+use hums_core::clock::Instant;
 use hums_dialect::wire::FRAME_BYTES_MAX;
 
 use crate::bytes::copy_few;

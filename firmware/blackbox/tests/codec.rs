@@ -15,7 +15,7 @@ use hums_blackbox::{
     Assembler, Entry, FRAME_BYTES_MAX, GroupDecoder, Item, LogReader, Outline, Record, SECTOR_BYTES, Sector,
     Writer,
 };
-use hums_core::time::Instant;
+use hums_core::clock::Instant;
 use proptest::prelude::*;
 
 fn read(sectors: &[Sector]) -> (Vec<Frame>, Vec<String>) {

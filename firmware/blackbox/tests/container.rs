@@ -6,7 +6,7 @@ use hums_blackbox::record::{Mark, Note, Resting};
 use hums_blackbox::{
     Cause, ENTRY_SECTORS_MAX, Full, Item, LogReader, Record, Sector, SectorSink, Summary, Writer,
 };
-use hums_core::time::Instant;
+use hums_core::clock::Instant;
 use hums_dialect::crc;
 use proptest::prelude::*;
 

@@ -11,7 +11,7 @@ use std::path::PathBuf;
 use card::Card;
 use hums_blackbox::record::{Boot, Clock, Moment, Note, Stats, Usage};
 use hums_blackbox::{Item, LogReader, Record, SECTOR_BYTES, Writer};
-use hums_core::time::Instant;
+use hums_core::clock::Instant;
 use hums_dialect::crc;
 
 /// Frames of the kinds that matter: floats that wander, counters, decimals, times, text, two senders, both versions, a

@@ -17,7 +17,7 @@ use std::path::Path;
 use card::Card;
 use frames::{Frame, checks, frame_len, frames_of};
 use hums_blackbox::{Item, LogReader, Record, SECTOR_BYTES, Writer};
-use hums_core::time::Instant;
+use hums_core::clock::Instant;
 use kinds::{Entry, entries};
 
 /// The log of batches of entries, each in groups of its own.

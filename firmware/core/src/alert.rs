@@ -239,10 +239,10 @@ impl Alerts {
 
     /// Causes of which [`Self::level`] may be other than that of what is over, or of what nobody ever spoke of.
     pub(crate) fn may_be_on(&self, now: Instant) -> Causes {
-        const LATE_MS: u64 = HOLDS.as_millis() + 1_000;
+        const LATE: Span = Span::from_millis(HOLDS.as_millis() + 1_000);
         let set = |causes: Causes, flags: &&Flags| causes.or(flags.now.both(flags.before));
         let flagged = self.flags().iter().fold(Causes::NONE, set);
-        if self.told_at.age_ms(now).is_none_or(|age_ms| age_ms > LATE_MS) {
+        if self.told_at.age(now).is_none_or(|age| age > LATE) {
             return flagged;
         }
         let told = Cause::ALL.into_iter().zip(self.told).filter(|(_, told)| told.is_some());

@@ -414,10 +414,10 @@ impl Derived {
     pub(crate) fn esc_silence(&self, now: Instant, motor: u8) -> Option<Reading> {
         let track = self.motors.get(usize::from(motor))?;
         let heard = self.heard?;
-        let silence_s = heard.since(track.last.instant(heard)?.max(self.resumed)).as_secs_f32();
+        let silence_s = heard.since(track.last.instant(heard)?.later(self.resumed)).as_secs_f32();
         let intervals = if track.interval_s > SLOW_S { INTERVALS_MISSED_SLOW } else { INTERVALS_MISSED };
         let missed = track.interval_s > 0.0 && silence_s > intervals * track.interval_s;
-        Some(Reading { at: heard.min(now), value: if missed { silence_s } else { 0.0 } })
+        Some(Reading { at: heard.earlier(now), value: if missed { silence_s } else { 0.0 } })
     }
 
     /// 0 % of a motor that turned and stands while it is given all there is: control asks it for thrust, and nothing comes. Its ESC's speed

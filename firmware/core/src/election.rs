@@ -87,7 +87,7 @@ impl Election {
         let asked = if self.settled || count < 2 || self.is_decided(now) {
             self.of(vehicle)
         } else {
-            let turns = now.since(self.first).as_micros() / TURN.as_micros();
+            let turns = now.since(self.first).as_millis() / TURN.as_millis();
             self.heard(now).nth(turns as usize % count)
         };
         asked.map(|candidate| (candidate.source, candidate.autopilot))
@@ -96,7 +96,7 @@ impl Election {
     /// Whether nothing that is asked changes the choice any more.
     fn is_decided(&self, now: Instant) -> bool {
         let turns = self.heard(now).count() as u64;
-        let over = now.since(self.first).as_micros() >= turns * TURN.as_micros();
+        let over = now.since(self.first).as_millis() >= turns * TURN.as_millis();
         self.by_itself || (self.streams && (turns < 2 || over))
     }
 

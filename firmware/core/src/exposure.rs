@@ -137,8 +137,8 @@ impl Exposure {
         }
         // Whole tenths are counted; the rest goes into the next step.
         let tenths = (step.as_millis() / 100) as u32;
-        let rest = step.as_micros() % 100_000;
-        self.last = Some(Instant::from_micros(now.as_micros() - rest));
+        let rest = Span::from_millis(step.as_millis() % 100);
+        self.last = Some(now - rest);
         if step > STEP_MAX {
             return;
         }

@@ -9,6 +9,7 @@ mod bytes;
 pub mod cause;
 pub mod cells;
 mod charge;
+pub mod clock;
 pub mod component;
 mod crosscheck;
 mod currents;

@@ -446,7 +446,7 @@ impl Mishap {
     }
 
     fn was_driven(&self, now: Instant) -> bool {
-        self.driven_at > Instant::ZERO && now.since(self.driven_at) <= DRIVEN
+        self.driven_at != Instant::ZERO && now.since(self.driven_at) <= DRIVEN
     }
 
     /// Whether it leaned so far or turned so fast in the last seconds that thrust did not carry it.
@@ -515,7 +515,8 @@ impl Mishap {
                     || (on_rotors(now, vehicle) && is_tilted(now, vehicle))
                     || self.lies_on_its_back(vehicle)));
         self.shock = Some(Shock { hit, ..shock });
-        let rests = self.still_since.is_some_and(|since| since >= shock.at && now.since(since) >= STILL);
+        let rests =
+            self.still_since.is_some_and(|since| !shock.at.is_after(since) && now.since(since) >= STILL);
         if hit && rests && self.is_idle(now, vehicle) {
             self.touch_mps = self.touch_mps.max(shock.sink_mps);
             self.see(now, Kind::Impact, shock.load_g, params);

@@ -169,11 +169,11 @@ impl Pairs {
                 _ => continue,
             };
             // Newer than when it was compared last.
-            let is_new = |age_ms: u64| pair.at.age_ms(at).is_none_or(|before_ms| age_ms < before_ms);
+            let is_new = |age: Span| pair.at.age(at).is_none_or(|before| age < before);
             if samples[partner]
                 .at
-                .age_ms(at)
-                .is_some_and(|age_ms| age_ms <= moment_ms.into() && is_new(age_ms))
+                .age(at)
+                .is_some_and(|age| age <= Span::from_millis(moment_ms.into()) && is_new(age))
             {
                 pair.take(at, kind, kind.difference(samples[one].axes, samples[other].axes));
             }
@@ -210,6 +210,6 @@ impl Pairs {
             .zip(beyond)
             .filter(|((one, other), _)| *other == sensor || (three && *one == sensor));
         mine.filter_map(|(_, beyond)| beyond)
-            .reduce(|one, other| Reading { at: one.at.min(other.at), value: one.value.min(other.value) })
+            .reduce(|one, other| Reading { at: one.at.earlier(other.at), value: one.value.min(other.value) })
     }
 }

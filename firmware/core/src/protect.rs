@@ -469,7 +469,7 @@ impl Protect {
     /// The autopilot's answer, once it has come.
     fn hear(&mut self, situation: &Situation<'_>, action: Action, attempt: u8, at: Instant) -> Option<Step> {
         let Situation { vehicle, .. } = *situation;
-        let answered_at = vehicle.command_ack.at().filter(|answered_at| *answered_at >= at)?;
+        let answered_at = vehicle.command_ack.at().filter(|answered_at| !at.is_after(*answered_at))?;
         let ack = vehicle.command_ack.get().filter(|ack| is_ours(ack, vehicle, action))?;
         match ack.result {
             TEMPORARILY_REJECTED if attempt < ATTEMPTS_MAX => return None,

@@ -245,8 +245,8 @@ impl Snapshots {
             Some(pending) if !before_told => pending.before_told = true,
             _ => *place = None,
         }
-        let length = INTERVAL.as_micros() * u64::from(self.filled.saturating_sub(1));
-        let first = Instant::from_micros(self.newest.as_micros().saturating_sub(length));
+        let length = INTERVAL.as_millis() * u64::from(self.filled.saturating_sub(1));
+        let first = self.newest - Span::from_millis(length);
         Some(Snapshot { at, check, instance, subsystem, after: before_told, first, snapshots: self })
     }
 

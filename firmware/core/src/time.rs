@@ -1,17 +1,21 @@
-//! Time as the monitor counts it: microseconds since its own power-on, from one monotonic clock that the caller reads.
+//! Time of all judgement: milliseconds since power-on in 32 bits, which wrap after 49.7 days.
 //!
-//! 64 bits of microseconds last 584,000 years, so nothing here wraps.
+//! Two times are compared by their wrapping difference. A time may be up to [`AHEAD_MAX`] later than the one that it is compared
+//! with; otherwise it is in the past, up to 49.7 days. Microseconds stay at the edge, in [`crate::clock`].
 
 use core::fmt;
-use core::num::{NonZeroU32, NonZeroU64};
-use core::ops::Add;
+use core::num::NonZeroU32;
+use core::ops::{Add, Sub};
 
-/// A point in time: microseconds since the monitor's power-on. Kept one higher, so that one that may be missing takes no more
-/// room: the monitor has more than a hundred of them.
-#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct Instant(NonZeroU64);
+/// A time that is later than `now` by up to this is in the future: messages may be processed in another order than they came.
+/// What lies back for 49.7 days less this would be mistaken for such a one.
+const AHEAD_MAX: Span = Span::from_secs(3_600);
 
-const _: () = assert!(size_of::<Option<Instant>>() == size_of::<Instant>());
+/// A point in time: milliseconds since power-on, modulo 2^32. Kept one higher, so that an optional one takes no more room.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub struct Instant(NonZeroU32);
+
+const _: () = assert!(size_of::<Option<Instant>>() == size_of::<u32>());
 
 impl Default for Instant {
     fn default() -> Self {
@@ -21,45 +25,48 @@ impl Default for Instant {
 
 impl fmt::Debug for Instant {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        formatter.debug_tuple("Instant").field(&self.as_micros()).finish()
+        formatter.debug_tuple("Instant").field(&self.as_millis()).finish()
     }
 }
 
 impl Instant {
     /// Power-on.
-    pub const ZERO: Self = Self(NonZeroU64::MIN);
+    pub const ZERO: Self = Self(NonZeroU32::MIN);
 
-    /// Later than all that there is.
-    pub(crate) const FAR: Self = Self(NonZeroU64::MAX);
-
-    /// From microseconds since power-on; the last one of 64 bits is taken for the one before it.
-    pub const fn from_micros(micros: u64) -> Self {
-        Self(NonZeroU64::MIN.saturating_add(micros))
-    }
-
-    /// From milliseconds since power-on.
+    /// From milliseconds since power-on, modulo 2^32. The last one before the wrap counts as the first one after it.
     pub const fn from_millis(millis: u64) -> Self {
-        Self::from_micros(millis.saturating_mul(1_000))
+        match NonZeroU32::new((millis as u32).wrapping_add(1)) {
+            Some(millis) => Self(millis),
+            None => Self::ZERO,
+        }
     }
 
-    /// Microseconds since power-on.
-    pub const fn as_micros(self) -> u64 {
-        self.0.get() - 1
-    }
-
-    /// Whole milliseconds since power-on, rounded down.
+    /// Milliseconds since power-on, modulo 2^32.
     pub const fn as_millis(self) -> u64 {
-        self.as_micros() / 1_000
+        (self.0.get() - 1) as u64
     }
 
-    /// Seconds since power-on; exact to a microsecond for the first 285 years.
-    pub fn as_secs_f64(self) -> f64 {
-        self.as_micros() as f64 / 1e6
-    }
-
-    /// The span from `earlier` to here; zero where `earlier` is the later one.
+    /// The span from `earlier` to here; zero if `earlier` is the later one.
     pub const fn since(self, earlier: Self) -> Span {
-        Span(self.0.get().saturating_sub(earlier.0.get()))
+        let millis = self.0.get().wrapping_sub(earlier.0.get());
+        if millis > u32::MAX - AHEAD_MAX.0 { Span::ZERO } else { Span(millis) }
+    }
+
+    /// Whether this is later than `other`; both are within 24.8 days.
+    pub const fn is_after(self, other: Self) -> bool {
+        self.0.get().wrapping_sub(other.0.get()).cast_signed() > 0
+    }
+
+    /// The later one of two.
+    #[must_use]
+    pub const fn later(self, other: Self) -> Self {
+        if other.is_after(self) { other } else { self }
+    }
+
+    /// The earlier one of two.
+    #[must_use]
+    pub const fn earlier(self, other: Self) -> Self {
+        if other.is_after(self) { self } else { other }
     }
 }
 
@@ -67,24 +74,29 @@ impl Add<Span> for Instant {
     type Output = Self;
 
     fn add(self, span: Span) -> Self {
-        Self(self.0.saturating_add(span.0))
+        let millis = self.0.get().wrapping_add(span.0);
+        Self(NonZeroU32::new(millis).unwrap_or(NonZeroU32::MIN))
     }
 }
 
-/// A point in time, or none, in four bytes, for what there is much of: milliseconds modulo 2^32, and never zero. What is measured from
-/// it is far shorter than the 49.7 days after which it would be mistaken.
+impl Sub<Span> for Instant {
+    type Output = Self;
+
+    fn sub(self, span: Span) -> Self {
+        let millis = self.0.get().wrapping_sub(span.0);
+        Self(NonZeroU32::new(millis).unwrap_or(NonZeroU32::MAX))
+    }
+}
+
+/// A point in time, or none.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(crate) struct Stamp(Option<NonZeroU32>);
+pub(crate) struct Stamp(Option<Instant>);
 
 impl Stamp {
     pub(crate) const NONE: Self = Self(None);
 
     pub(crate) const fn at(at: Instant) -> Self {
-        match NonZeroU32::new(at.as_millis() as u32) {
-            Some(millis) => Self(Some(millis)),
-            // A millisecond earlier.
-            None => Self(Some(NonZeroU32::MAX)),
-        }
+        Self(Some(at))
     }
 
     pub(crate) const fn is_set(self) -> bool {
@@ -93,74 +105,58 @@ impl Stamp {
 
     /// Whether it is set and more than `span` ago.
     pub(crate) fn older_than(self, now: Instant, span: Span) -> bool {
-        self.age_ms(now).is_some_and(|age_ms| age_ms > span.as_millis())
+        self.age(now).is_some_and(|age| age > span)
     }
 
-    pub(crate) fn age_ms(self, now: Instant) -> Option<u64> {
-        Some(u64::from((now.as_millis() as u32).wrapping_sub(self.0?.get())))
-    }
-
-    /// How long ago it was, up to 24.8 days; no time where it is yet to come.
+    /// How long ago it was; zero if it is yet to come.
     pub(crate) fn age(self, now: Instant) -> Option<Span> {
-        let age_ms = (now.as_millis() as u32).wrapping_sub(self.0?.get()).cast_signed();
-        Some(Span::from_millis(u64::from(age_ms.max(0).cast_unsigned())))
+        Some(now.since(self.0?))
     }
 
-    /// The point in time, to a millisecond.
+    /// The same in milliseconds.
+    pub(crate) fn age_ms(self, now: Instant) -> Option<u64> {
+        Some(self.age(now)?.as_millis())
+    }
+
+    /// The point in time, no later than `now`.
     pub(crate) fn instant(self, now: Instant) -> Option<Instant> {
-        let age_ms = self.age(now)?.as_millis();
-        Some(Instant::from_millis(now.as_millis().saturating_sub(age_ms)))
+        Some(self.0?.earlier(now))
     }
 
     /// Runs while `on`; whether it has run for `span`.
     pub(crate) fn run(&mut self, on: bool, now: Instant, span: Span) -> bool {
-        if !on {
-            *self = Self::NONE;
-            return false;
-        }
-        if !self.is_set() {
-            *self = Self::at(now);
-        }
-        self.age_ms(now).is_some_and(|age_ms| age_ms >= span.as_millis())
+        let began = self.0.filter(|_| on).or_else(|| on.then_some(now));
+        *self = Self(began);
+        began.is_some_and(|began| now.since(began) >= span)
     }
 }
 
-/// A length of time in microseconds.
+/// A length of time in milliseconds, up to 49.7 days.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct Span(u64);
+pub struct Span(u32);
 
 impl Span {
     /// No time.
     pub const ZERO: Self = Self(0);
 
-    /// From microseconds.
-    pub const fn from_micros(micros: u64) -> Self {
-        Self(micros)
-    }
-
-    /// From milliseconds.
+    /// From milliseconds; 49.7 days if it is more.
     pub const fn from_millis(millis: u64) -> Self {
-        Self(millis.saturating_mul(1_000))
+        Self(if millis > u32::MAX as u64 { u32::MAX } else { millis as u32 })
     }
 
-    /// From seconds.
+    /// From seconds; 49.7 days if it is more.
     pub const fn from_secs(secs: u64) -> Self {
-        Self(secs.saturating_mul(1_000_000))
+        Self::from_millis(secs.saturating_mul(1_000))
     }
 
-    /// Microseconds.
-    pub const fn as_micros(self) -> u64 {
-        self.0
-    }
-
-    /// Whole milliseconds, rounded down.
+    /// Milliseconds.
     pub const fn as_millis(self) -> u64 {
-        self.0 / 1_000
+        self.0 as u64
     }
 
-    /// Seconds; single precision is enough for a rate or a step of integration.
+    /// Seconds.
     pub fn as_secs_f32(self) -> f32 {
-        self.0 as f32 / 1e6
+        self.0 as f32 / 1e3
     }
 }
 

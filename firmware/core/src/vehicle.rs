@@ -27,9 +27,9 @@ pub(crate) const LANDED_STATE_AGE: Span = Span::from_secs(5);
 const LED: Span = Span::from_secs(5);
 /// `MAV_COMP_ID_BATTERY`, `MAV_COMP_ID_BATTERY2`
 const BATTERY_COMPONENTS: [u8; 2] = [180, 181];
-/// Boot times follow each other within this of the time that went by, microseconds: messages overtake each other and wait in line.
+/// Boot times follow each other within this of the time that went by, milliseconds: messages overtake each other and wait in line.
 /// One that falls by more is a reboot.
-const REBOOT_US: i64 = 3_000_000;
+const REBOOT_MS: i64 = 3_000;
 /// An autopilot that restarts in flight is off no longer; a link that was silent for longer is lost (PX4, `COM_DL_LOSS_T`: 10 s), and
 /// nobody knows what passed meanwhile: a landing, a disarming, another battery.
 const OFF: Span = Span::from_secs(10);
@@ -422,12 +422,11 @@ impl Vehicle {
     /// overtake each other a little, nor the end of 32 bits of milliseconds after 49.7 days.
     fn take_boot_time(&mut self, at: Instant, boot_ms: u32) {
         // How far this one is ahead of an earlier one, and how far it should be.
-        let ahead_us = |(told_ms, told_at): (u32, Instant)| {
-            let ahead_ms = boot_ms.wrapping_sub(told_ms) as i32;
-            (i64::from(ahead_ms) * 1_000, at.since(told_at).as_micros() as i64)
+        let ahead_ms = |(told_ms, told_at): (u32, Instant)| {
+            (i64::from(boot_ms.wrapping_sub(told_ms).cast_signed()), at.since(told_at).as_millis() as i64)
         };
-        if let Some((ahead, passed)) = self.boot.map(ahead_us)
-            && (-REBOOT_US..=passed + REBOOT_US).contains(&ahead)
+        if let Some((ahead, passed)) = self.boot.map(ahead_ms)
+            && (-REBOOT_MS..=passed + REBOOT_MS).contains(&ahead)
         {
             if ahead > 0 {
                 self.boot = Some((boot_ms, at));
@@ -435,13 +434,13 @@ impl Vehicle {
             (self.odd_boot, self.boot_armed) = (None, self.armed());
             return;
         }
-        let agrees = |(ahead, passed): (i64, i64)| (ahead - passed).abs() <= REBOOT_US;
-        if !self.odd_boot.map(ahead_us).is_some_and(agrees) {
+        let agrees = |(ahead, passed): (i64, i64)| (ahead - passed).abs() <= REBOOT_MS;
+        if !self.odd_boot.map(ahead_ms).is_some_and(agrees) {
             self.odd_boot = Some((boot_ms, at));
             return;
         }
         if let Some((_, told_at)) = self.boot
-            && self.boot.map(ahead_us).is_some_and(|(ahead, _)| ahead < 0)
+            && self.boot.map(ahead_ms).is_some_and(|(ahead, _)| ahead < 0)
         {
             // How long nothing was heard before this power-on: what happened in a long silence, a landing too, nobody knows.
             let silent_ms = at.since(told_at).as_millis().saturating_sub(boot_ms.into());

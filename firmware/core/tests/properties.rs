@@ -331,7 +331,7 @@ impl Random {
     }
 
     fn link(&mut self) -> LinkReading {
-        LinkReading { frames_lost: self.maybe(Self::f32), at: Instant::from_micros(self.next() >> 20) }
+        LinkReading { frames_lost: self.maybe(Self::f32), at: Instant::from_millis(self.next() >> 30) }
     }
 
     fn recorder(&mut self) -> RecorderStatus {
@@ -339,7 +339,7 @@ impl Random {
             recording: self.pick(&[Recording::Starting, Recording::Running, Recording::Stopped]),
             queue: self.f32(),
             frames_lost: self.next(),
-            stall: Span::from_micros(self.next()),
+            stall: Span::from_millis(self.next() >> 16),
             write_errors: self.next(),
             room: self.maybe(Self::f32),
         }
@@ -399,16 +399,16 @@ fn run(random: &mut Random) -> (Monitor, Instant) {
     monitor.observe(Instant::ZERO, AUTOPILOT, &Observation::Heartbeat(random.heartbeat()));
     let mut now = Instant::ZERO;
     for _ in 0..1_000 {
-        let step_us = match random.below(20) {
-            0 => random.below(4_000_000_000),
-            1 => random.below(10_000_000),
+        let step_ms = match random.below(20) {
+            0 => random.below(4_000_000),
+            1 => random.below(10_000),
             2 => 0,
-            _ => 50_000,
+            _ => 50,
         };
-        now = now + Span::from_micros(step_us);
+        now = now + Span::from_millis(step_ms);
         for _ in 0..random.below(4) {
             // A frame may wait for a while, and the clock may have gone on since it was read.
-            let late = Span::from_micros(random.below(3) * random.below(2_000_000));
+            let late = Span::from_millis(random.below(3) * random.below(2_000));
             let at = if random.below(8) == 0 { now + late } else { now };
             let observation = random.observation();
             for _ in 0..=random.below(2) {

@@ -276,7 +276,7 @@ fn what_comes_back_by_less_than_the_hysteresis_stays_bad() {
         let findings = fly(script);
         let mine = || findings.iter().filter(|finding| finding.check == check);
         let critical = mine().find(|finding| finding.level == Level::Critical).expect(check);
-        let next = mine().find(|finding| finding.at > critical.at).expect(check);
+        let next = mine().find(|finding| finding.at.is_after(critical.at)).expect(check);
         assert!(next.at.as_millis() >= END_MS, "{check} fell to {:?} at {:?}", next.level, next.at);
     }
 }

@@ -19,8 +19,8 @@
 //! What is asked for takes at most [`SHARE`] percent of the port's line, and all intervals are stretched until it does.
 
 use hums_core::cells::{self, KNOWN};
+use hums_core::clock::{Instant, Span};
 use hums_core::observation::{Autopilot, Source};
-use hums_core::time::{Instant, Span};
 
 use crate::messages;
 use crate::packet::Packet;

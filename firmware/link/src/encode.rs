@@ -1,6 +1,6 @@
 //! Our own frames: system id of the vehicle we ride on, component 191 (`MAV_COMP_ID_ONBOARD_COMPUTER`), MAVLink 2.
 
-use hums_core::time::Instant;
+use hums_core::clock::Instant;
 use hums_dialect::crc;
 pub use hums_dialect::wire::FRAME_BYTES_MAX;
 use hums_dialect::wire::{CHECKSUM_BYTES, HEADER_V2_BYTES, INCOMPAT_SIGNED, SIGNATURE_BYTES, START_V2};

@@ -3,8 +3,8 @@
 //! Each `EVENT` has a sequence number, and `CURRENT_EVENT_SEQUENCE` tells the latest every 3 s. PX4 keeps the last ones and sends what
 //! `REQUEST_EVENT` names. What it no longer has, or does not send when asked three times, is gone: the checks do without.
 
+use hums_core::clock::{Instant, Span};
 use hums_core::observation::Source;
-use hums_core::time::{Instant, Span};
 
 use crate::messages;
 use crate::packet::{Fields, Packet};

@@ -1,6 +1,6 @@
 //! The messages that we send, field by field as they lie on the wire (`common.xml`).
 
-use hums_core::time::Instant;
+use hums_core::clock::Instant;
 
 use crate::encode::COMPONENT;
 use crate::packet::Packet;

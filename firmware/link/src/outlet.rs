@@ -15,7 +15,7 @@
 //! that neither starves what is forwarded; and what is forwarded leaves three fifths, and half of the line's backlog,
 //! to bulk that waits.
 
-use hums_core::time::{Instant, Span};
+use hums_core::clock::{Instant, Span};
 use hums_dialect::wire::SIGNATURE_BYTES;
 
 use crate::encode::{Encoder, FRAME_BYTES_MAX};

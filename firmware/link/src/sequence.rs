@@ -3,9 +3,9 @@
 //! Each component counts its frames modulo 256, so a gap tells how many are missing. A gap of half the range or more is
 //! a sender that started anew or a frame that came late, and counts for nothing.
 
+use hums_core::clock::{Instant, Span};
 use hums_core::observation::Source;
 use hums_core::status::LinkReading;
-use hums_core::time::{Instant, Span};
 
 use crate::frame::Frame;
 
@@ -91,7 +91,7 @@ impl Sequences {
             sender.of = sender.of.max(u16::try_from(received + lost).unwrap_or(u16::MAX));
             (received + lost >= FRAMES_MIN).then(|| lost as f32 / f32::from(sender.of))
         });
-        LinkReading { frames_lost, at: now }
+        LinkReading { frames_lost, at: now.into() }
     }
 }
 

@@ -23,7 +23,7 @@
 
 use core::fmt;
 
-use hums_core::time::{Instant, Span};
+use hums_core::clock::{Instant, Span};
 use hums_dialect::wire::SIGNATURE_BYTES;
 use sha2::{Digest as _, Sha256};
 

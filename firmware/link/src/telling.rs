@@ -17,8 +17,8 @@
 //! * What is not critical waits while an event goes on of which something critical was told, and at most [`MILD_MAX`] are told in any
 //!   [`SPAN`], the worst first.
 
+use hums_core::clock::{Instant, Span};
 use hums_core::health::{self, Finding, Level, Subsystem};
-use hums_core::time::{Instant, Span};
 
 /// How long an event lasts, from its first text.
 const EVENT: Span = Span::from_secs(10);
@@ -131,7 +131,7 @@ impl Telling {
         if is_mishap {
             return Fate::Never;
         }
-        let is_held = finding.level == Level::Warning && now.since(finding.at) < HOLD;
+        let is_held = finding.level == Level::Warning && now.since(Instant::of(finding.at, now)) < HOLD;
         let is_busy = event.is_running(now)
             || self.events.iter().any(|event| event.critical[0].is_some() && event.is_running(now));
         while self.mild.front().is_some_and(|at_ms| since(now, *at_ms) >= SPAN.as_millis()) {

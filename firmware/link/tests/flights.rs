@@ -9,10 +9,10 @@ mod common;
 
 use common::{Recording, flight};
 use hums_core::Monitor;
+use hums_core::clock::{Instant, Span};
 use hums_core::health::{Finding, Level};
 use hums_core::params::Params;
 use hums_core::status::{RecorderStatus, Recording as Card};
-use hums_core::time::{Instant, Span};
 use hums_core::usage::UsageCounter;
 use hums_link::sequence::Sequences;
 use hums_link::{Framer, observe};
@@ -27,7 +27,7 @@ impl Outcome {
     /// Second, check and level of each finding at least as bad as a warning.
     fn alarms(&self) -> Vec<(f64, &'static str, Level)> {
         let bad = |finding: &&Finding| matches!(finding.level, Level::Warning | Level::Critical);
-        let entry = |finding: &Finding| (finding.at.as_secs_f64(), finding.check, finding.level);
+        let entry = |finding: &Finding| (finding.at.as_millis() as f64 / 1e3, finding.check, finding.level);
         self.findings.iter().filter(bad).map(entry).collect()
     }
 }
@@ -45,13 +45,13 @@ fn watch(recording: &Recording) -> Outcome {
         let at = Instant::from_micros(micros.saturating_sub(first_us));
         while tick_at < at {
             let link = sequences.reading(tick_at, monitor.vehicle().source);
-            monitor.tick(tick_at, &link, &recorder, &mut |finding| findings.push(*finding));
+            monitor.tick(tick_at.into(), &link, &recorder, &mut |finding| findings.push(*finding));
             tick_at = tick_at + Span::from_millis(50);
         }
         framer.push(&recording.bytes[start..start + len], &mut |frame| {
             sequences.frame(at, &frame);
             if let Some((source, observation)) = observe(&frame) {
-                monitor.observe(at, source, &observation);
+                monitor.observe(at.into(), source, &observation);
             }
         });
     }

@@ -1,6 +1,7 @@
 //! Nothing that a line can carry may panic, overflow, or make a vehicle that nobody knows look healthy.
 
 use hums_core::Monitor;
+use hums_core::clock;
 use hums_core::component::{COMPONENTS_MAX, Label};
 use hums_core::health::Level;
 use hums_core::lifetime::{ITEM_BYTES_MAX, ItemKey, Room};
@@ -141,13 +142,14 @@ proptest! {
         ) {
             now_ms += bytes.1;
             let now = Instant::from_millis(now_ms);
+            let heard = clock::Instant::from_millis(now_ms);
             framer.push(&bytes.0, &mut |frame| {
-                sequences.frame(now, &frame);
+                sequences.frame(heard, &frame);
                 if let Some((source, observation)) = observe(&frame) {
                     monitor.observe(now, source, &observation);
                 }
             });
-            let link = sequences.reading(now, monitor.vehicle().source);
+            let link = sequences.reading(heard, monitor.vehicle().source);
             monitor.tick(now, &link, &RecorderStatus::default(), &mut |finding| {
                 assert!(finding.level != finding.previous, "{finding:?}");
             });

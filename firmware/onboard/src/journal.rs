@@ -6,8 +6,9 @@ use core::fmt::{Arguments, Write as _};
 use hums_blackbox::record::{Event, Loss, Lost, Parameter, Record, Resting};
 use hums_blackbox::{Counters, Sector, SectorSink as _, Writer};
 use hums_core::Monitor;
+use hums_core::clock::Instant;
 use hums_core::params::Param;
-use hums_core::time::{Instant, Span};
+use hums_core::time::Span;
 use hums_link::text::Text;
 use hums_recorder::status::CardStatus;
 
@@ -136,7 +137,7 @@ impl Logbook<'_> {
     /// Whether motors may turn.
     pub(crate) fn arming(&self, now: Instant) -> Arming {
         let heartbeat = &self.monitor.vehicle().heartbeat;
-        match (heartbeat.get(), heartbeat.within(now, HEARTBEAT_AGE_MAX)) {
+        match (heartbeat.get(), heartbeat.within(now.into(), HEARTBEAT_AGE_MAX)) {
             (Some(last), _) if last.armed => Arming::Armed,
             (_, Some(_)) => Arming::Disarmed,
             _ => Arming::Unknown,

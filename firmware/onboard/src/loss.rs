@@ -1,7 +1,7 @@
 //! Losses waiting to be recorded: what was lost is itself data, with its count and its first and last moment.
 
 use hums_blackbox::record::{Loss, Lost};
-use hums_core::time::{Instant, Span};
+use hums_core::clock::{Instant, Span};
 
 /// Losses of one kind within this long are one record.
 const WINDOW: Span = Span::from_secs(1);

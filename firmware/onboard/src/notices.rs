@@ -3,9 +3,9 @@
 //! the box may have no more than that to tell where the other was.
 
 use hums_blackbox::record::{Note, Record};
+use hums_core::clock::{Instant, Span};
 use hums_core::mishap::{Change, Report};
 use hums_core::protect::Step;
-use hums_core::time::{Instant, Span};
 use hums_link::messages;
 use hums_link::outlet::{Class, Outlet};
 use hums_link::packet::Packet;

@@ -3,7 +3,7 @@
 //! The most urgent task: the port's ring holds 22 ms at 921,600 baud. It does nothing but find frames, about ten
 //! instructions a byte, and never waits.
 
-use hums_core::time::{Instant, Span};
+use hums_core::clock::{Instant, Span};
 use hums_link::frame::{Check, Frame};
 use hums_link::framer::Framer;
 

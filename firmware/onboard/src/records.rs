@@ -4,8 +4,8 @@ use hums_blackbox::record::{
     Boot, Clock, Component as ComponentRecord, Exceedance, LIFETIME_ENTRIES_MAX, Lifetime, Moment, Parameter,
     Record, USAGE_ENTRIES_MAX, Usage, Vehicle as VehicleRecord, Why,
 };
+use hums_core::clock::Instant;
 use hums_core::component::{COMPONENTS_MAX, Component, Figures, Label, Status};
-use hums_core::time::Instant;
 
 use crate::journal::{By, Logbook};
 use crate::queues::SectorsIn;
@@ -101,7 +101,7 @@ impl Recorded {
         let (Some(at), Some(utc_micros)) = (time.at(), time.get().and_then(|time| time.utc_micros)) else {
             return;
         };
-        let clock = Clock { boot: at, utc_micros, source: 1 };
+        let clock = Clock { boot: Instant::of(at, now), utc_micros, source: 1 };
         let epoch_micros = clock.epoch_micros();
         if self.epoch_micros.is_some_and(|known| known.abs_diff(epoch_micros) <= CLOCK_STEP_MICROS) {
             return;
@@ -180,7 +180,7 @@ fn exceedances(
     sectors: &mut SectorsIn,
 ) {
     let Logbook { monitor, journal, .. } = book;
-    for exceedance in monitor.exceedances().changed(now, since) {
+    for exceedance in monitor.exceedances().changed(now.into(), since.into()) {
         if moment == Moment::Start || exceedance.session.happened() {
             journal.record(now, &Record::Exceedance(Exceedance::new(moment, &exceedance)), sectors);
         }

@@ -3,7 +3,7 @@
 //! The least urgent task, because its library waits for the card: nothing else may wait with it. What waits for it is
 //! the sector queue, sized for a card that stands still for 2.5 s.
 
-use hums_core::time::{Instant, Span};
+use hums_core::clock::{Instant, Span};
 use hums_recorder::recorder::Written;
 use hums_recorder::{CardDevice, CardStatus, HeldBlocks, Recorder};
 

@@ -5,7 +5,7 @@
 
 use core::sync::atomic::{AtomicU32, Ordering};
 
-use hums_core::time::{Instant, Span};
+use hums_core::clock::{Instant, Span};
 use hums_recorder::spi::SERVICE_MAX;
 
 /// The tasks that must report.

@@ -4,7 +4,7 @@
 //! other side is a stranger, so nothing here costs more than a framer's bounded work for each byte, and a flood ends at
 //! a full queue: it keeps nobody from recording.
 
-use hums_core::time::{Instant, Span};
+use hums_core::clock::{Instant, Span};
 use hums_link::frame::{Check, Frame};
 use hums_link::framer::Framer;
 

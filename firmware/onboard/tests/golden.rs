@@ -12,13 +12,13 @@ use std::{env, fs, thread};
 
 use flate2::read::GzDecoder;
 use hums_core::Monitor;
-use hums_core::monitor::TICK;
+use hums_core::clock::Instant;
 use hums_core::params::Params;
 use hums_core::status::{RecorderStatus, Recording};
-use hums_core::time::Instant;
 use hums_link::frame::Check;
 use hums_link::framer::Framer;
 use hums_link::sequence::Sequences;
+use hums_onboard::monitoring::TICK;
 
 /// Bytes of a tlog's time before each frame: microseconds since 1970, big-endian.
 const TIME_BYTES: usize = 8;
@@ -161,7 +161,7 @@ impl BoxUnderTest {
             if frame.check() == Check::Verified {
                 sequences.frame(at, &frame);
                 if let Some((source, observation)) = hums_link::observe(&frame) {
-                    monitor.observe(at, source, &observation);
+                    monitor.observe(at.into(), source, &observation);
                 }
             }
         };
@@ -174,7 +174,7 @@ impl BoxUnderTest {
         let link = sequences.reading(*ticked, monitor.vehicle().source);
         let recorder = RecorderStatus { recording: Recording::Running, ..RecorderStatus::default() };
         let seconds = ticked.as_secs_f64();
-        monitor.tick(*ticked, &link, &recorder, &mut |finding| {
+        monitor.tick((*ticked).into(), &link, &recorder, &mut |finding| {
             let (check, instance, level) = (finding.check, finding.instance, finding.level.name());
             let cause = if finding.because.is_empty() { "told" } else { finding.because };
             writeln!(list, "{seconds:9.3} {check} {instance} {level} {cause}").expect("a string takes text");

@@ -7,15 +7,15 @@ use std::path::Path;
 
 use flate2::read::GzDecoder;
 use hums_core::Monitor;
+use hums_core::clock::Instant;
 use hums_core::happening::Happening;
 use hums_core::health::{Finding, Level};
-use hums_core::monitor::TICK;
 use hums_core::params::Params;
 use hums_core::protect::{Request, Stage};
 use hums_core::status::{RecorderStatus, Recording};
-use hums_core::time::Instant;
 use hums_link::frame::Frame;
 use hums_link::sequence::Sequences;
+use hums_onboard::monitoring::TICK;
 
 /// Flights that the monitor still judges wrongly. This list only shrinks: a flight that comes right must leave it.
 const KNOWN_WRONG: &[&str] = &["d1_one", "d1_all", "d4_a", "d6_0", "d7"];
@@ -78,7 +78,7 @@ impl Outcome {
 
     /// How long a check was critical or a warning in this session, in seconds.
     fn exceeded_s(&self, check: &str) -> f32 {
-        let of_check = self.monitor.exceedances().iter(self.end).filter(|it| it.check.name == check);
+        let of_check = self.monitor.exceedances().iter(self.end.into()).filter(|it| it.check.name == check);
         of_check.map(|it| (it.session.warning_tenths + it.session.critical_tenths) as f32 / 10.0).sum()
     }
 }
@@ -117,7 +117,7 @@ fn fly(name: &str) -> Outcome {
         while tick_at <= at {
             let at_s = tick_at.as_micros() as f32 / 1e6;
             let link = sequences.reading(tick_at, monitor.vehicle().source);
-            monitor.tick(tick_at, &link, &recorder, &mut |finding| findings.push((at_s, *finding)));
+            monitor.tick(tick_at.into(), &link, &recorder, &mut |finding| findings.push((at_s, *finding)));
             happenings.extend(core::iter::from_fn(|| monitor.take_happening()).map(|it| (at_s, it)));
             requests.extend(monitor.take_request().map(|it| (at_s, it)));
             tick_at = tick_at + TICK;
@@ -125,7 +125,7 @@ fn fly(name: &str) -> Outcome {
         let frame = Frame::parse(bytes).unwrap();
         sequences.frame(at, &frame);
         if let Some((source, observation)) = hums_link::observe(&frame) {
-            monitor.observe(at, source, &observation);
+            monitor.observe(at.into(), source, &observation);
         }
     }
     Outcome { findings, happenings, requests, monitor, end: tick_at }

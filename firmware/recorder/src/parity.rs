@@ -3,7 +3,7 @@
 use embedded_sdmmc::Block;
 use hums_blackbox::SECTOR_BYTES;
 use hums_blackbox::parity::{COLUMNS, PARITY_SECTORS, STRETCH_SECTORS, Sum};
-use hums_core::time::{Instant, Span};
+use hums_core::clock::{Instant, Span};
 
 /// A stretch that is not full has its parity written so often, while sectors come: what a card loses of the last while before
 /// power goes cannot be made again.

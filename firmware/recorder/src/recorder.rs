@@ -19,7 +19,7 @@ mod trouble;
 use embedded_sdmmc::Block;
 use hums_blackbox::parity::{STRETCH_SECTORS, data_blocks, parity_block};
 use hums_blackbox::{GROUP_SECTORS, Sector};
-use hums_core::time::{Instant, Span};
+use hums_core::clock::{Instant, Span};
 
 use crate::CardDevice;
 use crate::card::{Card, CardError};

@@ -4,7 +4,7 @@ use core::sync::atomic::{AtomicBool, AtomicU8, AtomicU32, Ordering};
 
 use embedded_sdmmc::{TimeSource, Timestamp};
 use hums_blackbox::record::{Before, Found};
-use hums_core::time::{Instant, Span};
+use hums_core::clock::{Instant, Span};
 
 /// No service of the card is going on.
 const IDLE: u32 = u32::MAX;

@@ -12,7 +12,7 @@ use hums_blackbox::parity::{
 };
 use hums_blackbox::record::{Before, Found};
 use hums_blackbox::{Header, Sector, SectorSink, Writer};
-use hums_core::time::{Instant, Span};
+use hums_core::clock::{Instant, Span};
 use hums_recorder::card::Card;
 use hums_recorder::{CardDevice, CardState, CardStatus, LogName, Recorder, Written};
 

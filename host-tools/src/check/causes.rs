@@ -2,8 +2,9 @@
 
 use std::collections::BTreeMap;
 
+use hums_core::clock::Instant;
 use hums_core::health::{Level, because};
-use hums_core::time::Instant;
+use hums_core::time;
 
 use super::problem::began;
 use crate::summary::FindingLine;
@@ -41,10 +42,10 @@ pub fn causes(findings: &[FindingLine]) -> Vec<Option<String>> {
             let others = open.values().map(|other| (other.since, other.check));
             began(one.check, one.since, others)
         };
-        let alarms: Vec<(Instant, &str, Level)> =
-            open.values().map(|one| (since(one), one.check, one.level)).collect();
+        let alarms: Vec<(time::Instant, &str, Level)> =
+            open.values().map(|one| (since(one).into(), one.check, one.level)).collect();
         for one in open.values_mut().filter(|one| !one.unexplained.is_empty()) {
-            if let Some(cause) = because(one.check, one.level, one.since, alarms.iter().copied()) {
+            if let Some(cause) = because(one.check, one.level, one.since.into(), alarms.iter().copied()) {
                 for place in one.unexplained.drain(..) {
                     if let Some(known) = causes.get_mut(place) {
                         *known = Some(cause.to_owned());

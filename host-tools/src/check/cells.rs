@@ -1,6 +1,6 @@
 //! Whether it was known how many cells the battery has: without that its voltage raises no alarm.
 
-use hums_core::time::{Instant, Span};
+use hums_core::clock::{Instant, Span};
 
 use super::judged::JudgedBy;
 use crate::utc::moment;

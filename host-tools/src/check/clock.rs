@@ -4,8 +4,8 @@
 //! in the air. After a gap of [`SETTLE`] and longer the checks are not stepped for that long, while the first values come
 //! in.
 
-use hums_core::monitor::TICK;
-use hums_core::time::{Instant, Span};
+use hums_core::clock::{Instant, Span};
+use hums_onboard::monitoring::TICK;
 
 /// What follows a long gap and is not judged: what is told once a second has come again by then.
 pub(crate) const SETTLE: Span = Span::from_secs(1);

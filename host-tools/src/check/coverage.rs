@@ -2,11 +2,11 @@
 
 use hums_core::Monitor;
 use hums_core::baseline::Baselines;
+use hums_core::clock::{Instant, Span};
 use hums_core::health::{Check, Level, Parts, Scope, Side, VOCABULARY, When, checks, vocabulary};
 use hums_core::observation::{Autopilot, Gnss, Heartbeat};
 use hums_core::params::{Param, Params};
 use hums_core::status::{LinkReading, RecorderStatus};
-use hums_core::time::{Instant, Span};
 
 use super::judged::JudgedBy;
 use super::problem::Problem;
@@ -61,7 +61,7 @@ impl Coverage {
         if monitor.vehicle().source.is_none() {
             return;
         }
-        let inputs = monitor.inputs(steps, link, recorder);
+        let inputs = monitor.inputs(steps.into(), link, recorder);
         let parts = Parts::of(&inputs);
         for (seen, check) in self.seen.iter_mut().zip(checks()).filter(|(seen, _)| !seen.value) {
             seen.value = (0..parts.count(check)).any(|instance| {
@@ -233,9 +233,9 @@ mod tests {
                 mode: 0,
             };
             let source = Source { system: 1, component: 1 };
-            monitor.observe(Instant::ZERO, source, &Observation::Heartbeat(heartbeat));
+            monitor.observe(Instant::ZERO.into(), source, &Observation::Heartbeat(heartbeat));
             if let Some(gnss) = gnss {
-                monitor.observe(Instant::ZERO, source, &Observation::Gnss(gnss));
+                monitor.observe(Instant::ZERO.into(), source, &Observation::Gnss(gnss));
             }
             let recording = Recording {
                 by: JudgedBy::Here,

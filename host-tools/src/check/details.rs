@@ -5,10 +5,10 @@ use std::collections::BTreeSet;
 
 use hums_core::alert::{HOLDS, of_estimator};
 use hums_core::cause::{Alert, Cause, Causes, Urgency};
+use hums_core::clock::Instant;
 use hums_core::health::{Level, checks};
 use hums_core::observation::{AutopilotIdentity, Estimator, Heartbeat, Source, SystemStatus};
 use hums_core::params::{Param, Params};
-use hums_core::time::Instant;
 use hums_core::vehicle::BATTERIES_MAX;
 
 use super::problem::Problems;
@@ -216,7 +216,7 @@ impl Details {
         }
         let said = self.said.get(cause as usize).and_then(Option::as_ref);
         if let Some((at, words)) = said
-            && problems.open_since(check).is_some_and(|since| since.since(*at) <= HOLDS)
+            && problems.open_since(check).is_some_and(|since| since.since(*at) <= HOLDS.into())
         {
             problems.detail(check, words);
         }
@@ -331,7 +331,7 @@ mod tests {
         let check = Cause::Gnss.check();
         let subsystem = hums_core::health::Subsystem::Navigation;
         let finding = Finding { subsystem, check: check.to_owned(), ..change(0, Level::Warning, 1.0) };
-        problems.take(&finding, hums_core::time::Span::ZERO);
+        problems.take(&finding, hums_core::clock::Span::ZERO);
         // Attitude and position; with PX4's glitch bit.
         let estimator = |flags| Estimator { scale: EstimatorScale::TestRatio, flags, ..Estimator::default() };
         assert!(details.estimator(&estimator(0b1_1001)));

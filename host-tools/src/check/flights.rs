@@ -1,9 +1,9 @@
 //! The flights of a recording: from take-off to landing, or to where a mishap ended it.
 
 use hums_core::Monitor;
+use hums_core::clock::{Instant, Span};
 use hums_core::mishap::{Change, Kind};
-use hums_core::monitor::TICK;
-use hums_core::time::{Instant, Span};
+use hums_onboard::monitoring::TICK;
 
 use super::clock::SETTLE;
 use super::problem::LISTED_MAX;

@@ -1,7 +1,7 @@
 //! `hums check --json`: one object a line for each log. Its names are a contract: `docs/check.md`.
 
+use hums_core::clock::Instant;
 use hums_core::health::vocabulary;
-use hums_core::time::Instant;
 use serde::Serialize;
 
 use super::checked::Checked;
@@ -192,7 +192,7 @@ pub fn error(log: &str, error: &anyhow::Error) -> String {
     serde_json::to_string(&object).unwrap_or_default()
 }
 
-fn seconds(span: hums_core::time::Span) -> f64 {
+fn seconds(span: hums_core::clock::Span) -> f64 {
     span.as_micros() as f64 / 1e6
 }
 

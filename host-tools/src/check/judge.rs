@@ -10,18 +10,18 @@ use std::collections::BTreeMap;
 use hums_core::Monitor;
 use hums_core::baseline::Baselines;
 use hums_core::cause::{Alert, Cause};
+use hums_core::clock::{Instant, Span};
 use hums_core::flight::{Flight as FlightState, Phase};
 use hums_core::happening::Happening;
 use hums_core::health::{Level, Scope, vocabulary};
-use hums_core::monitor::TICK;
 use hums_core::motion::{climb_mps, ground_speed_mps, height_m};
 use hums_core::observation::{Estimator, LandedState, Observation, Source, SystemStatus, VehicleKind};
 use hums_core::params::Params;
 use hums_core::status::{LinkReading, RecorderStatus};
-use hums_core::time::{Instant, Span};
 use hums_core::usage::UsageCounter;
 use hums_core::vehicle::Vehicle;
 use hums_link::sequence::Sequences;
+use hums_onboard::monitoring::TICK;
 
 use super::cells::Cells;
 use super::clock::{Clock, SETTLE};
@@ -208,7 +208,7 @@ impl Judge {
     /// What the vehicle was doing at the last item.
     pub fn phase(&self) -> (&FlightState, Phase) {
         let flight = self.monitor.flight();
-        (flight, flight.phase(self.clock.now(), self.monitor.vehicle()))
+        (flight, flight.phase(self.clock.now().into(), self.monitor.vehicle()))
     }
 
     /// The limits that hold now.
@@ -243,7 +243,7 @@ impl Judge {
                     Observation::Identity(identity) => self.details.identity(source, identity),
                     _ => {}
                 }
-                self.monitor.observe(self.clock.monitor(at), source, observation);
+                self.monitor.observe(self.clock.monitor(at).into(), source, observation);
             }
             Item::Fact(Fact { about: About::Failsafes, words }) => {
                 self.details.failsafes(words);
@@ -421,7 +421,7 @@ impl Judge {
         }
         self.advance(finding.at);
         let steps = self.clock.monitor(finding.at);
-        let hit_at = self.monitor.mishap().hit_at();
+        let hit_at = Instant::of(self.monitor.mishap().hit_at(), steps);
         let is_its = hit_at > Instant::ZERO && steps.since(hit_at) <= LIES_STILL;
         if is_its { Clock::recording(finding.at, steps, hit_at).min(finding.at) } else { finding.at }
     }
@@ -496,7 +496,7 @@ impl Judge {
             }
             self.clock.pause(from, to);
             if gap.cause == Why::Lost {
-                self.monitor.lose(length);
+                self.monitor.lose(length.into());
             }
             self.holes.pause(from, to);
             let place = self.list(gap);
@@ -539,18 +539,20 @@ impl Judge {
             self.settle();
         }
         let steps = self.clock.monitor(now);
+        let of = |at| Instant::of(at, steps);
         let (link, recorder) = (self.link(steps), RecorderStatus::default());
         let mut found = Vec::new();
-        self.monitor.tick(steps, &link, &recorder, &mut |finding| found.push(Finding::from(finding)));
+        self.monitor
+            .tick(steps.into(), &link, &recorder, &mut |finding| found.push(Finding::new(steps, finding)));
         for finding in found {
             if is_of(&finding.check, self.format, self.wire.is_some(), self.limits.past.is_some()) {
                 // What hit something is seen to lie still seconds later.
-                let hit_at = if is_hit(&finding) { self.monitor.mishap().hit_at() } else { finding.at };
+                let hit_at = if is_hit(&finding) { of(self.monitor.mishap().hit_at()) } else { finding.at };
                 let at = Clock::recording(now, steps, hit_at.min(finding.at));
                 self.here.take(&Finding { at, ..finding.clone() }, self.clock.behind());
                 self.details.tell(&finding.check, &mut self.here);
                 if let Some(from) = self.monitor.mishap().unheard_from().filter(|_| is_hit(&finding)) {
-                    self.here.unheard(&finding.check, Clock::recording(now, steps, from), at);
+                    self.here.unheard(&finding.check, Clock::recording(now, steps, of(from)), at);
                 }
             }
         }
@@ -558,7 +560,7 @@ impl Judge {
             match happening {
                 Happening::TakeOff | Happening::FlightResumed => {
                     let since = self.monitor.flight().airborne_since();
-                    let from = since.map_or(now, |since| Clock::recording(now, steps, since));
+                    let from = since.map_or(now, |since| Clock::recording(now, steps, of(since)));
                     self.flights.take_off(now, from, self.monitor.flight().was_on_ground());
                 }
                 Happening::Landing => self.flights.landing(),
@@ -567,7 +569,7 @@ impl Judge {
                     let hit_at = self.monitor.mishap().struck_at();
                     let unheard_from = self.monitor.mishap().unheard_from();
                     let [hit_at, unheard_from] =
-                        [hit_at, unheard_from].map(|at| at.map(|at| Clock::recording(now, steps, at)));
+                        [hit_at, unheard_from].map(|at| at.map(|at| Clock::recording(now, steps, of(at))));
                     self.flights.mishap(change, now, hit_at, unheard_from, &self.monitor);
                 }
                 _ => {}
@@ -577,7 +579,7 @@ impl Judge {
             self.cells.lack(now);
         }
         let heard_at = self.monitor.vehicle().heartbeat.at();
-        self.flights.step(now, steps, steps.since(heard_at.unwrap_or(steps)), &self.monitor);
+        self.flights.step(now, steps, steps.since(heard_at.map_or(steps, of)), &self.monitor);
         self.coverage.note(now, steps, &self.monitor, &link, &recorder);
     }
 
@@ -598,7 +600,7 @@ impl Judge {
     /// The worst values of what the monitor followed.
     fn peaks(&mut self, at: Instant) {
         let steps = self.clock.monitor(at);
-        for exceedance in self.monitor.exceedances().iter(steps) {
+        for exceedance in self.monitor.exceedances().iter(steps.into()) {
             for problems in [&mut self.here, &mut self.board] {
                 problems.peak(exceedance.check.name, exceedance.instance, exceedance.session.peak);
             }
@@ -615,7 +617,7 @@ impl Judge {
     /// How the vehicle was when the recording ended in the air.
     fn ends_in_air(&mut self) -> Option<EndsInAir> {
         self.flights.going_on().filter(|_| is_in_air(&self.monitor))?;
-        let steps = self.clock.monitor(self.last);
+        let steps = self.clock.monitor(self.last).into();
         let vehicle = self.monitor.vehicle();
         Some(EndsInAir {
             at: self.last,

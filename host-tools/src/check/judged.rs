@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 
 use hums_core::Monitor;
+use hums_core::clock::{Instant, Span};
 use hums_core::health::{Level, Scope, vocabulary};
-use hums_core::time::{Instant, Span};
 use hums_core::vehicle::Vehicle;
 
 use super::flights::{Flight, begin_in_air};

@@ -1,6 +1,6 @@
 //! What is left of a judgement where the recording's clock did not run from some place on: what was there before.
 
-use hums_core::time::{Instant, Span};
+use hums_core::clock::{Instant, Span};
 
 use super::clock::SETTLE;
 use super::judged::Judged;

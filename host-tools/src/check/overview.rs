@@ -231,7 +231,7 @@ fn fill(contents: &mut Contents, judged: Judged) {
     contents.findings = findings.into_iter().map(FindingLine::from).collect();
     contents.usage.extend(counters);
     if let Some((_, last)) = span {
-        for exceedance in monitor.exceedances().iter(last) {
+        for exceedance in monitor.exceedances().iter(last.into()) {
             let line = ExceedanceLine {
                 session: exceedance.session,
                 lifetime: exceedance.lifetime,

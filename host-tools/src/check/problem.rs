@@ -2,8 +2,9 @@
 
 use std::collections::BTreeMap;
 
+use hums_core::clock::{Instant, Span};
 use hums_core::health::{Level, Side, Subsystem, because, checks};
-use hums_core::time::{Instant, Span};
+use hums_core::time;
 
 use crate::part;
 use crate::source::told::Finding;
@@ -225,12 +226,13 @@ impl Problems {
                 since
             }
         };
-        let alarms: Vec<(Instant, String, Level)> =
-            open().map(|(since, check, level)| (since_of(since, check), check.to_owned(), level)).collect();
+        let alarms: Vec<(time::Instant, String, Level)> = open()
+            .map(|(since, check, level)| (since_of(since, check).into(), check.to_owned(), level))
+            .collect();
         for followed in self.open.values_mut().filter(|followed| followed.unexplained) {
             let Some((since, _)) = followed.since else { continue };
             let alarms = alarms.iter().map(|(since, check, level)| (*since, check.as_str(), *level));
-            if let Some(cause) = because(&followed.problem.check, followed.level, since, alarms) {
+            if let Some(cause) = because(&followed.problem.check, followed.level, since.into(), alarms) {
                 // Of several times the one counts that had its worst level first.
                 if followed.problem.because.is_none() || followed.problem.at >= since {
                     followed.problem.because = Some(cause.to_owned());

@@ -6,8 +6,8 @@ use std::cmp::Reverse;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
+use hums_core::clock::Span;
 use hums_core::health::{Level, Side, Subsystem, vocabulary};
-use hums_core::time::Span;
 
 use super::checked::Checked;
 use super::flights::{Flight, Mishap};
@@ -580,7 +580,7 @@ fn short(value: f32) -> String {
 
 #[cfg(test)]
 mod tests {
-    use hums_core::time::Instant;
+    use hums_core::clock::Instant;
 
     use super::*;
     use crate::summary::EndsInAir;

@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
+use hums_core::clock::Span;
 use hums_core::health::{Level, vocabulary};
-use hums_core::time::Span;
 
 use crate::endpoint::Endpoint;
 use crate::utc::{When, parse_seconds};

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use anyhow::Result;
 use arrow_array::{ArrayRef, Float64Array, RecordBatch, TimestampMicrosecondArray, UInt8Array, UInt32Array};
 use arrow_schema::{DataType, Field, Schema, SchemaRef, TimeUnit};
-use hums_core::time::Instant;
+use hums_core::clock::Instant;
 
 use super::columns::{Column, TextColumn};
 use super::field_names::free_name;

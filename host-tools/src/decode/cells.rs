@@ -227,7 +227,7 @@ impl CellColumn {
 mod tests {
     use arrow_array::Array as _;
     use arrow_array::cast::AsArray as _;
-    use hums_core::time::Instant;
+    use hums_core::clock::Instant;
 
     use super::*;
 

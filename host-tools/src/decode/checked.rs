@@ -1,8 +1,8 @@
 //! Who checked the vehicle's health in a log, as rows: `HUMS_CHECKED`, one row a log, and `HUMS_FINDING` of what this program
 //! found where the recorder ran no checks. A table without a finding is then no table that nobody has checked.
 
+use hums_core::clock::Instant;
 use hums_core::health::Level;
-use hums_core::time::Instant;
 
 use super::row::{Cell, CellType, Row};
 use crate::check::judged::{Judged, JudgedBy, TOO_LITTLE};

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use hums_blackbox::{Gap, Record};
-use hums_core::time::Instant;
+use hums_core::clock::Instant;
 use hums_link as link;
 
 use super::batches::Batches;

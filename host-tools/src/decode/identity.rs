@@ -4,8 +4,8 @@
 use anyhow::Result;
 use hums_blackbox::Record;
 use hums_blackbox::record::Vehicle;
+use hums_core::clock::Instant;
 use hums_core::observation::Observation;
-use hums_core::time::Instant;
 
 use super::checked::Checked;
 use crate::check::judge::{Judge, Limits};

@@ -13,9 +13,9 @@
 //! A database keeps one point for a set of tags and a time. The record's clock has milliseconds, in which a message may
 //! come twice: the second one's time is a nanosecond later, so that none replaces another.
 
+use hums_core::clock::Instant;
 use hums_core::health::Level;
 use hums_core::observation::Observation;
-use hums_core::time::Instant;
 use hums_dialect::{Field, Kind};
 
 use super::field_names::free_name;

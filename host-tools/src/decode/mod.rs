@@ -51,7 +51,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 
 use anyhow::{Result, bail};
-use hums_core::time::Instant;
+use hums_core::clock::Instant;
 
 use crate::check;
 use crate::check::judge::{Judge, Limits};

@@ -293,7 +293,7 @@ mod tests {
     use arrow_array::types::Float64Type;
     use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 
-    use hums_core::time::Instant;
+    use hums_core::clock::Instant;
 
     use super::*;
     use crate::files::Inputs;

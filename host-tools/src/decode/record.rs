@@ -3,7 +3,7 @@
 
 use hums_blackbox::Gap;
 use hums_blackbox::record::{Record, Stats};
-use hums_core::time::Instant;
+use hums_core::clock::Instant;
 
 use super::checked::{BOARD, finding_row};
 use super::row::{Cell, CellType, Row};

@@ -6,9 +6,10 @@
 //! the battery from `BATTERY_STATUS` or, where that is silent, `SYS_STATUS`, and so on.
 //! A value older than `AGE_MAX` is no value: better an empty cell than a stale number.
 
+use hums_core::clock::Instant;
 use hums_core::flight::{Flight, Support};
 use hums_core::observation::{Esc, Observation, Source};
-use hums_core::time::{Instant, Span};
+use hums_core::time::{self, Span};
 use hums_core::units::{MetresPerSecond, MetresPerSecond2};
 use hums_core::vehicle::{Motor, Vehicle};
 
@@ -159,10 +160,11 @@ impl Reference {
 
     /// Takes an observation; `false` where it is not of the vehicle.
     pub fn observe(&mut self, at: Instant, source: Source, observation: &Observation) -> bool {
-        if !self.vehicle.observe(at, source, observation) {
+        if !self.vehicle.observe(at.into(), source, observation) {
             return false;
         }
         self.heard = Some(at);
+        let at = time::Instant::from(at);
         let since = self.flight.airborne_since();
         self.flight.step(at, &self.vehicle, Support::UNKNOWN);
         match (since, self.flight.airborne_since()) {
@@ -185,6 +187,7 @@ impl Reference {
 
     /// A quantity as it is known now.
     pub fn value(&self, now: Instant, quantity: Quantity) -> Option<Scalar> {
+        let now = time::Instant::from(now);
         let single = |value: f32| Some(Scalar::Single(value));
         let vehicle = &self.vehicle;
         let gnss = || vehicle.gnss.first().and_then(|gnss| gnss.within(now, AGE_MAX));
@@ -197,7 +200,7 @@ impl Reference {
         match quantity {
             Quantity::FlightTime => {
                 let flown = self.flight.airborne_since().map_or(self.flown, |since| now.since(since));
-                Some(Scalar::Double(flown.as_micros() as f64 / 1e6))
+                Some(Scalar::Double(flown.as_millis() as f64 / 1e3))
             }
             Quantity::BatteryPercent | Quantity::BatteryVolts => self.battery(now, quantity),
             Quantity::Temperature => single(air()?.temperature?.0),
@@ -228,17 +231,17 @@ impl Reference {
         }
     }
 
-    fn acceleration(&self, now: Instant) -> Option<[MetresPerSecond2; 3]> {
+    fn acceleration(&self, now: time::Instant) -> Option<[MetresPerSecond2; 3]> {
         self.vehicle.imu.within(now, AGE_MAX)?.acceleration
     }
 
-    fn velocity(&self, now: Instant) -> Option<[MetresPerSecond; 3]> {
+    fn velocity(&self, now: time::Instant) -> Option<[MetresPerSecond; 3]> {
         let local = self.vehicle.local.within(now, AGE_MAX).map(|local| local.velocity);
         local.or_else(|| self.vehicle.global.within(now, AGE_MAX).map(|global| global.velocity))
     }
 
     /// The first battery, or what the autopilot's status says of it.
-    fn battery(&self, now: Instant, quantity: Quantity) -> Option<Scalar> {
+    fn battery(&self, now: time::Instant, quantity: Quantity) -> Option<Scalar> {
         let battery = self.vehicle.batteries.first().and_then(|battery| battery.within(now, AGE_MAX));
         let system = || self.vehicle.system.within(now, AGE_MAX);
         if quantity == Quantity::BatteryVolts {
@@ -250,7 +253,7 @@ impl Reference {
     }
 
     /// The fields of a motor's ESC, where its last message of that kind is young enough.
-    fn esc(&self, now: Instant, motor: usize, at: fn(&Motor) -> Option<Instant>) -> Option<&Esc> {
+    fn esc(&self, now: time::Instant, motor: usize, at: fn(&Motor) -> Option<time::Instant>) -> Option<&Esc> {
         let motor = self.vehicle.motors.get(motor)?;
         at(motor).filter(|at| now.since(*at) <= AGE_MAX).map(|_| &motor.esc)
     }

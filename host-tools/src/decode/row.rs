@@ -1,6 +1,6 @@
 //! A row of a table of the monitor's own, and how its cells are written.
 
-use hums_core::time::Instant;
+use hums_core::clock::Instant;
 
 use super::text::{push_csv_number, push_csv_text, push_integer, push_json_number, push_json_text};
 use crate::hex::push_hex;

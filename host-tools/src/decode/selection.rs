@@ -4,7 +4,7 @@ use std::cmp::Ordering;
 
 use anyhow::Result;
 use hums_blackbox::Gap;
-use hums_core::time::Instant;
+use hums_core::clock::Instant;
 
 use crate::cli;
 use crate::outcome::usage;

@@ -12,8 +12,8 @@ use std::path::PathBuf;
 
 use anyhow::Result;
 use hums_blackbox::Gap;
+use hums_core::clock::{Instant, Span};
 use hums_core::observation::{Observation, Source};
-use hums_core::time::{Instant, Span};
 
 use super::reference::{MOTORS, Quantity, Reference};
 use super::selection::Selection;

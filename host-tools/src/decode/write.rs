@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Result;
 use hums_blackbox::{Cause, Gap};
-use hums_core::time::Instant;
+use hums_core::clock::Instant;
 
 use super::checked::{Checked, OnBoard};
 use super::collect::Collected;

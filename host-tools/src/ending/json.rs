@@ -1,7 +1,7 @@
 //! The end of a log as JSON.
 
 use hums_blackbox::BlockCounts;
-use hums_core::time::Instant;
+use hums_core::clock::Instant;
 use serde::Serialize;
 
 use super::log::Ending;

@@ -1,7 +1,7 @@
 //! What proves how a log ends.
 
 use hums_blackbox::record::{Before, Found, Resting};
-use hums_core::time::Instant;
+use hums_core::clock::Instant;
 
 use crate::logs::reader::Summary;
 use crate::plural::count;

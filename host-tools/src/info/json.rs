@@ -1,6 +1,6 @@
 //! What `hums info --json` prints. Names carry their units; times are seconds since the monitor's power-on or UTC.
 
-use hums_core::time::Instant;
+use hums_core::clock::Instant;
 use serde::Serialize;
 
 use crate::ending::{BlocksJson, EndJson};

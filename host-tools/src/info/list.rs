@@ -3,8 +3,8 @@
 use std::fmt::Write as _;
 
 use anyhow::Result;
+use hums_core::clock::{Instant, Span};
 use hums_core::health::Level;
-use hums_core::time::{Instant, Span};
 use hums_core::usage::UsageCounter;
 use indicatif::BinaryBytes;
 use serde::Serialize;

@@ -6,8 +6,8 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use hums_blackbox::{Cause, Gap};
+use hums_core::clock::Instant;
 use hums_core::health::Level;
-use hums_core::time::Instant;
 
 use super::json::{duration_s, vehicle};
 use super::number::short;
@@ -374,7 +374,7 @@ fn messages_text(text: &mut String, log: &Overview) {
 
 #[cfg(test)]
 mod tests {
-    use hums_core::time::Instant;
+    use hums_core::clock::Instant;
 
     use super::*;
 

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use hums_core::time::Span;
+use hums_core::clock::Span;
 
 use super::number::short;
 use crate::counters::{self, Band, Motor, Plain};

@@ -2,8 +2,8 @@
 
 use std::fmt::Write as _;
 
+use hums_core::clock::Instant;
 use hums_core::health::exceedance::Crossings;
-use hums_core::time::Instant;
 
 use super::json::finite;
 use super::number::short;

@@ -3,8 +3,8 @@
 //! A HUMS on board of the vehicle hears every frame; where one speaks, its level counts, and the reason is what these
 //! checks see of the same. Its recorder is its own to judge.
 
+use hums_core::clock::{Instant, Span};
 use hums_core::health::{self, EXPECTED, Finding, Level, Subsystem, When};
-use hums_core::time::{Instant, Span};
 use hums_link::summary;
 use serde::Serialize;
 
@@ -134,7 +134,7 @@ fn overall(craft: &Craft, now: Instant, known: &[Known]) -> Level {
 /// The worst of what was so when it was judged last.
 fn was(craft: &Craft, silent: bool) -> Option<&Finding> {
     let all = craft.unjudged.values().chain(craft.worries.values().filter(|_| silent));
-    all.filter(|finding| is_bad(finding)).max_by_key(|finding| (rank(finding.level), finding.at))
+    all.filter(|finding| is_bad(finding)).max_by_key(|finding| (rank(finding.level), finding.at.as_millis()))
 }
 
 fn is_bad(finding: &Finding) -> bool {
@@ -232,7 +232,7 @@ fn waits_for(craft: &Craft, subsystem: Subsystem) -> &'static str {
 /// The worst finding, or why there is none.
 fn reason(craft: &Craft, subsystem: Subsystem, level: Level, here: Level, good: usize) -> String {
     let findings = craft.worries.values().filter(|finding| finding.subsystem == subsystem);
-    let worst = findings.max_by_key(|finding| (rank(finding.level), finding.at));
+    let worst = findings.max_by_key(|finding| (rank(finding.level), finding.at.as_millis()));
     if let Some(finding) = worst.filter(|_| level != Level::Ok) {
         let alarms = craft.worries.values().map(|worry| (worry.at, worry.check, worry.level));
         // One cause has one order: its own.
@@ -281,7 +281,7 @@ mod tests {
 
     fn finding(check: &'static str, subsystem: Subsystem, level: Level) -> Finding {
         Finding {
-            at: Instant::from_millis(900),
+            at: Instant::from_millis(900).into(),
             subsystem,
             check,
             instance: 0,
@@ -346,7 +346,7 @@ mod tests {
     fn what_was_bad_when_the_link_fell_silent_is_still_said() {
         let mut craft = craft(&[finding("cell_voltage", Subsystem::Power, Level::Critical)]);
         craft.monitor.tick(
-            Instant::from_millis(1_050),
+            Instant::from_millis(1_050).into(),
             &LinkReading::default(),
             &RecorderStatus::default(),
             &mut |_| {},

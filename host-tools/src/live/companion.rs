@@ -1,8 +1,8 @@
 //! What a HUMS on board of the vehicle tells of itself over the link: the authority on what happened on board, because
 //! it hears every frame and this PC only what the radio carries. See `hums_link::summary` for what it sends.
 
+use hums_core::clock::{Instant, Span};
 use hums_core::health::{Level, Subsystem};
-use hums_core::time::{Instant, Span};
 use hums_link::encode::COMPONENT;
 use hums_link::packet::Fields;
 use hums_link::{Check, Frame};

@@ -6,6 +6,7 @@ use std::collections::BTreeMap;
 use std::sync::LazyLock;
 
 use hums_core::Monitor;
+use hums_core::clock::{Instant, Span};
 use hums_core::component::{COMPONENTS_MAX, Component};
 use hums_core::flight::Phase;
 use hums_core::happening::Happening;
@@ -13,7 +14,6 @@ use hums_core::health::{Finding, Level, Orders, Scope, Subsystem, VOCABULARY, ch
 use hums_core::observation::{Autopilot, Feeds, Observation, Source};
 use hums_core::params::Params;
 use hums_core::status::{RecorderStatus, Recording};
-use hums_core::time::{Instant, Span};
 use hums_core::usage::UsageCounter;
 use hums_link::sequence::Sequences;
 use hums_link::{Check, Frame, observe};
@@ -202,7 +202,8 @@ impl Craft {
         observation: &Observation,
         history: &mut Option<&mut History>,
     ) {
-        if !self.monitor.observe(at, source, observation) || !self.reference.observe(at, source, observation)
+        if !self.monitor.observe(at.into(), source, observation)
+            || !self.reference.observe(at, source, observation)
         {
             return;
         }
@@ -269,7 +270,7 @@ impl Craft {
         let cut_off = now.since(self.heard) >= SILENT;
         let Self { monitor, worries, unjudged, on_the_wire, .. } = self;
         let mut found = Vec::new();
-        monitor.tick(now, &link, &recorder, &mut |finding| {
+        monitor.tick(now.into(), &link, &recorder, &mut |finding| {
             let silence = finding.level == Level::Stale
                 || (finding.level == Level::Ok && finding.previous == Level::Stale);
             if finding.subsystem == Subsystem::Recorder
@@ -308,11 +309,11 @@ impl Craft {
             findings(finding);
         });
         for finding in found {
-            keep(history, now, Note::finding(&finding).of_part(self.due(&finding).as_ref()));
+            keep(history, now, Note::finding(now, &finding).of_part(self.due(&finding).as_ref()));
         }
         self.happenings(now, history);
         // Nobody takes these here, and they are made anew.
-        while self.monitor.take_snapshot(now).is_some() {}
+        while self.monitor.take_snapshot(now.into()).is_some() {}
         self.texts.pass(now, &mut |text| say(history, text));
         if let Some(history) = history {
             history.pass(now);
@@ -391,7 +392,7 @@ impl Craft {
             _ => {
                 self.unjudged.remove(&key);
                 let finding = Finding {
-                    at: finding.at,
+                    at: finding.at.into(),
                     subsystem: check.subsystem,
                     check: check.name,
                     instance: finding.instance,
@@ -412,7 +413,7 @@ impl Craft {
 
     /// What it is doing.
     pub fn phase(&self, now: Instant) -> Phase {
-        self.monitor.flight().phase(now, self.monitor.vehicle())
+        self.monitor.flight().phase(now.into(), self.monitor.vehicle())
     }
 }
 

@@ -9,7 +9,7 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
 use std::time::{Duration, Instant as Wall, SystemTime, UNIX_EPOCH};
 
 use anyhow::Result;
-use hums_core::time::Instant;
+use hums_core::clock::Instant;
 use hums_link::framer::Framer;
 
 use super::hub::{Hub, Published};

@@ -5,7 +5,7 @@
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use hums_core::time::Instant;
+use hums_core::clock::Instant;
 use tokio::sync::watch;
 
 use super::world::Histories;

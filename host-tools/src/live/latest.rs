@@ -1,8 +1,8 @@
 //! The reference system's quantities as they were told last: what of them is shown, under which name, and how old it may
 //! be.
 
+use hums_core::clock::{Instant, Span};
 use hums_core::observation::MOTORS_MAX;
-use hums_core::time::{Instant, Span};
 
 use crate::decode::reference::Quantity;
 use crate::mavlink::values::Scalar;

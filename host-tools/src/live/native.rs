@@ -6,8 +6,8 @@ use std::io;
 use std::sync::mpsc::{Receiver, sync_channel};
 use std::thread;
 
+use hums_core::clock::Instant;
 use hums_core::observation::{Observation, Source};
-use hums_core::time::Instant;
 
 use crate::page::more::{More, rows};
 use crate::source::item::{Item, Stop, Want};

@@ -7,7 +7,7 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError};
 use std::time::{Duration, Instant as Wall};
 
 use anyhow::{Context as _, Result};
-use hums_core::time::{Instant, Span};
+use hums_core::clock::{Instant, Span};
 use hums_link::Frame;
 
 use super::hub::{Command, Hub, Published};

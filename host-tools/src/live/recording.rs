@@ -5,7 +5,7 @@ use std::io;
 use std::path::Path;
 
 use anyhow::{Result, bail};
-use hums_core::time::Instant;
+use hums_core::clock::Instant;
 use hums_link::Frame;
 
 use super::native::{self, Entry, Native};

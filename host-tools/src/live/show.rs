@@ -2,8 +2,8 @@
 
 use std::borrow::Cow;
 
+use hums_core::clock::Instant;
 use hums_core::component::COMPONENTS_MAX;
-use hums_core::time::Instant;
 use hums_core::usage::UsageCounter;
 use serde::{Serialize, Serializer};
 

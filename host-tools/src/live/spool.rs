@@ -4,7 +4,7 @@
 use std::fs::File;
 use std::io::{self, BufReader, BufWriter, Read, Seek, SeekFrom, Write};
 
-use hums_core::time::Instant;
+use hums_core::clock::Instant;
 use hums_link::Check;
 
 /// Time, check, length.

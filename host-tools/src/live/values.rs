@@ -1,7 +1,8 @@
 //! The latest values as the page takes them: each with its age and whether that is too old.
 
+use hums_core::clock::{Instant, Span};
 use hums_core::observation::MOTORS_MAX;
-use hums_core::time::{Instant, Span};
+use hums_core::time;
 use serde::Serialize;
 use serde::ser::{SerializeMap, SerializeTuple, Serializer};
 
@@ -41,7 +42,7 @@ impl Serialize for Shown {
 }
 
 /// Takes a value by its name: when it came, what it is, how old it may be.
-type Put<'a> = dyn FnMut(&'static str, Option<Instant>, Option<f32>, Span) + 'a;
+type Put<'a> = dyn FnMut(&'static str, Option<time::Instant>, Option<f32>, Span) + 'a;
 
 /// Everything that is known now, by name.
 #[derive(Debug)]
@@ -66,9 +67,9 @@ impl<'a> Values<'a> {
                 each(name, Shown::new(now, at, value, *limit));
             }
         }
-        let mut put = |name, at: Option<Instant>, value: Option<f32>, limit| {
+        let mut put = |name, at: Option<time::Instant>, value: Option<f32>, limit| {
             if let (Some(at), Some(value)) = (at, value) {
-                each(name, Shown::new(now, at, Scalar::Single(value), limit));
+                each(name, Shown::new(now, Instant::of(at, now), Scalar::Single(value), limit));
             }
         };
         self.motion(&mut put);
@@ -175,7 +176,7 @@ impl<'a> Values<'a> {
         let names = ["speed_sensor_0", "speed_sensor_1"];
         for (sensor, name) in self.craft.speed_sensors.iter().zip(names) {
             if let Some((at, rpm)) = sensor {
-                put(name, Some(*at), Some(*rpm), SLOW);
+                put(name, Some((*at).into()), Some(*rpm), SLOW);
             }
         }
     }

@@ -2,12 +2,12 @@
 
 use std::collections::BTreeMap;
 
+use hums_core::clock::{Instant, Span};
 use hums_core::component::{COMPONENTS_MAX, Component};
 use hums_core::health::{Finding, Subsystem};
-use hums_core::monitor::TICK;
 use hums_core::observation::Observation;
-use hums_core::time::{Instant, Span};
 use hums_link::{Check, Frame, observe};
+use hums_onboard::monitoring::TICK;
 
 use super::craft::Craft;
 use super::native::Entry;
@@ -45,7 +45,7 @@ pub struct World {
     /// Frames of vehicles beyond [`VEHICLES_MAX`].
     pub refused: u64,
     /// Findings since this was cleared, with whose they are; what nobody clears stops at `FOUND_MAX`.
-    pub found: Vec<(u8, Finding)>,
+    pub found: Vec<(Instant, u8, Finding)>,
     limits: Limits,
     /// See [`Craft::on_the_wire`].
     on_the_wire: bool,
@@ -290,7 +290,7 @@ impl World {
                 let found = &mut self.found;
                 craft.tick(self.next_tick, &mut history, &mut |finding| {
                     if found.len() < FOUND_MAX {
-                        found.push((*system, *finding));
+                        found.push((self.next_tick, *system, *finding));
                     }
                 });
             }
@@ -373,7 +373,7 @@ mod tests {
                 }
                 world.entry(Instant::from_millis(second * 1_000), &beat, None);
             }
-            world.found.iter().filter(|(_, finding)| finding.level != Level::Ok).count()
+            world.found.iter().filter(|(.., finding)| finding.level != Level::Ok).count()
         };
         assert!(found(false) > 0, "a silence is found");
         assert_eq!(found(true), 0);
@@ -394,7 +394,7 @@ mod tests {
             hear(&mut world, &mut histories, at(second * 1_000), &heartbeat(1));
         }
         assert_eq!(world.crafts[&1].missing, 3_591);
-        assert!(world.found.iter().all(|(_, finding)| finding.level == Level::Ok), "{:?}", world.found);
+        assert!(world.found.iter().all(|(.., finding)| finding.level == Level::Ok), "{:?}", world.found);
         let part = |until_s: u64| {
             let part = histories[&1].since(1, &mut Cursor::default(), at(until_s * 1_000)).expect("a part");
             serde_json::to_value(part).expect("JSON")["gaps"].clone()

@@ -16,7 +16,7 @@ use std::ops::Range;
 use anyhow::Result;
 use hums_blackbox::record::{Keep, Lost};
 use hums_blackbox::{Entry, GroupDecoder, Header, Outline, Record, Sector};
-use hums_core::time::{Instant, Span};
+use hums_core::clock::{Instant, Span};
 
 use super::board::HEADING_GROUPS;
 use super::groups::{Group, Groups, at_beginning};

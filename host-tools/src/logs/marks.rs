@@ -3,7 +3,7 @@
 
 use hums_blackbox::Record;
 use hums_blackbox::record::{Before, Found, Resting};
-use hums_core::time::Instant;
+use hums_core::clock::Instant;
 
 use super::board::{self, Board};
 use crate::loss::lost;

@@ -11,7 +11,7 @@ use std::cell::Cell;
 use anyhow::Result;
 use hums_blackbox::record::Keep;
 use hums_blackbox::{BlockCounts, Cause, Entry, Gap, GroupDecoder, GroupError, Outline, Record};
-use hums_core::time::Instant;
+use hums_core::clock::Instant;
 
 use super::board::HEADING_GROUPS;
 use super::groups::{Group, Groups, Joined};

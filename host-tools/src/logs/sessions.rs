@@ -246,7 +246,7 @@ mod tests {
 
     use hums_blackbox::record::{Before, Boot, Clock, Found};
     use hums_blackbox::{Record, Sector, SectorSink, Writer};
-    use hums_core::time::Instant;
+    use hums_core::clock::Instant;
 
     use super::*;
     use crate::logs::find::find_in;

@@ -1,7 +1,7 @@
 //! How many frames came in a second, and how many of the vehicle's are missing by its own count.
 
+use hums_core::clock::Instant;
 use hums_core::observation::Source;
-use hums_core::time::Instant;
 
 use super::plots::Plot;
 use crate::series::Store;

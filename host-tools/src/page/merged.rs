@@ -1,8 +1,8 @@
 //! Several flights in the same plots: what each told, from its take-off on, as lines of one plot for each quantity. So they have one
 //! scale, and the page draws them as it draws one flight.
 
+use hums_core::clock::Instant;
 use hums_core::observation::Autopilot;
-use hums_core::time::Instant;
 
 use super::history::{History, Part, Place, PlotJson, Series, told};
 use super::plots::{self, Limits, Plot};

@@ -1,9 +1,9 @@
 //! What stands in the list of a page: findings, texts, events.
 
+use hums_core::clock::Instant;
 use hums_core::happening::Happening;
 use hums_core::health::{Finding, OFF_MEANING, VOCABULARY, instances, off_alarm, vocabulary};
 use hums_core::observation::Feeds;
-use hums_core::time::Instant;
 use hums_link::encode::COMPONENT;
 use serde::Serialize;
 
@@ -165,9 +165,9 @@ impl Note {
     }
 
     /// A finding of the checks here.
-    pub fn finding(finding: &Finding) -> Self {
+    pub fn finding(now: Instant, finding: &Finding) -> Self {
         let line = FindingLine {
-            at: finding.at,
+            at: Instant::of(finding.at, now),
             subsystem: finding.subsystem.name(),
             check: finding.check.to_owned(),
             instance: finding.instance,
@@ -291,7 +291,7 @@ mod tests {
                 let instance = check.instances - 1;
                 let feeds = if check.subsystem == Subsystem::Power { Feeds::Payload } else { Feeds::Unsaid };
                 let finding = Finding {
-                    at: Instant::ZERO,
+                    at: Instant::ZERO.into(),
                     subsystem: check.subsystem,
                     check: check.name,
                     instance,

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use hums_core::time::Instant;
+use hums_core::clock::Instant;
 use serde::Serialize;
 
 use super::more::Default as DefaultValue;

@@ -1,7 +1,7 @@
 //! What the vehicle told, as points of series and of the track.
 
+use hums_core::clock::Instant;
 use hums_core::observation::{Air, Battery, CELLS_MAX, Esc, Imu, MOTORS_MAX, Observation};
-use hums_core::time::Instant;
 use hums_core::units::{Metres, Position};
 
 use super::more::{self, compass_deg};

@@ -2,7 +2,7 @@
 
 use std::borrow::Cow;
 
-use hums_core::time::{Instant, Span};
+use hums_core::clock::{Instant, Span};
 
 /// Kept at most; what follows counts to the last one.
 const SPANS_MAX: usize = 2_000;

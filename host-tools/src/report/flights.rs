@@ -1,7 +1,7 @@
 //! Flights, as [`crate::check`] finds them, with how high and fast they were.
 
+use hums_core::clock::Instant;
 use hums_core::motion::ground_speed_mps;
-use hums_core::time::Instant;
 use serde::Serialize;
 
 use crate::check::flights::Flight as Judged;
@@ -62,7 +62,7 @@ impl Extents {
         let height_m = vehicle.global.get().map(|global| global.relative_altitude.0);
         let percent = percent(at, reference);
         extent.height_max_m = most(extent.height_max_m, height_m);
-        extent.speed_max_m_s = most(extent.speed_max_m_s, ground_speed_mps(at, vehicle));
+        extent.speed_max_m_s = most(extent.speed_max_m_s, ground_speed_mps(at.into(), vehicle));
         extent.percent_from = extent.percent_from.or(percent);
         extent.percent_to = percent.or(extent.percent_to);
     }

@@ -3,7 +3,7 @@
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD as BASE64;
 use hums_blackbox::record::Stats;
-use hums_core::time::Instant;
+use hums_core::clock::Instant;
 use serde::Serialize;
 use sha2::{Digest as _, Sha256};
 

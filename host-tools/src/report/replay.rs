@@ -1,10 +1,10 @@
 //! A recording read in order: what the vehicle told becomes the history of its flight, and flights.
 
 use anyhow::Result;
+use hums_core::clock::Instant;
 use hums_core::happening::Happening;
 use hums_core::health::Level;
 use hums_core::observation::{Observation, Source};
-use hums_core::time::Instant;
 use serde::Serialize;
 
 use super::flights::{Extents, Flight};

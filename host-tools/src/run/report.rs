@@ -5,8 +5,8 @@ use std::path::Path;
 
 use anyhow::Result;
 use hums_blackbox::record::Stats;
+use hums_core::clock::Instant;
 use hums_core::health::{self, Level};
-use hums_core::time::Instant;
 use serde::Serialize;
 
 use super::earlier::EarlierSessions;
@@ -138,7 +138,7 @@ impl From<&health::Finding> for Finding {
             check: finding.check.to_owned(),
             instance: finding.instance,
             level: finding.level.name().to_owned(),
-            time_s: finding.at.as_secs_f64(),
+            time_s: finding.at.as_millis() as f64 / 1e3,
             value: known(finding.value),
             unit: finding.unit.to_owned(),
         }
@@ -152,7 +152,7 @@ impl From<&FindingLine> for Finding {
             check: finding.check.clone(),
             instance: finding.instance,
             level: finding.level.to_owned(),
-            time_s: finding.at.as_secs_f64(),
+            time_s: finding.at.as_millis() as f64 / 1e3,
             value: known(finding.value),
             unit: finding.unit.clone(),
         }

@@ -1,6 +1,6 @@
 //! Parts of raw bytes that no line made: blocks of a file that were never written, and what another file left there.
 
-use hums_core::time::Instant;
+use hums_core::clock::Instant;
 
 use super::item::{Cause, Gap};
 use crate::plural::count;

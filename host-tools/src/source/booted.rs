@@ -3,7 +3,7 @@
 
 use std::io;
 
-use hums_core::time::Instant;
+use hums_core::clock::Instant;
 use hums_link::Framer;
 
 use super::blocks::Blocks;

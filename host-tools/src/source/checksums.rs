@@ -1,6 +1,6 @@
 //! Frames of a ground station's log whose checksum does not fit: they are not read, and that is told.
 
-use hums_core::time::Instant;
+use hums_core::clock::Instant;
 use hums_link::{Check, Frame};
 
 use super::item::Gap;

@@ -8,7 +8,7 @@
 //! told anew, or late. Where a format has such ([`Rules::old_values`]), a time that is behind is *old*, not wrong, unless it is
 //! also behind the time that the same series told before: it counts as now, and is not asked about others.
 
-use hums_core::time::Instant;
+use hums_core::clock::Instant;
 
 use super::doubt::{DISORDER_US, Ends, Question, RUN, Time};
 use super::item::Gap;

@@ -1,7 +1,7 @@
 //! The time of day of frames without recorded times: what their autopilot tells of it.
 
+use hums_core::clock::Instant;
 use hums_core::observation::{Observation, SystemTime};
-use hums_core::time::Instant;
 use hums_link::{Frame, observe};
 
 use super::item::AUTOPILOT;

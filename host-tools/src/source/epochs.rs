@@ -1,6 +1,6 @@
 //! UTC of a recording whose clock may begin again: each power-on has its own.
 
-use hums_core::time::Instant;
+use hums_core::clock::Instant;
 
 use super::item::Item;
 

@@ -16,8 +16,8 @@ use std::sync::Arc;
 use anyhow::Result;
 use hums_blackbox::Record;
 use hums_core::cause::Alert;
+use hums_core::clock::Instant;
 use hums_core::observation::{Observation, Source};
-use hums_core::time::Instant;
 use hums_link::Frame;
 
 use crate::ending::Ending;

@@ -6,7 +6,7 @@ use std::io::Read;
 use std::path::Path;
 
 use anyhow::Result;
-use hums_core::time::Instant;
+use hums_core::clock::Instant;
 
 use super::epochs::Epochs;
 use super::item::{Item, Stop, Want};

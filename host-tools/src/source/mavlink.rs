@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 
 use anyhow::Result;
-use hums_core::time::{Instant, Span};
+use hums_core::clock::{Instant, Span};
 use hums_link::framer::{Framer, FramerCounts};
 
 use super::blocks::Blocks;

@@ -3,8 +3,8 @@
 use anyhow::Result;
 use hums_blackbox::record::{Loss, Lost, Note, RECORD_BYTES_MAX};
 use hums_blackbox::{Cause as OwnCause, Entry, Gap as OwnGap, Record, SECTOR_BYTES};
+use hums_core::clock::Instant;
 use hums_core::observation::{Observation, Source};
-use hums_core::time::Instant;
 use hums_link::{Check, Frame, observe};
 
 use super::checksums::wrong_checksums;

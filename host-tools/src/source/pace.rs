@@ -10,7 +10,7 @@
 //! | messages of one kind that tell no later time, a hundred in a row | a kind is told again when time has passed |
 //! | how often the clock fell in a row | one that falls eight times with less than five seconds between runs backwards |
 
-use hums_core::time::{Instant, Span};
+use hums_core::clock::{Instant, Span};
 
 use super::clock::Wrong;
 use super::item::{Cause, Gap};

@@ -8,7 +8,7 @@
 //! tell it (texts, modes, parameters), nor what must be known before the first part (clocks): a reading in order has all.
 
 use anyhow::Result;
-use hums_core::time::Instant;
+use hums_core::clock::Instant;
 
 use super::item::{Gap, Item};
 pub use crate::logs::reader::PART_BYTES;

@@ -6,7 +6,7 @@ use std::mem;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result, bail};
-use hums_core::time::Instant;
+use hums_core::clock::Instant;
 
 use super::format::{Detected, KNOWN, LOOK_BYTES, detect, hint};
 use super::input::{Input, Progress};

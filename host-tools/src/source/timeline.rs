@@ -5,7 +5,7 @@
 //! which time goes on a microsecond behind where it was: each time is of one power-on. A step forward beyond a day is damage or a clock that was set: it counts for
 //! nothing, and if the clock stays there, time goes on from there. (Which times are wrong, [`super::doubt`] tells before.)
 
-use hums_core::time::Instant;
+use hums_core::clock::Instant;
 
 /// A step back beyond this is a clock that began again, not a reordering.
 pub const STEP_BACK_US_MAX: u64 = 1_000_000;

@@ -2,9 +2,9 @@
 
 use hums_blackbox::Record;
 use hums_blackbox::record::{FindingRecord, Lost, Why};
+use hums_core::clock::Instant;
 use hums_core::component::{COMPONENTS_MAX, Component, Label};
 use hums_core::health::{self, Level, Subsystem};
-use hums_core::time::Instant;
 use hums_onboard::monitoring::CELLS_UNKNOWN;
 use hums_onboard::persist::STORE_NEW;
 
@@ -81,9 +81,10 @@ pub struct Finding {
     pub unit: String,
 }
 
-impl From<&health::Finding> for Finding {
-    fn from(finding: &health::Finding) -> Self {
-        Self::from(&FindingRecord::from(finding))
+impl Finding {
+    /// From a finding of the monitor's, found at about `now`.
+    pub fn new(now: Instant, finding: &health::Finding) -> Self {
+        Self::from(&FindingRecord::new(now, finding))
     }
 }
 

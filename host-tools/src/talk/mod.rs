@@ -148,7 +148,7 @@ impl Client {
     /// Sends a message.
     pub fn send(&mut self, packet: &Packet) -> Result<()> {
         let mut buffer = [0; FRAME_BYTES_MAX];
-        let now = hums_core::time::Instant::from_micros(self.begun.elapsed().as_micros() as u64);
+        let now = hums_core::clock::Instant::from_micros(self.begun.elapsed().as_micros() as u64);
         let frame = match &mut self.seal {
             Some(seal) => self.encoder.frame_signed(&mut buffer, packet, now, seal),
             None => self.encoder.frame(&mut buffer, packet),
@@ -288,7 +288,7 @@ pub fn stamp_now() -> u64 {
 /// A clock that begins with it.
 fn our_time() -> Clock {
     let mut clock = Clock::default();
-    clock.is_at_least(hums_core::time::Instant::ZERO, stamp_now());
+    clock.is_at_least(hums_core::clock::Instant::ZERO, stamp_now());
     clock
 }
 

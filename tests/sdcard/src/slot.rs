@@ -7,7 +7,7 @@ use std::rc::Rc;
 
 use embedded_hal::delay::DelayNs;
 use embedded_hal::spi::{ErrorType, Operation, SpiDevice};
-use hums_core::time::Instant;
+use hums_core::clock::Instant;
 use hums_recorder::spi::{Clock, Port, PortFailed};
 
 use crate::card::SdCard;

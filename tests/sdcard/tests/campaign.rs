@@ -4,8 +4,8 @@
 mod rig;
 
 use hums_blackbox::{Header, NotASector};
+use hums_core::clock::Span;
 use hums_core::health::Level;
-use hums_core::time::Span;
 use hums_recorder::CardState;
 use hums_recorder::spi::{BUSY_MAX, SERVICE_MAX};
 use hums_sdcard::{Event, Fault, Kind, MS, Medium, Model, Plan};

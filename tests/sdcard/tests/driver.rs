@@ -2,7 +2,7 @@
 //! time, and without anything on the bus that the specification forbids.
 
 use embedded_sdmmc::{Block, BlockDevice as _, BlockIdx};
-use hums_core::time::Span;
+use hums_core::clock::Span;
 use hums_recorder::spi::{BUSY_MAX, SERVICE_MAX, SpiCard, SpiError};
 use hums_recorder::{CardDevice as _, Trouble};
 use hums_sdcard::{Event, Fault, Kind, MS, Medium, Model, Plan, SimPort, Slot};
@@ -145,7 +145,7 @@ fn a_card_that_is_busy_for_a_minute_is_interrupted_only_after_it_was_waited_for_
         bench.assert_in_order();
     }
     assert!(bench.read(0).is_ok(), "a reset helps this one");
-    assert!(bench.slot.now() < hums_core::time::Instant::from_millis(20_000));
+    assert!(bench.slot.now() < hums_core::clock::Instant::from_millis(20_000));
 }
 
 #[test]

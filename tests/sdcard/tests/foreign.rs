@@ -2,7 +2,7 @@
 
 mod rig;
 
-use hums_core::time::Instant;
+use hums_core::clock::Instant;
 use hums_recorder::CardState;
 use hums_recorder::format::BLOCKS_MIN;
 use hums_recorder::layout::Layout;

@@ -2,7 +2,7 @@
 //! nobody but idle.
 
 use embassy_time::{Duration, Timer, with_timeout};
-use hums_core::time::Instant;
+use hums_core::clock::Instant;
 use hums_onboard::queues::SectorsOut;
 use hums_onboard::shelf::Server;
 use hums_onboard::storage::NO_CARD_RETRY;

@@ -1,7 +1,7 @@
 //! What was found, and other moments worth a mark.
 
+use hums_core::clock::Instant;
 use hums_core::health::{Finding, Level, Subsystem};
-use hums_core::time::Instant;
 
 use super::stored::{Fields, Sink};
 
@@ -28,10 +28,11 @@ pub struct FindingRecord<'a> {
     pub unit: &'a str,
 }
 
-impl From<&Finding> for FindingRecord<'static> {
-    fn from(finding: &Finding) -> Self {
+impl FindingRecord<'static> {
+    /// From the monitor's own one, found at about `now`.
+    pub fn new(now: Instant, finding: &Finding) -> Self {
         Self {
-            at: finding.at,
+            at: Instant::of(finding.at, now),
             subsystem: finding.subsystem,
             check: finding.check,
             instance: finding.instance,

@@ -1,6 +1,6 @@
 //! What is missing, and what the recorder counted.
 
-use hums_core::time::Instant;
+use hums_core::clock::Instant;
 
 use super::stored::{Fields, Sink};
 

@@ -161,11 +161,11 @@ impl<'a> Record<'a> {
 
 #[cfg(test)]
 mod tests {
+    use hums_core::clock::Instant;
     use hums_core::component::{Figures, Kind, Status};
     use hums_core::health::exceedance::Crossings;
     use hums_core::health::{Level, Subsystem};
     use hums_core::protect::{Action, Stage};
-    use hums_core::time::Instant;
 
     use super::*;
 

@@ -1,10 +1,10 @@
 //! What went on around a critical finding, and what was asked of the autopilot because of one.
 
+use hums_core::clock::{Instant, Span};
 use hums_core::half;
 use hums_core::health::Subsystem;
 use hums_core::protect::{Action, Stage};
 use hums_core::snapshot::{COLUMNS_MAX, INTERVAL, SAMPLES, columns};
-use hums_core::time::{Instant, Span};
 
 use super::stored::{Fields, Sink};
 use crate::limits::RECORD_BYTES_MAX;
@@ -39,8 +39,8 @@ pub struct Snapshot<'a> {
 }
 
 impl<'a> Snapshot<'a> {
-    /// To be written; `values` is room for its values.
-    pub fn new(of: &hums_core::snapshot::Snapshot<'_>, values: &'a mut SnapshotValues) -> Self {
+    /// To be written; `values` is room for its values. It was taken at about `now`.
+    pub fn new(now: Instant, of: &hums_core::snapshot::Snapshot<'_>, values: &'a mut SnapshotValues) -> Self {
         let SnapshotValues { bytes, .. } = values;
         let (mut length, mut last) = (0, [0; COLUMNS_MAX]);
         let columns = (0..of.width().clamp(1, COLUMNS_MAX)).cycle();
@@ -50,13 +50,13 @@ impl<'a> Snapshot<'a> {
             length += 2;
         }
         Self {
-            at: of.at,
+            at: Instant::of(of.at, now),
             check: of.check,
             instance: of.instance,
             subsystem: of.subsystem,
             after: of.after,
-            first: of.first,
-            interval: INTERVAL,
+            first: Instant::of(of.first, now),
+            interval: INTERVAL.into(),
             width: of.width() as u8,
             values: bytes.get(..length).unwrap_or_default(),
         }

@@ -1,7 +1,7 @@
 //! The stored form of a record: a head that says how many numbers there are, then the numbers, then bytes. So the coder
 //! knows the numbers of a record of any kind, also of one that comes later.
 
-use hums_core::time::Instant;
+use hums_core::clock::Instant;
 
 use crate::bytes::Fields as Bytes;
 use crate::limits::{NAME_BYTES_MAX, TEXT_BYTES_MAX};

@@ -1,6 +1,6 @@
 //! What was recorded: the vehicle, its and our parameters, and the date.
 
-use hums_core::time::Instant;
+use hums_core::clock::Instant;
 
 use super::stored::{Fields, Sink};
 

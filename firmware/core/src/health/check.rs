@@ -243,6 +243,9 @@ pub const CLEAR_MAX: Span = Span::from_secs(128);
 /// The same for checks that apply on the ground too: they have no end of a flight to begin anew at.
 pub const CLEAR_MAX_ALWAYS: Span = Span::from_secs(16);
 
+/// A state that rests is looked at again after this long.
+pub(super) const REST_MAX: Span = Span::from_secs(600);
+
 const _: () = assert!(CLEAR.as_millis() << (3 * Repeats::MOST) == CLEAR_MAX.as_millis());
 
 /// Measurements that have to be bad, one after the other: one message of nonsense is no alarm.
@@ -463,10 +466,10 @@ impl State {
             return None;
         }
         // When what is never stale was measured counts once it is bad: then it is noted.
-        let Some(limit) = check.stale_after else { return Some(Instant::FAR) };
-        // Dividing is dear: that of now is done once for all checks, and what is younger than its limit needs none.
-        let (at, seen) = if at < now { (at, Stamp::at(at)) } else { (now, Stamp::at(now)) };
-        if now.since(at) > limit && seen.older_than(now, limit) {
+        let Some(limit) = check.stale_after else { return Some(now + REST_MAX) };
+        let at = at.earlier(now);
+        let seen = Stamp::at(at);
+        if now.since(at) > limit {
             return None;
         }
         self.seen = seen;
@@ -491,7 +494,9 @@ impl State {
         match reading.filter(|reading| reading.value.is_finite()) {
             Some(_) if quiet => None,
             Some(reading) => self.stays_calm(check, inputs.now, reading, inputs.params),
-            None => (self.is_new() || (applies && check.stale_after.is_none())).then_some(Instant::FAR),
+            None => {
+                (self.is_new() || (applies && check.stale_after.is_none())).then(|| inputs.now + REST_MAX)
+            }
         }
     }
 
@@ -519,7 +524,7 @@ impl State {
         if reading.is_some_and(|reading| self.stays_calm(check, now, reading, params).is_some()) {
             return None;
         }
-        let seen = reading.map_or(self.seen, |reading| Stamp::at(reading.at.min(now)));
+        let seen = reading.map_or(self.seen, |reading| Stamp::at(reading.at.earlier(now)));
         let measured = core::mem::replace(&mut self.seen, seen) != seen;
         // A value that was measured once and no longer is grows old like one whose message stops.
         if self.stale_after(check).is_some_and(|limit| self.seen.older_than(now, limit)) {

@@ -7,7 +7,7 @@ use super::inputs::Inputs;
 use crate::cause::Cause;
 use crate::latest::Reading;
 use crate::params::Param;
-use crate::time::Span;
+use crate::time::{Instant, Span};
 
 const HEARTBEAT: Check = Check {
     name: "heartbeat",
@@ -95,11 +95,19 @@ fn heartbeat_age_s(inputs: &Inputs<'_>, _: u8) -> Option<Reading> {
     Some(Reading { at: inputs.now, value: inputs.now.since(at).as_secs_f32() })
 }
 
+/// The later one of two times, of which either may be unknown.
+fn later(one: Option<Instant>, other: Option<Instant>) -> Option<Instant> {
+    match (one, other) {
+        (Some(one), Some(other)) => Some(one.later(other)),
+        (one, other) => one.or(other),
+    }
+}
+
 /// Since the last position, global or local, while the autopilot is heard.
 fn position_age_s(inputs: &Inputs<'_>, _: u8) -> Option<Reading> {
     let Inputs { now, vehicle, .. } = *inputs;
-    let at = vehicle.global.at().max(vehicle.local.at())?;
-    let heard = vehicle.heartbeat.at()?.max(vehicle.attitude.at()?);
+    let at = later(vehicle.global.at(), vehicle.local.at())?;
+    let heard = vehicle.heartbeat.at()?.later(vehicle.attitude.at()?);
     Some(Reading { at: now, value: heard.since(at).as_secs_f32() })
 }
 

@@ -28,7 +28,7 @@ mod tables;
 mod vocabulary;
 
 pub use check::{CLEAR, CLEAR_MAX, CLEAR_MAX_ALWAYS, Check, Parts, Side, State, When};
-use check::{Change, How, Part};
+use check::{Change, How, Part, REST_MAX};
 pub use consequence::{because, explains, is_of_mishap, is_with_mishap};
 pub use finding::{Finding, Level, OFF_MEANING, Orders, Subsystem, is_off, off_alarm};
 pub use inputs::Inputs;
@@ -80,7 +80,7 @@ impl Health {
             looked_at: 0,
             awake: Kinds::NONE,
             rest: Places::NONE,
-            rest_until: Instant::FAR,
+            rest_until: Instant::ZERO,
             heard: 0,
             stepped: 0,
         }
@@ -138,8 +138,8 @@ impl Health {
 
     /// Those of the checks that have a state which does not rest, as nearly all do.
     fn restless(&mut self, places: Places, inputs: &Inputs<'_>, parts: &Parts, now: &Now) -> Places {
-        if self.stepped != now.mark() || inputs.now > self.rest_until {
-            (self.stepped, self.rest, self.rest_until) = (now.mark(), Places::NONE, Instant::FAR);
+        if self.stepped != now.mark() || inputs.now.is_after(self.rest_until) {
+            (self.stepped, self.rest, self.rest_until) = (now.mark(), Places::NONE, inputs.now + REST_MAX);
         }
         // What the autopilot says rests while it does not say it.
         let on = Places::of_causes(inputs.vehicle.alerts.may_be_on(inputs.now));
@@ -160,7 +160,7 @@ impl Health {
             let states = self.states.iter_mut().skip(first).take(usize::from(parts.stepped(check)));
             for (instance, state) in (0..).zip(states) {
                 match state.rests(check, instance, inputs, how) {
-                    Some(rests_until) => until = until.min(rests_until),
+                    Some(rests_until) => until = until.earlier(rests_until),
                     None => restless.add(place),
                 }
             }

@@ -57,7 +57,7 @@ impl Saving {
         Self {
             changed: Self::bit(ItemKey::Lifetime) | Self::bit(ItemKey::Exposure),
             due: 0,
-            next: Instant::from_micros(FIRST.as_micros()),
+            next: Instant::from_millis(FIRST.as_millis()),
             session_at: Instant::ZERO,
         }
     }
@@ -85,11 +85,11 @@ impl Saving {
     /// The item to be saved next; the same until it is [`Self::saved`].
     pub(crate) fn due(&mut self, now: Instant, armed: bool, room: Room) -> Option<ItemKey> {
         if room == Room::Enough {
-            if now >= self.next {
+            if !self.next.is_after(now) {
                 self.next = now + EVERY;
                 self.hurry_all();
             }
-            let every = EVERY_ARMED.max(Span::from_micros(now.as_micros() / EVERY_PART));
+            let every = EVERY_ARMED.max(Span::from_millis(now.as_millis() / EVERY_PART));
             if armed && now.since(self.session_at) >= every {
                 self.due |= self.changed & Self::bit(ItemKey::Session);
             }

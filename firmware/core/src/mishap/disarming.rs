@@ -29,7 +29,7 @@ impl Mishap {
         // Below home there is air too, over a valley. A height that nobody knows may be any, where
         // forces say what becomes of it; but on wings a landing rolls on.
         let limit_m = params.get(Param::MisDisarm);
-        let is_felt = self.felt_at > Instant::ZERO && on_rotors(now, vehicle);
+        let is_felt = self.felt_at != Instant::ZERO && on_rotors(now, vehicle);
         let high = height_m.map_or(is_felt, |height_m| height_m.abs() > limit_m);
         // What has landed idles for a while before an autopilot disarms it.
         let had_thrust = self.driven_at == Instant::ZERO || now.since(self.driven_at) <= BEATS;
@@ -69,8 +69,11 @@ impl Mishap {
     pub(super) fn judge_disarming(&mut self, now: Instant, vehicle: &Vehicle, params: &Params) {
         self.judge_first(now, params);
         // What was terminated stays armed, and its autopilot's word that it stands is not of that.
-        let says_so =
-            |since| vehicle.armed() && vehicle.landed.at() > Some(since) && calls_itself_landed(now, vehicle);
+        let says_so = |since| {
+            vehicle.armed()
+                && vehicle.landed.at().is_some_and(|at| at.is_after(since))
+                && calls_itself_landed(now, vehicle)
+        };
         let Some(Doubt { since, .. }) = self.doubt else { return };
         let stands = says_so(since) || self.stands(now, vehicle);
         let Some(doubt) = &mut self.doubt else { return };
@@ -124,7 +127,7 @@ impl Mishap {
     /// Whether it was terminated and does not stand after that. Sensors and speeds that were told and are no more are no word that it
     /// stands.
     fn is_lost(&self, now: Instant, vehicle: &Vehicle, doubt: &Doubt, stands: bool) -> bool {
-        let watched = !doubt.stood && self.felt_at > Instant::ZERO && on_rotors(now, vehicle);
+        let watched = !doubt.stood && self.felt_at != Instant::ZERO && on_rotors(now, vehicle);
         let passed = now.since(doubt.since);
         let shows = (doubt.unseen && passed >= LIES_FOR) || (vehicle.armed() && passed > FALL_SHOWS);
         watched && !stands && shows

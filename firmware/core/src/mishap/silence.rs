@@ -37,7 +37,7 @@ impl Mishap {
             return;
         }
         let again_at = *unheard.again_at.get_or_insert(now);
-        let tells = |at: Option<Instant>| at.is_none_or(|at| at > unheard.last_heard_at);
+        let tells = |at: Option<Instant>| at.is_none_or(|at| at.is_after(unheard.last_heard_at));
         if unheard.state_known_at.is_none() && tells(vehicle.imu.at()) && tells(vehicle.global.at()) {
             unheard.state_known_at = Some(now);
         }
@@ -87,8 +87,7 @@ impl Mishap {
     /// Its recording lost what it said for so long, and no time passed here meanwhile.
     pub(crate) fn lose(&mut self, span: Span, vehicle: &Vehicle, flight: &Flight) {
         if span >= UNHEARD && self.unheard.is_none() {
-            let from_us = self.heard_at.as_micros().saturating_sub(span.as_micros());
-            self.begin_silence(Instant::from_micros(from_us), vehicle, flight);
+            self.begin_silence(self.heard_at - span, vehicle, flight);
         }
     }
 

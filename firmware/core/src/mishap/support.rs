@@ -82,7 +82,7 @@ impl Mishap {
             && self.is_supported(now)
             && is_lost()
             && let Some(since) = self.support.since.instant(now)
-            && self.pressure.rose_at() + UNTIL > since
+            && (self.pressure.rose_at() + UNTIL).is_after(since)
         {
             self.hit_at = since;
             self.see(now, Kind::Impact, 0.0, params);

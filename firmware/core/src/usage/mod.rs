@@ -163,9 +163,10 @@ impl Usage {
         self.totals.set(UsageCounter::AutopilotReboots, f64::from(vehicle.reboots));
         let set_ah = params.get(Param::BatCapacity);
         self.capacity_ah = if set_ah > 0.0 { set_ah } else { derived.cells().capacity_ah() };
-        let step = self.last.map_or(Span::ZERO, |last| now.since(last));
-        self.last = Some(now);
-        self.totals.set(UsageCounter::Powered, now.as_secs_f64());
+        let before = self.last.replace(now);
+        let step = before.map_or(Span::ZERO, |last| now.since(last));
+        let powered = now.since(before.unwrap_or(Instant::ZERO));
+        self.totals.add(UsageCounter::Powered, f64::from(powered.as_secs_f32()));
         if step > STEP_MAX {
             return;
         }

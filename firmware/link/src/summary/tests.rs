@@ -6,7 +6,7 @@ const VEHICLE: Source = Source { system: 1, component: 1 };
 
 fn finding(level: Level) -> Finding {
     Finding {
-        at: Instant::ZERO,
+        at: Instant::ZERO.into(),
         subsystem: Subsystem::Power,
         check: "batt_remaining",
         instance: 0,
@@ -292,7 +292,7 @@ fn told_where(findings: &[Comes], because: &'static str, orders: fn(&str) -> Ord
         for (_, check, instance, level, previous) in findings.iter().filter(|(at, ..)| *at == tenths) {
             let check = health::check_named(check).expect("a check");
             let finding = Finding {
-                at: now,
+                at: now.into(),
                 subsystem: check.subsystem,
                 check: check.name,
                 instance: *instance,

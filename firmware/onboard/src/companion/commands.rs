@@ -12,10 +12,10 @@
 
 use hums_blackbox::record::Boot;
 use hums_core::Monitor;
+use hums_core::clock::Instant;
 use hums_core::health::{self, Level};
 use hums_core::observation::Feeds;
 use hums_core::params::TABLE;
-use hums_core::time::Instant;
 use hums_link::messages;
 use hums_link::packet::Packet;
 use hums_link::request::{Port, Replies, Reply};

@@ -1,6 +1,6 @@
 //! Who asks, and how often somebody may change something.
 
-use hums_core::time::Instant;
+use hums_core::clock::Instant;
 use hums_link::request::Port;
 
 use crate::journal::By;

@@ -15,8 +15,8 @@ mod ways;
 
 use embedded_storage::nor_flash::NorFlash;
 use hums_blackbox::record::Boot;
+use hums_core::clock::{Instant, Span};
 use hums_core::params::{Param, Params, TABLE};
-use hums_core::time::{Instant, Span};
 use hums_core::{Monitor, protect};
 use hums_link::asking::{Asking, Known};
 use hums_link::encode::COMPONENT;
@@ -344,7 +344,7 @@ impl Companion {
         if self.commands.stopped() && book.monitor.vehicle().armed() {
             self.commands.stop_or_record(now, false, NOBODY, &mut book.journal, sectors);
         }
-        self.secure.seal(gs.path(), book.monitor, [&mut summary.outlet, &mut self.outlet]);
+        self.secure.seal(now, gs.path(), book.monitor, [&mut summary.outlet, &mut self.outlet]);
         self.tell_autopilot(now, book.monitor, gs);
         self.settings.tick(now, &mut self.library, book, notices, sectors, &mut gs.shelf);
     }
@@ -423,7 +423,7 @@ impl Companion {
 /// Who is asked: the vehicle, and each autopilot on the port in turn until it is settled which of them that is.
 fn known(now: Instant, monitor: &Monitor) -> Option<Known> {
     let vehicle = monitor.vehicle();
-    let (source, autopilot) = vehicle.asks(now)?;
+    let (source, autopilot) = vehicle.asks(now.into())?;
     Some(Known {
         source,
         autopilot,

@@ -8,8 +8,8 @@
 //! definition that we do not have.
 
 use hums_core::Monitor;
+use hums_core::clock::{Instant, Span};
 use hums_core::params::Param;
-use hums_core::time::{Instant, Span};
 use hums_link::encode::COMPONENT;
 use hums_link::frame::{Check, Frame};
 use hums_link::outlet::Class;

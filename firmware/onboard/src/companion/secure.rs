@@ -16,9 +16,9 @@
 
 use embedded_storage::nor_flash::NorFlash;
 use hums_core::Monitor;
+use hums_core::clock::{Instant, Span};
 use hums_core::lifetime::Room;
 use hums_core::params::{Param, Params};
-use hums_core::time::{Instant, Span};
 use hums_link::frame::Frame;
 use hums_link::outlet::Outlet;
 use hums_link::request::Port;
@@ -200,7 +200,7 @@ impl Secure {
     }
 
     /// Keeps both ways out signing as they should, in our time: the summary stream's, and the autopilot's.
-    pub(crate) fn seal(&mut self, path: Path, monitor: &Monitor, outlets: [&mut Outlet; 2]) {
+    pub(crate) fn seal(&mut self, now: Instant, path: Path, monitor: &Monitor, outlets: [&mut Outlet; 2]) {
         let params = monitor.params();
         let carries = if path == Path::Autopilot { Port::Autopilot } else { Port::Gs };
         let guards = [guard(params, carries), guard(params, Port::Autopilot)];
@@ -208,7 +208,7 @@ impl Secure {
         let reseal = core::mem::take(reseal);
         let time = &monitor.vehicle().time;
         if let (Some(at), Some(utc_micros)) = (time.at(), time.get().and_then(|time| time.utc_micros)) {
-            signing.clock.hear_utc(at, stamp(utc_micros));
+            signing.clock.hear_utc(Instant::of(at, now), stamp(utc_micros));
         }
         for ((outlet, link), guard) in outlets.into_iter().zip(LINKS).zip(guards) {
             match (signing.key().filter(|_| guard > 0), &mut outlet.seal) {

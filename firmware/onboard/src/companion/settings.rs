@@ -9,7 +9,7 @@
 //! A refused line is an event in the record and a text for the ground station. [`BYTES_MAX`] of the file are read,
 //! [`LINE_MAX`] of a line.
 
-use hums_core::time::Instant;
+use hums_core::clock::Instant;
 use hums_link::param_line::{self, Line};
 use hums_recorder::CardState;
 

@@ -1,6 +1,6 @@
 //! The ways out: each port's outlet, which says what may go when, with the queue behind it.
 
-use hums_core::time::Instant;
+use hums_core::clock::Instant;
 use hums_link::outlet::{Class, Outlet};
 use hums_link::packet::Packet;
 use hums_link::request::Port;

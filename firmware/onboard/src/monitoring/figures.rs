@@ -2,8 +2,8 @@
 
 use hums_blackbox::SECTOR_BYTES;
 use hums_blackbox::record::{Lost, Stats};
+use hums_core::clock::{Instant, Span};
 use hums_core::status::{RecorderStatus, Recording};
-use hums_core::time::{Instant, Span};
 use hums_link::messages::{ComputerStatus, LinkStatus};
 use hums_link::summary::OwnFigures;
 use hums_recorder::status::{CardState, CardStatus};
@@ -176,7 +176,7 @@ impl<'a> Figures<'a> {
             recording,
             queue: sectors.len() as f32 / SECTOR_QUEUE_SECTORS as f32,
             frames_lost: self.sums.frames_lost + journal.refused() + u64::from(reading.frames_lost),
-            stall: card.stall(now),
+            stall: card.stall(now).into(),
             write_errors: u64::from(reading.write_errors),
             room: reading.room_permille.map(|permille| permille as f32 / 1000.0),
         }

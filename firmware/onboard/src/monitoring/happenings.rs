@@ -2,9 +2,9 @@
 //! protective action.
 
 use hums_blackbox::record::{Event, Lost, Moment, Protection, Record, Resting, Snapshot, SnapshotValues};
+use hums_core::clock::Instant;
 use hums_core::happening::Happening;
 use hums_core::mishap::Change;
-use hums_core::time::Instant;
 
 use super::marks::Marks;
 use crate::journal::Logbook;
@@ -66,9 +66,9 @@ pub(super) fn record(
     }
     let Logbook { monitor, journal, .. } = book;
     journal.lose(now, Lost::Records, u64::from(monitor.take_happenings_lost()));
-    while let Some(snapshot) = monitor.take_snapshot(now) {
+    while let Some(snapshot) = monitor.take_snapshot(now.into()) {
         let mut values = SnapshotValues::default();
-        journal.record(now, &Record::Snapshot(Snapshot::new(&snapshot, &mut values)), sectors);
+        journal.record(now, &Record::Snapshot(Snapshot::new(now, &snapshot, &mut values)), sectors);
     }
 }
 

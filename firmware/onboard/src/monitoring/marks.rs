@@ -6,7 +6,7 @@
 
 use hums_blackbox::SectorSink as _;
 use hums_blackbox::record::Resting;
-use hums_core::time::{Instant, Span};
+use hums_core::clock::{Instant, Span};
 
 use crate::journal::Journal;
 use crate::queues::SectorsIn;

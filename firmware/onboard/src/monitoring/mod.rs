@@ -12,8 +12,8 @@ mod slot;
 use embedded_storage::nor_flash::NorFlash;
 use hums_blackbox::Writer;
 use hums_blackbox::record::{Boot, Event, Fault, FindingRecord, Moment, Note, Record, Stats};
+use hums_core::clock::{Instant, Span};
 use hums_core::health::{Finding, Level};
-use hums_core::time::{Instant, Span};
 use hums_core::{Monitor, monitor};
 use hums_link::frame::{Check, Frame};
 use hums_link::sequence::Sequences;
@@ -37,7 +37,7 @@ use marks::Marks;
 use slot::Slot;
 
 /// How often [`Monitoring::tick`] is to be called.
-pub const TICK: Span = monitor::TICK;
+pub const TICK: Span = Span::from_millis(monitor::TICK.as_millis());
 /// A sector in progress is given to storage at least this often: with the tick's 50 ms a power cut costs less than 200 ms,
 /// however little comes.
 const PARTIAL: Span = Span::from_millis(150);
@@ -207,7 +207,7 @@ impl<'a> Monitoring<'a> {
     fn observe(&mut self, at: Instant, frame: &Frame<'_>) {
         self.sequences.frame(at, frame);
         if let Some((source, observation)) = hums_link::observe(frame) {
-            self.book.monitor.observe(at, source, &observation);
+            self.book.monitor.observe(at.into(), source, &observation);
         }
     }
 
@@ -344,8 +344,8 @@ impl<'a> Monitoring<'a> {
         let link = sequences.reading(now, book.monitor.vehicle().source);
         let recorder = figures.recorder(now, companion.stopped(), book.card, &book.journal, sectors);
         let Logbook { monitor, journal, .. } = book;
-        monitor.tick(now, &link, &recorder, &mut |finding| {
-            journal.record(now, &Record::Finding(FindingRecord::from(finding)), sectors);
+        monitor.tick(now.into(), &link, &recorder, &mut |finding| {
+            journal.record(now, &Record::Finding(FindingRecord::new(now, finding)), sectors);
             if finding.level == Level::Critical {
                 // Marks the place for whoever looks through the record.
                 let event = Event { number: CRITICAL, text: finding.check };

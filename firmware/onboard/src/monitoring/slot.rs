@@ -1,7 +1,7 @@
 //! What the card's slot is up to, told: why nothing is recorded, and that it is again.
 
 use hums_blackbox::record::{Event, Record};
-use hums_core::time::{Instant, Span};
+use hums_core::clock::{Instant, Span};
 use hums_recorder::CardState;
 
 use crate::journal::Journal;

@@ -1,9 +1,9 @@
 //! The monitor task's side: what is to be saved, and what is to be told about it.
 
 use hums_core::Monitor;
+use hums_core::clock::{Instant, Span};
 use hums_core::lifetime::{ITEM_BYTES_MAX, Room};
 use hums_core::params::Params;
-use hums_core::time::{Instant, Span};
 use hums_store::{Key, param_value};
 
 use super::mailbox::MailboxIn;
@@ -148,7 +148,7 @@ impl<'a> Handover<'a> {
 
     /// Each item that is due; `false` when one found no room.
     fn put_items(&mut self, now: Instant, monitor: &mut Monitor) -> bool {
-        while let Some(key) = monitor.save_due(now, self.status.read().room) {
+        while let Some(key) = monitor.save_due(now.into(), self.status.read().room) {
             let mut bytes = [0; ITEM_BYTES_MAX];
             let length = monitor.encode_item(key, &mut bytes);
             if !self.items.put(Key::item(key.number()), bytes.get(..length).unwrap_or_default()) {

@@ -9,12 +9,12 @@ use hums_store::sim::SimFlash;
 use super::keeper::{Keeper, Kept};
 use super::{Calm, Handover, Mailbox, StoreStatus};
 use hums_core::Monitor;
+use hums_core::clock::Instant;
 use hums_core::lifetime::{ItemKey, Room};
 use hums_core::observation::{
     Battery, Esc, EscGroup, Heartbeat, LandedState, Observation, Source, VehicleKind, VtolState,
 };
 use hums_core::params::Params;
-use hums_core::time::Instant;
 use hums_core::units::{Amperes, Celsius, Rpm, Volts};
 use hums_core::usage::UsageCounter;
 use hums_store::{Key, Store, param_value};
@@ -29,7 +29,7 @@ fn session(flash: &mut Flash, act: impl FnOnce(&mut Monitor, &mut Handover, &mut
     let mut keeper = Keeper::mount(Some(flash), items_out, &status);
     keeper.turn_ahead();
     keeper.load(&mut monitor);
-    monitor.tick(Instant::ZERO, &LinkReading::default(), &RecorderStatus::default(), &mut |_| ());
+    monitor.tick(Instant::ZERO.into(), &LinkReading::default(), &RecorderStatus::default(), &mut |_| ());
     let mut handover = Handover::new(items_in, &status, &mut monitor);
     act(&mut monitor, &mut handover, &mut keeper);
 }
@@ -132,17 +132,17 @@ fn live(second: u64, flies: bool, monitor: &mut Monitor, handover: &mut Handover
     let now = Instant::from_millis(second * 1_000);
     let source = Source { system: 1, component: 1 };
     let heartbeat = Heartbeat { armed: flies, kind: VehicleKind::Rotorcraft, ..Heartbeat::default() };
-    monitor.observe(now, source, &Observation::Heartbeat(heartbeat));
+    monitor.observe(now.into(), source, &Observation::Heartbeat(heartbeat));
     let landed = if flies { LandedState::InAir } else { LandedState::OnGround };
-    monitor.observe(now, source, &Observation::Landed(landed, VtolState::Unknown));
+    monitor.observe(now.into(), source, &Observation::Landed(landed, VtolState::Unknown));
     let current = Some(Amperes(if flies { 20.0 } else { 0.5 }));
     let temperature = Some(Celsius(30.0 + (second / 60 % 60) as f32));
     let battery = Battery { voltage: Some(Volts(15.0)), current, temperature, ..Battery::default() };
-    monitor.observe(now, source, &Observation::Battery(battery));
+    monitor.observe(now.into(), source, &Observation::Battery(battery));
     let esc =
         Esc { rpm: Some(Rpm(if flies { 6_000.0 } else { 0.0 })), current, temperature, ..Esc::default() };
-    monitor.observe(now, source, &Observation::Escs(EscGroup { first: 0, escs: [Some(esc); 4] }));
-    monitor.tick(now, &LinkReading::default(), &RecorderStatus::default(), &mut |_| ());
+    monitor.observe(now.into(), source, &Observation::Escs(EscGroup { first: 0, escs: [Some(esc); 4] }));
+    monitor.tick(now.into(), &LinkReading::default(), &RecorderStatus::default(), &mut |_| ());
     handover.step(now, monitor, frames);
 }
 

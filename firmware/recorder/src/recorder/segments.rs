@@ -2,7 +2,7 @@
 
 use hums_blackbox::record::{Before, Found};
 use hums_blackbox::{GROUP_SECTORS, SECTOR_BYTES};
-use hums_core::time::Instant;
+use hums_core::clock::Instant;
 
 use super::before;
 use crate::CardDevice;

@@ -1,6 +1,6 @@
 //! Finds out what card is in the slot (SD specification, 7.2.1 and figure 7-2).
 
-use hums_core::time::Span;
+use hums_core::clock::Span;
 
 use super::error::SpiError;
 use super::line::{BUSY_MAX, Line, STOP_TRANSMISSION};

@@ -1,6 +1,6 @@
 //! Commands, answers and blocks on the bus, each within its time (SD specification, chapter 7).
 
-use hums_core::time::{Instant, Span};
+use hums_core::clock::{Instant, Span};
 
 use super::crc::{crc7, crc16};
 use super::error::SpiError;

@@ -25,7 +25,7 @@ mod registers;
 use core::cell::RefCell;
 
 use embedded_sdmmc::{Block, BlockCount, BlockDevice, BlockIdx};
-use hums_core::time::Span;
+use hums_core::clock::Span;
 
 pub use error::SpiError;
 pub use line::BUSY_MAX;

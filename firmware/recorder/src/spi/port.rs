@@ -1,6 +1,6 @@
 //! What the driver needs of a board: a bus, a select pin and a clock.
 
-use hums_core::time::Instant;
+use hums_core::clock::Instant;
 
 /// How fast the bus runs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -20,7 +20,7 @@ use std::time::{Duration, Instant as Wall};
 use anyhow::Result;
 use hums_blackbox::Record;
 use hums_blackbox::record::{FindingRecord, Moment, USAGE_ENTRIES_MAX, Usage};
-use hums_core::time::{Instant, Span};
+use hums_core::clock::{Instant, Span};
 use hums_link::{Frame, observe};
 
 use self::batch::Batch;
@@ -111,11 +111,11 @@ impl Influx {
 
     /// Points for the findings that the world has made.
     pub fn found(&mut self, epoch_us: u64, world: &World) {
-        for (system, finding) in &world.found {
+        for (at, system, finding) in &world.found {
             let tags = self.names.tags(*system, world);
             let mut lines = Lines::default();
-            for row in rows(&Record::Finding(FindingRecord::from(finding))) {
-                lines.row(&tags, finding.at, &row);
+            for row in rows(&Record::Finding(FindingRecord::new(*at, finding))) {
+                lines.row(&tags, *at, &row);
             }
             self.put(&lines, epoch_us, false);
         }

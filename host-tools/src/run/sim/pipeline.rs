@@ -6,7 +6,7 @@ use std::path::Path;
 
 use anyhow::Result;
 use hums_blackbox::record::Boot;
-use hums_core::time::{Instant, Span};
+use hums_core::clock::{Instant, Span};
 use hums_onboard::monitoring::TICK;
 use hums_onboard::persist::Kept;
 use hums_onboard::queues::{Ends, FRAME_BYTES_MAX};
@@ -207,7 +207,7 @@ impl<'a, 'w> Pipeline<'a, 'w> {
         let Outside { findings, power_on_us, .. } = outside;
         monitoring.tick(*now, &mut ends.sectors_in, &mut ends.gs_in, &mut |finding| {
             findings(Finding {
-                time_s: power_on_us.saturating_add(finding.at.as_micros()) as f64 / 1e6,
+                time_s: power_on_us.saturating_add(now.as_micros()) as f64 / 1e6,
                 ..Finding::from(finding)
             });
         });

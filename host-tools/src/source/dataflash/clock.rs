@@ -4,7 +4,7 @@
 //! oldest (`ArduCopter` 2.9 and 3.0) only in GPS messages, as the receiver's time of the week. A message without a time
 //! counts as written with the one before it, and one with a wrong time too.
 
-use hums_core::time::{Instant, Span};
+use hums_core::clock::{Instant, Span};
 
 use super::ahead::Ahead;
 use super::format::Formats;

@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use anyhow::Result;
+use hums_core::clock::Instant;
 use hums_core::observation::Source;
-use hums_core::time::Instant;
 
 use super::ahead::Ahead;
 use super::clock::{Clock, Own};

@@ -4,7 +4,7 @@
 
 use std::io::Read;
 
-use hums_core::time::Instant;
+use hums_core::clock::Instant;
 
 use super::records::{Records, UTC_US_MIN};
 use crate::mavlink::frame::{Check, Peek, peek};

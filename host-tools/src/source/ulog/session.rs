@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use anyhow::{Result, bail};
 use hums_core::alert::{self, event_name};
-use hums_core::time::Span;
+use hums_core::clock::Span;
 
 use super::fields::Fields;
 use super::format::Formats;

@@ -1,6 +1,6 @@
 //! A small writer of `ULog`, for tests: what it writes is what the format's description says.
 
-use hums_core::time::Instant;
+use hums_core::clock::Instant;
 
 use super::Ulog;
 use crate::source::item::{Gap, Item, Reader, Rows, Summary, Value, Want};

@@ -7,8 +7,8 @@ use std::slice;
 
 use anyhow::{Context as _, Result, bail};
 use hums_blackbox::GROUP_SECTORS;
+use hums_core::clock::{Instant, Span};
 use hums_core::health::Level;
-use hums_core::time::{Instant, Span};
 
 use super::ftp::Ftp;
 use super::moment::{Sectors as _, between, first_group, group_before};

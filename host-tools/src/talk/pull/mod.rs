@@ -21,7 +21,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result, bail};
 use hums_blackbox::SECTOR_BYTES;
-use hums_core::time::Instant;
+use hums_core::clock::Instant;
 use serde::Serialize;
 
 use self::compare::{Heading, Likeness, beginning_of, compare, heading_here, heading_of};

@@ -5,7 +5,7 @@ use std::ops::Range;
 
 use anyhow::Result;
 use hums_blackbox::{GROUP_SECTORS, Header, Sector};
-use hums_core::time::Instant;
+use hums_core::clock::Instant;
 
 /// Sectors before one that cannot be read, among which the beginning of a group is looked for.
 const STEPS_BACK_MAX: u32 = 2 * GROUP_SECTORS as u32;

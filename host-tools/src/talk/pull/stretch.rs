@@ -7,7 +7,7 @@ use std::path::PathBuf;
 
 use anyhow::Result;
 use hums_blackbox::{BlockCounts, Gap, Header, SECTOR_BYTES};
-use hums_core::time::Instant;
+use hums_core::clock::Instant;
 
 use super::session::number;
 use crate::logs::fat::Extent as Bytes;

@@ -205,8 +205,14 @@ fn a_part_that_has_what_the_card_has_lost_since_is_not_written_over() {
     lost[..SECTOR_BYTES].fill(0);
     let mut ftp = board(lost.clone(), lost, u32::MAX);
     let what: cli::Around = "0".parse().expect("a time");
-    around::pull(&mut ftp, &[NAME.to_owned()], &[], dir.path(), (&what, hums_core::time::Span::from_secs(1)))
-        .expect("a part");
+    around::pull(
+        &mut ftp,
+        &[NAME.to_owned()],
+        &[],
+        dir.path(),
+        (&what, hums_core::clock::Span::from_secs(1)),
+    )
+    .expect("a part");
     assert_eq!(fs::read(&part).expect("there"), log);
 }
 
@@ -217,7 +223,7 @@ fn a_part_has_sectors_of_one_session_also_where_the_log_is_exchanged_while_it_is
     let what: cli::Around = "0".parse().expect("a time");
     // The log's beginning is read before.
     let mut ftp = board(log.clone(), other, 8 * 3 + 5);
-    let span = hums_core::time::Span::from_secs(9_999);
+    let span = hums_core::clock::Span::from_secs(9_999);
     let names = [NAME.to_owned()];
     let brought = around::pull(&mut ftp, &names, &[], dir.path(), (&what, span)).expect("a part");
     let [(_, path)] = &brought.parts[..] else { panic!("{brought:?}") };
@@ -600,7 +606,7 @@ fn a_sector_of_a_part_that_belongs_elsewhere_is_brought_anew() {
     let around = |ftp: &mut Ftp| {
         let what: cli::Around = "1:00".parse().expect("a time");
         let names = [NAME.to_owned()];
-        around::pull(ftp, &names, &[], dir.path(), (&what, hums_core::time::Span::from_secs(9_999)))
+        around::pull(ftp, &names, &[], dir.path(), (&what, hums_core::clock::Span::from_secs(9_999)))
             .expect("a part")
     };
     let mut ftp = board(log.clone(), Vec::new(), u32::MAX);

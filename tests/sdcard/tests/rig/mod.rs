@@ -11,9 +11,9 @@ use embedded_sdmmc::Block;
 use hums_blackbox::record::{Boot, Record, Resting};
 use hums_blackbox::{Gap, Item, LogReader, Writer};
 use hums_core::Monitor;
+use hums_core::clock::{Instant, Span};
 use hums_core::health::Level;
 use hums_core::params::Params;
-use hums_core::time::{Instant, Span};
 use hums_link::frame::{Check, Frame};
 use hums_onboard::queues::{Ends, FRAME_BYTES_MAX, Queues};
 use hums_onboard::storage::NO_CARD_RETRY;
@@ -182,7 +182,7 @@ impl Rig {
         }
         assert_eq!(supervisor.silent(*tick_at), None, "the watchdog would bite");
         monitoring.tick(*tick_at, &mut ends.sectors_in, &mut ends.gs_in, &mut |finding| {
-            findings.push((finding.at, finding.check, finding.level));
+            findings.push((Instant::of(finding.at, *tick_at), finding.check, finding.level));
         });
     }
 

@@ -12,7 +12,7 @@ use embassy_stm32::gpio::{Level, Output};
 use embassy_stm32::mode::Async;
 use embassy_stm32::spi::{Error, Spi, mode::Master};
 use embassy_stm32::time::Hertz;
-use hums_core::time::{Instant, Span};
+use hums_core::clock::{Instant, Span};
 use hums_recorder::SpiCard;
 use hums_recorder::spi::{Clock, Port, PortFailed};
 

@@ -14,7 +14,7 @@ pub(super) mod held;
 mod log;
 mod step;
 
-use hums_core::time::Instant;
+use hums_core::clock::Instant;
 use hums_link::ftp;
 use hums_link::request::{Port, Reply, Request};
 

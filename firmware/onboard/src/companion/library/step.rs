@@ -1,6 +1,6 @@
 //! What one look at an answer of the card's did, and the way to whoever asked.
 
-use hums_core::time::Instant;
+use hums_core::clock::Instant;
 use hums_link::messages;
 use hums_link::outlet::Class;
 use hums_link::packet::Packet;

@@ -3,8 +3,8 @@
 use hums_blackbox::Writer;
 use hums_blackbox::record::Boot;
 use hums_core::Monitor;
+use hums_core::clock::{Instant, Span};
 use hums_core::params::{Param, Params};
-use hums_core::time::{Instant, Span};
 use hums_link::encode::{Encoder, FRAME_BYTES_MAX};
 use hums_link::packet::Packet;
 use hums_recorder::{CardState, CardStatus};

@@ -4,7 +4,7 @@
 //! flies must have been armed: a throttle above idle, or the speed of a plane that flies, is evidence. The first message
 //! about arming ends the guessing.
 
-use hums_core::time::{Instant, Span};
+use hums_core::clock::{Instant, Span};
 
 /// Evidence that lasts this long counts: throttle is touched for a test.
 const ARMED_AFTER: Span = Span::from_secs(2);

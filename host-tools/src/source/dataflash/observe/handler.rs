@@ -1,6 +1,6 @@
 //! One message's way to what it says: which columns it has, and their values.
 
-use hums_core::time::Instant;
+use hums_core::clock::Instant;
 
 use super::say::Out;
 use super::state::State;

@@ -15,7 +15,7 @@ mod state;
 mod system;
 mod words;
 
-use hums_core::time::Instant;
+use hums_core::clock::Instant;
 
 use self::handler::{Given, Handler, Slots};
 pub(super) use self::say::{Out, Say};

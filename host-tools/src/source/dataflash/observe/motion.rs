@@ -2,11 +2,11 @@
 
 use std::num::NonZeroU32;
 
+use hums_core::clock::Span;
 use hums_core::observation::{
     Air, Attitude, Estimator, EstimatorScale, GlobalPosition, Gnss, Hud, Imu, LocalPosition, MOTORS_MAX,
     Observation, Outputs, SecondEstimate, SystemTime, Vibration, VibrationScale, Wanted, WantedRates,
 };
-use hums_core::time::Span;
 use hums_core::units::{
     Celsius, Fraction, GRAVITY, Gauss, Hectopascals, Metres, MetresPerSecond, MetresPerSecond2, Position,
     Radians, RadiansPerSecond, norm,

@@ -1,11 +1,11 @@
 //! What a log has told so far, as far as later messages need it: MAVLink's messages are put together of several of the
 //! log's, and some of them are told by nothing but events.
 
+use hums_core::clock::{Instant, Span};
 use hums_core::observation::{
     Autopilot, AutopilotIdentity, Battery, CELLS_MAX, CellVoltage, Heartbeat, LandedState, Observation,
     Sensors, SystemStatus, VehicleKind, VtolState,
 };
-use hums_core::time::{Instant, Span};
 use hums_core::units::{Amperes, Fraction, Gauss, Metres, RadiansPerSecond, Volts};
 
 use super::arming::{Arming, Word};

@@ -1,7 +1,7 @@
 //! The autopilot's processor, its radios, and what a plane says of its state.
 
+use hums_core::clock::Span;
 use hums_core::observation::{LandedState, Observation, RadioControl, TelemetryRadio};
-use hums_core::time::Span;
 
 use super::handler::{Given, Handler};
 use super::say::Out;

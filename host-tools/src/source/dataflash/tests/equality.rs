@@ -7,12 +7,12 @@
 use std::path::Path;
 
 use hums_core::Monitor;
+use hums_core::clock::Instant;
 use hums_core::health::Level;
-use hums_core::monitor::TICK;
 use hums_core::observation::Observation;
 use hums_core::params::Params;
 use hums_core::status::{LinkReading, RecorderStatus};
-use hums_core::time::Instant;
+use hums_onboard::monitoring::TICK;
 
 use crate::source::item::{Item, Want};
 use crate::source::recording::Place;
@@ -32,7 +32,7 @@ fn findings(name: &str) -> (Vec<Change>, f64) {
         let Item::Observation(source, observation) = item else { return Ok(()) };
         let step = next.get_or_insert(at);
         while *step <= at {
-            monitor.tick(*step, &link, &recorder, &mut |finding| {
+            monitor.tick((*step).into(), &link, &recorder, &mut |finding| {
                 changes.push((finding.check, finding.instance, finding.level, step.as_secs_f64() + boot_s));
             });
             *step = *step + TICK;
@@ -42,7 +42,7 @@ fn findings(name: &str) -> (Vec<Change>, f64) {
             boot_s = f64::from(attitude.boot_ms.expect("ArduPilot")) / 1e3 - at.as_secs_f64();
             begins_s = begins_s.min(at.as_secs_f64() + boot_s);
         }
-        monitor.observe(at, source, observation);
+        monitor.observe(at.into(), source, observation);
         Ok(())
     };
     recording.read(Want { observations: true, ..Want::default() }, &mut take).expect("readable");

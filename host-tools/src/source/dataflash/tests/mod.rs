@@ -11,8 +11,8 @@ mod time;
 mod writer;
 
 use anyhow::Result;
+use hums_core::clock::Instant;
 use hums_core::observation::{LandedState, Observation, VehicleKind};
-use hums_core::time::Instant;
 
 use self::writer::Writer;
 use super::*;

@@ -16,7 +16,7 @@ mod system;
 #[cfg(test)]
 mod tests;
 
-use hums_core::time::Instant;
+use hums_core::clock::Instant;
 
 pub(crate) use self::system::mode_name;
 

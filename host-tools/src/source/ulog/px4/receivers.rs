@@ -6,8 +6,8 @@
 
 use std::num::NonZeroU32;
 
+use hums_core::clock::{Instant, Span};
 use hums_core::observation::{Gnss, GnssIntegrity, Observation};
-use hums_core::time::{Instant, Span};
 use hums_core::units::{Metres, MetresPerSecond, Radians};
 
 use super::motion::place;

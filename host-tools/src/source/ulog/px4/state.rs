@@ -1,7 +1,7 @@
 //! What topics said so far, as far as one message needs what others said.
 
+use hums_core::clock::Instant;
 use hums_core::observation::{Observation, Sensors, Source};
-use hums_core::time::Instant;
 use hums_core::units::{Amperes, Fraction, Gauss, RadiansPerSecond, Volts};
 
 use super::super::fields::Fields;
