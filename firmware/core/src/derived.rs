@@ -5,12 +5,12 @@ use crate::cells::Cells;
 use crate::crosscheck::Crosschecks;
 use crate::currents::Currents;
 use crate::flight::{Flight, FlightEvent};
+use crate::gates;
 use crate::inertial::FORCE_MAX;
 use crate::latest::{Latest, Reading};
 use crate::observation::{Battery, EscGroup, Imu, MOTORS_MAX, Observation, Vibration};
 use crate::outputs::MotorOutputs;
 use crate::params::{Param, Params};
-use crate::response::Response;
 use crate::status::RecorderStatus;
 use crate::time::{Instant, Span, Stamp};
 use crate::trend::{Rate, Resistance};
@@ -74,7 +74,6 @@ pub struct Derived {
     currents: Currents,
     crosschecks: Crosschecks,
     outputs: MotorOutputs,
-    response: Response,
     /// Of the last sample, and smoothed.
     load_factor: Latest<[f32; 2]>,
     /// When anything at all was heard of the vehicle.
@@ -140,9 +139,8 @@ impl Derived {
             resistance: [Resistance::new(); BATTERIES_MAX],
             motors: [MOTOR; MOTORS_MAX],
             currents: Currents::new(),
-            crosschecks: Crosschecks::new(),
+            crosschecks: Crosschecks::NEW,
             outputs: MotorOutputs::new(),
-            response: Response::new(),
             load_factor: Latest::nothing(),
             heard: None,
             resumed: Instant::ZERO,
@@ -171,32 +169,33 @@ impl Derived {
     pub fn observe(&mut self, at: Instant, vehicle: &Vehicle, flight: &Flight, observation: &Observation) {
         self.hear(at);
         match observation {
-            Observation::Imu(imu) => self.take_imu(at, imu, vehicle, flight),
-            Observation::Air(air) => self.crosschecks.take_air(at, air, vehicle, flight),
+            Observation::Imu(imu) => self.take_imu(at, imu, vehicle),
+            Observation::Air(air) => self.crosschecks.take_air(at, air, vehicle),
             Observation::ImuAndAir(imu, air) => {
                 self.crosschecks.select(vehicle);
-                self.take_imu(at, imu, vehicle, flight);
-                self.crosschecks.take_air(at, air, vehicle, flight);
+                self.take_imu(at, imu, vehicle);
+                self.crosschecks.take_air(at, air, vehicle);
             }
-            Observation::Attitude(attitude) => self.response.take_attitude(at, attitude, vehicle, flight),
-            Observation::Wanted(wanted) => self.response.take_wanted(at, wanted.rates, vehicle),
-            Observation::SecondEstimate(second) => {
-                self.crosschecks.take_second(at, second, vehicle, flight);
-            }
+            Observation::Attitude(attitude) => self.crosschecks.take_attitude(at, attitude),
+            Observation::Wanted(wanted) => self.crosschecks.take_rate_setpoint(at, wanted.rates, vehicle),
+            Observation::SecondEstimate(second) => self.crosschecks.take_second(at, second, vehicle),
             Observation::Hud(hud) => {
                 // On wings a motor is off without throttle, and its ESC may fall silent.
                 let is_off = hud.throttle.is_some_and(|throttle| throttle.0 < OFF_THROTTLE);
                 if is_off && vehicle.hovers(at) == Some(false) {
                     self.resumed = at;
                 }
-                self.response.take_hud(at, hud, vehicle, flight);
+                self.crosschecks.take_hud(at, hud, vehicle);
             }
-            Observation::Estimator(estimator) => self.crosschecks.take_estimator(at, estimator, flight),
+            Observation::Estimator(estimator) => self.crosschecks.take_estimator(at, estimator),
             // On the scale that the vehicle knows.
-            Observation::Vibration(_) => self.crosschecks.take_vibration(at, vehicle, flight),
-            Observation::Outputs(outputs) => self.outputs.take(at, outputs, vehicle, flight),
+            Observation::Vibration(_) => self.crosschecks.take_vibration(at, vehicle),
+            Observation::Outputs(outputs) => {
+                let level = self.crosschecks.gates().are(gates::SETTLED | gates::CLEAR | gates::LEVEL);
+                self.outputs.take(at, outputs, vehicle, flight, level);
+            }
             Observation::Gnss(gnss) => {
-                self.crosschecks.take_gnss(at, gnss, vehicle, flight);
+                self.crosschecks.take_gnss(at, gnss, vehicle);
                 if let Some(had_fix) = self.had_fix.get_mut(usize::from(gnss.instance)) {
                     *had_fix |= gnss.fix >= 3;
                 }
@@ -227,8 +226,8 @@ impl Derived {
         }
     }
 
-    fn take_imu(&mut self, at: Instant, imu: &Imu, vehicle: &Vehicle, flight: &Flight) {
-        self.crosschecks.take_imu(at, imu, vehicle, flight);
+    fn take_imu(&mut self, at: Instant, imu: &Imu, vehicle: &Vehicle) {
+        self.crosschecks.take_imu(at, imu, vehicle);
         // What shakes so has no load factor: its samples are of the vibration, and too few to average that out.
         let shakes =
             |vibration: &Vibration| vibration.levels.iter().flatten().any(|level| *level >= SHAKES_MPS2);
@@ -303,7 +302,6 @@ impl Derived {
         if matches!(event, Some(FlightEvent::TakeOff | FlightEvent::Resumed)) {
             self.crosschecks.begin();
             self.outputs.begin();
-            self.response.begin();
         }
         self.crosschecks.step(now, vehicle, flight);
         let clips = clips(vehicle).unwrap_or(0);
@@ -326,11 +324,6 @@ impl Derived {
     /// What the motors are given.
     pub(crate) const fn outputs(&self) -> &MotorOutputs {
         &self.outputs
-    }
-
-    /// What it does against what it is told to do.
-    pub(crate) const fn response(&self) -> &Response {
-        &self.response
     }
 
     /// What the motors take.

@@ -39,7 +39,8 @@ const LANDED_HEIGHT_M: f32 = 0.5;
 const PLANE_FLYING_MPS: f32 = 8.0;
 /// A multicopter hovers at a quarter to three quarters of its throttle, where nothing better is known.
 pub(crate) const FLYING_THROTTLE: f32 = 0.2;
-const FULL_THROTTLE: f32 = 0.95;
+/// Full throttle: autopilots end within 5 % of it.
+pub(crate) const FULL_THROTTLE: f32 = 0.95;
 /// Near the ground.
 const HPA_PER_METRE: f32 = 0.12;
 const STILL_MPS: f32 = 0.5;

@@ -14,13 +14,13 @@
 //! A heading that is wrong turns a horizontal force, and makes it neither longer nor shorter: where the lengths agree, what 30 degrees make
 //! of the change of velocity is taken off. So a compass that led the attitude astray hardly shows here.
 
-use crate::flight::Flight;
+use crate::gates::{self, Gates};
 use crate::inertial::FORCE_MAX;
 use crate::latest::Reading;
 use crate::motion::climb_within;
-use crate::observation::{Gnss, VehicleKind};
+use crate::observation::Gnss;
+use crate::residual::smooth;
 use crate::rotation::to_earth;
-use crate::steady::{TURNED, is_clear};
 use crate::time::{Instant, Span, Stamp};
 use crate::units::{GRAVITY, norm};
 use crate::vehicle::Vehicle;
@@ -110,12 +110,9 @@ impl ImuGnssResidual {
     }
 
     /// What a receiver says that does not repeat itself.
-    pub(crate) fn take_gnss(&mut self, at: Instant, gnss: &Gnss, vehicle: &Vehicle, flight: &Flight) {
-        let on_rotors = vehicle.kind() == VehicleKind::Rotorcraft;
-        let judged = gnss.is_exact()
-            && (on_rotors || vehicle.kind() == VehicleKind::Plane)
-            && flight.is_settled(at)
-            && is_clear(at, vehicle);
+    pub(crate) fn take_gnss(&mut self, at: Instant, gnss: &Gnss, vehicle: &Vehicle, gates: Gates) {
+        let on_rotors = gates.are(gates::ROTORS);
+        let judged = gnss.is_exact() && gates.are(gates::SETTLED | gates::CLEAR | gates::ONE_FRAME);
         let climb_mps = if on_rotors { climb_within(at, vehicle, CLIMB_AGE) } else { Some(0.0) };
         let (Some(speed), Some(course), Some(climb_mps), true) = (gnss.speed, gnss.course, climb_mps, judged)
         else {
@@ -131,8 +128,8 @@ impl ImuGnssResidual {
             (self.at, self.residual) = (Stamp::NONE, None);
             return;
         }
-        let turns_little = vehicle.inertial.turns_little(at, TURNED);
-        self.residual = missing.filter(|_| turns_little).map(|missing| (missing - shaken).max(0.0));
+        self.residual =
+            missing.filter(|_| gates.are(gates::STILL)).map(|missing| (missing - shaken).max(0.0));
     }
 
     /// A velocity, and the time since the one before, where it is compared with that: what is missing in so many of the axes north, east,
@@ -152,14 +149,16 @@ impl ImuGnssResidual {
             return None;
         };
         let weight = step_s / (SMOOTHING_S + step_s);
-        let mut changes = [0.0; 3];
+        let mut force = [0.0; 3];
+        let mut missing = [0.0; 3];
         for axis in 0..axes {
-            let force = f32::midpoint(force_before[axis], force_now[axis]);
-            let missing = (force - (velocity[axis] - before[axis]) / step_s).clamp(-LEAP_MPS2, LEAP_MPS2);
-            self.missing[axis] += weight * (missing - self.missing[axis]);
-            self.force[axis] += weight * (force - self.force[axis]);
-            changes[axis] = (force - self.force[axis]) / SMOOTHING_S;
+            force[axis] = f32::midpoint(force_before[axis], force_now[axis]);
+            let change = (velocity[axis] - before[axis]) / step_s;
+            missing[axis] = (force[axis] - change).clamp(-LEAP_MPS2, LEAP_MPS2);
         }
+        smooth(&mut self.missing, missing, weight, f32::INFINITY);
+        smooth(&mut self.force, force, weight, f32::INFINITY);
+        let changes = [0, 1, 2].map(|axis| (force[axis] - self.force[axis]) / SMOOTHING_S);
         let ([north, east, down], [force_north, force_east, _]) = (self.missing, self.force);
         let specific_force = norm([force_north, force_east, 0.0]);
         let kinematic_acceleration = norm([force_north - north, force_east - east, 0.0]);

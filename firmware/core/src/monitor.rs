@@ -329,7 +329,8 @@ impl Monitor {
 
     /// From which figure on vibration counts as risen, by what is usual in this flight; `None` until that is known.
     pub fn vibration_limit(&self) -> Option<f32> {
-        self.derived.crosschecks().shaking().limit(self.params.get(Param::VibeRiseWarn))
+        let times = self.params.get(Param::VibeRiseWarn);
+        self.derived.crosschecks().vibration_limit(&self.vehicle, times)
     }
 
     /// Whether nothing tells how many cells a battery has that carries the vehicle: then its voltage raises no alarm.

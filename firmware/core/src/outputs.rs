@@ -7,7 +7,7 @@
 //! or turns it changes commands in pairs: as much down on one side as up on the other. What is judged is therefore how far the highest
 //! change is above the second, less how far the others are apart from each other: of four motors all others, of six without the
 //! lowest. Of six it is half of the loss, and counts twice. It is in percent of what the motors are given on the average, smoothed, and
-//! against what was usual in this flight ([`crate::departure`]), less what commands vary by anyway. (Derived from the geometry of
+//! against what was usual in this flight ([`crate::adaptive_baseline`]), less what commands vary by anyway. (Derived from the geometry of
 //! regular frames, for this project.)
 //!
 //! Of eight motors, flat or two on each of four arms, it is 1/2 of the loss at the weak motor, a quarter or less at three others, and less at
@@ -30,12 +30,11 @@
 
 use core::ops::RangeInclusive;
 
+use crate::adaptive_baseline::AdaptiveBaseline;
 use crate::baseline::OUTPUTS_MAX;
-use crate::departure::Departure;
 use crate::flight::Flight;
 use crate::latest::Reading;
 use crate::observation::{MOTORS_MAX, Outputs};
-use crate::steady::flies_level;
 use crate::time::{Instant, Span, Stamp};
 use crate::vehicle::Vehicle;
 
@@ -137,7 +136,7 @@ pub(crate) struct MotorOutputs {
     /// Outputs that are at the end of their range: a bit each.
     full: u8,
     /// Command against the average of all, percent.
-    share: [Departure; JUDGED_MAX],
+    share: [AdaptiveBaseline; JUDGED_MAX],
     at: Stamp,
     /// The motor that has stood out over time, and by how much, percent for [`SUMMED_S`].
     summed: (u8, f32),
@@ -162,7 +161,7 @@ impl MotorOutputs {
             carried: 0,
             off: 0,
             full: 0,
-            share: [Departure::NEW; JUDGED_MAX],
+            share: [AdaptiveBaseline::NEW; JUDGED_MAX],
             at: Stamp::NONE,
             summed: (0, 0.0),
             excess: (0, 0.0),
@@ -179,7 +178,14 @@ impl MotorOutputs {
         *self = Self { port, range, idle, carried, ..Self::new() };
     }
 
-    pub(crate) fn take(&mut self, at: Instant, outputs: &Outputs, vehicle: &Vehicle, flight: &Flight) {
+    pub(crate) fn take(
+        &mut self,
+        at: Instant,
+        outputs: &Outputs,
+        vehicle: &Vehicle,
+        flight: &Flight,
+        flies_level: bool,
+    ) {
         let told = motors(vehicle);
         if !outputs.pulses.iter().take(told).any(|pulse| *pulse > 0) {
             return;
@@ -216,9 +222,9 @@ impl MotorOutputs {
                 let out =
                     only(given, is_off, surely_carries).filter(|_| used).map(|place| (place, OFF_PERCENT));
                 let full = || Some((full_alone(given)?, AT_END_PERCENT));
-                let at_end = out.or_else(full).filter(|(place, _)| {
-                    (self.moved | 1 << place) & all == all && flies_level(at, vehicle, flight)
-                });
+                let at_end = out
+                    .or_else(full)
+                    .filter(|(place, _)| (self.moved | 1 << place) & all == all && flies_level);
                 let lasts = self.at_end_since.run(at_end.is_some(), at, LASTS);
                 self.excess = at_end.filter(|_| lasts).unwrap_or_default();
             }
@@ -231,7 +237,7 @@ impl MotorOutputs {
         if (AT_END_PERCENT..OFF_PERCENT).contains(&self.excess.1) {
             (self.at, self.excess.1) = (Stamp::at(at), 0.0);
         }
-        if !known || !flies_level(at, vehicle, flight) || yaws(vehicle) {
+        if !known || !flies_level || yaws(vehicle) {
             return;
         }
         let mean = given.iter().sum::<f32>() / count as f32;
@@ -251,7 +257,7 @@ impl MotorOutputs {
         let step_s = self.at.age(at).filter(|step| *step <= PAUSE).map_or(0.0, Span::as_secs_f32);
         self.at = Stamp::at(at);
         for (share, given) in self.share.iter_mut().zip(given) {
-            share.follow(given / mean * 100.0 - 100.0, step_s, SMOOTHING_S);
+            share.follow(given / mean * 100.0 - 100.0, step_s / (SMOOTHING_S + step_s));
         }
         self.judge(count, step_s);
     }
@@ -321,7 +327,7 @@ impl MotorOutputs {
             6 => (changes[4], 0.5),
             _ => (lowest, 1.0),
         };
-        let spread = self.share.iter().take(count).map(Departure::spread).sum::<f32>() / count as f32;
+        let spread = self.share.iter().take(count).map(AdaptiveBaseline::spread).sum::<f32>() / count as f32;
         let excess = ((first.0 - second.0) - (second.0 - lowest.0)) / part;
         let (now, (summed, sum)) = (excess - SPREADS * spread / part, self.sum(excess, first.1, step_s));
         // What stands out over time goes on doing so while another one does for a moment.
@@ -352,7 +358,7 @@ impl MotorOutputs {
 
     /// All learn together.
     fn is_known(&self) -> bool {
-        self.share.first().is_some_and(Departure::is_known)
+        self.share.first().is_some_and(AdaptiveBaseline::is_known)
     }
 
     /// How many motors are judged; 0 of what is no such frame now.
@@ -457,7 +463,7 @@ mod tests {
                 }
             }
             for (share, figure) in outputs.share.iter_mut().zip(figures) {
-                share.follow(figure, STEP_S, 0.0);
+                share.follow(figure, 1.0);
             }
             outputs.judge(JUDGED_MAX, STEP_S);
             outputs.excess

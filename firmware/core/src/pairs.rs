@@ -1,16 +1,15 @@
 //! Sensors of one kind against each other.
 //!
-//! Two samples are compared where they are of one moment, and each sample once: how far they are apart is smoothed as a vector, so that
-//! noise and what the vehicle does between the two cancel. How long that vector is has a usual level in each flight
-//! ([`crate::departure`]): calibration, mounting and currents make one, and it is no fault. What comes to it in flight is. One sample moves
-//! it by half of the limit at most: one wrong message is no fault.
-//!
-//! Of three sensors the one is told that is apart from both others; of two nobody knows which of them is wrong, and the second one is
-//! told. One that says nothing any more is not counted.
+//! 1. Two samples are compared if they are of one moment, and each sample once. Their difference is smoothed as a vector, so that noise and
+//!    the motion between the two samples cancel. One sample moves it by half of the limit at most: one wrong message is no fault.
+//! 2. The length of that vector is the residual ([`crate::residual::PAIRS`]). Calibration, mounting and currents make its baseline.
+//! 3. Of three sensors the one that is apart from both others is wrong. Of two nobody knows which is wrong: the second one is named. A sensor
+//!    that sends nothing any more is not counted.
 
-use crate::departure::Departure;
-use crate::heights::SCALE_HEIGHT_M;
+use crate::baro_gnss::SCALE_HEIGHT_M;
+use crate::gates::{self, Gates};
 use crate::latest::Reading;
+use crate::residual::{PAIRS as ROWS, Residual, Row, smooth};
 use crate::time::{Instant, Span, Stamp};
 use crate::units::norm;
 
@@ -20,17 +19,16 @@ pub(crate) const SENSORS_MAX: usize = 3;
 const PAIRS: [(usize, usize); SENSORS_MAX] = [(0, 1), (0, 2), (1, 2)];
 /// Older samples, and older comparisons, say nothing.
 const FRESH: Span = Span::from_secs(2);
-/// A slow stream is smoothed over as many samples as one of 4 Hz, and its usual level is known after as many as that of one of 2 Hz.
-const STEP_MAX_S: f32 = 0.25;
-const LEARNT_MAX: Span = Span::from_millis(500);
 /// So long after the first comparison the difference is that of many samples, and learnt.
-const SETTLES_S: f32 = 2.0;
+const SETTLES_S: f32 = 1.5;
 /// No sensor measures so much, in any of the units.
 const GARBAGE: f32 = 1e6;
 /// Gyros differ so in scale, and autopilots calibrate their offsets only (MPU-6000: 3 %, data sheet).
 const GYRO_SCALE: f32 = 0.05;
-/// Before what is usual is known, one sample moves the difference by so many times what it may later.
+/// Until the baseline is known, one sample moves the difference by so many times as much.
 const UNKNOWN_TIMES: f32 = 4.0;
+/// The turn of a vehicle within so many milliseconds is no difference, however fast it turns.
+const AT_ONCE_MS: u64 = 5;
 
 /// A kind of sensors.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -49,32 +47,21 @@ impl Kind {
     pub(crate) const ALL: [Self; 4] = [Self::Accelerometer, Self::Gyro, Self::Compass, Self::Barometer];
     pub(crate) const COUNT: usize = Self::ALL.len();
 
-    /// What one sample moves the difference by at most, and further beyond their usual range they teach nothing: half of the default limits.
-    const fn hold(self) -> f32 {
-        match self {
-            Self::Accelerometer => 0.5,
-            Self::Gyro => 0.05,
-            Self::Compass => 20.0,
-            Self::Barometer => 4.0,
-        }
+    const fn row(self) -> &'static Row {
+        &ROWS[self as usize]
     }
 
-    /// Time constant of the difference, and of its length. Motors shake accelerometers most.
-    const fn smoothing_s(self) -> f32 {
-        match self {
-            Self::Gyro | Self::Compass => 0.25,
-            Self::Accelerometer | Self::Barometer => 0.5,
-        }
-    }
-
-    /// Samples that come within so many milliseconds are of one moment, where the vehicle turns slower than 40 degrees a second: `ArduPilot`
-    /// tells of its sensors within 20 ms, and at different rates where it is asked so; and what climbs with 2.5 m/s does so by 0.6 m.
-    pub(crate) const fn one_moment_ms(self) -> u8 {
-        match self {
+    /// Samples within so many milliseconds are of one moment, if the vehicle turns slower than 40 degrees a second: `ArduPilot` sends its
+    /// sensors within 20 ms, and at different rates if it is asked so; and a vehicle that climbs with 2.5 m/s does so by 0.6 m. 0 where no
+    /// samples are.
+    fn one_moment(self, gates: Gates) -> Span {
+        Span::from_millis(match self {
+            _ if !self.row().is_open(gates) => 0,
+            Self::Gyro if !gates.are(gates::STILL) => AT_ONCE_MS,
             Self::Accelerometer | Self::Gyro => 25,
             Self::Compass => 100,
             Self::Barometer => 250,
-        }
+        })
     }
 
     fn difference(self, one: [f32; 3], other: [f32; 3]) -> [f32; 3] {
@@ -103,42 +90,33 @@ struct Sample {
 /// Two sensors of a kind.
 #[derive(Clone, Copy, Debug)]
 struct Pair {
-    /// When they were compared last.
-    at: Stamp,
     /// How far they are apart, smoothed.
     difference: [f32; 3],
-    usual: Departure,
+    residual: Residual,
 }
 
 impl Pair {
-    const NEW: Self = Self { at: Stamp::NONE, difference: [0.0; 3], usual: Departure::after(SETTLES_S) };
+    const NEW: Self = Self { difference: [0.0; 3], residual: Residual::after(SETTLES_S) };
 
     fn take(&mut self, at: Instant, kind: Kind, difference: [f32; 3]) {
         if !difference.iter().all(|axis| axis.abs() <= GARBAGE) {
             return;
         }
-        let learnt_s = self.at.age(at).unwrap_or(LEARNT_MAX).min(LEARNT_MAX).as_secs_f32();
-        let step_s = learnt_s.min(STEP_MAX_S);
-        let weight = if self.at.is_set() { step_s / (kind.smoothing_s() + step_s) } else { 1.0 };
-        let most = match (self.usual.is_known(), self.at.is_set()) {
-            (true, _) => kind.hold(),
-            (false, true) => UNKNOWN_TIMES * kind.hold(),
-            (false, false) => f32::INFINITY,
+        let row = kind.row();
+        let step = self.residual.at().age(at);
+        let most = match (self.residual.excess(row), step) {
+            (Some(_), _) => row.hold(),
+            (None, Some(_)) => UNKNOWN_TIMES * row.hold(),
+            (None, None) => f32::INFINITY,
         };
-        for (smooth, axis) in self.difference.iter_mut().zip(difference) {
-            *smooth += (weight * (axis - *smooth)).clamp(-most, most);
-        }
-        self.at = Stamp::at(at);
-        self.usual.follow(norm(self.difference), step_s, kind.smoothing_s());
-        if self.usual.beyond().is_none_or(|beyond| beyond <= kind.hold()) {
-            self.usual.learn(learnt_s);
-        }
+        smooth(&mut self.difference, difference, step.map_or(1.0, |step| row.weight(step)), most);
+        self.residual.take(row, at, norm(self.difference), 0.0);
     }
 
-    /// How far they are apart beyond what is usual, where that is known and fresh.
-    fn beyond(&self, now: Instant) -> Option<Reading> {
-        let at = self.at.instant(now).filter(|at| now.since(*at) <= FRESH);
-        Reading::new(at, self.usual.beyond())
+    /// How far they are apart beyond their baseline, while that is known and fresh.
+    fn excess(&self, now: Instant, kind: Kind) -> Option<Reading> {
+        let at = self.residual.at().instant(now).filter(|at| now.since(*at) <= FRESH);
+        Reading::new(at, self.residual.excess(kind.row()))
     }
 }
 
@@ -156,25 +134,22 @@ impl Pairs {
         pairs: [Pair::NEW; SENSORS_MAX],
     };
 
-    /// Takes a sample, and compares it with those of the others that came within so many milliseconds; with none where that is 0.
-    pub(crate) fn take(&mut self, at: Instant, kind: Kind, sensor: usize, axes: [f32; 3], moment_ms: u8) {
+    /// Takes a sample, and compares it with those of the others of the same moment.
+    pub(crate) fn take(&mut self, at: Instant, kind: Kind, sensor: usize, axes: [f32; 3], gates: Gates) {
         let Self { samples, pairs } = self;
+        let moment = kind.one_moment(gates);
         if let Some(sample) = samples.get_mut(sensor) {
             *sample = Sample { at: Stamp::at(at), axes };
         }
-        for ((one, other), pair) in PAIRS.into_iter().zip(pairs).filter(|_| moment_ms > 0) {
+        for ((one, other), pair) in PAIRS.into_iter().zip(pairs).filter(|_| moment > Span::ZERO) {
             let partner = match (one == sensor, other == sensor) {
                 (true, _) => other,
                 (_, true) => one,
                 _ => continue,
             };
             // Newer than when it was compared last.
-            let is_new = |age: Span| pair.at.age(at).is_none_or(|before| age < before);
-            if samples[partner]
-                .at
-                .age(at)
-                .is_some_and(|age| age <= Span::from_millis(moment_ms.into()) && is_new(age))
-            {
+            let is_new = |age: Span| pair.residual.at().age(at).is_none_or(|before| age < before);
+            if samples[partner].at.age(at).is_some_and(|age| age <= moment && is_new(age)) {
                 pair.take(at, kind, kind.difference(samples[one].axes, samples[other].axes));
             }
         }
@@ -197,13 +172,13 @@ impl Pairs {
 
     /// Whether any two were compared in this flight.
     pub(crate) fn are_compared(&self) -> bool {
-        self.pairs.iter().any(|pair| pair.at.is_set())
+        self.pairs.iter().any(|pair| pair.residual.at().is_set())
     }
 
     /// How far a sensor is apart from all others, beyond what is usual; of two, for the second one. Measured when the first of its pairs
     /// was: one sample is one measurement.
-    pub(crate) fn mismatch(&self, now: Instant, sensor: usize) -> Option<Reading> {
-        let beyond = self.pairs.map(|pair| pair.beyond(now));
+    pub(crate) fn mismatch(&self, now: Instant, kind: Kind, sensor: usize) -> Option<Reading> {
+        let beyond = self.pairs.map(|pair| pair.excess(now, kind));
         let three = beyond.iter().all(Option::is_some);
         let mine = PAIRS
             .iter()

@@ -12,7 +12,11 @@
 //! Two messages may tell of the same sensor in digits of their own, so a value counts as repeated where it is one of the last two.
 
 use crate::latest::Reading;
-use crate::time::Instant;
+use crate::motion::{climb_mps, ground_speed_mps};
+use crate::observation::Gnss;
+use crate::pairs::{Kind, SENSORS_MAX};
+use crate::time::{Instant, Span};
+use crate::vehicle::{RECEIVERS_MAX, Vehicle};
 
 /// Values that differed before anything is usual.
 const CHANGES_KNOWN: u8 = 20;
@@ -32,9 +36,23 @@ const SILENT_TIMES: u32 = 20;
 /// Each so long, ms, it must have moved again.
 const MOVES_MS: f32 = 3_000.0;
 
+/// A vehicle that moves by so much changes the values of its sensors: m up or down and over ground, rad about any axis.
+const CLIMBED_M: f32 = 0.3;
+const TRAVELLED_M: f32 = 0.5;
+const TURNED_RAD: f32 = 0.02;
+/// So many times as far it must have turned if all of its compasses repeat their values at once: an estimator's yaw drifts by 0.02
+/// rad in 3 s while a vehicle holds still, and a compass's digit of a milligauss may hide its noise.
+const ALL_REPEAT_TIMES: f32 = 10.0;
+/// An attitude that was not received for longer tells of no turn.
+const HOLE: Span = Span::from_secs(2);
+/// Less is no move, m/s and rad: an estimator trembles and has offsets while a simulator without noise hangs still, and the last digits
+/// of its sensors do not change.
+const HANGS_MPS: f32 = 0.3;
+const TREMBLES_RAD: f32 = 0.01;
+
 /// One sensor.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Stuck {
+struct Stuck {
     /// Check sums of the last two values that differed.
     values: [u16; 2],
     /// When the last one came first: milliseconds modulo 2^32.
@@ -52,7 +70,7 @@ pub(crate) struct Stuck {
 
 impl Stuck {
     /// Nothing seen.
-    pub(crate) const NEW: Self = Self {
+    const NEW: Self = Self {
         values: [0; 2],
         since_ms: 0,
         lasts_ms: 0,
@@ -64,7 +82,7 @@ impl Stuck {
     };
 
     /// Takes a value, as the bits of all it consists of; and how far it has moved in this flight.
-    pub(crate) fn take(&mut self, at: Instant, bits: impl IntoIterator<Item = u32>, moved: f32) {
+    fn take(&mut self, at: Instant, bits: impl IntoIterator<Item = u32>, moved: f32) {
         // FNV-1a, of words.
         let sum = bits.into_iter().fold(0x811C_9DC5_u32, |sum, word| (sum ^ word).wrapping_mul(0x0100_0193));
         let value = (sum ^ sum >> 16) as u16;
@@ -86,28 +104,23 @@ impl Stuck {
     }
 
     /// The same, as another flight begins, in which nothing is usual yet.
-    pub(crate) const fn begun(self) -> Self {
+    const fn begun(self) -> Self {
         Self { moved: 0.0, usual_ms: 0, ..self }
     }
 
-    /// Whether the last value is not a new one.
-    pub(crate) const fn repeats(&self) -> bool {
-        self.repeats > 0
-    }
-
     /// Whether a sensor's values differ in this flight.
-    pub(crate) const fn is_known(&self) -> bool {
+    const fn is_known(&self) -> bool {
         self.changes >= CHANGES_KNOWN
     }
 
     /// Whether this one took a new value in the second half of the time for which another has repeated its own: what changed both last
     /// comes in two messages, one after the other.
-    pub(crate) fn changed_during(&self, other: &Self) -> bool {
+    fn changed_during(&self, other: &Self) -> bool {
         self.since_ms.wrapping_sub(other.since_ms) as i32 > i32::from(other.lasts_ms / 2)
     }
 
     /// Whether it trembled while nothing moved, and does not any more.
-    pub(crate) fn fell_silent(&self) -> bool {
+    fn fell_silent(&self) -> bool {
         self.trembles >= CHANGES_KNOWN
             && u32::from(self.lasts_ms)
                 > (u32::from(self.usual_ms) * SILENT_TIMES).clamp(SILENT_MS, LASTS_MAX_MS)
@@ -115,12 +128,144 @@ impl Stuck {
 
     /// For how long it has been stuck, s; 0 while it is not. The vehicle has moved so far, and must have moved by `least`
     /// meanwhile, and again by as much each [`MOVES_MS`].
-    pub(crate) fn lasts(&self, now: Instant, moved: f32, least: f32) -> Option<Reading> {
+    fn lasts(&self, now: Instant, moved: f32, least: f32) -> Option<Reading> {
         let stuck = self.repeats >= REPEATS_MIN
             && u32::from(self.lasts_ms) > (u32::from(self.usual_ms) * TIMES).min(LASTS_MAX_MS)
             && moved - self.moved >= least * (f32::from(self.lasts_ms) / MOVES_MS).max(1.0);
         let value = if stuck { f32::from(self.lasts_ms) / 1_000.0 } else { 0.0 };
         self.is_known().then_some(Reading { at: now, value })
+    }
+}
+
+/// How far the vehicle has moved in this flight, to and fro.
+#[derive(Clone, Copy, Debug)]
+struct Moved {
+    climbed_m: f32,
+    travelled_m: f32,
+    turned_rad: f32,
+    /// The attitude when a turn was counted last, rad; none since a hole.
+    attitude: Option<[f32; 3]>,
+}
+
+impl Moved {
+    const NONE: Self = Self { climbed_m: 0.0, travelled_m: 0.0, turned_rad: 0.0, attitude: None };
+
+    fn step(&mut self, now: Instant, step_s: f32, vehicle: &Vehicle) {
+        let climb_mps = climb_mps(now, vehicle).map_or(0.0, libm::fabsf);
+        self.climbed_m += if climb_mps > HANGS_MPS { climb_mps * step_s } else { 0.0 };
+        self.travelled_m += ground_speed_mps(now, vehicle).map_or(0.0, |speed| speed * step_s);
+        let attitude = vehicle.attitude.within(now, HOLE);
+        let attitude = attitude.map(|told| [told.roll.0, told.pitch.0, told.yaw.0]);
+        let (Some(now), Some(before)) = (attitude, self.attitude) else {
+            // How it turned meanwhile, its sensors did not see either.
+            self.attitude = attitude;
+            return;
+        };
+        // Round north it jumps once a turn, which is a turn anyway.
+        let apart = |(axis, before): (f32, f32)| {
+            let apart = libm::fabsf(axis - before);
+            libm::fminf(apart, libm::fabsf(core::f32::consts::TAU - apart))
+        };
+        let turned_rad: f32 = now.into_iter().zip(before).map(apart).sum();
+        if turned_rad >= TREMBLES_RAD {
+            (self.turned_rad, self.attitude) = (self.turned_rad + turned_rad, Some(now));
+        }
+    }
+}
+
+/// All sensors by kind, and the receivers.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Repeats {
+    moved: Moved,
+    sensors: [[Stuck; SENSORS_MAX]; Kind::COUNT],
+    receivers: [Stuck; RECEIVERS_MAX],
+}
+
+impl Repeats {
+    /// Nothing seen.
+    pub(crate) const NEW: Self = Self {
+        moved: Moved::NONE,
+        sensors: [[Stuck::NEW; SENSORS_MAX]; Kind::COUNT],
+        receivers: [Stuck::NEW; RECEIVERS_MAX],
+    };
+
+    /// The same, as another flight begins.
+    pub(crate) fn begun(&self) -> Self {
+        let mut begun = Self::NEW;
+        begun.sensors[Kind::Barometer as usize] = self.sensors[Kind::Barometer as usize].map(Stuck::begun);
+        begun
+    }
+
+    /// One step of a vehicle that may move.
+    pub(crate) fn step(&mut self, now: Instant, step_s: f32, vehicle: &Vehicle) {
+        self.moved.step(now, step_s, vehicle);
+    }
+
+    /// How far the vehicle has moved so that a kind's values change, and how far it must.
+    const fn moved(&self, kind: Kind) -> (f32, f32) {
+        match kind {
+            Kind::Barometer => (self.moved.climbed_m, CLIMBED_M),
+            Kind::Accelerometer | Kind::Gyro | Kind::Compass => (self.moved.turned_rad, TURNED_RAD),
+        }
+    }
+
+    /// Takes a sample of a sensor: of a barometer always, of others in flight.
+    pub(crate) fn take(&mut self, at: Instant, kind: Kind, sensor: u8, sample: [f32; 3]) {
+        let (moved, _) = self.moved(kind);
+        if let Some(stuck) = self.sensors[kind as usize].get_mut(usize::from(sensor)) {
+            stuck.take(at, sample.map(f32::to_bits), moved);
+        }
+    }
+
+    /// Takes a receiver's place in flight.
+    pub(crate) fn take_gnss(&mut self, at: Instant, gnss: &Gnss) {
+        let place = gnss.position.filter(|_| gnss.fix >= 3);
+        let altitude = gnss.altitude.map_or(0.0, |altitude| altitude.0).to_bits();
+        let speed = gnss.speed.map_or(0.0, |speed| speed.0).to_bits();
+        if let (Some(place), Some(stuck)) = (place, self.receivers.get_mut(usize::from(gnss.instance))) {
+            let words = |degrees: f64| [degrees.to_bits() as u32, (degrees.to_bits() >> 32) as u32];
+            let place = words(place.latitude_deg).into_iter().chain(words(place.longitude_deg));
+            stuck.take(at, place.chain([altitude, speed]), self.moved.travelled_m);
+        }
+    }
+
+    /// Whether a receiver's last place is not a new one.
+    pub(crate) fn repeats_place(&self, receiver: usize) -> bool {
+        self.receivers.get(receiver).is_some_and(|stuck| stuck.repeats > 0)
+    }
+
+    /// For how long a sensor has repeated one value in flight, s; 0 if it does not. `measures`: whether another one of its kind does.
+    pub(crate) fn stuck(
+        &self,
+        now: Instant,
+        kind: Kind,
+        sensor: u8,
+        measures: impl Fn(usize) -> bool,
+    ) -> Option<Reading> {
+        let (moved, least) = self.moved(kind);
+        let all = &self.sensors[kind as usize];
+        let stuck = all.get(usize::from(sensor))?;
+        let is_witness = |(place, other): &(usize, &Stuck)| {
+            *place != usize::from(sensor) && measures(*place) && other.is_known()
+        };
+        let mut witnesses = all.iter().enumerate().filter(is_witness).peekable();
+        let times = match kind {
+            // Where the accelerometer repeats its values too, a simulator without noise hovers.
+            Kind::Barometer if stuck.fell_silent() && self.sensors[0][0].repeats == 0 => 0.0,
+            // All of them repeat their values.
+            Kind::Compass
+                if witnesses.peek().is_some() && !witnesses.any(|(_, other)| other.changed_during(stuck)) =>
+            {
+                ALL_REPEAT_TIMES
+            }
+            _ => 1.0,
+        };
+        stuck.lasts(now, moved, least * times)
+    }
+
+    /// The same of a receiver.
+    pub(crate) fn receiver_stuck(&self, now: Instant, receiver: u8) -> Option<Reading> {
+        self.receivers.get(usize::from(receiver))?.lasts(now, self.moved.travelled_m, TRAVELLED_M)
     }
 }
 

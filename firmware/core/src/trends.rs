@@ -26,10 +26,10 @@
 use crate::baseline::{Baseline, Baselines, OUTPUTS_MAX, Quantity};
 use crate::charge::Charge;
 use crate::derived::{Derived, pack_v};
-use crate::drawn::drawn;
 use crate::flight::{Flight, FlightEvent, Phase};
 use crate::observation::{Autopilot, MOTORS_MAX, VehicleKind, VibrationScale};
 use crate::params::{Param, Params};
+use crate::power_draw::drawn;
 use crate::time::{Instant, Span};
 use crate::trend::Resistance;
 use crate::vehicle::{BATTERIES_MAX, Vehicle};

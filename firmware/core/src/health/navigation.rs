@@ -5,12 +5,12 @@ use super::common::{STALE, alert, px4_metric};
 use super::finding::Subsystem;
 use super::inputs::Inputs;
 use crate::cause::Cause;
-
-use crate::geometry::Geometry;
+use crate::gnss_constellation;
 use crate::latest::Reading;
 use crate::observation::{Estimator, EstimatorScale, Gnss, VehicleKind};
 use crate::pairs::{Kind, SENSORS_MAX};
 use crate::params::Param;
+use crate::residual::Comparison;
 use crate::time::Span;
 use crate::vehicle::RECEIVERS_MAX;
 
@@ -97,7 +97,7 @@ const SECOND: Check = Check {
     debounce_warn: Span::from_secs(1),
     instances: 1,
     part: Part::Vehicle,
-    read: |inputs, _| inputs.derived.crosschecks().second().tilt(inputs.now),
+    read: |inputs, _| residual(inputs, Comparison::Ahrs2Tilt),
     ..MISMATCH
 };
 
@@ -142,7 +142,7 @@ pub(super) const CHECKS: &[Check] = &[
         warn: Some(Param::AlertWarn),
         // That it is used says nothing about how well it is.
         alarm_only: true,
-        read: |inputs, _| inputs.derived.crosschecks().heading().unused(inputs.now),
+        read: |inputs, _| inputs.derived.crosschecks().compass_unused(inputs.now),
         ..ESTIMATOR
     },
     MISMATCH,
@@ -174,7 +174,7 @@ pub(super) const CHECKS: &[Check] = &[
         instances: 1,
         // It goes by the attitude and a receiver too.
         part: Part::Vehicle,
-        read: |inputs, _| inputs.derived.crosschecks().imu_gnss().residual(inputs.now),
+        read: |inputs, _| inputs.derived.crosschecks().imu_gnss(inputs.now),
         ..MISMATCH
     },
     Check {
@@ -194,7 +194,7 @@ pub(super) const CHECKS: &[Check] = &[
         debounce_warn: SMOOTHED,
         instances: 1,
         part: Part::Vehicle,
-        read: |inputs, _| inputs.derived.crosschecks().heading().apart(inputs.now),
+        read: |inputs, _| residual(inputs, Comparison::MagHeading),
         ..MISMATCH
     },
     Check {
@@ -214,7 +214,7 @@ pub(super) const CHECKS: &[Check] = &[
         debounce_warn: Span::from_secs(1),
         instances: 1,
         part: Part::Sensor,
-        read: |inputs, _| inputs.derived.crosschecks().heights().apart(inputs.now),
+        read: |inputs, _| residual(inputs, Comparison::BaroGnss),
         ..MISMATCH
     },
     Check {
@@ -225,7 +225,7 @@ pub(super) const CHECKS: &[Check] = &[
         debounce_warn: Span::from_millis(500),
         instances: 1,
         part: Part::Sensor,
-        read: |inputs, _| inputs.derived.crosschecks().heights().noise(inputs.now),
+        read: |inputs, _| residual(inputs, Comparison::BaroNoise),
         ..MISMATCH
     },
     Check {
@@ -238,7 +238,7 @@ pub(super) const CHECKS: &[Check] = &[
         debounce_critical: Span::from_millis(500),
         instances: 1,
         part: Part::Sensor,
-        read: |inputs, _| inputs.derived.crosschecks().heights().climbs_apart(inputs.now),
+        read: |inputs, _| residual(inputs, Comparison::BaroClimb),
         ..MISMATCH
     },
     SECOND,
@@ -248,7 +248,7 @@ pub(super) const CHECKS: &[Check] = &[
         warn: Some(Param::Ahrs2HgtWarn),
         critical: Some(Param::Ahrs2HgtCrit),
         hysteresis: 1.0,
-        read: |inputs, _| inputs.derived.crosschecks().second().height(inputs.now),
+        read: |inputs, _| residual(inputs, Comparison::Ahrs2Height),
         ..SECOND
     },
     Check {
@@ -256,7 +256,7 @@ pub(super) const CHECKS: &[Check] = &[
         unit: "m",
         warn: Some(Param::Ahrs2PosWarn),
         hysteresis: 2.0,
-        read: |inputs, _| inputs.derived.crosschecks().second().place(inputs.now),
+        read: |inputs, _| residual(inputs, Comparison::Ahrs2Position),
         ..SECOND
     },
     STUCK,
@@ -286,7 +286,13 @@ pub(super) const CHECKS: &[Check] = &[
         warn: Some(Param::GpsSatsFall),
         hysteresis: 5.0,
         debounce_warn: Span::from_secs(1),
-        read: |inputs, receiver| geometry(inputs, receiver, Geometry::satellites_lost),
+        read: |inputs, receiver| {
+            gnss_constellation::satellites_lost(
+                inputs.derived.crosschecks().residuals(),
+                inputs.now,
+                receiver,
+            )
+        },
         ..GNSS
     },
     Check {
@@ -297,10 +303,7 @@ pub(super) const CHECKS: &[Check] = &[
         side: Side::Above,
         warn: Some(Param::GpsSpeedWarn),
         hysteresis: 0.2,
-        read: |inputs, receiver| {
-            let apart = inputs.derived.crosschecks().speed_apart(receiver);
-            Reading::new(inputs.vehicle.gnss.get(usize::from(receiver))?.at(), apart)
-        },
+        read: |inputs, receiver| inputs.derived.crosschecks().gnss_velocity(inputs.now, receiver),
         ..GNSS
     },
     Check {
@@ -315,7 +318,7 @@ pub(super) const CHECKS: &[Check] = &[
         instances: 1,
         // It goes by the barometer too.
         part: Part::Vehicle,
-        read: |inputs, _| inputs.derived.crosschecks().heights().receiver_leapt(inputs.now),
+        read: |inputs, _| inputs.derived.crosschecks().receiver_leapt(inputs.now),
         ..GNSS
     },
     Check {
@@ -339,7 +342,9 @@ pub(super) const CHECKS: &[Check] = &[
         warn: Some(Param::GpsHdopRise),
         hysteresis: 0.1,
         debounce_warn: Span::from_secs(1),
-        read: |inputs, receiver| geometry(inputs, receiver, Geometry::hdop_rise),
+        read: |inputs, receiver| {
+            gnss_constellation::hdop_rise(inputs.derived.crosschecks().residuals(), inputs.now, receiver)
+        },
         ..GNSS
     },
     Check {
@@ -393,6 +398,10 @@ pub(super) const CHECKS: &[Check] = &[
     alert::<{ Cause::Estimator as usize }>(Subsystem::Navigation),
 ];
 
+fn residual(inputs: &Inputs<'_>, of: Comparison) -> Option<Reading> {
+    inputs.derived.crosschecks().residual(inputs.now, of)
+}
+
 fn mismatch(inputs: &Inputs<'_>, kind: Kind, sensor: u8) -> Option<Reading> {
     inputs.derived.crosschecks().mismatch(inputs.now, kind, sensor)
 }
@@ -434,11 +443,6 @@ fn gnss(inputs: &Inputs<'_>, receiver: u8, value: impl FnOnce(&Gnss) -> Option<f
     let slot = inputs.vehicle.gnss.get(usize::from(receiver))?;
     let known = slot.get().filter(|_| inputs.derived.had_fix(receiver))?;
     Reading::new(slot.at(), value(known))
-}
-
-fn geometry(inputs: &Inputs<'_>, receiver: u8, value: fn(&Geometry) -> Option<f32>) -> Option<Reading> {
-    let geometry = inputs.derived.crosschecks().geometry(receiver)?;
-    Reading::new(inputs.vehicle.gnss.get(usize::from(receiver))?.at(), value(geometry))
 }
 
 /// A receiver that knows where it is within half of what its accuracy may be does so with however few satellites: its own word is better than

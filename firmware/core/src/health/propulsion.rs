@@ -10,6 +10,7 @@ use crate::latest::Reading;
 use crate::observation::MOTORS_MAX;
 use crate::outputs::JUDGED_MAX;
 use crate::params::Param;
+use crate::residual::Comparison;
 use crate::time::Span;
 use crate::vehicle::Motor;
 
@@ -157,11 +158,11 @@ pub(super) const CHECKS: &[Check] = &[
         when: When::InFlight,
         instances: 1,
         part: Part::Vehicle,
-        read: |inputs, _| inputs.derived.response().full_in_vain(),
+        read: |inputs, _| inputs.derived.crosschecks().full_in_vain(),
         ..ESC
     },
-    Check { name: "roll_rate", read: |inputs, _| inputs.derived.response().rate_missing(0), ..RATE },
-    Check { name: "pitch_rate", read: |inputs, _| inputs.derived.response().rate_missing(1), ..RATE },
+    Check { name: "roll_rate", read: |inputs, _| rate_off_deg_s(inputs, 0), ..RATE },
+    Check { name: "pitch_rate", read: |inputs, _| rate_off_deg_s(inputs, 1), ..RATE },
     Check {
         name: "motor_trend",
         warn: Some(Param::TrdEscWarn),
@@ -177,6 +178,12 @@ pub(super) const CHECKS: &[Check] = &[
     Check { name: "drive_due", ..due(Subsystem::Propulsion) },
     alert::<{ Cause::Propulsion as usize }>(Subsystem::Propulsion),
 ];
+
+/// The body rate that the setpoint is not followed by, about roll (0) or pitch (1).
+fn rate_off_deg_s(inputs: &Inputs<'_>, axis: usize) -> Option<Reading> {
+    let reading = inputs.derived.crosschecks().residual(inputs.now, Comparison::RATES[axis])?;
+    Some(Reading { value: reading.value.to_degrees(), ..reading })
+}
 
 /// A motor's speed against the others', where its ESC tells it, or else its output.
 fn motor_departure(inputs: &Inputs<'_>, motor: u8) -> Option<Reading> {

@@ -51,7 +51,7 @@ pub(super) const CHECKS: &[Check] = &[
         when: When::InFlight,
         // Never stale: only what flies on rotors says something.
         stale_after: None,
-        read: |inputs, _| inputs.derived.crosschecks().shaking().rise(inputs.now),
+        read: |inputs, _| inputs.derived.crosschecks().vibration_rise(inputs.now, inputs.vehicle),
         ..VIBRATION
     },
     Check {

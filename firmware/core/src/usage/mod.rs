@@ -12,11 +12,11 @@ pub use counters::{
 pub use totals::{MotorTotals, Totals, Wear};
 
 use crate::derived::Derived;
-use crate::drawn::{Drawn, MOTOR_AGE, discharge_a, drawn};
 use crate::flight::{Flight, FlightEvent, Phase};
 use crate::motion::{climb_mps, ground_speed_mps, height_m};
 use crate::observation::Observation;
 use crate::params::{Param, Params};
+use crate::power_draw::{Drawn, MOTOR_AGE, discharge_a, drawn};
 use crate::rainflow::Rainflow;
 use crate::time::{Instant, Span};
 use crate::vehicle::{BATTERIES_MAX, Vehicle};

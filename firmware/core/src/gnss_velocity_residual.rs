@@ -1,19 +1,21 @@
 //! A receiver's velocity against how far its position moves: both come from the same signals, by different measurements.
 //!
-//! The way is the sum of the steps between positions, and the velocity is summed over the same time; both are forgotten with [`MEMORY_S`].
-//! They are vectors, so that an error in one direction does not hide behind a course that changes. What repeats a position bit for bit is
-//! the same measurement again. A receiver's filters may be late by [`LATE_S`] with one of the two: that part of what the velocity has
-//! changed by is taken off.
+//! The difference is smoothed with [`MEMORY_S`], as a vector: an error in one direction does not hide behind a course that changes. A
+//! position that is repeated bit for bit is the same measurement again. A receiver's filters may be late by [`LATE_S`] with one of the two:
+//! that part of the change of velocity is taken off.
 //!
-//! How long a step took is the receiver's word ([`Gnss::measured_ms`]): messages wait on a link and then come all at once, and
-//! a clock that is slow makes each way a fast one. Where that is not known nothing is said.
+//! The receiver itself says how long a step took ([`Gnss::measured_ms`]): messages wait on a link and then come all at once. Where that is
+//! not known nothing is said.
 
 use core::num::NonZeroU32;
 
+use crate::latest::Reading;
 use crate::observation::Gnss;
+use crate::residual::smooth;
+use crate::time::{Instant, Stamp};
 use crate::units::Position;
 
-/// Ways and velocities are forgotten with this time constant, s; before it has passed nothing is said.
+/// Time constant, s; before it has passed nothing is said.
 const MEMORY_S: f32 = 4.0;
 /// Positions further apart are not of one way, ms.
 const PAUSE_MS: u32 = 2_000;
@@ -38,64 +40,61 @@ struct Fix {
 
 /// The memory of one receiver.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Travel {
+pub(crate) struct GnssVelocity {
     before: Option<Fix>,
-    /// How much further it went by its velocity than by its positions, m, and in what time, s.
-    further_m: [f32; 2],
-    time_s: f32,
-    /// The mean velocity of that time, m/s.
+    /// The velocity less that of the positions, and the velocity, both smoothed, m/s; for how long, s; when they were measured.
+    off: [f32; 2],
     mean: [f32; 2],
+    known_s: f32,
+    at: Stamp,
 }
 
-impl Travel {
+impl GnssVelocity {
     /// Nothing seen.
-    pub(crate) const NEW: Self = Self { before: None, further_m: [0.0; 2], time_s: 0.0, mean: [0.0; 2] };
+    pub(crate) const NEW: Self =
+        Self { before: None, off: [0.0; 2], mean: [0.0; 2], known_s: 0.0, at: Stamp::NONE };
 
-    /// Takes what a receiver says in flight.
-    pub(crate) fn take(&mut self, gnss: &Gnss, airborne: bool) {
-        let Some(told) = fix(gnss).filter(|_| airborne) else {
+    /// Takes a receiver's message in flight.
+    pub(crate) fn take(&mut self, at: Instant, gnss: &Gnss, airborne: bool) {
+        let Some(fix) = fix(gnss).filter(|_| airborne) else {
             *self = Self::NEW;
             return;
         };
-        let Some(was) = self.before else {
-            *self = Self { before: Some(told), mean: told.velocity, ..Self::NEW };
+        let begun = Self { before: Some(fix), mean: fix.velocity, ..Self::NEW };
+        let Some(before) = self.before.replace(fix) else {
+            *self = begun;
             return;
         };
-        let step_ms = told.measured_ms.get().wrapping_sub(was.measured_ms.get());
-        let is_same = told.place == was.place;
+        let step_ms = fix.measured_ms.get().wrapping_sub(before.measured_ms.get());
+        let is_same = fix.place == before.place;
+        if is_same && step_ms <= PAUSE_MS {
+            self.before = Some(before);
+            return;
+        }
+        let units = [0, 1].map(|axis| fix.place[axis].wrapping_sub(before.place[axis]) as f32 * UNIT_M);
+        let latitude = fix.place[0] as f32 * 1e-7;
+        let moved_m = [units[0], units[1] * libm::cosf(latitude.to_radians())];
         // A time that stands still, or goes back, is none.
-        if step_ms > PAUSE_MS || (step_ms == 0 && !is_same) {
-            *self = Self { before: Some(told), mean: told.velocity, ..Self::NEW };
-            return;
-        }
-        if is_same {
-            return;
-        }
-        let [north, east] = [0, 1].map(|axis| told.place[axis].wrapping_sub(was.place[axis]) as f32 * UNIT_M);
-        let latitude = told.place[0] as f32 * 1e-7;
-        let moved_m = [north, east * libm::cosf(latitude.to_radians())];
-        if moved_m.iter().any(|moved_m| libm::fabsf(*moved_m) > JUMP_MAX_M) {
-            *self = Self { before: Some(told), mean: told.velocity, ..Self::NEW };
+        let is_leap = moved_m.iter().any(|moved_m| libm::fabsf(*moved_m) > JUMP_MAX_M);
+        if step_ms == 0 || step_ms > PAUSE_MS || is_leap {
+            *self = begun;
             return;
         }
         let step_s = step_ms as f32 / 1e3;
-        let kept = MEMORY_S / (MEMORY_S + step_s);
-        for (axis, moved_m) in moved_m.iter().enumerate() {
-            let further_m = f32::midpoint(told.velocity[axis], was.velocity[axis]) * step_s - moved_m;
-            self.further_m[axis] = kept * (self.further_m[axis] + further_m);
-            self.mean[axis] = told.velocity[axis] + kept * (self.mean[axis] - told.velocity[axis]);
-        }
-        self.time_s = kept * (self.time_s + step_s);
-        self.before = Some(told);
+        let weight = step_s / (MEMORY_S + step_s);
+        let off = [0, 1]
+            .map(|axis| f32::midpoint(fix.velocity[axis], before.velocity[axis]) - moved_m[axis] / step_s);
+        smooth(&mut self.off, off, weight, f32::INFINITY);
+        smooth(&mut self.mean, fix.velocity, weight, f32::INFINITY);
+        (self.known_s, self.at) = (self.known_s + step_s, Stamp::at(at));
     }
 
     /// How far the velocity is from that of the positions, m/s.
-    pub(crate) fn speed_apart(&self) -> Option<f32> {
-        let now = self.before?.velocity;
-        let late_m = LATE_S * length([0, 1].map(|axis| now[axis] - self.mean[axis]));
-        let apart_mps = (length(self.further_m) - late_m).max(0.0) / MEMORY_S;
-        // Of a whole memory two thirds are there after its time constant.
-        (self.time_s > 0.6 * MEMORY_S).then_some(apart_mps)
+    pub(crate) fn residual(&self, now: Instant) -> Option<Reading> {
+        let velocity = self.before?.velocity;
+        let changed_mps = length([0, 1].map(|axis| velocity[axis] - self.mean[axis]));
+        let off_mps = (length(self.off) - LATE_S / MEMORY_S * changed_mps).max(0.0);
+        Reading::new(self.at.instant(now).filter(|_| self.known_s >= MEMORY_S), Some(off_mps))
     }
 }
 
@@ -122,9 +121,10 @@ mod tests {
     /// Flies with a velocity that turns once in so many seconds, and tells one that is off by an error, both north and east in m/s; each
     /// position twice. `measured` is when a step was measured, ms.
     fn heard((speed_mps, turn_s): (f32, f32), error_mps: [f32; 2], measured: fn(u64) -> u32) -> Option<f32> {
-        let mut travel = Travel::NEW;
+        let mut velocity_residual = GnssVelocity::NEW;
         let mut place = [47.0, 8.0];
         for step in 0_u64..100 {
+            let now = Instant::from_millis(step * 200);
             let course = step as f32 * 0.2 / turn_s * core::f32::consts::TAU;
             let velocity = [speed_mps * course.cos(), speed_mps * course.sin()];
             let [north, east] = [0, 1].map(|axis| velocity[axis] + error_mps[axis]);
@@ -137,12 +137,12 @@ mod tests {
                 measured_ms: NonZeroU32::new(measured(step)),
                 ..Gnss::default()
             };
-            travel.take(&gnss, true);
-            travel.take(&gnss, true);
+            velocity_residual.take(now, &gnss, true);
+            velocity_residual.take(now, &gnss, true);
             place[0] += f64::from(velocity[0]) * 0.2 / 111_320.0;
             place[1] += f64::from(velocity[1]) * 0.2 / (111_320.0 * 47.0_f64.to_radians().cos());
         }
-        travel.speed_apart()
+        velocity_residual.residual(Instant::from_millis(20_000)).map(|reading| reading.value)
     }
 
     const STRAIGHT_S: f32 = 1e6;

@@ -1,0 +1,200 @@
+//! The first barometer against the height of GNSS, its noise, and the climb of the estimator.
+//!
+//! 1. Barometer and GNSS ([`Comparison::BaroGnss`]): weather and site make an offset, which is learnt. Two effects on a healthy barometer
+//!    are allowed for. Air that is warmer or colder than standard makes a scale error: [`SCALE_PART`] of the change of height. The wind of
+//!    the flight presses on the housing: half of the change of the dynamic pressure.
+//! 2. Noise ([`Comparison::BaroNoise`]): how far the height steps from sample to sample, less the climb, less the error by a late message
+//!    ([`LATE_S`]) and by a climb that changed.
+//! 3. Climb ([`Comparison::BaroClimb`]): an accelerometer that folds vibration into an offset lets an estimator fall while the vehicle
+//!    climbs, and height control gives full throttle. On rotors only, by the climb of `VFR_HUD`. The change of the whole dynamic pressure
+//!    is taken off.
+//! 4. Which height leapt ([`Heights::receiver_leapt`]): the climb of the estimator, which is that of its accelerometer over so short a time,
+//!    votes. If the receiver's height moved within [`VOTE_S`] without that climb, and the barometer's by less than half as much, the receiver
+//!    is wrong. A slow drift leads the estimator with it, and is nobody's.
+
+use crate::gates::{self, Gates};
+use crate::latest::Reading;
+use crate::motion::{climb_mps, ground_speed_mps};
+use crate::observation::Gnss;
+use crate::residual::{Comparison, Residuals, smooth};
+use crate::time::{Instant, Span, Stamp};
+use crate::units::{GRAVITY, Hectopascals};
+use crate::vehicle::Vehicle;
+
+/// Metres of height for a relative change of pressure: the scale height of air at 15 degrees, R T / (M g).
+pub(crate) const SCALE_HEIGHT_M: f32 = 8_430.0;
+/// A standard atmosphere is wrong by so much of a climb in air that is 28 K warmer or colder.
+const SCALE_PART: f32 = 0.1;
+/// Messages on a link are late by so much: a step takes that much longer or shorter.
+const LATE_S: f32 = 0.3;
+/// Receivers are some tenths of a second late: faster than this, m/s, the two heights are not of the same moment.
+const CLIMB_MPS: f32 = 2.0;
+/// A receiver's height is so old, s: 1 of those of 2013.
+const RECEIVER_LATE_S: f32 = 1.0;
+/// Heights and climb are summed over this time, s, when they vote.
+const VOTE_S: f32 = 4.0;
+/// Time constant of the usual height and speed, s.
+const AIR_S: f32 = 30.0;
+/// No rotors climb or fall faster, m/s: garbage.
+const CLIMB_MAX_MPS: f32 = 200.0;
+/// Samples further apart are not compared.
+const PAUSE: Span = Span::from_secs(2);
+/// A sample that leaps by more is one wrong message unless the next one leaps too: no vehicle climbs so fast, m/s, and the noise, m, is
+/// above the default limit.
+const LEAPS_MPS: f32 = 50.0;
+const LEAPS_M: f32 = 5.0;
+
+/// How far a height has moved of late without a climb.
+#[derive(Clone, Copy, Debug)]
+struct Leap {
+    /// The last height, m, and when it was measured.
+    height_m: f32,
+    at: Stamp,
+    leapt_m: f32,
+    /// The error of a height that is late, by the climb, m.
+    late_m: f32,
+}
+
+impl Leap {
+    const NONE: Self = Self { height_m: 0.0, at: Stamp::NONE, leapt_m: 0.0, late_m: 0.0 };
+
+    /// Takes a height; the climb is `None` where it is not known.
+    fn take(&mut self, at: Instant, height_m: f32, climb_mps: Option<f32>) {
+        let step = self.at.age(at).filter(|step| *step <= PAUSE);
+        let risen_m = height_m - self.height_m;
+        (self.at, self.height_m) = (Stamp::at(at), height_m);
+        let (Some(step), Some(climb_mps)) = (step, climb_mps) else {
+            (self.leapt_m, self.late_m) = (0.0, 0.0);
+            return;
+        };
+        let step_s = step.as_secs_f32();
+        let kept = VOTE_S / (VOTE_S + step_s);
+        let leapt_m = kept * (self.leapt_m + risen_m - climb_mps * step_s);
+        self.leapt_m = if leapt_m.is_finite() { leapt_m } else { 0.0 };
+        self.late_m = (kept * self.late_m).max(RECEIVER_LATE_S * libm::fabsf(climb_mps));
+    }
+
+    /// How far, m, either way.
+    fn far_m(&self) -> f32 {
+        (libm::fabsf(self.leapt_m) - self.late_m).max(0.0)
+    }
+}
+
+/// The last sample of the barometer: height above that of the first one, m; the dynamic pressure of the speed over ground as a height, m;
+/// the climb, m/s.
+#[derive(Clone, Copy, Debug, Default)]
+struct Sample {
+    at: Stamp,
+    height_m: f32,
+    wind_m: f32,
+    climb_mps: f32,
+}
+
+/// The heights of barometer and receiver.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Heights {
+    /// The first pressure of the flight, hPa; 0 before it.
+    first_hpa: f32,
+    sample: Sample,
+    /// The last sample leapt, and was passed over.
+    is_doubted: bool,
+    /// Usual height and half of the usual dynamic pressure, both in m.
+    air: Option<[f32; 2]>,
+    /// The leaps of barometer and receiver.
+    leaps: [Leap; 2],
+}
+
+impl Heights {
+    /// Nothing seen.
+    pub(crate) const NEW: Self = Self {
+        first_hpa: 0.0,
+        sample: Sample { at: Stamp::NONE, height_m: 0.0, wind_m: 0.0, climb_mps: 0.0 },
+        is_doubted: false,
+        air: None,
+        leaps: [Leap::NONE; 2],
+    };
+
+    pub(crate) fn take_pressure(
+        &mut self,
+        residuals: &mut Residuals,
+        at: Instant,
+        pressure: Hectopascals,
+        vehicle: &Vehicle,
+        gates: Gates,
+    ) {
+        if !gates.are(gates::SETTLED) || !pressure.0.is_finite() || pressure.0 <= 0.0 {
+            return;
+        }
+        if self.first_hpa == 0.0 {
+            self.first_hpa = pressure.0;
+        }
+        let height_m = SCALE_HEIGHT_M * libm::logf(self.first_hpa / pressure.0);
+        let before = self.sample;
+        let step = before.at.age(at).filter(|step| *step <= PAUSE);
+        let risen_m = height_m - before.height_m;
+        let leaps = step.is_some_and(|step| libm::fabsf(risen_m) > LEAPS_M + LEAPS_MPS * step.as_secs_f32());
+        self.is_doubted = leaps && !self.is_doubted;
+        if self.is_doubted {
+            return;
+        }
+        let speed_mps = ground_speed_mps(at, vehicle).unwrap_or(0.0);
+        let wind_m = speed_mps * speed_mps / (2.0 * GRAVITY);
+        let climb = climb_mps(at, vehicle);
+        self.leaps[0].take(at, height_m, climb);
+        self.sample = Sample { at: Stamp::at(at), height_m, wind_m, climb_mps: climb.unwrap_or(0.0) };
+        // A second leap is a step of the barometer, and no climb.
+        let Some(step) = step.filter(|step| *step > Span::ZERO && !leaps) else { return };
+        let step_s = step.as_secs_f32();
+        if let Some(climb_mps) = climb {
+            let off_m = libm::fabsf(risen_m - climb_mps * step_s);
+            let changed_mps = libm::fabsf(climb_mps - before.climb_mps);
+            let late_m = LATE_S * libm::fabsf(climb_mps) + step_s * changed_mps;
+            residuals.take(Comparison::BaroNoise, at, gates, (off_m - late_m).max(0.0), 0.0);
+        }
+        let display = vehicle.hud.within(at, PAUSE).and_then(|hud| hud.climb).map(|climb| climb.0);
+        // Nothing but zeros is sent if no climb is known.
+        if let Some(climb_mps) = display.filter(|climb| climb.abs() > 0.0 && climb.abs() <= CLIMB_MAX_MPS) {
+            let missing_m = risen_m - step_s * climb_mps;
+            let by_wind_m = libm::fabsf(wind_m - before.wind_m);
+            let beyond_m = libm::copysignf((libm::fabsf(missing_m) - by_wind_m).max(0.0), missing_m);
+            residuals.take(Comparison::BaroClimb, at, gates, beyond_m / step_s, 0.0);
+        }
+    }
+
+    pub(crate) fn take_gnss(
+        &mut self,
+        residuals: &mut Residuals,
+        at: Instant,
+        gnss: &Gnss,
+        vehicle: &Vehicle,
+        gates: Gates,
+    ) {
+        let Some(altitude) = gnss.altitude.filter(|_| gnss.is_exact()) else { return };
+        let climb = climb_mps(at, vehicle);
+        if gates.are(gates::SETTLED) {
+            self.leaps[1].take(at, altitude.0, climb);
+        }
+        let Sample { at: measured, height_m, .. } = self.sample;
+        let climbs = climb.is_none_or(|climb| libm::fabsf(climb) > CLIMB_MPS);
+        let is_old = measured.age(at).is_none_or(|age| age > PAUSE);
+        if climbs || is_old || !residuals.is_due(Comparison::BaroGnss, at, gates, Span::ZERO) {
+            return;
+        }
+        let airspeed = vehicle.hud.get().and_then(|hud| hud.airspeed).map_or(0.0, |speed| speed.0);
+        let speed_mps = ground_speed_mps(at, vehicle).unwrap_or(0.0).max(airspeed);
+        let air = [height_m, speed_mps * speed_mps / (4.0 * GRAVITY)];
+        let usual = self.air.get_or_insert(air);
+        let [up_m, faster_m] = [0, 1].map(|part| libm::fabsf(air[part] - usual[part]));
+        let allowance_m = SCALE_PART * up_m + faster_m;
+        let off_m = height_m - altitude.0;
+        let learnt_s = residuals.take(Comparison::BaroGnss, at, gates, off_m, allowance_m);
+        smooth(usual, air, learnt_s / (AIR_S + learnt_s), f32::INFINITY);
+    }
+
+    /// How far the receiver's height has leapt alone, m.
+    pub(crate) fn receiver_leapt(&self, now: Instant) -> Option<Reading> {
+        let [barometer_m, receiver_m] = self.leaps.map(|leap| leap.far_m());
+        let alone_m = if receiver_m > 2.0 * barometer_m { receiver_m } else { 0.0 };
+        Reading::new(self.leaps[1].at.instant(now), Some(alone_m))
+    }
+}

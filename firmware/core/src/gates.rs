@@ -1,0 +1,104 @@
+//! Conditions of the flight, as bits: computed once a step, read by every comparison that needs them.
+
+use crate::flight::Flight;
+use crate::motion::climb_mps;
+use crate::observation::{Attitude, Gnss, LandedState, VehicleKind};
+use crate::time::{Instant, Span, Stamp};
+use crate::vehicle::{LANDED_STATE_AGE, Vehicle};
+
+/// In the air.
+pub(crate) const AIRBORNE: u16 = 1 << 0;
+/// In the air for three seconds.
+pub(crate) const SETTLED: u16 = 1 << 1;
+/// Away from the ground, as far as that is known: near it legs shake sensors, and motors hold the vehicle on its legs.
+pub(crate) const CLEAR: u16 = 1 << 2;
+/// It turned slower than 40 degrees a second for a second.
+pub(crate) const STILL: u16 = 1 << 3;
+/// It climbs or sinks slower than 2 m/s and leans less than 34 degrees, as far as that is known. It may be fast.
+pub(crate) const LEVEL: u16 = 1 << 4;
+/// A rotorcraft.
+pub(crate) const ROTORS: u16 = 1 << 5;
+/// A rotorcraft or a plane: one set of axes. A tail-sitter has two.
+pub(crate) const ONE_FRAME: u16 = 1 << 6;
+/// It flies on rotors now, a VTOL too.
+pub(crate) const HOVERS: u16 = 1 << 7;
+/// One set of actuators controls it: the two of a VTOL share the work in a transition.
+pub(crate) const ONE_CONTROL: u16 = 1 << 8;
+/// The first receiver has been exact for 15 s: `AHRS_RP_P` 0.2 makes DCM level within three time constants of 5 s.
+pub(crate) const EXACT: u16 = 1 << 9;
+
+const TURNED: Span = Span::from_secs(1);
+/// Older motion, and an older fix, say nothing.
+const FRESH: Span = Span::from_secs(1);
+const RECEIVER_AGE: Span = Span::from_secs(2);
+const EXACT_FOR: Span = Span::from_secs(15);
+/// Height over home of what is clear of the ground, m.
+const CLEAR_M: f32 = 1.5;
+const LEVEL_MPS: f32 = 2.0;
+const LEANS_RAD: f32 = 0.6;
+
+/// The conditions at the last step.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Gates {
+    open: u16,
+    /// When the first receiver was not exact last.
+    inexact_at: Stamp,
+}
+
+impl Gates {
+    /// None is open.
+    pub(crate) const CLOSED: Self = Self { open: 0, inexact_at: Stamp::NONE };
+
+    /// These are open.
+    #[cfg(test)]
+    pub(crate) const fn open(open: u16) -> Self {
+        Self { open, ..Self::CLOSED }
+    }
+
+    /// Whether all of these are open.
+    pub(crate) const fn are(self, all: u16) -> bool {
+        self.open & all == all
+    }
+
+    /// One step.
+    pub(crate) fn step(&mut self, now: Instant, vehicle: &Vehicle, flight: &Flight) {
+        let receiver = &vehicle.gnss[0];
+        let exact = receiver.within(now, RECEIVER_AGE).is_some_and(Gnss::is_exact);
+        if !exact && receiver.get().is_some() {
+            self.inexact_at = Stamp::at(now);
+        }
+        let kind = vehicle.kind();
+        let hovers = vehicle.hovers(now) == Some(true);
+        let rotors = kind == VehicleKind::Rotorcraft;
+        self.open = 0;
+        for (gate, is_open) in [
+            (AIRBORNE, flight.airborne()),
+            (SETTLED, flight.is_settled(now)),
+            (CLEAR, is_clear(now, vehicle)),
+            (STILL, vehicle.inertial.turns_little(now, TURNED)),
+            (LEVEL, is_level(now, vehicle)),
+            (ROTORS, rotors),
+            (ONE_FRAME, rotors || kind == VehicleKind::Plane),
+            (HOVERS, hovers),
+            (ONE_CONTROL, kind != VehicleKind::Vtol || hovers),
+            (EXACT, exact && self.inexact_at.age(now).is_none_or(|age| age > EXACT_FOR)),
+        ] {
+            self.open |= if is_open { gate } else { 0 };
+        }
+    }
+}
+
+fn is_level(now: Instant, vehicle: &Vehicle) -> bool {
+    let climbs = climb_mps(now, vehicle).is_some_and(|climb| climb.abs() > LEVEL_MPS);
+    let leans = |attitude: &Attitude| attitude.roll.0.abs().max(attitude.pitch.0.abs()) > LEANS_RAD;
+    !climbs && !vehicle.attitude.get().is_some_and(leans)
+}
+
+fn is_clear(now: Instant, vehicle: &Vehicle) -> bool {
+    let landed = vehicle.landed.within(now, LANDED_STATE_AGE);
+    !matches!(landed, Some(LandedState::TakingOff | LandedState::Landing | LandedState::OnGround))
+        && vehicle
+            .global
+            .within(now, FRESH)
+            .is_none_or(|global| libm::fabsf(global.relative_altitude.0) > CLEAR_M)
+}

@@ -1,0 +1,77 @@
+//! A receiver's satellites and its dilution of precision against their baselines in this flight.
+//!
+//! How many satellites a receiver uses, and how well they stand, depends on the receiver, on the site and on the view of the antenna. A site
+//! with few is as it is; a sudden loss is a jammer that begins, a cable that comes off, or a view that is gone, and is worth a word
+//! while there are enough left. Both figures are followed as logarithms, since the lost part counts.
+
+use crate::gates::Gates;
+use crate::latest::Reading;
+use crate::observation::Gnss;
+use crate::residual::{Comparison, Residuals};
+use crate::time::Instant;
+
+/// No geometry is worth more, and a receiver of several systems says so much less that its least change is a large part.
+const HDOP_IDEAL: f32 = 1.0;
+
+/// Takes a receiver's figures with a fix.
+pub(crate) fn take(residuals: &mut Residuals, at: Instant, gnss: &Gnss, gates: Gates) {
+    let fewer = gnss.satellites.filter(|count| *count > 0).map(|count| -libm::logf(count.into()));
+    let hdop = gnss.hdop.filter(|hdop| hdop.is_finite()).map(|hdop| libm::logf(hdop.max(HDOP_IDEAL)));
+    for (figure, of) in [(fewer, Comparison::SATELLITES), (hdop, Comparison::HDOP)] {
+        if let (Some(figure), Some(of), true) = (figure, of.get(usize::from(gnss.instance)), gnss.fix >= 3) {
+            residuals.take(*of, at, gates, figure, 0.0);
+        }
+    }
+}
+
+/// The lost part of a receiver's usual satellites, percent.
+pub(crate) fn satellites_lost(residuals: &Residuals, now: Instant, receiver: u8) -> Option<Reading> {
+    let reading = residuals.reading(now, *Comparison::SATELLITES.get(usize::from(receiver))?)?;
+    Some(Reading { value: (1.0 - libm::expf(-reading.value)) * 100.0, ..reading })
+}
+
+/// A receiver's dilution of precision as a multiple of the usual one, 1 at least.
+pub(crate) fn hdop_rise(residuals: &Residuals, now: Instant, receiver: u8) -> Option<Reading> {
+    let reading = residuals.reading(now, *Comparison::HDOP.get(usize::from(receiver))?)?;
+    Some(Reading { value: libm::expf(reading.value), ..reading })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::gates;
+
+    /// The lost part and the rise of the dilution after seconds with so many satellites and such a dilution, five times a second.
+    fn told(said: impl Iterator<Item = (usize, u8, f32)>) -> (Option<f32>, Option<f32>) {
+        let (mut residuals, mut now) = (Residuals::NEW, Instant::ZERO);
+        for (seconds, satellites, hdop) in said {
+            for _ in 0..5 * seconds {
+                now = now + crate::time::Span::from_millis(200);
+                let fix = if satellites > 0 { 3 } else { 0 };
+                let gnss = Gnss { fix, satellites: Some(satellites), hdop: Some(hdop), ..Gnss::default() };
+                take(&mut residuals, now, &gnss, Gates::open(gates::AIRBORNE));
+            }
+        }
+        let tenths = |reading: Reading| (reading.value * 10.0).round() / 10.0;
+        (
+            satellites_lost(&residuals, now, 0).map(|reading| reading.value.round()),
+            hdop_rise(&residuals, now, 0).map(tenths),
+        )
+    }
+
+    #[test]
+    fn a_sudden_loss_is_told_and_a_site_that_has_few_and_a_slow_change_are_usual() {
+        for (said, expected) in [
+            (&[(60, 16, 0.8), (300, 8, 2.4)][..], (Some(50.0), Some(2.4))),
+            (&[(60, 16, 0.8), (300, 8, 2.4), (5, 16, 0.8)], (Some(0.0), Some(1.0))),
+            (&[(60, 7, 1.9)], (Some(0.0), Some(1.0))),
+            (&[(5, 16, 0.8)], (None, None)),
+            (&[(60, 16, 0.5), (1, 0, 0.5)], (Some(0.0), Some(1.0))),
+            (&[(60, 30, 0.4), (60, 30, 0.9)], (Some(0.0), Some(1.0))),
+        ] {
+            assert_eq!(told(said.iter().copied()), expected, "{said:?}");
+        }
+        let (lost, rise) = told((0..12).map(|step| (40, 20 - step, 1.0 + 0.1 * f32::from(step))));
+        assert!(lost.is_some_and(|lost| lost < 20.0) && rise.is_some_and(|rise| rise <= 1.2));
+    }
+}

@@ -1,0 +1,114 @@
+//! Setpoint tracking: how fast the vehicle turns, and whether it climbs with full throttle.
+//!
+//! 1. Control makes the body's rates those of the setpoint, within a fraction of a second. A motor, a propeller, a servo or a surface that
+//!    fails keeps them apart ([`Comparison::RATES`]). A part of the rates of the setpoint is allowed: in fast turns a vehicle is late by much.
+//! 2. Rates about the axes of the attitude's setpoint are turned to the body's first: a vehicle that is yawed fast lags that attitude by a
+//!    quarter of a turn.
+//! 3. With full throttle a multicopter climbs, and a plane does not sink ([`Thrust`]).
+
+use crate::flight::FULL_THROTTLE;
+use crate::gates::{self, Gates};
+use crate::latest::{Latest, Reading};
+use crate::modes::has_pilots_throttle;
+use crate::motion::climb_mps;
+use crate::observation::{Attitude, Hud, WantedRates};
+use crate::residual::{Comparison, Residuals};
+use crate::rotation;
+use crate::time::{Instant, Span};
+use crate::units::RadiansPerSecond;
+use crate::vehicle::Vehicle;
+
+/// A setpoint is as old as this at most: an agile vehicle turns otherwise after it.
+const FRESH: Span = Span::from_millis(150);
+/// A display that was not received for longer begins anew.
+const HOLE: Span = Span::from_millis(1_500);
+/// This part of the rates of the setpoint may be missing.
+const LATE_PART: f32 = 0.3;
+/// No vehicle turns faster, rad/s: garbage.
+const RATE_MAX: f32 = 60.0;
+/// With full throttle multicopters climb faster than this, m/s, while they are not tilted further, rad; planes do not sink faster.
+const CLIMBS_MPS: f32 = 0.3;
+const TILT_RAD: f32 = 0.52;
+const SINKS_MPS: f32 = -0.5;
+/// `THRUST_WARN` tells of what lasts so long.
+const IN_VAIN: Span = Span::from_secs(2);
+
+/// The latest setpoint of the rates about roll and pitch.
+pub(crate) type RateSetpoint = Latest<[RadiansPerSecond; 2]>;
+
+pub(crate) fn take_setpoint(
+    setpoint: &mut RateSetpoint,
+    at: Instant,
+    rates: Option<WantedRates>,
+    vehicle: &Vehicle,
+) {
+    let Some(WantedRates { about, of }) = rates else { return };
+    let [roll, pitch, _] = match of.filter(|_| vehicle.is_ardupilot()) {
+        Some(of) => {
+            let Some(attitude) = vehicle.attitude.within(at, FRESH) else { return };
+            rotation::from_axes_of(of, about.map(|rate| rate.0), attitude).map(RadiansPerSecond)
+        }
+        None => about,
+    };
+    setpoint.set(at, [roll, pitch]);
+}
+
+pub(crate) fn take_attitude(
+    residuals: &mut Residuals,
+    at: Instant,
+    attitude: &Attitude,
+    setpoint: &RateSetpoint,
+    gates: Gates,
+) {
+    let (Some(setpoint), Some([roll, pitch, _])) = (setpoint.within(at, FRESH), attitude.rates) else {
+        return;
+    };
+    let is_sane = |rate: &RadiansPerSecond| rate.0.abs() <= RATE_MAX;
+    if setpoint.iter().chain(&[roll, pitch]).all(is_sane) {
+        for ((of, setpoint), flown) in Comparison::RATES.into_iter().zip(setpoint).zip([roll, pitch]) {
+            residuals.take(of, at, gates, setpoint.0 - flown.0, LATE_PART * setpoint.0.abs());
+        }
+    }
+}
+
+/// For how long full throttle has not made the vehicle climb.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Thrust {
+    full_since: Option<Instant>,
+    full_at: Option<Instant>,
+}
+
+impl Thrust {
+    /// Nothing seen.
+    pub(crate) const NEW: Self = Self { full_since: None, full_at: None };
+
+    /// A pilot's display: throttle.
+    pub(crate) fn take(&mut self, at: Instant, hud: &Hud, vehicle: &Vehicle, gates: Gates) {
+        let (Some(throttle), Some(climb_mps)) = (hud.throttle, climb_mps(at, vehicle)) else { return };
+        let level = vehicle
+            .attitude
+            .get()
+            .is_none_or(|attitude| attitude.roll.0.abs() < TILT_RAD && attitude.pitch.0.abs() < TILT_RAD);
+        if self.full_at.is_none_or(|before| at.since(before) > HOLE) {
+            self.full_since = None;
+        }
+        // Once it was so for long, it is until it climbs.
+        let was_long = self.full_since.is_some_and(|since| at.since(since) >= IN_VAIN);
+        let in_vain = match vehicle.hovers(at) {
+            Some(_) if was_long => climb_mps < CLIMBS_MPS,
+            Some(true) => level && climb_mps < CLIMBS_MPS,
+            // A pilot may dive with all his throttle.
+            Some(false) => climb_mps < SINKS_MPS && !has_pilots_throttle(vehicle),
+            None => false,
+        };
+        let is_full = throttle.0 >= FULL_THROTTLE && gates.are(gates::SETTLED);
+        self.full_at = Some(at);
+        self.full_since = (is_full && in_vain).then(|| self.full_since.unwrap_or(at));
+    }
+
+    /// For how long, s.
+    pub(crate) fn in_vain(&self) -> Option<Reading> {
+        let at = self.full_at?;
+        Some(Reading { at, value: self.full_since.map_or(0.0, |since| at.since(since).as_secs_f32()) })
+    }
+}
