@@ -1,20 +1,19 @@
 //! Protective action, off by default: a critical finding asks the autopilot to return or to land, once a flight.
 //!
-//! | state | what happens | next |
+//! | state | input | next |
 //! |---|---|---|
-//! | Idle | in flight, and critical; a return or landing is under way | `OnItsWay` |
-//! | | in flight, and critical | Counting, announced |
-//! | Counting | `PROT_DELAY` is over | Asking |
-//! | | no longer critical | Idle |
-//! | Asking | accepted; refused; no answer to 3 requests | `OnItsWay`; Refused or Done; Done |
-//! | Refused | | Asking for a landing |
-//! | Counting, Asking, Refused | cancelled by command | Done |
-//! | | the autopilot returns or lands | `OnItsWay` |
-//! | | the pilot changes the mode | `ModeChanged`, Done after 2 s |
-//! | Counting, Refused, `ModeChanged` | the autopilot changes the mode | Idle |
-//! | `OnItsWay` | the pilot leaves the returning mode | `ModeChanged` |
-//! | | the autopilot leaves it, or the vehicle no longer sinks to land | Idle |
-//! | any | the flight is over | Idle |
+//! | idle | in flight, and critical | counting: announced; on its way, if it returns or lands already |
+//! | counting | `PROT_DELAY` is over | asking |
+//! | counting | no longer critical; the autopilot changes the mode | idle |
+//! | asking | accepted; no answer to 3 requests | on its way; done |
+//! | asking | refused | asking for a landing, or done |
+//! | counting, asking | cancelled by command | done |
+//! | counting, asking | the autopilot returns or lands | on its way |
+//! | counting, asking | the pilot changes the mode | mode changed, and after 2 s done |
+//! | on its way | the pilot leaves the mode that returns | mode changed |
+//! | on its way | the autopilot leaves it, or there is no sign of landing any more | idle |
+//! | mode changed | the autopilot reports a problem | idle |
+//! | any | the flight is over | idle |
 //!
 //! Only in flight and armed. While the vehicle is on the ground for a moment, or in a mishap, the countdown and the requests pause.
 //! Each step is a record, with the autopilot's answer.
@@ -69,10 +68,11 @@ const TEMPORARILY_REJECTED: u8 = 1;
 const IN_PROGRESS: u8 = 5;
 
 /// What is asked for. The numbers are those of `PROT_ACTION`, and are stored.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Action {
     /// `MAV_CMD_NAV_RETURN_TO_LAUNCH`
+    #[default]
     Return = 1,
     /// `MAV_CMD_NAV_LAND`
     Land = 2,
@@ -223,24 +223,17 @@ enum State {
     #[default]
     Idle,
     Counting {
-        action: Action,
         left_ms: u32,
         told_s: u8,
     },
     Asking {
-        action: Action,
+        /// Requests so far; 0: a return was refused, and a landing is asked for next.
         attempt: u8,
         at: Instant,
         /// It was understood; the answer is to come.
         progress: bool,
     },
-    /// A return was refused: a landing is asked for next.
-    Refused,
-    /// The autopilot returns or lands.
-    OnItsWay {
-        action: Action,
-        way: Way,
-    },
+    OnItsWay(Way),
     /// The pilot cancelled by the mode, unless a sign comes that it was the autopilot.
     ModeChanged,
     /// Nothing more in this flight.
@@ -254,21 +247,34 @@ enum Way {
     Accepted,
     /// Its mode.
     Mode,
-    /// It sinks as in a landing, or calls it one.
+    /// The vehicle sinks as in a landing, or the autopilot calls it one.
     Landing,
 }
 
-/// Who changed the flight mode.
+/// What moves the state: the first of these that is so.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Changed {
-    Pilot,
-    Autopilot,
+enum Input {
+    FlightOver,
+    /// `MAV_RESULT`
+    Answer(u8),
+    Command,
+    Way(Way),
+    ModeByPilot,
+    ModeByAutopilot,
+    /// In the air, and in no mishap.
+    Flies,
+    /// On the ground for a moment, or in a mishap.
+    Waits,
 }
+
+/// The next state, and what is told with it: a stage and its detail.
+type Move = (State, Option<(Stage, u8)>);
 
 /// The protective action's memory.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Protect {
     state: State,
+    action: Action,
     request: Option<Request>,
     cancelled: bool,
     /// The autopilot's own mode number, and when it changed last.
@@ -305,6 +311,7 @@ impl Protect {
     pub const fn new() -> Self {
         Self {
             state: State::Idle,
+            action: Action::Return,
             request: None,
             cancelled: false,
             mode: None,
@@ -321,183 +328,156 @@ impl Protect {
 
     /// Somebody sent the command to cancel; `true` where there is something to cancel.
     pub(crate) const fn cancel(&mut self) -> bool {
-        self.cancelled = self.pending().is_some();
+        self.cancelled = matches!(self.state, State::Counting { .. } | State::Asking { .. });
         self.cancelled
-    }
-
-    /// The action that is counted down or requested.
-    const fn pending(&self) -> Option<Action> {
-        match self.state {
-            State::Counting { action, .. } | State::Asking { action, .. } => Some(action),
-            State::Refused => Some(Action::Land),
-            _ => None,
-        }
     }
 
     /// One step, after the checks'.
     pub(crate) fn step(&mut self, situation: &Situation<'_>) -> Option<Step> {
+        use Input::{Answer, Command, Flies, FlightOver, ModeByAutopilot, ModeByPilot, Waits};
+        use State::{Asking, Counting, Done, Idle, ModeChanged, OnItsWay};
         let Situation { now, vehicle, .. } = *situation;
         let step_ms = self.stepped_at.age_ms(now).unwrap_or(0) as u32;
         self.stepped_at = Stamp::at(now);
+        let (next, told) = match (self.state, self.input(situation)) {
+            (Counting { .. } | Asking { .. }, FlightOver) => (Idle, Some((Stage::CancelledOnGround, 0))),
+            (Asking { attempt, .. }, Answer(result)) => self.hear(situation, attempt, result),
+            (Counting { .. } | Asking { .. }, Command) => (Done, Some((Stage::CancelledByCommand, 0))),
+            (Counting { .. } | Asking { .. }, Input::Way(way)) => {
+                (OnItsWay(way), Some((Stage::AlreadyDone, 0)))
+            }
+            (Counting { .. } | Asking { .. } | OnItsWay(Way::Mode), ModeByPilot) => {
+                (ModeChanged, Some((Stage::CancelledByMode, 0)))
+            }
+            (OnItsWay(_), Input::Way(way)) => (OnItsWay(way), None),
+            (_, FlightOver)
+            | (Counting { .. }, ModeByAutopilot)
+            | (OnItsWay(Way::Mode | Way::Landing), _) => (Idle, None),
+            (ModeChanged, _) if self.changed_at.older_than(now, SIGN) => (Done, None),
+            (ModeChanged, _) if vehicle.alerts.have_begun_within(now, SIGN) => (Idle, None),
+            (Counting { left_ms, .. }, Waits) => (Counting { left_ms, told_s: u8::MAX }, None),
+            (Idle, input) if situation.flies() => self.start(situation, input),
+            (Counting { left_ms, told_s }, Flies) => {
+                self.count(situation, left_ms.saturating_sub(step_ms), told_s)
+            }
+            (Asking { attempt, at, progress }, Flies) => self.insist(now, attempt, at, progress),
+            (state, _) => (state, None),
+        };
+        self.state = next;
+        told.map(|(stage, detail)| Step { action: self.action, stage, detail })
+    }
+
+    /// What moves the state now.
+    fn input(&mut self, situation: &Situation<'_>) -> Input {
+        let Situation { now, vehicle, flight, .. } = *situation;
         let cancelled = core::mem::take(&mut self.cancelled);
-        let left = self.mode.is_some_and(|mode| returns(vehicle, mode));
         let changed = self.note_mode(now, vehicle);
         if is_landing(situation) {
             self.landing_at = Stamp::at(now);
         }
-        let pending = self.pending();
-        if !situation.flight.is_open() {
-            (self.state, self.landing_at) = (State::Idle, Stamp::NONE);
-            return pending.map(|action| Step { action, stage: Stage::CancelledOnGround, detail: 0 });
+        if !flight.is_open() {
+            self.landing_at = Stamp::NONE;
+            return Input::FlightOver;
         }
-        if let State::Asking { action, attempt, at, .. } = self.state
-            && let Some(step) = self.hear(situation, action, attempt, at)
-        {
-            return Some(step);
+        if let Some(result) = self.answer(vehicle) {
+            return Input::Answer(result);
         }
-        let way = self.way(now, vehicle);
-        if let Some(action) = pending {
-            if cancelled {
-                return Some(self.become_with(State::Done, action, Stage::CancelledByCommand));
-            }
-            if let Some(way) = way {
-                return Some(self.become_with(State::OnItsWay { action, way }, action, Stage::AlreadyDone));
-            }
-            if changed == Some(Changed::Pilot) {
-                return Some(self.become_with(State::ModeChanged, action, Stage::CancelledByMode));
-            }
+        if cancelled {
+            return Input::Command;
         }
-        let flies = situation.flies();
-        match self.state {
-            State::Idle if flies => self.start(situation, way),
-            State::Counting { .. } | State::Refused if changed.is_some() => self.become_idle(),
-            State::Counting { action, left_ms, .. } if !flies => {
-                self.state = State::Counting { action, left_ms, told_s: u8::MAX };
-                None
-            }
-            State::Counting { action, left_ms, told_s } => {
-                self.count(situation, action, left_ms.saturating_sub(step_ms), told_s)
-            }
-            State::Asking { .. } if flies => self.insist(now),
-            State::Refused if flies => Some(self.ask(now, Action::Land, 1)),
-            State::OnItsWay { action, way: before } => match way {
-                Some(way) => {
-                    self.state = State::OnItsWay { action, way };
-                    None
-                }
-                None if left && changed == Some(Changed::Pilot) => {
-                    Some(self.become_with(State::ModeChanged, action, Stage::CancelledByMode))
-                }
-                None if before == Way::Accepted => None,
-                None => self.become_idle(),
-            },
-            State::ModeChanged if self.changed_at.older_than(now, SIGN) => {
-                self.state = State::Done;
-                None
-            }
-            State::ModeChanged if vehicle.alerts.have_begun_within(now, SIGN) => self.become_idle(),
-            _ => None,
+        let returns =
+            modes(vehicle).zip(self.mode).is_some_and(|(modes, mode)| modes.returns.contains(&mode));
+        if returns {
+            return Input::Way(Way::Mode);
         }
+        let lands = self.landing_at.age(now).is_some_and(|age| age < LANDING_LASTS);
+        changed.unwrap_or(match (lands, situation.flies()) {
+            (true, _) => Input::Way(Way::Landing),
+            (false, true) => Input::Flies,
+            (false, false) => Input::Waits,
+        })
     }
 
     /// Whether the mode has changed since the last step, and who changed it.
-    fn note_mode(&mut self, now: Instant, vehicle: &Vehicle) -> Option<Changed> {
+    fn note_mode(&mut self, now: Instant, vehicle: &Vehicle) -> Option<Input> {
         let after = vehicle.heartbeat.get()?.mode;
         let before = self.mode.replace(after).filter(|before| *before != after)?;
         (self.changed_at, self.landing_at) = (Stamp::at(now), Stamp::NONE);
-        let by_itself = vehicle.alerts.have_begun_within(now, SIGN)
-            || waits(vehicle, after)
-            || mission_ended(now, vehicle, before, after);
-        Some(if by_itself { Changed::Autopilot } else { Changed::Pilot })
+        let by_itself =
+            vehicle.alerts.have_begun_within(now, SIGN) || is_own_change(now, vehicle, before, after);
+        Some(if by_itself { Input::ModeByAutopilot } else { Input::ModeByPilot })
     }
 
-    /// By which sign the autopilot returns or lands, if it does.
-    fn way(&self, now: Instant, vehicle: &Vehicle) -> Option<Way> {
-        if self.mode.is_some_and(|mode| returns(vehicle, mode)) {
-            return Some(Way::Mode);
-        }
-        let lands = self.landing_at.age(now).is_some_and(|age| age < LANDING_LASTS);
-        lands.then_some(Way::Landing)
-    }
-
-    fn become_with(&mut self, state: State, action: Action, stage: Stage) -> Step {
-        self.state = state;
-        Step { action, stage, detail: 0 }
-    }
-
-    /// Should it be critical still, it is announced anew.
-    const fn become_idle(&mut self) -> Option<Step> {
-        self.state = State::Idle;
-        None
+    /// The autopilot's answer to the latest request, once it has come.
+    fn answer(&self, vehicle: &Vehicle) -> Option<u8> {
+        let State::Asking { attempt, at, .. } = self.state else { return None };
+        vehicle.command_ack.at().filter(|answered_at| attempt > 0 && !at.is_after(*answered_at))?;
+        let ack = vehicle.command_ack.get().filter(|ack| is_ours(ack, vehicle, self.action))?;
+        Some(ack.result).filter(|result| *result != TEMPORARILY_REJECTED || attempt == ATTEMPTS_MAX)
     }
 
     /// Announces the action, once something is critical.
-    fn start(&mut self, situation: &Situation<'_>, way: Option<Way>) -> Option<Step> {
+    fn start(&mut self, situation: &Situation<'_>, input: Input) -> Move {
         let Situation { vehicle, health, params, .. } = *situation;
-        let action = Action::from_number(params.get(Param::ProtAction) as u8)?;
-        if self.mode.is_none() || !concerned(vehicle, health, params) {
-            return None;
-        }
-        if let Some(way) = way {
-            return Some(self.become_with(State::OnItsWay { action, way }, action, Stage::AlreadyDone));
+        let action = Action::from_number(params.get(Param::ProtAction) as u8);
+        let Some(action) = action.filter(|_| self.mode.is_some() && concerned(vehicle, health, params))
+        else {
+            return (State::Idle, None);
+        };
+        self.action = action;
+        if let Input::Way(way) = input {
+            return (State::OnItsWay(way), Some((Stage::AlreadyDone, 0)));
         }
         let delay_s = params.get(Param::ProtDelay).clamp(0.0, 250.0) as u8;
-        self.state = State::Counting { action, left_ms: u32::from(delay_s) * 1_000, told_s: delay_s };
-        Some(Step { action, stage: Stage::Announced, detail: delay_s })
+        let left_ms = u32::from(delay_s) * 1_000;
+        (State::Counting { left_ms, told_s: delay_s }, Some((Stage::Announced, delay_s)))
     }
 
-    fn count(&mut self, situation: &Situation<'_>, action: Action, left_ms: u32, told_s: u8) -> Option<Step> {
+    fn count(&mut self, situation: &Situation<'_>, left_ms: u32, told_s: u8) -> Move {
         let Situation { now, vehicle, health, params, .. } = *situation;
         if !concerned(vehicle, health, params) {
-            return Some(self.become_with(State::Idle, action, Stage::CancelledClear));
+            return (State::Idle, Some((Stage::CancelledClear, 0)));
         }
         if left_ms == 0 {
-            return Some(self.ask(now, action, 1));
+            return self.ask(now, 1);
         }
         let left_s = left_ms.div_ceil(1_000).min(255) as u8;
         let tells = left_s < told_s && (left_s.is_multiple_of(5) || left_s <= 3);
-        self.state = State::Counting { action, left_ms, told_s: if tells { left_s } else { told_s } };
-        tells.then_some(Step { action, stage: Stage::Counting, detail: left_s })
+        let told_s = if tells { left_s } else { told_s };
+        (State::Counting { left_ms, told_s }, tells.then_some((Stage::Counting, left_s)))
     }
 
-    fn ask(&mut self, now: Instant, action: Action, attempt: u8) -> Step {
-        self.state = State::Asking { action, attempt, at: now, progress: false };
-        self.request = Some(Request { command: action.command(), confirmation: attempt - 1 });
-        Step { action, stage: Stage::Asked, detail: attempt }
+    fn ask(&mut self, now: Instant, attempt: u8) -> Move {
+        self.request = Some(Request { command: self.action.command(), confirmation: attempt - 1 });
+        (State::Asking { attempt, at: now, progress: false }, Some((Stage::Asked, attempt)))
     }
 
-    /// The autopilot's answer, once it has come.
-    fn hear(&mut self, situation: &Situation<'_>, action: Action, attempt: u8, at: Instant) -> Option<Step> {
-        let Situation { vehicle, .. } = *situation;
-        let answered_at = vehicle.command_ack.at().filter(|answered_at| !at.is_after(*answered_at))?;
-        let ack = vehicle.command_ack.get().filter(|ack| is_ours(ack, vehicle, action))?;
-        match ack.result {
-            TEMPORARILY_REJECTED if attempt < ATTEMPTS_MAX => return None,
-            IN_PROGRESS => {
-                // What follows is waited for from here on.
-                self.state = State::Asking { action, attempt, at: answered_at, progress: true };
-                return None;
+    /// The autopilot answered the request.
+    fn hear(&self, situation: &Situation<'_>, attempt: u8, result: u8) -> Move {
+        let at = situation.now;
+        let next = match result {
+            // What follows is waited for from here on.
+            IN_PROGRESS => return (State::Asking { attempt, at, progress: true }, None),
+            ACCEPTED => State::OnItsWay(Way::Accepted),
+            _ if self.action == Action::Return && hovers(situation) => {
+                State::Asking { attempt: 0, at, progress: false }
             }
-            ACCEPTED => self.state = State::OnItsWay { action, way: Way::Accepted },
-            _ => {
-                let lands = action == Action::Return && hovers(situation);
-                self.state = if lands { State::Refused } else { State::Done };
-            }
-        }
-        Some(Step { action, stage: Stage::Answered, detail: ack.result })
+            _ => State::Done,
+        };
+        (next, Some((Stage::Answered, result)))
     }
 
-    /// Asks again where there is no answer.
-    fn insist(&mut self, now: Instant) -> Option<Step> {
-        let State::Asking { action, attempt, at, progress } = self.state else { return None };
-        if now.since(at) < if progress { PROGRESS } else { AGAIN } {
-            return None;
+    /// Asks again where there is no answer, or for a landing.
+    fn insist(&mut self, now: Instant, attempt: u8, at: Instant, progress: bool) -> Move {
+        if attempt == 0 {
+            self.action = Action::Land;
+        } else if now.since(at) < if progress { PROGRESS } else { AGAIN } {
+            return (self.state, None);
         }
         if attempt < ATTEMPTS_MAX {
-            return Some(self.ask(now, action, attempt + 1));
+            return self.ask(now, attempt + 1);
         }
-        self.state = State::Done;
-        Some(Step { action, stage: Stage::Unanswered, detail: attempt })
+        (State::Done, Some((Stage::Unanswered, attempt)))
     }
 }
 
@@ -508,19 +488,11 @@ fn hovers(situation: &Situation<'_>) -> bool {
         && (vehicle.kind() != VehicleKind::Vtol || vehicle.vtol == VtolState::Hover)
 }
 
-/// Whether it flies a mission whose landing the autopilot tells by no mode and no landed state. `ArduCopter` does tell it.
-fn in_mission(vehicle: &Vehicle) -> bool {
-    vehicle.heartbeat.get().is_some_and(|heartbeat| match (heartbeat.autopilot, vehicle.kind()) {
-        (Autopilot::Px4, _) => (heartbeat.mode >> 16) as u16 == 0x0404,
-        (Autopilot::ArduPilot, VehicleKind::Plane | VehicleKind::Vtol) => heartbeat.mode == 10,
-        _ => false,
-    })
-}
-
 /// Whether it comes down as a mission's landing does. A mission that goes to a lower place looks the same, and is waited for too.
 fn approaches(situation: &Situation<'_>) -> bool {
     let Situation { now, vehicle, .. } = *situation;
-    in_mission(vehicle)
+    let mode = vehicle.heartbeat.get().map(|heartbeat| heartbeat.mode);
+    modes(vehicle).is_some_and(|modes| Some(modes.mission) == mode && !modes.tells_landing)
         && motion::climb_mps(now, vehicle).is_some_and(|climb_mps| climb_mps < -APPROACH_MPS)
         && motion::height_m(now, vehicle).is_some_and(|height_m| height_m < APPROACH_M)
 }
@@ -550,29 +522,55 @@ fn concerned(vehicle: &Vehicle, health: &Health, params: &Params) -> bool {
     })
 }
 
-/// Whether the autopilot left a mission by itself because it was flown to its end.
-fn mission_ended(now: Instant, vehicle: &Vehicle, before: u32, after: u32) -> bool {
-    let Some(heartbeat) = vehicle.heartbeat.get() else { return false };
-    let left = match (heartbeat.autopilot, heartbeat.kind) {
-        // ArduPlane: from AUTO to LOITER. A mission's end in RTL is a return.
-        (Autopilot::ArduPilot, VehicleKind::Plane | VehicleKind::Vtol) => (before, after) == (10, 12),
-        // ArduCopter: from AUTO to LOITER or BRAKE.
-        (Autopilot::ArduPilot, _) => before == 3 && matches!(after, 5 | 17),
-        _ => false,
-    };
-    left && vehicle.mission_reached.within(now, MISSION_ENDS).is_some()
+/// Modes of an autopilot, by its own numbers.
+struct Modes {
+    /// It returns or lands.
+    returns: &'static [u32],
+    /// Failsafes wait in it: a pilot who chooses it has not cancelled.
+    waits: u32,
+    mission: u32,
+    /// It goes there by itself from a mission's end.
+    after_mission: &'static [u32],
+    /// A mission's landing shows in its landed state.
+    tells_landing: bool,
 }
 
-/// Whether failsafes wait in this mode, and PX4 at the end of a mission: a pilot who chooses it has not cancelled.
-fn waits(vehicle: &Vehicle, mode: u32) -> bool {
-    vehicle.heartbeat.get().is_some_and(|heartbeat| match (heartbeat.autopilot, heartbeat.kind) {
-        // PX4: HOLD, which is AUTO (4), LOITER (3).
-        (Autopilot::Px4, _) => (mode >> 16) as u16 == 0x0304,
-        // ArduPlane: CIRCLE.
-        (Autopilot::ArduPilot, VehicleKind::Plane | VehicleKind::Vtol) => mode == 1,
-        // ArduCopter: BRAKE.
-        (Autopilot::ArduPilot, _) => mode == 17,
-        (Autopilot::Other, _) => false,
+/// Main mode AUTO (4) with the sub modes RTL (5), LAND (6), PRECLAND (9); HOLD, which is LOITER (3), also after a mission; MISSION (4).
+const PX4: Modes = Modes {
+    returns: &[0x0504_0000, 0x0604_0000, 0x0904_0000],
+    waits: 0x0304_0000,
+    mission: 0x0404_0000,
+    after_mission: &[],
+    tells_landing: false,
+};
+/// RTL, QLAND, QRTL, `LOITER_ALT_QLAND`, AUTOLAND; CIRCLE; AUTO; LOITER. A mission's end in RTL is a return.
+const PLANE: Modes = Modes {
+    returns: &[11, 20, 21, 25, 26],
+    waits: 1,
+    mission: 10,
+    after_mission: &[12],
+    tells_landing: false,
+};
+/// RTL, LAND, `SMART_RTL`, `AUTO_RTL`; BRAKE; AUTO; LOITER, BRAKE.
+const COPTER: Modes =
+    Modes { returns: &[6, 9, 21, 27], waits: 17, mission: 3, after_mission: &[5, 17], tells_landing: true };
+
+/// The modes of the vehicle's autopilot, where they are known.
+fn modes(vehicle: &Vehicle) -> Option<&'static Modes> {
+    let heartbeat = vehicle.heartbeat.get()?;
+    match (heartbeat.autopilot, heartbeat.kind) {
+        (Autopilot::Px4, _) => Some(&PX4),
+        (Autopilot::ArduPilot, VehicleKind::Plane | VehicleKind::Vtol) => Some(&PLANE),
+        (Autopilot::ArduPilot, _) => Some(&COPTER),
+        (Autopilot::Other, _) => None,
+    }
+}
+
+/// Whether the autopilot changed the mode by its own: a failsafe may wait in it, or a mission was flown to its end.
+fn is_own_change(now: Instant, vehicle: &Vehicle, before: u32, after: u32) -> bool {
+    modes(vehicle).is_some_and(|modes| {
+        let is_end = before == modes.mission && modes.after_mission.contains(&after);
+        after == modes.waits || (is_end && vehicle.mission_reached.within(now, MISSION_ENDS).is_some())
     })
 }
 
@@ -582,24 +580,6 @@ fn is_landing(situation: &Situation<'_>) -> bool {
     vehicle.landed.within(now, LANDED_STATE_AGE) == Some(&LandedState::Landing)
         || flight.phase(now, vehicle) == Phase::Landing
         || approaches(situation)
-}
-
-/// Whether the autopilot returns or lands in this mode.
-fn returns(vehicle: &Vehicle, mode: u32) -> bool {
-    vehicle.heartbeat.get().is_some_and(|heartbeat| match (heartbeat.autopilot, heartbeat.kind) {
-        // PX4: main mode AUTO (4), sub modes RTL (5), LAND (6), PRECLAND (9).
-        (Autopilot::Px4, _) => {
-            let [_, _, main, sub] = mode.to_le_bytes();
-            main == 4 && matches!(sub, 5 | 6 | 9)
-        }
-        // ArduPlane: RTL, QLAND, QRTL, LOITER_ALT_QLAND, AUTOLAND.
-        (Autopilot::ArduPilot, VehicleKind::Plane | VehicleKind::Vtol) => {
-            matches!(mode, 11 | 20 | 21 | 25 | 26)
-        }
-        // ArduCopter: RTL, LAND, SMART_RTL, AUTO_RTL.
-        (Autopilot::ArduPilot, _) => matches!(mode, 6 | 9 | 21 | 27),
-        (Autopilot::Other, _) => false,
-    })
 }
 
 #[cfg(test)]
