@@ -60,16 +60,15 @@ const DRIFT_PERCENT: f32 = 3.0;
 const SUMMED_S: f32 = 6.0;
 /// No sum is worth more, percent: what ends is over soon.
 const SUM_MAX_PERCENT: f32 = 12.0;
-/// Below this part of the average, percent, a motor was taken out.
-const OUT_PERCENT: f32 = -70.0;
-/// What is told of one that was, and of no other, percent.
-pub(crate) const OFF_PERCENT: f32 = 100.0;
+/// Below this part of the average, percent, a motor was shut off.
+const SHUT_OFF_SHARE: f32 = -70.0;
+/// The verdicts on the scale of `motor_output`, percent.
+pub(crate) const SHUT_OFF_PERCENT: f32 = 100.0;
+const SATURATED_PERCENT: f32 = SHUT_OFF_PERCENT - 1.0;
 /// A motor that is given less is given nothing.
 const OFF: f32 = 0.05;
 /// Outputs end here or beyond: `MOT_PWM_MAX` of ArduPilot is 1950 us, `PWM_MAIN_MAX` of PX4 2000.
 const FULL: f32 = 0.94;
-/// What stands for a motor that alone is at the end of its range.
-const AT_END_PERCENT: f32 = OFF_PERCENT - 1.0;
 /// Two thirds of the range: what is above shares the load with what is at its end, as in a turn or a climb.
 const SHARES: f32 = 0.667;
 /// 30 degrees a second: a pilot yaws faster, and gusts do not turn a vehicle so fast for long.
@@ -120,6 +119,61 @@ impl Range {
     }
 }
 
+/// What an output says of its motor.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Verdict {
+    /// Nothing that counts.
+    Ok,
+    /// It gives less thrust than it should: its command stands out by so much, percent of the average.
+    Weak(f32),
+    /// It alone is at the end of its range.
+    Saturated,
+    /// It is given next to nothing while the others carry: the autopilot, or a command, shut it off.
+    ShutOff,
+}
+
+impl Verdict {
+    /// On the scale of the check `motor_output`, percent: a weak motor is at most where a saturated one is.
+    fn percent(self) -> f32 {
+        match self {
+            Self::Ok => 0.0,
+            Self::Weak(percent) => percent.clamp(0.0, SATURATED_PERCENT),
+            Self::Saturated => SATURATED_PERCENT,
+            Self::ShutOff => SHUT_OFF_PERCENT,
+        }
+    }
+}
+
+/// One output.
+#[derive(Clone, Copy, Debug)]
+#[expect(clippy::struct_excessive_bools, reason = "facts that have nothing to do with each other")]
+struct Output {
+    /// Command against the average of all, percent.
+    share: AdaptiveBaseline,
+    /// It was given as little on the ground as a motor that does not turn.
+    idles: bool,
+    /// It carried in any flight.
+    carried: bool,
+    /// It is given next to nothing now, or is at the end of its range.
+    off: bool,
+    full: bool,
+    /// Of a flight whose take-off was not received: the first output, and whether it moved since.
+    first: u16,
+    moved: bool,
+}
+
+impl Output {
+    const NEW: Self = Self {
+        share: AdaptiveBaseline::NEW,
+        idles: false,
+        carried: false,
+        off: false,
+        full: false,
+        first: 0,
+        moved: false,
+    };
+}
+
 /// The memory of the motors' commands.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct MotorOutputs {
@@ -128,25 +182,14 @@ pub(crate) struct MotorOutputs {
     /// How many motors there are in this flight; 0 before it is known.
     count: u8,
     range: Range,
-    /// Motors that were given as little on the ground as one that does not turn: a bit each.
-    idle: u8,
-    /// Outputs that carried in any flight, and those of them that are given next to nothing now: a bit each.
-    carried: u8,
-    off: u8,
-    /// Outputs that are at the end of their range: a bit each.
-    full: u8,
-    /// Command against the average of all, percent.
-    share: [AdaptiveBaseline; JUDGED_MAX],
+    outputs: [Output; JUDGED_MAX],
     at: Stamp,
     /// The motor that has stood out over time, and by how much, percent for [`SUMMED_S`].
     summed: (u8, f32),
-    /// The motor that stands out, and how far, percent.
-    excess: (u8, f32),
-    /// The flight began before it was heard, or its outputs were: what was heard first, which outputs moved since (a bit each), and since
-    /// when one output alone is at an end of its range.
+    /// The motor that is judged, and how; none of the others is anything but good.
+    verdict: (u8, Verdict),
+    /// The take-off was not received; since when one output alone is at an end of its range then.
     takeoff_not_recorded: bool,
-    first: [u16; JUDGED_MAX],
-    moved: u8,
     at_end_since: Stamp,
 }
 
@@ -157,25 +200,20 @@ impl MotorOutputs {
             port: None,
             count: 0,
             range: Range::Pulses,
-            idle: 0,
-            carried: 0,
-            off: 0,
-            full: 0,
-            share: [AdaptiveBaseline::NEW; JUDGED_MAX],
+            outputs: [Output::NEW; JUDGED_MAX],
             at: Stamp::NONE,
             summed: (0, 0.0),
-            excess: (0, 0.0),
+            verdict: (0, Verdict::Ok),
             takeoff_not_recorded: false,
-            first: [0; JUDGED_MAX],
-            moved: 0,
             at_end_since: Stamp::NONE,
         }
     }
 
     /// A flight begins: nothing is usual yet.
-    pub(crate) const fn begin(&mut self) {
-        let Self { port, range, idle, carried, .. } = *self;
-        *self = Self { port, range, idle, carried, ..Self::new() };
+    pub(crate) fn begin(&mut self) {
+        let Self { port, range, outputs, .. } = *self;
+        let outputs = outputs.map(|Output { idles, carried, .. }| Output { idles, carried, ..Output::NEW });
+        *self = Self { port, range, outputs, ..Self::new() };
     }
 
     pub(crate) fn take(
@@ -187,14 +225,13 @@ impl MotorOutputs {
         flies_level: bool,
     ) {
         let told = motors(vehicle);
-        if !outputs.pulses.iter().take(told).any(|pulse| *pulse > 0) {
-            return;
-        }
-        if *self.port.get_or_insert(outputs.port) != outputs.port {
+        if !outputs.pulses.iter().take(told).any(|pulse| *pulse > 0)
+            || *self.port.get_or_insert(outputs.port) != outputs.port
+        {
             return;
         }
         let Some((outputs, _)) = outputs.pulses.split_first_chunk::<JUDGED_MAX>() else { return };
-        // `ArduPilot` tells of pulses, whatever its drivers make of them.
+        // `ArduPilot` sends pulses, whatever its drivers make of them.
         let drivers = outputs.get(..told).filter(|_| !vehicle.is_ardupilot()).unwrap_or_default();
         self.range = self.range.seen(drivers, !flight.airborne());
         let parts = outputs.map(|output| self.range.part(output));
@@ -202,144 +239,159 @@ impl MotorOutputs {
             self.note_idle(outputs, &parts, vehicle.armed());
             return;
         }
-        self.note_off(&parts);
+        self.note_ends(&parts);
         let count = self.judged(vehicle);
-        let (all, Some(given)) = (u8::MAX >> (JUDGED_MAX - count), parts.get(..count)) else {
-            return;
-        };
-        // What does not idle on the ground is a servo.
-        let known = self.idle & all == all;
-        self.takeoff_not_recorded = self.idle == 0 || !flight.was_on_ground();
-        if !known && self.takeoff_not_recorded {
-            self.at = Stamp::at(at);
-            self.note_moved(outputs);
-            let (place, percent) = self.excess;
-            // The one opposite may idle then.
-            let stays = percent >= OFF_PERCENT && given.get(usize::from(place)).is_some_and(is_off);
-            if !stays {
-                // An output of nothing is not used.
+        let Some(given) = parts.get(..count) else { return };
+        let has_idled = self.outputs.iter().any(|output| output.idles);
+        self.takeoff_not_recorded = !has_idled || !flight.was_on_ground();
+        // An output that does not idle on the ground is a servo's.
+        if !self.outputs.iter().take(count).all(|output| output.idles) {
+            if self.takeoff_not_recorded {
+                self.at = Stamp::at(at);
+                self.note_moved(outputs);
                 let used = outputs.iter().take(count).all(|output| *output > 0);
-                let out =
-                    only(given, is_off, surely_carries).filter(|_| used).map(|place| (place, OFF_PERCENT));
-                let full = || Some((full_alone(given)?, AT_END_PERCENT));
-                let at_end = out
-                    .or_else(full)
-                    .filter(|(place, _)| (self.moved | 1 << place) & all == all && flies_level);
-                let lasts = self.at_end_since.run(at_end.is_some(), at, LASTS);
-                self.excess = at_end.filter(|_| lasts).unwrap_or_default();
+                self.verdict = self.judge_unseen(at, given, used, flies_level);
             }
             return;
         }
-        if let Some(place) = full_alone(given).filter(|_| known) {
-            (self.at, self.excess) = (Stamp::at(at), (place, AT_END_PERCENT));
+        if let Some(place) = saturated_alone(given) {
+            (self.at, self.verdict) = (Stamp::at(at), (place, Verdict::Saturated));
             return;
         }
-        if (AT_END_PERCENT..OFF_PERCENT).contains(&self.excess.1) {
-            (self.at, self.excess.1) = (Stamp::at(at), 0.0);
-        }
-        if !known || !flies_level || yaws(vehicle) {
-            return;
+        if self.verdict.1 == Verdict::Saturated {
+            (self.at, self.verdict.1) = (Stamp::at(at), Verdict::Ok);
         }
         let mean = given.iter().sum::<f32>() / count as f32;
-        if mean < CARRIES {
-            return;
-        }
-        if self.count == 0 {
-            let is_like = |given: &f32| LIKE_OTHERS.contains(&(given / mean));
-            let places = (0..).zip(&parts);
-            let motors =
-                places.take_while(|(place, given)| self.idle >> place & 1 != 0 && is_like(given)).count();
-            self.count = if matches!(motors, 6 | JUDGED_MAX) { motors.max(count) } else { count } as u8;
-        }
-        if usize::from(self.count) != count {
+        if !flies_level || yaws(vehicle) || mean < CARRIES || !self.is_of_frame(&parts, mean, count) {
             return;
         }
         let step_s = self.at.age(at).filter(|step| *step <= PAUSE).map_or(0.0, Span::as_secs_f32);
         self.at = Stamp::at(at);
-        for (share, given) in self.share.iter_mut().zip(given) {
-            share.follow(given / mean * 100.0 - 100.0, step_s / (SMOOTHING_S + step_s));
+        for (output, given) in self.outputs.iter_mut().zip(given) {
+            output.share.follow(given / mean * 100.0 - 100.0, step_s / (SMOOTHING_S + step_s));
         }
         self.judge(count, step_s);
     }
 
-    /// Which outputs are not where they were when they were heard first.
+    /// Whether there are so many motors; how many there are shows in the first level flight.
+    fn is_of_frame(&mut self, parts: &[f32; JUDGED_MAX], mean: f32, count: usize) -> bool {
+        if self.count == 0 {
+            let is_like =
+                |(output, given): &(&Output, &f32)| output.idles && LIKE_OTHERS.contains(&(*given / mean));
+            let motors = self.outputs.iter().zip(parts).take_while(is_like).count();
+            self.count = if matches!(motors, 6 | JUDGED_MAX) { motors.max(count) } else { count } as u8;
+        }
+        usize::from(self.count) == count
+    }
+
+    /// The verdict in a flight whose take-off was not received: only an output that alone is at an end of its range says something.
+    fn judge_unseen(&mut self, at: Instant, given: &[f32], used: bool, flies_level: bool) -> (u8, Verdict) {
+        let (place, verdict) = self.verdict;
+        // The one opposite may idle then.
+        if verdict == Verdict::ShutOff && given.get(usize::from(place)).is_some_and(is_off) {
+            return self.verdict;
+        }
+        // An output of nothing is not used.
+        let shut_off = only(given, is_off, surely_carries).filter(|_| used);
+        let at_end = shut_off.map(|place| (place, Verdict::ShutOff));
+        let at_end = at_end.or_else(|| Some((saturated_alone(given)?, Verdict::Saturated)));
+        let others_moved = |place: u8| {
+            let outputs = (0..).zip(&self.outputs).take(given.len());
+            outputs.into_iter().all(|(other, output)| other == place || output.moved)
+        };
+        let at_end = at_end.filter(|(place, _)| flies_level && others_moved(*place));
+        let lasts = self.at_end_since.run(at_end.is_some(), at, LASTS);
+        at_end.filter(|_| lasts).unwrap_or((0, Verdict::Ok))
+    }
+
+    /// Which outputs are not as they were received first.
     fn note_moved(&mut self, outputs: &[u16; JUDGED_MAX]) {
-        for (place, (output, first)) in outputs.iter().zip(&mut self.first).enumerate() {
-            if *first == 0 {
-                *first = *output;
+        for (output, now) in self.outputs.iter_mut().zip(outputs) {
+            if output.first == 0 {
+                output.first = *now;
             }
-            let moved = (self.range.part(*output) - self.range.part(*first)).abs();
-            self.moved |= u8::from(moved > MOVES) << place;
+            output.moved |= (self.range.part(*now) - self.range.part(output.first)).abs() > MOVES;
         }
     }
 
-    /// Whether this output alone is at an end of its range in a flight that began before it was heard: how its motor turned before is
+    /// Whether this output alone is at an end of its range in a flight whose take-off was not received: how its motor turned before is
     /// not known.
     pub(crate) fn was_found_at_end(&self, motor: u8) -> bool {
-        self.takeoff_not_recorded && self.excess.0 == motor && self.excess.1 > 0.0
+        self.takeoff_not_recorded && self.verdict.0 == motor && self.verdict.1.percent() > 0.0
     }
 
-    /// What the outputs are given on the ground. One that is given more while the vehicle is disarmed is a servo, or a motor in a test.
+    /// The outputs on the ground. One that is given more while the vehicle is disarmed is a servo's, or a motor's in a test.
     fn note_idle(&mut self, outputs: &[u16; JUDGED_MAX], parts: &[f32; JUDGED_MAX], armed: bool) {
-        for (place, (output, given)) in outputs.iter().zip(parts).enumerate() {
-            if *output == 0 {
-                continue;
-            }
-            if !armed && *given > IDLE {
-                self.idle &= !(1 << place);
-            }
-            self.idle |= u8::from(*given <= IDLE) << place;
+        let used = self.outputs.iter_mut().zip(outputs).zip(parts).filter(|((_, now), _)| **now > 0);
+        for ((output, _), given) in used {
+            output.idles = *given <= IDLE || (output.idles && armed);
         }
     }
 
-    /// Which outputs are given next to nothing: also those beyond the motors of the frame that the vehicle says it is.
-    fn note_off(&mut self, parts: &[f32; JUDGED_MAX]) {
-        (self.off, self.full) = (0, 0);
-        for (place, given) in parts.iter().enumerate() {
-            self.carried |= u8::from(carries(given)) << place;
-            self.off |= u8::from(is_off(given)) << place;
-            self.full |= u8::from(is_full(given)) << place;
+    /// Which outputs are at an end of their range: also those beyond the motors of the frame that the vehicle says it is.
+    fn note_ends(&mut self, parts: &[f32; JUDGED_MAX]) {
+        for (output, given) in self.outputs.iter_mut().zip(parts) {
+            output.carried |= carries(given);
+            output.off = output.carried && is_off(given);
+            output.full = is_full(given);
         }
-        self.off &= self.carried;
+    }
+
+    fn output(&self, motor: u8) -> Option<&Output> {
+        self.outputs.get(usize::from(motor))
     }
 
     /// Whether a motor that carried before is given next to nothing: that it does not turn is no fault of its own.
     pub(crate) fn is_off(&self, motor: u8) -> bool {
-        self.off.checked_shr(u32::from(motor)).is_some_and(|off| off & 1 != 0)
+        self.output(motor).is_some_and(|output| output.off)
     }
 
     /// Whether it is at the end of its range.
     pub(crate) fn is_full(&self, motor: u8) -> bool {
-        self.full.checked_shr(u32::from(motor)).is_some_and(|full| full & 1 != 0)
+        self.output(motor).is_some_and(|output| output.full)
     }
 
+    /// The verdict by what the outputs are usually given.
     fn judge(&mut self, count: usize, step_s: f32) {
+        let (place, stands_out) = self.find_weak(count, step_s);
+        let is_quiet = !self.is_known() || stands_out < HOLD_PERCENT;
+        if is_quiet {
+            self.outputs.iter_mut().for_each(|output| output.share.learn(step_s));
+        }
+        // Opposite to one that is driven alone, one idles: that is the balance, and no fault of its own.
+        let shut_off = self.find_shut_off(count).filter(|_| !self.is_known() || stands_out < HOLD_PERCENT);
+        self.verdict = match shut_off {
+            Some(place) => (place, Verdict::ShutOff),
+            None => (place, if self.is_known() { Verdict::Weak(stands_out) } else { Verdict::Ok }),
+        };
+    }
+
+    fn find_shut_off(&self, count: usize) -> Option<u8> {
+        let mut outputs = (0_u8..).zip(&self.outputs).take(count);
+        outputs.find(|(_, output)| output.share.figure() < SHUT_OFF_SHARE).map(|(place, _)| place)
+    }
+
+    /// The motor that stands out most, at once or over time, and by how much, percent of the average.
+    fn find_weak(&mut self, count: usize, step_s: f32) -> (u8, f32) {
         let mut changes = [(0.0, 0); JUDGED_MAX];
-        for ((place, change), share) in (0_u8..).zip(&mut changes).zip(&self.share).take(count) {
-            *change = (share.departed(), place);
+        for ((place, change), output) in (0_u8..).zip(&mut changes).zip(&self.outputs).take(count) {
+            *change = (output.share.departed(), place);
         }
         let changes = &mut changes[..count];
         changes.sort_unstable_by(|one, other| other.0.total_cmp(&one.0));
-        let [first, second, .., lowest] = *changes else { return };
+        let [first, second, .., lowest] = *changes else { return (0, 0.0) };
         let (lowest, part) = match count {
             8 => (changes[3], 0.2),
             // Of six the opposite one is lowered.
             6 => (changes[4], 0.5),
             _ => (lowest, 1.0),
         };
-        let spread = self.share.iter().take(count).map(AdaptiveBaseline::spread).sum::<f32>() / count as f32;
+        let spreads = self.outputs.iter().take(count).map(|output| output.share.spread());
+        let spread = spreads.sum::<f32>() / count as f32;
         let excess = ((first.0 - second.0) - (second.0 - lowest.0)) / part;
         let (now, (summed, sum)) = (excess - SPREADS * spread / part, self.sum(excess, first.1, step_s));
-        // What stands out over time goes on doing so while another one does for a moment.
-        let (place, stands_out) = if sum > now { (summed, sum) } else { (first.1, now) };
-        if !self.is_known() || stands_out < HOLD_PERCENT {
-            self.share.iter_mut().for_each(|share| share.learn(step_s));
-        }
-        // Opposite to one that is driven alone, one idles: that is the balance, and no fault of its own.
-        let out = (0_u8..).zip(&self.share).take(count).find(|(_, share)| share.figure() < OUT_PERCENT);
-        let out = out.filter(|_| !self.is_known() || stands_out < HOLD_PERCENT);
-        let weak = (place, stands_out.min(OFF_PERCENT.next_down()));
-        self.excess = out.map_or(weak, |(place, _)| (place, OFF_PERCENT));
+        // A motor that stands out over time goes on doing so while another one does for a moment.
+        if sum > now { (summed, sum) } else { (first.1, now) }
     }
 
     /// The motor that has stood out over time, and by how much.
@@ -358,7 +410,7 @@ impl MotorOutputs {
 
     /// All learn together.
     fn is_known(&self) -> bool {
-        self.share.first().is_some_and(AdaptiveBaseline::is_known)
+        self.outputs.first().is_some_and(|output| output.share.is_known())
     }
 
     /// How many motors are judged; 0 of what is no such frame now.
@@ -375,22 +427,21 @@ impl MotorOutputs {
     pub(crate) fn share(&self, now: Instant, vehicle: &Vehicle, motor: u8) -> Option<f32> {
         self.at.age(now).filter(|age| *age <= PAUSE)?;
         let judged = Some(self.judged(vehicle)).filter(|count| *count <= OUTPUTS_MAX)?;
-        Some(self.share.get(..judged)?.get(usize::from(motor))?.figure())
+        Some(self.outputs.get(..judged)?.get(usize::from(motor))?.share.figure())
     }
 
     /// How far a motor's command alone is above what is usual, percent of the average; 0 for those that do not stand out.
     pub(crate) fn excess(&self, now: Instant, vehicle: &Vehicle, motor: u8) -> Option<Reading> {
         let at = self.at.instant(now).filter(|at| now.since(*at) <= PAUSE)?;
         let count = self.judged(vehicle);
-        // Where all idled on the ground, or all but one moved in a flight that nobody saw begin, they are motors.
-        let are_motors = |seen: u8, all_but: u32| (seen.count_ones() + all_but) as usize >= count;
-        if usize::from(motor) >= count || !(are_motors(self.idle, 0) || are_motors(self.moved, 1)) {
+        // If all idled on the ground, or all but one moved in a flight whose take-off was not received, they are motors.
+        let seen = |is: fn(&Output) -> bool| self.outputs.iter().filter(|output| is(output)).count();
+        let are_motors = seen(|output| output.idles) >= count || seen(|output| output.moved) + 1 >= count;
+        if usize::from(motor) >= count || !are_motors {
             return None;
         }
-        let (place, percent) = self.excess;
-        // What is usual is known after a while in level flight; one that is alone at an end needs none of it.
-        let is_told = place == motor && (self.is_known() || percent >= AT_END_PERCENT);
-        Some(Reading { at, value: if is_told { percent.max(0.0) } else { 0.0 } })
+        let (place, verdict) = self.verdict;
+        Some(Reading { at, value: if place == motor { verdict.percent() } else { 0.0 } })
     }
 }
 
@@ -419,7 +470,7 @@ fn only(given: &[f32], is: fn(&f32) -> bool, others: fn(&f32) -> bool) -> Option
 }
 
 /// The one that is at the end of its range while no other one is near that, and none idles.
-fn full_alone(given: &[f32]) -> Option<u8> {
+fn saturated_alone(given: &[f32]) -> Option<u8> {
     only(given, is_full, |given| (IDLE..SHARES).contains(given))
 }
 
@@ -462,11 +513,11 @@ mod tests {
                     figures[3] = 0.6 * lost;
                 }
             }
-            for (share, figure) in outputs.share.iter_mut().zip(figures) {
-                share.follow(figure, 1.0);
+            for (output, figure) in outputs.outputs.iter_mut().zip(figures) {
+                output.share.follow(figure, 1.0);
             }
             outputs.judge(JUDGED_MAX, STEP_S);
-            outputs.excess
+            (outputs.verdict.0, outputs.verdict.1.percent())
         });
         judged.skip(50).collect()
     }

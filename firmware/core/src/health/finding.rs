@@ -3,7 +3,7 @@
 use core::fmt;
 
 use crate::observation::Feeds;
-use crate::outputs::OFF_PERCENT;
+use crate::outputs::SHUT_OFF_PERCENT;
 use crate::time::Instant;
 
 /// How bad it is. The numbers are stored in logs.
@@ -177,7 +177,7 @@ pub const OFF_MEANING: &str = "The motor was given next to nothing while the oth
 
 /// Whether a check's value says that a motor is given next to nothing: the autopilot took it out, and it is not weak.
 pub fn is_off(check: &str, value: f32) -> bool {
-    check == "motor_output" && value >= OFF_PERCENT
+    check == "motor_output" && value >= SHUT_OFF_PERCENT
 }
 
 #[cfg(test)]
