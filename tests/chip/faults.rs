@@ -136,33 +136,6 @@ fn random_numbers_that_never_come_do_not_keep_it_from_recording() {
     assert_no_reset(&rig);
 }
 
-/// 6: eight bytes are left in the ring of the log, and who read it is gone; it had asked for nothing to be dropped.
-#[test]
-fn a_debugger_that_went_does_not_stop_it() {
-    let mut rig = bench().settled(Board::default()).unwrap();
-    let begin = rig.machine.now() + SECOND;
-    rig.run(begin, false).unwrap();
-    let block = rig.machine.image().find("_SEGGER_RTT").unwrap().address;
-    // The first up-channel, behind 24 bytes of head: name, buffer, size, place of writing, place of reading, flags.
-    let word =
-        |rig: &Rig, at: u32| u32::from_le_bytes(rig.machine.memory(block + 24 + at, 4).try_into().unwrap());
-    let (size, written) = (word(&rig, 8), word(&rig, 12));
-    let read = (written + 9) % size;
-    for (at, value) in [(16, read), (20, 2)] {
-        for (byte, value) in (0..).zip(u32::to_le_bytes(value)) {
-            rig.machine.poke(block + 24 + at + byte, |_| value);
-        }
-    }
-    // A finding: nothing comes for too long.
-    rig.run(begin + SECOND, true).unwrap();
-    rig.run(begin + 6 * SECOND, false).unwrap();
-    rig.run(begin + 7 * SECOND, true).unwrap();
-    rig.run(begin + 8 * SECOND, false).unwrap();
-    assert_ne!(word(&rig, 12), written, "nothing was logged: this has tried nothing");
-    assert_whole(&rig);
-    assert_no_reset(&rig);
-}
-
 /// 7
 #[test]
 fn transmitters_that_stand_still_are_told_and_cost_nothing() {
@@ -205,6 +178,23 @@ fn flash_that_refuses_a_word_is_told_and_saving_goes_on() {
     assert_no_reset(&rig);
     let heard: Vec<u8> = rig.machine.take_sent(1).into_iter().map(|(_, byte)| byte).collect();
     assert!(String::from_utf8_lossy(&heard).contains("HUMS: saving failed"), "the ground was not told");
+}
+
+/// The rate of the ground station's port changes while frames go out one after the other.
+#[test]
+fn a_change_of_a_ports_rate_cuts_no_byte() {
+    let mut rig = bench().settled(Board::default()).unwrap();
+    let mut baud = 57_600.0;
+    for next in [38_400.0, 115_200.0, 19_200.0, 57_600.0] {
+        let now = rig.machine.now();
+        rig.machine.send(1, &set("GS_BAUD", next as f32, 1), now, baud);
+        rig.run(now + 2 * SECOND, true).unwrap();
+        let port = &rig.machine.chip.usarts[1];
+        assert!((port.baud() / next - 1.0).abs() < 0.01, "{} for {next}", port.baud());
+        assert_eq!(port.counts.cut, 0, "from {baud} to {next}");
+        baud = next;
+    }
+    assert_no_reset(&rig);
 }
 
 /// A line that carries beginnings of frames and no frame, as fast as it can, is the dearest for the framer: whoever looked for the next byte

@@ -47,6 +47,8 @@ pub struct Counts {
     pub noise: u64,
     /// Characters that came while nobody listened.
     pub missed: u64,
+    /// Characters that had not gone out when the rate was changed or the port was switched off.
+    pub cut: u64,
 }
 
 /// The port.
@@ -78,6 +80,8 @@ pub struct Usart {
     idle_at: Ps,
     /// SR was read: the next read of DR clears its errors.
     sr_was_read: bool,
+    /// SR was read: the next write of DR clears TC. DMA's writes alone do not.
+    tc_was_read: bool,
     pclk: u32,
 }
 
@@ -107,6 +111,7 @@ impl Usart {
             incoming: None,
             idle_at: NEVER,
             sr_was_read: false,
+            tc_was_read: false,
             pclk: 0,
         }
     }
@@ -254,7 +259,7 @@ impl Usart {
     pub fn read(&mut self, offset: u32) -> Option<u32> {
         Some(match offset {
             0x00 => {
-                self.sr_was_read = true;
+                (self.sr_was_read, self.tc_was_read) = (true, true);
                 self.sr
             }
             0x04 => {
@@ -277,7 +282,10 @@ impl Usart {
             // Written to 0 these are cleared.
             0x00 => self.sr &= value | !(RXNE | TC),
             0x04 => self.write_data(value as u8, now),
-            0x08 => self.brr = value & 0xFFFF,
+            0x08 => {
+                self.cut();
+                self.brr = value & 0xFFFF;
+            }
             0x0C => {
                 if value & 0xFFFF & !CR1_KNOWN != 0 {
                     return None;
@@ -288,6 +296,7 @@ impl Usart {
                     self.free = now;
                 }
                 if value & UE == 0 {
+                    self.cut();
                     (self.incoming, self.idle_at) = (None, NEVER);
                 }
             }
@@ -299,11 +308,21 @@ impl Usart {
         Some(())
     }
 
+    /// What is on its way out is lost.
+    fn cut(&mut self) {
+        if self.sending.take().is_some() {
+            self.counts.cut += 1 + u64::from(self.to_send.take().is_some());
+            self.sr |= TXE | TC;
+        }
+    }
+
     fn write_data(&mut self, byte: u8, now: Ps) {
         if self.cr[0] & (UE | TE) != UE | TE {
             return;
         }
-        self.sr &= !TC;
+        if std::mem::take(&mut self.tc_was_read) {
+            self.sr &= !TC;
+        }
         if self.sending.is_none() {
             self.send(byte, now);
         } else {
@@ -421,6 +440,7 @@ mod tests {
     #[test]
     fn transmission_has_two_places_and_ends_with_tc() {
         let mut port = port();
+        assert_eq!(port.read(0), Some(TXE | TC));
         port.write(4, 0x31, 0);
         assert_eq!(port.read(0), Some(TXE));
         port.write(4, 0x32, 0);
@@ -432,6 +452,19 @@ mod tests {
         port.is_stuck = true;
         port.write(4, 0x33, 0);
         assert_eq!(port.deadline(), NEVER);
+    }
+
+    #[test]
+    fn what_has_not_gone_out_is_cut_by_another_rate_and_dma_s_bytes_leave_tc_alone() {
+        let mut port = port();
+        port.write(4, 0x31, 0);
+        port.write(4, 0x32, 0);
+        assert_eq!(port.read(0), Some(TC));
+        port.write(0x08, 1_458, 0);
+        run(&mut port, |_, _| ());
+        assert_eq!((port.counts.cut, port.sent.len()), (2, 0));
+        port.write(0x08, 91, 0);
+        assert_eq!(port.counts.cut, 2);
     }
 
     #[test]

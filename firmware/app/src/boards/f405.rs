@@ -9,10 +9,10 @@
 //! | PA4, PA5, PA6, PA7 | microSD CS, SCK, MISO, MOSI (SPI1) | DMA2 streams 0 and 3; 400 kHz, then 21 MHz; MISO pulled up |
 //! | PC12 | LED, lit when low | |
 
-use embassy_stm32::dma::{self, Request};
+use embassy_stm32::dma;
 use embassy_stm32::gpio::{Level, Output, Pull, Speed};
 use embassy_stm32::interrupt;
-use embassy_stm32::peripherals::{DMA1_CH5, DMA1_CH6, DMA2_CH0, DMA2_CH2, DMA2_CH3, DMA2_CH7};
+use embassy_stm32::peripherals::{DMA1_CH5, DMA1_CH6, DMA2_CH0, DMA2_CH2, DMA2_CH3, DMA2_CH7, USART1, USART2};
 use embassy_stm32::spi::{self, Spi};
 use embassy_stm32::usart::Uart;
 use embassy_stm32::{bind_interrupts, pac, rcc};
@@ -24,7 +24,7 @@ pub(crate) use super::stm32f4::{
     AutopilotRx, AutopilotTx, Board, Card, GsRx, GsTx, Idle, LATE_TURNS, Led, StoreFlash, Watchdog,
     crystal_failed, restart,
 };
-use super::stm32f4::{CardPort, PortRx, PortTx, line, random_number, reset_cause, start};
+use super::stm32f4::{CardPort, halves, line, random_number, reset_cause, start};
 
 /// The board's name.
 pub(crate) const NAME: &str = "f405";
@@ -38,9 +38,6 @@ pub(crate) const PORT_INTERRUPTS: [interrupt::Interrupt; 6] = [
     interrupt::DMA2_STREAM0,
     interrupt::DMA2_STREAM3,
 ];
-
-/// What both ports' channels are called on all four streams (RM0090, tables 42 and 43).
-const USART_REQUEST: Request = 4;
 
 bind_interrupts!(struct Irqs {
     DMA2_STREAM2 => dma::InterruptHandler<DMA2_CH2>;
@@ -59,22 +56,12 @@ pub(crate) fn take() -> Parts<Board> {
     let (cause, cause_register) = reset_cause();
     let p = start(rcc::HseMode::Oscillator);
 
-    let (tx, rx) = Uart::new_blocking(p.USART1, p.PA10, p.PA9, line(AUTOPILOT_BAUD))
-        .expect("the clocks allow this baud rate")
-        .split();
-    let (rx_dma, tx_dma) = (dma::Channel::new(p.DMA2_CH2, Irqs), dma::Channel::new(p.DMA2_CH7, Irqs));
-    let autopilot = (
-        PortRx::new(rx, (pac::USART1, AUTOPILOT_BAUD), rx_dma, RING.take(), FETCH_EVERY, USART_REQUEST),
-        PortTx::new(tx, (pac::USART1, AUTOPILOT_BAUD), tx_dma, USART_REQUEST),
-    );
-    let (tx, rx) = Uart::new_blocking(p.USART2, p.PA3, p.PA2, line(GS_BAUD))
-        .expect("the clocks allow this baud rate")
-        .split();
-    let (rx_dma, tx_dma) = (dma::Channel::new(p.DMA1_CH5, Irqs), dma::Channel::new(p.DMA1_CH6, Irqs));
-    let gs = (
-        PortRx::new(rx, (pac::USART2, GS_BAUD), rx_dma, GS_RING.take(), GS_FETCH_EVERY, USART_REQUEST),
-        PortTx::new(tx, (pac::USART2, GS_BAUD), tx_dma, USART_REQUEST),
-    );
+    let port = Uart::new_blocking(p.USART1, p.PA10, p.PA9, line(AUTOPILOT_BAUD));
+    let (registers, channels) = (pac::USART1, (p.DMA2_CH2, p.DMA2_CH7));
+    let autopilot = halves::<USART1, _, _>(port, registers, channels, Irqs, RING.take(), FETCH_EVERY);
+    let port = Uart::new_blocking(p.USART2, p.PA3, p.PA2, line(GS_BAUD));
+    let (registers, channels) = (pac::USART2, (p.DMA1_CH5, p.DMA1_CH6));
+    let gs = halves::<USART2, _, _>(port, registers, channels, Irqs, GS_RING.take(), GS_FETCH_EVERY);
 
     let mut bus = spi::Config::default();
     bus.frequency = CardPort::IDENTIFICATION;

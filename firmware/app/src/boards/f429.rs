@@ -10,10 +10,10 @@
 //! | PD14, PA5, PA6, PA7 (D10, D13, D12, D11) | microSD CS, SCK, MISO, MOSI (SPI1) | DMA2 streams 0 and 3; 400 kHz, then 21 MHz; MISO pulled up; JP6 off, which gives PA7 to the Ethernet |
 //! | PB0 | LED LD1, lit when high | |
 
-use embassy_stm32::dma::{self, Request};
+use embassy_stm32::dma;
 use embassy_stm32::gpio::{Level, Output, Pull, Speed};
 use embassy_stm32::interrupt;
-use embassy_stm32::peripherals::{DMA1_CH5, DMA1_CH6, DMA2_CH0, DMA2_CH1, DMA2_CH3, DMA2_CH6};
+use embassy_stm32::peripherals::{DMA1_CH5, DMA1_CH6, DMA2_CH0, DMA2_CH1, DMA2_CH3, DMA2_CH6, USART2, USART6};
 use embassy_stm32::spi::{self, Spi};
 use embassy_stm32::usart::Uart;
 use embassy_stm32::{bind_interrupts, pac, rcc};
@@ -25,7 +25,7 @@ pub(crate) use super::stm32f4::{
     AutopilotRx, AutopilotTx, Board, Card, GsRx, GsTx, Idle, LATE_TURNS, Led, StoreFlash, Watchdog,
     crystal_failed, restart,
 };
-use super::stm32f4::{CardPort, PortRx, PortTx, line, random_number, reset_cause, start};
+use super::stm32f4::{CardPort, halves, line, random_number, reset_cause, start};
 
 /// The board's name.
 pub(crate) const NAME: &str = "f429";
@@ -39,10 +39,6 @@ pub(crate) const PORT_INTERRUPTS: [interrupt::Interrupt; 6] = [
     interrupt::DMA2_STREAM0,
     interrupt::DMA2_STREAM3,
 ];
-
-/// What USART6's channel is called on its streams, and USART2's on its own (RM0090, tables 42 and 43).
-const USART6_REQUEST: Request = 5;
-const USART2_REQUEST: Request = 4;
 
 bind_interrupts!(struct Irqs {
     DMA2_STREAM1 => dma::InterruptHandler<DMA2_CH1>;
@@ -61,22 +57,12 @@ pub(crate) fn take() -> Parts<Board> {
     let (cause, cause_register) = reset_cause();
     let p = start(rcc::HseMode::Bypass);
 
-    let (tx, rx) = Uart::new_blocking(p.USART6, p.PG9, p.PG14, line(AUTOPILOT_BAUD))
-        .expect("the clocks allow this baud rate")
-        .split();
-    let (rx_dma, tx_dma) = (dma::Channel::new(p.DMA2_CH1, Irqs), dma::Channel::new(p.DMA2_CH6, Irqs));
-    let autopilot = (
-        PortRx::new(rx, (pac::USART6, AUTOPILOT_BAUD), rx_dma, RING.take(), FETCH_EVERY, USART6_REQUEST),
-        PortTx::new(tx, (pac::USART6, AUTOPILOT_BAUD), tx_dma, USART6_REQUEST),
-    );
-    let (tx, rx) = Uart::new_blocking(p.USART2, p.PD6, p.PD5, line(GS_BAUD))
-        .expect("the clocks allow this baud rate")
-        .split();
-    let (rx_dma, tx_dma) = (dma::Channel::new(p.DMA1_CH5, Irqs), dma::Channel::new(p.DMA1_CH6, Irqs));
-    let gs = (
-        PortRx::new(rx, (pac::USART2, GS_BAUD), rx_dma, GS_RING.take(), GS_FETCH_EVERY, USART2_REQUEST),
-        PortTx::new(tx, (pac::USART2, GS_BAUD), tx_dma, USART2_REQUEST),
-    );
+    let port = Uart::new_blocking(p.USART6, p.PG9, p.PG14, line(AUTOPILOT_BAUD));
+    let (registers, channels) = (pac::USART6, (p.DMA2_CH1, p.DMA2_CH6));
+    let autopilot = halves::<USART6, _, _>(port, registers, channels, Irqs, RING.take(), FETCH_EVERY);
+    let port = Uart::new_blocking(p.USART2, p.PD6, p.PD5, line(GS_BAUD));
+    let (registers, channels) = (pac::USART2, (p.DMA1_CH5, p.DMA1_CH6));
+    let gs = halves::<USART2, _, _>(port, registers, channels, Irqs, GS_RING.take(), GS_FETCH_EVERY);
 
     let mut bus = spi::Config::default();
     bus.frequency = CardPort::IDENTIFICATION;

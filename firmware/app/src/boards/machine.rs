@@ -59,8 +59,8 @@ pub(crate) trait Transmit {
     /// Begins anew after a transmission that did not come to its end.
     fn restart(&mut self) {}
 
-    /// The port's baud rate, both ways, from the next frame on.
-    fn set_baud(&mut self, baud: u32);
+    /// Sets the port's baud rate, both ways, once the last frame has gone out.
+    async fn set_baud(&mut self, baud: u32);
 }
 
 /// What is known about this machine and this start of it.

@@ -31,7 +31,7 @@ pub(crate) async fn run(mut port: board::GsTx, mut queue: GsOut<'static>) -> ! {
     let mut frame = [0; FRAME_BYTES_MAX];
     loop {
         SUPERVISOR.report(Task::Downlink, now());
-        set_baud(&mut port, &BAUD_GS);
+        set_baud(&mut port, &BAUD_GS).await;
         if let Some(length) = queue.take(&mut frame) {
             send(&mut port, frame.get(..length).unwrap_or_default(), &GS_STOOD_STILL).await;
         } else {
@@ -46,7 +46,7 @@ pub(crate) async fn run(mut port: board::GsTx, mut queue: GsOut<'static>) -> ! {
 pub(crate) async fn requests(mut port: board::AutopilotTx, mut queue: AutopilotOut<'static>) -> ! {
     let mut frame = [0; FRAME_BYTES_MAX];
     loop {
-        set_baud(&mut port, &BAUD_AUTOPILOT);
+        set_baud(&mut port, &BAUD_AUTOPILOT).await;
         if let Some(length) = queue.take(&mut frame) {
             send(&mut port, frame.get(..length).unwrap_or_default(), &AUTOPILOT_STOOD_STILL).await;
         } else {
@@ -63,9 +63,9 @@ async fn send(port: &mut impl Transmit, frame: &[u8], stood_still: &AtomicBool) 
     }
 }
 
-fn set_baud(port: &mut impl Transmit, wanted: &AtomicU32) {
+async fn set_baud(port: &mut impl Transmit, wanted: &AtomicU32) {
     match wanted.load(Ordering::Relaxed) {
         0 => {}
-        baud => port.set_baud(baud),
+        baud => port.set_baud(baud).await,
     }
 }

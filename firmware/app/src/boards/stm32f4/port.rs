@@ -7,12 +7,45 @@
 //! that comes once for all of them. So a ring that nobody looked into for longer than it holds is lost as soon as anything came.
 
 use embassy_stm32::dma::{self, ReadableRingBuffer, Request, TransferOptions};
+use embassy_stm32::interrupt::typelevel::Binding;
 use embassy_stm32::mode::Blocking;
 use embassy_stm32::pac;
-use embassy_stm32::usart::{UartRx, UartTx};
+use embassy_stm32::time::Hertz;
+use embassy_stm32::usart::{ConfigError, Instance, RxDma, TxDma, Uart, UartRx, UartTx};
+use embassy_stm32::{Peri, rcc};
 use embassy_time::{Duration, Instant, Timer};
 
 use crate::boards::machine::{Overrun, Receive, Transmit};
+
+/// The last two bytes of a frame take 2.1 ms at 9,600 baud, the slowest rate.
+const LAST_LOOK: Duration = Duration::from_micros(100);
+const LAST_LOOKS: u32 = 30;
+
+/// Both halves of a port: reception into this ring, which is looked into so often, and transmission. `registers` must be those of
+/// `T`. The channels are its own, or it does not compile.
+///
+/// # Panics
+/// Where the clocks do not allow the port's baud rate.
+pub(crate) fn halves<T: Instance, R: RxDma<T>, S: TxDma<T>>(
+    port: Result<Uart<'static, Blocking>, ConfigError>,
+    registers: pac::usart::Usart,
+    (rx, tx): (Peri<'static, R>, Peri<'static, S>),
+    irqs: impl Binding<R::Interrupt, dma::InterruptHandler<R>>
+    + Binding<S::Interrupt, dma::InterruptHandler<S>>
+    + Copy
+    + 'static,
+    ring: &'static mut [u8],
+    fetch_every: Duration,
+) -> (PortRx, PortTx) {
+    let (tx_half, rx_half) = port.expect("the clocks allow this baud rate").split();
+    let clock = rcc::frequency::<T>();
+    let (rx_request, tx_request) = (rx.request(), tx.request());
+    let (rx, tx) = (dma::Channel::new(rx, irqs), dma::Channel::new(tx, irqs));
+    (
+        PortRx::new(rx_half, (registers, clock), rx, ring, fetch_every, rx_request),
+        PortTx::new(tx_half, (registers, clock), tx, tx_request),
+    )
+}
 
 /// A port's reception: a DMA ring.
 pub(crate) struct PortRx {
@@ -20,8 +53,8 @@ pub(crate) struct PortRx {
     _port: UartRx<'static, Blocking>,
     ring: ReadableRingBuffer<'static, u8>,
     registers: pac::usart::Usart,
-    /// What the port's rate is divided from, in Hz.
-    clock: u64,
+    /// The port's rate is divided from this.
+    clock: Hertz,
     fetch_every: Duration,
     looked: Instant,
     /// The last look took as much as it could: there may be more.
@@ -29,11 +62,11 @@ pub(crate) struct PortRx {
 }
 
 impl PortRx {
-    /// `channel` must be the one that serves the reception of `registers`, which must be `port`'s own and set to `baud`, by this
-    /// `request`.
-    pub(crate) fn new(
+    /// `channel` must serve the reception of `registers` by this `request`. `registers` must be `port`'s own, whose rate is divided from
+    /// `clock`.
+    fn new(
         port: UartRx<'static, Blocking>,
-        (registers, baud): (pac::usart::Usart, u32),
+        (registers, clock): (pac::usart::Usart, Hertz),
         channel: dma::Channel<'static>,
         buffer: &'static mut [u8],
         fetch_every: Duration,
@@ -46,14 +79,13 @@ impl PortRx {
             unsafe { ReadableRingBuffer::new(channel, request, from, buffer, TransferOptions::default()) };
         ring.start();
         registers.cr3().modify(|w| w.set_dmar(true));
-        let clock = u64::from(baud) * u64::from(registers.brr().read().0);
         Self { _port: port, ring, registers, clock, fetch_every, looked: Instant::now(), is_behind: false }
     }
 
     /// How long it takes to fill the ring at the port's rate of now: ten bits a byte.
     fn holds(&self) -> Duration {
         let clocks = 10 * self.ring.capacity() as u64 * u64::from(self.registers.brr().read().0);
-        Duration::from_micros(clocks * 1_000_000 / self.clock.max(1))
+        Duration::from_micros(clocks * 1_000_000 / u64::from(self.clock.0))
     }
 }
 
@@ -84,24 +116,25 @@ impl Receive for PortRx {
 
 /// A port's transmission, by DMA.
 pub(crate) struct PortTx {
-    port: UartTx<'static, Blocking>,
+    /// Keeps the pin and the port's clock.
+    _port: UartTx<'static, Blocking>,
     registers: pac::usart::Usart,
+    clock: Hertz,
     channel: dma::Channel<'static>,
     request: Request,
-    baud: u32,
 }
 
 impl PortTx {
-    /// `channel` must be the one that serves the transmission of `registers`, which must be `port`'s own and set to `baud`, by this
-    /// `request`.
-    pub(crate) fn new(
+    /// `channel` must serve the transmission of `registers` by this `request`. `registers` must be `port`'s own, whose rate is divided
+    /// from `clock`.
+    fn new(
         port: UartTx<'static, Blocking>,
-        (registers, baud): (pac::usart::Usart, u32),
+        (registers, clock): (pac::usart::Usart, Hertz),
         channel: dma::Channel<'static>,
         request: Request,
     ) -> Self {
         registers.cr3().modify(|w| w.set_dmat(true));
-        Self { port, registers, channel, request, baud }
+        Self { _port: port, registers, clock, channel, request }
     }
 }
 
@@ -110,6 +143,11 @@ impl Transmit for PortTx {
         if bytes.is_empty() {
             return;
         }
+        // The end of this frame sets the bit again; as DMA does not read it, its bytes do not clear it.
+        self.registers.sr().write(|w| {
+            w.0 = u32::MAX;
+            w.set_tc(false);
+        });
         let to = self.registers.dr().as_ptr().cast::<u8>();
         // SAFETY: `to` is the port's data register. The transfer borrows `bytes`, which lie in a task's memory, in RAM
         // that DMA reaches, and stops when it is dropped.
@@ -121,11 +159,20 @@ impl Transmit for PortTx {
         self.registers.cr1().modify(|w| w.set_te(true));
     }
 
-    fn set_baud(&mut self, baud: u32) {
-        // Both halves share the divider, and a byte that comes while it is set is lost. A rate that the clock cannot give changes nothing.
-        if baud != self.baud && self.port.set_baudrate(baud).is_err() {
-            defmt::warn!("a port cannot run at {=u32} baud", baud);
+    async fn set_baud(&mut self, baud: u32) {
+        // 16 samples a bit; the divider has 16 bits, and is 16 at least.
+        let divider = ((self.clock.0 + baud / 2) / baud.max(1)).clamp(16, u32::from(u16::MAX));
+        if divider == self.registers.brr().read().0 {
+            return;
         }
-        self.baud = baud;
+        // DMA is done when the port has taken the last byte of a frame, which then has yet to go out, as has the one before.
+        for _ in 0..LAST_LOOKS {
+            if self.registers.sr().read().tc() {
+                break;
+            }
+            Timer::after(LAST_LOOK).await;
+        }
+        // Both halves share the divider, and a byte that comes while it is set is lost.
+        self.registers.brr().write(|w| w.0 = divider);
     }
 }
