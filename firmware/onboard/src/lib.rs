@@ -25,6 +25,7 @@ pub mod shelf;
 pub mod storage;
 pub mod supervisor;
 pub mod uplink;
+pub mod wait;
 
 pub use monitoring::Monitoring;
 pub use persist::{Handover, Keeper, Mailbox, StoreStatus};

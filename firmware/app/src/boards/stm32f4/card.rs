@@ -6,7 +6,7 @@
 
 use core::future::Future;
 use core::pin::pin;
-use core::task::{Context, Poll, Waker};
+use core::task::{Context, Waker};
 
 use embassy_stm32::gpio::{Level, Output};
 use embassy_stm32::mode::Async;
@@ -103,21 +103,17 @@ fn by_dma(bytes: &[u8]) -> bool {
 
 /// Sleeps until a transfer is done. One that does not come to its end is stopped.
 fn wait(transfer: impl Future<Output = Result<(), Error>>) -> Result<(), PortFailed> {
-    let end = crate::links::now() + TRANSFER_MAX;
     let mut transfer = pin!(transfer);
     let mut context = Context::from_waker(Waker::noop());
-    while crate::links::now() < end {
+    let done = hums_onboard::wait::until(crate::links::now() + TRANSFER_MAX, crate::links::now, |may_sleep| {
         // Masked: an interrupt that comes between the two ends the sleep all the same, and is served right after it.
-        let polled = cortex_m::interrupt::free(|_| {
+        cortex_m::interrupt::free(|_| {
             let polled = transfer.as_mut().poll(&mut context);
-            if polled.is_pending() {
+            if polled.is_pending() && may_sleep {
                 measure(Stage::Idle, cortex_m::asm::wfi);
             }
             polled
-        });
-        if let Poll::Ready(done) = polled {
-            return done.map_err(|_| PortFailed);
-        }
-    }
-    Err(PortFailed)
+        })
+    });
+    done.and_then(Result::ok).ok_or(PortFailed)
 }
