@@ -63,8 +63,6 @@ pub struct Counters {
     pub records: u64,
     /// Sectors finished.
     pub sectors: u64,
-    /// Groups begun.
-    pub groups: u64,
     /// Entries refused.
     pub refused: u64,
 }
@@ -132,7 +130,7 @@ impl Writer {
             changed: false,
             last_ms: 0,
             epoch_micros: None,
-            counters: Counters { frames: 0, frame_bytes: 0, records: 0, sectors: 0, groups: 0, refused: 0 },
+            counters: Counters { frames: 0, frame_bytes: 0, records: 0, sectors: 0, refused: 0 },
         }
     }
 
@@ -345,7 +343,6 @@ impl Writer {
         self.model.reset(at_ms, Layouts::Current);
         self.coder = Encoder::new();
         self.in_group = true;
-        self.counters.groups += 1;
     }
 
     fn end_group(&mut self, closed: bool, sink: &mut impl SectorSink) -> bool {
