@@ -20,7 +20,8 @@ fn main() {
     let board = if env::var_os("CARGO_FEATURE_BOARD_F429").is_some() { "f429" } else { "f405" };
     copy(&format!("src/boards/{board}.x"), &out.join("board.x"));
     println!("cargo::rustc-link-search={}", out.display());
-    for argument in ["--nmagic", "-Tlink.x", "-Tdefmt.x"] {
+    let logs = env::var_os("CARGO_FEATURE_LOG").is_some();
+    for argument in ["--nmagic", "-Tlink.x"].into_iter().chain(logs.then_some("-Tdefmt.x")) {
         println!("cargo::rustc-link-arg-bins={argument}");
     }
 }

@@ -135,7 +135,7 @@ fn a_panic_is_survived_recorded_and_told() {
     let code = [load(0, place), load(1, panics)].concat();
     let since = rig.machine.now();
     rig.replace(DOWNLINK, &[&code[..], &[0x08, 0x47]].concat(), true).unwrap();
-    let fault = "fault: attempt to divide by zero in downlink at firmware/provoked.rs:7";
+    let fault = "fault: panic in downlink at firmware/provoked.rs:7";
     let told = "HUMS: restarted after: panic (downlink)";
     survives(&mut rig, since, &Expected { cause: Cause::Software, fault, told, within_ms: NOTICED_MS });
 }

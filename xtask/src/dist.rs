@@ -93,7 +93,7 @@ impl Release {
     fn make(&self) -> Result<Vec<File>> {
         let mut files = Vec::new();
         for board in Board::ALL {
-            self.build(&board.cargo_arguments())?;
+            self.cargo("rustc", &[&board.cargo_arguments()[..], &firmware::LAST.map(Into::into)].concat())?;
             let (_, elf) = read("", &self.target().join(FIRMWARE_TARGET).join("firmware/hums-firmware"))?;
             files.extend(firmware::files(board, elf)?);
             files.push(self.sbom(&format!("hums-{}", board.name()), "firmware/app", &board.choice())?);
@@ -123,14 +123,18 @@ impl Release {
         self.tree.join("target")
     }
 
-    fn build<A: AsRef<std::ffi::OsStr>>(&self, arguments: &[A]) -> Result<()> {
+    fn build(&self, arguments: &[&str]) -> Result<()> {
+        self.cargo("build", arguments)
+    }
+
+    fn cargo<A: AsRef<std::ffi::OsStr>>(&self, command: &str, arguments: &[A]) -> Result<()> {
         Shell::cargo()
             .within(&self.tree)
             .env("CARGO_TARGET_DIR", self.target())
             .env("CARGO_ENCODED_RUSTFLAGS", &self.flags)
             // The linker for Windows writes it instead of the time of day.
             .env("SOURCE_DATE_EPOCH", self.stamp()?)
-            .args(["build", "--locked"])
+            .args([command, "--locked"])
             .args(arguments)
             .run()
     }

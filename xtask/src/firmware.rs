@@ -11,6 +11,10 @@ use crate::image;
 use crate::repo::{self, FIRMWARE_TARGET};
 use crate::shell::Shell;
 
+/// What `cargo rustc` says to the compiler of the last crate, where all of the program is inlined: functions of less than half the
+/// compiler's own limit only. 4.7 KB of flash less, at 0.2 % more load.
+pub(crate) const LAST: [&str; 2] = ["--", "-Cllvm-args=-inline-threshold=40"];
+
 /// What the firmware runs on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Board {
@@ -93,10 +97,20 @@ pub(crate) fn cargo() -> Result<Shell> {
     Ok(Shell::cargo().env("CARGO_ENCODED_RUSTFLAGS", flags(repo::root())?))
 }
 
+/// Compiles the firmware with these further arguments; the compiler's ELF file.
+fn compile(board: Board, further: &[&str]) -> Result<PathBuf> {
+    cargo()?.arg("rustc").args(board.cargo_arguments()).args(further).args(LAST).run()?;
+    Ok(repo::target().join(FIRMWARE_TARGET).join("firmware/hums-firmware"))
+}
+
+/// Builds the firmware with logs for a debug probe, and returns where its ELF file lies.
+pub(crate) fn build_with_log(board: Board) -> Result<PathBuf> {
+    compile(board, &["--features=log"])
+}
+
 /// Builds the firmware for `board` as a release does and returns where its ELF file lies; beside it are the other files of a release.
 pub(crate) fn build(board: Board) -> Result<PathBuf> {
-    cargo()?.arg("build").args(board.cargo_arguments()).run()?;
-    let built = repo::target().join(FIRMWARE_TARGET).join("firmware/hums-firmware");
+    let built = compile(board, &[])?;
     let elf = fs::read(&built).with_context(|| format!("cannot read {}", built.display()))?;
     let image = board.image();
     for (name, data) in files(board, elf)? {

@@ -1,4 +1,4 @@
-//! `cargo xtask flash` and `cargo xtask attach`: a firmware onto a board, and what the board says of itself.
+//! `cargo xtask flash` and `cargo xtask attach`: a firmware onto a board, as released or with a log.
 
 use std::path::{Path, PathBuf};
 
@@ -69,11 +69,11 @@ pub(crate) fn flash(options: Options) -> Result<()> {
     }
 }
 
-/// Shows the log of a board that runs, as it goes on.
+/// Builds the firmware with its feature `log`, programs it and shows the log as it goes on.
 pub(crate) fn attach(options: Options) -> Result<()> {
-    let elf = firmware::build(options.board)?;
+    let elf = firmware::build_with_log(options.board)?;
     require(PROBE_RS)?;
-    probe("attach", options.board, &elf).run()
+    probe("run", options.board, &elf).run()
 }
 
 fn probe(command: &str, board: Board, elf: &PathBuf) -> Shell {

@@ -55,7 +55,7 @@ cargo xtask COMMAND
                                  and runs what is for Windows under Wine
   flash [--board BOARD] [--dfu]  build the firmware and program it: by a debug probe (probe-rs), or over USB by the chip's own
                                  boot loader (dfu-util); what the board has stored stays
-  attach [--board BOARD]         show the log of a board that runs (probe-rs)
+  attach [--board BOARD]         build the firmware with a log, program it and show the log (probe-rs)
   size                           flash and RAM of all boards against budgets.toml
   costs                          cycles, load and stack, on the model of the chip, against budgets.toml
   setup [--dry-run]              install what demo and test need, or only say what is missing

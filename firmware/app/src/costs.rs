@@ -66,6 +66,7 @@ fn busy() -> u64 {
     critical_section::with(cycles)
 }
 
+#[inline(never)]
 fn switch_to(stage: Stage) -> Stage {
     critical_section::with(|cs| {
         let now = DWT::cycle_count();

@@ -124,17 +124,6 @@ impl Fault {
     }
 }
 
-impl fmt::Display for Fault {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let [_, _, _, _, _, lr, pc, _, cfsr, _, _, bfar] = self.registers;
-        write!(f, "{} in {} at {}", self.message, self.task, self.place)?;
-        if self.kind == Kind::HardFault as u8 {
-            write!(f, " (pc {pc:08x} lr {lr:08x} cfsr {cfsr:08x} bfar {bfar:08x})")?;
-        }
-        Ok(())
-    }
-}
-
 /// How the start before this one ended, if it left a note; gives it once.
 pub(crate) fn take() -> Option<Fault> {
     let noted = NOTE.mark.swap(0, Ordering::Relaxed) == MARK;
@@ -260,19 +249,19 @@ pub(crate) fn processor(running: u16, registers: Registers, overflow: bool, plac
     NOTE.keep(Kind::HardFault, running, place, format_args!("{message}"));
 }
 
-/// The program cannot go on.
+/// The program cannot go on. The place says why; to keep the message needs the `Debug` of everything, 10 KiB of flash.
 pub(crate) fn panicked(registers: Registers, info: &PanicInfo) {
     NOTE.keep_registers(registers);
-    let (running, message) = (exceptions::running(), info.message());
+    let running = exceptions::running();
     match info.location() {
         Some(place) => {
             // The end of a long path says more than its beginning.
             let file = place.file();
             let file = file.get(file.len().saturating_sub(FILE_BYTES)..).unwrap_or(file);
             let place = format_args!("{file}:{}", place.line());
-            NOTE.keep(Kind::Panic, running, place, format_args!("{message}"));
+            NOTE.keep(Kind::Panic, running, place, format_args!("panic"));
         }
-        None => NOTE.keep(Kind::Panic, running, format_args!("?"), format_args!("{message}")),
+        None => NOTE.keep(Kind::Panic, running, format_args!("?"), format_args!("panic")),
     }
 }
 

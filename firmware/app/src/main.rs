@@ -16,6 +16,7 @@ mod exceptions;
 mod executors;
 mod fault;
 mod links;
+mod log;
 mod memory;
 mod registers;
 mod status;
@@ -59,7 +60,7 @@ fn start() -> board::Idle {
     unsafe { memory::init() };
     let boots = fault::count_start();
     let parts = board::take();
-    defmt::info!("start {=u32}, {=str}, id {=[u8]:02x}", boots, parts.boot.cause.name(), parts.boot.id);
+    log::log!(info, "start {=u32}, {=str}, id {=[u8]:02x}", boots, parts.boot.cause.name(), parts.boot.id);
 
     let queues = QUEUES.take().split();
     let Ends { frames_in, frames_out, sectors_in, sectors_out, gs_in, gs_out, .. } = queues;

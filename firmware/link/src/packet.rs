@@ -21,16 +21,19 @@ impl<'a> Fields<'a> {
     }
 
     /// `uint8_t`
+    #[inline(never)]
     pub fn u8(&self, at: usize) -> u8 {
         self.0.get(at).copied().unwrap_or(0)
     }
 
     /// `uint16_t`
+    #[inline(never)]
     pub fn u16(&self, at: usize) -> u16 {
         u16::from_le_bytes(self.bytes(at))
     }
 
     /// `uint32_t`
+    #[inline(never)]
     pub fn u32(&self, at: usize) -> u32 {
         u32::from_le_bytes(self.bytes(at))
     }
@@ -41,6 +44,7 @@ impl<'a> Fields<'a> {
     }
 
     /// `float`
+    #[inline(never)]
     pub fn f32(&self, at: usize) -> f32 {
         f32::from_le_bytes(self.bytes(at))
     }
@@ -69,6 +73,7 @@ impl Packet {
     }
 
     /// Sets bytes; what lies beyond the longest payload is left out.
+    #[inline(never)]
     pub fn bytes(mut self, at: usize, bytes: &[u8]) -> Self {
         for (index, byte) in bytes.iter().enumerate() {
             if let Some(place) = self.payload.get_mut(at + index) {

@@ -22,6 +22,7 @@ impl Losses {
     }
 
     /// Counts a loss that was noticed at `now`, and may have begun at `since`.
+    #[inline(never)]
     pub(crate) fn count(&mut self, since: Instant, now: Instant, what: Lost, count: u64) {
         let Some(slot) = KINDS.iter().position(|kind| *kind == what).filter(|_| count > 0) else { return };
         let loss = self.open[slot].get_or_insert(Loss { what, count: 0, from: since, to: now });

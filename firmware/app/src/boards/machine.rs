@@ -39,7 +39,7 @@ pub(crate) struct Parts<M: Machine> {
 
 /// Bytes were lost before the reception task could fetch them: it came too late and the receive buffer ran over. How many is not
 /// known; at most what comes in so many milliseconds.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, defmt::Format)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Overrun {
     pub(crate) blind_ms: u32,
 }

@@ -16,6 +16,7 @@ use crate::boards::machine::Boot;
 use crate::costs::{self, Stage, measure};
 use crate::fault::{self, Fault};
 use crate::links::{self, now};
+use crate::log::log;
 use crate::memory;
 use crate::status::{CARD_STATUS, PORT_STATUS, SUPERVISOR};
 use crate::watch;
@@ -105,7 +106,6 @@ fn tell_fault(body: &mut Monitoring<'static>, ends: &mut Ends, cause: ResetCause
     fault::begin();
     let unnoted = noted.is_none() && cause == ResetCause::Watchdog;
     if let Some(fault) = noted.or_else(|| unnoted.then(Fault::without_note)) {
-        defmt::error!("before this start: {}", defmt::Display2Format(&fault));
         body.fault(now(), &fault.record(), fault.last_messages(), &mut ends.sectors);
     }
 }
@@ -157,7 +157,7 @@ fn uplink(body: &mut Monitoring<'static>, ends: &mut Ends) {
 #[inline(never)]
 fn note(body: &mut Monitoring<'static>, ends: &mut Ends, handover: &mut Handover<'static>) {
     while let Some(news) = handover.news() {
-        defmt::info!("{=str}", news.text);
+        log!(info, "{=str}", news.text);
         body.note(now(), news.severity, news.text, &mut ends.sectors);
     }
 }
@@ -170,7 +170,8 @@ fn tick(body: &mut Monitoring<'static>, ends: &mut Ends, handover: &mut Handover
     let Ends { sectors, gs, .. } = ends;
     measure(Stage::Tick, || {
         body.tick(now(), sectors, gs, &mut |finding| {
-            defmt::info!(
+            log!(
+                info,
                 "{=str} {=str} {=str} {=f32} {=str}",
                 finding.subsystem.name(),
                 finding.check,

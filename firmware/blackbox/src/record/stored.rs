@@ -181,6 +181,7 @@ impl<'a> Sink<'a> {
         self.bytes(&[value])
     }
 
+    #[inline(never)]
     pub(crate) fn bytes(&mut self, bytes: &[u8]) -> &mut Self {
         let end = self.len.saturating_add(bytes.len());
         if let Some(place) = self.out.get_mut(self.len..end) {
@@ -200,6 +201,7 @@ impl<'a> Sink<'a> {
         self.cut(text, TEXT_BYTES_MAX)
     }
 
+    #[inline(never)]
     fn cut(&mut self, text: &str, bytes_max: usize) -> &mut Self {
         let mut end = text.len().min(bytes_max);
         while !text.is_char_boundary(end) {

@@ -26,6 +26,7 @@ pub(crate) use watchdog::Watchdog;
 
 use crate::boards::machine::{Machine, SYSTICK_RELOAD};
 
+#[cfg(feature = "log")]
 use defmt_rtt as _;
 
 /// Baud rate of the autopilot's port until a parameter sets it.
