@@ -5,9 +5,7 @@
 //! firmware: it runs the same sine and cosine, and a root is exact to the last bit on both.
 #![cfg_attr(not(test), no_std)]
 
-pub use libm::{
-    acosf, asinf, atan2f, copysignf, expf, fabsf, fminf, logf, round, roundevenf, roundf,
-};
+pub use libm::{acosf, asinf, atan2f, copysignf, expf, fabsf, fminf, logf, round, roundevenf, roundf};
 
 /// Angles up to here are turned back exactly enough; an attitude has less than one turn.
 const ANGLE_MAX: f32 = 8192.0;
@@ -30,7 +28,8 @@ fn turned(quarter: i32, rest: f32) -> f32 {
     let value = if quarter & 1 == 0 {
         ((-1.951_529_6e-4 * square + 8.332_161e-3) * square - 0.166_666_55) * square * rest + rest
     } else {
-        ((2.443_315_7e-5 * square - 1.388_731_6e-3) * square + 4.166_664_6e-2) * square * square - 0.5 * square
+        ((2.443_315_7e-5 * square - 1.388_731_6e-3) * square + 4.166_664_6e-2) * square * square
+            - 0.5 * square
             + 1.0
     };
     if quarter & 2 == 0 { value } else { -value }
@@ -94,7 +93,10 @@ mod tests {
     #[test]
     fn any_number_has_a_sine_and_a_cosine() {
         for angle in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, f32::MAX, -1e9, 8193.0] {
-            assert_eq!((sinf(angle).to_bits(), cosf(angle).to_bits()), (0.0_f32.to_bits(), 1.0_f32.to_bits()));
+            assert_eq!(
+                (sinf(angle).to_bits(), cosf(angle).to_bits()),
+                (0.0_f32.to_bits(), 1.0_f32.to_bits())
+            );
         }
     }
 }

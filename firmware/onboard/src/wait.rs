@@ -2,7 +2,7 @@
 
 use core::task::Poll;
 
-use hums_core::time::Instant;
+use hums_core::clock::Instant;
 
 /// Polls until it is ready; nothing if it is not by `end`. `poll` is told whether it may sleep until the next interrupt.
 ///

@@ -12,7 +12,9 @@
 use embassy_stm32::dma;
 use embassy_stm32::gpio::{Level, Output, Pull, Speed};
 use embassy_stm32::interrupt;
-use embassy_stm32::peripherals::{DMA1_CH5, DMA1_CH6, DMA2_CH0, DMA2_CH2, DMA2_CH3, DMA2_CH7, USART1, USART2};
+use embassy_stm32::peripherals::{
+    DMA1_CH5, DMA1_CH6, DMA2_CH0, DMA2_CH2, DMA2_CH3, DMA2_CH7, USART1, USART2,
+};
 use embassy_stm32::spi::{self, Spi};
 use embassy_stm32::usart::Uart;
 use embassy_stm32::{bind_interrupts, pac, rcc};

@@ -13,7 +13,9 @@
 use embassy_stm32::dma;
 use embassy_stm32::gpio::{Level, Output, Pull, Speed};
 use embassy_stm32::interrupt;
-use embassy_stm32::peripherals::{DMA1_CH5, DMA1_CH6, DMA2_CH0, DMA2_CH1, DMA2_CH3, DMA2_CH6, USART2, USART6};
+use embassy_stm32::peripherals::{
+    DMA1_CH5, DMA1_CH6, DMA2_CH0, DMA2_CH1, DMA2_CH3, DMA2_CH6, USART2, USART6,
+};
 use embassy_stm32::spi::{self, Spi};
 use embassy_stm32::usart::Uart;
 use embassy_stm32::{bind_interrupts, pac, rcc};

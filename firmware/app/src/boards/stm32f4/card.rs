@@ -105,15 +105,16 @@ fn by_dma(bytes: &[u8]) -> bool {
 fn wait(transfer: impl Future<Output = Result<(), Error>>) -> Result<(), PortFailed> {
     let mut transfer = pin!(transfer);
     let mut context = Context::from_waker(Waker::noop());
-    let done = hums_onboard::wait::until(crate::links::now() + TRANSFER_MAX, crate::links::now, |may_sleep| {
-        // Masked: an interrupt that comes between the two ends the sleep all the same, and is served right after it.
-        cortex_m::interrupt::free(|_| {
-            let polled = transfer.as_mut().poll(&mut context);
-            if polled.is_pending() && may_sleep {
-                measure(Stage::Idle, cortex_m::asm::wfi);
-            }
-            polled
-        })
-    });
+    let done =
+        hums_onboard::wait::until(crate::links::now() + TRANSFER_MAX, crate::links::now, |may_sleep| {
+            // Masked: an interrupt that comes between the two ends the sleep all the same, and is served right after it.
+            cortex_m::interrupt::free(|_| {
+                let polled = transfer.as_mut().poll(&mut context);
+                if polled.is_pending() && may_sleep {
+                    measure(Stage::Idle, cortex_m::asm::wfi);
+                }
+                polled
+            })
+        });
     done.and_then(Result::ok).ok_or(PortFailed)
 }
