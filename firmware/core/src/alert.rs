@@ -223,11 +223,6 @@ impl Alerts {
         self.estimator.take(at, of_estimator(estimator, self.had_both, has_fix));
     }
 
-    /// Whether anything was ever said.
-    pub(crate) fn are_known(&self) -> bool {
-        self.has_flags() || self.told.iter().any(Option::is_some)
-    }
-
     /// Whether flags were ever told: then each cause has a level.
     pub(crate) fn has_flags(&self) -> bool {
         self.flags().iter().any(|flags| flags.at.is_set())
@@ -235,18 +230,6 @@ impl Alerts {
 
     const fn flags(&self) -> [&Flags; 3] {
         [&self.sensors, &self.failures, &self.estimator]
-    }
-
-    /// Causes of which [`Self::level`] may be other than that of what is over, or of what nobody ever spoke of.
-    pub(crate) fn may_be_on(&self, now: Instant) -> Causes {
-        const LATE: Span = Span::from_millis(HOLDS.as_millis() + 1_000);
-        let set = |causes: Causes, flags: &&Flags| causes.or(flags.now.both(flags.before));
-        let flagged = self.flags().iter().fold(Causes::NONE, set);
-        if self.told_at.age(now).is_none_or(|age| age > LATE) {
-            return flagged;
-        }
-        let told = Cause::ALL.into_iter().zip(self.told).filter(|(_, told)| told.is_some());
-        told.fold(flagged, |causes, (cause, _)| causes.with(cause))
     }
 
     /// How bad the autopilot says it is, as [`Urgency`] numbers it: 0 where it says that it is over, and where flags come that call it

@@ -174,11 +174,6 @@ impl Baselines {
         Self([Baseline::NONE; Quantity::COUNT])
     }
 
-    /// Whether anything is known to be normal.
-    pub(crate) fn are_known(&self) -> bool {
-        self.0.iter().any(|baseline| baseline.known().is_some())
-    }
-
     /// What is normal for a quantity.
     pub fn get(&self, quantity: Quantity) -> Baseline {
         self.0.get(quantity.index()).copied().unwrap_or(Baseline::NONE)

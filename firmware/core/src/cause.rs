@@ -146,16 +146,6 @@ impl Causes {
         Self(self.0 | other.0)
     }
 
-    /// The causes that it has.
-    pub(crate) fn each(self) -> impl Iterator<Item = Cause> {
-        let mut left = self.0;
-        core::iter::from_fn(move || {
-            let cause = *Cause::ALL.get(left.trailing_zeros() as usize)?;
-            left &= left - 1;
-            Some(cause)
-        })
-    }
-
     pub(crate) fn of_bits(bits: u32, table: &[(u32, Cause)]) -> Self {
         // Nearly always: flags come with each status.
         if bits == 0 {

@@ -153,7 +153,6 @@ impl Monitor {
         self.mishap.observe(at, &self.vehicle, observation, &self.params);
         self.derived.observe(at, &self.vehicle, &self.flight, observation);
         self.usage.observe(at, &self.vehicle, &self.flight, &self.derived, observation);
-        self.health.hear(observation);
         true
     }
 
@@ -200,9 +199,6 @@ impl Monitor {
         findings: &mut impl FnMut(&Finding),
     ) {
         let event = self.step_flight(now);
-        if event.is_some() {
-            self.health.look_again();
-        }
         self.derived.step(now, &self.vehicle, &self.flight, event, recorder);
         self.step_trends(now, event);
         self.usage.step(now, &self.vehicle, &self.flight, event, &self.derived, &self.params);
@@ -367,7 +363,6 @@ impl Monitor {
     pub fn learn_parameter(&mut self, name: &str, value: f32) {
         if let Some(place) = cells::known(name) {
             self.derived.cells_mut().take_setting(place, value);
-            self.health.look_again();
         }
     }
 
@@ -460,7 +455,6 @@ impl Monitor {
 
     /// Limits and settings, to be changed.
     pub const fn params_mut(&mut self) -> &mut Params {
-        self.health.look_again();
         &mut self.params
     }
 

@@ -359,13 +359,13 @@ fn row(check: &Check) -> String {
         "| {} | {} | {input} | {when} | {side} | {} | {} | {} | {}, {} | {} | {} | {source} |",
         check.subsystem.name(),
         check.name,
-        check.unit,
+        check.unit.name(),
         limit(check.warn),
         limit(check.critical),
-        seconds(check.debounce_warn),
-        seconds(check.debounce_critical),
+        seconds(check.debounce_warn.span()),
+        seconds(check.debounce_critical.span()),
         check.hysteresis,
-        check.stale_after.map_or_else(|| "–".to_owned(), seconds),
+        check.stale_after().map_or_else(|| "–".to_owned(), seconds),
     )
 }
 
@@ -421,14 +421,14 @@ fn every_text_of_a_check_is_in_the_runbook() {
             continue;
         }
         told.push(alarm);
-        let unit = match check.unit {
+        let unit = match check.unit.name() {
             "" => String::new(),
             "degC" => " C".to_owned(),
             "1/min" => " per min".to_owned(),
             "times" => " x".to_owned(),
             unit => format!(" {unit}"),
         };
-        let value = words.said.around_value(check.unit);
+        let value = words.said.around_value(check.unit.name());
         let value =
             value.map_or_else(String::new, |(before, after)| format!(": {before}*value*{unit}{after}"));
         let alarm = alarm.split('|').next().unwrap().replace('#', "*n*");

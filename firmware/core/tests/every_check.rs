@@ -314,7 +314,8 @@ fn every_check_finds_what_it_is_there_for_in_time() {
             findings.iter().filter(|finding| (finding.check, finding.instance) == (name, instance));
         let found = mine.find(|finding| finding.level == level);
         let found = found.unwrap_or_else(|| panic!("{name} {instance} never {level:?}: {findings:?}"));
-        let debounce = if level == Level::Critical { check.debounce_critical } else { check.debounce_warn };
+        let debounce =
+            if level == Level::Critical { check.debounce_critical } else { check.debounce_warn }.span();
         let after_ms = found.at.as_millis().saturating_sub(FAULT_MS);
         // Speeds that are compared are smoothed: half again above the others is 30 % above after 0.9 s.
         let smoothing_ms = if name == "motor_imbalance" { 900 } else { 0 };

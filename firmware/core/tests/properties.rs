@@ -443,7 +443,7 @@ fn after_anything_at_all_a_vehicle_that_falls_silent_is_critical_and_nothing_tha
             monitor.tick(now, &LinkReading::default(), &RecorderStatus::default(), &mut |_| {});
         }
         for (check, instance, level) in monitor.health().levels() {
-            let said = check.stale_after.is_some();
+            let said = check.stale_after().is_some();
             assert!(!(said && level == Level::Ok), "seed {seed}: {} {instance} is OK", check.name);
         }
         let overall = monitor.health().overall();

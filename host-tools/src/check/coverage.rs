@@ -3,7 +3,7 @@
 use hums_core::Monitor;
 use hums_core::baseline::Baselines;
 use hums_core::clock::{Instant, Span};
-use hums_core::health::{Check, Level, Parts, Scope, Side, VOCABULARY, When, checks, vocabulary};
+use hums_core::health::{Check, Level, Scope, Side, VOCABULARY, When, checks, vocabulary};
 use hums_core::observation::{Autopilot, Gnss, Heartbeat};
 use hums_core::params::{Param, Params};
 use hums_core::status::{LinkReading, RecorderStatus};
@@ -62,9 +62,8 @@ impl Coverage {
             return;
         }
         let inputs = monitor.inputs(steps.into(), link, recorder);
-        let parts = Parts::of(&inputs);
         for (seen, check) in self.seen.iter_mut().zip(checks()).filter(|(seen, _)| !seen.value) {
-            seen.value = (0..parts.count(check)).any(|instance| {
+            seen.value = (0..check.instances).any(|instance| {
                 (check.read)(&inputs, instance).is_some_and(|reading| reading.value.is_finite())
             });
         }

@@ -289,7 +289,7 @@ pub(super) fn emergency(at: Instant, params: &Params) -> Vec<Finding> {
         previous,
         value: EMERGENCY,
         limit,
-        unit: check.unit.to_owned(),
+        unit: check.unit.name().to_owned(),
     };
     vec![change(Level::Ok, Level::Critical), change(Level::Critical, Level::Ok)]
 }

@@ -235,7 +235,7 @@ fn fill(contents: &mut Contents, judged: Judged) {
             let line = ExceedanceLine {
                 session: exceedance.session,
                 lifetime: exceedance.lifetime,
-                unit: exceedance.check.unit.to_owned(),
+                unit: exceedance.check.unit.name().to_owned(),
             };
             contents.exceedances.insert((exceedance.check.name.to_owned(), exceedance.instance), line);
         }

@@ -400,7 +400,7 @@ impl Craft {
                     previous: finding.previous,
                     value: finding.value,
                     limit: finding.limit,
-                    unit: check.unit,
+                    unit: check.unit.name(),
                     feeds: Feeds::Unsaid,
                     because: "",
                     orders: Orders::Own,

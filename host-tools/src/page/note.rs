@@ -299,7 +299,7 @@ mod tests {
                     previous: Level::Ok,
                     value: 12.0,
                     limit: 1.0,
-                    unit: check.unit,
+                    unit: check.unit.name(),
                     feeds,
                     because: "",
                     orders: hums_core::health::Orders::Own,

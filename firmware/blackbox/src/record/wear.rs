@@ -30,7 +30,7 @@ impl<'a> Exceedance<'a> {
             moment,
             check: of.check.name,
             instance: of.instance,
-            unit: of.check.unit,
+            unit: of.check.unit.name(),
             session: of.session,
             lifetime: of.lifetime,
         }

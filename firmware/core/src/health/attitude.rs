@@ -5,7 +5,7 @@
 //! wanted one. Where nobody says what is wanted, it counts but in modes in which the pilot banks as far as he likes. What is said to
 //! be wanted and is the attitude itself, sample by sample, is no word about what is wanted.
 
-use super::check::{Check, Part, Side, When};
+use super::check::{Check, Debounce, InstanceOf, Side, Unit, When};
 use super::common::{STALE, alert};
 use super::finding::Subsystem;
 use super::inputs::Inputs;
@@ -26,20 +26,20 @@ const WANTED_AGE: Span = Span::from_secs(2);
 const ROLL: Check = Check {
     name: "roll",
     subsystem: Subsystem::Attitude,
-    unit: "deg",
+    unit: Unit::of("deg"),
     side: Side::Above,
     warn: Some(Param::TiltWarn),
     critical: Some(Param::TiltCrit),
     hysteresis: 5.0,
-    debounce_warn: Span::from_millis(500),
+    debounce_warn: Debounce::millis(500),
     // PX4's failure detector: FD_FAIL_R_TTRI, FD_FAIL_P_TTRI 0.3 s.
-    debounce_critical: Span::from_millis(300),
+    debounce_critical: Debounce::millis(300),
     when: When::InFlight,
-    stale_after: STALE,
+    stale_s: STALE,
     instances: 1,
     alarm_only: false,
     is_flag: false,
-    part: Part::Vehicle,
+    of: InstanceOf::Vehicle,
     read: |inputs, _| degrees(inputs, |attitude| attitude.roll, 0),
 };
 

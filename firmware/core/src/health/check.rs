@@ -20,8 +20,10 @@
 
 use super::finding::{Finding, Level, Orders, Subsystem};
 use super::inputs::Inputs;
+use core::num::NonZeroU8;
+
 use crate::latest::Reading;
-use crate::observation::{Feeds, Observation};
+use crate::observation::Feeds;
 use crate::params::{Param, Params};
 use crate::time::{Instant, Span, Stamp};
 
@@ -50,149 +52,111 @@ impl When {
     pub(super) const ALL: [Self; 3] = [Self::Always, Self::Armed, Self::InFlight];
 }
 
-/// What a check, or an instance of it, has its value from. What never said anything has none, and is not asked for one: most of a step
-/// went into asking.
+/// What an instance's number counts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Part {
-    /// The vehicle, or parts of it that nobody counts: each is asked.
+pub enum InstanceOf {
+    /// Parts that nobody counts, or a single one: each instance is read.
     Vehicle,
-    /// Motors, whose ESCs tell of them.
+    /// Motors that an ESC reports on.
     Motor,
-    /// Motors by what they are given.
+    /// Motors by the outputs that drive them.
     Output,
-    /// Batteries, the first one also by the autopilot's own figures, which name none.
+    /// Batteries; the first one also by the autopilot's own figures.
     Supply,
     /// Batteries that report themselves.
     Battery,
-    /// The autopilot's board: its rails, its processor's load and temperature.
-    Board,
-    /// Vibration, and what it clips.
-    Vibration,
-    /// The remote control's receiver and the telemetry radio.
-    Radio,
     /// GNSS receivers.
     Receiver,
-    /// Accelerometers, gyros, compasses and barometers by instance.
+    /// Accelerometers, gyros, compasses and barometers.
     Sensor,
-    /// Two sensors of a kind that were compared.
+    /// Sensors that were compared with another one.
     Pair,
-    /// The estimator.
-    Estimator,
-    /// The combustion engine.
-    Engine,
-    /// The autopilot's own word on what is wrong.
-    Alert,
-    /// Components that wear.
-    Wear,
-    /// The airframe's earlier flights.
-    Past,
 }
 
-impl Part {
-    pub(super) const COUNT: usize = Self::Past as usize + 1;
+/// How many instances of each kind have ever reported: the others have no value, and are not read.
+pub(super) struct Reported([u8; InstanceOf::Pair as usize + 1]);
 
-    /// The parts of which an observation says something, among those that are [`Self::TOLD`], a bit each; all of these where it may change
-    /// more.
-    pub(super) const fn told_by(observation: &Observation) -> u16 {
-        match observation {
-            Observation::Battery(_) => Self::bits(&[Self::Supply, Self::Battery]),
-            Observation::SystemStatus(_) => Self::bits(&[Self::Supply, Self::Battery, Self::Board]),
-            Observation::Rails(_) | Observation::Processor(_) => Self::bits(&[Self::Board]),
-            Observation::Vibration(_) => Self::bits(&[Self::Vibration]),
-            Observation::RadioControl(_) | Observation::TelemetryRadio(_) => Self::bits(&[Self::Radio]),
-            Observation::Gnss(_) | Observation::GnssIntegrity(_) => Self::bits(&[Self::Receiver]),
-            Observation::Estimator(_) => Self::bits(&[Self::Estimator]),
-            Observation::Engine(_) => Self::bits(&[Self::Engine]),
-            Observation::Imu(_)
-            | Observation::Air(_)
-            | Observation::ImuAndAir(..)
-            | Observation::Shock(_)
-            | Observation::Attitude(_)
-            | Observation::SecondEstimate(_)
-            | Observation::Wanted(_)
-            | Observation::ClimbWanted(_)
-            | Observation::LocalPosition(_)
-            | Observation::GlobalPosition(_)
-            | Observation::Hud(_)
-            | Observation::Outputs(_)
-            | Observation::Escs(_)
-            | Observation::SystemTime(_) => 0,
-            _ => Self::TOLD,
-        }
-    }
-
-    /// The parts whose values change with an observation of them, an event of the flight or a setting only: not with time, and not with
-    /// what others say. A bit each.
-    pub(super) const TOLD: u16 = Self::bits(&[
-        Self::Supply,
-        Self::Battery,
-        Self::Board,
-        Self::Vibration,
-        Self::Radio,
-        Self::Receiver,
-        Self::Estimator,
-        Self::Engine,
-    ]);
-
-    const fn bits(parts: &[Self]) -> u16 {
-        let (mut bits, mut place) = (0, 0);
-        while place < parts.len() {
-            bits |= 1 << parts[place] as u8;
-            place += 1;
-        }
-        bits
-    }
-}
-
-/// How many of each [`Part`] have ever spoken.
-pub struct Parts([u8; Part::COUNT]);
-
-impl Parts {
-    /// As they are now.
-    pub fn of(inputs: &Inputs<'_>) -> Self {
+impl Reported {
+    pub(super) fn of(inputs: &Inputs<'_>) -> Self {
         let Inputs { vehicle, derived, .. } = inputs;
-        let all = |known: bool| if known { u8::MAX } else { 0 };
-        let is_known = |at: Option<Instant>| all(at.is_some());
         let batteries = vehicle.batteries_known();
         let sensors = derived.crosschecks().sensors_known();
         let mut counts = [u8::MAX; _];
-        for (part, count) in [
-            (Part::Motor, vehicle.motors_known()),
-            (Part::Output, all(derived.outputs().are_told())),
-            (Part::Supply, batteries.max(1)),
-            (Part::Battery, batteries),
-            (Part::Board, is_known(vehicle.rails.at().or(vehicle.processor.at()).or(vehicle.system.at()))),
-            (Part::Vibration, is_known(vehicle.vibration.at())),
-            (Part::Radio, is_known(vehicle.rc.at().or(vehicle.radio.at()))),
-            (Part::Receiver, vehicle.receivers_known()),
-            (Part::Sensor, sensors),
-            (Part::Pair, if derived.crosschecks().are_compared() { sensors } else { 0 }),
-            (Part::Estimator, is_known(vehicle.estimator.at())),
-            (Part::Engine, is_known(vehicle.engine.at())),
-            (Part::Alert, all(vehicle.alerts.are_known())),
-            (Part::Wear, all(inputs.wear.iter().any(Option::is_some))),
-            (Part::Past, all(inputs.baselines.are_known())),
+        for (kind, count) in [
+            (InstanceOf::Motor, vehicle.motors_known()),
+            (InstanceOf::Output, if derived.outputs().are_told() { u8::MAX } else { 0 }),
+            (InstanceOf::Supply, batteries.max(1)),
+            (InstanceOf::Battery, batteries),
+            (InstanceOf::Receiver, vehicle.receivers_known()),
+            (InstanceOf::Sensor, sensors),
+            (InstanceOf::Pair, if derived.crosschecks().are_compared() { sensors } else { 0 }),
         ] {
-            counts[part as usize] = count;
+            counts[kind as usize] = count;
         }
         Self(counts)
     }
 
-    /// The parts of which any has spoken: a bit each.
-    pub(super) fn spoken(&self) -> u16 {
-        self.0.iter().rev().fold(0, |spoken, count| spoken << 1 | u16::from(*count > 0))
+    pub(super) const fn count(&self, check: &Check) -> u8 {
+        self.0[check.of as usize]
+    }
+}
+
+/// The unit of a check's value and limits, in a byte.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Unit(u8);
+
+impl Unit {
+    const NAMES: [&str; 17] = [
+        "", "%", "1/min", "V", "deg", "deg/s", "degC", "frames", "g", "hPa", "m", "m/s", "m/s2", "ms",
+        "rad/s", "s", "times",
+    ];
+
+    /// A unit as it is written; empty for a plain number. A new one goes into `NAMES`.
+    pub const fn of(name: &str) -> Self {
+        let mut place = 0;
+        while !is_same(Self::NAMES[place], name) {
+            place += 1;
+        }
+        Self(place as u8)
     }
 
-    /// How many instances of a check may have a value.
-    pub const fn count(&self, check: &Check) -> u8 {
-        let spoken = self.0[check.part as usize];
-        if spoken < check.instances { spoken } else { check.instances }
+    /// As it is written.
+    pub const fn name(self) -> &'static str {
+        Self::NAMES[self.0 as usize]
+    }
+}
+
+const fn is_same(one: &str, other: &str) -> bool {
+    let (one, other) = (one.as_bytes(), other.as_bytes());
+    let mut at = 0;
+    while at < one.len() && at < other.len() && one[at] == other[at] {
+        at += 1;
+    }
+    at == one.len() && at == other.len()
+}
+
+/// A time of at most a minute, in two bytes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Debounce(u16);
+
+impl Debounce {
+    /// A single measurement is not enough all the same ([`SAMPLES`]).
+    pub const NONE: Self = Self(0);
+
+    /// In milliseconds.
+    pub const fn millis(millis: u16) -> Self {
+        Self(millis)
     }
 
-    /// How many of its states are stepped: what is not new is stepped, though nothing of it is known any more.
-    pub(super) const fn stepped(&self, check: &Check) -> u8 {
-        let spoken = self.0[check.part as usize];
-        if spoken == 0 || spoken > check.instances { check.instances } else { spoken }
+    /// In seconds, up to 65.
+    pub const fn secs(secs: u16) -> Self {
+        assert!(secs <= 65, "a debounce is kept in 16 bits of milliseconds");
+        Self(secs * 1_000)
+    }
+
+    /// As a span.
+    pub const fn span(self) -> Span {
+        Span::from_millis(self.0 as u64)
     }
 }
 
@@ -204,7 +168,7 @@ pub struct Check {
     /// The part of the vehicle.
     pub subsystem: Subsystem,
     /// The unit of value and limits.
-    pub unit: &'static str,
+    pub unit: Unit,
     /// Which side of the limits is bad.
     pub side: Side,
     /// The limit of [`Level::Warning`].
@@ -214,13 +178,13 @@ pub struct Check {
     /// How far back on the good side of a limit the value must be to count as good again.
     pub hysteresis: f32,
     /// How long it must be bad before it is a warning.
-    pub debounce_warn: Span,
+    pub debounce_warn: Debounce,
     /// How long it must be bad before it is critical.
-    pub debounce_critical: Span,
+    pub debounce_critical: Debounce,
     /// When the check applies.
     pub when: When,
-    /// How old the value may be; `None` for values that are ages themselves.
-    pub stale_after: Option<Span>,
+    /// How old the value may be, seconds; `None` for values that are ages themselves.
+    pub stale_s: Option<NonZeroU8>,
     /// How many there may be.
     pub instances: u8,
     /// Its silence says nothing: a flag that is not set, a restart that did not happen. Such a check can make its part
@@ -228,8 +192,8 @@ pub struct Check {
     pub alarm_only: bool,
     /// Its value is a flag or the number of a state, which tells a pilot nothing: the alarm alone is told.
     pub is_flag: bool,
-    /// What its value is from.
-    pub part: Part,
+    /// What its instances are numbers of.
+    pub of: InstanceOf,
     /// Reads the value; `None` while it has never been measured.
     pub read: fn(&Inputs<'_>, u8) -> Option<Reading>,
 }
@@ -242,9 +206,6 @@ pub const CLEAR_MAX: Span = Span::from_secs(128);
 
 /// The same for checks that apply on the ground too: they have no end of a flight to begin anew at.
 pub const CLEAR_MAX_ALWAYS: Span = Span::from_secs(16);
-
-/// A state that rests is looked at again after this long.
-pub(super) const REST_MAX: Span = Span::from_secs(600);
 
 const _: () = assert!(CLEAR.as_millis() << (3 * Repeats::MOST) == CLEAR_MAX.as_millis());
 
@@ -337,6 +298,8 @@ pub struct State {
 }
 
 const _: () = assert!(size_of::<State>() <= 20);
+/// There are more than a hundred rows in flash.
+const _: () = assert!(size_of::<Check>() <= if cfg!(target_pointer_width = "32") { 32 } else { 48 });
 
 /// A change of level.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -352,6 +315,14 @@ pub struct Change {
 }
 
 impl Check {
+    /// How old the value may be; `None` for values that are ages themselves.
+    pub const fn stale_after(&self) -> Option<Span> {
+        match self.stale_s {
+            Some(seconds) => Some(Span::from_secs(seconds.get() as u64)),
+            None => None,
+        }
+    }
+
     /// The limit of a level; NaN where there is none.
     pub(super) fn limit(&self, level: Level, params: &Params) -> f32 {
         let of = |param: Option<Param>| param.map_or(f32::NAN, |param| params.get(param));
@@ -369,7 +340,7 @@ impl Check {
             level: change.level,
             previous: change.previous,
             // What is no longer said is not known to be good, nor is what a mishap left.
-            value: if (matches!(self.part, Part::Alert) && change.value < 0.0)
+            value: if (self.is_flag && change.value < 0.0)
                 || (matches!(self.subsystem, Subsystem::Mishap) && matches!(change.level, Level::Ok))
             {
                 f32::NAN
@@ -377,7 +348,7 @@ impl Check {
                 change.value
             },
             limit: change.limit,
-            unit: self.unit,
+            unit: self.unit.name(),
             feeds,
             because: "",
             orders: Orders::Own,
@@ -442,19 +413,17 @@ impl State {
         self.level == Some(Level::Ok) && self.better.is_set() && !counts
     }
 
-    /// One step of what is good as it was for long and stays so, as nearly every step is: the time of its measurement is noted, and
-    /// nothing else changes. Until when that goes on with the same value, which is a number; `None` where [`Self::step`] has more to do,
-    /// and nothing was changed then.
-    fn stays_calm(
+    /// One step of a good value that was good before, as nearly every step is: notes when it was measured. `false` if
+    /// [`Self::step`] has more to do.
+    #[inline]
+    pub(super) fn stays_good(
         &mut self,
         check: &Check,
         now: Instant,
-        Reading { at, value }: Reading,
+        reading: Reading,
         params: &Params,
-    ) -> Option<Instant> {
-        if !self.is_calm() {
-            return None;
-        }
+    ) -> bool {
+        let Reading { at, value } = reading;
         // A limit that is NaN is off: no comparison with it is true.
         let is_beyond = |limit: Option<Param>| {
             limit.map(|limit| params.get(limit)).is_some_and(|limit| match check.side {
@@ -462,42 +431,27 @@ impl State {
                 Side::Below => value < limit,
             })
         };
-        if is_beyond(check.warn) || is_beyond(check.critical) {
-            return None;
+        if !self.is_calm() || !value.is_finite() || is_beyond(check.warn) || is_beyond(check.critical) {
+            return false;
         }
-        // When what is never stale was measured counts once it is bad: then it is noted.
-        let Some(limit) = check.stale_after else { return Some(now + REST_MAX) };
         let at = at.earlier(now);
-        let seen = Stamp::at(at);
-        if now.since(at) > limit {
-            return None;
+        if check.stale_after().is_some_and(|limit| now.since(at) > limit) {
+            return false;
         }
-        self.seen = seen;
-        Some(at + limit)
+        self.seen = Stamp::at(at);
+        true
     }
 
-    /// Whether a step changes nothing but when it was measured, which is noted: it is good as it was for long, or it has no value, and
-    /// never had one or is never stale. Until when that goes on with the same value; `None` where [`Self::step`] has more to do.
-    #[inline]
-    pub(super) fn rests(
-        &mut self,
-        check: &Check,
-        instance: u8,
-        inputs: &Inputs<'_>,
-        how: How,
-    ) -> Option<Instant> {
-        let How { applies, quiet, latched } = how;
-        if !quiet && !latched {
-            self.held = None;
+    /// Notes when a value was measured, and judges it not.
+    pub(super) fn see(&mut self, now: Instant, reading: Option<Reading>) {
+        if let Some(reading) = reading.filter(|reading| reading.value.is_finite()) {
+            self.seen = Stamp::at(reading.at.earlier(now));
         }
-        let reading = if applies { (check.read)(inputs, instance) } else { None };
-        match reading.filter(|reading| reading.value.is_finite()) {
-            Some(_) if quiet => None,
-            Some(reading) => self.stays_calm(check, inputs.now, reading, inputs.params),
-            None => {
-                (self.is_new() || (applies && check.stale_after.is_none())).then(|| inputs.now + REST_MAX)
-            }
-        }
+    }
+
+    /// Levels may fall again.
+    pub(super) const fn release(&mut self) {
+        self.held = None;
     }
 
     /// One step: at least every 50 ms.
@@ -521,9 +475,6 @@ impl State {
             });
         }
         let reading = reading.filter(|reading| reading.value.is_finite());
-        if reading.is_some_and(|reading| self.stays_calm(check, now, reading, params).is_some()) {
-            return None;
-        }
         let seen = reading.map_or(self.seen, |reading| Stamp::at(reading.at.earlier(now)));
         let measured = core::mem::replace(&mut self.seen, seen) != seen;
         // A value that was measured once and no longer is grows old like one whose message stops.
@@ -555,11 +506,6 @@ impl State {
         }
     }
 
-    /// The same as it was before a step, but for when its value was measured.
-    pub(super) const fn seen_as(self, later: &Self) -> Self {
-        Self { seen: later.seen, ..self }
-    }
-
     /// How long it must be good before the level falls.
     fn clear(&self, check: &Check) -> Span {
         // What its detector ended is over: what it sees next is another mishap, and told.
@@ -574,9 +520,9 @@ impl State {
     fn stale_after(&self, check: &Check) -> Option<Span> {
         match self.level {
             Some(Level::Warning | Level::Critical) => {
-                check.stale_after.map(|limit| self.repeats.grown(limit))
+                check.stale_after().map(|limit| self.repeats.grown(limit))
             }
-            _ => check.stale_after,
+            _ => check.stale_after(),
         }
     }
 
@@ -598,11 +544,11 @@ impl State {
             Side::Below => value < limit + margin,
         };
         let very_bad = self.samples.count(Samples::VERY_BAD, beyond(critical, 0.0), measured)
-            & self.very_bad.run(beyond(critical, 0.0), now, check.debounce_critical);
+            & self.very_bad.run(beyond(critical, 0.0), now, check.debounce_critical.span());
         // Without a warning limit there is no warning on the way to critical.
         let warned = beyond(warn, 0.0) || (!warn.is_nan() && beyond(critical, 0.0));
         let bad = self.samples.count(Samples::BAD, warned, measured)
-            & self.bad.run(warned, now, check.debounce_warn);
+            & self.bad.run(warned, now, check.debounce_warn.span());
         let undecided = self.bad.is_set() || self.very_bad.is_set();
 
         let held = match level {

@@ -1,6 +1,8 @@
 //! What several subsystems' tables share.
 
-use super::check::{Check, Part, Side, When};
+use core::num::NonZeroU8;
+
+use super::check::{Check, Debounce, InstanceOf, Side, Unit, When};
 use super::finding::Subsystem;
 use super::inputs::Inputs;
 use crate::baseline::Quantity;
@@ -8,33 +10,32 @@ use crate::cause::Cause;
 use crate::latest::Reading;
 use crate::observation::VibrationScale;
 use crate::params::Param;
-use crate::time::Span;
 
 /// Most streams come at 1 Hz or more even over a radio; some batteries at 0.5 Hz.
-pub(super) const STALE: Option<Span> = Some(Span::from_secs(5));
+pub(super) const STALE: Option<NonZeroU8> = NonZeroU8::new(5);
 /// For streams that come at 0.5 Hz.
-pub(super) const STALE_SLOW: Option<Span> = Some(Span::from_secs(12));
+pub(super) const STALE_SLOW: Option<NonZeroU8> = NonZeroU8::new(12);
 
 /// What the autopilot itself says is wrong with `CAUSE`, the number of a [`Cause`]: 1 a warning, 2 critical.
 pub(super) const fn alert<const CAUSE: usize>(subsystem: Subsystem) -> Check {
     Check {
         name: Cause::ALL[CAUSE].check(),
         subsystem,
-        unit: "",
+        unit: Unit::of(""),
         side: Side::Above,
         warn: Some(Param::AlertWarn),
         critical: Some(Param::AlertCrit),
         hysteresis: 0.0,
-        debounce_warn: Span::ZERO,
-        debounce_critical: Span::ZERO,
+        debounce_warn: Debounce::NONE,
+        debounce_critical: Debounce::NONE,
         // Only what is said while it is armed counts; a mishap does not silence it, and it is told at its own time.
         when: When::Always,
-        stale_after: None,
+        stale_s: None,
         instances: 1,
         // That it says nothing is no word about its health.
         alarm_only: true,
         is_flag: true,
-        part: Part::Alert,
+        of: InstanceOf::Vehicle,
         read: |inputs, _| {
             Reading::new(
                 Some(inputs.now),
@@ -49,20 +50,20 @@ pub(super) const fn due(subsystem: Subsystem) -> Check {
     Check {
         name: "",
         subsystem,
-        unit: "%",
+        unit: Unit::of("%"),
         side: Side::Above,
         warn: Some(Param::CompYellow),
         critical: Some(Param::CompRed),
         hysteresis: 0.0,
-        debounce_warn: Span::from_secs(1),
-        debounce_critical: Span::from_secs(1),
+        debounce_warn: Debounce::secs(1),
+        debounce_critical: Debounce::secs(1),
         when: When::Always,
-        stale_after: None,
+        stale_s: None,
         instances: 1,
         // That a part is not due does not make its subsystem healthy.
         alarm_only: true,
         is_flag: false,
-        part: Part::Wear,
+        of: InstanceOf::Vehicle,
         read: match subsystem {
             Subsystem::Power => |inputs, _| used(inputs, Subsystem::Power),
             Subsystem::Propulsion => |inputs, _| used(inputs, Subsystem::Propulsion),

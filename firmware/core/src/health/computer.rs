@@ -1,6 +1,6 @@
 //! The autopilot's processor.
 
-use super::check::{Check, Part, Side, When};
+use super::check::{Check, Debounce, InstanceOf, Side, Unit, When};
 use super::common::{STALE, alert};
 use super::finding::Subsystem;
 use super::inputs::Inputs;
@@ -20,42 +20,42 @@ const SLOW_MPS: f32 = 1.0;
 const LOAD: Check = Check {
     name: "load",
     subsystem: Subsystem::Computer,
-    unit: "%",
+    unit: Unit::of("%"),
     side: Side::Above,
     warn: Some(Param::CpuLoadWarn),
     critical: Some(Param::CpuLoadCrit),
     hysteresis: 2.0,
-    debounce_warn: Span::from_secs(2),
-    debounce_critical: Span::from_secs(2),
+    debounce_warn: Debounce::secs(2),
+    debounce_critical: Debounce::secs(2),
     when: When::Always,
-    stale_after: STALE,
+    stale_s: STALE,
     instances: 1,
     alarm_only: false,
     is_flag: false,
-    part: Part::Vehicle,
+    of: InstanceOf::Vehicle,
     read: load_percent,
 };
 
 pub(super) const CHECKS: &[Check] = &[
-    Check { part: Part::Board, ..LOAD },
+    Check { of: InstanceOf::Vehicle, ..LOAD },
     Check {
         name: "mcu_temperature",
-        unit: "degC",
+        unit: Unit::of("degC"),
         warn: Some(Param::McuTempWarn),
         critical: Some(Param::McuTempCrit),
-        part: Part::Board,
+        of: InstanceOf::Vehicle,
         read: temperature_c,
         ..LOAD
     },
     Check {
         name: "autopilot_reboot",
         is_flag: true,
-        unit: "",
+        unit: Unit::of(""),
         warn: None,
         critical: Some(Param::RebootCrit),
         hysteresis: 0.0,
-        debounce_critical: Span::ZERO,
-        stale_after: None,
+        debounce_critical: Debounce::NONE,
+        stale_s: None,
         alarm_only: true,
         read: restarted,
         ..LOAD
@@ -63,11 +63,11 @@ pub(super) const CHECKS: &[Check] = &[
     Check {
         name: "autopilot_state",
         is_flag: true,
-        unit: "",
+        unit: Unit::of(""),
         warn: None,
         critical: Some(Param::StateCrit),
         hysteresis: 0.0,
-        debounce_critical: Span::from_millis(500),
+        debounce_critical: Debounce::millis(500),
         when: When::Armed,
         alarm_only: true,
         read: state,

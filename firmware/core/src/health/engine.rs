@@ -1,31 +1,30 @@
 //! The combustion engine (EFI). What is normal depends on the engine, so the limits are off (at their maximum) until
 //! they are set.
 
-use super::check::{Check, Part, Side, When};
+use super::check::{Check, Debounce, InstanceOf, Side, Unit, When};
 use super::common::{STALE, due};
 use super::finding::Subsystem;
 use super::inputs::Inputs;
 use crate::latest::Reading;
 use crate::observation::Engine;
 use crate::params::Param;
-use crate::time::Span;
 
 const ENGINE: Check = Check {
     name: "cylinder_head",
     subsystem: Subsystem::Engine,
-    unit: "degC",
+    unit: Unit::of("degC"),
     side: Side::Above,
     warn: Some(Param::EngChtWarn),
     critical: Some(Param::EngChtCrit),
     hysteresis: 5.0,
-    debounce_warn: Span::from_secs(2),
-    debounce_critical: Span::from_secs(1),
+    debounce_warn: Debounce::secs(2),
+    debounce_critical: Debounce::secs(1),
     when: When::Always,
-    stale_after: STALE,
+    stale_s: STALE,
     instances: 1,
     alarm_only: false,
     is_flag: false,
-    part: Part::Engine,
+    of: InstanceOf::Vehicle,
     read: |inputs, _| read(inputs, |engine| engine.cylinder_head.map(|temperature| temperature.0)),
 };
 
@@ -40,7 +39,7 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         name: "fuel_pressure",
-        unit: "hPa",
+        unit: Unit::of("hPa"),
         side: Side::Below,
         warn: Some(Param::EngFuelWarn),
         critical: Some(Param::EngFuelCrit),

@@ -80,7 +80,7 @@ const fn worse(known: f32, value: f32, side: Side) -> f32 {
 #[derive(Clone, Copy, Debug)]
 struct Entry {
     /// Its place among all checks.
-    check: u8,
+    check: u16,
     instance: u8,
     /// [`Level::Ok`] while nothing is exceeded.
     level: Level,
@@ -130,7 +130,7 @@ impl Exceedances {
     }
 
     /// Takes a check's change of level; `check` is its place among all checks.
-    pub(crate) fn change(&mut self, check: u8, side: Side, finding: &Finding) {
+    pub(crate) fn change(&mut self, check: u16, side: Side, finding: &Finding) {
         let Some(entry) = self.entry(check, finding) else { return };
         let now_tenths = tenths(finding.at);
         entry.session.extend(entry.level, now_tenths.saturating_sub(entry.since_tenths));
@@ -149,7 +149,7 @@ impl Exceedances {
     }
 
     /// Takes the value of a check whose limit is exceeded.
-    pub(crate) fn note(&mut self, check: u8, instance: u8, side: Side, value: f32) {
+    pub(crate) fn note(&mut self, check: u16, instance: u8, side: Side, value: f32) {
         let entries = self.entries.iter_mut().flatten();
         if let Some(entry) =
             entries.into_iter().find(|entry| (entry.check, entry.instance) == (check, instance))
@@ -159,7 +159,7 @@ impl Exceedances {
     }
 
     /// The entry of a check and instance, a new one where there is none.
-    fn entry(&mut self, check: u8, finding: &Finding) -> Option<&mut Entry> {
+    fn entry(&mut self, check: u16, finding: &Finding) -> Option<&mut Entry> {
         let same = |entry: &Option<Entry>| {
             entry.is_some_and(|entry| (entry.check, entry.instance) == (check, finding.instance))
         };
@@ -256,7 +256,7 @@ impl Exceedances {
             before.code(&mut name, &mut instance, &mut fields)?;
             let check = checks().position(|check| fnv1a(check.name) == name && instance < check.instances);
             *place = check.map(|check| Entry {
-                check: check as u8,
+                check: check as u16,
                 instance,
                 level: Level::Ok,
                 since_tenths: 0,

@@ -1,45 +1,45 @@
 //! The autopilot's, the pilot's and the ground station's links.
 
-use super::check::{Check, Part, Side, When};
+use super::check::{Check, Debounce, InstanceOf, Side, Unit, When};
 use super::common::{STALE, alert};
 use super::finding::Subsystem;
 use super::inputs::Inputs;
 use crate::cause::Cause;
 use crate::latest::Reading;
 use crate::params::Param;
-use crate::time::{Instant, Span};
+use crate::time::Instant;
 
 const HEARTBEAT: Check = Check {
     name: "heartbeat",
     subsystem: Subsystem::Link,
-    unit: "s",
+    unit: Unit::of("s"),
     side: Side::Above,
     warn: Some(Param::LinkAgeWarn),
     critical: Some(Param::LinkAgeCrit),
     hysteresis: 0.0,
-    debounce_warn: Span::ZERO,
-    debounce_critical: Span::ZERO,
+    debounce_warn: Debounce::NONE,
+    debounce_critical: Debounce::NONE,
     when: When::Always,
-    stale_after: None,
+    stale_s: None,
     instances: 1,
     alarm_only: false,
     is_flag: false,
-    part: Part::Vehicle,
+    of: InstanceOf::Vehicle,
     read: heartbeat_age_s,
 };
 
 const RADIO: Check = Check {
     name: "rc_rssi",
-    unit: "",
+    unit: Unit::of(""),
     side: Side::Below,
     warn: Some(Param::RcRssiWarn),
     critical: Some(Param::RcRssiCrit),
     hysteresis: 2.0,
-    debounce_warn: Span::from_secs(2),
-    debounce_critical: Span::from_secs(1),
+    debounce_warn: Debounce::secs(2),
+    debounce_critical: Debounce::secs(1),
     when: When::Armed,
-    stale_after: STALE,
-    part: Part::Radio,
+    stale_s: STALE,
+    of: InstanceOf::Vehicle,
     read: rc_rssi,
     ..HEARTBEAT
 };
@@ -48,12 +48,12 @@ pub(super) const CHECKS: &[Check] = &[
     HEARTBEAT,
     Check {
         name: "frames_lost",
-        unit: "%",
+        unit: Unit::of("%"),
         warn: Some(Param::LinkLossWarn),
         critical: Some(Param::LinkLossCrit),
         hysteresis: 0.2,
-        debounce_warn: Span::from_secs(2),
-        debounce_critical: Span::from_secs(2),
+        debounce_warn: Debounce::secs(2),
+        debounce_critical: Debounce::secs(2),
         read: frames_lost_percent,
         ..HEARTBEAT
     },

@@ -1,31 +1,30 @@
 //! Mishaps: what [`crate::mishap`] saw. No gate holds them back, and they stay critical until the vehicle is armed again or flies
 //! on.
 
-use super::check::{Check, Part, Side, When};
+use super::check::{Check, Debounce, InstanceOf, Side, Unit, When};
 use super::common::{STALE, alert};
 use super::finding::{Orders, Subsystem};
 use super::inputs::Inputs;
 use crate::cause::Cause;
 use crate::mishap::Kind;
 use crate::params::Param;
-use crate::time::Span;
 
 const FREE_FALL: Check = Check {
     name: Kind::FreeFall.name(),
     subsystem: Subsystem::Mishap,
-    unit: "s",
+    unit: Unit::of("s"),
     side: Side::Above,
     warn: None,
     critical: Some(Param::MisFallTime),
     hysteresis: 0.0,
-    debounce_warn: Span::ZERO,
-    debounce_critical: Span::ZERO,
+    debounce_warn: Debounce::NONE,
+    debounce_critical: Debounce::NONE,
     when: When::Always,
-    stale_after: STALE,
+    stale_s: STALE,
     instances: 1,
     alarm_only: false,
     is_flag: false,
-    part: Part::Vehicle,
+    of: InstanceOf::Vehicle,
     read: |inputs, _| inputs.mishap.reading(Kind::FreeFall, inputs.now, inputs.vehicle),
 };
 
@@ -33,21 +32,21 @@ pub(super) const CHECKS: &[Check] = &[
     FREE_FALL,
     Check {
         name: Kind::Impact.name(),
-        unit: "g",
+        unit: Unit::of("g"),
         critical: Some(Param::MisImpact),
         read: |inputs, _| inputs.mishap.reading(Kind::Impact, inputs.now, inputs.vehicle),
         ..FREE_FALL
     },
     Check {
         name: Kind::Tumbling.name(),
-        unit: "deg/s",
+        unit: Unit::of("deg/s"),
         critical: Some(Param::MisTumble),
         read: |inputs, _| inputs.mishap.reading(Kind::Tumbling, inputs.now, inputs.vehicle),
         ..FREE_FALL
     },
     Check {
         name: Kind::Disarmed.name(),
-        unit: "m",
+        unit: Unit::of("m"),
         alarm_only: true,
         critical: Some(Param::MisDisarm),
         read: |inputs, _| inputs.mishap.reading(Kind::Disarmed, inputs.now, inputs.vehicle),
@@ -55,14 +54,14 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         name: Kind::Sinking.name(),
-        unit: "m/s",
+        unit: Unit::of("m/s"),
         critical: Some(Param::MisSink),
         read: |inputs, _| inputs.mishap.reading(Kind::Sinking, inputs.now, inputs.vehicle),
         ..FREE_FALL
     },
     Check {
         name: Kind::Overturned.name(),
-        unit: "deg",
+        unit: Unit::of("deg"),
         critical: Some(Param::MisOverturn),
         read: |inputs, _| inputs.mishap.reading(Kind::Overturned, inputs.now, inputs.vehicle),
         ..FREE_FALL

@@ -2,11 +2,6 @@
 //!
 //! Each subsystem's checks are a table in a file of its own; `tables` puts them together. A roll-up is never better than
 //! its worst part that is known, and where nothing is known it is not OK but stale.
-//!
-//! A step looks at what may change. Left out are checks that do not apply and have nothing to forget, and checks that rest: their
-//! states are good or have no value, and stay so until somebody says something of the part that they are of ([`check::Part`]), until the
-//! flight, a mishap or a setting changes what is judged, or until the first of their values grows stale. No value is kept for that. Where
-//! assertions are on, what is left out is looked at all the same, and has to rest.
 
 mod attitude;
 pub mod check;
@@ -27,8 +22,8 @@ mod structure;
 mod tables;
 mod vocabulary;
 
-pub use check::{CLEAR, CLEAR_MAX, CLEAR_MAX_ALWAYS, Check, Parts, Side, State, When};
-use check::{Change, How, Part, REST_MAX};
+pub use check::{CLEAR, CLEAR_MAX, CLEAR_MAX_ALWAYS, Check, Debounce, InstanceOf, Side, State, Unit, When};
+use check::{Change, How, Reported};
 pub use consequence::{because, explains, is_of_mishap, is_with_mishap};
 pub use finding::{Finding, Level, OFF_MEANING, Orders, Subsystem, is_off, off_alarm};
 pub use inputs::Inputs;
@@ -36,11 +31,10 @@ pub use tables::{check_named, checks, instances};
 pub use vocabulary::{Said, Scope, VOCABULARY, Words, said, vocabulary};
 
 use crate::latest::Reading;
-use crate::observation::Observation;
 use crate::params::{Param, Params};
 use crate::time::{Instant, Span};
 use exceedance::Exceedances;
-use tables::{Kinds, MAY_REST, Places, STATES};
+use tables::STATES;
 
 /// A vehicle that has not been heard for so long is silent.
 const SILENT: Span = Span::from_secs(5);
@@ -51,20 +45,11 @@ pub const EXPECTED: [Subsystem; 3] = [Subsystem::Power, Subsystem::Link, Subsyst
 #[derive(Clone, Copy, Debug)]
 pub struct Health {
     states: [State; STATES],
-    /// The state that is looked at next: whether what explained its alarm still does. One a step, each every 8 s.
-    looked_at: u8,
-    /// Kinds of checks whose states may not be new: of all others a step changes nothing while they do not apply.
-    awake: Kinds,
-    /// Checks that are left out until something is said of them, or this time: all their states rest.
-    rest: Places,
-    rest_until: Instant,
-    /// Parts of which something was said since the last step, a bit each.
-    heard: u16,
-    /// How checks were stepped last: [`Now::mark`].
-    stepped: u8,
+    /// The state that is looked at next: whether the alarm that explained it goes on. One a step.
+    looked_at: u16,
 }
 
-const _: () = assert!(size_of::<Health>() <= 5 * 1024 + 128);
+const _: () = assert!(size_of::<Health>() <= 20 * STATES + 4);
 
 impl Default for Health {
     fn default() -> Self {
@@ -75,32 +60,13 @@ impl Default for Health {
 impl Health {
     /// Nothing seen yet.
     pub const fn new() -> Self {
-        Self {
-            states: [const { State::new() }; STATES],
-            looked_at: 0,
-            awake: Kinds::NONE,
-            rest: Places::NONE,
-            rest_until: Instant::ZERO,
-            heard: 0,
-            stepped: 0,
-        }
+        Self { states: [const { State::new() }; STATES], looked_at: 0 }
     }
 
     /// As if nothing had been seen.
     pub(crate) fn clear(&mut self) {
-        let Self { states, looked_at, awake, rest, .. } = self;
-        states.fill(State::new());
-        (*looked_at, *awake, *rest) = (0, Kinds::NONE, Places::NONE);
-    }
-
-    /// An observation was taken in: what it is of is looked at again.
-    pub(crate) const fn hear(&mut self, observation: &Observation) {
-        self.heard |= Part::told_by(observation);
-    }
-
-    /// Something else changed that checks read: all of them are looked at again.
-    pub(crate) const fn look_again(&mut self) {
-        self.rest = Places::NONE;
+        self.states.fill(State::new());
+        self.looked_at = 0;
     }
 
     /// One step of all checks, at least every 50 ms; each change of level is a finding, and so is an alarm that outlives the one that
@@ -111,82 +77,50 @@ impl Health {
         exceedances: &mut Exceedances,
         findings: &mut impl FnMut(&Finding),
     ) {
-        let now = Now::of(inputs);
-        let parts = Parts::of(inputs);
-        debug_assert_eq!(speaks(&parts, inputs), None, "has a value, though its part never spoke");
-        let kinds = Kinds::of(parts.spoken(), now.times());
-        let stepped = kinds.and(self.awake);
-        let restless = self.restless(stepped.places(), inputs, &parts, &now);
-        for (place, check, first) in restless.checks() {
-            let (how, there) = (now.how(check), parts.stepped(check));
-            for instance in 0..there {
+        let (now, reported) = (Now::of(inputs), Reported::of(inputs));
+        debug_assert_eq!(unreported(&reported, inputs), None, "has a value, though it never reported");
+        let mut first = 0;
+        for (place, check) in (0..).zip(checks()) {
+            let (how, count) = (now.how(check), reported.count(check));
+            for instance in 0..check.instances {
                 let slot = first + usize::from(instance);
                 let Some(state) = self.states.get_mut(slot) else { break };
-                // The only one is known not to rest.
-                if there > 1 && state.rests(check, instance, inputs, how).is_some() {
+                let is_read = how.applies && instance < count;
+                if !is_read && state.is_new() {
                     continue;
                 }
-                if let Some(finding) = self.turn((place, check, instance, slot), inputs, how, exceedances) {
+                let reading = if is_read { (check.read)(inputs, instance) } else { None };
+                if !how.quiet && !how.latched {
+                    state.release();
+                }
+                if how.quiet {
+                    state.see(inputs.now, reading);
+                } else if reading
+                    .is_none_or(|reading| !state.stays_good(check, inputs.now, reading, inputs.params))
+                    && let Some(finding) =
+                        self.turn((place, check, instance, slot), inputs, reading, how, exceedances)
+                {
                     findings(&finding);
                 }
             }
+            first += usize::from(check.instances);
         }
-        self.looked_at = ((usize::from(self.looked_at) + 1) % STATES) as u8;
-        self.awake = if stepped == kinds { kinds } else { self.awake(stepped, kinds) };
-        debug_assert_eq!(self.awake(Kinds::ALL, self.awake), self.awake, "what is left out is new");
-    }
-
-    /// Those of the checks that have a state which does not rest, as nearly all do.
-    fn restless(&mut self, places: Places, inputs: &Inputs<'_>, parts: &Parts, now: &Now) -> Places {
-        if self.stepped != now.mark() || inputs.now.is_after(self.rest_until) {
-            (self.stepped, self.rest, self.rest_until) = (now.mark(), Places::NONE, inputs.now + REST_MAX);
-        }
-        // What the autopilot says rests while it does not say it.
-        let on = Places::of_causes(inputs.vehicle.alerts.may_be_on(inputs.now));
-        let heard = Places::of_parts(core::mem::take(&mut self.heard));
-        let left_out = self.rest.without(heard).without(on);
-        debug_assert!({ *self }.look(left_out, inputs, parts, now).is_empty(), "what is left out changes");
-        let restless = self.look(places.without(left_out), inputs, parts, now);
-        self.rest = places.without(restless).within(MAY_REST);
-        restless
-    }
-
-    /// Looks whether the states of these checks rest: those of which one does not. Apart, so that the many looks need few registers.
-    #[inline(never)]
-    fn look(&mut self, places: Places, inputs: &Inputs<'_>, parts: &Parts, now: &Now) -> Places {
-        let (mut restless, mut until) = (Places::NONE, self.rest_until);
-        for (place, check, first) in places.checks() {
-            let how = now.how(check);
-            let states = self.states.iter_mut().skip(first).take(usize::from(parts.stepped(check)));
-            for (instance, state) in (0..).zip(states) {
-                match state.rests(check, instance, inputs, how) {
-                    Some(rests_until) => until = until.earlier(rests_until),
-                    None => restless.add(place),
-                }
-            }
-        }
-        self.rest_until = until;
-        restless
+        self.looked_at = (self.looked_at + 1) % STATES as u16;
     }
 
     /// A step of one state that may change it.
     #[inline(never)]
     fn turn(
         &mut self,
-        (place, check, instance, slot): (u8, &'static Check, u8, usize),
+        (place, check, instance, slot): (u16, &'static Check, u8, usize),
         inputs: &Inputs<'_>,
-        How { applies, quiet, latched }: How,
+        reading: Option<Reading>,
+        How { applies, latched, .. }: How,
         exceedances: &mut Exceedances,
     ) -> Option<Finding> {
-        let reading = (check.read)(inputs, instance);
         let state = self.states.get_mut(slot)?;
         let before = *state;
         let change = state.step(check, inputs.now, reading, applies, inputs.params);
-        if quiet {
-            // It would only echo the mishap: it stays as it was.
-            *state = before.seen_as(state);
-            return None;
-        }
         let change = if latched { state.hold(&before, change) } else { change };
         if let (None, Some(Level::Warning | Level::Critical), Some(reading)) =
             (change, state.level(), reading)
@@ -205,15 +139,6 @@ impl Health {
             exceedances.change(place, check.side, &finding);
         }
         Some(finding)
-    }
-
-    /// These `kinds` of checks, and of the `others` those that have a state which is not new.
-    fn awake(&self, others: Kinds, kinds: Kinds) -> Kinds {
-        let others = others.places().checks().filter(|(_, check, _)| !kinds.has(check));
-        others.fold(kinds, |awake, (_, check, first)| {
-            let mut states = self.states.iter().skip(first).take(usize::from(check.instances));
-            if states.all(State::is_new) { awake } else { awake.and(Kinds::of_check(check)) }
-        })
     }
 
     /// A change, and the check whose alarm explains it.
@@ -307,8 +232,6 @@ impl Health {
 struct Now {
     /// How checks are stepped, by [`When`] they apply.
     hows: [How; When::ALL.len()],
-    /// Each cause that the autopilot may tell has a level.
-    has_flags: bool,
 }
 
 impl Now {
@@ -329,29 +252,18 @@ impl Now {
             };
             How { applies: quiet || (!over && applies), quiet, latched }
         });
-        Self { hows, has_flags: vehicle.alerts.has_flags() }
+        Self { hows }
     }
 
     const fn how(&self, check: &Check) -> How {
         self.hows[check.when as usize]
     }
-
-    fn times(&self) -> [bool; When::ALL.len()] {
-        self.hows.map(|how| how.applies)
-    }
-
-    /// All of it in a byte: checks are stepped otherwise where it differs.
-    fn mark(&self) -> u8 {
-        let [always, armed, in_flight] = self.hows;
-        let differs = [armed.applies, in_flight.applies, armed.quiet, always.latched, self.has_flags];
-        differs.into_iter().fold(0, |mark, is_so| mark << 1 | u8::from(is_so))
-    }
 }
 
-/// A check of which more instances have a value than of its part have spoken; there is none.
-fn speaks(parts: &Parts, inputs: &Inputs<'_>) -> Option<&'static str> {
+/// A check of which an instance has a value that never reported; there is none.
+fn unreported(reported: &Reported, inputs: &Inputs<'_>) -> Option<&'static str> {
     let has_more = |check: &&Check| {
-        (parts.count(check)..check.instances).any(|instance| (check.read)(inputs, instance).is_some())
+        (reported.count(check)..check.instances).any(|instance| (check.read)(inputs, instance).is_some())
     };
     checks().find(has_more).map(|check| check.name)
 }

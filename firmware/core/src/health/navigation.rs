@@ -1,6 +1,6 @@
 //! Estimator and GNSS.
 
-use super::check::{Check, Part, Side, When};
+use super::check::{Check, Debounce, InstanceOf, Side, Unit, When};
 use super::common::{STALE, alert, px4_metric};
 use super::finding::Subsystem;
 use super::inputs::Inputs;
@@ -11,33 +11,32 @@ use crate::observation::{Estimator, EstimatorScale, Gnss, VehicleKind};
 use crate::pairs::{Kind, SENSORS_MAX};
 use crate::params::Param;
 use crate::residual::Comparison;
-use crate::time::Span;
 use crate::vehicle::RECEIVERS_MAX;
 
 /// Of values that are smoothed and beyond their usual range: three comparisons.
-const SMOOTHED: Span = Span::from_millis(200);
+const SMOOTHED: Debounce = Debounce::millis(200);
 /// Four messages of a receiver at 5 Hz, two at 2 Hz. Dilutions of precision leap as satellites come and go, and wait longer.
-const RECEIVER_SAYS: Span = Span::from_millis(600);
+const RECEIVER_SAYS: Debounce = Debounce::millis(600);
 /// So far on the good side of its limit a value is good again.
 const MARGIN: f32 = 0.5;
 
 const ESTIMATOR: Check = Check {
     name: "ekf_variance",
     subsystem: Subsystem::Navigation,
-    unit: "",
+    unit: Unit::of(""),
     side: Side::Above,
     warn: Some(Param::EkfVarWarn),
     critical: None,
     hysteresis: 0.05,
     // Two messages at 2 Hz. ArduPilot's failsafe waits for a second, and acts then.
-    debounce_warn: Span::from_millis(500),
-    debounce_critical: Span::from_secs(1),
+    debounce_warn: Debounce::millis(500),
+    debounce_critical: Debounce::secs(1),
     when: When::InFlight,
-    stale_after: STALE,
+    stale_s: STALE,
     instances: 1,
     alarm_only: false,
     is_flag: false,
-    part: Part::Estimator,
+    of: InstanceOf::Vehicle,
     read: |inputs, _| estimator(inputs, EstimatorScale::Variance, largest),
 };
 
@@ -46,9 +45,9 @@ const GNSS: Check = Check {
     side: Side::Below,
     warn: Some(Param::GpsSatsWarn),
     hysteresis: 0.0,
-    debounce_warn: Span::from_secs(2),
+    debounce_warn: Debounce::secs(2),
     instances: RECEIVERS_MAX as u8,
-    part: Part::Receiver,
+    of: InstanceOf::Receiver,
     read: |inputs, receiver| {
         let enough = inputs.params.get(Param::GpsSatsWarn) + MARGIN;
         gnss(inputs, receiver, |gnss| {
@@ -62,14 +61,14 @@ const GNSS: Check = Check {
 /// Two sensors of a kind against each other ([`crate::crosscheck`]).
 const MISMATCH: Check = Check {
     name: "accel_mismatch",
-    unit: "m/s2",
+    unit: Unit::of("m/s2"),
     warn: Some(Param::AccMismWarn),
     hysteresis: 0.2,
-    debounce_warn: Span::from_millis(500),
+    debounce_warn: Debounce::millis(500),
     // Never stale: they are compared where that says something.
-    stale_after: None,
+    stale_s: None,
     instances: SENSORS_MAX as u8,
-    part: Part::Pair,
+    of: InstanceOf::Pair,
     read: |inputs, sensor| mismatch(inputs, Kind::Accelerometer, sensor),
     ..ESTIMATOR
 };
@@ -77,12 +76,12 @@ const MISMATCH: Check = Check {
 /// A sensor that repeats one value ([`crate::stuck`]). Never stale, and no word about how good it is.
 const STUCK: Check = Check {
     name: "accel_stuck",
-    unit: "s",
+    unit: Unit::of("s"),
     warn: Some(Param::StuckWarn),
     hysteresis: 0.0,
-    debounce_warn: Span::ZERO,
+    debounce_warn: Debounce::NONE,
     alarm_only: true,
-    part: Part::Sensor,
+    of: InstanceOf::Sensor,
     read: |inputs, sensor| stuck(inputs, Kind::Accelerometer, sensor),
     ..MISMATCH
 };
@@ -90,13 +89,13 @@ const STUCK: Check = Check {
 /// The estimator that flies against the second one ([`crate::second`]).
 const SECOND: Check = Check {
     name: "ahrs2_tilt",
-    unit: "deg",
+    unit: Unit::of("deg"),
     warn: Some(Param::Ahrs2TiltWarn),
     hysteresis: 2.0,
     // Who names the sensor is heard first.
-    debounce_warn: Span::from_secs(1),
+    debounce_warn: Debounce::secs(1),
     instances: 1,
-    part: Part::Vehicle,
+    of: InstanceOf::Vehicle,
     read: |inputs, _| residual(inputs, Comparison::Ahrs2Tilt),
     ..MISMATCH
 };
@@ -133,7 +132,7 @@ pub(super) const CHECKS: &[Check] = &[
         critical: Some(Param::EkfRatioCrit),
         read: |inputs, _| estimator(inputs, EstimatorScale::TestRatio, |estimator| estimator.compass),
         // PX4 tells none of a compass that it does not use: that is `compass_unused`.
-        stale_after: None,
+        stale_s: None,
         ..ESTIMATOR
     },
     Check {
@@ -148,7 +147,7 @@ pub(super) const CHECKS: &[Check] = &[
     MISMATCH,
     Check {
         name: "gyro_mismatch",
-        unit: "rad/s",
+        unit: Unit::of("rad/s"),
         warn: Some(Param::GyroMismWarn),
         hysteresis: 0.02,
         debounce_warn: SMOOTHED,
@@ -157,13 +156,13 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         name: "gyro_noise",
-        unit: "rad/s",
+        unit: Unit::of("rad/s"),
         warn: Some(Param::GyroNoiseWarn),
         hysteresis: 0.05,
-        debounce_warn: Span::from_millis(500),
+        debounce_warn: Debounce::millis(500),
         instances: 1,
-        stale_after: STALE,
-        part: Part::Vibration,
+        stale_s: STALE,
+        of: InstanceOf::Vehicle,
         read: |inputs, _| px4_metric(inputs, 1),
         ..MISMATCH
     },
@@ -173,13 +172,13 @@ pub(super) const CHECKS: &[Check] = &[
         hysteresis: 0.3,
         instances: 1,
         // It goes by the attitude and a receiver too.
-        part: Part::Vehicle,
+        of: InstanceOf::Vehicle,
         read: |inputs, _| inputs.derived.crosschecks().imu_gnss(inputs.now),
         ..MISMATCH
     },
     Check {
         name: "compass_mismatch",
-        unit: "%",
+        unit: Unit::of("%"),
         warn: Some(Param::MagMismWarn),
         hysteresis: 5.0,
         debounce_warn: SMOOTHED,
@@ -188,18 +187,18 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         name: "compass_heading",
-        unit: "deg",
+        unit: Unit::of("deg"),
         warn: Some(Param::MagHeadWarn),
         hysteresis: 3.0,
         debounce_warn: SMOOTHED,
         instances: 1,
-        part: Part::Vehicle,
+        of: InstanceOf::Vehicle,
         read: |inputs, _| residual(inputs, Comparison::MagHeading),
         ..MISMATCH
     },
     Check {
         name: "baro_mismatch",
-        unit: "m",
+        unit: Unit::of("m"),
         warn: Some(Param::BaroMismWarn),
         hysteresis: 1.0,
         debounce_warn: SMOOTHED,
@@ -208,43 +207,43 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         name: "baro_height",
-        unit: "m",
+        unit: Unit::of("m"),
         warn: Some(Param::BaroGpsWarn),
         hysteresis: 1.0,
-        debounce_warn: Span::from_secs(1),
+        debounce_warn: Debounce::secs(1),
         instances: 1,
-        part: Part::Sensor,
+        of: InstanceOf::Sensor,
         read: |inputs, _| residual(inputs, Comparison::BaroGnss),
         ..MISMATCH
     },
     Check {
         name: "baro_noise",
-        unit: "m",
+        unit: Unit::of("m"),
         warn: Some(Param::BaroNoiseWarn),
         hysteresis: 0.5,
-        debounce_warn: Span::from_millis(500),
+        debounce_warn: Debounce::millis(500),
         instances: 1,
-        part: Part::Sensor,
+        of: InstanceOf::Sensor,
         read: |inputs, _| residual(inputs, Comparison::BaroNoise),
         ..MISMATCH
     },
     Check {
         name: "ekf_climb",
-        unit: "m/s",
+        unit: Unit::of("m/s"),
         warn: Some(Param::EkfClimbWarn),
         critical: Some(Param::EkfClimbCrit),
         hysteresis: 1.0,
-        debounce_warn: Span::from_millis(500),
-        debounce_critical: Span::from_millis(500),
+        debounce_warn: Debounce::millis(500),
+        debounce_critical: Debounce::millis(500),
         instances: 1,
-        part: Part::Sensor,
+        of: InstanceOf::Sensor,
         read: |inputs, _| residual(inputs, Comparison::BaroClimb),
         ..MISMATCH
     },
     SECOND,
     Check {
         name: "ahrs2_height",
-        unit: "m",
+        unit: Unit::of("m"),
         warn: Some(Param::Ahrs2HgtWarn),
         critical: Some(Param::Ahrs2HgtCrit),
         hysteresis: 1.0,
@@ -253,7 +252,7 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         name: "ahrs2_position",
-        unit: "m",
+        unit: Unit::of("m"),
         warn: Some(Param::Ahrs2PosWarn),
         hysteresis: 2.0,
         read: |inputs, _| residual(inputs, Comparison::Ahrs2Position),
@@ -264,7 +263,7 @@ pub(super) const CHECKS: &[Check] = &[
     Check {
         name: "compass_stuck",
         // What changed all compasses is in one message up to 0.2 s before another.
-        debounce_warn: Span::from_millis(300),
+        debounce_warn: Debounce::millis(300),
         read: |inputs, sensor| stuck(inputs, Kind::Compass, sensor),
         ..STUCK
     },
@@ -273,19 +272,19 @@ pub(super) const CHECKS: &[Check] = &[
         name: "gps_stuck",
         instances: RECEIVERS_MAX as u8,
         // It goes by how far the vehicle moved.
-        part: Part::Vehicle,
+        of: InstanceOf::Vehicle,
         read: |inputs, receiver| inputs.derived.crosschecks().receiver_stuck(inputs.now, receiver),
         ..STUCK
     },
     Check { debounce_warn: RECEIVER_SAYS, ..GNSS },
     Check {
         name: "gps_sats_fall",
-        unit: "%",
-        stale_after: None,
+        unit: Unit::of("%"),
+        stale_s: None,
         side: Side::Above,
         warn: Some(Param::GpsSatsFall),
         hysteresis: 5.0,
-        debounce_warn: Span::from_secs(1),
+        debounce_warn: Debounce::secs(1),
         read: |inputs, receiver| {
             gnss_constellation::satellites_lost(
                 inputs.derived.crosschecks().residuals(),
@@ -297,9 +296,9 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         name: "gps_speed",
-        unit: "m/s",
+        unit: Unit::of("m/s"),
         // Never stale: only what moves says something.
-        stale_after: None,
+        stale_s: None,
         side: Side::Above,
         warn: Some(Param::GpsSpeedWarn),
         hysteresis: 0.2,
@@ -308,16 +307,16 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         name: "gps_height",
-        unit: "m",
-        stale_after: None,
+        unit: Unit::of("m"),
+        stale_s: None,
         side: Side::Above,
         warn: Some(Param::GpsHeightWarn),
         hysteresis: 1.0,
         // Two messages at 5 Hz.
-        debounce_warn: Span::from_millis(200),
+        debounce_warn: Debounce::millis(200),
         instances: 1,
         // It goes by the barometer too.
-        part: Part::Vehicle,
+        of: InstanceOf::Vehicle,
         read: |inputs, _| inputs.derived.crosschecks().receiver_leapt(inputs.now),
         ..GNSS
     },
@@ -336,12 +335,12 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         name: "gps_hdop_rise",
-        unit: "times",
-        stale_after: None,
+        unit: Unit::of("times"),
+        stale_s: None,
         side: Side::Above,
         warn: Some(Param::GpsHdopRise),
         hysteresis: 0.1,
-        debounce_warn: Span::from_secs(1),
+        debounce_warn: Debounce::secs(1),
         read: |inputs, receiver| {
             gnss_constellation::hdop_rise(inputs.derived.crosschecks().residuals(), inputs.now, receiver)
         },
@@ -349,7 +348,7 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         name: "gps_accuracy",
-        unit: "m",
+        unit: Unit::of("m"),
         side: Side::Above,
         warn: Some(Param::GpsHaccWarn),
         hysteresis: 0.1,
@@ -363,7 +362,7 @@ pub(super) const CHECKS: &[Check] = &[
         warn: None,
         critical: Some(Param::GpsFixCrit),
         // Two messages without one.
-        debounce_critical: Span::from_millis(200),
+        debounce_critical: Debounce::millis(200),
         read: |inputs, receiver| gnss(inputs, receiver, |gnss| Some(f32::from(gnss.fix))),
         ..GNSS
     },

@@ -1,6 +1,6 @@
 //! Batteries and rails.
 
-use super::check::{Check, Part, Side, When};
+use super::check::{Check, Debounce, InstanceOf, Side, Unit, When};
 use super::common::{STALE, STALE_SLOW, alert, departure, due};
 use super::finding::Subsystem;
 use super::inputs::Inputs;
@@ -9,7 +9,6 @@ use crate::cause::Cause;
 use crate::latest::{Latest, Reading};
 use crate::observation::Feeds;
 use crate::params::Param;
-use crate::time::Span;
 use crate::vehicle::BATTERIES_MAX;
 
 const BATTERIES: u8 = BATTERIES_MAX as u8;
@@ -17,19 +16,19 @@ const BATTERIES: u8 = BATTERIES_MAX as u8;
 const BATTERY: Check = Check {
     name: "batt_remaining",
     subsystem: Subsystem::Power,
-    unit: "%",
+    unit: Unit::of("%"),
     side: Side::Below,
     warn: Some(Param::BatRemWarn),
     critical: Some(Param::BatRemCrit),
     hysteresis: 1.0,
-    debounce_warn: Span::from_secs(2),
-    debounce_critical: Span::from_secs(2),
+    debounce_warn: Debounce::secs(2),
+    debounce_critical: Debounce::secs(2),
     when: When::Always,
-    stale_after: STALE_SLOW,
+    stale_s: STALE_SLOW,
     instances: BATTERIES,
     alarm_only: false,
     is_flag: false,
-    part: Part::Supply,
+    of: InstanceOf::Supply,
     read: remaining_percent,
 };
 
@@ -37,27 +36,27 @@ pub(super) const CHECKS: &[Check] = &[
     BATTERY,
     Check {
         name: "cell_voltage",
-        unit: "V",
+        unit: Unit::of("V"),
         warn: Some(Param::CellVoltWarn),
         critical: Some(Param::CellVoltCrit),
         hysteresis: 0.05,
         // ArduPilot's low voltage timer is 10 s: a sag under full throttle is not an empty battery.
-        debounce_warn: Span::from_secs(10),
-        debounce_critical: Span::from_secs(5),
+        debounce_warn: Debounce::secs(10),
+        debounce_critical: Debounce::secs(5),
         read: |inputs, battery| inputs.derived.cell_voltage(inputs.vehicle, inputs.params, battery),
         when: When::Armed,
         ..BATTERY
     },
     Check {
         name: "cell_deviation",
-        unit: "V",
+        unit: Unit::of("V"),
         side: Side::Above,
         warn: Some(Param::CellDevWarn),
         critical: Some(Param::CellDevCrit),
         hysteresis: 0.01,
-        debounce_warn: Span::from_secs(10),
-        debounce_critical: Span::from_secs(10),
-        part: Part::Battery,
+        debounce_warn: Debounce::secs(10),
+        debounce_critical: Debounce::secs(10),
+        of: InstanceOf::Battery,
         read: cell_deviation_v,
         when: When::Armed,
         ..BATTERY
@@ -65,13 +64,13 @@ pub(super) const CHECKS: &[Check] = &[
     Check {
         name: "cell_dev_lasting",
         side: Side::Above,
-        unit: "V",
+        unit: Unit::of("V"),
         warn: None,
         critical: Some(Param::CellDevWarn),
         hysteresis: 0.01,
         // AirData: above the warning's limit for a minute is as bad as far above it.
-        debounce_critical: Span::from_secs(60),
-        part: Part::Battery,
+        debounce_critical: Debounce::secs(60),
+        of: InstanceOf::Battery,
         read: cell_deviation_v,
         when: When::Armed,
         ..BATTERY
@@ -82,12 +81,12 @@ pub(super) const CHECKS: &[Check] = &[
         warn: Some(Param::BatResWarn),
         critical: Some(Param::BatResCrit),
         hysteresis: 5.0,
-        debounce_warn: Span::from_secs(10),
-        debounce_critical: Span::from_secs(10),
+        debounce_warn: Debounce::secs(10),
+        debounce_critical: Debounce::secs(10),
         when: When::InFlight,
         // A trend holds until the next figure.
-        stale_after: None,
-        part: Part::Battery,
+        stale_s: None,
+        of: InstanceOf::Battery,
         read: resistance_rise_percent,
         ..BATTERY
     },
@@ -97,47 +96,47 @@ pub(super) const CHECKS: &[Check] = &[
         warn: Some(Param::TrdCapWarn),
         critical: Some(Param::TrdCapCrit),
         hysteresis: 5.0,
-        debounce_warn: Span::from_secs(10),
-        debounce_critical: Span::from_secs(10),
+        debounce_warn: Debounce::secs(10),
+        debounce_critical: Debounce::secs(10),
         when: When::InFlight,
-        stale_after: None,
-        part: Part::Past,
+        stale_s: None,
+        of: InstanceOf::Vehicle,
         read: |inputs, battery| departure(inputs, Quantity::Capacity(battery)),
         ..BATTERY
     },
     Check {
         name: "batt_fault",
         is_flag: true,
-        unit: "",
+        unit: Unit::of(""),
         side: Side::Above,
         warn: Some(Param::BatFaultWarn),
         critical: None,
         hysteresis: 0.0,
         alarm_only: true,
-        part: Part::Battery,
+        of: InstanceOf::Battery,
         read: faults,
         ..BATTERY
     },
     Check {
         name: "batt_temperature",
-        unit: "degC",
+        unit: Unit::of("degC"),
         side: Side::Above,
         warn: Some(Param::BatTempWarn),
         critical: Some(Param::BatTempCrit),
         hysteresis: 3.0,
-        part: Part::Battery,
+        of: InstanceOf::Battery,
         read: temperature_c,
         ..BATTERY
     },
     Check {
         name: "batt_state",
         is_flag: true,
-        unit: "",
+        unit: Unit::of(""),
         side: Side::Above,
         warn: Some(Param::BatStateWarn),
         critical: Some(Param::BatStateCrit),
         hysteresis: 0.0,
-        part: Part::Battery,
+        of: InstanceOf::Battery,
         read: |inputs, battery| {
             let slot = inputs.vehicle.batteries.get(usize::from(battery))?;
             let value = match slot.get()?.charge {
@@ -153,30 +152,30 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         name: "rail_5v_low",
-        unit: "V",
+        unit: Unit::of("V"),
         warn: Some(Param::RailLowWarn),
         critical: Some(Param::RailLowCrit),
         hysteresis: 0.05,
-        debounce_warn: Span::from_secs(1),
-        debounce_critical: Span::from_millis(500),
+        debounce_warn: Debounce::secs(1),
+        debounce_critical: Debounce::millis(500),
         when: When::Armed,
-        stale_after: STALE,
+        stale_s: STALE,
         instances: 1,
-        part: Part::Board,
+        of: InstanceOf::Vehicle,
         read: rail_v,
         ..BATTERY
     },
     Check {
         name: "rail_5v_high",
-        unit: "V",
+        unit: Unit::of("V"),
         side: Side::Above,
         warn: Some(Param::RailHighWarn),
         critical: None,
         hysteresis: 0.05,
-        debounce_warn: Span::from_secs(1),
-        stale_after: STALE,
+        debounce_warn: Debounce::secs(1),
+        stale_s: STALE,
         instances: 1,
-        part: Part::Board,
+        of: InstanceOf::Vehicle,
         read: rail_v,
         ..BATTERY
     },

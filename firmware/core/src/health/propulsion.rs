@@ -1,6 +1,6 @@
 //! Motors, ESCs and propellers.
 
-use super::check::{Check, Part, Side, When};
+use super::check::{Check, Debounce, InstanceOf, Side, Unit, When};
 use super::common::{STALE_SLOW, alert, departure, due, heavier, takes_more};
 use super::finding::Subsystem;
 use super::inputs::Inputs;
@@ -11,54 +11,53 @@ use crate::observation::MOTORS_MAX;
 use crate::outputs::JUDGED_MAX;
 use crate::params::Param;
 use crate::residual::Comparison;
-use crate::time::Span;
 use crate::vehicle::Motor;
 
 const ESC: Check = Check {
     name: "esc_silent",
     subsystem: Subsystem::Propulsion,
-    unit: "s",
+    unit: Unit::of("s"),
     side: Side::Above,
     warn: Some(Param::EscAgeWarn),
     critical: Some(Param::EscAgeCrit),
     hysteresis: 0.0,
-    debounce_warn: Span::ZERO,
-    debounce_critical: Span::ZERO,
+    debounce_warn: Debounce::NONE,
+    debounce_critical: Debounce::NONE,
     when: When::Armed,
-    stale_after: None,
+    stale_s: None,
     instances: MOTORS_MAX as u8,
     alarm_only: false,
     is_flag: false,
-    part: Part::Motor,
+    of: InstanceOf::Motor,
     read: |inputs, motor| inputs.derived.esc_silence(inputs.now, motor),
 };
 
 /// A body rate that does not become what is wanted.
 const RATE: Check = Check {
-    unit: "deg/s",
+    unit: Unit::of("deg/s"),
     warn: Some(Param::RateWarn),
     critical: Some(Param::RateCrit),
     hysteresis: 5.0,
-    debounce_warn: Span::from_millis(200),
-    debounce_critical: Span::from_millis(200),
+    debounce_warn: Debounce::millis(200),
+    debounce_critical: Debounce::millis(200),
     when: When::InFlight,
     instances: 1,
-    part: Part::Vehicle,
+    of: InstanceOf::Vehicle,
     ..ESC
 };
 
 /// Against the airframe's own past.
 const TREND: Check = Check {
     name: "throttle_trend",
-    unit: "%",
+    unit: Unit::of("%"),
     warn: Some(Param::TrdThrWarn),
     critical: Some(Param::TrdThrCrit),
     hysteresis: 2.0,
-    debounce_warn: Span::from_secs(10),
-    debounce_critical: Span::from_secs(10),
+    debounce_warn: Debounce::secs(10),
+    debounce_critical: Debounce::secs(10),
     when: When::InFlight,
     instances: 1,
-    part: Part::Past,
+    of: InstanceOf::Vehicle,
     read: |inputs, _| takes_more(inputs, Quantity::HoverThrottle),
     ..ESC
 };
@@ -67,24 +66,24 @@ pub(super) const CHECKS: &[Check] = &[
     ESC,
     Check {
         name: "esc_temperature",
-        unit: "degC",
+        unit: Unit::of("degC"),
         warn: Some(Param::EscTempWarn),
         critical: Some(Param::EscTempCrit),
         hysteresis: 3.0,
-        debounce_warn: Span::from_secs(1),
-        debounce_critical: Span::from_millis(500),
+        debounce_warn: Debounce::secs(1),
+        debounce_critical: Debounce::millis(500),
         when: When::Always,
-        stale_after: STALE_SLOW,
+        stale_s: STALE_SLOW,
         read: temperature_c,
         ..ESC
     },
     Check {
         name: "esc_failure",
         is_flag: true,
-        unit: "",
+        unit: Unit::of(""),
         warn: Some(Param::EscFailWarn),
         critical: Some(Param::EscFailCrit),
-        stale_after: STALE_SLOW,
+        stale_s: STALE_SLOW,
         when: When::Always,
         alarm_only: true,
         read: failure_rank,
@@ -92,23 +91,23 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         name: "esc_errors",
-        unit: "1/min",
+        unit: Unit::of("1/min"),
         warn: Some(Param::EscErrWarn),
         critical: None,
         hysteresis: 2.0,
-        debounce_warn: Span::from_secs(1),
-        stale_after: STALE_SLOW,
+        debounce_warn: Debounce::secs(1),
+        stale_s: STALE_SLOW,
         read: errors_per_minute,
         ..ESC
     },
     Check {
         name: "motor_loss",
-        unit: "%",
+        unit: Unit::of("%"),
         side: Side::Below,
         warn: None,
         critical: Some(Param::MotLossCrit),
         hysteresis: 5.0,
-        debounce_critical: Span::from_millis(500),
+        debounce_critical: Debounce::millis(500),
         when: When::InFlight,
         read: |inputs, motor| {
             let Inputs { now, vehicle, derived, .. } = *inputs;
@@ -120,12 +119,12 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         name: "motor_imbalance",
-        unit: "%",
+        unit: Unit::of("%"),
         warn: Some(Param::MotImbalWarn),
         critical: Some(Param::MotImbalCrit),
         hysteresis: 2.0,
-        debounce_warn: Span::from_secs(3),
-        debounce_critical: Span::from_secs(1),
+        debounce_warn: Debounce::secs(3),
+        debounce_critical: Debounce::secs(1),
         when: When::InFlight,
         // Never stale: only steady flight says something, and ESCs that stop talking are `esc_silent`.
         read: |inputs, motor| {
@@ -137,27 +136,27 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         name: "motor_output",
-        unit: "%",
+        unit: Unit::of("%"),
         warn: Some(Param::MotOutWarn),
         critical: Some(Param::MotOutCrit),
         hysteresis: 5.0,
-        debounce_warn: Span::from_millis(500),
-        debounce_critical: Span::from_secs(1),
+        debounce_warn: Debounce::millis(500),
+        debounce_critical: Debounce::secs(1),
         when: When::InFlight,
         instances: JUDGED_MAX as u8,
-        part: Part::Output,
+        of: InstanceOf::Output,
         read: |inputs, motor| inputs.derived.outputs().excess(inputs.now, inputs.vehicle, motor),
         ..ESC
     },
     Check {
         name: "thrust_lost",
-        unit: "s",
+        unit: Unit::of("s"),
         warn: Some(Param::ThrustWarn),
         critical: None,
         hysteresis: 0.0,
         when: When::InFlight,
         instances: 1,
-        part: Part::Vehicle,
+        of: InstanceOf::Vehicle,
         read: |inputs, _| inputs.derived.crosschecks().full_in_vain(),
         ..ESC
     },

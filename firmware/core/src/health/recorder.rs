@@ -1,30 +1,29 @@
 //! Our own recording: a black box that stopped unnoticed is the failure that pilots report most.
 
-use super::check::{Check, Part, Side, When};
+use super::check::{Check, Debounce, InstanceOf, Side, Unit, When};
 use super::common::due;
 use super::finding::Subsystem;
 use super::inputs::Inputs;
 use crate::latest::Reading;
 use crate::params::Param;
 use crate::status::Recording;
-use crate::time::Span;
 
 const STATE: Check = Check {
     name: "recording",
     subsystem: Subsystem::Recorder,
-    unit: "",
+    unit: Unit::of(""),
     side: Side::Above,
     warn: Some(Param::RecStopWarn),
     critical: Some(Param::RecStopCrit),
     hysteresis: 0.0,
-    debounce_warn: Span::from_secs(1),
-    debounce_critical: Span::from_secs(1),
+    debounce_warn: Debounce::secs(1),
+    debounce_critical: Debounce::secs(1),
     when: When::Always,
-    stale_after: None,
+    stale_s: None,
     instances: 1,
     alarm_only: false,
     is_flag: false,
-    part: Part::Vehicle,
+    of: InstanceOf::Vehicle,
     read: stopped_rank,
 };
 
@@ -32,31 +31,31 @@ pub(super) const CHECKS: &[Check] = &[
     Check { is_flag: true, ..STATE },
     Check {
         name: "record_queue",
-        unit: "%",
+        unit: Unit::of("%"),
         warn: Some(Param::RecQueueWarn),
         critical: Some(Param::RecQueueCrit),
         hysteresis: 10.0,
-        debounce_warn: Span::ZERO,
-        debounce_critical: Span::ZERO,
+        debounce_warn: Debounce::NONE,
+        debounce_critical: Debounce::NONE,
         read: |inputs, _| Some(Reading { at: inputs.now, value: inputs.recorder.queue * 100.0 }),
         ..STATE
     },
     Check {
         name: "record_lost",
-        unit: "frames",
+        unit: Unit::of("frames"),
         warn: Some(Param::RecLostWarn),
         critical: None,
-        debounce_warn: Span::ZERO,
+        debounce_warn: Debounce::NONE,
         read: |inputs, _| Some(Reading { at: inputs.now, value: inputs.derived.frames_lost_lately() }),
         ..STATE
     },
     Check {
         name: "card_stall",
-        unit: "ms",
+        unit: Unit::of("ms"),
         warn: Some(Param::RecStallWarn),
         critical: Some(Param::RecStallCrit),
-        debounce_warn: Span::ZERO,
-        debounce_critical: Span::ZERO,
+        debounce_warn: Debounce::NONE,
+        debounce_critical: Debounce::NONE,
         read: |inputs, _| Some(Reading { at: inputs.now, value: inputs.recorder.stall.as_millis() as f32 }),
         ..STATE
     },
@@ -64,13 +63,13 @@ pub(super) const CHECKS: &[Check] = &[
         name: "card_errors",
         warn: Some(Param::RecErrWarn),
         critical: None,
-        debounce_warn: Span::ZERO,
+        debounce_warn: Debounce::NONE,
         read: |inputs, _| Some(Reading { at: inputs.now, value: inputs.derived.write_errors_lately() }),
         ..STATE
     },
     Check {
         name: "card_room",
-        unit: "%",
+        unit: Unit::of("%"),
         side: Side::Below,
         warn: Some(Param::RecRoomWarn),
         critical: Some(Param::RecRoomCrit),

@@ -1,6 +1,6 @@
 //! Vibration, clipping and load factor.
 
-use super::check::{Check, Part, Side, When};
+use super::check::{Check, Debounce, InstanceOf, Side, Unit, When};
 use super::common::{STALE, alert, departure, due, px4_metric};
 use super::finding::Subsystem;
 use super::inputs::Inputs;
@@ -9,24 +9,23 @@ use crate::cause::Cause;
 use crate::latest::Reading;
 use crate::observation::VibrationScale;
 use crate::params::Param;
-use crate::time::Span;
 
 const VIBRATION: Check = Check {
     name: "vibration",
     subsystem: Subsystem::Structure,
-    unit: "m/s2",
+    unit: Unit::of("m/s2"),
     side: Side::Above,
     warn: Some(Param::VibeWarn),
     critical: Some(Param::VibeCrit),
     hysteresis: 3.0,
-    debounce_warn: Span::from_secs(1),
-    debounce_critical: Span::from_secs(1),
+    debounce_warn: Debounce::secs(1),
+    debounce_critical: Debounce::secs(1),
     when: When::Armed,
-    stale_after: STALE,
+    stale_s: STALE,
     instances: 1,
     alarm_only: false,
     is_flag: false,
-    part: Part::Vibration,
+    of: InstanceOf::Vehicle,
     read: per_axis,
 };
 
@@ -42,58 +41,58 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         name: "vibration_rise",
-        unit: "times",
+        unit: Unit::of("times"),
         warn: Some(Param::VibeRiseWarn),
         critical: None,
         hysteresis: 0.5,
         // Two messages at 5 Hz.
-        debounce_warn: Span::from_millis(200),
+        debounce_warn: Debounce::millis(200),
         when: When::InFlight,
         // Never stale: only what flies on rotors says something.
-        stale_after: None,
+        stale_s: None,
         read: |inputs, _| inputs.derived.crosschecks().vibration_rise(inputs.now, inputs.vehicle),
         ..VIBRATION
     },
     Check {
         name: "clipping",
-        unit: "",
+        unit: Unit::of(""),
         warn: Some(Param::ClipWarn),
         critical: Some(Param::ClipCrit),
         hysteresis: 0.0,
-        debounce_warn: Span::ZERO,
-        debounce_critical: Span::ZERO,
+        debounce_warn: Debounce::NONE,
+        debounce_critical: Debounce::NONE,
         when: When::InFlight,
         read: |inputs, _| inputs.derived.clips(inputs.vehicle),
         ..VIBRATION
     },
     Check {
         name: "load_factor",
-        unit: "g",
+        unit: Unit::of("g"),
         warn: Some(Param::LoadFacWarn),
         critical: Some(Param::LoadFacCrit),
         hysteresis: 0.2,
         // What lasts is a manoeuvre; a shock or vibration does not, and an impact is a mishap.
-        debounce_warn: Span::from_millis(500),
-        debounce_critical: Span::from_millis(500),
+        debounce_warn: Debounce::millis(500),
+        debounce_critical: Debounce::millis(500),
         when: When::InFlight,
         // Never stale: what shakes has none.
-        stale_after: None,
-        part: Part::Vehicle,
+        stale_s: None,
+        of: InstanceOf::Vehicle,
         read: |inputs, _| inputs.derived.load_factor(),
         ..VIBRATION
     },
     Check {
         name: "vibration_trend",
-        unit: "%",
+        unit: Unit::of("%"),
         warn: Some(Param::TrdVibeWarn),
         critical: Some(Param::TrdVibeCrit),
         hysteresis: 5.0,
-        debounce_warn: Span::from_secs(10),
-        debounce_critical: Span::from_secs(10),
+        debounce_warn: Debounce::secs(10),
+        debounce_critical: Debounce::secs(10),
         when: When::InFlight,
         // A trend holds until the next figure.
-        stale_after: None,
-        part: Part::Past,
+        stale_s: None,
+        of: InstanceOf::Vehicle,
         read: |inputs, _| departure(inputs, Quantity::Vibration),
         ..VIBRATION
     },

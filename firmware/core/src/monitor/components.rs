@@ -73,6 +73,5 @@ impl Monitor {
             Kind::None | Kind::Card | Kind::Engine | Kind::Other => return,
         }
         self.saving.hurry(ItemKey::Baselines);
-        self.health.look_again();
     }
 }

@@ -53,7 +53,6 @@ impl Monitor {
     /// Takes an item that was saved in an earlier session; to be called before the first tick, and for
     /// [`ItemKey::Session`] once and last. One that cannot be read is as if there were none.
     pub fn restore(&mut self, key: ItemKey, stored: &[u8]) -> Result<(), Unreadable> {
-        self.health.look_again();
         match key {
             ItemKey::Lifetime => {
                 self.before = Lifetime::decode(stored)?;

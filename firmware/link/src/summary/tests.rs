@@ -115,7 +115,7 @@ fn a_finding_is_told_in_the_words_of_a_pilot_and_fits() {
 fn a_value_says_what_it_is_of_or_is_not_told() {
     let told = |check, value, level| {
         let check = health::check_named(check).expect("a check");
-        text(&Finding { unit: check.unit, value, ..of(check.name, level) }).as_str().to_owned()
+        text(&Finding { unit: check.unit.name(), value, ..of(check.name, level) }).as_str().to_owned()
     };
     let (warning, critical) = (Level::Warning, Level::Critical);
     for (check, value, level, text) in [
@@ -137,7 +137,10 @@ fn a_value_says_what_it_is_of_or_is_not_told() {
     ] {
         assert_eq!(told(check, value, level), format!("HUMS: {text}"));
     }
-    assert!(health::checks().all(|check| !check.is_flag || check.unit.is_empty()), "a state is no quantity");
+    assert!(
+        health::checks().all(|check| !check.is_flag || check.unit.name().is_empty()),
+        "a state is no quantity"
+    );
 }
 
 #[test]
@@ -150,17 +153,17 @@ fn no_text_is_cut_whatever_part_and_level() {
             let feeds = if check.subsystem == Subsystem::Power { feeds } else { Feeds::Unsaid };
             let finding = Finding {
                 instance: check.instances - 1,
-                unit: check.unit,
+                unit: check.unit.name(),
                 value: -234.5,
                 feeds,
                 ..of(check.name, level)
             };
             let told = text(&finding);
             let told = told.as_str();
-            let around = health::said(check.name).and_then(|said| said.around_value(check.unit));
+            let around = health::said(check.name).and_then(|said| said.around_value(check.unit.name()));
             let value =
                 around.filter(|_| feeds != Feeds::Avionics).map_or_else(String::new, |(before, after)| {
-                    format!(": {before}{}{after}", quantity(finding.value, check.unit).as_str())
+                    format!(": {before}{}{after}", quantity(finding.value, check.unit.name()).as_str())
                 });
             let end = match level {
                 Level::Critical => advice,

@@ -5,19 +5,19 @@ use super::*;
 const CHECK: Check = Check {
     name: "tilt",
     subsystem: Subsystem::Attitude,
-    unit: "deg",
+    unit: Unit::of("deg"),
     side: Side::Above,
     warn: Some(Param::TiltWarn),
     critical: Some(Param::TiltCrit),
     hysteresis: 5.0,
-    debounce_warn: Span::from_millis(500),
-    debounce_critical: Span::from_millis(200),
+    debounce_warn: Debounce::millis(500),
+    debounce_critical: Debounce::millis(200),
     when: When::Always,
-    stale_after: Some(Span::from_secs(1)),
+    stale_s: NonZeroU8::new(1),
     instances: 1,
     alarm_only: false,
     is_flag: false,
-    part: Part::Vehicle,
+    of: InstanceOf::Vehicle,
     read: |_, _| None,
 };
 
@@ -190,7 +190,7 @@ fn a_value_that_came_after_the_step_began_is_fresh() {
 
 #[test]
 fn a_check_without_a_warning_limit_never_warns() {
-    let check = Check { warn: None, debounce_critical: Span::from_secs(60), ..CHECK };
+    let check = Check { warn: None, debounce_critical: Debounce::secs(60), ..CHECK };
     let changes = run(&check, &[(1_000, 10.0), (62_000, 70.0)]);
     assert_eq!(changes, [(61_000, Level::Critical)]);
 }
@@ -237,25 +237,25 @@ fn hold(check: &Check, samples: &[(u64, f32)], until_ms: u64) -> Vec<(u64, Level
 #[test]
 fn one_message_of_nonsense_is_never_an_alarm_however_long_it_is_held() {
     // BATTERY_STATUS comes every 2.5 s over a radio.
-    let slow = Check { stale_after: Some(Span::from_secs(12)), ..CHECK };
+    let slow = Check { stale_s: NonZeroU8::new(12), ..CHECK };
     assert_eq!(hold(&slow, &[(0, 10.0), (2_500, 170.0), (5_000, 10.0)], 10_000), []);
     assert_eq!(hold(&slow, &[(0, 10.0), (2_500, 170.0)], 14_000), [], "nor is the last one");
     let twice = [(0, 10.0), (2_500, 170.0), (5_000, 170.0), (7_500, 10.0)];
     assert_eq!(hold(&slow, &twice, 12_000), [(5_000, Level::Critical), (9_500, Level::Ok)]);
-    let no_debounce = Check { debounce_critical: Span::ZERO, debounce_warn: Span::ZERO, ..slow };
+    let no_debounce = Check { debounce_critical: Debounce::NONE, debounce_warn: Debounce::NONE, ..slow };
     assert_eq!(hold(&no_debounce, &twice, 7_500), [(5_000, Level::Critical)]);
 }
 
 #[test]
 fn a_critical_value_needs_two_samples_of_its_own() {
-    let slow = Check { stale_after: Some(Span::from_secs(12)), ..CHECK };
+    let slow = Check { stale_s: NonZeroU8::new(12), ..CHECK };
     let samples = [(0, 50.0), (1_000, 50.0), (2_000, 70.0), (3_000, 50.0), (4_000, 70.0), (5_000, 70.0)];
     assert_eq!(hold(&slow, &samples, 6_000), [(1_000, Level::Warning), (5_000, Level::Critical)]);
 }
 
 #[test]
 fn two_bad_measurements_in_a_row_count_although_the_value_grew_stale_between_them() {
-    let sparse = Check { stale_after: Some(Span::from_secs(5)), ..CHECK };
+    let sparse = Check { stale_s: NonZeroU8::new(5), ..CHECK };
     let levels = hold(&sparse, &[(0, 10.0), (20_000, 170.0), (40_000, 170.0)], 42_000);
     assert_eq!(levels.last(), Some(&(40_200, Level::Critical)), "{levels:?}");
 }

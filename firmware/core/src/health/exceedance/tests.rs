@@ -4,7 +4,7 @@ use super::*;
 use crate::health::{Orders, Subsystem};
 use crate::observation::Feeds;
 
-const TILT: u8 = 3;
+const TILT: u16 = 3;
 
 fn finding(at_ms: u64, previous: Level, level: Level, value: f32) -> Finding {
     Finding {
@@ -170,8 +170,8 @@ const ROLL: [u8; 22] = [
     0, 0, 0x8D, 0x42, // 70.5
 ];
 
-fn place(name: &str) -> u8 {
-    checks().position(|check| check.name == name).expect(name) as u8
+fn place(name: &str) -> u16 {
+    checks().position(|check| check.name == name).expect(name) as u16
 }
 
 /// The stored form with no place left: checks that were critical once, from the first check on.
