@@ -5,7 +5,7 @@
 
 use hums_core::clock::{Instant, Span};
 use hums_recorder::recorder::Written;
-use hums_recorder::{CardDevice, CardStatus, HeldBlocks, Recorder};
+use hums_recorder::{Buffers, CardDevice, CardStatus, Recorder};
 
 use crate::queues::SectorsOut;
 use crate::shelf::Server;
@@ -37,19 +37,16 @@ impl Service {
 /// The recorder with its queue's other side.
 pub struct Storage<'a, D: CardDevice> {
     recorder: Recorder<'a, D>,
-    status: &'a CardStatus,
 }
 
 impl<'a, D: CardDevice> Storage<'a, D> {
     /// For the card in `device`; see [`Recorder::new`].
-    pub const fn new(device: D, status: &'a CardStatus, held: &'a HeldBlocks, entropy: u32) -> Self {
-        Self { recorder: Recorder::new(device, status, held, entropy), status }
+    pub const fn new(device: D, status: &'a CardStatus, held: &'a Buffers, entropy: u32) -> Self {
+        Self { recorder: Recorder::new(device, status, held, entropy) }
     }
 
-    /// Writes what waits with at most one command. The caller tells [`CardStatus::end_service`] afterwards how long it
-    /// took.
+    /// Writes what waits with at most one command.
     pub fn service(&mut self, now: Instant, sectors: &mut SectorsOut) -> Service {
-        self.status.begin_service(now);
         if self.recorder.format(now) {
             return Service::Wrote;
         }

@@ -1,24 +1,25 @@
-//! The log segments of one card, through `embedded-sdmmc`: find, make, overwrite, write in place.
+//! The log segments of one card: find, make, overwrite, write in place.
+//!
+//! Power may go at each single block write. A new segment's FAT is written first and its directory entry last: a cut in between
+//! leaves clusters that no file has, and nothing else. All other changes of the file system are one block write.
 
 use core::ops::ControlFlow;
 
-use embedded_sdmmc::{
-    Block, BlockDevice, BlockIdx, Mode, RawDirectory, RawVolume, ShortFileName, TimeSource as _, VolumeIdx,
-    VolumeManager,
-};
+use embedded_sdmmc::Block;
 
+use crate::CardDevice;
 pub use crate::card_error::CardError;
-use crate::chain::Chain;
-use crate::gate::{Gate, GateError, HeldBlocks};
+use crate::chain::ClusterChain;
+use crate::directory::{
+    ARCHIVE, ATTRIBUTES, BLOCK_ENTRIES, CLUSTER_HIGH, CLUSTER_LOW, Directory, ENTRY_BYTES, Entry, HIDDEN,
+    LENGTH, MADE, Newest, Slot, VERIFY_BLOCKS, WRITTEN, clusters_of, walk,
+};
+use crate::free::{FreeSearch, chain_free, write_hint};
 use crate::layout::{Layout, LayoutError};
-use crate::name::{EXTENSION, LogName};
-use crate::room::{Room, chain_free};
-use crate::status::{CardStatus, Counted, FatClock};
-
-type Manager<'a, D> = VolumeManager<Gate<'a, D>, FatClock<'a>, 1, 1, 1>;
-
-/// Directory blocks that a root directory may have before it counts as going in circles: 64 K entries.
-const DIRECTORY_BLOCKS_MAX: u32 = 4_096;
+use crate::name::LogName;
+use crate::recorder::Buffers;
+use crate::status::{CardStatus, Counted};
+use crate::volume::Volume;
 
 /// Bytes of a segment on a card with room for many: an hour of a busy vehicle.
 pub const SEGMENT_BYTES_MAX: u32 = 8 * 1024 * 1024;
@@ -26,19 +27,25 @@ pub const SEGMENT_BYTES_MAX: u32 = 8 * 1024 * 1024;
 /// Blocks of 512 bytes.
 const BLOCKS_PER_MIB: u64 = 2_048;
 
-/// The attributes of a file that lists do not show, and of one that was written since a backup.
-const HIDDEN: u8 = 2;
-const ARCHIVE: u8 = 32;
+/// Logs without their clusters that are passed by for one that can be overwritten: each takes looks at the FAT.
+const UNCHAINED_MAX: usize = 8;
 
-/// A directory entry's bytes, and where in it stand the attributes, when it was made (time and date), when it was written, its first
-/// cluster's upper and lower half, and the file's length.
-const ENTRY_BYTES: usize = 32;
-const ATTRIBUTES: usize = LogName::SHORT_BYTES;
-const MADE: usize = 14;
-const WRITTEN: usize = 22;
-const CLUSTER_HIGH: usize = 20;
-const CLUSTER_LOW: usize = 26;
-const LENGTH: usize = 28;
+/// Where logs have all of the card but one part of so many, the oldest one is overwritten before all of the FAT was searched.
+const UNSEARCHED: u32 = 64;
+
+/// The place of a directory entry.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Place {
+    block: u32,
+    offset: u16,
+}
+
+impl Place {
+    /// Of the entry with this index in the directory, in this block of the card.
+    pub(crate) const fn of(block: u32, index: u32) -> Self {
+        Self { block, offset: (index % BLOCK_ENTRIES) as u16 * ENTRY_BYTES as u16 }
+    }
+}
 
 /// One log segment in the card's root directory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -47,10 +54,12 @@ pub struct LogEntry {
     pub name: LogName,
     /// The file's length in bytes: what is allocated, not what is written.
     pub bytes: u32,
-    /// It was erased over a link ([`Card::hide`]): not offered any longer, and there until its room is wanted.
+    /// It was erased over a link ([`Card::hide_logs`]): not offered any longer, and there until its room is wanted.
     pub hidden: bool,
-    block: BlockIdx,
-    offset: u32,
+    /// When it was written, in seconds since 1970 UTC; 0: not known.
+    pub utc_secs: u32,
+    pub(crate) first: u32,
+    pub(crate) place: Place,
 }
 
 /// A segment's place on the card, for reading it and writing it in place. Good until the card is unmounted or the
@@ -61,10 +70,21 @@ pub struct Segment {
     pub name: LogName,
     /// The file's length in bytes.
     pub bytes: u32,
-    chain: Chain,
+    chain: ClusterChain,
+    place: Place,
 }
 
 impl Segment {
+    /// The segment of a directory entry.
+    pub const fn of(entry: &LogEntry) -> Self {
+        Self {
+            name: entry.name,
+            bytes: entry.bytes,
+            chain: ClusterChain::new(entry.first),
+            place: entry.place,
+        }
+    }
+
     /// How many whole blocks it has.
     pub const fn blocks(&self) -> u32 {
         self.bytes / Block::LEN_U32
@@ -72,261 +92,333 @@ impl Segment {
 }
 
 /// A card whose first partition is FAT32, with at most one segment open.
-pub struct Card<'a, D: BlockDevice> {
-    /// `None` only while the volume is being opened anew.
-    manager: Option<Manager<'a, D>>,
-    volume: RawVolume,
-    root: RawDirectory,
-    layout: Layout,
-    clock: FatClock<'a>,
-    held: &'a HeldBlocks,
+pub struct Card<'a, D> {
+    volume: Volume<'a, D>,
+    directory: Directory,
+    free: FreeSearch,
+    status: &'a CardStatus,
+    buffers: &'a Buffers,
     open: Option<Segment>,
-    room: Room,
 }
 
-impl<'a, D: BlockDevice> Card<'a, D> {
+impl<'a, D: CardDevice> Card<'a, D> {
     /// Checks and opens a card. On failure the device comes back with the reason.
     pub fn mount(
         device: D,
         status: &'a CardStatus,
-        held: &'a HeldBlocks,
+        buffers: &'a Buffers,
     ) -> Result<Self, (D, CardError<D::Error>)> {
         let layout = match Layout::read(&device) {
             Ok(layout) => layout,
             Err(LayoutError::Device(error)) => return Err((device, CardError::Device(error))),
             Err(why) => return Err((device, CardError::Foreign(why))),
         };
-        let clock = FatClock(status);
-        let manager = VolumeManager::new_with_limits(Gate::new(device, layout, held, 0), clock, 1);
-        match Self::open_root(&manager) {
-            Ok((volume, root)) => Ok(Self {
-                manager: Some(manager),
-                volume,
-                root,
-                layout,
-                clock,
-                held,
-                open: None,
-                room: Room::new(),
-            }),
-            Err(error) => Err((manager.free().0.into_device(), error)),
+        let volume = Volume::new(device, status, layout);
+        let free = match FreeSearch::new(&volume) {
+            Ok(free) => free,
+            Err(error) => return Err((volume.into_device(), error)),
+        };
+        let directory = Directory::new(layout.root);
+        let mut card = Self { volume, directory, free, status, buffers, open: None };
+        match card.begin() {
+            Ok(()) => Ok(card),
+            Err(error) => Err((card.unmount(), error)),
         }
     }
 
-    fn open_root(manager: &Manager<'a, D>) -> Result<(RawVolume, RawDirectory), CardError<D::Error>> {
-        manager.device(|gate| gate.allow_reads(DIRECTORY_BLOCKS_MAX));
-        let volume = manager.open_raw_volume(VolumeIdx(0))?;
-        let root = manager.open_root_dir(volume)?;
-        Ok((volume, root))
+    /// Walks over the directory. Where the information sector names no free cluster, those behind all logs are looked at first.
+    fn begin(&mut self) -> Result<(), CardError<D::Error>> {
+        self.learn(self.free.next(), None)?;
+        self.free.begin(&self.volume, self.directory.claimed_end())
     }
 
     /// Gives the device back.
-    pub(crate) fn unmount(self) -> Option<D> {
-        self.manager.map(|manager| manager.free().0.into_device())
+    pub(crate) fn unmount(self) -> D {
+        self.volume.into_device()
     }
 
     /// The device, for what is no matter of files.
-    pub fn device<T>(&self, act: impl FnOnce(&D) -> T) -> Option<T> {
-        self.manager.as_ref().map(|manager| manager.device(|gate| act(gate.device())))
+    pub const fn device(&self) -> &D {
+        self.volume.device()
     }
 
     /// The card's layout.
     pub const fn layout(&self) -> &Layout {
-        &self.layout
+        &self.volume.layout
     }
 
-    fn manager(&self) -> Result<&Manager<'a, D>, CardError<D::Error>> {
-        let manager = self.manager.as_ref().ok_or(CardError::Damaged)?;
-        // Any one operation may walk the FAT twice and the directory once.
-        let reads = self.layout.fat_blocks.saturating_mul(2).saturating_add(DIRECTORY_BLOCKS_MAX);
-        manager.device(|gate| gate.allow_reads(reads));
-        Ok(manager)
-    }
-
-    /// Opens the volume anew, because the library remembers blocks that were changed or dropped behind its back. From cluster
-    /// `free_from` on are free ones; 0: as the card says.
-    fn reopen(&mut self, free_from: u32) -> Result<(), CardError<D::Error>> {
-        self.open = None;
-        let manager = self.manager.take().ok_or(CardError::Damaged)?;
-        let device = manager.free().0.into_device();
-        let gate = Gate::new(device, self.layout, self.held, free_from);
-        let manager = VolumeManager::new_with_limits(gate, self.clock, 1);
-        let opened = Self::open_root(&manager);
-        self.manager = Some(manager);
-        (self.volume, self.root) = opened?;
-        Ok(())
+    /// Walks over the directory; whether what logs claim of the FAT from this block on was chained again.
+    fn learn(&mut self, verify: u32, of: Option<u32>) -> Result<bool, CardError<D::Error>> {
+        let mut parity = self.buffers.parity.borrow_mut();
+        self.directory.learn(&self.volume, parity.lend(), verify, of)
     }
 
     /// Calls `each` for every log segment of the root directory, in directory order.
     pub fn logs(&self, mut each: impl FnMut(LogEntry)) -> Result<(), CardError<D::Error>> {
-        self.manager()?.iterate_dir(self.root, |entry| {
-            let name = LogName::from_short(entry.name.base_name(), entry.name.extension());
-            if let Some(name) = name.filter(|_| !entry.attributes.is_directory()) {
-                let (block, offset) = (entry.entry_block, entry.entry_offset);
-                let hidden = entry.attributes.is_hidden();
-                each(LogEntry { name, bytes: entry.size, hidden, block, offset });
+        self.walk(0, &mut |slot| {
+            if let Some(entry) = slot.log().filter(|entry| entry.bytes > 0) {
+                each(entry);
             }
             ControlFlow::Continue(())
         })?;
         Ok(())
     }
 
-    /// The newest name of a log that the root directory has, also where it is that of a folder.
-    pub(crate) fn newest_name(&self) -> Result<Option<LogName>, CardError<D::Error>> {
-        let mut newest = None;
-        self.manager()?.iterate_dir(self.root, |entry| {
-            newest = newest.max(LogName::from_short(entry.name.base_name(), entry.name.extension()));
-            ControlFlow::Continue(())
+    /// Shows `each` the directory's entries from this one on; the entry after that at which it broke off.
+    #[inline(never)]
+    fn walk(
+        &self,
+        from: u32,
+        each: &mut dyn FnMut(&Slot<'_>) -> ControlFlow<()>,
+    ) -> Result<u32, CardError<D::Error>> {
+        let mut chain = ClusterChain::new(self.volume.layout.root);
+        walk(&self.volume, &mut chain, from, &mut [Block::new()], &mut |slot| Ok(each(slot)))
+    }
+
+    /// The log that is not hidden behind so many others, from the directory's entry `from` on, and its own entry there.
+    pub fn shown_behind(
+        &self,
+        from: u32,
+        others: u16,
+    ) -> Result<Option<(u32, LogEntry)>, CardError<D::Error>> {
+        let (mut left, mut found) = (others, None);
+        self.walk(from, &mut |slot| {
+            let Some(entry) = slot.log().filter(|entry| entry.bytes > 0 && !entry.hidden) else {
+                return ControlFlow::Continue(());
+            };
+            if left > 0 {
+                left -= 1;
+                return ControlFlow::Continue(());
+            }
+            found = Some((slot.index, entry));
+            ControlFlow::Break(())
         })?;
-        Ok(newest)
+        Ok(found)
+    }
+
+    /// The log of this name, unless it is hidden.
+    pub fn shown_log(&self, name: LogName) -> Result<Option<LogEntry>, CardError<D::Error>> {
+        Ok(self.find(name)?.filter(|entry| !entry.hidden))
+    }
+
+    fn find(&self, name: LogName) -> Result<Option<LogEntry>, CardError<D::Error>> {
+        let mut found = None;
+        self.walk(0, &mut |slot| {
+            found = slot.log().filter(|entry| entry.name == name && entry.bytes > 0);
+            if found.is_some() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        })?;
+        Ok(found)
+    }
+
+    /// How many logs are not hidden, and a number that changes with their names.
+    pub const fn shown(&self) -> (u16, u32) {
+        (self.directory.shown, self.directory.names)
+    }
+
+    /// The newest logs, the newest first.
+    pub(crate) const fn newest(&self) -> &Newest {
+        &self.directory.newest
+    }
+
+    /// The name from which the numbers of sessions go on, and the first name of the next session; `None` when they are used up.
+    pub(crate) fn next_session(&self) -> (Option<LogName>, Option<LogName>) {
+        self.directory.next_session()
     }
 
     /// Makes a segment of `bytes` (rounded up to whole clusters) and opens it. Its contents are whatever its clusters
     /// held before. At every moment in between, the directory is as before or holds the whole segment.
     pub fn create(&mut self, name: LogName, bytes: u32) -> Result<(), CardError<D::Error>> {
         self.open = None;
-        let mut made = self.allocate(name, bytes);
-        let committed = self.manager()?.device(|gate| {
-            if made.is_ok() {
-                return gate.commit();
-            }
-            if let Some(failure) = gate.take_failure() {
-                made = Err(CardError::Device(failure));
-            }
-            gate.abort();
-            Ok(())
-        });
-        self.reopen(0)?;
-        made?;
-        committed?;
-        self.open(name)
-    }
-
-    fn allocate(&mut self, name: LogName, bytes: u32) -> Result<(), CardError<D::Error>> {
-        let cluster_bytes = self.layout.cluster_blocks * Block::LEN_U32;
-        let clusters = bytes.div_ceil(cluster_bytes).max(1);
+        let wanted = clusters_of(&self.volume, bytes).max(1);
         // A card that logs and the directory fill is not searched.
-        if self.layout.clusters.saturating_sub(self.log_clusters()?).saturating_sub(1) < clusters {
+        let others = self.volume.layout.clusters.saturating_sub(self.directory.clusters).saturating_sub(1);
+        if others < wanted {
             return Err(CardError::Full);
         }
-        let mut room = self.room;
-        let found = self.manager()?.device(|gate| room.find(gate, clusters));
-        self.room = room;
-        let from = found?;
-        self.reopen(from)?;
-        let manager = self.manager()?;
-        manager.device(|gate| gate.begin());
-        // Makes the directory longer where it is full. Only then are the file's clusters taken.
-        let file = manager.open_file_in_dir(self.root, short_name(name)?, Mode::ReadWriteCreate)?;
-        manager.close_file(file)?;
-        let (first, last) = self.manager()?.device(|gate| chain_free(gate, from, clusters))?;
-        let made = self.find(name)?;
-        self.manager()?.device(|gate| {
-            gate.set_hint(last + 1)?;
-            change_entry(gate, &made, |entry| {
-                entry[ATTRIBUTES] |= ARCHIVE;
-                entry[CLUSTER_HIGH..CLUSTER_HIGH + 2].copy_from_slice(&first.to_le_bytes()[2..]);
-                entry[CLUSTER_LOW..CLUSTER_LOW + 2].copy_from_slice(&first.to_le_bytes()[..2]);
-                entry[LENGTH..].copy_from_slice(&(clusters * cluster_bytes).to_le_bytes());
-            })
+        let place = match self.directory.place_for_new(&self.volume)? {
+            Some(place) => place,
+            None => {
+                self.lengthen_directory()?;
+                self.directory.place_for_new(&self.volume)?.ok_or(CardError::Damaged)?
+            }
+        };
+        let (first, last) = match self.take_free(wanted) {
+            // Little can be free, and to search all of the FAT for it takes seconds in which nothing is written.
+            Err(CardError::Searching)
+                if others < self.volume.layout.clusters / UNSEARCHED && !self.device().keeps_logs() =>
+            {
+                return Err(CardError::Full);
+            }
+            found => found?,
+        };
+        write_hint(&self.volume, last + 1)?;
+        let bytes = wanted.saturating_mul(self.volume.layout.cluster_blocks * Block::LEN_U32);
+        let made = LogEntry { name, bytes, hidden: false, utc_secs: 0, first, place };
+        let date = self.status.fat_date();
+        self.change_entry(place, |entry| {
+            *entry = [0; ENTRY_BYTES];
+            entry[..LogName::SHORT_BYTES].copy_from_slice(&name.short());
+            entry[ATTRIBUTES] = ARCHIVE;
+            entry[CLUSTER_HIGH..CLUSTER_HIGH + 2].copy_from_slice(&first.to_le_bytes()[2..]);
+            entry[CLUSTER_LOW..CLUSTER_LOW + 2].copy_from_slice(&first.to_le_bytes()[..2]);
+            entry[LENGTH..].copy_from_slice(&bytes.to_le_bytes());
+            set_date(entry, date);
+            true
         })?;
+        self.directory.take_place();
+        self.directory.add(made, wanted);
+        self.open = Some(Segment::of(&made));
         Ok(())
     }
 
-    /// Whether a segment's clusters are chained to its end: one whose part of the FAT was lost cannot be written anew.
-    pub(crate) fn is_chained(&self, segment: &LogEntry) -> Result<bool, CardError<D::Error>> {
-        let mut segment = self.place(segment)?;
+    /// Finds so many free clusters and makes them a chain; its first and its last one.
+    fn take_free(&mut self, wanted: u32) -> Result<(u32, u32), CardError<D::Error>> {
+        let mut found = self.free.find(&self.volume, wanted)?;
+        // Once for each part of a chain that lies in pieces.
+        let mut verified = found.start;
+        let fat_blocks = self.volume.layout.fat_blocks;
+        while verified < found.end && !self.directory.is_verified(&(verified..found.end), fat_blocks) {
+            if self.learn(verified % fat_blocks, None)? {
+                self.free.again(&found);
+                found = self.free.find(&self.volume, wanted)?;
+                verified = found.start;
+            } else {
+                verified += VERIFY_BLOCKS;
+            }
+        }
+        chain_free(&self.volume, &found, wanted)
+    }
+
+    /// Gives the directory another cluster, of entries that were never used.
+    fn lengthen_directory(&mut self) -> Result<(), CardError<D::Error>> {
+        let last = self.directory.last_cluster();
+        let (cluster, _) = self.take_free(1)?;
+        let (first, blocks) = (self.volume.block_of(cluster), self.volume.layout.cluster_blocks);
+        let mut parity = self.buffers.parity.borrow_mut();
+        let zeros = parity.lend();
+        zeros.iter_mut().for_each(|block| block.contents.fill(0));
+        for at in (0..blocks).step_by(zeros.len()) {
+            let zeros = zeros.get(..(blocks - at) as usize).unwrap_or(zeros);
+            self.volume.write_metadata(zeros, first + at)?;
+        }
+        self.volume.link(last, cluster)
+    }
+
+    /// Whether a segment's clusters are chained to its end: one whose part of the FAT was lost cannot be overwritten.
+    fn is_chained(&self, entry: &LogEntry) -> Result<bool, CardError<D::Error>> {
+        let mut segment = Segment::of(entry);
         let last = segment.blocks().saturating_sub(1);
-        match self.manager()?.device(|gate| segment.chain.locate(gate, last, 1)) {
-            Ok(_) => Ok(true),
-            Err(GateError::Device(error)) => Err(CardError::Device(error)),
-            Err(_) => Ok(false),
+        Ok(segment.chain.locate(&self.volume, last, 1)?.is_some())
+    }
+
+    /// Gives the oldest log the name `name`, and opens it to be written anew. A few whose clusters are no longer chained
+    /// are passed by.
+    pub(crate) fn recycle_oldest(&mut self, name: LogName) -> Result<(), CardError<D::Error>> {
+        let of = self.device().keeps_logs().then_some(name.session);
+        let open = self.open.map(|open| open.name);
+        let (mut unchained, mut is_fresh) = (0, false);
+        loop {
+            if self.directory.oldest.is_empty() || of.is_some() && !is_fresh {
+                if is_fresh || self.directory.clusters == 0 {
+                    return Err(if unchained > 0 { CardError::Damaged } else { CardError::Full });
+                }
+                self.learn(self.free.next(), of)?;
+                is_fresh = true;
+                continue;
+            }
+            let oldest = self.directory.oldest.remove(0);
+            if oldest.name == name || Some(oldest.name) == open {
+                continue;
+            }
+            if self.is_chained(&oldest)? {
+                return self.recycle(&oldest, name);
+            }
+            unchained += 1;
+            if unchained == UNCHAINED_MAX {
+                return Err(CardError::Damaged);
+            }
         }
     }
 
     /// Gives an existing segment a new name, and the date of now, in one block write, and opens it to be written anew.
     pub fn recycle(&mut self, old: &LogEntry, name: LogName) -> Result<(), CardError<D::Error>> {
         self.open = None;
-        let date = self.clock.get_timestamp().serialize_to_fat();
-        self.change_entry(old, |entry| {
+        let date = self.status.fat_date();
+        self.change_entry(old.place, |entry| {
+            let is_same = entry.starts_with(&old.name.short());
             entry[..LogName::SHORT_BYTES].copy_from_slice(&name.short());
             entry[ATTRIBUTES] &= !HIDDEN;
             set_date(entry, date);
+            is_same
         })?;
-        self.open(name)
+        let new = LogEntry { name, hidden: false, ..*old };
+        self.directory.replace(old, new);
+        self.open = Some(Segment::of(&new));
+        Ok(())
     }
 
-    /// Marks a segment as hidden, in one block write: it stays as it is, and the open one stays open.
-    pub fn hide(&mut self, segment: &LogEntry) -> Result<(), CardError<D::Error>> {
-        let open = self.open;
-        self.change_entry(segment, |entry| entry[ATTRIBUTES] |= HIDDEN)?;
-        self.open = open;
-        Ok(())
+    /// Hides the logs of other sessions than this one in the directory's block of entry `from`, in one block write; `false` where the
+    /// directory ends before it. They stay as they are, and the open one stays open.
+    pub fn hide_logs(&mut self, from: u32, except: Option<u32>) -> Result<bool, CardError<D::Error>> {
+        let mut chain = ClusterChain::new(self.volume.layout.root);
+        let Some((at, _)) = chain.locate(&self.volume, from / BLOCK_ENTRIES, 1)? else { return Ok(false) };
+        let mut block = [Block::new()];
+        self.volume.read(&mut block, at)?;
+        let (mut is_changed, mut is_end) = (false, false);
+        for (index, bytes) in (0..).zip(block[0].contents.as_chunks_mut::<ENTRY_BYTES>().0) {
+            is_end |= bytes[0] == 0;
+            let slot = Slot { index, place: Place::of(at, index), bytes };
+            let log = slot.log().filter(|log| !is_end && !log.hidden && log.bytes > 0);
+            if let Some(log) = log.filter(|log| Some(log.name.session) != except) {
+                bytes[ATTRIBUTES] |= HIDDEN;
+                self.directory.hide(log.name);
+                is_changed = true;
+            }
+        }
+        if is_changed {
+            self.volume.write_metadata(&block, at)?;
+        }
+        Ok(!is_end)
     }
 
     /// Gives the open segment the date of now, in one block write. It stays open.
     pub(crate) fn date_open(&mut self) -> Result<(), CardError<D::Error>> {
-        let open = self.open.ok_or(CardError::NotOpen)?;
-        let date = self.clock.get_timestamp().serialize_to_fat();
-        self.change_entry(&self.find(open.name)?, |entry| set_date(entry, date))?;
-        self.open = Some(open);
-        Ok(())
+        let Segment { name, place, .. } = self.open.ok_or(CardError::NotOpen)?;
+        let date = self.status.fat_date();
+        self.change_entry(place, |entry| {
+            set_date(entry, date);
+            entry.starts_with(&name.short())
+        })
     }
 
-    /// Changes name, attributes or dates of a directory entry that is still as it was, at once.
+    /// Changes a directory entry. Where `change` says that the entry is another one, nothing is written.
+    #[inline(never)]
     fn change_entry(
-        &mut self,
-        old: &LogEntry,
-        change: impl FnOnce(&mut [u8; ENTRY_BYTES]),
+        &self,
+        place: Place,
+        change: impl FnOnce(&mut Entry) -> bool,
     ) -> Result<(), CardError<D::Error>> {
-        let changed = self.manager()?.device(|gate| change_entry(gate, old, change));
-        self.reopen(0)?;
-        Ok(changed?)
-    }
-
-    /// A segment's directory entry.
-    fn find(&self, name: LogName) -> Result<LogEntry, CardError<D::Error>> {
-        let mut found = None;
-        self.logs(|entry| found = found.or((entry.name == name).then_some(entry)))?;
-        found.ok_or(CardError::NotFound)
+        let mut block = [Block::new()];
+        self.volume.read(&mut block, place.block)?;
+        let entry = block[0].get_mut(usize::from(place.offset)..).and_then(|entry| entry.first_chunk_mut());
+        if !change(entry.ok_or(CardError::Damaged)?) {
+            return Err(CardError::Damaged);
+        }
+        self.volume.write_metadata(&block, place.block)
     }
 
     /// Finds an existing segment.
     pub fn segment(&self, name: LogName) -> Result<Segment, CardError<D::Error>> {
-        self.place(&self.find(name)?)
+        Ok(Segment::of(&self.find(name)?.ok_or(CardError::NotFound)?))
     }
 
-    fn place(&self, entry: &LogEntry) -> Result<Segment, CardError<D::Error>> {
-        let mut block = [Block::new()];
-        self.manager()?.device(|gate| gate.read(&mut block, entry.block))?;
-        let at = entry.offset as usize;
-        let word =
-            |at: usize| Some(u32::from(u16::from_le_bytes([*block[0].get(at)?, *block[0].get(at + 1)?])));
-        let (Some(high), Some(low)) = (word(at + 20), word(at + 26)) else { return Err(CardError::Damaged) };
-        Ok(Segment {
-            name: entry.name,
-            bytes: entry.bytes,
-            chain: Chain::new((high << 16 | low) & 0x0FFF_FFFF),
-        })
-    }
-
-    /// Finds a file of somebody else's in the root directory, for reading; how long it is.
-    pub fn text(&self, base: &[u8], extension: &[u8]) -> Result<(Segment, u32), CardError<D::Error>> {
-        let mut found = None;
-        self.manager()?.iterate_dir(self.root, |entry| {
-            let is_it = entry.name.base_name() == base && entry.name.extension() == extension;
-            if is_it && !entry.attributes.is_directory() {
-                let (block, offset) = (entry.entry_block, entry.entry_offset);
-                let name = LogName { session: 0, segment: 0 };
-                found = Some(LogEntry { name, bytes: entry.size, hidden: false, block, offset });
-            }
-            ControlFlow::Continue(())
-        })?;
-        let entry = found.ok_or(CardError::NotFound)?;
-        let segment = self.place(&entry)?;
+    /// The file of parameters, `PARAMS.TXT`, for reading; how long it is.
+    pub fn settings(&self) -> Option<(Segment, u32)> {
+        let (first, bytes) = self.directory.settings?;
         // Its last block is read whole.
-        let bytes = entry.bytes.checked_next_multiple_of(Block::LEN_U32).unwrap_or(u32::MAX);
-        Ok((Segment { bytes, ..segment }, entry.bytes))
+        let blocks = bytes.checked_next_multiple_of(Block::LEN_U32).unwrap_or(u32::MAX);
+        let (name, chain) = (LogName { session: 0, segment: 0 }, ClusterChain::new(first));
+        Some((Segment { name, bytes: blocks, chain, place: Place::of(0, 0) }, bytes))
     }
 
     /// Opens an existing segment for writing in place.
@@ -349,16 +441,13 @@ impl<'a, D: BlockDevice> Card<'a, D> {
     /// Writes the first of `blocks` of the open segment in place, as many as lie in a row, with one command. How many
     /// that were: at least one. After an error any of them may have been written.
     pub fn write(&mut self, index: u32, blocks: &[Block]) -> Result<usize, CardError<D::Error>> {
-        let mut open = self.open.filter(|open| index < open.blocks()).ok_or(CardError::NotOpen)?;
-        let blocks_max = (open.blocks() - index) as usize;
-        let written = self.manager()?.device(|gate| {
-            let wanted = blocks.len().min(blocks_max);
-            let (start, in_row) = open.chain.locate(gate, index, wanted as u32)?;
-            let blocks = blocks.get(..wanted.min(in_row as usize)).unwrap_or_default();
-            gate.write_data(blocks, start).map(|()| blocks.len())
-        })?;
-        self.open = Some(open);
-        Ok(written)
+        let open = self.open.as_mut().filter(|open| index < open.blocks()).ok_or(CardError::NotOpen)?;
+        let wanted = blocks.len().min((open.blocks() - index) as usize);
+        let located = open.chain.locate(&self.volume, index, wanted as u32)?;
+        let (start, in_row) = located.ok_or(CardError::Damaged)?;
+        let blocks = blocks.get(..wanted.min(in_row as usize)).unwrap_or_default();
+        self.volume.write(blocks, start)?;
+        Ok(blocks.len())
     }
 
     /// Reads one block of a segment.
@@ -371,22 +460,24 @@ impl<'a, D: BlockDevice> Card<'a, D> {
         if index >= segment.blocks() {
             return Err(CardError::NotFound);
         }
-        let read = self.manager()?.device(|gate| {
-            let (start, _) = segment.chain.locate(gate, index, 1)?;
-            gate.read(core::slice::from_mut(block), start)
-        });
-        Ok(read?)
+        let (start, _) = segment.chain.locate(&self.volume, index, 1)?.ok_or(CardError::Damaged)?;
+        self.volume.read(core::slice::from_mut(block), start)
+    }
+
+    /// Looks a little further for the free clusters of a segment that were not found at once, one block of the FAT at a call.
+    pub(crate) fn search_on(&mut self) -> Result<(), CardError<D::Error>> {
+        match self.free.search_on(&self.volume) {
+            Err(CardError::Searching | CardError::Full) => Ok(()),
+            searched => searched,
+        }
     }
 
     /// Counts a little further how much of the card logs can have, one block of the FAT at a call; how much once all of it is
     /// counted.
     pub(crate) fn count_room(&mut self) -> Result<Option<Counted>, CardError<D::Error>> {
-        let mut room = self.room;
-        let counted = self.manager()?.device(|gate| room.count(gate));
-        self.room = room;
-        let Some(free) = counted? else { return Ok(None) };
-        let Layout { clusters, cluster_blocks, .. } = self.layout;
-        let for_logs = u64::from(free) + u64::from(self.log_clusters()?);
+        let Some(free) = self.free.count(&self.volume)? else { return Ok(None) };
+        let Layout { clusters, cluster_blocks, .. } = self.volume.layout;
+        let for_logs = u64::from(free) + u64::from(self.directory.clusters);
         let mib = |clusters: u32| (u64::from(clusters) * u64::from(cluster_blocks) / BLOCKS_PER_MIB) as u32;
         Ok(Some(Counted {
             permille: (for_logs * 1000 / u64::from(clusters)).min(1000) as u32,
@@ -394,49 +485,11 @@ impl<'a, D: BlockDevice> Card<'a, D> {
             total_mib: mib(clusters),
         }))
     }
-
-    /// So many clusters at least the logs have. None has more than a segment can have, whatever its entry says.
-    fn log_clusters(&self) -> Result<u32, CardError<D::Error>> {
-        let cluster_bytes = self.layout.cluster_blocks * Block::LEN_U32;
-        let mut clusters = 0_u32;
-        self.logs(|entry| {
-            clusters = clusters.saturating_add(entry.bytes.min(SEGMENT_BYTES_MAX).div_ceil(cluster_bytes));
-        })?;
-        Ok(clusters)
-    }
 }
 
-/// Changes a directory entry that is still as it was.
-fn change_entry<D: BlockDevice>(
-    gate: &Gate<'_, D>,
-    old: &LogEntry,
-    change: impl FnOnce(&mut [u8; ENTRY_BYTES]),
-) -> Result<(), GateError<D::Error>> {
-    let mut block = [Block::new()];
-    gate.allow_reads(1);
-    gate.read(&mut block, old.block)?;
-    let entry = block[0].get_mut(old.offset as usize..).and_then(|entry| entry.first_chunk_mut());
-    let entry = entry.ok_or(GateError::Refused)?;
-    if entry.first_chunk() != Some(&old.name.short()) {
-        return Err(GateError::Refused);
-    }
-    change(entry);
-    gate.write(&block, old.block)
-}
-
-/// When it was made and when it was written: the same.
-fn set_date(entry: &mut [u8; ENTRY_BYTES], date: [u8; 4]) {
+/// The dates when the file was made and written: the same.
+fn set_date(entry: &mut Entry, date: [u8; 4]) {
     for at in [MADE, WRITTEN] {
         entry[at..at + 4].copy_from_slice(&date);
     }
-}
-
-fn short_name<E>(name: LogName) -> Result<ShortFileName, CardError<E>> {
-    let short = name.short();
-    let mut text = heapless::String::<12>::new();
-    for byte in &short[..8] {
-        text.push(char::from(*byte)).map_err(|_| CardError::Damaged)?;
-    }
-    text.push('.').and_then(|()| text.push_str(EXTENSION)).map_err(|_| CardError::Damaged)?;
-    ShortFileName::create_from_str(&text).map_err(|_| CardError::Damaged)
 }

@@ -2,9 +2,6 @@
 
 use core::fmt;
 
-use embedded_sdmmc::Error;
-
-use crate::gate::GateError;
 use crate::layout::LayoutError;
 
 /// Why a card operation failed.
@@ -38,29 +35,6 @@ impl<E: fmt::Debug> fmt::Display for CardError<E> {
             Self::Searching => write!(f, "room on the card is still looked for"),
             Self::NotFound => write!(f, "there is no such log"),
             Self::NotOpen => write!(f, "no log is open"),
-        }
-    }
-}
-
-impl<E> From<Error<GateError<E>>> for CardError<E>
-where
-    GateError<E>: core::error::Error,
-{
-    fn from(error: Error<GateError<E>>) -> Self {
-        match error {
-            Error::DeviceError(GateError::Device(error)) => Self::Device(error),
-            Error::NotEnoughSpace | Error::DiskFull => Self::Full,
-            Error::NotFound => Self::NotFound,
-            _ => Self::Damaged,
-        }
-    }
-}
-
-impl<E> From<GateError<E>> for CardError<E> {
-    fn from(error: GateError<E>) -> Self {
-        match error {
-            GateError::Device(error) => Self::Device(error),
-            GateError::Refused | GateError::Runaway => Self::Damaged,
         }
     }
 }

@@ -1,7 +1,7 @@
 //! Where things are on a card: read from its first blocks and checked before anything else looks at the card.
 //!
-//! `embedded-sdmmc` computes with these numbers without checking them; a card is the world's data, so a number that
-//! does not fit is an error here ([`LayoutError`] says which), never an overflow there.
+//! A card is the world's data, so a number that does not fit is an error here ([`LayoutError`] says which), and never an overflow
+//! later.
 //! Source of the layout: Microsoft FAT specification 1.03 (`fatgen103`).
 
 use core::fmt;
@@ -138,11 +138,6 @@ impl Layout {
             root,
             volume_id: u32_at(67),
         })
-    }
-
-    /// Whether a block holds FAT entries.
-    pub(crate) const fn is_fat(&self, block: u32) -> bool {
-        block >= self.fat_start && block < self.data_start
     }
 
     /// Whether a block belongs to a cluster.

@@ -5,39 +5,41 @@
 //!
 //! * A log is a row of *segments*: files that are allocated whole when they are made ([`card::Card::create`]) and
 //!   written in place from then on, one block write a sector, without a directory or FAT update.
-//! * A new segment's FAT blocks are held back and written first, its directory entry last (`gate::Gate`): a cut in
-//!   between leaves unused clusters, nothing else.
+//! * A new segment's FAT blocks are written first, its directory entry last: a cut in between leaves unused clusters,
+//!   nothing else.
 //! * When the card is full the oldest segment is renamed, one block write, and written anew ([`card::Card::recycle`]).
 //!
 //! * What a card loses of a segment is made again from parity, at the segment's end (`hums_blackbox::parity`).
-//! * Sectors that wait together and lie in a row are written with one command (`chain::Chain`).
+//! * Sectors that wait together and lie in a row are written with one command (`chain::ClusterChain`).
+//! * The directory is read once, when a card is mounted (`directory::Directory`): a new segment in flight costs a few blocks.
 //!
 //! [`spi`] is the driver of a real card; the PC's cards are files.
 //!
-//! Nothing on a card may stop the monitor: [`layout::Layout`] is checked before `embedded-sdmmc` sees the card, and
-//! `gate::Gate` checks what it reads of the FAT and bounds how much it may read.
+//! Nothing on a card may stop the monitor: [`layout::Layout`] is checked before anything is computed from it, a number of a cluster
+//! before it is used, and each walk over a chain has an end.
 #![cfg_attr(not(test), no_std)]
 
 pub mod card;
 mod card_error;
 mod chain;
-mod claims;
+mod directory;
 pub mod format;
-mod gate;
+mod free;
 pub mod layout;
 mod name;
 mod parity;
 pub mod recorder;
-mod room;
 pub mod spi;
 pub mod status;
+mod volume;
 
 pub use card::{Card, CardError};
-pub use gate::HeldBlocks;
 pub use name::LogName;
-pub use recorder::{Recorder, Written};
+pub use recorder::{Buffers, Recorder, Written};
 pub use spi::SpiCard;
 pub use status::{CardState, CardStatus};
+
+use hums_core::clock::Instant;
 
 /// What an error of a card means for whoever records on it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -59,6 +61,11 @@ pub trait CardDevice: embedded_sdmmc::BlockDevice {
 
     /// A service begins: all waits until the next call are together to have an end.
     fn begin_service(&self) {}
+
+    /// The time, by which the card's commands are timed.
+    fn now(&self) -> Instant {
+        Instant::ZERO
+    }
 
     /// Accesses that the device itself tried again since the last call.
     fn take_retries(&self) -> u32 {

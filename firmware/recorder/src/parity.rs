@@ -35,9 +35,9 @@ impl Parity {
         }
     }
 
-    /// The room, for blocks of the file system while a segment is made. Then there is nothing to be written until
+    /// The room, for blocks of the directory while a card is mounted or a segment is made. Then there is no parity until
     /// [`Self::begin`].
-    pub(crate) const fn lend(&mut self) -> &mut [Block; PARITY_SECTORS as usize] {
+    pub(crate) const fn lend(&mut self) -> &mut [Block] {
         self.since = None;
         &mut self.blocks
     }

@@ -13,10 +13,13 @@
 
 mod before;
 mod segments;
-mod slot;
+mod socket;
 mod trouble;
 
+use core::cell::RefCell;
+
 use embedded_sdmmc::Block;
+use heapless::Vec;
 use hums_blackbox::parity::{STRETCH_SECTORS, data_blocks, parity_block};
 use hums_blackbox::{GROUP_SECTORS, Sector};
 use hums_core::clock::{Instant, Span};
@@ -24,11 +27,11 @@ use hums_core::clock::{Instant, Span};
 use crate::CardDevice;
 use crate::card::{Card, CardError};
 use crate::format::FormatError;
-use crate::gate::HeldBlocks;
 use crate::name::LogName;
+use crate::parity::Parity;
 use crate::status::{CardState, CardStatus};
 use segments::{Log, NewestCopy, Segments};
-use slot::Slot;
+use socket::Socket;
 use trouble::may_work_elsewhere;
 
 /// How often a missing or failing card is looked for.
@@ -62,11 +65,29 @@ pub struct InWork {
     pub blocks: u32,
 }
 
+/// Blocks of log that are written with one command at most: the gain of more is small, and they take RAM.
+const BATCH_BLOCKS: usize = 8;
+
+/// Room for the sectors that are being written, and for their parity. Lent, because the recorder is moved and this, 12 KiB, would come
+/// along on the firmware's stack.
+#[derive(Default)]
+pub struct Buffers {
+    batch: RefCell<Vec<Block, BATCH_BLOCKS>>,
+    pub(crate) parity: RefCell<Parity>,
+}
+
+impl Buffers {
+    /// Empty.
+    pub const fn new() -> Self {
+        Self { batch: RefCell::new(Vec::new()), parity: RefCell::new(Parity::new()) }
+    }
+}
+
 /// The storage task's state.
 pub struct Recorder<'a, D: CardDevice> {
     status: &'a CardStatus,
-    held: &'a HeldBlocks,
-    slot: Slot<'a, D>,
+    buffers: &'a Buffers,
+    socket: Socket<'a, D>,
     retry_at: Instant,
     /// The card in the slot is another one than the group's beginning was written to: nothing is readable on it before
     /// the next group.
@@ -80,12 +101,12 @@ pub struct Recorder<'a, D: CardDevice> {
 impl<'a, D: CardDevice> Recorder<'a, D> {
     /// A recorder for the card in `device`. `entropy` keeps sessions of equal number on equal cards apart: random
     /// where the board has a random number generator, else any number that changes from one power-on to the next.
-    pub const fn new(device: D, status: &'a CardStatus, held: &'a HeldBlocks, entropy: u32) -> Self {
-        let slot = Slot::Waiting(device);
+    pub const fn new(device: D, status: &'a CardStatus, buffers: &'a Buffers, entropy: u32) -> Self {
+        let socket = Socket::Waiting(device);
         Self {
             status,
-            held,
-            slot,
+            buffers,
+            socket,
             retry_at: Instant::ZERO,
             await_group: false,
             segments: Segments::new(status, entropy),
@@ -96,13 +117,13 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
 
     /// Looks for a card if there is none, at most once a second, and opens a session on it. [`Written::Done`]: one is open now.
     pub fn ready(&mut self, now: Instant) -> Written {
-        self.slot.begin_service();
-        if !self.slot.is_mounted() {
+        self.begin_service();
+        if !self.socket.is_mounted() {
             if self.finished || now < self.retry_at {
                 return Written::Later;
             }
             self.retry_at = now + RETRY;
-            match self.slot.mount(self.status, self.held) {
+            match self.socket.mount(self.status, self.buffers) {
                 Ok(true) => {}
                 Ok(false) => return Written::Later,
                 Err(error) => {
@@ -130,17 +151,17 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
     pub fn take(&mut self, sector: &Sector) -> bool {
         let mut block = Block::new();
         block.contents = *sector.bytes();
-        self.held.batch.borrow_mut().push(block).is_ok()
+        self.buffers.batch.borrow_mut().push(block).is_ok()
     }
 
     /// Sectors that were taken and are not on the card yet.
     pub fn waiting(&self) -> usize {
-        self.held.batch.borrow().len()
+        self.buffers.batch.borrow().len()
     }
 
     /// Forgets them, because there is no card; how many frames are lost with them.
     pub fn abandon(&mut self) -> u64 {
-        let mut batch = self.held.batch.borrow_mut();
+        let mut batch = self.buffers.batch.borrow_mut();
         let frames = batch.iter().map(sector_of).filter(|sector| !sector.is_partial());
         let frames = frames.map(|sector| u64::from(sector.frames())).sum();
         batch.clear();
@@ -201,13 +222,13 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
     }
 
     fn count_retries(&self) {
-        self.status.count_write_errors(self.slot.take_retries());
+        self.status.count_write_errors(self.socket.take_retries());
     }
 
     /// With nothing to write: looks for where the session before ended, once the session has a sector on the card, gives the
     /// segment its date, once it is known, and counts a little further how much room there is on the card.
     pub fn idle(&mut self) {
-        let Some(card) = self.slot.card() else { return };
+        let Some(card) = self.socket.card() else { return };
         if self.segments.has_sector() {
             self.segments.look_before(card);
             self.segments.date(card);
@@ -215,13 +236,14 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
         if self.room_known {
             return;
         }
+        // The next write meets the same trouble and deals with it.
+        let _ = card.search_on();
         match card.count_room() {
             Ok(None) => {}
             Ok(room) => {
                 self.status.set_room(room);
                 self.room_known = true;
             }
-            // The next write meets the same trouble and deals with it.
             Err(_) => self.room_known = true,
         }
     }
@@ -230,15 +252,15 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
     pub fn finish(&mut self) {
         self.finished = true;
         self.write_parity();
-        if self.slot.is_mounted() {
+        if self.socket.is_mounted() {
             self.status.set_state(CardState::Finished);
         }
-        self.slot.release();
+        self.socket.release();
     }
 
     /// The segment in work.
     fn open_segment(&self) -> Option<Log> {
-        self.segments.log.filter(|_| self.slot.is_mounted() && self.segments.is_open)
+        self.segments.log.filter(|_| self.socket.is_mounted() && self.segments.is_open)
     }
 
     /// The name of the segment in work.
@@ -249,18 +271,18 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
     /// What of the segment in work no longer changes. What lies behind it, also where it has nothing yet, is left over.
     pub fn in_work(&self) -> Option<InWork> {
         let log = self.open_segment()?;
-        let blocks = log.base.map_or(0, |_| self.held.parity.borrow().end());
+        let blocks = log.base.map_or(0, |_| self.buffers.parity.borrow().end());
         Some(InWork { name: log.name, session: log.session, first: log.base.unwrap_or(0), blocks })
     }
 
     /// The card, for serving stored logs; `None` while there is none.
     pub const fn card(&mut self) -> Option<&mut Card<'a, D>> {
-        self.slot.card()
+        self.socket.card()
     }
 
     /// Gives the device back, with whatever is on it.
     pub fn into_device(self) -> Option<D> {
-        self.slot.into_device()
+        self.socket.into_device()
     }
 
     /// Formats the card if somebody asked for it, a little at each call; whether there was something to do: call again
@@ -268,12 +290,12 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
     pub fn format(&mut self, now: Instant) -> bool {
         if self.status.take_format_wanted() && !self.finished {
             self.retry_at = now + RETRY;
-            if self.slot.begin_format(self.segments.volume_id(now)) {
+            if self.socket.begin_format(self.segments.volume_id(now)) {
                 self.status.set_state(CardState::Formatting);
             }
         }
-        self.slot.begin_service();
-        match self.slot.format() {
+        self.begin_service();
+        match self.socket.format() {
             None => return false,
             Some(Ok(false)) => {}
             Some(Ok(true)) => self.retry_at = now,
@@ -281,6 +303,11 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
             Some(Err(FormatError::TooSmall)) => self.status.set_state(CardState::Foreign),
         }
         true
+    }
+
+    fn begin_service(&self) {
+        self.status.begin_service();
+        self.socket.begin_service();
     }
 
     /// Writes the sector that waits first, and of those behind it so many as belong there, `most` in all.
@@ -314,7 +341,7 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
         self.segments.log = Some(log);
         let is_closed = self.add_to_parity(now, at, written);
         self.drop_written(written);
-        if is_closed || self.held.parity.borrow().is_overdue(now) {
+        if is_closed || self.buffers.parity.borrow().is_overdue(now) {
             self.write_parity();
         }
         Ok(())
@@ -322,15 +349,15 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
 
     /// The next sector is of this stretch.
     fn begin_stretch(&mut self, stretch: u32) {
-        if self.held.parity.borrow().stretch() != stretch {
+        if self.buffers.parity.borrow().stretch() != stretch {
             self.write_parity();
-            self.held.parity.borrow_mut().begin(stretch);
+            self.buffers.parity.borrow_mut().begin(stretch);
         }
     }
 
     /// The first sectors that wait are on the card, from block `at` on; whether the log ends in order with one of them.
     fn add_to_parity(&self, now: Instant, at: u32, written: usize) -> bool {
-        let (batch, mut parity) = (self.held.batch.borrow(), self.held.parity.borrow_mut());
+        let (batch, mut parity) = (self.buffers.batch.borrow(), self.buffers.parity.borrow_mut());
         let mut is_closed = false;
         for (at, block) in (at..).zip(batch.iter().take(written)) {
             let sector = sector_of(block);
@@ -344,10 +371,10 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
 
     /// Writes the parity of the stretch in work, if there is any that is not on the card. What fails is counted.
     fn write_parity(&mut self) {
-        let held = self.held;
-        let mut parity = held.parity.borrow_mut();
+        let buffers = self.buffers;
+        let mut parity = buffers.parity.borrow_mut();
         let Some(Log { session, base: Some(base), .. }) = self.segments.log else { return };
-        let Some(card) = self.slot.card().filter(|_| parity.is_due()) else { return };
+        let Some(card) = self.socket.card().filter(|_| parity.is_due()) else { return };
         let mut at = parity_block(card.open_blocks(), parity.stretch());
         let mut blocks = parity.blocks(session, base);
         while !blocks.is_empty() {
@@ -365,7 +392,7 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
     /// takes nothing with it.
     #[inline(never)]
     fn write_copy(&mut self, session: u32, at: u32) -> Result<(), CardError<D::Error>> {
-        let mut batch = self.held.batch.borrow_mut();
+        let mut batch = self.buffers.batch.borrow_mut();
         let block = batch.get_mut(..1).ok_or(CardError::NotOpen)?;
         mark(block, Some(session));
         let written = self.mounted().and_then(|card| card.write(at, block));
@@ -374,7 +401,7 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
     }
 
     fn write_sealed(&mut self, log: &Log, at: u32, count: usize) -> Result<usize, CardError<D::Error>> {
-        let mut batch = self.held.batch.borrow_mut();
+        let mut batch = self.buffers.batch.borrow_mut();
         let batch = batch.get_mut(..count).ok_or(CardError::NotOpen)?;
         for block in batch.iter_mut() {
             let mut sector = sector_of(block);
@@ -400,7 +427,7 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
     /// How many of the sectors that wait, the first one being sector `number`, go right behind each other: full ones,
     /// and only the first may begin a group, because a segment may end before the next.
     fn count_in_row(&self, number: u32, max: usize) -> usize {
-        let batch = self.held.batch.borrow();
+        let batch = self.buffers.batch.borrow();
         let follows = |(index, block): &(usize, &Block)| {
             let sector = sector_of(block);
             let in_order = sector.number() == number.wrapping_add(*index as u32);
@@ -410,18 +437,18 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
     }
 
     fn sector(&self, index: usize) -> Option<Sector> {
-        self.held.batch.borrow().get(index).map(sector_of)
+        self.buffers.batch.borrow().get(index).map(sector_of)
     }
 
     fn drop_written(&self, count: usize) {
-        self.held.batch.borrow_mut().drain(..count);
+        self.buffers.batch.borrow_mut().drain(..count);
     }
 
     /// Opens a segment on a card just mounted.
     fn begin(&mut self) -> Result<(), CardError<D::Error>> {
-        let card = self.slot.card().ok_or(CardError::NotOpen)?;
+        let card = self.socket.card().ok_or(CardError::NotOpen)?;
         let begun = self.segments.begin(card);
-        self.held.parity.borrow_mut().begin(0);
+        self.buffers.parity.borrow_mut().begin(0);
         self.await_group = begun?;
         Ok(())
     }
@@ -429,8 +456,8 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
     /// Leaves the open segment for the next one, a short one where the open one did not take a sector.
     fn next_segment(&mut self, is_short: bool) -> Result<(), CardError<D::Error>> {
         self.write_parity();
-        let next = self.segments.next(is_short, self.slot.card().ok_or(CardError::NotOpen)?);
-        self.held.parity.borrow_mut().begin(0);
+        let next = self.segments.next(is_short, self.socket.card().ok_or(CardError::NotOpen)?);
+        self.buffers.parity.borrow_mut().begin(0);
         next
     }
 
@@ -448,7 +475,7 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
     fn give_up(&mut self, now: Instant, error: &CardError<D::Error>) {
         self.tell(error);
         self.retry_at = now + RETRY;
-        self.slot.release();
+        self.socket.release();
     }
 
     fn tell(&self, error: &CardError<D::Error>) {

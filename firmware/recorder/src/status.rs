@@ -2,11 +2,10 @@
 
 use core::sync::atomic::{AtomicBool, AtomicU8, AtomicU32, Ordering};
 
-use embedded_sdmmc::{TimeSource, Timestamp};
 use hums_blackbox::record::{Before, Found};
 use hums_core::clock::{Instant, Span};
 
-/// No service of the card is going on.
+/// The card works on no command.
 const IDLE: u32 = u32::MAX;
 /// How much room there is was not counted yet.
 const UNCOUNTED: u32 = u32::MAX;
@@ -80,8 +79,11 @@ pub struct CardStatus {
     frames_lost: AtomicU32,
     sectors_lost: AtomicU32,
     stall_ms_max: AtomicU32,
-    /// When the service of the card that is going on began, milliseconds modulo 2^32; [`IDLE`] between services.
+    /// When the command began that the card works on, milliseconds modulo 2^32; [`IDLE`] between commands.
     busy_since_ms: AtomicU32,
+    /// The longest command of the service that is going on: when it began, and how long it took.
+    longest_since_ms: AtomicU32,
+    longest_ms: AtomicU32,
     /// Thousandths of the card that logs can have.
     room: AtomicU32,
     used_mib: AtomicU32,
@@ -131,7 +133,7 @@ pub struct CardReading {
     pub frames_lost: u32,
     /// Sectors that could not be written.
     pub sectors_lost: u32,
-    /// The longest time that one service of the card took, in milliseconds.
+    /// The longest time that the card took for one command, in milliseconds.
     pub stall_ms_max: u32,
     /// The share of the card that logs can have, in thousandths: free clusters and those of logs. `None` until the
     /// file allocation table was counted, which takes a while on a large card.
@@ -161,6 +163,8 @@ impl CardStatus {
             sectors_lost: AtomicU32::new(0),
             stall_ms_max: AtomicU32::new(0),
             busy_since_ms: AtomicU32::new(IDLE),
+            longest_since_ms: AtomicU32::new(0),
+            longest_ms: AtomicU32::new(0),
             room: AtomicU32::new(UNCOUNTED),
             used_mib: AtomicU32::new(0),
             total_mib: AtomicU32::new(0),
@@ -232,24 +236,40 @@ impl CardStatus {
         self.room.store(room.permille, Ordering::Relaxed);
     }
 
-    /// A service of the card begins; [`Self::end_service`] is to follow.
-    pub fn begin_service(&self, now: Instant) {
+    /// A service of the card begins: a number of commands, one after the other.
+    pub(crate) fn begin_service(&self) {
+        self.longest_ms.store(0, Ordering::Relaxed);
+    }
+
+    /// A command begins; [`Self::end_command`] is to follow.
+    pub(crate) fn begin_command(&self, now: Instant) {
         self.busy_since_ms.store((now.as_millis() as u32).min(IDLE - 1), Ordering::Relaxed);
     }
 
-    /// The service of the card has ended; it took this long, in milliseconds.
-    pub fn end_service(&self, took_ms: u32) {
-        self.busy_since_ms.store(IDLE, Ordering::Relaxed);
+    /// The card is done with the command.
+    pub(crate) fn end_command(&self, now: Instant) {
+        let since_ms = self.busy_since_ms.swap(IDLE, Ordering::Relaxed);
+        let took_ms = (now.as_millis() as u32).wrapping_sub(since_ms);
         self.stall_ms_max.fetch_max(took_ms, Ordering::Relaxed);
+        if took_ms > self.longest_ms.load(Ordering::Relaxed) {
+            self.longest_since_ms.store(since_ms, Ordering::Relaxed);
+            self.longest_ms.store(took_ms, Ordering::Relaxed);
+        }
     }
 
-    /// How long the service of the card that is going on has taken by now; zero between services.
+    /// How long the card has worked on a command by now; zero between commands. Commands of a simulated card end at a time that is still to
+    /// come, and of those the longest one of the service counts.
     pub fn stall(&self, now: Instant) -> Span {
-        match self.busy_since_ms.load(Ordering::Relaxed) {
-            IDLE => Span::ZERO,
-            // A service is far shorter than the 49 days after which the number repeats.
-            since => Span::from_millis(u64::from((now.as_millis() as u32).wrapping_sub(since))),
-        }
+        // A command is far shorter than the 49 days after which the number repeats.
+        let since = |since_ms: u32| (now.as_millis() as u32).wrapping_sub(since_ms);
+        let ms = match self.busy_since_ms.load(Ordering::Relaxed) {
+            IDLE => {
+                let ms = since(self.longest_since_ms.load(Ordering::Relaxed));
+                if ms < self.longest_ms.load(Ordering::Relaxed) { ms } else { 0 }
+            }
+            since_ms => since(since_ms),
+        };
+        Span::from_millis(u64::from(ms))
     }
 
     /// Storage asks for a new group: what comes next should be readable without what came before.
@@ -301,26 +321,22 @@ impl CardStatus {
         self.fat_time.store(utc_secs, Ordering::Relaxed);
     }
 
+    /// Time and date for a directory entry: UTC once it is known, 1 January 1980 (FAT's zero) before.
+    pub(crate) fn fat_date(&self) -> [u8; 4] {
+        fat_date(self.fat_time.load(Ordering::Relaxed))
+    }
+
     /// Whether the date was told.
     pub(crate) fn is_utc_known(&self) -> bool {
         self.fat_time.load(Ordering::Relaxed) != 0
     }
 }
 
-/// The clock of directory entries: UTC once it is known, 1 January 1980 (FAT's zero) before.
-#[derive(Clone, Copy, Debug)]
-pub struct FatClock<'a>(pub &'a CardStatus);
-
-impl TimeSource for FatClock<'_> {
-    fn get_timestamp(&self) -> Timestamp {
-        timestamp(self.0.fat_time.load(Ordering::Relaxed))
-    }
-}
-
-/// Civil date from days since 1970 (Howard Hinnant, "chrono-compatible low-level date algorithms"), for 1980 to 2106.
-fn timestamp(utc_secs: u32) -> Timestamp {
+/// Time and date of a directory entry (Microsoft's FAT specification 1.03), for 1980 to 2106. The civil date from days since 1970 is
+/// Howard Hinnant's, "chrono-compatible low-level date algorithms".
+const fn fat_date(utc_secs: u32) -> [u8; 4] {
     const FAT_EPOCH_SECS: u32 = 315_532_800; // 1980-01-01
-    let secs = utc_secs.max(FAT_EPOCH_SECS);
+    let secs = if utc_secs > FAT_EPOCH_SECS { utc_secs } else { FAT_EPOCH_SECS };
     let (days, second_of_day) = (secs / 86_400 + 719_468, secs % 86_400);
     let (era, day_of_era) = (days / 146_097, days % 146_097);
     let year_of_era = (day_of_era - day_of_era / 1_460 + day_of_era / 36_524 - day_of_era / 146_096) / 365;
@@ -328,15 +344,25 @@ fn timestamp(utc_secs: u32) -> Timestamp {
     let shifted_month = (5 * day_of_year + 2) / 153;
     let day = day_of_year - (153 * shifted_month + 2) / 5 + 1;
     let month = if shifted_month < 10 { shifted_month + 3 } else { shifted_month - 9 };
-    let year = year_of_era + era * 400 + u32::from(month <= 2);
-    Timestamp {
-        year_since_1970: (year - 1970) as u8,
-        zero_indexed_month: (month - 1) as u8,
-        zero_indexed_day: (day - 1) as u8,
-        hours: (second_of_day / 3_600) as u8,
-        minutes: (second_of_day / 60 % 60) as u8,
-        seconds: (second_of_day % 60) as u8,
+    let year = year_of_era + era * 400 + if month <= 2 { 1 } else { 0 };
+    let date = (year - 1980) << 9 | month << 5 | day;
+    let time = second_of_day / 3_600 << 11 | second_of_day / 60 % 60 << 5 | second_of_day % 60 / 2;
+    (date << 16 | time).to_le_bytes()
+}
+
+/// Seconds since 1970 of time and date of a directory entry; 0 for 1 January 1980, which stands for a date that was not known. The inverse
+/// of [`fat_date`], by the same algorithms.
+pub(crate) const fn utc_secs(fat: &[u8; 4]) -> u32 {
+    let (time, date) =
+        (u16::from_le_bytes([fat[0], fat[1]]) as u32, u16::from_le_bytes([fat[2], fat[3]]) as u32);
+    let (month, day) = (date >> 5 & 15, date & 31);
+    if month == 0 || day == 0 || date == 1 << 5 | 1 {
+        return 0;
     }
+    let year = 1980 + (date >> 9) - if month <= 2 { 1 } else { 0 };
+    let day_of_year = (153 * ((month + 9) % 12) + 2) / 5 + day - 1;
+    let days = 365 * year + year / 4 - year / 100 + year / 400 + day_of_year - 719_468;
+    days.saturating_mul(86_400).saturating_add((time >> 11) * 3_600 + (time >> 5 & 63) * 60 + 2 * (time & 31))
 }
 
 #[cfg(test)]
@@ -345,20 +371,43 @@ mod tests {
 
     #[test]
     fn dates_are_civil() {
-        let leap_day = timestamp(1_709_210_096); // 2024-02-29T12:34:56Z
-        assert_eq!(leap_day.to_string(), "2024-02-29 12:34:56");
-        assert_eq!(timestamp(0).to_string(), "1980-01-01 00:00:00");
+        let fields = |utc_secs| {
+            let word = u32::from_le_bytes(fat_date(utc_secs));
+            let (date, time) = (word >> 16, word & 0xFFFF);
+            let day = (1980 + (date >> 9), date >> 5 & 15, date & 31);
+            (day, (time >> 11, time >> 5 & 63, 2 * (time & 31)))
+        };
+        assert_eq!(fields(1_709_210_096), ((2024, 2, 29), (12, 34, 56)));
+        assert_eq!(fields(0), ((1980, 1, 1), (0, 0, 0)));
+        for secs in [1_709_210_096, 1_704_067_200, 4_102_444_798] {
+            assert_eq!(utc_secs(&fat_date(secs)), secs);
+        }
+        assert_eq!((utc_secs(&fat_date(0)), utc_secs(&[0; 4])), (0, 0));
+        assert!((0..=255).map(|byte| utc_secs(&[byte; 4])).max() == Some(u32::MAX), "nothing overflows");
     }
 
     #[test]
-    fn a_service_that_goes_on_is_seen_until_it_ends() {
+    fn a_command_that_goes_on_is_seen_until_it_ends() {
         let status = CardStatus::new();
-        assert_eq!(status.stall(Instant::from_millis(5_000)), Span::ZERO);
-        status.begin_service(Instant::from_millis(5_000));
-        assert_eq!(status.stall(Instant::from_millis(7_500)), Span::from_millis(2_500));
-        status.end_service(2_600);
-        assert_eq!(status.stall(Instant::from_millis(8_000)), Span::ZERO);
+        let at = Instant::from_millis;
+        assert_eq!(status.stall(at(5_000)), Span::ZERO);
+        status.begin_command(at(5_000));
+        assert_eq!(status.stall(at(7_500)), Span::from_millis(2_500));
+        status.end_command(at(7_600));
+        assert_eq!(status.stall(at(8_000)), Span::ZERO);
         assert_eq!(status.read().stall_ms_max, 2_600);
+    }
+
+    #[test]
+    fn many_short_commands_are_no_stall() {
+        let status = CardStatus::new();
+        status.begin_service();
+        for ms in (0..3_000).step_by(30) {
+            status.begin_command(Instant::from_millis(ms));
+            assert!(status.stall(Instant::from_millis(ms + 20)) <= Span::from_millis(20));
+            status.end_command(Instant::from_millis(ms + 25));
+        }
+        assert_eq!(status.read().stall_ms_max, 25);
     }
 
     #[test]

@@ -312,9 +312,14 @@ fn change(device: &MemCard, at: u32, change: impl FnOnce(&mut [u8; 512])) {
     change(device.blocks.borrow_mut().entry(at).or_insert([0; 512]));
 }
 
-/// The search for room begins at the first cluster again.
+/// The information sector knows nothing.
 fn forget_hint(device: &MemCard) {
     change(device, 2048 + 1, |info| info[488..496].fill(0xFF));
+}
+
+/// The search for room begins at this cluster.
+fn set_hint(device: &MemCard, cluster: u32) {
+    change(device, 2048 + 1, |info| info[492..496].copy_from_slice(&cluster.to_le_bytes()));
 }
 
 #[test]
@@ -406,14 +411,14 @@ fn free_clusters_that_no_log_lost_are_taken() {
         *device.blocks.borrow().iter().find(|(_, block)| block.starts_with(&FIRST.short())).expect("root").0;
     free(3, 2051);
     change(&device, root, |block| block[0] = 0xE5);
-    forget_hint(&device);
+    set_hint(&device, 3);
     let mut card = mount(&device, &status);
     // The third log lies in the first one's place and behind the second one.
     card.create(third, 3 << 19).expect("there is room");
     drop(card);
     free(2051, 4099);
     change(&device, root, |block| block[32] = 0xE5);
-    forget_hint(&device);
+    set_hint(&device, 2051);
     device.journal.borrow_mut().clear();
     let mut card = mount(&device, &status);
     card.create(fourth, 1 << 20).expect("there is room");

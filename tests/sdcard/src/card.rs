@@ -40,6 +40,10 @@ enum Transfer {
         block: Option<Vec<u8>>,
         failed: bool,
     },
+    /// Sends blocks one after the other; the next one.
+    Read {
+        next: u32,
+    },
 }
 
 // Each is a flag of the specification's own.
@@ -150,6 +154,18 @@ impl SdCard {
         }
         if let Some((_, block)) = self.pending.take_if(|(at, _)| *at <= now_ns) {
             self.out.extend(block);
+            if let Transfer::Read { next: at } = self.transfer {
+                self.transfer = Transfer::Read { next: at + 1 };
+                // Behind the last block there is an error in the place of the next one.
+                let is_there = at < self.model.medium.size();
+                let bytes = if is_there {
+                    let data = self.model.medium.get(at);
+                    self.block(now_ns, &data)
+                } else {
+                    vec![0x08]
+                };
+                self.pending = Some((now_ns + self.model.read_next_ns, bytes));
+            }
             return self.out.pop_front().unwrap_or(0xFF);
         }
         0xFF
@@ -226,6 +242,7 @@ impl SdCard {
         let is_app = std::mem::take(&mut self.app);
         let is_idle = self.state == State::Idle;
         let in_row = matches!(self.transfer, Transfer::Write { .. });
+        let reads = matches!(self.transfer, Transfer::Read { .. });
         match (is_app, number) {
             (_, 0) => self.reset(),
             (_, 12) if in_row => {
@@ -234,11 +251,18 @@ impl SdCard {
                 self.answer_with(0, &[]);
                 self.busy_until_ns = now_ns + self.model.write_ns.0;
             }
-            (_, 13) if !is_idle => {
+            (_, 12) if reads => {
+                self.transfer = Transfer::None;
+                self.out.clear();
+                self.pending = None;
+                self.out.push_back(0xFF);
+                self.answer_with(0, &[]);
+            }
+            (_, 13) if !is_idle && !reads => {
                 let status = std::mem::take(&mut self.status);
                 self.answer_with(0, &[status]);
             }
-            _ if in_row => self.answer_with(ILLEGAL, &[]),
+            _ if in_row || reads => self.answer_with(ILLEGAL, &[]),
             (_, 8) if self.model.kind != Kind::Old => {
                 self.knows_conditions = true;
                 self.answer_with(0, &[0, 0, (argument >> 8) as u8 & 0x0F, argument as u8]);
@@ -287,11 +311,16 @@ impl SdCard {
         let at = if by_bytes { argument / 512 } else { argument };
         match number {
             16 => self.answer_with(if argument == 512 { 0 } else { PARAMETER }, &[]),
-            17 | 24 | 25 if by_bytes && !argument.is_multiple_of(512) => self.answer_with(ADDRESS, &[]),
-            17 | 24 | 25 if at >= self.model.medium.size() => self.answer_with(PARAMETER, &[]),
+            17 | 18 | 24 | 25 if by_bytes && !argument.is_multiple_of(512) => self.answer_with(ADDRESS, &[]),
+            17 | 18 | 24 | 25 if at >= self.model.medium.size() => self.answer_with(PARAMETER, &[]),
             9 => self.send(now_ns, &self.model.csd(), 0),
             10 => self.send(now_ns, &self.model.cid(), 0),
             17 => self.send(now_ns, &self.model.medium.get(at), self.model.read_ns),
+            18 => {
+                self.transfer = Transfer::Read { next: at + 1 };
+                let data = self.model.medium.get(at);
+                self.send(now_ns, &data, self.model.read_ns);
+            }
             24 | 25 => {
                 self.answer_with(0, &[]);
                 // Undefined until they are written (4.3.4): here they are erased.
@@ -322,13 +351,19 @@ impl SdCard {
             self.pending = Some((now_ns + after_ns, vec![token]));
             return;
         }
+        let bytes = self.block(now_ns, data);
+        self.pending = Some((now_ns + after_ns, bytes));
+    }
+
+    /// A block as it goes over the bus.
+    fn block(&mut self, now_ns: u64, data: &[u8]) -> Vec<u8> {
         let mut bytes = vec![0xFE];
         bytes.extend(data);
         bytes.extend(crc16(data).to_be_bytes());
         if self.model.has(now_ns, |fault| fault == Fault::DamagedRead).is_some() {
             bytes[7] ^= 0x10;
         }
-        self.pending = Some((now_ns + after_ns, bytes));
+        bytes
     }
 
     /// A block has arrived whole.

@@ -36,6 +36,8 @@ pub struct Model {
     pub start_ns: u64,
     /// How long it takes to find a block.
     pub read_ns: u64,
+    /// How long it takes from one block to the next that it sends in a row.
+    pub read_next_ns: u64,
     /// How long it takes to take one block alone, and one of many.
     pub write_ns: (u64, u64),
     /// Write protected, in its CSD: for now, for ever.
@@ -53,6 +55,7 @@ impl Model {
             serial: 0x1234_5678,
             start_ns: 20 * MS,
             read_ns: MS / 2,
+            read_next_ns: MS / 50,
             write_ns: (2 * MS, MS / 4),
             locked: (false, false),
             plans: Vec::new(),

@@ -4,7 +4,7 @@ mod rig;
 
 use embedded_sdmmc::Block;
 use hums_blackbox::Header;
-use hums_recorder::{Card, CardState, CardStatus, HeldBlocks, LogName};
+use hums_recorder::{Buffers, Card, CardState, CardStatus, LogName};
 use hums_sdcard::{Event, Fault, Kind, MS, Medium, Model, Plan};
 use rig::{FILE_TRANSFER_PROTOCOL, LOG_DATA, LOG_ENTRY, Rig, read as read_card};
 
@@ -42,7 +42,7 @@ fn with_two_sessions(mib: u32, seconds: u64) -> Medium {
 /// The same, and the rest full of later segments: the next one takes the place of the oldest.
 fn full() -> Medium {
     let medium = with_two_sessions(40, 20);
-    let (status, held) = (CardStatus::new(), HeldBlocks::new());
+    let (status, held) = (CardStatus::new(), Buffers::new());
     let mounted = Card::mount(medium.clone(), &status, &held);
     let mut card = mounted.map_err(|(_, error)| error.to_string()).expect("it is in order");
     // The short ones too with which the recorder goes on when a card is back.
@@ -286,7 +286,7 @@ fn a_checksum_is_of_what_was_recorded_and_nothing_is_lost_while_it_is_computed()
 
 /// Where the blocks of a segment lie, and how many of them hold what was recorded.
 fn places(medium: &Medium, name: LogName) -> (u32, u32) {
-    let (status, held) = (CardStatus::new(), HeldBlocks::new());
+    let (status, held) = (CardStatus::new(), Buffers::new());
     let mounted = Card::mount(medium.clone(), &status, &held);
     let card = mounted.map_err(|(_, error)| error.to_string()).expect("it is in order");
     let mut segment = card.segment(name).expect("it is there");

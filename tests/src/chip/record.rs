@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, HashMap, VecDeque};
 use embedded_sdmmc::Block;
 use hums_blackbox::record::Record;
 use hums_blackbox::{Item, LogReader};
-use hums_recorder::{Card, CardStatus, HeldBlocks, LogName};
+use hums_recorder::{Buffers, Card, CardStatus, LogName};
 use hums_sdcard::Medium;
 
 /// A session on a card.
@@ -33,7 +33,7 @@ pub fn last(medium: &Medium) -> Option<Session> {
 
 /// All sessions but the first `skip`, and the last one at least.
 fn some(medium: &Medium, skip: usize) -> Vec<Session> {
-    let (status, held) = (CardStatus::new(), HeldBlocks::new());
+    let (status, held) = (CardStatus::new(), Buffers::new());
     let Ok(card) = Card::mount(medium.clone(), &status, &held) else { return Vec::new() };
     let mut names: BTreeMap<u32, Vec<LogName>> = BTreeMap::new();
     if card.logs(|log| names.entry(log.name.session).or_default().push(log.name)).is_err() {

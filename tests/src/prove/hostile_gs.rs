@@ -14,7 +14,7 @@ use hums_link::encode::{Encoder, FRAME_BYTES_MAX};
 use hums_link::frame::{Check, Frame};
 use hums_link::packet::Packet;
 use hums_link::signing::{Clock, Key, Seal};
-use hums_recorder::{CardStatus, HeldBlocks};
+use hums_recorder::{Buffers, CardStatus};
 
 use super::card::Card;
 use super::figures::{Figures, Labels};
@@ -152,7 +152,7 @@ fn logs_of(card: &Card) -> Result<(BTreeMap<String, Vec<u64>>, usize)> {
         let hashes = Record::of(&log)?.frames.iter().map(|frame| frame.hash).collect();
         frames.insert(log.name, hashes);
     }
-    let (status, held) = (CardStatus::new(), HeldBlocks::new());
+    let (status, held) = (CardStatus::new(), Buffers::new());
     let mounted = hums_recorder::Card::mount(card.device(Faults::default())?, &status, &held);
     let mut erased = 0;
     let mounted = mounted.map_err(|(_, error)| anyhow::anyhow!("the card: {error}"))?;

@@ -7,7 +7,7 @@ use hums_onboard::queues::SectorsOut;
 use hums_onboard::shelf::Server;
 use hums_onboard::storage::NO_CARD_RETRY;
 use hums_onboard::{Keeper, Service, Storage, Task};
-use hums_recorder::HeldBlocks;
+use hums_recorder::Buffers;
 use static_cell::{ConstStaticCell, StaticCell};
 
 use crate::status::{CARD_STATUS, SUPERVISOR};
@@ -23,7 +23,7 @@ const REPORT: Duration = Duration::from_secs(1);
 type Body = Storage<'static, board::Card>;
 
 // Statics of their own: made within the task both would come to their place over the stack, 8 and 1.5 KiB of it.
-static HELD: ConstStaticCell<HeldBlocks> = ConstStaticCell::new(HeldBlocks::new());
+static HELD: ConstStaticCell<Buffers> = ConstStaticCell::new(Buffers::new());
 static BODY: StaticCell<Body> = StaticCell::new();
 
 /// Makes the task's body, once.
@@ -45,7 +45,6 @@ pub(crate) async fn run(
         SUPERVISOR.report(Task::Storage, now());
         let begun = now();
         let service = service(body, begun, &mut sectors);
-        CARD_STATUS.end_service(now().since(begun).as_millis() as u32);
         keep(keeper);
         match service {
             Service::Wrote => {}

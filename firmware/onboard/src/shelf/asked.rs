@@ -5,7 +5,7 @@ use hums_recorder::LogName;
 /// Bytes of a log in one answer.
 pub const DATA_MAX: usize = 240;
 /// What an answer's head takes.
-pub(super) const HEAD: usize = 32;
+pub(super) const HEAD: usize = 36;
 /// Which log it is, whatever happens to the card's directory: another one of the same name differs in the rest.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct LogId {
@@ -68,9 +68,10 @@ pub enum NoLog {
     Unread,
 }
 
-/// What an answer's head has in a place's stead.
-const ABSENT: u16 = u16::MAX;
-const UNREAD: u16 = u16::MAX - 1;
+/// What an answer's head has for each outcome.
+const FOUND: u16 = 0;
+const ABSENT: u16 = 1;
+const UNREAD: u16 = 2;
 
 /// What storage answers, without the data.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -79,12 +80,14 @@ pub struct Answer {
     pub ticket: u16,
     /// How many logs there are; 0 also where there is no card, and where the card did not give the directory.
     pub count: u16,
-    /// The log's place.
-    pub found: Result<u16, NoLog>,
+    /// Whether the log was found.
+    pub found: Result<(), NoLog>,
     /// Which log it is.
     pub log: LogId,
     /// The log's length in bytes.
     pub bytes: u32,
+    /// When it was written last by its directory entry, in seconds since 1970 UTC; 0: not known.
+    pub utc_secs: u32,
     /// Where the data lies in the log; with a checksum, how many bytes it is of.
     pub offset: u32,
     /// Changes with the names in the directory: a place means another log then.
@@ -95,7 +98,7 @@ impl Answer {
     /// That there is no such log.
     pub(super) const fn none(ticket: u16) -> Self {
         let found = Err(NoLog::Absent);
-        Self { ticket, count: 0, found, log: LogId::NONE, bytes: 0, offset: 0, directory: 0 }
+        Self { ticket, count: 0, found, log: LogId::NONE, bytes: 0, utc_secs: 0, offset: 0, directory: 0 }
     }
 
     /// The same of no log.
@@ -108,7 +111,7 @@ impl Answer {
         head[..2].copy_from_slice(&self.ticket.to_le_bytes());
         head[2..4].copy_from_slice(&self.count.to_le_bytes());
         let found = match self.found {
-            Ok(place) => place,
+            Ok(()) => FOUND,
             Err(NoLog::Absent) => ABSENT,
             Err(NoLog::Unread) => UNREAD,
         };
@@ -121,6 +124,7 @@ impl Answer {
             self.log.session,
             self.log.first,
             self.directory,
+            self.utc_secs,
         ];
         for (to, word) in head[8..].chunks_exact_mut(4).zip(words) {
             to.copy_from_slice(&word.to_le_bytes());
@@ -139,14 +143,15 @@ impl Answer {
             ticket: u16_at(0),
             count: u16_at(2),
             found: match u16_at(4) {
-                ABSENT => Err(NoLog::Absent),
+                FOUND => Ok(()),
                 UNREAD => Err(NoLog::Unread),
-                place => Ok(place),
+                _ => Err(NoLog::Absent),
             },
             log: LogId { name, session: word(3), first: word(4) },
             bytes: word(1),
             offset: word(2),
             directory: word(5),
+            utc_secs: word(6),
         }
     }
 }

@@ -23,8 +23,8 @@ use bbqueue::prod_cons::framed::{FramedConsumer, FramedProducer};
 use embedded_sdmmc::Block;
 use heapless::spsc;
 use hums_link::ftp;
-use hums_recorder::card::Segment;
-use hums_recorder::{Card, CardDevice, Recorder};
+use hums_recorder::card::{LogEntry, Segment};
+use hums_recorder::{Card, CardDevice, CardError, Recorder};
 
 use asked::HEAD;
 pub use asked::{Answer, DATA_MAX, LogId, NoLog, Want, What, Which};
@@ -57,7 +57,8 @@ impl Shelf {
                 answers: self.answers.framed_producer(),
                 last: None,
                 sum: None,
-                erases: false,
+                listed: Listed::default(),
+                erases: None,
             },
         )
     }
@@ -97,8 +98,18 @@ pub struct Server<'a> {
     last: Option<Found>,
     /// A checksum in the making.
     sum: Option<Sum>,
-    /// Logs are being erased, one at a call.
-    erases: bool,
+    /// The log that was looked up last by its place in the list.
+    listed: Listed,
+    /// Logs are being erased, a block of the directory at a call, from this entry of it on.
+    erases: Option<u32>,
+}
+
+/// The place of a log in the list of those that are shown, and its entry in the directory, while this has the same names.
+#[derive(Clone, Copy, Default)]
+struct Listed {
+    names: u32,
+    place: u16,
+    entry: u32,
 }
 
 /// A log, and where it lies.
@@ -119,7 +130,7 @@ struct Sum {
 impl Server<'_> {
     /// Whether somebody waits for an answer.
     pub fn is_wanted(&self) -> bool {
-        self.erases || self.sum.is_some() || self.wants.ready()
+        self.erases.is_some() || self.sum.is_some() || self.wants.ready()
     }
 
     /// Answers what is wanted of `PARAMS.TXT`, whose text this is.
@@ -131,7 +142,7 @@ impl Server<'_> {
         };
         let data = &text[(offset as usize).min(text.len())..];
         let data = &data[..data.len().min(DATA_MAX)];
-        let answer = Answer { found: Ok(0), bytes: text.len() as u32, offset, ..Answer::none(ticket) };
+        let answer = Answer { found: Ok(()), bytes: text.len() as u32, offset, ..Answer::none(ticket) };
         let mut grant = self.answers.grant((HEAD + data.len()) as u16).expect("room for one answer");
         grant[..HEAD].copy_from_slice(&answer.write());
         grant[HEAD..HEAD + data.len()].copy_from_slice(data);
@@ -140,15 +151,15 @@ impl Server<'_> {
 
     /// Does a little of what is wanted, if there is something and room for its answer; whether there was.
     pub fn serve<D: CardDevice>(&mut self, recorder: &mut Recorder<'_, D>) -> bool {
-        if self.erases {
+        if let Some(entry) = self.erases {
             self.last = None;
-            self.erases = erase_next(recorder);
+            self.erases = erase_next(recorder, entry);
             return true;
         }
         match self.wants.peek().copied() {
             Some(Want { what: What::Erase, .. }) => {
                 let _ = self.wants.dequeue();
-                self.erases = true;
+                self.erases = Some(0);
                 true
             }
             Some(want) => self.answer(recorder, &want),
@@ -164,7 +175,7 @@ impl Server<'_> {
             // One conversation at a time: who asks for something else no longer waits for a checksum.
             self.sum = None;
         }
-        let log = find(recorder, want, self.last.take());
+        let log = find(recorder, want, self.last.take(), &mut self.listed);
         let mut answer = Answer { ticket: want.ticket, ..log.answer };
         let mut data = 0;
         if let (Some(card), Some(mut segment)) = (recorder.card(), log.segment) {
@@ -229,17 +240,12 @@ impl Server<'_> {
     }
 }
 
-/// Hides one log of an earlier session; `false` when there is none, or the card does not take it.
-fn erase_next<D: CardDevice>(recorder: &mut Recorder<'_, D>) -> bool {
+/// Hides logs of earlier sessions in the directory's block of this entry; the next block's entry. `None`: that was all, or the card
+/// does not take it.
+fn erase_next<D: CardDevice>(recorder: &mut Recorder<'_, D>, entry: u32) -> Option<u32> {
     let session = recorder.log_name().map(|name| name.session);
-    let Some(card) = recorder.card() else { return false };
-    let mut next = None;
-    let looked = card.logs(|entry| {
-        if !entry.hidden && Some(entry.name.session) != session {
-            next = Some(entry);
-        }
-    });
-    looked.is_ok() && next.is_some_and(|entry| card.hide(&entry).is_ok())
+    let more = recorder.card()?.hide_logs(entry, session);
+    more.is_ok_and(|more| more).then_some(entry + Block::LEN_U32 / 32)
 }
 
 /// What was looked for: the answer, and where it lies if it is there.
@@ -249,15 +255,22 @@ struct Looked {
 }
 
 /// The log that is wanted, from the directory unless it is the one that was read last.
-fn find<D: CardDevice>(recorder: &mut Recorder<'_, D>, want: &Want, last: Option<Found>) -> Looked {
+fn find<D: CardDevice>(
+    recorder: &mut Recorder<'_, D>,
+    want: &Want,
+    last: Option<Found>,
+    listed: &mut Listed,
+) -> Looked {
     let none = Looked { answer: Answer::none(want.ticket), segment: None };
     let recorded = recorder.in_work();
     let Some(card) = recorder.card() else { return none };
-    let name = match want.which {
+    let mut answer = none.answer;
+    (answer.count, answer.directory) = card.shown();
+    let of_none = |why| Looked { answer: answer.without(why), segment: None };
+    let found = match want.which {
         Which::Settings => {
-            let Ok((segment, bytes)) = card.text(b"PARAMS", b"TXT") else { return none };
-            let answer = Answer { found: Ok(0), bytes, ..none.answer };
-            return Looked { answer, segment: Some(segment) };
+            let Some((segment, bytes)) = card.settings() else { return none };
+            return Looked { answer: Answer { found: Ok(()), bytes, ..none.answer }, segment: Some(segment) };
         }
         Which::Same(log) => {
             if let Some(Found { answer, mut segment }) = last.filter(|last| last.answer.log == log)
@@ -265,43 +278,46 @@ fn find<D: CardDevice>(recorder: &mut Recorder<'_, D>, want: &Want, last: Option
             {
                 return Looked { answer, segment: Some(segment) };
             }
-            Some(log.name)
+            card.shown_log(log.name)
         }
-        Which::Named(name) => Some(name),
-        Which::At(_) => None,
+        Which::Named(name) => card.shown_log(name),
+        Which::At(place) if place >= answer.count => return of_none(NoLog::Absent),
+        Which::At(place) => at_place(card, place, listed),
     };
-    let mut answer = none.answer;
-    // FNV-1a (Fowler, Noll, Vo) over the names.
-    answer.directory = 0x811c_9dc5;
-    let mut found = None;
-    let listed = card.logs(|entry| {
-        if entry.hidden {
-            return;
-        }
-        for word in [entry.name.session, entry.name.segment] {
-            answer.directory = (answer.directory ^ word).wrapping_mul(0x0100_0193);
-        }
-        if want.which == Which::At(answer.count) || name == Some(entry.name) {
-            found = Some((answer.count, entry.name));
-        }
-        answer.count = answer.count.saturating_add(1);
-    });
-    let of_none = |why| Looked { answer: answer.without(why), segment: None };
-    if listed.is_err() {
-        return Looked { answer: none.answer.without(NoLog::Unread), segment: None };
-    }
-    let Some((place, name)) = found else { return of_none(NoLog::Absent) };
-    let Ok(mut segment) = card.segment(name) else { return of_none(NoLog::Unread) };
-    let measured = match recorded.filter(|recorded| recorded.name == name) {
+    let entry = match found {
+        Ok(Some(entry)) => entry,
+        Ok(None) => return of_none(NoLog::Absent),
+        Err(_) => return Looked { answer: none.answer.without(NoLog::Unread), segment: None },
+    };
+    let mut segment = Segment::of(&entry);
+    let measured = match recorded.filter(|recorded| recorded.name == entry.name) {
         Some(recorded) => Some(in_work(&recorded)),
-        None => measure(card, &mut segment, name),
+        None => measure(card, &mut segment, entry.name),
     };
     let Some((log, blocks)) = measured else { return of_none(NoLog::Unread) };
     if matches!(want.which, Which::Same(wanted) if wanted != log) {
         return of_none(NoLog::Absent);
     }
-    (answer.log, answer.bytes, answer.found) = (log, blocks * Block::LEN_U32, Ok(place));
+    (answer.log, answer.bytes, answer.found) = (log, blocks * Block::LEN_U32, Ok(()));
+    answer.utc_secs = entry.utc_secs;
     Looked { answer, segment: Some(segment) }
+}
+
+/// The log at this place of the list: from the one on that was looked up before, where the directory is the same.
+fn at_place<D: CardDevice>(
+    card: &Card<'_, D>,
+    place: u16,
+    listed: &mut Listed,
+) -> Result<Option<LogEntry>, CardError<D::Error>> {
+    let (_, names) = card.shown();
+    if listed.names != names || listed.place > place {
+        *listed = Listed { names, ..Listed::default() };
+    }
+    let found = card.shown_behind(listed.entry, place - listed.place)?;
+    if let Some((entry, _)) = found {
+        (listed.place, listed.entry) = (place, entry);
+    }
+    Ok(found.map(|(_, log)| log))
 }
 
 /// Copies what there is from the answer's offset on; how many bytes.

@@ -13,51 +13,35 @@ use hums_blackbox::record::{Before, Found};
 use hums_blackbox::{GROUP_SECTORS, Header, Sector};
 
 use crate::CardDevice;
-use crate::card::{Card, CardError, Segment};
-use crate::name::LogName;
+use crate::card::{Card, CardError, LogEntry, Segment};
+use crate::directory::Newest;
 
 /// Blocks that are looked at for one sound sector: a damaged page is not the end.
 const PROBE_BLOCKS: u32 = 9;
-/// Segments that are looked at, the newest first: one that was made when the power went has no sector yet.
-const SEGMENTS_MAX: u32 = 3;
-
-/// What the newest log on the card, whose last segment is `newest`, ended with.
-pub(super) fn look<D: CardDevice>(card: &Card<'_, D>, newest: LogName) -> Before {
-    let unreadable = Before { found: Found::Unreadable, number: newest.session, ..Before::default() };
+/// Where the newest log on the card ended. A segment that was made when the power went has no sector: then the one before it counts.
+pub(super) fn look<D: CardDevice>(card: &Card<'_, D>, newest: &Newest) -> Before {
+    let number = newest.first().map_or(0, |newest| newest.name.session);
+    let unreadable = Before { found: Found::Unreadable, number, ..Before::default() };
     search(card, newest).ok().flatten().unwrap_or(unreadable)
 }
 
-fn search<D: CardDevice>(card: &Card<'_, D>, newest: LogName) -> Result<Option<Before>, CardError<D::Error>> {
-    let mut name = newest;
-    for _ in 0..SEGMENTS_MAX {
-        let older = older(card, name)?;
-        if let Some(before) = end_of(card, name, older)? {
+fn search<D: CardDevice>(card: &Card<'_, D>, newest: &Newest) -> Result<Option<Before>, CardError<D::Error>> {
+    let mut older = newest.iter();
+    while let Some(entry) = older.next() {
+        if let Some(before) = end_of(card, entry, older.as_slice().first())? {
             return Ok(Some(before));
         }
-        let Some(older) = older else { break };
-        name = older;
     }
     Ok(None)
-}
-
-/// The newest segment that is older than this one.
-fn older<D: CardDevice>(card: &Card<'_, D>, than: LogName) -> Result<Option<LogName>, CardError<D::Error>> {
-    let mut older = None;
-    card.logs(|entry| {
-        if entry.name < than {
-            older = older.max(Some(entry.name));
-        }
-    })?;
-    Ok(older)
 }
 
 /// Where this segment ends; `None` where it has no sector of its own. `older` is the segment before it.
 fn end_of<D: CardDevice>(
     card: &Card<'_, D>,
-    name: LogName,
-    older: Option<LogName>,
+    entry: &LogEntry,
+    older: Option<&LogEntry>,
 ) -> Result<Option<Before>, CardError<D::Error>> {
-    let mut segment = card.segment(name)?;
+    let mut segment = Segment::of(entry);
     let mut reader = Reader { card, segment: &mut segment, block: Block::new() };
     let begin = match older.and_then(|older| Some((older, first(card, older).ok()??))) {
         None => reader.probe(0, |_| true)?,
@@ -66,7 +50,7 @@ fn end_of<D: CardDevice>(
                 |header: &Header| header.session == before.session && is_later(header.number, before.number);
             match reader.probe(0, goes_on)? {
                 // A further segment of a log has nothing else; a log's first one may be of another power-on.
-                None if older.session != name.session => {
+                None if older.name.session != entry.name.session => {
                     reader.probe(0, |header| header.session != before.session)?
                 }
                 found => found,
@@ -91,7 +75,7 @@ fn end_of<D: CardDevice>(
     let end = reader.end(base, last, &header)?;
     Ok(Some(Before {
         found: if end.is_some() { Found::Frames } else { Found::Sectors },
-        number: name.session,
+        number: entry.name.session,
         session,
         sectors: header.number.wrapping_add(1),
         frames: end.map_or(0, |(frames, _)| frames),
@@ -100,8 +84,8 @@ fn end_of<D: CardDevice>(
 }
 
 /// The first sound sector of a segment.
-fn first<D: CardDevice>(card: &Card<'_, D>, name: LogName) -> Result<Option<Header>, CardError<D::Error>> {
-    let mut segment = card.segment(name)?;
+fn first<D: CardDevice>(card: &Card<'_, D>, entry: &LogEntry) -> Result<Option<Header>, CardError<D::Error>> {
+    let mut segment = Segment::of(entry);
     let mut reader = Reader { card, segment: &mut segment, block: Block::new() };
     Ok(reader.probe(0, |_| true)?.map(|(_, header)| header))
 }

@@ -1,12 +1,12 @@
 //! Which segment is written: the session's next one, made where there is room and else in the place of the oldest.
 
 use hums_blackbox::record::{Before, Found};
-use hums_blackbox::{GROUP_SECTORS, SECTOR_BYTES};
 use hums_core::clock::Instant;
 
 use super::before;
 use crate::CardDevice;
-use crate::card::{Card, CardError, LogEntry, SEGMENT_BYTES_MAX};
+use crate::card::{Card, CardError, SEGMENT_BYTES_MAX};
+use crate::directory::Newest;
 use crate::name::LogName;
 use crate::status::{CardState, CardStatus};
 
@@ -15,9 +15,6 @@ const SEGMENTS_MIN: u64 = 16;
 
 /// Bytes of a segment for what another one did not take: 30 s of a full line (921,600 baud).
 const SHORT_SEGMENT_BYTES: u32 = 256 * 1024;
-
-/// Logs without their clusters that are passed by for one that can be written anew: each takes a walk over the directory.
-const UNCHAINED_MAX: usize = 8;
 
 /// The session's log on the card that is in.
 #[derive(Clone, Copy)]
@@ -51,15 +48,15 @@ pub(super) struct Segments<'a> {
     pub(super) log: Option<Log>,
     /// The card in the slot has a segment of it.
     pub(super) is_open: bool,
-    /// The newest segment that was on the card before the session, until it was looked at.
-    earlier: Option<LogName>,
+    /// The newest segments that were on the card before the session, until they were looked at.
+    earlier: Newest,
     /// The open segment has a date in its directory entry, or there was trouble with it.
     is_dated: bool,
 }
 
 impl<'a> Segments<'a> {
     pub(super) const fn new(status: &'a CardStatus, entropy: u32) -> Self {
-        Self { status, entropy, log: None, is_open: false, earlier: None, is_dated: false }
+        Self { status, entropy, log: None, is_open: false, earlier: Newest::new(), is_dated: false }
     }
 
     /// A number for a card that is formatted now.
@@ -74,18 +71,16 @@ impl<'a> Segments<'a> {
         card: &mut Card<'_, D>,
     ) -> Result<bool, CardError<D::Error>> {
         let volume_id = card.layout().volume_id;
-        let newest = card.newest_name()?;
+        let (newest, next) = card.next_session();
         let resumed = self.log.filter(|log| log.volume_id == volume_id && newest == Some(log.name));
         let log = if let Some(log) = resumed {
             log
         } else {
-            self.earlier = newest;
+            self.earlier = card.newest().clone();
             if newest.is_none() {
                 self.status.set_before(&Before { found: Found::Nothing, ..Before::default() });
             }
-            let name = newest.map_or(Some(LogName { session: 1, segment: 0 }), LogName::next_session);
-            // The numbers end at 99,999; the last session number then goes on with its segments.
-            let name = name.or_else(|| newest.and_then(LogName::next_segment)).ok_or(CardError::Full)?;
+            let name = next.ok_or(CardError::Full)?;
             let session = mix(mix(volume_id, name.session), self.entropy);
             Log { name, session, volume_id, base: None, newest_copy: NewestCopy::Further }
         };
@@ -109,8 +104,9 @@ impl<'a> Segments<'a> {
     // Not within its callers: what it takes of the stack is not to lie below what makes a segment.
     #[inline(never)]
     pub(super) fn look_before<D: CardDevice>(&mut self, card: &Card<'_, D>) {
-        if let Some(newest) = self.earlier.take() {
-            self.status.set_before(&before::look(card, newest));
+        let earlier = core::mem::take(&mut self.earlier);
+        if !earlier.is_empty() {
+            self.status.set_before(&before::look(card, &earlier));
         }
     }
 
@@ -140,7 +136,7 @@ impl<'a> Segments<'a> {
         self.open(log.name.next_segment().ok_or(CardError::Full)?, is_short, card)
     }
 
-    /// Makes a segment, or overwrites the oldest one when the card has no room.
+    /// Makes a segment, or overwrites the oldest log when the card has no room.
     fn open<D: CardDevice>(
         &mut self,
         name: LogName,
@@ -172,49 +168,10 @@ impl<'a> Segments<'a> {
             Err(CardError::Full) => {}
             Err(error) => return Err(error),
         }
-        let of = card.device(D::keeps_logs).unwrap_or_default().then_some(name.session);
-        let oldest = oldest(card, name, of)?;
         self.look_before(card);
-        card.recycle(&oldest, name)?;
+        card.recycle_oldest(name)?;
         Ok(true)
     }
-}
-
-/// The oldest log that may be overwritten. A few whose clusters are no longer chained are passed by.
-fn oldest<D: CardDevice>(
-    card: &Card<'_, D>,
-    except: LogName,
-    of: Option<u32>,
-) -> Result<LogEntry, CardError<D::Error>> {
-    let mut after = None;
-    for _ in 0..UNCHAINED_MAX {
-        let oldest = oldest_behind(card, except, of, after)?.ok_or(CardError::Full)?;
-        if card.is_chained(&oldest)? {
-            return Ok(oldest);
-        }
-        after = Some(oldest.name);
-    }
-    Err(CardError::Damaged)
-}
-
-/// The oldest log that may be written anew: one of session `of`, where only these may, and one behind `after`.
-fn oldest_behind<D: CardDevice>(
-    card: &Card<'_, D>,
-    except: LogName,
-    of: Option<u32>,
-    after: Option<LogName>,
-) -> Result<Option<LogEntry>, CardError<D::Error>> {
-    let mut oldest: Option<LogEntry> = None;
-    let open = card.open_name();
-    card.logs(|entry| {
-        let usable = entry.bytes as usize >= 2 * GROUP_SECTORS * SECTOR_BYTES;
-        let older = oldest.is_none_or(|oldest| entry.name < oldest.name);
-        let allowed = of.is_none_or(|session| session == entry.name.session) && Some(entry.name) > after;
-        if usable && older && allowed && entry.name != except && Some(entry.name) != open {
-            oldest = Some(entry);
-        }
-    })?;
-    Ok(oldest)
 }
 
 /// Mixes two numbers into one whose every bit depends on all of theirs (the finalizer of `MurmurHash3`).

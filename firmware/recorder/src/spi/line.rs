@@ -165,6 +165,12 @@ impl<P: Port> Line<P> {
         self.ready(BUSY_MAX)
     }
 
+    /// Ends a read of many blocks, in the middle of the next one (7.2.3).
+    pub(super) fn stop_reading(&mut self) -> Result<(), SpiError> {
+        self.command_now(STOP_TRANSMISSION, 0)?;
+        self.ready(BUSY_MAX)
+    }
+
     /// Ends a write of many blocks that went well.
     pub(super) fn stop(&mut self) -> Result<(), SpiError> {
         // The byte after the token is not yet the card's busy signal.

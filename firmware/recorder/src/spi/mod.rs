@@ -25,7 +25,7 @@ mod registers;
 use core::cell::RefCell;
 
 use embedded_sdmmc::{Block, BlockCount, BlockDevice, BlockIdx};
-use hums_core::clock::Span;
+use hums_core::clock::{Instant, Span};
 
 pub use error::SpiError;
 pub use line::BUSY_MAX;
@@ -41,6 +41,7 @@ pub const SERVICE_MAX: Span = Span::from_secs(8);
 pub const TRIES: u32 = 3;
 
 const READ: u8 = 17;
+const READ_MANY: u8 = 18;
 const ERASE_BEFORE: u8 = 23;
 const WRITE: u8 = 24;
 const WRITE_MANY: u8 = 25;
@@ -116,9 +117,16 @@ fn address(card: &Identity, block: u32, count: usize) -> Result<u32, SpiError> {
     address.ok_or(SpiError::OutOfRange)
 }
 
-fn read_one<P: Port>(line: &mut Line<P>, address: u32, block: &mut Block) -> Result<(), SpiError> {
-    line.must(READ, address)?;
-    line.receive(&mut block.contents)
+fn read<P: Port>(line: &mut Line<P>, address: u32, blocks: &mut [Block]) -> Result<(), SpiError> {
+    if let [block] = blocks {
+        line.must(READ, address)?;
+        return line.receive(&mut block.contents);
+    }
+    line.must(READ_MANY, address)?;
+    let received = blocks.iter_mut().try_for_each(|block| line.receive(&mut block.contents));
+    // What went wrong first is what counts.
+    let stopped = line.stop_reading();
+    received.and(stopped)
 }
 
 fn write<P: Port>(line: &mut Line<P>, address: u32, blocks: &[Block]) -> Result<(), SpiError> {
@@ -156,13 +164,11 @@ fn give_many<P: Port>(line: &mut Line<P>, address: u32, blocks: &[Block]) -> Res
 impl<P: Port> BlockDevice for SpiCard<P> {
     type Error = SpiError;
 
-    /// One command a block: nothing here reads many in a row.
     fn read(&self, blocks: &mut [Block], start: BlockIdx) -> Result<(), SpiError> {
-        let mut inner = self.inner.borrow_mut();
-        for (index, block) in (start.0..).zip(blocks) {
-            inner.access(|line, card| read_one(line, address(card, index, 1)?, block))?;
+        if blocks.is_empty() {
+            return Ok(());
         }
-        Ok(())
+        self.inner.borrow_mut().access(|line, card| read(line, address(card, start.0, blocks.len())?, blocks))
     }
 
     fn write(&self, blocks: &[Block], start: BlockIdx) -> Result<(), SpiError> {
@@ -191,6 +197,10 @@ impl<P: Port> CardDevice for SpiCard<P> {
     fn begin_service(&self) {
         let mut inner = self.inner.borrow_mut();
         inner.line.deadline = Some(inner.line.port.now() + SERVICE_MAX);
+    }
+
+    fn now(&self) -> Instant {
+        self.inner.borrow().line.port.now()
     }
 
     fn take_retries(&self) -> u32 {

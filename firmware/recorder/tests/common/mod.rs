@@ -7,7 +7,7 @@ use std::rc::Rc;
 
 use embedded_sdmmc::{Block, BlockCount, BlockDevice, BlockIdx};
 use hums_recorder::format::format;
-use hums_recorder::{CardDevice, HeldBlocks};
+use hums_recorder::{Buffers, CardDevice};
 
 /// Blocks of a mebibyte.
 pub const MIB_BLOCKS: u32 = 2048;
@@ -133,6 +133,6 @@ impl CardDevice for MemCard {
 }
 
 /// Room for a gate to hold blocks back in, for as long as the test runs.
-pub fn held() -> &'static HeldBlocks {
+pub fn held() -> &'static Buffers {
     Box::leak(Box::default())
 }

@@ -6,11 +6,12 @@ use anyhow::Result;
 use embedded_sdmmc::{Block, BlockCount, BlockDevice, BlockIdx};
 use hums_blackbox::Writer;
 use hums_core::Monitor;
+use hums_core::clock::Instant;
 use hums_core::params::Params;
 use hums_onboard::queues::Queues;
 use hums_onboard::{Mailbox, PortStatus, StoreStatus};
 use hums_recorder::status::CardReading;
-use hums_recorder::{CardDevice, CardStatus, HeldBlocks, Trouble};
+use hums_recorder::{Buffers, CardDevice, CardStatus, Trouble};
 
 use crate::card::SimCard;
 use crate::card::sim::CardError;
@@ -23,7 +24,7 @@ pub(super) struct Memory {
     pub(super) port_status: PortStatus,
     pub(super) store_status: StoreStatus,
     pub(super) mailbox: Mailbox,
-    pub(super) held: HeldBlocks,
+    pub(super) held: Buffers,
     pub(super) queues: Box<Queues>,
     pub(super) writer: Box<Writer>,
     pub(super) monitor: Box<Monitor>,
@@ -36,7 +37,7 @@ impl Memory {
             port_status: PortStatus::new(),
             store_status: StoreStatus::new(),
             mailbox: Mailbox::new(),
-            held: HeldBlocks::new(),
+            held: Buffers::new(),
             queues: Box::new(Queues::new()),
             writer: Box::new(Writer::new()),
             monitor: Box::new(Monitor::new(*params)),
@@ -64,27 +65,34 @@ pub(super) struct Outside<'a, 'w> {
 }
 
 /// The slot that the card is in, as the recorder sees it.
-pub(super) struct Slot<'a>(pub(super) &'a SimCard);
+pub(super) struct Slot<'a> {
+    pub(super) card: &'a SimCard,
+    pub(super) power_on_us: u64,
+}
 
 impl BlockDevice for Slot<'_> {
     type Error = CardError;
 
     fn read(&self, blocks: &mut [Block], start: BlockIdx) -> Result<(), CardError> {
-        self.0.read(blocks, start)
+        self.card.read(blocks, start)
     }
 
     fn write(&self, blocks: &[Block], start: BlockIdx) -> Result<(), CardError> {
-        self.0.write(blocks, start)
+        self.card.write(blocks, start)
     }
 
     fn num_blocks(&self) -> Result<BlockCount, CardError> {
-        self.0.num_blocks()
+        self.card.num_blocks()
     }
 }
 
 impl CardDevice for Slot<'_> {
+    fn now(&self) -> Instant {
+        Instant::from_micros(self.card.clock().saturating_sub(self.power_on_us))
+    }
+
     fn keeps_logs(&self) -> bool {
-        self.0.keeps_logs()
+        self.card.keeps_logs()
     }
 
     fn trouble(error: &CardError) -> Trouble {

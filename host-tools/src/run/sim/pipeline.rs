@@ -43,8 +43,8 @@ pub(super) struct Pipeline<'a, 'w> {
     tick_at: Instant,
     /// When storage goes on; `None` while it waits for a sector.
     storage_at: Option<Instant>,
-    /// Until when the card keeps storage, and how long that is in all: told to the others only when it is over.
-    busy: Option<(Instant, Span)>,
+    /// Until when the card keeps storage.
+    busy_until: Instant,
     /// When the GS port can take the next frame.
     gs_at: Instant,
     /// When the line counts as silent.
@@ -123,12 +123,17 @@ impl<'a, 'w> Pipeline<'a, 'w> {
             reception: Reception::new(port_status),
             uplink: Uplink::new(),
             monitoring,
-            storage: Storage::new(Slot(outside.card), card_status, held, entropy),
+            storage: Storage::new(
+                Slot { card: outside.card, power_on_us: outside.power_on_us },
+                card_status,
+                held,
+                entropy,
+            ),
             outside,
             now: Instant::ZERO,
             tick_at: Instant::ZERO + TICK,
             storage_at: Some(Instant::ZERO),
-            busy: None,
+            busy_until: Instant::ZERO,
             gs_at: Instant::ZERO,
             silent_at: None,
             uplink_silent_at: None,
@@ -194,15 +199,7 @@ impl<'a, 'w> Pipeline<'a, 'w> {
         self.after_monitor()
     }
 
-    /// Tells that the card is done with what it was asked, once it is.
-    fn end_service(&mut self) {
-        if let Some((_, took)) = self.busy.take_if(|(until, _)| *until <= self.now) {
-            self.slot_status.end_service(u32::try_from(took.as_millis()).unwrap_or(u32::MAX));
-        }
-    }
-
     fn tick(&mut self) -> Result<()> {
-        self.end_service();
         let Self { monitoring, ends, outside, now, .. } = self;
         let Outside { findings, power_on_us, .. } = outside;
         monitoring.tick(*now, &mut ends.sectors_in, &mut ends.gs_in, &mut |finding| {
@@ -251,12 +248,11 @@ impl<'a, 'w> Pipeline<'a, 'w> {
     /// Storage does one thing, and is busy for as long as the card took.
     fn storage(&mut self) {
         let begin_us = self.outside.power_on_us.saturating_add(self.now.as_micros());
-        self.end_service();
         self.outside.card.set_clock(begin_us);
         let service = self.storage.service(self.now, &mut self.ends.sectors_out);
         let served = service == Service::Idle && self.storage.serve(&mut self.ends.shelf);
         let took = Span::from_micros(self.outside.card.clock().saturating_sub(begin_us));
-        self.busy = Some((self.now + took, took));
+        self.busy_until = self.now + took;
         self.storage_at = match service {
             Service::Idle if self.ends.sectors_out.is_empty() && !served => None,
             Service::Wrote | Service::Idle => Some(self.now + took),

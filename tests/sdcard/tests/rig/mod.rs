@@ -18,7 +18,7 @@ use hums_link::frame::{Check, Frame};
 use hums_onboard::queues::{Ends, FRAME_BYTES_MAX, Queues};
 use hums_onboard::storage::NO_CARD_RETRY;
 use hums_onboard::{Monitoring, PortStatus, ResetCause, Service, Storage, Supervisor, Task};
-use hums_recorder::{Card, CardState, CardStatus, HeldBlocks, LogName, SpiCard};
+use hums_recorder::{Buffers, Card, CardState, CardStatus, LogName, SpiCard};
 use hums_sdcard::{MS, Medium, Model, SimPort, Slot};
 
 /// One frame of noise each so often: 2.5 kB/s of log.
@@ -78,7 +78,7 @@ impl Rig {
         let monitor = Box::leak(Box::new(Monitor::new(Params::defaults())));
         let writer = Box::leak(Box::new(Writer::new()));
         let identity = Boot { version: "1.2.3", board: "rig", ..Boot::default() };
-        let held: &HeldBlocks = Box::leak(Box::default());
+        let held: &Buffers = Box::leak(Box::default());
         let queues = Box::leak(Box::new(Queues::new()));
         let mut rig = Self {
             status,
@@ -123,7 +123,6 @@ impl Rig {
         let took = self.slot.now().since(begun);
         self.longest = self.longest.max(took);
         self.meanwhile();
-        self.status.end_service(took.as_millis() as u32);
         let now_ns = self.slot.now_ns();
         match service {
             Service::Wrote => self.slot.advance_to(now_ns + 1_000),
@@ -326,7 +325,7 @@ fn frame(system: u8, component: u8, id: u32, payload: &[u8]) -> Vec<u8> {
 /// Reads a card as `hums` does: its segments in order, one session after the other.
 #[track_caller]
 pub fn read(medium: &Medium) -> Found {
-    let (status, held) = (CardStatus::new(), HeldBlocks::new());
+    let (status, held) = (CardStatus::new(), Buffers::new());
     let mounted = Card::mount(medium.clone(), &status, &held);
     let card = mounted.map_err(|(_, error)| error.to_string()).expect("the card is in order");
     let mut sessions: BTreeMap<u32, Vec<LogName>> = BTreeMap::new();

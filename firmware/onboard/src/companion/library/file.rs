@@ -182,7 +182,9 @@ impl Job {
                 step
             }
             (Kind::Read { .. } | Kind::Burst { .. }, Some((answer, data))) => {
-                self.read(answer.bytes, data, &mut buffer, out)
+                // Without the part that was sent before the port was full.
+                let rest = data.get(reply.offset.wrapping_sub(answer.offset) as usize..).unwrap_or_default();
+                self.read(answer.bytes, rest, &mut buffer, out)
             }
             (Kind::Read { of: Open::Held(held), .. } | Kind::Burst { of: Open::Held(held), .. }, None) => {
                 let bytes = held.bytes();
@@ -196,9 +198,10 @@ impl Job {
 
     /// Sends what there is of a file of so many bytes, in messages of the size that was asked for, as far as the port's line allows.
     ///
-    /// "Burst complete" stands only in a message of the whole size: `MAVProxy` (`mavproxy_ftp.py`, 1.8.75) takes a
-    /// shorter one for the file's end. Where the line is too slow for that size, a burst ends without it, and the client
-    /// asks on when nothing more comes. The file's end is always said by itself.
+    /// A burst ends after [`BURST_BYTES`] with "burst complete", as those of `ArduPilot` and PX4 do: a client that has to wait for its
+    /// timeout at the end of each burst gives up. `MAVProxy` and pymavlink take a shorter message than they asked for with this mark
+    /// for the file's end. So where the line is too slow for messages of that size, the mark stands in a message without data. The
+    /// file's end is always said by itself.
     fn read(
         &mut self,
         bytes: u32,
@@ -212,7 +215,7 @@ impl Job {
             Kind::Read { size, .. } => (usize::from(size), 0),
             _ => return Step::Done,
         };
-        let size = asked.min(out.file_data_max());
+        let (size, is_burst) = (asked.min(out.file_data_max()), reply.opcode == ftp::BURST);
         let mut rest = data;
         loop {
             if reply.offset >= bytes {
@@ -220,6 +223,10 @@ impl Job {
             }
             let piece = rest.get(..size).unwrap_or(rest);
             let end = reply.offset.saturating_add(piece.len() as u32);
+            if is_burst && left == 0 {
+                reply.complete = true;
+                return out.file(reply.ack(&[], buffer), Step::Done);
+            }
             if data.is_empty() {
                 return out.file(reply.nak(Error::Fail, buffer), Step::Done);
             }
@@ -227,11 +234,11 @@ impl Job {
                 return Step::Next;
             }
             let is_last = left <= piece.len() as u32;
-            let is_burst = reply.opcode == ftp::BURST;
             reply.complete = is_burst && is_last && piece.len() == asked;
-            match out.file(reply.ack(piece, buffer), if is_last { Step::Done } else { Step::Next }) {
+            let is_done = reply.complete || !is_burst;
+            match out.file(reply.ack(piece, buffer), if is_done { Step::Done } else { Step::Next }) {
                 Step::Next => {
-                    left -= piece.len() as u32;
+                    left = left.saturating_sub(piece.len() as u32);
                     if let Kind::Burst { left: kept, .. } = kind {
                         *kept = left;
                     }

@@ -119,7 +119,8 @@ impl List {
         let is_last = self.next >= self.last || self.next + 1 >= count;
         let then = if is_last { self.end() } else { Step::Next };
         let step = match answer.found {
-            Ok(_) => out.say(&messages::log_entry(self.next + 1, count, count, answer.bytes, 0), then),
+            Ok(()) => out
+                .say(&messages::log_entry(self.next + 1, count, count, answer.bytes, answer.utc_secs), then),
             // It has a length that nobody knows.
             Err(_) => then,
         };
@@ -183,7 +184,8 @@ impl Data {
     }
 
     fn send(&mut self, answer: &Answer, data: &[u8], out: &mut Out<'_, '_, '_>) -> Step {
-        let mut rest = data;
+        // Without the part that was sent before the port was full.
+        let mut rest = data.get(self.offset.wrapping_sub(answer.offset) as usize..).unwrap_or_default();
         loop {
             let wanted = (self.end.saturating_sub(self.offset) as usize).min(DATA_BYTES);
             let piece = rest.get(..wanted).unwrap_or(rest);

@@ -133,23 +133,24 @@ impl Library {
             };
             let mut out = Out { now, asker: job.asker, ways };
             let step = self.step(&mut job, answered.as_ref(), &mut out);
-            match step {
-                Step::Done | Step::End(_) => self.job = None,
-                Step::Wait | Step::Next => {
-                    self.job = Some(job);
-                    self.asked = false;
-                }
+            let goes_on = matches!(step, Step::Wait | Step::Next);
+            self.job = goes_on.then_some(job);
+            if step == Step::Wait {
+                // The answer stays in the queue until all of it is sent.
+                return None;
             }
-            match step {
-                Step::Wait => return None,
-                Step::End(reply) => return Some((job.asker.port, reply)),
-                Step::Next | Step::Done => {}
+            self.asked = false;
+            if answered.is_some() {
+                ways.queues.shelf.answer(|_, _| true);
+            }
+            if let Step::End(reply) = step {
+                return Some((job.asker.port, reply));
             }
         }
         None
     }
 
-    /// The answer to what is wanted, if it has come; asks for it, if nobody has.
+    /// The answer to what is wanted, if it has come, which stays in the queue; asks for it, if nobody has.
     fn answered(&mut self, (which, what): (Which, What), ways: &mut Ways) -> Option<Answered> {
         let ticket = self.ticket;
         let mut seen = None;
@@ -162,7 +163,7 @@ impl Library {
                     let _ = copy.extend_from_slice(data);
                     seen = Some((*answer, copy));
                 }
-                true
+                answer.ticket != ticket
             })
         {}
         if seen.is_none() && !self.asked {

@@ -30,10 +30,7 @@ impl Pipeline<'_, '_> {
             self.now = at;
             self.storage();
         }
-        if let Some((until, _)) = self.busy {
-            self.now = self.now.max(until);
-            self.end_service();
-        }
+        self.now = self.now.max(self.busy_until);
         self.storage.finish();
         // The port sends what it has, at its pace.
         self.now = self.now.max(self.gs_at);

@@ -1,16 +1,16 @@
 //! What is in the card's slot: a device without a usable card, a card, or one that is being formatted.
 
+use super::Buffers;
 use crate::CardDevice;
 use crate::card::{Card, CardError};
 use crate::format::{FormatError, Formatting};
-use crate::gate::HeldBlocks;
 use crate::status::CardStatus;
 
 #[expect(
     clippy::large_enum_variant,
     reason = "one of these exists, in a static: its largest variant is the budget"
 )]
-pub(super) enum Slot<'a, D: CardDevice> {
+pub(super) enum Socket<'a, D: CardDevice> {
     /// The device, while no usable card is in it.
     Waiting(D),
     Mounted(Card<'a, D>),
@@ -20,21 +20,21 @@ pub(super) enum Slot<'a, D: CardDevice> {
     Moving,
 }
 
-impl<'a, D: CardDevice> Slot<'a, D> {
+impl<'a, D: CardDevice> Socket<'a, D> {
     /// Opens the card that is in; `false` where the slot is not waiting for one.
     // Not within its caller: the volumes that are moved here are not to lie on the stack below what follows.
     #[inline(never)]
     pub(super) fn mount(
         &mut self,
         status: &'a CardStatus,
-        held: &'a HeldBlocks,
+        buffers: &'a Buffers,
     ) -> Result<bool, CardError<D::Error>> {
         if !matches!(self, Self::Waiting(_)) {
             return Ok(false);
         }
         let Self::Waiting(device) = core::mem::replace(self, Self::Moving) else { return Ok(false) };
         device.reset();
-        match Card::mount(device, status, held) {
+        match Card::mount(device, status, buffers) {
             Ok(card) => {
                 *self = Self::Mounted(card);
                 Ok(true)
@@ -49,7 +49,7 @@ impl<'a, D: CardDevice> Slot<'a, D> {
     /// Closes the card that is in.
     pub(super) fn release(&mut self) {
         *self = match core::mem::replace(self, Self::Moving) {
-            Self::Mounted(card) => card.unmount().map_or(Self::Moving, Self::Waiting),
+            Self::Mounted(card) => Self::Waiting(card.unmount()),
             other => other,
         };
     }
@@ -79,7 +79,7 @@ impl<'a, D: CardDevice> Slot<'a, D> {
     pub(super) fn begin_service(&self) {
         match self {
             Self::Waiting(device) | Self::Formatting(device, _) => device.begin_service(),
-            Self::Mounted(card) => card.device(D::begin_service).unwrap_or_default(),
+            Self::Mounted(card) => card.device().begin_service(),
             Self::Moving => {}
         }
     }
@@ -87,7 +87,7 @@ impl<'a, D: CardDevice> Slot<'a, D> {
     /// What the device tried again since it was asked last.
     pub(super) fn take_retries(&self) -> u32 {
         match self {
-            Self::Mounted(card) => card.device(D::take_retries).unwrap_or_default(),
+            Self::Mounted(card) => card.device().take_retries(),
             Self::Waiting(_) | Self::Formatting(..) | Self::Moving => 0,
         }
     }

@@ -1,0 +1,413 @@
+//! The root directory: one walk over it when a card is mounted tells all that recording needs of it.
+//!
+//! The walk notes the newest logs, the oldest ones, where the next entry goes, and how many clusters logs have. So a new segment
+//! needs no walk. Once the oldest logs that were noted are overwritten, the next segment takes another walk.
+//!
+//! # Clusters that a log claims although the FAT calls them free
+//! A card that lost power may have kept a log's directory entry and lost blocks of the FAT. The next segment would be written over
+//! that log. A segment mostly lies in a row, so that its clusters are known all the same: as many as its size takes, from the
+//! first one on. Where the FAT follows this row up to an entry that says "free", which no sound chain holds, the free entries of
+//! the row are chained again. Clusters that belong to anything are not touched, and a log whose chain leaves the row is passed
+//! over. Behind the last cluster that any log claims, this need not be looked for ([`Directory::is_verified`]).
+
+use core::ops::{ControlFlow, Range};
+
+use embedded_sdmmc::Block;
+use heapless::Vec;
+
+use crate::CardDevice;
+use crate::card::{CardError, LogEntry, Place, SEGMENT_BYTES_MAX};
+use crate::chain::ClusterChain;
+use crate::name::LogName;
+use crate::status::utc_secs;
+use crate::volume::{END_OF_CHAIN, ENTRIES, Volume, entry, set_entry};
+
+/// Entries that a root directory may have before its chain counts as going in circles.
+const ENTRIES_MAX: u32 = 131_072;
+/// Entries of a block.
+pub(crate) const BLOCK_ENTRIES: u32 = Block::LEN_U32 / ENTRY_BYTES as u32;
+/// Logs that are noted: the newest, and the oldest that may be overwritten.
+const NEWEST_MAX: usize = 4;
+const OLDEST_MAX: usize = 16;
+/// Deleted entries that are noted, for new ones.
+const DELETED_MAX: usize = 8;
+/// The shortest log that may be overwritten: two groups.
+const OVERWRITTEN_MIN: u32 = 2 * (hums_blackbox::GROUP_SECTORS * hums_blackbox::SECTOR_BYTES) as u32;
+/// FAT blocks of which one walk looks for claims.
+pub(crate) const VERIFY_BLOCKS: u32 = 64;
+
+/// Bytes of an entry, and the offsets of its attributes, of the times when the file was made and written (time and date), of both
+/// halves of its first cluster's number, and of its length.
+pub(crate) const ENTRY_BYTES: usize = 32;
+pub(crate) const ATTRIBUTES: usize = LogName::SHORT_BYTES;
+pub(crate) const MADE: usize = 14;
+pub(crate) const WRITTEN: usize = 22;
+pub(crate) const CLUSTER_HIGH: usize = 20;
+pub(crate) const CLUSTER_LOW: usize = 26;
+pub(crate) const LENGTH: usize = 28;
+
+/// Attributes: not shown in lists; no file but a volume's label, a directory, or a part of a long name; written since a backup.
+pub(crate) const HIDDEN: u8 = 0x02;
+const NO_FILE: u8 = 0x18;
+const LONG_NAME: u8 = 0x0F;
+pub(crate) const ARCHIVE: u8 = 0x20;
+
+/// First bytes of an entry: none from here on, and a deleted one.
+const NEVER_USED: u8 = 0;
+const DELETED: u8 = 0xE5;
+
+pub(crate) type Entry = [u8; ENTRY_BYTES];
+
+/// The file of parameters, as an entry has its name.
+const SETTINGS: &[u8; LogName::SHORT_BYTES] = b"PARAMS  TXT";
+
+/// The newest logs of a card, the newest first.
+pub(crate) type Newest = Vec<LogEntry, NEWEST_MAX>;
+
+/// What is known of the root directory.
+pub(crate) struct Directory {
+    root: ClusterChain,
+    /// The newest names below the last session number. A folder has the length 0.
+    pub(crate) newest: Newest,
+    /// The newest name of the last session number.
+    last: Option<LogName>,
+    /// The oldest logs that may be overwritten, the oldest first.
+    pub(crate) oldest: Vec<LogEntry, OLDEST_MAX>,
+    deleted: Vec<u32, DELETED_MAX>,
+    /// The first entry that was never used.
+    end: u32,
+    /// Clusters that logs have. None has more than a segment can have, whatever its entry says.
+    pub(crate) clusters: u32,
+    /// Logs that are not hidden, and a sum over their names.
+    pub(crate) shown: u16,
+    pub(crate) names: u32,
+    /// First cluster and length of the file of parameters.
+    pub(crate) settings: Option<(u32, u32)>,
+    /// Behind all clusters that logs claim.
+    claimed_end: u32,
+    /// FAT blocks that were looked through for claims.
+    verified: Range<u32>,
+}
+
+impl Directory {
+    /// Nothing is known.
+    pub(crate) const fn new(root: u32) -> Self {
+        Self {
+            root: ClusterChain::new(root),
+            newest: Vec::new(),
+            last: None,
+            oldest: Vec::new(),
+            deleted: Vec::new(),
+            end: 0,
+            clusters: 0,
+            shown: 0,
+            names: 0,
+            settings: None,
+            claimed_end: 0,
+            verified: 0..0,
+        }
+    }
+
+    /// Walks over the whole directory, and chains again what logs claim of the FAT from this block on; whether there was any. Where
+    /// `of` is given, only logs of that session may be overwritten.
+    pub(crate) fn learn<D: CardDevice>(
+        &mut self,
+        volume: &Volume<'_, D>,
+        buffer: &mut [Block],
+        verify: u32,
+        of: Option<u32>,
+    ) -> Result<bool, CardError<D::Error>> {
+        let verified = verify..verify.saturating_add(VERIFY_BLOCKS).min(volume.layout.fat_blocks);
+        *self = Self::new(volume.layout.root);
+        let (mut root, mut changed) = (self.root, false);
+        self.end = walk(volume, &mut root, 0, buffer, &mut |slot| {
+            if slot.bytes[0] == DELETED {
+                // Of more than these the rest stays unused until the next walk.
+                let _ = self.deleted.push(slot.index);
+            } else if slot.is_file(SETTINGS) {
+                self.settings = Some((slot.first(), slot.bytes()));
+            } else if let Some(row) = self.note(volume, slot, of) {
+                changed |= mend(volume, &row, &verified)?;
+            }
+            Ok(ControlFlow::Continue(()))
+        })?;
+        (self.root, self.verified) = (root, verified);
+        Ok(changed)
+    }
+
+    /// Notes an entry; the clusters that it claims, if it is a log's.
+    fn note<D: CardDevice>(
+        &mut self,
+        volume: &Volume<'_, D>,
+        slot: &Slot<'_>,
+        of: Option<u32>,
+    ) -> Option<Range<u32>> {
+        let entry = slot.log()?;
+        self.note_newest(entry);
+        if entry.bytes == 0 {
+            return None;
+        }
+        if !entry.hidden {
+            self.show(entry.name);
+        }
+        let claimed = clusters_of(volume, entry.bytes);
+        self.clusters = self.clusters.saturating_add(clusters_of(volume, entry.bytes.min(SEGMENT_BYTES_MAX)));
+        if entry.bytes >= OVERWRITTEN_MIN && of.is_none_or(|session| session == entry.name.session) {
+            let place = self.oldest.partition_point(|older| older.name < entry.name);
+            if self.oldest.is_full() && place < OLDEST_MAX {
+                self.oldest.pop();
+            }
+            // No place for it: it is newer than all of them.
+            let _ = self.oldest.insert(place, entry);
+        }
+        let end = entry.first.checked_add(claimed).filter(|end| volume.is_cluster(end.saturating_sub(1)))?;
+        self.claimed_end = self.claimed_end.max(end);
+        volume.is_cluster(entry.first).then_some(entry.first..end)
+    }
+
+    fn note_newest(&mut self, entry: LogEntry) {
+        if entry.name.session == LogName::SESSION_MAX {
+            self.last = self.last.max(Some(entry.name));
+            return;
+        }
+        let place = self.newest.partition_point(|newer| newer.name > entry.name);
+        if self.newest.is_full() && place < NEWEST_MAX {
+            self.newest.pop();
+        }
+        // No place for it: it is older than all of them.
+        let _ = self.newest.insert(place, entry);
+    }
+
+    /// One log more is shown, or one less: the sum of names is of both kinds of change.
+    fn show(&mut self, name: LogName) {
+        self.shown = self.shown.saturating_add(1);
+        self.names ^= hash(name);
+    }
+
+    /// A log is no longer shown.
+    pub(crate) fn hide(&mut self, name: LogName) {
+        self.shown = self.shown.saturating_sub(1);
+        self.names ^= hash(name);
+    }
+
+    /// A log of so many clusters more was made.
+    pub(crate) fn add(&mut self, entry: LogEntry, clusters: u32) {
+        self.note_newest(entry);
+        self.show(entry.name);
+        self.clusters = self.clusters.saturating_add(clusters);
+        self.claimed_end = self.claimed_end.max(entry.first.saturating_add(clusters));
+    }
+
+    /// The log `old` was overwritten by `new`.
+    pub(crate) fn replace(&mut self, old: &LogEntry, new: LogEntry) {
+        self.newest.retain(|entry| entry.name != old.name);
+        self.oldest.retain(|entry| entry.name != old.name);
+        if !old.hidden {
+            self.hide(old.name);
+        }
+        self.note_newest(new);
+        self.show(new.name);
+    }
+
+    /// The name from which the numbers of sessions go on, and the next session's first name. A session number that is in use is
+    /// passed over, so that a foreign file with the last number does not end the numbers.
+    pub(crate) fn next_session(&self) -> (Option<LogName>, Option<LogName>) {
+        let is_free = |name: &LogName| {
+            let is_last = name.session == LogName::SESSION_MAX && self.last.is_some();
+            !is_last && self.newest.iter().all(|entry| entry.name.session != name.session)
+        };
+        let after = |entry: &LogEntry| Some((entry.name, entry.name.next_session().filter(is_free)?));
+        match self.newest.iter().find_map(after) {
+            Some((newest, next)) => (Some(newest), Some(next)),
+            // The last session number goes on with its segments.
+            None if self.last.is_some() && !self.newest.is_empty() => {
+                (self.last, self.last.and_then(LogName::next_segment))
+            }
+            None => (None, Some(LogName { session: 1, segment: 0 })),
+        }
+    }
+
+    /// Whether no log may claim free clusters of these FAT blocks.
+    pub(crate) fn is_verified(&self, blocks: &Range<u32>, fat_blocks: u32) -> bool {
+        blocks.start * ENTRIES >= self.claimed_end && blocks.end <= fat_blocks
+            || blocks.start >= self.verified.start && blocks.end <= self.verified.end
+    }
+
+    /// The cluster behind all that logs claim.
+    pub(crate) const fn claimed_end(&self) -> u32 {
+        self.claimed_end
+    }
+
+    /// Where a new entry goes: the block and offset; `None`: the directory needs another cluster.
+    pub(crate) fn place_for_new<D: CardDevice>(
+        &mut self,
+        volume: &Volume<'_, D>,
+    ) -> Result<Option<Place>, CardError<D::Error>> {
+        let index = self.deleted.last().copied().unwrap_or(self.end);
+        let located = self.root.locate(volume, index / BLOCK_ENTRIES, 1)?;
+        Ok(located.map(|(block, _)| Place::of(block, index)))
+    }
+
+    /// The place for a new entry is taken.
+    pub(crate) fn take_place(&mut self) {
+        if self.deleted.pop().is_none() {
+            self.end += 1;
+        }
+    }
+
+    /// The last cluster of a directory that needs another one.
+    pub(crate) const fn last_cluster(&self) -> u32 {
+        self.root.last()
+    }
+}
+
+/// A place in the directory with what is there.
+pub(crate) struct Slot<'b> {
+    pub(crate) index: u32,
+    pub(crate) place: Place,
+    pub(crate) bytes: &'b Entry,
+}
+
+impl Slot<'_> {
+    /// A log, or a folder of a log's name, which has the length 0.
+    pub(crate) fn log(&self) -> Option<LogEntry> {
+        let name = LogName::from_short(&self.bytes[..8], &self.bytes[8..LogName::SHORT_BYTES])?;
+        let attributes = self.bytes[ATTRIBUTES];
+        let bytes = if attributes & NO_FILE == 0 { self.bytes() } else { 0 };
+        let hidden = attributes & HIDDEN != 0;
+        let utc_secs = utc_secs(self.bytes.get(WRITTEN..)?.first_chunk()?);
+        (attributes & LONG_NAME != LONG_NAME).then_some(LogEntry {
+            name,
+            bytes,
+            hidden,
+            utc_secs,
+            first: self.first(),
+            place: self.place,
+        })
+    }
+
+    /// Whether it is a file of this name, as an entry holds it.
+    pub(crate) fn is_file(&self, short: &[u8; LogName::SHORT_BYTES]) -> bool {
+        self.bytes.starts_with(short) && self.bytes[ATTRIBUTES] & NO_FILE == 0
+    }
+
+    /// The file's length in bytes.
+    pub(crate) fn bytes(&self) -> u32 {
+        self.bytes.last_chunk().map_or(0, |bytes| u32::from_le_bytes(*bytes))
+    }
+
+    /// The file's first cluster.
+    pub(crate) fn first(&self) -> u32 {
+        let half = |at: usize| u16::from_le_bytes([self.bytes[at], self.bytes[at + 1]]) as u32;
+        (half(CLUSTER_HIGH) << 16 | half(CLUSTER_LOW)) & 0x0FFF_FFFF
+    }
+}
+
+/// Shows `each` the used and deleted entries of a directory, from entry `from` on, as many blocks with one command as `buffer` has.
+/// Gives the first entry that was never used, or the one after that at which `each` broke off.
+pub(crate) fn walk<D: CardDevice>(
+    volume: &Volume<'_, D>,
+    chain: &mut ClusterChain,
+    from: u32,
+    buffer: &mut [Block],
+    each: &mut dyn FnMut(&Slot<'_>) -> Result<ControlFlow<()>, CardError<D::Error>>,
+) -> Result<u32, CardError<D::Error>> {
+    let mut index = from;
+    while index < ENTRIES_MAX {
+        let wanted = buffer.len() as u32;
+        let Some((block, in_row)) = chain.locate(volume, index / BLOCK_ENTRIES, wanted)? else {
+            return Ok(index);
+        };
+        let blocks = buffer.get_mut(..wanted.min(in_row) as usize).unwrap_or_default();
+        volume.read(blocks, block)?;
+        let mut entries = blocks.iter().flat_map(|block| block.contents.as_chunks::<ENTRY_BYTES>().0);
+        let first = index % BLOCK_ENTRIES;
+        for (at, bytes) in (first..).zip(entries.by_ref().skip(first as usize)) {
+            if bytes[0] == NEVER_USED {
+                return Ok(index);
+            }
+            let slot = Slot { index, place: Place::of(block + at / BLOCK_ENTRIES, index), bytes };
+            index += 1;
+            if each(&slot)?.is_break() {
+                return Ok(index);
+            }
+        }
+    }
+    Err(CardError::Damaged)
+}
+
+/// Clusters that so many bytes take.
+pub(crate) const fn clusters_of<D>(volume: &Volume<'_, D>, bytes: u32) -> u32 {
+    bytes.div_ceil(volume.layout.cluster_blocks * Block::LEN_U32)
+}
+
+/// A number for a name, such that a sum of several tells which they are.
+const fn hash(name: LogName) -> u32 {
+    let hash = (name.session << 7 | name.segment).wrapping_mul(0x9E37_79B1);
+    (hash ^ hash >> 15).wrapping_mul(0x85EB_CA6B)
+}
+
+/// Chains a log's row of clusters again where these blocks of the FAT lost it; whether they did.
+fn mend<D: CardDevice>(
+    volume: &Volume<'_, D>,
+    row: &Range<u32>,
+    blocks: &Range<u32>,
+) -> Result<bool, CardError<D::Error>> {
+    if row.start >= blocks.end * ENTRIES || row.end <= blocks.start * ENTRIES {
+        return Ok(false);
+    }
+    let Some(broken_at) = broken_at(volume, row)? else { return Ok(false) };
+    let lost = broken_at..row.end;
+    let mut changed = false;
+    for index in blocks.start.max(broken_at / ENTRIES)..blocks.end.min(row.end.div_ceil(ENTRIES)) {
+        changed |= chain_block(volume, index, &lost)?;
+    }
+    Ok(changed)
+}
+
+/// The first cluster of the row that the FAT calls free, where it follows the row up to there.
+#[inline(never)]
+fn broken_at<D: CardDevice>(
+    volume: &Volume<'_, D>,
+    row: &Range<u32>,
+) -> Result<Option<u32>, CardError<D::Error>> {
+    let mut cluster = row.start;
+    while cluster < row.end {
+        let [block] = volume.read_fat(cluster / ENTRIES)?;
+        for _ in cluster % ENTRIES..ENTRIES.min(row.end - cluster + cluster % ENTRIES) {
+            match entry(&block, cluster) {
+                0 => return Ok(Some(cluster)),
+                next if next == cluster + 1 => cluster = next,
+                _ => return Ok(None),
+            }
+        }
+    }
+    Ok(None)
+}
+
+/// Chains the free entries of one block of the FAT that lie in this row; whether there were any. One block is written in
+/// each copy of the FAT, and each of its entries is right by itself, however much of the block is.
+#[inline(never)]
+fn chain_block<D: CardDevice>(
+    volume: &Volume<'_, D>,
+    index: u32,
+    row: &Range<u32>,
+) -> Result<bool, CardError<D::Error>> {
+    let (first, end) = (row.start.max(index * ENTRIES), row.end.min((index + 1) * ENTRIES));
+    // What comes behind is chained to where it is free, and so the row's, too.
+    let mut next = if end < row.end { volume.entry(end)? } else { END_OF_CHAIN };
+    let mut block = volume.read_fat(index)?;
+    let mut changed = false;
+    for cluster in (first..end).rev() {
+        let old = entry(&block[0], cluster);
+        if old == 0 {
+            set_entry(&mut block[0], cluster, if next == 0 { cluster + 1 } else { END_OF_CHAIN });
+            changed = true;
+        }
+        next = old;
+    }
+    if changed {
+        volume.write_fat(&block, index)?;
+    }
+    Ok(changed)
+}

@@ -1,0 +1,240 @@
+//! Free clusters: found for one more segment, chained to be its own, and counted for the share of the card that logs can have.
+//!
+//! A segment of 8 MiB costs its FAT blocks and no more. The data of an earlier file stays in those clusters until it is
+//! overwritten: readers tell it by its session.
+
+use core::ops::Range;
+
+use embedded_sdmmc::Block;
+
+use crate::CardDevice;
+use crate::card::CardError;
+use crate::volume::{END_OF_CHAIN, ENTRIES, Volume, set_entry};
+
+/// FAT blocks that one call looks through, beside a segment's own: 64 ms of a usual card. All of a large card's FAT takes
+/// seconds, and no one service of the card may take so long.
+const SEARCH_BLOCKS: u32 = 128;
+
+/// Offset of the cluster in the information sector from which on to look for free ones, and of the number of free ones.
+const HINT: usize = 492;
+const FREE_COUNT: usize = 488;
+/// Signatures of the information sector (Microsoft's FAT specification 1.03, `FSInfo`), and their offsets.
+const SIGNATURES: [(usize, u32); 3] = [(0, 0x4161_5252), (484, 0x6141_7272), (508, 0xAA55_0000)];
+
+/// The search for free clusters, which goes on from segment to segment, and the count of all of them.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct FreeSearch {
+    /// The FAT block to look at next.
+    next: u32,
+    /// FAT blocks looked through since enough clusters were found, and free clusters in the last ones of them.
+    searched: u32,
+    found: u32,
+    /// The FAT block from which on these are.
+    first: u32,
+    /// So many clusters are looked for, and were not found by the call before; 0: none are.
+    wanted: u32,
+    /// So many clusters or more are not free. Nothing but another computer makes clusters free.
+    too_many: u32,
+    /// FAT blocks whose free entries are counted, and those.
+    counted: u32,
+    clusters: u32,
+}
+
+impl FreeSearch {
+    /// A search that begins at the cluster that the information sector names.
+    pub(crate) fn new<D: CardDevice>(volume: &Volume<'_, D>) -> Result<Self, CardError<D::Error>> {
+        let mut block = [Block::new()];
+        volume.read(&mut block, volume.layout.info)?;
+        let hint =
+            Some(word(&block[0], HINT)).filter(|hint| is_signed(&block[0]) && volume.is_cluster(*hint));
+        Ok(Self::at(hint.unwrap_or(0) / ENTRIES, u32::MAX))
+    }
+
+    const fn at(next: u32, too_many: u32) -> Self {
+        Self { next, searched: 0, found: 0, first: next, wanted: 0, too_many, counted: 0, clusters: 0 }
+    }
+
+    /// Begins at the FAT block after this cluster, where there is none free at the one that the information sector names.
+    pub(crate) fn begin<D: CardDevice>(
+        &mut self,
+        volume: &Volume<'_, D>,
+        cluster: u32,
+    ) -> Result<(), CardError<D::Error>> {
+        if volume.is_cluster(cluster) && free_in_block(volume, self.next)? == 0 {
+            *self = Self::at(cluster.div_ceil(ENTRIES) % volume.layout.fat_blocks, self.too_many);
+        }
+        Ok(())
+    }
+
+    /// The FAT block at which the search goes on.
+    pub(crate) const fn next(&self) -> u32 {
+        self.next
+    }
+
+    /// Counts the free clusters of one more block of the FAT; how many there are once all of it is counted.
+    pub(crate) fn count<D: CardDevice>(
+        &mut self,
+        volume: &Volume<'_, D>,
+    ) -> Result<Option<u32>, CardError<D::Error>> {
+        if self.counted >= volume.layout.fat_blocks {
+            return Ok(Some(self.clusters));
+        }
+        self.clusters += free_in_block(volume, self.counted)?;
+        self.counted += 1;
+        Ok(None)
+    }
+
+    /// Blocks of the FAT that tell of so many free clusters, no more of them than one call looks through; the search goes on at the
+    /// last of them. Those behind the FAT's end are those of its beginning.
+    ///
+    /// # Errors
+    ///
+    /// [`CardError::Searching`] where a part of the FAT was looked through and the next call looks further;
+    /// [`CardError::Full`] where all of it was.
+    pub(crate) fn find<D: CardDevice>(
+        &mut self,
+        volume: &Volume<'_, D>,
+        wanted: u32,
+    ) -> Result<Range<u32>, CardError<D::Error>> {
+        self.find_within(volume, wanted, SEARCH_BLOCKS + wanted / ENTRIES)
+    }
+
+    /// Goes on with a search that has not ended, one block of the FAT at a call. The next [`Self::find`] begins at what it found.
+    pub(crate) fn search_on<D: CardDevice>(
+        &mut self,
+        volume: &Volume<'_, D>,
+    ) -> Result<(), CardError<D::Error>> {
+        if self.wanted > 0 {
+            let found = self.find_within(volume, self.wanted, 1)?;
+            self.again(&found);
+        }
+        Ok(())
+    }
+
+    fn find_within<D: CardDevice>(
+        &mut self,
+        volume: &Volume<'_, D>,
+        wanted: u32,
+        blocks: u32,
+    ) -> Result<Range<u32>, CardError<D::Error>> {
+        if wanted >= self.too_many {
+            return Err(CardError::Full);
+        }
+        let fat_blocks = volume.layout.fat_blocks;
+        for _ in 0..blocks {
+            let free = free_in_block(volume, self.next % fat_blocks)?;
+            if self.found == 0 || self.next - self.first > SEARCH_BLOCKS + wanted / ENTRIES {
+                (self.first, self.found) = (self.next, 0);
+            }
+            self.found += free;
+            if self.found >= wanted {
+                let found = self.first..self.next + 1;
+                // The last block may have some left for the next segment. What is counted changes under the count.
+                *self = Self::at(self.next % fat_blocks, self.too_many);
+                return Ok(found);
+            }
+            self.next += 1;
+            self.searched += 1;
+            if self.searched >= fat_blocks {
+                *self = Self::at(self.next % fat_blocks, wanted);
+                return Err(CardError::Full);
+            }
+        }
+        self.wanted = wanted;
+        Err(CardError::Searching)
+    }
+
+    /// The blocks that were found last are to be looked through again.
+    pub(crate) const fn again(&mut self, found: &Range<u32>) {
+        (self.next, self.first) = (found.start, found.start);
+    }
+}
+
+/// Makes so many free clusters of these blocks of the FAT one chain; its first and its last one. The blocks are written from the
+/// last to the first, so that each entry names a cluster that is chained already.
+pub(crate) fn chain_free<D: CardDevice>(
+    volume: &Volume<'_, D>,
+    found: &Range<u32>,
+    wanted: u32,
+) -> Result<(u32, u32), CardError<D::Error>> {
+    let fat_blocks = volume.layout.fat_blocks;
+    let (mut end, mut before, mut in_last) = (found.start, 0, 0);
+    while before + in_last < wanted {
+        if end >= found.end {
+            return Err(CardError::Full);
+        }
+        before += in_last;
+        in_last = free_in_block(volume, end % fat_blocks)?;
+        end += 1;
+    }
+    let (last, mut next) =
+        chain_in_block(volume, end.saturating_sub(1) % fat_blocks, wanted - before, END_OF_CHAIN)?;
+    for index in (found.start..end.saturating_sub(1)).rev() {
+        if free_in_block(volume, index % fat_blocks)? > 0 {
+            (_, next) = chain_in_block(volume, index % fat_blocks, ENTRIES, next)?;
+        }
+    }
+    Ok((next, last))
+}
+
+/// Makes the free clusters of one block of the FAT a chain that goes on with `next`, or so many of them; the last one and the first.
+// Each function that holds a block is a call of its own, so that the stack never has two of them.
+#[inline(never)]
+fn chain_in_block<D: CardDevice>(
+    volume: &Volume<'_, D>,
+    index: u32,
+    most: u32,
+    next: u32,
+) -> Result<(u32, u32), CardError<D::Error>> {
+    let mut block = volume.read_fat(index)?;
+    let (mut first, mut last, mut taken) = (0, 0, 0);
+    for cluster in index * ENTRIES..(index + 1) * ENTRIES {
+        if taken == most || !volume.is_free(&block[0], cluster) {
+            continue;
+        }
+        set_entry(&mut block[0], cluster, next);
+        if taken == 0 {
+            first = cluster;
+        } else {
+            set_entry(&mut block[0], last, cluster);
+        }
+        (last, taken) = (cluster, taken + 1);
+    }
+    volume.write_fat(&block, index)?;
+    Ok((last, first))
+}
+
+/// Free clusters that one block of the FAT tells of.
+#[inline(never)]
+fn free_in_block<D: CardDevice>(volume: &Volume<'_, D>, index: u32) -> Result<u32, CardError<D::Error>> {
+    let [block] = volume.read_fat(index)?;
+    let clusters = index * ENTRIES..(index + 1) * ENTRIES;
+    Ok(clusters.filter(|cluster| volume.is_free(&block, *cluster)).count() as u32)
+}
+
+/// Writes the information sector: the next search for free clusters, on whatever computer, begins at this one. How many are free
+/// is not known, so that it can never be wrong. A damaged sector is mended.
+#[inline(never)]
+pub(crate) fn write_hint<D: CardDevice>(
+    volume: &Volume<'_, D>,
+    cluster: u32,
+) -> Result<(), CardError<D::Error>> {
+    let mut block = [Block::new()];
+    volume.read(&mut block, volume.layout.info)?;
+    if !is_signed(&block[0]) {
+        block = [Block::new()];
+    }
+    let words = [(FREE_COUNT, u32::MAX), (HINT, cluster)];
+    for (at, value) in SIGNATURES.into_iter().chain(words) {
+        block[0][at..at + 4].copy_from_slice(&value.to_le_bytes());
+    }
+    volume.write_metadata(&block, volume.layout.info)
+}
+
+fn is_signed(block: &Block) -> bool {
+    SIGNATURES.into_iter().all(|(at, signature)| word(block, at) == signature)
+}
+
+fn word(block: &Block, at: usize) -> u32 {
+    block.get(at..at + 4).and_then(|word| word.try_into().ok()).map_or(0, u32::from_le_bytes)
+}

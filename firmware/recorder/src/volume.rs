@@ -1,0 +1,127 @@
+//! A card's blocks as the file system accesses them: one command at a time, each of which is timed.
+
+use embedded_sdmmc::{Block, BlockIdx};
+
+use crate::CardDevice;
+use crate::card::CardError;
+use crate::layout::Layout;
+use crate::status::CardStatus;
+
+/// How often a block of the file system is tried to be written. A chain of which only a part was written takes clusters that no
+/// file has. The device bounds the time of all tries together ([`CardDevice::begin_service`]).
+const METADATA_TRIES: u32 = 8;
+
+/// FAT entries of a block.
+pub(crate) const ENTRIES: u32 = 128;
+/// The FAT entry of the last cluster of a chain.
+pub(crate) const END_OF_CHAIN: u32 = 0x0FFF_FFFF;
+
+/// A FAT32 volume: the card, and the place of everything on it.
+pub(crate) struct Volume<'a, D> {
+    device: D,
+    status: &'a CardStatus,
+    pub(crate) layout: Layout,
+}
+
+impl<'a, D: CardDevice> Volume<'a, D> {
+    pub(crate) const fn new(device: D, status: &'a CardStatus, layout: Layout) -> Self {
+        Self { device, status, layout }
+    }
+
+    /// The card.
+    pub(crate) const fn device(&self) -> &D {
+        &self.device
+    }
+
+    /// Gives the card back.
+    pub(crate) fn into_device(self) -> D {
+        self.device
+    }
+
+    /// Reads blocks that lie in a row.
+    pub(crate) fn read(&self, blocks: &mut [Block], at: u32) -> Result<(), CardError<D::Error>> {
+        self.command(|device| device.read(blocks, BlockIdx(at)))
+    }
+
+    /// Writes blocks that lie in a row.
+    pub(crate) fn write(&self, blocks: &[Block], at: u32) -> Result<(), CardError<D::Error>> {
+        self.command(|device| device.write(blocks, BlockIdx(at)))
+    }
+
+    /// Writes blocks of the file system, [`METADATA_TRIES`] times where that fails.
+    pub(crate) fn write_metadata(&self, blocks: &[Block], at: u32) -> Result<(), CardError<D::Error>> {
+        let mut written = self.write(blocks, at);
+        for _ in 1..METADATA_TRIES {
+            if written.is_ok() {
+                break;
+            }
+            written = self.write(blocks, at);
+        }
+        written
+    }
+
+    fn command<T>(&self, act: impl FnOnce(&D) -> Result<T, D::Error>) -> Result<T, CardError<D::Error>> {
+        self.status.begin_command(self.device.now());
+        let done = act(&self.device);
+        self.status.end_command(self.device.now());
+        done.map_err(CardError::Device)
+    }
+
+    /// Reads one block of the FAT.
+    pub(crate) fn read_fat(&self, index: u32) -> Result<[Block; 1], CardError<D::Error>> {
+        let mut block = [Block::new()];
+        self.read(&mut block, self.layout.fat_start + index)?;
+        Ok(block)
+    }
+
+    /// Writes one block of the FAT into each of its copies.
+    pub(crate) fn write_fat(&self, block: &[Block; 1], index: u32) -> Result<(), CardError<D::Error>> {
+        let Layout { fat_start, fat_blocks, fat_copies, .. } = self.layout;
+        (0..fat_copies).try_for_each(|copy| self.write_metadata(block, fat_start + copy * fat_blocks + index))
+    }
+
+    /// Changes the FAT entry of one cluster.
+    #[inline(never)]
+    pub(crate) fn link(&self, cluster: u32, next: u32) -> Result<(), CardError<D::Error>> {
+        let mut block = self.read_fat(cluster / ENTRIES)?;
+        set_entry(&mut block[0], cluster, next);
+        self.write_fat(&block, cluster / ENTRIES)
+    }
+
+    /// The FAT entry of one cluster.
+    #[inline(never)]
+    pub(crate) fn entry(&self, cluster: u32) -> Result<u32, CardError<D::Error>> {
+        Ok(entry(&self.read_fat(cluster / ENTRIES)?[0], cluster))
+    }
+
+    /// Whether a cluster of this number exists.
+    pub(crate) const fn is_cluster(&self, cluster: u32) -> bool {
+        cluster >= 2 && cluster - 2 < self.layout.clusters
+    }
+
+    /// The first block of a cluster.
+    pub(crate) const fn block_of(&self, cluster: u32) -> u32 {
+        self.layout.data_start + (cluster - 2) * self.layout.cluster_blocks
+    }
+
+    /// Whether this cluster is free by its entry in a block of the FAT. The root directory's first one never is, although a card
+    /// may have lost its part of the FAT.
+    pub(crate) fn is_free(&self, block: &Block, cluster: u32) -> bool {
+        self.is_cluster(cluster) && cluster != self.layout.root && entry(block, cluster) == 0
+    }
+}
+
+/// The FAT entry of a cluster, from its block of the FAT.
+pub(crate) fn entry(block: &Block, cluster: u32) -> u32 {
+    let at = (cluster % ENTRIES * 4) as usize;
+    let entry = block.get(at..at + 4).and_then(|entry| entry.try_into().ok());
+    entry.map_or(0, u32::from_le_bytes) & 0x0FFF_FFFF
+}
+
+/// Changes the FAT entry of a cluster in its block of the FAT. The upper four bits are reserved and stay.
+pub(crate) fn set_entry(block: &mut Block, cluster: u32, value: u32) {
+    let at = (cluster % ENTRIES * 4) as usize;
+    if let Some(entry) = block.get_mut(at..).and_then(|entries| entries.first_chunk_mut()) {
+        *entry = (u32::from_le_bytes(*entry) & 0xF000_0000 | value).to_le_bytes();
+    }
+}
