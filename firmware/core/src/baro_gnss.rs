@@ -14,10 +14,10 @@
 
 use crate::gates::{self, Gates};
 use crate::latest::Reading;
-use crate::motion::{climb_mps, ground_speed_mps};
+use crate::motion::{SPEED_MAX_MPS, climb_mps, ground_speed_mps};
 use crate::observation::Gnss;
 use crate::residual::{Comparison, Residuals, smooth};
-use crate::time::{Instant, Span, Stamp};
+use crate::time::{Instant, PAUSE, Span, Stamp};
 use crate::units::{GRAVITY, Hectopascals};
 use crate::vehicle::Vehicle;
 
@@ -27,18 +27,12 @@ pub(crate) const SCALE_HEIGHT_M: f32 = 8_430.0;
 const SCALE_PART: f32 = 0.1;
 /// Messages on a link are late by so much: a step takes that much longer or shorter.
 const LATE_S: f32 = 0.3;
-/// Receivers are some tenths of a second late: faster than this, m/s, the two heights are not of the same moment.
-const CLIMB_MPS: f32 = 2.0;
 /// A receiver's height is so old, s: 1 of those of 2013.
 const RECEIVER_LATE_S: f32 = 1.0;
 /// Heights and climb are summed over this time, s, when they vote.
 const VOTE_S: f32 = 4.0;
 /// Time constant of the usual height and speed, s.
 const AIR_S: f32 = 30.0;
-/// No rotors climb or fall faster, m/s: garbage.
-const CLIMB_MAX_MPS: f32 = 200.0;
-/// Samples further apart are not compared.
-const PAUSE: Span = Span::from_secs(2);
 /// A sample that leaps by more is one wrong message unless the next one leaps too: no vehicle climbs so fast, m/s, and the noise, m, is
 /// above the default limit.
 const LEAPS_MPS: f32 = 50.0;
@@ -153,7 +147,7 @@ impl Heights {
         }
         let display = vehicle.hud.within(at, PAUSE).and_then(|hud| hud.climb).map(|climb| climb.0);
         // Nothing but zeros is sent if no climb is known.
-        if let Some(climb_mps) = display.filter(|climb| climb.abs() > 0.0 && climb.abs() <= CLIMB_MAX_MPS) {
+        if let Some(climb_mps) = display.filter(|climb| climb.abs() > 0.0 && climb.abs() <= SPEED_MAX_MPS) {
             let missing_m = risen_m - step_s * climb_mps;
             let by_wind_m = libm::fabsf(wind_m - before.wind_m);
             let beyond_m = libm::copysignf((libm::fabsf(missing_m) - by_wind_m).max(0.0), missing_m);
@@ -175,7 +169,8 @@ impl Heights {
             self.leaps[1].take(at, altitude.0, climb);
         }
         let Sample { at: measured, height_m, .. } = self.sample;
-        let climbs = climb.is_none_or(|climb| libm::fabsf(climb) > CLIMB_MPS);
+        // Receivers are some tenths of a second late: in a climb the two heights are not of one moment.
+        let climbs = climb.is_none_or(|climb| libm::fabsf(climb) > gates::LEVEL_MPS);
         let is_old = measured.age(at).is_none_or(|age| age > PAUSE);
         if climbs || is_old || !residuals.is_due(Comparison::BaroGnss, at, gates, Span::ZERO) {
             return;

@@ -21,7 +21,7 @@ use crate::gnss_velocity_residual::GnssVelocity;
 use crate::imu_gnss::ImuGnssResidual;
 use crate::latest::{Latest, Reading};
 use crate::mag_heading_residual::{self, CompassUse};
-use crate::motion::throttle;
+use crate::motion::{IDLE_THROTTLE, throttle};
 use crate::observation::{Air, Attitude, Estimator, Gnss, Hud, Imu, SecondEstimate, WantedRates};
 use crate::pairs::{Kind, Pairs, SENSORS_MAX};
 use crate::rate_tracking::{self, RateSetpoint, Thrust};
@@ -37,8 +37,6 @@ const NOT_COMPARED: [f32; 3] = [f32::NAN; 3];
 const EVERY: Span = Span::from_millis(100);
 /// Of what is integrated: a longer pause of the steps is none.
 const STEP_MAX: Span = Span::from_secs(1);
-/// With less no rotors carry anything.
-const IDLE_THROTTLE: f32 = 0.1;
 
 /// The memory of all comparisons.
 #[derive(Clone, Copy, Debug)]

@@ -16,17 +16,14 @@
 
 use core::ops::Range;
 
+use crate::flight::FLYING_THROTTLE;
 use crate::latest::Reading;
 use crate::observation::{MOTORS_MAX, VehicleKind};
-use crate::time::{Instant, Span};
+use crate::time::{Instant, PAUSE};
 use crate::vehicle::{Motor, Vehicle};
 
-/// Currents that are older decide nothing.
-const FRESH: Span = Span::from_secs(2);
 /// ESCs that do not measure current say zero for all, and then nothing follows.
 const CURRENT_MIN_A: f32 = 0.5;
-/// PX4's motor failure check: below this throttle no motor is asked for much.
-const THROTTLE_MIN: f32 = 0.2;
 /// From this part of the mean of the others a motor takes its share; below [`IDLE_PART`] it stands nearly still.
 const SHARE_PART: f32 = 0.3;
 const IDLE_PART: f32 = 0.1;
@@ -120,7 +117,7 @@ impl Currents {
         };
         let most_a = currents().fold(0.0, f32::max);
         let idle = currents().filter(|current_a| *current_a < SHARE_PART * most_a).count();
-        let rates = vehicle.attitude.within(now, FRESH).and_then(|attitude| attitude.rates);
+        let rates = vehicle.attitude.within(now, PAUSE).and_then(|attitude| attitude.rates);
         let spins = rates.is_none_or(|rates| rates.into_iter().any(|rate| rate.0.abs() > SPINS_RAD_S));
         2 * idle >= currents().count() && !spins
     }
@@ -134,7 +131,7 @@ fn current_a(now: Instant, vehicle: &Vehicle, motor: usize) -> Option<f32> {
 }
 
 fn is_fresh(now: Instant, motor: &Motor) -> bool {
-    motor.moved_at.is_some_and(|at| now.since(at) <= FRESH)
+    motor.moved_at.is_some_and(|at| now.since(at) <= PAUSE)
 }
 
 /// What several motors take together.
@@ -154,10 +151,10 @@ impl Total {
 
     /// The current of one of them as a part of the mean of the others, while the throttle asks for thrust in hover.
     fn part(&self, now: Instant, vehicle: &Vehicle, own_a: f32) -> Option<f32> {
-        let throttle = vehicle.hud.within(now, FRESH)?.throttle?.0;
+        let throttle = vehicle.hud.within(now, PAUSE)?.throttle?.0;
         let others = self.count.checked_sub(1)?;
         let mean_a = (self.sum_a - own_a) / f32::from(others);
-        let asked = vehicle.hovers(now) == Some(true) && throttle > THROTTLE_MIN;
+        let asked = vehicle.hovers(now) == Some(true) && throttle > FLYING_THROTTLE;
         (asked && others >= 2 && mean_a > CURRENT_MIN_A).then(|| own_a / mean_a)
     }
 }

@@ -8,6 +8,7 @@ use crate::flight::{Flight, FlightEvent};
 use crate::gates;
 use crate::inertial::FORCE_MAX;
 use crate::latest::{Latest, Reading};
+use crate::motion::IDLE_THROTTLE;
 use crate::observation::{Battery, EscGroup, Imu, MOTORS_MAX, Observation, Vibration};
 use crate::outputs::MotorOutputs;
 use crate::params::{Param, Params};
@@ -35,8 +36,6 @@ const MOTORS_TOLD: Span = Span::from_secs(1);
 const FLYING_PART: f32 = 0.2;
 /// Below this part of the middle speed a motor is lost; no control in steady flight drives it there.
 const LOST_PART: f32 = 0.4;
-/// Nothing hovers with less throttle.
-const IDLE_THROTTLE: f32 = 0.1;
 /// A plane with less throttle glides: autopilots let its motor idle from some percents on.
 const OFF_THROTTLE: f32 = 0.03;
 /// What turns fast, or did of late, drives each motor as it needs to.

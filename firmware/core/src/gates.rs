@@ -3,7 +3,7 @@
 use crate::flight::Flight;
 use crate::motion::climb_mps;
 use crate::observation::{Attitude, Gnss, LandedState, VehicleKind};
-use crate::time::{Instant, Span, Stamp};
+use crate::time::{Instant, PAUSE, Span, Stamp};
 use crate::vehicle::{LANDED_STATE_AGE, Vehicle};
 
 /// In the air.
@@ -28,13 +28,12 @@ pub(crate) const ONE_CONTROL: u16 = 1 << 8;
 pub(crate) const EXACT: u16 = 1 << 9;
 
 const TURNED: Span = Span::from_secs(1);
-/// Older motion, and an older fix, say nothing.
+/// Older motion says nothing.
 const FRESH: Span = Span::from_secs(1);
-const RECEIVER_AGE: Span = Span::from_secs(2);
 const EXACT_FOR: Span = Span::from_secs(15);
 /// Height over home of what is clear of the ground, m.
 const CLEAR_M: f32 = 1.5;
-const LEVEL_MPS: f32 = 2.0;
+pub(crate) const LEVEL_MPS: f32 = 2.0;
 const LEANS_RAD: f32 = 0.6;
 
 /// The conditions at the last step.
@@ -63,7 +62,7 @@ impl Gates {
     /// One step.
     pub(crate) fn step(&mut self, now: Instant, vehicle: &Vehicle, flight: &Flight) {
         let receiver = &vehicle.gnss[0];
-        let exact = receiver.within(now, RECEIVER_AGE).is_some_and(Gnss::is_exact);
+        let exact = receiver.within(now, PAUSE).is_some_and(Gnss::is_exact);
         if !exact && receiver.get().is_some() {
             self.inexact_at = Stamp::at(now);
         }

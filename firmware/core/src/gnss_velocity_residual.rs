@@ -10,23 +10,20 @@
 use core::num::NonZeroU32;
 
 use crate::latest::Reading;
+use crate::motion::SPEED_MAX_MPS;
 use crate::observation::Gnss;
 use crate::residual::smooth;
-use crate::time::{Instant, Stamp};
+use crate::time::{Instant, PAUSE, Span, Stamp};
 use crate::units::Position;
 
 /// Time constant, s; before it has passed nothing is said.
 const MEMORY_S: f32 = 4.0;
-/// Positions further apart are not of one way, ms.
-const PAUSE_MS: u32 = 2_000;
 /// One of the two may be older by so much, s.
 const LATE_S: f32 = 0.3;
 /// Positions are compared in units of 1e-7 degrees of latitude, in metres.
 const UNIT_M: f32 = 0.011_132;
 /// Nothing jumps further, m: garbage, or the date line.
 const JUMP_MAX_M: f32 = 100_000.0;
-/// No vehicle here is faster, m/s: garbage.
-const SPEED_MAX_MPS: f32 = 200.0;
 
 /// One measurement of a receiver.
 #[derive(Clone, Copy, Debug)]
@@ -66,8 +63,9 @@ impl GnssVelocity {
             return;
         };
         let step_ms = fix.measured_ms.get().wrapping_sub(before.measured_ms.get());
+        let step = Span::from_millis(step_ms.into());
         let is_same = fix.place == before.place;
-        if is_same && step_ms <= PAUSE_MS {
+        if is_same && step <= PAUSE {
             self.before = Some(before);
             return;
         }
@@ -76,11 +74,11 @@ impl GnssVelocity {
         let moved_m = [units[0], units[1] * libm::cosf(latitude.to_radians())];
         // A time that stands still, or goes back, is none.
         let is_leap = moved_m.iter().any(|moved_m| libm::fabsf(*moved_m) > JUMP_MAX_M);
-        if step_ms == 0 || step_ms > PAUSE_MS || is_leap {
+        if step_ms == 0 || step > PAUSE || is_leap {
             *self = begun;
             return;
         }
-        let step_s = step_ms as f32 / 1e3;
+        let step_s = step.as_secs_f32();
         let weight = step_s / (MEMORY_S + step_s);
         let off = [0, 1]
             .map(|axis| f32::midpoint(fix.velocity[axis], before.velocity[axis]) - moved_m[axis] / step_s);

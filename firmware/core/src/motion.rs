@@ -6,7 +6,10 @@ use crate::vehicle::Vehicle;
 /// Positions and speeds older than this decide nothing.
 const MOTION_AGE: Span = Span::from_secs(3);
 /// Nothing that is watched here is faster: garbage, which must not get into sums and maxima.
-const SPEED_MAX_MPS: f32 = 1_000.0;
+pub(crate) const SPEED_MAX_MPS: f32 = 1_000.0;
+
+/// With less throttle no rotors carry anything: hover takes a quarter to three quarters.
+pub(crate) const IDLE_THROTTLE: f32 = 0.1;
 
 /// Height above home; above the local origin where there is no global position.
 pub fn height_m(now: Instant, vehicle: &Vehicle) -> Option<f32> {

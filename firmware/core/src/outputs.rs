@@ -34,8 +34,9 @@ use crate::adaptive_baseline::AdaptiveBaseline;
 use crate::baseline::OUTPUTS_MAX;
 use crate::flight::Flight;
 use crate::latest::Reading;
+use crate::motion::IDLE_THROTTLE;
 use crate::observation::{MOTORS_MAX, Outputs};
-use crate::time::{Instant, Span, Stamp};
+use crate::time::{Instant, PAUSE, Span, Stamp};
 use crate::vehicle::Vehicle;
 
 /// Motors of the largest frame that is judged.
@@ -47,8 +48,6 @@ const IDLE: f32 = 0.15;
 /// Parts of what the others are given: what idled on the ground and is given so much in level flight is a motor too. A frame that is put
 /// together by parameters may still call itself a quadrotor.
 const LIKE_OTHERS: RangeInclusive<f32> = 0.5..=1.5;
-/// Motors that carry a vehicle are given more on the average.
-const CARRIES: f32 = 0.1;
 const SURELY_CARRIES: f32 = 0.3;
 /// Further above the others a change teaches nothing, percent.
 const HOLD_PERCENT: f32 = 4.0;
@@ -77,8 +76,6 @@ const YAWS_RAD_S: f32 = 0.5;
 const MOVES: f32 = 0.02;
 /// What nobody saw begin is believed after so long.
 const LASTS: Span = Span::from_secs(3);
-/// Messages that are further apart are not of the same hover.
-const PAUSE: Span = Span::from_secs(2);
 
 /// What an output's range is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -262,7 +259,7 @@ impl MotorOutputs {
             (self.at, self.verdict.1) = (Stamp::at(at), Verdict::Ok);
         }
         let mean = given.iter().sum::<f32>() / count as f32;
-        if !flies_level || yaws(vehicle) || mean < CARRIES || !self.is_of_frame(&parts, mean, count) {
+        if !flies_level || yaws(vehicle) || mean < IDLE_THROTTLE || !self.is_of_frame(&parts, mean, count) {
             return;
         }
         let step_s = self.at.age(at).filter(|step| *step <= PAUSE).map_or(0.0, Span::as_secs_f32);
@@ -454,7 +451,7 @@ fn is_full(given: &f32) -> bool {
 }
 
 fn carries(given: &f32) -> bool {
-    *given > CARRIES
+    *given > IDLE_THROTTLE
 }
 
 /// Numbers for `DShot` that were not seen on the ground look like pulses: a motor among such is given less of both.

@@ -6,23 +6,20 @@
 //! 3. Of three sensors the one that is apart from both others is wrong. Of two nobody knows which is wrong: the second one is named. A sensor
 //!    that sends nothing any more is not counted.
 
+use crate::adaptive_baseline::AdaptiveBaseline;
 use crate::baro_gnss::SCALE_HEIGHT_M;
 use crate::gates::{self, Gates};
 use crate::latest::Reading;
 use crate::residual::{PAIRS as ROWS, Residual, Row, smooth};
-use crate::time::{Instant, Span, Stamp};
+use crate::time::{Instant, PAUSE, Span, Stamp};
 use crate::units::norm;
 
 /// Sensors of one kind that are compared.
 pub(crate) const SENSORS_MAX: usize = 3;
 /// Pairs of them.
 const PAIRS: [(usize, usize); SENSORS_MAX] = [(0, 1), (0, 2), (1, 2)];
-/// Older samples, and older comparisons, say nothing.
-const FRESH: Span = Span::from_secs(2);
 /// So long after the first comparison the difference is that of many samples, and learnt.
 const SETTLES_S: f32 = 1.5;
-/// No sensor measures so much, in any of the units.
-const GARBAGE: f32 = 1e6;
 /// Gyros differ so in scale, and autopilots calibrate their offsets only (MPU-6000: 3 %, data sheet).
 const GYRO_SCALE: f32 = 0.05;
 /// Until the baseline is known, one sample moves the difference by so many times as much.
@@ -99,7 +96,7 @@ impl Pair {
     const NEW: Self = Self { difference: [0.0; 3], residual: Residual::after(SETTLES_S) };
 
     fn take(&mut self, at: Instant, kind: Kind, difference: [f32; 3]) {
-        if !difference.iter().all(|axis| axis.abs() <= GARBAGE) {
+        if !difference.into_iter().all(AdaptiveBaseline::is_sane) {
             return;
         }
         let row = kind.row();
@@ -115,7 +112,7 @@ impl Pair {
 
     /// How far they are apart beyond their baseline, while that is known and fresh.
     fn excess(&self, now: Instant, kind: Kind) -> Option<Reading> {
-        let at = self.residual.at().instant(now).filter(|at| now.since(*at) <= FRESH);
+        let at = self.residual.at().instant(now).filter(|at| now.since(*at) <= PAUSE);
         Reading::new(at, self.residual.excess(kind.row()))
     }
 }
@@ -167,7 +164,7 @@ impl Pairs {
 
     pub(crate) fn measures(&self, now: Instant, sensor: usize) -> bool {
         let sample = self.samples.get(sensor);
-        sample.is_some_and(|sample| sample.at.age(now).is_some_and(|age| age <= FRESH))
+        sample.is_some_and(|sample| sample.at.age(now).is_some_and(|age| age <= PAUSE))
     }
 
     /// Whether any two were compared in this flight.

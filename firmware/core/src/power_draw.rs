@@ -1,6 +1,6 @@
 //! What the vehicle draws from its batteries, from the best source that is fresh.
 
-use crate::time::{Instant, Span};
+use crate::time::{Instant, PAUSE, Span};
 use crate::units::{Amperes, Volts};
 use crate::vehicle::Vehicle;
 
@@ -9,8 +9,6 @@ const VOLTS_MAX: f32 = 1_000.0;
 const AMPERES_MAX: f32 = 10_000.0;
 /// A battery figure holds this long.
 const BATTERY_AGE: Span = Span::from_secs(5);
-/// A motor speed or current holds this long.
-pub(crate) const MOTOR_AGE: Span = Span::from_secs(2);
 
 /// The first battery's voltage, or the autopilot's figure where none reports itself; the discharge current and the power
 /// of all batteries together, or of all ESCs where no battery knows its current (PX4 in simulation).
@@ -32,7 +30,7 @@ pub(crate) fn drawn(now: Instant, vehicle: &Vehicle) -> Drawn {
         drawn.add(system.voltage, system.current);
     }
     if drawn.current_a.is_none() {
-        let fresh = |at: Option<Instant>| at.is_some_and(|at| now.since(at) <= MOTOR_AGE);
+        let fresh = |at: Option<Instant>| at.is_some_and(|at| now.since(at) <= PAUSE);
         for motor in vehicle.motors.iter().filter(|motor| fresh(motor.moved_at)) {
             drawn.add(motor.esc.voltage, motor.esc.current);
         }

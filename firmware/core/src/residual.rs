@@ -22,11 +22,8 @@
 use crate::adaptive_baseline::AdaptiveBaseline;
 use crate::gates::{self, Gates};
 use crate::latest::Reading;
-use crate::time::{Instant, Span, Stamp};
+use crate::time::{Instant, PAUSE, Span, Stamp};
 use crate::vehicle::RECEIVERS_MAX;
-
-/// What was not compared for longer begins anew, where it has no baseline.
-const HOLE: Span = Span::from_secs(2);
 
 /// Which side of the baseline is wrong.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -67,7 +64,7 @@ pub(crate) struct Row {
 const ROW: Row = Row {
     gates: gates::SETTLED,
     smoothing_s: 0.5,
-    step_max: Span::from_secs(2),
+    step_max: PAUSE,
     clamp: f32::INFINITY,
     period: 0.0,
     side: Side::Above,
@@ -224,7 +221,7 @@ impl Residual {
             return 0.0;
         }
         let step = self.at.age(at);
-        if row.learn == Learn::Nothing && step.is_none_or(|step| step > HOLE) {
+        if row.learn == Learn::Nothing && step.is_none_or(|step| step > PAUSE) {
             *self = Self { figure: AdaptiveBaseline::ZERO, ..Self::NEW };
         }
         let clamp = if self.at.is_set() { row.clamp } else { f32::INFINITY };

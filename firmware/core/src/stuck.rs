@@ -15,7 +15,7 @@ use crate::latest::Reading;
 use crate::motion::{climb_mps, ground_speed_mps};
 use crate::observation::Gnss;
 use crate::pairs::{Kind, SENSORS_MAX};
-use crate::time::{Instant, Span};
+use crate::time::{Instant, PAUSE};
 use crate::vehicle::{RECEIVERS_MAX, Vehicle};
 
 /// Values that differed before anything is usual.
@@ -24,9 +24,6 @@ const CHANGES_KNOWN: u8 = 20;
 const REPEATS_MIN: u8 = 3;
 /// What lasts so many times what is usual is none of it.
 const TIMES: u32 = 4;
-
-/// What was not heard for longer, ms, was not seen to repeat anything meanwhile.
-const HOLE_MS: u32 = 2_000;
 
 /// What trembled is silent once it has repeated one value for so long, ms, and for so many times what is usual.
 const SILENT_MS: u32 = 10_000;
@@ -43,8 +40,6 @@ const TURNED_RAD: f32 = 0.02;
 /// So many times as far it must have turned if all of its compasses repeat their values at once: an estimator's yaw drifts by 0.02
 /// rad in 3 s while a vehicle holds still, and a compass's digit of a milligauss may hide its noise.
 const ALL_REPEAT_TIMES: f32 = 10.0;
-/// An attitude that was not received for longer tells of no turn.
-const HOLE: Span = Span::from_secs(2);
 /// Less is no move, m/s and rad: an estimator trembles and has offsets while a simulator without noise hangs still, and the last digits
 /// of its sensors do not change.
 const HANGS_MPS: f32 = 0.3;
@@ -88,7 +83,7 @@ impl Stuck {
         let value = (sum ^ sum >> 16) as u16;
         let at_ms = at.as_millis() as u32;
         let unheard_ms = at_ms.wrapping_sub(self.since_ms).saturating_sub(u32::from(self.lasts_ms));
-        if unheard_ms > HOLE_MS {
+        if u64::from(unheard_ms) > PAUSE.as_millis() {
             self.since_ms = self.since_ms.wrapping_add(unheard_ms);
         }
         if self.values.contains(&value) {
@@ -154,7 +149,7 @@ impl Moved {
         let climb_mps = climb_mps(now, vehicle).map_or(0.0, libm::fabsf);
         self.climbed_m += if climb_mps > HANGS_MPS { climb_mps * step_s } else { 0.0 };
         self.travelled_m += ground_speed_mps(now, vehicle).map_or(0.0, |speed| speed * step_s);
-        let attitude = vehicle.attitude.within(now, HOLE);
+        let attitude = vehicle.attitude.within(now, PAUSE);
         let attitude = attitude.map(|told| [told.roll.0, told.pitch.0, told.yaw.0]);
         let (Some(now), Some(before)) = (attitude, self.attitude) else {
             // How it turned meanwhile, its sensors did not see either.

@@ -131,6 +131,9 @@ impl Stamp {
     }
 }
 
+/// Samples further apart than this are not of one course, and an older one is not of now: two messages of a stream at 1 Hz.
+pub(crate) const PAUSE: Span = Span::from_secs(2);
+
 /// A length of time in milliseconds, up to 49.7 days.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Span(u32);

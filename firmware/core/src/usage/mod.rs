@@ -16,9 +16,9 @@ use crate::flight::{Flight, FlightEvent, Phase};
 use crate::motion::{climb_mps, ground_speed_mps, height_m};
 use crate::observation::Observation;
 use crate::params::{Param, Params};
-use crate::power_draw::{Drawn, MOTOR_AGE, discharge_a, drawn};
+use crate::power_draw::{Drawn, discharge_a, drawn};
 use crate::rainflow::Rainflow;
-use crate::time::{Instant, Span};
+use crate::time::{Instant, PAUSE, Span};
 use crate::vehicle::{BATTERIES_MAX, Vehicle};
 use touchdown::Touchdown;
 
@@ -259,7 +259,7 @@ impl Usage {
     fn step_motors(&mut self, now: Instant, vehicle: &Vehicle, step_s: f64) {
         for (number, usage) in self.totals.motors.iter_mut().enumerate() {
             let motor = &vehicle.motors[number];
-            let fresh = motor.moved_at.is_some_and(|at| now.since(at) <= MOTOR_AGE);
+            let fresh = motor.moved_at.is_some_and(|at| now.since(at) <= PAUSE);
             if fresh && Derived::turns(vehicle, number) {
                 let rpm = motor.esc.rpm.map_or(0.0, |rpm| rpm.0.abs().min(RPM_MAX));
                 usage.seconds += step_s;
