@@ -45,19 +45,6 @@ fn what_turns_over_after_a_shock_hit_something_first_with_its_greatest_shock() {
 }
 
 #[test]
-fn a_wreck_that_is_carried_home_armed_flies_no_more() {
-    for of in ROTORS {
-        let outcome = fly(&hovering(of), |ms, quad, motion| {
-            fall(ms, quad, motion);
-            if ms >= 8_000 {
-                (motion.ground_mps, motion.rates, quad.height) = (3.0, [0.4, 0.5, 0.2], 1.5);
-            }
-        });
-        assert_eq!(outcome.flights(), (1, 0, 1), "{of:?}: {:?}", outcome.changes);
-    }
-}
-
-#[test]
 fn an_impact_is_a_shock_a_speed_that_breaks_off_and_then_stillness() {
     let crash: Script = |ms, quad, motion| {
         (motion.ground_mps, quad.climb) = (18.0, -3.0);
@@ -67,49 +54,47 @@ fn an_impact_is_a_shock_a_speed_that_breaks_off_and_then_stillness() {
             (motion.ground_mps, quad.throttle, quad.height, motion.rates) = (0.0, 0.0, 0.5, [0.0; 3]);
         }
     };
-    for of in WINGS {
-        let outcome = fly(&on_wings(of), crash);
-        assert_eq!(outcome.told(), ["impact"], "{of:?}");
-        assert_eq!(outcome.flights(), (1, 0, 1), "{of:?}");
-        assert_eq!(outcome.reports[0].touch, 30, "{of:?}: as it sank before the shock");
-    }
-    // A shock alone: a gust, a bird, a hard manoeuvre.
-    for of in ROTORS {
-        let outcome = fly(&hovering(of), |ms, _, motion| {
-            if ms < 100 {
-                motion.load_g = 6.0;
-            }
-        });
-        assert!(outcome.told().is_empty(), "{of:?}: {:?}", outcome.findings);
-        assert_eq!(outcome.flights(), (1, 0, 0));
-    }
+    judge(wings(), "it flies into the ground", (&["impact"], DOWN), crash);
+    assert_eq!(fly(&on_wings(WINGS[0]), crash).reports[0].touch, 30, "as it sank before the shock");
+    judge(rotors(), "a shock alone: a gust, a bird, a hard manoeuvre", (&[], FLIES), |ms, _, motion| {
+        motion.load_g = if ms < 100 { 6.0 } else { 1.0 };
+    });
+    judge(rotors(), "disarmed before it lies still", (&["impact"], DOWN), |ms, quad, motion| {
+        let hits = 3_300;
+        if ms < hits {
+            (quad.climb, quad.height) = (-6.0, 20.0 - 0.006 * ms as f32);
+        } else {
+            (quad.climb, quad.height, motion.ground_mps) = (0.0, 0.3, 0.0);
+            motion.load_g = if ms < hits + 100 { 10.0 } else { 1.0 };
+            // It rocks for a while.
+            let still = ms >= hits + 2_600;
+            motion.rates = if still { [0.0; 3] } else { [0.5, 0.0, 0.0] };
+            let off = ms >= hits + 2_000;
+            (quad.armed, quad.throttle) = (!off, if off { 0.0 } else { 0.4 });
+        }
+    });
 }
 
 #[test]
-fn a_hard_landing_is_none() {
-    for of in ROTORS {
-        let outcome = fly(&hovering(of), |ms, quad, motion| {
-            let touches = 9_600;
-            if ms < touches {
-                (quad.climb, quad.height) = (-2.0, 20.0 - ms as f32 / 500.0);
-            } else {
-                (quad.climb, quad.height, quad.throttle) = (0.0, 0.8, 0.0);
-                motion.load_g = if ms < touches + 100 { 4.0 } else { 1.0 };
-                quad.landed =
-                    Some(if ms < touches + 1_000 { LandedState::InAir } else { LandedState::OnGround });
-                quad.armed = ms < touches + 3_000;
-            }
-        });
-        assert!(outcome.told().is_empty(), "{of:?}: {:?}", outcome.findings);
-        assert_eq!(outcome.flights(), (1, 1, 0), "{of:?}");
-        assert_eq!(outcome.count(UsageCounter::HardLandings), 1, "{of:?}");
-    }
-}
-
-#[test]
-fn a_landing_that_legs_take_is_none_though_it_moves_sideways() {
-    for of in ROTORS {
-        let outcome = fly(&hovering(of), |ms, quad, motion| {
+fn a_landing_is_none_however_hard() {
+    let hard: Script = |ms, quad, motion| {
+        let touches = 9_600;
+        if ms < touches {
+            (quad.climb, quad.height) = (-2.0, 20.0 - ms as f32 / 500.0);
+        } else {
+            (quad.climb, quad.height, quad.throttle) = (0.0, 0.8, 0.0);
+            motion.load_g = if ms < touches + 100 { 4.0 } else { 1.0 };
+            quad.landed = Some(if ms < touches + 1_000 { LandedState::InAir } else { LandedState::OnGround });
+            quad.armed = ms < touches + 3_000;
+        }
+    };
+    judge(rotors(), "a hard landing", (&[], LANDED), hard);
+    assert_eq!(fly(&hovering(ROTORS[0]), hard).count(UsageCounter::HardLandings), 1);
+    judge(
+        rotors(),
+        "a landing that legs take, though it moves sideways",
+        (&[], LANDED),
+        |ms, quad, motion| {
             let touches = 7_800;
             if ms < touches {
                 motion.ground_mps = 3.3;
@@ -119,10 +104,19 @@ fn a_landing_that_legs_take_is_none_though_it_moves_sideways() {
                 (motion.ground_mps, motion.rates) = (0.0, [0.0; 3]);
                 motion.load_g = if ms < touches + 100 { 3.8 } else { 1.0 };
             }
-        });
-        assert!(outcome.told().is_empty(), "{of:?}: {:?}", outcome.findings);
-        assert_eq!(outcome.flights(), (1, 1, 0), "{of:?}");
-    }
+        },
+    );
+    judge(rotors(), "a jolt, shaking, and a landing", (&[], LANDED), |ms, quad, motion| {
+        motion.ground_mps = if ms < 500 { 4.0 } else { 1.0 };
+        let jolts = (500..31_000).contains(&ms) && ms % 2_000 < 50;
+        motion.load_g = if jolts { 4.2 } else { 1.0 };
+        if ms >= 30_000 {
+            (quad.height, quad.throttle, quad.climb) = (0.1, 0.0, 0.0);
+            (motion.ground_mps, motion.rates) = (0.0, [0.0; 3]);
+            quad.landed = Some(LandedState::OnGround);
+            quad.armed = ms < 33_000;
+        }
+    });
 }
 
 /// Touches at 11.5 m/s with a hard jolt, and slides to a stop.
@@ -137,46 +131,49 @@ fn skids(ms: u64, quad: &mut Quad, motion: &mut Motion) {
 
 #[test]
 fn a_plane_that_lands_without_throttle_skids_and_one_that_flies_into_a_wall_does_not() {
-    for of in WINGS {
-        assert!(fly(&on_wings(of), skids).told().is_empty(), "{of:?}");
-        let hit = fly(&on_wings(of), |ms, quad, motion| {
-            skids(ms, quad, motion);
-            quad.throttle = 0.6;
-            if ms >= 3_600 {
-                quad.landed = Some(LandedState::OnGround);
+    judge(wings(), "it skids", (&[], ANY), skids);
+    judge(wings(), "it has throttle", (&["impact"], ANY), |ms, quad, motion| {
+        skids(ms, quad, motion);
+        quad.throttle = 0.6;
+        if ms >= 3_600 {
+            quad.landed = Some(LandedState::OnGround);
+        }
+    });
+    for (ground_mps, told) in [(20.0, &["impact"][..]), (12.0, &[])] {
+        judge(wings(), "it stops", (told, ANY), |ms, quad, motion| {
+            (motion.ground_mps, quad.throttle) = (ground_mps, 0.0);
+            if ms >= 1_000 {
+                motion.load_g = if ms < 1_100 { 6.0 } else { 1.0 };
+                (motion.ground_mps, quad.height, motion.rates) = (0.0, 0.5, [0.0; 3]);
             }
         });
-        assert_eq!(hit.told(), ["impact"], "{of:?}: {:?}", hit.changes);
     }
 }
 
 #[test]
-fn a_wreck_that_dances_on_the_ground_with_all_its_thrust_is_down() {
-    for of in ROTORS {
-        let outcome = fly(&hovering(of), |ms, quad, motion| {
-            quad.throttle = 1.0;
-            if ms < 2_500 {
-                (quad.climb, quad.height) = (-8.0, 20.0 - ms as f32 / 125.0);
-            } else {
-                (quad.climb, quad.height, motion.ground_mps) = (0.3, 0.6, 0.5);
-                motion.rates = [0.5, 0.3, 2.5];
-            }
-        });
-        assert_eq!(outcome.told(), ["sinking"], "{of:?}");
-        assert_eq!(outcome.flights(), (1, 0, 1), "{of:?}: {:?}", outcome.changes);
-    }
-}
-
-#[test]
-fn what_crashed_and_was_never_disarmed_begins_another_flight_where_it_hovers() {
-    let outcome = fly(&hovering(ROTORS[0]), |ms, quad, motion| {
+fn a_wreck_is_down_whatever_it_does_and_flies_again_where_it_hovers() {
+    judge(rotors(), "carried home armed", (&["free_fall", ".."], DOWN), |ms, quad, motion| {
+        fall(ms, quad, motion);
+        if ms >= 8_000 {
+            (motion.ground_mps, motion.rates, quad.height) = (3.0, [0.4, 0.5, 0.2], 1.5);
+        }
+    });
+    judge(rotors(), "it dances with all its thrust", (&["sinking"], DOWN), |ms, quad, motion| {
+        quad.throttle = 1.0;
+        if ms < 2_500 {
+            (quad.climb, quad.height) = (-8.0, 20.0 - ms as f32 / 125.0);
+        } else {
+            (quad.climb, quad.height, motion.ground_mps) = (0.3, 0.6, 0.5);
+            motion.rates = [0.5, 0.3, 2.5];
+        }
+    });
+    judge(rotors(), "it hovers later", (&["free_fall", ".."], (2, 0, 1)), |ms, quad, motion| {
         fall(ms, quad, motion);
         if ms >= 20_000 {
             (quad.climb, quad.height, quad.throttle) = (0.0, 12.0, 0.5);
             (motion.ground_mps, motion.load_g, motion.rates) = (0.1, 1.0, CALM.rates);
         }
     });
-    assert_eq!(outcome.flights(), (2, 0, 1), "{:?}", outcome.changes);
 }
 
 /// Falls from less than a metre for 0.45 s, and lies.
@@ -290,32 +287,6 @@ fn what_a_mishap_was_is_no_value_of_now() {
 }
 
 #[test]
-fn what_hits_the_ground_and_is_disarmed_before_it_lies_still_has_crashed() {
-    for of in ROTORS {
-        let outcome = fly(&hovering(of), |ms, quad, motion| {
-            let hits = 3_300;
-            if ms < hits {
-                (quad.climb, quad.height) = (-6.0, 20.0 - 0.006 * ms as f32);
-            } else {
-                (quad.climb, quad.height, motion.ground_mps) = (0.0, 0.3, 0.0);
-                motion.load_g = if ms < hits + 100 { 10.0 } else { 1.0 };
-                // It rocks for a while.
-                let still = ms >= hits + 2_600;
-                motion.rates = if still { [0.0; 3] } else { [0.5, 0.0, 0.0] };
-                let off = ms >= hits + 2_000;
-                (quad.armed, quad.throttle) = (!off, if off { 0.0 } else { 0.4 });
-            }
-        });
-        assert_eq!(
-            (outcome.told(), outcome.flights()),
-            (vec!["impact"], (1, 0, 1)),
-            "{of:?}: {:?}",
-            outcome.changes
-        );
-    }
-}
-
-#[test]
 fn a_second_shock_does_not_hide_the_first() {
     for of in ROTORS {
         let outcome = fly(&hovering(of), |ms, quad, motion| {
@@ -334,23 +305,6 @@ fn a_second_shock_does_not_hide_the_first() {
         });
         assert_eq!(outcome.told(), ["impact"], "{of:?}: {:?}", outcome.changes);
         assert_eq!(outcome.monitor.mishap().hit_at(), Instant::from_millis(AT_MS + 500), "{of:?}");
-    }
-}
-
-#[test]
-fn what_is_too_fast_to_skid_and_stops_has_hit_something() {
-    for of in WINGS {
-        let stops_from = |mps: f32| {
-            fly(&on_wings(of), move |ms, quad, motion| {
-                (motion.ground_mps, quad.throttle) = (mps, 0.0);
-                if ms >= 1_000 {
-                    motion.load_g = if ms < 1_100 { 6.0 } else { 1.0 };
-                    (motion.ground_mps, quad.height, motion.rates) = (0.0, 0.5, [0.0; 3]);
-                }
-            })
-        };
-        assert_eq!(stops_from(20.0).told(), ["impact"], "{of:?}");
-        assert!(stops_from(12.0).told().is_empty(), "{of:?}");
     }
 }
 
@@ -386,25 +340,6 @@ fn what_stands_with_little_throttle_flies_no_more_whatever_its_estimate_says() {
         let hovers =
             fly(&hovering(of), |ms, quad, motion| stands_with_a_lost_estimate(ms, quad, motion, 0.3));
         assert_eq!(hovers.flights(), (1, 0, 0), "{of:?}");
-    }
-}
-
-#[test]
-fn shaking_that_goes_on_is_no_impact_that_goes_on() {
-    for of in ROTORS {
-        let outcome = fly(&hovering(of), |ms, quad, motion| {
-            // It brakes with a jolt, shakes on, and lands half a minute later.
-            motion.ground_mps = if ms < 500 { 4.0 } else { 1.0 };
-            let jolts = (500..31_000).contains(&ms) && ms % 2_000 < 50;
-            motion.load_g = if jolts { 4.2 } else { 1.0 };
-            if ms >= 30_000 {
-                (quad.height, quad.throttle, quad.climb) = (0.1, 0.0, 0.0);
-                (motion.ground_mps, motion.rates) = (0.0, [0.0; 3]);
-                quad.landed = Some(LandedState::OnGround);
-                quad.armed = ms < 33_000;
-            }
-        });
-        assert!(outcome.told().is_empty() && outcome.flights() == (1, 1, 0), "{of:?}: {:?}", outcome.changes);
     }
 }
 

@@ -195,6 +195,61 @@ fn fly_between(
     Outcome { monitor, findings, changes, reports }
 }
 
+/// Autopilot, kind and `MAV_TYPE` of a vehicle.
+type Of = (Autopilot, VehicleKind, u8);
+
+/// Flights, landings, and mishaps.
+type Counts = (u32, u32, u32);
+
+/// What comes of a flight: what is told of mishaps, in order, and after ".." more; and the counts.
+type Come<'a> = (&'a [&'a str], Counts);
+
+/// Each of these vehicles flies the script. `told` is what is told of mishaps, in order; after ".." there may be more.
+fn judge(
+    vehicles: impl IntoIterator<Item = Quad>,
+    what: &str,
+    (told, counts): Come<'_>,
+    script: impl Fn(u64, &mut Quad, &mut Motion),
+) {
+    judge_from(AT_MS, vehicles, what, (told, counts), script);
+}
+
+/// The same, with a script from this time on.
+fn judge_from(
+    at_ms: u64,
+    vehicles: impl IntoIterator<Item = Quad>,
+    what: &str,
+    (told, counts): Come<'_>,
+    script: impl Fn(u64, &mut Quad, &mut Motion),
+) {
+    for quad in vehicles {
+        let outcome = fly_from(at_ms, &quad, &script);
+        let is_told = match told {
+            [first @ .., ".."] => outcome.told().starts_with(first),
+            all => outcome.told() == all,
+        };
+        let of = (quad.autopilot, quad.kind, quad.type_number);
+        let came = (outcome.told(), outcome.flights(), &outcome.changes);
+        assert!(is_told && (counts == ANY || outcome.flights() == counts), "{what}, {of:?}: {came:?}");
+    }
+}
+
+/// In the air on rotors, and on wings.
+fn rotors() -> impl Iterator<Item = Quad> {
+    ROTORS.into_iter().map(hovering)
+}
+
+fn wings() -> impl Iterator<Item = Quad> {
+    WINGS.into_iter().map(on_wings)
+}
+
+/// It flies on, it landed, it came down in a mishap.
+const FLIES: Counts = (1, 0, 0);
+const LANDED: Counts = (1, 1, 0);
+const DOWN: Counts = (1, 0, 1);
+/// Its flights are not asked.
+const ANY: Counts = (u32::MAX, 0, 0);
+
 /// Falls from 20 m for two seconds, hits with 15 g, and lies.
 fn fall(ms: u64, quad: &mut Quad, motion: &mut Motion) {
     let seconds = ms as f32 / 1_000.0;
@@ -217,7 +272,7 @@ fn vehicle(autopilot: Autopilot, kind: VehicleKind, type_number: u8) -> Quad {
     Quad { mode, autopilot, kind, type_number, ..Quad::healthy() }
 }
 
-const ROTORS: [(Autopilot, VehicleKind, u8); 6] = [
+const ROTORS: [Of; 6] = [
     (Autopilot::ArduPilot, VehicleKind::Rotorcraft, 2),
     (Autopilot::Px4, VehicleKind::Rotorcraft, 2),
     (Autopilot::ArduPilot, VehicleKind::Rotorcraft, 13),
@@ -226,14 +281,14 @@ const ROTORS: [(Autopilot, VehicleKind, u8); 6] = [
     (Autopilot::Px4, VehicleKind::Vtol, 22),
 ];
 
-const WINGS: [(Autopilot, VehicleKind, u8); 4] = [
+const WINGS: [Of; 4] = [
     (Autopilot::ArduPilot, VehicleKind::Plane, 1),
     (Autopilot::Px4, VehicleKind::Plane, 1),
     (Autopilot::ArduPilot, VehicleKind::Vtol, 22),
     (Autopilot::Px4, VehicleKind::Vtol, 22),
 ];
 
-const SURFACE: [(Autopilot, VehicleKind, u8); 6] = [
+const SURFACE: [Of; 6] = [
     (Autopilot::ArduPilot, VehicleKind::Surface, 10),
     (Autopilot::ArduPilot, VehicleKind::Surface, 11),
     (Autopilot::ArduPilot, VehicleKind::Surface, 12),
@@ -242,11 +297,11 @@ const SURFACE: [(Autopilot, VehicleKind, u8); 6] = [
     (Autopilot::Px4, VehicleKind::Surface, 12),
 ];
 
-fn hovering((autopilot, kind, type_number): (Autopilot, VehicleKind, u8)) -> Quad {
+fn hovering((autopilot, kind, type_number): Of) -> Quad {
     Quad { landed: Some(LandedState::InAir), vtol: VtolState::Hover, ..vehicle(autopilot, kind, type_number) }
 }
 
-fn on_wings((autopilot, kind, type_number): (Autopilot, VehicleKind, u8)) -> Quad {
+fn on_wings((autopilot, kind, type_number): Of) -> Quad {
     Quad {
         landed: Some(LandedState::InAir),
         vtol: VtolState::Forward,
