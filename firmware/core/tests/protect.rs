@@ -604,3 +604,41 @@ fn a_pilot_who_changes_the_mode_while_it_is_asked_is_not_asked_against() {
     let outcome = fly(|now_ms, quad, _| quad.mode = if now_ms < ASKED_MS + 500 { 4 } else { 5 });
     assert_eq!(outcome.story(), "announced, asked, cancelled_by_mode");
 }
+
+/// Disturbances of a flight, each for a while, one after the other, until 35 s; a number chooses them.
+fn disturb(seed: u64, now_ms: u64, quad: &mut Quad, monitor: &mut Monitor) {
+    // The high bits of a multiplication by the golden ratio are as good as random.
+    let random = |of: u64| (seed * 64 + of).wrapping_mul(0x9E37_79B9_7F4A_7C15) >> 40;
+    let slot = now_ms / 2_500;
+    if !(6..14).contains(&slot) || now_ms % 2_500 > 500 + random(slot) % 1_800 {
+        return;
+    }
+    match random(slot + 32) % 6 {
+        0 => quad.landed = Some(LandedState::OnGround),
+        1 => (quad.height, quad.climb) = (2.0, -0.8),
+        2 => quad.silent = true,
+        3 => (quad.height, quad.climb) = (-20.0, -2.0),
+        4 => quad.battery.remaining = Some(Fraction(0.6)),
+        _ => {
+            let imu = Imu { rate: Some([7.0, 0.0, 0.0].map(RadiansPerSecond)), ..Imu::default() };
+            say(now_ms, monitor, now_ms, AUTOPILOT, Observation::Imu(imu));
+        }
+    }
+}
+
+#[test]
+fn whatever_disturbs_a_flight_the_action_comes_unless_the_pilot_cancels() {
+    for seed in 0..60 {
+        let vehicle = VEHICLES[seed as usize % VEHICLES.len()];
+        for (pilots_ms, is_asked) in [(u64::MAX, true), (FOUND_MS + 5_000, false)] {
+            let outcome = fly(|now_ms, quad, monitor| {
+                become_vehicle(now_ms, quad, vehicle);
+                if is_asked || now_ms >= pilots_ms {
+                    disturb(seed, now_ms, quad, monitor);
+                }
+                quad.mode += u32::from(now_ms >= pilots_ms);
+            });
+            assert_eq!(!outcome.requests.is_empty(), is_asked, "{seed} {vehicle:?}: {:?}", outcome.steps);
+        }
+    }
+}
