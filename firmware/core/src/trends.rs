@@ -344,7 +344,7 @@ fn sample(
         }
         Quantity::MotorSpeed(motor) => {
             let at = vehicle.motors.get(usize::from(motor))?.moved_at?;
-            (now.since(at) <= FRESH).then(|| derived.motor_departure(motor)).flatten()
+            (now.since(at) <= FRESH).then(|| derived.motors().departure(motor)).flatten()
         }
         Quantity::MotorOutput(motor) => derived.outputs().share(now, vehicle, motor),
         // They are no figures of steady flight.

@@ -74,7 +74,7 @@ pub(super) const CHECKS: &[Check] = &[
 /// telemetry alone is silent, of all ESCs.
 pub(super) fn orders(check: &Check, inputs: &Inputs<'_>, has_lost_drive: impl FnOnce() -> bool) -> Orders {
     let Inputs { now, vehicle, derived, mishap, .. } = *inputs;
-    if check.name == "esc_silent" && derived.are_escs_silent(now) {
+    if check.name == "esc_silent" && derived.are_escs_silent() {
         return Orders::Watch;
     }
     // It comes down, or lies, whatever it still says.

@@ -111,9 +111,7 @@ pub(super) const CHECKS: &[Check] = &[
         when: When::InFlight,
         read: |inputs, motor| {
             let Inputs { now, vehicle, derived, .. } = *inputs;
-            let percent = || derived.currents().percent(now, vehicle, motor);
-            let taken = || percent().filter(|_| !derived.outputs().is_off(motor));
-            derived.stopped(vehicle, motor).or_else(taken)
+            derived.motors().share(now, vehicle, derived.outputs(), motor)
         },
         ..ESC
     },
@@ -129,8 +127,7 @@ pub(super) const CHECKS: &[Check] = &[
         // Never stale: only steady flight says something, and ESCs that stop talking are `esc_silent`.
         read: |inputs, motor| {
             let Inputs { now, vehicle, flight, derived, .. } = *inputs;
-            let imbalance = derived.motor_imbalance(now, vehicle, flight, motor);
-            imbalance.filter(|_| !derived.outputs().is_off(motor))
+            derived.motors().imbalance(now, vehicle, flight, derived.outputs(), motor)
         },
         ..ESC
     },
@@ -195,7 +192,7 @@ fn motor(inputs: &Inputs<'_>, motor: u8) -> Option<Motor> {
 }
 
 fn errors_per_minute(inputs: &Inputs<'_>, number: u8) -> Option<Reading> {
-    Reading::new(motor(inputs, number)?.state_at, inputs.derived.esc_errors(number))
+    Reading::new(motor(inputs, number)?.state_at, inputs.derived.motors().errors(number))
 }
 
 fn temperature_c(inputs: &Inputs<'_>, number: u8) -> Option<Reading> {

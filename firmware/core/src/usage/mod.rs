@@ -14,6 +14,7 @@ pub use totals::{MotorTotals, Totals, Wear};
 use crate::derived::Derived;
 use crate::flight::{Flight, FlightEvent, Phase};
 use crate::motion::{climb_mps, ground_speed_mps, height_m};
+use crate::motors::turns;
 use crate::observation::Observation;
 use crate::params::{Param, Params};
 use crate::power_draw::{Drawn, discharge_a, drawn};
@@ -260,7 +261,7 @@ impl Usage {
         for (number, usage) in self.totals.motors.iter_mut().enumerate() {
             let motor = &vehicle.motors[number];
             let fresh = motor.moved_at.is_some_and(|at| now.since(at) <= PAUSE);
-            if fresh && Derived::turns(vehicle, number) {
+            if fresh && turns(vehicle, number) {
                 let rpm = motor.esc.rpm.map_or(0.0, |rpm| rpm.0.abs().min(RPM_MAX));
                 usage.seconds += step_s;
                 usage.revolutions += f64::from(rpm) * step_s / 60.0;
