@@ -53,7 +53,7 @@ const ATTEMPTS_MAX: u8 = 3;
 const PROGRESS: Span = Span::from_secs(10);
 /// A mission's last item is reached this long before the autopilot leaves the mission by itself.
 const MISSION_ENDS: Span = Span::from_secs(3);
-/// A mission that sinks faster than this below this height may be landing.
+/// A mission that sinks faster than this, within this height of home, may be landing.
 const APPROACH_MPS: f32 = 0.5;
 const APPROACH_M: f32 = 40.0;
 /// A vehicle that showed a sign of landing so lately is landing: it may flare.
@@ -494,7 +494,7 @@ fn approaches(situation: &Situation<'_>) -> bool {
     let mode = vehicle.heartbeat.get().map(|heartbeat| heartbeat.mode);
     modes(vehicle).is_some_and(|modes| Some(modes.mission) == mode && !modes.tells_landing)
         && motion::climb_mps(now, vehicle).is_some_and(|climb_mps| climb_mps < -APPROACH_MPS)
-        && motion::height_m(now, vehicle).is_some_and(|height_m| height_m < APPROACH_M)
+        && motion::height_m(now, vehicle).is_some_and(|height_m| height_m.abs() < APPROACH_M)
 }
 
 /// An answer to our command, and not to what somebody else asked.

@@ -286,6 +286,11 @@ fn a_mission_that_goes_lower_is_announced_once_it_flies_on() {
     });
     assert_eq!(outcome.story(), format!("already_done, {UNANSWERED}"));
     assert!(matches!(outcome.announced_ms()[..], [44_900..45_300]), "{:?}", outcome.steps);
+    let far_below_home = fly(|now_ms, quad, _| {
+        become_vehicle(now_ms, quad, (ArduPilot, Plane, 10));
+        (quad.height, quad.climb) = (-50.0 - now_ms as f32 / 1_000.0, -1.0);
+    });
+    assert_eq!(far_below_home.story(), UNANSWERED);
 }
 
 #[test]
