@@ -235,13 +235,12 @@ impl<'a, D: CardDevice> Card<'a, D> {
         if others < wanted {
             return Err(CardError::Full);
         }
-        let place = match self.directory.place_for_new(&self.volume)? {
-            Some(place) => place,
-            None => {
-                self.lengthen_directory()?;
-                self.directory.place_for_new(&self.volume)?.ok_or(CardError::Damaged)?
-            }
-        };
+        let mut place = self.directory.place_for_new(&self.volume)?;
+        if place.is_none() {
+            self.lengthen_directory()?;
+            place = self.directory.place_for_new(&self.volume)?;
+        }
+        let place = place.ok_or(CardError::Damaged)?;
         let (first, last) = match self.take_free(wanted) {
             // Little can be free, and to search all of the FAT for it takes seconds in which nothing is written.
             Err(CardError::Searching)
@@ -296,7 +295,9 @@ impl<'a, D: CardDevice> Card<'a, D> {
         let (first, blocks) = (self.volume.block_of(cluster), self.volume.layout.cluster_blocks);
         let mut parity = self.buffers.parity.borrow_mut();
         let zeros = parity.lend();
-        zeros.iter_mut().for_each(|block| block.contents.fill(0));
+        for block in zeros.iter_mut() {
+            block.contents.fill(0);
+        }
         for at in (0..blocks).step_by(zeros.len()) {
             let zeros = zeros.get(..(blocks - at) as usize).unwrap_or(zeros);
             self.volume.write_metadata(zeros, first + at)?;

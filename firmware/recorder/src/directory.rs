@@ -261,6 +261,9 @@ impl Directory {
     }
 }
 
+/// Whether a walk goes on.
+type Step<E> = Result<ControlFlow<()>, CardError<E>>;
+
 /// A place in the directory with what is there.
 pub(crate) struct Slot<'b> {
     pub(crate) index: u32,
@@ -310,7 +313,7 @@ pub(crate) fn walk<D: CardDevice>(
     chain: &mut ClusterChain,
     from: u32,
     buffer: &mut [Block],
-    each: &mut dyn FnMut(&Slot<'_>) -> Result<ControlFlow<()>, CardError<D::Error>>,
+    each: &mut dyn FnMut(&Slot<'_>) -> Step<D::Error>,
 ) -> Result<u32, CardError<D::Error>> {
     let mut index = from;
     while index < ENTRIES_MAX {

@@ -346,7 +346,8 @@ const fn fat_date(utc_secs: u32) -> [u8; 4] {
     let month = if shifted_month < 10 { shifted_month + 3 } else { shifted_month - 9 };
     let year = year_of_era + era * 400 + if month <= 2 { 1 } else { 0 };
     let date = (year - 1980) << 9 | month << 5 | day;
-    let time = second_of_day / 3_600 << 11 | second_of_day / 60 % 60 << 5 | second_of_day % 60 / 2;
+    let (hour, minute, second) = (second_of_day / 3_600, second_of_day / 60 % 60, second_of_day % 60);
+    let time = hour << 11 | minute << 5 | (second / 2);
     (date << 16 | time).to_le_bytes()
 }
 

@@ -566,7 +566,7 @@ fn record_files(device: &MemCard) -> u32 {
             state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
             (state >> 24) as u8
         });
-        writer.frame(now, &noise[..index as usize % 200 + 1], false, &mut sink).expect("there is room");
+        writer.frame(now, &noise[..=index as usize % 200], false, &mut sink).expect("there is room");
         for sector in sink.0.drain(..) {
             assert_eq!(put(&mut recorder, now, &sector), Written::Done);
         }
