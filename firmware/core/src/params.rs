@@ -327,15 +327,6 @@ impl Params {
         self.unsaved = [0; TABLE.len().div_ceil(32)];
     }
 
-    /// Nothing is stored any more: whatever is not at its default is to be saved.
-    pub fn all_unsaved(&mut self) {
-        for (index, (spec, value)) in TABLE.iter().zip(self.values).enumerate() {
-            if value.to_bits() != spec.default.to_bits() {
-                self.unsaved[index / 32] |= 1 << (index % 32);
-            }
-        }
-    }
-
     /// All parameters with their values, in table order.
     pub fn iter(&self) -> impl Iterator<Item = (&'static ParamSpec, f32)> {
         TABLE.iter().zip(self.values)

@@ -3,10 +3,10 @@
 
 use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashErrorKind, ReadNorFlash};
 
-use crate::marks::{HEADER_BYTES, MAGIC};
+use crate::sector::{HEADER_BYTES, MAGIC};
 
 /// Whether bytes can be those of two sectors of `SECTOR` bytes with a store in them: one sector has its magic, or one has
-/// nothing behind its marks, as power may leave a store that it takes before there is any magic.
+/// nothing behind its header, as power may leave a store that it takes before there is any magic.
 pub fn is_store<const SECTOR: usize>(bytes: &[u8]) -> bool {
     let mut sectors = bytes.chunks(SECTOR);
     let is_erased = |sector: &[u8]| sector.iter().skip(HEADER_BYTES).all(|byte| *byte == 0xFF);

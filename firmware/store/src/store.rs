@@ -1,31 +1,13 @@
 //! The store itself: a map of keys to bytes.
 
-use core::pin::pin;
-use core::task::{Context, Poll, Waker};
-
 use embedded_storage::nor_flash::{ErrorType, NorFlash};
-use sequential_storage::cache::{Cache, Uncached};
-use sequential_storage::map::{MapConfig, MapStorage, SerializationError, Value};
 
 use crate::key::Key;
-use crate::sectors::{Found, Refusal, SECTORS, Sectors};
+use crate::sector::{Content, HEADER_BYTES, Header, ITEM_BYTES, Item, Sector, WORD};
 
 /// The longest value.
 pub const VALUE_BYTES_MAX: usize = 512;
 
-/// A key, a value and the byte that ends it.
-const BUFFER_BYTES: usize = (4 + VALUE_BYTES_MAX + 1).next_multiple_of(4);
-/// What an item takes beside its value: its length and checks, its key, the byte that ends it.
-const OVERHEAD_BYTES: usize = 8 + 4 + 1;
-/// Ends each value, so that no item ends like erased flash and what is free can be told from what is not.
-const END: u8 = 0;
-
-/// The longest filler.
-const ZEROS: [u8; VALUE_BYTES_MAX] = [0; VALUE_BYTES_MAX];
-
-/// Nothing is remembered: looking through all of 16 KiB takes the processor some 6 ms, and whoever saves has time.
-type Library<F> = MapStorage<u32, Sectors<F>, Cache<Uncached, Uncached, Uncached, u32>>;
-type Trouble<F> = sequential_storage::Error<Refusal<<F as ErrorType>::Error>>;
 type Outcome<T, F> = Result<T, Error<<F as ErrorType>::Error>>;
 
 /// Why something was not stored, or not read.
@@ -37,10 +19,14 @@ pub enum Error<E> {
     TooLong,
     /// All items together do not fit into one sector.
     Full,
-    /// What is in the flash cannot be read.
-    Unreadable,
     /// The flash itself.
     Flash(E),
+}
+
+impl<E> From<E> for Error<E> {
+    fn from(error: E) -> Self {
+        Self::Flash(error)
+    }
 }
 
 /// What a save did.
@@ -50,77 +36,137 @@ pub enum Saved {
     Unchanged,
     /// The value is stored.
     Written,
-    /// The store was found unreadable and was made anew; this value is stored, all others are lost.
-    Remade,
 }
 
-/// Items in two sectors of `F`.
+/// What a start found in the flash.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Found {
+    /// What was stored.
+    Kept,
+    /// What was stored, but for places that are damaged: of an item there the value before it counts, or none.
+    Damaged,
+    /// Erased flash: nothing was ever stored.
+    Blank,
+    /// Something that cannot be read: what was stored is lost, and the store was made anew.
+    Unreadable,
+}
+
+/// Items in two sectors of `F`, which has no more and no fewer.
 pub struct Store<F: NorFlash> {
-    library: Library<F>,
-    buffer: [u8; BUFFER_BYTES],
+    flash: F,
+    /// The sector in use, its generation, and where the next item goes.
+    in_use: usize,
+    generation: u16,
+    end: usize,
+    may_erase: bool,
+    value: [u8; VALUE_BYTES_MAX],
 }
 
 impl<F: NorFlash> Store<F> {
-    /// Starts with what is in the flash, which is two sectors; ends whatever power cut short, for which erases are
-    /// allowed here. Afterwards they are not, until [`Self::allow_erase`].
+    /// Starts with what is in the flash; ends whatever power cut short, for which erases are allowed here. Afterwards they are not,
+    /// until [`Self::allow_erase`].
     pub fn mount(flash: F) -> Outcome<(Self, Found), F> {
-        let (sectors, mut found) = Sectors::mount(flash).map_err(refused::<F>)?;
-        let config = const { MapConfig::new(0..(SECTORS * Sectors::<F>::PAGE_BYTES) as u32) };
-        let library = MapStorage::new(sectors, config, Cache::new_uncached());
-        let mut store = Self { library, buffer: [0; BUFFER_BYTES] };
-        let look = store.library.flash().look().map_err(refused::<F>)?;
-        if look.damaged > 0 || found == Found::Damaged {
-            // Noise may look like a sector in use.
-            found = if look.items > 0 { Found::Damaged } else { Found::Unreadable };
-            if found == Found::Unreadable {
-                store.library.flash().remake().map_err(refused::<F>)?;
-            }
-        }
-        let mut mounts = [0; 4];
-        if let Ok(Some(length)) = store.get(Key::MOUNTS, &mut mounts)
-            && length != mounts.len()
-        {
-            mounts = [0; 4];
-        }
-        // A save makes the library look at everything, and repair it: now, when there is time.
-        let count = u32::from_le_bytes(mounts).saturating_add(1);
+        let mut store =
+            Self { flash, in_use: 0, generation: 0, end: 0, may_erase: true, value: [0; VALUE_BYTES_MAX] };
+        let found = store.choose()?;
+        let count = store.mounts()?.saturating_add(1);
         match store.save(Key::MOUNTS, &count.to_le_bytes()) {
-            Ok(Saved::Remade) => found = Found::Unreadable,
             // A store that is full of items may stay so.
             Ok(_) | Err(Error::Full) => {}
             Err(error) => return Err(error),
         }
-        if found == Found::Damaged {
-            // Into the other sector, where what is damaged does not go along: it is told once. Where that fails the next start
-            // tries again.
-            let _ = store.turn_away();
+        match found {
+            Found::Kept => {}
+            // What is damaged does not go along: it is told once. Where this fails the next start tries again.
+            Found::Damaged => drop(store.turn()),
+            Found::Blank | Found::Unreadable => store.current().complete()?,
         }
-        store.allow_erase(false);
+        store.may_erase = false;
         Ok((store, found))
     }
 
+    /// Takes the newer sector of those that are complete. If the other one was to supersede it, that one's header is damaged, and its
+    /// items count.
+    fn choose(&mut self) -> Outcome<Found, F> {
+        let headers = [self.sector(0).header()?, self.sector(1).header()?];
+        let contents = [self.sector(0).content()?, self.sector(1).content()?];
+        let generation = |index: usize| headers[index].generation.filter(|_| headers[index].is_complete);
+        let newer = usize::from(generation(1) > generation(0));
+        let is_superseded =
+            |header: &Header| header.superseded_by.is_some_and(|by| Some(by) > header.generation);
+        let more = usize::from(contents[1].items > contents[0].items);
+        let (chosen, is_whole) = match generation(newer) {
+            Some(_) if is_superseded(&headers[newer]) && contents[1 - newer].items > 0 => (1 - newer, false),
+            Some(_) => (newer, !is_superseded(&headers[newer])),
+            None => (more, false),
+        };
+        let Content { items, is_damaged, end } = contents[chosen];
+        (self.in_use, self.end) = (chosen, end);
+        self.generation = headers.iter().filter_map(|header| header.generation).max().unwrap_or(0);
+        if items > 0 {
+            return Ok(if is_whole && !is_damaged { Found::Kept } else { Found::Damaged });
+        }
+        let is_empty = contents.iter().all(|content| content.end == HEADER_BYTES);
+        // A sector is complete with its first item: of one without any all items are lost.
+        let found = match headers.iter().any(|header| header.is_complete) {
+            _ if !is_empty => Found::Unreadable,
+            true => Found::Damaged,
+            false => Found::Blank,
+        };
+        for index in [1, 0] {
+            self.sector(index).begin(1)?;
+        }
+        (self.in_use, self.generation, self.end) = (0, 1, HEADER_BYTES);
+        Ok(found)
+    }
+
+    const fn sector(&mut self, index: usize) -> Sector<'_, F> {
+        Sector::new(&mut self.flash, index, F::ERASE_SIZE)
+    }
+
+    /// The sector in use, as far as it is written.
+    const fn current(&mut self) -> Sector<'_, F> {
+        Sector::new(&mut self.flash, self.in_use, self.end)
+    }
+
     /// Whether an erase is allowed from now on: it may stop the processor for half a second.
-    pub fn allow_erase(&mut self, allowed: bool) {
-        self.library.flash().allow_erase(allowed);
+    pub const fn allow_erase(&mut self, allowed: bool) {
+        self.may_erase = allowed;
     }
 
     /// Hands every stored item to `found`, the values of one key in the order in which they were stored: the last one
     /// counts.
     pub fn for_each(&mut self, mut found: impl FnMut(Key, &[u8])) -> Outcome<(), F> {
-        self.for_each_stored(|key, value| {
-            if !key.is_own() {
-                found(key, value);
+        let mut at = HEADER_BYTES;
+        while let Some(item) = self.current().next(at)? {
+            at = item.end();
+            let Self { flash, in_use, end, value, .. } = self;
+            if let Some(value) = value.get_mut(..item.length).filter(|_| !item.key.is_own()) {
+                Sector::new(flash, *in_use, *end).read(item.value_at(), value)?;
+                found(item.key, value);
             }
-        })
+        }
+        Ok(())
     }
 
     /// Copies a value into `out`; its length, or `None` where there is none or it is longer than `out`.
     pub fn get(&mut self, key: Key, out: &mut [u8]) -> Outcome<Option<usize>, F> {
-        let Some(stored) = self.stored(key)? else { return Ok(None) };
-        Ok(out.get_mut(..stored.len()).map(|out| {
-            out.copy_from_slice(stored);
-            stored.len()
-        }))
+        let Some(item) = self.find(key)? else { return Ok(None) };
+        let Some(out) = out.get_mut(..item.length) else { return Ok(None) };
+        self.current().read(item.value_at(), out)?;
+        Ok(Some(item.length))
+    }
+
+    /// The newest item of this key.
+    fn find(&mut self, key: Key) -> Outcome<Option<Item>, F> {
+        let (mut found, mut at) = (None, HEADER_BYTES);
+        while let Some(item) = self.current().next(at)? {
+            at = item.end();
+            if item.key == key {
+                found = Some(item);
+            }
+        }
+        Ok(found)
     }
 
     /// Stores a value. When this returns an error the old value still stands.
@@ -128,24 +174,35 @@ impl<F: NorFlash> Store<F> {
         if value.len() > VALUE_BYTES_MAX {
             return Err(Error::TooLong);
         }
-        // An error here comes again below, where something is done about it.
-        if let Ok(Some(stored)) = self.stored(key)
-            && stored == value
+        if let Some(item) = self.find(key)?
+            && item.length == value.len()
         {
-            return Ok(Saved::Unchanged);
-        }
-        match self.write(key, value) {
-            Err(Error::Unreadable) => {
-                self.library.flash().remake().map_err(refused::<F>)?;
-                self.write(key, value).map(|()| Saved::Remade)
+            let Self { flash, in_use, end, value: stored, .. } = self;
+            let stored = stored.get_mut(..item.length).unwrap_or_default();
+            Sector::new(flash, *in_use, *end).read(item.value_at(), stored)?;
+            if stored == value {
+                return Ok(Saved::Unchanged);
             }
-            outcome => outcome.map(|()| Saved::Written),
         }
+        let bytes = ITEM_BYTES + value.len().next_multiple_of(WORD);
+        if bytes > F::ERASE_SIZE - self.end {
+            if HEADER_BYTES + self.live_bytes()? + bytes > F::ERASE_SIZE {
+                return Err(Error::Full);
+            }
+            if !self.may_erase {
+                return Err(Error::NotNow);
+            }
+            self.turn()?;
+        }
+        let at = self.end;
+        self.end += bytes;
+        self.current().append(at, key, value)?;
+        Ok(Saved::Written)
     }
 
-    /// Bytes that are free in the sector in use; an item takes 13 and its value, rounded up to 4.
-    pub fn room(&mut self) -> Outcome<usize, F> {
-        self.library.flash().room().map_err(refused::<F>)
+    /// Bytes that are free in the sector in use; an item takes 12 and its value, rounded up to 4.
+    pub const fn room(&self) -> usize {
+        F::ERASE_SIZE.saturating_sub(self.end)
     }
 
     /// How often the store was mounted since it was made, this time included.
@@ -155,110 +212,45 @@ impl<F: NorFlash> Store<F> {
         Ok(u32::from_le_bytes(mounts))
     }
 
-    /// Goes on into the other sector now if less than `room` bytes are free, so that it need not be done later; whether
-    /// it did. Takes an erase.
+    /// Goes on into the other sector now if less than `room` bytes are free and that gains some, so that it need not be done later;
+    /// whether it did. Takes an erase.
     pub fn turn_ahead(&mut self, room: usize) -> Outcome<bool, F> {
-        /// The shortest filler, rounded up to a word.
-        const SHORTEST: usize = OVERHEAD_BYTES.next_multiple_of(4);
-        let before = self.library.flash().in_use().map_err(refused::<F>)?;
-        if before.is_none() || self.room()? >= room {
+        if self.room() >= room || HEADER_BYTES + self.live_bytes()? >= self.end {
             return Ok(false);
         }
-        self.allow_erase(true);
-        // Each filler takes half a kilobyte or all that is free, so that this ends after so many.
-        let mut outcome = Ok(false);
-        for _ in 0..F::ERASE_SIZE / VALUE_BYTES_MAX + 4 {
-            let free = self.room()?;
-            // The last one is short, for it goes along into the other sector.
-            let spare = if free >= 2 * SHORTEST { SHORTEST + OVERHEAD_BYTES } else { OVERHEAD_BYTES };
-            let filler = ZEROS.get(..free.saturating_sub(spare)).unwrap_or(&ZEROS);
-            outcome = self.write(Key::FILLER, filler).map(|()| false);
-            if outcome.is_err() || self.library.flash().in_use().map_err(refused::<F>)? != before {
-                outcome = outcome.map(|_| true);
-                break;
-            }
-        }
-        self.allow_erase(false);
-        outcome
+        self.turn().map(|()| true)
     }
 
-    /// Goes on into the other sector, however much of this one is free: what is damaged may lie there. Erases must be allowed.
-    fn turn_away(&mut self) -> Outcome<(), F> {
-        let before = self.library.flash().in_use().map_err(refused::<F>)?;
-        for _ in 0..F::ERASE_SIZE / VALUE_BYTES_MAX + 4 {
-            self.write(Key::FILLER, &ZEROS)?;
-            if self.library.flash().in_use().map_err(refused::<F>)? != before {
-                break;
-            }
+    /// Bytes of all items that count.
+    fn live_bytes(&mut self) -> Outcome<usize, F> {
+        let (mut bytes, mut at) = (0, HEADER_BYTES);
+        while let Some(item) = self.current().next(at)? {
+            at = item.end();
+            bytes += if self.current().is_newest(&item)? { item.bytes() } else { 0 };
         }
+        Ok(bytes)
+    }
+
+    /// Copies all that counts into the other sector, and goes on there.
+    fn turn(&mut self) -> Outcome<(), F> {
+        let (from, to) = (self.in_use, 1 - self.in_use);
+        let generation = self.generation.saturating_add(1);
+        self.sector(to).begin(generation)?;
+        let (mut at, mut end) = (HEADER_BYTES, HEADER_BYTES);
+        while let Some(item) = self.current().next(at)? {
+            at = item.end();
+            if !self.current().is_newest(&item)? {
+                continue;
+            }
+            for place in (0..item.bytes()).step_by(WORD) {
+                let word = self.current().word(item.at + place)?;
+                self.sector(to).write_word(end + place, word)?;
+            }
+            end += item.bytes();
+        }
+        self.sector(to).complete()?;
+        (self.in_use, self.generation, self.end) = (to, generation, end);
+        self.sector(from).supersede(generation)?;
         Ok(())
-    }
-
-    fn for_each_stored(&mut self, mut found: impl FnMut(Key, &[u8])) -> Outcome<(), F> {
-        let Self { library, buffer } = self;
-        let mut items = done(library.fetch_all_items(buffer)).map_err(troubled::<F>)?;
-        while let Some((key, stored)) = done(items.next::<&[u8]>(buffer)).map_err(troubled::<F>)? {
-            if let Some((_end, value)) = stored.split_last() {
-                found(Key::from_stored(key), value);
-            }
-        }
-        Ok(())
-    }
-
-    fn stored(&mut self, key: Key) -> Outcome<Option<&[u8]>, F> {
-        let Self { library, buffer } = self;
-        let stored = done(library.fetch_item::<&[u8]>(buffer, &key.stored())).map_err(troubled::<F>)?;
-        Ok(stored.and_then(|stored| stored.split_last()).map(|(_, value)| value))
-    }
-
-    fn write(&mut self, key: Key, value: &[u8]) -> Outcome<(), F> {
-        let Self { library, buffer } = self;
-        done(library.store_item(buffer, &key.stored(), &Ended(value))).map_err(troubled::<F>)
-    }
-}
-
-/// A value with the byte that ends it.
-struct Ended<'a>(&'a [u8]);
-
-impl<'a> Value<'a> for Ended<'a> {
-    fn serialize_into(&self, buffer: &mut [u8]) -> Result<usize, SerializationError> {
-        let length = self.0.len();
-        let place = buffer.get_mut(..=length).and_then(<[u8]>::split_last_mut);
-        let (end, value) = place.ok_or(SerializationError::BufferTooSmall)?;
-        value.copy_from_slice(self.0);
-        *end = END;
-        Ok(length + 1)
-    }
-
-    fn deserialize_from(buffer: &'a [u8]) -> Result<(Self, usize), SerializationError> {
-        Ok((Self(buffer), buffer.len()))
-    }
-}
-
-/// The library is written for flash that is waited for; ours is done when it returns, so each future is ready at once.
-fn done<T>(future: impl Future<Output = T>) -> T {
-    let mut future = pin!(future);
-    loop {
-        if let Poll::Ready(result) = future.as_mut().poll(&mut Context::from_waker(Waker::noop())) {
-            return result;
-        }
-    }
-}
-
-fn troubled<F: NorFlash>(error: Trouble<F>) -> Error<F::Error> {
-    match error {
-        sequential_storage::Error::Storage { value } => refused::<F>(value),
-        sequential_storage::Error::FullStorage => Error::Full,
-        sequential_storage::Error::ItemTooBig => Error::TooLong,
-        // A buffer of ours is never too small for an item of ours.
-        _ => Error::Unreadable,
-    }
-}
-
-fn refused<F: NorFlash>(refusal: Refusal<F::Error>) -> Error<F::Error> {
-    match refusal {
-        Refusal::NotNow => Error::NotNow,
-        Refusal::OutOfBounds => Error::Unreadable,
-        Refusal::Flash(error) => Error::Flash(error),
     }
 }

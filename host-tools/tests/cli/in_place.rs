@@ -140,7 +140,7 @@ fn a_damaged_store_is_told_and_one_that_cannot_be_read_is_refused_and_stays() {
         let records: Vec<u8> =
             contents(&dir.path().join(format!("out{at}"))).into_iter().flat_map(|(_, bytes)| bytes).collect();
         let records = String::from_utf8_lossy(&records);
-        assert_eq!(records.matches("a stored item was lost: older value or anew").count(), told, "{at}");
+        assert_eq!(records.matches("a saved value was lost, using an older one").count(), told, "{at}");
     }
     // Erased but for what stands first in it.
     let mut emptied = whole.clone();

@@ -94,19 +94,6 @@ impl Monitor {
         self.saving.hurry_all();
     }
 
-    /// Everything is due: what was stored is lost.
-    pub fn save_anew(&mut self) {
-        for key in ItemKey::ALL {
-            let used = match key {
-                ItemKey::Component(place) => self.component_figures(usize::from(place)).is_some(),
-                _ => true,
-            };
-            if used {
-                self.saving.hurry(key);
-            }
-        }
-    }
-
     /// Writes an item as it is to be saved; gives its length.
     pub fn encode_item(&self, key: ItemKey, out: &mut [u8; ITEM_BYTES_MAX]) -> usize {
         let boots = self.boots();

@@ -80,8 +80,6 @@ pub(crate) struct Secure {
     last: u64,
     /// A key was set, and the time with it: both ways out begin anew.
     reseal: bool,
-    /// How often the store had been made anew when the key was handed over.
-    remade: u32,
     /// Requests that were refused for their signature.
     pub(super) refused: u32,
 }
@@ -97,7 +95,6 @@ impl Secure {
             scarce: 0,
             last: 0,
             reseal: false,
-            remade: 0,
             refused: 0,
         }
     }
@@ -120,13 +117,10 @@ impl Secure {
 
     /// Hands over what is due, at every tick and at the end. `last` is the highest stamp that was signed with.
     pub(crate) fn save(&mut self, now: Instant, last: Option<u64>, handover: &mut Handover<'_>) {
-        let Self { signing, times, key_due, times_due, saved_at, scarce, remade, .. } = self;
+        let Self { signing, times, key_due, times_due, saved_at, scarce, .. } = self;
         let has_room = handover.room() == Room::Enough;
         *scarce = if has_room { 0 } else { *scarce };
         let every = if has_room { SAVE } else { SAVE_SCARCE };
-        if core::mem::replace(remade, handover.remade()) != handover.remade() {
-            (*key_due, *times_due) = (signing.key().is_some(), signing.key().is_some());
-        }
         if *key_due {
             let bytes = signing.key().map_or([0; KEY_BYTES], |key| key.0);
             *key_due = !handover.put(Item::item(ITEM_KEY), &bytes);

@@ -23,7 +23,6 @@ pub struct Handover<'a> {
     items: MailboxIn<'a>,
     status: &'a StoreStatus,
     told: StoreReading,
-    remade: u32,
     frames: u32,
     frames_at: Instant,
     /// The vehicle was armed, flew, or was not known to be disarmed.
@@ -44,7 +43,7 @@ impl<'a> Handover<'a> {
     pub fn new(items: MailboxIn<'a>, status: &'a StoreStatus, monitor: &mut Monitor) -> Self {
         monitor.params_mut().all_saved();
         let told = StoreReading { state: StoreState::Kept, ..StoreReading::default() };
-        Self { items, status, told, remade: 0, frames: 0, frames_at: Instant::ZERO, active_at: Instant::ZERO }
+        Self { items, status, told, frames: 0, frames_at: Instant::ZERO, active_at: Instant::ZERO }
     }
 
     /// At every tick: hands over what is due. `frames` is what reception has counted.
@@ -63,11 +62,6 @@ impl<'a> Handover<'a> {
         } else {
             Calm::None
         });
-        if newer(&mut self.remade, self.status.read().remade) {
-            // Nothing of it is there any more.
-            monitor.params_mut().all_unsaved();
-            monitor.save_anew();
-        }
         self.put_params(monitor.params_mut());
         self.put_items(now, monitor);
     }
@@ -95,10 +89,7 @@ impl<'a> Handover<'a> {
             };
         }
         if newer(&mut told.unreadable, now.unreadable) {
-            return news(4, "HUMS: a stored item was lost: older value or anew");
-        }
-        if newer(&mut told.remade, now.remade) {
-            return news(3, "HUMS: store unreadable, made anew");
+            return news(4, "HUMS: a saved value was lost, using an older one");
         }
         if told.room != now.room {
             told.room = now.room;
@@ -126,11 +117,6 @@ impl<'a> Handover<'a> {
     /// Hands over an item of somebody else's; `false` when it found no room.
     pub fn put(&mut self, key: Key, value: &[u8]) -> bool {
         self.items.put(key, value)
-    }
-
-    /// How often the store was found unreadable since power-on, and made anew: what is in it has to be put again.
-    pub(crate) fn remade(&self) -> u32 {
-        self.status.read().remade
     }
 
     /// Each parameter that was set; `false` when one found no room.

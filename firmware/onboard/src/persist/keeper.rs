@@ -6,7 +6,7 @@ use hums_core::baseline::Baselines;
 use hums_core::health::exceedance::Exceedances;
 use hums_core::lifetime::{ITEM_BYTES_MAX, Item as _, ItemKey, Room, Session};
 use hums_core::params::ParamError;
-use hums_store::{Error, Found, Key, Saved, Store, param};
+use hums_store::{Error, Found, Key, Store, param};
 
 use super::mailbox::MailboxOut;
 use super::status::{Calm, StoreState, StoreStatus, count};
@@ -135,11 +135,8 @@ impl<'a, F: NorFlash> Keeper<'a, F> {
         }
         store.allow_erase(may_erase || calm == Calm::Silent);
         let kept = items.oldest(|key, value| match store.save(key, value) {
-            Ok(saved) => {
+            Ok(_) => {
                 count(&status.saved);
-                if saved == Saved::Remade {
-                    count(&status.remade);
-                }
                 (Kept::Took, true)
             }
             Err(Error::NotNow) => (Kept::Waits, false),
@@ -163,9 +160,8 @@ impl<'a, F: NorFlash> Keeper<'a, F> {
 
     /// Tells the monitor whether there is room to spare.
     fn look_for_room(&mut self) {
-        if let Some(store) = &mut self.store
-            && let Ok(room) = store.room()
-        {
+        if let Some(store) = &self.store {
+            let room = store.room();
             self.scarce = room < F::ERASE_SIZE * SCARCE.0 / SCARCE.1;
             self.status.set_room(if room < RESERVE { Room::Reserve } else { Room::Enough });
         }

@@ -42,7 +42,6 @@ pub struct StoreStatus {
     pub(crate) saved: AtomicU32,
     pub(crate) refused: AtomicU32,
     pub(crate) failed: AtomicU32,
-    pub(crate) remade: AtomicU32,
     pub(crate) erased: AtomicU32,
     calm: AtomicU8,
     reserve_only: AtomicBool,
@@ -61,8 +60,6 @@ pub struct StoreReading {
     pub refused: u32,
     /// Items that could not be saved.
     pub failed: u32,
-    /// Times that it was found unreadable later, and made anew.
-    pub remade: u32,
     /// Erases while the autopilot talked: frames were lost with each.
     pub erased: u32,
     /// Whether there is room to spare.
@@ -78,7 +75,6 @@ impl StoreStatus {
             saved: AtomicU32::new(0),
             refused: AtomicU32::new(0),
             failed: AtomicU32::new(0),
-            remade: AtomicU32::new(0),
             erased: AtomicU32::new(0),
             calm: AtomicU8::new(Calm::None as u8),
             reserve_only: AtomicBool::new(false),
@@ -99,7 +95,6 @@ impl StoreStatus {
             saved: self.saved.load(Ordering::Relaxed),
             refused: self.refused.load(Ordering::Relaxed),
             failed: self.failed.load(Ordering::Relaxed),
-            remade: self.remade.load(Ordering::Relaxed),
             erased: self.erased.load(Ordering::Relaxed),
             room: if self.reserve_only.load(Ordering::Relaxed) { Room::Reserve } else { Room::Enough },
         }

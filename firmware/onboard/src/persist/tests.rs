@@ -278,27 +278,6 @@ fn flash_with_something_else_in_it_is_told_and_the_counters_begin() {
 }
 
 #[test]
-fn a_store_that_is_made_anew_in_the_middle_gets_everything_again() {
-    let mut flash = Flash::blank();
-    fly(&mut flash, 600);
-    session(&mut flash, |monitor, handover, keeper| {
-        monitor.params_mut().set("CELL_VOLT_WARN", 3.3).expect("in range");
-        for second in 0..60 {
-            live(second, true, monitor, handover, second as u32);
-            while keeper.service(false) == Kept::Took {}
-        }
-        keeper.status.remade.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
-        let saved = keeper.status.read().saved;
-        live(60, true, monitor, handover, 60);
-        while keeper.service(false) == Kept::Took {
-            handover.step(Instant::from_millis(60_000), monitor, 60);
-        }
-        // Lifetime, baselines, exceedances, exposure, the session, one parameter.
-        assert_eq!(keeper.status.read().saved - saved, 6);
-    });
-}
-
-#[test]
 fn an_item_that_makes_no_sense_is_told_and_the_others_are_read() {
     let mut flash = Flash::blank();
     let (mut store, _) = Store::mount(&mut flash).expect("it works");
@@ -314,7 +293,7 @@ fn an_item_that_makes_no_sense_is_told_and_the_others_are_read() {
         assert!((monitor.params().get(Param::CellVoltCrit) - 3.25).abs() < 1e-6);
         assert_eq!(monitor.params().get(Param::CellVoltWarn).to_bits(), 3.6_f32.to_bits());
         assert_eq!(keeper.status.read().unreadable, 2);
-        assert!(handover.news().is_some_and(|news| news.text.contains("stored item was lost")));
+        assert!(handover.news().is_some_and(|news| news.text.contains("saved value was lost")));
     });
 }
 

@@ -1,0 +1,330 @@
+//! One sector: its header, and the items behind it.
+//!
+//! | word | header |
+//! |---|---|
+//! | 0 | [`MAGIC`] |
+//! | 1 | the sector's generation, [`coded`]: counts up with each turn to the other sector |
+//! | 2 | [`COMPLETE`]: all that is live was copied into it |
+//! | 3 | the generation of the sector that supersedes it, [`coded`] |
+//!
+//! | word | item |
+//! |---|---|
+//! | 0 | the value's length in bytes, [`coded`] |
+//! | 1 | the key |
+//! | 2.. | the value, zeros up to a word |
+//! | last | CRC-32C of length, key and value |
+//!
+//! Words are written in this order, so that a cut in the middle of an item leaves either a first word that is no length, or a last
+//! one that is not written whole. Bits only go from 1 to 0, so that a last word that is written in part has all ones of the right
+//! one ([`Check::Cut`]). All else that is no item is damage.
+
+use embedded_storage::nor_flash::NorFlash;
+
+use crate::key::Key;
+
+/// Bytes of a word.
+pub(crate) const WORD: usize = 4;
+/// Bytes of a header.
+pub(crate) const HEADER_BYTES: usize = 4 * WORD;
+/// Bytes of an item beside its value: length, key and check.
+pub(crate) const ITEM_BYTES: usize = 3 * WORD;
+/// What erased flash reads as.
+pub(crate) const ERASED: u32 = u32::MAX;
+/// "HST2": a layout that differs needs another number.
+pub(crate) const MAGIC: u32 = u32::from_be_bytes(*b"HST2");
+/// "done"
+const COMPLETE: u32 = u32::from_be_bytes(*b"done");
+
+/// Offsets of the header's words.
+const GENERATION_AT: usize = WORD;
+const COMPLETE_AT: usize = 2 * WORD;
+const SUPERSEDED_AT: usize = 3 * WORD;
+
+/// A number such that no part of it, and no word that was written only in part, is taken for a number: each bit stands
+/// beside its opposite, and what power cut short lacks a zero somewhere.
+const fn coded(number: u16) -> u32 {
+    number as u32 | ((!number as u32) << 16)
+}
+
+const fn decoded(word: u32) -> Option<u16> {
+    let number = word as u16;
+    if coded(number) == word { Some(number) } else { None }
+}
+
+/// A sector's header, as it is read.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Header {
+    /// Its generation, also where the rest of the header is damaged.
+    pub(crate) generation: Option<u16>,
+    /// It holds all that was live when it was begun.
+    pub(crate) is_complete: bool,
+    /// Which generation supersedes it.
+    pub(crate) superseded_by: Option<u16>,
+}
+
+/// An item's place.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Item {
+    pub(crate) at: usize,
+    pub(crate) key: Key,
+    /// The value's length.
+    pub(crate) length: usize,
+}
+
+impl Item {
+    /// Where the value begins.
+    pub(crate) const fn value_at(&self) -> usize {
+        self.at + 2 * WORD
+    }
+
+    /// Bytes of the item in the flash.
+    pub(crate) const fn bytes(&self) -> usize {
+        ITEM_BYTES + self.length.next_multiple_of(WORD)
+    }
+
+    /// Where the next item begins.
+    pub(crate) const fn end(&self) -> usize {
+        self.at + self.bytes()
+    }
+}
+
+/// What an item's last word says.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Check {
+    Whole,
+    /// Power went before it was whole.
+    Cut,
+    Damaged,
+}
+
+/// What a walk over a sector found.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Content {
+    /// Items that are whole.
+    pub(crate) items: usize,
+    /// Something there is neither an item nor what power cut short.
+    pub(crate) is_damaged: bool,
+    /// Behind all that was written.
+    pub(crate) end: usize,
+}
+
+/// One of the two sectors of `F`.
+pub(crate) struct Sector<'f, F> {
+    flash: &'f mut F,
+    start: usize,
+    /// Items go no further.
+    end: usize,
+}
+
+impl<'f, F: NorFlash> Sector<'f, F> {
+    /// The first sector, or the second one, up to this offset.
+    pub(crate) const fn new(flash: &'f mut F, index: usize, end: usize) -> Self {
+        const {
+            assert!(F::WRITE_SIZE == WORD && F::READ_SIZE == 1, "the layout is made for words of four bytes");
+            assert!(F::ERASE_SIZE.is_multiple_of(WORD) && F::ERASE_SIZE <= u16::MAX as usize);
+        }
+        Self { flash, start: index * F::ERASE_SIZE, end }
+    }
+
+    pub(crate) fn read(&mut self, at: usize, bytes: &mut [u8]) -> Result<(), F::Error> {
+        self.flash.read((self.start + at) as u32, bytes)
+    }
+
+    pub(crate) fn word(&mut self, at: usize) -> Result<u32, F::Error> {
+        let mut bytes = [0; WORD];
+        self.read(at, &mut bytes)?;
+        Ok(u32::from_le_bytes(bytes))
+    }
+
+    pub(crate) fn write_word(&mut self, at: usize, word: u32) -> Result<(), F::Error> {
+        self.flash.write((self.start + at) as u32, &word.to_le_bytes())
+    }
+
+    pub(crate) fn header(&mut self) -> Result<Header, F::Error> {
+        let generation = decoded(self.word(GENERATION_AT)?);
+        let is_ours = self.word(0)? == MAGIC && generation.is_some();
+        let is_complete = is_ours && self.word(COMPLETE_AT)? == COMPLETE;
+        Ok(Header { generation, is_complete, superseded_by: decoded(self.word(SUPERSEDED_AT)?) })
+    }
+
+    /// Erases it, and begins it anew.
+    pub(crate) fn begin(&mut self, generation: u16) -> Result<(), F::Error> {
+        self.flash.erase(self.start as u32, (self.start + F::ERASE_SIZE) as u32)?;
+        self.write_word(GENERATION_AT, coded(generation))?;
+        self.write_word(0, MAGIC)
+    }
+
+    /// All that is live is in it.
+    pub(crate) fn complete(&mut self) -> Result<(), F::Error> {
+        self.write_word(COMPLETE_AT, COMPLETE)
+    }
+
+    /// Another sector supersedes it. The mark is of use only where that one's header is damaged later, so it may fail.
+    pub(crate) fn supersede(&mut self, generation: u16) -> Result<(), F::Error> {
+        if self.word(SUPERSEDED_AT)? == ERASED {
+            self.write_word(SUPERSEDED_AT, coded(generation))?;
+        }
+        Ok(())
+    }
+
+    /// Writes an item of this value there; it fits.
+    pub(crate) fn append(&mut self, at: usize, key: Key, value: &[u8]) -> Result<(), F::Error> {
+        let mut crc = Crc::new();
+        for (place, word) in [coded(value.len() as u16), key.stored()].into_iter().enumerate() {
+            crc.add(word);
+            self.write_word(at + place * WORD, word)?;
+        }
+        for (place, bytes) in value.chunks(WORD).enumerate() {
+            let word = bytes.iter().rev().fold(0, |word, byte| word << 8 | u32::from(*byte));
+            crc.add(word);
+            self.write_word(at + (2 + place) * WORD, word)?;
+        }
+        self.write_word(at + 2 * WORD + value.len().next_multiple_of(WORD), crc.check())
+    }
+
+    /// An item that may begin here, whole or not.
+    fn item(&mut self, at: usize) -> Result<Option<Item>, F::Error> {
+        if at + ITEM_BYTES > self.end {
+            return Ok(None);
+        }
+        let Some(length) = decoded(self.word(at)?) else { return Ok(None) };
+        let item = Item { at, key: Key::from_stored(self.word(at + WORD)?), length: usize::from(length) };
+        Ok(Some(item).filter(|item| item.end() <= self.end))
+    }
+
+    fn check(&mut self, item: &Item) -> Result<Check, F::Error> {
+        let mut crc = Crc::new();
+        let last = item.end() - WORD;
+        for at in (item.at..last).step_by(WORD) {
+            crc.add(self.word(at)?);
+        }
+        let stored = self.word(last)?;
+        Ok(match crc.check() {
+            check if check == stored => Check::Whole,
+            check if check & stored == check => Check::Cut,
+            _ => Check::Damaged,
+        })
+    }
+
+    /// The next whole item from here on.
+    pub(crate) fn next(&mut self, mut at: usize) -> Result<Option<Item>, F::Error> {
+        while at + ITEM_BYTES <= self.end {
+            match self.item(at)? {
+                Some(item) if self.check(&item)? == Check::Whole => return Ok(Some(item)),
+                _ => at += WORD,
+            }
+        }
+        Ok(None)
+    }
+
+    /// Whether no whole item behind this one has its key.
+    pub(crate) fn is_newest(&mut self, item: &Item) -> Result<bool, F::Error> {
+        let mut at = item.end();
+        while let Some(later) = self.next(at)? {
+            if later.key == item.key {
+                return Ok(false);
+            }
+            at = later.end();
+        }
+        Ok(true)
+    }
+
+    /// Looks through all of it.
+    ///
+    /// A place that power cut short is no damage: nothing is behind it, or the next start, which counts itself.
+    pub(crate) fn content(&mut self) -> Result<Content, F::Error> {
+        // Two starts in a row whose power went at the first word of their first item.
+        const CUT_WORDS: usize = 2;
+        let mut content = Content { end: HEADER_BYTES, ..Content::default() };
+        let (mut cut, mut words) = (false, 0);
+        let mut at = HEADER_BYTES;
+        while at < F::ERASE_SIZE && self.word(at)? != ERASED {
+            let item = self.item(at)?;
+            let check = item.map_or(Ok(Check::Damaged), |item| self.check(&item))?;
+            match (item, check) {
+                (Some(item), Check::Whole) => {
+                    content.items += 1;
+                    content.is_damaged |= words > CUT_WORDS || (cut || words > 0) && item.key != Key::MOUNTS;
+                    (cut, words, at) = (false, 0, item.end());
+                }
+                (Some(item), Check::Cut) => {
+                    cut = true;
+                    at = item.end();
+                }
+                _ => {
+                    words += 1;
+                    at += WORD;
+                }
+            }
+            content.end = at;
+        }
+        content.is_damaged |= words > CUT_WORDS;
+        while at < F::ERASE_SIZE {
+            at += WORD;
+            if self.word(at - WORD)? != ERASED {
+                (content.is_damaged, content.end) = (true, at);
+            }
+        }
+        Ok(content)
+    }
+}
+
+/// CRC-32C of each number of four bits.
+const NIBBLES: [u32; 16] = {
+    let mut table = [0; 16];
+    let mut at = 0;
+    while at < table.len() {
+        let (mut crc, mut bit) = (at as u32, 0);
+        while bit < 4 {
+            crc = if crc & 1 == 1 { crc >> 1 ^ 0x82F6_3B78 } else { crc >> 1 };
+            bit += 1;
+        }
+        table[at] = crc;
+        at += 1;
+    }
+    table
+};
+
+/// CRC-32C (Castagnoli), word by word.
+struct Crc(u32);
+
+impl Crc {
+    const fn new() -> Self {
+        Self(u32::MAX)
+    }
+
+    fn add(&mut self, word: u32) {
+        self.0 = (0..8).fold(self.0 ^ word, |crc, _| crc >> 4 ^ NIBBLES[(crc & 15) as usize]);
+    }
+
+    /// Never erased flash: an item whose check is not written is not whole.
+    const fn check(&self) -> u32 {
+        if !self.0 == ERASED { 0 } else { !self.0 }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_word_that_power_cut_short_is_no_number() {
+        for number in [0, 1, 0x8001, 0xFFFF, 12_345] {
+            let whole = coded(number);
+            assert_eq!(decoded(whole), Some(number));
+            for bit in (0..32).filter(|bit| whole & (1 << bit) == 0) {
+                assert_eq!(decoded(whole | 1 << bit), None, "{number} without bit {bit}");
+            }
+        }
+        assert_eq!(decoded(ERASED), None);
+        assert_eq!(decoded(0), None);
+    }
+
+    #[test]
+    fn the_check_is_crc_32c() {
+        let mut crc = Crc::new();
+        // RFC 3720, B.4: 32 bytes of zeros.
+        (0..8).for_each(|_| crc.add(0));
+        assert_eq!(crc.check(), 0x8A91_36AA);
+    }
+}
