@@ -56,6 +56,7 @@ pub struct Monitor {
     saving: Saving,
     happenings: Happenings,
     before_tick: Before,
+    ticked_at: Instant,
     cells_told: bool,
     /// The autopilot has been asked for all its parameters.
     parameters_asked: bool,
@@ -135,6 +136,7 @@ impl Monitor {
                 saving: Saving::new(),
                 happenings: Happenings::new(),
                 before_tick: Before::NOTHING,
+                ticked_at: Instant::ZERO,
                 cells_told: false,
                 parameters_asked: false,
             }
@@ -164,6 +166,7 @@ impl Monitor {
         apart(|| self.mishap = Mishap::new());
         apart(|| self.derived = Derived::new());
         self.health.clear();
+        self.exceedances.end(self.ticked_at);
         self.protect = Protect::new();
         self.usage.break_off();
         self.parameters_asked = false;
@@ -198,6 +201,7 @@ impl Monitor {
         recorder: &RecorderStatus,
         findings: &mut impl FnMut(&Finding),
     ) {
+        self.ticked_at = now;
         let event = self.step_flight(now);
         self.derived.step(now, &self.vehicle, &self.flight, event, recorder);
         self.step_trends(now, event);

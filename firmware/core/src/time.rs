@@ -170,3 +170,36 @@ impl Add for Span {
         Self(self.0.saturating_add(other.0))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Just before the clock wraps, at it, and after a month.
+    #[test]
+    fn times_are_compared_across_the_wrap() {
+        const WRAP_MS: u64 = 1 << 32;
+        for start_ms in [0, 1, WRAP_MS - 60_000, WRAP_MS - 2, WRAP_MS + 5] {
+            let start = Instant::from_millis(start_ms);
+            for span_ms in [0, 1, 50, 60_000, 3_000_000, 30 * 86_400_000] {
+                let later = start + Span::from_millis(span_ms);
+                assert!(later.since(start).as_millis().abs_diff(span_ms) <= 1, "{start:?} {span_ms}");
+                assert!((later - Span::from_millis(span_ms)).since(start) <= Span::from_millis(1));
+                if (2..=3_000_000).contains(&span_ms) {
+                    assert_eq!(start.since(later), Span::ZERO);
+                    assert!(later.is_after(start) && !start.is_after(later));
+                    assert_eq!((start.later(later), start.earlier(later)), (later, start));
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_a_month_old_is_old() {
+        let month = Span::from_secs(30 * 86_400);
+        for start_ms in [5, 1_u64 << 31, (1 << 32) - 5] {
+            let start = Instant::from_millis(start_ms);
+            assert!(Stamp::at(start).older_than(start + month, Span::from_secs(2)));
+        }
+    }
+}

@@ -3,8 +3,7 @@
 use std::collections::BTreeMap;
 
 use hums_core::clock::Instant;
-use hums_core::health::{Level, because};
-use hums_core::time;
+use hums_core::health::{Alarm, Level, because};
 
 use super::problem::began;
 use crate::summary::FindingLine;
@@ -14,8 +13,15 @@ struct Open<'a> {
     since: Instant,
     level: Level,
     check: &'a str,
+    instance: u8,
     /// Its findings that nothing explains yet.
     unexplained: Vec<usize>,
+}
+
+impl<'a> Open<'a> {
+    fn alarm(&self, since: Instant) -> Alarm<'a> {
+        Alarm { since: since.into(), check: self.check, instance: self.instance, level: self.level }
+    }
 }
 
 /// The check that explains each of the findings, which stand in order; `None` where nothing does.
@@ -33,6 +39,7 @@ pub fn causes(findings: &[FindingLine]) -> Vec<Option<String>> {
             since: finding.at,
             level,
             check: &finding.check,
+            instance: finding.instance,
             unexplained: Vec::new(),
         });
         one.level = level;
@@ -42,13 +49,12 @@ pub fn causes(findings: &[FindingLine]) -> Vec<Option<String>> {
             let others = open.values().map(|other| (other.since, other.check));
             began(one.check, one.since, others)
         };
-        let alarms: Vec<(time::Instant, &str, Level)> =
-            open.values().map(|one| (since(one).into(), one.check, one.level)).collect();
+        let alarms: Vec<Alarm<'_>> = open.values().map(|one| one.alarm(since(one))).collect();
         for one in open.values_mut().filter(|one| !one.unexplained.is_empty()) {
-            if let Some(cause) = because(one.check, one.level, one.since.into(), alarms.iter().copied()) {
+            if let Some(cause) = because(&one.alarm(one.since), alarms.iter().copied()) {
                 for place in one.unexplained.drain(..) {
                     if let Some(known) = causes.get_mut(place) {
-                        *known = Some(cause.to_owned());
+                        *known = Some(cause.check.to_owned());
                     }
                 }
             }

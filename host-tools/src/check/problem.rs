@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use hums_core::clock::{Instant, Span};
-use hums_core::health::{Level, Side, Subsystem, because, checks};
+use hums_core::health::{Alarm, Level, Side, Subsystem, because, checks};
 use hums_core::time;
 
 use crate::part;
@@ -217,25 +217,34 @@ impl Problems {
         let open = || {
             self.open
                 .values()
-                .filter_map(|followed| Some((followed.since?.0, &*followed.problem.check, followed.level)))
+                .filter_map(|followed| Some((followed.since?.0, &followed.problem, followed.level)))
         };
         let since_of = |since, check| {
             if self.of_box {
-                began(check, since, open().map(|(since, check, _)| (since, check)))
+                began(check, since, open().map(|(since, problem, _)| (since, &*problem.check)))
             } else {
                 since
             }
         };
-        let alarms: Vec<(time::Instant, String, Level)> = open()
-            .map(|(since, check, level)| (since_of(since, check).into(), check.to_owned(), level))
+        let alarms: Vec<(time::Instant, String, u8, Level)> = open()
+            .map(|(since, problem, level)| {
+                (since_of(since, &problem.check).into(), problem.check.clone(), problem.instance, level)
+            })
             .collect();
         for followed in self.open.values_mut().filter(|followed| followed.unexplained) {
             let Some((since, _)) = followed.since else { continue };
-            let alarms = alarms.iter().map(|(since, check, level)| (*since, check.as_str(), *level));
-            if let Some(cause) = because(&followed.problem.check, followed.level, since.into(), alarms) {
+            let alarms = alarms.iter().map(|(since, check, instance, level)| Alarm {
+                since: *since,
+                check,
+                instance: *instance,
+                level: *level,
+            });
+            let Problem { check, instance, .. } = &followed.problem;
+            let effect = Alarm { since: since.into(), check, instance: *instance, level: followed.level };
+            if let Some(cause) = because(&effect, alarms) {
                 // Of several times the one counts that had its worst level first.
                 if followed.problem.because.is_none() || followed.problem.at >= since {
-                    followed.problem.because = Some(cause.to_owned());
+                    followed.problem.because = Some(cause.check.to_owned());
                 }
                 followed.unexplained = false;
             }

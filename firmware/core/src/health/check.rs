@@ -73,6 +73,18 @@ pub enum InstanceOf {
     Pair,
 }
 
+impl InstanceOf {
+    /// What is the same in two checks whose instances have the same number; `None` where numbers tell nothing.
+    pub(super) const fn thing(self) -> Option<Self> {
+        match self {
+            Self::Motor | Self::Output => Some(Self::Motor),
+            Self::Supply | Self::Battery => Some(Self::Battery),
+            Self::Receiver => Some(Self::Receiver),
+            Self::Vehicle | Self::Sensor | Self::Pair => None,
+        }
+    }
+}
+
 /// How many instances of each kind have ever reported: the others have no value, and are not read.
 pub(super) struct Reported([u8; InstanceOf::Pair as usize + 1]);
 
@@ -209,6 +221,9 @@ pub const CLEAR_MAX_ALWAYS: Span = Span::from_secs(16);
 
 const _: () = assert!(CLEAR.as_millis() << (3 * Repeats::MOST) == CLEAR_MAX.as_millis());
 
+/// An alarm whose value is never stale is stale itself this long after its last value.
+const UNSEEN: Span = Span::from_secs(15);
+
 /// Measurements that have to be bad, one after the other: one message of nonsense is no alarm.
 pub const SAMPLES: u8 = 2;
 
@@ -230,8 +245,7 @@ impl Samples {
     }
 }
 
-/// How often a level was reached again, and the worst one that was reached, since the check began to apply; and how often the level was
-/// looked at since another check explained it. In a byte.
+/// How often a level was reached again, and the worst one that was reached, since the check began to apply. In a byte.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 struct Repeats(u8);
 
@@ -257,15 +271,6 @@ impl Repeats {
         let (rank, worst) = (if rank(level) > rank(previous) { rank(level) } else { 0 }, self.0 >> 2 & 3);
         let again = u32::from(rank > 0 && rank <= worst);
         self.0 = (self.count() + again).min(Self::MOST) as u8 | worst.max(rank) << 2;
-    }
-
-    /// 0 where no other check explained the level, 1 where one does, 2 where none did at the last look.
-    const fn looks(self) -> u8 {
-        self.0 >> 4
-    }
-
-    const fn set_looks(&mut self, looks: u8) {
-        self.0 = self.0 & 0xF | looks << 4;
     }
 }
 
@@ -376,30 +381,17 @@ impl State {
         self.level
     }
 
+    /// Its level, if that is an alarm.
+    pub(super) const fn alarm(&self) -> Option<Level> {
+        match self.level {
+            Some(level @ (Level::Warning | Level::Critical)) => Some(level),
+            _ => None,
+        }
+    }
+
     /// Whether it is a warning or critical, and its value is good just now.
     pub(super) const fn gets_better(&self) -> bool {
-        matches!(self.level, Some(Level::Warning | Level::Critical)) && self.better.is_set()
-    }
-
-    /// Another check's alarm explains its level, or does not, at the change to it.
-    pub(super) const fn explain(&mut self, explained: bool) {
-        self.repeats.set_looks(explained as u8);
-    }
-
-    /// Whether another check's alarm explained its level at the change to it.
-    pub(super) const fn was_explained(&self) -> bool {
-        self.repeats.looks() > 0
-    }
-
-    /// The same some time later, of what was explained. `true` where it is not for the second time: then it is a finding of its own.
-    pub(super) const fn outlives(&mut self, explained: bool) -> bool {
-        let looks = match (explained, self.repeats.looks()) {
-            (true, _) => 1,
-            (false, 1) => 2,
-            (false, _) => 0,
-        };
-        self.repeats.set_looks(looks);
-        looks == 0
+        self.alarm().is_some() && self.better.is_set()
     }
 
     /// Whether it never had a value since it began to apply, nor a level: then a step without a value changes nothing.
@@ -519,8 +511,9 @@ impl State {
     /// How old the value may be. What is bad, and came back as bad after a pause of its stream, is given longer.
     fn stale_after(&self, check: &Check) -> Option<Span> {
         match self.level {
+            // Also of a value that is never stale: without its input it has none.
             Some(Level::Warning | Level::Critical) => {
-                check.stale_after().map(|limit| self.repeats.grown(limit))
+                Some(self.repeats.grown(check.stale_after().unwrap_or(UNSEEN)))
             }
             _ => check.stale_after(),
         }

@@ -2,7 +2,8 @@
 //!
 //! A dead motor tips the vehicle over, a receiver without a fix makes the estimator doubt, and what is silent has no data at all. Who
 //! hears of all of it at once does not hear the cause. So a finding names the check that explains it, where that has an alarm which is
-//! as bad or worse; it is recorded like any other, and not told to the ground. Where it outlives that alarm it is told by itself.
+//! as bad or worse and begins within 12 s of it; it is recorded like any other, and not told to the ground. Where it outlives that
+//! alarm by 8 s it is told by itself.
 //!
 //! A mishap explains only what begins with it or after it ([`is_with_mishap`]): what came before may be its cause, and stands by itself.
 
@@ -10,8 +11,9 @@ use super::finding::{Level, Subsystem};
 use super::tables::check_named;
 use crate::time::{Instant, Span};
 
-/// A cause may be seen so much later than what it explains: figures are smoothed over 4 s, and limits are passed for 3 s and more.
-const SEEN_LATE: Span = Span::from_secs(10);
+/// A cause and its effect begin within this: the longest debounce of an effect is 10 s, and figures are smoothed. An alarm that has
+/// stood for longer explains nothing new.
+const NEAR: Span = Span::from_secs(12);
 /// What begins so shortly before a mishap begins with it: both are seen at a step, and by samples.
 const WITH_MISHAP: Span = Span::from_millis(200);
 
@@ -53,8 +55,9 @@ const SENSORS: &[&str] = &[
     "ekf_mag_ratio",
 ];
 const SHAKING: &[&str] = &["vibration", "vibration_px4", "vibration_rise", "clipping", "vibration_alert"];
-const DRIVE: &[&str] =
-    &["motor_loss", "motor_output", "motor_imbalance", "esc_failure", "drive_alert", "esc_silent"];
+const DRIVE: &[&str] = &["motor_loss", "motor_output", "motor_imbalance", "esc_failure", "drive_alert"];
+/// Checks that see a wire and not what it leads to: they explain no attitude, no mishap and no act of the autopilot.
+const TELEMETRY: &[&str] = &["esc_silent"];
 const BATTERY: &[&str] =
     &["cell_voltage", "batt_remaining", "batt_fault", "batt_state", "battery_alert", "cell_deviation"];
 const LINKS: &[&str] = &["rc_alert", "gcs_alert", "heartbeat"];
@@ -68,6 +71,7 @@ const ROWS: &[(&[&str], &[&str])] = &[
     // An ESC's silence is counted while others are heard: a heartbeat that is late explains none.
     (&["heartbeat"], &["frames_lost", "gcs_alert"]),
     (&["autopilot_reboot"], &["esc_silent", "ekf_alert"]),
+    (TELEMETRY, &["thrust_lost", "vibration_rise"]),
     (DRIVE, &["roll_rate", "pitch_rate", "roll", "pitch", "attitude_alert", "thrust_lost", "vibration_rise"]),
     (&["motor_loss"], &["motor_output", "motor_imbalance", "drive_alert"]),
     (&["motor_output", "motor_imbalance"], &["drive_alert"]),
@@ -76,7 +80,9 @@ const ROWS: &[(&[&str], &[&str])] = &[
         &["gyro_stuck", "gyro_alert", "gyro_mismatch", "imu_gps"],
         &["roll_rate", "pitch_rate", "roll", "pitch", "attitude_alert"],
     ),
-    (&["roll_rate", "pitch_rate"], &["roll", "pitch", "attitude_alert", "thrust_lost"]),
+    (&["roll_rate"], &["roll"]),
+    (&["pitch_rate"], &["pitch"]),
+    (&["roll_rate", "pitch_rate"], &["attitude_alert", "thrust_lost"]),
     (
         &["gps_fix", "gps_jamming", "gps_spoofing"],
         &["gnss_alert", "gps_accuracy", "gps_satellites", "gps_hdop", "gps_sats_fall", "gps_hdop_rise"],
@@ -139,7 +145,7 @@ const ROWS: &[(&[&str], &[&str])] = &[
 
 /// Whether a check is of what drives the vehicle: its alarm tells better what to do than that the vehicle sinks.
 pub(super) fn is_of_drive(check: &str) -> bool {
-    DRIVE.contains(&check)
+    DRIVE.contains(&check) || TELEMETRY.contains(&check)
 }
 
 /// Whether a mishap explains what a part says.
@@ -164,43 +170,72 @@ pub fn explains(cause: &str, effect: &str) -> bool {
     ROWS.iter().any(|(causes, effects)| effects.contains(&effect) && causes.contains(&cause))
 }
 
-/// Which of the checks that have an alarm (a warning, or critical), each since a time, explains that of `effect`, which went to `level` and is
-/// wrong since a time. A cause may be seen a little later than what it explains. What another cause of `effect` explains is none.
-pub fn because<'a>(
-    effect: &str,
-    level: Level,
-    since: Instant,
-    alarms: impl Iterator<Item = (Instant, &'a str, Level)> + Clone,
-) -> Option<&'a str> {
-    let mut alarms = alarms.filter(|(cause_since, ..)| cause_since.since(since) <= SEEN_LATE);
-    let at_least = match level {
-        // What is silent has no data.
-        Level::Stale => return alarms.any(|(_, cause, _)| cause == "heartbeat").then_some("heartbeat"),
-        Level::Warning | Level::Critical => level as u8,
+/// An alarm of a check.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Alarm<'a> {
+    /// When it began: its onset.
+    pub since: Instant,
+    /// The check.
+    pub check: &'a str,
+    /// Which one, where there are several.
+    pub instance: u8,
+    /// Its level.
+    pub level: Level,
+}
+
+impl Alarm<'_> {
+    /// Whether both began within [`NEAR`] of each other.
+    fn is_near(&self, other: &Alarm<'_>) -> bool {
+        self.since.since(other.since) <= NEAR && other.since.since(self.since) <= NEAR
+    }
+
+    /// Whether both may be of the same motor, battery or receiver.
+    fn may_concern(&self, other: &Alarm<'_>) -> bool {
+        let thing = |alarm: &Alarm<'_>| check_named(alarm.check).and_then(|check| check.of.thing());
+        thing(self).is_none() || thing(self) != thing(other) || self.instance == other.instance
+    }
+}
+
+/// Which of the alarms explains another one: by its row, as bad or worse, of the same motor where both are of motors, and begun within
+/// [`NEAR`] of it. A mishap, which is a state of the whole vehicle, explains whatever begins while it goes on. An alarm that
+/// another cause of `effect` explains is no cause beside that one.
+pub fn because<'a>(effect: &Alarm<'_>, alarms: impl Iterator<Item = Alarm<'a>> + Clone) -> Option<Alarm<'a>> {
+    let at_least = match effect.level {
+        // A silent link has no data, however long it is silent.
+        Level::Stale => {
+            return alarms
+                .filter(|cause| effect.since.since(cause.since) > Span::ZERO || cause.is_near(effect))
+                .find(|cause| cause.check == "heartbeat");
+        }
+        Level::Warning | Level::Critical => effect.level as u8,
         Level::Ok | Level::Advisory => return None,
     };
-    let by_mishap = check_named(effect).is_some_and(|check| is_of_mishap(check.subsystem));
+    let by_mishap = check_named(effect.check).is_some_and(|check| is_of_mishap(check.subsystem));
     let is_mishap =
         |cause: &str| check_named(cause).is_some_and(|check| check.subsystem == Subsystem::Mishap);
     // A mishap before all, then by row.
-    let place = |cause_since: Instant, cause: &str| {
-        if by_mishap && is_mishap(cause) {
-            return is_with_mishap(since, cause_since).then_some((0, 0));
+    let place = |cause: &Alarm<'_>| {
+        if by_mishap && is_mishap(cause.check) {
+            return is_with_mishap(effect.since, cause.since).then_some((0, 0));
         }
-        let of_effect = (1..).zip(ROWS).filter(|(_, (_, effects))| effects.contains(&effect));
-        let mut places = of_effect
-            .filter_map(|(row, (causes, _))| Some((row, causes.iter().position(|known| *known == cause)?)));
+        if !cause.is_near(effect) || !cause.may_concern(effect) {
+            return None;
+        }
+        let of_effect = (1..).zip(ROWS).filter(|(_, (_, effects))| effects.contains(&effect.check));
+        let mut places = of_effect.filter_map(|(row, (causes, _))| {
+            Some((row, causes.iter().position(|known| *known == cause.check)?))
+        });
         places.next()
     };
     let causes = alarms
-        .filter(|(.., level)| *level as u8 >= at_least)
-        .filter_map(|(since, cause, _)| Some((place(since, cause)?, since, cause)));
-    let (_, mut since, mut cause) = causes.clone().min_by_key(|(place, ..)| *place)?;
+        .filter(|cause| cause.level as u8 >= at_least)
+        .filter_map(|cause| Some((place(&cause)?, cause)));
+    let (_, mut cause) = causes.clone().min_by_key(|(place, _)| *place)?;
     // Nothing explains itself by way of others, so this ends.
-    while let Some((_, deeper_since, deeper)) =
-        causes.clone().find(|(_, before, deeper)| before.since(since) <= SEEN_LATE && explains(deeper, cause))
+    while let Some((_, deeper)) =
+        causes.clone().find(|(_, deeper)| deeper.is_near(&cause) && explains(deeper.check, cause.check))
     {
-        (since, cause) = (deeper_since, deeper);
+        cause = deeper;
     }
     Some(cause)
 }
@@ -218,8 +253,9 @@ mod tests {
 
     /// Of what is wrong since the beginning, as its alarms are.
     fn why_of(effect: &str, level: Level, alarms: &[(&'static str, Level)]) -> Option<&'static str> {
-        let alarms = alarms.iter().map(|(cause, level)| (Instant::ZERO, *cause, *level));
-        because(effect, level, Instant::ZERO, alarms)
+        let alarm = |check, level| Alarm { since: Instant::ZERO, check, instance: 0, level };
+        let alarms = alarms.iter().map(|(cause, level)| alarm(*cause, *level));
+        Some(because(&Alarm { since: Instant::ZERO, check: effect, instance: 0, level }, alarms)?.check)
     }
 
     #[test]
@@ -265,11 +301,58 @@ mod tests {
     fn a_cause_that_was_seen_long_after_another_one_does_not_explain_it() {
         let at = |s: u64| Instant::from_millis(60_000 + 1_000 * s);
         let why = |gyro_s: u64| {
-            let alarms =
-                [(at(0), "compass_alert", Level::Warning), (at(gyro_s), "gyro_mismatch", Level::Warning)];
-            because("ekf_alert", Level::Warning, at(30), alarms.into_iter())
+            let alarm = |at_s, check| Alarm { since: at(at_s), check, instance: 0, level: Level::Warning };
+            let alarms = [alarm(0, "compass_alert"), alarm(gyro_s, "gyro_mismatch")];
+            Some(because(&alarm(8, "ekf_alert"), alarms.into_iter())?.check)
         };
-        assert_eq!([why(5), why(20)], [Some("gyro_mismatch"), Some("compass_alert")]);
+        assert_eq!(
+            [why(5), why(13), why(20)],
+            [Some("gyro_mismatch"), Some("compass_alert"), Some("compass_alert")]
+        );
+    }
+
+    /// Whatever stands explains only what begins with it: every row, in both orders of time.
+    #[test]
+    fn a_standing_alarm_explains_only_what_begins_near_its_onset() {
+        let at = |s: u64| Instant::from_millis(100_000 + 1_000 * s);
+        for (causes, effects) in ROWS {
+            for (check, effect) in
+                causes.iter().flat_map(|cause| effects.iter().map(move |effect| (*cause, *effect)))
+            {
+                let cause = Alarm { since: at(40), check, instance: 0, level: Level::Critical };
+                for (at_s, is_explained) in
+                    [(0, false), (27, false), (28, true), (40, true), (52, true), (53, false), (90, false)]
+                {
+                    let effect = Alarm { since: at(at_s), check: effect, instance: 0, level: Level::Warning };
+                    let is = because(&effect, core::iter::once(cause)).is_some();
+                    assert_eq!(is, is_explained, "{check} at 40 s explains {effect:?}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_wire_explains_no_attitude_no_mishap_and_no_act_of_the_autopilot() {
+        for cause in TELEMETRY {
+            for check in super::super::checks() {
+                let never = matches!(check.subsystem, Subsystem::Attitude | Subsystem::Mishap);
+                assert!(
+                    !(explains(cause, check.name) && (never || ACTS.contains(&check.name))),
+                    "{}",
+                    check.name
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn a_motor_explains_no_other_one() {
+        let alarm = |check, instance| Alarm { since: Instant::ZERO, check, instance, level: Level::Critical };
+        let why = |cause: u8, effect: u8| {
+            because(&alarm("motor_output", effect), core::iter::once(alarm("motor_loss", cause))).is_some()
+        };
+        assert_eq!([why(2, 2), why(2, 3), why(0, 1)], [true, false, false]);
+        assert!(because(&alarm("roll", 0), core::iter::once(alarm("motor_loss", 3))).is_some());
     }
 
     #[test]
@@ -332,9 +415,9 @@ mod tests {
     fn a_mishap_explains_nothing_that_was_so_before_it() {
         let at = |ms: u64| Instant::from_millis(60_000 + ms);
         let why = |effect, mishap_ms: u64| {
-            let alarms =
-                [(at(mishap_ms), "sinking", Level::Critical), (at(3_000), "gps_fix", Level::Critical)];
-            because(effect, Level::Critical, at(0), alarms.into_iter())
+            let alarm = |at_ms, check| Alarm { since: at(at_ms), check, instance: 0, level: Level::Critical };
+            let alarms = [alarm(mishap_ms, "sinking"), alarm(3_000, "gps_fix")];
+            Some(because(&alarm(0, effect), alarms.into_iter())?.check)
         };
         assert_eq!(why("motor_loss", 0), Some("sinking"));
         assert_eq!(why("motor_loss", 200), Some("sinking"), "at the same time, by samples");

@@ -84,10 +84,26 @@ struct Entry {
     instance: u8,
     /// [`Level::Ok`] while nothing is exceeded.
     level: Level,
-    /// Since when it has had that level, tenths of a second since power-on.
-    since_tenths: u32,
+    /// Since when it has had that level.
+    since: Instant,
     session: Crossings,
     before: Crossings,
+}
+
+impl Entry {
+    /// Counts how long its level has lasted.
+    fn extend(&mut self, now: Instant) {
+        self.session.extend(self.level, (now.since(self.since).as_millis() / 100) as u32);
+        self.since = now;
+    }
+
+    /// With what lasts counted up to now.
+    fn now(mut self, now: Instant) -> Option<Exceedance> {
+        self.extend(now);
+        let check = checks().nth(self.check.into())?;
+        let lifetime = self.before.join(self.session, check.side);
+        Some(Exceedance { check, instance: self.instance, session: self.session, lifetime })
+    }
 }
 
 /// All exceedances.
@@ -132,8 +148,7 @@ impl Exceedances {
     /// Takes a check's change of level; `check` is its place among all checks.
     pub(crate) fn change(&mut self, check: u16, side: Side, finding: &Finding) {
         let Some(entry) = self.entry(check, finding) else { return };
-        let now_tenths = tenths(finding.at);
-        entry.session.extend(entry.level, now_tenths.saturating_sub(entry.since_tenths));
+        entry.extend(finding.at);
         match finding.level {
             Level::Warning if finding.previous != Level::Critical => {
                 entry.session.warnings = entry.session.warnings.saturating_add(1);
@@ -145,7 +160,6 @@ impl Exceedances {
             entry.session.peak = worse(entry.session.peak, finding.value, side);
         }
         entry.level = finding.level;
-        entry.since_tenths = now_tenths;
     }
 
     /// Takes the value of a check whose limit is exceeded.
@@ -188,7 +202,7 @@ impl Exceedances {
             check,
             instance: finding.instance,
             level: Level::Ok,
-            since_tenths: tenths(finding.at),
+            since: finding.at,
             session: Crossings::NONE,
             before: Crossings::NONE,
         }))
@@ -196,19 +210,21 @@ impl Exceedances {
 
     /// Whatever was exceeded, with what lasts counted up to now.
     pub fn iter(&self, now: Instant) -> impl Iterator<Item = Exceedance> {
-        self.changed(now, Instant::ZERO)
+        self.entries.iter().flatten().filter_map(move |entry| entry.now(now))
     }
 
     /// Whatever began, ended or lasted at a time or after it, with what lasts counted up to now.
     pub fn changed(&self, now: Instant, since: Instant) -> impl Iterator<Item = Exceedance> {
-        let changed = move |entry: &&Entry| rank(entry.level) > 0 || entry.since_tenths >= tenths(since);
-        self.entries.iter().flatten().filter(changed).filter_map(move |entry| {
-            let check = checks().nth(usize::from(entry.check))?;
-            let mut session = entry.session;
-            session.extend(entry.level, tenths(now).saturating_sub(entry.since_tenths));
-            let lifetime = entry.before.join(session, check.side);
-            Some(Exceedance { check, instance: entry.instance, session, lifetime })
-        })
+        let changed = move |entry: &&Entry| rank(entry.level) > 0 || !since.is_after(entry.since);
+        self.entries.iter().flatten().filter(changed).filter_map(move |entry| entry.now(now))
+    }
+
+    /// Nothing is exceeded any more: the vehicle of before was heard last by now.
+    pub(crate) fn end(&mut self, now: Instant) {
+        for entry in self.entries.iter_mut().flatten() {
+            entry.extend(now);
+            entry.level = Level::Ok;
+        }
     }
 
     /// Whether anything is exceeded now.
@@ -259,18 +275,13 @@ impl Exceedances {
                 check: check as u16,
                 instance,
                 level: Level::Ok,
-                since_tenths: 0,
+                since: Instant::ZERO,
                 session: Crossings::NONE,
                 before,
             });
         }
         Ok(exceedances)
     }
-}
-
-/// 32 bits of tenths last 13 years.
-const fn tenths(at: Instant) -> u32 {
-    (at.as_millis() / 100) as u32
 }
 
 /// Not knowing exceeds nothing.

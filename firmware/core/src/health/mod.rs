@@ -3,6 +3,7 @@
 //! Each subsystem's checks are a table in a file of its own; `tables` puts them together. A roll-up is never better than
 //! its worst part that is known, and where nothing is known it is not OK but stale.
 
+mod alarms;
 mod attitude;
 pub mod check;
 mod common;
@@ -24,17 +25,18 @@ mod vocabulary;
 
 pub use check::{CLEAR, CLEAR_MAX, CLEAR_MAX_ALWAYS, Check, Debounce, InstanceOf, Side, State, Unit, When};
 use check::{Change, How, Reported};
-pub use consequence::{because, explains, is_of_mishap, is_with_mishap};
+pub use consequence::{Alarm, because, explains, is_of_mishap, is_with_mishap};
 pub use finding::{Finding, Level, OFF_MEANING, Orders, Subsystem, is_off, off_alarm};
 pub use inputs::Inputs;
 pub use tables::{check_named, checks, instances};
 pub use vocabulary::{Said, Scope, VOCABULARY, Words, said, vocabulary};
 
 use crate::latest::Reading;
-use crate::params::{Param, Params};
+use crate::params::Param;
 use crate::time::{Instant, Span};
+use alarms::{ALARMS_MAX, Alarms};
 use exceedance::Exceedances;
-use tables::STATES;
+use tables::{STATES, check_of, slot_of};
 
 /// A vehicle that has not been heard for so long is silent.
 const SILENT: Span = Span::from_secs(5);
@@ -45,11 +47,10 @@ pub const EXPECTED: [Subsystem; 3] = [Subsystem::Power, Subsystem::Link, Subsyst
 #[derive(Clone, Copy, Debug)]
 pub struct Health {
     states: [State; STATES],
-    /// The state that is looked at next: whether the alarm that explained it goes on. One a step.
-    looked_at: u16,
+    alarms: Alarms,
 }
 
-const _: () = assert!(size_of::<Health>() <= 20 * STATES + 4);
+const _: () = assert!(size_of::<Health>() <= 20 * STATES + 512);
 
 impl Default for Health {
     fn default() -> Self {
@@ -60,13 +61,13 @@ impl Default for Health {
 impl Health {
     /// Nothing seen yet.
     pub const fn new() -> Self {
-        Self { states: [const { State::new() }; STATES], looked_at: 0 }
+        Self { states: [const { State::new() }; STATES], alarms: Alarms::NONE }
     }
 
     /// As if nothing had been seen.
     pub(crate) fn clear(&mut self) {
         self.states.fill(State::new());
-        self.looked_at = 0;
+        self.alarms = Alarms::NONE;
     }
 
     /// One step of all checks, at least every 50 ms; each change of level is a finding, and so is an alarm that outlives the one that
@@ -105,7 +106,14 @@ impl Health {
             }
             first += usize::from(check.instances);
         }
-        self.looked_at = (self.looked_at + 1) % STATES as u16;
+        for place in 0..ALARMS_MAX {
+            if let Some(slot) = self.alarms.outliving(place, inputs.now)
+                && let Some(finding) = self.outlives(slot, inputs)
+            {
+                self.alarms.explain(slot, None);
+                findings(&finding);
+            }
+        }
     }
 
     /// A step of one state that may change it.
@@ -127,56 +135,71 @@ impl Health {
         {
             exceedances.note(place, instance, check.side, reading.value);
         }
-        let (told, because) = match change {
-            Some(change) => self.explained(slot, check, change),
-            None if slot == usize::from(self.looked_at) => self.alone(slot, check, reading, inputs.params)?,
-            None => return None,
-        };
-        let feeds = power::feeds(check, inputs, instance);
-        let orders = mishap::orders(check, inputs, || self.has_lost_drive());
-        let finding = Finding { because, orders, ..check.finding(instance, inputs.now, told, feeds) };
-        if change.is_some() {
-            exceedances.change(place, check.side, &finding);
-        }
+        let change = change?;
+        let because = self.explain(slot as u16, check, instance, change.level, inputs.now);
+        let finding = self.finding(check, instance, inputs, change, because);
+        exceedances.change(place, check.side, &finding);
         Some(finding)
     }
 
-    /// A change, and the check whose alarm explains it.
-    fn explained(&mut self, slot: usize, check: &Check, change: Change) -> (Change, &'static str) {
-        let because = self.because(check, change.level);
-        if let Some(state) = self.states.get_mut(slot) {
-            state.explain(!because.is_empty());
-        }
-        (change, because)
-    }
-
-    /// An alarm that outlives the one that explained it, as a change of its own.
-    fn alone(
-        &mut self,
-        slot: usize,
+    fn finding(
+        &self,
         check: &Check,
-        reading: Option<Reading>,
-        params: &Params,
-    ) -> Option<(Change, &'static str)> {
-        let state = self.states.get(slot).filter(|state| state.was_explained())?;
-        let level = state.level().filter(|level| matches!(level, Level::Warning | Level::Critical))?;
-        let value = reading?.value;
-        let change = Change { level, previous: level, value, limit: check.limit(level, params) };
-        self.outlives(slot, check, level).then_some((change, ""))
+        instance: u8,
+        inputs: &Inputs<'_>,
+        change: Change,
+        because: &'static str,
+    ) -> Finding {
+        let feeds = power::feeds(check, inputs, instance);
+        let orders = mishap::orders(check, inputs, || self.has_lost_drive());
+        Finding { because, orders, ..check.finding(instance, inputs.now, change, feeds) }
     }
 
-    /// The check whose alarm explains another one's change to a level; empty where none does.
-    fn because(&self, effect: &Check, level: Level) -> &'static str {
-        let alarms = self.levels().filter(|(.., level)| matches!(level, Level::Warning | Level::Critical));
-        // All of them were found before.
-        let alarms = alarms.map(|(check, _, level)| (Instant::ZERO, check.name, level));
-        consequence::because(effect.name, level, Instant::ZERO, alarms).unwrap_or_default()
+    /// The check whose alarm explains a change to a level; empty where none does. An alarm keeps its cause while that goes on and is as
+    /// bad.
+    fn explain(
+        &mut self,
+        slot: u16,
+        check: &Check,
+        instance: u8,
+        level: Level,
+        now: Instant,
+    ) -> &'static str {
+        let is_alarm = matches!(level, Level::Warning | Level::Critical);
+        let since = if is_alarm { self.alarms.begin(slot, now) } else { now };
+        if !is_alarm {
+            self.alarms.end(slot, now);
+        }
+        let is_as_bad = |cause: &u16| {
+            let of_cause = self.states.get(usize::from(*cause)).and_then(State::alarm);
+            of_cause.is_some_and(|of_cause| of_cause as u8 >= level as u8)
+        };
+        let effect = Alarm { since, check: check.name, instance, level };
+        let cause = self.alarms.cause(slot).filter(is_as_bad).or_else(|| {
+            let cause =
+                consequence::because(&effect, self.standing().filter(|other| other.check != check.name))?;
+            slot_of(cause.check, cause.instance)
+        });
+        self.alarms.explain(slot, cause);
+        cause.and_then(check_of).map_or("", |(cause, _)| cause.name)
     }
 
-    /// Whether nothing has explained an alarm any more for a while, though something did.
-    fn outlives(&mut self, slot: usize, check: &Check, level: Level) -> bool {
-        let explained = !self.because(check, level).is_empty();
-        self.states.get_mut(slot).is_some_and(|state| state.outlives(explained))
+    /// The alarms that stand.
+    fn standing(&self) -> impl Iterator<Item = Alarm<'static>> + Clone {
+        self.alarms.iter().filter_map(|standing| {
+            let (check, instance) = check_of(standing.slot)?;
+            let level = self.states.get(usize::from(standing.slot))?.alarm()?;
+            Some(Alarm { since: standing.since, check: check.name, instance, level })
+        })
+    }
+
+    /// An alarm that outlives the one that explained it, as a finding of its own.
+    fn outlives(&self, slot: u16, inputs: &Inputs<'_>) -> Option<Finding> {
+        let (check, instance) = check_of(slot)?;
+        let level = self.states.get(usize::from(slot))?.alarm()?;
+        let value = Some((check.read)(inputs, instance)?.value).filter(|value| value.is_finite())?;
+        let change = Change { level, previous: level, value, limit: check.limit(level, inputs.params) };
+        Some(self.finding(check, instance, inputs, change, ""))
     }
 
     /// Whether something that drives the vehicle has a critical alarm.

@@ -65,6 +65,30 @@ pub fn checks() -> impl ExactSizeIterator<Item = &'static Check> + Clone {
     CHECKS.iter()
 }
 
+/// The check of a state, and which instance of it.
+pub(super) fn check_of(slot: u16) -> Option<(&'static Check, u8)> {
+    let mut left = slot;
+    for check in checks() {
+        match left.checked_sub(check.instances.into()) {
+            Some(beyond) => left = beyond,
+            None => return Some((check, left as u8)),
+        }
+    }
+    None
+}
+
+/// The state of a check's instance.
+pub(super) fn slot_of(name: &str, instance: u8) -> Option<u16> {
+    let mut first = 0;
+    for check in checks() {
+        if check.name == name {
+            return Some(first + u16::from(instance));
+        }
+        first += u16::from(check.instances);
+    }
+    None
+}
+
 /// The check of this name.
 pub fn check_named(name: &str) -> Option<&'static Check> {
     checks().find(|check| check.name == name)

@@ -41,6 +41,20 @@ fn a_crossing_is_counted_with_its_peak_and_its_time() {
 }
 
 #[test]
+fn what_is_exceeded_ends_with_its_vehicle_in_the_session_and_in_the_life() {
+    for level in [Level::Warning, Level::Critical] {
+        let mut exceedances = Exceedances::new();
+        exceedances.change(TILT, Side::Above, &finding(10_000, Level::Ok, level, 50.0));
+        exceedances.end(Instant::from_millis(14_000));
+        let tilt = exceedances.iter(Instant::from_millis(90_000)).next().expect("exceeded");
+        for crossings in [tilt.session, tilt.lifetime] {
+            assert_eq!(crossings.warning_tenths + crossings.critical_tenths, 40, "{level:?}");
+        }
+        assert!(!exceedances.lasting());
+    }
+}
+
+#[test]
 fn what_neither_began_nor_lasted_nor_ended_since_has_not_changed() {
     let mut exceedances = Exceedances::new();
     exceedances.change(TILT, Side::Above, &finding(10_000, Level::Ok, Level::Warning, 50.0));
