@@ -191,8 +191,6 @@ fn dashboard(card: &Path) -> Result<Outcome> {
         token: None,
         org: None,
         bucket: "hums".to_owned(),
-        spool: None,
-        spool_limit: 1,
     })
 }
 

@@ -139,43 +139,6 @@ fn victoriametrics_is_restarted_in_flight_and_has_every_sample_in_the_end() {
 }
 
 #[test]
-fn what_waits_outlives_a_kill_and_is_written_by_the_next_run() {
-    let mut database = Database::start(Kind::Influx);
-    database.end();
-    let dir = tempfile::tempdir().unwrap();
-    let spool = dir.path().join("points.spool");
-    let url = format!("http://127.0.0.1:{}", database.port);
-    let to = ["--influx", &url, "--spool", spool.to_str().unwrap()];
-    // A recording is read whole at the start: all of its points wait.
-    let recording = own("px4_hil_quad_low.tlog");
-    let mut live = Live::start(&[&["--input", recording.to_str().unwrap()][..], &to].concat());
-    let (mut bytes, mut since) = (0, Instant::now());
-    while bytes < 100_000 || since.elapsed() < Duration::from_secs(3) {
-        let now = spool.metadata().map_or(0, |about| about.len());
-        if now != bytes {
-            (bytes, since) = (now, Instant::now());
-        }
-        std::thread::sleep(Duration::from_millis(50));
-    }
-    live.program.signal("KILL");
-    live.program.end(Duration::from_secs(5));
-
-    database.again();
-    let port = hums_tests::live::free_port();
-    let live = Live::start(&[&["--input", &format!("udpin:127.0.0.1:{port}")][..], &to].concat());
-    let (code, words) = live.terminate(Duration::from_mins(1));
-    assert_eq!(code, Some(0), "{words}");
-    let number = |line: &str| line.split_whitespace().find_map(|word| word.parse::<u64>().ok()).unwrap();
-    let waited = number(words.lines().find(|line| line.contains("of an earlier run")).expect("it says so"));
-    let written = number(words.lines().find(|line| line.contains("points written")).expect("it says so"));
-    assert_eq!(waited, written, "{words}");
-    let points: u64 = database.measurements().iter().map(|measurement| database.points(measurement)).sum();
-    assert!(written > 10_000, "{words}");
-    assert_eq!(points, written, "points that are there");
-    assert!(spool.metadata().unwrap().len() < 600, "its room is given back");
-}
-
-#[test]
 fn a_bad_point_costs_itself_and_what_the_database_wrote_is_not_counted_as_refused() {
     let database = Database::start(Kind::Influx);
     let flight = |database: &Database| {

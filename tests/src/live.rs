@@ -61,8 +61,6 @@ pub struct Live {
     /// The page's address.
     pub address: String,
     stderr: ChildStderr,
-    /// Where what waits for a database is kept, unless the test says where.
-    _state: tempfile::TempDir,
 }
 
 impl Live {
@@ -86,11 +84,8 @@ impl Live {
 
     #[track_caller]
     fn attempt_at(program: &Path, arguments: &[&str]) -> Result<Self, String> {
-        let state = tempfile::tempdir().unwrap();
         let mut command = Command::new(program);
         command
-            .env("XDG_STATE_HOME", state.path())
-            .env_remove("STATE_DIRECTORY")
             .args(["live", "--listen", "127.0.0.1:0"])
             .args(arguments)
             .stdout(Stdio::piped())
@@ -106,7 +101,7 @@ impl Live {
             assert!(code == Some(1) && !words.contains("panicked"), "{code:?}: {address:?} {words}");
             return Err(words);
         }
-        Ok(Self { program: Running(child), address: address.trim().to_owned(), stderr, _state: state })
+        Ok(Self { program: Running(child), address: address.trim().to_owned(), stderr })
     }
 
     /// Ends it as Ctrl-C does: its exit code, and what it said.

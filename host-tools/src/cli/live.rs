@@ -56,10 +56,4 @@ pub struct Live {
     /// Its bucket or database
     #[arg(long, value_name = "B", default_value = "hums", help_heading = "Database")]
     pub bucket: String,
-    /// Keep points that wait for it in this file, for the next run too; otherwise in the folder for a user's state
-    #[arg(long, value_name = "FILE", help_heading = "Database")]
-    pub spool: Option<PathBuf>,
-    /// How large that file may become; then the oldest points are lost, and counted
-    #[arg(long, value_name = "MIB", default_value_t = 1024, value_parser = clap::value_parser!(u64).range(1..=1_048_576), help_heading = "Database")]
-    pub spool_limit: u64,
 }

@@ -7,7 +7,7 @@
 //!
 //! One thread follows the vehicle (`feed` on this PC's clock, `playback` on a recording's), the first one serves the pages,
 //! one writes to a database where that is wanted. Who follows waits for neither of the others: pages take the newest state
-//! and what they lack of the history (`hub`), points wait in memory and on disk (`influx`).
+//! and what they lack of the history (`hub`), points wait in memory (`influx`).
 
 pub mod assets;
 pub mod board;
@@ -33,7 +33,6 @@ pub mod world;
 use std::convert::Infallible;
 use std::io::IsTerminal as _;
 use std::net::{IpAddr, SocketAddr, TcpListener, ToSocketAddrs};
-use std::path::PathBuf;
 use std::process::{Command, Stdio};
 use std::sync::Arc;
 use std::sync::mpsc::Receiver;
@@ -52,7 +51,6 @@ use self::influx::target::Target;
 use self::playback::Player;
 use self::told::Limits;
 use crate::cli;
-use crate::files::Inputs;
 use crate::interrupt;
 use crate::outcome::{Outcome, usage};
 use crate::output::{self, Schema};
@@ -60,14 +58,13 @@ use crate::plural::{are, count};
 
 /// Runs `hums live`.
 pub fn run(args: &cli::Live) -> Result<Outcome> {
-    // Before anything is opened: a spool is read through, which may take a while.
     if args.influx.is_some() {
         interrupt::watch_twice();
     } else {
         interrupt::watch();
     }
     let limits = Limits::new(&crate::run::params::read(args.params.as_deref())?);
-    let (influx, spool) = database(args)?.unzip();
+    let influx = database(args)?;
     let (listener, address) = listen(&args.listen)?;
     let host = args.listen.rsplit_once(':').map_or("", |(host, _)| host);
     let (guard, token) = Guard::new(address, host, args.listen_token.as_deref())?;
@@ -81,7 +78,7 @@ pub fn run(args: &cli::Live) -> Result<Outcome> {
     // Whichever fails ends the program; with Ctrl-C and SIGTERM the follower ends, and with it the server.
     server::serve(listener, hub, guard, followed)?;
     let influx = follower.join().map_err(|_| anyhow!("the thread that follows the vehicle has failed"))??;
-    Ok(influx.zip(spool).map_or(Outcome::Done, |(influx, spool)| finish(influx, &spool)))
+    Ok(influx.map_or(Outcome::Done, finish))
 }
 
 /// What `hums live --json` prints.
@@ -146,62 +143,22 @@ fn follow(
     Ok((started.context("no thread")?, followed))
 }
 
-/// The database, and the file of what waits for it.
-fn database(args: &cli::Live) -> Result<Option<(Influx, Waiting)>> {
+/// The database that is written to, if any.
+fn database(args: &cli::Live) -> Result<Option<Influx>> {
     let Some(url) = &args.influx else {
-        if args.token.is_some() || args.org.is_some() || args.spool.is_some() {
-            return Err(usage(
-                "--token, --org and --spool are for --influx; the page's own token is --listen-token",
-            ));
+        if args.token.is_some() || args.org.is_some() {
+            return Err(usage("--token and --org are for --influx; the page's own token is --listen-token"));
         }
         return Ok(None);
     };
     let token = args.token.clone().or_else(|| std::env::var("HUMS_INFLUX_TOKEN").ok());
     let target = Target::new(url, token.as_deref(), args.org.as_deref(), &args.bucket)?;
-    let mut inputs = Inputs::of(&args.params);
-    inputs.add_endpoint(&args.input);
-    let limit = args.spool_limit.saturating_mul(1024 * 1024);
-    let spool = influx::place::open(args.spool.as_deref(), &target, limit, &inputs)?;
-    let path = spool.path().to_owned();
-    let damage = spool.damage();
-    if damage.bytes > 0 {
-        note!(
-            "{}: of an earlier run, and lost: {} of batches that were cut off or are damaged, with {} as far as \
-             that is known",
-            path.display(),
-            count(damage.bytes, "byte"),
-            count(damage.points, "point")
-        );
-    }
-    if spool.points() > 0 {
-        note!(
-            "of an earlier run, and written first: {} in {}",
-            count(spool.points(), "point"),
-            path.display()
-        );
-    }
-    if spool.is_over_limit() {
-        note!(
-            "{}: has {}, which is more than --spool-limit {} (MiB): nothing is added before that is written, and what \
-             comes meanwhile is lost and counted (a recording waits)",
-            path.display(),
-            count(spool.bytes(), "byte"),
-            args.spool_limit
-        );
-    }
     let session = influx::names::session(SystemTime::now())?;
-    let influx = Influx::start(target, session, spool, !args.input.is_live())?;
-    Ok(Some((influx, Waiting { path, is_damaged: damage.bytes > 0 })))
+    Influx::start(target, session, !args.input.is_live()).map(Some)
 }
 
-/// The file of what waits for the database.
-struct Waiting {
-    path: PathBuf,
-    /// An earlier run has left what cannot be read.
-    is_damaged: bool,
-}
-
-fn finish(influx: Influx, spool: &Waiting) -> Outcome {
+/// Waits for the database, and says what became of the points.
+fn finish(influx: Influx) -> Outcome {
     let figures = influx.finish();
     let missing = figures.waiting + figures.lost + figures.rejected;
     output::aside(&format!("{} written", count(figures.written, "point")));
@@ -211,33 +168,14 @@ fn finish(influx: Influx, spool: &Waiting) -> Outcome {
         if figures.rejected > 0 {
             output::aside(&format!("  {} refused by the database: {}", figures.rejected, figures.refusal));
         }
-        if figures.lost > 0 {
-            output::aside(&format!(
-                "  {} lost: for want of room, or with what an earlier run left damaged",
-                figures.lost
-            ));
-        }
-        if figures.stored > 0 {
-            note!(
-                "  {} wait in {}: the next `hums live` with this database writes them",
-                figures.stored,
-                spool.path.display()
-            );
-        }
-        let unsaved = figures.waiting.saturating_sub(figures.stored);
-        if unsaved > 0 {
-            output::aside(&format!("  {unsaved} waited in memory only, and are lost"));
+        if figures.lost + figures.waiting > 0 {
+            output::aside(&format!("  {} lost while the database took none", figures.lost + figures.waiting));
         }
     }
     if !figures.left_out.is_empty() {
         note!("{}; the rest is not in the database: write the recording again", figures.left_out);
     }
-    if !figures.disk.is_empty() {
-        output::aside(&format!("{}: {}", spool.path.display(), figures.disk));
-    }
-    Outcome::lossy(
-        missing > 0 || spool.is_damaged || !figures.disk.is_empty() || !figures.left_out.is_empty(),
-    )
+    Outcome::lossy(missing > 0 || !figures.left_out.is_empty())
 }
 
 fn listen(text: &str) -> Result<(TcpListener, SocketAddr)> {

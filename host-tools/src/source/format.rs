@@ -18,8 +18,6 @@ const BY_CHANCE_BYTES: usize = LOOK_BYTES / 2;
 pub(super) const KNOWN: &str = "a recording that this program knows: a tlog, raw MAVLink, an ArduPilot log (.bin, .log), a PX4 log (.ulg), \
                      each also as .gz";
 
-/// With this a file of points begins that wait for a database (`--spool`).
-pub const SPOOL_MAGIC: &[u8; 8] = b"HUMSPOOL";
 /// A sector of the board's flash, of which two are its store (`--store`).
 pub const STORE_SECTOR_BYTES: usize = 16 * 1024;
 
@@ -136,15 +134,12 @@ pub(super) fn detect(start: &[u8]) -> Option<Detected> {
 pub(super) fn hint(start: &[u8]) -> Option<&'static str> {
     const TWICE: &str = "is compressed twice with gzip; unpack it once (gzip -dk)";
     const STORE: &str = "is the memory of a simulated board (--store), and no recording; it may stay there";
-    const SPOOL: &str =
-        "holds points that wait for a database (--spool), and no recording; it may stay there";
     const OWN: &str = "is a log of HUMS in another file, compressed or joined; unpack it (gzip -dk)";
     let is_own = || start.first_chunk().is_some_and(|block| Header::read(block).is_ok());
     archive::hint(start)
         .or_else(|| start.starts_with(&archive::GZIP).then_some(TWICE))
         .or_else(|| is_own().then_some(OWN))
         .or_else(|| is_store::<STORE_SECTOR_BYTES>(start).then_some(STORE))
-        .or_else(|| start.starts_with(SPOOL_MAGIC).then_some(SPOOL))
 }
 
 /// What a file that begins with these bytes (64 KiB, or all of it) is, where it is a recording and none of our own logs.

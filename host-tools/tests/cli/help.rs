@@ -54,7 +54,6 @@ fn serve(dir: &Path, example: &str) {
         .current_dir(dir)
         .env("PATH", "")
         // What waits for a database lies there.
-        .env("XDG_STATE_HOME", dir)
         .args(example.split_whitespace())
         .args(["--listen", "127.0.0.1:0"]);
     let mut program = command.stdout(Stdio::piped()).spawn().expect("it runs");

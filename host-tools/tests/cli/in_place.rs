@@ -160,11 +160,10 @@ fn a_damaged_store_is_told_and_one_that_cannot_be_read_is_refused_and_stays() {
 }
 
 #[test]
-fn a_store_or_a_spool_that_is_read_only_is_refused_as_an_image_is() {
+fn a_store_that_is_read_only_is_refused_as_an_image_is() {
     let dir = recorded();
     run(dir.path(), "sim --input PX4 --sd new.img --store store", 0);
-    fs::write(dir.path().join("spool"), b"").expect("written");
-    for name in ["card.img", "store", "spool"] {
+    for name in ["card.img", "store"] {
         let path = dir.path().join(name);
         let mut permissions = path.metadata().expect("there").permissions();
         permissions.set_readonly(true);
@@ -174,7 +173,6 @@ fn a_store_or_a_spool_that_is_read_only_is_refused_as_an_image_is() {
     for line in [
         "sim --input PX4 --sd card.img",
         "sim --input PX4 --sd new.img --store store",
-        "live --input PX4 --influx http://127.0.0.1:9 --spool spool --listen 127.0.0.1:0",
     ] {
         let said = run(dir.path(), line, 1);
         let said = String::from_utf8_lossy(&said.stderr);
@@ -212,15 +210,13 @@ fn an_image_is_whole_or_not_there_and_one_without_a_partition_table_is_told() {
 }
 
 #[test]
-fn a_store_and_a_spool_beside_recordings_are_named_and_are_no_loss() {
+fn a_store_beside_recordings_is_named_and_is_no_loss() {
     let dir = recorded();
     run(dir.path(), "sim --input PX4 --sd new.img --store store.bin", 0);
-    fs::write(dir.path().join("spool.bin"), b"HUMSPOOL and what waits").expect("written");
     for line in ["info .", "check .", "ls .", "verify .", "decode . -o out --format tlog --to 1"] {
         let ended = run(dir.path(), line, 0);
         let said = String::from_utf8_lossy(&ended.stderr);
         assert!(said.contains("store.bin: is the memory of a simulated board (--store)"), "{line}: {said}");
-        assert!(said.contains("spool.bin: holds points that wait for a database"), "{line}: {said}");
     }
     let said = run(dir.path(), "check store.bin", 1);
     assert!(String::from_utf8_lossy(&said.stderr).contains("is the memory of a simulated board"));
@@ -231,11 +227,11 @@ fn a_store_and_a_spool_beside_recordings_are_named_and_are_no_loss() {
 
 /// A store of which a half is there would be refused from then on.
 #[test]
-fn a_store_or_a_spool_that_cannot_be_made_leaves_nothing_that_is_in_the_way() {
+fn a_store_that_cannot_be_made_leaves_nothing_that_is_in_the_way() {
     let dir = tempfile::tempdir().expect("a folder");
     run(dir.path(), "sim --input PX4 --sd card.img --card-size 34", 0);
     let (before, program) = (contents(dir.path()), env!("CARGO_BIN_EXE_hums"));
-    // No file may be longer than this, in KiB: a write beyond it fails as on a full disk. A store has 32, a spool's head a half.
+    // No file may be longer than this, in KiB: a write beyond it fails as on a full disk. A store has 32.
     let limited = |kib: u32, line: &str| {
         let line =
             format!("ulimit -f {kib}; exec {program} {}", line.replace("PX4", &px4().display().to_string()));
@@ -248,11 +244,6 @@ fn a_store_or_a_spool_that_cannot_be_made_leaves_nothing_that_is_in_the_way() {
     let said = limited(20, "sim --input PX4 --sd card.img --store store");
     assert!(said.contains("store: cannot be written"), "{said}");
     assert!(contents(dir.path()) == before, "{said}");
-    let live = "live --input PX4 --influx http://127.0.0.1:9 --spool spool --listen 127.0.0.1:0";
-    let said = limited(0, live);
-    assert!(said.contains("spool: cannot be used for points that wait"), "{said}");
-    // An empty one is taken as a new one.
-    assert_eq!(fs::read(dir.path().join("spool")).expect("there").len(), 0);
 }
 
 /// At whatever write of it: the card is in order, and goes on with the next run; so does the store.

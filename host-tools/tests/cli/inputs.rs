@@ -23,11 +23,11 @@ enum Role {
 fn role(arg: &Arg) -> Role {
     match arg.get_id().as_str() {
         "inputs" | "input" | "gs_input" | "params" | "key" | "firmware" | "past" => Role::Input,
-        "output" | "sd" | "gs" | "tap" | "store" | "dir" | "spool" => Role::Output,
+        "output" | "sd" | "gs" | "tap" | "store" | "dir" => Role::Output,
         "around" | "bucket" | "card_out" | "command" | "card_size" | "cut_after_writes"
         | "cut_store_after" | "dashboard" | "format" | "from" | "influx" | "last" | "line_rate" | "link"
         | "listen" | "listen_token" | "message" | "name" | "names" | "noise" | "org" | "provoke"
-        | "reboot_at_us" | "seed" | "session" | "shell" | "span" | "speed" | "spool_limit" | "stall"
+        | "reboot_at_us" | "seed" | "session" | "shell" | "span" | "speed" | "stall"
         | "system" | "to" | "token" | "value" | "write_error" => Role::Other,
         unknown => panic!("is --{unknown} an input, an output or none? Say so in `role`"),
     }
@@ -81,7 +81,6 @@ pub(crate) fn value(command: &str, arg: &str) -> &'static str {
 
 /// The words of a command line: its name, what it requires, and these arguments.
 pub(crate) fn words(command: &clap::Command, path: &[&str], given: &[(&Arg, String)]) -> Vec<String> {
-    let mut words_more = Vec::new();
     let mut words: Vec<String> = path.iter().map(|word| (*word).to_owned()).collect();
     let mut push = |arg: &Arg, value: String| {
         if let Some(long) = arg.get_long() {
@@ -93,15 +92,10 @@ pub(crate) fn words(command: &clap::Command, path: &[&str], given: &[(&Arg, Stri
         let id = arg.get_id();
         if let Some((_, value)) = given.iter().find(|(given, _)| given.get_id() == id) {
             push(arg, value.clone());
-            if id == "spool" {
-                // Only with a database do points wait.
-                words_more = ["--influx", "http://127.0.0.1:9"].map(String::from).to_vec();
-            }
         } else if arg.is_required_set() {
             push(arg, value(path[0], id.as_str()).to_owned());
         }
     }
-    words.extend(words_more);
     words
 }
 
@@ -302,13 +296,9 @@ fn an_output_into_an_input_folder_replaces_nothing_there() {
 }
 
 /// Where files may be made, emptied, renamed or removed besides `files/`, and why.
-const MAY_WRITE: [(&str, &str); 4] = [
+const MAY_WRITE: [(&str, &str); 3] = [
     ("card/image.rs", "a simulated card's image is updated in place, as a card is"),
     ("run/store.rs", "the simulated board's flash is updated in place, as flash is"),
-    (
-        "live/influx/spool.rs",
-        "a queue that outlives the program, in place; it takes a file of its own kind only",
-    ),
     (
         "talk/pull/part.rs",
         "sectors of a log come in any order, each to its place in a file whose name says that it is a part",

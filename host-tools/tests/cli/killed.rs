@@ -421,31 +421,6 @@ fn a_demo_outside_of_the_source_tree_says_what_it_needs() {
     assert_eq!(contents(dir.path()).len(), 1, "nothing is made");
 }
 
-#[test]
-fn a_recording_whose_writing_is_ended_says_what_of_it_is_not_in_the_database() {
-    let dir = tempfile::tempdir().expect("directory");
-    let spool = dir.path().join("spool");
-    let mut live = Command::new(env!("CARGO_BIN_EXE_hums"));
-    // Nobody listens there, so that the reading waits when 1 MiB waits.
-    live.args(["live", "--influx", "http://127.0.0.1:9", "--spool-limit", "1", "--listen", "127.0.0.1:0"]);
-    live.arg("--spool").arg(&spool).arg("--input").arg(flight("ap_quad_guided.tlog"));
-    let mut live = live.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().expect("it runs");
-    until("the spool is full", || spool.metadata().is_ok_and(|about| about.len() > 700_000));
-    let end = || {
-        let ended = Command::new("kill").args(["-INT", &live.id().to_string()]).status();
-        assert!(ended.expect("it runs").success());
-    };
-    end();
-    std::thread::sleep(Duration::from_millis(500));
-    // The second one ends the wait for the database.
-    end();
-    let mut said = String::new();
-    let stderr = live.stderr.as_mut().expect("piped");
-    std::io::Read::read_to_string(stderr, &mut said).expect("text");
-    assert_eq!(live.wait().expect("it ends").code(), Some(3), "{said}");
-    assert!(said.contains("where it was ended; the rest is not in the database"), "{said}");
-}
-
 /// What sends two signals at once (a shell and `timeout`, say) means one end.
 #[test]
 fn two_signals_right_after_each_other_end_the_page_in_good_order() {
@@ -469,7 +444,7 @@ fn a_signal_while_it_starts_ends_the_writing_of_a_recording_with_words() {
     assert!(made.expect("it runs").success());
     let mut live = Command::new(env!("CARGO_BIN_EXE_hums"));
     live.args(["live", "--influx", "http://127.0.0.1:9", "--listen", "127.0.0.1:0", "--input"]).arg(px4());
-    live.arg("--params").arg(&params).arg("--spool").arg(dir.path().join("spool"));
+    live.arg("--params").arg(&params);
     let mut live = live.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().expect("it runs");
     // It reads its parameters, and has opened nothing else.
     let mut writer = fs::OpenOptions::new().write(true).open(&params).expect("it is read");

@@ -193,12 +193,11 @@ fn a_slip_in_the_name_of_an_output_costs_no_recording_with_any_flag() {
     let dir = furnished();
     run(dir.path(), "sim --input PX4 --sd card.img --card-size 64", 0);
     let at = |name: &str| dir.path().join(name);
-    fs::write(at("spool"), b"HUMSPOOL and what waits").expect("written");
     fs::write(at("thesis.txt"), "months of work").expect("written");
     // What a port sent, and a log off the card: originals of the kinds that the commands make.
     fs::write(at("gs"), frames_of(&px4())[..50].concat()).expect("written");
     let (before, whole) = (stamps(dir.path()), contents(dir.path()));
-    let names = ["card.img", "spool", "thesis.txt", "hums.elf", "flight.tlog", "gs", "log.hum"];
+    let names = ["card.img", "thesis.txt", "hums.elf", "flight.tlog", "gs", "log.hum"];
     for line in [
         "decode folder/log.hum -o OUT --format tlog",
         "report folder/log.hum -o OUT",

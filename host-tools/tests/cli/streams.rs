@@ -62,7 +62,6 @@ impl Place {
         fs::write(at("part.parquet.mine"), session.expect("a table").1).expect("written");
         // Damaged from its beginning on: only its name says what it is.
         fs::write(at("folder/bad.ulg"), [7; 5_000]).expect("written");
-        fs::write(at("spool"), b"HUMSPOOL\x02\0\0\0 and what waits").expect("written");
         fs::write(at("there"), "what was there").expect("written");
         let before = stamps(dir.path());
         Self { dir, before }
@@ -120,7 +119,6 @@ fn nothing_that_is_said_goes_behind_a_recording_or_what_is_made_of_one_wherever_
         "card.img",
         "store.bin",
         "part.parquet.mine",
-        "spool",
         "made.tlog",
         "made.jsonl",
         "made.lp",

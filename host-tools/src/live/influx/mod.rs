@@ -1,15 +1,12 @@
 //! `--influx`: points to a database as they come, named and tagged as `hums decode --format influx` does.
 //!
 //! The thread that follows the vehicle makes the lines and puts them into batches; another one writes these
-//! ([`writer`]). A database that is away costs nothing: batches wait in a file that outlives the program ([`queue`],
-//! [`spool`], [`place`]), and are written when it is back.
+//! ([`writer`]). Batches wait in a bounded memory while the database is away ([`queue`]).
 
 pub mod batch;
 mod figures;
 pub mod names;
-pub mod place;
 pub mod queue;
-pub mod spool;
 pub mod target;
 pub mod writer;
 
@@ -27,7 +24,6 @@ use self::batch::Batch;
 pub use self::figures::Figures;
 use self::names::Names;
 use self::queue::Queue;
-use self::spool::Spool;
 use self::target::Target;
 use super::world::World;
 use crate::decode::influx::{Clock, Lines};
@@ -62,10 +58,10 @@ pub struct Influx {
 }
 
 impl Influx {
-    /// Starts writing to a database what waits in the file and what comes; `session` tags every point that comes. Where
-    /// `patient`, making points waits for a database that takes them more slowly.
-    pub fn start(target: Target, session: String, spool: Spool, patient: bool) -> Result<Self> {
-        let queue = Arc::new(Queue::new(spool, patient));
+    /// Starts writing points to a database; `session` tags each of them. If `patient`, making points waits for a database that
+    /// takes them more slowly.
+    pub fn start(target: Target, session: String, patient: bool) -> Result<Self> {
+        let queue = Arc::new(Queue::new(patient));
         let writer = writer::start(target, Arc::clone(&queue))?;
         Self::new(queue, Some(writer), session)
     }
@@ -248,11 +244,7 @@ mod tests {
 
     /// Flies these packets past; gives the lines that the database would get, the last ones by the end.
     fn fly(packets: &[Packet], know: bool) -> Vec<String> {
-        let dir = tempfile::tempdir().expect("a folder");
-        let database = Target::new("http://h", None, None, "hums").expect("an address").database();
-        let spool =
-            Spool::open(&dir.path().join("spool"), 1 << 20, &database).expect("a file").expect("free");
-        let queue = Arc::new(Queue::new(spool, false));
+        let queue = Arc::new(Queue::new(false));
         let mut influx = Influx::new(Arc::clone(&queue), None, "s1".to_owned()).expect("random numbers");
         let mut encoder = Encoder::of(1, 1);
         let frames: Vec<Vec<u8>> =

@@ -8,18 +8,8 @@
 use std::fmt::Write as _;
 
 use anyhow::Result;
-use sha2::{Digest as _, Sha256};
 
 use crate::outcome::usage;
-
-/// What tells a database from others.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Database {
-    /// A hash of its address, its bucket and its organisation.
-    pub number: u64,
-    /// Its address for people, without a user's name or password.
-    pub name: String,
-}
 
 /// A database.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -68,18 +58,6 @@ impl Target {
     }
 }
 
-impl Target {
-    /// Which database it is, whatever the token.
-    pub fn database(&self) -> Database {
-        let hash = Sha256::digest(self.write.as_bytes());
-        let number = hash.first_chunk().map_or(0, |first| u64::from_be_bytes(*first));
-        let (scheme, rest) = self.write.split_once("//").unwrap_or(("", &self.write));
-        let (host, path) = rest.split_at(rest.find('/').unwrap_or(rest.len()));
-        let host = host.rsplit('@').next().unwrap_or_default();
-        Database { number, name: format!("{scheme}//{host}{path}") }
-    }
-}
-
 /// Text as a part of an address.
 fn percent(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
@@ -106,17 +84,6 @@ mod tests {
         let one = Target::new("http://h:8086", None, None, "hums").expect("good");
         assert_eq!(one.write, "http://h:8086/write?db=hums&precision=ns");
         assert_eq!(one.create.as_deref(), Some("http://h:8086/query?q=CREATE%20DATABASE%20%22hums%22"));
-    }
-
-    #[test]
-    fn a_database_is_told_from_others_and_named_without_secrets() {
-        let of = |url: &str, token, org, bucket: &str| {
-            Target::new(url, token, org, bucket).expect("good").database()
-        };
-        let one = of("http://user:secret@h:8086", Some("t"), None, "hums");
-        assert_eq!(one.name, "http://h:8086/write?db=hums&precision=ns");
-        assert_eq!(one.number, of("http://user:secret@h:8086/", Some("u"), None, "hums").number);
-        assert_ne!(one.number, of("http://user:secret@h:8086", Some("t"), None, "other").number);
     }
 
     #[test]

@@ -60,7 +60,7 @@ fn write_all(agent: &Agent, target: &Target, queue: &Queue) {
         let mut wait = WAIT_MIN;
         loop {
             let deliver = |lines: &[u8]| persist(agent, target, queue, lines);
-            // Without an answer it stays counted as waiting, and in the file.
+            // Without an answer it stays counted as waiting.
             let Some(delivered) = in_halves(&batch, deliver) else { return };
             has_taken |= delivered.written > 0;
             if has_taken {

@@ -134,11 +134,11 @@ export const link = () => {
     ["influx:waiting", "Waiting"],
   ]);
   const trouble = el("p", { class: "small" });
-  const stored = el("div", { hidden: true }, el("h4", {}, "Database"), database, trouble);
+  const written = el("div", { hidden: true }, el("h4", {}, "Database"), database, trouble);
   const box = panel("link", "Recorder and link", [
     el("p", { class: "recorder" }, el("b", {}, "Recorder"), recorder.node, told),
     list,
-    stored,
+    written,
   ]);
   return {
     node: box.node,
@@ -169,11 +169,10 @@ export const link = () => {
       say(numbers[2], whole(figures.missing));
       say(numbers[3], state.heard_ms < 1500 ? "now" : `${age(state.heard_ms)} ago`);
       say(numbers[4], whole(figures.reboots));
-      stored.hidden = !head.influx;
+      written.hidden = !head.influx;
       if (head.influx) {
         say(points[0], whole(head.influx.written));
-        const spilled = head.influx.spilled_bytes > 1e6 ? ` (${fixed(head.influx.spilled_bytes / 1e6, 1)} MB on disk)` : "";
-        say(points[1], whole(head.influx.waiting) + spilled);
+        say(points[1], whole(head.influx.waiting));
         const lost = head.influx.lost + head.influx.rejected;
         say(trouble, [lost ? `${whole(lost)} points lost or refused.` : "", head.influx.trouble].filter(Boolean).join(" "));
         toggle(trouble, "critical", lost > 0);
