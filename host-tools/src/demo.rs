@@ -1,27 +1,22 @@
 //! `hums demo`: a recorded flight is recorded by the firmware (on the model of its chip, where there is an image), the card is
 //! decoded, what came of it is summed up, and the dashboard plays the card.
 //!
-//! It is these commands one after the other, each with its own rules for what is there already. The card and what the ground
-//! station got are recorded beside their places, and get their names together. One demo at a time has a folder: it holds a
-//! lock on the file `.hums-demo`, which has nothing in it and stays.
+//! It is these commands one after the other. With `--force` the card and what the ground station got begin anew.
 
-use std::collections::HashSet;
+use std::fs;
 use std::io::IsTerminal as _;
 use std::net::TcpListener;
 use std::path::{Path, PathBuf};
 
-use anyhow::Result;
+use anyhow::{Context as _, Result};
 
 use crate::cli::{self, Dashboard, FaultFlags, Format};
-use crate::decode::naming::is_made_by_content;
 use crate::endpoint::Endpoint;
-use crate::files::{Begun, Inputs, make_directory, take_turn};
+use crate::files::{Inputs, Output, make_directory, settle};
 use crate::logs;
-use crate::outcome::{Differs, Outcome, usage};
+use crate::outcome::{Outcome, usage};
 use crate::output::line;
 use crate::run::{emulate, sim};
-use crate::source::item::{Item, Stop, Want};
-use crate::source::recording::Place;
 use crate::summary::Overview;
 use crate::{decode, info, live, report};
 
@@ -34,22 +29,22 @@ const PORT: u16 = 8080;
 /// Runs `hums demo`.
 pub fn run(args: &cli::Demo) -> Result<Outcome> {
     let flight = flight(args)?;
-    let [turn, card, gs, decoded, page] =
-        [".hums-demo", "card.img", "ground-station.bin", "decoded", "report.html"]
-            .map(|name| args.dir.join(name));
+    let [card, gs, decoded, page] =
+        ["card.img", "ground-station.bin", "decoded", "report.html"].map(|name| args.dir.join(name));
     let inputs = inputs(args, &flight, [&card, &gs, &page], &decoded)?;
     make_directory(&args.dir)?;
-    let turn = take_turn(&turn)?;
-    if !args.replace {
-        refuse_others(&flight, [&card, &gs, &page], &decoded)?;
+    for path in [&card, &gs, &page] {
+        Output::check(path, &inputs)?;
     }
     line(&format!("1. {flight} goes in at the autopilot UART"))?;
+    if let Endpoint::File(path) = &flight {
+        fs::File::open(path).with_context(|| format!("{flight}: cannot be read"))?;
+    }
     // Each demo begins with an empty card.
-    let parts = [Begun::of(&card, &inputs)?, Begun::of(&gs, &inputs)?];
-    let [card_part, gs_part] = parts.each_ref().map(Begun::path);
-    let recorded = record(&flight, card_part, gs_part)?;
-    parts.iter().try_for_each(Begun::check)?;
-    parts.into_iter().try_for_each(Begun::finish)?;
+    for path in [&card, &gs].into_iter().filter(|path| path.exists()) {
+        settle(fs::remove_file(path), path)?;
+    }
+    let recorded = record(&flight, &card, &gs)?;
     line("")?;
     line("2. what was on the SD card")?;
     let read = decode::run(&tables_of(args, &card, &decoded))?;
@@ -59,7 +54,7 @@ pub fn run(args: &cli::Demo) -> Result<Outcome> {
         session: None,
         system: None,
         compare: false,
-        replace: args.replace,
+        force: args.force,
         json: false,
     };
     report::run(&page_of)?;
@@ -85,7 +80,6 @@ pub fn run(args: &cli::Demo) -> Result<Outcome> {
         line(&format!("5. the dashboard: hums live --input {} --open", shown(&card)))?;
         return Ok(outcome);
     }
-    drop(turn);
     line("5. the dashboard plays it, until Ctrl-C, at")?;
     dashboard(&card)?;
     Ok(outcome)
@@ -93,7 +87,7 @@ pub fn run(args: &cli::Demo) -> Result<Outcome> {
 
 /// The flight, which none of the outputs may be, nor may it lie among the tables.
 fn inputs(args: &cli::Demo, flight: &Endpoint, outputs: [&PathBuf; 3], decoded: &Path) -> Result<Inputs> {
-    let mut inputs = Inputs::none().replacing(args.replace);
+    let mut inputs = Inputs::none().forcing(args.force);
     inputs.add_endpoint(flight);
     outputs.into_iter().try_for_each(|output| inputs.refuse(output))?;
     if let Endpoint::File(path) = flight
@@ -108,48 +102,6 @@ fn inputs(args: &cli::Demo, flight: &Endpoint, outputs: [&PathBuf; 3], decoded: 
     Ok(inputs)
 }
 
-/// Refuses what lies in the folder and no demo of this flight has made, before anything is recorded. What one may have made is compared
-/// with what this one makes.
-fn refuse_others(flight: &Endpoint, [card, gs, page]: [&PathBuf; 3], decoded: &Path) -> Result<()> {
-    let has_bytes = |path: &&PathBuf| path.metadata().is_ok_and(|about| about.is_file() && about.len() > 0);
-    let has_files = || std::fs::read_dir(decoded).is_ok_and(|mut entries| entries.next().is_some());
-    let other = if has_bytes(&card) {
-        let is_not_made = |page: &&PathBuf| has_bytes(page) && !is_made_by_content(page);
-        if is_card_of(card, flight) { Some(page).filter(is_not_made) } else { Some(card) }
-            .map(PathBuf::as_path)
-    } else {
-        // The card and what the ground station got are there before the others.
-        let others = [gs, page].into_iter().find(has_bytes).map(PathBuf::as_path);
-        others.or_else(|| has_files().then_some(decoded))
-    };
-    other.map_or(Ok(()), |other| Err(Differs::new(other).into()))
-}
-
-/// Whether a card is one of this flight: most of the flight's first frames are among the card's first ones.
-fn is_card_of(card: &Path, flight: &Endpoint) -> bool {
-    /// Of the flight. A box that starts with it misses some of them.
-    const FRAMES: usize = 400;
-    let Endpoint::File(flight) = flight else { return false };
-    let logs = logs::find(&[card.to_owned()], false).map(|found| found.logs).unwrap_or_default();
-    let first = |place: &Place, most: usize| {
-        let mut frames = HashSet::new();
-        // What cannot be read is told where it is recorded.
-        let _ = place.open().and_then(|recording| {
-            recording.read(Want { frames: true, ..Want::default() }, &mut |_, item| {
-                if let Item::Frame(frame) = item {
-                    frames.insert(frame.bytes().to_vec());
-                }
-                if frames.len() < most { Ok(()) } else { Err(Stop.into()) }
-            })
-        });
-        frames
-    };
-    let wanted = first(&Place::file(flight), FRAMES);
-    let [log] = logs.as_slice() else { return false };
-    let there = first(&Place::log(card.display().to_string(), log.clone()), 2 * FRAMES);
-    2 * wanted.intersection(&there).count() >= wanted.len()
-}
-
 /// What becomes of the card.
 fn tables_of(args: &cli::Demo, card: &Path, decoded: &Path) -> cli::Decode {
     cli::Decode {
@@ -161,7 +113,7 @@ fn tables_of(args: &cli::Demo, card: &Path, decoded: &Path) -> cli::Decode {
         from: None,
         to: None,
         message: Vec::new(),
-        replace: args.replace,
+        force: args.force,
         json: false,
     }
 }

@@ -50,7 +50,6 @@ pub mod sink;
 pub mod source;
 pub mod states;
 pub mod statustext;
-pub mod streams;
 pub mod summary;
 pub mod talk;
 pub mod track;
@@ -68,12 +67,7 @@ use outcome::Outcome;
 /// Runs the program with these arguments (the first is the program's own name).
 pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
     interrupt::no_end_by_file_size();
-    let arguments: Vec<OsString> = arguments.into_iter().collect();
-    let parsed = Cli::try_parse_from(&arguments);
-    if !are_streams_safe(arguments.get(1..).unwrap_or_default()) {
-        return ExitCode::from(2);
-    }
-    match parsed {
+    match Cli::try_parse_from(arguments) {
         Ok(cli) => outcome::exit_code(command(&cli.command)),
         Err(error) => {
             // Help and version go to standard output and are no failure; a reader that has gone is none either.
@@ -81,19 +75,6 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
             ExitCode::from(if error.use_stderr() { 2 } else { 0 })
         }
     }
-}
-
-/// Whether standard output and standard error lead to where something may be said. What is wrong is told on the other one.
-fn are_streams_safe(words: &[OsString]) -> bool {
-    match (streams::check_error(words), streams::check_output(words)) {
-        (Ok(()), Ok(())) => return true,
-        (Ok(()), Err(why)) => note!("{why}"),
-        // A reader that has gone changes nothing.
-        (Err(why), Ok(())) => drop(output::line(&format!("hums: {why}"))),
-        // There is nobody to tell.
-        (Err(_), Err(_)) => {}
-    }
-    false
 }
 
 fn command(command: &Command) -> anyhow::Result<Outcome> {

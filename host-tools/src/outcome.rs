@@ -11,7 +11,7 @@
 use std::error::Error as StdError;
 use std::fmt;
 use std::io;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::ExitCode;
 
 /// The end of a run that did what it was asked.
@@ -67,88 +67,13 @@ impl fmt::Display for ReaderGone {
 
 impl StdError for ReaderGone {}
 
-/// A file is there already under an output's name, and has other content: it was not replaced.
-#[derive(Debug)]
-pub struct Differs {
-    path: PathBuf,
-    /// Whether the command has a flag `--replace`.
-    may_replace: bool,
-}
-
-impl Differs {
-    /// Nobody said `--replace`.
-    pub fn new(path: &Path) -> Self {
-        Self { path: path.to_owned(), may_replace: true }
-    }
-
-    /// The command never replaces anything.
-    pub fn at_all(path: &Path) -> Self {
-        Self { path: path.to_owned(), may_replace: false }
-    }
-}
-
-impl fmt::Display for Differs {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let (way, last) = if self.may_replace {
-            (", move it away", ", or say --replace, which keeps it under another name")
-        } else {
-            ("", ", or move it away")
-        };
-        write!(
-            f,
-            "{}: is there already with other content, and was not replaced; name another output{way}{last}",
-            self.path.display()
-        )
-    }
-}
-
-impl StdError for Differs {}
-
-/// Outputs that were there with other content, of a command that has several: the others are written all the same.
-#[derive(Debug, Default)]
-pub struct Kept {
-    last: Option<anyhow::Error>,
-    count: u64,
-}
-
-impl Kept {
-    /// Hands on a result, but for [`Differs`]: that is told by [`Self::end`], or at once where it is not the only one.
-    pub fn pass<T>(&mut self, result: anyhow::Result<T>) -> anyhow::Result<Option<T>> {
-        match result {
-            Ok(value) => Ok(Some(value)),
-            Err(error) if differs(&error).is_some() => {
-                self.tell();
-                self.count += 1;
-                self.last = Some(error);
-                Ok(None)
-            }
-            Err(error) => Err(error),
-        }
-    }
-
-    /// Says the latest.
-    fn tell(&mut self) {
-        if let Some(differs) = self.last.take().as_ref().and_then(differs) {
-            note!("{differs}");
-        }
-    }
-
-    /// All is done: an error where outputs were kept.
-    pub fn end(mut self) -> anyhow::Result<()> {
-        if self.count > 1 {
-            self.tell();
-            anyhow::bail!(
-                "{} outputs were there already with other content, and were not replaced",
-                self.count
-            );
-        }
-        self.last.map_or(Ok(()), Err)
-    }
-}
-
-/// What says [`Differs`] in an error.
-pub fn differs(error: &anyhow::Error) -> Option<&Differs> {
-    find(error)
+/// The error of an output that exists; `has_force` if the command has a flag `--force`.
+pub fn exists(path: &Path, has_force: bool) -> anyhow::Error {
+    let force = if has_force { ", or say --force, which overwrites it" } else { "" };
+    anyhow::anyhow!(
+        "{}: exists, and was not overwritten; name another output, move it away{force}",
+        path.display()
+    )
 }
 
 /// An error of this type, however deep: a writer has it inside its `io::Error`.
@@ -167,11 +92,7 @@ pub fn exit_code(result: anyhow::Result<Outcome>) -> ExitCode {
         Ok(Outcome::Findings) => ExitCode::from(4),
         Err(error) if find::<ReaderGone>(&error).is_some() => ExitCode::SUCCESS,
         Err(error) => {
-            match differs(&error) {
-                // What it was met at says nothing more.
-                Some(differs) => note!("{differs}"),
-                None => note!("{error:#}"),
-            }
+            note!("{error:#}");
             ExitCode::from(if error.is::<Usage>() { 2 } else { 1 })
         }
     }

@@ -48,7 +48,7 @@ pub fn run(args: &cli::Pack) -> Result<Outcome> {
             args.input
         )));
     }
-    let mut inputs = Inputs::none().replacing(args.replace);
+    let mut inputs = Inputs::none().forcing(args.force);
     inputs.add_endpoint(&args.input);
     let source = source::open(&args.input, Timing { line_rate: None })?;
     // Raw bytes have the times that the autopilot tells, as in `check`.

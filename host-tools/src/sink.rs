@@ -9,7 +9,7 @@ use anyhow::{Context as _, Result};
 
 use crate::duplex::{self, Port};
 use crate::endpoint::Endpoint;
-use crate::files::{Inputs, Output, check_standard_output, settle};
+use crate::files::{Inputs, Output, settle};
 use crate::outcome::Outcome;
 use crate::output::Stdout;
 
@@ -152,7 +152,6 @@ pub fn open(endpoint: &Endpoint, inputs: &Inputs) -> Result<Ground> {
             Ok(Ground { writer: Beside::file(FLAG, file), heard })
         }
         Endpoint::Standard => {
-            check_standard_output()?;
             let stream = To::Stream(Box::new(BufWriter::new(Stdout::new())));
             Ok(Ground { writer: Beside::new(FLAG, stream), heard })
         }

@@ -57,7 +57,7 @@ fn the_documents_queries_answer_what_the_cards_say() {
     let (cards, fleet) = (dir.path().join("cards"), dir.path().join("fleet"));
     let decode = |format: &str, out: &Path| {
         let mut decode = command(["decode".as_ref(), cards.as_os_str(), "-o".as_ref(), out.as_os_str()]);
-        child::run(decode.args(["--format", format]), LIMIT).expect_code(&[0]);
+        child::run(decode.args(["--force", "--format", format]), LIMIT).expect_code(&[0]);
     };
     decode("parquet", &fleet);
     // Again, over it: nothing is there twice.

@@ -78,13 +78,13 @@ pub(crate) fn try_out(wine: &Wine, program: &Path, flight: &Path) -> Result<()> 
     let _ = fs::remove_file(&report);
     let mut made = Vec::new();
     for _ in 0..2 {
-        wine.run(program).arg("report").arg(flight).arg("-o").arg(&report).output()?;
+        wine.run(program).arg("report").arg(flight).arg("--force").arg("-o").arg(&report).output()?;
         made.push(fs::read(&report)?);
     }
     if made.first() != made.last() {
         bail!("under Wine the second run of hums.exe report has changed its page");
     }
-    let into_input = wine.run(program).args(["decode", "--replace", "--format", "tlog"]).arg(flight);
+    let into_input = wine.run(program).args(["decode", "--force", "--format", "tlog"]).arg(flight);
     let (_, code) = into_input.arg("-o").arg(flight).output_and_code()?;
     if code != 2 {
         bail!("under Wine hums.exe writes into its input (exit code {code}, not 2)");

@@ -34,7 +34,7 @@ pub fn open_or_make(
     }
     match path.metadata() {
         Ok(about) => open(path, &about, size_mib),
-        Err(error) if error.kind() == io::ErrorKind::NotFound => make_in_place(path, |file| {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => make_in_place(path, false, |file| {
             let bytes = size_mib.unwrap_or(SIZE_MIB) << 20;
             file.set_len(bytes).with_context(|| format!("{}: cannot have {bytes} bytes", path.display()))?;
             format(file)

@@ -23,9 +23,9 @@ pub struct Demo {
     /// Where to put the card image and what is decoded from it
     #[arg(long, value_name = "DIR", default_value = "hums-demo")]
     pub dir: PathBuf,
-    /// Where it is there already with other content: move the old one into the folder hums-kept beside it, and write the new one
+    /// Overwrite outputs that exist
     #[arg(long)]
-    pub replace: bool,
+    pub force: bool,
     /// Whether it ends with the dashboard
     #[arg(long, value_enum, value_name = "WHEN", default_value_t = Dashboard::Auto)]
     pub dashboard: Dashboard,

@@ -20,9 +20,8 @@ Where files go: -o names the file where there is one log and one format of a sin
 it is a directory; otherwise it is a directory with OUT/LOG.tlog, OUT/LOG.jsonl, OUT/LOG.lp and, for tables,
 OUT/LOG/ATTITUDE.csv, OUT/LOG.thesis/flightvalues.csv, OUT/vehicle=V/date=D/session=S/ATTITUDE.parquet and so on.
 LOG names the log, the box and the session: 00001-box3f0042000d51373435363338-s1a2b3c4d. `-o -` is standard output.
-No input is ever written over. What is there already is left as it is: if it is the same as what would be written, all is
-well; if not, the command fails. With --replace the new one takes its name, once all of it is there, and what was there
-is kept in the folder hums-kept beside it.
+An output that exists is overwritten with --force only, once all of the new one is written. An output that is an input,
+and a folder that holds another session's tables, are refused.
 Times: boot time counts from the monitor's power-on; UTC is known for a whole session once any frame told it.";
 
 /// What is read: a file whose name a slash stands behind is that file.
@@ -58,9 +57,9 @@ pub struct Decode {
     /// Only these messages, by name; HUMS records and gaps stay
     #[arg(long, value_name = "NAME")]
     pub message: Vec<String>,
-    /// Where it is there already with other content: move the old one into the folder hums-kept beside it, and write the new one
+    /// Overwrite outputs that exist
     #[arg(long)]
-    pub replace: bool,
+    pub force: bool,
     /// Print the result as one JSON object (docs/json.md)
     #[arg(long)]
     pub json: bool,
@@ -184,9 +183,9 @@ pub struct Report {
     /// Of several vehicles in a recording only this one, by its system id
     #[arg(long, value_name = "ID")]
     pub system: Option<u8>,
-    /// Where it is there already with other content: move the old one into the folder hums-kept beside it, and write the new one
+    /// Overwrite outputs that exist
     #[arg(long)]
-    pub replace: bool,
+    pub force: bool,
     /// Print the result as one JSON object (docs/json.md)
     #[arg(long)]
     pub json: bool,
@@ -206,9 +205,9 @@ pub struct Pack {
     /// The log file to write
     #[arg(short, long, value_name = "LOG")]
     pub output: PathBuf,
-    /// Where it is there already with other content: move the old one into the folder hums-kept beside it, and write the new one
+    /// Overwrite outputs that exist
     #[arg(long)]
-    pub replace: bool,
+    pub force: bool,
     /// Print the result as one JSON object (docs/json.md)
     #[arg(long)]
     pub json: bool,

@@ -66,8 +66,8 @@ pub struct Context {
     pub identity: Identity,
     /// The same for the line protocol.
     pub tags: Tags,
-    /// What the log was known by, for the stamp of its folders.
-    pub stamp: String,
+    /// The session, for the stamps of its folders.
+    pub session: String,
     /// What must not be written over.
     pub inputs: Inputs,
     /// What this program found, where the recorder ran no checks, and it was read for that before.

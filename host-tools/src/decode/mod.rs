@@ -12,8 +12,7 @@
 //! A log is read once (twice where its vehicle must be known first), and judged in the same reading where nobody has; its groups are turned to text and columns in
 //! parallel and written in order. Several logs go side by side, few enough that memory stays bounded.
 //!
-//! A log's files are named after its session ([`naming`]). What is there already is compared, and replaced only where the
-//! user says so ([`crate::files`]).
+//! A log's files are named after its session ([`naming`]), and written by the rules of [`crate::files`].
 //!
 //! Recordings of every kind go the same way ([`crate::source::parts`]); an autopilot's log has its own tables (`native`).
 //!
@@ -57,11 +56,11 @@ use crate::check;
 use crate::check::judge::{Judge, Limits};
 use crate::cli;
 use crate::ending::Ending;
-use crate::files::{Folder, Inputs, appended, check_parent, means_standard_output, says_directory};
+use crate::files::{Inputs, check_parent, means_standard_output, says_directory};
 use crate::followed::{Followed, Logged};
 use crate::logs::reader;
 use crate::logs::side_by_side::side_by_side;
-use crate::outcome::{Kept, Outcome, differs, usage as usage_error};
+use crate::outcome::{Outcome, usage as usage_error};
 use crate::output::{self, Schema};
 use crate::plural::count;
 use crate::printable;
@@ -80,7 +79,7 @@ use made::{LogJson, Made, MadeJson};
 use naming::Named;
 use selection::Selection;
 
-use works::{Work, Works, check_forms};
+use works::{Work, check_forms, works};
 use write::Writers;
 
 /// What `hums decode --json` prints.
@@ -101,16 +100,10 @@ pub fn run(args: &cli::Decode) -> Result<Outcome> {
     if found.places.is_empty() {
         note!("no log is in there, so nothing was written");
     }
-    let mut inputs =
-        Inputs::of(given.iter().map(PathBuf::as_path).chain(found.paths())).replacing(args.replace);
+    let inputs = Inputs::of(given.iter().map(PathBuf::as_path).chain(found.paths())).forcing(args.force);
     let sessions = sessions_of(&found.places);
     let wanted = found.name_of(args.session.as_deref())?;
-    let Works { works, earlier } =
-        Works::of(&found.places, &sessions, |name| appended(&args.output.join(name), "tlog"))?;
-    for (made, of) in &earlier {
-        note!("{}: is what this command makes of {of}, and is not read", made.display());
-        inputs.compare_only(made);
-    }
+    let works = works(&found.places, &sessions)?;
     inputs.refuse(&args.output)?;
     let is_wanted = |name: &String| wanted.as_ref().is_none_or(|wanted| wanted == name);
     let asked = works.iter().filter(|work| is_wanted(&work.log.name)).count();
@@ -122,7 +115,6 @@ pub fn run(args: &cli::Decode) -> Result<Outcome> {
     let task = Task { formats, selection, inputs, output: &args.output, standard_output, logs };
     let taken = Mutex::new(BTreeSet::new());
     let mut written = works.is_empty();
-    let (mut kept, mut any_kept) = (Kept::default(), false);
     let mut json = args.json.then(MadeJson::default);
     let mut tell = |done: Done| {
         if !is_wanted(&done.name) {
@@ -137,16 +129,11 @@ pub fn run(args: &cli::Decode) -> Result<Outcome> {
         |work| {
             if is_wanted(&work.log.name) { task.decode(work, &works, &taken) } else { beside(work) }
         },
-        |done| {
-            let done = kept.pass(done)?;
-            any_kept |= done.is_none();
-            done.map_or_else(Vec::new, |done| followed.push(done)).into_iter().try_for_each(&mut tell)
-        },
+        |done| followed.push(done?).into_iter().try_for_each(&mut tell),
     )?;
     followed.finish().try_for_each(&mut tell)?;
     json.map_or(Ok(()), |json| output::json(SCHEMA, &json))?;
-    kept.end()?;
-    if !written && !any_kept {
+    if !written {
         bail!("nothing of what was asked for is there, so nothing was written");
     }
     Ok(outcome)
@@ -296,7 +283,7 @@ impl Task<'_> {
         {
             let first = partition(self.output, &context.identity);
             check_parent(&first)?;
-            let dir = claim(&mut taken, &first, nth, &context.stamp);
+            let dir = claim(&mut taken, &first, nth);
             if dir != first {
                 remarks.push(format!(
                     "{}: {} has other tables of a session of this number; these go to {}: a query over both counts \
@@ -345,7 +332,7 @@ impl Task<'_> {
             formats: self.formats,
             selection: self.selection.clone(),
             inputs: self.inputs.clone(),
-            stamp: work.traits.stamp(),
+            session: work.traits.identity(work.log),
             ..Context::default()
         };
         // A box's log begins with the record of its start, and its monitor checks.
@@ -379,7 +366,6 @@ impl Task<'_> {
             (_, None) => return Ok(None),
             _ if self.standard_output => return Ok(None),
             (Ok((summary, ..)), _) => summary.ending.as_ref().and_then(|ending| ending.summary.epoch_us),
-            (Err(error), Some(log)) if differs(error).is_some() => reader::epoch(log)?,
             _ => return Ok(None),
         };
         Ok(Some(epoch_us).filter(|epoch_us| *epoch_us != context.epochs.whole()))
@@ -444,10 +430,9 @@ fn nothing_of(log: &Place, summary: &Summary, selection: &Selection) -> String {
     )
 }
 
-/// A directory for a session's tables: that of its own earlier tables, otherwise that of the session. A further log of one
-/// command under the same session (a copy that was cut short, a board without a source of randomness) gets a number. What
-/// an earlier command has put there is not joined by another part of the session: a query would read both.
-fn claim(taken: &mut BTreeSet<PathBuf>, dir: &Path, nth: u32, stamp: &str) -> PathBuf {
+/// A directory for a session's tables. A further log of one command under the same session (a copy that was cut short, a
+/// board without a source of randomness) gets a number.
+fn claim(taken: &mut BTreeSet<PathBuf>, dir: &Path, nth: u32) -> PathBuf {
     let numbered = |number: u32| {
         let mut name = dir.to_owned().into_os_string();
         if number > 1 {
@@ -455,12 +440,8 @@ fn claim(taken: &mut BTreeSet<PathBuf>, dir: &Path, nth: u32, stamp: &str) -> Pa
         }
         PathBuf::from(name)
     };
-    let own = (1..).map(numbered).take_while(|path| !Folder::is_free(path));
-    let mut own = own.filter(|path| Folder::made_of(path).is_some_and(|made_of| made_of == stamp));
-    let is_free = |path: &PathBuf| Folder::is_free(path) && !taken.contains(path);
-    let free = || (nth..u32::MAX).map(numbered).find(is_free);
-    let first = || (nth == 1).then(|| dir.to_owned()).filter(|dir| !taken.contains(dir));
-    let claimed = own.next().or_else(first).or_else(free).unwrap_or_else(|| dir.to_owned());
+    let claimed = (nth..u32::MAX).map(numbered).find(|path| !taken.contains(path));
+    let claimed = claimed.unwrap_or_else(|| dir.to_owned());
     taken.insert(claimed.clone());
     claimed
 }
@@ -473,34 +454,4 @@ fn partition(output: &Path, identity: &Identity) -> PathBuf {
         .join(format!("vehicle={}", identity.vehicle))
         .join(format!("date={date}"))
         .join(format!("session={}", identity.session))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn tables_of_a_session_replace_their_own_and_no_others() {
-        let root = tempfile::tempdir().expect("a directory");
-        let dir = root.path().join("session=s1");
-        let mut taken = BTreeSet::new();
-        let mut claim = |nth, stamp| claim(&mut taken, &dir, nth, stamp);
-        assert_eq!(claim(1, "one"), dir);
-        let second = root.path().join("session=s1-2");
-        assert_eq!(claim(2, "two"), second, "another of the same command");
-        for (path, stamp) in [(&dir, "one"), (&second, "two")] {
-            let folder = Folder::create(path, &Inputs::none(), stamp).expect("made");
-            folder.finish().expect("whole");
-        }
-        assert_eq!(claim(2, "one"), dir, "a later run, in another order");
-        assert_eq!(claim(1, "two"), second);
-        assert_eq!(claim(3, "three"), root.path().join("session=s1-3"));
-        assert_eq!(
-            claim(3, "four"),
-            root.path().join("session=s1-4"),
-            "also while the third is being written"
-        );
-        // Another part of the session, in a later command: nothing goes beside what is there.
-        assert_eq!(super::claim(&mut BTreeSet::new(), &dir, 1, "five"), dir);
-    }
 }

@@ -8,7 +8,6 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context as _, Result};
 
 use crate::files::{Folder, content_identity, digest};
-use crate::hex::hex;
 use crate::logs::Log;
 use crate::logs::board::{HEADING_GROUPS, board_of};
 use crate::logs::fingerprint::{Fingerprint, Fingerprinter};
@@ -73,12 +72,6 @@ impl Traits {
         let content = || place.path().and_then(content_identity);
         let [a, b, c, d, ..] = self.fingerprint;
         number.or_else(content).unwrap_or_else(|| format!("r{:08x}", u32::from_be_bytes([a, b, c, d])))
-    }
-
-    /// A line for the stamp of a folder that is made of the log.
-    pub fn stamp(&self) -> String {
-        let session = self.session.map_or_else(|| "unknown".to_owned(), |session| format!("s{session:08x}"));
-        format!("hums session {session} sectors {}", hex(&self.fingerprint))
     }
 }
 
@@ -147,7 +140,7 @@ pub fn without_made(inputs: &[PathBuf]) -> (Vec<PathBuf>, Vec<String>) {
 pub fn is_made(path: &Path) -> bool {
     let name = path.file_name().map_or_else(Default::default, |name| name.to_string_lossy());
     if path.is_dir() {
-        return Folder::made_of(path).is_some() || name.starts_with("vehicle=");
+        return Folder::is_ours(path) || name.starts_with("vehicle=");
     }
     if name.ends_with(".html") && says_report(path) {
         return true;
@@ -161,31 +154,6 @@ pub fn is_made(path: &Path) -> bool {
 fn says_report(path: &Path) -> bool {
     head(path).windows(GENERATOR.len()).any(|part| part == GENERATOR)
 }
-
-/// Whether what lies at this path begins as our outputs do that are no recordings, whatever its name.
-pub fn is_made_by_content(path: &Path) -> bool {
-    let head = head(path);
-    if BEGINNINGS.iter().any(|beginning| head.starts_with(beginning)) || says_report(path) {
-        return true;
-    }
-    // A point: the measurement and its tags, then fields.
-    let line = head.split(|byte| *byte == b'\n').next().unwrap_or_default();
-    let has_tag = |tag: &[u8]| line.windows(tag.len()).any(|part| part == tag);
-    has_tag(b",session=") && has_tag(b",vehicle=")
-}
-
-/// How tables begin, objects of `jsonl`, and the stamp of a folder.
-const BEGINNINGS: [&[u8]; 9] = [
-    b"time_boot[s],time_utc",
-    b"from[s],to[s],cause,",
-    b"{\"time_boot\":",
-    b"Flight Time [s]; Battery %;",
-    b"esc_rpm1; esc_rpm2;",
-    b"escfail1; escfail2;",
-    b"Airspeed [m/s]; Groundspeed [m/s];",
-    b"From [s]; To [s]; Cause;",
-    b"hums session ",
-];
 
 /// The first bytes of a file; none where it cannot be read.
 fn head(path: &Path) -> Vec<u8> {

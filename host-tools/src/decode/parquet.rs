@@ -309,7 +309,7 @@ mod tests {
         let dir = tempfile::tempdir().expect("a directory");
         let decode = |limits| {
             let path = dir.path().join("session=s1");
-            let inputs = Inputs::none().replacing(true);
+            let inputs = Inputs::none().forcing(true);
             let folder = Folder::create(&path, &inputs, "a session").expect("a folder");
             let mut tables = ParquetTables::new(folder, &[]);
             tables.limits = limits;

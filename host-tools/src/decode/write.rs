@@ -1,5 +1,6 @@
 //! The files of the output formats.
 
+use std::fs;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
@@ -143,7 +144,7 @@ impl<'a> Writers<'a> {
         };
         let tlog = open(formats.tlog, "tlog")?;
         if let Some(path) = tlog.as_ref().and_then(Single::gaps_path) {
-            inputs.refuse(&path)?;
+            Output::check(&path, inputs)?;
         }
         let jsonl = open(formats.jsonl, "jsonl")?;
         let influx = open(formats.influx, "lp")?.map(|file| Influx {
@@ -156,7 +157,7 @@ impl<'a> Writers<'a> {
         });
         let folder = |wanted: bool, path: Option<PathBuf>| -> Result<Option<Folder>> {
             let path = path.filter(|_| wanted);
-            path.map(|path| Folder::create(&path, inputs, &context.stamp)).transpose()
+            path.map(|path| Folder::create(&path, inputs, &context.session)).transpose()
         };
         let csv = folder(formats.csv, destination.tables())?.map(Tables::new);
         let thesis = folder(formats.thesis, destination.thesis())?
@@ -281,13 +282,6 @@ impl<'a> Writers<'a> {
         self.frames == 0 && !has_records && !has_points && !has_rows
     }
 
-    /// Whether a tlog and its gaps replace others, of which one has gaps. `stale` is where gaps of an earlier tlog would be.
-    fn replaces_pair(&self, stale: Option<&Path>) -> Result<bool> {
-        let has_stale = stale.is_some_and(|path| path.metadata().is_ok_and(|about| about.len() > 0));
-        let Some(gaps) = &self.gaps else { return Ok(has_stale) };
-        Ok(gaps.0.replaces()? || self.tlog.as_ref().map_or(Ok(false), |tlog| tlog.0.replaces())?)
-    }
-
     /// All of the log is there: the files get their names. Says what was written.
     pub fn finish(mut self) -> Result<Written> {
         let mut made = Vec::new();
@@ -301,21 +295,11 @@ impl<'a> Writers<'a> {
         // An empty tlog would be taken for a log in which nothing came.
         let has_no_frame = self.frames == 0 && self.context.selection.is_part() && self.tlog.take().is_some();
         self.gaps = self.gaps.filter(|_| !has_no_frame);
-        // None gets its name where another one of them is not what is there.
-        let influx = self.influx.as_mut().map(|influx| &mut influx.file);
-        for file in [&mut self.tlog, &mut self.jsonl, &mut self.gaps].into_iter().flatten().chain(influx) {
-            file.0.end()?;
-        }
         // Gaps of an earlier decoding beside a tlog that has none now would be taken for its own.
         let stale = self.tlog.as_ref().filter(|_| self.gaps.is_none()).and_then(Single::gaps_path);
-        stale.as_deref().map_or(Ok(()), |path| Output::check_none(path, &self.context.inputs))?;
-        // A tlog never has its name without its gaps, nor beside those of another: an earlier one makes way first.
-        if let Some(tlog) = &self.tlog
-            && self.replaces_pair(stale.as_deref())?
-        {
-            tlog.0.make_way()?;
+        if let Some(path) = stale.filter(|path| path.exists()) {
+            settle(fs::remove_file(&path), &path)?;
         }
-        stale.map_or(Ok(()), |path| Output::keep(&path, &self.context.inputs))?;
         let gaps = self.gaps.take().map(Single::finish).transpose()?;
         let mut singles =
             vec![(self.tlog.take(), "tlog", frames), (self.jsonl.take(), "jsonl", (self.objects, "object"))];

@@ -1,10 +1,8 @@
 //! Which file a path means, whatever its spelling: links, hard links, `./` and `..` come out alike.
 
-use std::fs::{self, File, Metadata};
+use std::fs::{self, Metadata};
 use std::io;
 use std::path::{Component, Path, PathBuf};
-
-use anyhow::{Context as _, Result, bail};
 
 /// A file's identity.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -30,18 +28,6 @@ fn node(path: &Path) -> io::Result<Node> {
     Ok((about.volume_serial_number(), about.file_index()))
 }
 
-/// How many names an open file has.
-#[cfg(unix)]
-fn names(file: &File) -> io::Result<u64> {
-    use std::os::unix::fs::MetadataExt as _;
-    file.metadata().map(|about| about.nlink())
-}
-
-#[cfg(windows)]
-fn names(file: &File) -> io::Result<u64> {
-    winapi_util::file::information(file).map(|about| about.number_of_links())
-}
-
 impl FileId {
     /// The identity of what `path` means. Links are followed, also one to a file that is not there yet. `..` behind a folder
     /// that is not there leads back to where that folder would be made, and a slash behind a file's name says nothing.
@@ -60,18 +46,6 @@ impl FileId {
             }
         }
     }
-}
-
-/// Refuses a file that is to be written in place and has another name too: what is kept under that would change with it.
-pub fn check_only_name(file: &File, path: &Path) -> Result<()> {
-    if names(file).with_context(|| format!("{}: cannot be looked at", path.display()))? > 1 {
-        bail!(
-            "{}: has another name too (a hard link, of a backup perhaps), under which it would change as well; nothing was \
-             written: put a copy in its place, or move it away",
-            path.display()
-        );
-    }
-    Ok(())
 }
 
 /// A path without the slash at its end; `None` where there is none.
@@ -107,7 +81,7 @@ fn place(path: &Path) -> io::Result<PathBuf> {
 }
 
 /// Links in a row that are followed: as many as Linux follows.
-pub(super) const LINKS_MAX: usize = 40;
+const LINKS_MAX: usize = 40;
 
 /// What a link leads to, through as many links as there are, also where nothing is there yet.
 pub(super) fn without_links(path: &Path) -> io::Result<PathBuf> {
@@ -122,7 +96,7 @@ pub(super) fn without_links(path: &Path) -> io::Result<PathBuf> {
 }
 
 /// Where one link leads to.
-pub(super) fn linked(path: &Path) -> io::Result<PathBuf> {
+fn linked(path: &Path) -> io::Result<PathBuf> {
     let to = fs::read_link(path)?;
     Ok(path.parent().unwrap_or(Path::new("")).join(to))
 }

@@ -1,12 +1,11 @@
 //! What a command reads, which no output may be, and whether its outputs may replace what is there.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 
 use anyhow::Result;
 
-use super::descriptor::{Opened, STANDARD_INPUT};
 use super::identity::FileId;
 use crate::endpoint::Endpoint;
 use crate::outcome::usage;
@@ -15,10 +14,8 @@ use crate::outcome::usage;
 #[derive(Clone, Debug, Default)]
 pub struct Inputs {
     files: BTreeMap<FileId, String>,
-    /// What an earlier run of the same command made, named as an input.
-    compared: BTreeSet<FileId>,
-    /// `--replace`
-    replace: bool,
+    /// `--force`; none if the command has no such flag.
+    force: Option<bool>,
     /// One of them comes live: what is made of it cannot be made again.
     live: bool,
 }
@@ -36,25 +33,21 @@ impl Inputs {
         inputs
     }
 
-    /// The same where the command line says whether outputs may replace what is there with other content.
+    /// The same of a command whose outputs may replace files if the user says `--force`.
     #[must_use]
-    pub fn replacing(mut self, replace: bool) -> Self {
-        self.replace = replace;
+    pub fn forcing(mut self, force: bool) -> Self {
+        self.force = Some(force);
         self
     }
 
-    /// An input that is not read, because the command made it earlier and makes it again: it is compared with what is
-    /// made now, and never replaced.
-    pub fn compare_only(&mut self, path: &Path) {
-        if let Ok(id) = FileId::of(path) {
-            self.files.remove(&id);
-            self.compared.insert(id);
-        }
+    /// Whether outputs may replace files.
+    pub(super) fn may_replace(&self) -> bool {
+        self.force == Some(true)
     }
 
-    /// Whether what is at `path` may be replaced with other content.
-    pub(super) fn may_replace(&self, path: &Path) -> bool {
-        self.replace && FileId::of(path).is_ok_and(|id| !self.compared.contains(&id))
+    /// Whether the command has a flag with which they may.
+    pub(super) const fn can_replace(&self) -> bool {
+        self.force.is_some()
     }
 
     /// Adds a file. One that cannot be looked at is none: whoever opens it says so. A folder is none either (what is
@@ -75,14 +68,8 @@ impl Inputs {
     /// Adds what an endpoint reads.
     pub fn add_endpoint(&mut self, endpoint: &Endpoint) {
         self.live |= endpoint.is_live();
-        match endpoint {
-            Endpoint::File(path) => self.add(path),
-            Endpoint::Standard => {
-                if let Some(id) = Opened::of(STANDARD_INPUT).and_then(|input| input.id()) {
-                    self.files.insert(id, "standard input".to_owned());
-                }
-            }
-            _ => {}
+        if let Endpoint::File(path) = endpoint {
+            self.add(path);
         }
     }
 

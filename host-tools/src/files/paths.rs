@@ -6,83 +6,52 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result, bail};
 
-use sha2::{Digest as _, Sha256};
-
-use super::descriptor::descriptor;
-use super::ends::short;
-use super::identity::{FileId, folded, without_links};
-use crate::outcome::usage;
+use super::identity::folded;
 
 /// How the name of a file or a folder ends that is not whole yet.
 pub(super) const PART: &str = ".hums-part";
-/// The folder of what was replaced.
-pub(super) const KEPT: &str = "hums-kept";
-
-/// Why readers of a folder pass over what has this name, as the end of a sentence: it is not whole, or was replaced.
+/// Why readers of a folder pass over a file of this name, as the end of a sentence.
 pub fn why_unread(path: &Path) -> Option<&'static str> {
-    let name = path.file_name()?.to_string_lossy();
-    if name.ends_with(PART) {
-        return Some(
-            "has the name of what a run of hums has not ended, and is passed over; to read it, rename it",
-        );
-    }
-    (name == KEPT)
-        .then_some("keeps what --replace has replaced, and is passed over; to read it, name what is in it")
+    path.file_name()?.to_string_lossy().ends_with(PART).then_some(
+        "has the name of what a run of hums has not ended, and is passed over; to read it, rename it",
+    )
 }
 
-/// Names of a part that are tried.
-pub(super) const PARTS_MAX: u32 = 100;
-/// A longer name is a hash in the name of its part: file systems take 255 bytes.
-const NAME_BYTES_MAX: usize = 200;
-
-/// The part of a target, beside it: the `number`-th name, from 1 on.
-pub(super) fn part_of(target: &Path, number: u32) -> Result<PathBuf> {
-    beside(target, "", number)
+/// Whether a path means standard output.
+pub fn means_standard_output(path: &Path) -> bool {
+    ["-", "/dev/stdout", "/dev/fd/1", "/proc/self/fd/1"].iter().any(|name| path == Path::new(name))
 }
 
-/// What `hums pull` has begun of a target, beside it: to be gone on with, so no other command takes it for its own.
+/// The folder that a path is in.
+pub(super) fn folder_of(path: &Path) -> &Path {
+    path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
+}
+
+/// As much of a target's name as its part has: file systems take 255 bytes.
+const NAME_CHARS_MAX: usize = 50;
+
+/// How the name of a target's part begins.
+pub(super) fn part_prefix(target: &Path) -> io::Result<String> {
+    let name = target.file_name().ok_or(io::ErrorKind::InvalidInput)?.to_string_lossy();
+    Ok(format!(".{}.", name.chars().take(NAME_CHARS_MAX).collect::<String>()))
+}
+
+/// Begins a file beside its target, under a name of its own. It is removed unless it is given its name.
+pub(super) fn begin<R>(
+    target: &Path,
+    open: impl FnMut(&Path) -> io::Result<R>,
+) -> io::Result<tempfile::NamedTempFile<R>> {
+    tempfile::Builder::new().prefix(&part_prefix(target)?).suffix(PART).make_in(folder_of(target), open)
+}
+
+/// The part of a target that `hums pull` has begun, beside it: a later call goes on with it.
 pub(super) fn begun_of(target: &Path) -> Result<PathBuf> {
-    beside(target, ".pull", 1)
-}
-
-/// The path that is written where this one is named: without links, so that a link stays one. What a link in `/proc` says
-/// (`/proc/PID/fd/3`) may be another file than the one it leads to: that one was deleted, or has its name elsewhere.
-pub(super) fn target_of(path: &Path) -> Result<PathBuf> {
-    let target = without_links(path).with_context(|| cannot_write(path))?;
-    if leads_to(path, &target) {
-        return Ok(target);
-    }
-    Err(usage(format!(
-        "{}: is a link to something that has not the name it says, {}: it was deleted, or is another process's; nothing was \
-         written; name the output by its own path",
-        path.display(),
-        target.display()
-    )))
-}
-
-/// Whether what a path leads to is what lies at `target`, which is [`without_links`] of it. What nothing is at yet may be made
-/// there, and what is neither a file nor a folder is written as it is.
-fn leads_to(path: &Path, target: &Path) -> bool {
-    let Ok(about) = fs::metadata(path) else { return true };
-    let is_ours = descriptor(path).is_some() && !about.is_dir();
-    let is_kept = about.is_file() || about.is_dir();
-    is_ours || !is_kept || FileId::of(path).ok() == FileId::of(target).ok()
-}
-
-fn beside(target: &Path, what: &str, number: u32) -> Result<PathBuf> {
     let Some(name) = target.file_name() else {
         bail!("{}: is no name of a file", target.display());
     };
     let mut part = std::ffi::OsString::from(".");
-    if name.len() <= NAME_BYTES_MAX {
-        part.push(name);
-    } else {
-        part.push(format!("{:08x}", short(Sha256::new().chain_update(name.as_encoded_bytes()))));
-    }
-    part.push(what);
-    if number > 1 {
-        part.push(format!(".{number}"));
-    }
+    part.push(name);
+    part.push(".pull");
     part.push(PART);
     Ok(target.with_file_name(part))
 }
@@ -122,16 +91,9 @@ pub fn make_parent(path: &Path) -> Result<()> {
     }
 }
 
-/// Says that a file cannot be written, and names its folder where that is missing.
+/// Says that a file cannot be written.
 pub fn cannot_write(path: &Path) -> String {
-    // A folder that is being made is there under the name of its part.
-    let is_there = |folder: &Path| {
-        folder.exists()
-            || (1..=PARTS_MAX).any(|number| part_of(folder, number).is_ok_and(|part| part.exists()))
-    };
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty() && !is_there(folder));
-    let why = folder.map_or_else(String::new, |folder| format!("; there is no folder {}", folder.display()));
-    format!("{}: cannot be written{why}", path.display())
+    format!("{}: cannot be written", path.display())
 }
 
 /// An error in terms of the file.

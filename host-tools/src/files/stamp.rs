@@ -1,7 +1,7 @@
-//! The file `.hums` of a folder of tables: what they were made of, and which files are ours.
+//! The file `.hums` of a folder of tables: which session they are of, and which files are ours.
 //!
 //! ```text
-//! hums session s1a2b3c4d sectors 00112233445566778899aabbccddeeff
+//! hums session s1a2b3c4d
 //! files 2
 //! ATTITUDE.csv
 //! HEARTBEAT.csv
@@ -20,8 +20,8 @@ const BYTES_MAX: u64 = 4 << 20;
 /// What a stamp says.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(super) struct Stamp {
-    /// What the tables were made of, a line.
-    pub(super) made_of: String,
+    /// The session that the tables are of.
+    pub(super) session: String,
     /// The names of the files that were made; none while the folder is being made, or where the stamp is cut off.
     pub(super) files: BTreeSet<String>,
 }
@@ -33,18 +33,19 @@ impl Stamp {
         fs::symlink_metadata(&path).ok().filter(|about| about.is_file() && about.len() <= BYTES_MAX)?;
         let text = fs::read_to_string(path).ok()?;
         let mut lines = text.lines();
-        let made_of = lines.next().unwrap_or_default().to_owned();
+        let session = lines.next().unwrap_or_default().to_owned();
         let count: Option<usize> = lines.next().and_then(|line| line.strip_prefix("files ")?.parse().ok());
         let mut files: BTreeSet<String> = lines.map(str::to_owned).collect();
-        if count != Some(files.len()) || !text.ends_with('\n') {
+        let is_name = |name: &String| Path::new(name).file_name().is_some_and(|own| own == name.as_str());
+        if count != Some(files.len()) || !text.ends_with('\n') || !files.iter().all(is_name) {
             files.clear();
         }
-        Some(Self { made_of, files })
+        Some(Self { session, files })
     }
 
     /// Writes it.
     pub(super) fn write(&self, mut file: &File) -> io::Result<()> {
-        let mut text = format!("{}\nfiles {}\n", self.made_of, self.files.len());
+        let mut text = format!("{}\nfiles {}\n", self.session, self.files.len());
         for line in &self.files {
             text.push_str(line);
             text.push('\n');

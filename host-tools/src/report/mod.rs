@@ -32,7 +32,7 @@ use crate::followed::{Followed, HELD_MAX};
 use crate::logs::sessions::Sessions;
 use crate::logs::side_by_side::side_by_side;
 use crate::logs::{Log, segment_name};
-use crate::outcome::{Kept, Outcome, usage};
+use crate::outcome::{Outcome, usage};
 use crate::output::{self, Schema};
 use crate::plural::count;
 use crate::printable::{path as shown, word};
@@ -83,7 +83,7 @@ pub fn run(args: &cli::Report) -> Result<Outcome> {
             shown(output)
         )));
     }
-    let inputs = Inputs::of(given.iter().map(PathBuf::as_path).chain(found.paths())).replacing(args.replace);
+    let inputs = Inputs::of(given.iter().map(PathBuf::as_path).chain(found.paths())).forcing(args.force);
     inputs.refuse(output)?;
     if wanted.directory {
         // Before any page is written. That of a session is refused by itself, when its name is known.
@@ -100,7 +100,6 @@ pub fn run(args: &cli::Report) -> Result<Outcome> {
         pages: BTreeMap::new(),
         rows: Vec::new(),
         names: Names::default(),
-        kept: Kept::default(),
         outcome: Outcome::lossy(found.is_lossy()),
         parameters: None,
         json: args.json,
@@ -130,7 +129,6 @@ struct Making<'a> {
     pages: BTreeMap<usize, String>,
     rows: Vec<index::Row>,
     names: Names,
-    kept: Kept,
     outcome: Outcome,
     /// The parameters of a session that was read last, by its index.
     parameters: Option<(usize, Vec<(String, f64)>)>,
@@ -192,10 +190,9 @@ impl Making<'_> {
             index,
             replay.history.last_parameters().map(|(name, value)| (name.to_owned(), value)).collect(),
         ));
-        if self.write(&path, &html, &What::Session(&place.name), self.inputs)? {
-            self.rows.push(index::Row::new(file.clone(), overview, &replay));
-            self.pages.insert(index, file);
-        }
+        self.write(&path, &html, &What::Session(&place.name), self.inputs)?;
+        self.rows.push(index::Row::new(file.clone(), overview, &replay));
+        self.pages.insert(index, file);
         Ok(())
     }
 
@@ -220,17 +217,15 @@ impl Making<'_> {
         Ok((!values.is_empty()).then(|| page::Before { name: place.name.clone(), values }))
     }
 
-    /// Whether it is there now: a page with other content is kept, and told.
-    fn write(&mut self, path: &Path, html: &str, what: &What<'_>, inputs: &Inputs) -> Result<bool> {
-        if self.kept.pass(write(path, html, inputs))?.is_none() {
-            return Ok(false);
-        }
+    /// Writes a page, and says so.
+    fn write(&mut self, path: &Path, html: &str, what: &What<'_>, inputs: &Inputs) -> Result<()> {
+        write(path, html, inputs)?;
         let made = PageJson { path: path.to_owned(), session: what.session(), bytes: html.len() as u64 };
         if !self.json {
             output::line(&format!("{}: {what}, {}", shown(path), count(made.bytes, "byte")))?;
         }
         self.made.pages.push(made);
-        Ok(true)
+        Ok(())
     }
 
     /// All sessions have been: the comparisons, and the table of a folder.
@@ -239,9 +234,9 @@ impl Making<'_> {
         if self.wanted.directory {
             let folder = &self.wanted.output;
             let known = index::Pages::of(folder);
-            // A table of ours goes on, and what it was is kept: that another flight has a page is no reason to ask.
+            // A table of ours goes on: that another flight has a page is no reason to ask.
             let inputs =
-                if known.is_some() { self.inputs.clone().replacing(true) } else { self.inputs.clone() };
+                if known.is_some() { self.inputs.clone().forcing(true) } else { self.inputs.clone() };
             let pages =
                 index::Pages { pages: std::mem::take(&mut self.rows), comparisons, ..Default::default() };
             let pages = pages.with(known.unwrap_or_default(), folder);
@@ -252,7 +247,6 @@ impl Making<'_> {
         if self.json {
             output::json(SCHEMA, &self.made)?;
         }
-        self.kept.end()?;
         Ok(self.outcome)
     }
 
@@ -288,7 +282,7 @@ impl Making<'_> {
             };
             let is_ours = self.wanted.directory && index::Pages::of(&self.wanted.output).is_some();
             let inputs = self.inputs.clone();
-            let inputs = if is_ours { inputs.replacing(true) } else { inputs };
+            let inputs = if is_ours { inputs.forcing(true) } else { inputs };
             self.write(&path, &html, &What::Comparison, &inputs)?;
             comparisons.push((airframe, file));
         }

@@ -34,8 +34,8 @@ pub(super) fn inputs(run: &Run, tap: Option<&Path>, firmware: Option<&Path>) -> 
         return Err(usage("--gs - and --tap - both want standard output; give one of them a file"));
     }
     for output in gs.into_iter().chain(tap) {
-        // A run also changes the card, so that it is too late to compare while it goes on.
-        Output::check_new(output, &inputs)?;
+        // Before the run changes the card.
+        Output::check(output, &inputs)?;
     }
     if let (Some(gs), Some(tap)) = (gs, tap)
         && FileId::of(gs).ok() == FileId::of(tap).ok()

@@ -12,7 +12,7 @@ use hums_core::params::ParamSpec;
 use hums_store::sim::{SimFlash, is_store};
 use hums_store::{Found, Key, Store, param_value};
 
-use crate::files::{cannot_write, make_in_place, open_in_place, remake_in_place};
+use crate::files::{cannot_write, make_in_place, open_in_place};
 use crate::source::format::STORE_SECTOR_BYTES as SECTOR;
 
 /// Two of them are the store.
@@ -29,7 +29,7 @@ pub(super) fn open(path: Option<&Path>, params: &[(&ParamSpec, f32)]) -> Result<
     if let Some(path) = path.filter(|_| found(&bytes) == Some(Found::Damaged)) {
         drop(file);
         let whole = |mut file: &File| file.write_all(&bytes).with_context(|| cannot_write(path));
-        file = Some(remake_in_place(path, true, whole).context("--store")?);
+        file = Some(make_in_place(path, true, whole).context("--store")?);
     }
     let flash = FileFlash(Rc::new(RefCell::new(Inside { flash: SimFlash::with(&bytes), file, error: None })));
     flash.write_out(0, BYTES);
@@ -85,7 +85,10 @@ fn read(path: &Path) -> Result<(Vec<u8>, Option<File>)> {
     let context = || format!("--store {}: cannot be opened for reading and writing", path.display());
     let mut file = match open_in_place(OpenOptions::new().read(true).write(true), path) {
         Err(error) if error.kind() == io::ErrorKind::NotFound => {
-            return Ok((Vec::new(), Some(make_in_place(path, |file| fill(file, path)).context("--store")?)));
+            return Ok((
+                Vec::new(),
+                Some(make_in_place(path, false, |file| fill(file, path)).context("--store")?),
+            ));
         }
         opened => opened.with_context(context)?,
     };

@@ -9,7 +9,6 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context as _, Result, anyhow, bail};
 
 use super::format::{KNOWN, begins_recording, detect, format_of, hint, is_recording, start_of};
-use super::made::{Made, made_of};
 use super::recording::{Place, of_one_vehicle};
 use crate::files::{FileId, content_identity, why_unread};
 use crate::logs::find::{Image, REMARKS_MAX, check_seekable};
@@ -96,68 +95,33 @@ impl Found {
         self.seen.extend(inside.into_keys());
     }
 
-    /// Drops tlogs that `hums decode` made of what is there too, by their names and their frames: a flight counts once.
+    /// Drops tlogs that have the name of what `hums decode` makes of another recording that was found: a flight counts once.
     fn drop_made(&mut self, before: usize) {
-        let found = self.places.get(before..).unwrap_or_default();
-        let made = |place: &Place| {
-            let path = place.path()?;
-            let stem = path.file_name()?.to_str()?.strip_suffix(".tlog")?;
-            identity_at_end(stem)
-                .map(|(base, identity)| (path.to_owned(), base.to_owned(), identity.to_owned()))
-        };
-        let made: Vec<_> = found.iter().map(made).collect();
-        if made.iter().all(Option::is_none) {
-            return;
-        }
-        let mut sessions: BTreeMap<u32, Vec<&Place>> = BTreeMap::new();
-        for place in found {
-            if let Some(session) = place.own().and_then(first_session) {
-                sessions.entry(session).or_default().push(place);
-            }
-        }
-        // Those of which it is made as far as can be told, or else those of which it has the name.
-        let of = |tlog: &Path, originals: &[&Place]| {
-            let likeness: Vec<Made> = originals.iter().map(|place| made_of(tlog, place)).collect();
-            let best =
-                [Made::Of, Made::OtherTimes, Made::No].into_iter().find(|made| likeness.contains(made))?;
-            let named = originals.iter().zip(&likeness).filter(|(_, made)| **made == best);
-            let named: Vec<&str> = named.map(|(place, _)| place.title.as_str()).collect();
-            Some((named.join(" or "), best))
-        };
-        let of_file = |base: &str, identity: &str| -> Vec<&Place> {
-            let is_it = |path: &Path| {
-                path.file_name().is_some_and(|name| name == base)
-                    && content_identity(path).is_some_and(|content| content == identity)
+        let found = self.places.split_off(before);
+        let original = |place: &Place| -> Option<String> {
+            let stem = place.path()?.file_name()?.to_str()?.strip_suffix(".tlog")?;
+            let (base, identity) = identity_at_end(stem)?;
+            let session = session_of(identity);
+            let is_it = |other: &&Place| match session {
+                Some(_) => other.own().and_then(first_session) == session,
+                None => other.path().is_some_and(|path| {
+                    path.file_name().is_some_and(|name| name == base)
+                        && content_identity(path).is_some_and(|content| content == identity)
+                }),
             };
-            found.iter().filter(|place| place.path().is_some_and(is_it)).collect()
+            found.iter().find(is_it).map(|place| place.title.clone())
         };
-        let originals: Vec<_> = made
-            .into_iter()
-            .map(|made| {
-                let (path, base, identity) = made?;
-                match session_of(&identity) {
-                    Some(session) => of(&path, sessions.get(&session)?),
-                    None => of(&path, &of_file(&base, &identity)),
-                }
-            })
-            .collect();
-        for (place, original) in self.places.split_off(before).into_iter().zip(originals) {
-            let remark = match &original {
-                Some((of, Made::Of)) => {
-                    format!("{}: was made by hums of {of}, which is read, and is passed over", place.title)
-                }
-                Some((of, made)) => format!(
-                    "{}: has the name of what hums makes of {of}, and {}: it is read as a recording of its own",
-                    place.title,
-                    if *made == Made::No { "more or other frames" } else { "its frames at other times" }
-                ),
-                None => String::new(),
-            };
-            if !remark.is_empty() && self.remarks.len() < REMARKS_MAX {
-                self.remarks.push(remark);
-            }
-            if original.is_none_or(|(_, made)| made != Made::Of) {
+        let originals: Vec<_> = found.iter().map(original).collect();
+        for (place, original) in found.into_iter().zip(originals) {
+            let Some(of) = original else {
                 self.places.push(place);
+                continue;
+            };
+            if self.remarks.len() < REMARKS_MAX {
+                self.remarks.push(format!(
+                    "{}: has the name of what hums decode makes of {of}, which is read, and is passed over",
+                    place.title
+                ));
             }
         }
     }
@@ -340,19 +304,6 @@ fn start_of_bytes(content: &Path, bytes: usize) -> Option<Vec<u8>> {
     let mut start = Vec::new();
     fs::File::open(content).and_then(|file| file.take(bytes as u64).read_to_end(&mut start)).ok()?;
     Some(start)
-}
-
-/// Whether words that are appended to the file of this path, whose content lies at `content`, would spoil a recording or a card, or
-/// are in a file that is no text at all. A damaged one may have nothing but its name.
-pub fn is_no_text(path: &Path, content: &Path) -> bool {
-    let is_named = logs::is_named_as_log(path) || logs::is_named_as_card(path) || is_named_as_recording(path);
-    // Further on, a text may have zeros too: a PC that loses its power leaves such in its logs. A backspace is in the talk of a terminal.
-    let is_of_text = |byte: &u8| matches!(byte, 0x08..=0x0D | 0x1B | b' '..);
-    let is_binary = || {
-        const START_BYTES: usize = 512;
-        start_of_bytes(content, START_BYTES).is_some_and(|start| !start.iter().all(is_of_text))
-    };
-    is_named || why_unread(path).is_some() || is_binary() || is_recording(content)
 }
 
 /// Why no log of ours was found, for a command that reads nothing else: a recording of another kind that was named is told as that.

@@ -38,7 +38,6 @@ pub mod format;
 pub mod input;
 pub mod item;
 pub mod live;
-mod made;
 pub mod mavlink;
 pub mod noise;
 pub mod own;

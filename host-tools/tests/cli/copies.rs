@@ -74,7 +74,7 @@ fn two_copies_of_one_session_have_two_pages_and_the_damaged_one_is_not_kept_alon
         fs::create_dir(dir.path().join(folder)).expect("made");
         fs::write(dir.path().join(folder).join("00001_00.HUM"), log).expect("written");
     }
-    for flags in ["", "--replace"] {
+    for flags in ["", "--force"] {
         let said = run(dir.path(), &format!("report damaged copied same -o pages/ {flags}"), 3);
         let lines = text(&said);
         let (tables, pages): (Vec<_>, Vec<_>) =
@@ -85,7 +85,7 @@ fn two_copies_of_one_session_have_two_pages_and_the_damaged_one_is_not_kept_alon
         let mut pages: Vec<String> = fs::read_dir(dir.path().join("pages"))
             .expect("pages")
             .map(|page| page.expect("a page").file_name().to_string_lossy().into_owned())
-            .filter(|name| name != "index.html" && name != "hums-kept")
+            .filter(|name| name != "index.html")
             .collect();
         pages.sort();
         assert!(pages.len() == 2 && pages[0].ends_with("-2.html"), "{pages:?}");

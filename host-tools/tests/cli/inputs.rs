@@ -1,4 +1,4 @@
-//! No command writes over any of its inputs, and one module makes files.
+//! No command writes over any of its inputs.
 
 use std::fs;
 use std::path::Path;
@@ -27,8 +27,8 @@ fn role(arg: &Arg) -> Role {
         "around" | "bucket" | "card_out" | "command" | "card_size" | "cut_after_writes"
         | "cut_store_after" | "dashboard" | "format" | "from" | "influx" | "last" | "line_rate" | "link"
         | "listen" | "listen_token" | "message" | "name" | "names" | "noise" | "org" | "provoke"
-        | "reboot_at_us" | "seed" | "session" | "shell" | "span" | "speed" | "stall"
-        | "system" | "to" | "token" | "value" | "write_error" => Role::Other,
+        | "reboot_at_us" | "seed" | "session" | "shell" | "span" | "speed" | "stall" | "system" | "to"
+        | "token" | "value" | "write_error" => Role::Other,
         unknown => panic!("is --{unknown} an input, an output or none? Say so in `role`"),
     }
 }
@@ -204,7 +204,7 @@ fn a_page_that_would_go_into_an_input_is_refused_before_any_other_is_written() {
     fs::create_dir(&pages).expect("made");
     std::os::unix::fs::symlink("../log.hum", pages.join("index.html")).expect("a link");
     let before = contents(dir.path());
-    for flag in ["", "--replace", "--compare"] {
+    for flag in ["", "--force", "--compare"] {
         let ended = run(dir.path(), &format!("report log.hum -o pages {flag}"), 2);
         let said = String::from_utf8_lossy(&ended.stderr);
         assert!(said.contains("index.html: is an input of this command"), "{said}");
@@ -219,7 +219,7 @@ fn a_cards_image_is_written_over_by_no_format() {
     let (before, whole) = (stamps(at), contents(at));
     for format in ["tlog", "csv", "jsonl", "influx", "parquet", "thesis", "tlog,csv"] {
         for output in ["card.img", "./card.img", "./new-folder/../card.img"] {
-            for flag in ["", "--replace", "--salvage"] {
+            for flag in ["", "--force", "--salvage"] {
                 refused(
                     at,
                     &words_of(&format!("decode card.img -o {output} --format {format} {flag}")),
@@ -229,28 +229,11 @@ fn a_cards_image_is_written_over_by_no_format() {
             }
         }
     }
-    for flag in ["", "--replace"] {
+    for flag in ["", "--force"] {
         let line = format!("report card.img -o ./new-folder/../card.img {flag}");
         refused(at, &words_of(&line), IS_INPUT, &before);
     }
     assert!(contents(at) == whole, "something was changed");
-}
-
-#[test]
-fn what_has_the_name_under_which_an_output_is_made_is_no_victim() {
-    let dir = tempfile::tempdir().expect("a folder");
-    let at = dir.path();
-    for part in [".out.hum.hums-part", ".gs.raw.hums-part"] {
-        fs::copy(px4(), at.join(part)).expect("copied");
-    }
-    let made = std::process::Command::new("mkfifo").arg(at.join(".pipe.hum.hums-part")).status();
-    assert!(made.expect("it runs").success());
-    run(at, "pack .out.hum.hums-part -o out.hum", 0);
-    run(at, "sim --input .gs.raw.hums-part --sd new.img --gs gs.raw", 0);
-    run(at, "pack .gs.raw.hums-part -o pipe.hum", 0);
-    for part in [".out.hum.hums-part", ".gs.raw.hums-part"] {
-        assert!(fs::read(at.join(part)).expect("there") == fs::read(px4()).expect("there"), "{part}");
-    }
 }
 
 fn words_of(line: &str) -> Vec<String> {
@@ -286,55 +269,11 @@ fn an_output_into_an_input_folder_replaces_nothing_there() {
     for line in ["decode folder -o folder --format csv,parquet,thesis,tlog", "report folder -o folder/"] {
         run(dir.path(), line, 0);
         let made = contents(&dir.path().join("folder"));
-        // And again: what is there is the same. A tlog that was made is no input, though it is a recording.
-        run(dir.path(), line, 0);
+        // And again. A tlog that was made is no input, though it is a recording.
+        run(dir.path(), &format!("{line} --force"), 0);
         assert_eq!(contents(&dir.path().join("folder")), made);
     }
     let after = contents(&dir.path().join("folder"));
     assert!(before.iter().all(|file| after.contains(file)), "every input is what it was");
     assert!(after.len() > before.len() + 60);
-}
-
-/// Where files may be made, emptied, renamed or removed besides `files/`, and why.
-const MAY_WRITE: [(&str, &str); 3] = [
-    ("card/image.rs", "a simulated card's image is updated in place, as a card is"),
-    ("run/store.rs", "the simulated board's flash is updated in place, as flash is"),
-    (
-        "talk/pull/part.rs",
-        "sectors of a log come in any order, each to its place in a file whose name says that it is a part",
-    ),
-];
-
-fn is_rust(name: &str) -> bool {
-    Path::new(name).extension().is_some_and(|extension| extension == "rs")
-}
-
-#[test]
-fn one_place_makes_files() {
-    let sources = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
-    let mut found = Vec::new();
-    for (name, bytes) in contents(&sources).into_iter().filter(|(name, _)| is_rust(name)) {
-        let source = String::from_utf8(bytes).expect("UTF-8");
-        // Tests may do what they like.
-        let source = source.split("#[cfg(test)]").next().unwrap_or_default();
-        let calls = [
-            "File::create",
-            "File::options",
-            "OpenOptions::new",
-            "fs::write",
-            "fs::rename",
-            "fs::copy",
-            "fs::remove",
-            "fs::hard_link",
-        ];
-        let writes = calls.iter().any(|call| source.contains(call));
-        if writes
-            && !name.starts_with("files/")
-            && !name.ends_with("/tests.rs")
-            && !MAY_WRITE.iter().any(|(file, _)| *file == name)
-        {
-            found.push(name);
-        }
-    }
-    assert_eq!(found, Vec::<String>::new(), "use `files::Output`, or say here why not");
 }

@@ -1,16 +1,15 @@
 //! What a kill, a full disk or an earlier demo leaves.
 
-use std::collections::BTreeSet;
 use std::fs;
 use std::io::Write as _;
 use std::net::TcpListener;
 use std::path::Path;
 use std::process::{Command, Stdio};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
-use sha2::Digest as _;
-
-use crate::support::{all_named, attempt, contents, flight, frames_of, json, named, px4, run, stamps, until};
+use crate::support::{
+    all_named, attempt, contents, flight, frames_of, furnished, json, named, px4, run, stamps, until,
+};
 
 /// Files and folders that are not whole.
 fn parts(dir: &Path) -> Vec<String> {
@@ -44,7 +43,7 @@ fn a_full_disk_leaves_the_old_file_or_nothing() {
         }
         let old = fs::read(dir.path().join("old")).unwrap_or_default();
         // No file may be longer than 20 KiB: a write beyond that fails as on a full disk.
-        let limited = format!("ulimit -f 20; exec {program} {} --replace", line.replace("PX4", &tlog));
+        let limited = format!("ulimit -f 20; exec {program} {} --force", line.replace("PX4", &tlog));
         let output_of = Command::new("bash").args(["-c", &limited]).current_dir(dir.path()).output();
         let ended = output_of.expect("it runs");
         let said = String::from_utf8_lossy(&ended.stderr);
@@ -52,7 +51,6 @@ fn a_full_disk_leaves_the_old_file_or_nothing() {
         assert!(said.contains("cannot be written") && !said.contains("there is no folder"), "{line}: {said}");
         assert_eq!(fs::read(dir.path().join("old")).unwrap_or_default(), old, "{line}");
         assert_eq!(parts(dir.path()), Vec::<String>::new(), "{line}");
-        assert!(!dir.path().join("hums-kept").exists(), "{line}");
         if output == "new" {
             let left =
                 if dir.path().join("new").exists() { contents(&dir.path().join("new")) } else { Vec::new() };
@@ -88,13 +86,13 @@ fn what_is_written_beside_a_recording_may_fail_and_the_recording_goes_on() {
 #[test]
 fn a_killed_run_leaves_the_old_file_and_is_in_nobodys_way() {
     let dir = tempfile::tempdir().expect("directory");
-    let (old, part) = (dir.path().join("old.hum"), dir.path().join(".old.hum.hums-part"));
+    let old = dir.path().join("old.hum");
     let few: usize = frames_of(&px4())[..60].iter().map(|frame| 8 + frame.len()).sum();
     fs::write(dir.path().join("few.tlog"), &fs::read(px4()).expect("a recording")[..few]).expect("written");
     run(dir.path(), "pack few.tlog -o old.hum", 0);
     let before = fs::read(&old).expect("there");
     let mut program = Command::new(env!("CARGO_BIN_EXE_hums"))
-        .args(["pack", "-", "-o", "old.hum", "--replace"])
+        .args(["pack", "-", "-o", "old.hum", "--force"])
         .current_dir(dir.path())
         .stdin(Stdio::piped())
         .spawn()
@@ -102,75 +100,13 @@ fn a_killed_run_leaves_the_old_file_and_is_in_nobodys_way() {
     let tlog = fs::read(px4()).expect("a recording");
     let mut input = program.stdin.take().expect("it is piped");
     input.write_all(&tlog[..tlog.len() / 2]).expect("it reads");
-    until("it writes", || part.metadata().is_ok_and(|about| about.len() > 10_000));
-    // While it is written nobody else writes it.
-    let said = run(dir.path(), "pack PX4 -o old.hum --replace", 1);
-    assert!(String::from_utf8_lossy(&said.stderr).contains("another run of hums is writing it"));
+    let begun = |name: &String| fs::metadata(dir.path().join(name)).is_ok_and(|about| about.len() > 10_000);
+    until("it writes", || parts(dir.path()).first().is_some_and(begun));
     program.kill().expect("it is ours");
     program.wait().expect("it is ours");
     assert_eq!(fs::read(&old).expect("there"), before);
-    assert!(part.exists());
-    // What it has left may be somebody's: it stays, which is said.
-    let left = fs::read(&part).expect("there");
-    let said = run(dir.path(), "pack PX4 -o old.hum --replace", 0);
-    assert!(String::from_utf8_lossy(&said.stderr).contains("was left by a run that was killed"));
-    assert!(fs::read(&part).expect("there") == left);
-    assert!(fs::read(dir.path().join("hums-kept/1/old.hum")).expect("kept") == before);
+    run(dir.path(), "pack PX4 -o old.hum --force", 0);
     run(dir.path(), "verify old.hum", 0);
-}
-
-/// A recording with gaps, another one with others, and a whole one: each is decoded in the place of each, and killed at every
-/// rename.
-#[test]
-fn a_tlog_never_stands_without_its_gaps_nor_beside_those_of_another() {
-    let dir = tempfile::tempdir().expect("directory");
-    let at = |name: &str| dir.path().join(name);
-    run(dir.path(), "pack PX4 -o whole.hum", 0);
-    let log = fs::read(at("whole.hum")).expect("a log");
-    for (name, sector) in [("one", 150), ("two", 350)] {
-        let mut damaged = log.clone();
-        damaged[sector * 512 + 100] ^= 4;
-        fs::write(at(&format!("{name}.hum")), damaged).expect("written");
-    }
-    let pair =
-        |name: &str| [".tlog", ".tlog.gaps.csv"].map(|ending| fs::read(at(&format!("{name}{ending}"))).ok());
-    let of = ["one", "two", "whole"].map(|name| {
-        attempt(dir.path(), &format!("decode {name}.hum -o {name}.tlog --format tlog"));
-        (name, pair(name))
-    });
-    let has_strace = Command::new("strace").arg("-V").output().is_ok();
-    for [old, new] in [[0, 1], [0, 2], [2, 0]] {
-        let ((old, there), (new, made)) = (&of[old], &of[new]);
-        let begin = || {
-            let _ = fs::remove_dir_all(at("hums-kept"));
-            for ending in [".tlog", ".tlog.gaps.csv"] {
-                let _ = fs::remove_file(at(&format!("x{ending}")));
-                let _ = fs::copy(at(&format!("{old}{ending}")), at(&format!("x{ending}")));
-            }
-        };
-        let decode = ["decode", &format!("{new}.hum"), "-o", "x.tlog", "--format", "tlog", "--replace"]
-            .map(str::to_owned);
-        begin();
-        let said = String::from_utf8_lossy(&attempt(dir.path(), &decode.join(" ")).stderr).into_owned();
-        let kept: Vec<_> = said.lines().filter(|line| line.contains("is kept as")).collect();
-        assert!(kept[0].contains("x.tlog: what was there"), "{said}");
-        assert_eq!(pair("x"), *made);
-        for rename in (1..5).take_while(|_| has_strace) {
-            begin();
-            let inject = format!("inject=renameat2:signal=KILL:when={rename}");
-            let mut killed = Command::new("strace");
-            killed.args(["-f", "-o", "/dev/null", "-e", &inject, env!("CARGO_BIN_EXE_hums")]).args(&decode);
-            killed.current_dir(dir.path()).output().expect("it ends");
-            let now = pair("x");
-            assert!(now == *there || now == *made || now[0].is_none(), "{new} for {old}, rename {rename}");
-            // Nothing of the old ones is gone.
-            let all = contents(dir.path());
-            assert!(there.iter().flatten().all(|old| all.iter().any(|(_, bytes)| bytes == old)));
-            for part in parts(dir.path()) {
-                fs::remove_file(at(&part)).expect("ours");
-            }
-        }
-    }
 }
 
 #[test]
@@ -189,7 +125,7 @@ fn tables_of_a_killed_run_are_the_old_ones_or_the_new_ones() {
     let mut killed = 0;
     for after_ms in (0..60).step_by(6) {
         let mut program = Command::new(env!("CARGO_BIN_EXE_hums"))
-            .args(["decode", "log.hum", "-o", "out", "--format", "csv,parquet", "--replace"])
+            .args(["decode", "log.hum", "-o", "out", "--format", "csv,parquet", "--force"])
             .current_dir(dir.path())
             .stdout(Stdio::null())
             .spawn()
@@ -201,23 +137,16 @@ fn tables_of_a_killed_run_are_the_old_ones_or_the_new_ones() {
         for tables in [format!("{name}/"), "vehicle=".to_owned()] {
             let found = of(&now, &tables);
             assert!(
-                // None between the two renames.
-                found == of(&few, &tables) || found == of(&whole, &tables) || found.is_empty(),
+                // Old ones go one by one before the new ones take their place.
+                found == of(&whole, &tables) || found.iter().all(|file| few.contains(file)),
                 "{tables} after {after_ms} ms: {:?}",
                 found.iter().map(|(name, bytes)| (name, bytes.len())).collect::<Vec<_>>()
             );
         }
-        // The few are where they were, or kept.
-        for (name, bytes) in &few {
-            let is_it = |(other, there): &(String, Vec<u8>)| {
-                there == bytes && other.replace("hums-kept/1/", "") == *name
-            };
-            assert!(now.iter().any(is_it), "{name} after {after_ms} ms");
-        }
     }
     assert!(killed > 0);
-    run(dir.path(), "decode log.hum -o out --format csv,parquet --replace", 0);
-    let is_made = |(name, _): &(String, Vec<u8>)| !name.contains(".hums-part") && !name.contains("hums-kept");
+    run(dir.path(), "decode log.hum -o out --format csv,parquet --force", 0);
+    let is_made = |(name, _): &(String, Vec<u8>)| !name.contains(".hums-part");
     assert_eq!(contents(&out).into_iter().filter(is_made).collect::<Vec<_>>(), whole);
 }
 
@@ -248,103 +177,26 @@ fn two_flights() -> tempfile::TempDir {
     dir
 }
 
-/// The contents of all files, whatever they are called.
-fn bytes_of(dir: &Path) -> BTreeSet<Vec<u8>> {
-    let digest = |(_, bytes): (String, Vec<u8>)| sha2::Sha256::digest(bytes).to_vec();
-    contents(dir).into_iter().map(digest).collect()
-}
-
 #[test]
-fn a_demo_replaces_another_one_only_where_the_user_says_so_and_keeps_it() {
+fn a_demo_replaces_another_one_only_where_the_user_says_so() {
     let dir = two_flights();
     let at = |name: &str| dir.path().join("demo").join(name);
     demo_ends(dir.path(), "one.tlog", &[], 0);
-    // The same again, and what the user has put beside it.
-    for path in ["mine.tlog", "decoded/mine.csv"] {
-        fs::write(at(path), "mine").expect("written");
-    }
+    fs::write(at("mine.tlog"), "mine").expect("written");
     let before = stamps(&dir.path().join("demo"));
-    demo_ends(dir.path(), "one.tlog", &[], 0);
-    assert!(stamps(&dir.path().join("demo")) == before);
-    // Another one, what cannot be recorded, and what is a demo's own.
-    let mut made =
-        fs::read_dir(at("decoded")).expect("a folder").map(|entry| entry.expect("an entry").path());
-    let tlog = made.find(|path| path.extension().is_some_and(|of| of == "tlog")).expect("a tlog");
     fs::write(dir.path().join("notes.txt"), "no recording").expect("written");
-    for (input, flag, code) in [
-        ("two.raw", None, 1),
-        ("nosuch.tlog", Some("--replace"), 1),
-        ("notes.txt", Some("--replace"), 1),
-        ("demo", Some("--replace"), 1),
-        (tlog.to_str().expect("UTF-8"), Some("--replace"), 2),
-        ("demo/card.img", Some("--replace"), 2),
-    ] {
-        let ended =
-            demo(dir.path(), input, flag.as_slice()).stdout(Stdio::piped()).output().expect("it runs");
-        let [said, told] = [ended.stderr, ended.stdout].map(|of| String::from_utf8_lossy(&of).into_owned());
-        assert_eq!(ended.status.code(), Some(code), "{input}: {said}");
-        assert!(stamps(&dir.path().join("demo")) == before, "{input}: {said}");
-        assert!(input != "two.raw" || !told.contains("1. two.raw"), "it is refused first: {told}");
+    for (input, flag, code) in
+        [("two.raw", None, 1), ("nosuch.tlog", Some("--force"), 1), ("demo/card.img", Some("--force"), 2)]
+    {
+        let said = demo_ends(dir.path(), input, flag.as_slice(), code);
         assert!(
-            input != "two.raw" || said.contains("card.img: is there already") && said.contains("--replace")
+            input != "two.raw" || said.contains("card.img: exists") && said.contains("--force"),
+            "{said}"
         );
+        assert!(input == "nosuch.tlog" || stamps(&dir.path().join("demo")) == before, "{input}");
     }
-    let was = bytes_of(dir.path());
-    demo_ends(dir.path(), "two.raw", &["--replace"], 0);
-    assert!(bytes_of(dir.path()).is_superset(&was) && fs::read(at("mine.tlog")).expect("there") == b"mine");
-    for name in ["card.img", "ground-station.bin", "report.html"] {
-        assert!(at("hums-kept/1").join(name).exists(), "{name}");
-        // What no demo made stays too.
-        let was = fs::read(at(name)).expect("there");
-        fs::write(at(name), "evidence").expect("written");
-        demo_ends(dir.path(), "two.raw", &[], 1);
-        assert_eq!(fs::read(at(name)).expect("there"), b"evidence");
-        fs::write(at(name), was).expect("written");
-    }
-    // Without the card that a demo makes first, nothing is a demo's.
-    fs::rename(at("card.img"), at("mine.img")).expect("renamed");
-    let before = stamps(&dir.path().join("demo"));
-    let said = demo_ends(dir.path(), "two.raw", &[], 1);
-    assert!(said.contains("ground-station.bin: is there already with other content"), "{said}");
-    assert!(stamps(&dir.path().join("demo")) == before);
-}
-
-#[test]
-fn a_demo_that_is_killed_takes_nothing_of_an_earlier_one_away_and_is_in_nobodys_way() {
-    let dir = two_flights();
-    let mine = dir.path().join("demo/.card.img.hums-part");
-    fs::create_dir(dir.path().join("demo")).expect("made");
-    fs::write(&mine, "mine").expect("written");
-    let begun = Instant::now();
-    demo_ends(dir.path(), "one.tlog", &[], 0);
-    let lasts = begun.elapsed();
-    // Also in the moments in which the outputs get their names, near the end.
-    let mut was = bytes_of(&dir.path().join("demo"));
-    for tenth in [1, 3, 5, 7, 8, 9] {
-        let mut killed = demo(dir.path(), "two.raw", &["--replace"]).spawn().expect("it runs");
-        std::thread::sleep(lasts * tenth / 10);
-        killed.kill().expect("it is ours");
-        killed.wait().expect("it is ours");
-        let now = bytes_of(&dir.path().join("demo"));
-        assert!(now.is_superset(&was), "{tenth}");
-        was = now;
-    }
-    demo_ends(dir.path(), "two.raw", &["--replace"], 0);
-    assert_eq!(fs::read(&mine).expect("there"), b"mine");
-}
-
-#[test]
-fn of_two_demos_in_one_folder_one_is_refused_and_the_other_is_whole() {
-    let dir = two_flights();
-    let alone = tempfile::tempdir().expect("directory");
-    fs::copy(dir.path().join("one.tlog"), alone.path().join("one.tlog")).expect("copied");
-    demo_ends(alone.path(), "one.tlog", &[], 0);
-    let mut first = demo(dir.path(), "one.tlog", &["--replace"]).spawn().expect("it runs");
-    until("it has begun", || dir.path().join("demo/.card.img.hums-part").exists());
-    let said = demo_ends(dir.path(), "two.raw", &["--replace"], 1);
-    assert!(said.contains("demo: another run of hums is writing it; wait for its end"), "{said}");
-    assert!(first.wait().expect("it ends").success());
-    assert!(contents(&dir.path().join("demo")) == contents(&alone.path().join("demo")));
+    demo_ends(dir.path(), "one.tlog", &["--force"], 0);
+    assert_eq!(fs::read(at("mine.tlog")).expect("there"), b"mine");
 }
 
 #[test]
@@ -374,13 +226,11 @@ fn what_came_live_before_a_kill_is_there_and_no_command_takes_it_away() {
         run(dir.path(), line, 1);
         assert!(fs::read(&tap).expect("there") == sent, "{line}");
     }
-    run(dir.path(), "report log.hum -o tap.bin --replace", 0);
-    assert!(fs::read(dir.path().join("hums-kept/1/tap.bin")).expect("kept") == sent);
     assert_eq!(parts(dir.path()), Vec::<String>::new());
 }
 
 #[test]
-fn what_is_not_whole_or_was_replaced_in_a_folder_is_passed_over_and_told() {
+fn what_is_not_whole_in_a_folder_is_passed_over_and_told() {
     let dir = tempfile::tempdir().expect("directory");
     run(dir.path(), "pack PX4 -o log.hum", 0);
     let folder = dir.path().join("folder");
@@ -388,23 +238,13 @@ fn what_is_not_whole_or_was_replaced_in_a_folder_is_passed_over_and_told() {
     for name in ["00001_00.HUM", ".00002_00.HUM.hums-part", ".00003_00.HUM.pull.hums-part"] {
         fs::copy(dir.path().join("log.hum"), folder.join(name)).expect("copied");
     }
-    fs::create_dir_all(folder.join("hums-kept/1")).expect("made");
-    fs::copy(dir.path().join("log.hum"), folder.join("hums-kept/1/00001_00.HUM")).expect("copied");
-    let logs = "folder/00001_00.HUM folder/hums-kept";
     for line in ["verify IN", "info IN", "check IN", "report IN -o pages/", "decode IN -o out/ --format tlog"]
     {
         let said = run(dir.path(), &line.replace("IN", "folder"), 0);
         let said = String::from_utf8_lossy(&said.stderr);
         assert_eq!(said.matches("has not ended, and is passed over").count(), 3, "{line}: {said}");
-        assert_eq!(said.matches("keeps what --replace has replaced").count(), 1, "{line}: {said}");
-        // As a shell names it with all others.
-        let said = run(dir.path(), &line.replace("IN", logs), 0);
-        let said = String::from_utf8_lossy(&said.stderr);
-        assert_eq!(said.matches("keeps what --replace has replaced").count(), 1, "{line}: {said}");
     }
     assert_eq!(all_named(&dir.path().join("out"), "00001").len(), 1);
-    // Named by itself it is read.
-    run(dir.path(), "verify folder/hums-kept", 0);
 }
 
 #[test]
@@ -460,4 +300,20 @@ fn a_signal_while_it_starts_ends_the_writing_of_a_recording_with_words() {
     std::io::Read::read_to_string(live.stderr.as_mut().expect("piped"), &mut said).expect("text");
     assert_eq!(live.wait().expect("it ends").code(), Some(3), "{said}");
     assert!(said.contains("it was ended while it was read; the rest is not in the database"), "{said}");
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_standard_error_on_a_full_disk_ends_nothing() {
+    let dir = furnished();
+    let shell = |line: &str| {
+        let hums = format!("hums() {{ {} \"$@\"; }}; {line}", env!("CARGO_BIN_EXE_hums"));
+        Command::new("bash").args(["-c", &hums]).current_dir(dir.path()).status().expect("a shell").code()
+    };
+    assert_eq!(shell("hums ls nosuch 2> /dev/full"), Some(1));
+    // What is said in flight cannot be said: the card has all of it.
+    let line = "hums sim --input flight.tlog --sd card.img --card-size 34 --tap /dev/full 2> /dev/full";
+    assert_eq!(shell(line), Some(3));
+    assert_eq!(shell("hums decode card.img -o all.tlog --format tlog"), Some(0));
+    assert_eq!(frames_of(&dir.path().join("all.tlog")).len(), frames_of(&px4()).len());
 }

@@ -76,7 +76,7 @@ fn whole_and_cut() -> TempDir {
 }
 
 #[test]
-fn what_is_there_is_not_replaced_by_other_content_unless_the_user_says_so() {
+fn an_output_that_exists_is_overwritten_with_force_only_by_every_format() {
     let dir = whole_and_cut();
     let out = dir.path().join("out");
     for line in ["decode LOG -o out --format tlog,jsonl,influx,csv,thesis", "report LOG -o out/"] {
@@ -84,61 +84,39 @@ fn what_is_there_is_not_replaced_by_other_content_unless_the_user_says_so() {
             |log: &str, more: &str| format!("{} {more}", line.replace("LOG", &format!("{log}/log.hum")));
         run(dir.path(), &line("whole", ""), 0);
         let made = contents(&out);
-        run(dir.path(), &line("whole", ""), 0);
-        assert_eq!(contents(&out), made, "the same again");
-        let kept = |line: &str| {
+        let refused = |line: &str| {
             let said = String::from_utf8_lossy(&run(dir.path(), line, 1).stderr).into_owned();
-            assert!(said.contains("is there already with other content, and was not replaced"), "{said}");
-            assert!(said.contains("--replace"), "{said}");
+            assert!(said.contains("exists, and was not overwritten") && said.contains("--force"), "{said}");
             assert!(contents(&out) == made, "{line} changed something");
         };
-        kept(&line("cut", ""));
-        if line("", "").starts_with("decode") {
-            kept(&line("whole", "--from 20"));
-            kept(&line("whole", "--message ATTITUDE"));
-        }
+        refused(&line("cut", ""));
+        refused(&line("whole", ""));
         // Each format by itself, so that none hides behind another.
         for format in ["tlog", "jsonl", "influx", "csv", "thesis"] {
             if line("", "").starts_with("decode") {
-                kept(&format!("decode cut/log.hum -o out --format {format}"));
+                refused(&format!("decode cut/log.hum -o out --format {format}"));
             }
         }
-        // With it the part takes its place, and the whole is kept.
-        run(dir.path(), &line("cut", "--replace"), 3);
-        let [kept, cut] = kept_and_made(&out);
-        assert!(kept == made && cut != made);
-        run(dir.path(), &line("whole", "--replace"), 0);
-        let [_, again] = kept_and_made(&out);
-        assert!(again == made, "a table of the part is left");
+        run(dir.path(), &line("cut", "--force"), 3);
+        assert!(contents(&out) != made);
+        run(dir.path(), &line("whole", "--force"), 0);
+        assert!(contents(&out) == made, "a table of the part is left");
         fs::remove_dir_all(&out).expect("removed");
     }
     // Parquet tables of two parts of a session never lie side by side: a query reads all that is there.
     run(dir.path(), "decode cut/log.hum -o fleet --format parquet", 3);
     run(dir.path(), "decode whole/log.hum -o fleet --format parquet", 1);
-    run(dir.path(), "decode whole/log.hum -o fleet --format parquet --replace", 0);
+    run(dir.path(), "decode whole/log.hum -o fleet --format parquet --force", 0);
     let fleet = dir.path().join("fleet");
     let before = contents(&fleet);
     run(dir.path(), "decode whole/log.hum -o fleet --format parquet --message ATTITUDE", 1);
-    run(dir.path(), "decode cut/log.hum -o fleet --format parquet", 1);
     assert!(contents(&fleet) == before);
-    // What is kept lies deeper than `fleet/*/*/*/TABLE.parquet`, by which a query names a table.
-    let at_depth = |depth| move |session: &PathBuf| session.components().count() == depth;
-    let sessions = parquet_sessions(&fleet);
-    assert_eq!((sessions.len(), sessions.iter().filter(|session| at_depth(3)(session)).count()), (2, 1));
-}
-
-/// What a folder's outputs were before the last run with `--replace`, and what they are now. What is no folder's own lies in
-/// folders of its own below it.
-fn kept_and_made(out: &Path) -> [Vec<(String, Vec<u8>)>; 2] {
-    let all = contents(out);
-    let (kept, made): (Vec<_>, Vec<_>) = all.into_iter().partition(|(name, _)| name.contains("hums-kept/"));
-    let own = |(name, bytes): (String, Vec<u8>)| (name.replace("hums-kept/1/", ""), bytes);
-    [kept.into_iter().map(own).collect(), made]
+    assert_eq!(parquet_sessions(&fleet).len(), 1);
 }
 
 /// Every command that has the flag, found by the definition of the command line, with every format of its.
 #[test]
-fn what_is_replaced_is_kept_byte_for_byte_by_every_command() {
+fn every_command_with_the_flag_makes_the_same_again_with_it() {
     let mut root = Cli::command();
     root.build();
     let mut commands = Vec::new();
@@ -146,7 +124,7 @@ fn what_is_replaced_is_kept_byte_for_byte_by_every_command() {
     let mut tried = Vec::new();
     for (command, path) in &commands {
         let of = |name: &str| command.get_arguments().find(|arg| arg.get_id() == name);
-        if of("replace").is_none() {
+        if of("force").is_none() {
             continue;
         }
         let Some(output) = of("output") else {
@@ -165,38 +143,26 @@ fn what_is_replaced_is_kept_byte_for_byte_by_every_command() {
         }));
         let line = words(command, path, &given).join(" ");
         run(dir.path(), &line, 0);
-        // What the user has made of it.
         let made = contents(&out);
-        for (name, bytes) in &made {
-            fs::write(out.join(name), [bytes.as_slice(), b"mine"].concat()).expect("written");
-        }
-        let changed = contents(&out);
         let said = run(dir.path(), &line, 1);
-        assert!(contents(&out) == changed, "{line}");
-        assert!(String::from_utf8_lossy(&said.stderr).contains("or say --replace"));
-        let said = run(dir.path(), &format!("{line} --replace"), 0);
-        let [kept, again] = kept_and_made(&out);
-        assert!(kept == changed && again == made, "{line}");
-        assert!(String::from_utf8_lossy(&said.stderr).contains("what was there is kept as new"), "{line}");
-        // And the same again changes nothing.
-        let before = stamps(&out);
-        let said = run(dir.path(), &format!("{line} --replace"), 0);
-        assert!(stamps(&out) == before, "{line}");
-        assert!(!String::from_utf8_lossy(&said.stderr).contains("is kept"), "{line}");
+        assert!(contents(&out) == made, "{line}");
+        assert!(String::from_utf8_lossy(&said.stderr).contains("or say --force"));
+        run(dir.path(), &format!("{line} --force"), 0);
+        assert!(contents(&out) == made, "{line}");
         tried.push(path[0]);
     }
     assert_eq!(tried, ["decode", "report", "pack"]);
 }
 
 #[test]
-fn a_slip_in_the_name_of_an_output_costs_no_recording_with_any_flag() {
+fn a_slip_in_the_name_of_an_output_costs_no_recording() {
     let dir = furnished();
     run(dir.path(), "sim --input PX4 --sd card.img --card-size 64", 0);
     let at = |name: &str| dir.path().join(name);
     fs::write(at("thesis.txt"), "months of work").expect("written");
     // What a port sent, and a log off the card: originals of the kinds that the commands make.
     fs::write(at("gs"), frames_of(&px4())[..50].concat()).expect("written");
-    let (before, whole) = (stamps(dir.path()), contents(dir.path()));
+    let before = stamps(dir.path());
     let names = ["card.img", "thesis.txt", "hums.elf", "flight.tlog", "gs", "log.hum"];
     for line in [
         "decode folder/log.hum -o OUT --format tlog",
@@ -206,22 +172,13 @@ fn a_slip_in_the_name_of_an_output_costs_no_recording_with_any_flag() {
         "sim --input folder/flight.tlog --sd new.img --tap OUT",
     ] {
         for name in names {
-            // A log that was packed of the same recording is the same again.
-            if line.starts_with("pack") && name == "log.hum" {
-                continue;
-            }
             let line = line.replace("OUT", name);
             let said = run(dir.path(), &line, 1);
             assert!(stamps(dir.path()) == before, "{line}");
             // What has no such flag does not advise it.
             let said = String::from_utf8_lossy(&said.stderr);
-            assert_eq!(said.contains("--replace"), !line.starts_with("sim"), "{line}: {said}");
+            assert_eq!(said.contains("--force"), !line.starts_with("sim"), "{line}: {said}");
         }
-    }
-    for name in names {
-        run(dir.path(), &format!("report folder/log.hum -o {name} --replace"), 0);
-        let (_, was) = whole.iter().find(|(other, _)| other == name).expect("it was there");
-        assert!(fs::read(at("hums-kept/1").join(name)).expect("kept") == *was, "{name}");
     }
     let said = run(dir.path(), "sim --input PX4 --sd new.img --gs both --tap ./both", 2);
     assert!(String::from_utf8_lossy(&said.stderr).contains("are one file"));
@@ -229,7 +186,7 @@ fn a_slip_in_the_name_of_an_output_costs_no_recording_with_any_flag() {
 
 /// Two cards have an equal log; the trend on its page is that of its card.
 #[test]
-fn pages_of_equal_sessions_of_two_cards_replace_each_other_and_both_are_there() {
+fn a_page_of_an_equal_session_of_another_card_is_refused() {
     let dir = tempfile::tempdir().expect("directory");
     for folder in ["one", "two"] {
         fs::create_dir(dir.path().join(folder)).expect("made");
@@ -245,38 +202,9 @@ fn pages_of_equal_sessions_of_two_cards_replace_each_other_and_both_are_there() 
     let one = page("one", "", 0);
     assert!(page("two", "", 1) == one);
     // Of two in one folder it is told that no card gave them their numbers.
-    let two = page("two", "--replace", 3);
+    let two = page("two", "--force", 3);
     assert!(two != one);
-    assert!(fs::read(dir.path().join("hums-kept/1/page.html")).expect("kept") == one);
-    assert!(page("one", "--replace", 0) == one);
-    assert!(fs::read(dir.path().join("hums-kept/2/page.html")).expect("kept") == two);
-}
-
-#[test]
-fn a_command_with_all_files_of_a_folder_can_be_called_again() {
-    let dir = tempfile::tempdir().expect("directory");
-    fs::copy(px4(), dir.path().join("flight.tlog")).expect("a copy");
-    run(dir.path(), "pack flight.tlog -o log.hum", 0);
-    for line in ["decode * -o . --format tlog,csv,jsonl,influx,parquet,thesis", "report * -o ./"] {
-        // As a shell puts it there: without what begins with a dot.
-        let all = || -> String {
-            let entries = fs::read_dir(dir.path()).expect("a directory");
-            let names =
-                entries.map(|entry| entry.expect("an entry").file_name().to_string_lossy().into_owned());
-            let mut names: Vec<String> = names.filter(|name| !name.starts_with('.')).collect();
-            names.sort();
-            line.replace('*', &names.join(" "))
-        };
-        run(dir.path(), &all(), 0);
-        let made = contents(dir.path());
-        let said = String::from_utf8_lossy(&run(dir.path(), &all(), 0).stderr).into_owned();
-        assert!(said.contains("and is passed over"), "{said}");
-        assert!(line.starts_with("report") || said.contains("is what this command makes of"), "{said}");
-        assert!(line.starts_with("report") || contents(dir.path()) == made);
-        // An output that was changed is not replaced, and no input either.
-        run(dir.path(), &format!("{} --replace", all()), 0);
-        assert!(line.starts_with("report") || contents(dir.path()) == made);
-    }
+    assert!(page("one", "--force", 0) == one);
 }
 
 #[test]
@@ -289,7 +217,7 @@ fn gaps_of_an_earlier_copy_do_not_stay_beside_a_tlog_without_gaps() {
     fs::write(dir.path().join("log.hum"), damaged).expect("written");
     let line = "decode log.hum -o back.tlog --format tlog";
     run(dir.path(), line, 3);
-    run(dir.path(), line, 3);
+    run(dir.path(), &format!("{line} --force"), 3);
     let gaps = dir.path().join("back.tlog.gaps.csv");
     assert!(gaps.exists());
     fs::write(dir.path().join("log.hum"), log).expect("written");
@@ -297,21 +225,8 @@ fn gaps_of_an_earlier_copy_do_not_stay_beside_a_tlog_without_gaps() {
     fs::remove_file(dir.path().join("back.tlog")).expect("removed");
     run(dir.path(), line, 1);
     assert!(gaps.exists() && !dir.path().join("back.tlog").exists());
-    // A link in the place of the folder is followed nowhere.
-    fs::create_dir(dir.path().join("elsewhere")).expect("made");
-    std::os::unix::fs::symlink("elsewhere", dir.path().join("hums-kept")).expect("a link");
-    let said = String::from_utf8_lossy(&run(dir.path(), &format!("{line} --replace"), 1).stderr).into_owned();
-    assert!(said.contains("and that is a link; nothing was replaced") && gaps.exists(), "{said}");
-    fs::remove_file(dir.path().join("hums-kept")).expect("removed");
-    // What the user has noted in it is kept, and lies beside the tlog of these gaps.
-    fs::write(dir.path().join("back.tlog"), "those gaps'").expect("written");
-    fs::write(&gaps, "my remarks").expect("written");
-    run(dir.path(), &format!("{line} --replace"), 0);
-    assert!(!gaps.exists());
-    let kept = contents(&dir.path().join("hums-kept/1"));
-    let is = |place: usize| kept.get(place).map(|(name, bytes)| (name.as_str(), bytes.as_slice()));
-    assert_eq!(is(0), Some(("back.tlog", &b"those gaps'"[..])));
-    assert_eq!(is(1), Some(("back.tlog.gaps.csv", &b"my remarks"[..])));
+    run(dir.path(), &format!("{line} --force"), 0);
+    assert!(!gaps.exists() && dir.path().join("back.tlog").exists());
 }
 
 #[test]
@@ -369,18 +284,4 @@ fn tables_that_would_lie_below_a_file_are_refused_in_every_format() {
         assert!(told.contains("is a file, and a directory is needed there"), "{output} {format}: {told}");
     }
     assert_eq!(fs::read(dir.path().join("notes.txt")).expect("there"), b"mine");
-}
-
-#[test]
-fn the_folder_in_which_it_runs_is_not_replaced() {
-    let dir = tempfile::tempdir().expect("directory");
-    run(dir.path(), "pack PX4 -o log.hum", 0);
-    run(dir.path(), "decode log.hum -o out --format csv --to 30", 0);
-    let inside = dir.path().join("out").join(named(&dir.path().join("out"), "log"));
-    let before = contents(dir.path());
-    let said = run(&inside, "decode ../../log.hum -o .. --format csv --to 20 --replace", 1);
-    let said = String::from_utf8_lossy(&said.stderr).into_owned();
-    assert!(said.contains("nothing was replaced; run it from another folder"), "{said}");
-    assert_eq!(contents(dir.path()), before);
-    run(&dir.path().join("out"), "decode ../log.hum -o . --format csv --to 20 --replace", 0);
 }

@@ -92,7 +92,7 @@ fn ratios(hums: &Path, python: &Path, recording: &Path) -> Result<()> {
     let out = dir.path().join("out");
     let decode = fastest(RUNS, || {
         let mut command = Command::new(hums);
-        command.arg("decode").arg(&log).arg("-o").arg(&out).args(["--replace", "--format", "csv"]);
+        command.arg("decode").arg(&log).arg("-o").arg(&out).args(["--force", "--format", "csv"]);
         for name in &types {
             command.args(["--message", name]);
         }

@@ -384,10 +384,10 @@ fn pull(ftp: &mut Ftp, name: &str, output: &Path) -> Result<Option<(PathBuf, boo
     let there = there(ftp, name, &path, length)?;
     let mut part = Part::there(&path, length / SECTOR_BYTES as u32, &heading.sectors)?;
     if there == There::Whole {
-        part.map_or(Ok(()), |part| part.finish(&path))?;
+        part.map_or(Ok(()), Part::finish)?;
         return Ok(Some((path, false)));
     }
-    let (mut file, _) = Output::resume(&path)?;
+    let mut file = Output::resume(&path)?;
     let (mut have, mut likeness) = begun(ftp, name, &mut file, length)?;
     if let There::Beginning(bytes) = there
         && have < bytes
@@ -411,7 +411,7 @@ fn pull(ftp: &mut Ftp, name: &str, output: &Path) -> Result<Option<(PathBuf, boo
         return Err(why);
     }
     file.finish()?;
-    part.map_or(Ok(()), |part| part.finish(&path))?;
+    part.map_or(Ok(()), Part::finish)?;
     Ok(Some((path, true)))
 }
 
@@ -426,11 +426,8 @@ fn complete(
 ) -> Result<()> {
     fetch(ftp, name, file, have, length, part)?;
     if !is_whole(ftp, name, file, length)? {
-        let aside = file.set_aside()?;
-        note!(
-            "{name}: what came differs from the board's log; once more from its beginning, and what came stays as {}",
-            aside.display()
-        );
+        file.begin_anew()?;
+        note!("{name}: what came differs from the board's log; once more from its beginning");
         length = ftp.open(name)?.min(length);
         check_same(heading, &heading_of(ftp, name, length)?)?;
         fetch(ftp, name, file, 0, length, None)?;
@@ -441,11 +438,11 @@ fn complete(
             );
         }
     }
-    if let Err(other) = check_same(heading, &heading_here(file.part(), name, length)?) {
-        file.set_aside()?;
-        return Err(other);
+    let same = check_same(heading, &heading_here(file.part(), name, length)?);
+    if same.is_err() {
+        file.begin_anew()?;
     }
-    Ok(())
+    same
 }
 
 /// Says of what came of a log that did not come whole how good it is.
@@ -476,13 +473,11 @@ fn check_same(first: &Heading, now: &Heading) -> Result<()> {
     match (first.session, now.session) {
         (first, now) if first == now => Ok(()),
         (_, Some(_)) => bail!(
-            "another log has come in its place while it was read, {}: nothing of it has the first one's name; what came is kept in \
-             hums-kept: call again",
+            "another log has come in its place while it was read, {}: nothing of it has the first one's name: call again",
             now.name
         ),
         (_, None) => bail!(
-            "its beginning can no longer be read on the board, so nothing tells whether it is the same log still; what came is \
-             kept in hums-kept: call again"
+            "its beginning can no longer be read on the board, so nothing tells whether it is the same log still: call again"
         ),
     }
 }
@@ -528,8 +523,7 @@ fn there(ftp: &mut Ftp, name: &str, path: &Path, length: u32) -> Result<There> {
     }
 }
 
-/// How much of the log an earlier run has left that can be gone on with, and what says so; what is of another log is set
-/// aside.
+/// How much of the log an earlier run has left that can be gone on with, and what says so; what is of another log goes.
 fn begun(ftp: &mut Ftp, name: &str, file: &mut Output, length: u32) -> Result<(u32, Likeness)> {
     let part = file.part().to_owned();
     let bytes = u32::try_from(part.metadata()?.len()).unwrap_or(u32::MAX);
@@ -537,8 +531,8 @@ fn begun(ftp: &mut Ftp, name: &str, file: &mut Output, length: u32) -> Result<(u
     if likeness != Likeness::Other {
         return Ok((bytes, likeness));
     }
-    let aside = file.set_aside()?;
-    note!("{name}: what was begun was changed; it begins anew, and that stays as {}", aside.display());
+    file.begin_anew()?;
+    note!("{name}: what was begun is not the beginning of the board's log; it begins anew");
     Ok((0, likeness))
 }
 
