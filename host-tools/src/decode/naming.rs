@@ -90,7 +90,7 @@ pub enum Named {
 pub struct Names {
     /// The indices of logs, by session and content.
     known: BTreeMap<(Option<u32>, [u8; 16]), usize>,
-    of_session: BTreeMap<Option<u32>, u32>,
+    of_session: BTreeMap<u32, u32>,
     taken: BTreeMap<String, u32>,
 }
 
@@ -101,12 +101,16 @@ impl Names {
             return Named::Copy(*first);
         }
         self.known.insert((traits.session, traits.fingerprint), index);
-        let count = self.of_session.entry(traits.session).or_default();
-        *count += 1;
+        // A recording without a session's number is named by its bytes, which no other one has.
+        let nth = traits.session.map_or(1, |session| {
+            let count = self.of_session.entry(session).or_default();
+            *count += 1;
+            *count
+        });
         let name = traits.name(log);
         let of_name = self.taken.entry(name.clone()).or_default();
         *of_name += 1;
-        Named::As(if *of_name > 1 { format!("{name}-{of_name}") } else { name }, *count)
+        Named::As(if *of_name > 1 { format!("{name}-{of_name}") } else { name }, nth)
     }
 }
 

@@ -44,8 +44,9 @@ const ELSE_REFUSED: [(&str, &str, &str, &str); 2] = [
 ];
 
 /// Commands that have inputs and write no file, or outputs and no input, and why there is no pair to try.
-const NO_PAIRS: [(&str, &str); 11] = [
+const NO_PAIRS: [(&str, &str); 12] = [
     ("check", "prints"),
+    ("live", "shows and sends"),
     ("ls", "prints"),
     ("completions", "prints"),
     ("man", "prints"),
