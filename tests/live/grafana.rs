@@ -1,6 +1,5 @@
-//! The dashboards in `host-tools/grafana`, for each kind of database: whole by Grafana's own schema and by what it leaves
-//! open, the same for all but for what they ask, and asking for what the points have; the databases that can be had answer
-//! each query, as `writes` shows.
+//! The dashboards of `host-tools/grafana`, for each kind of database: whole by Grafana's own schema and by what it leaves
+//! open, and asking for what the points have; the databases that can be had answer each query, as `writes` shows.
 #![cfg(feature = "oracle")]
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -10,6 +9,9 @@ use hums_tests::flights::{own, root};
 use hums_tests::oracle;
 use hums_tests::program::hums;
 use serde_json::{Value, json};
+
+#[path = "../../host-tools/grafana/resolve.rs"]
+mod resolve;
 
 /// A folder of dashboards: the type of their data source, the member that is the query, and what each query has.
 pub(crate) type Kind = (&'static str, &'static str, &'static str, &'static [&'static str]);
@@ -67,13 +69,14 @@ const PANELS: [&str; 22] = [
 
 const NAMES: [&str; 2] = ["flight.json", "health.json"];
 
-fn path_of(kind: Kind, name: &str) -> std::path::PathBuf {
-    root().join("host-tools/grafana").join(kind.0).join(name)
+fn read(name: &str) -> String {
+    fs::read_to_string(root().join("host-tools/grafana").join(name)).unwrap()
 }
 
 pub(crate) fn dashboards(kind: Kind) -> Vec<(String, Value)> {
-    let read = |name| serde_json::from_str(&fs::read_to_string(path_of(kind, name)).unwrap()).unwrap();
-    NAMES.map(|name| (format!("{}/{name}", kind.0), read(name))).to_vec()
+    let database = resolve::DATABASES.into_iter().find(|(database, _)| *database == kind.0).unwrap();
+    let made = |name| resolve::resolve(&serde_json::from_str(&read(name)).unwrap(), database).unwrap();
+    NAMES.map(|name| (format!("{}/{name}", kind.0), made(name))).to_vec()
 }
 
 pub(crate) fn panels(dashboard: &Value) -> &Vec<Value> {
@@ -86,15 +89,20 @@ fn queries(kind: Kind, panel: &Value) -> impl Iterator<Item = &str> {
 
 #[test]
 fn grafanas_own_model_takes_every_member_of_the_dashboards() {
-    let paths = KINDS.map(|kind| NAMES.map(|name| path_of(kind, name))).concat();
+    let dir = tempfile::tempdir().unwrap();
+    let all = KINDS.map(dashboards).concat();
+    let write = |(name, dashboard): &(String, Value)| {
+        let path = dir.path().join(name.replace('/', "-"));
+        fs::write(&path, dashboard.to_string()).unwrap();
+        path
+    };
+    let paths: Vec<_> = all.iter().map(write).collect();
     let said = oracle::grafana(&paths);
     assert_eq!(said["told"], json!([]), "Grafana has other members or types");
-    let all = KINDS.map(dashboards).concat();
     let count: usize = all.iter().map(|(_, dashboard)| panels(dashboard).len()).sum();
     assert_eq!(said["panels"], count);
 
     // That silence means something: each slip is told.
-    let dir = tempfile::tempdir().unwrap();
     let (_, whole) = dashboards(FLUX).swap_remove(0);
     let place = panels(&whole).iter().position(|panel| panel["type"] == "stat").unwrap();
     let slips: [(&str, Value); 6] = [
@@ -124,7 +132,7 @@ fn grafanas_own_model_takes_every_member_of_the_dashboards() {
 }
 
 fn compose() -> String {
-    fs::read_to_string(root().join("host-tools/grafana/compose.yaml")).unwrap()
+    read("compose.yaml")
 }
 
 #[test]
@@ -136,7 +144,7 @@ fn the_dashboards_are_whole() {
 
 fn are_whole(kind: Kind) {
     let source = json!({ "type": kind.1, "uid": "hums" });
-    let file = fs::read_to_string(path_of(kind, "datasource.yaml")).unwrap();
+    let file = read(&format!("{}/datasource.yaml", kind.0));
     assert!(file.contains("uid: hums\n") && file.contains(&format!("type: {}\n", kind.1)), "{}", kind.0);
     let mut uids = BTreeSet::new();
     for (name, dashboard) in dashboards(kind) {
@@ -181,32 +189,6 @@ fn are_whole(kind: Kind) {
         }
     }
     assert_eq!(uids.len(), 2);
-}
-
-/// What a database needs otherwise: what is asked of it, what its answers are called, and how they are put together.
-const ITS_OWN: [&str; 4] = ["datasource", "targets", "transformations", "description"];
-
-#[test]
-fn the_dashboards_of_all_databases_are_the_same_but_for_what_they_ask() {
-    let bare = |(_, mut dashboard): (String, Value)| {
-        for panel in dashboard["panels"].as_array_mut().unwrap() {
-            let panel = panel.as_object_mut().unwrap();
-            panel.retain(|member, _| !ITS_OWN.contains(&member.as_str()));
-            if let Some(config) = panel.get_mut("fieldConfig") {
-                config["overrides"].take();
-                config["defaults"].as_object_mut().unwrap().retain(|member, value| {
-                    member != "mappings" && !value.as_str().is_some_and(|text| text.contains("${__field"))
-                });
-            }
-        }
-        for variable in dashboard["templating"]["list"].as_array_mut().unwrap() {
-            variable.as_object_mut().unwrap().retain(|member, _| member != "query" && member != "datasource");
-        }
-        dashboard
-    };
-    let all = KINDS.map(|kind| dashboards(kind).into_iter().map(bare).collect::<Vec<_>>());
-    assert_eq!(all[0], all[1]);
-    assert_eq!(all[0], all[2]);
 }
 
 #[test]

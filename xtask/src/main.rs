@@ -13,6 +13,7 @@ mod firmware;
 mod flash;
 mod foreign;
 mod fuzz;
+mod grafana;
 mod hums;
 mod image;
 mod oracle;
@@ -59,6 +60,7 @@ cargo xtask COMMAND
   size                           flash and RAM of all boards against budgets.toml
   costs                          cycles, load and stack, on the model of the chip, against budgets.toml
   setup [--dry-run]              install what demo and test need, or only say what is missing
+  grafana                        make the dashboards of each database in host-tools/grafana
   manifest                       make tests/flights/manifest.json anew with pymavlink
   help                           this text
 
@@ -97,6 +99,7 @@ enum Command {
     Size,
     Costs,
     Setup { dry_run: bool },
+    Grafana,
     Manifest,
     Help,
 }
@@ -133,11 +136,12 @@ impl Command {
                 ["--dry-run"] => Ok(Self::Setup { dry_run: true }),
                 _ => bail!("setup takes nothing or --dry-run"),
             },
-            "size" | "costs" | "manifest" | "help" | "--help" | "-h" if !rest.is_empty() => {
+            "size" | "costs" | "grafana" | "manifest" | "help" | "--help" | "-h" if !rest.is_empty() => {
                 bail!("{name} takes nothing")
             }
             "size" => Ok(Self::Size),
             "costs" => Ok(Self::Costs),
+            "grafana" => Ok(Self::Grafana),
             "manifest" => Ok(Self::Manifest),
             "help" | "--help" | "-h" => Ok(Self::Help),
             other => bail!("there is no command {other}"),
@@ -175,6 +179,7 @@ impl Command {
                 }
                 outcome.require_all()
             }
+            Self::Grafana => grafana::write(),
             Self::Manifest => {
                 setup::ensure(&[Need::PythonVenv], false).require_all()?;
                 oracle::write_manifest()

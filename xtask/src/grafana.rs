@@ -1,0 +1,25 @@
+//! `cargo xtask grafana`: the dashboards of each database, made of one description.
+
+use std::fs;
+
+use anyhow::{Context as _, Result};
+
+use crate::repo;
+
+#[path = "../../host-tools/grafana/resolve.rs"]
+mod resolve;
+
+/// Writes the dashboards into the folders of the databases, beside their data sources, where `compose.yaml` takes them.
+pub(crate) fn write() -> Result<()> {
+    let folder = repo::root().join("host-tools/grafana");
+    for name in ["flight.json", "health.json"] {
+        let description = serde_json::from_slice(&fs::read(folder.join(name))?).context(name)?;
+        for database in resolve::DATABASES {
+            let dashboard = resolve::resolve(&description, database).context("a dashboard is an object")?;
+            let path = folder.join(database.0).join(name);
+            fs::write(&path, serde_json::to_string_pretty(&dashboard)?)?;
+            println!("{}", repo::shown(&path));
+        }
+    }
+    Ok(())
+}
