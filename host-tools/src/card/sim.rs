@@ -9,6 +9,7 @@ use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom, Write};
 
 use embedded_sdmmc::{Block, BlockCount, BlockDevice, BlockIdx};
+use hums_recorder::CardDevice;
 
 use super::faults::{Cut, Faults, Stall};
 use crate::rng::Rng;
@@ -254,6 +255,9 @@ impl BlockDevice for SimCard {
         Ok(BlockCount(self.blocks))
     }
 }
+
+/// The card on its own, outside of a power-on: for a look at its directory.
+impl CardDevice for SimCard {}
 
 #[cfg(test)]
 mod tests {
