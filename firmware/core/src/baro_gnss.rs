@@ -16,13 +16,12 @@ use crate::gates::{self, Gates};
 use crate::latest::Reading;
 use crate::motion::{SPEED_MAX_MPS, climb_mps, ground_speed_mps};
 use crate::observation::Gnss;
+use crate::pressure::SCALE_HEIGHT_M;
 use crate::residual::{Comparison, Residuals, smooth};
 use crate::time::{Instant, PAUSE, Span, Stamp};
 use crate::units::{GRAVITY, Hectopascals};
 use crate::vehicle::Vehicle;
 
-/// Metres of height for a relative change of pressure: the scale height of air at 15 degrees, R T / (M g).
-pub(crate) const SCALE_HEIGHT_M: f32 = 8_430.0;
 /// A standard atmosphere is wrong by so much of a climb in air that is 28 K warmer or colder.
 const SCALE_PART: f32 = 0.1;
 /// Messages on a link are late by so much: a step takes that much longer or shorter.

@@ -1,63 +1,88 @@
-//! On the ground or in the air, and since when; and which flights that makes.
+//! The phases of a flight: on the ground, in the air, in a mishap, down.
 //!
-//! # In the air
-//! Only what is armed flies, and only what can: a rover, a boat or a submarine never does, whatever its landed state says
-//! (PX4 calls an armed rover "in air"). The autopilot's own word ([`LandedState`], `EXTENDED_SYS_STATE`) counts where it is
-//! given, but for what idles: on rotors, with less throttle than flies or no more vibration than at rest, and neither height, climb
-//! nor speed that would show flight; on wings, with little throttle, no speed and no height. Otherwise, for half a second:
+//! Five witnesses say each step that the vehicle flies or stands ([`witness`]): the autopilot's word, height, thrust, inertial sensors, speed. A
+//! majority of them moves the phase:
 //!
-//! | what is known | in the air | on the ground again, for two seconds |
-//! |---|---|---|
-//! | a height above home or above the local origin | more than one metre above the place of arming | less than half a metre, and still; 2 m below the place of arming with less throttle than flies |
-//! | the speed of a plane or VTOL | faster than 8 m/s | as above |
-//! | the airspeed of a plane or VTOL, and its throttle | faster than 8 m/s with more than a fifth: wind alone is no flight | slower |
-//! | only the throttle (no position at all) | more than a fifth, and the displayed altitude rose by a metre | less than a tenth |
+//! | phase | evidence | for | next |
+//! |---|---|---|---|
+//! | ground | two witnesses of flight, more than of standing; or the word, the height, or the only one that tells, and none against it | 0.6 s | airborne |
+//! | ground | the same against the word | 5 s | airborne |
+//! | airborne | the word and another one that it stands, and two more than of flight | at once | touched |
+//! | airborne | two witnesses of standing, more than of flight; or the only one that tells | 2 s | touched |
+//! | touched | as on the ground | as there | airborne: a bounce, a touch-and-go |
+//! | touched | | 8 s | ground: the flight is over |
+//! | airborne, touched | disarmed, and not watched | at once | ground: the flight is over |
+//! | any, in a flight | a sign of a mishap: free fall, tumbling, overturned, sinking, disarmed in the air | as the sign | falling |
+//! | any, in a flight; falling | a shock, and it lies still | as the sign | impacted |
+//! | falling, impacted | two witnesses of standing, more than of flight | still for 1 s, or 5 s after the last sign | down |
+//! | falling, impacted | two witnesses of flight, more than of standing; with power | 5 s after the last sign | airborne |
+//! | falling, impacted | no majority: down if it is off, or two say that it stands; it flies otherwise | 30 s after the last sign | down, airborne |
+//! | falling, impacted | no heartbeat | 5 s | down |
+//! | down | armed again; or two witnesses of flight, more than of standing | at once; 4 s | ground |
 //!
-//! One lost message, or a land detector that fails, hides no flight: the word that it stands counts no more once it was contradicted
-//! for five seconds, by 2 m and more above the place of arming together with throttle that flies (on rotors) or more than
-//! 8 m/s (on wings). It counts again with the end of the flight, or once the autopilot has said that it flies.
+//! Nothing takes off with idle throttle on rotors, or without power. Surface vehicles never fly (PX4 calls an armed rover "in air").
 //!
-//! The place of arming counts only where arming was seen. Whoever hears an armed vehicle first (a restart in the air) takes
-//! the height above home as it is, and goes on in the air at once: [`FlightEvent::Resumed`].
-//!
-//! # Flights
-//! A flight begins with leaving the ground. It ends when the vehicle is disarmed, or when it has been on the ground for
-//! eight seconds; so a bounce and a touch-and-go are parts of one flight.
+//! Signs of a mishap ([`signs`]) count while the vehicle is armed and for 10 s afterwards; docs/health.md has their table. Outside of a flight
+//! they are told once for each arming ([`Change::OnBench`]); but a vehicle that its own rotors turned over has had a mishap. A link that was
+//! lost in flight is judged when it is back ([`link_loss`]).
 
-use crate::motion::{airspeed_mps, altitude_m, climb_mps, ground_speed_mps, height_m, throttle};
-use crate::observation::{LandedState, VehicleKind};
+mod disarming;
+mod link_loss;
+mod signs;
+mod witness;
+
+use crate::latest::Reading;
+use crate::mishap::{Change, Kind, Place, Report};
+use crate::motion::{Kinematics, STILL_MPS, climb_mps, ground_speed_mps, height_m, throttle};
+use crate::observation::VehicleKind;
+use crate::params::Params;
+use crate::pressure::Pressure;
+use crate::thrust::{Power, Thrust};
 use crate::time::{Instant, Span};
 use crate::vehicle::{LANDED_STATE_AGE, Vehicle};
+use disarming::DisarmWatch;
+use link_loss::LinkLoss;
+use signs::{Lasting, Shock};
+use witness::{HEIGHT, THRUST, Votes, WORD, is_on_wings, on_rotors};
 
 /// In the air for so long it has left the ground.
 const SETTLED: Span = Span::from_secs(3);
-/// Steady flight is not tilted further.
+/// Steady flight is not tilted further, rad.
 const STEADY_TILT_RAD: f32 = 0.26;
-
-const TAKEOFF_HEIGHT_M: f32 = 1.0;
-const LANDED_HEIGHT_M: f32 = 0.5;
-const PLANE_FLYING_MPS: f32 = 8.0;
-/// A multicopter hovers at a quarter to three quarters of its throttle, where nothing better is known.
-pub(crate) const FLYING_THROTTLE: f32 = 0.2;
-/// Full throttle: autopilots end within 5 % of it.
-pub(crate) const FULL_THROTTLE: f32 = 0.95;
-/// Near the ground.
-const HPA_PER_METRE: f32 = 0.12;
-const STILL_MPS: f32 = 0.5;
-/// What climbs, sinks or goes faster than this moves, whatever wind and noise make of what stands.
-const MOVES_MPS: f32 = 1.5;
-/// With idle throttle the height of what stands may drift so far: pressure and estimators do.
-const DRIFT_M: f32 = 8.0;
-/// Above this it hovers though it does not shake: simulators do not.
-const STANDS_M: f32 = 2.0;
-const TAKEOFF_DEBOUNCE: Span = Span::from_millis(500);
-const LANDING_DEBOUNCE: Span = Span::from_secs(2);
-/// The autopilot's word has its own debounce; one message of nonsense at 2 Hz has none.
-const WORD_DEBOUNCE: Span = Span::from_millis(600);
-/// What is seen of the vehicle contradicts the autopilot's word for so long: the word is as one that is not told any more.
-const CONTRADICTED: Span = LANDED_STATE_AGE;
+/// Vertical speed from which it is a climb or a descent, m/s; half of it near the ground.
+const VERTICAL_MPS: f32 = 0.7;
+/// Speed over ground from which it is a cruise, m/s.
+const CRUISE_MPS: f32 = 1.5;
+/// Within this height of the place of arming it takes off or lands, m.
+const NEAR_GROUND_M: f32 = 3.0;
+/// A clear majority moves the phase after so long: one wrong message at 2 Hz does not last.
+const BRIEF: Span = Span::from_millis(600);
+/// A majority against the word begins a flight after so long, as long as a landed state lasts that is not told again.
+const LONG: Span = LANDED_STATE_AGE;
+/// A majority without the word ends one after so long: a slow hover near the ground is shorter.
+const LANDS: Span = Span::from_secs(2);
 /// On the ground, still armed, for so long: the flight is over. A plane rolls on from a touch-and-go within this.
 const GROUND_LASTS: Span = Span::from_secs(8);
+/// How long after disarming it is watched.
+const WATCHED: Span = Span::from_secs(10);
+/// A mishap goes on for so long after its last sign.
+const RECOVERED: Span = Span::from_secs(5);
+/// A mishap without a majority is decided after so long.
+const GIVEN_UP: Span = Span::from_secs(30);
+/// A vehicle that was down has taken off again after so long.
+const TAKEN_OFF: Span = Span::from_secs(4);
+/// A vehicle is still after so long.
+const STILL: Span = Span::from_secs(1);
+/// A still vehicle turns slower, rad/s.
+const STILL_RADPS: f32 = 0.3;
+/// A still vehicle carries about its weight, g.
+const STILL_G: core::ops::Range<f32> = 0.7..1.3;
+/// A pressure that rose no longer ago rises still.
+const RISES: Span = Span::from_millis(300);
+/// A vehicle that lies over so long after its last throttle was turned over by its rotors.
+const DRIVEN: Span = Span::from_secs(5);
+/// Heartbeats so far apart hide a disarming.
+const BEATS: Span = Span::from_millis(2_500);
 
 /// What the vehicle is doing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -93,13 +118,6 @@ impl Phase {
     }
 }
 
-/// Vertical speed from which it is a climb or a descent; half of it near the ground.
-const VERTICAL_MPS: f32 = 0.7;
-/// Speed over ground from which it is a cruise.
-const CRUISE_MPS: f32 = 1.5;
-/// Below this height above the place of arming it takes off or lands.
-const NEAR_GROUND_M: f32 = 3.0;
-
 /// A flight begins or ends.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FlightEvent {
@@ -111,78 +129,150 @@ pub enum FlightEvent {
     Landing,
 }
 
-/// What others than the autopilot's estimator know of the ground.
-#[derive(Clone, Copy, Debug)]
-pub struct Support {
-    /// Something carries it that is not its rotors.
-    pub is_supported: bool,
-    /// The throttle from which on rotors may carry it. It idles below half of that.
-    pub flying_throttle: f32,
-    /// The barometer works: its pressure changed just now.
-    pub has_pressure: bool,
+/// The phase of the table.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+enum Stage {
+    #[default]
+    Ground,
+    Airborne,
+    /// On the ground for a moment: the flight goes on.
+    Touched,
+    Falling,
+    Impacted,
+    Down,
 }
 
-impl Support {
-    /// Nothing known.
-    pub const UNKNOWN: Self =
-        Self { is_supported: false, flying_throttle: FLYING_THROTTLE, has_pressure: true };
+impl Stage {
+    const fn is_mishap(self) -> bool {
+        matches!(self, Self::Falling | Self::Impacted | Self::Down)
+    }
 
-    const fn idle_throttle(&self) -> f32 {
-        self.flying_throttle / 2.0
+    /// It has hit something, or lies.
+    const fn has_hit(self) -> bool {
+        matches!(self, Self::Impacted | Self::Down)
     }
 }
 
-/// Whether the vehicle flies.
+/// The phases of a flight.
 #[derive(Clone, Copy, Debug)]
 #[expect(clippy::struct_excessive_bools, reason = "facts that have nothing to do with each other")]
 pub struct Flight {
+    stage: Stage,
+    /// Since when it is in the air; kept in a mishap.
     airborne_since: Option<Instant>,
-    /// A flight is going on, and when the vehicle was in the air last.
+    /// A flight is open, and when the vehicle was in the air last.
     flew_at: Option<Instant>,
-    /// The vehicle was heard disarmed: where it is armed next is the place of arming.
+    /// Since when a majority would move the phase.
+    changing_since: Option<Instant>,
+    pub(crate) pressure: Pressure,
+    pub(crate) thrust: Thrust,
+    pub(crate) motion: Kinematics,
+    /// The vehicle was heard disarmed: it is armed next at its place of arming.
     seen_disarmed: bool,
-    /// The vehicle was seen on the ground: what follows is a take-off.
+    /// The vehicle was seen on the ground: a take-off follows.
     seen_on_ground: bool,
     armed: bool,
-    /// Height where it was armed.
-    armed_height_m: Option<f32>,
-    /// The pressure where it was armed, hPa; whether it changed since by more than a take-off does.
-    armed_hpa: Option<f32>,
-    rose: bool,
-    support: Support,
-    /// The pilot's display of the altitude while it stood without thrust.
-    idle_altitude_m: Option<f32>,
-    /// It had throttle to fly with since its arming: what is told of the throttle means something.
-    driven: bool,
-    changing_since: Option<Instant>,
-    /// Since when what is seen contradicts the autopilot's word that it stands.
-    contradicted_since: Option<Instant>,
-    /// That word counts for nothing in this flight.
-    overruled: bool,
+    /// Armed and not terminated.
+    powered: bool,
+    off_at: Option<Instant>,
+    /// The latest heartbeat, the height above home then, and when the autopilot was heard last.
+    beat_at: Instant,
+    beat_height_m: Option<f32>,
+    heard_at: Instant,
+    /// It was heard first then, and has not flown since.
+    first_at: Option<Instant>,
+    watch: Option<DisarmWatch>,
+    link: Option<LinkLoss>,
+    /// It came down while the link was lost, since then.
+    unheard_from: Option<Instant>,
+    /// The worst of each sign, in its own unit; 0 for none.
+    worst: [f32; Kind::COUNT],
+    /// A sign of this step; the time of the last one.
+    seen: Option<Kind>,
+    seen_at: Instant,
+    on_bench: bool,
+    falls: Lasting,
+    unloaded: Lasting,
+    tumbles: Lasting,
+    overturned: Lasting,
+    sinks: Lasting,
+    still_since: Option<Instant>,
+    flies_since: Option<Instant>,
+    /// Since when it is carried without rotors, and the pressure then, hPa.
+    supported: Option<(Instant, f32)>,
+    shock: Option<Shock>,
+    /// The first of the shocks that belong together.
+    hit_at: Instant,
+    /// The fastest sink that broke off in this mishap, m/s.
+    touch_mps: f32,
+    /// When the force changed last; its load factor, and its part from above, g.
+    felt_at: Instant,
+    load_g: f32,
+    from_above_g: f32,
+    /// Body rate, rad/s.
+    rate_radps: f32,
+    /// Its greatest height since it has had all its thrust, m, which fades; and when that was worked out last.
+    peak_m: f32,
+    peak_at: Instant,
+    /// It was level while it was armed.
+    stood: bool,
+    /// When it leaned by more than 45 degrees, or turned fast, last, while armed.
+    tilted_at: Option<Instant>,
+    /// Where a mishap began, or ended.
+    place: Place,
 }
 
 impl Flight {
     /// On the ground.
     pub const fn grounded() -> Self {
         Self {
+            stage: Stage::Ground,
             airborne_since: None,
             flew_at: None,
+            changing_since: None,
+            pressure: Pressure::UNKNOWN,
+            thrust: Thrust::UNKNOWN,
+            motion: Kinematics::UNKNOWN,
             seen_disarmed: false,
             seen_on_ground: false,
             armed: false,
-            armed_height_m: None,
-            armed_hpa: None,
-            rose: false,
-            support: Support::UNKNOWN,
-            idle_altitude_m: None,
-            driven: false,
-            changing_since: None,
-            contradicted_since: None,
-            overruled: false,
+            powered: false,
+            off_at: None,
+            beat_at: Instant::ZERO,
+            beat_height_m: None,
+            heard_at: Instant::ZERO,
+            first_at: None,
+            watch: None,
+            link: None,
+            unheard_from: None,
+            worst: [0.0; Kind::COUNT],
+            seen: None,
+            seen_at: Instant::ZERO,
+            on_bench: false,
+            falls: Lasting::NOT,
+            unloaded: Lasting::NOT,
+            tumbles: Lasting::NOT,
+            overturned: Lasting::NOT,
+            sinks: Lasting::NOT,
+            still_since: None,
+            flies_since: None,
+            supported: None,
+            shock: None,
+            hit_at: Instant::ZERO,
+            touch_mps: 0.0,
+            felt_at: Instant::ZERO,
+            load_g: 1.0,
+            from_above_g: 0.0,
+            rate_radps: 0.0,
+            peak_m: f32::NEG_INFINITY,
+            peak_at: Instant::ZERO,
+            stood: false,
+            tilted_at: None,
+            place: Place::UNKNOWN,
         }
     }
 
-    /// Whether it is in the air.
+    /// Whether it is in the air; in a mishap, whether it was.
     pub const fn airborne(&self) -> bool {
         self.airborne_since.is_some()
     }
@@ -205,7 +295,7 @@ impl Flight {
         self.airborne_since
     }
 
-    /// Whether a flight has begun and not ended: in the air, or on the ground for a moment.
+    /// Whether a flight has begun and not ended: in the air, on the ground for a moment, or in a mishap.
     pub const fn is_open(&self) -> bool {
         self.flew_at.is_some()
     }
@@ -220,141 +310,289 @@ impl Flight {
         self.seen_on_ground && !self.is_open()
     }
 
-    /// A step in which nothing changes: a mishap goes on, and what the vehicle says of itself means little.
-    pub(crate) fn stay(&mut self, now: Instant) {
-        self.changing_since = None;
-        if self.is_open() {
-            self.flew_at = Some(now);
-        }
+    /// Whether it stands without thrust.
+    pub(crate) fn is_at_rest(&self, now: Instant, vehicle: &Vehicle) -> bool {
+        const OFF: f32 = 0.05;
+        let off = throttle(now, vehicle).map_or(!vehicle.armed(), |throttle| throttle < OFF);
+        !self.is_open() && !self.in_mishap() && off && vehicle.heartbeat.get().is_some()
     }
 
-    /// A step of a vehicle that is down for good, until it is armed again: the flight is over.
-    pub(crate) fn end(&mut self, now: Instant, vehicle: &Vehicle) -> Option<FlightEvent> {
-        self.note_arming(now, vehicle);
-        let open = self.is_open();
+    /// Whether a mishap goes on, or may: other checks would only echo it.
+    pub(crate) fn in_mishap(&self) -> bool {
+        self.stage.is_mishap() || self.watch.is_some() || self.came_back_down()
+    }
+
+    /// Whether it was disarmed out of a flight, and that it falls is not seen yet.
+    pub const fn is_watched(&self) -> bool {
+        self.watch.is_some()
+    }
+
+    /// Whether a mishap is over: the vehicle lies at the place of its impact.
+    pub(crate) fn is_down(&self) -> bool {
+        self.stage == Stage::Down
+    }
+
+    /// Whether it leaned so far or turned so fast in the last seconds that thrust did not carry it.
+    pub(crate) fn has_tilted(&self, now: Instant) -> bool {
+        self.tilted_at.is_some_and(|at| now.since(at) <= RECOVERED)
+    }
+
+    /// One step, at least every 50 ms: changes of a mishap and of the flight.
+    pub fn step(
+        &mut self,
+        now: Instant,
+        vehicle: &Vehicle,
+        params: &Params,
+    ) -> (Option<Change>, Option<FlightEvent>) {
+        self.note_power(now, vehicle, params);
+        self.motion.step(now, vehicle);
+        self.note_support(now, vehicle, params);
+        self.note_still(now, vehicle);
+        self.judge_disarming(now, vehicle, params);
+        self.note_link(now, vehicle, params);
+        self.judge_shock(now, vehicle, params);
+        let votes = self.ask(now, vehicle);
+        let seen = self.seen.take();
+        let change = match (self.stage, seen) {
+            (Stage::Falling | Stage::Impacted, _) => self.judge_mishap(now, vehicle, votes),
+            (Stage::Down, _) => self.judge_wreck(now, vehicle, votes),
+            (_, Some(kind)) => self.judge_sign(now, vehicle, kind, params),
+            (_, None) => None,
+        };
+        let event = match self.stage {
+            Stage::Down => self.close(),
+            Stage::Falling | Stage::Impacted => self.hold(now),
+            _ if self.watch.is_some() || self.may_have_hit() || self.is_heard_again() => self.hold(now),
+            _ => self.advance(now, vehicle, votes),
+        };
+        (change, event)
+    }
+
+    /// Arming, disarming and termination.
+    fn note_power(&mut self, now: Instant, vehicle: &Vehicle, params: &Params) {
+        let Some(heartbeat) = vehicle.heartbeat.get() else { return };
+        let armed = heartbeat.armed;
+        if armed != self.armed {
+            let is_seen = armed && self.seen_disarmed;
+            self.pressure.arm(now, is_seen);
+            self.motion.arm(now, vehicle, is_seen);
+        }
+        self.seen_disarmed |= !armed;
+        self.armed = armed;
+        if !self.airborne() && (!armed || self.power(now, vehicle) == Some(Power::Idle)) {
+            self.motion.idle(now, vehicle);
+        }
+        // A terminated vehicle stays armed, and its motors are off.
+        let powered = armed && vehicle.terminated_since.is_none();
+        if powered && !self.powered {
+            // Armed again in the air it flies on; on the ground another flight begins.
+            if self.stage == Stage::Down && self.off_at.is_some() {
+                self.calm();
+            }
+            (self.on_bench, self.off_at, self.stood, self.heard_at) = (false, None, false, now);
+            (self.watch, self.first_at, self.link) = (None, None, None);
+            self.thrust.forget();
+        }
+        let beat_at = vehicle.heartbeat.at().unwrap_or(self.beat_at);
+        // The height of the beat before: PX4's is 0 from the disarming on, and home may be another one.
+        let (mut before_m, mut beats_missed) = (self.beat_height_m, false);
+        if beat_at != self.beat_at {
+            if self.beat_at == Instant::ZERO {
+                self.note_first(now, vehicle, powered);
+            }
+            beats_missed = beat_at.since(self.beat_at) > BEATS;
+            before_m = core::mem::replace(&mut self.beat_height_m, height_m(now, vehicle));
+            self.beat_at = beat_at;
+        }
+        self.stood |= powered && vehicle.inertial.is_level(now);
+        if self.powered && !powered {
+            self.off_at = Some(now);
+            if self.is_open() && !self.stage.is_mishap() {
+                let height_m = before_m.or_else(|| height_m(now, vehicle));
+                self.note_disarming(now, vehicle, params, height_m, beats_missed);
+            }
+        }
+        self.powered = powered;
+    }
+
+    /// Since when it has been still. The sensors are believed, and not the estimate, of a vehicle that is off, lies on its back, or was hit.
+    fn note_still(&mut self, now: Instant, vehicle: &Vehicle) {
+        let ground_mps = ground_speed_mps(now, vehicle).unwrap_or(0.0);
+        let speed_mps = ground_mps.max(climb_mps(now, vehicle).map_or(0.0, f32::abs));
+        let was_hit = self.worst[Kind::Impact as usize] > 0.0 || self.was_dropped();
+        let is_slow = speed_mps < STILL_MPS
+            || (!self.powered && on_rotors(now, vehicle))
+            || self.lies_on_its_back(vehicle)
+            || (was_hit && self.rate_radps < STILL_RADPS / 3.0);
+        // Under a parachute it is carried, and goes down.
+        let descends = self.pressure.steady_for(now).is_some_and(|span| span < RISES);
+        let is_still = is_slow && !descends && self.is_slow_to_turn() && STILL_G.contains(&self.load_g);
+        self.still_since = if is_still { self.still_since.or(Some(now)) } else { None };
+    }
+
+    fn is_slow_to_turn(&self) -> bool {
+        self.rate_radps < STILL_RADPS
+    }
+
+    fn is_still(&self, now: Instant) -> bool {
+        self.still_since.is_some_and(|since| now.since(since) >= STILL)
+    }
+
+    /// A sign of a mishap, outside of one.
+    fn judge_sign(&mut self, now: Instant, vehicle: &Vehicle, kind: Kind, params: &Params) -> Option<Change> {
+        let is_own = self.is_open()
+            || kind == Kind::Disarmed
+            || (kind == Kind::Impact && self.first_at.is_some() && !self.powered)
+            || self.is_turned_over(now, vehicle, kind);
+        if !is_own {
+            (self.worst, self.unheard_from) = ([0.0; Kind::COUNT], None);
+            if !self.powered {
+                return None;
+            }
+            let is_told = core::mem::replace(&mut self.on_bench, true);
+            return (!is_told).then_some(Change::OnBench(kind));
+        }
+        self.stage = if kind == Kind::Impact { Stage::Impacted } else { Stage::Falling };
+        self.place = Place::of(now, vehicle);
+        let before_m = self.watch.take().and_then(|watch| watch.height_m);
+        if let Some(height_m) = before_m.filter(|_| kind == Kind::Disarmed) {
+            self.place.height_m = height_m as i16;
+        }
+        self.first_at = None;
+        // A vehicle that turned over right after a shock hit something first.
+        if let Some(shock) = self.shock.filter(|_| kind == Kind::Overturned) {
+            self.touch(now, shock.sink_mps);
+            self.see(now, Kind::Impact, shock.load_g, params);
+        }
+        Some(Change::Began(kind))
+    }
+
+    /// One step of a mishap: it is down, or flies on.
+    fn judge_mishap(&mut self, now: Instant, vehicle: &Vehicle, votes: Votes) -> Option<Change> {
+        let passed = now.since(self.seen_at);
+        let (is_long, is_given_up) = (passed >= RECOVERED, passed >= GIVEN_UP);
+        let (flies, stands) = votes.count();
+        let is_silent = vehicle.heartbeat.within(now, RECOVERED).is_none();
+        let is_down = (stands >= 2 && stands > flies && (is_long || self.is_still(now)))
+            || (is_given_up && (!self.powered || (stands >= 2 && stands >= flies)))
+            || (is_long && is_silent);
+        if is_down {
+            (self.stage, self.flies_since) = (Stage::Down, None);
+            if !self.motion.has_strayed(now) {
+                self.touch(now, self.motion.sink.greatest(now));
+            }
+            self.place = Place::of(now, vehicle);
+            return Some(Change::Down);
+        }
+        let flies_on = self.powered && ((is_long && flies >= 2 && flies > stands) || is_given_up);
+        flies_on.then(|| {
+            self.calm();
+            Change::FliesOn
+        })
+    }
+
+    /// One step of a vehicle that is down: whether it has taken off again.
+    fn judge_wreck(&mut self, now: Instant, vehicle: &Vehicle, votes: Votes) -> Option<Change> {
+        let is_flying = self.powered && self.takes_off(now, vehicle, votes).is_some() && votes.count().0 >= 2;
+        self.flies_since = if is_flying { self.flies_since.or(Some(now)) } else { None };
+        self.flies_since.filter(|since| now.since(*since) >= TAKEN_OFF).map(|_| {
+            self.calm();
+            Change::FliesAgain
+        })
+    }
+
+    /// It flies on, or is armed again: the mishap is over.
+    fn calm(&mut self) {
+        self.stage = match (self.airborne_since, self.flew_at) {
+            (Some(_), _) => Stage::Airborne,
+            (None, Some(_)) => Stage::Touched,
+            (None, None) => Stage::Ground,
+        };
+        (self.worst, self.seen) = ([0.0; Kind::COUNT], None);
+        (self.watch, self.first_at, self.link, self.unheard_from) = (None, None, None, None);
+        (self.shock, self.touch_mps, self.still_since, self.flies_since) = (None, 0.0, None, None);
+        self.place = Place::UNKNOWN;
+    }
+
+    /// The flight stays as it is.
+    fn hold(&mut self, now: Instant) -> Option<FlightEvent> {
+        self.changing_since = None;
+        self.flew_at = self.flew_at.map(|_| now);
+        None
+    }
+
+    /// The flight is over.
+    fn close(&mut self) -> Option<FlightEvent> {
+        let is_open = self.is_open();
         self.seen_on_ground = true;
         (self.airborne_since, self.flew_at, self.changing_since) = (None, None, None);
-        open.then_some(FlightEvent::Landing)
+        is_open.then_some(FlightEvent::Landing)
     }
 
-    /// One step, at least every 50 ms.
-    pub fn step(&mut self, now: Instant, vehicle: &Vehicle, support: Support) -> Option<FlightEvent> {
-        self.support = support;
-        self.note_arming(now, vehicle);
-        let idles = support.is_supported || self.idles(now, vehicle);
-        let word = Self::autopilot_says(now, vehicle);
-        self.weigh(now, vehicle, word, idles);
-        // That it stands needs a second witness: one wrong landed state ends nothing that is high and has thrust or speed.
-        let stands = |this: &Self| !(this.overruled || this.airborne() && this.surely_flies(now, vehicle));
-        let says = word.filter(|flies| if *flies { !idles } else { stands(self) });
-        // What was terminated before it was heard falls or lies.
-        let flies = self.armed
-            && can_fly(vehicle)
-            && (self.is_open() || vehicle.terminated_since.is_none())
-            && says.unwrap_or_else(|| !idles && self.seems_to_fly(now, vehicle));
-        let debounce = match (says, self.airborne()) {
-            // What is on the ground is judged as such at once: motors that stop are no fault there. One wrong word ends no
-            // flight.
-            (Some(_), true) => Span::ZERO,
-            (_, true) if !self.armed => Span::ZERO,
-            (Some(_), false) => WORD_DEBOUNCE,
-            (None, false) => TAKEOFF_DEBOUNCE,
-            (None, true) => LANDING_DEBOUNCE,
-        };
-        if flies == self.airborne() {
-            self.changing_since = None;
-            let knows = says.is_some() || !self.armed || height_m(now, vehicle).is_some();
-            self.seen_on_ground |= !flies && knows && vehicle.heartbeat.get().is_some();
-        } else {
-            let since = *self.changing_since.get_or_insert(now);
-            if now.since(since) >= debounce {
+    /// One step without a mishap.
+    fn advance(&mut self, now: Instant, vehicle: &Vehicle, votes: Votes) -> Option<FlightEvent> {
+        if self.airborne() && !self.armed {
+            (self.airborne_since, self.changing_since) = (None, None);
+        }
+        let debounce = if self.airborne() { Self::lands(votes) } else { self.takes_off(now, vehicle, votes) };
+        match debounce {
+            None => {
                 self.changing_since = None;
-                self.airborne_since = flies.then_some(since);
+                let is_known = votes.known & (WORD | HEIGHT) != 0 || !self.armed;
+                self.seen_on_ground |= !self.airborne() && is_known && vehicle.heartbeat.get().is_some();
+            }
+            Some(debounce) => {
+                let since = *self.changing_since.get_or_insert(now);
+                if now.since(since) >= debounce {
+                    self.changing_since = None;
+                    self.airborne_since = (!self.airborne()).then_some(since);
+                }
             }
         }
-        self.begin_or_end(now)
-    }
-
-    /// Whether the autopilot's word that it stands counts.
-    fn weigh(&mut self, now: Instant, vehicle: &Vehicle, word: Option<bool>, idles: bool) {
-        if word == Some(true) || !self.armed {
-            (self.contradicted_since, self.overruled) = (None, false);
-            return;
-        }
-        self.overruled &= self.is_open();
-        if word.is_none() || self.overruled || idles || !self.surely_flies(now, vehicle) {
-            self.contradicted_since = None;
-            return;
-        }
-        let since = *self.contradicted_since.get_or_insert(now);
-        if now.since(since) >= CONTRADICTED {
-            self.overruled = true;
-            self.changing_since = Some(since);
-        }
-    }
-
-    /// Whether it flies by all that is seen: above or below the ground where it was armed, and with the thrust or the speed of flight.
-    /// Once in the air, moving without idling is flight too.
-    fn surely_flies(&self, now: Instant, vehicle: &Vehicle) -> bool {
-        let height_m = self.height_above_start_m(now, vehicle).or_else(|| self.rise_m(now, vehicle));
-        let is_driven = if vehicle.hovers(now) == Some(true) {
-            let Support { flying_throttle, .. } = self.support;
-            let moves = || self.airborne() && moves(now, vehicle);
-            throttle(now, vehicle).is_some_and(|throttle| {
-                throttle >= flying_throttle || (throttle >= self.support.idle_throttle() && moves())
-            })
-        } else {
-            is_fast(ground_speed_mps(now, vehicle)) || is_fast(airspeed_mps(now, vehicle))
-        };
-        can_fly(vehicle) && is_driven && height_m.is_some_and(|height_m| height_m.abs() > STANDS_M)
-    }
-
-    fn note_arming(&mut self, now: Instant, vehicle: &Vehicle) {
-        let Some(heartbeat) = vehicle.heartbeat.get() else { return };
-        if !heartbeat.armed {
-            (self.seen_disarmed, self.armed_height_m) = (true, None);
-        } else if self.seen_disarmed && !self.armed {
-            self.armed_height_m = height_m(now, vehicle);
-        }
-        self.armed = heartbeat.armed;
-        let pressure =
-            vehicle.air.get().and_then(|air| air.pressure).filter(|pressure| pressure.0.is_finite());
-        if !self.armed {
-            (self.armed_hpa, self.rose) = (None, false);
-        } else if let Some(pressure) = pressure {
-            let off_hpa = libm::fabsf(pressure.0 - *self.armed_hpa.get_or_insert(pressure.0));
-            self.rose |= off_hpa >= TAKEOFF_HEIGHT_M * HPA_PER_METRE;
-        }
-        let flying = |throttle| throttle >= self.support.flying_throttle;
-        self.driven = self.armed && (self.driven || throttle(now, vehicle).is_some_and(flying));
-        let idle = self.support.idle_throttle();
-        let idles = !self.armed || throttle(now, vehicle).is_some_and(|throttle| throttle < idle);
-        if idles && !self.airborne() {
-            self.idle_altitude_m = altitude_m(now, vehicle).or(self.idle_altitude_m);
-        }
-    }
-
-    fn begin_or_end(&mut self, now: Instant) -> Option<FlightEvent> {
-        match (self.airborne(), self.flew_at) {
-            (true, None) => {
-                self.flew_at = Some(now);
-                Some(if self.seen_on_ground { FlightEvent::TakeOff } else { FlightEvent::Resumed })
-            }
-            (true, Some(_)) => {
-                self.flew_at = Some(now);
-                None
-            }
+        let (stage, event) = match (self.airborne(), self.flew_at) {
+            (true, None) if self.seen_on_ground => (Stage::Airborne, Some(FlightEvent::TakeOff)),
+            (true, None) => (Stage::Airborne, Some(FlightEvent::Resumed)),
+            (true, Some(_)) => (Stage::Airborne, None),
             (false, Some(last)) if !self.armed || now.since(last) >= GROUND_LASTS => {
                 self.flew_at = None;
-                Some(FlightEvent::Landing)
+                (Stage::Ground, Some(FlightEvent::Landing))
             }
-            (false, _) => None,
+            (false, Some(_)) => (Stage::Touched, None),
+            (false, None) => (Stage::Ground, None),
+        };
+        self.stage = stage;
+        if self.airborne() {
+            self.flew_at = Some(now);
+        }
+        event
+    }
+
+    /// For how long the witnesses must say so until it is in the air; `None` if they do not.
+    fn takes_off(&self, now: Instant, vehicle: &Vehicle, votes: Votes) -> Option<Span> {
+        let has_no_thrust = votes.stands & THRUST != 0
+            && (!is_on_wings(now, vehicle) && self.power(now, vehicle) != Some(Power::Full));
+        if !self.powered || has_no_thrust || vehicle.kind() == VehicleKind::Surface {
+            return None;
+        }
+        let (flies, stands) = votes.count();
+        let is_alone = stands == 0 && (votes.flies & (WORD | HEIGHT) != 0 || votes.flies == votes.known);
+        let is_against = votes.stands & WORD != 0;
+        if flies >= 1 && (is_alone || (flies >= 2 && flies > stands && !is_against)) {
+            Some(BRIEF)
+        } else {
+            (flies >= 2 && flies > stands).then_some(LONG)
         }
     }
 
-    /// Height above the place of arming where that was seen, above home otherwise.
-    fn height_above_start_m(&self, now: Instant, vehicle: &Vehicle) -> Option<f32> {
-        height_m(now, vehicle).map(|height_m| height_m - self.armed_height_m.unwrap_or(0.0))
+    /// For how long the witnesses must say so until it is on the ground; `None` if they do not.
+    fn lands(votes: Votes) -> Option<Span> {
+        let (flies, stands) = votes.count();
+        if stands >= 2 && stands >= flies + 2 && votes.stands & WORD != 0 {
+            Some(Span::ZERO)
+        } else {
+            let is_alone = stands == 1 && votes.stands == votes.known;
+            ((stands >= 2 && stands > flies) || is_alone).then_some(LANDS)
+        }
     }
 
     /// What the vehicle is doing now.
@@ -364,7 +602,7 @@ impl Flight {
         }
         let climb_mps = climb_mps(now, vehicle).unwrap_or(0.0);
         let near_ground =
-            self.height_above_start_m(now, vehicle).is_some_and(|height_m| height_m.abs() < NEAR_GROUND_M);
+            self.motion.rise_m(now, vehicle).is_some_and(|height_m| height_m.abs() < NEAR_GROUND_M);
         if near_ground && climb_mps > VERTICAL_MPS / 2.0 {
             Phase::TakeOff
         } else if near_ground && climb_mps < -VERTICAL_MPS / 2.0 {
@@ -380,132 +618,69 @@ impl Flight {
         }
     }
 
-    fn autopilot_says(now: Instant, vehicle: &Vehicle) -> Option<bool> {
-        match vehicle.landed.within(now, LANDED_STATE_AGE)? {
-            LandedState::OnGround => Some(false),
-            // Sent from the spooling up of the motors on the ground until the height that was asked for is reached:
-            // the height decides.
-            LandedState::TakingOff | LandedState::Unknown => None,
-            LandedState::InAir | LandedState::Landing => Some(true),
+    /// A check's reading: the worst of this mishap, 0 while there is none; `None` if the vehicle does not tell enough to see it.
+    pub(crate) fn reading(&self, kind: Kind, now: Instant, vehicle: &Vehicle) -> Option<Reading> {
+        let value = self.worst[kind as usize];
+        if value > 0.0 {
+            return Some(Reading { at: now, value });
         }
-    }
-
-    /// Nothing that moves, and less throttle than flies, or no more vibration than at rest: `ArduPilot`'s and PX4's land detectors
-    /// call a vehicle that is armed on the bench, spools up, or came down under a pilot's sticks, not landed. What glides moves;
-    /// what is thrown, falls or autorotates does too.
-    fn idles(&self, now: Instant, vehicle: &Vehicle) -> bool {
-        if vehicle.hovers(now) == Some(true) && self.never_rose() && vehicle.inertial.is_calm(now) {
-            return true;
-        }
-        let throttle = throttle(now, vehicle);
-        let (idle, flying) = (self.support.idle_throttle(), self.support.flying_throttle);
-        let enough = if self.airborne() { idle } else { flying };
-        let little = throttle.is_some_and(|throttle| throttle < enough);
-        let low =
-            self.height_above_start_m(now, vehicle).is_some_and(|height_m| height_m.abs() < TAKEOFF_HEIGHT_M);
-        // Of what stands, an estimator may drift away while its sensors rest.
-        let off = throttle.is_some_and(|throttle| throttle < idle);
-        let rests = !self.airborne() && off && vehicle.inertial.is_level(now);
-        if ((little && low) || rests) && vehicle.hovers(now) == Some(true) {
-            return true;
-        }
-        if moves(now, vehicle) {
-            return false;
-        }
-        let height_m = self.height_above_start_m(now, vehicle).or_else(|| self.rise_m(now, vehicle));
-        let within = |limit_m: f32| height_m.is_none_or(|height_m| height_m.abs() < limit_m);
-        match vehicle.hovers(now).or_else(|| has_wings(vehicle).then_some(false)) {
-            Some(true) => {
-                let shakes = vehicle.inertial.shakes(now);
-                // Some logs tell a throttle that says nothing.
-                let told = throttle.filter(|_| self.driven || shakes != Some(true));
-                let off = told.is_some_and(|throttle| throttle < idle);
-                if self.airborne() {
-                    // Little throttle alone is no landing: the height or the vibration must be that of the ground.
-                    let idles = throttle.is_some_and(|throttle| throttle < flying);
-                    let near = within(if shakes == Some(true) { STANDS_M } else { DRIFT_M });
-                    let rests = shakes == Some(false);
-                    return (off && (near || (rests && self.driven))) || (idles && rests && within(STANDS_M));
-                }
-                // With all its thrust it would climb.
-                let low = height_m.is_some() && within(TAKEOFF_HEIGHT_M);
-                let full = throttle.is_some_and(|throttle| throttle >= FULL_THROTTLE);
-                (off && within(DRIFT_M))
-                    || (full && low)
-                    || ((shakes == Some(false) || vehicle.inertial.contradicts(now)) && within(STANDS_M))
-            }
-            Some(false) => {
-                let air_mps = airspeed_mps(now, vehicle).unwrap_or(0.0);
-                let slow = air_mps < PLANE_FLYING_MPS / 2.0 && ground_speed_mps(now, vehicle).is_some();
-                let off = throttle.is_some_and(|throttle| throttle < flying);
-                off && slow && height_m.is_some_and(|height_m| height_m < TAKEOFF_HEIGHT_M)
-            }
-            None => false,
-        }
-    }
-
-    /// Whether the air pressure has stayed that of the place of arming, by a barometer that works. A vehicle that is heard first in the
-    /// air was not seen there.
-    const fn never_rose(&self) -> bool {
-        self.seen_on_ground && self.support.has_pressure && self.armed_hpa.is_some() && !self.rose
-    }
-
-    /// Whether it stands without thrust.
-    pub(crate) fn is_at_rest(&self, now: Instant, vehicle: &Vehicle) -> bool {
-        let off =
-            throttle(now, vehicle).map_or(!vehicle.armed(), |throttle| throttle < FLYING_THROTTLE / 4.0);
-        !self.is_open() && off && vehicle.heartbeat.get().is_some()
-    }
-
-    /// How far the displayed altitude rose since it stood without thrust.
-    fn rise_m(&self, now: Instant, vehicle: &Vehicle) -> Option<f32> {
-        self.idle_altitude_m.zip(altitude_m(now, vehicle)).map(|(stood_m, is_m)| is_m - stood_m)
-    }
-
-    fn seems_to_fly(&self, now: Instant, vehicle: &Vehicle) -> bool {
-        let speed_mps = ground_speed_mps(now, vehicle);
-        let throttle = throttle(now, vehicle);
-        let has_thrust = |least: f32| throttle.is_some_and(|throttle| throttle > least);
-        let (idle, flying) = (self.support.idle_throttle(), self.support.flying_throttle);
-        // Wind alone shows an airspeed on the ground.
-        let by_air = is_fast(airspeed_mps(now, vehicle)) && (self.airborne() || has_thrust(flying));
-        let fast = has_wings(vehicle) && (is_fast(speed_mps) || by_air);
-        let Some(height_m) = self.height_above_start_m(now, vehicle) else {
-            // Without any word about height, speed or thrust it goes on with what it does.
-            if self.airborne() {
-                return fast || throttle.is_none_or(|throttle| throttle > idle);
-            }
-            // Motors are tried on the bench: the barometer says so.
-            let rose = self.rise_m(now, vehicle).is_none_or(|rise_m| rise_m > TAKEOFF_HEIGHT_M);
-            return fast || (has_thrust(flying) && rose && !has_wings(vehicle));
+        let rotors = !matches!(vehicle.kind(), VehicleKind::Plane | VehicleKind::Surface);
+        let Vehicle { imu, attitude, heartbeat, .. } = vehicle;
+        let forces = || {
+            let known = imu
+                .get()
+                .and_then(|imu| imu.acceleration)
+                .is_some_and(|force| force.iter().all(|axis| axis.0.is_finite()));
+            imu.at().filter(|_| known)
         };
-        if self.airborne() {
-            // It hovers over a valley, unless it idles there.
-            let thrust = throttle.is_none_or(|throttle| throttle > flying);
-            let hangs = height_m < -STANDS_M && vehicle.hovers(now) == Some(true) && thrust;
-            return height_m > LANDED_HEIGHT_M || speed_mps.unwrap_or(0.0) > STILL_MPS || by_air || hangs;
-        }
-        height_m > TAKEOFF_HEIGHT_M || fast
+        let at = match kind {
+            Kind::FreeFall => forces().filter(|_| rotors),
+            Kind::Impact => forces(),
+            Kind::Overturned => {
+                let known = attitude.get().is_some_and(|it| it.roll.0.is_finite() && it.pitch.0.is_finite());
+                attitude.at().filter(|_| known && rotors)
+            }
+            Kind::Tumbling => {
+                let rates = attitude.get().and_then(|attitude| attitude.rates);
+                attitude
+                    .at()
+                    .filter(|_| rates.is_some_and(|rates| rates.iter().all(|rate| rate.0.is_finite())))
+            }
+            Kind::Disarmed => heartbeat.at(),
+            Kind::Sinking => climb_mps(now, vehicle).map(|_| now),
+        };
+        Reading::new(at.filter(|_| vehicle.kind() != VehicleKind::Surface), Some(0.0))
     }
-}
 
-/// Whether it climbs, sinks or goes faster than what stands.
-fn moves(now: Instant, vehicle: &Vehicle) -> bool {
-    let moves = |speed_mps: Option<f32>| speed_mps.is_some_and(|speed_mps| speed_mps.abs() > MOVES_MPS);
-    moves(climb_mps(now, vehicle)) || moves(ground_speed_mps(now, vehicle))
-}
+    /// What the ground is told of a change, at the tick of it.
+    pub fn report(&self, change: Change) -> Report {
+        Report { change, place: self.place, touch: (self.touch_mps * 10.0) as u16 }
+    }
 
-/// A speed at which wings carry.
-fn is_fast(speed_mps: Option<f32>) -> bool {
-    speed_mps.is_some_and(|speed_mps| speed_mps > PLANE_FLYING_MPS)
-}
+    /// When the first shock of the latest impact was.
+    pub const fn hit_at(&self) -> Instant {
+        self.hit_at
+    }
 
-fn can_fly(vehicle: &Vehicle) -> bool {
-    vehicle.kind() != VehicleKind::Surface
-}
+    /// When it was heard last before it came down, where nobody heard it meanwhile.
+    pub const fn unheard_from(&self) -> Option<Instant> {
+        self.unheard_from
+    }
 
-fn has_wings(vehicle: &Vehicle) -> bool {
-    matches!(vehicle.kind(), VehicleKind::Plane | VehicleKind::Vtol)
+    /// When it first hit something in this mishap; `None` where it did not.
+    pub fn struck_at(&self) -> Option<Instant> {
+        (self.worst[Kind::Impact as usize] > 0.0).then_some(self.hit_at)
+    }
+
+    /// The height above home of the last place that was told, metres.
+    pub const fn height_m(&self) -> i16 {
+        self.place.height_m
+    }
+
+    /// How fast it touched, m/s.
+    pub(crate) const fn touch_mps(&self) -> f32 {
+        self.touch_mps
+    }
 }
 
 #[cfg(test)]

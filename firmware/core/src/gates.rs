@@ -1,7 +1,7 @@
 //! Conditions of the flight, as bits: computed once a step, read by every comparison that needs them.
 
 use crate::flight::Flight;
-use crate::motion::climb_mps;
+use crate::motion::{CLEAR_M, climb_mps};
 use crate::observation::{Attitude, Gnss, LandedState, VehicleKind};
 use crate::time::{Instant, PAUSE, Span, Stamp};
 use crate::vehicle::{LANDED_STATE_AGE, Vehicle};
@@ -31,8 +31,6 @@ const TURNED: Span = Span::from_secs(1);
 /// Older motion says nothing.
 const FRESH: Span = Span::from_secs(1);
 const EXACT_FOR: Span = Span::from_secs(15);
-/// Height over home of what is clear of the ground, m.
-const CLEAR_M: f32 = 1.5;
 pub(crate) const LEVEL_MPS: f32 = 2.0;
 const LEANS_RAD: f32 = 0.6;
 

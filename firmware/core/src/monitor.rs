@@ -17,7 +17,7 @@ use crate::health::exceedance::Exceedances;
 use crate::health::{Finding, Health, Inputs, Subsystem};
 use crate::latest::Latest;
 use crate::lifetime::{ItemKey, Lifetime, Saving};
-use crate::mishap::{Change, Fate, Mishap};
+use crate::mishap::Change;
 use crate::observation::{Feeds, Observation, Source};
 use crate::params::{Param, Params};
 use crate::protect::{Protect, Request, Situation};
@@ -37,7 +37,6 @@ pub struct Monitor {
     params: Params,
     vehicle: Vehicle,
     flight: Flight,
-    mishap: Mishap,
     derived: Derived,
     health: Health,
     usage: Usage,
@@ -119,7 +118,6 @@ impl Monitor {
                 params: *params,
                 vehicle: Vehicle::unknown(),
                 flight: Flight::grounded(),
-                mishap: Mishap::new(),
                 derived: Derived::new(),
                 health: Health::new(),
                 usage: Usage::new(),
@@ -152,7 +150,7 @@ impl Monitor {
         if !known {
             return false;
         }
-        self.mishap.observe(at, &self.vehicle, observation, &self.params);
+        self.flight.observe(at, &self.vehicle, observation, &self.params);
         self.derived.observe(at, &self.vehicle, &self.flight, observation);
         self.usage.observe(at, &self.vehicle, &self.flight, &self.derived, observation);
         true
@@ -162,8 +160,7 @@ impl Monitor {
     #[inline(never)] // Its new states are large: not on the stack of every observation.
     fn begin_with_another(&mut self) {
         self.before_tick = Before { changes: self.vehicle.changes, ..Before::NOTHING };
-        self.flight = Flight::grounded();
-        apart(|| self.mishap = Mishap::new());
+        apart(|| self.flight = Flight::grounded());
         apart(|| self.derived = Derived::new());
         self.health.clear();
         self.exceedances.end(self.ticked_at);
@@ -176,14 +173,13 @@ impl Monitor {
     /// The autopilot was powered on again since the last observation: the flight of before is over, though nobody saw how it ended.
     pub fn begin_anew(&mut self) {
         self.flight = Flight::grounded();
-        self.mishap = Mishap::new();
         self.protect = Protect::new();
         self.usage.break_off();
     }
 
     /// The recording lost what was said for so long, and no time passed here meanwhile.
     pub fn lose(&mut self, span: Span) {
-        self.mishap.lose(span, &self.vehicle, &self.flight);
+        self.flight.lose(span, &self.vehicle);
     }
 
     /// What comes next is of another recording, of another day or another vehicle: nothing holds but what was counted.
@@ -211,7 +207,6 @@ impl Monitor {
             now,
             vehicle: &self.vehicle,
             flight: &self.flight,
-            mishap: &self.mishap,
             derived: &self.derived,
             link,
             recorder,
@@ -248,7 +243,6 @@ impl Monitor {
             now,
             vehicle: &self.vehicle,
             flight: &self.flight,
-            mishap: &self.mishap,
             derived: &self.derived,
             link,
             recorder,
@@ -259,28 +253,19 @@ impl Monitor {
         }
     }
 
-    /// The flight's own step, unless a mishap decides.
+    /// The flight's own step.
     fn step_flight(&mut self, now: Instant) -> Option<FlightEvent> {
-        let Self { vehicle, flight, mishap, usage, params, happenings, .. } = self;
-        if let Some(change) = mishap.step(now, vehicle, flight, params) {
-            if change == Change::Down && flight.is_open() {
-                usage.count_mishap(mishap.touch_mps());
+        let Self { vehicle, flight, usage, params, happenings, .. } = self;
+        let (change, event) = flight.step(now, vehicle, params);
+        if let Some(change) = change {
+            if change == Change::Down && event == Some(FlightEvent::Landing) {
+                usage.count_mishap(flight.touch_mps());
             }
             happenings.push(Happening::Mishap(change));
         }
-        let event = match mishap.fate() {
-            Fate::Own => {
-                if flight.is_at_rest(now, vehicle) {
-                    vehicle.inertial.rest(now);
-                }
-                flight.step(now, vehicle, mishap.support(now))
-            }
-            Fate::Over => flight.end(now, vehicle),
-            Fate::Held => {
-                flight.stay(now);
-                None
-            }
-        };
+        if flight.is_at_rest(now, vehicle) {
+            vehicle.inertial.rest(now);
+        }
         match event {
             // A recording that begins in the air: nobody has counted this flight yet.
             Some(FlightEvent::Resumed) if !self.has_open_flight() => Some(FlightEvent::TakeOff),
@@ -376,8 +361,8 @@ impl Monitor {
     }
 
     fn step_protect(&mut self, now: Instant) {
-        let Self { vehicle, flight, mishap, health, params, protect, happenings, .. } = self;
-        let situation = Situation { now, vehicle, flight, mishap: mishap.is_going(), health, params };
+        let Self { vehicle, flight, health, params, protect, happenings, .. } = self;
+        let situation = Situation { now, vehicle, flight, mishap: flight.in_mishap(), health, params };
         if let Some(step) = protect.step(&situation) {
             happenings.push(Happening::Protect(step));
         }
@@ -435,11 +420,6 @@ impl Monitor {
     /// On the ground or in the air.
     pub const fn flight(&self) -> &Flight {
         &self.flight
-    }
-
-    /// Mishaps.
-    pub const fn mishap(&self) -> &Mishap {
-        &self.mishap
     }
 
     /// Levels and roll-ups.

@@ -61,3 +61,124 @@ pub fn ground_speed_mps(now: Instant, vehicle: &Vehicle) -> Option<f32> {
     let hud = || vehicle.hud.within(now, MOTION_AGE).and_then(|hud| hud.groundspeed).map(|speed| speed.0);
     global.or_else(local).or_else(hud).filter(|speed| (0.0..=SPEED_MAX_MPS).contains(speed))
 }
+
+/// Values older than this are none of now.
+pub(crate) const FRESH: Span = Span::from_secs(2);
+/// Above this height over the place of arming a vehicle is in the air, and clear of the ground: heights of receivers and barometers move by
+/// a metre while it stands.
+pub(crate) const CLEAR_M: f32 = 1.5;
+/// Within this height of the place of arming it is on the ground, m.
+pub(crate) const LOW_M: f32 = 1.0;
+/// Slower than this it may stand: estimators wander by half of it.
+pub(crate) const STILL_MPS: f32 = 1.0;
+/// Faster than this it moves, whatever wind and noise make of an estimate at rest.
+pub(crate) const MOVES_MPS: f32 = 1.5;
+/// Wings carry a vehicle that is faster, and not one that is slower than half of it.
+pub(crate) const WINGS_MPS: f32 = 8.0;
+/// A receiver that stands for so long stands: its speed is a Doppler measurement, good to some tenths of a metre a second.
+const STANDS: Span = Span::from_secs(3);
+/// Heights of a receiver that stands stay within this, m.
+const RECEIVER_M: f32 = 3.0;
+/// An estimate that moved against the receiver is lost for so long.
+const STRAYED: Span = Span::from_secs(5);
+
+/// The greatest value of the last half to whole second.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct WindowMax {
+    now: f32,
+    before: f32,
+    window: Instant,
+}
+
+impl WindowMax {
+    pub(crate) const SPAN: Span = Span::from_millis(600);
+    pub(crate) const NONE: Self = Self { now: 0.0, before: 0.0, window: Instant::ZERO };
+
+    pub(crate) fn take(&mut self, at: Instant, value: f32) {
+        if at.since(self.window) >= Self::SPAN {
+            (self.before, self.now, self.window) = (self.now(at), 0.0, at);
+        }
+        self.now = self.now.max(value);
+    }
+
+    /// The greatest of this window; nothing that is old.
+    pub(crate) fn now(&self, at: Instant) -> f32 {
+        if at.since(self.window) <= FRESH { self.now } else { 0.0 }
+    }
+
+    /// The greatest of this window and the one before.
+    pub(crate) fn greatest(&self, at: Instant) -> f32 {
+        if at.since(self.window) <= FRESH { self.now.max(self.before) } else { 0.0 }
+    }
+}
+
+/// The estimator of motion: speeds of the last second, the place of arming, and whether the receiver stands.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Kinematics {
+    pub(crate) speed: WindowMax,
+    pub(crate) sink: WindowMax,
+    /// Height of the place of arming, m; `None` if nobody saw the arming.
+    armed_m: Option<f32>,
+    /// Displayed altitude while it stood without thrust, m.
+    idle_m: Option<f32>,
+    /// When the receiver moved last, and its altitude since, m.
+    moved_at: Option<Instant>,
+    stood_at_m: f32,
+    /// When the estimate moved last while the receiver stood.
+    strayed_at: Option<Instant>,
+}
+
+impl Kinematics {
+    pub(crate) const UNKNOWN: Self = Self {
+        speed: WindowMax::NONE,
+        sink: WindowMax::NONE,
+        armed_m: None,
+        idle_m: None,
+        moved_at: None,
+        stood_at_m: 0.0,
+        strayed_at: None,
+    };
+
+    /// The vehicle is armed here, or disarmed.
+    pub(crate) fn arm(&mut self, now: Instant, vehicle: &Vehicle, armed: bool) {
+        self.armed_m = height_m(now, vehicle).filter(|_| armed);
+    }
+
+    /// It stands without thrust.
+    pub(crate) fn idle(&mut self, now: Instant, vehicle: &Vehicle) {
+        self.idle_m = altitude_m(now, vehicle).or(self.idle_m);
+    }
+
+    /// Height above the place of arming, m, by the position; above home if nobody saw the arming; by the display without a position.
+    pub(crate) fn rise_m(&self, now: Instant, vehicle: &Vehicle) -> Option<f32> {
+        let by_position = height_m(now, vehicle).map(|height_m| height_m - self.armed_m.unwrap_or(0.0));
+        let by_display =
+            || self.idle_m.zip(altitude_m(now, vehicle)).map(|(stood_m, altitude_m)| altitude_m - stood_m);
+        by_position.or_else(by_display)
+    }
+
+    /// One step: whether the receiver stands, and the estimate moves.
+    pub(crate) fn step(&mut self, now: Instant, vehicle: &Vehicle) {
+        let receiver = vehicle.gnss[0].within(now, FRESH).filter(|gnss| gnss.is_exact());
+        let slow = receiver.and_then(|gnss| gnss.speed).filter(|speed| speed.0 < STILL_MPS);
+        let height_m = receiver.and_then(|gnss| gnss.altitude).map_or(0.0, |altitude| altitude.0);
+        let Some(speed) = slow.filter(|_| (height_m - self.stood_at_m).abs() <= RECEIVER_M) else {
+            (self.moved_at, self.stood_at_m, self.strayed_at) = (Some(now), height_m, None);
+            return;
+        };
+        let ground_mps = ground_speed_mps(now, vehicle).unwrap_or(0.0);
+        if self.stands_for(now, STANDS) && ground_mps > speed.0 + 2.0 * STILL_MPS {
+            self.strayed_at = Some(now);
+        }
+    }
+
+    /// Whether the receiver has stood for so long.
+    pub(crate) fn stands_for(&self, now: Instant, span: Span) -> bool {
+        self.moved_at.is_some_and(|at| now.since(at) >= span)
+    }
+
+    /// Whether the estimate moved within the last seconds while the receiver stood: it is lost.
+    pub(crate) fn has_strayed(&self, now: Instant) -> bool {
+        self.strayed_at.is_some_and(|at| now.since(at) <= STRAYED)
+    }
+}

@@ -17,11 +17,12 @@
 
 use core::ops::Range;
 
-use crate::flight::{FLYING_THROTTLE, Flight};
+use crate::flight::Flight;
 use crate::latest::Reading;
 use crate::motion::IDLE_THROTTLE;
 use crate::observation::{EscGroup, MOTORS_MAX, VehicleKind};
 use crate::outputs::MotorOutputs;
+use crate::thrust::CARRIES;
 use crate::time::{Instant, PAUSE, Span, Stamp};
 use crate::trend::Rate;
 use crate::units::Rpm;
@@ -395,7 +396,7 @@ impl Total {
         let others = self.count.checked_sub(1)?;
         let mean_a = (self.sum_a - own_a) / f32::from(others);
         // PX4's motor failure check: below this throttle no motor is asked for much.
-        let asked = vehicle.hovers(now) == Some(true) && throttle > FLYING_THROTTLE;
+        let asked = vehicle.hovers(now) == Some(true) && throttle > CARRIES;
         (asked && others >= 2 && mean_a > CURRENT_MIN_A).then(|| own_a / mean_a)
     }
 }

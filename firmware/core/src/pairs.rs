@@ -7,9 +7,9 @@
 //!    that sends nothing any more is not counted.
 
 use crate::adaptive_baseline::AdaptiveBaseline;
-use crate::baro_gnss::SCALE_HEIGHT_M;
 use crate::gates::{self, Gates};
 use crate::latest::Reading;
+use crate::pressure::SCALE_HEIGHT_M;
 use crate::residual::{PAIRS as ROWS, Residual, Row, smooth};
 use crate::time::{Instant, PAUSE, Span, Stamp};
 use crate::units::norm;

@@ -6,7 +6,6 @@
 //!    quarter of a turn.
 //! 3. With full throttle a multicopter climbs, and a plane does not sink ([`Thrust`]).
 
-use crate::flight::FULL_THROTTLE;
 use crate::gates::{self, Gates};
 use crate::latest::{Latest, Reading};
 use crate::modes::has_pilots_throttle;
@@ -14,6 +13,7 @@ use crate::motion::climb_mps;
 use crate::observation::{Attitude, Hud, WantedRates};
 use crate::residual::{Comparison, Residuals};
 use crate::rotation;
+use crate::thrust::FULL;
 use crate::time::{Instant, Span};
 use crate::units::RadiansPerSecond;
 use crate::vehicle::Vehicle;
@@ -101,7 +101,7 @@ impl Thrust {
             Some(false) => climb_mps < SINKS_MPS && !has_pilots_throttle(vehicle),
             None => false,
         };
-        let is_full = throttle.0 >= FULL_THROTTLE && gates.are(gates::SETTLED);
+        let is_full = throttle.0 >= FULL && gates.are(gates::SETTLED);
         self.full_at = Some(at);
         self.full_since = (is_full && in_vain).then(|| self.full_since.unwrap_or(at));
     }

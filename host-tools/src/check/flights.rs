@@ -102,8 +102,8 @@ pub(super) fn begin_in_air(flights: &[Flight]) -> bool {
 
 /// Whether a flight that goes on is in the air: also where it was disarmed, and may fall, or nothing carries it.
 pub(super) fn is_in_air(monitor: &Monitor) -> bool {
-    let falls = || monitor.flight().is_open() && monitor.mishap().is_uncarried();
-    (monitor.flight().airborne() && monitor.vehicle().armed()) || monitor.mishap().is_doubted() || falls()
+    let falls = || monitor.flight().is_open() && monitor.flight().is_unloaded();
+    (monitor.flight().airborne() && monitor.vehicle().armed()) || monitor.flight().is_watched() || falls()
 }
 
 impl Flights {
@@ -199,7 +199,7 @@ impl Flights {
         match change {
             Change::Began(Kind::Disarmed) => {
                 if let Some(flight) = self.list.last_mut().filter(|_| self.open) {
-                    flight.disarmed_at_m = Some(f32::from(monitor.mishap().height_m()));
+                    flight.disarmed_at_m = Some(f32::from(monitor.flight().height_m()));
                 }
             }
             Change::Down => {

@@ -343,7 +343,7 @@ impl Judge {
         let vehicle = self.monitor.vehicle();
         let flies = vehicle.armed()
             && vehicle.landed.get() != Some(&LandedState::OnGround)
-            && !self.monitor.mishap().is_doubted();
+            && !self.monitor.flight().is_watched();
         if airborne && flies && self.monitor.flight().airborne() {
             self.flights.silent(false);
         } else if let Some(gap) = self.gaps.get_mut(gap).filter(|gap| !gap.cause.is_damage()) {
@@ -421,7 +421,7 @@ impl Judge {
         }
         self.advance(finding.at);
         let steps = self.clock.monitor(finding.at);
-        let hit_at = Instant::of(self.monitor.mishap().hit_at(), steps);
+        let hit_at = Instant::of(self.monitor.flight().hit_at(), steps);
         let is_its = hit_at > Instant::ZERO && steps.since(hit_at) <= LIES_STILL;
         if is_its { Clock::recording(finding.at, steps, hit_at).min(finding.at) } else { finding.at }
     }
@@ -547,11 +547,11 @@ impl Judge {
         for finding in found {
             if is_of(&finding.check, self.format, self.wire.is_some(), self.limits.past.is_some()) {
                 // What hit something is seen to lie still seconds later.
-                let hit_at = if is_hit(&finding) { of(self.monitor.mishap().hit_at()) } else { finding.at };
+                let hit_at = if is_hit(&finding) { of(self.monitor.flight().hit_at()) } else { finding.at };
                 let at = Clock::recording(now, steps, hit_at.min(finding.at));
                 self.here.take(&Finding { at, ..finding.clone() }, self.clock.behind());
                 self.details.tell(&finding.check, &mut self.here);
-                if let Some(from) = self.monitor.mishap().unheard_from().filter(|_| is_hit(&finding)) {
+                if let Some(from) = self.monitor.flight().unheard_from().filter(|_| is_hit(&finding)) {
                     self.here.unheard(&finding.check, Clock::recording(now, steps, of(from)), at);
                 }
             }
@@ -566,8 +566,8 @@ impl Judge {
                 Happening::Landing => self.flights.landing(),
                 Happening::OtherVehicle => self.flights.break_off(),
                 Happening::Mishap(change) => {
-                    let hit_at = self.monitor.mishap().struck_at();
-                    let unheard_from = self.monitor.mishap().unheard_from();
+                    let hit_at = self.monitor.flight().struck_at();
+                    let unheard_from = self.monitor.flight().unheard_from();
                     let [hit_at, unheard_from] =
                         [hit_at, unheard_from].map(|at| at.map(|at| Clock::recording(now, steps, of(at))));
                     self.flights.mishap(change, now, hit_at, unheard_from, &self.monitor);

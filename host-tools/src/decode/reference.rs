@@ -7,8 +7,9 @@
 //! A value older than `AGE_MAX` is no value: better an empty cell than a stale number.
 
 use hums_core::clock::Instant;
-use hums_core::flight::{Flight, Support};
+use hums_core::flight::Flight;
 use hums_core::observation::{Esc, Observation, Source};
+use hums_core::params::Params;
 use hums_core::time::{self, Span};
 use hums_core::units::{MetresPerSecond, MetresPerSecond2};
 use hums_core::vehicle::{Motor, Vehicle};
@@ -166,7 +167,9 @@ impl Reference {
         self.heard = Some(at);
         let at = time::Instant::from(at);
         let since = self.flight.airborne_since();
-        self.flight.step(at, &self.vehicle, Support::UNKNOWN);
+        let params = Params::defaults();
+        self.flight.observe(at, &self.vehicle, observation, &params);
+        self.flight.step(at, &self.vehicle, &params);
         match (since, self.flight.airborne_since()) {
             (Some(since), None) => self.flown = at.since(since),
             (None, Some(_)) => self.flown = Span::ZERO,

@@ -1,7 +1,7 @@
 //! The flight, on observations made for the purpose.
 
 use super::*;
-use crate::observation::{GlobalPosition, Heartbeat, Hud, Observation, Source, VtolState};
+use crate::observation::{GlobalPosition, Heartbeat, Hud, LandedState, Observation, Source, VtolState};
 use crate::units::{Fraction, Metres, MetresPerSecond};
 
 const AUTOPILOT: Source = Source { system: 1, component: 1 };
@@ -18,7 +18,7 @@ fn fly(kind: VehicleKind, heights_m: &[(u64, f32)]) -> Vec<(u64, FlightEvent)> {
             vehicle.observe(now, AUTOPILOT, &Observation::Heartbeat(heartbeat));
             let global = GlobalPosition { relative_altitude: Metres(*height_m), ..GlobalPosition::default() };
             vehicle.observe(now, AUTOPILOT, &Observation::GlobalPosition(global));
-            events.extend(flight.step(now, &vehicle, Support::UNKNOWN).map(|event| (now_ms, event)));
+            events.extend(flight.step(now, &vehicle, &Params::defaults()).1.map(|event| (now_ms, event)));
             now_ms += 50;
         }
     }
@@ -29,7 +29,7 @@ fn fly(kind: VehicleKind, heights_m: &[(u64, f32)]) -> Vec<(u64, FlightEvent)> {
 fn height_above_the_place_of_arming_is_a_take_off() {
     let heights = [(5_000, 20.0), (10_000, 25.0), (30_000, 20.1)];
     // Two seconds of standing, and then the flight is over.
-    let expected = [(5_500, FlightEvent::TakeOff), (19_950, FlightEvent::Landing)];
+    let expected = [(5_600, FlightEvent::TakeOff), (19_950, FlightEvent::Landing)];
     assert_eq!(fly(VehicleKind::Rotorcraft, &heights), expected);
 }
 
@@ -65,7 +65,7 @@ fn told(kind: VehicleKind, words: &[(u64, LandedState)]) -> Vec<(u64, FlightEven
             if now_ms % 500 == 0 {
                 vehicle.observe(now, AUTOPILOT, &Observation::Landed(*landed, VtolState::Unknown));
             }
-            events.extend(flight.step(now, &vehicle, Support::UNKNOWN).map(|event| (now_ms, event)));
+            events.extend(flight.step(now, &vehicle, &Params::defaults()).1.map(|event| (now_ms, event)));
             now_ms += 50;
         }
     }
@@ -81,7 +81,7 @@ fn the_autopilots_own_word_counts() {
         (10, LandedState::Landing),
         (40, LandedState::OnGround),
     ];
-    let expected = [(7_600, FlightEvent::TakeOff), (29_950, FlightEvent::Landing)];
+    let expected = [(7_600, FlightEvent::TakeOff), (31_950, FlightEvent::Landing)];
     assert_eq!(told(VehicleKind::Rotorcraft, &words), expected);
 }
 
@@ -111,7 +111,7 @@ fn a_landed_state_that_is_lost_leaves_the_decision_to_what_else_is_known() {
         if (5_000..20_000).contains(&now_ms) {
             vehicle.observe(now, AUTOPILOT, &Observation::Landed(LandedState::InAir, VtolState::Unknown));
         }
-        events.extend(flight.step(now, &vehicle, Support::UNKNOWN));
+        events.extend(flight.step(now, &vehicle, &Params::defaults()).1);
     }
     assert_eq!(events, [FlightEvent::TakeOff, FlightEvent::Landing]);
 }
@@ -126,9 +126,9 @@ fn who_is_heard_first_in_the_air_goes_on_in_the_air_at_once() {
         vehicle.observe(now, AUTOPILOT, &Observation::Heartbeat(heartbeat));
         let global = GlobalPosition { relative_altitude: Metres(50.0), ..GlobalPosition::default() };
         vehicle.observe(now, AUTOPILOT, &Observation::GlobalPosition(global));
-        events.extend(flight.step(now, &vehicle, Support::UNKNOWN).map(|event| (now_ms, event)));
+        events.extend(flight.step(now, &vehicle, &Params::defaults()).1.map(|event| (now_ms, event)));
     }
-    assert_eq!(events, [(500, FlightEvent::Resumed)]);
+    assert_eq!(events, [(600, FlightEvent::Resumed)]);
 }
 
 /// Armed from 1 s on, without any position: its throttle and its airspeed, each until a time.
@@ -154,7 +154,7 @@ fn fly_by_hud(kind: VehicleKind, said: &[(u64, f32, f32)], height_m: Option<f32>
                 let global = GlobalPosition { relative_altitude, ..GlobalPosition::default() };
                 vehicle.observe(now, AUTOPILOT, &Observation::GlobalPosition(global));
             }
-            events.extend(flight.step(now, &vehicle, Support::UNKNOWN));
+            events.extend(flight.step(now, &vehicle, &Params::defaults()).1);
             now_ms += 50;
         }
     }
@@ -203,7 +203,7 @@ fn told_and_seen(
             ] {
                 vehicle.observe(now, AUTOPILOT, &observation);
             }
-            events.extend(flight.step(now, &vehicle, Support::UNKNOWN));
+            events.extend(flight.step(now, &vehicle, &Params::defaults()).1);
             now_ms += 50;
         }
     }

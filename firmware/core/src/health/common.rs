@@ -39,7 +39,7 @@ pub(super) const fn alert<const CAUSE: usize>(subsystem: Subsystem) -> Check {
         read: |inputs, _| {
             Reading::new(
                 Some(inputs.now),
-                inputs.vehicle.alerts.level(inputs.now, Cause::ALL[CAUSE], inputs.mishap.is_going()),
+                inputs.vehicle.alerts.level(inputs.now, Cause::ALL[CAUSE], inputs.flight.in_mishap()),
             )
         },
     }

@@ -4,7 +4,6 @@ use super::finding::Subsystem;
 use crate::baseline::Baselines;
 use crate::derived::Derived;
 use crate::flight::Flight;
-use crate::mishap::Mishap;
 use crate::params::Params;
 use crate::status::{LinkReading, RecorderStatus};
 use crate::time::Instant;
@@ -18,10 +17,8 @@ pub struct Inputs<'a> {
     pub now: Instant,
     /// The vehicle as it is known.
     pub vehicle: &'a Vehicle,
-    /// On the ground or in the air.
+    /// On the ground, in the air, or in a mishap.
     pub flight: &'a Flight,
-    /// Whether it falls, tumbles or lies.
-    pub mishap: &'a Mishap,
     /// What the raw messages do not say by themselves.
     pub derived: &'a Derived,
     /// The autopilot's port.

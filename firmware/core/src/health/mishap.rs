@@ -1,4 +1,4 @@
-//! Mishaps: what [`crate::mishap`] saw. No gate holds them back, and they stay critical until the vehicle is armed again or flies
+//! Mishaps: the signs that [`crate::flight`] saw. No gate holds them back, and they stay critical until the vehicle is armed again or flies
 //! on.
 
 use super::check::{Check, Debounce, InstanceOf, Side, Unit, When};
@@ -25,7 +25,7 @@ const FREE_FALL: Check = Check {
     alarm_only: false,
     is_flag: false,
     of: InstanceOf::Vehicle,
-    read: |inputs, _| inputs.mishap.reading(Kind::FreeFall, inputs.now, inputs.vehicle),
+    read: |inputs, _| inputs.flight.reading(Kind::FreeFall, inputs.now, inputs.vehicle),
 };
 
 pub(super) const CHECKS: &[Check] = &[
@@ -34,14 +34,14 @@ pub(super) const CHECKS: &[Check] = &[
         name: Kind::Impact.name(),
         unit: Unit::of("g"),
         critical: Some(Param::MisImpact),
-        read: |inputs, _| inputs.mishap.reading(Kind::Impact, inputs.now, inputs.vehicle),
+        read: |inputs, _| inputs.flight.reading(Kind::Impact, inputs.now, inputs.vehicle),
         ..FREE_FALL
     },
     Check {
         name: Kind::Tumbling.name(),
         unit: Unit::of("deg/s"),
         critical: Some(Param::MisTumble),
-        read: |inputs, _| inputs.mishap.reading(Kind::Tumbling, inputs.now, inputs.vehicle),
+        read: |inputs, _| inputs.flight.reading(Kind::Tumbling, inputs.now, inputs.vehicle),
         ..FREE_FALL
     },
     Check {
@@ -49,21 +49,21 @@ pub(super) const CHECKS: &[Check] = &[
         unit: Unit::of("m"),
         alarm_only: true,
         critical: Some(Param::MisDisarm),
-        read: |inputs, _| inputs.mishap.reading(Kind::Disarmed, inputs.now, inputs.vehicle),
+        read: |inputs, _| inputs.flight.reading(Kind::Disarmed, inputs.now, inputs.vehicle),
         ..FREE_FALL
     },
     Check {
         name: Kind::Sinking.name(),
         unit: Unit::of("m/s"),
         critical: Some(Param::MisSink),
-        read: |inputs, _| inputs.mishap.reading(Kind::Sinking, inputs.now, inputs.vehicle),
+        read: |inputs, _| inputs.flight.reading(Kind::Sinking, inputs.now, inputs.vehicle),
         ..FREE_FALL
     },
     Check {
         name: Kind::Overturned.name(),
         unit: Unit::of("deg"),
         critical: Some(Param::MisOverturn),
-        read: |inputs, _| inputs.mishap.reading(Kind::Overturned, inputs.now, inputs.vehicle),
+        read: |inputs, _| inputs.flight.reading(Kind::Overturned, inputs.now, inputs.vehicle),
         ..FREE_FALL
     },
     alert::<{ Cause::Crash as usize }>(Subsystem::Mishap),
@@ -73,7 +73,7 @@ pub(super) const CHECKS: &[Check] = &[
 /// not lost one, and has not tried in vain with full throttle: what rotors do not carry comes down. Wings glide. Nobody lands at once because
 /// telemetry alone is silent, of all ESCs.
 pub(super) fn orders(check: &Check, inputs: &Inputs<'_>, has_lost_drive: impl FnOnce() -> bool) -> Orders {
-    let Inputs { now, vehicle, derived, mishap, .. } = *inputs;
+    let Inputs { now, vehicle, derived, flight, .. } = *inputs;
     if check.name == "esc_silent" && derived.are_escs_silent() {
         return Orders::Watch;
     }
@@ -84,7 +84,7 @@ pub(super) fn orders(check: &Check, inputs: &Inputs<'_>, has_lost_drive: impl Fn
     if check.name == Kind::Sinking.name() {
         let in_vain = derived.crosschecks().full_in_vain().is_some_and(|full| full.value > 0.0);
         return match vehicle.hovers(now) {
-            Some(true) if !mishap.has_tilted(now) && !in_vain && !has_lost_drive() => Orders::Own,
+            Some(true) if !flight.has_tilted(now) && !in_vain && !has_lost_drive() => Orders::Own,
             Some(true) => Orders::Disarm,
             _ => Orders::Nothing,
         };

@@ -259,13 +259,13 @@ struct Now {
 
 impl Now {
     fn of(inputs: &Inputs<'_>) -> Self {
-        let Inputs { now, vehicle, mishap, .. } = *inputs;
+        let Inputs { now, vehicle, flight, .. } = *inputs;
         let armed = vehicle.armed();
         let is_silent = || vehicle.heartbeat.within(now, SILENT).is_none();
         // What lies disarmed, or is silent, has nothing more to judge but itself.
-        let over = mishap.is_going() && ((mishap.is_down() && !armed) || is_silent());
+        let over = flight.in_mishap() && ((flight.is_down() && !armed) || is_silent());
         // A mishap goes on: all but those that always apply would only echo it.
-        let quiet = mishap.is_going() && !over;
+        let quiet = flight.in_mishap() && !over;
         let latched = armed && inputs.params.get(Param::Latch) >= 0.5;
         let hows = When::ALL.map(|when| {
             let applies = match when {

@@ -188,7 +188,7 @@ fn fly_between(
         while let Some(happening) = monitor.take_happening() {
             if let Happening::Mishap(change) = happening {
                 changes.push((now_ms, change));
-                reports.push(monitor.mishap().report(change));
+                reports.push(monitor.flight().report(change));
             }
         }
     }

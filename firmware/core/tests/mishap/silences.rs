@@ -31,7 +31,7 @@ fn what_lies_over_after_a_silence_turned_over_in_it() {
             }
         });
         assert_eq!((lies.told().first(), lies.flights()), (Some(&"overturned"), DOWN), "{of:?}");
-        let from = lies.monitor.mishap().unheard_from();
+        let from = lies.monitor.flight().unheard_from();
         assert!(from.is_some_and(|from| Instant::from_millis(AT_MS).is_after(from)), "{from:?}");
         assert!(lies.changes.first().is_some_and(|(at_ms, _)| *at_ms < AT_MS + 9_000), "{:?}", lies.changes);
     }

@@ -91,7 +91,7 @@ fn mishap(
             return;
         }
     };
-    let report = book.monitor.mishap().report(change);
+    let report = book.monitor.flight().report(change);
     book.journal.record(now, &Record::Event(Event { number, text: &report.text() }), sectors);
     // That it began is told as a finding.
     if !matches!(change, Change::Began(_)) {

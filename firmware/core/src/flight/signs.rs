@@ -1,66 +1,125 @@
-//! What each observation shows of a mishap.
+//! Signs of a mishap in each observation: no weight, shocks, rates, tilt and sink.
 
-use super::evidence::{
-    BREAKS_OFF, BROKEN_OFF, FRESH, FULL_THROTTLE, Shock, UNCARRIED, is_believed, on_rotors,
-};
-use super::{Kind, Mishap, State, WATCHED};
+use super::witness::{is_fast, is_tilted, on_rotors};
+use super::{DRIVEN, Flight, Stage, WATCHED};
 use crate::derived::load_factor_g;
+use crate::mishap::Kind;
 use crate::modes::{has_pilots_throttle, is_made_to_turn, is_thrown};
-use crate::motion::{climb_mps, ground_speed_mps, height_m, throttle};
-use crate::observation::{Air, Attitude, Imu, Observation, VehicleKind};
+use crate::motion::{FRESH, STILL_MPS, climb_mps, ground_speed_mps, height_m, throttle};
+use crate::observation::{Attitude, EstimatorScale, Imu, Observation, VehicleKind};
 use crate::params::{Param, Params};
-use crate::time::{Instant, Span, Stamp};
+use crate::thrust::{FULL, Power};
+use crate::time::{Instant, Span};
 use crate::units::{GRAVITY, MetresPerSecond2, RadiansPerSecond, norm};
 use crate::vehicle::Vehicle;
 
-/// Below this load factor nothing carries the vehicle. A fall with the drag of a quad at its end speed is above it.
+/// Below this load factor, g, nothing carries the vehicle. A fall with the drag of a quad at its end speed is above it.
 const FALL_G: f32 = 0.3;
-/// A vehicle that was disarmed and is carried by less than this for [`UNCARRIED`] falls.
-const UNCARRIED_G: f32 = 0.5;
-/// What falls is carried by less than this for so long: nobody asks a multicopter to sink so hard, and so short before a touch.
-const DROPS_G: f32 = 0.65;
+/// Below this load factor, g, it falls: nobody asks a multicopter to sink so hard. A bounce is shorter than the first of these; a fall from
+/// half a metre lasts as long as the second.
+const UNLOADED_G: f32 = 0.65;
+const UNLOADED: Span = Span::from_millis(200);
 const DROPS: Span = Span::from_millis(300);
-/// What broke off a speed thrashes about for so long at most.
+/// A speed has broken off when it is below this part of it within so long.
+const BROKEN_OFF: f32 = 0.4;
+pub(super) const BREAKS_OFF: Span = Span::from_secs(1);
+/// A vehicle whose speed broke off thrashes about for so long at most.
 const THRASHES: Span = Span::from_secs(8);
-/// Tumbling and sinking last so long at least.
+/// A shock counts if the vehicle is still within so long after it.
+const AFTER_SHOCK: Span = Span::from_secs(4);
+/// A shock stops a vehicle that was this fast, m/s.
+const IMPACT_MPS: f32 = 3.5;
+/// Legs take so much of a vehicle that comes down upright, g and m/s, at the fastest landing speeds that are set (2.5 m/s).
+const LEGS_G: f32 = 4.0;
+const LEGS_MPS: f32 = 3.0;
+/// A plane without throttle that sinks slower than this, m/s, lands and skids. Skids slow down by 8 m/s2 at most: a plane that is faster than
+/// the second does not stop within [`BREAKS_OFF`].
+const FLARED_MPS: f32 = 2.0;
+const SKIDS_MPS: f32 = 15.0;
+/// Wings pull out of a dive with so much at most, g: the limit of CS-23 for the aerobatic category.
+const PULL_OUT_G: f32 = 6.0;
+/// Tumbling, turning over and sinking last so long at least.
 const TUMBLES: Span = Span::from_millis(500);
 const TUMBLES_ON_WINGS: Span = Span::from_millis(1_500);
 const TURNS_OVER: Span = Span::from_millis(700);
-/// What is level and still by its sensors for so long is not turned over.
+const SINKS: Span = Span::from_millis(500);
+/// A vehicle that is level and still by its sensors for so long is not turned over.
 const LEVEL: Span = Span::from_millis(500);
 /// Rotors that pull downwards for a moment more than level, by the estimator's attitude alone.
 const OVERTURNED_DEG: f32 = 100.0;
-const SINKS: Span = Span::from_millis(500);
-/// A sink that is wanted so lately, and is followed within this, m/s, is what the autopilot was told to do.
-const WANTED_AGE: Span = Span::from_secs(1);
+/// A setpoint is followed if it is no older, and the vehicle sinks no faster than it by this, m/s.
+const SETPOINT_AGE: Span = Span::from_secs(1);
 const FOLLOWS_MPS: f32 = 2.0;
-/// So much height is lost with all the thrust by what stalls, or has lost a propeller; gusts take less.
+/// A vehicle that stalls or has lost a propeller loses so much height with all its thrust, m; gusts take less.
 const LOST_M: f32 = 7.0;
-/// What sinks slower than this with all its thrust follows a glide path against the wind, m/s: a height is forgotten so fast.
+/// A vehicle that sinks slower with all its thrust follows a glide path against the wind, m/s.
 const GLIDES_MPS: f32 = 1.0;
-/// A bank in which all the thrust may not carry what hangs on rotors, rad.
+/// A bank in which all the thrust may not carry a multicopter, rad.
 const BANKS_RAD: f32 = 0.6;
-/// 45 degrees, and about 90 degrees a second: what leans so far, or turns so fast, is not carried by its thrust.
+/// 45 degrees, and about 90 degrees a second: beyond, its thrust does not carry it.
 const LEANS_RAD: f32 = 0.785;
 const TURNS_RADPS: f32 = 1.5;
 /// All the throttle of a plane, which may need most of it on a steep path against the wind.
 const FULL_ON_WINGS: f32 = 0.97;
-/// Wings pull out of a dive with so much at most: the limit of CS-23 for the aerobatic category.
-const PULL_OUT_G: f32 = 6.0;
+/// Samples, one after the other, before anything is believed.
+const SAMPLES: u8 = 3;
 
-impl Mishap {
+/// How long something has been so, and in how many samples.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Lasting {
+    since: Instant,
+    samples: u8,
+    last: Instant,
+}
+
+impl Lasting {
+    pub(super) const NOT: Self = Self { since: Instant::ZERO, samples: 0, last: Instant::ZERO };
+
+    /// For how long it has been so, once there were enough samples.
+    fn take(&mut self, at: Instant, so: bool) -> Option<Span> {
+        if !so {
+            self.samples = 0;
+            return None;
+        }
+        if self.samples == 0 || at.since(self.last) > FRESH {
+            (self.since, self.samples) = (at, 0);
+        }
+        self.last = at;
+        self.samples = self.samples.saturating_add(1);
+        (self.samples >= SAMPLES).then(|| at.since(self.since))
+    }
+
+    /// Whether it was so in the last samples, for so long.
+    fn lasts(&self, now: Instant, span: Span) -> bool {
+        self.samples >= 2 && now.since(self.last) <= FRESH && now.since(self.since) >= span
+    }
+}
+
+/// A shock, and its effect.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Shock {
+    at: Instant,
+    pub(super) load_g: f32,
+    /// Speed just before it, m/s; 0 if the estimator is not to be believed.
+    speed_mps: f32,
+    /// Sink just before it, m/s.
+    pub(super) sink_mps: f32,
+    /// The speed broke off.
+    stopped: bool,
+    /// Little carried the vehicle just before.
+    dropped: bool,
+    /// It hit something, if it lies still soon.
+    pub(super) has_hit: bool,
+}
+
+impl Flight {
     /// Takes an observation that the vehicle took.
-    pub(crate) fn observe(
-        &mut self,
-        at: Instant,
-        vehicle: &Vehicle,
-        observation: &Observation,
-        params: &Params,
-    ) {
-        let watched = self.armed
-            || self.unheard.is_some()
-            || matches!(self.state, State::Going(_))
-            || self.disarmed_at.is_some_and(|since| at.since(since) <= WATCHED);
+    pub fn observe(&mut self, at: Instant, vehicle: &Vehicle, observation: &Observation, params: &Params) {
+        self.estimate(at, vehicle, observation);
+        let watched = self.powered
+            || self.link.is_some()
+            || matches!(self.stage, Stage::Falling | Stage::Impacted)
+            || self.off_at.is_some_and(|since| at.since(since) <= WATCHED);
         if !watched || vehicle.kind() == VehicleKind::Surface {
             return;
         }
@@ -76,17 +135,10 @@ impl Mishap {
             self.heard_at = at;
         }
         match observation {
-            Observation::Imu(imu) if imu.instance == 0 => self.take_imu(at, imu, vehicle, params),
-            Observation::ImuAndAir(imu, air) => {
-                if air.instance == 0 {
-                    self.take_pressure(at, air);
-                }
-                if imu.instance == 0 {
-                    self.take_imu(at, imu, vehicle, params);
-                }
+            Observation::Imu(imu) | Observation::ImuAndAir(imu, _) if imu.instance == 0 => {
+                self.take_imu(at, imu, vehicle, params);
             }
             Observation::Shock(force) => self.take_shock(at, force.0 / GRAVITY, vehicle, params),
-            Observation::Air(air) if air.instance == 0 => self.take_pressure(at, air),
             Observation::Attitude(attitude) => {
                 self.take_attitude(at, attitude, vehicle, params);
                 if let Some(rates) = attitude.rates {
@@ -96,7 +148,6 @@ impl Mishap {
             Observation::GlobalPosition(_) | Observation::LocalPosition(_) => {
                 self.take_motion(at, vehicle, params);
             }
-            Observation::Hud(_) => self.note_throttle(at, vehicle),
             _ => {}
         }
     }
@@ -110,9 +161,24 @@ impl Mishap {
         }
     }
 
-    fn take_pressure(&mut self, at: Instant, air: &Air) {
-        if let Some(pressure) = air.pressure.filter(|pressure| pressure.0.is_finite()) {
-            self.pressure.take(at, pressure.0);
+    /// The estimators take what they use.
+    fn estimate(&mut self, at: Instant, vehicle: &Vehicle, observation: &Observation) {
+        match observation {
+            Observation::Air(air) | Observation::ImuAndAir(_, air) if air.instance == 0 => {
+                if let Some(pressure) = air.pressure {
+                    self.pressure.take(at, pressure.0);
+                }
+            }
+            Observation::Hud(_) if self.powered => {
+                let hovers = vehicle.is_multicopter()
+                    && self.airborne()
+                    && !self.stage.is_mishap()
+                    && self.shock.is_none()
+                    && climb_mps(at, vehicle).is_some_and(|climb_mps| climb_mps.abs() < STILL_MPS)
+                    && self.is_away(at, vehicle);
+                self.thrust.take(at, throttle(at, vehicle).unwrap_or(0.0), hovers);
+            }
+            _ => {}
         }
     }
 
@@ -125,8 +191,9 @@ impl Mishap {
         if self.seen.is_none() || kind == Kind::Disarmed {
             self.seen = Some(kind);
         }
-        if let State::Going(last) = &mut self.state {
-            *last = at;
+        self.seen_at = at;
+        if kind == Kind::Impact && self.stage == Stage::Falling {
+            self.stage = Stage::Impacted;
         }
     }
 
@@ -143,9 +210,6 @@ impl Mishap {
         self.take_shock(at, load_g, vehicle, params);
         self.felt_at = at;
         (self.load_g, self.from_above_g) = (load_g, force[2].0 / GRAVITY);
-        if load_g >= DROPS_G {
-            self.carried_at = at;
-        }
         let falls = load_g < FALL_G && on_rotors(at, vehicle) && self.asks_for_thrust(at, vehicle);
         let least_s = params.get(Param::MisFallTime);
         if let Some(span) = self.falls.take(at, falls)
@@ -153,11 +217,11 @@ impl Mishap {
         {
             self.see(at, Kind::FreeFall, span.as_secs_f32(), params);
         }
-        self.uncarried.take(at, load_g < UNCARRIED_G);
-        if self.uncarried.lasts(at, UNCARRIED)
-            && let Some(doubt) = &mut self.doubt
+        self.unloaded.take(at, load_g < UNLOADED_G);
+        if self.unloaded.lasts(at, UNLOADED)
+            && let Some(watch) = &mut self.watch
         {
-            doubt.uncarried = true;
+            watch.is_unloaded = true;
         }
         let limit_deg = params.get(Param::MisOverturn);
         if let Some(tilt_deg) = self.lies_turned(at, vehicle).map(f32::to_degrees)
@@ -181,14 +245,12 @@ impl Mishap {
             let shock = before.unwrap_or(Shock {
                 at,
                 load_g,
-                speed_mps: if is_believed(vehicle, params) { self.speed.greatest(at) } else { 0.0 },
-                sink_mps: self.sink.greatest(at),
+                speed_mps: if is_believed(vehicle, params) { self.motion.speed.greatest(at) } else { 0.0 },
+                sink_mps: self.motion.sink.greatest(at),
                 stopped: false,
-                hit: false,
+                has_hit: false,
                 dropped: self.shock.is_some_and(|shock| shock.dropped)
-                    || (self.load_g < DROPS_G
-                        && at.since(self.carried_at) >= DROPS
-                        && on_rotors(at, vehicle)),
+                    || (self.unloaded.lasts(at, DROPS) && on_rotors(at, vehicle)),
             });
             if self.shock.is_none() && self.worst[Kind::Impact as usize] == 0.0 {
                 (self.hit_at, self.unheard_from) = (at, None);
@@ -197,7 +259,7 @@ impl Mishap {
             let greatest_g = self.shock.map_or(load_g, |before| before.load_g.max(load_g));
             self.shock = Some(Shock { load_g: greatest_g, ..shock });
             let pulled_out = !on_rotors(at, vehicle) && load_g <= PULL_OUT_G;
-            if matches!(self.state, State::Going(_)) && !pulled_out {
+            if matches!(self.stage, Stage::Falling | Stage::Impacted) && !pulled_out {
                 self.see(at, Kind::Impact, load_g, params);
             }
         }
@@ -208,7 +270,7 @@ impl Mishap {
         if !rate.is_finite() {
             return;
         }
-        self.rate = rate;
+        self.rate_radps = rate;
         let rate_dps = rate.to_degrees();
         let tumbles = rate_dps > params.get(Param::MisTumble) && !is_made_to_turn(vehicle);
         let least = if on_rotors(at, vehicle) { TUMBLES } else { TUMBLES_ON_WINGS };
@@ -221,15 +283,15 @@ impl Mishap {
     fn take_attitude(&mut self, at: Instant, attitude: &Attitude, vehicle: &Vehicle, params: &Params) {
         let Attitude { roll, pitch, .. } = attitude;
         let most = libm::fabsf(roll.0).max(libm::fabsf(pitch.0));
-        if (most > LEANS_RAD || self.rate > TURNS_RADPS) && self.armed {
-            self.tilted_at = Stamp::at(at);
+        if (most > LEANS_RAD || self.rate_radps > TURNS_RADPS) && self.powered {
+            self.tilted_at = Some(at);
         }
         // Below 86 degrees of each, no cosine is asked for: this is done with each attitude.
         let tilts = most > 1.5;
         let tilt_deg =
             if tilts { libm::acosf(libm::cosf(roll.0) * libm::cosf(pitch.0)).to_degrees() } else { 0.0 };
         let over = tilt_deg > OVERTURNED_DEG.max(params.get(Param::MisOverturn))
-            && self.armed
+            && self.powered
             && on_rotors(at, vehicle)
             && !is_made_to_turn(vehicle)
             && !vehicle.inertial.contradicts(at)
@@ -250,14 +312,14 @@ impl Mishap {
         {
             shock.stopped |= speed_mps < BROKEN_OFF * shock.speed_mps;
         }
-        self.speed.take(at, speed_mps);
+        self.motion.speed.take(at, speed_mps);
         // What breaks off in a mishap is the touch, where the estimate is not lost.
-        let goes = matches!(self.state, State::Going(_));
-        let lost = goes && self.has_strayed(at);
-        if goes && !lost && -climb_mps < BROKEN_OFF * self.sink.greatest(at) {
-            self.touch(at, self.sink.greatest(at));
+        let goes = matches!(self.stage, Stage::Falling | Stage::Impacted);
+        let lost = goes && self.motion.has_strayed(at);
+        if goes && !lost && -climb_mps < BROKEN_OFF * self.motion.sink.greatest(at) {
+            self.touch(at, self.motion.sink.greatest(at));
         }
-        self.sink.take(at, -climb_mps);
+        self.motion.sink.take(at, -climb_mps);
         if !lost {
             self.take_sink(at, -climb_mps, vehicle, params);
         }
@@ -265,7 +327,7 @@ impl Mishap {
 
     /// It touched with this sink, where the air pressure does not contradict it: an estimate that is lost has any speed.
     pub(super) fn touch(&mut self, at: Instant, sink_mps: f32) {
-        if self.pressure.agrees(at, sink_mps) != Some(false) {
+        if self.pressure.follows(at, -sink_mps) != Some(false) {
             self.touch_mps = self.touch_mps.max(sink_mps);
         }
     }
@@ -273,7 +335,7 @@ impl Mishap {
     fn take_sink(&mut self, at: Instant, sink_mps: f32, vehicle: &Vehicle, params: &Params) {
         let limit_mps = params.get(Param::MisSink);
         let on_wings = vehicle.hovers(at) == Some(false);
-        let least = if on_wings { FULL_ON_WINGS } else { FULL_THROTTLE };
+        let least = if on_wings { FULL_ON_WINGS } else { FULL };
         let full = throttle(at, vehicle).is_some_and(|part| part >= least);
         let by_hand = has_pilots_throttle(vehicle);
         let told_to = || by_hand || is_told_to_sink(at, sink_mps, limit_mps, vehicle);
@@ -285,8 +347,8 @@ impl Mishap {
             None => false,
         };
         let by_display = || is_believed(vehicle, params) && is_displayed(at, sink_mps, vehicle);
-        let believed = || self.pressure.agrees(at, sink_mps).unwrap_or_else(by_display);
-        let sinks = sinks && self.armed && believed();
+        let believed = || self.pressure.follows(at, -sink_mps).unwrap_or_else(by_display);
+        let sinks = sinks && self.powered && believed();
         if self.sinks.take(at, sinks).is_some_and(|span| span >= SINKS) {
             self.see(at, Kind::Sinking, sink_mps, params);
         }
@@ -295,7 +357,7 @@ impl Mishap {
     /// How far it is below the highest that it was since it has had all its thrust, but for what a glide path takes.
     fn lose_height(&mut self, at: Instant, thrust: bool, vehicle: &Vehicle) -> f32 {
         let since_s = at.since(core::mem::replace(&mut self.peak_at, at)).as_secs_f32();
-        let height_m = height_m(at, vehicle).filter(|_| thrust && self.armed);
+        let height_m = height_m(at, vehicle).filter(|_| thrust && self.powered);
         let faded_m = self.peak_m - GLIDES_MPS * since_s;
         self.peak_m = height_m.map_or(f32::NEG_INFINITY, |height_m| faded_m.max(height_m));
         height_m.map_or(0.0, |height_m| self.peak_m - height_m)
@@ -303,15 +365,87 @@ impl Mishap {
 
     /// Whether the throttle asks for thrust; not known is yes. Thrown into the air to start (`ArduCopter`'s THROW), it falls.
     fn asks_for_thrust(&self, at: Instant, vehicle: &Vehicle) -> bool {
-        let asks = |part: f32| part > self.support.idle_throttle() && !self.support.is_little(part);
+        let asks = |part: f32| self.thrust.power(part) != Power::Idle;
         !is_thrown(vehicle) && throttle(at, vehicle).is_none_or(asks)
+    }
+
+    /// A shock after which it is still, and nothing carries it in the air.
+    pub(super) fn judge_shock(&mut self, now: Instant, vehicle: &Vehicle, params: &Params) {
+        let Some(shock) = self.shock else { return };
+        if now.since(shock.at) > AFTER_SHOCK {
+            self.shock = None;
+            return;
+        }
+        let power = self.power(now, vehicle);
+        let lands = !on_rotors(now, vehicle)
+            && shock.sink_mps < FLARED_MPS
+            && shock.speed_mps < SKIDS_MPS
+            && power.is_none_or(|power| power == Power::Idle);
+        let hard = shock.load_g > LEGS_G || shock.sink_mps > LEGS_MPS;
+        let stopped = shock.stopped && shock.speed_mps >= IMPACT_MPS && hard && !lands;
+        // A vehicle that was not seen to fly may be knocked, and lie on its back for its battery.
+        let has_hit = stopped
+            || (self.first_at.is_none()
+                && ((shock.dropped && shock.load_g > LEGS_G)
+                    || (on_rotors(now, vehicle) && is_tilted(now, vehicle))
+                    || self.lies_on_its_back(vehicle)));
+        self.shock = Some(Shock { has_hit, ..shock });
+        let rests = self.still_since.is_some_and(|since| !shock.at.is_after(since)) && self.is_still(now);
+        if has_hit && rests && self.hangs_not(now, vehicle, power) {
+            self.touch_mps = self.touch_mps.max(shock.sink_mps);
+            self.see(now, Kind::Impact, shock.load_g, params);
+            self.shock = None;
+        }
+    }
+
+    /// Whether a vehicle that is still does not hang in the air: off, on the ground by its word, on its side, without thrust or with all of
+    /// it.
+    fn hangs_not(&self, now: Instant, vehicle: &Vehicle, power: Option<Power>) -> bool {
+        !self.powered
+            || self.calls_itself_landed(now, vehicle)
+            || self.lies(now, vehicle)
+            || matches!(power, Some(Power::Idle | Power::Full))
+    }
+
+    /// Whether a sign outside of a flight is the work of its own rotors, and of no hand: it had throttle just now, and the inertial messages show
+    /// it.
+    pub(super) fn is_turned_over(&self, now: Instant, vehicle: &Vehicle, kind: Kind) -> bool {
+        self.was_driven(now)
+            && on_rotors(now, vehicle)
+            && (kind == Kind::Tumbling || self.lies_turned(now, vehicle).is_some())
+    }
+
+    /// How far it lies over, rad, if it stood level while it was armed and turned since.
+    fn lies_turned(&self, now: Instant, vehicle: &Vehicle) -> Option<f32> {
+        let over = vehicle.inertial.lies_over(now)?;
+        let turned = self.stood && !vehicle.inertial.turns_little(now, DRIVEN);
+        (turned && !is_fast(now, vehicle)).then_some(over)
+    }
+
+    fn was_driven(&self, now: Instant) -> bool {
+        self.thrust.was_driven(now, DRIVEN) == Some(true)
+    }
+
+    /// Whether a shock was seen that is an impact if it lies still soon.
+    pub(super) fn may_have_hit(&self) -> bool {
+        self.shock.is_some_and(|shock| shock.has_hit)
+    }
+
+    /// Whether the last shock followed a fall.
+    pub(super) fn was_dropped(&self) -> bool {
+        self.shock.is_some_and(|shock| shock.dropped)
+    }
+
+    /// Whether nothing carries it just now: a vehicle that flew is in the air, though its autopilot may call it landed.
+    pub fn is_unloaded(&self) -> bool {
+        self.unloaded.lasts(self.heard_at, UNLOADED)
     }
 }
 
 /// Whether the autopilot wants it to sink faster than the limit, and it does not sink much faster than that: a mission, a script or an
 /// offboard computer asks for it.
 fn is_told_to_sink(at: Instant, sink_mps: f32, limit_mps: f32, vehicle: &Vehicle) -> bool {
-    let wanted_mps = vehicle.climb_wanted.within(at, WANTED_AGE).map(|climb| -climb.0);
+    let wanted_mps = vehicle.climb_wanted.within(at, SETPOINT_AGE).map(|climb| -climb.0);
     wanted_mps.is_some_and(|wanted_mps| wanted_mps > limit_mps && sink_mps < wanted_mps + FOLLOWS_MPS)
 }
 
@@ -319,7 +453,7 @@ fn is_told_to_sink(at: Instant, sink_mps: f32, limit_mps: f32, vehicle: &Vehicle
 fn is_told_to_bank(at: Instant, vehicle: &Vehicle) -> bool {
     vehicle
         .wanted
-        .within(at, WANTED_AGE)
+        .within(at, SETPOINT_AGE)
         .is_some_and(|[roll, pitch]| vehicle.is_multicopter() && roll.0.abs().max(pitch.0.abs()) > BANKS_RAD)
 }
 
@@ -331,4 +465,16 @@ fn is_displayed(at: Instant, sink_mps: f32, vehicle: &Vehicle) -> bool {
     climb_mps
         .filter(|climb_mps| libm::fabsf(*climb_mps) > 0.0)
         .is_none_or(|climb_mps| -climb_mps > PART * sink_mps)
+}
+
+/// Whether the estimator's speeds are to be believed, by its own word: shaking sensors mislead it.
+fn is_believed(vehicle: &Vehicle, params: &Params) -> bool {
+    vehicle.estimator.get().is_none_or(|estimator| {
+        let limit = match estimator.scale {
+            EstimatorScale::Variance => Param::EkfVarWarn,
+            EstimatorScale::TestRatio => Param::EkfRatioCrit,
+        };
+        let of_motion = [estimator.velocity, estimator.position_vertical].into_iter().flatten();
+        of_motion.reduce(f32::max).is_none_or(|worst| worst <= params.get(limit))
+    })
 }

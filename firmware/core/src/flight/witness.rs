@@ -1,0 +1,366 @@
+//! The witnesses of flight: each says that the vehicle flies, that it stands, or neither.
+//!
+//! | witness | it flies | it stands |
+//! |---|---|---|
+//! | word | landed state "in air" or "landing", with power | landed state "on ground", newer than a termination |
+//! | height | more than 1.5 m above the place of arming, by pressure or position | within 1 m of it, 1.5 m in a mishap; motors off, and the pressure steady for 3 s |
+//! | thrust | the throttle carries it ([`crate::thrust`]) | idle, off, all of it without a climb; or it lies over, where rotors carry nothing |
+//! | inertial | nothing carries it; it turned fast within a second | on rotors: level and still with idle throttle; no vibration of rotors and no height; it hit something; it lies over |
+//! | speed | faster than 1.5 m/s, up, down or over ground; wings: 8 m/s | slow, and no throttle that carries it; the receiver stands and the estimate moves |
+//!
+//! Pressure and position that contradict each other say nothing of the height. An estimate that the receiver or the pressure contradicts says
+//! nothing of height and speed ([`crate::motion`]).
+
+use super::{Flight, Stage};
+use crate::mishap::Kind;
+use crate::motion::{
+    CLEAR_M, FRESH, LOW_M, MOVES_MPS, STILL_MPS, WINGS_MPS, airspeed_mps, climb_mps, ground_speed_mps,
+    throttle,
+};
+use crate::observation::{LandedState, VehicleKind};
+use crate::params::Params;
+use crate::pressure::NOISE_M;
+use crate::thrust::Power;
+use crate::time::{Instant, Span};
+use crate::units::{GRAVITY, norm};
+use crate::vehicle::{LANDED_STATE_AGE, Vehicle};
+
+/// 45 degrees: what rests at a greater tilt does not fly, rad.
+const LIES_RAD: f32 = 0.785;
+/// Rotors pull upwards: what carries the vehicle from above by more than this, g, is the ground under its back.
+const ON_BACK_G: f32 = 0.5;
+/// It was level, or did not turn fast, for so long.
+const TURNED: Span = Span::from_secs(1);
+/// With idle throttle, its weight on it and a steady pressure for so long, it stands: a flare takes its weight from the speed over ground for
+/// less.
+const SUPPORTED: Span = Span::from_secs(4);
+/// The weight, g, with the scale error of a sensor; more is a bias, which may be what lost the estimate.
+const WEIGHT_G: core::ops::Range<f32> = 0.85..2.0;
+/// The pressure stays within this meanwhile, m.
+const STAYS_M: f32 = 1.2;
+/// A vehicle without power that has not sunk for so long, by the pressure, is down.
+const STEADY: Span = Span::from_secs(3);
+/// A climb or sink by this, m/s, shows in the pressure, or the estimate is lost.
+const LOST_MPS: f32 = 2.0;
+
+/// What one witness says.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Vote {
+    /// It does not tell.
+    Unknown,
+    Undecided,
+    /// Its height is below the place of arming: a valley, or an estimate that drifts. It is no vote.
+    Below,
+    Flies,
+    Stands,
+}
+use Vote::{Below, Flies, Stands, Undecided, Unknown};
+
+/// A witness: its bit.
+pub(super) const WORD: u8 = 1;
+pub(super) const HEIGHT: u8 = 2;
+pub(super) const THRUST: u8 = 4;
+pub(super) const INERTIAL: u8 = 8;
+pub(super) const SPEED: u8 = 16;
+
+/// What all witnesses say, as bits.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Votes {
+    pub(super) flies: u8,
+    pub(super) stands: u8,
+    pub(super) known: u8,
+}
+
+impl Votes {
+    fn take(&mut self, witness: u8, vote: Vote) {
+        match vote {
+            Unknown => return,
+            Undecided | Below => {}
+            Flies => self.flies |= witness,
+            Stands => self.stands |= witness,
+        }
+        self.known |= witness;
+    }
+
+    /// How many say that it flies, and that it stands.
+    pub(super) const fn count(self) -> (u32, u32) {
+        (self.flies.count_ones(), self.stands.count_ones())
+    }
+}
+
+impl Flight {
+    /// Asks all witnesses.
+    pub(super) fn ask(&self, now: Instant, vehicle: &Vehicle) -> Votes {
+        let mut votes = Votes::default();
+        let is_lost = self.is_lost(now, vehicle);
+        let heights = self.heights(now, vehicle, is_lost);
+        let (word, height) = (self.word(now, vehicle), self.height(now, heights));
+        votes.take(WORD, word);
+        votes.take(HEIGHT, height);
+        if self.stage.is_mishap() && self.lies(now, vehicle) {
+            votes.take(THRUST, Stands);
+            votes.take(INERTIAL, Stands);
+            return votes;
+        }
+        // A hover is slow and still too.
+        let may_hover = (height == Flies || (word == Flies && are_away(heights))) && !self.is_supported(now);
+        let power = self.power(now, vehicle);
+        let speed = self.speed(now, vehicle, is_lost, power, may_hover);
+        votes.take(THRUST, self.thrust_vote(now, vehicle, power, speed));
+        votes.take(INERTIAL, self.inertial(now, vehicle, power, heights, may_hover));
+        votes.take(SPEED, speed);
+        votes
+    }
+
+    fn word(&self, now: Instant, vehicle: &Vehicle) -> Vote {
+        let is_older = vehicle
+            .terminated_since
+            .is_some_and(|since| vehicle.landed.at().is_none_or(|at| !at.is_after(since)));
+        match vehicle.landed.within(now, LANDED_STATE_AGE) {
+            Some(LandedState::OnGround) if !is_older => Stands,
+            Some(LandedState::InAir | LandedState::Landing) if self.powered => Flies,
+            // Taking off: from the spooling up of the motors until the height that was asked for is reached.
+            None | Some(LandedState::TakingOff | LandedState::Unknown) => Unknown,
+            Some(_) => Undecided,
+        }
+    }
+
+    /// Whether its autopilot says that it is on the ground.
+    pub(super) fn calls_itself_landed(&self, now: Instant, vehicle: &Vehicle) -> bool {
+        self.word(now, vehicle) == Stands
+    }
+
+    /// Height above the place of arming, by pressure and by position.
+    fn heights(&self, now: Instant, vehicle: &Vehicle, is_lost: bool) -> [Vote; 2] {
+        let by_position = self.motion.rise_m(now, vehicle).filter(|_| !is_lost);
+        let lows_m = if self.stage.is_mishap() { [CLEAR_M; 2] } else { [NOISE_M, LOW_M] };
+        let mut heights = [Unknown; 2];
+        for ((vote, height_m), low_m) in
+            heights.iter_mut().zip([self.pressure.height_m(now), by_position]).zip(lows_m)
+        {
+            *vote = match height_m {
+                None => Unknown,
+                Some(height_m) if height_m > CLEAR_M => Flies,
+                Some(height_m) if height_m < -CLEAR_M => Below,
+                Some(height_m) if height_m.abs() < low_m => Stands,
+                Some(_) => Undecided,
+            };
+        }
+        heights
+    }
+
+    fn height(&self, now: Instant, heights: [Vote; 2]) -> Vote {
+        if !self.powered && self.stage.is_mishap() {
+            let passed = self.off_at.map_or(Span::ZERO, |since| now.since(since));
+            let steady_for = self.pressure.steady_for(now).map(|span| span.min(passed));
+            return steady_for.map_or(Unknown, |span| if span >= STEADY { Stands } else { Flies });
+        }
+        match heights {
+            [Undecided | Below | Unknown, one] if one != Unknown => one,
+            [one, Undecided | Below | Unknown] => one,
+            [one, other] if one == other => one,
+            _ => Undecided,
+        }
+    }
+
+    /// Whether its height is another one than that of the place of arming.
+    pub(super) fn is_away(&self, now: Instant, vehicle: &Vehicle) -> bool {
+        are_away(self.heights(now, vehicle, self.is_lost(now, vehicle)))
+    }
+
+    /// What the throttle does; `None` if nobody tells, or it is zero in a log while motors shake the vehicle.
+    pub(super) fn power(&self, now: Instant, vehicle: &Vehicle) -> Option<Power> {
+        let power = throttle(now, vehicle).map(|part| self.thrust.power(part));
+        power.filter(|power| {
+            *power != Power::Idle || self.thrust.has_flown() || vehicle.inertial.shakes(now) != Some(true)
+        })
+    }
+
+    fn thrust_vote(&self, now: Instant, vehicle: &Vehicle, power: Option<Power>, speed: Vote) -> Vote {
+        if !self.powered {
+            return Stands;
+        }
+        let on_wings = is_on_wings(now, vehicle);
+        match power {
+            None => Unknown,
+            // Wings glide.
+            Some(Power::Idle) if on_wings && speed == Flies => Undecided,
+            Some(Power::Idle) => Stands,
+            Some(Power::Little) => Undecided,
+            // With all its thrust it would climb.
+            Some(Power::Full)
+                if !on_wings
+                    && !climb_mps(now, vehicle).is_some_and(|climb_mps| climb_mps.abs() > STILL_MPS) =>
+            {
+                Stands
+            }
+            Some(Power::Carries | Power::Full) => Flies,
+        }
+    }
+
+    fn inertial(
+        &self,
+        now: Instant,
+        vehicle: &Vehicle,
+        power: Option<Power>,
+        heights: [Vote; 2],
+        may_hover: bool,
+    ) -> Vote {
+        if self.stage.has_hit() {
+            return Stands;
+        }
+        if self.felt_at == Instant::ZERO {
+            return Unknown;
+        }
+        let turns = !vehicle.inertial.turns_little(now, TURNED);
+        if self.airborne() && (self.is_unloaded() || turns) {
+            return Flies;
+        }
+        if is_on_wings(now, vehicle) {
+            return Undecided;
+        }
+        let rests = power == Some(Power::Idle) && vehicle.inertial.is_level(now) && !may_hover;
+        // Simulators have no vibration.
+        let [by_pressure, by_position] = heights;
+        let is_quiet = (vehicle.inertial.is_calm(now) && by_pressure == Stands)
+            || ((vehicle.inertial.shakes(now) == Some(false) || vehicle.inertial.contradicts(now))
+                && by_position == Stands);
+        if rests || is_quiet || self.is_supported(now) { Stands } else { Undecided }
+    }
+
+    fn speed(
+        &self,
+        now: Instant,
+        vehicle: &Vehicle,
+        is_lost: bool,
+        power: Option<Power>,
+        may_hover: bool,
+    ) -> Vote {
+        let climb_mps = climb_mps(now, vehicle);
+        let ground_mps = ground_speed_mps(now, vehicle);
+        let is_over =
+            |speed_mps: Option<f32>, limit_mps| speed_mps.is_some_and(|speed_mps| speed_mps > limit_mps);
+        if is_on_wings(now, vehicle) {
+            let air_mps = airspeed_mps(now, vehicle);
+            // Wind alone is no flight.
+            let has_thrust = matches!(power, Some(Power::Carries | Power::Full));
+            let by_air = is_over(air_mps, WINGS_MPS) && (self.airborne() || has_thrust);
+            return if ground_mps.or(air_mps).is_none() {
+                Unknown
+            } else if by_air || is_over(ground_mps, WINGS_MPS) {
+                Flies
+            } else if is_over(ground_mps, WINGS_MPS / 2.0) || is_over(air_mps, WINGS_MPS / 2.0) {
+                Undecided
+            } else {
+                Stands
+            };
+        }
+        if is_lost {
+            return if self.has_strayed(now) { Stands } else { Unknown };
+        }
+        if ground_mps.or(climb_mps).is_none() || matches!(self.stage, Stage::Ground | Stage::Touched) {
+            return Unknown;
+        }
+        let vertical_mps = climb_mps.map(f32::abs);
+        // An estimate is shaken by an impact: only a climb is believed.
+        let moves = if self.stage.has_hit() {
+            is_over(climb_mps, STILL_MPS)
+        } else {
+            is_over(ground_mps, MOVES_MPS) || is_over(vertical_mps, MOVES_MPS)
+        };
+        let is_slow = !is_over(ground_mps, STILL_MPS) && !is_over(vertical_mps, STILL_MPS);
+        let hovers =
+            self.powered && (power == Some(Power::Carries) || (may_hover && !self.stage.is_mishap()));
+        match (moves, is_slow && !hovers) {
+            (true, _) => Flies,
+            (false, true) => Stands,
+            (false, false) => Undecided,
+        }
+    }
+
+    /// Whether the estimate of height and speed is lost: the pressure does not follow a climb or a sink; or, in a mishap, the receiver stands.
+    fn is_lost(&self, now: Instant, vehicle: &Vehicle) -> bool {
+        let climbs = climb_mps(now, vehicle).filter(|climb_mps| climb_mps.abs() > LOST_MPS);
+        self.has_strayed(now)
+            || climbs.is_some_and(|climb_mps| self.pressure.follows(now, climb_mps) == Some(false))
+    }
+
+    /// A receiver that stands in flight may be stuck.
+    fn has_strayed(&self, now: Instant) -> bool {
+        self.stage.is_mishap() && self.motion.has_strayed(now)
+    }
+
+    /// Whether it lies on its side or its back: by an attitude that the sensors do not contradict, or by the force that carries it. Wings bank,
+    /// and tail-sitters look up.
+    pub(super) fn lies(&self, now: Instant, vehicle: &Vehicle) -> bool {
+        let flies = vehicle.hovers(now) == Some(false) && is_fast(now, vehicle);
+        let is_over = self.stood && on_rotors(now, vehicle) && vehicle.inertial.lies_over(now).is_some();
+        (is_tilted(now, vehicle) && !flies)
+            || self.lies_on_its_back(vehicle)
+            || (is_over && !is_fast(now, vehicle))
+    }
+
+    pub(super) fn lies_on_its_back(&self, vehicle: &Vehicle) -> bool {
+        vehicle.is_multicopter() && self.from_above_g > ON_BACK_G
+    }
+
+    /// Whether something carries it that is not its rotors, by no estimate: for a while it had idle throttle, its weight on it, and a steady
+    /// pressure.
+    pub(super) fn is_supported(&self, now: Instant) -> bool {
+        self.supported.is_some_and(|(since, _)| now.since(since) >= SUPPORTED)
+    }
+
+    /// One step of the same. An autopilot whose estimate climbs takes the thrust away, and flies into the ground.
+    pub(super) fn note_support(&mut self, now: Instant, vehicle: &Vehicle, params: &Params) {
+        let rests = self.powered
+            && self.thrust.is_learnt()
+            && self.power(now, vehicle) == Some(Power::Idle)
+            && now.since(self.felt_at) <= FRESH
+            && WEIGHT_G.contains(&(norm(vehicle.inertial.force()) / GRAVITY))
+            && self.is_slow_to_turn();
+        self.supported = match (self.pressure.now(now).filter(|_| rests), self.supported) {
+            (None, _) => None,
+            (Some(_), Some((since, hpa))) if self.pressure.is_within(hpa, STAYS_M) => Some((since, hpa)),
+            (Some(hpa), _) => Some((now, hpa)),
+        };
+        if let Some((since, _)) = self.supported
+            && self.stage == Stage::Airborne
+            && self.is_supported(now)
+            && self.is_lost(now, vehicle)
+            && (self.pressure.sank_at() + TURNED).is_after(since)
+        {
+            self.hit_at = since;
+            self.see(now, Kind::Impact, 0.0, params);
+        }
+    }
+}
+
+fn are_away(heights: [Vote; 2]) -> bool {
+    heights.iter().any(|vote| matches!(vote, Flies | Below))
+}
+
+/// Whether it hangs on rotors now.
+pub(super) fn on_rotors(now: Instant, vehicle: &Vehicle) -> bool {
+    vehicle.hovers(now) == Some(true)
+}
+
+/// Whether it hangs on wings, or is between rotors and wings.
+pub(super) fn is_on_wings(now: Instant, vehicle: &Vehicle) -> bool {
+    let has_wings = matches!(vehicle.kind(), VehicleKind::Plane | VehicleKind::Vtol);
+    !vehicle.hovers(now).unwrap_or(!has_wings)
+}
+
+/// Whether its attitude is that of a vehicle on its side or its back.
+pub(super) fn is_tilted(now: Instant, vehicle: &Vehicle) -> bool {
+    !vehicle.inertial.contradicts(now)
+        && vehicle
+            .attitude
+            .within(now, FRESH)
+            .is_some_and(|attitude| attitude.roll.0.abs().max(attitude.pitch.0.abs()) > LIES_RAD)
+}
+
+/// Whether it is faster over ground than a vehicle that lies, or is dragged along: the air carries it from ahead besides its rotors.
+pub(super) fn is_fast(now: Instant, vehicle: &Vehicle) -> bool {
+    const DRAGS_MPS: f32 = 12.0;
+    ground_speed_mps(now, vehicle).is_some_and(|speed_mps| speed_mps > DRAGS_MPS)
+}

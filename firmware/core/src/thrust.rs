@@ -1,0 +1,118 @@
+//! Thrust by the throttle that the autopilot gives, against the throttle that the vehicle hovers with.
+//!
+//! Thrust grows at least as fast as the throttle. So below half of the hover throttle rotors carry less than half of the weight. Until that
+//! is learnt, a multicopter hovers at a quarter to three quarters of its throttle and idles below a tenth.
+
+use crate::motion::IDLE_THROTTLE;
+use crate::time::{Instant, Span};
+
+/// From this on it may fly as long as the hover throttle is not known.
+pub(crate) const CARRIES: f32 = 0.2;
+/// All of it. Controllers keep some back for attitude.
+pub(crate) const FULL: f32 = 0.95;
+/// The part of the hover throttle below which rotors do not carry the vehicle.
+const HOVER_PART: f32 = 0.5;
+/// Time constant of the hover throttle, and how long a hover is until it is known, s.
+const HOVER_S: f32 = 10.0;
+/// Throttles come more often than this, s.
+const STEP_MAX_S: f32 = 2.0;
+
+/// What a throttle does to a vehicle.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Power {
+    /// It does not carry the vehicle.
+    Idle,
+    /// It may be that of idling or of hovering rotors.
+    Little,
+    /// It carries the vehicle.
+    Carries,
+    /// It would climb.
+    Full,
+}
+
+/// The estimator of the thrust.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Thrust {
+    hover: f32,
+    hovered_s: f32,
+    at: Instant,
+    /// When it was armed with more than idling throttle last; zero for never.
+    driven_at: Instant,
+    /// The throttle was that of flight since the arming: its values mean something.
+    has_flown: bool,
+}
+
+impl Thrust {
+    pub(crate) const UNKNOWN: Self =
+        Self { hover: 0.0, hovered_s: 0.0, at: Instant::ZERO, driven_at: Instant::ZERO, has_flown: false };
+
+    /// Armed anew, perhaps with another payload.
+    pub(crate) fn forget(&mut self) {
+        (self.hovered_s, self.has_flown) = (0.0, false);
+    }
+
+    /// Takes a throttle of an armed vehicle, which hovers or not.
+    pub(crate) fn take(&mut self, at: Instant, part: f32, hovers: bool) {
+        let step_s = at.since(core::mem::replace(&mut self.at, at)).as_secs_f32().min(STEP_MAX_S);
+        if part > self.idle().min(IDLE_THROTTLE) {
+            self.driven_at = at;
+        }
+        self.has_flown |= part >= CARRIES;
+        if hovers {
+            let weight = if self.hover > 0.0 { step_s / (HOVER_S + step_s) } else { 1.0 };
+            self.hover += weight * (part - self.hover);
+            self.hovered_s += step_s;
+        }
+    }
+
+    /// Whether the hover throttle is known.
+    pub(crate) fn is_learnt(&self) -> bool {
+        self.hovered_s >= HOVER_S
+    }
+
+    /// The throttle below which nothing flies.
+    fn idle(&self) -> f32 {
+        if self.is_learnt() { HOVER_PART * self.hover } else { IDLE_THROTTLE }
+    }
+
+    /// What a throttle does.
+    pub(crate) fn power(&self, part: f32) -> Power {
+        let carries = if self.is_learnt() { self.idle() } else { CARRIES };
+        match part {
+            part if part >= FULL => Power::Full,
+            part if part >= carries => Power::Carries,
+            part if part >= self.idle() => Power::Little,
+            _ => Power::Idle,
+        }
+    }
+
+    /// Whether the throttle was that of flight since the arming.
+    pub(crate) const fn has_flown(&self) -> bool {
+        self.has_flown
+    }
+
+    /// Whether it had more than idling throttle within so long; `None` if it never had any, or tells none.
+    pub(crate) fn was_driven(&self, now: Instant, within: Span) -> Option<bool> {
+        (self.driven_at != Instant::ZERO).then(|| now.since(self.driven_at) <= within)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_vehicle_that_hovers_with_little_throttle_is_carried_by_it() {
+        let mut thrust = Thrust::UNKNOWN;
+        assert_eq!(
+            [0.05, 0.15, 0.4, 0.95].map(|part| thrust.power(part)),
+            [Power::Idle, Power::Little, Power::Carries, Power::Full]
+        );
+        for at_ms in (0..12_000).step_by(200) {
+            thrust.take(Instant::from_millis(at_ms), 0.09, true);
+        }
+        assert_eq!([0.03, 0.09].map(|part| thrust.power(part)), [Power::Idle, Power::Carries]);
+        thrust.forget();
+        assert_eq!(thrust.power(0.09), Power::Idle, "with another payload");
+    }
+}
