@@ -26,7 +26,7 @@ const ROOT: &str = "all.xml";
 const READ_FROM: &str = "ardupilotmega.xml";
 
 /// Those that are. A structure is generated for each; all of a dialect would take a compiler half a minute.
-const READ: [&str; 38] = [
+const READ: &[&str] = &[
     "AHRS2",
     "ATTITUDE",
     "ATTITUDE_TARGET",
@@ -118,7 +118,7 @@ fn write_structures(definitions: &Path) -> Result<()> {
     }
     let enumerations =
         read.iter().flat_map(|message| &message.fields).map(|field| field.enumeration.as_str());
-    let kept: BTreeSet<&str> = READ.into_iter().chain(enumerations).collect();
+    let kept: BTreeSet<&str> = READ.iter().copied().chain(enumerations).collect();
     let folder = out.join("definitions");
     fs::create_dir_all(&folder)?;
     for name in &files {

@@ -676,3 +676,10 @@ pub enum Observation {
         takeoff_boot_ms: u32,
     },
 }
+
+impl Observation {
+    /// Whether another component than the autopilot may send it: such a one may be received while the autopilot is not.
+    pub(crate) const fn may_be_of_another_component(&self) -> bool {
+        matches!(self, Self::TelemetryRadio(_) | Self::Battery(_) | Self::Escs(_) | Self::Engine(_))
+    }
+}

@@ -330,11 +330,11 @@ impl Vehicle {
         true
     }
 
-    /// Batteries, ESCs and engines may be components of their own; a radio is a system of its own (51, 68).
+    /// A radio is a system of its own (51, 68).
     fn concerns(&self, source: Source, observation: &Observation) -> bool {
         match observation {
             Observation::TelemetryRadio(_) => true,
-            Observation::Battery(_) | Observation::Escs(_) | Observation::Engine(_) => {
+            _ if observation.may_be_of_another_component() => {
                 self.source.is_some_and(|vehicle| vehicle.system == source.system)
             }
             _ => self.source == Some(source),

@@ -68,7 +68,7 @@ fn fly(settings: &[(&str, f32)], fault: Fault) -> Vec<Finding> {
     findings
 }
 
-const FAULTS: [(&str, u8, Level, Fault); 98] = [
+const FAULTS: &[(&str, u8, Level, Fault)] = &[
     ("batt_remaining", 0, Level::Critical, |quad, _| quad.battery.remaining = Some(Fraction(0.05))),
     ("batt_remaining", 1, Level::Critical, |_, more| {
         let remaining = Some(Fraction(0.05));
@@ -307,7 +307,7 @@ fn radio(more: &mut Vec<Observation>, rssi: [u8; 2], noise: [u8; 2]) {
 
 #[test]
 fn every_check_finds_what_it_is_there_for_in_time() {
-    for (name, instance, level, fault) in FAULTS {
+    for &(name, instance, level, fault) in FAULTS {
         let check = checks().find(|check| check.name == name).expect(name);
         let findings = fly(&LIMITS, fault);
         let mut mine =

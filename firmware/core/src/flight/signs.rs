@@ -123,15 +123,7 @@ impl Flight {
         if !watched || vehicle.kind() == VehicleKind::Surface {
             return;
         }
-        // A radio, a battery or an engine may be heard while the autopilot is not.
-        let of_others = matches!(
-            observation,
-            Observation::TelemetryRadio(_)
-                | Observation::Battery(_)
-                | Observation::Escs(_)
-                | Observation::Engine(_)
-        );
-        if !of_others {
+        if !observation.may_be_of_another_component() {
             self.heard_at = at;
         }
         match observation {

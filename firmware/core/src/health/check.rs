@@ -156,12 +156,12 @@ impl Debounce {
     pub const NONE: Self = Self(0);
 
     /// In milliseconds.
-    pub const fn millis(millis: u16) -> Self {
+    pub(super) const fn millis(millis: u16) -> Self {
         Self(millis)
     }
 
     /// In seconds, up to 65.
-    pub const fn secs(secs: u16) -> Self {
+    pub(super) const fn secs(secs: u16) -> Self {
         assert!(secs <= 65, "a debounce is kept in 16 bits of milliseconds");
         Self(secs * 1_000)
     }
