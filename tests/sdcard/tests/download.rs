@@ -410,3 +410,45 @@ fn a_log_that_the_card_refuses_slowly_is_left_out_of_a_list_and_never_called_emp
         assert!(list(&mut rig) > listed);
     }
 }
+
+/// The ground station's port gets so many bytes a second.
+fn set_budget(rig: &mut Rig, bytes_a_second: f32) {
+    let mut payload = bytes_a_second.to_le_bytes().to_vec();
+    payload.extend([1, 191]);
+    payload.extend(b"GS_BUDGET\0\0\0\0\0\0\0\x09");
+    rig.ask(23, &payload);
+}
+
+#[test]
+fn on_a_slow_line_too_a_burst_ends_with_its_mark() {
+    let medium = with_two_sessions(40, 60);
+    let mut rig = recording(&medium);
+    set_budget(&mut rig, 1_000.0);
+    let length = open(&mut rig, VICTIM);
+    let mut had = 0;
+    for _ in 0..2 {
+        let answers = ftp(&mut rig, BURST, had, 239, &[], 90_000);
+        let (last, before) = answers.split_last().expect("a burst");
+        assert!(before.iter().all(|(_, _, complete, _, data)| !complete && (1..239).contains(&data.len())));
+        had += before.iter().map(|answer| answer.4.len() as u32).sum::<u32>();
+        // MAVProxy takes a shorter message that is complete for the file's end, but not one without data.
+        assert!(last.2 && last.4.is_empty() && last.3 == had, "{last:?} at {had}");
+    }
+    assert!(had < length);
+}
+
+#[test]
+fn a_port_that_is_full_asks_the_card_nothing_again() {
+    let medium = with_two_sessions(40, 20);
+    let mut rig = recording(&medium);
+    set_budget(&mut rig, 100.0);
+    let bytes = |rig: &mut Rig| {
+        let before = rig.slot.counts().bytes;
+        wait(rig, 20_000);
+        rig.slot.counts().bytes - before
+    };
+    let quiet = bytes(&mut rig);
+    rig.ask(117, &[0, 0, 255, 255, 1, 191]);
+    let listing = bytes(&mut rig);
+    assert!(listing < quiet + 500_000, "{listing} bytes over the bus, {quiet} without a list");
+}
