@@ -362,7 +362,7 @@ impl Monitor {
 
     fn step_protect(&mut self, now: Instant) {
         let Self { vehicle, flight, health, params, protect, happenings, .. } = self;
-        let situation = Situation { now, vehicle, flight, mishap: flight.in_mishap(), health, params };
+        let situation = Situation { now, vehicle, flight, health, params };
         if let Some(step) = protect.step(&situation) {
             happenings.push(Happening::Protect(step));
         }

@@ -291,8 +291,6 @@ pub(crate) struct Situation<'a> {
     pub(crate) now: Instant,
     pub(crate) vehicle: &'a Vehicle,
     pub(crate) flight: &'a Flight,
-    /// It falls, tumbles or lies: no command helps.
-    pub(crate) mishap: bool,
     pub(crate) health: &'a Health,
     pub(crate) params: &'a Params,
 }
@@ -300,7 +298,7 @@ pub(crate) struct Situation<'a> {
 impl Situation<'_> {
     fn flies(&self) -> bool {
         self.flight.airborne()
-            && !self.mishap
+            && !self.flight.in_mishap()
             && self.vehicle.armed()
             && self.vehicle.kind() != VehicleKind::Surface
     }

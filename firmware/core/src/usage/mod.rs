@@ -49,7 +49,6 @@ pub struct Usage {
     /// All but what is worked out when it is asked for: the cycles of the load factor.
     totals: Totals,
     touchdown: Touchdown,
-    airborne: bool,
     /// The flight that ends now ends by a mishap.
     crashed: bool,
     /// The hardest touch of this flight.
@@ -82,8 +81,7 @@ impl Usage {
             last: None,
             current_a: None,
             totals: Totals::nothing(),
-            touchdown: Touchdown::new(),
-            airborne: false,
+            touchdown: Touchdown::NONE,
             crashed: false,
             touched_mps: 0.0,
             capacity_ah: 0.0,
@@ -152,7 +150,7 @@ impl Usage {
         if event == Some(FlightEvent::TakeOff) {
             self.totals.add(UsageCounter::Flights, 1.0);
         }
-        if flight.airborne() && !self.airborne {
+        if event.is_some_and(|event| event != FlightEvent::Landing) {
             // It was seen a moment after it happened.
             let late = flight.airborne_since().map_or(Span::ZERO, |since| now.since(since));
             self.totals.add(UsageCounter::Flight, f64::from(late.as_secs_f32()));
@@ -232,8 +230,7 @@ impl Usage {
 
     /// The flight is over, and nobody saw how it ended.
     pub(crate) fn break_off(&mut self) {
-        (self.touchdown, self.airborne, self.crashed, self.touched_mps) =
-            (Touchdown::new(), false, false, 0.0);
+        (self.touchdown, self.crashed, self.touched_mps) = (Touchdown::NONE, false, 0.0);
         self.unheard_s = [0.0; 2];
     }
 
@@ -242,19 +239,18 @@ impl Usage {
         self.crashed = true;
         self.touched_mps = self.touched_mps.max(touch_mps);
         // What the estimate of a vehicle that lies says of speeds is no touch.
-        (self.touchdown, self.airborne) = (Touchdown::new(), false);
+        self.touchdown = Touchdown::NONE;
     }
 
     fn note_touch(&mut self, now: Instant, vehicle: &Vehicle, flight: &Flight) {
         let height_m = height_m(now, vehicle);
         if flight.airborne() {
             if let (Some(climb_mps), Some(height_m)) = (climb_mps(now, vehicle), height_m) {
-                self.touchdown.step(now, -climb_mps, height_m);
+                self.touchdown.step(now, -climb_mps, flight.motion.sink.greatest(now), height_m);
             }
-        } else if self.airborne {
+        } else {
             self.touched_mps = self.touched_mps.max(self.touchdown.take(now, height_m));
         }
-        self.airborne = flight.airborne();
     }
 
     fn step_motors(&mut self, now: Instant, vehicle: &Vehicle, step_s: f64) {

@@ -1,14 +1,12 @@
 //! How fast the vehicle came down on the ground.
 //!
 //! Nobody says when a vehicle touches: the autopilot calls it landed a second or more later, and its estimate of the speed
-//! goes on sinking slowly meanwhile. What shows the touch is that the sink speed breaks off: it halves within
-//! [`BREAKS_WITHIN`]. The speed before that counts, where the vehicle then stays at this height until it has landed; a stop
-//! higher up was a hover.
+//! goes on sinking slowly meanwhile. The sink shows the touch by breaking off: it is half of the greatest of the last second
+//! ([`crate::motion::WindowMax`]). That speed counts if the vehicle then stays at this height until it has landed; a stop higher up
+//! was a hover.
 
 use crate::time::{Instant, Span};
 
-/// A sink speed that halves within this was stopped by something.
-const BREAKS_WITHIN: Span = Span::from_millis(600);
 /// Slower than this nothing breaks off.
 const SINK_MIN_MPS: f32 = 0.3;
 /// The touch was at the height where the vehicle stands, give or take what pressure does near the ground.
@@ -24,37 +22,23 @@ struct Stop {
     sink_mps: f32,
 }
 
-/// The speed of the last touch.
+/// The last place where a descent broke off.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Touchdown {
-    /// The fastest sink of this window of [`BREAKS_WITHIN`], and of the one before.
-    now_mps: f32,
-    before_mps: f32,
-    window: Instant,
-    stop: Option<Stop>,
-}
+pub(super) struct Touchdown(Option<Stop>);
 
 impl Touchdown {
-    pub(super) const fn new() -> Self {
-        Self { now_mps: 0.0, before_mps: 0.0, window: Instant::ZERO, stop: None }
-    }
+    pub(super) const NONE: Self = Self(None);
 
-    /// One step in the air: how fast it sinks (negative: climbs), and how high it is.
-    pub(super) fn step(&mut self, at: Instant, sink_mps: f32, height_m: f32) {
-        if at.since(self.window) >= BREAKS_WITHIN {
-            (self.before_mps, self.now_mps, self.window) = (self.now_mps, 0.0, at);
-        }
-        self.now_mps = self.now_mps.max(sink_mps);
-        let fastest_mps = self.now_mps.max(self.before_mps);
+    /// One step in the air: how fast it sinks (negative: climbs), and sank at most in the last second, and how high it is.
+    pub(super) fn step(&mut self, at: Instant, sink_mps: f32, fastest_mps: f32, height_m: f32) {
         if fastest_mps < SINK_MIN_MPS || sink_mps > fastest_mps / 2.0 {
             return;
         }
-        (self.now_mps, self.before_mps) = (sink_mps.max(0.0), 0.0);
         let same = |stop: &Stop| {
             (stop.height_m - height_m).abs() <= SAME_HEIGHT_M && at.since(stop.at) <= KNOWN_AFTER
         };
-        let stop = self.stop.filter(same).filter(|stop| stop.sink_mps >= fastest_mps);
-        self.stop = stop.or(Some(Stop { at, height_m, sink_mps: fastest_mps }));
+        let stop = self.0.filter(same).filter(|stop| stop.sink_mps >= fastest_mps);
+        self.0 = stop.or(Some(Stop { at, height_m, sink_mps: fastest_mps }));
     }
 
     /// The vehicle stands at this height: how fast it touched, m/s. 0 where nothing broke off: it came down gently.
@@ -63,24 +47,25 @@ impl Touchdown {
             at.since(stop.at) <= KNOWN_AFTER
                 && height_m.is_none_or(|height_m| (stop.height_m - height_m).abs() <= SAME_HEIGHT_M)
         };
-        let touched_mps = self.stop.filter(here).map_or(0.0, |stop| stop.sink_mps);
-        *self = Self::new();
-        touched_mps
+        self.0.take().filter(here).map_or(0.0, |stop| stop.sink_mps)
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::motion::WindowMax;
 
     /// (seconds, sink) pieces from a height, at 5 Hz; then the vehicle stands.
     fn land(mut height_m: f32, pieces: &[(f32, f32)]) -> f32 {
-        let (mut touchdown, mut now_ms) = (Touchdown::new(), 0);
+        let (mut touchdown, mut sink, mut now_ms) = (Touchdown::NONE, WindowMax::NONE, 0);
         for (seconds, sink_mps) in pieces {
             for _ in 0..(seconds * 5.0) as u32 {
                 now_ms += 200;
                 height_m -= sink_mps * 0.2;
-                touchdown.step(Instant::from_millis(now_ms), *sink_mps, height_m);
+                let now = Instant::from_millis(now_ms);
+                sink.take(now, *sink_mps);
+                touchdown.step(now, *sink_mps, sink.greatest(now), height_m);
             }
         }
         touchdown.take(Instant::from_millis(now_ms), Some(height_m))
