@@ -1,6 +1,6 @@
 //! What people are shown of a check's value: a quantity with its limit, or the words of a state.
 
-use hums_core::health::{OFF_MEANING, check_named, is_off, vocabulary};
+use hums_core::health::{check_named, vocabulary};
 
 /// Counts of what should never happen: a limit below one means "any", which tells nobody anything.
 const COUNTS: [&str; 2] = ["card_errors", "record_lost"];
@@ -17,7 +17,7 @@ pub enum Shown {
 
 /// What is shown of a check's value and of the limit that it crossed.
 pub fn shown(check: &str, value: f32, limit: f32) -> Shown {
-    if check_named(check).is_some_and(|check| check.is_flag) || is_off(check, value) {
+    if check_named(check).is_some_and(|check| check.is_flag) {
         return Shown::State(name(check, value));
     }
     let finite = |value: f32| value.is_finite().then_some(value);
@@ -60,7 +60,7 @@ pub fn name(check: &str, value: f32) -> Option<&'static str> {
         "esc_failure" => &["no failure", "a failure", "motor stuck or ESC failed"],
         "recording" => &["recording", "not recording", "not recording while armed"],
         "compass_unused" => &["used", "not used"],
-        _ if is_off(check, value) => return Some("given next to nothing"),
+        "motor_off" => &["driven", "driven", "given next to nothing"],
         // A number of faults.
         "batt_fault" if value >= 2.0 => return Some("several faults"),
         "batt_fault" => &["no fault", "one fault"],
@@ -73,9 +73,9 @@ pub fn name(check: &str, value: f32) -> Option<&'static str> {
     names.get(place).copied()
 }
 
-/// What is so where a check has this value at a warning or worse, as a sentence.
-pub fn meaning(check: &str, value: f32) -> &'static str {
-    if is_off(check, value) { OFF_MEANING } else { vocabulary(check).map_or("", |words| words.meaning) }
+/// What is so where a check has an alarm, as a sentence.
+pub fn meaning(check: &str) -> &'static str {
+    vocabulary(check).map_or("", |words| words.meaning)
 }
 
 /// Names of the bits of `MAV_SYS_STATUS_SENSOR`, from bit 0; empty where it is no sensor (the check `sensors` leaves those

@@ -33,7 +33,6 @@ use core::ops::RangeInclusive;
 use crate::adaptive_baseline::AdaptiveBaseline;
 use crate::baseline::OUTPUTS_MAX;
 use crate::flight::Flight;
-use crate::latest::Reading;
 use crate::motion::IDLE_THROTTLE;
 use crate::observation::{MOTORS_MAX, Outputs};
 use crate::time::{Instant, PAUSE, Span, Stamp};
@@ -61,9 +60,8 @@ const SUMMED_S: f32 = 6.0;
 const SUM_MAX_PERCENT: f32 = 12.0;
 /// Below this part of the average, percent, a motor was shut off.
 const SHUT_OFF_SHARE: f32 = -70.0;
-/// The verdicts on the scale of `motor_output`, percent.
-pub(crate) const SHUT_OFF_PERCENT: f32 = 100.0;
-const SATURATED_PERCENT: f32 = SHUT_OFF_PERCENT - 1.0;
+/// A motor at the end of its range stands out by so much, percent, and none by more.
+const SATURATED_PERCENT: f32 = 100.0;
 /// A motor that is given less is given nothing.
 const OFF: f32 = 0.05;
 /// Outputs end here or beyond: `MOT_PWM_MAX` of ArduPilot is 1950 us, `PWM_MAIN_MAX` of PX4 2000.
@@ -130,14 +128,18 @@ pub(crate) enum Verdict {
 }
 
 impl Verdict {
-    /// On the scale of the check `motor_output`, percent: a weak motor is at most where a saturated one is.
-    fn percent(self) -> f32 {
+    /// How far its command stands out, percent of the average; all of it at the end of its range.
+    pub(crate) fn excess_percent(self) -> f32 {
         match self {
-            Self::Ok => 0.0,
+            Self::Ok | Self::ShutOff => 0.0,
             Self::Weak(percent) => percent.clamp(0.0, SATURATED_PERCENT),
             Self::Saturated => SATURATED_PERCENT,
-            Self::ShutOff => SHUT_OFF_PERCENT,
         }
+    }
+
+    /// 2, critical, of a motor that is shut off.
+    pub(crate) fn off_rank(self) -> f32 {
+        if self == Self::ShutOff { 2.0 } else { 0.0 }
     }
 }
 
@@ -314,7 +316,9 @@ impl MotorOutputs {
     /// Whether this output alone is at an end of its range in a flight whose take-off was not received: how its motor turned before is
     /// not known.
     pub(crate) fn was_found_at_end(&self, motor: u8) -> bool {
-        self.takeoff_not_recorded && self.verdict.0 == motor && self.verdict.1.percent() > 0.0
+        self.takeoff_not_recorded
+            && self.verdict.0 == motor
+            && matches!(self.verdict.1, Verdict::Saturated | Verdict::ShutOff)
     }
 
     /// The outputs on the ground. One that is given more while the vehicle is disarmed is a servo's, or a motor's in a test.
@@ -427,8 +431,8 @@ impl MotorOutputs {
         Some(self.outputs.get(..judged)?.get(usize::from(motor))?.share.figure())
     }
 
-    /// How far a motor's command alone is above what is usual, percent of the average; 0 for those that do not stand out.
-    pub(crate) fn excess(&self, now: Instant, vehicle: &Vehicle, motor: u8) -> Option<Reading> {
+    /// The verdict on a motor, and when it was made; good for those that are not judged now.
+    pub(crate) fn verdict(&self, now: Instant, vehicle: &Vehicle, motor: u8) -> Option<(Instant, Verdict)> {
         let at = self.at.instant(now).filter(|at| now.since(*at) <= PAUSE)?;
         let count = self.judged(vehicle);
         // If all idled on the ground, or all but one moved in a flight whose take-off was not received, they are motors.
@@ -438,7 +442,7 @@ impl MotorOutputs {
             return None;
         }
         let (place, verdict) = self.verdict;
-        Some(Reading { at, value: if place == motor { verdict.percent() } else { 0.0 } })
+        Some((at, if place == motor { verdict } else { Verdict::Ok }))
     }
 }
 
@@ -514,7 +518,7 @@ mod tests {
                 output.share.follow(figure, 1.0);
             }
             outputs.judge(JUDGED_MAX, STEP_S);
-            (outputs.verdict.0, outputs.verdict.1.percent())
+            (outputs.verdict.0, outputs.verdict.1.excess_percent())
         });
         judged.skip(50).collect()
     }

@@ -52,7 +52,11 @@ const INPUTS: &[(&str, &str)] = &[
     ),
     (
         "motor_output",
-        "SERVO_OUTPUT_RAW: one motor's pulse alone above what is usual in this flight, percent of what motors are given; 100 where one gets next to nothing; 4, 6 or 8 motors in level flight",
+        "SERVO_OUTPUT_RAW: one motor's pulse alone above what is usual in this flight, percent of what motors are given; 100 if it alone is at the end of its range; 4, 6 or 8 motors in level flight",
+    ),
+    (
+        "motor_off",
+        "SERVO_OUTPUT_RAW: 2 if a motor is given next to nothing while the others carry; the same motors",
     ),
     ("thrust_lost", "VFR_HUD: how long throttle was full without a climb; on wings, with a sink"),
     (

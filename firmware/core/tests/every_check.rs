@@ -217,7 +217,7 @@ const FAULTS: &[(&str, u8, Level, Fault)] = &[
 
 /// Found by scripts of their own: silence, restarts and rates in `scripted_faults.rs`, what departs from a baseline in
 /// `trends.rs`, mishaps in `mishap.rs`, what departs from its usual level in a flight in `crosscheck.rs`.
-const ELSEWHERE: [&str; 45] = [
+const ELSEWHERE: [&str; 46] = [
     "ahrs2_tilt",
     "ahrs2_height",
     "ahrs2_position",
@@ -245,6 +245,7 @@ const ELSEWHERE: [&str; 45] = [
     "compass_unused",
     "vibration_rise",
     "motor_output",
+    "motor_off",
     "esc_silent",
     "esc_errors",
     "heartbeat",
@@ -415,7 +416,7 @@ fn there_are_as_many_of_each_check_as_there_may_be_of_what_it_watches() {
     for check in checks() {
         let instances = match check.name {
             name if name.starts_with("batt_") || name.starts_with("cell_") => 4,
-            "motor_output" => 8,
+            "motor_output" | "motor_off" => 8,
             "gps_stuck" => 2,
             "gps_height" => 1,
             name if name.ends_with("_mismatch") || name.ends_with("_stuck") => 3,
@@ -446,6 +447,7 @@ fn flags_that_are_not_set_and_parts_that_are_not_due_make_nothing_healthy() {
         "autopilot_state",
         "compass_unused",
         "disarmed_in_air",
+        "motor_off",
         "position_silent",
     ];
     for check in checks() {

@@ -339,7 +339,7 @@ fn a_motor_is_found_by_outputs_that_are_heard_in_the_air_first() {
 #[test]
 fn a_motor_that_was_dead_before_the_vehicle_was_heard_is_found_by_its_output() {
     let turns = [5_000.0; 6];
-    assert_eq!(heard_in_the_air([1_500, 1_480, 900, 1_510, 1_530, 1_600], 30, turns), [("motor_output", 2)]);
+    assert_eq!(heard_in_the_air([1_500, 1_480, 900, 1_510, 1_530, 1_600], 30, turns), [("motor_off", 2)]);
     assert_eq!(
         heard_in_the_air([1_500, 1_480, 1_950, 1_510, 1_530, 1_600], 30, turns),
         [("motor_output", 2)]

@@ -440,10 +440,7 @@ pub fn text(finding: &Finding) -> Text {
         Level::Stale => return Text::new(format_args!("HUMS: no data: {}", said.name_of(instance))),
         Level::Advisory | Level::Warning | Level::Critical => {}
     }
-    let is_off = health::is_off(check, value);
-    let mut text = if is_off {
-        Text::new(format_args!("HUMS: {}", health::off_alarm(instance)))
-    } else if check == "esc_silent" && finding.orders != Orders::Own {
+    let mut text = if check == "esc_silent" && finding.orders != Orders::Own {
         Text::new(format_args!("HUMS: ESC {} and all others silent", u16::from(instance) + 1))
     } else {
         Text::new(format_args!("HUMS: {}", said.alarm_of(instance, feeds)))
@@ -454,7 +451,6 @@ pub fn text(finding: &Finding) -> Text {
     let advice = if order.is_empty() { Text::default() } else { Text::new(format_args!(", {order}")) };
     if let Some((before, after)) = said.around_value(finding.unit)
         && value.is_finite()
-        && !is_off
     {
         let value = Text::new(format_args!(": {before}{}{after}", quantity(value, finding.unit).as_str()));
         // What to do says more than how much.

@@ -249,7 +249,7 @@ fn problem(problem: &Problem, time_utc: Option<String>) -> ProblemJson<'_> {
         unit: &problem.unit,
         because: problem.because.as_deref(),
         detail: (!problem.details.is_empty()).then(|| problem.details.join(", ")),
-        meaning: states::meaning(&problem.check, problem.value),
+        meaning: states::meaning(&problem.check),
         action: words.map_or("", |words| words.action),
     }
 }

@@ -408,7 +408,7 @@ fn problems(text: &mut String, problems: &[Problem]) {
         let level = level_of(group.is_critical());
         let _ = writeln!(text, "  {:<8} {:>9}  {line}{itself}", coloured(level), moment(first.at));
         if place < SHOWN_MAX {
-            let _ = writeln!(text, "                      {}", meaning(&first.check, first.value));
+            let _ = writeln!(text, "                      {}", meaning(&first.check));
             let _ = writeln!(text, "                      {}", action(first));
         }
         for effect in &group.effects {
@@ -418,8 +418,7 @@ fn problems(text: &mut String, problems: &[Problem]) {
                 writeln!(text, "                      with it {at}  {level}: {}", word(&sentence(effect)));
             // What a card that is out looks like besides has no meaning of its own.
             if place < SHOWN_MAX && first.subsystem != Subsystem::Recorder {
-                let _ =
-                    writeln!(text, "                              {}", meaning(&of_it.check, of_it.value));
+                let _ = writeln!(text, "                              {}", meaning(&of_it.check));
                 if group.is_raised && is_critical(effect) {
                     let _ = writeln!(text, "                              {}", action(of_it));
                 }

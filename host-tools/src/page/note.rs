@@ -2,7 +2,7 @@
 
 use hums_core::clock::Instant;
 use hums_core::happening::Happening;
-use hums_core::health::{Finding, OFF_MEANING, VOCABULARY, instances, off_alarm, vocabulary};
+use hums_core::health::{Finding, VOCABULARY, instances, vocabulary};
 use hums_core::observation::Feeds;
 use hums_link::encode::COMPONENT;
 use serde::Serialize;
@@ -88,8 +88,6 @@ impl Cause {
 const AGAIN_S: f64 = 45.0;
 /// Before the words of what is good again.
 const OVER: &str = "over: ";
-/// The check of motors by what they are given, which has words of its own for one that is given nothing.
-const OUTPUT: &str = "motor_output";
 
 /// Which check and which part of it the words of a HUMS's text are of, and what they say besides.
 fn told_check(words: &str) -> Option<(&'static str, u8, &str)> {
@@ -103,10 +101,7 @@ fn told_check(words: &str) -> Option<(&'static str, u8, &str)> {
             Some(silent) => silent.strip_prefix(said.name_of(part).to_string().as_str()),
             None => FEEDS
                 .iter()
-                .find_map(|feeds| words.strip_prefix(said.alarm_of(part, *feeds).to_string().as_str()))
-                .or_else(|| {
-                    words.strip_prefix(off_alarm(part).to_string().as_str()).filter(|_| said.check == OUTPUT)
-                }),
+                .find_map(|feeds| words.strip_prefix(said.alarm_of(part, *feeds).to_string().as_str())),
         }?;
         (rest.is_empty() || rest.starts_with([':', ','])).then_some((said.check, part, rest))
     });
@@ -145,7 +140,7 @@ impl Note {
                 state,
                 limit,
                 unit: unit_name(&finding.unit).to_owned(),
-                meaning: if is_worry { meaning(&finding.check, finding.value) } else { "" },
+                meaning: if is_worry { meaning(&finding.check) } else { "" },
                 action: known.filter(|_| is_worry).map_or("", |known| known.action),
                 because: because.map(Cause::of),
             }),
@@ -203,7 +198,6 @@ impl Note {
         let (check, instance, rest) = told_check(words)?;
         let known = vocabulary(check)?;
         let level = if words.starts_with(OVER) { "ok" } else { text.level() };
-        let is_off = check == OUTPUT && words.starts_with(off_alarm(instance).to_string().as_str());
         let is_worry = matches!(level, "warning" | "critical");
         let rest = rest.trim_start_matches([':', ',', ' ']);
         let name = check_name(check, instance);
@@ -214,7 +208,6 @@ impl Note {
             from: "on board".to_owned(),
             subsystem: "",
             words: match rest {
-                _ if is_off => format!("{name}: no output"),
                 "" => name,
                 rest => format!("{name}: {rest}"),
             },
@@ -227,11 +220,7 @@ impl Note {
                 state: None,
                 limit: None,
                 unit: String::new(),
-                meaning: match is_worry {
-                    true if is_off => OFF_MEANING,
-                    true => known.meaning,
-                    false => "",
-                },
+                meaning: if is_worry { known.meaning } else { "" },
                 action: if is_worry { known.action } else { "" },
                 because: None,
             }),

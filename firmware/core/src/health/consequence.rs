@@ -55,7 +55,8 @@ const SENSORS: &[&str] = &[
     "ekf_mag_ratio",
 ];
 const SHAKING: &[&str] = &["vibration", "vibration_px4", "vibration_rise", "clipping", "vibration_alert"];
-const DRIVE: &[&str] = &["motor_loss", "motor_output", "motor_imbalance", "esc_failure", "drive_alert"];
+const DRIVE: &[&str] =
+    &["motor_loss", "motor_output", "motor_off", "motor_imbalance", "esc_failure", "drive_alert"];
 /// Checks that see a wire and not what it leads to: they explain no attitude, no mishap and no act of the autopilot.
 const TELEMETRY: &[&str] = &["esc_silent"];
 const BATTERY: &[&str] =
@@ -73,8 +74,8 @@ const ROWS: &[(&[&str], &[&str])] = &[
     (&["autopilot_reboot"], &["esc_silent", "ekf_alert"]),
     (TELEMETRY, &["thrust_lost", "vibration_rise"]),
     (DRIVE, &["roll_rate", "pitch_rate", "roll", "pitch", "attitude_alert", "thrust_lost", "vibration_rise"]),
-    (&["motor_loss"], &["motor_output", "motor_imbalance", "drive_alert"]),
-    (&["motor_output", "motor_imbalance"], &["drive_alert"]),
+    (&["motor_loss"], &["motor_output", "motor_off", "motor_imbalance", "drive_alert"]),
+    (&["motor_output", "motor_off", "motor_imbalance"], &["drive_alert"]),
     // Control follows the attitude, and that the gyros. One that is noisy turns nothing over.
     (
         &["gyro_stuck", "gyro_alert", "gyro_mismatch", "imu_gps"],

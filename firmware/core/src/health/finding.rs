@@ -1,9 +1,6 @@
 //! A finding: one check changed its level. The numbers and names here are stored in logs and never change meaning.
 
-use core::fmt;
-
 use crate::observation::Feeds;
-use crate::outputs::SHUT_OFF_PERCENT;
 use crate::time::Instant;
 
 /// How bad it is. The numbers are stored in logs.
@@ -165,19 +162,6 @@ impl Finding {
     pub fn is_unjudged(&self) -> bool {
         self.level == Level::Ok && self.value.is_nan()
     }
-}
-
-/// What is told of a motor that [`is_off`], which is counted from 0.
-pub fn off_alarm(instance: u8) -> impl fmt::Display {
-    fmt::from_fn(move |f| write!(f, "motor {} off: no output", u16::from(instance) + 1))
-}
-
-/// What is so of a motor that [`is_off`], as a sentence.
-pub const OFF_MEANING: &str = "The motor was given next to nothing while the others carried: the autopilot, or a command, shut it down.";
-
-/// Whether a check's value says that a motor is given next to nothing: the autopilot took it out, and it is not weak.
-pub fn is_off(check: &str, value: f32) -> bool {
-    check == "motor_output" && value >= SHUT_OFF_PERCENT
 }
 
 #[cfg(test)]

@@ -26,7 +26,7 @@ mod vocabulary;
 pub use check::{CLEAR, CLEAR_MAX, CLEAR_MAX_ALWAYS, Check, Debounce, InstanceOf, Side, State, Unit, When};
 use check::{Change, How, Reported};
 pub use consequence::{Alarm, because, explains, is_of_mishap, is_with_mishap};
-pub use finding::{Finding, Level, OFF_MEANING, Orders, Subsystem, is_off, off_alarm};
+pub use finding::{Finding, Level, Orders, Subsystem};
 pub use inputs::Inputs;
 pub use tables::{check_named, checks, instances};
 pub use vocabulary::{Said, Scope, VOCABULARY, Words, said, vocabulary};

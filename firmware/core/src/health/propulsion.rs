@@ -8,7 +8,7 @@ use crate::baseline::{OUTPUTS_MAX, Quantity};
 use crate::cause::Cause;
 use crate::latest::Reading;
 use crate::observation::MOTORS_MAX;
-use crate::outputs::JUDGED_MAX;
+use crate::outputs::{JUDGED_MAX, Verdict};
 use crate::params::Param;
 use crate::residual::Comparison;
 use crate::vehicle::Motor;
@@ -142,7 +142,23 @@ pub(super) const CHECKS: &[Check] = &[
         when: When::InFlight,
         instances: JUDGED_MAX as u8,
         of: InstanceOf::Output,
-        read: |inputs, motor| inputs.derived.outputs().excess(inputs.now, inputs.vehicle, motor),
+        read: |inputs, motor| verdict(inputs, motor, Verdict::excess_percent),
+        ..ESC
+    },
+    Check {
+        name: "motor_off",
+        unit: Unit::of(""),
+        is_flag: true,
+        warn: Some(Param::AlertWarn),
+        critical: Some(Param::AlertCrit),
+        debounce_warn: Debounce::millis(500),
+        debounce_critical: Debounce::secs(1),
+        when: When::InFlight,
+        instances: JUDGED_MAX as u8,
+        of: InstanceOf::Output,
+        // That a motor is driven says nothing about how well it is.
+        alarm_only: true,
+        read: |inputs, motor| verdict(inputs, motor, Verdict::off_rank),
         ..ESC
     },
     Check {
@@ -174,6 +190,12 @@ pub(super) const CHECKS: &[Check] = &[
     Check { name: "drive_due", ..due(Subsystem::Propulsion) },
     alert::<{ Cause::Propulsion as usize }>(Subsystem::Propulsion),
 ];
+
+/// What the outputs say of a motor, as a check's value.
+fn verdict(inputs: &Inputs<'_>, motor: u8, value: fn(Verdict) -> f32) -> Option<Reading> {
+    let (at, verdict) = inputs.derived.outputs().verdict(inputs.now, inputs.vehicle, motor)?;
+    Some(Reading { at, value: value(verdict) })
+}
 
 /// The body rate that the setpoint is not followed by, about roll (0) or pitch (1).
 fn rate_off_deg_s(inputs: &Inputs<'_>, axis: usize) -> Option<Reading> {

@@ -123,6 +123,7 @@ fn a_value_says_what_it_is_of_or_is_not_told() {
         ("batt_resistance", 160.0, critical, "battery 1 worn: +160 %, REPLACE IT"),
         ("motor_loss", 4.2, critical, "motor 1 lost: 4.2 % of normal amps, LAND NOW"),
         ("motor_output", 12.3, critical, "motor 1 weak: output +12.3 %, LAND NOW"),
+        ("motor_off", 2.0, critical, "motor 1 off: no output, LAND NOW"),
         ("throttle_trend", 25.0, critical, "hover throttle up: +25 %, CHECK MOTORS"),
         ("vibration_rise", 10.2, warning, "vibration up: 10.2 x usual"),
         ("gps_satellites", 5.0, warning, "GPS 1 few satellites: 5"),
@@ -445,13 +446,6 @@ fn what_a_dead_sensor_says_is_not_over_while_it_is_dead() {
     let expected =
         [(10, "compass 1 frozen"), (210, "compass 1 and others differ"), (600, "over: compass 1 frozen")];
     assert_eq!(texts(&told(&findings)), expected);
-}
-
-#[test]
-fn a_motor_that_is_given_nothing_is_not_called_weak() {
-    let weak = Finding { instance: 2, value: 99.0, ..of("motor_output", Level::Critical) };
-    assert_eq!(text(&weak).as_str(), "HUMS: motor 3 weak: output +99 %, LAND NOW");
-    assert_eq!(text(&Finding { value: 100.0, ..weak }).as_str(), "HUMS: motor 3 off: no output, LAND NOW");
 }
 
 #[test]

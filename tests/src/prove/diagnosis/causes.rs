@@ -28,6 +28,7 @@ pub(super) const CLASSES: &[Class] = &[
             "motor_loss",
             "motor_imbalance",
             "motor_output",
+            "motor_off",
             "thrust_lost",
             "roll_rate",
             "pitch_rate",
