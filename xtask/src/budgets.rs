@@ -4,6 +4,7 @@
 //! variables in each memory, so that what is left is the stack's.
 
 use std::collections::BTreeMap;
+use std::fmt::Write as _;
 use std::fs;
 
 use anyhow::{Context as _, Result, bail};
@@ -15,63 +16,78 @@ use serde::Deserialize;
 use crate::firmware::{self, Board};
 use crate::repo;
 
-/// The memories: name, first address, one past the last of the board that has most of it.
-const MEMORIES: [(&str, u64, u64); 3] = [
-    ("flash", 0x0800_0000, 0x0820_0000),
-    ("ram", 0x2000_0000, 0x2003_0000),
-    ("ccm", 0x1000_0000, 0x1001_0000),
+/// The memories: name, first address, one past the last of the board that has most of it, and what the f405 has for
+/// these (`memory.x`, `boards/f405.x`): flash is the half of a program, CCM is without the stack.
+const MEMORIES: [(&str, u64, u64, u64); 3] = [
+    ("flash", 0x0800_0000, 0x0820_0000, 448 * 1024),
+    ("ram", 0x2000_0000, 0x2003_0000, 128 * 1024),
+    ("ccm", 0x1000_0000, 0x1001_0000, 48 * 1024),
 ];
+/// The f405's stack: the rest of CCM.
+const STACK_BYTES: u64 = 16 * 1024;
+
+const FILE: &str = "budgets.toml";
+/// Where the table of what is taken stands, between these lines.
+const TABLE_FILE: &str = "ARCHITECTURE.md";
+const TABLE: [&str; 2] = ["<!-- taken: cargo xtask size --write -->\n", "<!-- end of taken -->\n"];
 
 /// One limit of `budgets.toml`, in bytes.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Bytes {
+    /// When the limit was set, or `--write` was given last.
+    pub(crate) taken: u64,
+    /// The rest of the f405's; of a stack there is one rest for all urgencies.
+    free: Option<u64>,
     pub(crate) bytes_max: u64,
     pub(crate) reason: String,
 }
 
-/// One limit of `budgets.toml`, in cycles of the processor.
+/// One limit of `budgets.toml`, in cycles of the processor for each frame.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Cycles {
-    /// For each frame.
+    pub(crate) taken: f64,
     pub(crate) per_frame_max: f64,
     pub(crate) reason: String,
 }
 
-/// What the processor may be busy at the fastest line.
+/// What the processor may be busy at the fastest line, in percent of all of it, in the worst second.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Load {
-    /// In percent, of all of it, in the worst second.
+    pub(crate) taken: f64,
+    pub(crate) free: f64,
     pub(crate) percent_max: f64,
     pub(crate) reason: String,
 }
 
-/// A board's limits.
+/// Limits of a folder's lines (`cargo xtask test --only lines`).
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct OfBoard {
-    spare_min: u64,
-    memory: BTreeMap<String, Bytes>,
+pub(crate) struct Lines {
+    pub(crate) code_max: usize,
+    pub(crate) tests_max: usize,
 }
 
 /// All of `budgets.toml`.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Budgets {
-    f405: OfBoard,
-    f429: OfBoard,
+    /// Static memory, of every board.
+    memory: BTreeMap<String, Bytes>,
     /// By urgency.
     pub(crate) stack: BTreeMap<String, Bytes>,
     /// By stage.
     pub(crate) cycles: BTreeMap<String, Cycles>,
     pub(crate) load: Load,
+    /// By folder.
+    pub(crate) lines: BTreeMap<String, Lines>,
 }
 
 impl Budgets {
     pub(crate) fn read() -> Result<Self> {
-        let path = repo::root().join("budgets.toml");
+        let path = repo::root().join(FILE);
         let text = fs::read_to_string(&path).with_context(|| format!("cannot read {}", path.display()))?;
         toml::from_str(&text).with_context(|| format!("{}", path.display()))
     }
@@ -81,53 +97,86 @@ impl Budgets {
         self.stack.values().map(|budget| budget.bytes_max).sum()
     }
 
-    fn of(&self, board: Board) -> &OfBoard {
-        match board {
-            Board::F405 => &self.f405,
-            Board::F429 => &self.f429,
+    /// What is taken and free on the f405, in KiB and percent.
+    fn table(&self) -> String {
+        let mut table = "\n| | of | taken | free | limit |\n|---|---|---|---|---|\n".to_owned();
+        let kib = |bytes: u64| bytes as f64 / 1024.0;
+        let mut row = |what: &str, unit: &str, [all, taken, limit]: [f64; 3]| {
+            let free = all - taken;
+            // Cannot fail: it is a text.
+            let _ = writeln!(table, "| {what} | {all:.0} {unit} | {taken:.1} | {free:.1} | {limit:.1} |");
+        };
+        for (name, _, _, all) in MEMORIES {
+            if let Some(budget) = self.memory.get(name) {
+                row(name, "KiB", [all, budget.taken, budget.bytes_max].map(kib));
+            }
         }
+        let taken: u64 = self.stack.values().map(|budget| budget.taken).sum();
+        row("stack", "KiB", [STACK_BYTES, taken, self.stack_bytes()].map(kib));
+        row("processor", "%", [100.0, self.load.taken, self.load.percent_max]);
+        table + "\n"
     }
 }
 
-/// Builds for these boards, prints what they take and fails if any takes more than its budget.
-pub(crate) fn check(boards: &[Board]) -> Result<()> {
+/// Builds for these boards, prints what they take and fails if any takes more than its budget. `write`: what the first one takes is
+/// written into the budgets and the table of ARCHITECTURE.md.
+pub(crate) fn check(boards: &[Board], write: bool) -> Result<()> {
     let budgets = Budgets::read()?;
-    let stack_bytes = budgets.stack_bytes();
-    let (mut rows, mut spares) = (Vec::new(), Vec::new());
-    for &board in boards {
+    let mut rows = Vec::new();
+    for (index, &board) in boards.iter().enumerate() {
         let image = firmware::build(board)?;
-        let data = fs::read(&image)?;
-        let used = sizes(&data).with_context(|| format!("{}", image.display()))?;
-        let of_board = budgets.of(board);
-        rows.extend(compare(board.name(), &used, &of_board.memory)?);
-        spares.push(spare(board, &used, stack_bytes, of_board.spare_min));
+        let used = sizes(&fs::read(&image)?).with_context(|| format!("{}", image.display()))?;
+        rows.extend(compare(board.name(), &used, &budgets.memory)?);
+        if write && index == 0 {
+            write_taken(&used)?;
+        }
     }
     println!(
-        "{:<10} {:<6} {:>9} {:>9} {:>6}  reason of the limit",
-        "board", "memory", "bytes", "limit", "used"
+        "{:<10} {:<6} {:>9} {:>9} {:>9}  reason of the limit",
+        "board", "memory", "bytes", "limit", "free"
     );
-    for row in rows.iter().chain(&spares) {
+    for row in &rows {
         println!("{}", row.text);
     }
-    if rows.iter().chain(&spares).any(|row| row.over) {
+    if rows.iter().any(|row| row.over) {
         bail!("the firmware is over its budget: see the table");
     }
     Ok(())
 }
 
-/// What is free of all that can be written to.
-fn spare(board: Board, used: &BTreeMap<&str, u64>, stack_bytes: u64, spare_min: u64) -> Row {
-    let all = board.ram_bytes();
-    let taken = ["ram", "ccm"].iter().filter_map(|memory| used.get(memory)).sum::<u64>() + stack_bytes;
-    let spare = 100.0 - taken as f64 * 100.0 / all as f64;
-    let over = spare < spare_min as f64;
-    let text = format!(
-        "{:<10} of {all} bytes of RAM and CCM {taken} are taken, {stack_bytes} of stack with them: {spare:.1} % to \
-         spare{}",
-        board.name(),
-        if over { format!(", OVER: {spare_min} % are asked") } else { String::new() }
-    );
-    Row { text, over }
+/// Writes what is taken of each memory into the budgets, and the table that is made from them.
+fn write_taken(used: &BTreeMap<&str, u64>) -> Result<()> {
+    let path = repo::root().join(FILE);
+    let mut section = String::new();
+    let line = |line: &str| {
+        if line.starts_with('[') {
+            line.clone_into(&mut section);
+        }
+        let memory = section.strip_prefix("[memory.").and_then(|name| name.strip_suffix(']'));
+        let memory = MEMORIES.iter().find(|(name, ..)| Some(*name) == memory);
+        let taken = memory.and_then(|(name, .., all)| Some((used.get(name)?, all)));
+        match (taken, line.split(" = ").next()) {
+            (Some((taken, _)), Some("taken")) => format!("taken = {taken}\n"),
+            (Some((taken, all)), Some("free")) => format!("free = {}\n", all.saturating_sub(*taken)),
+            _ => format!("{line}\n"),
+        }
+    };
+    let text: String = fs::read_to_string(&path)?.lines().map(line).collect();
+    fs::write(&path, text)?;
+    let path = repo::root().join(TABLE_FILE);
+    let text = fs::read_to_string(&path)?;
+    let [before, _, after] = around_table(&text)?;
+    fs::write(&path, [before, &Budgets::read()?.table(), after].concat())?;
+    Ok(())
+}
+
+/// What stands before the table, the table, and what follows.
+fn around_table(text: &str) -> Result<[&str; 3]> {
+    let place = |mark: &str| text.find(mark).with_context(|| format!("{TABLE_FILE} has no {mark}"));
+    let (from, to) = (place(TABLE[0])? + TABLE[0].len(), place(TABLE[1])?);
+    let parts = (text.get(..from), text.get(from..to), text.get(to..));
+    let (Some(before), Some(table), Some(after)) = parts else { bail!("{TABLE_FILE}: the table ends first") };
+    Ok([before, table, after])
 }
 
 pub(crate) struct Row {
@@ -138,16 +187,14 @@ pub(crate) struct Row {
 fn compare(board: &str, used: &BTreeMap<&str, u64>, limits: &BTreeMap<String, Bytes>) -> Result<Vec<Row>> {
     MEMORIES
         .iter()
-        .map(|(memory, ..)| {
-            let budget = limits
-                .get(*memory)
-                .with_context(|| format!("budgets.toml has no [{board}.memory.{memory}]"))?;
+        .map(|(memory, _, _, all)| {
+            let budget = limits.get(*memory).with_context(|| format!("{FILE} has no [memory.{memory}]"))?;
             let bytes = used.get(memory).copied().unwrap_or(0);
             let over = bytes > budget.bytes_max;
-            let percent = bytes * 100 / budget.bytes_max.max(1);
             let text = format!(
-                "{board:<10} {memory:<6} {bytes:>9} {:>9} {percent:>5}%  {}{}",
+                "{board:<10} {memory:<6} {bytes:>9} {:>9} {:>9}  {}{}",
                 budget.bytes_max,
+                all.saturating_sub(bytes),
                 if over { "OVER: " } else { "" },
                 budget.reason
             );
@@ -160,7 +207,7 @@ fn compare(board: &str, used: &BTreeMap<&str, u64>, limits: &BTreeMap<String, By
 fn sizes(elf: &[u8]) -> Result<BTreeMap<&'static str, u64>> {
     let file = ElfFile32::<Endianness>::parse(elf)?;
     let endian = file.endian();
-    let memory_at = |address: u64| MEMORIES.iter().find(|(_, from, to)| (*from..*to).contains(&address));
+    let memory_at = |address: u64| MEMORIES.iter().find(|(_, from, to, _)| (*from..*to).contains(&address));
     let mut sizes: BTreeMap<&'static str, u64> = BTreeMap::new();
     for segment in file.elf_header().program_headers(endian, elf)? {
         let stored = u64::from(segment.p_filesz(endian));
@@ -189,10 +236,10 @@ mod tests {
     use super::*;
 
     fn limits(bytes_max: u64) -> BTreeMap<String, Bytes> {
-        MEMORIES
-            .iter()
-            .map(|(name, ..)| ((*name).to_owned(), Bytes { bytes_max, reason: "because".into() }))
-            .collect()
+        let limit = |name: &str| {
+            (name.to_owned(), Bytes { taken: 0, free: None, bytes_max, reason: "because".into() })
+        };
+        MEMORIES.iter().map(|(name, ..)| limit(name)).collect()
     }
 
     #[test]
@@ -210,26 +257,31 @@ mod tests {
         assert!(compare("f405", &BTreeMap::new(), &limits).is_err());
     }
 
+    /// A limit far above what is taken is none: what grows is not seen.
     #[test]
-    fn the_stack_counts_for_what_is_to_spare() {
-        let used = BTreeMap::from([("flash", 300_000), ("ram", 100_000), ("ccm", 40_000)]);
-        let (all, taken) = (Board::F405.ram_bytes() as f64, 146_000.0);
-        let row = spare(Board::F405, &used, 6_000, 25);
-        assert!(
-            !row.over && row.text.contains(&format!("{:.1} %", 100.0 - taken * 100.0 / all)),
-            "{}",
-            row.text
-        );
-        assert!(spare(Board::F405, &used, 16_000, 25).over);
+    fn each_limit_is_a_little_above_what_is_taken() {
+        let budgets = Budgets::read().unwrap();
+        let bytes = budgets.memory.iter().chain(&budgets.stack);
+        let bytes = bytes.map(|(name, budget)| (name, budget.taken as f64, budget.bytes_max as f64));
+        let cycles = budgets.cycles.iter().map(|(name, budget)| (name, budget.taken, budget.per_frame_max));
+        for (name, taken, limit) in bytes.chain(cycles) {
+            // Small stacks grow in steps of a saved register file.
+            assert!(limit >= taken && limit <= taken * 1.06 + 64.0, "{name}: {taken} of {limit}");
+        }
+        assert!(budgets.load.percent_max <= budgets.load.taken * 1.06);
+        assert!(budgets.stack_bytes() <= STACK_BYTES);
+        for (name, _, _, all) in MEMORIES {
+            let Bytes { taken, free, bytes_max, .. } = budgets.memory[name];
+            assert!(bytes_max <= all && free == Some(all - taken), "{name}");
+        }
+        assert!((budgets.load.taken + budgets.load.free - 100.0).abs() < 0.01);
     }
 
     #[test]
-    fn the_file_of_budgets_is_whole() {
-        let budgets = Budgets::read().unwrap();
-        for board in Board::ALL {
-            assert!(MEMORIES.iter().all(|(memory, ..)| budgets.of(board).memory.contains_key(*memory)));
-        }
-        assert!(budgets.stack_bytes() > 0 && !budgets.cycles.is_empty());
+    fn the_table_is_that_of_the_budgets() {
+        let text = fs::read_to_string(repo::root().join(TABLE_FILE)).unwrap();
+        let [_, table, _] = around_table(&text).unwrap();
+        assert_eq!(table, Budgets::read().unwrap().table(), "cargo xtask size --write");
     }
 
     #[test]

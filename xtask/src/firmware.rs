@@ -41,14 +41,6 @@ impl Board {
         }
     }
 
-    /// Bytes of memory that can be written to: RAM and CCM (`firmware/app/src/boards/*.x`).
-    pub(crate) fn ram_bytes(self) -> u64 {
-        match self {
-            Self::F405 => (128 + 64) * 1024,
-            Self::F429 => (192 + 64) * 1024,
-        }
-    }
-
     /// The arguments that choose this board, for any cargo command on the firmware's package.
     pub(crate) fn choice(self) -> [String; 4] {
         [
@@ -81,7 +73,11 @@ pub(crate) fn flags(tree: &Path) -> Result<OsString> {
     let cargo_home = cargo_home.or_else(|| Some(env::home_dir()?.join(".cargo")));
     let cargo_home = cargo_home.context("neither CARGO_HOME nor a home folder is known")?;
     let mut flags = OsString::new();
-    for (from, to) in [(tree.canonicalize()?, "/hums"), (cargo_home, "/cargo")] {
+    // Of several that fit the compiler takes the last one. The folder of a registry has a long name, which is in each place of a panic.
+    let sources = fs::read_dir(cargo_home.join("registry/src")).into_iter().flatten();
+    let registries = sources.filter_map(|entry| Some((entry.ok()?.path(), "/cargo")));
+    for (from, to) in [(tree.canonicalize()?, "/hums"), (cargo_home, "/cargo")].into_iter().chain(registries)
+    {
         flags.push("--remap-path-prefix=");
         flags.push(from);
         // Not separated by spaces: a folder may have one in its name.

@@ -16,6 +16,7 @@ mod fuzz;
 mod grafana;
 mod hums;
 mod image;
+mod lines;
 mod oracle;
 mod pc;
 mod prove;
@@ -57,7 +58,8 @@ cargo xtask COMMAND
   flash [--board BOARD] [--dfu]  build the firmware and program it: by a debug probe (probe-rs), or over USB by the chip's own
                                  boot loader (dfu-util); what the board has stored stays
   attach [--board BOARD]         build the firmware with a log, program it and show the log (probe-rs)
-  size                           flash and RAM of all boards against budgets.toml
+  size [--write]                 flash and RAM of all boards against budgets.toml; --write notes what is taken there and in
+                                 ARCHITECTURE.md
   costs                          cycles, load and stack, on the model of the chip, against budgets.toml
   setup [--dry-run]              install what demo and test need, or only say what is missing
   grafana                        make the dashboards of each database in host-tools/grafana
@@ -96,7 +98,7 @@ enum Command {
     Bench(Vec<bench::Bench>),
     Fuzz { seconds: u32 },
     Dist { check: bool },
-    Size,
+    Size { write: bool },
     Costs,
     Setup { dry_run: bool },
     Grafana,
@@ -136,10 +138,14 @@ impl Command {
                 ["--dry-run"] => Ok(Self::Setup { dry_run: true }),
                 _ => bail!("setup takes nothing or --dry-run"),
             },
-            "size" | "costs" | "grafana" | "manifest" | "help" | "--help" | "-h" if !rest.is_empty() => {
+            "size" => match rest.as_slice() {
+                [] => Ok(Self::Size { write: false }),
+                ["--write"] => Ok(Self::Size { write: true }),
+                _ => bail!("size takes nothing or --write"),
+            },
+            "costs" | "grafana" | "manifest" | "help" | "--help" | "-h" if !rest.is_empty() => {
                 bail!("{name} takes nothing")
             }
-            "size" => Ok(Self::Size),
             "costs" => Ok(Self::Costs),
             "grafana" => Ok(Self::Grafana),
             "manifest" => Ok(Self::Manifest),
@@ -168,9 +174,9 @@ impl Command {
             Self::Bench(what) => bench::run(&what),
             Self::Fuzz { seconds } => fuzz::run(seconds),
             Self::Dist { check } => dist::run(check),
-            Self::Size => {
+            Self::Size { write } => {
                 setup::ensure(&[Need::Linker, Need::FirmwareTarget], false).require_all()?;
-                budgets::check(&Board::ALL)
+                budgets::check(&Board::ALL, write)
             }
             Self::Setup { dry_run } => {
                 let outcome = setup::ensure(&Need::all(), dry_run);
