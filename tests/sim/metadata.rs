@@ -6,7 +6,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use hums_core::param_words::{DECIMAL_PLACES, group, long, short};
+use hums_core::param_words::{DECIMAL_PLACES, group, short};
 use hums_core::params::Param;
 use hums_link::ftp;
 use hums_tests::flights::root;
@@ -38,7 +38,6 @@ fn parameters() -> String {
             "name": spec.name,
             "type": "Float",
             "shortDesc": short(param).to_string(),
-            "longDesc": long(param).to_string(),
             "group": group(param),
             "category": "HUMS",
             "default": number(spec.default),
