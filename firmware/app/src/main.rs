@@ -1,9 +1,9 @@
 //! The firmware: puts the board's ports and the bodies of `hums_onboard` together.
 //!
 //! ```text
-//! AutopilotRx -> reception -> monitor -> storage -> card
-//!        GsRx -> uplink    -/       \\-> downlink -> GsTx
-//!                                     \-> requests -> AutopilotTx
+//! autopilot -> reception -> monitor -> storage -> card
+//!        gs -> uplink    -/       \\-> downlink -> gs
+//!                                  \-> requests -> autopilot
 //! ```
 //! Everything is allocated here and once: queues, the codec, the tasks. What the tasks do is in `hums_onboard`, where
 //! it is tested on a PC; what the machine does is in `boards`.
@@ -53,7 +53,8 @@ fn main() -> ! {
     start().run()
 }
 
-/// Puts all together and starts the tasks. Not a part of `main`, whose place on the stack is taken for good.
+/// Puts all together and starts the tasks.
+// Own stack frame (ARCHITECTURE.md, Memory).
 #[inline(never)]
 fn start() -> board::Idle {
     // SAFETY: this is the program's first statement: nobody has touched CCM, no interrupt is unmasked.
@@ -107,7 +108,7 @@ fn counted(mounts: u32, identity: &Boot<'_>) -> u32 {
         .fold(0, |sum, word| (sum ^ word).wrapping_mul(0x9E37_79B1).rotate_left(15))
 }
 
-// Apart from `start`: what each builds on the stack is gone when the next one begins.
+// Own stack frame (ARCHITECTURE.md, Memory). As all that follow.
 
 #[inline(never)]
 fn restore(

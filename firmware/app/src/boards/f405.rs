@@ -23,8 +23,7 @@ use static_cell::ConstStaticCell;
 use super::machine::{Boot, Parts};
 use super::stm32f4::{AUTOPILOT_BAUD, FETCH_EVERY, GS_BAUD, GS_FETCH_EVERY, GS_RING_BYTES, RING_BYTES};
 pub(crate) use super::stm32f4::{
-    AutopilotRx, AutopilotTx, Board, Card, GsRx, GsTx, Idle, LATE_TURNS, Led, StoreFlash, Watchdog,
-    crystal_failed, restart,
+    Card, Idle, LATE_TURNS, Led, PortRx, PortTx, StoreFlash, Watchdog, crystal_failed, restart,
 };
 use super::stm32f4::{CardPort, halves, line, random_number, reset_cause, start};
 
@@ -54,7 +53,7 @@ static RING: ConstStaticCell<[u8; RING_BYTES]> = ConstStaticCell::new([0; RING_B
 static GS_RING: ConstStaticCell<[u8; GS_RING_BYTES]> = ConstStaticCell::new([0; GS_RING_BYTES]);
 
 /// Starts clocks, watchdog, ports and card.
-pub(crate) fn take() -> Parts<Board> {
+pub(crate) fn take() -> Parts {
     let (cause, cause_register) = reset_cause();
     let p = start(rcc::HseMode::Oscillator);
 

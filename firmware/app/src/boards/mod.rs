@@ -8,8 +8,8 @@
 //! |---|---|
 //! | `NAME` | the board's name |
 //! | `PORT_INTERRUPTS` | what moves the bytes of ports and card |
-//! | `take() -> Parts<Board>` | starts the machine; to be called once, first |
-//! | `Board` | its [`Machine`](machine::Machine): the type of each of its parts |
+//! | `take() -> Parts` | starts the machine; to be called once, first |
+//! | `PortRx`, `Card` and so on | the types of its parts, which `stm32f4` has for all |
 //! | `Idle::run()` | what the processor does while all tasks wait; never returns |
 //! | `crystal_failed()` | whether the clock has gone over to a less exact oscillator |
 //! | `LATE_TURNS` | when the watchdog counts as late (`watch`) |

@@ -8,7 +8,6 @@ use hums_onboard::Task;
 use hums_onboard::queues::{AutopilotOut, FRAME_BYTES_MAX, GsOut};
 
 use crate::boards::board;
-use crate::boards::machine::Transmit;
 use crate::links::{self, now};
 use crate::status::SUPERVISOR;
 
@@ -27,7 +26,7 @@ pub(crate) static GS_STOOD_STILL: AtomicBool = AtomicBool::new(false);
 pub(crate) static AUTOPILOT_STOOD_STILL: AtomicBool = AtomicBool::new(false);
 
 #[embassy_executor::task]
-pub(crate) async fn run(mut port: board::GsTx, mut queue: GsOut<'static>) -> ! {
+pub(crate) async fn run(mut port: board::PortTx, mut queue: GsOut<'static>) -> ! {
     let mut frame = [0; FRAME_BYTES_MAX];
     loop {
         SUPERVISOR.report(Task::Downlink, now());
@@ -43,7 +42,7 @@ pub(crate) async fn run(mut port: board::GsTx, mut queue: GsOut<'static>) -> ! {
 
 /// To the autopilot.
 #[embassy_executor::task]
-pub(crate) async fn requests(mut port: board::AutopilotTx, mut queue: AutopilotOut<'static>) -> ! {
+pub(crate) async fn requests(mut port: board::PortTx, mut queue: AutopilotOut<'static>) -> ! {
     let mut frame = [0; FRAME_BYTES_MAX];
     loop {
         set_baud(&mut port, &BAUD_AUTOPILOT).await;
@@ -56,14 +55,14 @@ pub(crate) async fn requests(mut port: board::AutopilotTx, mut queue: AutopilotO
 }
 
 /// Sends a frame; gives it up where the port does not take it in time.
-async fn send(port: &mut impl Transmit, frame: &[u8], stood_still: &AtomicBool) {
+async fn send(port: &mut board::PortTx, frame: &[u8], stood_still: &AtomicBool) {
     if with_timeout(SEND_MAX, port.transmit(frame)).await.is_err() {
         port.restart();
         stood_still.store(true, Ordering::Relaxed);
     }
 }
 
-async fn set_baud(port: &mut impl Transmit, wanted: &AtomicU32) {
+async fn set_baud(port: &mut board::PortTx, wanted: &AtomicU32) {
     match wanted.load(Ordering::Relaxed) {
         0 => {}
         baud => port.set_baud(baud).await,

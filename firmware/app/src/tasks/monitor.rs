@@ -98,8 +98,8 @@ pub(crate) async fn run(
     }
 }
 
-/// Records how the start before this one ended, and tells the ground station. The note is read here, so that it takes no
-/// memory of the task's.
+/// Records how the start before this one ended, and tells the ground station.
+// Own stack frame (ARCHITECTURE.md, Memory).
 #[inline(never)]
 fn tell_fault(body: &mut Monitoring<'static>, ends: &mut Ends, cause: ResetCause) {
     let noted = fault::take();
@@ -127,7 +127,7 @@ fn tell_board(body: &mut Monitoring<'static>, ends: &mut Ends, told: &mut [bool;
     }
 }
 
-// None of these within the task: what one of them takes of the stack is not to lie below what another takes.
+// Own stack frame (ARCHITECTURE.md, Memory). As all that follow.
 
 /// Takes the frames that are there, or [`DRAINED_MAX`] of them: `true`, there may be more.
 #[inline(never)]

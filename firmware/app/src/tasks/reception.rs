@@ -6,13 +6,13 @@ use hums_onboard::queues::FramesIn;
 use hums_onboard::reception::{Reception, SILENCE};
 
 use crate::boards::board;
-use crate::boards::machine::{FETCH_BYTES, Receive};
+use crate::boards::machine::FETCH_BYTES;
 use crate::costs::{Stage, measure};
 use crate::links::{self, now};
 use crate::status::{PORT_STATUS, SUPERVISOR};
 
 #[embassy_executor::task]
-pub(crate) async fn run(mut port: board::AutopilotRx, mut frames: FramesIn<'static>) -> ! {
+pub(crate) async fn run(mut port: board::PortRx, mut frames: FramesIn<'static>) -> ! {
     let mut body = Reception::new(&PORT_STATUS);
     let mut bytes = [0; FETCH_BYTES];
     loop {

@@ -71,7 +71,7 @@ async fn wait_for_work(
     }
 }
 
-// None of these within the task: what one of them takes of the stack is not to lie below what another takes.
+// Own stack frame (ARCHITECTURE.md, Memory). As all that follow.
 
 #[inline(never)]
 fn service(body: &mut Body, begun: Instant, sectors: &mut SectorsOut<'static>) -> Service {

@@ -5,14 +5,13 @@ use hums_onboard::queues::UplinkIn;
 use hums_onboard::uplink::{SILENCE, Uplink};
 
 use crate::boards::board;
-use crate::boards::machine::Receive;
 use crate::links::{self, now};
 
 /// Bytes fetched at a time: 22 ms at 57,600 baud.
 const FETCH_BYTES: usize = 128;
 
 #[embassy_executor::task]
-pub(crate) async fn run(mut port: board::GsRx, mut frames: UplinkIn<'static>) -> ! {
+pub(crate) async fn run(mut port: board::PortRx, mut frames: UplinkIn<'static>) -> ! {
     let mut body = Uplink::new();
     let mut bytes = [0; FETCH_BYTES];
     let mut begun = false;

@@ -18,13 +18,12 @@ use embassy_time::Duration;
 pub(crate) use card::{Card, CardPort};
 pub(crate) use clock::crystal_failed;
 pub(crate) use flash::StoreFlash;
-pub(crate) use port::halves;
-use port::{PortRx, PortTx};
+pub(crate) use port::{PortRx, PortTx, halves};
 pub(crate) use random::number as random_number;
 pub(crate) use reset::{reset_cause, restart};
 pub(crate) use watchdog::Watchdog;
 
-use crate::boards::machine::{Machine, SYSTICK_RELOAD};
+use crate::boards::machine::SYSTICK_RELOAD;
 
 #[cfg(feature = "log")]
 use defmt_rtt as _;
@@ -44,30 +43,6 @@ pub(crate) const LATE_TURNS: u32 = 6;
 pub(crate) const GS_RING_BYTES: usize = 512;
 /// How often the uplink looks into its ring: nobody there is in a hurry.
 pub(crate) const GS_FETCH_EVERY: Duration = Duration::from_millis(10);
-
-/// Reception from the autopilot.
-pub(crate) type AutopilotRx = PortRx;
-/// Transmission to the autopilot.
-pub(crate) type AutopilotTx = PortTx;
-/// Reception from the ground station.
-pub(crate) type GsRx = PortRx;
-/// Transmission to the ground station.
-pub(crate) type GsTx = PortTx;
-
-/// The types of its parts.
-pub(crate) struct Board;
-
-impl Machine for Board {
-    type AutopilotRx = AutopilotRx;
-    type AutopilotTx = AutopilotTx;
-    type GsRx = GsRx;
-    type GsTx = GsTx;
-    type Card = Card;
-    type StoreFlash = StoreFlash;
-    type Led = Led;
-    type Watchdog = Watchdog;
-    type Idle = Idle;
-}
 
 /// Starts clocks, counters and the watches over the machine; the chip's parts. `mode`: what is at the clock's pins.
 pub(crate) fn start(mode: rcc::HseMode) -> Peripherals {

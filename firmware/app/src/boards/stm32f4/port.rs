@@ -15,7 +15,7 @@ use embassy_stm32::usart::{ConfigError, Instance, RxDma, TxDma, Uart, UartRx, Ua
 use embassy_stm32::{Peri, rcc};
 use embassy_time::{Duration, Instant, Timer};
 
-use crate::boards::machine::{Overrun, Receive, Transmit};
+use crate::boards::machine::Overrun;
 
 /// The last two bytes of a frame take 2.1 ms at 9,600 baud, the slowest rate.
 const LAST_LOOK: Duration = Duration::from_micros(100);
@@ -89,8 +89,10 @@ impl PortRx {
     }
 }
 
-impl Receive for PortRx {
-    async fn receive(&mut self, buffer: &mut [u8]) -> Result<usize, Overrun> {
+impl PortRx {
+    /// Waits for bytes and gives as many as have come and fit, at least one. Damaged bytes are given like others: the
+    /// frame's checksum finds them.
+    pub(crate) async fn receive(&mut self, buffer: &mut [u8]) -> Result<usize, Overrun> {
         loop {
             // Also after a look that found something: as soon as what is done with a byte takes longer than the next one needs to
             // come, whoever looks again at once finds something each time, and nobody less urgent ever runs again.
@@ -138,8 +140,9 @@ impl PortTx {
     }
 }
 
-impl Transmit for PortTx {
-    async fn transmit(&mut self, bytes: &[u8]) {
+impl PortTx {
+    /// Sends all of `bytes`; returns when the port has taken the last.
+    pub(crate) async fn transmit(&mut self, bytes: &[u8]) {
         if bytes.is_empty() {
             return;
         }
@@ -154,12 +157,14 @@ impl Transmit for PortTx {
         unsafe { self.channel.write(self.request, bytes, to, TransferOptions::default()) }.await;
     }
 
-    fn restart(&mut self) {
+    /// Begins anew after a transmission that did not come to its end.
+    pub(crate) fn restart(&mut self) {
         self.registers.cr1().modify(|w| w.set_te(false));
         self.registers.cr1().modify(|w| w.set_te(true));
     }
 
-    async fn set_baud(&mut self, baud: u32) {
+    /// Sets the port's baud rate, both ways, once the last frame has gone out.
+    pub(crate) async fn set_baud(&mut self, baud: u32) {
         // 16 samples a bit; the divider has 16 bits, and is 16 at least.
         let divider = ((self.clock.0 + baud / 2) / baud.max(1)).clamp(16, u32::from(u16::MAX));
         if divider == self.registers.brr().read().0 {
