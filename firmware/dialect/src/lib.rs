@@ -157,8 +157,12 @@ impl Message {
 
 /// The definition of a message id, or `None` where the dialect has none.
 pub fn message(id: u32) -> Option<&'static Message> {
-    let index = MESSAGES.binary_search_by_key(&id, |message| message.id).ok()?;
-    MESSAGES.get(index)
+    MESSAGES.get(usize::from(index(id)?))
+}
+
+/// The place of a message id in [`messages`].
+pub fn index(id: u32) -> Option<u16> {
+    MESSAGES.binary_search_by_key(&id, |message| message.id).ok().map(|index| index as u16)
 }
 
 /// All messages, by ascending id.

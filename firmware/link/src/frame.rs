@@ -115,6 +115,8 @@ pub struct Frame<'a> {
     header: Header,
     bytes: &'a [u8],
     check: Check,
+    /// The message by its index in the dialect's table, where the checksum is right.
+    message: Option<u16>,
 }
 
 impl<'a> Frame<'a> {
@@ -130,23 +132,38 @@ impl<'a> Frame<'a> {
             return None;
         }
         let (computed, sent) = checksums(&header, bytes)?;
-        let verified = hums_dialect::message(header.id)
-            .is_some_and(|message| crc::step(computed, message.crc_extra) == sent);
-        let check = if verified { Check::Verified } else { Check::Unverified };
-        Some(Self { header, bytes, check })
+        let message = hums_dialect::index(header.id).filter(|index| {
+            let message = hums_dialect::messages().get(usize::from(*index));
+            message.is_some_and(|message| crc::step(computed, message.crc_extra) == sent)
+        });
+        Some(Self::from_parts(header, bytes, message))
     }
 
-    /// A frame that the framer found and checked before, from the queue that it was put in: not checked again.
+    /// A frame that was checked before, for instance when it was recorded: not checked again.
     pub fn again(bytes: &'a [u8], check: Check) -> Option<Self> {
         let header = Header::read(bytes).ok().filter(|header| header.frame_len() == bytes.len())?;
-        Some(Self { header, bytes, check })
+        let message = if check == Check::Verified { hums_dialect::index(header.id) } else { None };
+        Some(Self { header, bytes, check, message })
     }
 
-    /// `bytes` are exactly the frame of `header`: the framer has seen to that.
+    /// A frame that the framer found and checked, from the queue that it was put in with its [`Self::message`]: not looked up again.
+    pub fn from_queue(bytes: &'a [u8], message: Option<u16>) -> Option<Self> {
+        let header = Header::read(bytes).ok().filter(|header| header.frame_len() == bytes.len())?;
+        Some(Self::from_parts(header, bytes, message))
+    }
+
+    /// `bytes` are exactly the frame of `header`: the framer has seen to that. `message` is there where the checksum is right.
     #[inline]
-    pub(crate) fn from_parts(header: Header, bytes: &'a [u8], check: Check) -> Self {
+    pub(crate) fn from_parts(header: Header, bytes: &'a [u8], message: Option<u16>) -> Self {
         debug_assert_eq!(header.frame_len(), bytes.len());
-        Self { header, bytes, check }
+        let check = if message.is_some() { Check::Verified } else { Check::Unverified };
+        Self { header, bytes, check, message }
+    }
+
+    /// The message by its index in the dialect's table; `None` where the checksum is not that of our definition.
+    #[inline]
+    pub const fn message(&self) -> Option<u16> {
+        self.message
     }
 
     /// The message id.
@@ -193,7 +210,7 @@ impl<'a> Frame<'a> {
 
     /// System and component whom it is for, 0 for all; `None` where its message names nobody, or is not known.
     pub fn target(&self) -> Option<(u8, u8)> {
-        let message = hums_dialect::message(self.id()).filter(|_| self.check == Check::Verified)?;
+        let message = hums_dialect::messages().get(usize::from(self.message?))?;
         if message.target_system == hums_dialect::Message::NO_TARGET {
             return None;
         }

@@ -11,7 +11,7 @@
 //! # Frames of definitions that we do not have
 //! They must be recorded and passed on, yet line noise must not. For each checksum that does not fit we compute which
 //! `crc_extra` would make it fit ([`hums_dialect::crc::extra_of`]; 1 in 256 of random bytes has one), and let the candidate through
-//! as [`Check::Unverified`] if that extra is the one that this system used for this id before, or, at first sight, if
+//! as [`Check::Unverified`](crate::frame::Check::Unverified) if that extra is the one that this system used for this id before, or, at first sight, if
 //! it stands between frames: a frame (a damaged one, silence) before it, a start byte (or silence) after it, and no whole frame of
 //! a known definition inside. Without a frame before it, its extra is only remembered, and the next one comes through.
 //! An id that this system has sent with our definition never comes through unverified: then it is damage.
@@ -25,7 +25,7 @@
 use hums_dialect::crc;
 use hums_dialect::wire::{FRAME_BYTES_MAX, START_V1, START_V2};
 
-use crate::frame::{self, Check, Frame, Header, NoHeader};
+use crate::frame::{self, Frame, Header, NoHeader};
 use crate::seen::{Extra, Seen};
 
 /// Bytes held: the longest frame, the byte after it, and as much again so that bytes are seldom moved.
@@ -78,8 +78,8 @@ const _: () = assert!(BUFFER > FRAME_BYTES_MAX + 1, "a decided candidate must al
 
 /// What becomes of the first bytes held.
 enum Verdict {
-    /// A frame.
-    Frame(Header, Check),
+    /// A frame, and its message if the checksum is ours.
+    Frame(Header, Option<u16>),
     /// So many bytes are of no frame.
     Skip(usize),
     /// Nobody can say with fewer bytes than this.
@@ -147,12 +147,12 @@ impl Framer {
     fn scan(&mut self, idle: bool, sink: &mut impl FnMut(Frame<'_>)) {
         while self.held() >= self.needed || (idle && self.held() > 0) {
             match self.judge(idle) {
-                Verdict::Frame(header, check) => {
+                Verdict::Frame(header, message) => {
                     let len = header.frame_len();
                     let bytes = &self.buffer[self.start..self.start + len];
-                    sink(Frame::from_parts(header, bytes, check));
+                    sink(Frame::from_parts(header, bytes, message));
                     self.counts.frames = self.counts.frames.wrapping_add(1);
-                    let unverified = u64::from(check == Check::Unverified);
+                    let unverified = u64::from(message.is_none());
                     self.counts.unverified = self.counts.unverified.wrapping_add(unverified);
                     self.counts.bytes_in_frames = self.counts.bytes_in_frames.wrapping_add(len as u64);
                     self.consume(len);
@@ -205,10 +205,10 @@ impl Framer {
         if let Known::Fits { index, crc_extra } = known {
             let Some((computed, sent)) = frame::checksums(&header, held) else { return Verdict::Skip(1) };
             if crc::step(computed, crc_extra) == sent {
-                self.seen.verified(header.system, index);
-                return Verdict::Frame(header, Check::Verified);
+                self.seen.verified(header.system, usize::from(index));
+                return Verdict::Frame(header, Some(index));
             }
-            if self.seen.was_verified(header.system, index) {
+            if self.seen.was_verified(header.system, usize::from(index)) {
                 return self.damaged(len);
             }
         }
@@ -232,10 +232,10 @@ impl Framer {
         let Some(credit) = self.credit.checked_sub(len as u32) else { return Verdict::Skip(1) };
         self.credit = credit;
         let Some((computed, sent)) = frame::checksums(header, held) else { return Verdict::Skip(1) };
-        if let Known::Misfits { crc_extra } = known
+        if let Known::Misfits { index, crc_extra } = known
             && crc::step(computed, crc_extra) == sent
         {
-            return Verdict::Frame(*header, Check::Verified);
+            return Verdict::Frame(*header, Some(index));
         }
         let Some(extra) = crc::extra_of(computed, sent) else { return self.damaged(len) };
         let accepted = match learned {
@@ -249,7 +249,7 @@ impl Framer {
         if !accepted {
             return self.damaged(len);
         }
-        Verdict::Frame(*header, Check::Unverified)
+        Verdict::Frame(*header, None)
     }
 
     /// A wrong checksum where nothing but the checksum speaks for a frame: damage if id and length are those of a
@@ -282,24 +282,21 @@ const fn is_start(byte: u8) -> bool {
 #[derive(Clone, Copy)]
 enum Known {
     /// There is a message of this id, and the payload may have this length.
-    Fits { index: usize, crc_extra: u8 },
+    Fits { index: u16, crc_extra: u8 },
     /// There is a message of this id, but no encoder makes it so long or so short.
-    Misfits { crc_extra: u8 },
+    Misfits { index: u16, crc_extra: u8 },
     /// No such message.
     No,
 }
 
 impl Known {
     fn of(header: &Header) -> Self {
-        let messages = hums_dialect::messages();
-        let Ok(index) = messages.binary_search_by_key(&header.id, |message| message.id) else {
-            return Self::No;
-        };
-        let message = &messages[index];
+        let Some(index) = hums_dialect::index(header.id) else { return Self::No };
+        let message = &hums_dialect::messages()[usize::from(index)];
         // MAVLink 1 sends all fields but the extensions. MAVLink 2 leaves out zeros at the end, and a newer definition
         // may have extension fields that ours has not.
         if header.version == 1 && header.payload_len != message.len_base {
-            return Self::Misfits { crc_extra: message.crc_extra };
+            return Self::Misfits { index, crc_extra: message.crc_extra };
         }
         Self::Fits { index, crc_extra: message.crc_extra }
     }

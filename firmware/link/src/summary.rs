@@ -430,7 +430,7 @@ fn urgency(finding: &Finding) -> u8 {
 
 /// A finding in words a pilot understands: what is wrong with which part, the value, and what to do where it is critical, for
 /// instance `HUMS: battery 1 low: 6.8 %, LAND NOW`. What is good again is called as it was told: `HUMS: over: battery 1 low`.
-// Not in its callers: the deepest of them needs the stack.
+// Own stack frame (ARCHITECTURE.md, Memory).
 #[inline(never)]
 pub fn text(finding: &Finding) -> Text {
     let Finding { check, instance, level, value, feeds, .. } = *finding;

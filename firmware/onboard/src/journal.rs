@@ -79,7 +79,7 @@ impl<'a> Journal<'a> {
     }
 
     /// Records the losses whose time has come, or, at the end, all.
-    // Not within its caller: what one step of a tick takes of the stack is not to lie below what another takes.
+    // Own stack frame (ARCHITECTURE.md, Memory).
     #[inline(never)]
     pub(crate) fn record_losses(&mut self, now: Instant, all: bool, sectors: &mut SectorsIn) {
         let Self { losses, writer, .. } = self;

@@ -145,7 +145,7 @@ impl Recorded {
     }
 }
 
-// Never within their caller: what each takes of the stack is not taken by all.
+// Own stack frame (ARCHITECTURE.md, Memory).
 
 #[inline(never)]
 fn session(now: Instant, moment: Moment, book: &mut Logbook<'_>, sectors: &mut SectorsIn) {

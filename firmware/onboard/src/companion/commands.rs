@@ -194,7 +194,8 @@ fn preflight(monitor: &Monitor) -> Option<(&'static str, u8)> {
     monitor.health().levels().find(|(_, _, level)| bad(*level)).map(|(check, part, _)| (check.name, part))
 }
 
-/// What stands against a flight. Not in its caller, whose callers need the stack.
+/// What stands against a flight.
+// Own stack frame (ARCHITECTURE.md, Memory).
 #[inline(never)]
 fn not_ready(check: &str, part: u8) -> Text {
     match health::said(check) {

@@ -32,7 +32,7 @@ use hums_link::summary::{self, Summary};
 use crate::journal::{Journal, Logbook};
 use crate::notices::Notices;
 use crate::persist::{Handover, Keeper};
-use crate::queues::{GsIn, Path, SectorsIn};
+use crate::queues::{GsIn, SectorsIn, SummaryRoute};
 use commands::Commands;
 use library::Library;
 use limiter::Asker;
@@ -335,16 +335,16 @@ impl Companion {
         sectors: &mut SectorsIn,
         gs: &mut GsIn,
     ) {
-        gs.set_path(match book.monitor.params().get(Param::GsPath) as u8 {
-            0 => Path::Nobody,
-            2 => Path::Autopilot,
-            _ => Path::Port,
+        gs.set_route(match book.monitor.params().get(Param::GsPath) as u8 {
+            0 => SummaryRoute::Nobody,
+            2 => SummaryRoute::Autopilot,
+            _ => SummaryRoute::Port,
         });
-        summary.forwards = gs.path() == Path::Port;
+        summary.forwards = gs.route() == SummaryRoute::Port;
         if self.commands.stopped() && book.monitor.vehicle().armed() {
             self.commands.stop_or_record(now, false, NOBODY, &mut book.journal, sectors);
         }
-        self.secure.seal(now, gs.path(), book.monitor, [&mut summary.outlet, &mut self.outlet]);
+        self.secure.seal(now, gs.route(), book.monitor, [&mut summary.outlet, &mut self.outlet]);
         self.tell_autopilot(now, book.monitor, gs);
         self.settings.tick(now, &mut self.library, book, notices, sectors, &mut gs.shelf);
     }

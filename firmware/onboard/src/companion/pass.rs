@@ -17,7 +17,7 @@ use hums_link::request::Port;
 
 use super::secure;
 use super::ways::Ways;
-use crate::queues::Path;
+use crate::queues::SummaryRoute;
 
 /// `RADIO`, `RADIO_STATUS`
 const RADIO: [u32; 2] = [166, 109];
@@ -85,5 +85,5 @@ impl Pass {
 }
 
 fn is_on(monitor: &Monitor, ways: &Ways) -> bool {
-    ways.queues.path() == Path::Port && monitor.params().get(Param::GsPass) > 0.5
+    ways.queues.route() == SummaryRoute::Port && monitor.params().get(Param::GsPass) > 0.5
 }

@@ -27,7 +27,7 @@ use hums_store::Key as Item;
 
 use crate::persist::keeper::SIGNED_MAX;
 use crate::persist::{Handover, Keeper};
-use crate::queues::Path;
+use crate::queues::SummaryRoute;
 
 /// Numbers of stored items: the key, and [`Times`] as three `u64`.
 const ITEM_KEY: u8 = 32;
@@ -194,9 +194,15 @@ impl Secure {
     }
 
     /// Keeps both ways out signing as they should, in our time: the summary stream's, and the autopilot's.
-    pub(crate) fn seal(&mut self, now: Instant, path: Path, monitor: &Monitor, outlets: [&mut Outlet; 2]) {
+    pub(crate) fn seal(
+        &mut self,
+        now: Instant,
+        route: SummaryRoute,
+        monitor: &Monitor,
+        outlets: [&mut Outlet; 2],
+    ) {
         let params = monitor.params();
-        let carries = if path == Path::Autopilot { Port::Autopilot } else { Port::Gs };
+        let carries = if route == SummaryRoute::Autopilot { Port::Autopilot } else { Port::Gs };
         let guards = [guard(params, carries), guard(params, Port::Autopilot)];
         let Self { signing, last, reseal, .. } = self;
         let reseal = core::mem::take(reseal);

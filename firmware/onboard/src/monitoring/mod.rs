@@ -4,10 +4,10 @@
 //! One call of [`Monitoring::drain`] takes one frame through the whole pipeline; [`Monitoring::tick`] every 50 ms does
 //! what time alone asks for.
 
+mod card_notices;
 mod figures;
 mod happenings;
 mod marks;
-mod slot;
 
 use embedded_storage::nor_flash::NorFlash;
 use hums_blackbox::Writer;
@@ -26,15 +26,15 @@ use crate::journal::{Journal, Logbook};
 use crate::notices::{Notice, Notices};
 use crate::persist::{Handover, Keeper};
 use crate::port::PortStatus;
-use crate::queues::{FramesOut, GsIn, Path, SectorsIn, UplinkOut};
+use crate::queues::{FramesOut, GsIn, SectorsIn, SummaryRoute, UplinkOut};
 use crate::records::Recorded;
 use crate::supervisor::Task;
+use card_notices::CardNotices;
 use figures::Figures;
 pub use figures::Machine;
 pub use happenings::CELLS_UNKNOWN;
 use happenings::CRITICAL;
 use marks::Marks;
-use slot::Slot;
 
 /// How often [`Monitoring::tick`] is to be called.
 pub const TICK: Span = Span::from_millis(monitor::TICK.as_millis());
@@ -74,7 +74,7 @@ pub struct Monitoring<'a> {
     identity: Boot<'a>,
     recorded: Recorded,
     notices: Notices,
-    slot: Slot,
+    card_notices: CardNotices,
     /// Files that storage had begun at the last tick.
     files: u32,
     figures: Figures<'a>,
@@ -102,7 +102,7 @@ impl<'a> Monitoring<'a> {
             identity,
             recorded: Recorded::new(),
             notices: Notices::new(),
-            slot: Slot::new(),
+            card_notices: CardNotices::new(),
             files: 0,
             figures: Figures::new(port, card),
             marks: Marks::new(),
@@ -164,34 +164,32 @@ impl<'a> Monitoring<'a> {
         gs: &mut GsIn,
         begin: &mut impl FnMut(Step),
     ) -> bool {
-        frames.take(|at_micros, verified, bytes| {
-            self.frame(Instant::from_micros(at_micros), verified, bytes, sectors, gs, begin);
+        frames.take(|at_micros, message, bytes| {
+            self.frame(Instant::from_micros(at_micros), message, bytes, sectors, gs, begin);
         })
     }
 
     fn frame(
         &mut self,
         at: Instant,
-        verified: bool,
+        message: Option<u16>,
         bytes: &[u8],
         sectors: &mut SectorsIn,
         gs: &mut GsIn,
         begin: &mut impl FnMut(Step),
     ) {
         let Self { book, summary, companion, .. } = self;
-        let whole = Frame::again(bytes, Check::Unverified);
-        begin(Step::Encode { at, id: whole.as_ref().map_or(0, Frame::id) });
-        let key = whole.filter(|frame| frame.id() == companion::SETUP);
-        if let Some(frame) = key {
+        let frame = Frame::from_queue(bytes, message);
+        begin(Step::Encode { at, id: frame.as_ref().map_or(0, Frame::id) });
+        if let Some(frame) = frame.filter(|frame| frame.id() == companion::SETUP) {
             companion.withhold(at, &frame, &mut book.journal, sectors);
         } else if !companion.stopped() {
-            book.journal.frame(at, bytes, verified, sectors);
+            book.journal.frame(at, bytes, message.is_some(), sectors);
         }
         begin(Step::Observe);
+        let Some(frame) = frame else { return };
         // What is not ours by its checksum is recorded but not believed.
-        let check = if verified { Check::Verified } else { Check::Unverified };
-        let Some(frame) = Frame::again(bytes, check) else { return };
-        if !verified {
+        if frame.check() == Check::Unverified {
             companion.pass_down(at, &frame, book, summary, gs);
             return;
         }
@@ -202,7 +200,7 @@ impl<'a> Monitoring<'a> {
         summary.frame(at, &frame, &mut |bytes| gs.tell(bytes));
     }
 
-    /// Not within its caller: an observation is not to lie on the stack below a conversation.
+    // Own stack frame (ARCHITECTURE.md, Memory).
     #[inline(never)]
     fn observe(&mut self, at: Instant, frame: &Frame<'_>) {
         self.sequences.frame(at, frame);
@@ -219,14 +217,13 @@ impl<'a> Monitoring<'a> {
         sectors: &mut SectorsIn,
         gs: &mut GsIn,
     ) -> bool {
-        uplink.take(|_, verified, bytes| {
+        uplink.take(|_, message, bytes| {
             // Where the autopilot carries our stream, the port is nobody's.
-            if gs.path() == Path::Autopilot {
+            if gs.route() == SummaryRoute::Autopilot {
                 return;
             }
-            let check = if verified { Check::Verified } else { Check::Unverified };
             let Self { book, summary, companion, identity, .. } = self;
-            if let Some(frame) = Frame::again(bytes, check) {
+            if let Some(frame) = Frame::from_queue(bytes, message) {
                 companion.uplink(now, &frame, book, summary, sectors, gs);
             }
             companion.answer(now, book.monitor, identity, summary, gs);
@@ -247,9 +244,9 @@ impl<'a> Monitoring<'a> {
         }
         self.tell_before(now, sectors);
         self.head_file(now, sectors);
-        let Self { book, figures, slot, notices, .. } = self;
+        let Self { book, figures, card_notices, notices, .. } = self;
         figures.count(now, book.card, &mut book.journal, sectors);
-        slot.tick(now, book.card.read().state, &mut book.journal, notices, sectors);
+        card_notices.tick(now, book.card.read().state, &mut book.journal, notices, sectors);
         self.check(now, sectors, gs, findings);
         let Self { book, recorded, notices, marks, .. } = self;
         happenings::record(now, book, recorded, notices, marks, sectors);
@@ -272,7 +269,8 @@ impl<'a> Monitoring<'a> {
         self.talk(now, sectors, gs);
     }
 
-    /// What time alone asks for at the ports. Not within the tick, as those below.
+    /// What time alone asks for at the ports.
+    // Own stack frame (ARCHITECTURE.md, Memory).
     #[inline(never)]
     fn talk(&mut self, now: Instant, sectors: &mut SectorsIn, gs: &mut GsIn) {
         let Self { book, summary, companion, notices, figures, identity, .. } = self;
@@ -330,8 +328,7 @@ impl<'a> Monitoring<'a> {
         self.companion.save(now, &self.summary, handover);
     }
 
-    // Not within the tick: what one of these takes of the stack is not to lie below what another takes.
-
+    // Own stack frame (ARCHITECTURE.md, Memory).
     #[inline(never)]
     fn check(
         &mut self,

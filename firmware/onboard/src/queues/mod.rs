@@ -26,7 +26,7 @@ pub use capacities::{
 };
 pub use frames::{FramesIn, FramesOut, UplinkIn, UplinkOut};
 use level::Level;
-pub use ports::{AutopilotOut, GsIn, GsOut, Path, PortIn, PortOut};
+pub use ports::{AutopilotOut, GsIn, GsOut, PortIn, PortOut, SummaryRoute};
 pub use sectors::{SectorsIn, SectorsOut};
 
 // The queue keeps one place empty to tell full from empty.
@@ -108,7 +108,7 @@ impl Queues {
                 gs: PortIn::new(self.gs.framed_producer(), gs),
                 autopilot: PortIn::new(self.autopilot.framed_producer(), autopilot),
                 shelf: reader,
-                path: Path::Port,
+                route: SummaryRoute::Port,
             },
             shelf,
             gs_out: PortOut(self.gs.framed_consumer(), gs),
@@ -123,22 +123,48 @@ impl Queues {
 mod tests {
     use super::frames::STAMP_BYTES;
     use hums_blackbox::SectorSink as _;
+    use hums_link::encode::Encoder;
+    use hums_link::frame::Frame;
+    use hums_link::packet::Packet;
 
     use super::*;
+
+    /// Puts a frame of these bytes in, with the header of MAVLink 1 in place of the first ones.
+    fn put<const BYTES: usize>(frames: &mut FramesIn, at_micros: u64, mut bytes: [u8; BYTES]) -> bool {
+        bytes[..6].copy_from_slice(&[0xFE, BYTES as u8 - 8, 0, 1, 1, 255]);
+        frames.put(at_micros, &Frame::parse(&bytes).expect("a frame"))
+    }
+
+    #[test]
+    fn a_frame_comes_out_with_the_message_that_it_was_found_to_be() {
+        let mut queues = Box::new(Queues::new());
+        let mut ends = queues.split();
+        let mut out = [0; FRAME_BYTES_MAX];
+        for id in [0, 30, 253] {
+            let bytes = Encoder::of(1, 1).frame(&mut out, &Packet::new(id)).to_vec();
+            let put = Frame::parse(&bytes).expect("a frame");
+            assert!(ends.frames_in.put(5, &put) && put.message().is_some());
+            let mut is_same = false;
+            ends.frames_out.take(|_, message, bytes| {
+                is_same = Frame::from_queue(bytes, message) == Some(put);
+            });
+            assert!(is_same, "message {id}");
+        }
+    }
 
     #[test]
     fn a_full_frame_queue_refuses_and_keeps_what_it_has() {
         let mut queues = Box::new(Queues::new());
         let mut ends = queues.split();
         let mut taken = 0;
-        while ends.frames_in.put(taken, true, &[taken as u8; 100]) {
+        while put(&mut ends.frames_in, taken, [taken as u8; 100]) {
             taken += 1;
         }
         assert!(taken as usize >= FRAME_QUEUE_BYTES / 120, "{taken} frames of 100 bytes");
         for expected in 0..taken {
             let mut seen = false;
-            ends.frames_out.take(|at, verified, frame| {
-                seen = (at, verified, frame) == (expected, true, &[expected as u8; 100][..]);
+            ends.frames_out.take(|at, message, frame| {
+                seen = (at, message, &frame[6..98]) == (expected, None, &[expected as u8; 92][..]);
             });
             assert!(seen, "frame {expected}");
         }
@@ -152,12 +178,12 @@ mod tests {
         let mut out = [0; FRAME_BYTES_MAX];
         for frames in [3, 1] {
             for _ in 0..frames {
-                ends.frames_in.put(0, true, &[1; 50]);
+                put(&mut ends.frames_in, 0, [1; 50]);
                 ends.gs_in.put(&[7; 100]);
             }
             while ends.frames_out.take(|_, _, _| {}) && ends.gs_out.take(&mut out).is_some() {}
-            assert_eq!(ends.frames_in.bytes_max(), 3 * (50 + STAMP_BYTES as u32));
-            assert_eq!(ends.gs_in.bytes_max(), 300);
+            assert_eq!(ends.frames_in.bytes_max(), 3 * (2 + 50 + STAMP_BYTES as u32));
+            assert_eq!(ends.gs_in.bytes_max(), 3 * 102);
         }
     }
 

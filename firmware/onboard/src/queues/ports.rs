@@ -15,12 +15,12 @@ pub struct GsIn<'a> {
     pub autopilot: PortIn<'a, AUTOPILOT_QUEUE_BYTES>,
     /// To storage and back: the logs on the card.
     pub shelf: Reader<'a>,
-    pub(super) path: Path,
+    pub(super) route: SummaryRoute,
 }
 
 /// The way of the summary stream.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Path {
+pub enum SummaryRoute {
     /// There is none.
     Nobody,
     /// A radio at the ground station's port.
@@ -37,21 +37,21 @@ impl GsIn<'_> {
 
     /// Queues a frame of the summary stream, on its way.
     pub fn tell(&mut self, frame: &[u8]) {
-        match self.path {
-            Path::Nobody => {}
-            Path::Port => self.gs.put(frame),
-            Path::Autopilot => self.autopilot.put(frame),
+        match self.route {
+            SummaryRoute::Nobody => {}
+            SummaryRoute::Port => self.gs.put(frame),
+            SummaryRoute::Autopilot => self.autopilot.put(frame),
         }
     }
 
     /// The way of the summary stream.
-    pub const fn path(&self) -> Path {
-        self.path
+    pub const fn route(&self) -> SummaryRoute {
+        self.route
     }
 
     /// Another way for the summary stream.
-    pub const fn set_path(&mut self, path: Path) {
-        self.path = path;
+    pub const fn set_route(&mut self, route: SummaryRoute) {
+        self.route = route;
     }
 
     /// Frames queued since power-on.

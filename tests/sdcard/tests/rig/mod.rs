@@ -159,17 +159,18 @@ impl Rig {
             state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
             (state >> 24) as u8
         }));
-        self.give(NOISE_ID, &payload, false);
+        self.give(NOISE_ID, &payload);
         if index.is_multiple_of(25) {
             self.heartbeats += 1;
             let mode = if self.armed { 0x81 } else { 0x01 };
-            self.give(0, &[0, 0, 0, 0, 2, 3, mode, 4, 3], true);
+            self.give(0, &[0, 0, 0, 0, 2, 3, mode, 4, 3]);
         }
     }
 
-    fn give(&mut self, id: u32, payload: &[u8], verified: bool) {
+    fn give(&mut self, id: u32, payload: &[u8]) {
         let bytes = frame(1, 1, id, payload);
-        assert!(self.ends.frames_in.put(self.frame_at.as_micros(), verified, &bytes));
+        let frame = Frame::parse(&bytes).expect("a frame");
+        assert!(self.ends.frames_in.put(self.frame_at.as_micros(), &frame));
         let Ends { frames_out, sectors_in, gs_in, .. } = &mut self.ends;
         while self.monitoring.drain(frames_out, sectors_in, gs_in) {}
     }
@@ -211,7 +212,7 @@ impl Rig {
     /// The autopilot says something.
     pub fn say(&mut self, id: u32, payload: &[u8]) {
         self.said += 1;
-        self.give(id, payload, true);
+        self.give(id, payload);
     }
 
     /// A ground station sends a command; its answer.
@@ -230,7 +231,8 @@ impl Rig {
     pub fn ask(&mut self, id: u32, payload: &[u8]) {
         let bytes = frame(255, 190, id, payload);
         let now = self.slot.now();
-        assert!(self.ends.uplink_in.put(now.as_micros(), true, &bytes));
+        let frame = Frame::parse(&bytes).expect("a frame");
+        assert!(self.ends.uplink_in.put(now.as_micros(), &frame));
         let Ends { uplink_out, sectors_in, gs_in, .. } = &mut self.ends;
         while self.monitoring.uplink(now, uplink_out, sectors_in, gs_in) {}
     }

@@ -6,6 +6,7 @@ use hums_core::Monitor;
 use hums_core::clock::{Instant, Span};
 use hums_core::params::{Param, Params};
 use hums_link::encode::{Encoder, FRAME_BYTES_MAX};
+use hums_link::frame::Frame;
 use hums_link::packet::Packet;
 use hums_recorder::{CardState, CardStatus};
 
@@ -62,11 +63,13 @@ fn run_slowly(cause: ResetCause, ticks_an_answer: u64, comes: &[(u64, Comes)]) -
                 Heartbeat { armed } => {
                     let mode = if armed { 0x80 } else { 0 };
                     let packet = Packet::new(0).u8(4, 2).u8(5, 3).u8(6, mode).u8(7, 4).u8(8, 3);
-                    ends.frames_in.put(now.as_micros(), true, encoder.frame(&mut out, &packet));
+                    let frame = Frame::parse(encoder.frame(&mut out, &packet)).expect("a frame");
+                    ends.frames_in.put(now.as_micros(), &frame);
                 }
                 Baud(value) => {
                     let packet = Packet::new(23).f32(0, value).u8(4, 1).u8(5, 191).text(6, 16, "AP_BAUD");
-                    ends.uplink_in.put(now.as_micros(), true, station.frame(&mut out, &packet.u8(22, 9)));
+                    let frame = Frame::parse(station.frame(&mut out, &packet.u8(22, 9))).expect("a frame");
+                    ends.uplink_in.put(now.as_micros(), &frame);
                 }
                 Card => card.set_state(CardState::Recording),
                 NoCard => card.set_state(CardState::Absent),

@@ -17,14 +17,14 @@ const NOTICE: u8 = 5;
 const CARD_IN: u8 = 6;
 const CARD_OUT: u8 = 7;
 
-/// What was told of the slot.
+/// What was told of the card.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Slot {
+pub(super) struct CardNotices {
     told: CardState,
     told_at: Option<Instant>,
 }
 
-impl Slot {
+impl CardNotices {
     pub(super) const fn new() -> Self {
         Self { told: CardState::Unknown, told_at: None }
     }
