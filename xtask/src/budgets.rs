@@ -34,7 +34,7 @@ const TABLE: [&str; 2] = ["<!-- taken: cargo xtask size --write -->\n", "<!-- en
 /// One limit of `budgets.toml`, in bytes.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(crate) struct Bytes {
+pub(crate) struct Limit {
     /// When the limit was set, or `--write` was given last.
     pub(crate) taken: u64,
     /// The rest of the f405's; of a stack there is one rest for all urgencies.
@@ -75,9 +75,9 @@ pub(crate) struct Lines {
 #[serde(deny_unknown_fields)]
 pub(crate) struct Budgets {
     /// Static memory, of every board.
-    memory: BTreeMap<String, Bytes>,
+    memory: BTreeMap<String, Limit>,
     /// By urgency.
-    pub(crate) stack: BTreeMap<String, Bytes>,
+    pub(crate) stack: BTreeMap<String, Limit>,
     /// By stage.
     pub(crate) cycles: BTreeMap<String, Cycles>,
     pub(crate) load: Load,
@@ -101,19 +101,19 @@ impl Budgets {
     fn table(&self) -> String {
         let mut table = "\n| | of | taken | free | limit |\n|---|---|---|---|---|\n".to_owned();
         let kib = |bytes: u64| bytes as f64 / 1024.0;
-        let mut row = |what: &str, unit: &str, [all, taken, limit]: [f64; 3]| {
-            let free = all - taken;
+        let mut row = |what: &str, unit: &str, [all, taken, free, limit]: [f64; 4]| {
             // Cannot fail: it is a text.
             let _ = writeln!(table, "| {what} | {all:.0} {unit} | {taken:.1} | {free:.1} | {limit:.1} |");
         };
         for (name, _, _, all) in MEMORIES {
             if let Some(budget) = self.memory.get(name) {
-                row(name, "KiB", [all, budget.taken, budget.bytes_max].map(kib));
+                let free = budget.free.unwrap_or_default();
+                row(name, "KiB", [all, budget.taken, free, budget.bytes_max].map(kib));
             }
         }
         let taken: u64 = self.stack.values().map(|budget| budget.taken).sum();
-        row("stack", "KiB", [STACK_BYTES, taken, self.stack_bytes()].map(kib));
-        row("processor", "%", [100.0, self.load.taken, self.load.percent_max]);
+        row("stack", "KiB", [STACK_BYTES, taken, STACK_BYTES - taken, self.stack_bytes()].map(kib));
+        row("processor", "%", [100.0, self.load.taken, self.load.free, self.load.percent_max]);
         table + "\n"
     }
 }
@@ -184,7 +184,7 @@ pub(crate) struct Row {
     pub(crate) over: bool,
 }
 
-fn compare(board: &str, used: &BTreeMap<&str, u64>, limits: &BTreeMap<String, Bytes>) -> Result<Vec<Row>> {
+fn compare(board: &str, used: &BTreeMap<&str, u64>, limits: &BTreeMap<String, Limit>) -> Result<Vec<Row>> {
     MEMORIES
         .iter()
         .map(|(memory, _, _, all)| {
@@ -235,9 +235,9 @@ fn sizes(elf: &[u8]) -> Result<BTreeMap<&'static str, u64>> {
 mod tests {
     use super::*;
 
-    fn limits(bytes_max: u64) -> BTreeMap<String, Bytes> {
+    fn limits(bytes_max: u64) -> BTreeMap<String, Limit> {
         let limit = |name: &str| {
-            (name.to_owned(), Bytes { taken: 0, free: None, bytes_max, reason: "because".into() })
+            (name.to_owned(), Limit { taken: 0, free: None, bytes_max, reason: "because".into() })
         };
         MEMORIES.iter().map(|(name, ..)| limit(name)).collect()
     }
@@ -271,7 +271,7 @@ mod tests {
         assert!(budgets.load.percent_max <= budgets.load.taken * 1.06);
         assert!(budgets.stack_bytes() <= STACK_BYTES);
         for (name, _, _, all) in MEMORIES {
-            let Bytes { taken, free, bytes_max, .. } = budgets.memory[name];
+            let Limit { taken, free, bytes_max, .. } = budgets.memory[name];
             assert!(bytes_max <= all && free == Some(all - taken), "{name}");
         }
         assert!((budgets.load.taken + budgets.load.free - 100.0).abs() < 0.01);

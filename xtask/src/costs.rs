@@ -60,7 +60,8 @@ fn compare(report: &Value, budgets: &Budgets) -> Result<Vec<Row>> {
         };
         let count = count.with_context(|| format!("budgets.toml: there is no stage {name}"))?;
         let what = format!("{name} a frame");
-        rows.push(row(&what, "cycles", count / frames, budget.per_frame_max, &budget.reason));
+        let reason = format!("{} when it was set; {}", budget.taken, budget.reason);
+        rows.push(row(&what, "cycles", count / frames, budget.per_frame_max, &reason));
     }
     if let Some((name, _)) = STAGES.iter().find(|(name, _)| !budgets.cycles.contains_key(*name)) {
         bail!("budgets.toml has no [cycles.{name}]");
