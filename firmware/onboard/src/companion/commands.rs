@@ -23,7 +23,7 @@ use hums_link::summary;
 use hums_link::text::{Severity, Text};
 use hums_recorder::CardState;
 
-use super::library::held::{self, Held};
+use super::library::builtin::{self, BuiltinFile};
 use super::limiter::{Asker, Limiter};
 use crate::journal::{By, Journal, Logbook};
 use crate::queues::SectorsIn;
@@ -217,7 +217,9 @@ pub(crate) fn packet(now: Instant, reply: Reply, monitor: &Monitor, identity: &B
         }
         Reply::Version => messages::autopilot_version(version(identity.version), identity.git, &identity.uid),
         Reply::Protocol => messages::protocol_version(),
-        Reply::Metadata => messages::component_metadata(now, Held::General.crc(), held::GENERAL_URI),
+        Reply::Metadata => {
+            messages::component_metadata(now, BuiltinFile::General.crc(), builtin::GENERAL_URI)
+        }
         Reply::Heartbeat => summary::heartbeat(monitor),
         Reply::Preflight => match preflight(monitor) {
             Some((check, part)) => messages::status_text(Severity::Warning, not_ready(check, part).as_str()),

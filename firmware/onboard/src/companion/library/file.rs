@@ -2,7 +2,7 @@
 //! checksum.
 //!
 //! An open file is a log and not a name: once it is overwritten, or the card is another one, what is asked of it is
-//! answered with an error. Files that the firmware holds ([`super::held`]) are opened by their names, are in no list, and need
+//! answered with an error. Files that the firmware holds ([`super::builtin`]) are opened by their names, are in no list, and need
 //! nothing of the card.
 
 use core::fmt::Write as _;
@@ -11,7 +11,7 @@ use hums_link::ftp::{self, Error, Operation};
 use hums_link::request::Reply;
 use hums_recorder::LogName;
 
-use super::held::Held;
+use super::builtin::BuiltinFile;
 use super::step::{Out, Step};
 use crate::shelf::{Answer, LogId, NoLog, What, Which};
 
@@ -25,7 +25,7 @@ pub(super) enum Open {
     /// A log on the card.
     Log(LogId),
     /// A file of the firmware's own.
-    Held(Held),
+    Builtin(BuiltinFile),
 }
 
 /// What is being answered.
@@ -68,19 +68,19 @@ impl Job {
             }
             Operation::List(..) => Kind::Say(Some(Error::FileNotFound)),
             Operation::Open(path) => {
-                let held = Held::named(path);
-                *open = held.map(Open::Held);
-                match (held, name(path)) {
-                    (Some(held), _) => Kind::Number(held.bytes().len() as u32),
+                let builtin = BuiltinFile::named(path);
+                *open = builtin.map(Open::Builtin);
+                match (builtin, name(path)) {
+                    (Some(builtin), _) => Kind::Number(builtin.bytes().len() as u32),
                     (None, Some(name)) => Kind::Open(name),
                     (None, None) => Kind::Say(Some(Error::FileNotFound)),
                 }
             }
-            Operation::Checksum(path, bytes) => match (Held::named(path), name(path)) {
-                (Some(held), _) => {
+            Operation::Checksum(path, bytes) => match (BuiltinFile::named(path), name(path)) {
+                (Some(builtin), _) => {
                     // Of all of it, whatever part is asked for.
-                    reply.offset = held.bytes().len() as u32;
-                    Kind::Number(held.crc())
+                    reply.offset = builtin.bytes().len() as u32;
+                    Kind::Number(builtin.crc())
                 }
                 (None, Some(name)) => Kind::Checksum { name, bytes, sum: None },
                 (None, None) => Kind::Say(Some(Error::FileNotFound)),
@@ -123,8 +123,8 @@ impl Job {
             Kind::Say(_)
             | Kind::Number(_)
             | Kind::Checksum { sum: Some(_), .. }
-            | Kind::Read { of: Open::Held(_), .. }
-            | Kind::Burst { of: Open::Held(_), .. } => None,
+            | Kind::Read { of: Open::Builtin(_), .. }
+            | Kind::Burst { of: Open::Builtin(_), .. } => None,
         }
     }
 
@@ -186,8 +186,12 @@ impl Job {
                 let rest = data.get(reply.offset.wrapping_sub(answer.offset) as usize..).unwrap_or_default();
                 self.read(answer.bytes, rest, &mut buffer, out)
             }
-            (Kind::Read { of: Open::Held(held), .. } | Kind::Burst { of: Open::Held(held), .. }, None) => {
-                let bytes = held.bytes();
+            (
+                Kind::Read { of: Open::Builtin(builtin), .. }
+                | Kind::Burst { of: Open::Builtin(builtin), .. },
+                None,
+            ) => {
+                let bytes = builtin.bytes();
                 let rest = bytes.get(self.reply.offset as usize..).unwrap_or_default();
                 self.read(bytes.len() as u32, rest, &mut buffer, out)
             }

@@ -9,8 +9,8 @@
 //! question -> job -> what it wants of the card -> storage's answer -> messages -> what it wants next, or the end
 //! ```
 
+pub(super) mod builtin;
 mod file;
-pub(super) mod held;
 mod log;
 mod step;
 

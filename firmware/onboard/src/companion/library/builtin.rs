@@ -11,14 +11,14 @@ pub(in crate::companion) const GENERAL_URI: &str = "mftp://[;comp=191]/general.j
 
 /// One of them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(in crate::companion) enum Held {
+pub(in crate::companion) enum BuiltinFile {
     /// Which others there are (`COMP_METADATA_TYPE_GENERAL`).
     General,
     /// The parameters (`COMP_METADATA_TYPE_PARAMETER`), packed with xz.
     Parameters,
 }
 
-impl Held {
+impl BuiltinFile {
     /// The one of this name, with or without the directory before it.
     pub(super) fn named(path: &str) -> Option<Self> {
         match path.strip_prefix('/').unwrap_or(path) {
@@ -38,8 +38,8 @@ impl Held {
 
     /// Its checksum, by which a ground station knows the one that it has already.
     pub(in crate::companion) const fn crc(self) -> u32 {
-        const GENERAL: u32 = ftp::checksum_of(Held::General.bytes());
-        const PARAMETERS: u32 = ftp::checksum_of(Held::Parameters.bytes());
+        const GENERAL: u32 = ftp::checksum_of(BuiltinFile::General.bytes());
+        const PARAMETERS: u32 = ftp::checksum_of(BuiltinFile::Parameters.bytes());
         match self {
             Self::General => GENERAL,
             Self::Parameters => PARAMETERS,
@@ -53,14 +53,14 @@ mod tests {
 
     #[test]
     fn the_general_file_names_the_other_one_with_its_checksum() {
-        let general = core::str::from_utf8(Held::General.bytes()).expect("text");
-        assert!(general.contains(&format!("\"fileCrc\":{}", Held::Parameters.crc())), "{general}");
+        let general = core::str::from_utf8(BuiltinFile::General.bytes()).expect("text");
+        assert!(general.contains(&format!("\"fileCrc\":{}", BuiltinFile::Parameters.crc())), "{general}");
         let uri =
             general.split("\"uri\":\"").nth(1).and_then(|rest| rest.split('"').next()).expect("an address");
         let path = |uri: &str| uri.strip_prefix("mftp://[;comp=191]").map(str::to_owned).expect("ours");
-        assert_eq!(Held::named(&path(uri)), Some(Held::Parameters));
-        assert_eq!(Held::named(&path(GENERAL_URI)), Some(Held::General));
-        assert_eq!(Held::named("/00001_00.HUM"), None);
-        assert_eq!(ftp::checksum(0, Held::Parameters.bytes()), Held::Parameters.crc());
+        assert_eq!(BuiltinFile::named(&path(uri)), Some(BuiltinFile::Parameters));
+        assert_eq!(BuiltinFile::named(&path(GENERAL_URI)), Some(BuiltinFile::General));
+        assert_eq!(BuiltinFile::named("/00001_00.HUM"), None);
+        assert_eq!(ftp::checksum(0, BuiltinFile::Parameters.bytes()), BuiltinFile::Parameters.crc());
     }
 }
