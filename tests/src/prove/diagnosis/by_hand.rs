@@ -12,10 +12,9 @@ use super::verdicts::{Flown, Verdict};
 
 pub(super) const BY_HAND: Form = Form {
     title: "Recordings of other people, judged by hand",
-    about: "Alarms in the air of the recordings without labels. Each was looked at: by the values around it, the mode, the pilot's \
-            sticks and the autopilot's own texts and errors. It is true where the vehicle crashed or was about to, where the autopilot says the \
-            same, or where a value is beyond the limit that the autopilot's makers publish. Who judged is who chose the limits. Rates are of false \
-            alarms, by the hour in the air, with what they are at most (exact Poisson bound, 95 %).",
+    about: "Alarms in the air of recordings without labels, judged by those who chose the limits. An alarm is true if the vehicle \
+            crashed or was about to, if the autopilot says the same, or if a value is beyond the limit of the autopilot's makers. \
+            Rates are of false alarms.",
     columns: &[
         "flown by",
         "recordings",

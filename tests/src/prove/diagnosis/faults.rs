@@ -1,42 +1,44 @@
 //! The tables of faults: how many were found, how fast, and each of them.
 
-use std::collections::BTreeMap;
+use hums_core::health::Level;
 
 use super::causes::CLASSES;
 use super::judged::{Judged, with_label};
-use super::outcome::{Alarm, Fault, Outcome};
-use super::rates::{quantile_s, share};
+use super::options::Known;
+use super::outcome::{Alarm, Fault, Outcome, count};
+use super::rates::{an_hour, hours, quantile_s, share};
 use super::table::Form;
 
-pub(super) const FOUND: Form = Form {
-    title: "Faults found",
-    about: "A fault is told when a check rises to a warning or to critical while the fault lasts. Its cause is named when one \
-            of these checks is of the part that failed. Both shares stand with what they are at least (exact, 95 %). Delays \
-            are in seconds after the fault began: half of the faults that were told were told within the first, nine in ten \
-            within the second. Faults that the messages do not show at all are not counted.",
+pub(super) const SETS: Form = Form {
+    title: "Sets of flights",
+    about: "Simulator flights have simulated hours.",
     columns: &[
         "flights",
-        "autopilot",
+        "known",
+        "recordings",
+        "hours",
         "faults",
         "told",
-        "share",
         "at least",
         "cause named",
-        "share",
         "at least",
         "median s",
         "9 of 10 within s",
+        "false warnings",
+        "an hour",
+        "at most",
+        "false criticals",
+        "an hour",
+        "at most",
     ],
 };
 
 pub(super) const BY_CLASS: Form = Form {
     title: "Faults by class",
-    about: "The autopilot's own first text of severity warning or worse, for comparison: of how many faults it told, and how \
-            often it or HUMS was first where both told.",
+    about: "Of all sets with labels. The autopilot's own first text of severity warning or worse, for comparison.",
     columns: &[
-        "flights",
         "class",
-        "what it is",
+        "parts",
         "faults",
         "told",
         "cause named",
@@ -64,56 +66,60 @@ fn delays_s<'a>(faults: impl Iterator<Item = &'a Fault>) -> Vec<f64> {
     faults.filter_map(|fault| Some(fault.told.as_ref()?.at_s)).collect()
 }
 
-/// One row for each set and autopilot.
-pub(super) fn found(sets: &[Judged]) -> Vec<Vec<String>> {
-    let mut rows = Vec::new();
-    for judged in with_label(sets, true) {
-        let mut by_autopilot: BTreeMap<&str, Vec<&Fault>> = BTreeMap::new();
-        for (one, fault) in shown(judged) {
-            by_autopilot.entry(&one.autopilot).or_default().push(fault);
+/// One row for each set with labels.
+pub(super) fn sets(sets: &[Judged]) -> Vec<Vec<String>> {
+    let row = |judged: &Judged| {
+        let faults: Vec<&Fault> = shown(judged).map(|(_, fault)| fault).collect();
+        let air_s = judged.outcomes.iter().map(|one| one.air_s).sum::<f64>();
+        let known = match judged.known {
+            Known::Yes => "yes",
+            Known::No => "no",
+            Known::Seen => "findings seen",
+        };
+        let counts = [judged.outcomes.len().to_string(), hours(air_s), faults.len().to_string()];
+        let mut row = vec![judged.name.clone(), known.to_owned()];
+        row.extend(counts);
+        let is_so: [fn(&Fault) -> bool; 2] = [|fault| fault.told.is_some(), |fault| fault.named.is_some()];
+        for is_so in is_so {
+            let count = faults.iter().filter(|fault| is_so(fault)).count() as u64;
+            let [_, least] = share(count, faults.len() as u64);
+            row.extend([count.to_string(), least]);
         }
-        for (autopilot, faults) in by_autopilot {
-            let all = faults.len() as u64;
-            let told = faults.iter().filter(|fault| fault.told.is_some()).count() as u64;
-            let named = faults.iter().filter(|fault| fault.named.is_some()).count() as u64;
-            let delays_s = delays_s(faults.into_iter());
-            let mut row = vec![judged.name.clone(), autopilot.to_owned(), all.to_string(), told.to_string()];
-            row.extend(share(told, all));
-            row.push(named.to_string());
-            row.extend(share(named, all));
-            row.extend([quantile_s(&delays_s, 0.5), quantile_s(&delays_s, 0.9)]);
-            rows.push(row);
+        let delays_s = delays_s(faults.into_iter());
+        row.extend([quantile_s(&delays_s, 0.5), quantile_s(&delays_s, 0.9)]);
+        for level in [Level::Warning, Level::Critical] {
+            let events = count(judged.outcomes.iter().flat_map(|one| &one.alarms), level, true);
+            row.push(events.to_string());
+            row.extend(an_hour(events, air_s));
         }
-    }
-    rows
+        row
+    };
+    with_label(sets, true).map(row).collect()
 }
 
-/// One row for each set and class.
+/// One row for each class.
 pub(super) fn by_class(sets: &[Judged]) -> Vec<Vec<String>> {
     let mut rows = Vec::new();
-    for judged in with_label(sets, true) {
-        for class in CLASSES {
-            let faults: Vec<&Fault> =
-                shown(judged).filter(|(one, _)| one.class == class.name).map(|(_, fault)| fault).collect();
-            if faults.is_empty() {
-                continue;
-            }
-            let count =
-                |is: &dyn Fn(&Fault) -> bool| faults.iter().filter(|fault| is(fault)).count().to_string();
-            let both = |fault: &Fault| Some((fault.told.as_ref()?.at_s, fault.autopilot.as_ref()?.0));
-            rows.push(vec![
-                judged.name.clone(),
-                class.name.to_owned(),
-                class.about.to_owned(),
-                faults.len().to_string(),
-                count(&|fault| fault.told.is_some()),
-                count(&|fault| fault.named.is_some()),
-                quantile_s(&delays_s(faults.iter().copied()), 0.5),
-                count(&|fault| fault.autopilot.is_some()),
-                count(&|fault| both(fault).is_some_and(|(ours_s, theirs_s)| ours_s <= theirs_s)),
-                count(&|fault| both(fault).is_some_and(|(ours_s, theirs_s)| ours_s > theirs_s)),
-            ]);
+    for class in CLASSES {
+        let of_class = with_label(sets, true).flat_map(shown).filter(|(one, _)| one.class == class.name);
+        let faults: Vec<&Fault> = of_class.map(|(_, fault)| fault).collect();
+        if faults.is_empty() {
+            continue;
         }
+        let count =
+            |is: &dyn Fn(&Fault) -> bool| faults.iter().filter(|fault| is(fault)).count().to_string();
+        let both = |fault: &Fault| Some((fault.told.as_ref()?.at_s, fault.autopilot.as_ref()?.0));
+        rows.push(vec![
+            class.name.to_owned(),
+            class.about.to_owned(),
+            faults.len().to_string(),
+            count(&|fault| fault.told.is_some()),
+            count(&|fault| fault.named.is_some()),
+            quantile_s(&delays_s(faults.iter().copied()), 0.5),
+            count(&|fault| fault.autopilot.is_some()),
+            count(&|fault| both(fault).is_some_and(|(ours_s, theirs_s)| ours_s <= theirs_s)),
+            count(&|fault| both(fault).is_some_and(|(ours_s, theirs_s)| ours_s > theirs_s)),
+        ]);
     }
     rows
 }
@@ -136,24 +142,6 @@ pub(super) fn each(sets: &[Judged]) -> Vec<Vec<String>> {
         ]);
     }
     rows
-}
-
-/// What no check told: the set, the class, and the faults.
-pub(super) fn missed(sets: &[Judged]) -> Vec<String> {
-    let mut missed: BTreeMap<(&str, &str), Vec<String>> = BTreeMap::new();
-    for judged in with_label(sets, true) {
-        for one in &judged.outcomes {
-            if let Some(fault) = one.fault.as_ref().filter(|fault| fault.told.is_none()) {
-                let why = if fault.visible { "" } else { ", the messages do not show it" };
-                let fault = format!("{} ({}{why})", one.what, stem(&one.file));
-                missed.entry((&judged.name, one.class)).or_default().push(fault);
-            }
-        }
-    }
-    missed
-        .into_iter()
-        .map(|((set, class), faults)| format!("* {set}, {class}: {}", faults.join("; ")))
-        .collect()
 }
 
 fn alarm(alarm: &Alarm) -> String {

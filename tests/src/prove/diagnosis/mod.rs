@@ -50,5 +50,5 @@ pub fn run(flights: &Flights, commit: impl FnOnce() -> Result<String>) -> Result
         let whole = format!("{}\nCommit {commit}.\n\n{text}", document::HEAD);
         fs::write(&path, whole).with_context(|| path.display().to_string())?;
     }
-    Ok(text)
+    Ok(format!("{text}\n{}", document::details(&judged)))
 }
