@@ -183,39 +183,31 @@ impl Figures {
     }
 }
 
-/// Which parameters describe a component.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct ComponentParams {
-    pub(crate) kind: Param,
-    pub(crate) number: Param,
-    hours: Param,
-    flights: Param,
-    cycles: Param,
-    motor_hours: Param,
+/// What parameters say of a component. Those of all components follow each other, each in this order.
+#[derive(Clone, Copy)]
+enum Setting {
+    Kind,
+    Number,
+    Hours,
+    Flights,
+    Cycles,
+    MotorHours,
 }
 
-macro_rules! component_params {
-    ($($kind:ident $number:ident $hours:ident $flights:ident $cycles:ident $motor_hours:ident;)*) => {
-        pub(crate) const PARAMS: [ComponentParams; COMPONENTS_MAX] = [$(ComponentParams {
-            kind: Param::$kind,
-            number: Param::$number,
-            hours: Param::$hours,
-            flights: Param::$flights,
-            cycles: Param::$cycles,
-            motor_hours: Param::$motor_hours,
-        },)*];
-    };
-}
+const _: () = {
+    let settings = Param::Cmp8MotorHours as usize + 1 - Param::Cmp1Kind as usize;
+    assert!(settings == COMPONENTS_MAX * Setting::COUNT);
+};
 
-component_params! {
-    Cmp1Kind Cmp1Number Cmp1Hours Cmp1Flights Cmp1Cycles Cmp1MotorHours;
-    Cmp2Kind Cmp2Number Cmp2Hours Cmp2Flights Cmp2Cycles Cmp2MotorHours;
-    Cmp3Kind Cmp3Number Cmp3Hours Cmp3Flights Cmp3Cycles Cmp3MotorHours;
-    Cmp4Kind Cmp4Number Cmp4Hours Cmp4Flights Cmp4Cycles Cmp4MotorHours;
-    Cmp5Kind Cmp5Number Cmp5Hours Cmp5Flights Cmp5Cycles Cmp5MotorHours;
-    Cmp6Kind Cmp6Number Cmp6Hours Cmp6Flights Cmp6Cycles Cmp6MotorHours;
-    Cmp7Kind Cmp7Number Cmp7Hours Cmp7Flights Cmp7Cycles Cmp7MotorHours;
-    Cmp8Kind Cmp8Number Cmp8Hours Cmp8Flights Cmp8Cycles Cmp8MotorHours;
+impl Setting {
+    const COUNT: usize = 6;
+
+    /// Of the component at a place; 0 where there is no such place.
+    fn of(self, place: usize, params: &Params) -> f32 {
+        let index = Param::Cmp1Kind as usize + place * Self::COUNT + self as usize;
+        let param = Param::ALL.get(index).filter(|_| place < COMPONENTS_MAX);
+        param.map_or(0.0, |param| params.get(*param))
+    }
 }
 
 /// Whether a component may go on. The numbers are stored.
@@ -288,17 +280,19 @@ impl Component {
 
     /// The part of its life that is used, percent, by the limit that trips first; `None` where it has no limit.
     pub fn used_percent(&self, place: usize, wear: &Wear<'_>, params: &Params) -> Option<f32> {
-        let limits = PARAMS.get(place).filter(|_| self.kind != Kind::None)?;
+        if self.kind == Kind::None {
+            return None;
+        }
         let figures = self.figures(wear);
         let hours = if self.kind.wears_while_powered() { figures.powered_s } else { figures.flight_s };
         let used = [
-            (hours / 3_600.0, limits.hours),
-            (figures.flights, limits.flights),
-            (figures.cycles, limits.cycles),
-            (figures.motor_s / 3_600.0, limits.motor_hours),
+            (hours / 3_600.0, Setting::Hours),
+            (figures.flights, Setting::Flights),
+            (figures.cycles, Setting::Cycles),
+            (figures.motor_s / 3_600.0, Setting::MotorHours),
         ];
         used.into_iter()
-            .map(|(used, limit)| (used, params.get(limit)))
+            .map(|(used, limit)| (used, limit.of(place, params)))
             .filter(|(_, limit)| *limit > 0.0)
             .map(|(used, limit)| (used / f64::from(limit) * 100.0) as f32)
             .reduce(f32::max)
@@ -319,9 +313,8 @@ impl Component {
     /// Takes what its parameters say it is; `true` where that is something else than before. What it ran as the other
     /// stays.
     pub(crate) fn describe(&mut self, place: usize, wear: &Wear<'_>, params: &Params) -> bool {
-        let Some(described) = PARAMS.get(place) else { return false };
-        let kind = Kind::from_number(params.get(described.kind) as u8);
-        let number = (params.get(described.number) as u8).min(MOTORS_MAX as u8);
+        let kind = Kind::from_number(Setting::Kind.of(place, params) as u8);
+        let number = (Setting::Number.of(place, params) as u8).min(MOTORS_MAX as u8);
         if (kind, number) == (self.kind, self.number) {
             return false;
         }

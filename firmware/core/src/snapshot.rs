@@ -4,7 +4,9 @@
 
 use crate::half;
 use crate::health::{Finding, Inputs, Level, Subsystem};
+use crate::observation::{Battery, SystemStatus};
 use crate::time::{Instant, Span};
+use crate::vehicle::Vehicle;
 
 /// Between two samples.
 pub const INTERVAL: Span = Span::from_millis(200);
@@ -39,12 +41,14 @@ const COLUMNS: [&[usize]; Subsystem::ALL.len()] = [
 ];
 
 const KEPT: [Quantity; 24] = [
-    Quantity("voltage_v", voltage_v),
-    Quantity("current_a", current_a),
+    Quantity("voltage_v", |inputs| Some(of_battery(inputs, |it| it.voltage, |it| it.voltage)?.0)),
+    Quantity("current_a", |inputs| Some(of_battery(inputs, |it| it.current, |it| it.current)?.0)),
     Quantity("cell_lowest_v", |inputs| {
         inputs.derived.cell_voltage(inputs.vehicle, inputs.params, 0).map(|reading| reading.value)
     }),
-    Quantity("remaining_percent", remaining_percent),
+    Quantity("remaining_percent", |inputs| {
+        Some(of_battery(inputs, |it| it.remaining, |it| it.remaining)?.0 * 100.0)
+    }),
     Quantity("throttle_percent", |inputs| {
         Some(inputs.vehicle.hud.within(inputs.now, FRESH)?.throttle?.0 * 100.0)
     }),
@@ -95,22 +99,14 @@ const KEPT: [Quantity; 24] = [
     Quantity("height_m", |inputs| Some(inputs.vehicle.global.within(inputs.now, FRESH)?.relative_altitude.0)),
 ];
 
-fn voltage_v(inputs: &Inputs<'_>) -> Option<f32> {
-    let battery = inputs.vehicle.batteries[0].get();
-    let system = || inputs.vehicle.system.get().and_then(|system| system.voltage);
-    battery.map_or_else(system, |battery| battery.voltage).map(|voltage| voltage.0)
-}
-
-fn current_a(inputs: &Inputs<'_>) -> Option<f32> {
-    let battery = inputs.vehicle.batteries[0].get();
-    let system = || inputs.vehicle.system.get().and_then(|system| system.current);
-    battery.map_or_else(system, |battery| battery.current).map(|current| current.0)
-}
-
-fn remaining_percent(inputs: &Inputs<'_>) -> Option<f32> {
-    let battery = inputs.vehicle.batteries[0].get();
-    let system = || inputs.vehicle.system.get().and_then(|system| system.remaining);
-    battery.map_or_else(system, |battery| battery.remaining).map(|remaining| remaining.0 * 100.0)
+/// Of the first battery; of `SYS_STATUS` where no battery tells of itself.
+fn of_battery<T>(
+    inputs: &Inputs<'_>,
+    battery: fn(&Battery) -> Option<T>,
+    system: fn(&SystemStatus) -> Option<T>,
+) -> Option<T> {
+    let Vehicle { batteries, system: status, .. } = inputs.vehicle;
+    batteries[0].get().map_or_else(|| status.get().and_then(system), battery)
 }
 
 fn speeds(inputs: &Inputs<'_>) -> impl Iterator<Item = f32> {
