@@ -60,65 +60,44 @@ enum Bad {
     Either,
 }
 
+/// How a quantity is compared.
+struct Terms {
+    bad: Bad,
+    /// It is percents of the others: a departure is a difference, and not a part of the baseline.
+    is_share: bool,
+    /// What differs by less does not differ, in the quantity's unit; the least that a baseline counts as.
+    grain: f32,
+    /// How far flights differ where nothing changed: as a part of the baseline, of a share in percents. Hover throttle, power and
+    /// outputs as in real flights of one quadrotor, at one place and day.
+    prior: f32,
+    /// A flight beyond this limit teaches nothing.
+    warn: Param,
+    /// No vehicle has more or less.
+    sane: (f32, f32),
+}
+
 impl Quantity {
-    const fn bad(self) -> Bad {
-        match self {
-            Self::Vibration | Self::MotorSpeed(_) | Self::MotorOutput(_) => Bad::Either,
-            Self::HoverThrottle | Self::HoverPower | Self::Resistance(_) => Bad::Up,
-            Self::Capacity(_) => Bad::Down,
-        }
+    const fn terms(self) -> Terms {
+        let (bad, grain, prior, warn, sane) = match self {
+            Self::Vibration => (Bad::Either, 1.0, 0.1, Param::TrdVibeWarn, (0.0, 1_000.0)),
+            Self::HoverThrottle => (Bad::Up, 0.05, 0.007, Param::TrdThrWarn, (0.02, 2.0)),
+            Self::HoverPower => (Bad::Up, 1.0, 0.0125, Param::TrdThrWarn, (1.0, 1e6)),
+            Self::Resistance(_) => (Bad::Up, 0.002, 0.05, Param::BatResWarn, (0.0005, 1.0)),
+            Self::Capacity(_) => (Bad::Down, 0.05, 0.08, Param::TrdCapWarn, (0.05, 10_000.0)),
+            Self::MotorSpeed(_) => (Bad::Either, 1.0, 1.0, Param::TrdEscWarn, (-100.0, 100.0)),
+            Self::MotorOutput(_) => (Bad::Either, 1.0, 2.5, Param::TrdEscWarn, (-100.0, 100.0)),
+        };
+        let is_share = matches!(self, Self::MotorSpeed(_) | Self::MotorOutput(_));
+        Terms { bad, is_share, grain, prior, warn, sane }
     }
 
-    /// Whether it is percents of the others: a departure is a difference, and not a part of the baseline.
-    const fn is_share(self) -> bool {
-        matches!(self, Self::MotorSpeed(_) | Self::MotorOutput(_))
-    }
-
-    /// What differs by less does not differ: the quantity's own unit. Also the least that a baseline counts as, where
-    /// a departure is a part of it.
     const fn grain(self) -> f32 {
-        match self {
-            Self::Vibration | Self::MotorSpeed(_) | Self::MotorOutput(_) | Self::HoverPower => 1.0,
-            Self::HoverThrottle | Self::Capacity(_) => 0.05,
-            Self::Resistance(_) => 0.002,
-        }
+        self.terms().grain
     }
 
-    /// How far flights differ where nothing changed: in its own unit, or as a part of the baseline. Hover throttle, power and outputs as
-    /// in real flights of one quadrotor, at one place and day.
-    fn prior(self, normal: f32) -> f32 {
-        match self {
-            Self::Vibration => 0.1 * normal,
-            Self::HoverThrottle => 0.007 * normal,
-            Self::HoverPower => 0.0125 * normal,
-            Self::Resistance(_) => 0.05 * normal,
-            Self::Capacity(_) => 0.08 * normal,
-            Self::MotorSpeed(_) => 1.0,
-            Self::MotorOutput(_) => 2.5,
-        }
-    }
-
-    /// The limit beyond which a flight teaches nothing.
-    const fn warn(self) -> Param {
-        match self {
-            Self::Vibration => Param::TrdVibeWarn,
-            Self::HoverThrottle | Self::HoverPower => Param::TrdThrWarn,
-            Self::Resistance(_) => Param::BatResWarn,
-            Self::Capacity(_) => Param::TrdCapWarn,
-            Self::MotorSpeed(_) | Self::MotorOutput(_) => Param::TrdEscWarn,
-        }
-    }
-
-    /// What no vehicle has: garbage.
     fn is_sane(self, value: f32) -> bool {
-        match self {
-            Self::Vibration => (0.0..=1_000.0).contains(&value),
-            Self::HoverThrottle => (0.02..=2.0).contains(&value),
-            Self::HoverPower => (1.0..=1e6).contains(&value),
-            Self::Resistance(_) => (0.0005..=1.0).contains(&value),
-            Self::Capacity(_) => (0.05..=10_000.0).contains(&value),
-            Self::MotorSpeed(_) | Self::MotorOutput(_) => value.abs() <= 100.0,
-        }
+        let (least, most) = self.terms().sane;
+        (least..=most).contains(&value)
     }
 }
 
@@ -244,7 +223,8 @@ impl Trends {
         params: &Params,
     ) -> Option<f32> {
         let (baseline, off) = self.off(quantity, baselines)?;
-        let bad = match quantity.bad() {
+        let Terms { bad, is_share, grain, .. } = quantity.terms();
+        let bad = match bad {
             Bad::Up => off,
             Bad::Down => -off,
             Bad::Either => off.abs(),
@@ -252,7 +232,7 @@ impl Trends {
         if !exceeds(quantity, &baseline, off, params) || bad <= 0.0 {
             return Some(0.0);
         }
-        let whole = if quantity.is_share() { 100.0 } else { baseline.value.max(quantity.grain()) };
+        let whole = if is_share { 100.0 } else { baseline.value.max(grain) };
         Some(bad / whole * 100.0)
     }
 
@@ -281,11 +261,12 @@ impl Trends {
         for quantity in quantities() {
             let Some(figure) = self.figure(quantity) else { continue };
             let departure = self.departure(quantity, baselines, params).unwrap_or(0.0);
-            if departure >= params.get(quantity.warn()) {
+            let Terms { bad, warn, .. } = quantity.terms();
+            if departure >= params.get(warn) {
                 continue;
             }
             let changed = |(baseline, off): (Baseline, f32)| {
-                quantity.bad() != Bad::Either && departure == 0.0 && exceeds(quantity, &baseline, off, params)
+                bad != Bad::Either && departure == 0.0 && exceeds(quantity, &baseline, off, params)
             };
             if self.off(quantity, baselines).is_some_and(changed) {
                 baselines.forget(quantity);
@@ -299,7 +280,9 @@ impl Trends {
 
 /// Whether a flight in which nothing changed does not go so far.
 fn exceeds(quantity: Quantity, baseline: &Baseline, off: f32, params: &Params) -> bool {
-    off.abs() > baseline.reach(quantity.prior(baseline.value), params.get(Param::TrdFalse))
+    let Terms { is_share, prior, .. } = quantity.terms();
+    let prior = if is_share { prior } else { prior * baseline.value };
+    off.abs() > baseline.reach(prior, params.get(Param::TrdFalse))
 }
 
 fn quantities() -> impl Iterator<Item = Quantity> {

@@ -99,29 +99,16 @@ impl ItemKey {
     }
 
     /// The key of a stored number; `None` for an item that this version does not know.
-    pub const fn from_number(number: u8) -> Option<Self> {
-        match number {
-            1 => Some(Self::Lifetime),
-            2 => Some(Self::Baselines),
-            3 => Some(Self::Exceedances),
-            4 => Some(Self::Exposure),
-            Self::SESSION => Some(Self::Session),
-            _ => match number.checked_sub(Self::COMPONENT_FIRST) {
-                Some(place) if (place as usize) < COMPONENTS_MAX => Some(Self::Component(place)),
-                _ => None,
-            },
-        }
+    pub fn from_number(number: u8) -> Option<Self> {
+        Self::ALL.into_iter().find(|key| key.number() == number)
     }
 
-    /// A number from 0 without gaps.
+    /// Its place in [`Self::ALL`].
     const fn index(self) -> usize {
         match self {
-            Self::Lifetime => 0,
-            Self::Baselines => 1,
-            Self::Exceedances => 2,
-            Self::Exposure => 3,
             Self::Component(place) => 4 + place as usize,
             Self::Session => 4 + COMPONENTS_MAX,
+            _ => self.number() as usize - 1,
         }
     }
 }
