@@ -23,11 +23,10 @@
 //! Nothing takes off with idle throttle on rotors, or without power. Surface vehicles never fly (PX4 calls an armed rover "in air").
 //!
 //! Signs of a mishap ([`signs`]) count while the vehicle is armed and for 10 s afterwards; docs/health.md has their table. Outside of a flight
-//! they are told once for each arming ([`Change::OnBench`]); but a vehicle that its own rotors turned over has had a mishap. A link that was
-//! lost in flight is judged when it is back ([`link_loss`]).
+//! they are told once for each arming ([`Change::OnBench`]); but a vehicle that its own rotors turned over has had a mishap. A fall
+//! that nobody heard is judged by `hums check`.
 
 mod disarming;
-mod link_loss;
 mod signs;
 mod witness;
 
@@ -41,7 +40,6 @@ use crate::thrust::{Power, Thrust};
 use crate::time::{Instant, Span};
 use crate::vehicle::{LANDED_STATE_AGE, Vehicle};
 use disarming::DisarmWatch;
-use link_loss::LinkLoss;
 use signs::{Lasting, Shock};
 use witness::{HEIGHT, THRUST, Votes, WORD, is_on_wings, on_rotors};
 
@@ -182,9 +180,6 @@ pub struct Flight {
     /// It was heard first then, and has not flown since.
     first_at: Option<Instant>,
     watch: Option<DisarmWatch>,
-    link: Option<LinkLoss>,
-    /// It came down while the link was lost, since then.
-    unheard_from: Option<Instant>,
     /// The worst of each sign, in its own unit; 0 for none.
     worst: [f32; Kind::COUNT],
     /// A sign of this step; the time of the last one.
@@ -243,8 +238,6 @@ impl Flight {
             heard_at: Instant::ZERO,
             first_at: None,
             watch: None,
-            link: None,
-            unheard_from: None,
             worst: [0.0; Kind::COUNT],
             seen: None,
             seen_at: Instant::ZERO,
@@ -319,7 +312,7 @@ impl Flight {
 
     /// Whether a mishap goes on, or may: other checks would only echo it.
     pub(crate) fn in_mishap(&self) -> bool {
-        self.stage.is_mishap() || self.watch.is_some() || self.came_back_down()
+        self.stage.is_mishap() || self.watch.is_some()
     }
 
     /// Whether it was disarmed out of a flight, and that it falls is not seen yet.
@@ -349,7 +342,6 @@ impl Flight {
         self.note_support(now, vehicle, params);
         self.note_still(now, vehicle);
         self.judge_disarming(now, vehicle, params);
-        self.note_link(now, vehicle, params);
         self.judge_shock(now, vehicle, params);
         let votes = self.ask(now, vehicle);
         let seen = self.seen.take();
@@ -362,7 +354,7 @@ impl Flight {
         let event = match self.stage {
             Stage::Down => self.close(),
             Stage::Falling | Stage::Impacted => self.hold(now),
-            _ if self.watch.is_some() || self.may_have_hit() || self.is_heard_again() => self.hold(now),
+            _ if self.watch.is_some() || self.may_have_hit() => self.hold(now),
             _ => self.advance(now, vehicle, votes),
         };
         (change, event)
@@ -390,7 +382,7 @@ impl Flight {
                 self.calm();
             }
             (self.on_bench, self.off_at, self.stood, self.heard_at) = (false, None, false, now);
-            (self.watch, self.first_at, self.link) = (None, None, None);
+            (self.watch, self.first_at) = (None, None);
             self.thrust.forget();
         }
         let beat_at = vehicle.heartbeat.at().unwrap_or(self.beat_at);
@@ -445,7 +437,7 @@ impl Flight {
             || (kind == Kind::Impact && self.first_at.is_some() && !self.powered)
             || self.is_turned_over(now, vehicle, kind);
         if !is_own {
-            (self.worst, self.unheard_from) = ([0.0; Kind::COUNT], None);
+            self.worst = [0.0; Kind::COUNT];
             if !self.powered {
                 return None;
             }
@@ -509,7 +501,7 @@ impl Flight {
             (None, None) => Stage::Ground,
         };
         (self.worst, self.seen) = ([0.0; Kind::COUNT], None);
-        (self.watch, self.first_at, self.link, self.unheard_from) = (None, None, None, None);
+        (self.watch, self.first_at) = (None, None);
         (self.shock, self.touch_mps, self.still_since, self.flies_since) = (None, 0.0, None, None);
         self.place = Place::UNKNOWN;
     }
@@ -660,11 +652,6 @@ impl Flight {
     /// When the first shock of the latest impact was.
     pub const fn hit_at(&self) -> Instant {
         self.hit_at
-    }
-
-    /// When it was heard last before it came down, where nobody heard it meanwhile.
-    pub const fn unheard_from(&self) -> Option<Instant> {
-        self.unheard_from
     }
 
     /// When it first hit something in this mishap; `None` where it did not.

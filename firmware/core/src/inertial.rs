@@ -217,7 +217,7 @@ impl Inertial {
     }
 
     /// Whether it has been level and still for a while, whatever an estimator says.
-    pub(crate) fn is_level(&self, now: Instant) -> bool {
+    pub fn is_level(&self, now: Instant) -> bool {
         self.is_level_for(now, LASTS)
     }
 
@@ -248,12 +248,12 @@ impl Inertial {
     }
 
     /// Whether the estimator's attitude is not that of the vehicle.
-    pub(crate) fn contradicts(&self, now: Instant) -> bool {
+    pub fn contradicts(&self, now: Instant) -> bool {
         self.contradicts && self.is_fresh(now)
     }
 
     /// How far it lies over, in radians, once it has lain so for a moment: by the force that carries it.
-    pub(crate) fn lies_over(&self, now: Instant) -> Option<f32> {
+    pub fn lies_over(&self, now: Instant) -> Option<f32> {
         let lasts = self.over_since.age(now).is_some_and(|age| age >= LIES) && self.is_fresh(now);
         let [x, y, z] = self.force;
         lasts.then(|| libm::atan2f(libm::sqrtf(x * x + y * y), -z))

@@ -31,7 +31,7 @@ mod latest;
 pub mod lifetime;
 mod mag_heading_residual;
 pub mod mishap;
-mod modes;
+pub mod modes;
 pub mod monitor;
 pub mod motion;
 mod motors;

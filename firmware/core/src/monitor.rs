@@ -177,11 +177,6 @@ impl Monitor {
         self.usage.break_off();
     }
 
-    /// The recording lost what was said for so long, and no time passed here meanwhile.
-    pub fn lose(&mut self, span: Span) {
-        self.flight.lose(span, &self.vehicle);
-    }
-
     /// What comes next is of another recording, of another day or another vehicle: nothing holds but what was counted.
     pub fn begin_another_recording(&mut self) {
         self.vehicle = Vehicle::unknown();

@@ -19,7 +19,7 @@ pub fn height_m(now: Instant, vehicle: &Vehicle) -> Option<f32> {
 }
 
 /// The part of the throttle that the autopilot gives.
-pub(crate) fn throttle(now: Instant, vehicle: &Vehicle) -> Option<f32> {
+pub fn throttle(now: Instant, vehicle: &Vehicle) -> Option<f32> {
     let hud = vehicle.hud.within(now, MOTION_AGE);
     hud.and_then(|hud| hud.throttle).map(|throttle| throttle.0).filter(|part| part.is_finite())
 }

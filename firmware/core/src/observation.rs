@@ -154,7 +154,7 @@ pub struct Gnss {
 impl Gnss {
     /// A 3D fix that is exact enough to hold other sensors against: accuracy and dilution within what PX4 flies with (`EKF2_REQ_EPH` 3 m,
     /// `EKF2_REQ_PDOP` 2.5), as far as they are told.
-    pub(crate) fn is_exact(&self) -> bool {
+    pub fn is_exact(&self) -> bool {
         self.fix >= 3
             && self.accuracy.is_none_or(|accuracy| accuracy.0 <= 3.0)
             && self.hdop.is_none_or(|hdop| hdop <= 2.5)

@@ -22,9 +22,7 @@ pub const BATTERIES_MAX: usize = 4;
 /// GNSS receivers that are monitored.
 pub const RECEIVERS_MAX: usize = 2;
 /// `EXTENDED_SYS_STATE` comes at 1 Hz or faster where it comes at all.
-pub(crate) const LANDED_STATE_AGE: Span = Span::from_secs(5);
-/// An attitude that was the wanted one at each sample for so long, and turned, follows none.
-const LED: Span = Span::from_secs(5);
+pub const LANDED_STATE_AGE: Span = Span::from_secs(5);
 /// `MAV_COMP_ID_BATTERY`, `MAV_COMP_ID_BATTERY2`
 const BATTERY_COMPONENTS: [u8; 2] = [180, 181];
 /// Boot times follow each other within this of the time that went by, milliseconds: messages overtake each other and wait in line.
@@ -102,8 +100,6 @@ pub struct Vehicle {
     pub attitude: Latest<Attitude>,
     /// Roll and pitch that the autopilot wants.
     pub wanted: Latest<[Radians; 2]>,
-    /// When the attitude was another one than that last.
-    led_at: Option<Instant>,
     /// Position from the local origin.
     pub local: Latest<LocalPosition>,
     /// The fused position.
@@ -134,8 +130,6 @@ pub struct Vehicle {
     pub landed: Latest<LandedState>,
     /// What a VTOL flies on, as old as `landed`.
     pub vtol: VtolState,
-    /// How often the vertical speed of `GLOBAL_POSITION_INT` had the sign of the displayed climb, less how often the other one.
-    counts_up: i8,
     /// The autopilot's processor.
     pub processor: Latest<Processor>,
     /// The autopilot's identity.
@@ -160,7 +154,7 @@ pub struct Vehicle {
     /// Whether it was armed when a boot time was believed last.
     boot_armed: bool,
     /// Since when it has called its flight terminated.
-    pub(crate) terminated_since: Option<Instant>,
+    pub terminated_since: Option<Instant>,
     /// The climb that the autopilot wants.
     pub(crate) climb_wanted: Latest<MetresPerSecond>,
 }
@@ -189,7 +183,6 @@ impl Vehicle {
             air: Latest::nothing(),
             attitude: Latest::nothing(),
             wanted: Latest::nothing(),
-            led_at: None,
             local: Latest::nothing(),
             global: Latest::nothing(),
             hud: Latest::nothing(),
@@ -205,7 +198,6 @@ impl Vehicle {
             engine: Latest::nothing(),
             landed: Latest::nothing(),
             vtol: VtolState::Unknown,
-            counts_up: 0,
             processor: Latest::nothing(),
             identity: Latest::nothing(),
             command_ack: Latest::nothing(),
@@ -373,13 +365,16 @@ impl Vehicle {
                 }
                 self.inertial.take_rates(at, attitude.rates);
                 self.inertial.take_attitude(at, attitude.roll, attitude.pitch);
-                self.note_led(at, &attitude);
                 self.attitude.set(at, attitude);
             }
-            Observation::Wanted(Wanted { roll, pitch, .. }) => self.wanted.set(at, [roll, pitch]),
+            Observation::Wanted(Wanted { roll, pitch, .. }) => {
+                if roll.0.is_finite() && pitch.0.is_finite() {
+                    self.wanted.set(at, [roll, pitch]);
+                }
+            }
             Observation::ClimbWanted(climb) => self.climb_wanted.set(at, climb),
             Observation::LocalPosition(local) => self.local.set(at, local),
-            Observation::GlobalPosition(global) => self.take_global(at, global),
+            Observation::GlobalPosition(global) => self.global.set(at, global),
             Observation::Hud(hud) => self.hud.set(at, hud),
             Observation::RadioControl(rc) => self.rc.set(at, rc),
             Observation::TelemetryRadio(radio) => self.radio.set(at, radio),
@@ -451,54 +446,6 @@ impl Vehicle {
             self.rebooted_armed = self.boot_armed && silent_ms <= OFF.as_millis();
         }
         (self.boot, self.odd_boot, self.boot_armed) = (Some((boot_ms, at)), None, self.armed());
-    }
-
-    /// Its vertical speed counts down. `ArduPilot`'s counted up until about 2018 (seen in Copter of 2013, 2016 and 3.5.7, Plane 3.6.0), so
-    /// where it may be so old, it is held against the displayed climb, where both say that it climbs or sinks about as fast.
-    fn take_global(&mut self, at: Instant, mut global: GlobalPosition) {
-        const FRESH: Span = Span::from_secs(1);
-        const MOVES_MPS: f32 = 0.5;
-        const SURE: i8 = 8;
-        const MOST: i8 = 3 * SURE;
-        /// Versions are bytes from the top down.
-        const COUNTS_DOWN_SINCE: u32 = 0x0400_0000;
-        let is_old = self.is_ardupilot()
-            && self.identity.get().is_none_or(|identity| identity.firmware < COUNTS_DOWN_SINCE);
-        let [.., down] = &mut global.velocity;
-        let told = self.hud.within(at, FRESH).and_then(|hud| hud.climb).map(|climb| climb.0);
-        if let Some(climb_mps) = told
-            && libm::fabsf(down.0).min(libm::fabsf(climb_mps)) > MOVES_MPS
-            && (0.5..2.0).contains(&libm::fabsf(climb_mps / down.0))
-        {
-            let vote = if climb_mps * down.0 > 0.0 { 1 } else { -1 };
-            self.counts_up = (self.counts_up + vote).clamp(-MOST, MOST);
-        }
-        if is_old && self.counts_up >= SURE {
-            down.0 = -down.0;
-        }
-        self.global.set(at, global);
-    }
-
-    fn note_led(&mut self, at: Instant, attitude: &Attitude) {
-        /// 0.6 degrees, which is more than rounding.
-        const COPY_RAD: f32 = 0.01;
-        /// What turns slower than this, rad/s, lags the attitude that leads it, by 0.1 s and more, by no more than that: it may well be
-        /// where it is wanted, as a fast multicopter on its straight way.
-        const HOLDS: f32 = 0.1;
-        let Some([roll, pitch]) = self.wanted.within(at, LED) else { return };
-        let leads =
-            (roll.0 - attitude.roll.0).abs() > COPY_RAD || (pitch.0 - attitude.pitch.0).abs() > COPY_RAD;
-        let holds =
-            attitude.rates.is_some_and(|[roll, pitch, _]| roll.0.abs() < HOLDS && pitch.0.abs() < HOLDS);
-        if leads || holds && self.is_led(at) {
-            self.led_at = Some(at);
-        }
-    }
-
-    /// Whether the attitude that is said to be wanted leads the vehicle's. Some firmwares log the attitude itself as the one that is
-    /// wanted: what it is like at each sample is then no command.
-    pub(crate) fn is_led(&self, now: Instant) -> bool {
-        self.led_at.is_some_and(|at| now.since(at) <= LED)
     }
 
     /// The first sensor's figures serve; the others measure the same thing.
@@ -596,45 +543,6 @@ mod tests {
         assert_eq!((motor.esc.rpm, motor.esc.errors), (Some(Rpm(5_000.0)), Some(3)));
         assert_eq!(motor.moved_at, Some(Instant::from_millis(1)));
         assert_eq!(motor.state_at, Some(Instant::from_millis(2)));
-    }
-
-    /// The climb that is known of an autopilot after so many positions with this vertical speed, beside a displayed climb.
-    fn climb_of(
-        (autopilot, firmware): (Autopilot, u32),
-        positions: u64,
-        down_mps: f32,
-        climb_mps: f32,
-    ) -> Option<f32> {
-        let mut vehicle = known();
-        let heartbeat = Heartbeat { autopilot, ..Heartbeat::default() };
-        vehicle.observe(Instant::ZERO, AUTOPILOT, &Observation::Heartbeat(heartbeat));
-        let identity = AutopilotIdentity { firmware, uid: 0 };
-        vehicle.observe(Instant::ZERO, AUTOPILOT, &Observation::Identity(identity));
-        let mut now = Instant::ZERO;
-        for step in 0..positions {
-            now = Instant::from_millis(step * 250);
-            let hud = Hud { climb: Some(MetresPerSecond(climb_mps)), ..Hud::default() };
-            vehicle.observe(now, AUTOPILOT, &Observation::Hud(hud));
-            let velocity = [0.0, 0.0, down_mps].map(MetresPerSecond);
-            let global = GlobalPosition { velocity, ..GlobalPosition::default() };
-            vehicle.observe(now, AUTOPILOT, &Observation::GlobalPosition(global));
-        }
-        crate::motion::climb_mps(now, &vehicle)
-    }
-
-    #[test]
-    fn a_vertical_speed_that_counts_up_is_known_by_the_displayed_climb() {
-        let old = (Autopilot::ArduPilot, 0x0305_07FF);
-        let climb_known = |positions, down_mps, climb_mps| climb_of(old, positions, down_mps, climb_mps);
-        for other in [(Autopilot::ArduPilot, 0x0400_00FF), (Autopilot::Px4, 0)] {
-            assert_eq!(climb_of(other, 20, 3.0, 3.1), Some(-3.0), "{other:?}");
-        }
-        assert_eq!(climb_known(20, 3.0, 3.1), Some(3.0));
-        assert_eq!(climb_known(20, -3.0, -2.5), Some(-3.0));
-        assert_eq!(climb_known(20, -3.0, 3.1), Some(3.0), "as MAVLink has it");
-        assert_eq!(climb_known(5, 3.0, 3.1), Some(-3.0), "not sure yet");
-        assert_eq!(climb_known(20, 8.0, 1.0), Some(-8.0), "not of one motion");
-        assert_eq!(climb_known(20, 0.3, 0.3), Some(-0.3), "hardly moves");
     }
 
     #[test]

@@ -8,42 +8,28 @@ use hums_core::observation::{Autopilot, Observation, VehicleKind, Wanted};
 use hums_core::params::Params;
 use hums_core::status::LinkReading;
 use hums_core::time::Instant;
-use hums_core::units::{Radians, RadiansPerSecond};
+use hums_core::units::Radians;
 
 const BANK: f32 = 1.2;
 const NOTHING: [&str; 0] = [];
 
 /// A minute in which it banks from 20 s on; `wanted` is the roll that the autopilot wants then, where it says so.
 fn banks(vehicle: &Quad, wanted: Option<f32>) -> Vec<&'static str> {
-    banks_and_wants(vehicle, 5, None, |banks_for_ms, _| {
-        wanted.map(|roll| if banks_for_ms.is_some() { roll } else { 0.0 })
-    })
-}
-
-/// The same for so many seconds, turning at a rate that it tells; `wanted` gets how long it has banked, and its roll.
-fn banks_and_wants(
-    vehicle: &Quad,
-    for_s: u64,
-    rate: Option<f32>,
-    wanted: impl Fn(Option<u64>, f32) -> Option<f32>,
-) -> Vec<&'static str> {
     let mut monitor = Monitor::new(Params::defaults());
     let mut findings = Vec::new();
     for now_ms in (0..60_000).step_by(100) {
         let now = Instant::from_millis(now_ms);
         let mut quad = vehicle.clone();
-        let banks_for_ms = now_ms.checked_sub(20_000).filter(|ms| *ms < for_s * 1_000);
+        let banks_for_ms = now_ms.checked_sub(20_000).filter(|ms| *ms < 5_000);
         if banks_for_ms.is_some() {
             quad.roll = BANK;
         }
-        if let Some(roll) = wanted(banks_for_ms, quad.roll) {
+        if let Some(roll) = wanted {
+            let roll = if banks_for_ms.is_some() { roll } else { 0.0 };
             let wanted = Wanted { roll: Radians(roll), ..Wanted::default() };
             monitor.observe(now, AUTOPILOT, &Observation::Wanted(wanted));
         }
-        for mut said in quad.says(now_ms) {
-            if let Observation::Attitude(attitude) = &mut said {
-                attitude.rates = rate.map(|rate| [rate, 0.0, 0.0].map(RadiansPerSecond));
-            }
+        for said in quad.says(now_ms) {
             monitor.observe(now, AUTOPILOT, &said);
         }
         for step in [0, 50] {
@@ -80,27 +66,6 @@ fn a_bank_that_is_wanted_is_none_and_one_that_nobody_asked_for_is_found() {
         assert_eq!(banks(&quad, Some(0.1)), ["roll"], "{autopilot:?} {mode:x}: not wanted");
         assert_eq!(banks(&quad, Some(-BANK)), ["roll"], "{autopilot:?} {mode:x}: the other way");
         assert_eq!(banks(&quad, None), ["roll"], "{autopilot:?} {mode:x}: nobody says what is wanted");
-    }
-}
-
-#[test]
-fn what_is_wanted_and_is_the_attitude_itself_at_each_sample_is_no_command() {
-    for (autopilot, mode) in ANGLES {
-        let copied = banks_and_wants(&quad(autopilot, mode), 5, None, |_, roll| Some(roll + 0.002));
-        assert_eq!(copied, ["roll"], "{autopilot:?} {mode:x}");
-    }
-}
-
-#[test]
-fn a_bank_that_is_held_where_it_is_wanted_stays_a_wanted_one() {
-    for (autopilot, mode) in ANGLES {
-        // It leads for a second, and is reached then.
-        let reached = |banks_for_ms: Option<u64>, roll: f32| {
-            Some(if banks_for_ms.is_some_and(|ms| ms < 1_000) { roll - 0.1 } else { roll })
-        };
-        let held = |rate| banks_and_wants(&quad(autopilot, mode), 20, Some(rate), reached);
-        assert_eq!(held(0.02), NOTHING, "{autopilot:?} {mode:x}: as it flies its fast straight way");
-        assert_eq!(held(0.5), ["roll"], "{autopilot:?} {mode:x}: what leads it does so while it turns");
     }
 }
 

@@ -193,7 +193,6 @@ impl Flights {
         change: Change,
         now: Instant,
         hit_at: Option<Instant>,
-        unheard_from: Option<Instant>,
         monitor: &Monitor,
     ) {
         match change {
@@ -206,7 +205,7 @@ impl Flights {
                 self.crashed = self.open;
                 if let Some(flight) = self.list.last_mut().filter(|_| self.open) {
                     let (at, is_impact) = (hit_at.unwrap_or(now), hit_at.is_some());
-                    flight.mishap = Some(Mishap { at, is_impact, unheard_from });
+                    flight.mishap = Some(Mishap { at, is_impact, unheard_from: None });
                 }
             }
             // It was caught in time.
@@ -216,6 +215,15 @@ impl Flights {
                 }
             }
             Change::Began(_) | Change::FliesAgain | Change::OnBench(_) => {}
+        }
+    }
+
+    /// The last flight ended in a silence that began then, by a mishap: it was no landing that was seen after it.
+    pub(super) fn came_down(&mut self, at: Instant, is_impact: bool, from: Instant) {
+        self.close();
+        if let Some(flight) = self.list.last_mut() {
+            flight.landed = false;
+            flight.mishap = Some(Mishap { at, is_impact, unheard_from: Some(from) });
         }
     }
 

@@ -29,11 +29,13 @@ use super::coverage::{Coverage, Recording};
 use super::details::{self, Details};
 use super::flights::{Flight, Flights, begin_in_air, is_in_air};
 use super::judged::{Holes, Judged, JudgedBy};
+use super::link_loss::{LinkLoss, Verdict};
 use super::problem::{IMPACT, LISTED_MAX, Problems};
 use crate::part;
 use crate::source::epochs::Epochs;
 use crate::source::item::{About, Cause as Why, Event, Fact, Gap, Item, Text};
 use crate::source::recording::Format;
+use crate::source::repairs::Repairs;
 use crate::source::told::{Finding, Told};
 use crate::summary::EndsInAir;
 
@@ -137,6 +139,8 @@ pub struct Judge {
     recorded_to: Instant,
     last_heard: Option<Last>,
     silence: Option<Silence>,
+    link_loss: LinkLoss,
+    repairs: Repairs,
     coverage: Coverage,
     /// What the monitor here found, and what the one on board did.
     here: Problems,
@@ -174,6 +178,8 @@ impl Judge {
             recorded_to: Instant::ZERO,
             last_heard: None,
             silence: None,
+            link_loss: LinkLoss::default(),
+            repairs: Repairs::default(),
             coverage: Coverage::new(),
             here: Problems::default(),
             board: Problems::of_box(),
@@ -231,6 +237,7 @@ impl Judge {
         self.epochs.take(at, &item);
         match item {
             Item::Observation(source, observation) => {
+                let observation = &self.repairs.mend(at, source, observation);
                 if self.is_vehicle(source) {
                     self.hear(at);
                 }
@@ -243,7 +250,10 @@ impl Judge {
                     Observation::Identity(identity) => self.details.identity(source, identity),
                     _ => {}
                 }
-                self.monitor.observe(self.clock.monitor(at).into(), source, observation);
+                let steps = self.clock.monitor(at).into();
+                if self.monitor.observe(steps, source, observation) {
+                    self.link_loss.observe(steps, observation, self.monitor.vehicle());
+                }
             }
             Item::Fact(Fact { about: About::Failsafes, words }) => {
                 self.details.failsafes(words);
@@ -466,6 +476,7 @@ impl Judge {
         if self.joints.len() < LISTED_MAX {
             self.joints.push(at);
         }
+        self.repairs = Repairs::default();
         self.monitor.begin_another_recording();
     }
 
@@ -496,7 +507,7 @@ impl Judge {
             }
             self.clock.pause(from, to);
             if gap.cause == Why::Lost {
-                self.monitor.lose(length.into());
+                self.link_loss.lose(length.into(), &self.monitor, self.here.is_in_mishap());
             }
             self.holes.pause(from, to);
             let place = self.list(gap);
@@ -551,9 +562,6 @@ impl Judge {
                 let at = Clock::recording(now, steps, hit_at.min(finding.at));
                 self.here.take(&Finding { at, ..finding.clone() }, self.clock.behind());
                 self.details.tell(&finding.check, &mut self.here);
-                if let Some(from) = self.monitor.flight().unheard_from().filter(|_| is_hit(&finding)) {
-                    self.here.unheard(&finding.check, Clock::recording(now, steps, of(from)), at);
-                }
             }
         }
         while let Some(happening) = self.monitor.take_happening() {
@@ -567,13 +575,16 @@ impl Judge {
                 Happening::OtherVehicle => self.flights.break_off(),
                 Happening::Mishap(change) => {
                     let hit_at = self.monitor.flight().struck_at();
-                    let unheard_from = self.monitor.flight().unheard_from();
-                    let [hit_at, unheard_from] =
-                        [hit_at, unheard_from].map(|at| at.map(|at| Clock::recording(now, steps, of(at))));
-                    self.flights.mishap(change, now, hit_at, unheard_from, &self.monitor);
+                    let hit_at = hit_at.map(|at| Clock::recording(now, steps, of(at)));
+                    self.flights.mishap(change, now, hit_at, &self.monitor);
                 }
                 _ => {}
             }
+        }
+        if let Some((level, verdict)) =
+            self.link_loss.step(steps.into(), &self.monitor, self.here.is_in_mishap())
+        {
+            self.came_down(now, steps, level, verdict);
         }
         if self.monitor.flight().airborne() && self.monitor.lacks_cells() {
             self.cells.lack(now);
@@ -581,6 +592,22 @@ impl Judge {
         let heard_at = self.monitor.vehicle().heartbeat.at();
         self.flights.step(now, steps, steps.since(heard_at.map_or(steps, of)), &self.monitor);
         self.coverage.note(now, steps, &self.monitor, &link, &recorder);
+    }
+
+    /// It came down while nobody heard it: a board does not look for that, and so nobody but this one finds it.
+    fn came_down(&mut self, now: Instant, steps: Instant, level: Level, verdict: Verdict) {
+        let recording = |at| Clock::recording(now, steps, Instant::of(at, steps));
+        let (at, from) = (recording(verdict.at), verdict.from.map(recording));
+        let Some(finding) = verdict.finding(at, level, self.monitor.params()) else { return };
+        for problems in [&mut self.here, &mut self.board] {
+            problems.take(&finding, self.clock.behind());
+            if let Some(from) = from.filter(|_| is_hit(&finding)) {
+                problems.unheard(verdict.check, from, at);
+            }
+        }
+        if let Some(from) = from.filter(|_| level == Level::Critical) {
+            self.flights.came_down(at, verdict.check == IMPACT, from);
+        }
     }
 
     /// What is lost of the vehicle's frames, where that is known.

@@ -14,6 +14,7 @@ pub mod grouped;
 pub mod json;
 pub mod judge;
 pub mod judged;
+mod link_loss;
 mod no_times;
 mod overview;
 pub mod past;

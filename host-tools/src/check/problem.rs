@@ -263,6 +263,14 @@ impl Problems {
         self.open.get(&(check.to_owned(), 0)).is_some_and(|followed| followed.since.is_some())
     }
 
+    /// Whether a mishap goes on.
+    pub(super) fn is_in_mishap(&self) -> bool {
+        self.open.values().any(|followed| {
+            let Followed { problem, since, level, .. } = followed;
+            problem.subsystem == Subsystem::Mishap && since.is_some() && *level == Level::Critical
+        })
+    }
+
     /// Since when it is wrong, while it is.
     pub(super) fn open_since(&self, check: &str) -> Option<Instant> {
         self.open.get(&(check.to_owned(), 0)).and_then(|followed| followed.since.map(|(since, _)| since))

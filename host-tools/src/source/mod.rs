@@ -46,6 +46,7 @@ pub mod paced;
 pub mod parts;
 pub mod raw;
 pub mod recording;
+pub mod repairs;
 mod said;
 pub mod sniff;
 mod stream;

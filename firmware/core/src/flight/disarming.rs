@@ -89,7 +89,9 @@ impl Flight {
 
     /// One step of the watch.
     pub(super) fn judge_disarming(&mut self, now: Instant, vehicle: &Vehicle, params: &Params) {
-        self.judge_first(now, params);
+        if self.first_at.is_some_and(|since| self.airborne() || now.since(since) > WATCHED) {
+            self.first_at = None;
+        }
         let Some(mut watch) = self.watch else { return };
         // A terminated vehicle stays armed.
         let says_so = vehicle.armed() && self.calls_itself_landed(now, vehicle);
@@ -104,20 +106,6 @@ impl Flight {
             self.see(now, Kind::Disarmed, watch.height_m.unwrap_or(0.0), params);
         } else if now.since(watch.since) > WATCH || (watch.stood && !vehicle.armed()) {
             self.watch = None;
-        }
-    }
-
-    /// A disarmed vehicle that was not seen to fly must fall faster than anything is carried down.
-    fn judge_first(&mut self, now: Instant, params: &Params) {
-        let Some(since) = self.first_at else { return };
-        let sink_mps = self.motion.sink.now(now);
-        let falls = !self.powered
-            && sink_mps > params.get(Param::MisSink)
-            && self.pressure.follows(now, -sink_mps) == Some(true);
-        if falls && now.since(since) > WindowMax::SPAN {
-            self.see(now, Kind::Disarmed, 0.0, params);
-        } else if self.airborne() || now.since(since) > WATCHED {
-            self.first_at = None;
         }
     }
 

@@ -117,7 +117,6 @@ impl Flight {
     pub fn observe(&mut self, at: Instant, vehicle: &Vehicle, observation: &Observation, params: &Params) {
         self.estimate(at, vehicle, observation);
         let watched = self.powered
-            || self.link.is_some()
             || matches!(self.stage, Stage::Falling | Stage::Impacted)
             || self.off_at.is_some_and(|since| at.since(since) <= WATCHED);
         if !watched || vehicle.kind() == VehicleKind::Surface {
@@ -245,7 +244,7 @@ impl Flight {
                     || (self.unloaded.lasts(at, DROPS) && on_rotors(at, vehicle)),
             });
             if self.shock.is_none() && self.worst[Kind::Impact as usize] == 0.0 {
-                (self.hit_at, self.unheard_from) = (at, None);
+                self.hit_at = at;
             }
             // The greatest of several: what hits something bounces.
             let greatest_g = self.shock.map_or(load_g, |before| before.load_g.max(load_g));

@@ -54,7 +54,7 @@ fn degrees(inputs: &Inputs<'_>, angle: fn(&Attitude) -> Radians, axis: usize) ->
     if !matches!(vehicle.kind(), VehicleKind::Rotorcraft | VehicleKind::Vtol) {
         return None;
     }
-    let told = vehicle.wanted.within(now, WANTED_AGE).filter(|_| vehicle.is_led(now));
+    let told = vehicle.wanted.within(now, WANTED_AGE);
     let told = told.map(|told| told[axis].0);
     let degrees = |attitude: &Attitude| {
         let is = angle(attitude).0;

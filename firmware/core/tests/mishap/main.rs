@@ -19,7 +19,7 @@ use hums_core::observation::{
 };
 use hums_core::params::Params;
 use hums_core::status::LinkReading;
-use hums_core::time::{Instant, Span};
+use hums_core::time::Instant;
 use hums_core::units::{
     Amperes, Fraction, Hectopascals, Metres, MetresPerSecond, MetresPerSecond2, Position, Radians,
     RadiansPerSecond,
@@ -55,8 +55,6 @@ struct Motion {
     beats_only: bool,
     /// Home is so much lower than before.
     home_sank_m: f32,
-    /// So much was lost of the recording, in which no time passed here.
-    lost_s: Option<u64>,
 }
 
 const CALM: Motion = Motion {
@@ -72,7 +70,6 @@ const CALM: Motion = Motion {
     unheard: false,
     beats_only: false,
     home_sank_m: 0.0,
-    lost_s: None,
 };
 
 type Script = fn(u64, &mut Quad, &mut Motion);
@@ -138,9 +135,6 @@ fn fly_between(
         let (mut quad, mut motion) = (vehicle.clone(), CALM);
         if now_ms >= at_ms {
             script(now_ms - at_ms, &mut quad, &mut motion);
-        }
-        if let Some(lost_s) = motion.lost_s {
-            monitor.lose(Span::from_secs(lost_s));
         }
         if motion.unheard {
             monitor.observe(now, RADIO, &Observation::TelemetryRadio(TelemetryRadio::default()));

@@ -61,14 +61,10 @@ pub(super) struct Outcome {
     pub(super) file: String,
     /// Autopilot and frame.
     pub(super) vehicle: String,
-    pub(super) autopilot: String,
     pub(super) class: &'static str,
     pub(super) what: String,
-    /// Recorded time.
-    pub(super) recorded_s: f64,
     /// Time in the air, and on the ground, in which nothing was wrong.
     pub(super) air_s: f64,
-    pub(super) ground_s: f64,
     pub(super) alarms: Vec<False>,
     pub(super) fault: Option<Fault>,
     /// What is true and what was counted; none where the truth is not known.
@@ -121,12 +117,9 @@ fn of(judged: &Judged, name: &str, label: Option<&Label>) -> Outcome {
     Outcome {
         file: label.map_or(name, |label| &label.file).to_owned(),
         vehicle: label.map_or_else(|| format!("{autopilot} {vehicle_type}"), Label::group),
-        autopilot,
         class: class.map_or("", |class| class.name),
         what: label.map_or_else(String::new, |label| label.what.clone()),
-        recorded_s,
         air_s,
-        ground_s: (quiet_s.min(recorded_s) - air_s).max(0.0),
         alarms: false_ones
             .map(|alarm| False { alarm: alarm.clone(), in_air: is_in_air(alarm.at_s) })
             .collect(),
