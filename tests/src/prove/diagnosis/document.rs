@@ -110,7 +110,10 @@ mod tests {
     #[test]
     fn the_document_is_of_the_tables_that_the_judge_prints() {
         let text = fs::read_to_string(root().join("docs/diagnosis.md")).unwrap();
-        assert!(text.starts_with(HEAD) && text.ends_with(LIMITS), "`cargo xtask prove diagnosis --write` writes it");
+        assert!(
+            text.starts_with(HEAD) && text.ends_with(LIMITS),
+            "`cargo xtask prove diagnosis --write` writes it"
+        );
         for line in [&SETS, &BY_CLASS, &BY_CHECK, &BY_HAND].into_iter().flat_map(|form| form.lines()) {
             assert!(text.lines().any(|of_page| of_page == line), "{line}");
         }

@@ -106,8 +106,7 @@ pub(super) fn by_class(sets: &[Judged]) -> Vec<Vec<String>> {
         if faults.is_empty() {
             continue;
         }
-        let count =
-            |is: &dyn Fn(&Fault) -> bool| faults.iter().filter(|fault| is(fault)).count().to_string();
+        let count = |is: &dyn Fn(&Fault) -> bool| faults.iter().filter(|fault| is(fault)).count().to_string();
         let both = |fault: &Fault| Some((fault.told.as_ref()?.at_s, fault.autopilot.as_ref()?.0));
         rows.push(vec![
             class.name.to_owned(),
