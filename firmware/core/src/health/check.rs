@@ -18,10 +18,10 @@
 //! again, up to [`CLEAR_MAX`], until the check no longer applies (the vehicle landed, or was disarmed). So does the time after
 //! which a bad value is stale: a stream that is slower than values stay fresh is no new alarm with each message.
 
-use super::finding::{Finding, Level, Orders, Subsystem};
-use super::inputs::Inputs;
 use core::num::NonZeroU8;
 
+use super::finding::{Finding, Level, Orders, Subsystem};
+use super::inputs::Inputs;
 use crate::latest::Reading;
 use crate::observation::Feeds;
 use crate::params::{Param, Params};
