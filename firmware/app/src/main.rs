@@ -30,7 +30,7 @@ use hums_core::Monitor;
 use hums_core::params::Params;
 use hums_onboard::persist::mailbox::MailboxOut;
 use hums_onboard::queues::{Ends, Queues};
-use hums_onboard::{Handover, Keeper, Monitoring, ResetCause};
+use hums_onboard::{Handover, Monitoring, ResetCause, StoreWriter};
 use static_cell::{ConstStaticCell, StaticCell};
 
 use boards::board;
@@ -42,7 +42,7 @@ static QUEUES: ConstStaticCell<Queues> = ConstStaticCell::new(Queues::new());
 static WRITER: ConstStaticCell<Writer> = ConstStaticCell::new(Writer::new());
 static MONITOR: StaticCell<Monitor> = StaticCell::new();
 static MONITORING: StaticCell<Monitoring<'static>> = StaticCell::new();
-static KEEPER: StaticCell<Keeper<'static, board::StoreFlash>> = StaticCell::new();
+static STORE_WRITER: StaticCell<StoreWriter<'static, board::StoreFlash>> = StaticCell::new();
 static HANDOVER: StaticCell<Handover<'static>> = StaticCell::new();
 
 /// What a second spawning of a task would be told.
@@ -77,11 +77,11 @@ fn start() -> board::Idle {
     };
     let monitor = Monitor::begin(MONITOR.uninit(), &Params::defaults());
     let (items_in, items_out) = status::MAILBOX.split();
-    let keeper = restore(parts.store, items_out, parts.boot.cause, monitor);
-    let entropy = parts.boot.entropy.unwrap_or_else(|| counted(keeper.mounts(), &identity));
+    let store_writer = restore(parts.store, items_out, parts.boot.cause, monitor);
+    let entropy = parts.boot.entropy.unwrap_or_else(|| counted(store_writer.mounts(), &identity));
     let handover = HANDOVER.init_with(|| Handover::new(items_in, &status::STORE_STATUS, monitor));
     let monitoring = monitoring(monitor, identity, parts.boot.cause);
-    monitoring.restore_signing(keeper);
+    monitoring.restore_signing(store_writer);
 
     let on = executors::start();
     let (autopilot_rx, autopilot_tx) = parts.autopilot;
@@ -94,8 +94,9 @@ fn start() -> board::Idle {
     on.downlink.spawn(tasks::downlink::run(gs_tx, gs_out).expect(ONCE));
     on.downlink.spawn(tasks::downlink::requests(autopilot_tx, queues.autopilot_out).expect(ONCE));
     on.downlink.spawn(tasks::uplink::run(gs_rx, queues.uplink_in).expect(ONCE));
-    on.storage
-        .spawn(tasks::storage::run(parts.card, entropy, sectors_out, queues.shelf, keeper).expect(ONCE));
+    on.storage.spawn(
+        tasks::storage::run(parts.card, entropy, sectors_out, queues.shelf, store_writer).expect(ONCE),
+    );
     parts.idle
 }
 
@@ -116,13 +117,13 @@ fn restore(
     items: MailboxOut<'static>,
     cause: ResetCause,
     monitor: &mut Monitor,
-) -> &'static mut Keeper<'static, board::StoreFlash> {
-    let keeper = KEEPER.init_with(|| Keeper::mount(store, items, &status::STORE_STATUS));
+) -> &'static mut StoreWriter<'static, board::StoreFlash> {
+    let store_writer = STORE_WRITER.init_with(|| StoreWriter::mount(store, items, &status::STORE_STATUS));
     if !cause.may_be_in_flight() {
-        keeper.turn_ahead();
+        store_writer.turn_ahead();
     }
-    keeper.load(monitor);
-    keeper
+    store_writer.load(monitor);
+    store_writer
 }
 
 #[inline(never)]

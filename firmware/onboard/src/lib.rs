@@ -28,7 +28,7 @@ pub mod uplink;
 pub mod wait;
 
 pub use monitoring::Monitoring;
-pub use persist::{Handover, Keeper, Mailbox, StoreStatus};
+pub use persist::{Handover, Mailbox, StoreStatus, StoreWriter};
 pub use port::PortStatus;
 pub use reception::Reception;
 pub use reset::ResetCause;

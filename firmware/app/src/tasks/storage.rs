@@ -6,7 +6,7 @@ use hums_core::clock::Instant;
 use hums_onboard::queues::SectorsOut;
 use hums_onboard::shelf::Server;
 use hums_onboard::storage::NO_CARD_RETRY;
-use hums_onboard::{Keeper, Service, Storage, Task};
+use hums_onboard::{Service, Storage, StoreWriter, Task};
 use hums_recorder::Buffers;
 use static_cell::{ConstStaticCell, StaticCell};
 
@@ -38,18 +38,18 @@ pub(crate) async fn run(
     entropy: u32,
     mut sectors: SectorsOut<'static>,
     mut shelf: Server<'static>,
-    keeper: &'static mut Keeper<'static, board::StoreFlash>,
+    store_writer: &'static mut StoreWriter<'static, board::StoreFlash>,
 ) -> ! {
     let body = prepare(card, entropy);
     loop {
         SUPERVISOR.report(Task::Storage, now());
         let begun = now();
         let service = service(body, begun, &mut sectors);
-        keep(keeper);
+        keep(store_writer);
         match service {
             Service::Wrote => {}
             Service::Idle if !sectors.is_empty() || serve(body, &mut shelf) => {}
-            Service::Idle => wait_for_work(&sectors, &shelf, keeper).await,
+            Service::Idle => wait_for_work(&sectors, &shelf, store_writer).await,
             Service::NoCard => Timer::after(links::wait(NO_CARD_RETRY)).await,
         }
     }
@@ -59,12 +59,12 @@ pub(crate) async fn run(
 async fn wait_for_work(
     sectors: &SectorsOut<'_>,
     shelf: &Server<'_>,
-    keeper: &mut Keeper<'static, board::StoreFlash>,
+    store_writer: &mut StoreWriter<'static, board::StoreFlash>,
 ) {
     let mut asked = shelf.is_wanted();
     while sectors.is_empty() && !asked {
         SUPERVISOR.report(Task::Storage, now());
-        keep(keeper);
+        keep(store_writer);
         // Either way it looks again.
         let _ = with_timeout(REPORT, links::SECTORS.wait()).await;
         asked = shelf.is_wanted();
@@ -85,6 +85,6 @@ fn serve(body: &mut Body, shelf: &mut Server<'static>) -> bool {
 
 /// Saves one item, if there is one.
 #[inline(never)]
-fn keep(keeper: &mut Keeper<'static, board::StoreFlash>) {
-    measure(Stage::Storage, || keeper.service(false));
+fn keep(store_writer: &mut StoreWriter<'static, board::StoreFlash>) {
+    measure(Stage::Storage, || store_writer.service(false));
 }

@@ -31,7 +31,7 @@ use hums_link::summary::{self, Summary};
 
 use crate::journal::{Journal, Logbook};
 use crate::notices::Notices;
-use crate::persist::{Handover, Keeper};
+use crate::persist::{Handover, StoreWriter};
 use crate::queues::{GsIn, SectorsIn, SummaryRoute};
 use commands::Commands;
 use library::Library;
@@ -108,8 +108,8 @@ impl Companion {
     }
 
     /// Takes the signing key out of the store: see [`secure`].
-    pub(crate) fn restore<F: NorFlash>(&mut self, keeper: &mut Keeper<'_, F>) {
-        self.secure.restore(keeper);
+    pub(crate) fn restore<F: NorFlash>(&mut self, store_writer: &mut StoreWriter<'_, F>) {
+        self.secure.restore(store_writer);
     }
 
     /// Hands over what of the signing key is due.

@@ -25,8 +25,8 @@ use hums_link::request::Port;
 use hums_link::signing::{KEY_BYTES, Key, Seal, Signing, Times, Verdict, stamp};
 use hums_store::Key as Item;
 
-use crate::persist::keeper::SIGNED_MAX;
-use crate::persist::{Handover, Keeper};
+use crate::persist::store_writer::SIGNED_MAX;
+use crate::persist::{Handover, StoreWriter};
 use crate::queues::SummaryRoute;
 
 /// Numbers of stored items: the key, and [`Times`] as three `u64`.
@@ -100,11 +100,11 @@ impl Secure {
     }
 
     /// Takes the key and its times out of the store. At power-on, before anything is sent.
-    pub(crate) fn restore<F: NorFlash>(&mut self, keeper: &mut Keeper<'_, F>) {
+    pub(crate) fn restore<F: NorFlash>(&mut self, store_writer: &mut StoreWriter<'_, F>) {
         let mut bytes = [0; KEY_BYTES];
-        let key = (keeper.item(ITEM_KEY, &mut bytes) == KEY_BYTES).then_some(Key(bytes));
+        let key = (store_writer.item(ITEM_KEY, &mut bytes) == KEY_BYTES).then_some(Key(bytes));
         let mut bytes = [0; TIMES_BYTES];
-        let len = keeper.item(ITEM_TIMES, &mut bytes);
+        let len = store_writer.item(ITEM_TIMES, &mut bytes);
         if let ([accepted, used, time], []) = bytes.as_chunks::<8>()
             && len == TIMES_BYTES
         {
@@ -224,7 +224,7 @@ impl Secure {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::persist::{Kept, Mailbox, StoreStatus};
+    use crate::persist::{Mailbox, Saved, StoreStatus};
     use hums_core::lifetime::ItemKey;
     use hums_store::sim::SimFlash;
 
@@ -235,7 +235,7 @@ mod tests {
         let mut flash = Flash::blank();
         let (mailbox, status) = (Mailbox::new(), StoreStatus::new());
         let (items_in, items_out) = mailbox.split();
-        let mut keeper = Keeper::mount(Some(&mut flash), items_out, &status);
+        let mut store_writer = StoreWriter::mount(Some(&mut flash), items_out, &status);
         let mut monitor = Box::new(Monitor::new(Params::defaults()));
         let mut handover = Handover::new(items_in, &status, &mut monitor);
         let mut secure = Secure::new();
@@ -245,7 +245,7 @@ mod tests {
             secure.changed(Trust::Signed);
             secure.times.time = second;
             secure.save(Instant::from_millis(second * 1_000), None, &mut handover);
-            while keeper.service(false) == Kept::Took {
+            while store_writer.service(false) == Saved::Took {
                 scarce += u32::from(handover.room() == Room::Reserve);
             }
         }
@@ -259,13 +259,13 @@ mod tests {
         ];
         for (key, length) in landing {
             assert!(handover.put(Item::item(key.number()), &[1; 512][..length]));
-            assert_eq!(keeper.service(false), Kept::Took, "{key:?}");
+            assert_eq!(store_writer.service(false), Saved::Took, "{key:?}");
         }
         assert_eq!(status.read().refused, 0);
         // What waited is stored once there is room again.
         assert!(secure.times_due);
-        assert!(keeper.turn_ahead());
+        assert!(store_writer.turn_ahead());
         secure.save(Instant::from_millis(86_400_000), None, &mut handover);
-        assert!(!secure.times_due && keeper.service(false) == Kept::Took);
+        assert!(!secure.times_due && store_writer.service(false) == Saved::Took);
     }
 }

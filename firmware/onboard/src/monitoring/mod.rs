@@ -24,7 +24,7 @@ use crate::ResetCause;
 use crate::companion::{self, Companion};
 use crate::journal::{Journal, Logbook};
 use crate::notices::{Notice, Notices};
-use crate::persist::{Handover, Keeper};
+use crate::persist::{Handover, StoreWriter};
 use crate::port::PortStatus;
 use crate::queues::{FramesOut, GsIn, SectorsIn, SummaryRoute, UplinkOut};
 use crate::records::Recorded;
@@ -319,8 +319,8 @@ impl<'a> Monitoring<'a> {
     }
 
     /// Takes the signing key and its times out of the store. At power-on, before anything is sent.
-    pub fn restore_signing<F: NorFlash>(&mut self, keeper: &mut Keeper<'_, F>) {
-        self.companion.restore(keeper);
+    pub fn restore_signing<F: NorFlash>(&mut self, store_writer: &mut StoreWriter<'_, F>) {
+        self.companion.restore(store_writer);
     }
 
     /// Hands over what of the signing key and its times is due, at every tick and at the end.

@@ -39,7 +39,7 @@ pub struct News {
 }
 
 impl<'a> Handover<'a> {
-    /// After [`Keeper::load`](super::Keeper::load): the parameters are as they are stored.
+    /// After [`StoreWriter::load`](super::StoreWriter::load): the parameters are as they are stored.
     pub fn new(items: MailboxIn<'a>, status: &'a StoreStatus, monitor: &mut Monitor) -> Self {
         monitor.params_mut().all_saved();
         let told = StoreReading { state: StoreState::Kept, ..StoreReading::default() };
@@ -67,7 +67,7 @@ impl<'a> Handover<'a> {
     }
 
     /// At the end of a session: hands over everything that changed; `false` when it is to be called again after the
-    /// keeper took something.
+    /// store_writer took something.
     pub fn finish(&mut self, now: Instant, monitor: &mut Monitor) -> bool {
         monitor.save_all();
         self.put_params(monitor.params_mut()) && self.put_items(now, monitor)

@@ -56,7 +56,7 @@ impl MailboxIn<'_> {
     }
 }
 
-/// The keeper's end.
+/// The store_writer's end.
 pub struct MailboxOut<'a>(FramedConsumer<&'a Queue>);
 
 impl MailboxOut<'_> {

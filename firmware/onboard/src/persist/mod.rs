@@ -2,11 +2,11 @@
 //! RAM, and the store, which has them in flash.
 //!
 //! ```text
-//!            Handover (monitor's task)     Mailbox      Keeper (storage's task)
+//!            Handover (monitor's task)     Mailbox      StoreWriter (storage's task)
 //! Monitor ---------------------------> items (queue) ----------------------> flash
 //!     ^------------------------------- StoreStatus -----------------------------/
 //! ```
-//! At the start [`Keeper::load`] gives the monitor what is stored, before the first frame. Later the monitor's task
+//! At the start [`StoreWriter::load`] gives the monitor what is stored, before the first frame. Later the monitor's task
 //! hands over what is due ([`Handover::step`]); an item that finds the mailbox full stays due, and so is handed over
 //! later with its value of then: the owner keeps what is not taken, and nothing is lost by waiting. The least urgent
 //! task writes.
@@ -20,7 +20,7 @@
 //!
 //! | when | what is lost |
 //! |---|---|
-//! | at power-on, before reception begins ([`Keeper::turn_ahead`]); at least five eighths of a sector are free afterwards | nothing |
+//! | at power-on, before reception begins ([`StoreWriter::turn_ahead`]); at least five eighths of a sector are free afterwards | nothing |
 //! | disarmed, and no frame for [`handover::QUIET`]: room is made for the next flight | nothing |
 //! | disarmed on the ground for [`handover::GROUNDED`] while the autopilot talks, and only where the sector is more than three quarters full | frames of up to 0.5 s; it is recorded and told |
 //!
@@ -48,13 +48,13 @@
 //! years.
 
 pub mod handover;
-pub mod keeper;
 pub mod mailbox;
 pub mod status;
+pub mod store_writer;
 #[cfg(test)]
 mod tests;
 
 pub use handover::{Handover, News, STORE_NEW};
-pub use keeper::{Keeper, Kept};
 pub use mailbox::Mailbox;
 pub use status::{Calm, StoreState, StoreStatus};
+pub use store_writer::{Saved, StoreWriter};

@@ -6,7 +6,7 @@ use hums_core::params::{Param, TABLE};
 use hums_core::status::{LinkReading, RecorderStatus};
 use hums_store::sim::SimFlash;
 
-use super::keeper::{Keeper, Kept};
+use super::store_writer::{Saved, StoreWriter};
 use super::{Calm, Handover, Mailbox, StoreStatus};
 use hums_core::Monitor;
 use hums_core::clock::Instant;
@@ -22,22 +22,22 @@ use hums_store::{Key, Store, param_value};
 type Flash = SimFlash<16384>;
 
 /// One power-on, with nothing heard, and then power is gone.
-fn session(flash: &mut Flash, act: impl FnOnce(&mut Monitor, &mut Handover, &mut Keeper<&mut Flash>)) {
+fn session(flash: &mut Flash, act: impl FnOnce(&mut Monitor, &mut Handover, &mut StoreWriter<&mut Flash>)) {
     let (mailbox, status) = (Mailbox::new(), StoreStatus::new());
     let (items_in, items_out) = mailbox.split();
     let mut monitor = Box::new(Monitor::new(Params::defaults()));
-    let mut keeper = Keeper::mount(Some(flash), items_out, &status);
-    keeper.turn_ahead();
-    keeper.load(&mut monitor);
+    let mut store_writer = StoreWriter::mount(Some(flash), items_out, &status);
+    store_writer.turn_ahead();
+    store_writer.load(&mut monitor);
     monitor.tick(Instant::ZERO.into(), &LinkReading::default(), &RecorderStatus::default(), &mut |_| ());
     let mut handover = Handover::new(items_in, &status, &mut monitor);
-    act(&mut monitor, &mut handover, &mut keeper);
+    act(&mut monitor, &mut handover, &mut store_writer);
 }
 
-fn end(monitor: &mut Monitor, handover: &mut Handover, keeper: &mut Keeper<&mut Flash>) {
+fn end(monitor: &mut Monitor, handover: &mut Handover, store_writer: &mut StoreWriter<&mut Flash>) {
     for _ in 0..100 {
         let all = handover.finish(Instant::from_millis(60_000), monitor);
-        while keeper.service(true) == Kept::Took {}
+        while store_writer.service(true) == Saved::Took {}
         if all {
             return;
         }
@@ -49,7 +49,7 @@ fn end(monitor: &mut Monitor, handover: &mut Handover, keeper: &mut Keeper<&mut 
 fn counters_and_parameters_go_on_where_the_last_power_on_left_them() {
     let mut flash = Flash::blank();
     for boot in 1..=50 {
-        session(&mut flash, |monitor, handover, keeper| {
+        session(&mut flash, |monitor, handover, store_writer| {
             assert_eq!(monitor.lifetime().boots, boot);
             assert_eq!(
                 monitor.params().get(Param::CellVoltWarn).to_bits(),
@@ -60,7 +60,7 @@ fn counters_and_parameters_go_on_where_the_last_power_on_left_them() {
                 }
             );
             monitor.params_mut().set("CELL_VOLT_WARN", 3.0 + boot as f32 / 100.0).expect("in range");
-            end(monitor, handover, keeper);
+            end(monitor, handover, store_writer);
         });
     }
 }
@@ -68,12 +68,12 @@ fn counters_and_parameters_go_on_where_the_last_power_on_left_them() {
 #[test]
 fn what_is_due_reaches_the_flash_without_the_end_of_a_session() {
     let mut flash = Flash::blank();
-    session(&mut flash, |monitor, handover, keeper| {
+    session(&mut flash, |monitor, handover, store_writer| {
         handover.step(Instant::from_millis(9_000), monitor, 0);
-        assert_eq!(keeper.service(false), Kept::Idle, "nothing is due yet");
+        assert_eq!(store_writer.service(false), Saved::Idle, "nothing is due yet");
         for second in 10..20 {
             handover.step(Instant::from_millis(second * 1_000), monitor, 0);
-            while keeper.service(false) == Kept::Took {}
+            while store_writer.service(false) == Saved::Took {}
         }
     });
     session(&mut flash, |monitor, _, _| assert_eq!(monitor.lifetime().boots, 2));
@@ -82,17 +82,17 @@ fn what_is_due_reaches_the_flash_without_the_end_of_a_session() {
 #[test]
 fn more_than_the_mailbox_holds_stays_with_its_owner_and_follows() {
     let mut flash = Flash::blank();
-    session(&mut flash, |monitor, handover, keeper| {
+    session(&mut flash, |monitor, handover, store_writer| {
         for spec in TABLE {
             monitor.params_mut().set(spec.name, spec.max).expect("its own limit");
         }
         handover.step(Instant::ZERO, monitor, 0);
         let mut taken = 0;
-        while keeper.service(false) == Kept::Took {
+        while store_writer.service(false) == Saved::Took {
             taken += 1;
         }
         assert!(taken > 10 && taken < TABLE.len(), "{taken}");
-        end(monitor, handover, keeper);
+        end(monitor, handover, store_writer);
     });
     session(&mut flash, |monitor, _, _| {
         assert!(monitor.params().iter().all(|(spec, value)| value.to_bits() == spec.max.to_bits()));
@@ -102,7 +102,7 @@ fn more_than_the_mailbox_holds_stays_with_its_owner_and_follows() {
 #[test]
 fn a_save_that_needs_an_erase_waits_is_told_once_and_is_done_when_it_may() {
     let mut flash = Flash::blank();
-    session(&mut flash, |monitor, handover, keeper| {
+    session(&mut flash, |monitor, handover, store_writer| {
         assert_eq!(handover.news().map(|news| news.severity), Some(6), "the store is new");
         let mut value: f32 = 0.0;
         let mut waits = false;
@@ -111,16 +111,16 @@ fn a_save_that_needs_an_erase_waits_is_told_once_and_is_done_when_it_may() {
             assert!(value < 4.0, "the sector is never full");
             monitor.params_mut().set("CELL_VOLT_WARN", value).expect("in range");
             handover.step(Instant::ZERO, monitor, 1);
-            waits = keeper.service(false) == Kept::Waits;
+            waits = store_writer.service(false) == Saved::Waits;
         }
-        assert_eq!((keeper.service(false), keeper.service(false)), (Kept::Waits, Kept::Waits));
-        assert_eq!(keeper.status.read().refused, 1);
+        assert_eq!((store_writer.service(false), store_writer.service(false)), (Saved::Waits, Saved::Waits));
+        assert_eq!(store_writer.status.read().refused, 1);
         assert!(handover.news().is_some_and(|news| news.text.contains("nearly full")));
         assert!(handover.news().is_some_and(|news| news.text.contains("waits")));
         assert_eq!(handover.news(), None);
-        assert_eq!((keeper.service(true), keeper.service(true)), (Kept::Took, Kept::Idle));
+        assert_eq!((store_writer.service(true), store_writer.service(true)), (Saved::Took, Saved::Idle));
         monitor.params_mut().set("CELL_VOLT_WARN", 4.25).expect("in range");
-        end(monitor, handover, keeper);
+        end(monitor, handover, store_writer);
     });
     session(&mut flash, |monitor, _, _| {
         assert!((monitor.params().get(Param::CellVoltWarn) - 4.25).abs() < 1e-6);
@@ -150,13 +150,13 @@ fn live(second: u64, flies: bool, monitor: &mut Monitor, handover: &mut Handover
 fn fly(flash: &mut Flash, seconds: u64) -> Vec<u64> {
     let mut kept = Vec::new();
     let mut copies = Vec::new();
-    session(flash, |monitor, handover, keeper| {
+    session(flash, |monitor, handover, store_writer| {
         let before = monitor.lifetime().totals.raw(UsageCounter::Flight);
         for second in 0..seconds {
             live(second, (20..seconds - 5).contains(&second), monitor, handover, second as u32);
-            while keeper.service(false) == Kept::Took {}
-            assert_eq!(keeper.status.read().refused, 0, "nothing waits for an erase");
-            copies.push((second, before, keeper.status.read().saved));
+            while store_writer.service(false) == Saved::Took {}
+            assert_eq!(store_writer.status.read().refused, 0, "nothing waits for an erase");
+            copies.push((second, before, store_writer.status.read().saved));
         }
         let count = |counter| monitor.lifetime().totals.raw(counter) as u32;
         assert_eq!(count(UsageCounter::Landings), count(UsageCounter::Flights));
@@ -197,22 +197,22 @@ fn a_flight_of_many_hours_uses_what_there_is_and_its_landing_is_saved_all_the_sa
 #[test]
 fn between_two_flights_room_is_made_for_the_next_one() {
     let mut flash = Flash::blank();
-    session(&mut flash, |monitor, handover, keeper| {
+    session(&mut flash, |monitor, handover, store_writer| {
         let mut second = 0;
         for flight in 0..6 {
             for _ in 0..3_600 {
                 live(second, true, monitor, handover, second as u32);
-                while keeper.service(false) == Kept::Took {}
+                while store_writer.service(false) == Saved::Took {}
                 second += 1;
             }
-            assert_eq!(keeper.status.read().refused, 0, "flight {flight}");
+            assert_eq!(store_writer.status.read().refused, 0, "flight {flight}");
             // Frames end: the autopilot is switched off.
             for _ in 0..20 {
                 live(second, false, monitor, handover, u32::MAX);
-                while keeper.service(false) == Kept::Took {}
+                while store_writer.service(false) == Saved::Took {}
                 second += 1;
             }
-            assert_eq!(keeper.status.read().room, Room::Enough, "flight {flight}");
+            assert_eq!(store_writer.status.read().room, Room::Enough, "flight {flight}");
         }
     });
 }
@@ -222,7 +222,7 @@ fn a_board_that_stays_on_beside_an_autopilot_that_never_falls_silent_keeps_its_c
     let mut flash = Flash::blank();
     let mut flown = 0.0;
     let mut erases = 0;
-    session(&mut flash, |monitor, handover, keeper| {
+    session(&mut flash, |monitor, handover, store_writer| {
         for second in 0..12 * 3_600_u64 {
             // A flight of ten minutes in each hour, and a key whose times are stored every two minutes.
             let flies = (600..1_200).contains(&(second % 3_600));
@@ -230,16 +230,16 @@ fn a_board_that_stays_on_beside_an_autopilot_that_never_falls_silent_keeps_its_c
             if second % 120 == 0 {
                 handover.put(Key::item(33), &second.to_le_bytes().repeat(3));
             }
-            let before = keeper.status.read().erased;
-            while keeper.service(false) == Kept::Took {}
-            let now = keeper.status.read();
+            let before = store_writer.status.read().erased;
+            while store_writer.service(false) == Saved::Took {}
+            let now = store_writer.status.read();
             assert!(now.erased == before || !flies, "erased in flight");
             assert_eq!(now.refused, 0, "after {second} s something waits");
             let told = std::iter::from_fn(|| handover.news()).any(|news| news.text.contains("not recorded"));
             assert_eq!(told, now.erased != before, "what an erase loses is told");
         }
         flown = monitor.lifetime().totals.raw(UsageCounter::Flight);
-        erases = keeper.status.read().erased;
+        erases = store_writer.status.read().erased;
     });
     assert!((2..=6).contains(&erases), "{erases}");
     session(&mut flash, |monitor, _, _| {
@@ -252,18 +252,18 @@ fn a_board_that_stays_on_beside_an_autopilot_that_never_falls_silent_keeps_its_c
 #[test]
 fn on_the_ground_nothing_is_erased_while_there_is_room_or_the_vehicle_was_just_disarmed() {
     let mut flash = Flash::blank();
-    session(&mut flash, |monitor, handover, keeper| {
+    session(&mut flash, |monitor, handover, store_writer| {
         for second in 0..3_600 {
             live(second, false, monitor, handover, second as u32);
-            while keeper.service(false) == Kept::Took {}
+            while store_writer.service(false) == Saved::Took {}
         }
-        assert_eq!((keeper.status.read().erased, keeper.status.calm()), (0, Calm::Grounded));
+        assert_eq!((store_writer.status.read().erased, store_writer.status.calm()), (0, Calm::Grounded));
         for (second, calm) in [(3_600, Calm::None), (3_601, Calm::None), (3_620, Calm::Grounded)] {
             live(second, second == 3_600, monitor, handover, second as u32);
-            assert_eq!(keeper.status.calm(), calm, "at {second} s");
+            assert_eq!(store_writer.status.calm(), calm, "at {second} s");
         }
         live(3_626, false, monitor, handover, 3_620);
-        assert_eq!(keeper.status.calm(), Calm::Silent);
+        assert_eq!(store_writer.status.calm(), Calm::Silent);
     });
 }
 
@@ -289,10 +289,10 @@ fn an_item_that_makes_no_sense_is_told_and_the_others_are_read() {
     store.save(Key::param("OF_A_LATER_TIME"), &bytes[..length]).expect("room");
     store.save(Key::item(ItemKey::Lifetime.number()), &[1, 2, 3]).expect("room");
     store.save(Key::item(250), b"of a later time").expect("room");
-    session(&mut flash, |monitor, handover, keeper| {
+    session(&mut flash, |monitor, handover, store_writer| {
         assert!((monitor.params().get(Param::CellVoltCrit) - 3.25).abs() < 1e-6);
         assert_eq!(monitor.params().get(Param::CellVoltWarn).to_bits(), 3.6_f32.to_bits());
-        assert_eq!(keeper.status.read().unreadable, 2);
+        assert_eq!(store_writer.status.read().unreadable, 2);
         assert!(handover.news().is_some_and(|news| news.text.contains("saved value was lost")));
     });
 }
@@ -302,13 +302,13 @@ fn without_a_store_all_goes_on_and_it_is_told() {
     let (mailbox, status) = (Mailbox::new(), StoreStatus::new());
     let (items_in, items_out) = mailbox.split();
     let mut monitor = Box::new(Monitor::new(Params::defaults()));
-    let mut keeper = Keeper::<Flash>::mount(None, items_out, &status);
-    keeper.load(&mut monitor);
+    let mut store_writer = StoreWriter::<Flash>::mount(None, items_out, &status);
+    store_writer.load(&mut monitor);
     let mut handover = Handover::new(items_in, &status, &mut monitor);
     assert!(handover.news().is_some_and(|news| news.text.contains("no store")));
     for second in 0..100 {
         handover.step(Instant::from_millis(second * 1_000), &mut monitor, 0);
-        while keeper.service(false) == Kept::Took {}
+        while store_writer.service(false) == Saved::Took {}
     }
     assert!(handover.finish(Instant::from_millis(100_000), &mut monitor));
 }

@@ -8,10 +8,10 @@ use anyhow::Result;
 use hums_blackbox::record::Boot;
 use hums_core::clock::{Instant, Span};
 use hums_onboard::monitoring::TICK;
-use hums_onboard::persist::Kept;
+use hums_onboard::persist::Saved;
 use hums_onboard::queues::{Ends, FRAME_BYTES_MAX};
 use hums_onboard::uplink::{self, Uplink};
-use hums_onboard::{Handover, Keeper, Monitoring, PortStatus, Reception, ResetCause, Service, Storage};
+use hums_onboard::{Handover, Monitoring, PortStatus, Reception, ResetCause, Service, Storage, StoreWriter};
 use hums_recorder::CardStatus;
 
 use super::outside::{Memory, Outside, Slot};
@@ -36,7 +36,7 @@ pub(super) struct Pipeline<'a, 'w> {
     uplink: Uplink,
     monitoring: Monitoring<'a>,
     storage: Storage<'a, Slot<'a>>,
-    keeper: Keeper<'a, FileFlash>,
+    store_writer: StoreWriter<'a, FileFlash>,
     handover: Handover<'a>,
     /// Since this power-on, as all that follow.
     now: Instant,
@@ -107,18 +107,18 @@ impl<'a, 'w> Pipeline<'a, 'w> {
         let Memory { card_status, port_status, store_status, mailbox, held, queues, writer, monitor } =
             memory;
         let (items_in, items_out) = mailbox.split();
-        let mut keeper = Keeper::mount(Some(outside.flash.clone()), items_out, store_status);
-        keeper.turn_ahead();
-        keeper.load(monitor);
+        let mut store_writer = StoreWriter::mount(Some(outside.flash.clone()), items_out, store_status);
+        store_writer.turn_ahead();
+        store_writer.load(monitor);
         let handover = Handover::new(items_in, store_status, monitor);
         let mut monitoring =
             Monitoring::new(monitor, writer, identity, ResetCause::PowerOn, card_status, port_status);
-        monitoring.restore_signing(&mut keeper);
+        monitoring.restore_signing(&mut store_writer);
         Self {
             slot_status: card_status,
             port_status,
             ends: queues.split(),
-            keeper,
+            store_writer,
             handover,
             reception: Reception::new(port_status),
             uplink: Uplink::new(),
@@ -267,7 +267,7 @@ impl<'a, 'w> Pipeline<'a, 'w> {
 
     /// Saves what was handed over.
     fn keep(&mut self, may_erase: bool) {
-        while !self.is_dead() && self.keeper.service(may_erase) == Kept::Took {}
+        while !self.is_dead() && self.store_writer.service(may_erase) == Saved::Took {}
     }
 
     /// Records what is new about the store.

@@ -22,9 +22,9 @@ pub(crate) const SIGNED_MAX: u8 = 4;
 const LANDING: usize = Exceedances::BYTES + Baselines::BYTES + 2 * Session::BYTES_TYPICAL + 4 * 16;
 const _: () = assert!(LANDING + SIGNED_MAX as usize * 40 <= RESERVE);
 
-/// What one call of [`Keeper::service`] did.
+/// What one call of [`StoreWriter::service`] did.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kept {
+pub enum Saved {
     /// An item was taken: there may be another.
     Took,
     /// There is nothing to do.
@@ -34,7 +34,7 @@ pub enum Kept {
 }
 
 /// The storage task's side: the store and what goes into it.
-pub struct Keeper<'a, F: NorFlash> {
+pub struct StoreWriter<'a, F: NorFlash> {
     store: Option<Store<F>>,
     items: MailboxOut<'a>,
     pub(crate) status: &'a StoreStatus,
@@ -46,7 +46,7 @@ pub struct Keeper<'a, F: NorFlash> {
     scarce: bool,
 }
 
-impl<'a, F: NorFlash> Keeper<'a, F> {
+impl<'a, F: NorFlash> StoreWriter<'a, F> {
     /// With the store in `flash`, if there is one. Ends what power cut short, which may take an erase: before reception
     /// begins.
     pub fn mount(flash: Option<F>, items: MailboxOut<'a>, status: &'a StoreStatus) -> Self {
@@ -115,7 +115,7 @@ impl<'a, F: NorFlash> Keeper<'a, F> {
     }
 
     /// Saves one item. An erase is allowed where [`Calm`] allows it (the table in [`super`]), or if `may_erase` says so.
-    pub fn service(&mut self, may_erase: bool) -> Kept {
+    pub fn service(&mut self, may_erase: bool) -> Saved {
         let calm = self.status.calm();
         let erases = calm == Calm::Silent || (calm == Calm::Grounded && self.scarce);
         self.turned &= calm != Calm::None;
@@ -128,31 +128,31 @@ impl<'a, F: NorFlash> Keeper<'a, F> {
         }
         let Self { store, items, status, waits, .. } = self;
         let Some(store) = store else {
-            return items.oldest(|_, _| (Kept::Took, true)).unwrap_or(Kept::Idle);
+            return items.oldest(|_, _| (Saved::Took, true)).unwrap_or(Saved::Idle);
         };
         if *waits && !may_erase && !erases {
-            return Kept::Waits;
+            return Saved::Waits;
         }
         store.allow_erase(may_erase || calm == Calm::Silent);
         let kept = items.oldest(|key, value| match store.save(key, value) {
             Ok(_) => {
                 count(&status.saved);
-                (Kept::Took, true)
+                (Saved::Took, true)
             }
-            Err(Error::NotNow) => (Kept::Waits, false),
+            Err(Error::NotNow) => (Saved::Waits, false),
             // To try again would not help; its owner saves it again when it has changed.
             Err(_) => {
                 count(&status.failed);
-                (Kept::Took, true)
+                (Saved::Took, true)
             }
         });
         store.allow_erase(false);
-        let waited = core::mem::replace(waits, kept == Some(Kept::Waits));
+        let waited = core::mem::replace(waits, kept == Some(Saved::Waits));
         if *waits && !waited {
             count(&status.refused);
         }
-        let kept = kept.unwrap_or(Kept::Idle);
-        if kept == Kept::Took {
+        let kept = kept.unwrap_or(Saved::Idle);
+        if kept == Saved::Took {
             self.look_for_room();
         }
         kept
