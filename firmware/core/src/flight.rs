@@ -152,7 +152,7 @@ impl Stage {
 }
 
 /// The phases of a flight.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 #[expect(clippy::struct_excessive_bools, reason = "facts that have nothing to do with each other")]
 pub struct Flight {
     stage: Stage,
@@ -202,12 +202,12 @@ pub struct Flight {
     touch_mps: f32,
     /// When the force changed last; its load factor, and its part from above, g.
     felt_at: Instant,
-    load_g: f32,
+    load_g: Option<f32>,
     from_above_g: f32,
     /// Body rate, rad/s.
     rate_radps: f32,
     /// Its greatest height since it has had all its thrust, m, which fades; and when that was worked out last.
-    peak_m: f32,
+    peak_m: Option<f32>,
     peak_at: Instant,
     /// It was level while it was armed.
     stood: bool,
@@ -219,50 +219,8 @@ pub struct Flight {
 
 impl Flight {
     /// On the ground.
-    pub const fn grounded() -> Self {
-        Self {
-            stage: Stage::Ground,
-            airborne_since: None,
-            flew_at: None,
-            changing_since: None,
-            pressure: Pressure::UNKNOWN,
-            thrust: Thrust::UNKNOWN,
-            motion: Kinematics::UNKNOWN,
-            seen_disarmed: false,
-            seen_on_ground: false,
-            armed: false,
-            powered: false,
-            off_at: None,
-            beat_at: Instant::ZERO,
-            beat_height_m: None,
-            heard_at: Instant::ZERO,
-            first_at: None,
-            watch: None,
-            worst: [0.0; Kind::COUNT],
-            seen: None,
-            seen_at: Instant::ZERO,
-            on_bench: false,
-            falls: Lasting::NOT,
-            unloaded: Lasting::NOT,
-            tumbles: Lasting::NOT,
-            overturned: Lasting::NOT,
-            sinks: Lasting::NOT,
-            still_since: None,
-            flies_since: None,
-            supported: None,
-            shock: None,
-            hit_at: Instant::ZERO,
-            touch_mps: 0.0,
-            felt_at: Instant::ZERO,
-            load_g: 1.0,
-            from_above_g: 0.0,
-            rate_radps: 0.0,
-            peak_m: f32::NEG_INFINITY,
-            peak_at: Instant::ZERO,
-            stood: false,
-            tilted_at: None,
-            place: Place::UNKNOWN,
-        }
+    pub fn grounded() -> Self {
+        Self::default()
     }
 
     /// Whether it is in the air; in a mishap, whether it was.
@@ -418,7 +376,10 @@ impl Flight {
             || (was_hit && self.rate_radps < STILL_RADPS / 3.0);
         // Under a parachute it is carried, and goes down.
         let descends = self.pressure.steady_for(now).is_some_and(|span| span < RISES);
-        let is_still = is_slow && !descends && self.is_slow_to_turn() && STILL_G.contains(&self.load_g);
+        let is_still = is_slow
+            && !descends
+            && self.is_slow_to_turn()
+            && self.load_g.is_none_or(|load_g| STILL_G.contains(&load_g));
         self.still_since = if is_still { self.still_since.or(Some(now)) } else { None };
     }
 
@@ -503,7 +464,7 @@ impl Flight {
         (self.worst, self.seen) = ([0.0; Kind::COUNT], None);
         (self.watch, self.first_at) = (None, None);
         (self.shock, self.touch_mps, self.still_since, self.flies_since) = (None, 0.0, None, None);
-        self.place = Place::UNKNOWN;
+        self.place = Place::default();
     }
 
     /// The flight stays as it is.

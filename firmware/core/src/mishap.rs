@@ -66,8 +66,6 @@ pub struct Place {
 }
 
 impl Place {
-    pub(crate) const UNKNOWN: Self = Self { position: None, height_m: 0 };
-
     pub(crate) fn of(now: Instant, vehicle: &Vehicle) -> Self {
         let e7 = |degrees: f64| (degrees * 1e7) as i32;
         let global = vehicle.global.get().and_then(|global| global.position);

@@ -83,7 +83,7 @@ const RECEIVER_M: f32 = 3.0;
 const STRAYED: Span = Span::from_secs(5);
 
 /// The greatest value of the last half to whole second.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct WindowMax {
     now: f32,
     before: f32,
@@ -92,7 +92,6 @@ pub(crate) struct WindowMax {
 
 impl WindowMax {
     pub(crate) const SPAN: Span = Span::from_millis(600);
-    pub(crate) const NONE: Self = Self { now: 0.0, before: 0.0, window: Instant::ZERO };
 
     pub(crate) fn take(&mut self, at: Instant, value: f32) {
         if at.since(self.window) >= Self::SPAN {
@@ -113,7 +112,7 @@ impl WindowMax {
 }
 
 /// The estimator of motion: speeds of the last second, the place of arming, and whether the receiver stands.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Kinematics {
     pub(crate) speed: WindowMax,
     pub(crate) sink: WindowMax,
@@ -129,16 +128,6 @@ pub(crate) struct Kinematics {
 }
 
 impl Kinematics {
-    pub(crate) const UNKNOWN: Self = Self {
-        speed: WindowMax::NONE,
-        sink: WindowMax::NONE,
-        armed_m: None,
-        idle_m: None,
-        moved_at: None,
-        stood_at_m: 0.0,
-        strayed_at: None,
-    };
-
     /// The vehicle is armed here, or disarmed.
     pub(crate) fn arm(&mut self, now: Instant, vehicle: &Vehicle, armed: bool) {
         self.armed_m = height_m(now, vehicle).filter(|_| armed);

@@ -22,7 +22,7 @@ const SHOWN_S: f32 = 0.3;
 pub(crate) const NOISE_M: f32 = 0.8;
 
 /// The estimator of the pressure: the first barometer's values, and that at the arming.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Pressure {
     hpa: f32,
     changed_at: Instant,
@@ -37,16 +37,6 @@ pub(crate) struct Pressure {
 }
 
 impl Pressure {
-    pub(crate) const UNKNOWN: Self = Self {
-        hpa: 0.0,
-        changed_at: Instant::ZERO,
-        began_hpa: 0.0,
-        before_hpa: 0.0,
-        window: Instant::ZERO,
-        sank_at: Instant::ZERO,
-        armed_hpa: 0.0,
-    };
-
     /// Takes a pressure of the first barometer.
     pub(crate) fn take(&mut self, at: Instant, hpa: f32) {
         if !hpa.is_finite() || hpa <= 0.0 {
@@ -126,7 +116,7 @@ mod tests {
     fn a_height_is_right_at_sea_level_and_at_four_thousand_metres() {
         // ICAO standard atmosphere: pressures of two heights that are 20 m apart.
         for (from_hpa, to_hpa) in [(1_013.25, 1_010.85), (616.60, 614.98)] {
-            let mut pressure = Pressure::UNKNOWN;
+            let mut pressure = Pressure::default();
             pressure.take(Instant::from_millis(1_000), from_hpa);
             pressure.arm(Instant::from_millis(1_000), true);
             pressure.take(Instant::from_millis(2_000), to_hpa);
@@ -137,7 +127,7 @@ mod tests {
 
     #[test]
     fn a_stuck_barometer_has_no_height() {
-        let mut pressure = Pressure::UNKNOWN;
+        let mut pressure = Pressure::default();
         pressure.take(Instant::from_millis(1_000), 950.0);
         pressure.arm(Instant::from_millis(1_000), true);
         for at_ms in (1_000..20_000).step_by(200) {

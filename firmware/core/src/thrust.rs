@@ -31,7 +31,7 @@ pub(crate) enum Power {
 }
 
 /// The estimator of the thrust.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Thrust {
     hover: f32,
     hovered_s: f32,
@@ -43,9 +43,6 @@ pub(crate) struct Thrust {
 }
 
 impl Thrust {
-    pub(crate) const UNKNOWN: Self =
-        Self { hover: 0.0, hovered_s: 0.0, at: Instant::ZERO, driven_at: Instant::ZERO, has_flown: false };
-
     /// Armed anew, perhaps with another payload.
     pub(crate) fn forget(&mut self) {
         (self.hovered_s, self.has_flown) = (0.0, false);
@@ -103,7 +100,7 @@ mod tests {
 
     #[test]
     fn a_vehicle_that_hovers_with_little_throttle_is_carried_by_it() {
-        let mut thrust = Thrust::UNKNOWN;
+        let mut thrust = Thrust::default();
         assert_eq!(
             [0.05, 0.15, 0.4, 0.95].map(|part| thrust.power(part)),
             [Power::Idle, Power::Little, Power::Carries, Power::Full]

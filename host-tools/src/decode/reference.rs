@@ -150,7 +150,7 @@ impl Default for Reference {
 
 impl Reference {
     /// Nothing heard yet.
-    pub const fn new() -> Self {
+    pub fn new() -> Self {
         Self {
             vehicle: Vehicle::unknown(),
             flight: Flight::grounded(),

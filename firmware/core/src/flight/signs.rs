@@ -65,7 +65,7 @@ const FULL_ON_WINGS: f32 = 0.97;
 const SAMPLES: u8 = 3;
 
 /// How long something has been so, and in how many samples.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Lasting {
     since: Instant,
     samples: u8,
@@ -73,8 +73,6 @@ pub(super) struct Lasting {
 }
 
 impl Lasting {
-    pub(super) const NOT: Self = Self { since: Instant::ZERO, samples: 0, last: Instant::ZERO };
-
     /// For how long it has been so, once there were enough samples.
     fn take(&mut self, at: Instant, so: bool) -> Option<Span> {
         if !so {
@@ -191,16 +189,16 @@ impl Flight {
     fn take_force(&mut self, at: Instant, force: [MetresPerSecond2; 3], vehicle: &Vehicle, params: &Params) {
         let Some(load_g) = load_factor_g(force) else {
             // What is no force is no rest either.
-            self.load_g = f32::INFINITY;
+            self.load_g = Some(f32::INFINITY);
             return;
         };
         // A sensor that says the same again, or nothing but zeros, is no sensor that flies.
-        if load_g == 0.0 || load_g.to_bits() == self.load_g.to_bits() {
+        if load_g == 0.0 || self.load_g.is_some_and(|before| load_g.to_bits() == before.to_bits()) {
             return;
         }
         self.take_shock(at, load_g, vehicle, params);
         self.felt_at = at;
-        (self.load_g, self.from_above_g) = (load_g, force[2].0 / GRAVITY);
+        (self.load_g, self.from_above_g) = (Some(load_g), force[2].0 / GRAVITY);
         let falls = load_g < FALL_G && on_rotors(at, vehicle) && self.asks_for_thrust(at, vehicle);
         let least_s = params.get(Param::MisFallTime);
         if let Some(span) = self.falls.take(at, falls)
@@ -349,9 +347,9 @@ impl Flight {
     fn lose_height(&mut self, at: Instant, thrust: bool, vehicle: &Vehicle) -> f32 {
         let since_s = at.since(core::mem::replace(&mut self.peak_at, at)).as_secs_f32();
         let height_m = height_m(at, vehicle).filter(|_| thrust && self.powered);
-        let faded_m = self.peak_m - GLIDES_MPS * since_s;
-        self.peak_m = height_m.map_or(f32::NEG_INFINITY, |height_m| faded_m.max(height_m));
-        height_m.map_or(0.0, |height_m| self.peak_m - height_m)
+        let faded_m = self.peak_m.map(|peak_m| peak_m - GLIDES_MPS * since_s);
+        self.peak_m = height_m.map(|height_m| faded_m.map_or(height_m, |faded_m| faded_m.max(height_m)));
+        self.peak_m.zip(height_m).map_or(0.0, |(peak_m, height_m)| peak_m - height_m)
     }
 
     /// Whether the throttle asks for thrust; not known is yes. Thrown into the air to start (`ArduCopter`'s THROW), it falls.

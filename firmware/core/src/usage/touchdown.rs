@@ -58,7 +58,7 @@ mod tests {
 
     /// (seconds, sink) pieces from a height, at 5 Hz; then the vehicle stands.
     fn land(mut height_m: f32, pieces: &[(f32, f32)]) -> f32 {
-        let (mut touchdown, mut sink, mut now_ms) = (Touchdown::NONE, WindowMax::NONE, 0);
+        let (mut touchdown, mut sink, mut now_ms) = (Touchdown::NONE, WindowMax::default(), 0);
         for (seconds, sink_mps) in pieces {
             for _ in 0..(seconds * 5.0) as u32 {
                 now_ms += 200;
