@@ -3,7 +3,7 @@ use std::ops::Range;
 use std::path::PathBuf;
 
 use hums_blackbox::record::{Clock, FindingRecord, Keep, Mark, Note, Resting};
-use hums_blackbox::{Header, Record, Sector, SectorSink, Writer};
+use hums_blackbox::{GROUP_SECTORS, Header, Record, Sector, SectorSink, Writer};
 use hums_core::health::{Level, Subsystem};
 use hums_link::messages;
 use hums_link::packet::Fields;
@@ -478,7 +478,9 @@ fn a_moment_between_two_logs_of_a_power_on_is_a_pause_of_which_both_ends_are_tol
         let text = format!("{random:016x}{:016x}", random.rotate_left(29) ^ tenth);
         let note = Record::Note(Note { severity: 6, text: &text });
         writer.record(at, &note, &mut memory).expect("there is room");
-        if std::mem::replace(&mut groups, writer.counters().groups) != groups && from > 0 {
+        if std::mem::replace(&mut groups, writer.counters().sectors / GROUP_SECTORS as u64) != groups
+            && from > 0
+        {
             let keep = Record::Keep(Keep { all: false, from, seconds: 30 });
             writer.record(at, &keep, &mut memory).expect("there is room");
         }
@@ -860,7 +862,7 @@ fn a_search_reads_what_was_recorded_while_only_the_last_while_was_kept() {
             .record(at, &Record::Note(Note { severity: 6, text: &text }), &mut memory)
             .expect("there is room");
         // Each group says so.
-        if std::mem::replace(&mut groups, writer.counters().groups) != groups {
+        if std::mem::replace(&mut groups, writer.counters().sectors / GROUP_SECTORS as u64) != groups {
             let keep = Record::Keep(Keep { all: false, from: 0, seconds: 30 });
             writer.record(at, &keep, &mut memory).expect("there is room");
         }
