@@ -16,7 +16,6 @@ use hums_link as link;
 use crate::ending::Ending;
 use crate::followed::Logged;
 use crate::logs::{Log, marks};
-use crate::loss;
 use crate::mavlink::frame::{Check, Peek, peek};
 use crate::names::counter_name;
 use crate::part;
@@ -539,30 +538,6 @@ pub struct Overview {
 impl Logged for Overview {
     fn ending(&mut self) -> Option<&mut Ending> {
         Some(&mut self.ending)
-    }
-
-    fn follows(&mut self, sectors: u32, frames: Option<u32>) {
-        let summary = &mut self.ending.summary;
-        // Counted from the power-on on, or not counted, because nothing in the log tells where it began.
-        let lost = |gap: &Gap| {
-            let first = summary.first_number.filter(|first| sectors <= *first)?;
-            match loss::sectors_lost(gap) {
-                None => Some(first - sectors),
-                Some(lost) if first <= lost => Some(lost - sectors),
-                Some(_) => None,
-            }
-        };
-        let is_before = |gap: &&mut Gap| gap.from.is_none() && gap.cause != Cause::Disarmed;
-        let Some(gap) = self.contents.gaps.first_mut().filter(is_before) else { return };
-        let Some(lost) = lost(gap) else { return };
-        gap.sectors_lost = lost;
-        let all = gap.frames.or(summary.frames_before);
-        let before = gap.frames;
-        gap.frames = all.zip(frames).and_then(|(all, frames)| all.checked_sub(frames));
-        summary.frames_missing -= u64::from(before.unwrap_or(0));
-        summary.frames_missing += u64::from(gap.frames.unwrap_or(0));
-        summary.gaps_uncounted -= u64::from(before.is_none());
-        summary.gaps_uncounted += u64::from(gap.frames.is_none());
     }
 }
 

@@ -10,8 +10,8 @@ use serde::Serialize;
 use crate::cli;
 use crate::colour::level;
 use crate::ending::{
-    BlocksJson, EndJson, Ending, PowerOn, SessionBefore, among_words, behind_words, copies_words,
-    made_again_words, not_taken_words, unprotected_words,
+    BlocksJson, EndJson, Ending, SessionBefore, among_words, behind_words, copies_words, made_again_words,
+    not_taken_words, unprotected_words,
 };
 use crate::followed::Followed;
 use crate::info::json::images_json;
@@ -195,8 +195,6 @@ pub fn verdict(log: &Overview) -> Verdict {
 const END: &str = "end";
 /// The check of the session that was recorded before a log.
 const SESSION_BEFORE: &str = "session before";
-/// The check of how a log follows the one before it of the same power-on.
-const SAME_POWER_ON: &str = "same power-on";
 
 /// What of a session is to be judged: what is missing before or after that was left out on purpose.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -220,7 +218,7 @@ pub fn failed(log: &Overview, extent: Extent) -> Vec<(&'static str, String)> {
     let judged = LogJson::new(&log);
     let is_judged = |check: &Check| {
         check.failed > 0
-            && (extent.follows || ![SESSION_BEFORE, SAME_POWER_ON].contains(&check.name))
+            && (extent.follows || check.name != SESSION_BEFORE)
             && (extent.to_end || check.name != END)
     };
     let checks = judged.checks.into_iter().filter(is_judged);
@@ -268,9 +266,7 @@ fn without_before(mut log: Overview) -> Overview {
         summary.gaps -= 1;
         summary.frames_missing -= u64::from(gap.frames.unwrap_or(0));
         summary.gaps_uncounted -= u64::from(gap.frames.is_none());
-    } else if let Some(gap) =
-        log.contents.gaps.first_mut().filter(|gap| gap.from.is_none() && gap.cause != Cause::Disarmed)
-    {
+    } else if let Some(gap) = log.contents.gaps.first_mut().filter(|gap| gap.from.is_none()) {
         // Of what is missing before the first sector only that counts which has a place here.
         gap.sectors_lost = gap.sectors_lost.min(u32::try_from(others(all) + all.damaged).unwrap_or(u32::MAX));
         if let Some(frames) = gap.frames.take() {
@@ -344,7 +340,7 @@ impl LogJson {
             .map(|message| message.amount.count)
             .sum::<u64>()
             + contents.other_messages.count;
-        let gaps = || contents.gaps.iter().filter(|gap| gap.cause != Cause::Disarmed);
+        let gaps = || contents.gaps.iter();
         // Where nobody knows how many are missing it is one at least.
         let missing: u64 = gaps().map(|gap| u64::from(loss::sectors_lost(gap).unwrap_or(1))).sum();
         let useless: u64 = gaps().map(|gap| u64::from(gap.sectors_skipped)).sum();
@@ -403,7 +399,7 @@ impl LogJson {
 
 /// What a mere copy holds that is not of the session which it copies.
 fn beside_copy(ending: &Ending) -> Vec<Check> {
-    let (besides, files) = (ending.besides_copy(), ending.files.len() as u64);
+    let (besides, files) = (ending.besides(), ending.files.len() as u64);
     let check =
         Check { name: "files", checked: files, failed: besides.len() as u64, detail: besides.join("; ") };
     Some(check).filter(|check| check.failed > 0).into_iter().collect()
@@ -434,7 +430,7 @@ fn weakened(log: &Overview) -> Vec<Check> {
 }
 
 /// What the log says of its end and of its place.
-fn ends(log: &Overview) -> [Check; 8] {
+fn ends(log: &Overview) -> [Check; 7] {
     let ending = &log.ending;
     let summary = &ending.summary;
     let blocks = &summary.blocks;
@@ -451,14 +447,12 @@ fn ends(log: &Overview) -> [Check; 8] {
     let (before_checked, before_failed) = match ending.before {
         SessionBefore::NotNamed | SessionBefore::NotLookedFor(_) => (0, 0),
         SessionBefore::There => (1, 0),
-        SessionBefore::Gone(_) | SessionBefore::Elsewhere { .. } => (1, 1),
+        SessionBefore::Gone(_) => (1, 1),
     };
     let before = match ending.before {
         SessionBefore::NotNamed => "it names none".to_owned(),
         SessionBefore::NotLookedFor(number) => format!("session {number:05} is not among what was read"),
-        SessionBefore::There | SessionBefore::Gone(_) | SessionBefore::Elsewhere { .. } => {
-            gone.unwrap_or_default()
-        }
+        SessionBefore::There | SessionBefore::Gone(_) => gone.unwrap_or_default(),
     };
     let strange = ending.strange();
     let holds = ending.proof.holds() && !newer && ending.noise().is_none();
@@ -471,42 +465,14 @@ fn ends(log: &Overview) -> [Check; 8] {
         check("end marks", summary.marks.count, summary.marks.wrong, String::new()),
         check(END, 1, u64::from(!holds), format!("{}; {behind}{among}", ending.words())),
         check(SESSION_BEFORE, before_checked, before_failed, before),
-        power_on(ending.power_on),
     ]
 }
 
-/// How it follows the log before it of the same power-on.
-fn power_on(power_on: PowerOn) -> Check {
-    let wrong = power_on.wrong();
-    let checked = u64::from(!matches!(power_on, PowerOn::First | PowerOn::NotRead));
-    let detail = wrong.clone().unwrap_or_else(|| power_on.words().to_owned());
-    Check { name: SAME_POWER_ON, checked, failed: u64::from(wrong.is_some()), detail }
-}
-
 fn gaps_detail(log: &Overview) -> String {
-    let not_kept = match log.ending.summary.not_kept {
-        0 => String::new(),
-        times => format!("not recorded while disarmed: {}{}; ", count(times, "time"), kept_words(log)),
-    };
     match log.ending.summary.gaps {
-        0 => not_kept,
-        gaps => format!("{}; {not_kept}", count(gaps, "gap")),
+        0 => String::new(),
+        gaps => count(gaps, "gap"),
     }
-    .trim_end_matches("; ")
-    .to_owned()
-}
-
-/// What is known of where a log begins that lacks what came before.
-fn kept_words(log: &Overview) -> String {
-    let summary = &log.ending.summary;
-    let Some(keep) = summary.keep else { return String::new() };
-    if summary.is_cut {
-        return format!(
-            " (all files of the ring were full: less than the last {} s may be kept)",
-            keep.seconds
-        );
-    }
-    format!(" (the last {} s at least are kept; whether more was kept, nothing tells)", keep.seconds)
 }
 
 fn newer(log: &Overview) -> String {
@@ -540,73 +506,9 @@ fn losses_detail(log: &Overview) -> String {
 mod tests {
     use std::fs;
 
-    use hums_blackbox::record::{Keep, Note};
-    use hums_blackbox::{GROUP_SECTORS, Record, Sector, Writer};
-    use hums_core::clock::Instant;
+    use hums_blackbox::Sector;
 
     use super::*;
-    use crate::followed::Logged;
-    use crate::logs::memory::Memory;
-
-    /// A power-on from its second group on, which says from which of its sectors on all was kept.
-    fn second_log(before: u32) -> Overview {
-        let (mut memory, mut writer) = (Memory::default(), Box::new(Writer::new()));
-        let (mut groups, mut starts) = (0, Vec::new());
-        for tenth in 0..3_000_u64 {
-            let at = Instant::from_millis(tenth * 100);
-            let random = tenth.wrapping_mul(0x9E37_79B9_7F4A_7C15);
-            let text = format!("{random:016x}{:016x}", random.rotate_left(29));
-            writer.record(at, &Record::Note(Note { severity: 6, text: &text }), &mut memory).expect("room");
-            if std::mem::replace(&mut groups, writer.counters().sectors / GROUP_SECTORS as u64) != groups {
-                let start = writer.counters().sectors as u32;
-                starts.push(start as usize);
-                let keep = Record::Keep(Keep { all: true, from: start.saturating_sub(before), seconds: 30 });
-                writer.record(at, &keep, &mut memory).expect("room");
-            }
-        }
-        writer.finish(&mut memory);
-        let sectors = memory.0;
-        let start = starts.iter().copied().find(|start| *start >= GROUP_SECTORS / 2).expect("a second group");
-        assert!(Sector::from_bytes(sectors[start]).starts_group());
-        let dir = tempfile::tempdir().expect("a folder");
-        fs::write(dir.path().join("00002_00.HUM"), sectors[start..].concat()).expect("room");
-        let found = logs::find(&[dir.path().to_owned()], false).expect("a log");
-        Overview::verified(&found.logs[0]).expect("it reads")
-    }
-
-    #[test]
-    fn what_the_logs_before_have_of_a_power_on_is_not_missing() {
-        let whole = second_log(0);
-        assert_eq!((whole.contents.gaps.len(), whole.ending.summary.not_kept), (0, 0));
-        // Of what is, nothing tells how many frames it had.
-        let late = second_log(5);
-        let gap = late.contents.gaps[0];
-        assert_eq!((gap.sectors_lost, gap.frames, late.ending.summary.gaps_uncounted), (5, None, 1));
-        // Where nothing tells where it began, the log before does.
-        let mut lost = Overview::default();
-        lost.contents.gaps.push(Gap { sectors_lost: 628, frames: Some(70), ..gap });
-        let summary = &mut lost.ending.summary;
-        (summary.first_number, summary.gaps, summary.frames_missing) = (Some(628), 1, 70);
-        let unknown = |lost: &Overview| {
-            let mut lost = lost.clone();
-            (lost.contents.gaps[0].sectors_lost, lost.contents.gaps[0].frames) = (0, None);
-            let summary = &mut lost.ending.summary;
-            (summary.frames_before, summary.frames_missing, summary.gaps_uncounted) = (Some(70), 0, 1);
-            assert_eq!(loss::sectors_lost(&lost.contents.gaps[0]), None);
-            lost
-        };
-        for (lost, frames, expected) in [
-            (lost.clone(), Some(50), (Some(20), 20, 0)),
-            (lost.clone(), None, (None, 0, 1)),
-            (unknown(&lost), Some(50), (Some(20), 20, 0)),
-        ] {
-            let mut lost = lost.clone();
-            Logged::follows(&mut lost, 100, frames);
-            let (gap, summary) = (&lost.contents.gaps[0], &lost.ending.summary);
-            assert_eq!(gap.sectors_lost, 528);
-            assert_eq!((gap.frames, summary.frames_missing, summary.gaps_uncounted), expected);
-        }
-    }
 
     #[test]
     fn a_log_that_cannot_be_read_keeps_no_other_from_being_read() {

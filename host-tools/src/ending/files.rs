@@ -1,15 +1,14 @@
-//! What of a log's files is not the log's, and what lies behind its last sector.
+//! Which sectors of a log's files are not of the log, which files are not there, and what lies behind its last sector.
 
 use std::path::Path;
 
 use hums_blackbox::{BlockCounts, PAGE_SECTORS};
 
 use super::proof::Proof;
-use crate::hex::hex;
 use crate::logs::naming::is_part;
 use crate::logs::reader::Summary;
 use crate::logs::segment_name;
-use crate::logs::strangers::{Others, Shift, Strange};
+use crate::logs::strangers::Strange;
 use crate::plural::{are, count};
 
 /// Clocks of two power-ons differ by more than this, or say nothing about which one was first: microseconds.
@@ -60,7 +59,7 @@ impl Files<'_> {
         ))
     }
 
-    /// Files that hold what is not the log's, and files that are missing before its first one.
+    /// Which sectors of its files are not of the log, and which of its files are not there.
     pub(super) fn strange(&self) -> Vec<String> {
         let parts = self.names.iter().filter(|name| is_part(Path::new(name)));
         let part_words = |name: &String| {
@@ -69,140 +68,84 @@ impl Files<'_> {
                  brings what the card has"
             )
         };
-        let parts: Vec<_> = parts.map(part_words).collect();
-        let told: Vec<_> = self.summary.strange.iter().filter(|strange| !self.is_usual(strange)).collect();
-        let strange = told.iter().take(NAMED_MAX).map(|strange| self.strange_words(strange));
-        let mut all: Vec<_> = parts.into_iter().chain(strange).collect();
-        if told.len() > NAMED_MAX {
-            all.push(format!("so it is with {} more of its files", told.len() - NAMED_MAX));
-        }
-        let gone = self.summary.files_gone;
-        if gone > 0 {
-            all.push(format!(
-                "the first {} of it {} not there: the recorder overwrites the oldest ones when a card is full; else they \
-                 were taken away",
-                count(gone, "file"),
-                if gone == 1 { "is" } else { "are" }
-            ));
-        }
-        all.extend(self.joined());
-        all.extend(self.misnumbered());
+        let mut all: Vec<_> = parts.map(part_words).collect();
+        all.extend(self.empty());
+        all.extend(self.others());
+        all.extend(self.missing());
         all
     }
 
-    /// What other logs its files hold, which are not read.
+    /// Files without a sector. One that the next start found empty was made when the power went; the card refused one between
+    /// sectors that follow each other, or was out.
+    fn empty(&self) -> Option<String> {
+        let is_usual = |strange: &Strange| {
+            let is_between = strange.file + 1 < self.names.len() && self.summary.gaps == 0;
+            is_between || matches!(self.proof, Proof::NextStart(None))
+        };
+        let is_told = |strange: &&Strange| strange.hollow && strange.sectors == 0 && !is_usual(strange);
+        let mut told = self.summary.strange.iter().filter(is_told);
+        let name = told.next().and_then(|strange| self.names.get(strange.file))?;
+        let more = match told.count() {
+            0 => String::new(),
+            more => format!(", and {} more", count(more as u64, "file")),
+        };
+        Some(format!("{name} has the name of a segment and holds nothing of ours{more}"))
+    }
+
+    /// Sectors of its files that are not of the log.
     pub(super) fn others(&self) -> Vec<String> {
-        let is_other = |strange: &&Strange| strange.others.is_some() && !self.is_usual(strange);
-        let strange = self.summary.strange.iter().filter(is_other).map(|strange| self.strange_words(strange));
-        strange.chain(self.joined()).chain(self.newer()).collect()
-    }
-
-    /// A file that the next start found empty was made when the power went; so was one that was to be written anew, which
-    /// still holds what it held before. One between sectors that follow each other got nothing: the card refused it, or was out.
-    fn is_usual(&self, strange: &Strange) -> bool {
-        let is_empty = strange.hollow && matches!(self.proof, Proof::NextStart(None) | Proof::NextLog);
-        match strange.others {
-            Some(others) => is_empty && self.is_begun_anew(strange, &others),
-            None if strange.shift.is_some() => false,
-            None => {
-                is_empty || strange.passed || strange.older && self.is_last(strange) && !self.summary.closed
-            }
+        let is_told = |strange: &&Strange| strange.sectors > 0 && !self.is_begun_anew(strange);
+        let told: Vec<_> = self.summary.strange.iter().filter(is_told).collect();
+        let words = |strange: &&Strange| {
+            format!(
+                "{} of {} not of this log (the first at block {}, of session {:08x}): only this log is read",
+                count(strange.sectors, "sector"),
+                self.names.get(strange.file).map_or("a file", String::as_str).to_owned()
+                    + if strange.sectors == 1 { " is" } else { " are" },
+                strange.first,
+                strange.session
+            )
+        };
+        let mut all: Vec<_> = told.iter().copied().take(NAMED_MAX).map(|strange| words(&strange)).collect();
+        if told.len() > NAMED_MAX {
+            all.push(format!("so it is with {} more of its files", told.len() - NAMED_MAX));
         }
+        all.extend(self.newer());
+        all
     }
 
-    fn is_last(&self, strange: &Strange) -> bool {
-        strange.file + 1 == self.names.len()
+    /// Whether the last file was to be written anew when power went, and still holds another session from its beginning on. Its
+    /// first sector may be torn.
+    fn is_begun_anew(&self, strange: &Strange) -> bool {
+        let is_last = strange.file + 1 == self.names.len();
+        strange.hollow && is_last && strange.first <= 1 && matches!(self.proof, Proof::NextStart(None))
     }
 
-    /// Whether all that a file holds is another log from its beginning on, as of one that was to be written anew, and what
-    /// that one had not written over. Its first sector may be torn.
-    fn is_begun_anew(&self, strange: &Strange, others: &Others) -> bool {
-        strange.hollow && self.is_last(strange) && others.first <= 1
-    }
-
-    /// Another log of the same power-on is in its files.
-    fn joined(&self) -> Option<String> {
-        self.summary.joined.map(|joined| {
-            let (place, of) = if joined.is_within {
-                ("in one of its files", "another file")
-            } else {
-                ("behind its end", "a later log")
-            };
-            format!(
-                "{} {place}, from number {} on, of {of} of the same power-on: logs were joined into one file; only the \
-                 first is read: give each by itself",
-                are(joined.sectors, "sector"),
-                joined.first
-            )
-        })
-    }
-
-    /// Names of its files that do not follow each other. The recorder numbers them one by one, and only the first ones may
-    /// be missing.
-    fn misnumbered(&self) -> Option<String> {
+    /// Files of the log that are not there: the first ones, or those between two.
+    fn missing(&self) -> Option<String> {
         let segment = |name: &String| segment_name(Path::new(name)).map(|name| name.segment);
-        let first = self.names.first().filter(|_| self.summary.is_renamed).map(|file| {
-            format!(
-                "{file} begins as the first file of its log, and has not the number of one: files were renamed, or nothing came into \
-                 those before it"
-            )
-        });
         // Where the card was out, or refused what came, a file may have been begun into which nothing came: it is not copied.
         let is_passed = self.summary.gaps == 0 && self.summary.marks.has_card_trouble();
-        let jump = || {
+        let between = || {
             self.names.iter().zip(self.names.iter().skip(1)).find_map(|(before, after)| {
-                let (before_number, number) = (segment(before)?, segment(after)?);
-                let follows = before_number.checked_add(1)? == number || is_passed && before_number < number;
-                (!follows).then(|| {
-                    format!("no file is there between {before} and {after}: one was taken away, or files were renamed")
-                })
+                let (first, end) = (segment(before)?.checked_add(1)?, segment(after)?);
+                (first < end && !is_passed).then_some((first, end))
             })
         };
-        first.or_else(jump)
-    }
-
-    fn strange_words(&self, strange: &Strange) -> String {
-        let file = self.names.get(strange.file).map_or("a file", String::as_str);
-        match strange.others {
-            None if strange.older => {
-                format!(
-                    "all sectors in {file} are older than the log's first one: files were renamed or exchanged"
-                )
-            }
-            None => match strange.shift {
-                Some(Shift { at, blocks }) => format!(
-                    "from block {at} of {file} on its sectors lie {} too far back: something was put before them",
-                    count(blocks, "block")
-                ),
-                None => format!("{file} has the name of a segment and holds nothing of ours"),
-            },
-            Some(others) if strange.hollow => format!(
-                "{file} has the name of a segment of this log and holds {}{}{}",
-                count(others.sectors, "sector"),
-                of_whom(&others),
-                if self.is_begun_anew(strange, &others) {
-                    ": the recorder had just begun to write it anew when power went, or files were exchanged"
-                } else {
-                    ""
-                }
-            ),
-            Some(others) => format!(
-                "sectors {} to {} of {file} are{}: logs were joined into one file, or it was made where a deleted log \
-                 lay; only this log is read: give each by itself",
-                others.first,
-                others.last,
-                of_whom(&others)
-            ),
-        }
+        let gone = Some((0, self.summary.files_gone)).filter(|(first, end)| first < end);
+        let (first, end) = gone.or_else(between)?;
+        Some(match end - first {
+            1 => format!("file {first:02} of this log is not there"),
+            _ => format!("files {first:02} to {:02} of this log are not there", end - 1),
+        })
     }
 
     /// Sectors of a session that began later lie where a recycled file may have older ones.
     pub(super) fn newer(&self) -> Option<String> {
-        let told = self.summary.strange.iter().any(|strange| strange.others.is_some());
+        let told = self.summary.strange.iter().any(|strange| strange.sectors > 0);
         (self.has_newer() && !told).then(|| {
             format!(
-                "{} of other sessions, of which one began later by its clock: logs were joined into one file; only this \
-                 log is read: give each by itself",
+                "{} not of this log, and of a session that began later: only this log is read",
                 are(self.summary.blocks.stale, "sector")
             )
         })
@@ -215,13 +158,6 @@ impl Files<'_> {
             self.summary.other_epoch_us.zip(self.summary.epoch_us.filter(|epoch| *epoch >= EARLIEST_US));
         both.is_some_and(|(other, own)| other > own.saturating_add(EPOCH_SLACK_US))
     }
-}
-
-/// Whose sectors they are.
-fn of_whom(others: &Others) -> String {
-    let board = others.board.map_or_else(String::new, |board| format!("box {}, ", hex(&board)));
-    let several = if others.several { ", and of more" } else { "" };
-    format!(" of another session ({board}session {:08x}{several})", others.session)
 }
 
 /// That a block is no sector of a log.
@@ -274,39 +210,33 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_stranger_is_named_by_box_and_session() {
-        let others = Others {
-            sectors: 300,
-            first: 400,
-            last: 699,
-            session: 0x1a2b_3c4d,
-            board: Some([0x3f; 12]),
-            several: false,
+    fn sectors_of_another_log_are_counted_with_the_first_ones_place() {
+        let words = |hollow, proof| {
+            let strange = vec![Strange { file: 0, hollow, sectors: 300, first: 1, session: 0x1a2b_3c4d }];
+            let summary = Summary { session: Some(7), strange, ..Summary::default() };
+            let names = ["00001_00.HUM".to_owned()];
+            Files { names: &names, summary: &summary, proof }.strange().join("; ")
         };
-        let words = |hollow| {
-            let strange = vec![Strange {
-                file: 0,
-                hollow,
-                passed: false,
-                older: false,
-                others: Some(others),
-                shift: None,
-            }];
-            let summary = Summary { strange, ..Summary::default() };
-            Files { names: &["00001_00.HUM".to_owned()], summary: &summary, proof: Proof::None }
-                .strange()
-                .join("")
+        let told = "300 sectors of 00001_00.HUM are not of this log (the first at block 1, of session 1a2b3c4d): only this log is read";
+        assert_eq!([words(false, Proof::None), words(true, Proof::None)], [told, told]);
+        assert_eq!(words(true, Proof::NextStart(None)), "", "the next start found it so");
+    }
+
+    #[test]
+    fn files_that_are_not_there_are_named() {
+        let words = |names: &[&str], files_gone| {
+            let names: Vec<String> = names.iter().map(|name| (*name).to_owned()).collect();
+            let summary = Summary { session: Some(7), files_gone, ..Summary::default() };
+            Files { names: &names, summary: &summary, proof: Proof::None }.strange().join("; ")
         };
-        let [joined, hollow] = [false, true].map(words);
-        let whom = "of another session (box 3f3f3f3f3f3f3f3f3f3f3f3f, session 1a2b3c4d)";
-        assert!(joined.starts_with(&format!("sectors 400 to 699 of 00001_00.HUM are {whom}: ")), "{joined}");
-        assert!(hollow.ends_with(&format!("holds 300 sectors {whom}")), "{hollow}");
+        assert_eq!(words(&["00001_03.HUM"], 3), "files 00 to 02 of this log are not there");
+        assert_eq!(words(&["00001_00.HUM", "00001_02.HUM"], 0), "file 01 of this log is not there");
     }
 
     #[test]
     fn a_number_that_no_file_has_is_no_finding_where_the_card_took_nothing_and_nothing_is_missing() {
         let strange = |second: &str, card_out, gaps| {
-            let mut summary = Summary { gaps, ..Summary::default() };
+            let mut summary = Summary { session: Some(7), gaps, ..Summary::default() };
             summary.marks.card_out = card_out;
             let names = ["00001_00.HUM", second].map(str::to_owned);
             Files { names: &names, summary: &summary, proof: Proof::None }.strange().len()

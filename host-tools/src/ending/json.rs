@@ -11,7 +11,7 @@ use crate::utc::iso8601;
 /// The end of a log as JSON.
 #[derive(Debug, Serialize)]
 pub struct EndJson {
-    /// What proves it: `closed`, `next_start`, `next_log`, `mark`, `none`, `short`.
+    /// What proves it: `closed`, `next_start`, `mark`, `none`, `short`.
     proof: &'static str,
     /// The same in words.
     words: String,

@@ -1,12 +1,12 @@
 //! A log that was read: what tells whether it is whole.
 
 use super::files::{Files, behind_words};
-use super::place::{Misnamed, PowerOn, SessionBefore};
+use super::place::SessionBefore;
 use super::proof::Proof;
 use crate::logs::Log;
 use crate::logs::begun_anew::BegunAnew;
 use crate::logs::reader::Summary;
-use crate::logs::sessions::{Beginning, again_words};
+use crate::logs::sessions::again_words;
 use crate::logs::strangers::Strange;
 use crate::plural::{are, count, noun};
 
@@ -23,16 +23,10 @@ pub struct Ending {
     pub proof: Proof,
     /// What became of the session that was recorded on the card just before this one.
     pub before: SessionBefore,
-    /// How it follows the log before it of the same power-on, where it was recorded by arming.
-    pub power_on: PowerOn,
-    /// What of its name disagrees with what the logs hold.
-    pub misnamed: Option<Misnamed>,
     /// Power went when the recorder began to write its file anew, which holds what it held before.
     pub begun_anew: Option<BegunAnew>,
     /// The name of the log of which it is a mere copy.
     pub again: Option<String>,
-    /// All of it is in another log, which goes on.
-    pub beginning: Option<Beginning>,
     /// It is what newer sessions left of one that no file holds any more.
     pub left_over: bool,
 }
@@ -48,14 +42,6 @@ impl Ending {
     /// How the log ends, as a part of a sentence.
     pub fn words(&self) -> String {
         self.proof.words(&self.summary)
-    }
-
-    /// The number under which the same session is there too, of a log that is not to be counted again.
-    pub const fn copy_of(&self) -> Option<u32> {
-        match self.misnamed {
-            Some(Misnamed::Copy { of }) => Some(of),
-            _ => None,
-        }
     }
 
     /// What it is, where it is no log of its own whose losses count: a mere copy of another one, what is left over of a
@@ -84,12 +70,12 @@ impl Ending {
 
     /// Whether it is to be counted: its session is not there under another name.
     pub const fn is_counted(&self) -> bool {
-        self.copy_of().is_none() && self.again.is_none() && self.beginning.is_none()
+        self.again.is_none()
     }
 
     /// Whether logs that were recorded before it on its card are not among what was read.
     pub const fn is_without_earlier(&self) -> bool {
-        matches!(self.before, SessionBefore::NotLookedFor(_)) || matches!(self.power_on, PowerOn::NotRead)
+        matches!(self.before, SessionBefore::NotLookedFor(_))
     }
 
     /// Whether nothing was lost or damaged, and the log is proved to its end or at least to its last end mark.
@@ -131,7 +117,7 @@ impl Ending {
     /// log's. What is missing in a mere copy is said of its original, and what it holds besides is said of it.
     pub fn unproved(&self) -> Vec<String> {
         if self.aside().is_some() {
-            return self.besides_copy();
+            return self.besides();
         }
         let mut all = Vec::new();
         if let Some(anew) = self.begun_anew {
@@ -176,22 +162,13 @@ impl Ending {
         all.extend(self.contradicted());
         all.extend(self.noise());
         all.extend(self.strange());
-        all.extend(self.file().newer());
         all.extend(self.before.gone());
-        all.extend(self.power_on.wrong());
         all
     }
 
-    /// What a mere copy holds that is not of the session which it copies: another log, which is not read; and that its name is
-    /// another session's or another box's.
-    pub fn besides_copy(&self) -> Vec<String> {
-        if self.again.is_none() {
-            return Vec::new();
-        }
-        let is_of_name =
-            |misnamed: &Misnamed| matches!(misnamed, Misnamed::Session { .. } | Misnamed::Board { .. });
-        let named = self.misnamed.filter(is_of_name).map(Misnamed::words);
-        self.file().others().into_iter().chain(named).collect()
+    /// Sectors of a mere copy's files that are not of the session which it copies.
+    pub fn besides(&self) -> Vec<String> {
+        if self.again.is_some() { self.file().others() } else { Vec::new() }
     }
 
     /// The next start found sectors of this session in the log's last file. Whether that has none of the log's own, because it
@@ -200,8 +177,7 @@ impl Ending {
         let last = self.files.len().saturating_sub(1);
         let strange = &mut self.summary.strange;
         let is_it = |strange: &Strange| {
-            let others = strange.others.filter(|others| others.session == session && !others.several);
-            strange.hollow && strange.file == last && last > 0 && others.is_some()
+            strange.hollow && strange.file == last && last > 0 && strange.session == session
         };
         let before = strange.len();
         strange.retain(|strange| !is_it(strange));
@@ -222,12 +198,9 @@ impl Ending {
         self.file().contradicted()
     }
 
-    /// What of its files is not the log's, and what of its name.
+    /// Which sectors of its files are not of the log, and which of its files are not there.
     pub fn strange(&self) -> Vec<String> {
-        let mut all = self.file().strange();
-        all.extend(self.misnamed.map(Misnamed::words));
-        all.extend(self.beginning.as_ref().map(Beginning::words));
-        all
+        self.file().strange()
     }
 
     /// Whether sectors of a session that began later lie in the log's files.

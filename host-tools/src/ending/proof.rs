@@ -15,14 +15,12 @@ pub enum Proof {
     /// The next start on the card found that it ends there; with when the vehicle was armed or took off, if power went
     /// then: what the card did not take any more nobody knows.
     NextStart(Option<Instant>),
-    /// The next log of the same power-on begins where it ends, or as much later as a vehicle that waited did not keep.
-    NextLog,
     /// It is whole to its last end mark.
     Mark(Instant, Resting),
     /// Nothing: it has no end mark, or the vehicle was armed or took off after the last one.
     #[default]
     None,
-    /// The next start, or the next log of the same power-on, found as many sectors and frames, and they were others.
+    /// The next start found as many sectors and frames, and they were others.
     Differs,
     /// There was more than is there now: so many sectors, and frames where they were counted.
     Short {
@@ -40,8 +38,6 @@ pub enum Proof {
 pub enum Teller {
     /// The next start on the card.
     NextStart,
-    /// The next log of the same power-on, which was recorded by arming.
-    NextLog,
     /// Its own parity, which covers sectors once they are on the card.
     Parity,
 }
@@ -90,14 +86,13 @@ impl Proof {
 
     /// Whether all of the end is proved.
     pub const fn is_whole(self) -> bool {
-        matches!(self, Self::Closed | Self::NextStart(None) | Self::NextLog)
+        matches!(self, Self::Closed | Self::NextStart(None))
     }
 
     pub(super) const fn name(self) -> &'static str {
         match self {
             Self::Closed => "closed",
             Self::NextStart(_) => "next_start",
-            Self::NextLog => "next_log",
             Self::Mark(..) => "mark",
             Self::None => "none",
             Self::Differs => "differs",
@@ -114,9 +109,6 @@ impl Proof {
                 "nothing was written into it, as the next start found".to_owned()
             }
             Self::NextStart(None) => "whole to its end, as the next start found it".to_owned(),
-            Self::NextLog => {
-                "whole as far as it was to be kept: the next log of the same power-on goes on".to_owned()
-            }
             Self::NextStart(Some(moved)) => format!(
                 "whole to its end, as the next start found it; armed or in the air since {} when power went: what was \
                  not written then is not known",
@@ -151,7 +143,6 @@ impl Proof {
                 let frames = frames.map(|some| count(some, "frame"));
                 let by = match by {
                     Teller::NextStart => "the next start found them",
-                    Teller::NextLog => "the next log of the same power-on begins after them",
                     Teller::Parity => "its parity tells of them",
                 };
                 match (sectors, frames) {

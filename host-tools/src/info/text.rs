@@ -15,7 +15,7 @@ use super::{usage, wear};
 use crate::check::causes::causes;
 use crate::colour::level;
 use crate::ending::{
-    PowerOn, among_words, behind_words, copies_words, made_again_words, not_taken_words, unprotected_words,
+    among_words, behind_words, copies_words, made_again_words, not_taken_words, unprotected_words,
 };
 use crate::logs;
 use crate::logs::begun_anew::BegunAnew;
@@ -138,7 +138,7 @@ fn ending(text: &mut String, log: &Overview) {
         let _ = writeln!(text, "  before   {gone}");
     }
     let anew = ending.begun_anew.map(BegunAnew::words);
-    for words in ending.aside().or(anew).into_iter().chain(ending.power_on.wrong()) {
+    if let Some(words) = ending.aside().or(anew) {
         let _ = writeln!(text, "  place    {words}");
     }
     for strange in ending.contradicted().into_iter().chain(ending.noise()).chain(ending.strange()) {
@@ -283,18 +283,7 @@ fn gaps_text(text: &mut String, log: &Overview) {
     if !own {
         return foreign_gaps(text, log);
     }
-    for gap in contents.gaps.iter().filter(|gap| gap.cause == Cause::Disarmed).take(SHOWN_MAX) {
-        let time = |at: Option<Instant>| moment(at.unwrap_or(Instant::ZERO));
-        // Before a later log of a power-on are the logs before.
-        let is_later =
-            summary.keep.is_some_and(|keep| keep.from > 0) || log.ending.power_on == PowerOn::Follows;
-        let from = match gap.from {
-            None if is_later => "since the log before".to_owned(),
-            from => format!("from {}", time(from)),
-        };
-        let _ = writeln!(text, "    {from} to {}: not recorded: disarmed", time(gap.to));
-    }
-    for gap in contents.gaps.iter().filter(|gap| gap.cause != Cause::Disarmed).take(SHOWN_MAX) {
+    for gap in contents.gaps.iter().take(SHOWN_MAX) {
         let time = |at: Option<Instant>, none: &str| at.map_or_else(|| none.to_owned(), moment);
         let frames = gap
             .frames

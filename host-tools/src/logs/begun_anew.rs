@@ -12,10 +12,11 @@ use hums_blackbox::record::{Before, Found};
 use hums_blackbox::{Header, Sector};
 
 use super::groups::at_beginning;
-use super::joined::HEAD;
 use super::places::Log;
 use super::reader::likely_epoch;
 
+/// How a sector's bytes begin.
+const HEAD: [u8; 2] = [b'H', 0xb0 | hums_blackbox::VERSION];
 /// Blocks from a file's beginning in which a start finds a sector, or passes the file over (`PROBE_BLOCKS` of the recorder).
 const PROBE_BLOCKS: usize = 9;
 /// Files that a start looks at (`SEGMENTS_MAX` of the recorder), so a power-on's first log is so many numbers at most behind the

@@ -9,12 +9,10 @@ use anyhow::{Context as _, Result, bail};
 use super::card::{image, whole_file};
 use super::folder::directory;
 pub use super::found::{Found, Image, REMARKS_MAX};
-use super::late::leftovers;
 pub use super::look::{Content, look};
 use super::naming::{SegmentName, is_part, segment_or_part};
 use super::places::Log;
 use crate::files::{is_seekable, why_unread};
-use crate::plural::count;
 
 /// Finds all logs in `inputs`; with `salvage` by looking at every block of an image, whatever its file system says. An
 /// error where one of them has none.
@@ -73,7 +71,6 @@ fn search(inputs: &[PathBuf], salvage: bool, none: impl Fn(&Path) -> Result<()>)
         }
     }
     found.add(as_in_folders(segments));
-    set_leftovers_aside(&mut found)?;
     make_names_unique(&mut found.logs);
     found.finish();
     Ok(found)
@@ -151,31 +148,6 @@ fn as_in_folders(segments: Segments) -> Vec<Log> {
         }
     }
     logs
-}
-
-/// Takes those files from the logs that the ring of a vehicle which waits for its arming has given away since they were copied.
-fn set_leftovers_aside(found: &mut Found) -> Result<()> {
-    let mut words = Vec::new();
-    for log in &mut found.logs {
-        let left = leftovers(log)?;
-        log.pieces.drain(..left);
-        let files: Vec<_> = log.files.drain(..left).collect();
-        if let [first, ..] = &files[..] {
-            let (more, hold) = match left {
-                1 => (String::new(), "holds"),
-                _ => (format!(" and {} after it", count(left as u64 - 1, "file")), "hold"),
-            };
-            words.push(format!(
-                "{first}{more} {hold} what was recorded while disarmed and was not kept: the recorder has given it away since, so that it is \
-                 none of log {} any more, and is not read with it; named alone it is read",
-                log.name
-            ));
-        }
-    }
-    for words in words {
-        found.remark(words);
-    }
-    Ok(())
 }
 
 /// Two cards both have a session 1: the later ones get a number.

@@ -1,13 +1,10 @@
 //! A log's blocks as groups of sectors, each of which decodes by itself: the unit of parallel work.
 
-use std::collections::VecDeque;
-
 use anyhow::Result;
 use hums_blackbox::record::Boot;
-use hums_blackbox::{Assembler, BlockCounts, GROUP_SECTORS, Header, Sector, Step};
+use hums_blackbox::{Assembler, BlockCounts, GROUP_SECTORS, Sector, Step};
 
-use super::board::{Board, HEADING_GROUPS, find_boot, heading};
-use super::joined::{Found, Joints};
+use super::board::{HEADING_GROUPS, find_boot};
 use super::places::{BLOCK_BYTES, Blocks, Log};
 use super::repair::{Evidence, Repairs};
 use super::strangers::{Strange, Strangers};
@@ -21,39 +18,6 @@ fn is_empty(block: &[u8; BLOCK_BYTES]) -> bool {
     block.as_chunks().0.iter().all(|piece| *piece == [0; 32])
 }
 
-/// The groups with which a file begins lie within so many blocks: a sector in progress may be there twice, and some of an older
-/// file between.
-const HEADING_BLOCKS: u64 = (4 * HEADING_GROUPS * GROUP_SECTORS) as u64;
-
-/// Who recorded the file that begins at this block of the one that `blocks` are of, if one begins there, and no page of a log whose
-/// sectors go on behind it from the `last` one.
-fn begins_at(blocks: &Blocks<'_>, mut at: u64, last: Option<Found>) -> Result<Option<Board>> {
-    let rest = blocks.from(at, HEADING_BLOCKS);
-    if let Some(last) = last {
-        let mut rest = rest.blocks();
-        let blocks = std::iter::from_fn(|| {
-            let block = rest.next_block().transpose()?;
-            at += 1;
-            Some(block.map(|block| (at - 1, *block)))
-        });
-        if last.is_resumed(blocks)? {
-            return Ok(None);
-        }
-    }
-    let mut groups = Groups { strangers: None, joints: None, repairs: None, ..Groups::new(&rest) };
-    for _ in 0..HEADING_GROUPS {
-        // What lies behind a gap is no part of what begins here.
-        let group = groups
-            .next_group()?
-            .filter(|group| group.first().is_some_and(|first| first.header.starts_group()));
-        let Some(group) = group else { break };
-        if let Some(board) = heading(&group) {
-            return Ok(Some(board));
-        }
-    }
-    Ok(None)
-}
-
 /// What is wanted of the record of a start with which a log begins; none where there is none, or the log cannot be read.
 pub fn at_beginning<T>(log: &Log, wanted: impl Fn(&Boot<'_>) -> Option<T>) -> Option<T> {
     let mut groups = Groups::new(log);
@@ -65,28 +29,11 @@ pub fn at_beginning<T>(log: &Log, wanted: impl Fn(&Boot<'_>) -> Option<T>) -> Op
     None
 }
 
-/// Another log of the same power-on in the files of a log, which is not read.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Joined {
-    /// The number of its first sector.
-    pub first: u32,
-    /// How many sectors of it there are.
-    pub sectors: u64,
-    /// It was joined to one of the files; otherwise it follows the log, which ended in order.
-    pub is_within: bool,
-}
-
 /// Streams a log's groups.
 pub struct Groups<'a> {
     blocks: Blocks<'a>,
     assembler: Assembler,
     group: Group,
-    /// Groups that were looked at and not given out.
-    ahead: VecDeque<Group>,
-    /// The group given out last ends the log in order.
-    is_closed: bool,
-    /// Another log follows, and is not read.
-    joined: Option<Joined>,
     ended: bool,
     ends_short: bool,
     /// So many blocks at the end of all are no sectors of any log.
@@ -97,8 +44,6 @@ pub struct Groups<'a> {
     first: Option<[u8; BLOCK_BYTES]>,
     /// None where the sectors of a session were searched for on a card: their places tell nothing.
     strangers: Option<Strangers>,
-    /// The same.
-    joints: Option<Joints>,
     /// What was made again of the file of the last block, which is the one that is named. None as with `strangers`.
     repairs: Option<(Option<usize>, Repairs)>,
     /// The second of two sectors that are read in the place of one block.
@@ -118,16 +63,12 @@ impl<'a> Groups<'a> {
             blocks: log.blocks(),
             assembler: if is_late { assembler.beginning_late() } else { assembler },
             group: Vec::new(),
-            ahead: VecDeque::new(),
-            is_closed: false,
-            joined: None,
             foreign_at_end: 0,
             ended: false,
             ends_short: log.ends_short(),
             file: 0,
             first: None,
             strangers: log.session.is_none().then(|| Strangers::new(log.pieces.len())),
-            joints: log.session.is_none().then(Joints::default),
             repairs: log.session.is_none().then(Default::default),
             beside: None,
             repaired: 0,
@@ -135,48 +76,8 @@ impl<'a> Groups<'a> {
         }
     }
 
-    /// The next group; `None` at the end. A log that is recorded by arming ends in order while the power-on goes on: what
-    /// follows it in its files is the next log, and was joined to it.
+    /// The next group; `None` at the end.
     pub fn next_group(&mut self) -> Result<Option<Group>> {
-        if std::mem::take(&mut self.is_closed) && self.begins_file()? {
-            self.skip_joined()?;
-            return Ok(None);
-        }
-        let group = match self.ahead.pop_front() {
-            Some(group) => Some(group),
-            None => self.read_group()?,
-        };
-        let last = group.as_ref().and_then(|group| group.last());
-        // The sectors that were gathered from a whole card are those of all logs of a power-on.
-        self.is_closed = self.strangers.is_some() && last.is_some_and(|last| last.header.closed);
-        Ok(group)
-    }
-
-    /// Whether what follows is the beginning of a file: it says who records. A vehicle that is armed again at the very moment
-    /// in which its log ends goes on in the same file.
-    fn begins_file(&mut self) -> Result<bool> {
-        while self.ahead.len() < HEADING_GROUPS
-            && let Some(group) = self.read_group()?
-        {
-            self.ahead.push_back(group);
-        }
-        Ok(self.ahead.iter().any(|group| heading(group).is_some()))
-    }
-
-    /// Passes over what is left.
-    fn skip_joined(&mut self) -> Result<()> {
-        while let Some(group) = match self.ahead.pop_front() {
-            Some(group) => Some(group),
-            None => self.read_group()?,
-        } {
-            let first = group.first().map_or(0, |first| first.header.number);
-            let joined = Joined { first, sectors: 0, is_within: false };
-            self.joined.get_or_insert(joined).sectors += group.len() as u64;
-        }
-        Ok(())
-    }
-
-    fn read_group(&mut self) -> Result<Option<Group>> {
         loop {
             let Some(step) = self.assembler.next() else {
                 if self.ended {
@@ -245,21 +146,6 @@ impl<'a> Groups<'a> {
     }
 
     fn feed(&mut self, block: &[u8; BLOCK_BYTES]) -> Result<()> {
-        let joined = match &mut self.joints {
-            Some(joints) => {
-                joints.look(self.blocks.place(), block, |at, last| begins_at(&self.blocks, at, last))?
-            }
-            None => None,
-        };
-        if joined.is_some()
-            && let Ok(header) = Header::read(block)
-            && Some(header.session) == self.assembler.session()
-        {
-            let joined = Joined { first: header.number, sectors: 0, is_within: true };
-            self.joined.get_or_insert(joined).sectors += 1;
-            self.assembler.pass_over();
-            return Ok(());
-        }
         let before = self.assembler.counts();
         self.assembler.feed(block);
         let seen = self.assembler.counts().since(&before);
@@ -267,31 +153,23 @@ impl<'a> Groups<'a> {
         let Some(strangers) = &mut self.strangers else { return Ok(()) };
         let (file, at) = self.blocks.place();
         match seen {
-            BlockCounts { stale: 1.., .. } => strangers.other(file, at, block, joined),
+            BlockCounts { stale: 1.., .. } => strangers.other(file, at, block),
             BlockCounts { damaged: 0, parity: 0, empty: 0, erased: 0, foreign: 0, unsound: 0, .. } => {
-                strangers.own(file, at, block);
+                strangers.own(file);
             }
             _ => {}
         }
         Ok(())
     }
 
-    /// What of its files is not the log's, once all is read; `first` is the number of its first sector, before which none is missing where
-    /// `is_first`.
-    pub fn strange(&self, first: u32, is_first: bool) -> Vec<Strange> {
-        self.strangers.as_ref().map_or_else(Vec::new, |strangers| strangers.strange(first, is_first))
-    }
-
-    /// What was joined to it, once all is read.
-    pub const fn joined(&self) -> Option<Joined> {
-        self.joined
+    /// Which sectors of its files are not of the log, once all is read.
+    pub fn strange(&self) -> Vec<Strange> {
+        self.strangers.as_ref().map_or_else(Vec::new, Strangers::strange)
     }
 
     /// What was seen so far.
     pub fn counts(&self) -> BlockCounts {
-        let (counts, shifts) =
-            (self.assembler.counts(), self.strangers.as_ref().map_or(0, Strangers::shifts));
-        BlockCounts { misplaced: counts.misplaced + shifts, repaired: self.repaired, ..counts }
+        BlockCounts { repaired: self.repaired, ..self.assembler.counts() }
     }
 
     /// What parity tells, once all is read.

@@ -5,7 +5,6 @@ use hums_blackbox::Record;
 use hums_blackbox::record::{Before, Found, Resting};
 use hums_core::clock::Instant;
 
-use super::board::{self, Board};
 use crate::loss::lost;
 
 /// Numbers of the events that say that the vehicle moves.
@@ -48,8 +47,6 @@ pub struct Marks {
     pub refused: bool,
     /// There was no card for a while, or none that could be used.
     pub card_out: bool,
-    /// Which box, as its first boot record tells; none where there is no board.
-    pub board: Option<Board>,
 }
 
 impl Marks {
@@ -72,7 +69,6 @@ impl Marks {
             Record::Note(note) => self.packed |= note.text == PACKED,
             Record::Boot(boot) => {
                 self.has_boot = true;
-                self.board = self.board.or(board::known(boot.uid));
                 self.before =
                     Some(boot.before).filter(|before| before.found != Found::Unknown).or(self.before);
             }
@@ -93,7 +89,6 @@ impl Marks {
         self.has_boot |= next.has_boot;
         self.refused |= next.refused;
         self.card_out |= next.card_out;
-        self.board = self.board.or(next.board);
         self.packed |= next.packed;
         self.took_off = next.took_off.or(self.took_off);
         self.before = next.before.or(self.before);

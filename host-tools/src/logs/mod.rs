@@ -15,12 +15,8 @@ mod folder;
 mod found;
 pub mod groups;
 pub mod in_order;
-mod joined;
-pub mod late;
 mod look;
 pub mod marks;
-#[cfg(test)]
-pub(crate) mod memory;
 pub mod naming;
 pub mod places;
 pub mod reader;

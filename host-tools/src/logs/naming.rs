@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use hums_recorder::LogName;
 
 use super::board::Board;
-use crate::hex::{bytes_of, hex};
+use crate::hex::hex;
 
 /// The digits of a session.
 const SESSION_DIGITS: usize = 8;
@@ -58,16 +58,6 @@ impl SegmentName {
     /// The box, where the name tells it: the logs of one box are read as those of one card.
     pub fn recorder(&self) -> &str {
         self.of.rsplit_once('-').map_or("", |(recorder, _)| recorder)
-    }
-
-    /// The session that the name tells.
-    pub fn named_session(&self) -> Option<u32> {
-        session_of(self.of.rsplit('-').next()?)
-    }
-
-    /// The unique id of the board that the name tells.
-    pub fn named_board(&self) -> Option<Board> {
-        bytes_of(self.recorder().strip_prefix("box")?)
     }
 
     /// The log's name for people: `00042`, behind that of its box where the name tells it.
@@ -156,8 +146,8 @@ mod tests {
         let part = part_name(Path::new("logs/00042-s1a2b3c4d_07.HUM"));
         assert_eq!(part, Path::new("logs/00042-s1a2b3c4d_07.part.HUM"));
         assert!(is_part(&part) && is_part(Path::new("a.PART.hum")) && segment_name(&part).is_none());
-        let named = |path: &Path| segment_or_part(path)?.named_session();
-        assert_eq!((named(&part), named(Path::new("a.part.hum"))), (Some(0x1a2b_3c4d), None));
+        let of = |path: &Path| Some(segment_or_part(path)?.of);
+        assert_eq!((of(&part), of(Path::new("a.part.hum"))), (Some("s1a2b3c4d".to_owned()), None));
         for other in ["00042-s1a2b3c4d_07.HUM", "a.part", "part.HUM", "a.part.tlog"] {
             assert!(!is_part(Path::new(other)), "{other}");
         }
@@ -175,19 +165,6 @@ mod tests {
         ] {
             assert_eq!(identity_at_end(stem), expected, "{stem}");
         }
-    }
-
-    #[test]
-    fn a_name_tells_the_session_and_the_box_as_they_were_put_into_it() {
-        let told = |name: &str| {
-            let name = segment_name(Path::new(name)).expect("a segment");
-            (name.named_session(), name.named_board())
-        };
-        let whole = session_name("00042", Some(&[0x3f; 12]), Some(0x1a2b_3c4d));
-        assert_eq!(told(&format!("{whole}_00.HUM")), (Some(0x1a2b_3c4d), Some([0x3f; 12])));
-        assert_eq!(told("00042-s1A2B3C4D_00.HUM"), (Some(0x1a2b_3c4d), None));
-        assert_eq!(told("00042-box3f-s1a2b3c4d_00.HUM"), (Some(0x1a2b_3c4d), None), "no whole id");
-        assert_eq!(told("00042_00.HUM"), (None, None));
     }
 
     #[test]

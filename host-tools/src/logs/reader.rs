@@ -9,14 +9,11 @@
 use std::cell::Cell;
 
 use anyhow::Result;
-use hums_blackbox::record::Keep;
 use hums_blackbox::{BlockCounts, Cause, Entry, Gap, GroupDecoder, GroupError, Outline, Record};
 use hums_core::clock::Instant;
 
-use super::board::HEADING_GROUPS;
-use super::groups::{Group, Groups, Joined};
+use super::groups::{Group, Groups};
 use super::in_order::{in_order, workers};
-use super::late::{Late, is_begun_unknown, late};
 pub use super::marks::Marks;
 use super::places::Log;
 pub use super::repair::Evidence;
@@ -57,7 +54,6 @@ pub trait Deliver<C> {
 
 /// What was read, in all.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-#[expect(clippy::struct_excessive_bools, reason = "facts that have nothing to do with each other")]
 pub struct Summary {
     /// The session that the sectors name.
     pub session: Option<u32>,
@@ -75,8 +71,6 @@ pub struct Summary {
     pub frames_missing: u64,
     /// Gaps of which nothing tells how many frames are missing in them.
     pub gaps_uncounted: u64,
-    /// Gaps that are none: what a disarmed vehicle sent was not kept, on purpose.
-    pub not_kept: u64,
     /// Groups whose first entry came before the last one of the group before.
     pub times_fell: u64,
     /// Entries whose time is before the entry before, within a group.
@@ -99,8 +93,6 @@ pub struct Summary {
     pub ends_partial: bool,
     /// Frames of the session before its first group, modulo 2^32.
     pub frames_before: Option<u32>,
-    /// What its first group says is kept, where not all is.
-    pub keep: Option<Keep>,
     /// Frames of the session up to its end, modulo 2^32.
     pub frames_end: Option<u32>,
     /// The check of the session's entries before its first group.
@@ -119,14 +111,8 @@ pub struct Summary {
     pub parity: Evidence,
     /// What of its files is not the log's.
     pub strange: Vec<Strange>,
-    /// Files that are missing before its first one, where nothing proves that they were left out on purpose.
+    /// Files that are missing before its first one.
     pub files_gone: u32,
-    /// What it lacks before its first sector went when the ring was full: it may have less than the while that was to be kept.
-    pub is_cut: bool,
-    /// None of its first sectors is missing, and its first file has not the name of a first one.
-    pub is_renamed: bool,
-    /// A later log of the same power-on, which was joined to it.
-    pub joined: Option<Joined>,
 }
 
 impl Summary {
@@ -150,14 +136,7 @@ pub fn read<C: Collect>(
     mut progress: impl FnMut(u64),
 ) -> Result<Summary> {
     let mut groups = Groups::new(log);
-    let late = late(log)?;
-    let mut stitch = Stitch {
-        late,
-        is_begun_unknown: late.is_none() && is_begun_unknown(log)?,
-        gathered: log.session.is_some(),
-        first_file: log.first_segment(),
-        ..Stitch::default()
-    };
+    let mut stitch = Stitch { first_file: log.first_segment(), ..Stitch::default() };
     let workers = workers();
     let ahead_max = (workers * GROUPS_PER_WORKER).min(GROUPS_MAX);
     let next = || {
@@ -183,11 +162,7 @@ pub fn read<C: Collect>(
     summary.session = groups.session();
     summary.blocks = groups.counts();
     summary.parity = groups.evidence();
-    let first = summary.first_number.unwrap_or(0);
-    summary.strange = groups.strange(first, late.is_some_and(|late| late.from == first));
-    summary.joined = groups.joined();
-    summary.is_cut = late.is_some_and(|late| late.is_wanted && late.is_cut);
-    summary.is_renamed = late.is_some_and(|late| late.is_renamed);
+    summary.strange = groups.strange();
     Ok(summary)
 }
 
@@ -277,8 +252,6 @@ struct Decoded<C> {
     damaged_partial: u32,
     closed: bool,
     marks: Marks,
-    /// What its first record about it says is kept.
-    keep: Option<Keep>,
     /// UTC at power-on by what it learned last, microseconds since 1970.
     epoch_us: Option<u64>,
 }
@@ -306,7 +279,6 @@ impl<C: Collect> Decoded<C> {
             damaged_partial: last.filter(|step| step.header.partial).map_or(0, |step| step.damaged),
             closed: last.is_some_and(|step| step.header.closed),
             marks: Marks::default(),
-            keep: None,
             epoch_us: None,
         }
     }
@@ -364,9 +336,6 @@ impl<C: Collect> Decoded<C> {
                 self.time(at);
                 self.frames += u32::from(matches!(entry, Entry::Frame { .. }));
                 match entry {
-                    Entry::Record { record: Record::Keep(keep), .. } => {
-                        self.keep.get_or_insert(keep);
-                    }
                     Entry::Record { record: Record::Clock(clock), .. } => {
                         self.epoch_us = Some(clock.epoch_micros());
                     }
@@ -396,16 +365,8 @@ struct Stitch {
     expected: Option<u32>,
     /// The check that the last sector has.
     check: Option<u32>,
-    /// The number of the sector that would follow.
-    next_number: u32,
     cut: bool,
     damaged_partial: u32,
-    /// What is missing before the first group.
-    late: Option<Late>,
-    /// Nothing tells where the log began.
-    is_begun_unknown: bool,
-    /// The sectors of a session were searched for on a card: what is left of several logs may be among them.
-    gathered: bool,
     /// The number of the log's first file.
     first_file: Option<u32>,
 }
@@ -418,34 +379,20 @@ impl Stitch {
         deliver: &mut impl Deliver<C>,
     ) -> Result<()> {
         let begins_late = self.summary.groups == 0 && self.open.is_none() && group.number > 0;
-        // A later log of a power-on of which all is there: what its sectors count before it is the logs' before.
-        let lacks_none =
-            begins_late && !group.damaged && self.late.is_some_and(|late| late.from == group.number);
         let cut = std::mem::replace(&mut self.cut, group.ends_partial);
         self.damaged_partial = group.damaged_partial;
-        if lacks_none {
-            self.expected = group.begun.map(|(_, frames_before)| frames_before);
-        } else if group.missing > 0 || cut || begins_late {
-            let cause = match group.damaged {
-                true => Cause::Damaged,
-                false if self.is_wanted(&group, begins_late) => Cause::Disarmed,
-                false => Cause::Missing,
-            };
+        if group.missing > 0 || cut || begins_late {
+            let cause = if group.damaged { Cause::Damaged } else { Cause::Missing };
             if begins_late && cause == Cause::Missing {
                 self.summary.files_gone = self.first_file.unwrap_or(0);
             }
-            let missing = if begins_late {
-                self.missing_before(group.number)
-            } else {
-                group.missing.max(u32::from(cut))
-            };
+            let missing = if begins_late { group.number } else { group.missing.max(u32::from(cut)) };
             let gap = self.gap(cause);
             gap.sectors_lost = gap.sectors_lost.saturating_add(missing);
         }
         self.summary.closed = group.closed;
         self.summary.first_number.get_or_insert(group.number);
         self.summary.last_number = Some(group.number.wrapping_add(group.sectors).wrapping_sub(1));
-        self.next_number = group.number.wrapping_add(group.sectors);
         match group.begun {
             None => self.skip(&group),
             Some((start, frames_before)) => {
@@ -468,11 +415,6 @@ impl Stitch {
                 self.expected = Some(frames_before.wrapping_add(group.frames));
                 self.summary.first = self.summary.first.or(Some(start));
                 self.summary.frames_before.get_or_insert(frames_before);
-                if self.summary.groups < HEADING_GROUPS as u64 {
-                    let first = self.summary.first_number.unwrap_or(0);
-                    let keep = group.keep.filter(|keep| keep.from <= first);
-                    self.summary.keep = self.summary.keep.or(keep);
-                }
                 self.summary.last = group.last.or(self.summary.last);
                 self.summary.groups += 1;
                 self.summary.frames += u64::from(group.frames);
@@ -493,32 +435,10 @@ impl Stitch {
         Ok(())
     }
 
-    /// The sectors of this log that are missing before its first one that is there.
-    fn missing_before(&self, number: u32) -> u32 {
-        match self.late {
-            Some(late) => number.saturating_sub(late.from),
-            // Which of those since the power-on were the logs' before it, nothing tells.
-            None if self.is_begun_unknown => 0,
-            None => number,
-        }
-    }
-
-    /// Whether what is missing before this group was not kept, on purpose. Within a log nothing is; where sectors were
-    /// gathered from a whole card, a record of the same while that began before them says so.
-    fn is_wanted<C>(&self, group: &Decoded<C>, begins_late: bool) -> bool {
-        if begins_late {
-            return self.late.is_some_and(|late| late.is_wanted);
-        }
-        self.gathered && group.keep.is_some_and(|keep| keep.from <= self.next_number)
-    }
-
-    /// Frames that are missing before a group before which so many came. Of those before a later log of a power-on most are the
-    /// logs' before it: how many are not, nothing here tells; and also where nothing tells whether it is a later one.
+    /// Frames that are missing before a group before which so many came.
     fn frames_missing(&self, before: u32) -> Option<u32> {
-        let may_be_later = self.is_begun_unknown || self.late.is_some_and(|late| late.from > 0);
-        let is_later = self.summary.groups == 0 && may_be_later;
         let missing = before.wrapping_sub(self.expected.unwrap_or(0));
-        Some(missing).filter(|missing| *missing < 1 << 31 && (self.expected.is_some() || !is_later))
+        Some(missing).filter(|missing| *missing < 1 << 31)
     }
 
     /// Nothing of a group is given out.
@@ -536,13 +456,9 @@ impl Stitch {
     }
 
     fn close<C>(&mut self, gap: Gap, deliver: &mut impl Deliver<C>) -> Result<()> {
-        if gap.cause == Cause::Disarmed {
-            self.summary.not_kept += 1;
-        } else {
-            self.summary.gaps += 1;
-            self.summary.frames_missing += u64::from(gap.frames.unwrap_or(0));
-            self.summary.gaps_uncounted += u64::from(gap.frames.is_none());
-        }
+        self.summary.gaps += 1;
+        self.summary.frames_missing += u64::from(gap.frames.unwrap_or(0));
+        self.summary.gaps_uncounted += u64::from(gap.frames.is_none());
         deliver.gap(&gap)
     }
 

@@ -6,40 +6,19 @@ use std::collections::{BTreeMap, BTreeSet};
 use hums_blackbox::Header;
 
 use super::begun_anew::{self, BegunAnew, Known};
-use super::fingerprint::{Fingerprint, fingerprint, longer_by};
+use super::fingerprint::{Fingerprint, fingerprint};
 use super::places::{Log, Piece};
-use crate::plural::count;
 
 /// Blocks that are searched for a log's first sector: what is read at once.
 const LOOK_BLOCKS: usize = 128;
 
-/// Of a log that is all there in another one, which goes on.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Beginning {
-    /// The name of that one.
-    of: String,
-    /// How many sectors that one has more.
-    sectors: u32,
-}
-
-impl Beginning {
-    /// What is said of it, as a part of a sentence.
-    pub fn words(&self) -> String {
-        let more = count(self.sectors, "sector");
-        format!("it is the beginning of {}, which has {more} more: its end is missing (not counted)", self.of)
-    }
-}
-
 /// The numbers under which each session is there, by card.
 #[derive(Clone, Debug, Default)]
 pub struct Sessions {
-    /// By what stands before the number in a log's name, and by the session that its sectors name: the number, and that of
-    /// its first sector. Logs by arming share the session of a power-on, and their sectors are numbered on.
-    logs: BTreeMap<(String, u32), Vec<(u32, u32)>>,
+    /// The numbers of its logs, by what stands before the number in their names, and by the session that their sectors name.
+    logs: BTreeMap<(String, u32), Vec<u32>>,
     /// Of logs that hold the same as another one: the name of that.
     again: BTreeMap<String, String>,
-    /// Of logs that hold the beginning of another one only.
-    beginnings: BTreeMap<String, Beginning>,
     /// The numbers of all logs of each card, also of those without a sector.
     numbers: BTreeMap<String, BTreeSet<u32>>,
     /// By card and number.
@@ -50,7 +29,7 @@ impl Sessions {
     /// Looks at the first sectors of these logs, by their names. What has no number is left out.
     pub fn of<'a>(logs: impl IntoIterator<Item = (&'a str, &'a Log)>) -> Self {
         let logs: Vec<(&str, &Log)> = logs.into_iter().collect();
-        let mut all: BTreeMap<_, Vec<(u32, u32)>> = BTreeMap::new();
+        let mut all: BTreeMap<_, Vec<u32>> = BTreeMap::new();
         let mut alike: BTreeMap<u32, Vec<Candidate<'_>>> = BTreeMap::new();
         let mut numbers: BTreeMap<String, BTreeSet<u32>> = BTreeMap::new();
         let mut known: BTreeMap<&str, Vec<Known<'_>>> = BTreeMap::new();
@@ -60,25 +39,20 @@ impl Sessions {
                 numbers.entry(card.to_owned()).or_default().insert(number);
             }
             let Some((at, first)) = first_sector(log) else { continue };
-            alike.entry(first.session).or_default().push(Candidate { name, card, number, log });
+            alike.entry(first.session).or_default().push(Candidate { name, number, log });
             if let Some(number) = number {
-                all.entry((card.to_owned(), first.session)).or_default().push((number, first.number));
+                all.entry((card.to_owned(), first.session)).or_default().push(number);
                 known.entry(card).or_default().push(Known { number, first, at, log });
             }
         }
-        let (mut again, mut beginnings) = (BTreeMap::new(), BTreeMap::new());
-        for logs in alike.into_values() {
-            let (copies, shorter) = copies(logs);
-            again.extend(copies);
-            beginnings.extend(shorter);
-        }
+        let again = alike.into_values().flat_map(copies).collect();
         let mut anew = BTreeMap::new();
         for (card, mut known) in known {
             known.sort_by_key(|known| known.number);
             let numbers = numbers.get(card).map_or_else(BTreeMap::new, |all| begun_anew::find(all, &known));
             anew.extend(numbers.into_iter().map(|(number, anew)| ((card.to_owned(), number), anew)));
         }
-        Self { logs: all, again, beginnings, numbers, begun_anew: anew }
+        Self { logs: all, again, numbers, begun_anew: anew }
     }
 
     /// What a log's file held when the recorder had just begun to write it anew, if it had. A full card's oldest file gets the
@@ -93,36 +67,15 @@ impl Sessions {
         self.begun_anew.get(&(card.to_owned(), number)).copied()
     }
 
-    /// The name of the log of which this one is a copy, sector by sector, or a copy of one of its files: under a name that
-    /// is no number, or on another card. It is not to be counted again.
+    /// The name of the log of which this one is a copy, sector by sector, or a copy of one of its files. It is not to be counted
+    /// again.
     pub fn again(&self, name: &str) -> Option<&str> {
         self.again.get(name).map(String::as_str)
     }
 
-    /// The log of which the one of this name is the beginning only. It is not to be counted again.
-    pub fn beginning(&self, name: &str) -> Option<&Beginning> {
-        self.beginnings.get(name)
-    }
-
     /// The numbers under which a session is there on a card.
-    pub fn numbers(&self, card: &str, session: u32) -> Vec<u32> {
-        self.of_session(card, session).iter().map(|(number, _)| *number).collect()
-    }
-
-    /// How many of the numbers between these two no log of a card has.
-    pub fn absent(&self, card: &str, after: u32, before: u32) -> u32 {
-        let (first, end) = (after.saturating_add(1), before.max(after.saturating_add(1)));
-        let there = self.numbers.get(card).map_or(0, |numbers| numbers.range(first..end).count());
-        (end - first).saturating_sub(there as u32)
-    }
-
-    /// Whether a number between these two is that of a log of another session. One that the recorder had begun to write anew is
-    /// of none.
-    pub fn has_other(&self, card: &str, after: u32, before: u32, session: u32) -> bool {
-        let others = self.logs.iter().filter(|((other, of), _)| other == card && *of != session);
-        others.flat_map(|(_, logs)| logs).any(|(number, _)| {
-            after < *number && *number < before && self.begun_anew_number(card, *number).is_none()
-        })
+    pub fn numbers(&self, card: &str, session: u32) -> &[u32] {
+        self.logs.get(&(card.to_owned(), session)).map_or(&[], Vec::as_slice)
     }
 
     /// Whether a card has a log of a lower number.
@@ -133,38 +86,19 @@ impl Sessions {
     /// Whether what a card's oldest file held may be of this session: it has no log on the card, or the one of the lowest number.
     pub fn may_be_oldest(&self, card: &str, session: u32) -> bool {
         let lowest = self.numbers.get(card).and_then(|numbers| numbers.first());
-        let own = self.of_session(card, session).iter().map(|(number, _)| number).min();
+        let own = self.numbers(card, session).iter().min();
         own.is_none() || own == lowest
-    }
-
-    /// The lower number under which the log of this name is there too.
-    pub fn copy_of(&self, name: &str, session: u32) -> Option<u32> {
-        let (card, number) = place(name);
-        let (number, all) = (number?, self.of_session(card, session));
-        let (_, first) = all.iter().find(|(other, _)| *other == number)?;
-        let same = all.iter().filter(|(other, other_first)| other_first == first && *other < number);
-        same.map(|(other, _)| *other).min()
-    }
-
-    fn of_session(&self, card: &str, session: u32) -> &[(u32, u32)] {
-        self.logs.get(&(card.to_owned(), session)).map_or(&[], Vec::as_slice)
     }
 }
 
 /// A log of a session of which others may be copies.
 struct Candidate<'a> {
     name: &'a str,
-    card: &'a str,
     number: Option<u32>,
     log: &'a Log,
 }
 
 impl Candidate<'_> {
-    /// Whether one may be a copy of the other. Two numbers of one card cannot: one of them has lost its own session.
-    fn may_be_copy(&self, other: &Self) -> bool {
-        self.card != other.card || self.number.is_none() || other.number.is_none()
-    }
-
     /// Of all of it, then of each file where there are several. What cannot be read is no copy; it is said where it is read.
     fn fingerprints(&self) -> Vec<Fingerprint> {
         let file = |piece: &Piece| Log { pieces: vec![piece.clone()], ..self.log.clone() };
@@ -173,49 +107,29 @@ impl Candidate<'_> {
     }
 }
 
-/// Something of each of some logs, by their names.
-type Named<T> = Vec<(String, T)>;
-
 /// Names of copies among the logs of one session, each with that of its original: a card's log before one of another name,
-/// one of more files before one of less. Then those that are the beginning of another one.
-fn copies(mut logs: Vec<Candidate<'_>>) -> (Named<String>, Named<Beginning>) {
-    let may_be = |one: &Candidate<'_>| logs.iter().skip(1).any(|other| one.may_be_copy(other));
-    if !logs.first().is_some_and(may_be) && logs.iter().all(|log| log.number.is_some()) {
-        return (Vec::new(), Vec::new());
+/// one of more files before one of less.
+fn copies(mut logs: Vec<Candidate<'_>>) -> Vec<(String, String)> {
+    if logs.len() < 2 {
+        return Vec::new();
     }
     logs.sort_by_key(|log| (log.number.is_none(), std::cmp::Reverse(log.log.pieces.len())));
-    let (mut originals, mut copies) = (Vec::<(Candidate<'_>, Vec<Fingerprint>)>::new(), Vec::new());
-    for log in logs {
+    let (mut originals, mut copies) = (Vec::<(&str, Vec<Fingerprint>)>::new(), Vec::new());
+    for log in &logs {
         let all = log.fingerprints();
-        let is_original = |(other, others): &&(Candidate<'_>, Vec<Fingerprint>)| {
-            log.may_be_copy(other) && all.first().is_some_and(|whole| others.contains(whole))
-        };
+        let is_original =
+            |(_, others): &&(&str, Vec<Fingerprint>)| all.first().is_some_and(|whole| others.contains(whole));
         match originals.iter().find(is_original) {
-            Some((original, _)) => copies.push((log.name.to_owned(), original.name.to_owned())),
-            None => originals.push((log, all)),
+            Some((original, _)) => copies.push((log.name.to_owned(), (*original).to_owned())),
+            None => originals.push((log.name, all)),
         }
     }
-    let beginning = |(log, _): &(Candidate<'_>, Vec<Fingerprint>)| {
-        let others = originals.iter().map(|(other, _)| other);
-        let others = others.filter(|other| other.name != log.name && log.may_be_copy(other));
-        let longer = others.filter_map(|other| {
-            let sectors = longer_by(log.log, other.log).ok()??;
-            Some(Beginning { of: other.name.to_owned(), sectors })
-        });
-        Some((log.name.to_owned(), longer.max_by_key(|longer| longer.sectors)?))
-    };
-    let beginnings = originals.iter().filter_map(beginning).collect();
-    (copies, beginnings)
+    copies
 }
 
 /// What is said of a copy.
 pub fn again_words(original: &str) -> String {
     format!("is the same session as {original} once more (not counted)")
-}
-
-/// What is said of a log that holds the session of this number.
-pub fn copy_words(of: u32) -> String {
-    format!("is session {of:05} once more; its own log is not there")
 }
 
 /// A log's name in two: what stands before its number, and the number.

@@ -6,7 +6,6 @@ use std::path::{Path, PathBuf};
 use std::slice;
 
 use anyhow::{Context as _, Result, bail};
-use hums_blackbox::GROUP_SECTORS;
 use hums_core::clock::{Instant, Span};
 use hums_core::health::Level;
 
@@ -16,8 +15,6 @@ use super::remote::Remote;
 use super::session::number as number_of;
 use super::stretch::{Reading, Stretch, Unread, by_number};
 use crate::cli::Around;
-use crate::logs::Log;
-use crate::logs::late::late;
 use crate::outcome::Outcome;
 use crate::summary::FindingLine;
 use crate::utc::{When, date_and_time, moment};
@@ -310,35 +307,16 @@ impl Board<'_> {
             Some(before) => number.map(|number| number.saturating_add(before.sectors)),
             None => Some(0),
         };
-        let Some((end, mut begins)) = end.zip(later.number).filter(|(end, begins)| begins > end) else {
+        let Some((end, begins)) = end.zip(later.number).filter(|(end, begins)| begins > end) else {
             return Ok(());
         };
-        if !is_one_log {
-            begins = self.kept_from(later.name)?.map_or(begins, |kept| kept.min(begins));
-        }
         let last = before.map(|before| Reading::of(slice::from_ref(before))).transpose()?;
         let last = last.and_then(|last| last.span()).map(|(_, last)| last);
-        if begins > end && last.is_none_or(|last| last < to) {
+        if last.is_none_or(|last| last < to) {
             let sectors = u64::from(begins - end);
             self.missing = Unread::all(Some(Unread { sectors, from: last, to: later.at }), self.missing);
         }
         Ok(())
-    }
-
-    /// The sector from which on all was kept that was to be, as the log says that begins with the file of this name.
-    fn kept_from(&mut self, name: &str) -> Result<Option<u32>> {
-        let is_of_it = |other: &&String| number_of(other) == number_of(name) && other.as_str() >= name;
-        let (mut files, mut pieces) = (Vec::new(), Vec::new());
-        for other in self.names.iter().filter(is_of_it) {
-            let mut file = Remote::open(self.ftp, other, self.output)?;
-            if other == name {
-                file.bring(0..file.count().min(GROUP_SECTORS as u32))?;
-            }
-            files.push(other.clone());
-            pieces.push(file.stretch(0..file.count()).piece());
-        }
-        let log = Log { name: name.to_owned(), files, pieces, session: None, left_over: false };
-        Ok(late(&log)?.filter(|late| late.is_wanted).map(|late| late.from))
     }
 
     /// The clock of the log in which a time of day is, as every reader dates that log: by the last clock record of all that are in it. That

@@ -13,7 +13,6 @@ mod part;
 mod remote;
 mod session;
 mod stretch;
-mod waiting;
 
 use std::fs::File;
 use std::io::{self, Read as _, Write as _};
@@ -113,11 +112,7 @@ fn bring(client: Client, args: &cli::Pull) -> Result<Outcome> {
     }
     // One that was begun just now may have nothing in it yet.
     let begun = begun.filter(|_| args.names.is_empty());
-    let asked = if args.names.is_empty() {
-        newest(&mut ftp, &mut logs, args.last)?
-    } else {
-        Asked::named(&args.names)
-    };
+    let asked = if args.names.is_empty() { newest(&mut logs, args.last) } else { Asked::named(&args.names) };
     let mut bringing = Bringing { begun, args, pulled: Vec::new(), gone: Vec::new() };
     let came = bringing.all(&mut ftp, logs, &mut all, &asked);
     let Bringing { mut pulled, gone, .. } = bringing;
@@ -125,7 +120,7 @@ fn bring(client: Client, args: &cli::Pull) -> Result<Outcome> {
     let judged = judge(&all, &asked, &mut pulled);
     let outcome = came?
         .and(judged?)
-        .and(waiting::tell_gone(&gone, &pulled)?)
+        .and(tell_gone(&gone))
         .and(hold_against_next(&mut ftp, &all, &asked, &mut pulled)?)
         .and(listed);
     if args.json {
@@ -134,33 +129,31 @@ fn bring(client: Client, args: &cli::Pull) -> Result<Outcome> {
     Ok(outcome)
 }
 
-/// Leaves the newest so many logs, or all, each with all of its files. A vehicle that is recorded by arming waits for that in a log of
-/// its own, of which nothing is kept unless it is armed.
-fn newest(ftp: &mut Ftp, logs: &mut Vec<(String, u32)>, most: Option<usize>) -> Result<Asked> {
-    let waits = waiting::newest(ftp, logs)?;
-    if let Some(number) = waits {
-        let before = logs.len();
-        logs.retain(|(log, _)| session::number(log) != Some(number));
-        note!(
-            "log {number:05}, {}, is left out: the vehicle is not armed, and the box keeps of it what was recorded last; by name its files come",
-            count((before - logs.len()) as u64, "file")
-        );
-    }
-    let last =
-        waits.map_or(Place::MAX, |number| Place { session: number.saturating_sub(1), segment: u32::MAX });
-    let Some(most) = most else { return Ok(Asked::between(Place::default(), last)) };
+/// Leaves the newest so many logs, or all, each with all of its files.
+fn newest(logs: &mut Vec<(String, u32)>, most: Option<usize>) -> Asked {
+    let Some(most) = most else { return Asked::between(Place::default(), Place::MAX) };
     // One that was begun just now and has nothing yet is no log to be counted, and comes with them.
     let mut numbers: Vec<u32> =
         logs.iter().filter(|(_, bytes)| *bytes > 0).filter_map(|(log, _)| session::number(log)).collect();
     numbers.dedup();
     if most == 0 {
         logs.clear();
-        return Ok(Asked::named(&[]));
+        return Asked::named(&[]);
     }
     let first = numbers.len().checked_sub(most).and_then(|at| numbers.get(at));
     let first = Place { session: first.copied().unwrap_or(0), segment: 0 };
     logs.retain(|(log, _)| place(log).is_none_or(|place| place >= first));
-    Ok(Asked::between(first, last))
+    Asked::between(first, Place::MAX)
+}
+
+/// Says of files that the board had in its list, and gave away before they came, that they are lost.
+fn tell_gone(gone: &[String]) -> Outcome {
+    let Some(first) = gone.first() else { return Outcome::Done };
+    note!(
+        "the board no longer has {} that it had in its list, from {first} on: its card made room for later ones",
+        count(gone.len() as u64, "file")
+    );
+    Outcome::Losses
 }
 
 /// How often the board's list is asked again, where it gave files away while others came.

@@ -1,5 +1,5 @@
-//! Which of a board's logs are those of one session: what was recorded from one power-on to the next. A vehicle that is recorded by
-//! arming has several logs of different numbers in it; a longer log has several files of one number. All of them name the same session.
+//! Which of a board's logs are those of one session: what was recorded from one power-on to the next. A longer log has several
+//! files of one number, which name the same session.
 
 use std::path::Path;
 

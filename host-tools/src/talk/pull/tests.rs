@@ -2,8 +2,8 @@ use std::fs;
 use std::ops::Range;
 use std::path::PathBuf;
 
-use hums_blackbox::record::{Clock, FindingRecord, Keep, Mark, Note, Resting};
-use hums_blackbox::{GROUP_SECTORS, Header, Record, Sector, SectorSink, Writer};
+use hums_blackbox::record::{Clock, FindingRecord, Mark, Note, Resting};
+use hums_blackbox::{Header, Record, Sector, SectorSink, Writer};
 use hums_core::health::{Level, Subsystem};
 use hums_link::messages;
 use hums_link::packet::Fields;
@@ -451,69 +451,6 @@ fn a_time_of_day_goes_by_the_last_clock_record_of_its_log() {
     let mut lost = log.clone();
     lost[in_group..in_group + 512].fill(0);
     assert_eq!(around(&named(lost), "2026-09-21T14:14:20Z").expect("it comes"), Outcome::Losses);
-    // By arming each log has its own clock, as everywhere.
-    let names = ["00001_00.HUM", "00002_00.HUM"];
-    let by_arming = of(names, [begin, end]);
-    for utc in ["2026-09-21T14:14:20Z", "2026-09-21T15:19:30Z"] {
-        assert_eq!(around(&by_arming, utc).expect("it comes"), Outcome::Done, "{utc}");
-    }
-    assert!(around(&by_arming, "2026-09-21T15:14:20Z").is_err(), "nothing was recorded then");
-}
-
-#[test]
-fn a_moment_between_two_logs_of_a_power_on_is_a_pause_of_which_both_ends_are_told() {
-    let mut memory = Memory { session: 7, ..Memory::default() };
-    let (mut writer, mut groups, mut from) = (Box::new(Writer::new()), 0, 0);
-    for tenth in 0..4_000_u64 {
-        let at = Instant::from_millis(tenth * 100);
-        if tenth == 1_000 {
-            // From the disarming on the last while is kept.
-            writer.finish(&mut memory);
-            from = writer.counters().sectors as u32;
-        }
-        if tenth % 300 == 0 {
-            writer.restart(&mut memory);
-        }
-        let random = tenth.wrapping_mul(0x9E37_79B9_7F4A_7C15);
-        let text = format!("{random:016x}{:016x}", random.rotate_left(29) ^ tenth);
-        let note = Record::Note(Note { severity: 6, text: &text });
-        writer.record(at, &note, &mut memory).expect("there is room");
-        if std::mem::replace(&mut groups, writer.counters().sectors / GROUP_SECTORS as u64) != groups
-            && from > 0
-        {
-            let keep = Record::Keep(Keep { all: false, from, seconds: 30 });
-            writer.record(at, &keep, &mut memory).expect("there is room");
-        }
-    }
-    writer.finish(&mut memory);
-    let log = memory.sectors;
-    let [second, third] = [300, 370].map(|second| group_at(&log, second).start * SECTOR_BYTES);
-    let earlier = from as usize * SECTOR_BYTES;
-    assert!(earlier < second && second < third, "{earlier}, {second}, {third}");
-    let files: Files = [
-        ("00001_00.HUM", &log[..earlier]),
-        ("00002_03.HUM", &log[second..third]),
-        ("00002_04.HUM", &log[third..]),
-    ]
-    .map(|(name, bytes)| (name.to_owned(), bytes.to_vec()))
-    .into();
-    let told = |files: &Files, args: &[&str]| {
-        brought(files, &[&["--around"], args].concat()).expect_err("nothing was recorded then").to_string()
-    };
-    let first = Sector::from_bytes(*log[second..].first_chunk().expect("a sector")).preamble().expect("one");
-    let start = crate::utc::moment(Instant::from_millis(first.start_ms));
-    let words = format!("between 1:39.9, where 00001_00.HUM ends, and {start}, where 00002_03.HUM begins");
-    // With a span that reaches into none of them, and into both.
-    for (at, span) in [("101", "0.5"), ("200", "1"), ("200", "190")] {
-        let told = told(&files, &[at, "--span", span]);
-        assert_eq!(told, format!("nothing was recorded {words}"), "{at}, {span}");
-    }
-    assert!(told(&files, &["30000"]).contains("ends at 6:39.9; for another session"), "no pause");
-    // Of a log between them that was left out nobody said what is in it.
-    let mut more = files.clone();
-    more.insert(1, ("00001_01.HUM".to_owned(), recorded(7, 10)));
-    let told = told(&more, &["200", "--span", "1", "00001_00.HUM", "00002_03.HUM", "00002_04.HUM"]);
-    assert!(told.contains("as far as it was asked for, has nothing between 1:39.9 and"), "{told}");
 }
 
 #[test]
@@ -838,39 +775,6 @@ fn what_no_file_of_a_session_has_is_told_of_a_moment_and_of_a_search() {
     ] {
         assert_eq!(search(&files), Outcome::Losses);
     }
-    // By arming a power-on has logs of several numbers, whose sectors are numbered on.
-    let by_arming = |files: &Files| -> Files {
-        let name = |(n, (_, log)): (usize, &(String, Vec<u8>))| (format!("{:05}_00.HUM", n + 1), log.clone());
-        files.iter().enumerate().map(name).collect()
-    };
-    assert_eq!(search(&by_arming(&files)), Outcome::Done);
-    let mut files = by_arming(&files);
-    files.remove(later);
-    assert_eq!((search(&files), moment(&files, 1_300)), (Outcome::Losses, Outcome::Losses));
-    assert_eq!(moment(&files, 600), Outcome::Done);
-}
-
-#[test]
-fn a_search_reads_what_was_recorded_while_only_the_last_while_was_kept() {
-    let mut memory = Memory { session: 7, ..Memory::default() };
-    let (mut writer, mut groups) = (Box::new(Writer::new()), 0);
-    for tenth in 0..SECONDS * 10 {
-        let at = Instant::from_millis(tenth * 100);
-        let random = tenth.wrapping_mul(0x9E37_79B9_7F4A_7C15);
-        let text = format!("{random:016x}{:016x}", random.rotate_left(29) ^ tenth);
-        writer
-            .record(at, &Record::Note(Note { severity: 6, text: &text }), &mut memory)
-            .expect("there is room");
-        // Each group says so.
-        if std::mem::replace(&mut groups, writer.counters().sectors / GROUP_SECTORS as u64) != groups {
-            let keep = Record::Keep(Keep { all: false, from: 0, seconds: 30 });
-            writer.record(at, &keep, &mut memory).expect("there is room");
-        }
-    }
-    writer.finish(&mut memory);
-    let log = &memory.sectors[group_at(&memory.sectors, 400).start * SECTOR_BYTES..];
-    assert_eq!(brought(&named(log.to_vec()), &["--around", "critical"]).expect("none"), Outcome::Losses);
-    assert_eq!(brought(&named(log.to_vec()), &["--around", "1000"]).expect("it comes"), Outcome::Done);
 }
 
 #[test]
@@ -917,83 +821,25 @@ fn what_was_forged_in_a_part_comes_once_more() {
     assert_eq!(fs::read(&path).expect("there"), log);
 }
 
-/// A board that is recorded by arming: a flight of two files, and what it keeps while it waits again, in files of 10 s each, of which
-/// these are there; each group says that only the last 30 s are kept.
-fn by_arming(ring: Range<usize>) -> Files {
-    let (mut memory, mut writer) = (Memory { session: 7, ..Memory::default() }, Box::new(Writer::new()));
-    let mut files = Files::new();
-    let mut put = |names: &[String], all: bool, ends: bool, from: u32, first_s: u64| {
-        for (nth, name) in (0..).zip(names) {
-            let start = memory.sectors.len();
-            for second in 0..10 {
-                let at = Instant::from_millis((first_s + nth * 10 + second) * 1_000);
-                let keep = Record::Keep(Keep { all, from, seconds: 30 });
-                let note = Record::Note(Note { severity: 6, text: "a second" });
-                for record in [keep, note].iter().skip(usize::from(second > 0)) {
-                    writer.record(at, record, &mut memory).expect("there is room");
-                }
-            }
-            let is_last = ends && nth + 1 == names.len() as u64;
-            assert!(if is_last { writer.finish(&mut memory) } else { writer.restart(&mut memory) });
-            files.push((name.clone(), memory.sectors[start..].to_vec()));
-        }
-        (writer.counters().sectors as u32, first_s + names.len() as u64 * 10)
-    };
-    let flight = ["00001_00.HUM", "00001_01.HUM"].map(str::to_owned);
-    let (from, first_s) = put(&flight, true, true, 0, 0);
-    let names: Vec<String> = (0..ring.end).map(|nth| format!("00002_{nth:02}.HUM")).collect();
-    put(&names, false, false, from, first_s);
-    drop(files.drain(2..2 + ring.start));
-    files
-}
-
 #[test]
-fn the_newest_logs_are_flights_and_not_what_a_vehicle_that_waits_for_one_keeps() {
+fn the_newest_logs_come_with_all_of_their_files() {
     let names = |args: &[&str], files: &Files| {
         let folder = tempfile::tempdir().expect("a folder");
         let outcome =
             brought_into(folder.path(), board_of(files.clone(), |_, _| None), args).expect("they come");
-        let on_card = |name: String| name.replace("-s00000007", "").replace(".HUM", "");
-        (outcome, names_in(folder.path()).into_iter().map(on_card).collect::<Vec<_>>())
+        (outcome, names_in(folder.path()).len())
     };
-    let files = by_arming(2..6);
-    let flight = (Outcome::Done, vec!["00001_00".to_owned(), "00001_01".to_owned()]);
-    assert_eq!(names(&["--last", "1"], &files), flight);
-    assert_eq!(names(&["--last", "9"], &files), flight);
-    assert_eq!(names(&[], &files), flight);
-    // Armed meanwhile: that is a log to be counted.
-    let mut armed = files.clone();
-    armed.push(("00003_00.HUM".to_owned(), recorded(8, 30)));
-    assert_eq!(names(&["--last", "1"], &armed).1, ["00003-s00000008_00"]);
-    assert_eq!(names(&["--last", "0"], &files).1, Vec::<String>::new());
-    // It was asked for by name.
-    assert_eq!(names(&["00002_05.HUM"], &files).1, ["00002_05"]);
+    let log = recorded(7, SECONDS);
+    let mut files = files_of(&log, 2);
+    let count = files.len();
+    files.push(("00002_00.HUM".to_owned(), recorded(8, 30)));
+    assert_eq!(names(&["--last", "1"], &files), (Outcome::Done, 1));
+    assert_eq!(names(&["--last", "2"], &files), (Outcome::Done, count + 1));
+    assert_eq!(names(&["--last", "0"], &files).1, 0);
 }
 
 #[test]
-fn what_the_recorder_gave_away_while_it_was_brought_is_no_error_and_a_flight_is_a_loss() {
-    let ring = by_arming(4..8).split_off(2);
-    let folder = tempfile::tempdir().expect("a folder");
-    let write = |(name, log): &(String, Vec<u8>)| {
-        let path = folder.path().join(name.replace('_', "-s00000007_"));
-        fs::write(&path, log).expect("written");
-        LogJson::new(name.clone(), path, true)
-    };
-    let pulled: Vec<LogJson> = ring.iter().map(write).collect();
-    let gone = ["00002_02.HUM", "00002_03.HUM"].map(str::to_owned);
-    assert_eq!(waiting::tell_gone(&gone, &pulled).expect("they read"), Outcome::Done);
-    let flight = ["00001_00.HUM".to_owned()];
-    assert_eq!(
-        waiting::tell_gone(&flight, &pulled).expect("they read"),
-        Outcome::Losses,
-        "nothing of it is there"
-    );
-    // What was copied before is none of the log any more.
-    by_arming(0..2)[2..].iter().for_each(|file| drop(write(file)));
-    assert_eq!(names_in(folder.path()).len(), 6);
-    let found = crate::logs::find::find_in(folder.path(), false).expect("a folder");
-    assert_eq!((found.logs.len(), found.logs[0].files.len(), found.remarks.len()), (1, 4, 1));
-    // A file of a flight is a loss: its card makes room after the list was asked for.
+fn a_file_that_the_card_made_room_of_meanwhile_is_a_loss_and_the_others_come() {
     let flight = board_of(files_of(&recorded(7, SECONDS), 2), |files, opcode| {
         if opcode == 4 && files[0].0 == NAME {
             drop(files.remove(0));
