@@ -72,9 +72,6 @@ fn family(text: &str) -> Subsystem {
     if ["down at", "mishap over", "it flies again"].iter().any(|begin| words.starts_with(begin)) {
         return Subsystem::Mishap;
     }
-    if (0..8).any(|motor| words.starts_with(health::off_alarm(motor).to_string().as_str())) {
-        return Subsystem::Propulsion;
-    }
     let fits = |name: &str| {
         let said = health::said(name).unwrap();
         if let Some(silent) = words.strip_prefix("no data: ") {
