@@ -13,7 +13,7 @@ use std::time::Duration;
 
 use hums_tests::flights::{own, root};
 use hums_tests::oracle;
-use hums_tests::program::{hums, records};
+use hums_tests::program::hums;
 use serde_json::Value;
 use tempfile::TempDir;
 
@@ -264,20 +264,23 @@ fn a_box_that_restarts_in_the_air_reads_no_parameters() {
     let dir = tempfile::tempdir().unwrap();
     let image = dir.path().join("card.img");
     let flight = own("ap_quad_faults.tlog");
-    let record = |further: &[&str]| {
-        let command =
-            ["sim".as_ref(), "--input".as_ref(), flight.as_os_str(), "--sd".as_ref(), image.as_os_str()];
-        hums(command.into_iter().chain(further.iter().map(AsRef::as_ref))).expect_code(&[0]);
+    let record = |further: &[&str], codes: &[i32]| {
+        let input = flight.as_os_str();
+        let command = ["sim".as_ref(), "--input".as_ref(), input, "--sd".as_ref(), image.as_os_str()];
+        hums(command.into_iter().chain(further.iter().map(AsRef::as_ref))).expect_code(codes);
     };
-    record(&[]);
-    put_parameters(&image, "PROT_ACTION 1\nAP_BAUD 57600\n");
-    record(&["--reboot-at", "60"]);
-    let set: Vec<String> = records(&image, &[0])
-        .iter()
-        .filter(|record| record["record"] == "HUMS_PARAM" && record["fields"]["changed"] == true)
-        .map(|record| format!("{} {}", record["fields"]["name"], record["session"]))
-        .collect();
-    assert_eq!(set, Vec::<String>::new());
+    record(&[], &[0]);
+    put_parameters(&image, "PROT_ACTION 1\nBAT_REM_WARN 31\n");
+    // What comes while the power is off is lost.
+    record(&["--reboot-at", "60"], &[3]);
+    let out = dir.path().join("out");
+    let command = ["decode".as_ref(), image.as_os_str(), "-o".as_ref(), out.as_os_str()];
+    hums(command.into_iter().chain(["--format", "jsonl"].map(AsRef::as_ref))).expect_code(&[0, 3]);
+    let mut sessions: Vec<_> = fs::read_dir(&out).unwrap().map(|entry| entry.unwrap().path()).collect();
+    sessions.sort();
+    let is_set = |line: &&str| line.contains("HUMS_PARAM") && line.contains("\"changed\":true");
+    let set = sessions.iter().map(|log| fs::read_to_string(log).unwrap().lines().filter(is_set).count());
+    assert_eq!(set.collect::<Vec<_>>(), [0, 2, 0]);
 }
 
 #[test]
