@@ -38,7 +38,7 @@ const SETTLED: Span = Span::from_secs(1);
 const SIGN_LASTS: Span = Span::from_millis(500);
 /// What flew is lower by this, m.
 const CAME_DOWN_M: f32 = 3.0;
-/// As high as the place of take-off, m. Below that there may be a valley.
+/// No higher than the place of take-off, m above home.
 const NEAR_GROUND_M: f32 = 2.0;
 /// Slow: m/s, rad/s.
 const STILL_MPS: f32 = 1.0;
@@ -339,7 +339,7 @@ impl LinkLoss {
         }
         let slow =
             climb_mps(now, vehicle).is_none_or(|climb_mps| climb_mps.abs() < STILL_MPS) || self.rests(now);
-        let near_ground = height_m(now, vehicle).is_some_and(|height_m| height_m.abs() < NEAR_GROUND_M);
+        let near_ground = height_m(now, vehicle).is_some_and(|height_m| height_m < NEAR_GROUND_M);
         let in_vain = self.armed
             && (self.lies(now, vehicle) || near_ground)
             && part.is_some_and(|part| part >= FULL_THROTTLE);
