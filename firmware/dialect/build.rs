@@ -40,6 +40,7 @@ const READ: &[&str] = &[
     "ESC_TELEMETRY_5_TO_8",
     "ESTIMATOR_STATUS",
     "FLIGHT_INFORMATION",
+    "GENERATOR_STATUS",
     "GLOBAL_POSITION_INT",
     "GPS2_RAW",
     "GPS_RAW_INT",

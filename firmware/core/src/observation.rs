@@ -527,6 +527,15 @@ pub struct Engine {
     pub ignition: Option<Volts>,
 }
 
+/// The generator of a hybrid drone: `GENERATOR_STATUS`.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Generator {
+    /// Whether it reports itself switched off.
+    pub is_off: bool,
+    /// Speed of the generator or alternator.
+    pub speed: Option<Rpm>,
+}
+
 /// A speed sensor: `RPM` or `RAW_RPM`.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SpeedSensor {
@@ -648,6 +657,8 @@ pub enum Observation {
     Escs(EscGroup),
     /// `EFI_STATUS`
     Engine(Engine),
+    /// `GENERATOR_STATUS`
+    Generator(Generator),
     /// `RPM` (two sensors), `RAW_RPM`
     SpeedSensors([Option<SpeedSensor>; 2]),
     /// `EXTENDED_SYS_STATE`
@@ -679,7 +690,10 @@ pub enum Observation {
 
 impl Observation {
     /// Whether another component than the autopilot may send it: such a one may be received while the autopilot is not.
-    pub(crate) const fn may_be_of_another_component(&self) -> bool {
-        matches!(self, Self::TelemetryRadio(_) | Self::Battery(_) | Self::Escs(_) | Self::Engine(_))
+    pub const fn may_be_of_another_component(&self) -> bool {
+        matches!(
+            self,
+            Self::TelemetryRadio(_) | Self::Battery(_) | Self::Escs(_) | Self::Engine(_) | Self::Generator(_)
+        )
     }
 }

@@ -262,6 +262,8 @@ params! {
     Ahrs2HgtCrit "AHRS2_HGT_CRIT" "m" 12.0 0.5 10_000.0 "two estimators' heights apart so far that the height that is held may be wrong";
     Ahrs2PosWarn "AHRS2_POS_WARN" "m" 10.0 0.5 10_000.0 "two estimators' positions apart beyond half a second of flight; up to 2.6 with it in healthy real flights";
     ImuGpsWarn "IMU_GPS_WARN" "m/s2" 1.0 0.1 1000.0 "measured force, turned by the attitude, less the change of GPS velocity; up to 0.4 in healthy flights of simulators" is "Measured force less change of GPS velocity: warning above";
+    GenSpeedWarn "GEN_SPEED_WARN" "rpm" 0.0 0.0 65_000.0 "by generator, below its idle speed; off until set";
+    GenSpeedCrit "GEN_SPEED_CRIT" "rpm" 0.0 0.0 65_000.0 "by generator, below its idle speed; off until set";
 }
 
 impl Param {

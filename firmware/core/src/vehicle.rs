@@ -10,12 +10,12 @@ use crate::inertial::Inertial;
 use crate::latest::Latest;
 use crate::observation::{
     Air, Attitude, Autopilot, AutopilotIdentity, Battery, CommandAck, Engine, Esc, EscGroup, Estimator,
-    Feeds, GlobalPosition, Gnss, GnssIntegrity, Heartbeat, Hud, Imu, LandedState, LocalPosition, MOTORS_MAX,
-    Observation, Processor, RadioControl, Rails, Source, SystemStatus, SystemTime, TelemetryRadio,
-    VehicleKind, Vibration, VibrationScale, VtolState, Wanted,
+    Feeds, Generator, GlobalPosition, Gnss, GnssIntegrity, Heartbeat, Hud, Imu, LandedState, LocalPosition,
+    MOTORS_MAX, Observation, Processor, RadioControl, Rails, Source, SystemStatus, SystemTime,
+    TelemetryRadio, VehicleKind, Vibration, VibrationScale, VtolState, Wanted,
 };
 use crate::time::{Instant, Span};
-use crate::units::{MetresPerSecond, Radians};
+use crate::units::{MetresPerSecond, Radians, Rpm};
 
 /// Batteries that are monitored.
 pub const BATTERIES_MAX: usize = 4;
@@ -126,6 +126,10 @@ pub struct Vehicle {
     pub motors: [Motor; MOTORS_MAX],
     /// The combustion engine.
     pub engine: Latest<Engine>,
+    /// The generator.
+    pub generator: Latest<Generator>,
+    /// Its highest speed since it was switched on; `None` until it runs in this flight, from arming to disarming.
+    pub(crate) generator_top: Option<Rpm>,
     /// The autopilot's word on flying.
     pub landed: Latest<LandedState>,
     /// What a VTOL flies on, as old as `landed`.
@@ -196,6 +200,8 @@ impl Vehicle {
             vibration: Latest::nothing(),
             motors: [Motor::UNKNOWN; MOTORS_MAX],
             engine: Latest::nothing(),
+            generator: Latest::nothing(),
+            generator_top: None,
             landed: Latest::nothing(),
             vtol: VtolState::Unknown,
             processor: Latest::nothing(),
@@ -388,6 +394,7 @@ impl Vehicle {
             Observation::Vibration(vibration) => self.take_vibration(at, vibration),
             Observation::Escs(group) => self.take_escs(at, &group),
             Observation::Engine(engine) => self.engine.set(at, engine),
+            Observation::Generator(generator) => self.take_generator(at, generator),
             Observation::Landed(landed, vtol) => {
                 self.landed.set(at, landed);
                 self.vtol = vtol;
@@ -489,6 +496,16 @@ impl Vehicle {
         }
     }
 
+    fn take_generator(&mut self, at: Instant, generator: Generator) {
+        let before = self.generator_top.filter(|_| self.armed());
+        self.generator_top = match generator.speed {
+            _ if generator.is_off => before.map(|_| Rpm(0.0)),
+            Some(speed) if speed.0 > 0.0 => Some(before.map_or(speed, |top| Rpm(top.0.max(speed.0)))),
+            _ => before,
+        };
+        self.generator.set(at, generator);
+    }
+
     fn take_escs(&mut self, at: Instant, group: &EscGroup) {
         for (offset, esc) in group.escs.iter().enumerate() {
             if let (Some(esc), Some(motor)) = (esc, self.motors.get_mut(usize::from(group.first) + offset)) {
@@ -507,7 +524,7 @@ fn set_instance<T, const N: usize>(slots: &mut [Latest<T>; N], instance: u8, at:
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::units::{Rpm, Volts};
+    use crate::units::Volts;
 
     const AUTOPILOT: Source = Source { system: 1, component: 1 };
 

@@ -85,6 +85,10 @@ const INPUTS: &[(&str, &str)] = &[
     ("cylinder_head", "EFI_STATUS"),
     ("exhaust_gas", "EFI_STATUS"),
     ("fuel_pressure", "EFI_STATUS"),
+    (
+        "generator_speed",
+        "GENERATOR_STATUS: not while it is off or starts; once it has reached its limits since it was switched on, in this flight",
+    ),
     ("engine_due", "components of kind engine"),
     ("vibration", "VIBRATION of ArduPilot: the worst axis"),
     ("vibration_px4", "VIBRATION of PX4: the accelerometer metric"),

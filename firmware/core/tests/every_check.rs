@@ -9,8 +9,8 @@ use hums_core::Monitor;
 use hums_core::cause::{Alert, Cause, Urgency};
 use hums_core::health::{self, Finding, Level, checks};
 use hums_core::observation::{
-    Attitude, Autopilot, Battery, CellVoltage, Engine, Esc, EscGroup, EstimatorScale, Gnss, Heartbeat,
-    Observation, Processor, RadioControl, Rails, SystemStatus, TelemetryRadio, VehicleKind,
+    Attitude, Autopilot, Battery, CellVoltage, Engine, Esc, EscGroup, EstimatorScale, Generator, Gnss,
+    Heartbeat, Observation, Processor, RadioControl, Rails, SystemStatus, TelemetryRadio, VehicleKind,
 };
 use hums_core::params::Params;
 use hums_core::status::{LinkReading, Recording};
@@ -24,10 +24,11 @@ const END_MS: u64 = 95_000;
 type Fault = fn(&mut Quad, &mut Vec<Observation>);
 
 /// Off by default, since they depend on the engine and on the devices.
-const LIMITS: [(&str, f32); 5] = [
+const LIMITS: [(&str, f32); 6] = [
     ("ENG_CHT_CRIT", 200.0),
     ("ENG_EGT_CRIT", 800.0),
     ("ENG_FUEL_CRIT", 100.0),
+    ("GEN_SPEED_CRIT", 5_000.0),
     ("RC_RSSI_CRIT", 50.0),
     ("RADIO_RSSI_WARN", 60.0),
 ];
@@ -107,6 +108,10 @@ const FAULTS: &[(&str, u8, Level, Fault)] = &[
             fuel_pressure: Some(Hectopascals(50.0)),
             ..Engine::default()
         }));
+    }),
+    // It runs at its speed, and then does not.
+    ("generator_speed", 0, Level::Critical, |_, more| {
+        more.extend([6_000.0, 3_000.0].map(|rpm| generator(false, rpm)));
     }),
     ("vibration", 0, Level::Critical, |quad, _| quad.vibration.levels[0] = Some(70.0)),
     ("vibration_px4", 0, Level::Critical, |quad, more| {
@@ -306,6 +311,44 @@ fn radio(more: &mut Vec<Observation>, rssi: [u8; 2], noise: [u8; 2]) {
     more.push(Observation::TelemetryRadio(radio));
 }
 
+fn generator(is_off: bool, rpm: f32) -> Observation {
+    Observation::Generator(Generator { is_off, speed: Some(Rpm(rpm)) })
+}
+
+/// Levels of the generator's speed, of a vehicle whose generator reports these flags and speeds for 10 s each.
+fn generator_levels(armed: bool, reports: &[(bool, f32)]) -> Vec<Level> {
+    let mut params = Params::defaults();
+    params.set("GEN_SPEED_WARN", 5_500.0).unwrap();
+    params.set("GEN_SPEED_CRIT", 5_000.0).unwrap();
+    let mut monitor = Monitor::new(params);
+    let (quad, mut levels) = (Quad { armed, ..Quad::healthy() }, Vec::new());
+    for now_ms in (0..reports.len() as u64 * 10_000).step_by(50) {
+        let now = Instant::from_millis(now_ms);
+        if now_ms.is_multiple_of(500) {
+            let (is_off, rpm) = reports[now_ms as usize / 10_000];
+            for observation in quad.says(now_ms).iter().chain([&generator(is_off, rpm)]) {
+                monitor.observe(now, AUTOPILOT, observation);
+            }
+        }
+        let link = LinkReading { frames_lost: Some(0.0), at: now };
+        monitor.tick(now, &link, &quad.recorder, &mut |finding| {
+            levels.extend((finding.check == "generator_speed").then_some(finding.level));
+        });
+    }
+    levels
+}
+
+#[test]
+fn a_generator_is_judged_once_it_has_run_and_until_it_is_switched_off() {
+    let (off, starts, runs, slow, stands) =
+        ((true, 0.0), (false, 3_000.0), (false, 6_000.0), (false, 5_200.0), (false, 0.0));
+    assert_eq!(generator_levels(true, &[runs, slow, stands]), [Level::Warning, Level::Critical]);
+    assert_eq!(generator_levels(true, &[runs, stands, off]), [Level::Critical, Level::Ok]);
+    assert_eq!(generator_levels(true, &[off, off, stands]), [], "it has not run");
+    assert_eq!(generator_levels(true, &[off, starts, runs, off, starts, runs, off]), [], "on purpose");
+    assert_eq!(generator_levels(false, &[runs, stands, starts]), [], "disarmed");
+}
+
 #[test]
 fn every_check_finds_what_it_is_there_for_in_time() {
     for &(name, instance, level, fault) in FAULTS {
@@ -339,6 +382,7 @@ fn what_else_is_fitted_and_well_has_no_finding() {
             fuel_pressure: Some(Hectopascals(300.0)),
             ..Engine::default()
         }));
+        more.push(generator(false, 6_000.0));
         more.push(Observation::Gnss(Gnss {
             instance: 1,
             fix: 3,

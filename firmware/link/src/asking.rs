@@ -66,7 +66,7 @@ enum By {
 type Wanted = (u32, By, u8, u8);
 
 /// What the checks need, the most needed first.
-const WANTED: [Wanted; 33] = [
+const WANTED: [Wanted; 34] = [
     (1, By::Both, 5, 43),            // SYS_STATUS
     (30, By::Both, 10, 40),          // ATTITUDE
     (33, By::Both, 5, 40),           // GLOBAL_POSITION_INT
@@ -90,6 +90,7 @@ const WANTED: [Wanted; 33] = [
     (27, By::ArduPilot, 10, 41),     // RAW_IMU
     (226, By::ArduPilot, 2, 20),     // RPM
     (225, By::ArduPilot, 2, 82),     // EFI_STATUS
+    (373, By::ArduPilot, 2, 54),     // GENERATOR_STATUS
     (11_039, By::ArduPilot, 1, 22),  // MCU_STATUS
     (29, By::ArduPilot, 5, 28),      // SCALED_PRESSURE
     (178, By::ArduPilot, 5, 36),     // AHRS2

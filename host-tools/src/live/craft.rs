@@ -239,8 +239,8 @@ impl Craft {
 
     /// Whether an observation of another component than the autopilot is one of the vehicle: a battery's, an ESC's.
     pub fn told_by_part(&self, source: Source, observation: &Observation) -> bool {
-        let part =
-            matches!(observation, Observation::Battery(_) | Observation::Escs(_) | Observation::Engine(_));
+        let part = observation.may_be_of_another_component()
+            && !matches!(observation, Observation::TelemetryRadio(_));
         part && self.monitor.vehicle().source.is_some_and(|vehicle| vehicle.system == source.system)
     }
 

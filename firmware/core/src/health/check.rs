@@ -118,9 +118,9 @@ impl Reported {
 pub struct Unit(u8);
 
 impl Unit {
-    const NAMES: [&str; 17] = [
+    const NAMES: [&str; 18] = [
         "", "%", "1/min", "V", "deg", "deg/s", "degC", "frames", "g", "hPa", "m", "m/s", "m/s2", "ms",
-        "rad/s", "s", "times",
+        "rad/s", "rpm", "s", "times",
     ];
 
     /// A unit as it is written; empty for a plain number. A new one goes into `NAMES`.

@@ -1,5 +1,5 @@
-//! The combustion engine (EFI). What is normal depends on the engine, so the limits are off (at their maximum) until
-//! they are set.
+//! The combustion engine (EFI) and the generator. Normal values depend on the engine, so the limits are off (at the end of
+//! their range that no value passes) until they are set.
 
 use super::check::{Check, Debounce, InstanceOf, Side, Unit, When};
 use super::common::{STALE, due};
@@ -8,6 +8,9 @@ use super::inputs::Inputs;
 use crate::latest::Reading;
 use crate::observation::Engine;
 use crate::params::Param;
+
+/// Above the ripple of a governor that holds the speed.
+const GENERATOR_HYSTERESIS_RPM: f32 = 100.0;
 
 const ENGINE: Check = Check {
     name: "cylinder_head",
@@ -47,10 +50,32 @@ pub(super) const CHECKS: &[Check] = &[
         read: |inputs, _| read(inputs, |engine| engine.fuel_pressure.map(|pressure| pressure.0)),
         ..ENGINE
     },
+    Check {
+        name: "generator_speed",
+        unit: Unit::of("rpm"),
+        side: Side::Below,
+        warn: Some(Param::GenSpeedWarn),
+        critical: Some(Param::GenSpeedCrit),
+        hysteresis: GENERATOR_HYSTERESIS_RPM,
+        when: When::Armed,
+        read: generator_rpm,
+        ..ENGINE
+    },
     Check { name: "engine_due", ..due(Subsystem::Engine) },
 ];
 
 fn read(inputs: &Inputs<'_>, value: impl FnOnce(&Engine) -> Option<f32>) -> Option<Reading> {
     let engine = &inputs.vehicle.engine;
     Reading::new(engine.at(), value(engine.get()?))
+}
+
+/// The speed counts once the generator has reached its limits since it was switched on. Before that, and while it is off, the
+/// value is a good one: a value that ends would become stale.
+fn generator_rpm(inputs: &Inputs<'_>, _: u8) -> Option<Reading> {
+    let slot = &inputs.vehicle.generator;
+    let (generator, top) = (slot.get()?, inputs.vehicle.generator_top?);
+    let limit = inputs.params.get(Param::GenSpeedWarn).max(inputs.params.get(Param::GenSpeedCrit));
+    let is_judged = !generator.is_off && top.0 >= limit;
+    let value = if is_judged { generator.speed?.0 } else { limit + GENERATOR_HYSTERESIS_RPM };
+    Reading::new(slot.at(), Some(value))
 }

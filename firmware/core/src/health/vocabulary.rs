@@ -225,6 +225,8 @@ vocabulary! {
     "The engine's exhaust gas was too hot."; "Check the mixture before the next flight.";
     "fuel_pressure" Vehicle "fuel pressure", "", says "fuel pressure low", "LAND NOW", needs "engine data";
     "The fuel pressure was too low."; "Check pump, filter and lines before the next flight.";
+    "generator_speed" Vehicle "generator speed", "", says "generator speed low", "LAND", needs "generator data";
+    "The generator turned too slowly: the flight may have gone on by battery alone."; "Check fuel, engine and generator before the next flight.";
     "engine_due" Stored "engine life", "", says "engine life used", "SERVICE IT", needs "engine registered with the monitor on board";
     "The engine is due for maintenance."; "Do the maintenance, and tell the monitor.";
 

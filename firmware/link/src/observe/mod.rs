@@ -68,6 +68,7 @@ fn by_id(id: u32, payload: &[u8]) -> Option<Observation> {
         290 => Observation::Escs(propulsion::esc_info(payload)?),
         291 => Observation::Escs(propulsion::esc_status(payload)?),
         339 => Observation::SpeedSensors(propulsion::raw_rpm(payload)?),
+        373 => Observation::Generator(propulsion::generator(payload)?),
         410 => Observation::Alert(system::alert_of_event(payload)?),
         441 => Observation::GnssIntegrity(motion::gnss_integrity(payload)),
         11_030..=11_032 => Observation::Escs(propulsion::esc_telemetry(id, payload)?),

@@ -1,6 +1,6 @@
-//! Motors, ESCs and engines.
+//! Motors, ESCs, engines and generators.
 
-use hums_core::observation::{ESC_GROUP, Engine, Esc, EscGroup, SpeedSensor};
+use hums_core::observation::{ESC_GROUP, Engine, Esc, EscGroup, Generator, SpeedSensor};
 use hums_core::units::{Amperes, Celsius, Fraction, Hectopascals, Rpm, Volts};
 use hums_dialect::ardupilotmega as ap;
 
@@ -89,6 +89,15 @@ pub(super) fn engine(payload: &[u8]) -> Option<Engine> {
         intake: temperature(efi.intake_manifold_temperature),
         fuel_pressure: extension(efi.fuel_pressure).map(|kilopascals| Hectopascals(kilopascals * 10.0)),
         ignition: extension(efi.ignition_voltage).map(Volts),
+    })
+}
+
+/// The generator of a hybrid drone.
+pub(super) fn generator(payload: &[u8]) -> Option<Generator> {
+    let message = read::<ap::GENERATOR_STATUS_DATA>(payload, &[])?;
+    Some(Generator {
+        is_off: message.status.contains(ap::MavGeneratorStatusFlag::MAV_GENERATOR_STATUS_FLAG_OFF),
+        speed: unless(message.generator_speed, u16::MAX).map(|speed| Rpm(f32::from(speed))),
     })
 }
 

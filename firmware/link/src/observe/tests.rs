@@ -4,7 +4,7 @@ use hums_core::observation::{
     Autopilot, CellVoltage, EstimatorScale, LandedState, Observation, SystemTime, VehicleKind, VtolState,
 };
 use hums_core::units::{
-    Amperes, Celsius, Fraction, Gauss, Hectopascals, Metres, MetresPerSecond, MetresPerSecond2, Volts,
+    Amperes, Celsius, Fraction, Gauss, Hectopascals, Metres, MetresPerSecond, MetresPerSecond2, Rpm, Volts,
 };
 use hums_dialect::ardupilotmega as ap;
 use hums_dialect::{MavlinkVersion, MessageData};
@@ -293,6 +293,22 @@ fn an_exhaust_at_absolute_zero_and_extensions_at_zero_are_unknown() {
     let Some(Observation::Engine(engine)) = said(&message) else { panic!() };
     assert_eq!((engine.exhaust, engine.fuel_pressure, engine.ignition), (None, None, None));
     assert_eq!(engine.cylinder_head, Some(Celsius(201.0)));
+}
+
+#[test]
+fn a_generator_of_unknown_speed_has_none_and_new_flags_hide_neither_speed_nor_off() {
+    let told = |message: &ap::GENERATOR_STATUS_DATA| {
+        let Some(Observation::Generator(generator)) = said(message) else { panic!() };
+        (generator.is_off, generator.speed)
+    };
+    let flags = ap::MavGeneratorStatusFlag::from_bits_retain;
+    let running =
+        ap::GENERATOR_STATUS_DATA { status: flags(4), generator_speed: 6_200, ..Default::default() };
+    assert_eq!(told(&running), (false, Some(Rpm(6_200.0))));
+    let unknown = ap::GENERATOR_STATUS_DATA { generator_speed: u16::MAX, ..running.clone() };
+    assert_eq!(told(&unknown), (false, None));
+    let newer = ap::GENERATOR_STATUS_DATA { status: flags(1 << 40 | 1), ..running };
+    assert_eq!(told(&newer), (true, Some(Rpm(6_200.0))));
 }
 
 #[test]
