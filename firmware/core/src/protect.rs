@@ -4,7 +4,7 @@
 //! |---|---|---|
 //! | idle | in flight, and critical | counting: announced; on its way, if it returns or lands already |
 //! | counting | `PROT_DELAY` is over | asking |
-//! | counting | no longer critical; the autopilot changes the mode | idle |
+//! | counting | measured as no longer critical; the autopilot changes the mode | idle |
 //! | asking | accepted; no answer to 3 requests | on its way; done |
 //! | asking | refused | asking for a landing, or done |
 //! | counting, asking | cancelled by command | done |
@@ -23,7 +23,7 @@
 //!
 //! A return that is refused (no position) is followed by a landing, where the vehicle can land as it hangs: multicopters,
 //! helicopters, and a VTOL that says that it hovers. Nothing is asked of a vehicle that returns or lands already, by its mode, by its
-//! landed state or because it sinks close above the ground. `ArduPlane` and PX4 tell a mission's landing by none of these:
+//! landed state or because it sinks close above the ground, once one of these has lasted 2 s; until then the action waits. `ArduPlane` and PX4 tell a mission's landing by none of these:
 //! a mission that sinks in the last `APPROACH_M` is one (`approaches`). The control structure and what could go wrong with it are in
 //! docs/safety.md.
 
@@ -39,7 +39,7 @@ use crate::observation::{
     Autopilot, CommandAck, Feeds, LandedState, OUR_COMPONENT, Source, VehicleKind, VtolState,
 };
 use crate::params::{Param, Params};
-use crate::time::{Instant, Span, Stamp};
+use crate::time::{Instant, PAUSE, Span, Stamp};
 use crate::vehicle::{BATTERIES_MAX, LANDED_STATE_AGE, Vehicle};
 
 /// Bytes of a text that a ground station shows to the pilot as it comes: those of one `STATUSTEXT`.
@@ -56,6 +56,8 @@ const MISSION_ENDS: Span = Span::from_secs(3);
 /// A mission that sinks faster than this, within this height of home, may be landing.
 const APPROACH_MPS: f32 = 0.5;
 const APPROACH_M: f32 = 40.0;
+/// A sign of landing that has lasted so long is believed. One message says nothing, nor do the pauses of a stream at 1 Hz.
+const LANDING_SHOWS: Span = PAUSE;
 /// A vehicle that showed a sign of landing so lately is landing: it may flare.
 const LANDING_LASTS: Span = Span::from_secs(15);
 /// A mode change is the autopilot's own if a sign of that comes within this time, before or after.
@@ -263,7 +265,7 @@ enum Input {
     ModeByAutopilot,
     /// In the air, and in no mishap.
     Flies,
-    /// On the ground for a moment, or in a mishap.
+    /// On the ground for a moment, in a mishap, or with a sign of landing that has to last yet.
     Waits,
 }
 
@@ -281,9 +283,14 @@ pub struct Protect {
     mode: Option<u32>,
     changed_at: Stamp,
     stepped_at: Stamp,
-    /// When the vehicle showed a sign of landing last.
+    /// Since when the vehicle has shown a sign of landing, and when it showed one last that lasted.
+    lands_since: Stamp,
     landing_at: Stamp,
+    /// The critical check that is the reason: its name and instance.
+    reason: Option<Reason>,
 }
+
+type Reason = (&'static str, u8);
 
 /// What a step looks at.
 #[derive(Clone, Copy)]
@@ -315,7 +322,9 @@ impl Protect {
             mode: None,
             changed_at: Stamp::NONE,
             stepped_at: Stamp::NONE,
+            lands_since: Stamp::NONE,
             landing_at: Stamp::NONE,
+            reason: None,
         }
     }
 
@@ -370,7 +379,8 @@ impl Protect {
         let Situation { now, vehicle, flight, .. } = *situation;
         let cancelled = core::mem::take(&mut self.cancelled);
         let changed = self.note_mode(now, vehicle);
-        if is_landing(situation) {
+        let lands_now = is_landing(situation);
+        if self.lands_since.run(lands_now, now, LANDING_SHOWS) {
             self.landing_at = Stamp::at(now);
         }
         if !flight.is_open() {
@@ -389,7 +399,7 @@ impl Protect {
             return Input::Way(Way::Mode);
         }
         let lands = self.landing_at.age(now).is_some_and(|age| age < LANDING_LASTS);
-        changed.unwrap_or(match (lands, situation.flies()) {
+        changed.unwrap_or(match (lands, situation.flies() && !lands_now) {
             (true, _) => Input::Way(Way::Landing),
             (false, true) => Input::Flies,
             (false, false) => Input::Waits,
@@ -416,10 +426,10 @@ impl Protect {
 
     /// Announces the action, once something is critical.
     fn start(&mut self, situation: &Situation<'_>, input: Input) -> Move {
-        let Situation { vehicle, health, params, .. } = *situation;
+        let Situation { params, .. } = *situation;
+        self.reason = reason(situation, None);
         let action = Action::from_number(params.get(Param::ProtAction) as u8);
-        let Some(action) = action.filter(|_| self.mode.is_some() && concerned(vehicle, health, params))
-        else {
+        let Some(action) = action.filter(|_| self.mode.is_some() && self.reason.is_some()) else {
             return (State::Idle, None);
         };
         self.action = action;
@@ -432,12 +442,12 @@ impl Protect {
     }
 
     fn count(&mut self, situation: &Situation<'_>, left_ms: u32, told_s: u8) -> Move {
-        let Situation { now, vehicle, health, params, .. } = *situation;
-        if !concerned(vehicle, health, params) {
+        self.reason = reason(situation, self.reason);
+        if self.reason.is_none() {
             return (State::Idle, Some((Stage::CancelledClear, 0)));
         }
         if left_ms == 0 {
-            return self.ask(now, 1);
+            return self.ask(situation.now, 1);
         }
         let left_s = left_ms.div_ceil(1_000).min(255) as u8;
         let tells = left_s < told_s && (left_s.is_multiple_of(5) || left_s <= 3);
@@ -502,12 +512,13 @@ fn is_ours(ack: &CommandAck, vehicle: &Vehicle, action: Action) -> bool {
     ack.command == action.command() && ack.target.is_none_or(|target| target == us)
 }
 
-/// Whether a check that `PROT_CHECK` names is critical: 0 an empty battery (by what remains or by its cells), from 1 on
-/// any check of a subsystem. A battery that feeds the avionics or the payload alone, or nobody knows what, is no reason to come
-/// down.
-fn concerned(vehicle: &Vehicle, health: &Health, params: &Params) -> bool {
+/// The check that is critical, of those that `PROT_CHECK` names; or the one that was, while it is silent: that is no better level.
+/// They are: 0 an empty battery (by what remains or by its cells), from 1 on any check of a subsystem. A battery that feeds the
+/// avionics or the payload alone, or nobody knows what, is no reason to come down.
+fn reason(situation: &Situation<'_>, before: Option<Reason>) -> Option<Reason> {
+    let Situation { vehicle, health, params, .. } = *situation;
     let chosen = params.get(Param::ProtCheck) as u8;
-    health.levels().any(|(check, instance, level)| {
+    let reasons = health.levels().filter_map(|(check, instance, level)| {
         let concerned = match chosen.checked_sub(1) {
             None => matches!(check.name, "batt_remaining" | "cell_voltage" | "batt_state"),
             Some(subsystem) => Subsystem::from_number(subsystem) == Some(check.subsystem),
@@ -516,8 +527,15 @@ fn concerned(vehicle: &Vehicle, health: &Health, params: &Params) -> bool {
         let other = check.subsystem == Subsystem::Power
             && check.instances as usize == BATTERIES_MAX
             && battery.is_some_and(|battery| battery.feeds != Feeds::Vehicle);
-        concerned && level == Level::Critical && !other
-    })
+        (concerned && !other).then_some(((check.name, instance), level))
+    });
+    let find = |wanted: Level, only: Option<Reason>| {
+        let mut found = reasons
+            .clone()
+            .filter(|(reason, level)| *level == wanted && only.is_none_or(|only| only == *reason));
+        found.next().map(|(reason, _)| reason)
+    };
+    find(Level::Critical, None).or_else(|| before.and_then(|before| find(Level::Stale, Some(before))))
 }
 
 /// Modes of an autopilot, by its own numbers.

@@ -17,6 +17,8 @@ pub const AUTOPILOT: Source = Source { system: 1, component: 1 };
 #[derive(Clone)]
 pub struct Quad {
     pub silent: bool,
+    /// Its battery says nothing.
+    pub battery_silent: bool,
     pub armed: bool,
     pub boot_offset_ms: i64,
     pub battery: Battery,
@@ -65,6 +67,7 @@ impl Quad {
         };
         Self {
             silent: false,
+            battery_silent: false,
             armed: true,
             boot_offset_ms: 100_000,
             battery: Battery {
@@ -156,8 +159,8 @@ impl Quad {
             Observation::GnssIntegrity(self.integrity),
             Observation::Vibration(self.vibration),
             Observation::SystemStatus(self.system),
-            Observation::Battery(self.battery),
         ];
+        said.extend((!self.battery_silent).then_some(Observation::Battery(self.battery)));
         said.extend(self.climb_wanted.map(|climb| Observation::ClimbWanted(MetresPerSecond(climb))));
         if now_ms.is_multiple_of(500) {
             said.push(Observation::Heartbeat(heartbeat));
