@@ -201,8 +201,7 @@ fn a_page_of_an_equal_session_of_another_card_is_refused() {
     };
     let one = page("one", "", 0);
     assert!(page("two", "", 1) == one);
-    // Of two in one folder it is told that no card gave them their numbers.
-    let two = page("two", "--force", 3);
+    let two = page("two", "--force", 0);
     assert!(two != one);
     assert!(page("one", "--force", 0) == one);
 }
