@@ -286,11 +286,9 @@ pub struct Protect {
     /// Since when the vehicle has shown a sign of landing, and when it showed one last that lasted.
     lands_since: Stamp,
     landing_at: Stamp,
-    /// The critical check that is the reason: its name and instance.
-    reason: Option<Reason>,
+    /// The number of the critical check that is the reason.
+    reason: Option<u16>,
 }
-
-type Reason = (&'static str, u8);
 
 /// What a step looks at.
 #[derive(Clone, Copy)]
@@ -513,12 +511,12 @@ fn is_ours(ack: &CommandAck, vehicle: &Vehicle, action: Action) -> bool {
 }
 
 /// The check that is critical, of those that `PROT_CHECK` names; or the one that was, while it is silent: that is no better level.
-/// They are: 0 an empty battery (by what remains or by its cells), from 1 on any check of a subsystem. A battery that feeds the
+/// It names: 0 an empty battery (by what remains or by its cells), from 1 on any check of a subsystem. A battery that feeds the
 /// avionics or the payload alone, or nobody knows what, is no reason to come down.
-fn reason(situation: &Situation<'_>, before: Option<Reason>) -> Option<Reason> {
+fn reason(situation: &Situation<'_>, before: Option<u16>) -> Option<u16> {
     let Situation { vehicle, health, params, .. } = *situation;
     let chosen = params.get(Param::ProtCheck) as u8;
-    let reasons = health.levels().filter_map(|(check, instance, level)| {
+    let reasons = health.numbered_levels().filter_map(|(number, check, instance, level)| {
         let concerned = match chosen.checked_sub(1) {
             None => matches!(check.name, "batt_remaining" | "cell_voltage" | "batt_state"),
             Some(subsystem) => Subsystem::from_number(subsystem) == Some(check.subsystem),
@@ -527,15 +525,11 @@ fn reason(situation: &Situation<'_>, before: Option<Reason>) -> Option<Reason> {
         let other = check.subsystem == Subsystem::Power
             && check.instances as usize == BATTERIES_MAX
             && battery.is_some_and(|battery| battery.feeds != Feeds::Vehicle);
-        (concerned && !other).then_some(((check.name, instance), level))
+        (concerned && !other).then_some((number, level))
     });
-    let find = |wanted: Level, only: Option<Reason>| {
-        let mut found = reasons
-            .clone()
-            .filter(|(reason, level)| *level == wanted && only.is_none_or(|only| only == *reason));
-        found.next().map(|(reason, _)| reason)
-    };
-    find(Level::Critical, None).or_else(|| before.and_then(|before| find(Level::Stale, Some(before))))
+    let critical = reasons.clone().find(|(_, level)| *level == Level::Critical);
+    let silent = || reasons.clone().find(|(number, level)| *level == Level::Stale && before == Some(*number));
+    critical.or_else(silent).map(|(number, _)| number)
 }
 
 /// Modes of an autopilot, by its own numbers.

@@ -210,10 +210,15 @@ impl Health {
 
     /// Every check instance that has had something to say, with its level.
     pub fn levels(&self) -> impl Iterator<Item = (&'static Check, u8, Level)> + Clone {
-        checks()
-            .flat_map(|check| (0..check.instances).map(move |instance| (check, instance)))
-            .zip(&self.states)
-            .filter_map(|((check, instance), state)| state.level().map(|level| (check, instance, level)))
+        self.numbered_levels().map(|(_, check, instance, level)| (check, instance, level))
+    }
+
+    /// The same, each with a number that is its own.
+    pub(crate) fn numbered_levels(&self) -> impl Iterator<Item = (u16, &'static Check, u8, Level)> + Clone {
+        let places = checks().flat_map(|check| (0..check.instances).map(move |instance| (check, instance)));
+        (0..).zip(places.zip(&self.states)).filter_map(|(number, ((check, instance), state))| {
+            state.level().map(|level| (number, check, instance, level))
+        })
     }
 
     /// Whether an alarm's value is good just now, and its level about to fall.
