@@ -7,7 +7,7 @@ mod common;
 use common::{AUTOPILOT, Quad};
 use hums_core::Monitor;
 use hums_core::health::{CLEAR, Finding, Level, Subsystem};
-use hums_core::observation::{Observation, Sensors, SystemTime, VehicleKind};
+use hums_core::observation::{Autopilot, EstimatorScale, Observation, Sensors, SystemTime, VehicleKind};
 use hums_core::params::Params;
 use hums_core::status::{LinkReading, Recording};
 use hums_core::time::{Instant, Span};
@@ -458,4 +458,47 @@ fn an_esc_of_a_plane_that_glides_may_fall_silent() {
     };
     assert!(told(0.5));
     assert!(!told(0.0));
+}
+
+/// When and because of which check an estimator's check is critical.
+fn critical_of(check: &str, findings: &[Finding]) -> Vec<(u64, &'static str)> {
+    let mine = findings.iter().filter(|finding| finding.check == check && finding.level == Level::Critical);
+    mine.map(|finding| (finding.at.as_millis() / 1_000, finding.because)).collect()
+}
+
+#[test]
+fn a_critical_outlives_a_cause_that_falls_to_a_warning() {
+    let findings = fly(|now_ms, quad| {
+        quad.vibration.levels = [Some(if now_ms < FAULT_MS + 10_000 { 80.0 } else { 45.0 }); 3];
+        if now_ms >= FAULT_MS + 2_000 {
+            (quad.estimator.velocity, quad.estimator.position_horizontal) = (Some(1.2), Some(1.2));
+        }
+    });
+    let fell =
+        findings.iter().rfind(|finding| finding.check == "vibration" && finding.level == Level::Warning);
+    let fell_s = fell.expect("it falls").at.as_millis() / 1_000;
+    assert_eq!(critical_of("ekf_failsafe", &findings), [(23, "vibration"), (fell_s + 8, "")]);
+}
+
+#[test]
+fn an_alarm_that_rises_long_after_its_cause_began_is_not_explained_by_it() {
+    let findings = fly(|now_ms, quad| {
+        quad.autopilot = Autopilot::Px4;
+        quad.mode = 3 << 16;
+        quad.estimator.scale = EstimatorScale::TestRatio;
+        quad.vibration.levels = [Some(0.01), Some(0.01), Some(20.0)];
+        let velocity = if now_ms < FAULT_MS + 2_000 {
+            0.1
+        } else if now_ms < 70_000 {
+            0.8
+        } else {
+            5.0
+        };
+        quad.estimator.velocity = Some(velocity);
+    });
+    let warned = findings.iter().find(|finding| finding.check == "ekf_test_ratio").expect("it warns");
+    assert_eq!((warned.level, warned.because), (Level::Warning, "vibration_px4"));
+    let critical = critical_of("ekf_test_ratio", &findings);
+    assert!(critical.iter().all(|(at_s, because)| *at_s >= 70 && because.is_empty()), "{critical:?}");
+    assert!(!critical.is_empty());
 }

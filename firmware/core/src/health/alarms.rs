@@ -1,11 +1,12 @@
 //! The alarms that stand: since when each does, and which other one explains it.
 
+use super::finding::Level;
 use crate::time::{Instant, Span};
 
-/// Alarms that are kept. One more is reported, and explains nothing.
+/// Alarms that are kept. One more is reported, explains nothing and is not explained.
 pub(super) const ALARMS_MAX: usize = 32;
 
-/// An explained alarm that goes on for so long after its cause ended is reported by itself: what a cause disturbed needs
+/// An explained alarm that goes on for so long after its cause ended, or fell below it, is reported by itself: what a cause disturbed needs
 /// some seconds to settle.
 pub(super) const OUTLIVES: Span = Span::from_secs(8);
 
@@ -13,8 +14,10 @@ pub(super) const OUTLIVES: Span = Span::from_secs(8);
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Standing {
     pub(super) slot: u16,
+    pub(super) level: Level,
+    /// Its onset: when it began, or rose to its level.
     pub(super) since: Instant,
-    /// The state whose alarm explains it, and when that ended.
+    /// The state whose alarm explains it, and when that ended or fell below this one.
     cause: Option<u16>,
     cause_ended: Option<Instant>,
 }
@@ -30,28 +33,28 @@ impl Alarms {
         self.0.iter().flatten()
     }
 
-    /// Since when a state has an alarm, which begins now if it had none.
-    pub(super) fn begin(&mut self, slot: u16, now: Instant) -> Instant {
-        if let Some(known) = self.iter().find(|known| known.slot == slot) {
-            return known.since;
-        }
-        if let Some(free) = self.0.iter_mut().find(|place| place.is_none()) {
-            *free = Some(Standing { slot, since: now, cause: None, cause_ended: None });
-        }
-        now
-    }
-
-    /// A state has an alarm no longer.
-    pub(super) fn end(&mut self, slot: u16, now: Instant) {
-        for place in &mut self.0 {
-            match place {
-                Some(ended) if ended.slot == slot => *place = None,
-                Some(explained) if explained.cause == Some(slot) && explained.cause_ended.is_none() => {
-                    explained.cause_ended = Some(now);
-                }
-                _ => {}
+    /// A state's level changes. Gives since when it has an alarm; `None` where it has none, or no place is left for it. A rise is
+    /// an onset of its own, with no cause yet. What the alarm no longer explains at its new level outlives it from now on.
+    pub(super) fn change(&mut self, slot: u16, level: Level, now: Instant) -> Option<Instant> {
+        let is_alarm = matches!(level, Level::Warning | Level::Critical);
+        for known in self.0.iter_mut().flatten() {
+            let explains = is_alarm && level as u8 >= known.level as u8;
+            if known.cause == Some(slot) && known.cause_ended.is_none() && !explains {
+                known.cause_ended = Some(now);
             }
         }
+        let of = |slot: Option<u16>| {
+            move |place: &Option<Standing>| place.as_ref().map(|known| known.slot) == slot
+        };
+        let mut places = self.0.iter();
+        let place = places.clone().position(of(Some(slot))).or_else(|| places.position(of(None)))?;
+        let place = self.0.get_mut(place)?;
+        *place = match *place {
+            _ if !is_alarm => None,
+            Some(known) if (level as u8) < known.level as u8 => Some(Standing { level, ..known }),
+            _ => Some(Standing { slot, level, since: now, cause: None, cause_ended: None }),
+        };
+        Some(place.as_ref()?.since)
     }
 
     /// The state that explains an alarm and still has its own.

@@ -2,8 +2,8 @@
 //!
 //! A dead motor tips the vehicle over, a receiver without a fix makes the estimator doubt, and what is silent has no data at all. Who
 //! hears of all of it at once does not hear the cause. So a finding names the check that explains it, where that has an alarm which is
-//! as bad or worse and begins within 12 s of it; it is recorded like any other, and not told to the ground. Where it outlives that
-//! alarm by 8 s it is told by itself.
+//! as bad or worse and begins within 12 s of it; it is recorded like any other, and not told to the ground. Where that alarm ended, or fell
+//! below it, 8 s ago it is told by itself. A rise of level is an onset too.
 //!
 //! A mishap explains only what begins with it or after it ([`is_with_mishap`]): what came before may be its cause, and stands by itself.
 
@@ -174,7 +174,7 @@ pub fn explains(cause: &str, effect: &str) -> bool {
 /// An alarm of a check.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Alarm<'a> {
-    /// When it began: its onset.
+    /// Its onset: when it began, or rose to its level.
     pub since: Instant,
     /// The check.
     pub check: &'a str,

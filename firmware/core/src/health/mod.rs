@@ -156,7 +156,7 @@ impl Health {
     }
 
     /// The check whose alarm explains a change to a level; empty where none does. An alarm keeps its cause while that goes on and is as
-    /// bad.
+    /// bad, until it rises itself.
     fn explain(
         &mut self,
         slot: u16,
@@ -165,17 +165,13 @@ impl Health {
         level: Level,
         now: Instant,
     ) -> &'static str {
-        let is_alarm = matches!(level, Level::Warning | Level::Critical);
-        let since = if is_alarm { self.alarms.begin(slot, now) } else { now };
-        if !is_alarm {
-            self.alarms.end(slot, now);
-        }
-        let is_as_bad = |cause: &u16| {
-            let of_cause = self.states.get(usize::from(*cause)).and_then(State::alarm);
-            of_cause.is_some_and(|of_cause| of_cause as u8 >= level as u8)
+        let since = match self.alarms.change(slot, level, now) {
+            Some(since) => since,
+            None if level == Level::Stale => now,
+            None => return "",
         };
         let effect = Alarm { since, check: check.name, instance, level };
-        let cause = self.alarms.cause(slot).filter(is_as_bad).or_else(|| {
+        let cause = self.alarms.cause(slot).or_else(|| {
             let cause =
                 consequence::because(&effect, self.standing().filter(|other| other.check != check.name))?;
             slot_of(cause.check, cause.instance)
@@ -188,8 +184,7 @@ impl Health {
     fn standing(&self) -> impl Iterator<Item = Alarm<'static>> + Clone {
         self.alarms.iter().filter_map(|standing| {
             let (check, instance) = check_of(standing.slot)?;
-            let level = self.states.get(usize::from(standing.slot))?.alarm()?;
-            Some(Alarm { since: standing.since, check: check.name, instance, level })
+            Some(Alarm { since: standing.since, check: check.name, instance, level: standing.level })
         })
     }
 
