@@ -63,10 +63,10 @@ impl Instant {
         if other.is_after(self) { other } else { self }
     }
 
-    /// The earlier one of two.
+    /// The earlier one of two, by the rule of [`Self::since`]: what is not up to [`AHEAD_MAX`] later than `other` lies before it.
     #[must_use]
     pub const fn earlier(self, other: Self) -> Self {
-        if other.is_after(self) { self } else { other }
+        if other.since(self).0 == 0 { other } else { self }
     }
 }
 
@@ -199,7 +199,9 @@ mod tests {
         let month = Span::from_secs(30 * 86_400);
         for start_ms in [5, 1_u64 << 31, (1 << 32) - 5] {
             let start = Instant::from_millis(start_ms);
-            assert!(Stamp::at(start).older_than(start + month, Span::from_secs(2)));
+            let now = start + month;
+            assert!(Stamp::at(start).older_than(now, Span::from_secs(2)));
+            assert_eq!(start.earlier(now), start);
         }
     }
 }
