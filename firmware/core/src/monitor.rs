@@ -162,6 +162,8 @@ impl Monitor {
         self.before_tick = Before { changes: self.vehicle.changes, ..Before::NOTHING };
         apart(|| self.flight = Flight::grounded());
         apart(|| self.derived = Derived::new());
+        apart(|| self.trends = Trends::new());
+        self.wear = [None; COMPONENTS_MAX];
         self.health.clear();
         self.exceedances.end(self.ticked_at);
         self.protect = Protect::new();
