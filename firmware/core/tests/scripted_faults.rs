@@ -502,3 +502,49 @@ fn an_alarm_that_rises_long_after_its_cause_began_is_not_explained_by_it() {
     assert!(critical.iter().all(|(at_s, because)| *at_s >= 70 && because.is_empty()), "{critical:?}");
     assert!(!critical.is_empty());
 }
+
+#[test]
+fn a_mishap_that_is_over_explains_nothing_where_levels_are_latched() {
+    let mut latched = Params::defaults();
+    latched.set("HEALTH_LATCH", 1.0).unwrap();
+    let (_, findings) = fly_with(&latched, |now_ms, quad| {
+        if now_ms < FAULT_MS + 700 {
+            quad.acceleration_down = -0.5 - (now_ms / 100 % 7) as f32 * 0.01;
+        }
+        if now_ms >= FAULT_MS + 30_000 {
+            quad.escs[2].as_mut().unwrap().failures = Some(0x20);
+        }
+    });
+    assert!(findings.iter().any(|finding| finding.check == "free_fall"), "{findings:?}");
+    let failure = findings.iter().find(|finding| finding.check == "esc_failure").expect("found");
+    assert_eq!(failure.because, "");
+}
+
+#[test]
+fn a_value_of_power_on_is_stale_for_ever() {
+    let mut monitor = Monitor::new(Params::defaults());
+    let quad = Quad::healthy();
+    let mut hot = quad.battery;
+    hot.temperature = Some(Celsius(95.0));
+    let mut levels = Vec::new();
+    for day in [0, 24, 25, 48] {
+        for ms in (0..20_000).step_by(50) {
+            let now = Instant::from_millis(day * 86_400_000 + ms);
+            for observation in quad.says(ms) {
+                if !matches!(observation, Observation::Battery(_)) {
+                    monitor.observe(now, AUTOPILOT, &observation);
+                }
+            }
+            if day == 0 && ms < 6_000 {
+                monitor.observe(now, AUTOPILOT, &Observation::Battery(hot));
+            }
+            let link = LinkReading { frames_lost: Some(0.0), at: now };
+            monitor.tick(now, &link, &quad.recorder, &mut |finding| {
+                if finding.check == "batt_temperature" {
+                    levels.push((day, finding.level));
+                }
+            });
+        }
+    }
+    assert_eq!(levels.last(), Some(&(0, Level::Stale)), "{levels:?}");
+}

@@ -278,8 +278,10 @@ impl Now {
         Self { hows }
     }
 
+    /// A mishap's level falls even where levels are latched: it explains what others say only while it goes on.
     const fn how(&self, check: &Check) -> How {
-        self.hows[check.when as usize]
+        let how = self.hows[check.when as usize];
+        How { latched: how.latched && !matches!(check.subsystem, Subsystem::Mishap), ..how }
     }
 }
 
