@@ -3,7 +3,7 @@
 //! Power may go at each single block write. A new segment's FAT is written first and its directory entry last: a cut in between
 //! leaves clusters that no file has, and nothing else. All other changes of the file system are one block write.
 
-use core::ops::ControlFlow;
+use core::ops::{ControlFlow, Range};
 
 use embedded_sdmmc::Block;
 
@@ -11,8 +11,8 @@ use crate::CardDevice;
 pub use crate::card_error::CardError;
 use crate::chain::ClusterChain;
 use crate::directory::{
-    ARCHIVE, ATTRIBUTES, BLOCK_ENTRIES, CLUSTER_HIGH, CLUSTER_LOW, Directory, ENTRY_BYTES, Entry, HIDDEN,
-    LENGTH, MADE, Newest, Slot, VERIFY_BLOCKS, WRITTEN, clusters_of, walk,
+    ARCHIVE, ATTRIBUTES, BLOCK_ENTRIES, CLUSTER_HIGH, CLUSTER_LOW, DELETED, Directory, ENTRY_BYTES, Entry,
+    HIDDEN, LENGTH, MADE, NEVER_USED, Newest, Slot, VERIFY_BLOCKS, WRITTEN, clusters_of, walk,
 };
 use crate::free::{FreeSearch, chain_free, write_hint};
 use crate::layout::{Layout, LayoutError};
@@ -229,19 +229,19 @@ impl<'a, D: CardDevice> Card<'a, D> {
     /// held before. At every moment in between, the directory is as before or holds the whole segment.
     pub fn create(&mut self, name: LogName, bytes: u32) -> Result<(), CardError<D::Error>> {
         self.open = None;
+        if !self.directory.is_known {
+            self.learn(self.free.next(), None)?;
+        }
         let wanted = clusters_of(&self.volume, bytes).max(1);
         // A card that logs and the directory fill is not searched.
         let others = self.volume.layout.clusters.saturating_sub(self.directory.clusters).saturating_sub(1);
         if others < wanted {
             return Err(CardError::Full);
         }
-        let mut place = self.directory.place_for_new(&self.volume)?;
-        if place.is_none() {
+        if self.place_for_new()?.is_none() {
             self.lengthen_directory()?;
-            place = self.directory.place_for_new(&self.volume)?;
         }
-        let place = place.ok_or(CardError::Damaged)?;
-        let (first, last) = match self.take_free(wanted) {
+        let found = match self.find_free(wanted) {
             // Little can be free, and to search all of the FAT for it takes seconds in which nothing is written.
             Err(CardError::Searching)
                 if others < self.volume.layout.clusters / UNSEARCHED && !self.device().keeps_logs() =>
@@ -250,11 +250,15 @@ impl<'a, D: CardDevice> Card<'a, D> {
             }
             found => found?,
         };
+        // The search may have walked over the directory, and the walk notes the places anew.
+        let place = self.place_for_new()?.ok_or(CardError::Damaged)?;
+        let (first, last) = chain_free(&self.volume, &found, wanted)?;
         write_hint(&self.volume, last + 1)?;
         let bytes = wanted.saturating_mul(self.volume.layout.cluster_blocks * Block::LEN_U32);
         let made = LogEntry { name, bytes, hidden: false, utc_secs: 0, first, place };
         let date = self.status.fat_date();
         self.change_entry(place, |entry| {
+            let was_unused = is_unused(entry);
             *entry = [0; ENTRY_BYTES];
             entry[..LogName::SHORT_BYTES].copy_from_slice(&name.short());
             entry[ATTRIBUTES] = ARCHIVE;
@@ -262,7 +266,7 @@ impl<'a, D: CardDevice> Card<'a, D> {
             entry[CLUSTER_LOW..CLUSTER_LOW + 2].copy_from_slice(&first.to_le_bytes()[..2]);
             entry[LENGTH..].copy_from_slice(&bytes.to_le_bytes());
             set_date(entry, date);
-            true
+            was_unused
         })?;
         self.directory.take_place();
         self.directory.add(made, wanted);
@@ -270,8 +274,21 @@ impl<'a, D: CardDevice> Card<'a, D> {
         Ok(())
     }
 
-    /// Finds so many free clusters and makes them a chain; its first and its last one.
-    fn take_free(&mut self, wanted: u32) -> Result<(u32, u32), CardError<D::Error>> {
+    /// The place of a new entry, where no file has one. Where one does, the directory is not as it was noted: it is walked over
+    /// again, once. `None`: the directory needs another cluster.
+    fn place_for_new(&mut self) -> Result<Option<Place>, CardError<D::Error>> {
+        for _ in 0..2 {
+            let Some(place) = self.directory.place_for_new(&self.volume)? else { return Ok(None) };
+            if self.is_unused(place)? {
+                return Ok(Some(place));
+            }
+            self.learn(self.free.next(), None)?;
+        }
+        Err(CardError::Damaged)
+    }
+
+    /// Finds blocks of the FAT with so many free clusters that no log claims.
+    fn find_free(&mut self, wanted: u32) -> Result<Range<u32>, CardError<D::Error>> {
         let mut found = self.free.find(&self.volume, wanted)?;
         // Once for each part of a chain that lies in pieces.
         let mut verified = found.start;
@@ -285,13 +302,14 @@ impl<'a, D: CardDevice> Card<'a, D> {
                 verified += VERIFY_BLOCKS;
             }
         }
-        chain_free(&self.volume, &found, wanted)
+        Ok(found)
     }
 
     /// Gives the directory another cluster, of entries that were never used.
     fn lengthen_directory(&mut self) -> Result<(), CardError<D::Error>> {
         let last = self.directory.last_cluster();
-        let (cluster, _) = self.take_free(1)?;
+        let found = self.find_free(1)?;
+        let (cluster, _) = chain_free(&self.volume, &found, 1)?;
         let (first, blocks) = (self.volume.block_of(cluster), self.volume.layout.cluster_blocks);
         let mut parity = self.buffers.parity.borrow_mut();
         let zeros = parity.lend();
@@ -316,10 +334,9 @@ impl<'a, D: CardDevice> Card<'a, D> {
     /// are passed by.
     pub(crate) fn recycle_oldest(&mut self, name: LogName) -> Result<(), CardError<D::Error>> {
         let of = self.device().keeps_logs().then_some(name.session);
-        let open = self.open.map(|open| open.name);
         let (mut unchained, mut is_fresh) = (0, false);
         loop {
-            if self.directory.oldest.is_empty() || of.is_some() && !is_fresh {
+            if !self.directory.is_known || self.directory.oldest.is_empty() || of.is_some() && !is_fresh {
                 if is_fresh || self.directory.clusters == 0 {
                     return Err(if unchained > 0 { CardError::Damaged } else { CardError::Full });
                 }
@@ -328,7 +345,7 @@ impl<'a, D: CardDevice> Card<'a, D> {
                 continue;
             }
             let oldest = self.directory.oldest.remove(0);
-            if oldest.name == name || Some(oldest.name) == open {
+            if oldest.name == name {
                 continue;
             }
             if self.is_chained(&oldest)? {
@@ -406,6 +423,14 @@ impl<'a, D: CardDevice> Card<'a, D> {
             return Err(CardError::Damaged);
         }
         self.volume.write_metadata(&block, place.block)
+    }
+
+    /// Whether no file has the entry at this place.
+    #[inline(never)]
+    fn is_unused(&self, place: Place) -> Result<bool, CardError<D::Error>> {
+        let mut block = [Block::new()];
+        self.volume.read(&mut block, place.block)?;
+        Ok(block[0].get(usize::from(place.offset)..).is_some_and(is_unused))
     }
 
     /// Finds an existing segment.
@@ -486,6 +511,11 @@ impl<'a, D: CardDevice> Card<'a, D> {
             total_mib: mib(clusters),
         }))
     }
+}
+
+/// Whether no file has this entry: it was never used, or its file was deleted.
+fn is_unused(entry: &[u8]) -> bool {
+    matches!(entry.first(), Some(&(NEVER_USED | DELETED)))
 }
 
 /// The dates when the file was made and written: the same.

@@ -53,8 +53,8 @@ const LONG_NAME: u8 = 0x0F;
 pub(crate) const ARCHIVE: u8 = 0x20;
 
 /// First bytes of an entry: none from here on, and a deleted one.
-const NEVER_USED: u8 = 0;
-const DELETED: u8 = 0xE5;
+pub(crate) const NEVER_USED: u8 = 0;
+pub(crate) const DELETED: u8 = 0xE5;
 
 pub(crate) type Entry = [u8; ENTRY_BYTES];
 
@@ -67,6 +67,8 @@ pub(crate) type Newest = Vec<LogEntry, NEWEST_MAX>;
 /// What is known of the root directory.
 pub(crate) struct Directory {
     root: ClusterChain,
+    /// The walk came to the directory's end. Until then there may be more than is noted.
+    pub(crate) is_known: bool,
     /// The newest names below the last session number. A folder has the length 0.
     pub(crate) newest: Newest,
     /// The newest name of the last session number.
@@ -94,6 +96,7 @@ impl Directory {
     pub(crate) const fn new(root: u32) -> Self {
         Self {
             root: ClusterChain::new(root),
+            is_known: false,
             newest: Vec::new(),
             last: None,
             oldest: Vec::new(),
@@ -131,7 +134,7 @@ impl Directory {
             }
             Ok(ControlFlow::Continue(()))
         })?;
-        (self.root, self.verified) = (root, verified);
+        (self.root, self.verified, self.is_known) = (root, verified, true);
         Ok(changed)
     }
 
