@@ -7,7 +7,7 @@
 //!
 //! Each line is set, recorded and stored as if a ground station had set it, at every power-on as long as the file is there.
 //! A refused line is an event in the record and a text for the ground station. [`BYTES_MAX`] of the file are read,
-//! [`LINE_MAX`] of a line.
+//! [`LINE_MAX`] of a line. The last line is refused where the file's end was not read.
 
 use hums_core::clock::Instant;
 use hums_link::param_line::{self, Line};
@@ -42,8 +42,8 @@ pub(crate) struct Settings {
     state: State,
     ticket: Option<u16>,
     line: heapless::Vec<u8, LINE_MAX>,
-    /// The line is longer than there is room.
-    long: bool,
+    /// The line is longer than there is room, or its end was not read.
+    is_cut: bool,
     number: u16,
     refused: u16,
 }
@@ -54,7 +54,7 @@ impl Settings {
             state: State::NoCard,
             ticket: None,
             line: heapless::Vec::new(),
-            long: false,
+            is_cut: false,
             number: 0,
             refused: 0,
         }
@@ -69,7 +69,7 @@ impl Settings {
     fn take(&mut self, byte: u8) -> bool {
         if byte != b'\n' {
             let comment = self.line.contains(&b'#');
-            self.long |= !comment && self.line.push(byte).is_err();
+            self.is_cut |= !comment && self.line.push(byte).is_err();
         }
         byte == b'\n'
     }
@@ -120,16 +120,16 @@ impl Settings {
             return;
         };
         let mut piece = heapless::Vec::<u8, DATA_MAX>::new();
-        let mut bytes = None;
+        let mut length = None;
         shelf.answer(|answer, data| {
             if answer.ticket == ticket {
-                bytes = Some(answer.bytes.min(BYTES_MAX));
+                length = Some(answer.bytes);
                 // Fits: an answer is never longer.
                 let _ = piece.extend_from_slice(data);
             }
             true
         });
-        let Some(bytes) = bytes else { return };
+        let Some(length) = length else { return };
         self.ticket = None;
         for byte in &piece {
             if self.take(*byte) {
@@ -137,10 +137,11 @@ impl Settings {
             }
         }
         let next = offset + piece.len() as u32;
-        if !piece.is_empty() && next < bytes {
+        if !piece.is_empty() && next < length.min(BYTES_MAX) {
             self.state = State::Reading(next);
             return;
         }
+        self.is_cut |= next != length;
         self.line(now, book, sectors);
         self.state = State::Done;
     }
@@ -148,10 +149,10 @@ impl Settings {
     /// Sets what a line says.
     fn line(&mut self, now: Instant, book: &mut Logbook<'_>, sectors: &mut SectorsIn) {
         self.number = self.number.saturating_add(1);
-        let (number, long) = (self.number, core::mem::take(&mut self.long));
+        let (number, is_cut) = (self.number, core::mem::take(&mut self.is_cut));
         let line = core::mem::take(&mut self.line);
         let set = match core::str::from_utf8(&line).map(param_line::read) {
-            _ if long => false,
+            _ if is_cut => false,
             Ok(Line::Nothing) => true,
             Ok(Line::Set(name, value)) => param_line::value(value)
                 .is_some_and(|value| book.set_parameter(now, name, value, (0, 0), sectors)),

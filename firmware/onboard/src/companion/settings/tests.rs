@@ -43,8 +43,12 @@ fn run(cause: ResetCause, comes: &[(u64, Comes)]) -> ([bool; 2], f32) {
     run_slowly(cause, 1, comes)
 }
 
-/// The same of a card that answers at one tick in so many.
 fn run_slowly(cause: ResetCause, ticks_an_answer: u64, comes: &[(u64, Comes)]) -> ([bool; 2], f32) {
+    run_with(&text(), cause, ticks_an_answer, comes)
+}
+
+/// The same of a file with this text on a card that answers at one tick in so many.
+fn run_with(text: &str, cause: ResetCause, ticks_an_answer: u64, comes: &[(u64, Comes)]) -> ([bool; 2], f32) {
     let (card, port) = (CardStatus::new(), PortStatus::new());
     let (mut monitor, mut writer) = (Box::new(Monitor::new(Params::defaults())), Box::new(Writer::new()));
     let mut queues = Box::new(Queues::new());
@@ -79,7 +83,7 @@ fn run_slowly(cause: ResetCause, ticks_an_answer: u64, comes: &[(u64, Comes)]) -
         while body.uplink(now, &mut ends.uplink_out, &mut ends.sectors_in, &mut ends.gs_in) {}
         body.tick(now, &mut ends.sectors_in, &mut ends.gs_in, &mut |_| {});
         if tick % ticks_an_answer == 0 {
-            ends.shelf.serve_text(text().as_bytes());
+            ends.shelf.serve_text(text.as_bytes());
         }
         while ends.gs_out.take(&mut out).is_some() {}
         while ends.autopilot_out.take(&mut out).is_some() {}
@@ -138,6 +142,20 @@ fn without_a_heartbeat_no_parameters_are_read_nor_long_after_the_last_one() {
     assert_eq!(run(ResetCause::PowerOn, &[(0, Card), (60, Card)]), NOTHING);
     assert_eq!(run(ResetCause::PowerOn, &[(1, DISARMED), (10, Card)]), NOTHING);
     assert_eq!(run(ResetCause::PowerOn, &[(1, ARMED), (10, Card), (60, Card)]), NOTHING);
+}
+
+#[test]
+fn a_line_whose_end_is_not_read_is_refused() {
+    let comes = [(0, Card), (1, DISARMED), (3, DISARMED), (5, DISARMED), (7, DISARMED), (9, DISARMED)];
+    // Of 16 KiB, in pieces of 240 bytes, this is the end.
+    let end = 16_384_usize.next_multiple_of(240);
+    for (number, set) in [("31", [true, true]), ("31.0", [true, false])] {
+        let begin = "PROT_ACTION 1\n# ";
+        let line = format!("\nBAT_REM_WARN {number}");
+        let filler = "#".repeat(end - begin.len() - "\nBAT_REM_WARN 31".len());
+        let (found, _) = run_with(&format!("{begin}{filler}{line}"), ResetCause::PowerOn, 1, &comes);
+        assert_eq!([found[1], found[0]], set, "{number}");
+    }
 }
 
 #[test]
