@@ -72,9 +72,12 @@ impl<'a> Segments<'a> {
     ) -> Result<bool, CardError<D::Error>> {
         let volume_id = card.layout().volume_id;
         let (newest, next) = card.next_session();
-        let resumed = self.log.filter(|log| log.volume_id == volume_id && newest == Some(log.name));
+        // Entries of further segments may be there although the card did not say so.
+        let is_of =
+            |log: &Log| newest.is_some_and(|newest| newest.session == log.name.session && newest >= log.name);
+        let resumed = self.log.filter(|log| log.volume_id == volume_id && is_of(log));
         let log = if let Some(log) = resumed {
-            log
+            Log { name: newest.unwrap_or(log.name), ..log }
         } else {
             self.earlier = card.newest().clone();
             if newest.is_none() {
