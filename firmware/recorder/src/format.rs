@@ -181,7 +181,7 @@ fn boot_sector(plan: &Plan) -> Block {
     block
 }
 
-/// The free count stays unknown for ever (see [`crate::gate`]), so it can never be wrong.
+/// The free count stays unknown for ever, so it can never be wrong.
 fn info_sector(_: &Plan) -> Block {
     let mut block = Block::new();
     put(&mut block, 0, &0x4161_5252_u32.to_le_bytes());

@@ -11,7 +11,7 @@
 //!
 //! * What a card loses of a segment is made again from parity, at the segment's end (`hums_blackbox::parity`).
 //! * Sectors that wait together and lie in a row are written with one command (`chain::ClusterChain`).
-//! * The directory is read once, when a card is mounted (`directory::Directory`): a new segment in flight costs a few blocks.
+//! * The directory is read once, when a card is mounted (`directory::Directory`).
 //!
 //! [`spi`] is the driver of a real card; the PC's cards are files.
 //!
