@@ -14,7 +14,7 @@ use crate::directory::{
     ARCHIVE, ATTRIBUTES, BLOCK_ENTRIES, CLUSTER_HIGH, CLUSTER_LOW, DELETED, Directory, ENTRY_BYTES, Entry,
     HIDDEN, LENGTH, MADE, NEVER_USED, Newest, Slot, VERIFY_BLOCKS, WRITTEN, clusters_of, walk,
 };
-use crate::free::{FreeSearch, chain_free, write_hint};
+use crate::free::{FreeSearch, chain_free, free_chain, write_hint};
 use crate::layout::{Layout, LayoutError};
 use crate::name::LogName;
 use crate::recorder::Buffers;
@@ -114,10 +114,7 @@ impl<'a, D: CardDevice> Card<'a, D> {
             Err(why) => return Err((device, CardError::Foreign(why))),
         };
         let volume = Volume::new(device, status, layout);
-        let free = match FreeSearch::new(&volume) {
-            Ok(free) => free,
-            Err(error) => return Err((volume.into_device(), error)),
-        };
+        let free = FreeSearch::new(&volume);
         let directory = Directory::new(layout.root);
         let mut card = Self { volume, directory, free, status, buffers, open: None };
         match card.begin() {
@@ -253,25 +250,42 @@ impl<'a, D: CardDevice> Card<'a, D> {
         // The search may have walked over the directory, and the walk notes the places anew.
         let place = self.place_for_new()?.ok_or(CardError::Damaged)?;
         let (first, last) = chain_free(&self.volume, &found, wanted)?;
-        write_hint(&self.volume, last + 1)?;
+        write_hint(&self.volume, last + 1);
         let bytes = wanted.saturating_mul(self.volume.layout.cluster_blocks * Block::LEN_U32);
-        let made = LogEntry { name, bytes, hidden: false, utc_secs: 0, first, place };
-        let date = self.status.fat_date();
-        self.change_entry(place, |entry| {
-            let was_unused = is_unused(entry);
-            *entry = [0; ENTRY_BYTES];
-            entry[..LogName::SHORT_BYTES].copy_from_slice(&name.short());
-            entry[ATTRIBUTES] = ARCHIVE;
-            entry[CLUSTER_HIGH..CLUSTER_HIGH + 2].copy_from_slice(&first.to_le_bytes()[2..]);
-            entry[CLUSTER_LOW..CLUSTER_LOW + 2].copy_from_slice(&first.to_le_bytes()[..2]);
-            entry[LENGTH..].copy_from_slice(&bytes.to_le_bytes());
-            set_date(entry, date);
-            was_unused
-        })?;
+        let made = self.make_entry(LogEntry { name, bytes, hidden: false, utc_secs: 0, first, place })?;
         self.directory.take_place();
         self.directory.add(made, wanted);
         self.open = Some(Segment::of(&made));
         Ok(())
+    }
+
+    /// Writes the entry of a new segment, which is unused. One that the card does not write is passed by, as long as deleted ones are
+    /// known; where none takes it, the segment's clusters are free again.
+    fn make_entry(&mut self, mut made: LogEntry) -> Result<LogEntry, CardError<D::Error>> {
+        let (name, first, date) = (made.name.short(), made.first.to_le_bytes(), self.status.fat_date());
+        loop {
+            let written = self.change_entry(made.place, |entry| {
+                let was_unused = is_unused(entry);
+                *entry = [0; ENTRY_BYTES];
+                entry[..LogName::SHORT_BYTES].copy_from_slice(&name);
+                entry[ATTRIBUTES] = ARCHIVE;
+                entry[CLUSTER_HIGH..CLUSTER_HIGH + 2].copy_from_slice(&first[2..]);
+                entry[CLUSTER_LOW..CLUSTER_LOW + 2].copy_from_slice(&first[..2]);
+                entry[LENGTH..].copy_from_slice(&made.bytes.to_le_bytes());
+                set_date(entry, date);
+                was_unused
+            });
+            // The card may have written what it says it did not: then the clusters are the file's.
+            if written.is_ok() || !self.is_unused(made.place)? {
+                return written.map(|()| made);
+            }
+            let is_other = self.directory.pass_by();
+            let Some(place) = self.place_for_new().ok().flatten().filter(|_| is_other) else {
+                let _ = free_chain(&self.volume, made.first);
+                return written.map(|()| made);
+            };
+            made.place = place;
+        }
     }
 
     /// The place of a new entry, where no file has one. Where one does, the directory is not as it was noted: it is walked over

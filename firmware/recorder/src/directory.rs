@@ -251,6 +251,11 @@ impl Directory {
         Ok(located.map(|(block, _)| Place::of(block, index)))
     }
 
+    /// The place for a new entry is not used until the next walk; `false` where there is no other one.
+    pub(crate) fn pass_by(&mut self) -> bool {
+        self.deleted.pop().is_some()
+    }
+
     /// The place for a new entry is taken.
     pub(crate) fn take_place(&mut self) {
         if self.deleted.pop().is_none() {

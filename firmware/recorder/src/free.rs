@@ -9,7 +9,7 @@ use embedded_sdmmc::Block;
 
 use crate::CardDevice;
 use crate::card::CardError;
-use crate::volume::{END_OF_CHAIN, ENTRIES, Volume, set_entry};
+use crate::volume::{END_OF_CHAIN, ENTRIES, Volume, entry, set_entry};
 
 /// FAT blocks that one call looks through, beside a segment's own: 64 ms of a usual card. All of a large card's FAT takes
 /// seconds, and no one service of the card may take so long.
@@ -42,12 +42,13 @@ pub(crate) struct FreeSearch {
 
 impl FreeSearch {
     /// A search that begins at the cluster that the information sector names.
-    pub(crate) fn new<D: CardDevice>(volume: &Volume<'_, D>) -> Result<Self, CardError<D::Error>> {
+    pub(crate) fn new<D: CardDevice>(volume: &Volume<'_, D>) -> Self {
         let mut block = [Block::new()];
-        volume.read(&mut block, volume.layout.info)?;
-        let hint =
-            Some(word(&block[0], HINT)).filter(|hint| is_signed(&block[0]) && volume.is_cluster(*hint));
-        Ok(Self::at(hint.unwrap_or(0) / ENTRIES, u32::MAX))
+        // A sector that cannot be read tells nothing, as one that is not signed.
+        let is_read = volume.read(&mut block, volume.layout.info).is_ok();
+        let hint = Some(word(&block[0], HINT))
+            .filter(|hint| is_read && is_signed(&block[0]) && volume.is_cluster(*hint));
+        Self::at(hint.unwrap_or(0) / ENTRIES, u32::MAX)
     }
 
     const fn at(next: u32, too_many: u32) -> Self {
@@ -177,6 +178,26 @@ pub(crate) fn chain_free<D: CardDevice>(
     Ok((next, last))
 }
 
+/// Makes the clusters of a chain free, from its first one on.
+pub(crate) fn free_chain<D: CardDevice>(
+    volume: &Volume<'_, D>,
+    first: u32,
+) -> Result<(), CardError<D::Error>> {
+    let mut cluster = first;
+    // Each step makes one cluster free, which ends a chain that goes in a circle.
+    while volume.is_cluster(cluster) {
+        let index = cluster / ENTRIES;
+        let mut block = volume.read_fat(index)?;
+        while volume.is_cluster(cluster) && cluster / ENTRIES == index {
+            let next = entry(&block[0], cluster);
+            set_entry(&mut block[0], cluster, 0);
+            cluster = next;
+        }
+        volume.write_fat(&block, index)?;
+    }
+    Ok(())
+}
+
 /// Makes the free clusters of one block of the FAT a chain that goes on with `next`, or so many of them; the last one and the first.
 // Each function that holds a block is a call of its own, so that the stack never has two of them.
 #[inline(never)]
@@ -213,22 +234,19 @@ fn free_in_block<D: CardDevice>(volume: &Volume<'_, D>, index: u32) -> Result<u3
 }
 
 /// Writes the information sector: the next search for free clusters, on whatever computer, begins at this one. How many are free
-/// is not known, so that it can never be wrong. A damaged sector is mended.
+/// is not known, so that it can never be wrong. A damaged sector is mended. A sector that the card refuses is left: files need no hint.
 #[inline(never)]
-pub(crate) fn write_hint<D: CardDevice>(
-    volume: &Volume<'_, D>,
-    cluster: u32,
-) -> Result<(), CardError<D::Error>> {
+pub(crate) fn write_hint<D: CardDevice>(volume: &Volume<'_, D>, cluster: u32) {
     let mut block = [Block::new()];
-    volume.read(&mut block, volume.layout.info)?;
-    if !is_signed(&block[0]) {
+    let is_read = volume.read(&mut block, volume.layout.info).is_ok();
+    if !is_read || !is_signed(&block[0]) {
         block = [Block::new()];
     }
     let words = [(FREE_COUNT, u32::MAX), (HINT, cluster)];
     for (at, value) in SIGNATURES.into_iter().chain(words) {
         block[0][at..at + 4].copy_from_slice(&value.to_le_bytes());
     }
-    volume.write_metadata(&block, volume.layout.info)
+    let _ = volume.write(&block, volume.layout.info);
 }
 
 fn is_signed(block: &Block) -> bool {

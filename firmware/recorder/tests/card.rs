@@ -485,3 +485,57 @@ fn a_segment_is_chained_through_whatever_clusters_are_free() {
     let last = segment.blocks() - 1;
     card.read(&mut segment, last, &mut Block::new()).expect("its chain ends with it");
 }
+
+/// A card of which another computer deleted these of 21 logs, all before the last one's clusters.
+fn with_deleted(is_deleted: impl Fn(u32) -> bool) -> MemCard {
+    let device = MemCard::formatted(64 * MIB_BLOCKS);
+    let status = CardStatus::new();
+    let mut card = mount(&device, &status);
+    let names = (0..21).map(|session| LogName { session: session + 1, segment: 0 });
+    for name in names.clone() {
+        card.create(name, 1 << 20).expect("there is room");
+    }
+    for (at, name) in (0..).zip(names).filter(|(at, _)| is_deleted(*at)) {
+        let mut blocks = device.blocks.borrow_mut();
+        let mut entries = blocks.values_mut().flat_map(|block| block.as_chunks_mut::<32>().0);
+        entries.find(|entry| entry.starts_with(&name.short())).expect("its entry")[0] = 0xE5;
+        for cluster in 3 + at * 2048..3 + (at + 1) * 2048 {
+            let block = blocks.get_mut(&(FAT_START + cluster / 128)).expect("chained");
+            block[cluster as usize % 128 * 4..][..4].fill(0);
+        }
+    }
+    set_hint(&device, 3 + (0..21).find(|at| is_deleted(*at)).expect("one") * 2048);
+    device
+}
+
+#[test]
+fn a_directory_that_is_walked_over_while_a_segment_is_made_loses_no_log() {
+    let device = with_deleted(|at| at < 20);
+    let status = CardStatus::new();
+    let mut card = mount(&device, &status);
+    for segment in 0..12 {
+        card.create(LogName { session: 30, segment }, 1 << 20).expect("there is room");
+        assert_eq!(logs(&card).len() as u32, 2 + segment);
+    }
+}
+
+#[test]
+fn a_read_that_fails_while_a_segment_is_made_costs_no_log() {
+    for reads in 0.. {
+        let device = with_deleted(|at| at % 2 == 1);
+        let status = CardStatus::new();
+        let mut card = mount(&device, &status);
+        device.fail_read_after.set(Some(reads));
+        let mut made = 0;
+        for segment in 0..4 {
+            made += usize::from(card.create(LogName { session: 30, segment }, 3 << 19).is_ok());
+        }
+        let is_all = device.fail_read_after.take().is_some();
+        assert!(made >= 3, "{reads}: {made}");
+        let found = logs(&mount(&device, &status));
+        assert_eq!(found.len(), 11 + made, "the read after {reads}");
+        if is_all {
+            break;
+        }
+    }
+}

@@ -109,6 +109,27 @@ fn a_card_that_comes_back_goes_on_where_it_was() {
 }
 
 #[test]
+fn a_segment_that_the_card_made_and_did_not_say_so_is_of_the_session() {
+    let device = MemCard::formatted(64 * MIB_BLOCKS);
+    let status = CardStatus::new();
+    let mut recorder = Recorder::new(device.clone(), &status, held(), 7);
+    let (all, unsaid) = (sectors(2_000), LogName { session: 1, segment: 1 });
+    let mut now_ms = 0;
+    for (index, sector) in all.iter().enumerate() {
+        device.broken.set(index == 100);
+        while put(&mut recorder, Instant::from_millis(now_ms), sector) == Written::Later {
+            device.broken.set(false);
+            device.unsaid.set((now_ms < 2_500).then(|| unsaid.short()));
+            now_ms += 100;
+        }
+    }
+    let name = recorder.log_name().expect("it records");
+    assert_eq!(name.session, 1);
+    assert!(name > unsaid, "{name:?}");
+    assert_eq!(numbers(&device), (0..all.len() as u32).collect::<Vec<_>>());
+}
+
+#[test]
 fn on_another_card_the_next_group_begins_a_session_and_the_rest_is_counted() {
     let first = MemCard::formatted(64 * MIB_BLOCKS);
     let second = MemCard::new(64 * MIB_BLOCKS);

@@ -40,6 +40,10 @@ pub struct MemCard {
     pub reads: Rc<Cell<u32>>,
     /// After so many more blocks one write fails.
     pub fail_after: Rc<Cell<Option<u32>>>,
+    /// After so many more read commands one fails.
+    pub fail_read_after: Rc<Cell<Option<u32>>>,
+    /// Blocks with this name in them are written, and called refused.
+    pub unsaid: Rc<Cell<Option<[u8; 11]>>>,
     /// So many write commands are refused from now on.
     pub refusals: Rc<Cell<u32>>,
     /// So many of a thousand block writes are refused, at random.
@@ -64,6 +68,8 @@ impl MemCard {
             writes: Rc::default(),
             reads: Rc::default(),
             fail_after: Rc::default(),
+            fail_read_after: Rc::default(),
+            unsaid: Rc::default(),
             refusals: Rc::default(),
             refused_permille: Rc::default(),
             random: Rc::default(),
@@ -84,6 +90,11 @@ impl BlockDevice for MemCard {
 
     fn read(&self, blocks: &mut [Block], start: BlockIdx) -> Result<(), Broken> {
         self.reads.set(self.reads.get() + blocks.len() as u32);
+        let left = self.fail_read_after.get();
+        self.fail_read_after.set(left.and_then(|left| left.checked_sub(1)));
+        if left == Some(0) {
+            return Err(Broken);
+        }
         for (at, block) in (start.0..).zip(blocks) {
             if self.broken.get() || at >= self.size {
                 return Err(Broken);
@@ -117,6 +128,11 @@ impl BlockDevice for MemCard {
             }
             self.journal.borrow_mut().push((at, block.contents));
             self.blocks.borrow_mut().insert(at, block.contents);
+            if let Some(name) = self.unsaid.get()
+                && block.contents.as_chunks::<32>().0.iter().any(|entry| entry.starts_with(&name))
+            {
+                return Err(Broken);
+            }
         }
         Ok(())
     }
