@@ -91,7 +91,7 @@ const PHASE_LASTS: Span = Span::from_secs(1);
 /// By then cells are told as not known, where nobody says that the autopilot's parameters were asked for.
 const CELLS_COME: Span = Span::from_secs(45);
 
-const _: () = assert!(size_of::<Monitor>() <= 16 * 1024 + 512);
+const _: () = assert!(size_of::<Monitor>() <= 16 * 1024 + 592);
 
 /// Whether a battery keeps the vehicle up: where none tells of itself, the first one does.
 fn carries(vehicle: &Vehicle, battery: usize) -> bool {

@@ -548,3 +548,30 @@ fn a_value_of_power_on_is_stale_for_ever() {
     }
     assert_eq!(levels.last(), Some(&(0, Level::Stale)), "{levels:?}");
 }
+
+#[test]
+fn what_has_no_data_when_a_silence_is_over_is_told_then() {
+    let mut monitor = Monitor::new(Params::defaults());
+    let mut stale = Vec::new();
+    for now_ms in (0..100_000).step_by(50) {
+        let now = Instant::from_millis(now_ms);
+        let mut quad = Quad::healthy();
+        quad.silent = (20_000..50_000).contains(&now_ms);
+        for observation in quad.says(now_ms) {
+            if now_ms < 19_000 || !matches!(observation, Observation::Battery(_)) {
+                monitor.observe(now, AUTOPILOT, &observation);
+            }
+        }
+        let link = LinkReading { frames_lost: Some(0.0), at: now };
+        monitor.tick(now, &link, &quad.recorder, &mut |finding| {
+            if finding.level == Level::Stale && (finding.check == "batt_remaining" || now_ms > 50_000) {
+                stale.push((finding.check, now_ms / 1_000, finding.because));
+            }
+        });
+    }
+    let of_battery: Vec<_> = stale.iter().filter(|(check, ..)| *check == "batt_remaining").collect();
+    let [(_, first_s, "heartbeat"), (_, again_s, "")] = of_battery[..] else { panic!("{stale:?}") };
+    assert!(*first_s < 50 && (58..=62).contains(again_s), "{stale:?}");
+    let of_battery = ["batt_remaining", "cell_voltage", "batt_fault", "batt_temperature"];
+    assert!(stale.iter().all(|(check, ..)| of_battery.contains(check)), "{stale:?}");
+}

@@ -1,6 +1,7 @@
 //! The alarms that stand: since when each does, and which other one explains it.
 
 use super::finding::Level;
+use super::tables::STATES;
 use crate::time::{Instant, Span};
 
 /// Alarms that are kept. One more is reported, explains nothing and is not explained.
@@ -24,31 +25,47 @@ pub(super) struct Standing {
 
 /// All of them.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Alarms([Option<Standing>; ALARMS_MAX]);
+pub(super) struct Alarms {
+    standing: [Option<Standing>; ALARMS_MAX],
+    /// The states that are stale because of a silent link, a bit each.
+    silenced: [u32; STATES.div_ceil(32)],
+    /// The state whose alarm explains these, and when that ended.
+    silence: Option<u16>,
+    silence_ended: Option<Instant>,
+}
 
 impl Alarms {
-    pub(super) const NONE: Self = Self([None; ALARMS_MAX]);
+    pub(super) const NONE: Self = Self {
+        standing: [None; ALARMS_MAX],
+        silenced: [0; STATES.div_ceil(32)],
+        silence: None,
+        silence_ended: None,
+    };
 
     pub(super) fn iter(&self) -> impl Iterator<Item = &Standing> + Clone {
-        self.0.iter().flatten()
+        self.standing.iter().flatten()
     }
 
     /// A state's level changes. Gives since when it has an alarm; `None` where it has none, or no place is left for it. A rise is
     /// an onset of its own, with no cause yet. What the alarm no longer explains at its new level outlives it from now on.
     pub(super) fn change(&mut self, slot: u16, level: Level, now: Instant) -> Option<Instant> {
         let is_alarm = matches!(level, Level::Warning | Level::Critical);
-        for known in self.0.iter_mut().flatten() {
+        for known in self.standing.iter_mut().flatten() {
             let explains = is_alarm && level as u8 >= known.level as u8;
             if known.cause == Some(slot) && known.cause_ended.is_none() && !explains {
                 known.cause_ended = Some(now);
             }
         }
+        if self.silence == Some(slot) {
+            self.silence_ended = (!is_alarm).then_some(now);
+        }
+        self.set_silenced(slot, false);
         let of = |slot: Option<u16>| {
             move |place: &Option<Standing>| place.as_ref().map(|known| known.slot) == slot
         };
-        let mut places = self.0.iter();
+        let mut places = self.standing.iter();
         let place = places.clone().position(of(Some(slot))).or_else(|| places.position(of(None)))?;
-        let place = self.0.get_mut(place)?;
+        let place = self.standing.get_mut(place)?;
         *place = match *place {
             _ if !is_alarm => None,
             Some(known) if (level as u8) < known.level as u8 => Some(Standing { level, ..known }),
@@ -65,14 +82,37 @@ impl Alarms {
 
     /// A state explains an alarm, or none does.
     pub(super) fn explain(&mut self, slot: u16, cause: Option<u16>) {
-        if let Some(known) = self.0.iter_mut().flatten().find(|known| known.slot == slot) {
+        if let Some(known) = self.standing.iter_mut().flatten().find(|known| known.slot == slot) {
             (known.cause, known.cause_ended) = (cause, None);
         }
     }
 
     /// The alarm in a place, if it has outlived its cause: it is explained no longer once that is reported.
     pub(super) fn outliving(&self, place: usize, now: Instant) -> Option<u16> {
-        let known = self.0.get(place)?.as_ref()?;
+        let known = self.standing.get(place)?.as_ref()?;
         (now.since(known.cause_ended?) >= OUTLIVES).then_some(known.slot)
+    }
+    fn set_silenced(&mut self, slot: u16, is: bool) {
+        if let Some(word) = self.silenced.get_mut(usize::from(slot / 32)) {
+            let bit = 1 << (slot % 32);
+            *word = if is { *word | bit } else { *word & !bit };
+        }
+    }
+
+    /// A state explains that another one is stale.
+    pub(super) fn silence(&mut self, slot: u16, cause: u16) {
+        (self.silence, self.silence_ended) = (Some(cause), None);
+        self.set_silenced(slot, true);
+    }
+
+    /// A state that is stale still when the silence that explained it is over for [`OUTLIVES`]; gives each once.
+    pub(super) fn outliving_silence(&mut self, now: Instant) -> Option<u16> {
+        if now.since(self.silence_ended?) < OUTLIVES {
+            return None;
+        }
+        let (word, bits) = (0..).zip(&self.silenced).find(|(_, bits)| **bits != 0)?;
+        let slot = word * 32 + bits.trailing_zeros() as u16;
+        self.set_silenced(slot, false);
+        Some(slot)
     }
 }

@@ -50,7 +50,7 @@ pub struct Health {
     alarms: Alarms,
 }
 
-const _: () = assert!(size_of::<Health>() <= 20 * STATES + 512);
+const _: () = assert!(size_of::<Health>() <= 20 * STATES + 512 + 80);
 
 impl Default for Health {
     fn default() -> Self {
@@ -105,6 +105,11 @@ impl Health {
                 }
             }
             first += usize::from(check.instances);
+        }
+        if let Some(slot) = self.alarms.outliving_silence(inputs.now)
+            && let Some(finding) = self.outlives(slot, inputs)
+        {
+            findings(&finding);
         }
         for place in 0..ALARMS_MAX {
             if let Some(slot) = self.alarms.outliving(place, inputs.now)
@@ -176,7 +181,10 @@ impl Health {
                 consequence::because(&effect, self.standing().filter(|other| other.check != check.name))?;
             slot_of(cause.check, cause.instance)
         });
-        self.alarms.explain(slot, cause);
+        match cause {
+            Some(cause) if level == Level::Stale => self.alarms.silence(slot, cause),
+            _ => self.alarms.explain(slot, cause),
+        }
         cause.and_then(check_of).map_or("", |(cause, _)| cause.name)
     }
 
@@ -188,12 +196,17 @@ impl Health {
         })
     }
 
-    /// An alarm that outlives the one that explained it, as a finding of its own.
+    /// An alarm, or a lack of data, that outlives the alarm that explained it, as a finding of its own.
     fn outlives(&self, slot: u16, inputs: &Inputs<'_>) -> Option<Finding> {
         let (check, instance) = check_of(slot)?;
-        let level = self.states.get(usize::from(slot))?.alarm()?;
-        let value = Some((check.read)(inputs, instance)?.value).filter(|value| value.is_finite())?;
-        let change = Change { level, previous: level, value, limit: check.limit(level, inputs.params) };
+        let level = self.states.get(usize::from(slot))?.level()?;
+        let (value, limit) = if level == Level::Stale {
+            (f32::NAN, f32::NAN)
+        } else {
+            let value = Some((check.read)(inputs, instance)?.value).filter(|value| value.is_finite())?;
+            (value, check.limit(level, inputs.params))
+        };
+        let change = Change { level, previous: level, value, limit };
         Some(self.finding(check, instance, inputs, change, ""))
     }
 
