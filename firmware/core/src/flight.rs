@@ -16,11 +16,13 @@
 //! | any, in a flight; falling | a shock, and it lies still | as the sign | impacted |
 //! | falling, impacted | two witnesses of standing, more than of flight | still for 1 s, or 5 s after the last sign | down |
 //! | falling, impacted | two witnesses of flight, more than of standing; with power | 5 s after the last sign | airborne |
-//! | falling, impacted | no majority: down if it is off, or two say that it stands; it flies otherwise | 30 s after the last sign | down, airborne |
-//! | falling, impacted | no heartbeat | 5 s | down |
+//! | falling, impacted | no majority: down if it is off or silent, or two say that it stands; it flies otherwise | 30 s after the last sign | down, airborne |
 //! | down | armed again; or two witnesses of flight, more than of standing | at once; 4 s | ground |
 //!
-//! Nothing takes off with idle throttle on rotors, or without power. Surface vehicles never fly (PX4 calls an armed rover "in air").
+//! Without power, or with less than 5 % of throttle on rotors, nothing takes off; with less than 10 % it does after 5 s, if two witnesses say so
+//! and no other one is against it.
+//! An inertial sensor that falls or turns for 5 s, while two others say that it flies and it does not sink, is no sign any more.
+//! Surface vehicles never fly (PX4 calls an armed rover "in air").
 //!
 //! Signs of a mishap ([`signs`]) count while the vehicle is armed and for 10 s afterwards; docs/health.md has their table. Outside of a flight
 //! they are told once for each arming ([`Change::OnBench`]); but a vehicle that its own rotors turned over has had a mishap. A fall
@@ -37,12 +39,14 @@ use crate::observation::VehicleKind;
 use crate::params::Params;
 use crate::pressure::Pressure;
 use crate::thrust::{Power, Thrust};
-use crate::time::{Instant, Span};
+use crate::time::{Instant, Span, Stamp};
 use crate::vehicle::{LANDED_STATE_AGE, Vehicle};
 use disarming::DisarmWatch;
 use signs::{Lasting, Shock};
 use witness::{HEIGHT, THRUST, Votes, WORD, is_on_wings, on_rotors};
 
+/// Below this throttle rotors are off, or as slow as they go.
+const OFF: f32 = 0.05;
 /// In the air for so long it has left the ground.
 const SETTLED: Span = Span::from_secs(3);
 /// Steady flight is not tilted further, rad.
@@ -185,6 +189,8 @@ pub struct Flight {
     /// A sign of this step; the time of the last one.
     seen: Option<Kind>,
     seen_at: Instant,
+    /// Since when an inertial sensor has fallen or turned while the others say that it flies.
+    doubted_since: Stamp,
     on_bench: bool,
     falls: Lasting,
     unloaded: Lasting,
@@ -263,7 +269,6 @@ impl Flight {
 
     /// Whether it stands without thrust.
     pub(crate) fn is_at_rest(&self, now: Instant, vehicle: &Vehicle) -> bool {
-        const OFF: f32 = 0.05;
         let off = throttle(now, vehicle).map_or(!vehicle.armed(), |throttle| throttle < OFF);
         !self.is_open() && !self.in_mishap() && off && vehicle.heartbeat.get().is_some()
     }
@@ -302,6 +307,7 @@ impl Flight {
         self.judge_disarming(now, vehicle, params);
         self.judge_shock(now, vehicle, params);
         let votes = self.ask(now, vehicle);
+        self.doubt(now, vehicle, votes);
         let seen = self.seen.take();
         let change = match (self.stage, seen) {
             (Stage::Falling | Stage::Impacted, _) => self.judge_mishap(now, vehicle, votes),
@@ -427,8 +433,7 @@ impl Flight {
         let (flies, stands) = votes.count();
         let is_silent = vehicle.heartbeat.within(now, RECOVERED).is_none();
         let is_down = (stands >= 2 && stands > flies && (is_long || self.is_still(now)))
-            || (is_given_up && (!self.powered || (stands >= 2 && stands >= flies)))
-            || (is_long && is_silent);
+            || (is_given_up && (!self.powered || is_silent || (stands >= 2 && stands >= flies)));
         if is_down {
             (self.stage, self.flies_since) = (Stage::Down, None);
             if !self.motion.has_strayed(now) {
@@ -524,10 +529,14 @@ impl Flight {
     fn takes_off(&self, now: Instant, vehicle: &Vehicle, votes: Votes) -> Option<Span> {
         let has_no_thrust = votes.stands & THRUST != 0
             && (!is_on_wings(now, vehicle) && self.power(now, vehicle) != Some(Power::Full));
-        if !self.powered || has_no_thrust || vehicle.kind() == VehicleKind::Surface {
+        if !self.powered || vehicle.kind() == VehicleKind::Surface {
             return None;
         }
         let (flies, stands) = votes.count();
+        if has_no_thrust {
+            let may_hover = throttle(now, vehicle).is_some_and(|part| part >= OFF);
+            return (may_hover && flies >= 2 && votes.stands == THRUST).then_some(LONG);
+        }
         let is_alone = stands == 0 && (votes.flies & (WORD | HEIGHT) != 0 || votes.flies == votes.known);
         let is_against = votes.stands & WORD != 0;
         if flies >= 1 && (is_alone || (flies >= 2 && flies > stands && !is_against)) {

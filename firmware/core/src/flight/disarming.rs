@@ -19,7 +19,7 @@ const STANDS: Span = Span::from_secs(1);
 /// A termination that nobody received is known to be a crash after so long without standing.
 const LIES_FOR: Span = Span::from_millis(1_500);
 /// A disarmed vehicle that sinks so fast sinks through the air, m/s.
-const FALLING_MPS: f32 = 2.5;
+pub(super) const FALLING_MPS: f32 = 2.5;
 /// One that is lower by so much fell, m.
 const FALLEN_M: f32 = 2.0;
 /// A terminated one falls so fast some seconds later, by the air pressure alone, m/s.

@@ -1,7 +1,8 @@
 //! Signs of a mishap in each observation: no weight, shocks, rates, tilt and sink.
 
-use super::witness::{is_fast, is_tilted, on_rotors};
-use super::{DRIVEN, Flight, Stage, WATCHED};
+use super::disarming::FALLING_MPS;
+use super::witness::{INERTIAL, Votes, is_fast, is_tilted, on_rotors};
+use super::{DRIVEN, Flight, RECOVERED, Stage, WATCHED};
 use crate::derived::load_factor_g;
 use crate::mishap::Kind;
 use crate::modes::{has_pilots_throttle, is_made_to_turn, is_thrown};
@@ -165,14 +166,31 @@ impl Flight {
                     && self.shock.is_none()
                     && climb_mps(at, vehicle).is_some_and(|climb_mps| climb_mps.abs() < STILL_MPS)
                     && self.is_away(at, vehicle);
-                self.thrust.take(at, throttle(at, vehicle).unwrap_or(0.0), hovers);
+                if let Some(part) = throttle(at, vehicle) {
+                    // Many autopilots and logs tell none, which is 0.
+                    self.thrust.take(at, part, hovers && part > 0.0);
+                }
             }
             _ => {}
         }
     }
 
+    /// Since when an inertial sensor has fallen or turned while others say that it flies, none that it stands, and it does not sink:
+    /// the sensor is bad.
+    pub(super) fn doubt(&mut self, now: Instant, vehicle: &Vehicle, votes: Votes) {
+        let holds = climb_mps(now, vehicle).is_some_and(|climb_mps| climb_mps > -FALLING_MPS)
+            && self.pressure.follows(now, -FALLING_MPS) != Some(true);
+        let others_fly = (votes.flies & !INERTIAL).count_ones() >= 2 && votes.stands == 0;
+        let goes_on = now.since(self.falls.last.later(self.tumbles.last)) <= FRESH;
+        self.doubted_since.run(goes_on && others_fly && holds, now, RECOVERED);
+    }
+
     /// It was seen, with such a value, which is above the limit.
     pub(super) fn see(&mut self, at: Instant, kind: Kind, value: f32, params: &Params) {
+        let is_felt = matches!(kind, Kind::FreeFall | Kind::Tumbling);
+        if is_felt && self.doubted_since.older_than(at, RECOVERED) {
+            return;
+        }
         let value = value.max(params.get(kind.limit()).next_up());
         let worst = &mut self.worst[kind as usize];
         *worst = worst.max(value);
