@@ -10,10 +10,12 @@
 //! | counting, asking | cancelled by command | done |
 //! | counting, asking | the autopilot returns or lands | on its way |
 //! | counting, asking | the pilot changes the mode | mode changed, and after 2 s done |
+//! | on its way | accepted, and the mode has not changed within 5 s | idle |
 //! | on its way | the pilot leaves the mode that returns | mode changed |
 //! | on its way | the autopilot leaves it, or there is no sign of landing any more | idle |
 //! | mode changed | the autopilot reports a problem | idle |
-//! | any | the flight is over | idle |
+//! | mode changed, done | the flight is over, and it is armed | done |
+//! | any other | the flight is over | idle |
 //!
 //! Only in flight and armed. While the vehicle is on the ground for a moment, or in a mishap, the countdown and the requests pause.
 //! Each step is a record, with the autopilot's answer.
@@ -51,6 +53,8 @@ const AGAIN: Span = Span::from_secs(1);
 const ATTEMPTS_MAX: u8 = 3;
 /// How long `MAV_RESULT_IN_PROGRESS` is waited for.
 const PROGRESS: Span = Span::from_secs(10);
+/// An accepted request shows in the mode within this time, or nothing came of it.
+const HEEDED: Span = Span::from_secs(5);
 /// A mission's last item is reached this long before the autopilot leaves the mission by itself.
 const MISSION_ENDS: Span = Span::from_secs(3);
 /// A mission that sinks faster than this, within this height of home, may be landing.
@@ -235,7 +239,7 @@ enum State {
         /// It was understood; the answer is to come.
         progress: bool,
     },
-    OnItsWay(Way),
+    OnItsWay(Way, Instant),
     /// The pilot cancelled by the mode, unless a sign comes that it was the autopilot.
     ModeChanged,
     /// Nothing more in this flight.
@@ -349,15 +353,22 @@ impl Protect {
             (Asking { attempt, .. }, Answer(result)) => self.hear(situation, attempt, result),
             (Counting { .. } | Asking { .. }, Command) => (Done, Some((Stage::CancelledByCommand, 0))),
             (Counting { .. } | Asking { .. }, Input::Way(way)) => {
-                (OnItsWay(way), Some((Stage::AlreadyDone, 0)))
+                (OnItsWay(way, now), Some((Stage::AlreadyDone, 0)))
             }
-            (Counting { .. } | Asking { .. } | OnItsWay(Way::Mode), ModeByPilot) => {
+            (Counting { .. } | Asking { .. } | OnItsWay(Way::Mode, _), ModeByPilot) => {
                 (ModeChanged, Some((Stage::CancelledByMode, 0)))
             }
-            (OnItsWay(_), Input::Way(way)) => (OnItsWay(way), None),
+            (OnItsWay(..), Input::Way(way)) => (OnItsWay(way, now), None),
+            // A flight that is over by a silence may go on: what the pilot cancelled stays so until it is disarmed.
+            (ModeChanged | Done, FlightOver) if vehicle.armed() => (Done, None),
+            (OnItsWay(Way::Accepted, at), Flies)
+                if now.since(at) > HEEDED && !self.has_changed_since(now, vehicle, at) =>
+            {
+                (Idle, None)
+            }
             (_, FlightOver)
             | (Counting { .. }, ModeByAutopilot)
-            | (OnItsWay(Way::Mode | Way::Landing), _) => (Idle, None),
+            | (OnItsWay(Way::Mode | Way::Landing, _), _) => (Idle, None),
             (ModeChanged, _) if self.changed_at.older_than(now, SIGN) => (Done, None),
             (ModeChanged, _) if vehicle.alerts.have_begun_within(now, SIGN) => (Idle, None),
             (Counting { left_ms, .. }, Waits) => (Counting { left_ms, told_s: u8::MAX }, None),
@@ -414,6 +425,11 @@ impl Protect {
         Some(if by_itself { Input::ModeByAutopilot } else { Input::ModeByPilot })
     }
 
+    /// Whether the mode has changed since then, or shows nothing, as it is with an autopilot whose modes are not known.
+    fn has_changed_since(&self, now: Instant, vehicle: &Vehicle, at: Instant) -> bool {
+        modes(vehicle).is_none() || self.changed_at.age(now).is_some_and(|age| age <= now.since(at))
+    }
+
     /// The autopilot's answer to the latest request, once it has come.
     fn answer(&self, vehicle: &Vehicle) -> Option<u8> {
         let State::Asking { attempt, at, .. } = self.state else { return None };
@@ -424,7 +440,7 @@ impl Protect {
 
     /// Announces the action, once something is critical.
     fn start(&mut self, situation: &Situation<'_>, input: Input) -> Move {
-        let Situation { params, .. } = *situation;
+        let Situation { now, params, .. } = *situation;
         self.reason = reason(situation, None);
         let action = Action::from_number(params.get(Param::ProtAction) as u8);
         let Some(action) = action.filter(|_| self.mode.is_some() && self.reason.is_some()) else {
@@ -432,7 +448,7 @@ impl Protect {
         };
         self.action = action;
         if let Input::Way(way) = input {
-            return (State::OnItsWay(way), Some((Stage::AlreadyDone, 0)));
+            return (State::OnItsWay(way, now), Some((Stage::AlreadyDone, 0)));
         }
         let delay_s = params.get(Param::ProtDelay).clamp(0.0, 250.0) as u8;
         let left_ms = u32::from(delay_s) * 1_000;
@@ -464,7 +480,7 @@ impl Protect {
         let next = match result {
             // What follows is waited for from here on.
             IN_PROGRESS => return (State::Asking { attempt, at, progress: true }, None),
-            ACCEPTED => State::OnItsWay(Way::Accepted),
+            ACCEPTED => State::OnItsWay(Way::Accepted, at),
             _ if self.action == Action::Return && hovers(situation) => {
                 State::Asking { attempt: 0, at, progress: false }
             }

@@ -111,6 +111,14 @@ fn ack(now_ms: u64, monitor: &mut Monitor, at_ms: u64, command: u16, result: u8)
     say(now_ms, monitor, at_ms, AUTOPILOT, Observation::CommandAck(ack));
 }
 
+/// It accepts a return or a landing, and enters a mode that is one for a plane and for a copter.
+fn accept(now_ms: u64, quad: &mut Quad, monitor: &mut Monitor, at_ms: u64, command: u16) {
+    ack(now_ms, monitor, at_ms, command, 0);
+    if now_ms > at_ms {
+        quad.mode = 21;
+    }
+}
+
 /// A vehicle whose landed state is sent, with the mode that it is in.
 fn become_vehicle(now_ms: u64, quad: &mut Quad, (autopilot, kind, mode): (Autopilot, VehicleKind, u32)) {
     (quad.autopilot, quad.kind, quad.mode) = (autopilot, kind, mode);
@@ -153,7 +161,7 @@ fn the_action_is_off_by_default() {
 
 #[test]
 fn an_empty_battery_is_announced_counted_down_and_requested() {
-    let outcome = fly(|now_ms, _, monitor| ack(now_ms, monitor, ASKED_MS + 300, 20, 0));
+    let outcome = fly(|now_ms, quad, monitor| accept(now_ms, quad, monitor, ASKED_MS + 300, 20));
     let steps: Vec<_> = outcome.steps.iter().map(|(at_ms, step)| (*at_ms, step.stage, step.detail)).collect();
     let expected = [
         (FOUND_MS, Stage::Announced, 10),
@@ -189,16 +197,21 @@ fn an_answer_that_is_not_for_our_request_does_not_count() {
         (ASKED_MS + 1_700, 20, Some(us), "announced, asked, asked, accepted"),
     ] {
         let ack = Observation::CommandAck(CommandAck { command, result: 0, target });
-        let outcome = fly(|now_ms, _, monitor| say(now_ms, monitor, at_ms, AUTOPILOT, ack));
+        let outcome = fly(|now_ms, quad, monitor| {
+            say(now_ms, monitor, at_ms, AUTOPILOT, ack);
+            if story != UNANSWERED && now_ms > at_ms {
+                quad.mode = 21;
+            }
+        });
         assert_eq!(outcome.story(), story, "{at_ms} {command} {target:?}");
     }
 }
 
 #[test]
 fn an_answer_in_progress_is_waited_for() {
-    let outcome = fly(|now_ms, _, monitor| {
+    let outcome = fly(|now_ms, quad, monitor| {
         ack(now_ms, monitor, ASKED_MS + 300, 20, 5);
-        ack(now_ms, monitor, ASKED_MS + 6_000, 20, 0);
+        accept(now_ms, quad, monitor, ASKED_MS + 6_000, 20);
     });
     assert_eq!(outcome.story(), "announced, asked, accepted");
 }
@@ -225,7 +238,9 @@ fn a_refused_return_is_followed_by_a_landing_only_on_rotors() {
             become_vehicle(now_ms, quad, (ArduPilot, kind, 4));
             quad.vtol = vtol;
             ack(now_ms, monitor, ASKED_MS + 300, 20, 4);
-            ack(now_ms, monitor, ASKED_MS + 700, 21, 0);
+            if story == lands {
+                accept(now_ms, quad, monitor, ASKED_MS + 700, 21);
+            }
         });
         assert_eq!(outcome.story(), story, "{kind:?} {vtol:?}");
     }
@@ -686,5 +701,79 @@ fn a_battery_that_falls_silent_keeps_the_countdown() {
         });
         assert_eq!(outcome.story(), UNANSWERED, "{alone} {until_ms}");
         assert_eq!(outcome.requests[0].0, ASKED_MS + 5_000, "{alone} {until_ms}");
+    }
+}
+
+#[test]
+fn an_accepted_return_that_the_mode_does_not_show_is_announced_anew() {
+    for (autopilot, is_known) in [(ArduPilot, true), (Px4, true), (Autopilot::Other, false)] {
+        let outcome = fly(|now_ms, quad, monitor| {
+            become_vehicle(now_ms, quad, (autopilot, Rotorcraft, 4));
+            ack(now_ms, monitor, ASKED_MS + 300, 20, 0);
+        });
+        let end = if is_known { format!(", {UNANSWERED}") } else { String::new() };
+        assert_eq!(outcome.story(), format!("announced, asked, accepted{end}"), "{autopilot:?}");
+        let announced = outcome.announced_ms();
+        let again_ms = announced.get(1).map(|again_ms| again_ms - ASKED_MS);
+        assert_eq!(again_ms.map(|ms| ms / 100), is_known.then_some(54), "{announced:?}");
+    }
+}
+
+#[test]
+fn what_the_pilot_cancelled_stays_so_after_a_fall_and_a_silence() {
+    for silent_ms in [5_800, 17_000] {
+        let outcome = fly(|now_ms, quad, _| {
+            let mode = if now_ms < FOUND_MS + 3_000 { 4 } else { 5 };
+            become_vehicle(now_ms, quad, (ArduPilot, Rotorcraft, mode));
+            if (30_000..30_700).contains(&now_ms) {
+                quad.acceleration_down = -0.5 - (now_ms / 100 % 7) as f32 * 0.01;
+            }
+            quad.silent = (30_700..30_700 + silent_ms).contains(&now_ms);
+        });
+        assert_eq!(outcome.story(), "announced, cancelled_by_mode", "{silent_ms}");
+    }
+}
+
+#[test]
+fn a_bad_inertial_sensor_does_not_hold_the_action_off() {
+    for falls in [true, false] {
+        let outcome = fly(|now_ms, quad, monitor| {
+            become_vehicle(now_ms, quad, (ArduPilot, Rotorcraft, 5));
+            quad.climb = 0.0;
+            let bad = now_ms >= 10_000;
+            quad.acceleration_down =
+                if bad && falls { -0.5 } else { -9.8 } - (now_ms / 100 % 7) as f32 * 0.01;
+            let imu = Imu {
+                acceleration: Some([0.0, 0.0, quad.acceleration_down].map(MetresPerSecond2)),
+                rate: Some([if bad && !falls { 7.0 } else { 0.01 }, 0.0, 0.0].map(RadiansPerSecond)),
+                ..Imu::default()
+            };
+            say(now_ms, monitor, now_ms, AUTOPILOT, Observation::Imu(imu));
+        });
+        assert_eq!(
+            (outcome.story(), outcome.announced_ms()),
+            (UNANSWERED.to_owned(), vec![FOUND_MS]),
+            "{falls}"
+        );
+    }
+}
+
+#[test]
+fn a_hover_with_little_throttle_is_protected() {
+    for throttle in [0.09, 0.06] {
+        for is_seen_on_ground in [true, false] {
+            for vehicle in [(ArduPilot, Rotorcraft, 5), (Px4, Rotorcraft, POSCTL)] {
+                let outcome = fly(|now_ms, quad, _| {
+                    become_vehicle(if is_seen_on_ground { now_ms } else { 2_000 }, quad, vehicle);
+                    quad.throttle = throttle;
+                    if !is_seen_on_ground {
+                        quad.start_height = quad.height;
+                    }
+                });
+                let what = (throttle, is_seen_on_ground, vehicle);
+                assert_eq!(outcome.story(), UNANSWERED, "{what:?}: {:?}", outcome.steps);
+                assert_eq!(outcome.announced_ms(), [FOUND_MS], "{what:?}");
+            }
+        }
     }
 }
