@@ -309,9 +309,15 @@ fn frame(system: u8, component: u8, id: u32, payload: &[u8]) -> Vec<u8> {
     // CRC-16/MCRF4XX over all but the first byte, and a byte that stands for the definition.
     let seed = match id {
         0 => 50,
+        23 => 168,
         30 => 39,
         33 => 104,
         76 => 152,
+        110 => 84,
+        117 => 128,
+        119 => 116,
+        121 => 237,
+        122 => 203,
         245 => 130,
         _ => 0,
     };
