@@ -134,16 +134,18 @@ impl<'a, F: NorFlash> StoreWriter<'a, F> {
             return Saved::Waits;
         }
         store.allow_erase(may_erase || calm == Calm::Silent);
-        let kept = items.oldest(|key, value| match store.save(key, value) {
-            Ok(_) => {
-                count(&status.saved);
-                (Saved::Took, true)
-            }
-            Err(Error::NotNow) => (Saved::Waits, false),
-            // To try again would not help; its owner saves it again when it has changed.
-            Err(_) => {
-                count(&status.failed);
-                (Saved::Took, true)
+        let kept = items.oldest(|key, value| {
+            match store.save(key, value).or_else(|error| again(store, error, key, value)) {
+                Ok(_) => {
+                    count(&status.saved);
+                    (Saved::Took, true)
+                }
+                Err(Error::NotNow) => (Saved::Waits, false),
+                // Twice; its owner saves it again when it has changed.
+                Err(_) => {
+                    count(&status.failed);
+                    (Saved::Took, true)
+                }
             }
         });
         store.allow_erase(false);
@@ -166,6 +168,16 @@ impl<'a, F: NorFlash> StoreWriter<'a, F> {
             self.status.set_room(if room < RESERVE { Room::Reserve } else { Room::Enough });
         }
     }
+}
+
+/// Saves an item once more that met an error of the flash: it is tried at another place.
+fn again<F: NorFlash>(
+    store: &mut Store<F>,
+    error: Error<F::Error>,
+    key: Key,
+    value: &[u8],
+) -> Result<hums_store::Saved, Error<F::Error>> {
+    if matches!(error, Error::Flash(_)) { store.save(key, value) } else { Err(error) }
 }
 
 /// `false` where the item cannot be read. One that this version does not know is left alone.
