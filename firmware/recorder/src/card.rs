@@ -306,9 +306,8 @@ impl<'a, D: CardDevice> Card<'a, D> {
         let mut found = self.free.find(&self.volume, wanted)?;
         // Once for each part of a chain that lies in pieces.
         let mut verified = found.start;
-        let fat_blocks = self.volume.layout.fat_blocks;
-        while verified < found.end && !self.directory.is_verified(&(verified..found.end), fat_blocks) {
-            if self.learn(verified % fat_blocks, None)? {
+        while verified < found.end && !self.directory.is_verified(&(verified..found.end)) {
+            if self.learn(verified, None)? {
                 self.free.again(&found);
                 found = self.free.find(&self.volume, wanted)?;
                 verified = found.start;

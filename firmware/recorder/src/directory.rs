@@ -189,6 +189,9 @@ impl Directory {
 
     /// A log is no longer shown.
     pub(crate) fn hide(&mut self, name: LogName) {
+        for entry in self.oldest.iter_mut().filter(|entry| entry.name == name) {
+            entry.hidden = true;
+        }
         self.shown = self.shown.saturating_sub(1);
         self.names ^= hash(name);
     }
@@ -231,8 +234,8 @@ impl Directory {
     }
 
     /// Whether no log may claim free clusters of these FAT blocks.
-    pub(crate) fn is_verified(&self, blocks: &Range<u32>, fat_blocks: u32) -> bool {
-        blocks.start * ENTRIES >= self.claimed_end && blocks.end <= fat_blocks
+    pub(crate) fn is_verified(&self, blocks: &Range<u32>) -> bool {
+        blocks.start * ENTRIES >= self.claimed_end
             || blocks.start >= self.verified.start && blocks.end <= self.verified.end
     }
 

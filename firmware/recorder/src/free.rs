@@ -62,7 +62,7 @@ impl FreeSearch {
         cluster: u32,
     ) -> Result<(), CardError<D::Error>> {
         if volume.is_cluster(cluster) && free_in_block(volume, self.next)? == 0 {
-            *self = Self::at(cluster.div_ceil(ENTRIES) % volume.layout.fat_blocks, self.too_many);
+            *self = Self::at(cluster.div_ceil(ENTRIES), self.too_many);
         }
         Ok(())
     }
@@ -86,7 +86,7 @@ impl FreeSearch {
     }
 
     /// Blocks of the FAT that tell of so many free clusters, no more of them than one call looks through; the search goes on at the
-    /// last of them. Those behind the FAT's end are those of its beginning.
+    /// last of them. None of them lie on both sides of the FAT's end.
     ///
     /// # Errors
     ///
@@ -123,7 +123,10 @@ impl FreeSearch {
         }
         let fat_blocks = volume.layout.fat_blocks;
         for _ in 0..blocks {
-            let free = free_in_block(volume, self.next % fat_blocks)?;
+            if self.next >= fat_blocks {
+                (self.next, self.found) = (0, 0);
+            }
+            let free = free_in_block(volume, self.next)?;
             if self.found == 0 || self.next - self.first > SEARCH_BLOCKS + wanted / ENTRIES {
                 (self.first, self.found) = (self.next, 0);
             }
@@ -131,13 +134,13 @@ impl FreeSearch {
             if self.found >= wanted {
                 let found = self.first..self.next + 1;
                 // The last block may have some left for the next segment. What is counted changes under the count.
-                *self = Self::at(self.next % fat_blocks, self.too_many);
+                *self = Self::at(self.next, self.too_many);
                 return Ok(found);
             }
             self.next += 1;
             self.searched += 1;
             if self.searched >= fat_blocks {
-                *self = Self::at(self.next % fat_blocks, wanted);
+                *self = Self::at(self.next, wanted);
                 return Err(CardError::Full);
             }
         }
@@ -158,21 +161,19 @@ pub(crate) fn chain_free<D: CardDevice>(
     found: &Range<u32>,
     wanted: u32,
 ) -> Result<(u32, u32), CardError<D::Error>> {
-    let fat_blocks = volume.layout.fat_blocks;
     let (mut end, mut before, mut in_last) = (found.start, 0, 0);
     while before + in_last < wanted {
         if end >= found.end {
             return Err(CardError::Full);
         }
         before += in_last;
-        in_last = free_in_block(volume, end % fat_blocks)?;
+        in_last = free_in_block(volume, end)?;
         end += 1;
     }
-    let (last, mut next) =
-        chain_in_block(volume, end.saturating_sub(1) % fat_blocks, wanted - before, END_OF_CHAIN)?;
+    let (last, mut next) = chain_in_block(volume, end.saturating_sub(1), wanted - before, END_OF_CHAIN)?;
     for index in (found.start..end.saturating_sub(1)).rev() {
-        if free_in_block(volume, index % fat_blocks)? > 0 {
-            (_, next) = chain_in_block(volume, index % fat_blocks, ENTRIES, next)?;
+        if free_in_block(volume, index)? > 0 {
+            (_, next) = chain_in_block(volume, index, ENTRIES, next)?;
         }
     }
     Ok((next, last))

@@ -27,8 +27,10 @@ pub struct Layout {
     pub info: u32,
     /// The first FAT's first block.
     pub fat_start: u32,
-    /// Blocks of one FAT.
+    /// Blocks of one FAT that tell of clusters.
     pub fat_blocks: u32,
+    /// Blocks from one copy of the FAT to the next.
+    pub fat_stride: u32,
     /// Copies of the FAT: 1 or 2.
     pub fat_copies: u32,
     /// The first block of cluster 2.
@@ -113,6 +115,8 @@ impl Layout {
         check((1..=2).contains(&fat_copies), "number of FATs")?;
         check(u16_at(17) == 0 && u16_at(22) == 0, "it is FAT12 or FAT16")?;
         let fat_blocks = u32_at(36);
+        let flags = u16_at(40);
+        check(flags & 0x80 == 0 || flags & 0x0F == 0, "another FAT than the first is in use")?;
         check(u16_at(42) == 0, "version")?;
         let total = if u16_at(19) == 0 { u32_at(32) } else { u16_at(19) };
         check(total <= blocks, "it is larger than its partition")?;
@@ -130,7 +134,8 @@ impl Layout {
             start,
             info: start + info,
             fat_start: start + reserved,
-            fat_blocks,
+            fat_blocks: (clusters + 2).div_ceil(128),
+            fat_stride: fat_blocks,
             fat_copies,
             data_start: start + data,
             cluster_blocks,

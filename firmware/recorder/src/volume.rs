@@ -76,8 +76,8 @@ impl<'a, D: CardDevice> Volume<'a, D> {
 
     /// Writes one block of the FAT into each of its copies.
     pub(crate) fn write_fat(&self, block: &[Block; 1], index: u32) -> Result<(), CardError<D::Error>> {
-        let Layout { fat_start, fat_blocks, fat_copies, .. } = self.layout;
-        (0..fat_copies).try_for_each(|copy| self.write_metadata(block, fat_start + copy * fat_blocks + index))
+        let Layout { fat_start, fat_stride, fat_copies, .. } = self.layout;
+        (0..fat_copies).try_for_each(|copy| self.write_metadata(block, fat_start + copy * fat_stride + index))
     }
 
     /// Changes the FAT entry of one cluster.
