@@ -341,13 +341,7 @@ impl Vehicle {
 
     fn take(&mut self, at: Instant, component: u8, observation: &Observation) {
         match *observation {
-            Observation::Heartbeat(heartbeat) => {
-                self.alerts.take_armed(at, heartbeat.armed);
-                self.alerts.take_state(at, heartbeat.state);
-                let terminated = heartbeat.state == Heartbeat::TERMINATED;
-                self.terminated_since = terminated.then(|| self.terminated_since.unwrap_or(at));
-                self.heartbeat.set(at, heartbeat);
-            }
+            Observation::Heartbeat(heartbeat) => self.take_heartbeat(at, heartbeat),
             Observation::SystemStatus(system) => {
                 if let Some(sensors) = &system.sensors {
                     self.alerts.take_sensors(at, sensors);
@@ -413,6 +407,14 @@ impl Vehicle {
             | Observation::FlightInformation { .. }
             | Observation::Shock(_) => {}
         }
+    }
+
+    fn take_heartbeat(&mut self, at: Instant, heartbeat: Heartbeat) {
+        self.alerts.take_armed(at, heartbeat.armed);
+        self.alerts.take_state(at, heartbeat.state);
+        let terminated = heartbeat.state == Heartbeat::TERMINATED;
+        self.terminated_since = terminated.then(|| self.terminated_since.unwrap_or(at));
+        self.heartbeat.set(at, heartbeat);
     }
 
     fn take_time(&mut self, at: Instant, time: SystemTime) {

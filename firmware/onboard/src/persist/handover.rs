@@ -67,7 +67,7 @@ impl<'a> Handover<'a> {
     }
 
     /// At the end of a session: hands over everything that changed; `false` when it is to be called again after the
-    /// store_writer took something.
+    /// store's writer took something.
     pub fn finish(&mut self, now: Instant, monitor: &mut Monitor) -> bool {
         monitor.save_all();
         self.put_params(monitor.params_mut()) && self.put_items(now, monitor)

@@ -56,7 +56,7 @@ impl MailboxIn<'_> {
     }
 }
 
-/// The store_writer's end.
+/// The end of the store's writer.
 pub struct MailboxOut<'a>(FramedConsumer<&'a Queue>);
 
 impl MailboxOut<'_> {
