@@ -34,7 +34,7 @@ pub enum Calm {
     Silent = 2,
 }
 
-/// What the store_writer tells the monitor, and what it is told: atomics, so that neither waits.
+/// What the store's writer tells the monitor, and what it is told: atomics, so that neither waits.
 #[derive(Debug, Default)]
 pub struct StoreStatus {
     state: AtomicU8,
