@@ -32,7 +32,6 @@ pub(crate) fn halves<T: Instance, R: RxDma<T>, S: TxDma<T>>(
     (rx, tx): (Peri<'static, R>, Peri<'static, S>),
     irqs: impl Binding<R::Interrupt, dma::InterruptHandler<R>>
     + Binding<S::Interrupt, dma::InterruptHandler<S>>
-    + Copy
     + 'static,
     ring: &'static mut [u8],
     fetch_every: Duration,
