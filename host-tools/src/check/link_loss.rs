@@ -167,7 +167,7 @@ impl LinkLoss {
                 self.take_air(at, air);
             }
             Observation::Attitude(Attitude { rates: Some(rates), .. }) => {
-                self.rate = norm(rates.map(|rate| rate.0))
+                self.rate = norm(rates.map(|rate| rate.0));
             }
             Observation::GlobalPosition(_) | Observation::LocalPosition(_) => {
                 if let Some(climb_mps) = climb_mps(at, vehicle) {

@@ -296,7 +296,7 @@ impl Task<'_> {
             parquet = Some(dir);
         }
         let mut read = self.read(log, name, &context, parquet.as_deref());
-        if let Some(epoch_us) = self.better_epoch(log, &context, &read)? {
+        if let Some(epoch_us) = self.better_epoch(log, &context, &read) {
             // Only its last group knew better: all of it again, with that.
             drop(read);
             context.epochs = Epochs::of(epoch_us);
@@ -356,19 +356,14 @@ impl Task<'_> {
     /// UTC at power-on as a reading has found it, where that is not what the log's files were begun with. A reading that
     /// ended because the files there differ may have ended for just that.
     #[expect(clippy::option_option, reason = "it may be known now that nobody told it")]
-    fn better_epoch(
-        &self,
-        place: &Place,
-        context: &Context,
-        read: &Result<Read<'_>>,
-    ) -> Result<Option<Option<u64>>> {
+    fn better_epoch(&self, place: &Place, context: &Context, read: &Result<Read<'_>>) -> Option<Option<u64>> {
         let epoch_us = match (read, place.own()) {
-            (_, None) => return Ok(None),
-            _ if self.standard_output => return Ok(None),
+            (_, None) => return None,
+            _ if self.standard_output => return None,
             (Ok((summary, ..)), _) => summary.ending.as_ref().and_then(|ending| ending.summary.epoch_us),
-            _ => return Ok(None),
+            _ => return None,
         };
-        Ok(Some(epoch_us).filter(|epoch_us| *epoch_us != context.epochs.whole()))
+        Some(epoch_us).filter(|epoch_us| *epoch_us != context.epochs.whole())
     }
 
     /// Reads a log into its files, which are not whole yet.

@@ -113,7 +113,7 @@ impl<'a> Groups<'a> {
                 self.foreign_at_end = 0;
                 self.assembler.skip_empty();
             }
-            Some(block) => self.feed(&block)?,
+            Some(block) => self.feed(&block),
             None => {
                 self.ended = true;
                 self.assembler.end();
@@ -145,12 +145,12 @@ impl<'a> Groups<'a> {
         Ok(Some(both[0]))
     }
 
-    fn feed(&mut self, block: &[u8; BLOCK_BYTES]) -> Result<()> {
+    fn feed(&mut self, block: &[u8; BLOCK_BYTES]) {
         let before = self.assembler.counts();
         self.assembler.feed(block);
         let seen = self.assembler.counts().since(&before);
         self.foreign_at_end = if seen.foreign > 0 { self.foreign_at_end + 1 } else { 0 };
-        let Some(strangers) = &mut self.strangers else { return Ok(()) };
+        let Some(strangers) = &mut self.strangers else { return };
         let (file, at) = self.blocks.place();
         match seen {
             BlockCounts { stale: 1.., .. } => strangers.other(file, at, block),
@@ -159,7 +159,6 @@ impl<'a> Groups<'a> {
             }
             _ => {}
         }
-        Ok(())
     }
 
     /// Which sectors of its files are not of the log, once all is read.
