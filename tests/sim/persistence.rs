@@ -260,7 +260,7 @@ fn a_file_that_is_no_store_or_cannot_be_read_is_refused_and_stays() {
     assert!(outcome.stderr.contains("is no store, though it has the length of one"), "{}", outcome.stderr);
     assert_eq!(fs::read(&store).unwrap(), spoiled);
     // A store that was spoiled but for its magic.
-    spoiled[..4].copy_from_slice(b"1TSH");
+    spoiled[..4].copy_from_slice(b"2TSH");
     fs::write(&store, &spoiled).unwrap();
     let outcome = fly(&store, &[]).expect_code(&[1]).outcome;
     assert!(outcome.stderr.contains("move it away, or name a new file"), "{}", outcome.stderr);

@@ -91,7 +91,7 @@ fn two_cards_are_never_made_into_one_log() {
     let lock = fs::File::options().append(true).open(&part).unwrap();
     lock.lock().unwrap();
     let told = pull(&first, &output, &[LOG]).expect_code(&[1]).stderr;
-    assert!(told.contains("another run of hums is writing it; wait for its end"), "{told}");
+    assert!(told.contains("another run of hums is using it; wait for its end"), "{told}");
     drop(lock);
     let told = pull(&first, &output, &[LOG]).expect_code(&[0]).stderr;
     assert!(told.contains(&format!("goes on after {} bytes", kept.len())), "{told}");

@@ -441,11 +441,12 @@ impl Protect {
     /// Announces the action, once something is critical.
     fn start(&mut self, situation: &Situation<'_>, input: Input) -> Move {
         let Situation { now, params, .. } = *situation;
-        self.reason = reason(situation, None);
         let action = Action::from_number(params.get(Param::ProtAction) as u8);
-        let Some(action) = action.filter(|_| self.mode.is_some() && self.reason.is_some()) else {
+        let Some(action) = action.filter(|_| self.mode.is_some()) else { return (State::Idle, None) };
+        self.reason = reason(situation, None);
+        if self.reason.is_none() {
             return (State::Idle, None);
-        };
+        }
         self.action = action;
         if let Input::Way(way) = input {
             return (State::OnItsWay(way, now), Some((Stage::AlreadyDone, 0)));

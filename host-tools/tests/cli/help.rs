@@ -1,7 +1,6 @@
 //! The examples of every `--help`, taken out of its text and run in a directory that has the files that they name.
 
 use std::collections::BTreeSet;
-use std::ffi::OsString;
 use std::fs;
 use std::io::{BufRead as _, BufReader};
 use std::net::UdpSocket;
@@ -88,9 +87,13 @@ fn copy(from: &Path, to: &Path) {
     assert!(copied.success(), "cp {} {}", from.display(), to.display());
 }
 
-/// Runs an example to its end. The files that it makes are removed: examples share names of outputs.
+/// Runs an example to its end. The output of another one that has the same name is removed before.
 fn works(dir: &Path, example: &str) {
-    let before = names(dir);
+    let output =
+        example.split_whitespace().skip_while(|word| *word != "-o").nth(1).map(|name| dir.join(name));
+    if let Some(made) = output.filter(|made| made.exists()) {
+        if made.is_dir() { fs::remove_dir_all(made) } else { fs::remove_file(made) }.expect("it is ours");
+    }
     // Where there is no firmware the demo runs the same pipeline on this PC.
     let output =
         hums().current_dir(dir).env("HUMS_FIRMWARE", "none").args(example.split_whitespace()).output();
@@ -98,15 +101,6 @@ fn works(dir: &Path, example: &str) {
     let said = String::from_utf8_lossy(&output.stderr);
     // 3: what an example of a fault recorded has losses; 4: a check found something.
     assert!(matches!(output.status.code(), Some(0 | 3 | 4)), "hums {example}\n{said}");
-    for made in names(dir).difference(&before) {
-        let made = dir.join(made);
-        if made.is_dir() { fs::remove_dir_all(made) } else { fs::remove_file(made) }.expect("it is ours");
-    }
-}
-
-fn names(dir: &Path) -> BTreeSet<OsString> {
-    let entries = fs::read_dir(dir).expect("a folder");
-    entries.map(|entry| entry.expect("an entry").file_name()).collect()
 }
 
 #[test]
