@@ -184,6 +184,8 @@ fn flash_that_refuses_a_word_is_told_and_saving_goes_on() {
 #[test]
 fn a_change_of_a_ports_rate_cuts_no_byte() {
     let mut rig = bench().settled(Board::default()).unwrap();
+    let begin = rig.machine.now() + SECOND;
+    rig.run(begin, false).unwrap();
     let mut baud = 57_600.0;
     for next in [38_400.0, 115_200.0, 19_200.0, 57_600.0] {
         let now = rig.machine.now();

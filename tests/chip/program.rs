@@ -118,7 +118,7 @@ fn a_full_stack_hurts_nobody_and_is_survived_recorded_and_told() {
     survives(&mut rig, since, &Expected { cause: Cause::Software, fault, told, within_ms: NOTICED_MS });
 }
 
-/// The handler divides by zero, as code of a file of this name would.
+/// The handler takes an item past a slice's end, as code of a file of this name would.
 #[test]
 fn a_panic_is_survived_recorded_and_told() {
     const FILE: &[u8] = b"firmware/provoked.rs";
@@ -130,11 +130,11 @@ fn a_panic_is_survived_recorded_and_told() {
     for (at, byte) in (place..).zip(bytes) {
         rig.machine.poke(at, |_| byte);
     }
-    let panics = rig.machine.image().find("panic_const_div_by_zero").unwrap().address | 1;
-    // `movw r0`, `movt r0`, `movw r1`, `movt r1`, `bx r1`
-    let code = [load(0, place), load(1, panics)].concat();
+    let panics = rig.machine.image().find("panic_bounds_check").unwrap().address | 1;
+    // The index, the length and the place; `movw` and `movt` of each and of the function, `bx r3`
+    let code = [load(0, 8), load(1, 8), load(2, place), load(3, panics)].concat();
     let since = rig.machine.now();
-    rig.replace(DOWNLINK, &[&code[..], &[0x08, 0x47]].concat(), true).unwrap();
+    rig.replace(DOWNLINK, &[&code[..], &[0x18, 0x47]].concat(), true).unwrap();
     let fault = "fault: panic in downlink at firmware/provoked.rs:7";
     let told = "HUMS: restarted after: panic (downlink)";
     survives(&mut rig, since, &Expected { cause: Cause::Software, fault, told, within_ms: NOTICED_MS });
