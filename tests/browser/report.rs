@@ -320,8 +320,8 @@ fn a_track_across_the_180th_meridian_is_as_wide_as_the_flight() {
     let (_dir, path) = report(&file, &[0]);
     let mut page = LivePage::start();
     page.open(&format!("file://{}", path.display()), "light", 1280, 900);
-    page.wait("return document.querySelector('.legend')?.textContent.includes('from the start')", 20);
-    let legend = page.run("return document.querySelector('.legend').textContent");
+    page.wait("return document.querySelector('p.legend')?.textContent.includes('from the start')", 20);
+    let legend = page.run("return document.querySelector('p.legend').textContent");
     assert!(legend.as_str().unwrap().contains("380 m"), "{legend}");
 }
 
