@@ -154,9 +154,11 @@ fn transmitters_that_stand_still_are_told_and_cost_nothing() {
     assert_no_reset(&rig);
 }
 
-/// 8: the flash refuses a word. The ground is told, and what is set after that is saved.
+/// 8: the flash refuses a word, and the item is saved at another place; it refuses one there too, and the ground is told. What is
+/// set after that is saved.
 #[test]
 fn flash_that_refuses_a_word_is_told_and_saving_goes_on() {
+    const FAILED: &str = "HUMS: saving failed, have the board replaced";
     let mut rig = bench().settled(Board::default()).unwrap();
     let begin = rig.machine.now() + SECOND;
     rig.run(begin, false).unwrap();
@@ -170,9 +172,16 @@ fn flash_that_refuses_a_word_is_told_and_saving_goes_on() {
         rig.machine.chip.flash.counts.1
     };
     rig.machine.chip.flash.refuses = 1;
-    let refused = set(&mut rig, 41.0);
-    assert_told(&rig, "HUMS: saving failed, have the board replaced");
+    set(&mut rig, 40.0);
     assert_eq!(rig.machine.chip.flash.refuses, 0, "nothing was refused: this has tried nothing");
+    assert!(
+        !last(&rig).texts.iter().any(|text| text == FAILED),
+        "what is saved at another place has not failed"
+    );
+    rig.machine.chip.flash.refuses = 2;
+    let refused = set(&mut rig, 41.0);
+    assert_eq!(rig.machine.chip.flash.refuses, 0, "less was refused than it was to refuse");
+    assert_told(&rig, FAILED);
     let saved = set(&mut rig, 42.0);
     assert!(saved > refused, "{refused} words, and then {saved}");
     assert_no_reset(&rig);

@@ -47,9 +47,15 @@ fn some(medium: &Medium, skip: usize) -> Vec<Session> {
         let mut session = Session::default();
         for name in names {
             let Ok(mut segment) = card.segment(name) else { continue };
+            // The newest copy of the last sector may lie at the place after it, and nothing yet at its own.
+            let mut empty = 0;
             for index in 0..segment.blocks() {
                 let mut block = Block::new();
-                if card.read(&mut segment, index, &mut block).is_err() || block.contents == [0; 512] {
+                if card.read(&mut segment, index, &mut block).is_err() {
+                    break;
+                }
+                empty = if block.contents == [0; 512] { empty + 1 } else { 0 };
+                if empty > 1 {
                     break;
                 }
                 reader.feed(&block.contents);

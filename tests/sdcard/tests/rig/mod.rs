@@ -345,11 +345,14 @@ pub fn read(medium: &Medium) -> Found {
         let mut reader = Box::new(LogReader::new());
         for name in names {
             let mut segment = card.segment(name).expect("it is there");
+            // The newest copy of the last sector may lie at the place after it, and nothing yet at its own.
+            let mut empty = 0;
             for index in 0..segment.blocks() {
                 let mut block = Block::new();
                 card.read(&mut segment, index, &mut block).expect("it reads");
+                empty = if block.contents == [0; 512] { empty + 1 } else { 0 };
                 // Nothing was written from here on.
-                if block.contents == [0; 512] {
+                if empty > 1 {
                     break;
                 }
                 reader.feed(&block.contents);
