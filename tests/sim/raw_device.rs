@@ -6,7 +6,7 @@ use std::process::Command;
 
 use hums_tests::flights::own;
 use hums_tests::not_tested;
-use hums_tests::program::{Machine, Recording, command, hums};
+use hums_tests::program::{Machine, Recording, hums};
 use serde_json::Value;
 
 /// A loop device over an image; gone when dropped.
