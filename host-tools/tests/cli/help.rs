@@ -89,9 +89,9 @@ fn copy(from: &Path, to: &Path) {
 
 /// Runs an example to its end. The output of another one that has the same name is removed before.
 fn works(dir: &Path, example: &str) {
-    let output =
-        example.split_whitespace().skip_while(|word| *word != "-o").nth(1).map(|name| dir.join(name));
-    if let Some(made) = output.filter(|made| made.exists()) {
+    let named = example.split_whitespace().skip_while(|word| *word != "-o").nth(1);
+    let made = dir.join(named.unwrap_or("hums-demo"));
+    if made.exists() {
         if made.is_dir() { fs::remove_dir_all(made) } else { fs::remove_file(made) }.expect("it is ours");
     }
     // Where there is no firmware the demo runs the same pipeline on this PC.

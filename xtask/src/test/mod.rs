@@ -49,27 +49,28 @@ pub(crate) fn run(only: &[String]) -> Result<()> {
     needs.sort_unstable();
     needs.dedup();
     let there = setup::ensure(&needs, false);
-    let mut rows = String::new();
+    let mut rows = Vec::new();
     let mut failed = None;
     for step in chosen {
         if !step.needs.iter().all(|need| there.has(*need)) {
-            rows += &format!("{:<16} {:>8}  a tool is missing\n", step.name, "-");
+            rows.push(format!("{:<16} {:>8}  a tool is missing\n", step.name, "-"));
             continue;
         }
         println!("\n=== {}: {}", step.name, step.about);
         let begun = Instant::now();
         let ended = (step.run)();
         let word = if ended.is_ok() { "" } else { "  FAILED" };
-        rows += &format!("{:<16} {:>8.1}{word}\n", step.name, begun.elapsed().as_secs_f64());
+        rows.push(format!("{:<16} {:>8.1}{word}\n", step.name, begun.elapsed().as_secs_f64()));
         if let Err(error) = ended {
             failed = Some(error.context(format!("step {0}; alone: cargo xtask test --only {0}", step.name)));
             break;
         }
     }
     println!(
-        "\n{:<16} {:>8}\n{rows}{:<16} {:>8.1}",
+        "\n{:<16} {:>8}\n{}{:<16} {:>8.1}",
         "step",
         "seconds",
+        rows.concat(),
         "in all",
         start.elapsed().as_secs_f64()
     );

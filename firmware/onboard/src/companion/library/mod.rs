@@ -1,5 +1,5 @@
 //! Logs for download: `LOG_REQUEST_LIST`, `LOG_REQUEST_DATA` as ground stations speak them ([`log`]), and MAVLink FTP
-//! (`file`), which also has the files that the firmware holds itself ([`held`]).
+//! (`file`), which also has the files that the firmware holds itself ([`builtin`]).
 //!
 //! One conversation at a time: who asks anew ends the one before. Nothing is remembered that a client could fill: a
 //! question that is lost, or its answer, is asked again by the client, from wherever it likes. Everything goes out in
