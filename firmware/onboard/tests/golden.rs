@@ -57,17 +57,16 @@ fn compare(folder: &str) {
     let known = fs::read_to_string(&golden).expect("the golden list can be read");
     let differs = known.lines().zip(list.lines()).position(|(known, now)| known != now);
     let differs = differs.or((known != list).then(|| known.lines().count().min(list.lines().count())));
-    if let Some(line) = differs {
-        let recording = known.lines().take(line + 1).filter(|line| line.starts_with('#')).last();
-        panic!(
-            "{}:{}: {}\n known: {}\n now:   {}\nRun with HUMS_GOLDEN=write and look at the difference.",
-            golden.display(),
-            line + 1,
-            recording.unwrap_or_default(),
-            known.lines().nth(line).unwrap_or("(end)"),
-            list.lines().nth(line).unwrap_or("(end)"),
-        );
-    }
+    let line = differs.unwrap_or_default();
+    assert!(
+        differs.is_none(),
+        "{}:{}: {}\n known: {}\n now:   {}\nRun with HUMS_GOLDEN=write and look at the difference.",
+        golden.display(),
+        line + 1,
+        known.lines().take(line + 1).filter(|line| line.starts_with('#')).last().unwrap_or_default(),
+        known.lines().nth(line).unwrap_or("(end)"),
+        list.lines().nth(line).unwrap_or("(end)"),
+    );
 }
 
 fn recordings(folder: &Path) -> Vec<PathBuf> {

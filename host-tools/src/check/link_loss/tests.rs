@@ -120,7 +120,9 @@ fn judge(
                 Observation::GlobalPosition(global),
             ]);
         }
-        said.iter().for_each(|said| judge.item(now, Item::Observation(AUTOPILOT, said)));
+        for said in &said {
+            judge.item(now, Item::Observation(AUTOPILOT, said));
+        }
     }
     judge.end()
 }
@@ -135,6 +137,7 @@ fn told(judged: &Judged) -> (Vec<&str>, [usize; 3]) {
 }
 
 #[test]
+#[expect(clippy::too_many_lines, clippy::type_complexity, reason = "a table of cases")]
 fn what_came_down_in_a_silence_is_told_from_what_landed_and_from_what_flies_on() {
     type After = fn(u64, &mut State);
     let dive = |ms: u64, state: &mut State, from_m, sink_mps, heard_ms: u64| {

@@ -114,7 +114,9 @@ mod tests {
             text.starts_with(HEAD) && text.ends_with(LIMITS),
             "`cargo xtask prove diagnosis --write` writes it"
         );
-        for line in [&SETS, &BY_CLASS, &BY_CHECK, &BY_HAND].into_iter().flat_map(|form| form.lines()) {
+        for line in
+            [&SETS, &BY_CLASS, &BY_CHECK, &BY_HAND].into_iter().flat_map(super::super::table::Form::lines)
+        {
             assert!(text.lines().any(|of_page| of_page == line), "{line}");
         }
         assert!(text.contains(summary::TITLE));
