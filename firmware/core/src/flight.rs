@@ -1,6 +1,6 @@
 //! The phases of a flight: on the ground, in the air, in a mishap, down.
 //!
-//! Five witnesses say each step that the vehicle flies or stands ([`witness`]): the autopilot's word, height, thrust, inertial sensors, speed. A
+//! Five witnesses say each step that the vehicle flies or stands (`witness`): the autopilot's word, height, thrust, inertial sensors, speed. A
 //! majority of them moves the phase:
 //!
 //! | phase | evidence | for | next |
@@ -24,7 +24,7 @@
 //! An inertial sensor that falls or turns for 5 s, while two others say that it flies and it does not sink, is no sign any more.
 //! Surface vehicles never fly (PX4 calls an armed rover "in air").
 //!
-//! Signs of a mishap ([`signs`]) count while the vehicle is armed and for 10 s afterwards; docs/health.md has their table. Outside of a flight
+//! Signs of a mishap (`signs`) count while the vehicle is armed and for 10 s afterwards; docs/health.md has their table. Outside of a flight
 //! they are told once for each arming ([`Change::OnBench`]); but a vehicle that its own rotors turned over has had a mishap. A fall
 //! that nobody heard is judged by `hums check`.
 

@@ -20,7 +20,7 @@
 //! Only in flight and armed. While the vehicle is on the ground for a moment, or in a mishap, the countdown and the requests pause.
 //! Each step is a record, with the autopilot's answer.
 //!
-//! A mode change is the autopilot's own if the autopilot reports a new problem within [`SIGN`] of it, if it enters a mode in which
+//! A mode change is the autopilot's own if the autopilot reports a new problem within `SIGN` of it, if it enters a mode in which
 //! failsafes wait, or if a mission ended. Any other mode change is the pilot's, and cancels the action for the flight.
 //!
 //! A return that is refused (no position) is followed by a landing, where the vehicle can land as it hangs: multicopters,

@@ -1,6 +1,6 @@
 //! Time of all judgement: milliseconds since power-on in 32 bits, which wrap after 49.7 days.
 //!
-//! Two times are compared by their wrapping difference. A time may be up to [`AHEAD_MAX`] later than the one that it is compared
+//! Two times are compared by their wrapping difference. A time may be up to `AHEAD_MAX` later than the one that it is compared
 //! with; otherwise it is in the past, up to 49.7 days. Microseconds stay at the edge, in [`crate::clock`].
 
 use core::fmt;
@@ -63,7 +63,7 @@ impl Instant {
         if other.is_after(self) { other } else { self }
     }
 
-    /// The earlier one of two, by the rule of [`Self::since`]: what is not up to [`AHEAD_MAX`] later than `other` lies before it.
+    /// The earlier one of two, by the rule of [`Self::since`]: what is not up to `AHEAD_MAX` later than `other` lies before it.
     #[must_use]
     pub const fn earlier(self, other: Self) -> Self {
         if other.since(self).0 == 0 { other } else { self }

@@ -1,7 +1,7 @@
 //! Small items in two sectors of NOR flash, each of which reads as its old or as its new value whatever word power went
 //! at: lifetime counters, baselines, components and changed parameters.
 //!
-//! A sector is a log of checked items ([`sector`] has its layout); of a key the newest whole item counts. When the sector in use is
+//! A sector is a log of checked items (`sector` has its layout); of a key the newest whole item counts. When the sector in use is
 //! full the store turns: it erases the other sector, copies all that counts into it, and marks it as complete. Until that mark is
 //! there the old sector is the one in use, and an erase that power cut short is never of a sector in use. Of two complete sectors the
 //! newer one counts. The older one then has a mark that it is superseded: so damage of the newer one's header is noticed, and its

@@ -198,7 +198,7 @@ impl Alarm<'_> {
 }
 
 /// Which of the alarms explains another one: by its row, as bad or worse, of the same motor where both are of motors, and begun within
-/// [`NEAR`] of it. A mishap, which is a state of the whole vehicle, explains whatever begins while it goes on. An alarm that
+/// `NEAR` of it. A mishap, which is a state of the whole vehicle, explains whatever begins while it goes on. An alarm that
 /// another cause of `effect` explains is no cause beside that one.
 pub fn because<'a>(effect: &Alarm<'_>, alarms: impl Iterator<Item = Alarm<'a>> + Clone) -> Option<Alarm<'a>> {
     let at_least = match effect.level {

@@ -86,7 +86,7 @@ const STUCK: Check = Check {
     ..MISMATCH
 };
 
-/// The estimator that flies against the second one ([`crate::second`]).
+/// The estimator that flies against the second one (`ahrs2_residual`).
 const SECOND: Check = Check {
     name: "ahrs2_tilt",
     unit: Unit::of("deg"),
