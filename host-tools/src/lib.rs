@@ -19,7 +19,6 @@ pub mod cli;
 pub mod colour;
 pub mod counters;
 pub mod decode;
-pub mod demo;
 pub mod duplex;
 pub mod ending;
 pub mod endpoint;
@@ -61,7 +60,7 @@ use std::process::ExitCode;
 
 use clap::Parser;
 
-use cli::{Cli, Command};
+use cli::{BoxAction, Cli, Command};
 use outcome::Outcome;
 
 /// Runs the program with these arguments (the first is the program's own name).
@@ -79,20 +78,17 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
 
 fn command(command: &Command) -> anyhow::Result<Outcome> {
     match command {
-        Command::Decode(args) => decode::run(args),
-        Command::Sim(args) => run::sim::run(args),
-        Command::Emulate(args) => run::emulate::run(args),
         Command::Check(args) => check::run(args),
-        Command::Ls(args) => info::list::run(args),
-        Command::Info(args) => info::run(args),
-        Command::Verify(args) => verify::run(args),
         Command::Report(args) => report::run(args),
         Command::Live(args) => live::run(args),
-        Command::Pack(args) => pack::run(args),
-        Command::Demo(args) => demo::run(args),
-        Command::Params(args) => talk::params::run(args),
-        Command::Pull(args) => talk::pull::run(args),
-        Command::Format(args) => talk::format::run(args),
+        Command::Decode(args) => decode::run(args),
+        Command::Info(args) => info::run(args),
+        Command::Sim(args) => run::sim::run(args),
+        Command::Box(args) => match &args.action {
+            BoxAction::Pull(args) => talk::pull::run(args),
+            BoxAction::Params(args) => talk::params::run(args),
+            BoxAction::FormatCard(args) => talk::format::run(args),
+        },
         Command::Completions(args) => shell::completions(args),
         Command::Man(args) => shell::man(args),
     }

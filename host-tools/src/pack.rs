@@ -1,25 +1,27 @@
-//! `hums pack`: a recording becomes one log file, through the same framer and the same writer as on board, but without
+//! `hums decode --format hum`: a recording becomes one log file, through the same framer and the same writer as on board, but without
 //! a card's file system, queues or checks. `hums decode` reads it back.
 
 use std::collections::VecDeque;
 use std::io::Write;
-use std::path::Path;
+use std::path::PathBuf;
 
 use anyhow::{Context, Result};
 use hums_blackbox::record::{Clock, Loss, Lost, Note};
 use hums_blackbox::{Full, Record, Sector, SectorSink, Writer};
 use hums_core::clock::Instant;
 use hums_link::{Check, Framer};
-use serde::Serialize;
 use sha2::{Digest as _, Sha256};
 
 use crate::cli;
+use crate::decode;
+use crate::decode::made::{LogJson, Made, MadeJson};
 use crate::endpoint::Endpoint;
-use crate::files::{Inputs, Output, cannot_write};
+use crate::files::{Inputs, Output, cannot_write, says_directory};
 use crate::logs::marks::PACKED;
 use crate::outcome::{Outcome, usage};
-use crate::output::{self, Schema};
+use crate::output;
 use crate::plural::count;
+use crate::printable;
 use crate::source::booted::Booted;
 use crate::source::checksums::Checksums;
 use crate::source::own::JOINED;
@@ -28,34 +30,18 @@ use crate::source::{self, Source, Timing};
 /// Where UTC came from: the recording's own times (see `hums_blackbox::record::Clock`).
 const FROM_RECORDING: u8 = 2;
 
-/// What `hums pack --json` prints.
-const SCHEMA: Schema = Schema::first("hums-pack");
-
-#[derive(Debug, Serialize)]
-struct PackedJson<'a> {
-    path: &'a Path,
-    frames: u64,
-    log_bytes: u64,
-    tlog_bytes: u64,
-    bytes_not_frames: u64,
-}
-
-/// Runs `hums pack`.
-pub fn run(args: &cli::Pack) -> Result<Outcome> {
-    if args.input.is_live() {
-        return Err(usage(format!(
-            "{}: hums pack takes a file or `-`; hums sim records what comes live",
-            args.input
-        )));
-    }
+/// Runs `hums decode --format hum`.
+pub fn run(args: &cli::Decode) -> Result<Outcome> {
+    let (input, path) = (input(args)?, output(args));
+    let name = input.to_string();
     let mut inputs = Inputs::none().forcing(args.force);
-    inputs.add_endpoint(&args.input);
-    let source = source::open(&args.input, Timing { line_rate: None })?;
+    inputs.add_endpoint(&input);
+    let source = source::open(&input, Timing { line_rate: None })?;
     // Raw bytes have the times that the autopilot tells, as in `check`.
     let mut source: Box<dyn Source> =
         if source.has_records() { source } else { Box::new(Booted::new(source)) };
-    let context = || cannot_write(&args.output);
-    let read = || format!("{}: cannot be read", args.input);
+    let context = || cannot_write(&path);
+    let read = || format!("{name}: cannot be read");
     // What waits for its first byte, as a pipe may for ever, leaves nothing behind.
     let (mut first, mut hash, mut bytes) = (VecDeque::new(), Sha256::new(), 0);
     while bytes < FIRST_BYTES
@@ -69,7 +55,7 @@ pub fn run(args: &cli::Pack) -> Result<Outcome> {
     let utc_us = source.utc_start_us();
     hash.update(utc_us.unwrap_or(0).to_le_bytes());
     let session = session_of(hash);
-    let file = Output::create(&args.output, &inputs)?;
+    let file = Output::create(&path, &inputs)?;
     let mut packer = Packer::new(file, session);
     packer.start(utc_us).with_context(context)?;
     let mut last_us = 0;
@@ -89,48 +75,51 @@ pub fn run(args: &cli::Pack) -> Result<Outcome> {
     packer.damaged(last_us, last_us, source.damages()).with_context(context)?;
     let (done, mut file) = packer.finish(last_us).with_context(context)?;
     if done.frames == 0 {
-        return Err(source::no_frame(&args.input));
+        return Err(source::no_frame(&input));
     }
     file.finish()?;
     if let Some(remark) = source.remark() {
-        note!("{}: {remark}", args.input);
+        note!("{name}: {remark}");
     }
-    tell(args, &done)?;
-    if let Endpoint::File(_) | Endpoint::Standard = args.input
-        && done.bytes_not_frames > 0
-    {
+    if done.bytes_not_frames > 0 {
         let bytes = count(done.bytes_not_frames, "byte");
         note!("of no frame, and only counted: {bytes} of the recording");
     }
     if let Some(words) = &done.wrong_checksums {
-        note!("{}: {words}", args.input);
+        note!("{name}: {words}");
     }
-    Ok(Outcome::lossy(source.damages() > 0 || done.wrong_checksums.is_some()))
-}
-
-/// Says what was written.
-fn tell(args: &cli::Pack, done: &Done) -> Result<()> {
+    let whole = source.damages() == 0 && done.wrong_checksums.is_none();
+    let made = Made::of(path, "hum", &[(done.frames, "frame"), (done.log_bytes, "byte")]);
     if args.json {
-        let Done { frames, log_bytes, recording_bytes: tlog_bytes, bytes_not_frames, .. } = *done;
-        let json = PackedJson { path: &args.output, frames, log_bytes, tlog_bytes, bytes_not_frames };
-        return output::json(SCHEMA, &json);
+        let logs = vec![LogJson { name, whole, files: vec![made] }];
+        output::json(decode::SCHEMA, &MadeJson { logs })?;
+    } else {
+        output::line(&printable::word(&made.line()))?;
     }
-    output::line(&format!(
-        "{}: {}, {}, {}; times to the millisecond",
-        args.output.display(),
-        count(done.frames, "frame"),
-        count(done.log_bytes, "byte"),
-        beside_a_tlog(done.recording_bytes, done.log_bytes)
-    ))
+    Ok(Outcome::lossy(!whole))
 }
 
-/// How large the log is beside a tlog of the same frames, as words.
-fn beside_a_tlog(tlog_bytes: u64, log_bytes: u64) -> String {
-    let (tlog, log) = (tlog_bytes.max(1) as f64, log_bytes.max(1) as f64);
-    if tlog >= log {
-        format!("{:.2} times smaller than as a tlog", tlog / log)
+/// The one recording that is read; a usage error if more is asked for than all of it.
+fn input(args: &cli::Decode) -> Result<Endpoint> {
+    let is_part =
+        args.session.is_some() || args.from.is_some() || args.to.is_some() || !args.message.is_empty();
+    match args.inputs.as_slice() {
+        [input] if args.format.len() == 1 && !is_part => {
+            Ok(if input.as_os_str() == "-" { Endpoint::Standard } else { Endpoint::File(input.clone()) })
+        }
+        _ => Err(usage(
+            "--format hum writes all of one recording, and no other format beside it; leave out --session, --from, --to and --message",
+        )),
+    }
+}
+
+/// The log's path: in a directory it is named after the recording.
+fn output(args: &cli::Decode) -> PathBuf {
+    let stem = args.inputs.first().and_then(|input| input.file_stem()).unwrap_or_default();
+    if says_directory(&args.output) {
+        args.output.join(stem).with_extension("hum")
     } else {
-        format!("{:.2} times as large as a tlog of the same frames", log / tlog)
+        args.output.clone()
     }
 }
 
@@ -148,8 +137,6 @@ fn session_of(hash: Sha256) -> u32 {
 #[derive(Clone, Debug, PartialEq, Eq)]
 struct Done {
     frames: u64,
-    /// What the frames take as a tlog.
-    recording_bytes: u64,
     log_bytes: u64,
     bytes_not_frames: u64,
     /// Frames of a tlog whose checksum does not fit, as a sentence.
@@ -282,7 +269,6 @@ impl<W: Write> Packer<W> {
         let counters = self.writer.counters();
         let done = Done {
             frames: counters.frames,
-            recording_bytes: counters.frame_bytes + 8 * counters.frames,
             log_bytes: self.log_bytes,
             bytes_not_frames,
             wrong_checksums: wrong_checksums.map(|gap| gap.words),

@@ -18,18 +18,14 @@ pub fn completions(args: &cli::Completions) -> Result<Outcome> {
 
 /// Runs `hums man`.
 pub fn man(args: &cli::Man) -> Result<Outcome> {
-    let mut root = Cli::command();
-    root.build();
-    let page = match &args.command {
-        None => root,
-        Some(name) => {
-            let named = |command: &&clap::Command| command.get_name() == name && name != "help";
-            let Some(command) = root.get_subcommands().find(named) else {
-                return Err(usage(format!("{name}: is no command of hums; hums --help lists them")));
-            };
-            command.clone()
-        }
-    };
+    let mut page = Cli::command();
+    page.build();
+    for name in &args.command {
+        let Some(command) = page.find_subcommand(name).filter(|_| name != "help") else {
+            return Err(usage(format!("{name}: is no command of hums; hums --help lists them")));
+        };
+        page = command.clone();
+    }
     let mut text = Vec::new();
     clap_mangen::Man::new(page).render(&mut text)?;
     print(&text)

@@ -1,4 +1,4 @@
-//! `hums verify`: every check there is, each with what it looked at and what failed.
+//! `hums info --verify`: every check there is, each with what it looked at and what failed.
 
 use std::borrow::Cow;
 
@@ -26,11 +26,11 @@ use crate::printable::{path, word};
 use crate::source::find::{besides, not_ours};
 use crate::summary::{Contents, Overview};
 
-/// What `hums verify --json` prints.
-const SCHEMA: Schema = Schema::first("hums-verify");
+/// What `hums info --verify --json` prints.
+const SCHEMA: Schema = Schema::first("hums-info-verify");
 
-/// Runs `hums verify`.
-pub fn run(args: &cli::Verify) -> Result<Outcome> {
+/// Runs `hums info --verify`.
+pub fn run(args: &cli::Info) -> Result<Outcome> {
     let found = logs::find(&args.inputs, args.salvage).map_err(|error| not_ours(&args.inputs, error))?;
     for remark in &found.remarks {
         note!("{remark}");
@@ -208,7 +208,7 @@ pub struct Extent {
 }
 
 impl Extent {
-    /// All of it, with what the logs tell of each other, as `hums verify` judges.
+    /// All of it, with what the logs tell of each other, as `hums info --verify` judges.
     pub const ALL: Self = Self { from_start: true, to_end: true, follows: true };
 }
 

@@ -27,7 +27,7 @@ fn packed(names: &[&str]) -> TempDir {
     let dir = tempfile::tempdir().expect("a directory");
     for name in names {
         let (from, stem) = (flight(name), name.split('.').next().unwrap_or(name));
-        hums(dir.path(), &format!("pack {} -o {stem}.hum", from.display()), 0);
+        hums(dir.path(), &format!("decode --format hum {} -o {stem}.hum", from.display()), 0);
     }
     dir
 }
@@ -359,7 +359,7 @@ fn more_ids_than_files_can_be_open_lose_nothing() {
     }
     let dir = tempfile::tempdir().expect("a directory");
     fs::write(dir.path().join("private.tlog"), tlog).expect("written");
-    hums(dir.path(), "pack private.tlog -o private.hum", 0);
+    hums(dir.path(), "decode --format hum private.tlog -o private.hum", 0);
     hums(dir.path(), "decode private.hum -o out --format csv,parquet", 0);
     let tables = files(&dir.path().join("out"), ".csv");
     let unknown: Vec<_> = tables.iter().filter(|(name, _)| name.starts_with("UNKNOWN_")).collect();

@@ -13,8 +13,15 @@ const FORMATS: &str = "tlog,csv,jsonl,influx,parquet,thesis";
 fn what_is_left_of_a_damaged_log_is_in_every_format_and_in_its_report() {
     let dir = tempfile::tempdir().unwrap();
     let log = dir.path().join("log.hum");
-    hums(["pack".as_ref(), own("px4_hil_quad_low.tlog").as_os_str(), "-o".as_ref(), log.as_os_str()])
-        .expect_code(&[0]);
+    hums([
+        "decode".as_ref(),
+        "--format".as_ref(),
+        "hum".as_ref(),
+        own("px4_hil_quad_low.tlog").as_os_str(),
+        "-o".as_ref(),
+        log.as_os_str(),
+    ])
+    .expect_code(&[0]);
     let whole = fs::read(&log).unwrap();
     let middle = whole.len() / 1024 * 512;
     let mut zeroed = whole.clone();

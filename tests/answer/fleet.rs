@@ -25,14 +25,29 @@ fn cards(dir: &Path) {
     }
     // Recorders that check nothing: a packed recording, and one of which nobody can tell the vehicle.
     let packed = dir.join("cards/packed.hum");
-    hums(["pack".as_ref(), own("ap_quad_faults.tlog").as_os_str(), "-o".as_ref(), packed.as_os_str()])
-        .expect_code(&[0]);
+    hums([
+        "decode".as_ref(),
+        "--format".as_ref(),
+        "hum".as_ref(),
+        own("ap_quad_faults.tlog").as_os_str(),
+        "-o".as_ref(),
+        packed.as_os_str(),
+    ])
+    .expect_code(&[0]);
     let (raw, silent) = (dir.join("silent.raw"), dir.join("cards/silent.hum"));
     // A SYSTEM_TIME and no heartbeat.
     let frame = [0xfe, 12, 0, 1, 1, 2, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0];
     let crc = crc::step(crc::update(crc::START, &frame[1..]), 137);
     fs::write(&raw, [&frame[..], &crc.to_le_bytes()].concat().repeat(100)).unwrap();
-    hums(["pack".as_ref(), raw.as_os_str(), "-o".as_ref(), silent.as_os_str()]).expect_code(&[0]);
+    hums([
+        "decode".as_ref(),
+        "--format".as_ref(),
+        "hum".as_ref(),
+        raw.as_os_str(),
+        "-o".as_ref(),
+        silent.as_os_str(),
+    ])
+    .expect_code(&[0]);
 }
 
 /// The rows of the query under a heading, as objects.

@@ -11,8 +11,15 @@ use hums_tests::{child, oracle};
 fn compare(recording: &Path) {
     let dir = tempfile::tempdir().unwrap();
     let (log, out) = (dir.path().join("log.hum"), dir.path().join("out"));
-    let packed =
-        hums(["pack".as_ref(), recording.as_os_str(), "-o".as_ref(), log.as_os_str()]).expect_code(&[0, 3]);
+    let packed = hums([
+        "decode".as_ref(),
+        "--format".as_ref(),
+        "hum".as_ref(),
+        recording.as_os_str(),
+        "-o".as_ref(),
+        log.as_os_str(),
+    ])
+    .expect_code(&[0, 3]);
     let mut command =
         hums_tests::program::command(["decode".as_ref(), log.as_os_str(), "-o".as_ref(), out.as_os_str()]);
     child::run(command.args(["--format", "csv,jsonl,influx,parquet"]), hums_tests::program::LIMIT)

@@ -29,7 +29,15 @@ fn shown(page: &Value, name: &str) -> f64 {
 fn frames(recording: &Path) -> Vec<Value> {
     let dir = tempfile::tempdir().unwrap();
     let (log, out) = (dir.path().join("flight.hum"), dir.path().join("flight.jsonl"));
-    hums(["pack".as_ref(), recording.as_os_str(), "-o".as_ref(), log.as_os_str()]).expect_code(&[0]);
+    hums([
+        "decode".as_ref(),
+        "--format".as_ref(),
+        "hum".as_ref(),
+        recording.as_os_str(),
+        "-o".as_ref(),
+        log.as_os_str(),
+    ])
+    .expect_code(&[0]);
     let format = ["--format".as_ref(), "jsonl".as_ref()];
     hums([&["decode".as_ref(), log.as_os_str(), "-o".as_ref(), out.as_os_str()][..], &format].concat())
         .expect_code(&[0]);
@@ -246,25 +254,6 @@ fn each_session_of_a_card_is_played_with_its_parts_as_they_were_then() {
     let wrong =
         hums(["live", "--listen", "127.0.0.1:0", "--input", input, "--session", "99999"]).expect_code(&[2]);
     assert!(wrong.stderr.contains(names[0]), "it says which there are");
-}
-
-#[test]
-fn the_demo_ends_with_the_dashboard_on_the_card_that_it_made() {
-    let dir = tempfile::tempdir().unwrap();
-    let mut demo = command(["demo", "--dashboard", "always", "--dir"]);
-    // Without the firmware the flight is recorded on this PC.
-    demo.arg(dir.path()).arg("--input").arg(own("px4_hil_quad_low.tlog")).env("HUMS_FIRMWARE", "none");
-    let mut child = demo.stdout(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap();
-    let lines = BufReader::new(child.stdout.take().unwrap()).lines().map_while(Result::ok);
-    let address = lines.into_iter().find(|line| line.starts_with("http://127.0.0.1:"));
-    let mut demo = Running(child);
-    let mut page = LivePage::start();
-    page.open(&address.expect("an address"), "light", 1440, 900);
-    page.wait("return document.documentElement.dataset.ready === 'true'", 60);
-    assert!(page.read()["values"]["battery_volts"].as_str().is_some());
-    assert_sound(&mut page);
-    demo.signal("INT");
-    assert_eq!(demo.end(Duration::from_secs(10)), Some(0));
 }
 
 fn last_s(frames: &[Value]) -> f64 {

@@ -174,8 +174,15 @@ fn assert_pointed_values(image: &Path, shown: &Value) {
 fn a_px4_flights_page_shows_its_cells_of_the_recorder_and_a_gap() {
     let dir = tempfile::tempdir().unwrap();
     let log = dir.path().join("flight.hum");
-    hums(["pack".as_ref(), own("px4_hil_quad_low.tlog").as_os_str(), "-o".as_ref(), log.as_os_str()])
-        .expect_code(&[0]);
+    hums([
+        "decode".as_ref(),
+        "--format".as_ref(),
+        "hum".as_ref(),
+        own("px4_hil_quad_low.tlog").as_os_str(),
+        "-o".as_ref(),
+        log.as_os_str(),
+    ])
+    .expect_code(&[0]);
     let mut bytes = fs::read(&log).unwrap();
     bytes[150 * 512 + 100] ^= 0x10;
     fs::write(&log, bytes).unwrap();
@@ -355,7 +362,15 @@ fn data_of(path: &Path) -> Value {
 fn parameters(recording: &Path) -> BTreeMap<String, u32> {
     let dir = tempfile::tempdir().unwrap();
     let log = dir.path().join("flight.hum");
-    hums(["pack".as_ref(), recording.as_os_str(), "-o".as_ref(), log.as_os_str()]).expect_code(&[0]);
+    hums([
+        "decode".as_ref(),
+        "--format".as_ref(),
+        "hum".as_ref(),
+        recording.as_os_str(),
+        "-o".as_ref(),
+        log.as_os_str(),
+    ])
+    .expect_code(&[0]);
     let mut decode = command(["decode".as_ref(), log.as_os_str()]);
     let lines = child::run(decode.args(["-o", "-", "--format", "jsonl"]), LIMIT).expect_code(&[0]).text();
     let values = lines.lines().filter(|line| line.contains("\"PARAM_VALUE\"")).map(json);

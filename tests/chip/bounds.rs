@@ -1,4 +1,4 @@
-//! Memory of `hums emulate`, as `tests/sim/memory.rs` has it of the other commands.
+//! Memory of `hums sim --firmware`, as `tests/sim/memory.rs` has it of the other commands.
 
 use std::fs;
 

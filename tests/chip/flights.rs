@@ -30,10 +30,10 @@ const ACR: u32 = 0x705;
 /// The watchdog stops in a debugger's halt.
 const FREEZES_IWDG: u32 = 1 << 12;
 
-/// All that `hums verify` checks holds; only the end of a record that power cut in the air cannot be proved (exit code 3).
+/// All that `hums info --verify` checks holds; only the end of a record that power cut in the air cannot be proved (exit code 3).
 #[track_caller]
 pub(crate) fn assert_verifies(card: &Path) {
-    let said = hums(["verify".as_ref(), card.as_os_str()]).expect_code(&[0, 3]).text();
+    let said = hums(["info".as_ref(), "--verify".as_ref(), card.as_os_str()]).expect_code(&[0, 3]).text();
     let checks: Vec<_> = said.lines().filter(|line| line.contains(" checked, ")).collect();
     assert!(checks.len() > 10, "{said}");
     for check in checks {

@@ -71,12 +71,12 @@ fn with_main(code: &[u16]) -> (Vec<u8>, u32) {
     (elf, main)
 }
 
-/// What `hums emulate` of this image says.
+/// What `hums sim --firmware` of this image says.
 fn emulated(elf: &[u8], code: i32) -> String {
     let dir = tempfile::tempdir().unwrap();
     let (image, card) = (dir.path().join("hums.elf"), dir.path().join("card.img"));
     fs::write(&image, elf).unwrap();
-    let mut command = program::command(["emulate", "--card-size", "64", "--input"]);
+    let mut command = program::command(["sim", "--card-size", "64", "--input"]);
     command.arg(hostile::raw_heartbeats(dir.path(), 10)).arg("--sd").arg(card).arg("--firmware").arg(image);
     child::run(&mut command, program::LIMIT).expect_code(&[code]).stderr
 }

@@ -77,7 +77,7 @@ pub(crate) fn assert_on_card(log: &Path, card: &[u8]) {
     assert!(card[first * 512..].starts_with(&log), "the download differs from the card");
 }
 
-/// The first segment of the log of this number that `hums pull` has brought into a folder: its name has the session.
+/// The first segment of the log of this number that `hums box pull` has brought into a folder: its name has the session.
 pub(crate) fn pulled_log(folder: &Path, number: &str) -> PathBuf {
     let all: Vec<PathBuf> = pulled_logs(folder, number);
     assert_eq!(all.len(), 1, "{all:?}");

@@ -202,22 +202,24 @@ fn mavproxy_lists_sets_downloads_and_signs() {
     // Unsigned nothing is told any longer; with the passphrase our own tool may.
     let address = format!("udpout:127.0.0.1:{}", board.port);
     let unsigned =
-        hums(["params", "get", "BAT_REM_WARN", "--system", "1", "--link", &address]).expect_code(&[1]);
+        hums(["box", "params", "get", "BAT_REM_WARN", "--system", "1", "--link", &address]).expect_code(&[1]);
     assert!(unsigned.stderr.contains("no answer"), "{}", unsigned.stderr);
     let key = folder.join("key.txt");
     fs::write(&key, "passphrase-of-this-flight\n").unwrap();
     let key = key.to_str().unwrap();
-    let got = hums(["params", "get", "BAT_REM_WARN", "--key", key, "--system", "1", "--link", &address])
-        .expect_code(&[0])
-        .text();
+    let got =
+        hums(["box", "params", "get", "BAT_REM_WARN", "--key", key, "--system", "1", "--link", &address])
+            .expect_code(&[0])
+            .text();
     assert_eq!(got, "BAT_REM_WARN 34\n");
-    let gone = hums(["params", "sign", "--remove", "--key", key, "--system", "1", "--link", &address])
+    let gone = hums(["box", "params", "sign", "--remove", "--key", key, "--system", "1", "--link", &address])
         .expect_code(&[0]);
     assert_eq!(gone.text(), "key removed\n");
-    hums(["params", "get", "BAT_REM_WARN", "--system", "1", "--link", &address]).expect_code(&[0]);
-    let set = hums(["params", "sign", "--key", key, "--system", "1", "--link", &address]).expect_code(&[0]);
+    hums(["box", "params", "get", "BAT_REM_WARN", "--system", "1", "--link", &address]).expect_code(&[0]);
+    let set =
+        hums(["box", "params", "sign", "--key", key, "--system", "1", "--link", &address]).expect_code(&[0]);
     assert_eq!(set.text(), "key set\n");
-    hums(["params", "get", "BAT_REM_WARN", "--key", key, "--system", "1", "--link", &address])
+    hums(["box", "params", "get", "BAT_REM_WARN", "--key", key, "--system", "1", "--link", &address])
         .expect_code(&[0]);
 }
 
@@ -402,11 +404,12 @@ fn a_log_pulled_over_a_link_that_loses_a_tenth_is_the_one_on_the_card() {
     let address = format!("udpout:127.0.0.1:{}", link.port);
     let output = pulled.to_str().unwrap();
     let log = "00001_00.HUM";
-    hums(["pull", "--link", &address, "--system", "1", "-o", output, log]).expect_code(&[0]);
+    hums(["box", "pull", "--link", &address, "--system", "1", "-o", output, log]).expect_code(&[0]);
     assert!(link.lost.load(Ordering::Relaxed) > 5, "nothing was lost: {:?}", link.lost);
     assert_on_card(&pulled_log(&pulled, "00001"), &card);
     // Again: what is there is left.
-    let again = hums(["pull", "--link", &address, "--system", "1", "-o", output, log]).expect_code(&[0]);
+    let again =
+        hums(["box", "pull", "--link", &address, "--system", "1", "-o", output, log]).expect_code(&[0]);
     assert!(again.stderr.contains("00001_00.HUM: is there already as "), "{}", again.stderr);
 
     let said = oracle::log_download(board.port, &downloaded, 0.1);
@@ -421,18 +424,19 @@ fn the_command_line_lists_reads_and_sets_parameters_over_a_bad_link() {
     let link = Lossy::to(board.port);
     let address = format!("udpout:127.0.0.1:{}", link.port);
     // Nobody says which system's board: it is the only one.
-    let listed = hums(["params", "list", "--link", &address]).expect_code(&[0]);
+    let listed = hums(["box", "params", "list", "--link", &address]).expect_code(&[0]);
     assert!(listed.stderr.contains("system 1: its board is heard"), "{}", listed.stderr);
     let list = listed.text();
     assert!(list.contains("GS_BUDGET 2000\n") && list.contains("BAT_REM_WARN 15\n"), "{list}");
-    let set = hums(["params", "set", "BAT_REM_WARN", "21.5", "--system", "1", "--link", &address])
+    let set = hums(["box", "params", "set", "BAT_REM_WARN", "21.5", "--system", "1", "--link", &address])
         .expect_code(&[0])
         .text();
     assert_eq!(set, "BAT_REM_WARN 21.5\n");
-    let got =
-        hums(["params", "get", "BAT_REM_WARN", "--system", "1", "--link", &address]).expect_code(&[0]).text();
+    let got = hums(["box", "params", "get", "BAT_REM_WARN", "--system", "1", "--link", &address])
+        .expect_code(&[0])
+        .text();
     assert_eq!(got, "BAT_REM_WARN 21.5\n");
-    let refused = hums(["params", "set", "BAT_REM_WARN", "1000", "--system", "1", "--link", &address])
+    let refused = hums(["box", "params", "set", "BAT_REM_WARN", "1000", "--system", "1", "--link", &address])
         .expect_code(&[1]);
     assert!(refused.stderr.contains("keeps 21.5"), "{}", refused.stderr);
 }
@@ -449,7 +453,11 @@ fn a_card_from_the_shop_is_formatted_by_command_and_one_with_logs_is_not() {
     let board = Board::start_in(dir, &[]);
     let address = format!("udpout:127.0.0.1:{}", board.port);
     let format = |flags: &[&str]| {
-        hums(["format", "--link", &address, "--system", "1"].into_iter().chain(flags.iter().copied()))
+        hums(
+            ["box", "format-card", "--link", &address, "--system", "1"]
+                .into_iter()
+                .chain(flags.iter().copied()),
+        )
     };
     assert!(format(&[]).expect_code(&[2]).stderr.contains("will be lost"));
     assert_eq!(fs::read(&image).unwrap(), card, "nobody said --yes");

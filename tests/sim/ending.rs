@@ -33,7 +33,9 @@ fn record_of(flight: &Path, image: &Path, cut: Option<u64>) -> Value {
 
 /// The logs as `verify --json` has them; the exit code must be this one.
 fn verify(image: &Path, code: i32) -> Vec<Value> {
-    let text = hums(["verify".as_ref(), "--json".as_ref(), image.as_os_str()]).expect_code(&[code]).text();
+    let text = hums(["info".as_ref(), "--verify".as_ref(), "--json".as_ref(), image.as_os_str()])
+        .expect_code(&[code])
+        .text();
     let all: Value = serde_json::from_str(&text).unwrap();
     assert_eq!(all["ok"], code == 0, "{text}");
     all["logs"].as_array().unwrap().clone()
@@ -51,7 +53,7 @@ fn power_that_goes_after_the_disarming_leaves_a_log_that_is_whole_to_it() {
     let end = &logs[0]["end"];
     assert_eq!((&end["proof"], &end["mark"]["why"]), (&"mark".into(), &"disarmed".into()), "{end}");
     assert!(end["words"].as_str().unwrap().contains("whole to the disarming at 20"), "{end}");
-    let text = hums(["verify".as_ref(), image.as_os_str()]).expect_code(&[0]).text();
+    let text = hums(["info".as_ref(), "--verify".as_ref(), image.as_os_str()]).expect_code(&[0]).text();
     assert!(text.contains("whose end cannot be proved") && !text.contains("everything holds"), "{text}");
     let info = hums(["info".as_ref(), image.as_os_str()]).expect_code(&[0]).text();
     assert!(info.contains("  end      whole to the disarming at"), "{info}");
@@ -129,8 +131,9 @@ fn power_that_goes_after_a_landing_while_armed_leaves_a_log_that_is_whole_to_it_
     let cut = |at| {
         let _ = fs::remove_file(&image);
         let report = record_of(&flight, &image, at);
-        let text =
-            hums(["verify".as_ref(), "--json".as_ref(), image.as_os_str()]).expect_code(&[0, 3]).text();
+        let text = hums(["info".as_ref(), "--verify".as_ref(), "--json".as_ref(), image.as_os_str()])
+            .expect_code(&[0, 3])
+            .text();
         (report, serde_json::from_str::<Value>(&text).unwrap()["logs"][0]["end"].clone())
     };
     // The first write with which the mark is on the card.
@@ -143,7 +146,7 @@ fn power_that_goes_after_a_landing_while_armed_leaves_a_log_that_is_whole_to_it_
     let (report, end) = cut(Some(with));
     assert_eq!(end["proof"], "mark", "{end}");
     assert!(end["words"].as_str().unwrap().contains("whole to the landing at "), "{end}");
-    hums(["verify".as_ref(), image.as_os_str()]).expect_code(&[0]);
+    hums(["info".as_ref(), "--verify".as_ref(), image.as_os_str()]).expect_code(&[0]);
     // What came in between the mark and that write.
     let decode = [
         "decode".as_ref(),

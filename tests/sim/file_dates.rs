@@ -43,7 +43,7 @@ fn a_log_has_the_date_of_its_flight_and_none_before_it_is_known() {
     assert_eq!(dates.len(), 3, "{dates:?}");
     assert_eq!((day(0), day(1)), (utc_day(&image, 1), "1980-01-01".to_owned()), "{dates:?}");
     assert_eq!(day(2), utc_day(&image, 3), "{dates:?}");
-    hums(["verify".as_ref(), image.as_os_str()]).expect_code(&[0, 3]);
+    hums(["info".as_ref(), "--verify".as_ref(), image.as_os_str()]).expect_code(&[0, 3]);
 }
 
 /// The day that `hums info` tells of a session.

@@ -98,7 +98,8 @@ fn sigterm_ends_a_recording_as_ctrl_c_does_with_the_log_closed() {
     std::thread::sleep(Duration::from_secs(1));
     sim.signal("TERM");
     assert_eq!(sim.end(Duration::from_secs(20)), Some(0));
-    let json = program::hums(["verify".as_ref(), "--json".as_ref(), image.as_os_str()]).text();
+    let json =
+        program::hums(["info".as_ref(), "--verify".as_ref(), "--json".as_ref(), image.as_os_str()]).text();
     let json: serde_json::Value = serde_json::from_str(&json).unwrap();
     assert_eq!(json["logs"][0]["closed"], true, "{json}");
 }
@@ -177,7 +178,7 @@ fn sigterm_ends_what_waits_for_a_board() {
     let link = format!("udpin:127.0.0.1:{}", free_port());
     let mut pull = Command::new(program::path());
     let dir = tempfile::tempdir().unwrap();
-    pull.args(["pull", "--link", &link, "-o"]).arg(dir.path()).stderr(Stdio::piped());
+    pull.args(["box", "pull", "--link", &link, "-o"]).arg(dir.path()).stderr(Stdio::piped());
     let mut child = pull.spawn().unwrap();
     let mut stderr = child.stderr.take().unwrap();
     let mut pull = Running(child);

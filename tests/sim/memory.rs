@@ -20,8 +20,7 @@ const ABOVE_KIB_MAX: u64 = 64 << 10;
 
 fn run<A: AsRef<std::ffi::OsStr>>(arguments: &[A]) -> Outcome {
     let mut command = command(arguments);
-    // A demo records on this PC: the chip is measured in tests/chip.
-    command.env("RAYON_NUM_THREADS", "1").env("HUMS_FIRMWARE", "none");
+    command.env("RAYON_NUM_THREADS", "1");
     child::run(&mut command, LIMIT).expect_code(&[0, 1, 2, 3, 4])
 }
 
@@ -52,10 +51,16 @@ enum Tried {
 fn tried(command: &str) -> Tried {
     let lines = |lines: &[&str]| Tried::Lines(lines.iter().map(|line| (*line).to_owned()).collect());
     match command {
-        "info" => lines(&["info IN", "info --json IN", "info --salvage IN"]),
-        "verify" => lines(&["verify IN", "verify --json IN"]),
+        "info" => lines(&[
+            "info IN",
+            "info --json IN",
+            "info --salvage IN",
+            "info --list IN",
+            "info --list --json IN",
+            "info --verify IN",
+            "info --verify --json IN",
+        ]),
         "check" => lines(&["check IN", "check --json IN"]),
-        "ls" => lines(&["ls IN", "ls --json IN"]),
         "report" => lines(&["report IN -o OUT/page.html", "report IN -o OUT/pages.html --compare"]),
         "decode" => {
             let name = |format: &Format| format.to_possible_value().unwrap().get_name().to_owned();
@@ -64,17 +69,10 @@ fn tried(command: &str) -> Tried {
                 formats.map(|format| format!("decode IN -o OUT/{format}/ --format {format}")).collect(),
             )
         }
-        "pack" => lines(&["pack IN -o OUT/packed.hum"]),
         "sim" => lines(&["sim --json --input IN --sd OUT/card.img --gs OUT/gs --tap OUT/tap"]),
         "live" => Tried::Live,
-        "demo" => Tried::Nothing(
-            "what `sim`, `decode` and `report` do, one after the other; it is tried below, once",
-        ),
-        "emulate" => {
-            Tried::Nothing("its input comes through what `sim` reads with, and tests/chip measures it")
-        }
         "completions" | "man" => Tried::Nothing("it reads no file"),
-        "params" | "pull" | "format" => Tried::Nothing(
+        "box" => Tried::Nothing(
             "a line's bytes; what is kept of them has a limit (host-tools/src/talk), and a key 4 KiB",
         ),
         unknown => panic!("how does `hums {unknown}` read a file? Say so in `tried`"),
@@ -201,12 +199,12 @@ fn the_logs_of_a_large_folder_are_told_one_by_one() {
     for number in 0..4_000 {
         fs::write(logs.join(format!("{number:05}.hum")), &first).unwrap();
     }
-    for command in ["verify", "info"] {
-        let outcome = run(&[command, "--json", logs.to_str().unwrap()]);
-        assert_bounded(&format!("{command} --json"), outcome.memory_kib_max, empty);
+    for command in ["--verify", "--json"] {
+        let outcome = run(&["info", command, "--json", logs.to_str().unwrap()]);
+        assert_bounded(&format!("info {command}"), outcome.memory_kib_max, empty);
         let told: serde_json::Value = serde_json::from_str(&outcome.text()).unwrap();
         assert_eq!(told["logs"].as_array().unwrap().len(), 4_000, "{command}");
-        assert_eq!(command == "verify", told["ok"].is_boolean(), "{command}");
+        assert_eq!(command == "--verify", told["ok"].is_boolean(), "{command}");
     }
 }
 
@@ -230,9 +228,6 @@ fn what_is_recorded_and_packed_and_a_cards_image_take_little_memory_with_any_com
         assert_all_bounded(&image, empty);
         fs::remove_file(image).unwrap();
     }
-    let (raw, demo) = (raw.display().to_string(), dir.path().join("demo").display().to_string());
-    let words = ["demo", "--input", &raw, "--dir", &demo, "--dashboard", "never"];
-    assert_bounded("demo", run(&words).memory_kib_max, empty);
 }
 
 #[test]
@@ -256,8 +251,8 @@ fn files_of_parameters_keys_and_images_without_an_end_are_refused_and_take_littl
         &["check", "--params", endless, &log][..],
         &["live", "--listen", "127.0.0.1:0", "--params", endless, "--input", &log],
         &["sim", "--params", endless, "--input", &raw, "--sd", &image],
-        &["params", "list", "--link", "tcp:127.0.0.1:1", "--key", endless],
-        &["emulate", "--firmware", endless, "--input", &raw, "--sd", &image],
+        &["box", "params", "list", "--link", "tcp:127.0.0.1:1", "--key", endless],
+        &["sim", "--firmware", endless, "--input", &raw, "--sd", &image],
     ] {
         let outcome = run(words);
         assert!(matches!(outcome.code, Some(1 | 2)), "{words:?}: {}", outcome.stderr);

@@ -5,10 +5,11 @@ use std::fs;
 use std::path::Path;
 
 use hums_core::usage::UsageCounter;
+use hums_tests::child;
 use hums_tests::damage::Random;
 use hums_tests::flights::{Manifest, own};
 use hums_tests::frames::build_v2;
-use hums_tests::program::{Machine, Recording, hums};
+use hums_tests::program::{self, Machine, Recording, command, hums};
 use hums_tests::store::Stored;
 
 const FLIGHT: &str = "px4_hil_quad_low.tlog";
@@ -237,12 +238,10 @@ fn a_parameter_file_that_is_wrong_is_told_with_line_and_range_and_leaves_nothing
         ("CELL_VOLT_WARN\n", "line 1: wants NAME VALUE"),
     ] {
         fs::write(&file, text).unwrap();
-        for command in ["sim", "emulate"] {
-            let arguments =
-                [command.as_ref(), "--input".as_ref(), own(FLIGHT).as_os_str().to_owned().as_os_str()]
-                    .map(std::ffi::OsStr::to_owned);
-            let more = ["--sd".into(), image.clone().into(), "--params".into(), file.clone().into()];
-            let outcome = hums(arguments.into_iter().chain(more)).expect_code(&[1, 2]);
+        for flags in [&[][..], &["--firmware", "hums.elf"]] {
+            let mut sim = command(["sim", "--input"]);
+            sim.arg(own(FLIGHT)).arg("--sd").arg(&image).arg("--params").arg(&file).args(flags);
+            let outcome = child::run(&mut sim, program::LIMIT).expect_code(&[1, 2]);
             assert!(outcome.stderr.contains(why), "{}", outcome.stderr);
         }
         assert!(!image.exists());

@@ -1,4 +1,4 @@
-//! `hums pull`: interrupted, gone on with, and never made of two logs.
+//! `hums box pull`: interrupted, gone on with, and never made of two logs.
 
 use std::fs;
 use std::io::{BufRead as _, BufReader};
@@ -40,14 +40,14 @@ fn board(dir: TempDir) -> Board {
 
 fn pull(board: &Board, output: &Path, names: &[&str]) -> hums_tests::child::Outcome {
     let address = format!("udpout:127.0.0.1:{}", board.port);
-    let flags = ["pull", "--link", &address, "--system", "1", "-o", output.to_str().unwrap()];
+    let flags = ["box", "pull", "--link", &address, "--system", "1", "-o", output.to_str().unwrap()];
     hums(flags.into_iter().chain(names.iter().copied()))
 }
 
 /// Begins to pull and is killed when something has come.
 fn begin(board: &Board, output: &Path) -> PathBuf {
     let address = format!("udpout:127.0.0.1:{}", board.port);
-    let mut pull = command(["pull", "--link", &address, LOG, "-o"]);
+    let mut pull = command(["box", "pull", "--link", &address, LOG, "-o"]);
     let mut child = pull.arg(output).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
     let words = BufReader::new(child.stderr.take().unwrap()).lines().map_while(Result::ok);
     let mut pull = Running(child);
@@ -146,7 +146,7 @@ fn what_is_there_already_is_checked_as_what_comes_is() {
     let home = tempfile::tempdir().unwrap();
     for words in ["bytes", "is there already"] {
         let told = pull(&board, home.path(), &[LOG]).expect_code(&[3]).stderr;
-        assert!(told.contains(words) && told.contains("`hums verify` says more"), "{told}");
+        assert!(told.contains(words) && told.contains("`hums info --verify` says more"), "{told}");
     }
 }
 
@@ -243,9 +243,9 @@ fn a_finding_comes_first_as_a_part_that_says_so_and_the_rest_comes_once() {
 
     // Every reader takes it, and says what it is.
     let name = part.to_str().unwrap();
-    for command in ["info", "verify"] {
-        let told = hums([command, name]).expect_code(&[3]).text();
-        assert!(told.contains("is a part of its log, as `hums pull --around` brings it"), "{told}");
+    for words in [&["info", name][..], &["info", "--verify", name]] {
+        let told = hums(words).expect_code(&[3]).text();
+        assert!(told.contains("is a part of its log, as `hums box pull --around` brings it"), "{told}");
     }
     let made = home.path().join("part.tlog");
     hums(["decode", name, "-o", made.to_str().unwrap(), "--format", "tlog"]).expect_code(&[3]);
@@ -329,7 +329,7 @@ fn a_board_that_computes_no_checksum_is_read_whole_and_what_its_sectors_say_coun
     let output = home.path().join("logs");
     let pull = || {
         let address = format!("udpout:127.0.0.1:{port}");
-        hums(["pull", "--link", &address, "--system", "1", LOG, "-o", output.to_str().unwrap()])
+        hums(["box", "pull", "--link", &address, "--system", "1", LOG, "-o", output.to_str().unwrap()])
     };
     let told = pull().expect_code(&[0]).stderr;
     assert!(told.contains("the board's firmware computes no checksum"), "{told}");

@@ -39,10 +39,10 @@ fn zero(image: &Path, from: u64, to: u64) {
     file.write_all_at(&vec![0; (to - from) as usize], from).unwrap();
 }
 
-/// `info --json` or `verify --json`, which must end with this code.
+/// The JSON of this command, which must end with this code.
 fn json(command: &str, image: &Path, flags: &[&str], code: i32) -> Value {
-    let arguments = [command.as_ref(), "--json".as_ref(), image.as_os_str()];
-    let outcome = hums(arguments.into_iter().chain(flags.iter().map(AsRef::as_ref))).expect_code(&[code]);
+    let words = command.split(' ').chain(["--json"]).chain(flags.iter().copied()).map(AsRef::as_ref);
+    let outcome = hums(words.chain([image.as_os_str()])).expect_code(&[code]);
     serde_json::from_str(&outcome.text()).unwrap()
 }
 
@@ -84,8 +84,8 @@ fn a_card_without_a_file_system_gives_all_that_is_on_it() {
             assert_ne!(info["images"][0]["damage"], serde_json::json!([]), "{what}");
             assert_eq!(info["logs"].as_array().unwrap().len(), 1, "{what}: {info}");
             assert_eq!(info["logs"][0]["gaps_count"], 0, "{what}: the log itself is whole");
-            json("verify", &image, &[], 3);
-            for command in ["info", "verify", "check"] {
+            json("info --verify", &image, &[], 3);
+            for command in ["info", "info --verify", "check"] {
                 changes_nothing(command, &image, what);
             }
             let decoded = Decoded::of(&image, &[3]);
@@ -97,7 +97,8 @@ fn a_card_without_a_file_system_gives_all_that_is_on_it() {
 /// Nothing that is said of a card which holds evidence advises to change anything on it.
 #[track_caller]
 fn changes_nothing(command: &str, image: &Path, what: &str) {
-    let outcome = hums([command.as_ref(), image.as_os_str()]).expect_code(&[3]);
+    let words = command.split(' ').map(AsRef::as_ref).chain([image.as_os_str()]);
+    let outcome = hums(words).expect_code(&[3]);
     let said = format!("{}{}", outcome.text(), outcome.stderr).to_ascii_lowercase();
     let words: Vec<&str> = said.split(|character: char| !character.is_ascii_alphabetic()).collect();
     for advice in ["format", "reformat", "erase", "delete", "fsck", "chkdsk", "repair"] {
@@ -118,7 +119,7 @@ fn a_log_whose_directory_entry_is_lost_is_found_and_told_beside_others() {
     let info = json("info", &image, &[], 3);
     assert_eq!(info["logs"].as_array().unwrap().len(), 2, "{info}");
     assert!(info["images"][0]["damage"][0].as_str().unwrap().contains("belong to no file"), "{info}");
-    assert_eq!(json("verify", &image, &[], 3)["logs"].as_array().unwrap().len(), 2);
+    assert_eq!(json("info --verify", &image, &[], 3)["logs"].as_array().unwrap().len(), 2);
 
     // The FAT of its sectors is lost as well, and its parity is all that is left in clusters of no file.
     let Places { fat, data, cluster_bytes, .. } = places(&image);
@@ -136,7 +137,7 @@ fn a_log_whose_directory_entry_is_lost_is_found_and_told_beside_others() {
     let info = json("info", &image, &[], 3);
     assert_eq!(info["logs"].as_array().unwrap().len(), 2, "{info}");
     assert!(info["images"][0]["damage"][0].as_str().unwrap().contains("sectors of logs in them"), "{info}");
-    json("verify", &image, &[], 3);
+    json("info --verify", &image, &[], 3);
 }
 
 /// Two bytes of a directory entry.
@@ -227,7 +228,9 @@ fn an_older_log_that_a_newer_one_overwrites_gives_what_is_left_of_it_and_never_m
     // What the newest one left of the oldest is there, from the group after the last overwritten one on.
     // It is no damage of the card.
     let found = json("info", &image, &["--salvage"], 0);
-    let verify = hums(["verify".as_ref(), "--salvage".as_ref(), image.as_os_str()]).expect_code(&[0]).text();
+    let verify = hums(["info".as_ref(), "--verify".as_ref(), "--salvage".as_ref(), image.as_os_str()])
+        .expect_code(&[0])
+        .text();
     assert!(
         verify.contains(
             "is in no file: it was deleted, its file lost its name, or newer sessions have written over it; "
@@ -276,7 +279,7 @@ fn a_file_that_held_something_else_before_is_no_damage() {
     fs::write(&image, &content).unwrap();
     let info = json("info", &image, &[], 0);
     assert_eq!(info["logs"][0]["gaps_count"], 0, "{info}");
-    json("verify", &image, &[], 0);
+    json("info --verify", &image, &[], 0);
     let input = fs::read(&path).unwrap();
     assert_eq!(
         Decoded::of(&image, &[0]).frames(&manifest.seeds).len(),

@@ -30,7 +30,15 @@ fn packed(dir: &Path, name: &str, raw: &[u8]) -> PathBuf {
     if log.exists() {
         fs::remove_file(&log).unwrap();
     }
-    hums(["pack".as_ref(), recording.as_os_str(), "-o".as_ref(), log.as_os_str()]).expect_code(&[0]);
+    hums([
+        "decode".as_ref(),
+        "--format".as_ref(),
+        "hum".as_ref(),
+        recording.as_os_str(),
+        "-o".as_ref(),
+        log.as_os_str(),
+    ])
+    .expect_code(&[0]);
     fs::remove_file(recording).unwrap();
     log
 }

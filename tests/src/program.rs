@@ -68,7 +68,7 @@ pub fn hums<A: AsRef<OsStr>>(arguments: impl IntoIterator<Item = A>) -> Outcome 
 pub enum Machine {
     /// `hums sim`: this PC.
     Sim,
-    /// `hums emulate`: the image that is flashed, on the model of its chip.
+    /// `hums sim --firmware`: the image that is flashed, on the model of its chip.
     Chip,
 }
 
@@ -85,11 +85,11 @@ impl Recording {
     #[track_caller]
     pub fn attempt(machine: Machine, input: &Path, flags: &[&str]) -> Self {
         let dir = tempfile::tempdir().unwrap();
-        let (name, limit) = match machine {
-            Machine::Sim => ("sim", LIMIT),
-            Machine::Chip => ("emulate", LIMIT_CHIP),
+        let limit = match machine {
+            Machine::Sim => LIMIT,
+            Machine::Chip => LIMIT_CHIP,
         };
-        let mut command = command([name, "--json", "--input"]);
+        let mut command = command(["sim", "--json", "--input"]);
         command.arg(input).arg("--sd").arg(dir.path().join("card.img"));
         command.arg("--gs").arg(dir.path().join("gs.bin")).args(flags);
         match machine {

@@ -87,7 +87,7 @@ fn fly(options: &Options, image: Option<&Path>, built: Duration) -> Result<()> {
 
     let (card, gs, figures) = (folder.join("card.img"), folder.join("gs.bin"), folder.join("run.json"));
     let pipeline = match image {
-        Some(image) => Shell::new(hums::program()).arg("emulate").arg("--firmware").arg(image),
+        Some(image) => Shell::new(hums::program()).arg("sim").arg("--firmware").arg(image),
         None => Shell::new(hums::program()).arg("sim"),
     };
     let recording = Instant::now();

@@ -9,7 +9,7 @@ use cortex_m::peripheral::DWT;
 use critical_section::{CriticalSection, Mutex};
 use hums_core::clock::Instant;
 
-/// The parts that are measured apart; `hums emulate --costs` has their names in this order.
+/// The parts that are measured apart; `hums sim --firmware --costs` has their names in this order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Stage {
     /// Nothing else; also the interrupts of ports and clock.

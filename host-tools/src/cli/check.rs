@@ -34,7 +34,7 @@ pub struct Check {
     /// Earlier flights of the same vehicle, three or more, in which it was well: trends are judged against them. May be given several times
     #[arg(long, value_name = "LOG", value_parser = input())]
     pub past: Vec<PathBuf>,
-    /// Only this session of a card or folder, by the name that `hums ls` gives
+    /// Only this session of a card or folder, by the name that `hums info --list` prints
     #[arg(long, value_name = "NAME")]
     pub session: Option<String>,
     /// Of several vehicles in a recording only this one, by its system id

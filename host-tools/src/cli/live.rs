@@ -26,7 +26,7 @@ pub struct Live {
     /// A link (udpin:, udpout:, tcp:, serial:), a recording (tlog or raw MAVLink, `-`), or a log (file, image, folder)
     #[arg(long, value_name = "SRC")]
     pub input: Endpoint,
-    /// Of several sessions this one, by the name that `hums ls` gives; otherwise the newest
+    /// Of several sessions this one, by the name that `hums info --list` prints; otherwise the newest
     #[arg(long, value_name = "NAME")]
     pub session: Option<String>,
     /// Where the page is served; port 0 is any free one

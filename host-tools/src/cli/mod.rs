@@ -1,7 +1,6 @@
 //! The command line, as clap reads it and `--help` teaches it.
 
 mod check;
-mod demo;
 mod live;
 mod read;
 mod run;
@@ -11,12 +10,11 @@ mod talk;
 use clap::{Parser, Subcommand};
 
 pub use check::Check;
-pub use demo::{Dashboard, Demo};
 pub use live::Live;
-pub use read::{Decode, Format, Info, Ls, Pack, Report, Verify};
-pub use run::{Emulate, FaultFlags, Run, Sim, Speed};
+pub use read::{Decode, Format, Info, Report};
+pub use run::{FaultFlags, Sim, Speed};
 pub use shell::{Completions, Man};
-pub use talk::{Around, FormatCard, Link, Params, ParamsAction, Pull};
+pub use talk::{Around, BoxAction, BoxArgs, FormatCard, Link, Params, ParamsAction, Pull};
 
 const ABOUT: &str = "HUMS: an on-board black box and health monitor for drones that speak MAVLink.
 
@@ -32,10 +30,9 @@ const AFTER: &str = "Where bytes come from and go to (SRC, SINK):
   serial:DEVICE:BAUD    a serial port, e.g. serial:/dev/ttyUSB0:921600
 
 Examples:
-  hums demo                                                  a recorded flight through all of it
   hums check flight.tlog                                     what is wrong with a flight
   hums sim --input flight.tlog --sd card.img                 record a flight onto an SD card image
-  hums ls card.img                                           the flights on a card, a line each
+  hums info --list card.img                                  the flights on a card, a line each
   hums info card.img --session 00001                         all that is known of one of them
   hums decode card.img -o out --format tlog,csv              a card's logs for other tools
   hums live --input udpin:0.0.0.0:14550 --open               the vehicle as it flies, in the browser
@@ -56,37 +53,25 @@ pub struct Cli {
 /// What to do.
 #[derive(Debug, Subcommand)]
 pub enum Command {
-    /// Run the firmware's pipeline on this PC: bytes in at the autopilot UART, an SD card image out
-    Sim(Sim),
-    /// The same with the firmware image that is flashed, on a model of its chip
-    Emulate(Emulate),
-    /// Turn logs into files for other tools: tlog, CSV, JSON lines, Parquet, InfluxDB
-    Decode(Decode),
     /// Say what is wrong with a flight, from the log of any autopilot or ground station
     Check(Check),
-    /// List flights, a line each: date, length, size, the worst finding
-    Ls(Ls),
-    /// Say what is in a log: sessions, vehicle, frames, gaps, findings, usage, sizes
-    Info(Info),
-    /// Check everything that can be checked about a log or a card
-    Verify(Verify),
     /// Write a page about a flight: plots, map, findings, usage, trend; one HTML file, no network
     Report(Report),
     /// Show the vehicle as it flies, on a page that this program serves: from a link, a recording or a log
     Live(Live),
-    /// Turn a recording into one log file of HUMS, without a card
-    Pack(Pack),
-    /// List, read or set the board's parameters over MAVLink
-    Params(Params),
-    /// Download the board's logs over MAVLink
-    Pull(Pull),
-    /// Have the board format a card that it cannot record on
-    Format(FormatCard),
-    /// Show what HUMS does: a flight is recorded, decoded and summed up, and played on the dashboard
-    Demo(Demo),
+    /// Turn logs into files for other tools: tlog, CSV, JSON lines, Parquet, InfluxDB
+    Decode(Decode),
+    /// Say what is in a log: sessions, vehicle, frames, gaps, findings, usage, sizes
+    Info(Info),
+    /// Run the firmware's pipeline on this PC: bytes in at the autopilot UART, an SD card image out
+    Sim(Sim),
+    /// Talk with the box over MAVLink: its logs, its parameters, its card
+    Box(BoxArgs),
     /// Print a script that has a shell complete commands, flags and file names
+    #[command(hide = true)]
     Completions(Completions),
     /// Print the manual page of the program or of one command
+    #[command(hide = true)]
     Man(Man),
 }
 

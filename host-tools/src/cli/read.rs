@@ -1,11 +1,11 @@
-//! What reads logs: `hums ls`, `hums info`, `hums decode`, `hums verify`, `hums report`; and `hums pack`, which makes one.
+//! The commands that read logs: `hums info`, `hums decode`, `hums report`.
 
 use std::path::PathBuf;
 
 use clap::builder::{PathBufValueParser, TypedValueParser};
 use clap::{Args, ValueEnum};
 
-use crate::endpoint::{Endpoint, without_slash};
+use crate::endpoint::without_slash;
 use crate::utc::When;
 
 const DECODE_EXAMPLES: &str = "Examples:
@@ -15,6 +15,7 @@ const DECODE_EXAMPLES: &str = "Examples:
   hums decode 00001_00.HUM -o - --format jsonl --from 60 --to 2026-11-21T10:20:00Z | head
   hums decode cards/ -o fleet --format parquet
   hums decode card.img --session 00001 -o - --format influx | curl --data-binary @- http://localhost:8428/write
+  hums decode flight.tlog -o flight.hum --format hum
 
 Where files go: -o names the file where there is one log and one format of a single file (tlog, jsonl, influx), unless
 it is a directory; otherwise it is a directory with OUT/LOG.tlog, OUT/LOG.jsonl, OUT/LOG.lp and, for tables,
@@ -39,7 +40,7 @@ pub struct Decode {
     /// Look at every block of an image: finds logs that were deleted, and what is left of overwritten ones
     #[arg(long)]
     pub salvage: bool,
-    /// Only this session of a card or folder, by the name that `hums ls` gives
+    /// Only this session of a card or folder, by the name that `hums info --list` prints
     #[arg(long, value_name = "NAME")]
     pub session: Option<String>,
     /// The file or directory to write
@@ -78,74 +79,45 @@ pub enum Format {
     Influx,
     /// Typed columns by vehicle, date and session, for DuckDB, Spark, pandas
     Parquet,
+    /// A log as the box writes it, of one tlog or raw recording; written alone
+    Hum,
     /// Four tables with a row a second, as the thesis has them on which HUMS is built: flight, ESC status, ESC errors, speeds
     Thesis,
-}
-
-const LS_EXAMPLES: &str = "Examples:
-  hums ls card.img
-  hums ls cards/ flight.tlog
-  hums ls --json 00001_00.HUM
-
-A line for each flight, in the order in which they began: when that was, how long it is, how long the vehicle was in the air, how large it is, and the worst
-finding. `hums info --session NAME` shows all of one. Exit code 3: one of them has losses or damage.";
-
-/// `hums ls`
-#[derive(Args, Clone, Debug)]
-#[command(after_help = LS_EXAMPLES)]
-pub struct Ls {
-    /// Logs, card images, recordings of any kind that `hums check` reads, or directories with such
-    #[arg(required = true, value_name = "LOG|IMAGE|DIR", value_parser = input())]
-    pub inputs: Vec<PathBuf>,
-    /// Look at every block of an image: finds logs that were deleted, and what is left of overwritten ones
-    #[arg(long)]
-    pub salvage: bool,
-    /// Print the result as one JSON object (docs/json.md)
-    #[arg(long)]
-    pub json: bool,
 }
 
 const INFO_EXAMPLES: &str = "Examples:
   hums info card.img
   hums info card.img --session 00001
   hums info flight.tlog
-  hums info --json 00001_00.HUM";
+  hums info --json 00001_00.HUM
+  hums info --list cards/ flight.tlog
+  hums info --verify card.img
+
+--list: a line a log, in the order in which they began: date, length, time in the air, size, worst finding.
+--verify: the file system's structures, each sector's checksum and number, each group's decoding, each frame's checksum, the order
+of times, and where each log ends.
+Exit code 3: a log has losses or damage.";
 
 /// `hums info`
 #[derive(Args, Clone, Debug)]
 #[command(after_help = INFO_EXAMPLES)]
+#[expect(clippy::struct_excessive_bools, reason = "flags of a command line")]
 pub struct Info {
     /// Logs, card images, recordings of any kind that `hums check` reads, or directories with such
     #[arg(required = true, value_name = "LOG|IMAGE|DIR", value_parser = input())]
     pub inputs: Vec<PathBuf>,
-    /// Only this session, by the name that `hums ls` gives
+    /// Print a line a log: date, length, time in the air, size, worst finding
+    #[arg(long)]
+    pub list: bool,
+    /// Check all that can be checked about HUMS logs and cards, and print each check
+    #[arg(long, conflicts_with_all = ["list", "session", "system"])]
+    pub verify: bool,
+    /// Only this session, by the name that `hums info --list` prints
     #[arg(long, value_name = "NAME")]
     pub session: Option<String>,
     /// Of several vehicles in a recording only this one, by its system id
     #[arg(long, value_name = "ID")]
     pub system: Option<u8>,
-    /// Look at every block of an image: finds logs that were deleted, and what is left of overwritten ones
-    #[arg(long)]
-    pub salvage: bool,
-    /// Print the result as one JSON object (docs/json.md)
-    #[arg(long)]
-    pub json: bool,
-}
-
-const VERIFY_EXAMPLES: &str = "Examples:
-  hums verify card.img
-  hums verify --json card.img
-
-Checks the file system's structures, every sector's checksum and number, every group's decoding, every frame's own
-checksum and the order of times. Exit code 3 means damage or losses were found.";
-
-/// `hums verify`
-#[derive(Args, Clone, Debug)]
-#[command(after_help = VERIFY_EXAMPLES)]
-pub struct Verify {
-    /// Logs, card images, or directories with such
-    #[arg(required = true, value_name = "LOG|IMAGE|DIR", value_parser = input())]
-    pub inputs: Vec<PathBuf>,
     /// Look at every block of an image: finds logs that were deleted, and what is left of overwritten ones
     #[arg(long)]
     pub salvage: bool,
@@ -174,7 +146,7 @@ pub struct Report {
     /// The page to write, or a directory for a page a session
     #[arg(short, long, value_name = "OUT")]
     pub output: Option<PathBuf>,
-    /// Only this session, by the name that `hums ls` gives
+    /// Only this session, by the name that `hums info --list` prints
     #[arg(long, value_name = "NAME")]
     pub session: Option<String>,
     /// Show the newest flight and up to ten before it side by side on one page; with a directory such a page for each airframe too
@@ -183,28 +155,6 @@ pub struct Report {
     /// Of several vehicles in a recording only this one, by its system id
     #[arg(long, value_name = "ID")]
     pub system: Option<u8>,
-    /// Overwrite outputs that exist
-    #[arg(long)]
-    pub force: bool,
-    /// Print the result as one JSON object (docs/json.md)
-    #[arg(long)]
-    pub json: bool,
-}
-
-const PACK_EXAMPLES: &str = "Examples:
-  hums pack flight.tlog -o flight.hum
-  hums decode flight.hum -o back.tlog --format tlog";
-
-/// `hums pack`
-#[derive(Args, Clone, Debug)]
-#[command(after_help = PACK_EXAMPLES)]
-pub struct Pack {
-    /// A tlog or raw MAVLink bytes, also as .gz
-    #[arg(value_name = "TLOG")]
-    pub input: Endpoint,
-    /// The log file to write
-    #[arg(short, long, value_name = "LOG")]
-    pub output: PathBuf,
     /// Overwrite outputs that exist
     #[arg(long)]
     pub force: bool,

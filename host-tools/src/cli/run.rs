@@ -1,4 +1,4 @@
-//! `hums sim` and `hums emulate`, and what they share.
+//! `hums sim`.
 
 use std::path::PathBuf;
 
@@ -16,14 +16,17 @@ const SIM_EXAMPLES: &str = "Examples:
   hums sim --input flight.tlog --sd card.img --stall 2500@60 --noise 0.001 --seed 7
   hums sim --input flight.tlog --sd card.img --cut-after-writes 1000:torn
   hums sim --input flight.tlog --sd card.img --store store.bin --params hums.param
+  hums sim --input flight.tlog --sd card.img --firmware hums-f405.elf
 
 Raw bytes carry no times: they come as on a line at 115,200 baud. A file without a MAVLink frame is refused before anything
 is written. The image of --sd is kept: a second run adds a session to it; a file that is no card is refused. Where --gs or --tap fails the recording goes on (exit code 3).
-A file of --gs or --tap must be new, or empty.";
+A file of --gs or --tap must be new, or empty.
+With --firmware a second of flight takes some 0.15 s; `cargo xtask firmware` builds an image and prints its path.";
 
-/// What `sim` and `emulate` share.
+/// `hums sim`
 #[derive(Args, Clone, Debug)]
-pub struct Run {
+#[command(after_help = SIM_EXAMPLES)]
+pub struct Sim {
     /// Where the autopilot's bytes come from: a file (tlog or raw MAVLink, also as .gz), `-`, udpin:, udpout:, tcp: or serial:
     #[arg(long, value_name = "SRC")]
     pub input: Endpoint,
@@ -48,6 +51,16 @@ pub struct Run {
     /// Overwrite the oldest sessions where the card has no room, as on a vehicle
     #[arg(long)]
     pub overwrite_oldest: bool,
+    /// Also write the bytes as they arrived at the UART, noise and all, to this file
+    #[arg(long, value_name = "FILE")]
+    pub tap: Option<PathBuf>,
+    /// Run this firmware image of the board f405 (ELF, DFU or raw) on a model of its chip, instead of the pipeline on this PC
+    #[arg(long, value_name = "IMAGE", conflicts_with_all = ["cut_after_writes", "cut_store_after", "stall", "card_out", "write_error"])]
+    pub firmware: Option<PathBuf>,
+    /// With --firmware: measure what the stages of the pipeline cost the processor and the stack: `cycles`, `stack_by_urgency`
+    /// and `busy_percent_max` in the JSON, modelled
+    #[arg(long)]
+    pub costs: bool,
     /// Print the result as one JSON object (docs/json.md)
     #[arg(long)]
     pub json: bool,
@@ -103,38 +116,4 @@ pub struct FaultFlags {
 
 fn micros(text: &str) -> Result<u64, String> {
     parse_seconds(text).ok_or_else(|| format!("`{text}` is no time: seconds since the first byte"))
-}
-
-/// `hums sim`
-#[derive(Args, Clone, Debug)]
-#[command(after_help = SIM_EXAMPLES)]
-pub struct Sim {
-    /// The run.
-    #[command(flatten)]
-    pub run: Run,
-    /// Also write the bytes as they arrived at the UART, noise and all, to this file
-    #[arg(long, value_name = "FILE")]
-    pub tap: Option<PathBuf>,
-}
-
-const EMULATE_EXAMPLES: &str = "Examples:
-  hums emulate --input flight.tlog --sd card.img
-  hums emulate --input flight.tlog --sd card.img --json --firmware hums-f405.elf
-
-A second of flight takes some 0.15 s. Inside the source tree a missing image is built first (cargo xtask firmware).";
-
-/// `hums emulate`
-#[derive(Args, Clone, Debug)]
-#[command(after_help = EMULATE_EXAMPLES)]
-pub struct Emulate {
-    /// The run.
-    #[command(flatten)]
-    pub run: Run,
-    /// The firmware image of the board f405 (ELF, DFU or raw); otherwise the one that the source tree built
-    #[arg(long, value_name = "IMAGE")]
-    pub firmware: Option<PathBuf>,
-    /// Measure what the stages of the pipeline cost the processor and the stack: `cycles`, `stack_by_urgency` and
-    /// `busy_percent_max` in the JSON, modelled
-    #[arg(long)]
-    pub costs: bool,
 }

@@ -23,6 +23,7 @@ pub struct Completions {
 const MAN_EXAMPLES: &str = "Examples:
   hums man > hums.1
   hums man decode > hums-decode.1
+  hums man box pull > hums-box-pull.1
   hums man | man -l -";
 
 /// `hums man`
@@ -31,5 +32,5 @@ const MAN_EXAMPLES: &str = "Examples:
 pub struct Man {
     /// The command; without it the page of the whole program
     #[arg(value_name = "COMMAND")]
-    pub command: Option<String>,
+    pub command: Vec<String>,
 }

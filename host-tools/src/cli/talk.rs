@@ -1,4 +1,4 @@
-//! What talks with the board: `hums params`, `hums pull`, `hums format`.
+//! The commands that talk with the board: `hums box pull`, `hums box params`, `hums box format-card`.
 
 use std::path::PathBuf;
 
@@ -9,15 +9,40 @@ use hums_core::health::{Level, vocabulary};
 use crate::endpoint::Endpoint;
 use crate::utc::{When, parse_seconds};
 
+const BOX_EXAMPLES: &str = "Examples:
+  hums box pull --link serial:/dev/ttyUSB0:57600 -o logs
+  hums box params list --link serial:/dev/ttyUSB0:57600
+  hums box format-card --yes --link serial:/dev/ttyUSB0:57600";
+
+/// `hums box`
+#[derive(Args, Clone, Debug)]
+#[command(after_help = BOX_EXAMPLES)]
+pub struct BoxArgs {
+    /// What to do.
+    #[command(subcommand)]
+    pub action: BoxAction,
+}
+
+/// What to do with the box.
+#[derive(Clone, Debug, Subcommand)]
+pub enum BoxAction {
+    /// Download the board's logs over MAVLink
+    Pull(Pull),
+    /// List, read or set the board's parameters over MAVLink
+    Params(Params),
+    /// Have the board format a card that it cannot record on
+    FormatCard(FormatCard),
+}
+
 const PARAMS_EXAMPLES: &str = "Examples:
-  hums params list --link serial:/dev/ttyUSB0:57600
-  hums params get GS_BUDGET BAT_REM_WARN --link udpin:0.0.0.0:14550
-  hums params set GS_BUDGET 1000 --link tcp:192.168.1.5:5760 --system 2
-  hums params sign --key key.txt --link serial:/dev/ttyUSB0:57600
+  hums box params list --link serial:/dev/ttyUSB0:57600
+  hums box params get GS_BUDGET BAT_REM_WARN --link udpin:0.0.0.0:14550
+  hums box params set GS_BUDGET 1000 --link tcp:192.168.1.5:5760 --system 2
+  hums box params sign --key key.txt --link serial:/dev/ttyUSB0:57600
 
 The list is lines of NAME VALUE, which `hums sim --params` reads back.";
 
-/// `hums params`
+/// `hums box params`
 #[derive(Args, Clone, Debug)]
 #[command(after_help = PARAMS_EXAMPLES)]
 pub struct Params {
@@ -35,7 +60,7 @@ pub struct Link {
     /// Sign what is sent with the key in this file: 64 hexadecimal digits, or a passphrase as Mission Planner takes it
     #[arg(long, value_name = "FILE")]
     pub key: Option<PathBuf>,
-    /// Talk with the board of this system (vehicle); without it with the only one that is heard. Where several are heard, say which
+    /// MAVLink system id of the vehicle. Needed only if several vehicles are on the link
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..))]
     pub system: Option<u8>,
 }
@@ -94,11 +119,11 @@ pub enum ParamsAction {
 }
 
 const PULL_EXAMPLES: &str = "Examples:
-  hums pull --link serial:/dev/ttyUSB0:57600 -o logs
-  hums pull --link udpin:0.0.0.0:14550 -o logs --last 1
-  hums pull --link tcp:192.168.1.5:5760 -o logs 00001_00.HUM
-  hums pull --link serial:/dev/ttyUSB0:57600 -o logs --around critical
-  hums pull --link serial:/dev/ttyUSB0:57600 -o logs --around 4:20 --span 60
+  hums box pull --link serial:/dev/ttyUSB0:57600 -o logs
+  hums box pull --link udpin:0.0.0.0:14550 -o logs --last 1
+  hums box pull --link tcp:192.168.1.5:5760 -o logs 00001_00.HUM
+  hums box pull --link serial:/dev/ttyUSB0:57600 -o logs --around critical
+  hums box pull --link serial:/dev/ttyUSB0:57600 -o logs --around 4:20 --span 60
 
 Names of files say whose log it is: 00001-box3f0042000d51373435363338-s1a2b3c4d_00.HUM. One that is there already is left if it
 is the same by its checksum, and checked as a new one is. A download that was cut off (.NAME.pull.hums-part) goes on
@@ -106,7 +131,7 @@ where it stopped, once the board has confirmed that what is there is the beginni
 without it all of the log comes, but for what is in the part already. Exit code 3: a log came as it is on the card, and has damage there;
 with --around, something of the moment, or of what was searched for the finding, could not be read: the words say what.";
 
-/// `hums pull`
+/// `hums box pull`
 #[derive(Args, Clone, Debug)]
 #[command(after_help = PULL_EXAMPLES)]
 pub struct Pull {
@@ -170,12 +195,12 @@ impl std::str::FromStr for Around {
 }
 
 const FORMAT_EXAMPLES: &str = "Examples:
-  hums format --yes --link serial:/dev/ttyUSB0:57600
+  hums box format-card --yes --link serial:/dev/ttyUSB0:57600
 
 Only a card that the board cannot use as it is (exFAT, no partition table, another file system, a damaged one), and
 only while the vehicle is disarmed.";
 
-/// `hums format`
+/// `hums box format-card`
 #[derive(Args, Clone, Debug)]
 #[command(after_help = FORMAT_EXAMPLES)]
 pub struct FormatCard {

@@ -6,6 +6,7 @@
 //! | `csv` | a table for each message type, `HUMS_*` tables for the monitor's own records and for gaps | one file a table |
 //! | `jsonl` | everything in order, an object a line | one file a log |
 //! | `influx` | line protocol: the reference system's measurement, every frame, every record | one file a log |
+//! | `hum` | a log as the box writes it, of a tlog or raw recording ([`crate::pack`]) | one file |
 //! | `parquet` | typed columns, the tables of `csv` | one file a table, by vehicle, date and session |
 //! | `thesis` | the reference system's four tables | four files a log |
 //!
@@ -62,6 +63,7 @@ use crate::logs::reader;
 use crate::logs::side_by_side::side_by_side;
 use crate::outcome::{Outcome, usage as usage_error};
 use crate::output::{self, Schema};
+use crate::pack;
 use crate::plural::count;
 use crate::printable;
 use crate::source::epochs::Epochs;
@@ -83,10 +85,13 @@ use works::{Work, check_forms, works};
 use write::Writers;
 
 /// What `hums decode --json` prints.
-const SCHEMA: Schema = Schema::first("hums-decode");
+pub const SCHEMA: Schema = Schema::first("hums-decode");
 
 /// Runs `hums decode`.
 pub fn run(args: &cli::Decode) -> Result<Outcome> {
+    if args.format.contains(&cli::Format::Hum) {
+        return pack::run(args);
+    }
     let formats = Formats::new(&args.format);
     let (given, remarks) = naming::without_made(&args.inputs);
     let found = find(&given, args.salvage)?;

@@ -64,7 +64,7 @@ impl Files<'_> {
         let parts = self.names.iter().filter(|name| is_part(Path::new(name)));
         let part_words = |name: &String| {
             format!(
-                "{name} is a part of its log, as `hums pull --around` brings it: what it lacks was not brought, or came damaged; `hums pull` \
+                "{name} is a part of its log, as `hums box pull --around` brings it: what it lacks was not brought, or came damaged; `hums box pull` \
                  brings what the card has"
             )
         };

@@ -44,7 +44,7 @@ pub(super) fn begin<R>(
     tempfile::Builder::new().prefix(&part_prefix(target)?).suffix(PART).make_in(folder_of(target), open)
 }
 
-/// The part of a target that `hums pull` has begun, beside it: a later call goes on with it.
+/// The part of a target that `hums box pull` has begun, beside it: a later call goes on with it.
 pub(super) fn begun_of(target: &Path) -> Result<PathBuf> {
     let Some(name) = target.file_name() else {
         bail!("{}: is no name of a file", target.display());

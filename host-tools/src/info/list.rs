@@ -1,4 +1,4 @@
-//! `hums ls`: a line for each flight of a card, a folder or a log: when, how long, the worst that was found, how large.
+//! `hums info --list`: a line for each flight of a card, a folder or a log: when, how long, the worst that was found, how large.
 
 use std::fmt::Write as _;
 
@@ -25,12 +25,13 @@ use crate::source::recording::Format;
 use crate::summary::Overview;
 use crate::utc::{clock, date_and_time, iso8601};
 
-/// What `hums ls --json` prints.
-const SCHEMA: Schema = Schema::first("hums-ls");
+/// What `hums info --list --json` prints.
+const SCHEMA: Schema = Schema::first("hums-info-list");
 
-/// Runs `hums ls`.
-pub fn run(args: &cli::Ls) -> Result<Outcome> {
-    let found = find(&args.inputs, args.salvage)?;
+/// Runs `hums info --list`.
+pub(super) fn run(args: &cli::Info) -> Result<Outcome> {
+    let found = find(&args.inputs, args.salvage)?.of_system(args.system)?;
+    let wanted = args.session.as_deref().map(|name| found.session(name)).transpose()?;
     let mut list =
         args.json.then(|| JsonList::begin(SCHEMA, &images_json(&found.images), "logs")).transpose()?;
     let width = found.places.iter().map(|place| word(&place.name).chars().count()).max().unwrap_or(0);
@@ -44,7 +45,7 @@ pub fn run(args: &cli::Ls) -> Result<Outcome> {
     }
     // In the order in which they began; what does not tell stays behind the one before it.
     let (mut lines, mut elements, mut begun_us) = (Vec::new(), Vec::new(), 0);
-    let read = each(&found, None, |overview| {
+    let read = each(&found, wanted, |overview| {
         begun_us = start_utc_us(overview).unwrap_or(begun_us);
         if args.json {
             elements.push((begun_us, LogJson::of(overview)));
@@ -168,7 +169,7 @@ fn line(log: &Overview, width: usize) -> String {
     }
     if !log.is_sound() {
         // What is no log of ours is judged by another command.
-        let teller = if log.format.is_some() { "check says where" } else { "verify says why" };
+        let teller = if log.format.is_some() { "check says where" } else { "info --verify says why" };
         let _ = write!(text, "; {} (hums {teller})", warning("not proved to be whole"));
     }
     text
@@ -299,7 +300,7 @@ mod tests {
             line(&log, 5)
         };
         assert!(told(Some(Format::DataFlash)).contains("(hums check says where)"));
-        assert!(told(None).contains("(hums verify says why)"));
+        assert!(told(None).contains("(hums info --verify says why)"));
     }
 
     /// What the box had counted when power went in the air is the least.

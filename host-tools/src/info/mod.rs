@@ -1,10 +1,10 @@
-//! `hums info`: what is in a log or a recording; `hums ls`: a line for each of many. For people and as JSON.
+//! `hums info`: what is in a log or a recording; with `--list` a line for each, with `--verify` each check. For people and as JSON.
 
 mod each;
 pub mod json;
-pub mod list;
+mod list;
 mod number;
-pub mod text;
+mod text;
 mod usage;
 mod wear;
 
@@ -14,6 +14,7 @@ use crate::cli;
 use crate::outcome::Outcome;
 use crate::output::{self, JsonList, Schema};
 use crate::source::find::find;
+use crate::verify;
 use each::each;
 use json::{LogJson, images_json};
 use text::{image_text, text};
@@ -23,6 +24,12 @@ const SCHEMA: Schema = Schema::first("hums-info");
 
 /// Runs `hums info`.
 pub fn run(args: &cli::Info) -> Result<Outcome> {
+    if args.verify {
+        return verify::run(args);
+    }
+    if args.list {
+        return list::run(args);
+    }
     let found = find(&args.inputs, args.salvage)?.of_system(args.system)?;
     let wanted = args.session.as_deref().map(|name| found.session(name)).transpose()?;
     let mut list =

@@ -34,7 +34,7 @@ use crate::utc::{clock, iso8601_ms, moment};
 const SHOWN_MAX: usize = 40;
 
 /// A card for people to read.
-pub fn image_text(image: &logs::find::Image) -> String {
+pub(super) fn image_text(image: &logs::find::Image) -> String {
     let mut text = format!("Card {}", path(&image.path));
     for damage in &image.damage {
         let _ = write!(text, "\n  damaged: {damage}");
@@ -49,7 +49,7 @@ pub fn image_text(image: &logs::find::Image) -> String {
 }
 
 /// A log for people to read.
-pub fn text(log: &Overview) -> String {
+pub(super) fn text(log: &Overview) -> String {
     let mut text = String::new();
     heading(&mut text, log);
     findings_text(&mut text, log);

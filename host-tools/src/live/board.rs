@@ -188,7 +188,7 @@ fn part(craft: &Craft, now: Instant, subsystem: Subsystem, known: &Known) -> Par
     } else if unknown && !absent && !silent && waits(craft, subsystem) {
         (Some("idle"), waits_for(craft, subsystem).to_owned())
     } else if recorder && level == Level::Stale && craft.on_the_wire {
-        (Some("recorded"), "it recorded this; hums verify says how well".to_owned())
+        (Some("recorded"), "it recorded this; hums info --verify says how well".to_owned())
     } else if unknown && !EXPECTED.contains(&subsystem) {
         (Some("none"), "nothing is heard of any".to_owned())
     } else if silent && level == Level::Stale && !recorder {

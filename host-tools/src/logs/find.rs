@@ -96,7 +96,7 @@ fn named_file(path: &Path, salvage: bool, found: &mut Found) -> Result<()> {
         Content::Empty => bail!("{}: is empty", path.display()),
         Content::Unread(unread) => bail!("{}: {unread}", path.display()),
         Content::Mavlink => bail!(
-            "{}: is a recording of MAVLink, not a log of HUMS; `hums pack` makes it one, `hums sim` records it",
+            "{}: is a recording of MAVLink, not a log of HUMS; `hums decode --format hum` makes it one, `hums sim` records it",
             path.display()
         ),
         Content::Other => {

@@ -19,7 +19,7 @@ pub(super) const REFUSED: &str = "card_errors";
 pub const RESUMED: u8 = 14;
 
 /// The note that a packed log begins with.
-pub const PACKED: &str = "packed on a PC by hums pack";
+pub const PACKED: &str = "packed on a PC by hums decode --format hum";
 
 /// What the records of a part of a log say of the log.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -87,7 +87,7 @@ pub fn segment_name(path: &Path) -> Option<SegmentName> {
 /// What stands before the ending of a part of a log.
 const PART: &str = ".part";
 
-/// The path of a part of this log, which `hums pull --around` brings: `00042-s1a2b3c4d_07.part.HUM`.
+/// The path of a part of this log, which `hums box pull --around` brings: `00042-s1a2b3c4d_07.part.HUM`.
 pub fn part_name(whole: &Path) -> PathBuf {
     whole.with_extension("part.HUM")
 }

@@ -8,7 +8,7 @@ use std::path::Path;
 use anyhow::{Context, Result};
 use hums_link::{Check, Frame, Framer};
 
-use crate::cli::Run;
+use crate::cli::Sim;
 use crate::endpoint::Endpoint;
 use crate::files::{Inputs, Output};
 use crate::outcome::Outcome;
@@ -37,23 +37,19 @@ pub struct Arrivals {
 }
 
 impl Arrivals {
-    /// As the command line says it; `tap` gets a copy of the bytes, and is none of the inputs. `prepare` is what else must be ready: done after a
+    /// As the command line says it; --tap gets a copy of the bytes, and is none of the inputs. `prepare` is what else must be ready: done after a
     /// stored input was found to have a MAVLink frame, so that a slip leaves nothing behind, and before a live one, which waits for
     /// nobody.
-    pub fn open<T>(
-        run: &Run,
-        tap: Option<(&Path, &Inputs)>,
-        prepare: impl FnOnce() -> Result<T>,
-    ) -> Result<(Self, T)> {
+    pub fn open<T>(run: &Sim, inputs: &Inputs, prepare: impl FnOnce() -> Result<T>) -> Result<(Self, T)> {
         if run.input.is_live() {
             let prepared = prepare()?;
-            return Ok((Self::new(run, tap)?, prepared));
+            return Ok((Self::new(run, inputs)?, prepared));
         }
-        let arrivals = Self::new(run, tap)?;
+        let arrivals = Self::new(run, inputs)?;
         Ok((arrivals, prepare()?))
     }
 
-    fn new(run: &Run, tap: Option<(&Path, &Inputs)>) -> Result<Self> {
+    fn new(run: &Sim, inputs: &Inputs) -> Result<Self> {
         let timing = Timing { line_rate: run.faults.line_rate };
         if let Endpoint::File(_) = run.input {
             // Read again from its beginning below: any amount may come before the first frame.
@@ -75,7 +71,7 @@ impl Arrivals {
             first,
             name: run.input.to_string(),
             waiting: VecDeque::new(),
-            tap: tap.map_or_else(|| Ok(Beside::nowhere()), |(path, inputs)| tap_of(path, inputs))?,
+            tap: run.tap.as_deref().map_or_else(|| Ok(Beside::nowhere()), |path| tap_of(path, inputs))?,
             bytes: 0,
             autopilot,
             broken_off: false,

@@ -46,7 +46,7 @@ pub struct EarlierSessions {
 impl EarlierSessions {
     /// Looks at a card. A usage error where the run may have to overwrite a session; `unknown` is how much comes of an input
     /// that has no length.
-    pub fn of(run: &cli::Run, unknown: u64) -> Result<Self> {
+    pub fn of(run: &cli::Sim, unknown: u64) -> Result<Self> {
         // A card that cannot be read has no session to lose.
         let Some(card) = Card::of(&run.sd) else {
             return Ok(Self { sessions: Vec::new(), allowed: run.overwrite_oldest });
@@ -104,7 +104,7 @@ fn oldest(logs: &[Log]) -> Option<&Log> {
 
 /// Whether a card has room for what a run may write: as much as it reads, and a segment that is begun at each of its starts.
 /// Writing errors may use up any room: segments are left early.
-fn has_room(card: &Card, run: &cli::Run, unknown: u64) -> bool {
+fn has_room(card: &Card, run: &cli::Sim, unknown: u64) -> bool {
     if run.faults.write_error.is_some_and(|probability| probability > 0.0) {
         return false;
     }

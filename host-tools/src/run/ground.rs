@@ -6,7 +6,7 @@ use std::io::Write;
 use anyhow::{Context, Result};
 
 use super::arrivals::CHUNK_BYTES_MAX;
-use crate::cli::Run;
+use crate::cli::Sim;
 use crate::files::Inputs;
 use crate::outcome::Outcome;
 use crate::sink::{self, Beside, Heard};
@@ -21,7 +21,7 @@ pub struct Ground {
 }
 
 /// Opens both directions as the command line says it. What is written is none of the inputs.
-pub fn open(run: &Run, inputs: &Inputs) -> Result<(Ground, Box<dyn Write + Send>)> {
+pub fn open(run: &Sim, inputs: &Inputs) -> Result<(Ground, Box<dyn Write + Send>)> {
     let sink::Ground { writer, heard } = match &run.gs {
         Some(endpoint) => sink::open(endpoint, inputs)?,
         None => sink::Ground { writer: Beside::nowhere(), heard: Heard::nobody() },

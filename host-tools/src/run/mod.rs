@@ -1,11 +1,11 @@
-//! `hums sim` and `hums emulate`: a recording goes in at the UART and comes out on a card.
+//! `hums sim`: a recording goes in at the UART and comes out on a card.
 //!
 //! Both get the same bytes at the same times ([`arrivals`]) and report alike ([`report`]); what differs is the machine:
 //! [`sim`] runs the tasks' bodies on this PC, [`emulate`] the image that is flashed on the model of its chip.
 
 pub mod arrivals;
 mod earlier;
-pub mod emulate;
+mod emulate;
 pub mod ground;
 pub(crate) mod params;
 mod paths;
@@ -22,7 +22,7 @@ use anyhow::{Context, Result};
 
 use crate::card::image;
 use crate::card::{Faults, SimCard};
-use crate::cli::{Run, Speed};
+use crate::cli::{Sim, Speed};
 use crate::endpoint::Endpoint;
 use crate::files::FileId;
 use crate::interrupt;
@@ -100,7 +100,7 @@ fn hear(ground: &mut Ground, now_us: u64, machine: &mut impl Machine) -> Result<
 }
 
 /// How fast a run goes, and whether its input is live.
-fn pace(run: &Run) -> Result<(Speed, bool)> {
+fn pace(run: &Sim) -> Result<(Speed, bool)> {
     let live = run.input.is_live();
     match run.speed {
         Some(Speed::Max) if live => {
@@ -135,7 +135,7 @@ fn prepare_card(path: &Path, size_mib: Option<u64>, seed: u64) -> Result<File> {
 struct InPlace<'a>(Vec<(&'a Path, Option<FileId>)>);
 
 impl<'a> InPlace<'a> {
-    fn of(run: &'a Run) -> Self {
+    fn of(run: &'a Sim) -> Self {
         let paths = std::iter::once(run.sd.as_path()).chain(run.store.as_deref());
         Self(paths.map(|path| (path, FileId::of(path).ok())).collect())
     }
@@ -155,7 +155,7 @@ impl<'a> InPlace<'a> {
 }
 
 /// Two kinds of output cannot share standard output.
-fn check_standard_output(run: &Run) -> Result<()> {
+fn check_standard_output(run: &Sim) -> Result<()> {
     if run.gs == Some(Endpoint::Standard) && run.json {
         return Err(usage("--gs - and --json both want standard output; give --gs a file"));
     }

@@ -4,15 +4,16 @@ use std::path::Path;
 
 use anyhow::Result;
 
-use crate::cli::Run;
+use crate::cli::Sim;
 use crate::endpoint::Endpoint;
 use crate::files::{FileId, Inputs, Output, is_seekable, means_standard_output};
 use crate::outcome::usage;
 
 /// What of a run must not be written over: its inputs, and the card and the store, which are updated in place. Refuses
 /// a run of which one file is named twice.
-pub(super) fn inputs(run: &Run, tap: Option<&Path>, firmware: Option<&Path>) -> Result<Inputs> {
-    let mut inputs = Inputs::of(run.params.as_deref().into_iter().chain(firmware));
+pub(super) fn inputs(run: &Sim) -> Result<Inputs> {
+    let tap = run.tap.as_deref();
+    let mut inputs = Inputs::of(run.params.as_deref().into_iter().chain(run.firmware.as_deref()));
     inputs.add_endpoint(&run.input);
     run.gs_input.iter().for_each(|input| inputs.add_endpoint(input));
     if run.sd.metadata().is_ok_and(|about| is_seekable(&about) && !about.is_file()) {

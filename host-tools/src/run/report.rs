@@ -1,4 +1,4 @@
-//! What `sim` and `emulate` print: counters of the run, and what the card's newest logs say was found.
+//! What `hums sim` prints: counters of the run, and what the card's newest logs say was found.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -19,7 +19,7 @@ use crate::plural::count;
 use crate::summary::{FindingLine, Overview};
 use crate::utc::moment;
 
-/// What `hums sim --json` and `hums emulate --json` print.
+/// What `hums sim --json` prints.
 const SCHEMA: Schema = Schema::first("hums-run");
 
 /// The object of `--json`; its names are a contract.

@@ -5,13 +5,13 @@ use anyhow::{Context as _, Result};
 use sha2::{Digest as _, Sha256};
 
 use super::arrivals::Arrivals;
-use crate::cli::Run;
+use crate::cli::Sim;
 use crate::endpoint::Endpoint;
 use crate::files::{add_ends, short};
 
 /// A number that depends on the input, on the parameters and on what is put in the way. What comes live comes once, so it
 /// is random then.
-pub(super) fn salt(run: &Run, arrivals: &mut Arrivals) -> Result<u32> {
+pub(super) fn salt(run: &Sim, arrivals: &mut Arrivals) -> Result<u32> {
     let mut hash = Sha256::new();
     hash.update(format!("{:?}", run.faults));
     if let Some(params) = &run.params {

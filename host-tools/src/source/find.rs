@@ -318,7 +318,7 @@ pub fn not_ours(inputs: &[PathBuf], error: anyhow::Error) -> anyhow::Error {
             format.with_article()
         ),
         Some((input, _)) => anyhow!(
-            "{}: is a recording of MAVLink, not a log of HUMS; `hums check` judges it, `hums pack` makes it one",
+            "{}: is a recording of MAVLink, not a log of HUMS; `hums check` judges it, `hums decode --format hum` makes it one",
             input.display()
         ),
         None => error,

@@ -1,4 +1,4 @@
-//! `hums format`: the board formats a card that it cannot record on.
+//! `hums box format-card`: the board formats a card that it cannot record on.
 
 use std::time::{Duration, Instant};
 
@@ -26,7 +26,7 @@ const SILENCE: Duration = Duration::from_secs(15);
 const ACCEPTED: u8 = 0;
 const IN_PROGRESS: u8 = 5;
 
-/// What `hums format --json` prints.
+/// What `hums box format-card --json` prints.
 const SCHEMA: Schema = Schema::first("hums-format");
 
 #[derive(Debug, Serialize)]
@@ -35,7 +35,7 @@ struct FormattedJson {
     formatted: bool,
 }
 
-/// Runs `hums format`.
+/// Runs `hums box format-card`.
 pub fn run(args: &cli::FormatCard) -> Result<Outcome> {
     if !args.yes {
         return Err(usage("everything on the board's card will be lost; say --yes if that is meant"));

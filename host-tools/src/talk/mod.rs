@@ -1,4 +1,4 @@
-//! Talking with a board as a ground station does: `hums params`, `hums pull` and `hums format`.
+//! Talking with a board as a ground station does: `hums box params`, `hums box pull` and `hums box format-card`.
 
 #[cfg(test)]
 mod fake;

@@ -1,4 +1,4 @@
-//! `hums params`: the board's parameters, as ground stations ask for them.
+//! `hums box params`: the board's parameters, as ground stations ask for them.
 
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
@@ -34,7 +34,7 @@ struct Param {
     count: u16,
 }
 
-/// Runs `hums params`.
+/// Runs `hums box params`.
 pub fn run(args: &cli::Params) -> Result<Outcome> {
     match &args.action {
         ParamsAction::List { at, json } => {
@@ -91,9 +91,9 @@ pub fn run(args: &cli::Params) -> Result<Outcome> {
     Ok(Outcome::Done)
 }
 
-/// What `hums params list`, `get` and `set` print with `--json`.
+/// What `hums box params list`, `get` and `set` print with `--json`.
 const VALUES: Schema = Schema::first("hums-params");
-/// What `hums params sign --json` prints.
+/// What `hums box params sign --json` prints.
 const SIGNED: Schema = Schema::first("hums-params-sign");
 
 /// What the board said of its key.

@@ -47,7 +47,7 @@ fn a_recording_its_compressed_form_its_pack_and_its_card_are_found_alike() {
     let mut packed = flate2::write::GzEncoder::new(file, flate2::Compression::fast());
     packed.write_all(&plain).and_then(|()| packed.finish().map(drop)).expect("written");
     let sim = json(&run(dir.path(), "sim --input faults.tlog --sd card.img --json", 0));
-    run(dir.path(), "pack faults.tlog -o packed.hum", 0);
+    run(dir.path(), "decode --format hum faults.tlog -o packed.hum", 0);
     for (input, format, by) in [
         ("faults.tlog", "tlog", "hums"),
         ("named_by_nobody", "tlog", "hums"),
@@ -126,7 +126,7 @@ fn damage_is_said_with_its_place_and_wins_over_findings() {
 #[test]
 fn a_log_whose_middle_is_gone_is_not_called_all_right_anywhere() {
     let dir = tempfile::tempdir().expect("directory");
-    run(dir.path(), "pack PX4 -o log.hum", 0);
+    run(dir.path(), "decode --format hum PX4 -o log.hum", 0);
     let log = fs::read(dir.path().join("log.hum")).expect("a log");
     let from = log.len() / 1024 * 512;
     let missing = [&log[..from - 20 * 512], &log[from..]].concat();
@@ -141,7 +141,7 @@ fn a_log_whose_middle_is_gone_is_not_called_all_right_anywhere() {
     assert!(line("log.hum").ends_with("part of it is missing or damaged"), "{table}");
     // Where nobody knows how many frames are missing, nothing says that none is.
     fs::write(dir.path().join("log.hum"), [&log[..512], &log[from..]].concat()).expect("written");
-    for command in ["check", "info", "verify", "decode -o out --format tlog"] {
+    for command in ["check", "info", "info --verify", "decode -o out --format tlog"] {
         let ended = run(dir.path(), &format!("{command} log.hum"), 3);
         let said = [ended.stdout, ended.stderr].concat();
         let said = String::from_utf8_lossy(&said);
@@ -196,7 +196,7 @@ fn other_limits_give_other_findings() {
 fn a_packed_recording_is_checked_by_everything_that_shows_findings() {
     let dir = tempfile::tempdir().expect("directory");
     faults(dir.path());
-    run(dir.path(), "pack faults.tlog -o packed.hum", 0);
+    run(dir.path(), "decode --format hum faults.tlog -o packed.hum", 0);
     let info = json(&run(dir.path(), "info --json packed.hum", 0));
     assert_eq!(info["logs"][0]["checked_by"].as_str(), Some("hums"));
     assert!(info["logs"][0]["findings_count"].as_u64().expect("a number") > 3);
@@ -237,7 +237,7 @@ fn a_recording_is_decoded_without_a_log_of_ours_between() {
     run(dir.path(), "decode faults.tlog -o back.tlog --format tlog", 0);
     assert_eq!(frames_of(&dir.path().join("back.tlog")), frames_of(&flight("ap_quad_faults.tlog")));
     run(dir.path(), "decode faults.tlog -o out --format csv,jsonl,parquet", 0);
-    run(dir.path(), "pack faults.tlog -o packed.hum", 0);
+    run(dir.path(), "decode --format hum faults.tlog -o packed.hum", 0);
     run(dir.path(), "decode packed.hum -o packed --format csv", 0);
     // The tables of the recording are those of its pack, but for what a log of ours has besides.
     let table = |folder: &str| {
@@ -350,7 +350,7 @@ fn no_word_of_a_log_and_no_name_of_a_file_is_obeyed_by_a_terminal() {
         vec!["report", &one, "-o", "page.html"],
         vec!["decode", &one, "-o", "out", "--format", "csv"],
         vec!["check", "logs/\u{1b}none"],
-        vec!["verify", "logs/\u{1b}none"],
+        vec!["info", "--verify", "logs/\u{1b}none"],
     ] {
         let output =
             super::support::hums().current_dir(dir.path()).args(&arguments).output().expect("it runs");
@@ -603,10 +603,10 @@ fn one_wrong_time_changes_no_other_time_of_what_is_packed() {
         with_times(&log, |index, us| if index == 999 { us ^ 1 << 36 } else { us }),
     )
     .expect("written");
-    let pack = run(dir.path(), "pack wrong.tlog -o wrong.hum", 3);
+    let pack = run(dir.path(), "decode --format hum wrong.tlog -o wrong.hum", 3);
     let told = String::from_utf8_lossy(&pack.stderr).into_owned();
     assert!(told.contains("1 message with a wrong time"), "{told}");
-    run(dir.path(), "pack faults.tlog -o faults.hum", 0);
+    run(dir.path(), "decode --format hum faults.tlog -o faults.hum", 0);
     let info = |name: &str| json(&attempt(dir.path(), &format!("info --json {name}")))["logs"][0].clone();
     let (wrong, right) = (info("wrong.hum"), info("faults.hum"));
     assert_eq!(wrong["duration_s"], right["duration_s"]);
@@ -622,7 +622,7 @@ fn two_recordings_with_the_same_first_time_are_not_packed_as_one_session() {
         let first = records(&log)[0].0;
         let log = with_times(&log, |_, us| us - first + 1_800_000_000_000_000);
         fs::write(dir.path().join(format!("{name}.tlog")), log).expect("written");
-        run(dir.path(), &format!("pack {name}.tlog -o {name}.hum"), 0);
+        run(dir.path(), &format!("decode --format hum {name}.tlog -o {name}.hum"), 0);
     }
     let packed = |name: &str| fs::read(dir.path().join(format!("{name}.hum"))).expect("packed");
     let session = |name: &str| {
@@ -664,7 +664,7 @@ fn a_packed_recording_has_the_times_the_damage_and_the_joints_that_check_sees() 
     // The same vehicle, a day earlier.
     write("joined.tlog", &[tlog.clone(), with_times(&tlog, |_, us| us - 86_400_000_000)].concat());
     for (name, code) in [("flight.raw", 0), ("damaged.tlog", 3), ("joined.tlog", 0)] {
-        run(dir.path(), &format!("pack {name} -o {name}.hum"), code);
+        run(dir.path(), &format!("decode --format hum {name} -o {name}.hum"), code);
         let of = |input: &str| {
             let checked = json(&attempt(dir.path(), &format!("check --json {input}")));
             let problems: Vec<String> = checked["problems"]
@@ -687,7 +687,7 @@ fn a_packed_recording_has_the_times_the_damage_and_the_joints_that_check_sees() 
     let mut wrong = tlog.clone();
     wrong[8 + first - 1] ^= 1;
     write("wrong.tlog", &wrong);
-    let told = run(dir.path(), "pack wrong.tlog -o wrong.hum", 3);
+    let told = run(dir.path(), "decode --format hum wrong.tlog -o wrong.hum", 3);
     let told = String::from_utf8_lossy(&told.stderr).into_owned();
     assert!(told.contains("1 frame with a wrong checksum"), "{told}");
     let checked = json(&run(dir.path(), "check --json wrong.hum", 3));
@@ -706,9 +706,10 @@ fn a_frame_whose_id_is_not_known_is_kept_bit_for_bit() {
     fs::write(dir.path().join("flip.tlog"), &tlog).expect("written");
     run(dir.path(), "decode flip.tlog -o same.tlog --format tlog", 0);
     assert!(fs::read(dir.path().join("same.tlog")).expect("made") == tlog);
-    let packed = json(&run(dir.path(), "pack flip.tlog -o flip.hum --json", 0));
-    assert_eq!((&packed["frames"], &packed["bytes_not_frames"]), (&16_645.into(), &0.into()));
-    run(dir.path(), "verify flip.hum", 0);
+    let packed = run(dir.path(), "decode --format hum flip.tlog -o flip.hum --json", 0);
+    assert!(packed.stderr.is_empty(), "no byte is of no frame");
+    assert_eq!(json(&packed)["logs"][0]["files"][0]["counts"]["frames"], 16_645);
+    run(dir.path(), "info --verify flip.hum", 0);
     run(dir.path(), "decode flip.hum -o back.tlog --format tlog", 0);
     assert!(frames_of(&dir.path().join("back.tlog")) == frames_of(&dir.path().join("flip.tlog")));
     let told = text(&attempt(dir.path(), "check flip.tlog"));
@@ -794,7 +795,7 @@ fn raw_bytes_have_the_time_of_day_that_their_autopilot_tells() {
         "{}",
         log["start_utc"]
     );
-    for command in ["check signed.raw", "ls signed.raw"] {
+    for command in ["check signed.raw", "info --list signed.raw"] {
         let said = text(&run(dir.path(), command, 0));
         assert!(said.contains("2026-11-20") && said.contains("21:29:46"), "{said}");
     }
@@ -829,9 +830,9 @@ fn what_nothing_tells_is_told_neither_as_good_nor_as_zero() {
     let info = text(&run(dir.path(), "info beats.tlog", 0));
     assert!(info.contains("findings not enough to judge: 3 of 94 checks"), "{info}");
     assert!(!info.contains("On the ground") && info.contains("Armed"), "{info}");
-    let listed = text(&run(dir.path(), "ls beats.tlog", 0));
+    let listed = text(&run(dir.path(), "info --list beats.tlog", 0));
     assert!(listed.contains("not enough to judge (3 of 94 checks)"), "{listed}");
-    let log = json(&run(dir.path(), "ls --json beats.tlog", 0))["logs"][0].clone();
+    let log = json(&run(dir.path(), "info --list --json beats.tlog", 0))["logs"][0].clone();
     assert_eq!((log["flight_s"].is_null(), log["checks_judged"].as_u64()), (true, Some(3)), "{log}");
     run(dir.path(), "report beats.tlog -o pages/", 0);
     let table = fs::read_to_string(dir.path().join("pages/index.html")).expect("a table");
@@ -846,7 +847,7 @@ fn what_nothing_tells_is_told_neither_as_good_nor_as_zero() {
     }
     fs::write(dir.path().join("alone.tlog"), beats).expect("written");
     run(dir.path(), "sim --input alone.tlog --sd card.img", 0);
-    let listed = text(&run(dir.path(), "ls card.img", 0));
+    let listed = text(&run(dir.path(), "info --list card.img", 0));
     assert!(listed.contains("not enough to judge"), "{listed}");
 }
 
@@ -859,7 +860,7 @@ fn a_recording_that_ends_in_the_air_says_so_everywhere_and_where_it_was_heard_la
         assert!(said.contains("the recording ends in the air: ") && said.contains("m above home"), "{said}");
         assert!(said.contains("over ground, at ") && said.contains("what became of the vehicle"), "{said}");
     }
-    let listed = text(&attempt(dir.path(), "ls cut.tlog"));
+    let listed = text(&attempt(dir.path(), "info --list cut.tlog"));
     assert!(listed.contains("; ends in the air"), "{listed}");
     run(dir.path(), "report cut.tlog -o pages/", 0);
     let table = fs::read_to_string(dir.path().join("pages/index.html")).expect("a table");
@@ -870,7 +871,7 @@ fn a_recording_that_ends_in_the_air_says_so_everywhere_and_where_it_was_heard_la
     let later = |place: usize, all: usize| place > all / 2 && place < all / 3 * 2;
     filtered("ap_quad_faults.tlog", dir.path(), "later.tlog", |place, all, _| later(place, all));
     run(dir.path(), "sim --input later.tlog --sd later.img", 0);
-    let listed = text(&attempt(dir.path(), "ls later.img"));
+    let listed = text(&attempt(dir.path(), "info --list later.img"));
     assert!(listed.contains("; begins in the air; ends in the air"), "{listed}");
 }
 

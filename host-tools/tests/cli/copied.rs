@@ -16,7 +16,7 @@ pub(crate) const SEGMENT: usize = 7_999 * BLOCK;
 /// Every command that reads, with these inputs: its exit code and what it said on both streams. A finding of the vehicle's
 /// health is no damage.
 pub(crate) fn readers(dir: &Path, inputs: &str) -> Vec<(&'static str, i32, String)> {
-    ["decode -o out --format csv", "report -o pages/", "verify", "info", "check"]
+    ["decode -o out --format csv", "report -o pages/", "info --verify", "info", "check"]
         .into_iter()
         .map(|command| {
             let ended = attempt(dir, &format!("{command} {inputs}"));

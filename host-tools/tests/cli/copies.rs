@@ -12,7 +12,7 @@ fn one_session_under_two_names_is_told_by_every_command_and_counted_once() {
     fs::copy(at("00001_00.HUM"), at("00003_00.HUM")).expect("copied");
     let words = "is the same session as 00001 once more (not counted)";
     all_say(dir.path(), "copied", 0, &[words]);
-    let said = text(&run(dir.path(), "verify copied", 0));
+    let said = text(&run(dir.path(), "info --verify copied", 0));
     assert!(said.contains("\n2 sessions: "), "{said}");
     let said = text(&attempt(dir.path(), "check copied"));
     assert!(said.contains("2 logs checked") && said.contains("1  the same session once more"), "{said}");
@@ -35,7 +35,7 @@ fn a_mere_copy_is_told_and_its_flight_counted_once() {
     for (inputs, out) in [("copied", "a"), ("card.img again.img copied", "b")] {
         let (decode, report) = (format!("-o {out}/ --format csv"), format!("-o {out}-pages/"));
         let commands =
-            [("verify", ""), ("info", ""), ("check", ""), ("decode", &decode), ("report", &report)];
+            [("info --verify", ""), ("info", ""), ("check", ""), ("decode", &decode), ("report", &report)];
         for (command, flags) in commands {
             let said = attempt(dir.path(), &format!("{command} {inputs} {flags}"));
             let told = text(&said) + &String::from_utf8_lossy(&said.stderr);
@@ -43,7 +43,7 @@ fn a_mere_copy_is_told_and_its_flight_counted_once() {
             let words = ["is the same session as", "is a copy of"];
             assert!(words.iter().any(|words| told.contains(words)), "{command}: {told}");
         }
-        let said = text(&run(dir.path(), &format!("verify {inputs}"), 0));
+        let said = text(&run(dir.path(), &format!("info --verify {inputs}"), 0));
         assert!(said.contains("\n1 session: "), "{said}");
         let said = text(&attempt(dir.path(), &format!("check {inputs}")));
         assert!(said.contains("1 log checked") && said.contains("the same session once more"), "{said}");
@@ -52,7 +52,7 @@ fn a_mere_copy_is_told_and_its_flight_counted_once() {
     let mut copy = without(&fs::read(&log).expect("there"), usize::MAX, 0);
     copy[20 * BLOCK + 100] ^= 1;
     fs::write(dir.path().join("copied/flight.hum"), copy).expect("written");
-    let said = text(&run(dir.path(), "verify copied", 3));
+    let said = text(&run(dir.path(), "info --verify copied", 3));
     assert!(said.contains("\n2 sessions: "), "{said}");
 }
 
@@ -99,9 +99,9 @@ fn another_log_behind_a_copy_is_told_by_every_command() {
     let words =
         format!("not of this log (the first at block {}, of session {session:08x})", one.len() / BLOCK);
     all_say(dir.path(), "copied", 3, &[&words, "00001 once more (not counted)"]);
-    let said = text(&run(dir.path(), "verify copied", 3));
+    let said = text(&run(dir.path(), "info --verify copied", 3));
     assert!(said.contains("FAILED  files ") && said.contains("1 session: damage"), "{said}");
-    assert!(text(&run(dir.path(), "ls copied", 3)).contains("not proved to be whole"));
+    assert!(text(&run(dir.path(), "info --list copied", 3)).contains("not proved to be whole"));
     // A copy alone is no finding.
     fs::write(at("all.hum"), &one).expect("written");
     all_say(dir.path(), "copied", 0, &["00001 once more (not counted)"]);

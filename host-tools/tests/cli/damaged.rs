@@ -50,7 +50,7 @@ fn a_header_that_counts_what_is_not_there_is_told_by_every_command() {
         *block = *sector.bytes();
         fs::write(&path, &bytes).expect("written");
         all_say(dir.path(), "copied", 3, &[]);
-        let said = text(&attempt(dir.path(), "verify copied"));
+        let said = text(&attempt(dir.path(), "info --verify copied"));
         let told = said
             .lines()
             .any(|line| line.contains("FAILED  group decoding") || line.contains("FAILED  frames missing"));
@@ -76,7 +76,7 @@ fn what_parity_contradicts_is_told_by_every_command() {
     all_say(dir.path(), "copied", 3, &["32 sectors missing at its end: its parity tells of them"]);
     let verified = |bytes: &[u8]| {
         fs::write(&path, bytes).expect("written");
-        let said = text(&attempt(dir.path(), "verify copied"));
+        let said = text(&attempt(dir.path(), "info --verify copied"));
         (said.contains("FAILED  parity "), said.contains("1 sector had to be made again from parity"))
     };
     assert_eq!(verified(&whole), (false, false));
@@ -135,11 +135,11 @@ fn sectors_that_parity_made_again_are_told_by_every_command() {
         fs::write(&path, damaged).expect("written");
         let words = format!("{count} had to be made again from parity, without a loss: keep the original");
         all_say(dir.path(), "copied", 3, &[&words]);
-        let said = text(&run(dir.path(), "verify copied", 3));
+        let said = text(&run(dir.path(), "info --verify copied", 3));
         let last = said.lines().last().expect("a verdict");
         assert!(last.starts_with(&format!("1 session: nothing is lost; {words}")), "{said}");
         assert_eq!(said.matches("FAILED").count(), 1, "{said}");
-        let json = json(&run(dir.path(), "verify --json copied", 3));
+        let json = json(&run(dir.path(), "info --verify --json copied", 3));
         let made_again = json["logs"][0]["blocks"]["repaired"].as_u64().expect("a number");
         assert_eq!((&json["ok"], &json["logs"][0]["ok"]), (&false.into(), &false.into()));
         assert!(count.starts_with(&made_again.to_string()), "{json}");
@@ -155,7 +155,7 @@ fn sectors_that_parity_made_again_are_told_by_every_command() {
     fs::remove_file(dir.path().join("copied/00002_00.HUM")).expect("ours");
     // Also of a copy, whose losses are its original's.
     fs::write(dir.path().join("copied/Copy of 00001_00.HUM"), &whole).expect("written");
-    let said = text(&run(dir.path(), "verify copied", 3));
+    let said = text(&run(dir.path(), "info --verify copied", 3));
     assert!(said.contains("not counted") && said.contains("2 sectors had to be made again"), "{said}");
 }
 
@@ -174,12 +174,12 @@ fn parity_that_is_gone_is_told_by_every_command() {
     ] {
         fs::write(&path, without(&whole, most, with)).expect("written");
         all_say(dir.path(), "copied", 3, &[&words]);
-        let said = text(&run(dir.path(), "verify copied", 3));
+        let said = text(&run(dir.path(), "info --verify copied", 3));
         let last = said.lines().last().expect("a verdict");
         assert!(last.starts_with(&format!("1 session: nothing is lost; {words}")), "{said}");
         assert_eq!(said.matches("FAILED").count(), 1, "{said}");
         assert!(said.contains("FAILED  sectors protected"), "{said}");
-        assert_eq!(json(&run(dir.path(), "verify --json copied", 3))["ok"], false);
+        assert_eq!(json(&run(dir.path(), "info --verify --json copied", 3))["ok"], false);
         let screen = text(&run(dir.path(), "check copied", 3));
         assert!(screen.contains("; the log is whole, without all of its parity"), "{screen}");
     }
@@ -195,7 +195,7 @@ fn parity_that_is_gone_is_told_by_every_command() {
     blocks.iter_mut().filter(|block| is_later(block)).for_each(|block| block.fill(0));
     for (bytes, is_told) in [(long.clone(), false), (without(&long, usize::MAX, 0), true)] {
         fs::write(&path, bytes).expect("written");
-        let said = text(&run(dir.path(), "verify copied", 3));
+        let said = text(&run(dir.path(), "info --verify copied", 3));
         assert_eq!(said.contains("FAILED  sectors protected  16 checked, 16 failed"), is_told, "{said}");
     }
 }
@@ -221,7 +221,7 @@ fn a_sector_that_was_put_between_others_costs_no_frame() {
         longer.splice(at..at, whole[18 * BLOCK..(18 + put) * BLOCK].to_vec());
         fs::write(&path, longer).expect("written");
         assert_eq!(frames(), before, "{put} put {back} sectors before the end");
-        run(dir.path(), "verify copied", 3);
+        run(dir.path(), "info --verify copied", 3);
     }
 }
 
@@ -254,7 +254,7 @@ fn blocks_that_do_not_count_are_counted_by_verify_and_info() {
     });
     block(3, &|block| block.fill(0x5a));
     fs::write(&path, log).expect("written");
-    for command in ["verify", "info"] {
+    for command in ["info --verify", "info"] {
         let said = text(&run(dir.path(), &format!("{command} copied"), 0));
         for words in ["1 sector superseded", "1 block of another session, 1 block that is no sector"] {
             assert!(said.contains(words), "{command}: `{words}` is not in {said}");
@@ -278,14 +278,14 @@ fn noise_behind_the_last_end_mark_is_told_by_every_command() {
     noisy[last * BLOCK..(last + 1) * BLOCK].iter_mut().enumerate().for_each(noise);
     fs::write(&path, noisy).expect("written");
     all_say(dir.path(), "copied", 3, &["1 block that is no sector"]);
-    let said = text(&run(dir.path(), "verify copied", 3));
+    let said = text(&run(dir.path(), "info --verify copied", 3));
     assert!(said.contains("FAILED  end "), "{said}");
     // The head of a sector makes none: what fails the check is of nobody.
     let mut forged = log.clone();
     forged[last * BLOCK..(last + 1) * BLOCK].iter_mut().enumerate().for_each(noise);
     forged[last * BLOCK..][..2].copy_from_slice(&[0x48, 0xb3]);
     fs::write(&path, forged).expect("written");
-    let said = text(&run(dir.path(), "verify copied", 3));
+    let said = text(&run(dir.path(), "info --verify copied", 3));
     assert!(
         said.contains("1 block with the head of a sector") && !said.contains("of another session"),
         "{said}"
@@ -294,7 +294,7 @@ fn noise_behind_the_last_end_mark_is_told_by_every_command() {
     let mut film = log.clone();
     film[last * BLOCK..].iter_mut().enumerate().for_each(noise);
     fs::write(&path, film).expect("written");
-    let said = text(&run(dir.path(), "verify copied", 0));
+    let said = text(&run(dir.path(), "info --verify copied", 0));
     assert!(said.contains("blocks that are no sectors") && said.contains("cannot be proved"), "{said}");
     // Nothing there: whether there was anything nobody knows.
     for empty in [0x00, 0xff] {

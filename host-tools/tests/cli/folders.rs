@@ -56,7 +56,7 @@ fn a_recording_in_a_folder_that_holds_nothing_is_told() {
     fs::remove_file(path).expect("removed");
     fs::copy(px4(), dir.path().join("copied/flight.tlog")).expect("copied");
     fs::write(dir.path().join("copied/notes.txt"), "mine").expect("written");
-    let said = run(dir.path(), "verify copied", 0).stderr;
+    let said = run(dir.path(), "info --verify copied", 0).stderr;
     let said = String::from_utf8_lossy(&said);
     for words in ["1 recording of other kinds passed over", "1 file passed over: no log of a known kind"] {
         assert!(said.contains(words), "{said}");
@@ -67,7 +67,7 @@ fn a_recording_in_a_folder_that_holds_nothing_is_told() {
 fn not_everything_holds_where_something_was_passed_over() {
     let dir = copied(2);
     let verdict = || {
-        let said = text(&run(dir.path(), "verify copied", 0));
+        let said = text(&run(dir.path(), "info --verify copied", 0));
         said.lines().last().expect("a verdict").to_owned()
     };
     assert_eq!(verdict(), "2 sessions: everything holds");
@@ -83,17 +83,17 @@ fn files_that_are_named_one_by_one_are_judged_as_their_folder_is() {
     let named = "copied/00003_00.HUM copied/00001_00.HUM";
     let all = format!("{named} ./copied/00002_00.HUM");
     let said = |line: &str, code| text(&run(dir.path(), line, code)).replace("./", "");
-    assert_eq!(said(&format!("verify {all}"), 0), said("verify copied", 0));
+    assert_eq!(said(&format!("info --verify {all}"), 0), said("info --verify copied", 0));
     fs::rename(at("00002_00.HUM"), dir.path().join("elsewhere")).expect("renamed");
     all_say(dir.path(), named, 3, &["session 00002, which was recorded just before it, is not there"]);
-    assert_eq!(said(&format!("verify {named}"), 3), said("verify copied", 3));
+    assert_eq!(said(&format!("info --verify {named}"), 3), said("info --verify copied", 3));
     // Without their endings, and two cards.
     fs::rename(dir.path().join("elsewhere"), at("00002_00")).expect("renamed");
-    run(dir.path(), "verify copied", 0);
-    run(dir.path(), &format!("verify {named} copied/00002_00"), 0);
+    run(dir.path(), "info --verify copied", 0);
+    run(dir.path(), &format!("info --verify {named} copied/00002_00"), 0);
     fs::create_dir_all(dir.path().join("other/copied")).expect("made");
     fs::rename(at("00002_00"), dir.path().join("other/copied/00002_00.HUM")).expect("renamed");
-    run(dir.path(), &format!("verify {named} other/copied/00002_00.HUM"), 3);
+    run(dir.path(), &format!("info --verify {named} other/copied/00002_00.HUM"), 3);
 }
 
 /// Power went before the second session had a sector; the third one found none there.
@@ -136,8 +136,8 @@ fn a_pipe_or_a_device_as_a_recording_is_refused_at_once_and_nothing_is_left() {
     let made = std::process::Command::new("mkfifo").arg(dir.path().join("pipe")).status();
     assert!(made.expect("it runs").success());
     for line in [
-        "pack /dev/zero -o new.hum",
-        "pack pipe -o new.hum",
+        "decode --format hum /dev/zero -o new.hum",
+        "decode --format hum pipe -o new.hum",
         "sim --input pipe --sd new.img",
         "sim --input PX4 --gs-input pipe --sd new.img",
         "sim --input PX4 --sd pipe",

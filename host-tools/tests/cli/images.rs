@@ -24,7 +24,7 @@ fn numbers_begin_anew_where_all_logs_were_deleted() {
     // Its clock is 23 minutes later than that of the deleted session 00002.
     record(&flight("ap_quad_faults.tlog"));
     all_say(dir.path(), "card.img", 0, &[]);
-    let logs = json(&run(dir.path(), "verify card.img --json", 0));
+    let logs = json(&run(dir.path(), "info --verify card.img --json", 0));
     assert_eq!(logs["logs"].as_array().map(Vec::len), Some(1), "the deleted ones are not the card's");
     // One that was recorded after it, of which no clock tells that it is older.
     record(&px4());
@@ -66,7 +66,7 @@ fn a_wiped_card_and_a_deleted_newest_log_are_told_with_and_without_salvage() {
         cards[two[0]..][..5].copy_from_slice(there);
         cards[two[1] + 1..][..4].copy_from_slice(&gone[1..]);
         fs::write(&path, &cards).expect("written");
-        let said = text(&attempt(dir.path(), "verify card.img"));
+        let said = text(&attempt(dir.path(), "info --verify card.img"));
         let words = "session 10002, which is newer than all that are there, was deleted";
         assert_eq!((said.contains(words), said.contains("was deleted")), (is_newer, is_newer), "{said}");
     }
@@ -110,7 +110,7 @@ fn a_log_under_another_name_is_read_and_one_that_only_salvage_finds_is_not_calle
     renamed[entry(b"00003_00HUM")..][..11].copy_from_slice(b"FLIGHT  BAK");
     fs::write(&path, &renamed).expect("written");
     all_say(dir.path(), "card.img", 0, &["FLIGHT.BAK begins as a log and has not the name of a segment"]);
-    assert!(text(&run(dir.path(), "verify card.img", 0)).contains("Session FLIGHT_BAK (FLIGHT.BAK)"));
+    assert!(text(&run(dir.path(), "info --verify card.img", 0)).contains("Session FLIGHT_BAK (FLIGHT.BAK)"));
     // Another file has taken its entry, and its clusters are free.
     let at = entry(b"00003_00HUM");
     let word = |at: usize| u32::from_le_bytes(image[at..at + 4].try_into().expect("four"));
@@ -130,7 +130,7 @@ fn a_log_under_another_name_is_read_and_one_that_only_salvage_finds_is_not_calle
     taken[at + 20..at + 32].fill(0);
     fs::write(&path, &taken).expect("written");
     let words = "sectors that no file names were not looked at: --salvage does";
-    for (command, sessions) in [("info", "Session 0000"), ("verify", "Session 0000")] {
+    for (command, sessions) in [("info", "Session 0000"), ("info --verify", "Session 0000")] {
         let said = text(&run(dir.path(), &format!("{command} card.img"), 0));
         assert!(said.contains(words) && said.matches(sessions).count() == 2, "{command}: {said}");
         let said = text(&run(dir.path(), &format!("{command} card.img --salvage"), 0));
@@ -159,7 +159,7 @@ fn a_report_of_the_newest_session_tells_that_an_older_one_on_the_card_is_damaged
     let sectors = blocks.iter_mut().filter(|block| block.starts_with(&[0x48, 0xb3])).skip(20).step_by(8);
     sectors.take(3).for_each(|block| block[100] ^= 4);
     fs::write(&path, image).expect("written");
-    for line in ["report card.img -o page.html", "verify card.img"] {
+    for line in ["report card.img -o page.html", "info --verify card.img"] {
         run(dir.path(), line, 3);
     }
     let said = run(dir.path(), "report card.img -o other.html", 3).stderr;
@@ -179,7 +179,7 @@ fn a_report_compares_sessions_of_one_card_only() {
     assert_eq!((sessions("report card.img"), sessions("report copied")), (2, 2));
     // Packed logs may be anybody's: of two vehicles, for instance.
     for name in ["one", "two"] {
-        run(dir.path(), &format!("pack PX4 -o {name}.hum"), 0);
+        run(dir.path(), &format!("decode --format hum PX4 -o {name}.hum"), 0);
     }
     assert_eq!(sessions("report one.hum two.hum"), 1);
 }
@@ -192,7 +192,7 @@ fn an_image_of_a_partition_alone_is_read_like_its_cards() {
     let partition = &image[word(446 + 8) * BLOCK..][..word(446 + 12) * BLOCK];
     fs::create_dir(dir.path().join("part")).expect("made");
     fs::write(dir.path().join("part/card.img"), partition).expect("written");
-    for command in ["verify", "info", "verify --salvage"] {
+    for command in ["info --verify", "info", "info --verify --salvage"] {
         let said = |card: &str| text(&run(dir.path(), &format!("{command} {card}"), 0)).replace("part/", "");
         assert_eq!(said("part/card.img"), said("card.img"));
     }

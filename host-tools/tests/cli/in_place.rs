@@ -36,7 +36,7 @@ fn two_runs_do_not_use_one_card_or_one_store() {
     // The half ends in the middle of a record.
     assert_eq!(first.wait().expect("it is ours").code(), Some(3));
     run(dir.path(), "sim --input PX4 --sd card.img --store store", 0);
-    run(dir.path(), "verify card.img", 0);
+    run(dir.path(), "info --verify card.img", 0);
 }
 
 #[test]
@@ -214,7 +214,9 @@ fn an_image_is_whole_or_not_there_and_one_without_a_partition_table_is_told() {
 fn a_store_beside_recordings_is_named_and_is_no_loss() {
     let dir = recorded();
     run(dir.path(), "sim --input PX4 --sd new.img --store store.bin", 0);
-    for line in ["info .", "check .", "ls .", "verify .", "decode . -o out --format tlog --to 1"] {
+    for line in
+        ["info .", "check .", "info --list .", "info --verify .", "decode . -o out --format tlog --to 1"]
+    {
         let ended = run(dir.path(), line, 0);
         let said = String::from_utf8_lossy(&ended.stderr);
         assert!(said.contains("store.bin: is the memory of a simulated board (--store)"), "{line}: {said}");
@@ -264,7 +266,7 @@ fn a_run_that_is_killed_leaves_a_card_and_a_store_that_the_next_one_goes_on_with
         sim.kill().expect("it is ours");
         sim.wait().expect("it is ours");
         // A log that a kill has ended has no end that is proved, and nothing else is wrong.
-        let told = text(&attempt(dir.path(), "verify card.img"));
+        let told = text(&attempt(dir.path(), "info --verify card.img"));
         assert!(told.contains("  ok      file system"), "{after_ms} ms: {told}");
     }
     run(dir.path(), "sim --input PX4 --sd card.img --store store", 0);
@@ -278,7 +280,7 @@ fn what_is_no_card_is_no_card_for_a_run_and_stays_as_it_is() {
     let dir = tempfile::tempdir().expect("directory");
     let at = |name: &str| dir.path().join(name);
     run(dir.path(), "sim --input PX4 --sd card.img --card-size 34", 0);
-    run(dir.path(), "pack PX4 -o log.hum", 0);
+    run(dir.path(), "decode --format hum PX4 -o log.hum", 0);
     let [tlog, log] = [px4(), at("log.hum")].map(|path| fs::read(path).expect("a recording"));
     let card = fs::read(at("card.img")).expect("an image");
     let mut damaged = card.clone();

@@ -6,7 +6,7 @@ use std::path::Path;
 use clap::{Arg, ArgAction, CommandFactory as _};
 use hums::cli::Cli;
 
-use crate::support::{Stamp, attempt, contents, furnished, px4, recorded, run, stamps, text};
+use crate::support::{Stamp, attempt, contents, furnished, recorded, run, stamps, text};
 
 /// What an argument names.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -23,12 +23,12 @@ enum Role {
 fn role(arg: &Arg) -> Role {
     match arg.get_id().as_str() {
         "inputs" | "input" | "gs_input" | "params" | "key" | "firmware" | "past" => Role::Input,
-        "output" | "sd" | "gs" | "tap" | "store" | "dir" => Role::Output,
+        "output" | "sd" | "gs" | "tap" | "store" => Role::Output,
         "around" | "bucket" | "card_out" | "command" | "card_size" | "cut_after_writes"
-        | "cut_store_after" | "dashboard" | "format" | "from" | "influx" | "last" | "line_rate" | "link"
-        | "listen" | "listen_token" | "message" | "name" | "names" | "noise" | "org" | "provoke"
-        | "reboot_at_us" | "seed" | "session" | "shell" | "span" | "speed" | "stall" | "system" | "to"
-        | "token" | "value" | "write_error" => Role::Other,
+        | "cut_store_after" | "format" | "from" | "influx" | "last" | "line_rate" | "link" | "listen"
+        | "listen_token" | "message" | "name" | "names" | "noise" | "org" | "provoke" | "reboot_at_us"
+        | "seed" | "session" | "shell" | "span" | "speed" | "stall" | "system" | "to" | "token" | "value"
+        | "write_error" => Role::Other,
         unknown => panic!("is --{unknown} an input, an output or none? Say so in `role`"),
     }
 }
@@ -38,32 +38,32 @@ const IS_INPUT: &str = "input of this command";
 
 /// Where an output is no file, what is said instead of [`IS_INPUT`]: the command, the output, the words, and why that is all
 /// there is to say.
-const ELSE_REFUSED: [(&str, &str, &str, &str); 2] = [
-    ("demo", "dir", "is a file, and a directory is needed there", "what it writes lies in that folder"),
-    ("pull", "output", "is a file, and a directory is needed there", "what it writes lies in that folder"),
-];
+const ELSE_REFUSED: [(&str, &str, &str, &str); 1] = [(
+    "box pull",
+    "output",
+    "is a file, and a directory is needed there",
+    "what it writes lies in that folder",
+)];
 
 /// Commands that have inputs and write no file, or outputs and no input, and why there is no pair to try.
-const NO_PAIRS: [(&str, &str); 12] = [
+const NO_PAIRS: [(&str, &str); 10] = [
     ("check", "prints"),
     ("live", "shows and sends"),
-    ("ls", "prints"),
     ("completions", "prints"),
     ("man", "prints"),
     ("info", "prints"),
-    ("verify", "prints"),
-    ("format", "talks with a board"),
-    ("params list", "talks with a board"),
-    ("params get", "talks with a board"),
-    ("params sign", "talks with a board"),
-    ("params set", "talks with a board"),
+    ("box format-card", "talks with a board"),
+    ("box params list", "talks with a board"),
+    ("box params get", "talks with a board"),
+    ("box params sign", "talks with a board"),
+    ("box params set", "talks with a board"),
 ];
 
 /// A good value for an argument, where one is needed.
 pub(crate) fn value(command: &str, arg: &str) -> &'static str {
     match (command, arg) {
-        ("decode" | "report" | "info" | "verify", "inputs") | ("check", "past") => "log.hum",
-        ("check" | "ls", "inputs") | (_, "input" | "gs_input") => "flight.tlog",
+        ("decode" | "report" | "info", "inputs") | ("check", "past") => "log.hum",
+        ("check", "inputs") | (_, "input" | "gs_input") => "flight.tlog",
         ("completions", "shell") => "bash",
         (_, "params") => "hums.param",
         (_, "key") => "key.txt",
@@ -72,7 +72,6 @@ pub(crate) fn value(command: &str, arg: &str) -> &'static str {
         (_, "output") => "new.out",
         (_, "format") => "tlog",
         (_, "link") => "tcp:127.0.0.1:1",
-        (_, "dir") => "new",
         (_, "name" | "names") => "GS_BUDGET",
         (_, "value") => "1",
         (_, "listen") => "127.0.0.1:0",
@@ -174,27 +173,6 @@ fn no_command_writes_over_any_of_its_inputs() {
         );
     }
     assert!(contents(dir.path()) == whole, "something was changed");
-}
-
-/// What a demo makes has names of its own in its folder: an input that lies there under one of them stays too.
-#[test]
-fn a_demo_into_the_folder_of_its_input_changes_nothing() {
-    let dir = tempfile::tempdir().expect("a folder");
-    for name in ["card.img", "ground-station.bin", "report.html"] {
-        let folder = dir.path().join(name.replace('.', "-"));
-        fs::create_dir(&folder).expect("made");
-        fs::copy(px4(), folder.join(name)).expect("copied");
-        let before = contents(&folder);
-        let line = format!(
-            "demo --input {} --dir {} --dashboard never",
-            folder.join(name).display(),
-            folder.display()
-        );
-        let ended = attempt(dir.path(), &line);
-        let said = String::from_utf8_lossy(&ended.stderr);
-        assert!(matches!(ended.status.code(), Some(1 | 2)), "{line}: {said}");
-        assert!(contents(&folder) == before, "{line}: {said}");
-    }
 }
 
 /// The table of a folder's pages has a name of its own, which may be a link.

@@ -1,4 +1,4 @@
-//! What a kill, a full disk or an earlier demo leaves.
+//! What a kill or a full disk leaves.
 
 use std::fs;
 use std::io::Write as _;
@@ -8,7 +8,7 @@ use std::process::{Command, Stdio};
 use std::time::Duration;
 
 use crate::support::{
-    all_named, attempt, contents, flight, frames_of, furnished, json, named, px4, run, stamps, until,
+    all_named, attempt, contents, flight, frames_of, furnished, json, named, px4, run, until,
 };
 
 /// Files and folders that are not whole.
@@ -19,7 +19,7 @@ fn parts(dir: &Path) -> Vec<String> {
 #[test]
 fn a_full_disk_leaves_the_old_file_or_nothing() {
     let dir = tempfile::tempdir().expect("directory");
-    run(dir.path(), "pack PX4 -o log.hum", 0);
+    run(dir.path(), "decode --format hum PX4 -o log.hum", 0);
     let program = env!("CARGO_BIN_EXE_hums");
     let tlog = px4().display().to_string();
     fs::write(dir.path().join("few.tlog"), &fs::read(px4()).expect("a recording")[..4000]).expect("written");
@@ -31,7 +31,7 @@ fn a_full_disk_leaves_the_old_file_or_nothing() {
         ),
         ("decode log.hum -o old --format jsonl --to 0.1", "decode log.hum -o old --format jsonl", "old"),
         ("report few.tlog -o old", "report log.hum -o old", "old"),
-        ("pack few.tlog -o old", "pack PX4 -o old", "old"),
+        ("decode --format hum few.tlog -o old", "decode --format hum PX4 -o old", "old"),
         ("", "decode log.hum -o new/ --format tlog", "new"),
         ("", "decode log.hum -o new --format csv", "new"),
         ("", "decode log.hum -o new --format thesis", "new"),
@@ -89,10 +89,10 @@ fn a_killed_run_leaves_the_old_file_and_is_in_nobodys_way() {
     let old = dir.path().join("old.hum");
     let few: usize = frames_of(&px4())[..60].iter().map(|frame| 8 + frame.len()).sum();
     fs::write(dir.path().join("few.tlog"), &fs::read(px4()).expect("a recording")[..few]).expect("written");
-    run(dir.path(), "pack few.tlog -o old.hum", 0);
+    run(dir.path(), "decode --format hum few.tlog -o old.hum", 0);
     let before = fs::read(&old).expect("there");
     let mut program = Command::new(env!("CARGO_BIN_EXE_hums"))
-        .args(["pack", "-", "-o", "old.hum", "--force"])
+        .args(["decode", "--format", "hum", "-", "-o", "old.hum", "--force"])
         .current_dir(dir.path())
         .stdin(Stdio::piped())
         .spawn()
@@ -105,14 +105,14 @@ fn a_killed_run_leaves_the_old_file_and_is_in_nobodys_way() {
     program.kill().expect("it is ours");
     program.wait().expect("it is ours");
     assert_eq!(fs::read(&old).expect("there"), before);
-    run(dir.path(), "pack PX4 -o old.hum --force", 0);
-    run(dir.path(), "verify old.hum", 0);
+    run(dir.path(), "decode --format hum PX4 -o old.hum --force", 0);
+    run(dir.path(), "info --verify old.hum", 0);
 }
 
 #[test]
 fn tables_of_a_killed_run_are_the_old_ones_or_the_new_ones() {
     let dir = tempfile::tempdir().expect("directory");
-    run(dir.path(), "pack PX4 -o log.hum", 0);
+    run(dir.path(), "decode --format hum PX4 -o log.hum", 0);
     run(dir.path(), "decode log.hum -o out --format csv,parquet --message ATTITUDE", 0);
     let out = dir.path().join("out");
     let (few, name) = (contents(&out), named(&out, "log"));
@@ -150,59 +150,10 @@ fn tables_of_a_killed_run_are_the_old_ones_or_the_new_ones() {
     assert_eq!(contents(&out).into_iter().filter(is_made).collect::<Vec<_>>(), whole);
 }
 
-/// A demo of a recording, on this PC.
-fn demo(dir: &Path, input: &str, flags: &[&str]) -> Command {
-    let mut demo = Command::new(env!("CARGO_BIN_EXE_hums"));
-    // Without the firmware it records on this PC.
-    demo.current_dir(dir).env("HUMS_FIRMWARE", "none").stdout(Stdio::null()).stderr(Stdio::piped());
-    demo.args(["demo", "--input", input, "--dir", "demo", "--dashboard", "never"]).args(flags);
-    demo
-}
-
-#[track_caller]
-fn demo_ends(dir: &Path, input: &str, flags: &[&str], code: i32) -> String {
-    let ended = demo(dir, input, flags).output().expect("it runs");
-    let said = String::from_utf8_lossy(&ended.stderr).into_owned();
-    assert_eq!(ended.status.code(), Some(code), "{input} {flags:?}: {said}");
-    said
-}
-
-/// Two short recordings of different vehicles.
-fn two_flights() -> tempfile::TempDir {
-    let dir = tempfile::tempdir().expect("directory");
-    let few: usize = frames_of(&px4())[..400].iter().map(|frame| 8 + frame.len()).sum();
-    fs::write(dir.path().join("one.tlog"), &fs::read(px4()).expect("a recording")[..few]).expect("written");
-    let raw = fs::read(flight("ap_quad_signed.raw")).expect("a recording");
-    fs::write(dir.path().join("two.raw"), &raw[..20_000]).expect("written");
-    dir
-}
-
-#[test]
-fn a_demo_replaces_another_one_only_where_the_user_says_so() {
-    let dir = two_flights();
-    let at = |name: &str| dir.path().join("demo").join(name);
-    demo_ends(dir.path(), "one.tlog", &[], 0);
-    fs::write(at("mine.tlog"), "mine").expect("written");
-    let before = stamps(&dir.path().join("demo"));
-    fs::write(dir.path().join("notes.txt"), "no recording").expect("written");
-    for (input, flag, code) in
-        [("two.raw", None, 1), ("nosuch.tlog", Some("--force"), 1), ("demo/card.img", Some("--force"), 2)]
-    {
-        let said = demo_ends(dir.path(), input, flag.as_slice(), code);
-        assert!(
-            input != "two.raw" || said.contains("card.img: exists") && said.contains("--force"),
-            "{said}"
-        );
-        assert!(input == "nosuch.tlog" || stamps(&dir.path().join("demo")) == before, "{input}");
-    }
-    demo_ends(dir.path(), "one.tlog", &["--force"], 0);
-    assert_eq!(fs::read(at("mine.tlog")).expect("there"), b"mine");
-}
-
 #[test]
 fn what_came_live_before_a_kill_is_there_and_no_command_takes_it_away() {
     let dir = tempfile::tempdir().expect("directory");
-    run(dir.path(), "pack PX4 -o log.hum", 0);
+    run(dir.path(), "decode --format hum PX4 -o log.hum", 0);
     let server = TcpListener::bind("127.0.0.1:0").expect("a port");
     let mut sim = Command::new(env!("CARGO_BIN_EXE_hums"))
         .args(["sim", "--sd", "card.img", "--tap", "tap.bin", "--input"])
@@ -221,7 +172,7 @@ fn what_came_live_before_a_kill_is_there_and_no_command_takes_it_away() {
     for line in [
         "sim --input PX4 --sd other.img --tap tap.bin",
         "sim --input PX4 --sd other.img --gs tap.bin",
-        "pack PX4 -o tap.bin",
+        "decode --format hum PX4 -o tap.bin",
     ] {
         run(dir.path(), line, 1);
         assert!(fs::read(&tap).expect("there") == sent, "{line}");
@@ -232,33 +183,20 @@ fn what_came_live_before_a_kill_is_there_and_no_command_takes_it_away() {
 #[test]
 fn what_is_not_whole_in_a_folder_is_passed_over_and_told() {
     let dir = tempfile::tempdir().expect("directory");
-    run(dir.path(), "pack PX4 -o log.hum", 0);
+    run(dir.path(), "decode --format hum PX4 -o log.hum", 0);
     let folder = dir.path().join("folder");
     fs::create_dir_all(folder.join(".x.hums-part")).expect("made");
     for name in ["00001_00.HUM", ".00002_00.HUM.hums-part", ".00003_00.HUM.pull.hums-part"] {
         fs::copy(dir.path().join("log.hum"), folder.join(name)).expect("copied");
     }
-    for line in ["verify IN", "info IN", "check IN", "report IN -o pages/", "decode IN -o out/ --format tlog"]
+    for line in
+        ["info --verify IN", "info IN", "check IN", "report IN -o pages/", "decode IN -o out/ --format tlog"]
     {
         let said = run(dir.path(), &line.replace("IN", "folder"), 0);
         let said = String::from_utf8_lossy(&said.stderr);
         assert_eq!(said.matches("has not ended, and is passed over").count(), 3, "{line}: {said}");
     }
     assert_eq!(all_named(&dir.path().join("out"), "00001").len(), 1);
-}
-
-#[test]
-fn a_demo_outside_of_the_source_tree_says_what_it_needs() {
-    let dir = tempfile::tempdir().expect("directory");
-    let program = dir.path().join("hums");
-    fs::hard_link(env!("CARGO_BIN_EXE_hums"), &program)
-        .or_else(|_| fs::copy(env!("CARGO_BIN_EXE_hums"), &program).map(|_| ()))
-        .expect("a copy");
-    let ended = Command::new(&program).arg("demo").current_dir(dir.path()).output().expect("it runs");
-    let said = String::from_utf8_lossy(&ended.stderr).into_owned();
-    assert_eq!(ended.status.code(), Some(2), "{said}");
-    assert!(said.lines().count() == 1 && said.contains("name a recording with --input"), "{said}");
-    assert_eq!(contents(dir.path()).len(), 1, "nothing is made");
 }
 
 /// What sends two signals at once (a shell and `timeout`, say) means one end.
@@ -310,7 +248,7 @@ fn a_standard_error_on_a_full_disk_ends_nothing() {
         let hums = format!("hums() {{ {} \"$@\"; }}; {line}", env!("CARGO_BIN_EXE_hums"));
         Command::new("bash").args(["-c", &hums]).current_dir(dir.path()).status().expect("a shell").code()
     };
-    assert_eq!(shell("hums ls nosuch 2> /dev/full"), Some(1));
+    assert_eq!(shell("hums info --list nosuch 2> /dev/full"), Some(1));
     // What is said in flight cannot be said: the card has all of it.
     let line = "hums sim --input flight.tlog --sd card.img --card-size 34 --tap /dev/full 2> /dev/full";
     assert_eq!(shell(line), Some(3));

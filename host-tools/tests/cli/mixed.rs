@@ -17,11 +17,11 @@ fn another_session_under_the_number_of_the_session_before_is_told_by_every_comma
         3,
         &["session 00002, which was recorded just before it, is not there under that number"],
     );
-    let said = String::from_utf8_lossy(&run(dir.path(), "verify copied", 3).stdout).into_owned();
+    let said = String::from_utf8_lossy(&run(dir.path(), "info --verify copied", 3).stdout).into_owned();
     assert!(said.contains("FAILED  session before     1 checked, 1 failed"), "{said}");
     // Without any log before it nothing tells that one should be there: that is said, and is no finding.
     fs::remove_file(at("00002_00.HUM")).expect("removed");
-    let said = String::from_utf8_lossy(&run(dir.path(), "verify copied", 0).stdout).into_owned();
+    let said = String::from_utf8_lossy(&run(dir.path(), "info --verify copied", 0).stdout).into_owned();
     let words = "session before     0 checked, 0 failed; session 00002 is not among what was read";
     assert!(said.contains(words), "{said}");
 }
@@ -30,7 +30,11 @@ fn another_session_under_the_number_of_the_session_before_is_told_by_every_comma
 fn two_logs_in_one_file_are_told_by_every_command_in_both_orders() {
     let dir = tempfile::tempdir().expect("directory");
     let [one, other] = ["px4_hil_quad_low.tlog", "ap_quad_guided.tlog"].map(|name| {
-        run(dir.path(), &format!("pack {} -o {name}.hum", end_of(name, dir.path()).display()), 0);
+        run(
+            dir.path(),
+            &format!("decode --format hum {} -o {name}.hum", end_of(name, dir.path()).display()),
+            0,
+        );
         fs::read(dir.path().join(format!("{name}.hum"))).expect("a log")
     });
     for (first, second) in [(&one, &other), (&other, &one)] {

@@ -12,7 +12,7 @@ use crate::support::{contents, flight, frames, frames_of, hums, json, named, px4
 
 /// A packed log of the PX4 flight.
 fn packed(dir: &Path) {
-    run(dir, "pack PX4 -o flight.hum", 0);
+    run(dir, "decode --format hum PX4 -o flight.hum", 0);
 }
 
 #[test]
@@ -20,7 +20,7 @@ fn a_packed_recording_comes_back_frame_for_frame() {
     let dir = tempfile::tempdir().expect("directory");
     for name in ["px4_hil_quad_low.tlog", "ap_quad_guided.tlog"] {
         let input = flight(name);
-        run(dir.path(), &format!("pack {} -o {name}.hum", input.display()), 0);
+        run(dir.path(), &format!("decode --format hum {} -o {name}.hum", input.display()), 0);
         run(dir.path(), &format!("decode {name}.hum -o {name} --format tlog"), 0);
         assert_eq!(frames_of(&dir.path().join(name)), frames_of(&input), "{name}");
     }
@@ -29,11 +29,15 @@ fn a_packed_recording_comes_back_frame_for_frame() {
 #[test]
 fn what_is_made_on_standard_output_by_its_path_is_nothing_but_that() {
     let dir = tempfile::tempdir().expect("directory");
-    run(dir.path(), &format!("pack {} -o few.hum", flight("px4_hil_quad_low.tlog").display()), 0);
+    run(
+        dir.path(),
+        &format!("decode --format hum {} -o few.hum", flight("px4_hil_quad_low.tlog").display()),
+        0,
+    );
     for (line, made) in [
         ("decode few.hum --format tlog -o", "a.tlog"),
         ("decode few.hum --format jsonl --message ATTITUDE -o", "a.jsonl"),
-        ("pack PX4 -o", "few.hum"),
+        ("decode --format hum PX4 -o", "few.hum"),
     ] {
         if made != "few.hum" {
             run(dir.path(), &format!("{line} {made}"), 0);
@@ -59,14 +63,14 @@ fn what_is_made_on_standard_output_by_its_path_is_nothing_but_that() {
 fn what_has_no_frame_is_not_packed() {
     let dir = tempfile::tempdir().expect("directory");
     fs::write(dir.path().join("text"), "no frame in here\n".repeat(500)).expect("written");
-    let output = run(dir.path(), "pack text -o out.hum", 1);
+    let output = run(dir.path(), "decode --format hum text -o out.hum", 1);
     assert!(String::from_utf8_lossy(&output.stderr).contains("no MAVLink frame"));
     assert!(!dir.path().join("out.hum").exists());
     // An autopilot's log has a frame by chance.
     let frame = &fs::read(px4()).expect("a recording")[8..];
     fs::write(dir.path().join("log.bin"), [&[0xa3, 0x95, 128, 128, 89][..], b"FMT\0BBnNZ", frame].concat())
         .expect("written");
-    let output = run(dir.path(), "pack log.bin -o out.hum", 1);
+    let output = run(dir.path(), "decode --format hum log.bin -o out.hum", 1);
     assert!(String::from_utf8_lossy(&output.stderr).contains("is an ArduPilot log"), "{output:?}");
     assert!(!dir.path().join("out.hum").exists());
 }
@@ -80,10 +84,10 @@ fn a_compressed_recording_is_packed_as_it_is_unpacked() {
     fs::write(dir.path().join("flight.tlog.gz"), &gz).expect("written");
     fs::write(dir.path().join("cut.tlog.gz"), &gz[..gz.len() / 2]).expect("written");
     packed(dir.path());
-    run(dir.path(), "pack flight.tlog.gz -o of_gz.hum", 0);
+    run(dir.path(), "decode --format hum flight.tlog.gz -o of_gz.hum", 0);
     let of = |name: &str| fs::read(dir.path().join(name)).expect("a log");
     assert!(of("flight.hum") == of("of_gz.hum"));
-    let cut = run(dir.path(), "pack cut.tlog.gz -o cut.hum", 3);
+    let cut = run(dir.path(), "decode --format hum cut.tlog.gz -o cut.hum", 3);
     assert!(String::from_utf8_lossy(&cut.stderr).contains("ends too soon"), "{cut:?}");
 }
 
@@ -192,7 +196,7 @@ fn a_recording_that_nobody_checked_has_the_findings_of_this_program_and_says_so(
     let dir = tempfile::tempdir().expect("directory");
     let at = dir.path();
     fs::copy(flight("ap_quad_faults.tlog"), at.join("flight.tlog")).expect("copied");
-    run(at, "pack flight.tlog -o flight.hum", 0);
+    run(at, "decode --format hum flight.tlog -o flight.hum", 0);
     for input in ["flight.hum", "flight.tlog"] {
         let info: serde_json::Value =
             serde_json::from_str(&text(&run(at, &format!("info --json {input}"), 0))).expect("JSON");
@@ -259,7 +263,7 @@ fn where_files_go_depends_on_how_many_there_are() {
     };
     assert!(tlog("two", "00001", ".tlog") && tlog("two", "00002", ".tlog"));
     run(at, "decode card.img -o - --format tlog", 2);
-    run(at, "pack PX4 -o cards.hum", 0);
+    run(at, "decode --format hum PX4 -o cards.hum", 0);
     run(at, "decode card.img cards.hum -o all --format jsonl", 0);
     assert!(tlog("all", "00001", ".jsonl") && tlog("all", "cards", ".jsonl"));
 }
@@ -285,7 +289,7 @@ fn a_bit_flipped_in_any_group_costs_that_group_and_is_told() {
         let read = |ending: &str| fs::read_to_string(made(ending)).expect(ending);
         assert_eq!(read("/HUMS_GAP.csv").lines().count(), 2, "sector {sector}");
         assert!(read(".jsonl").contains("HUMS_GAP"), "sector {sector}");
-        let verify = json(&run(dir.path(), "verify bad.hum --json", 3));
+        let verify = json(&run(dir.path(), "info --verify bad.hum --json", 3));
         assert_eq!(verify["ok"], false);
         let info = json(&run(dir.path(), "info bad.hum --json", 3));
         assert_eq!(info["logs"][0]["gaps_count"], 1, "sector {sector}: {}", info["logs"][0]["gaps"]);
@@ -363,7 +367,7 @@ fn what_is_no_log_is_told_apart() {
     // As large as what may be a card without a partition table.
     fs::write(at.join("large"), [&dataflash[..], &vec![b'\n'; 3 << 20]].concat()).expect("written");
     for input in ["ArduPilot", "ULog", "large", "PX4"] {
-        let output = run(at, &format!("verify {input}"), 1);
+        let output = run(at, &format!("info --verify {input}"), 1);
         let error = String::from_utf8_lossy(&output.stderr).into_owned();
         assert!(error.contains("not a log of HUMS; `hums check` judges it"), "{input}: {error}");
     }
@@ -373,10 +377,10 @@ fn what_is_no_log_is_told_apart() {
         ("zeros", "no partition table"),
         ("folder", "no log"),
         ("missing", "cannot be read"),
-        ("PX4", "hums pack"),
+        ("PX4", "hums decode --format hum"),
     ] {
-        for command in ["info", "verify", "decode -o out --format csv"] {
-            if input == "PX4" && command != "verify" {
+        for command in ["info", "info --verify", "decode -o out --format csv"] {
+            if input == "PX4" && command != "info --verify" {
                 // Recordings of every kind have a summary and become tables.
                 run(at, &format!("{command} {input}"), 0);
                 continue;
@@ -385,8 +389,9 @@ fn what_is_no_log_is_told_apart() {
             let error = String::from_utf8_lossy(&output.stderr).into_owned();
             assert!(error.contains(said), "{command} {input}: {error}");
             // Whoever named a large file of something else learns what is read.
-            let lists =
-                command == "verify" || input != "zeros" || error.contains("an ArduPilot log (.bin, .log)");
+            let lists = command == "info --verify"
+                || input != "zeros"
+                || error.contains("an ArduPilot log (.bin, .log)");
             assert!(lists, "{command} {input}: {error}");
         }
     }
@@ -425,9 +430,11 @@ fn slips_of_the_command_line_are_usage_errors() {
         "sim --input PX4 --sd c.img --card-size 5",
         "sim --input PX4 --sd c.img --gs - --json",
         "sim --input udpin:127.0.0.1:1 --sd c.img --speed max",
-        "emulate --input PX4 --sd c.img --card-out 1..2",
+        "sim --firmware x.elf --input PX4 --sd c.img --card-out 1..2",
+        "sim --input PX4 --sd c.img --costs",
         "decode c.img -o out --format xml",
-        "pack tcp:127.0.0.1:1 -o out.hum",
+        "decode --format hum,tlog PX4 -o out",
+        "decode --format hum PX4 -o out.hum --from 1",
     ] {
         let output = run(dir.path(), line, 2);
         assert!(output.stdout.is_empty() && !output.stderr.is_empty(), "hums {line}");
@@ -469,7 +476,7 @@ fn a_log_that_breaks_off_in_the_air_has_one_time_in_the_air_and_logs_stand_in_th
         3,
     );
     fs::copy(flight("ap_quad_guided.tlog"), dir.path().join("y.tlog")).expect("copied");
-    let lines = text(&run(dir.path(), "ls .", 3));
+    let lines = text(&run(dir.path(), "info --list .", 3));
     let name = |line: &str| line.split_whitespace().next().unwrap_or_default().to_owned();
     let names: Vec<String> = lines.lines().skip(1).map(name).collect();
     assert_eq!(names, ["y.tlog", "z/00001", "z/00002"], "{lines}");

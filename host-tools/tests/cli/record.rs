@@ -162,7 +162,7 @@ fn what_came_damaged_over_the_line_is_said_by_verify_and_is_no_damage_of_the_log
     for (noise, is_told) in [("", false), (" --noise 0.002", true)] {
         let _ = fs::remove_file(dir.path().join("card.img"));
         run(dir.path(), &format!("sim --input {} --sd card.img{noise}", recording.display()), 0);
-        let told = text(&run(dir.path(), "verify card.img", 0));
+        let told = text(&run(dir.path(), "info --verify card.img", 0));
         let words = "of no frame came over the line, before the recorder: no damage of the log";
         assert_eq!(
             (told.contains(words), told.contains("1 session: everything holds")),

@@ -188,7 +188,7 @@ pub(crate) fn furnished() -> TempDir {
     let dir = tempfile::tempdir().expect("directory");
     let at = |name: &str| dir.path().join(name);
     fs::copy(px4(), at("flight.tlog")).expect("a copy");
-    run(dir.path(), "pack flight.tlog -o log.hum", 0);
+    run(dir.path(), "decode --format hum flight.tlog -o log.hum", 0);
     fs::write(at("hums.param"), "CELL_VOLT_WARN 3.6\n").expect("a file");
     fs::write(at("key.txt"), "00112233445566778899aabbccddeeff00112233445566778899aabbccddeeff\n")
         .expect("a file");

@@ -76,9 +76,10 @@ fn fastest(runs: u32, mut command: impl FnMut() -> Command) -> Result<Duration> 
 fn ratios(hums: &Path, python: &Path, recording: &Path) -> Result<()> {
     let dir = tempfile::tempdir()?;
     let log = dir.path().join("log.hum");
-    let pack = Command::new(hums).arg("pack").arg(recording).arg("-o").arg(&log).output()?;
+    let pack =
+        Command::new(hums).args(["decode", "--format", "hum"]).arg(recording).arg("-o").arg(&log).output()?;
     if !matches!(pack.status.code(), Some(0 | 3)) {
-        bail!("hums pack: {}", String::from_utf8_lossy(&pack.stderr));
+        bail!("hums decode --format hum: {}", String::from_utf8_lossy(&pack.stderr));
     }
     let types = types(python, recording)?;
     let list = types.iter().cloned().collect::<Vec<_>>().join(",");
@@ -152,7 +153,7 @@ print('\\n'.join(sorted(t for t in types if t != 'BAD_DATA' and not t.startswith
 /// long log is hundreds of gigabytes of text.
 const MADE: [(&str, &[&str]); 9] = [
     ("info", &["info"]),
-    ("verify", &["verify"]),
+    ("verify", &["info", "--verify"]),
     ("report", &["report", "-o", "OUT"]),
     ("tlog", &["decode", "-o", "-", "--format", "tlog"]),
     ("jsonl", &["decode", "-o", "-", "--format", "jsonl"]),
@@ -170,7 +171,7 @@ fn long(hums: &Path, mib: &str, recording: &Path, what: &[&str]) -> Result<()> {
     }
     let dir = tempfile::tempdir()?;
     let (log, short) = (dir.path().join("long.hum"), dir.path().join("short.hum"));
-    Command::new(hums).arg("pack").arg(recording).arg("-o").arg(&short).output()?;
+    Command::new(hums).args(["decode", "--format", "hum"]).arg(recording).arg("-o").arg(&short).output()?;
     let (written, frames) = lengthen(&short, &log, bytes)?;
     println!("a log of {} MiB with {frames} frames", written >> 20);
     for (name, arguments) in MADE.iter().filter(|(name, _)| what.is_empty() || what.contains(name)) {

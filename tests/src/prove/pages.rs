@@ -3,7 +3,7 @@
 //! A log is recorded once. Then its file is cut, pages of it are erased, zeroed, copied, exchanged or replaced by what an
 //! older session left there, or it goes on with the second half of another log, or with all of one; what is left is read and verified, and
 //! compared with the whole log. Besides, a sector is altered, or one is lost and a parity sector of it is altered, with checks that fit.
-//! *Noticed* is what `hums verify` does not call good; that is also what parity has made again without a loss. A cut behind an end mark cannot be
+//! *Noticed* is what `hums info --verify` does not call good; that is also what parity has made again without a loss. A cut behind an end mark cannot be
 //! told from power that went there: that is *told* if `verify` says up to which mark the log is whole, and all of it is.
 
 use std::collections::BTreeSet;

@@ -188,9 +188,14 @@ fn speed(flights: &[PathBuf]) -> Result<()> {
         repeat(flight, DECODED_MIN, &tlog)?;
         // `pack` replaces nothing that is there.
         let _ = fs::remove_file(&log);
-        let done = Command::new(&program).arg("pack").arg(&tlog).arg("-o").arg(&log).output()?;
+        let done = Command::new(&program)
+            .args(["decode", "--format", "hum"])
+            .arg(&tlog)
+            .arg("-o")
+            .arg(&log)
+            .output()?;
         if !log.is_file() || !done.status.success() {
-            bail!("hums pack {}: {}", flight.display(), String::from_utf8_lossy(&done.stderr));
+            bail!("hums decode --format hum {}: {}", flight.display(), String::from_utf8_lossy(&done.stderr));
         }
         let gzip = Command::new("gzip").arg("-c").arg(&tlog).stdout(File::create(&zipped)?).status();
         gzip.context("gzip cannot be started")?;
@@ -286,7 +291,7 @@ pub(crate) fn record_at_full_rate(program: &Path, image: &Path, flight: &Path) -
     let _ = fs::remove_file(&card);
     repeat(flight, SECONDS_MIN * BYTES_PER_S, &input)?;
     let (json, _) = Shell::new(program)
-        .args(["emulate", "--json", "--costs", "--firmware"])
+        .args(["sim", "--json", "--costs", "--firmware"])
         .arg(image)
         .arg("--input")
         .arg(&input)
@@ -294,7 +299,7 @@ pub(crate) fn record_at_full_rate(program: &Path, image: &Path, flight: &Path) -
         .args(["--line-rate", BAUD, "--card-size", "4096", "--sd"])
         .arg(&card)
         .output_and_code()?;
-    serde_json::from_str(&json).context("the report of hums emulate")
+    serde_json::from_str(&json).context("the report of hums sim --firmware")
 }
 
 /// One recording's stages; gives the cycles that encoding took, and the bytes.

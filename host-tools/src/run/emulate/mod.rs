@@ -1,10 +1,9 @@
-//! `hums emulate`: the image that is flashed, on the model of its chip (`docs/chip.md`).
+//! `hums sim --firmware`: the image that is flashed, on the model of its chip (`docs/chip.md`).
 
 mod board;
 
 use std::collections::VecDeque;
-use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
+use std::path::Path;
 use std::time::Instant;
 
 use anyhow::{Context, Result, anyhow, bail};
@@ -22,27 +21,21 @@ use crate::card::image::is_card;
 use crate::cli;
 use crate::endpoint::Endpoint;
 use crate::files::read_short;
-use crate::outcome::{Outcome, usage};
+use crate::outcome::Outcome;
 use crate::plural::count;
 
-/// The environment variable that names the image as `--firmware` does.
-const FIRMWARE_VARIABLE: &str = "HUMS_FIRMWARE";
 /// The ELF file of a release with all of its symbols has 8 MB.
 const IMAGE_FILE_BYTES_MAX: u64 = 32 << 20;
-/// Where a build in the source tree leaves the image.
-const IMAGE: &str = "target/firmware/hums-f405.elf";
 
-/// Runs `hums emulate`.
-pub fn run(args: &cli::Emulate) -> Result<Outcome> {
-    let run = &args.run;
-    check_flags(run)?;
+/// Runs `hums sim --firmware`.
+pub(super) fn run(run: &cli::Sim, firmware: &Path) -> Result<Outcome> {
     check_standard_output(run)?;
     let (speed, live) = pace(run)?;
-    let inputs = paths::inputs(run, None, args.firmware.as_deref())?;
+    let inputs = paths::inputs(run)?;
     let params = params::read(run.params.as_deref())?;
-    let image = image(&firmware(args.firmware.as_deref())?)?;
+    let image = image(firmware)?;
     // Open, so that no other run uses them.
-    let (mut arrivals, (card, flash)) = Arrivals::open(run, None, || {
+    let (mut arrivals, (card, flash)) = Arrivals::open(run, &inputs, || {
         run.store.as_deref().map_or(Ok(()), store::check)?;
         let card = prepare_card(&run.sd, run.faults.card_size, run.faults.seed)?;
         Ok((card, store::open(run.store.as_deref(), &params)?))
@@ -71,7 +64,7 @@ pub fn run(args: &cli::Emulate) -> Result<Outcome> {
         bail!("--store {}: {error}", run.store.as_deref().unwrap_or(Path::new("")).display());
     }
     flown?;
-    let beside = ground.finish();
+    let beside = ground.finish().and(arrivals.finish());
     if let Some(remark) = arrivals.remark() {
         note!("{remark}");
     }
@@ -83,7 +76,7 @@ pub fn run(args: &cli::Emulate) -> Result<Outcome> {
     let (frames, on_card) = report.read_card(&run.sd, &earlier)?;
     tell(&mut report, &board.traffic(), frames, &on_card);
     report.blocks_written = medium.writes();
-    if args.costs {
+    if run.costs {
         report.cycles = Some(board.stage_cycles().context("--costs: wants an ELF file of this version's")?);
         report.stack_by_urgency = Some(board.stack_by_urgency());
         report.busy_percent_max = Some(board.busy_percent_max());
@@ -114,73 +107,9 @@ fn tell(report: &mut Report, traffic: &Traffic, frames: u64, on_card: &OnCard) {
     }
 }
 
-/// Faults of the card are `hums sim`'s.
-fn check_flags(run: &cli::Run) -> Result<()> {
-    let faults = &run.faults;
-    let given = [
-        ("--cut-after-writes", !faults.cut_after_writes.is_empty()),
-        ("--cut-store-after", faults.cut_store_after.is_some()),
-        ("--stall", !faults.stall.is_empty()),
-        ("--card-out", !faults.card_out.is_empty()),
-        ("--write-error", faults.write_error.is_some()),
-    ];
-    for (flag, given) in given {
-        if given {
-            return Err(usage(format!("{flag} works with hums sim only")));
-        }
-    }
-    Ok(())
-}
-
 /// What the file holds.
 fn image(path: &Path) -> Result<Image> {
     let file = read_short(path, IMAGE_FILE_BYTES_MAX)?;
     Image::parse(&file)
         .map_err(|why| anyhow!("{}: is no firmware image of the STM32F405: {why}", path.display()))
-}
-
-/// The image: as named, as built, or built now.
-pub(crate) fn firmware(named: Option<&Path>) -> Result<PathBuf> {
-    let variable = std::env::var_os(FIRMWARE_VARIABLE).map(PathBuf::from);
-    if let Some(path) = named.map(Path::to_owned).or(variable) {
-        if !path.is_file() {
-            bail!("{}: there is no such firmware image; `cargo xtask firmware` builds one", path.display());
-        }
-        return Ok(std::path::absolute(path)?);
-    }
-    let Some(tree) = source_tree() else {
-        bail!(
-            "no firmware image: this is not inside the source tree of hums. There, type `cargo xtask firmware`, and name \
-             what it prints here with --firmware"
-        );
-    };
-    let built = tree.join(IMAGE);
-    if built.is_file() { Ok(built) } else { build(&tree) }
-}
-
-fn build(tree: &Path) -> Result<PathBuf> {
-    note!("no firmware image yet: building it (cargo xtask firmware)");
-    let output = Command::new("cargo")
-        .args(["xtask", "firmware"])
-        .current_dir(tree)
-        .stdin(Stdio::null())
-        .stderr(Stdio::inherit())
-        .output()
-        .context("cargo cannot be started")?;
-    let printed = String::from_utf8_lossy(&output.stdout);
-    let image = printed.lines().last().map(PathBuf::from).filter(|image| image.is_file());
-    match image {
-        Some(image) if output.status.success() => Ok(image),
-        _ => bail!("the firmware was not built; see what `cargo xtask firmware` says above"),
-    }
-}
-
-/// The source tree around the working directory or around this program.
-pub fn source_tree() -> Option<PathBuf> {
-    let here = std::env::current_dir().ok();
-    let program = std::env::current_exe().ok();
-    let starts = here.iter().chain(&program);
-    let is_tree =
-        |dir: &&Path| dir.join("firmware/app/Cargo.toml").is_file() && dir.join("xtask/Cargo.toml").is_file();
-    starts.flat_map(|start| start.ancestors()).find(is_tree).map(Path::to_owned)
 }

@@ -28,24 +28,28 @@ use super::earlier::EarlierSessions;
 use super::ground::{self, Ground};
 use super::report::{FINDINGS_MAX, Report};
 use super::store::{self, FileFlash};
-use super::{InPlace, check_standard_output, drive, pace, params, paths, prepare_card, salt};
+use super::{InPlace, check_standard_output, drive, emulate, pace, params, paths, prepare_card, salt};
 use crate::card::image::is_card;
 use crate::card::{Faults, SimCard};
 use crate::cli;
 use crate::endpoint::Endpoint;
-use crate::outcome::Outcome;
+use crate::outcome::{Outcome, usage};
 use crate::run::Machine as _;
 use crate::source::Chunk;
 
 /// Runs `hums sim`.
-pub fn run(args: &cli::Sim) -> Result<Outcome> {
-    let run = &args.run;
+pub fn run(run: &cli::Sim) -> Result<Outcome> {
+    if let Some(image) = &run.firmware {
+        return emulate::run(run, image);
+    }
     check_standard_output(run)?;
     let (speed, live) = pace(run)?;
-    let inputs = paths::inputs(run, args.tap.as_deref(), None)?;
+    let inputs = paths::inputs(run)?;
+    if run.costs {
+        return Err(usage("--costs measures a firmware image: give one with --firmware"));
+    }
     let params = params::read(run.params.as_deref())?;
-    let tap = args.tap.as_deref().map(|path| (path, &inputs));
-    let (mut arrivals, (image, flash)) = Arrivals::open(run, tap, || {
+    let (mut arrivals, (image, flash)) = Arrivals::open(run, &inputs, || {
         run.store.as_deref().map_or(Ok(()), store::check)?;
         let card = prepare_card(&run.sd, run.faults.card_size, run.faults.seed)?;
         Ok((card, store::open(run.store.as_deref(), &params)?))

@@ -1,4 +1,4 @@
-//! `hums pull --around`: over a slow radio a crash's minute first. The moment is found by random access ([`super::moment`]), and
+//! `hums box pull --around`: over a slow radio a crash's minute first. The moment is found by random access ([`super::moment`]), and
 //! what was recorded round it becomes a part of the log ([`super::part`]). What cannot be read of it, or of what was searched, is told.
 
 use std::collections::BTreeSet;
@@ -94,7 +94,7 @@ pub(super) fn pull(
         // The moment goes on behind all that the board has.
         let to_end = reading.is_to_end(names) && reading.span().is_none_or(|(_, end)| end < to);
         for fault in reading.faults_of(is_of_it, to_end) {
-            note!("{}: of the moment: {fault}; `hums verify` says more", reading.name());
+            note!("{}: of the moment: {fault}; `hums info --verify` says more", reading.name());
             outcome = Outcome::Losses;
         }
         is_over |= reading.span().is_some_and(|(_, end)| end > to);

@@ -1,4 +1,4 @@
-//! What came, judged as `hums verify` judges the folder that it makes, in one reading: by the same function, of which all checks count
+//! What came, judged as `hums info --verify` judges the folder that it makes, in one reading: by the same function, of which all checks count
 //! where all of the board's logs were asked for.
 //!
 //! Of what was not asked for nothing is missing: files of a session between which others were left out are logs of their own
@@ -26,7 +26,7 @@ pub(super) struct LogJson {
     pub(super) path: PathBuf,
     /// It was not there already.
     pub(super) is_new: bool,
-    /// `hums verify` finds no fault with the logs of its session that were asked for and follow each other; and of the last one the end is
+    /// `hums info --verify` finds no fault with the logs of its session that were asked for and follow each other; and of the last one the end is
     /// proved, or was not asked for.
     pub(super) whole: bool,
     /// What is known of the end of the last one of these.
@@ -158,7 +158,7 @@ fn tell(overview: &Overview, extent: Extent, pulled: &mut [LogJson]) -> Outcome 
         );
     }
     for (check, why) in &failed {
-        note!("{}: {check}: {why}; `hums verify` says more", last.name);
+        note!("{}: {check}: {why}; `hums info --verify` says more", last.name);
     }
     if extent.to_end {
         last.end = Some(EndJson::new(ending));

@@ -1,8 +1,8 @@
-//! `hums pull`: the board's logs over MAVLink FTP, burst by burst; what a burst lost is read piece by piece.
+//! `hums box pull`: the board's logs over MAVLink FTP, burst by burst; what a burst lost is read piece by piece.
 //!
 //! A download that was interrupted is gone on with, once what is there was compared with the beginning of the board's
 //! log (by its checksum, or where the board's firmware computes none by its ends); at the end the whole is compared, and read through as
-//! `hums verify` does, also where it is there already. A file's name says whose session it is, so that those of two cards never meet.
+//! `hums info --verify` does, also where it is there already. A file's name says whose session it is, so that those of two cards never meet.
 
 mod around;
 mod compare;
@@ -44,7 +44,7 @@ const TOLD_BYTES: u32 = 8 * 1024;
 /// What a log without bytes is. A board does not know a log whose first sector is lost.
 const NOTHING: &str = "nothing is recorded in it yet, or its first sector cannot be read";
 
-/// What `hums pull --json` prints.
+/// What `hums box pull --json` prints.
 const SCHEMA: Schema = Schema::first("hums-pull");
 
 #[derive(Debug, Serialize)]
@@ -75,7 +75,7 @@ impl MomentJson {
     }
 }
 
-/// Runs `hums pull`.
+/// Runs `hums box pull`.
 pub fn run(args: &cli::Pull) -> Result<Outcome> {
     make_directory(&args.output)?;
     let client = Client::connect(&args.at)?;
@@ -332,7 +332,7 @@ fn around(
     for name in &session.unknown {
         note!(
             "{name}: its beginning cannot be read, so that nothing tells whether it is of this session; it is not looked at: \
-             `hums pull {name}` brings it"
+             `hums box pull {name}` brings it"
         );
         outcome = Outcome::Losses;
     }
@@ -348,7 +348,7 @@ fn around(
     outcome = outcome.and(brought.outcome);
     if brought.at.is_none() && outcome == Outcome::Done {
         bail!(
-            "no such finding is in what the board gives of this session; what came stays for `hums pull`, which brings the rest"
+            "no such finding is in what the board gives of this session; what came stays for `hums box pull`, which brings the rest"
         );
     }
     let mut pulled = Vec::new();
@@ -509,7 +509,7 @@ fn there(ftp: &mut Ftp, name: &str, path: &Path, length: u32) -> Result<There> {
         // Not proved: it comes once more, and takes the place of what is there when it is whole.
         Likeness::SameEnds => Ok(There::Nothing),
         Likeness::Other => bail!(
-            "{} differs from the board's log of the same session: one of both is damaged or was changed, and `hums verify` \
+            "{} differs from the board's log of the same session: one of both is damaged or was changed, and `hums info --verify` \
              says whether this one is; it is left as it is: move it away, or name another directory with -o",
             path.display()
         ),

@@ -41,7 +41,7 @@ impl<'a> Remote<'a> {
         let whole = output.join(&heading.name);
         if whole.exists() {
             bail!(
-                "{} is there already: `hums decode --from --to` shows a moment of it, and `hums pull` brings what it lacks",
+                "{} is there already: `hums decode --from --to` shows a moment of it, and `hums box pull` brings what it lacks",
                 whole.display()
             );
         }

@@ -1,4 +1,4 @@
-//! Sectors of a log that were asked for, as they came, though the rest of it did not: read and judged as `hums verify` does a log.
+//! Sectors of a log that were asked for, as they came, though the rest of it did not: read and judged as `hums info --verify` does a log.
 //! Each place of them is to hold the sector that belongs there. Where one does not, what was recorded then is not known, and what was
 //! looked for may be there.
 

@@ -1,3 +1,4 @@
+use std::ffi::OsString;
 use std::fs;
 use std::ops::Range;
 use std::path::PathBuf;
@@ -10,15 +11,14 @@ use hums_link::packet::Fields;
 use hums_recorder::card::SEGMENT_BYTES_MAX;
 
 use super::*;
-use crate::endpoint::Endpoint;
 use crate::talk::fake;
 
-/// The sectors of a recording of the repository, as `hums pack` makes them.
+/// The sectors of a recording of the repository, as `hums decode --format hum` makes them.
 pub(super) fn packed(dir: &Path, name: &str) -> Vec<u8> {
     let input = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../tests/flights").join(name);
     let output = dir.join(name);
-    let pack = cli::Pack { input: Endpoint::File(input), output: output.clone(), force: false, json: false };
-    crate::pack::run(&pack).expect("packed");
+    let words = ["hums", "decode", "--format", "hum", "-o"].map(OsString::from);
+    crate::run(words.into_iter().chain([output.clone().into(), input.into()]));
     fs::read(output).expect("there")
 }
 
@@ -298,7 +298,7 @@ fn recorded_by(session: u32, seconds: u64, clocks: &[(u64, u64)]) -> Vec<u8> {
     memory.sectors
 }
 
-/// A command line with only `hums pull`'s arguments.
+/// A command line with only `hums box pull`'s arguments.
 #[derive(clap::Parser)]
 struct Line {
     #[command(flatten)]
@@ -652,7 +652,7 @@ fn files_of(log: &[u8], groups: usize) -> Files {
         .collect()
 }
 
-/// What `hums verify` says of a folder.
+/// What `hums info --verify` says of a folder.
 fn verified(folder: &Path) -> Outcome {
     let found = crate::logs::find::find_in(folder, false).expect("a folder");
     let mut outcome = Outcome::Done;

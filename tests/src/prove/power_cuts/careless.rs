@@ -3,7 +3,7 @@
 //! The recorder takes each block that the card reports as written for a barrier. These cards do not: one writes the last
 //! blocks in any order, so that any of them may be missing; one has lost a single block that it acknowledged; one spoils
 //! the whole page of flash that the last block lies in. What such a card holds is looked at in three ways: by `fsck.vfat`,
-//! whose complaints are counted; by the readers behind `hums verify`; and by the recorder, which is started on it again.
+//! whose complaints are counted; by the readers behind `hums info --verify`; and by the recorder, which is started on it again.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -491,7 +491,7 @@ fn frames_by_session(found: &Found) -> Result<BTreeMap<u32, usize>> {
     Ok(frames)
 }
 
-/// Whether `hums verify` tells that something of these sessions is missing: of the card, of the log, or of the log after.
+/// Whether `hums info --verify` tells that something of these sessions is missing: of the card, of the log, or of the log after.
 fn tells(found: &Found, less: &BTreeSet<u32>) -> Result<bool> {
     if found.images.iter().any(|image| !image.damage.is_empty()) {
         return Ok(true);
