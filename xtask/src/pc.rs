@@ -36,39 +36,25 @@ pub(crate) struct TestProgram {
     path: PathBuf,
 }
 
-/// Each crate's own tests; those of `hums`, the largest crate, without optimisation, which costs more than what they run faster by.
-const OWN_TESTS: [(&[&str], &[&str]); 2] = [
-    (&CHOICE, &["--lib", "--exclude=hums"]),
-    (&["--package=hums"], &["--lib", "--config=profile.test.package.hums.opt-level=0"]),
-];
-
-/// Builds `hums`, the campaigns, all tests and the examples; a warning is an error. First what is in `tests/` with the programs that it runs, and programs with tests of their own.
+/// Builds `hums`, the campaigns, all tests and the examples by one call of cargo; a warning is an error.
 pub(crate) fn build() -> Result<()> {
-    let metadata = MetadataCommand::new().no_deps().current_dir(repo::root()).exec()?;
-    let targets = metadata.packages.iter().flat_map(|package| &package.targets);
-    let tested = targets.filter(|target| target.is_bin() && target.test);
-    let bins: Vec<String> = tested.map(|target| format!("--bin={}", target.name)).collect();
-    let outer: Vec<&str> = bins.iter().map(String::as_str).chain(["--test=*"]).collect();
-    let tests = [(&CHOICE[..], &outer[..])].into_iter().chain(OWN_TESTS);
-    let tests = tests.map(|(choice, targets)| (&["test", "--no-run"][..], choice, targets));
+    let cargo = Shell::cargo().args(["test", "--no-run", "--message-format=json"]).args(CHOICE);
+    let (messages, code) = cargo.output_and_code()?;
     let (mut artifacts, mut warned) = (Vec::new(), false);
-    for (command, choice, targets) in tests.chain([(&["build"][..], &CHOICE[..], &["--examples"][..])]) {
-        let cargo = Shell::cargo().args(command).args(choice).args(targets).arg("--message-format=json");
-        let (messages, code) = cargo.output_and_code()?;
-        for message in Message::parse_stream(messages.as_bytes()) {
-            match message? {
-                Message::CompilerArtifact(artifact) => artifacts.push(artifact),
-                Message::CompilerMessage(message) => {
-                    eprintln!("{}", message.message.rendered.unwrap_or(message.message.message));
-                    warned |= message.message.level == DiagnosticLevel::Warning;
-                }
-                _ => {}
+    for message in Message::parse_stream(messages.as_bytes()) {
+        match message? {
+            Message::CompilerArtifact(artifact) => artifacts.push(artifact),
+            Message::CompilerMessage(message) => {
+                eprintln!("{}", message.message.rendered.unwrap_or(message.message.message));
+                warned |= message.message.level == DiagnosticLevel::Warning;
             }
-        }
-        if code != 0 {
-            bail!("cargo ended with exit code {code}");
+            _ => {}
         }
     }
+    if code != 0 {
+        bail!("cargo ended with exit code {code}");
+    }
+    let metadata = MetadataCommand::new().no_deps().current_dir(repo::root()).exec()?;
     let mut programs = test_programs(artifacts, &metadata)?;
     programs.sort_by(|a, b| (&a.package, &a.name).cmp(&(&b.package, &b.name)));
     fs::create_dir_all(list().parent().unwrap_or(Path::new(".")))?;
