@@ -113,8 +113,9 @@ impl Telling {
 
     /// Whether an alarm that was told explains it: a sensor that is dead agrees with others by chance.
     fn is_explained(&self, finding: &Finding) -> bool {
+        let Some(check) = health::check_named(finding.check) else { return false };
         let mut open = self.open.iter().filter_map(|(number, _)| health::checks().nth(usize::from(*number)));
-        open.any(|check| health::explains(check.name, finding.check))
+        open.any(|cause| health::explains(cause, check))
     }
 
     /// What becomes of it now.

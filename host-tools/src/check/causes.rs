@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use hums_core::clock::Instant;
-use hums_core::health::{Alarm, Level, because};
+use hums_core::health::{Alarm, Level, root_cause};
 
 use super::problem::began;
 use crate::summary::FindingLine;
@@ -18,9 +18,9 @@ struct Open<'a> {
     unexplained: Vec<usize>,
 }
 
-impl<'a> Open<'a> {
-    fn alarm(&self, since: Instant) -> Alarm<'a> {
-        Alarm { since: since.into(), check: self.check, instance: self.instance, level: self.level }
+impl Open<'_> {
+    fn alarm(&self, since: Instant) -> Option<Alarm> {
+        Alarm::of(self.check, self.instance, self.level, since.into())
     }
 }
 
@@ -49,12 +49,13 @@ pub fn causes(findings: &[FindingLine]) -> Vec<Option<String>> {
             let others = open.values().map(|other| (other.since, other.check));
             began(one.check, one.since, others)
         };
-        let alarms: Vec<Alarm<'_>> = open.values().map(|one| one.alarm(since(one))).collect();
+        let alarms: Vec<Alarm> = open.values().filter_map(|one| one.alarm(since(one))).collect();
         for one in open.values_mut().filter(|one| !one.unexplained.is_empty()) {
-            if let Some(cause) = because(&one.alarm(one.since), alarms.iter().copied()) {
+            let effect = one.alarm(one.since);
+            if let Some(cause) = effect.and_then(|effect| root_cause(&effect, alarms.iter().copied())) {
                 for place in one.unexplained.drain(..) {
                     if let Some(known) = causes.get_mut(place) {
-                        *known = Some(cause.check.to_owned());
+                        *known = Some(cause.check.name.to_owned());
                     }
                 }
             }

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use hums_core::clock::{Instant, Span};
-use hums_core::health::{Alarm, Level, Side, Subsystem, because, checks};
+use hums_core::health::{Alarm, Level, Side, Subsystem, checks, root_cause};
 use hums_core::time;
 
 use crate::part;
@@ -226,25 +226,19 @@ impl Problems {
                 since
             }
         };
-        let alarms: Vec<(time::Instant, String, u8, Level)> = open()
-            .map(|(since, problem, level)| {
-                (since_of(since, &problem.check).into(), problem.check.clone(), problem.instance, level)
+        let alarms: Vec<Alarm> = open()
+            .filter_map(|(since, problem, level)| {
+                Alarm::of(&problem.check, problem.instance, level, since_of(since, &problem.check).into())
             })
             .collect();
         for followed in self.open.values_mut().filter(|followed| followed.unexplained) {
             let Some((since, _)) = followed.since else { continue };
-            let alarms = alarms.iter().map(|(since, check, instance, level)| Alarm {
-                since: *since,
-                check,
-                instance: *instance,
-                level: *level,
-            });
             let Problem { check, instance, .. } = &followed.problem;
-            let effect = Alarm { since: since.into(), check, instance: *instance, level: followed.level };
-            if let Some(cause) = because(&effect, alarms) {
+            let effect = Alarm::of(check, *instance, followed.level, since.into());
+            if let Some(cause) = effect.and_then(|effect| root_cause(&effect, alarms.iter().copied())) {
                 // Of several times the one counts that had its worst level first.
                 if followed.problem.because.is_none() || followed.problem.at >= since {
-                    followed.problem.because = Some(cause.check.to_owned());
+                    followed.problem.because = Some(cause.check.name.to_owned());
                 }
                 followed.unexplained = false;
             }

@@ -234,16 +234,13 @@ fn reason(craft: &Craft, subsystem: Subsystem, level: Level, here: Level, good: 
     let findings = craft.worries.values().filter(|finding| finding.subsystem == subsystem);
     let worst = findings.max_by_key(|finding| (rank(finding.level), finding.at.as_millis()));
     if let Some(finding) = worst.filter(|_| level != Level::Ok) {
-        let alarm = |worry: &Finding| health::Alarm {
-            since: worry.at,
-            check: worry.check,
-            instance: worry.instance,
-            level: worry.level,
-        };
-        let alarms = craft.worries.values().filter(|worry| worry.check != finding.check).map(alarm);
+        let alarm = |worry: &Finding| health::Alarm::of(worry.check, worry.instance, worry.level, worry.at);
+        let alarms = craft.worries.values().filter_map(alarm);
         // One cause has one order: its own.
-        return match health::because(&alarm(finding), alarms) {
-            Some(cause) => format!("{}, because of: {}", without_advice(finding), check_kind(cause.check)),
+        return match alarm(finding).and_then(|effect| health::root_cause(&effect, alarms)) {
+            Some(cause) => {
+                format!("{}, because of: {}", without_advice(finding), check_kind(cause.check.name))
+            }
             None => match craft.due(finding) {
                 Some(due) => format!("{}: {}", part::due_words(&due), words(finding)),
                 None => words(finding),

@@ -9,6 +9,7 @@ use super::check::{Check, Debounce, InstanceOf, Side, Unit, When};
 use super::common::{STALE, alert};
 use super::finding::Subsystem;
 use super::inputs::Inputs;
+use super::suppression::{DRIVE, GYROS, Group, RATES, Role};
 use crate::cause::Cause;
 use crate::latest::Reading;
 use crate::modes::{is_banked_by_hand, is_made_to_turn};
@@ -39,14 +40,20 @@ const ROLL: Check = Check {
     instances: 1,
     alarm_only: false,
     is_flag: false,
+    role: Role::NONE,
     of: InstanceOf::Vehicle,
     read: |inputs, _| degrees(inputs, |attitude| attitude.roll, 0),
 };
 
 pub(super) const CHECKS: &[Check] = &[
-    ROLL,
-    Check { name: "pitch", read: |inputs, _| degrees(inputs, |attitude| attitude.pitch, 1), ..ROLL },
-    alert::<{ Cause::Attitude as usize }>(Subsystem::Attitude),
+    Check { role: Role::of(Group::Other, DRIVE | GYROS | Group::RollRate.bit()), ..ROLL },
+    Check {
+        name: "pitch",
+        role: Role::of(Group::Other, DRIVE | GYROS | Group::PitchRate.bit()),
+        read: |inputs, _| degrees(inputs, |attitude| attitude.pitch, 1),
+        ..ROLL
+    },
+    alert::<{ Cause::Attitude as usize }>(Subsystem::Attitude, Role::of(Group::Other, DRIVE | GYROS | RATES)),
 ];
 
 fn degrees(inputs: &Inputs<'_>, angle: fn(&Attitude) -> Radians, axis: usize) -> Option<Reading> {

@@ -22,6 +22,7 @@ use core::num::NonZeroU8;
 
 use super::finding::{Finding, Level, Orders, Subsystem};
 use super::inputs::Inputs;
+use super::suppression::Role;
 use crate::latest::Reading;
 use crate::observation::Feeds;
 use crate::params::{Param, Params};
@@ -204,6 +205,8 @@ pub struct Check {
     pub alarm_only: bool,
     /// Its value is a flag or the number of a state, which tells a pilot nothing: the alarm alone is told.
     pub is_flag: bool,
+    /// What it explains, and what explains it.
+    pub role: Role,
     /// What its instances are numbers of.
     pub of: InstanceOf,
     /// Reads the value; `None` while it has never been measured.
@@ -304,7 +307,7 @@ pub struct State {
 
 const _: () = assert!(size_of::<State>() <= 20);
 /// There are more than a hundred rows in flash.
-const _: () = assert!(size_of::<Check>() <= if cfg!(target_pointer_width = "32") { 32 } else { 48 });
+const _: () = assert!(size_of::<Check>() <= if cfg!(target_pointer_width = "32") { 40 } else { 56 });
 
 /// A change of level.
 #[derive(Clone, Copy, Debug, PartialEq)]

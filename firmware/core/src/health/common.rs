@@ -5,6 +5,7 @@ use core::num::NonZeroU8;
 use super::check::{Check, Debounce, InstanceOf, Side, Unit, When};
 use super::finding::Subsystem;
 use super::inputs::Inputs;
+use super::suppression::Role;
 use crate::baseline::Quantity;
 use crate::cause::Cause;
 use crate::latest::Reading;
@@ -17,7 +18,7 @@ pub(super) const STALE: Option<NonZeroU8> = NonZeroU8::new(5);
 pub(super) const STALE_SLOW: Option<NonZeroU8> = NonZeroU8::new(12);
 
 /// What the autopilot itself says is wrong with `CAUSE`, the number of a [`Cause`]: 1 a warning, 2 critical.
-pub(super) const fn alert<const CAUSE: usize>(subsystem: Subsystem) -> Check {
+pub(super) const fn alert<const CAUSE: usize>(subsystem: Subsystem, role: Role) -> Check {
     Check {
         name: Cause::ALL[CAUSE].check(),
         subsystem,
@@ -35,6 +36,7 @@ pub(super) const fn alert<const CAUSE: usize>(subsystem: Subsystem) -> Check {
         // That it says nothing is no word about its health.
         alarm_only: true,
         is_flag: true,
+        role,
         of: InstanceOf::Vehicle,
         read: |inputs, _| {
             Reading::new(
@@ -63,6 +65,7 @@ pub(super) const fn due(subsystem: Subsystem) -> Check {
         // That a part is not due does not make its subsystem healthy.
         alarm_only: true,
         is_flag: false,
+        role: Role::NONE,
         of: InstanceOf::Vehicle,
         read: match subsystem {
             Subsystem::Power => |inputs, _| used(inputs, Subsystem::Power),

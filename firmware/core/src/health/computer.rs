@@ -4,6 +4,7 @@ use super::check::{Check, Debounce, InstanceOf, Side, Unit, When};
 use super::common::{STALE, alert};
 use super::finding::Subsystem;
 use super::inputs::Inputs;
+use super::suppression::{FAILSAFES, Group, Role};
 use crate::cause::Cause;
 use crate::latest::Reading;
 use crate::motion::{climb_mps, ground_speed_mps};
@@ -32,6 +33,7 @@ const LOAD: Check = Check {
     instances: 1,
     alarm_only: false,
     is_flag: false,
+    role: Role::NONE,
     of: InstanceOf::Vehicle,
     read: load_percent,
 };
@@ -49,6 +51,7 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         name: "autopilot_reboot",
+        role: Role::of(Group::Reboot, 0),
         is_flag: true,
         unit: Unit::of(""),
         warn: None,
@@ -62,6 +65,7 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         name: "autopilot_state",
+        role: Role::of(Group::Other, FAILSAFES | Group::Failsafe.bit()),
         is_flag: true,
         unit: Unit::of(""),
         warn: None,
@@ -73,11 +77,11 @@ pub(super) const CHECKS: &[Check] = &[
         read: state,
         ..LOAD
     },
-    alert::<{ Cause::Processor as usize }>(Subsystem::Computer),
-    alert::<{ Cause::Logging as usize }>(Subsystem::Computer),
-    alert::<{ Cause::Fence as usize }>(Subsystem::Computer),
-    alert::<{ Cause::Failsafe as usize }>(Subsystem::Computer),
-    alert::<{ Cause::Other as usize }>(Subsystem::Computer),
+    alert::<{ Cause::Processor as usize }>(Subsystem::Computer, Role::NONE),
+    alert::<{ Cause::Logging as usize }>(Subsystem::Computer, Role::NONE),
+    alert::<{ Cause::Fence as usize }>(Subsystem::Computer, Role::NONE),
+    alert::<{ Cause::Failsafe as usize }>(Subsystem::Computer, Role::of(Group::Failsafe, FAILSAFES)),
+    alert::<{ Cause::Other as usize }>(Subsystem::Computer, Role::NONE),
 ];
 
 fn load_percent(inputs: &Inputs<'_>, _: u8) -> Option<Reading> {

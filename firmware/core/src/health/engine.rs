@@ -5,6 +5,7 @@ use super::check::{Check, Debounce, InstanceOf, Side, Unit, When};
 use super::common::{STALE, due};
 use super::finding::Subsystem;
 use super::inputs::Inputs;
+use super::suppression::Role;
 use crate::latest::Reading;
 use crate::observation::Engine;
 use crate::params::Param;
@@ -27,6 +28,7 @@ const ENGINE: Check = Check {
     instances: 1,
     alarm_only: false,
     is_flag: false,
+    role: Role::NONE,
     of: InstanceOf::Vehicle,
     read: |inputs, _| read(inputs, |engine| engine.cylinder_head.map(|temperature| temperature.0)),
 };

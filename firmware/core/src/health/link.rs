@@ -4,6 +4,7 @@ use super::check::{Check, Debounce, InstanceOf, Side, Unit, When};
 use super::common::{STALE, alert};
 use super::finding::Subsystem;
 use super::inputs::Inputs;
+use super::suppression::{Group, RECEIVERS, Role};
 use crate::cause::Cause;
 use crate::latest::Reading;
 use crate::params::Param;
@@ -24,6 +25,7 @@ const HEARTBEAT: Check = Check {
     instances: 1,
     alarm_only: false,
     is_flag: false,
+    role: Role::NONE,
     of: InstanceOf::Vehicle,
     read: heartbeat_age_s,
 };
@@ -45,9 +47,10 @@ const RADIO: Check = Check {
 };
 
 pub(super) const CHECKS: &[Check] = &[
-    HEARTBEAT,
+    Check { role: Role::of(Group::Silence, 0), ..HEARTBEAT },
     Check {
         name: "frames_lost",
+        role: Role::of(Group::FramesLost, Group::Silence.bit()),
         unit: Unit::of("%"),
         warn: Some(Param::LinkLossWarn),
         critical: Some(Param::LinkLossCrit),
@@ -59,6 +62,7 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         name: "position_silent",
+        role: Role::of(Group::Other, Group::Silence.bit() | Group::FramesLost.bit() | RECEIVERS),
         warn: Some(Param::PosAgeWarn),
         critical: None,
         when: When::InFlight,
@@ -86,8 +90,11 @@ pub(super) const CHECKS: &[Check] = &[
         read: radio_margin,
         ..RADIO
     },
-    alert::<{ Cause::RemoteControl as usize }>(Subsystem::Link),
-    alert::<{ Cause::GroundStation as usize }>(Subsystem::Link),
+    alert::<{ Cause::RemoteControl as usize }>(Subsystem::Link, Role::of(Group::FailsafeCause, 0)),
+    alert::<{ Cause::GroundStation as usize }>(
+        Subsystem::Link,
+        Role::of(Group::FailsafeCause, Group::Silence.bit()),
+    ),
 ];
 
 fn heartbeat_age_s(inputs: &Inputs<'_>, _: u8) -> Option<Reading> {

@@ -5,6 +5,7 @@ use super::check::{Check, Debounce, InstanceOf, Side, Unit, When};
 use super::common::{STALE, alert};
 use super::finding::{Orders, Subsystem};
 use super::inputs::Inputs;
+use super::suppression::Role;
 use crate::cause::Cause;
 use crate::mishap::Kind;
 use crate::params::Param;
@@ -24,6 +25,7 @@ const FREE_FALL: Check = Check {
     instances: 1,
     alarm_only: false,
     is_flag: false,
+    role: Role::NONE,
     of: InstanceOf::Vehicle,
     read: |inputs, _| inputs.flight.reading(Kind::FreeFall, inputs.now, inputs.vehicle),
 };
@@ -66,7 +68,7 @@ pub(super) const CHECKS: &[Check] = &[
         read: |inputs, _| inputs.flight.reading(Kind::Overturned, inputs.now, inputs.vehicle),
         ..FREE_FALL
     },
-    alert::<{ Cause::Crash as usize }>(Subsystem::Mishap),
+    alert::<{ Cause::Crash as usize }>(Subsystem::Mishap, Role::NONE),
 ];
 
 /// What the text of a check orders. DISARM is ordered while it is armed, and FLY FORWARD, CLIMB of what hangs upright on rotors, has

@@ -8,7 +8,6 @@ mod attitude;
 pub mod check;
 mod common;
 mod computer;
-mod consequence;
 mod engine;
 pub mod exceedance;
 pub mod finding;
@@ -20,14 +19,15 @@ mod power;
 mod propulsion;
 mod recorder;
 mod structure;
+mod suppression;
 mod tables;
 mod vocabulary;
 
 pub use check::{CLEAR, CLEAR_MAX, CLEAR_MAX_ALWAYS, Check, Debounce, InstanceOf, Side, State, Unit, When};
 use check::{Change, How, Reported};
-pub use consequence::{Alarm, because, explains, is_of_mishap, is_with_mishap};
 pub use finding::{Finding, Level, Orders, Subsystem};
 pub use inputs::Inputs;
+pub use suppression::{Alarm, Role, explains, is_of_mishap, is_with_mishap, root_cause};
 pub use tables::{check_named, checks, instances};
 pub use vocabulary::{Said, Scope, VOCABULARY, Words, said, vocabulary};
 
@@ -36,7 +36,7 @@ use crate::params::Param;
 use crate::time::{Instant, Span};
 use alarms::{ALARMS_MAX, Alarms};
 use exceedance::Exceedances;
-use tables::{STATES, check_of, slot_of};
+use tables::{STATES, check_of};
 
 /// A vehicle that has not been heard for so long is silent.
 const SILENT: Span = Span::from_secs(5);
@@ -141,7 +141,7 @@ impl Health {
             exceedances.note(place, instance, check.side, reading.value);
         }
         let change = change?;
-        let because = self.explain(slot as u16, check, instance, change.level, inputs.now);
+        let because = self.explain(slot as u16, change.level, inputs.now);
         let finding = self.finding(check, instance, inputs, change, because);
         exceedances.change(place, check.side, &finding);
         Some(finding)
@@ -162,25 +162,16 @@ impl Health {
 
     /// The check whose alarm explains a change to a level; empty where none does. An alarm keeps its cause while that goes on and is as
     /// bad, until it rises itself.
-    fn explain(
-        &mut self,
-        slot: u16,
-        check: &Check,
-        instance: u8,
-        level: Level,
-        now: Instant,
-    ) -> &'static str {
+    fn explain(&mut self, slot: u16, level: Level, now: Instant) -> &'static str {
         let since = match self.alarms.change(slot, level, now) {
             Some(since) => since,
             None if level == Level::Stale => now,
             None => return "",
         };
-        let effect = Alarm { since, check: check.name, instance, level };
-        let cause = self.alarms.cause(slot).or_else(|| {
-            let cause =
-                consequence::because(&effect, self.standing().filter(|other| other.check != check.name))?;
-            slot_of(cause.check, cause.instance)
-        });
+        let cause = self
+            .alarms
+            .cause(slot)
+            .or_else(|| Some(root_cause(&Alarm::at(slot, level, since)?, self.standing())?.slot));
         match cause {
             Some(cause) if level == Level::Stale => self.alarms.silence(slot, cause),
             _ => self.alarms.explain(slot, cause),
@@ -189,11 +180,8 @@ impl Health {
     }
 
     /// The alarms that stand.
-    fn standing(&self) -> impl Iterator<Item = Alarm<'static>> + Clone {
-        self.alarms.iter().filter_map(|standing| {
-            let (check, instance) = check_of(standing.slot)?;
-            Some(Alarm { since: standing.since, check: check.name, instance, level: standing.level })
-        })
+    fn standing(&self) -> impl Iterator<Item = Alarm> + Clone {
+        self.alarms.iter().filter_map(|standing| Alarm::at(standing.slot, standing.level, standing.since))
     }
 
     /// An alarm, or a lack of data, that outlives the alarm that explained it, as a finding of its own.
@@ -212,8 +200,7 @@ impl Health {
 
     /// Whether something that drives the vehicle has a critical alarm.
     fn has_lost_drive(&self) -> bool {
-        self.levels()
-            .any(|(check, _, level)| level == Level::Critical && consequence::is_of_drive(check.name))
+        self.levels().any(|(check, _, level)| level == Level::Critical && suppression::is_of_drive(check))
     }
 
     /// Every check instance that has had something to say, with its level.

@@ -4,6 +4,9 @@ use super::check::{Check, Debounce, InstanceOf, Side, Unit, When};
 use super::common::{STALE, alert, px4_metric};
 use super::finding::Subsystem;
 use super::inputs::Inputs;
+use super::suppression::{
+    COMPASS, DISTURBANCES, ESTIMATORS, Group, INERTIAL, RECEIVERS, Role, TURNS, VIBRATION, WRONG_RECEIVERS,
+};
 use crate::cause::Cause;
 use crate::gnss_constellation;
 use crate::latest::Reading;
@@ -36,6 +39,7 @@ const ESTIMATOR: Check = Check {
     instances: 1,
     alarm_only: false,
     is_flag: false,
+    role: Role::NONE,
     of: InstanceOf::Vehicle,
     read: |inputs, _| estimator(inputs, EstimatorScale::Variance, largest),
 };
@@ -89,6 +93,7 @@ const STUCK: Check = Check {
 /// The estimator that flies against the second one (`ahrs2_residual`).
 const SECOND: Check = Check {
     name: "ahrs2_tilt",
+    role: Role::of(Group::Other, DISTURBANCES | ESTIMATORS),
     unit: Unit::of("deg"),
     warn: Some(Param::Ahrs2TiltWarn),
     hysteresis: 2.0,
@@ -101,11 +106,12 @@ const SECOND: Check = Check {
 };
 
 pub(super) const CHECKS: &[Check] = &[
-    ESTIMATOR,
+    Check { role: Role::of(Group::Ekf, DISTURBANCES | Group::EkfClimb.bit()), ..ESTIMATOR },
     Check {
         // ArduPilot's failsafe wants two of compass, velocity and position beyond the limit; where nothing hovers there is none:
         // a plane flies on by its airspeed.
         name: "ekf_failsafe",
+        role: Role::of(Group::Ekf, DISTURBANCES | Group::EkfClimb.bit()),
         warn: None,
         critical: Some(Param::EkfVarCrit),
         read: |inputs, _| {
@@ -116,11 +122,13 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         name: "ekf_compass",
+        role: Role::of(Group::Sensor, COMPASS | Group::CompassUse.bit() | TURNS),
         read: |inputs, _| estimator(inputs, EstimatorScale::Variance, |estimator| estimator.compass),
         ..ESTIMATOR
     },
     Check {
         name: "ekf_test_ratio",
+        role: Role::of(Group::Ekf, DISTURBANCES | Group::EkfClimb.bit()),
         warn: Some(Param::EkfRatioWarn),
         critical: Some(Param::EkfRatioCrit),
         read: |inputs, _| estimator(inputs, EstimatorScale::TestRatio, largest),
@@ -128,6 +136,7 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         name: "ekf_mag_ratio",
+        role: Role::of(Group::Sensor, COMPASS | Group::CompassUse.bit() | TURNS),
         warn: Some(Param::EkfRatioWarn),
         critical: Some(Param::EkfRatioCrit),
         read: |inputs, _| estimator(inputs, EstimatorScale::TestRatio, |estimator| estimator.compass),
@@ -137,6 +146,7 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         name: "compass_unused",
+        role: Role::of(Group::CompassUse, COMPASS | TURNS),
         is_flag: true,
         warn: Some(Param::AlertWarn),
         // That it is used says nothing about how well it is.
@@ -144,9 +154,10 @@ pub(super) const CHECKS: &[Check] = &[
         read: |inputs, _| inputs.derived.crosschecks().compass_unused(inputs.now),
         ..ESTIMATOR
     },
-    MISMATCH,
+    Check { role: Role::of(Group::AccelMismatch, Group::AccelFault.bit() | VIBRATION), ..MISMATCH },
     Check {
         name: "gyro_mismatch",
+        role: Role::of(Group::GyroMismatch, Group::GyroFault.bit() | VIBRATION),
         unit: Unit::of("rad/s"),
         warn: Some(Param::GyroMismWarn),
         hysteresis: 0.02,
@@ -156,6 +167,7 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         name: "gyro_noise",
+        role: Role::of(Group::GyroNoise, 0),
         unit: Unit::of("rad/s"),
         warn: Some(Param::GyroNoiseWarn),
         hysteresis: 0.05,
@@ -168,6 +180,7 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         name: "imu_gps",
+        role: Role::of(Group::ImuGnss, WRONG_RECEIVERS | INERTIAL | VIBRATION),
         warn: Some(Param::ImuGpsWarn),
         hysteresis: 0.3,
         instances: 1,
@@ -178,6 +191,7 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         name: "compass_mismatch",
+        role: Role::of(Group::CompassMismatch, Group::CompassFault.bit()),
         unit: Unit::of("%"),
         warn: Some(Param::MagMismWarn),
         hysteresis: 5.0,
@@ -187,6 +201,7 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         name: "compass_heading",
+        role: Role::of(Group::CompassUse, COMPASS | TURNS),
         unit: Unit::of("deg"),
         warn: Some(Param::MagHeadWarn),
         hysteresis: 3.0,
@@ -198,6 +213,7 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         name: "baro_mismatch",
+        role: Role::of(Group::Sensor, Group::BaroFault.bit()),
         unit: Unit::of("m"),
         warn: Some(Param::BaroMismWarn),
         hysteresis: 1.0,
@@ -207,6 +223,7 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         name: "baro_height",
+        role: Role::of(Group::Sensor, Group::BaroFault.bit() | RECEIVERS),
         unit: Unit::of("m"),
         warn: Some(Param::BaroGpsWarn),
         hysteresis: 1.0,
@@ -218,6 +235,7 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         name: "baro_noise",
+        role: Role::of(Group::Sensor, Group::BaroFault.bit() | Group::ImuGnss.bit()),
         unit: Unit::of("m"),
         warn: Some(Param::BaroNoiseWarn),
         hysteresis: 0.5,
@@ -229,6 +247,7 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         name: "ekf_climb",
+        role: Role::of(Group::EkfClimb, DISTURBANCES),
         unit: Unit::of("m/s"),
         warn: Some(Param::EkfClimbWarn),
         critical: Some(Param::EkfClimbCrit),
@@ -258,27 +277,40 @@ pub(super) const CHECKS: &[Check] = &[
         read: |inputs, _| residual(inputs, Comparison::Ahrs2Position),
         ..SECOND
     },
-    STUCK,
-    Check { name: "gyro_stuck", read: |inputs, sensor| stuck(inputs, Kind::Gyro, sensor), ..STUCK },
+    Check { role: Role::of(Group::AccelFault, 0), ..STUCK },
+    Check {
+        name: "gyro_stuck",
+        role: Role::of(Group::GyroFault, 0),
+        read: |inputs, sensor| stuck(inputs, Kind::Gyro, sensor),
+        ..STUCK
+    },
     Check {
         name: "compass_stuck",
+        role: Role::of(Group::CompassFault, 0),
         // What changed all compasses is in one message up to 0.2 s before another.
         debounce_warn: Debounce::millis(300),
         read: |inputs, sensor| stuck(inputs, Kind::Compass, sensor),
         ..STUCK
     },
-    Check { name: "baro_stuck", read: |inputs, sensor| stuck(inputs, Kind::Barometer, sensor), ..STUCK },
+    Check {
+        name: "baro_stuck",
+        role: Role::of(Group::BaroFault, 0),
+        read: |inputs, sensor| stuck(inputs, Kind::Barometer, sensor),
+        ..STUCK
+    },
     Check {
         name: "gps_stuck",
+        role: Role::of(Group::GnssFrozen, 0),
         instances: RECEIVERS_MAX as u8,
         // It goes by how far the vehicle moved.
         of: InstanceOf::Vehicle,
         read: |inputs, receiver| inputs.derived.crosschecks().receiver_stuck(inputs.now, receiver),
         ..STUCK
     },
-    Check { debounce_warn: RECEIVER_SAYS, ..GNSS },
+    Check { role: Role::of(Group::GnssQuality, Group::GnssLost.bit()), debounce_warn: RECEIVER_SAYS, ..GNSS },
     Check {
         name: "gps_sats_fall",
+        role: Role::of(Group::SatellitesLost, Group::GnssLost.bit() | Group::GnssQuality.bit()),
         unit: Unit::of("%"),
         stale_s: None,
         side: Side::Above,
@@ -296,6 +328,7 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         name: "gps_speed",
+        role: Role::of(Group::GnssMotion, Group::GnssFrozen.bit()),
         unit: Unit::of("m/s"),
         // Never stale: only what moves says something.
         stale_s: None,
@@ -307,6 +340,7 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         name: "gps_height",
+        role: Role::of(Group::GnssMotion, Group::GnssFrozen.bit()),
         unit: Unit::of("m"),
         stale_s: None,
         side: Side::Above,
@@ -322,6 +356,7 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         name: "gps_hdop",
+        role: Role::of(Group::GnssQuality, Group::GnssLost.bit()),
         side: Side::Above,
         warn: Some(Param::GpsHdopWarn),
         hysteresis: 0.1,
@@ -335,6 +370,10 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         name: "gps_hdop_rise",
+        role: Role::of(
+            Group::GnssWord,
+            Group::GnssLost.bit() | Group::GnssQuality.bit() | Group::SatellitesLost.bit(),
+        ),
         unit: Unit::of("times"),
         stale_s: None,
         side: Side::Above,
@@ -348,6 +387,7 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         name: "gps_accuracy",
+        role: Role::of(Group::GnssQuality, Group::GnssLost.bit()),
         unit: Unit::of("m"),
         side: Side::Above,
         warn: Some(Param::GpsHaccWarn),
@@ -358,6 +398,7 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         name: "gps_fix",
+        role: Role::of(Group::GnssLost, 0),
         is_flag: true,
         warn: None,
         critical: Some(Param::GpsFixCrit),
@@ -368,6 +409,7 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         name: "gps_jamming",
+        role: Role::of(Group::GnssLost, 0),
         is_flag: true,
         side: Side::Above,
         warn: Some(Param::GpsJamWarn),
@@ -378,6 +420,7 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         name: "gps_spoofing",
+        role: Role::of(Group::GnssLost, 0),
         is_flag: true,
         side: Side::Above,
         warn: Some(Param::GpsJamWarn),
@@ -386,15 +429,21 @@ pub(super) const CHECKS: &[Check] = &[
         read: |inputs, receiver| integrity(inputs, receiver, |_, spoofing| spoofing),
         ..GNSS
     },
-    alert::<{ Cause::Gyro as usize }>(Subsystem::Navigation),
-    alert::<{ Cause::Accelerometer as usize }>(Subsystem::Navigation),
-    alert::<{ Cause::Compass as usize }>(Subsystem::Navigation),
-    alert::<{ Cause::Barometer as usize }>(Subsystem::Navigation),
-    alert::<{ Cause::Airspeed as usize }>(Subsystem::Navigation),
-    alert::<{ Cause::Gnss as usize }>(Subsystem::Navigation),
-    alert::<{ Cause::Ranging as usize }>(Subsystem::Navigation),
-    alert::<{ Cause::Terrain as usize }>(Subsystem::Navigation),
-    alert::<{ Cause::Estimator as usize }>(Subsystem::Navigation),
+    alert::<{ Cause::Gyro as usize }>(Subsystem::Navigation, Role::of(Group::GyroFault, 0)),
+    alert::<{ Cause::Accelerometer as usize }>(Subsystem::Navigation, Role::of(Group::AccelFault, 0)),
+    alert::<{ Cause::Compass as usize }>(Subsystem::Navigation, Role::of(Group::CompassFault, TURNS)),
+    alert::<{ Cause::Barometer as usize }>(Subsystem::Navigation, Role::of(Group::BaroFault, 0)),
+    alert::<{ Cause::Airspeed as usize }>(Subsystem::Navigation, Role::of(Group::Sensor, 0)),
+    alert::<{ Cause::Gnss as usize }>(
+        Subsystem::Navigation,
+        Role::of(Group::GnssWord, WRONG_RECEIVERS | INERTIAL | Group::ImuGnss.bit() | VIBRATION),
+    ),
+    alert::<{ Cause::Ranging as usize }>(Subsystem::Navigation, Role::NONE),
+    alert::<{ Cause::Terrain as usize }>(Subsystem::Navigation, Role::NONE),
+    alert::<{ Cause::Estimator as usize }>(
+        Subsystem::Navigation,
+        Role::of(Group::Ekf, Group::Reboot.bit() | DISTURBANCES | Group::EkfClimb.bit()),
+    ),
 ];
 
 fn residual(inputs: &Inputs<'_>, of: Comparison) -> Option<Reading> {

@@ -4,6 +4,7 @@ use super::check::{Check, Debounce, InstanceOf, Side, Unit, When};
 use super::common::{STALE, STALE_SLOW, alert, departure, due};
 use super::finding::Subsystem;
 use super::inputs::Inputs;
+use super::suppression::{Group, Role};
 use crate::baseline::Quantity;
 use crate::cause::Cause;
 use crate::latest::{Latest, Reading};
@@ -28,14 +29,16 @@ const BATTERY: Check = Check {
     instances: BATTERIES,
     alarm_only: false,
     is_flag: false,
+    role: Role::NONE,
     of: InstanceOf::Supply,
     read: remaining_percent,
 };
 
 pub(super) const CHECKS: &[Check] = &[
-    BATTERY,
+    Check { role: Role::of(Group::Battery, 0), ..BATTERY },
     Check {
         name: "cell_voltage",
+        role: Role::of(Group::Battery, 0),
         unit: Unit::of("V"),
         warn: Some(Param::CellVoltWarn),
         critical: Some(Param::CellVoltCrit),
@@ -49,6 +52,7 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         name: "cell_deviation",
+        role: Role::of(Group::FailsafeCause, 0),
         unit: Unit::of("V"),
         side: Side::Above,
         warn: Some(Param::CellDevWarn),
@@ -106,6 +110,7 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         name: "batt_fault",
+        role: Role::of(Group::FailsafeCause, 0),
         is_flag: true,
         unit: Unit::of(""),
         side: Side::Above,
@@ -130,6 +135,7 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         name: "batt_state",
+        role: Role::of(Group::BatteryState, Group::Battery.bit()),
         is_flag: true,
         unit: Unit::of(""),
         side: Side::Above,
@@ -180,7 +186,10 @@ pub(super) const CHECKS: &[Check] = &[
         ..BATTERY
     },
     Check { name: "battery_due", ..due(Subsystem::Power) },
-    alert::<{ Cause::Power as usize }>(Subsystem::Power),
+    alert::<{ Cause::Power as usize }>(
+        Subsystem::Power,
+        Role::of(Group::FailsafeCause, Group::Battery.bit() | Group::BatteryState.bit()),
+    ),
 ];
 
 /// What the battery feeds that a check is of.

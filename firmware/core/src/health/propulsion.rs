@@ -4,6 +4,7 @@ use super::check::{Check, Debounce, InstanceOf, Side, Unit, When};
 use super::common::{STALE_SLOW, alert, departure, due, heavier, takes_more};
 use super::finding::Subsystem;
 use super::inputs::Inputs;
+use super::suppression::{DRIVE, GYROS, Group, RATES, Role};
 use crate::baseline::{OUTPUTS_MAX, Quantity};
 use crate::cause::Cause;
 use crate::latest::Reading;
@@ -28,6 +29,7 @@ const ESC: Check = Check {
     instances: MOTORS_MAX as u8,
     alarm_only: false,
     is_flag: false,
+    role: Role::NONE,
     of: InstanceOf::Motor,
     read: |inputs, motor| inputs.derived.esc_silence(inputs.now, motor),
 };
@@ -63,7 +65,7 @@ const TREND: Check = Check {
 };
 
 pub(super) const CHECKS: &[Check] = &[
-    ESC,
+    Check { role: Role::of(Group::EscTelemetry, Group::Reboot.bit()), ..ESC },
     Check {
         name: "esc_temperature",
         unit: Unit::of("degC"),
@@ -79,6 +81,7 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         name: "esc_failure",
+        role: Role::of(Group::Drive, 0),
         is_flag: true,
         unit: Unit::of(""),
         warn: Some(Param::EscFailWarn),
@@ -102,6 +105,7 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         name: "motor_loss",
+        role: Role::of(Group::MotorLoss, 0),
         unit: Unit::of("%"),
         side: Side::Below,
         warn: None,
@@ -117,6 +121,7 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         name: "motor_imbalance",
+        role: Role::of(Group::MotorOutput, Group::MotorLoss.bit()),
         unit: Unit::of("%"),
         warn: Some(Param::MotImbalWarn),
         critical: Some(Param::MotImbalCrit),
@@ -133,6 +138,7 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         name: "motor_output",
+        role: Role::of(Group::MotorOutput, Group::MotorLoss.bit()),
         unit: Unit::of("%"),
         warn: Some(Param::MotOutWarn),
         critical: Some(Param::MotOutCrit),
@@ -147,6 +153,7 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         name: "motor_off",
+        role: Role::of(Group::MotorOutput, Group::MotorLoss.bit()),
         unit: Unit::of(""),
         is_flag: true,
         warn: Some(Param::AlertWarn),
@@ -163,6 +170,7 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         name: "thrust_lost",
+        role: Role::of(Group::Other, DRIVE | Group::EscTelemetry.bit() | RATES | Group::EkfClimb.bit()),
         unit: Unit::of("s"),
         warn: Some(Param::ThrustWarn),
         critical: None,
@@ -173,10 +181,21 @@ pub(super) const CHECKS: &[Check] = &[
         read: |inputs, _| inputs.derived.crosschecks().full_in_vain(),
         ..ESC
     },
-    Check { name: "roll_rate", read: |inputs, _| rate_off_deg_s(inputs, 0), ..RATE },
-    Check { name: "pitch_rate", read: |inputs, _| rate_off_deg_s(inputs, 1), ..RATE },
+    Check {
+        name: "roll_rate",
+        role: Role::of(Group::RollRate, DRIVE | GYROS),
+        read: |inputs, _| rate_off_deg_s(inputs, 0),
+        ..RATE
+    },
+    Check {
+        name: "pitch_rate",
+        role: Role::of(Group::PitchRate, DRIVE | GYROS),
+        read: |inputs, _| rate_off_deg_s(inputs, 1),
+        ..RATE
+    },
     Check {
         name: "motor_trend",
+        role: Role::of(Group::MotorTrend, 0),
         warn: Some(Param::TrdEscWarn),
         critical: Some(Param::TrdEscCrit),
         hysteresis: 1.0,
@@ -184,11 +203,19 @@ pub(super) const CHECKS: &[Check] = &[
         read: motor_departure,
         ..TREND
     },
-    TREND,
-    Check { name: "power_trend", read: |inputs, _| takes_more(inputs, Quantity::HoverPower), ..TREND },
+    Check { role: Role::of(Group::ThrottleTrend, Group::MotorTrend.bit()), ..TREND },
+    Check {
+        name: "power_trend",
+        role: Role::of(Group::Other, Group::MotorTrend.bit() | Group::ThrottleTrend.bit()),
+        read: |inputs, _| takes_more(inputs, Quantity::HoverPower),
+        ..TREND
+    },
     Check { name: "weight_trend", critical: None, read: |inputs, _| heavier(inputs), ..TREND },
     Check { name: "drive_due", ..due(Subsystem::Propulsion) },
-    alert::<{ Cause::Propulsion as usize }>(Subsystem::Propulsion),
+    alert::<{ Cause::Propulsion as usize }>(
+        Subsystem::Propulsion,
+        Role::of(Group::Drive, Group::MotorLoss.bit() | Group::MotorOutput.bit()),
+    ),
 ];
 
 /// What the outputs say of a motor, as a check's value.

@@ -4,6 +4,7 @@ use super::check::{Check, Debounce, InstanceOf, Side, Unit, When};
 use super::common::due;
 use super::finding::Subsystem;
 use super::inputs::Inputs;
+use super::suppression::{Group, Role};
 use crate::latest::Reading;
 use crate::params::Param;
 use crate::status::Recording;
@@ -23,14 +24,16 @@ const STATE: Check = Check {
     instances: 1,
     alarm_only: false,
     is_flag: false,
+    role: Role::NONE,
     of: InstanceOf::Vehicle,
     read: stopped_rank,
 };
 
 pub(super) const CHECKS: &[Check] = &[
-    Check { is_flag: true, ..STATE },
+    Check { role: Role::of(Group::Recording, 0), is_flag: true, ..STATE },
     Check {
         name: "record_queue",
+        role: Role::of(Group::Other, Group::Recording.bit()),
         unit: Unit::of("%"),
         warn: Some(Param::RecQueueWarn),
         critical: Some(Param::RecQueueCrit),
@@ -42,6 +45,7 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         name: "record_lost",
+        role: Role::of(Group::Other, Group::Recording.bit()),
         unit: Unit::of("frames"),
         warn: Some(Param::RecLostWarn),
         critical: None,
@@ -51,6 +55,7 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         name: "card_stall",
+        role: Role::of(Group::Other, Group::Recording.bit()),
         unit: Unit::of("ms"),
         warn: Some(Param::RecStallWarn),
         critical: Some(Param::RecStallCrit),
@@ -61,6 +66,7 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         name: "card_errors",
+        role: Role::of(Group::Other, Group::Recording.bit()),
         warn: Some(Param::RecErrWarn),
         critical: None,
         debounce_warn: Debounce::NONE,

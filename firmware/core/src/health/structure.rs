@@ -4,6 +4,7 @@ use super::check::{Check, Debounce, InstanceOf, Side, Unit, When};
 use super::common::{STALE, alert, departure, due, px4_metric};
 use super::finding::Subsystem;
 use super::inputs::Inputs;
+use super::suppression::{DRIVE, Group, INERTIAL, Role, SHAKING};
 use crate::baseline::Quantity;
 use crate::cause::Cause;
 use crate::latest::Reading;
@@ -25,14 +26,16 @@ const VIBRATION: Check = Check {
     instances: 1,
     alarm_only: false,
     is_flag: false,
+    role: Role::NONE,
     of: InstanceOf::Vehicle,
     read: per_axis,
 };
 
 pub(super) const CHECKS: &[Check] = &[
-    VIBRATION,
+    Check { role: Role::of(Group::Vibration, 0), ..VIBRATION },
     Check {
         name: "vibration_px4",
+        role: Role::of(Group::Vibration, 0),
         warn: Some(Param::VibePx4Warn),
         critical: Some(Param::VibePx4Crit),
         hysteresis: 0.5,
@@ -41,6 +44,7 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         name: "vibration_rise",
+        role: Role::of(Group::Shaking, DRIVE | Group::EscTelemetry.bit() | Group::Vibration.bit()),
         unit: Unit::of("times"),
         warn: Some(Param::VibeRiseWarn),
         critical: None,
@@ -55,6 +59,7 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         name: "clipping",
+        role: Role::of(Group::Shaking, Group::Vibration.bit()),
         unit: Unit::of(""),
         warn: Some(Param::ClipWarn),
         critical: Some(Param::ClipCrit),
@@ -67,6 +72,7 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         name: "load_factor",
+        role: Role::of(Group::Other, SHAKING),
         unit: Unit::of("g"),
         warn: Some(Param::LoadFacWarn),
         critical: Some(Param::LoadFacCrit),
@@ -97,7 +103,10 @@ pub(super) const CHECKS: &[Check] = &[
         ..VIBRATION
     },
     Check { name: "airframe_due", ..due(Subsystem::Structure) },
-    alert::<{ Cause::Vibration as usize }>(Subsystem::Structure),
+    alert::<{ Cause::Vibration as usize }>(
+        Subsystem::Structure,
+        Role::of(Group::VibrationWord, Group::Vibration.bit() | INERTIAL | Group::ImuGnss.bit()),
+    ),
 ];
 
 fn per_axis(inputs: &Inputs<'_>, _: u8) -> Option<Reading> {

@@ -17,6 +17,7 @@ const CHECK: Check = Check {
     instances: 1,
     alarm_only: false,
     is_flag: false,
+    role: Role::NONE,
     of: InstanceOf::Vehicle,
     read: |_, _| None,
 };
