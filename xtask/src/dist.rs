@@ -175,7 +175,7 @@ impl Release {
     }
 }
 
-/// A flight with faults (`docs/health.md`).
+/// A flight with faults (`docs/usage.md`).
 const FAULTY: &str = "tests/flights/ap_quad_faults.tlog";
 
 /// Whether a program, as `check --json`, finds what is in the flight with faults.
