@@ -140,7 +140,10 @@ mod tests {
     #[test]
     fn no_number_of_a_state_is_shown_and_each_has_words() {
         for check in checks().filter(|check| check.is_flag) {
-            let limits = [check.warn, check.critical].into_iter().flatten().map(|limit| limit.spec().default);
+            let limits = [check.limits.warn, check.limits.critical]
+                .into_iter()
+                .flatten()
+                .map(|limit| limit.spec().default);
             let highest = limits.fold(0.0, f32::max).ceil() as u8;
             for value in 0..=highest {
                 let shown = shown(check.name, f32::from(value), 0.5);

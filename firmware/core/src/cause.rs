@@ -1,74 +1,53 @@
 //! Causes: what is wrong, as an autopilot sees it, in terms that people know; and the flags that say so by themselves.
 
-macro_rules! causes {
-    ($($(#[$doc:meta])* $name:ident, $check:literal;)*) => {
-        /// What is wrong, as the autopilot sees it.
-        #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-        #[repr(u8)]
-        pub enum Cause {
-            $($(#[$doc])* $name,)*
-        }
+use crate::numbered::numbered;
 
-        impl Cause {
-            /// All causes, by number.
-            pub const ALL: [Self; [$($check),*].len()] = [$(Self::$name),*];
-
-            /// How many there are.
-            pub const COUNT: usize = Self::ALL.len();
-
-            /// The name of the check that tells it.
-            pub const fn check(self) -> &'static str {
-                match self {
-                    $(Self::$name => $check,)*
-                }
-            }
-        }
-    };
-}
-
-causes! {
-    /// Gyro.
-    Gyro, "gyro_alert";
-    /// Accelerometer.
-    Accelerometer, "accel_alert";
-    /// Compass.
-    Compass, "compass_alert";
-    /// Barometer.
-    Barometer, "baro_alert";
-    /// Airspeed sensor.
-    Airspeed, "airspeed_alert";
-    /// Satellite navigation: no fix, glitches, jamming, spoofing.
-    Gnss, "gnss_alert";
-    /// Rangefinder, optical flow, vision, proximity.
-    Ranging, "ranging_alert";
-    /// Heights of the ground.
-    Terrain, "terrain_alert";
-    /// The estimator: it doubts or has lost attitude, velocity, position or height.
-    Estimator, "ekf_alert";
-    /// The attitude is not what it should be.
-    Attitude, "attitude_alert";
-    /// Motors, propellers, ESCs, engine.
-    Propulsion, "drive_alert";
-    /// Batteries and supplies.
-    Power, "battery_alert";
-    /// The pilot's remote control.
-    RemoteControl, "rc_alert";
-    /// Ground station or companion computer.
-    GroundStation, "gcs_alert";
-    /// The geofence is breached.
-    Fence, "fence_alert";
-    /// Vibration or clipping.
-    Vibration, "vibration_alert";
-    /// The autopilot's own log or storage.
-    Logging, "logging_alert";
-    /// The autopilot's processor or firmware.
-    Processor, "processor_alert";
-    /// A crash, a parachute, flight termination.
-    Crash, "crash_alert";
-    /// A failsafe whose cause is not said.
-    Failsafe, "failsafe_alert";
-    /// Something severe that no table knows.
-    Other, "autopilot_alert";
+numbered! {
+    /// What is wrong, as the autopilot sees it; its name is that of the check that tells it.
+    pub enum Cause {
+        /// Gyro.
+        Gyro "gyro_alert",
+        /// Accelerometer.
+        Accelerometer "accel_alert",
+        /// Compass.
+        Compass "compass_alert",
+        /// Barometer.
+        Barometer "baro_alert",
+        /// Airspeed sensor.
+        Airspeed "airspeed_alert",
+        /// Satellite navigation: no fix, glitches, jamming, spoofing.
+        Gnss "gnss_alert",
+        /// Rangefinder, optical flow, vision, proximity.
+        Ranging "ranging_alert",
+        /// Heights of the ground.
+        Terrain "terrain_alert",
+        /// The estimator: it doubts or has lost attitude, velocity, position or height.
+        Estimator "ekf_alert",
+        /// The attitude is not what it should be.
+        Attitude "attitude_alert",
+        /// Motors, propellers, ESCs, engine.
+        Propulsion "drive_alert",
+        /// Batteries and supplies.
+        Power "battery_alert",
+        /// The pilot's remote control.
+        RemoteControl "rc_alert",
+        /// Ground station or companion computer.
+        GroundStation "gcs_alert",
+        /// The geofence is breached.
+        Fence "fence_alert",
+        /// Vibration or clipping.
+        Vibration "vibration_alert",
+        /// The autopilot's own log or storage.
+        Logging "logging_alert",
+        /// The autopilot's processor or firmware.
+        Processor "processor_alert",
+        /// A crash, a parachute, flight termination.
+        Crash "crash_alert",
+        /// A failsafe whose cause is not said.
+        Failsafe "failsafe_alert",
+        /// Something severe that no table knows.
+        Other "autopilot_alert",
+    }
 }
 
 /// What the autopilot says once, in a text or an event.

@@ -6,6 +6,7 @@
 
 use crate::bytes::{Fields, Item, Unreadable, fields};
 use crate::health::finding::Subsystem;
+use crate::numbered::numbered;
 use crate::observation::MOTORS_MAX;
 use crate::params::{Param, Params};
 use crate::usage::{UsageCounter, Wear};
@@ -44,65 +45,33 @@ impl Label {
     }
 }
 
-/// What a component is. The numbers are those of `CMPn_KIND`, and are stored.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[repr(u8)]
-pub enum Kind {
-    /// No component.
-    #[default]
-    None = 0,
-    /// The whole airframe.
-    Airframe = 1,
-    /// A battery, by its place.
-    Battery = 2,
-    /// A motor by its number, or all of them.
-    Motor = 3,
-    /// A propeller by its motor's number, or all of them.
-    Propeller = 4,
-    /// An ESC by its motor's number, or all of them.
-    Esc = 5,
-    /// The card that we record on.
-    Card = 6,
-    /// A combustion engine.
-    Engine = 7,
-    /// Anything else that wears with the hours powered.
-    Other = 8,
+numbered! {
+    /// What a component is. The numbers are those of `CMPn_KIND`, and are stored.
+    #[derive(Default)]
+    pub enum Kind {
+        /// No component.
+        #[default]
+        None "none",
+        /// The whole airframe.
+        Airframe "airframe",
+        /// A battery, by its place.
+        Battery "battery",
+        /// A motor by its number, or all of them.
+        Motor "motor",
+        /// A propeller by its motor's number, or all of them.
+        Propeller "propeller",
+        /// An ESC by its motor's number, or all of them.
+        Esc "esc",
+        /// The card that we record on.
+        Card "card",
+        /// A combustion engine.
+        Engine "engine",
+        /// Anything else that wears with the hours powered.
+        Other "other",
+    }
 }
 
 impl Kind {
-    /// All kinds, by number.
-    pub const ALL: [Self; 9] = [
-        Self::None,
-        Self::Airframe,
-        Self::Battery,
-        Self::Motor,
-        Self::Propeller,
-        Self::Esc,
-        Self::Card,
-        Self::Engine,
-        Self::Other,
-    ];
-
-    /// The kind of a number; [`Self::None`] for one that is not known.
-    pub fn from_number(number: u8) -> Self {
-        Self::ALL.get(usize::from(number)).copied().unwrap_or_default()
-    }
-
-    /// The name that reports use.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::None => "none",
-            Self::Airframe => "airframe",
-            Self::Battery => "battery",
-            Self::Motor => "motor",
-            Self::Propeller => "propeller",
-            Self::Esc => "esc",
-            Self::Card => "card",
-            Self::Engine => "engine",
-            Self::Other => "other",
-        }
-    }
-
     /// The part of the vehicle whose health it is.
     pub const fn subsystem(self) -> Option<Subsystem> {
         match self {
@@ -313,7 +282,7 @@ impl Component {
     /// Takes what its parameters say it is; `true` where that is something else than before. What it ran as the other
     /// stays.
     pub(crate) fn describe(&mut self, place: usize, wear: &Wear<'_>, params: &Params) -> bool {
-        let kind = Kind::from_number(Setting::Kind.of(place, params) as u8);
+        let kind = Kind::from_number(Setting::Kind.of(place, params) as u8).unwrap_or_default();
         let number = (Setting::Number.of(place, params) as u8).min(MOTORS_MAX as u8);
         if (kind, number) == (self.kind, self.number) {
             return false;
@@ -382,7 +351,7 @@ impl Item for Component {
         let mut ran = [*powered_s, *flight_s, *motor_s].map(|seconds| libm::round(seconds * 10.0) as i32);
         let mut flown = *flights as i32;
         fields!(fields: kind, self.number, self.replaced, self.name.0, self.serial.0, ran, flown, cycles, self.as_of);
-        self.kind = Kind::from_number(kind);
+        self.kind = Kind::from_number(kind).unwrap_or_default();
         [self.name, self.serial] = [self.name, self.serial].map(|label| Label::of(label.0.into_iter()));
         [*powered_s, *flight_s, *motor_s] = ran.map(|tenths| f64::from(tenths) / 10.0);
         *flights = f64::from(flown);

@@ -1,6 +1,7 @@
 //! Exposure: how long each quantity that ages a part stood in which range, in this session and over the airframe's life.
 
 use crate::bytes::{Fields, Item, Unreadable, fields};
+use crate::numbered::numbered;
 use crate::time::{Instant, Span};
 use crate::units::Celsius;
 use crate::vehicle::Vehicle;
@@ -12,43 +13,23 @@ const FRESH: Span = Span::from_secs(5);
 /// Hotter than anything that still measures: garbage.
 const CELSIUS_MAX: f32 = 1_000.0;
 
-/// A quantity that ages a part.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[repr(u8)]
-pub enum Quantity {
-    /// The hottest ESC.
-    EscTemperature = 0,
-    /// The hottest battery.
-    BatteryTemperature = 1,
-    /// The autopilot's processor.
-    McuTemperature = 2,
-    /// Vibration while armed, on the autopilot's own scale.
-    Vibration = 3,
-    /// The current of all batteries together while armed.
-    Current = 4,
+numbered! {
+    /// A quantity that ages a part.
+    pub enum Quantity {
+        /// The hottest ESC.
+        EscTemperature "esc_temperature",
+        /// The hottest battery.
+        BatteryTemperature "battery_temperature",
+        /// The autopilot's processor.
+        McuTemperature "mcu_temperature",
+        /// Vibration while armed, on the autopilot's own scale.
+        Vibration "vibration",
+        /// The current of all batteries together while armed.
+        Current "current",
+    }
 }
 
 impl Quantity {
-    /// All quantities, by number.
-    pub const ALL: [Self; 5] = [
-        Self::EscTemperature,
-        Self::BatteryTemperature,
-        Self::McuTemperature,
-        Self::Vibration,
-        Self::Current,
-    ];
-
-    /// The name that reports use.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::EscTemperature => "esc_temperature",
-            Self::BatteryTemperature => "battery_temperature",
-            Self::McuTemperature => "mcu_temperature",
-            Self::Vibration => "vibration",
-            Self::Current => "current",
-        }
-    }
-
     /// The unit of its ranges, as names spell it.
     pub const fn unit(self) -> &'static str {
         match self {

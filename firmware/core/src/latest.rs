@@ -45,6 +45,12 @@ impl<T> Latest<T> {
     pub fn within(&self, now: Instant, limit: Span) -> Option<&T> {
         self.slot.as_ref().filter(|(at, _)| now.since(*at) <= limit).map(|(_, value)| value)
     }
+
+    /// A figure of the value, however old.
+    pub fn read(&self, figure: impl FnOnce(&T) -> Option<f32>) -> Option<Reading> {
+        let (at, value) = self.slot.as_ref()?;
+        Some(Reading { at: *at, value: figure(value)? })
+    }
 }
 
 /// A value and when it was measured.

@@ -35,6 +35,7 @@ pub mod modes;
 pub mod monitor;
 pub mod motion;
 mod motors;
+mod numbered;
 pub mod observation;
 mod outputs;
 mod pairs;

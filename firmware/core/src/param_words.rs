@@ -19,7 +19,7 @@ pub fn short(param: Param) -> impl fmt::Display {
         };
         let name = vocabulary(check.name).map_or(check.name, |words| words.said.name);
         let level = if is_warning { "warning" } else { "critical" };
-        let side = if check.side == Side::Above { "above" } else { "below" };
+        let side = if check.limits.side == Side::Above { "above" } else { "below" };
         let state = if check.is_flag { " this state" } else { "" };
         write!(f, "{}: {level} {side}{state}", capital(name))
     })
@@ -73,8 +73,8 @@ pub fn group(param: Param) -> &'static str {
 /// The checks that a parameter limits, and whether it is the warning's limit.
 fn limits(param: Param) -> impl Iterator<Item = (&'static Check, bool)> {
     checks().filter_map(move |check| match param {
-        _ if check.warn == Some(param) => Some((check, true)),
-        _ if check.critical == Some(param) => Some((check, false)),
+        _ if check.limits.warn == Some(param) => Some((check, true)),
+        _ if check.limits.critical == Some(param) => Some((check, false)),
         _ => None,
     })
 }

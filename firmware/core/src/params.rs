@@ -28,13 +28,13 @@ pub struct ParamWords {
 }
 
 macro_rules! params {
-    ($($variant:ident $name:literal $unit:literal $default:literal $min:literal $max:literal $source:literal
-       $(is $what:literal)? $(of $($option:literal)|+)?;)*) => {
+    ($($variant:ident $name:tt $unit:literal $default:literal $min:literal $max:literal $source:literal
+       $(is $($what:literal)+)? $(of $($option:literal)|+)?;)*) => {
         /// A parameter; its number is its index in [`TABLE`].
         #[derive(Clone, Copy, Debug, PartialEq, Eq)]
         #[repr(u8)]
         pub enum Param {
-            $(#[doc = concat!("`", $name, "`: ", $source)] $variant,)*
+            $(#[doc = concat!($source, ".")] $variant,)*
         }
 
         impl Param {
@@ -52,7 +52,7 @@ macro_rules! params {
         /// What people read of all parameters, in the same order.
         pub const WORDS: &[ParamWords] = &[$(ParamWords {
             unit: $unit,
-            what: concat!($($what)?),
+            what: concat!($($($what),+)?),
             options: &[$($($option,)+)?],
             source: $source,
         },)*];
@@ -74,7 +74,30 @@ macro_rules! params {
     };
 }
 
-params! {
+/// The parameters, with the same six of each part that wears (`CMP1_KIND` and so on) between the others.
+macro_rules! with_parts {
+    (
+        { $($before:tt)* }
+        parts { $($n:literal $kind:ident $number:ident $hours:ident $flights:ident $cycles:ident $motor_hours:ident;)* }
+        { $($after:tt)* }
+    ) => {
+        params! {
+            $($before)*
+            $(
+                $kind (concat!("CMP", $n, "_KIND")) "" 0.0 0.0 8.0 "docs/usage.md" is "Part " $n ": kind" of "none" | "airframe" | "battery" | "motor" | "propeller" | "ESC" | "card" | "engine" | "other";
+                $number (concat!("CMP", $n, "_NUMBER")) "" 0.0 0.0 12.0 "which battery or motor, from 1; 0: all" is "Part " $n ": number";
+                $hours (concat!("CMP", $n, "_HOURS")) "h" 0.0 0.0 100_000.0 "limit of hours in the air (card, other: powered); 0: none" is "Part " $n ": life in hours";
+                $flights (concat!("CMP", $n, "_FLIGHTS")) "" 0.0 0.0 1_000_000.0 "limit of flights; 0: none" is "Part " $n ": life in flights";
+                $cycles (concat!("CMP", $n, "_CYCLES")) "" 0.0 0.0 100_000.0 "limit of full battery discharges; 0: none" is "Part " $n ": life in battery cycles";
+                $motor_hours (concat!("CMP", $n, "_MOT_HOURS")) "h" 0.0 0.0 100_000.0 "limit of hours that the motor turned; 0: none" is "Part " $n ": life in motor hours";
+            )*
+            $($after)*
+        }
+    };
+}
+
+with_parts! {
+{
     BatRemWarn "BAT_REM_WARN" "%" 15.0 0.0 100.0 "PX4 commander, COM_LOW_BAT (BAT_LOW_THR 15 %)";
     BatRemCrit "BAT_REM_CRIT" "%" 7.0 0.0 100.0 "PX4 commander, BAT_CRIT_THR 7 %";
     BatCells "BAT_CELLS" "" 0.0 0.0 24.0 "0: reported, of the autopilot's parameters, or of the voltage at rest where it fits one count only" is "Cells of a battery in series";
@@ -167,54 +190,20 @@ params! {
     RecRoomCrit "REC_ROOM_CRIT" "%" 1.0 0.0 100.0 "of the card are left for logs: other files fill it";
     CompYellow "CMP_YELLOW" "%" 90.0 1.0 1000.0 "of the limit that trips first: soon due" is "A part's life used: warning above";
     CompRed "CMP_RED" "%" 100.0 1.0 1000.0 "of the limit that trips first: due" is "A part's life used: critical above";
-    Cmp1Kind "CMP1_KIND" "" 0.0 0.0 8.0 "docs/usage.md" is "Part 1: kind" of "none" | "airframe" | "battery" | "motor" | "propeller" | "ESC" | "card" | "engine" | "other";
-    Cmp1Number "CMP1_NUMBER" "" 0.0 0.0 12.0 "which battery or motor, from 1; 0: all" is "Part 1: number";
-    Cmp1Hours "CMP1_HOURS" "h" 0.0 0.0 100_000.0 "limit of hours in the air (card, other: powered); 0: none" is "Part 1: life in hours";
-    Cmp1Flights "CMP1_FLIGHTS" "" 0.0 0.0 1_000_000.0 "limit of flights; 0: none" is "Part 1: life in flights";
-    Cmp1Cycles "CMP1_CYCLES" "" 0.0 0.0 100_000.0 "limit of full battery discharges; 0: none" is "Part 1: life in battery cycles";
-    Cmp1MotorHours "CMP1_MOT_HOURS" "h" 0.0 0.0 100_000.0 "limit of hours that the motor turned; 0: none" is "Part 1: life in motor hours";
-    Cmp2Kind "CMP2_KIND" "" 0.0 0.0 8.0 "docs/usage.md" is "Part 2: kind" of "none" | "airframe" | "battery" | "motor" | "propeller" | "ESC" | "card" | "engine" | "other";
-    Cmp2Number "CMP2_NUMBER" "" 0.0 0.0 12.0 "which battery or motor, from 1; 0: all" is "Part 2: number";
-    Cmp2Hours "CMP2_HOURS" "h" 0.0 0.0 100_000.0 "limit of hours in the air (card, other: powered); 0: none" is "Part 2: life in hours";
-    Cmp2Flights "CMP2_FLIGHTS" "" 0.0 0.0 1_000_000.0 "limit of flights; 0: none" is "Part 2: life in flights";
-    Cmp2Cycles "CMP2_CYCLES" "" 0.0 0.0 100_000.0 "limit of full battery discharges; 0: none" is "Part 2: life in battery cycles";
-    Cmp2MotorHours "CMP2_MOT_HOURS" "h" 0.0 0.0 100_000.0 "limit of hours that the motor turned; 0: none" is "Part 2: life in motor hours";
-    Cmp3Kind "CMP3_KIND" "" 0.0 0.0 8.0 "docs/usage.md" is "Part 3: kind" of "none" | "airframe" | "battery" | "motor" | "propeller" | "ESC" | "card" | "engine" | "other";
-    Cmp3Number "CMP3_NUMBER" "" 0.0 0.0 12.0 "which battery or motor, from 1; 0: all" is "Part 3: number";
-    Cmp3Hours "CMP3_HOURS" "h" 0.0 0.0 100_000.0 "limit of hours in the air (card, other: powered); 0: none" is "Part 3: life in hours";
-    Cmp3Flights "CMP3_FLIGHTS" "" 0.0 0.0 1_000_000.0 "limit of flights; 0: none" is "Part 3: life in flights";
-    Cmp3Cycles "CMP3_CYCLES" "" 0.0 0.0 100_000.0 "limit of full battery discharges; 0: none" is "Part 3: life in battery cycles";
-    Cmp3MotorHours "CMP3_MOT_HOURS" "h" 0.0 0.0 100_000.0 "limit of hours that the motor turned; 0: none" is "Part 3: life in motor hours";
-    Cmp4Kind "CMP4_KIND" "" 0.0 0.0 8.0 "docs/usage.md" is "Part 4: kind" of "none" | "airframe" | "battery" | "motor" | "propeller" | "ESC" | "card" | "engine" | "other";
-    Cmp4Number "CMP4_NUMBER" "" 0.0 0.0 12.0 "which battery or motor, from 1; 0: all" is "Part 4: number";
-    Cmp4Hours "CMP4_HOURS" "h" 0.0 0.0 100_000.0 "limit of hours in the air (card, other: powered); 0: none" is "Part 4: life in hours";
-    Cmp4Flights "CMP4_FLIGHTS" "" 0.0 0.0 1_000_000.0 "limit of flights; 0: none" is "Part 4: life in flights";
-    Cmp4Cycles "CMP4_CYCLES" "" 0.0 0.0 100_000.0 "limit of full battery discharges; 0: none" is "Part 4: life in battery cycles";
-    Cmp4MotorHours "CMP4_MOT_HOURS" "h" 0.0 0.0 100_000.0 "limit of hours that the motor turned; 0: none" is "Part 4: life in motor hours";
-    Cmp5Kind "CMP5_KIND" "" 0.0 0.0 8.0 "docs/usage.md" is "Part 5: kind" of "none" | "airframe" | "battery" | "motor" | "propeller" | "ESC" | "card" | "engine" | "other";
-    Cmp5Number "CMP5_NUMBER" "" 0.0 0.0 12.0 "which battery or motor, from 1; 0: all" is "Part 5: number";
-    Cmp5Hours "CMP5_HOURS" "h" 0.0 0.0 100_000.0 "limit of hours in the air (card, other: powered); 0: none" is "Part 5: life in hours";
-    Cmp5Flights "CMP5_FLIGHTS" "" 0.0 0.0 1_000_000.0 "limit of flights; 0: none" is "Part 5: life in flights";
-    Cmp5Cycles "CMP5_CYCLES" "" 0.0 0.0 100_000.0 "limit of full battery discharges; 0: none" is "Part 5: life in battery cycles";
-    Cmp5MotorHours "CMP5_MOT_HOURS" "h" 0.0 0.0 100_000.0 "limit of hours that the motor turned; 0: none" is "Part 5: life in motor hours";
-    Cmp6Kind "CMP6_KIND" "" 0.0 0.0 8.0 "docs/usage.md" is "Part 6: kind" of "none" | "airframe" | "battery" | "motor" | "propeller" | "ESC" | "card" | "engine" | "other";
-    Cmp6Number "CMP6_NUMBER" "" 0.0 0.0 12.0 "which battery or motor, from 1; 0: all" is "Part 6: number";
-    Cmp6Hours "CMP6_HOURS" "h" 0.0 0.0 100_000.0 "limit of hours in the air (card, other: powered); 0: none" is "Part 6: life in hours";
-    Cmp6Flights "CMP6_FLIGHTS" "" 0.0 0.0 1_000_000.0 "limit of flights; 0: none" is "Part 6: life in flights";
-    Cmp6Cycles "CMP6_CYCLES" "" 0.0 0.0 100_000.0 "limit of full battery discharges; 0: none" is "Part 6: life in battery cycles";
-    Cmp6MotorHours "CMP6_MOT_HOURS" "h" 0.0 0.0 100_000.0 "limit of hours that the motor turned; 0: none" is "Part 6: life in motor hours";
-    Cmp7Kind "CMP7_KIND" "" 0.0 0.0 8.0 "docs/usage.md" is "Part 7: kind" of "none" | "airframe" | "battery" | "motor" | "propeller" | "ESC" | "card" | "engine" | "other";
-    Cmp7Number "CMP7_NUMBER" "" 0.0 0.0 12.0 "which battery or motor, from 1; 0: all" is "Part 7: number";
-    Cmp7Hours "CMP7_HOURS" "h" 0.0 0.0 100_000.0 "limit of hours in the air (card, other: powered); 0: none" is "Part 7: life in hours";
-    Cmp7Flights "CMP7_FLIGHTS" "" 0.0 0.0 1_000_000.0 "limit of flights; 0: none" is "Part 7: life in flights";
-    Cmp7Cycles "CMP7_CYCLES" "" 0.0 0.0 100_000.0 "limit of full battery discharges; 0: none" is "Part 7: life in battery cycles";
-    Cmp7MotorHours "CMP7_MOT_HOURS" "h" 0.0 0.0 100_000.0 "limit of hours that the motor turned; 0: none" is "Part 7: life in motor hours";
-    Cmp8Kind "CMP8_KIND" "" 0.0 0.0 8.0 "docs/usage.md" is "Part 8: kind" of "none" | "airframe" | "battery" | "motor" | "propeller" | "ESC" | "card" | "engine" | "other";
-    Cmp8Number "CMP8_NUMBER" "" 0.0 0.0 12.0 "which battery or motor, from 1; 0: all" is "Part 8: number";
-    Cmp8Hours "CMP8_HOURS" "h" 0.0 0.0 100_000.0 "limit of hours in the air (card, other: powered); 0: none" is "Part 8: life in hours";
-    Cmp8Flights "CMP8_FLIGHTS" "" 0.0 0.0 1_000_000.0 "limit of flights; 0: none" is "Part 8: life in flights";
-    Cmp8Cycles "CMP8_CYCLES" "" 0.0 0.0 100_000.0 "limit of full battery discharges; 0: none" is "Part 8: life in battery cycles";
-    Cmp8MotorHours "CMP8_MOT_HOURS" "h" 0.0 0.0 100_000.0 "limit of hours that the motor turned; 0: none" is "Part 8: life in motor hours";
+}
+
+parts {
+    1 Cmp1Kind Cmp1Number Cmp1Hours Cmp1Flights Cmp1Cycles Cmp1MotorHours;
+    2 Cmp2Kind Cmp2Number Cmp2Hours Cmp2Flights Cmp2Cycles Cmp2MotorHours;
+    3 Cmp3Kind Cmp3Number Cmp3Hours Cmp3Flights Cmp3Cycles Cmp3MotorHours;
+    4 Cmp4Kind Cmp4Number Cmp4Hours Cmp4Flights Cmp4Cycles Cmp4MotorHours;
+    5 Cmp5Kind Cmp5Number Cmp5Hours Cmp5Flights Cmp5Cycles Cmp5MotorHours;
+    6 Cmp6Kind Cmp6Number Cmp6Hours Cmp6Flights Cmp6Cycles Cmp6MotorHours;
+    7 Cmp7Kind Cmp7Number Cmp7Hours Cmp7Flights Cmp7Cycles Cmp7MotorHours;
+    8 Cmp8Kind Cmp8Number Cmp8Hours Cmp8Flights Cmp8Cycles Cmp8MotorHours;
+}
+
+{
     GsPath "GS_PATH" "" 1.0 0.0 2.0 "docs/companion.md" is "Where the summary for the ground station goes" of "nowhere" | "radio at the box" | "through the autopilot";
     GsBaud "GS_BAUD" "baud" 57_600.0 9_600.0 921_600.0 "what SiK radios come with" is "Rate of the ground station's port";
     GsPass "GS_PASS" "" 0.0 0.0 1.0 "what is not for us passes between ground station and autopilot" is "The radio serves the autopilot too" of "no" | "yes";
@@ -264,6 +253,7 @@ params! {
     ImuGpsWarn "IMU_GPS_WARN" "m/s2" 1.0 0.1 1000.0 "measured force, turned by the attitude, less the change of GPS velocity; up to 0.4 in healthy flights of simulators" is "Measured force less change of GPS velocity: warning above";
     GenSpeedWarn "GEN_SPEED_WARN" "rpm" 0.0 0.0 65_000.0 "by generator, below its idle speed; off until set";
     GenSpeedCrit "GEN_SPEED_CRIT" "rpm" 0.0 0.0 65_000.0 "by generator, below its idle speed; off until set";
+}
 }
 
 impl Param {

@@ -1,6 +1,6 @@
 //! Every check there is finds what it is there for, within its own debounce plus 100 ms: on either autopilot's scales,
 //! with an engine, with a second battery and with a twelfth motor.
-#![expect(clippy::unwrap_used, reason = "that is how a test fails")]
+#![expect(clippy::panic, clippy::unwrap_used, reason = "that is how a test fails")]
 
 mod common;
 
@@ -45,7 +45,7 @@ fn px4() -> Observation {
     })
 }
 
-fn fly(settings: &[(&str, f32)], fault: Fault) -> Vec<Finding> {
+fn fly(settings: &[(&str, f32)], fault: impl Fn(&mut Quad, &mut Vec<Observation>)) -> Vec<Finding> {
     let mut params = Params::defaults();
     for (name, value) in settings {
         params.set(name, *value).unwrap();
@@ -165,48 +165,6 @@ const FAULTS: &[(&str, u8, Level, Fault)] = &[
         let kind = VehicleKind::Rotorcraft;
         more.push(Observation::Heartbeat(Heartbeat { armed: true, kind, state: 5, ..Heartbeat::default() }));
     }),
-    ("battery_alert", 0, Level::Warning, |_, more| more.push(said(Cause::Power, false))),
-    ("battery_alert", 0, Level::Critical, |_, more| more.push(said(Cause::Power, true))),
-    ("drive_alert", 0, Level::Warning, |_, more| more.push(said(Cause::Propulsion, false))),
-    ("drive_alert", 0, Level::Critical, |_, more| more.push(said(Cause::Propulsion, true))),
-    ("vibration_alert", 0, Level::Warning, |_, more| more.push(said(Cause::Vibration, false))),
-    ("vibration_alert", 0, Level::Critical, |_, more| more.push(said(Cause::Vibration, true))),
-    ("gyro_alert", 0, Level::Warning, |_, more| more.push(said(Cause::Gyro, false))),
-    ("gyro_alert", 0, Level::Critical, |_, more| more.push(said(Cause::Gyro, true))),
-    ("accel_alert", 0, Level::Warning, |_, more| more.push(said(Cause::Accelerometer, false))),
-    ("accel_alert", 0, Level::Critical, |_, more| more.push(said(Cause::Accelerometer, true))),
-    ("compass_alert", 0, Level::Warning, |_, more| more.push(said(Cause::Compass, false))),
-    ("compass_alert", 0, Level::Critical, |_, more| more.push(said(Cause::Compass, true))),
-    ("baro_alert", 0, Level::Warning, |_, more| more.push(said(Cause::Barometer, false))),
-    ("baro_alert", 0, Level::Critical, |_, more| more.push(said(Cause::Barometer, true))),
-    ("airspeed_alert", 0, Level::Warning, |_, more| more.push(said(Cause::Airspeed, false))),
-    ("airspeed_alert", 0, Level::Critical, |_, more| more.push(said(Cause::Airspeed, true))),
-    ("gnss_alert", 0, Level::Warning, |_, more| more.push(said(Cause::Gnss, false))),
-    ("gnss_alert", 0, Level::Critical, |_, more| more.push(said(Cause::Gnss, true))),
-    ("ranging_alert", 0, Level::Warning, |_, more| more.push(said(Cause::Ranging, false))),
-    ("ranging_alert", 0, Level::Critical, |_, more| more.push(said(Cause::Ranging, true))),
-    ("terrain_alert", 0, Level::Warning, |_, more| more.push(said(Cause::Terrain, false))),
-    ("terrain_alert", 0, Level::Critical, |_, more| more.push(said(Cause::Terrain, true))),
-    ("ekf_alert", 0, Level::Warning, |_, more| more.push(said(Cause::Estimator, false))),
-    ("ekf_alert", 0, Level::Critical, |_, more| more.push(said(Cause::Estimator, true))),
-    ("rc_alert", 0, Level::Warning, |_, more| more.push(said(Cause::RemoteControl, false))),
-    ("rc_alert", 0, Level::Critical, |_, more| more.push(said(Cause::RemoteControl, true))),
-    ("gcs_alert", 0, Level::Warning, |_, more| more.push(said(Cause::GroundStation, false))),
-    ("gcs_alert", 0, Level::Critical, |_, more| more.push(said(Cause::GroundStation, true))),
-    ("processor_alert", 0, Level::Warning, |_, more| more.push(said(Cause::Processor, false))),
-    ("processor_alert", 0, Level::Critical, |_, more| more.push(said(Cause::Processor, true))),
-    ("logging_alert", 0, Level::Warning, |_, more| more.push(said(Cause::Logging, false))),
-    ("logging_alert", 0, Level::Critical, |_, more| more.push(said(Cause::Logging, true))),
-    ("fence_alert", 0, Level::Warning, |_, more| more.push(said(Cause::Fence, false))),
-    ("fence_alert", 0, Level::Critical, |_, more| more.push(said(Cause::Fence, true))),
-    ("failsafe_alert", 0, Level::Warning, |_, more| more.push(said(Cause::Failsafe, false))),
-    ("failsafe_alert", 0, Level::Critical, |_, more| more.push(said(Cause::Failsafe, true))),
-    ("autopilot_alert", 0, Level::Warning, |_, more| more.push(said(Cause::Other, false))),
-    ("autopilot_alert", 0, Level::Critical, |_, more| more.push(said(Cause::Other, true))),
-    ("attitude_alert", 0, Level::Warning, |_, more| more.push(said(Cause::Attitude, false))),
-    ("attitude_alert", 0, Level::Critical, |_, more| more.push(said(Cause::Attitude, true))),
-    ("crash_alert", 0, Level::Warning, |_, more| more.push(said(Cause::Crash, false))),
-    ("crash_alert", 0, Level::Critical, |_, more| more.push(said(Cause::Crash, true))),
     ("roll", 0, Level::Critical, |quad, _| quad.roll = -1.2),
     ("pitch", 0, Level::Critical, |_, more| {
         more.push(Observation::Attitude(Attitude { pitch: Radians(1.2), ..Attitude::default() }));
@@ -222,54 +180,13 @@ const FAULTS: &[(&str, u8, Level, Fault)] = &[
 
 /// Found by scripts of their own: silence, restarts and rates in `scripted_faults.rs`, what departs from a baseline in
 /// `trends.rs`, mishaps in `mishap.rs`, what departs from its usual level in a flight in `crosscheck.rs`.
-const ELSEWHERE: [&str; 46] = [
-    "ahrs2_tilt",
-    "ahrs2_height",
-    "ahrs2_position",
-    "gps_sats_fall",
-    "gps_hdop_rise",
-    "compass_heading",
-    "gps_height",
-    "position_silent",
-    "baro_height",
-    "baro_noise",
-    "ekf_climb",
-    "accel_stuck",
-    "gyro_stuck",
-    "compass_stuck",
-    "baro_stuck",
-    "gps_stuck",
-    "thrust_lost",
-    "roll_rate",
-    "pitch_rate",
-    "accel_mismatch",
-    "gyro_mismatch",
-    "imu_gps",
-    "compass_mismatch",
-    "baro_mismatch",
-    "compass_unused",
-    "vibration_rise",
-    "motor_output",
-    "motor_off",
-    "esc_silent",
-    "esc_errors",
-    "heartbeat",
-    "autopilot_reboot",
-    "batt_resistance",
-    "batt_capacity",
-    "gps_speed",
-    "motor_trend",
-    "throttle_trend",
-    "power_trend",
-    "weight_trend",
-    "vibration_trend",
-    "free_fall",
-    "impact",
-    "tumbling",
-    "disarmed_in_air",
-    "sinking",
-    "overturned",
-];
+const ELSEWHERE: &str = "\
+    ahrs2_tilt ahrs2_height ahrs2_position gps_sats_fall gps_hdop_rise compass_heading gps_height \
+    position_silent baro_height baro_noise ekf_climb accel_stuck gyro_stuck compass_stuck baro_stuck \
+    gps_stuck thrust_lost roll_rate pitch_rate accel_mismatch gyro_mismatch imu_gps compass_mismatch \
+    baro_mismatch compass_unused vibration_rise motor_output motor_off esc_silent esc_errors heartbeat \
+    autopilot_reboot batt_resistance batt_capacity gps_speed motor_trend throttle_trend power_trend \
+    weight_trend vibration_trend free_fall impact tumbling disarmed_in_air sinking overturned";
 
 /// What is due, and the kind of component (`CMP1_KIND`) that is.
 const DUE: [(&str, f32); 8] = [
@@ -292,12 +209,6 @@ fn cells(quad: &mut Quad, lowest_v: f32) {
 
 fn rail(more: &mut Vec<Observation>, volts: f32) {
     more.push(Observation::Rails(Rails { vcc: Some(Volts(volts)), servo: None }));
-}
-
-/// What the autopilot says in a text or an event.
-fn said(cause: Cause, critical: bool) -> Observation {
-    let urgency = if critical { Urgency::Critical } else { Urgency::Warning };
-    Observation::Alert(Alert { cause, urgency })
 }
 
 fn esc(quad: &mut Quad, motor: usize) -> &mut Esc {
@@ -349,23 +260,33 @@ fn a_generator_is_judged_once_it_has_run_and_until_it_is_switched_off() {
     assert_eq!(generator_levels(false, &[runs, stands, starts]), [], "disarmed");
 }
 
+/// A fault is found as this level, after the debounce of its check.
+fn assert_found(name: &str, instance: u8, level: Level, fault: &dyn Fn(&mut Quad, &mut Vec<Observation>)) {
+    let check = health::check_named(name).expect(name);
+    let findings = fly(&LIMITS, fault);
+    let mut mine = findings.iter().filter(|finding| (finding.check, finding.instance) == (name, instance));
+    let found = mine.find(|finding| finding.level == level);
+    let found = found.unwrap_or_else(|| panic!("{name} {instance} never {level:?}: {findings:?}"));
+    let debounce_ms = check.debounce[usize::from(level == Level::Critical)].span().as_millis();
+    let after_ms = found.at.as_millis().saturating_sub(FAULT_MS);
+    // Speeds that are compared are smoothed: half again above the others is 30 % above after 0.9 s.
+    let smoothing_ms = if name == "motor_imbalance" { 900 } else { 0 };
+    let in_time = debounce_ms..=debounce_ms + smoothing_ms + 100;
+    assert!(found.at.as_millis() >= FAULT_MS, "{name} {instance} before anything was wrong: {found:?}");
+    assert!(in_time.contains(&after_ms), "{name} {instance} {level:?} after {after_ms} ms: {in_time:?}");
+}
+
 #[test]
 fn every_check_finds_what_it_is_there_for_in_time() {
-    for &(name, instance, level, fault) in FAULTS {
-        let check = checks().find(|check| check.name == name).expect(name);
-        let findings = fly(&LIMITS, fault);
-        let mut mine =
-            findings.iter().filter(|finding| (finding.check, finding.instance) == (name, instance));
-        let found = mine.find(|finding| finding.level == level);
-        let found = found.unwrap_or_else(|| panic!("{name} {instance} never {level:?}: {findings:?}"));
-        let debounce =
-            if level == Level::Critical { check.debounce_critical } else { check.debounce_warn }.span();
-        let after_ms = found.at.as_millis().saturating_sub(FAULT_MS);
-        // Speeds that are compared are smoothed: half again above the others is 30 % above after 0.9 s.
-        let smoothing_ms = if name == "motor_imbalance" { 900 } else { 0 };
-        let in_time = debounce.as_millis()..=debounce.as_millis() + smoothing_ms + 100;
-        assert!(found.at.as_millis() >= FAULT_MS, "{name} {instance} before anything was wrong: {found:?}");
-        assert!(in_time.contains(&after_ms), "{name} {instance} {level:?} after {after_ms} ms: {in_time:?}");
+    for (name, instance, level, fault) in FAULTS {
+        assert_found(name, *instance, *level, fault);
+    }
+    for cause in Cause::ALL {
+        for (urgency, level) in [(Urgency::Warning, Level::Warning), (Urgency::Critical, Level::Critical)] {
+            assert_found(cause.name(), 0, level, &|_, more| {
+                more.push(Observation::Alert(Alert { cause, urgency }));
+            });
+        }
     }
 }
 
@@ -451,7 +372,12 @@ fn there_is_no_check_that_nothing_shows_to_work() {
     for check in checks() {
         let here = FAULTS.iter().any(|(name, ..)| *name == check.name);
         let due = DUE.iter().any(|(name, _)| *name == check.name);
-        assert!(here || due || ELSEWHERE.contains(&check.name), "{}", check.name);
+        let alert = Cause::ALL.iter().any(|cause| cause.name() == check.name);
+        assert!(
+            here || due || alert || ELSEWHERE.split_whitespace().any(|name| name == check.name),
+            "{}",
+            check.name
+        );
     }
 }
 
@@ -478,26 +404,13 @@ fn there_are_as_many_of_each_check_as_there_may_be_of_what_it_watches() {
 }
 
 #[test]
-fn a_check_of_later_has_no_words_here() {
-    assert_eq!((health::said("of_later"), health::instances("of_later")), (None, 0), "no such check");
-}
-
-#[test]
 fn flags_that_are_not_set_and_parts_that_are_not_due_make_nothing_healthy() {
-    let flags = [
-        "batt_fault",
-        "esc_failure",
-        "autopilot_reboot",
-        "autopilot_state",
-        "compass_unused",
-        "disarmed_in_air",
-        "motor_off",
-        "position_silent",
-    ];
+    let flags = "batt_fault esc_failure autopilot_reboot autopilot_state compass_unused disarmed_in_air motor_off position_silent";
     for check in checks() {
         let due = DUE.iter().any(|(name, _)| *name == check.name);
-        let flag =
-            flags.contains(&check.name) || check.name.ends_with("_alert") || check.name.ends_with("_stuck");
+        let flag = flags.split(' ').any(|name| name == check.name)
+            || check.name.ends_with("_alert")
+            || check.name.ends_with("_stuck");
         assert_eq!(check.alarm_only, due || flag, "{}", check.name);
     }
 }

@@ -46,7 +46,6 @@ fn fly_with(params: &Params, script: impl Fn(u64, &mut Quad)) -> (Monitor, Vec<F
 
 /// The check reaches the level within its debounce plus 100 ms, is the only one to complain besides `also`, and is
 /// well again once the fault has ended.
-#[track_caller]
 fn found(findings: &[Finding], check: &str, instance: u8, level: Level, debounce_ms: u64, also: &[&str]) {
     let mine = |finding: &&Finding| finding.check == check && finding.instance == instance;
     let first = findings.iter().filter(mine).find(|finding| finding.level == level);
@@ -81,27 +80,50 @@ fn a_healthy_vehicle_is_ok_as_a_whole_and_in_each_part_that_it_has() {
 }
 
 #[test]
-fn a_battery_that_collapses() {
-    let findings = fly(|_, quad| quad.battery.voltage = Some(Volts(13.2)));
-    found(&findings, "cell_voltage", 0, Level::Critical, 5_000, &[]);
-}
-
-#[test]
-fn a_battery_that_runs_empty() {
-    let findings = fly(|_, quad| quad.battery.remaining = Some(Fraction(0.05)));
-    found(&findings, "batt_remaining", 0, Level::Critical, 2_000, &[]);
-}
-
-#[test]
-fn one_esc_that_gets_hot() {
-    let findings = fly(|_, quad| quad.escs[2].as_mut().unwrap().temperature = Some(Celsius(120.0)));
-    found(&findings, "esc_temperature", 2, Level::Critical, 500, &[]);
-}
-
-#[test]
-fn one_motor_that_draws_nothing() {
-    let findings = fly(|_, quad| quad.escs[1].as_mut().unwrap().current = Some(Amperes(0.0)));
-    found(&findings, "motor_loss", 1, Level::Critical, 500, &[]);
+fn each_fault_is_found_alone_and_cleared() {
+    type Fault = fn(&mut Quad);
+    // The check, which one of several, its level, its debounce in milliseconds, and what else may complain.
+    let cases: [(Fault, &str); 17] = [
+        (|quad| quad.battery.voltage = Some(Volts(13.2)), "cell_voltage 0 critical 5000"),
+        (|quad| quad.battery.remaining = Some(Fraction(0.05)), "batt_remaining 0 critical 2000"),
+        (
+            |quad| quad.escs[2].as_mut().unwrap().temperature = Some(Celsius(120.0)),
+            "esc_temperature 2 critical 500",
+        ),
+        (|quad| quad.escs[1].as_mut().unwrap().current = Some(Amperes(0.0)), "motor_loss 1 critical 500"),
+        (
+            |quad| {
+                (quad.estimator.compass, quad.estimator.velocity) = (Some(1.2), Some(0.9));
+            },
+            "ekf_failsafe 0 critical 1000 ekf_variance ekf_compass",
+        ),
+        (|quad| quad.estimator.compass = Some(1.2), "ekf_compass 0 warning 500"),
+        (|quad| quad.integrity.jamming = 3, "gps_jamming 0 critical 1000"),
+        (|quad| quad.gnss.fix = 1, "gps_fix 0 critical 200"),
+        (|quad| quad.vibration.levels[2] = Some(70.0), "vibration 0 critical 1000 vibration_rise"),
+        (|quad| quad.acceleration_down = -45.0, "load_factor 0 critical 500"),
+        (|quad| quad.roll = 1.2, "roll 0 critical 300"),
+        (|quad| quad.system.load = Some(Fraction(0.97)), "load 0 critical 2000"),
+        (|quad| quad.lost = 0.08, "frames_lost 0 critical 2000"),
+        (|quad| quad.recorder.recording = Recording::Stopped, "recording 0 critical 1000"),
+        // Until the next heartbeat it is not known that the vehicle is disarmed, which is less than the debounce.
+        (
+            |quad| {
+                quad.armed = false;
+                quad.recorder.recording = Recording::Stopped;
+            },
+            "recording 0 warning 1000",
+        ),
+        (|quad| quad.recorder.stall = Span::from_millis(800), "card_stall 0 warning 0"),
+        (|quad| quad.recorder.room = Some(0.005), "card_room 0 critical 1000"),
+    ];
+    for (fault, expected) in cases {
+        let words: Vec<&str> = expected.split(' ').collect();
+        let [check, instance, level, debounce_ms, also @ ..] = &words[..] else { panic!("{expected}") };
+        let level = Level::ALL.into_iter().find(|known| known.name() == *level).unwrap();
+        let (instance, debounce_ms) = (instance.parse().unwrap(), debounce_ms.parse().unwrap());
+        found(&fly(|_, quad| fault(quad)), check, instance, level, debounce_ms, also);
+    }
 }
 
 #[test]
@@ -155,56 +177,6 @@ fn one_esc_that_falls_silent() {
     let last = findings.last().expect("there are some");
     assert_eq!((last.check, last.level), ("esc_silent", Level::Ok));
     assert!((END_MS + 2_000..=END_MS + 2_100).contains(&last.at.as_millis()), "{last:?}");
-}
-
-#[test]
-fn an_estimator_that_diverges() {
-    let findings = fly(|_, quad| {
-        (quad.estimator.compass, quad.estimator.velocity) = (Some(1.2), Some(0.9));
-    });
-    found(&findings, "ekf_failsafe", 0, Level::Critical, 1_000, &["ekf_variance", "ekf_compass"]);
-}
-
-#[test]
-fn one_figure_of_the_estimator_alone_is_a_warning() {
-    let findings = fly(|_, quad| quad.estimator.compass = Some(1.2));
-    found(&findings, "ekf_compass", 0, Level::Warning, 500, &[]);
-}
-
-#[test]
-fn gps_that_is_jammed() {
-    let findings = fly(|_, quad| quad.integrity.jamming = 3);
-    found(&findings, "gps_jamming", 0, Level::Critical, 1_000, &[]);
-}
-
-#[test]
-fn a_fix_that_is_lost() {
-    let findings = fly(|_, quad| quad.gnss.fix = 1);
-    found(&findings, "gps_fix", 0, Level::Critical, 200, &[]);
-}
-
-#[test]
-fn vibration() {
-    let findings = fly(|_, quad| quad.vibration.levels[2] = Some(70.0));
-    found(&findings, "vibration", 0, Level::Critical, 1_000, &["vibration_rise"]);
-}
-
-#[test]
-fn a_turn_too_tight() {
-    let findings = fly(|_, quad| quad.acceleration_down = -45.0);
-    found(&findings, "load_factor", 0, Level::Critical, 500, &[]);
-}
-
-#[test]
-fn a_vehicle_that_rolls_over() {
-    let findings = fly(|_, quad| quad.roll = 1.2);
-    found(&findings, "roll", 0, Level::Critical, 300, &[]);
-}
-
-#[test]
-fn an_overloaded_processor() {
-    let findings = fly(|_, quad| quad.system.load = Some(Fraction(0.97)));
-    found(&findings, "load", 0, Level::Critical, 2_000, &[]);
 }
 
 #[test]
@@ -282,28 +254,6 @@ fn what_comes_back_by_less_than_the_hysteresis_stays_bad() {
 }
 
 #[test]
-fn frames_that_are_lost() {
-    let findings = fly(|_, quad| quad.lost = 0.08);
-    found(&findings, "frames_lost", 0, Level::Critical, 2_000, &[]);
-}
-
-#[test]
-fn a_recorder_that_stops_while_armed() {
-    let findings = fly(|_, quad| quad.recorder.recording = Recording::Stopped);
-    found(&findings, "recording", 0, Level::Critical, 1_000, &[]);
-}
-
-#[test]
-fn a_recorder_that_stops_on_the_ground_is_a_warning() {
-    let findings = fly(|_, quad| {
-        quad.armed = false;
-        quad.recorder.recording = Recording::Stopped;
-    });
-    // Until the next heartbeat it is not known that the vehicle is disarmed, which is less than the debounce.
-    found(&findings, "recording", 0, Level::Warning, 1_000, &[]);
-}
-
-#[test]
 fn what_is_checked_before_arming_and_heights_of_the_ground_are_no_sensors() {
     assert_eq!(
         fly(|_, quad| quad.system.sensors = Some(Sensors::of(u32::MAX, u32::MAX, !(1 << 28 | 1 << 22)))),
@@ -354,24 +304,12 @@ fn a_latched_warning_whose_message_stops_comes_back_with_it_until_disarming() {
 }
 
 #[test]
-fn a_card_that_keeps_the_recorder_waiting() {
-    let findings = fly(|_, quad| quad.recorder.stall = Span::from_millis(800));
-    found(&findings, "card_stall", 0, Level::Warning, 0, &[]);
-}
-
-#[test]
 fn a_card_that_refuses_writes() {
     let findings = fly(|_, quad| quad.recorder.write_errors = 3);
     let errors = findings.iter().find(|finding| finding.check == "card_errors").expect("found");
     assert_eq!((errors.level, errors.at.as_millis()), (Level::Warning, FAULT_MS + 50), "two ticks");
     let cleared = findings.iter().rfind(|finding| finding.check == "card_errors").expect("there");
     assert_eq!(cleared.level, Level::Ok, "ten seconds without one");
-}
-
-#[test]
-fn a_card_that_is_full_of_other_files() {
-    let findings = fly(|_, quad| quad.recorder.room = Some(0.005));
-    found(&findings, "card_room", 0, Level::Critical, 1_000, &[]);
 }
 
 #[test]

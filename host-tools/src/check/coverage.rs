@@ -204,12 +204,12 @@ fn is_off(check: &Check, params: &Params) -> bool {
     let off = |param: Param| {
         let (limit, spec) = (params.get(param), param.spec());
         limit.is_nan()
-            || match check.side {
+            || match check.limits.side {
                 Side::Above => limit >= spec.max,
                 Side::Below => limit <= spec.min,
             }
     };
-    [check.warn, check.critical].into_iter().flatten().all(off)
+    [check.limits.warn, check.limits.critical].into_iter().flatten().all(off)
 }
 
 #[cfg(test)]

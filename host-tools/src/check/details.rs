@@ -200,7 +200,7 @@ impl Details {
 
     /// What the autopilot's alert was of: its words of late, and the sensors that it calls unhealthy.
     fn tell_alert(&self, check: &str, problems: &mut Problems) {
-        let Some(cause) = Cause::ALL.into_iter().find(|cause| cause.check() == check) else { return };
+        let Some(cause) = Cause::ALL.into_iter().find(|cause| cause.name() == check) else { return };
         let of = |bit: &u32| self.sensors & bit != 0 && Causes::of_sensors(*bit).has(cause);
         for bit in (0..u32::BITS).map(|bit| 1 << bit).filter(of) {
             states::sensors(bit)
@@ -328,7 +328,7 @@ mod tests {
     #[test]
     fn an_alert_that_the_estimator_raised_by_a_flag_says_so() {
         let (mut details, mut problems) = (Details::default(), Problems::default());
-        let check = Cause::Gnss.check();
+        let check = Cause::Gnss.name();
         let subsystem = hums_core::health::Subsystem::Navigation;
         let finding = Finding { subsystem, check: check.to_owned(), ..change(0, Level::Warning, 1.0) };
         problems.take(&finding, hums_core::clock::Span::ZERO);

@@ -376,7 +376,7 @@ impl Judge {
     fn sensors(&mut self, source: Source, status: &SystemStatus) {
         if self.is_vehicle(source) && self.details.sensors(status) {
             for cause in Cause::ALL {
-                self.tell(cause.check());
+                self.tell(cause.name());
             }
         }
     }
@@ -384,15 +384,15 @@ impl Judge {
     /// The estimator says what it doubts.
     fn doubts(&mut self, source: Source, estimator: &Estimator) {
         if self.is_vehicle(source) && self.details.estimator(estimator) {
-            self.tell(Cause::Gnss.check());
-            self.tell(Cause::Accelerometer.check());
+            self.tell(Cause::Gnss.name());
+            self.tell(Cause::Accelerometer.name());
         }
     }
 
     /// Somebody says in words that something is wrong.
     fn said(&mut self, at: Instant, source: Source, alert: Alert, words: String) {
         if self.is_vehicle(source) && self.details.said(at, alert, words) {
-            self.tell(alert.cause.check());
+            self.tell(alert.cause.name());
         }
     }
 

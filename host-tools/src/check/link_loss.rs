@@ -80,7 +80,7 @@ impl Verdict {
     /// As a finding; `None` where its check is off.
     pub(super) fn finding(&self, at: clock::Instant, level: Level, params: &Params) -> Option<Finding> {
         let check = checks().find(|check| check.name == self.check)?;
-        let limit = check.critical.map(|limit| params.get(limit)).filter(|limit| limit.is_finite())?;
+        let limit = check.limits.critical.map(|limit| params.get(limit)).filter(|limit| limit.is_finite())?;
         Some(Finding {
             at,
             subsystem: check.subsystem,

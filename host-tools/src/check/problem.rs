@@ -4,7 +4,6 @@ use std::collections::BTreeMap;
 
 use hums_core::clock::{Instant, Span};
 use hums_core::health::{Alarm, Level, Side, Subsystem, checks, root_cause};
-use hums_core::time;
 
 use crate::part;
 use crate::source::told::Finding;
@@ -95,7 +94,7 @@ const fn rank(level: Level) -> u8 {
 
 /// The side of a check's limits that is bad.
 pub(super) fn side(check: &str) -> Side {
-    checks().find(|known| known.name == check).map_or(Side::Above, |check| check.side)
+    checks().find(|known| known.name == check).map_or(Side::Above, |check| check.limits.side)
 }
 
 /// The worse of two values; what is no number is none.

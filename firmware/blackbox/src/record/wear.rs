@@ -141,7 +141,7 @@ impl<'a> Component<'a> {
         Self {
             why: Why::from_number(fields.u8()),
             place: fields.u8(),
-            kind: Kind::from_number(fields.u8()),
+            kind: Kind::from_number(fields.u8()).unwrap_or_default(),
             number: fields.u8(),
             status: Status::from_number(fields.u8()),
             replaced: fields.u32(),

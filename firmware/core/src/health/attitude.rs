@@ -5,7 +5,7 @@
 //! wanted one. Where nobody says what is wanted, it counts but in modes in which the pilot banks as far as he likes. What is said to
 //! be wanted and is the attitude itself, sample by sample, is no word about what is wanted.
 
-use super::check::{Check, Debounce, InstanceOf, Side, Unit, When};
+use super::check::{Check, Debounce, InstanceOf, Limits, Unit, When};
 use super::common::{STALE, alert};
 use super::finding::Subsystem;
 use super::inputs::Inputs;
@@ -28,13 +28,9 @@ const ROLL: Check = Check {
     name: "roll",
     subsystem: Subsystem::Attitude,
     unit: Unit::of("deg"),
-    side: Side::Above,
-    warn: Some(Param::TiltWarn),
-    critical: Some(Param::TiltCrit),
-    hysteresis: 5.0,
-    debounce_warn: Debounce::millis(500),
+    limits: Limits::above(Some(Param::TiltWarn), Some(Param::TiltCrit), 5.0),
+    debounce: [Debounce::millis(500), Debounce::millis(300)],
     // PX4's failure detector: FD_FAIL_R_TTRI, FD_FAIL_P_TTRI 0.3 s.
-    debounce_critical: Debounce::millis(300),
     when: When::InFlight,
     stale_s: STALE,
     instances: 1,

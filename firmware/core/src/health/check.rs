@@ -173,6 +173,44 @@ impl Debounce {
     }
 }
 
+/// The limits of a check.
+#[derive(Clone, Copy, Debug)]
+pub struct Limits {
+    /// Which side of them is bad.
+    pub side: Side,
+    /// The limit of [`Level::Warning`].
+    pub warn: Option<Param>,
+    /// The limit of [`Level::Critical`].
+    pub critical: Option<Param>,
+    /// How far back on the good side of a limit the value must be to count as good again.
+    pub hysteresis: f32,
+}
+
+impl Limits {
+    /// Values above them are bad.
+    pub(super) const fn above(warn: Option<Param>, critical: Option<Param>, hysteresis: f32) -> Self {
+        Self { side: Side::Above, warn, critical, hysteresis }
+    }
+
+    /// Values below them are bad.
+    pub(super) const fn below(warn: Option<Param>, critical: Option<Param>, hysteresis: f32) -> Self {
+        Self { side: Side::Below, warn, critical, hysteresis }
+    }
+
+    /// The values of both. A limit that is missing or off is NaN: no comparison with it is true.
+    fn values(&self, params: &Params) -> [f32; 2] {
+        [self.warn, self.critical].map(|limit| limit.map_or(f32::NAN, |param| params.get(param)))
+    }
+
+    /// Whether a value is beyond a limit, or nearer to it than a margin.
+    fn is_beyond(&self, value: f32, limit: f32, margin: f32) -> bool {
+        match self.side {
+            Side::Above => value > limit - margin,
+            Side::Below => value < limit + margin,
+        }
+    }
+}
+
 /// One check.
 #[derive(Clone, Copy, Debug)]
 pub struct Check {
@@ -182,18 +220,10 @@ pub struct Check {
     pub subsystem: Subsystem,
     /// The unit of value and limits.
     pub unit: Unit,
-    /// Which side of the limits is bad.
-    pub side: Side,
-    /// The limit of [`Level::Warning`].
-    pub warn: Option<Param>,
-    /// The limit of [`Level::Critical`].
-    pub critical: Option<Param>,
-    /// How far back on the good side of a limit the value must be to count as good again.
-    pub hysteresis: f32,
-    /// How long it must be bad before it is a warning.
-    pub debounce_warn: Debounce,
-    /// How long it must be bad before it is critical.
-    pub debounce_critical: Debounce,
+    /// Its limits.
+    pub limits: Limits,
+    /// How long it must be bad before it is a warning, and before it is critical.
+    pub debounce: [Debounce; 2],
     /// When the check applies.
     pub when: When,
     /// How old the value may be, seconds; `None` for values that are ages themselves.
@@ -333,8 +363,7 @@ impl Check {
 
     /// The limit of a level; NaN where there is none.
     pub(super) fn limit(&self, level: Level, params: &Params) -> f32 {
-        let of = |param: Option<Param>| param.map_or(f32::NAN, |param| params.get(param));
-        let (warn, critical) = (of(self.warn), of(self.critical));
+        let [warn, critical] = self.limits.values(params);
         if level == Level::Critical || warn.is_nan() { critical } else { warn }
     }
 
@@ -419,14 +448,8 @@ impl State {
         params: &Params,
     ) -> bool {
         let Reading { at, value } = reading;
-        // A limit that is NaN is off: no comparison with it is true.
-        let is_beyond = |limit: Option<Param>| {
-            limit.map(|limit| params.get(limit)).is_some_and(|limit| match check.side {
-                Side::Above => value > limit,
-                Side::Below => value < limit,
-            })
-        };
-        if !self.is_calm() || !value.is_finite() || is_beyond(check.warn) || is_beyond(check.critical) {
+        let is_beyond = |limit| check.limits.is_beyond(value, limit, 0.0);
+        if !self.is_calm() || !value.is_finite() || check.limits.values(params).into_iter().any(is_beyond) {
             return false;
         }
         let at = at.earlier(now);
@@ -532,24 +555,22 @@ impl State {
         params: &Params,
     ) -> Option<Change> {
         let level = self.level.unwrap_or(Level::Ok);
-        let warn = check.warn.map_or(f32::NAN, |param| params.get(param));
-        let critical = check.critical.map_or(f32::NAN, |param| params.get(param));
-        // A limit that is NaN is off: no comparison with it is true.
-        let beyond = |limit: f32, margin: f32| match check.side {
-            Side::Above => value > limit - margin,
-            Side::Below => value < limit + margin,
-        };
+        let [warn, critical] = check.limits.values(params);
+        let beyond = |limit: f32, margin: f32| check.limits.is_beyond(value, limit, margin);
+        let [debounce_warn, debounce_critical] = check.debounce.map(Debounce::span);
         let very_bad = self.samples.count(Samples::VERY_BAD, beyond(critical, 0.0), measured)
-            & self.very_bad.run(beyond(critical, 0.0), now, check.debounce_critical.span());
+            & self.very_bad.run(beyond(critical, 0.0), now, debounce_critical);
         // Without a warning limit there is no warning on the way to critical.
         let warned = beyond(warn, 0.0) || (!warn.is_nan() && beyond(critical, 0.0));
-        let bad = self.samples.count(Samples::BAD, warned, measured)
-            & self.bad.run(warned, now, check.debounce_warn.span());
+        let bad =
+            self.samples.count(Samples::BAD, warned, measured) & self.bad.run(warned, now, debounce_warn);
         let undecided = self.bad.is_set() || self.very_bad.is_set();
 
         let held = match level {
-            Level::Critical => beyond(critical, check.hysteresis),
-            Level::Warning => beyond(warn, check.hysteresis) || beyond(critical, check.hysteresis),
+            Level::Critical => beyond(critical, check.limits.hysteresis),
+            Level::Warning => {
+                beyond(warn, check.limits.hysteresis) || beyond(critical, check.limits.hysteresis)
+            }
             _ => false,
         };
         let better = self.better.run(!held, now, self.clear(check));

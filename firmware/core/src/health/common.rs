@@ -2,7 +2,7 @@
 
 use core::num::NonZeroU8;
 
-use super::check::{Check, Debounce, InstanceOf, Side, Unit, When};
+use super::check::{Check, Debounce, InstanceOf, Limits, Unit, When};
 use super::finding::Subsystem;
 use super::inputs::Inputs;
 use super::suppression::Role;
@@ -20,15 +20,11 @@ pub(super) const STALE_SLOW: Option<NonZeroU8> = NonZeroU8::new(12);
 /// What the autopilot itself says is wrong with `CAUSE`, the number of a [`Cause`]: 1 a warning, 2 critical.
 pub(super) const fn alert<const CAUSE: usize>(subsystem: Subsystem, role: Role) -> Check {
     Check {
-        name: Cause::ALL[CAUSE].check(),
+        name: Cause::ALL[CAUSE].name(),
         subsystem,
         unit: Unit::of(""),
-        side: Side::Above,
-        warn: Some(Param::AlertWarn),
-        critical: Some(Param::AlertCrit),
-        hysteresis: 0.0,
-        debounce_warn: Debounce::NONE,
-        debounce_critical: Debounce::NONE,
+        limits: Limits::above(Some(Param::AlertWarn), Some(Param::AlertCrit), 0.0),
+        debounce: [Debounce::NONE; 2],
         // Only what is said while it is armed counts; a mishap does not silence it, and it is told at its own time.
         when: When::Always,
         stale_s: None,
@@ -39,10 +35,8 @@ pub(super) const fn alert<const CAUSE: usize>(subsystem: Subsystem, role: Role) 
         role,
         of: InstanceOf::Vehicle,
         read: |inputs, _| {
-            Reading::new(
-                Some(inputs.now),
-                inputs.vehicle.alerts.level(inputs.now, Cause::ALL[CAUSE], inputs.flight.in_mishap()),
-            )
+            let level = inputs.vehicle.alerts.level(inputs.now, Cause::ALL[CAUSE], inputs.flight.in_mishap());
+            inputs.reading(level?)
         },
     }
 }
@@ -53,12 +47,8 @@ pub(super) const fn due(subsystem: Subsystem) -> Check {
         name: "",
         subsystem,
         unit: Unit::of("%"),
-        side: Side::Above,
-        warn: Some(Param::CompYellow),
-        critical: Some(Param::CompRed),
-        hysteresis: 0.0,
-        debounce_warn: Debounce::secs(1),
-        debounce_critical: Debounce::secs(1),
+        limits: Limits::above(Some(Param::CompYellow), Some(Param::CompRed), 0.0),
+        debounce: [Debounce::secs(1); 2],
         when: When::Always,
         stale_s: None,
         instances: 1,
@@ -84,30 +74,32 @@ fn used(inputs: &Inputs<'_>, subsystem: Subsystem) -> Option<Reading> {
     let most = if inputs.flight.is_open() { inputs.params.get(Param::CompRed) } else { f32::INFINITY };
     // What has reached its limit is due, while a check's value must be beyond it.
     let percent = mine.map(|(_, percent)| percent.next_up()).reduce(f32::max);
-    Reading::new(Some(inputs.now), percent.map(|percent| percent.min(most)))
+    inputs.reading(percent?.min(most))
 }
 
 /// How much heavier than normal for this airframe it hovers, percent.
 pub(super) fn heavier(inputs: &Inputs<'_>) -> Option<Reading> {
-    Reading::new(Some(inputs.now), inputs.trends.heavier(inputs.baselines, inputs.params))
+    inputs.reading(inputs.trends.heavier(inputs.baselines, inputs.params)?)
 }
 
 /// The same of what hovering takes, where the vehicle is not heavier.
 pub(super) fn takes_more(inputs: &Inputs<'_>, quantity: Quantity) -> Option<Reading> {
-    let is_heavier =
-        inputs.trends.heavier(inputs.baselines, inputs.params).is_some_and(|percent| percent > 0.0);
+    let is_heavier = heavier(inputs).is_some_and(|heavier| heavier.value > 0.0);
     let departure = departure(inputs, quantity)?;
     Some(if is_heavier { Reading { value: 0.0, ..departure } } else { departure })
 }
 
 /// How far a quantity is from what is normal for this airframe.
 pub(super) fn departure(inputs: &Inputs<'_>, quantity: Quantity) -> Option<Reading> {
-    Reading::new(Some(inputs.now), inputs.trends.departure(quantity, inputs.baselines, inputs.params))
+    inputs.reading(inputs.trends.departure(quantity, inputs.baselines, inputs.params)?)
 }
 
-/// One of VIBRATION's three as PX4 means them: coning of the gyro, high-frequency rate (rad/s), high-frequency acceleration (m/s2).
-pub(super) fn px4_metric(inputs: &Inputs<'_>, place: usize) -> Option<Reading> {
-    let slot = &inputs.vehicle.vibration;
-    let vibration = slot.get().filter(|vibration| vibration.scale == VibrationScale::Px4Metrics)?;
-    Reading::new(slot.at(), *vibration.levels.get(place)?)
+/// A figure of VIBRATION's three, on this scale: an axis each of ArduPilot; of PX4 coning of the gyro, high-frequency rate (rad/s) and
+/// high-frequency acceleration (m/s2).
+pub(super) fn vibration(
+    inputs: &Inputs<'_>,
+    scale: VibrationScale,
+    value: fn([Option<f32>; 3]) -> Option<f32>,
+) -> Option<Reading> {
+    inputs.vehicle.vibration.read(|vibration| value(vibration.levels).filter(|_| vibration.scale == scale))
 }

@@ -1,6 +1,6 @@
 //! The autopilot's processor.
 
-use super::check::{Check, Debounce, InstanceOf, Side, Unit, When};
+use super::check::{Check, Debounce, InstanceOf, Limits, Unit, When};
 use super::common::{STALE, alert};
 use super::finding::Subsystem;
 use super::inputs::Inputs;
@@ -22,12 +22,8 @@ const LOAD: Check = Check {
     name: "load",
     subsystem: Subsystem::Computer,
     unit: Unit::of("%"),
-    side: Side::Above,
-    warn: Some(Param::CpuLoadWarn),
-    critical: Some(Param::CpuLoadCrit),
-    hysteresis: 2.0,
-    debounce_warn: Debounce::secs(2),
-    debounce_critical: Debounce::secs(2),
+    limits: Limits::above(Some(Param::CpuLoadWarn), Some(Param::CpuLoadCrit), 2.0),
+    debounce: [Debounce::secs(2); 2],
     when: When::Always,
     stale_s: STALE,
     instances: 1,
@@ -35,18 +31,17 @@ const LOAD: Check = Check {
     is_flag: false,
     role: Role::NONE,
     of: InstanceOf::Vehicle,
-    read: load_percent,
+    read: |inputs, _| inputs.vehicle.system.read(|system| Some(system.load?.0 * 100.0)),
 };
 
 pub(super) const CHECKS: &[Check] = &[
-    Check { of: InstanceOf::Vehicle, ..LOAD },
+    LOAD,
     Check {
         name: "mcu_temperature",
         unit: Unit::of("degC"),
-        warn: Some(Param::McuTempWarn),
-        critical: Some(Param::McuTempCrit),
+        limits: Limits::above(Some(Param::McuTempWarn), Some(Param::McuTempCrit), 2.0),
         of: InstanceOf::Vehicle,
-        read: temperature_c,
+        read: |inputs, _| inputs.vehicle.processor.read(|processor| Some(processor.temperature?.0)),
         ..LOAD
     },
     Check {
@@ -54,10 +49,8 @@ pub(super) const CHECKS: &[Check] = &[
         role: Role::of(Group::Reboot, 0),
         is_flag: true,
         unit: Unit::of(""),
-        warn: None,
-        critical: Some(Param::RebootCrit),
-        hysteresis: 0.0,
-        debounce_critical: Debounce::NONE,
+        limits: Limits::above(None, Some(Param::RebootCrit), 0.0),
+        debounce: [Debounce::secs(2), Debounce::NONE],
         stale_s: None,
         alarm_only: true,
         read: restarted,
@@ -68,10 +61,8 @@ pub(super) const CHECKS: &[Check] = &[
         role: Role::of(Group::Other, FAILSAFES | Group::Failsafe.bit()),
         is_flag: true,
         unit: Unit::of(""),
-        warn: None,
-        critical: Some(Param::StateCrit),
-        hysteresis: 0.0,
-        debounce_critical: Debounce::millis(500),
+        limits: Limits::above(None, Some(Param::StateCrit), 0.0),
+        debounce: [Debounce::secs(2), Debounce::millis(500)],
         when: When::Armed,
         alarm_only: true,
         read: state,
@@ -83,11 +74,6 @@ pub(super) const CHECKS: &[Check] = &[
     alert::<{ Cause::Failsafe as usize }>(Subsystem::Computer, Role::of(Group::Failsafe, FAILSAFES)),
     alert::<{ Cause::Other as usize }>(Subsystem::Computer, Role::NONE),
 ];
-
-fn load_percent(inputs: &Inputs<'_>, _: u8) -> Option<Reading> {
-    let slot = &inputs.vehicle.system;
-    Reading::new(slot.at(), slot.get()?.load.map(|load| load.0 * 100.0))
-}
 
 /// `MAV_STATE`. PX4's kill switch makes a termination of it, and pilots press it when they have touched down. What was terminated in
 /// the air falls, glides or hangs on a parachute after [`COMES_TO_REST`].
@@ -102,20 +88,13 @@ fn state(inputs: &Inputs<'_>, _: u8) -> Option<Reading> {
     };
     let ended = vehicle.terminated_since.is_some_and(|since| now.since(since) >= COMES_TO_REST) && !rests();
     let counts = |state| if state == Heartbeat::TERMINATED && !ended { ACTIVE } else { state };
-    let slot = &vehicle.heartbeat;
-    Reading::new(slot.at(), slot.get().map(|heartbeat| f32::from(counts(heartbeat.state))))
+    vehicle.heartbeat.read(|heartbeat| Some(f32::from(counts(heartbeat.state))))
 }
 
 /// 1 for half a minute after a restart while it was armed.
 fn restarted(inputs: &Inputs<'_>, _: u8) -> Option<Reading> {
-    inputs.vehicle.heartbeat.get()?;
-    let recently = |at| inputs.now.since(at) <= Span::from_secs(30);
-    let vehicle = inputs.vehicle;
-    let value = f32::from(u8::from(vehicle.rebooted_armed && vehicle.rebooted_at.is_some_and(recently)));
-    Some(Reading { at: inputs.now, value })
-}
-
-fn temperature_c(inputs: &Inputs<'_>, _: u8) -> Option<Reading> {
-    let slot = &inputs.vehicle.processor;
-    Reading::new(slot.at(), slot.get()?.temperature.map(|temperature| temperature.0))
+    let Inputs { now, vehicle, .. } = *inputs;
+    let recently = |at| now.since(at) <= Span::from_secs(30);
+    let is_new = vehicle.rebooted_armed && vehicle.rebooted_at.is_some_and(recently);
+    vehicle.heartbeat.get().and_then(|_| inputs.reading(f32::from(u8::from(is_new))))
 }

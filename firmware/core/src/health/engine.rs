@@ -1,13 +1,12 @@
 //! The combustion engine (EFI) and the generator. Normal values depend on the engine, so the limits are off (at the end of
 //! their range that no value passes) until they are set.
 
-use super::check::{Check, Debounce, InstanceOf, Side, Unit, When};
+use super::check::{Check, Debounce, InstanceOf, Limits, Unit, When};
 use super::common::{STALE, due};
 use super::finding::Subsystem;
 use super::inputs::Inputs;
 use super::suppression::Role;
 use crate::latest::Reading;
-use crate::observation::Engine;
 use crate::params::Param;
 
 /// Above the ripple of a governor that holds the speed.
@@ -17,12 +16,8 @@ const ENGINE: Check = Check {
     name: "cylinder_head",
     subsystem: Subsystem::Engine,
     unit: Unit::of("degC"),
-    side: Side::Above,
-    warn: Some(Param::EngChtWarn),
-    critical: Some(Param::EngChtCrit),
-    hysteresis: 5.0,
-    debounce_warn: Debounce::secs(2),
-    debounce_critical: Debounce::secs(1),
+    limits: Limits::above(Some(Param::EngChtWarn), Some(Param::EngChtCrit), 5.0),
+    debounce: [Debounce::secs(2), Debounce::secs(1)],
     when: When::Always,
     stale_s: STALE,
     instances: 1,
@@ -30,35 +25,29 @@ const ENGINE: Check = Check {
     is_flag: false,
     role: Role::NONE,
     of: InstanceOf::Vehicle,
-    read: |inputs, _| read(inputs, |engine| engine.cylinder_head.map(|temperature| temperature.0)),
+    read: |inputs, _| inputs.vehicle.engine.read(|engine| Some(engine.cylinder_head?.0)),
 };
 
 pub(super) const CHECKS: &[Check] = &[
     ENGINE,
     Check {
         name: "exhaust_gas",
-        warn: Some(Param::EngEgtWarn),
-        critical: Some(Param::EngEgtCrit),
-        read: |inputs, _| read(inputs, |engine| engine.exhaust.map(|temperature| temperature.0)),
+        limits: Limits::above(Some(Param::EngEgtWarn), Some(Param::EngEgtCrit), 5.0),
+        read: |inputs, _| inputs.vehicle.engine.read(|engine| Some(engine.exhaust?.0)),
         ..ENGINE
     },
     Check {
         name: "fuel_pressure",
         unit: Unit::of("hPa"),
-        side: Side::Below,
-        warn: Some(Param::EngFuelWarn),
-        critical: Some(Param::EngFuelCrit),
+        limits: Limits::below(Some(Param::EngFuelWarn), Some(Param::EngFuelCrit), 5.0),
         when: When::Armed,
-        read: |inputs, _| read(inputs, |engine| engine.fuel_pressure.map(|pressure| pressure.0)),
+        read: |inputs, _| inputs.vehicle.engine.read(|engine| Some(engine.fuel_pressure?.0)),
         ..ENGINE
     },
     Check {
         name: "generator_speed",
         unit: Unit::of("rpm"),
-        side: Side::Below,
-        warn: Some(Param::GenSpeedWarn),
-        critical: Some(Param::GenSpeedCrit),
-        hysteresis: GENERATOR_HYSTERESIS_RPM,
+        limits: Limits::below(Some(Param::GenSpeedWarn), Some(Param::GenSpeedCrit), GENERATOR_HYSTERESIS_RPM),
         when: When::Armed,
         read: generator_rpm,
         ..ENGINE
@@ -66,18 +55,13 @@ pub(super) const CHECKS: &[Check] = &[
     Check { name: "engine_due", ..due(Subsystem::Engine) },
 ];
 
-fn read(inputs: &Inputs<'_>, value: impl FnOnce(&Engine) -> Option<f32>) -> Option<Reading> {
-    let engine = &inputs.vehicle.engine;
-    Reading::new(engine.at(), value(engine.get()?))
-}
-
 /// The speed counts once the generator has reached its limits since it was switched on. Before that, and while it is off, the
 /// value is a good one: a value that ends would become stale.
 fn generator_rpm(inputs: &Inputs<'_>, _: u8) -> Option<Reading> {
-    let slot = &inputs.vehicle.generator;
-    let (generator, top) = (slot.get()?, inputs.vehicle.generator_top?);
+    let top = inputs.vehicle.generator_top?;
     let limit = inputs.params.get(Param::GenSpeedWarn).max(inputs.params.get(Param::GenSpeedCrit));
-    let is_judged = !generator.is_off && top.0 >= limit;
-    let value = if is_judged { generator.speed?.0 } else { limit + GENERATOR_HYSTERESIS_RPM };
-    Reading::new(slot.at(), Some(value))
+    inputs.vehicle.generator.read(|generator| {
+        let is_judged = !generator.is_off && top.0 >= limit;
+        Some(if is_judged { generator.speed?.0 } else { limit + GENERATOR_HYSTERESIS_RPM })
+    })
 }

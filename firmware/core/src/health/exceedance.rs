@@ -101,7 +101,7 @@ impl Entry {
     fn now(mut self, now: Instant) -> Option<Exceedance> {
         self.extend(now);
         let check = checks().nth(self.check.into())?;
-        let lifetime = self.before.join(self.session, check.side);
+        let lifetime = self.before.join(self.session, check.limits.side);
         Some(Exceedance { check, instance: self.instance, session: self.session, lifetime })
     }
 }

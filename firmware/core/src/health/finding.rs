@@ -1,105 +1,48 @@
 //! A finding: one check changed its level. The numbers and names here are stored in logs and never change meaning.
 
+use crate::numbered::numbered;
 use crate::observation::Feeds;
 use crate::time::Instant;
 
-/// How bad it is. The numbers are stored in logs.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-#[repr(u8)]
-pub enum Level {
-    /// Within limits, seen recently.
-    Ok = 0,
-    /// Worth knowing, nothing to do in flight.
-    Advisory = 1,
-    /// Outside the normal range: act soon.
-    Warning = 2,
-    /// Act now.
-    Critical = 3,
-    /// The input has stopped (or never came): nobody knows, which is not the same as healthy.
-    Stale = 4,
-}
-
-impl Level {
-    /// All levels, by number.
-    pub const ALL: [Self; 5] = [Self::Ok, Self::Advisory, Self::Warning, Self::Critical, Self::Stale];
-
-    /// The name that logs, JSON and reports use.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Ok => "ok",
-            Self::Advisory => "advisory",
-            Self::Warning => "warning",
-            Self::Critical => "critical",
-            Self::Stale => "stale",
-        }
-    }
-
-    /// The level of a stored number.
-    pub const fn from_number(number: u8) -> Option<Self> {
-        if (number as usize) < Self::ALL.len() { Some(Self::ALL[number as usize]) } else { None }
+numbered! {
+    /// How bad it is. The numbers are stored in logs.
+    pub enum Level {
+        /// Within limits, seen recently.
+        Ok "ok",
+        /// Worth knowing, nothing to do in flight.
+        Advisory "advisory",
+        /// Outside the normal range: act soon.
+        Warning "warning",
+        /// Act now.
+        Critical "critical",
+        /// The input has stopped (or never came): nobody knows, which is not the same as healthy.
+        Stale "stale",
     }
 }
 
-/// The part of the vehicle that a check watches. The numbers are stored in logs.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-#[repr(u8)]
-pub enum Subsystem {
-    /// Batteries and rails.
-    Power = 0,
-    /// Motors, ESCs and propellers.
-    Propulsion = 1,
-    /// Combustion engine (EFI).
-    Engine = 2,
-    /// Vibration, clipping and load factor.
-    Structure = 3,
-    /// Estimator and GNSS.
-    Navigation = 4,
-    /// Autopilot, RC and telemetry links.
-    Link = 5,
-    /// The autopilot's processor.
-    Computer = 6,
-    /// Roll and pitch.
-    Attitude = 7,
-    /// This monitor: its card, its queues, its own losses.
-    Recorder = 8,
-    /// Falls, impacts, tumbling: what ends a flight otherwise than by landing.
-    Mishap = 9,
-}
-
-impl Subsystem {
-    /// All subsystems, by number.
-    pub const ALL: [Self; 10] = [
-        Self::Power,
-        Self::Propulsion,
-        Self::Engine,
-        Self::Structure,
-        Self::Navigation,
-        Self::Link,
-        Self::Computer,
-        Self::Attitude,
-        Self::Recorder,
-        Self::Mishap,
-    ];
-
-    /// The name that logs, JSON and reports use.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Power => "power",
-            Self::Propulsion => "propulsion",
-            Self::Engine => "engine",
-            Self::Structure => "structure",
-            Self::Navigation => "navigation",
-            Self::Link => "link",
-            Self::Computer => "computer",
-            Self::Attitude => "attitude",
-            Self::Recorder => "recorder",
-            Self::Mishap => "mishap",
-        }
-    }
-
-    /// The subsystem of a stored number.
-    pub const fn from_number(number: u8) -> Option<Self> {
-        if (number as usize) < Self::ALL.len() { Some(Self::ALL[number as usize]) } else { None }
+numbered! {
+    /// The part of the vehicle that a check watches. The numbers are stored in logs.
+    pub enum Subsystem {
+        /// Batteries and rails.
+        Power "power",
+        /// Motors, ESCs and propellers.
+        Propulsion "propulsion",
+        /// Combustion engine (EFI).
+        Engine "engine",
+        /// Vibration, clipping and load factor.
+        Structure "structure",
+        /// Estimator and GNSS.
+        Navigation "navigation",
+        /// Autopilot, RC and telemetry links.
+        Link "link",
+        /// The autopilot's processor.
+        Computer "computer",
+        /// Roll and pitch.
+        Attitude "attitude",
+        /// This monitor: its card, its queues, its own losses.
+        Recorder "recorder",
+        /// Falls, impacts, tumbling: what ends a flight otherwise than by landing.
+        Mishap "mishap",
     }
 }
 

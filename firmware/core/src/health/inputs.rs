@@ -4,6 +4,7 @@ use super::finding::Subsystem;
 use crate::baseline::Baselines;
 use crate::derived::Derived;
 use crate::flight::Flight;
+use crate::latest::Reading;
 use crate::params::Params;
 use crate::status::{LinkReading, RecorderStatus};
 use crate::time::Instant;
@@ -33,4 +34,11 @@ pub struct Inputs<'a> {
     pub wear: &'a [Option<(Subsystem, f32)>],
     /// Limits and settings.
     pub params: &'a Params,
+}
+
+impl Inputs<'_> {
+    /// A value that is so now.
+    pub(super) fn reading(&self, value: impl Into<Option<f32>>) -> Option<Reading> {
+        Reading::new(Some(self.now), value.into())
+    }
 }

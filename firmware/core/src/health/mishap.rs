@@ -1,7 +1,7 @@
 //! Mishaps: the signs that [`crate::flight`] saw. No gate holds them back, and they stay critical until the vehicle is armed again or flies
 //! on.
 
-use super::check::{Check, Debounce, InstanceOf, Side, Unit, When};
+use super::check::{Check, Debounce, InstanceOf, Limits, Unit, When};
 use super::common::{STALE, alert};
 use super::finding::{Orders, Subsystem};
 use super::inputs::Inputs;
@@ -14,12 +14,8 @@ const FREE_FALL: Check = Check {
     name: Kind::FreeFall.name(),
     subsystem: Subsystem::Mishap,
     unit: Unit::of("s"),
-    side: Side::Above,
-    warn: None,
-    critical: Some(Param::MisFallTime),
-    hysteresis: 0.0,
-    debounce_warn: Debounce::NONE,
-    debounce_critical: Debounce::NONE,
+    limits: Limits::above(None, Some(Param::MisFallTime), 0.0),
+    debounce: [Debounce::NONE; 2],
     when: When::Always,
     stale_s: STALE,
     instances: 1,
@@ -35,14 +31,14 @@ pub(super) const CHECKS: &[Check] = &[
     Check {
         name: Kind::Impact.name(),
         unit: Unit::of("g"),
-        critical: Some(Param::MisImpact),
+        limits: Limits::above(None, Some(Param::MisImpact), 0.0),
         read: |inputs, _| inputs.flight.reading(Kind::Impact, inputs.now, inputs.vehicle),
         ..FREE_FALL
     },
     Check {
         name: Kind::Tumbling.name(),
         unit: Unit::of("deg/s"),
-        critical: Some(Param::MisTumble),
+        limits: Limits::above(None, Some(Param::MisTumble), 0.0),
         read: |inputs, _| inputs.flight.reading(Kind::Tumbling, inputs.now, inputs.vehicle),
         ..FREE_FALL
     },
@@ -50,21 +46,21 @@ pub(super) const CHECKS: &[Check] = &[
         name: Kind::Disarmed.name(),
         unit: Unit::of("m"),
         alarm_only: true,
-        critical: Some(Param::MisDisarm),
+        limits: Limits::above(None, Some(Param::MisDisarm), 0.0),
         read: |inputs, _| inputs.flight.reading(Kind::Disarmed, inputs.now, inputs.vehicle),
         ..FREE_FALL
     },
     Check {
         name: Kind::Sinking.name(),
         unit: Unit::of("m/s"),
-        critical: Some(Param::MisSink),
+        limits: Limits::above(None, Some(Param::MisSink), 0.0),
         read: |inputs, _| inputs.flight.reading(Kind::Sinking, inputs.now, inputs.vehicle),
         ..FREE_FALL
     },
     Check {
         name: Kind::Overturned.name(),
         unit: Unit::of("deg"),
-        critical: Some(Param::MisOverturn),
+        limits: Limits::above(None, Some(Param::MisOverturn), 0.0),
         read: |inputs, _| inputs.flight.reading(Kind::Overturned, inputs.now, inputs.vehicle),
         ..FREE_FALL
     },

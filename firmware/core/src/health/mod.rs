@@ -23,7 +23,9 @@ mod suppression;
 mod tables;
 mod vocabulary;
 
-pub use check::{CLEAR, CLEAR_MAX, CLEAR_MAX_ALWAYS, Check, Debounce, InstanceOf, Side, State, Unit, When};
+pub use check::{
+    CLEAR, CLEAR_MAX, CLEAR_MAX_ALWAYS, Check, Debounce, InstanceOf, Limits, Side, State, Unit, When,
+};
 use check::{Change, How, Reported};
 pub use finding::{Finding, Level, Orders, Subsystem};
 pub use inputs::Inputs;
@@ -138,12 +140,12 @@ impl Health {
         if let (None, Some(Level::Warning | Level::Critical), Some(reading)) =
             (change, state.level(), reading)
         {
-            exceedances.note(place, instance, check.side, reading.value);
+            exceedances.note(place, instance, check.limits.side, reading.value);
         }
         let change = change?;
         let because = self.explain(slot as u16, change.level, inputs.now);
         let finding = self.finding(check, instance, inputs, change, because);
-        exceedances.change(place, check.side, &finding);
+        exceedances.change(place, check.limits.side, &finding);
         Some(finding)
     }
 

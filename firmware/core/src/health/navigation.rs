@@ -1,7 +1,7 @@
 //! Estimator and GNSS.
 
-use super::check::{Check, Debounce, InstanceOf, Side, Unit, When};
-use super::common::{STALE, alert, px4_metric};
+use super::check::{Check, Debounce, InstanceOf, Limits, Unit, When};
+use super::common::{STALE, alert, vibration};
 use super::finding::Subsystem;
 use super::inputs::Inputs;
 use super::suppression::{
@@ -10,7 +10,7 @@ use super::suppression::{
 use crate::cause::Cause;
 use crate::gnss_constellation;
 use crate::latest::Reading;
-use crate::observation::{Estimator, EstimatorScale, Gnss, VehicleKind};
+use crate::observation::{Estimator, EstimatorScale, Gnss, GnssIntegrity, VehicleKind, VibrationScale};
 use crate::pairs::{Kind, SENSORS_MAX};
 use crate::params::Param;
 use crate::residual::Comparison;
@@ -27,13 +27,9 @@ const ESTIMATOR: Check = Check {
     name: "ekf_variance",
     subsystem: Subsystem::Navigation,
     unit: Unit::of(""),
-    side: Side::Above,
-    warn: Some(Param::EkfVarWarn),
-    critical: None,
-    hysteresis: 0.05,
+    limits: Limits::above(Some(Param::EkfVarWarn), None, 0.05),
     // Two messages at 2 Hz. ArduPilot's failsafe waits for a second, and acts then.
-    debounce_warn: Debounce::millis(500),
-    debounce_critical: Debounce::secs(1),
+    debounce: [Debounce::millis(500), Debounce::secs(1)],
     when: When::InFlight,
     stale_s: STALE,
     instances: 1,
@@ -46,10 +42,8 @@ const ESTIMATOR: Check = Check {
 
 const GNSS: Check = Check {
     name: "gps_satellites",
-    side: Side::Below,
-    warn: Some(Param::GpsSatsWarn),
-    hysteresis: 0.0,
-    debounce_warn: Debounce::secs(2),
+    limits: Limits::below(Some(Param::GpsSatsWarn), None, 0.0),
+    debounce: [Debounce::secs(2), Debounce::secs(1)],
     instances: RECEIVERS_MAX as u8,
     of: InstanceOf::Receiver,
     read: |inputs, receiver| {
@@ -66,9 +60,8 @@ const GNSS: Check = Check {
 const MISMATCH: Check = Check {
     name: "accel_mismatch",
     unit: Unit::of("m/s2"),
-    warn: Some(Param::AccMismWarn),
-    hysteresis: 0.2,
-    debounce_warn: Debounce::millis(500),
+    limits: Limits::above(Some(Param::AccMismWarn), None, 0.2),
+    debounce: [Debounce::millis(500), Debounce::secs(1)],
     // Never stale: they are compared where that says something.
     stale_s: None,
     instances: SENSORS_MAX as u8,
@@ -81,9 +74,8 @@ const MISMATCH: Check = Check {
 const STUCK: Check = Check {
     name: "accel_stuck",
     unit: Unit::of("s"),
-    warn: Some(Param::StuckWarn),
-    hysteresis: 0.0,
-    debounce_warn: Debounce::NONE,
+    limits: Limits::above(Some(Param::StuckWarn), None, 0.0),
+    debounce: [Debounce::NONE, Debounce::secs(1)],
     alarm_only: true,
     of: InstanceOf::Sensor,
     read: |inputs, sensor| stuck(inputs, Kind::Accelerometer, sensor),
@@ -95,10 +87,9 @@ const SECOND: Check = Check {
     name: "ahrs2_tilt",
     role: Role::of(Group::Other, DISTURBANCES | ESTIMATORS),
     unit: Unit::of("deg"),
-    warn: Some(Param::Ahrs2TiltWarn),
-    hysteresis: 2.0,
+    limits: Limits::above(Some(Param::Ahrs2TiltWarn), None, 2.0),
     // Who names the sensor is heard first.
-    debounce_warn: Debounce::secs(1),
+    debounce: [Debounce::secs(1); 2],
     instances: 1,
     of: InstanceOf::Vehicle,
     read: |inputs, _| residual(inputs, Comparison::Ahrs2Tilt),
@@ -112,8 +103,7 @@ pub(super) const CHECKS: &[Check] = &[
         // a plane flies on by its airspeed.
         name: "ekf_failsafe",
         role: Role::of(Group::Ekf, DISTURBANCES | Group::EkfClimb.bit()),
-        warn: None,
-        critical: Some(Param::EkfVarCrit),
+        limits: Limits::above(None, Some(Param::EkfVarCrit), 0.05),
         read: |inputs, _| {
             let reading = estimator(inputs, EstimatorScale::Variance, second_largest);
             reading.filter(|_| inputs.vehicle.kind() != VehicleKind::Plane)
@@ -129,16 +119,14 @@ pub(super) const CHECKS: &[Check] = &[
     Check {
         name: "ekf_test_ratio",
         role: Role::of(Group::Ekf, DISTURBANCES | Group::EkfClimb.bit()),
-        warn: Some(Param::EkfRatioWarn),
-        critical: Some(Param::EkfRatioCrit),
+        limits: Limits::above(Some(Param::EkfRatioWarn), Some(Param::EkfRatioCrit), 0.05),
         read: |inputs, _| estimator(inputs, EstimatorScale::TestRatio, largest),
         ..ESTIMATOR
     },
     Check {
         name: "ekf_mag_ratio",
         role: Role::of(Group::Sensor, COMPASS | Group::CompassUse.bit() | TURNS),
-        warn: Some(Param::EkfRatioWarn),
-        critical: Some(Param::EkfRatioCrit),
+        limits: Limits::above(Some(Param::EkfRatioWarn), Some(Param::EkfRatioCrit), 0.05),
         read: |inputs, _| estimator(inputs, EstimatorScale::TestRatio, |estimator| estimator.compass),
         // PX4 tells none of a compass that it does not use: that is `compass_unused`.
         stale_s: None,
@@ -148,7 +136,7 @@ pub(super) const CHECKS: &[Check] = &[
         name: "compass_unused",
         role: Role::of(Group::CompassUse, COMPASS | TURNS),
         is_flag: true,
-        warn: Some(Param::AlertWarn),
+        limits: Limits::above(Some(Param::AlertWarn), None, 0.05),
         // That it is used says nothing about how well it is.
         alarm_only: true,
         read: |inputs, _| inputs.derived.crosschecks().compass_unused(inputs.now),
@@ -159,9 +147,8 @@ pub(super) const CHECKS: &[Check] = &[
         name: "gyro_mismatch",
         role: Role::of(Group::GyroMismatch, Group::GyroFault.bit() | VIBRATION),
         unit: Unit::of("rad/s"),
-        warn: Some(Param::GyroMismWarn),
-        hysteresis: 0.02,
-        debounce_warn: SMOOTHED,
+        limits: Limits::above(Some(Param::GyroMismWarn), None, 0.02),
+        debounce: [SMOOTHED, Debounce::secs(1)],
         read: |inputs, sensor| mismatch(inputs, Kind::Gyro, sensor),
         ..MISMATCH
     },
@@ -169,20 +156,18 @@ pub(super) const CHECKS: &[Check] = &[
         name: "gyro_noise",
         role: Role::of(Group::GyroNoise, 0),
         unit: Unit::of("rad/s"),
-        warn: Some(Param::GyroNoiseWarn),
-        hysteresis: 0.05,
-        debounce_warn: Debounce::millis(500),
+        limits: Limits::above(Some(Param::GyroNoiseWarn), None, 0.05),
+        debounce: [Debounce::millis(500), Debounce::secs(1)],
         instances: 1,
         stale_s: STALE,
         of: InstanceOf::Vehicle,
-        read: |inputs, _| px4_metric(inputs, 1),
+        read: |inputs, _| vibration(inputs, VibrationScale::Px4Metrics, |[_, rate, _]| rate),
         ..MISMATCH
     },
     Check {
         name: "imu_gps",
         role: Role::of(Group::ImuGnss, WRONG_RECEIVERS | INERTIAL | VIBRATION),
-        warn: Some(Param::ImuGpsWarn),
-        hysteresis: 0.3,
+        limits: Limits::above(Some(Param::ImuGpsWarn), None, 0.3),
         instances: 1,
         // It goes by the attitude and a receiver too.
         of: InstanceOf::Vehicle,
@@ -193,9 +178,8 @@ pub(super) const CHECKS: &[Check] = &[
         name: "compass_mismatch",
         role: Role::of(Group::CompassMismatch, Group::CompassFault.bit()),
         unit: Unit::of("%"),
-        warn: Some(Param::MagMismWarn),
-        hysteresis: 5.0,
-        debounce_warn: SMOOTHED,
+        limits: Limits::above(Some(Param::MagMismWarn), None, 5.0),
+        debounce: [SMOOTHED, Debounce::secs(1)],
         read: |inputs, sensor| mismatch(inputs, Kind::Compass, sensor),
         ..MISMATCH
     },
@@ -203,9 +187,8 @@ pub(super) const CHECKS: &[Check] = &[
         name: "compass_heading",
         role: Role::of(Group::CompassUse, COMPASS | TURNS),
         unit: Unit::of("deg"),
-        warn: Some(Param::MagHeadWarn),
-        hysteresis: 3.0,
-        debounce_warn: SMOOTHED,
+        limits: Limits::above(Some(Param::MagHeadWarn), None, 3.0),
+        debounce: [SMOOTHED, Debounce::secs(1)],
         instances: 1,
         of: InstanceOf::Vehicle,
         read: |inputs, _| residual(inputs, Comparison::MagHeading),
@@ -215,9 +198,8 @@ pub(super) const CHECKS: &[Check] = &[
         name: "baro_mismatch",
         role: Role::of(Group::Sensor, Group::BaroFault.bit()),
         unit: Unit::of("m"),
-        warn: Some(Param::BaroMismWarn),
-        hysteresis: 1.0,
-        debounce_warn: SMOOTHED,
+        limits: Limits::above(Some(Param::BaroMismWarn), None, 1.0),
+        debounce: [SMOOTHED, Debounce::secs(1)],
         read: |inputs, sensor| mismatch(inputs, Kind::Barometer, sensor),
         ..MISMATCH
     },
@@ -225,9 +207,8 @@ pub(super) const CHECKS: &[Check] = &[
         name: "baro_height",
         role: Role::of(Group::Sensor, Group::BaroFault.bit() | RECEIVERS),
         unit: Unit::of("m"),
-        warn: Some(Param::BaroGpsWarn),
-        hysteresis: 1.0,
-        debounce_warn: Debounce::secs(1),
+        limits: Limits::above(Some(Param::BaroGpsWarn), None, 1.0),
+        debounce: [Debounce::secs(1); 2],
         instances: 1,
         of: InstanceOf::Sensor,
         read: |inputs, _| residual(inputs, Comparison::BaroGnss),
@@ -237,9 +218,8 @@ pub(super) const CHECKS: &[Check] = &[
         name: "baro_noise",
         role: Role::of(Group::Sensor, Group::BaroFault.bit() | Group::ImuGnss.bit()),
         unit: Unit::of("m"),
-        warn: Some(Param::BaroNoiseWarn),
-        hysteresis: 0.5,
-        debounce_warn: Debounce::millis(500),
+        limits: Limits::above(Some(Param::BaroNoiseWarn), None, 0.5),
+        debounce: [Debounce::millis(500), Debounce::secs(1)],
         instances: 1,
         of: InstanceOf::Sensor,
         read: |inputs, _| residual(inputs, Comparison::BaroNoise),
@@ -249,11 +229,8 @@ pub(super) const CHECKS: &[Check] = &[
         name: "ekf_climb",
         role: Role::of(Group::EkfClimb, DISTURBANCES),
         unit: Unit::of("m/s"),
-        warn: Some(Param::EkfClimbWarn),
-        critical: Some(Param::EkfClimbCrit),
-        hysteresis: 1.0,
-        debounce_warn: Debounce::millis(500),
-        debounce_critical: Debounce::millis(500),
+        limits: Limits::above(Some(Param::EkfClimbWarn), Some(Param::EkfClimbCrit), 1.0),
+        debounce: [Debounce::millis(500); 2],
         instances: 1,
         of: InstanceOf::Sensor,
         read: |inputs, _| residual(inputs, Comparison::BaroClimb),
@@ -263,17 +240,14 @@ pub(super) const CHECKS: &[Check] = &[
     Check {
         name: "ahrs2_height",
         unit: Unit::of("m"),
-        warn: Some(Param::Ahrs2HgtWarn),
-        critical: Some(Param::Ahrs2HgtCrit),
-        hysteresis: 1.0,
+        limits: Limits::above(Some(Param::Ahrs2HgtWarn), Some(Param::Ahrs2HgtCrit), 1.0),
         read: |inputs, _| residual(inputs, Comparison::Ahrs2Height),
         ..SECOND
     },
     Check {
         name: "ahrs2_position",
         unit: Unit::of("m"),
-        warn: Some(Param::Ahrs2PosWarn),
-        hysteresis: 2.0,
+        limits: Limits::above(Some(Param::Ahrs2PosWarn), None, 2.0),
         read: |inputs, _| residual(inputs, Comparison::Ahrs2Position),
         ..SECOND
     },
@@ -288,7 +262,7 @@ pub(super) const CHECKS: &[Check] = &[
         name: "compass_stuck",
         role: Role::of(Group::CompassFault, 0),
         // What changed all compasses is in one message up to 0.2 s before another.
-        debounce_warn: Debounce::millis(300),
+        debounce: [Debounce::millis(300), Debounce::secs(1)],
         read: |inputs, sensor| stuck(inputs, Kind::Compass, sensor),
         ..STUCK
     },
@@ -307,22 +281,21 @@ pub(super) const CHECKS: &[Check] = &[
         read: |inputs, receiver| inputs.derived.crosschecks().receiver_stuck(inputs.now, receiver),
         ..STUCK
     },
-    Check { role: Role::of(Group::GnssQuality, Group::GnssLost.bit()), debounce_warn: RECEIVER_SAYS, ..GNSS },
+    Check {
+        role: Role::of(Group::GnssQuality, Group::GnssLost.bit()),
+        debounce: [RECEIVER_SAYS, Debounce::secs(1)],
+        ..GNSS
+    },
     Check {
         name: "gps_sats_fall",
         role: Role::of(Group::SatellitesLost, Group::GnssLost.bit() | Group::GnssQuality.bit()),
         unit: Unit::of("%"),
         stale_s: None,
-        side: Side::Above,
-        warn: Some(Param::GpsSatsFall),
-        hysteresis: 5.0,
-        debounce_warn: Debounce::secs(1),
+        limits: Limits::above(Some(Param::GpsSatsFall), None, 5.0),
+        debounce: [Debounce::secs(1); 2],
         read: |inputs, receiver| {
-            gnss_constellation::satellites_lost(
-                inputs.derived.crosschecks().residuals(),
-                inputs.now,
-                receiver,
-            )
+            let residuals = inputs.derived.crosschecks().residuals();
+            gnss_constellation::satellites_lost(residuals, inputs.now, receiver)
         },
         ..GNSS
     },
@@ -332,9 +305,7 @@ pub(super) const CHECKS: &[Check] = &[
         unit: Unit::of("m/s"),
         // Never stale: only what moves says something.
         stale_s: None,
-        side: Side::Above,
-        warn: Some(Param::GpsSpeedWarn),
-        hysteresis: 0.2,
+        limits: Limits::above(Some(Param::GpsSpeedWarn), None, 0.2),
         read: |inputs, receiver| inputs.derived.crosschecks().gnss_velocity(inputs.now, receiver),
         ..GNSS
     },
@@ -343,11 +314,9 @@ pub(super) const CHECKS: &[Check] = &[
         role: Role::of(Group::GnssMotion, Group::GnssFrozen.bit()),
         unit: Unit::of("m"),
         stale_s: None,
-        side: Side::Above,
-        warn: Some(Param::GpsHeightWarn),
-        hysteresis: 1.0,
+        limits: Limits::above(Some(Param::GpsHeightWarn), None, 1.0),
         // Two messages at 5 Hz.
-        debounce_warn: Debounce::millis(200),
+        debounce: [Debounce::millis(200), Debounce::secs(1)],
         instances: 1,
         // It goes by the barometer too.
         of: InstanceOf::Vehicle,
@@ -357,9 +326,7 @@ pub(super) const CHECKS: &[Check] = &[
     Check {
         name: "gps_hdop",
         role: Role::of(Group::GnssQuality, Group::GnssLost.bit()),
-        side: Side::Above,
-        warn: Some(Param::GpsHdopWarn),
-        hysteresis: 0.1,
+        limits: Limits::above(Some(Param::GpsHdopWarn), None, 0.1),
         read: |inputs, receiver| {
             let little = inputs.params.get(Param::GpsHdopWarn) - MARGIN;
             gnss(inputs, receiver, |gnss| {
@@ -376,10 +343,8 @@ pub(super) const CHECKS: &[Check] = &[
         ),
         unit: Unit::of("times"),
         stale_s: None,
-        side: Side::Above,
-        warn: Some(Param::GpsHdopRise),
-        hysteresis: 0.1,
-        debounce_warn: Debounce::secs(1),
+        limits: Limits::above(Some(Param::GpsHdopRise), None, 0.1),
+        debounce: [Debounce::secs(1); 2],
         read: |inputs, receiver| {
             gnss_constellation::hdop_rise(inputs.derived.crosschecks().residuals(), inputs.now, receiver)
         },
@@ -389,10 +354,8 @@ pub(super) const CHECKS: &[Check] = &[
         name: "gps_accuracy",
         role: Role::of(Group::GnssQuality, Group::GnssLost.bit()),
         unit: Unit::of("m"),
-        side: Side::Above,
-        warn: Some(Param::GpsHaccWarn),
-        hysteresis: 0.1,
-        debounce_warn: RECEIVER_SAYS,
+        limits: Limits::above(Some(Param::GpsHaccWarn), None, 0.1),
+        debounce: [RECEIVER_SAYS, Debounce::secs(1)],
         read: |inputs, receiver| gnss(inputs, receiver, |gnss| gnss.accuracy.map(|accuracy| accuracy.0)),
         ..GNSS
     },
@@ -400,10 +363,9 @@ pub(super) const CHECKS: &[Check] = &[
         name: "gps_fix",
         role: Role::of(Group::GnssLost, 0),
         is_flag: true,
-        warn: None,
-        critical: Some(Param::GpsFixCrit),
+        limits: Limits::below(None, Some(Param::GpsFixCrit), 0.0),
         // Two messages without one.
-        debounce_critical: Debounce::millis(200),
+        debounce: [Debounce::secs(2), Debounce::millis(200)],
         read: |inputs, receiver| gnss(inputs, receiver, |gnss| Some(f32::from(gnss.fix))),
         ..GNSS
     },
@@ -411,22 +373,18 @@ pub(super) const CHECKS: &[Check] = &[
         name: "gps_jamming",
         role: Role::of(Group::GnssLost, 0),
         is_flag: true,
-        side: Side::Above,
-        warn: Some(Param::GpsJamWarn),
-        critical: Some(Param::GpsJamCrit),
+        limits: Limits::above(Some(Param::GpsJamWarn), Some(Param::GpsJamCrit), 0.0),
         when: When::Always,
-        read: |inputs, receiver| integrity(inputs, receiver, |jamming, _| jamming),
+        read: |inputs, receiver| integrity(inputs, receiver, |known| known.jamming),
         ..GNSS
     },
     Check {
         name: "gps_spoofing",
         role: Role::of(Group::GnssLost, 0),
         is_flag: true,
-        side: Side::Above,
-        warn: Some(Param::GpsJamWarn),
-        critical: Some(Param::GpsJamCrit),
+        limits: Limits::above(Some(Param::GpsJamWarn), Some(Param::GpsJamCrit), 0.0),
         when: When::Always,
-        read: |inputs, receiver| integrity(inputs, receiver, |_, spoofing| spoofing),
+        read: |inputs, receiver| integrity(inputs, receiver, |known| known.spoofing),
         ..GNSS
     },
     alert::<{ Cause::Gyro as usize }>(Subsystem::Navigation, Role::of(Group::GyroFault, 0)),
@@ -461,11 +419,9 @@ fn stuck(inputs: &Inputs<'_>, kind: Kind, sensor: u8) -> Option<Reading> {
 fn estimator(
     inputs: &Inputs<'_>,
     scale: EstimatorScale,
-    pick: fn(&Estimator) -> Option<f32>,
+    value: fn(&Estimator) -> Option<f32>,
 ) -> Option<Reading> {
-    let slot = &inputs.vehicle.estimator;
-    let estimator = slot.get().filter(|estimator| estimator.scale == scale)?;
-    Reading::new(slot.at(), pick(estimator))
+    inputs.vehicle.estimator.read(|estimator| value(estimator).filter(|_| estimator.scale == scale))
 }
 
 /// The compass has a check of its own, which names it.
@@ -478,19 +434,16 @@ fn largest(estimator: &Estimator) -> Option<f32> {
 
 fn second_largest(estimator: &Estimator) -> Option<f32> {
     let known = [estimator.velocity, estimator.position_horizontal, estimator.compass].into_iter().flatten();
-    let (_, second) = known
-        .filter(|value| !value.is_nan())
-        .fold((f32::NEG_INFINITY, f32::NEG_INFINITY), |(first, second), value| {
-            (first.max(value), second.max(first.min(value)))
-        });
+    let known = known.filter(|value| !value.is_nan());
+    let fold = |[first, second]: [f32; 2], value: f32| [first.max(value), second.max(first.min(value))];
+    let [_, second] = known.fold([f32::NEG_INFINITY; 2], fold);
     Some(second).filter(|second| second.is_finite())
 }
 
 /// A second receiver that never had a fix is not fitted; it says nothing.
 fn gnss(inputs: &Inputs<'_>, receiver: u8, value: impl FnOnce(&Gnss) -> Option<f32>) -> Option<Reading> {
     let slot = inputs.vehicle.gnss.get(usize::from(receiver))?;
-    let known = slot.get().filter(|_| inputs.derived.had_fix(receiver))?;
-    Reading::new(slot.at(), value(known))
+    slot.read(|gnss| value(gnss).filter(|_| inputs.derived.had_fix(receiver)))
 }
 
 /// A receiver that knows where it is within half of what its accuracy may be does so with however few satellites: its own word is better than
@@ -501,9 +454,8 @@ fn is_exact(inputs: &Inputs<'_>, gnss: &Gnss) -> bool {
         && gnss.accuracy.is_some_and(|accuracy| accuracy.0 <= inputs.params.get(Param::GpsHaccWarn) / 2.0)
 }
 
-fn integrity(inputs: &Inputs<'_>, receiver: u8, value: impl FnOnce(u8, u8) -> u8) -> Option<Reading> {
+/// A state of a receiver; 0 is unknown.
+fn integrity(inputs: &Inputs<'_>, receiver: u8, state: fn(&GnssIntegrity) -> u8) -> Option<Reading> {
     let slot = inputs.vehicle.gnss_integrity.get(usize::from(receiver))?;
-    let known = slot.get()?;
-    let state = value(known.jamming, known.spoofing);
-    Reading::new(slot.at(), (state > 0).then_some(f32::from(state)))
+    slot.read(|known| Some(f32::from(state(known))).filter(|state| *state > 0.0))
 }

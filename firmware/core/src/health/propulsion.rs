@@ -1,6 +1,6 @@
 //! Motors, ESCs and propellers.
 
-use super::check::{Check, Debounce, InstanceOf, Side, Unit, When};
+use super::check::{Check, Debounce, InstanceOf, Limits, Unit, When};
 use super::common::{STALE_SLOW, alert, departure, due, heavier, takes_more};
 use super::finding::Subsystem;
 use super::inputs::Inputs;
@@ -8,22 +8,17 @@ use super::suppression::{DRIVE, GYROS, Group, RATES, Role};
 use crate::baseline::{OUTPUTS_MAX, Quantity};
 use crate::cause::Cause;
 use crate::latest::Reading;
-use crate::observation::MOTORS_MAX;
+use crate::observation::{Esc, MOTORS_MAX};
 use crate::outputs::{JUDGED_MAX, Verdict};
 use crate::params::Param;
 use crate::residual::Comparison;
-use crate::vehicle::Motor;
 
 const ESC: Check = Check {
     name: "esc_silent",
     subsystem: Subsystem::Propulsion,
     unit: Unit::of("s"),
-    side: Side::Above,
-    warn: Some(Param::EscAgeWarn),
-    critical: Some(Param::EscAgeCrit),
-    hysteresis: 0.0,
-    debounce_warn: Debounce::NONE,
-    debounce_critical: Debounce::NONE,
+    limits: Limits::above(Some(Param::EscAgeWarn), Some(Param::EscAgeCrit), 0.0),
+    debounce: [Debounce::NONE; 2],
     when: When::Armed,
     stale_s: None,
     instances: MOTORS_MAX as u8,
@@ -37,11 +32,8 @@ const ESC: Check = Check {
 /// A body rate that does not become what is wanted.
 const RATE: Check = Check {
     unit: Unit::of("deg/s"),
-    warn: Some(Param::RateWarn),
-    critical: Some(Param::RateCrit),
-    hysteresis: 5.0,
-    debounce_warn: Debounce::millis(200),
-    debounce_critical: Debounce::millis(200),
+    limits: Limits::above(Some(Param::RateWarn), Some(Param::RateCrit), 5.0),
+    debounce: [Debounce::millis(200); 2],
     when: When::InFlight,
     instances: 1,
     of: InstanceOf::Vehicle,
@@ -52,11 +44,8 @@ const RATE: Check = Check {
 const TREND: Check = Check {
     name: "throttle_trend",
     unit: Unit::of("%"),
-    warn: Some(Param::TrdThrWarn),
-    critical: Some(Param::TrdThrCrit),
-    hysteresis: 2.0,
-    debounce_warn: Debounce::secs(10),
-    debounce_critical: Debounce::secs(10),
+    limits: Limits::above(Some(Param::TrdThrWarn), Some(Param::TrdThrCrit), 2.0),
+    debounce: [Debounce::secs(10); 2],
     when: When::InFlight,
     instances: 1,
     of: InstanceOf::Vehicle,
@@ -69,14 +58,11 @@ pub(super) const CHECKS: &[Check] = &[
     Check {
         name: "esc_temperature",
         unit: Unit::of("degC"),
-        warn: Some(Param::EscTempWarn),
-        critical: Some(Param::EscTempCrit),
-        hysteresis: 3.0,
-        debounce_warn: Debounce::secs(1),
-        debounce_critical: Debounce::millis(500),
+        limits: Limits::above(Some(Param::EscTempWarn), Some(Param::EscTempCrit), 3.0),
+        debounce: [Debounce::secs(1), Debounce::millis(500)],
         when: When::Always,
         stale_s: STALE_SLOW,
-        read: temperature_c,
+        read: |inputs, motor| state(inputs, motor, |esc| Some(esc.temperature?.0)),
         ..ESC
     },
     Check {
@@ -84,38 +70,31 @@ pub(super) const CHECKS: &[Check] = &[
         role: Role::of(Group::Drive, 0),
         is_flag: true,
         unit: Unit::of(""),
-        warn: Some(Param::EscFailWarn),
-        critical: Some(Param::EscFailCrit),
+        limits: Limits::above(Some(Param::EscFailWarn), Some(Param::EscFailCrit), 0.0),
         stale_s: STALE_SLOW,
         when: When::Always,
         alarm_only: true,
-        read: failure_rank,
+        read: |inputs, motor| state(inputs, motor, |esc| esc.failures.map(failure_rank)),
         ..ESC
     },
     Check {
         name: "esc_errors",
         unit: Unit::of("1/min"),
-        warn: Some(Param::EscErrWarn),
-        critical: None,
-        hysteresis: 2.0,
-        debounce_warn: Debounce::secs(1),
+        limits: Limits::above(Some(Param::EscErrWarn), None, 2.0),
+        debounce: [Debounce::secs(1), Debounce::NONE],
         stale_s: STALE_SLOW,
-        read: errors_per_minute,
+        read: |inputs, motor| state(inputs, motor, |_| inputs.derived.motors().errors(motor)),
         ..ESC
     },
     Check {
         name: "motor_loss",
         role: Role::of(Group::MotorLoss, 0),
         unit: Unit::of("%"),
-        side: Side::Below,
-        warn: None,
-        critical: Some(Param::MotLossCrit),
-        hysteresis: 5.0,
-        debounce_critical: Debounce::millis(500),
+        limits: Limits::below(None, Some(Param::MotLossCrit), 5.0),
+        debounce: [Debounce::NONE, Debounce::millis(500)],
         when: When::InFlight,
-        read: |inputs, motor| {
-            let Inputs { now, vehicle, derived, .. } = *inputs;
-            derived.motors().share(now, vehicle, derived.outputs(), motor)
+        read: |Inputs { now, vehicle, derived, .. }, motor| {
+            derived.motors().share(*now, vehicle, derived.outputs(), motor)
         },
         ..ESC
     },
@@ -123,16 +102,12 @@ pub(super) const CHECKS: &[Check] = &[
         name: "motor_imbalance",
         role: Role::of(Group::MotorOutput, Group::MotorLoss.bit()),
         unit: Unit::of("%"),
-        warn: Some(Param::MotImbalWarn),
-        critical: Some(Param::MotImbalCrit),
-        hysteresis: 2.0,
-        debounce_warn: Debounce::secs(3),
-        debounce_critical: Debounce::secs(1),
+        limits: Limits::above(Some(Param::MotImbalWarn), Some(Param::MotImbalCrit), 2.0),
+        debounce: [Debounce::secs(3), Debounce::secs(1)],
         when: When::InFlight,
         // Never stale: only steady flight says something, and ESCs that stop talking are `esc_silent`.
-        read: |inputs, motor| {
-            let Inputs { now, vehicle, flight, derived, .. } = *inputs;
-            derived.motors().imbalance(now, vehicle, flight, derived.outputs(), motor)
+        read: |Inputs { now, vehicle, flight, derived, .. }, motor| {
+            derived.motors().imbalance(*now, vehicle, flight, derived.outputs(), motor)
         },
         ..ESC
     },
@@ -140,11 +115,8 @@ pub(super) const CHECKS: &[Check] = &[
         name: "motor_output",
         role: Role::of(Group::MotorOutput, Group::MotorLoss.bit()),
         unit: Unit::of("%"),
-        warn: Some(Param::MotOutWarn),
-        critical: Some(Param::MotOutCrit),
-        hysteresis: 5.0,
-        debounce_warn: Debounce::millis(500),
-        debounce_critical: Debounce::secs(1),
+        limits: Limits::above(Some(Param::MotOutWarn), Some(Param::MotOutCrit), 5.0),
+        debounce: [Debounce::millis(500), Debounce::secs(1)],
         when: When::InFlight,
         instances: JUDGED_MAX as u8,
         of: InstanceOf::Output,
@@ -156,10 +128,8 @@ pub(super) const CHECKS: &[Check] = &[
         role: Role::of(Group::MotorOutput, Group::MotorLoss.bit()),
         unit: Unit::of(""),
         is_flag: true,
-        warn: Some(Param::AlertWarn),
-        critical: Some(Param::AlertCrit),
-        debounce_warn: Debounce::millis(500),
-        debounce_critical: Debounce::secs(1),
+        limits: Limits::above(Some(Param::AlertWarn), Some(Param::AlertCrit), 0.0),
+        debounce: [Debounce::millis(500), Debounce::secs(1)],
         when: When::InFlight,
         instances: JUDGED_MAX as u8,
         of: InstanceOf::Output,
@@ -172,9 +142,7 @@ pub(super) const CHECKS: &[Check] = &[
         name: "thrust_lost",
         role: Role::of(Group::Other, DRIVE | Group::EscTelemetry.bit() | RATES | Group::EkfClimb.bit()),
         unit: Unit::of("s"),
-        warn: Some(Param::ThrustWarn),
-        critical: None,
-        hysteresis: 0.0,
+        limits: Limits::above(Some(Param::ThrustWarn), None, 0.0),
         when: When::InFlight,
         instances: 1,
         of: InstanceOf::Vehicle,
@@ -196,9 +164,7 @@ pub(super) const CHECKS: &[Check] = &[
     Check {
         name: "motor_trend",
         role: Role::of(Group::MotorTrend, 0),
-        warn: Some(Param::TrdEscWarn),
-        critical: Some(Param::TrdEscCrit),
-        hysteresis: 1.0,
+        limits: Limits::above(Some(Param::TrdEscWarn), Some(Param::TrdEscCrit), 1.0),
         instances: MOTORS_MAX as u8,
         read: motor_departure,
         ..TREND
@@ -210,7 +176,12 @@ pub(super) const CHECKS: &[Check] = &[
         read: |inputs, _| takes_more(inputs, Quantity::HoverPower),
         ..TREND
     },
-    Check { name: "weight_trend", critical: None, read: |inputs, _| heavier(inputs), ..TREND },
+    Check {
+        name: "weight_trend",
+        limits: Limits::above(Some(Param::TrdThrWarn), None, 2.0),
+        read: |inputs, _| heavier(inputs),
+        ..TREND
+    },
     Check { name: "drive_due", ..due(Subsystem::Propulsion) },
     alert::<{ Cause::Propulsion as usize }>(
         Subsystem::Propulsion,
@@ -236,28 +207,19 @@ fn motor_departure(inputs: &Inputs<'_>, motor: u8) -> Option<Reading> {
     departure(inputs, Quantity::MotorSpeed(motor)).or_else(|| departure(inputs, output()?))
 }
 
-fn motor(inputs: &Inputs<'_>, motor: u8) -> Option<Motor> {
-    inputs.vehicle.motors.get(usize::from(motor)).copied()
-}
-
-fn errors_per_minute(inputs: &Inputs<'_>, number: u8) -> Option<Reading> {
-    Reading::new(motor(inputs, number)?.state_at, inputs.derived.motors().errors(number))
-}
-
-fn temperature_c(inputs: &Inputs<'_>, number: u8) -> Option<Reading> {
-    let motor = motor(inputs, number)?;
-    Reading::new(motor.state_at, motor.esc.temperature.map(|temperature| temperature.0))
+/// A figure of a motor's last `ESC_INFO`.
+fn state(inputs: &Inputs<'_>, motor: u8, value: impl FnOnce(&Esc) -> Option<f32>) -> Option<Reading> {
+    let motor = inputs.vehicle.motors.get(usize::from(motor))?;
+    Reading::new(motor.state_at, value(&motor.esc))
 }
 
 /// `ESC_FAILURE_FLAGS`: over current 1, over voltage 2, over temperature 4, over rpm 8, inconsistent command 16, motor
 /// stuck 32, generic 64. A motor that is stuck or an ESC that failed cannot be flown on.
-fn failure_rank(inputs: &Inputs<'_>, number: u8) -> Option<Reading> {
+fn failure_rank(flags: u16) -> f32 {
     const STUCK_OR_FAILED: u16 = 0x60;
-    let motor = motor(inputs, number)?;
-    let rank = |flags: u16| match flags {
+    match flags {
         0 => 0.0,
         flags if flags & STUCK_OR_FAILED != 0 => 2.0,
         _ => 1.0,
-    };
-    Reading::new(motor.state_at, motor.esc.failures.map(rank))
+    }
 }

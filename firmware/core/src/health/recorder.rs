@@ -1,6 +1,6 @@
 //! Our own recording: a black box that stopped unnoticed is the failure that pilots report most.
 
-use super::check::{Check, Debounce, InstanceOf, Side, Unit, When};
+use super::check::{Check, Debounce, InstanceOf, Limits, Unit, When};
 use super::common::due;
 use super::finding::Subsystem;
 use super::inputs::Inputs;
@@ -13,12 +13,8 @@ const STATE: Check = Check {
     name: "recording",
     subsystem: Subsystem::Recorder,
     unit: Unit::of(""),
-    side: Side::Above,
-    warn: Some(Param::RecStopWarn),
-    critical: Some(Param::RecStopCrit),
-    hysteresis: 0.0,
-    debounce_warn: Debounce::secs(1),
-    debounce_critical: Debounce::secs(1),
+    limits: Limits::above(Some(Param::RecStopWarn), Some(Param::RecStopCrit), 0.0),
+    debounce: [Debounce::secs(1); 2],
     when: When::Always,
     stale_s: None,
     instances: 1,
@@ -35,52 +31,42 @@ pub(super) const CHECKS: &[Check] = &[
         name: "record_queue",
         role: Role::of(Group::Other, Group::Recording.bit()),
         unit: Unit::of("%"),
-        warn: Some(Param::RecQueueWarn),
-        critical: Some(Param::RecQueueCrit),
-        hysteresis: 10.0,
-        debounce_warn: Debounce::NONE,
-        debounce_critical: Debounce::NONE,
-        read: |inputs, _| Some(Reading { at: inputs.now, value: inputs.recorder.queue * 100.0 }),
+        limits: Limits::above(Some(Param::RecQueueWarn), Some(Param::RecQueueCrit), 10.0),
+        debounce: [Debounce::NONE; 2],
+        read: |inputs, _| inputs.reading(inputs.recorder.queue * 100.0),
         ..STATE
     },
     Check {
         name: "record_lost",
         role: Role::of(Group::Other, Group::Recording.bit()),
         unit: Unit::of("frames"),
-        warn: Some(Param::RecLostWarn),
-        critical: None,
-        debounce_warn: Debounce::NONE,
-        read: |inputs, _| Some(Reading { at: inputs.now, value: inputs.derived.frames_lost_lately() }),
+        limits: Limits::above(Some(Param::RecLostWarn), None, 0.0),
+        debounce: [Debounce::NONE, Debounce::secs(1)],
+        read: |inputs, _| inputs.reading(inputs.derived.frames_lost_lately()),
         ..STATE
     },
     Check {
         name: "card_stall",
         role: Role::of(Group::Other, Group::Recording.bit()),
         unit: Unit::of("ms"),
-        warn: Some(Param::RecStallWarn),
-        critical: Some(Param::RecStallCrit),
-        debounce_warn: Debounce::NONE,
-        debounce_critical: Debounce::NONE,
-        read: |inputs, _| Some(Reading { at: inputs.now, value: inputs.recorder.stall.as_millis() as f32 }),
+        limits: Limits::above(Some(Param::RecStallWarn), Some(Param::RecStallCrit), 0.0),
+        debounce: [Debounce::NONE; 2],
+        read: |inputs, _| inputs.reading(inputs.recorder.stall.as_millis() as f32),
         ..STATE
     },
     Check {
         name: "card_errors",
         role: Role::of(Group::Other, Group::Recording.bit()),
-        warn: Some(Param::RecErrWarn),
-        critical: None,
-        debounce_warn: Debounce::NONE,
-        read: |inputs, _| Some(Reading { at: inputs.now, value: inputs.derived.write_errors_lately() }),
+        limits: Limits::above(Some(Param::RecErrWarn), None, 0.0),
+        debounce: [Debounce::NONE, Debounce::secs(1)],
+        read: |inputs, _| inputs.reading(inputs.derived.write_errors_lately()),
         ..STATE
     },
     Check {
         name: "card_room",
         unit: Unit::of("%"),
-        side: Side::Below,
-        warn: Some(Param::RecRoomWarn),
-        critical: Some(Param::RecRoomCrit),
-        hysteresis: 1.0,
-        read: |inputs, _| Some(Reading { at: inputs.now, value: inputs.recorder.room? * 100.0 }),
+        limits: Limits::below(Some(Param::RecRoomWarn), Some(Param::RecRoomCrit), 1.0),
+        read: |inputs, _| inputs.reading(inputs.recorder.room? * 100.0),
         ..STATE
     },
     Check { name: "card_due", ..due(Subsystem::Recorder) },
@@ -94,5 +80,5 @@ fn stopped_rank(inputs: &Inputs<'_>, _: u8) -> Option<Reading> {
         Recording::Stopped if inputs.vehicle.armed() => 2.0,
         Recording::Stopped => 1.0,
     };
-    Some(Reading { at: inputs.now, value })
+    inputs.reading(value)
 }

@@ -1,13 +1,11 @@
 //! Vibration, clipping and load factor.
 
-use super::check::{Check, Debounce, InstanceOf, Side, Unit, When};
-use super::common::{STALE, alert, departure, due, px4_metric};
+use super::check::{Check, Debounce, InstanceOf, Limits, Unit, When};
+use super::common::{STALE, alert, departure, due, vibration};
 use super::finding::Subsystem;
-use super::inputs::Inputs;
 use super::suppression::{DRIVE, Group, INERTIAL, Role, SHAKING};
 use crate::baseline::Quantity;
 use crate::cause::Cause;
-use crate::latest::Reading;
 use crate::observation::VibrationScale;
 use crate::params::Param;
 
@@ -15,12 +13,8 @@ const VIBRATION: Check = Check {
     name: "vibration",
     subsystem: Subsystem::Structure,
     unit: Unit::of("m/s2"),
-    side: Side::Above,
-    warn: Some(Param::VibeWarn),
-    critical: Some(Param::VibeCrit),
-    hysteresis: 3.0,
-    debounce_warn: Debounce::secs(1),
-    debounce_critical: Debounce::secs(1),
+    limits: Limits::above(Some(Param::VibeWarn), Some(Param::VibeCrit), 3.0),
+    debounce: [Debounce::secs(1); 2],
     when: When::Armed,
     stale_s: STALE,
     instances: 1,
@@ -28,7 +22,9 @@ const VIBRATION: Check = Check {
     is_flag: false,
     role: Role::NONE,
     of: InstanceOf::Vehicle,
-    read: per_axis,
+    read: |inputs, _| {
+        vibration(inputs, VibrationScale::PerAxis, |levels| levels.into_iter().flatten().reduce(f32::max))
+    },
 };
 
 pub(super) const CHECKS: &[Check] = &[
@@ -36,21 +32,17 @@ pub(super) const CHECKS: &[Check] = &[
     Check {
         name: "vibration_px4",
         role: Role::of(Group::Vibration, 0),
-        warn: Some(Param::VibePx4Warn),
-        critical: Some(Param::VibePx4Crit),
-        hysteresis: 0.5,
-        read: |inputs, _| px4_metric(inputs, 2),
+        limits: Limits::above(Some(Param::VibePx4Warn), Some(Param::VibePx4Crit), 0.5),
+        read: |inputs, _| vibration(inputs, VibrationScale::Px4Metrics, |[.., accelerometer]| accelerometer),
         ..VIBRATION
     },
     Check {
         name: "vibration_rise",
         role: Role::of(Group::Shaking, DRIVE | Group::EscTelemetry.bit() | Group::Vibration.bit()),
         unit: Unit::of("times"),
-        warn: Some(Param::VibeRiseWarn),
-        critical: None,
-        hysteresis: 0.5,
+        limits: Limits::above(Some(Param::VibeRiseWarn), None, 0.5),
         // Two messages at 5 Hz.
-        debounce_warn: Debounce::millis(200),
+        debounce: [Debounce::millis(200), Debounce::secs(1)],
         when: When::InFlight,
         // Never stale: only what flies on rotors says something.
         stale_s: None,
@@ -61,11 +53,8 @@ pub(super) const CHECKS: &[Check] = &[
         name: "clipping",
         role: Role::of(Group::Shaking, Group::Vibration.bit()),
         unit: Unit::of(""),
-        warn: Some(Param::ClipWarn),
-        critical: Some(Param::ClipCrit),
-        hysteresis: 0.0,
-        debounce_warn: Debounce::NONE,
-        debounce_critical: Debounce::NONE,
+        limits: Limits::above(Some(Param::ClipWarn), Some(Param::ClipCrit), 0.0),
+        debounce: [Debounce::NONE; 2],
         when: When::InFlight,
         read: |inputs, _| inputs.derived.clips(inputs.vehicle),
         ..VIBRATION
@@ -74,12 +63,9 @@ pub(super) const CHECKS: &[Check] = &[
         name: "load_factor",
         role: Role::of(Group::Other, SHAKING),
         unit: Unit::of("g"),
-        warn: Some(Param::LoadFacWarn),
-        critical: Some(Param::LoadFacCrit),
-        hysteresis: 0.2,
+        limits: Limits::above(Some(Param::LoadFacWarn), Some(Param::LoadFacCrit), 0.2),
         // What lasts is a manoeuvre; a shock or vibration does not, and an impact is a mishap.
-        debounce_warn: Debounce::millis(500),
-        debounce_critical: Debounce::millis(500),
+        debounce: [Debounce::millis(500); 2],
         when: When::InFlight,
         // Never stale: what shakes has none.
         stale_s: None,
@@ -90,11 +76,8 @@ pub(super) const CHECKS: &[Check] = &[
     Check {
         name: "vibration_trend",
         unit: Unit::of("%"),
-        warn: Some(Param::TrdVibeWarn),
-        critical: Some(Param::TrdVibeCrit),
-        hysteresis: 5.0,
-        debounce_warn: Debounce::secs(10),
-        debounce_critical: Debounce::secs(10),
+        limits: Limits::above(Some(Param::TrdVibeWarn), Some(Param::TrdVibeCrit), 5.0),
+        debounce: [Debounce::secs(10); 2],
         when: When::InFlight,
         // A trend holds until the next figure.
         stale_s: None,
@@ -108,9 +91,3 @@ pub(super) const CHECKS: &[Check] = &[
         Role::of(Group::VibrationWord, Group::Vibration.bit() | INERTIAL | Group::ImuGnss.bit()),
     ),
 ];
-
-fn per_axis(inputs: &Inputs<'_>, _: u8) -> Option<Reading> {
-    let slot = &inputs.vehicle.vibration;
-    let vibration = slot.get().filter(|vibration| vibration.scale == VibrationScale::PerAxis)?;
-    Reading::new(slot.at(), vibration.levels.into_iter().flatten().reduce(f32::max))
-}

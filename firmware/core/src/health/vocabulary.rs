@@ -117,20 +117,19 @@ pub fn vocabulary(check: &str) -> Option<&'static Words> {
 }
 
 /// What a radio text says of a check.
-pub fn said(check: &str) -> Option<&'static Said> {
-    SAID.iter().find(|said| said.check == check)
+pub fn said(check: &str) -> Option<Said> {
+    let is_of = |line: &&str| line.strip_prefix(check).is_some_and(|rest| rest.starts_with('\t'));
+    let mut fields = SAID.split('\n').find(is_of)?.split('\t');
+    let mut next = || fields.next();
+    Some(Said { check: next()?, name: next()?, part: next()?, alarm: next()?, advice: next()? })
 }
 
 macro_rules! vocabulary {
     ($($check:literal $scope:ident $name:literal, $part:literal, says $alarm:literal, $advice:literal, needs $needs:literal;
        $meaning:literal; $action:literal;)*) => {
-        const SAID: &[Said] = &[$(Said {
-            check: $check,
-            name: $name,
-            part: $part,
-            alarm: $alarm,
-            advice: $advice,
-        },)*];
+        /// What the firmware links, in one text: a line for each check, and a tab between its words.
+        const SAID: &str =
+            concat!($($check, "\t", $name, "\t", $part, "\t", $alarm, "\t", $advice, "\n"),*);
 
         /// Every check, in the order of the subsystems' tables.
         pub const VOCABULARY: &[Words] = &[$(Words {
@@ -451,6 +450,8 @@ mod tests {
         let checks: Vec<&str> = checks().map(|check| check.name).collect();
         let words: Vec<&str> = VOCABULARY.iter().map(|words| words.said.check).collect();
         assert_eq!(words, checks);
+        assert!(VOCABULARY.iter().all(|words| said(words.said.check) == Some(words.said)));
+        assert_eq!([said(""), said("batt"), said("of_later")], [None; 3]);
     }
 
     #[test]
@@ -477,7 +478,8 @@ mod tests {
             assert!(!alarm.is_empty() && alarm.is_ascii() && advice.is_ascii(), "{check}");
             assert_eq!(alarm.contains('#'), !part.is_empty(), "{check}: {alarm}");
             assert!(alarm.matches('#').count() <= 1, "{check}: {alarm}");
-            let is_critical = crate::health::check_named(check).is_some_and(|check| check.critical.is_some());
+            let is_critical =
+                crate::health::check_named(check).is_some_and(|check| check.limits.critical.is_some());
             assert_eq!(is_critical, !advice.is_empty(), "{check}: {advice}");
             let other = VOCABULARY[..index].iter().find(|other| other.said.alarm == alarm);
             assert_eq!(other.is_some(), twins.contains(&check), "{check}: {alarm}");

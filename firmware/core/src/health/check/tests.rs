@@ -6,12 +6,8 @@ const CHECK: Check = Check {
     name: "tilt",
     subsystem: Subsystem::Attitude,
     unit: Unit::of("deg"),
-    side: Side::Above,
-    warn: Some(Param::TiltWarn),
-    critical: Some(Param::TiltCrit),
-    hysteresis: 5.0,
-    debounce_warn: Debounce::millis(500),
-    debounce_critical: Debounce::millis(200),
+    limits: Limits::above(Some(Param::TiltWarn), Some(Param::TiltCrit), 5.0),
+    debounce: [Debounce::millis(500), Debounce::millis(200)],
     when: When::Always,
     stale_s: NonZeroU8::new(1),
     instances: 1,
@@ -22,296 +18,160 @@ const CHECK: Check = Check {
     read: |_, _| None,
 };
 
-/// Steps every 50 ms through (milliseconds, value) and gives (milliseconds, level) of each change.
-fn run(check: &Check, values: &[(u64, f32)]) -> Vec<(u64, Level)> {
-    let params = Params::defaults();
-    let mut state = State::new();
-    let mut changes = Vec::new();
-    let mut now_ms = 0;
-    for (until_ms, value) in values {
-        while now_ms < *until_ms {
-            let now = Instant::from_millis(now_ms);
-            let reading = Some(Reading { at: now, value: *value });
-            changes
-                .extend(state.step(check, now, reading, true, &params).map(|change| (now_ms, change.level)));
-            now_ms += 50;
+/// Steps every 50 ms through a script, and gives the changes of level and the last level: `500 warning, 3000 ok | ok`. A script has times in
+/// milliseconds, the last one of which is the end: `10` is measured at each step from then on, `+10` after each step began, `=10` once and then
+/// held; from `-` on nothing is measured, and from `off` on the check does not apply.
+fn changes(check: &Check, script: &str, start_ms: u64) -> String {
+    let (mut state, mut told) = (State::new(), Vec::new());
+    let mut parts = script.split(", ").peekable();
+    while let Some((from, what)) = parts.next().and_then(|part| part.split_once(' ')) {
+        let ms = |text: &str| text.parse::<u64>().unwrap();
+        let from_ms = ms(from);
+        let until_ms = parts.peek().map_or(from_ms, |next| ms(next.split(' ').next().unwrap()));
+        let value = what.trim_start_matches(['=', '+']).parse().ok();
+        for now_ms in (from_ms..until_ms).step_by(50) {
+            let measured_ms = match what.as_bytes()[0] {
+                b'=' => from_ms,
+                b'+' => now_ms + 20,
+                _ => now_ms,
+            };
+            let [now, at] = [now_ms, measured_ms].map(|ms| Instant::from_millis(start_ms + ms));
+            let reading = value.map(|value| Reading { at, value });
+            let change = state.step(check, now, reading, what != "off", &Params::defaults());
+            told.extend(change.map(|change| format!("{now_ms} {}", change.level.name())));
         }
     }
-    changes
+    format!("{} | {}", told.join(", "), state.level().map_or("none", Level::name))
 }
 
 #[test]
-fn a_level_rises_after_its_debounce_and_falls_after_the_clear_time() {
-    let changes = run(&CHECK, &[(1_000, 10.0), (3_000, 50.0), (4_000, 70.0), (10_000, 10.0)]);
-    let expected = [(1_500, Level::Warning), (3_200, Level::Critical), (6_000, Level::Ok)];
-    assert_eq!(changes, expected);
-}
-
-#[test]
-fn a_short_excursion_is_no_finding() {
-    assert_eq!(run(&CHECK, &[(1_000, 10.0), (1_450, 50.0), (5_000, 10.0)]), []);
-}
-
-#[test]
-fn a_value_at_its_limit_is_good_and_at_the_end_of_its_hysteresis_good_again() {
-    let below = Check {
-        side: Side::Below,
-        warn: Some(Param::BatRemWarn),
-        critical: Some(Param::BatRemCrit),
-        hysteresis: 1.0,
-        ..CHECK
-    };
-    for (check, limit, just_beyond, end) in [(&CHECK, 45.0, 45.1, 40.0), (&below, 15.0, 14.9, 16.0)] {
-        assert_eq!(run(check, &[(5_000, limit)]), []);
-        let changes = run(check, &[(1_000, just_beyond), (4_000, end)]);
-        assert_eq!(changes, [(500, Level::Warning), (3_000, Level::Ok)]);
+fn a_level_is_what_its_values_of_some_time_say() {
+    let above = Limits::above(Some(Param::TiltWarn), Some(Param::TiltCrit), 5.0);
+    let alone = Limits { warn: None, ..above };
+    let battery = Limits::below(Some(Param::BatRemWarn), Some(Param::BatRemCrit), 1.0);
+    let cell = Limits::below(Some(Param::CellVoltWarn), Some(Param::CellVoltCrit), 0.05);
+    let minute = Debounce::secs(60);
+    let [usual, none, long] = [CHECK.debounce, [Debounce::NONE; 2], [minute; 2]];
+    for (limits, debounce, stale_s, script, expected) in [
+        // It rises after its debounce, and falls after the time that it must be good.
+        (
+            above,
+            usual,
+            1,
+            "0 10, 1000 50, 3000 70, 4000 10, 10000",
+            "1500 warning, 3200 critical, 6000 ok | ok",
+        ),
+        (
+            cell,
+            usual,
+            1,
+            "0 3.8, 1000 3.55, 3000 3.4, 4000 3.9, 10000",
+            "1500 warning, 3200 critical, 6000 ok | ok",
+        ),
+        (above, usual, 1, "0 10, 1000 50, 1450 10, 5000", " | ok"),
+        (alone, long, 1, "0 10, 1000 70, 62000", "61000 critical | critical"),
+        // At its limit it is good, and at the end of its hysteresis good again.
+        (above, usual, 1, "0 45, 5000", " | ok"),
+        (battery, usual, 1, "0 15, 5000", " | ok"),
+        (above, usual, 1, "0 45.1, 1000 40, 4000", "500 warning, 3000 ok | ok"),
+        (battery, usual, 1, "0 14.9, 1000 16, 4000", "500 warning, 3000 ok | ok"),
+        (above, usual, 1, "0 50, 1000 42, 20000 39, 30000", "500 warning, 22000 ok | ok"),
+        // Silence is stale, is told once, and is not healthy.
+        (above, usual, 1, "0 =1, 1500 =1, 2000", "1050 stale, 1500 ok | ok"),
+        (above, usual, 1, "0 NaN, 50 inf, 100 -inf, 150 -, 200", " | none"),
+        (above, usual, 1, "0 10, 1000 -, 3000 70, 5000", "2000 stale, 3200 critical | critical"),
+        (above, usual, 1, "0 10, 500 50, 2000 -, 5000", "1000 warning, 3000 stale | stale"),
+        // A first value that is bad is not OK while it is debounced.
+        (above, usual, 1, "0 70, 50", " | none"),
+        (alone, usual, 1, "0 70, 50", " | none"),
+        // A value that came after the step began is fresh.
+        (above, usual, 1, "0 -, 50 +10, 100", " | ok"),
+        // A check that does not apply has no level.
+        (above, usual, 1, "0 10, 50 off, 100", " | none"),
+        (above, usual, 1, "0 50, 1000 off, 1050", "500 warning, 1000 ok | none"),
+        // One message of nonsense is no alarm, however long it is held, and also if it is the last one.
+        (above, usual, 12, "0 =10, 2500 =170, 5000 =10, 10000", " | ok"),
+        (above, usual, 12, "0 =10, 2500 =170, 14000", " | ok"),
+        (above, usual, 12, "0 =10, 2500 =170, 5000 =170, 7500 =10, 12000", "5000 critical, 9500 ok | ok"),
+        (above, none, 12, "0 =10, 2500 =170, 5000 =170, 7500", "5000 critical | critical"),
+        // A critical value needs two measurements of its own.
+        (
+            above,
+            usual,
+            12,
+            "0 =50, 1000 =50, 2000 =70, 3000 =50, 4000 =70, 5000 =70, 6000",
+            "1000 warning, 5000 critical | critical",
+        ),
+        // Two bad measurements in a row count although the value grew stale between them.
+        (above, usual, 5, "0 =10, 20000 =170, 40000 =170, 42000", "5050 stale, 40200 critical | critical"),
+    ] {
+        let check = Check { limits, debounce, stale_s: NonZeroU8::new(stale_s), ..CHECK };
+        // Also across the end of the counter of milliseconds.
+        for start_ms in [0, u64::from(u32::MAX) - 1_050] {
+            assert_eq!(changes(&check, script, start_ms), expected, "{script}");
+        }
     }
 }
 
 #[test]
 fn a_change_tells_its_value_and_the_limit_it_crossed() {
-    let params = Params::defaults();
-    let no_warning = Check { warn: None, ..CHECK };
-    let cases = [
-        (&CHECK, 50.0, Level::Warning, 45.0),
-        (&CHECK, 70.0, Level::Critical, 60.0),
-        (&no_warning, 70.0, Level::Critical, 60.0),
-    ];
-    for (check, value, level, limit) in cases {
+    let no_warning = Check { limits: Limits { warn: None, ..CHECK.limits }, ..CHECK };
+    for (check, value, level, limit, falls_below) in [
+        (&CHECK, 50.0, Level::Warning, 45.0, 45.0),
+        (&CHECK, 70.0, Level::Critical, 60.0, 45.0),
+        (&no_warning, 70.0, Level::Critical, 60.0, 60.0),
+    ] {
         let (mut state, mut told) = (State::new(), Vec::new());
         for now_ms in (0..6_000).step_by(50) {
-            let now = Instant::from_millis(now_ms);
+            let at = Instant::from_millis(now_ms);
             let value = if now_ms <= 2_000 { value } else { 10.0 };
-            told.extend(state.step(check, now, Some(Reading { at: now, value }), true, &params));
+            told.extend(state.step(check, at, Some(Reading { at, value }), true, &Params::defaults()));
         }
         let rises = Change { level, previous: Level::Ok, value, limit };
-        let falls_below = if check.warn.is_some() { 45.0 } else { 60.0 };
         let falls = Change { level: Level::Ok, previous: level, value: 10.0, limit: falls_below };
         assert_eq!(told, [rises, falls]);
     }
 }
 
-#[test]
-fn within_the_hysteresis_the_level_stays() {
-    let changes = run(&CHECK, &[(1_000, 50.0), (20_000, 42.0), (30_000, 39.0)]);
-    assert_eq!(changes, [(500, Level::Warning), (22_000, Level::Ok)]);
-}
-
-#[test]
-fn a_side_below_mirrors_everything() {
-    let below = Check {
-        side: Side::Below,
-        warn: Some(Param::CellVoltWarn),
-        critical: Some(Param::CellVoltCrit),
-        hysteresis: 0.05,
-        ..CHECK
-    };
-    let changes = run(&below, &[(1_000, 3.8), (3_000, 3.55), (4_000, 3.4), (10_000, 3.9)]);
-    assert_eq!(changes, [(1_500, Level::Warning), (3_200, Level::Critical), (6_000, Level::Ok)]);
-}
-
-#[test]
-fn silence_is_stale_and_not_healthy() {
-    let params = Params::defaults();
-    let mut state = State::new();
-    let reading = Some(Reading { at: Instant::ZERO, value: 1.0 });
-    assert_eq!(state.step(&CHECK, Instant::ZERO, reading, true, &params), None);
-    assert_eq!(state.level(), Some(Level::Ok));
-    let late = Instant::from_millis(1_050);
-    let change = state.step(&CHECK, late, reading, true, &params).expect("it is stale");
-    assert_eq!((change.level, change.previous), (Level::Stale, Level::Ok));
-    assert_eq!(state.step(&CHECK, late, reading, true, &params), None, "said once");
-    let fresh = Some(Reading { at: late, value: 1.0 });
-    let change = state.step(&CHECK, late, fresh, true, &params).expect("it is back");
-    assert_eq!((change.level, change.previous), (Level::Ok, Level::Stale));
-}
-
-#[test]
-fn what_was_never_seen_or_is_no_number_is_not_ok() {
-    let params = Params::defaults();
-    let mut state = State::new();
-    for value in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
-        let reading = Some(Reading { at: Instant::ZERO, value });
-        assert_eq!(state.step(&CHECK, Instant::ZERO, reading, true, &params), None);
-    }
-    assert_eq!(state.step(&CHECK, Instant::ZERO, None, true, &params), None);
-    assert_eq!(state.level(), None);
-}
-
-#[test]
-fn a_value_that_is_no_longer_given_grows_stale_and_bad_news_after_that_is_never_ok() {
-    let params = Params::defaults();
-    let mut state = State::new();
-    let mut levels = Vec::new();
-    for now_ms in (0..5_000).step_by(50) {
-        let now = Instant::from_millis(now_ms);
-        let value = if now_ms < 1_000 { Some(10.0) } else { (now_ms >= 3_000).then_some(70.0) };
-        let reading = value.map(|value| Reading { at: now, value });
-        let change = state.step(&CHECK, now, reading, true, &params);
-        levels.extend(change.map(|change| (now_ms, change.level)));
-    }
-    assert_eq!(levels, [(2_000, Level::Stale), (3_200, Level::Critical)]);
-}
-
-#[test]
-fn a_first_value_that_is_bad_is_not_ok_while_it_is_debounced() {
-    let params = Params::defaults();
-    for check in [CHECK, Check { warn: None, ..CHECK }] {
-        let mut state = State::new();
-        let reading = Some(Reading { at: Instant::ZERO, value: 70.0 });
-        assert_eq!(state.step(&check, Instant::ZERO, reading, true, &params), None);
-        assert_eq!(state.level(), None);
-    }
-}
-
-#[test]
-fn debounce_and_staleness_hold_across_the_end_of_the_counter_of_milliseconds() {
-    let params = Params::defaults();
-    let mut state = State::new();
-    let mut levels = Vec::new();
-    let start_ms = u64::from(u32::MAX) - 1_050;
-    for after_ms in (0..5_000).step_by(50) {
-        let now = Instant::from_millis(start_ms + after_ms);
-        let value = if after_ms < 500 { 10.0 } else { 50.0 };
-        let reading = (after_ms < 2_000).then_some(Reading { at: now, value });
-        let change = state.step(&CHECK, now, reading, true, &params);
-        levels.extend(change.map(|change| (after_ms, change.level)));
-    }
-    assert_eq!(levels, [(1_000, Level::Warning), (3_000, Level::Stale)]);
-}
-
-#[test]
-fn a_value_that_came_after_the_step_began_is_fresh() {
-    let params = Params::defaults();
-    let mut state = State::new();
-    let reading = Some(Reading { at: Instant::from_millis(70), value: 10.0 });
-    assert_eq!(state.step(&CHECK, Instant::from_millis(50), reading, true, &params), None);
-    assert_eq!(state.level(), Some(Level::Ok));
-}
-
-#[test]
-fn a_check_without_a_warning_limit_never_warns() {
-    let check = Check { warn: None, debounce_critical: Debounce::secs(60), ..CHECK };
-    let changes = run(&check, &[(1_000, 10.0), (62_000, 70.0)]);
-    assert_eq!(changes, [(61_000, Level::Critical)]);
-}
-
-#[test]
-fn what_does_not_apply_has_no_level() {
-    let params = Params::defaults();
-    let mut state = State::new();
-    let reading = Some(Reading { at: Instant::ZERO, value: 10.0 });
-    state.step(&CHECK, Instant::ZERO, reading, true, &params);
-    assert_eq!(state.level(), Some(Level::Ok));
-    assert_eq!(state.step(&CHECK, Instant::ZERO, reading, false, &params), None);
-    assert_eq!(state.level(), None);
-}
-
-#[test]
-fn what_no_longer_applies_is_no_longer_bad() {
-    let params = Params::defaults();
-    let mut state = State::new();
-    for now_ms in (0..1_000).step_by(50) {
-        let now = Instant::from_millis(now_ms);
-        state.step(&CHECK, now, Some(Reading { at: now, value: 50.0 }), true, &params);
-    }
-    assert_eq!(state.level(), Some(Level::Warning));
-    let change = state.step(&CHECK, Instant::from_millis(1_000), None, false, &params).expect("it clears");
-    assert_eq!(change.level, Level::Ok);
-}
-
-/// Steps every 50 ms through measurements (milliseconds, value), each of which is held until the next.
-fn hold(check: &Check, samples: &[(u64, f32)], until_ms: u64) -> Vec<(u64, Level)> {
-    let params = Params::defaults();
-    let mut state = State::new();
-    let mut changes = Vec::new();
-    for now_ms in (0..until_ms).step_by(50) {
-        let now = Instant::from_millis(now_ms);
-        let last = samples.iter().rev().find(|(at_ms, _)| *at_ms <= now_ms);
-        let reading = last.map(|(at_ms, value)| Reading { at: Instant::from_millis(*at_ms), value: *value });
-        let change = state.step(check, now, reading, true, &params);
-        changes.extend(change.map(|change| (now_ms, change.level)));
-    }
-    changes
-}
-
-#[test]
-fn one_message_of_nonsense_is_never_an_alarm_however_long_it_is_held() {
-    // BATTERY_STATUS comes every 2.5 s over a radio.
-    let slow = Check { stale_s: NonZeroU8::new(12), ..CHECK };
-    assert_eq!(hold(&slow, &[(0, 10.0), (2_500, 170.0), (5_000, 10.0)], 10_000), []);
-    assert_eq!(hold(&slow, &[(0, 10.0), (2_500, 170.0)], 14_000), [], "nor is the last one");
-    let twice = [(0, 10.0), (2_500, 170.0), (5_000, 170.0), (7_500, 10.0)];
-    assert_eq!(hold(&slow, &twice, 12_000), [(5_000, Level::Critical), (9_500, Level::Ok)]);
-    let no_debounce = Check { debounce_critical: Debounce::NONE, debounce_warn: Debounce::NONE, ..slow };
-    assert_eq!(hold(&no_debounce, &twice, 7_500), [(5_000, Level::Critical)]);
-}
-
-#[test]
-fn a_critical_value_needs_two_samples_of_its_own() {
-    let slow = Check { stale_s: NonZeroU8::new(12), ..CHECK };
-    let samples = [(0, 50.0), (1_000, 50.0), (2_000, 70.0), (3_000, 50.0), (4_000, 70.0), (5_000, 70.0)];
-    assert_eq!(hold(&slow, &samples, 6_000), [(1_000, Level::Warning), (5_000, Level::Critical)]);
-}
-
-#[test]
-fn two_bad_measurements_in_a_row_count_although_the_value_grew_stale_between_them() {
-    let sparse = Check { stale_s: NonZeroU8::new(5), ..CHECK };
-    let levels = hold(&sparse, &[(0, 10.0), (20_000, 170.0), (40_000, 170.0)], 42_000);
-    assert_eq!(levels.last(), Some(&(40_200, Level::Critical)), "{levels:?}");
+/// Bad for two seconds, every so often, and what is between: the changes of level, each without the times before its period.
+fn again(when: When, times: u64, period_ms: u64, after: impl Fn(u64) -> String) -> Vec<(u64, Level)> {
+    let script: Vec<String> =
+        (0..times).map(|time| format!("{} 50, {}", time * period_ms, after(time * period_ms))).collect();
+    let script = format!("{}, {}", script.join(", "), times * period_ms);
+    let changes = changes(&Check { when, ..CHECK }, &script, 0);
+    let changes = changes.split(" | ").next().unwrap().split(", ");
+    let parsed = changes.map(|change| change.split_once(' ').unwrap());
+    parsed
+        .map(|(ms, level)| {
+            let level = Level::ALL.into_iter().find(|known| known.name() == level).unwrap();
+            (ms.parse::<u64>().unwrap() % period_ms, level)
+        })
+        .collect()
 }
 
 #[test]
 fn a_value_that_goes_up_and_down_is_told_a_few_times_and_not_each_time() {
-    // Five minutes of two seconds beyond the limit, and eight below.
-    let values: Vec<_> =
-        (0..30).flat_map(|time| [(time * 10_000 + 2_000, 50.0), (time * 10_000 + 10_000, 10.0)]).collect();
-    let warnings = |when| {
-        let changes = run(&Check { when, ..CHECK }, &values);
-        changes.iter().filter(|(_, level)| *level == Level::Warning).count()
-    };
-    assert_eq!((warnings(When::InFlight), warnings(When::Always)), (2, 2));
-    // Good for longer than ever asked for, it is news again.
-    let good: Vec<_> =
-        (0..4).flat_map(|time| [(time * 150_000 + 2_000, 50.0), (time * 150_000 + 150_000, 10.0)]).collect();
-    let changes = run(&Check { when: When::InFlight, ..CHECK }, &good);
-    let at: Vec<u64> =
-        changes.iter().filter(|(_, level)| *level == Level::Ok).map(|(at_ms, _)| at_ms % 150_000).collect();
-    assert_eq!(at, [4_000, 18_000, 130_000, 130_000], "2 s, 16 s, and then 128 s");
-}
-
-#[test]
-fn what_no_longer_applies_forgets_how_often_it_was_bad() {
-    let (mut state, params) = (State::new(), Params::defaults());
-    let check = Check { when: When::InFlight, ..CHECK };
-    let mut cleared = Vec::new();
-    for now_ms in (0..80_000).step_by(50) {
-        let now = Instant::from_millis(now_ms);
-        // Landed for a second every 20 s.
-        let (value, applies) = (if now_ms % 20_000 < 2_000 { 50.0 } else { 10.0 }, now_ms % 20_000 < 19_000);
-        let reading = Some(Reading { at: now, value });
-        let change = state.step(&check, now, reading, applies, &params);
-        cleared.extend(change.filter(|change| change.level == Level::Ok).map(|_| now_ms % 20_000));
+    let good = |from_ms: u64| format!("{} 10", from_ms + 2_000);
+    for when in [When::InFlight, When::Always] {
+        let warnings = again(when, 30, 10_000, good);
+        assert_eq!(warnings.iter().filter(|(_, level)| *level == Level::Warning).count(), 2);
     }
-    assert_eq!(cleared, [4_000; 4]);
+    let falls = |changes: Vec<(u64, Level)>| -> Vec<u64> {
+        changes.into_iter().filter(|(_, level)| *level == Level::Ok).map(|(ms, _)| ms).collect()
+    };
+    // Good for longer than ever asked for, it is news again.
+    let times = falls(again(When::InFlight, 4, 150_000, good));
+    assert_eq!(times, [4_000, 18_000, 130_000, 130_000], "2 s, 16 s, and then 128 s");
+    // Landed for a second every 20 s: how often it was bad is forgotten.
+    let landed = |from_ms: u64| format!("{} 10, {} off", from_ms + 2_000, from_ms + 19_000);
+    assert_eq!(falls(again(When::InFlight, 4, 20_000, landed)), [4_000; 4]);
 }
 
 #[test]
 fn a_bad_value_of_a_slow_stream_is_told_twice_and_then_stays() {
-    let (mut state, params) = (State::new(), Params::defaults());
-    let check = Check { when: When::InFlight, ..CHECK };
-    let mut told = 0;
-    for now_ms in (0..60_000_u64).step_by(50) {
-        // A message each three seconds; it is stale after one.
-        let at = Instant::from_millis(now_ms / 3_000 * 3_000);
-        let change = state.step(
-            &check,
-            Instant::from_millis(now_ms),
-            Some(Reading { at, value: 50.0 }),
-            true,
-            &params,
-        );
-        told += u32::from(change.is_some_and(|change| change.level == Level::Warning));
-    }
-    assert_eq!((told, state.level()), (2, Some(Level::Warning)));
+    // A message each three seconds; it is stale after one.
+    let script: Vec<String> = (0..20).map(|message| format!("{} =50", message * 3_000)).collect();
+    let script = script.join(", ") + ", 60000";
+    let told = changes(&Check { when: When::InFlight, ..CHECK }, &script, 0);
+    assert_eq!(told, "1050 stale, 3500 warning, 4050 stale, 6500 warning | warning");
 }

@@ -1,0 +1,35 @@
+//! Names with numbers that are stored in logs: each stands once.
+
+/// An enumeration by number, with the name of each. A number and a name never change their meaning.
+macro_rules! numbered {
+    ($(#[$meta:meta])* $vis:vis enum $type:ident { $($(#[$doc:meta])* $variant:ident $name:literal,)* }) => {
+        $(#[$meta])*
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+        #[repr(u8)]
+        $vis enum $type {
+            $($(#[$doc])* $variant,)*
+        }
+
+        impl $type {
+            /// All of them, by number.
+            pub const ALL: [Self; [$($name),*].len()] = [$(Self::$variant),*];
+
+            /// How many there are.
+            pub const COUNT: usize = Self::ALL.len();
+
+            /// The name that logs, JSON and reports use.
+            pub const fn name(self) -> &'static str {
+                match self {
+                    $(Self::$variant => $name,)*
+                }
+            }
+
+            /// That of a stored number; `None` for one that this version does not know.
+            pub const fn from_number(number: u8) -> Option<Self> {
+                if (number as usize) < Self::COUNT { Some(Self::ALL[number as usize]) } else { None }
+            }
+        }
+    };
+}
+
+pub(crate) use numbered;
