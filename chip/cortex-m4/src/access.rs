@@ -7,7 +7,7 @@ use crate::processor::Core;
 use crate::registers::{FORCED, IMPRECISERR};
 use crate::trap::Trap;
 
-/// Where an access goes.
+/// The target of an access.
 enum Way {
     Bus,
     /// A bit of this word at this place.
@@ -280,8 +280,8 @@ impl Core {
     }
 }
 
-/// Whether an address is the processor's own on its private bus. What the chip's vendor has there (an STM32's DBGMCU at
-/// `0xE004_2000`) is the chip's.
+/// Whether an address is the processor's own on its private bus. The vendor's devices there (an STM32's DBGMCU at
+/// `0xE004_2000`) belong to the chip.
 pub(crate) fn own(address: u32) -> bool {
     address >> 20 == 0xE00 && address >> 12 != 0xE_0042
 }

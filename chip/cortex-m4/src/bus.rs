@@ -1,10 +1,10 @@
-//! The seam between the processor and the chip round it: what the processor asks of the bus.
+//! The interface between the processor and the chip round it.
 //!
-//! The processor's own registers (`0xE000_0000` to `0xE00F_FFFF`: SCS, NVIC, `SysTick`, DWT, ...) never reach the bus; bit-band
-//! aliases (`0x2200_0000`, `0x4200_0000`) reach it as a read, and for a store a write after it, of the byte, halfword or word (the
-//! size of the access) that holds the bit. All else does, device and memory alike.
+//! The processor's own registers (`0xE000_0000` to `0xE00F_FFFF`: SCS, NVIC, `SysTick`, DWT, ...) never reach the bus. Bit-band
+//! aliases (`0x2200_0000`, `0x4200_0000`) reach it as a read of the byte, halfword or word that holds the bit, by the size of the
+//! access; for a store a write follows. All other accesses reach it.
 //!
-//! `now` is the processor's count of cycles ([`crate::Core::cycles`]) at the start of the access: what a timer's counter is read by.
+//! `now` is the processor's count of cycles ([`crate::Core::cycles`]) at the start of the access. A timer's counter is read at this time.
 
 /// The width of an access.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -29,14 +29,14 @@ impl Size {
     }
 }
 
-/// What the bus refuses.
+/// An access that the bus refuses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Fault {
     /// An error response (nothing there, or not to be accessed so): a `BusFault` of the processor.
     Bus,
 }
 
-/// The chip, as the processor sees it. All addresses are aligned to the access: the core splits what is not.
+/// The chip, as the processor sees it. All addresses are aligned to the access: the core splits unaligned ones.
 pub trait Bus {
     /// A load. The value is zero-extended.
     fn read(&mut self, address: u32, size: Size, now: u64) -> Result<u32, Fault>;
@@ -44,12 +44,12 @@ pub trait Bus {
     /// A store. Of `value` the low bits of `size` count.
     fn write(&mut self, address: u32, size: Size, value: u32, now: u64) -> Result<(), Fault>;
 
-    /// An instruction's halfword. The core asks once and keeps what it decoded: whoever changes memory that may hold code by
-    /// another way than the core's own stores (DMA, the flash controller) calls [`crate::Core::forget_code`].
+    /// An instruction's halfword. The core asks once and keeps the decoded instruction. DMA and the flash controller, which change
+    /// memory without a store of the core, must call [`crate::Core::forget_code`].
     fn fetch(&mut self, address: u32) -> Result<u16, Fault>;
 
-    /// The wait states (processor cycles beyond the zero-wait time) of fetching an instruction of `bytes` (2 or 4) at `address`;
-    /// called once for each instruction executed, in order. `branched`: the pipeline was refilled at this address.
+    /// The wait states of a fetch of `bytes` (2 or 4) at `address`, in processor cycles beyond the zero-wait time. Called once for
+    /// each executed instruction, in order. `branched`: the pipeline was refilled at this address.
     fn fetch_wait(&mut self, address: u32, bytes: u32, branched: bool, now: u64) -> u32;
 
     /// The wait states that the loads and stores since the last call had, in processor cycles.

@@ -1,10 +1,10 @@
-//! What was decoded is kept by address, so that each instruction is decoded once.
+//! Decoded instructions by address: each is decoded once.
 
 use crate::op::Op;
 
 /// Halfwords that the cache holds at once: 256 KiB of code without a conflict.
 const ENTRIES: usize = 1 << 17;
-/// A page is what is forgotten together.
+/// Entries are discarded by page.
 const PAGE_BITS: u32 = 8;
 
 /// A decoded instruction.
@@ -65,7 +65,7 @@ impl Cache {
         }
     }
 
-    /// Forgets the pages of these bytes, and what reaches into them from the page before.
+    /// Discards the pages of these bytes, and an instruction that reaches into them from the page before.
     pub(crate) fn forget(&mut self, address: u32, bytes: u32) {
         let first = address >> PAGE_BITS;
         let last = address.saturating_add(bytes.max(1) - 1) >> PAGE_BITS;

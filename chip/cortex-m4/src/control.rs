@@ -1,7 +1,7 @@
 //! The system control space: SCB, NVIC, `SysTick`, MPU, FPU and debug registers, and the DWT's cycle counter.
 //!
 //! Addresses and reset values: `ARMv7-M` Architecture Reference Manual (DDI 0403E), chapters B3 and C1; Cortex-M4 TRM.
-//! Without a debugger: DHCSR shows none, FPB, ITM, TPIU and ETM are not there. An access to what is not modelled is told
+//! Without a debugger: DHCSR shows none, FPB, ITM, TPIU and ETM are not there. An unmodelled access is reported
 //! ([`crate::Outcome::Unmodelled`]).
 
 use crate::bus::Size;
@@ -89,7 +89,7 @@ impl Core {
             0xE000_ED40..=0xE000_ED70 => FEATURES[(address - 0xE000_ED40) as usize / 4],
             0xE000_ED88 => control.cpacr,
             0xE000_ED90..=0xE000_EDB8 => self.mpu.read(address - 0xE000_ED90).unwrap_or(0),
-            // DWT_LSR, for there is no lock; DFSR, AFSR, DHCSR and DCRDR without a debugger, STIR, MVFR2.
+            // DWT_LSR (no lock); DFSR, AFSR, DHCSR and DCRDR without a debugger, STIR, MVFR2.
             0xE000_1FB4 | 0xE000_ED30 | 0xE000_ED3C | 0xE000_EDF0 | 0xE000_EDF8 | 0xE000_EF00
             | 0xE000_EF48 => 0,
             0xE000_EDFC => control.demcr,

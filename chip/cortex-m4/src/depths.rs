@@ -1,4 +1,4 @@
-//! How deep each exception took the stack: what a program that measures itself by painting sees, without changing it.
+//! Stack depth of each exception, as a painted stack would show it, without a change of the program.
 
 /// One that was entered and has not returned.
 #[derive(Clone, Copy, Debug)]
@@ -6,16 +6,16 @@ struct Level {
     exception: u16,
     /// The stack pointer before its frame.
     begin: u32,
-    /// The lowest that what it interrupted had gone by then.
+    /// The lowest stack pointer of the interrupted code until then.
     interrupted: u32,
 }
 
 /// The main stack's use.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Depths {
-    /// The lowest stack pointer of what runs.
+    /// The lowest stack pointer of the running code.
     pub(crate) lowest: u32,
-    /// The stack pointer and [`Depths::lowest`] where an entry began.
+    /// The stack pointer and [`Depths::lowest`] at an entry.
     entering: (u32, u32),
     /// Thread mode first.
     levels: Vec<Level>,
@@ -51,7 +51,7 @@ impl Depths {
         }
     }
 
-    /// What was interrupted goes on.
+    /// Returns to the interrupted code.
     pub(crate) fn resumed(&mut self) {
         self.lowest = self.entering.1;
     }

@@ -113,7 +113,7 @@ impl Exceptions {
         new
     }
 
-    /// Takes back what is pending, unless its line holds it.
+    /// Clears a pending exception, unless its line holds it.
     pub(crate) fn unpend(&mut self, number: u16) {
         self.pending.put(number, self.high.has(number) && !self.active.has(number));
     }
@@ -155,7 +155,7 @@ impl Exceptions {
         self.priority[usize::from(number & 255)]
     }
 
-    /// Sets a priority, of which the lower bits are not there.
+    /// Sets a priority; its lower bits are not implemented.
     pub(crate) fn set_priority(&mut self, number: u16, value: u8) {
         let configurable = (4..=6).contains(&number)
             || matches!(number, SVCALL | DEBUG_MONITOR | PENDSV | SYSTICK)

@@ -301,7 +301,7 @@ impl Core {
         }
     }
 
-    /// Whether an exception pre-empts what is returned to, so that nothing need be unstacked.
+    /// Whether an exception pre-empts the code to return to, so that nothing is unstacked.
     fn due_after_return(&self, _value: u32) -> bool {
         self.due(self.priority()).is_some()
     }
@@ -409,7 +409,7 @@ impl Core {
         Ok(())
     }
 
-    /// What a floating-point instruction needs before it: access, the state of who was interrupted saved, a context of its own.
+    /// Prepares a floating-point instruction: access, saved state of the interrupted code, a context of its own.
     #[cold]
     #[inline(never)]
     pub(crate) fn prepare_float<B: Bus>(&mut self, bus: &mut B) -> Result<(), Trap> {
@@ -436,7 +436,7 @@ impl Core {
             self.fpscr = self.fpscr & !FPDSCR | self.control.fpdscr & FPDSCR;
             self.fp_active = true;
         }
-        // Unprivileged access may differ: only what holds for both is remembered.
+        // Unprivileged access may differ: only a result for both is remembered.
         self.fp_ready = self.control.cpacr >> 20 & 3 == 3;
         Ok(())
     }

@@ -22,7 +22,7 @@ impl Mpu {
         self.control & 1 != 0
     }
 
-    /// A register by its offset from `0xE000_ED90`; none where none is.
+    /// A register by its offset from `0xE000_ED90`; `None` for other offsets.
     pub(crate) fn read(&self, offset: u32) -> Option<u32> {
         let region = self.regions[usize::from(self.number)];
         match offset {
@@ -46,7 +46,7 @@ impl Mpu {
         if alias == 0 { usize::from(self.number) } else { usize::from(self.number & 4) + alias as usize }
     }
 
-    /// Writes a register; false where none is.
+    /// Writes a register; false for other offsets.
     pub(crate) fn write(&mut self, offset: u32, value: u32) -> bool {
         match offset {
             0 => {}

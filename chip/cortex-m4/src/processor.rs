@@ -1,4 +1,4 @@
-//! The processor's state, and what the chip round it may do with it.
+//! The processor's state, and the interface for the chip round it.
 
 use crate::bus::Bus;
 use crate::cache::Cache;
@@ -21,7 +21,7 @@ pub enum Outcome {
     Sleeping,
     /// AIRCR.SYSRESETREQ: the chip resets all, and then calls [`Core::reset`].
     ResetRequested,
-    /// A fault in a fault: only a reset helps (of which the watchdog's is one).
+    /// A fault in a fault: only a reset helps, for example the watchdog's.
     Lockup,
     /// BKPT with its number, if [`Core::stop_at_breakpoints`] was asked for. The program counter is at it; [`Core::skip`] goes on
     /// behind it.
@@ -44,7 +44,7 @@ pub struct Core {
     pub(crate) other_sp: u32,
     /// The address of the instruction that comes next, or that is executed now.
     pub(crate) pc: u32,
-    /// Where the executed instruction goes on.
+    /// The address after the executed instruction.
     pub(crate) next: u32,
     pub(crate) flags: Flags,
     /// `ITSTATE` for the next instruction, and for the one executed.
@@ -79,7 +79,7 @@ pub struct Core {
     pub(crate) leave: bool,
     /// The pipeline was refilled: the next fetch is from a new place.
     pub(crate) branched: bool,
-    /// What the last instruction wrote, for the timing of loads and stores: see [`crate::timing`].
+    /// The register that the last instruction wrote, for the timing of loads and stores: see [`crate::timing`].
     pub(crate) previous: u8,
     /// An exception's entry (or tail-chaining) is under way: the frame is on the stack, the vector not yet chosen.
     pub(crate) entering: Option<u32>,
@@ -205,7 +205,7 @@ impl Core {
     }
 
     /// How many bytes of the main stack this exception alone took at its deepest, its frame included, in all that was run; 0 is
-    /// thread mode. What interrupted it counts on its own.
+    /// thread mode. Interrupts count on their own.
     pub fn stack_depth(&self, exception: u16) -> u32 {
         self.depths.of(exception)
     }
@@ -286,7 +286,7 @@ impl Core {
         self.faults_stop = on;
     }
 
-    /// What was decoded of these bytes is forgotten: they were changed by DMA or the flash controller.
+    /// Discards the decoded instructions of these bytes, which DMA or the flash controller changed.
     pub fn forget_code(&mut self, address: u32, bytes: u32) {
         self.cache.forget(address, bytes);
     }
@@ -338,7 +338,7 @@ impl Core {
         if self.uses_process_stack() { (self.other_sp, self.r[13]) } else { (self.r[13], self.other_sp) }
     }
 
-    /// CFSR, HFSR, MMFAR, BFAR: what a report of a fault shows.
+    /// CFSR, HFSR, MMFAR, BFAR, for the report of a fault.
     pub fn fault_status(&self) -> [u32; 4] {
         [self.control.cfsr, self.control.hfsr, self.control.mmfar, self.control.bfar]
     }

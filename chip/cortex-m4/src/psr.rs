@@ -1,4 +1,4 @@
-//! The program status registers: flags, and where ITSTATE and the exception's number stand.
+//! The program status registers: flags, ITSTATE, the exception's number.
 
 /// APSR: the flags of conditions, saturation, and of parallel additions.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -1,4 +1,4 @@
-//! The registers of the system control space that hold no more than what was written, and the bits of them that matter.
+//! The registers of the system control space that only hold their written value, and their significant bits.
 
 /// Bits of CFSR: its bytes are MMFSR, BFSR and the halfword UFSR.
 pub(crate) const IACCVIOL: u32 = 1;
@@ -45,7 +45,7 @@ pub(crate) const FPSCR: u32 = 0xF7C0_009F;
 /// The bits of FPDSCR, and of FPSCR that come from it.
 pub(crate) const FPDSCR: u32 = 0x07C0_0000;
 
-/// The registers that hold no more than what was written.
+/// The registers that only hold their written value.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Control {
     pub(crate) actlr: u32,
@@ -62,7 +62,7 @@ pub(crate) struct Control {
     pub(crate) fpdscr: u32,
     pub(crate) demcr: u32,
     pub(crate) dwt: u32,
-    /// What to take from the count of cycles for CYCCNT while it counts; else its value.
+    /// Offset from the count of cycles to CYCCNT while it counts; else its value.
     pub(crate) cyccnt: u32,
 }
 
@@ -94,7 +94,7 @@ impl Control {
         self.demcr >> 16 & 1 == 1
     }
 
-    /// What unprivileged code may reach of the private bus: STIR, if CCR says so.
+    /// Unprivileged access to the private bus: STIR, if CCR allows it.
     pub(crate) fn user_may(&self, address: u32, write: bool) -> bool {
         address == 0xE000_EF00 && write && self.ccr & USERSETMPEND != 0
     }

@@ -104,7 +104,7 @@ impl Core {
         bus.fetch(address).map_err(|_| Trap::FetchBus)
     }
 
-    /// What is due between two instructions: `SysTick`, exceptions, sleep, the end of the run. Sets the next moment for it.
+    /// Handles `SysTick`, exceptions, sleep and the end of the run between two instructions. Sets the next moment for it.
     #[cold]
     #[inline(never)]
     fn attend<B: Bus>(&mut self, bus: &mut B) -> Option<Outcome> {
@@ -139,7 +139,7 @@ impl Core {
             }
         }
         if !self.thumb {
-            // The state of the instruction set is no property of the address: nothing decoded may be used.
+            // The address does not give the instruction set's state: no decoded instruction may be used.
             self.it_now = self.it;
             let trap = self.decode(bus, self.pc).err().unwrap_or(Trap::InvalidState);
             return self.trapped(bus, trap).or_else(|| self.attend(bus));
@@ -154,7 +154,7 @@ impl Core {
         (self.exceptions.grouped(self.exceptions.priority(number)) < priority).then_some(number)
     }
 
-    /// The priority of what is executed: the active exceptions', raised by the masks.
+    /// The execution priority: the active exceptions', raised by the masks.
     pub(crate) fn priority(&self) -> i16 {
         let exceptions = &self.exceptions;
         let mut boosted = THREAD;

@@ -34,7 +34,7 @@ impl Rounding {
         [Rounding::Nearest, Rounding::Up, Rounding::Down, Rounding::Zero][(status >> 22 & 3) as usize]
     }
 
-    /// Whether what was cut off (its highest bit is `half`) moves the magnitude away from zero.
+    /// Whether the discarded bits (the highest is `half`) move the magnitude away from zero.
     fn goes_up(self, negative: bool, odd: bool, cut: u64, half: u64) -> bool {
         match self {
             Rounding::Nearest => cut > half || cut == half && odd,
@@ -111,7 +111,7 @@ fn invalid(status: &mut u32) -> u32 {
     DEFAULT_NAN
 }
 
-/// A shift to the right that leaves a trace of what it cut off in the lowest bit.
+/// A shift to the right with a sticky lowest bit.
 fn jam(value: u128, by: u32) -> u128 {
     match by {
         0 => value,

@@ -1,7 +1,7 @@
 //! Cycles: how long an instruction takes with memory that never waits.
 //!
 //! Source: Arm's Cortex-M4 Technical Reference Manual (DDI 0439), table 3-1 (instruction set summary), section 3.3.2 (load/store
-//! timings) and table 7-1 (FPU instructions). What depends on more than the instruction is added as it is executed:
+//! timings) and table 7-1 (FPU instructions). Cycles that depend on more than the instruction are added at execution:
 //! * a branch that is taken: the refill of the pipeline, P, which the manual gives as 1 to 3. Here: 2 if the distance is in the
 //!   instruction (the processor fetches ahead to it), 3 if a register or memory gives the target;
 //! * a load: 2 cycles, 1 if it directly follows a load that does not give its address (they are pipelined); a store: 1;
@@ -9,19 +9,19 @@
 //! * a division: 2 to 12, here 2 and one for each 4 bits by which the quotient is long (early termination is by both operands);
 //! * an access that is not aligned: 1 for each part more.
 //!
-//! Not modelled: the alignment of a branch's target beyond what the chip's fetch hook does, the contention of literal loads with
-//! the fetch unit, IT folded into the instruction before it (IT takes 1 cycle), the write buffer (a store's wait states count
-//! in full), integer instructions that run beside VDIV and VSQRT.
+//! Not modelled: the alignment of a branch's target (but for the chip's fetch hook), the contention of literal loads with the
+//! fetch unit, and integer instructions that run beside VDIV and VSQRT. IT takes 1 cycle, without folding. A store's wait states
+//! count in full, without a write buffer.
 
 use crate::op::{Float2, Float3, Op};
 
 /// Cycles for filling the pipeline anew behind a branch with its distance in the instruction.
 pub(crate) const REFILL_NEAR: u64 = 2;
-/// The same where a register or memory gives the target.
+/// The same if a register or memory gives the target.
 pub(crate) const REFILL_FAR: u64 = 3;
 /// From the interrupt to the handler's first instruction, with memory that never waits.
 pub(crate) const ENTRY: u64 = 12;
-/// From the return to the first instruction of what was interrupted.
+/// From the return to the first instruction of the interrupted code.
 pub(crate) const RETURN: u64 = 10;
 /// From one handler to the next without unstacking.
 pub(crate) const TAIL_CHAIN: u64 = 6;
@@ -33,8 +33,8 @@ pub(crate) const NOTHING: u8 = 0x1F;
 /// The flag of a register that a load wrote.
 pub(crate) const LOADED: u8 = 0x20;
 
-/// The least number of cycles, and what the instruction writes as far as the next load or store may wait for it: a register's
-/// number for data processing, with [`LOADED`] for a load of one register.
+/// The least number of cycles, and the written register, for which the next load or store may wait. A load of one register has
+/// the flag [`LOADED`].
 pub(crate) fn of(op: Op) -> (u8, u8) {
     match op {
         Op::MovImmediate { d, .. }

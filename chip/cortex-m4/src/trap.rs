@@ -1,6 +1,6 @@
 //! Why an instruction did not end as others do.
 
-/// What interrupts the flow of instructions from inside.
+/// An interruption of the flow by an instruction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Trap {
     /// `UsageFault`s, by their bit of the upper half of CFSR.
@@ -15,7 +15,7 @@ pub(crate) enum Trap {
     FetchBus,
     /// A load or store that the MPU refuses.
     Memory(u32),
-    /// An instruction from where none may be.
+    /// An instruction fetch from a forbidden place.
     FetchMemory,
     /// The same two while the floating-point registers were stored late.
     LazyBus,

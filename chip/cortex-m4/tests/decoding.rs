@@ -1,4 +1,4 @@
-//! Encodings whose meaning no run can show: far branches, and what is no instruction.
+//! Encodings that no run can show: far branches and undefined instructions.
 use cortex_m4_model::decode;
 use cortex_m4_model::op::Op;
 

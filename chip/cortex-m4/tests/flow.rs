@@ -1,4 +1,4 @@
-//! The flow of exceptions where QEMU has no cycles or no such path: by the tables of the architecture's manual and the TRM.
+//! The flow of exceptions without a counterpart in QEMU (cycles, paths): by the tables of the architecture's manual and the TRM.
 mod common;
 
 use common::Flat;
@@ -253,7 +253,7 @@ fn a_refused_store_without_its_handler_is_a_hard_fault() {
 
 #[test]
 fn a_fault_stops_before_its_handler_if_it_is_asked_to() {
-    /// Program, r1, where it is then.
+    /// Program, r1, the address then.
     type Fault = (&'static [u16], u32, u32);
     let cases: [(&str, Fault); 5] = [
         ("undefined", (&[NOP, UDF], 0, PROGRAM + 2)),
@@ -274,7 +274,7 @@ fn a_fault_stops_before_its_handler_if_it_is_asked_to() {
             assert_eq!(rig.core.run(&mut rig.memory, 1_000), Outcome::Fault, "{name}: for ever");
         }
     }
-    // What is no fault goes on.
+    // Without a fault the program goes on.
     let mut rig = Rig::new(&[SVC, NOP, STAY]);
     rig.core.stop_at_faults(true);
     rig.core.set_pending(5);
@@ -360,7 +360,7 @@ fn systick_wakes_and_its_time_is_known_before() {
 
 #[test]
 fn changed_code_is_decoded_anew() {
-    // STRH r2, [r1]; NOP; NOP; what is stored over the second NOP: MOVS r3, #7.
+    // STRH r2, [r1]; NOP; NOP; stored over the second NOP: MOVS r3, #7.
     let program = &[0x800A, NOP, NOP, STAY];
     let mut rig = Rig::new(program);
     rig.code(0x2000_0100, program);
@@ -420,7 +420,7 @@ fn a_request_for_reset_is_told_and_reset_begins_anew() {
 
 #[test]
 fn instructions_take_the_cycles_of_the_table() {
-    // Name, code, r0 to r3, cycles of the code without what follows it.
+    // Name, code, r0 to r3, cycles of the code alone.
     let cases: [(&str, &[u16], [u32; 4], u64); 17] = [
         ("add", &[0x1840], [1, 2, 0, 0], 1),
         ("branch", &[0xE000, NOP], [0; 4], 1 + 2),
@@ -458,7 +458,7 @@ fn instructions_take_the_cycles_of_the_table() {
         if name == "two loads, the second's base by the first" {
             rig.memory.load(0x2000_0000, &0x2000_0010u32.to_le_bytes());
         }
-        // What `set` left behind is no part of it.
+        // The rest of `set` does not count.
         rig.code(PROGRAM - 2, &[NOP]);
         rig.core.set_register(15, PROGRAM - 2);
         rig.step();

@@ -1,4 +1,4 @@
-//! Every instruction of an image decodes: `CORTEX_IMAGE` is the ELF file, with its symbols (`$t` and `$d` say what is code).
+//! Every instruction of an image decodes: `CORTEX_IMAGE` is the ELF file, with its symbols (`$t` and `$d` mark code and data).
 use cortex_m4_model::decode;
 use cortex_m4_model::op::Op;
 use std::collections::BTreeMap;

@@ -1,8 +1,8 @@
-//! Accesses: by the processor ([`Bus`]) and by DMA. What is where, what it costs in wait states, and what is refused.
+//! Accesses: by the processor ([`Bus`]) and by DMA. Addresses, wait states and refusals.
 //!
-//! Wait states: the memories have none; the flash's are [`crate::art`]'s, and whoever reads it while it erases or
-//! programs waits for the end; a load from a device costs two clocks of its bus (RM0090, 2.1: the bridges
-//! synchronise), a store none, as it is buffered. Contention of the processor and DMA is not modelled.
+//! Wait states: the memories have none; the flash's are [`crate::art`]'s. A read of the flash waits for the
+//! end of an erase or programming. A load from a device costs two clocks of its bus (RM0090, 2.1: the bridges
+//! synchronise), a buffered store none. Contention of the processor and DMA is not modelled.
 
 use cortex_m4_model::{Bus, Fault, Size};
 
@@ -16,7 +16,7 @@ use crate::time::Now;
 /// DCKCFGR of other chips: embassy reads it, and writes 0. It is reserved here, and harmless.
 const RESERVED: u32 = 0x4002_388C;
 
-/// Where an address leads.
+/// The target of an address.
 enum Place {
     Flash(u32),
     Sram(u32),
@@ -346,7 +346,7 @@ impl Bus for Chip {
     }
 }
 
-/// What DMA's ports reach: SRAM and devices by both, the flash to read, never CCM (RM0090, 2.1); DMA1's device port
+/// Reach of DMA's ports: SRAM and devices by both, the flash to read, never CCM (RM0090, 2.1); DMA1's device port
 /// only APB1.
 pub struct DmaPort<'a> {
     pub(crate) chip: &'a mut Chip,

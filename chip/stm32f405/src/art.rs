@@ -1,12 +1,14 @@
 //! The flash accelerator's timing (RM0090, 3.4.2): 128-bit lines, 64 of them kept for instructions and 8 for data, and
 //! a line fetched ahead.
 //!
-//! Modelled: the line that was read last stays in the flash's own register (also with all caches off); a line that
-//! misses costs the wait states; with prefetch on the next line is read as soon as the flash is free, and who comes
-//! too early waits for the rest; least recently used lines are replaced. A read by the data bus and one by the
-//! instruction bus wait for each other only through the time that the flash is busy. **The data cache holds what it
-//! read**: an erase leaves it stale, until it is emptied, which works only while it is off (3.5.2); a store into the
-//! flash changes it too. Not modelled: instructions that are stale.
+//! * The line of the last read stays in the flash's own register, also with all caches off.
+//! * A miss costs the wait states. With prefetch the next line is read as soon as the flash is free; an early access waits for
+//!   the rest. Least recently used lines are replaced.
+//! * Data bus and instruction bus wait for each other only while the flash is busy.
+//! * **An erase leaves the data cache stale**, until it is emptied, which works only while it is off (3.5.2). A store into the
+//!   flash updates it.
+//!
+//! Not modelled: stale instructions.
 
 use cortex_m4_model::Size;
 
@@ -28,7 +30,7 @@ const NONE: u32 = u32::MAX;
 struct Lines<const N: usize> {
     /// The line in each place.
     kept: [u32; N],
-    /// For each line of the flash its place and one, 0 where it is in none.
+    /// For each line of the flash its place plus one; 0 outside the cache.
     place_of: Box<[u8]>,
     /// The places in a ring, in the order in which they were used: the one before each, and the one behind it.
     ring: [(u8, u8); N],
@@ -133,7 +135,7 @@ impl Art {
         }
     }
 
-    /// Switches the caches; what they hold stays.
+    /// Switches the caches; their content stays.
     pub fn set_caches(&mut self, instructions: bool, data: bool) {
         self.on = (instructions, data);
     }
@@ -207,7 +209,7 @@ impl Art {
         }
     }
 
-    /// What the data cache holds at this offset, fresh or stale.
+    /// The data cache's content at this offset, fresh or stale.
     #[inline]
     pub fn held(&mut self, offset: u32, size: Size) -> Option<u32> {
         if !self.on.1 {

@@ -1,4 +1,4 @@
-//! The chip round the processor: its devices, what they have to do with each other, and when something happens next.
+//! The chip round the processor: its devices, their connections, and the next event.
 //!
 //! A device is asked when the program reads it, and when its own next moment comes ([`Chip::happen`]). After either
 //! `Chip::settle` looks at its interrupt, at requests for DMA and at its next moment.
@@ -19,7 +19,7 @@ use crate::tim::Tim;
 use crate::time::{NEVER, Now, Timebase};
 use crate::usart::Usart;
 
-/// Why the machine cannot go on: what the program does is not modelled, or cannot work on the chip.
+/// Reason of a stop: the program does something that is not modelled, or cannot work on the chip.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Trouble {
     /// A register that there is not, or that is not modelled, or bits of it: address, and the value if it was written.
@@ -90,20 +90,20 @@ pub struct Chip {
     pub uid: [u32; 3],
     /// `DBGMCU_CR` and the two freeze registers.
     pub dbgmcu: [u32; 3],
-    /// The pin that selects what is at each bus.
+    /// The select pin of each bus.
     pub selects: [Option<Pin>; 3],
-    /// What was odd, and how often.
+    /// Oddities, with their counts.
     pub notes: BTreeMap<Note, u64>,
     pub(crate) clocks: Clocks,
     pub(crate) lines: u128,
     pub(crate) trouble: Option<Trouble>,
     pub(crate) attention: bool,
     pub(crate) wait: u32,
-    /// What changed by another way than the processor's stores.
+    /// Memory that changed without a store of the processor.
     pub(crate) changed: Vec<(u32, u32)>,
     pub(crate) reset_by: Option<Cause>,
     pub(crate) event: bool,
-    /// The moment of what is going on.
+    /// The current moment.
     pub(crate) moment: Now,
     selected: [bool; 3],
     deadlines: [u64; SLOTS],
@@ -115,7 +115,7 @@ pub struct Chip {
 }
 
 impl Chip {
-    /// A chip that just got its power, with this crystal, low-speed oscillator, and seed of what is random.
+    /// A chip that just got its power, with this crystal, low-speed oscillator, and random seed.
     pub fn new(hse_hz: u32, lsi_hz: u32, seed: u64) -> Self {
         let mut chip = Self {
             time: Timebase::new(16_000_000),
@@ -197,7 +197,7 @@ impl Chip {
         self.clocks.hclk == 0
     }
 
-    /// Forgets wait states that nobody waits for.
+    /// Discards unused wait states.
     pub(crate) fn take_waits(&mut self) {
         self.wait = 0;
     }
@@ -273,7 +273,7 @@ impl Chip {
         }
     }
 
-    /// What is due until this cycle happens, each at its own moment; ends early at a reset.
+    /// Handles events up to this cycle, each at its own moment; ends early at a reset.
     pub fn happen(&mut self, until: u64) {
         while self.next <= until && self.reset_by.is_none() && self.trouble.is_none() {
             let at = self.next;

@@ -1,4 +1,4 @@
-//! DMA1 and DMA2 (RM0090, chapter 10): streams between a device and memory, or memory and memory; normal, circular,
+//! DMA1 and DMA2 (RM0090, chapter 10): streams between a device and memory, or memory and memory. Normal, circular,
 //! double-buffered; direct or by the FIFO with packing; half, full and error flags.
 //!
 //! An item moves the moment a device asks: neither arbitration nor the bus's waits are modelled, and no burst. FIFO
@@ -21,7 +21,7 @@ const CT: u32 = 1 << 19;
 const TEIF: u32 = 1 << 3;
 const HTIF: u32 = 1 << 4;
 const TCIF: u32 = 1 << 5;
-/// Where a stream's flags are.
+/// Position of a stream's flags.
 const PLACES: [u32; 4] = [0, 6, 16, 22];
 
 /// A device's request.
@@ -63,7 +63,7 @@ pub fn request(dma: usize, stream: usize, channel: u32) -> Option<Request> {
     })
 }
 
-/// What DMA reads and writes by.
+/// The memory and devices that DMA reads and writes.
 pub trait Port {
     /// A load; `None`: the bus refuses.
     fn load(&mut self, address: u32, size: Size) -> Option<u32>;
@@ -122,7 +122,7 @@ impl Stream {
         }
     }
 
-    /// A program that switches it off: what is in the FIFO goes out, and that is told as a transfer's end.
+    /// The program switches it off: the FIFO is flushed, which counts as a transfer's end.
     fn end(&mut self, port: &mut impl Port) {
         self.flags |= if self.drain(port, true).is_break() { TEIF } else { 0 };
         self.flags |= TCIF;
@@ -282,7 +282,7 @@ impl Dma {
         })
     }
 
-    /// Writes the register at this offset; `None`: there is none, or what is asked for is not modelled.
+    /// Writes the register at this offset; `None`: the register or the value is not modelled.
     pub fn write(&mut self, offset: u32, value: u32, port: &mut impl Port) -> Option<()> {
         match offset {
             0x00 | 0x04 => {}

@@ -1,6 +1,6 @@
 //! The flash and its controller (RM0090, chapter 3): wait states and caches are switched here ([`crate::art`] counts
-//! them), a sector is erased and a word programmed in the data sheet's time while whoever reads the flash waits,
-//! errors are flagged, and a power cut leaves a sector that is neither.
+//! them). Erasing a sector and programming a word take the data sheet's time; a read of the flash waits. Errors are flagged. A
+//! power cut leaves a half-erased sector.
 //!
 //! Not modelled: programming of option bytes (it stops the machine), read protection, the OTP area's writing.
 
@@ -45,7 +45,7 @@ pub enum Speed {
     Longest,
 }
 
-/// What is going on.
+/// The work in progress.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Work {
     Erase { from: u32, bytes: u32 },
@@ -55,7 +55,7 @@ enum Work {
 /// The flash.
 #[derive(Clone)]
 pub struct Flash {
-    /// What it holds.
+    /// The content.
     pub content: Memory,
     /// How fast it is.
     pub speed: Speed,
@@ -69,7 +69,7 @@ pub struct Flash {
     keys: Option<u8>,
     option_keys: Option<u8>,
     work: Option<(Work, Ps, Ps)>,
-    /// The work that was finished ahead of its time for a processor that waits for it, with what was there before.
+    /// The work that was finished ahead of its time for a processor that waits for it, with the content before.
     ahead: Option<(Work, Ps, Ps, Vec<u8>)>,
     /// Erases and words programmed.
     pub counts: (u64, u64),
@@ -77,7 +77,7 @@ pub struct Flash {
     pub erases: Vec<(u32, Ps, Ps)>,
 }
 
-/// Where a sector begins and how long it is.
+/// Start and length of a sector.
 pub fn sector(number: u32) -> Option<(u32, u32)> {
     match number {
         0..=3 => Some((number * 0x4000, 0x4000)),
@@ -119,7 +119,7 @@ impl Flash {
         }
     }
 
-    /// A reset of the chip in mid-work leaves what a power cut leaves.
+    /// A reset of the chip in mid-work, like a power cut.
     pub fn reset(&mut self, now: Ps) {
         self.cut(now);
         (self.acr, self.sr, self.cr, self.optcr) = (0, 0, LOCK, OPTCR);
@@ -141,7 +141,7 @@ impl Flash {
         self.busy_until().unwrap_or(NEVER)
     }
 
-    /// Its work is done, if this is its time. Gives what changed: from where, how many bytes.
+    /// Its work is done, if this is its time. Gives the changed bytes: start and length.
     pub fn happen(&mut self, now: Ps) -> Option<(u32, u32)> {
         let (work, _, _) = self.work.take_if(|(_, _, end)| *end <= now)?;
         if self.cr & EOPIE != 0 {
@@ -205,7 +205,7 @@ impl Flash {
         }
     }
 
-    /// A store into the flash at this offset; it must not be busy. Gives false where the bus refuses.
+    /// A store into the flash at this offset; it must not be busy. Gives false if the bus refuses.
     pub fn program(&mut self, at: u32, size: Size, value: u32, now: Ps) {
         let width = 8 << (self.cr >> 8 & 3);
         let refused = std::mem::take(&mut self.refuses);
@@ -268,7 +268,7 @@ impl Flash {
         })
     }
 
-    /// Writes the register at this offset; `None`: there is none, or what is asked for is not modelled.
+    /// Writes the register at this offset; `None`: the register or the value is not modelled.
     pub fn write(&mut self, offset: u32, value: u32, now: Ps) -> Option<()> {
         match offset {
             0x00 => self.acr = value & 0x1F07,

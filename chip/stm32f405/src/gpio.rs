@@ -25,7 +25,7 @@ struct Port {
     odr: u32,
     lckr: u32,
     afr: [u32; 2],
-    /// What drives pins from outside: which, and how.
+    /// Pins driven from outside, and their levels.
     driven: u32,
     level: u32,
 }
@@ -55,7 +55,7 @@ impl Port {
             3 => false,
             _ if drives => bit(self.odr),
             _ if bit(self.driven) => bit(self.level),
-            // A pin that nobody drives and nothing pulls reads as low here.
+            // An undriven pin without a pull reads as low here.
             _ => self.pupdr >> (2 * pin) & 3 == 1,
         }
     }
@@ -79,7 +79,7 @@ impl Gpio {
         Self { ports: std::array::from_fn(Port::new) }
     }
 
-    /// A reset of the chip; what is outside stays.
+    /// A reset of the chip; the outside stays.
     pub fn reset(&mut self) {
         for port in 0..PORTS {
             self.reset_port(port);
@@ -105,7 +105,7 @@ impl Gpio {
         self.ports[pin.0 as usize].is_high(pin.1)
     }
 
-    /// Whether the pin is an output of the program's and low; what selects a card.
+    /// Whether the pin is an output and low, as it selects a card.
     pub fn pulls_low(&self, pin: Pin) -> bool {
         let port = &self.ports[pin.0 as usize];
         port.mode(pin.1) == 1 && port.odr >> pin.1 & 1 == 0

@@ -1,5 +1,5 @@
-//! What is flashed: an ELF file, a `DfuSe` file (ST's UM0391) or a raw image for the flash's beginning. What is
-//! truncated, damaged or for another chip is refused with a reason.
+//! The flashed image: an ELF file, a `DfuSe` file (ST's UM0391) or a raw image for the flash's beginning. A
+//! truncated, damaged or foreign image is refused with a reason.
 
 use std::fmt;
 
@@ -8,7 +8,7 @@ use crate::memory::{CCM, FLASH, SRAM};
 /// Why a file cannot be flashed.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Refused {
-    /// The file ends before what it says it has: how many bytes, and how many there must be.
+    /// The file is shorter than its header says: bytes present, bytes expected.
     Truncated(usize, usize),
     /// A checksum or a structure is wrong.
     Damaged(&'static str),
@@ -45,7 +45,7 @@ impl std::error::Error for Refused {}
 /// A function: its address, its size, its name.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Symbol {
-    /// Where it is.
+    /// Its address.
     pub address: u32,
     /// How long it is.
     pub bytes: u32,
@@ -58,7 +58,7 @@ pub struct Symbol {
 pub struct Image {
     /// Its pieces, by addresses.
     pub pieces: Vec<(u32, Vec<u8>)>,
-    /// Its symbols by address, where the file names them.
+    /// Its symbols by address, if the file has names.
     pub symbols: Vec<Symbol>,
 }
 
@@ -107,7 +107,7 @@ impl Image {
             .then(|| (symbol.name.as_str(), address - symbol.address))
     }
 
-    /// Where a symbol of this name (or with this in its name) is.
+    /// Address of the symbol with this name, or with this text in its name.
     pub fn find(&self, name: &str) -> Option<&Symbol> {
         let exact = self.symbols.iter().find(|symbol| symbol.name == name);
         exact.or_else(|| self.symbols.iter().find(|symbol| symbol.name.contains(name)))
@@ -147,7 +147,7 @@ fn elf(file: &[u8]) -> Result<Image, Refused> {
         let at = headers + number * size;
         let (kind, offset, address, bytes) =
             (numbers.word(at)?, numbers.word(at + 4)?, numbers.word(at + 12)?, numbers.word(at + 16)?);
-        // What is loaded, and where its load address is: data begin in the flash.
+        // A loaded segment and its load address: data begin in the flash.
         if kind == 1 && bytes > 0 {
             image.pieces.push((address, numbers.bytes(offset as usize, bytes as usize)?.to_vec()));
         }

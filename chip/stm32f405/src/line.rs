@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 
 use crate::time::{NEVER, Ps};
 
-/// What is wrong with a character.
+/// The fault of a character.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Flaw {
     /// Nothing.
@@ -24,7 +24,7 @@ pub struct Char {
     pub bit: Ps,
     /// The byte.
     pub byte: u8,
-    /// What is wrong with it.
+    /// Its fault.
     pub flaw: Flaw,
 }
 
@@ -39,7 +39,7 @@ impl Char {
     }
 }
 
-/// What a receiver makes of a character.
+/// A character as a receiver reads it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Seen {
     /// The byte.
@@ -50,7 +50,7 @@ pub struct Seen {
     pub framing: bool,
 }
 
-/// A line, high where no character is.
+/// A line, high between characters.
 #[derive(Clone, Debug, Default)]
 pub struct Line {
     chars: VecDeque<Char>,
@@ -67,7 +67,7 @@ impl Line {
         self.chars.len()
     }
 
-    /// Forgets what is over.
+    /// Discards past characters.
     pub fn forget(&mut self, before: Ps) {
         while self.chars.front().is_some_and(|char| char.end() <= before) {
             self.chars.pop_front();
@@ -103,8 +103,7 @@ impl Line {
         true
     }
 
-    /// What a receiver with bits of this length makes of the character whose start bit fell at `edge`; `None`: it was
-    /// none.
+    /// The character with its start bit at `edge`, as a receiver with bits of this length reads it; `None`: a glitch.
     pub fn sample(&self, edge: Ps, bit: Ps) -> Option<Seen> {
         let middle = |number: Ps| edge + number * bit + bit / 2;
         if self.is_high(middle(0)) {

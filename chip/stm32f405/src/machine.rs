@@ -1,7 +1,7 @@
-//! A board: the processor, the chip round it, its supply, its crystal, and what is wired to its pins.
+//! A board: the processor, the chip round it, its supply, its crystal, and its wired pins.
 //!
-//! Time is the wires' ([`Ps`]): the machine runs until a moment, then who drives it looks at what came out, puts in
-//! what comes next, pulls the power, and lets it run on. Runs are repeatable: the same image, seed and wires give the
+//! Time is the wires' ([`Ps`]): the machine runs until a moment. Then its driver reads the outputs, sets the
+//! inputs, may cut the power, and lets it run on. Runs are repeatable: the same image, seed and wires give the
 //! same run.
 
 use cortex_m4_model::{Core, Outcome};
@@ -20,14 +20,14 @@ use crate::time::{MS, Now, Ps, US};
 /// The chip waits this long after power before it starts (DS8626, table 20: 0.5 to 3 ms).
 const START: Ps = 1_500_000_000;
 
-/// What a board is made of.
+/// The parts of a board.
 #[derive(Clone, Copy, Debug)]
 pub struct Board {
     /// The crystal.
     pub hse_hz: u32,
     /// The chip's low-speed oscillator: 17 to 47 kHz.
     pub lsi_hz: u32,
-    /// What is random: memory at power-on, random numbers.
+    /// Seed of memory at power-on and of random numbers.
     pub seed: u64,
 }
 
@@ -154,7 +154,7 @@ impl Machine {
         Ok(())
     }
 
-    /// What the chip has for the processor.
+    /// Hands the chip's signals to the processor.
     fn deliver(&mut self) -> Result<(), Box<Report>> {
         if !std::mem::take(&mut self.chip.attention) {
             return Ok(());
@@ -186,7 +186,7 @@ impl Machine {
         Ok(())
     }
 
-    /// A reset at this moment: the processor may have waited beyond it, and what it waited for never was.
+    /// A reset at this moment: the processor may have waited beyond it, for something that never came.
     fn reset(&mut self, cause: Cause, at: Now) {
         let now = Now { cycle: self.core.cycles(), ps: at.ps.max(self.now) };
         self.resets.push((now.ps, cause));
@@ -201,7 +201,7 @@ impl Machine {
         self.lines = 0;
     }
 
-    /// Why it stops, and where it was.
+    /// Reason and place of the stop.
     pub fn report(&self, reason: &str) -> Box<Report> {
         let registers = std::array::from_fn(|number| self.core.register(number as u8));
         let name =
@@ -238,7 +238,7 @@ impl Machine {
         self.is_off = true;
     }
 
-    /// Power comes: memory holds anything, the flash what it held.
+    /// Power comes: memory holds anything, the flash its content.
     pub fn power_on(&mut self) {
         if !self.is_off {
             return;
@@ -292,7 +292,7 @@ impl Machine {
         self.chip.line_changed(port);
     }
 
-    /// What a port has sent since it was asked last: when each character was out.
+    /// Characters that a port sent since the last call, with the time of each end.
     pub fn take_sent(&mut self, port: usize) -> Vec<(Ps, u8)> {
         std::mem::take(&mut self.chip.usarts[port].sent)
     }
@@ -303,7 +303,7 @@ impl Machine {
         self.chip.selects[bus] = Some(select);
     }
 
-    /// Bytes of memory as a debugger sees them; fewer where the memory ends.
+    /// Bytes of memory as a debugger sees them; fewer at the memory's end.
     pub fn memory(&self, address: u32, bytes: u32) -> &[u8] {
         let memories = [(SRAM, &self.chip.sram), (CCM, &self.chip.ccm), (FLASH, &self.chip.flash.content)];
         let found = memories.into_iter().find(|((from, size), _)| (*from..from + size).contains(&address));

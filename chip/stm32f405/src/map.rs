@@ -1,4 +1,4 @@
-//! Where things are: the devices' addresses and clock gates (RM0090, tables 1 and the gates of 7.3), the interrupts'
+//! The map: the devices' addresses and clock gates (RM0090, tables 1 and the gates of 7.3), the interrupts'
 //! numbers (table 62) and the pins' alternate functions (DS8626, table 9), as far as they are modelled.
 
 use crate::gpio::Pin;
@@ -33,7 +33,7 @@ pub enum Unit {
     Dma(u8),
     /// The random number generator.
     Rng,
-    /// What a debugger may ask.
+    /// The debugger's identity device.
     Dbgmcu,
 }
 
@@ -86,7 +86,7 @@ pub fn unit_of(gate: Gate) -> Option<Unit> {
     BASES.into_iter().filter_map(unit_at).find(|(_, of)| *of == Some(gate)).map(|(unit, _)| unit)
 }
 
-/// Where each device with a gate begins.
+/// Start of each device with a gate.
 const BASES: [u32; 29] = [
     0x4000_1800,
     0x4000_0000,

@@ -2,7 +2,7 @@
 
 use cortex_m4_model::Size;
 
-/// Where the main flash begins, and how much of it there is.
+/// Start and size of the main flash.
 pub const FLASH: (u32, u32) = (0x0800_0000, 1024 * 1024);
 /// The core coupled memory: only the processor reaches it.
 pub const CCM: (u32, u32) = (0x1000_0000, 64 * 1024);
@@ -56,7 +56,7 @@ impl Memory {
     }
 }
 
-/// What memory holds when power comes: neither zeros nor the same each time.
+/// Content of memory at power-on: neither zeros nor the same each time.
 pub fn garbage(bytes: &mut [u8], seed: u64) {
     let mut state = seed | 1;
     for byte in bytes {

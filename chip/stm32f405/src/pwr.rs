@@ -88,7 +88,7 @@ impl Pwr {
     /// Writes the register at this offset.
     pub fn write(&mut self, offset: u32, value: u32) -> Option<()> {
         match offset {
-            // CWUF and CSBF read as 0. What only other chips have: the overdrive of the F42x. (Bit 15, the upper one
+            // CWUF and CSBF read as 0. Other chips only: the overdrive of the F42x. (Bit 15, the upper one
             // of their VOS, is reserved here, and written by embassy.)
             0 if value & !0xC3FF != 0 => return None,
             0 => self.cr = value & 0x43F3,

@@ -1,5 +1,5 @@
 //! Reset and clock control (RM0090, chapter 7; reset values of the STM32F405): oscillators with their start times and
-//! failures, the PLL, the prescalers, clock gates, resets of single devices, and why the chip was reset.
+//! failures, the PLL, the prescalers, clock gates, resets of single devices, causes of reset.
 //!
 //! Not modelled: interrupts of ready oscillators (an enabled one stops the machine), the clock outputs, spread
 //! spectrum, `PLLI2S`'s output.
@@ -287,7 +287,7 @@ impl Rcc {
         })
     }
 
-    /// Writes the register at this offset; `None`: there is none, or what is asked for is not modelled.
+    /// Writes the register at this offset; `None`: the register or the value is not modelled.
     pub fn write(&mut self, offset: u32, value: u32, now: Now, backup_unlocked: bool) -> Option<()> {
         match offset {
             0x00 => self.write_cr(value, now.ps),
@@ -323,7 +323,7 @@ impl Rcc {
 
     fn write_cr(&mut self, value: u32, now: Ps) {
         let mut kept = value & (HSION | 0xF8 | HSEON | HSEBYP | CSSON | PLLON | PLLI2SON);
-        // What the processor runs by cannot be switched off.
+        // The processor's clock source cannot be switched off.
         let by_pll = self.cfgr >> 2 & 3 == 2;
         match self.cfgr >> 2 & 3 {
             0 => kept |= HSION,

@@ -1,4 +1,4 @@
-//! What is told when a machine stops: why, the registers, where it was, the last instructions.
+//! The report of a stopped machine: reason, registers, place, last instructions.
 
 use std::fmt;
 
@@ -20,7 +20,7 @@ impl fmt::Display for Trouble {
     }
 }
 
-/// What the fault status says of a fault at this place (DDI 0403E, B3.2.15 and B3.2.16).
+/// The fault status of a fault at this place, in words (DDI 0403E, B3.2.15 and B3.2.16).
 pub(crate) fn fault([cfsr, hfsr, mmfar, bfar]: [u32; 4], at: u32) -> String {
     let causes = [
         (cfsr & (1 | 1 << 8), format!("an instruction is wanted from {at:#010x}, where none may be")),
@@ -51,7 +51,7 @@ pub struct Report {
     pub us: u64,
     /// R0 to R15.
     pub registers: [u32; 16],
-    /// The program counter's function; where it is in none, with the last instruction's.
+    /// The program counter's function; outside of any, with the last instruction's.
     pub place: String,
     /// The addresses of the last instructions, the newest last, each with its function.
     pub trace: Vec<(u32, String)>,

@@ -1,8 +1,8 @@
 //! SPI1 to SPI3 as master (RM0090, chapter 28): a word on its way and one behind it, reception with overrun, the
-//! clock's divider, DMA requests and interrupts. What is at the other end is a [`Wire`].
+//! clock's divider, DMA requests and interrupts. The other end is a [`Wire`].
 //!
-//! Not modelled: slave mode, one line for both ways, the CRC unit, I2S, TI's frame: whoever switches one on stops the
-//! machine. The card decides by time, so that a word is exchanged at its last clock.
+//! Not modelled: slave mode, one line for both ways, the CRC unit, I2S, TI's frame: they stop the machine. The
+//! card decides by time, so that a word is exchanged at its last clock.
 
 use crate::time::{NEVER, Now, Timebase};
 
@@ -26,9 +26,9 @@ const MODF: u32 = 1 << 5;
 const OVR: u32 = 1 << 6;
 const BSY: u32 = 1 << 7;
 
-/// What is at the other end of a bus.
+/// The other end of a bus.
 pub trait Wire {
-    /// A byte goes over the bus, its last clock at this moment in picoseconds, at this clock. Gives what came back.
+    /// A byte goes over the bus, its last clock at this moment in picoseconds, at this clock. Gives the answer.
     fn exchange(&mut self, ps: u64, hz: u32, sent: u8) -> u8;
 
     /// The select pin changed.
@@ -61,13 +61,13 @@ pub struct Spi {
     overrun_read: bool,
     modf: bool,
     to_send: Option<u16>,
-    /// What is on its way and when its last clock is.
+    /// The word on its way, and the time of its last clock.
     sending: Option<(u16, u64)>,
     /// Processor cycles of a clock of the bus APB.
     bus_cycles: u64,
     /// Whether the pins are the bus's: clock, to the card, from it.
     pub routed: [bool; 3],
-    /// What is connected.
+    /// The connected device.
     pub wire: Box<dyn Wire>,
     /// Words exchanged.
     pub words: u64,
@@ -101,7 +101,7 @@ impl Spi {
         }
     }
 
-    /// A reset; what is outside stays.
+    /// A reset; the outside stays.
     pub fn reset(&mut self) {
         let wire = std::mem::replace(&mut self.wire, Box::new(Nobody));
         *self =
@@ -212,7 +212,7 @@ impl Spi {
         })
     }
 
-    /// Writes the register at this offset; `None`: there is none, or what is asked for is not modelled.
+    /// Writes the register at this offset; `None`: the register or the value is not modelled.
     pub fn write(&mut self, offset: u32, value: u32, now: Now, time: &Timebase) -> Option<()> {
         self.advance(now, time);
         match offset {

@@ -1,9 +1,9 @@
-//! TIM2 to TIM5 and TIM12, general-purpose timers (RM0090, chapters 18 and 19), as counters: prescaler, reload with
+//! TIM2 to TIM5 and TIM12, general-purpose timers (RM0090, chapters 18 and 19), as counters. Prescaler, reload with
 //! and without its buffer, update, four compare channels, one pulse, interrupts. TIM2 and TIM5 have 32 bits; TIM12
 //! has two channels.
 //!
-//! Not modelled: counting down, capture, outputs, encoder, slave mode, DMA requests: whoever switches one on stops
-//! the machine. The counter is computed when it is asked for; an event stands for each flag only.
+//! Not modelled: counting down, capture, outputs, encoder, slave mode, DMA requests: they stop the
+//! machine. The counter is computed when it is asked for; an event stands for each flag only.
 
 use crate::time::NEVER;
 
@@ -31,7 +31,7 @@ pub struct Tim {
     ccr: [u32; 4],
     dcr: u32,
     or: u32,
-    /// What counts now: the prescaler's and the reload's buffers.
+    /// Active values of prescaler and reload.
     psc_now: u32,
     arr_now: u32,
     max: u32,
@@ -221,7 +221,7 @@ impl Tim {
         })
     }
 
-    /// Writes the register at this offset; `None`: there is none, or what is asked for is not modelled.
+    /// Writes the register at this offset; `None`: the register or the value is not modelled.
     pub fn write(&mut self, offset: u32, value: u32, now: u64) -> Option<()> {
         self.advance(now);
         match offset {

@@ -1,7 +1,7 @@
 //! Time: the processor's cycles, and picoseconds since the model began.
 //!
-//! What hangs on a bus clock counts in cycles; what has a clock of its own (a sender, the watchdog, the flash, a
-//! card) counts in picoseconds. A change of the clock tree moves the relation, never the past.
+//! Devices on a bus clock count in cycles. Devices with their own clock (sender, watchdog, flash, card) count in
+//! picoseconds. A change of the clock tree moves the relation, never the past.
 
 /// Picoseconds since the model began: 213 days fit.
 pub type Ps = u64;

@@ -1,9 +1,9 @@
 //! A USART or UART in asynchronous mode (RM0090, chapter 30): reception with overrun, noise, framing and idle line;
-//! transmission; DMA requests and interrupts. The baud rate is what the divider and the bus clock make, and the
+//! transmission; DMA requests and interrupts. The baud rate follows from divider and bus clock, and the
 //! sender has its own.
 //!
 //! Not modelled: synchronous, smart card, infrared (`IrDA`), LIN, half duplex, hardware flow control, 9 bits, parity,
-//! break, mute mode: whoever switches one on stops the machine. The idle frame that TE sends first is left out.
+//! break, mute mode: they stop the machine. The idle frame that TE sends first is left out.
 
 use crate::line::Line;
 use crate::time::{NEVER, Ps};
@@ -25,7 +25,7 @@ const TCIE: u32 = 1 << 6;
 const TXEIE: u32 = 1 << 7;
 const UE: u32 = 1 << 13;
 const OVER8: u32 = 1 << 15;
-/// What of `CR1`, `CR2`, `CR3` is modelled.
+/// The modelled bits of `CR1`, `CR2`, `CR3`.
 const CR1_KNOWN: u32 = RE | TE | IDLEIE | RXNEIE | TCIE | TXEIE | 1 << 8 | UE | OVER8;
 const CR2_KNOWN: u32 = 0x3000;
 const CR3_KNOWN: u32 = EIE | DMAR | DMAT | 1 << 11;
@@ -34,7 +34,7 @@ const EIE: u32 = 1;
 const DMAR: u32 = 1 << 6;
 const DMAT: u32 = 1 << 7;
 
-/// What was counted on a port.
+/// Counters of a port.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counts {
     /// Characters received.
@@ -45,7 +45,7 @@ pub struct Counts {
     pub framing: u64,
     /// Characters with noise.
     pub noise: u64,
-    /// Characters that came while nobody listened.
+    /// Characters received while reception was off.
     pub missed: u64,
     /// Characters that had not gone out when the rate was changed or the port was switched off.
     pub cut: u64,
@@ -54,15 +54,15 @@ pub struct Counts {
 /// The port.
 #[derive(Clone)]
 pub struct Usart {
-    /// What comes in.
+    /// The input line.
     pub line: Line,
-    /// What went out: when each character's stop bit ended.
+    /// Sent characters, with the end of each stop bit.
     pub sent: Vec<(Ps, u8)>,
     /// Whether its pins are the port's: reception, transmission.
     pub routed: (bool, bool),
     /// The transmitter stands still.
     pub is_stuck: bool,
-    /// What was counted.
+    /// Counters.
     pub counts: Counts,
     sr: u32,
     cr: [u32; 3],
@@ -70,7 +70,7 @@ pub struct Usart {
     gtpr: u32,
     received: u8,
     to_send: Option<u8>,
-    /// What is on its way out, and until when.
+    /// The character on its way out, and its end.
     sending: Option<(u8, Ps)>,
     /// The receiver looks for a start bit from this moment on.
     free: Ps,
@@ -165,7 +165,7 @@ impl Usart {
         reception.min(sending).min(self.idle_at)
     }
 
-    /// What is due happens.
+    /// Handles due events.
     pub fn happen(&mut self, now: Ps) {
         if let Some((byte, end)) = self.sending.filter(|(_, end)| *end <= now && !self.is_stuck) {
             if self.routed.1 {
@@ -202,7 +202,7 @@ impl Usart {
             }
             self.idle_at = NEVER;
         }
-        // Its clock became faster within a character: what it would have seen by now is over.
+        // Its clock became faster within a character: the samples up to now are over.
         if self.deadline() <= now {
             (self.incoming, self.idle_at, self.free) = (None, NEVER, now);
         }
@@ -276,7 +276,7 @@ impl Usart {
         })
     }
 
-    /// Writes the register at this offset; `None`: there is none, or what is asked for is not modelled.
+    /// Writes the register at this offset; `None`: the register or the value is not modelled.
     pub fn write(&mut self, offset: u32, value: u32, now: Ps) -> Option<()> {
         match offset {
             // Written to 0 these are cleared.
@@ -308,7 +308,7 @@ impl Usart {
         Some(())
     }
 
-    /// What is on its way out is lost.
+    /// The character on its way out is lost.
     fn cut(&mut self) {
         if self.sending.take().is_some() {
             self.counts.cut += 1 + u64::from(self.to_send.take().is_some());

@@ -1,4 +1,4 @@
-//! Small programs on the whole machine: what the chip does to them is measured from outside.
+//! Small programs on the whole machine: their effects are measured from outside.
 
 use stm32f405_model::gpio::Pin;
 use stm32f405_model::image::Image;

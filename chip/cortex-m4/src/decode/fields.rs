@@ -1,6 +1,6 @@
-//! What the encodings share: fields, registers, and the place that distances are from.
+//! Parts of all encodings: fields, registers, and the base of distances.
 
-/// Where the instruction stands, as far as decoding depends on it.
+/// The place of the instruction, as far as decoding depends on it.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Place {
     /// The instruction's address.
@@ -10,7 +10,7 @@ pub(crate) struct Place {
 }
 
 impl Place {
-    /// What reading the program counter gives, aligned to a word: the base of literals.
+    /// The program counter as it reads, aligned to a word: the base of literals.
     pub(super) fn base(self) -> u32 {
         self.address.wrapping_add(4) & !3
     }

@@ -6,7 +6,7 @@ use crate::op::{Float2, Float3, Op};
 /// Any coprocessor's instruction; all but 10 and 11 are not there.
 pub(super) fn coprocessor(a: u32, b: u32) -> Op {
     if field(b, 9, 3) != 5 {
-        // Advanced SIMD is no coprocessor of an M profile.
+        // An M profile lacks Advanced SIMD.
         return if field(a, 8, 2) == 3 { Op::Undefined } else { Op::NoCoprocessor };
     }
     if a & 0x1000 != 0 {

@@ -1,7 +1,7 @@
 //! From halfwords to an [`Op`]: the encodings of Thumb as ARMv7E-M has them (DDI 0403E, chapter A5).
 //!
-//! What the manual calls UNPREDICTABLE is decoded as UNDEFINED wherever the test is cheap: no compiler makes it, and a model that
-//! goes on would hide that something jumped into data. Where it is not (such as a base in a list), see [`crate`]'s documentation.
+//! UNPREDICTABLE encodings are decoded as UNDEFINED if the test is cheap. No compiler makes them, and going on would hide a jump
+//! into data. Exceptions (such as a base in a list) are in [`crate`]'s documentation.
 
 mod dsp;
 mod fields;
@@ -14,7 +14,7 @@ pub(crate) use fields::Place;
 
 use crate::op::Op;
 
-/// What the instruction at an address is: its first two halfwords, of which an instruction of 16 bits is the first; and its length
+/// Decodes the instruction at an address by its first two halfwords; one of 16 bits is in the first. Gives the operation and its length
 /// in bytes. `in_it`: inside of an IT block.
 pub fn decode(address: u32, in_it: bool, halfwords: [u16; 2]) -> (Op, u32) {
     let place = Place { address, in_it };

@@ -61,7 +61,7 @@ fn shift_add_move(place: Place, h: u32) -> Op {
     }
 }
 
-/// With the plain forms where no flags are set.
+/// The plain forms set no flags.
 fn immediate(alu: Alu, flags: bool, d: u8, n: u8, value: u32) -> Op {
     match (alu, flags) {
         (Alu::Mov, false) => Op::MovImmediate { d, value },

@@ -56,7 +56,7 @@ pub(super) fn modified_immediate(a: u32, b: u32) -> Op {
     }
 }
 
-/// A constant of 12 bits, and the carry where it was rotated.
+/// A constant of 12 bits, and the carry of its rotation.
 fn expand(constant: u32) -> (u32, Option<bool>) {
     let byte = constant & 0xFF;
     match constant >> 8 {

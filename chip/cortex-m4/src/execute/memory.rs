@@ -37,7 +37,7 @@ impl Core {
         }
         match target {
             Some(target) => {
-                // What follows the stack pointer's change looks at it.
+                // Code after the stack pointer's change looks at it.
                 self.r[13] &= !3;
                 self.exchange(target)
             }

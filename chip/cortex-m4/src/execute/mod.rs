@@ -1,4 +1,4 @@
-//! What each instruction does: the operations of `ARMv7-M`'s manual, chapter A7, on the processor's state.
+//! Execution: the operations of `ARMv7-M`'s manual, chapter A7, on the processor's state.
 //!
 //! The frequent ones are here or inlined here; the others are one call away, so that this stays small in the host's cache.
 

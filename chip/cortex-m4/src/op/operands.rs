@@ -1,4 +1,4 @@
-//! What the fields of an operation may be: which sum, which shift, how wide, how rounded.
+//! Values of an operation's fields: kinds of sums and shifts, widths, rounding.
 #![allow(missing_docs, reason = "names of operations and operands are those of the architecture's manual")]
 
 /// The data-processing operations with two operands.
@@ -32,7 +32,7 @@ pub enum Shift {
     Rrx,
 }
 
-/// What a load or store moves.
+/// The unit of a load or store.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Width {
     Byte,
@@ -75,7 +75,7 @@ pub enum Lanes {
     Sub16,
 }
 
-/// What a parallel addition or subtraction does with what does not fit.
+/// Overflow of a parallel addition or subtraction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Prefix {
     S,

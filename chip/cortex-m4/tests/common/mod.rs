@@ -1,4 +1,4 @@
-//! What the comparisons with QEMU share: programs are built, loaded, and run there and on the model.
+//! Shared by the comparisons with QEMU: programs are built, loaded, and run there and on the model.
 #![allow(dead_code, unreachable_pub, reason = "each test program uses a part")]
 #![allow(clippy::panic, reason = "tests")]
 
@@ -86,7 +86,7 @@ impl Bus for Flat {
     }
 }
 
-/// A folder of this process for what passes between the programs.
+/// A folder of this process for files between the programs.
 pub fn folder(name: &str) -> PathBuf {
     let folder = std::env::temp_dir().join(format!("cortex-m4-model-{name}-{}", std::process::id()));
     std::fs::create_dir_all(&folder).expect("a folder for temporary files");
@@ -134,7 +134,7 @@ pub fn segments(elf: &Path) -> Vec<(u32, Vec<u8>)> {
         .collect()
 }
 
-/// Runs a program in QEMU, with parts of memory given; what it printed.
+/// Runs a program in QEMU, with parts of memory given. Gives its output.
 pub fn qemu(elf: &Path, parts: &[(u32, &[u8])], folder: &Path) -> String {
     let mut command = Command::new("timeout");
     command.args(["20", "qemu-system-arm"]);
@@ -175,7 +175,7 @@ fn boot(elf: &Path, parts: &[(u32, &[u8])]) -> (Flat, Core) {
     (memory, core)
 }
 
-/// Serves a run's end; false at `SYS_EXIT`. What `SYS_WRITE0` prints is added to the text.
+/// Serves a run's end; false at `SYS_EXIT`. The text of `SYS_WRITE0` is added.
 fn serve(core: &mut Core, memory: &mut Flat, outcome: Outcome, printed: &mut String) -> bool {
     match outcome {
         Outcome::Ran => {}
@@ -203,7 +203,7 @@ fn serve(core: &mut Core, memory: &mut Flat, outcome: Outcome, printed: &mut Str
     true
 }
 
-/// Runs a program on the model up to `SYS_EXIT`, but no longer than so many cycles; what it printed, the memory, the processor.
+/// Runs a program on the model up to `SYS_EXIT`, for at most that many cycles. Gives its output, the memory, the processor.
 pub fn model(elf: &Path, parts: &[(u32, &[u8])], limit: u64) -> (String, Flat, Core) {
     let (mut memory, mut core) = boot(elf, parts);
     let mut printed = String::new();

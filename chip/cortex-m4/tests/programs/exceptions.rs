@@ -1,7 +1,7 @@
-//! Exceptions, faults, masks, privilege, late floating-point state, sleep, MPU: each scenario prints what it saw.
+//! Exceptions, faults, masks, privilege, late floating-point state, sleep, MPU: each scenario prints its observations.
 //!
 //! The text is compared between QEMU and the model. Every vector leads to `on_exception`, which prints number, return code and
-//! status, does what the scenario has set for that number, and steps over the instruction of a fault.
+//! status, does the scenario's action for that number, and steps over the instruction of a fault.
 #![no_std]
 #![no_main]
 
@@ -256,7 +256,7 @@ fn lazy() {
             asm!("vmov s1, {0}", "svc #1", "vmov {0}, s1", inout(reg) 0x1234_5678u32 => s0, out("s1") _);
         }
         print!("  s1 {s0:x} {:x?}\n\0", status());
-        // What was kept free is free again, before anything touches the FPU.
+        // The reserved space is free again, before anything touches the FPU.
         let after: u32;
         unsafe {
             asm!("vmov s1, {0}", "svc #1", "ldr {1}, [{2}]", in(reg) 1, out(reg) after, in(reg) FPCCR, out("s1") _);
@@ -394,7 +394,7 @@ fn vector_table() {
 }
 
 fn systick() {
-    // Where it interrupts is a matter of time: nothing of the frame is shown.
+    // The place of the interrupt depends on time: the frame is not shown.
     unsafe { QUIET = true };
     on(15, |_, _| {
         put(0xE000_E010, 0);

@@ -45,7 +45,7 @@ pub fn faults() {
     bad_stack(5, 0x3000_1000);
 }
 
-/// A supervisor call with the process stack where none may be: the fault of this number leads back.
+/// A supervisor call with the process stack at a forbidden place: the fault of this number leads back.
 pub fn bad_stack(number: u32, stack: u32) {
     let main = mrs!("msp");
     on(number, |_, exc_return| {

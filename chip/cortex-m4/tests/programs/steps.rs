@@ -1,7 +1,7 @@
 //! Runs instructions one by one: loads a state, jumps to the instruction, stores the state after it.
 //!
-//! Each test runs in thread mode on the process stack and ends by SVC or by a fault; every exception comes to `handler`, which
-//! stores the registers and the scratch memory, and returns into the next test's state through a frame that it builds.
+//! Each test runs in thread mode on the process stack and ends by SVC or by a fault. Every exception comes to `handler`. It
+//! stores the registers and the scratch memory, builds a frame with the next test's state, and returns into it.
 #![no_std]
 #![no_main]
 

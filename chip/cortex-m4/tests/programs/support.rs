@@ -1,4 +1,4 @@
-//! What the scenarios stand on: text by semihosting, registers, and one handler for every vector.
+//! The base of the scenarios: text by semihosting, registers, and one handler for every vector.
 
 use core::arch::{asm, global_asm};
 use core::fmt::Write;
@@ -142,7 +142,7 @@ pub struct Frame {
     pub xpsr: u32,
 }
 
-/// What a handler does beside printing.
+/// The action of a handler beside printing.
 pub type Action = fn(&mut Frame, &mut u32);
 pub static mut ACTIONS: [Option<Action>; 64] = [None; 64];
 pub static mut QUIET: bool = false;
@@ -184,7 +184,7 @@ extern "C" fn on_exception(number: u32, frame: &mut Frame, exc_return: &mut u32)
         put(CFSR, cfsr);
         put(CFSR + 4, hfsr);
         if unsafe { ACTIONS[number as usize] }.is_none() {
-            // Over the instruction; out of a place where none is.
+            // Over the instruction; out of a place without one.
             if cfsr & 0x0002_0101 != 0 {
                 print!(" pc {:x}", frame.pc);
                 frame.pc = frame.lr & !1;
@@ -236,7 +236,7 @@ pub fn reset() {
     }
 }
 
-/// Jumps to where something may be.
+/// Jumps to an address.
 pub fn call(address: u32) {
     unsafe { asm!("blx {0}", in(reg) address, clobber_abi("C")) }
 }

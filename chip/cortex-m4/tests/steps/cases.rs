@@ -125,7 +125,7 @@ pub(crate) fn generate(random: &mut Random, number: u32) -> Option<Case> {
         if pattern.len() > 20 { [(bits >> 16) as u16, bits as u16] } else { [bits as u16, 0xDF00] };
     let slot = SLOTS + number * SLOT;
     let in_it = random.one_in(4);
-    // The program counter is aligned where it is a base, so half of them stand where it is not.
+    // A base program counter is aligned, so half of the instructions stand at unaligned places.
     let at = AT + 2 * random.below(2);
     let (op, _) = decode(slot + at, in_it, halfwords);
     let allowed_in_it = !matches!(op, Op::BranchIf { .. } | Op::BranchZero { .. } | Op::IfThen { .. });
@@ -147,7 +147,7 @@ pub(crate) fn generate(random: &mut Random, number: u32) -> Option<Case> {
 /// Gives registers the values that the operation needs to do no harm; false if it cannot be tested here.
 fn prepare(random: &mut Random, case: &mut Case, slot: u32) -> bool {
     match case.op {
-        // QEMU loads where the architecture has a hint that is not allocated.
+        // QEMU loads; the architecture has an unallocated hint here.
         Op::Nop => !case.name.starts_with("load"),
         Op::Undefined => case.name == "undefined",
         Op::TableBranch { n, m, .. } => {
@@ -179,7 +179,7 @@ fn prepare(random: &mut Random, case: &mut Case, slot: u32) -> bool {
         }
         Op::MoveToSpecial { special, .. } => special < 4,
         Op::IfThen { state } => {
-            // What follows is an SVC, executed or not: the slot is full of them, of 16 bits each.
+            // An SVC follows, executed or not: the slot is full of them, of 16 bits each.
             state & 15 != 0
         }
         Op::MovImmediate { d: 13, .. }
@@ -204,7 +204,7 @@ fn prepare(random: &mut Random, case: &mut Case, slot: u32) -> bool {
 /// Gives a load or store a base in the scratch memory.
 fn prepare_memory(random: &mut Random, case: &mut Case, slot: u32) -> bool {
     let to_pc = to_pc(case.op);
-    // What is loaded into the program counter is a whole word: an address where nothing is.
+    // The program counter is loaded with a whole word: an address without memory.
     let target = |size: u32, random: &mut Random| {
         let at = SCRATCH + if to_pc { random.below(0x94) } else { random.below(0x158) };
         if random.one_in(4) && !to_pc { at } else { at & !(size - 1) }
@@ -289,7 +289,7 @@ fn bytes(width: Width) -> u32 {
     }
 }
 
-/// The base register's value for this address; the stack pointer stays where it is, if the address is good all the same.
+/// The base register's value for this address; the stack pointer stays if the address is good.
 fn base(case: &mut Case, n: u8, address: u32, offset: i32) -> bool {
     if n == 13 {
         return (0..0x3F0).contains(&offset) || (-0x100..0).contains(&offset) && !to_pc(case.op);
@@ -312,7 +312,7 @@ fn by_register(case: &mut Case, n: u8, m: u8, shift: u8, address: u32) -> bool {
     true
 }
 
-/// Into the slot, or to where nothing is: QEMU's machine has its memories a second time behind them, and devices at `0x4000_0000`.
+/// Into the slot, or to an empty address: QEMU's machine has its memories a second time behind them, and devices at `0x4000_0000`.
 fn good_target(target: u32, slot: u32) -> bool {
     let outside = matches!(target >> 28, 3 | 6..=13);
     // Not to itself, and not into its own second half.

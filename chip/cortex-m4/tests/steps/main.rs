@@ -2,7 +2,7 @@
 //!
 //! A batch is a program (`programs/steps.rs`) with some thousand states and instructions as data. It runs in QEMU and on the
 //! model; registers, flags, floating-point registers and status, fault status, return address and memory are compared after each.
-//! `CORTEX_BATCHES` says how many batches (1), `CORTEX_SEED` where the random numbers begin.
+//! `CORTEX_BATCHES` is the number of batches (1), `CORTEX_SEED` the seed.
 mod cases;
 #[path = "../common/mod.rs"]
 mod common;
@@ -13,11 +13,11 @@ use cases::{Case, generate, sequence};
 use random::Random;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Where the parts of a batch stand in QEMU's mps2-an386.
+/// Addresses of a batch's parts in QEMU's mps2-an386.
 const TESTS: usize = 12_000;
 const SLOTS: u32 = 0x2100_1000;
 const SLOT: u32 = 64;
-/// Where in its slot an instruction stands: halfwords before it are for IT, or for LDREX before STREX.
+/// Offset of an instruction in its slot: halfwords before it are for IT, or for LDREX before STREX.
 const AT: u32 = 24;
 const SCRATCH: u32 = 0x2029_0000;
 const SCRATCH_WORDS: usize = 96;
@@ -56,7 +56,7 @@ fn parts(cases: &[Case], seed: u64) -> Vec<(u32, Vec<u8>)> {
     let mut random = Random(seed ^ 0x5EED | 1);
     let mut pattern: Vec<u32> = (0..SCRATCH_WORDS)
         .map(|_| {
-            // An address where nothing is, odd, or even and then that of a word.
+            // An address without memory: odd, or that of a word.
             let word = random.next() & 0x0FFF_FFFF | random.of(&[3u32, 7, 9, 11]) << 28;
             if word & 1 == 1 { word } else { word & !3 }
         })
@@ -74,7 +74,7 @@ fn parts(cases: &[Case], seed: u64) -> Vec<(u32, Vec<u8>)> {
     ]
 }
 
-/// What the words of a record are called.
+/// Names of a record's words.
 fn word_name(i: usize) -> String {
     const FRAME: [&str; 8] = ["r0", "r1", "r2", "r3", "r12", "lr", "pc", "xpsr"];
     const STATUS: [&str; 6] = ["psp", "fpscr", "ipsr", "cfsr", "exc_return", "hfsr"];

@@ -109,7 +109,7 @@ pub(crate) const PATTERNS: &[(&str, &str)] = &[
     ("no coprocessor", "11101110 xxxxxxxx xxxx00xx xxxxxxxx"),
 ];
 
-/// The pattern with these bits where it leaves them open; 16 or 32 bits.
+/// The pattern with these bits in its open places; 16 or 32 bits.
 pub(crate) fn fill(pattern: &str, random: u32) -> u32 {
     let bits = pattern.chars().filter(|letter| *letter != ' ');
     let mut random = random;

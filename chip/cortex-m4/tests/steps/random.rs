@@ -1,4 +1,4 @@
-//! Random numbers, and operands on the edges of what an instruction does.
+//! Random numbers, and operands at the edges of an instruction's range.
 
 /// A small generator of random numbers (xorshift*), so that a seed gives the same tests for ever.
 pub(crate) struct Random(pub(crate) u64);

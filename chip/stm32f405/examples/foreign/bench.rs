@@ -1,4 +1,4 @@
-//! What the judges of all programs use.
+//! Shared by the judges of all programs.
 
 use std::error::Error;
 
@@ -7,7 +7,7 @@ use stm32f405_model::machine::Machine;
 use stm32f405_model::spi::Wire;
 use stm32f405_model::time::{MS, Ps};
 
-/// What a judge says: nothing, or what the program did not do.
+/// Result of a judge: nothing, or the program's fault.
 pub(crate) type Outcome = Result<(), Box<dyn Error>>;
 
 /// Runs until this moment.
@@ -15,7 +15,7 @@ pub(crate) fn run(machine: &mut Machine, until: Ps) -> Outcome {
     machine.run_until(until).map_err(|report| format!("{} in {}", report.reason, report.place).into())
 }
 
-/// It is so, or this is what is wrong.
+/// True, or this fault.
 pub(crate) fn expect(good: bool, what: String) -> Outcome {
     if good { Ok(()) } else { Err(what.into()) }
 }
@@ -36,7 +36,7 @@ pub(crate) fn logged(machine: &Machine) -> u32 {
     channel(machine).map_or(0, |[.., written]| written)
 }
 
-/// What was written to the log, a ring, since this place.
+/// The log (a ring) since this place.
 pub(crate) fn logged_since(machine: &Machine, place: u32) -> Vec<u8> {
     let Some([buffer, ring, written]) = channel(machine) else { return Vec::new() };
     let bytes = (written + ring - place) % ring;
@@ -49,7 +49,7 @@ pub(crate) fn log(machine: &Machine) -> String {
     String::from_utf8_lossy(machine.memory(buffer, written)).into_owned()
 }
 
-/// What a port has sent, as text.
+/// The text that a port has sent.
 pub(crate) fn text(sent: &[(Ps, u8)]) -> String {
     sent.iter().map(|(_, byte)| char::from(*byte)).collect()
 }
@@ -85,7 +85,7 @@ pub(crate) fn expect_pauses(changes: &[(u64, bool)], ms: u64, least: usize) -> O
     expect(good, format!("it changed after {pauses:?} ms, and not each {ms} ms"))
 }
 
-/// Keeps what comes over a bus, and the fastest clock of it.
+/// Keeps the bytes of a bus, and its fastest clock.
 #[derive(Default)]
 pub(crate) struct Tap(pub(crate) std::rc::Rc<std::cell::RefCell<(Vec<u8>, u32)>>);
 

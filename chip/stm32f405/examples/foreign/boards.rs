@@ -8,7 +8,7 @@ use stm32f405_model::time::{MS, SECOND};
 
 use crate::bench::{Outcome, changes, expect, log, run, text};
 
-/// A memory on a bus: it answers what it is, and that it is not busy.
+/// A memory on a bus: it answers with its identity, and that it is not busy.
 #[derive(Default)]
 struct Memory {
     selected: bool,

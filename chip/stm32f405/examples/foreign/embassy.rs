@@ -29,8 +29,8 @@ pub(crate) fn wdt(machine: &mut Machine) -> Outcome {
     )
 }
 
-/// Sector 5 is erased, and 32 numbers are written to its beginning; what it goes on with are sectors that this chip lacks: the HAL refuses, and
-/// it panics.
+/// Erases sector 5 and writes 32 numbers to its beginning. The next sectors do not exist on this chip: the HAL refuses, and it
+/// panics.
 pub(crate) fn flash(machine: &mut Machine) -> Outcome {
     const SECTOR: u32 = 0x0802_0000;
     run(machine, 10 * SECOND)?;

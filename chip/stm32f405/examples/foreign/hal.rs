@@ -28,7 +28,7 @@ pub(crate) fn serial_dma(machine: &mut Machine) -> Outcome {
     expect(heard == ["by DMA", "by ask", ""], format!("it echoed {heard:?}"))
 }
 
-/// Takes what comes into one of two buffers, by DMA through its FIFO; the line's silence ends it. (Its interrupt never clears that flag, so that
+/// Receives into one of two buffers, by DMA through its FIFO; the line's silence ends it. (Its interrupt never clears that flag, so that
 /// the buffers change again and again until the next byte: which of the two is taken is chance.)
 pub(crate) fn rtic_serial_dma_rx_idle(machine: &mut Machine) -> Outcome {
     const TEXTS: [&[u8]; 3] = [b"the first of them", b"another one", b"a third text, longer than the first"];
@@ -115,7 +115,7 @@ pub(crate) fn delay_syst_blinky(machine: &mut Machine) -> Outcome {
     expect_pauses(&changes, 1_000, 6)
 }
 
-/// A shell at 115,200 baud, each byte by an interrupt: what was typed is echoed, `status` tells the LED, the button turns it.
+/// A shell at 115,200 baud, each byte by an interrupt: input is echoed, `status` prints the LED, the button turns it.
 pub(crate) fn rtic_usart_shell(machine: &mut Machine) -> Outcome {
     let typed = |machine: &mut Machine, words: &str, at: Ps| -> Result<String, Box<dyn std::error::Error>> {
         for (number, byte) in (0..).zip(words.bytes()) {
