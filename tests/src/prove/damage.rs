@@ -27,26 +27,26 @@ const BURST_BITS_MAX: u64 = 8 * BLOCK as u64;
 /// What it prints.
 pub(super) const LABELS: Labels = Labels {
     facts: &[
-        "errors in bits",
-        "of them single bits",
-        "of them bursts of 2 to 4096 bits",
-        "of them noticed",
+        "bit errors",
+        "single bits",
+        "bursts of 2 to 4096 bits",
+        "noticed",
         "frames lost",
-        "frames given out, all of them right",
-        "single bits in memory, before a sector got its checksum",
-        "of them noticed",
-        "of them without an effect on what is read",
-        "frames lost by one of them at most",
-        "frames given out after them, all of them right",
+        "frames decoded, all correct",
+        "bit errors in memory, before the sector's checksum",
+        "noticed",
+        "without effect",
+        "frames lost by one of them, at most",
+        "frames decoded after them, all correct",
         "damaged pages and ends",
-        "of them noticed: `verify` does not call it good",
-        "of them read as the other session, and told",
-        "of them told: whole up to the end mark that is named, and no further",
-        "of them without a loss: what was made again from parity is said, and `verify` does not call it good",
-        "missed, or told wrong",
-        "frames given out after these, all of them right",
+        "noticed by `verify`",
+        "read as the other session, and reported",
+        "reported as complete up to the named end mark",
+        "rebuilt from parity without a loss, and noticed by `verify`",
+        "missed or wrong",
+        "frames decoded after these, all correct",
     ],
-    columns: &["damage", "how often", "noticed", "told", "missed", "most frames lost"],
+    columns: &["damage", "cases", "noticed", "reported", "missed", "frames lost, at most"],
 };
 
 pub(super) fn run(options: &Options) -> Result<Figures> {
@@ -68,19 +68,19 @@ fn bits(options: &Options, figures: &mut Figures) -> Result<()> {
     let (outcomes, in_memory): (Vec<_>, Vec<_>) = outcomes.collect::<Result<Vec<_>>>()?.into_iter().unzip();
     let sum = |of: fn(&Outcome) -> u64| outcomes.iter().map(of).sum::<u64>();
     let (errors, noticed) = (sum(|one| one.single + one.bursts), sum(|one| one.noticed));
-    figures.fact("errors in bits", errors);
-    figures.fact("of them single bits", sum(|one| one.single));
-    figures.fact("of them bursts of 2 to 4096 bits", sum(|one| one.bursts));
-    figures.fact("of them noticed", noticed);
+    figures.fact("bit errors", errors);
+    figures.fact("single bits", sum(|one| one.single));
+    figures.fact("bursts of 2 to 4096 bits", sum(|one| one.bursts));
+    figures.fact("noticed", noticed);
     figures.fact("frames lost", outcomes.iter().map(|one| one.lost_max).max().unwrap_or(0));
-    figures.fact("frames given out, all of them right", sum(|one| one.frames));
+    figures.fact("frames decoded, all correct", sum(|one| one.frames));
     let sum = |of: fn(&Outcome) -> u64| in_memory.iter().map(of).sum::<u64>();
-    figures.fact("single bits in memory, before a sector got its checksum", sum(|one| one.single));
-    figures.fact("of them noticed", sum(|one| one.noticed));
-    figures.fact("of them without an effect on what is read", sum(|one| one.harmless));
+    figures.fact("bit errors in memory, before the sector's checksum", sum(|one| one.single));
+    figures.fact("noticed", sum(|one| one.noticed));
+    figures.fact("without effect", sum(|one| one.harmless));
     let lost_max = in_memory.iter().map(|one| one.lost_max).max().unwrap_or(0);
-    figures.fact("frames lost by one of them at most", lost_max);
-    figures.fact("frames given out after them, all of them right", sum(|one| one.frames));
+    figures.fact("frames lost by one of them, at most", lost_max);
+    figures.fact("frames decoded after them, all correct", sum(|one| one.frames));
     ensure!(noticed == errors, "{} of {errors} errors in bits were not noticed", errors - noticed);
     Ok(())
 }
@@ -104,15 +104,12 @@ fn whole_pages(options: &Options, figures: &mut Figures) -> Result<()> {
         outcomes.iter().map(move |one| &one.tallies[kind].1)
     });
     figures.fact("damaged pages and ends", all.damages);
-    figures.fact("of them noticed: `verify` does not call it good", all.noticed);
-    figures.fact("of them read as the other session, and told", all.other);
-    figures.fact("of them told: whole up to the end mark that is named, and no further", all.told);
-    figures.fact(
-        "of them without a loss: what was made again from parity is said, and `verify` does not call it good",
-        all.repaired,
-    );
-    figures.fact("missed, or told wrong", all.missed);
-    figures.fact("frames given out after these, all of them right", all.frames);
+    figures.fact("noticed by `verify`", all.noticed);
+    figures.fact("read as the other session, and reported", all.other);
+    figures.fact("reported as complete up to the named end mark", all.told);
+    figures.fact("rebuilt from parity without a loss, and noticed by `verify`", all.repaired);
+    figures.fact("missed or wrong", all.missed);
+    figures.fact("frames decoded after these, all correct", all.frames);
     let misses: Vec<_> = outcomes.iter().flat_map(|one| &one.misses).take(10).map(String::as_str).collect();
     ensure!(all.missed == 0, "{}\nthe first ones:\n{}", figures.text(), misses.join("\n"));
     ensure!(all.noticed + all.told == all.damages, "they do not add up:\n{}", figures.text());

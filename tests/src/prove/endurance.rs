@@ -49,12 +49,12 @@ pub(super) const LABELS: Labels = Labels {
         "MAVLink, MB",
         "log, MB",
         "segments",
-        "of them in the place of an older one",
+        "segments that replaced an older one",
         "block writes of the log, commands",
-        "the card was looked at",
-        "newest data on the card, whole, minutes at least",
-        "log behind the line at most, ms",
-        "bytes allocated at the second look and at most later",
+        "inspections of the card",
+        "newest data on the card, minutes, at least",
+        "delay from line to card, ms, at most",
+        "bytes allocated at the second inspection, and at most later",
         "`fsck.vfat -n` at the end",
     ],
     columns: &[],
@@ -104,19 +104,21 @@ pub(super) fn run(options: &Options) -> Result<Figures> {
     figures.fact("MAVLink, MB", done.stats.bytes_in / 1_000_000);
     figures.fact("log, MB", done.stats.bytes_logged / 1_000_000);
     figures.fact("segments", done.card.segments);
-    figures.fact("of them in the place of an older one", done.card.segments_overwritten);
+    figures.fact("segments that replaced an older one", done.card.segments_overwritten);
     figures.fact(
         "block writes of the log, commands",
         format!("{}, {}", done.card.blocks_written, done.card.writes),
     );
-    figures.fact("the card was looked at", seen.len() + 1);
-    figures.fact("newest data on the card, whole, minutes at least", {
+    figures.fact("inspections of the card", seen.len() + 1);
+    figures.fact("newest data on the card, minutes, at least", {
         let kept = seen.iter().filter(|about| about.is_full).chain([&last]);
         kept.map(|about| about.kept_ms / 60_000).min().unwrap_or(0)
     });
-    figures
-        .fact("log behind the line at most, ms", seen.iter().map(|about| about.behind_ms).max().unwrap_or(0));
-    figures.fact("bytes allocated at the second look and at most later", format!("{early}, {late}"));
+    figures.fact(
+        "delay from line to card, ms, at most",
+        seen.iter().map(|about| about.behind_ms).max().unwrap_or(0),
+    );
+    figures.fact("bytes allocated at the second inspection, and at most later", format!("{early}, {late}"));
     figures.fact("`fsck.vfat -n` at the end", "clean");
     Ok(figures)
 }

@@ -51,21 +51,21 @@ pub(super) const LABELS: Labels = Labels {
     facts: &[
         "simulated hours",
         "without a key: hostile bytes, MB",
-        "without a key: frames of the vehicle, lost",
-        "without a key: bytes to the ground station in any second at most, of",
-        "without a key: bytes to the autopilot in any second at most, of",
-        "without a key: frames to the autopilot, of them such as the box sends by itself",
+        "without a key: frames of the vehicle, and lost",
+        "without a key: bytes to the ground station in a second: most, budget",
+        "without a key: bytes to the autopilot in a second: most, budget",
+        "without a key: frames to the autopilot, and the box's own of them",
         "without a key: parameters changed",
-        "without a key: earlier logs, of them marked as erased, of them unreadable",
-        "without a key: sector queue at most, of",
+        "without a key: earlier logs, marks as erased, unreadable",
+        "without a key: sector queue: most, size",
         "with a key: hostile bytes, MB",
-        "with a key: frames of the vehicle, lost",
-        "with a key: bytes to the ground station in any second at most, of",
-        "with a key: bytes to the autopilot in any second at most, of",
-        "with a key: frames to the autopilot, of them such as the box sends by itself",
+        "with a key: frames of the vehicle, and lost",
+        "with a key: bytes to the ground station in a second: most, budget",
+        "with a key: bytes to the autopilot in a second: most, budget",
+        "with a key: frames to the autopilot, and the box's own of them",
         "with a key: parameters changed",
-        "with a key: earlier logs, of them marked as erased, of them unreadable",
-        "with a key: sector queue at most, of",
+        "with a key: earlier logs, marks as erased, unreadable",
+        "with a key: sector queue: most, size",
     ],
     columns: &[],
 };
@@ -79,28 +79,28 @@ pub(super) fn run(options: &Options) -> Result<Figures> {
         let half = attack(options, seconds / 2, key).with_context(|| name.to_owned())?;
         figures.fact(format!("{name}: hostile bytes, MB"), format!("{:.1}", half.hostile_bytes as f64 / 1e6));
         figures.fact(
-            format!("{name}: frames of the vehicle, lost"),
+            format!("{name}: frames of the vehicle, and lost"),
             format!("{}, {}", half.outcome.done.stats.frames_in, half.outcome.done.stats.frames_lost),
         );
         figures.fact(
-            format!("{name}: bytes to the ground station in any second at most, of"),
+            format!("{name}: bytes to the ground station in a second: most, budget"),
             format!("{}, {}", half.fullest, half.budget),
         );
         figures.fact(
-            format!("{name}: bytes to the autopilot in any second at most, of"),
+            format!("{name}: bytes to the autopilot in a second: most, budget"),
             format!("{}, {}", half.to_autopilot.window.fullest, half.autopilot_budget),
         );
         figures.fact(
-            format!("{name}: frames to the autopilot, of them such as the box sends by itself"),
+            format!("{name}: frames to the autopilot, and the box's own of them"),
             format!("{}, {}", half.to_autopilot.frames, half.to_autopilot.own),
         );
         figures.fact(format!("{name}: parameters changed"), half.changed);
         figures.fact(
-            format!("{name}: earlier logs, of them marked as erased, of them unreadable"),
+            format!("{name}: earlier logs, marks as erased, unreadable"),
             format!("{EARLIER}, {}, 0", half.erased),
         );
         figures.fact(
-            format!("{name}: sector queue at most, of"),
+            format!("{name}: sector queue: most, size"),
             format!(
                 "{}, {}",
                 half.outcome.done.stats.queue_bytes_max, half.outcome.done.stats.queue_bytes_capacity

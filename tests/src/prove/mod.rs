@@ -46,60 +46,61 @@ pub struct Campaign {
 pub const CAMPAIGNS: &[Campaign] = &[
     Campaign {
         name: "power-cuts",
-        about: "power goes at any block write, half of them torn, on a simulated card that keeps what it acknowledged and \
-                in its order: the file system stays in order, earlier logs stay as they are, and the log, once it has begun, \
-                gives the flight up to 200 ms before",
+        about: "power fails at a block write of a simulated card, in half of the cases in the middle of a block. The \
+                card keeps acknowledged blocks in order. Promise: the file system and earlier logs stay intact, and the \
+                log holds the flight up to 200 ms before the cut",
         labels: power_cuts::LABELS,
         run: power_cuts::run,
     },
     Campaign {
         name: "careless-cards",
-        about: "power goes at a simulated card that keeps its last blocks in no order, has lost one that it acknowledged, or \
-                spoils the page around the last one, one of these at a time: earlier sessions lose nothing beyond the groups \
-                that were spoiled, and each loss is told; what the next power-on writes over is counted",
+        about: "power fails at a simulated card with one of three faults: it loses some of its last blocks, it loses \
+                one acknowledged block, or it spoils the page around the last block. Promise: earlier sessions lose \
+                only spoiled groups, and each loss is reported. Sectors that the next power-on overwrites are counted",
         labels: power_cuts::careless::LABELS,
         run: power_cuts::careless::run,
     },
     Campaign {
         name: "damage",
-        about: "bits flip anywhere in a log, pages of it go wrong, or its end goes missing, one damage at a time: each is \
-                noticed or told for what it is, no wrong frame comes out, and at most the groups that were touched are lost",
+        about: "a log gets one damage: flipped bits, damaged pages, or a missing end. Promise: each damage is noticed \
+                or reported, no wrong frame is decoded, and only the damaged groups are lost",
         labels: damage::LABELS,
         run: damage::run,
     },
     Campaign {
         name: "stalls",
-        about: "a simulated card answers nothing for 2.5 s, once in a recording at 921,600 baud: no frame of an unsigned \
-                recording is lost",
+        about: "a simulated card does not answer for 2.5 s, once in a recording at 921,600 baud. Promise: an unsigned \
+                recording loses no frame",
         labels: stalls::LABELS,
         run: stalls::run,
     },
     Campaign {
         name: "endurance",
-        about: "24 simulated hours at 20 kB/s on a card of 64 MiB: the newest data is always there, and memory stays as it is",
+        about: "24 simulated hours at 20 kB/s on a card of 64 MiB. Promise: the newest data is always on the card, and \
+                memory does not grow",
         labels: endurance::LABELS,
         run: endurance::run,
     },
     Campaign {
         name: "hostile-gs",
-        about: "24 simulated hours of a ground station that sends noise, floods, forged and malformed frames at full rate: no \
-                panic, no frame of the vehicle is lost, no second has more bytes than the budget at either port, earlier logs \
-                stay readable; where a key is asked for, no parameter is changed, no log is marked as erased, the record has no \
-                hole, and the autopilot gets nothing but what the box sends by itself",
+        about: "for 24 simulated hours a ground station sends noise, floods, forged and malformed frames at full rate. \
+                Promise: no panic, no lost frame of the vehicle, no second above the budget of a port, and readable \
+                earlier logs. With a key also: no parameter changes, no log is marked as erased, the record has no gap, \
+                and the autopilot receives only the box's own messages",
         labels: hostile_gs::LABELS,
         run: hostile_gs::run,
     },
     Campaign {
         name: "noise",
-        about: "bytes on the line are damaged, each at random and by itself: each frame that is not itself damaged is recorded, \
-                unless the noise happens to make a false frame, with a checksum that fits, over it",
+        about: "single bytes on the line are damaged at random. Promise: each undamaged frame is recorded, unless noise \
+                forms a false frame with a valid checksum over it",
         labels: noise::LABELS,
         run: noise::run,
     },
     Campaign {
         name: "mutations",
-        about: "each reader gets inputs of its corpus with one to eight changes, and noise: none panics, and what must hold for \
-                any bytes (fuzz/src) holds",
+        about: "each reader gets inputs of its corpus with one to eight changes, and noise. Promise: no reader panics, \
+                and the rules of fuzz/src hold",
         labels: mutations::LABELS,
         run: mutations::run,
     },

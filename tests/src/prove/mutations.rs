@@ -17,7 +17,7 @@ const SHORT: u64 = 5;
 
 /// What it prints.
 pub(super) const LABELS: Labels = Labels {
-    facts: &["readers", "inputs tried", "inputs that broke a reader"],
+    facts: &["readers", "inputs tried", "inputs that broke a rule"],
     columns: &["reader", "inputs"],
 };
 
@@ -30,7 +30,7 @@ pub(super) fn run(options: &Options) -> Result<Figures> {
     figures.fact("readers", outcomes.len());
     figures.fact("inputs tried", outcomes.iter().sum::<u64>());
     // The first one ends the campaign with an error.
-    figures.fact("inputs that broke a reader", 0);
+    figures.fact("inputs that broke a rule", 0);
     for (target, tried) in TARGETS.iter().zip(outcomes) {
         figures.row([target.name.to_owned(), tried.to_string()]);
     }

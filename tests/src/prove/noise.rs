@@ -24,14 +24,14 @@ const INVENTED_MAX: f64 = 1.0 / 2_000.0;
 
 /// What it prints.
 pub(super) const LABELS: Labels = Labels {
-    facts: &["runs", "frames", "whole frames that were not recorded"],
+    facts: &["runs", "frames", "undamaged frames that were not recorded"],
     columns: &[
-        "a byte is damaged with",
+        "probability for a byte",
         "frames",
         "damaged",
-        "whole and recorded",
-        "whole, under a false frame",
-        "damaged, but fit their checksum by chance",
+        "undamaged, recorded",
+        "undamaged, under a false frame",
+        "damaged, checksum fits by chance",
     ],
 };
 
@@ -57,7 +57,7 @@ pub(super) fn run(options: &Options) -> Result<Figures> {
     figures.fact("runs", outcomes.len());
     figures.fact("frames", outcomes.iter().map(|(_, one)| one.frames).sum::<u64>());
     figures.fact(
-        "whole frames that were not recorded",
+        "undamaged frames that were not recorded",
         outcomes.iter().map(|(_, one)| one.missing).sum::<u64>(),
     );
     for probability in PROBABILITIES {

@@ -103,12 +103,12 @@ const SCENARIOS: &[Scenario] = &[
 pub(super) const LABELS: Labels = Labels {
     facts: &[
         "cuts",
-        "of them torn",
-        "of them at the FAT or the directory",
+        "cuts in the middle of a block (torn)",
+        "cuts at the FAT or the directory",
         "files of earlier sessions compared",
-        "frames decoded, all equal to those that went in",
-        "most that a cut cost, ms (200 allowed)",
-        "most that a cut cost before the log had begun, ms (300 allowed)",
+        "frames decoded, all correct",
+        "largest loss by a cut, ms (200 allowed)",
+        "largest loss before the log began, ms (300 allowed)",
     ],
     columns: &["scenario", "flight", "block writes", "cuts", "torn", "worst ms"],
 };
@@ -128,14 +128,14 @@ pub(super) fn run(options: &Options) -> Result<Figures> {
     let sum = |of: fn(&Outcome) -> u64| outcomes.iter().map(of).sum::<u64>();
     let mut figures = Figures::new(&LABELS);
     figures.fact("cuts", sum(|one| one.cuts));
-    figures.fact("of them torn", sum(|one| one.torn));
-    figures.fact("of them at the FAT or the directory", sum(|one| one.metadata));
+    figures.fact("cuts in the middle of a block (torn)", sum(|one| one.torn));
+    figures.fact("cuts at the FAT or the directory", sum(|one| one.metadata));
     figures.fact("files of earlier sessions compared", sum(|one| one.files));
-    figures.fact("frames decoded, all equal to those that went in", sum(|one| one.frames));
+    figures.fact("frames decoded, all correct", sum(|one| one.frames));
     let worst = outcomes.iter().map(|one| one.loss_us_max).max().unwrap_or(0);
-    figures.fact("most that a cut cost, ms (200 allowed)", worst / 1000);
+    figures.fact("largest loss by a cut, ms (200 allowed)", worst / 1000);
     let begun = outcomes.iter().map(|one| one.begin_us_max).max().unwrap_or(0);
-    figures.fact("most that a cut cost before the log had begun, ms (300 allowed)", begun / 1000);
+    figures.fact("largest loss before the log began, ms (300 allowed)", begun / 1000);
     for (one, scenario) in
         outcomes.iter().zip(SCENARIOS.iter().filter(|one| !options.short || one.seconds < 60.0))
     {

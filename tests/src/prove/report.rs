@@ -35,9 +35,10 @@ pub struct Part {
 const HEAD: &str = "\
 # Proof
 
-What the recorder promises, tried in bulk. `cargo xtask prove` runs all campaigns (an hour) on the recordings of the repository
-and writes this file whole; `cargo xtask prove NAME` only prints the figures of one. `cargo xtask test` runs the short form of
-each campaign. The same commit and seed give the same figures, apart from the seconds.
+For people who ask how far the record can be trusted. Each section is a campaign: a promise, the number of cases, the result.
+
+`cargo xtask prove` runs all campaigns on the recordings of the repository (an hour) and writes this page. `cargo xtask prove NAME`
+prints one. `cargo xtask test` runs a short form of each. The same commit and seed give the same figures, apart from the seconds.
 ";
 
 /// What the document says in place of its commit where campaigns changed and have not been run as a whole since.
@@ -56,7 +57,7 @@ fn text(parts: &[Part], from: &Provenance) -> String {
     for Part { campaign, figures, seconds } in parts {
         let _ = write!(
             text,
-            "\n{}\n\n{}\n\nIt took {seconds:.0} s.\n\n{}\n",
+            "\n{}\n\n{} It took {seconds:.0} s.\n\n{}\n",
             heading(campaign),
             sentence(campaign.about),
             figures.text().trim()
@@ -127,7 +128,7 @@ mod tests {
         let text = document();
         assert_eq!(labels(&text), expected());
         assert_eq!(text.matches("\nCommit 0123456789ab, seed 1.\n").count(), 1);
-        assert!(CAMPAIGNS.iter().all(|one| text.contains(&format!("\n{}\n", sentence(one.about)))));
+        assert!(CAMPAIGNS.iter().all(|one| text.contains(&format!("\n{} It took", sentence(one.about)))));
     }
 
     #[test]

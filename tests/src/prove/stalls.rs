@@ -23,13 +23,8 @@ const SECONDS_MIN: f64 = 12.0;
 
 /// What it prints.
 pub(super) const LABELS: Labels = Labels {
-    facts: &[
-        "unsigned recordings",
-        "stalls of 2.5 s in each, every one alone, from second",
-        "frames",
-        "frames lost",
-    ],
-    columns: &["recording", "seconds", "frames", "lost at most", "queue at most", "of"],
+    facts: &["unsigned recordings", "one stall of 2.5 s a run, from second", "frames", "frames lost"],
+    columns: &["recording", "seconds", "frames", "lost, at most", "queue, at most", "queue size"],
 };
 
 pub(super) fn run(options: &Options) -> Result<Figures> {
@@ -49,7 +44,7 @@ pub(super) fn run(options: &Options) -> Result<Figures> {
     let mut figures = Figures::new(&LABELS);
     let unsigned: Vec<_> = outcomes.iter().filter(|(_, stream, _)| !stream.is_signed).collect();
     figures.fact("unsigned recordings", unsigned.len());
-    figures.fact("stalls of 2.5 s in each, every one alone, from second", seconds_of(moments));
+    figures.fact("one stall of 2.5 s a run, from second", seconds_of(moments));
     figures.fact("frames", unsigned.iter().map(|(.., stats)| stats.frames_in).sum::<u64>());
     figures.fact("frames lost", unsigned.iter().map(|(.., stats)| stats.frames_lost).sum::<u64>());
     for (name, stream, stats) in &outcomes {

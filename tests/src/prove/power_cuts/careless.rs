@@ -53,26 +53,26 @@ const SCENARIOS_SHORT: usize = 2;
 pub(in crate::prove) const LABELS: Labels = Labels {
     facts: &[
         "cuts",
-        "cards of which `fsck.vfat` complains",
-        "cards on which sectors of earlier sessions were spoiled by the cut itself",
-        "cards that gave less of an earlier session, and how many did not tell so",
-        "frames of earlier sessions lost beyond the groups that were spoiled",
-        "next power-on: recorded, and read back whole",
-        "next power-on: not recorded, and the box says why",
-        "next power-on: sectors of the session before that are written over because the oldest file's new name was lost",
-        "next power-on: other sectors of earlier sessions that were readable and are written over",
+        "cards with complaints of `fsck.vfat`",
+        "cards with sectors of earlier sessions spoiled by the cut",
+        "cards that lost part of an earlier session, and how many without a report",
+        "frames of earlier sessions lost outside spoiled groups",
+        "next power-on: recorded completely",
+        "next power-on: not recorded, and the box reports why",
+        "next power-on: sectors of the session before overwritten, because the oldest file's new name was lost",
+        "next power-on: other readable sectors of earlier sessions overwritten",
     ],
     columns: &[
-        "the card",
+        "card fault",
         "cuts",
         "fsck complains",
         "spoiled",
-        "gave less",
-        "of them not told",
-        "recorded next",
-        "said why not",
+        "with loss",
+        "not reported",
+        "next recorded",
+        "next reported",
         "name lost",
-        "sectors written over",
+        "overwritten",
     ],
 };
 
@@ -149,8 +149,8 @@ impl Fault {
 
     const fn name(self) -> &'static str {
         match self {
-            Self::Reordered => "of the last 2 to 64 blocks any are missing",
-            Self::Forgotten => "one block that it acknowledged is missing",
+            Self::Reordered => "some of the last 2 to 64 blocks lost",
+            Self::Forgotten => "one acknowledged block lost",
             Self::Spoiled => "the page of 4 or 16 KiB around the last block is spoiled",
         }
     }
