@@ -17,7 +17,7 @@ pub enum Shown {
 
 /// What is shown of a check's value and of the limit that it crossed.
 pub fn shown(check: &str, value: f32, limit: f32) -> Shown {
-    if check_named(check).is_some_and(|check| check.is_flag) {
+    if check_named(check).is_some_and(|check| check.unit.is_flag()) {
         return Shown::State(name(check, value));
     }
     let finite = |value: f32| value.is_finite().then_some(value);
@@ -139,7 +139,7 @@ mod tests {
 
     #[test]
     fn no_number_of_a_state_is_shown_and_each_has_words() {
-        for check in checks().filter(|check| check.is_flag) {
+        for check in checks().filter(|check| check.unit.is_flag()) {
             let limits = [check.limits.warn, check.limits.critical]
                 .into_iter()
                 .flatten()

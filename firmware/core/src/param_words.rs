@@ -20,7 +20,7 @@ pub fn short(param: Param) -> impl fmt::Display {
         let name = vocabulary(check.name).map_or(check.name, |words| words.said.name);
         let level = if is_warning { "warning" } else { "critical" };
         let side = if check.limits.side == Side::Above { "above" } else { "below" };
-        let state = if check.is_flag { " this state" } else { "" };
+        let state = if check.unit.is_flag() { " this state" } else { "" };
         write!(f, "{}: {level} {side}{state}", capital(name))
     })
 }

@@ -5,8 +5,8 @@
 //! wanted one. Where nobody says what is wanted, it counts but in modes in which the pilot banks as far as he likes. What is said to
 //! be wanted and is the attitude itself, sample by sample, is no word about what is wanted.
 
-use super::check::{Check, Debounce, InstanceOf, Limits, Unit, When};
-use super::common::{STALE, alert};
+use super::check::{Check, Debounce, Limits, Unit, When};
+use super::common::{PLAIN, STALE, alert};
 use super::finding::Subsystem;
 use super::inputs::Inputs;
 use super::suppression::{DRIVE, GYROS, Group, RATES, Role};
@@ -33,12 +33,8 @@ const ROLL: Check = Check {
     // PX4's failure detector: FD_FAIL_R_TTRI, FD_FAIL_P_TTRI 0.3 s.
     when: When::InFlight,
     stale_s: STALE,
-    instances: 1,
-    alarm_only: false,
-    is_flag: false,
-    role: Role::NONE,
-    of: InstanceOf::Vehicle,
     read: |inputs, _| degrees(inputs, |attitude| attitude.roll, 0),
+    ..PLAIN
 };
 
 pub(super) const CHECKS: &[Check] = &[

@@ -119,9 +119,9 @@ impl Reported {
 pub struct Unit(u8);
 
 impl Unit {
-    const NAMES: [&str; 18] = [
+    const NAMES: [&str; 19] = [
         "", "%", "1/min", "V", "deg", "deg/s", "degC", "frames", "g", "hPa", "m", "m/s", "m/s2", "ms",
-        "rad/s", "rpm", "s", "times",
+        "rad/s", "rpm", "s", "times", "",
     ];
 
     /// A unit as it is written; empty for a plain number. A new one goes into `NAMES`.
@@ -131,6 +131,14 @@ impl Unit {
             place += 1;
         }
         Self(place as u8)
+    }
+
+    /// A flag, or the number of a state: the value tells a pilot nothing, and the alarm alone is sent. It is written like a plain number.
+    pub const FLAG: Self = Self(Self::NAMES.len() as u8 - 1);
+
+    /// Whether it is that of a flag.
+    pub const fn is_flag(self) -> bool {
+        self.0 == Self::FLAG.0
     }
 
     /// As it is written.
@@ -211,6 +219,9 @@ impl Limits {
     }
 }
 
+/// Reads the value of one of several.
+pub type Read = fn(&Inputs<'_>, u8) -> Option<Reading>;
+
 /// One check.
 #[derive(Clone, Copy, Debug)]
 pub struct Check {
@@ -233,14 +244,12 @@ pub struct Check {
     /// Its silence says nothing: a flag that is not set, a restart that did not happen. Such a check can make its part
     /// of the vehicle worse, and never by itself make it healthy.
     pub alarm_only: bool,
-    /// Its value is a flag or the number of a state, which tells a pilot nothing: the alarm alone is told.
-    pub is_flag: bool,
     /// What it explains, and what explains it.
     pub role: Role,
     /// What its instances are numbers of.
     pub of: InstanceOf,
     /// Reads the value; `None` while it has never been measured.
-    pub read: fn(&Inputs<'_>, u8) -> Option<Reading>,
+    pub read: Read,
 }
 
 /// How long a value must be good before the level falls, so that a value at its limit does not flicker.
@@ -377,7 +386,7 @@ impl Check {
             level: change.level,
             previous: change.previous,
             // What is no longer said is not known to be good, nor is what a mishap left.
-            value: if (self.is_flag && change.value < 0.0)
+            value: if (self.unit.is_flag() && change.value < 0.0)
                 || (matches!(self.subsystem, Subsystem::Mishap) && matches!(change.level, Level::Ok))
             {
                 f32::NAN

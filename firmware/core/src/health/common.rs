@@ -17,27 +17,37 @@ pub(super) const STALE: Option<NonZeroU8> = NonZeroU8::new(5);
 /// For streams that come at 0.5 Hz.
 pub(super) const STALE_SLOW: Option<NonZeroU8> = NonZeroU8::new(12);
 
+/// What most checks are like.
+pub(super) const PLAIN: Check = Check {
+    name: "",
+    subsystem: Subsystem::Power,
+    unit: Unit::of(""),
+    limits: Limits::above(None, None, 0.0),
+    debounce: [Debounce::NONE; 2],
+    when: When::Always,
+    stale_s: None,
+    instances: 1,
+    alarm_only: false,
+    role: Role::NONE,
+    of: InstanceOf::Vehicle,
+    read: |_, _| None,
+};
+
 /// What the autopilot itself says is wrong with `CAUSE`, the number of a [`Cause`]: 1 a warning, 2 critical.
 pub(super) const fn alert<const CAUSE: usize>(subsystem: Subsystem, role: Role) -> Check {
     Check {
         name: Cause::ALL[CAUSE].name(),
         subsystem,
-        unit: Unit::of(""),
         limits: Limits::above(Some(Param::AlertWarn), Some(Param::AlertCrit), 0.0),
-        debounce: [Debounce::NONE; 2],
-        // Only what is said while it is armed counts; a mishap does not silence it, and it is told at its own time.
-        when: When::Always,
-        stale_s: None,
-        instances: 1,
         // That it says nothing is no word about its health.
         alarm_only: true,
-        is_flag: true,
+        unit: Unit::FLAG,
         role,
-        of: InstanceOf::Vehicle,
         read: |inputs, _| {
             let level = inputs.vehicle.alerts.level(inputs.now, Cause::ALL[CAUSE], inputs.flight.in_mishap());
             inputs.reading(level?)
         },
+        ..PLAIN
     }
 }
 
@@ -49,14 +59,8 @@ pub(super) const fn due(subsystem: Subsystem) -> Check {
         unit: Unit::of("%"),
         limits: Limits::above(Some(Param::CompYellow), Some(Param::CompRed), 0.0),
         debounce: [Debounce::secs(1); 2],
-        when: When::Always,
-        stale_s: None,
-        instances: 1,
         // That a part is not due does not make its subsystem healthy.
         alarm_only: true,
-        is_flag: false,
-        role: Role::NONE,
-        of: InstanceOf::Vehicle,
         read: match subsystem {
             Subsystem::Power => |inputs, _| used(inputs, Subsystem::Power),
             Subsystem::Propulsion => |inputs, _| used(inputs, Subsystem::Propulsion),
@@ -65,6 +69,7 @@ pub(super) const fn due(subsystem: Subsystem) -> Check {
             Subsystem::Recorder => |inputs, _| used(inputs, Subsystem::Recorder),
             _ => |_, _| None,
         },
+        ..PLAIN
     }
 }
 

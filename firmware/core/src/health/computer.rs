@@ -1,7 +1,7 @@
 //! The autopilot's processor.
 
-use super::check::{Check, Debounce, InstanceOf, Limits, Unit, When};
-use super::common::{STALE, alert};
+use super::check::{Check, Debounce, Limits, Unit, When};
+use super::common::{PLAIN, STALE, alert};
 use super::finding::Subsystem;
 use super::inputs::Inputs;
 use super::suppression::{FAILSAFES, Group, Role};
@@ -24,14 +24,9 @@ const LOAD: Check = Check {
     unit: Unit::of("%"),
     limits: Limits::above(Some(Param::CpuLoadWarn), Some(Param::CpuLoadCrit), 2.0),
     debounce: [Debounce::secs(2); 2],
-    when: When::Always,
     stale_s: STALE,
-    instances: 1,
-    alarm_only: false,
-    is_flag: false,
-    role: Role::NONE,
-    of: InstanceOf::Vehicle,
     read: |inputs, _| inputs.vehicle.system.read(|system| Some(system.load?.0 * 100.0)),
+    ..PLAIN
 };
 
 pub(super) const CHECKS: &[Check] = &[
@@ -40,15 +35,13 @@ pub(super) const CHECKS: &[Check] = &[
         name: "mcu_temperature",
         unit: Unit::of("degC"),
         limits: Limits::above(Some(Param::McuTempWarn), Some(Param::McuTempCrit), 2.0),
-        of: InstanceOf::Vehicle,
         read: |inputs, _| inputs.vehicle.processor.read(|processor| Some(processor.temperature?.0)),
         ..LOAD
     },
     Check {
         name: "autopilot_reboot",
         role: Role::of(Group::Reboot, 0),
-        is_flag: true,
-        unit: Unit::of(""),
+        unit: Unit::FLAG,
         limits: Limits::above(None, Some(Param::RebootCrit), 0.0),
         debounce: [Debounce::secs(2), Debounce::NONE],
         stale_s: None,
@@ -59,8 +52,7 @@ pub(super) const CHECKS: &[Check] = &[
     Check {
         name: "autopilot_state",
         role: Role::of(Group::Other, FAILSAFES | Group::Failsafe.bit()),
-        is_flag: true,
-        unit: Unit::of(""),
+        unit: Unit::FLAG,
         limits: Limits::above(None, Some(Param::StateCrit), 0.0),
         debounce: [Debounce::secs(2), Debounce::millis(500)],
         when: When::Armed,

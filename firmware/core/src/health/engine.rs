@@ -1,11 +1,10 @@
 //! The combustion engine (EFI) and the generator. Normal values depend on the engine, so the limits are off (at the end of
 //! their range that no value passes) until they are set.
 
-use super::check::{Check, Debounce, InstanceOf, Limits, Unit, When};
-use super::common::{STALE, due};
+use super::check::{Check, Debounce, Limits, Unit, When};
+use super::common::{PLAIN, STALE, due};
 use super::finding::Subsystem;
 use super::inputs::Inputs;
-use super::suppression::Role;
 use crate::latest::Reading;
 use crate::params::Param;
 
@@ -18,14 +17,9 @@ const ENGINE: Check = Check {
     unit: Unit::of("degC"),
     limits: Limits::above(Some(Param::EngChtWarn), Some(Param::EngChtCrit), 5.0),
     debounce: [Debounce::secs(2), Debounce::secs(1)],
-    when: When::Always,
     stale_s: STALE,
-    instances: 1,
-    alarm_only: false,
-    is_flag: false,
-    role: Role::NONE,
-    of: InstanceOf::Vehicle,
     read: |inputs, _| inputs.vehicle.engine.read(|engine| Some(engine.cylinder_head?.0)),
+    ..PLAIN
 };
 
 pub(super) const CHECKS: &[Check] = &[

@@ -1,7 +1,7 @@
 //! The autopilot's, the pilot's and the ground station's links.
 
-use super::check::{Check, Debounce, InstanceOf, Limits, Unit, When};
-use super::common::{STALE, alert};
+use super::check::{Check, Debounce, Limits, Unit, When};
+use super::common::{PLAIN, STALE, alert};
 use super::finding::Subsystem;
 use super::inputs::Inputs;
 use super::suppression::{Group, RECEIVERS, Role};
@@ -15,15 +15,8 @@ const HEARTBEAT: Check = Check {
     subsystem: Subsystem::Link,
     unit: Unit::of("s"),
     limits: Limits::above(Some(Param::LinkAgeWarn), Some(Param::LinkAgeCrit), 0.0),
-    debounce: [Debounce::NONE; 2],
-    when: When::Always,
-    stale_s: None,
-    instances: 1,
-    alarm_only: false,
-    is_flag: false,
-    role: Role::NONE,
-    of: InstanceOf::Vehicle,
     read: |inputs, _| inputs.reading(inputs.now.since(inputs.vehicle.heartbeat.at()?).as_secs_f32()),
+    ..PLAIN
 };
 
 const RADIO: Check = Check {
@@ -33,7 +26,6 @@ const RADIO: Check = Check {
     debounce: [Debounce::secs(2), Debounce::secs(1)],
     when: When::Armed,
     stale_s: STALE,
-    of: InstanceOf::Vehicle,
     read: |inputs, _| inputs.vehicle.rc.read(|rc| rc.rssi.map(f32::from)),
     ..HEARTBEAT
 };

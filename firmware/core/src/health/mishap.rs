@@ -1,71 +1,34 @@
 //! Mishaps: the signs that [`crate::flight`] saw. No gate holds them back, and they stay critical until the vehicle is armed again or flies
 //! on.
 
-use super::check::{Check, Debounce, InstanceOf, Limits, Unit, When};
-use super::common::{STALE, alert};
+use super::check::{Check, Limits, Read, Unit};
+use super::common::{PLAIN, STALE, alert};
 use super::finding::{Orders, Subsystem};
 use super::inputs::Inputs;
 use super::suppression::Role;
 use crate::cause::Cause;
+use crate::latest::Reading;
 use crate::mishap::Kind;
-use crate::params::Param;
-
-const FREE_FALL: Check = Check {
-    name: Kind::FreeFall.name(),
-    subsystem: Subsystem::Mishap,
-    unit: Unit::of("s"),
-    limits: Limits::above(None, Some(Param::MisFallTime), 0.0),
-    debounce: [Debounce::NONE; 2],
-    when: When::Always,
-    stale_s: STALE,
-    instances: 1,
-    alarm_only: false,
-    is_flag: false,
-    role: Role::NONE,
-    of: InstanceOf::Vehicle,
-    read: |inputs, _| inputs.flight.reading(Kind::FreeFall, inputs.now, inputs.vehicle),
-};
 
 pub(super) const CHECKS: &[Check] = &[
-    FREE_FALL,
-    Check {
-        name: Kind::Impact.name(),
-        unit: Unit::of("g"),
-        limits: Limits::above(None, Some(Param::MisImpact), 0.0),
-        read: |inputs, _| inputs.flight.reading(Kind::Impact, inputs.now, inputs.vehicle),
-        ..FREE_FALL
-    },
-    Check {
-        name: Kind::Tumbling.name(),
-        unit: Unit::of("deg/s"),
-        limits: Limits::above(None, Some(Param::MisTumble), 0.0),
-        read: |inputs, _| inputs.flight.reading(Kind::Tumbling, inputs.now, inputs.vehicle),
-        ..FREE_FALL
-    },
-    Check {
-        name: Kind::Disarmed.name(),
-        unit: Unit::of("m"),
-        alarm_only: true,
-        limits: Limits::above(None, Some(Param::MisDisarm), 0.0),
-        read: |inputs, _| inputs.flight.reading(Kind::Disarmed, inputs.now, inputs.vehicle),
-        ..FREE_FALL
-    },
-    Check {
-        name: Kind::Sinking.name(),
-        unit: Unit::of("m/s"),
-        limits: Limits::above(None, Some(Param::MisSink), 0.0),
-        read: |inputs, _| inputs.flight.reading(Kind::Sinking, inputs.now, inputs.vehicle),
-        ..FREE_FALL
-    },
-    Check {
-        name: Kind::Overturned.name(),
-        unit: Unit::of("deg"),
-        limits: Limits::above(None, Some(Param::MisOverturn), 0.0),
-        read: |inputs, _| inputs.flight.reading(Kind::Overturned, inputs.now, inputs.vehicle),
-        ..FREE_FALL
-    },
+    sign(Kind::FreeFall, "s", |inputs, _| reading(inputs, Kind::FreeFall)),
+    sign(Kind::Impact, "g", |inputs, _| reading(inputs, Kind::Impact)),
+    sign(Kind::Tumbling, "deg/s", |inputs, _| reading(inputs, Kind::Tumbling)),
+    Check { alarm_only: true, ..sign(Kind::Disarmed, "m", |inputs, _| reading(inputs, Kind::Disarmed)) },
+    sign(Kind::Sinking, "m/s", |inputs, _| reading(inputs, Kind::Sinking)),
+    sign(Kind::Overturned, "deg", |inputs, _| reading(inputs, Kind::Overturned)),
     alert::<{ Cause::Crash as usize }>(Subsystem::Mishap, Role::NONE),
 ];
+
+const fn sign(kind: Kind, unit: &str, read: Read) -> Check {
+    let limits = Limits::above(None, Some(kind.limit()), 0.0);
+    let (subsystem, unit) = (Subsystem::Mishap, Unit::of(unit));
+    Check { name: kind.name(), subsystem, unit, limits, stale_s: STALE, read, ..PLAIN }
+}
+
+fn reading(inputs: &Inputs<'_>, kind: Kind) -> Option<Reading> {
+    inputs.flight.reading(kind, inputs.now, inputs.vehicle)
+}
 
 /// What the text of a check orders. DISARM is ordered while it is armed, and FLY FORWARD, CLIMB of what hangs upright on rotors, has
 /// not lost one, and has not tried in vain with full throttle: what rotors do not carry comes down. Wings glide. Nobody lands at once because

@@ -1,7 +1,7 @@
 //! Estimator and GNSS.
 
 use super::check::{Check, Debounce, InstanceOf, Limits, Unit, When};
-use super::common::{STALE, alert, vibration};
+use super::common::{PLAIN, STALE, alert, vibration};
 use super::finding::Subsystem;
 use super::inputs::Inputs;
 use super::suppression::{
@@ -26,18 +26,13 @@ const MARGIN: f32 = 0.5;
 const ESTIMATOR: Check = Check {
     name: "ekf_variance",
     subsystem: Subsystem::Navigation,
-    unit: Unit::of(""),
     limits: Limits::above(Some(Param::EkfVarWarn), None, 0.05),
     // Two messages at 2 Hz. ArduPilot's failsafe waits for a second, and acts then.
     debounce: [Debounce::millis(500), Debounce::secs(1)],
     when: When::InFlight,
     stale_s: STALE,
-    instances: 1,
-    alarm_only: false,
-    is_flag: false,
-    role: Role::NONE,
-    of: InstanceOf::Vehicle,
     read: |inputs, _| estimator(inputs, EstimatorScale::Variance, largest),
+    ..PLAIN
 };
 
 const GNSS: Check = Check {
@@ -61,7 +56,6 @@ const MISMATCH: Check = Check {
     name: "accel_mismatch",
     unit: Unit::of("m/s2"),
     limits: Limits::above(Some(Param::AccMismWarn), None, 0.2),
-    debounce: [Debounce::millis(500), Debounce::secs(1)],
     // Never stale: they are compared where that says something.
     stale_s: None,
     instances: SENSORS_MAX as u8,
@@ -135,7 +129,7 @@ pub(super) const CHECKS: &[Check] = &[
     Check {
         name: "compass_unused",
         role: Role::of(Group::CompassUse, COMPASS | TURNS),
-        is_flag: true,
+        unit: Unit::FLAG,
         limits: Limits::above(Some(Param::AlertWarn), None, 0.05),
         // That it is used says nothing about how well it is.
         alarm_only: true,
@@ -157,7 +151,6 @@ pub(super) const CHECKS: &[Check] = &[
         role: Role::of(Group::GyroNoise, 0),
         unit: Unit::of("rad/s"),
         limits: Limits::above(Some(Param::GyroNoiseWarn), None, 0.05),
-        debounce: [Debounce::millis(500), Debounce::secs(1)],
         instances: 1,
         stale_s: STALE,
         of: InstanceOf::Vehicle,
@@ -219,7 +212,6 @@ pub(super) const CHECKS: &[Check] = &[
         role: Role::of(Group::Sensor, Group::BaroFault.bit() | Group::ImuGnss.bit()),
         unit: Unit::of("m"),
         limits: Limits::above(Some(Param::BaroNoiseWarn), None, 0.5),
-        debounce: [Debounce::millis(500), Debounce::secs(1)],
         instances: 1,
         of: InstanceOf::Sensor,
         read: |inputs, _| residual(inputs, Comparison::BaroNoise),
@@ -362,7 +354,7 @@ pub(super) const CHECKS: &[Check] = &[
     Check {
         name: "gps_fix",
         role: Role::of(Group::GnssLost, 0),
-        is_flag: true,
+        unit: Unit::FLAG,
         limits: Limits::below(None, Some(Param::GpsFixCrit), 0.0),
         // Two messages without one.
         debounce: [Debounce::secs(2), Debounce::millis(200)],
@@ -372,7 +364,7 @@ pub(super) const CHECKS: &[Check] = &[
     Check {
         name: "gps_jamming",
         role: Role::of(Group::GnssLost, 0),
-        is_flag: true,
+        unit: Unit::FLAG,
         limits: Limits::above(Some(Param::GpsJamWarn), Some(Param::GpsJamCrit), 0.0),
         when: When::Always,
         read: |inputs, receiver| integrity(inputs, receiver, |known| known.jamming),
@@ -381,7 +373,7 @@ pub(super) const CHECKS: &[Check] = &[
     Check {
         name: "gps_spoofing",
         role: Role::of(Group::GnssLost, 0),
-        is_flag: true,
+        unit: Unit::FLAG,
         limits: Limits::above(Some(Param::GpsJamWarn), Some(Param::GpsJamCrit), 0.0),
         when: When::Always,
         read: |inputs, receiver| integrity(inputs, receiver, |known| known.spoofing),

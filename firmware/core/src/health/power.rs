@@ -1,7 +1,7 @@
 //! Batteries and rails.
 
 use super::check::{Check, Debounce, InstanceOf, Limits, Unit, When};
-use super::common::{STALE, STALE_SLOW, alert, departure, due};
+use super::common::{PLAIN, STALE, STALE_SLOW, alert, departure, due};
 use super::finding::Subsystem;
 use super::inputs::Inputs;
 use super::suppression::{Group, Role};
@@ -21,14 +21,11 @@ const BATTERY: Check = Check {
     unit: Unit::of("%"),
     limits: Limits::below(Some(Param::BatRemWarn), Some(Param::BatRemCrit), 1.0),
     debounce: [Debounce::secs(2); 2],
-    when: When::Always,
     stale_s: STALE_SLOW,
     instances: BATTERIES,
-    alarm_only: false,
-    is_flag: false,
-    role: Role::NONE,
     of: InstanceOf::Supply,
     read: remaining_percent,
+    ..PLAIN
 };
 
 pub(super) const CHECKS: &[Check] = &[
@@ -93,8 +90,7 @@ pub(super) const CHECKS: &[Check] = &[
     Check {
         name: "batt_fault",
         role: Role::of(Group::FailsafeCause, 0),
-        is_flag: true,
-        unit: Unit::of(""),
+        unit: Unit::FLAG,
         limits: Limits::above(Some(Param::BatFaultWarn), None, 0.0),
         alarm_only: true,
         of: InstanceOf::Battery,
@@ -112,8 +108,7 @@ pub(super) const CHECKS: &[Check] = &[
     Check {
         name: "batt_state",
         role: Role::of(Group::BatteryState, Group::Battery.bit()),
-        is_flag: true,
-        unit: Unit::of(""),
+        unit: Unit::FLAG,
         limits: Limits::above(Some(Param::BatStateWarn), Some(Param::BatStateCrit), 0.0),
         of: InstanceOf::Battery,
         read: |inputs, battery| {

@@ -1,7 +1,7 @@
 //! Motors, ESCs and propellers.
 
 use super::check::{Check, Debounce, InstanceOf, Limits, Unit, When};
-use super::common::{STALE_SLOW, alert, departure, due, heavier, takes_more};
+use super::common::{PLAIN, STALE_SLOW, alert, departure, due, heavier, takes_more};
 use super::finding::Subsystem;
 use super::inputs::Inputs;
 use super::suppression::{DRIVE, GYROS, Group, RATES, Role};
@@ -18,15 +18,11 @@ const ESC: Check = Check {
     subsystem: Subsystem::Propulsion,
     unit: Unit::of("s"),
     limits: Limits::above(Some(Param::EscAgeWarn), Some(Param::EscAgeCrit), 0.0),
-    debounce: [Debounce::NONE; 2],
     when: When::Armed,
-    stale_s: None,
     instances: MOTORS_MAX as u8,
-    alarm_only: false,
-    is_flag: false,
-    role: Role::NONE,
     of: InstanceOf::Motor,
     read: |inputs, motor| inputs.derived.esc_silence(inputs.now, motor),
+    ..PLAIN
 };
 
 /// A body rate that does not become what is wanted.
@@ -68,8 +64,7 @@ pub(super) const CHECKS: &[Check] = &[
     Check {
         name: "esc_failure",
         role: Role::of(Group::Drive, 0),
-        is_flag: true,
-        unit: Unit::of(""),
+        unit: Unit::FLAG,
         limits: Limits::above(Some(Param::EscFailWarn), Some(Param::EscFailCrit), 0.0),
         stale_s: STALE_SLOW,
         when: When::Always,
@@ -126,8 +121,7 @@ pub(super) const CHECKS: &[Check] = &[
     Check {
         name: "motor_off",
         role: Role::of(Group::MotorOutput, Group::MotorLoss.bit()),
-        unit: Unit::of(""),
-        is_flag: true,
+        unit: Unit::FLAG,
         limits: Limits::above(Some(Param::AlertWarn), Some(Param::AlertCrit), 0.0),
         debounce: [Debounce::millis(500), Debounce::secs(1)],
         when: When::InFlight,
@@ -141,7 +135,6 @@ pub(super) const CHECKS: &[Check] = &[
     Check {
         name: "thrust_lost",
         role: Role::of(Group::Other, DRIVE | Group::EscTelemetry.bit() | RATES | Group::EkfClimb.bit()),
-        unit: Unit::of("s"),
         limits: Limits::above(Some(Param::ThrustWarn), None, 0.0),
         when: When::InFlight,
         instances: 1,

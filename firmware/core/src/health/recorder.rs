@@ -1,7 +1,7 @@
 //! Our own recording: a black box that stopped unnoticed is the failure that pilots report most.
 
-use super::check::{Check, Debounce, InstanceOf, Limits, Unit, When};
-use super::common::due;
+use super::check::{Check, Debounce, Limits, Unit};
+use super::common::{PLAIN, due};
 use super::finding::Subsystem;
 use super::inputs::Inputs;
 use super::suppression::{Group, Role};
@@ -12,21 +12,14 @@ use crate::status::Recording;
 const STATE: Check = Check {
     name: "recording",
     subsystem: Subsystem::Recorder,
-    unit: Unit::of(""),
     limits: Limits::above(Some(Param::RecStopWarn), Some(Param::RecStopCrit), 0.0),
     debounce: [Debounce::secs(1); 2],
-    when: When::Always,
-    stale_s: None,
-    instances: 1,
-    alarm_only: false,
-    is_flag: false,
-    role: Role::NONE,
-    of: InstanceOf::Vehicle,
     read: stopped_rank,
+    ..PLAIN
 };
 
 pub(super) const CHECKS: &[Check] = &[
-    Check { role: Role::of(Group::Recording, 0), is_flag: true, ..STATE },
+    Check { role: Role::of(Group::Recording, 0), unit: Unit::FLAG, ..STATE },
     Check {
         name: "record_queue",
         role: Role::of(Group::Other, Group::Recording.bit()),

@@ -1,7 +1,7 @@
 //! Vibration, clipping and load factor.
 
-use super::check::{Check, Debounce, InstanceOf, Limits, Unit, When};
-use super::common::{STALE, alert, departure, due, vibration};
+use super::check::{Check, Debounce, Limits, Unit, When};
+use super::common::{PLAIN, STALE, alert, departure, due, vibration};
 use super::finding::Subsystem;
 use super::suppression::{DRIVE, Group, INERTIAL, Role, SHAKING};
 use crate::baseline::Quantity;
@@ -17,14 +17,10 @@ const VIBRATION: Check = Check {
     debounce: [Debounce::secs(1); 2],
     when: When::Armed,
     stale_s: STALE,
-    instances: 1,
-    alarm_only: false,
-    is_flag: false,
-    role: Role::NONE,
-    of: InstanceOf::Vehicle,
     read: |inputs, _| {
         vibration(inputs, VibrationScale::PerAxis, |levels| levels.into_iter().flatten().reduce(f32::max))
     },
+    ..PLAIN
 };
 
 pub(super) const CHECKS: &[Check] = &[
@@ -69,7 +65,6 @@ pub(super) const CHECKS: &[Check] = &[
         when: When::InFlight,
         // Never stale: what shakes has none.
         stale_s: None,
-        of: InstanceOf::Vehicle,
         read: |inputs, _| inputs.derived.load_factor(),
         ..VIBRATION
     },
@@ -81,7 +76,6 @@ pub(super) const CHECKS: &[Check] = &[
         when: When::InFlight,
         // A trend holds until the next figure.
         stale_s: None,
-        of: InstanceOf::Vehicle,
         read: |inputs, _| departure(inputs, Quantity::Vibration),
         ..VIBRATION
     },

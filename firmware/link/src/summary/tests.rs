@@ -138,10 +138,7 @@ fn a_value_says_what_it_is_of_or_is_not_told() {
     ] {
         assert_eq!(told(check, value, level), format!("HUMS: {text}"));
     }
-    assert!(
-        health::checks().all(|check| !check.is_flag || check.unit.name().is_empty()),
-        "a state is no quantity"
-    );
+    assert!(health::checks().filter(|check| check.unit.is_flag()).count() > 20, "a state is no quantity");
 }
 
 #[test]

@@ -12,7 +12,6 @@ const CHECK: Check = Check {
     stale_s: NonZeroU8::new(1),
     instances: 1,
     alarm_only: false,
-    is_flag: false,
     role: Role::NONE,
     of: InstanceOf::Vehicle,
     read: |_, _| None,
