@@ -26,169 +26,103 @@ enum Says {
     Failover,
 }
 
-const fn warn(name: &'static str, cause: Cause) -> Row {
-    (name, Says::Is(Meaning::Wrong(Alert::warning(cause))))
+macro_rules! events {
+    (fine: $($fine:ident)+; $($urgency:ident $cause:ident: $($name:ident)+;)*) => {
+        const EVENTS: &[(&str, Says)] = &[
+            ("sensor_failover", Says::Failover),
+            ("commander_failsafe_enter", Says::Failsafe(5)),
+            ("commander_failsafe_enter_hold", Says::Failsafe(7)),
+            ("commander_failsafe_enter_warn", Says::Failsafe(4)),
+            $($((stringify!($name), Says::Is(Meaning::Wrong(Alert::$urgency(Cause::$cause)))),)+)*
+            $((stringify!($fine), Says::Is(Meaning::Fine)),)+
+        ];
+    };
 }
 
-const fn act(name: &'static str, cause: Cause) -> Row {
-    (name, Says::Is(Meaning::Wrong(Alert::critical(cause))))
+events! {
+    // Severe in its own words, and nothing that is wrong with the vehicle: which mode may not be flown now, or why arming is refused. A flight
+    // termination is also a pilot's kill switch, after a landing too: HEARTBEAT says the same, and whether that matters is seen there.
+    fine:
+        check_system_flight_term_active commander_kill_sw_engaged check_modes_angular_velocity
+        check_modes_attitude check_modes_global_pos check_modes_local_alt check_modes_local_pos
+        check_modes_manual_control check_modes_mission check_modes_offboard_signal check_modes_home_position
+        check_modes_cannot_takeoff check_rc_dl_no_dllink check_system_usb_connected
+        check_man_control_rtl_engaged check_external_modes_unavailable commander_arming_check_summary
+        commander_health_summary commander_modeswitch_not_avail commander_disarm_denied_not_landed
+        commander_arm_denied_calibrating commander_arm_denied_not_manual commander_arm_denied_resolve_failures
+        commander_arm_denied_throttle_center commander_arm_denied_throttle_high mavlink_log_not_enough_bw;
+    warning Compass:
+        sensor_failover_mag check_mag_missing check_mag_no_data check_mag_fault check_mag_consistency
+        check_mag_sys_has_mag_missing check_estimator_mag_fault check_estimator_mag_interference;
+    warning Barometer:
+        sensor_failover_baro check_baro_missing check_baro_no_data;
+    warning Accelerometer:
+        check_accel_missing check_accel_no_data check_imu_accel_inconsistent check_estimator_high_accel_bias;
+    warning Gyro:
+        check_gyro_missing check_gyro_no_data check_imu_gyro_inconsistent check_estimator_high_gyro_bias;
+    warning Airspeed:
+        check_airspeed_invalid check_airspeed_no_data check_airspeed_too_high airspeed_selector_sensor_failure
+        airspeed_selector_estimation_invalid airspeed_selector_switch;
+    warning Gnss:
+        check_estimator_gnss_fault check_estimator_gnss_fusion_stopped check_estimator_gps_fix_too_low
+        check_estimator_gps_generic check_estimator_gps_not_fusing check_estimator_gps_num_sats_too_low
+        check_estimator_gps_pdop_too_high check_estimator_gps_speed_acc_too_low
+        check_estimator_gps_hor_pos_drift_too_high check_estimator_gps_hor_pos_err_too_high
+        check_estimator_gps_hor_speed_drift_too_high check_estimator_gps_vert_pos_drift_too_high
+        check_estimator_gps_vert_pos_err_too_high check_estimator_gps_vert_speed_drift_too_high;
+    critical Gnss:
+        check_estimator_gnss_warning_jamming check_estimator_gnss_warning_spoofing
+        check_estimator_gps_jamming_critical check_estimator_gps_jammed check_estimator_gps_spoofed;
+    over Gnss:
+        check_estimator_gnss_fusion_started;
+    warning Estimator:
+        check_estimator_heading_not_stable check_estimator_hgt_not_stable check_estimator_hor_pos_not_stable
+        check_estimator_hor_vel_not_stable check_estimator_vert_vel_not_stable
+        check_estimator_low_position_accuracy check_estimator_position_failure_imminent;
+    critical Attitude:
+        check_failure_detector_roll check_failure_detector_pitch check_failure_detector_alt;
+    warning Propulsion:
+        check_failure_detector_imbalanced_prop check_failure_detector_arm_esc check_escs_fault
+        check_escs_offline check_escs_telem_missing check_vtol_fixed_wing_system_failure;
+    critical Propulsion:
+        check_failure_detector_motor;
+    warning Power:
+        check_battery_low check_battery_rem_flight_time_low check_battery_disconnected check_battery_fault
+        check_battery_unhealthy check_avionics_power_low check_avionics_power_high check_power_oc_hipower
+        check_power_oc_periph check_power_oc_report commander_failsafe_enter_low_bat
+        commander_failsafe_enter_low_flight_time_warn;
+    critical Power:
+        check_battery_critical check_battery_emergency commander_low_bat_shutdown
+        commander_low_bat_shutdown_failed commander_failsafe_enter_crit_bat_warn
+        commander_failsafe_enter_crit_low_bat_warn;
+    warning RemoteControl:
+        commander_rc_lost;
+    over RemoteControl:
+        commander_rc_regained;
+    warning GroundStation:
+        commander_gcs_lost commander_mission_comp_lost commander_high_latency_lost;
+    over GroundStation:
+        commander_dl_regained;
+    warning Failsafe:
+        commander_failsafe_enter_generic commander_failsafe_enter_generic_hold
+        commander_failsafe_enter_generic_warn commander_failsafe_enter_autopilot_disengaged;
+    warning Vibration:
+        vehicle_imu_accel_clipping vehicle_imu_gyro_clipping;
+    warning Fence:
+        check_gf_violation_custom_gf check_gf_violation_max_alt check_gf_violation_max_hor_dist;
+    warning Ranging:
+        check_distance_sensor_invalid check_distance_sensor_missing check_optical_flow_sensor_invalid
+        check_optical_sensor_missing;
+    warning Terrain:
+        navigator_terrain_collision_risk;
+    warning Logging:
+        check_missing_fmu_sdcard logger_storage_full;
+    warning Processor:
+        check_cpuload_too_high check_ram_usage_too_high;
+    critical Crash:
+        vtol_att_ctrl_quadchute_alt_loss vtol_att_ctrl_quadchute_max_pitch vtol_att_ctrl_quadchute_max_roll
+        vtol_att_ctrl_quadchute_min_alt vtol_att_ctrl_quadchute_tout vtol_att_ctrl_quadchute_trans_alt_err;
 }
-
-const fn over(name: &'static str, cause: Cause) -> Row {
-    (name, Says::Is(Meaning::Wrong(Alert::over(cause))))
-}
-
-/// Severe in its own words, and nothing that is wrong with the vehicle.
-const fn fine(name: &'static str) -> Row {
-    (name, Says::Is(Meaning::Fine))
-}
-
-type Row = (&'static str, Says);
-
-const EVENTS: &[Row] = &[
-    ("sensor_failover", Says::Failover),
-    warn("sensor_failover_mag", Cause::Compass),
-    warn("sensor_failover_baro", Cause::Barometer),
-    warn("check_accel_missing", Cause::Accelerometer),
-    warn("check_accel_no_data", Cause::Accelerometer),
-    warn("check_imu_accel_inconsistent", Cause::Accelerometer),
-    warn("check_estimator_high_accel_bias", Cause::Accelerometer),
-    warn("check_gyro_missing", Cause::Gyro),
-    warn("check_gyro_no_data", Cause::Gyro),
-    warn("check_imu_gyro_inconsistent", Cause::Gyro),
-    warn("check_estimator_high_gyro_bias", Cause::Gyro),
-    warn("check_mag_missing", Cause::Compass),
-    warn("check_mag_no_data", Cause::Compass),
-    warn("check_mag_fault", Cause::Compass),
-    warn("check_mag_consistency", Cause::Compass),
-    warn("check_mag_sys_has_mag_missing", Cause::Compass),
-    warn("check_estimator_mag_fault", Cause::Compass),
-    warn("check_estimator_mag_interference", Cause::Compass),
-    warn("check_baro_missing", Cause::Barometer),
-    warn("check_baro_no_data", Cause::Barometer),
-    warn("check_airspeed_invalid", Cause::Airspeed),
-    warn("check_airspeed_no_data", Cause::Airspeed),
-    warn("check_airspeed_too_high", Cause::Airspeed),
-    warn("airspeed_selector_sensor_failure", Cause::Airspeed),
-    warn("airspeed_selector_estimation_invalid", Cause::Airspeed),
-    warn("airspeed_selector_switch", Cause::Airspeed),
-    warn("check_estimator_gnss_fault", Cause::Gnss),
-    warn("check_estimator_gnss_fusion_stopped", Cause::Gnss),
-    act("check_estimator_gnss_warning_jamming", Cause::Gnss),
-    act("check_estimator_gnss_warning_spoofing", Cause::Gnss),
-    act("check_estimator_gps_jamming_critical", Cause::Gnss),
-    act("check_estimator_gps_jammed", Cause::Gnss),
-    act("check_estimator_gps_spoofed", Cause::Gnss),
-    warn("check_estimator_gps_fix_too_low", Cause::Gnss),
-    warn("check_estimator_gps_generic", Cause::Gnss),
-    warn("check_estimator_gps_not_fusing", Cause::Gnss),
-    warn("check_estimator_gps_num_sats_too_low", Cause::Gnss),
-    warn("check_estimator_gps_pdop_too_high", Cause::Gnss),
-    warn("check_estimator_gps_speed_acc_too_low", Cause::Gnss),
-    warn("check_estimator_gps_hor_pos_drift_too_high", Cause::Gnss),
-    warn("check_estimator_gps_hor_pos_err_too_high", Cause::Gnss),
-    warn("check_estimator_gps_hor_speed_drift_too_high", Cause::Gnss),
-    warn("check_estimator_gps_vert_pos_drift_too_high", Cause::Gnss),
-    warn("check_estimator_gps_vert_pos_err_too_high", Cause::Gnss),
-    warn("check_estimator_gps_vert_speed_drift_too_high", Cause::Gnss),
-    warn("check_estimator_heading_not_stable", Cause::Estimator),
-    warn("check_estimator_hgt_not_stable", Cause::Estimator),
-    warn("check_estimator_hor_pos_not_stable", Cause::Estimator),
-    warn("check_estimator_hor_vel_not_stable", Cause::Estimator),
-    warn("check_estimator_vert_vel_not_stable", Cause::Estimator),
-    warn("check_estimator_low_position_accuracy", Cause::Estimator),
-    warn("check_estimator_position_failure_imminent", Cause::Estimator),
-    act("check_failure_detector_roll", Cause::Attitude),
-    act("check_failure_detector_pitch", Cause::Attitude),
-    act("check_failure_detector_alt", Cause::Attitude),
-    act("check_failure_detector_motor", Cause::Propulsion),
-    warn("check_failure_detector_imbalanced_prop", Cause::Propulsion),
-    warn("check_failure_detector_arm_esc", Cause::Propulsion),
-    warn("check_escs_fault", Cause::Propulsion),
-    warn("check_escs_offline", Cause::Propulsion),
-    warn("check_escs_telem_missing", Cause::Propulsion),
-    warn("check_vtol_fixed_wing_system_failure", Cause::Propulsion),
-    warn("check_battery_low", Cause::Power),
-    warn("check_battery_rem_flight_time_low", Cause::Power),
-    act("check_battery_critical", Cause::Power),
-    act("check_battery_emergency", Cause::Power),
-    warn("check_battery_disconnected", Cause::Power),
-    warn("check_battery_fault", Cause::Power),
-    warn("check_battery_unhealthy", Cause::Power),
-    warn("check_avionics_power_low", Cause::Power),
-    warn("check_avionics_power_high", Cause::Power),
-    warn("check_power_oc_hipower", Cause::Power),
-    warn("check_power_oc_periph", Cause::Power),
-    warn("check_power_oc_report", Cause::Power),
-    act("commander_low_bat_shutdown", Cause::Power),
-    act("commander_low_bat_shutdown_failed", Cause::Power),
-    warn("commander_failsafe_enter_low_bat", Cause::Power),
-    warn("commander_failsafe_enter_low_flight_time_warn", Cause::Power),
-    act("commander_failsafe_enter_crit_bat_warn", Cause::Power),
-    act("commander_failsafe_enter_crit_low_bat_warn", Cause::Power),
-    warn("commander_rc_lost", Cause::RemoteControl),
-    over("commander_rc_regained", Cause::RemoteControl),
-    over("commander_dl_regained", Cause::GroundStation),
-    over("check_estimator_gnss_fusion_started", Cause::Gnss),
-    warn("commander_gcs_lost", Cause::GroundStation),
-    warn("commander_mission_comp_lost", Cause::GroundStation),
-    warn("commander_high_latency_lost", Cause::GroundStation),
-    ("commander_failsafe_enter", Says::Failsafe(5)),
-    ("commander_failsafe_enter_hold", Says::Failsafe(7)),
-    ("commander_failsafe_enter_warn", Says::Failsafe(4)),
-    warn("commander_failsafe_enter_generic", Cause::Failsafe),
-    warn("commander_failsafe_enter_generic_hold", Cause::Failsafe),
-    warn("commander_failsafe_enter_generic_warn", Cause::Failsafe),
-    warn("commander_failsafe_enter_autopilot_disengaged", Cause::Failsafe),
-    warn("vehicle_imu_accel_clipping", Cause::Vibration),
-    warn("vehicle_imu_gyro_clipping", Cause::Vibration),
-    warn("check_gf_violation_custom_gf", Cause::Fence),
-    warn("check_gf_violation_max_alt", Cause::Fence),
-    warn("check_gf_violation_max_hor_dist", Cause::Fence),
-    warn("check_distance_sensor_invalid", Cause::Ranging),
-    warn("check_distance_sensor_missing", Cause::Ranging),
-    warn("check_optical_flow_sensor_invalid", Cause::Ranging),
-    warn("check_optical_sensor_missing", Cause::Ranging),
-    warn("navigator_terrain_collision_risk", Cause::Terrain),
-    warn("check_missing_fmu_sdcard", Cause::Logging),
-    warn("logger_storage_full", Cause::Logging),
-    warn("check_cpuload_too_high", Cause::Processor),
-    warn("check_ram_usage_too_high", Cause::Processor),
-    act("vtol_att_ctrl_quadchute_alt_loss", Cause::Crash),
-    act("vtol_att_ctrl_quadchute_max_pitch", Cause::Crash),
-    act("vtol_att_ctrl_quadchute_max_roll", Cause::Crash),
-    act("vtol_att_ctrl_quadchute_min_alt", Cause::Crash),
-    act("vtol_att_ctrl_quadchute_tout", Cause::Crash),
-    act("vtol_att_ctrl_quadchute_trans_alt_err", Cause::Crash),
-    // Also of a pilot's kill switch, after a landing too: HEARTBEAT says the same, and whether that matters is seen there.
-    fine("check_system_flight_term_active"),
-    fine("commander_kill_sw_engaged"),
-    // Which mode may not be flown now, and why arming is refused: not that anything broke.
-    fine("check_modes_angular_velocity"),
-    fine("check_modes_attitude"),
-    fine("check_modes_global_pos"),
-    fine("check_modes_local_alt"),
-    fine("check_modes_local_pos"),
-    fine("check_modes_manual_control"),
-    fine("check_modes_mission"),
-    fine("check_modes_offboard_signal"),
-    fine("check_modes_home_position"),
-    fine("check_modes_cannot_takeoff"),
-    fine("check_rc_dl_no_dllink"),
-    fine("check_system_usb_connected"),
-    fine("check_man_control_rtl_engaged"),
-    fine("check_external_modes_unavailable"),
-    fine("commander_arming_check_summary"),
-    fine("commander_health_summary"),
-    fine("commander_modeswitch_not_avail"),
-    fine("commander_disarm_denied_not_landed"),
-    fine("commander_arm_denied_calibrating"),
-    fine("commander_arm_denied_not_manual"),
-    fine("commander_arm_denied_resolve_failures"),
-    fine("commander_arm_denied_throttle_center"),
-    fine("commander_arm_denied_throttle_high"),
-    fine("mavlink_log_not_enough_bw"),
-];
 
 /// The same by their numbers, worked out while the firmware is built: it holds no names.
 static NUMBERED: [(u32, Says); EVENTS.len()] = {

@@ -6,33 +6,6 @@
 
 use crate::cause::{Alert, Cause, Meaning};
 
-const fn warn(pattern: &'static str, cause: Cause) -> Row {
-    (pattern, Meaning::Wrong(Alert::warning(cause)), Where::Everywhere)
-}
-
-const fn act(pattern: &'static str, cause: Cause) -> Row {
-    (pattern, Meaning::Wrong(Alert::critical(cause)), Where::Everywhere)
-}
-
-/// The end of what was wrong.
-const fn over(pattern: &'static str, cause: Cause) -> Row {
-    (pattern, Meaning::Wrong(Alert::over(cause)), Where::Everywhere)
-}
-
-/// Only the name of a part, which mild texts have too.
-const fn broad(pattern: &'static str, cause: Cause) -> Row {
-    (pattern, Meaning::Wrong(Alert::warning(cause)), Where::Severe)
-}
-
-const fn fine(pattern: &'static str) -> Row {
-    (pattern, Meaning::Fine, Where::Everywhere)
-}
-
-/// Only what a text is about, which texts of failures have too.
-const fn mild(pattern: &'static str) -> Row {
-    (pattern, Meaning::Fine, Where::Sound)
-}
-
 /// Which texts a row is about.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Where {
@@ -44,185 +17,124 @@ enum Where {
     Sound,
 }
 
-type Row = (&'static str, Meaning, Where);
+/// What rows of a kind mean, and of which texts.
+macro_rules! kind {
+    (fine) => {
+        (Meaning::Fine, Where::Everywhere)
+    };
+    // Only what a text is about, which texts of failures have too.
+    (mild) => {
+        (Meaning::Fine, Where::Sound)
+    };
+    // Only the name of a part, which mild texts have too.
+    (broad $cause:ident) => {
+        (Meaning::Wrong(Alert::warning(Cause::$cause)), Where::Severe)
+    };
+    ($urgency:ident $cause:ident) => {
+        (Meaning::Wrong(Alert::$urgency(Cause::$cause)), Where::Everywhere)
+    };
+}
+
+macro_rules! texts {
+    ($($kind:tt: $($pattern:literal)+;)*) => {
+        const TEXTS: &[(&str, (Meaning, Where))] = &[$($(($pattern, kind! $kind),)+)*];
+    };
+}
 
 /// Words of failure ("fail" alone is in "failsafe" too).
 const FAILURES: [&str; 8] =
     ["failed", "failure", "fail:", "error", "lost", "timeout", " fault", "unsuccessful"];
 
-const TEXTS: &[Row] = &[
-    fine("^prearm"),
-    fine("^arm:"),
-    fine("^arming"),
-    fine("disarm denied"),
-    fine("disarming denied"),
-    over("radio failsafe clear", Cause::RemoteControl),
-    over("throttle failsafe off", Cause::RemoteControl),
-    over("gcs failsafe clear", Cause::GroundStation),
-    over("ekf failsafe clear", Cause::Estimator),
-    over("gps glitch clear", Cause::Gnss),
-    over("glitch clear", Cause::Estimator),
-    over("compensation off", Cause::Vibration),
-    fine("clear"),
-    fine("regained"),
-    fine("recovered"),
-    mild("recover"),
-    fine("failsafe off"),
-    fine("event off"),
-    fine("crash dump"),
-    fine("crashdump"),
-    fine("failure injection"),
-    mild("disabled"),
-    fine("returned to"),
-    fine("re-enabled"),
-    fine("data ok"),
-    fine(": ok"),
-    fine("ok again"),
-    mild("unsupported"),
-    fine("clamping"),
-    fine("hit ground"),
-    warn("compass needs calib", Cause::Compass),
-    mild("calib"),
-    mild("initiali"),
-    fine("ground start"),
-    fine("tmode"),
-    fine("autotune"),
-    fine("quicktune"),
-    mild("tune"),
-    fine("motor test"),
-    fine("cruise learn"),
-    fine("yaw re-aligned"),
-    warn("mission computer lost", Cause::GroundStation),
-    mild("mission"),
-    fine("mode change"),
-    fine("requires position"),
-    mild("param"),
-    fine("landing sequence"),
-    fine("smartrtl"),
-    fine("rally"),
-    fine("fence upload"),
-    fine("log streaming"),
-    fine("log download"),
-    fine("avoidance enabled"),
-    fine("avoidance disabled"),
-    fine("avoid: performing"),
-    fine("locate copter"),
-    fine("command received"),
-    fine("throttle not zero"),
-    fine("not landed"),
+texts! {
+    (fine): "^prearm" "^arm:" "^arming" "disarm denied" "disarming denied";
+    (over RemoteControl): "radio failsafe clear" "throttle failsafe off";
+    (over GroundStation): "gcs failsafe clear";
+    (over Estimator): "ekf failsafe clear";
+    (over Gnss): "gps glitch clear";
+    (over Estimator): "glitch clear";
+    (over Vibration): "compensation off";
+    (fine): "clear" "regained" "recovered";
+    (mild): "recover";
+    (fine): "failsafe off" "event off" "crash dump" "crashdump" "failure injection";
+    (mild): "disabled";
+    (fine): "returned to" "re-enabled" "data ok" ": ok" "ok again";
+    (mild): "unsupported";
+    (fine): "clamping" "hit ground";
+    (warning Compass): "compass needs calib";
+    (mild): "calib" "initiali";
+    (fine): "ground start" "tmode" "autotune" "quicktune";
+    (mild): "tune";
+    (fine): "motor test" "cruise learn" "yaw re-aligned";
+    (warning GroundStation): "mission computer lost";
+    (mild): "mission";
+    (fine): "mode change" "requires position";
+    (mild): "param";
+    (fine): "landing sequence" "smartrtl" "rally" "fence upload" "log streaming" "log download"
+        "avoidance enabled" "avoidance disabled" "avoid: performing" "locate copter"
+        "command received" "throttle not zero" "not landed";
     // Mishaps and what ends a flight.
-    act("crash", Cause::Crash),
-    act("ditching", Cause::Crash),
-    warn("hard landing", Cause::Crash),
-    act("parachute*releas", Cause::Crash),
-    act("parachute*deploy", Cause::Crash),
+    (critical Crash): "crash" "ditching";
+    (warning Crash): "hard landing";
+    (critical Crash): "parachute*releas" "parachute*deploy";
     // PX4, also of a pilot's kill switch, after a landing too: its HEARTBEAT says the same, and whether that matters is seen there.
-    fine("flight termination active"),
-    act("terminat", Cause::Crash),
+    (fine): "flight termination active";
+    (critical Crash): "terminat";
     // Motors, before sensors: "thrust loss", "imbalanced propeller".
-    warn("thrust loss", Cause::Propulsion),
-    act("motor*fail", Cause::Propulsion),
-    act("engine*stop", Cause::Propulsion),
-    act("engine*fail", Cause::Propulsion),
-    act("lost motor", Cause::Propulsion),
-    warn("yaw imbalance", Cause::Propulsion),
-    broad("prop", Cause::Propulsion),
-    warn("esc*fail", Cause::Propulsion),
-    warn("esc*offline", Cause::Propulsion),
-    broad("^esc", Cause::Propulsion),
-    warn("governor fault", Cause::Propulsion),
-    broad("generator", Cause::Propulsion),
-    act("attitude failure", Cause::Attitude),
+    (warning Propulsion): "thrust loss";
+    (critical Propulsion): "motor*fail" "engine*stop" "engine*fail" "lost motor";
+    (warning Propulsion): "yaw imbalance";
+    (broad Propulsion): "prop";
+    (warning Propulsion): "esc*fail" "esc*offline";
+    (broad Propulsion): "^esc";
+    (warning Propulsion): "governor fault";
+    (broad Propulsion): "generator";
+    (critical Attitude): "attitude failure";
     // Power.
-    act("critical battery", Cause::Power),
-    act("emergency battery", Cause::Power),
-    act("dangerous*battery", Cause::Power),
-    act("battery*critical", Cause::Power),
-    warn("batt*failsafe", Cause::Power),
-    warn("low batt", Cause::Power),
-    warn("batt*is low", Cause::Power),
-    warn("batt*missing", Cause::Power),
-    broad("batt", Cause::Power),
-    broad("power module", Cause::Power),
-    broad("power low", Cause::Power),
-    broad("power high", Cause::Power),
-    warn("overcurrent", Cause::Power),
-    broad("low voltage", Cause::Power),
+    (critical Power): "critical battery" "emergency battery" "dangerous*battery" "battery*critical";
+    (warning Power): "batt*failsafe" "low batt" "batt*is low" "batt*missing";
+    (broad Power): "batt" "power module" "power low" "power high";
+    (warning Power): "overcurrent";
+    (broad Power): "low voltage";
     // Links.
-    warn("radio failsafe", Cause::RemoteControl),
-    warn("rc failsafe", Cause::RemoteControl),
-    warn("rc*failsafe", Cause::RemoteControl),
-    warn("failsafe. short event", Cause::RemoteControl),
-    warn("failsafe. long event", Cause::RemoteControl),
-    warn("throttle failsafe on", Cause::RemoteControl),
-    warn("failsafe - *event on", Cause::RemoteControl),
-    broad("manual control", Cause::RemoteControl),
-    warn("no rc receiver", Cause::RemoteControl),
-    warn("gcs*failsafe", Cause::GroundStation),
-    warn("gcs*lost", Cause::GroundStation),
-    warn("link lost", Cause::GroundStation),
-    warn("ground*station*lost", Cause::GroundStation),
+    (warning RemoteControl): "radio failsafe" "rc failsafe" "rc*failsafe" "failsafe. short event"
+        "failsafe. long event" "throttle failsafe on" "failsafe - *event on";
+    (broad RemoteControl): "manual control";
+    (warning RemoteControl): "no rc receiver";
+    (warning GroundStation): "gcs*failsafe" "gcs*lost" "link lost" "ground*station*lost";
     // What shakes, before the sensors that it shakes.
-    warn("vibration comp", Cause::Vibration),
-    warn("clipping", Cause::Vibration),
+    (warning Vibration): "vibration comp" "clipping";
     // The estimator, before the sensors that its words name.
-    act("ekf failsafe", Cause::Estimator),
-    warn("ekf*variance", Cause::Estimator),
-    warn("gps glitch or compass", Cause::Estimator),
-    warn("gps glitch", Cause::Gnss),
-    warn("lost gps", Cause::Gnss),
-    warn("lane switch", Cause::Estimator),
-    warn("emergency yaw", Cause::Estimator),
-    warn("stopped aiding", Cause::Estimator),
-    warn("ekf primary changed", Cause::Estimator),
-    warn("primary ekf changed", Cause::Estimator),
-    warn("hgt timeout", Cause::Estimator),
-    warn("dead reckoning", Cause::Estimator),
-    warn("ekf bad", Cause::Estimator),
-    warn("bad ahrs", Cause::Estimator),
-    warn("not stable", Cause::Estimator),
-    warn("unstable", Cause::Estimator),
-    warn("no valid*estimate", Cause::Estimator),
-    warn("no longer valid", Cause::Estimator),
-    warn("position error", Cause::Estimator),
+    (critical Estimator): "ekf failsafe";
+    (warning Estimator): "ekf*variance" "gps glitch or compass";
+    (warning Gnss): "gps glitch" "lost gps";
+    (warning Estimator): "lane switch" "emergency yaw" "stopped aiding" "ekf primary changed"
+        "primary ekf changed" "hgt timeout" "dead reckoning" "ekf bad" "bad ahrs"
+        "not stable" "unstable" "no valid*estimate" "no longer valid" "position error";
     // Sensors.
-    warn("low on stack", Cause::Processor),
-    broad("rangefinder", Cause::Ranging),
-    broad("distance sensor", Cause::Ranging),
-    broad("lidar", Cause::Ranging),
-    broad("optflow", Cause::Ranging),
-    broad("optical flow", Cause::Ranging),
-    broad("compass", Cause::Compass),
-    warn("mag *fail", Cause::Compass),
+    (warning Processor): "low on stack";
+    (broad Ranging): "rangefinder" "distance sensor" "lidar" "optflow" "optical flow";
+    (broad Compass): "compass";
+    (warning Compass): "mag *fail";
     // PX4's voter of sensors, of the one that it flies by: "Accel #0 fail:  TIMEOUT!".
-    act("accel #*fail", Cause::Accelerometer),
-    act("gyro #*fail", Cause::Gyro),
-    warn("baro #*fail", Cause::Barometer),
-    broad("magnet", Cause::Compass),
-    warn("airspeed*fail", Cause::Airspeed),
-    broad("airspeed", Cause::Airspeed),
-    broad("diff. pressure", Cause::Airspeed),
-    broad("gps", Cause::Gnss),
-    broad("gnss", Cause::Gnss),
-    broad("baro", Cause::Barometer),
-    broad("static pressure", Cause::Barometer),
-    broad("gyro", Cause::Gyro),
-    broad("accel", Cause::Accelerometer),
-    warn("error pos", Cause::Estimator),
-    warn("error vel", Cause::Estimator),
-    broad("terrain", Cause::Terrain),
+    (critical Accelerometer): "accel #*fail";
+    (critical Gyro): "gyro #*fail";
+    (warning Barometer): "baro #*fail";
+    (broad Compass): "magnet";
+    (warning Airspeed): "airspeed*fail";
+    (broad Airspeed): "airspeed" "diff. pressure";
+    (broad Gnss): "gps" "gnss";
+    (broad Barometer): "baro" "static pressure";
+    (broad Gyro): "gyro";
+    (broad Accelerometer): "accel";
+    (warning Estimator): "error pos" "error vel";
+    (broad Terrain): "terrain";
     // The rest of the autopilot.
-    warn("fence*breach", Cause::Fence),
-    warn("geofence violation", Cause::Fence),
-    warn("log file", Cause::Logging),
-    broad("logg", Cause::Logging),
-    broad("sd card", Cause::Logging),
-    warn("cpu load", Cause::Processor),
-    warn("internal error", Cause::Processor),
-    warn("watchdog", Cause::Processor),
-    warn("deadlock", Cause::Processor),
-    broad("failsafe", Cause::Failsafe),
-];
+    (warning Fence): "fence*breach" "geofence violation";
+    (warning Logging): "log file";
+    (broad Logging): "logg" "sd card";
+    (warning Processor): "cpu load" "internal error" "watchdog" "deadlock";
+    (broad Failsafe): "failsafe";
+}
 
 /// The pairs of letters of each row's pattern.
 static PAIRS: [u64; TEXTS.len()] = {
@@ -263,8 +175,8 @@ pub(super) fn meaning(text: &[u8], is_severe: bool) -> Meaning {
         }
     };
     let mut rows = TEXTS.iter().zip(&PAIRS).filter(|(_, pairs)| has & **pairs == **pairs);
-    let row = rows.find(|((pattern, _, place), _)| is_about(pattern, *place));
-    row.map_or(Meaning::Unknown, |((_, meaning, _), _)| *meaning)
+    let row = rows.find(|((pattern, (_, place)), _)| is_about(pattern, *place));
+    row.map_or(Meaning::Unknown, |((_, (meaning, _)), _)| *meaning)
 }
 
 fn fits(pattern: &[u8], text: &[u8]) -> bool {
