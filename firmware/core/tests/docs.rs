@@ -215,11 +215,13 @@ fn inputs() -> impl Iterator<Item = (&'static str, &'static str)> {
     INPUTS.lines().filter_map(|line| line.split_once(": "))
 }
 
-/// A document holds a table between two marks.
-fn assert_holds(document: &str, begin: &str, table: &str, end: &str) {
+/// A document holds a table between the marks of its name.
+fn assert_holds(document: &str, name: &str, table: &str) {
+    let begin = format!("<!-- {name}: made by firmware/core/tests/docs.rs -->\n");
+    let end = format!("<!-- end of {name} -->\n");
     let found = fs::read_to_string(path(document)).unwrap();
-    let (before, rest) = found.split_once(begin).expect("a place for the table");
-    let (_, after) = rest.split_once(end).expect("and it ends");
+    let (before, rest) = found.split_once(&begin).expect("a place for the table");
+    let (_, after) = rest.split_once(&end).expect("and it ends");
     assert_is(document, &format!("{before}{begin}{table}{end}{after}"));
 }
 
@@ -263,15 +265,13 @@ fn row(check: &Check) -> String {
 
 #[test]
 fn every_check_is_documented_as_it_is() {
-    const BEGIN: &str = "<!-- checks: made by firmware/core/tests/docs.rs -->\n";
-    const END: &str = "<!-- end of checks -->\n";
     let mut table = "| subsystem | check | reads | when | bad | unit | warning | critical | debounce | hysteresis | stale after | source |\n\
         |---|---|---|---|---|---|---|---|---|---|---|---|\n"
         .to_owned();
     for check in checks() {
         let _ = writeln!(table, "{}", row(check));
     }
-    assert_holds("health.md", BEGIN, &table, END);
+    assert_holds("health.md", "checks", &table);
     for (name, _) in inputs() {
         assert!(checks().any(|check| check.name == name), "there is no check {name}");
     }
@@ -279,8 +279,6 @@ fn every_check_is_documented_as_it_is() {
 
 #[test]
 fn every_check_is_explained_as_people_are_told() {
-    const BEGIN: &str = "<!-- words: made by firmware/core/tests/docs.rs -->\n";
-    const END: &str = "<!-- end of words -->\n";
     let mut table = "| check | name | means | do | needs |\n|---|---|---|---|---|\n".to_owned();
     for words in VOCABULARY {
         let Said { check, name, part, .. } = words.said;
@@ -291,13 +289,11 @@ fn every_check_is_explained_as_people_are_told() {
             words.meaning, words.action, words.needs
         );
     }
-    assert_holds("check.md", BEGIN, &table, END);
+    assert_holds("check.md", "words", &table);
 }
 
 #[test]
 fn every_text_of_a_check_is_in_the_runbook() {
-    const BEGIN: &str = "<!-- texts: made by firmware/core/tests/docs.rs -->\n";
-    const END: &str = "<!-- end of texts -->\n";
     let mut table = "| HUMS: | if critical | what is so | what to do |\n|---|---|---|---|\n".to_owned();
     let mut told = Vec::new();
     for (words, check) in VOCABULARY.iter().zip(checks()) {
@@ -320,7 +316,7 @@ fn every_text_of_a_check_is_in_the_runbook() {
         let alarm = alarm.split('|').next().unwrap().replace('#', "*n*");
         let _ = writeln!(table, "| {alarm}{value} | {advice} | {} | {} |", words.meaning, words.action);
     }
-    assert_holds("runbook.md", BEGIN, &table, END);
+    assert_holds("runbook.md", "texts", &table);
 }
 
 #[test]

@@ -213,39 +213,25 @@ fn an_autopilot_that_restarts() {
 
 #[test]
 fn what_comes_back_by_less_than_the_hysteresis_stays_bad() {
-    type Script = fn(u64, &mut Quad);
-    /// Bad for the first half of the fault; then back, by less than the hysteresis.
-    const BACK_MS: u64 = 60_000;
-    let cases: [(&str, Script); 8] = [
-        ("cell_voltage", |now_ms, quad| {
-            quad.battery.voltage = Some(Volts(if now_ms < BACK_MS { 13.2 } else { 14.1 }));
+    type Set = fn(&mut Quad, f32);
+    // A value that is bad for the first half of the fault, and then another one.
+    let cases: [(&str, f32, f32, Set); 8] = [
+        ("cell_voltage", 13.2, 14.1, |quad, v| quad.battery.voltage = Some(Volts(v))),
+        ("batt_remaining", 0.05, 0.075, |quad, part| quad.battery.remaining = Some(Fraction(part))),
+        ("esc_temperature", 120.0, 108.0, |quad, c| {
+            quad.escs[2].as_mut().unwrap().temperature = Some(Celsius(c));
         }),
-        ("batt_remaining", |now_ms, quad| {
-            quad.battery.remaining = Some(Fraction(if now_ms < BACK_MS { 0.05 } else { 0.075 }));
+        // Of the others' 5 A.
+        ("motor_loss", 0.0, 0.7, |quad, a| quad.escs[1].as_mut().unwrap().current = Some(Amperes(a))),
+        ("ekf_failsafe", 0.9, 0.77, |quad, velocity| {
+            (quad.estimator.compass, quad.estimator.velocity) = (Some(1.2), Some(velocity));
         }),
-        ("esc_temperature", |now_ms, quad| {
-            let temperature = Some(Celsius(if now_ms < BACK_MS { 120.0 } else { 108.0 }));
-            quad.escs[2].as_mut().unwrap().temperature = temperature;
-        }),
-        ("motor_loss", |now_ms, quad| {
-            // Percent of the others' 5 A.
-            let current = Some(Amperes(if now_ms < BACK_MS { 0.0 } else { 0.7 }));
-            quad.escs[1].as_mut().unwrap().current = current;
-        }),
-        ("ekf_failsafe", |now_ms, quad| {
-            let velocity = Some(if now_ms < BACK_MS { 0.9 } else { 0.77 });
-            (quad.estimator.compass, quad.estimator.velocity) = (Some(1.2), velocity);
-        }),
-        ("vibration", |now_ms, quad| {
-            quad.vibration.levels[2] = Some(if now_ms < BACK_MS { 70.0 } else { 58.0 });
-        }),
-        ("roll", |now_ms, quad| quad.roll = if now_ms < BACK_MS { 1.2 } else { 1.0 }),
-        ("load", |now_ms, quad| {
-            quad.system.load = Some(Fraction(if now_ms < BACK_MS { 0.97 } else { 0.94 }));
-        }),
+        ("vibration", 70.0, 58.0, |quad, level| quad.vibration.levels[2] = Some(level)),
+        ("roll", 1.2, 1.0, |quad, roll| quad.roll = roll),
+        ("load", 0.97, 0.94, |quad, load| quad.system.load = Some(Fraction(load))),
     ];
-    for (check, script) in cases {
-        let findings = fly(script);
+    for (check, bad, back, set) in cases {
+        let findings = fly(|now_ms, quad| set(quad, if now_ms < 60_000 { bad } else { back }));
         let mine = || findings.iter().filter(|finding| finding.check == check);
         let critical = mine().find(|finding| finding.level == Level::Critical).expect(check);
         let next = mine().find(|finding| finding.at.is_after(critical.at)).expect(check);

@@ -7,7 +7,7 @@ use crate::time::{Instant, Span};
 /// Alarms that are kept. One more is reported, explains nothing and is not explained.
 pub(super) const ALARMS_MAX: usize = 32;
 
-/// An explained alarm that goes on for so long after its cause ended, or fell below it, is reported by itself: what a cause disturbed needs
+/// An explained alarm is reported by itself if it goes on for this long after its cause ended or fell below it: a disturbed estimator needs
 /// some seconds to settle.
 pub(super) const OUTLIVES: Span = Span::from_secs(8);
 
@@ -47,7 +47,7 @@ impl Alarms {
     }
 
     /// A state's level changes. Gives since when it has an alarm; `None` where it has none, or no place is left for it. A rise is
-    /// an onset of its own, with no cause yet. What the alarm no longer explains at its new level outlives it from now on.
+    /// an onset of its own, with no cause yet. From now on an effect outlives this alarm if that no longer explains it at its new level.
     pub(super) fn change(&mut self, slot: u16, level: Level, now: Instant) -> Option<Instant> {
         let is_alarm = matches!(level, Level::Warning | Level::Critical);
         for known in self.standing.iter_mut().flatten() {

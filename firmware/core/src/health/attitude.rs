@@ -1,9 +1,8 @@
-//! Roll and pitch of what hangs on rotors. A plane banks as it needs to, and so does a VTOL while it flies on its wings.
+//! Roll and pitch of vehicles on rotors. A plane banks as it needs to, and so does a VTOL while it flies on its wings.
 //!
-//! An angle that the autopilot wants is none that it lost: pilots bank a multicopter steeply, and the autopilot turns their sticks
-//! into an attitude that it wants ([`crate::vehicle::Vehicle::wanted`]). So an angle counts only where the vehicle is further than [`FOLLOWS_RAD`] from the
-//! wanted one. Where nobody says what is wanted, it counts but in modes in which the pilot banks as far as he likes. What is said to
-//! be wanted and is the attitude itself, sample by sample, is no word about what is wanted.
+//! Pilots bank a multicopter steeply, and the autopilot turns their sticks into a setpoint ([`crate::vehicle::Vehicle::wanted`]). So an angle
+//! counts only if it is further than [`FOLLOWS_RAD`] from the setpoint. Without a setpoint it counts, except in modes that let the pilot bank
+//! freely.
 
 use super::check::{Check, Debounce, Limits, Unit, When};
 use super::common::{PLAIN, STALE, alert};
@@ -21,7 +20,7 @@ use crate::units::Radians;
 /// 25 degrees: an attitude follows the wanted one within this, but for moments that are shorter than the debounce. The thrust loss
 /// and crash checks of `ArduCopter` take 30 degrees.
 const FOLLOWS_RAD: f32 = 0.436;
-/// What is wanted comes at 1 Hz or faster where it comes at all.
+/// Attitude setpoints come at 1 Hz or faster.
 const WANTED_AGE: Span = Span::from_secs(2);
 
 const ROLL: Check = Check {

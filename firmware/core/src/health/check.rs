@@ -16,7 +16,7 @@
 //!
 //! A value that goes up and down is one thing and not one each time: [`CLEAR`] grows eightfold with each level that it rises to
 //! again, up to [`CLEAR_MAX`], until the check no longer applies (the vehicle landed, or was disarmed). So does the time after
-//! which a bad value is stale: a stream that is slower than values stay fresh is no new alarm with each message.
+//! which a bad value is stale: a slow stream gives no new alarm with each message.
 
 use core::num::NonZeroU8;
 
@@ -56,7 +56,7 @@ impl When {
 /// What an instance's number counts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum InstanceOf {
-    /// Parts that nobody counts, or a single one: each instance is read.
+    /// A single one, or parts without numbers: each instance is read.
     Vehicle,
     /// Motors that an ESC reports on.
     Motor,
@@ -75,7 +75,7 @@ pub enum InstanceOf {
 }
 
 impl InstanceOf {
-    /// What is the same in two checks whose instances have the same number; `None` where numbers tell nothing.
+    /// The parts that are numbered; checks of the same parts with the same number are of the same one. `None` if numbers say nothing.
     pub(super) const fn thing(self) -> Option<Self> {
         match self {
             Self::Motor | Self::Output => Some(Self::Motor),
@@ -136,7 +136,7 @@ impl Unit {
     /// A flag, or the number of a state: the value tells a pilot nothing, and the alarm alone is sent. It is written like a plain number.
     pub const FLAG: Self = Self(Self::NAMES.len() as u8 - 1);
 
-    /// Whether it is that of a flag.
+    /// Whether the value is a flag.
     pub const fn is_flag(self) -> bool {
         self.0 == Self::FLAG.0
     }
@@ -244,7 +244,7 @@ pub struct Check {
     /// Its silence says nothing: a flag that is not set, a restart that did not happen. Such a check can make its part
     /// of the vehicle worse, and never by itself make it healthy.
     pub alarm_only: bool,
-    /// What it explains, and what explains it.
+    /// Its place among causes.
     pub role: Role,
     /// What its instances are numbers of.
     pub of: InstanceOf,
@@ -266,7 +266,7 @@ const _: () = assert!(CLEAR.as_millis() << (3 * Repeats::MOST) == CLEAR_MAX.as_m
 /// An alarm whose value is never stale is stale itself this long after its last value.
 const UNSEEN: Span = Span::from_secs(15);
 
-/// Measurements that have to be bad, one after the other: one message of nonsense is no alarm.
+/// So many measurements in a row must be bad: one wrong message is no alarm.
 pub const SAMPLES: u8 = 2;
 
 /// Two counts up to 15 in a byte.
@@ -332,7 +332,7 @@ pub(super) struct How {
 pub struct State {
     /// `None` until the value has been seen while the check applied.
     level: Option<Level>,
-    /// What it does not fall below, while levels are held: a warning or a critical level.
+    /// The lowest level while levels are held: a warning or critical.
     held: Option<Level>,
     /// Measurements in a row beyond the warning's limit, and beyond the critical one.
     samples: Samples,
@@ -376,7 +376,7 @@ impl Check {
         if level == Level::Critical || warn.is_nan() { critical } else { warn }
     }
 
-    /// What a change of its level is told as.
+    /// The finding of a change of level.
     pub(super) const fn finding(&self, instance: u8, at: Instant, change: Change, feeds: Feeds) -> Finding {
         Finding {
             at,
@@ -385,7 +385,7 @@ impl Check {
             instance,
             level: change.level,
             previous: change.previous,
-            // What is no longer said is not known to be good, nor is what a mishap left.
+            // A flag that is no longer reported is not known to be good, nor is a vehicle after a mishap.
             value: if (self.unit.is_flag() && change.value < 0.0)
                 || (matches!(self.subsystem, Subsystem::Mishap) && matches!(change.level, Level::Ok))
             {
@@ -491,7 +491,7 @@ impl State {
         params: &Params,
     ) -> Option<Change> {
         if !applies {
-            // What no longer applies is no longer bad, but it is not known to be good either: it has no level.
+            // A check that no longer applies is neither bad nor known to be good: it has no level.
             let previous = self.level.filter(|level| *level != Level::Ok);
             *self = Self::new();
             return previous.map(|previous| Change {
@@ -535,7 +535,7 @@ impl State {
 
     /// How long it must be good before the level falls.
     fn clear(&self, check: &Check) -> Span {
-        // What its detector ended is over: what it sees next is another mishap, and told.
+        // The detector ends a mishap. The next sign is a new mishap, and reported.
         if check.subsystem == Subsystem::Mishap {
             return CLEAR;
         }
@@ -543,7 +543,7 @@ impl State {
         self.repeats.grown(CLEAR).min(most)
     }
 
-    /// How old the value may be. What is bad, and came back as bad after a pause of its stream, is given longer.
+    /// How old the value may be. An alarm that came back after a pause of its stream has more time.
     fn stale_after(&self, check: &Check) -> Option<Span> {
         match self.level {
             // Also of a value that is never stale: without its input it has none.
@@ -596,7 +596,7 @@ impl State {
         self.go(next, value, check.limit(next, params))
     }
 
-    /// Changes the level; the first time, good news is no news.
+    /// Changes the level. A first level that is good is no change.
     fn go(&mut self, level: Level, value: f32, limit: f32) -> Option<Change> {
         let before = self.level.replace(level);
         let previous = before.unwrap_or(Level::Ok);

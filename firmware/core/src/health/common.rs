@@ -33,13 +33,13 @@ pub(super) const PLAIN: Check = Check {
     read: |_, _| None,
 };
 
-/// What the autopilot itself says is wrong with `CAUSE`, the number of a [`Cause`]: 1 a warning, 2 critical.
+/// The autopilot's own word on `CAUSE`, the number of a [`Cause`]: 1 is a warning, 2 is critical.
 pub(super) const fn alert<const CAUSE: usize>(subsystem: Subsystem, role: Role) -> Check {
     Check {
         name: Cause::ALL[CAUSE].name(),
         subsystem,
         limits: Limits::above(Some(Param::AlertWarn), Some(Param::AlertCrit), 0.0),
-        // That it says nothing is no word about its health.
+        // Silence is no word about health.
         alarm_only: true,
         unit: Unit::FLAG,
         role,
@@ -77,7 +77,7 @@ fn used(inputs: &Inputs<'_>, subsystem: Subsystem) -> Option<Reading> {
     let mine = inputs.wear.iter().flatten().filter(|(of, _)| *of == subsystem);
     // A part is replaced on the ground, and a flight counts when it is over: until then it is due soon.
     let most = if inputs.flight.is_open() { inputs.params.get(Param::CompRed) } else { f32::INFINITY };
-    // What has reached its limit is due, while a check's value must be beyond it.
+    // A part at its limit is due, while a check's value must be beyond the limit.
     let percent = mine.map(|(_, percent)| percent.next_up()).reduce(f32::max);
     inputs.reading(percent?.min(most))
 }
@@ -87,7 +87,7 @@ pub(super) fn heavier(inputs: &Inputs<'_>) -> Option<Reading> {
     inputs.reading(inputs.trends.heavier(inputs.baselines, inputs.params)?)
 }
 
-/// The same of what hovering takes, where the vehicle is not heavier.
+/// How much more of a quantity hovering takes, if the vehicle is not heavier.
 pub(super) fn takes_more(inputs: &Inputs<'_>, quantity: Quantity) -> Option<Reading> {
     let is_heavier = heavier(inputs).is_some_and(|heavier| heavier.value > 0.0);
     let departure = departure(inputs, quantity)?;

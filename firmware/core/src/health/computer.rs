@@ -12,8 +12,8 @@ use crate::observation::Heartbeat;
 use crate::params::Param;
 use crate::time::Span;
 
-/// What was killed at its touch-down rests after so long, level and still for the second of these, and slower than this, m/s. In two
-/// real landings the sensors were still 0.6 and 1.2 s after the kill.
+/// A vehicle that was killed at its touchdown is at rest after [`COMES_TO_REST`]: level and still for [`RESTS`], slower than [`SLOW_MPS`]. In
+/// two real landings the sensors were still 0.6 and 1.2 s after the kill.
 const COMES_TO_REST: Span = Span::from_secs(2);
 const RESTS: Span = Span::from_millis(300);
 const SLOW_MPS: f32 = 1.0;
@@ -67,8 +67,8 @@ pub(super) const CHECKS: &[Check] = &[
     alert::<{ Cause::Other as usize }>(Subsystem::Computer, Role::NONE),
 ];
 
-/// `MAV_STATE`. PX4's kill switch makes a termination of it, and pilots press it when they have touched down. What was terminated in
-/// the air falls, glides or hangs on a parachute after [`COMES_TO_REST`].
+/// `MAV_STATE`. PX4's kill switch is a termination, and pilots press it after a touchdown. A vehicle that was terminated in the air falls,
+/// glides or hangs on a parachute after [`COMES_TO_REST`].
 fn state(inputs: &Inputs<'_>, _: u8) -> Option<Reading> {
     const ACTIVE: u8 = 4;
     let Inputs { now, vehicle, .. } = *inputs;

@@ -69,7 +69,7 @@ impl Crossings {
     }
 }
 
-/// The worse of two values; what is no number is none.
+/// The worse of two values; NaN is none.
 const fn worse(known: f32, value: f32, side: Side) -> f32 {
     match side {
         Side::Above => known.max(value),
@@ -237,7 +237,7 @@ impl Exceedances {
         self.left_out
     }
 
-    /// It is another airframe: what was before this session was not its own.
+    /// It is another airframe: earlier sessions were not its own.
     pub(crate) fn forget_life(&mut self) {
         for place in &mut self.entries {
             match place {
@@ -257,7 +257,7 @@ impl Exceedances {
         fields.len()
     }
 
-    /// Reads the stored form, of this version or a later one. A check that there is no longer is left out.
+    /// Reads the stored form, of this version or a later one. Checks that no longer exist are left out.
     ///
     /// # Errors
     /// [`Unreadable`] where it ends within an entry, or has no version.

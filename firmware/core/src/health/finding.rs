@@ -15,7 +15,7 @@ numbered! {
         Warning "warning",
         /// Act now.
         Critical "critical",
-        /// The input has stopped (or never came): nobody knows, which is not the same as healthy.
+        /// The input has stopped, or never came: unknown, which is not healthy.
         Stale "stale",
     }
 }
@@ -61,8 +61,8 @@ pub struct Finding {
     pub level: Level,
     /// The level before.
     pub previous: Level,
-    /// The value that decided, in the check's unit; NaN where the input stopped, where the check no longer applies, and where the
-    /// autopilot no longer says what it said.
+    /// The value that decided, in the check's unit. NaN if the input stopped, if the check no longer applies, or if the autopilot
+    /// no longer reports the flag.
     pub value: f32,
     /// The limit that it crossed, in the same unit; NaN where there is none (stale).
     pub limit: f32,
@@ -76,7 +76,7 @@ pub struct Finding {
     pub orders: Orders,
 }
 
-/// What the text of a finding orders.
+/// The order in the text of a finding.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Orders {
     /// What its check's words say.
@@ -85,7 +85,7 @@ pub enum Orders {
     Disarm,
     /// WATCH IT.
     Watch,
-    /// Nothing: what is disarmed is not to be disarmed.
+    /// Nothing: the vehicle is disarmed already.
     Nothing,
 }
 

@@ -20,7 +20,7 @@ pub struct Inputs<'a> {
     pub vehicle: &'a Vehicle,
     /// On the ground, in the air, or in a mishap.
     pub flight: &'a Flight,
-    /// What the raw messages do not say by themselves.
+    /// Figures that are derived from messages.
     pub derived: &'a Derived,
     /// The autopilot's port.
     pub link: &'a LinkReading,

@@ -30,9 +30,11 @@ fn reading(inputs: &Inputs<'_>, kind: Kind) -> Option<Reading> {
     inputs.flight.reading(kind, inputs.now, inputs.vehicle)
 }
 
-/// What the text of a check orders. DISARM is ordered while it is armed, and FLY FORWARD, CLIMB of what hangs upright on rotors, has
-/// not lost one, and has not tried in vain with full throttle: what rotors do not carry comes down. Wings glide. Nobody lands at once because
-/// telemetry alone is silent, of all ESCs.
+/// The order in the text of a check:
+/// * WATCH IT if all ESCs are silent: it is their telemetry;
+/// * DISARM IF DOWN only while it is armed;
+/// * FLY FORWARD, CLIMB of a sinking vehicle on rotors only if it is upright, has lost no motor and has not had full throttle in vain;
+/// * none of a sinking vehicle on wings, which glides.
 pub(super) fn orders(check: &Check, inputs: &Inputs<'_>, has_lost_drive: impl FnOnce() -> bool) -> Orders {
     let Inputs { now, vehicle, derived, flight, .. } = *inputs;
     if check.name == "esc_silent" && derived.are_escs_silent() {

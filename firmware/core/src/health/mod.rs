@@ -1,4 +1,4 @@
-//! Health: checks of everything the vehicle says, what they find, and roll-ups of that.
+//! Health: the checks of all values, their findings, and the level of each subsystem and of the vehicle.
 //!
 //! Each subsystem's checks are a table in a file of its own; `tables` puts them together. A roll-up is never better than
 //! its worst part that is known, and where nothing is known it is not OK but stale.
@@ -38,7 +38,7 @@ use crate::params::Param;
 use crate::time::{Instant, Span};
 use alarms::{ALARMS_MAX, Alarms};
 use exceedance::Exceedances;
-use tables::{STATES, check_of};
+use tables::{STATES, check_of, slot_of, slots};
 
 /// A vehicle that has not been heard for so long is silent.
 const SILENT: Span = Span::from_secs(5);
@@ -212,18 +212,16 @@ impl Health {
 
     /// The same, each with a number that is its own.
     pub(crate) fn numbered_levels(&self) -> impl Iterator<Item = (u16, &'static Check, u8, Level)> + Clone {
-        let places = checks().flat_map(|check| (0..check.instances).map(move |instance| (check, instance)));
-        (0..).zip(places.zip(&self.states)).filter_map(|(number, ((check, instance), state))| {
-            state.level().map(|level| (number, check, instance, level))
+        let states = slots().zip(&self.states);
+        states.filter_map(|((slot, check, instance), state)| {
+            state.level().map(|level| (slot, check, instance, level))
         })
     }
 
     /// Whether an alarm's value is good just now, and its level about to fall.
     pub fn gets_better(&self, check: &str, instance: u8) -> bool {
-        let places = checks().flat_map(|check| (0..check.instances).map(move |instance| (check, instance)));
-        let mut states = places.zip(&self.states);
-        let mine = states.find(|((of, number), _)| of.name == check && *number == instance);
-        mine.is_some_and(|(_, state)| state.gets_better())
+        let state = slot_of(check, instance).and_then(|slot| self.states.get(usize::from(slot)));
+        state.is_some_and(State::gets_better)
     }
 
     /// Of each check, in the order of [`checks`], the levels of its instances.
@@ -253,7 +251,7 @@ impl Health {
     }
 }
 
-/// What is common to all checks of a step.
+/// The conditions of a step, for all checks.
 struct Now {
     /// How checks are stepped, by [`When`] they apply.
     hows: [How; When::ALL.len()],
@@ -264,7 +262,7 @@ impl Now {
         let Inputs { now, vehicle, flight, .. } = *inputs;
         let armed = vehicle.armed();
         let is_silent = || vehicle.heartbeat.within(now, SILENT).is_none();
-        // What lies disarmed, or is silent, has nothing more to judge but itself.
+        // A vehicle that is down and disarmed, or silent, is not judged any further.
         let over = flight.in_mishap() && ((flight.is_down() && !armed) || is_silent());
         // A mishap goes on: all but those that always apply would only echo it.
         let quiet = flight.in_mishap() && !over;
@@ -287,7 +285,7 @@ impl Now {
     }
 }
 
-/// A check of which an instance has a value that never reported; there is none.
+/// A check that has a value of a part that never reported; there must be none.
 fn unreported(reported: &Reported, inputs: &Inputs<'_>) -> Option<&'static str> {
     let has_more = |check: &&Check| {
         (reported.count(check)..check.instances).any(|instance| (check.read)(inputs, instance).is_some())

@@ -438,10 +438,10 @@ fn gnss(inputs: &Inputs<'_>, receiver: u8, value: impl FnOnce(&Gnss) -> Option<f
     slot.read(|gnss| value(gnss).filter(|_| inputs.derived.had_fix(receiver)))
 }
 
-/// A receiver that knows where it is within half of what its accuracy may be does so with however few satellites: its own word is better than
-/// their number, which depends on how many systems and bands it hears.
+/// A receiver with half of the allowed inaccuracy is exact, with however few satellites: their number depends on the systems and bands that it
+/// receives.
 fn is_exact(inputs: &Inputs<'_>, gnss: &Gnss) -> bool {
-    // What it tells without a fix is of before.
+    // Without a fix the accuracy is an old one.
     gnss.fix >= 3
         && gnss.accuracy.is_some_and(|accuracy| accuracy.0 <= inputs.params.get(Param::GpsHaccWarn) / 2.0)
 }

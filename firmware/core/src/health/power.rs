@@ -152,7 +152,7 @@ pub(super) const CHECKS: &[Check] = &[
     ),
 ];
 
-/// What the battery feeds that a check is of.
+/// The consumer of the battery that a check is of.
 pub(super) fn feeds(check: &Check, inputs: &Inputs<'_>, instance: u8) -> Feeds {
     let of_battery = check.subsystem == Subsystem::Power && check.instances == BATTERIES;
     let slot = inputs.vehicle.batteries.get(usize::from(instance)).filter(|_| of_battery);

@@ -182,7 +182,7 @@ pub(super) const CHECKS: &[Check] = &[
     ),
 ];
 
-/// What the outputs say of a motor, as a check's value.
+/// The verdict of the outputs on a motor, as a check's value.
 fn verdict(inputs: &Inputs<'_>, motor: u8, value: fn(Verdict) -> f32) -> Option<Reading> {
     let (at, verdict) = inputs.derived.outputs().verdict(inputs.now, inputs.vehicle, motor)?;
     Some(Reading { at, value: value(verdict) })

@@ -1,4 +1,4 @@
-//! One cause, one finding: which check's alarm explains that of which other one.
+//! One cause, one finding: the alarm of one check may explain that of another one.
 //!
 //! A failed motor tips the vehicle over, and a receiver without a fix makes the estimator doubt. So each check has a [`Role`]: its group,
 //! and the groups that explain it. A finding names the alarm that explains it if that alarm is as bad or worse, began within [`NEAR`]
@@ -52,7 +52,7 @@ pub(super) enum Group {
     GnssLost,
     /// A receiver repeats one position.
     GnssFrozen,
-    /// A receiver's velocity or height is not that of the vehicle.
+    /// A receiver's velocity or height is wrong.
     GnssMotion,
     /// A receiver has few satellites, or is inaccurate.
     GnssQuality,
@@ -72,9 +72,9 @@ pub(super) enum Group {
     GyroMismatch,
     /// The measured force is not the change of velocity.
     ImuGnss,
-    /// What the autopilot says of a receiver, by innovations that inertial sensors disturb as well.
+    /// The autopilot's word on a receiver. Inertial sensors disturb its innovations as well.
     GnssWord,
-    /// What the autopilot says of vibration, by the same innovations.
+    /// The autopilot's word on vibration, by the same innovations.
     VibrationWord,
     /// A gyro is noisy. It turns no vehicle over.
     GyroNoise,
@@ -141,7 +141,7 @@ pub(super) const FAILSAFES: u64 = Group::Silence.bit()
     | SENSORS
     | ESTIMATORS;
 
-/// What a check explains, and what explains it: its group, and a bit for each group that explains it. In 8 bytes, the group in the first.
+/// The place of a check among causes: its group in the first byte, and a bit for each group that explains it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Role(u64);
 

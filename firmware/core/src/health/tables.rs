@@ -65,28 +65,20 @@ pub fn checks() -> impl ExactSizeIterator<Item = &'static Check> + Clone {
     CHECKS.iter()
 }
 
-/// The check of a state, and which instance of it.
-pub(super) fn check_of(slot: u16) -> Option<(&'static Check, u8)> {
-    let mut left = slot;
-    for check in checks() {
-        match left.checked_sub(check.instances.into()) {
-            Some(beyond) => left = beyond,
-            None => return Some((check, left as u8)),
-        }
-    }
-    None
+/// The states of all checks: the number of each, its check and which one of several.
+pub(super) fn slots() -> impl Iterator<Item = (u16, &'static Check, u8)> + Clone {
+    let each = checks().flat_map(|check| (0..check.instances).map(move |instance| (check, instance)));
+    (0..).zip(each).map(|(slot, (check, instance))| (slot, check, instance))
 }
 
-/// The state of a check's instance.
+/// The check of a state, and which one of several.
+pub(super) fn check_of(slot: u16) -> Option<(&'static Check, u8)> {
+    slots().nth(slot.into()).map(|(_, check, instance)| (check, instance))
+}
+
+/// The state of a check.
 pub(super) fn slot_of(name: &str, instance: u8) -> Option<u16> {
-    let mut first = 0;
-    for check in checks() {
-        if check.name == name {
-            return Some(first + u16::from(instance));
-        }
-        first += u16::from(check.instances);
-    }
-    None
+    slots().find(|(_, check, number)| *number == instance && check.name == name).map(|(slot, ..)| slot)
 }
 
 /// The check of this name.

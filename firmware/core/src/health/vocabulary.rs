@@ -9,43 +9,43 @@ use core::fmt;
 
 use crate::observation::Feeds;
 
-/// What a check can be judged from.
+/// The source that a check is judged from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Scope {
-    /// What any vehicle says.
+    /// Messages of any vehicle.
     Vehicle,
-    /// What ArduPilot says.
+    /// Messages of ArduPilot.
     ArduPilot,
-    /// What PX4 says.
+    /// Messages of PX4.
     Px4,
     /// The monitor's own place on the autopilot's wire: another place on another link tells of that link.
     Wire,
     /// The monitor's own recorder.
     Recorder,
-    /// What the autopilot says is wrong: that it says nothing cannot be judged.
+    /// The autopilot's own alerts. Silence cannot be judged.
     Said,
-    /// What the monitor on board has stored of earlier flights, or of parts that wear.
+    /// The monitor's store: earlier flights, and parts that wear.
     Stored,
 }
 
-/// What a radio text says of a check.
+/// The words of a check in radio texts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Said {
     /// The check: [`super::Check::name`].
     pub check: &'static str,
-    /// Its name for people: what is watched, not what is wrong.
+    /// Its name for people: the value, not the fault.
     pub name: &'static str,
-    /// What there may be several of, as the autopilot counts them from 1; empty where there is one.
+    /// The part, if there are several, numbered from 1; empty if there is one.
     pub part: &'static str,
-    /// What is wrong, in a few words; `#` stands for the number of the part. Behind a bar stands how the value is told, with `~` for the value and
+    /// The fault in a few words; `#` stands for the number of the part. After a bar: the form of the value, with `~` for the value and
     /// its unit.
     pub alarm: &'static str,
-    /// What a pilot does at once where it is critical; empty where it never is.
+    /// The pilot's immediate action if it is critical; empty if it never is.
     pub advice: &'static str,
 }
 
 impl Said {
-    /// What is wrong with one part, which is counted from 0: `battery 2 (payload) low`.
+    /// The fault of one part, counted from 0: `battery 2 (payload) low`.
     pub fn alarm_of(&self, instance: u8, feeds: Feeds) -> impl fmt::Display {
         let (alarm, _) = self.alarm.split_once('|').unwrap_or((self.alarm, ""));
         let (before, after) = alarm.split_once('#').unwrap_or((alarm, ""));
@@ -58,8 +58,7 @@ impl Said {
         )
     }
 
-    /// What stands before and after the value where that is told. A number that has no unit tells a pilot nothing: `None`, where the words do not
-    /// say what it counts.
+    /// The words before and after the value. `None` of a number without a unit, which tells a pilot nothing unless the words say its meaning.
     pub fn around_value(&self, unit: &str) -> Option<(&'static str, &'static str)> {
         match self.alarm.split_once('|') {
             Some((_, value)) => value.split_once('~'),
@@ -99,15 +98,15 @@ impl fmt::Display for Number {
 /// All that is known of a check besides its limits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Words {
-    /// What a radio text says.
+    /// The words in radio texts.
     pub said: Said,
-    /// What is so, as a sentence.
+    /// The meaning, as a sentence.
     pub meaning: &'static str,
-    /// What to do, as a sentence.
+    /// The remedy, as a sentence.
     pub action: &'static str,
-    /// What it reads, as the end of "no …".
+    /// Its input, as the end of "no …".
     pub needs: &'static str,
-    /// What it can be judged from.
+    /// The source that it is judged from.
     pub scope: Scope,
 }
 
@@ -116,7 +115,7 @@ pub fn vocabulary(check: &str) -> Option<&'static Words> {
     VOCABULARY.iter().find(|words| words.said.check == check)
 }
 
-/// What a radio text says of a check.
+/// The words of a check in radio texts.
 pub fn said(check: &str) -> Option<Said> {
     let is_of = |line: &&str| line.strip_prefix(check).is_some_and(|rest| rest.starts_with('\t'));
     let mut fields = SAID.split('\n').find(is_of)?.split('\t');
@@ -127,7 +126,7 @@ pub fn said(check: &str) -> Option<Said> {
 macro_rules! vocabulary {
     ($($check:literal $scope:ident $name:literal, $part:literal, says $alarm:literal, $advice:literal, needs $needs:literal;
        $meaning:literal; $action:literal;)*) => {
-        /// What the firmware links, in one text: a line for each check, and a tab between its words.
+        /// The words that the firmware links, in one text: a line for each check, and a tab between its words.
         const SAID: &str =
             concat!($($check, "\t", $name, "\t", $part, "\t", $alarm, "\t", $advice, "\n"),*);
 
