@@ -10,7 +10,7 @@
 //! | airborne | the word and another one that it stands, and two more than of flight | at once | touched |
 //! | airborne | two witnesses of standing, more than of flight; or the only one that tells | 2 s | touched |
 //! | touched | as on the ground | as there | airborne: a bounce, a touch-and-go |
-//! | touched | | 8 s | ground: the flight is over |
+//! | touched | | 8 s since the touch | ground: the flight is over |
 //! | airborne, touched | disarmed, and not watched | at once | ground: the flight is over |
 //! | any, in a flight | a sign of a mishap: free fall, tumbling, overturned, sinking, disarmed in the air | as the sign | falling |
 //! | any, in a flight; falling | a shock, and it lies still | as the sign | impacted |
@@ -19,6 +19,7 @@
 //! | falling, impacted | no majority: down if it is off or silent, or two say that it stands; it flies otherwise | 30 s after the last sign | down, airborne |
 //! | down | armed again; or two witnesses of flight, more than of standing | at once; 4 s | ground |
 //!
+//! A take-off and a landing have the time at which their majority began.
 //! Without power, or with less than 5 % of throttle on rotors, nothing takes off; with less than 10 % it does after 5 s, if two witnesses say so
 //! and no other one is against it.
 //! An inertial sensor that falls or turns for 5 s, while two others say that it flies and it does not sink, is no sign any more.
@@ -255,6 +256,11 @@ impl Flight {
     /// Whether a flight has begun and not ended: in the air, on the ground for a moment, or in a mishap.
     pub const fn is_open(&self) -> bool {
         self.flew_at.is_some()
+    }
+
+    /// Whether a majority says that it stands, and has not lasted yet: this time is flight if the vehicle flies on, and ground if not.
+    pub const fn may_have_landed(&self) -> bool {
+        self.airborne() && self.changing_since.is_some()
     }
 
     /// Whether it was ever seen on the ground: a flight that goes on without that began before the vehicle was heard.
@@ -503,6 +509,8 @@ impl Flight {
                 let since = *self.changing_since.get_or_insert(now);
                 if now.since(since) >= debounce {
                     self.changing_since = None;
+                    // Both changes have the time at which their majority began.
+                    self.flew_at = self.flew_at.map(|_| since);
                     self.airborne_since = (!self.airborne()).then_some(since);
                 }
             }

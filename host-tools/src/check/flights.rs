@@ -50,6 +50,8 @@ pub(super) struct Flights {
     /// The recording was silent in it, and the vehicle has not been seen to fly since.
     unseen: bool,
     silence: Option<Silence>,
+    /// How long the flight may have been over: flight, if it goes on.
+    landing: Span,
     /// The monitor's time of the last step.
     stepped_at: Option<Instant>,
 }
@@ -146,8 +148,13 @@ impl Flights {
         }
         if monitor.flight().airborne() {
             let passed = if passed > STEP_MAX { TICK } else { passed };
-            flight.air = flight.air + passed.min(now.since(flight.to));
-            flight.to = now;
+            self.landing = self.landing + passed;
+            if !monitor.flight().may_have_landed() {
+                flight.air = flight.air + self.landing.min(now.since(flight.to));
+                (flight.to, self.landing) = (now, Span::ZERO);
+            }
+        } else {
+            self.landing = Span::ZERO;
         }
     }
 
@@ -158,7 +165,7 @@ impl Flights {
         {
             (flight.to, flight.air) = (silence.to, silence.air);
         }
-        (self.open, self.unseen, self.silence) = (false, false, None);
+        (self.open, self.unseen, self.silence, self.landing) = (false, false, None, Span::ZERO);
     }
 
     /// Which of the flights goes on.

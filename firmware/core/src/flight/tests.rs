@@ -1,259 +1,255 @@
 //! The flight, on observations made for the purpose.
 
+use super::FlightEvent::{Landing, Resumed, TakeOff};
+use super::VehicleKind::{Plane, Rotorcraft, Surface};
 use super::*;
+use crate::observation::LandedState::{InAir, OnGround, TakingOff};
 use crate::observation::{GlobalPosition, Heartbeat, Hud, LandedState, Observation, Source, VtolState};
 use crate::units::{Fraction, Metres, MetresPerSecond};
 
 const AUTOPILOT: Source = Source { system: 1, component: 1 };
 
-fn fly(kind: VehicleKind, heights_m: &[(u64, f32)]) -> Vec<(u64, FlightEvent)> {
-    let mut vehicle = Vehicle::unknown();
-    let mut flight = Flight::grounded();
-    let mut events = Vec::new();
-    let mut now_ms = 0;
-    for (until_ms, height_m) in heights_m {
-        while now_ms < *until_ms {
-            let now = Instant::from_millis(now_ms);
-            let heartbeat = Heartbeat { armed: now_ms >= 1_000, kind, ..Heartbeat::default() };
-            vehicle.observe(now, AUTOPILOT, &Observation::Heartbeat(heartbeat));
-            let global = GlobalPosition { relative_altitude: Metres(*height_m), ..GlobalPosition::default() };
-            vehicle.observe(now, AUTOPILOT, &Observation::GlobalPosition(global));
-            events.extend(flight.step(now, &vehicle, &Params::defaults()).1.map(|event| (now_ms, event)));
-            now_ms += 50;
-        }
+/// What a vehicle reports: its landed state twice a second, the rest every 50 ms.
+#[derive(Clone, Copy, Debug, Default)]
+struct Says {
+    disarmed: bool,
+    word: Option<LandedState>,
+    /// The height at the beginning, and the climb from there, m and m/s.
+    height_m: Option<f32>,
+    climb_mps: f32,
+    throttle: Option<f32>,
+    air_mps: Option<f32>,
+    ground_mps: f32,
+}
+
+/// Each of these until a time, ms.
+type Script = Vec<(u64, Says)>;
+
+/// An event, when it was found, and the time that it has: of the take-off, and of the last moment in the air.
+type Event = (FlightEvent, u64, u64);
+
+/// Disarmed for a second.
+const OFF: (u64, Says) = (1_000, Says { disarmed: true, ..height(0.0) });
+
+const fn height(height_m: f32) -> Says {
+    Says { height_m: Some(height_m), ..word_of(None) }
+}
+
+const fn word(word: LandedState) -> Says {
+    word_of(Some(word))
+}
+
+const fn word_of(word: Option<LandedState>) -> Says {
+    let (disarmed, climb_mps, ground_mps) = (false, 0.0, 0.0);
+    Says { disarmed, word, height_m: None, climb_mps, throttle: None, air_mps: None, ground_mps }
+}
+
+/// By throttle and air speed alone.
+fn hud(throttle: f32, air_mps: f32) -> Says {
+    Says { throttle: Some(throttle), air_mps: Some(air_mps), ..word_of(None) }
+}
+
+/// By throttle and height; with a throttle it goes at 15 m/s.
+fn moves(word: Option<LandedState>, throttle: f32, height_m: f32) -> Says {
+    let ground_mps = if word.is_some() && throttle > 0.0 { 15.0 } else { 0.0 };
+    Says { throttle: Some(throttle), word, ground_mps, ..height(height_m) }
+}
+
+impl Says {
+    fn observations(self, now_ms: u64, since_ms: u64, kind: VehicleKind) -> Vec<Observation> {
+        let heartbeat = Heartbeat { armed: !self.disarmed, kind, ..Heartbeat::default() };
+        let word = self.word.filter(|_| now_ms.is_multiple_of(500));
+        let hud = Hud {
+            throttle: self.throttle.map(Fraction),
+            airspeed: self.air_mps.map(MetresPerSecond),
+            ..Hud::default()
+        };
+        let global = self.height_m.map(|height_m| GlobalPosition {
+            relative_altitude: Metres(height_m + self.climb_mps * (now_ms - since_ms) as f32 / 1_000.0),
+            velocity: [self.ground_mps, 0.0, 0.0].map(MetresPerSecond),
+            ..GlobalPosition::default()
+        });
+        let mut said = vec![Observation::Heartbeat(heartbeat)];
+        said.extend(word.map(|word| Observation::Landed(word, VtolState::Unknown)));
+        said.extend((self.throttle.is_some()).then_some(Observation::Hud(hud)));
+        said.extend(global.map(Observation::GlobalPosition));
+        said
     }
-    events
 }
 
-#[test]
-fn height_above_the_place_of_arming_is_a_take_off() {
-    let heights = [(5_000, 20.0), (10_000, 25.0), (30_000, 20.1)];
-    // Two seconds of standing, and then the flight is over.
-    let expected = [(5_600, FlightEvent::TakeOff), (19_950, FlightEvent::Landing)];
-    assert_eq!(fly(VehicleKind::Rotorcraft, &heights), expected);
-}
-
-#[test]
-fn a_submarine_never_flies() {
-    assert_eq!(fly(VehicleKind::Surface, &[(5_000, 0.0), (10_000, 25.0)]), []);
-}
-
-#[test]
-fn a_bounce_and_a_touch_and_go_are_one_flight() {
-    let heights = [
-        (5_000, 0.0),
-        (20_000, 25.0),
-        (25_000, 0.0),
-        (26_000, 3.0),
-        (32_000, 0.0),
-        (50_000, 25.0),
-        (70_000, 0.0),
-    ];
-    let events: Vec<_> = fly(VehicleKind::Rotorcraft, &heights).into_iter().map(|(_, event)| event).collect();
-    assert_eq!(events, [FlightEvent::TakeOff, FlightEvent::Landing]);
-}
-
-/// Armed all along; what the autopilot says of it, each for so many messages, two a second.
-fn told(kind: VehicleKind, words: &[(u64, LandedState)]) -> Vec<(u64, FlightEvent)> {
-    let (mut vehicle, mut flight, mut events, mut now_ms) =
-        (Vehicle::unknown(), Flight::grounded(), Vec::new(), 0);
-    let heartbeat = Heartbeat { armed: true, kind, ..Heartbeat::default() };
-    for (messages, landed) in words {
-        for _ in 0..messages * 10 {
-            let now = Instant::from_millis(now_ms);
-            vehicle.observe(now, AUTOPILOT, &Observation::Heartbeat(heartbeat));
-            if now_ms % 500 == 0 {
-                vehicle.observe(now, AUTOPILOT, &Observation::Landed(*landed, VtolState::Unknown));
-            }
-            events.extend(flight.step(now, &vehicle, &Params::defaults()).1.map(|event| (now_ms, event)));
-            now_ms += 50;
-        }
-    }
-    events
-}
-
-#[test]
-fn the_autopilots_own_word_counts() {
-    let words = [
-        (10, LandedState::OnGround),
-        (4, LandedState::TakingOff),
-        (20, LandedState::InAir),
-        (10, LandedState::Landing),
-        (40, LandedState::OnGround),
-    ];
-    let expected = [(7_600, FlightEvent::TakeOff), (31_950, FlightEvent::Landing)];
-    assert_eq!(told(VehicleKind::Rotorcraft, &words), expected);
-}
-
-#[test]
-fn a_rover_never_flies_whatever_its_landed_state_says() {
-    assert_eq!(told(VehicleKind::Surface, &[(10, LandedState::OnGround), (40, LandedState::InAir)]), []);
-}
-
-#[test]
-fn one_wrong_word_is_no_landing() {
-    let mut words = vec![(10, LandedState::OnGround), (20, LandedState::InAir)];
-    words.extend([(1, LandedState::OnGround), (40, LandedState::InAir)]);
-    assert_eq!(told(VehicleKind::Rotorcraft, &words).len(), 1);
-}
-
-#[test]
-fn a_landed_state_that_is_lost_leaves_the_decision_to_what_else_is_known() {
+fn fly(kind: VehicleKind, script: &[(u64, Says)]) -> Vec<Event> {
     let (mut vehicle, mut flight, mut events) = (Vehicle::unknown(), Flight::grounded(), Vec::new());
-    for now_ms in (0..60_000).step_by(50) {
-        let now = Instant::from_millis(now_ms);
-        let heartbeat =
-            Heartbeat { armed: now_ms >= 1_000, kind: VehicleKind::Rotorcraft, ..Heartbeat::default() };
-        vehicle.observe(now, AUTOPILOT, &Observation::Heartbeat(heartbeat));
-        let height_m = if (5_000..50_000).contains(&now_ms) { 30.0 } else { 0.0 };
-        let global = GlobalPosition { relative_altitude: Metres(height_m), ..GlobalPosition::default() };
-        vehicle.observe(now, AUTOPILOT, &Observation::GlobalPosition(global));
-        if (5_000..20_000).contains(&now_ms) {
-            vehicle.observe(now, AUTOPILOT, &Observation::Landed(LandedState::InAir, VtolState::Unknown));
-        }
-        events.extend(flight.step(now, &vehicle, &Params::defaults()).1);
-    }
-    assert_eq!(events, [FlightEvent::TakeOff, FlightEvent::Landing]);
-}
-
-#[test]
-fn who_is_heard_first_in_the_air_goes_on_in_the_air_at_once() {
-    let (mut vehicle, mut flight) = (Vehicle::unknown(), Flight::grounded());
-    let mut events = Vec::new();
-    for now_ms in (0..2_000).step_by(50) {
-        let now = Instant::from_millis(now_ms);
-        let heartbeat = Heartbeat { armed: true, kind: VehicleKind::Rotorcraft, ..Heartbeat::default() };
-        vehicle.observe(now, AUTOPILOT, &Observation::Heartbeat(heartbeat));
-        let global = GlobalPosition { relative_altitude: Metres(50.0), ..GlobalPosition::default() };
-        vehicle.observe(now, AUTOPILOT, &Observation::GlobalPosition(global));
-        events.extend(flight.step(now, &vehicle, &Params::defaults()).1.map(|event| (now_ms, event)));
-    }
-    assert_eq!(events, [(600, FlightEvent::Resumed)]);
-}
-
-/// Armed from 1 s on, without any position: its throttle and its airspeed, each until a time.
-fn fly_by_hud(kind: VehicleKind, said: &[(u64, f32, f32)], height_m: Option<f32>) -> Vec<FlightEvent> {
-    let (mut vehicle, mut flight, mut events, mut now_ms) =
-        (Vehicle::unknown(), Flight::grounded(), Vec::new(), 0);
-    for (until_ms, throttle, airspeed_mps) in said {
+    let (mut now_ms, mut flew_ms) = (0, 0);
+    for (until_ms, says) in script {
+        let since_ms = now_ms;
         while now_ms < *until_ms {
             let now = Instant::from_millis(now_ms);
-            let heartbeat = Heartbeat { armed: now_ms >= 1_000, kind, ..Heartbeat::default() };
-            vehicle.observe(now, AUTOPILOT, &Observation::Heartbeat(heartbeat));
-            let hud = Hud {
-                throttle: Some(Fraction(*throttle)),
-                airspeed: Some(MetresPerSecond(*airspeed_mps)),
-                ..Hud::default()
-            };
-            vehicle.observe(now, AUTOPILOT, &Observation::Hud(hud));
-            if let Some(height_m) = height_m {
-                // Down into a valley, where it stays.
-                let height_m =
-                    if now_ms < 5_000 { 0.0 } else { (20.0 - now_ms as f32 / 500.0).max(height_m) };
-                let relative_altitude = Metres(height_m);
-                let global = GlobalPosition { relative_altitude, ..GlobalPosition::default() };
-                vehicle.observe(now, AUTOPILOT, &Observation::GlobalPosition(global));
-            }
-            events.extend(flight.step(now, &vehicle, &Params::defaults()).1);
-            now_ms += 50;
-        }
-    }
-    events
-}
-
-#[test]
-fn a_plane_without_a_position_flies_by_its_airspeed_and_a_wind_over_the_runway_is_no_flight() {
-    let flown = [(5_000, 0.0, 3.0), (40_000, 0.6, 18.0), (50_000, 0.0, 12.0), (60_000, 0.0, 2.0)];
-    let expected = [FlightEvent::TakeOff, FlightEvent::Landing];
-    assert_eq!(fly_by_hud(VehicleKind::Plane, &flown, None), expected);
-    assert_eq!(fly_by_hud(VehicleKind::Plane, &[(60_000, 0.0, 12.0)], None), []);
-}
-
-#[test]
-fn a_multicopter_that_hovers_below_its_place_of_arming_flies_until_it_stands_there() {
-    let hovers = [(5_000, 0.0, 0.0), (60_000, 0.5, 0.0)];
-    assert_eq!(fly_by_hud(VehicleKind::Rotorcraft, &hovers, Some(-15.0)), [FlightEvent::TakeOff]);
-    let lands = [(5_000, 0.0, 0.0), (60_000, 0.5, 0.0), (80_000, 0.02, 0.0)];
-    let expected = [FlightEvent::TakeOff, FlightEvent::Landing];
-    assert_eq!(fly_by_hud(VehicleKind::Rotorcraft, &lands, Some(-15.0)), expected);
-}
-
-/// Armed from 1 s on; what the autopilot says of its landing, its throttle and its height, each until a time. The events, and
-/// since when it was in the air after the last step.
-fn told_and_seen(
-    kind: VehicleKind,
-    said: &[(u64, LandedState, f32, f32)],
-) -> (Vec<FlightEvent>, Option<Instant>) {
-    let (mut vehicle, mut flight, mut events, mut now_ms) =
-        (Vehicle::unknown(), Flight::grounded(), Vec::new(), 0);
-    for (until_ms, landed, throttle, height_m) in said {
-        while now_ms < *until_ms {
-            let now = Instant::from_millis(now_ms);
-            let heartbeat = Heartbeat { armed: now_ms >= 1_000, kind, ..Heartbeat::default() };
-            let relative_altitude = Metres(*height_m);
-            let hud = Hud { throttle: Some(Fraction(*throttle)), ..Hud::default() };
-            let north = MetresPerSecond(if *throttle > 0.0 { 15.0 } else { 0.0 });
-            let velocity = [north, MetresPerSecond(0.0), MetresPerSecond(0.0)];
-            let global = GlobalPosition { relative_altitude, velocity, ..GlobalPosition::default() };
-            for observation in [
-                Observation::Heartbeat(heartbeat),
-                Observation::Landed(*landed, VtolState::Unknown),
-                Observation::Hud(hud),
-                Observation::GlobalPosition(global),
-            ] {
+            for observation in says.observations(now_ms, since_ms, kind) {
                 vehicle.observe(now, AUTOPILOT, &observation);
             }
-            events.extend(flight.step(now, &vehicle, &Params::defaults()).1);
+            let event = flight.step(now, &vehicle, &Params::defaults()).1;
+            if flight.airborne() && !flight.may_have_landed() {
+                flew_ms = now_ms;
+            }
+            let of_ms = flight.airborne_since().map_or(flew_ms, |since| since.as_millis());
+            events.extend(event.map(|event| (event, now_ms, of_ms)));
             now_ms += 50;
         }
     }
-    (events, flight.airborne_since())
+    let is_over = events.last().is_none_or(|(event, ..)| *event == Landing);
+    assert_eq!(flight.is_open(), !is_over, "{events:?}");
+    events
 }
 
 #[test]
-fn a_word_that_it_stands_hides_no_flight() {
-    use LandedState::OnGround;
-    let flown = [(5_000, OnGround, 0.0, 0.0), (60_000, OnGround, 0.5, 30.0)];
-    let expected = (vec![FlightEvent::TakeOff], Some(Instant::from_millis(5_000)));
-    assert_eq!(told_and_seen(VehicleKind::Rotorcraft, &flown), expected);
-    let landed = [&flown[..], &[(63_000, OnGround, 0.5, 1.5), (80_000, OnGround, 0.0, 0.0)]].concat();
-    let expected = (vec![FlightEvent::TakeOff, FlightEvent::Landing], None);
-    assert_eq!(told_and_seen(VehicleKind::Rotorcraft, &landed), expected);
-}
-
-#[test]
-fn a_word_that_it_stands_again_in_the_air_ends_no_flight() {
-    use LandedState::{InAir, OnGround};
-    for wrong_until_ms in [36_000, 90_000] {
-        let flown = [
-            (5_000, OnGround, 0.0, 0.0),
-            (30_000, InAir, 0.5, 30.0),
-            (wrong_until_ms, OnGround, 0.5, 30.0),
-            (95_000, InAir, 0.5, 30.0),
-        ];
-        let (events, since) = told_and_seen(VehicleKind::Rotorcraft, &flown);
-        assert_eq!((events, since.is_some()), (vec![FlightEvent::TakeOff], true), "{wrong_until_ms}");
+fn a_flight_begins_and_ends_by_what_is_known_of_it() {
+    let valley = (17_500, Says { climb_mps: -2.0, ..moves(None, 0.5, 10.0) });
+    let ground = || (5_000, moves(Some(OnGround), 0.0, 0.0));
+    let hidden = || (60_000, moves(Some(OnGround), 0.5, 30.0));
+    let cases: Vec<(&str, VehicleKind, Script, Vec<Event>)> = vec![
+        (
+            "a height above the place of arming, which is 20 m above home",
+            Rotorcraft,
+            vec![OFF, (5_000, height(20.0)), (10_000, height(25.0)), (30_000, height(20.1))],
+            vec![(TakeOff, 5_600, 5_000), (Landing, 18_000, 9_950)],
+        ),
+        ("a submarine", Surface, vec![OFF, (5_000, height(0.0)), (10_000, height(25.0))], vec![]),
+        (
+            "a bounce, and a touch-and-go",
+            Rotorcraft,
+            vec![
+                OFF,
+                (5_000, height(0.0)),
+                (20_000, height(25.0)),
+                (25_000, height(0.0)),
+                (26_000, height(3.0)),
+                (32_000, height(0.0)),
+                (50_000, height(25.0)),
+                (70_000, height(0.0)),
+            ],
+            vec![(TakeOff, 5_600, 5_000), (Landing, 58_000, 49_950)],
+        ),
+        (
+            "the landed state alone",
+            Rotorcraft,
+            vec![
+                (5_000, word(OnGround)),
+                (7_000, word(TakingOff)),
+                (17_000, word(InAir)),
+                (22_000, word(LandedState::Landing)),
+                (42_000, word(OnGround)),
+            ],
+            vec![(TakeOff, 7_600, 7_000), (Landing, 30_000, 21_950)],
+        ),
+        (
+            "a rover that is called flying",
+            Surface,
+            vec![(5_000, word(OnGround)), (25_000, word(InAir))],
+            vec![],
+        ),
+        (
+            "one wrong word",
+            Rotorcraft,
+            vec![
+                (5_000, word(OnGround)),
+                (15_000, word(InAir)),
+                (15_500, word(OnGround)),
+                (35_000, word(InAir)),
+            ],
+            vec![(TakeOff, 5_600, 5_000)],
+        ),
+        (
+            "a landed state that is lost",
+            Rotorcraft,
+            vec![
+                OFF,
+                (5_000, height(0.0)),
+                (20_000, Says { word: Some(InAir), ..height(30.0) }),
+                (50_000, height(30.0)),
+                (60_000, height(0.0)),
+            ],
+            vec![(TakeOff, 5_600, 5_000), (Landing, 58_000, 49_950)],
+        ),
+        ("first received in the air", Rotorcraft, vec![(2_000, height(50.0))], vec![(Resumed, 600, 0)]),
+        (
+            "a plane by its air speed",
+            Plane,
+            vec![
+                OFF,
+                (5_000, hud(0.0, 3.0)),
+                (40_000, hud(0.6, 18.0)),
+                (50_000, hud(0.0, 12.0)),
+                (62_000, hud(0.0, 2.0)),
+            ],
+            vec![(TakeOff, 5_600, 5_000), (Landing, 58_000, 49_950)],
+        ),
+        ("a wind over the runway", Plane, vec![OFF, (60_000, hud(0.0, 12.0))], vec![]),
+        (
+            "a hover in a valley",
+            Rotorcraft,
+            vec![OFF, (5_000, moves(None, 0.0, 0.0)), valley, (60_000, moves(None, 0.5, -15.0))],
+            vec![(TakeOff, 5_600, 5_000)],
+        ),
+        (
+            "a landing in a valley",
+            Rotorcraft,
+            vec![
+                OFF,
+                (5_000, moves(None, 0.0, 0.0)),
+                valley,
+                (60_000, moves(None, 0.5, -15.0)),
+                (80_000, moves(None, 0.02, -15.0)),
+            ],
+            vec![(TakeOff, 5_600, 5_000), (Landing, 68_000, 59_950)],
+        ),
+        (
+            "a wrong word hides no flight",
+            Rotorcraft,
+            vec![OFF, ground(), hidden()],
+            vec![(TakeOff, 10_000, 5_000)],
+        ),
+        (
+            "nor its landing",
+            Rotorcraft,
+            vec![
+                OFF,
+                ground(),
+                hidden(),
+                (63_000, moves(Some(OnGround), 0.5, 1.5)),
+                (80_000, moves(Some(OnGround), 0.0, 0.0)),
+            ],
+            vec![(TakeOff, 10_000, 5_000), (Landing, 71_000, 62_950)],
+        ),
+        ("nor that of a plane", Plane, vec![OFF, ground(), hidden()], vec![(TakeOff, 10_000, 5_000)]),
+    ];
+    for (what, kind, script, events) in cases {
+        assert_eq!(fly(kind, &script), events, "{what}");
     }
 }
 
 #[test]
-fn a_word_that_it_stands_counts_against_what_may_drift_and_against_a_moment() {
-    use LandedState::OnGround;
+fn a_word_that_it_stands_ends_no_flight_in_the_air_and_counts_against_a_drift_and_a_moment() {
+    for wrong_until_ms in [36_000, 90_000] {
+        let script = [
+            OFF,
+            (5_000, moves(Some(OnGround), 0.0, 0.0)),
+            (30_000, moves(Some(InAir), 0.5, 30.0)),
+            (wrong_until_ms, moves(Some(OnGround), 0.5, 30.0)),
+            (95_000, moves(Some(InAir), 0.5, 30.0)),
+        ];
+        assert_eq!(fly(Rotorcraft, &script), [(TakeOff, 5_600, 5_000)], "{wrong_until_ms}");
+    }
     for (kind, throttle, height_m, until_ms) in [
         // An estimator that drifts, motors that are tried, a glitch of 4 s; a plane that is carried up a hill.
-        (VehicleKind::Rotorcraft, 0.15, 30.0, 60_000),
-        (VehicleKind::Rotorcraft, 0.5, 1.5, 60_000),
-        (VehicleKind::Rotorcraft, 0.5, 30.0, 9_000),
-        (VehicleKind::Plane, 0.0, 30.0, 60_000),
-        (VehicleKind::Surface, 0.5, 30.0, 60_000),
+        (Rotorcraft, 0.15, 30.0, 60_000),
+        (Rotorcraft, 0.5, 1.5, 60_000),
+        (Rotorcraft, 0.5, 30.0, 9_000),
+        (Plane, 0.0, 30.0, 60_000),
+        (Surface, 0.5, 30.0, 60_000),
     ] {
-        let said = [
-            (5_000, OnGround, 0.0, 0.0),
-            (until_ms, OnGround, throttle, height_m),
-            (70_000, OnGround, 0.0, 0.0),
-        ];
-        assert_eq!(told_and_seen(kind, &said), (vec![], None), "{kind:?} {throttle} {height_m}");
+        let stands = |until_ms| (until_ms, moves(Some(OnGround), 0.0, 0.0));
+        let script =
+            [OFF, stands(5_000), (until_ms, moves(Some(OnGround), throttle, height_m)), stands(70_000)];
+        assert_eq!(fly(kind, &script), [], "{kind:?} {throttle} {height_m}");
     }
-    let fast = [(5_000, OnGround, 0.0, 0.0), (60_000, OnGround, 0.5, 30.0)];
-    assert_eq!(told_and_seen(VehicleKind::Plane, &fast).0, [FlightEvent::TakeOff]);
 }

@@ -57,8 +57,10 @@ pub struct Usage {
     /// Full discharges of each battery, where the capacity is known: each has an equal share of it.
     battery_cycles: [f64; BATTERIES_MAX],
     load_cycles: Rainflow<7>,
-    /// How long it has been armed and in the air, seconds, as far as is known of a vehicle that is silent.
-    unheard_s: [f64; 2],
+    /// Seconds armed and in the air that count once this is known.
+    held_s: [f64; 2],
+    /// Seconds in which it may have landed, of no phase yet.
+    landing_s: f64,
 }
 
 /// Lowest ranges of the load factor's cycles, g.
@@ -87,7 +89,8 @@ impl Usage {
             capacity_ah: 0.0,
             battery_cycles: [0.0; BATTERIES_MAX],
             load_cycles: Rainflow::new(LOAD_RANGES_G, LOAD_TURN_G),
-            unheard_s: [0.0; 2],
+            held_s: [0.0; 2],
+            landing_s: 0.0,
         }
     }
 
@@ -179,24 +182,27 @@ impl Usage {
         self.step_motors(now, vehicle, step_s);
     }
 
-    /// Silence counts once the vehicle is heard again as it was: still armed, still in the air.
+    /// Silence counts once the vehicle reports again and still is armed, still in the air. So does the time in which it may have landed.
     fn step_times(&mut self, now: Instant, vehicle: &Vehicle, flight: &Flight, step_s: f64) {
-        let states = [(UsageCounter::Armed, vehicle.armed()), (UsageCounter::Flight, flight.airborne())];
-        let heard = vehicle.heartbeat.within(now, HEARD).is_some();
+        let reports = vehicle.heartbeat.within(now, HEARD).is_some();
+        let is_known = reports && !flight.may_have_landed();
+        let states = [
+            (UsageCounter::Armed, vehicle.armed(), reports),
+            (UsageCounter::Flight, flight.airborne(), is_known),
+        ];
         if !vehicle.armed() {
-            self.unheard_s = [0.0; 2];
+            self.held_s = [0.0; 2];
         }
-        for ((counter, is_so), unheard_s) in states.into_iter().zip(&mut self.unheard_s) {
-            if !is_so {
-                *unheard_s = 0.0;
-            } else if heard {
-                self.totals.add(counter, step_s + core::mem::take(unheard_s));
-            } else {
-                *unheard_s += step_s;
-            }
+        for ((counter, is_so, is_known), held_s) in states.into_iter().zip(&mut self.held_s) {
+            let passed_s = if is_so { step_s + *held_s } else { 0.0 };
+            *held_s = 0.0;
+            if is_known { self.totals.add(counter, passed_s) } else { *held_s = passed_s }
         }
-        if heard {
-            self.totals.add(regime(flight.phase(now, vehicle)), step_s);
+        if is_known {
+            let landing_s = core::mem::take(&mut self.landing_s);
+            self.totals.add(regime(flight.phase(now, vehicle)), step_s + landing_s);
+        } else if reports {
+            self.landing_s += step_s;
         }
     }
 
@@ -231,7 +237,7 @@ impl Usage {
     /// The flight is over, and nobody saw how it ended.
     pub(crate) fn break_off(&mut self) {
         (self.touchdown, self.crashed, self.touched_mps) = (Touchdown::NONE, false, 0.0);
-        self.unheard_s = [0.0; 2];
+        (self.held_s, self.landing_s) = ([0.0; 2], 0.0);
     }
 
     /// The flight ends now by a mishap, in which it touched with so many m/s: that is no landing.

@@ -165,9 +165,8 @@ fn a_recording_that_ends_on_the_ground_shortly_after_the_landing_has_the_whole_f
         judge.item(Instant::from_millis(65_000 + ground_ms), Item::Observation(AUTOPILOT, &heartbeat(false)));
         let flights = judge.end().flights;
         let [(air, true)] = air_ms(&flights)[..] else { panic!("{ground_ms}: {flights:?}") };
-        // The landed state alone ends a flight after 2 s.
-        assert!((59_000..=62_100).contains(&air), "{ground_ms}: {flights:?}");
-        assert!(flights[0].to <= Instant::from_millis(67_100), "{ground_ms}: {flights:?}");
+        assert!((59_000..=60_100).contains(&air), "{ground_ms}: {flights:?}");
+        assert!(flights[0].to <= Instant::from_millis(65_100), "{ground_ms}: {flights:?}");
     }
 }
 
