@@ -1,4 +1,4 @@
-//! What explains each finding of a log: a record of a finding does not have it.
+//! The causes of a log's findings. The record of a finding does not name its cause.
 
 use std::collections::BTreeMap;
 
@@ -14,7 +14,7 @@ struct Open<'a> {
     level: Level,
     check: &'a str,
     instance: u8,
-    /// Its findings that nothing explains yet.
+    /// Findings of the check without a cause yet.
     unexplained: Vec<usize>,
 }
 
@@ -24,7 +24,7 @@ impl Open<'_> {
     }
 }
 
-/// The check that explains each of the findings, which stand in order; `None` where nothing does.
+/// The check that explains each finding; `None` without a cause. The findings are in order.
 pub fn causes(findings: &[FindingLine]) -> Vec<Option<String>> {
     let mut causes = vec![None; findings.len()];
     let mut open: BTreeMap<(&str, u8), Open<'_>> = BTreeMap::new();
@@ -44,7 +44,7 @@ pub fn causes(findings: &[FindingLine]) -> Vec<Option<String>> {
         });
         one.level = level;
         one.unexplained.push(place);
-        // Also what came before: the consequence may be seen first.
+        // Also earlier alarms: the consequence may be seen first.
         let since = |one: &Open<'_>| {
             let others = open.values().map(|other| (other.since, other.check));
             began(one.check, one.since, others)
@@ -113,7 +113,7 @@ mod tests {
             finding(20, "ekf_test_ratio", "ok"),
             finding(30, "compass_heading", "warning"),
             finding(32, "clipping", "warning"),
-            // A second after what hit something came to rest.
+            // One second after the vehicle came to rest.
             finding(33, "impact", "critical"),
         ];
         let causes = causes(&findings);

@@ -5,22 +5,22 @@ use hums_core::clock::{Instant, Span};
 use super::judged::JudgedBy;
 use crate::utc::moment;
 
-/// Parameters that tell of cells come within this, where a recording begins in the air.
+/// If a recording begins in the air, the parameters with the cell count come within this time.
 const CELLS_COME: Span = Span::from_secs(2);
 
-/// What is known of how many cells a battery has that carries the vehicle.
+/// The cell count of the main battery, as the recording reports it.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Cells {
-    /// In the air nothing told it here: from and to.
+    /// The time in the air without a known cell count: from and to.
     unknown: Option<(Instant, Instant)>,
-    /// Nothing told it to the box, which said so.
+    /// The box reported that it did not know the cell count.
     unknown_on_board: bool,
-    /// The box had no store, and so none from its last flight.
+    /// The box had no store, so it had no count from the last flight.
     nothing_stored: bool,
 }
 
 impl Cells {
-    /// The box says that nothing told it.
+    /// The box reports an unknown cell count.
     pub(super) const fn told_unknown(&mut self) {
         self.unknown_on_board = true;
     }
@@ -30,13 +30,14 @@ impl Cells {
         self.nothing_stored = true;
     }
 
-    /// In the air nothing tells it now.
+    /// The vehicle is in the air and the cell count is unknown.
     pub(super) fn lack(&mut self, now: Instant) {
         let (from, _) = *self.unknown.get_or_insert((now, now));
         self.unknown = Some((from, now));
     }
 
-    /// Since when in the air nothing told it, where no alarm came from the voltage for that.
+    /// Start of the time in the air with an unknown cell count, if the voltage raised no alarm for that
+    /// reason.
     pub(super) fn unknown_since(&self, by: JudgedBy) -> Option<Instant> {
         self.unknown.filter(|_| self.are_unknown(by)).map(|(from, _)| from)
     }
@@ -51,7 +52,7 @@ impl Cells {
         }
     }
 
-    /// As a sentence; `None` where there is nothing to say of it.
+    /// The remark as a sentence; `None` without one.
     pub(super) fn words(&self, by: JudgedBy, begins_in_air: bool) -> Option<String> {
         if self.are_unknown(by) {
             let when = self

@@ -1,13 +1,13 @@
-//! The monitor's time over a recording: it goes with the recording's time, and stands still where the recording has a gap.
+//! The monitor's time over a recording: it follows the recording's time and stops over each gap.
 //!
-//! Nothing is known of the vehicle in a gap. So no age grows over one, no debounce runs out, and nothing is counted as time
-//! in the air. After a gap of [`SETTLE`] and longer the checks are not stepped for that long, while the first values come
-//! in.
+//! The vehicle's state is unknown in a gap. So values do not age over it, debounces do not run, and the gap
+//! does not count as time in the air. After a gap of [`SETTLE`] or longer the checks pause for that time,
+//! until the first values have come.
 
 use hums_core::clock::{Instant, Span};
 use hums_onboard::monitoring::TICK;
 
-/// What follows a long gap and is not judged: what is told once a second has come again by then.
+/// Pause of the checks after a long gap: messages sent once a second have come again by then.
 pub(crate) const SETTLE: Span = Span::from_secs(1);
 
 /// The two times, side by side.
@@ -24,7 +24,7 @@ pub(super) struct Clock {
 }
 
 impl Clock {
-    /// The recording's time of the next step, which is `at`, or up to a step later, where there was none yet.
+    /// The recording's time of the next step. The first step is at `at` or up to one step later.
     pub(super) fn begin(&mut self, at: Instant) -> Instant {
         *self.next.get_or_insert(whole(at))
     }
@@ -41,7 +41,8 @@ impl Clock {
         self.next = self.next.max(Some(whole(at)));
     }
 
-    /// The recording has nothing from here to there: the monitor's time stands still. What comes before was stepped.
+    /// The recording has a gap between these two times, so the monitor's time stops. The time before it was
+    /// already stepped.
     pub(super) fn pause(&mut self, from: Instant, to: Instant) {
         let length = to.since(from.max(self.gap_end));
         let Some(next) = self.next.filter(|_| length > Span::ZERO) else { return };

@@ -19,7 +19,7 @@ const CELL_VOLTAGE: &str = "cell_voltage";
 /// How often it is noted.
 const NOTE_EVERY: Span = Span::from_millis(500);
 
-/// What a check had to judge.
+/// Data that a check had to judge.
 #[derive(Clone, Copy, Debug, Default)]
 struct Seen {
     /// It had a value.
@@ -28,7 +28,7 @@ struct Seen {
     level: bool,
 }
 
-/// What each check had to judge.
+/// Data that each check had to judge.
 #[derive(Debug)]
 pub(super) struct Coverage {
     /// In the order of the checks.
@@ -40,7 +40,7 @@ pub(super) struct Coverage {
 pub(super) type Lists = (Vec<&'static str>, Vec<(&'static str, String)>);
 
 impl Coverage {
-    /// Nothing yet.
+    /// Empty.
     pub(super) fn new() -> Self {
         Self { seen: vec![Seen::default(); VOCABULARY.len()], next: Instant::ZERO }
     }
@@ -88,33 +88,33 @@ impl Coverage {
     }
 }
 
-/// What is known of a recording at its end.
+/// Facts about a recording at its end.
 #[expect(clippy::struct_excessive_bools, reason = "facts that have nothing to do with each other")]
 pub(super) struct Recording<'a> {
     pub(super) by: JudgedBy,
     pub(super) monitor: &'a Monitor,
-    /// What is normal, where earlier flights are known.
+    /// The vehicle's baselines, if earlier flights are known.
     pub(super) past: Option<&'a Baselines>,
-    /// It holds what came over a link.
+    /// The recording was received over a link.
     pub(super) is_of_link: bool,
-    /// It was heard on the monitor's own wire.
+    /// The recording was taken on the monitor's own wire.
     pub(super) on_the_wire: bool,
     /// How long it was armed.
     pub(super) armed: Span,
-    /// Why it is not known whether it was armed, where the recording does not tell it.
+    /// Why the arming state is unknown, if the recording does not report it.
     pub(super) arming: Option<&'a str>,
     /// It was in the air.
     pub(super) flew: bool,
-    /// Nothing told how many cells its battery has.
+    /// The cell count of the battery is unknown.
     pub(super) cells_unknown: bool,
-    /// What was found.
+    /// The problems found.
     pub(super) problems: &'a [Problem],
 }
 
 enum Verdict {
     Judged,
     NotJudged(String),
-    /// It is made for another autopilot, or for parts that nobody registered.
+    /// The check is for another autopilot, or for parts that are not registered.
     NotMeant,
 }
 
@@ -126,7 +126,7 @@ impl Recording<'_> {
         let is_found = self.problems.iter().any(|problem| problem.check == check.name);
         if self.by == JudgedBy::Board && matches!(words.scope, Scope::Wire | Scope::Recorder | Scope::Stored)
         {
-            // The board had its own wire and card; what it had stored is not in the log.
+            // The board had its own wire and card; its store is not in the log.
             return if words.scope == Scope::Stored && !seen.level {
                 Verdict::NotMeant
             } else {
@@ -134,7 +134,7 @@ impl Recording<'_> {
             };
         }
         match words.scope {
-            // The autopilot's silence says nothing, good or bad.
+            // An autopilot without alerts is neither good nor bad.
             Scope::Said if is_found => return Verdict::Judged,
             Scope::Said => return Verdict::NotMeant,
             Scope::ArduPilot if autopilot == Some(Autopilot::Px4) => return Verdict::NotMeant,

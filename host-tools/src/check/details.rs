@@ -1,5 +1,5 @@
-//! What a check of several things was of: which failsafe, which sensor. The monitor counts and compares; names are for
-//! people.
+//! Names for the parts of a check: which failsafe, which sensor. The monitor counts and compares; names are
+//! for people.
 
 use std::collections::BTreeSet;
 
@@ -20,14 +20,14 @@ use crate::states;
 /// The check of the autopilot's own state.
 pub(super) const FAILSAFE: &str = "autopilot_state";
 
-/// What is so now.
+/// The present states.
 #[derive(Debug, Default)]
 pub(super) struct Details {
     failsafes: String,
     sensors: u32,
-    /// What the estimator's flags doubt.
+    /// The sensors that the estimator's flags reject.
     doubted: Option<Causes>,
-    /// What the autopilot said last of each cause, and when.
+    /// The autopilot's last text about each cause, and its time.
     said: [Option<(Instant, String)>; Cause::COUNT],
     /// Batteries that are followed, in the order in which they came: component and id.
     batteries: Vec<(u8, u8)>,
@@ -35,28 +35,28 @@ pub(super) struct Details {
     beyond: BTreeSet<(u8, u8)>,
     /// Autopilots in the order in which they came.
     autopilots: Vec<Heard>,
-    /// What was said of recordings that another one was joined to.
+    /// Remarks on the recordings before a joint.
     earlier: Vec<String>,
     /// The autopilots of those.
     others: Vec<Heard>,
 }
 
-/// An autopilot that was heard, as far as one is told from another.
+/// An autopilot that was received, as far as autopilots can be told apart.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Heard {
     system: u8,
     /// `MAV_AUTOPILOT`
     autopilot: u8,
-    /// Its unique id, once it told one.
+    /// Its unique id, once reported.
     uid: u64,
 }
 
-/// `MAV_AUTOPILOT_INVALID`: what sends it is no autopilot.
+/// `MAV_AUTOPILOT_INVALID`: the sender is not an autopilot.
 const NO_AUTOPILOT: u8 = 8;
 
-/// Autopilots that are told apart.
+/// Maximum number of autopilots told apart.
 const TOLD_APART_MAX: usize = 32;
-/// Batteries beyond those that are followed which are told apart: `ArduPilot` has 16.
+/// Maximum number of further batteries told apart, beyond those followed: `ArduPilot` has 16.
 const BEYOND_MAX: usize = 1_024;
 
 impl Details {
@@ -100,7 +100,7 @@ impl Details {
         is_new.is_some()
     }
 
-    /// The estimator says by its flags what it doubts.
+    /// The estimator's flags name the sensors that it rejects.
     pub(super) fn estimator(&mut self, estimator: &Estimator) -> bool {
         let doubted = Some(of_estimator(estimator, true, true));
         core::mem::replace(&mut self.doubted, doubted) != doubted
@@ -115,7 +115,7 @@ impl Details {
         is_wrong
     }
 
-    /// An autopilot tells what it is.
+    /// An autopilot reports its type.
     pub(super) fn heartbeat(&mut self, source: Source, heartbeat: &Heartbeat) {
         let (system, autopilot) = (source.system, heartbeat.autopilot_number);
         let is_new =
@@ -181,7 +181,7 @@ impl Details {
         }
     }
 
-    /// What else there is to say of the vehicles, of which this system is judged, and what there is more of than the monitor has room for.
+    /// Further remarks on the vehicles, with the judged system, and on parts beyond the monitor's room.
     pub(super) fn remarks(&self, judged: Option<u8>) -> Vec<String> {
         self.of_parts(judged).into_iter().chain(self.vehicles_of_parts()).collect()
     }
@@ -198,7 +198,7 @@ impl Details {
         remarks
     }
 
-    /// What the autopilot's alert was of: its words of late, and the sensors that it calls unhealthy.
+    /// The cause of the autopilot's alert: its recent texts, and the sensors that it reports as unhealthy.
     fn tell_alert(&self, check: &str, problems: &mut Problems) {
         let Some(cause) = Cause::ALL.into_iter().find(|cause| cause.name() == check) else { return };
         let of = |bit: &u32| self.sensors & bit != 0 && Causes::of_sensors(*bit).has(cause);
@@ -222,7 +222,7 @@ impl Details {
         }
     }
 
-    /// A check's level has changed, or what it is of.
+    /// A check has changed its level or its part.
     pub(super) fn tell(&self, check: &str, problems: &mut Problems) {
         if !problems.is_open(check) {
             return;

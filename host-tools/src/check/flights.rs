@@ -16,9 +16,10 @@ pub struct Flight {
     pub from: Instant,
     /// When it was in the air last.
     pub to: Instant,
-    /// How long it was in the air: without what lies on the ground between, and without the recording's gaps.
+    /// Time in the air, without the stops on the ground and without the gaps of the recording.
     pub air: Span,
-    /// It was seen on the ground before; otherwise it was in the air when it was heard first, and nobody knows since when.
+    /// The vehicle was seen on the ground before. Otherwise it was first received in the air, and the start
+    /// of the flight is unknown.
     pub took_off: bool,
     /// It landed.
     pub landed: bool,
@@ -35,7 +36,7 @@ pub struct Mishap {
     pub at: Instant,
     /// It hit something.
     pub is_impact: bool,
-    /// Nobody heard it come down: when it was heard last before.
+    /// The last time the vehicle was received before a mishap in a radio gap.
     pub unheard_from: Option<Instant>,
 }
 
@@ -59,20 +60,22 @@ pub(super) struct Flights {
 /// The vehicle was silent, and is not known to be still on its flight.
 #[derive(Clone, Copy, Debug)]
 struct Silence {
-    /// The flight as it was when the vehicle was heard last.
+    /// End of the flight when the vehicle was last received.
     to: Instant,
     air: Span,
-    /// Since when it is heard again.
+    /// Time at which the vehicle was received again.
     heard_since: Option<Instant>,
 }
 
-/// Steps are no further apart than this, behind a gap of the recording too ([`SETTLE`]); the rest of a longer silence was left out.
+/// The longest time between two steps, also after a gap of the recording ([`SETTLE`]). The rest of a longer
+/// silence was left out.
 const STEP_MAX: Span = Span::from_millis(SETTLE.as_millis() + 2 * TICK.as_millis());
-/// An impact is found so late at most: once what hit something lies still.
+/// The longest delay of an impact's finding: the vehicle must lie still first.
 const FOUND_LATE: Span = Span::from_secs(5);
 /// Without a heartbeat for so long it is silent.
 const SILENT: Span = Span::from_secs(5);
-/// What is heard for so long and flies is on its flight still: longer than a landing needs to be seen.
+/// A vehicle received in the air for this long is still on its flight: longer than a landing takes to be
+/// seen.
 const STILL_FLIES: Span = Span::from_secs(3);
 
 impl Flight {
@@ -81,12 +84,13 @@ impl Flight {
         self.mishap.filter(|mishap| mishap.is_impact == is_impact).map(|mishap| mishap.at.as_secs_f64())
     }
 
-    /// When it was heard last before a mishap that nobody heard, in seconds.
+    /// Last time the vehicle was received before a mishap in a radio gap, in seconds.
     pub fn unheard_s(&self) -> Option<f64> {
         Some(self.mishap?.unheard_from?.as_secs_f64())
     }
 
-    /// The impact that ended it is told once, when the box found it, as these findings of it say.
+    /// Moves the impact that ended the flight to the time of the box's finding. Such an impact is reported
+    /// once.
     pub(super) fn was_hit<'a>(&mut self, mut found: impl Iterator<Item = &'a Finding>) {
         if let Some(Mishap { at, is_impact: true, .. }) = &mut self.mishap
             && let Some(finding) =
@@ -97,12 +101,12 @@ impl Flight {
     }
 }
 
-/// Whether the vehicle was in the air when it was heard first.
+/// Whether the vehicle was first received in the air.
 pub(super) fn begin_in_air(flights: &[Flight]) -> bool {
     flights.first().is_some_and(|flight| !flight.took_off)
 }
 
-/// Whether a flight that goes on is in the air: also where it was disarmed, and may fall, or nothing carries it.
+/// Whether an open flight is in the air. A vehicle disarmed in the air still counts while it may fall.
 pub(super) fn is_in_air(monitor: &Monitor) -> bool {
     let falls = || monitor.flight().is_open() && monitor.flight().is_unloaded();
     (monitor.flight().airborne() && monitor.vehicle().armed()) || monitor.flight().is_watched() || falls()
@@ -126,8 +130,8 @@ impl Flights {
         }
     }
 
-    /// A step of the monitor was made, at `steps` of its own time, so long after the vehicle's last heartbeat. Silence counts as
-    /// flight once the vehicle is heard again and still flies.
+    /// The monitor made a step at `steps` of its own time, this long after the vehicle's last heartbeat.
+    /// Silence counts as flight once the vehicle is received again and still flies.
     pub(super) fn step(&mut self, now: Instant, steps: Instant, since_heard: Span, monitor: &Monitor) {
         let passed = self.stepped_at.replace(steps).map_or(Span::ZERO, |before| steps.since(before));
         let Some(flight) = self.list.last_mut().filter(|_| self.open) else { return };
@@ -158,7 +162,7 @@ impl Flights {
         }
     }
 
-    /// The flight goes on no more: a silence after which it was not seen to fly is none of it.
+    /// Ends the flight. A silence counts only if the vehicle was seen to fly after it.
     fn close(&mut self) {
         if let (Some(flight), Some(silence)) =
             (self.list.last_mut().filter(|_| self.open), self.silence.take())
@@ -189,7 +193,7 @@ impl Flights {
         }
     }
 
-    /// The recording was silent: until the vehicle is seen to fly on, nobody knows that it landed.
+    /// The recording was silent. The landing is unknown until the vehicle is seen to fly on.
     pub(super) fn silent(&mut self, is_unseen: bool) {
         self.unseen = self.open && is_unseen;
     }
@@ -237,14 +241,14 @@ impl Flights {
     /// A recording has ended, and perhaps another one begins.
     pub(super) fn end_of_recording(&mut self, monitor: &Monitor) {
         if !is_in_air(monitor) {
-            // On the ground, still armed: what is over is the recording, and the flight too.
+            // The vehicle is on the ground and still armed: the recording ends, and so does the flight.
             self.landing();
         }
-        // Otherwise nobody saw how it ended.
+        // The end of the flight was not seen.
         self.break_off();
     }
 
-    /// What follows is of another vehicle: the flight ended where this one was heard last.
+    /// Another vehicle follows: the flight ended when this one was last received.
     pub(super) fn break_off(&mut self) {
         self.close();
         self.crashed = false;

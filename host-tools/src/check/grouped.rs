@@ -1,4 +1,5 @@
-//! What was wrong, as people read it: the parts of one check together, under each cause what it explains, and first what matters most.
+//! Problems in the order in which people read them: parts of one check together, effects under their cause,
+//! the worst first.
 
 use std::cmp::Reverse;
 use std::collections::BTreeSet;
@@ -7,14 +8,14 @@ use hums_core::health::Level;
 
 use super::problem::{Problem, mishaps};
 
-/// A cause with what it explains.
+/// A cause with its effects.
 #[derive(Debug)]
 pub struct Group<'a> {
-    /// Problems of one check and one level, which differ in the part alone; never none.
+    /// Problems of one check and one level, which differ only in the part; at least one.
     pub members: Vec<&'a Problem>,
-    /// What they explain: of each check and level the problems.
+    /// The effects: the problems of each check and level.
     pub effects: Vec<Vec<&'a Problem>>,
-    /// It is a warning, and what it explains became critical.
+    /// The cause is a warning, and one of its effects became critical.
     pub is_raised: bool,
 }
 
@@ -24,14 +25,17 @@ impl<'a> Group<'a> {
         self.members.first().copied()
     }
 
-    /// Whether it, or what it explains, is critical.
+    /// Whether the cause or an effect is critical.
     pub fn is_critical(&self) -> bool {
         self.is_raised || is_critical(&self.members)
     }
 }
 
-/// Problems by their causes: what is critical before warnings, there a mishap with what led to it (a warning too) before all else and parts
-/// that are due behind it, then what came first.
+/// Problems by their causes, in this order:
+/// - critical before warnings;
+/// - a mishap first, then its precursors (also warnings);
+/// - parts that are due last;
+/// - otherwise by time.
 pub fn grouped(problems: &[Problem]) -> Vec<Group<'_>> {
     let alike = alike(problems);
     let causes: Vec<_> = alike.iter().map(|one| cause(one, &alike)).collect();
@@ -51,7 +55,7 @@ pub fn grouped(problems: &[Problem]) -> Vec<Group<'_>> {
         let leads = group.first().is_some_and(|problem| problem.leads_to(&mishaps));
         (Reverse(group.is_critical() || leads), group.first().map(|problem| problem.order(&mishaps)))
     });
-    // The first of a check's groups has what it explains.
+    // Only the first group of a check keeps the effects.
     let mut seen = BTreeSet::new();
     for group in &mut groups {
         if !seen.insert(check_of(&group.members)) {
@@ -71,7 +75,8 @@ fn check_of<'a>(alike: &[&'a Problem]) -> &'a str {
     alike.first().map_or("", |problem| &problem.check)
 }
 
-/// The check that explains all of some problems that are alike, and is explained by none; `None` where there is none among these.
+/// The check that explains all of these alike problems and has no cause itself; `None` if there is none in
+/// the list.
 fn cause<'a>(one: &[&'a Problem], all: &[Vec<&'a Problem>]) -> Option<&'a str> {
     let explains = |one: &[&'a Problem]| {
         let cause = one.first()?.because.as_deref()?;

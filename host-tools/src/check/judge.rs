@@ -1,9 +1,9 @@
-//! The monitor of the board over a recording: the same checks, the same limits, the recording's own time.
+//! The board's monitor over a recording: the same checks, the same limits, the recording's own time.
 //!
-//! The monitor is stepped every 50 ms of the recording's time, whatever the rate of what it holds: debounce and staleness
-//! follow the clock, not the number of samples. Where nothing was recorded for longer than `SILENCE_MAX` everything
-//! has grown stale and every debounce has run out, so what follows is left out. A gap of the recording itself is no silence
-//! of the vehicle: the monitor's time stands still over it (`super::clock`).
+//! The monitor is stepped every 50 ms of the recording's time, at any sample rate: debounce and staleness
+//! follow the clock, not the number of samples. After a silence of `SILENCE_MAX` all values are stale and all
+//! debounces have run out, so the rest of the silence is left out. A gap of the recording is not a silence of
+//! the vehicle: the monitor's time stops over it (`super::clock`).
 
 use std::collections::BTreeMap;
 
@@ -42,22 +42,22 @@ use crate::summary::EndsInAir;
 /// Silence that is stepped through: longer than each debounce and each time after which a value is stale.
 const SILENCE_MAX: Span = Span::from_secs(75);
 
-/// So long a recording says nothing of a vehicle that is armed, and it is told: three heartbeats of a link, ...
+/// A silence of an armed vehicle is reported after this time: three heartbeats of a link, ...
 const SILENT: Span = Span::from_secs(3);
 /// ... and of a log that the autopilot writes itself, whose slowest topics come once a second.
 const NOT_WRITTEN: Span = Span::from_secs(2);
 /// Silence of a vehicle that is armed on the ground hides a flight where it is longer.
 const HIDES_FLIGHT: Span = Span::from_secs(10);
-/// What flies on is seen to fly so long after the silence: longer than a landing needs to be seen.
+/// A vehicle in flight is seen to fly this long after the silence: longer than a landing takes to be seen.
 const SEEN: Span = Span::from_secs(3);
 
 /// The check of disarming in the air.
 const DISARMED: &str = "disarmed_in_air";
 
-/// Where a recording was heard.
+/// The place at which a recording was received.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Heard {
-    /// Nobody knows: what tells of the wire is not judged.
+    /// Unknown place: checks of the wire are not judged.
     #[default]
     Somewhere,
     /// At the monitor's own place, the autopilot's telemetry port: silence and lost frames are those of its wire.
@@ -68,25 +68,25 @@ pub enum Heard {
 #[derive(Clone, Debug, Default)]
 pub struct Limits {
     params: Params,
-    /// Names that the user gave: what a log says of them does not count.
+    /// Names that the user gave: they override the log's own values.
     given: Vec<&'static str>,
-    /// What is normal for the vehicle, from its earlier flights.
+    /// The vehicle's baselines, from its earlier flights.
     past: Option<Box<Baselines>>,
 }
 
 impl Limits {
-    /// These are given; all others are the defaults, or what a log of ours says.
+    /// Limits given by the user. All others are the defaults, or the values in a log of ours.
     pub fn new(given: &[(&'static hums_core::params::ParamSpec, f32)]) -> Self {
         let mut limits = Self::default();
         for (spec, value) in given {
-            // Whoever read the file has checked name and range.
+            // Name and range were checked when the file was read.
             let _ = limits.params.set(spec.name, *value);
             limits.given.push(spec.name);
         }
         limits
     }
 
-    /// With what is normal for the vehicle: then trends are judged against it.
+    /// With the vehicle's baselines: trends are judged against them.
     #[must_use]
     pub fn after(self, past: &Baselines) -> Self {
         Self { past: Some(Box::new(*past)), ..self }
@@ -107,14 +107,14 @@ impl Limits {
     }
 }
 
-/// When the vehicle was heard last, and whether it was in the air then.
+/// When the vehicle was last received, and whether it was in the air.
 #[derive(Clone, Copy, Debug)]
 struct Last {
     at: Instant,
     airborne: bool,
 }
 
-/// A silence of which is not known yet what it hides.
+/// A silence whose meaning is still open.
 #[derive(Clone, Copy, Debug)]
 struct Silence {
     to: Instant,
@@ -126,23 +126,23 @@ struct Silence {
 /// Judges a recording, item by item.
 pub struct Judge {
     monitor: Box<Monitor>,
-    /// As it was when the last part of the file ended in which an autopilot was heard.
+    /// The monitor at the end of the last part of the file with an autopilot.
     earlier: Option<Box<Monitor>>,
     limits: Limits,
     format: Format,
-    /// The sequence numbers of the frames, where the recording was heard on the monitor's wire.
+    /// Sequence numbers of the frames, if the recording was taken on the monitor's wire.
     wire: Option<Sequences>,
     clock: Clock,
     first: Option<Instant>,
     last: Instant,
-    /// The last record of a box, which goes on where nothing is heard.
+    /// The last record of a box, which also writes during a silence of the vehicle.
     recorded_to: Instant,
     last_heard: Option<Last>,
     silence: Option<Silence>,
     link_loss: LinkLoss,
     repairs: Repairs,
     coverage: Coverage,
-    /// What the monitor here found, and what the one on board did.
+    /// Problems found by the monitor here and by the one on board.
     here: Problems,
     board: Problems,
     checked_on_board: bool,
@@ -200,7 +200,7 @@ impl Judge {
         }
     }
 
-    /// With a recording that was heard there.
+    /// For a recording received at this place.
     #[must_use]
     pub fn heard(self, heard: Heard) -> Self {
         Self { wire: (heard == Heard::OnTheWire).then(Sequences::new), ..self }
@@ -211,7 +211,7 @@ impl Judge {
         self.flights.going_on()
     }
 
-    /// What the vehicle was doing at the last item.
+    /// Flight state and phase at the last item.
     pub fn phase(&self) -> (&FlightState, Phase) {
         let flight = self.monitor.flight();
         (flight, flight.phase(self.clock.now().into(), self.monitor.vehicle()))
@@ -298,8 +298,9 @@ impl Judge {
         }
     }
 
-    /// The vehicle is heard, perhaps after a silence that the recording does not tell itself. (A log of ours is heard on the
-    /// autopilot's wire, whose silence is a check of its own, unless it was packed on a PC.)
+    /// The vehicle is received, perhaps after a silence that the recording does not report itself. A log of
+    /// ours comes from the autopilot's wire, whose silence is a check of its own, unless it was packed on a
+    /// PC.
     fn hear(&mut self, at: Instant) {
         let (armed, airborne) = (self.monitor.vehicle().armed(), self.monitor.flight().airborne());
         let before = self.last_heard.replace(Last { at, airborne });
@@ -325,7 +326,7 @@ impl Judge {
         let (to, cause) = (Some(at), Why::Lost);
         let gap = Gap { from: Some(from), to, cause, place: None, bytes: 0, words, own: None };
         if is_own {
-            // The logger wrote nothing: that is no silence of the vehicle.
+            // The logger paused; the vehicle was not silent.
             self.gap(&gap);
         } else {
             self.holes.silence(from, at);
@@ -334,7 +335,7 @@ impl Judge {
         }
     }
 
-    /// What a silence until then hides, which is this one of the gaps, is seen later.
+    /// Keeps a silence, listed as this gap, until its meaning is known.
     fn doubt(&mut self, gap: Option<usize>, to: Instant, airborne: bool, length: Span) {
         self.settle();
         let hides =
@@ -345,11 +346,11 @@ impl Judge {
         }
     }
 
-    /// Whether the vehicle flies on after a silence: if not, nobody knows how its flight ended, and that the recording does not
-    /// have it counts as damage.
+    /// Decides whether the vehicle flew on after a silence. If it did not, the end of its flight is missing
+    /// from the recording, which counts as damage.
     fn settle(&mut self) {
         let Some(Silence { airborne, gap, .. }) = self.silence.take() else { return };
-        // What was disarmed meanwhile, and may fall, is not seen to fly, nor is what calls itself on the ground.
+        // A vehicle that was disarmed meanwhile and may fall, or that reports on-ground, does not fly.
         let vehicle = self.monitor.vehicle();
         let flies = vehicle.armed()
             && vehicle.landed.get() != Some(&LandedState::OnGround)
@@ -381,7 +382,7 @@ impl Judge {
         }
     }
 
-    /// The estimator says what it doubts.
+    /// The estimator reports the sensors that it rejects.
     fn doubts(&mut self, source: Source, estimator: &Estimator) {
         if self.is_vehicle(source) && self.details.estimator(estimator) {
             self.tell(Cause::Gnss.name());
@@ -396,7 +397,7 @@ impl Judge {
         }
     }
 
-    /// What a check is of, while it is wrong: here, and as the board found it.
+    /// Names the parts of an open check, in the findings made here and in those of the board.
     fn tell(&mut self, check: &str) {
         self.details.tell(check, &mut self.here);
         self.details.tell(check, &mut self.board);
@@ -405,7 +406,7 @@ impl Judge {
     fn told(&mut self, told: &Told) {
         match told {
             Told::Parameter { name, value, .. } if !self.limits.given.contains(&name.as_str()) => {
-                // What is out of range, or no parameter of ours, changes nothing.
+                // A value out of range or an unknown parameter changes nothing.
                 let _ = self.monitor.params_mut().set(name, *value);
             }
             Told::Finding(finding) => {
@@ -423,7 +424,8 @@ impl Judge {
         }
     }
 
-    /// When what a box found began: it finds an impact once what hit something lies still, and the shock is in its recording.
+    /// Start of a finding of a box. The box finds an impact after the vehicle lies still; the shock is in its
+    /// recording.
     fn hit_at(&mut self, finding: &Finding) -> Instant {
         const LIES_STILL: Span = Span::from_secs(5);
         if !is_hit(finding) {
@@ -436,8 +438,9 @@ impl Judge {
         if is_its { Clock::recording(finding.at, steps, hit_at).min(finding.at) } else { finding.at }
     }
 
-    /// The autopilot's clock began again: another power-on in the same recording. Its own log begins anew with each, and raw frames have no
-    /// other clock that tells what passed between: what it flew before is over. (A box that is restarted in the air, or the clock of a ground station that is set, ends no flight.)
+    /// The autopilot's clock began again: another power-on in the same recording. The earlier flight is over,
+    /// because no other clock of an autopilot's log or of raw frames measures the time between. A restart of
+    /// the box in the air, or a clock set by the ground station, ends no flight.
     fn restart(&mut self, at: Instant) {
         self.restarts += 1;
         if self.restarted.len() < LISTED_MAX {
@@ -449,8 +452,8 @@ impl Judge {
         }
     }
 
-    /// A recording, or a power-on, ended where the vehicle was heard last, and its flight too. Another one begins here: what passed
-    /// between them is of neither, and the first values come in before it is judged.
+    /// A recording or a power-on ended when the vehicle was last received, and so did its flight. Another one
+    /// begins here. The time between belongs to neither, and the first values come before it is judged.
     fn leave_off(&mut self, at: Instant) {
         if self.first.is_some() {
             self.advance(self.last);
@@ -461,8 +464,8 @@ impl Judge {
         self.clock.skip_to(at + SETTLE);
     }
 
-    /// Another recording was joined on, of another day or another vehicle: it is judged by itself, from the time on at which all
-    /// was told anew. What was found and counted stays.
+    /// Another recording was joined, of another day or another vehicle. It is judged by itself, once all its
+    /// values have come. Earlier findings and counts stay.
     fn joint(&mut self, at: Instant) {
         self.leave_off(at);
         self.here.break_off(self.last, self.clock.behind());
@@ -480,8 +483,8 @@ impl Judge {
         self.monitor.begin_another_recording();
     }
 
-    /// The autopilot stops its motors in the moment in which it says why: that is no state which lasts for as long as the
-    /// monitor needs to see it.
+    /// The autopilot stops its motors at the moment of its text with the reason. That state is too short for
+    /// the monitor's debounce.
     fn emergency(&mut self, at: Instant, words: &str) {
         self.advance(at);
         if self.here.is_open(details::FAILSAFE) {
@@ -502,7 +505,7 @@ impl Judge {
             self.advance(from);
             let (airborne, length) = (self.monitor.flight().airborne(), to.since(from));
             if to.since(from) >= SETTLE {
-                // What came last before it counts: a landing, a disarming.
+                // Items up to the gap count: a landing, a disarming.
                 self.tick(from);
             }
             self.clock.pause(from, to);
@@ -557,7 +560,7 @@ impl Judge {
             .tick(steps.into(), &link, &recorder, &mut |finding| found.push(Finding::new(steps, finding)));
         for finding in found {
             if is_of(&finding.check, self.format, self.wire.is_some(), self.limits.past.is_some()) {
-                // What hit something is seen to lie still seconds later.
+                // A vehicle is seen to lie still seconds after an impact.
                 let hit_at = if is_hit(&finding) { of(self.monitor.flight().hit_at()) } else { finding.at };
                 let at = Clock::recording(now, steps, hit_at.min(finding.at));
                 self.here.take(&Finding { at, ..finding.clone() }, self.clock.behind());
@@ -594,7 +597,8 @@ impl Judge {
         self.coverage.note(now, steps, &self.monitor, &link, &recorder);
     }
 
-    /// It came down while nobody heard it: a board does not look for that, and so nobody but this one finds it.
+    /// The vehicle came down in a radio gap. The board does not look for that, so the finding is made only
+    /// here.
     fn came_down(&mut self, now: Instant, steps: Instant, level: Level, verdict: Verdict) {
         let recording = |at| Clock::recording(now, steps, Instant::of(at, steps));
         let (at, from) = (recording(verdict.at), verdict.from.map(recording));
@@ -610,13 +614,13 @@ impl Judge {
         }
     }
 
-    /// What is lost of the vehicle's frames, where that is known.
+    /// Frame loss of the vehicle's link, if known.
     fn link(&mut self, steps: Instant) -> LinkReading {
         let source = self.monitor.vehicle().source;
         self.wire.as_mut().map_or_else(LinkReading::default, |wire| wire.reading(steps, source))
     }
 
-    /// Where arming is guessed from the throttle, one that is closed in the air is no disarming.
+    /// If arming is guessed from the throttle, closing the throttle in the air does not disarm.
     fn distrust_disarming(&mut self) {
         if self.facts.get(&About::Arming).is_some_and(|words| !words.is_empty()) {
             self.here.drop_checks(|check| check == DISARMED);
@@ -624,7 +628,7 @@ impl Judge {
         }
     }
 
-    /// The worst values of what the monitor followed.
+    /// Takes the worst values from the monitor's exceedances.
     fn peaks(&mut self, at: Instant) {
         let steps = self.clock.monitor(at);
         for exceedance in self.monitor.exceedances().iter(steps.into()) {
@@ -655,7 +659,7 @@ impl Judge {
         })
     }
 
-    /// What else there is to say of the recording, as sentences.
+    /// Further remarks on the recording, as sentences.
     fn remarks(&mut self, by: JudgedBy, flights: &[Flight]) -> Vec<String> {
         let (of_cells, of_vehicles) =
             (self.cells.words(by, begin_in_air(flights)), self.details.remarks(self.system()));
@@ -692,7 +696,7 @@ impl Judge {
         let by =
             if self.checked_on_board && !self.limits.is_given() { JudgedBy::Board } else { JudgedBy::Here };
         if !self.checked_on_board && self.wire.is_none() {
-            // Nobody knows where it was heard: a packed recording may be that of a ground station.
+            // The place of reception is unknown: a packed recording may come from a ground station.
             self.here.drop_checks(|check| vocabulary(check).is_some_and(|words| words.scope == Scope::Wire));
         }
         if by == JudgedBy::Board {
@@ -709,7 +713,7 @@ impl Judge {
         problems.end(end, behind);
         let (mut findings, findings_count) =
             (std::mem::take(&mut problems.findings), problems.findings_count);
-        // An impact is told once what hit something lies still.
+        // An impact is reported after the vehicle lies still.
         findings.sort_by_key(|finding| finding.at);
         let worst_first = problems.worst_first();
         let (judged, not_judged) = self.coverage.lists(&Recording {
@@ -751,7 +755,7 @@ impl Judge {
     }
 }
 
-/// Where it was heard to be last, by its estimator or else by its first receiver.
+/// Last known position: by the estimator, or else by the first receiver.
 fn place_deg(vehicle: &Vehicle) -> Option<(f64, f64)> {
     let estimated = vehicle.global.get().and_then(|global| global.position);
     let received = || vehicle.gnss.first()?.get()?.position;
@@ -790,8 +794,8 @@ fn is_hit(finding: &Finding) -> bool {
     finding.check == IMPACT && matches!(finding.level, Level::Warning | Level::Critical)
 }
 
-/// Whether a check says anything in a recording of this format, judged here: one recording tells neither of earlier flights, unless
-/// these are known, nor of parts that wear.
+/// Whether a check applies to a recording of this format that is judged here. One recording shows neither
+/// earlier flights, unless these are known, nor worn parts.
 fn is_of(check: &str, format: Format, on_the_wire: bool, has_past: bool) -> bool {
     let scope = vocabulary(check).map(|words| words.scope);
     !matches!(scope, Some(Scope::Recorder))

@@ -1,4 +1,4 @@
-//! What came of a recording that was judged.
+//! The judgement of a recording.
 
 use std::collections::BTreeMap;
 
@@ -26,7 +26,7 @@ pub enum JudgedBy {
     Here,
 }
 
-/// Where a recording has nothing of the vehicle, from and to: up to [`LISTED_MAX`].
+/// Times without data of the vehicle, from and to: up to [`LISTED_MAX`].
 #[derive(Clone, Debug, Default)]
 pub struct Holes {
     pauses: Vec<(Instant, Instant)>,
@@ -34,7 +34,7 @@ pub struct Holes {
 }
 
 impl Holes {
-    /// The recording says so: time stands still over it.
+    /// The recording reports the hole: time stops over it.
     pub(super) fn pause(&mut self, from: Instant, to: Instant) {
         if self.pauses.len() < LISTED_MAX {
             self.pauses.push((from, to));
@@ -48,7 +48,8 @@ impl Holes {
         }
     }
 
-    /// Whether it has nothing just there: a gap that is none of these is a place, or a count over much of it.
+    /// Whether this span is exactly one of the holes. A gap that is none of them is a place, or a count over
+    /// much of the recording.
     pub fn is_one(&self, span: &(Instant, Instant)) -> bool {
         self.pauses.contains(span) || self.silences.contains(span)
     }
@@ -60,12 +61,12 @@ impl Holes {
     }
 }
 
-/// What came of a recording.
+/// The judgement of a recording.
 #[derive(Clone, Debug)]
 pub struct Judged {
     /// Who judged.
     pub by: JudgedBy,
-    /// The monitor as it was at the end: the vehicle, its usage, what it exceeded.
+    /// The monitor at the end: the vehicle, its usage, its exceedances.
     pub monitor: Box<Monitor>,
     /// Facts besides, the last of each kind.
     pub facts: BTreeMap<About, String>,
@@ -83,27 +84,27 @@ pub struct Judged {
     pub findings: Vec<Finding>,
     /// How many there are.
     pub findings_count: u64,
-    /// What was wrong, worst first.
+    /// The problems, worst first.
     pub problems: Vec<Problem>,
     /// Checks that had something to judge.
     pub judged: Vec<&'static str>,
     /// Checks that had not, with the reason. Checks that are made for another autopilot are in neither list.
     pub not_judged: Vec<(&'static str, String)>,
-    /// What else the monitor has not judged, as sentences.
+    /// Further limits of the judgement, as sentences.
     pub remarks: Vec<String>,
-    /// Since when in the air nothing told how many cells its battery has, so that no voltage raised an alarm.
+    /// Start of the time in the air with an unknown cell count, so that no voltage raised an alarm.
     pub cells_unknown: Option<Instant>,
-    /// What is missing, in order, up to [`super::problem::LISTED_MAX`].
+    /// The gaps, in order, up to [`super::problem::LISTED_MAX`].
     pub gaps: Vec<Gap>,
-    /// Where it has nothing from here to there.
+    /// The times without data.
     pub holes: Holes,
     /// How many gaps are damage.
     pub damages: u64,
-    /// How many gaps are what the recorder lost while it recorded.
+    /// Number of gaps that the recorder lost while it recorded.
     pub losses: u64,
     /// How often the recording's clock began again.
     pub restarts: u64,
-    /// It has no times, from its beginning on: nothing was judged.
+    /// The recording has no times from its beginning, so nothing was judged.
     pub is_timeless: bool,
 }
 
@@ -113,7 +114,7 @@ impl Judged {
         self.monitor.vehicle()
     }
 
-    /// Whether the vehicle was in the air when it was heard first.
+    /// Whether the vehicle was first received in the air.
     pub fn begins_in_air(&self) -> bool {
         begin_in_air(&self.flights)
     }
@@ -128,7 +129,7 @@ impl Judged {
         self.flights.iter().fold(Span::ZERO, |sum, flight| sum + flight.air)
     }
 
-    /// Why nothing is known of the vehicle, as words in its place; `None` where an autopilot was heard.
+    /// Why the vehicle is unknown, as words in its place; `None` if an autopilot was received.
     pub fn unheard(&self) -> Option<String> {
         match (self.vehicle().source, self.vehicle().heartbeat.get()) {
             (None, _) => Some("none was heard".to_owned()),
@@ -150,13 +151,13 @@ impl Judged {
         JudgedChecks { judged, of_box, all: judged + self.not_judged.len() }
     }
 
-    /// Whether so few had that nothing found is no good news.
+    /// Whether too few checks had data for a clean result to mean anything.
     pub fn is_little(&self) -> bool {
         self.checks().is_little()
     }
 
-    /// The verdict in a word, for scripts and tables: the worst level; what says that there was too little, or nothing, to
-    /// judge is not `ok`.
+    /// The verdict in a word, for scripts and tables: the worst level. With too little to judge it is not
+    /// `ok`.
     pub fn verdict(&self) -> &'static str {
         match self.worst() {
             None => "unknown",
@@ -165,7 +166,7 @@ impl Judged {
         }
     }
 
-    /// The worst level that was found; `None` where nothing could be judged.
+    /// The worst level found; `None` if nothing could be judged.
     pub fn worst(&self) -> Option<Level> {
         match self.problems.first() {
             Some(problem) => Some(problem.level),

@@ -1,17 +1,17 @@
-//! What came down while nobody heard it: forensics of a radio gap, and of a vehicle that falls when it is heard first.
+//! Crashes in a radio gap, and vehicles that fall when first received: forensics after the flight.
 //!
-//! Nobody who flies can act on it, so the box does not judge it. A vehicle was heard in the air, was silent for [`SILENT`], and is
-//! heard again. Within [`SHOWS`] after that, one of these for [`SIGN_LASTS`] says that it crashed meanwhile. Vehicles on wings are
-//! not judged.
+//! A pilot cannot act on them, so the box does not judge them. The vehicle was received in the air, was
+//! silent for [`SILENT`], and is received again. Within [`SHOWS`] after that, one of these signs for
+//! [`SIGN_LASTS`] shows a crash. Fixed-wing vehicles are not judged.
 //!
 //! | sign | found as |
 //! |---|---|
-//! | it lies over, and did not have the time to land and be laid down | `overturned` |
+//! | on its side, without the time to land and be laid down | `overturned` |
 //! | more than [`CAME_DOWN_M`] lower and slow, with full throttle near the ground or on its side | `impact` |
 //! | as low and slow, landed or disarmed earlier than any landing takes | `impact` |
 //!
-//! A vehicle that is heard first, disarmed, and sinks faster than `MIS_SINK` by its speed and by the air pressure was disarmed in the
-//! air.
+//! A vehicle may be disarmed when first received. If it then sinks faster than `MIS_SINK` by its speed and by
+//! the air pressure, it was disarmed in the air.
 
 use std::collections::VecDeque;
 
@@ -28,15 +28,16 @@ use hums_core::vehicle::{LANDED_STATE_AGE, Vehicle};
 use super::problem::IMPACT;
 use crate::source::told::Finding;
 
-/// Nothing heard for so long hides a fall.
+/// The shortest silence that can hide a fall.
 const SILENT: Span = Span::from_secs(5);
-/// So long after the vehicle is heard again its lie is seen; one that is disarmed and restarted tells its forces later.
+/// Attitude is known within this time after the vehicle is received again. A disarmed and restarted vehicle
+/// reports its forces later.
 const SHOWS: Span = Span::from_millis(2_400);
 const STARTS: Span = Span::from_secs(20);
 /// Values from before the silence have gone by then.
 const SETTLED: Span = Span::from_secs(1);
 const SIGN_LASTS: Span = Span::from_millis(500);
-/// What flew is lower by this, m.
+/// Minimum loss of height, m.
 const CAME_DOWN_M: f32 = 3.0;
 /// No higher than the place of take-off, m above home.
 const NEAR_GROUND_M: f32 = 2.0;
@@ -46,19 +47,19 @@ const STILL_RADPS: f32 = 0.3;
 /// Faster than this a multicopter leans, and does not lie, m/s.
 const LEANS_MPS: f32 = 12.0;
 const TILTED_RAD: f32 = 0.785;
-/// Carried from above by this, g, a multicopter lies on its back.
+/// Gravity on the underside beyond this, g, means that a multicopter lies on its back.
 const ON_BACK_G: f32 = 0.5;
 const IDLE_THROTTLE: f32 = 0.1;
 const FULL_THROTTLE: f32 = 0.9;
-/// Older values decide nothing.
+/// Older values are not used.
 const FRESH: Span = Span::from_secs(2);
-/// A receiver that stands keeps its height within this, m.
+/// A receiver at rest keeps its height within this, m.
 const STANDS_M: f32 = 3.0;
-/// What falls sinks faster, m/s.
+/// A falling vehicle sinks faster than this, m/s.
 const FALLING_MPS: f32 = 2.5;
 /// Of sea level: 35 % too much at 4,000 m, so a fall there must be deeper.
 const HPA_PER_METRE: f32 = 0.12;
-/// A vehicle that is heard first is judged for so long.
+/// A vehicle is judged for this long after it is first received.
 const FIRST: Span = Span::from_secs(10);
 /// Sinks are looked back on for so long.
 const WINDOW: Span = Span::from_millis(900);
@@ -68,11 +69,11 @@ const WINDOW: Span = Span::from_millis(900);
 pub(super) struct Verdict {
     /// The check that finds it.
     pub check: &'static str,
-    /// In its unit; `None` where nobody felt it.
+    /// The value in its unit; `None` if it was not measured.
     value: Option<f32>,
-    /// When it is found: an impact when the vehicle is heard again.
+    /// Time of the finding; for an impact the time at which the vehicle is received again.
     pub at: Instant,
-    /// When it was heard last before.
+    /// Last time the vehicle was received before it.
     pub from: Option<Instant>,
 }
 
@@ -95,14 +96,15 @@ impl Verdict {
     }
 }
 
-/// The vehicle was not heard, in the air.
+/// A silence of the vehicle in the air.
 #[derive(Clone, Copy, Debug)]
 struct Silence {
-    /// When it was heard last; what a recording lost is taken off, for no time passes over that.
+    /// Last time the vehicle was received, less the losses of the recording, because the monitor's time stops
+    /// over them.
     from: Instant,
     last_heard_at: Instant,
     again_at: Option<Instant>,
-    /// When its forces and its place are heard again, where it tells them.
+    /// Time at which forces and position are received again, if the vehicle reports them.
     state_at: Option<Instant>,
     /// It did something else than a wreck then, last.
     no_sign_at: Instant,
@@ -111,8 +113,8 @@ struct Silence {
 }
 
 impl Silence {
-    /// The shortest time for a landing by itself, s: to the fastest descent that can be set, the last metres no faster than legs
-    /// take, and the autopilot sees it for a second before it disarms.
+    /// The shortest time for a regular landing, s. The vehicle descends at the fastest rate that can be set,
+    /// and slower in the last metres. The autopilot then waits a second before it disarms.
     fn least_s(&self, lost_m: f32, limit_mps: f32, armed: bool) -> f32 {
         const SEES_S: f32 = 1.0;
         const LAST_M: f32 = 5.0;
@@ -131,12 +133,12 @@ impl Silence {
 pub(super) struct LinkLoss {
     heard_at: Instant,
     armed: bool,
-    /// It was level while it was armed: it is no tail-sitter.
+    /// The vehicle was level while armed, so it is not a tail-sitter.
     stood: bool,
     first_at: Option<Instant>,
-    /// It has flown since it was heard first, or was heard for [`FIRST`].
+    /// The vehicle has flown since it was first received, or was received for [`FIRST`].
     is_known: bool,
-    /// What was found stands until it is armed again.
+    /// A finding stays until the vehicle is armed again.
     found: Option<Verdict>,
     silence: Option<Silence>,
     /// Sinks, and pressures in hPa, of the last seconds.
@@ -146,7 +148,7 @@ pub(super) struct LinkLoss {
     changed_at: Option<Instant>,
     rate: f32,
     from_above_g: f32,
-    /// Since when the receiver stands, at this altitude.
+    /// Start of the receiver's rest, and its altitude.
     stands_since: Option<Instant>,
     stands_at_m: f32,
 }
@@ -155,7 +157,7 @@ impl LinkLoss {
     /// Takes an observation that the monitor took.
     pub(super) fn observe(&mut self, at: Instant, observation: &Observation, vehicle: &Vehicle) {
         match observation {
-            // A radio, a battery or an engine may be heard while the autopilot is not.
+            // A radio, a battery or an engine may be received without the autopilot.
             Observation::TelemetryRadio(_)
             | Observation::Battery(_)
             | Observation::Escs(_)
@@ -201,7 +203,7 @@ impl LinkLoss {
         push(&mut self.pressures, FRESH, at, hpa);
     }
 
-    /// The recording lost what was said for so long, and no time of the monitor passed meanwhile.
+    /// The recording lost this span, and the monitor's time stopped over it.
     pub(super) fn lose(&mut self, span: Span, monitor: &Monitor, in_mishap: bool) {
         if span >= SILENT && self.silence.is_none() {
             self.begin(self.heard_at - span, monitor, in_mishap);
@@ -311,7 +313,7 @@ impl LinkLoss {
         None
     }
 
-    /// What only a wreck does, and its value.
+    /// A sign of a crash, and its value.
     fn sign(
         &self,
         now: Instant,
@@ -322,7 +324,7 @@ impl LinkLoss {
         if vehicle.hovers(now) != Some(true) {
             return None;
         }
-        // Above the sea: a disarmed vehicle may set home anew.
+        // Above sea level: a disarmed vehicle may set a new home.
         let altitude_m = vehicle.global.within(now, FRESH).map(|global| global.altitude.0);
         let lost_m = silence.altitude_m.zip(altitude_m).map_or(0.0, |(before_m, now_m)| before_m - now_m);
         let least_s = silence.least_s(lost_m.max(0.0), params.get(Param::MisSink), self.armed);
@@ -348,7 +350,8 @@ impl LinkLoss {
         (slow && lost_m > CAME_DOWN_M && (in_vain || fell)).then_some((IMPACT, None))
     }
 
-    /// Whether it lies on its side, by an attitude that the sensors do not contradict, or on its back.
+    /// Whether the vehicle lies on its side, by an attitude that the sensors do not contradict, or on its
+    /// back.
     fn lies(&self, now: Instant, vehicle: &Vehicle) -> bool {
         let tilts = |attitude: &Attitude| attitude.roll.0.abs().max(attitude.pitch.0.abs()) > TILTED_RAD;
         let is_tilted =
@@ -391,7 +394,7 @@ impl LinkLoss {
     }
 }
 
-/// Keeps a value, and those that are no older than this.
+/// Appends a value and drops values older than `span`.
 fn push(values: &mut VecDeque<(Instant, f32)>, span: Span, at: Instant, value: f32) {
     values.push_back((at, value));
     while values.front().is_some_and(|(then, _)| at.since(*then) > span) {

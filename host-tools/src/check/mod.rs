@@ -1,7 +1,8 @@
-//! `hums check`: what is wrong with a flight, from any log.
+//! `hums check`: the problems of a flight, from any log.
 //!
-//! [`judge`] runs the monitor of the board over the stream of a recording; [`problem`] puts its findings together, [`flights`]
-//! its flights; [`judged`](mod@judged) is what came of it, which [`text`] and [`json`] say.
+//! [`judge`] runs the monitor of the board over the stream of a recording. [`problem`] puts its findings
+//! together, [`flights`] its flights. [`judged`](mod@judged) is the judgement, which [`text`] and [`json`]
+//! print.
 
 pub mod causes;
 mod cells;
@@ -53,7 +54,7 @@ pub fn run(args: &cli::Check) -> Result<Outcome> {
     let many = found.places.len() > 1 && wanted.is_none();
     let (bar, mut table) = (progress::logs(found.places.len()), Table::default());
     let mut followed = Followed::new(sessions_of(&found.places));
-    // What lies beside the one that is wanted tells how it ends.
+    // A log next to the wanted one shows how it ends.
     let is_beside = |of: &str| wanted.as_ref().is_some_and(|wanted| wanted != of);
     let mut done = |Told { name, of, checked }: Told| match checked {
         _ if is_beside(&of) => Ok(()),
@@ -114,13 +115,14 @@ pub fn run(args: &cli::Check) -> Result<Outcome> {
     }
 }
 
-/// The logs that are meant. With `--json` an input that is no log at all has an object too, and the others are judged: so many are none.
+/// The given logs, and the number of inputs without a log. With `--json` such an input has an object too, and
+/// the others are judged.
 fn logs(args: &cli::Check) -> Result<(Found, usize)> {
     let error = match find(&args.inputs, args.salvage) {
         Ok(found) => return Ok((found, 0)),
         Err(error) => error,
     };
-    // What is printed of a wrong command line might stand in an input.
+    // The error object of a wrong command line would look like an object of an input.
     if !args.json || error.is::<Usage>() {
         return Err(error);
     }

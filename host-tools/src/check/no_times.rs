@@ -1,4 +1,4 @@
-//! What is left of a judgement where the recording's clock did not run from some place on: what was there before.
+//! The part of a judgement that remains if the recording's clock stopped: everything before that place.
 
 use hums_core::clock::{Instant, Span};
 
@@ -6,12 +6,12 @@ use super::clock::SETTLE;
 use super::judged::Judged;
 use crate::source::item::Cause;
 
-/// Why a check was not judged, where the recording has no times at all.
+/// Reason for an unjudged check if the recording has no times at all.
 const WHY: &str = "the recording has no times";
 
 impl Judged {
-    /// Without what was seen from this place on, where there are no times up to the next recording that was joined on, and without what was
-    /// seen of a vehicle of which nothing is known.
+    /// Removes the results from a place without times up to the next joint. Also removes the results of an
+    /// unknown vehicle.
     pub(super) fn what_is_known(
         self,
         no_times: Option<Instant>,
@@ -23,7 +23,7 @@ impl Judged {
         self.forget(from, next, restarts).forget_unheard()
     }
 
-    /// Leaves out all that was seen between these two times, which are none, and what says how long it lasted.
+    /// Removes all results between these two times, which are invalid, and everything with a duration.
     fn forget(mut self, from: Instant, to: Option<Instant>, restarts: &[Instant]) -> Self {
         let is_out = |at: Instant| at >= from && to.is_none_or(|to| at < to);
         self.restarts -= restarts.iter().filter(|at| is_out(**at)).count() as u64;
@@ -38,7 +38,7 @@ impl Judged {
             flight.air = flight.air.min(from.since(flight.from));
         }
         self.ends_in_air = self.ends_in_air.filter(|end| !is_out(end.at));
-        // What the silence of such a clock hides is not known either.
+        // A silence by such a clock has no known length.
         let (mut damages, mut losses) = (0, 0);
         self.gaps.retain(|gap| {
             let of_time = gap.place.is_none() && matches!(gap.cause, Cause::Lost | Cause::Silent);
@@ -53,7 +53,7 @@ impl Judged {
         {
             self.span = Some((first, last.min(from.max(first))));
             self.armed = self.armed.min(from.since(first));
-            // What comes in its first second is not judged.
+            // The first second is not judged.
             if from <= first + SETTLE {
                 self.is_timeless = true;
                 (self.armed, self.flights) = (Span::ZERO, Vec::new());
@@ -65,7 +65,7 @@ impl Judged {
         self
     }
 
-    /// Leaves out what was seen of a vehicle of which nothing is known.
+    /// Removes the results of an unknown vehicle.
     fn forget_unheard(mut self) -> Self {
         if self.worst().is_none() {
             (self.findings, self.findings_count) = (Vec::new(), 0);

@@ -1,7 +1,8 @@
-//! What is in a recording, with what a monitor says of it: for `info`, `report` and what else shows findings.
+//! The contents of a recording with the monitor's findings: for `info`, `report` and other views of findings.
 //!
-//! A log of ours tells what the monitor on board found. Where no monitor ran (a packed recording, the log of an autopilot
-//! or a ground station) the one here checks it when it is read: "not checked" is not "good".
+//! A log of ours has the findings of the monitor on board. Recordings without a monitor are packed recordings
+//! and the logs of autopilots and ground stations. They are checked here when they are read: "not checked" is
+//! not "good".
 
 use std::collections::BTreeSet;
 
@@ -26,18 +27,18 @@ use crate::summary::{Contents, ExceedanceLine, FindingLine, Overview};
 
 /// A log with fewer kinds of messages may have too little in it to be judged, though a recorder that checks wrote it.
 const FEW_KINDS: usize = 16;
-/// That a vehicle is in the air is seen so much later than it is heard first, s.
+/// Delay between first reception and a known flight state, s.
 const SEEN_LATE_S: f64 = 3.0;
 /// Items between two looks at how far the reading is.
 const LOOK_EVERY: u32 = 4_096;
 
 /// A recording that was read through and judged.
 pub(super) struct Read {
-    /// What it is.
+    /// Format of the recording.
     pub(super) format: Format,
-    /// What came of it.
+    /// The judgement.
     pub(super) judged: Judged,
-    /// What was read.
+    /// Summary of the data read.
     pub(super) summary: Summary,
     /// Bytes of the file that were read.
     taken: u64,
@@ -78,11 +79,11 @@ pub(super) fn judge_twice(
     Ok((read, other.map(Judge::end)))
 }
 
-/// Reads a recording through, once; where nobody has checked it, the monitor here does.
+/// Reads a recording once. The monitor here checks it if no monitor did.
 pub fn overview(place: &Place) -> Result<Overview> {
     let limits = Limits::default();
     if let Some(log) = place.own() {
-        // Where a log begins with the record of a start a monitor ran, and nobody needs to judge it here.
+        // If a log begins with the record of a start, a monitor ran, and the log is not judged here.
         let has_start = at_beginning(log, |_| Some(())).is_some();
         let mut here = (!has_start).then(|| Judge::new(&limits, Format::Hums));
         let mut overview = match &mut here {
@@ -165,15 +166,15 @@ pub(super) fn is_heard(place: &Place, heard: bool) -> Result<()> {
     Err(usage(format!("--system {wanted}: no autopilot of this system is in {}{there}", place.title)))
 }
 
-/// How much was judged, and which counters counted what nobody told.
+/// Adds the number of judged checks. Removes counters without a source.
 fn look(contents: &mut Contents, judged: &Judged) {
     contents.judged = Some(judged.checks());
     let vehicle = judged.vehicle();
     contents.usage.retain(|name, _| is_told(name, vehicle));
 }
 
-/// How a log ends whose landing is not in it, or that breaks off while the vehicle is armed. What its box had counted is of the time until it stored that: it
-/// is counted here to the end.
+/// Marks a log that ends in the air or while the vehicle is armed. The box counted only until its last store;
+/// the counters go on to the end here.
 fn go_on(overview: &mut Overview, judged: &Judged) {
     let is_whole = overview.ending.summary.first_number == Some(0);
     let is_stored = overview.counted_until().is_some();
@@ -186,21 +187,21 @@ fn go_on(overview: &mut Overview, judged: &Judged) {
     for (name, value) in counters(judged) {
         let is_least = name == UsageCounter::VoltageMin.name();
         let stored = contents.usage.entry(name).or_insert(value);
-        // What the box counted while it lost frames is not in the log.
+        // The box also counted while it lost frames, which are not in the log.
         *stored = if is_least { stored.min(value) } else { stored.max(value) };
     }
 }
 
-/// What the monitor here counted.
+/// The counters of the monitor here.
 fn counters(judged: &Judged) -> Vec<(String, f64)> {
-    // What was in the air when it was heard first was taken to stand until that was seen.
+    // A vehicle that was first received in the air counted as on the ground until its flight was seen.
     let begins_in_air = judged.begins_in_air();
     let monitor = &judged.monitor;
     let mut counters = Vec::new();
     monitor.for_each_counter(|number, value| {
         let name = counter_name(number);
         let seen_late = begins_in_air && name == UsageCounter::Ground.name() && value < SEEN_LATE_S;
-        // One time in the air, however it is told.
+        // One value for the time in the air everywhere.
         let value =
             if name == UsageCounter::Flight.name() { judged.flown().as_micros() as f64 / 1e6 } else { value };
         if is_told(&name, monitor.vehicle()) && !seen_late {
@@ -210,7 +211,7 @@ fn counters(judged: &Judged) -> Vec<(String, f64)> {
     counters
 }
 
-/// What the monitor here makes of a recording.
+/// Adds the judgement of the monitor here.
 fn fill(contents: &mut Contents, judged: Judged) {
     contents.unheard = judged.unheard();
     contents.judged = Some(judged.checks());
@@ -224,7 +225,7 @@ fn fill(contents: &mut Contents, judged: Judged) {
     contents.vehicle = vehicle(&monitor);
     contents.checked_here = contents.vehicle.is_some() && is_judged;
     if !contents.checked_here {
-        // No autopilot was heard, or there are no times: counters that nobody counted would look as if somebody had.
+        // Without an autopilot or times, the counters would be zeros that look like measurements.
         return;
     }
     contents.findings_count = findings_count;
@@ -242,7 +243,7 @@ fn fill(contents: &mut Contents, judged: Judged) {
     }
 }
 
-/// The vehicle that a monitor heard; `None` where it heard none.
+/// The vehicle that a monitor received; `None` without one.
 pub(super) fn vehicle(monitor: &Monitor) -> Option<Vehicle> {
     let vehicle = monitor.vehicle();
     let (source, heartbeat) = vehicle.source.zip(vehicle.heartbeat.get())?;

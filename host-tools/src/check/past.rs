@@ -1,4 +1,4 @@
-//! `--past`: what is normal for a vehicle, from recordings of its earlier flights.
+//! `--past`: a vehicle's baselines, from recordings of its earlier flights.
 
 use std::path::PathBuf;
 
@@ -14,18 +14,18 @@ use crate::outcome::usage;
 use crate::source::find::find;
 use crate::source::recording::{Format, Place};
 
-/// What `hums check` judges by: limits, and what earlier flights of one vehicle teach.
+/// The basis of `hums check`: limits, and the earlier flights of one vehicle.
 pub(super) struct Past {
     limits: Limits,
-    /// With what is normal for that vehicle, where there are earlier flights.
+    /// The limits with the vehicle's baselines, if there are earlier flights.
     taught: Option<(Limits, Option<Vehicle>)>,
 }
 
 impl Past {
-    /// These limits, with what recordings of earlier flights teach of the vehicle.
+    /// These limits, with the baselines from recordings of earlier flights.
     ///
     /// # Errors
-    /// A usage error where the recordings are of different vehicles.
+    /// A usage error if the recordings are of different vehicles.
     pub(super) fn of(limits: Limits, past: &[PathBuf], system: Option<u8>) -> Result<Self> {
         if past.is_empty() {
             return Ok(Self { limits, taught: None });
@@ -42,8 +42,8 @@ impl Past {
         Ok(Self { limits, taught })
     }
 
-    /// Judges a recording; `shows` how far it is. What other vehicles flew says nothing of its own: then it is judged without that,
-    /// which is said.
+    /// Judges a recording; `shows` turns progress on. If it is of another vehicle, it is judged without the
+    /// baselines, and a message says so.
     pub(super) fn judge(&self, place: &Place, heard: Heard, shows: bool) -> Result<Read> {
         let Some((taught, past)) = &self.taught else {
             return overview::judge(place, &self.limits, heard, shows);
@@ -64,10 +64,10 @@ impl Past {
     }
 }
 
-/// What is normal after the flights of these recordings, in their order.
+/// The baselines after the flights of these recordings, in their order.
 ///
 /// # Errors
-/// A usage error where they are of different vehicles.
+/// A usage error if they are of different vehicles.
 pub fn learn(limits: &Limits, places: &[Place]) -> Result<Baselines> {
     learnt(limits, places).map(|(baselines, _)| baselines)
 }
@@ -103,8 +103,9 @@ fn vehicle(read: &Read) -> Option<Vehicle> {
     Some(Vehicle { system, ..vehicle })
 }
 
-/// Whether two recordings are certainly of two vehicles: by the autopilot's unique id, where both tell it, otherwise by its system id; and by
-/// what kind of vehicle it is, for an autopilot may have been moved to another airframe.
+/// Whether two recordings are certainly of two vehicles. They differ in the autopilot's unique id if both
+/// report it, otherwise in the system id. They also differ in the kind of vehicle, because an autopilot may
+/// have been moved to another airframe.
 fn are_two(one: &Vehicle, other: &Vehicle) -> bool {
     let airframe = |of: &Vehicle| Airframe { system: of.system, uid: of.uid };
     let differ = |one: u8, other: u8| one != 0 && other != 0 && one != other;
@@ -113,7 +114,7 @@ fn are_two(one: &Vehicle, other: &Vehicle) -> bool {
         || differ(one.autopilot, other.autopilot)
 }
 
-/// What it is, as a part of a sentence.
+/// The vehicle as a part of a sentence.
 fn words(of: &Vehicle) -> String {
     let system = if of.system == 0 { String::new() } else { format!("system {}, ", of.system) };
     let id = if of.uid == 0 { String::new() } else { format!(", uid {:016x}", of.uid) };

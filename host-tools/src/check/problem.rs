@@ -1,4 +1,4 @@
-//! What was wrong: the changes of level of one check and one part put together.
+//! Problems: the level changes of one check and one part put together.
 
 use std::collections::BTreeMap;
 
@@ -10,17 +10,17 @@ use crate::source::told::Finding;
 use crate::summary::FindingLine;
 use crate::utc::moment;
 
-/// What is kept one by one of findings, flights, gaps; the rest is counted.
+/// Maximum number of listed findings, flights and gaps; further ones are only counted.
 pub const LISTED_MAX: usize = 10_000;
-/// Parts that are followed at most: there are 140 of them, and a log may name what it likes.
+/// Maximum number of parts followed: there are 140 of them, and a log may name any.
 const FOLLOWED_MAX: usize = 1_000;
 
 /// The check of an impact.
 pub(super) const IMPACT: &str = "impact";
-/// A box finds an impact once what hit something has lain still for so long.
+/// A box finds an impact after the vehicle has been still for this time.
 const LIES_STILL: Span = Span::from_secs(1);
 
-/// Names of what a check was of: there are 32 sensors.
+/// Maximum number of names of parts: there are 32 sensors.
 const DETAILS_MAX: usize = 32;
 
 /// One check of one part that was at a warning or worse.
@@ -48,16 +48,16 @@ pub struct Problem {
     pub limit: f32,
     /// The unit of both.
     pub unit: String,
-    /// What it was of, where the check is of several: failsafes, sensors. By their names.
+    /// Names of the parts, if the check covers several: failsafes, sensors.
     pub details: Vec<String>,
-    /// A mishap that nobody heard: when the vehicle was heard last before it.
+    /// For a mishap in a radio gap, the last time the vehicle was received before it.
     pub unheard_from: Option<Instant>,
     /// The check that explains it: one whose alarm was as bad when it was found, each time that it was wrong.
     pub because: Option<String>,
 }
 
 impl Problem {
-    /// What comes first of what is as bad: a mishap with what led to it, behind all others parts that are due, and otherwise what came first.
+    /// Order within a level: a mishap and its precursors first, parts that are due last, otherwise by time.
     pub(super) fn order(&self, mishaps: &[Instant]) -> (bool, bool, Instant) {
         (!self.is_mishap() && !self.leads_to(mishaps), part::is_due(&self.check), self.at)
     }
@@ -67,23 +67,23 @@ impl Problem {
         self.subsystem == Subsystem::Mishap && self.level == Level::Critical
     }
 
-    /// Whether it is of what drives and holds the vehicle, and began shortly before one of the mishaps.
+    /// Whether it concerns propulsion or attitude and began shortly before one of the mishaps.
     pub(super) fn leads_to(&self, mishaps: &[Instant]) -> bool {
         let is_of_flight = matches!(self.subsystem, Subsystem::Propulsion | Subsystem::Attitude);
         is_of_flight && mishaps.iter().any(|at| self.at <= *at && at.since(self.at) <= LEADS)
     }
 }
 
-/// What leads to a mishap begins so shortly before it.
+/// A precursor begins at most this long before a mishap.
 const LEADS: Span = Span::from_secs(10);
 
-/// When each mishap of some problems began: where nobody heard it, when the vehicle was heard last.
+/// Start of each mishap; for one in a radio gap the last time the vehicle was received.
 pub(super) fn mishaps(problems: &[Problem]) -> Vec<Instant> {
     let mishaps = problems.iter().filter(|problem| problem.is_mishap());
     mishaps.map(|problem| problem.unheard_from.unwrap_or(problem.at)).collect()
 }
 
-/// How bad a level is as a problem; stale is not known, and so is none.
+/// Rank of a level as a problem; stale means unknown and does not count.
 const fn rank(level: Level) -> u8 {
     match level {
         Level::Critical => 2,
@@ -97,7 +97,7 @@ pub(super) fn side(check: &str) -> Side {
     checks().find(|known| known.name == check).map_or(Side::Above, |check| check.limits.side)
 }
 
-/// The worse of two values; what is no number is none.
+/// The worse of two values; a `NaN` is ignored.
 fn worse(known: f32, value: f32, check: &str) -> f32 {
     match side(check) {
         Side::Above => known.max(value),
@@ -105,7 +105,8 @@ fn worse(known: f32, value: f32, check: &str) -> f32 {
     }
 }
 
-/// What nobody heard hit the ground has no value: a monitor tells the least one that is beyond the limit.
+/// A value, or `NaN` for an impact in a radio gap. The monitor reports such an impact with the least value
+/// beyond the limit.
 fn measured(check: &str, value: f32, limit: f32) -> f32 {
     let is_least = check == IMPACT && value.to_bits() == limit.next_up().to_bits();
     if is_least { f32::NAN } else { value }
@@ -135,7 +136,7 @@ struct Followed {
     since: Option<Since>,
     /// Its level now.
     level: Level,
-    /// Nothing explains it this time; nothing did at some time.
+    /// Now without a cause; once without a cause.
     unexplained: bool,
     alone: bool,
 }
@@ -151,7 +152,7 @@ impl Followed {
 }
 
 impl Problems {
-    /// Of what a box found.
+    /// Problems found by a box.
     pub(super) fn of_box() -> Self {
         Self { of_box: true, ..Self::default() }
     }
@@ -211,7 +212,8 @@ impl Problems {
         }
     }
 
-    /// Looks for what explains what is wrong now: also what came a little later, since the consequence may be seen first.
+    /// Looks for the cause of the open problems, also among later ones, since the consequence may be seen
+    /// first.
     fn explain(&mut self) {
         let open = || {
             self.open
@@ -269,7 +271,7 @@ impl Problems {
         self.open.get(&(check.to_owned(), 0)).and_then(|followed| followed.since.map(|(since, _)| since))
     }
 
-    /// What a check of several is of, while it is wrong.
+    /// Adds the name of a part to an open check.
     pub(super) fn detail(&mut self, check: &str, name: &str) {
         let known = self.open.get_mut(&(check.to_owned(), 0)).filter(|followed| followed.since.is_some());
         let Some(Followed { problem, .. }) = known else { return };
@@ -278,7 +280,7 @@ impl Problems {
         }
     }
 
-    /// A mishap of this check was not heard: it was between two times.
+    /// A mishap of this check was in a radio gap, between two times.
     pub(super) fn unheard(&mut self, check: &str, from: Instant, to: Instant) {
         self.detail(check, &format!("not heard, between {} and {}", moment(from), moment(to)));
         if let Some(Followed { problem, .. }) = self.open.get_mut(&(check.to_owned(), 0)) {
@@ -286,14 +288,14 @@ impl Problems {
         }
     }
 
-    /// Names the part that each check is of which tells that one is due.
+    /// Names the part of each check that reports a part as due.
     pub(super) fn name_parts(&mut self, due: impl Fn(Subsystem) -> Option<(String, Option<String>)>) {
         for Followed { problem, .. } in self.open.values_mut().filter(|of| part::is_due(&of.problem.check)) {
             problem.details.extend(due(problem.subsystem).map(|due| part::due_words(&due)));
         }
     }
 
-    /// Leaves some checks out, as if they had said nothing.
+    /// Removes some checks with all their findings.
     pub(super) fn drop_checks(&mut self, out: impl Fn(&str) -> bool) {
         let before = self.findings.len();
         self.findings.retain(|finding| !out(&finding.check));
@@ -301,12 +303,12 @@ impl Problems {
         self.open.retain(|(check, _), _| !out(check));
     }
 
-    /// What was wrong is so no more: nobody knows how it ended.
+    /// The open problems end; the real end is unknown.
     pub(super) fn break_off(&mut self, at: Instant, gaps: Span) {
         self.open.values_mut().for_each(|followed| followed.end(at, gaps));
     }
 
-    /// Nothing follows.
+    /// The recording ends.
     pub(super) fn end(&mut self, at: Instant, gaps: Span) {
         for followed in self.open.values_mut() {
             followed.problem.lasting |= followed.since.is_some();
@@ -314,7 +316,7 @@ impl Problems {
         }
     }
 
-    /// What was wrong, worst first, and of the same level by [`Problem::order`].
+    /// The problems, worst first, and within a level by [`Problem::order`].
     pub(super) fn worst_first(self) -> Vec<Problem> {
         let mut problems: Vec<_> = self
             .open
@@ -330,7 +332,7 @@ impl Problems {
     }
 }
 
-/// What was wrong by a log's findings, worst first; a box found them, or this program.
+/// The problems from a log's findings, worst first. The findings are by a box or by this program.
 pub fn problems(findings: &[FindingLine], of_box: bool) -> Vec<Problem> {
     let mut problems = if of_box { Problems::of_box() } else { Problems::default() };
     for finding in findings {
@@ -339,8 +341,8 @@ pub fn problems(findings: &[FindingLine], of_box: bool) -> Vec<Problem> {
     problems.worst_first()
 }
 
-/// When what a box found began: a check of which it found an alarm at this time, while others are `open` since theirs. In a mishap that goes
-/// on it finds an impact at once.
+/// Start of a problem that a box found at this time, while others are `open` since theirs. In an ongoing
+/// mishap it finds an impact at once.
 pub fn began<'a>(
     check: &str,
     found_at: Instant,

@@ -1,4 +1,4 @@
-//! What `hums check` prints for people: a screen for one log; a line for each of many, and a table of them all.
+//! Text output of `hums check`: a screen for one log; a line for each of many, and a table of them all.
 //!
 //! Writing to a `String` cannot fail; the results of `write!` are dropped on purpose in all of this.
 
@@ -30,7 +30,7 @@ const SHOWN_MAX: usize = 6;
 /// Reasons and places that are shown; `--json` has them all.
 const LINES_MAX: usize = 8;
 
-/// The word of the worst level, as it stands before a line.
+/// Name of the worst level, at the beginning of a line.
 const CRITICAL: &str = "CRITICAL";
 
 /// One log, as a screen.
@@ -62,7 +62,7 @@ pub fn line(checked: &Checked) -> String {
     let judged = &checked.judged;
     let level = match (judged.verdict(), state(checked)) {
         ("too_little", _) => "little",
-        // Nothing wrong in what is left of it is not all right.
+        // A damaged log without problems is not all right.
         ("ok", State::Damaged) => "damaged",
         ("ok", State::NotProved) => "unproved",
         (verdict, _) => verdict,
@@ -88,24 +88,24 @@ pub fn line(checked: &Checked) -> String {
         .to_owned()
 }
 
-/// What is wrong with the recording itself.
+/// Faults of the recording itself.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum State {
-    /// Nothing that is known.
+    /// No known fault.
     Whole,
-    /// An autopilot's log is cut in the middle of a message wherever its power goes before it closes the log: that is not
-    /// the same as damage inside of it.
+    /// The last message of an autopilot's log is incomplete. Each power cut before the log is closed leaves
+    /// that, so it differs from damage inside.
     Cut,
     Damaged,
     /// The recorder says itself, or it is seen, that it did not write all.
     Lossy,
-    /// All that came was written, and some of it is no frame: noise on the line, or words before the first frame.
+    /// All bytes were written, and some of them are noise on the line, or text before the first frame.
     NotFrames,
-    /// A log of ours without damage, of which nothing proves that it is whole.
+    /// A log of ours without damage and without proof that it is complete.
     NotProved,
-    /// A log of ours that lacks nothing, because sectors that a card had lost were made again from parity.
+    /// A complete log of ours, with lost sectors rebuilt from parity.
     MadeAgain,
-    /// A log of ours that lacks nothing but its parity.
+    /// A complete log of ours without its parity.
     Unprotected,
 }
 
@@ -141,7 +141,7 @@ fn state(checked: &Checked) -> State {
     }
 }
 
-/// What the verdict is not about: the end of its line.
+/// Limits of the verdict: the end of its line.
 fn but(checked: &Checked) -> String {
     let ends = if checked.judged.ends_in_air.is_some() { "; the log ends in the air" } else { "" };
     let what = match state(checked) {
@@ -164,7 +164,7 @@ fn but(checked: &Checked) -> String {
 #[derive(Debug, Default)]
 pub struct Table {
     levels: BTreeMap<&'static str, u64>,
-    /// Logs by what was found in them.
+    /// Logs by their findings.
     checks: BTreeMap<String, (u64, u64)>,
     logs: u64,
     damaged: u64,
@@ -279,7 +279,7 @@ pub(super) fn firmware(version: u32) -> Option<String> {
 
 fn when(checked: &Checked) -> String {
     let (judged, format) = (&checked.judged, checked.format);
-    // A log of ours goes on while nothing is heard of the vehicle.
+    // A log of ours goes on while the vehicle is not received.
     let of_log = checked.ending.as_ref().and_then(|ending| ending.summary.first.zip(ending.summary.last));
     let Some((first, last)) = judged.span.map(|span| of_log.unwrap_or(span)) else {
         return "nothing of a vehicle is in it".to_owned();
@@ -328,7 +328,7 @@ fn in_air(judged: &Judged) -> String {
     told.map_or(text.clone(), |told| format!("{text} ({told})"))
 }
 
-/// What of flights the log does not have, and how the last one ended otherwise.
+/// The unseen parts of flights, and any other end of the last one.
 fn not_seen(flights: &[Flight]) -> String {
     let last = flights.last();
     let ended = match last {
@@ -416,7 +416,7 @@ fn problems(text: &mut String, problems: &[Problem]) {
             let (at, level) = (moment(of_it.at), level_of(is_critical(effect)));
             let _ =
                 writeln!(text, "                      with it {at}  {level}: {}", word(&sentence(effect)));
-            // What a card that is out looks like besides has no meaning of its own.
+            // The side effects of a missing card have no meaning of their own.
             if place < SHOWN_MAX && first.subsystem != Subsystem::Recorder {
                 let _ = writeln!(text, "                              {}", meaning(&of_it.check));
                 if group.is_raised && is_critical(effect) {
@@ -437,7 +437,7 @@ const fn level_of(is_critical: bool) -> &'static str {
     if is_critical { CRITICAL } else { "warning" }
 }
 
-/// What to do, as a sentence.
+/// The recommended action, as a sentence.
 fn action(problem: &Problem) -> &'static str {
     vocabulary(&problem.check).map_or("", |words| words.action)
 }
@@ -452,7 +452,7 @@ fn worst_of<'a>(group: &[&'a Problem]) -> Option<&'a Problem> {
     group.iter().copied().reduce(|worst, one| if is_worse(one, worst) { one } else { worst })
 }
 
-/// What it was: the check, the parts, the worst value, its limit, how long.
+/// The problem: the check, the parts, the worst value, its limit, its duration.
 fn sentence(group: &[&Problem]) -> String {
     let Some(first) = worst_of(group) else { return String::new() };
     let part = vocabulary(&first.check).map_or("", |words| words.said.part);
@@ -476,7 +476,7 @@ fn sentence(group: &[&Problem]) -> String {
         Shown::State(state) => (state, None, None),
         Shown::Quantity(value, limit) => (None, value, limit),
     };
-    // Of what the autopilot says its words are there, and the level stands before them.
+    // An alert of the autopilot shows its texts, and the level is in front of them.
     if let Some(state) = state.filter(|_| first.details.is_empty() || !first.check.ends_with("_alert")) {
         let _ = write!(text, ": {state}");
     }
@@ -561,14 +561,14 @@ fn damage(text: &mut String, judged: &Judged) {
     }
 }
 
-/// What sorts the worst places first: damage before losses; what is counted over the whole recording (it has no bytes: frames with a wrong
-/// checksum, wrong times, a clock that does not run) before single places, and of these the longest.
+/// Order of places, worst first: damage before losses. Then counts over the whole recording, which have no
+/// bytes (wrong checksums, wrong times, a clock that stops). Then single places, the longest first.
 fn how_bad(gap: &Gap) -> (bool, bool, Reverse<u64>, Reverse<Span>) {
     let lasts = gap.from.zip(gap.to).map_or(Span::ZERO, |(from, to)| to.since(from));
     (!gap.cause.is_damage(), gap.bytes > 0, Reverse(gap.bytes), Reverse(lasts))
 }
 
-/// With as many digits as a limit has; what is damaged is shown as that.
+/// With as many digits as a limit has; a damaged value is shown as such.
 fn short(value: f32) -> String {
     if !is_possible(&value) {
         return format!("{value:.0e}");

@@ -13,7 +13,7 @@ use super::*;
 use crate::check::flights::Flight;
 use crate::source::item::hand_said;
 
-/// What only a monitor writes that checks.
+/// A record that only a monitor with checks writes.
 const CHECKED: Record<'_> = Record::Usage(Usage::new(Moment::Start, &[]));
 
 const AUTOPILOT: Source = Source { system: 1, component: 1 };
@@ -142,7 +142,7 @@ fn a_vehicle_that_falls_after_it_is_disarmed_did_not_land() {
     assert_eq!((flight.landed, flight.disarmed_at_m), (true, None), "it stands on a hill");
 }
 
-/// Half a second each, with what the autopilot says of itself: armed, and where it is.
+/// Half-second steps in which the autopilot reports its armed and landed states.
 fn half_seconds(judge: &mut Judge, from_ms: u64, to_ms: u64, armed: bool, landed: LandedState) {
     for at_ms in (from_ms..to_ms).step_by(500) {
         let at = Instant::from_millis(at_ms);
@@ -217,7 +217,7 @@ fn cells_that_nothing_tells_in_the_air_are_said_and_no_check_of_their_voltage_co
     );
 }
 
-/// A check of the box itself: what it exceeded is in its record alone.
+/// A check of the box itself: only its record has the worst value.
 #[test]
 fn the_worst_value_of_a_check_of_the_box_is_that_of_its_record() {
     use hums_blackbox::record::Exceedance;
@@ -421,7 +421,7 @@ fn a_recording_that_was_joined_on_is_judged_by_itself() {
             }
         };
         flight(&mut judge, 0);
-        // A vehicle with another one's ESCs would miss their word.
+        // With the ESCs of another vehicle, their reports would be missing.
         escs(&mut judge, if findings == 0 { 50_000 } else { 60_000 }, 60_000);
         judge.item(Instant::from_millis(60_000), joint);
         flight(&mut judge, 60_000);
@@ -490,7 +490,8 @@ fn nothing_of_a_vehicle_is_no_good_news() {
     assert!(judged.judged.is_empty(), "{:?}", judged.judged);
 }
 
-/// Heartbeats at 10 Hz, of which so many in a hundred are lost on the wire after 20 s, and none from 40 to 48 s.
+/// Heartbeats at 10 Hz. After 20 s this many in a hundred are lost on the wire, and all of them from 40 to 48
+/// s.
 fn link_faults(heard: Heard) -> Judged {
     use hums_link::encode::{Encoder, FRAME_BYTES_MAX};
     use hums_link::{Frame, messages};
@@ -575,7 +576,7 @@ fn a_pause_of_the_recording_is_no_silence_of_an_esc_and_one_that_falls_silent_is
             judge.item(at, Item::Observation(AUTOPILOT, &heartbeat(true)));
         }
         escs(&mut judge, 30_000, 40_000);
-        // A count over the whole recording, told at its end, is no pause.
+        // A loss count over the whole recording, reported at its end, is not a pause.
         let whole = Gap { from: Some(Instant::ZERO), to: Some(Instant::from_millis(39_900)), ..gap };
         judge.item(Instant::from_millis(39_900), Item::Gap(&whole));
         let judged = judge.end();
@@ -663,11 +664,11 @@ fn a_finding_names_the_text_or_the_event_that_raised_it_whatever_the_words_of_it
         let names: Vec<_> = judged.problems.iter().flat_map(|problem| &problem.details).collect();
         assert_eq!(names, Vec::from_iter(named), "{:?}", judged.problems);
         assert_eq!(judged.problems.len(), usize::from(named.is_some()), "{:?}", judged.problems);
-        // What it did not say is no check that was judged.
+        // A check without an alert does not count as judged.
         let alerts = judged.judged.iter().filter(|check| check.ends_with("_alert"));
         assert_eq!(alerts.copied().collect::<Vec<_>>(), Vec::from_iter(named.map(|_| "battery_alert")));
     }
-    // What nobody calls an alert is none, however severe.
+    // A text that is not marked as an alert raises none, at any severity.
     let silent = Text { source: AUTOPILOT, severity: 0, words: "Battery failsafe", alert: None };
     assert!(armed_and_told(Format::Tlog, Item::Text(silent)).problems.is_empty());
 }
@@ -699,8 +700,8 @@ fn what_the_board_found_is_named_too() {
     );
 }
 
-/// What a silence of so many seconds in the air, after which the vehicle is so, makes of a recording: flights that landed,
-/// causes of gaps, damages.
+/// Result of a silence of this many seconds in the air, with the given vehicle state after it: landed
+/// flights, causes of gaps, damages.
 fn silent_in_air(
     format: Format,
     silence_ms: u64,

@@ -1,4 +1,4 @@
-//! What comes down in a radio gap, or falls when it is heard first.
+//! Crashes in a radio gap, and falls when first received.
 
 use hums_core::clock::{Instant, Span};
 use hums_core::observation::{
@@ -23,7 +23,7 @@ const ROTORS: [(Autopilot, VehicleKind, u8); 3] = [
     (Autopilot::Px4, VehicleKind::Vtol, 22),
 ];
 
-/// What a script changes from [`AT_MS`] on.
+/// The state that a script changes from [`AT_MS`] on.
 struct State {
     quad: Quad,
     heard: bool,
@@ -54,8 +54,8 @@ impl State {
     }
 }
 
-/// A hover at 20 m from a time on to the end of a minute, of which the recording lost so much at [`AT_MS`]; the script gets the time
-/// since then.
+/// A hover at 20 m until the end of a minute. The recording lost the given span at [`AT_MS`]; the script gets
+/// the time since then.
 fn judge(
     (autopilot, kind, type_number): (Autopilot, VehicleKind, u8),
     (begin_ms, lost): (u64, Span),
@@ -127,7 +127,7 @@ fn judge(
     judge.end()
 }
 
-/// What was found of mishaps; how many flights, how many of them landed, and were ended by a mishap that nobody heard.
+/// The mishaps found; the number of flights, of landings, and of mishaps in a radio gap.
 fn told(judged: &Judged) -> (Vec<&str>, [usize; 3]) {
     let mishaps = judged.problems.iter().filter(|problem| problem.is_mishap());
     let count =
