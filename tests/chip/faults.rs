@@ -1,4 +1,4 @@
-//! What fails round the processor, as a review saw it on another model of the chip (issue 22), each as it is to be.
+//! Faults of the devices round the processor, each with its expected result.
 
 use hums_tests::chip::BAUD;
 use hums_tests::chip::record::{Compared, Session};
@@ -154,8 +154,8 @@ fn transmitters_that_stand_still_are_told_and_cost_nothing() {
     assert_no_reset(&rig);
 }
 
-/// 8: the flash refuses a word, and the item is saved at another place; it refuses one there too, and the ground is told. What is
-/// set after that is saved.
+/// 8: the flash refuses a word, and the item is saved at another place; it refuses one there too, and the ground is told. Later
+/// settings are saved.
 #[test]
 fn flash_that_refuses_a_word_is_told_and_saving_goes_on() {
     const FAILED: &str = "HUMS: saving failed, have the board replaced";
@@ -208,8 +208,8 @@ fn a_change_of_a_ports_rate_cuts_no_byte() {
     assert_no_reset(&rig);
 }
 
-/// A line that carries beginnings of frames and no frame, as fast as it can, is the dearest for the framer: whoever looked for the next byte
-/// as soon as it was done with one would find one each time, and nobody else would run again.
+/// A line that carries beginnings of frames and no frame, as fast as it can, costs the framer most. A reception
+/// that looked for the next byte at once would always find one, and no other task would run.
 #[test]
 fn beginnings_without_a_frame_at_full_rate_starve_nobody() {
     let mut rig = bench().settled(Board::default()).unwrap();

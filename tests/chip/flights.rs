@@ -23,7 +23,7 @@ use crate::bench;
 
 /// The flight of the demo.
 const FLIGHT: &str = "ap_quad_faults.tlog";
-/// What the processor may be busy in the worst second, of 168 MHz, at 921,600 baud back to back.
+/// Limit of the load in the worst second, of 168 MHz, at 921,600 baud back to back.
 const BUSY_PERCENT_MAX: f64 = 40.0;
 /// Prefetch, both caches, five wait states.
 const ACR: u32 = 0x705;
@@ -46,7 +46,7 @@ const CARD_MIB: [&str; 2] = ["--card-size", "4096"];
 /// Every step of the checks, on both machines.
 const TICK_US: u64 = 50_000;
 
-/// What is compared with this PC.
+/// The part that is compared with this PC.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Against {
     /// Which records there are, by kind and texts.
@@ -103,7 +103,7 @@ fn assert_times(input: &[Frame<'_>], recorded: &[Frame<'_>]) {
     assert!(off < 20_000, "{off} us");
 }
 
-/// Where in each 50 ms the chip's checks are stepped: what they record has that time, cut off to a millisecond.
+/// Offset of the chip's steps in each 50 ms: its records have that time, cut off to a millisecond.
 #[track_caller]
 fn phase_us(records: &[Value]) -> u64 {
     let stats = records.iter().find(|record| record["record"] == "HUMS_STATS").expect("figures");
@@ -157,7 +157,7 @@ const OF_THE_MACHINE: [(&str, &[&str]); 4] = [
 ];
 /// A step of the checks may be the one before or the next where a frame comes within a millisecond of it.
 const TIME_MAX_S: f64 = 0.101;
-/// A number may differ by so much of itself, or of one: by what a frame within a millisecond of a step changes.
+/// Tolerance of a number, relative to itself or to one: the effect of a frame within a millisecond of a step.
 const PART_MAX: f64 = 0.02;
 /// As many of all records may differ by more: momentary values at such a step.
 const ODD_PART_MAX: f64 = 0.02;
@@ -177,7 +177,7 @@ fn assert_same_records(of_chip: &[Value], of_pc: &[Value], against: Against) {
         let texts: Vec<_> = texts.map(|(name, value)| format!("{name}={value}")).collect();
         format!("{} {}", record["record"], texts.join(" "))
     };
-    // What is at the end of the power: this PC is switched off in order.
+    // Records at the end of the power: this PC is switched off in order.
     let last_s = quiet_before_the_end_s(of_chip);
     let by_key = |records: &[Value]| {
         let mut rows = BTreeMap::<String, Vec<Value>>::new();
@@ -231,7 +231,7 @@ fn of_the_machine(record: &Value) -> &'static [&'static str] {
     OF_THE_MACHINE.iter().find(|(name, _)| record["record"] == *name).map_or(&[], |(_, fields)| fields)
 }
 
-/// What differs by more than it may.
+/// Differences beyond the tolerance.
 fn difference(a: &Value, b: &Value) -> Option<String> {
     let far = |a: &Value, b: &Value, most: f64| match (a.as_f64(), b.as_f64()) {
         (Some(a), Some(b)) => (a - b).abs() > most.max(PART_MAX * a.abs().max(b.abs()).max(1.0)),
@@ -250,7 +250,7 @@ fn difference(a: &Value, b: &Value) -> Option<String> {
     None
 }
 
-/// What goes to the ground station: the same texts in the same order, and of each message as many but for a few.
+/// Frames to the ground station: the same texts in the same order, and of each message as many but for a few.
 #[track_caller]
 fn assert_same_stream(of_chip: &[u8], of_pc: &[u8], seeds: &Seeds) {
     const STATUSTEXT: u32 = 253;

@@ -31,7 +31,7 @@ fn off_ms(ended: &[Ps], recorded: &[(u64, Vec<u8>)]) -> u64 {
     lates.map(|late| late.abs_diff(first)).max().unwrap_or(0)
 }
 
-/// What flies, over and over: a recording's frames at their own times, and three seconds without a word.
+/// The flight, over and over: a recording's frames at their own times, and three seconds without a word.
 struct Flight {
     frames: Vec<(u64, Vec<u8>)>,
     lap: Ps,
@@ -55,7 +55,7 @@ impl Flight {
     }
 }
 
-/// What a board keeps while it has no power, as files.
+/// The board's state without power, as files.
 struct Shelf(PathBuf);
 
 impl Shelf {
@@ -141,7 +141,7 @@ fn fly(machine: &mut Machine, flight: &Flight, until: Ps) -> Vec<Ps> {
             ended.push(free);
         }
         machine.run_until(to).unwrap();
-        // What it says of itself is not kept.
+        // Its own messages are not kept.
         machine.take_sent(0);
         machine.take_sent(1);
         if to % (600 * SECOND) < 100 * MS {
@@ -175,7 +175,7 @@ fn the_records_time_is_the_senders_for_an_hour_with_ten_erases() {
     const ROUND: Ps = 360 * SECOND;
     let mut rig = bench().settled(Board::default()).unwrap();
     let begin = rig.machine.now() + SECOND;
-    // What comes before it listens is nobody's.
+    // Frames before the port is open do not count.
     rig.run(begin, false).unwrap();
     for round in 1..=10 {
         while rig.machine.chip.flash.erases.len() < round {

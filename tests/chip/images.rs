@@ -1,4 +1,4 @@
-//! What is flashed is what the model has, and a bad image is told.
+//! The model loads exactly the flashed files, and refuses a bad image.
 
 use std::fs;
 
@@ -71,7 +71,7 @@ fn with_main(code: &[u16]) -> (Vec<u8>, u32) {
     (elf, main)
 }
 
-/// What `hums sim --firmware` of this image says.
+/// The output of `hums sim --firmware` for this image.
 fn emulated(elf: &[u8], code: i32) -> String {
     let dir = tempfile::tempdir().unwrap();
     let (image, card) = (dir.path().join("hums.elf"), dir.path().join("card.img"));

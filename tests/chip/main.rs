@@ -25,7 +25,7 @@ mod program;
 #[cfg(feature = "chip")]
 mod recompute;
 
-/// In the list of what was ignored: what was not tested is no success.
+/// In the list of ignored tests: an untested part is not a success.
 #[cfg(not(feature = "chip"))]
 #[test]
 #[ignore = "the image on the model of its chip: `cargo xtask test` runs it"]

@@ -1,4 +1,4 @@
-//! Memory that changes by itself: what was not recorded as it came is given up and told, and recording goes on.
+//! Memory that changes by itself: altered frames are left out and reported, and recording goes on.
 
 use std::collections::BTreeMap;
 
@@ -17,7 +17,7 @@ use stm32f405_model::time::{MS, Ps, SECOND};
 
 use crate::bench;
 
-/// What became of it all.
+/// Results of all flips.
 #[derive(Debug, Default)]
 struct Read {
     frames: Vec<Vec<u8>>,
@@ -61,7 +61,7 @@ impl Deliver<Group> for Read {
     }
 }
 
-/// What came of flips.
+/// Results of flips.
 struct Outcome {
     compared: Compared,
     read: Read,
@@ -69,11 +69,11 @@ struct Outcome {
     resets: usize,
     /// So many were made.
     flips: u64,
-    /// Where a flip led the program to what the model does not have: there is no telling what the chip would do. None came after that.
+    /// A flip led the program to something that is not modelled: the chip's behaviour is unknown. None came after that.
     stopped: Option<Box<Report>>,
 }
 
-/// Flips so many bits, one at a time, in the memory that this name stands for, at full line rate, and reads what was recorded.
+/// Flips so many bits, one at a time, in the memory that this name stands for, at full line rate, and reads the record.
 fn flipped(part: &str, most: u64, apart: Ps, seed: u64) -> Outcome {
     let mut rig = bench().settled(Board { seed, ..Board::default() }).unwrap();
     let begin = rig.machine.now() + SECOND;

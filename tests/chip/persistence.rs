@@ -1,4 +1,4 @@
-//! What outlives power: the store, and the card's sessions, by `hums sim --firmware`.
+//! Persistence over power cuts: the store, and the card's sessions, by `hums sim --firmware`.
 
 use std::fs;
 use std::path::{Path, PathBuf};

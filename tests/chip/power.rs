@@ -10,10 +10,10 @@ use stm32f405_model::time::{MS, SECOND, US};
 
 use crate::bench;
 
-/// What is in memory, in frames of full rate: a quarter of a second of them, and a sector in progress.
+/// Frames in memory at full rate: a quarter of a second of them, and a sector in progress.
 const IN_MEMORY_MAX: usize = 700;
 
-/// What the processor may be busy in the second from power on, in which memory is cleared, the card mounted and the log made.
+/// Limit of the load in the first second, which clears memory, mounts the card and makes the log.
 const FIRST_BUSY_PERCENT_MAX: f64 = 47.0;
 
 #[test]
@@ -115,7 +115,7 @@ fn a_noisy_line_costs_the_frames_that_it_damaged() {
         match number % 40 {
             5 => line[middle].byte ^= 0x10,
             15 => line[middle].flaw = Flaw::Noise,
-            // The byte is what it is all the same: nothing is lost.
+            // The byte is still right: nothing is lost.
             25 => line[middle].flaw = Flaw::Framing,
             35 => line.push(Char { start: end, byte: 0xFD, ..line[0] }),
             _ => {}

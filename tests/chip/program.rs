@@ -1,4 +1,4 @@
-//! Faults of the program itself, provoked from outside: each leaves a note of what happened, and where; the next start records it,
+//! Faults of the program itself, provoked from outside: each leaves a note with its place. The next start records it,
 //! tells the ground station, and goes on recording.
 
 use hums_tests::chip::rig::Rig;
@@ -22,19 +22,19 @@ const BUS_FAULT: [u8; 6] = [0x4F, 0xF0, 0x40, 0x50, 0x00, 0x68];
 /// `push {r0-r7, lr}`, again and again.
 const OVERFLOW: [u8; 4] = [0xFF, 0xB5, 0xFD, 0xE7];
 
-/// From the moment that a task hangs: the watchdog's second and what is left of a tick.
+/// From the moment that a task hangs: the watchdog's second and the rest of a tick.
 const NOTICED_MS: u64 = 1_100;
 /// Storage may wait for its card: it has to report in each 10 s only (`hums_onboard::supervisor`).
 const STORAGE_NOTICED_MS: u64 = 11_100;
-/// What a reset may cost, in frames of full rate: what was in memory, a quarter of a second, and the start.
+/// Limit of a reset's loss, in frames of full rate: memory, a quarter of a second, and the start.
 const LOST_MAX: usize = 700;
 
-/// What is to come of a fault.
+/// The expected result of a fault.
 struct Expected<'a> {
     cause: Cause,
     /// As the record has it.
     fault: &'a str,
-    /// What the ground station is told.
+    /// Text for the ground station.
     told: &'a str,
     within_ms: u64,
 }
@@ -48,7 +48,7 @@ fn flying() -> Rig {
     rig
 }
 
-/// Goes on after a reset, and looks at what was left of it; `since` is when it went wrong.
+/// Goes on after a reset, and looks at the note; `since` is the time of the fault.
 #[track_caller]
 fn survives(rig: &mut Rig, since: u64, expected: &Expected<'_>) {
     let (at, cause) = *rig.machine.resets.last().unwrap();
@@ -111,7 +111,7 @@ fn a_fault_of_the_processor_is_survived_recorded_and_told() {
 fn a_full_stack_hurts_nobody_and_is_survived_recorded_and_told() {
     let mut rig = flying();
     let since = rig.machine.now();
-    // What is pushed is no return address: the nearest one is what called nobody.
+    // The pushed value is not a return address.
     rig.replace(MONITOR, &OVERFLOW, true).unwrap();
     let fault = "fault: stack overflow in monitor at called from 00000000";
     let told = "HUMS: restarted after: stack overflow (monitor)";
@@ -123,7 +123,7 @@ fn a_full_stack_hurts_nobody_and_is_survived_recorded_and_told() {
 fn a_panic_is_survived_recorded_and_told() {
     const FILE: &[u8] = b"firmware/provoked.rs";
     let mut rig = flying();
-    // At the stack's lower end, where nobody comes: where the place is, and its text behind.
+    // At the unused lower end of the stack: the address of the place, and its text behind.
     let place = CCM.0 + 64;
     let words = [place + 16, FILE.len() as u32, 7, 1];
     let bytes = words.iter().flat_map(|word| word.to_le_bytes()).chain(FILE.iter().copied());

@@ -1,5 +1,5 @@
-//! What the codec computes as the sender did comes out the same on every machine: the very function of the image, called on the model
-//! of the chip, against `docs/log-format.md` ("Links") on this PC.
+//! The codec's computed floats are the same on every machine: the function of the image, called on the model of the chip, against
+//! `docs/log-format.md` ("Links") on this PC.
 
 use std::f32::consts::PI;
 use std::time::Instant;
@@ -89,8 +89,8 @@ fn documented(angles: [f32; 3], told: [f32; 4]) -> [f32; 4] {
     if (a + b) + (c + d) < 0.0 { made.map(|part| -part) } else { made }
 }
 
-/// Three of four times angles of all sizes up to half a turn and parts of a quaternion, else any bits at all. All are equal to the bit; what
-/// is no number differs between machines, and counts nowhere.
+/// Three of four times angles of all sizes up to half a turn and parts of a quaternion, else any bits at all. All are equal to the
+/// bit. NaN differs between machines, and does not count.
 fn compare(count: u64, seed: u64) {
     let mut machine = begun();
     let function = machine.image().find("Registers10quaternion").expect("the codec's function").address;

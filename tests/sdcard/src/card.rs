@@ -1,4 +1,4 @@
-//! A card with power: what it makes of each byte.
+//! A card with power: its answer to each byte.
 
 use std::collections::VecDeque;
 
@@ -8,7 +8,7 @@ use crate::model::{Kind, Model, crc7, crc16};
 
 /// Clocks with the card not selected that it needs before its first command (6.4.1).
 const WAKE_CLOCKS: u32 = 74;
-/// What a card must be able to take before it is identified, and afterwards.
+/// Clock limits of a card before its identification, and afterwards.
 const IDENTIFICATION_HZ: u32 = 400_000;
 const TRANSFER_HZ: u32 = 25_000_000;
 
@@ -66,7 +66,7 @@ pub(crate) struct SdCard {
     busy_until_ns: u64,
     was_busy: bool,
     transfer: Transfer,
-    /// The block that is being programmed while it is busy, and what it held before.
+    /// The block that is being programmed while it is busy, and its content before.
     programmed: Option<(u32, [u8; 512])>,
     noise: u32,
 }
@@ -94,7 +94,7 @@ impl SdCard {
         }
     }
 
-    /// One byte while another is sent; what is not allowed is told to `wrong`.
+    /// One byte while another is sent; violations go to `wrong`.
     pub(crate) fn exchange(
         &mut self,
         now_ns: u64,
@@ -404,6 +404,6 @@ impl SdCard {
         self.busy_until_ns = now_ns.saturating_add(busy_ns);
     }
 
-    /// So that nobody waits for long by chance: times are as of usual cards.
+    /// Times of usual cards, without random long waits.
     pub(crate) const POWER_UP_NS: u64 = MS;
 }

@@ -1,6 +1,6 @@
-//! What can be wrong with a card, and when it is.
+//! Faults of a card, and their times.
 
-/// What is wrong.
+/// The fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Fault {
     /// A command gets no answer.

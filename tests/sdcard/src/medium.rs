@@ -1,4 +1,4 @@
-//! What a card holds: blocks, as many as were ever written.
+//! The content of a card: the blocks that were ever written.
 
 use std::cell::{Cell, RefCell};
 use std::collections::BTreeMap;
@@ -36,7 +36,7 @@ impl Medium {
         medium
     }
 
-    /// One that holds what this image has, which may be sparse. A last part of a block is left out.
+    /// A medium with this image's content, which may be sparse. A last part of a block is left out.
     ///
     /// # Errors
     /// Of the image's reading; `InvalidInput` where it has more blocks than a card can.
@@ -60,7 +60,7 @@ impl Medium {
         Ok(medium)
     }
 
-    /// Writes what it holds into this image, in place.
+    /// Writes its content into this image, in place.
     ///
     /// # Errors
     /// Of the image's writing.

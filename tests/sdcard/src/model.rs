@@ -1,4 +1,4 @@
-//! Which card it is: what does not change while it has power.
+//! The kind of card: its properties that do not change while it has power.
 
 use crate::MS;
 use crate::fault::{Fault, Plan};
@@ -28,7 +28,7 @@ impl Kind {
 pub struct Model {
     /// Its kind.
     pub kind: Kind,
-    /// What it holds.
+    /// Its content.
     pub medium: Medium,
     /// Its serial number.
     pub serial: u32,
@@ -42,7 +42,7 @@ pub struct Model {
     pub write_ns: (u64, u64),
     /// Write protected, in its CSD: for now, for ever.
     pub locked: (bool, bool),
-    /// What is wrong with it.
+    /// Its faults.
     pub plans: Vec<Plan>,
 }
 
@@ -88,7 +88,7 @@ impl Model {
     pub(crate) fn csd(&self) -> [u8; 16] {
         let size = self.medium.size();
         let mut csd = if self.kind.by_bytes() {
-            // Blocks of 512 bytes, in units of 512: what a card of this structure can say of its size.
+            // Blocks of 512 bytes, in units of 512: the size in a CSD of this structure.
             let units = (size >> 9) - 1;
             [
                 0x00,

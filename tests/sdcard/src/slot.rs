@@ -1,4 +1,4 @@
-//! The slot: the bus, its clock and time, and what happens to the card in it.
+//! The slot: the bus, its clock and time, and events of the card in it.
 
 use std::cell::RefCell;
 use std::collections::BTreeMap;
@@ -13,7 +13,7 @@ use hums_recorder::spi::{Clock, Port, PortFailed};
 use crate::card::SdCard;
 use crate::model::Model;
 
-/// What happens to the card in the slot.
+/// An event of the card in the slot.
 #[derive(Clone, Debug)]
 pub enum Event {
     /// It is pulled, and loses its power: a block that it is programming is torn.
@@ -24,7 +24,7 @@ pub enum Event {
     Bounce,
 }
 
-/// What went over the bus.
+/// Traffic of the bus.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counts {
     /// Bytes.
@@ -117,12 +117,12 @@ impl Slot {
         inner.happen_what_is_due();
     }
 
-    /// What went over the bus so far.
+    /// Traffic of the bus so far.
     pub fn counts(&self) -> Counts {
         self.0.borrow().counts
     }
 
-    /// What was not allowed so far, and how often.
+    /// Violations so far, with their counts.
     pub fn violations(&self) -> BTreeMap<String, u32> {
         self.0.borrow().violations.clone()
     }

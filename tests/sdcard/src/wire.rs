@@ -1,4 +1,4 @@
-//! The card at a bus of the chip's model: what the flashed image sees of it.
+//! The card at a bus of the chip's model: as the flashed image sees it.
 
 use hums_recorder::spi::{Clock, Port as _};
 use stm32f405_model::spi::Wire;

@@ -44,7 +44,7 @@ fn every_kind_of_card_is_recorded_on() {
     }
 }
 
-/// What the box records of itself, every 10 s, and its parity.
+/// The box's own records, every 10 s, and its parity.
 #[test]
 fn a_silent_line_wears_no_card() {
     let medium = medium();
@@ -192,7 +192,7 @@ fn noise_on_the_line_is_told_and_recorded_over_again_once_it_is_gone() {
     rig.run_to(35_000);
     rig.assert_state(CardState::Recording);
     assert!(rig.longest < SERVICE_MAX + Span::from_secs(1), "{:?}", rig.longest);
-    // What went over the bus then is not the driver's fault.
+    // The traffic of that time is not the driver's fault.
     let (found, lost) = rig.finish(&[&medium]);
     assert_eq!((lost, found[0].gaps.len()), (0, 0));
 }
@@ -267,7 +267,7 @@ fn a_card_that_is_out_for_longer_than_the_queue_lasts_loses_counted_frames() {
     assert!(found.frames.last().is_some_and(|last| *last > 2_600), "it went on");
 }
 
-/// Pulled at bytes spread over all of what the card is asked, from its first command on, and put back two seconds later.
+/// Pulled at bytes spread over all commands, from the first on, and put back two seconds later.
 /// A block that is being programmed then is torn.
 #[test]
 fn a_card_that_is_pulled_at_any_byte_misses_nothing() {

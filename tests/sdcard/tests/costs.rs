@@ -1,4 +1,4 @@
-//! What a driver costs on the bus, and what it makes of a card's faults: `embedded-sdmmc`'s and ours, side by side. These
+//! Costs of a driver on the bus, and its handling of a card's faults: `embedded-sdmmc`'s and ours, side by side. These
 //! are the measurements for which ours exists (`docs/cards.md`).
 //!
 //! `cargo test -p hums-sdcard --test costs -- --nocapture` prints them.
@@ -16,7 +16,7 @@ fn model(medium: &Medium) -> Model {
     Model::new(Kind::Sdhc, medium.clone())
 }
 
-/// What one driver did: whether it was content, what is on the medium, and what it took.
+/// Result of one driver: success, content of the medium, costs.
 #[derive(Debug)]
 struct Run {
     is_content: bool,

@@ -1,4 +1,4 @@
-//! Downloads from a card that changes meanwhile: what was begun goes on with the same log, or ends with an error.
+//! Downloads from a card that changes meanwhile: a download continues with the same log, or ends with an error.
 
 mod rig;
 
@@ -10,7 +10,7 @@ use rig::{FILE_TRANSFER_PROTOCOL, LOG_DATA, LOG_ENTRY, Rig, read as read_card};
 
 const MIB: u32 = 2_048;
 const S: u64 = 1_000;
-/// What is downloaded: the second of the full card's logs, which is the next to make room.
+/// The downloaded log: the second of the full card's logs, the next to be overwritten.
 const VICTIM: LogName = LogName { session: 2, segment: 0 };
 
 const LIST: u8 = 3;
@@ -30,7 +30,7 @@ fn model(medium: &Medium) -> Model {
 
 /// A card with a session of so many seconds on it, and one more; both end as power goes.
 fn with_two_sessions(mib: u32, seconds: u64) -> Medium {
-    // The file system's number comes from the size, and what tells sessions of equal names apart from that.
+    // The file system's number comes from the size, and the mark that separates sessions of equal names from that.
     let medium = Medium::formatted(mib * MIB);
     for _ in 0..2 {
         let mut rig = Rig::new(model(&medium));
@@ -76,10 +76,10 @@ fn wait(rig: &mut Rig, ms: u64) {
     rig.run_to(now_ms + ms);
 }
 
-/// An answer over FTP: operation, of which one, complete, offset, data.
+/// An answer over FTP: operation, requested operation, complete, offset, data.
 type Answer = (u8, u8, bool, u32, Vec<u8>);
 
-/// Asks over FTP; what comes within so many milliseconds.
+/// Asks over FTP. Gives the answers within that many milliseconds.
 fn ftp(rig: &mut Rig, opcode: u8, offset: u32, size: u8, data: &[u8], ms: u64) -> Vec<Answer> {
     let size = if data.is_empty() { size } else { data.len() as u8 };
     let mut payload = vec![0, 1, 191, 7, 0, 0, opcode, size, 0, 0, 0];
@@ -137,7 +137,7 @@ fn list(rig: &mut Rig) -> usize {
     rig.logs.iter().filter(|(id, _)| *id == LOG_ENTRY).count()
 }
 
-/// `LOG_REQUEST_DATA`: what comes, by offset.
+/// `LOG_REQUEST_DATA`: the answers, by offset.
 fn data(rig: &mut Rig, id: u16, offset: u32, count: u32) -> Vec<(u32, Vec<u8>)> {
     rig.logs.clear();
     let mut payload = offset.to_le_bytes().to_vec();
@@ -166,7 +166,7 @@ fn a_file_that_makes_room_while_it_is_read_ends_with_an_error() {
     insert(&mut rig, &medium);
     for opcode in [READ, BURST] {
         if opcode == BURST {
-            // It is still open for whoever did not see the answer to the first question.
+            // It is still open for a client that lost the first answer.
             assert_eq!(ftp(&mut rig, OPEN, 0, 0, &path(VICTIM), 2_000)[0].4, [FILE_NOT_FOUND]);
         }
         let answers = ftp(&mut rig, opcode, before.len() as u32, 239, &[], 2_000);
@@ -284,7 +284,7 @@ fn a_checksum_is_of_what_was_recorded_and_nothing_is_lost_while_it_is_computed()
     assert_eq!(read_card(&medium).gaps, []);
 }
 
-/// Where the blocks of a segment lie, and how many of them hold what was recorded.
+/// Place of a segment's blocks, and the number of recorded ones.
 fn places(medium: &Medium, name: LogName) -> (u32, u32) {
     let (status, held) = (CardStatus::new(), Buffers::new());
     let mounted = Card::mount(medium.clone(), &status, &held);
@@ -367,7 +367,7 @@ fn a_burst_has_the_size_that_was_asked_for_and_is_complete_before_the_end_only_w
             }
             assert_eq!(*offset, had);
             assert!(data.len() == 239 || had + data.len() as u32 == length, "{} at {had}", data.len());
-            // What MAVProxy takes for the end of the file.
+            // MAVProxy takes this for the end of the file.
             assert!(!*complete || data.len() == 239, "{} bytes at {had} are not the end", data.len());
             had += data.len() as u32;
         }
@@ -378,7 +378,7 @@ fn a_burst_has_the_size_that_was_asked_for_and_is_complete_before_the_end_only_w
 #[test]
 fn a_log_that_the_card_refuses_slowly_is_left_out_of_a_list_and_never_called_empty() {
     let medium = with_two_sessions(40, 20);
-    // From then on, and after so many blocks that it still gives, it keeps whoever reads waiting.
+    // From then on, and after so many blocks that it still gives, it keeps the reader waiting.
     let refusing = |skip| {
         let plan = Plan::always(Fault::NoBlock).from(20 * S * MS).until(60 * S * MS).skip(skip);
         let mut rig = Rig::new(model(&medium).with(plan));

@@ -1,5 +1,5 @@
-//! Cards with long directories, of our own logs and of other files: recorded on soon after power-on, and what our own searching
-//! takes is not called the card's.
+//! Cards with long directories, of our own logs and of other files: recorded soon after power-on. The time
+//! of our own search does not count as the card's.
 
 mod rig;
 

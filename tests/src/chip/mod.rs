@@ -16,7 +16,7 @@ use stm32f405_model::time::{Ps, SECOND, US};
 /// The autopilot's rate.
 pub const BAUD: f64 = 921_600.0;
 
-/// What comes to the first port: pieces of bytes, each at its time or as soon as the line is free.
+/// Input of the first port: pieces of bytes, each at its time or as soon as the line is free.
 #[derive(Debug, Default)]
 pub struct Feed {
     pieces: VecDeque<(Ps, Vec<u8>)>,
@@ -39,7 +39,7 @@ impl Feed {
         Ok(Self { pieces: pieces.collect(), ..Self::default() })
     }
 
-    /// Puts what comes until this moment on the line.
+    /// Puts the bytes up to this moment on the line.
     pub fn give(&mut self, machine: &mut Machine, until: Ps) {
         while let Some((at, bytes)) = self.pieces.pop_front_if(|(at, _)| *at < until && self.free < until) {
             let start = at.max(self.free);
@@ -72,7 +72,7 @@ pub fn frames(mut tlog: &[u8]) -> Vec<(u64, &[u8])> {
     frames
 }
 
-/// Blocks of the card: 4 GB, a multiple of what a CSD counts in.
+/// Blocks of the card: 4 GB, a multiple of a CSD's unit.
 pub const BLOCKS: u32 = 8_388_608;
 
 /// A board of this image with a card in good order.

@@ -1,4 +1,4 @@
-//! What is on a card, and how it compares with what was sent.
+//! The record on a card, compared with the sent frames.
 
 use std::collections::{BTreeMap, HashMap, VecDeque};
 
@@ -15,7 +15,7 @@ pub struct Session {
     pub frames: Vec<(u64, Vec<u8>)>,
     /// Losses told: what, how many, from and to in milliseconds.
     pub losses: Vec<(&'static str, u64, u64, u64)>,
-    /// What it says of itself: faults, notes.
+    /// Its own messages: faults, notes.
     pub texts: Vec<String>,
     /// Parts that cannot be read.
     pub gaps: usize,
@@ -98,7 +98,7 @@ pub struct Compared {
     pub right: usize,
     /// Frames that were sent and are not there.
     pub missing: usize,
-    /// Frames that nobody sent, or more of them than were sent.
+    /// Frames that were not sent, or come more often than sent.
     pub wrong: usize,
     /// Frames missing before the first that is there, and after the last.
     pub ends: (usize, usize),

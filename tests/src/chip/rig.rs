@@ -1,4 +1,4 @@
-//! A board on a bench: frames come at its first port as fast as it takes them, and what becomes of them is compared.
+//! A board on a bench: frames come at its first port as fast as it takes them, and the record is compared with them.
 
 use hums_sdcard::{Medium, Plan, Slot};
 use stm32f405_model::gpio::Pin;
@@ -17,9 +17,9 @@ const LED: Pin = Pin(2, 12);
 /// Frames and the image that is to record them.
 #[derive(Debug)]
 pub struct Bench {
-    /// What the board runs.
+    /// The board's image.
     pub image: Image,
-    /// What comes at its first port, over and over.
+    /// Input of its first port, over and over.
     pub frames: Vec<Vec<u8>>,
 }
 
@@ -47,7 +47,7 @@ pub struct Rig {
     pub machine: Machine,
     /// Its card's slot.
     pub slot: Slot,
-    /// What is on the card.
+    /// The record on the card.
     pub medium: Medium,
     /// Frames that were sent, and when each one's last bit was.
     pub sent: Vec<(Ps, Vec<u8>)>,
@@ -146,7 +146,7 @@ impl Rig {
         read(&self.medium)
     }
 
-    /// What is recorded, against what was sent.
+    /// The record, compared with the sent frames.
     pub fn compared(&self) -> Compared {
         let sent: Vec<Vec<u8>> = self.sent.iter().map(|(_, frame)| frame.clone()).collect();
         let sessions = self.sessions();

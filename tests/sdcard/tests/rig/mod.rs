@@ -1,4 +1,4 @@
-//! The firmware's own monitor and storage over the simulated card, in virtual time, and what a pilot sees of it.
+//! The firmware's own monitor and storage over the simulated card, in virtual time, and the pilot's view of it.
 //!
 //! Storage waits for the card with the processor, and whatever is more urgent goes on meanwhile: so, when a service of
 //! the card has taken its time, frames and ticks of that time come first and then the next service.
@@ -34,7 +34,7 @@ pub struct Rig {
     pub status: &'static CardStatus,
     pub texts: Vec<(Instant, String)>,
     pub acks: Vec<(u16, u8)>,
-    /// What of logs and files came: message and payload.
+    /// Answers about logs and files: message and payload.
     pub logs: Vec<(u32, Vec<u8>)>,
     pub findings: Vec<(Instant, &'static str, Level)>,
     pub armed: bool,
@@ -54,7 +54,7 @@ pub struct Rig {
     said: u32,
 }
 
-/// What a card holds in the end.
+/// The content of a card in the end.
 #[derive(Debug, Default)]
 pub struct Found {
     /// Numbers of the frames of noise, in the order of sessions.
@@ -112,7 +112,7 @@ impl Rig {
         }
     }
 
-    /// One round of the storage task, and what else happens meanwhile.
+    /// One round of the storage task, and other tasks meanwhile.
     fn service(&mut self) -> Service {
         let begun = self.slot.now();
         self.supervisor.report(Task::Storage, begun);
@@ -186,7 +186,7 @@ impl Rig {
         });
     }
 
-    /// What reaches the ground station.
+    /// Frames that reach the ground station.
     fn listen(&mut self) {
         let mut bytes = [0; FRAME_BYTES_MAX];
         while let Some(length) = self.ends.gs_out.take(&mut bytes) {
@@ -276,7 +276,7 @@ impl Rig {
         let found: Vec<Found> = cards.iter().map(|medium| read(medium)).collect();
         let on_cards: u64 = found.iter().map(|found| found.all_frames).sum();
         let sent = u64::from(self.frames + self.heartbeats + self.said);
-        // On the first of two cards a copy of a sector in progress may hold what is counted as lost for the second.
+        // On the first of two cards a copy of a sector in progress may hold frames that count as lost for the second.
         let twice = 10 * (cards.len() as u64 - 1);
         let accounted = on_cards + lost;
         assert!(
