@@ -1,5 +1,5 @@
 //! An onboard log of `ArduPilot`, binary or text: whatever it says, it comes to its end, its times never fall, every row
-//! has its table's columns, and what could not be read is no more than the file.
+//! has its table's columns, and the unreadable part is at most the file.
 
 use std::io::Cursor;
 
@@ -35,7 +35,7 @@ pub fn check(data: &[u8]) {
     assert!(read + unread <= log.len() as u64, "{read} bytes read and {unread} not, of {}", log.len());
 }
 
-/// A binary log of a few seconds: definitions with units, texts, parameters, and some of what observations are made of.
+/// A binary log of a few seconds: definitions with units, texts, parameters, and some messages of observations.
 pub fn log() -> Vec<u8> {
     let mut out = Vec::new();
     let formats: [(u8, &str, &str, &str); 12] = [

@@ -1,5 +1,5 @@
 //! Any coded stream, in sectors that are sound, through the decoder of a group: it may be no stream that a writer makes,
-//! but what it decodes to is bounded.
+//! but its output is bounded.
 
 use hums_blackbox::{BODY_BYTES, Entry, GROUP_SECTORS, GroupDecoder, Header, SECTOR_BYTES, Sector};
 use hums_blackbox::{SectorSink, Writer};
@@ -7,7 +7,7 @@ use hums_blackbox::{SectorSink, Writer};
 /// Bytes of a group's first body before its coded stream.
 const PREAMBLE_BYTES: usize = 26;
 
-/// Where a sector's body begins.
+/// Start of a sector's body.
 const BODY_AT: usize = 19;
 
 /// The longest entry: a record.
@@ -33,7 +33,7 @@ fn preamble() -> [u8; PREAMBLE_BYTES] {
     sector.bytes()[BODY_AT..].first_chunk().copied().expect("a sector is longer")
 }
 
-/// Sectors with this stream, each of which says that it completes `entries`.
+/// Sectors with this stream; each claims to complete `entries`.
 pub fn sectors(stream: &[u8], entries: u16) -> Vec<[u8; SECTOR_BYTES]> {
     let body = [&preamble(), stream].concat();
     let bodies = body.chunks(BODY_BYTES).take(GROUP_SECTORS);

@@ -1,4 +1,4 @@
-//! Any file that somebody calls a log or an image of a card: what is found in it can be read to its end.
+//! Any file as a log or an image of a card: found logs can be read to their end.
 
 use std::collections::BTreeSet;
 use std::fs::File;

@@ -19,14 +19,14 @@ fn frames(bytes: &[u8], piece: usize) -> (Vec<Vec<u8>>, FramerCounts) {
     (frames, framer.counts())
 }
 
-/// Takes the first byte for the size of the pieces, the others for what a line carried.
+/// Takes the first byte for the size of the pieces, the others as bytes of a line.
 pub fn check(data: &[u8]) {
     let Some((&piece, bytes)) = data.split_first() else { return };
     let (found, counts) = frames(bytes, usize::from(piece) + 1);
     assert_eq!(counts.bytes_in_frames + counts.bytes_not_frames, bytes.len() as u64);
     assert_eq!(counts.bytes_in_frames, found.iter().map(Vec::len).sum::<usize>() as u64);
     assert_eq!(counts.frames, found.len() as u64);
-    // Frames are what was received, in its order.
+    // Frames are the received ones, in order.
     let mut rest = bytes;
     for frame in &found {
         let at =

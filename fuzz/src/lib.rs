@@ -1,4 +1,4 @@
-//! Fuzz targets: what must hold for any bytes that somebody gives to a reader.
+//! Fuzz targets: rules for any bytes at a reader.
 //!
 //! A target is a function of bytes that panics where something does not hold. Three things run it:
 //!
@@ -10,8 +10,8 @@
 //!
 //! # To add a target
 //! 1. Write `fuzz/src/NAME.rs` with `pub fn check(data: &[u8])`. The framework limits the length of `data`; the function
-//!    bounds everything else. It takes any bytes for what the reader would get, for instance a file's contents
-//!    ([`file::with_file`] makes a file of them), and asserts what must hold. That the reader does not panic needs no assertion.
+//!    bounds everything else. It gives any bytes to the reader, for instance a file's contents
+//!    ([`file::with_file`] makes a file of them), and asserts its rules. That the reader does not panic needs no assertion.
 //! 2. Add `pub mod NAME;` and a row of [`TARGETS`] to this file.
 //! 3. Put a few small inputs that the reader understands into `fuzz/corpus/NAME/` (some kB in all). They are made by us,
 //!    never taken from somebody's recording. Without a corpus the mutations begin from noise and reach little.
@@ -37,7 +37,7 @@ pub mod ulog;
 /// A fuzz target.
 #[derive(Clone, Copy, Debug)]
 pub struct Target {
-    /// Its name: that of its module, and of its folder in the corpus.
+    /// Its name, which its module and its folder in the corpus have too.
     pub name: &'static str,
     /// The longest input, in bytes.
     pub bytes_max: usize,

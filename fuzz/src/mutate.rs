@@ -107,7 +107,7 @@ impl Mutator {
 pub struct Broken {
     /// The target.
     pub target: &'static str,
-    /// Where the input was written to.
+    /// The input's path.
     pub path: PathBuf,
 }
 

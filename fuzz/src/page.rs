@@ -40,8 +40,8 @@ impl SectorSink for Log {
     }
 }
 
-/// A log of what the input says: entries of kind, time since the one before, two bytes of message, length, content. The
-/// kind's three lowest bits say what it is: 7 a note, 6 a frame that is not verified, others a frame of a known message;
+/// A log made from the input: entries of kind, time since the one before, two bytes of message, length, content. The
+/// kind's three lowest bits: 7 a note, 6 a frame that is not verified, others a frame of a known message;
 /// the four highest say which system it is of.
 pub fn log(mut data: &[u8]) -> Vec<u8> {
     let (mut writer, mut log) = (Box::new(Writer::new()), Log::default());

@@ -1,4 +1,4 @@
-//! Any file through the reader of logs: it comes to its end, and says of each block what it was.
+//! Any file through the reader of logs: it comes to its end, and counts each block by kind.
 
 use hums_blackbox::{Header, Item, LogReader, SECTOR_BYTES, Sector};
 

@@ -14,7 +14,7 @@ const COLUMNS_MAX: usize = 65_536 + 7;
 /// The header, at 1 s.
 const HEADER: [u8; 16] = [b'U', b'L', b'o', b'g', 1, 0x12, 0x35, 1, 0x40, 0x42, 0x0f, 0, 0, 0, 0, 0];
 
-/// Takes the input for a log, with a header where it has none.
+/// Reads the input as a log, with a header if it lacks one.
 pub fn check(data: &[u8]) {
     let bytes = if data.starts_with(&HEADER[..7]) { data.to_vec() } else { [&HEADER[..], data].concat() };
     let mut last = Instant::ZERO;

@@ -1,7 +1,7 @@
 //! The firmware's size against `budgets.toml`.
 //!
-//! Flash is what is programmed (code, constants and the initial values of variables); RAM and CCM are the static
-//! variables in each memory, so that what is left is the stack's.
+//! Flash is the programmed part (code, constants and the initial values of variables); RAM and CCM are the static
+//! variables in each memory, and the stack has the rest.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -27,7 +27,7 @@ const MEMORIES: [(&str, u64, u64, u64); 3] = [
 const STACK_BYTES: u64 = 16 * 1024;
 
 const FILE: &str = "budgets.toml";
-/// Where the table of what is taken stands, between these lines.
+/// The table of usage stands between these lines.
 const TABLE_FILE: &str = "ARCHITECTURE.md";
 const TABLE: [&str; 2] = ["<!-- taken: cargo xtask size --write -->\n", "<!-- end of taken -->\n"];
 
@@ -52,7 +52,7 @@ pub(crate) struct Cycles {
     pub(crate) reason: String,
 }
 
-/// What the processor may be busy at the fastest line, in percent of all of it, in the worst second.
+/// Limit of the processor's load at the fastest line, in percent, in the worst second.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Load {
@@ -92,12 +92,12 @@ impl Budgets {
         toml::from_str(&text).with_context(|| format!("{}", path.display()))
     }
 
-    /// What the stack takes when every urgency interrupts the one below it at its deepest.
+    /// The stack's depth when every urgency interrupts the one below it at its deepest.
     pub(crate) fn stack_bytes(&self) -> u64 {
         self.stack.values().map(|budget| budget.bytes_max).sum()
     }
 
-    /// What is taken and free on the f405, in KiB and percent.
+    /// Used and free memory on the f405, in KiB and percent.
     fn table(&self) -> String {
         let mut table = "\n| | of | taken | free | limit |\n|---|---|---|---|---|\n".to_owned();
         let kib = |bytes: u64| bytes as f64 / 1024.0;
@@ -118,7 +118,7 @@ impl Budgets {
     }
 }
 
-/// Builds for these boards, prints what they take and fails if any takes more than its budget. `write`: what the first one takes is
+/// Builds for these boards, prints their usage and fails if one exceeds its budget. `write`: the first one's usage is
 /// written into the budgets and the table of ARCHITECTURE.md.
 pub(crate) fn check(boards: &[Board], write: bool) -> Result<()> {
     let budgets = Budgets::read()?;
@@ -144,7 +144,7 @@ pub(crate) fn check(boards: &[Board], write: bool) -> Result<()> {
     Ok(())
 }
 
-/// Writes what is taken of each memory into the budgets, and the table that is made from them.
+/// Writes the usage of each memory into the budgets, and the table that is made from them.
 fn write_taken(used: &BTreeMap<&str, u64>) -> Result<()> {
     let path = repo::root().join(FILE);
     let mut section = String::new();
@@ -170,7 +170,7 @@ fn write_taken(used: &BTreeMap<&str, u64>) -> Result<()> {
     Ok(())
 }
 
-/// What stands before the table, the table, and what follows.
+/// The text before the table, the table, and the text after it.
 fn around_table(text: &str) -> Result<[&str; 3]> {
     let place = |mark: &str| text.find(mark).with_context(|| format!("{TABLE_FILE} has no {mark}"));
     let (from, to) = (place(TABLE[0])? + TABLE[0].len(), place(TABLE[1])?);
@@ -257,7 +257,7 @@ mod tests {
         assert!(compare("f405", &BTreeMap::new(), &limits).is_err());
     }
 
-    /// A limit far above what is taken is none: what grows is not seen.
+    /// A limit far above the usage is useless: it hides growth.
     #[test]
     fn each_limit_is_a_little_above_what_is_taken() {
         let budgets = Budgets::read().unwrap();

@@ -15,7 +15,7 @@ use crate::setup::{self, Need};
 
 /// The recording: PX4, whose frames compress the least.
 const FLIGHT: &str = "tests/flights/px4_hil_quad_low.tlog";
-/// What the stages of the firmware's report are called in the budgets; the others are in the total only.
+/// Names of the report's stages in the budgets; others are in the total only.
 const STAGES: [(&str, &str); 5] = [
     ("framer", "framer"),
     ("encode", "encode"),

@@ -1,4 +1,4 @@
-//! A recorded flight through all of it, and what came of it.
+//! A recorded flight through the whole system, and its results.
 
 use std::fs;
 use std::io::IsTerminal as _;
@@ -41,7 +41,7 @@ impl Options {
                     let Some(flight) = words.next() else {
                         bail!("--flight wants a tlog or a raw recording")
                     };
-                    // As typed where it was typed: the commands themselves run at the root.
+                    // As typed in the user's folder: the commands themselves run at the root.
                     options.flight = std::path::absolute(flight)?;
                 }
                 other => bail!("demo takes --flight FILE, --pc and --no-dashboard, not {other}"),
@@ -77,7 +77,7 @@ pub(crate) fn run(options: &Options) -> Result<()> {
     fly(options, image?.as_deref(), start.elapsed())
 }
 
-/// Records the flight with the firmware in `image`, or on this PC without one, and shows what came of it.
+/// Records the flight with the firmware in `image`, or on this PC without one, and shows the results.
 fn fly(options: &Options, image: Option<&Path>, built: Duration) -> Result<()> {
     let folder = repo::target().join("demo");
     if folder.exists() {

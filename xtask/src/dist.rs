@@ -1,4 +1,4 @@
-//! `cargo xtask dist`: what a release is made of, and proof that whoever builds it gets the same.
+//! `cargo xtask dist`: the files of a release, and proof that every build gives the same.
 //!
 //! A release is built from a commit, in a clone of its own, so that nothing that lies about in the working copy gets
 //! into it. The firmware's flags and files are those of every build of it ([`firmware::flags`], [`firmware::files`]). Two builds in two
@@ -68,7 +68,7 @@ pub(crate) fn run(check: bool) -> Result<()> {
     Ok(())
 }
 
-/// A file of the release: its name and what is in it.
+/// A file of the release: name and content.
 pub(crate) type File = (String, Vec<u8>);
 
 /// A clone in which one release is built.
@@ -167,7 +167,7 @@ impl Release {
         Ok((format!("{name}.cdx.json"), text.into_bytes()))
     }
 
-    /// What somebody needs to know who wants to build the same.
+    /// Information for a person who wants to build the same.
     fn provenance(&self) -> Result<String> {
         let rustc = Shell::new(env::var_os("RUSTC").unwrap_or_else(|| "rustc".into()));
         let rustc = rustc.args(["--version", "--verbose"]).output()?;
@@ -178,7 +178,7 @@ impl Release {
 /// A flight with faults (`docs/usage.md`).
 const FAULTY: &str = "tests/flights/ap_quad_faults.tlog";
 
-/// Whether a program, as `check --json`, finds what is in the flight with faults.
+/// Whether a program, as `check --json`, finds the faults of the flight with faults.
 fn check_findings(program: impl Fn(&Path) -> Shell, tree: &Path) -> Result<()> {
     const FINDINGS: [&str; 3] = ["cell_voltage", "autopilot_state", "batt_state"];
     let (json, code) = program(&tree.join(FAULTY)).output_and_code()?;
@@ -199,7 +199,7 @@ fn lint_for(target: &str) -> Result<()> {
     Shell::cargo().arg("clippy").args(choice).args(["--", "-D", "warnings"]).run()
 }
 
-/// Scripts by which shells complete what is typed, and pages of the manual, as the program makes them.
+/// Completion scripts for shells, and pages of the manual, as the program makes them.
 fn for_shells(program: &Path) -> Result<Vec<File>> {
     let made = |name: &str, arguments: &[&str]| -> Result<File> {
         Ok((name.to_owned(), Shell::new(program).args(arguments).output()?.into_bytes()))
@@ -290,7 +290,7 @@ pub(crate) fn sums(files: &[File]) -> String {
     })
 }
 
-/// The names of what is not the same in both.
+/// The names of files that differ.
 fn differences(one: &[File], other: &[File]) -> Vec<String> {
     let missing = |from: &[File], file: &File| !from.contains(file);
     let mut names: Vec<String> =

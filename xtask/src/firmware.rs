@@ -11,11 +11,11 @@ use crate::image;
 use crate::repo::{self, FIRMWARE_TARGET};
 use crate::shell::Shell;
 
-/// What `cargo rustc` says to the compiler of the last crate, where all of the program is inlined: functions of less than half the
+/// Flags of `cargo rustc` for the last crate, where all of the program is inlined: functions of less than half the
 /// compiler's own limit only. 4.7 KB of flash less, at 0.2 % more load.
 pub(crate) const LAST: [&str; 2] = ["--", "-Cllvm-args=-inline-threshold=40"];
 
-/// What the firmware runs on.
+/// The firmware's targets.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Board {
     /// A real board with an STM32F405.
@@ -51,7 +51,7 @@ impl Board {
         ]
     }
 
-    /// The same with package and profile, for what builds it from the root.
+    /// The same with package and profile, for builds from the root.
     pub(crate) fn cargo_arguments(self) -> Vec<String> {
         ["--package=hums-app", "--profile=firmware"]
             .map(Into::into)
@@ -88,7 +88,7 @@ pub(crate) fn flags(tree: &Path) -> Result<OsString> {
     Ok(flags)
 }
 
-/// cargo with the flags of a release, for what is of the firmware.
+/// cargo with the flags of a release, for the firmware.
 pub(crate) fn cargo() -> Result<Shell> {
     Ok(Shell::cargo().env("CARGO_ENCODED_RUSTFLAGS", flags(repo::root())?))
 }
@@ -99,12 +99,12 @@ fn compile(board: Board, further: &[&str]) -> Result<PathBuf> {
     Ok(repo::target().join(FIRMWARE_TARGET).join("firmware/hums-firmware"))
 }
 
-/// Builds the firmware with logs for a debug probe, and returns where its ELF file lies.
+/// Builds the firmware with logs for a debug probe, and returns its ELF file's path.
 pub(crate) fn build_with_log(board: Board) -> Result<PathBuf> {
     compile(board, &["--features=log"])
 }
 
-/// Builds the firmware for `board` as a release does and returns where its ELF file lies; beside it are the other files of a release.
+/// Builds the firmware for `board` as a release does and returns its ELF file's path; beside it are the other files of a release.
 pub(crate) fn build(board: Board) -> Result<PathBuf> {
     let built = compile(board, &[])?;
     let elf = fs::read(&built).with_context(|| format!("cannot read {}", built.display()))?;
@@ -116,7 +116,7 @@ pub(crate) fn build(board: Board) -> Result<PathBuf> {
     Ok(image)
 }
 
-/// What a user flashes of the firmware of `board`: the name and the content of each file, the ELF file last.
+/// The flashable files of the firmware of `board`: the name and the content of each file, the ELF file last.
 pub(crate) fn files(board: Board, elf: Vec<u8>) -> Result<[(String, Vec<u8>); 3]> {
     let name = format!("hums-{}", board.name());
     let pieces = image::pieces(&elf).with_context(|| name.clone())?;

@@ -21,7 +21,7 @@ pub(crate) enum Way {
     Dfu,
 }
 
-/// What `flash` and `attach` are told.
+/// Arguments of `flash` and `attach`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Options {
     pub(crate) board: Board,
@@ -49,7 +49,7 @@ impl Options {
     }
 }
 
-/// Builds the firmware and programs it. What is stored on the board stays as it is.
+/// Builds the firmware and programs it. The board's store is kept.
 pub(crate) fn flash(options: Options) -> Result<()> {
     setup::ensure(&[Need::Linker, Need::FirmwareTarget], false).require_all()?;
     let elf = firmware::build(options.board)?;

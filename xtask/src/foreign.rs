@@ -1,7 +1,7 @@
 //! `cargo xtask prove foreign`: programs that are not ours on the model of the chip, the second opinion on our reading of the manual.
 //!
 //! They are the examples that packages of the registry bring, fetched and built where this runs; only their names are here. embassy's own
-//! examples are in no package: they come from a checkout of its repository, if there is one. Each program's judge, and what its source says,
+//! examples come from a checkout of its repository, if there is one. Each program's judge, and the behaviour by its source,
 //! is in `chip/stm32f405/examples/foreign`.
 
 use std::fs;
@@ -51,7 +51,7 @@ const PACKAGES: &[Package] = &[
 /// embassy's programs, by their name in `examples/stm32f4/src/bin`, and the tag of its repository that fits [`EMBASSY_MANIFEST`].
 const EMBASSY: &[&str] = &["wdt", "flash", "usart_dma", "usart_buffered", "button_exti", "multiprio"];
 const EMBASSY_TAG: &str = "embassy-stm32-v0.6.0";
-/// What they are built with: the packages of that tag, for an STM32F405.
+/// Their dependencies: the packages of that tag, for an STM32F405.
 const EMBASSY_MANIFEST: &str = r#"
 [package]
 name = "foreign"
@@ -192,9 +192,9 @@ fn embassys(sources: &Path) -> Result<PathBuf> {
     Ok(to)
 }
 
-/// Builds what a package's folder holds, in it, so that its own settings of the linker count.
+/// Builds a package in its own folder, so that its own settings of the linker count.
 fn build<'a>(source: &Path, arguments: impl IntoIterator<Item = &'a str>) -> Result<()> {
-    // What a newer compiler says of others' sources is not ours to mend.
+    // Warnings of a newer compiler about foreign sources do not count.
     let silent = format!("target.{FIRMWARE_TARGET}.rustflags=[\"-Awarnings\", \"--cap-lints=warn\"]");
     Shell::cargo()
         .args(["build", "--release", "--quiet", "--target", FIRMWARE_TARGET, "--config", &silent])

@@ -1,4 +1,4 @@
-//! `cargo xtask fuzz`: the fuzz targets under libFuzzer, one after the other. `fuzz/src/lib.rs` says what they are.
+//! `cargo xtask fuzz`: the fuzz targets under libFuzzer, one after the other. `fuzz/src/lib.rs` describes them.
 
 use std::fs;
 use std::path::Path;
@@ -10,7 +10,7 @@ use crate::shell::Shell;
 
 /// The targets are the folders of the corpus: a test of `hums-fuzz` holds the one against the other.
 const CORPUS: &str = "fuzz/corpus";
-/// What libFuzzer finds new is kept here, and not in the repository.
+/// libFuzzer's new inputs are kept here, outside of the repository.
 const FOUND: &str = "target/fuzz/found";
 /// The longest input, in bytes; each target's own limit is for the mutations on stable Rust.
 const BYTES_MAX: u32 = 16_384;
@@ -26,7 +26,7 @@ pub(crate) fn parse(words: &[&str]) -> Result<u32> {
     }
 }
 
-/// Runs each target for so many seconds; what breaks one lies in `fuzz/libfuzzer/artifacts`.
+/// Runs each target for that many seconds. Inputs that break one are in `fuzz/libfuzzer/artifacts`.
 pub(crate) fn run(seconds: u32) -> Result<()> {
     require(&["+nightly", "--version"], "a nightly compiler: rustup toolchain install nightly")?;
     require(&["fuzz", "--version"], "cargo-fuzz: cargo install cargo-fuzz")?;
@@ -57,7 +57,7 @@ fn targets(corpus: &Path) -> Result<Vec<String>> {
     Ok(names)
 }
 
-/// The `cargo` that understands `+nightly`: that of rustup, not the one that runs this program.
+/// The `cargo` that understands `+nightly`: rustup's, not the one that runs this program.
 fn cargo() -> Shell {
     Shell::new("cargo")
 }

@@ -1,4 +1,4 @@
-//! The `hums` program: one build for tests and demo, and the one that users make for what is measured.
+//! The `hums` program: one build for tests and demo, and the users' build for measurements.
 
 use std::path::PathBuf;
 
@@ -7,7 +7,7 @@ use anyhow::Result;
 use crate::repo;
 use crate::shell::Shell;
 
-/// The build that the tests share (profile `dev`, optimised as `Cargo.toml` says); returns where the program lies.
+/// The build that the tests share (profile `dev`, optimised as `Cargo.toml` says); returns the program's path.
 pub(crate) fn build() -> Result<PathBuf> {
     Shell::cargo().args(["build", "--package=hums"]).run()?;
     Ok(program())
@@ -18,7 +18,7 @@ pub(crate) fn program() -> PathBuf {
     repo::target().join("debug/hums")
 }
 
-/// The build that users make, for measurements; returns where the program lies.
+/// The build that users make, for measurements; returns the program's path.
 pub(crate) fn build_release() -> Result<PathBuf> {
     Shell::cargo().args(["build", "--release", "--package=hums"]).run()?;
     Ok(repo::target().join("release/hums"))

@@ -1,4 +1,4 @@
-//! What of a firmware's ELF file goes where into the flash.
+//! The parts of a firmware's ELF file, with their places in the flash.
 
 use anyhow::{Context as _, Result, bail};
 use object::Endianness;
@@ -30,7 +30,7 @@ pub(crate) fn pieces(elf: &[u8]) -> Result<Vec<Piece>> {
     joined(pieces)
 }
 
-/// In order of address, and what follows directly as one.
+/// In order of address, with adjacent pieces joined.
 fn joined(mut pieces: Vec<Piece>) -> Result<Vec<Piece>> {
     pieces.sort_by_key(|piece| piece.address);
     let mut joined: Vec<Piece> = Vec::new();

@@ -1,7 +1,7 @@
-//! `cargo xtask`: what this repository can do, from nothing but Rust and git.
+//! `cargo xtask`: the tasks of this repository, from nothing but Rust and git.
 //!
-//! Each command first sees to what it needs ([`setup`]): it installs what is missing where it may, and where it may
-//! not it says what to type and goes on as far as that goes. Nothing here is needed to use `hums` itself.
+//! Each command first looks for its requirements ([`setup`]). It installs missing ones if it may. Otherwise it prints the
+//! commands to type, and does the rest of its work. Nothing here is needed to use `hums` itself.
 
 mod bench;
 mod budgets;
@@ -86,7 +86,7 @@ fn main() -> ExitCode {
     }
 }
 
-/// What was asked for.
+/// The requested command.
 #[derive(Debug, PartialEq, Eq)]
 enum Command {
     Demo(demo::Options),

@@ -1,5 +1,5 @@
-//! What is built for this PC: one choice of packages, features and profile, so that tests and campaigns share
-//! what is compiled. Test programs are run as they lie there, without asking cargo again.
+//! Builds for this PC: one choice of packages, features and profile, so that tests and campaigns share
+//! the compiled crates. Test programs are run directly, without asking cargo again.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -28,7 +28,7 @@ const END_TO_END: &str = "hums-tests";
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(crate) struct TestProgram {
     package: String,
-    /// What cargo calls the target: the crate's name for its own tests.
+    /// Cargo's name of the target: the crate's name for its own tests.
     name: String,
     /// From `tests/`, not from the sources.
     is_integration: bool,
@@ -66,7 +66,7 @@ pub(crate) fn build() -> Result<()> {
     Ok(())
 }
 
-/// The test programs among what cargo built.
+/// The test programs among cargo's outputs.
 fn test_programs(artifacts: Vec<Artifact>, metadata: &Metadata) -> Result<Vec<TestProgram>> {
     let mut programs = Vec::new();
     for Artifact { package_id, target, profile, executable, .. } in artifacts {

@@ -1,7 +1,7 @@
-//! `cargo xtask prove`: the campaigns, thousands of cases each; what is left of them is `docs/proof.md`.
+//! `cargo xtask prove`: the campaigns, thousands of cases each; their results are `docs/proof.md`.
 //!
-//! The campaigns themselves are in the tests' crate; this builds them and sees to what they need. Three parts are no
-//! campaigns: `diagnosis` judges labelled flights and writes `docs/diagnosis.md`; `chip` is what the tests on the model of the chip leave out
+//! The campaigns themselves are in the tests' crate; this builds them and their requirements. Three parts are separate
+//! from the campaigns: `diagnosis` judges labelled flights and writes `docs/diagnosis.md`; `chip` has the long tests on the model of the chip
 //! for want of time; `foreign` judges that model by programs that are not ours.
 
 use anyhow::Result;
@@ -13,7 +13,7 @@ use crate::pc;
 use crate::setup::{self, Need};
 use crate::shell::Shell;
 
-/// What the campaigns look at cards with.
+/// The campaigns' tools for cards.
 pub(crate) const NEEDS: &[Need] = &[Need::Dosfstools];
 
 /// The part that runs the image that is flashed.

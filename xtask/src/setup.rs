@@ -1,4 +1,4 @@
-//! What the other commands need: a table of what each is for, how it is found and how it is installed.
+//! Requirements of the other commands: a table with purpose, search and installation of each.
 //!
 //! Rust's own parts come from `rustup`, the rest from `apt-get` as root or by a `sudo` that asks for no password. Where that is
 //! not possible, or with `HUMS_SETUP=never` in the environment, the command to type is printed.
@@ -144,7 +144,7 @@ impl Need {
     }
 }
 
-/// What a line of `sh` prints; none if it fails. The system folders are looked at too: a user's `PATH` on Debian leaves them out.
+/// The output of a line of `sh`; `None` if it fails. The system folders are looked at too: a user's `PATH` on Debian leaves them out.
 fn sh(line: &str) -> Option<String> {
     Shell::new("sh").args(["-c", &format!("PATH=\"$PATH:/usr/sbin:/sbin\"; {line}")]).ask()
 }
@@ -154,7 +154,7 @@ pub(crate) fn find_wine() -> Option<PathBuf> {
     Some(PathBuf::from(sh(FIND_WINE)?.lines().next()?))
 }
 
-/// What is still missing after [`ensure`].
+/// Requirements that are still missing after [`ensure`].
 #[derive(Debug, Default)]
 pub(crate) struct Outcome {
     missing: BTreeSet<Need>,
@@ -175,14 +175,14 @@ impl Outcome {
     }
 }
 
-/// Says what of `needs` is missing and installs it (never with `dry_run`); gives what is missing in the end.
+/// Prints missing `needs` and installs them (never with `dry_run`). Gives those that are missing in the end.
 pub(crate) fn ensure(needs: &[Need], dry_run: bool) -> Outcome {
     let mut missing: Vec<Need> = needs.iter().copied().filter(|need| !need.present()).collect();
     let install = !dry_run && env::var_os("HUMS_SETUP").is_none_or(|value| value != "never");
     for need in &missing {
         let (purpose, line) = (need.row().0, need.install());
         eprintln!("missing: {purpose}\n  {line}");
-        // What is still missing afterwards decides.
+        // Requirements that are still missing decide.
         if install && let Err(error) = Shell::new("sh").args(["-c", &line]).quiet().run() {
             eprintln!("warning: {error:#}");
         }

@@ -1,4 +1,4 @@
-//! Running other programs: every command is shown before it runs, so that what xtask does can be typed by hand.
+//! Running other programs: every command is shown before it runs, so that it can be typed by hand.
 
 use std::ffi::OsStr;
 use std::path::Path;
@@ -59,7 +59,7 @@ impl Shell {
         &self.shown
     }
 
-    /// Without what it writes to stdout, for programs that say much and mean little.
+    /// Without its stdout, for programs with much output of little use.
     pub(crate) fn quiet(mut self) -> Self {
         self.command.stdout(Stdio::null());
         self
@@ -75,7 +75,7 @@ impl Shell {
         Ok(())
     }
 
-    /// Runs it and returns what it wrote to stdout; stderr stays ours. Also the exit code, for programs such as
+    /// Runs it and returns its stdout; stderr stays ours. Also the exit code, for programs such as
     /// `hums decode` whose code 3 is a result.
     pub(crate) fn output_and_code(mut self) -> Result<(String, i32)> {
         eprintln!("$ {}", self.shown);
@@ -110,7 +110,7 @@ pub(crate) fn is_root() -> bool {
     *ROOT.get_or_init(|| Shell::new("id").arg("-u").ask().is_some_and(|id| id.trim() == "0"))
 }
 
-/// In quotes where a shell would otherwise read it differently. A control character (cargo's flags have such between them) is shown as
+/// In quotes if a shell would otherwise read it differently. A control character (cargo's flags have such between them) is shown as
 /// its number: a file into which this is sent stays a text.
 fn quoted(word: &str) -> String {
     let plain = |c: char| c.is_ascii_alphanumeric() || "-_./=:,+@%".contains(c);
@@ -136,7 +136,7 @@ mod tests {
     fn what_is_shown_can_be_typed() {
         let shell = Shell::new("printf").arg("%s").arg("it's here").env("A", "b c");
         assert_eq!(shell.shown, r"A='b c' printf %s 'it'\''s here'");
-        // The character between cargo's flags would make a file of what is shown no text.
+        // The character between cargo's flags would make a file of this output binary.
         let shell = Shell::new("printf").arg("%s").arg("it's\u{1f}a\\b");
         assert_eq!(shell.shown, r"printf %s $'it\'s\x1fa\\b'");
         let typed = Command::new("bash").args(["-c", &shell.shown]).output().unwrap();

@@ -1,4 +1,4 @@
-//! Programs for Windows, run on Linux: under Wine, which is not Windows. What holds there need not hold on Windows itself.
+//! Programs for Windows, run on Linux: under Wine, which is not Windows. Results there need not hold on Windows itself.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -9,7 +9,7 @@ use crate::repo;
 use crate::setup::{WINDOWS_TARGET, find_wine};
 use crate::shell::Shell;
 
-/// What `hums` is made of, besides itself.
+/// The crates of `hums`, besides itself.
 const PARTS: [&str; 8] = [
     "hums-core",
     "hums-blackbox",
@@ -55,7 +55,7 @@ impl Wine {
         self.shell(&self.program).arg(program)
     }
 
-    /// The unit tests of `hums` and of what it is made of.
+    /// The unit tests of `hums` and of its crates.
     pub(crate) fn unit_tests(&self) -> Result<()> {
         let packages = PARTS.into_iter().chain(["hums"]).flat_map(|package| ["--package", package]);
         self.shell(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
@@ -67,7 +67,7 @@ impl Wine {
     }
 
     fn shell(&self, program: impl AsRef<std::ffi::OsStr>) -> Shell {
-        // Its own complaints are of windows that nobody opens here.
+        // Its own complaints concern windows, which are not used here.
         Shell::new(program).env("WINEPREFIX", &self.prefix).env("WINEDEBUG", "-all")
     }
 }

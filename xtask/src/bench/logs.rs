@@ -1,4 +1,4 @@
-//! `cargo xtask bench logs`: how fast `hums check` reads the logs of autopilots, beside what everybody reads them with:
+//! `cargo xtask bench logs`: the speed of `hums check` on logs of autopilots, beside the usual readers:
 //! pymavlink's `DFReader` for `DataFlash`, pyulog for `ULog`. Each reads every message of a log, on one core, one after the
 //! other in the same run; speeds depend on the machine, ratios hardly. What counts is the processor's time, of the program and of the
 //! system for it, and of some rounds the best: what else runs on the machine only makes a round slower.
@@ -21,14 +21,14 @@ use crate::hums;
 use crate::oracle;
 use crate::repo;
 
-/// What `hums check` is to read, in MB a second, on one core.
+/// Target of `hums check`, in MB a second, on one core.
 const ASKED_MB_S: f64 = 100.0;
-/// A log is repeated until it has so many bytes.
+/// A log is repeated to this many bytes.
 const BYTES_MIN: f64 = 16e6;
 /// Runs that are compared.
 const ROUNDS: usize = 5;
 
-/// What reads a log besides, as a program for Python whose first argument is the log.
+/// Another reader of a log, as a program for Python; its first argument is the log.
 const DATAFLASH: &str = "import sys\n\
     from pymavlink import DFReader\n\
     log = DFReader.DFReader_binary(sys.argv[1])\n\
@@ -79,7 +79,7 @@ pub(crate) fn run() -> Result<()> {
     Ok(())
 }
 
-/// The logs, with what else reads them.
+/// The logs, with their other readers.
 fn logs() -> Result<Vec<(PathBuf, &'static str)>> {
     let named = env::var_os("HUMS_LOGS").map(|folders| env::split_paths(&folders).collect::<Vec<_>>());
     let mut waiting = named.unwrap_or_else(|| vec![repo::root().join("tests")]);
@@ -107,7 +107,7 @@ fn logs() -> Result<Vec<(PathBuf, &'static str)>> {
     Ok(logs)
 }
 
-/// The log without its compression, which is not what is measured.
+/// The log without its compression, which is not measured.
 fn plain(log: &Path) -> Result<PathBuf> {
     if log.extension().is_none_or(|extension| extension != "gz") {
         return Ok(log.to_owned());

@@ -1,4 +1,4 @@
-//! `cargo xtask bench`: what the record takes, each figure beside what is asked for.
+//! `cargo xtask bench`: size and speed of the record, each figure beside its target.
 //!
 //! Recordings are those of `tests/flights` and below the folders that `HUMS_FLIGHTS` names (separated by colons). Sizes and
 //! costs repeat to the digit, so they are checked; speeds depend on the machine, so they are only shown.
@@ -24,28 +24,28 @@ use crate::shell::Shell;
 
 /// How much smaller than the tlog a whole session is to be, as a geometric mean.
 const SMALLER_MIN: f64 = 6.5;
-/// How much smaller than what `xz -9e` makes of the tlog.
+/// Ratio of the size to that of `xz -9e` of the tlog.
 const SMALLER_THAN_XZ_MIN: f64 = 2.3;
 /// The processor's clock, Hz.
 const CLOCK_HZ: f64 = 168e6;
 /// Bytes of MAVLink a second at 921,600 baud.
 pub(crate) const BYTES_PER_S: f64 = 92_160.0;
-/// What the encoder may take of the processor.
+/// Limit of the encoder's load.
 const LOAD_MAX: f64 = 0.16;
 /// How fast decoding is to be, as a part of the speed of `gzip -d`.
 const AGAINST_GZIP_MIN: f64 = 0.4;
 /// Steps of all checks, usage and trends, a second.
 const TICKS_PER_S: f64 = 20.0;
-/// The line on which costs are counted: at a slower one what is done by the clock is a larger part of each byte.
+/// The line on which costs are counted: at a slower one, work by the clock is a larger part of each byte.
 const BAUD: &str = "921600";
-/// What is counted at least, in seconds of that line, so that a short recording shows more than its start.
+/// Least length of a count, in seconds of that line, so that a short recording shows more than its start.
 const SECONDS_MIN: f64 = 10.0;
-/// What is decoded at least, in bytes of tlog, so that neither program's start counts for much.
+/// Least input of a decoding, in bytes of tlog, so that the programs' starts hardly count.
 const DECODED_MIN: f64 = 8e6;
 /// Pairs of runs that are compared.
 const ROUNDS: usize = 9;
 
-/// What to measure.
+/// The measurements.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Bench {
     Sizes,
@@ -72,7 +72,7 @@ impl Bench {
     }
 }
 
-/// Measures; an error where a figure that is checked misses its target.
+/// Measures; an error if a checked figure misses its target.
 pub(crate) fn run(what: &[Bench]) -> Result<()> {
     setup::ensure(&[Need::Linker], false).require_all()?;
     let flights = flights()?;
@@ -139,7 +139,7 @@ fn sizes(flights: &[PathBuf]) -> Result<()> {
     sizes_of_sessions(flights).and(logs)
 }
 
-/// What whole sessions take: with every finding, snapshot, counter and statistic that the monitor makes of a recording.
+/// Size of whole sessions: with every finding, snapshot, counter and statistic that the monitor makes of a recording.
 fn sizes_of_sessions(flights: &[PathBuf]) -> Result<()> {
     println!("\nSizes of whole sessions, with all that the monitor records of them\n");
     let program = hums::build_release()?;
@@ -337,7 +337,7 @@ fn print_costs(flight: &str, report: &Value) -> Result<(f64, f64)> {
     Ok((report["cycles"]["encode"].as_f64().context("no stage encode")?, bytes))
 }
 
-/// The part of the processor that so many cycles a byte take on the fastest line.
+/// The load of that many cycles a byte on the fastest line.
 fn load(cycles_per_byte: f64) -> f64 {
     cycles_per_byte * BYTES_PER_S / CLOCK_HZ
 }

@@ -1,4 +1,4 @@
-//! What the benches share.
+//! Shared by the benches.
 
 use std::ffi::OsStr;
 use std::fs;
@@ -26,14 +26,14 @@ pub(super) fn median(values: &mut [f64]) -> f64 {
     values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
 }
 
-/// Where what is measured lies.
+/// Place of the measured files.
 pub(super) fn work_folder() -> Result<PathBuf> {
     let folder = repo::target().join("bench");
     fs::create_dir_all(&folder)?;
     Ok(folder)
 }
 
-/// A recording as often as it takes to have so many bytes.
+/// A recording, repeated to that many bytes.
 pub(super) fn repeat(flight: &Path, bytes_min: f64, to: &Path) -> Result<()> {
     let tlog = fs::read(flight)?;
     let times = (bytes_min / tlog.len().max(1) as f64).ceil().max(1.0) as usize;

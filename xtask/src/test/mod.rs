@@ -29,7 +29,7 @@ fn find(name: &str) -> Option<&'static Step> {
     STEPS.iter().find(|step| step.name == name)
 }
 
-/// Those named, in the order of the table, with what they need before them; all, where none is named.
+/// Those named, in the order of the table, with their requirements before them; all, if none is named.
 fn chosen(only: &[String]) -> Vec<&'static Step> {
     let mut names: Vec<&str> = only.iter().map(String::as_str).collect();
     let mut index = 0;

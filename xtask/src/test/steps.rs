@@ -174,7 +174,7 @@ fn page() -> Result<()> {
     Shell::new(biome).args(["ci", "--error-on-warnings", "--colors=off"]).within(&folder).run()
 }
 
-/// What is flashed is what is tested: the sums are those of `cargo xtask dist` of the same sources.
+/// The tested files are the flashed ones: the sums are those of `cargo xtask dist` of the same sources.
 fn chip() -> Result<()> {
     let elf = FLOWN.image();
     let files = firmware::files(FLOWN, fs::read(&elf).with_context(|| elf.display().to_string())?)?;
@@ -190,7 +190,7 @@ fn sim() -> Result<()> {
     pc::end_to_end("sim", &options)
 }
 
-/// The tests of further recordings are left out where there are none. On the model of the chip they are for `cargo xtask prove`.
+/// The tests of further recordings are left out without such recordings. On the model of the chip they are for `cargo xtask prove`.
 fn further() -> &'static [&'static str] {
     let given = std::env::var_os("HUMS_FLIGHTS").is_some_and(|folder| !folder.is_empty());
     if given { &["--include-ignored"] } else { &[] }
