@@ -14,7 +14,7 @@ use super::Client;
 use crate::duplex::{Duplex, Port};
 use crate::mavlink::ids::HEARTBEAT;
 
-/// What a line's other end says to a frame: who of them, and what.
+/// The other end's answers to a frame: sender and packet.
 pub(super) type Said = Vec<(u8, Packet)>;
 
 struct Line {

@@ -19,14 +19,14 @@ const ANSWER: Duration = Duration::from_millis(700);
 const TRIES: usize = 8;
 /// A card of 512 GB takes two minutes, one of 1 TB four.
 const LIMIT: Duration = Duration::from_mins(5);
-/// A board that says nothing for so long, no heartbeat either, is no longer there.
+/// A board without any message, also without heartbeats, for this long is gone.
 const SILENCE: Duration = Duration::from_secs(15);
 
 /// `MAV_RESULT`
 const ACCEPTED: u8 = 0;
 const IN_PROGRESS: u8 = 5;
 
-/// What `hums box format-card --json` prints.
+/// Output of `hums box format-card --json`.
 const SCHEMA: Schema = Schema::first("hums-format");
 
 #[derive(Debug, Serialize)]
@@ -51,7 +51,7 @@ pub fn run(args: &cli::FormatCard) -> Result<Outcome> {
     Ok(Outcome::Done)
 }
 
-/// What a board says that is formatting.
+/// A message of a board about formatting.
 enum Said {
     /// To our command: a `MAV_RESULT`.
     Result(u8),
@@ -75,7 +75,8 @@ impl Said {
     }
 }
 
-/// Has the card formatted, and waits until it is recorded on: `limit` at most, and `silence` without any word of the board's.
+/// Formats the card and waits until the board records again: at most `limit`, and at most `silence` without a
+/// message of the board.
 fn format(client: &mut Client, silence: Duration, limit: Duration) -> Result<()> {
     let (system, component) = client.target();
     let packet = messages::command_long(FORMAT, &[1.0, 1.0], system, component);
@@ -93,7 +94,7 @@ fn format(client: &mut Client, silence: Duration, limit: Duration) -> Result<()>
     loop {
         // Any frame of the board's says that it is there.
         match client.until(end.min(Instant::now() + silence), |frame| Some(Said::read(frame)))? {
-            // What comes after it was accepted answers the command that was said again.
+            // A result after the acceptance answers the repeated command.
             Some(Some(Said::Result(next))) if result == IN_PROGRESS => {
                 check(next)?;
                 result = next;
@@ -115,7 +116,7 @@ fn format(client: &mut Client, silence: Duration, limit: Duration) -> Result<()>
     }
 }
 
-/// Whether an answer to the command is no refusal.
+/// Fails if the command was refused.
 fn check(result: u8) -> Result<()> {
     match result {
         ACCEPTED | IN_PROGRESS => Ok(()),
@@ -163,7 +164,7 @@ mod tests {
         end(5_000, 5_000, || vec![ack(5, 255), ack(5, 255), ack(0, 255), recording(1)]).expect("done");
         let failed = end(5_000, 5_000, || vec![ack(5, 255), ack(4, 255), recording(1)]);
         assert!(failed.expect_err("it failed").to_string().contains("no card that can be formatted"));
-        // The command was said twice, and the second answer is of a card that is being formatted.
+        // The command was sent twice; the second answer came while the card was being formatted.
         end(5_000, 5_000, || vec![ack(0, 255), ack(2, 255), recording(1)]).expect("done");
     }
 

@@ -35,7 +35,7 @@ const SYSTEM: u8 = 255;
 const OUR_COMPONENT: u8 = 190;
 /// How long the board may keep silent at first.
 const CONNECT: Duration = Duration::from_secs(15);
-/// How long others are listened for once one board is heard: two heartbeats of each, of which a radio may lose one.
+/// Time to look for further boards after the first one: two heartbeats of each, because a radio may lose one.
 const LISTEN: Duration = Duration::from_millis(2_200);
 /// How often we say that we are there: radios and UDP peers learn from it where to answer.
 const PRESENCE: Duration = Duration::from_secs(1);
@@ -50,26 +50,27 @@ pub struct Client {
     duplex: Duplex,
     framer: Framer,
     encoder: Encoder,
-    /// Signs what we send, in this PC's time.
+    /// Signs outgoing frames with this PC's time.
     seal: Option<Seal>,
     begun: Instant,
-    /// The system that the board is part of; 0, which is no system, until it is known.
+    /// System id of the board; 0, an invalid id, until it is known.
     system: u8,
     frames: VecDeque<Vec<u8>>,
     heartbeat_at: Option<Instant>,
 }
 
 impl Client {
-    /// Opens the link and finds the board: the one of `--system`, or the only one that is heard. Which one it is, is said.
+    /// Opens the link and finds the board: the one of `--system`, or the only one on the link. Prints which
+    /// one it is.
     ///
     /// # Errors
-    /// No board is heard; or more than one, and nobody said which: a usage error.
+    /// No board is on the link. Several boards without `--system` are a usage error.
     pub fn connect(link: &Link) -> Result<Self> {
         // Who says which one it is has not to wait for others.
         Self::find_on(link, if link.system.is_some() { Duration::ZERO } else { LISTEN })
     }
 
-    /// The same, for what cannot be undone: others are listened for also where `--system` is given.
+    /// The same for a command that cannot be undone: it looks for further boards even with `--system`.
     pub fn connect_alone(link: &Link) -> Result<Self> {
         Self::find_on(link, LISTEN)
     }
@@ -102,8 +103,8 @@ impl Client {
         }
     }
 
-    /// Takes the board of this system, or of the only one that is heard within `listen` from the first one on. Two boards of one system
-    /// are known by their unique ids, for which each is asked.
+    /// Takes the board of this system, or the only one on the link within `listen` after the first. Two
+    /// boards of one system differ in their unique ids, so each board is asked for its id.
     fn find(&mut self, wanted: Option<u8>, listen: Duration) -> Result<()> {
         let mut heard: BTreeMap<u8, BTreeSet<Board>> = BTreeMap::new();
         let (mut end, mut is_found) = (Instant::now() + CONNECT, false);
@@ -230,7 +231,7 @@ impl Client {
     }
 }
 
-/// What a board tells of itself: its system, and its unique id where it is asked for.
+/// A board's report of itself: its system, and on request its unique id.
 fn told(frame: &Frame<'_>) -> Option<(u8, Option<Board>)> {
     match frame.id() {
         HEARTBEAT => Some((frame.system(), None)),
@@ -239,7 +240,7 @@ fn told(frame: &Frame<'_>) -> Option<(u8, Option<Board>)> {
     }
 }
 
-/// Why there is no board to talk with, where those of these systems are heard.
+/// The error without a usable board; these are the systems on the link.
 fn not_found<'a>(wanted: Option<u8>, heard: impl Iterator<Item = &'a u8>) -> anyhow::Error {
     let systems = heard.map(u8::to_string).collect::<Vec<_>>().join(", ");
     match wanted {
@@ -261,7 +262,7 @@ const fn is_for_us(system: u8, component: u8) -> bool {
     (system == SYSTEM || system == 0) && (component == OUR_COMPONENT || component == 0)
 }
 
-/// What a key file holds: 64 hexadecimal digits, or a passphrase.
+/// The key in a key file: 64 hexadecimal digits, or a passphrase.
 pub fn key(path: &Path) -> Result<Key> {
     let text = String::from_utf8(read_short(path, KEY_FILE_BYTES_MAX).context("--key")?).map_err(|_| {
         usage(format!(
@@ -334,7 +335,7 @@ mod tests {
             let refused = find([1, 2], wanted, 50).expect_err("which one?").to_string();
             assert!(refused.starts_with("2 boards") && refused.contains("of system 7"), "{refused}");
         }
-        // One that is heard by two ways; and who says which one it is and cannot wait gets it.
+        // One board on two paths is found. With a system id and no time to wait, the board is taken at once.
         assert_eq!(find([3, 3], None, 50).expect("one board"), (7, COMPONENT));
         assert_eq!(find([1, 2], Some(7), 0).expect("it is taken"), (7, COMPONENT));
     }

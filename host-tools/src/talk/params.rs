@@ -19,7 +19,7 @@ use crate::output::{self, Schema};
 use crate::printable;
 use crate::talk;
 
-/// A silence of this long in a list means that what is missing was lost.
+/// After a pause of this length in a list, the missing values are lost.
 const GAP: Duration = Duration::from_millis(1_500);
 const ANSWER: Duration = Duration::from_millis(700);
 const TRIES: usize = 8;
@@ -54,7 +54,7 @@ pub fn run(args: &cli::Params) -> Result<Outcome> {
             if *json {
                 show(system, values.collect::<Result<Vec<_>>>()?, true)?;
             } else {
-                // Each as it comes: a later one may not be there.
+                // Each value as it arrives: a later one may fail.
                 values.into_iter().try_for_each(|value| show(system, [value?], false))?;
             }
         }
@@ -91,12 +91,12 @@ pub fn run(args: &cli::Params) -> Result<Outcome> {
     Ok(Outcome::Done)
 }
 
-/// What `hums box params list`, `get` and `set` print with `--json`.
+/// Output of `hums box params list`, `get` and `set` with `--json`.
 const VALUES: Schema = Schema::first("hums-params");
-/// What `hums box params sign --json` prints.
+/// Output of `hums box params sign --json`.
 const SIGNED: Schema = Schema::first("hums-params-sign");
 
-/// What the board said of its key.
+/// The board's report about its key.
 #[derive(Debug, Serialize)]
 struct KeyJson {
     system: u8,
@@ -118,8 +118,8 @@ const fn is_of_names(c: char) -> bool {
     c.is_ascii_uppercase() || c.is_ascii_digit() || c == '_'
 }
 
-/// A name as it can stand in a line of NAME VALUE, and among the members of the JSON that are ours: what no parameter's name has in it is
-/// shown by its number.
+/// A name that fits in a line of NAME VALUE and among the members of our JSON. Characters that do not occur
+/// in parameter names become their numbers.
 fn shown(name: &str) -> String {
     if name.is_empty() {
         return '\0'.escape_unicode().to_string();
@@ -127,8 +127,8 @@ fn shown(name: &str) -> String {
     printable::rewritten(name, |c| !is_of_names(c), |out, c| out.extend(c.escape_unicode())).into_owned()
 }
 
-/// A number as a parameter can have it, and whether it is another one then: as it is printed, which tells no difference
-/// that single precision does not.
+/// The number in single precision, and whether that changes it. Numbers are compared as printed, so rounding
+/// to single precision is not a change.
 fn single(wanted: f64) -> Result<(f32, bool)> {
     let value = wanted as f32;
     if wanted.is_finite() && value.is_infinite() {
@@ -168,7 +168,7 @@ fn no_answer(system: u8, name: &str) -> String {
     format!("system {system}: {name}: no answer; is there such a parameter?")
 }
 
-/// What ends at a zero, or has 16 bytes.
+/// A name, ended by a zero or by the 16th byte.
 fn name_of(bytes: [u8; 16]) -> String {
     let name = bytes.split(|byte| *byte == 0).next().unwrap_or_default();
     String::from_utf8_lossy(name).into_owned()
@@ -193,7 +193,7 @@ fn read(client: &mut Client, name: &str) -> Result<Param> {
     answer.with_context(|| no_answer(system, name))
 }
 
-/// The whole list, and what is wrong with it. What was lost on the way is asked for one by one.
+/// The whole list, and its faults. Lost values are requested one by one.
 fn list(client: &mut Client) -> Result<(Vec<Param>, Vec<String>)> {
     let (system, component) = client.target();
     let request = Packet::new(PARAM_REQUEST_LIST).u8(0, system).u8(1, component);
@@ -245,7 +245,7 @@ fn list(client: &mut Client) -> Result<(Vec<Param>, Vec<String>)> {
     Ok((values.into_values().collect(), wrong))
 }
 
-/// Names that are none, and those that two parameters have.
+/// Invalid names, and names of two parameters.
 fn strange_names(values: &BTreeMap<u16, Param>) -> Vec<String> {
     let mut wrong = Vec::new();
     let mut places: BTreeMap<&str, u16> = BTreeMap::new();

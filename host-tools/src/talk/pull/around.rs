@@ -1,5 +1,6 @@
-//! `hums box pull --around`: over a slow radio a crash's minute first. The moment is found by random access ([`super::moment`]), and
-//! what was recorded round it becomes a part of the log ([`super::part`]). What cannot be read of it, or of what was searched, is told.
+//! `hums box pull --around`: over a slow radio the minute of a crash first. Random access finds the moment
+//! ([`super::moment`]), and the sectors around it become a part of the log ([`super::part`]). Unreadable
+//! sectors in the part or in the search are reported.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -19,23 +20,23 @@ use crate::outcome::Outcome;
 use crate::summary::FindingLine;
 use crate::utc::{When, date_and_time, moment};
 
-/// What was brought.
+/// The result of a download.
 #[derive(Debug)]
 pub(super) struct Brought {
     /// The log's name on the board, and the part.
     pub(super) parts: Vec<(String, PathBuf)>,
-    /// None where no finding that is wanted is in what could be read.
+    /// `None` if the readable sectors hold no such finding.
     pub(super) at: Option<Instant>,
-    /// The finding, where one was asked for.
+    /// The finding, if one was requested.
     pub(super) found: Option<FindingLine>,
     /// Sectors of other sessions that came, and are in no part.
     pub(super) strange: u64,
-    /// Whether all that was asked for could be read. What could not is told.
+    /// Whether all requested sectors were read. Unread ones are reported.
     pub(super) outcome: Outcome,
 }
 
-/// Brings what these logs, those of one session in their order, have round a moment: so much before and after it. Others that the board
-/// has were left out on purpose.
+/// Downloads this span around a moment from the logs of one session, in their order. Other logs of the board
+/// were left out on purpose.
 pub(super) fn pull(
     ftp: &mut Ftp,
     names: &[String],
@@ -89,7 +90,7 @@ pub(super) fn pull(
     }
     let mut is_over = false;
     for reading in &readings {
-        // What comes after a log that goes beyond the moment is not of it.
+        // Logs after one that goes beyond the moment do not count.
         let is_of_it = |unread: &Unread| !is_over && unread.is_within(from, to);
         // The moment goes on behind all that the board has.
         let to_end = reading.is_to_end(names) && reading.span().is_none_or(|(_, end)| end < to);
@@ -115,7 +116,8 @@ fn parts_of(stretches: &[Stretch]) -> Vec<(String, PathBuf)> {
     stretches.iter().map(|stretch| (stretch.name.clone(), stretch.path.clone())).collect()
 }
 
-/// Refuses a moment at which nothing was recorded. Where something cannot be read, it may be that: then it is told.
+/// Refuses a moment without a recording. If a sector is unreadable, the recording may be there; then this is
+/// reported.
 fn check_recorded(
     at: Instant,
     readings: &[Reading],
@@ -163,17 +165,17 @@ fn check_recorded(
     Ok(Outcome::Losses)
 }
 
-/// What a search has found.
+/// The result of a search.
 struct Searched {
     found: Option<FindingLine>,
-    /// What was looked at and could not be read.
+    /// Unreadable sectors in the search.
     unread: Option<Unread>,
     /// All that was looked at.
     stretches: Vec<Stretch>,
 }
 
 impl Searched {
-    /// Says what was found, and what it does not know.
+    /// Prints the finding and the gaps of the search.
     fn tell(&self) -> Outcome {
         let unread = self.unread.as_ref().map(Unread::words);
         if let Some(FindingLine { check, level, at, .. }) = &self.found {
@@ -192,12 +194,12 @@ impl Searched {
 struct Clock {
     /// Microseconds since 1970.
     epoch_us: u64,
-    /// What is behind the record that told it and cannot be read: there it may have been set anew.
+    /// Unreadable sectors after the last clock record: the clock may have been set again there.
     unread: Option<Unread>,
 }
 
 impl Clock {
-    /// Says what it does not know.
+    /// Prints the gaps of the search.
     fn tell(&self) -> Outcome {
         if let Some(unread) = &self.unread {
             note!(
@@ -218,27 +220,29 @@ struct Board<'a> {
     output: &'a Path,
     /// Sectors of other sessions that came, by their logs and places.
     strange: BTreeSet<(String, u32)>,
-    /// What was recorded between the logs that were looked at, or before them, and is in none: their sectors' numbers tell.
+    /// Data recorded between the searched logs or before them, and in none of them, as the sectors' numbers
+    /// show.
     missing: Option<Unread>,
     /// The first log that begins after all that was wanted, and when it does.
     next: Option<(String, Instant)>,
 }
 
-/// Where a log of the session begins.
+/// Beginning of a log of the session.
 struct Begin<'a> {
     name: &'a str,
     /// The number of its first sector.
     number: Option<u32>,
     at: Option<Instant>,
-    /// Its beginning was brought: what is missing between it and a log of the same number is seen when they are read.
+    /// Its beginning was downloaded. A gap between it and a log of the same number is found when both are
+    /// read.
     is_read: bool,
 }
 
 impl Board<'_> {
-    /// Brings what was recorded from one time to the other.
+    /// Downloads the recording between these times.
     fn bring(&mut self, from: Instant, to: Instant) -> Result<Vec<Stretch>> {
         let (mut stretches, mut later) = (Vec::new(), None);
-        // Sectors of a group of which the beginning was not looked for yet, with their logs.
+        // Sectors of a group whose beginning is still to be found, with their logs.
         let mut tails: Vec<(&String, u32)> = Vec::new();
         for name in self.names.iter().rev() {
             let mut log = Remote::open(self.ftp, name, self.output)?;
@@ -285,8 +289,8 @@ impl Board<'_> {
         Ok(stretches)
     }
 
-    /// Notes what is missing between the end of a log, of which this was brought and whose first sector has this number, and the one after
-    /// it; without a log, what is missing before that. What was recorded after the time `to` is not wanted.
+    /// Notes the gap between the end of a downloaded log and the next log, whose first sector has this
+    /// number. Without a log, it is the gap before the next one. Data after the time `to` do not count.
     fn hold_against(
         &mut self,
         before: Option<&Stretch>,
@@ -319,8 +323,9 @@ impl Board<'_> {
         Ok(())
     }
 
-    /// The clock of the log in which a time of day is, as every reader dates that log: by the last clock record of all that are in it. That
-    /// is the newest log that began by its own clock before that time; a log that has no clock goes by the one of the next log.
+    /// The clock of the log that contains a time of day. Every reader dates a log by the last clock record in
+    /// it. The log is the newest one that began before that time by its own clock. A log without a clock uses
+    /// the next log's.
     fn clock(&mut self, utc_us: u64) -> Result<Clock> {
         let mut clock = None;
         for logs in self.names.chunk_by(|one, next| number_of(one) == number_of(next)).rev() {
@@ -337,7 +342,7 @@ impl Board<'_> {
         )
     }
 
-    /// What the clock of a log was at last: its last group tells that can be read.
+    /// A log's last clock record, from its last readable group.
     fn last_clock(&mut self, names: &[String]) -> Result<Option<Clock>> {
         let mut stretches = Vec::new();
         for name in names.iter().rev() {
@@ -398,12 +403,12 @@ impl Board<'_> {
     }
 }
 
-/// The latest finding in what was read that is asked for.
+/// The latest matching finding in the data read.
 fn wanted(reading: &Reading, what: &Around) -> Option<FindingLine> {
     reading.findings().iter().rfind(|finding| is_wanted(what, &finding.check, finding.level)).cloned()
 }
 
-/// Whether a change of level is one that is asked for: that all is well again is none.
+/// Whether a change of level matches the request. A return to normal does not.
 fn is_wanted(what: &Around, check: &str, level: &str) -> bool {
     let is_bad = [Level::Warning, Level::Critical].map(Level::name).contains(&level);
     match what {

@@ -1,5 +1,5 @@
-//! Whether bytes on this PC are the beginning of a board's log. Logs of two cards have the same names and, often
-//! enough, the same lengths: what says that they are one is the content.
+//! Compares bytes on this PC with the beginning of a board's log. Logs of two cards have the same names and
+//! often the same lengths: only their content tells them apart.
 
 use std::fs::File;
 use std::io::{self, Read as _, Seek as _, SeekFrom};
@@ -13,18 +13,18 @@ use super::ftp::Ftp;
 use crate::logs::board::{heading, known};
 use crate::logs::naming::{segment_name, session_name};
 
-/// What is compared where the board computes no checksum: the first sector, which names its session by a random number,
+/// Bytes compared if the board computes no checksum: the first sector, which has the session's random number,
 /// and the last one.
 const SECTOR: u32 = 512;
 /// A file begins with the record of who records, behind at most three sectors of a group that was begun before.
 const HEADING_SECTORS: u32 = 8;
 
-/// What a comparison says.
+/// Result of a comparison.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Likeness {
     /// The checksums are equal.
     Same,
-    /// The board computes none; the first and the last bytes are equal.
+    /// The board computes no checksum; the first and the last bytes are equal.
     SameEnds,
     /// It is another log.
     Other,
@@ -56,9 +56,9 @@ pub(super) fn compare(ftp: &mut Ftp, name: &str, path: &Path, bytes: u32) -> Res
 
 /// The beginning of a log on the board.
 pub(super) struct Heading {
-    /// What the log is called here.
+    /// Name of the log on this PC.
     pub(super) name: String,
-    /// The session that its first sectors name, where one of them can be read.
+    /// The session in its first sectors, if one of them is readable.
     pub(super) session: Option<u32>,
     /// The first sectors, as far as they were looked at.
     pub(super) sectors: Vec<Sector>,
@@ -74,13 +74,13 @@ pub(super) fn beginning_of(head: &[Sector]) -> (Option<u32>, Option<u32>) {
     (session, whole.and_then(|(at, header): (u32, _)| header.number.checked_sub(at)))
 }
 
-/// What the board's log that is open and has so many bytes is called here: by the session that its first sectors name, and the box that
-/// its record of the start does.
+/// Name on this PC for the board's open log of this many bytes. It has the session from the first sectors,
+/// and the box from the record of the start.
 pub(super) fn heading_of(ftp: &mut Ftp, name: &str, length: u32) -> Result<Heading> {
     heading_by(name, length, |at| bytes_of(ftp, at, SECTOR))
 }
 
-/// The same of what came of it, a file here.
+/// The same for a downloaded file on this PC.
 pub(super) fn heading_here(path: &Path, name: &str, length: u32) -> Result<Heading> {
     let unread = || format!("{}: cannot be read", path.display());
     let mut file = File::open(path).with_context(unread)?;

@@ -19,12 +19,13 @@ const ANSWER: Duration = Duration::from_secs(3);
 const TRIES: usize = 10;
 /// A board reads a log of 8 MiB in some 20 s while it has little to record, and in as many minutes at worst.
 const CHECKSUM_TRIES: usize = 100;
-/// A burst is over when nothing came for so long.
+/// A burst is over after a pause of this length.
 const GAP: Duration = Duration::from_millis(2_500);
 
 /// More logs than a card has: its directory has 65,536 entries at most.
 const LOGS_MAX: usize = 100_000;
-/// Pieces of a burst that are taken, and so are held at most: boards send far fewer in one. What comes after them is asked for again.
+/// Maximum number of pieces taken and held from a burst: boards send far fewer in one. Later pieces are
+/// requested again.
 const PIECES_MAX: usize = 4_096;
 
 /// `MAV_FTP_OPCODE`
@@ -75,8 +76,8 @@ impl Answer {
         self.offset.saturating_add(self.data.len() as u32)
     }
 
-    /// Where its data begin, and those of them that lie before `length`: a log in work has grown since it was opened, and a board
-    /// sends all that there is.
+    /// Offset of the data, and the data before `length`. An open log may have grown, and a board sends all it
+    /// has.
     fn before(mut self, length: u32) -> (u32, Vec<u8>) {
         self.data.truncate(length.saturating_sub(self.offset) as usize);
         (self.offset, self.data)
@@ -88,12 +89,12 @@ impl Answer {
     }
 }
 
-/// That nothing comes, which is so with every log: as an error of the link.
+/// A timeout, which concerns every log: an error of the link.
 fn silence(words: &'static str) -> Error {
     io::Error::new(io::ErrorKind::TimedOut, words).into()
 }
 
-/// What a refusal of something that was asked says, and no more.
+/// The text of a refusal.
 fn refused(answer: &Answer, what: &str) -> Error {
     if answer.is_nak(FILE_NOT_FOUND) {
         return anyhow!(
@@ -162,7 +163,7 @@ impl Ftp {
             skipped += text.split('\0').filter(|entry| entry.starts_with('S')).count();
             for entry in text.split('\0').filter_map(|entry| entry.strip_prefix('F')) {
                 let (name, bytes) = entry.split_once('\t').context("a directory entry without a length")?;
-                // A name is a file's in our directory, and nothing else.
+                // A valid name is a plain file name in our directory.
                 if name.contains(['/', '\\']) || name.starts_with('.') {
                     bail!("the board names a file that is none: {name:?}");
                 }
@@ -200,7 +201,7 @@ impl Ftp {
         }
     }
 
-    /// Brings these bytes of the log that is open, in order. Each piece is handed on as it comes, once all before it has.
+    /// Downloads these bytes of the open log, in order. Each piece is handed on once all before it have come.
     pub(super) fn bring(
         &mut self,
         from: u32,
@@ -212,7 +213,7 @@ impl Ftp {
         while have < to {
             let (before, mut pieces) = (have, BTreeMap::new());
             let came = self.burst(have, to, |at, data| {
-                // What lies behind a piece that was lost waits for it.
+                // Pieces after a lost one wait for it.
                 if at >= have {
                     pieces.insert(at, data);
                 }
@@ -246,7 +247,7 @@ impl Ftp {
         Ok(())
     }
 
-    /// Hands on what a burst from `offset` brings, each piece with its offset. Whether anything came.
+    /// Hands on the pieces of a burst from `offset`, each with its offset. Returns whether any came.
     fn burst(
         &mut self,
         offset: u32,

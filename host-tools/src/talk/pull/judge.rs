@@ -1,8 +1,8 @@
-//! What came, judged as `hums info --verify` judges the folder that it makes, in one reading: by the same function, of which all checks count
-//! where all of the board's logs were asked for.
+//! Verifies the downloaded logs as `hums info --verify` does with their folder, in one reading and by the
+//! same function. All of its checks count if all logs of the board were requested.
 //!
-//! Of what was not asked for nothing is missing: files of a session between which others were left out are logs of their own
-//! here, each without what comes before and after it.
+//! A log that was not requested is not missing. If files of a session were left out, the rest count as logs
+//! of their own, without their neighbours.
 
 use std::path::{Path, PathBuf};
 use std::slice;
@@ -26,15 +26,15 @@ pub(super) struct LogJson {
     pub(super) path: PathBuf,
     /// It was not there already.
     pub(super) is_new: bool,
-    /// `hums info --verify` finds no fault with the logs of its session that were asked for and follow each other; and of the last one the end is
-    /// proved, or was not asked for.
+    /// `hums info --verify` finds no fault with the requested logs of its session that follow each other. The
+    /// end of the last one is proved, or was not requested.
     pub(super) whole: bool,
-    /// What is known of the end of the last one of these.
+    /// The end of the last one, as far as known.
     pub(super) end: Option<EndJson>,
 }
 
 impl LogJson {
-    /// What came; all else is for [`judge`].
+    /// The download; the other fields are for [`judge`].
     pub(super) const fn new(name: String, path: PathBuf, is_new: bool) -> Self {
         Self { name, path, is_new, whole: false, end: None }
     }
@@ -65,7 +65,7 @@ impl Asked {
         self.0.iter().any(|(first, last)| (first.session..=last.session).contains(&session))
     }
 
-    /// What of a session these files of it are, on a board that has these logs.
+    /// The part of a session in these files, on a board with these logs.
     fn extent(&self, files: &[String], board: &[Place]) -> Extent {
         let ends = files.first().and_then(|file| place(file)).zip(files.last().and_then(|file| place(file)));
         let Some((first, last)) = ends else { return Extent::ALL };
@@ -106,8 +106,8 @@ impl Asked {
     }
 }
 
-/// Judges logs with what they tell of each other, and says what is wrong with them, and what is not proved; `board` are those that the
-/// board has something of.
+/// Judges logs together and prints faults and missing proofs; `board` are the board's logs that are not
+/// empty.
 pub(super) fn judge(board: &[String], asked: &Asked, pulled: &mut [LogJson]) -> Result<Outcome> {
     let board: Vec<Place> = board.iter().filter_map(|name| place(name)).collect();
     let (mut outcome, mut paths) = (Outcome::Done, Vec::new());
@@ -132,7 +132,7 @@ pub(super) fn judge(board: &[String], asked: &Asked, pulled: &mut [LogJson]) -> 
     Ok(outcome.and(Outcome::lossy(unread > 0)))
 }
 
-/// Says of a log that was read what is wrong with it, or not proved.
+/// Prints the faults and missing proofs of a log that was read.
 fn tell(overview: &Overview, extent: Extent, pulled: &mut [LogJson]) -> Outcome {
     let ending = &overview.ending;
     let failed = failed(overview, extent);
@@ -223,7 +223,7 @@ mod tests {
         let further = |bytes: &[u8]| judged(bytes, "00001_01.HUM", &[NAME]);
         assert_eq!(further(&new[2 * GROUP..]), HOLDS);
         assert_eq!(first(&new[2 * GROUP..]), FAILS);
-        // One that begins in the middle of a group: what is in that can be read only with the file before.
+        // A file that begins in the middle of a group: that group can be read only with the file before.
         let middle = 2 * GROUP + 55 * SECTOR;
         assert_eq!(further(&new[middle..]), FAILS);
         let extent = Extent { from_start: false, ..Extent::ALL };
@@ -235,7 +235,7 @@ mod tests {
             (rest_of_group(&overview, extent), failed(&overview, extent))
         };
         assert_eq!(read(&new[middle..]), (Some(9), Vec::new()), "nothing else is wrong with it");
-        // Where a group's first sector is lost, that is another matter.
+        // A lost first sector of a group is another matter.
         let mut lost = new[2 * GROUP..].to_vec();
         lost[..SECTOR].fill(0);
         let (rest, failed) = read(&lost);
@@ -246,7 +246,7 @@ mod tests {
             mixed[middle..middle + GROUP].copy_from_slice(spoiled);
             assert_eq!(first(&mixed), FAILS);
             assert_eq!(further(&mixed[2 * GROUP..]), FAILS);
-            // At its beginning: that is none of what was not asked for.
+            // The damage is at its beginning, which was requested.
             let mut begins_later = new[2 * GROUP..].to_vec();
             begins_later[..GROUP].copy_from_slice(spoiled);
             assert_eq!(further(&begins_later), FAILS);

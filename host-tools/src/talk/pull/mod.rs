@@ -1,8 +1,9 @@
-//! `hums box pull`: the board's logs over MAVLink FTP, burst by burst; what a burst lost is read piece by piece.
+//! `hums box pull`: the board's logs over MAVLink FTP, burst by burst; lost pieces are read one by one.
 //!
-//! A download that was interrupted is gone on with, once what is there was compared with the beginning of the board's
-//! log (by its checksum, or where the board's firmware computes none by its ends); at the end the whole is compared, and read through as
-//! `hums info --verify` does, also where it is there already. A file's name says whose session it is, so that those of two cards never meet.
+//! An interrupted download is resumed if its bytes match the beginning of the board's log. They are compared
+//! by checksum, or by both ends if the firmware computes none. At the end the whole file is compared and
+//! verified as by `hums info --verify`, also if it was there already. A file's name contains its session, so
+//! files of two cards never collide.
 
 mod around;
 mod compare;
@@ -38,13 +39,13 @@ use crate::plural::{are, count};
 use crate::printable::word;
 use crate::summary::FindingLine;
 
-/// How much comes before it is said again how far it is.
+/// Bytes between two progress messages.
 const TOLD_BYTES: u32 = 8 * 1024;
 
-/// What a log without bytes is. A board does not know a log whose first sector is lost.
+/// Message for an empty log. A board does not list a log whose first sector is lost.
 const NOTHING: &str = "nothing is recorded in it yet, or its first sector cannot be read";
 
-/// What `hums box pull --json` prints.
+/// Output of `hums box pull --json`.
 const SCHEMA: Schema = Schema::first("hums-pull");
 
 #[derive(Debug, Serialize)]
@@ -99,7 +100,7 @@ fn bring(client: Client, args: &cli::Pull) -> Result<Outcome> {
         let such = if skipped > 0 { "lists no such log now" } else { "has no such log" };
         bail!("{missing}: the board {such}; it has {}", names.join(", "));
     }
-    // Whoever names logs does not miss others.
+    // With named logs, others are not missing.
     let listed = Outcome::lossy(skipped > 0 && args.names.is_empty());
     let mut all: Vec<String> =
         logs.iter().filter(|(_, bytes)| *bytes > 0).map(|(log, _)| log.clone()).collect();
@@ -110,13 +111,13 @@ fn bring(client: Client, args: &cli::Pull) -> Result<Outcome> {
             all.into_iter().filter(|log| !args.names.is_empty() && !args.names.contains(log)).collect();
         return Ok(around(&mut ftp, logs, &left_out, args, moment)?.and(listed));
     }
-    // One that was begun just now may have nothing in it yet.
+    // A log begun just now may be empty.
     let begun = begun.filter(|_| args.names.is_empty());
     let asked = if args.names.is_empty() { newest(&mut logs, args.last) } else { Asked::named(&args.names) };
     let mut bringing = Bringing { begun, args, pulled: Vec::new(), gone: Vec::new() };
     let came = bringing.all(&mut ftp, logs, &mut all, &asked);
     let Bringing { mut pulled, gone, .. } = bringing;
-    // Also what came before an error.
+    // Also the logs before an error.
     let judged = judge(&all, &asked, &mut pulled);
     let outcome = came?
         .and(judged?)
@@ -132,7 +133,7 @@ fn bring(client: Client, args: &cli::Pull) -> Result<Outcome> {
 /// Leaves the newest so many logs, or all, each with all of its files.
 fn newest(logs: &mut Vec<(String, u32)>, most: Option<usize>) -> Asked {
     let Some(most) = most else { return Asked::between(Place::default(), Place::MAX) };
-    // One that was begun just now and has nothing yet is no log to be counted, and comes with them.
+    // A log begun just now that is still empty is not counted, and comes with the others.
     let mut numbers: Vec<u32> =
         logs.iter().filter(|(_, bytes)| *bytes > 0).filter_map(|(log, _)| session::number(log)).collect();
     numbers.dedup();
@@ -156,12 +157,12 @@ fn tell_gone(gone: &[String]) -> Outcome {
     Outcome::Losses
 }
 
-/// How often the board's list is asked again, where it gave files away while others came.
+/// How often the board's list is requested again if files disappeared during the download.
 const LISTS_MAX: usize = 8;
 
-/// What comes.
+/// A download.
 struct Bringing<'a> {
-    /// Of this one it is no loss that nothing is in it.
+    /// This log may be empty without a loss.
     begun: Option<String>,
     args: &'a cli::Pull,
     pulled: Vec<LogJson>,
@@ -170,8 +171,8 @@ struct Bringing<'a> {
 }
 
 impl Bringing<'_> {
-    /// Brings these logs whole. Those that the board has given away meanwhile are none of it any more: then its list is asked again, and
-    /// what it has instead comes too; `board` are the files that it has something of.
+    /// Downloads these logs. If the board deleted some meanwhile, its list is requested again, and the new
+    /// logs come too; `board` are its logs that are not empty.
     fn all(
         &mut self,
         ftp: &mut Ftp,
@@ -211,8 +212,8 @@ impl Bringing<'_> {
         Ok(outcome)
     }
 
-    /// Brings these logs whole, one after the other. What is wrong with one of them keeps no other from coming: with the names of those
-    /// that did not.
+    /// Downloads these logs one after the other. A fault of one does not stop the others. Returns the names
+    /// that failed.
     fn each(
         &mut self,
         ftp: &mut Ftp,
@@ -266,8 +267,8 @@ impl Bringing<'_> {
     }
 }
 
-/// Whether each of these logs has all that was recorded before the next file of its session, where that was not asked for: the number with
-/// which that begins tells.
+/// Whether each log is complete up to the next file of its session, if that was not requested. The first
+/// number of the next file shows it.
 fn hold_against_next(
     ftp: &mut Ftp,
     board: &[String],
@@ -320,7 +321,8 @@ fn around(
         }
     }
     let session = session::newest(ftp, &names, !args.names.is_empty())?;
-    // What is between two logs is known by their sectors' numbers. Of the last one's further files a search must say that they were not read.
+    // The sectors' numbers show a gap between two logs. A search must report unread further files of the last
+    // one.
     let last = session.logs.last().and_then(|log| place(log));
     let is_further =
         |log: &&String| place(log) > last && place(log).map(|log| log.session) == last.map(|log| log.session);
@@ -365,7 +367,7 @@ fn around(
     Ok(outcome)
 }
 
-/// Brings a log: where it is, and whether it was not there already; none where nothing is in it.
+/// Downloads a log. Returns its path and whether it is new; `None` for an empty log.
 fn pull(ftp: &mut Ftp, name: &str, output: &Path) -> Result<Option<(PathBuf, bool)>> {
     let length = ftp.open(name)?;
     if length == 0 {
@@ -399,7 +401,7 @@ fn pull(ftp: &mut Ftp, name: &str, output: &Path) -> Result<Option<(PathBuf, boo
     }
     let brought = complete(ftp, name, &mut file, (have, length), part.as_mut(), &heading);
     if let Err(why) = brought {
-        // Before any word about it.
+        // Before any message about it.
         tell_begun(name, file.part())?;
         return Err(why);
     }
@@ -408,7 +410,7 @@ fn pull(ftp: &mut Ftp, name: &str, output: &Path) -> Result<Option<(PathBuf, boo
     Ok(Some((path, true)))
 }
 
-/// Brings what a log lacks of which so many bytes of so many are here, until it is the board's.
+/// Downloads the missing rest of a log until it equals the board's; the counts are bytes here and in all.
 fn complete(
     ftp: &mut Ftp,
     name: &str,
@@ -438,7 +440,7 @@ fn complete(
     same
 }
 
-/// Says of what came of a log that did not come whole how good it is.
+/// Prints the quality of an incomplete log.
 fn tell_begun(name: &str, begun: &Path) -> Result<()> {
     let bytes = begun.metadata().map_or(0, |about| about.len());
     if bytes < SECTOR_BYTES as u64 {
@@ -453,7 +455,7 @@ fn tell_begun(name: &str, begun: &Path) -> Result<()> {
     Ok(())
 }
 
-/// What is wrong with the beginning of a log.
+/// Faults of the beginning of a log.
 fn faults_of(name: &str, begun: &Path) -> Result<Vec<String>> {
     let bytes = begun.metadata().map_or(0, |about| about.len());
     let sectors = u32::try_from(bytes / SECTOR_BYTES as u64).unwrap_or(u32::MAX);
@@ -461,7 +463,7 @@ fn faults_of(name: &str, begun: &Path) -> Result<Vec<String>> {
     Ok(Reading::of(&[stretch])?.faults(false))
 }
 
-/// Nothing of one session gets the name of another one.
+/// Data of one session never get the name of another.
 fn check_same(first: &Heading, now: &Heading) -> Result<()> {
     match (first.session, now.session) {
         (first, now) if first == now => Ok(()),
@@ -475,7 +477,7 @@ fn check_same(first: &Heading, now: &Heading) -> Result<()> {
     }
 }
 
-/// What is on this PC already under the log's name.
+/// The file already on this PC under the log's name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum There {
     Nothing,
@@ -506,7 +508,7 @@ fn there(ftp: &mut Ftp, name: &str, path: &Path, length: u32) -> Result<There> {
         ),
         Likeness::Same if bytes < length => Ok(There::Beginning(bytes)),
         Likeness::Same => Ok(There::Whole),
-        // Not proved: it comes once more, and takes the place of what is there when it is whole.
+        // Equality is not proved: the log is downloaded again and replaces the file once complete.
         Likeness::SameEnds => Ok(There::Nothing),
         Likeness::Other => bail!(
             "{} differs from the board's log of the same session: one of both is damaged or was changed, and `hums info --verify` \
@@ -516,7 +518,8 @@ fn there(ftp: &mut Ftp, name: &str, path: &Path, length: u32) -> Result<There> {
     }
 }
 
-/// How much of the log an earlier run has left that can be gone on with, and what says so; what is of another log goes.
+/// The bytes left by an earlier run that can be resumed, and the kind of proof. Bytes of another log are
+/// deleted.
 fn begun(ftp: &mut Ftp, name: &str, file: &mut Output, length: u32) -> Result<(u32, Likeness)> {
     let part = file.part().to_owned();
     let bytes = u32::try_from(part.metadata()?.len()).unwrap_or(u32::MAX);
@@ -529,7 +532,7 @@ fn begun(ftp: &mut Ftp, name: &str, file: &mut Output, length: u32) -> Result<(u
     Ok((0, likeness))
 }
 
-/// Brings what is missing, but for what is in a part of it that is here already.
+/// Downloads the missing sectors, except those that a part already has.
 fn fetch(
     ftp: &mut Ftp,
     name: &str,
@@ -541,7 +544,7 @@ fn fetch(
     const SECTOR: u32 = SECTOR_BYTES as u32;
     let mut have = from;
     while have < length {
-        // What is begun of a sector is brought to its end.
+        // An incomplete sector is downloaded to its end.
         let place = have.div_ceil(SECTOR);
         if let Some(part) = part.as_mut().filter(|part| have.is_multiple_of(SECTOR) && part.has(place)) {
             let written = file.write_all(part.read(place)?.bytes());
@@ -567,7 +570,7 @@ fn fetch(
     Ok(())
 }
 
-/// Whether what came is the board's log.
+/// Whether the download equals the board's log.
 fn is_whole(ftp: &mut Ftp, name: &str, file: &mut Output, length: u32) -> Result<bool> {
     let flushed = file.flush();
     settle(flushed, file.path())?;

@@ -1,5 +1,5 @@
-//! Where in a log a moment is, by random access: a group begins with its time, so that each sector that is looked at halves the
-//! log.
+//! Finds a moment in a log by random access: a group begins with its time, so each sector read halves the
+//! search.
 
 use std::ops::Range;
 
@@ -10,7 +10,7 @@ use hums_core::clock::Instant;
 /// Sectors before one that cannot be read, among which the beginning of a group is looked for.
 const STEPS_BACK_MAX: u32 = 2 * GROUP_SECTORS as u32;
 
-/// A log of which any sector can be had.
+/// A log with random access to its sectors.
 pub(super) trait Sectors {
     /// How many it has.
     fn count(&self) -> u32;
@@ -57,7 +57,8 @@ pub(super) fn first_group(log: &mut impl Sectors) -> Result<Option<Start>> {
     Ok(None)
 }
 
-/// The group that the sector before this place is in; where none can be read, as far back as one can, or the log's beginning.
+/// Start of the group that holds the sector before this place. If unreadable, the nearest readable start
+/// before it, or the log's beginning.
 pub(super) fn group_before(log: &mut impl Sectors, place: u32) -> Result<u32> {
     let mut place = place;
     while let Some(last) = place.checked_sub(1) {
@@ -74,8 +75,8 @@ pub(super) fn between(log: &mut impl Sectors, from: Instant, to: Instant) -> Res
     Ok(around(log, from)?.start..around(log, to)?.end)
 }
 
-/// Sectors among which is what was recorded at this time: from the beginning of a group that begins then or before, and to one
-/// that begins later, or to the end.
+/// Sectors that hold the recording of this time. They begin with a group that starts then or before, and end
+/// with a group that starts later, or with the log.
 fn around(log: &mut impl Sectors, time: Instant) -> Result<Range<u32>> {
     let group = GROUP_SECTORS as u32;
     let (mut start, mut end) = (0, log.count());
@@ -85,7 +86,7 @@ fn around(log: &mut impl Sectors, time: Instant) -> Result<Range<u32>> {
         match group_of(log, middle)? {
             Some(found) if found.place > start && found.at <= time => start = found.place,
             Some(found) if found.place > start => end = found.place,
-            // Nothing tells what is before it: all of it is taken.
+            // The time before it is unknown: all of it is taken.
             _ => break,
         }
     }

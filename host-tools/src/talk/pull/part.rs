@@ -1,7 +1,7 @@
-//! A part of a log: a file in which each sector that was brought stands at its own place, and zeros stand for the others.
+//! A part of a log: a file with each downloaded sector at its own place, and zeros for the others.
 //!
-//! Its name says that it is a part, `00042-..._07.part.HUM`, and every reader says so too ([`crate::logs::naming::is_part`]). What is
-//! in it is not brought again, neither by `--around` nor when all of the log is.
+//! Its name marks it as a part, `00042-..._07.part.HUM`, and every reader reports that
+//! ([`crate::logs::naming::is_part`]). Neither `--around` nor a full download fetches its sectors again.
 
 use std::collections::BTreeSet;
 use std::fs::{self, File};
@@ -25,17 +25,17 @@ pub(super) struct Part {
     has: Vec<bool>,
     /// Those of them that came now: the others were here before, and may have been changed.
     came: BTreeSet<u32>,
-    /// The session of which it is a part, where a sector has told it.
+    /// The session of the part, once a sector has named it.
     session: Option<u32>,
-    /// The number of the sector that belongs at its beginning, where the first ones tell it.
+    /// The number of the sector at its beginning, if the first ones show it.
     base: Option<u32>,
     /// The places of sectors of other sessions that came, and are not in it.
     strange: BTreeSet<u32>,
 }
 
 impl Part {
-    /// The part beside a log's own path; made when missing. A log in work may have become longer. A file that is no part of the
-    /// log that begins with these sectors is refused.
+    /// Opens the part beside a log's own path, or makes it. An open log may have grown. A file that is not a
+    /// part of the log with these first sectors is refused.
     pub(super) fn open(whole: &Path, sectors: u32, head: &[Sector]) -> Result<Self> {
         let path = part_name(whole);
         if fs::symlink_metadata(&path).is_ok_and(|about| !about.is_file()) {
@@ -78,8 +78,8 @@ impl Part {
         is_there.then(|| Self::open(whole, sectors, head)).transpose()
     }
 
-    /// Whether what has so many bytes is a part of the log that begins with these sectors: it is empty, or has sectors of that
-    /// session and of no other one, and those that are known are the same.
+    /// Whether a file of this many bytes is a part of the log with these first sectors. It is one if it is
+    /// empty. Otherwise its sectors must be of this session only and equal the known ones.
     fn is_of(&mut self, head: &[Sector], bytes: u64) -> Result<bool> {
         let (mut is_empty, mut session) = (true, self.session);
         let mut is_known = false;
@@ -121,13 +121,13 @@ impl Part {
         Ok(())
     }
 
-    /// The places of sectors of other sessions that came, and are not in it: another log has come in its place, or the card has lost
-    /// some.
+    /// Places at which sectors of other sessions came, which are not kept: another log has replaced this one,
+    /// or the card has lost some.
     pub(super) const fn strange(&self) -> &BTreeSet<u32> {
         &self.strange
     }
 
-    /// The number of the sector that belongs at its beginning, where one tells it.
+    /// The number of the sector at its beginning, if known.
     pub(super) const fn base(&self) -> Option<u32> {
         self.base
     }
@@ -162,7 +162,7 @@ impl Part {
         (from..self.has.len() as u32).find(|place| self.has(*place) == is_in)
     }
 
-    /// What is at a place.
+    /// The sector at a place.
     pub(super) fn read(&mut self, place: u32) -> Result<Sector> {
         let mut bytes = [0; SECTOR_BYTES];
         self.seek(place)
@@ -261,7 +261,7 @@ mod tests {
             assert_eq!(fs::read(&path).expect("there"), what);
         }
         fs::remove_file(&path).expect("ours");
-        // What comes of another session while it is read.
+        // A sector of another session comes during the download.
         let mut part = Part::open(&whole, 8, &head).expect("made");
         part.put(0, &sector(0)).expect("room");
         part.put(1, &other(1)).expect("room");

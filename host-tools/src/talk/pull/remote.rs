@@ -1,4 +1,4 @@
-//! A log on the board of which sectors are brought one by one, into the part of it that is here.
+//! A log on the board whose sectors are downloaded one by one into the local part of it.
 
 use std::collections::BTreeSet;
 use std::ops::Range;
@@ -47,7 +47,7 @@ impl<'a> Remote<'a> {
         }
         let mut part = Part::open(&whole, sectors, &heading.sectors)?;
         for (place, sector) in (0..).zip(&heading.sectors) {
-            // The card may have lost since what is here.
+            // The card may have lost sectors that are already here.
             if !part.has(place) {
                 part.put(place, sector)?;
             }
@@ -66,7 +66,7 @@ impl<'a> Remote<'a> {
         Stretch { name, path, places, sectors: self.sectors }
     }
 
-    /// The number of its first sector, where one tells it.
+    /// The number of its first sector, if known.
     pub(super) const fn first_number(&self) -> Option<u32> {
         self.part.base()
     }

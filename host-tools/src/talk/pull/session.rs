@@ -1,5 +1,5 @@
-//! Which of a board's logs are those of one session: what was recorded from one power-on to the next. A longer log has several
-//! files of one number, which name the same session.
+//! The board's logs of one session: the recording from one power-on to the next. A longer log has several
+//! files of one number, with the same session in their sectors.
 
 use std::path::Path;
 
@@ -14,7 +14,7 @@ use crate::outcome::usage;
 #[derive(Debug, Default, PartialEq, Eq)]
 pub(super) struct Session {
     pub(super) logs: Vec<String>,
-    /// Logs among them, or newer ones, of whose beginnings nothing can be read: nobody knows whose they are.
+    /// Logs among them, or newer ones, with an unreadable beginning: their session is unknown.
     pub(super) unknown: Vec<String>,
 }
 
@@ -40,7 +40,7 @@ pub(super) fn number(log: &str) -> Option<u32> {
     place(log).map(|place| place.session)
 }
 
-/// The newest session of these logs, which are in their order. Where the logs were named, all must be of it.
+/// The newest session of these logs, which are in order. Named logs must all belong to it.
 pub(super) fn newest(ftp: &mut Ftp, logs: &[String], are_named: bool) -> Result<Session> {
     let (mut of, mut found) = (None, Session::default());
     for name in logs.iter().rev() {
@@ -68,7 +68,7 @@ pub(super) fn newest(ftp: &mut Ftp, logs: &[String], are_named: bool) -> Result<
         }
     }
     if found.logs.is_empty() {
-        // Perhaps what is behind its beginning can be read.
+        // The sectors after its beginning may be readable.
         found.logs.extend(found.unknown.pop());
     }
     if found.logs.is_empty() {

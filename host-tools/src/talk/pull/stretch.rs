@@ -1,6 +1,6 @@
-//! Sectors of a log that were asked for, as they came, though the rest of it did not: read and judged as `hums info --verify` does a log.
-//! Each place of them is to hold the sector that belongs there. Where one does not, what was recorded then is not known, and what was
-//! looked for may be there.
+//! A stretch of requested sectors of a log, read and judged as by `hums info --verify`, without the rest of
+//! the log. Each place should hold its own sector. If one does not, its part of the recording is unknown and
+//! may hold the wanted data.
 
 use std::ops::Range;
 use std::path::PathBuf;
@@ -22,7 +22,7 @@ use crate::verify::{Extent, failed};
 pub(super) struct Stretch {
     /// As the board calls the log.
     pub(super) name: String,
-    /// Where they are here.
+    /// The file with the sectors on this PC.
     pub(super) path: PathBuf,
     pub(super) places: Range<u32>,
     /// How many places the log has.
@@ -39,7 +39,7 @@ impl Stretch {
     }
 }
 
-/// What was read of stretches that follow each other.
+/// The data read from consecutive stretches.
 pub(super) struct Reading {
     overview: Overview,
     /// The first place holds a sector.
@@ -49,7 +49,7 @@ pub(super) struct Reading {
 }
 
 impl Reading {
-    /// Reads stretches of the logs of one number, in their order, each of which goes on where the one before ends.
+    /// Reads stretches of the logs of one number, in order; each one continues the one before.
     pub(super) fn of(stretches: &[Stretch]) -> Result<Self> {
         let name = stretches.first().map_or_else(String::new, |first| first.name.clone());
         let pieces = stretches.iter().map(Stretch::piece).collect();
@@ -61,7 +61,7 @@ impl Reading {
         })
     }
 
-    /// When the first and the last entry came that could be read. What came before the first entry of a session is nothing.
+    /// Times of the first and the last readable entry. A session has no data before its first entry.
     pub(super) fn span(&self) -> Option<(Instant, Instant)> {
         let summary = &self.overview.ending.summary;
         let first =
@@ -86,12 +86,12 @@ impl Reading {
             || names.iter().any(|name| is_later(&name))
     }
 
-    /// Whether nothing of the session is behind them.
+    /// Whether the session ends with them.
     pub(super) fn is_to_end(&self, names: &[String]) -> bool {
         !self.goes_on(names) && names.last().is_some_and(|newest| newest == self.name())
     }
 
-    /// UTC at power-on, microseconds since 1970, by what was learned last.
+    /// UTC at power-on, microseconds since 1970, by the last clock record.
     pub(super) fn epoch_us(&self) -> Option<u64> {
         self.overview.ending.summary.epoch_us
     }
@@ -101,36 +101,36 @@ impl Reading {
         &self.overview.contents.findings
     }
 
-    /// How they end, where nothing is wrong with that and all of it is not proved.
+    /// The way they end, if the end has no fault but completeness is not proved.
     pub(super) fn unproved_end(&self) -> Option<String> {
         let ending = &self.overview.ending;
         (ending.proof.holds() && !ending.proof.is_whole()).then(|| ending.words())
     }
 
-    /// What is wrong with them, as parts of sentences; with `to_end` also that nothing proves that the log ends with them.
+    /// Their faults, as parts of sentences; with `to_end` also a missing proof of the log's end.
     pub(super) fn faults(&self, to_end: bool) -> Vec<String> {
         self.faults_of(|_| true, to_end)
     }
 
-    /// The same, of what cannot be read only what `is_wanted`.
+    /// The same; of the unreadable places only those that `is_wanted` accepts.
     pub(super) fn faults_of(&self, is_wanted: impl FnOnce(&Unread) -> bool, to_end: bool) -> Vec<String> {
         let unread = self.unread().filter(is_wanted).as_ref().map(Unread::words);
-        // What is missing before them is known by their numbers.
+        // Their numbers show a gap before them.
         let extent = Extent { from_start: false, to_end, follows: false };
         let failed = failed(&self.overview, extent);
         unread.into_iter().chain(failed.into_iter().map(|(check, why)| format!("{check}: {why}"))).collect()
     }
 
-    /// Places of which the sector is not there, or cannot be decoded.
+    /// Places with a missing or undecodable sector.
     pub(super) fn unread(&self) -> Option<Unread> {
         let summary = &self.overview.ending.summary;
         let mut lost = not_ours(&summary.blocks);
         let mut is_lost_behind = not_ours(&summary.behind) > 0;
         if summary.closed {
-            // What lies behind the end of a log is none of it.
+            // Blocks after a log's end do not belong to it.
             (lost, is_lost_behind) = (lost - not_ours(&summary.behind), false);
         }
-        // That what is before them was not asked for is no gap.
+        // The data before them were not requested and are not a gap.
         let is_within = |gap: &&Gap| gap.from.is_some() || gap.sectors_skipped > 0;
         let gaps: Vec<&Gap> = self.overview.contents.gaps.iter().filter(is_within).collect();
         let missing =
@@ -149,12 +149,12 @@ impl Reading {
             Some(gap) => gap.to,
             None => summary.first,
         };
-        // A gap in which nobody knows how many are missing is one at least.
+        // A gap of unknown length counts as at least one sector.
         Some(Unread { sectors: lost.max(missing).saturating_add(useless).max(1), from, to })
     }
 }
 
-/// Blocks that are no sector of the log, or not at their places.
+/// Number of blocks that are not the log's sectors, or not at their places.
 const fn not_ours(blocks: &BlockCounts) -> u64 {
     let BlockCounts { misplaced, damaged, stale, unsound, empty, erased, foreign, .. } = *blocks;
     misplaced + damaged + stale + unsound + empty + erased + foreign
@@ -181,7 +181,8 @@ impl Unread {
         Some(Self { sectors: one.sectors.saturating_add(other.sectors), from: one.from, to: other.to })
     }
 
-    /// Whether any of them may be of this time: where nothing was read before or behind them, they may be of any.
+    /// Whether any of them may be of this time. If no data were read before or after them, they may be of any
+    /// time.
     pub(super) fn is_within(&self, from: Instant, to: Instant) -> bool {
         self.to.is_none_or(|behind| behind >= from) && self.from.is_none_or(|before| before <= to)
     }

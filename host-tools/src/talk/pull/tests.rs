@@ -33,7 +33,7 @@ fn names_in(folder: &Path) -> Vec<String> {
     names
 }
 
-/// What a board has.
+/// Files on a board.
 type Files = Vec<(String, Vec<u8>)>;
 
 /// A board with these logs. Before each answer `change` gets them, with the opcode, and may give an error that is answered.
@@ -41,7 +41,7 @@ fn board_of(files: Files, change: impl FnMut(&mut Files, u8) -> Option<u8> + Sen
     board_with(files, None, change)
 }
 
-/// The same, the card of which does not give the log of this name.
+/// The same with a card that does not list the log of this name.
 fn board_with(
     mut files: Files,
     skipped: Option<&'static str>,
@@ -109,7 +109,7 @@ fn board(log: Vec<u8>, other: Vec<u8>, mut reads: u32) -> Ftp {
     Ftp::new(client).expect("it answers")
 }
 
-/// The first sectors of two sessions, and what `pull` calls the first one.
+/// The first sectors of two sessions, and the name that `pull` gives the first one.
 fn two_logs(dir: &Path) -> (Vec<u8>, Vec<u8>, String) {
     let [one, other] = ["px4_hil_quad_low.tlog", "ap_quad_guided.tlog"]
         .map(|name| packed(dir, name).get(..80 * SECTOR_BYTES).expect("a longer log").to_vec());
@@ -140,7 +140,7 @@ fn a_log_begins_anew_when_the_card_loses_some_of_it_and_is_not_mixed_with_anothe
         } else {
             let told = pulled.expect_err("it is another one").to_string();
             assert!(told.contains("another log has come in its place"), "{told}");
-            // Nothing is left of what was begun.
+            // The begun file was deleted.
             assert_eq!(names_in(&output), Vec::<String>::new());
         }
     }
@@ -157,7 +157,7 @@ fn a_log_begins_anew_when_the_card_loses_some_of_it_and_is_not_mixed_with_anothe
 fn a_card_that_loses_the_beginning_of_a_log_is_not_called_another_log() {
     let dir = tempfile::tempdir().expect("a folder");
     let (log, _, name) = two_logs(dir.path());
-    // The first sector alone, of which the others tell the session; the whole first page.
+    // The first sector alone, whose session the others name; then the whole first page.
     let without = |bytes: usize| [&vec![0; bytes][..], &log[bytes..]].concat();
     for (next, words) in [
         (without(SECTOR_BYTES), None),
@@ -238,7 +238,7 @@ fn a_part_has_sectors_of_one_session_also_where_the_log_is_exchanged_while_it_is
     assert!(brought.strange > 10, "{brought:?}");
 }
 
-/// Seconds of what [`recorded`] records, and the criticals in it.
+/// Length of the recording by [`recorded`] in seconds, and the times of its criticals.
 const SECONDS: u64 = 1_500;
 const CRITICALS_S: [u64; 2] = [200, 1_000];
 /// UTC at its power-on, microseconds since 1970.
@@ -305,7 +305,7 @@ struct Line {
     pull: cli::Pull,
 }
 
-/// Brings what is asked for of these logs.
+/// Runs `pull` with these arguments on these logs.
 fn brought(files: &Files, args: &[&str]) -> Result<Outcome> {
     brought_of(board_of(files.clone(), |_, _| None), args)
 }
@@ -418,7 +418,7 @@ fn a_moment_at_which_nothing_was_recorded_is_refused() {
     for moment in ["0", "0:29.9", "2026-09-21T14:13:20Z", "2026-09-21T14:13:49Z"] {
         assert_eq!(brought(&files, &["--around", moment]).expect("it comes"), Outcome::Done, "{moment}");
     }
-    // It may be in what cannot be read.
+    // It may be in the unreadable sectors.
     for files in spoiled(&log, log.len() / SECTOR_BYTES - 1).into_iter().take(4) {
         assert_eq!(brought(&files, &["--around", "0:29.9"]).expect("it comes"), Outcome::Losses);
     }
@@ -447,7 +447,7 @@ fn a_time_of_day_goes_by_the_last_clock_record_of_its_log() {
         let told = around(&files, "2026-09-21T14:19:30Z").expect_err("by no clock").to_string();
         assert!(told.contains("began later, 2026-09-21 15:13:20 UTC"), "{told}");
     }
-    // Where it cannot be read, that is told.
+    // An unreadable place is reported.
     let mut lost = log.clone();
     lost[in_group..in_group + 512].fill(0);
     assert_eq!(around(&named(lost), "2026-09-21T14:14:20Z").expect("it comes"), Outcome::Losses);
@@ -521,7 +521,7 @@ fn a_session_is_all_that_was_recorded_from_one_power_on() {
     ] {
         assert_eq!(done(&files, args), Outcome::Done, "{args:?}");
     }
-    // What was just begun when the power went.
+    // A log just begun at the power cut.
     let with = |log: &[u8]| [&files[..], &[file("00006_00.HUM", log)]].concat();
     assert_eq!(done(&with(&[]), &["--around", "critical"]), Outcome::Done);
     for newest in [vec![0; 4096], vec![0x5a; 3000]] {
@@ -559,7 +559,7 @@ fn a_sector_of_a_part_that_belongs_elsewhere_is_brought_anew() {
 #[test]
 fn a_board_that_contradicts_itself_is_told() {
     let log = recorded(7, 30);
-    // Its directory has a log in which nothing is when it is opened.
+    // The directory lists a log that is empty when opened.
     let emptied = |files: &mut Files, opcode| {
         if opcode == 4 {
             files[0].1.clear();
@@ -628,7 +628,7 @@ fn a_refusal_says_no_more_than_is_known() {
         let begun = output.join(&names_in(&output)[0]);
         assert_eq!(fs::read(&begun).expect("kept"), log);
         assert_eq!(faults_of(NAME, &begun).expect("it reads"), Vec::<String>::new());
-        // What came damaged is not called good.
+        // A damaged download is not reported as good.
         let mut damaged = log.clone();
         damaged[SECTOR_BYTES * 3..SECTOR_BYTES * 4].fill(0);
         fs::write(&begun, &damaged).expect("written");
@@ -652,7 +652,7 @@ fn files_of(log: &[u8], groups: usize) -> Files {
         .collect()
 }
 
-/// What `hums info --verify` says of a folder.
+/// Result of `hums info --verify` on a folder.
 fn verified(folder: &Path) -> Outcome {
     let found = crate::logs::find::find_in(folder, false).expect("a folder");
     let mut outcome = Outcome::Done;
@@ -689,7 +689,7 @@ fn all_logs_of_a_board_are_judged_as_verify_judges_their_folder() {
             brought_into(folder.path(), board_of(files.clone(), |_, _| None), &[]).expect("they come");
         assert_eq!((pulled, verified(folder.path())), (expected, expected), "{names:?}");
     }
-    // What was not asked for is no loss.
+    // A log that was not requested is not lost.
     let code = |args: &[&str]| brought(&files, args).expect("they come");
     assert_eq!(code(&["--last", "2"]), Outcome::Done);
     assert_eq!(code(&["00001_01.HUM", "00001_03.HUM", &files[last].0]), Outcome::Done);
@@ -860,7 +860,7 @@ fn what_cannot_be_read_far_from_a_moment_is_not_told_with_it() {
     };
     let around =
         |files: &Files, at: &str| brought(files, &["--around", at, "--span", "5"]).expect("it comes");
-    // What comes round a moment is whole groups, which begin before it and end behind it.
+    // The download around a moment has whole groups, which begin before it and end after it.
     let near = group_at(&log, 600);
     let lost = spoiled(near.start..near.end);
     assert_eq!(around(&lost, "600"), Outcome::Losses);
