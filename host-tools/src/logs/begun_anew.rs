@@ -1,9 +1,11 @@
-//! Files that the recorder had just begun to write anew when power went.
+//! Files that the recorder had just begun to rewrite when power failed.
 //!
-//! A full card's oldest file gets the next name before its first new sector is written. If power goes in between, that file has
-//! the newest number and holds the oldest log. Its own beginning tells: it names the session that was recorded just before it,
-//! and a start looks for the newest one. So a log that has a lower number than this file, and a higher one than the session
-//! that this file names, was recorded later than what is in this file.
+//! A full card's oldest file gets the next name before its first new sector is written. If power fails in
+//! between, that file has the newest number and holds the oldest log.
+//!
+//! The file's own beginning shows this. It names the session recorded just before it, and a start looks for
+//! the newest one. A log may have a lower number than this file and a higher one than the session named in
+//! it. Then the log was recorded later than the file's content.
 
 use std::cell::Cell;
 use std::collections::{BTreeMap, BTreeSet};
@@ -19,16 +21,16 @@ use super::reader::likely_epoch;
 const HEAD: [u8; 2] = [b'H', 0xb0 | hums_blackbox::VERSION];
 /// Blocks from a file's beginning in which a start finds a sector, or passes the file over (`PROBE_BLOCKS` of the recorder).
 const PROBE_BLOCKS: usize = 9;
-/// Files that a start looks at (`SEGMENTS_MAX` of the recorder), so a power-on's first log is so many numbers at most behind the
-/// session that it names.
+/// Number of files that a start looks at (`SEGMENTS_MAX` of the recorder). A power-on's first log is at most
+/// this many numbers after the session that it names.
 pub const LOOKED_AT_MAX: u32 = 3;
 
-/// A file of a full card that the recorder has given a new name, to write it anew, and whose old content is still there.
+/// A file of a full card that the recorder has renamed to rewrite it, with its old content still in it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BegunAnew {
     /// The session that the sectors name.
     pub session: u32,
-    /// The number of the log that it held, as that log's beginning tells: where that is lost, none.
+    /// The number of the log that it held, from that log's beginning; `None` if that is lost.
     pub of: Option<u32>,
     /// Or it is a later log of the same power-on.
     pub or_later: bool,
@@ -41,7 +43,7 @@ impl BegunAnew {
         Self { session, of: None, or_later: false, is_confirmed: false }
     }
 
-    /// What it is, as a part of a sentence.
+    /// Its description, as a part of a sentence.
     pub fn words(self) -> String {
         let later = if self.or_later { " or a later one of the same power-on" } else { "" };
         let what = match self.of {
@@ -61,16 +63,16 @@ pub(super) struct Known<'a> {
     pub(super) number: u32,
     /// Its first sector.
     pub(super) first: Header,
-    /// The block in which that lies.
+    /// The block of that sector.
     pub(super) at: usize,
     pub(super) log: &'a Log,
 }
 
-/// The files that were begun anew, by their new numbers: several where power went several times. `numbers` are those of all logs of
-/// a card, `known` the ones that have sectors, in the order of their numbers.
+/// The files begun anew, by their new numbers; several after several power cuts. `numbers` are those of all
+/// logs of a card, `known` the ones with sectors, ordered by number.
 pub(super) fn find(numbers: &BTreeSet<u32>, known: &[Known<'_>]) -> BTreeMap<u32, BegunAnew> {
     let mut all = BTreeMap::new();
-    // The recorder writes nothing anew before the first number is gone.
+    // The recorder rewrites files only after it has used up the first number.
     let Some(oldest) = numbers.first().copied().filter(|oldest| *oldest > 1) else { return all };
     let oldest_names =
         known.first().and_then(|known| before(known.log)).filter(|before| before.number < oldest);
@@ -104,13 +106,13 @@ pub(super) fn find(numbers: &BTreeSet<u32>, known: &[Known<'_>]) -> BTreeMap<u32
     all
 }
 
-/// What is known of a card.
+/// Facts about a card.
 struct Card {
     /// The number of its oldest log.
     oldest: u32,
     /// The session before that one, which is not there any more under its number.
     oldest_names: Option<u32>,
-    /// The sessions of which there is a log.
+    /// The sessions with a log.
     sessions: BTreeSet<u32>,
 }
 
@@ -133,7 +135,7 @@ impl<'a> Lower<'a> {
         let session = one.first.session;
         let part = self.parts.entry(session).or_default();
         *part = one.first.number.max(*part);
-        // What no start finds says nothing of the order.
+        // A record that no start finds does not show the order.
         if one.at >= PROBE_BLOCKS {
             return;
         }
@@ -164,7 +166,7 @@ impl<'a> Lower<'a> {
     }
 }
 
-/// What is known of what a file holds.
+/// Facts about the content of a file.
 enum Held {
     /// It is older than the logs of lower numbers.
     Older(BegunAnew),
@@ -198,9 +200,12 @@ fn held(one: &Known<'_>, lower: &Lower<'_>, card: &Card) -> Held {
     }
 }
 
-/// Whether power went while a file's first sector was written anew: the head of that one is there, of number 0 and of a session of which
-/// the card has nothing else, and fails its check; behind it the older log goes on. A head that went wrong differs in some bytes of the
-/// session only, or has zeros or ones there.
+/// Whether power failed while a file's first sector was rewritten. Three signs show it:
+/// - The head of the new sector has number 0 and a session that occurs nowhere else on the card.
+/// - The sector fails its check.
+/// - The older log continues behind it.
+///
+/// A damaged head differs in some bytes of the session only, or has zeros or ones there.
 fn is_torn(one: &Known<'_>, card: &Card) -> bool {
     let first = || one.log.blocks().next_block().ok().flatten().copied();
     let Some(block) = (one.at == 1).then(first).flatten() else { return false };
@@ -218,7 +223,8 @@ fn is_newer(log: &Log, lower: Option<&Log>) -> bool {
     lower.and_then(epoch).is_some_and(|lower| epoch(log).is_some_and(|own| own > lower))
 }
 
-/// The next start looked at the last one of several in a row, each of which has what was recorded after the one before it.
+/// Marks a series of begun files as confirmed by the next start, which looked at the last one. Each of the
+/// series holds the recording after the one before it.
 fn confirm(known: &[Known<'_>], all: &mut BTreeMap<u32, BegunAnew>) {
     let mut later: Option<(u32, BegunAnew, u32)> = None;
     for (nth, one) in known.iter().enumerate().rev() {
@@ -237,22 +243,22 @@ fn confirm(known: &[Known<'_>], all: &mut BTreeMap<u32, BegunAnew>) {
     }
 }
 
-/// The session before a log on its card and how it ended, where the beginning of the log tells that.
+/// The session before a log on its card and its end, if the beginning of the log records them.
 pub(super) fn before(log: &Log) -> Option<Before> {
     at_beginning(log, |boot| Some(boot.before).filter(Before::has_end))
 }
 
-/// Whether a log's beginning says that there was none on its card.
+/// Whether a log's beginning says that its card had no log.
 pub(super) fn found_nothing(log: &Log) -> bool {
     own(log).is_some_and(|before| before.found == Found::Nothing)
 }
 
-/// What a log's beginning first says of what was on its card.
+/// The first record of a log's beginning about its card.
 fn own(log: &Log) -> Option<Before> {
     at_beginning(log, |boot| Some(boot.before).filter(|before| before.found != Found::Unknown))
 }
 
-/// What it says last of that.
+/// The last such record.
 fn own_last(log: &Log) -> Option<Before> {
     let last = Cell::new(None);
     let _: Option<()> = at_beginning(log, |boot| {

@@ -19,7 +19,7 @@ use super::scan::{Files, Scan, scan};
 use super::sessions::first_session;
 use crate::card::{ReadOnlyImage, length};
 
-/// What a deleted name's digits count up to.
+/// The digits of a deleted name wrap at this number.
 const DIGITS: u32 = 10_000;
 
 /// A file that is a log, or a segment of one.
@@ -47,17 +47,17 @@ pub fn is_card(path: &Path) -> Result<bool> {
     Ok(layout(&ReadOnlyImage::new(File::open(path)?)?).is_ok())
 }
 
-/// The logs that a card's file system knows; none where it has none. No block is searched for more.
+/// The logs in a card's file system; empty without one. Only these blocks are searched.
 pub fn on_card(path: &Path) -> Vec<Log> {
     Card::of(path).map_or_else(Vec::new, |card| card.logs)
 }
 
-/// What a card's file system says of itself. No block is searched for more.
+/// Facts from a card's file system. No further blocks are searched.
 #[derive(Clone, Debug)]
 pub struct Card {
     /// The logs that it knows.
     pub logs: Vec<Log>,
-    /// What is wrong with it, in its first place.
+    /// Its damage, the most important first.
     pub damage: Option<String>,
     /// Bytes that are free for files.
     pub free: u64,
@@ -98,8 +98,8 @@ pub(super) fn image(path: &Path, salvage: bool, found: &mut Found) -> Result<()>
             about.damage.push(cut.unwrap_or_else(|| error.to_string()));
         }
     }
-    // A file system that is damaged tells of some files only, and of none surely: every block is looked at instead. That of a
-    // sound one is read by its files, also where every block is looked at for what no file holds any more.
+    // A damaged file system lists only some files, and none reliably: every block is searched instead. A
+    // sound one is read by its files, also if every block is searched for data outside of the files.
     let known = if about.damage.is_empty() { sessions_of(path, &files) } else { Vec::new() };
     if !known.is_empty() {
         for name in files.iter().filter(|file| file.name.is_none()).map(|file| &file.path) {
@@ -118,7 +118,7 @@ pub(super) fn image(path: &Path, salvage: bool, found: &mut Found) -> Result<()>
     Ok(())
 }
 
-/// The files of logs that a card's file system knows, and what is wrong with it.
+/// The log files in a card's file system, and its damage.
 fn by_file_system(path: &Path, walk: Walk, about: &mut Image) -> Result<Vec<CardFile>> {
     about.damage = walk.damage;
     about.lost_clusters = walk.lost_clusters;
@@ -137,11 +137,12 @@ fn by_file_system(path: &Path, walk: Walk, about: &mut Image) -> Result<Vec<Card
     Ok(walk.files)
 }
 
-/// The number of the newest deleted log that was recorded after all that are there. Older logs are deleted to make room; the newest
-/// one is what a card is read for.
+/// The number of the newest deleted log that was recorded after all others on the card. Older logs are
+/// deleted to make room; the newest one is the reason to read a card.
 fn newest_deleted(path: &Path, files: &[CardFile], deleted: &[Deleted]) -> Result<Option<u32>> {
     let newest = files.iter().filter_map(|file| Some(file.name?.session)).max();
-    // The first digit of a deleted one is lost: of the numbers that it may have had, the next one to those that are there counts.
+    // The first digit of a deleted log's number is lost. Of the possible numbers, the next one after those on
+    // the card counts.
     let after = |deleted: &Deleted| {
         let ahead = (deleted.name.session + DIGITS - newest? % DIGITS) % DIGITS;
         (1..DIGITS / 2).contains(&ahead).then_some((newest? + ahead, *deleted))
@@ -155,8 +156,8 @@ fn newest_deleted(path: &Path, files: &[CardFile], deleted: &[Deleted]) -> Resul
         let Some(first) = first_sector(path, vec![deleted.place])? else { continue };
         let extent = Extent { length: deleted.bytes, ..deleted.place };
         let log = Log { session: Some(first.session), ..lost(path, vec![extent]) };
-        // It goes on with a power-on of which a log is there, or its own beginning says that one of these was recorded just before
-        // it: whatever the clocks say, which may have been wrong.
+        // It continues a power-on with a log on the card, or its own beginning names such a log as the one
+        // just before it. Clocks do not count, because they may have been wrong.
         let is_known = |session: u32| sessions.contains(&session);
         if is_known(first.session) || begun_anew::before(&log).is_some_and(|before| is_known(before.session))
         {
@@ -170,8 +171,8 @@ fn newest_deleted(path: &Path, files: &[CardFile], deleted: &[Deleted]) -> Resul
     Ok(following.or(other.map(|(number, _)| number)))
 }
 
-/// Whether a deleted log was recorded before the first one that is there, which found none on its card, and is newer by its
-/// clock: numbers began anew after all logs had been deleted.
+/// Whether a deleted log is older than all logs on the card. The first one of those found an empty card and
+/// is newer by its clock: numbers began again after all logs had been deleted.
 fn is_older_than_all(deleted: &Log, logs: &[Log]) -> bool {
     let epoch = |log: &Log| likely_epoch(log).ok().flatten();
     let first = logs.first().filter(|first| begun_anew::found_nothing(first));
@@ -179,7 +180,7 @@ fn is_older_than_all(deleted: &Log, logs: &[Log]) -> bool {
         .is_some_and(|first| epoch(first).zip(epoch(deleted)).is_some_and(|(first, deleted)| deleted < first))
 }
 
-/// The sessions of which there are sectors outside of the logs that the file system knows of.
+/// The sessions with sectors outside of the logs in the file system.
 fn by_blocks(path: &Path, length: u64, known: &[Log], about: &mut Image) -> Result<Vec<Log>> {
     let knows_none = known.is_empty() && about.damage.is_empty();
     let Scan { logs, left_out } = scan(path, length, &Files::of(known))?;
@@ -203,7 +204,8 @@ fn by_blocks(path: &Path, length: u64, known: &[Log], about: &mut Image) -> Resu
     Ok(logs)
 }
 
-/// Says of an image that ends before its first partition does that it is cut short. Its volume is then not what is wrong.
+/// The message for an image that ends before its first partition does. Such an image is cut short; its volume
+/// is not damaged.
 fn cut_short(file: &File, device: &ReadOnlyImage) -> io::Result<Option<String>> {
     let mut entry = [0; BLOCK_BYTES];
     let has = length(file)?;
@@ -229,7 +231,7 @@ fn first_sector(path: &Path, extents: Vec<Extent>) -> Result<Option<Header>> {
     first_block(path, extents, |block| Header::read(block).ok())
 }
 
-/// What `look` makes of the first block here of which it makes something.
+/// The first result of `look` on the blocks here.
 fn first_block<T>(
     path: &Path,
     extents: Vec<Extent>,
@@ -245,7 +247,7 @@ fn first_block<T>(
     Ok(None)
 }
 
-/// What lies here, which no file has.
+/// Blocks here that belong to no file, as a log.
 fn lost(path: &Path, extents: Vec<Extent>) -> Log {
     Log {
         name: String::new(),

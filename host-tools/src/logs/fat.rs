@@ -1,12 +1,13 @@
-//! Reads a card's FAT32 volume, trusting nothing on it: every number is checked where it is used, every walk is
-//! bounded, and what does not hold is told while everything that does hold is still read.
+//! Reads a card's FAT32 volume and trusts nothing on it. Every number is checked at its use, and every walk
+//! is bounded. Damage is reported, and all sound parts are still read.
 //!
-//! Reading a whole card needs places (extents), not bytes, and needs the damage named; that is why this does not go
-//! through `embedded-sdmmc`, whose reader stops at the first doubt.
-//! Source of the layout: Microsoft FAT specification 1.03 (`fatgen103`).
+//! Reading a whole card needs places (extents), not bytes, and a name for the damage. That is why this does
+//! not use `embedded-sdmmc`, whose reader stops at the first error. Source of the layout: Microsoft FAT
+//! specification 1.03 (`fatgen103`).
 //!
 //! Memory: a bit for each cluster (32 MiB for the largest volume of FAT32), 64 KiB of the FAT, and at most
-//! `FILES_MAX` files in `EXTENTS_MAX` extents: 10 MiB and 16 MiB. What is beyond is counted and told.
+//! `FILES_MAX` files in `EXTENTS_MAX` extents: 10 MiB and 16 MiB. Entries beyond that are counted and
+//! reported.
 
 use std::fmt;
 use std::fs::File;
@@ -47,7 +48,7 @@ const ATTRIBUTE_LONG_NAME: u8 = 0x0f;
 /// A run of bytes in the image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Extent {
-    /// Where it begins, in bytes from the beginning of the image.
+    /// Start of the volume, in bytes from the beginning of the image.
     pub start: u64,
     /// How long it is, in bytes.
     pub length: u64,
@@ -58,39 +59,40 @@ pub struct Extent {
 pub struct CardFile {
     /// Its directories and its short name, for instance `LOGS/00042_07.HUM`.
     pub path: String,
-    /// Which segment of which session its name says it is. `None` where it is not the name of a segment, and the file's
-    /// first block is a sector of a log.
+    /// Segment and session by its name. `None` for any other name, if the file's first block is a sector of a
+    /// log.
     pub name: Option<LogName>,
     /// The size that the directory says, in bytes.
     pub size: u64,
-    /// Where it lies; less than `size` where its chain is damaged.
+    /// Its places; less than `size` if its chain is damaged.
     pub extents: Vec<Extent>,
 }
 
 /// A deleted segment.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Deleted {
-    /// Its name, of which the first digit is lost and taken for 0.
+    /// Its name, with the lost first digit as 0.
     pub name: LogName,
     /// Its first cluster.
     pub place: Extent,
-    /// The size that it had. What lay behind its first cluster nobody knows: the recorder's files mostly lie in a row.
+    /// Its former size. The places after its first cluster are unknown: the recorder's files are mostly
+    /// contiguous.
     pub bytes: u64,
 }
 
-/// What a walk over the volume found.
+/// Result of a walk over the volume.
 #[derive(Clone, Debug, Default)]
 pub struct Walk {
     /// The logs' segments and other files that begin with a sector of a log, in directory order, up to `FILES_MAX`. The rest
     /// is only checked.
     pub files: Vec<CardFile>,
-    /// What does not hold, as sentences: the first `DAMAGE_MAX`, then one that counts the others.
+    /// Damage, as sentences: the first `DAMAGE_MAX`, then one that counts the others.
     pub damage: Vec<String>,
     /// Clusters that are free.
     pub free_clusters: u64,
     /// Clusters that are allocated and belong to no file: room that a cut left behind, or a file whose entry is lost.
     pub lost_clusters: u64,
-    /// Where they lie, as far as there is room to keep it.
+    /// Their places, as far as there is room.
     pub lost: Vec<Extent>,
     /// The deleted segments whose first clusters are free.
     pub deleted: Vec<Deleted>,
@@ -100,7 +102,7 @@ pub struct Walk {
 
 /// Something that blocks can be read from at any place: an image file, a raw device, memory.
 pub trait ReadAt {
-    /// Reads all of `buffer` from this place, in bytes; what lies beyond the end reads as zeros (a cut image).
+    /// Reads all of `buffer` from this place, in bytes; bytes beyond the end read as zeros (a cut image).
     fn read_at(&self, start: u64, buffer: &mut [u8]) -> io::Result<()>;
 }
 
@@ -221,7 +223,7 @@ impl<'a, I: ReadAt> Volume<'a, I> {
         }
     }
 
-    /// Follows the clusters from `first` on, `clusters_max` at most. Ends at the first doubt, which is told.
+    /// Follows the clusters from `first` on, at most `clusters_max`. Stops at the first error and reports it.
     fn chain(&mut self, first: u32, clusters_max: u64, what: &Name<'_>) -> io::Result<Chain> {
         let mut chain = Chain::default();
         let mut cluster = first;
@@ -265,7 +267,7 @@ impl<'a, I: ReadAt> Volume<'a, I> {
         Ok(())
     }
 
-    /// The entries of a directory that lies here.
+    /// The entries of the directory at these places.
     fn children(&mut self, extents: &[Extent], bytes_max: u64) -> io::Result<Vec<Child>> {
         let mut children = Vec::new();
         let mut bytes = Vec::new();
@@ -386,12 +388,12 @@ impl<'a, I: ReadAt> Volume<'a, I> {
 /// A chain of clusters, as far as it holds.
 #[derive(Default)]
 struct Chain {
-    /// The clusters joined to runs, where they are kept.
+    /// The clusters joined to runs, if requested.
     extents: Vec<Extent>,
     clusters: u64,
 }
 
-/// What a chain is of. Its name is only put together where it is told.
+/// The owner of a chain. Its name is only put together for a report.
 enum Name<'a> {
     Directory(&'a str),
     Child { path: &'a str, child: &'a Child, is_kept: bool },
@@ -434,7 +436,8 @@ struct Child {
 }
 
 impl Entry {
-    /// `None` for what is no file and no directory: long-name parts, the volume's label, `.` and `..`.
+    /// `None` for entries other than files and directories: long-name parts, the volume's label, `.` and
+    /// `..`.
     fn read(entry: &[u8]) -> Option<Self> {
         let entry: &[u8; ENTRY_BYTES] = entry.try_into().ok()?;
         let attributes = entry[11];
@@ -476,7 +479,7 @@ impl Child {
     }
 
     fn name(&self) -> String {
-        // Only what is safe in a path of this PC.
+        // Only characters that are safe in a path of this PC.
         let safe = |bytes: &[u8]| -> String {
             let keep = |byte: &u8| byte.is_ascii_alphanumeric() || b"_-~".contains(byte);
             bytes.iter().map(|byte| if keep(byte) { char::from(*byte) } else { '_' }).collect()

@@ -1,4 +1,4 @@
-//! Finds the logs in files, card images, raw devices and folders, by what is in them.
+//! Finds the logs in files, card images, raw devices and folders, by content.
 
 use std::collections::BTreeMap;
 use std::fs::{self, Metadata};
@@ -14,13 +14,13 @@ use super::naming::{SegmentName, is_part, segment_or_part};
 use super::places::Log;
 use crate::files::{is_seekable, why_unread};
 
-/// Finds all logs in `inputs`; with `salvage` by looking at every block of an image, whatever its file system says. An
-/// error where one of them has none.
+/// Finds all logs in `inputs`; with `salvage` it looks at every block of an image and ignores its file
+/// system. An input without a log is an error.
 pub fn find(inputs: &[PathBuf], salvage: bool) -> Result<Found> {
     search(inputs, salvage, |input| bail!("{}: no log of HUMS is in there", input.display()))
 }
 
-/// The same of one folder, which may have none.
+/// The same for one folder, which may have no log.
 pub fn find_in(folder: &Path, salvage: bool) -> Result<Found> {
     search(&[folder.to_owned()], salvage, |_| Ok(()))
 }
@@ -76,8 +76,8 @@ fn search(inputs: &[PathBuf], salvage: bool, none: impl Fn(&Path) -> Result<()>)
     Ok(found)
 }
 
-/// Refuses what cannot be read from any place: a pipe may never have another end, and a terminal waits for ever. To be
-/// called before a file is opened.
+/// Refuses inputs without random access: a pipe may never have another end, and a terminal waits for ever.
+/// Call it before a file is opened.
 pub fn check_seekable(path: &Path, about: &Metadata) -> Result<()> {
     if !about.is_dir() && !is_seekable(about) {
         bail!(
@@ -115,8 +115,8 @@ fn folder_of(path: &Path) -> PathBuf {
     folder.canonicalize().unwrap_or_else(|_| folder.to_owned())
 }
 
-/// The logs of segments, as if a folder with no others had been named, whatever their order: those of one session are one
-/// log, and those of one folder are of one card.
+/// The logs of single segments, as if the user had named a folder with just these, in any order. Segments of
+/// one session are one log; those of one folder are of one card.
 fn as_in_folders(segments: Segments) -> Vec<Log> {
     let (mut logs, mut prefixes) = (Vec::<Log>::new(), BTreeMap::<String, u32>::new());
     let is_one = segments.len() == 1;

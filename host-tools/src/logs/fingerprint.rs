@@ -1,4 +1,4 @@
-//! What tells whether two logs hold the same sectors, wherever they lie.
+//! Fingerprints of logs: equal for two logs with the same sectors in different places.
 
 use anyhow::Result;
 use sha2::{Digest as _, Sha256};
@@ -29,7 +29,7 @@ impl Fingerprinter {
     }
 }
 
-/// Reads a log's sectors, and decodes none.
+/// Reads a log's sectors without decoding them.
 pub fn fingerprint(log: &Log) -> Result<Fingerprint> {
     let (mut groups, mut all) = (Groups::new(log), Fingerprinter::default());
     while let Some(group) = groups.next_group()? {

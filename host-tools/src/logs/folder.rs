@@ -1,6 +1,6 @@
-//! Walks a folder for logs and images of cards. Only files and folders count: links, pipes, sockets and devices in it are
-//! passed over, and said so. So no loop of links is walked, nothing waits for a pipe's other end, and a log that a link
-//! leads to is not found twice.
+//! Walks a folder for logs and images of cards. Only files and folders count: links, pipes, sockets and
+//! devices are passed over with a remark. So a loop of links is not followed, a pipe without another end does
+//! not block, and a linked log is not found twice.
 
 use std::collections::BTreeMap;
 use std::fs::{self, FileType};
@@ -24,13 +24,14 @@ const SEGMENTS_MAX: usize = 8 * LOGS_MAX;
 
 /// How the names of cards' images end.
 const IMAGES: [&str; 3] = [".img", ".dd", ".iso"];
-/// What follows where they are packed.
+/// Endings of their compressed forms.
 const PACKED: [&str; 5] = [".gz", ".xz", ".zst", ".bz2", ".zip"];
 
-/// What lies in a folder and may be ours.
+/// Entries of a folder that may be ours.
 #[derive(Default)]
 struct Entries {
-    /// Segments by session, which its first one's name stands for; parts of them, which are whole no log, by themselves.
+    /// Segments by session, under the name of its first one. Parts, which are not whole logs, are by
+    /// themselves.
     sessions: BTreeMap<(bool, SegmentName), Vec<(SegmentName, PathBuf)>>,
     segments: usize,
     /// Logs and images.
@@ -132,7 +133,7 @@ impl Entries {
         match (content, segment_name(&path).or_else(|| segment_or_part(&path).filter(|_| is_log))) {
             (Err(error), _) => found.leave_out(format!("{error:#}")),
             (Ok(Content::Unread(unread)), _) => found.leave_out(format!("{shown}: {unread}")),
-            // Whatever is in it: that it holds nothing of ours is told with its log.
+            // Any content: if the file holds no log of ours, the report on its log says so.
             (Ok(content), Some(_)) if content != Content::Log && path.extension().is_none() => {}
             (Ok(_), Some(name)) if self.segments < SEGMENTS_MAX => {
                 self.segments += 1;
@@ -153,12 +154,13 @@ impl Entries {
     }
 }
 
-/// Whether its name ends as that of a log of ours does, compressed or not: what is none is told with the logs of a folder.
+/// Whether its name ends like a log's, compressed or not. A file that is not a log is reported with the logs
+/// of a folder.
 pub fn is_named_as_log(path: &Path) -> bool {
     is_named(path, &[".hum"])
 }
 
-/// Whether its name ends as that of a card's image does, compressed or not.
+/// Whether its name ends like a card image's, compressed or not.
 pub fn is_named_as_card(path: &Path) -> bool {
     is_named(path, &IMAGES)
 }
@@ -186,7 +188,7 @@ fn nothing_of_ours(path: &Path) -> String {
     format!("{}: has the name {what}", path.display())
 }
 
-/// Says of something in a folder that it is no file.
+/// Remark about an entry of a folder that is not a file.
 pub fn passed_over(path: &Path, kind: FileType) -> String {
     let what = if kind.is_symlink() {
         "a link"

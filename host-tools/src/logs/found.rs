@@ -1,4 +1,4 @@
-//! What was found, and what was passed over: bounded, and what is left out is counted.
+//! Logs found and entries passed over: bounded lists; entries beyond them are counted.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -11,16 +11,16 @@ use crate::plural::count;
 pub(super) const LOGS_MAX: usize = 10_000;
 /// Remarks that are kept.
 pub const REMARKS_MAX: usize = 20;
-/// Files of logs and images that are told from each other by their numbers.
+/// Maximum number of log files and images told apart by their file numbers.
 const SEEN_MAX: usize = 200_000;
-/// What was found.
+/// Result of a search.
 #[derive(Clone, Debug, Default)]
 pub struct Found {
     /// The logs, oldest session first.
     pub logs: Vec<Log>,
-    /// What the file systems of the images say of themselves, one for each image.
+    /// Facts from the file systems of the images, one entry for each image.
     pub images: Vec<Image>,
-    /// What was passed over, as sentences: the first [`REMARKS_MAX`], then one that counts the others.
+    /// Entries passed over, as sentences: the first [`REMARKS_MAX`], then one that counts the others.
     pub remarks: Vec<String>,
     remarks_more: u64,
     /// Files that were found a second time.
@@ -29,7 +29,7 @@ pub struct Found {
     pub(super) logs_more: u64,
     /// Files or folders were not looked into, because there were too many.
     left_out: bool,
-    /// Something in a folder was not read for what it is: a link, a pipe, or what is not whole yet.
+    /// An entry of a folder was not read: a link, a pipe, or an incomplete file.
     passed_over: bool,
     /// Files that were looked at, by device and number: one that has two names is one log.
     seen: BTreeSet<FileId>,
@@ -45,7 +45,7 @@ impl Found {
         }
     }
 
-    /// Something in a folder is not read for what it is; a log may be behind it.
+    /// Passes over an entry of a folder; it may be a log.
     pub(super) fn pass_over(&mut self, sentence: String) {
         self.passed_over = true;
         self.remark(sentence);
@@ -71,7 +71,8 @@ impl Found {
         logs.into_iter().for_each(|log| self.log(log));
     }
 
-    /// Whether this file was met before, under this name or another one. Where the system has no numbers for files, no.
+    /// Whether this file was met before, under this name or another one. Always false if the system has no
+    /// file numbers.
     pub(super) fn is_known(&mut self, path: &Path) -> bool {
         let Ok(identity) = FileId::of(path) else { return false };
         let known = self.seen.contains(&identity);
@@ -82,7 +83,7 @@ impl Found {
         known
     }
 
-    /// What was left out becomes a remark.
+    /// Adds remarks about omitted entries.
     pub(super) fn finish(&mut self) {
         if self.logs_more > 0 {
             self.remarks.push(format!(
@@ -95,12 +96,12 @@ impl Found {
         }
     }
 
-    /// Whether something that may be a log was not read for what it is: no damage, and not all there is.
+    /// Whether an entry that may be a log was not read: not damaged, but the result is incomplete.
     pub fn has_passed_over(&self) -> bool {
         self.passed_over
     }
 
-    /// Whether logs were left out, or what may hold one.
+    /// Whether logs, or entries that may hold one, were left out.
     pub fn is_cut(&self) -> bool {
         self.left_out || self.logs_more > 0
     }
@@ -111,7 +112,7 @@ impl Found {
 pub struct Image {
     /// The file.
     pub path: PathBuf,
-    /// What does not hold, as sentences; empty where everything does.
+    /// Damage, as sentences; empty for a sound file system.
     pub damage: Vec<String>,
     /// Clusters that belong to no file.
     pub lost_clusters: u64,
@@ -124,15 +125,15 @@ pub struct Image {
 }
 
 impl Image {
-    /// What there is to say of clusters that belong to no file.
+    /// Words about clusters that belong to no file.
     pub fn lost_words(&self) -> Option<String> {
-        // Where the file system is in order they were looked at, and hold no sector of a log.
+        // In a sound file system they were searched, and hold no sector of a log.
         let what = if self.damage.is_empty() && !self.scanned { " (lost space, no data)" } else { "" };
         let number = Some(self.lost_clusters).filter(|number| *number > 0)?;
         Some(format!("{}{what}", belong(number)))
     }
 
-    /// What was not looked at, where not every block was.
+    /// Words about the blocks that were not searched.
     pub fn not_looked_at(&self) -> Option<String> {
         let deleted = match self.deleted_logs {
             0 => String::new(),

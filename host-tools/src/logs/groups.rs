@@ -1,4 +1,4 @@
-//! A log's blocks as groups of sectors, each of which decodes by itself: the unit of parallel work.
+//! A log's blocks as groups of sectors. Each group decodes by itself: the unit of parallel work.
 
 use anyhow::Result;
 use hums_blackbox::record::Boot;
@@ -12,13 +12,14 @@ use super::strangers::{Strange, Strangers};
 /// Sectors that belong together, in order: a group, or a part of one whose beginning is missing.
 pub type Group = Vec<Step>;
 
-/// Whether a block was set aside and never written, as most of a short log's segment was: the assembler only counts it,
-/// and takes as long as for a sector.
+/// Whether a block was allocated and never written, like most of a short log's segment. The assembler only
+/// counts it, but takes as long as for a sector.
 fn is_empty(block: &[u8; BLOCK_BYTES]) -> bool {
     block.as_chunks().0.iter().all(|piece| *piece == [0; 32])
 }
 
-/// What is wanted of the record of a start with which a log begins; none where there is none, or the log cannot be read.
+/// The wanted value from the record of a start at a log's beginning. `None` without such a record, or if the
+/// log is unreadable.
 pub fn at_beginning<T>(log: &Log, wanted: impl Fn(&Boot<'_>) -> Option<T>) -> Option<T> {
     let mut groups = Groups::new(log);
     for _ in 0..HEADING_GROUPS {
@@ -36,21 +37,21 @@ pub struct Groups<'a> {
     group: Group,
     ended: bool,
     ends_short: bool,
-    /// So many blocks at the end of all are no sectors of any log.
+    /// Number of blocks at the end of all files that belong to no log.
     foreign_at_end: u64,
     /// The file of the last block.
     file: usize,
-    /// The first block of a file, while what lies before it is given out.
+    /// The first block of a file, while the blocks before it are given out.
     first: Option<[u8; BLOCK_BYTES]>,
-    /// None where the sectors of a session were searched for on a card: their places tell nothing.
+    /// `None` if the sectors of a session were searched for on a card: their places have no meaning.
     strangers: Option<Strangers>,
-    /// What was made again of the file of the last block, which is the one that is named. None as with `strangers`.
+    /// Rebuilt sectors of the file of the last block, and that file. `None` as for `strangers`.
     repairs: Option<(Option<usize>, Repairs)>,
     /// The second of two sectors that are read in the place of one block.
     beside: Option<[u8; BLOCK_BYTES]>,
     /// Sectors that were made again.
     repaired: u64,
-    /// What the parity of the files so far tells.
+    /// Evidence from the parity of the files so far.
     evidence: Evidence,
 }
 
@@ -122,7 +123,8 @@ impl<'a> Groups<'a> {
         Ok(())
     }
 
-    /// The next block as it was written, where that can be known; before or behind it what is there, if that is nowhere else.
+    /// The next block as it was written, if known. Before or after it comes the block actually there, if that
+    /// is nowhere else.
     fn read_block(&mut self) -> Result<Option<[u8; BLOCK_BYTES]>> {
         if let Some(beside) = self.beside.take() {
             return Ok(Some(beside));
@@ -166,22 +168,22 @@ impl<'a> Groups<'a> {
         self.strangers.as_ref().map_or_else(Vec::new, Strangers::strange)
     }
 
-    /// What was seen so far.
+    /// Counts so far.
     pub fn counts(&self) -> BlockCounts {
         BlockCounts { repaired: self.repaired, ..self.assembler.counts() }
     }
 
-    /// What parity tells, once all is read.
+    /// Evidence from parity, once all is read.
     pub const fn evidence(&self) -> Evidence {
         self.evidence
     }
 
-    /// What lies behind the last sector.
+    /// Counts of the blocks after the last sector.
     pub const fn behind(&self) -> BlockCounts {
         self.assembler.behind_last()
     }
 
-    /// How many blocks at the end of all are no sectors of any log.
+    /// Number of blocks at the end of all files that belong to no log.
     pub const fn foreign_at_end(&self) -> u64 {
         self.foreign_at_end
     }

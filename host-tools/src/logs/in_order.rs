@@ -1,7 +1,7 @@
-//! Work done side by side and handed on in its order, in bounded memory.
+//! Parallel work with results in order, in bounded memory.
 //!
-//! The calling thread is one of the workers: it fetches items, hands on what is done, and works itself whenever there is
-//! nothing else to do. So one core needs no thread at all, and nobody waits for a thread that is not awake yet.
+//! The calling thread is one of the workers: it fetches items, hands on results, and works itself whenever it
+//! is free. So one core needs no further thread, and no work waits for a thread to wake up.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::mpsc;
@@ -56,7 +56,7 @@ pub fn in_order<T: Send, R: Send>(
                             promise.keep(work(item));
                         }
                     };
-                    // Where the system gives no thread, those that are there do its work.
+                    // If the system gives no more threads, the existing ones do the work.
                     if thread::Builder::new().spawn_scoped(scope, worker).is_err() {
                         break;
                     }
@@ -64,7 +64,7 @@ pub fn in_order<T: Send, R: Send>(
             }
             waiting.extend(results.try_iter());
             if let Some(result) = waiting.remove(&taken) {
-                // A worker that panicked gives nothing; the end of the scope tells.
+                // A worker that panicked has no result; the end of the scope reports it.
                 let Some(result) = result else { break };
                 taken += 1;
                 take(result)?;
@@ -119,7 +119,8 @@ impl<T> Drop for Closing<'_, T> {
     }
 }
 
-/// What a worker sends when it is done: nothing, where it panics, so that nobody waits for it.
+/// A worker's result. It is sent also without a value if the worker panics, so that the receiver does not
+/// wait for it.
 struct Promise<'a, R> {
     sender: &'a mpsc::Sender<(usize, Option<R>)>,
     index: usize,
@@ -134,7 +135,7 @@ impl<R> Promise<'_, R> {
 
 impl<R> Drop for Promise<'_, R> {
     fn drop(&mut self) {
-        // Where nobody listens any more, the work has ended with an error.
+        // Without a receiver, the work has ended with an error.
         let _ = self.sender.send((self.index, self.result.take()));
     }
 }
@@ -214,7 +215,7 @@ mod tests {
     #[should_panic(expected = "a scoped thread panicked")]
     fn a_worker_that_panics_is_told() {
         let work = |item: usize| {
-            // On the calling thread it would be told anyway.
+            // On the calling thread the panic would be reported anyway.
             assert!(thread::current().name().is_some() || item < 10, "for this test");
             thread::sleep(std::time::Duration::from_millis(1));
         };

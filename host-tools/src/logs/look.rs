@@ -1,4 +1,4 @@
-//! What a file is, by what is in it.
+//! The kind of a file, by its content.
 
 use std::fs::File;
 use std::io::Read;
@@ -14,7 +14,7 @@ use crate::mavlink::frame::{Peek, peek};
 /// How far into a file to look for a first sector before calling it no log.
 const LOOK_BLOCKS: usize = 2048;
 
-/// What a file is, by its content.
+/// The kind of a file, by its content.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Content {
     /// Sectors of a log.
@@ -25,7 +25,7 @@ pub enum Content {
     Unread(Unread),
     /// A ground station's log or raw MAVLink: to be recorded first.
     Mavlink,
-    /// Nothing in it.
+    /// An empty file.
     Empty,
     /// Anything else.
     Other,
@@ -62,7 +62,7 @@ impl std::fmt::Display for Unread {
     }
 }
 
-/// What a file is.
+/// Finds the kind of a file.
 pub fn look(path: &Path) -> Result<Content> {
     let context = || format!("{}: cannot be read", path.display());
     let mut file = File::open(path).with_context(context)?;
@@ -93,7 +93,7 @@ pub fn look(path: &Path) -> Result<Content> {
             Err(NotASector::Empty | NotASector::Erased | NotASector::Damaged) => {}
             Err(NotASector::Foreign) => other_blocks += 1,
         }
-        // A partition table stands before everything; a log has a sector early.
+        // A partition table is in front of everything else; a log has a sector early.
         if log_blocks > 0 {
             break;
         }

@@ -1,5 +1,5 @@
-//! What a log's records tell of the log itself: its end marks, whether the vehicle moved on after the last one, what the
-//! recorder lost, and how the log before it on the card ended.
+//! Facts about a log from its own records. They are its end marks, movement after the last one, the
+//! recorder's losses, and the end of the log before it on the card.
 
 use hums_blackbox::Record;
 use hums_blackbox::record::{Before, Found, Resting};
@@ -11,7 +11,7 @@ use crate::loss::lost;
 const ARMED: u8 = 1;
 const TAKE_OFF: u8 = 3;
 const LANDING: u8 = 4;
-/// The number of the event that says that there is no card, or none that can be used.
+/// The number of the event for a missing or unusable card.
 pub(super) const CARD_OUT: u8 = 7;
 /// The check that finds that the card refused blocks.
 pub(super) const REFUSED: &str = "card_errors";
@@ -21,7 +21,7 @@ pub const RESUMED: u8 = 14;
 /// The note that a packed log begins with.
 pub const PACKED: &str = "packed on a PC by hums decode --format hum";
 
-/// What the records of a part of a log say of the log.
+/// Facts about a log from the records of a part of it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[expect(clippy::struct_excessive_bools, reason = "facts that have nothing to do with each other")]
 pub struct Marks {
@@ -33,7 +33,8 @@ pub struct Marks {
     pub last: Option<(Instant, Resting)>,
     /// The first time after it that the vehicle was armed or took off.
     pub moved: Option<Instant>,
-    /// Whether the last of its take-offs and landings is a take-off: what the box counts of a flight it stores at the landing.
+    /// Whether the last take-off or landing is a take-off. The box stores its counts of a flight at the
+    /// landing.
     pub took_off: Option<bool>,
     /// Frames and records that the recorder says it lost.
     pub lost: u64,
@@ -45,7 +46,7 @@ pub struct Marks {
     pub has_boot: bool,
     /// The card refused blocks: its recorder found that.
     pub refused: bool,
-    /// There was no card for a while, or none that could be used.
+    /// The card was missing or unusable for a while.
     pub card_out: bool,
 }
 
@@ -76,12 +77,12 @@ impl Marks {
         }
     }
 
-    /// Whether the card took nothing for a while, as the records say: then a file may have been begun into which nothing came.
+    /// Whether the records report that the card took no data for a while. Then an empty file may exist.
     pub const fn has_card_trouble(&self) -> bool {
         self.refused || self.card_out
     }
 
-    /// Adds those of what follows.
+    /// Adds the facts from the next part.
     pub(super) fn add(&mut self, next: &Self) {
         self.count += next.count;
         self.wrong += next.wrong;

@@ -1,9 +1,12 @@
-//! What the command line calls LOG, IMAGE and DIR, and the logs in it.
+//! Inputs of the command line (LOG, IMAGE and DIR), and the logs in them.
 //!
-//! A log is what the monitor recorded in one session on one card. On the card it is a row of segments
-//! (`00042_00.HUM`, `00042_01.HUM`, …); copied off the card the same files, in a directory; pulled, these with the session in their
-//! names (`naming`); packed, one file.
-//! Whatever it was, here it is a list of places to read blocks of 512 bytes from.
+//! A log is the recording of one session on one card. It comes in several forms:
+//! - on the card, a row of segments (`00042_00.HUM`, `00042_01.HUM`, …);
+//! - copied off the card, the same files in a directory;
+//! - pulled, these with the session in their names (`naming`);
+//! - packed, one file.
+//!
+//! Here each of them is a list of places to read blocks of 512 bytes from.
 
 pub mod begun_anew;
 pub mod board;

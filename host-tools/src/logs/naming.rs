@@ -1,6 +1,8 @@
-//! What the files of a log are called. On a card that is its number alone: `00042_07.HUM`. Elsewhere the name says whose session it is, so
-//! that no other one's files ever have it: `00042-box3f0042000d51373435363338-s1a2b3c4d_07.HUM` is the same segment of the card's log
-//! 00042 of the board with that unique id, and the session that its sectors name.
+//! Names of the files of a log.
+//!
+//! On a card the name is just the number: `00042_07.HUM`. Elsewhere the name contains the session, so that it
+//! is unique: `00042-box3f0042000d51373435363338-s1a2b3c4d_07.HUM` is the same segment of the card's log
+//! 00042. It has the unique id of the board, and the session in its sectors.
 
 use std::cmp::Ordering;
 use std::path::{Path, PathBuf};
@@ -13,19 +15,19 @@ use crate::hex::hex;
 /// The digits of a session.
 const SESSION_DIGITS: usize = 8;
 
-/// The name of a session: what it is called on its card, and whose it is. What is not known is left out: a packed log has no
-/// board.
+/// The name of a session: its name on the card, and its board and session. Unknown parts are left out: a
+/// packed log has no board.
 pub fn session_name(on_card: &str, board: Option<&Board>, session: Option<u32>) -> String {
     let board = board.map_or_else(String::new, |board| format!("-box{}", hex(board)));
     let session = session.map_or_else(String::new, |session| format!("-s{session:08x}"));
     format!("{on_card}{board}{session}")
 }
 
-/// The segment that a file's name says it is. In their order those of a box are together, the oldest first: by their numbers,
-/// and not by what names a session, which is random.
+/// Segment and session in a file's name. In order, the segments of a box are together, the oldest first: by
+/// number, not by the random name of the session.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SegmentName {
-    /// Whose session it is, `box3f0042000d51373435363338-s1a2b3c4d`; empty where the name is that of a card.
+    /// Box and session, `box3f0042000d51373435363338-s1a2b3c4d`; empty in a name from a card.
     pub of: String,
     /// The session's number on its card.
     pub session: u32,
@@ -55,12 +57,12 @@ impl SegmentName {
         Self { segment: 0, ..self.clone() }
     }
 
-    /// The box, where the name tells it: the logs of one box are read as those of one card.
+    /// The box, if it is in the name: the logs of one box are read as those of one card.
     pub fn recorder(&self) -> &str {
         self.of.rsplit_once('-').map_or("", |(recorder, _)| recorder)
     }
 
-    /// The log's name for people: `00042`, behind that of its box where the name tells it.
+    /// The log's name for people: `00042`, after the name of its box if known.
     pub fn log(&self) -> String {
         match self.recorder() {
             "" => format!("{:05}", self.session),
@@ -84,7 +86,7 @@ pub fn segment_name(path: &Path) -> Option<SegmentName> {
     Some(SegmentName { of, session, segment })
 }
 
-/// What stands before the ending of a part of a log.
+/// Mark of a part of a log, in front of the ending.
 const PART: &str = ".part";
 
 /// The path of a part of this log, which `hums box pull --around` brings: `00042-s1a2b3c4d_07.part.HUM`.
@@ -106,8 +108,9 @@ pub fn is_part(path: &Path) -> bool {
     is_hum && stem.is_some_and(|stem| stem.ends_with(PART))
 }
 
-/// What stands before and what is the identity with which the name of what is made of a log ends, without its ending: a session,
-/// `s1a2b3c4d`, or the content of another recording, `r1a2b3c4d`. A further log of a session has a number behind it.
+/// Splits the name of a file made from a log, without its ending, into the rest and the identity at its end.
+/// The identity is a session, `s1a2b3c4d`, or the content of another recording, `r1a2b3c4d`. A further log of
+/// a session has a number after it.
 pub fn identity_at_end(stem: &str) -> Option<(&str, &str)> {
     let split = |stem: &'_ str| -> Option<usize> {
         let at = stem.rfind('-')?;
@@ -126,7 +129,7 @@ pub fn session_of(identity: &str) -> Option<u32> {
     u32::from_str_radix(identity.strip_prefix('s')?, 16).ok()
 }
 
-/// Whether a name ends with a session, `s1a2b3c4d`, behind a box or nothing.
+/// Whether a name ends with a session, `s1a2b3c4d`, alone or after a box.
 fn is_of_session(of: &str) -> bool {
     let session = match of.rsplit_once('-') {
         Some((recorder, session)) if recorder.starts_with("box") => session,

@@ -30,12 +30,12 @@ pub struct Log {
     pub name: String,
     /// The names of its files: on the card for a card's, on this PC otherwise.
     pub files: Vec<String>,
-    /// Where it lies, in order: a piece for each of its files.
+    /// Its places, in order: a piece for each of its files.
     pub pieces: Vec<Piece>,
-    /// What its sectors name as their session, where a scan told it; otherwise that of the first sector counts.
+    /// The session of its sectors, if a scan found it; otherwise its first sector decides.
     pub session: Option<u32>,
-    /// It is what is left of a session that no file of a sound file system holds any more: sectors that a newer one has not
-    /// written over.
+    /// The rest of a session outside of all files of a sound file system: sectors that a newer session has
+    /// not overwritten.
     pub left_over: bool,
 }
 
@@ -51,8 +51,9 @@ impl Log {
         last.is_some_and(|extent| extent.length % BLOCK_BYTES as u64 != 0)
     }
 
-    /// The number of its first file, where the files are segments by their names: the ring of a vehicle that is recorded by
-    /// arming, and a full card, take those before it. What was searched for on a card has none.
+    /// The number of its first file, if the files are segments by their names. Earlier files were deleted by
+    /// a full card, or by the ring of a vehicle that is recorded by arming. `None` for sectors found by a
+    /// search of a card.
     pub fn first_segment(&self) -> Option<u32> {
         let name = self.files.first().filter(|_| self.session.is_none());
         name.and_then(|name| segment_name(Path::new(name))).map(|name| name.segment)
@@ -71,7 +72,7 @@ pub struct Blocks<'a> {
     extent: usize,
     /// Bytes of the extent already read.
     offset: u64,
-    /// Bytes of the piece before what is in the buffer.
+    /// Bytes of the piece before the buffer.
     begun: u64,
     file: Option<File>,
     buffer: Vec<u8>,
@@ -95,7 +96,7 @@ impl<'a> Blocks<'a> {
         Ok(self.buffer.get(self.at - BLOCK_BYTES..).and_then(|rest| rest.first_chunk()))
     }
 
-    /// Where the last block lies: its piece, and its place in that, in blocks.
+    /// Place of the last block: its piece, and the block number in that.
     pub const fn place(&self) -> (usize, u64) {
         (self.piece, (self.begun + self.at as u64).saturating_sub(1) / BLOCK_BYTES as u64)
     }
@@ -143,7 +144,7 @@ impl<'a> Blocks<'a> {
                 none => none.insert(File::open(&piece.path).with_context(context)?),
             };
             self.begun += self.buffer.len() as u64;
-            // What is overwritten is not filled with zeros before.
+            // The bytes to be overwritten are not zeroed first.
             self.buffer.resize((length as usize).next_multiple_of(BLOCK_BYTES), 0);
             let (bytes, behind) = self.buffer.split_at_mut(length as usize);
             file.read_at(extent.start + self.offset, bytes).with_context(context)?;

@@ -1,10 +1,10 @@
-//! Reads a log: groups are decoded in parallel, a few at a time, and what they hold is handed on in order, with the
-//! gaps between them.
+//! Reads a log. Groups are decoded in parallel, a few at a time. Their contents are handed on in order, with
+//! the gaps between them.
 //!
-//! Memory is bounded, whatever the log's size and whatever is in it: two groups are in work for each worker, 16 at most,
-//! and each becomes [`PART_BYTES`] and one entry at most. A group that becomes more (equal frames are coded 2,000 times
-//! smaller than they are) is handed on in parts: its decoder waits with the first part until its turn comes, and decodes
-//! the rest then.
+//! Memory is bounded for any log. Two groups are in work for each worker, 16 at most, and each becomes
+//! [`PART_BYTES`] and one entry at most. A larger group (equal frames are coded 2,000 times smaller than they
+//! are) is handed on in parts. Its decoder waits with the first part until its turn comes, and decodes the
+//! rest then.
 
 use std::cell::Cell;
 
@@ -23,11 +23,11 @@ use crate::plural::count;
 /// Groups in work for each worker, and at most.
 const GROUPS_PER_WORKER: usize = 2;
 const GROUPS_MAX: usize = 16;
-/// What a group's entries may become before they are handed on: more than a group of a usual flight becomes in any
-/// format (a few megabytes as JSON lines), so that usual flights are decoded in parallel from end to end.
+/// Maximum size of a group's entries before they are handed on. A group of a usual flight is smaller in any
+/// format (a few megabytes as JSON lines). So usual flights are decoded in parallel from end to end.
 pub const PART_BYTES: usize = 4 << 20;
 
-/// What one group's entries become, or a part of them; made in parallel, handed on in order.
+/// The result of one group's entries, or of a part of them; made in parallel, handed on in order.
 pub trait Collect: Send {
     /// Takes the next entry of the group.
     fn entry(&mut self, entry: &Entry<'_>);
@@ -52,7 +52,7 @@ pub trait Deliver<C> {
     fn group(&mut self, collected: C) -> Result<()>;
 }
 
-/// What was read, in all.
+/// Totals of the reading.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Summary {
     /// The session that the sectors name.
@@ -69,21 +69,22 @@ pub struct Summary {
     pub losses: u64,
     /// Frames that are known to be missing.
     pub frames_missing: u64,
-    /// Gaps of which nothing tells how many frames are missing in them.
+    /// Gaps with an unknown number of missing frames.
     pub gaps_uncounted: u64,
     /// Groups whose first entry came before the last one of the group before.
     pub times_fell: u64,
     /// Entries whose time is before the entry before, within a group.
     pub entries_fell: u64,
-    /// What the blocks were.
+    /// Counts of the blocks by kind.
     pub blocks: BlockCounts,
     /// The first entry's time.
     pub first: Option<Instant>,
     /// The last entry's time.
     pub last: Option<Instant>,
-    /// UTC at power-on, microseconds since 1970, where the log knows it anywhere: what it learned last counts for all.
+    /// UTC at power-on, microseconds since 1970, if the log has it anywhere: the last value counts for the
+    /// whole log.
     pub epoch_us: Option<u64>,
-    /// What its records tell of it: end marks, losses, the log before.
+    /// Facts from its records: end marks, losses, the log before.
     pub marks: Marks,
     /// The number of the first sector.
     pub first_number: Option<u32>,
@@ -101,15 +102,15 @@ pub struct Summary {
     pub check_end: Option<u32>,
     /// Groups that go on from other entries than the sectors before them end with.
     pub unchained: u64,
-    /// What lies behind the last sector.
+    /// Counts of the blocks after the last sector.
     pub behind: BlockCounts,
-    /// How many blocks up to the end of its files are no sectors of any log.
+    /// Number of blocks up to the end of its files that belong to no log.
     pub foreign_at_end: u64,
     /// The latest power-on of another session whose sectors lie among this one's or behind it, microseconds since 1970.
     pub other_epoch_us: Option<u64>,
-    /// What its parity tells.
+    /// Evidence from its parity.
     pub parity: Evidence,
-    /// What of its files is not the log's.
+    /// Strange sectors in its files.
     pub strange: Vec<Strange>,
     /// Files that are missing before its first one.
     pub files_gone: u32,
@@ -128,7 +129,7 @@ impl Summary {
 
 /// Reads a log: `new` makes the collector of a group, `deliver` gets them in order.
 ///
-/// Groups are decoded side by side; this thread reads them, hands on what is done, and decodes too.
+/// Groups are decoded in parallel; this thread reads them, hands on results, and decodes too.
 pub fn read<C: Collect>(
     log: &Log,
     new: impl Fn() -> C + Sync,
@@ -166,9 +167,10 @@ pub fn read<C: Collect>(
     Ok(summary)
 }
 
-/// Decodes with this thread's decoder, which is large and made once; one that waits for its turn is another one's.
+/// Decodes with this thread's decoder, which is large and made once; a decoder that waits for its turn is
+/// taken by that group.
 ///
-/// What a sector completes may be wrong where it does not decode, or is not what came, and is found only then: such a group is decoded
+/// An entry that a bad sector completes may be wrong, and that is found only later. Such a group is decoded
 /// once more, up to the sector before.
 fn decode_here<C: Collect>(group: Group, new: &impl Fn() -> C) -> Decoded<C> {
     thread_local!(static DECODER: Cell<Option<Box<GroupDecoder>>> = const { Cell::new(None) });
@@ -178,7 +180,7 @@ fn decode_here<C: Collect>(group: Group, new: &impl Fn() -> C) -> Decoded<C> {
     let mut whole = decoded.go_on(&mut rest, &mut collected);
     let mut failed = decoded.unsound(&rest);
     if !whole && failed.is_none() {
-        // Nothing of a sector is handed on before it is known to be sound.
+        // Contents of a sector are handed on only after it is known to be sound.
         let mut probe = Decoded::of(&rest.group);
         let (decoder, group) = (Box::new(GroupDecoder::new()), rest.group.clone());
         let mut again = Rest { decoder, end: group.len(), group, at: 0 };
@@ -200,7 +202,7 @@ fn decode_here<C: Collect>(group: Group, new: &impl Fn() -> C) -> Decoded<C> {
     decoded
 }
 
-/// Keeps nothing.
+/// A collector that keeps no entries.
 struct Uncollected;
 
 impl Collect for Uncollected {
@@ -237,9 +239,9 @@ struct Decoded<C> {
     number: u32,
     /// Frames that its sectors say they complete.
     frames_said: u32,
-    /// How it began: its first time and the count of frames before it; `None` where nothing of it can be decoded.
+    /// Its first time and the count of frames before it; `None` if it cannot be decoded at all.
     begun: Option<(Instant, u32)>,
-    /// The check of the session's entries before it, where it begins, and up to its last sector.
+    /// The check over the session's entries, before the group and up to its last sector.
     check_before: Option<u32>,
     check_end: Option<u32>,
     frames: u32,
@@ -248,16 +250,16 @@ struct Decoded<C> {
     fell: u64,
     error: Option<GroupError>,
     ends_partial: bool,
-    /// Where it ends so: damaged blocks at that place, one of which may have been the whole sector.
+    /// For such an end: the number of damaged blocks there, one of them perhaps the whole sector.
     damaged_partial: u32,
     closed: bool,
     marks: Marks,
-    /// UTC at power-on by what it learned last, microseconds since 1970.
+    /// UTC at power-on by its last clock record, microseconds since 1970.
     epoch_us: Option<u64>,
 }
 
 impl<C: Collect> Decoded<C> {
-    /// What its sectors say of it.
+    /// The facts from its sectors' headers.
     fn of(group: &Group) -> Self {
         let (first, last) = (group.first(), group.last());
         Self {
@@ -283,7 +285,8 @@ impl<C: Collect> Decoded<C> {
         }
     }
 
-    /// Decodes to the group's end, or until what was collected is enough for a part. Whether it was the end.
+    /// Decodes to the group's end, or until the collected entries fill a part. Returns whether it was the
+    /// end.
     fn go_on(&mut self, rest: &mut Rest, collected: &mut C) -> bool {
         let Rest { decoder, group, at, end } = rest;
         let counts = collected.only_counts();
@@ -313,7 +316,7 @@ impl<C: Collect> Decoded<C> {
         }
     }
 
-    /// Why something of it is not what came, and how many of its sectors are.
+    /// The error of an altered group, and the number of its sound sectors.
     fn unsound(&self, rest: &Rest) -> Option<(GroupError, usize)> {
         let error = self.error.filter(|error| matches!(error, GroupError::Corrupt | GroupError::Altered))?;
         Some((error, rest.at.saturating_sub(1)))
@@ -356,7 +359,7 @@ fn next(decoder: &mut GroupDecoder, counts: bool) -> Option<Result<Outline<'_>, 
     if counts { decoder.next_outline() } else { Some(decoder.next_entry()?.map(Outline::Whole)) }
 }
 
-/// Puts groups together again and finds what is missing between them.
+/// Puts groups together again and finds the gaps between them.
 #[derive(Default)]
 struct Stitch {
     summary: Summary,
@@ -400,7 +403,7 @@ impl Stitch {
                 if missing != Some(0) {
                     self.gap(Cause::Missing);
                 }
-                // The session's first group goes on from none.
+                // The session's first group continues from zero.
                 let before = self.check.or((group.number == 0).then_some(0));
                 if let (None, Some(before), Some(begun)) = (&self.open, before, group.check_before) {
                     self.summary.unchained += u64::from(before != begun);
@@ -418,7 +421,7 @@ impl Stitch {
                 self.summary.last = group.last.or(self.summary.last);
                 self.summary.groups += 1;
                 self.summary.frames += u64::from(group.frames);
-                // All entries that its sectors say they complete were decoded, and not so many of each kind: a header is wrong.
+                // All entries of its sectors were decoded, but the counts by kind differ: a header is wrong.
                 let is_other = group.frames != group.frames_said;
                 if let Some(error) = group.error.or(is_other.then_some(GroupError::Corrupt)) {
                     let gap = self.gap(error.into());
@@ -441,14 +444,14 @@ impl Stitch {
         Some(missing).filter(|missing| *missing < 1 << 31)
     }
 
-    /// Nothing of a group is given out.
+    /// Skips a group with all its entries.
     fn skip<C>(&mut self, group: &Decoded<C>) {
         let gap = self.gap(group.error.map_or(Cause::Missing, Cause::from));
         gap.sectors_skipped = gap.sectors_skipped.saturating_add(group.sectors);
         gap.frames = Some(gap.frames.unwrap_or(0).saturating_add(group.frames_said));
     }
 
-    /// The gap that is going on, begun here if there is none.
+    /// The open gap; a new one if there is none.
     fn gap(&mut self, cause: Cause) -> &mut Gap {
         let from = self.summary.last;
         let new = Gap { from, to: None, cause, sectors_lost: 0, sectors_skipped: 0, frames: None };
@@ -475,7 +478,7 @@ impl Stitch {
     }
 }
 
-/// Hands a group on: what was decoded of it, and part by part what was not.
+/// Hands a group on: first its decoded entries, then the rest part by part.
 fn hand_on<C: Collect>(
     group: &mut Decoded<C>,
     new: &impl Fn() -> C,
@@ -494,7 +497,8 @@ fn hand_on<C: Collect>(
     Ok(())
 }
 
-/// UTC at power-on, microseconds since 1970, where the log knows it anywhere: what it learned last counts for all.
+/// UTC at power-on, microseconds since 1970, if the log has it anywhere: the last value counts for the whole
+/// log.
 pub fn epoch(log: &Log) -> Result<Option<u64>> {
     last_epoch(log, |_| true)
 }
@@ -512,7 +516,7 @@ fn last_epoch(log: &Log, go_on: impl Fn(Option<u64>) -> bool) -> Result<Option<u
     let (mut epoch, mut last) = (None, Vec::new());
     while let Some(group) = groups.next_group()? {
         if let Some(first) = group.first() {
-            // The preamble is plain: nothing is decoded here.
+            // The preamble is plain: no decoding is needed.
             if decoder.push(&first.header, &first.sector).is_ok() {
                 epoch = decoder.preamble().epoch_micros.or(epoch);
             }

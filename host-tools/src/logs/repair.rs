@@ -1,12 +1,12 @@
-//! Sectors that a card has lost, made again from parity before anything else looks at a log; and what parity tells of those that are
-//! there. The recorder covers a sector once it is on the card: so every sector up to the last one that is covered was there, and what
-//! the sums do not agree with was altered since.
+//! Rebuilds lost sectors from parity before a log is read, and checks the remaining ones against parity. The
+//! recorder covers a sector after it is on the card. So every sector up to the last covered one was there,
+//! and a sector that disagrees with the sums was altered later.
 //!
-//! The sector with the number `n` lies at block `n - base` of its file, so whoever knows the file's base knows what is lost:
-//! every place that holds another sector, or none. The base is the one that most sound sectors of the file agree on, unless
-//! the file begins with a number that comes after all others in it: then the recorder had just begun to write it anew.
+//! The sector with the number `n` is at block `n - base` of its file. So the base shows the lost sectors:
+//! every place with another sector, or none. Most sound sectors of the file agree on its base. The exception
+//! is a file that begins with a number after all others in it: the recorder had just begun to rewrite it.
 //!
-//! A file that is longer than any recorder makes one is read as it is: what is kept of a file is bounded by its length.
+//! A file longer than any of the recorder is read without repair, so memory is bounded by a file's length.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -17,19 +17,19 @@ use hums_recorder::card::SEGMENT_BYTES_MAX;
 
 use super::places::{BLOCK_BYTES, Log};
 
-/// Of more lost sectors in a column none is made again.
+/// Maximum number of lost sectors in a column that can be rebuilt.
 const LOST_MAX: usize = 2;
-/// In a longer file nothing is made again: twice the longest that the recorder makes. A hostile one of nothing but parity is held
-/// whole.
+/// Files longer than this are not repaired: twice the longest file of the recorder. A hostile file of parity
+/// alone is held whole.
 const FILE_BYTES_MAX: u64 = 2 * SEGMENT_BYTES_MAX as u64;
 
-/// What the parity of a log's files tells of its sectors.
+/// Evidence about a log's sectors from the parity of its files.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Evidence {
     /// The last sector that any of it covers: all up to there were written.
     pub last: Option<u32>,
-    /// Parity sectors that the recorder had written for sure: of a stretch that was full before the next one began, and of the
-    /// last one of a log that ended in order.
+    /// Parity sectors that the recorder had certainly written. It writes those of a full stretch before the
+    /// next stretch, and those of the last one before a proper end.
     pub written: u64,
     /// How many of these are not there, or not sound.
     pub missing: u64,
@@ -42,7 +42,7 @@ pub struct Evidence {
 }
 
 impl Evidence {
-    /// Adds that of a further file.
+    /// Adds the evidence from the next file.
     pub fn add(&mut self, next: &Self) {
         self.last = self.last.max(next.last);
         self.written += next.written;
@@ -53,7 +53,7 @@ impl Evidence {
     }
 }
 
-/// What was made again of one file, by its block, and what its parity tells of it.
+/// Rebuilt sectors of one file, by block, and the evidence from its parity.
 #[derive(Debug, Default)]
 pub(super) struct Repairs {
     made: BTreeMap<u64, [u8; BLOCK_BYTES]>,
@@ -63,7 +63,7 @@ pub(super) struct Repairs {
 }
 
 impl Repairs {
-    /// Of this file of a log; its session is the one given, or that of its first sound sector.
+    /// Repairs this file of a log; its session is given, or else taken from its first sound sector.
     pub(super) fn of(log: &Log, index: usize, session: Option<u32>) -> Result<Self> {
         let Some(piece) = log.pieces.get(index) else { return Ok(Self::default()) };
         let file = Log { pieces: vec![piece.clone()], ..log.clone() };
@@ -90,7 +90,7 @@ impl Repairs {
         }
         for ((stretch, first), (column, lost)) in columns {
             all.evidence.columns += 1;
-            // Which of them is wrong nobody knows: none is taken.
+            // The wrong one of them is unknown, so none is used.
             if !column.agrees(&lost) {
                 let first =
                     base.saturating_add(stretch.saturating_mul(STRETCH_SECTORS)).saturating_add(first);
@@ -111,7 +111,7 @@ impl Repairs {
         self.made.get(&block)
     }
 
-    /// Whether what is there is to be read too.
+    /// Whether the block at this place is to be read too.
     pub(super) fn is_displaced(&self, block: u64) -> bool {
         self.displaced.contains(&block)
     }
@@ -122,10 +122,10 @@ const fn column_of(at: u32) -> (u32, u32) {
     (at / STRETCH_SECTORS, at % COLUMNS as u32)
 }
 
-/// What a file holds.
+/// Contents of a file.
 struct Found {
     session: u32,
-    /// The number of the file's first sector; none where it has no sector of the session.
+    /// The number of the file's first sector; `None` without a sector of the session.
     base: Option<u32>,
     /// The number of the whole sector of the session in each block, where there is one.
     numbers: Vec<Option<u32>>,
@@ -135,7 +135,7 @@ struct Found {
 }
 
 impl Found {
-    /// `None` where there is no sector.
+    /// `None` without any sector.
     fn of(file: &Log, session: Option<u32>) -> Result<Option<Self>> {
         let (mut session, mut numbers, mut parity) = (session, Vec::new(), Vec::new());
         let (mut bases, mut begins, mut closed) = (BTreeMap::<u32, u32>::new(), None, None);
@@ -208,8 +208,8 @@ impl Found {
         number.filter(|number| *number == base.wrapping_add(at))
     }
 
-    /// The blocks in which another sector belongs, which was made again, and whose own one is nowhere else. Where something was put into
-    /// a file, all that follows lies in other blocks, and some columns have lost more than can be made again.
+    /// Blocks whose own sector was rebuilt, and that hold another sector found nowhere else. After an
+    /// insertion into a file all later sectors are displaced, and some columns have lost too many to rebuild.
     fn displaced(&self, base: u32, made: &BTreeMap<u64, [u8; BLOCK_BYTES]>) -> BTreeSet<u64> {
         let number =
             |at: u64| usize::try_from(at).ok().and_then(|at| self.numbers.get(at).copied()).flatten();
@@ -217,7 +217,8 @@ impl Found {
             made.keys().filter_map(|at| number(*at).map(|number| (number, *at))).collect();
         if !only.is_empty() {
             let elsewhere = (0_u64..).zip(&self.numbers).filter(|(at, _)| !made.contains_key(at));
-            // One that was made again is of use up to the first that is neither there nor made: what is behind that comes in another order.
+            // A rebuilt sector helps up to the first one that is neither present nor rebuilt: sectors after
+            // that come in another order.
             let hole = (0_u32..).zip(&self.numbers).find(|(at, number)| {
                 number.is_none_or(|number| Some(number) != base.checked_add(*at))
                     && !made.contains_key(&u64::from(*at))
@@ -236,7 +237,7 @@ impl Found {
     fn columns(&self, base: u32) -> BTreeMap<(u32, u32), (Column, Vec<u32>)> {
         let mut columns = BTreeMap::new();
         for (one, block) in &self.parity {
-            // What the file held before covers what was before it, or lies far off.
+            // Parity of the file's older content covers sectors before the base, or far away.
             let last = one.last.checked_sub(base);
             let Some(last) = last.filter(|last| (*last as usize) < self.numbers.len()) else { continue };
             let empty = || (Column::new(self.session), Vec::new());

@@ -1,7 +1,7 @@
-//! Looks at every block of a card for sectors of logs, and puts those of each session in order.
+//! Searches every block of a card for sectors of logs, and puts those of each session in order.
 //!
-//! Memory: at most [`RUNS_MAX`] runs of 16 bytes and twice [`SESSIONS_MAX`] sessions. A card that has more is not ours or was
-//! made to take our memory: of too many sessions those with the most sectors stay, and what is left out is counted.
+//! Memory: at most [`RUNS_MAX`] runs of 16 bytes and twice [`SESSIONS_MAX`] sessions. A card with more is not
+//! ours, or hostile. Of too many sessions those with the most sectors stay, and the others are counted.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -21,11 +21,11 @@ const BLOCKS_OF_BAR: u64 = 2_048;
 /// Sessions that are kept.
 const SESSIONS_MAX: usize = 10_000;
 
-/// What a scan found.
+/// Result of a scan.
 pub(super) struct Scan {
     /// The sessions, by the place of their first sector.
     pub(super) logs: Vec<Log>,
-    /// Sectors that belong to none of them, because there were too many sessions or runs.
+    /// Sectors without a session here, because there were too many sessions or runs.
     pub(super) left_out: u64,
 }
 
@@ -39,7 +39,8 @@ struct Run {
 }
 
 impl Run {
-    /// Whether a sector of this number in this block continues it, with at most a group between that is none.
+    /// Whether a sector of this number in this block continues the run, after at most one group of other
+    /// blocks.
     fn goes_on(&self, number: u32, at: u64) -> bool {
         let blocks = at.checked_sub(self.start);
         let numbers = number.checked_sub(self.number).map(u64::from);
@@ -92,7 +93,7 @@ impl Sessions {
     }
 }
 
-/// The files of a sound file system: what a log's files hold of its own session is read there.
+/// The files of a sound file system. Sectors of a log's own session are read through its files.
 #[derive(Debug, Default)]
 pub(super) struct Files {
     /// The blocks of each extent and the session of its log, by the block where it begins.
@@ -167,7 +168,7 @@ pub(super) fn scan(path: &Path, length: u64, files: &Files) -> Result<Scan> {
         }
     };
     let mut logs: Vec<Log> = runs.into_iter().map(log).collect();
-    // As they were recorded, mostly: what a next log tells of the one before needs their order.
+    // Mostly in the order of recording: a log reports on the one before it, which needs their order.
     logs.sort_by_key(|log| {
         log.pieces.first().and_then(|piece| piece.extents.first()).map(|extent| extent.start)
     });

@@ -1,5 +1,5 @@
-//! Which session each number of a card holds. The first sector of each log tells it, so it is known before the logs are
-//! read: a log that was copied, renamed or exchanged with another one is found wherever it stands.
+//! The session of each log number of a card. The first sector of each log has it, so it is known before the
+//! logs are read. A log that was copied, renamed or exchanged with another one is found anywhere.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -9,13 +9,13 @@ use super::begun_anew::{self, BegunAnew, Known};
 use super::fingerprint::{Fingerprint, fingerprint};
 use super::places::{Log, Piece};
 
-/// Blocks that are searched for a log's first sector: what is read at once.
+/// Number of blocks searched for a log's first sector: one read.
 const LOOK_BLOCKS: usize = 128;
 
 /// The numbers under which each session is there, by card.
 #[derive(Clone, Debug, Default)]
 pub struct Sessions {
-    /// The numbers of its logs, by what stands before the number in their names, and by the session that their sectors name.
+    /// The numbers of its logs, by the prefix of their names, and by the session in their sectors.
     logs: BTreeMap<(String, u32), Vec<u32>>,
     /// Of logs that hold the same as another one: the name of that.
     again: BTreeMap<String, String>,
@@ -26,7 +26,7 @@ pub struct Sessions {
 }
 
 impl Sessions {
-    /// Looks at the first sectors of these logs, by their names. What has no number is left out.
+    /// Looks at the first sectors of these logs, by their names. Names without a number are left out.
     pub fn of<'a>(logs: impl IntoIterator<Item = (&'a str, &'a Log)>) -> Self {
         let logs: Vec<(&str, &Log)> = logs.into_iter().collect();
         let mut all: BTreeMap<_, Vec<u32>> = BTreeMap::new();
@@ -55,8 +55,8 @@ impl Sessions {
         Self { logs: all, again, numbers, begun_anew: anew }
     }
 
-    /// What a log's file held when the recorder had just begun to write it anew, if it had. A full card's oldest file gets the
-    /// next name before its first sector is written.
+    /// The old content of a log's file, if the recorder had just begun to rewrite it. A full card's oldest
+    /// file gets the next name before its first sector is written.
     pub fn begun_anew(&self, name: &str) -> Option<BegunAnew> {
         let (card, number) = place(name);
         self.begun_anew_number(card, number?)
@@ -67,8 +67,8 @@ impl Sessions {
         self.begun_anew.get(&(card.to_owned(), number)).copied()
     }
 
-    /// The name of the log of which this one is a copy, sector by sector, or a copy of one of its files. It is not to be counted
-    /// again.
+    /// The name of the original if this log is a copy of it or of one of its files, sector by sector. Copies
+    /// are not counted.
     pub fn again(&self, name: &str) -> Option<&str> {
         self.again.get(name).map(String::as_str)
     }
@@ -83,7 +83,8 @@ impl Sessions {
         self.numbers.get(card).is_some_and(|numbers| numbers.range(..number).next().is_some())
     }
 
-    /// Whether what a card's oldest file held may be of this session: it has no log on the card, or the one of the lowest number.
+    /// Whether the content of a card's oldest file may be of this session. It may if the session has no log
+    /// on the card, or the one of the lowest number.
     pub fn may_be_oldest(&self, card: &str, session: u32) -> bool {
         let lowest = self.numbers.get(card).and_then(|numbers| numbers.first());
         let own = self.numbers(card, session).iter().min();
@@ -91,7 +92,7 @@ impl Sessions {
     }
 }
 
-/// A log of a session of which others may be copies.
+/// A log of a session that may have copies.
 struct Candidate<'a> {
     name: &'a str,
     number: Option<u32>,
@@ -99,7 +100,8 @@ struct Candidate<'a> {
 }
 
 impl Candidate<'_> {
-    /// Of all of it, then of each file where there are several. What cannot be read is no copy; it is said where it is read.
+    /// Fingerprints of the log, and of each of several files. An unreadable log does not count as a copy;
+    /// reading it reports the error.
     fn fingerprints(&self) -> Vec<Fingerprint> {
         let file = |piece: &Piece| Log { pieces: vec![piece.clone()], ..self.log.clone() };
         let files = self.log.pieces.iter().map(file).filter(|_| self.log.pieces.len() > 1);
@@ -107,8 +109,8 @@ impl Candidate<'_> {
     }
 }
 
-/// Names of copies among the logs of one session, each with that of its original: a card's log before one of another name,
-/// one of more files before one of less.
+/// Names of copies among the logs of one session, each with its original. A card's log counts as the original
+/// before one of another name, and one of more files before one of fewer.
 fn copies(mut logs: Vec<Candidate<'_>>) -> Vec<(String, String)> {
     if logs.len() < 2 {
         return Vec::new();
@@ -127,12 +129,12 @@ fn copies(mut logs: Vec<Candidate<'_>>) -> Vec<(String, String)> {
     copies
 }
 
-/// What is said of a copy.
+/// Words about a copy.
 pub fn again_words(original: &str) -> String {
     format!("is the same session as {original} once more (not counted)")
 }
 
-/// A log's name in two: what stands before its number, and the number.
+/// A log's name in two: the prefix and the number.
 pub fn place(name: &str) -> (&str, Option<u32>) {
     let (card, number) = name.rsplit_once('/').unwrap_or(("", name));
     (card, number.parse().ok().filter(|_| number.len() == 5))
@@ -143,7 +145,7 @@ pub fn first_session(log: &Log) -> Option<u32> {
     first_sector(log).map(|(_, first)| first.session)
 }
 
-/// A log's first sector, and in which block that is. That a log cannot be read is said where it is read.
+/// A log's first sector, and its block. Reading the log reports errors.
 fn first_sector(log: &Log) -> Option<(usize, Header)> {
     let mut blocks = log.blocks();
     for at in 0..LOOK_BLOCKS {
@@ -191,7 +193,7 @@ mod tests {
         }
     }
 
-    /// A log of which the start found this session under this number.
+    /// A log whose start found this session under this number.
     fn after(number: u32, session: u32) -> Vec<u8> {
         log(9, number, session)
     }
@@ -206,7 +208,7 @@ mod tests {
         sink.0.into_iter().flat_map(|sector| sealed(sector, own)).collect()
     }
 
-    /// Logs in a folder, of which some files were begun anew.
+    /// Logs in a folder; the recorder had begun to rewrite some files.
     struct Card(tempfile::TempDir);
 
     impl Card {
@@ -222,7 +224,8 @@ mod tests {
             fs::remove_file(self.0.path().join(format!("{name:05}_00.HUM"))).expect("there");
         }
 
-        /// By number: what it held, whether or a later one of the power-on, and whether the next start found it so.
+        /// By number: the old log, whether it may be a later one of the power-on, and whether the next start
+        /// found it so.
         fn anew(&self) -> Vec<(u32, Option<u32>, bool, bool)> {
             let found = find_in(self.0.path(), false).expect("a folder");
             let sessions = Sessions::of(found.logs.iter().map(|log| (log.name.as_str(), log)));
@@ -237,7 +240,7 @@ mod tests {
     #[test]
     fn a_file_that_was_to_be_written_anew_is_known_and_the_next_start_confirms_it() {
         let card = Card::new();
-        // The beginning of the power-on whose second log is the oldest one that is there; what it says of itself is lost.
+        // The beginning of the power-on whose second log is the oldest on the card; its own record is lost.
         card.write(5, sector(7, 100));
         card.write(6, sector(8, 0));
         card.write(7, sector(7, 0));
@@ -275,7 +278,7 @@ mod tests {
         card.remove(15);
         card.write(20, log(20, 19, 19));
         assert_eq!(card.anew(), both[1..]);
-        // Somebody exchanged two names: what is in them is in the wrong order.
+        // Two names were exchanged: their contents are in the wrong order.
         card.write(15, log(11, 10, 10));
         card.write(14, log(14, 13, 13));
         card.write(16, log(10, 9, 9));
@@ -295,7 +298,7 @@ mod tests {
         assert_eq!(card.anew(), [(21, None, false, false)]);
         card.write(22, log(22, 21, old));
         assert_eq!(card.anew(), [(21, None, false, true)]);
-        // Its clock is later than that of the log before: it is not older.
+        // Its clock is later than in the log before: it is not older.
         let timed = |own: u32, number: u32, utc_micros: u64| {
             let (mut writer, mut sink) = (Box::new(Writer::new()), Sink::default());
             let clock = Record::Clock(Clock { boot: Instant::ZERO, utc_micros, source: 3 });
@@ -313,7 +316,7 @@ mod tests {
             card.write(21, [&torn[..], &timed(old, 1, utc)].concat());
             assert_eq!(card.anew(), expected);
         }
-        // The next log of that power-on was begun anew too, and the start after it found it so.
+        // The next log of that power-on was begun anew too, and the following start found it so.
         write(&torn);
         card.write(22, log(old, 9, 9));
         card.write(23, log(23, 22, old));

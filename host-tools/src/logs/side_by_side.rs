@@ -1,5 +1,5 @@
-//! Several logs at once: each is read by a worker of its own and the workers that this one has in turn. The results are
-//! told in the logs' order, and only as many are in work that memory stays bounded.
+//! Several logs in parallel: each has a worker of its own with further workers. Results are reported in the
+//! logs' order, and the number of logs in work is bounded, and so is memory.
 
 use anyhow::Result;
 
@@ -10,8 +10,8 @@ const AT_ONCE: usize = 4;
 /// Logs at most that are in work or done and wait for an earlier one.
 const AHEAD_MAX: usize = 16;
 
-/// Calls `work` for each item, some side by side, and `tell` with the results in the items' order. The first error of
-/// `tell` ends it: what is in work is finished, what is not is left.
+/// Calls `work` for each item, some in parallel, and `tell` with the results in the items' order. The first
+/// error of `tell` ends it: begun items are finished, others are left.
 pub fn side_by_side<I: Sync, R: Send>(
     items: &[I],
     work: impl Fn(&I) -> R + Sync,

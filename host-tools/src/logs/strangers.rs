@@ -1,9 +1,10 @@
-//! Which sectors in a log's files are not of the log.
+//! Sectors in a log's files that do not belong to the log.
 //!
-//! The recorder writes a file from its beginning, so the sector at block `n` has at least the number `n`; a copy of a sector in
-//! progress may lie one block further. In a recycled file this holds for the sectors of the older session behind the newest one
-//! too. Sectors of another session with lower numbers came there in another way: logs were joined, or the file was made over a
-//! deleted log. In a file without a sector of the log all sectors are another's.
+//! The recorder writes a file from its beginning, so the sector at block `n` has at least the number `n`. A
+//! copy of a sector in progress may be one block further. In a recycled file this also holds for the sectors
+//! of the older session after the newest one. Sectors of another session with lower numbers came there in
+//! another way: logs were joined, or the file was made over a deleted log. In a file without a sector of the
+//! log all sectors are strange.
 
 use hums_blackbox::{Header, SECTOR_BYTES};
 
@@ -16,7 +17,7 @@ pub struct Strange {
     pub hollow: bool,
     /// How many sectors there are of other sessions.
     pub sectors: u64,
-    /// The block of the file where the first one lies.
+    /// The file's block with the first one.
     pub first: u64,
     /// The session of the first one.
     pub session: u32,
@@ -75,8 +76,8 @@ mod tests {
 
     use super::*;
 
-    /// The strange sectors of a log of these files. A block is a number, `p` behind it for a copy of a sector in progress, `x`
-    /// before it for another session; `-` is no sector.
+    /// The strange sectors of a log of these files. A block is a number, with `p` after it for a copy of a
+    /// sector in progress, and `x` before it for another session. `-` is a block without a sector.
     fn look(files: &[&str]) -> Vec<(usize, bool, u64, u64)> {
         let mut strangers = Strangers::new(files.len());
         for (file, blocks) in files.iter().enumerate() {
@@ -104,7 +105,7 @@ mod tests {
         assert_eq!(look(&["0 1 2 x0 x1 x2"]), [(0, false, 3, 3)], "joined");
         assert_eq!(look(&["0 1", "x0 x1 x2"]), [(1, true, 3, 0)]);
         assert_eq!(look(&["0 1 x7 x2 x3"]), [(0, false, 2, 3)]);
-        // A power cut in a recycled file, and blocks that are no sectors.
+        // A power cut in a recycled file, and blocks without sectors.
         for files in [&["0 1 2p x3 x4"][..], &["0 1 2 2p x4 x5"], &["0 1 x2p x4"], &["0 1 - -", "2 3"]] {
             assert_eq!(look(files), [], "{files:?}");
         }
