@@ -1,7 +1,7 @@
 //! The health board: each subsystem's level with its reason in words.
 //!
-//! A HUMS on board of the vehicle hears every frame; where one speaks, its level counts, and the reason is what these
-//! checks see of the same. Its recorder is its own to judge.
+//! A HUMS on board receives every frame, so its level counts if there is one. The reason comes from the
+//! checks here. The state of its recorder comes from the HUMS alone.
 
 use hums_core::clock::{Instant, Span};
 use hums_core::health::{self, EXPECTED, Finding, Level, Subsystem, When};
@@ -17,7 +17,7 @@ use crate::part;
 /// As long as a heartbeat may be missed.
 const SILENT: Span = Span::from_secs(5);
 
-/// What a finding of a HUMS begins with on the radio.
+/// Prefix of a finding of a HUMS on the radio.
 const OURS: &str = "HUMS: ";
 
 /// A finding in words.
@@ -25,7 +25,7 @@ fn words(finding: &Finding) -> String {
     summary::text(finding).as_str().trim_start_matches(OURS).to_owned()
 }
 
-/// The same, without what is to be done.
+/// The same, without the recommended action.
 fn without_advice(finding: &Finding) -> String {
     words(&Finding { level: Level::Warning, ..*finding })
 }
@@ -37,8 +37,8 @@ pub struct Part {
     level: &'static str,
     /// By whom: `on board`, `here`, or `nobody`.
     by: &'static str,
-    /// What a level that is stale means where that is no cause for worry: `idle` where its checks are for a vehicle that
-    /// is armed or flies, `none` where the vehicle seems to have no such part.
+    /// Meaning of a stale level without cause for worry. `idle`: its checks are for an armed or flying
+    /// vehicle. `none`: the vehicle seems to have no such part.
     calm: Option<&'static str>,
     reason: String,
 }
@@ -46,17 +46,17 @@ pub struct Part {
 /// The health board.
 #[derive(Debug)]
 pub struct Board {
-    /// The whole vehicle's level, by whoever knows best.
+    /// The whole vehicle's level, from the best source.
     pub overall: &'static str,
-    /// What stands in the place of that where it is not known any more: `was critical`, and of a vehicle that is silent with what.
+    /// Text for an unknown level: `was critical`, and for a silent vehicle the cause.
     pub said: Option<String>,
-    /// The level that it had, where it is not known any more.
+    /// The last level before it became unknown.
     pub was: Option<&'static str>,
     /// All subsystems, in the order of [`Subsystem::ALL`].
     pub parts: Vec<Part>,
 }
 
-/// What the checks here say of a subsystem.
+/// The state of a subsystem by the checks here.
 #[derive(Clone, Copy)]
 struct Known {
     level: Level,
@@ -68,20 +68,21 @@ struct Known {
 }
 
 impl Board {
-    /// Of a vehicle. The checks, which are some hundred, are gone through once: this is done as often as pages are told.
+    /// The board of a vehicle. It goes once through the some hundred checks, because it runs for every update
+    /// of the pages.
     pub fn of(craft: &Craft, now: Instant) -> Self {
         let none = Known { level: Level::Stale, is_heard: false, good: 0, last: "" };
         let mut known = [none; Subsystem::ALL.len()];
         for (check, _, level) in craft.monitor.health().levels() {
             let Some(known) = known.get_mut(check.subsystem as usize) else { continue };
-            // What is bad on another link than the autopilot's wire is that link's.
+            // A bad link other than the autopilot's wire is a fault of that link.
             if rank(level) > 0 && !craft.on_the_wire && is_of_wire(check.name) {
                 continue;
             }
             if level == Level::Ok && known.last != check.name {
                 (known.good, known.last) = (known.good + 1, check.name);
             }
-            // Silence of a check that only raises an alarm is no news.
+            // The `ok` of a check that only raises alarms has no meaning.
             if !check.alarm_only || level != Level::Ok {
                 if !known.is_heard || rank(level) > rank(known.level) {
                     known.level = level;
@@ -89,7 +90,7 @@ impl Board {
                 known.is_heard = true;
             }
         }
-        // What the box found that recorded it is no level here.
+        // Findings of the box that recorded this are not among the levels here.
         for worry in craft.worries.values().filter(|worry| !craft.judges(worry.check, worry.instance)) {
             if let Some(known) = known.get_mut(worry.subsystem as usize)
                 && (!known.is_heard || rank(worry.level) > rank(known.level))
@@ -120,8 +121,8 @@ impl Board {
     }
 }
 
-/// The worst that is known of any part; not known, where nothing is of one that every vehicle has, where the vehicle is silent, or where what
-/// was bad is not judged any more.
+/// The worst known level of any part. Unknown if a part of every vehicle has no data, if the vehicle is
+/// silent, or if a bad check has lost its data.
 fn overall(craft: &Craft, now: Instant, known: &[Known]) -> Level {
     let unknown = is_silent(craft, now)
         || EXPECTED.into_iter().any(|part| known.get(part as usize).is_none_or(|known| !known.is_heard))
@@ -131,7 +132,7 @@ fn overall(craft: &Craft, now: Instant, known: &[Known]) -> Level {
     heard.chain(unknown.then_some(Level::Stale)).max_by_key(|level| rank(*level)).unwrap_or(Level::Stale)
 }
 
-/// The worst of what was so when it was judged last.
+/// The worst finding of the last judgement.
 fn was(craft: &Craft, silent: bool) -> Option<&Finding> {
     let all = craft.unjudged.values().chain(craft.worries.values().filter(|_| silent));
     all.filter(|finding| is_bad(finding)).max_by_key(|finding| (rank(finding.level), finding.at.as_millis()))
@@ -145,7 +146,7 @@ fn was_level(finding: &Finding) -> &'static str {
     if finding.level == Level::Critical { "was critical" } else { "was warning" }
 }
 
-/// How long nothing has been heard of the vehicle.
+/// Time since the vehicle was last received.
 fn seconds(craft: &Craft, now: Instant) -> String {
     format!("{} s", now.since(craft.heard).as_millis() / 1000)
 }
@@ -202,7 +203,7 @@ fn part(craft: &Craft, now: Instant, subsystem: Subsystem, known: &Known) -> Par
     Part { subsystem: subsystem.name(), level: level.name(), by, calm, reason }
 }
 
-/// Whether nothing at all has been heard of the vehicle for a while.
+/// Whether the vehicle has been silent for a while.
 fn is_silent(craft: &Craft, now: Instant) -> bool {
     now.since(craft.heard) > SILENT
 }
@@ -229,7 +230,7 @@ fn waits_for(craft: &Craft, subsystem: Subsystem) -> &'static str {
     }
 }
 
-/// The worst finding, or why there is none.
+/// The worst finding, or the reason for its absence.
 fn reason(craft: &Craft, subsystem: Subsystem, level: Level, here: Level, good: usize) -> String {
     let findings = craft.worries.values().filter(|finding| finding.subsystem == subsystem);
     let worst = findings.max_by_key(|finding| (rank(finding.level), finding.at.as_millis()));
@@ -299,7 +300,7 @@ mod tests {
         }
     }
 
-    /// A vehicle that is heard, with these worries.
+    /// A vehicle on the link, with these worries.
     fn craft(worries: &[Finding]) -> Craft {
         let at = Instant::from_millis(1_000);
         let mut craft = Craft::new(at, &Params::defaults(), false);
@@ -344,7 +345,7 @@ mod tests {
         assert_eq!(part(&board, Subsystem::Power), words);
     }
 
-    /// That nothing is heard any more heals nothing.
+    /// A silent link does not clear a finding.
     #[test]
     fn what_was_bad_when_the_link_fell_silent_is_still_said() {
         let mut craft = craft(&[finding("cell_voltage", Subsystem::Power, Level::Critical)]);
@@ -361,7 +362,7 @@ mod tests {
         assert_eq!(part(&board, Subsystem::Power), words);
     }
 
-    /// Between a radio and a PC there is no wire of the autopilot's.
+    /// A link between a radio and a PC is not the autopilot's wire.
     #[test]
     fn the_silence_of_a_link_is_no_finding_of_the_wire_and_nothing_is_called_well() {
         let mut craft = craft(&[]);

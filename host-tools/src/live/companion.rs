@@ -1,5 +1,5 @@
-//! What a HUMS on board of the vehicle tells of itself over the link: the authority on what happened on board, because
-//! it hears every frame and this PC only what the radio carries. See `hums_link::summary` for what it sends.
+//! Reports of a HUMS on board over the link. It is the authority on events on board, because it receives
+//! every frame, and this PC only those on the radio. See `hums_link::summary` for its messages.
 
 use hums_core::clock::{Instant, Span};
 use hums_core::health::{Level, Subsystem};
@@ -15,7 +15,7 @@ const GONE: Span = Span::from_secs(5);
 /// The levels come every two seconds where the budget allows; over the slowest radio every half minute.
 const LEVELS_AGE_MAX: Span = Span::from_secs(60);
 
-/// What was heard.
+/// State of the HUMS on board.
 #[derive(Clone, Debug, Default)]
 pub struct Companion {
     heard: Option<Instant>,
@@ -84,7 +84,7 @@ impl Companion {
         self.heard = Some(at);
     }
 
-    /// Whether there is one, and it is heard.
+    /// Whether there is one and it is being received.
     pub fn present(&self, now: Instant) -> bool {
         self.named && self.heard.is_some_and(|at| now.since(at) <= GONE)
     }
@@ -94,15 +94,15 @@ impl Companion {
         self.named
     }
 
-    /// Its word on the whole vehicle, while it is heard.
+    /// Its level of the whole vehicle, while it is received.
     pub fn overall(&self, now: Instant) -> Option<Level> {
         self.overall.filter(|_| self.present(now))
     }
 
-    /// Its word on a subsystem, unless it is too old to count.
+    /// Its level of a subsystem, unless too old.
     pub fn level(&self, now: Instant, subsystem: Subsystem) -> Option<Level> {
         let (at, levels) = self.levels.filter(|(at, _)| now.since(*at) <= LEVELS_AGE_MAX)?;
-        // Levels of one that is silent are nobody's.
+        // The levels of a silent one are out of date.
         if !self.present(now) || now.since(at) > LEVELS_AGE_MAX {
             return None;
         }

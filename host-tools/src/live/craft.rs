@@ -1,6 +1,8 @@
-//! One vehicle: the same monitor that flies on board, on the frames that reach this PC, and what else is told of it.
+//! One vehicle: the monitor that also flies on board, fed with the frames on this PC, and other reports about
+//! the vehicle.
 //!
-//! Small, and all of it can be copied: playback keeps copies to go back to. What grows is in [`crate::page::history`].
+//! It is small and can be copied: playback keeps copies to go back to. Growing data are in
+//! [`crate::page::history`].
 
 use std::collections::BTreeMap;
 use std::sync::LazyLock;
@@ -29,20 +31,20 @@ use crate::source::parameter;
 use crate::source::told;
 use crate::statustext::{Text, Texts};
 
-/// By then a HUMS on board has told of itself.
+/// A HUMS on board has reported itself by then.
 const SETTLE: Span = Span::from_secs(5);
-/// When the whole vehicle is silent for so long, that its ESCs are says nothing of them.
+/// After a silence of the whole vehicle of this length, silent ESCs are not a finding.
 const SILENT: Span = Span::from_secs(1);
 /// The check of that.
 const ESC_SILENT: &str = "esc_silent";
 /// The check of the autopilot's silence on its wire.
 const HEARTBEAT: &str = "heartbeat";
-/// What is so within this time of the vehicle's first heartbeat was so before: that it is in the air is seen a moment later.
+/// A state within this time of the first heartbeat is older than that: flight is detected with a delay.
 const JOINED: Span = Span::from_secs(5);
 /// How often the limits are looked at.
 const LIMITS_EVERY: Span = Span::from_secs(1);
 
-/// What is known of a vehicle.
+/// State of a vehicle.
 #[derive(Clone, Debug)]
 #[expect(clippy::struct_excessive_bools, reason = "facts that have nothing to do with each other")]
 pub struct Craft {
@@ -50,7 +52,7 @@ pub struct Craft {
     pub monitor: Monitor,
     /// The reference system's view of it.
     pub reference: Reference,
-    /// When each of the reference system's quantities was told last.
+    /// Time of the last value of each quantity of the reference system.
     pub latest: Latest,
     /// A HUMS on board.
     pub companion: Companion,
@@ -60,15 +62,16 @@ pub struct Craft {
     pub worries: BTreeMap<(&'static str, u8), Finding>,
     /// Of those that were not well, and are not judged any more: until it is armed again, or they are good.
     pub unjudged: BTreeMap<(&'static str, u8), Finding>,
-    /// Nobody tells how many cells its battery has, and it flies or they will not be told.
+    /// The cell count of its battery is unknown, and the vehicle flies or will not report it.
     pub cells_unknown: bool,
-    /// That was said.
+    /// That was reported.
     cells_said: bool,
-    /// The frames come from the autopilot's own wire: a box recorded them. What is missing on another link tells of that link.
+    /// The frames come from the autopilot's own wire: a box recorded them. On another link, missing frames
+    /// are a fault of that link.
     pub on_the_wire: bool,
-    /// It was armed when it was first heard.
+    /// It was armed when first received.
     joined: bool,
-    /// When its autopilot was heard last.
+    /// Time of its autopilot's last message.
     pub heard: Instant,
     /// Frames of its system, and how many of them are missing by their own count.
     pub frames: u64,
@@ -76,14 +79,14 @@ pub struct Craft {
     pub missing: u64,
     /// The part of its frames that was lost in the last ten seconds.
     pub loss: Option<f32>,
-    /// What its components say in words.
+    /// Texts of its components.
     texts: Texts,
     sequences: Sequences,
     began: Instant,
     limits_at: Option<Instant>,
-    /// A barometer tells of itself: what an inertial sensor's message tells of the air is another one's.
+    /// A barometer reports itself, so air data in an inertial sensor's message are from another sensor.
     barometer: bool,
-    /// Of which parts it is known what they ran before this session.
+    /// Parts with known hours before this session.
     lives: [bool; COMPONENTS_MAX],
     /// Seconds in the air, by the usage: on the ground last, and before the last flight.
     grounded_s: f64,
@@ -91,7 +94,7 @@ pub struct Craft {
 }
 
 impl Craft {
-    /// A vehicle whose autopilot has just been heard.
+    /// A vehicle whose autopilot was just received for the first time.
     pub fn new(at: Instant, params: &Params, on_the_wire: bool) -> Self {
         Self {
             monitor: Monitor::new(*params),
@@ -129,7 +132,7 @@ impl Craft {
         self.monitor.usage().value(UsageCounter::Flight).unwrap_or(0.0)
     }
 
-    /// A log has told of a part, with all that it has run.
+    /// A log has reported a part with all its hours.
     pub fn learn_part(&mut self, place: usize, part: Component) {
         self.monitor.learn_component(place, part);
         if let Some(known) = self.lives.get_mut(place) {
@@ -137,7 +140,7 @@ impl Craft {
         }
     }
 
-    /// Whether what a part has run is all of its life, and not this session alone.
+    /// Whether a part's hours cover its whole life, not just this session.
     pub fn knows_life(&self, place: usize) -> bool {
         self.lives.get(place).copied().unwrap_or(false)
     }
@@ -152,7 +155,7 @@ impl Craft {
         let before = self.companion.known();
         self.companion.frame(at, frame);
         if !before && self.companion.known() {
-            // What was missing until now was left out by it.
+            // It left out the frames missing so far.
             self.missing = 0;
         }
         if frame.id() == STATUSTEXT && frame.check() == Check::Verified {
@@ -170,7 +173,7 @@ impl Craft {
         self.parameter(at, frame, history);
     }
 
-    /// So many of its frames are not in the recording: what follows them follows none before.
+    /// This many of its frames are missing from the recording, so the following sequence numbers start again.
     pub fn miss(&mut self, frames: u64) {
         self.missing = self.missing.saturating_add(frames);
         self.sequences = Sequences::new();
@@ -189,12 +192,12 @@ impl Craft {
         self.monitor.vehicle().heartbeat.get().map_or(Autopilot::Other, |heartbeat| heartbeat.autopilot)
     }
 
-    /// Takes what it said in words.
+    /// Takes one of its texts.
     pub fn text(&mut self, text: Text, history: &mut Option<&mut History>) {
         self.texts.take(text, &mut |text| say(history, text));
     }
 
-    /// Takes what somebody said of it.
+    /// Takes an observation of it.
     pub fn observe(
         &mut self,
         at: Instant,
@@ -244,8 +247,8 @@ impl Craft {
         part && self.monitor.vehicle().source.is_some_and(|vehicle| vehicle.system == source.system)
     }
 
-    /// Whose sequence numbers tell what the link loses: a HUMS on board thins out what it forwards, which is no loss, so
-    /// its own count where there is one. Whether there is one shows within some seconds.
+    /// The component whose sequence numbers show the link's losses. A HUMS on board thins out the frames that
+    /// it forwards, so its own numbers count. It is known after some seconds.
     fn counted(&self, now: Instant) -> Option<Source> {
         let autopilot = self.monitor.vehicle().source?;
         if self.companion.known() {
@@ -254,7 +257,7 @@ impl Craft {
         (now.since(self.began) >= SETTLE).then_some(autopilot)
     }
 
-    /// What time alone asks for, every [`hums_core::monitor::TICK`].
+    /// A step of time, every [`hums_core::monitor::TICK`].
     pub fn tick(
         &mut self,
         now: Instant,
@@ -263,9 +266,10 @@ impl Craft {
     ) {
         let link = self.sequences.reading(now, self.counted(now));
         self.loss = link.frames_lost;
-        // There is no card here: that the recording is well is the box's to say.
+        // This PC has no card: the state of the recording comes from the box.
         let recorder = RecorderStatus { recording: Recording::Running, ..RecorderStatus::default() };
-        // A HUMS on board passes on what the radio can carry: that a stream is thin here says nothing of the vehicle.
+        // A HUMS on board forwards as much as the radio can carry: a slow stream here is not a fault of the
+        // vehicle.
         let thin = self.companion.present(now);
         let cut_off = now.since(self.heard) >= SILENT;
         let Self { monitor, worries, unjudged, on_the_wire, .. } = self;
@@ -283,12 +287,12 @@ impl Craft {
                 return;
             }
             let key = (finding.check, finding.instance);
-            // Whoever hears nothing hears of nothing that is good again.
+            // During a silence a return to normal is not seen.
             if cut_off && finding.level == Level::Ok {
                 unjudged.extend(worries.remove(&key).map(|before| (key, before)));
                 return;
             }
-            // That a link is silent is said once, of the link.
+            // A silent link is reported once, as a fault of the link.
             let echo = match finding.level {
                 Level::Stale => finding.because == HEARTBEAT,
                 _ => silence && !worries.contains_key(&key),
@@ -312,7 +316,7 @@ impl Craft {
             keep(history, now, Note::finding(now, &finding).of_part(self.due(&finding).as_ref()));
         }
         self.happenings(now, history);
-        // Nobody takes these here, and they are made anew.
+        // Snapshots are not used here, and are made again.
         while self.monitor.take_snapshot(now.into()).is_some() {}
         self.texts.pass(now, &mut |text| say(history, text));
         if let Some(history) = history {
@@ -326,7 +330,7 @@ impl Craft {
         }
     }
 
-    /// What has happened since the last tick.
+    /// Events since the last tick.
     fn happenings(&mut self, now: Instant, history: &mut Option<&mut History>) {
         let mut cells_come = self.cells_said;
         while let Some(happening) = self.monitor.take_happening() {
@@ -358,7 +362,7 @@ impl Craft {
         }
     }
 
-    /// Nothing tells how many cells its battery has: said once.
+    /// The cell count of its battery is unknown: reported once.
     pub fn say_cells_unknown(&mut self, now: Instant, history: &mut Option<&mut History>) {
         self.cells_unknown = true;
         if !std::mem::replace(&mut self.cells_said, true)
@@ -368,7 +372,7 @@ impl Craft {
         }
     }
 
-    /// The part that a finding is of which tells that one is due, and its limit; `None` for another check.
+    /// The part of a finding that a part is due, and its limit; `None` for another check.
     pub fn due(&self, finding: &Finding) -> Option<(String, Option<String>)> {
         part::is_due(finding.check).then(|| part::due(&self.monitor, finding.subsystem)).flatten()
     }
@@ -378,7 +382,8 @@ impl Craft {
         self.monitor.health().levels().any(|(known, of, _)| known.name == check && of == instance)
     }
 
-    /// What the box found that recorded this, and nobody here can: what its store, or its count of cells, told it.
+    /// Takes a finding of the box that recorded this, if no check here can make it. The box made it from its
+    /// store or its cell count.
     pub fn found_on_board(&mut self, finding: &told::Finding) -> bool {
         let Some(check) = check_named(&finding.check) else { return false };
         if self.judges(check.name, finding.instance) {
@@ -411,7 +416,7 @@ impl Craft {
         true
     }
 
-    /// What it is doing.
+    /// Its phase of flight.
     pub fn phase(&self, now: Instant) -> Phase {
         self.monitor.flight().phase(now.into(), self.monitor.vehicle())
     }

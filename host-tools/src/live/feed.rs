@@ -1,8 +1,9 @@
-//! A live source: bytes as they come, on this PC's clock, until Ctrl-C.
+//! A live source: bytes as they arrive, on this PC's clock, until Ctrl-C.
 //!
-//! The thread waits for bytes at most `SILENCE`, takes them through the framer into the world, and publishes twenty
-//! to twenty-five times a second, at once what comes after a pause; between that it rests for moments (`GATHER`). A connection that breaks is
-//! opened again by a thread of its own, as that may take ten seconds; meanwhile the values grow old, and the page says so.
+//! The thread waits at most `SILENCE` for bytes, passes them through the framer into the world, and publishes
+//! 20 to 25 times a second. The first bytes after a pause are published at once. In between it rests for
+//! short times (`GATHER`). A broken connection is opened again by a thread of its own, as that may take ten
+//! seconds. Meanwhile the values grow old, and the page shows that.
 
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
@@ -24,19 +25,19 @@ use crate::interrupt;
 
 /// How long a byte is waited for: the page's clock goes on meanwhile.
 const SILENCE: Duration = Duration::from_millis(10);
-/// While nothing is due, what comes is gathered so long: a vehicle sends hundreds of messages a second, and to wake for
-/// each would cost several times what the message does. Radios and USB adapters gather as long.
+/// Time to gather bytes while no update is due. A vehicle sends hundreds of messages a second, and a wake-up
+/// for each would cost several times the message. Radios and USB adapters gather as long.
 const GATHER: Duration = Duration::from_millis(20);
 /// More than the fastest port brings in half of that (921,600 baud) is not waited on.
 const GATHERED_BYTES: usize = 1_024;
-/// What was gathered counts as having come evenly since the last look, in so many pieces.
+/// Gathered bytes are spread evenly over the time since the last look, in this number of pieces.
 const PIECES: usize = 8;
-/// What has come is shown so long after what came before was: at once where nothing came for a while. Pages that draw in
-/// 10 ms have time for it.
+/// Time between two updates of the page; the first bytes after a pause are shown at once. Pages that draw in
+/// 10 ms keep up.
 const SOON: Duration = Duration::from_millis(40);
 /// How soon a broken connection is tried again.
 const AGAIN: Duration = Duration::from_secs(1);
-/// A source that says nothing for so long is silent.
+/// A source without data for this long is silent.
 const SILENT: Duration = Duration::from_secs(3);
 
 /// Follows a live source until Ctrl-C.
@@ -80,7 +81,7 @@ impl Link {
 }
 
 impl Feed {
-    /// Opens the source: a slip in its name is told at once.
+    /// Opens the source; an error in its name is reported at once.
     pub fn open(endpoint: &Endpoint, limits: Limits, hub: Arc<Hub>, influx: Option<Influx>) -> Result<Self> {
         let port = duplex::open(endpoint, SILENCE)?.reader;
         Ok(Self {
@@ -99,7 +100,7 @@ impl Feed {
         })
     }
 
-    /// Runs until Ctrl-C; gives what is still to be written.
+    /// Runs until Ctrl-C; returns the points still to be written.
     pub fn run(mut self) -> Option<Influx> {
         let mut buffer = vec![0; duplex::ALL_BYTES];
         let (mut published, mut shown, mut news) = (Wall::now(), Wall::now(), false);
@@ -128,7 +129,7 @@ impl Feed {
         Instant::from_micros(u64::try_from(self.start.elapsed().as_micros()).unwrap_or(u64::MAX))
     }
 
-    /// Takes what has come, or waits for it a while; gives how many bytes there were.
+    /// Takes the bytes that have arrived, or waits a while for some; returns their number.
     fn read(&mut self, buffer: &mut [u8]) -> usize {
         let Link::Open(port) = &mut self.link else {
             self.open_again();
@@ -168,7 +169,7 @@ impl Feed {
         got
     }
 
-    /// All that time asks for until now: what is shown of a moment is whole.
+    /// All steps of time until now, so that each update is consistent.
     fn pass(&mut self, now: Instant) {
         self.looked = now;
         let Self { hub, world, influx, epoch_us, .. } = self;
@@ -226,14 +227,14 @@ impl Feed {
     }
 }
 
-/// UTC at time zero of the monotonic clock, microseconds since 1970, by UTC now. It is asked for again and again: the
-/// monotonic clock stands while the PC sleeps, and UTC may be set meanwhile.
+/// UTC at time zero of the monotonic clock, microseconds since 1970, by UTC now. It is computed again and
+/// again: the monotonic clock stops while the PC sleeps, and UTC may be set meanwhile.
 fn epoch_us(utc: SystemTime, now: Instant) -> u64 {
     let utc_us = utc.duration_since(UNIX_EPOCH).unwrap_or_default().as_micros();
     u64::try_from(utc_us).unwrap_or(0).saturating_sub(now.as_micros())
 }
 
-/// What came between two looks, in pieces, each with the time at which it counts as having come.
+/// The bytes between two looks, in pieces, each with its time of arrival.
 fn evenly(bytes: &[u8], from: Instant, to: Instant) -> impl Iterator<Item = (Instant, &[u8])> {
     let pieces = bytes.chunks(bytes.len().div_ceil(PIECES).max(1));
     let count = pieces.len() as u64;

@@ -1,10 +1,10 @@
-//! Who may ask: pages of this server only, and from other machines only with the token.
+//! Access control: only pages of this server, and other machines only with the token.
 //!
-//! * The `Host` of a request must be an address, `localhost`, or the name that the user gave: a foreign name that was
-//!   made to point here (DNS rebinding) is refused.
-//! * A browser says in `Origin` whose page asks: only ours may. Programs that are no browsers send none.
-//! * On an address that other machines reach, the connection that carries the data needs the token. The page itself is
-//!   the program's own, and no secret.
+//! * The `Host` of a request must be an address, `localhost`, or the name that the user gave. A foreign name
+//!   pointed at this machine (DNS rebinding) is refused.
+//! * A browser names the requesting page in `Origin`: only ours is accepted. Other programs send no `Origin`.
+//! * On an address that other machines reach, the data connection needs the token. The page itself is part of
+//!   the program and public.
 
 use std::net::{IpAddr, SocketAddr};
 
@@ -19,10 +19,10 @@ const TOKEN_BYTES: usize = 16;
 /// One that the user makes is at least so long.
 const TOKEN_CHARS_MIN: usize = 8;
 
-/// What is asked of a request.
+/// The checks of a request.
 #[derive(Clone, Debug)]
 pub struct Guard {
-    /// Hashed, so that the time that a comparison takes says nothing.
+    /// Hashed, so that the time of a comparison reveals no part of it.
     token: Option<[u8; 32]>,
     /// The host that the user named.
     host: String,
@@ -48,7 +48,7 @@ impl Guard {
         Ok((Self { token: hashed, host: host.to_ascii_lowercase() }, token))
     }
 
-    /// Whether the request is for this server by a name that nobody else can take.
+    /// Whether the request names this server by a name that cannot be taken over.
     pub fn knows_host(&self, headers: &HeaderMap) -> bool {
         host(headers).is_some_and(|host| {
             let name = without_port(host).to_ascii_lowercase();
@@ -63,7 +63,7 @@ impl Guard {
         ours.is_some_and(|ours| origin.to_str().is_ok_and(|origin| origin.eq_ignore_ascii_case(&ours)))
     }
 
-    /// Whether it has the token, where one is needed.
+    /// Whether it has the token, if one is needed.
     pub fn knows_token(&self, query: Option<&str>) -> bool {
         let Some(wanted) = &self.token else { return true };
         let mut pairs = query.unwrap_or_default().split('&').filter_map(|pair| pair.split_once('='));

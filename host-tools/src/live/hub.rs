@@ -1,6 +1,6 @@
-//! Between the thread that follows the vehicle and the pages: what is known now, of which only the newest counts, and the
-//! histories, of which each page takes what it lacks. The one side never waits for the other: a page that is slow skips
-//! states, and gets a larger part of the history the next time.
+//! Connects the vehicle's thread with the pages. It holds the present state, always the newest, and the
+//! histories, from which each page takes the part it lacks. Neither side waits for the other: a slow page
+//! skips states, and gets a larger part of the history the next time.
 
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -14,25 +14,25 @@ use crate::page::history::{Cursor, Part};
 /// Commands of all pages that wait; more are refused, which a second key press repeats.
 const COMMANDS_MAX: usize = 64;
 
-/// What is known at a moment, as text that is made once for all pages.
+/// The present state, as text made once for all pages.
 #[derive(Debug, Default)]
 pub struct Published {
-    /// Another one: the time went back, take the histories anew.
+    /// A new number means that time went back: take the histories again.
     pub epoch: u64,
-    /// No page sees what is later.
+    /// Pages see no later data.
     pub now: Instant,
     /// Source, time and vehicles.
     pub head: String,
-    /// What stands on a recording's time line; the same one until it changes.
+    /// The recording's time line; the same text until it changes.
     pub timeline: Arc<str>,
     /// Each vehicle by system id.
     pub crafts: Vec<(u8, String)>,
 }
 
-/// What a page asks for; only a recording can be played otherwise.
+/// A request of a page; apart from the vehicle, only for playback.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Command {
-    /// Time stands.
+    /// Stops time.
     Pause,
     /// Time goes on.
     Play,
@@ -70,11 +70,11 @@ impl Hub {
 
     /// The histories, to be held for moments.
     pub fn histories(&self) -> MutexGuard<'_, Histories> {
-        // What a panicking thread left is still the best there is.
+        // The data that a panicked thread left are still usable.
         self.histories.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// What a page lacks of a vehicle's history.
+    /// The part of a vehicle's history that a page lacks.
     pub fn since(&self, vehicle: u8, cursor: &mut Cursor, until: Instant) -> Option<Part> {
         self.histories().get(&vehicle)?.since(vehicle, cursor, until)
     }

@@ -1,5 +1,4 @@
-//! The reference system's quantities as they were told last: what of them is shown, under which name, and how old it may
-//! be.
+//! Last values of the reference system's quantities: those shown, their names, and their maximum ages.
 
 use hums_core::clock::{Instant, Span};
 use hums_core::observation::MOTORS_MAX;
@@ -40,7 +39,7 @@ pub const QUANTITIES: [(&str, Quantity, Span); 23] = [
 ];
 const PLACES: usize = QUANTITIES.len() + 6 * MOTORS_MAX;
 
-/// When each quantity was told last, and what.
+/// Time and last value of each quantity.
 #[derive(Clone, Debug)]
 pub struct Latest([Option<(Instant, Scalar)>; PLACES]);
 
@@ -53,7 +52,7 @@ impl Default for Latest {
 /// A name of the page's, and the quantity of a motor.
 pub type OfMotor = (&'static str, fn(usize) -> Quantity);
 
-/// What of an ESC is shown.
+/// Shown values of an ESC.
 pub const ESC: [OfMotor; 6] = [
     ("rpm", Quantity::EscRpm),
     ("volts", Quantity::EscVoltage),
@@ -77,14 +76,14 @@ fn place(quantity: Quantity) -> Option<usize> {
 }
 
 impl Latest {
-    /// A quantity was told.
+    /// Stores a reported value.
     pub fn set(&mut self, at: Instant, quantity: Quantity, value: Scalar) {
         if let Some(slot) = place(quantity).and_then(|place| self.0.get_mut(place)) {
             *slot = Some((at, value));
         }
     }
 
-    /// When a quantity was told last, and what.
+    /// Time and last value of a quantity.
     pub fn get(&self, quantity: Quantity) -> Option<(Instant, Scalar)> {
         *self.0.get(place(quantity)?)?
     }

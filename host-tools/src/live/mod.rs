@@ -5,9 +5,9 @@
 //!                                       \-> points -> InfluxDB
 //! ```
 //!
-//! One thread follows the vehicle (`feed` on this PC's clock, `playback` on a recording's), the first one serves the pages,
-//! one writes to a database where that is wanted. Who follows waits for neither of the others: pages take the newest state
-//! and what they lack of the history (`hub`), points wait in memory (`influx`).
+//! One thread follows the vehicle (`feed` on this PC's clock, `playback` on a recording's). The first thread
+//! serves the pages, and one writes to a database if requested. The vehicle's thread waits for neither: pages
+//! take the newest state and the part of the history that they lack (`hub`); points wait in memory (`influx`).
 
 pub mod assets;
 pub mod board;
@@ -81,16 +81,17 @@ pub fn run(args: &cli::Live) -> Result<Outcome> {
     Ok(influx.map_or(Outcome::Done, finish))
 }
 
-/// What `hums live --json` prints.
+/// Output of `hums live --json`.
 const SCHEMA: Schema = Schema::first("hums-live");
 
-/// Where the page is.
+/// Addresses of the page.
 #[derive(Debug, Serialize)]
 struct PagesJson<'a> {
     pages: &'a [String],
 }
 
-/// Says where the page is: on a terminal also as a code for the camera of a phone, where a phone can reach it.
+/// Prints the page's addresses, on a terminal also as a code for a phone's camera, if a phone can reach the
+/// page.
 fn tell(args: &cli::Live, pages: &[String]) -> Result<()> {
     if args.json {
         return output::json(SCHEMA, &PagesJson { pages });
@@ -110,8 +111,8 @@ fn is_here_only(page: &str) -> bool {
 
 type Follower = JoinHandle<Result<Option<Influx>>>;
 
-/// Starts the thread that follows the vehicle; what is wrong with the source is told at once. What is given besides never
-/// comes, and is cut off when the thread ends.
+/// Starts the thread that follows the vehicle; errors of the source are reported at once. The returned
+/// receiver never gets a value, and is closed when the thread ends.
 fn follow(
     args: &cli::Live,
     limits: &Limits,
@@ -157,7 +158,7 @@ fn database(args: &cli::Live) -> Result<Option<Influx>> {
     Influx::start(target, session, !args.input.is_live()).map(Some)
 }
 
-/// Waits for the database, and says what became of the points.
+/// Waits for the database, and prints the counts of the points.
 fn finish(influx: Influx) -> Outcome {
     let figures = influx.finish();
     let missing = figures.waiting + figures.lost + figures.rejected;
@@ -189,8 +190,8 @@ fn listen(text: &str) -> Result<(TcpListener, SocketAddr)> {
     Ok((listener, address))
 }
 
-/// What to type into a browser: here first, then on other machines. The token stands behind the `#`, which a browser
-/// sends to nobody.
+/// Addresses for a browser: on this machine first, then on others. The token is after the `#`, so the browser
+/// does not send it.
 fn page_addresses(
     listen: SocketAddr,
     token: Option<&str>,
@@ -220,7 +221,7 @@ fn others() -> Vec<IpAddr> {
     addresses
 }
 
-/// Shows the page in the user's browser; without one the address stands there anyway.
+/// Opens the page in the user's browser; without one the printed address is enough.
 fn open(page: &str) {
     let (program, first): (&str, &[&str]) = if cfg!(target_os = "macos") {
         ("open", &[])

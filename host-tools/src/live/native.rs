@@ -1,5 +1,5 @@
-//! An autopilot's own log, played. It has no frames that could be kept in a file of ours ([`super::spool`]): it is read
-//! again, from its beginning to the place that is wanted, by a thread that is a little ahead.
+//! Playback of an autopilot's own log. It has no frames for a file of ours ([`super::spool`]). So a thread
+//! reads it again from its beginning to the requested place, a little ahead.
 
 use std::collections::VecDeque;
 use std::io;
@@ -18,23 +18,23 @@ use crate::statustext::Text;
 const BATCH: usize = 256;
 const BATCHES: usize = 4;
 
-/// What such a log tells.
+/// An entry of such a log.
 #[derive(Clone, Debug)]
 pub enum Entry {
-    /// What the vehicle said.
+    /// An observation of the vehicle.
     Observation(Source, Box<Observation>),
-    /// What it said in words.
+    /// A text of the vehicle.
     Text(Text),
     /// A parameter and its value.
     Parameter(String, f64),
-    /// What plots show besides.
+    /// Further values for plots.
     More(More),
-    /// The log has nothing from here to there.
+    /// The log has a gap between these times.
     Gap(Instant, Instant),
 }
 
 impl Entry {
-    /// What an item tells, where it is of use here.
+    /// The entry of an item, if it is of use here.
     pub fn of(at: Instant, item: &Item<'_>) -> Option<Self> {
         match *item {
             Item::Observation(source, observation) => Some(Self::Observation(source, Box::new(*observation))),
@@ -47,7 +47,7 @@ impl Entry {
     }
 }
 
-/// What is read of such a log.
+/// The parts of such a log to read.
 pub fn want() -> Want<'static> {
     Want { observations: true, rows: rows(), ..Want::default() }
 }
@@ -72,7 +72,7 @@ impl Native {
     pub fn seek(&mut self, entries: u64) -> io::Result<()> {
         let (sender, batches) = sync_channel(BATCHES);
         let place = self.place.clone();
-        // A thread whose batches nobody takes any more ends with the next one.
+        // A thread without a receiver ends with its next batch.
         thread::Builder::new().name("log".to_owned()).spawn(move || {
             let (mut passed, mut batch) = (0_u64, Batch::new());
             let read = place.open().and_then(|recording| {
@@ -89,7 +89,7 @@ impl Native {
                 })
             });
             let _ = sender.send(batch);
-            // It was read once already, and what could not be read then was told.
+            // It was read once already, with a report of its unreadable parts.
             drop(read);
         })?;
         self.batches = Some(batches);
@@ -123,7 +123,7 @@ mod tests {
 
     #[test]
     fn entries_come_by_their_time_and_again_from_any_place() {
-        // Any recording will do: what it says is the same stream.
+        // Any recording will do: the stream is the same.
         let flight = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/flights/px4_hil_quad_low.tlog");
         let mut native = Native::new(Place::file(&flight));
         let take = |native: &mut Native, until_s: u64| {

@@ -1,5 +1,5 @@
-//! A recording or a HUMS log, played: read through once at the start, which makes the whole history, the time line and
-//! copies of the vehicles' state to go back to; then played at any speed, from any place.
+//! Playback of a recording or a HUMS log. It is read once at the start for the whole history, the time line,
+//! and copies of the vehicles' state to go back to. Then it plays at any speed, from any place.
 
 use std::io;
 use std::sync::Arc;
@@ -29,7 +29,7 @@ const COPIED_MAX: usize = 256;
 const COPY_EVERY: Span = Span::from_secs(5);
 /// Speeds that make sense.
 const SPEEDS: (f64, f64) = (0.1, 64.0);
-/// What a log tells besides frames: its parameters and parts, some hundred at its start. More is not kept.
+/// Maximum number of kept reports other than frames: a log's parameters and parts, some hundred at its start.
 const TOLD_MAX: usize = 8_192;
 /// Frames between two looks at the clock while reading.
 const LOOK_EVERY: u64 = 4_096;
@@ -39,7 +39,7 @@ const LOOK_EVERY: u64 = 4_096;
 struct Copy {
     at: Instant,
     offset: u64,
-    /// What else is told from here on.
+    /// Index of the next report from here on.
     told: usize,
     world: World,
 }
@@ -57,7 +57,7 @@ struct Loaded {
     frames: u64,
 }
 
-/// What is played.
+/// The source of playback.
 #[derive(Debug)]
 enum Played {
     /// Frames, kept.
@@ -66,8 +66,8 @@ enum Played {
     Native(Native),
 }
 
-/// What gets each frame of a recording that is followed, and each entry of one without frames, after the world has;
-/// `false` ends it.
+/// Callback after the world has taken a frame of a recording, or an entry of one without frames; `false` ends
+/// it.
 type Each<'a> = dyn FnMut(Instant, Option<&Frame<'_>>, &mut World) -> bool + 'a;
 
 impl Loaded {
@@ -80,7 +80,7 @@ impl Loaded {
         }
     }
 
-    /// The world takes what came by `now`.
+    /// The world takes all frames up to `now`.
     fn go(&mut self, world: &mut World, now: Instant) -> io::Result<()> {
         self.follow(world, now, &mut |_, _, _| true)?;
         world.advance(now, None);
@@ -120,7 +120,7 @@ fn copied(copies: &[Copy]) -> usize {
     copies.iter().map(|copy| copy.world.crafts.len()).sum()
 }
 
-/// Keeps what else was told. That something is missing is known behind it: copies that were made meanwhile take it too.
+/// Keeps a report. A gap is known only after it: copies made meanwhile take it too.
 fn keep(told: &mut Vec<(Instant, Told)>, copies: &mut [Copy], at: Instant, what: &Told) {
     let at = if let Told::Missing { from, .. } = what { at.min(*from) } else { at };
     let place = told.partition_point(|(known, _)| *known <= at);
@@ -131,7 +131,7 @@ fn keep(told: &mut Vec<(Instant, Told)>, copies: &mut [Copy], at: Instant, what:
     }
 }
 
-/// What else was told by then.
+/// Passes on the reports up to this time.
 fn tell(told: &[(Instant, Told)], next: &mut usize, by: Instant, world: &mut World) {
     while let Some((at, what)) = told.get(*next).filter(|(at, _)| *at <= by) {
         world.told(*at, what, None);
@@ -147,7 +147,7 @@ pub struct Player {
     source: SourceJson,
     epoch_us: Option<u64>,
     influx: Option<Influx>,
-    /// How much of the recording was read, 0 to 1, where the user ended the reading.
+    /// The part of the recording that was read, 0 to 1, if the user stopped the reading.
     read_to: Option<f64>,
     rate: Rate,
     /// See [`World::on_the_wire`].
@@ -158,7 +158,7 @@ pub struct Player {
 }
 
 impl Player {
-    /// What the pages see, and where they ask.
+    /// The state for the pages, and their requests.
     pub fn new(
         name: &str,
         limits: Limits,
@@ -178,7 +178,8 @@ impl Player {
         Self { hub, commands, limits, source, epoch_us, influx, read_to, rate, is_of_box, epoch: 0, timeline }
     }
 
-    /// Runs until Ctrl-C; gives what is still to be written. A recording that cannot be read is told on the page too.
+    /// Runs until Ctrl-C; returns the points still to be written. An unreadable recording is reported on the
+    /// page too.
     pub fn run(mut self, mut opened: Opened) -> Result<Option<Influx>> {
         let mut loaded =
             self.load(&mut opened).with_context(|| format!("{}: cannot be read", self.source.name))?;
@@ -189,7 +190,7 @@ impl Player {
         Ok(self.influx)
     }
 
-    /// Nothing heard yet.
+    /// A world without frames.
     fn world(&self) -> World {
         World::new(self.limits.clone()).on_the_wire(self.is_of_box)
     }
@@ -225,7 +226,7 @@ impl Player {
             };
             let due = copies.last().is_none_or(|copy: &Copy| at.since(copy.at) >= copy_every);
             if due {
-                // Vehicles that are heard later make the later copies larger, so several rounds may be needed.
+                // Later vehicles make the later copies larger, so several rounds may be needed.
                 while copies.len() >= COPIES_MAX || copied(&copies) + world.crafts.len() > COPIED_MAX {
                     let mut odd = false;
                     copies.retain(|_| {
@@ -363,7 +364,7 @@ impl Player {
                     self.source.phase = "paused";
                 }
             }
-            // Nothing to be paused, and times that are no numbers.
+            // Nothing to pause, or a time that is not a number.
             Command::Pause | Command::Speed(_) | Command::Seek(_) => {}
         }
         Ok(())

@@ -4,7 +4,7 @@ use anyhow::{Context as _, Result};
 use qrcode::render::unicode::Dense1x2;
 use qrcode::{EcLevel, QrCode};
 
-/// The code of a text. In colour it is black on white, as a camera expects it, whatever the terminal's colours are; without
+/// The code of a text. In colour it is black on white, as a camera expects it, on any terminal; without
 /// colours it is right on a dark terminal.
 pub fn code(text: &str, in_colour: bool) -> Result<String> {
     let code = QrCode::with_error_correction_level(text, EcLevel::L).context("no QR code of the address")?;

@@ -1,4 +1,4 @@
-//! How often pages are told, and how many frames come a second.
+//! Update rate of the pages, and number of frames per second.
 
 use std::time::{Duration, Instant as Wall};
 
@@ -22,7 +22,7 @@ impl Default for Rate {
 }
 
 impl Rate {
-    /// It goes on from so many frames, elsewhere: what lies between did not come now.
+    /// Jumps to this number of frames; those in between do not count.
     pub fn jump(&mut self, frames: u64) {
         (self.frames, self.since) = (frames, Wall::now());
     }

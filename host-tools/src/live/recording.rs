@@ -1,5 +1,5 @@
-//! What can be played: a recording of any kind, or a log of ours (a log file, segments, a card's image or folder: one of its
-//! sessions).
+//! Sources of playback: a recording of any kind, or one session of a log of ours (a log file, segments, a
+//! card's image or folder).
 
 use std::io;
 use std::path::Path;
@@ -23,10 +23,10 @@ const LISTED_MAX: usize = 12;
 
 /// An input, found good.
 pub struct Opened {
-    /// What it is called.
+    /// Its name.
     pub name: String,
     recording: Option<Recording>,
-    /// Where it is, of one without frames.
+    /// Its place, if it has no frames.
     native: Option<Place>,
     is_of_box: bool,
 }
@@ -43,7 +43,7 @@ impl Opened {
     }
 }
 
-/// Opens SRC, which is no live one; of several sessions the newest, or the one of this name.
+/// Opens SRC, which is not live; of several sessions the newest, or the one of this name.
 pub fn open(endpoint: &Endpoint, session: Option<&str>) -> Result<Opened> {
     let place = match endpoint {
         Endpoint::File(path) => chosen(path, session)?,
@@ -69,7 +69,7 @@ pub fn open(endpoint: &Endpoint, session: Option<&str>) -> Result<Opened> {
     Ok(Opened { name, recording: Some(recording), native, is_of_box })
 }
 
-/// What is to be played of all that a path holds.
+/// The recording to play, of all those in a path.
 fn chosen(path: &Path, session: Option<&str>) -> Result<Place> {
     let mut found = find(&[path.to_owned()], false)?;
     let names: Vec<String> = found.places.iter().map(|place| place.name.clone()).collect();
@@ -89,19 +89,19 @@ fn listed(names: &[String]) -> String {
     shown.join(", ") + &more
 }
 
-/// What comes out of a recording.
+/// An item of a recording.
 #[derive(Clone, Copy, Debug)]
 pub enum Heard<'a> {
     /// A frame.
     Frame(&'a Frame<'a>),
-    /// What an autopilot's own log tells.
+    /// An entry of an autopilot's own log.
     Entry(&'a Entry),
-    /// What a log tells besides.
+    /// Another report of a log.
     Told(&'a Told),
 }
 
-/// What gets each of these: its time, UTC of time zero where that is known, how much has been read, 0 to 1, and what it
-/// is. `false` ends the reading.
+/// Callback for each item: its time, UTC of time zero if known, the part read so far, 0 to 1, and the item.
+/// `false` ends the reading.
 pub type Take<'a> = dyn FnMut(Instant, Option<u64>, f64, Heard<'_>) -> io::Result<bool> + 'a;
 
 /// Reads it from its beginning to its end, once; gives how a log of ours ends.

@@ -1,7 +1,7 @@
-//! The page, and the one connection that carries its data: a WebSocket.
+//! The page, and its data connection: a WebSocket.
 //!
-//! Each page has a task that looks at the newest state when it can send, so a slow one skips states; a page that takes
-//! nothing for `PATIENCE` is dropped.
+//! Each page has a task that takes the newest state when it can send, so a slow one skips states. A page that
+//! takes no data for `PATIENCE` is dropped.
 
 use std::convert::Infallible;
 use std::sync::Arc;
@@ -29,13 +29,13 @@ use crate::page::json;
 
 /// Pages at once.
 const PAGES_MAX: usize = 16;
-/// What a page may send at once: its commands are short. Also the room that is cleared for it before each look whether it
-/// has sent something, which is done as often as the page is told something.
+/// Maximum size of a page's message: its commands are short. It is also the size of the buffer cleared before
+/// each check for a message, once for every update of the page.
 const COMMAND_BYTES_MAX: usize = 1_024;
-/// A page that takes nothing for so long is gone.
+/// A page that takes no data for this long is gone.
 const PATIENCE: Duration = Duration::from_secs(10);
 
-/// Only what is our own, nothing written into the page, no foreign frame around it.
+/// Only our own scripts and styles, no inline code, no foreign frame around the page.
 const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; img-src 'self'; \
                       base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
 
@@ -46,8 +46,8 @@ struct Shared {
     pages: Arc<AtomicUsize>,
 }
 
-/// One page's place. It is free again when this is dropped: also when the connection breaks before it is a WebSocket,
-/// because then the closure that holds it is dropped without a call.
+/// One page's place. Dropping it frees the place. That also works if the connection breaks before it is a
+/// WebSocket: the closure that holds the place is then dropped without a call.
 struct Place(Arc<AtomicUsize>);
 
 impl Place {
@@ -64,7 +64,8 @@ impl Drop for Place {
     }
 }
 
-/// Serves pages until nobody follows the vehicle any more, as after Ctrl-C: then the other end of `followed` is gone.
+/// Serves pages until the thread that follows the vehicle ends, as after Ctrl-C: then the other end of
+/// `followed` is gone.
 pub fn serve(
     listener: std::net::TcpListener,
     hub: Arc<Hub>,
@@ -89,7 +90,7 @@ pub fn serve(
     })
 }
 
-/// What holds for every request and every answer.
+/// Rules for every request and every answer.
 async fn check(State(shared): State<Shared>, request: Request, next: Next) -> Response {
     let headers = request.headers();
     let mut response = if !shared.guard.knows_host(headers) {
@@ -158,7 +159,7 @@ async fn send(socket: &mut WebSocket, messages: Vec<String>) -> Result<(), axum:
     socket.flush().await
 }
 
-/// What a page sends.
+/// A message of a page.
 #[derive(Debug, Deserialize)]
 #[serde(tag = "cmd", rename_all = "lowercase")]
 enum Asked {
@@ -169,7 +170,7 @@ enum Asked {
     Speed { to: f64 },
 }
 
-/// One page, and what it has.
+/// One page, and the data it has.
 struct Page {
     follow: tokio::sync::watch::Receiver<Arc<Published>>,
     vehicle: Option<u8>,
@@ -212,7 +213,7 @@ impl Page {
         }
     }
 
-    /// What cannot be read asks for nothing.
+    /// An unreadable message is ignored.
     fn obey(&mut self, text: &str, hub: &Hub) {
         let command = match serde_json::from_str(text) {
             Ok(Asked::Vehicle { system }) => {
@@ -230,7 +231,7 @@ impl Page {
         hub.command(command);
     }
 
-    /// The newest state, and what this page lacks of the history.
+    /// The newest state, and the part of the history that this page lacks.
     fn news(&mut self, hub: &Hub) -> Vec<String> {
         let published = Arc::clone(&self.follow.borrow_and_update());
         if published.epoch != self.epoch {

@@ -1,4 +1,4 @@
-//! What is known now as the text that pages take.
+//! The present state as text for the pages.
 
 use std::borrow::Cow;
 
@@ -18,7 +18,7 @@ use crate::page::json::json;
 use crate::page::modes;
 use crate::part;
 
-/// Where the bytes come from, and what they are doing.
+/// The source of the bytes, and its state.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct SourceJson {
     /// As the command line names it.
@@ -46,7 +46,7 @@ struct Head<'a> {
     t: &'static str,
     source: &'a SourceJson,
     now_s: f64,
-    /// UTC now, milliseconds since 1970, where it is known.
+    /// UTC now, milliseconds since 1970, if known.
     utc_ms: Option<u64>,
     frames: u64,
     frames_s: f64,
@@ -64,7 +64,7 @@ struct VehicleJson {
     heard_ms: u64,
 }
 
-/// What the head tells besides the world.
+/// Data in the head of the page, apart from the world.
 #[derive(Clone, Debug)]
 pub struct Around<'a> {
     /// The source.
@@ -73,7 +73,7 @@ pub struct Around<'a> {
     pub epoch_us: Option<u64>,
     /// Frames a second, lately.
     pub frames_s: f64,
-    /// What goes to a database.
+    /// Counts of the points for a database.
     pub influx: Option<super::influx::Figures>,
 }
 
@@ -118,7 +118,7 @@ struct State<'a> {
     mode: Cow<'static, str>,
     overall: &'static str,
     overall_said: Option<&'a str>,
-    /// The level that it had, where it is not known any more.
+    /// The last level before it became unknown.
     overall_was: Option<&'static str>,
     heard_ms: u64,
     px4: bool,

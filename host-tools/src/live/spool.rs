@@ -1,5 +1,5 @@
-//! A recording's frames with their times, in a file without a name: whatever the recording is (a tlog, raw bytes, a
-//! pipe, a HUMS log), from here on it is the same, and any place of it is reached at once.
+//! A recording's frames with their times, in a file without a name. The recording may be a tlog, raw bytes, a
+//! pipe or a HUMS log. From here on they are alike, and any place is reached at once.
 
 use std::fs::File;
 use std::io::{self, BufReader, BufWriter, Read, Seek, SeekFrom, Write};
@@ -31,7 +31,7 @@ pub struct Spool {
 pub struct Spooled<'a> {
     /// When it came.
     pub at: Instant,
-    /// What its checksum says.
+    /// Result of its checksum.
     pub check: Check,
     /// Its bytes.
     pub bytes: &'a [u8],
@@ -43,7 +43,7 @@ impl SpoolWriter {
         Ok(Self { file: BufWriter::new(tempfile::tempfile()?), offset: 0 })
     }
 
-    /// Where the next frame will stand.
+    /// Offset of the next frame.
     pub fn offset(&self) -> u64 {
         self.offset
     }

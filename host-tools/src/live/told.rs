@@ -1,5 +1,5 @@
-//! What the box on board has recorded or said of its settings and of the parts that wear: the limits here are then its
-//! own, and what a part had run before this session is known.
+//! Settings and part hours as the box on board has recorded or reported them. With these, the limits here are
+//! its own, and a part's hours before this session are known.
 
 use std::sync::Arc;
 
@@ -23,7 +23,7 @@ impl Limits {
     pub fn new(given: &[(&'static ParamSpec, f32)]) -> Self {
         let mut limits = Self::default();
         for (spec, value) in given {
-            // Whoever read the file has checked name and range.
+            // Name and range were checked when the file was read.
             let _ = limits.params.set(spec.name, *value);
         }
         limits.given = given.iter().map(|(spec, _)| spec.name).collect();
@@ -35,7 +35,8 @@ impl Limits {
         &self.params
     }
 
-    /// Takes what the box says into `params`; what is out of range, or not a parameter of ours, changes nothing.
+    /// Takes a parameter of the box into `params`; an unknown parameter or a value out of range changes
+    /// nothing.
     pub fn take(&self, params: &mut Params, name: &str, value: f32) {
         if !self.given.contains(&name) {
             let _ = params.set(name, value);

@@ -31,7 +31,7 @@ impl Serialize for Shown {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let mut tuple = serializer.serialize_tuple(3)?;
         match self.value {
-            // As short as it was sent: 15.3, not 15.300000190734863. What is not finite becomes null.
+            // As short as it was sent: 15.3, not 15.300000190734863. Infinite values and `NaN` become null.
             Scalar::Single(value) => tuple.serialize_element(&value)?,
             other => tuple.serialize_element(&other.as_f64())?,
         }
@@ -41,7 +41,7 @@ impl Serialize for Shown {
     }
 }
 
-/// Takes a value by its name: when it came, what it is, how old it may be.
+/// Takes a value by its name: its time, value and maximum age.
 type Put<'a> = dyn FnMut(&'static str, Option<time::Instant>, Option<f32>, Span) + 'a;
 
 /// Everything that is known now, by name.
@@ -158,7 +158,7 @@ impl<'a> Values<'a> {
         }
     }
 
-    /// A combustion engine, and what speed sensors there are.
+    /// A combustion engine, and its speed sensors.
     fn engine(&self, put: &mut Put<'_>) {
         let engine = &self.craft.monitor.vehicle().engine;
         if let Some(known) = engine.get() {
@@ -196,7 +196,7 @@ impl Serialize for Values<'_> {
     }
 }
 
-/// The motors that were heard, by number; one in between that never was is an empty object.
+/// The motors received so far, by number; a missing one in between is an empty object.
 #[derive(Debug)]
 pub struct Motors<'a>(pub Values<'a>);
 

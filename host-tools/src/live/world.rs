@@ -20,11 +20,11 @@ use crate::page::note::Note;
 use crate::source::told::Finding as BoxFinding;
 use crate::summary::FindingLine;
 
-/// Vehicles that are told apart; later ones are counted.
+/// Maximum number of vehicles; further ones are counted.
 pub const VEHICLES_MAX: usize = 8;
 /// A silence that is longer than this is stepped through only at its beginning and end.
 const SILENCE_MAX: Span = Span::from_secs(600);
-/// What a check's debounce and age need at its beginning.
+/// Time for a check's debounce and age at its beginning.
 const SILENCE_HEAD: Span = Span::from_secs(60);
 
 /// A session's start, which is recorded at once.
@@ -33,27 +33,27 @@ const BEGINNING: Instant = Instant::from_millis(10_000);
 /// Histories by system id.
 pub type Histories = BTreeMap<u8, History>;
 
-/// All vehicles, and what was heard in all.
+/// All vehicles, and the counts of all frames.
 #[derive(Clone, Debug)]
 pub struct World {
     /// By system id.
     pub crafts: BTreeMap<u8, Craft>,
-    /// Frames heard, whoever sent them.
+    /// Number of frames received, from any sender.
     pub frames: u64,
     /// Those of them that fit no definition of ours.
     pub unverified: u64,
     /// Frames of vehicles beyond [`VEHICLES_MAX`].
     pub refused: u64,
-    /// Findings since this was cleared, with whose they are; what nobody clears stops at `FOUND_MAX`.
+    /// Findings since this was last cleared, with their vehicles; at most `FOUND_MAX`.
     pub found: Vec<(Instant, u8, Finding)>,
     limits: Limits,
     /// See [`Craft::on_the_wire`].
     on_the_wire: bool,
-    /// The vehicle that a log is of: the first one heard in it.
+    /// The vehicle of a log: the first one in it.
     owner: Option<u8>,
-    /// Parameters that autopilots told before their first heartbeat: system and frame.
+    /// Parameters that autopilots reported before their first heartbeat: system and frame.
     early: Vec<(u8, Vec<u8>)>,
-    /// What the log told of its parts before that.
+    /// The log's parts before that.
     parts: [Option<Component>; COMPONENTS_MAX],
     next_tick: Instant,
 }
@@ -65,7 +65,7 @@ const EARLY_MAX: usize = 2_048;
 const FOUND_MAX: usize = 4_096;
 
 impl World {
-    /// Nothing heard yet.
+    /// Empty.
     pub fn new(limits: Limits) -> Self {
         Self {
             crafts: BTreeMap::new(),
@@ -82,7 +82,7 @@ impl World {
         }
     }
 
-    /// What a box recorded: its frames come from the autopilot's own wire.
+    /// For a recording of a box: its frames come from the autopilot's own wire.
     #[must_use]
     pub fn on_the_wire(self, on_the_wire: bool) -> Self {
         Self { on_the_wire, ..self }
@@ -93,7 +93,7 @@ impl World {
         self.next_tick = at;
     }
 
-    /// Takes a frame. What is kept goes to `histories`, where there are any.
+    /// Takes a frame. Growing data go to `histories`, if given.
     pub fn frame(&mut self, at: Instant, frame: &Frame<'_>, mut histories: Option<&mut Histories>) {
         self.advance(at, histories.as_deref_mut());
         self.frames += 1;
@@ -136,7 +136,7 @@ impl World {
         }
     }
 
-    /// A vehicle has been heard for the first time.
+    /// A vehicle was received for the first time.
     fn meet(&mut self, at: Instant, system: u8) {
         if self.crafts.len() >= VEHICLES_MAX {
             self.refused += 1;
@@ -154,7 +154,7 @@ impl World {
         self.crafts.insert(system, craft);
     }
 
-    /// Takes what an autopilot's own log tells, which has no frames.
+    /// Takes an entry of an autopilot's own log, which has no frames.
     pub fn entry(&mut self, at: Instant, entry: &Entry, mut histories: Option<&mut Histories>) {
         let system = match entry {
             Entry::Observation(source, _) => source.system,
@@ -180,7 +180,8 @@ impl World {
         }
     }
 
-    /// The vehicle of an autopilot's own log, which is of one: system 1; its parameters stand before it is heard.
+    /// The only vehicle of an autopilot's own log: system 1, because its parameters come before the vehicle
+    /// is known.
     fn only(&self) -> u8 {
         self.crafts.keys().next().copied().unwrap_or(1)
     }
@@ -197,10 +198,10 @@ impl World {
         }
     }
 
-    /// An autopilot's own log has nothing from here to there, which is no silence of the vehicle: nothing is stepped, and
-    /// nothing for a moment after it, while the first values come in ([`SETTLE`]).
+    /// An autopilot's own log has a gap between these times; the vehicle was not silent. The world is not
+    /// stepped over it, nor for a moment after it, until the first values have come ([`SETTLE`]).
     fn pass(&mut self, from: Instant, to: Instant, histories: Option<&mut Histories>) {
-        // One that begins before what was heard last is a count over the whole log.
+        // A gap that begins before the last item is a count over the whole log.
         if self.next_tick <= to && from + SETTLE + TICK >= self.next_tick {
             self.advance(from, histories);
             let settle = if to.since(from) >= SETTLE { SETTLE } else { TICK };
@@ -208,7 +209,7 @@ impl World {
         }
     }
 
-    /// Takes what a log tells besides frames.
+    /// Takes another report of a log.
     pub fn told(&mut self, at: Instant, told: &Told, mut histories: Option<&mut Histories>) {
         if let Told::Missing { from, to, frames } = told {
             return self.miss(*from, *to, *frames, histories);
@@ -217,8 +218,8 @@ impl World {
         match told {
             Told::Parameter { name, value, start } => {
                 self.limits.learn(name, *value);
-                // Each file of a log repeats the table. At the session's start it stands before the parts, each with
-                // what it ran before: one that is not told has run nothing.
+                // Each file of a log repeats the table. At the session's start it comes before the parts with
+                // their earlier hours: a part not listed has run zero hours.
                 let new = |place: &usize| matches!(self.parts.get(*place), Some(None));
                 if let Some(place) = place_of(name).filter(|_| *start && at < BEGINNING).filter(new) {
                     self.part(place, Component::NONE);
@@ -240,7 +241,7 @@ impl World {
         }
     }
 
-    /// The log has nothing from here to there, which is no silence of the vehicle.
+    /// The log has a gap between these times; the vehicle was not silent.
     fn miss(&mut self, from: Instant, to: Instant, frames: u64, mut histories: Option<&mut Histories>) {
         self.pass(from, to, histories.as_deref_mut());
         for (system, craft) in &mut self.crafts {
@@ -251,7 +252,8 @@ impl World {
         }
     }
 
-    /// What the box found: the monitor here finds the same, where the frames tell it. What it said of itself nobody else can find.
+    /// Takes a finding of the box. The monitor here finds the same from the frames. Only findings about the
+    /// box itself cannot be made here.
     fn found_on_board(&mut self, finding: &BoxFinding, histories: Option<&mut Histories>) {
         let Some(owner) = self.owner else { return };
         let is_new = finding.subsystem == Subsystem::Recorder
@@ -357,7 +359,7 @@ mod tests {
         assert_eq!(told, [9.0, 9.0, 8.0, 8.0, 9.0, 9.0, 9.0, 9.0, 8.0, 8.0]);
     }
 
-    /// What an autopilot's own log lost is no silence of the vehicle: nothing is stale or lost for it.
+    /// A gap of an autopilot's own log is not a silence of the vehicle: no value is stale or lost for it.
     #[test]
     fn a_gap_of_an_autopilots_own_log_is_no_silence_of_the_vehicle() {
         let source = Source { system: 1, component: 1 };
@@ -379,7 +381,7 @@ mod tests {
         assert_eq!(found(true), 0);
     }
 
-    /// What the box counted as lost is missing here too, and is no silence of the vehicle.
+    /// Frames that the box counted as lost are missing here too, and are not a silence of the vehicle.
     #[test]
     fn what_a_box_lost_is_counted_and_is_a_gap_of_the_page() {
         let (mut world, mut histories) = (World::new(Limits::default()).on_the_wire(true), Histories::new());
@@ -402,7 +404,7 @@ mod tests {
         assert_eq!((part(19), part(60)), (serde_json::json!([]), serde_json::json!([[19.1, 39.9]])));
     }
 
-    /// What is so when the vehicle is first heard has not happened then.
+    /// A state at first reception is not an event of that moment.
     #[test]
     fn a_vehicle_that_is_first_heard_in_the_air_has_not_just_taken_off() {
         let mut encoder = Encoder::of(1, 1);

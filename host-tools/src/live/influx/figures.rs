@@ -2,21 +2,21 @@
 
 use serde::Serialize;
 
-/// What became of the points.
+/// Counts of the points by their fate.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Figures {
     /// The database has them.
     pub written: u64,
     /// They wait.
     pub waiting: u64,
-    /// The database refuses them for what they are.
+    /// Invalid points that the database refused.
     pub rejected: u64,
-    /// What it said of those last.
+    /// Its last reason for a refusal.
     pub refusal: String,
-    /// What of a recording no points were made of, because the user ended it; empty where there is nothing such.
+    /// The part of a recording without points, because the user stopped the program; empty if there is none.
     pub left_out: String,
-    /// They made room for newer ones while the database took none.
+    /// Points dropped in favour of newer ones while the database took none.
     pub lost: u64,
-    /// What the database said last when it did not take a batch; empty while all is well.
+    /// Its last reason for not taking a batch; empty while all is well.
     pub trouble: String,
 }

@@ -167,7 +167,7 @@ impl Influx {
         }
     }
 
-    /// Gives away what waited for its vehicles' names, when it is time.
+    /// Hands over the points that waited for their vehicles' names, when it is time.
     fn settle(&mut self, world: &World) {
         if self.names.is_waiting() {
             self.give_away();
@@ -191,7 +191,7 @@ impl Influx {
         }
     }
 
-    /// What became of the points so far.
+    /// Counts of the points so far.
     pub fn figures(&mut self) -> Figures {
         self.give_away_when_old();
         let mut figures = self.queue.figures();
@@ -199,13 +199,13 @@ impl Influx {
         figures
     }
 
-    /// Says what of the recording no points were made of.
+    /// Notes the part of the recording without points.
     pub fn leave_out(&mut self, words: String) {
         self.left_out = words;
     }
 
-    /// Gives away what is left and waits for the database, for a while, or until the user asks again to end; what became of
-    /// all points.
+    /// Hands over the rest and waits for the database, for a while, or until the user stops again. Returns
+    /// the counts of all points.
     pub fn finish(mut self) -> Figures {
         self.give_away();
         let settled = self.names.end();
@@ -230,7 +230,7 @@ mod tests {
     use crate::live::told::Limits;
     use crate::mavlink::ids::{AUTOPILOT_VERSION, HEARTBEAT};
 
-    /// What was told of the autopilot's id.
+    /// The reported id of the autopilot.
     const UID: u64 = 0x0031_002a_3035_510a;
 
     fn heartbeat() -> Packet {

@@ -1,7 +1,7 @@
-//! Whose points they are: the tag `vehicle` is the one that `hums decode` gives the same flight, which is the
-//! autopilot's unique id. An autopilot tells it when somebody asks for it, which may be some seconds after its first
-//! frame; until then points wait ([`WAIT`] and [`WAITING_BYTES_MAX`] at most) with a mark in the tag's place. A vehicle
-//! that has told nothing by then is `system-1`, from the moment it does its id.
+//! The vehicle of the points: the tag `vehicle` is the same as in `hums decode` of the flight, the
+//! autopilot's unique id. An autopilot reports its id only on request, perhaps some seconds after its first
+//! frame. Until then points wait, with a mark in place of the tag, for at most [`WAIT`] and
+//! [`WAITING_BYTES_MAX`]. A vehicle without an id by then is `system-1`, until it reports one.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::{Duration, Instant as Wall, SystemTime, UNIX_EPOCH};
@@ -12,13 +12,13 @@ use super::batch::Batch;
 use crate::decode::influx::Tags;
 use crate::live::world::World;
 
-/// Whoever asks an autopilot for its id does so at once, and again after some seconds.
+/// Programs ask an autopilot for its id at once, and again after some seconds.
 pub const WAIT: Duration = Duration::from_secs(10);
-/// What a fast link brings in that time.
+/// Data of a fast link in that time.
 pub const WAITING_BYTES_MAX: usize = 8 * 1024 * 1024;
 
-/// A new name for a session: in the order of time by the second; of those that begin in one second two are alike once in
-/// four thousand million.
+/// A new name for a session. Names are in the order of time by the second. Two sessions of the same second
+/// get the same name once in four thousand million.
 pub fn session(now: SystemTime) -> Result<String> {
     let seconds = now.duration_since(UNIX_EPOCH).unwrap_or_default().as_secs();
     Ok(format!("s{:08x}{:08x}", seconds as u32, u32::from_le_bytes(random()?)))
@@ -34,10 +34,10 @@ fn random<const N: usize>() -> Result<[u8; N]> {
 #[derive(Debug)]
 pub struct Names {
     session: String,
-    /// Vehicles by system, with their unique ids; 0 where none was told.
+    /// Vehicles by system, with their unique ids; 0 if unknown.
     vehicles: BTreeMap<u8, u64>,
     tags: BTreeMap<u8, (String, Tags)>,
-    /// What stands for a name that is still waited for; no vehicle can guess it.
+    /// Placeholder for a name not known yet; a vehicle cannot guess it.
     mark: String,
     waiting: Option<Waiting>,
 }
@@ -82,8 +82,8 @@ impl Names {
         self.waiting.as_ref().map_or(0, |waiting| waiting.batch.points)
     }
 
-    /// The tags of a system's points: of a vehicle its own; whoever else speaks is tagged with the first vehicle, as a
-    /// log's points are with the one whose log it is.
+    /// The tags of a system's points. A vehicle has its own. Other senders get those of the first vehicle, as
+    /// a log's points get its vehicle's.
     pub fn tags(&mut self, system: u8, world: &World) -> Tags {
         let name = if let Some(waiting) = &mut self.waiting {
             waiting.systems.insert(system);
@@ -102,7 +102,7 @@ impl Names {
         }
     }
 
-    /// What stands in the place of a system's name.
+    /// The placeholder for a system's name.
     fn place(&self, system: u8) -> String {
         format!("{}{system:03}", self.mark)
     }
@@ -116,7 +116,7 @@ impl Names {
         }
     }
 
-    /// Takes points whose tags may be marks: gives them back where nothing is waited for.
+    /// Takes points whose tags may be placeholders; returns them if no name is awaited.
     pub fn pass(&mut self, batch: Batch) -> Option<Batch> {
         let Some(waiting) = &mut self.waiting else { return Some(batch) };
         waiting.since.get_or_insert_with(Wall::now);
@@ -125,7 +125,7 @@ impl Names {
         None
     }
 
-    /// The points that waited, with their names, once all vehicles have told theirs or have had their time.
+    /// The waiting points with their names, once all vehicles have reported theirs or their time is over.
     pub fn settle(&mut self, world: &World) -> Option<Batch> {
         let waiting = self.waiting.as_ref()?;
         let late = waiting.since.is_some_and(|since| since.elapsed() >= WAIT)
@@ -135,10 +135,10 @@ impl Names {
         if told || late { self.end() } else { None }
     }
 
-    /// The points that waited, with what is known of their names.
+    /// The waiting points, with the names known so far.
     pub fn end(&mut self) -> Option<Batch> {
         let Waiting { mut batch, systems, .. } = self.waiting.take()?;
-        // What is not UTF-8 was replaced when it became a field.
+        // Invalid UTF-8 was replaced when it became a field.
         let mut text = String::from_utf8_lossy(&batch.text).into_owned();
         for system in systems {
             text = text.replace(&self.place(system), &self.name(system));

@@ -1,7 +1,8 @@
-//! Batches on their way to the database, in order, in a bounded memory.
+//! Queue of batches for the database, in order, in bounded memory.
 //!
-//! While the database is away, a live link's oldest batches make room for its newest ones, and their points are counted as
-//! lost: the database shows the present, and the record on the card has the whole flight. A recording waits for room instead.
+//! While the database is away, a live link's oldest batches are dropped for its newest ones, and their points
+//! are counted as lost. The database shows the present; the record on the card has the whole flight. A
+//! recording waits for room instead.
 
 use std::collections::VecDeque;
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
@@ -16,14 +17,14 @@ const BYTES_MAX: usize = 64 * 1024 * 1024;
 /// The longest time between two looks at Ctrl-C while a recording waits for room.
 const LOOK: Duration = Duration::from_millis(200);
 
-/// What became of a batch.
+/// Result of a batch.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Delivered {
-    /// The database has so many of its points.
+    /// Number of points in the database.
     pub written: u64,
-    /// It refuses so many for what they are.
+    /// Number of invalid points that it refused.
     pub refused: u64,
-    /// What it says of those.
+    /// Its reason for the refusal.
     pub why: String,
 }
 
@@ -45,7 +46,7 @@ struct Inner {
     /// Points of the batch that the writer has taken and not delivered.
     in_hand: u64,
     figures: Figures,
-    /// No more comes; nobody waits longer than this.
+    /// The queue takes no more batches, and waiting ends at this time.
     closed: Option<Wall>,
 }
 
@@ -63,8 +64,8 @@ impl Queue {
         self.changed.wait_timeout(inner, time).unwrap_or_else(PoisonError::into_inner).0
     }
 
-    /// Takes a batch. A patient queue first waits for room, until the user ends the program; otherwise nothing is waited for,
-    /// and the oldest batches make room.
+    /// Takes a batch. A patient queue waits for room, until the user stops the program. Any other drops its
+    /// oldest batches at once.
     pub fn put(&self, batch: Batch) {
         let mut inner = self.lock();
         let has_room = |inner: &Inner| inner.bytes + batch.text.len() <= self.bytes_max;
@@ -107,7 +108,7 @@ impl Queue {
         if delivered.refused > 0 {
             inner.figures.refusal.clone_from(&delivered.why);
         }
-        // On the page a word on what was refused stays until all is well.
+        // On the page the reason of a refusal stays until all is well.
         inner.figures.trouble = delivered.why;
     }
 
@@ -132,7 +133,7 @@ impl Queue {
         self.changed.notify_all();
     }
 
-    /// What became of the points.
+    /// Counts of the points.
     pub fn figures(&self) -> Figures {
         let inner = self.lock();
         let waiting = inner.waiting.iter().map(|batch| batch.points).sum::<u64>() + inner.in_hand;

@@ -1,4 +1,4 @@
-//! Where points go: which database, by which of its interfaces.
+//! The destination of points: a database and its interface.
 //!
 //! | flags | interface | for |
 //! |---|---|---|
@@ -16,9 +16,9 @@ use crate::outcome::usage;
 pub struct Target {
     /// The address that takes batches.
     pub write: String,
-    /// The address that makes the database, where it may have to be made: 1.x has no buckets to be set up before.
+    /// The address that creates the database, if that may be needed: 1.x has no buckets to set up before.
     pub create: Option<String>,
-    /// What the header `Authorization` says.
+    /// Value of the header `Authorization`.
     pub authorization: Option<String>,
 }
 

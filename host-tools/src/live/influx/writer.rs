@@ -1,8 +1,8 @@
-//! The thread that writes batches: each until the database has it, or refuses it for what it is.
+//! The thread that writes batches: each until the database has it, or refuses it as invalid.
 //!
-//! A batch that is refused is tried again in halves, and these in halves: so a bad point costs itself and no other. A
-//! point that is written twice is the same point. `InfluxDB` 1.x and 2 write what is good of a batch themselves, answer
-//! 400 or 422 all the same, and say how many points they dropped; then nothing is tried again.
+//! A refused batch is tried again in halves, and these in halves: so a bad point costs only itself. A point
+//! written twice is the same point. `InfluxDB` 1.x and 2 write the good points of a batch themselves. They
+//! still answer 400 or 422, and say how many points they dropped; then the batch is not tried again.
 
 use std::sync::Arc;
 use std::thread::JoinHandle;
@@ -20,9 +20,9 @@ const LIMIT: Duration = Duration::from_secs(10);
 /// The first wait after a failure, which doubles up to the longest.
 const WAIT_MIN: Duration = Duration::from_millis(200);
 const WAIT_MAX: Duration = Duration::from_secs(5);
-/// What is read of an answer.
+/// Maximum number of bytes read from an answer.
 const ANSWER_BYTES_MAX: u64 = 64 * 1024;
-/// What is told of it.
+/// Maximum number of characters reported from it.
 const WORDS_MAX: usize = 200;
 /// Requests for one batch. A bad point among 2,048 takes at most 30; where there are more bad ones than these find, the good
 /// ones beside them go with them.
@@ -32,9 +32,9 @@ const REQUESTS_MAX: usize = 64;
 #[derive(Debug)]
 enum Answer {
     Taken,
-    /// For what it is: another try would end alike. Where the rest was written, how many were not.
+    /// Invalid: another try would fail too. If the rest was written, the number of points not written.
     Refused(String, Option<u64>),
-    /// There is no such database.
+    /// The database does not exist.
     Missing(String),
     /// The server is away, busy, or wants another token.
     Away(String),
@@ -42,7 +42,8 @@ enum Answer {
 
 /// Starts the thread; it ends when the queue is closed and empty, or its time is up.
 pub fn start(target: Target, queue: Arc<Queue>) -> Result<JoinHandle<()>> {
-    // A server that sends elsewhere is told of: what is there would get no points, and may say that it took them.
+    // A redirect is reported as an error: the server behind it would get no points, and may still confirm
+    // them.
     let config = Agent::config_builder()
         .timeout_global(Some(LIMIT))
         .http_status_as_error(false)
@@ -54,7 +55,7 @@ pub fn start(target: Target, queue: Arc<Queue>) -> Result<JoinHandle<()>> {
 }
 
 fn write_all(agent: &Agent, target: &Target, queue: &Queue) {
-    // A server that has taken a point is a database of ours. Of one that refuses all nobody knows: its address may be wrong.
+    // A server that has taken a point is the right database. If it refuses all, its address may be wrong.
     let mut has_taken = false;
     while let Some(batch) = queue.take() {
         let mut wait = WAIT_MIN;
@@ -94,7 +95,7 @@ fn persist(agent: &Agent, target: &Target, queue: &Queue, lines: &[u8]) -> Optio
     }
 }
 
-/// Delivers a batch, what is refused in halves, with a bounded number of requests.
+/// Delivers a batch, its refused parts in halves, with a bounded number of requests.
 fn in_halves(batch: &Batch, mut deliver: impl FnMut(&[u8]) -> Option<Answer>) -> Option<Delivered> {
     let mut delivered = Delivered::default();
     // The parts that are still to be written, the first of them last.
@@ -150,8 +151,8 @@ fn write(agent: &Agent, target: &Target, lines: &[u8]) -> Answer {
     answer(status, &body.unwrap_or_default())
 }
 
-/// What an answer means. A database that has all points says 204, and nothing else. What it says of points that it refuses is an
-/// object of JSON; the same status in other words is another server's, or one that wants https.
+/// Meaning of an answer. A database that took all points answers exactly 204. It explains refused points with
+/// a JSON object. The same status with another text is from another server, or from one that wants https.
 fn answer(status: u16, body: &str) -> Answer {
     let words: String = body.chars().take(WORDS_MAX).collect();
     let words = words.trim();
@@ -176,8 +177,8 @@ fn is_refusal(body: &str) -> bool {
     has("error") || has("code") && has("message")
 }
 
-/// How many points were dropped where the rest was written: "partial write: ... dropped=3". 0 stands there where lines
-/// could not be read (`InfluxDB` 1.x), which says nothing of their number.
+/// Number of points dropped while the rest was written: "partial write: ... dropped=3". For unreadable lines
+/// (`InfluxDB` 1.x) it is 0, which does not give their number.
 fn dropped(body: &str) -> Option<u64> {
     let (_, partial) = body.split_once("partial write")?;
     let (_, after) = partial.rsplit_once("dropped=")?;
@@ -200,7 +201,7 @@ fn create(agent: &Agent, target: &Target) {
 mod tests {
     use super::*;
 
-    /// What `InfluxDB` 2 says of a batch with a bad line.
+    /// Answer of `InfluxDB` 2 to a batch with a bad line.
     const UNREADABLE: &str = "{\"code\":\"invalid\",\"message\":\"unable to parse 'BAD': missing fields\"}";
 
     #[test]
@@ -236,14 +237,15 @@ mod tests {
         }
     }
 
-    /// A batch of so many lines, of which some are bad.
+    /// A batch of this many lines, some of them bad.
     fn batch(lines: u64, bad: &[u64]) -> Batch {
         let line =
             |number| if bad.contains(&number) { "BAD\n".to_owned() } else { format!("m v={number}\n") };
         Batch { text: (0..lines).map(line).collect::<String>().into_bytes(), points: lines }
     }
 
-    /// Delivers to a database that refuses a request with a bad line in it; what it has, and the requests.
+    /// Delivers to a database that refuses any request with a bad line. Returns the result, the stored lines,
+    /// and the number of requests.
     fn deliver(batch: &Batch) -> (Delivered, Vec<String>, usize) {
         let (mut has, mut requests) = (Vec::new(), 0);
         let delivered = in_halves(batch, |lines| {
