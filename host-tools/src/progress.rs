@@ -1,28 +1,71 @@
-//! How far a long reading is, on standard error.
+//! How far a long reading is: a line on standard error, if that is a terminal.
 
-use indicatif::{ProgressBar, ProgressStyle};
+use std::io::{IsTerminal as _, Write as _};
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::{Duration, Instant};
 
+use crate::plural::count;
 use crate::printable::word;
 
-/// A bar over so many bytes, on a terminal only; none where nobody knows how many.
-pub fn bytes(total: Option<u64>, name: &str) -> ProgressBar {
-    let Some(total) = total else { return ProgressBar::hidden() };
-    let bar = ProgressBar::new(total);
-    if let Ok(style) = ProgressStyle::with_template("{msg} {bar:40} {bytes}/{total_bytes} {eta}") {
-        bar.set_style(style);
-    }
-    bar.set_message(word(name).into_owned());
-    bar
+/// Between two drawings.
+const EVERY: Duration = Duration::from_millis(100);
+
+/// A line that says how much of something is done.
+#[derive(Debug)]
+pub struct Progress {
+    name: String,
+    /// 0: it is not shown.
+    total: u64,
+    done: AtomicU64,
+    drawn: Mutex<Option<Instant>>,
 }
 
-/// A bar over several logs, on a terminal only; none for a single one.
-pub fn logs(count: usize) -> ProgressBar {
-    if count < 2 {
-        return ProgressBar::hidden();
+/// The progress over so many bytes; it is not shown if nobody knows how many.
+pub fn bytes(total: Option<u64>, name: &str) -> Progress {
+    Progress::new(total.unwrap_or(0), word(name).into_owned())
+}
+
+/// The progress over several logs; it is not shown for a single one.
+pub fn logs(logs: usize) -> Progress {
+    Progress::new(if logs < 2 { 0 } else { logs as u64 }, count(logs as u64, "log"))
+}
+
+impl Progress {
+    fn new(total: u64, name: String) -> Self {
+        let total = if std::io::stderr().is_terminal() { total } else { 0 };
+        Self { name, total, done: AtomicU64::new(0), drawn: Mutex::new(None) }
     }
-    let bar = ProgressBar::new(count as u64);
-    if let Ok(style) = ProgressStyle::with_template("{bar:40} {pos}/{len} logs {eta}") {
-        bar.set_style(style);
+
+    /// So much is done.
+    pub fn set_position(&self, done: u64) {
+        self.done.store(done, Ordering::Relaxed);
+        let Ok(mut drawn) = self.drawn.lock() else { return };
+        if self.total == 0 || drawn.is_some_and(|drawn| drawn.elapsed() < EVERY) {
+            return;
+        }
+        *drawn = Some(Instant::now());
+        // A terminal that is gone shows nothing.
+        let _ = write!(std::io::stderr(), "\r{} {} % ", self.name, (done * 100 / self.total).min(100));
     }
-    bar
+
+    /// So much more is done.
+    pub fn inc(&self, more: u64) {
+        self.set_position(self.done.load(Ordering::Relaxed) + more);
+    }
+
+    /// Prints something else in its place.
+    pub fn suspend<T>(&self, print: impl FnOnce() -> T) -> T {
+        self.finish_and_clear();
+        print()
+    }
+
+    /// Takes the line away.
+    pub fn finish_and_clear(&self) {
+        if let Ok(mut drawn) = self.drawn.lock()
+            && drawn.take().is_some()
+        {
+            let _ = write!(std::io::stderr(), "\r{:1$}\r", "", self.name.chars().count() + 7);
+        }
+    }
 }

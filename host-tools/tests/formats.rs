@@ -4,9 +4,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
 
-use arrow_array::cast::AsArray;
-use arrow_array::types::{Float32Type, UInt32Type};
-use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
+use parquet::file::reader::{FileReader as _, SerializedFileReader};
+use parquet::record::Field;
 use tempfile::TempDir;
 
 fn flight(name: &str) -> PathBuf {
@@ -20,6 +19,10 @@ fn hums(dir: &Path, line: &str, code: i32) -> String {
     let error = String::from_utf8_lossy(&output.stderr).into_owned();
     assert_eq!(output.status.code(), Some(code), "hums {line}\n{error}");
     String::from_utf8_lossy(&output.stdout).into_owned() + &error
+}
+
+fn read(path: &Path) -> SerializedFileReader<File> {
+    SerializedFileReader::new(File::open(path).expect("a file")).expect("Parquet")
 }
 
 /// A directory with a flight packed as `NAME.hum`.
@@ -248,26 +251,25 @@ fn parquet_keeps_types_units_and_every_value() {
         fs::read_to_string(out.join(name).join("ATTITUDE.csv")).expect("the same as CSV")
     };
     let rows: Vec<Vec<&str>> = csv.lines().skip(1).map(|line| line.split(',').collect()).collect();
-    let builder =
-        ParquetRecordBatchReaderBuilder::try_new(File::open(&path).expect("a file")).expect("Parquet");
-    let roll = builder.schema().field_with_name("roll").expect("roll").clone();
-    assert_eq!(roll.metadata().get("units").map(String::as_str), Some("rad"));
+    let reader = read(Path::new(&path));
+    let metadata = reader.metadata().file_metadata().key_value_metadata().expect("what is known of it");
+    let roll = metadata.iter().find(|known| known.key == "units.roll").expect("its unit");
+    assert_eq!(roll.value.as_deref(), Some("rad"));
     let mut at = 0;
-    for batch in builder.build().expect("a reader") {
-        let batch = batch.expect("rows");
-        let time = batch.column_by_name("time_boot_ms").expect("a column").as_primitive::<UInt32Type>();
-        let roll = batch.column_by_name("roll").expect("a column").as_primitive::<Float32Type>();
-        for row in 0..batch.num_rows() {
-            assert_eq!(rows[at][4].parse(), Ok(time.value(row)));
-            assert_eq!(rows[at][5].parse(), Ok(roll.value(row)));
-            at += 1;
-        }
+    for row in reader.get_row_iter(None).expect("rows") {
+        let row = row.expect("a row");
+        let of =
+            |name: &str| row.get_column_iter().find(|(known, _)| *known == name).expect("a column").1.clone();
+        let (Field::UInt(time), Field::Float(roll)) = (of("time_boot_ms"), of("roll")) else {
+            panic!("their types are as they were sent: {row}")
+        };
+        assert_eq!((rows[at][4].parse(), rows[at][5].parse()), (Ok(time), Ok(roll)));
+        at += 1;
     }
     assert_eq!(at, rows.len());
     // As many rows in every table as in the CSV's.
     for (name, csv) in files(&dir.path().join("out"), ".csv") {
-        let builder = ParquetRecordBatchReaderBuilder::try_new(File::open(&tables[&name]).expect("a file"));
-        let parquet = builder.expect(&name).metadata().file_metadata().num_rows();
+        let parquet = read(&tables[&name]).metadata().file_metadata().num_rows();
         let lines = fs::read_to_string(csv).expect("text").lines().count() as i64 - 1;
         assert!(parquet == lines || name == "STATUSTEXT", "{name}: {parquet} and {lines}");
     }
@@ -372,6 +374,6 @@ fn more_ids_than_files_can_be_open_lose_nothing() {
         assert_eq!(text.matches("payload").count(), 1, "{name} has one header");
     }
     let parquet = files(&dir.path().join("out"), ".parquet");
-    let builder = ParquetRecordBatchReaderBuilder::try_new(File::open(&parquet["UNKNOWN"]).expect("a file"));
-    assert_eq!(builder.expect("Parquet").metadata().file_metadata().num_rows(), i64::from(3 * IDS));
+    let rows = read(&parquet["UNKNOWN"]).metadata().file_metadata().num_rows();
+    assert_eq!(rows, i64::from(3 * IDS));
 }

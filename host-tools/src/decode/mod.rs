@@ -20,7 +20,6 @@
 //! Gaps are in every format: `HUMS_GAP` tables, objects and points; a table `gaps.csv` beside a tlog and with `thesis`.
 
 pub mod batches;
-mod cells;
 pub mod checked;
 pub mod collect;
 pub mod columns;

@@ -5,7 +5,7 @@
 //! ```
 //! One file for each message type and for each table of the monitor's own, below what is known of the session: these
 //! tools read `vehicle`, `date` and `session` as columns. Columns keep the type that was sent (arrays are lists, `char`
-//! arrays text); the fields' metadata has their `units` and `enum`. Each table begins with `boot_s`, seconds since the
+//! arrays text); the file's metadata has `units.COLUMN` and `enum.COLUMN`. Each table begins with `boot_s`, seconds since the
 //! monitor's power-on, and `utc`, null where nobody told it; those of frames go on with `system` and `component`.
 //!
 //! Memory is bounded: rows wait as plain columns, 12 MiB in all; then the tables with the most become row groups
@@ -20,25 +20,21 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use anyhow::{Context as _, Result, bail};
-use arrow_array::RecordBatch;
-use arrow_schema::{DataType, SchemaRef};
-use arrow_select::concat::concat_batches;
-use parquet::arrow::ArrowWriter;
-use parquet::basic::Compression;
-use parquet::file::metadata::{KeyValue, RowGroupMetaData};
+use parquet::basic::{Compression, Repetition};
+use parquet::file::metadata::KeyValue;
 use parquet::file::properties::{EnabledStatistics, WriterProperties, WriterPropertiesBuilder};
+use parquet::file::writer::SerializedFileWriter;
+use parquet::schema::types::Type;
 
-use super::batches::{Batches, FrameColumns, Rows, frame_schema};
-use super::cells::CellColumns;
+use super::batches::{Batches, TimedRow};
+use super::columns::{Column, TableRows};
 use super::table::Table;
 use crate::files::{Folder, FolderFile, cannot_write};
 use crate::logs::in_order::{in_order, workers};
 
 /// What is held at most: some 55 MiB with all that reading takes.
 const LIMITS: Limits = Limits { pending_bytes: 12 << 20, open_bytes: 8 << 20 };
-/// Batches of a table that wait, before they are made one: each array of a batch takes some 200 bytes besides its values.
-const BATCHES_MAX: usize = 16;
-/// Rows of a row group at most: what engines like to read at once.
+/// So many rows of a table are a row group: what engines like to read at once.
 const GROUP_ROWS: usize = 128 * 1024;
 /// Bytes of a page and of a column's dictionary at most.
 const PAGE_BYTES: usize = 32 * 1024;
@@ -46,7 +42,7 @@ const PAGE_BYTES: usize = 32 * 1024;
 const DICTIONARIES_MAX: usize = 32;
 /// What an open file takes: its buffer, and its writer.
 const OPEN_FILE_BYTES: usize = 10 << 10;
-/// What each of its columns takes, in the schemas of both formats.
+/// What each of its columns takes in its schema.
 const OPEN_COLUMN_BYTES: usize = 1_000;
 /// What each column of a row group takes that was written.
 const CHUNK_BYTES: usize = 800;
@@ -66,32 +62,31 @@ struct Limits {
 pub struct ParquetTables {
     folder: Folder,
     limits: Limits,
-    properties: WriterPropertiesBuilder,
+    properties: Properties,
     tables: BTreeMap<Table, TableFile>,
 }
 
-/// A table: what waits of it, and its file while that is open.
+/// How files are written, and what is said in each of the session.
+struct Properties {
+    writer: WriterPropertiesBuilder,
+    about: Vec<KeyValue>,
+}
+
+/// A table: the rows that wait, and its file while that is open.
 struct TableFile {
     table: Table,
-    pending: Pending,
+    columns: TableRows,
+    /// What its rows take that wait.
     pending_bytes: usize,
     open: Option<Open>,
     /// Files of it so far.
     parts: u32,
 }
 
-/// Rows that wait.
-enum Pending {
-    /// Of frames.
-    Frames(SchemaRef, Vec<RecordBatch>),
-    /// Of the monitor's own, or of an autopilot's log.
-    Rows(CellColumns),
-}
-
 /// A file that is written.
 struct Open {
     path: PathBuf,
-    writer: ArrowWriter<FolderFile>,
+    writer: SerializedFileWriter<FolderFile>,
     /// What it takes.
     bytes: usize,
 }
@@ -101,30 +96,34 @@ impl ParquetTables {
     pub fn new(folder: Folder, about: &[(&str, String)]) -> Self {
         let about =
             about.iter().map(|(name, value)| KeyValue::new((*name).to_owned(), value.clone())).collect();
-        let properties = WriterProperties::builder()
+        let writer = WriterProperties::builder()
             .set_compression(Compression::SNAPPY)
-            .set_max_row_group_row_count(Some(GROUP_ROWS))
             .set_data_page_size_limit(PAGE_BYTES)
             .set_dictionary_page_size_limit(PAGE_BYTES)
             .set_dictionary_enabled(false)
             // What there is to know of each page would be kept until the file's end.
             .set_statistics_enabled(EnabledStatistics::Chunk)
             .set_offset_index_disabled(true)
-            .set_created_by(concat!("hums ", env!("CARGO_PKG_VERSION")).to_owned())
-            .set_key_value_metadata(Some(about));
-        Self { folder, limits: LIMITS, properties, tables: BTreeMap::new() }
+            .set_created_by(concat!("hums ", env!("CARGO_PKG_VERSION")).to_owned());
+        Self { folder, limits: LIMITS, properties: Properties { writer, about }, tables: BTreeMap::new() }
     }
 
     /// Takes a group's columns.
     pub fn put(&mut self, batches: Batches) -> Result<()> {
         let (frames, rows) = batches.parts();
         for (table, columns) in frames {
-            let new = || Pending::Frames(frame_schema(table), Vec::new());
-            self.tables.entry(table).or_insert_with(|| TableFile::new(table, new())).frames(columns)?;
+            let new = || TableFile::new(table, TableRows::of_frames(table));
+            self.tables.entry(table).or_insert_with(new).frames(columns)?;
         }
         for (name, rows) in rows {
-            let (table, new) = (Table::Hums(name), || Pending::Rows(CellColumns::default()));
-            self.tables.entry(table).or_insert_with(|| TableFile::new(table, new())).rows(rows)?;
+            let Some((_, _, first)) = rows.first() else { continue };
+            let table = Table::Hums(name);
+            let new = || TableFile::new(table, TableRows::of_rows(first));
+            self.tables.entry(table).or_insert_with(new).rows(&rows)?;
+        }
+        let Self { folder, properties, tables, .. } = self;
+        for file in tables.values_mut().filter(|file| file.columns.rows() >= GROUP_ROWS) {
+            file.write_group(folder, properties)?;
         }
         let pending_bytes: usize = self.tables.values().map(|table| table.pending_bytes).sum();
         if pending_bytes > self.limits.pending_bytes {
@@ -196,55 +195,70 @@ fn file_name(table: Table, part: u32) -> String {
 }
 
 impl Open {
-    fn new(
-        folder: &Folder,
-        name: &str,
-        schema: &SchemaRef,
-        properties: &WriterPropertiesBuilder,
-    ) -> Result<Self> {
+    fn new(folder: &Folder, name: &str, columns: &[Column], properties: &Properties) -> Result<Self> {
         let path = folder.path().join(name);
         // Files of numbers are a sixth smaller without a dictionary; texts gain by it.
-        let texts = schema.fields().iter().filter(|field| *field.data_type() == DataType::Utf8);
-        let properties = texts.take(DICTIONARIES_MAX).fold(properties.clone(), |properties, field| {
-            properties.set_column_dictionary_enabled(vec![field.name().clone()].into(), true)
+        let texts = columns.iter().filter_map(Column::text_name).take(DICTIONARIES_MAX);
+        let writer = texts.fold(properties.writer.clone(), |writer, name| {
+            writer.set_column_dictionary_enabled(vec![name.to_owned()].into(), true)
         });
-        let writer = ArrowWriter::try_new(folder.file(name)?, Arc::clone(schema), Some(properties.build()))
+        let about = columns.iter().flat_map(Column::about);
+        let about = about.map(|(name, value)| KeyValue::new(name, value.to_owned()));
+        let writer =
+            writer.set_key_value_metadata(Some(properties.about.iter().cloned().chain(about).collect()));
+        let types: parquet::errors::Result<Vec<_>> =
+            columns.iter().map(|column| column.parquet_type().map(Arc::new)).collect();
+        let schema = types.and_then(|types| {
+            Type::group_type_builder("hums").with_repetition(Repetition::REQUIRED).with_fields(types).build()
+        });
+        let file = folder.file(name)?;
+        let writer = schema
+            .and_then(|schema| SerializedFileWriter::new(file, Arc::new(schema), Arc::new(writer.build())))
             .with_context(|| cannot_write(&path))?;
-        let bytes = OPEN_FILE_BYTES + OPEN_COLUMN_BYTES * schema.fields().len();
+        let bytes = OPEN_FILE_BYTES + OPEN_COLUMN_BYTES * columns.len();
         Ok(Self { path, writer, bytes })
+    }
+
+    fn write(&mut self, columns: &[Column]) -> parquet::errors::Result<()> {
+        let mut group = self.writer.next_row_group()?;
+        for column in columns {
+            if let Some(mut writer) = group.next_column()? {
+                column.write(&mut writer)?;
+                writer.close()?;
+            }
+        }
+        group.close()?;
+        self.bytes += CHUNK_BYTES * columns.len();
+        Ok(())
     }
 }
 
 impl TableFile {
-    fn new(table: Table, pending: Pending) -> Self {
-        Self { table, pending, pending_bytes: 0, open: None, parts: 0 }
+    fn new(table: Table, columns: TableRows) -> Self {
+        Self { table, columns, pending_bytes: 0, open: None, parts: 0 }
     }
 
-    fn frames(&mut self, columns: FrameColumns) -> Result<()> {
-        let Pending::Frames(schema, pending) = &mut self.pending else { return self.is_other() };
-        let name = || format!("{}: its columns do not fit", self.table.name());
-        let batch = columns.batch(schema).with_context(name)?;
-        self.pending_bytes += batch.get_array_memory_size();
-        pending.push(batch);
-        // Those made one before stay apart, so that no row is copied again and again.
-        let small = pending.iter().rev().take_while(|batch| batch.num_rows() < GROUP_ROWS / 64).count();
-        if small >= BATCHES_MAX {
-            let few = pending.split_off(pending.len() - small);
-            pending.push(concat_batches(schema, &few)?);
-            self.pending_bytes = pending.iter().map(RecordBatch::get_array_memory_size).sum();
+    fn frames(&mut self, columns: TableRows) -> Result<()> {
+        self.check(true)?;
+        self.columns.append(columns);
+        self.pending_bytes = self.columns.held_bytes();
+        Ok(())
+    }
+
+    fn rows(&mut self, rows: &[TimedRow]) -> Result<()> {
+        self.check(false)?;
+        for (at, utc_us, row) in rows {
+            self.columns.row(*at, *utc_us, row);
+        }
+        self.pending_bytes = self.columns.held_bytes();
+        Ok(())
+    }
+
+    fn check(&self, has_frames: bool) -> Result<()> {
+        if self.columns.has_frames() != has_frames {
+            bail!("{}: is the name of two tables of different columns", self.table.name())
         }
         Ok(())
-    }
-
-    fn rows(&mut self, rows: Rows) -> Result<()> {
-        let Pending::Rows(columns) = &mut self.pending else { return self.is_other() };
-        columns.append(rows);
-        self.pending_bytes = columns.held_bytes();
-        Ok(())
-    }
-
-    fn is_other(&self) -> Result<()> {
-        bail!("{}: is the name of two tables of different columns", self.table.name())
     }
 
     /// What it takes that its file is open.
@@ -253,29 +267,21 @@ impl TableFile {
     }
 
     /// Writes what waits, as a row group.
-    fn write_group(&mut self, folder: &Folder, properties: &WriterPropertiesBuilder) -> Result<()> {
+    fn write_group(&mut self, folder: &Folder, properties: &Properties) -> Result<()> {
+        if self.columns.rows() == 0 {
+            return Ok(());
+        }
+        let rows = self.columns.take();
         self.pending_bytes = 0;
-        let batches = match &mut self.pending {
-            Pending::Frames(_, pending) => std::mem::take(pending),
-            Pending::Rows(columns) => columns.take_batch()?.into_iter().collect(),
-        };
-        let Some(first) = batches.first() else { return Ok(()) };
         let open = match &mut self.open {
             Some(open) => open,
             none => {
                 self.parts += 1;
                 let name = file_name(self.table, self.parts);
-                none.insert(Open::new(folder, &name, &first.schema(), properties)?)
+                none.insert(Open::new(folder, &name, rows.columns(), properties)?)
             }
         };
-        for batch in batches {
-            open.writer.write(&batch).with_context(|| cannot_write(&open.path))?;
-        }
-        let groups = open.writer.flushed_row_groups().len();
-        open.writer.flush().with_context(|| cannot_write(&open.path))?;
-        let new = open.writer.flushed_row_groups().get(groups..).unwrap_or_default();
-        open.bytes += CHUNK_BYTES * new.iter().map(RowGroupMetaData::num_columns).sum::<usize>();
-        Ok(())
+        open.write(rows.columns()).with_context(|| cannot_write(&open.path))
     }
 
     /// Ends its file; what comes later goes into a further one.
@@ -289,11 +295,9 @@ impl TableFile {
 mod tests {
     use std::fs::File;
 
-    use arrow_array::cast::AsArray as _;
-    use arrow_array::types::Float64Type;
-    use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
-
     use hums_core::clock::Instant;
+    use parquet::file::reader::SerializedFileReader;
+    use parquet::record::RowAccessor as _;
 
     use super::*;
     use crate::files::Inputs;
@@ -333,12 +337,11 @@ mod tests {
             let files: Vec<PathBuf> = files.take_while(|path| path.exists()).collect();
             for path in &files {
                 let file = File::open(path).expect("a file");
-                let reader = ParquetRecordBatchReaderBuilder::try_new(file)
-                    .and_then(ParquetRecordBatchReaderBuilder::build);
-                for batch in reader.expect("a Parquet file") {
-                    let batch = batch.expect("a batch");
-                    seconds.extend_from_slice(batch.column(0).as_primitive::<Float64Type>().values());
-                }
+                let reader = SerializedFileReader::new(file).expect("a Parquet file");
+                seconds.extend(reader.into_iter().map(|row| {
+                    let row = row.expect("a row");
+                    row.get_double(0).expect("seconds")
+                }));
             }
             assert!(seconds.iter().copied().eq((0..2000_u32).map(f64::from)), "{seconds:?}");
             files.len()

@@ -6,7 +6,6 @@ use anyhow::Result;
 use hums_core::clock::{Instant, Span};
 use hums_core::health::Level;
 use hums_core::usage::UsageCounter;
-use indicatif::BinaryBytes;
 use serde::Serialize;
 
 use super::each::each;
@@ -148,7 +147,7 @@ fn line(log: &Overview, width: usize) -> String {
     let least = if is_least { ">" } else { "" };
     let air =
         flight_s(log).map_or_else(|| "-".to_owned(), |seconds| format!("{least}{}", clock(span(seconds))));
-    let size = BinaryBytes(bytes(log)).to_string();
+    let size = binary(bytes(log));
     let name = word(&log.ending.name);
     let mut text = format!("{name:<width$}  {date:<19}  {length:>8}  {air:>8}  {size:>10}  {}", found(log));
     if let Some(aside) = log.ending.aside() {
@@ -218,6 +217,18 @@ fn flight_s(log: &Overview) -> Option<f64> {
 /// What is recorded of it, without the room that is set aside for it on a card.
 fn bytes(log: &Overview) -> u64 {
     if log.format.is_some() { log.bytes_on_card } else { log.log_bytes() }
+}
+
+/// Bytes in the largest unit of which it is one at least.
+fn binary(bytes: u64) -> String {
+    let (mut size, mut units) = (bytes as f64, ["KiB", "MiB", "GiB", "TiB"].iter());
+    let mut unit = "B";
+    while size >= 1024.0
+        && let Some(next) = units.next()
+    {
+        (size, unit) = (size / 1024.0, next);
+    }
+    if unit == "B" { format!("{bytes} B") } else { format!("{size:.2} {unit}") }
 }
 
 /// Seconds of a log, which may be any number: the cast saturates.
