@@ -101,14 +101,17 @@ pub fn run(args: &cli::Decode) -> Result<Outcome> {
 
 /// The one recording that is read; a usage error if more is asked for than all of it.
 fn input(args: &cli::Decode) -> Result<Endpoint> {
-    let is_part =
-        args.session.is_some() || args.from.is_some() || args.to.is_some() || !args.message.is_empty();
+    let is_part = args.session.is_some()
+        || args.from.is_some()
+        || args.to.is_some()
+        || args.split.is_some()
+        || !args.message.is_empty();
     match args.inputs.as_slice() {
         [input] if args.format.len() == 1 && !is_part => {
             Ok(if input.as_os_str() == "-" { Endpoint::Standard } else { Endpoint::File(input.clone()) })
         }
         _ => Err(usage(
-            "--format hum writes all of one recording, and no other format beside it; leave out --session, --from, --to and --message",
+            "--format hum writes all of one recording, and no other format beside it; leave out --session, --from, --to, --split and --message",
         )),
     }
 }

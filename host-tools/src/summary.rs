@@ -206,6 +206,15 @@ pub struct ExceedanceLine {
     pub unit: String,
 }
 
+/// A flight.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct FlightLine {
+    /// Take-off, or when the vehicle was seen first.
+    pub from: Instant,
+    /// Landing, if it is in the log.
+    pub to: Option<Instant>,
+}
+
 /// A part that wears.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ComponentLine {
@@ -258,6 +267,8 @@ pub struct Contents {
     pub judged: Option<JudgedChecks>,
     /// The vehicle was in the air when it was heard first.
     pub begins_in_air: bool,
+    /// Take-offs (`true`) and landings, in order, up to [`LISTED_MAX`].
+    pub moves: Vec<(Instant, bool)>,
     /// The last flight goes on at its end, in a recording that was judged here.
     pub ends_in_air: Option<EndsInAir>,
     /// Part of the time was not recorded, as its recorder says or as is seen, in a recording of another program.
@@ -325,6 +336,19 @@ impl Contents {
         }
     }
 
+    /// Its flights, as the box recorded them or as this program saw them.
+    pub fn flights(&self) -> Vec<FlightLine> {
+        let mut flights: Vec<FlightLine> = Vec::new();
+        for (at, is_take_off) in &self.moves {
+            match flights.last_mut() {
+                Some(last) if !is_take_off => last.to = last.to.or(Some(*at)),
+                _ if *is_take_off => flights.push(FlightLine { from: *at, to: None }),
+                _ => {}
+            }
+        }
+        flights
+    }
+
     /// Bytes of all frames.
     pub fn frame_bytes(&self) -> u64 {
         self.all_frames().bytes
@@ -388,7 +412,7 @@ impl Contents {
                 });
             }
             Record::Vehicle(vehicle) => self.vehicle = Some(*vehicle),
-            Record::Event(event) if event.number == marks::RESUMED => self.begins_in_air = true,
+            Record::Event(event) => self.event(at, event.number),
             Record::Finding(finding) => {
                 self.findings_count += 1;
                 if self.findings.len() < LISTED_MAX {
@@ -443,6 +467,14 @@ impl Contents {
         }
     }
 
+    fn event(&mut self, at: Instant, number: u8) {
+        self.begins_in_air |= number == marks::RESUMED;
+        let is_move = [marks::RESUMED, marks::TAKE_OFF, marks::LANDING].contains(&number);
+        if is_move && self.moves.len() < LISTED_MAX {
+            self.moves.push((at, number != marks::LANDING));
+        }
+    }
+
     fn exceeded(&mut self, key: (String, u8), line: ExceedanceLine) {
         if self.exceedances.len() < EXCEEDANCES_MAX || self.exceedances.contains_key(&key) {
             self.exceedances.insert(key, line);
@@ -455,6 +487,8 @@ impl Contents {
         self.boot = self.boot.take().or(next.boot);
         self.vehicle = next.vehicle.or(self.vehicle);
         self.begins_in_air |= next.begins_in_air;
+        let room = LISTED_MAX.saturating_sub(self.moves.len());
+        self.moves.extend(next.moves.into_iter().take(room));
         self.findings_count += next.findings_count;
         let room = LISTED_MAX.saturating_sub(self.findings.len());
         self.findings.extend(next.findings.into_iter().take(room));
@@ -502,7 +536,7 @@ impl Collect for Contents {
     fn held_bytes(&self) -> usize {
         // What an entry of a tree takes, texts on the heap included.
         const ENTRY_BYTES: usize = 256;
-        ENTRY_BYTES * (self.findings.len() + self.exceedances.len())
+        ENTRY_BYTES * (self.findings.len() + self.exceedances.len() + self.moves.len())
     }
 }
 

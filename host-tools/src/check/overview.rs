@@ -9,9 +9,11 @@ use std::collections::BTreeSet;
 use anyhow::Result;
 use hums_blackbox::record::Vehicle;
 use hums_core::Monitor;
+use hums_core::clock::Instant;
 use hums_core::observation::Observation;
 use hums_core::usage::UsageCounter;
 
+use super::flights::Flight;
 use super::judge::{Heard, Judge, Limits};
 use super::judged::Judged;
 use crate::counters::is_told;
@@ -217,6 +219,7 @@ fn fill(contents: &mut Contents, judged: Judged) {
     contents.judged = Some(judged.checks());
     contents.begins_in_air = judged.begins_in_air();
     contents.ends_in_air = judged.ends_in_air;
+    contents.moves = moves(&judged.flights);
     contents.is_lossy = judged.is_lossy();
     let is_judged = judged.worst().is_some();
     let counters = counters(&judged);
@@ -241,6 +244,15 @@ fn fill(contents: &mut Contents, judged: Judged) {
             contents.exceedances.insert((exceedance.check.name.to_owned(), exceedance.instance), line);
         }
     }
+}
+
+/// Take-offs and landings of these flights; a mishap ends a flight as a landing does.
+fn moves(flights: &[Flight]) -> Vec<(Instant, bool)> {
+    let of = |flight: &Flight| {
+        let ended = flight.landed || flight.mishap.is_some();
+        std::iter::once((flight.from, true)).chain(ended.then_some((flight.to, false)))
+    };
+    flights.iter().flat_map(of).collect()
 }
 
 /// The vehicle that a monitor received; `None` without one.

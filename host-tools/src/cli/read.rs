@@ -15,6 +15,7 @@ const DECODE_EXAMPLES: &str = "Examples:
   hums decode 00001_00.HUM -o - --format jsonl --from 60 --to 2026-11-21T10:20:00Z | head
   hums decode cards/ -o fleet --format parquet
   hums decode card.img --session 00001 -o - --format influx | curl --data-binary @- http://localhost:8428/write
+  hums decode card.img -o out --format tlog --split flights
   hums decode flight.tlog -o flight.hum --format hum
 
 Where files go: -o names the file where there is one log and one format of a single file (tlog, jsonl, influx), unless
@@ -55,6 +56,9 @@ pub struct Decode {
     /// Leave out what is later
     #[arg(long, value_name = "T")]
     pub to: Option<When>,
+    /// Write files of their own for each flight; the time on the ground between two is cut in its middle
+    #[arg(long, value_enum, value_name = "WHAT", conflicts_with_all = ["from", "to"])]
+    pub split: Option<Split>,
     /// Only these messages, by name; HUMS records and gaps stay
     #[arg(long, value_name = "NAME")]
     pub message: Vec<String>,
@@ -64,6 +68,13 @@ pub struct Decode {
     /// Print the result as one JSON object (docs/json.md)
     #[arg(long)]
     pub json: bool,
+}
+
+/// Where a log is cut into several files.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Split {
+    /// Between its flights
+    Flights,
 }
 
 /// What to write.

@@ -25,11 +25,13 @@ pub struct Formats {
     pub parquet: bool,
     /// The reference system's tables.
     pub thesis: bool,
+    /// Each flight has files of its own.
+    pub split: bool,
 }
 
 impl Formats {
     /// These.
-    pub fn new(formats: &[Format]) -> Self {
+    pub fn new(formats: &[Format], split: bool) -> Self {
         let has = |format| formats.contains(&format);
         Self {
             tlog: has(Format::Tlog),
@@ -38,6 +40,7 @@ impl Formats {
             influx: has(Format::Influx),
             parquet: has(Format::Parquet),
             thesis: has(Format::Thesis),
+            split,
         }
     }
 
@@ -49,7 +52,7 @@ impl Formats {
     /// Whether a log becomes exactly one file.
     pub fn is_single_file(self) -> bool {
         let single = u8::from(self.tlog) + u8::from(self.jsonl) + u8::from(self.influx);
-        single == 1 && !self.csv && !self.parquet && !self.thesis
+        single == 1 && !self.csv && !self.parquet && !self.thesis && !self.split
     }
 }
 

@@ -17,6 +17,8 @@
 //!
 //! Recordings of every kind go the same way ([`crate::source::parts`]); an autopilot's log has its own tables (`native`).
 //!
+//! `--split flights` cuts a log between its flights, each of which is decoded as a log of its own.
+//!
 //! Gaps are in every format: `HUMS_GAP` tables, objects and points; a table `gaps.csv` beside a tlog and with `thesis`.
 
 pub mod batches;
@@ -91,7 +93,7 @@ pub fn run(args: &cli::Decode) -> Result<Outcome> {
     if args.format.contains(&cli::Format::Hum) {
         return pack::run(args);
     }
-    let formats = Formats::new(&args.format);
+    let formats = Formats::new(&args.format, args.split.is_some());
     let (given, remarks) = naming::without_made(&args.inputs);
     let found = find(&given, args.salvage)?;
     for remark in remarks.iter().chain(&found.remarks) {
@@ -222,6 +224,16 @@ impl Done {
         Self { name: log.name.clone(), outcome: Outcome::Done, ending: None, written: false, made, remarks }
     }
 
+    /// Adds what was written of the same log besides.
+    fn add(&mut self, next: Self) {
+        self.outcome = self.outcome.and(next.outcome);
+        self.ending = next.ending.or_else(|| self.ending.take());
+        self.written |= next.written;
+        self.made.extend(next.made);
+        let new = next.remarks.into_iter().filter(|remark| !self.remarks.contains(remark));
+        self.remarks.extend(new.collect::<Vec<_>>());
+    }
+
     fn outcome(&self) -> Outcome {
         let is_sound = self.ending.as_ref().is_none_or(Ending::is_sound);
         self.outcome.and(Outcome::lossy(!is_sound))
@@ -278,8 +290,32 @@ impl Task<'_> {
                 return copy(log, all.get(*of).map_or("another log", |work| &work.log.name));
             }
         };
+        let flights = if self.formats.split { flights(log)? } else { Vec::new() };
+        if flights.is_empty() {
+            return self.decode_part(work, (name, nth), self.context(work)?, taken);
+        }
+        let mut done = Done::of(log);
+        for (number, span) in (1..).zip(flights) {
+            let mut context = self.context(work)?;
+            context.selection = context.selection.within(span);
+            context.identity.session = format!("{}-flight{number}", context.identity.session);
+            context.tags = Tags::new(&context.identity.session, &context.identity.vehicle);
+            let name = format!("{name}-flight{number}");
+            done.add(self.decode_part(work, (&name, nth), context, taken)?);
+        }
+        Ok(done)
+    }
+
+    /// Decodes what the context selects of a log into files of this name.
+    fn decode_part(
+        &self,
+        work: &Work<'_>,
+        (name, nth): (&str, u32),
+        mut context: Context,
+        taken: &Mutex<BTreeSet<PathBuf>>,
+    ) -> Result<Done> {
+        let log = work.log;
         let mut remarks = Vec::new();
-        let mut context = self.context(work)?;
         remarks.extend(check_clock(&log.name, &context)?);
         let mut parquet = None;
         if self.formats.parquet
@@ -403,6 +439,21 @@ impl Task<'_> {
         })?;
         Ok((summary, writers, Checked::new(judge.end())))
     }
+}
+
+/// The parts of a log, each with one flight: it is cut in the middle between a landing and the next take-off.
+fn flights(log: &Place) -> Result<Vec<(Instant, Instant)>> {
+    let flights = check::overview(log)?.contents.flights();
+    let middle = |landing: Instant, take_off: Instant| {
+        Instant::from_micros(landing.as_micros() + take_off.since(landing).as_micros() / 2)
+    };
+    let cuts = flights.iter().zip(flights.iter().skip(1));
+    let cuts: Vec<Instant> =
+        cuts.map(|(flight, next)| middle(flight.to.unwrap_or(next.from), next.from)).collect();
+    let after = |cut: &Instant| Instant::from_micros(cut.as_micros() + 1);
+    let begins = std::iter::once(Instant::ZERO).chain(cuts.iter().map(after));
+    let ends = cuts.iter().copied().chain([Instant::from_micros(u64::MAX)]);
+    Ok(if flights.is_empty() { Vec::new() } else { begins.zip(ends).collect() })
 }
 
 /// A log that is a copy of another one: nothing is written of it, and it is read for what there is to say of it.

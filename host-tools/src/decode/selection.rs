@@ -40,6 +40,12 @@ impl Selection {
         Ok(Self { from: args.from, to: args.to, ids, names: args.message.clone() })
     }
 
+    /// The same, of this time only.
+    pub fn within(&self, (from, to): (Instant, Instant)) -> Self {
+        let limit = |at: Instant| Some(When::Seconds(at.as_micros()));
+        Self { from: limit(from), to: limit(to), ..self.clone() }
+    }
+
     /// The names of the messages that are wanted; none: all.
     pub fn names(&self) -> &[String] {
         &self.names

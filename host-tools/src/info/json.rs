@@ -10,7 +10,7 @@ use crate::names::{autopilot_name, check_name, type_name};
 use crate::source::item::MessageCount;
 use crate::source::recording::Format;
 use crate::states;
-use crate::summary::{Contents, Overview};
+use crate::summary::{Contents, FlightLine, Overview};
 use crate::utc::iso8601;
 
 /// A card image's file system.
@@ -80,6 +80,7 @@ pub struct LogJson {
     checks_judged: Option<usize>,
     checks_all: Option<usize>,
     ends_in_air: Option<String>,
+    flights: Vec<FlightJson>,
     findings_count: u64,
     findings: Vec<FindingJson>,
     usage: serde_json::Map<String, serde_json::Value>,
@@ -142,6 +143,19 @@ struct LossJson {
     count: u64,
     from_s: f64,
     to_s: f64,
+}
+
+#[derive(Debug, Serialize)]
+struct FlightJson {
+    from_s: f64,
+    /// `null` if its landing is not in the log.
+    to_s: Option<f64>,
+}
+
+impl FlightJson {
+    fn of(flight: FlightLine) -> Self {
+        Self { from_s: flight.from.as_secs_f64(), to_s: flight.to.map(Instant::as_secs_f64) }
+    }
 }
 
 #[derive(Debug, Serialize)]
@@ -288,6 +302,7 @@ impl LogJson {
             checks_judged: contents.judged.map(|checks| checks.judged),
             checks_all: contents.judged.map(|checks| checks.all),
             ends_in_air: contents.ends_in_air.map(|end| end.to_string()),
+            flights: contents.flights().into_iter().map(FlightJson::of).collect(),
             findings_count: contents.findings_count,
             findings: findings(log),
             usage: contents.usage.iter().map(|(name, value)| (name.clone(), (*value).into())).collect(),

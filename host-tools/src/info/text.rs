@@ -82,6 +82,12 @@ fn heading(text: &mut String, log: &Overview) {
     if let Some(end) = &contents.ends_in_air {
         let _ = writeln!(text, "  the end  {:>12}  {end}", moment(end.at));
     }
+    let flights = contents.flights();
+    for (number, flight) in (1..).zip(&flights).take(SHOWN_MAX) {
+        let to = flight.to.map_or_else(|| "the end of the log".to_owned(), moment);
+        let _ = writeln!(text, "  flight {number:<2} {:>11}  to {to}", moment(flight.from));
+    }
+    more(text, flights.len() as u64, flights.len().min(SHOWN_MAX));
     if let Some(vehicle) = vehicle(log) {
         let firmware = vehicle.firmware.map_or_else(String::new, |version| format!(" {version}"));
         let uid = vehicle.uid.map_or_else(String::new, |uid| format!(", uid {uid}"));

@@ -7,11 +7,13 @@ use hums_core::clock::Instant;
 
 use crate::loss::lost;
 
-/// Numbers of the events that say that the vehicle moves.
+/// The number of the event that says that the vehicle was armed.
 const ARMED: u8 = 1;
-const TAKE_OFF: u8 = 3;
-const LANDING: u8 = 4;
-/// The number of the event for a missing or unusable card.
+/// The number of the event that says that it took off.
+pub const TAKE_OFF: u8 = 3;
+/// The number of the event that says that it landed.
+pub const LANDING: u8 = 4;
+/// The number of the event that says that there is no card, or none that can be used.
 pub(super) const CARD_OUT: u8 = 7;
 /// The check that finds that the card refused blocks.
 pub(super) const REFUSED: &str = "card_errors";

@@ -8,7 +8,9 @@ use std::process::Stdio;
 use flate2::Compression;
 use flate2::write::GzEncoder;
 
-use crate::support::{contents, flight, frames, frames_of, hums, json, named, px4, recorded, run, text};
+use crate::support::{
+    attempt, contents, flight, frames, frames_of, hums, json, named, px4, recorded, run, text,
+};
 
 /// A packed log of the PX4 flight.
 fn packed(dir: &Path) {
@@ -548,4 +550,33 @@ fn a_ulog_with_a_field_twice_has_a_column_for_each() {
         .find(|path| path.extension().is_some_and(|e| e == "jsonl"));
     let lines = fs::read_to_string(lines.expect("lines")).expect("text");
     assert!(lines.lines().any(|line| line.contains("\"a\":") && line.contains("\"a_2\":")), "{lines}");
+}
+
+#[test]
+fn each_flight_of_a_recording_becomes_files_of_its_own_and_no_frame_is_lost() {
+    let dir = tempfile::tempdir().expect("directory");
+    let recordings = ["ap_quad_guided.tlog", "ap_quad_faults.tlog"];
+    let joined = recordings.map(|name| fs::read(flight(name)).expect("a recording")).concat();
+    fs::write(dir.path().join("two.tlog"), joined).expect("written");
+    let info = json(&attempt(dir.path(), "info --json two.tlog"));
+    let flights = info["logs"][0]["flights"].as_array().expect("flights");
+    let times: Vec<_> =
+        flights.iter().map(|flight| (flight["from_s"].as_f64(), flight["to_s"].as_f64())).collect();
+    assert_eq!(times, [(Some(48.3), Some(266.05)), (Some(1442.45), Some(1750.15))]);
+    attempt(dir.path(), "decode two.tlog -o whole.tlog --format tlog");
+    attempt(dir.path(), "decode two.tlog -o out --format tlog,csv --split flights");
+    let made = contents(&dir.path().join("out"));
+    let tlogs: Vec<_> = made
+        .iter()
+        .filter(|(name, _)| Path::new(name).extension().is_some_and(|end| end == "tlog"))
+        .collect();
+    assert!(
+        tlogs[0].0.ends_with("-flight1.tlog") && tlogs[1].0.ends_with("-flight2.tlog"),
+        "{}",
+        tlogs.len()
+    );
+    let whole = fs::read(dir.path().join("whole.tlog")).expect("made");
+    assert!(tlogs.len() == 2 && [&tlogs[0].1[..], &tlogs[1].1].concat() == whole);
+    run(dir.path(), "decode two.tlog -o out --format tlog --split flights --from 1", 2);
+    run(dir.path(), "decode two.tlog -o - --format tlog --split flights", 2);
 }
