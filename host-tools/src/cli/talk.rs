@@ -128,7 +128,7 @@ const PULL_EXAMPLES: &str = "Examples:
 Names of files say whose log it is: 00001-box3f0042000d51373435363338-s1a2b3c4d_00.HUM. One that is there already is left if it
 is the same by its checksum, and checked as a new one is. A download that was cut off (.NAME.pull.hums-part) goes on
 where it stopped, once the board has confirmed that what is there is the beginning of its log. With --around a part of a log comes, NAME.part.HUM, which every command reads and calls a part;
-without it all of the log comes, but for what is in the part already. Exit code 3: a log came as it is on the card, and has damage there;
+one that exists is not overwritten. Exit code 3: a log came as it is on the card, and has damage there;
 with --around, something of the moment, or of what was searched for the finding, could not be read: the words say what.";
 
 /// `hums box pull`

@@ -27,7 +27,7 @@ pub use in_place::{make_in_place, open_in_place};
 pub use inputs::Inputs;
 pub use output::Output;
 pub use paths::{
-    appended, cannot_write, check_parent, inside, make_directory, make_parent, means_standard_output,
+    appended, begin, cannot_write, check_parent, inside, make_directory, make_parent, means_standard_output,
     says_directory, settle, why_unread,
 };
 pub use short::read_short;

@@ -37,7 +37,7 @@ pub(super) fn part_prefix(target: &Path) -> io::Result<String> {
 }
 
 /// Begins a file beside its target, under a name of its own. It is removed unless it is given its name.
-pub(super) fn begin<R>(
+pub fn begin<R>(
     target: &Path,
     open: impl FnMut(&Path) -> io::Result<R>,
 ) -> io::Result<tempfile::NamedTempFile<R>> {

@@ -2,7 +2,7 @@
 //! ([`super::moment`]), and the sectors around it become a part of the log ([`super::part`]). Unreadable
 //! sectors in the part or in the search are reported.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::slice;
 
@@ -12,6 +12,7 @@ use hums_core::health::Level;
 
 use super::ftp::Ftp;
 use super::moment::{Sectors as _, between, first_group, group_before};
+use super::part::Part;
 use super::remote::Remote;
 use super::session::number as number_of;
 use super::stretch::{Reading, Stretch, Unread, by_number};
@@ -44,8 +45,7 @@ pub(super) fn pull(
     output: &Path,
     (what, span): (&Around, Span),
 ) -> Result<Brought> {
-    let mut board =
-        Board { ftp, names, left_out, output, strange: BTreeSet::new(), missing: None, next: None };
+    let mut board = Board::new(ftp, names, left_out, output);
     let (mut outcome, mut found, mut epoch_us) = (Outcome::Done, None, None);
     let at = match what {
         Around::Time(When::Seconds(micros)) => Instant::from_micros(*micros),
@@ -65,9 +65,8 @@ pub(super) fn pull(
             let searched = board.latest(what)?;
             outcome = searched.tell();
             let Some(latest) = searched.found else {
-                let parts = parts_of(&searched.stretches);
                 return Ok(Brought {
-                    parts,
+                    parts: Vec::new(),
                     at: None,
                     found: None,
                     strange: board.strange.len() as u64,
@@ -104,7 +103,7 @@ pub(super) fn pull(
         }
     }
     Ok(Brought {
-        parts: parts_of(&stretches),
+        parts: board.finish(&stretches)?,
         at: Some(at),
         found,
         strange: board.strange.len() as u64,
@@ -112,12 +111,7 @@ pub(super) fn pull(
     })
 }
 
-fn parts_of(stretches: &[Stretch]) -> Vec<(String, PathBuf)> {
-    stretches.iter().map(|stretch| (stretch.name.clone(), stretch.path.clone())).collect()
-}
-
-/// Refuses a moment without a recording. If a sector is unreadable, the recording may be there; then this is
-/// reported.
+/// Refuses a moment at which nothing was recorded. Where something cannot be read, it may be that: then it is told.
 fn check_recorded(
     at: Instant,
     readings: &[Reading],
@@ -170,8 +164,6 @@ struct Searched {
     found: Option<FindingLine>,
     /// Unreadable sectors in the search.
     unread: Option<Unread>,
-    /// All that was looked at.
-    stretches: Vec<Stretch>,
 }
 
 impl Searched {
@@ -218,6 +210,8 @@ struct Board<'a> {
     names: &'a [String],
     left_out: &'a [String],
     output: &'a Path,
+    /// The parts of logs that were looked at, by their names.
+    parts: BTreeMap<String, Part>,
     /// Sectors of other sessions that came, by their logs and places.
     strange: BTreeSet<(String, u32)>,
     /// Data recorded between the searched logs or before them, and in none of them, as the sectors' numbers
@@ -238,14 +232,26 @@ struct Begin<'a> {
     is_read: bool,
 }
 
-impl Board<'_> {
-    /// Downloads the recording between these times.
+impl<'a> Board<'a> {
+    fn new(ftp: &'a mut Ftp, names: &'a [String], left_out: &'a [String], output: &'a Path) -> Self {
+        let (parts, strange) = (BTreeMap::new(), BTreeSet::new());
+        Self { ftp, names, left_out, output, parts, strange, missing: None, next: None }
+    }
+
+    /// The parts with these stretches get their names; the others go.
+    fn finish(&mut self, stretches: &[Stretch]) -> Result<Vec<(String, PathBuf)>> {
+        let of = |stretch: &Stretch| Some((stretch.name.clone(), self.parts.remove(&stretch.name)?));
+        let parts: Vec<_> = stretches.iter().filter_map(of).collect();
+        parts.into_iter().map(|(name, part)| Ok((name, part.finish()?))).collect()
+    }
+
+    /// Brings what was recorded from one time to the other.
     fn bring(&mut self, from: Instant, to: Instant) -> Result<Vec<Stretch>> {
         let (mut stretches, mut later) = (Vec::new(), None);
         // Sectors of a group whose beginning is still to be found, with their logs.
         let mut tails: Vec<(&String, u32)> = Vec::new();
         for name in self.names.iter().rev() {
-            let mut log = Remote::open(self.ftp, name, self.output)?;
+            let mut log = Remote::open(self.ftp, &mut self.parts, name, self.output)?;
             let first = first_group(&mut log)?;
             let (at, number) = (first.map(|first| first.at), log.first_number());
             let is_further =
@@ -269,7 +275,7 @@ impl Board<'_> {
             if let Some(later) = &mut later {
                 for (name, end) in std::mem::take(&mut tails) {
                     if end > 0 && stretch.places.end == stretch.sectors {
-                        let mut log = Remote::open(self.ftp, name, self.output)?;
+                        let mut log = Remote::open(self.ftp, &mut self.parts, name, self.output)?;
                         stretches.push(log.bring(0..end)?);
                         log.add_strange(&mut self.strange);
                         later.is_read = true;
@@ -331,7 +337,7 @@ impl Board<'_> {
         for logs in self.names.chunk_by(|one, next| number_of(one) == number_of(next)).rev() {
             clock = self.last_clock(logs)?.or(clock);
             let Some(found) = clock else { continue };
-            let mut first = Remote::open(self.ftp, &logs[0], self.output)?;
+            let mut first = Remote::open(self.ftp, &mut self.parts, &logs[0], self.output)?;
             let began = first_group(&mut first)?.map(|first| first.at);
             if began.is_some_and(|began| found.epoch_us.saturating_add(began.as_micros()) <= utc_us) {
                 break;
@@ -346,7 +352,7 @@ impl Board<'_> {
     fn last_clock(&mut self, names: &[String]) -> Result<Option<Clock>> {
         let mut stretches = Vec::new();
         for name in names.iter().rev() {
-            let mut log = Remote::open(self.ftp, name, self.output)?;
+            let mut log = Remote::open(self.ftp, &mut self.parts, name, self.output)?;
             let count = log.count();
             let place = group_before(&mut log, count)?;
             stretches.insert(0, log.bring(place..count)?);
@@ -364,7 +370,7 @@ impl Board<'_> {
         let (mut found, mut stretches, mut later) = (None, Vec::new(), None);
         let never = Instant::from_micros(u64::MAX);
         for name in self.names.iter().rev() {
-            let mut log = Remote::open(self.ftp, name, self.output)?;
+            let mut log = Remote::open(self.ftp, &mut self.parts, name, self.output)?;
             let count = log.count();
             let mut end = count;
             while end > 0 && found.is_none() {
@@ -399,7 +405,7 @@ impl Board<'_> {
             unread = Unread::all(unread, reading.unread());
             found = found.into_iter().chain(wanted(&reading, what)).max_by_key(|found| found.at);
         }
-        Ok(Searched { found, unread: Unread::all(unread, self.missing.take()), stretches })
+        Ok(Searched { found, unread: Unread::all(unread, self.missing.take()) })
     }
 }
 

@@ -27,7 +27,6 @@ use serde::Serialize;
 use self::compare::{Heading, Likeness, beginning_of, compare, heading_here, heading_of};
 use self::ftp::Ftp;
 use self::judge::{Asked, LogJson, judge};
-use self::part::Part;
 use self::session::{Place, place};
 use self::stretch::{Reading, Stretch};
 use super::Client;
@@ -349,9 +348,7 @@ fn around(
     }
     outcome = outcome.and(brought.outcome);
     if brought.at.is_none() && outcome == Outcome::Done {
-        bail!(
-            "no such finding is in what the board gives of this session; what came stays for `hums box pull`, which brings the rest"
-        );
+        bail!("no such finding is in what the board gives of this session");
     }
     let mut pulled = Vec::new();
     for (name, path) in brought.parts {
@@ -377,9 +374,7 @@ fn pull(ftp: &mut Ftp, name: &str, output: &Path) -> Result<Option<(PathBuf, boo
     let heading = heading_of(ftp, name, length)?;
     let path = output.join(&heading.name);
     let there = there(ftp, name, &path, length)?;
-    let mut part = Part::there(&path, length / SECTOR_BYTES as u32, &heading.sectors)?;
     if there == There::Whole {
-        part.map_or(Ok(()), Part::finish)?;
         return Ok(Some((path, false)));
     }
     let mut file = Output::resume(&path)?;
@@ -399,14 +394,13 @@ fn pull(ftp: &mut Ftp, name: &str, output: &Path) -> Result<Option<(PathBuf, boo
         };
         note!("{name}: goes on after {have} bytes, {who}");
     }
-    let brought = complete(ftp, name, &mut file, (have, length), part.as_mut(), &heading);
+    let brought = complete(ftp, name, &mut file, (have, length), &heading);
     if let Err(why) = brought {
         // Before any message about it.
         tell_begun(name, file.part())?;
         return Err(why);
     }
     file.finish()?;
-    part.map_or(Ok(()), Part::finish)?;
     Ok(Some((path, true)))
 }
 
@@ -416,16 +410,15 @@ fn complete(
     name: &str,
     file: &mut Output,
     (have, mut length): (u32, u32),
-    part: Option<&mut Part>,
     heading: &Heading,
 ) -> Result<()> {
-    fetch(ftp, name, file, have, length, part)?;
+    fetch(ftp, name, file, have, length)?;
     if !is_whole(ftp, name, file, length)? {
         file.begin_anew()?;
         note!("{name}: what came differs from the board's log; once more from its beginning");
         length = ftp.open(name)?.min(length);
         check_same(heading, &heading_of(ftp, name, length)?)?;
-        fetch(ftp, name, file, 0, length, None)?;
+        fetch(ftp, name, file, 0, length)?;
         if !is_whole(ftp, name, file, length)? {
             bail!(
                 "what came differs from the board's log twice; does its card give the same bytes each time? {} has what came",
@@ -532,42 +525,19 @@ fn begun(ftp: &mut Ftp, name: &str, file: &mut Output, length: u32) -> Result<(u
     Ok((0, likeness))
 }
 
-/// Downloads the missing sectors, except those that a part already has.
-fn fetch(
-    ftp: &mut Ftp,
-    name: &str,
-    file: &mut Output,
-    from: u32,
-    length: u32,
-    mut part: Option<&mut Part>,
-) -> Result<()> {
-    const SECTOR: u32 = SECTOR_BYTES as u32;
-    let mut have = from;
-    while have < length {
-        // An incomplete sector is downloaded to its end.
-        let place = have.div_ceil(SECTOR);
-        if let Some(part) = part.as_mut().filter(|part| have.is_multiple_of(SECTOR) && part.has(place)) {
-            let written = file.write_all(part.read(place)?.bytes());
-            settle(written, file.path())?;
-            have += SECTOR;
-            continue;
+/// Brings what is missing.
+fn fetch(ftp: &mut Ftp, name: &str, file: &mut Output, have: u32, length: u32) -> Result<()> {
+    let (mut done, mut told) = (have, have);
+    let brought = ftp.bring(have, length, |bytes| {
+        settle(file.write_all(bytes), file.path())?;
+        done += bytes.len() as u32;
+        if done >= length || done - told >= TOLD_BYTES {
+            told = done;
+            note!("{name}: {done} of {length} bytes");
         }
-        let next = part.as_ref().and_then(|part| part.next(place, true));
-        let end = next.map_or(length, |next| (next * SECTOR).min(length));
-        let (mut done, mut told) = (have, have);
-        let brought = ftp.bring(have, end, |bytes| {
-            settle(file.write_all(bytes), file.path())?;
-            done += bytes.len() as u32;
-            if done >= end || done - told >= TOLD_BYTES {
-                told = done;
-                note!("{name}: {done} of {length} bytes");
-            }
-            Ok(())
-        });
-        brought.with_context(|| format!("after {done} of {length} bytes"))?;
-        have = end;
-    }
-    Ok(())
+        Ok(())
+    });
+    brought.with_context(|| format!("after {done} of {length} bytes"))
 }
 
 /// Whether the download equals the board's log.

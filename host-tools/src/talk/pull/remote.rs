@@ -1,9 +1,9 @@
-//! A log on the board whose sectors are downloaded one by one into the local part of it.
+//! A log on the board of which sectors are brought one by one, into a part of it.
 
-use std::collections::BTreeSet;
+use std::collections::btree_map::Entry;
+use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 use std::path::Path;
-use std::slice;
 
 use anyhow::{Result, bail};
 use hums_blackbox::{Header, SECTOR_BYTES, Sector};
@@ -13,7 +13,7 @@ use super::compare::{bytes_of, heading_of};
 use super::ftp::Ftp;
 use super::moment::Sectors;
 use super::part::Part;
-use super::stretch::{Reading, Stretch};
+use super::stretch::Stretch;
 
 /// Twice the longest log that a recorder makes: of a longer one a part would fill the disk.
 const LOG_BYTES_MAX: u64 = 2 * SEGMENT_BYTES_MAX as u64;
@@ -22,13 +22,17 @@ const LOG_BYTES_MAX: u64 = 2 * SEGMENT_BYTES_MAX as u64;
 pub(super) struct Remote<'a> {
     ftp: &'a mut Ftp,
     name: &'a str,
-    part: Part,
-    sectors: u32,
+    part: &'a mut Part,
 }
 
 impl<'a> Remote<'a> {
-    /// Opens a log, which has something in it by the board's directory.
-    pub(super) fn open(ftp: &'a mut Ftp, name: &'a str, output: &Path) -> Result<Self> {
+    /// Opens a log, which has something in it by the board's directory. `parts` are those of the logs that were opened before.
+    pub(super) fn open(
+        ftp: &'a mut Ftp,
+        parts: &'a mut BTreeMap<String, Part>,
+        name: &'a str,
+        output: &Path,
+    ) -> Result<Self> {
         let length = ftp.open(name)?;
         if u64::from(length) > LOG_BYTES_MAX {
             bail!("{name}: no recorder makes a log of {length} bytes, as the board says that it has");
@@ -37,6 +41,10 @@ impl<'a> Remote<'a> {
         if sectors == 0 {
             bail!("{name}: nothing is in it, though the board's directory says so; call again");
         }
+        let none = match parts.entry(name.to_owned()) {
+            Entry::Occupied(part) => return Ok(Self { ftp, name, part: part.into_mut() }),
+            Entry::Vacant(none) => none,
+        };
         let heading = heading_of(ftp, name, length)?;
         let whole = output.join(&heading.name);
         if whole.exists() {
@@ -45,14 +53,8 @@ impl<'a> Remote<'a> {
                 whole.display()
             );
         }
-        let mut part = Part::open(&whole, sectors, &heading.sectors)?;
-        for (place, sector) in (0..).zip(&heading.sectors) {
-            // The card may have lost sectors that are already here.
-            if !part.has(place) {
-                part.put(place, sector)?;
-            }
-        }
-        Ok(Self { ftp, name, part, sectors })
+        let part = none.insert(Part::begin(&whole, sectors, &heading.sectors)?);
+        Ok(Self { ftp, name, part })
     }
 
     /// Adds the places of sectors of other sessions that came, and are not in the part.
@@ -63,28 +65,17 @@ impl<'a> Remote<'a> {
     /// These places of it.
     pub(super) fn stretch(&self, places: Range<u32>) -> Stretch {
         let (name, path) = (self.name.to_owned(), self.part.path().to_owned());
-        Stretch { name, path, places, sectors: self.sectors }
+        Stretch { name, path, places, sectors: self.part.sectors() }
     }
 
-    /// The number of its first sector, if known.
-    pub(super) const fn first_number(&self) -> Option<u32> {
+    /// The number of its first sector, where one tells it.
+    pub(super) fn first_number(&self) -> Option<u32> {
         self.part.base()
     }
 
-    /// Brings the sectors of these places that are not here yet. Where those that are make no sound log with them, they are brought
-    /// again too.
+    /// Brings the sectors of these places that did not come yet.
     pub(super) fn bring(&mut self, places: Range<u32>) -> Result<Stretch> {
-        self.bring_missing(&places)?;
-        let stretch = self.stretch(places.clone());
-        let is_sound = Reading::of(slice::from_ref(&stretch))?.faults(false).is_empty();
-        if !is_sound && self.part.doubt(places.clone()) {
-            self.bring_missing(&places)?;
-        }
-        Ok(stretch)
-    }
-
-    fn bring_missing(&mut self, places: &Range<u32>) -> Result<()> {
-        let Range { start: mut place, end: to } = *places;
+        let Range { start: mut place, end: to } = places;
         while let Some(first) = self.part.next(place, false).filter(|first| *first < to) {
             let end = self.part.next(first, true).unwrap_or(to).min(to);
             let Self { ftp, part, .. } = self;
@@ -102,13 +93,13 @@ impl<'a> Remote<'a> {
             note!("{}: {} of {} sectors came", self.name, end - places.start, to - places.start);
             place = end;
         }
-        Ok(())
+        Ok(self.stretch(places))
     }
 }
 
 impl Sectors for Remote<'_> {
     fn count(&self) -> u32 {
-        self.sectors
+        self.part.sectors()
     }
 
     fn sector(&mut self, place: u32) -> Result<Option<(Header, Sector)>> {

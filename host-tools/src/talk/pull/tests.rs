@@ -193,27 +193,6 @@ fn what_is_no_file_in_the_place_of_a_log_is_told_and_left() {
 }
 
 #[test]
-fn a_part_that_has_what_the_card_has_lost_since_is_not_written_over() {
-    let dir = tempfile::tempdir().expect("a folder");
-    let (log, _, name) = two_logs(dir.path());
-    let part = crate::logs::naming::part_name(&dir.path().join(&name));
-    fs::write(&part, &log).expect("written");
-    let mut lost = log.clone();
-    lost[..SECTOR_BYTES].fill(0);
-    let mut ftp = board(lost.clone(), lost, u32::MAX);
-    let what: cli::Around = "0".parse().expect("a time");
-    around::pull(
-        &mut ftp,
-        &[NAME.to_owned()],
-        &[],
-        dir.path(),
-        (&what, hums_core::clock::Span::from_secs(1)),
-    )
-    .expect("a part");
-    assert_eq!(fs::read(&part).expect("there"), log);
-}
-
-#[test]
 fn a_part_has_sectors_of_one_session_also_where_the_log_is_exchanged_while_it_is_read() {
     let dir = tempfile::tempdir().expect("a folder");
     let (log, other, name) = two_logs(dir.path());
@@ -536,27 +515,6 @@ fn a_session_is_all_that_was_recorded_from_one_power_on() {
 }
 
 #[test]
-fn a_sector_of_a_part_that_belongs_elsewhere_is_brought_anew() {
-    let dir = tempfile::tempdir().expect("a folder");
-    let log = recorded(7, 300);
-    let around = |ftp: &mut Ftp| {
-        let what: cli::Around = "1:00".parse().expect("a time");
-        let names = [NAME.to_owned()];
-        around::pull(ftp, &names, &[], dir.path(), (&what, hums_core::clock::Span::from_secs(9_999)))
-            .expect("a part")
-    };
-    let mut ftp = board(log.clone(), Vec::new(), u32::MAX);
-    let (_, path) = around(&mut ftp).parts.remove(0);
-    let mut part = fs::read(&path).expect("there");
-    assert_eq!(part, log);
-    part.copy_within(5 * SECTOR_BYTES..6 * SECTOR_BYTES, 9 * SECTOR_BYTES);
-    fs::write(&path, &part).expect("written");
-    let mut ftp = board(log.clone(), Vec::new(), u32::MAX);
-    assert_eq!(around(&mut ftp).outcome, Outcome::Done);
-    assert_eq!(fs::read(&path).expect("there"), log);
-}
-
-#[test]
 fn a_board_that_contradicts_itself_is_told() {
     let log = recorded(7, 30);
     // The directory lists a log that is empty when opened.
@@ -785,40 +743,13 @@ fn one_log_that_cannot_come_keeps_no_other_from_coming() {
     changed[700] ^= 1;
     let [one, two, three] = [1, 2, 3].map(|n| dir.path().join(format!("{n:05}-s{n:08x}_00.HUM")));
     fs::write(&one, &changed).expect("written");
-    let long = [&files[1].1[..], &[0; SECTOR_BYTES]].concat();
-    fs::write(crate::logs::naming::part_name(&two), &long).expect("written");
+    fs::create_dir(&two).expect("a folder stands where a log is to be");
     let board = || board_of(files.clone(), |_, _| None);
     let told = brought_into(dir.path(), board(), &[]).expect_err("one differs");
     assert!(format!("{told:#}").contains("differs from the board's log of the same session"), "{told:#}");
     assert_eq!(fs::read(&one).expect("there"), changed);
-    assert!(!two.exists());
+    assert!(two.is_dir());
     assert_eq!(fs::read(&three).expect("it came"), files[2].1);
-}
-
-#[test]
-fn what_was_forged_in_a_part_comes_once_more() {
-    let dir = tempfile::tempdir().expect("a folder");
-    let log = recorded(7, 300);
-    let around = || {
-        brought_into(
-            dir.path(),
-            board_of(named(log.clone()), |_, _| None),
-            &["--around", "1:00", "--span", "999"],
-        )
-    };
-    assert_eq!(around().expect("it comes"), Outcome::Done);
-    let path = dir.path().join("00001-s00000007_00.part.HUM");
-    let mut part = fs::read(&path).expect("there");
-    assert_eq!(part, log);
-    let place = 9 * SECTOR_BYTES..10 * SECTOR_BYTES;
-    let mut bytes: [u8; SECTOR_BYTES] = *part[place.clone()].first_chunk().expect("a sector");
-    bytes[100] ^= 1;
-    let mut forged = Sector::from_bytes(bytes);
-    forged.seal(7);
-    part[place].copy_from_slice(forged.bytes());
-    fs::write(&path, &part).expect("written");
-    assert_eq!(around().expect("it comes"), Outcome::Done);
-    assert_eq!(fs::read(&path).expect("there"), log);
 }
 
 #[test]
