@@ -96,7 +96,7 @@ pub fn tells_flight(vehicle: &Vehicle) -> bool {
 }
 
 /// Title, unit and decimals of a counter of the vehicle.
-const fn about(counter: UsageCounter) -> (&'static str, &'static str, u8) {
+pub const fn about(counter: UsageCounter) -> (&'static str, &'static str, u8) {
     use UsageCounter as U;
     match counter {
         U::Powered => ("Powered", "s", 0),

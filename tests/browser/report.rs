@@ -685,7 +685,7 @@ fn a_report_is_read_on_paper_in_the_dark_with_high_contrast_on_a_phone_and_from_
     page.press(&["ESCAPE"]);
     page.wait("return document.querySelector('.back').hidden", 5);
     // Nothing that can be clicked is out of its reach.
-    let mute = page.run("return [...document.querySelectorAll('[onclick], tr.go, .notes li, canvas[role=slider]')].filter((node) => node.tabIndex < 0).length");
+    let mute = page.run("return [...document.querySelectorAll('[onclick], tr.go, .notes .when, canvas[role=slider]')].filter((node) => node.tabIndex < 0).length");
     assert_eq!(mute, 0);
     assert_fits_on_paper(&mut page, &address);
     let pdf = dir.path().join("report.pdf");

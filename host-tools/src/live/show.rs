@@ -5,14 +5,14 @@ use std::borrow::Cow;
 use hums_core::clock::Instant;
 use hums_core::component::COMPONENTS_MAX;
 use hums_core::usage::UsageCounter;
-use serde::{Serialize, Serializer};
+use serde::Serialize;
 
 use super::board::{self, Board};
 use super::companion::CompanionJson;
 use super::craft::Craft;
 use super::values::{Motors, Values};
 use super::world::World;
-use crate::counters::{is_told, tells_flight};
+use crate::counters::{about, is_told, tells_flight};
 use crate::names::{autopilot_name, type_name};
 use crate::page::json::json;
 use crate::page::modes;
@@ -126,7 +126,7 @@ struct State<'a> {
     motors: Motors<'a>,
     cells: Vec<f32>,
     board: &'a [board::Part],
-    usage: Usage<'a>,
+    usage: Vec<CounterJson>,
     components: Vec<ComponentJson>,
     link: LinkJson,
     companion: Option<CompanionJson>,
@@ -138,6 +138,16 @@ struct LinkJson {
     missing: u64,
     loss_percent: Option<f32>,
     reboots: u32,
+}
+
+#[derive(Serialize)]
+struct CounterJson {
+    name: &'static str,
+    title: &'static str,
+    unit: &'static str,
+    decimals: u8,
+    /// `null` if nothing tells it.
+    value: Option<f64>,
 }
 
 #[derive(Serialize)]
@@ -185,7 +195,7 @@ fn state(system: u8, craft: &Craft, board: &Board, now: Instant) -> String {
             .map(|battery| battery.cells.iter().flatten().map(|cell| cell.volts().0).collect())
             .unwrap_or_default(),
         board: &board.parts,
-        usage: Usage(craft),
+        usage: usage(craft),
         components: components(craft),
         link: LinkJson {
             frames: craft.frames,
@@ -202,19 +212,30 @@ fn name(craft: &Craft) -> String {
     format!("{} {}", autopilot_name(heartbeat.autopilot_number), type_name(heartbeat.type_number))
 }
 
-/// The counters of this session that have something to say.
-struct Usage<'a>(&'a Craft);
+/// The counters of a session that the page shows.
+const SHOWN: [UsageCounter; 12] = [
+    UsageCounter::Flight,
+    UsageCounter::Flights,
+    UsageCounter::Armed,
+    UsageCounter::Distance,
+    UsageCounter::HeightMax,
+    UsageCounter::SpeedMax,
+    UsageCounter::Charge,
+    UsageCounter::Energy,
+    UsageCounter::VoltageMin,
+    UsageCounter::CurrentMax,
+    UsageCounter::HardLandings,
+    UsageCounter::LoadFactorMax,
+];
 
-impl Serialize for Usage<'_> {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let usage = self.0.monitor.usage();
-        let vehicle = self.0.monitor.vehicle();
-        let value = |counter: &UsageCounter| {
-            let value = usage.value(*counter)?;
-            is_told(counter.name(), vehicle).then_some((counter.name(), value))
-        };
-        serializer.collect_map(UsageCounter::ALL.iter().filter_map(value))
-    }
+fn usage(craft: &Craft) -> Vec<CounterJson> {
+    let (usage, vehicle) = (craft.monitor.usage(), craft.monitor.vehicle());
+    let json = |counter: UsageCounter| {
+        let (title, unit, decimals) = about(counter);
+        let value = usage.value(counter).filter(|_| is_told(counter.name(), vehicle));
+        CounterJson { name: counter.name(), title, unit, decimals, value }
+    };
+    SHOWN.into_iter().map(json).collect()
 }
 
 fn components(craft: &Craft) -> Vec<ComponentJson> {

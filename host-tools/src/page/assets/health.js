@@ -36,26 +36,16 @@ export const board = () => {
 };
 
 const DUE = { green: ["ok", "good"], yellow: ["warning", "soon"], red: ["critical", "due"] };
-const USAGE = [
-  ["flight_time_s", "In the air", span, ""],
-  ["flights", "Flights", whole, ""],
-  ["armed_time_s", "Armed", span, ""],
-  ["distance_m", "Distance over ground", whole, "m"],
-  ["height_max_m", "Greatest height", (v) => fixed(v, 1), "m"],
-  ["speed_max_m_s", "Greatest ground speed", (v) => fixed(v, 1), "m/s"],
-  ["charge_ah", "Charge taken", (v) => fixed(v, 2), "Ah"],
-  ["energy_wh", "Energy taken", (v) => fixed(v, 1), "Wh"],
-  ["voltage_min_v", "Lowest battery voltage", (v) => fixed(v, 2), "V"],
-  ["current_max_a", "Highest current", (v) => fixed(v, 1), "A"],
-  ["hard_landings", "Hard landings", whole, ""],
-  ["load_factor_max_g", "Greatest load factor", (v) => fixed(v, 2), "g"],
-];
+const counted = ({ value, unit, decimals }) => (unit === "s" ? span(value) : decimals ? fixed(value, decimals) : whole(value));
 
 export const usage = () => {
-  const rows = USAGE.map(([name, label, format, unit]) => {
+  const list = el("dl", { class: "facts two" });
+  let rows = [];
+  const row = ({ name, title, unit }) => {
     const number = el("b", { "data-value": `usage:${name}` });
-    return { name, format, number, node: el("div", { class: "fact" }, el("dt", {}, label), el("dd", {}, number, unit ? ` ${unit}` : "")) };
-  });
+    const shown = unit === "s" ? "" : unit;
+    return { number, node: el("div", { class: "fact" }, el("dt", {}, title), el("dd", {}, number, shown ? ` ${shown}` : "")) };
+  };
   const due = el("ul", { class: "due" });
   const none = el(
     "p",
@@ -64,24 +54,19 @@ export const usage = () => {
     el("span", { class: "word" }, "--params"),
     ".",
   );
-  const box = panel("usage", "Usage of this session", [
-    el(
-      "dl",
-      { class: "facts two" },
-      rows.map((row) => row.node),
-    ),
-    el("h4", {}, "Due"),
-    due,
-    none,
-  ]);
+  const box = panel("usage", "Usage of this session", [list, el("h4", {}, "Due"), due, none]);
   let parts = [];
   return {
     node: box.node,
     update({ usage: counters, components }) {
-      for (const row of rows) {
-        row.node.hidden = counters[row.name] == null;
-        say(row.number, row.format(counters[row.name]));
+      if (rows.length !== counters.length) {
+        rows = counters.map(row);
+        list.replaceChildren(...rows.map(({ node }) => node));
       }
+      rows.forEach(({ node, number }, i) => {
+        node.hidden = counters[i].value == null;
+        say(number, counted(counters[i]));
+      });
       none.hidden = components.length > 0;
       if (parts.length !== components.length) {
         parts = components.map(() => {

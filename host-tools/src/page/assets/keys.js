@@ -15,7 +15,26 @@ const HELP = [
   ["?", "this help"],
 ];
 
+// Where the choice to have no keys outlives the page; a browser may refuse that.
+const STORED = "hums-keys";
+const stored = () => {
+  try {
+    return localStorage.getItem(STORED);
+  } catch {
+    return null;
+  }
+};
+const store = (value) => {
+  try {
+    localStorage.setItem(STORED, value);
+  } catch {
+    // Then it holds until the page is left.
+  }
+};
+
 export const keys = ({ player, sound, window: nextWindow, vehicle }) => {
+  const on = el("input", { type: "checkbox", id: "keys-on", onchange: () => store(on.checked ? "on" : "off") });
+  on.checked = stored() !== "off";
   const dialog = el(
     "dialog",
     { "aria-label": "Keys" },
@@ -32,6 +51,7 @@ export const keys = ({ player, sound, window: nextWindow, vehicle }) => {
         el("dd", {}, does),
       ]),
     ),
+    el("p", {}, el("label", {}, on, " Keys do this")),
     el("p", { class: "dim" }, "A click on a finding goes to it. Nothing here is sent to the vehicle."),
     el("form", { method: "dialog" }, el("button", {}, "Close")),
   );
@@ -56,7 +76,7 @@ export const keys = ({ player, sound, window: nextWindow, vehicle }) => {
     Escape: home,
   };
   addEventListener("keydown", (event) => {
-    if (event.ctrlKey || event.metaKey || event.altKey || event.target.matches?.("select, input[type=search]")) return;
+    if (!on.checked || event.ctrlKey || event.metaKey || event.altKey || event.target.matches?.("select, input")) return;
     if (event.key === " " && event.target.matches?.("button")) return;
     // An open help takes Esc itself: the browser closes it.
     if (event.key === "Escape" && dialog.open) return;

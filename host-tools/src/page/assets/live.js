@@ -163,6 +163,43 @@ const NO_ANSWER = "hums does not answer, or wants the token that stands in the a
 // What a recording does not have is not good news.
 const endsInAir = () => head.source.phase === "ended" && state?.airborne;
 
+const isSilent = ({ phase }) => Boolean(state) && state.heard_ms > 3000 && phase !== "reading";
+const isRefused = () => failures > 3 && lostAt && !head.now_s && !tokenGiven;
+
+// What stands over the page: the first of these that holds, and its words.
+const NOTICES = [
+  [() => !connected && isRefused(), () => NO_ANSWER],
+  [() => !connected, () => `No connection to hums: what stands here is ${age(performance.now() - (lostAt ?? 0))} old.`],
+  [({ phase }) => phase === "reading", ({ name, progress }) => `Reading ${name}: ${whole(progress * 100)} %`],
+  [({ phase }) => phase === "lost", ({ words }) => `The link is lost, and tried again every second: ${words}`],
+  [({ words }) => words, ({ words }) => words],
+  [
+    ({ phase }) => phase === "waiting",
+    ({ name }) =>
+      `Waiting for the first frame on ${name}. If none comes: is the vehicle's telemetry sent there, and does the firewall let it in?`,
+  ],
+  [() => !state, () => "Frames come, but no autopilot's heartbeat yet."],
+  [isSilent, () => `The autopilot has been silent for ${age(state.heard_ms)}: values are its last ones.`],
+  [
+    () => endsInAir(),
+    ({ log_end: end }) => `The recording ends in the air: what became of the vehicle is not in it.${end ? ` The log: ${end}.` : ""}`,
+  ],
+  [() => time.held, () => "Paused: instruments and plots show an earlier moment. Level, findings and link are of now."],
+];
+
+const drawVehicles = () => {
+  const shown = head.vehicles.length > 1 ? head.vehicles : [];
+  if (vehicles.children.length !== shown.length) {
+    vehicles.replaceChildren(...shown.map((_, i) => el("button", { type: "button", onclick: () => choose(i) })));
+  }
+  [...vehicles.children].forEach((button, i) => {
+    const one = shown[i];
+    say(button, `${one.system} \u00b7 ${one.name} \u00b7 ${!connected ? "not known" : one.heard_ms > 5000 ? "silent" : one.overall}`);
+    attribute(button, "aria-pressed", String(one.system === state?.vehicle));
+    attribute(button, "class", connected ? one.overall : "stale");
+  });
+};
+
 const drawHead = () => {
   const { source } = head;
   const said =
@@ -174,43 +211,12 @@ const drawHead = () => {
   picture.set(connected ? (SOURCES[source.phase] ?? "stale") : "critical", connected ? said : "no connection");
   const utc = head.utc_ms == null ? "" : ` \u00b7 ${new Date(head.utc_ms).toISOString().slice(0, 19).replace("T", " ")} UTC`;
   say(facts, `${source.name}${utc}`);
-  if (vehicles.children.length !== (head.vehicles.length > 1 ? head.vehicles.length : 0)) {
-    vehicles.replaceChildren(
-      ...(head.vehicles.length > 1 ? head.vehicles : []).map((_, i) => el("button", { type: "button", onclick: () => choose(i) })),
-    );
-  }
-  [...vehicles.children].forEach((button, i) => {
-    const one = head.vehicles[i];
-    say(button, `${one.system} \u00b7 ${one.name} \u00b7 ${!connected ? "not known" : one.heard_ms > 5000 ? "silent" : one.overall}`);
-    attribute(button, "aria-pressed", String(one.system === state?.vehicle));
-    attribute(button, "class", connected ? one.overall : "stale");
-  });
+  drawVehicles();
   flight.epoch_ms = head.utc_ms == null ? null : head.utc_ms - head.now_s * 1000;
   time.update(head);
   toggle(root, "playing-back", time.recording);
-  const silent = state && state.heard_ms > 3000 && source.phase !== "reading";
-  const refused = failures > 3 && lostAt && !head.now_s && !tokenGiven;
-  const text = !connected
-    ? refused
-      ? NO_ANSWER
-      : `No connection to hums: what stands here is ${age(performance.now() - (lostAt ?? 0))} old.`
-    : source.phase === "reading"
-      ? `Reading ${source.name}: ${whole(source.progress * 100)} %`
-      : source.phase === "lost"
-        ? `The link is lost, and tried again every second: ${source.words}`
-        : source.words
-          ? source.words
-          : source.phase === "waiting"
-            ? `Waiting for the first frame on ${source.name}. If none comes: is the vehicle's telemetry sent there, and does the firewall let it in?`
-            : !state
-              ? "Frames come, but no autopilot's heartbeat yet."
-              : silent
-                ? `The autopilot has been silent for ${age(state.heard_ms)}: values are its last ones.`
-                : endsInAir()
-                  ? `The recording ends in the air: what became of the vehicle is not in it.${source.log_end ? ` The log: ${source.log_end}.` : ""}`
-                  : time.held
-                    ? "Paused: instruments and plots show an earlier moment. Level, findings and link are of now."
-                    : "";
+  const silent = isSilent(source);
+  const text = NOTICES.find(([holds]) => holds(source))?.[1](source) ?? "";
   notice.hidden = !text;
   say(notice, text);
   // What was last heard of the vehicle is not known to be so any longer.
@@ -218,8 +224,8 @@ const drawHead = () => {
     overall.set("stale", "not known");
     document.title = "NO CONNECTION \u00b7 HUMS live";
   }
-  for (const chip of [armed, phase]) toggle(chip, "stale", !connected || Boolean(silent));
-  toggle(root, "cut", !connected || Boolean(silent) || source.phase === "lost");
+  for (const chip of [armed, phase]) toggle(chip, "stale", !connected || silent);
+  toggle(root, "cut", !connected || silent || source.phase === "lost");
 };
 
 const drawState = () => {

@@ -2,6 +2,7 @@
 
 import { FONT, canvas } from "./canvas.js";
 import { PHASES, colour, whenColoursChange } from "./colours.js";
+import { attribute } from "./dom.js";
 import { el } from "./elements.js";
 import { flight, place } from "./flight.js";
 import { fixed } from "./text.js";
@@ -195,6 +196,7 @@ export const map = ({ id = "map", whose = flight, frame = null, name = "Track ov
       ),
       el("span", { class: "dim" }, "north is up"),
     );
+    attribute(surface, "aria-label", `${name}: ${[...legend.children].map((part) => part.textContent).join("; ")}`);
   };
   const self = {
     node,

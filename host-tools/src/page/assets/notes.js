@@ -16,7 +16,8 @@ const measured = ({ value, state, limit, unit, previous }) =>
 
 // `rows` are on the page at most, the newest first or last. A click on one goes there.
 export const notes = ({ go, newestFirst, rows = Infinity }) => {
-  const list = el("ol", { class: "notes", role: "log", "aria-live": newestFirst ? "polite" : "off", "aria-relevant": "additions" });
+  const list = el("ol", { class: "notes" });
+  const live = el("div", { role: "log", "aria-live": newestFirst ? "polite" : "off", "aria-relevant": "additions" }, list);
   const empty = el("p", { class: "dim empty" }, "Nothing yet: every change of a check's level stands here.");
   const more = el("p", { class: "dim", hidden: true });
   let only = false,
@@ -28,7 +29,7 @@ export const notes = ({ go, newestFirst, rows = Infinity }) => {
     filter.setAttribute("aria-pressed", String(only));
     toggle(list, "only", only);
   };
-  const box = panel("notes", "Findings and messages", [list, empty, more], { class: "tall" });
+  const box = panel("notes", "Findings and messages", [live, empty, more], { class: "tall" });
   box.node.firstChild.append(filter);
   // What a finding explains stands with it: by check, while its alarm lasts. What was seen before its cause waits.
   let causes = new Map(),
@@ -65,8 +66,12 @@ export const notes = ({ go, newestFirst, rows = Infinity }) => {
     const from = note.from === "here" ? note.subsystem : note.from;
     return el(
       "li",
-      { class: `${note.kind} ${note.level}`, tabindex: 0, "data-at": note.at_s, "data-check": found?.check },
-      el("time", { title: utc(note.at_s) && `${utc(note.at_s)} UTC` }, moment(note.at_s - flight.zero)),
+      { class: `${note.kind} ${note.level}`, "data-at": note.at_s, "data-check": found?.check },
+      el(
+        "button",
+        { type: "button", class: "when", title: utc(note.at_s) && `${utc(note.at_s)} UTC` },
+        el("time", {}, moment(note.at_s - flight.zero)),
+      ),
       level.node,
       el("span", { class: "words" }, note.words),
       el("small", {}, [from, found && measured(found)].filter(Boolean).join(" \u00b7 ")),
@@ -75,12 +80,10 @@ export const notes = ({ go, newestFirst, rows = Infinity }) => {
       found ? follows(note) : null,
     );
   };
-  const chosen = (event) => {
+  list.addEventListener("click", (event) => {
     const at = event.target.closest("li")?.dataset.at;
     if (at) go(Number(at));
-  };
-  list.addEventListener("click", chosen);
-  list.addEventListener("keydown", (event) => event.key === "Enter" && chosen(event));
+  });
   return {
     node: box.node,
     // After a part of the flight: everything anew, or what is new.

@@ -97,7 +97,7 @@ const ground = (u, limits) => {
 
 export const chart = (id, name = null) => {
   const keys = el("div", { class: "keys" }),
-    body = el("div", { class: "plotted" }),
+    body = el("div", { class: "plotted", role: "img" }),
     unit = el("small");
   const box = panel(id, name ?? "", [keys, body], { class: "plot" });
   const title = box.node.querySelector(".name");
@@ -117,6 +117,16 @@ export const chart = (id, name = null) => {
       say(value, v == null ? "" : fixed(v, info()?.decimals ?? 1));
       attribute(labels[i].node, "class", labels[i].shown ? "" : "off");
     });
+  // What the picture shows, for a reader who does not see it.
+  const describe = ([, ...columns]) => {
+    const { unit, decimals } = info();
+    const lines = labels.map(({ text }, i) => {
+      const known = columns[i].filter((v) => v != null);
+      return known.length ? `${text} ${fixed(Math.min(...known), decimals)} to ${fixed(Math.max(...known), decimals)}` : `${text} no data`;
+    });
+    const [from, to] = [view.from, view.to].map((at) => clock(Math.round(at - flight.zero)));
+    attribute(body, "aria-label", `${title.textContent}, ${unit}, from ${from} to ${to}: ${lines.join("; ")}`);
+  };
   const axis = (extra) => ({
     stroke: colour("dim"),
     font: FONT,
@@ -214,16 +224,15 @@ export const chart = (id, name = null) => {
       }
       drawn = `${flight.version} ${view.from} ${view.to}`;
       drawnAt = performance.now();
+      const table = flight.table(
+        id,
+        labels.map(({ number }) => number),
+        view.from,
+        view.to,
+      );
+      describe(table);
       made.batch(() => {
-        made.setData(
-          flight.table(
-            id,
-            labels.map(({ number }) => number),
-            view.from,
-            view.to,
-          ),
-          false,
-        );
+        made.setData(table, false);
         made.setScale("x", { min: view.from, max: view.to });
       });
       values();
