@@ -1,14 +1,15 @@
-//! Parts of raw bytes that no line made: blocks of a file that were never written, and what another file left there.
+//! Parts of raw bytes that did not come over a line: unwritten blocks of a file, and remains of another file.
 
 use hums_core::clock::Instant;
 
 use super::item::{Cause, Gap};
 use crate::plural::count;
 
-/// Bytes of the same value in a row, 0x00 or 0xff, that no frame and no line makes (a payload is 255 bytes at most): a block of a file that was
-/// never written.
+/// An unwritten block of a file: at least this many bytes 0x00 or 0xff in a row. Frames and lines are shorter
+/// (a payload is 255 bytes at most).
 const BLOCK_BYTES: u64 = 512;
-/// Bytes without a frame that are no noise of a line (5 s at 115,200 baud) but of something else, blocks aside.
+/// More bytes without a frame than this (5 s at 115,200 baud), blocks aside, are not noise of a line but
+/// foreign data.
 const FOREIGN_BYTES: u64 = 64 * 1024;
 
 /// Some bytes, and where the first of them is.
@@ -46,7 +47,7 @@ pub struct Blocks {
     length: u64,
     unwritten: Bytes,
     foreign: Bytes,
-    /// Frames until now; where the bytes without one begin, and how many of them were never written.
+    /// Frames so far; start of the bytes without a frame, and the number of unwritten ones among them.
     frames: u64,
     since: u64,
     unwritten_since: u64,
@@ -89,7 +90,7 @@ impl Blocks {
         self.unwritten.count + self.foreign.count
     }
 
-    /// What they are, once all has been taken: damage.
+    /// The damage, once all has been taken.
     pub fn gaps(&self, at: Instant) -> impl Iterator<Item = Gap> {
         let unwritten = self.unwritten.gap(at, "of nothing but 0x00 or 0xff");
         unwritten.into_iter().chain(self.foreign.gap(at, "of something else than MAVLink"))
@@ -100,7 +101,7 @@ impl Blocks {
 mod tests {
     use super::*;
 
-    /// What is told of bytes of which so many have come at each frame.
+    /// The report on these bytes; `frames` are the places of frames.
     fn told(bytes: &[u8], frames: &[usize]) -> Vec<(Option<u64>, u64)> {
         let mut blocks = Blocks::default();
         for (at, chunk) in (0..).zip(bytes.chunks(32)) {
@@ -117,7 +118,7 @@ mod tests {
         assert_eq!(told(&noise(90_000), &[]), [(Some(0), 90_000)]);
         assert_eq!(told(&noise(90_016), &[45_024]), []);
         assert_eq!(told(&[vec![1; 64], vec![0; 600], vec![1; 64]].concat(), &[]), [(Some(64), 600)]);
-        // What was never written is told once.
+        // Unwritten bytes are reported once.
         let both = [vec![0xff; 100_000], noise(70_000)].concat();
         assert_eq!(told(&both, &[]), [(Some(0), 100_000), (Some(0), 70_000)]);
     }

@@ -1,8 +1,10 @@
-//! The autopilot's own time in a ground station's recording: what tells two recordings that were joined from a clock that was set.
+//! The autopilot's own time in a ground station's recording: it tells a joint of two recordings from a clock
+//! that was set.
 //!
-//! A ground station's clock that falls, or jumps by more than an hour, was set, or another recording was joined on. The
-//! autopilot's messages tell its time since its power-on: where that goes on, the recording does; where it changes too, a
-//! vehicle did not restart in the air just when a clock was set: it is another recording.
+//! If a ground station's clock falls, or jumps by more than an hour, it was set, or another recording was
+//! joined on. The autopilot's messages have its time since power-on. If that time goes on, so does the
+//! recording. If it changes too, this is another recording: a restart in the air just when a clock is set is
+//! too unlikely.
 
 use std::collections::VecDeque;
 use std::io::Read;
@@ -13,7 +15,7 @@ use super::timeline::STEP_BACK_US_MAX;
 use super::tlog::records::Records;
 use crate::mavlink::frame;
 
-/// A clock that jumps by more than this may be that of another recording: microseconds.
+/// A clock that jumps by more than this may belong to another recording: microseconds.
 pub(super) const JOINT_US: u64 = 3_600_000_000;
 /// Messages that tell the time since power-on come every few seconds at least, s.
 const TOLD_MS: i64 = 60_000;
@@ -39,9 +41,9 @@ pub(super) fn boot_ms_of(id: u32, component: u8, payload: &[u8]) -> Option<u32> 
 /// Follows the autopilots' time.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Joints {
-    /// Of whichever autopilot told it last: its system, and its time since power-on.
+    /// The last report of an autopilot: its system, and its time since power-on.
     last: Option<(u8, u32)>,
-    /// By how much the recorder's clock was ahead of the autopilots' when they told their last few times, microseconds.
+    /// Lead of the recorder's clock over the autopilots' at their last few reports, microseconds.
     ahead: VecDeque<(u8, i64)>,
     /// By how much the recorder's clock was set back last, microseconds, until it is set again.
     fell_us: Option<i64>,
@@ -57,7 +59,7 @@ const ASKED_MS: u32 = 5_000;
 const HELD_BACK_US: i64 = 10_000_000;
 
 impl Joints {
-    /// An autopilot of the recording told its time, at this time of the recorder's clock.
+    /// An autopilot of the recording reported its time, at this time of the recorder's clock.
     pub(super) fn told(&mut self, time_us: Option<u64>, system: u8, boot_ms: u32) {
         if self.last.is_some_and(|(last, before)| last == system && falls(before, boot_ms)) {
             self.ahead.clear();
@@ -84,9 +86,9 @@ impl Joints {
         self.ahead.iter_mut().for_each(|(_, ahead)| *ahead = ahead.saturating_add(set_us));
     }
 
-    /// Where the recorder's clock was set from one time to another while the autopilot's went on: how much time passed,
-    /// microseconds. A frame may come late, by as much as a link holds back, and never early: so a clock that falls was set, and
-    /// one that jumps forward was where it jumps by more, or by as much as it fell before.
+    /// The real time passed, microseconds, if the recorder's clock was set while the autopilot's went on. A
+    /// frame may be late, by as much as a link holds back, but never early. So a clock that falls was set.
+    /// One that jumps forward was set if it jumps by more, or by as much as it fell before.
     pub(super) fn elapsed_us<R: Read>(
         &self,
         before_us: u64,
@@ -117,7 +119,8 @@ impl Joints {
             }
             seen_ms < ASKED_MS
         });
-        // Soon it is back where it was, before the autopilot told its time: nothing passed but what it is ahead by then.
+        // The clock is soon back at its old time, before the next report of the autopilot: only its lead by
+        // then has passed.
         let returned_us = returns.and_then(|us| i64::try_from(i128::from(us) - i128::from(before_us)).ok());
         if first_ms.is_none()
             && jump_us >= HELD_BACK_US
@@ -130,7 +133,7 @@ impl Joints {
         let goes_on = (-DISORDER_MS..=TOLD_MS).contains(&passed_ms);
         let ran_us = last_us.saturating_sub(time_us);
         if goes_on && seen_ms >= ASKED_MS && ran_us.saturating_mul(SLOWER) < u64::from(seen_ms) * 1_000 {
-            // It does not run after the jump: by how much it is ahead says nothing.
+            // The clock does not run after the jump: its lead has no meaning.
             return Some(u64::try_from(passed_ms * 1_000).unwrap_or(0));
         }
         let known = self.ahead.iter().filter(|(of, _)| *of == system).map(|(_, ahead)| *ahead);
@@ -141,8 +144,8 @@ impl Joints {
         (is_set && goes_on && fits).then(|| u64::try_from(passed_us).unwrap_or(0))
     }
 
-    /// Whether another recording begins where the recorder's clock goes from one time to another: the autopilot's does not
-    /// go on. Where none tells its time, a jump by more than an hour says so.
+    /// Whether another recording begins at this jump of the recorder's clock: the autopilot's clock does not
+    /// go on. Without an autopilot's time, a jump by more than an hour counts.
     pub(super) fn is_joint<R: Read>(&self, before_us: u64, time_us: u64, after: &Records<R>) -> bool {
         let Some((system, before_ms)) = self.last else { return before_us.abs_diff(time_us) > JOINT_US };
         let told = after.frames_after(|bytes| match frame::peek(bytes) {

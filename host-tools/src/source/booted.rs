@@ -1,5 +1,5 @@
-//! Raw MAVLink in the time that its autopilot tells: the same for whoever takes frames ([`BootTimes`]) and for whoever takes
-//! bytes ([`Booted`]).
+//! Raw MAVLink in its autopilot's time: the same for readers of frames ([`BootTimes`]) and of bytes
+//! ([`Booted`]).
 
 use std::io;
 
@@ -12,12 +12,12 @@ use super::stream::{Chunk, Source};
 use super::timeline::Timeline;
 use super::tlog::times::Begins;
 
-/// An autopilot that was powered on again in a recording tells its time by then; one whose time fell and that runs for longer is in
-/// another recording.
+/// An autopilot restarted in a recording reports its time before this. If its time falls and it has run for
+/// longer, it is in another recording.
 const STARTS_MS: u32 = 10_000;
 
-/// The time of frames without recorded times: what the autopilot's own messages tell of the time since its boot, and until it
-/// tells any, what a line takes for the bytes.
+/// The time of frames without recorded times: the autopilot's time since boot. Until its first report, the
+/// time that a line takes for the bytes.
 #[derive(Debug, Default)]
 pub struct BootTimes {
     /// Whose times count: the first system whose autopilot tells one.
@@ -28,7 +28,7 @@ pub struct BootTimes {
 }
 
 impl BootTimes {
-    /// The time of a frame, and what begins with it.
+    /// The time of a frame, and the power-on or recording that begins with it.
     pub fn at(&mut self, line: Instant, frame: &hums_link::Frame<'_>) -> (Instant, Option<Begins>) {
         let told = boot_ms(frame).filter(|_| self.system.is_none_or(|system| system == frame.system()));
         if let Some(boot_ms) = told {
@@ -49,7 +49,7 @@ impl BootTimes {
         self.system == Some(frame.system())
     }
 
-    /// Whether an autopilot has told its time.
+    /// Whether an autopilot has reported its time.
     const fn is_known(&self) -> bool {
         self.timeline.is_some()
     }

@@ -1,4 +1,4 @@
-//! Frames of a ground station's log whose checksum does not fit: they are not read, and that is told.
+//! Frames of a ground station's log with a wrong checksum: they are skipped and reported.
 
 use hums_core::clock::Instant;
 use hums_link::{Check, Frame};
@@ -16,8 +16,7 @@ pub fn wrong_checksums(frames: u64) -> String {
     )
 }
 
-/// Which records' frames have a checksum that does not fit. Of an id that is not known, or is known by another definition, nobody
-/// can say.
+/// Finds the records with a wrong checksum. An unknown id, or one with another definition, cannot be checked.
 #[derive(Debug, Default)]
 pub struct Checksums {
     /// Of the record at hand, whether the message is known; `None` once its frame has come.
@@ -29,7 +28,7 @@ pub struct Checksums {
     /// Frames that are damaged, and where the first one is.
     damaged: u64,
     first: Option<(Instant, u64)>,
-    /// Frames that nobody can check.
+    /// Number of frames that cannot be checked.
     unchecked: u64,
 }
 
@@ -41,7 +40,7 @@ impl Checksums {
         (self.at, self.place) = (at, place);
     }
 
-    /// A frame that is one: that of the record, unless it lies in one that is damaged.
+    /// A valid frame: the record's own, unless it is inside a damaged one.
     pub fn frame(&mut self, frame: &Frame<'_>) {
         if frame.bytes().len() == self.length || self.waits == Some(false) {
             self.waits = None;
@@ -49,8 +48,8 @@ impl Checksums {
         self.unchecked += u64::from(frame.check() == Check::Unverified);
     }
 
-    /// The record is over. Gives its frame, of these bytes, where it came out as none only because its message is not known: it
-    /// is kept as it is.
+    /// The record is over. Returns its frame of these bytes, if it failed only because its message is
+    /// unknown: it is kept unchanged.
     pub fn end<'a>(&mut self, bytes: &'a [u8]) -> Option<Frame<'a>> {
         if self.waits.take()? {
             self.damaged += 1;
@@ -73,7 +72,7 @@ impl Checksums {
         Some(Gap::damaged(at, place, words))
     }
 
-    /// Those that nobody can check, as a sentence.
+    /// The unchecked frames, as a sentence.
     pub fn words(&self) -> Option<String> {
         (self.unchecked > 0).then(|| {
             let frames = count(self.unchecked, "frame");

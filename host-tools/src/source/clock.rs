@@ -1,12 +1,13 @@
-//! A recording's clock: recorded times as times that never fall, and which of them do not count.
+//! A recording's clock: makes recorded times that never fall, and finds the invalid ones.
 //!
-//! Every reader of a format with recorded times asks here, message by message. A time within a second of the latest one
-//! counts, and is a reordering where it is earlier. Any other is a jump, and is put to [`super::doubt`]: it is wrong, or a
-//! pause, or the clock began again.
+//! Every reader of a format with recorded times asks here, message by message. A time within a second of the
+//! latest one counts; an earlier one is a reordering. Any other is a jump, and goes to [`super::doubt`]: it
+//! is wrong, or a pause, or the clock began again.
 //!
-//! **Old values.** A `ULog` begins with the value that each topic had last, which may be minutes old, and some topics are never
-//! told anew, or late. Where a format has such ([`Rules::old_values`]), a time that is behind is *old*, not wrong, unless it is
-//! also behind the time that the same series told before: it counts as now, and is not asked about others.
+//! **Old values.** A `ULog` begins with the last value of each topic, which may be minutes old; some topics
+//! come again late or never. For a format with such values ([`Rules::old_values`]), a time that is behind is
+//! *old*, not wrong. It is wrong only if it is also behind the last time of its own series. An old time
+//! counts as now, and is not a witness for other times.
 
 use hums_core::clock::Instant;
 
@@ -15,15 +16,16 @@ use super::item::Gap;
 use super::timeline::{Moment, STEP_BACK_US_MAX, STEP_FORWARD_US_MAX, Timeline};
 use crate::plural::count;
 
-/// Messages of a series are steady where they are no further apart than this, ...
+/// Messages of a series are steady if they come at least this often, ...
 const STEADY_US: u64 = 500_000;
 /// ... so many in a row.
 const STEADY_MIN: u8 = 32;
-/// A clock stands where so many messages of a series tell no later time than the one before each, and no other message goes on.
+/// A clock stands still if this many messages of a series in a row have no later time, and no other message
+/// goes on.
 const STILL_MIN: u8 = 100;
 /// So many times have to be there, most of them before a log's own beginning, until that one is wrong.
 pub const BEGINNING_ASKED: usize = 64;
-/// Series that are followed; what is beyond them counts as one that comes seldom.
+/// Maximum number of series followed; further ones count as rare.
 const SERIES_MAX: usize = 65_537;
 
 /// A time as a message tells it.
@@ -40,11 +42,11 @@ pub struct Stamp {
 pub struct Ahead {
     /// Up to [`super::doubt::ASKED`] of those that were asked for.
     pub stamps: Vec<Stamp>,
-    /// Nothing follows them.
+    /// No times follow them.
     pub is_end: bool,
 }
 
-/// What differs between formats.
+/// Differences between formats.
 #[derive(Clone, Copy, Debug)]
 pub struct Rules {
     /// The first time is the stream's time zero, whatever it says; otherwise times count from a power-on.
@@ -55,8 +57,9 @@ pub struct Rules {
     pub ends: Ends,
 }
 
-/// When a log began that says so itself, and whether that is wrong: most of its first times (some are old values) are
-/// before it, or a day behind it. Then it began where many follow each other.
+/// Start of a log that records its own start, and whether that is wrong. It is wrong if most of its first
+/// times (some are old values) are before it, or a day behind it. Then the log began at the time shared by
+/// many.
 pub fn beginning(told: u64, first: &[u64], is_end: bool) -> (u64, bool) {
     let fits = |time: u64| {
         time.saturating_add(STEP_BACK_US_MAX) >= told && time <= told.saturating_add(STEP_FORWARD_US_MAX)
@@ -76,7 +79,7 @@ pub fn beginning(told: u64, first: &[u64], is_end: bool) -> (u64, bool) {
     (began.unwrap_or(told), true)
 }
 
-/// What a message's time is worth.
+/// Validity of a message's time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Reading {
     /// It counts.
@@ -90,14 +93,15 @@ pub enum Reading {
     },
 }
 
-/// What is known of messages of a kind.
+/// State of a series of messages.
 #[derive(Clone, Copy, Debug, Default)]
 struct Series {
     /// The latest time, be it old or not.
     last_us: Option<u64>,
     /// How many came in a row without a pause.
     steady: u8,
-    /// How many came in a row that told no later time than the one before, while the recording's time was this one.
+    /// Number of messages in a row without a later time than the one before, while the recording's time was
+    /// this one.
     still: u8,
     still_at: Option<u64>,
     /// One has counted.
@@ -109,7 +113,7 @@ struct Series {
 pub struct Clock {
     rules: Rules,
     timeline: Timeline,
-    /// A message has told a time that counts.
+    /// A valid time has come.
     begun: bool,
     series: Vec<Series>,
     steps: Steps,
@@ -206,7 +210,7 @@ impl Clock {
         Reading::Wrong { known }
     }
 
-    /// A time that counts; where the clock was set, so much passed before it.
+    /// Takes a valid time; if the clock was set, this much time passed before it.
     fn count(&mut self, stamp: Stamp, passed_us: Option<u64>) -> Moment {
         if self.rules.from_first && !self.begun {
             self.timeline = Timeline::from_first(stamp.us);
@@ -248,7 +252,7 @@ impl Clock {
         self.series.get(series).copied().unwrap_or_default()
     }
 
-    /// Whether a time is behind, and that of a topic which has told nothing later.
+    /// Whether a time is behind, and its topic has reported no later one.
     fn is_old(&self, stamp: Stamp) -> bool {
         let Some(now) = self.timeline.recorded_us().filter(|_| self.rules.old_values) else { return false };
         let last_us = self.series(stamp.series).last_us;
@@ -256,7 +260,7 @@ impl Clock {
             && last_us.is_none_or(|last| stamp.us.saturating_add(DISORDER_US) >= last)
     }
 
-    /// Whether the clock stands still, or runs backwards, as messages of this series tell it.
+    /// Whether the clock stands still or runs backwards, by the messages of this series.
     pub fn stands(&self, series: usize) -> bool {
         self.series(series).still >= STILL_MIN
     }
@@ -271,7 +275,7 @@ impl Clock {
                 .is_some_and(|(last, now)| last.saturating_add(STEADY_US) >= now)
     }
 
-    /// Whether a message has told a time that counts.
+    /// Whether a valid time has come.
     pub const fn has_begun(&self) -> bool {
         self.begun
     }
@@ -306,7 +310,7 @@ impl Wrong {
         self.first.get_or_insert((at, place));
     }
 
-    /// Tells them as damage; nothing where there are none.
+    /// The damage report; `None` without wrong times.
     pub fn gap(&self) -> Option<Gap> {
         let (at, place) = self.first?;
         let words =
@@ -326,7 +330,7 @@ mod tests {
         ends: Ends { steady_us: SECOND, seldom_us: 3_600 * SECOND },
     };
 
-    /// What becomes of times of one series after another: the latest time in seconds, and what each is worth.
+    /// Result of the times of several series: the latest time in seconds, and the validity of each.
     fn read(clock: &mut Clock, stamps: &[(usize, f64)]) -> (f64, String) {
         let stamps: Vec<Stamp> = stamps
             .iter()

@@ -1,4 +1,4 @@
-//! A recording as `.gz`: what is wrong with its compressed bytes is damage of the recording.
+//! A recording as `.gz`: damage of its compressed bytes is damage of the recording.
 
 use std::io;
 

@@ -10,7 +10,7 @@ const NEAR: usize = 1024;
 /// Further ids that are counted one by one: there are 16 million, and hostile recordings.
 const FAR_MAX: usize = 4_096;
 
-/// Frames by their id, and whether their checksum is that of the definition known here.
+/// Frames by their id, and by whether their checksum matches the definition known here.
 #[derive(Debug)]
 pub(super) struct Counts {
     near: Vec<Amount>,
@@ -35,7 +35,7 @@ impl Counts {
         self.other.add(next.other);
     }
 
-    /// By their ids, and of those beyond what is counted one by one.
+    /// Counts by id, and the total of those beyond the limit.
     pub(super) fn messages(self) -> (Vec<MessageCount>, Amount) {
         let near = (0_u32..).zip(self.near).filter(|(_, amount)| amount.count > 0);
         let near = near.map(|(place, amount)| ((place >> 1, place & 1 != 0), amount));

@@ -1,14 +1,14 @@
-//! Which of a recording's times is wrong: one rule for all formats.
+//! Finds the wrong times of a recording: one rule for all formats.
 //!
-//! One damaged bit makes a time of any size. What a wrong one is, the times after it tell. A clock goes on; it may pause for as
-//! long as it likes; it seldom falls. So of the times at hand and the few that follow, those are right that make the longest
-//! row that goes on, where a fall counts as much as [`RUN`] wrong times and a half: eight wrong ones in a row are outvoted,
-//! whatever they say, and a clock that began again is confirmed by the times that go on from there. A row leaves out whole runs
-//! only: where a time that is left out goes on right into one that is not, both are right (a clock that was set back by a
-//! second, for instance).
+//! One damaged bit may change a time to any value; the times after it show which one is wrong. A clock goes
+//! on; it may pause for any time; it seldom falls. So take the present times and the next few. The right ones
+//! make the longest row that goes on. A fall costs as much as [`RUN`] wrong times and a half. So eight wrong
+//! times in a row are outvoted, and a clock that began again is confirmed by the times after it. A row leaves
+//! out whole runs only. If an omitted time goes on right into a kept one, both are right (a clock that was
+//! set back by a second, for instance).
 //!
-//! At a recording's end nothing follows. There a message that came again and again until just now never comes alone after a
-//! pause, and what comes seldom may (parameters that are saved, a change of mode). At its beginning a pause is believed unless
+//! At a recording's end no times follow. There a message that came steadily until just now never comes alone
+//! after a pause. A rare one may (saved parameters, a change of mode). At its beginning a pause counts unless
 //! it is long.
 
 use super::timeline::{STEP_BACK_US_MAX, STEP_FORWARD_US_MAX};
@@ -24,13 +24,13 @@ const GOES_ON_US: u64 = 500_000;
 /// A time that is not further from the next right one is out of order: slow topics come so late.
 const FAR_US: u64 = 800_000;
 
-/// What each time in a row is worth.
+/// Value of each time in a row.
 const TIME: i32 = 10;
-/// What a fall costs.
+/// Cost of a fall.
 const FALL: i32 = RUN * TIME + TIME / 2;
-/// What a time out of order costs: a little more than it is worth.
+/// Cost of a time out of order: a little more than its value.
 const LATE: i32 = TIME + 2;
-/// What a pause costs: of two ways to go on, the one with fewer.
+/// Cost of a pause: of two rows, the one with fewer pauses wins.
 const PAUSE: i32 = 1;
 
 /// A time, as far as it is asked.
@@ -58,7 +58,7 @@ pub struct Question<'a> {
     pub before: Option<u64>,
     /// It, and up to [`ASKED`] after it.
     pub times: &'a [Time],
-    /// Nothing follows them.
+    /// No times follow them.
     pub is_end: bool,
     /// How the recording's ends are judged.
     pub ends: Ends,
@@ -99,7 +99,7 @@ impl Question<'_> {
         with.is_some_and(|with| without > with)
     }
 
-    /// Whether a time goes on right from the one that stands before it in the file.
+    /// Whether a time goes on right from the one before it in the file.
     fn goes_on_into(&self, index: usize) -> bool {
         self.pair(index.wrapping_sub(1)).is_some_and(|[last, time]| {
             time.us.saturating_add(DISORDER_US) >= last.us && time.us <= last.us.saturating_add(GOES_ON_US)
@@ -116,7 +116,7 @@ impl Question<'_> {
         Some([*self.times.get(index)?, *self.times.get(index.checked_add(1)?)?])
     }
 
-    /// What it costs that a time follows another one.
+    /// Cost of one time after another.
     fn cost(&self, last: u64, time: &Time) -> i32 {
         let step = time.us.saturating_sub(last);
         if time.us.saturating_add(STEP_BACK_US_MAX) < last || step > STEP_FORWARD_US_MAX {

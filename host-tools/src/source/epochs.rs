@@ -4,7 +4,7 @@ use hums_core::clock::Instant;
 
 use super::item::Item;
 
-/// Parts that are told apart at most.
+/// Maximum number of parts.
 const PARTS_MAX: usize = 10_000;
 
 /// UTC at time zero by the clock of each part, microseconds since 1970; the parts begin with each restart of the clock.
@@ -46,7 +46,7 @@ impl Epochs {
         }
     }
 
-    /// Parts whose UTC nobody told, and all parts.
+    /// Number of parts with unknown UTC, and of all parts.
     pub fn untold(&self) -> (usize, usize) {
         let parts = std::iter::once(self.first_us).chain(self.later.iter().map(|(_, epoch_us)| *epoch_us));
         (parts.filter(Option::is_none).count(), 1 + self.later.len())

@@ -27,16 +27,16 @@ const WALKED_MAX: usize = 10_000;
 /// Files that are passed over and named.
 const PASSED_OVER_MAX: usize = 20;
 
-/// What was found.
+/// Result of a search.
 #[derive(Debug, Default)]
 pub struct Found {
     /// Recordings, in the order in which they were named, those of a folder by name.
     pub places: Vec<Place>,
-    /// What the file systems of cards and images say of themselves.
+    /// Facts from the file systems of cards and images.
     pub images: Vec<Image>,
-    /// What was passed over, as sentences.
+    /// Entries passed over, as sentences.
     pub remarks: Vec<String>,
-    /// There were more logs or recordings than are kept, or files with the name of one that hold none.
+    /// More logs or recordings than the limit, or files named like one without one in them.
     pub is_cut: bool,
     /// Files of the inputs so far, by device and number.
     seen: BTreeSet<FileId>,
@@ -66,7 +66,7 @@ impl Found {
         }
     }
 
-    /// Drops what was added since there were `before` places and lies in files of earlier inputs.
+    /// Drops the places added since there were `before`, if they are in files of earlier inputs.
     fn drop_repeats(&mut self, before: usize) {
         // The sessions of one card's image are in one file; a second path of that file is a second name of it.
         let mut inside: BTreeMap<FileId, PathBuf> = BTreeMap::new();
@@ -95,7 +95,7 @@ impl Found {
         self.seen.extend(inside.into_keys());
     }
 
-    /// Drops tlogs that have the name of what `hums decode` makes of another recording that was found: a flight counts once.
+    /// Drops tlogs that `hums decode` made from another recording in the list: a flight counts once.
     fn drop_made(&mut self, before: usize) {
         let found = self.places.split_off(before);
         let original = |place: &Place| -> Option<String> {
@@ -156,7 +156,7 @@ impl Found {
         })
     }
 
-    /// Says what there is to say of what was found.
+    /// Prints the remarks on the search.
     pub fn tell(&self) {
         for remark in &self.remarks {
             note!("{remark}");
@@ -166,7 +166,7 @@ impl Found {
         }
     }
 
-    /// The name of the session that is asked for, as it is here; `None` where none is.
+    /// The name here of the requested session; `None` without a request.
     pub fn name_of(&self, asked: Option<&str>) -> Result<Option<String>> {
         let index = asked.map(|name| self.session(name)).transpose()?;
         Ok(index.and_then(|index| self.places.get(index)).map(|place| place.name.clone()))
@@ -180,8 +180,8 @@ impl Found {
     }
 }
 
-/// Finds all recordings in `inputs`: files, folders, cards, images, `-`. What the user named must be a recording; what
-/// lies in a folder and is none is passed over.
+/// Finds all recordings in `inputs`: files, folders, cards, images, `-`. An input named by the user must be a
+/// recording; other files in a folder are passed over.
 pub fn find(inputs: &[PathBuf], salvage: bool) -> Result<Found> {
     let mut found = Found::default();
     let is_segment = |input: &&PathBuf| segment_name(input).is_some() && is_own(input).unwrap_or(false);
@@ -260,8 +260,8 @@ fn make_names_unique(places: &mut [Place]) {
     }
 }
 
-/// What lies in a folder besides the logs of ours that were found there, as sentences, and whether something is among it that
-/// has the name of a recording and holds none: for a command that reads logs of ours only.
+/// Other contents of a folder besides our logs, as sentences, for a command that reads only our logs. Also
+/// returns whether a file is named like a recording and holds none.
 pub fn besides(folder: &Path, own: &logs::Found) -> Result<(Vec<String>, bool)> {
     let walk = Walk::of(folder, own)?;
     let recordings = walk.paths.len();
@@ -293,23 +293,24 @@ fn is_own(path: &Path) -> Result<bool> {
     }
     Ok(match logs::find::look(path)? {
         Content::Log | Content::Unread(_) => true,
-        // A large file of anything may be a card without a partition table: what is known to be something is none.
+        // A large file may be a card without a partition table, unless its format is known.
         Content::Image => !is_recording(path),
         Content::Mavlink | Content::Empty | Content::Other => false,
     })
 }
 
-/// Its first bytes, as they lie there; none where it cannot be read.
+/// Its first bytes as stored; `None` if unreadable.
 fn start_of_bytes(content: &Path, bytes: usize) -> Option<Vec<u8>> {
     let mut start = Vec::new();
     fs::File::open(content).and_then(|file| file.take(bytes as u64).read_to_end(&mut start)).ok()?;
     Some(start)
 }
 
-/// Why no log of ours was found, for a command that reads nothing else: a recording of another kind that was named is told as that.
+/// The error without a log of ours, for a command that reads only those: it names an input that is another
+/// kind of recording.
 pub fn not_ours(inputs: &[PathBuf], error: anyhow::Error) -> anyhow::Error {
     let is_ours = |input: &Path| input.is_dir() || is_own(input).unwrap_or(false);
-    // What it failed on is the first of them.
+    // The search failed on the first of them.
     let first = inputs.iter().find(|input| !is_ours(input));
     match first.and_then(|input| Some((input, format_of(&start_of(input))?))) {
         Some((input, format)) if !format.is_of_link() => anyhow!(
@@ -325,8 +326,8 @@ pub fn not_ours(inputs: &[PathBuf], error: anyhow::Error) -> anyhow::Error {
     }
 }
 
-/// A large file of anything may be a card whose first blocks are gone. That nothing was found on it is no news to whoever named
-/// something else by mistake.
+/// The error for a large file that may be a card without its first blocks. The user may have named another
+/// file by mistake, so the error does not say only that the card is empty.
 fn not_known(path: &Path, error: anyhow::Error) -> anyhow::Error {
     if matches!(logs::find::look(path), Ok(Content::Image)) && !logs::is_card(path).unwrap_or(true) {
         return error.context(format!("{}: is no log of HUMS, and not {KNOWN}; as a card", path.display()));
@@ -347,15 +348,15 @@ struct Walk {
     others: u64,
     /// The first of them, by their names in the folder.
     passed_over: Vec<String>,
-    /// The first of them that are archives and the like, as sentences that say what to do.
+    /// The first archives and the like, as sentences with advice.
     hinted: Vec<String>,
-    /// Files with the name of a recording that hold none, and the first of them as sentences.
+    /// Files named like a recording without one in them, and the first of them as sentences.
     unknown: u64,
     remarks: Vec<String>,
 }
 
 impl Walk {
-    /// What is in a folder besides what was found of our own.
+    /// The contents of a folder besides our own logs.
     fn of(folder: &Path, own: &logs::Found) -> Result<Self> {
         let mut walk = Self { ours: own.paths().map(Path::to_owned).collect(), ..Self::default() };
         walk.folder(folder, 0)?;
@@ -386,14 +387,14 @@ impl Walk {
         })
     }
 
-    /// What is neither a recording nor a folder is forgotten at once: there may be millions of files.
+    /// Other files are dropped at once: there may be millions of them.
     fn folder(&mut self, dir: &Path, depth: usize) -> Result<()> {
         let context = || format!("{}: cannot be read", dir.display());
         let mut inside: Vec<(PathBuf, bool)> = Vec::new();
         for entry in fs::read_dir(dir).with_context(context)? {
             let entry = entry.with_context(context)?;
             let (path, kind) = (entry.path(), entry.file_type().with_context(context)?);
-            // What a run of this program has not made whole, or has replaced, is told with our own logs.
+            // Incomplete or replaced files of this program are reported with our own logs.
             if why_unread(&path).is_some() || self.ours.contains(&path) {
                 continue;
             }
@@ -412,7 +413,7 @@ impl Walk {
                     }
                     self.passed_over.push(words);
                 }
-                // Of one that nobody may read, that is told.
+                // An unreadable file is reported as such.
                 let is_read = || fs::File::open(&path).is_ok();
                 if kind.is_file() && hint(&start).is_none() && is_named_as_recording(&path) && is_read() {
                     self.unknown += 1;
@@ -432,7 +433,7 @@ impl Walk {
         inside.sort();
         for (path, is_folder) in inside {
             if is_folder {
-                // That one cannot be read is told with our own logs.
+                // An unreadable folder is reported with our own logs.
                 let _ = self.folder(&path, depth + 1);
             } else {
                 self.paths.push(path);
@@ -442,7 +443,7 @@ impl Walk {
     }
 }
 
-/// Whether its name ends as those of recordings do that nothing else has, `.gz` or not. `.log` is the name of too much.
+/// Whether its name ends like only a recording's does, `.gz` or not. The ending `.log` is too common.
 fn is_named_as_recording(path: &Path) -> bool {
     let name =
         path.file_name().map_or_else(Default::default, |name| name.to_string_lossy().to_ascii_lowercase());

@@ -1,4 +1,4 @@
-//! What a recording is, by its first bytes.
+//! The format of a recording, by its first bytes.
 
 use std::path::Path;
 
@@ -10,18 +10,19 @@ use super::sniff::{Kind, sniff_bytes};
 use super::{dataflash, ulog};
 use crate::archive;
 
-/// How much of a file tells what it is.
+/// Number of bytes read to find the format.
 pub(super) const LOOK_BYTES: usize = 64 * 1024;
-/// In so many bytes of noise a frame is found by chance once in a hundred times: more than one for each of these is MAVLink.
+/// In this many bytes of noise a frame is found by chance once in a hundred times. More than one frame for
+/// each of these is MAVLink.
 const BY_CHANCE_BYTES: usize = LOOK_BYTES / 2;
-/// What is read besides logs of ours, for messages: the end of a sentence.
+/// The known formats besides our own logs, for messages: the end of a sentence.
 pub(super) const KNOWN: &str = "a recording that this program knows: a tlog, raw MAVLink, an ArduPilot log (.bin, .log), a PX4 log (.ulg), \
                      each also as .gz";
 
-/// A sector of the board's flash, of which two are its store (`--store`).
+/// Size of a sector of the board's flash; two sectors are its store (`--store`).
 pub const STORE_SECTOR_BYTES: usize = 16 * 1024;
 
-/// What a recording is.
+/// The format of a recording.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Format {
     /// A log of HUMS, from a file, a card or a card's image.
@@ -48,7 +49,7 @@ impl Format {
         }
     }
 
-    /// What it is, for people.
+    /// The name for people.
     pub const fn words(self) -> &'static str {
         match self {
             Self::Hums => "log of HUMS",
@@ -59,7 +60,7 @@ impl Format {
         }
     }
 
-    /// What it is, for people, in a sentence: `a PX4 log (ULog)`.
+    /// The name for people, in a sentence: `a PX4 log (ULog)`.
     pub fn with_article(self) -> String {
         match self {
             Self::Raw => self.words().to_owned(),
@@ -68,14 +69,14 @@ impl Format {
         }
     }
 
-    /// Whether it holds what came over a link, as a ground station or a recorder on a port heard it; otherwise the
+    /// Whether it was received over a link, by a ground station or a recorder on a port; otherwise the
     /// autopilot wrote it itself.
     pub const fn is_of_link(self) -> bool {
         matches!(self, Self::Hums | Self::Tlog | Self::Raw)
     }
 }
 
-/// What some first bytes are.
+/// The kind found from some first bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Detected {
     /// A ground station's log.
@@ -104,10 +105,10 @@ pub(super) fn begins_recording(start: &[u8]) -> bool {
     ulog::detect(start) || dataflash::begins(start).is_some()
 }
 
-/// What a file that begins so is; none where that is not known.
+/// The kind of a file with these first bytes; `None` if unknown.
 pub(super) fn detect(start: &[u8]) -> Option<Detected> {
     if hint(start).is_some() {
-        // A log that lies in an archive as it is would be read from its middle.
+        // An uncompressed log in an archive would be read from its middle.
         return None;
     }
     if ulog::detect(start) {
@@ -130,7 +131,7 @@ pub(super) fn detect(start: &[u8]) -> Option<Detected> {
     }
 }
 
-/// What is known of a file that is not read, by its first bytes as they are after unpacking, and what to do with it.
+/// Description of a known file that is not read, by its first bytes after unpacking, with advice.
 pub(super) fn hint(start: &[u8]) -> Option<&'static str> {
     const TWICE: &str = "is compressed twice with gzip; unpack it once (gzip -dk)";
     const STORE: &str = "is the memory of a simulated board (--store), and no recording; it may stay there";
@@ -142,17 +143,18 @@ pub(super) fn hint(start: &[u8]) -> Option<&'static str> {
         .or_else(|| is_store::<STORE_SECTOR_BYTES>(start).then_some(STORE))
 }
 
-/// What a file that begins with these bytes (64 KiB, or all of it) is, where it is a recording and none of our own logs.
+/// The format of a file with these first bytes (64 KiB, or the whole file), if it is a recording other than
+/// our own logs.
 pub fn format_of(start: &[u8]) -> Option<Format> {
     detect(start).map(Detected::format)
 }
 
-/// Whether a file is a recording, and none of our own logs.
+/// Whether a file is a recording other than our own logs.
 pub(super) fn is_recording(path: &Path) -> bool {
     detect(&start_of(path)).is_some()
 }
 
-/// The first bytes of a file; none where it cannot be read.
+/// The first bytes of a file; empty if unreadable.
 pub(super) fn start_of(path: &Path) -> Vec<u8> {
     Input::open(path).ok().and_then(|mut input| input.peek(LOOK_BYTES).ok()).unwrap_or_default()
 }
@@ -170,7 +172,7 @@ mod tests {
             assert_eq!(format_of(&start), Some(Format::DataFlash));
         }
         assert_eq!(format_of(&HEARTBEAT.repeat(3)), Some(Format::Raw));
-        // In noise one is none.
+        // A single frame in noise does not count.
         for (frames, expected) in [(1, None), (2, None), (3, Some(Format::Raw))] {
             let noise = vec![0x55; LOOK_BYTES - frames * HEARTBEAT.len()];
             assert_eq!(format_of(&[noise, HEARTBEAT.repeat(frames)].concat()), expected);

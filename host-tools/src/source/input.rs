@@ -1,7 +1,8 @@
-//! The bytes of a recording: a file or standard input, plain or compressed by gzip, with how far it has been read.
+//! The bytes of a recording: a file or standard input, plain or compressed by gzip, with the progress of
+//! reading.
 //!
-//! Whether it is compressed is told by its content, never by its name. Compressed bytes that are damaged or end too
-//! soon end the input; [`Progress::damage`] then says where and why.
+//! Compression is found by content, never by name. Compressed bytes that are damaged or end too soon end the
+//! input; [`Progress::damage`] then names place and reason.
 
 use std::fs::File;
 use std::io::{self, BufRead, BufReader, Cursor, Read};
@@ -47,7 +48,7 @@ impl Progress {
         self.total().map_or(0.0, |total| (self.taken() as f64 / total as f64).min(1.0))
     }
 
-    /// What was wrong with the compressed bytes, if anything.
+    /// Damage of the compressed bytes, if any.
     pub fn damage(&self) -> Option<String> {
         self.0.damage.lock().ok()?.clone()
     }
@@ -69,7 +70,7 @@ impl Progress {
     }
 }
 
-/// An open input. It keeps no more than what is read at once.
+/// An open input. It keeps only the present chunk.
 pub struct Input {
     inner: Box<dyn Read + Send>,
     progress: Progress,
@@ -102,7 +103,7 @@ impl Input {
         Ok(Self { inner, progress, compressed })
     }
 
-    /// The bytes that the file at `path` gives: unpacked, where it is compressed. Those are counted, as far as they can be read.
+    /// Size of the content of the file at `path`, unpacked if compressed, as far as it is readable.
     pub fn bytes_of(path: &Path) -> u64 {
         match Self::open(path) {
             Ok(mut input) if input.compressed => io::copy(&mut input, &mut io::sink()).unwrap_or(u64::MAX),
@@ -116,7 +117,7 @@ impl Input {
         self.progress.clone()
     }
 
-    /// Looks at the first `bytes` bytes, fewer where there are no more, and puts them back.
+    /// Looks at the first `bytes` bytes, or fewer at the end, and puts them back.
     pub fn peek(&mut self, bytes: usize) -> io::Result<Vec<u8>> {
         let start = read_start(self, bytes)?;
         let rest = std::mem::replace(&mut self.inner, Box::new(io::empty()));
@@ -144,7 +145,7 @@ impl Read for Input {
     }
 }
 
-/// What the decoder says of its bytes, other than what the file system says of the file.
+/// Whether an error is by the decoder about its bytes, not by the file system about the file.
 fn is_damage(error: &io::Error) -> bool {
     use io::ErrorKind::{InvalidData, InvalidInput, UnexpectedEof};
     matches!(error.kind(), InvalidData | InvalidInput | UnexpectedEof)
@@ -192,7 +193,7 @@ impl<R: BufRead> Read for Members<R> {
     }
 }
 
-/// Counts what is taken.
+/// Counts the bytes taken.
 struct Counted<R> {
     inner: R,
     progress: Progress,

@@ -1,4 +1,4 @@
-//! The one stream that every recording is read as, whatever its format: a time, and what was recorded then.
+//! The one stream that every recording is read as, whatever its format: times and the items recorded at them.
 //!
 //! A format is one file (or folder) beside this one with a [`Reader`]; a command takes [`Item`]s and knows no format.
 //! A reader streams: its memory does not grow with its input, and nothing in an input may panic it.
@@ -7,8 +7,8 @@
 //! clock that falls is an [`Item::Restart`]). UTC of time zero is an [`Item::Epoch`] as soon as it is known, and again
 //! when it is known better.
 //!
-//! **Damage** is walked over. What is missing is an [`Item::Gap`] with its place and its reason; an error is for what
-//! cannot be read at all.
+//! **Damage** is walked over and reported as an [`Item::Gap`] with its place and its reason. An error means that
+//! the input cannot be read at all.
 
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -25,20 +25,20 @@ use crate::ending::Ending;
 /// The component that an autopilot is: `MAV_COMP_ID_AUTOPILOT1`.
 pub const AUTOPILOT: u8 = 1;
 
-/// What a recording holds.
+/// An item of a recording.
 #[derive(Clone, Copy, Debug)]
 pub enum Item<'a> {
     /// UTC at time zero, microseconds since 1970.
     Epoch(u64),
-    /// A MAVLink frame as it came. What it says follows as items of its own.
+    /// A MAVLink frame as received. Its contents follow as items of their own.
     Frame(&'a Frame<'a>),
-    /// What a vehicle said, in SI units.
+    /// A report of a vehicle, in SI units.
     Observation(Source, &'a Observation),
     /// A parameter of the autopilot.
     Parameter(Parameter<'a>),
-    /// Words, whole: long ones are put together. The time is that of their first part, so it may lie a second back.
+    /// A whole text: long ones are put together. The time is the first part's, so it may be a second back.
     Text(Text<'a>),
-    /// The flight mode, whenever it is told.
+    /// The flight mode, at each report of it.
     Mode(Mode<'a>),
     /// An event that has a number.
     Event(Event<'a>),
@@ -50,10 +50,10 @@ pub enum Item<'a> {
     Record(&'a Record<'a>),
     /// Something is missing or damaged here.
     Gap(&'a Gap),
-    /// The recording's clock began again: another power-on of what recorded it. Time goes on from where it was.
+    /// The recording's clock began again: another power-on of the recorder. Time goes on from its last value.
     Restart,
-    /// Another recording was joined on here: the recorder's clock and the autopilot's changed together. Its clock begins anew,
-    /// as with [`Item::Restart`], and nothing of before holds.
+    /// Another recording was joined on here: the recorder's clock and the autopilot's changed together. Its
+    /// clock begins again, as with [`Item::Restart`], and all earlier state is void.
     Joint,
 }
 
@@ -66,7 +66,7 @@ pub struct Parameter<'a> {
     pub value: f64,
 }
 
-/// What somebody said in words.
+/// A text from a component.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Text<'a> {
     /// Who.
@@ -75,7 +75,7 @@ pub struct Text<'a> {
     pub severity: u8,
     /// Words of the world, never markup.
     pub words: &'a str,
-    /// What they say is wrong: an [`Observation::Alert`] of its own, which the monitor takes.
+    /// The alert in the text: an [`Observation::Alert`] of its own, which the monitor takes.
     pub alert: Option<Alert>,
 }
 
@@ -97,22 +97,22 @@ pub struct Event<'a> {
     pub number: u32,
     /// `MAV_SEVERITY`.
     pub severity: u8,
-    /// Its name or meaning; empty where nothing is known of it.
+    /// Its name or meaning; empty if unknown.
     pub words: &'a str,
-    /// What it says is wrong: as of a [`Text`].
+    /// The alert in it: as in a [`Text`].
     pub alert: Option<Alert>,
 }
 
 /// A fact.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Fact<'a> {
-    /// What it is about.
+    /// The subject.
     pub about: About,
     /// Words of the world.
     pub words: &'a str,
 }
 
-/// What facts are about.
+/// The subject of a fact.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum About {
     /// The autopilot's firmware with its version: `ArduCopter V4.6.0 (3fc7011a)`.
@@ -121,18 +121,18 @@ pub enum About {
     Hardware,
     /// The airframe: `QUAD/X`.
     Frame,
-    /// Who or what made the recording.
+    /// The recorder: program or device.
     Recorder,
-    /// The failsafes that the autopilot has declared and not yet resolved, by their names with `, ` between; empty where
-    /// there is none. It is so from here on.
+    /// Names of the autopilot's unresolved failsafes, with `, ` between; empty without any. It holds from
+    /// here on.
     Failsafes,
     /// An emergency that happens here, in which the autopilot stops the motors at once, by its name.
     Emergency,
-    /// How arming is known, where the recording does not tell it: a sentence. Empty where it does.
+    /// The source of the arming state, if the recording does not report it: a sentence. Empty if it does.
     Arming,
-    /// What of the recording nobody can say whether it is damaged: a sentence.
+    /// Parts of the recording that cannot be checked for damage: a sentence.
     Unchecked,
-    /// What stands before the first frame without being one, where nothing is lost by it: a sentence.
+    /// Harmless bytes before the first frame: a sentence.
     Beginning,
 }
 
@@ -147,8 +147,8 @@ pub struct Table {
 }
 
 impl Table {
-    /// The name of a recording's next table, or of a table's next column: the first one of `name`, `name_2` and so on that
-    /// none of those before has.
+    /// The name of a recording's next table, or of a table's next column: the first of `name`, `name_2` and
+    /// so on that is free.
     pub fn free_name(taken: &mut BTreeSet<String>, name: &str) -> String {
         let mut free = name.to_owned();
         let mut number = 2_u32;
@@ -165,7 +165,7 @@ impl Table {
 pub struct Column {
     /// Its name.
     pub name: String,
-    /// The unit of its values as they stand here (multipliers are applied); empty where none is known.
+    /// The unit of the values here, after multipliers; empty if unknown.
     pub unit: String,
     /// The type of its values.
     pub kind: Kind,
@@ -210,8 +210,8 @@ pub enum Kind {
     Bytes,
 }
 
-/// One row: as many values as its table has columns, each of its column's kind, [`Value::Unknown`], or
-/// [`Value::Text`] where a text log has words in the place of a number.
+/// One row, with one value for each column of its table. The value is of its column's kind or
+/// [`Value::Unknown`]; or [`Value::Text`], if a text log has a word in place of a number.
 #[derive(Clone, Copy, Debug)]
 pub struct Row<'a> {
     /// Its table. The same table is the same `Arc`.
@@ -237,7 +237,7 @@ pub enum Value<'a> {
     Flag(bool),
     /// Words.
     Text(&'a str),
-    /// Bytes that are no words: part of a file's content. Their column is of [`Kind::Bytes`].
+    /// Bytes that are not text: part of a file's content. Their column is of [`Kind::Bytes`].
     Bytes(&'a [u8]),
 }
 
@@ -254,20 +254,20 @@ pub struct Gap {
     pub place: Option<u64>,
     /// How many bytes of the file could not be read.
     pub bytes: u64,
-    /// What was found there, as the end of a sentence: `a length of 3 bytes for FMT`.
+    /// The data found there, as the end of a sentence: `a length of 3 bytes for FMT`.
     pub words: String,
     /// The same as a log of ours has it, which counts sectors and frames.
     pub own: Option<hums_blackbox::Gap>,
 }
 
 impl Gap {
-    /// What is there from this time and place on is damaged; no byte of it is passed over.
+    /// The data from this time and place on are damaged; no byte of them is passed over.
     pub const fn damaged(at: Instant, place: u64, words: String) -> Self {
         let (from, place) = (Some(at), Some(place));
         Self { from, to: None, cause: Cause::Damaged, place, bytes: 0, words, own: None }
     }
 
-    /// Whether nothing is missing there: bytes are in the recording that are no frame.
+    /// Whether it is only noise: bytes that are not part of a frame.
     pub fn is_noise(&self) -> bool {
         self.cause == Cause::Lost && self.bytes > 0
     }
@@ -304,9 +304,10 @@ pub enum Cause {
     Lost,
     /// The recorder left it out on purpose.
     NotKept,
-    /// Nothing was recorded for a while in the air, and the vehicle was not seen to fly on: how the flight ended is not known.
+    /// A silence in the air, after which the vehicle was not seen to fly on: the end of the flight is
+    /// unknown.
     Silent,
-    /// No message of the recording, or of a part of it, has a time: nothing in it can be put in order with the rest.
+    /// No message of the recording, or of a part of it, has a time: the data have no order.
     NoTimes,
 }
 
@@ -329,22 +330,23 @@ impl Cause {
     }
 }
 
-/// What a command needs. A reader may leave out what is not wanted, and is expected to where that saves time: messages
-/// that nobody needs are skipped by their length. Everything that has no switch here is always handed on.
+/// The needs of a command. A reader may leave out unwanted data, and should if that saves time: unwanted
+/// messages are skipped by their length. Items without a switch here are always handed on.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Want<'a> {
     /// [`Item::Frame`]
     pub frames: bool,
     /// [`Item::Observation`]
     pub observations: bool,
-    /// [`Item::Row`]: of which tables.
+    /// [`Item::Row`]: the wanted tables.
     pub rows: Rows<'a>,
-    /// Of several vehicles in a recording of a link only that with this system id: what the autopilots of others say is left out.
+    /// The only wanted vehicle in a recording of a link, by system id: messages of other autopilots are left
+    /// out.
     pub system: Option<u8>,
 }
 
 impl Want<'_> {
-    /// Whether what this source says is left out: it is another vehicle's autopilot.
+    /// Whether this source is left out: it is another vehicle's autopilot.
     pub fn leaves_out(&self, source: Source) -> bool {
         source.component == AUTOPILOT && self.system.is_some_and(|system| system != source.system)
     }
@@ -373,7 +375,8 @@ impl Rows<'_> {
     }
 }
 
-/// What gets each item with its time. An error of it ends the reading and is handed on; [`Stop`] is no failure.
+/// Callback for each item with its time. An error of it ends the reading and is handed on; [`Stop`] is not a
+/// failure.
 pub type Take<'a> = dyn FnMut(Instant, Item<'_>) -> Result<()> + 'a;
 
 /// Hands on a text or an event, and before it the alert that it is, where observations are wanted.
@@ -419,7 +422,7 @@ impl Amount {
 /// Messages of one name.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct MessageCount {
-    /// MAVLink's id of it, and whether the checksum is that of the definition known to who recorded it; `None` in an autopilot's
+    /// Its MAVLink id, and whether the checksum matches the recorder's definition; `None` in an autopilot's
     /// own log.
     pub id: Option<(u32, bool)>,
     /// Its name.
@@ -428,14 +431,14 @@ pub struct MessageCount {
     pub amount: Amount,
 }
 
-/// What was read, in all.
+/// Totals of a reading.
 #[derive(Clone, Debug, Default)]
 pub struct Summary {
-    /// Messages by name, those that nobody wanted too: in order of their ids, or of their names where they have none.
+    /// Messages by name, unwanted ones too: in order of their ids, or of their names without ids.
     pub messages: Vec<MessageCount>,
-    /// Messages of further ids: only so many are told apart.
+    /// Messages of further ids, beyond the limit of ids counted one by one.
     pub other_messages: Amount,
-    /// Entries of a log of ours that should be frames and are none.
+    /// Invalid frames in entries of a log of ours.
     pub not_frames: u64,
     /// The first and the last time of the frames, rows and observations that were handed on.
     pub span: Option<(Instant, Instant)>,

@@ -1,10 +1,10 @@
-//! Bytes that come in their own time: UDP, TCP, serial. Their arrival times are the clock's, counted from the first.
+//! Live bytes: UDP, TCP, serial. Their arrival times are from the clock, counted from the first byte.
 //!
-//! A live source ends when its peer closes it or on Ctrl-C (see [`crate::interrupt`]); silence is handed on as chunks
-//! without bytes, so that the pipeline's clock goes on.
+//! A live source ends when its peer closes it or on Ctrl-C (see [`crate::interrupt`]). Silence is handed on
+//! as chunks without bytes, so that the pipeline's clock goes on.
 //!
-//! A network delivers in bursts what no UART could: bytes count as arriving at 921,600 baud at most, the fastest rate of
-//! the monitor's port.
+//! A network delivers larger bursts than any UART. So bytes count as arriving at 921,600 baud at most, the
+//! fastest rate of the monitor's port.
 
 use std::io::{self, Write};
 use std::time::{Duration, Instant};
@@ -29,7 +29,7 @@ struct Live {
     buffer: Vec<u8>,
 }
 
-/// Opens a live SRC, with what is sent to it.
+/// Opens a live SRC, with its writer.
 pub(super) fn open(endpoint: &Endpoint) -> Result<(Box<dyn Source>, Box<dyn Write + Send>)> {
     let duplex = duplex::open(endpoint, SILENCE)?;
     interrupt::watch();
@@ -49,7 +49,7 @@ impl Source for Live {
                 Err(error) if duplex::is_silence(&error) => 0,
                 Err(error) => return Err(error),
             };
-            // Before the first byte there is no time to speak of.
+            // Time starts with the first byte.
             if got == 0 && self.first.is_none() {
                 continue;
             }

@@ -23,7 +23,7 @@ use super::tlog::times::{Begins, Times};
 use crate::plural::count;
 use crate::utc::moment;
 
-/// What was counted; a message that has a definition here counts as verified.
+/// The counts; a message with a definition here counts as verified.
 fn summary(counts: Counts) -> Summary {
     let (mut messages, other_messages) = counts.messages();
     for message in &mut messages {
@@ -61,7 +61,7 @@ impl Reader for TlogReader {
                     let told = times.take(time_us, &bytes, place, &self.records);
                     match told.begins {
                         Some(Begins::Recording) => {
-                            // Nothing that was said before holds.
+                            // All earlier state is void.
                             said.end(take)?;
                             (framer, said) = (Framer::new(), Said::default());
                             take(times.now(), Item::Joint)?;
@@ -115,7 +115,7 @@ impl Reader for TlogReader {
     }
 }
 
-/// Bytes of a tlog that are no record, as one place, however many there are.
+/// Bytes of a tlog outside of records, as one place.
 struct Noise {
     at: Instant,
     place: u64,
@@ -214,28 +214,28 @@ impl Reader for RawReader {
     }
 }
 
-/// Bytes of no frame: what an autopilot says in words while it boots, and noise.
+/// Bytes outside of frames: text of an autopilot that boots, and noise.
 #[derive(Default)]
 struct Strays {
     /// The latest bytes; until a frame has come, the first ones.
     latest: VecDeque<u8>,
     /// When the first frame came.
     begun: Option<Instant>,
-    /// Bytes of no frame until now, and how many of them are words by which nothing is lost.
+    /// Bytes outside of frames so far, and the harmless text among them.
     bytes: u64,
     words: u64,
     /// When and where the first noise came, and when the last did.
     noise: Option<(Instant, u64, Instant)>,
 }
 
-/// More in a row are no words of a boot, which is over so soon after its first frame.
+/// A longer run of bytes is not text of a boot. A boot is over this long after its first frame.
 const WORDS_BYTES_MAX: usize = 16 * 1024;
 const BOOTS: Span = Span::from_secs(2);
-/// What a framer may hold before it says that bytes are of no frame.
+/// Number of bytes that a framer may hold before it reports them as outside of frames.
 const HELD_BYTES: usize = 512;
 
 impl Strays {
-    /// These bytes have come, with so many of no frame in all.
+    /// These bytes have come, with this total of bytes outside of frames.
     fn take(&mut self, at: Instant, place: u64, bytes: &[u8], counts: FramerCounts) {
         self.latest.extend(bytes);
         let kept = if self.begun.is_none() { WORDS_BYTES_MAX } else { HELD_BYTES };
@@ -256,7 +256,7 @@ impl Strays {
         }
     }
 
-    /// Tells of them, without those that are told otherwise.
+    /// Reports them, without those that are reported elsewhere.
     fn tell(self, now: Instant, others: u64, take: &mut Take<'_>) -> Result<()> {
         if self.words > 0 {
             let words = format!(

@@ -1,5 +1,5 @@
-//! What is read: recordings of every format as one stream of items ([`item`], [`recording`]), and, for `hums sim` and its
-//! like, the bytes of the autopilot's UART: chunks with the times at which they arrive.
+//! Inputs: recordings of every format as one stream of items ([`item`], [`recording`]). For `hums sim` and its like
+//! they are the bytes of the autopilot's UART: chunks with their times of arrival.
 //!
 //! | format | read by |
 //! |---|---|
@@ -9,17 +9,17 @@
 //! | PX4's `ULog` | `ulog` |
 //!
 //! A further format is one more [`item::Reader`], and a line of [`recording::Recording::new`]. A command takes the items in order
-//! ([`recording::Recording::read`]), or in [`parts`] ([`recording::Place::in_parts`]) where the work is to be shared among the cores.
+//! ([`recording::Recording::read`]), or in [`parts`] ([`recording::Place::in_parts`]) to share the work among the cores.
 //!
 //! # Bytes
 //!
 //! | source | arrival times |
 //! |---|---|
 //! | a tlog (file or `-`) | the recorded ones, counted from the first |
-//! | raw bytes (file or `-`) | none recorded: paced as on a line at 115,200 baud; [`booted`] has those that the autopilot tells |
+//! | raw bytes (file or `-`) | none recorded: paced as on a line at 115,200 baud; [`booted`] has the autopilot's |
 //! | UDP, TCP, serial | the clock's |
 //!
-//! Files and `-` may be compressed by gzip. Times are microseconds since the first byte and never fall: see [`tlog::times`] for what happens to clocks that jumped.
+//! Files and `-` may be compressed by gzip. Times are microseconds since the first byte and never fall: see [`tlog::times`] for clocks that jumped.
 //! Everything streams: memory does not grow with the input.
 
 pub mod blocks;
@@ -105,7 +105,7 @@ pub fn open(endpoint: &Endpoint, timing: Timing) -> Result<Box<dyn Source>> {
             if about.is_dir() {
                 bail!("{}: is a directory; give a recording (tlog or raw MAVLink bytes)", path.display());
             }
-            // Before it is opened: a pipe would wait for its other end, without a word.
+            // Checked before opening: opening a pipe would wait for its other end, without a message.
             if !is_seekable(&about) {
                 bail!(
                     "{0}: is a pipe, a socket, a terminal or the like; copy it into a file, or name `-` and give it as \
@@ -146,12 +146,12 @@ pub fn open(endpoint: &Endpoint, timing: Timing) -> Result<Box<dyn Source>> {
     Ok(Box::new(compressed::Compressed::new(source, progress)))
 }
 
-/// The error of a command that writes what it finds in an input, and finds nothing.
+/// The error of a command that writes the frames of an input, for an input without any.
 pub fn no_frame(input: &Endpoint) -> Error {
     anyhow!("{input}: has no MAVLink frame, so nothing was written; hums check says what a file is")
 }
 
-/// What HUMS itself has recorded is full of frames, but not as they came.
+/// A recording by HUMS itself is full of frames, but not as received.
 fn refuse_our_own(path: &Path) -> Result<()> {
     let name = path.display();
     let what = match logs::find::look(path)? {

@@ -62,7 +62,8 @@ impl OwnReader {
         Ok(Summary { messages, other_messages, not_frames, span, gaps, losses, ending: Some(ending) })
     }
 
-    /// Reads it in parts, and hands on in order what [`Reader::read`] does of observations and what else is said: one reading for both.
+    /// Reads it in parts, and also hands on observations and further items in order, as [`Reader::read`]
+    /// does: one reading for both.
     pub fn in_parts_and_order<C: Collect>(
         &self,
         want: Want<'_>,
@@ -130,7 +131,7 @@ impl<C: Collect> reader::Collect for Part<C> {
     }
 
     fn held_bytes(&self) -> usize {
-        // What is counted has a limit of its own.
+        // The counts have a limit of their own.
         self.collected.held_bytes()
     }
 
@@ -143,7 +144,7 @@ impl<C: Collect> reader::Collect for Part<C> {
     }
 }
 
-/// What is common to all parts.
+/// State common to all parts.
 struct Parts<'a, D> {
     deliver: &'a mut D,
     counts: Counts,
@@ -202,15 +203,15 @@ impl Collect for Kept {
     }
 
     fn held_bytes(&self) -> usize {
-        // Observations lie on the heap, each with what the allocator adds.
+        // Observations are on the heap, each with the allocator's overhead.
         const ITEM_BYTES: usize = size_of::<(Instant, Stored)>() + size_of::<Observation>() + 16;
         self.bytes.len() + self.items.len() * ITEM_BYTES
     }
 }
 
-/// What is made of a part, and its items until it is their turn.
+/// The result of a part, and its items until their turn.
 struct Both<C> {
-    /// Frames are wanted for what is made.
+    /// The result needs frames.
     frames: bool,
     collected: C,
     kept: Kept,
@@ -229,7 +230,7 @@ impl<C: Collect> Collect for Both<C> {
     }
 }
 
-/// Hands on what was made of parts, and their items.
+/// Hands on the results of parts, and their items.
 struct HandBoth<'a, 'b, 'c, D> {
     deliver: &'c mut D,
     hand: Hand<'a, 'b>,
@@ -252,7 +253,7 @@ struct Hand<'a, 'b> {
     want: Want<'a>,
     take: &'a mut Take<'b>,
     said: Said,
-    /// What the recorder lost, until something was recorded again: it has a record for each second.
+    /// Losses of the recorder, until recording goes on: it has a record for each second.
     lost: Option<(Instant, Loss)>,
 }
 
@@ -286,7 +287,7 @@ impl Deliver<Kept> for Hand<'_, '_> {
 }
 
 impl Hand<'_, '_> {
-    /// A record, and what it says of the recording that was packed.
+    /// Takes a record, also about the recording that was packed.
     fn record(&mut self, at: Instant, record: &Record<'_>) -> Result<()> {
         (self.take)(at, Item::Record(record))?;
         if let Some((last, _)) = &mut self.lost {
@@ -316,7 +317,7 @@ impl Hand<'_, '_> {
         }
     }
 
-    /// Hands on what the recorder lost until now.
+    /// Hands on the recorder's losses so far.
     fn tell_lost(&mut self) -> Result<()> {
         let Some((at, lost)) = self.lost.take() else { return Ok(()) };
         match not_recorded(&lost) {
@@ -325,14 +326,14 @@ impl Hand<'_, '_> {
         }
     }
 
-    /// Nothing follows.
+    /// The log ends.
     fn end(mut self) -> Result<()> {
         self.tell_lost()?;
         self.said.end(self.take)
     }
 }
 
-/// What was damaged in the recording that was packed, as a loss: the log itself is whole.
+/// Damage of the recording that was packed, as a loss: the log itself is whole.
 fn of_packed(loss: &Loss) -> Gap {
     let (words, to) = match loss.what {
         // Counted over the whole recording.
@@ -342,7 +343,7 @@ fn of_packed(loss: &Loss) -> Gap {
     Gap { from: Some(loss.from), to, cause: Cause::Lost, place: None, bytes: 0, words, own: None }
 }
 
-/// What the recorder counted as lost.
+/// The recorder's count of lost data.
 fn not_recorded(loss: &Loss) -> Option<Gap> {
     let (from, to) = (Some(loss.from), Some(loss.to));
     let words = loss::words(loss)?;

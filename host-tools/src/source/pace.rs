@@ -1,28 +1,31 @@
-//! Whether a recording's clock runs, asked all along and by one rule for all formats.
+//! Checks whether a recording's clock runs, all along and by one rule for all formats.
 //!
-//! A clock that stops, is zero from some place on, or tells milliseconds as microseconds, makes a recording of which hours
-//! seem to be a moment: no check has time to see anything, and nothing would seem wrong. Four things tell it:
+//! A bad clock stops, is zero from some place on, or has milliseconds as microseconds. Then a recording of
+//! hours seems to be a moment: checks have no time to find anything, and all seems well. Four signs show it:
 //!
-//! | what | against what |
+//! | measure | reason |
 //! |---|---|
-//! | how many bytes were recorded within the time | no logger and no link writes 4 MiB a second for long |
-//! | another clock in the messages (UTC of a receiver) | a recording's clock that is a hundred times slower is none |
-//! | messages of one kind that tell no later time, a hundred in a row | a kind is told again when time has passed |
-//! | how often the clock fell in a row | one that falls eight times with less than five seconds between runs backwards |
+//! | bytes recorded within the time | loggers and links cannot write 4 MiB a second for long |
+//! | another clock in the messages (UTC of a receiver) | a recording's clock a hundred times slower is wrong
+//! |
+//! | messages of one kind without a later time, a hundred in a row | a kind comes again after some time |
+//! | falls of the clock in a row | eight falls with less than five seconds between mean that it runs
+//! backwards |
 
 use hums_core::clock::{Instant, Span};
 
 use super::clock::Wrong;
 use super::item::{Cause, Gap};
 
-/// Bytes a second that nothing records: the fastest logs, of all inertial samples on an autopilot's card, have a quarter of it.
+/// A data rate above any logger's, bytes a second: the fastest logs, of all inertial samples on an
+/// autopilot's card, have a quarter of it.
 const BYTES_PER_S: u64 = 4 * 1024 * 1024;
-/// Bytes that may come at once: what a logger writes when it begins (parameters, a mission), or had to hold back. The most in 80 public
-/// logs of `ArduPilot` is 84 KB, definitions included.
+/// Size of a burst: the data that a logger writes when it begins (parameters, a mission), or had to hold
+/// back. The most in 80 public logs of `ArduPilot` is 84 KB, definitions included.
 const BURST_BYTES: u64 = 192 * 1024;
-/// A clock that is so many times slower than another one is none. (Simulators run at some tens of times at most.)
+/// A clock this many times slower than another one is wrong. (Simulators run at some tens of times at most.)
 pub const SLOWER: u64 = 100;
-/// After so much of the other clock it is told.
+/// The slow clock is reported after this much of the other clock.
 const WITNESSED: Span = Span::from_secs(10);
 /// The other clock itself was set where it jumps by more.
 const APART: Span = Span::from_secs(60);
@@ -45,7 +48,7 @@ pub struct Pace {
     /// The first and the latest time.
     first: Option<Instant>,
     last: Option<Instant>,
-    /// Where the latest message stands.
+    /// Place of the latest message.
     place: u64,
     /// Bytes for which there was no time yet, and where they begin.
     level: u64,
@@ -59,7 +62,7 @@ pub struct Pace {
 }
 
 impl Pace {
-    /// A message that stands here was recorded at this time, and so many bytes of messages since the last call.
+    /// A message at this place has this time; this many bytes of messages came since the last call.
     pub fn at(&mut self, now: Instant, place: u64, bytes: u64) {
         self.place = place;
         self.first.get_or_insert(now);
@@ -120,14 +123,14 @@ impl Pace {
         *self = Self { first: self.first, stands: self.stands, ..Self::default() };
     }
 
-    /// What is wrong with the recorded times, once all has been read: single ones, and the clock. Where the clock never ran, nobody
-    /// knows which of the times are wrong.
+    /// Faults of the recorded times, once all has been read: single ones, and the clock. If the clock never
+    /// ran, the single wrong times are unknown.
     pub fn gaps(&self, wrong: &Wrong) -> impl Iterator<Item = Gap> + use<> {
         let never_ran = self.stands.is_some() && self.first == self.last;
         wrong.gap().filter(|_| !never_ran).into_iter().chain(self.gap())
     }
 
-    /// What is wrong with the clock, once all has been read.
+    /// Faults of the clock, once all has been read.
     pub fn gap(&self) -> Option<Gap> {
         let (at, place) = self.stands?;
         let words = "the recorded times stand still, fall again and again, or go on far too slowly, from here on: what is \

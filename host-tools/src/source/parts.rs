@@ -1,11 +1,12 @@
-//! The stream in parts, for commands that make much of each item and put it in order afterwards.
+//! The stream in parts, for commands that compute much for each item and put the results in order afterwards.
 //!
-//! A log of ours is decoded group by group, several at a time, and what is made of a group's items is made there too: so
-//! `decode` and `info` use all cores. Such a command has a [`Collect`] for each part, and a [`Deliver`] that gets the parts
-//! in their order. A recording of another format is one row of items: it is cut into parts of bounded size, on one thread.
+//! A log of ours is decoded group by group, several in parallel, and the results of a group's items are made
+//! there too. So `decode` and `info` use all cores. Such a command has a [`Collect`] for each part, and a
+//! [`Deliver`] that gets the parts in their order. A recording of another format is one row of items: it is
+//! cut into parts of bounded size, on one thread.
 //!
-//! Parts have frames, observations, rows and records. What a frame says is not in them where it takes the frames before to
-//! tell it (texts, modes, parameters), nor what must be known before the first part (clocks): a reading in order has all.
+//! Parts have frames, observations, rows and records. They lack items that need earlier frames (texts, modes,
+//! parameters) and items needed before the first part (clocks): a reading in order has all.
 
 use anyhow::Result;
 use hums_core::clock::Instant;
@@ -13,10 +14,10 @@ use hums_core::clock::Instant;
 use super::item::{Gap, Item};
 pub use crate::logs::reader::PART_BYTES;
 
-/// Items of a part of a recording that is no log of ours.
+/// Items in a part of a recording of another format.
 pub const PART_ITEMS: u32 = 4_096;
 
-/// What the items of one part become.
+/// The result of the items of one part.
 pub trait Collect: Send {
     /// Takes the next item of the part.
     fn item(&mut self, at: Instant, item: Item<'_>);
@@ -29,6 +30,6 @@ pub trait Collect: Send {
 pub trait Deliver<C> {
     /// Something is missing here.
     fn gap(&mut self, gap: &Gap) -> Result<()>;
-    /// What the items of the next part became.
+    /// Takes the result of the next part.
     fn part(&mut self, collected: C) -> Result<()>;
 }

@@ -1,4 +1,4 @@
-//! A recording of any format: where it is, and reading it.
+//! A recording of any format: its place, and its reader.
 
 use std::fs;
 use std::io;
@@ -27,7 +27,7 @@ pub const RAW_BAUD: u32 = 115_200;
 /// A recording that was found, not yet open.
 #[derive(Clone, Debug)]
 pub struct Place {
-    /// Where it is, for people: its path, or path and session.
+    /// Its place for people: its path, or path and session.
     pub title: String,
     /// A name for files made of it, unique within one call: the file's own, or a session's as `hums info` gives it.
     pub name: String,
@@ -55,7 +55,7 @@ impl Place {
         }
     }
 
-    /// A file that is no log of ours.
+    /// A file other than a log of ours.
     pub fn file(path: &Path) -> Self {
         let name = path.file_name().map_or_else(|| "recording".into(), |name| name.to_string_lossy());
         Self {
@@ -79,7 +79,7 @@ impl Place {
         }
     }
 
-    /// Its file, where it is one of its own.
+    /// Its file, if it is a single one.
     pub fn path(&self) -> Option<&Path> {
         match &self.source {
             From::File(path) => Some(path),
@@ -124,7 +124,8 @@ impl Place {
         Ok(Recording { system: self.system, ..recording })
     }
 
-    /// Reads a log of ours in parts, as [`Self::in_parts`] does, and hands on in order what it says: one reading for both.
+    /// Reads a log of ours in parts, as [`Self::in_parts`] does, and also hands on its items in order: one
+    /// reading for both.
     pub fn in_parts_and_order<C: Collect>(
         &self,
         log: &Log,
@@ -161,7 +162,7 @@ impl Place {
         let (mut part, mut items) = (new(), 0);
         let summary = recording.read(want, &mut |at, item| {
             let begins = match item {
-                // What a frame says stays with it.
+                // Observations of a frame stay with it.
                 Item::Observation(..) => !is_of_link,
                 Item::Frame(_) | Item::Row(_) | Item::Gap(_) => true,
                 _ => return Ok(()),
@@ -187,7 +188,7 @@ impl Place {
     }
 }
 
-/// Why there is no choice of a vehicle in an autopilot's own log.
+/// The error for a choice of a vehicle in an autopilot's own log.
 pub(super) fn of_one_vehicle(title: &str) -> anyhow::Error {
     usage(format!(
         "--system is for a recording of several vehicles; {title} is an autopilot's own log, which is of one"
@@ -196,7 +197,7 @@ pub(super) fn of_one_vehicle(title: &str) -> anyhow::Error {
 
 /// A recording, open at its beginning.
 pub struct Recording {
-    /// What it is.
+    /// Its format.
     pub format: Format,
     /// How far it has been read.
     pub progress: Progress,
@@ -206,7 +207,7 @@ pub struct Recording {
 }
 
 impl Recording {
-    /// What `input` is, by its content; `name` is for messages.
+    /// The recording in `input`, by content; `name` is for messages.
     pub fn new(mut input: Input, name: &str) -> Result<Self> {
         let context = || format!("{name}: cannot be read");
         let start = input.peek(LOOK_BYTES).with_context(context)?;
@@ -264,7 +265,7 @@ impl Recording {
     }
 }
 
-/// What was handed on.
+/// Counts of the items handed on.
 #[derive(Default)]
 struct Seen {
     span: Option<(Instant, Instant)>,

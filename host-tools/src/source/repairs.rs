@@ -1,9 +1,11 @@
-//! Repairs of what old autopilots tell wrong, before anything is judged by it.
+//! Repairs of wrong reports by old autopilots, before they are judged.
 //!
-//! | told | by | repair |
+//! | report | by | repair |
 //! |---|---|---|
-//! | a vertical speed that counts up | `ArduPilot` until about 2018 (Copter of 2013, 2016 and 3.5.7, Plane 3.6.0) | it is turned round, once it has the sign of the displayed climb |
-//! | the attitude itself as the wanted one | some logs | the wanted attitude is not known, until the attitude was another one |
+//! | a vertical speed that is positive upwards | `ArduPilot` until about 2018 (Copter of 2013, 2016 and
+//! 3.5.7, Plane 3.6.0) | its sign is changed, once it has the sign of the displayed climb |
+//! | the attitude itself as the attitude setpoint | some logs | the setpoint is unknown, until it differs
+//! from the attitude |
 
 use std::collections::BTreeMap;
 
@@ -11,9 +13,9 @@ use hums_core::clock::{Instant, Span};
 use hums_core::observation::{Attitude, Autopilot, GlobalPosition, Observation, Source, Wanted};
 use hums_core::units::Radians;
 
-/// Older values are compared with nothing.
+/// Older values are not compared.
 const FRESH: Span = Span::from_secs(1);
-/// A wanted attitude that was the attitude at each sample for so long, and turned, leads none.
+/// An attitude setpoint that equalled the turning attitude at each sample for this long is not a setpoint.
 const LEADS_FOR: Span = Span::from_secs(5);
 /// 0.6 degrees, which is more than rounding.
 const COPY_RAD: f32 = 0.01;
@@ -27,7 +29,7 @@ const VOTES_MAX: i8 = 3 * SURE;
 /// `ArduPilot`'s versions are bytes from the top down: 4.0 counts down.
 const COUNTS_DOWN_SINCE: u32 = 0x0400_0000;
 
-/// What is known of each source.
+/// State of each source.
 #[derive(Debug, Default)]
 pub struct Repairs(BTreeMap<(u8, u8), Teller>);
 
@@ -42,7 +44,7 @@ struct Teller {
 }
 
 impl Repairs {
-    /// The observation as it should have been told.
+    /// The observation as it should have been reported.
     pub fn mend(&mut self, at: Instant, source: Source, observation: &Observation) -> Observation {
         let teller = self.0.entry((source.system, source.component)).or_default();
         match *observation {

@@ -1,4 +1,5 @@
-//! What MAVLink frames say, as items: observations, parameters, modes, and texts put together from their parts.
+//! The contents of MAVLink frames as items: observations, parameters, modes, and texts put together from
+//! their parts.
 
 use anyhow::Result;
 use hums_core::alert::event_name;
@@ -23,7 +24,7 @@ pub(super) struct Said {
 }
 
 impl Said {
-    /// Hands on a frame, where frames are wanted, and what it says.
+    /// Hands on a frame, if wanted, and its contents.
     pub(super) fn frame(
         &mut self,
         at: Instant,
@@ -63,7 +64,7 @@ impl Said {
         if want.observations { take(at, Item::Observation(source, &observation)) } else { Ok(()) }
     }
 
-    /// Nothing follows.
+    /// The recording ends.
     pub(super) fn end(&mut self, take: &mut Take<'_>) -> Result<()> {
         hand_texts(take, |hand| self.texts.end(&mut |text| hand(text)))
     }
@@ -92,7 +93,7 @@ fn hand_texts(take: &mut Take<'_>, make: impl FnOnce(&mut dyn FnMut(statustext::
     result
 }
 
-/// `ArduPilot` says what firmware it is as a text, when a ground station asks for its parameters (`send_banner`).
+/// `ArduPilot` names its firmware in a text, when a ground station asks for its parameters (`send_banner`).
 fn hand_text(text: &statustext::Text, take: &mut Take<'_>) -> Result<()> {
     let words = text.words.as_str();
     if text.source.component == AUTOPILOT && is_firmware(words) {

@@ -1,7 +1,8 @@
-//! Tells a tlog from raw bytes by what is in it, never by its name.
+//! Tells a tlog from raw bytes by content, never by name.
 //!
-//! In a tlog eight bytes of time stand before every frame; in raw bytes the next frame follows at once. Every frame
-//! whose checksum holds is a vote, so a damaged beginning, or boot text before the first frame, decides nothing.
+//! A tlog has eight bytes of time before every frame; in raw bytes the next frame follows at once. Every
+//! frame with a right checksum is a vote, so a damaged beginning, or boot text before the first frame, does
+//! not matter.
 
 use std::io::{self, Cursor, Read};
 
@@ -15,7 +16,7 @@ const WINDOW_BYTES: usize = 64 * 1024;
 /// Votes that settle it, so that a live pipe is not held up until the window is full.
 const LEAD: i32 = 3;
 
-/// What an input is.
+/// The kind of an input.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     /// Not one byte.
@@ -55,7 +56,7 @@ pub fn sniff<R: Read>(mut input: R) -> io::Result<(Kind, Sniffed<R>)> {
     Ok((kind, Cursor::new(window).chain(input)))
 }
 
-/// What these first bytes are, and how many frames are among them whose checksum holds.
+/// The kind of these first bytes, and the number of frames with a right checksum among them.
 pub fn sniff_bytes(bytes: &[u8]) -> (Kind, usize) {
     let (votes, good) = count(bytes);
     let kind = match votes {

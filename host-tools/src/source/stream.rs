@@ -7,7 +7,7 @@ use std::io::{self, Read};
 pub struct Chunk {
     /// When the last of them is there, in microseconds since the first byte of the input; never falls.
     pub at_us: u64,
-    /// The bytes; may be none where only time passed (a live source that is silent).
+    /// The bytes; empty if only time passed (a silent live source).
     pub bytes: Vec<u8>,
 }
 
@@ -16,12 +16,12 @@ pub trait Source: Send {
     /// The next chunk; `None` at the end.
     fn next(&mut self) -> io::Result<Option<Chunk>>;
 
-    /// The source whose chunks it hands on: what it does not say itself, that one says.
+    /// The source of its chunks: it answers all calls that this one does not.
     fn inner(&self) -> Option<&dyn Source> {
         None
     }
 
-    /// UTC at the first byte, microseconds since 1970, where the input told it (known once a chunk was read).
+    /// UTC at the first byte, microseconds since 1970, if the input has it (known after the first chunk).
     fn utc_start_us(&self) -> Option<u64> {
         self.inner()?.utc_start_us()
     }
@@ -41,13 +41,13 @@ pub trait Source: Send {
         self.inner().map_or(0, Source::damages)
     }
 
-    /// A sentence about what was strange in the input, once it has been read.
+    /// A remark about the input, once it has been read.
     fn remark(&self) -> Option<String> {
         self.inner()?.remark()
     }
 }
 
-/// Reads what there is, going on after an interrupted call; 0 at the end.
+/// Reads the available bytes, again after an interrupted call; 0 at the end.
 pub(super) fn read_some(input: &mut impl Read, buffer: &mut [u8]) -> io::Result<usize> {
     loop {
         match input.read(buffer) {

@@ -1,9 +1,14 @@
-//! Recorded times as times that never fall.
+//! Makes times that never fall from recorded times.
 //!
-//! A recording's clock may fall (another power-on in the same file, a clock that was set) and damage may make it say
-//! anything. A small step back is a reordering: what comes late counts as coming now. A larger one is a restart, after
-//! which time goes on a microsecond behind where it was: each time is of one power-on. A step forward beyond a day is damage or a clock that was set: it counts for
-//! nothing, and if the clock stays there, time goes on from there. (Which times are wrong, [`super::doubt`] tells before.)
+//! A recording's clock may fall (another power-on in the same file, a clock that was set), and damage may
+//! give it any value.
+//! - A small step back is a reordering: the late item counts as coming now.
+//! - A larger step back is a restart. Time goes on a microsecond after its last value, so each time is of one
+//!   power-on.
+//! - A step forward beyond a day is damage or a clock that was set. It does not count; if the clock stays
+//!   there, time goes on from there.
+//!
+//! [`super::doubt`] finds the wrong times before.
 
 use hums_core::clock::Instant;
 
@@ -12,7 +17,7 @@ pub const STEP_BACK_US_MAX: u64 = 1_000_000;
 /// A step forward beyond this is damage or a clock that was set; gaps of hours are real.
 pub const STEP_FORWARD_US_MAX: u64 = 24 * 3600 * 1_000_000;
 
-/// What a recorded time became.
+/// Result of a recorded time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Moment {
     /// When it is.
@@ -24,14 +29,14 @@ pub struct Moment {
 /// Follows a recording's clock.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Timeline {
-    /// The latest recorded time of this power-on, and what it became.
+    /// The latest recorded time of this power-on, and its result.
     last: Option<(u64, u64)>,
     restarts: u64,
 }
 
 impl Timeline {
-    /// A clock whose first time is that of the stream: microseconds since a power-on. (One that counts from 1970 is
-    /// made by [`Timeline::from_first`].)
+    /// A clock whose first time is the stream's: microseconds since a power-on. [`Timeline::from_first`]
+    /// makes one for times since 1970.
     pub const fn new() -> Self {
         Self { last: None, restarts: 0 }
     }

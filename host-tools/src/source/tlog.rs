@@ -1,6 +1,6 @@
 //! A ground station's log: eight big-endian bytes of microseconds since 1970, one frame, repeated.
 //!
-//! [`records`] finds the records, [`times`] says what their times tell every command.
+//! [`records`] finds the records; [`times`] makes their times, the same for every command.
 
 pub mod records;
 pub mod times;

@@ -1,4 +1,4 @@
-//! What a log of ours tells besides frames, as far as a command that reads recordings takes it.
+//! Reports of a log of ours besides frames, as far as a command that reads recordings uses them.
 
 use hums_blackbox::Record;
 use hums_blackbox::record::{FindingRecord, Lost, Why};
@@ -27,7 +27,7 @@ pub enum Told {
     Part {
         /// Its place, from 0.
         place: usize,
-        /// What it is.
+        /// The part.
         component: Component,
     },
     /// A check changed its level.
@@ -41,24 +41,24 @@ pub enum Told {
         /// In the check's unit.
         value: f32,
     },
-    /// The log has nothing from here to there.
+    /// The log has a gap between these times.
     Missing {
-        /// The first of what is missing.
+        /// Start of the gap.
         from: Instant,
         /// The last.
         to: Instant,
-        /// Frames that are missing, where it is known how many.
+        /// Number of missing frames, if known.
         frames: u64,
     },
-    /// Nothing told the box how many cells a battery has.
+    /// The box does not know the cell count of a battery.
     CellsUnknown,
-    /// The box knows nothing of earlier flights.
+    /// The box has no data of earlier flights.
     StoreNew,
-    /// What only a monitor writes that checks the vehicle's health: its findings are all that there were.
+    /// A record that only a monitor with health checks writes: its findings are complete.
     Checked,
 }
 
-/// A check's change of level, whoever found it.
+/// A check's change of level, by any finder.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Finding {
     /// When, after the debounce.
@@ -73,9 +73,9 @@ pub struct Finding {
     pub level: Level,
     /// The level before.
     pub previous: Level,
-    /// What decided; NaN where the input stopped.
+    /// The deciding value; NaN if the input stopped.
     pub value: f32,
-    /// What it crossed; NaN where there is none.
+    /// The limit it crossed; NaN without one.
     pub limit: f32,
     /// The unit of both.
     pub unit: String,
@@ -105,13 +105,13 @@ impl From<&FindingRecord<'_>> for Finding {
 }
 
 impl Told {
-    /// What sectors that cannot be read had; `None` where nobody knows from when to when they are.
+    /// The gap of unreadable sectors; `None` if its times are unknown.
     pub fn missing(gap: &Gap) -> Option<Self> {
         let (own, (from, to)) = (gap.own?, gap.from.zip(gap.to)?);
         Some(Self::Missing { from, to, frames: u64::from(own.frames.unwrap_or(0)) })
     }
 
-    /// What a record tells, where it is of use here.
+    /// The report in a record, if it is of use here.
     pub fn of(record: &Record<'_>) -> Option<Self> {
         match record {
             Record::Parameter(parameter) => {

@@ -110,7 +110,8 @@ fn a_clock_that_is_set_back_by_a_second_again_and_again_is_no_damage() {
     assert_eq!((gaps, restarts), (vec![], 4));
 }
 
-/// What a tlog says of its clock: of attitudes at these seconds of the ground station's clock and of the autopilot's.
+/// The report on a tlog's clock, from attitudes at these seconds of the ground station's clock and of the
+/// autopilot's.
 fn clock_of(times: &[(u64, u64)]) -> String {
     let tenths: Vec<(u64, u64)> = times.iter().map(|(recorded, boot)| (recorded * 10, boot * 10)).collect();
     clock_of_tenths(&tenths).0
@@ -169,7 +170,7 @@ fn what_passed_is_told_by_the_autopilot_where_the_ground_stations_clock_is_set()
     let swings: Vec<_> =
         (0..20).flat_map(|turn| part(9_000 + (turn + 1) % 2 * 15, turn * 50, turn * 50 + 50)).collect();
     assert_eq!(clock_of_tenths(&swings), ("restart ".repeat(19), 999));
-    // A link that is silent, and then brings what it held back.
+    // A link that is silent, and then delivers the frames held back.
     let held = (1_500..1_560).map(|boot| (9_000 + 1_560, boot));
     let silent: Vec<_> = part(9_000, 1_000, 1_500).chain(held).chain(part(9_000, 1_560, 2_000)).collect();
     assert_eq!(clock_of_tenths(&silent), (String::new(), 999));
@@ -302,7 +303,7 @@ fn raw_frames_come_when_the_autopilots_messages_say_and_where_none_does_when_a_l
     assert!(times.len() == 3 && times[2] < 20 && restarts == 0, "no autopilot says so: {times:?}");
 }
 
-/// What is missing in raw bytes, and what begins in them.
+/// The gaps in raw bytes, and the power-ons and recordings that begin in them.
 fn told_raw(bytes: Vec<u8>) -> Vec<String> {
     let mut reader = RawReader::new(Input::new(std::io::Cursor::new(bytes)).expect("memory"), 115_200);
     let mut told = Vec::new();

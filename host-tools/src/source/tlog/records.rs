@@ -1,7 +1,7 @@
 //! The records of a tlog.
 //!
-//! Damage is walked over: where no record stands, bytes are skipped up to the next place where one does, and what was
-//! skipped arrives as noise on the line, because nothing that was in the file may vanish unseen.
+//! Damage is walked over: bytes without a record are skipped up to the next record. Skipped bytes arrive as
+//! noise on the line, because no bytes of the file may vanish unseen.
 
 use std::io::{self, Read};
 
@@ -15,7 +15,7 @@ const BUFFER_BYTES: usize = 64 * 1024;
 const RECORD_BYTES: usize = 2 * (TIME_BYTES + FRAME_BYTES_MAX);
 /// Enough to see those after it too that are asked whether its time is right, behind damage as well.
 const AHEAD_BYTES: usize = 256 * 1024;
-/// No record for so long: what follows is no part of the log.
+/// After this many bytes without a record, the rest is not part of the log.
 const NOTHING_BYTES: usize = 64 * 1024;
 
 /// Recorded times before 2000 count from some power-on: they tell no UTC.
@@ -43,7 +43,7 @@ pub struct Records<R> {
     buffer: Vec<u8>,
     at: usize,
     ended: bool,
-    /// How much is kept of what follows.
+    /// Number of following bytes to keep.
     ahead_bytes: usize,
 }
 
@@ -72,7 +72,7 @@ impl<R: Read> Records<R> {
         (times, is_end)
     }
 
-    /// What the first of the next frames tells that tells it, as far as they are here.
+    /// The first result of `told` among the next frames, as far as they are here.
     pub(in crate::source) fn frames_after<T>(&self, mut told: impl FnMut(&[u8]) -> Option<T>) -> Option<T> {
         let mut found = None;
         self.each_after(&mut |_, bytes| {
@@ -115,7 +115,7 @@ impl<R: Read> Records<R> {
         }
         self.buffer.drain(..self.at);
         self.at = 0;
-        // Twice as much: what is left is not moved for each chunk.
+        // Twice as much, so that the rest is not moved for each chunk.
         while self.buffer.len() < 2 * self.ahead_bytes && !self.ended {
             let old = self.buffer.len();
             self.buffer.resize(old + BUFFER_BYTES, 0);
@@ -151,9 +151,9 @@ impl<R: Read> Records<R> {
     }
 }
 
-/// The time and the frame length of the record that begins here. A frame that does not check counts where the record
-/// after it, or the end of the file, stands where it should: that is another definition of the message, not damage. One that
-/// has a whole record in it does not count: its length is damaged, or its end is missing.
+/// Time and frame length of the record that begins here. A frame with a wrong checksum counts if the next
+/// record, or the end of the file, is at its proper place. Then the message has another definition and is not
+/// damaged. A frame with a whole record in it does not count: its length is damaged, or its end is missing.
 fn record_at(bytes: &[u8], ended: bool) -> Option<(u64, usize)> {
     let time_us = u64::from_be_bytes(bytes.get(..TIME_BYTES)?.try_into().ok()?);
     if time_us > TIME_US_MAX {
@@ -170,7 +170,7 @@ fn record_at(bytes: &[u8], ended: bool) -> Option<(u64, usize)> {
     counts.then_some((time_us, length))
 }
 
-/// Whether a record whose frame checks lies behind the first byte of a frame.
+/// Whether a record with a valid frame is after the first byte of a frame.
 fn has_record_in(frame: &[u8]) -> bool {
     (1..frame.len()).any(|at| {
         let record = frame.get(at..).unwrap_or_default();

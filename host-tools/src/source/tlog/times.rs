@@ -1,4 +1,5 @@
-//! The times of a tlog's records: which of them count, what they say of the recording, and whether they are times at all.
+//! The times of a tlog's records: their validity, their meaning for the recording, and whether the clock
+//! works at all.
 //!
 //! Every command that reads a tlog asks here, so that all of them have the same times.
 
@@ -15,15 +16,15 @@ use crate::source::doubt::Ends;
 use crate::source::item::{Cause, Gap};
 use crate::source::pace::{Pace, SLOWER};
 
-/// Microseconds since 1970, by the clock of a ground station, which may be set; a link may be silent for seconds until its last
-/// frames come, and for longer after its first.
+/// Microseconds since 1970, by the clock of a ground station, which may be set. A link may be silent for
+/// seconds before its last frames, and for longer after its first.
 const RULES: Rules = Rules {
     from_first: true,
     old_values: false,
     ends: Ends { steady_us: 10_000_000, seldom_us: 60_000_000 },
 };
 
-/// Times that stand still from the first to the last record are none where there are so many.
+/// Times that stand still from the first to the last record are invalid if there are this many records.
 const STILL_RECORDS: u64 = 100;
 /// By so much the autopilot's clock is ahead until the recorder's does not run: a link that holds frames back makes them late, never early.
 const EARLY_US: i64 = 2_000_000;
@@ -32,8 +33,9 @@ const APART_US: i64 = 60_000_000;
 /// Messages of an autopilot are out of order by so much at most, microseconds.
 const DISORDER_US: i64 = 1_000_000;
 
-/// The recorder's clock beside the autopilot's. A frame is never heard before it is sent: where the recorder's clock stands, or goes on
-/// a hundred times slower (milliseconds as microseconds), what passed is what the autopilot tells.
+/// The recorder's clock beside the autopilot's. A frame is never received before it is sent. So if the
+/// recorder's clock stands still, or goes on a hundred times slower (milliseconds as microseconds), the
+/// autopilot's clock counts.
 #[derive(Clone, Copy, Debug, Default)]
 struct Beside {
     /// Whose: the first system whose autopilot tells its time, that time, and the recording's.
@@ -48,7 +50,7 @@ struct Beside {
 }
 
 impl Beside {
-    /// By how much more the time went on than the recorder's clock, where it does not run.
+    /// Further progress of the time beyond the recorder's clock, while that does not run.
     fn told(&mut self, system: u8, boot_ms: u32, now: Instant, place: u64) -> u64 {
         let (boot_us, now_us) =
             (i64::from(boot_ms) * 1_000, i64::try_from(now.as_micros()).unwrap_or(i64::MAX));
@@ -83,7 +85,7 @@ impl Beside {
         early_us
     }
 
-    /// What is wrong with the recorder's clock.
+    /// Faults of the recorder's clock.
     fn gap(&self) -> Option<Gap> {
         let (at, place) = self.began?;
         let words = format!(
@@ -95,7 +97,7 @@ impl Beside {
     }
 }
 
-/// What begins with a record.
+/// The power-on or recording that begins with a record.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Begins {
     /// The clock: it was set.
@@ -104,10 +106,10 @@ pub enum Begins {
     Recording,
 }
 
-/// What a record's time says.
+/// Meaning of a record's time.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Told {
-    /// What begins with it.
+    /// Whether something begins with it.
     pub begins: Option<Begins>,
     /// UTC at time zero, where that is new: microseconds since 1970.
     pub epoch_us: Option<u64>,
@@ -146,7 +148,7 @@ impl Times {
         self.now
     }
 
-    /// Takes the time of a record with this frame, which stands at this byte.
+    /// Takes the time of a record with this frame, at this byte.
     pub fn take<R: Read>(&mut self, time_us: u64, bytes: &[u8], place: u64, after: &Records<R>) -> Told {
         let (told, is_wrong) = self.time(time_us, place, after);
         if let Peek::Frame(frame) = peek(bytes)
@@ -164,7 +166,7 @@ impl Times {
         told
     }
 
-    /// What a time says, and whether it is wrong.
+    /// Meaning of a time, and whether it is wrong.
     fn time<R: Read>(&mut self, time_us: u64, place: u64, after: &Records<R>) -> (Told, bool) {
         self.records += 1;
         let (before, reached) = (self.clock.recorded_us(), self.now);
@@ -174,7 +176,7 @@ impl Times {
             Ahead { stamps: times.into_iter().map(stamp).collect(), is_end }
         };
         let (joints, stands) = (&self.joints, self.beside.stands);
-        // Where it stood, what passed has been counted.
+        // While the clock stood still, the time passed has been counted.
         let passed = || if stands { Some(1) } else { joints.elapsed_us(before?, time_us, after) };
         let Reading::Sound(moment) = self.clock.take_beside(stamp(time_us), ahead, passed) else {
             self.wrong.add(self.now, place);
@@ -209,7 +211,7 @@ impl Times {
         (Told { begins, epoch_us }, false)
     }
 
-    /// What is wrong with the times, once all were taken: damage.
+    /// Faults of the times, once all were taken: damage.
     pub fn gaps(&self) -> impl Iterator<Item = Gap> {
         self.wrong
             .gap()
@@ -218,7 +220,7 @@ impl Times {
             .chain(self.no_times().or_else(|| self.pace.gap()))
     }
 
-    /// That none of so many frames has a time that can be one.
+    /// The damage report if none of this many frames has a possible time.
     pub fn none_of(&self, frames: u64) -> Option<Gap> {
         let words = format!(
             "{} without a time that can be one: nothing in the log can be judged",
@@ -235,7 +237,7 @@ impl Times {
         })
     }
 
-    /// The recorded times are none.
+    /// The damage report if the recorded times are invalid.
     fn no_times(&self) -> Option<Gap> {
         if self.now != Instant::ZERO || self.records < STILL_RECORDS {
             return None;
