@@ -39,10 +39,10 @@ pub(super) const LABELS: Labels = Labels {
         "frames lost by one of them, at most",
         "frames decoded after them, all correct",
         "damaged pages and ends",
-        "noticed by `verify`",
+        "noticed by `info --verify`",
         "read as the other session, and reported",
         "reported as complete up to the named end mark",
-        "rebuilt from parity without a loss, and noticed by `verify`",
+        "rebuilt from parity without a loss, and noticed by `info --verify`",
         "missed or wrong",
         "frames decoded after these, all correct",
     ],
@@ -104,10 +104,10 @@ fn whole_pages(options: &Options, figures: &mut Figures) -> Result<()> {
         outcomes.iter().map(move |one| &one.tallies[kind].1)
     });
     figures.fact("damaged pages and ends", all.damages);
-    figures.fact("noticed by `verify`", all.noticed);
+    figures.fact("noticed by `info --verify`", all.noticed);
     figures.fact("read as the other session, and reported", all.other);
     figures.fact("reported as complete up to the named end mark", all.told);
-    figures.fact("rebuilt from parity without a loss, and noticed by `verify`", all.repaired);
+    figures.fact("rebuilt from parity without a loss, and noticed by `info --verify`", all.repaired);
     figures.fact("missed or wrong", all.missed);
     figures.fact("frames decoded after these, all correct", all.frames);
     let misses: Vec<_> = outcomes.iter().flat_map(|one| &one.misses).take(10).map(String::as_str).collect();
