@@ -1,4 +1,4 @@
-//! The times of the next messages: what tells whether a jump of the clock is one, or one damaged time.
+//! The times of the next messages: they tell a jump of the clock from a single damaged time.
 
 use std::collections::BTreeMap;
 
@@ -10,34 +10,35 @@ use super::text;
 use crate::source::clock::{self, Stamp};
 use crate::source::doubt::ASKED;
 
-/// Room for more than [`ASKED`] of the longest binary messages, for all definitions, which stand between the first messages of
-/// today, for a second of the oldest logs, in which only GPS messages have times, and for damage.
+/// Size of the look-ahead. It has room for more than [`ASKED`] of the longest binary messages, and for all
+/// definitions, which are among the first messages today. It also has room for damage, and for a second of
+/// the oldest logs, in which only GPS messages have times.
 pub(super) const AHEAD_BYTES: usize = 256 * 1_024;
-/// No message for so long: what follows is erased memory, not part of the log.
+/// After this many bytes without a message, the rest is erased memory, not part of the log.
 const ERASED_BYTES: usize = 4 * 1_024;
 /// Fields of a line that are looked at.
 const VALUES_MAX: usize = 32;
-/// Messages behind a pause that are looked at for arming: all of what a logger begins with, ...
+/// Number of messages after a pause that are searched for arming: all that a logger begins with, ...
 const MESSAGES_MAX: usize = 2_048;
 /// ... within this of the first.
 const ARMS_US: u64 = 1_000_000;
 /// Definitions that are looked at.
 const DEFINED_MAX: usize = 256;
 
-/// What follows a message in the file.
+/// The bytes after a message in the file.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Ahead<'a> {
     /// As much of it as is here: [`AHEAD_BYTES`] or more, if there are so many.
     pub(super) bytes: &'a [u8],
     /// It is a text log.
     pub(super) is_text: bool,
-    /// Nothing follows these bytes.
+    /// The file ends after these bytes.
     pub(super) is_end: bool,
 }
 
 impl Ahead<'_> {
-    /// Whether arming comes next, in a message or in those after it, before any disarming: the vehicle was disarmed until now.
-    /// (Copters of before 2016 log no disarming where they are told to log only while armed.)
+    /// Whether arming comes next, in this message or later ones, before any disarming: then the vehicle was
+    /// disarmed until now. (Copters of before 2016 log no disarming if they log only while armed.)
     pub(super) fn arms(self, message: &Message<'_>, formats: &Formats) -> bool {
         if let Some(arms) = arming(message) {
             return arms;
@@ -88,8 +89,8 @@ fn arming(message: &Message<'_>) -> Option<bool> {
     }
 }
 
-/// Gives messages on until `take` has enough or another log begins; where the last one of those that were looked at ends, and
-/// whether another log begins there. Messages may be defined between them.
+/// Passes on messages until `take` has enough or another log begins. Returns the end of the last one, and
+/// whether another log begins there. Definitions may come in between.
 fn of_bytes(bytes: &[u8], formats: &Formats, take: &mut dyn FnMut(&Message<'_>) -> bool) -> (usize, bool) {
     let (mut at, mut last) = (0, 0);
     let mut defined: BTreeMap<u8, Format> = BTreeMap::new();

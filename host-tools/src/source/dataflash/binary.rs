@@ -1,9 +1,10 @@
-//! The bytes of a binary log as messages: two bytes of head, the type, and as many bytes as FMT said of it.
+//! The messages of a binary log: two bytes of head, the type, and as many bytes as FMT defines for it.
 //!
-//! A message counts where the next one's head, or the end, stands right behind it. Where it does not, bytes were lost
-//! or changed: when a chain of messages begins inside of what should be this message, the message is damaged and the
-//! reading goes on there; otherwise it is whole and what follows it is skipped up to the next chain. What was skipped
-//! is told once, with its place and its size, when a message stands there again.
+//! A message counts if the next head, or the end, is right after it. Otherwise bytes were lost or changed:
+//! - If a chain of messages begins inside of it, it is damaged, and reading goes on at the chain.
+//! - If not, it is whole, and the bytes after it are skipped up to the next chain.
+//!
+//! Skipped bytes are reported once, with place and size, before the next message.
 //!
 //! Memory: one buffer. Time: each byte is looked at a bounded number of times (a message has at most 255).
 
@@ -17,18 +18,18 @@ const HEAD: [u8; 2] = [0xA3, 0x95];
 /// The longest message, and the head of the one after it.
 const LOOKAHEAD_BYTES: usize = 2 * 258;
 
-/// What comes next.
+/// The next piece of a log.
 #[derive(Debug)]
 pub(super) enum Piece<'a> {
-    /// A message: its type, what stands after its header, and where in the file it begins.
+    /// A message: its type, its bytes after the header, and its place in the file.
     Message {
         /// Its type.
         kind: u8,
-        /// What stands after the header.
+        /// The bytes after the header.
         payload: &'a [u8],
         /// Where it begins.
         place: u64,
-        /// What follows it.
+        /// The bytes after it.
         after: Ahead<'a>,
     },
     /// Bytes that could not be read.
@@ -44,7 +45,7 @@ pub(super) struct Damage {
     pub(super) bytes: u64,
     /// Whether the file ends with them.
     pub(super) at_end: bool,
-    /// What they are.
+    /// Their description.
     pub(super) words: String,
 }
 
@@ -55,9 +56,9 @@ struct Skipped {
     bytes: u64,
     /// All of them are this one.
     only: Option<u8>,
-    /// The type of a message that nothing defines, where one began it.
+    /// The type of an undefined message at their beginning.
     undefined: Option<u8>,
-    /// The type of a message that is shorter than it should be, where one began it.
+    /// The type of a shortened message at their beginning.
     cut: Option<u8>,
 }
 
@@ -83,8 +84,8 @@ impl<R: Read> Binary<R> {
         self.buffer.place()
     }
 
-    /// The next message, or what was skipped before it; `None` at the end. `lengths` learns which of two lengths of a
-    /// type is the right one.
+    /// The next message, or the skipped bytes before it; `None` at the end. `lengths` learns the right one of
+    /// a type's two lengths.
     pub(super) fn next(&mut self, lengths: &mut Lengths) -> io::Result<Option<Piece<'_>>> {
         loop {
             self.buffer.fill(LOOKAHEAD_BYTES.max(AHEAD_BYTES))?;
@@ -142,7 +143,7 @@ impl Skipped {
     }
 }
 
-/// The messages of bytes that are all there, one after the other; what cannot be read between them is passed over.
+/// The messages in complete bytes, in order; unreadable bytes between them are passed over.
 pub(super) struct Window<'a> {
     bytes: &'a [u8],
     at: usize,
@@ -154,7 +155,7 @@ impl<'a> Window<'a> {
         Self { bytes, at: 0 }
     }
 
-    /// The next message: its type, what stands after its header, where it begins, and what follows it.
+    /// The next message: its type, its bytes after the header, its place, and the bytes after it.
     pub(super) fn next(&mut self, lengths: &mut Lengths) -> Option<(u8, &'a [u8], usize, Ahead<'a>)> {
         loop {
             let rest = self.bytes.get(self.at..).filter(|rest| !rest.is_empty())?;
@@ -178,11 +179,11 @@ impl<'a> Window<'a> {
 enum Look {
     /// A message of this length begins here.
     Message(usize),
-    /// So many bytes are none.
+    /// This many bytes are not a message.
     Skip { bytes: usize, undefined: Option<u8>, cut: Option<u8> },
 }
 
-/// What begins here.
+/// The piece that begins here.
 fn look(rest: &[u8], ended: bool, lengths: &mut Lengths) -> Look {
     let kind = match rest {
         [a, b, kind, ..] if [*a, *b] == HEAD => *kind,
@@ -216,7 +217,7 @@ fn look(rest: &[u8], ended: bool, lengths: &mut Lengths) -> Look {
     Look::Message(length)
 }
 
-/// Whether a head, or the end, stands behind so many bytes.
+/// Whether a head, or the end, follows after this many bytes.
 fn followed(rest: &[u8], length: usize, ended: bool) -> bool {
     match rest.get(length..) {
         Some([a, b, ..]) => [*a, *b] == HEAD,
@@ -226,7 +227,7 @@ fn followed(rest: &[u8], length: usize, ended: bool) -> bool {
     }
 }
 
-/// How far a search may go: where a message that begins before can be seen whole.
+/// Range of a search: a message that begins in it is completely visible.
 fn searched(rest: &[u8], ended: bool) -> &[u8] {
     let limit = if ended { rest.len() } else { rest.len().saturating_sub(LOOKAHEAD_BYTES / 2).max(1) };
     rest.get(..limit).unwrap_or(rest)

@@ -1,4 +1,4 @@
-//! A file's bytes, some of them at a time: what both forms of a log are read through.
+//! A buffer over a file's bytes, for both forms of a log.
 
 use std::io::{self, Read};
 
@@ -6,14 +6,14 @@ use crate::source::stream::read_some;
 
 /// Read at once: pages that are touched for the first time cost a small log more than its messages.
 const CHUNK_BYTES: usize = 64 * 1024;
-/// Where less is wanted, so much more is read: what is left is not moved for each chunk.
+/// Number of bytes read beyond a smaller request, so that the rest is not moved for each chunk.
 const MORE_BYTES: usize = 256 * 1024;
 
-/// The part of a file that is read, and where in it the reading stands.
+/// The buffered part of a file, and the place of reading.
 pub(super) struct Buffer<R> {
     input: R,
     bytes: Vec<u8>,
-    /// Where in the buffer the reading stands.
+    /// Place of reading in the buffer.
     at: usize,
     /// Where in the file the buffer begins.
     base: u64,
@@ -36,12 +36,12 @@ impl<R: Read> Buffer<R> {
         self.base + self.at as u64
     }
 
-    /// Whether nothing follows what is here.
+    /// Whether the file ends after the buffer.
     pub(super) const fn ended(&self) -> bool {
         self.ended
     }
 
-    /// What is here and not read yet.
+    /// The bytes here that are still to be read.
     pub(super) fn rest(&self) -> &[u8] {
         self.bytes.get(self.at..).unwrap_or_default()
     }
@@ -51,7 +51,7 @@ impl<R: Read> Buffer<R> {
         self.take_before(bytes).0
     }
 
-    /// The next bytes, which are read then, and what is here of those after them.
+    /// Takes the next bytes; also returns the bytes here after them.
     pub(super) fn take_before(&mut self, bytes: usize) -> (&[u8], &[u8]) {
         let start = self.at;
         self.at += bytes;

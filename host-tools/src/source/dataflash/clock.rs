@@ -1,8 +1,8 @@
-//! When a message was written, from what it says of it.
+//! The time of a message.
 //!
-//! Logs of today tell microseconds since power-on in every message, those of before 2015 milliseconds in most, and the
-//! oldest (`ArduCopter` 2.9 and 3.0) only in GPS messages, as the receiver's time of the week. A message without a time
-//! counts as written with the one before it, and one with a wrong time too.
+//! Logs of today have microseconds since power-on in every message. Those of before 2015 have milliseconds in
+//! most. The oldest (`ArduCopter` 2.9 and 3.0) have only the receiver's time of the week, in GPS messages. A
+//! message without a time, or with a wrong one, gets the time of the message before it.
 
 use hums_core::clock::{Instant, Span};
 
@@ -13,14 +13,14 @@ use super::stamp::{Week, stamp, week_us};
 use crate::source::clock::{self, Reading, Rules};
 use crate::source::doubt::Ends;
 
-/// A log that is only written while armed does have pauses of any length. What is written after them again and again is a
-/// state or a saved parameter, every 30 s.
+/// A log that is only written while armed has pauses of any length. After a pause, repeated messages are
+/// states or saved parameters, every 30 s.
 const RULES: Rules = Rules {
     from_first: false,
     old_values: false,
     ends: Ends { steady_us: 1_000_000, seldom_us: 3_600_000_000 },
 };
-/// Nothing is written for this long only where the logger pauses or fails: something of every log comes at 5 Hz.
+/// A silence of this length means that the logger pauses or fails: every log has a message at 5 Hz.
 const SILENCE: Span = Span::from_secs(1);
 
 /// Follows the clock of a log.
@@ -29,7 +29,7 @@ pub(super) struct Clock {
     times: clock::Clock,
     /// The first time of the week, where that is the log's only clock.
     week_first_us: Option<u64>,
-    /// When nothing had been written for a while before the message at hand: since when.
+    /// Start of a silence before the present message.
     silence: Option<Instant>,
 }
 
@@ -40,18 +40,18 @@ pub(super) struct When {
     pub(super) at: Instant,
     /// Another power-on begins with it.
     pub(super) restarted: bool,
-    /// Microseconds since power-on as the message says; `None` where it says nothing.
+    /// Microseconds since power-on in the message; `None` without a time.
     pub(super) boot_us: Option<u64>,
-    /// What its own time is worth.
+    /// Validity of its own time.
     pub(super) own: Own,
-    /// The clock stands still, as messages of this type tell it.
+    /// The clock stands still, by the messages of this type.
     pub(super) stands: bool,
 }
 
-/// What a message's own time is worth.
+/// Validity of a message's own time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Own {
-    /// It has none.
+    /// No time.
     None,
     /// It counts.
     Sound,
@@ -79,12 +79,12 @@ impl Clock {
         }
     }
 
-    /// Whether a message has told a time.
+    /// Whether a message with a time has come.
     pub(super) const fn has_begun(&self) -> bool {
         self.times.has_begun()
     }
 
-    /// Since when nothing had been written before the message at hand, where that was for long; asked for once.
+    /// Start of a long silence before the present message; taken once.
     pub(super) fn silence(&mut self) -> Option<Instant> {
         self.silence.take()
     }
@@ -94,7 +94,7 @@ impl Clock {
         self.times.now()
     }
 
-    /// When a message was written; `ahead` is what follows it in the file.
+    /// The time of a message; `ahead` are the bytes after it in the file.
     pub(super) fn at(&mut self, message: &Message<'_>, ahead: Ahead<'_>, formats: &Formats) -> When {
         let boot_us = message.time_us();
         if boot_us.is_none()
@@ -119,7 +119,7 @@ impl Clock {
         When { at: self.now(), restarted: false, boot_us, own, stands: false }
     }
 
-    /// How times of the week are told.
+    /// Conversion of times of the week.
     fn week(&self) -> Week {
         Week::new(self.week_first_us, self.times.recorded_us().unwrap_or(0))
     }

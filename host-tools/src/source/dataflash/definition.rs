@@ -1,4 +1,4 @@
-//! What an FMT message defines.
+//! The definition in an FMT message.
 
 use super::format::{FMT_TYPE, Format, Role};
 use super::message::Message;
@@ -6,7 +6,7 @@ use super::message::Message;
 /// The columns of a message have 64 characters at most in a binary log; a text log may have been made of several.
 const DEFINITION_CHARACTERS_MAX: usize = 256;
 
-/// What a message defines, where it is an FMT.
+/// The definition in a message, if it is an FMT.
 pub(super) fn definition(message: &Message<'_>) -> Option<Format> {
     let format = message.format();
     if format.role != Role::Fmt {

@@ -1,19 +1,19 @@
 //! The date: UTC at the log's time zero, which the autopilot's GPS tells again and again.
 
-/// UTC is said again where it differs by more than the receiver's delay.
+/// A new UTC is reported if it differs by more than the receiver's delay.
 const DIFFERS_US: u64 = 1_500_000;
 
 /// The UTC of time zero, as the GPS tells it.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Epoch {
     known_us: Option<u64>,
-    /// Another one that was told last.
+    /// The last different value.
     other_us: Option<u64>,
 }
 
 impl Epoch {
-    /// Takes what was told; gives what is new. Once one is known, another one counts when it is told twice: one damaged bit
-    /// moves the date by years.
+    /// Takes a value; returns it if it is new. A different value counts only when it comes twice: one damaged
+    /// bit moves the date by years.
     pub(super) fn take(&mut self, epoch_us: u64) -> Option<u64> {
         let is_near = |other: Option<u64>| other.is_some_and(|other| other.abs_diff(epoch_us) < DIFFERS_US);
         if is_near(self.known_us) {

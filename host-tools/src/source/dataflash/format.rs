@@ -1,5 +1,5 @@
-//! What a message looks like: FMT defines a type's name, length, columns and their format characters; UNIT, MULT and
-//! FMTU say in which units its numbers are. `LogStructure.h` of `ArduPilot` is the description of both.
+//! The form of messages: FMT defines a type's name, length, columns and their format characters; UNIT, MULT
+//! and FMTU give the units of its numbers. `LogStructure.h` of `ArduPilot` describes both.
 
 use std::sync::Arc;
 
@@ -134,7 +134,7 @@ pub(super) struct Field {
     pub(super) name: String,
     /// How it is read.
     pub(super) kind: FieldKind,
-    /// Where it stands after the header.
+    /// Offset after the header.
     pub(super) offset: usize,
 }
 
@@ -151,7 +151,7 @@ pub(super) struct Format {
     pub(super) fields: Vec<Field>,
     /// The length that the fields make, with the header, where that is another one.
     pub(super) fields_length: Option<u8>,
-    /// What of it cannot be read, and why, until it was told.
+    /// Its unreadable parts and the reason, until reported.
     odd: Option<String>,
     /// Whether all of its format characters are known.
     is_known: bool,
@@ -167,7 +167,7 @@ pub(super) struct Format {
     pub(super) role: Role,
 }
 
-/// What a message is for.
+/// The purpose of a message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Role {
     /// It defines a message.
@@ -178,7 +178,7 @@ pub(super) enum Role {
     Unit,
     /// It defines a multiplier.
     Mult,
-    /// It defines nothing.
+    /// Not a definition.
     Other,
 }
 
@@ -283,7 +283,7 @@ fn time_field(name: &str, fields: &[Field]) -> Option<TimeField> {
     if name.starts_with("GPS") { at("T", &millis) } else { at("TimeMS", &millis) }.map(TimeField::Millis)
 }
 
-/// What FMTU says of one type.
+/// Units of one type from FMTU.
 #[derive(Clone, Debug, Default)]
 struct Units {
     units: Vec<u8>,
@@ -293,12 +293,12 @@ struct Units {
 /// Everything that a file has defined so far.
 pub(super) struct Formats {
     by_kind: Vec<Option<Box<Format>>>,
-    /// Lengths with the header by type; 0 where there is no definition.
+    /// Lengths with the header by type; 0 without a definition.
     pub(super) lengths: Lengths,
     units: Vec<Option<Units>>,
     unit_names: Vec<Option<String>>,
     multipliers: Vec<Option<f64>>,
-    /// Whether any message tells the time since power-on: the oldest logs have only that of the GPS receiver.
+    /// Whether any message has the time since power-on: the oldest logs have only the GPS receiver's time.
     pub(super) has_boot_clock: bool,
     /// The type that was defined last.
     newest: Option<u8>,
@@ -307,13 +307,13 @@ pub(super) struct Formats {
 /// Lengths of the types, as a scanner needs them.
 #[derive(Clone, Debug)]
 pub(super) struct Lengths {
-    /// As FMT says; 0 where there is no definition that can be followed.
+    /// From FMT; 0 without a usable definition.
     pub(super) told: [u8; 256],
     /// As the fields say, where that differs; 0 otherwise.
     pub(super) fields: [u8; 256],
 }
 
-/// What became of a definition.
+/// Result of a definition.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum Defined {
     /// It is new, or a change.
@@ -325,7 +325,7 @@ pub(super) enum Defined {
 }
 
 impl Formats {
-    /// Nothing is defined but FMT.
+    /// Only FMT is defined.
     pub(super) fn new() -> Self {
         let mut by_kind: Vec<Option<Box<Format>>> = Vec::new();
         by_kind.resize_with(256, || None);
@@ -348,7 +348,7 @@ impl Formats {
         self.by_kind.get(usize::from(kind))?.as_deref()
     }
 
-    /// What was defined last.
+    /// The last definition.
     pub(super) fn newest(&self) -> Option<&Format> {
         self.get(self.newest?)
     }
@@ -359,7 +359,7 @@ impl Formats {
         Self { units, unit_names, multipliers, has_boot_clock, ..Self::new() }
     }
 
-    /// Takes a definition. That of FMT itself stands.
+    /// Takes a definition. FMT itself stays as it is.
     pub(super) fn define(&mut self, format: Format) -> Defined {
         let place = usize::from(format.kind);
         if format.kind == FMT_TYPE {
@@ -380,12 +380,12 @@ impl Formats {
         Defined::New
     }
 
-    /// Whether nothing is wrong with a definition but its length, which says nothing of a text log's lines.
+    /// Whether only the length of a definition is wrong, which does not matter for a text log's lines.
     pub(super) fn is_only_long(&self, kind: u8) -> bool {
         self.get(kind).is_some_and(|format| format.is_known && !format.lacks_names)
     }
 
-    /// What is wrong with a definition, once.
+    /// The fault of a definition, once.
     pub(super) fn take_odd(&mut self, kind: u8) -> Option<String> {
         self.by_kind.get_mut(usize::from(kind))?.as_deref_mut()?.odd.take()
     }
@@ -411,7 +411,7 @@ impl Formats {
         }
     }
 
-    /// The unit of a column's values as they are read; empty where the file says nothing.
+    /// The unit of a column's values as read; empty if the file has none.
     fn unit(&self, kind: u8, column: usize, field: FieldKind) -> String {
         let known = || {
             let units = self.units.get(usize::from(kind))?.as_ref()?;
@@ -446,7 +446,7 @@ fn unnamed(name: &str, named: usize, characters: usize) -> String {
     format!("FMT names {named} of the {characters} columns of {name}: those without a name are not read")
 }
 
-/// What of a message cannot be read.
+/// The unreadable part of a message.
 fn odd(name: &str, length: u8, unknown: Option<char>, fields: usize) -> Option<String> {
     if let Some(character) = unknown {
         return Some(format!(
@@ -463,7 +463,7 @@ fn odd(name: &str, length: u8, unknown: Option<char>, fields: usize) -> Option<S
     Some(format!("FMT says that {name} has {length} bytes, and its columns make {fields}: {so}"))
 }
 
-/// A unit's name with its multiplier as a prefix. `!` and `/` are what hours have been made of.
+/// A unit's name with its multiplier as a prefix. `!` and `/` stand for a factor to hours.
 fn unit_of(name: &str, factor: Option<f64>) -> String {
     if matches!(name, "" | "UNKNOWN" | "instance") {
         return String::new();

@@ -13,12 +13,12 @@ pub(super) struct Message<'a> {
     body: Body<'a>,
 }
 
-/// What a message says.
+/// Content of a message.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Body<'a> {
-    /// What stands after the header.
+    /// The bytes after the header.
     Bytes(&'a [u8]),
-    /// What stands between the commas, as many as there are.
+    /// The words between the commas.
     Words(&'a [&'a str]),
 }
 
@@ -28,7 +28,7 @@ impl<'a> Message<'a> {
         Self { format, body }
     }
 
-    /// What it looks like.
+    /// Its format.
     pub(super) const fn format(&self) -> &'a Format {
         self.format
     }
@@ -37,7 +37,7 @@ impl<'a> Message<'a> {
         self.format.fields.get(column)
     }
 
-    /// A number, scaled as its format character says; `None` for what is no finite number.
+    /// A number, scaled by its format character; `None` if it is not finite.
     pub(super) fn number(&self, column: usize) -> Option<f64> {
         self.any_number(column).filter(|number| number.is_finite())
     }
@@ -62,7 +62,7 @@ impl<'a> Message<'a> {
         Some(single).filter(|single| single.is_finite())
     }
 
-    /// What stands in the place of a number in a text log and is none.
+    /// A word in the place of a number in a text log.
     pub(super) fn no_number(&self, column: usize) -> Option<&'a str> {
         match self.body {
             Body::Bytes(_) => None,
@@ -70,7 +70,7 @@ impl<'a> Message<'a> {
         }
     }
 
-    /// Whether it stands in a text log.
+    /// Whether it is from a text log.
     pub(super) const fn is_words(&self) -> bool {
         matches!(self.body, Body::Words(_))
     }
@@ -133,7 +133,7 @@ impl<'a> Message<'a> {
         }
     }
 
-    /// Words. What is no UTF-8 is read as ISO 8859-1, as `pymavlink` does.
+    /// A text. Invalid UTF-8 is read as ISO 8859-1, as in `pymavlink`.
     pub(super) fn text(&self, column: usize) -> Option<Cow<'a, str>> {
         let field = self.field(column)?;
         match self.body {

@@ -1,12 +1,12 @@
 //! `ArduPilot`'s onboard logs (`DataFlash`), binary (`.bin`) and text (`.log`), of 2012 until today.
 //!
-//! A log describes itself: FMT messages define the others, and FMTU, UNIT and MULT tell their units. `format` keeps the
-//! definitions, `binary` and `text` find the messages, `message` reads their values, `clock` their times, and
-//! `observe` makes of them what the same autopilot says by MAVLink. The reading streams: it keeps one buffer, the
-//! definitions (256 at most at a time) and what a vehicle's state needs, whatever the file says.
+//! A log describes itself: FMT messages define the others, and FMTU, UNIT and MULT give their units. `format`
+//! keeps the definitions, `binary` and `text` find the messages, `message` reads their values, `clock` their
+//! times. `observe` turns them into the MAVLink reports of the same autopilot. Reading streams: for any file
+//! it keeps one buffer, the definitions (256 at most at a time) and the vehicle's state.
 //!
-//! The first part of a file is looked through before it is read: the units of a message may be told after its first
-//! rows, and what vehicle it is after its first observations.
+//! The first part of a file is searched before it is read. Units may come after a message's first rows, and
+//! the kind of vehicle after its first observations.
 
 mod ahead;
 mod binary;
@@ -39,7 +39,7 @@ use self::text::{Line, Lines};
 use super::input::Input;
 use super::item::{Cause, Reader, Summary, Take, Want};
 
-/// The first part of a file, which is looked through before it is read: a log of today writes its definitions and
+/// The first part of a file, which is searched before it is read. A log of today writes its definitions and
 /// parameters, 100 KiB, within its first second, among up to 1 MiB of other messages.
 const FIRST_BYTES: usize = 2 * 1024 * 1024;
 /// How much of a file is searched for its first definition.
@@ -77,8 +77,9 @@ pub fn detect(start: &[u8]) -> Option<Form> {
     }
 }
 
-/// Whether these first bytes of a file are of a binary log whose own beginning is gone: messages stand everywhere in it, and
-/// hardly any of the MAVLink frames that a recorded download of such a log is made of (90 bytes of it in each).
+/// Whether these first bytes are of a binary log without its own beginning. Messages are everywhere in it,
+/// and hardly any MAVLink frames. A recorded download of such a log consists of frames (90 bytes of the log
+/// in each).
 pub fn is_headless(start: &[u8], frames: usize) -> bool {
     /// No message is longer; by chance two such bytes stand in 64 KiB once.
     const MESSAGE_BYTES: usize = 256;
@@ -110,7 +111,8 @@ impl Reader for DataFlash {
 /// Names of a text log at most: a file may define them for ever.
 const NAMES_MAX: usize = 4_096;
 const CONTEXT: &str = "the log cannot be read on";
-/// A text log begins with a banner, or the menu of an old console, which is no damage of a log that it was joined to.
+/// A text log begins with a banner, or the menu of an old console. That is not damage of a log before it in
+/// the same file.
 const BANNER_BYTES_MAX: u64 = 4_096;
 const ODD_LINE: &str = "a line with bytes that are no text";
 const CUT_LINE: &str = "a line that the beginning of another log cuts off";
@@ -163,7 +165,7 @@ fn text(input: impl std::io::Read, want: Want<'_>, take: &mut Take<'_>) -> Resul
     let mut skipped: Option<Skipped> = None;
     while let Some(line) = lines.next().context(CONTEXT)? {
         if let Some(at) = text::beginning(&line.words).filter(|_| session.is_timed()) {
-            // What stands right before it is its banner, or the end of a line of the log before.
+            // The words right before it are its banner, or the end of a line of the log before.
             let (place, cut) = (line.place, at as u64);
             if cut > 0 {
                 session.gap(Cause::Cut, Some(place), cut, CUT_LINE.to_owned(), take)?;
@@ -250,7 +252,7 @@ fn first_of_lines(lines: &mut Lines<impl std::io::Read>) -> Result<First> {
     Ok(first)
 }
 
-/// What follows a line.
+/// The bytes after a line.
 fn ahead_of<'a>(line: &Line<'a>) -> Ahead<'a> {
     Ahead { bytes: line.after, is_text: true, is_end: line.is_end }
 }
@@ -259,7 +261,7 @@ fn ahead_of<'a>(line: &Line<'a>) -> Ahead<'a> {
 fn values_of<'a>(line: &'a Line<'_>, kind: u8, formats: &format::Formats) -> Vec<&'a str> {
     let Some(format) = formats.get(kind) else { return Vec::new() };
     let mut values = text::values(&line.words, format.fields.len());
-    // What is behind the last column is told, and not read.
+    // Values after the last column are reported, and not read.
     if let Some(last) = values.last_mut().filter(|_| !format.ends_in_text()) {
         *last = last.split(',').next().unwrap_or_default();
     }
@@ -280,14 +282,14 @@ struct Skipped {
 #[derive(Default)]
 struct Kinds {
     by_name: HashMap<String, u8>,
-    /// Definitions have begun: what stands before them is a banner.
+    /// Definitions have begun: earlier lines are a banner.
     begun: bool,
-    /// Types of which a line with too many values was told.
+    /// Types with a reported line of too many values.
     surplus: BTreeSet<u8>,
 }
 
 impl Kinds {
-    /// The type of a line; `None` for an empty one and for a banner, an error where it is none.
+    /// The type of a line; `None` for an empty one and for a banner, an error for an invalid line.
     fn of(&mut self, line: &Line<'_>, formats: &format::Formats) -> Result<Option<u8>, String> {
         let name = text::name(&line.words);
         if name == "FMT" {
@@ -311,7 +313,7 @@ impl Kinds {
         Ok(Some(kind))
     }
 
-    /// What is wrong with a line that has more values than its type has columns; once for each type.
+    /// The fault of a line with more values than its type has columns; once for each type.
     fn surplus(&mut self, line: &Line<'_>, kind: u8, formats: &format::Formats) -> Option<String> {
         let format = formats.get(kind).filter(|format| !format.ends_in_text())?;
         let (columns, found) = (format.characters.max(format.fields.len()), line.words.matches(',').count());

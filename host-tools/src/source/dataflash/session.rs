@@ -1,4 +1,4 @@
-//! One reading of a log, message by message: definitions are kept, times made, and what is wanted handed on.
+//! One reading of a log, message by message: keeps definitions, makes times, and hands on the wanted items.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -27,22 +27,22 @@ use crate::source::pace::Pace;
 /// The autopilot: every log is of one.
 const SOURCE: Source = Source { system: 1, component: 1 };
 
-/// Logs that were joined in one file at most: what comes after them counts as of the last one.
+/// Maximum number of joined logs in a file: messages after these count as the last one's.
 const JOINTS_MAX: u32 = 1_000;
 
-/// What the first part of a file tells of all of it.
+/// Facts about the whole file from its first part.
 pub(super) struct First {
     formats: Formats,
     state: State,
     clock: Clock,
     handlers: Handlers,
-    /// Of each type, whether the next messages tell nothing of all of the file either.
+    /// For each type, whether the next messages have no facts about the whole file either.
     idle: Vec<bool>,
     /// The first time that a message tells.
     begins_us: Option<u64>,
     /// A message that has a time has come.
     timed: bool,
-    /// The firmware, where a text log names it before its first message.
+    /// The firmware, if a text log names it before its first message.
     banner: Option<String>,
 }
 
@@ -66,7 +66,7 @@ impl First {
         &mut self.formats.lengths
     }
 
-    /// Takes a line that stands before the first message.
+    /// Takes a line before the first message.
     pub(super) fn banner(&mut self, words: &str) {
         let words = words.trim();
         if self.banner.is_none() && self.state.is_firmware(words) {
@@ -140,7 +140,7 @@ fn defined_by(formats: &Formats, kind: u8, body: Body<'_>) -> Option<(u8, String
     Some((of, formats.get(of).map(|format| format.name.clone()).unwrap_or_default()))
 }
 
-/// Takes a definition, and tells what is odd with it.
+/// Takes a definition, and reports its faults.
 fn define(formats: &mut Formats, kind: u8, body: Body<'_>) -> Option<Defined> {
     let format = formats.get(kind)?;
     let message = Message::new(format, body);
@@ -185,8 +185,7 @@ pub(super) struct Session<'w> {
     epoch: Epoch,
     firmware: String,
     rows_refused: bool,
-    /// What messages with a doubted time, or with none, have changed: it holds from the next message on whose time is
-    /// known.
+    /// Changes by messages without a certain time: they hold from the next message with a certain time on.
     later: Option<Standing>,
     wrong: Wrong,
     pace: Pace,
@@ -236,7 +235,7 @@ impl<'w> Session<'w> {
         self.timed && self.joints < JOINTS_MAX
     }
 
-    /// Another log begins, of which this much is known: nothing of the one before holds.
+    /// Another log begins, with these facts: all earlier state is void.
     pub(super) fn begin_another(&mut self, first: First, take: &mut Take<'_>) -> Result<()> {
         self.count_by_name();
         let First { formats, state, begins_us, banner, .. } = first;
@@ -353,8 +352,8 @@ impl<'w> Session<'w> {
         }
     }
 
-    /// What cannot be read of the messages of a type is told when the first of them comes: autopilots define messages
-    /// wrongly that they never write.
+    /// Reports the unreadable parts of a type at its first message: autopilots have wrong definitions of
+    /// messages that they never write.
     fn tell_odd(&mut self, kind: u8, place: u64, take: &mut Take<'_>) -> Result<()> {
         match self.formats.take_odd(kind) {
             Some(words) => self.gap(Cause::Damaged, Some(place), 0, words, take),
@@ -374,7 +373,7 @@ impl<'w> Session<'w> {
         }
     }
 
-    /// Hands on what a message says, and what the autopilot says again and again.
+    /// Hands on a message's reports, and the autopilot's periodic reports.
     fn say(
         &mut self,
         (kind, body): (u8, Body<'_>),
@@ -394,7 +393,7 @@ impl<'w> Session<'w> {
             if let Some(week_us) = receiver_us(&message) {
                 pace.witness(when.at, week_us);
             }
-            // Parameters come all at once; what is measured does not.
+            // Parameters come all at once; measurements do not.
             if when.stands && handlers.of(format).is_some_and(|resolved| !resolved.handler.is_said) {
                 pace.stood(when.at, place);
             }
@@ -483,7 +482,7 @@ impl<'w> Session<'w> {
         Some(table)
     }
 
-    /// Rows of a name that is defined anew again and again are told to be missing, once.
+    /// Reports once that the rows of a name with too many definitions are left out.
     fn refuse_rows(&mut self, kind: u8, take: &mut Take<'_>) -> Result<()> {
         if std::mem::replace(&mut self.rows_refused, true) {
             return Ok(());
@@ -507,13 +506,13 @@ impl<'w> Session<'w> {
         take(now, Item::Gap(&Gap { from, to: None, cause, place, bytes, words, own: None }))
     }
 
-    /// What was read.
+    /// Totals of the reading.
     pub(super) fn end(mut self, take: &mut Take<'_>) -> Result<Summary> {
         for gap in self.pace.gaps(&self.wrong) {
             take(self.clock.now(), Item::Gap(&gap))?;
         }
         let messages: u64 = self.counts.iter().map(|(count, _)| count).sum();
-        // The clock follows only what is wanted.
+        // The clock follows only the wanted messages.
         let has_time = |(kind, (count, _)): (u8, &(u64, u64))| {
             self.formats.get(kind).filter(|_| *count > 0).is_some_and(tells_time)
         };
@@ -542,7 +541,7 @@ fn add(counts: &mut BTreeMap<String, (u64, u64)>, name: String, (count, bytes): 
     sum.1 += bytes;
 }
 
-/// Hands on what handlers say, as items.
+/// Hands on the outputs of handlers, as items.
 struct Said<'a, 't> {
     at: Instant,
     observations: bool,

@@ -1,4 +1,4 @@
-//! What a message tells of the time.
+//! The time in a message.
 
 use super::format::Formats;
 use super::message::Message;
@@ -30,7 +30,7 @@ impl Week {
     }
 }
 
-/// What a message tells of the time, which says itself that it is so long after power-on, microseconds.
+/// The time in a message that reports this time since power-on, microseconds.
 pub(super) fn stamp(
     message: &Message<'_>,
     boot_us: Option<u64>,
@@ -41,7 +41,7 @@ pub(super) fn stamp(
     Some(Stamp { us, series: usize::from(message.format().kind) })
 }
 
-/// A GPS message's time of the week, where the log has no other clock.
+/// A GPS message's time of the week, if the log has no other clock.
 pub(super) fn week_us(message: &Message<'_>, formats: &Formats) -> Option<u64> {
     let format = message.format();
     if formats.has_boot_clock || format.name != "GPS" {

@@ -17,7 +17,7 @@ const TABLES_MAX: usize = 1_024;
 #[derive(Debug, Default)]
 pub(super) struct Tables {
     by_name: BTreeMap<String, Vec<Arc<Table>>>,
-    /// The names that they have: those of two messages may be one, where only letters and digits are left of them.
+    /// Their names. Two messages may get the same name, if only letters and digits are kept.
     taken: BTreeSet<String>,
 }
 
@@ -43,7 +43,7 @@ impl Tables {
     }
 }
 
-/// What is safe in a file's name.
+/// The characters that are safe in a file's name.
 pub(super) fn safe(name: &str) -> String {
     let safe = |character: char| {
         let keeps = character.is_ascii_alphanumeric() || matches!(character, '_' | '-');

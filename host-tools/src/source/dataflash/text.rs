@@ -1,6 +1,7 @@
 //! The lines of a text log: `NAME, value, value`. FMT lines define the others as in a binary log.
 //!
-//! What stands before the first FMT (a banner, the menu of an old console) is no damage. A line is at most 64 KiB.
+//! Lines before the first FMT (a banner, the menu of an old console) are not damage. A line is at most 64
+//! KiB.
 
 use std::borrow::Cow;
 use std::io::{self, Read};
@@ -16,18 +17,18 @@ pub(super) struct Line<'a> {
     pub(super) place: u64,
     /// Its bytes in the file, with its end.
     pub(super) bytes: u64,
-    /// What stands in it. What is no UTF-8 is read as ISO 8859-1.
+    /// Its text. Invalid UTF-8 is read as ISO 8859-1.
     pub(super) words: Cow<'a, str>,
-    /// It has an end; only the last one may have none.
+    /// It has a line end; only the last one may have none.
     pub(super) whole: bool,
-    /// What is here of the bytes after it.
+    /// The bytes here after it.
     pub(super) after: &'a [u8],
-    /// Nothing follows these.
+    /// The file ends after these.
     pub(super) is_end: bool,
 }
 
 impl Line<'_> {
-    /// Whether it holds bytes that no text log has: what is no UTF-8, and characters of control.
+    /// Whether it holds bytes that do not occur in text logs: invalid UTF-8 and control characters.
     pub(super) fn is_odd(&self) -> bool {
         let is_text = |byte: u8| byte == b'\t' || !byte.is_ascii_control();
         matches!(self.words, Cow::Owned(_)) || !self.words.bytes().all(is_text)
@@ -71,7 +72,7 @@ impl<R: Read> Lines<R> {
     }
 }
 
-/// The values of a line behind its name: as many as there are columns. What is in the last column may have commas.
+/// The values of a line after its name: as many as there are columns. The last column may contain commas.
 pub(super) fn values(line: &str, columns: usize) -> Vec<&str> {
     match line.split_once(',') {
         Some((_, rest)) if columns > 0 => rest.splitn(columns, ',').collect(),
@@ -79,7 +80,8 @@ pub(super) fn values(line: &str, columns: usize) -> Vec<&str> {
     }
 }
 
-/// Where a log begins in a line: FMT defines itself. (What stands before it is the end of a log that another was joined to.)
+/// The place in a line at which a log begins: FMT defines itself. (The text before it is the end of another
+/// log in the same file.)
 pub(super) fn beginning(line: &str) -> Option<usize> {
     line.find("FMT, 128, 89, FMT")
 }

@@ -3,7 +3,7 @@
 use super::format::{Layout, Number};
 use super::message::words;
 
-/// Where a field that the mapping needs is in the data of a message.
+/// Place of a field for the mapping in a message's data.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Slot {
     number: Number,
@@ -74,7 +74,7 @@ impl<'a> Fields<'a> {
         self.count(field).and_then(|value| u8::try_from(value).ok())
     }
 
-    /// Whether a flag is set; `false` where there is none.
+    /// Whether a flag is set; `false` without one.
     pub(super) fn flag(&self, field: usize) -> bool {
         self.get(field).is_some_and(|value| value != 0.0)
     }

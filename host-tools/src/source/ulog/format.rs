@@ -1,9 +1,9 @@
-//! Format definitions, and what they make of the bytes of a message.
+//! Format definitions, and the layouts of messages that follow from them.
 //!
-//! A definition (`vehicle_attitude:uint64_t timestamp;float[4] q;`) may name other definitions as types of its fields,
-//! also such that come after it. [`Formats::layout`] resolves one to its numbers: a flat list of fields, each with its
-//! place. The limits are there because a file may say anything: a definition that names itself, a thousand that name
-//! each other, an array of four billion. What PX4 logs stays far below each.
+//! A definition (`vehicle_attitude:uint64_t timestamp;float[4] q;`) may name other definitions as types of
+//! its fields, also later ones. [`Formats::layout`] resolves one to its numbers: a flat list of fields, each
+//! with its place. The limits guard against hostile files: a definition that names itself, a thousand that
+//! name each other, an array of four billion. PX4's own logs stay far below each.
 
 use std::collections::HashMap;
 use std::fmt;
@@ -72,9 +72,9 @@ pub(super) struct Field {
     /// Its name with those of the definitions around it: `esc[3].esc_rpm`.
     pub(super) name: String,
     pub(super) number: Number,
-    /// How many, where it is an array.
+    /// Number of elements of an array.
     pub(super) array: Option<u32>,
-    /// Where it begins in the message's data.
+    /// Offset in the message's data.
     pub(super) offset: u32,
 }
 
@@ -101,7 +101,7 @@ pub(super) enum FormatError {
     TooMany,
     /// It is there already, and says something else.
     Redefined(String),
-    /// There is none of this name.
+    /// No definition has this name.
     Unknown(String),
     /// Definitions that name each other deeper than [`DEPTH_MAX`], or in a circle.
     TooDeep(String),
@@ -153,7 +153,7 @@ impl Default for Formats {
 }
 
 impl Formats {
-    /// Takes a definition. The same one again is no harm.
+    /// Takes a definition. The same one again is harmless.
     pub(super) fn define(&mut self, text: &[u8]) -> Result<(), FormatError> {
         let (name, fields) = parse(text).ok_or(FormatError::Malformed)?;
         if let Some(known) = self.written.get(name) {
@@ -164,7 +164,7 @@ impl Formats {
             return Err(FormatError::TooMany);
         }
         self.written.insert(name.to_owned(), fields);
-        // What was not there may be there now.
+        // A definition that was missing may be there now.
         self.layouts.retain(|_, layout| layout.is_ok());
         Ok(())
     }
@@ -175,7 +175,7 @@ impl Formats {
             return known.clone();
         }
         let layout = self.resolve(name);
-        // Names of the world that resolve to nothing are not kept: there may be 65,536 of them.
+        // Results for names without a definition are not kept: there may be 65,536 of them.
         if self.written.contains_key(name) {
             self.layouts.insert(name.to_owned(), layout.clone());
         }
@@ -185,7 +185,7 @@ impl Formats {
     fn resolve(&mut self, name: &str) -> Result<Arc<Layout>, FormatError> {
         let mut walk = Walk { formats: self, fields: Vec::new(), bytes: 0, left: self.left };
         let result = walk.definition(name, "", 0);
-        // What it took counts whether it came to something or not.
+        // The effort counts even without a result.
         let Walk { fields, bytes, left, .. } = walk;
         self.left = left;
         result?;
@@ -282,7 +282,7 @@ fn parse(text: &[u8]) -> Option<(&str, Vec<Written>)> {
     (!written.is_empty()).then_some((name, written))
 }
 
-/// An array has an element at least: one without would make a definition of nothing.
+/// An array has at least one element: an empty one would make an empty definition.
 fn written(field: &str) -> Option<Written> {
     let (kind, name) = typed(field)?;
     let (kind, array) = kind;

@@ -1,9 +1,9 @@
-//! Messages: three bytes of header (length, kind), and what follows.
+//! Messages: three bytes of header (length, kind), and a body.
 //!
-//! `ULog` has no checksum, so a message is believed by what it says: each kind has lengths and contents that it can have,
-//! and where those leave room for doubt, the header after it has to be one as well ([`Parser::look`]). Where nothing can be
-//! believed, the next place is searched at which a message can ([`Parser::find`]): the synchronisation message that the logger
-//! writes twice a second is one of them.
+//! `ULog` has no checksum, so a message counts by its content. Each kind has possible lengths and contents.
+//! If those leave doubt, the next header must be valid as well ([`Parser::look`]). After damage the next
+//! possible message is searched ([`Parser::find`]), such as the synchronisation message that the logger
+//! writes twice a second.
 
 use super::format::{Number, typed_key};
 
@@ -15,19 +15,20 @@ pub(super) const MESSAGE_BYTES_MAX: usize = HEADER_BYTES + u16::MAX as usize;
 pub(super) const FILE_HEADER_BYTES: usize = 16;
 /// How a file begins.
 pub(super) const MAGIC: [u8; 7] = [b'U', b'L', b'o', b'g', 0x01, 0x12, 0x35];
-/// Where the header has the version of the format, and the newest one that is known: PX4 writes 1, and wrote 0 before v1.8.
+/// Place of the format's version in the header, and the newest known version: PX4 writes 1, and wrote 0
+/// before v1.8.
 pub(super) const VERSION_AT: usize = MAGIC.len();
 pub(super) const VERSION_MAX: u8 = 1;
-/// The longest message other than data that is looked for in damage: each byte may be the beginning of one, and to look
-/// through 65,536 bytes for each would take seconds a megabyte.
+/// The longest message other than data in a search after damage. Each byte may begin one, and checking 65,536
+/// bytes for each would take seconds a megabyte.
 const FOUND_BYTES_MAX: usize = 2_048;
-/// What a synchronisation message holds.
+/// Content of a synchronisation message.
 const SYNC: [u8; 8] = [0x2f, 0x73, 0x13, 0x20, 0x25, 0x0c, 0xbb, 0x12];
 
-/// A message, as it stands in the input.
+/// A message in the input.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Message<'a> {
-    /// `B`: what a reader must know, and where more was appended.
+    /// `B`: flags for the reader, and places of appended data.
     Flags { incompatible: [u8; 8], appended: [u64; 3] },
     /// `F`
     Format(&'a [u8]),
@@ -104,28 +105,28 @@ impl<'a> Keyed<'a> {
     }
 }
 
-/// The text at the beginning of some bytes: up to the first NUL or the first byte that is no UTF-8.
+/// The text at the beginning of some bytes: up to the first NUL or the first invalid UTF-8 byte.
 pub(super) fn words(bytes: &[u8]) -> &str {
     let bytes = bytes.split(|&byte| byte == 0).next().unwrap_or_default();
     bytes.utf8_chunks().next().map_or("", |chunk| chunk.valid())
 }
 
-/// What stands at the beginning of some bytes.
+/// The piece at the beginning of some bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Found<'a> {
     /// A message, and its bytes with the header.
     Message(Message<'a>, usize),
     /// The input ends within a message.
     Cut,
-    /// Nothing that can be believed.
+    /// No valid message.
     Nothing,
 }
 
-/// Whether messages of data have the length that their subscription says: `Some(true)` or `Some(false)`; `None` where
-/// there is no such subscription.
+/// Whether messages of data have the length of their subscription: `Some(true)` or `Some(false)`; `None`
+/// without such a subscription.
 pub(super) type Fits<'a> = dyn Fn(u16, usize) -> Option<bool> + 'a;
 
-/// Tells messages from what is none.
+/// Tells messages from other bytes.
 pub(super) struct Parser<'a> {
     pub(super) fits: &'a Fits<'a>,
 }
@@ -141,8 +142,8 @@ enum Belief<'a> {
 }
 
 impl Parser<'_> {
-    /// What stands at the beginning of `rest`, which is all there is if it is shorter than the longest message and the
-    /// header after it.
+    /// The piece at the beginning of `rest`. If `rest` is shorter than the longest message and the next
+    /// header, it is the end of the input.
     pub(super) fn look<'a>(&self, rest: &'a [u8]) -> Found<'a> {
         if let Some((version, time_us)) = beginning(rest) {
             return Found::Message(Message::Beginning { version, time_us }, FILE_HEADER_BYTES);
@@ -167,8 +168,8 @@ impl Parser<'_> {
         }
     }
 
-    /// Where in `rest`, from `from` on, the next message begins that can be believed. `Err` is how many bytes are certain
-    /// to begin none: all, if `rest` is the last there is, or else all but the longest message.
+    /// Place in `rest` of the next valid message, from `from` on. `Err` is the number of bytes that certainly
+    /// begin none. At the end of the input (`last`) these are all, or else all but the longest message.
     pub(super) fn find(&self, rest: &[u8], from: usize, last: bool) -> Result<usize, usize> {
         let end = if last { rest.len() } else { rest.len().saturating_sub(MESSAGE_BYTES_MAX + HEADER_BYTES) };
         (from..end).find(|&at| self.begins(rest.get(at..).unwrap_or_default())).ok_or(end)
@@ -193,7 +194,7 @@ impl Parser<'_> {
         }
     }
 
-    /// Whether a message, the header of one, or nothing at all stands here.
+    /// Whether a message, a header, or the end is here.
     fn goes_on(&self, rest: &[u8]) -> bool {
         if rest.is_empty() || beginning(rest).is_some() {
             return true;
@@ -300,14 +301,14 @@ fn could_be(kind: u8, bytes: usize) -> bool {
     }
 }
 
-/// Kind, and length of what follows.
+/// Kind, and length of the body.
 fn header(rest: &[u8]) -> Option<(u8, usize)> {
     let &[low, high, kind] = rest.first_chunk::<HEADER_BYTES>()?;
     Some((kind, usize::from(u16::from_le_bytes([low, high]))))
 }
 
-/// The messages of data at the beginning of some bytes, with the numbers of their subscriptions, as far as each message
-/// follows the one before it.
+/// The messages of data at the beginning of some bytes, with the numbers of their subscriptions, until
+/// another message comes.
 pub(super) const fn data_after(bytes: &[u8]) -> DataAfter<'_> {
     DataAfter { rest: bytes }
 }
@@ -332,7 +333,7 @@ impl<'a> Iterator for DataAfter<'a> {
     }
 }
 
-/// The time in the header of a file, where one stands.
+/// Version and time in the header of a file, if it is here.
 pub(super) fn beginning(rest: &[u8]) -> Option<(u8, u64)> {
     let header = rest.first_chunk::<FILE_HEADER_BYTES>()?;
     header.starts_with(&MAGIC).then(|| (header[VERSION_AT], word(header.get(8..))))

@@ -1,6 +1,6 @@
-//! The log's own rows: every field of every message under its own name, with the unit where it is known.
+//! The log's own rows: every field of every message under its own name, with the unit if known.
 //!
-//! `ULog` says no units. PX4's names end in them (`voltage_v`, `vel_m_s`), which is what `unit` goes by.
+//! `ULog` has no units. PX4's names end in them (`voltage_v`, `vel_m_s`), and `unit` uses that.
 
 use super::format::{Field, Layout, Number};
 use super::message::words;
@@ -31,15 +31,15 @@ pub(super) fn columns(layout: &Layout) -> usize {
     1 + layout.fields.iter().map(|field| elements(field).unwrap_or(1) as usize).sum::<usize>()
 }
 
-/// Names of tables that are no topic's.
+/// Names of tables other than topics.
 pub(super) const DEFAULTS: &str = "default_parameters";
 pub(super) const INFORMATION: &str = "information";
 pub(super) const PARAMETERS: &str = "parameters";
 pub(super) const TEXTS: &str = "logged_messages";
 const OWN: [&str; 4] = [DEFAULTS, INFORMATION, PARAMETERS, TEXTS];
 
-/// Its name: the topic's, without what a file's name cannot have. No topic of PX4's has a name of those that are no topic's,
-/// or that are ours; one that does is told apart from them.
+/// Its name: the topic's, without characters that are invalid in file names. A topic with one of our own
+/// table names gets a prefix; PX4 has none.
 pub(super) fn table_name(layout: &Layout) -> String {
     let name = layout.name.replace('/', "_");
     let is_taken =
@@ -67,7 +67,7 @@ pub(super) fn values<'a>(layout: &Layout, instance: u8, data: &'a [u8]) -> Vec<V
     values
 }
 
-/// How many columns an array has; `None` for what is none, or is a text.
+/// Number of columns of an array; `None` for a single value or a text.
 fn elements(field: &Field) -> Option<u32> {
     field.array.filter(|_| field.number != Number::Char)
 }
@@ -153,7 +153,7 @@ const NAMED: [(&str, &str); 14] = [
     ("voltage5V_v", "V"),
 ];
 
-/// The unit of a field; empty where none is known.
+/// The unit of a field; empty if unknown.
 pub(super) fn unit(name: &str) -> &'static str {
     let name = name.rsplit_once('.').map_or(name, |(_, last)| last);
     let named = NAMED.iter().find(|(known, _)| *known == name);

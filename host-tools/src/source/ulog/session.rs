@@ -1,4 +1,4 @@
-//! One pass over a log: message by message, from the header to the last of what was appended.
+//! One pass over a log: message by message, from the header to the last appended data.
 
 use std::collections::BTreeMap;
 use std::io::Read;
@@ -26,12 +26,12 @@ use crate::source::item::{
 };
 use crate::source::pace::Pace;
 
-/// An event that is older than this when it comes tells of what was before the log.
+/// An event older than this when it comes is from before the log.
 const OLD_US: u64 = 1_000_000;
 
-/// What a look needs to see: the longest message, and what follows it.
+/// Bytes needed for a look: the longest message, and the look-ahead.
 const LOOK_BYTES: usize = MESSAGE_BYTES_MAX + times::AHEAD_BYTES;
-/// What a search for the next message needs to see.
+/// Bytes needed for a search for the next message.
 const FIND_BYTES: usize = LOOK_BYTES + 64 * 1024;
 /// The incompatible flag that is known: data was appended.
 const APPENDED: [u8; 8] = [1, 0, 0, 0, 0, 0, 0, 0];
@@ -106,7 +106,7 @@ fn damage<R: Read>(window: &mut Window<R>, session: &mut Session<'_, '_>, cut: b
     session.gap(cause, Some(place), bytes, words)
 }
 
-/// What is known while a log is read.
+/// State of a reading.
 struct Session<'a, 'b> {
     want: Want<'a>,
     take: &'a mut Take<'b>,
@@ -119,11 +119,11 @@ struct Session<'a, 'b> {
     told_facts: bool,
     /// Where data was appended and not yet reached, the first one first.
     appended: Vec<u64>,
-    /// Where the log at hand begins in the file.
+    /// Place of the present log in the file.
     base: u64,
     /// Messages of data whose subscription is not known, and where the first one is.
     strays: (u64, u64),
-    /// The words that were told last: a topic and a logged string may have the same.
+    /// The last text reported: a topic and a logged string may have the same.
     last_words: String,
     wrong: Wrong,
     /// Bytes that may be looked at for further jumps of the time.
@@ -174,7 +174,7 @@ impl<'a, 'b> Session<'a, 'b> {
         rest.get(..bytes).unwrap_or(rest)
     }
 
-    /// Goes on to what was appended; `false` where nothing was, or the input ends.
+    /// Goes on to appended data; `false` without any, or at the end of the input.
     fn next_part(&mut self, ended: bool) -> bool {
         if ended || self.appended.is_empty() {
             return false;
@@ -257,7 +257,7 @@ impl<'a, 'b> Session<'a, 'b> {
         }
     }
 
-    /// A newer format may mean something else by what is read as this one: that is told as damage of the log's beginning.
+    /// A newer format may give these data another meaning: reported as damage of the log's beginning.
     fn version(&mut self, beginning: u64, version: u8) -> Result<()> {
         if version <= VERSION_MAX {
             return Ok(());
@@ -268,7 +268,7 @@ impl<'a, 'b> Session<'a, 'b> {
         self.gap(Cause::Damaged, Some(beginning + VERSION_AT as u64), 1, words)
     }
 
-    /// Flags that nobody knows change what follows: the format says that a reader must refuse them.
+    /// Unknown flags change the meaning of the rest: by the format a reader must refuse them.
     fn flags(&mut self, place: u64, incompatible: [u8; 8], appended: [u64; 3]) -> Result<()> {
         let unknown: Vec<String> = incompatible
             .iter()
@@ -437,7 +437,7 @@ impl<'a, 'b> Session<'a, 'b> {
         again
     }
 
-    /// What the mapping has made.
+    /// Hands on the outputs of the mapping.
     fn hand_on(&mut self) -> Result<()> {
         if self.px4.told.is_empty() {
             return Ok(());
@@ -521,7 +521,7 @@ impl<'a, 'b> Session<'a, 'b> {
         self.tell(Item::Gap(&gap))
     }
 
-    /// Another log was joined on: nothing of the first one holds.
+    /// Another log was joined on: all earlier state is void.
     fn another(&mut self, place: u64, time_us: u64, after: &[u8]) -> Result<()> {
         self.tell_facts()?;
         self.formats = Formats::default();
@@ -536,7 +536,7 @@ impl<'a, 'b> Session<'a, 'b> {
         self.tell(Item::Joint)
     }
 
-    /// Who made the log, once all of it has been told.
+    /// The maker of the log, once all about it has come.
     fn tell_facts(&mut self) -> Result<()> {
         if std::mem::replace(&mut self.told_facts, true) {
             return Ok(());
@@ -578,7 +578,7 @@ fn version(release: u32) -> String {
     format!("{major}.{minor}.{patch}{kind}")
 }
 
-/// What is in a log besides topics, as rows.
+/// Contents of a log besides topics, as rows.
 struct OwnTables {
     defaults: Option<Arc<Table>>,
     information: Option<Arc<Table>>,
@@ -613,7 +613,7 @@ impl OwnTables {
     }
 }
 
-/// Words without the module that they come from, which stands before them in brackets.
+/// A text without its module, which is in front of it in brackets.
 fn without_module(words: &str) -> &str {
     words.strip_prefix('[').and_then(|words| words.split_once("] ")).map_or(words, |(_, words)| words)
 }

@@ -1,4 +1,4 @@
-//! A small writer of `ULog`, for tests: what it writes is what the format's description says.
+//! A small writer of `ULog`, for tests, by the format's description.
 
 use hums_core::clock::Instant;
 
@@ -83,7 +83,7 @@ impl Writer {
     }
 }
 
-/// What came out of a log, in words: easy to compare, easy to read when it differs.
+/// The items of a log as texts: easy to compare, easy to read if they differ.
 #[derive(Debug, Default)]
 pub(super) struct Read {
     pub(super) items: Vec<(u64, String)>,
@@ -92,7 +92,7 @@ pub(super) struct Read {
 }
 
 impl Read {
-    /// The items that begin with this word.
+    /// The items of this kind.
     pub(super) fn of(&self, kind: &str) -> Vec<&str> {
         self.items.iter().filter_map(|(_, item)| item.strip_prefix(kind)).map(str::trim_start).collect()
     }
@@ -103,7 +103,7 @@ pub(super) fn read(bytes: &[u8]) -> Read {
     try_read(bytes).expect("a ULog")
 }
 
-/// Reads what may be a log. Times never fall.
+/// Reads bytes that may be a log. Times never fall.
 pub(super) fn try_read(bytes: &[u8]) -> anyhow::Result<Read> {
     let mut read = Read::default();
     let mut last = Instant::ZERO;

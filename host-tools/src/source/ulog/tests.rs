@@ -211,7 +211,7 @@ fn data_that_was_appended_to_a_log_that_ends_in_the_middle_of_a_message_is_read(
     assert_eq!(read.of("gap"), ["Cut a message that the end cuts off"]);
 }
 
-/// What is read at once, and the longest message, end near there.
+/// A read chunk and the longest message end near there.
 #[test]
 fn a_log_that_is_cut_near_any_multiple_of_64_kib_says_so_unless_it_is_cut_between_two_messages() {
     const SEAM: usize = 64 * 1024;
@@ -439,7 +439,7 @@ fn no_flipped_bit_costs_more_than_its_neighbours() {
 
 #[test]
 fn lies_of_any_kind_take_neither_a_panic_nor_memory() {
-    // Each byte of the definitions, set to what hurts.
+    // Each byte of the definitions, set to harmful values.
     let log = small().bytes;
     for at in 0..log.len().min(420) {
         for value in [0, 1, 0x20, 0x3a, 0x5b, 0x7f, 0x80, 0xff] {
@@ -500,7 +500,7 @@ fn a_clock_that_stands_or_runs_backwards_is_told_in_a_log_of_any_size() {
     assert_eq!(gaps(&|_| 2 * SECOND), [Cause::NoTimes]);
     assert_eq!(gaps(&|number| 900 * SECOND - number * 100_000), [Cause::NoTimes]);
     assert_eq!(gaps(&|number| 2 * SECOND + number.min(250) * 10_000), [Cause::NoTimes]);
-    // Set back by less than a second, which is no jump.
+    // Set back by less than a second, which is not a jump.
     let set = |number: u64| 2 * SECOND + number * 2_500 - if number < 100 { 0 } else { 900_000 };
     assert_eq!(gaps(&set), []);
 }

@@ -1,4 +1,4 @@
-//! The times of messages, and those that follow them in the file: what tells a wrong one.
+//! The times of messages, and of those after them in the file, which show a wrong time.
 
 use std::io::Read;
 
@@ -14,9 +14,10 @@ pub(super) const RULES: Rules =
     Rules { from_first: false, old_values: true, ends: Ends { steady_us: 1_000_000, seldom_us: 10_000_000 } };
 /// How much of a log is looked at for the first messages of data: definitions come before them, 100 to 200 KiB.
 const FIRST_BYTES: usize = 512 * 1024;
-/// How much of what follows a jump of the time is looked at, damage too.
+/// Number of bytes after a jump of the time that are looked at, damage too.
 pub(super) const AHEAD_BYTES: usize = 256 * 1024;
-/// No message for so long: what follows is erased memory, not part of the log. Longer than any message.
+/// After this many bytes without a message, the rest is erased memory, not part of the log. Longer than any
+/// message.
 const NOTHING_BYTES: usize = 2 * MESSAGE_BYTES_MAX;
 /// Bytes that are looked at for all jumps of a file together: each of a hostile one could ask for all that there may be.
 pub(super) const ASKED_BYTES: usize = 64 * 1024 * 1024;
@@ -35,8 +36,9 @@ pub(super) const fn of_text(us: u64) -> Stamp {
     Stamp { us, series: TEXTS }
 }
 
-/// The next times that are asked for; what is damaged between them is passed over. A topic with the time zero tells none.
-/// (There are [`AHEAD_BYTES`] and the longest message, or `after` is all that there is.) So many bytes may be `left` to look at.
+/// The next times as witnesses; damage between them is passed over. A topic with the time zero has none.
+/// `after` has [`AHEAD_BYTES`] and the longest message, or the rest of the file. At most `left` bytes are
+/// looked at.
 pub(super) fn ahead(
     subscriptions: &Subscriptions,
     after: &[u8],
@@ -78,8 +80,8 @@ pub(super) fn ahead(
     Ahead { is_end: stamps.len() < ASKED && messages < MESSAGES_MAX && (is_all || nothing), stamps }
 }
 
-/// The times of the first messages of data in these bytes, as many as tell when a log began. (The time stands first in each
-/// topic of PX4.)
+/// The times of the first messages of data in these bytes, as many as needed for the log's start. (The time
+/// is first in each topic of PX4.)
 pub(super) fn first(bytes: &[u8]) -> Vec<u64> {
     let time = |(_, data): (u16, &[u8])| data.first_chunk().map(|time| u64::from_le_bytes(*time));
     let messages: DataAfter<'_> = data_after(bytes);

@@ -1,4 +1,4 @@
-//! Subscriptions: which topic a message of data is of, and what is to be done with it.
+//! Subscriptions: the topic of a message of data, and its use.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -25,7 +25,7 @@ const OTHERS: &str = "others";
 pub(super) struct Subscription {
     pub(super) layout: Arc<Layout>,
     pub(super) instance: u8,
-    /// What becomes observations, and where its fields are.
+    /// The mapping to observations, and the places of its fields.
     pub(super) topic: Option<(&'static Topic, Vec<Option<Slot>>)>,
     /// Where rows are wanted.
     pub(super) table: Option<Arc<Table>>,
@@ -36,14 +36,14 @@ pub(super) struct Subscription {
 }
 
 impl Subscription {
-    /// Counts a message; its time, where it has one.
+    /// Counts a message; returns its time, if any.
     pub(super) fn take(&mut self, data: &[u8], message_bytes: usize) -> Option<u64> {
         self.count += 1;
         self.bytes += message_bytes as u64;
         self.time(data)
     }
 
-    /// The time of a message, where it has one.
+    /// The time of a message, if any.
     fn time(&self, data: &[u8]) -> Option<u64> {
         let at = self.layout.timestamp? as usize;
         Some(u64::from_le_bytes(*data.get(at..)?.first_chunk()?))
@@ -74,7 +74,7 @@ impl Subscriptions {
         self.numbered.get_mut(usize::from(id))?.as_deref_mut()
     }
 
-    /// The time of a message of data, where it is known.
+    /// The time of a message of data, if known.
     pub(super) fn time(&self, id: u16, data: &[u8]) -> Option<u64> {
         self.numbered.get(usize::from(id))?.as_ref()?.time(data)
     }
@@ -84,7 +84,7 @@ impl Subscriptions {
         Some(&self.numbered.get(id)?.as_ref()?.layout.name)
     }
 
-    /// What does not fit, as the end of a sentence.
+    /// Adds a subscription. The error is a misfit, as the end of a sentence.
     pub(super) fn add(
         &mut self,
         id: u16,
@@ -166,7 +166,7 @@ impl Subscriptions {
         self.living = 0;
     }
 
-    /// What there was, by name.
+    /// Counts of messages by name.
     pub(super) fn counts(mut self) -> Vec<MessageCount> {
         self.clear();
         let of = |(name, (count, bytes))| MessageCount { id: None, name, amount: Amount { count, bytes } };

@@ -1,4 +1,4 @@
-//! A window that moves over the input: what is parsed lies in one piece, and memory does not grow with the input.
+//! A window that moves over the input: parsed bytes are contiguous, and memory does not grow with the input.
 
 use std::io::{self, Read};
 
@@ -8,13 +8,13 @@ use super::super::stream::read_some;
 /// moved. Pages that are touched for the first time cost a small log more than its messages.
 const READ_BYTES: usize = 128 * 1024;
 
-/// Part of the input, and where it lies.
+/// Part of the input, and its place.
 pub(super) struct Window<R> {
     input: R,
     buffer: Vec<u8>,
-    /// Where the rest begins in the buffer.
+    /// Place of the rest in the buffer.
     at: usize,
-    /// Where the rest begins in the input.
+    /// Place of the rest in the input.
     place: u64,
     ended: bool,
     /// Why the input ended too early: a compressed stream that is damaged, a disk that fails.
@@ -26,12 +26,12 @@ impl<R: Read> Window<R> {
         Self { input, buffer: Vec::new(), at: 0, place: 0, ended: false, trouble: None }
     }
 
-    /// What has been read and not yet consumed.
+    /// Bytes read and not yet consumed.
     pub(super) fn rest(&self) -> &[u8] {
         self.buffer.get(self.at..).unwrap_or_default()
     }
 
-    /// Where the rest begins in the input.
+    /// Place of the rest in the input.
     pub(super) fn place(&self) -> u64 {
         self.place
     }
@@ -41,7 +41,7 @@ impl<R: Read> Window<R> {
         self.ended
     }
 
-    /// What ended the input before its end, once.
+    /// The error that ended the input before its end, once.
     pub(super) fn take_trouble(&mut self) -> Option<io::Error> {
         self.trouble.take()
     }

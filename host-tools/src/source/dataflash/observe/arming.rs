@@ -1,8 +1,8 @@
-//! Whether motors may turn: by what the log says of it, and by what the vehicle does where the log says nothing.
+//! The arming state: from the log's messages, or else from the vehicle's motion.
 //!
-//! Logs of today tell arming by ARM, EV and MSG. Those of planes and rovers before 2015 do not tell it at all, and what
-//! flies must have been armed: a throttle above idle, or the speed of a plane that flies, is evidence. The first message
-//! about arming ends the guessing.
+//! Logs of today report arming by ARM, EV and MSG. Those of planes and rovers before 2015 do not report it at
+//! all, and a flying vehicle must have been armed. Evidence is a throttle above idle, or the speed of a
+//! flying plane. The first message about arming ends the guessing.
 
 use hums_core::clock::{Instant, Span};
 
@@ -39,19 +39,19 @@ impl Word {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Arming {
     armed: Option<bool>,
-    /// What the first message about it said.
+    /// State in the first message about arming.
     first_told: Option<bool>,
     /// Since when and until when the evidence has lasted.
     evidence: Option<(Instant, Instant)>,
 }
 
 impl Arming {
-    /// Whether it is armed; `None` where nobody knows.
+    /// Whether it is armed; `None` if unknown.
     pub(super) const fn armed(&self) -> Option<bool> {
         self.armed
     }
 
-    /// What the first message about it said.
+    /// State in the first message about arming.
     pub(super) const fn first_told(&self) -> Option<bool> {
         self.first_told
     }
@@ -76,7 +76,7 @@ impl Arming {
         self.armed = Some(armed);
     }
 
-    /// What the vehicle does at this time is evidence that it is armed, or none. It counts where no message has told.
+    /// Evidence of arming from the vehicle's motion at this time. It counts until a message reports arming.
     pub(super) fn evidence(&mut self, at: Instant, runs: bool) {
         if self.first_told.is_some() {
             return;

@@ -1,4 +1,4 @@
-//! One message's way to what it says: which columns it has, and their values.
+//! From one message to its observations: its columns, and their values.
 
 use hums_core::clock::Instant;
 
@@ -13,13 +13,13 @@ const SLOTS_MAX: usize = 16;
 /// The column of each slot; `None` where the file does not have it.
 pub(in crate::source::dataflash) type Slots = [Option<u8>; SLOTS_MAX];
 
-/// What is to be done with a message.
+/// The handler of a message.
 pub(in crate::source::dataflash) struct Handler {
     /// The names of the message, each with the number of the sensor that it is of: `IMU2` is the second.
     pub(super) names: &'static [(&'static str, u8)],
     /// The columns: for each slot the labels that it has had.
     pub(super) columns: &'static [&'static [&'static str]],
-    /// Whether it tells what the log is of: the first part of a file is looked through for these.
+    /// Whether it reports a fact about the whole log: the first part of a file is searched for these.
     pub(in crate::source::dataflash) is_fact: bool,
     /// Whether it is needed also where no observations are wanted.
     pub(in crate::source::dataflash) is_said: bool,
@@ -53,7 +53,7 @@ pub(super) struct Given<'a> {
     pub(super) base: u8,
     /// When it was written.
     pub(super) at: Instant,
-    /// Microseconds since power-on, where the log tells them.
+    /// Microseconds since power-on, if the log has them.
     pub(super) boot_us: Option<u64>,
 }
 
@@ -72,7 +72,7 @@ impl Given<'_> {
         self.message.single(self.column(slot)?)
     }
 
-    /// Numbers of slots that follow each other, all or none.
+    /// Numbers of consecutive slots, all or none.
     pub(super) fn singles<const N: usize>(&self, first: usize) -> Option<[f32; N]> {
         let mut numbers = [0.0; N];
         for (offset, number) in numbers.iter_mut().enumerate() {

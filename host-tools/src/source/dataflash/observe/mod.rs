@@ -1,9 +1,10 @@
-//! From `ArduPilot`'s messages to observations in SI units: what the same autopilot would have said by MAVLink.
+//! From `ArduPilot`'s messages to observations in SI units, equal to the MAVLink reports of the same
+//! autopilot.
 //!
-//! Each message that says something has a [`Handler`]: its names, the columns that it reads (with the labels that they
-//! had in other versions), and one function. Which columns a file has is found out once, when FMT defines the message.
-//! Sources: `LogStructure.h` of `ArduPilot`'s libraries and vehicles for the messages, `GCS_Common.cpp` and
-//! `AP_NavEKF3_Outputs.cpp` for what MAVLink makes of the same figures.
+//! Each useful message has a [`Handler`]: its names, its columns (with their labels in other versions), and
+//! one function. The columns of a file are found once, when FMT defines the message. Sources:
+//! `LogStructure.h` of `ArduPilot`'s libraries and vehicles for the messages; `GCS_Common.cpp` and
+//! `AP_NavEKF3_Outputs.cpp` for the MAVLink form of the same values.
 
 mod arming;
 mod handler;
@@ -54,12 +55,12 @@ pub(super) struct Handlers {
     by_kind: Vec<Looked>,
 }
 
-/// What was found for a type.
+/// The handler found for a type.
 #[derive(Clone, Copy, Debug)]
 enum Looked {
-    /// Nothing was looked for since its definition.
+    /// Not searched since its definition.
     NotYet,
-    /// It has none.
+    /// There is none.
     Nothing,
     /// It has this one.
     Found(Resolved),

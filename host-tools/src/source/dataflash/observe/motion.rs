@@ -1,4 +1,4 @@
-//! Where the vehicle is, how it moves and how well it knows.
+//! Position, motion, and their accuracy.
 
 use std::num::NonZeroU32;
 
@@ -29,13 +29,14 @@ const FIX_2D: u8 = 2;
 const FIX_3D: u8 = 3;
 /// A week of the receiver's time.
 const WEEK_MS: u64 = 7 * 86_400_000;
-/// What belongs together in one of MAVLink's messages was logged within this.
+/// Maximum age difference of log values in one MAVLink message.
 const TOGETHER: Span = Span::from_secs(2);
-/// A shock's specific force is greater than this: below the least limit of one, and above what nearly all flights have.
+/// The specific force of a shock is greater than this: below the lowest limit of a shock, and above the
+/// forces of nearly all flights.
 const SHOCK_MIN: f32 = 2.0 * GRAVITY;
 /// Sensors that feel the same shock say so within this.
 const AT_ONCE: Span = Span::from_millis(100);
-/// An angle that is further round than this is none, whatever the file says.
+/// Angles beyond this are invalid.
 const TURN_DEG: f32 = 360.0;
 /// Rates go with an attitude within this.
 const RATES_AGE: Span = Span::from_millis(500);
@@ -204,8 +205,8 @@ fn attitude(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
     out.observe(&Observation::Attitude(Attitude { roll, pitch, yaw, rates, boot_ms: boot_ms(given) }));
 }
 
-/// Where the log has no place of the estimator that flies, it has none of the second one either: what stands for the first is then the
-/// receiver's.
+/// If the log has no position of the estimator in use, the second estimator's does not count either: the
+/// first one's place then holds the receiver's position.
 fn second_estimate(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
     let angles =
         given.singles(0).filter(|angles: &[f32; 3]| angles.iter().all(|angle| angle.abs() <= TURN_DEG));
@@ -224,8 +225,8 @@ fn signed(yaw_deg: f32) -> f32 {
     (yaw_deg + 180.0).rem_euclid(360.0) - 180.0
 }
 
-/// The body's rates and those that are wanted, of one moment: degrees a second, until 3.3 hundredths of them (`Log_Write_Rate` of
-/// `ArduCopter`). Where the version does not tell, the gyro does.
+/// The body's rates and their setpoints at one moment: degrees a second, until 3.3 hundredths of them
+/// (`Log_Write_Rate` of `ArduCopter`). If the version is unknown, the gyro decides.
 fn rates(state: &mut State, given: &Given<'_>, _: &mut Out<'_>) {
     let Some(rates) = given.singles::<6>(0) else { return };
     let [_, _, _, flown @ ..] = rates;
@@ -255,7 +256,7 @@ fn imu(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
         acceleration.map(|axes| norm(axes.map(|axis| axis.0))).filter(|force| *force > SHOCK_MIN)
     {
         let other = state.shaken.replace((instance, given.at));
-        // One sensor alone that says so may be broken. What the first one measures is looked at as it is.
+        // A single such sensor may be broken. The first one's values are judged as they are.
         let agrees = other.is_some_and(|(by, at)| by != instance && given.at.since(at) <= AT_ONCE);
         if instance > 0 && agrees {
             out.observe(&Observation::Shock(MetresPerSecond2(force)));
@@ -289,7 +290,7 @@ fn gnss(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
         instance,
         fix,
         satellites: given.byte(2),
-        // 99.99 is what a receiver says that does not know.
+        // 99.99 means unknown.
         hdop: given.single(3).filter(|hdop| *hdop > 0.0 && *hdop < 99.0),
         accuracy,
         position: position.filter(|_| has_position),
@@ -439,7 +440,7 @@ fn position(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
     }));
 }
 
-/// Where home is. The estimator's own origin (type 0) is none.
+/// Home position. The estimator's own origin (type 0) does not count.
 fn origin(state: &mut State, given: &Given<'_>, _: &mut Out<'_>) {
     const HOME: u64 = 1;
     if given.unsigned(0) == Some(HOME) {
@@ -489,7 +490,7 @@ fn estimator(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
         let glitching = if status & STATUS_GPS_GLITCHING == 0 { 0 } else { GPS_GLITCHING };
         (status & SAME_BITS) as u16 | glitching
     });
-    // Before the filter runs it says zeros, which are no variances.
+    // Before the filter runs it reports zeros, which are not variances.
     let runs = status.is_none_or(|status| status & SAME_BITS != 0);
     let known = |slot: usize| given.single(slot).filter(|value| *value >= 0.0 && runs);
     out.observe(&Observation::Estimator(Estimator {
@@ -523,7 +524,7 @@ fn vibration(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
 }
 
 fn hud(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
-    // A copter's climb rates are in cm/s in CTUN; a plane's CTUN has none.
+    // A copter's CTUN has climb rates in cm/s; a plane's has none.
     let rate =
         |slot| given.single(slot).map(|climb| if given.is_integer(slot) { climb / 100.0 } else { climb });
     let climb = rate(1);

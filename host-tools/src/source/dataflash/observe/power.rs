@@ -85,7 +85,7 @@ fn hundredths(given: &Given<'_>, slot: usize) -> Option<f32> {
 
 fn battery(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
     let id = given.instance(0);
-    // Nothing runs from 0 V: that is a monitor that is off.
+    // 0 V means that the monitor is off.
     let Some(volts) = hundredths(given, 1).filter(|volts| *volts > 0.0) else { return };
     let current = hundredths(given, 2);
     let consumed_mah = given.single(3);
@@ -118,7 +118,7 @@ fn battery(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
     }));
 }
 
-/// `RemPct` came with 4.1; before, what the autopilot itself worked it out from (`AP_BattMonitor_Backend`).
+/// `RemPct` came with 4.1; before that, the autopilot's own formula (`AP_BattMonitor_Backend`).
 fn remaining(state: &State, given: &Given<'_>, id: u8, consumed_mah: Option<f32>) -> Option<f32> {
     if let Some(percent) = given.single(6) {
         // -1, as an unsigned byte, is a monitor without current.
@@ -136,7 +136,7 @@ fn cells(state: &mut State, given: &Given<'_>, _: &mut Out<'_>) {
         *cell = millivolts.and_then(|millivolts| CellVoltage::from_millivolts((millivolts - 1) as u16));
     }
     let id = given.instance(0);
-    // BCL2 of today has the cells beyond the twelfth, that of before 2021 a second battery.
+    // BCL2 of today has the cells beyond the twelfth; before 2021 it had a second battery.
     if given.column(1).is_none() {
         let before = state.cells_of(given.at, id);
         cells = std::array::from_fn(|cell| cells[cell].or(before[cell]));
@@ -173,7 +173,7 @@ fn observe_processor(given: &Given<'_>, first: usize, out: &mut Out<'_>) {
 }
 
 fn esc(_: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
-    // As in ESC_TELEMETRY: without speed and voltage there is no ESC.
+    // As in ESC_TELEMETRY: an ESC without speed and voltage is absent.
     if [1, 2].into_iter().all(|slot| given.single(slot).is_none_or(|value| value == 0.0)) {
         return;
     }

@@ -1,4 +1,4 @@
-//! What a log says in words and numbers of its own: parameters, texts, modes, events, errors, arming.
+//! A log's own texts and numbers: parameters, texts, modes, events, errors, arming.
 
 use hums_core::alert;
 
@@ -45,7 +45,7 @@ fn parameter(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
     let number = value.clamp(0.0, 255.0) as u8;
     match name.as_str() {
         "FRAME_CLASS" => facts.frame_class = Some(number),
-        // Where nothing names the firmware.
+        // Only if the firmware has no name in the log.
         "SYSID_SW_TYPE" if facts.craft == Craft::Unknown => {
             facts.craft = Craft::of_software(number).unwrap_or_default();
         }
@@ -174,7 +174,7 @@ fn error(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
 /// The autopilot counts the messages that its logger had no room for.
 fn dropped(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
     let Some(lost) = given.unsigned(0) else { return };
-    // What was lost before the first word of it is not known to be of this log.
+    // Losses before the first report may be of another log.
     if let Some(more) =
         state.messages_lost.and_then(|before| lost.checked_sub(before)).filter(|more| *more > 0)
     {

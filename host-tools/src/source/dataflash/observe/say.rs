@@ -1,25 +1,25 @@
-//! What handlers say, and where to.
+//! Outputs of handlers, and their receiver.
 
 use hums_core::cause::Alert;
 use hums_core::observation::Observation;
 
-/// What handlers say.
+/// An output of a handler.
 pub(in crate::source::dataflash) enum Say<'a> {
     /// An observation.
     Observation(&'a Observation),
     /// A parameter and its value.
     Parameter(&'a str, f64),
-    /// Words with their severity, and what they say is wrong.
+    /// A text with its severity and alert.
     Text(u8, &'a str, Option<Alert>),
     /// The mode's number.
     Mode(u32),
-    /// An event's number, severity and words, and what it says is wrong.
+    /// An event's number, severity, text and alert.
     Event(u32, u8, &'a str, Option<Alert>),
     /// The firmware's name and version.
     Firmware(&'a str),
     /// The airframe.
     Frame(&'a str),
-    /// The failsafes in force from here on, by their names; empty where there is none.
+    /// Names of the active failsafes from here on; empty without any.
     Failsafes(&'a str),
     /// An emergency in which the motors stop at once, by its name.
     Emergency(&'a str),

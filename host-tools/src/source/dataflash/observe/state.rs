@@ -1,5 +1,5 @@
-//! What a log has told so far, as far as later messages need it: MAVLink's messages are put together of several of the
-//! log's, and some of them are told by nothing but events.
+//! State of a log that later messages need: a MAVLink message is put together from several of the log's, and
+//! some come from events alone.
 
 use hums_core::clock::{Instant, Span};
 use hums_core::observation::{
@@ -13,10 +13,10 @@ use super::say::{Out, Say};
 use super::words::{self, Craft, name_and_version};
 use crate::source::dataflash::format::Format;
 
-/// How often the autopilot's state is said, which the log tells by its changes only: `HEARTBEAT` and `SYS_STATUS` come
-/// at 1 Hz or faster.
+/// Period of the autopilot's state, because the log has only changes. `HEARTBEAT` and `SYS_STATUS` come at 1
+/// Hz or faster.
 const SAID_EVERY: Span = Span::from_millis(500);
-/// What is older than this is not repeated.
+/// Older values are not repeated.
 const AGE: Span = Span::from_secs(12);
 /// Receivers, batteries and sensors that are put together.
 pub(super) const INSTANCES: usize = 4;
@@ -52,14 +52,15 @@ pub(super) struct Rates {
     pub(super) flown: [RadiansPerSecond; 3],
 }
 
-/// What a gyro says of the unit of `RATE`: its samples that agree with degrees a second, less those that agree with hundredths.
+/// The unit of `RATE` by a gyro: number of samples that agree with degrees a second, less those that agree
+/// with hundredths.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct RateUnit(i8);
 
 impl RateUnit {
-    /// A rate as it is logged, and that of a gyro in degrees a second.
+    /// Takes a logged rate, and a gyro's in degrees a second.
     pub(super) fn take(&mut self, logged: f32, gyro_dps: f32) {
-        /// What turns slower says nothing.
+        /// Slower turns do not count.
         const TURNS_DPS: f32 = 10.0;
         let ratio = logged / gyro_dps;
         let vote = match (gyro_dps > TURNS_DPS, ratio) {
@@ -93,11 +94,11 @@ pub(super) enum ToldArming {
     Before,
 }
 
-/// What the log has told of the vehicle itself; the first part of a file is looked through for it, so that it is known
-/// from the first message on.
+/// Facts about the vehicle. The first part of a file is searched for them, so that they are known from the
+/// first message on.
 #[derive(Clone, Copy, Debug, Default)]
 pub(in crate::source::dataflash) struct Facts {
-    /// What kind of firmware.
+    /// Kind of firmware.
     pub(super) craft: Craft,
     /// `FRAME_CLASS`
     pub(super) frame_class: Option<u8>,
@@ -113,7 +114,7 @@ pub(in crate::source::dataflash) struct Facts {
     pub(super) has_rssi: bool,
     /// `BATTn_CAPACITY`, mAh.
     pub(super) capacity_mah: [Option<f32>; INSTANCES],
-    /// `AHRS_EKF_TYPE`: 2 or 3; 0: none of the filters.
+    /// `AHRS_EKF_TYPE`: 2 or 3; 0 without a filter.
     pub(super) estimator: Option<u8>,
     /// Version of the firmware, from the top byte down.
     pub(super) version: u32,
@@ -136,12 +137,12 @@ impl Facts {
     }
 }
 
-/// What a log has told so far.
+/// State of a log so far.
 #[derive(Debug, Default)]
 pub(in crate::source::dataflash) struct State {
-    /// What the vehicle is.
+    /// Facts about the vehicle.
     pub(super) facts: Facts,
-    /// VER, or a text, told its version.
+    /// Its version is known, from VER or a text.
     pub(super) identified: bool,
     /// The version that was handed on.
     told_version: u32,
@@ -158,7 +159,7 @@ pub(in crate::source::dataflash) struct State {
     /// Sensors that say that they are not healthy: bits of `MAV_SYS_STATUS_SENSOR`, one set for each instance.
     pub(super) unhealthy: [u32; INSTANCES],
     pub(super) rates: Dated<Rates>,
-    /// The first gyro's rate, rad/s, and what it says of the unit of `RATE`.
+    /// The first gyro's rate, rad/s, and the unit of `RATE` by it.
     pub(super) gyro: Dated<f32>,
     pub(super) rate_unit: RateUnit,
     /// The inertial sensor that felt a shock last, and when.
@@ -167,11 +168,11 @@ pub(in crate::source::dataflash) struct State {
     pub(super) has_inertial: bool,
     /// Accuracy by receiver.
     pub(super) accuracy: [Dated<Metres>; INSTANCES],
-    /// What each compass measured last, until an inertial sensor's observation takes it along.
+    /// Last measurement of each compass, until an inertial sensor's observation takes it along.
     pub(super) fields: [Option<[Gauss; 3]>; INSTANCES],
     /// Velocity of the estimator, north, east, down.
     pub(super) velocity: Dated<[f32; 3]>,
-    /// The same of the receiver, where the estimator tells none.
+    /// The same of the receiver, if the estimator has none.
     pub(super) receiver_velocity: Dated<[f32; 3]>,
     pub(super) primary_core: u8,
     pub(super) altitude: Dated<f32>,
@@ -182,14 +183,14 @@ pub(in crate::source::dataflash) struct State {
     pub(super) airspeed: Dated<f32>,
     pub(super) ground_speed: Dated<f32>,
     pub(super) heading_deg: Dated<f32>,
-    /// Height of the first GPS fix, where nothing better tells the height above it.
+    /// Height of the first GPS fix, the reference of heights without a better one.
     pub(super) first_altitude: Option<f32>,
     /// Height of home.
     pub(super) home_altitude: Option<f32>,
     pub(super) clips: [u32; 3],
     pub(super) cells: [Dated<[Option<CellVoltage>; CELLS_MAX]>; INSTANCES],
     pub(super) messages_lost: Option<u64>,
-    /// When UTC was said last.
+    /// Time of the last report of UTC.
     pub(super) utc_said: Option<Instant>,
     /// When the event of arming came last.
     armed_at: Option<Instant>,
@@ -200,10 +201,10 @@ pub(in crate::source::dataflash) struct State {
     failsafes_said: u64,
 }
 
-/// How long it is said to be disarmed then: longer than what follows a gap and is not judged.
+/// Length of the inserted disarming: longer than the unjudged time after a gap.
 const REARMS: Span = Span::from_millis(1_600);
 
-/// Whether it is said to be disarmed though it is armed again.
+/// Whether a disarming is inserted although the vehicle is armed again.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 enum Rearms {
     #[default]
@@ -214,7 +215,7 @@ enum Rearms {
     Since(Instant),
 }
 
-/// What messages of arming and of leaving the ground change.
+/// State from messages of arming and take-off.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(in crate::source::dataflash) struct Standing {
     arming: Arming,
@@ -230,14 +231,14 @@ impl Standing {
 }
 
 impl State {
-    /// Of a vehicle of which this much is known.
+    /// The state of a vehicle with these facts.
     pub(in crate::source::dataflash) fn new(facts: Facts) -> Self {
         let mut state = Self { facts, ..Self::default() };
         state.begin();
         state
     }
 
-    /// What is known of the vehicle.
+    /// Facts about the vehicle.
     pub(in crate::source::dataflash) fn facts(&self) -> Facts {
         let told_arming = match (self.facts.told_arming, self.arming.first_told()) {
             (ToldArming::Nowhere, Some(armed)) => ToldArming::First(armed),
@@ -254,7 +255,7 @@ impl State {
         }
     }
 
-    /// What firmware wrote it.
+    /// The firmware that wrote the log.
     pub(in crate::source::dataflash) fn craft(&self) -> Craft {
         self.facts.craft
     }
@@ -274,7 +275,7 @@ impl State {
         self.arming.armed() == Some(true)
     }
 
-    /// Another power-on: what was so before tells nothing, but the vehicle is the same.
+    /// Another power-on: the same vehicle, but all earlier state is void.
     pub(in crate::source::dataflash) fn restart(&mut self) {
         let mut facts = self.facts();
         if facts.told_arming != ToldArming::Nowhere {
@@ -283,26 +284,27 @@ impl State {
         *self = Self::new(facts);
     }
 
-    /// What messages of arming and of leaving the ground change.
+    /// State from messages of arming and take-off.
     pub(in crate::source::dataflash) fn standing(&self) -> Standing {
         Standing { arming: self.arming, landed: self.landed, failsafes: self.failsafes }
     }
 
-    /// Sets what [`State::standing`] tells.
+    /// Sets the state from [`State::standing`].
     pub(in crate::source::dataflash) fn stand(&mut self, standing: Standing) {
         Standing { arming: self.arming, landed: self.landed, failsafes: self.failsafes } = standing;
     }
 
-    /// A log that is only written while armed begins armed where the first message about arming is that of disarming. A
-    /// logger also begins with an attempt to arm that fails (`AP_Logger`: `LOG_DISARMED` 0), and just before arming.
+    /// A log that is only written while armed begins armed if its first message about arming is a disarming.
+    /// A logger also begins before arming, and at an attempt to arm that fails (`AP_Logger`: `LOG_DISARMED`
+    /// 0).
     fn begin(&mut self) {
         if self.facts.logs_disarmed == Some(false) && self.facts.told_arming == ToldArming::First(false) {
             self.arming.begin_armed();
         }
     }
 
-    /// The event of arming comes while it is armed, long after the last one: nobody logged the disarming in between, and the vehicle
-    /// is said to be disarmed for a moment.
+    /// The event of arming came while armed, long after the last one: the disarming in between was not
+    /// logged. The vehicle counts as disarmed for a moment.
     pub(super) fn arm_again(&mut self, at: Instant) {
         /// Newer logs tell one arming by several messages.
         const ONE_ARMING: Span = Span::from_secs(2);
@@ -313,8 +315,8 @@ impl State {
         }
     }
 
-    /// The vehicle is armed or disarmed, as a message says. A copter tells by an event when it leaves the ground, so it
-    /// stands until then.
+    /// A message reports arming or disarming. A copter reports its take-off by an event, so it is on the
+    /// ground until then.
     pub(super) fn arm(&mut self, armed: bool) {
         let changes = self.arming.armed() != Some(armed);
         self.arming.tell(armed);
@@ -327,14 +329,14 @@ impl State {
         }
     }
 
-    /// It stands, as a message says.
+    /// A message reports that it is on the ground.
     pub(super) fn land(&mut self) {
         if self.tells_landing() {
             self.landed = LandedState::OnGround;
         }
     }
 
-    /// Whether events tell when it leaves the ground and stands again: a copter's since 3.1 (`DATA_NOT_LANDED`).
+    /// Whether events report take-off and landing: a copter's since 3.1 (`DATA_NOT_LANDED`).
     fn tells_landing(&self) -> bool {
         /// Versions are bytes from the top down.
         const SINCE: u32 = 0x0301_0000;
@@ -352,14 +354,14 @@ impl State {
 
     /// Its height above home.
     pub(super) fn height(&mut self, metres: f32) {
-        /// Well above where a take-off is told by the height.
+        /// Well above the height at which a take-off is reported.
         const TAKEN_OFF_M: f32 = 3.0;
         if self.landed == LandedState::TakingOff && metres > TAKEN_OFF_M {
             self.landed = LandedState::InAir;
         }
     }
 
-    /// The throttle that the autopilot gives, as a part of all: evidence of arming where nothing tells it.
+    /// Throttle of the autopilot, 0 to 1: evidence of arming without messages about it.
     pub(super) fn throttle(&mut self, at: Instant, throttle: f32) {
         /// A multicopter idles on the ground below a tenth; so does an engine.
         const IDLE: f32 = 0.1;
@@ -379,13 +381,14 @@ impl State {
     }
 
     fn evidence(&mut self, at: Instant, runs: bool) {
-        // Whoever tells arming in every version is believed, unless the log is only written while armed.
+        // If every version of the firmware reports arming, the messages decide, unless the log is only
+        // written while armed.
         if !self.facts.craft.tells_arming() || self.facts.logs_disarmed == Some(false) {
             self.arming.evidence(at, runs);
         }
     }
 
-    /// Says what the autopilot says again and again: its heartbeat, its status, whether it stands.
+    /// Repeats the autopilot's periodic reports: heartbeat, status, landed state.
     pub(in crate::source::dataflash) fn repeat(&mut self, now: Instant, out: &mut Out<'_>) {
         if std::mem::replace(&mut self.failsafes_said, self.failsafes) != self.failsafes {
             out.say(&Say::Failsafes(&words::failsafes(self.failsafes)));
@@ -403,7 +406,7 @@ impl State {
         self.said_at = Some(now);
         self.said = Some(heartbeat);
         let word = self.arming.word();
-        // What the file tells further on is not said to be unknown until then.
+        // If the file reports arming later, it does not count as unknown until then.
         let known =
             word == Word::Told || (word == Word::Unknown && self.facts.told_arming != ToldArming::Nowhere);
         if (!known || self.word_said.is_some()) && self.word_said.replace(word) != Some(word) {
@@ -447,7 +450,7 @@ impl State {
         })
     }
 
-    /// What flies, with its `MAV_TYPE`; `None` for what is no vehicle.
+    /// The kind of vehicle, with its `MAV_TYPE`; `None` for other senders.
     fn kind(&self) -> Option<(VehicleKind, u8)> {
         let Facts { craft, frame_class, motors, quadplane, quadplane_type, .. } = self.facts;
         Some(match craft {
@@ -491,7 +494,7 @@ impl State {
         }
     }
 
-    /// A battery's cells that were told lately.
+    /// A battery's recent cell voltages.
     pub(super) fn cells_of(&self, now: Instant, id: u8) -> [Option<CellVoltage>; CELLS_MAX] {
         let known = self.cells.get(usize::from(id)).and_then(|cells| cells.within(now, Span::from_secs(3)));
         known.unwrap_or(Battery::default().cells)
@@ -525,7 +528,7 @@ const fn copter_type(frame_class: u8) -> u8 {
     }
 }
 
-/// `ArduCopter V4.6.3 (92b0cd78)` is 4.6.3; an official release where nothing follows the numbers.
+/// `ArduCopter V4.6.3 (92b0cd78)` is 4.6.3; an official release if the numbers are the end of the version.
 pub(super) fn version_of(words: &str) -> Option<u32> {
     /// `FIRMWARE_VERSION_TYPE_OFFICIAL`
     const OFFICIAL: u32 = 255;

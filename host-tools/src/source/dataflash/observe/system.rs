@@ -1,4 +1,4 @@
-//! The autopilot's processor, its radios, and what a plane says of its state.
+//! The autopilot's processor, its radios, and a plane's state.
 
 use hums_core::clock::Span;
 use hums_core::observation::{LandedState, Observation, RadioControl, TelemetryRadio};

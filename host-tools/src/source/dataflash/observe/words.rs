@@ -6,7 +6,7 @@ use hums_core::cause::{Alert, Cause, Urgency};
 /// Which firmware wrote the log.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(in crate::source::dataflash) enum Craft {
-    /// Not told yet.
+    /// Not known yet.
     #[default]
     Unknown,
     /// `ArduCopter`
@@ -66,7 +66,7 @@ impl Craft {
         })
     }
 
-    /// Whether events tell when it leaves the ground and stands again.
+    /// Whether events report take-off and landing.
     pub(super) const fn tells_landing(self) -> bool {
         matches!(self, Self::Copter | Self::Heli)
     }
@@ -218,7 +218,7 @@ const SUB_MODES: &[(u32, &str)] = &[
     (21, "SURFTRAK"),
 ];
 
-/// What an EV says; empty where its number is not known.
+/// The text of an EV; empty for an unknown number.
 pub(super) fn event(number: u8) -> &'static str {
     EVENTS.iter().find(|(known, _)| *known == number).map_or("", |(_, words)| words)
 }
@@ -287,7 +287,7 @@ const EVENTS: &[(u8, &str)] = &[
     (166, "off the bottom"),
 ];
 
-/// What an ERR's subsystem is, and what its code says of it; the code 0 is always the end of it.
+/// The subsystem of an ERR, and the meaning of its code; the code 0 is always the end of it.
 pub(super) fn error(subsystem: u8, code: u8) -> String {
     let name = SUBSYSTEMS.iter().find(|(known, _)| *known == subsystem).map(|(_, name)| *name);
     let name = name.map_or_else(|| format!("subsystem {subsystem}"), str::to_owned);
@@ -311,7 +311,7 @@ pub(super) fn error(subsystem: u8, code: u8) -> String {
     format!("{name}: {words}")
 }
 
-/// What an ERR says is wrong with the vehicle, or is no longer (code 0).
+/// The alert of an ERR, or its end (code 0).
 pub(super) fn alert(subsystem: u8, code: u8) -> Option<Alert> {
     let (cause, urgency) = match subsystem {
         3 => (Cause::Compass, Urgency::Warning),
@@ -369,13 +369,13 @@ const SUBSYSTEMS: &[(u8, &str)] = &[
     (31, "dead reckoning failsafe"),
 ];
 
-/// The subsystem of ERR that stops the motors at once, and so is no state that lasts.
+/// The subsystem of ERR that stops the motors at once, and so is not a lasting state.
 pub(super) const CRASH_CHECK: u8 = 12;
 
-/// Whether a subsystem of ERR tells of a failsafe or of an emergency, which lasts until it is resolved or the vehicle is
-/// disarmed. 5, 6, 8, 17, 20, 23 and 31 also make the autopilot call its state critical in its heartbeat
-/// (`Copter::any_failsafe_triggered`); of the others (GPS failsafe of before 3.3, fence, CPU, thrust loss, sensors and leak
-/// of `ArduSub`, vibration, internal error) a heartbeat tells nothing.
+/// Whether a subsystem of ERR is a failsafe or an emergency, which lasts until it is resolved or the vehicle
+/// is disarmed. For 5, 6, 8, 17, 20, 23 and 31 the autopilot also reports a critical state in its heartbeat
+/// (`Copter::any_failsafe_triggered`). The heartbeat does not show the others (GPS failsafe of before 3.3,
+/// fence, CPU, thrust loss, sensors and leak of `ArduSub`, vibration, internal error).
 pub(super) const fn is_failsafe(subsystem: u8) -> bool {
     matches!(subsystem, 5..=9 | 17 | 19 | 20 | 23 | 25..=27 | 29..=31)
 }

@@ -1,4 +1,4 @@
-//! When a vehicle was armed: by the log's words, and by what it did where the log has none.
+//! Arming times: from the log's messages, or else from the vehicle's motion.
 
 use std::fmt::Write as _;
 
@@ -103,7 +103,8 @@ fn a_log_that_opens_before_arming_begins_disarmed() {
     assert_eq!(changes(&seen(&log.bytes)), [(1, true), (6, false)]);
 }
 
-/// A plane's log of 2014, which has no word about arming: 20 m/s from 10 s to 20 s, and then it glides against the wind until 40 s.
+/// A plane's log of 2014, without any message about arming: 20 m/s from 10 s to 20 s, and then it glides
+/// against the wind until 40 s.
 #[test]
 fn a_plane_whose_log_has_no_word_about_arming_is_armed_while_it_flies() {
     let mut log = "ArduPlane V3.1.2beta1 (834f90e8)\n\

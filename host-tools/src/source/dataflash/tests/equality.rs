@@ -1,8 +1,9 @@
-//! One flight, two recordings: what the autopilot wrote itself, and what it said to a ground station. The same monitor
-//! finds the same in both.
+//! One flight, two recordings: the autopilot's own log, and a ground station's. The same monitor finds the
+//! same in both.
 //!
-//! The autopilot's logs in `tests/labelled/bin` are those of the labelled set without the messages that observations
-//! are not made of, and with every tenth ESC message (the simulator writes 100 a second of each).
+//! The autopilot's logs in `tests/labelled/bin` are those of the labelled set, without messages that are
+//! unused for observations. They have only every tenth ESC message (the simulator writes 100 a second of
+//! each).
 
 use std::path::Path;
 
@@ -20,7 +21,7 @@ use crate::source::recording::Place;
 /// A change of a level: the check, its instance, the level, and the seconds since the autopilot's power-on.
 type Change = (&'static str, u8, Level, f64);
 
-/// What the monitor finds, and the seconds since power-on at which the recording begins.
+/// The monitor's findings, and the beginning of the recording in seconds since power-on.
 fn findings(name: &str) -> (Vec<Change>, f64) {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/labelled").join(name);
     let recording = Place::file(&path).open().expect("a recording");
@@ -33,7 +34,7 @@ fn findings(name: &str) -> (Vec<Change>, f64) {
         let step = next.get_or_insert(at);
         while *step <= at {
             monitor.tick((*step).into(), &link, &recorder, &mut |finding| {
-                // An alarm that outlives its cause is told again, and is no change.
+                // An alarm that outlives its cause is reported again, and is not a change.
                 if finding.level != finding.previous {
                     changes.push((
                         finding.check,
@@ -57,7 +58,7 @@ fn findings(name: &str) -> (Vec<Change>, f64) {
     (changes, begins_s)
 }
 
-/// What a ground station's link and the end of a recording say is nothing that the vehicle has.
+/// Findings about a ground station's link and the end of a recording are not about the vehicle.
 fn is_of_vehicle((check, _, level, _): &Change) -> bool {
     *level != Level::Stale && !matches!(*check, "heartbeat" | "frames_lost")
 }

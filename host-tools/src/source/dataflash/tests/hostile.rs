@@ -1,4 +1,4 @@
-//! Bytes that nobody meant well: no panic, no memory, and time that never falls (which [`Seen`](super::Seen) asserts).
+//! Hostile bytes: no panic, bounded memory, and time that never falls (which [`Seen`](super::Seen) asserts).
 
 use proptest::prelude::*;
 

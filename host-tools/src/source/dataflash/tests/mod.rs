@@ -18,7 +18,7 @@ use self::writer::Writer;
 use super::*;
 use crate::source::item::{Amount, Item, Rows, Value};
 
-/// What a log gives, in a form that is easily compared.
+/// The items of a log, in a form that is easily compared.
 #[derive(Debug, Default)]
 struct Seen {
     observations: Vec<(u64, Observation)>,

@@ -1,4 +1,4 @@
-//! Which messages serve, and what the rest is for.
+//! The messages in use, and the purpose of the others.
 
 use std::fmt::Write as _;
 
@@ -7,7 +7,7 @@ use hums_core::observation::Observation;
 use super::seen;
 use super::writer::Writer;
 
-/// What is said of these logs.
+/// The documentation of these logs.
 const DOCUMENT: &str = include_str!("../../../../../docs/dataflash.md");
 
 #[test]

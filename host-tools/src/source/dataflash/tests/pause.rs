@@ -1,10 +1,11 @@
-//! An autopilot that stops logging for a while: what is not in the log is nothing that the vehicle did.
+//! An autopilot that stops logging for a while: missing entries are not events of the vehicle.
 
 use super::*;
 use crate::check::judge::{Judge, Limits};
 use crate::source::recording::Format;
 
-/// An armed copter whose four ESCs tell ten times a second, in these tenths of seconds; `silent` ones tell nothing.
+/// An armed copter in these tenths of seconds, with four ESCs that report ten times a second; `silent` ones
+/// do not report.
 fn fly(log: &mut Writer, tenths: std::ops::Range<u64>, silent: bool) {
     for tenth in tenths {
         let time = (tenth * 100_000).to_le_bytes();

@@ -2,7 +2,7 @@
 
 use super::*;
 
-/// Where the time of the message stands that begins at this byte.
+/// Sets the time of the message that begins at this byte.
 fn set_time(log: &mut Writer, message: usize, seconds: f64) {
     log.bytes[message + 3..message + 11].copy_from_slice(&((seconds * 1e6) as u64).to_le_bytes());
 }
@@ -25,7 +25,7 @@ fn tenths(log: &mut Writer, tenths: std::ops::Range<u64>) {
     }
 }
 
-/// What is told of time: gaps, restarts, and the last time.
+/// Reports about time: gaps, restarts, and the last time.
 fn told(log: &[u8]) -> (Vec<(Cause, String)>, usize, u64) {
     let seen = seen(log);
     let gaps = seen.gaps.into_iter().map(|(cause, _, _, words)| (cause, words)).collect();

@@ -1,12 +1,12 @@
-//! What PX4's topics say, as observations: the same that `hums_link::observe` makes of the MAVLink messages that PX4
-//! computes from these topics (`src/modules/mavlink/streams` in PX4 is the source of each formula).
+//! From PX4's topics to observations, equal to those of `hums_link::observe` from PX4's MAVLink messages. PX4
+//! computes these from the same topics (`src/modules/mavlink/streams` in PX4 is the source of each formula).
 //!
-//! Names of fields changed between versions; a topic's row lists those of v1.8 to v1.17, and takes what is there.
-//! Topics that are logged faster than the monitor steps (attitude 250 times a second) are taken 20 or 10 times a second,
-//! so that counters of usage mean the same for a log as on the board.
+//! Names of fields changed between versions; a topic's row lists those of v1.8 to v1.17, and takes the
+//! existing ones. Topics faster than the monitor's steps (attitude 250 times a second) are taken 20 or 10
+//! times a second. So usage counters mean the same for a log as on the board.
 //!
-//! What MAVLink repeats by the clock although nothing is published (`HEARTBEAT`, `EXTENDED_SYS_STATE`, `SYSTEM_TIME`,
-//! `GPS_RAW_INT` of a receiver that fell silent) is repeated here once a second.
+//! MAVLink repeats some messages by the clock even without a new topic (`HEARTBEAT`, `EXTENDED_SYS_STATE`,
+//! `SYSTEM_TIME`, `GPS_RAW_INT` of a silent receiver). They are repeated here once a second.
 
 mod motion;
 mod power;
@@ -22,7 +22,7 @@ pub(crate) use self::system::mode_name;
 
 pub(super) use state::{Px4, Said, Told, Topic};
 
-/// How often what MAVLink repeats is repeated.
+/// Period of the repeated messages.
 const REPEAT_US: u64 = 1_000_000;
 /// All topics that serve.
 const LISTS: [&[Topic]; 4] = [system::TOPICS, motion::TOPICS, power::TOPICS, receivers::TOPICS];
@@ -43,7 +43,7 @@ impl Px4 {
         self.system.release = release;
     }
 
-    /// The logger missed something: silence means nothing for a while.
+    /// The logger lost data: silence has no meaning for a while.
     pub(super) fn dropout(&mut self) {
         receivers::dropout(&mut self.receivers);
     }

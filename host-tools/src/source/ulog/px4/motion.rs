@@ -11,7 +11,8 @@ use hums_core::units::{
 
 use super::state::{FAST_US, Home, Local, MEDIUM_US, Px4, Said, Topic};
 
-/// A shock's specific force is greater than this: below the least limit of one, and above what nearly all flights have.
+/// The specific force of a shock is greater than this: below the lowest limit of a shock, and above the
+/// forces of nearly all flights.
 const SHOCK_MIN: f32 = 2.0 * GRAVITY;
 
 pub(super) const TOPICS: &[Topic] = &[
@@ -267,8 +268,8 @@ fn imu(px4: &mut Px4, said: &Said<'_>) {
     }
 }
 
-/// Whether the specific force of a message is one of those that are handed on. Of the others only that of a shock is, as that: what
-/// hits the ground does so between two of them.
+/// Whether the specific force of a message is handed on. Between two of them only a shock is, as such:
+/// impacts are short.
 fn is_due(px4: &mut Px4, said: &Said<'_>) -> bool {
     let now_us = said.recorded_us;
     let long_ago = |last: u64| now_us < last || now_us - last >= FAST_US;
@@ -303,14 +304,14 @@ fn other_air(px4: &mut Px4, said: &Said<'_>) {
     }
 }
 
-/// What `SERVO_OUTPUT_RAW` is made of.
+/// The source of `SERVO_OUTPUT_RAW`.
 fn outputs(px4: &mut Px4, said: &Said<'_>) {
     let pulse = |output: usize| said.fields.element(0, output).map_or(0, |pulse| pulse.round() as u16);
     let pulses = std::array::from_fn::<u16, MOTORS_MAX, _>(pulse);
     px4.observe(Observation::Outputs(Outputs { port: said.instance, pulses }));
 }
 
-/// Where a log has no `sensor_combined`.
+/// For a log without `sensor_combined`.
 fn acceleration(px4: &mut Px4, said: &Said<'_>) {
     if !px4.motion.combined && is_due(px4, said) {
         inertial(px4, 0, said.fields.vector(0), px4.motion.rate);
@@ -350,7 +351,8 @@ fn attitude(px4: &mut Px4, said: &Said<'_>) {
     }));
 }
 
-/// The rates that are wanted go with an attitude that is wanted within this: in some modes nobody wants an attitude, in others no rates.
+/// Maximum age of rate setpoints beside an attitude setpoint: some modes have no attitude setpoint, others no
+/// rate setpoints.
 const RATES_AGE_US: u64 = 500_000;
 
 fn attitude_setpoint(px4: &mut Px4, said: &Said<'_>) {
@@ -420,7 +422,7 @@ fn global_position(px4: &mut Px4, said: &Said<'_>) {
     }));
 }
 
-/// Degrees. 0, 0 is what those send that do not know.
+/// Degrees. 0, 0 means unknown.
 pub(super) fn place(latitude: Option<f64>, longitude: Option<f64>) -> Option<Position> {
     let (latitude_deg, longitude_deg) = (latitude?, longitude?);
     let valid = (-90.0..=90.0).contains(&latitude_deg) && (-180.0..=180.0).contains(&longitude_deg);
@@ -465,7 +467,7 @@ fn estimator_status(px4: &mut Px4, said: &Said<'_>) {
         compass: if fields.get(4).is_some() { ratio(4) } else { ratio(3) },
         flags: fields.count(5).unwrap_or(0) as u16,
     }));
-    // Before v1.11 the estimator says how strong vibration is; nobody counts clipped samples.
+    // Before v1.11 the estimator reports the strength of vibration; clipped samples are not counted.
     if !px4.motion.imu_status
         && let Some(levels) = fields.vector::<3>(6)
     {
@@ -495,7 +497,7 @@ fn test_ratios(px4: &mut Px4, said: &Said<'_>) {
     }));
 }
 
-/// `ESTIMATOR_STATUS_FLAGS` of a log without `estimator_status`, as far as they are told.
+/// `ESTIMATOR_STATUS_FLAGS` of a log without `estimator_status`, as far as known.
 fn estimator_flags(px4: &mut Px4, said: &Said<'_>) {
     const ATTITUDE: u16 = 1;
     const CONST_POS_MODE: u16 = 1 << 7;
@@ -508,7 +510,7 @@ fn estimator_flags(px4: &mut Px4, said: &Said<'_>) {
     }
 }
 
-/// A motor that there is not, or that stands, has no number or nothing.
+/// A missing or stopped motor has NaN or zero.
 fn motors(px4: &mut Px4, said: &Said<'_>) {
     let given = (0..12).filter_map(|motor| said.fields.element(0, motor)).filter(|part| part.is_finite());
     let running: Vec<f64> = given.filter(|part| *part > 0.0).collect();

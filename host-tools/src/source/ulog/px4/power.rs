@@ -68,7 +68,7 @@ fn battery(px4: &mut Px4, said: &Said<'_>) {
     // Logs before the field existed have a battery where its voltage is one.
     let connected = fields.get(0).map_or(fields.finite(1) > Some(0.1), |flag| flag != 0.0);
     let when = |value: Option<f32>| value.filter(|_| connected);
-    // Filtered ones are what MAVLink sends; they are gone since v1.16. -1 is unknown.
+    // MAVLink sends the filtered ones, which ended with v1.16. -1 is unknown.
     let current =
         when(fields.finite(4).or_else(|| fields.finite(3))).filter(|amperes| (*amperes + 1.0).abs() > 1e-6);
     let remaining = when(fields.finite(5)).filter(|part| (0.0..=1.0).contains(part));
@@ -104,8 +104,8 @@ fn battery(px4: &mut Px4, said: &Said<'_>) {
     }
 }
 
-/// `MAV_BATTERY_CHARGE_STATE` of `battery_status.warning`, as PX4's stream `BATTERY_STATUS` makes it: none, low, critical,
-/// emergency, failed; 6 and 7 (since v1.13) are unhealthy and charging in both.
+/// `MAV_BATTERY_CHARGE_STATE` of `battery_status.warning`, as in PX4's stream `BATTERY_STATUS`: none, low,
+/// critical, emergency, failed. 6 and 7 (since v1.13) are unhealthy and charging in both.
 const fn charge(warning: Option<u8>) -> u8 {
     const UNDEFINED: u8 = 0;
     match warning {
@@ -115,7 +115,7 @@ const fn charge(warning: Option<u8>) -> u8 {
     }
 }
 
-/// The cells' voltages, where the battery measures them.
+/// The cells' voltages, if the battery measures them.
 fn cells(said: &Said<'_>) -> Option<[Option<Volts>; CELLS_MAX]> {
     let fields = &said.fields;
     let count = fields.count(9).filter(|&count| count > 0)?;
@@ -150,7 +150,7 @@ fn system_status(px4: &mut Px4) {
 /// The name of the rail has a capital letter before v1.12.
 fn rails(px4: &mut Px4, said: &Said<'_>) {
     let vcc = said.fields.finite(0).or_else(|| said.fields.finite(1)).filter(|volts| *volts > 0.0);
-    // MAVLink has a servo rail; PX4's topic has none.
+    // MAVLink has a servo rail; PX4's topic does not.
     px4.observe(Observation::Rails(Rails { vcc: vcc.map(Volts), servo: None }));
 }
 
@@ -167,7 +167,8 @@ fn escs(px4: &mut Px4, said: &Said<'_>) {
     }
 }
 
-/// Until v1.11 PX4 hands on what CAN ESCs send, which is kelvin; no ESC works above 200 degrees Celsius, nor below 200 kelvin.
+/// Until v1.11 PX4 hands on the values of CAN ESCs in kelvin. ESCs do not work above 200 degrees Celsius, nor
+/// below 200 kelvin.
 fn celsius(temperature: f32) -> Celsius {
     const ZERO_CELSIUS: f32 = 273.15;
     Celsius(if temperature > 200.0 { temperature - ZERO_CELSIUS } else { temperature })

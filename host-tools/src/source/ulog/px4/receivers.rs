@@ -1,8 +1,8 @@
 //! GNSS receivers.
 //!
-//! Since v1.12 each receiver is an instance of `sensor_gps`, and `vehicle_gps_position` is what the estimator uses; before,
-//! each is an instance of the latter. MAVLink sends the receivers, and says "no receiver" when one falls silent for a
-//! second; in a log, where receivers have one message a second, it takes [`SILENCE`].
+//! Since v1.12 each receiver is an instance of `sensor_gps`, and `vehicle_gps_position` is the estimator's
+//! input; before, each is an instance of the latter. MAVLink sends the receivers, and reports "no receiver"
+//! after a second of silence. In a log, where receivers have one message a second, it takes [`SILENCE`].
 
 use std::num::NonZeroU32;
 
@@ -13,7 +13,7 @@ use hums_core::units::{Metres, MetresPerSecond, Radians};
 use super::motion::place;
 use super::state::{MEDIUM_US, Px4, RECEIVERS_MAX, Receivers, Said, Told, Topic};
 
-/// A receiver that says nothing for longer is gone.
+/// A receiver silent for longer is gone.
 const SILENCE: Span = Span::from_millis(2_500);
 /// A fix with a position: `FIX_TYPE_2D`.
 const FIX_2D: u8 = 2;
@@ -53,12 +53,12 @@ pub(super) const TOPICS: &[Topic] = &[
     },
 ];
 
-/// Heard again before anything is said of silence.
+/// A silence counts only after a receiver's next message.
 pub(super) fn dropout(receivers: &mut Receivers) {
     receivers.heard = [None; RECEIVERS_MAX];
 }
 
-/// What MAVLink says of receivers that fell silent.
+/// MAVLink's report about silent receivers.
 pub(super) fn silence(receivers: &Receivers, now: Instant, observe: &mut dyn FnMut(Observation)) {
     for (instance, heard) in receivers.heard.iter().enumerate() {
         if heard.is_some_and(|heard| now.since(heard) > SILENCE) {
@@ -72,7 +72,7 @@ fn sensor(px4: &mut Px4, said: &Said<'_>) {
     receiver(px4, said);
 }
 
-/// What the estimator uses: a receiver of its own before v1.12, and a sign of life of the first one since.
+/// The estimator's input: a receiver of its own before v1.12, and since then a sign of life of the first one.
 fn used(px4: &mut Px4, said: &Said<'_>) {
     if !px4.receivers.sensors {
         receiver(px4, said);
@@ -101,7 +101,7 @@ fn receiver(px4: &mut Px4, said: &Said<'_>) {
         speed: fields.finite(10).filter(|speed| (0.0..655.35).contains(speed)).map(MetresPerSecond),
         // As MAVLink holds it: of a turn from north.
         course: fields.finite(14).map(|course| Radians(course.rem_euclid(core::f32::consts::TAU))),
-        // The receiver's UTC: 0 where it has none.
+        // The receiver's UTC: 0 if unknown.
         measured_ms: fields.count(11).and_then(|us| NonZeroU32::new((us / 1_000) as u32)),
     }));
     if let Some(heard) = px4.receivers.heard.get_mut(usize::from(said.instance)) {

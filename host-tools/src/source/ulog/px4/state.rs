@@ -1,4 +1,4 @@
-//! What topics said so far, as far as one message needs what others said.
+//! State from topics that other messages need.
 
 use hums_core::clock::Instant;
 use hums_core::observation::{Observation, Sensors, Source};
@@ -25,7 +25,7 @@ pub(in crate::source::ulog) struct Said<'a> {
     pub(in crate::source::ulog) at: Instant,
     /// Microseconds since the autopilot's boot.
     pub(in crate::source::ulog) recorded_us: u64,
-    /// It was said before the log began, or long before what came last.
+    /// The value is from before the log, or from long before the latest message.
     pub(in crate::source::ulog) is_old: bool,
     pub(in crate::source::ulog) instance: u8,
     pub(in crate::source::ulog) fields: Fields<'a>,
@@ -34,7 +34,7 @@ pub(in crate::source::ulog) struct Said<'a> {
 /// Bytes of an event's arguments that are looked at.
 pub(in crate::source::ulog) const ARGUMENTS: usize = 8;
 
-/// What comes of messages.
+/// An output of the mapping.
 #[derive(Clone, Debug, PartialEq)]
 pub(in crate::source::ulog) enum Told {
     Observation(Observation),
@@ -63,13 +63,13 @@ pub(in crate::source::ulog) enum Told {
 /// The least time between two messages of a fast topic: the monitor's own step (`hums_core::monitor::TICK`), and the rate
 /// at which the board asks for `HIGHRES_IMU`.
 pub(super) const FAST_US: u64 = 50_000;
-/// The same for what changes slowly; the board asks for it at 1 to 5 a second.
+/// The same for slow values; the board requests them at 1 to 5 a second.
 pub(super) const MEDIUM_US: u64 = 100_000;
 
-/// The vehicle, as far as one message needs what others said.
+/// State of the vehicle that other messages need.
 #[derive(Debug, Default)]
 pub(in crate::source::ulog) struct Px4 {
-    /// What came of the last messages, to be handed on.
+    /// Outputs of the last messages, to be handed on.
     pub(in crate::source::ulog) told: Vec<Told>,
     pub(super) system: System,
     pub(super) motion: Motion,
@@ -89,7 +89,7 @@ impl Px4 {
     }
 }
 
-/// What topics said of the autopilot itself.
+/// State of the autopilot itself.
 #[derive(Debug, Default)]
 #[expect(clippy::struct_excessive_bools, reason = "flags of several topics, none a state of the others")]
 pub(super) struct System {
@@ -133,7 +133,7 @@ pub(super) struct Status {
     pub(super) sensors: Option<Sensors>,
 }
 
-/// What topics said of motion.
+/// State of motion.
 #[derive(Debug, Default)]
 #[expect(clippy::struct_excessive_bools, reason = "which topics a log has, none a state of the others")]
 pub(super) struct Motion {
@@ -143,7 +143,7 @@ pub(super) struct Motion {
     pub(super) rate: Option<[f32; 3]>,
     /// The body rates that are wanted, about roll and pitch, and when, microseconds.
     pub(super) rates_wanted: Option<(u64, [RadiansPerSecond; 3])>,
-    /// What each compass measured last, until an inertial sensor's observation takes it along.
+    /// Last measurement of each compass, until an inertial sensor's observation takes it along.
     pub(super) fields: [Option<[Gauss; 3]>; 3],
     pub(super) local: Option<Local>,
     pub(super) home: Option<Home>,
@@ -151,7 +151,7 @@ pub(super) struct Motion {
     pub(super) airspeed: Option<f32>,
     pub(super) airspeed_validated: bool,
     pub(super) thrust: [Option<f32>; 2],
-    /// What the motors are given, where the log has no thrust setpoint.
+    /// Motor outputs, if the log has no thrust setpoint.
     pub(super) motors: Option<f32>,
     /// The log has `estimator_status`.
     pub(super) estimator_status: bool,
@@ -192,7 +192,7 @@ pub(super) struct Home {
 /// Batteries that serve: as many as PX4 has instances.
 pub(super) const BATTERIES_MAX: usize = 4;
 
-/// What topics said of power.
+/// State of power.
 #[derive(Debug, Default)]
 pub(super) struct Power {
     pub(super) batteries: [Option<Pack>; BATTERIES_MAX],
@@ -201,7 +201,7 @@ pub(super) struct Power {
     pub(super) has_load: bool,
 }
 
-/// What `SYS_STATUS` repeats of a battery.
+/// Values of a battery that `SYS_STATUS` repeats.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Pack {
     pub(super) voltage: Option<Volts>,
@@ -211,12 +211,12 @@ pub(super) struct Pack {
 
 /// Receivers that serve.
 pub(super) const RECEIVERS_MAX: usize = 2;
-/// What is known of the receivers.
+/// State of the receivers.
 #[derive(Debug, Default)]
 pub(super) struct Receivers {
     /// There are messages of the receivers themselves.
     pub(super) sensors: bool,
-    /// When each was heard last.
+    /// Time of each one's last message.
     pub(super) heard: [Option<Instant>; RECEIVERS_MAX],
     pub(super) told_utc: bool,
 }

@@ -1,4 +1,4 @@
-//! The autopilot itself: what it is, whether it is armed, its mode, where it stands, its words.
+//! The autopilot itself: its identity, arming, mode, landed state and texts.
 
 use hums_core::observation::{
     Autopilot, AutopilotIdentity, CommandAck, Heartbeat, LandedState, Observation, RadioControl, Sensors,
@@ -144,8 +144,8 @@ pub(super) const TOPICS: &[Topic] = &[
     },
 ];
 
-/// The conditions of `failsafe_flags`, in the order of its fields above, for people. Flags of modes that are not flown, and
-/// what only keeps it from arming, are left out.
+/// The conditions of `failsafe_flags`, in the order of its fields above, for people. Flags of unused modes,
+/// and flags that only prevent arming, are left out.
 const FAILSAFES: [&str; 22] = [
     "manual control",
     "ground station",
@@ -188,7 +188,7 @@ impl System {
         self.status.is_some_and(|status| status.arming == ARMED)
     }
 
-    /// What is said of sensors, where the log says it (until v1.13).
+    /// State of sensors, if the log has it (until v1.13).
     pub(super) fn sensors(&self) -> Option<Sensors> {
         self.status?.sensors
     }
@@ -329,14 +329,14 @@ fn status(px4: &mut Px4, said: &Said<'_>) {
     };
     px4.system.status = Some(status);
     px4.failsafes();
-    // What changes is told at once; the rest waits for its turn.
+    // Changes are reported at once; the rest waits for its turn.
     let now = |status: Status| (status.arming, status.nav, status.failsafe);
     if before.is_none_or(|before| now(before) != now(status)) {
         px4.heartbeat();
     }
 }
 
-/// Since v1.14. They are conditions, which also hold where no failsafe acts on them: they are told while it is in failsafe.
+/// Since v1.14. These conditions also hold without an active failsafe, so they are reported only in failsafe.
 fn failsafe_flags(px4: &mut Px4, said: &Said<'_>) {
     // `BATTERY_WARNING_CRITICAL`: a low battery alone is a warning.
     const BATTERY: &str = "battery";
@@ -435,8 +435,9 @@ fn log_message(px4: &mut Px4, said: &Said<'_>) {
     }
 }
 
-/// The name of a mode as `HEARTBEAT.custom_mode` has it: the main mode in the third byte, the sub mode in the fourth. What was
-/// told of before v1.13, a failure or a state that is none of the pilot's, has the number of another mode.
+/// The name of a mode in `HEARTBEAT.custom_mode`: the main mode in the third byte, the sub mode in the
+/// fourth. States before v1.13 that the pilot did not choose, such as failures, have the number of another
+/// mode.
 pub(crate) fn mode_name(mode: u32) -> Option<&'static str> {
     let [_, _, main, sub] = mode.to_le_bytes();
     let flown = MODES.iter().filter(|(nav, ..)| !matches!(nav, 8 | 9 | 11..=13));
@@ -483,7 +484,7 @@ impl Px4 {
         }
     }
 
-    /// What MAVLink repeats whether or not it was published.
+    /// The messages that MAVLink repeats without a new topic.
     pub(super) fn repeat(&mut self, recorded_us: u64) {
         self.heartbeat();
         self.landed();

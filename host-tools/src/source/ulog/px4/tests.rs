@@ -1,4 +1,4 @@
-//! What topics of several versions become.
+//! Observations from topics of several versions.
 
 use crate::source::ulog::testing::{Read, Writer, read};
 
@@ -126,7 +126,7 @@ fn a_batterys_warning_is_its_charge_state() {
         let charge = said.split("charge: ").nth(1).and_then(|rest| rest.split([',', ' ']).next());
         charge.expect("a charge state").parse::<u8>().expect("a number")
     };
-    // none, low, critical, emergency, failed, unhealthy, charging, and what is none of these.
+    // none, low, critical, emergency, failed, unhealthy, charging, and an invalid value.
     assert_eq!([0, 1, 2, 3, 4, 6, 7, 5].map(|warning| of(warning, 1)), [1, 2, 3, 4, 5, 6, 7, 0]);
     assert_eq!(of(2, 0), 0, "no battery is connected");
     let silent = log(&[(
@@ -341,7 +341,7 @@ fn the_throttle_is_that_of_the_motors_where_nothing_else_tells_it() {
     assert_eq!((throttle(false).as_str(), throttle(true).as_str()), ("0.6", "0.25"));
 }
 
-/// What is said of PX4's logs.
+/// The documentation of PX4's logs.
 const DOCUMENT: &str = include_str!("../../../../../docs/ulog.md");
 
 #[test]
