@@ -5,54 +5,26 @@
     reason = "`eprintln!` panics where standard error lies on a full disk: `output::note`, `output::aside`"
 )]
 
-/// A message on standard error: what the world put into it obeys no terminal.
-macro_rules! note {
-    ($($words:tt)*) => {
-        $crate::output::note(&format!($($words)*))
-    };
-}
+#[macro_use(note)]
+extern crate hums_base;
 
-pub mod archive;
-pub mod card;
-pub mod check;
+pub use hums_analysis::{check, counters, params, part, series, states, summary, track};
+pub use hums_base::{
+    archive, colour, duplex, endpoint, files, hex, interrupt, outcome, output, plural, printable, progress,
+    rng, sink, utc,
+};
+pub use hums_formats::{card, ending, followed, logs, loss, mavlink, names, source, statustext};
+
 pub mod cli;
-pub mod colour;
-pub mod counters;
 pub mod decode;
-pub mod duplex;
-pub mod ending;
-pub mod endpoint;
-pub mod files;
-pub mod followed;
-pub mod hex;
 pub mod info;
-pub mod interrupt;
 pub mod live;
-pub mod logs;
-pub mod loss;
-pub mod mavlink;
-pub mod names;
-pub mod outcome;
-pub mod output;
 pub mod pack;
 pub mod page;
-pub mod part;
-pub mod plural;
-pub mod printable;
-pub mod progress;
 pub mod report;
-pub mod rng;
 pub mod run;
-pub mod series;
 pub mod shell;
-pub mod sink;
-pub mod source;
-pub mod states;
-pub mod statustext;
-pub mod summary;
 pub mod talk;
-pub mod track;
-pub mod utc;
 pub mod verify;
 
 use std::ffi::OsString;
@@ -78,7 +50,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
 
 fn command(command: &Command) -> anyhow::Result<Outcome> {
     match command {
-        Command::Check(args) => check::run(args),
+        Command::Check(args) => check::run(&args.request()),
         Command::Report(args) => report::run(args),
         Command::Live(args) => live::run(args),
         Command::Decode(args) => decode::run(args),

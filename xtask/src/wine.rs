@@ -10,7 +10,7 @@ use crate::setup::{WINDOWS_TARGET, find_wine};
 use crate::shell::Shell;
 
 /// The crates of `hums`, besides itself.
-const PARTS: [&str; 8] = [
+const PARTS: [&str; 11] = [
     "hums-core",
     "hums-blackbox",
     "hums-dialect",
@@ -19,6 +19,9 @@ const PARTS: [&str; 8] = [
     "hums-recorder",
     "hums-sdcard",
     "hums-store",
+    "hums-analysis",
+    "hums-base",
+    "hums-formats",
 ];
 
 /// Rust's library takes its random numbers from here; Wine has it from version 9 on.

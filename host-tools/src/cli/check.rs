@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::read::input;
+use crate::check;
 
 const EXAMPLES: &str = "Examples:
   hums check flight.tlog
@@ -46,4 +47,19 @@ pub struct Check {
     /// Print a line with a JSON object for each log (docs/check.md)
     #[arg(long)]
     pub json: bool,
+}
+
+impl Check {
+    /// What the analysis is asked.
+    pub fn request(&self) -> check::Request<'_> {
+        check::Request {
+            inputs: &self.inputs,
+            params: self.params.as_deref(),
+            past: &self.past,
+            session: self.session.as_deref(),
+            system: self.system,
+            salvage: self.salvage,
+            json: self.json,
+        }
+    }
 }

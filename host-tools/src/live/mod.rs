@@ -63,7 +63,7 @@ pub fn run(args: &cli::Live) -> Result<Outcome> {
     } else {
         interrupt::watch();
     }
-    let limits = Limits::new(&crate::run::params::read(args.params.as_deref())?);
+    let limits = Limits::new(&crate::params::read(args.params.as_deref())?);
     let influx = database(args)?;
     let (listener, address) = listen(&args.listen)?;
     let host = args.listen.rsplit_once(':').map_or("", |(host, _)| host);

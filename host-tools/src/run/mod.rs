@@ -7,7 +7,6 @@ pub mod arrivals;
 mod earlier;
 mod emulate;
 pub mod ground;
-pub(crate) mod params;
 mod paths;
 pub mod report;
 mod salt;

@@ -14,14 +14,14 @@ use stm32f405_model::image::Image;
 use super::earlier::EarlierSessions;
 use super::report::{OnCard, Report};
 use super::{
-    InPlace, arrivals::Arrivals, check_standard_output, drive, ground, pace, params, paths, prepare_card,
-    salt, store,
+    InPlace, arrivals::Arrivals, check_standard_output, drive, ground, pace, paths, prepare_card, salt, store,
 };
 use crate::card::image::is_card;
 use crate::cli;
 use crate::endpoint::Endpoint;
 use crate::files::read_short;
 use crate::outcome::Outcome;
+use crate::params;
 use crate::plural::count;
 
 /// The ELF file of a release with all of its symbols has 8 MB.

@@ -28,12 +28,13 @@ use super::earlier::EarlierSessions;
 use super::ground::{self, Ground};
 use super::report::{FINDINGS_MAX, Report};
 use super::store::{self, FileFlash};
-use super::{InPlace, check_standard_output, drive, emulate, pace, params, paths, prepare_card, salt};
+use super::{InPlace, check_standard_output, drive, emulate, pace, paths, prepare_card, salt};
 use crate::card::image::is_card;
 use crate::card::{Faults, SimCard};
 use crate::cli;
 use crate::endpoint::Endpoint;
 use crate::outcome::{Outcome, usage};
+use crate::params;
 use crate::run::Machine as _;
 use crate::source::Chunk;
 

@@ -23,7 +23,7 @@ type Change = (&'static str, u8, Level, f64);
 
 /// The monitor's findings, and the beginning of the recording in seconds since power-on.
 fn findings(name: &str) -> (Vec<Change>, f64) {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/labelled").join(name);
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/labelled").join(name);
     let recording = Place::file(&path).open().expect("a recording");
     let mut monitor = Monitor::new(Params::default());
     let (link, recorder) = (LinkReading::default(), RecorderStatus::default());

@@ -13,7 +13,7 @@ use crate::outcome::usage;
 const BYTES_MAX: u64 = 1 << 20;
 
 /// The parameters that a file sets, in its order; none where there is no file.
-pub(crate) fn read(path: Option<&Path>) -> Result<Vec<(&'static ParamSpec, f32)>> {
+pub fn read(path: Option<&Path>) -> Result<Vec<(&'static ParamSpec, f32)>> {
     let Some(path) = path else { return Ok(Vec::new()) };
     let bytes = read_short(path, BYTES_MAX).context("--params")?;
     let text = String::from_utf8(bytes).map_err(|_| {

@@ -438,7 +438,7 @@ fn log_message(px4: &mut Px4, said: &Said<'_>) {
 /// The name of a mode in `HEARTBEAT.custom_mode`: the main mode in the third byte, the sub mode in the
 /// fourth. States before v1.13 that the pilot did not choose, such as failures, have the number of another
 /// mode.
-pub(crate) fn mode_name(mode: u32) -> Option<&'static str> {
+pub fn mode_name(mode: u32) -> Option<&'static str> {
     let [_, _, main, sub] = mode.to_le_bytes();
     let flown = MODES.iter().filter(|(nav, ..)| !matches!(nav, 8 | 9 | 11..=13));
     flown.rev().find(|(_, of, part, _)| (*of, *part) == (main, sub)).map(|&(.., name)| name)

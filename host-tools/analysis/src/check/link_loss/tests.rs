@@ -12,7 +12,7 @@ use crate::source::item::{Cause, Gap, Item};
 use crate::source::recording::Format;
 use common::{AUTOPILOT, Quad};
 
-#[path = "../../../../firmware/core/tests/common/mod.rs"]
+#[path = "../../../../../firmware/core/tests/common/mod.rs"]
 mod common;
 
 const AT_MS: u64 = 20_000;

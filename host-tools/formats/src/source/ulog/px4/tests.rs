@@ -342,7 +342,7 @@ fn the_throttle_is_that_of_the_motors_where_nothing_else_tells_it() {
 }
 
 /// The documentation of PX4's logs.
-const DOCUMENT: &str = include_str!("../../../../../docs/ulog.md");
+const DOCUMENT: &str = include_str!("../../../../../../docs/ulog.md");
 
 #[test]
 fn each_topic_that_serves_is_in_the_document_and_each_other_that_is_asked_for_is_among_the_rows() {

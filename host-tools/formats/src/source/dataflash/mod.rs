@@ -33,7 +33,7 @@ use self::binary::{Binary, Damage, Piece, Window};
 use self::format::{BEGINNING, FMT_TYPE, HEADER_BYTES};
 use self::message::Body;
 pub(super) use self::observe::is_firmware;
-pub(crate) use self::observe::mode_name;
+pub use self::observe::mode_name;
 use self::session::{First, Session};
 use self::text::{Line, Lines};
 use super::input::Input;
@@ -117,7 +117,8 @@ const BANNER_BYTES_MAX: u64 = 4_096;
 const ODD_LINE: &str = "a line with bytes that are no text";
 const CUT_LINE: &str = "a line that the beginning of another log cuts off";
 
-fn binary(input: impl std::io::Read, want: Want<'_>, take: &mut Take<'_>) -> Result<Summary> {
+/// Reads a binary log.
+pub fn binary(input: impl std::io::Read, want: Want<'_>, take: &mut Take<'_>) -> Result<Summary> {
     let mut bytes = Binary::new(input);
     let mut session = Session::new(first_of_bytes(&mut bytes)?, want);
     while let Some(piece) = bytes.next(session.lengths()).context(CONTEXT)? {

@@ -8,7 +8,7 @@ use hums_core::clock::{Instant, Span};
 use hums_onboard::monitoring::TICK;
 
 /// Pause of the checks after a long gap: messages sent once a second have come again by then.
-pub(crate) const SETTLE: Span = Span::from_secs(1);
+pub const SETTLE: Span = Span::from_secs(1);
 
 /// The two times, side by side.
 #[derive(Clone, Copy, Debug, Default)]

@@ -23,7 +23,7 @@ pub(super) use self::say::{Out, Say};
 pub(super) use self::state::{Standing, State};
 pub(super) use self::words::Craft;
 pub(in crate::source) use self::words::is_firmware;
-pub(crate) use self::words::mode_name;
+pub use self::words::mode_name;
 use super::format::Format;
 use super::message::Message;
 

@@ -6,7 +6,6 @@ mod estimator;
 mod hostile;
 mod joined;
 mod names;
-mod pause;
 mod time;
 mod writer;
 

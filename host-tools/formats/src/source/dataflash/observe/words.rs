@@ -101,7 +101,7 @@ impl Craft {
 }
 
 /// The name of a mode, by its number and the `MAV_TYPE` of the vehicle (`HEARTBEAT`).
-pub(crate) fn mode_name(vehicle: u8, number: u32) -> Option<&'static str> {
+pub fn mode_name(vehicle: u8, number: u32) -> Option<&'static str> {
     let craft = match vehicle {
         // Quadrotor, coaxial, helicopter, hexarotor, octorotor, tricopter, dodecarotor, decarotor.
         2..=4 | 13..=15 | 29 | 35 => Craft::Copter,

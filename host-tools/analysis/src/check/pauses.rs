@@ -1,8 +1,14 @@
 //! An autopilot that stops logging for a while: missing entries are not events of the vehicle.
 
-use super::*;
-use crate::check::judge::{Judge, Limits};
+#[path = "../../../formats/src/source/dataflash/tests/writer.rs"]
+#[allow(dead_code, reason = "a writer for the tests of the reader, too")]
+mod writer;
+
+use super::judge::{Judge, Limits};
+use crate::source::dataflash::binary;
+use crate::source::item::Want;
 use crate::source::recording::Format;
+use writer::Writer;
 
 /// An armed copter in these tenths of seconds, with four ESCs that report ten times a second; `silent` ones
 /// do not report.

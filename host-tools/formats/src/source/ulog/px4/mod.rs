@@ -18,7 +18,7 @@ mod tests;
 
 use hums_core::clock::Instant;
 
-pub(crate) use self::system::mode_name;
+pub use self::system::mode_name;
 
 pub(super) use state::{Px4, Said, Told, Topic};
 

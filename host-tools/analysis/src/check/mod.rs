@@ -19,22 +19,25 @@ mod link_loss;
 mod no_times;
 mod overview;
 pub mod past;
+#[cfg(test)]
+mod pauses;
 pub mod problem;
 pub mod text;
 
+use std::path::{Path, PathBuf};
+
 use anyhow::{Result, bail};
 
-pub(crate) use clock::SETTLE;
+pub use clock::SETTLE;
 pub use overview::overview;
 
-use crate::cli;
 use crate::ending::Ending;
 use crate::followed::{Followed, Logged};
 use crate::logs::side_by_side::side_by_side;
 use crate::outcome::{Outcome, Usage};
 use crate::output;
+use crate::params;
 use crate::progress;
-use crate::run::params;
 use crate::source::find::{Found, find, sessions_of};
 use crate::source::recording::Place;
 use checked::Checked;
@@ -43,12 +46,31 @@ use overview::Read;
 use past::Past;
 use text::Table;
 
+/// What `hums check` is asked.
+#[derive(Clone, Copy, Debug)]
+pub struct Request<'a> {
+    /// Recordings, logs, cards, or directories with such.
+    pub inputs: &'a [PathBuf],
+    /// A file of limits.
+    pub params: Option<&'a Path>,
+    /// Earlier flights.
+    pub past: &'a [PathBuf],
+    /// Only this session.
+    pub session: Option<&'a str>,
+    /// Only this vehicle.
+    pub system: Option<u8>,
+    /// Look at every block of an image.
+    pub salvage: bool,
+    /// Print JSON.
+    pub json: bool,
+}
+
 /// Runs `hums check`.
-pub fn run(args: &cli::Check) -> Result<Outcome> {
-    let past = Past::of(Limits::new(&params::read(args.params.as_deref())?), &args.past, args.system)?;
+pub fn run(args: &Request<'_>) -> Result<Outcome> {
+    let past = Past::of(Limits::new(&params::read(args.params)?), args.past, args.system)?;
     let (found, mut failed) = logs(args)?;
     let found = found.of_system(args.system)?;
-    let wanted = found.name_of(args.session.as_deref())?;
+    let wanted = found.name_of(args.session)?;
     found.tell();
     let mut outcome = Outcome::lossy(found.is_lossy());
     let many = found.places.len() > 1 && wanted.is_none();
@@ -106,7 +128,7 @@ pub fn run(args: &cli::Check) -> Result<Outcome> {
     if many && !args.json {
         output::line(&table.text(failed))?;
     }
-    match (failed, args.inputs.as_slice()) {
+    match (failed, args.inputs) {
         (0, _) => Ok(outcome),
         (_, [input]) if !many => bail!("{}: could not be read", input.display()),
         (failed, inputs) => {
@@ -117,8 +139,8 @@ pub fn run(args: &cli::Check) -> Result<Outcome> {
 
 /// The given logs, and the number of inputs without a log. With `--json` such an input has an object too, and
 /// the others are judged.
-fn logs(args: &cli::Check) -> Result<(Found, usize)> {
-    let error = match find(&args.inputs, args.salvage) {
+fn logs(args: &Request<'_>) -> Result<(Found, usize)> {
+    let error = match find(args.inputs, args.salvage) {
         Ok(found) => return Ok((found, 0)),
         Err(error) => error,
     };
@@ -127,7 +149,7 @@ fn logs(args: &cli::Check) -> Result<(Found, usize)> {
         return Err(error);
     }
     let (mut good, mut bad) = (Vec::new(), Vec::new());
-    for input in &args.inputs {
+    for input in args.inputs {
         match find(std::slice::from_ref(input), args.salvage) {
             Ok(_) => good.push(input.clone()),
             Err(error) if error.is::<Usage>() => return Err(error),

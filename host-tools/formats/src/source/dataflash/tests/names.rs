@@ -8,7 +8,7 @@ use super::seen;
 use super::writer::Writer;
 
 /// The documentation of these logs.
-const DOCUMENT: &str = include_str!("../../../../../docs/dataflash.md");
+const DOCUMENT: &str = include_str!("../../../../../../docs/dataflash.md");
 
 #[test]
 fn each_message_that_is_asked_for_serves_or_is_told_to_be_rows_only() {

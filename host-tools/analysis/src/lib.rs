@@ -1,0 +1,28 @@
+//! What a recording says of its vehicle.
+//!
+//! * [`check`]: the monitor of the board, run over a recording: flights, findings, what was judged and why not
+//! * [`summary`]: what is in a recording, counted
+//! * [`series`], [`track`]: quantities over time and the way over ground, for pages
+//! * [`counters`], [`part`], [`states`], [`params`]: usage, components, words for states, limits from a file
+//!
+//! It reads recordings through `hums_formats` only, and writes nothing but what is wrong.
+
+#![deny(
+    clippy::print_stderr,
+    reason = "`eprintln!` panics where standard error lies on a full disk: `output::note`, `output::aside`"
+)]
+
+#[macro_use(note)]
+extern crate hums_base;
+
+use hums_base::{colour, files, outcome, output, plural, printable, progress, utc};
+use hums_formats::{ending, followed, logs, mavlink, names, source};
+
+pub mod check;
+pub mod counters;
+pub mod params;
+pub mod part;
+pub mod series;
+pub mod states;
+pub mod summary;
+pub mod track;

@@ -1,0 +1,33 @@
+//! What all of hums is built on: files that are whole or not there ([`files`]), links ([`endpoint`], [`duplex`], [`sink`]), results
+//! and messages ([`output`], [`outcome`]), and how numbers and times are written ([`utc`], [`plural`], [`hex`]).
+//!
+//! It knows nothing of recordings or vehicles.
+
+#![deny(
+    clippy::print_stderr,
+    reason = "`eprintln!` panics where standard error lies on a full disk: `output::note`, `output::aside`"
+)]
+
+/// A message on standard error: what the world put into it obeys no terminal.
+#[macro_export]
+macro_rules! note {
+    ($($words:tt)*) => {
+        $crate::output::note(&format!($($words)*))
+    };
+}
+
+pub mod archive;
+pub mod colour;
+pub mod duplex;
+pub mod endpoint;
+pub mod files;
+pub mod hex;
+pub mod interrupt;
+pub mod outcome;
+pub mod output;
+pub mod plural;
+pub mod printable;
+pub mod progress;
+pub mod rng;
+pub mod sink;
+pub mod utc;

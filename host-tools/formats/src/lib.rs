@@ -1,0 +1,31 @@
+//! Readers of recordings. Each becomes one stream of [`source::item::Item`]s, whatever its format.
+//!
+//! * [`source`]: tlog, raw MAVLink, DataFlash, ULog and HUMS logs, their clocks, and what a file is by its content
+//! * [`logs`]: HUMS logs on cards and images: file system, sessions, groups, sectors made again from parity
+//! * [`ending`], [`followed`]: how a HUMS log ends, and what proves that
+//! * [`card`]: card images and the simulated card
+//! * [`mavlink`], [`names`], [`statustext`]: fields, names and texts
+//!
+//! It judges no vehicle and writes no output.
+
+#![deny(
+    clippy::print_stderr,
+    reason = "`eprintln!` panics where standard error lies on a full disk: `output::note`, `output::aside`"
+)]
+
+#[macro_use(note)]
+extern crate hums_base;
+
+use hums_base::{
+    archive, duplex, endpoint, files, hex, interrupt, outcome, plural, printable, progress, rng, utc,
+};
+
+pub mod card;
+pub mod ending;
+pub mod followed;
+pub mod logs;
+pub mod loss;
+pub mod mavlink;
+pub mod names;
+pub mod source;
+pub mod statustext;
