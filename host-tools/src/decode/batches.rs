@@ -10,7 +10,8 @@ use super::table::Table;
 use crate::mavlink::frame::Frame;
 use crate::mavlink::values::Payload;
 
-/// One group's entries: frames as columns, rows as they are, since the first row of the whole log says what its columns are.
+/// One group's entries: frames as columns; rows unchanged, since the first row of the whole log determines
+/// the columns.
 #[derive(Debug, Default)]
 pub struct Batches {
     frames: BTreeMap<Table, TableRows>,
@@ -21,12 +22,12 @@ pub struct Batches {
 /// A row with its time since power-on and its UTC.
 pub type TimedRow = (Instant, Option<u64>, Row);
 
-/// What a table takes without a row, and a row besides the values of its message: its times, its sender.
+/// Memory of an empty table, and of a row besides the values of its message: its times, its sender.
 const TABLE_BYTES: usize = 4_096;
 const ROW_BYTES: usize = 32;
-/// What an offset or a length takes, for each field.
+/// Memory of an offset or a length, for each field.
 const FIELD_BYTES: usize = 4;
-/// What a cell of a row takes, a short text on the heap included; a long one takes its length besides.
+/// Memory of a cell of a row, a short text on the heap included; a long one takes its length in addition.
 const CELL_BYTES: usize = 96;
 
 /// The table of a frame: one for all ids without a definition of ours, and one for those made with another.

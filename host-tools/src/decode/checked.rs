@@ -1,5 +1,6 @@
-//! Who checked the vehicle's health in a log, as rows: `HUMS_CHECKED`, one row a log, and `HUMS_FINDING` of what this program
-//! found where the recorder ran no checks. A table without a finding is then no table that nobody has checked.
+//! The checker of the vehicle's health in a log, as rows: `HUMS_CHECKED`, one row a log. If the recorder ran
+//! no checks, also `HUMS_FINDING` with the findings of this program. So an empty table of findings means a
+//! checked log.
 
 use hums_core::clock::Instant;
 use hums_core::health::Level;
@@ -8,14 +9,14 @@ use super::row::{Cell, CellType, Row};
 use crate::check::judged::{Judged, JudgedBy, TOO_LITTLE};
 use crate::source::told::Finding;
 
-/// The word for the monitor on board, as `hums info --json` has it in `checked_by`.
+/// Word for the monitor on board, as `checked_by` in `hums info --json`.
 pub const BOARD: &str = "board";
-/// The word for this program.
+/// Word for this program.
 const HUMS: &str = "hums";
-/// The word where nothing could be judged.
+/// Word if nothing could be judged.
 const NOBODY: &str = "nobody";
 
-/// What this program found in a recording whose recorder ran no checks.
+/// This program's findings in a recording whose recorder ran no checks.
 #[derive(Clone, Debug)]
 pub struct Checked {
     by: &'static str,
@@ -39,7 +40,7 @@ impl Checked {
         Some(Self { by, verdict, findings, count, judged, not_judged, is_timeless })
     }
 
-    /// Why there are no findings of anybody, as a part of a sentence; `None` where it was checked.
+    /// The reason for missing findings, as a part of a sentence; `None` if it was checked.
     pub fn not_checked(&self) -> Option<&'static str> {
         let why = if self.is_timeless {
             "not checked: it has no times"
@@ -54,7 +55,7 @@ impl Checked {
         self.findings.iter().map(|finding| (finding.at, finding_row(finding, self.by)))
     }
 
-    /// The row of the log; where only a part of it is wanted, of the findings in that part.
+    /// The row of the log; for a part of it, of the findings in that part.
     pub fn row(&self, part: Option<&dyn Fn(Instant) -> bool>) -> Row {
         let (verdict, findings) = match part.filter(|_| self.by == HUMS) {
             None => (self.verdict, self.count),
@@ -76,7 +77,7 @@ impl Checked {
 #[derive(Clone, Copy, Debug, Default)]
 pub struct OnBoard {
     count: u64,
-    /// The worst level, by its number; that of an input which stopped is none.
+    /// The worst level, by its number; a stopped input does not count.
     worst: u8,
 }
 
@@ -95,7 +96,7 @@ impl OnBoard {
         self.worst = self.worst.max(next.worst);
     }
 
-    /// The worst, as `hums check` calls it: what is only worth knowing is nothing wrong.
+    /// The worst level, as in `hums check`: advisories are not problems.
     fn verdict(self) -> &'static str {
         match Level::ALL.get(usize::from(self.worst)) {
             Some(level @ (Level::Warning | Level::Critical)) => level.name(),
@@ -103,7 +104,7 @@ impl OnBoard {
         }
     }
 
-    /// The row of the log. What its monitor could not judge is not in the record.
+    /// The row of the log. The record does not name the checks that its monitor could not judge.
     pub fn row(&self) -> Row {
         let unknown = || Cell::Unknown(CellType::Count);
         row(BOARD, self.verdict(), self.count, unknown(), unknown())

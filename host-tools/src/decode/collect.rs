@@ -42,7 +42,7 @@ pub struct Collected<'a> {
     pub influx: Lines,
     /// Columns of the Parquet output.
     pub parquet: Batches,
-    /// What the vehicle told, for what can only be made in order.
+    /// The vehicle's observations, for outputs that are made in order.
     pub observed: Vec<Observed>,
     /// Frames written.
     pub frames: u64,
@@ -52,7 +52,7 @@ pub struct Collected<'a> {
     pub on_board: OnBoard,
     /// Rows of tables for whose names there was no room.
     pub rows_left_out: u64,
-    /// Bytes in `tables`, and what the tables themselves take.
+    /// Bytes in `tables`, with the tables' own memory.
     tables_bytes: usize,
 }
 
@@ -60,7 +60,7 @@ pub struct Collected<'a> {
 const TABLE_BYTES: usize = 256;
 
 impl<'a> Collected<'a> {
-    /// Nothing yet.
+    /// Empty.
     pub fn new(context: &'a Context) -> Self {
         Self {
             context,
@@ -209,7 +209,7 @@ impl<'a> Collected<'a> {
 
 impl Collect for Collected<'_> {
     fn item(&mut self, at: Instant, item: Item<'_>) {
-        // Whether wanted or not: what is wanted later depends on what the vehicle was before.
+        // Always: later items depend on the vehicle's earlier state.
         if let Item::Observation(source, observation) = item {
             self.observed.push(Observed { at, source, observation: *observation });
         }
@@ -244,7 +244,7 @@ impl Collect for Collected<'_> {
     }
 }
 
-/// What a table's lines take; nothing before the first one.
+/// Memory of a table's lines; 0 before the first one.
 fn table_bytes(lines: &[u8]) -> usize {
     if lines.is_empty() { 0 } else { TABLE_BYTES + lines.len() }
 }

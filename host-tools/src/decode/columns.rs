@@ -1,6 +1,6 @@
-//! The columns of a Parquet table, gathered until they are written as a row group: of frames with the types that were sent, of
-//! rows with the types of the first row's cells. A row takes as many bytes as its values: a log of thousands of tables,
-//! each with a few rows, takes no more than a log of a few tables.
+//! The columns of a Parquet table, gathered until they are written as a row group. Columns of frames have the
+//! sent types, columns of rows those of the first row's cells. A row takes as many bytes as its values. So a
+//! log of thousands of tables, each with a few rows, takes no more than a log of a few tables.
 
 use hums_core::clock::Instant;
 use hums_dialect::Kind as Sent;
@@ -83,7 +83,7 @@ impl Kind {
 
     fn logical_type(self) -> Option<LogicalType> {
         match self {
-            // What Parquet's own types are.
+            // Parquet's own types.
             Self::Signed(32 | 64) | Self::Single | Self::Double | Self::Flag => None,
             Self::Signed(bits) => Some(LogicalType::integer(bits, true)),
             Self::Unsigned(bits) => Some(LogicalType::integer(bits, false)),
@@ -138,7 +138,7 @@ pub(super) struct Column {
     kind: Kind,
     units: &'static str,
     enumeration: &'static str,
-    /// Elements of each row's list; 0 if its rows are no lists.
+    /// Elements of each row's list; 0 without lists.
     length: usize,
     is_optional: bool,
     /// Those that are there.
@@ -184,7 +184,7 @@ impl Column {
         Self { units, ..Self::new(free_name(&plain, &TAKEN), kind).optional() }
     }
 
-    /// What a reader may want to know of it besides its name and its type.
+    /// Its properties besides name and type.
     pub(super) fn about(&self) -> impl Iterator<Item = (String, &'static str)> {
         let known = [("units", self.units), ("enum", self.enumeration)];
         let name = &self.name;
@@ -231,7 +231,7 @@ impl Column {
     /// Adds a value of this field.
     fn push_value(&mut self, value: Value<'_>) {
         match value {
-            // What is not UTF-8 gets replacement characters.
+            // Invalid UTF-8 gets replacement characters.
             Value::Text(text) => self.push_text(&String::from_utf8_lossy(text)),
             Value::Scalar(scalar) => self.push_scalar(scalar),
             Value::Array(array) => array.iter().for_each(|scalar| self.push_scalar(scalar)),
@@ -326,7 +326,7 @@ impl Column {
             Values::Doubles(values) => values.len(),
             Values::Texts(values) => values.ends.len(),
         };
-        // The first element of a list begins a row, and none is missing.
+        // The first element of a list begins a row; lists have no gaps.
         let begins: Vec<i16> = match self.length {
             0 => Vec::new(),
             length => (0..values).map(|at| i16::from(at % length > 0)).collect(),
@@ -446,7 +446,7 @@ impl TableRows {
         }
     }
 
-    /// Takes all rows out; none are left.
+    /// Takes all rows out, and leaves it empty.
     pub fn take(&mut self) -> Self {
         let (rows, columns) = (std::mem::take(&mut self.rows), &mut self.columns);
         let take = |column: &mut Column| Column {

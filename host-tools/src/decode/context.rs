@@ -1,4 +1,4 @@
-//! What is asked for, and what all parts of a log's decoding need to know.
+//! The request, and the context common to all parts of a log's decoding.
 
 use super::checked::Checked;
 use super::identity::Identity;
@@ -56,24 +56,24 @@ impl Formats {
     }
 }
 
-/// What all parts of one log's decoding need to know.
+/// Context common to all parts of one log's decoding.
 #[derive(Debug, Default)]
 pub struct Context {
-    /// What to write.
+    /// The formats to write.
     pub formats: Formats,
-    /// UTC by the clock of each part: of a log of ours, that of the power-on.
+    /// UTC by the clock of each part; for a log of ours, at the power-on.
     pub epochs: Epochs,
-    /// What of it is wanted.
+    /// The wanted part of it.
     pub selection: Selection,
-    /// Who flew and when, where a format asks for it.
+    /// Vehicle and date, if a format needs them.
     pub identity: Identity,
     /// The same for the line protocol.
     pub tags: Tags,
     /// The session, for the stamps of its folders.
     pub session: String,
-    /// What must not be written over.
+    /// Files that must not be overwritten.
     pub inputs: Inputs,
-    /// What this program found, where the recorder ran no checks, and it was read for that before.
+    /// This program's findings, if the recorder ran no checks and an earlier reading made them.
     pub checked: Option<Checked>,
     /// It is judged while it is read.
     pub judges: bool,

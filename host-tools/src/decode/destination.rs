@@ -1,4 +1,4 @@
-//! Where a log's files go.
+//! The destination of a log's files.
 
 use std::path::{Path, PathBuf};
 
@@ -6,7 +6,7 @@ use crate::files::{appended, says_directory};
 
 use super::context::Formats;
 
-/// Where a log's files go.
+/// The destination of a log's files.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Destination {
     /// The one file goes to standard output.
@@ -35,7 +35,7 @@ impl Destination {
         }
     }
 
-    /// The directory of the CSV tables. A single file has none.
+    /// The directory of the CSV tables; `None` for a single file.
     pub fn tables(&self) -> Option<PathBuf> {
         match self {
             Self::Standard | Self::File(_) => None,
@@ -43,7 +43,7 @@ impl Destination {
         }
     }
 
-    /// The directory of the reference system's tables. A single file has none.
+    /// The directory of the reference system's tables; `None` for a single file.
     pub fn thesis(&self) -> Option<PathBuf> {
         self.tables().map(|name| appended(&name, "thesis"))
     }

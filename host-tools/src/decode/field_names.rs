@@ -1,9 +1,9 @@
-//! What a field is called in an output that has names of its own.
+//! The name of a field in an output with names of its own.
 
 use std::borrow::Cow;
 
-/// A field's name, with `_field` behind it where `taken` has that name already: the one rule of all outputs, so that a
-/// message's `session` is `session_field` in the line protocol as in Parquet.
+/// A field's name, with `_field` appended if `taken` has that name already. This is the rule of all outputs,
+/// so a message's `session` is `session_field` in the line protocol as in Parquet.
 pub(super) fn free_name<'a>(name: &'a str, taken: &[&str]) -> Cow<'a, str> {
     if taken.contains(&name) { Cow::Owned(format!("{name}_field")) } else { Cow::Borrowed(name) }
 }

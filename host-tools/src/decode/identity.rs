@@ -1,5 +1,5 @@
-//! Who flew and when, known before the first byte is written: what the line protocol tags every point with, and where
-//! the Parquet tables lie.
+//! Vehicle and date of a log, known before the first byte is written. They are the tags of every point of the
+//! line protocol, and the path of the Parquet tables.
 
 use anyhow::Result;
 use hums_blackbox::Record;
@@ -19,10 +19,10 @@ use crate::utc::iso8601;
 /// A session's names. Each begins with a letter: a tool that guesses types must not make a number of it.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Identity {
-    /// `uid-0031002a3035510a` where the autopilot told its unique id, otherwise the board's own,
-    /// `box-3f0042000d51373435363338`; where there is neither, `system-1` or `unknown`.
+    /// `uid-0031002a3035510a` from the autopilot's unique id, otherwise `box-3f0042000d51373435363338` from
+    /// the board's own; without both `system-1` or `unknown`.
     pub vehicle: String,
-    /// The day of its first entry, UTC: `2026-11-21`; `None` where nobody told it.
+    /// The day of its first entry, UTC: `2026-11-21`; `None` if unknown.
     pub date: Option<String>,
     /// `s1a2b3c4d`: the session number of a HUMS log; `r1a2b3c4d`: a number made of a recording's bytes.
     pub session: String,
@@ -30,9 +30,9 @@ pub struct Identity {
     pub epochs: Epochs,
 }
 
-/// Who flew and when, and UTC; where it is asked for, what the monitor here says of it, as `hums check` does, unless the one on
-/// board did. The recording is read through for it. Its `session` is that of its files' names, so that another version of this
-/// program, which understands other messages, gives the same.
+/// Vehicle, date and UTC of a recording. If `judges`, also the findings by the monitor here, as in
+/// `hums check`, unless one on board checked it. The recording is read once for it. Its `session` is taken
+/// from its files' names, so it does not depend on the messages that this version understands.
 pub fn identity(place: &Place, session: String, judges: bool) -> Result<(Identity, Option<Checked>)> {
     let (mut known, mut epochs) = (Known::default(), Epochs::default());
     let want = Want { observations: true, ..Want::default() };
@@ -62,10 +62,11 @@ pub fn identity(place: &Place, session: String, judges: bool) -> Result<(Identit
     Ok((Identity { vehicle, date, session, epochs }, checked))
 }
 
-/// What tells who it is.
+/// Sources of the identity.
 #[derive(Default)]
 struct Known {
-    /// What the monitor recorded of the vehicle; a packed log has no such record, so the vehicle's own words count too.
+    /// The monitor's record of the vehicle. A packed log has no such record, so the vehicle's own messages
+    /// count too.
     recorded: Option<Vehicle>,
     /// The board's unique id.
     board: Option<[u8; 12]>,

@@ -1,17 +1,19 @@
-//! The line protocol of `InfluxDB`, `VictoriaMetrics`, `QuestDB` and Telegraf: `measurement,tags fields nanoseconds`.
+//! The line protocol of `InfluxDB`, `VictoriaMetrics`, `QuestDB` and Telegraf:
+//! `measurement,tags fields nanoseconds`.
 //!
-//! * `HUMS`: the reference system's measurement with its field names, so that its dashboards keep working. A point for
-//!   each message that tells one of its quantities; an ESC's points carry the tag `motor`. All fields are floats.
-//! * `ATTITUDE` and so on: a point for each frame, its fields as sent. Integers are integers. A `uint64_t` with a unit
-//!   is an integer too, one without (an id, a bit mask) is text, because the protocol's integers are signed. NaN and
-//!   the infinities do not exist in the protocol: such fields are left out.
+//! * `HUMS`: the reference system's measurement with its field names, so that its dashboards keep working.
+//!   One point for each message with one of its quantities; an ESC's points carry the tag `motor`. All fields
+//!   are floats.
+//! * `ATTITUDE` and so on: a point for each frame, its fields as sent. Integers are integers. A `uint64_t`
+//!   with a unit is an integer too; one without (an id, a bit mask) is text, because the protocol's integers
+//!   are signed. NaN and the infinities do not exist in the protocol: such fields are left out.
 //! * `HUMS_FINDING`, `HUMS_GAP` and so on: the monitor's own records.
 //!
-//! Tags: `vehicle`, `session` on all; `system` and `component` (the sender) on frames; `motor` where it is one motor's;
-//! `subsystem`, `check`, `counter` on records that have them.
+//! Tags: `vehicle` and `session` on all; `system` and `component` (the sender) on frames; `motor` on values
+//! of one motor; `subsystem`, `check`, `counter` on records with them.
 //!
-//! A database keeps one point for a set of tags and a time. The record's clock has milliseconds, in which a message may
-//! come twice: the second one's time is a nanosecond later, so that none replaces another.
+//! A database keeps one point for a set of tags and a time. The record's clock has milliseconds, in which a
+//! message may come twice: the second one's time is a nanosecond later, so that both are kept.
 
 use hums_core::clock::Instant;
 use hums_core::health::Level;
@@ -29,7 +31,7 @@ use crate::mavlink::ids::ACTUATOR_OUTPUT_STATUS;
 use crate::mavlink::values::{Payload, Scalar, Value};
 use crate::source::epochs::Epochs;
 
-/// Columns of records that are tags: few values, and what one groups by.
+/// Columns of records that are tags: few values, used for grouping.
 const TAGS: [&str; 3] = ["subsystem", "check", "counter"];
 /// Names that the database or our tags have already: a field called `time` would be dropped.
 pub(super) const TAKEN: [&str; 5] = ["time", "vehicle", "session", "system", "component"];
@@ -68,7 +70,7 @@ pub struct Lines {
 }
 
 impl Lines {
-    /// Whether there is nothing.
+    /// Whether it has no lines.
     pub fn is_empty(&self) -> bool {
         self.ends.is_empty()
     }
@@ -87,7 +89,7 @@ impl Lines {
         self.text.len()
     }
 
-    /// Ends the line that began at `start`; one without a field is none.
+    /// Ends the line that began at `start`; a line without fields is dropped.
     fn end(&mut self, start: usize, at: Instant, fields: usize) {
         if fields == 0 {
             self.text.truncate(start);
@@ -124,7 +126,7 @@ impl Lines {
         }
     }
 
-    /// What the actuators are told, where the autopilot says it: the status untagged, the values by `motor`.
+    /// Actuator commands, if the autopilot reports them: the status untagged, the values by `motor`.
     fn actuators(&mut self, tags: &Tags, at: Instant, payload: &Payload) {
         let Some(active) = payload.number("active") else { return };
         self.reference(tags, at, None, [("Actuator Output Status".to_owned(), Scalar::Double(active))]);
@@ -139,7 +141,7 @@ impl Lines {
         }
     }
 
-    /// Points of the reference system's measurement for what an observation told.
+    /// Points of the reference system's measurement from an observation.
     pub fn observed(&mut self, tags: &Tags, at: Instant, reference: &Reference, observation: &Observation) {
         for (motor, quantities) in reference.told_by(observation) {
             let fields = quantities
@@ -316,7 +318,7 @@ impl<'a> Fields<'a> {
     }
 }
 
-/// A key with a backslash before what would end it.
+/// A key with escaped delimiters.
 fn push_key(out: &mut Vec<u8>, key: &str) {
     for byte in key.bytes() {
         if matches!(byte, b',' | b' ' | b'=') {

@@ -1,4 +1,4 @@
-//! What a decoding made, for people and as JSON.
+//! The outputs of a decoding, for people and as JSON.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -7,19 +7,19 @@ use serde::Serialize;
 
 use crate::plural::{count, noun};
 
-/// What `hums decode --json` prints.
+/// Output of `hums decode --json`.
 #[derive(Debug, Default, Serialize)]
 pub struct MadeJson {
     /// By log.
     pub logs: Vec<LogJson>,
 }
 
-/// A log, and what was made of it.
+/// A log, and its outputs.
 #[derive(Debug, Serialize)]
 pub struct LogJson {
     /// Its name.
     pub name: String,
-    /// Nothing of it is lost, damaged or not proved, and all that was asked for is there.
+    /// The log is complete, undamaged and proved, and all requested outputs are there.
     pub whole: bool,
     /// Its files and folders.
     pub files: Vec<Made>,
@@ -45,7 +45,7 @@ impl Made {
         Self { path, format, counts, words: words.join(", ") }
     }
 
-    /// With what these words say.
+    /// With this description.
     pub fn with_words(path: PathBuf, format: &'static str, words: String) -> Self {
         Self { path, format, counts: BTreeMap::new(), words }
     }

@@ -1,25 +1,30 @@
 //! `hums decode`: logs and recordings become files for other tools.
 //!
-//! | format | what | where |
+//! | format | content | files |
 //! |---|---|---|
 //! | `tlog` | every frame bit for bit, UTC before it | one file a log |
-//! | `csv` | a table for each message type, `HUMS_*` tables for the monitor's own records and for gaps | one file a table |
+//! | `csv` | a table for each message type, `HUMS_*` tables for the monitor's own records and for gaps | one
+//! file a table |
 //! | `jsonl` | everything in order, an object a line | one file a log |
-//! | `influx` | line protocol: the reference system's measurement, every frame, every record | one file a log |
+//! | `influx` | line protocol: the reference system's measurement, every frame, every record | one file a log
+//! |
 //! | `hum` | a log as the box writes it, of a tlog or raw recording ([`crate::pack`]) | one file |
 //! | `parquet` | typed columns, the tables of `csv` | one file a table, by vehicle, date and session |
 //! | `thesis` | the reference system's four tables | four files a log |
 //!
-//! A log is read once (twice where its vehicle must be known first), and judged in the same reading where nobody has; its groups are turned to text and columns in
-//! parallel and written in order. Several logs go side by side, few enough that memory stays bounded.
+//! A log is read once (twice if its vehicle must be known first), and an unchecked one is judged in the same
+//! reading. Its groups become text and columns in parallel, and are written in order. Several logs are
+//! decoded in parallel, few enough that memory stays bounded.
 //!
 //! A log's files are named after its session ([`naming`]), and written by the rules of [`crate::files`].
 //!
-//! Recordings of every kind go the same way ([`crate::source::parts`]); an autopilot's log has its own tables (`native`).
+//! Recordings of every kind go the same way ([`crate::source::parts`]); an autopilot's log has its own tables
+//! (`native`).
 //!
-//! `--split flights` cuts a log between its flights, each of which is decoded as a log of its own.
+//! `--split flights` cuts a log between its flights, and decodes each as a log of its own.
 //!
-//! Gaps are in every format: `HUMS_GAP` tables, objects and points; a table `gaps.csv` beside a tlog and with `thesis`.
+//! Gaps are in every format: `HUMS_GAP` tables, objects and points; a table `gaps.csv` beside a tlog and with
+//! `thesis`.
 
 pub mod batches;
 pub mod checked;
@@ -85,7 +90,7 @@ use selection::Selection;
 use works::{Work, check_forms, works};
 use write::Writers;
 
-/// What `hums decode --json` prints.
+/// Output of `hums decode --json`.
 pub const SCHEMA: Schema = Schema::first("hums-decode");
 
 /// Runs `hums decode`.
@@ -145,7 +150,7 @@ pub fn run(args: &cli::Decode) -> Result<Outcome> {
     Ok(outcome)
 }
 
-/// What lies beside the one log that is asked for: it tells how that ends.
+/// A log beside the requested one, which may show how that one ends.
 fn beside(work: &Work<'_>) -> Result<Done> {
     let ending = match work.log.own() {
         Some(_) => Some(check::overview(work.log)?.ending),
@@ -157,8 +162,8 @@ fn beside(work: &Work<'_>) -> Result<Done> {
 /// Endings of the files that are made: no folder is made of such a name by mistake.
 const FILE_NAMES: [&str; 5] = ["tlog", "jsonl", "lp", "csv", "parquet"];
 
-/// Whether the output is standard output; an error where what is asked for does not go there, or into the file that it
-/// names.
+/// Whether the output is standard output. An error if the requested formats cannot go there, or into the
+/// given file.
 fn check_output(args: &cli::Decode, logs: usize, formats: Formats) -> Result<bool> {
     let standard_output = means_standard_output(&args.output);
     if standard_output && (logs != 1 || !formats.is_single_file()) {
@@ -190,10 +195,11 @@ fn check_output(args: &cli::Decode, logs: usize, formats: Formats) -> Result<boo
     Ok(standard_output)
 }
 
-/// A log that was read into its files, which are not whole yet; what this program found, where it was judged in the same reading.
+/// A log that was read into its still incomplete files, with this program's findings if it was judged in the
+/// same reading.
 type Read<'a> = (Summary, Writers<'a>, Option<Checked>);
 
-/// What to do with each log.
+/// The work for each log.
 struct Task<'a> {
     formats: Formats,
     selection: Selection,
@@ -203,7 +209,7 @@ struct Task<'a> {
     logs: usize,
 }
 
-/// A log's outcome, to be told in the logs' order.
+/// A log's outcome, reported in the logs' order.
 struct Done {
     name: String,
     outcome: Outcome,
@@ -211,20 +217,20 @@ struct Done {
     ending: Option<Ending>,
     /// Whether there was anything to write.
     written: bool,
-    /// What was written.
+    /// The files written.
     made: Vec<Made>,
-    /// What there is to say of it.
+    /// Remarks on it.
     remarks: Vec<String>,
 }
 
 impl Done {
-    /// Nothing was written of it, and nothing is said.
+    /// Without files and remarks.
     fn of(log: &Place) -> Self {
         let (made, remarks) = (Vec::new(), Vec::new());
         Self { name: log.name.clone(), outcome: Outcome::Done, ending: None, written: false, made, remarks }
     }
 
-    /// Adds what was written of the same log besides.
+    /// Adds further files of the same log.
     fn add(&mut self, next: Self) {
         self.outcome = self.outcome.and(next.outcome);
         self.ending = next.ending.or_else(|| self.ending.take());
@@ -239,7 +245,7 @@ impl Done {
         self.outcome.and(Outcome::lossy(!is_sound))
     }
 
-    /// Says what there is to say of it, and what was written, or adds that to the JSON.
+    /// Prints the remarks and the files written, or adds them to the JSON.
     fn tell(self, json: Option<&mut MadeJson>) -> Result<()> {
         for remark in &self.remarks {
             note!("{remark}");
@@ -263,7 +269,8 @@ impl Logged for Done {
     }
 }
 
-/// What of a log has no time of day, as a remark; a usage error where one is asked for and all of it has none.
+/// A remark on the parts of a log without a time of day. A usage error if the request has a time of day and
+/// no part has one.
 fn check_clock(name: &str, context: &Context) -> Result<Option<String>> {
     let what = match context.epochs.untold() {
         (0, _) => return Ok(None),
@@ -306,7 +313,7 @@ impl Task<'_> {
         Ok(done)
     }
 
-    /// Decodes what the context selects of a log into files of this name.
+    /// Decodes the selected part of a log into files of this name.
     fn decode_part(
         &self,
         work: &Work<'_>,
@@ -366,7 +373,7 @@ impl Task<'_> {
         Ok(Done { outcome, ending, written: true, made, remarks, ..Done::of(log) })
     }
 
-    /// What must be known of a log before its first byte is written.
+    /// The context of a log, needed before its first byte is written.
     fn context(&self, work: &Work<'_>) -> Result<Context> {
         let mut context = Context {
             formats: self.formats,
@@ -393,8 +400,8 @@ impl Task<'_> {
         Ok(context)
     }
 
-    /// UTC at power-on as a reading has found it, where that is not what the log's files were begun with. A reading that
-    /// ended because the files there differ may have ended for just that.
+    /// UTC at power-on from a reading, if the log's files were begun with another one. A reading that failed
+    /// because the existing files differ may have failed for that reason.
     #[expect(clippy::option_option, reason = "it may be known now that nobody told it")]
     fn better_epoch(&self, place: &Place, context: &Context, read: &Result<Read<'_>>) -> Option<Option<u64>> {
         let epoch_us = match (read, place.own()) {
@@ -456,7 +463,7 @@ fn flights(log: &Place) -> Result<Vec<(Instant, Instant)>> {
     Ok(if flights.is_empty() { Vec::new() } else { begins.zip(ends).collect() })
 }
 
-/// A log that is a copy of another one: nothing is written of it, and it is read for what there is to say of it.
+/// A copy of another log: it is read for remarks only, and no files are written.
 fn copy(log: &Place, of: &str) -> Result<Done> {
     let remarks = vec![format!("{}: is a copy of {of}, which is written once", log.name)];
     let ending = log.own().map(Overview::verified).transpose()?.map(|overview| overview.ending);
@@ -464,7 +471,7 @@ fn copy(log: &Place, of: &str) -> Result<Done> {
     Ok(Done { written: true, ending, remarks, ..Done::of(log) })
 }
 
-/// Says that nothing that was asked for is in a log, and what time it has.
+/// The message for a log without the requested data, with the log's own times.
 fn nothing_of(log: &Place, summary: &Summary, selection: &Selection) -> String {
     let seconds = |at: Option<Instant>| at.map_or(0.0, |at| at.as_micros() as f64 / 1e6);
     let names = selection.names().join(", ");
@@ -480,8 +487,8 @@ fn nothing_of(log: &Place, summary: &Summary, selection: &Selection) -> String {
     )
 }
 
-/// A directory for a session's tables. A further log of one command under the same session (a copy that was cut short, a
-/// board without a source of randomness) gets a number.
+/// A directory for a session's tables. A further log with the same session in one command (a shortened copy,
+/// a board without a source of randomness) gets a number.
 fn claim(taken: &mut BTreeSet<PathBuf>, dir: &Path, nth: u32) -> PathBuf {
     let numbered = |number: u32| {
         let mut name = dir.to_owned().into_os_string();
@@ -498,7 +505,7 @@ fn claim(taken: &mut BTreeSet<PathBuf>, dir: &Path, nth: u32) -> PathBuf {
 
 /// The directory of a session's Parquet tables, named as the tools that read them expect.
 fn partition(output: &Path, identity: &Identity) -> PathBuf {
-    // Hive's word for "null", which every reader of this layout knows.
+    // Hive's word for "null", known to every reader of this layout.
     let date = identity.date.as_deref().unwrap_or("__HIVE_DEFAULT_PARTITION__");
     output
         .join(format!("vehicle={}", identity.vehicle))

@@ -1,4 +1,4 @@
-//! What the files are called that are made of a session: by the name that says whose it is ([`crate::logs::naming`]).
+//! Names of a session's files: the session's name from [`crate::logs::naming`].
 
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -19,13 +19,13 @@ use crate::source::recording::Place;
 /// Of a file's own name: file systems take 255 bytes, and 55 at most follow.
 const NAME_BYTES_MAX: usize = 190;
 
-/// What tells a log from any other, read from its sectors' headers and its first records. Of a card's session it is
-/// the same wherever the card or a copy of it lies.
+/// The identity of a log, from its sectors' headers and its first records. For a session on a card it is the
+/// same for the card and all copies of it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Traits {
-    /// The session that the sectors name: 32 bits, of which a board makes random ones.
+    /// The session in the sectors: 32 bits, random on a board.
     session: Option<u32>,
-    /// The board's unique id; none where the log does not begin with the record of its start.
+    /// The board's unique id; `None` if the log does not begin with the record of its start.
     board: Option<[u8; 12]>,
     /// Of every sector's number and checksum: equal of copies only.
     fingerprint: Fingerprint,
@@ -65,8 +65,8 @@ impl Traits {
         session_name(&base(log), self.board.as_ref(), self.session)
     }
 
-    /// The session by which tables and points name it, and at the end of its files' names: of a HUMS log the number in its
-    /// sectors, `s1a2b3c4d`; of any other recording a number made of its bytes, `r1a2b3c4d`.
+    /// The session's name in tables and points, and at the end of its files' names. For a HUMS log it is the
+    /// number in its sectors, `s1a2b3c4d`; for any other recording a number made from its bytes, `r1a2b3c4d`.
     pub fn identity(&self, place: &Place) -> String {
         let number = self.session.map(|session| format!("s{session:08x}"));
         let content = || place.path().and_then(content_identity);
@@ -75,7 +75,7 @@ impl Traits {
     }
 }
 
-/// What a log's files are called in one command.
+/// The name of a log's files in one command.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Named {
     /// By this name, and as the so-and-so-many-th log of its session, from 1.
@@ -84,8 +84,8 @@ pub enum Named {
     Copy(usize),
 }
 
-/// Names the logs of one command, in their order. Two that share a session and are no copies of each other get
-/// different names: a copy that was cut short, for instance.
+/// Names the logs of one command, in their order. Two different logs of one session get different names: a
+/// shortened copy, for instance.
 #[derive(Debug, Default)]
 pub struct Names {
     /// The indices of logs, by session and content.
@@ -114,7 +114,7 @@ impl Names {
     }
 }
 
-/// Names all logs of one command. A mere copy has no name, wherever it stands before its original.
+/// Names all logs of one command. A mere copy has no name, also if it comes before its original.
 pub fn names(logs: &[(&Place, Traits)], sessions: &Sessions) -> Vec<Named> {
     let mut names = Names::default();
     let original = |log: &Place| {
@@ -128,8 +128,9 @@ pub fn names(logs: &[(&Place, Traits)], sessions: &Sessions) -> Vec<Named> {
     logs.iter().enumerate().map(name).collect()
 }
 
-/// Inputs without those that `hums decode` and `hums report` make and that are no recordings, and what is said of them:
-/// a second `hums decode * -o .` is given the outputs of the first. An input alone is what the user means.
+/// Removes our own outputs that are not recordings (of `hums decode` and `hums report`) from the inputs, and
+/// returns remarks about them. A second `hums decode * -o .` gets the outputs of the first. A single input is
+/// always kept.
 pub fn without_made(inputs: &[PathBuf]) -> (Vec<PathBuf>, Vec<String>) {
     let (made, others): (Vec<&PathBuf>, Vec<&PathBuf>) = inputs.iter().partition(|input| is_made(input));
     if others.is_empty() {
@@ -140,7 +141,7 @@ pub fn without_made(inputs: &[PathBuf]) -> (Vec<PathBuf>, Vec<String>) {
     (others.into_iter().cloned().collect(), made.iter().map(remark).collect())
 }
 
-/// Whether a file or a folder has a name, or a folder a stamp, as our outputs that are no recordings have.
+/// Whether a file's name, or a folder's name or stamp, marks an output of ours other than a recording.
 pub fn is_made(path: &Path) -> bool {
     let name = path.file_name().map_or_else(Default::default, |name| name.to_string_lossy());
     if path.is_dir() {
@@ -159,15 +160,15 @@ fn says_report(path: &Path) -> bool {
     head(path).windows(GENERATOR.len()).any(|part| part == GENERATOR)
 }
 
-/// The first bytes of a file; none where it cannot be read.
+/// The first bytes of a file; empty if unreadable.
 fn head(path: &Path) -> Vec<u8> {
     let mut head = Vec::new();
-    // What came before an error counts.
+    // Bytes before an error count.
     let _ = File::open(path).and_then(|file| file.take(1_024).read_to_end(&mut head));
     head
 }
 
-/// What such a page's head has.
+/// Mark in such a page's head.
 const GENERATOR: &[u8] = b"name=\"generator\" content=\"hums report\"";
 
 /// The name of a recording's file.
@@ -176,7 +177,7 @@ fn file_name(place: &Place) -> String {
     name.map_or_else(|| "recording".to_owned(), |name| cut(name.to_string_lossy().into_owned()))
 }
 
-/// As much of a name as leaves room for what follows it: the box, the session, a number, `.tlog.gaps.csv`.
+/// Shortens a name to leave room for the rest: the box, the session, a number, `.tlog.gaps.csv`.
 fn cut(mut name: String) -> String {
     let end = (0..=NAME_BYTES_MAX.min(name.len())).rev().find(|at| name.is_char_boundary(*at));
     name.truncate(end.unwrap_or(0));
@@ -189,7 +190,7 @@ fn fingerprint(path: &Path) -> Result<[u8; 16]> {
     Ok(digest.first_chunk().copied().unwrap_or_default())
 }
 
-/// What a log is called without its identity: its number on the card, or the name of its file.
+/// The name of a log without its identity: its number on the card, or the name of its file.
 fn base(log: &Log) -> String {
     let file = log.files.first().map_or(log.name.as_str(), String::as_str);
     let path = Path::new(file);

@@ -10,7 +10,7 @@ use crate::source::item::{self, Kind, Table, Value};
 /// has more of them is not made by an autopilot; its further tables are left out, and counted.
 const NAMES_BYTES_MAX: usize = 4 << 20;
 
-/// The names of the tables of one log that were seen, and of their columns with units; none where there was no room for them.
+/// The names of one log's tables, and of their columns with units; `None` if there was no room for them.
 #[derive(Debug, Default)]
 pub struct Tables(Mutex<BTreeMap<String, Option<Names>>>);
 
@@ -45,7 +45,7 @@ fn names(table: &Table) -> Option<Names> {
     Some((kept(&table.name)?, columns))
 }
 
-/// A name that lives as long as the program; none where there are too many.
+/// A name that lives as long as the program; `None` beyond the limit.
 fn kept(name: &str) -> Option<&'static str> {
     static KEPT: Mutex<(BTreeSet<&'static str>, usize)> = Mutex::new((BTreeSet::new(), 0));
     let mut kept = KEPT.lock().ok()?;

@@ -3,16 +3,19 @@
 //! ```text
 //! OUT/vehicle=uid-0031002a3035510a/date=2026-11-21/session=s1a2b3c4d/ATTITUDE.parquet
 //! ```
-//! One file for each message type and for each table of the monitor's own, below what is known of the session: these
-//! tools read `vehicle`, `date` and `session` as columns. Columns keep the type that was sent (arrays are lists, `char`
-//! arrays text); the file's metadata has `units.COLUMN` and `enum.COLUMN`. Each table begins with `boot_s`, seconds since the
-//! monitor's power-on, and `utc`, null where nobody told it; those of frames go on with `system` and `component`.
 //!
-//! Memory is bounded: rows wait as plain columns, 12 MiB in all; then the tables with the most become row groups
-//! and are written out. So no encoder is open longer than for one row group, which costs far more than the rows in it.
-//! A file that is open takes memory for each of its columns, and what it says of its row groups stands at its end and
-//! waits until then. So only so many bytes of open files are held: where there are more, the largest are closed, and their
-//! tables go on in `ATTITUDE.2.parquet`. That is so in a session of days, and in a log of thousands of tables.
+//! One file for each message type and for each table of the monitor's own, in a path that identifies the
+//! session. These tools read `vehicle`, `date` and `session` as columns. Columns keep the sent type (arrays
+//! are lists, `char` arrays text); the file's metadata has `units.COLUMN` and `enum.COLUMN`. Each table
+//! begins with `boot_s`, seconds since the monitor's power-on, and `utc`, null if unknown. Tables of frames
+//! go on with `system` and `component`.
+//!
+//! Memory is bounded. Rows wait as plain columns, 12 MiB in all; then the largest tables become row groups
+//! and are written. So an encoder, which costs far more than its rows, is open only for one row group. An
+//! open file takes memory for each of its columns, and for the description of its row groups, which is
+//! written at its end. The memory of open files is limited too: beyond the limit the largest are closed, and
+//! their tables go on in `ATTITUDE.2.parquet`. That happens in a session of days, and in a log of thousands
+//! of tables.
 
 use std::cmp::Reverse;
 use std::collections::BTreeMap;
@@ -32,24 +35,24 @@ use super::table::Table;
 use crate::files::{Folder, FolderFile, cannot_write};
 use crate::logs::in_order::{in_order, workers};
 
-/// What is held at most: some 55 MiB with all that reading takes.
+/// Memory limits: some 55 MiB with the reading.
 const LIMITS: Limits = Limits { pending_bytes: 12 << 20, open_bytes: 8 << 20 };
-/// So many rows of a table are a row group: what engines like to read at once.
+/// Number of rows in a row group: a good size for one read of an engine.
 const GROUP_ROWS: usize = 128 * 1024;
 /// Bytes of a page and of a column's dictionary at most.
 const PAGE_BYTES: usize = 32 * 1024;
 /// Columns of texts of a table at most that have a dictionary: it takes 73 kB of each.
 const DICTIONARIES_MAX: usize = 32;
-/// What an open file takes: its buffer, and its writer.
+/// Memory of an open file: its buffer, and its writer.
 const OPEN_FILE_BYTES: usize = 10 << 10;
-/// What each of its columns takes in its schema.
+/// Memory of each of its columns in its schema.
 const OPEN_COLUMN_BYTES: usize = 1_000;
-/// What each column of a row group takes that was written.
+/// Memory of each column of a written row group.
 const CHUNK_BYTES: usize = 800;
 /// Tables that are written before it is looked at how many are open.
 const AT_ONCE: usize = 16;
 
-/// What the tables of one session hold at most, all together.
+/// Memory limits for all tables of one session.
 #[derive(Clone, Copy)]
 struct Limits {
     /// Bytes of columns that wait to be encoded.
@@ -66,7 +69,7 @@ pub struct ParquetTables {
     tables: BTreeMap<Table, TableFile>,
 }
 
-/// How files are written, and what is said in each of the session.
+/// Properties of the writer, and the session's metadata for each file.
 struct Properties {
     writer: WriterPropertiesBuilder,
     about: Vec<KeyValue>,
@@ -76,7 +79,7 @@ struct Properties {
 struct TableFile {
     table: Table,
     columns: TableRows,
-    /// What its rows take that wait.
+    /// Memory of its waiting rows.
     pending_bytes: usize,
     open: Option<Open>,
     /// Files of it so far.
@@ -87,7 +90,7 @@ struct TableFile {
 struct Open {
     path: PathBuf,
     writer: SerializedFileWriter<FolderFile>,
-    /// What it takes.
+    /// Its memory.
     bytes: usize,
 }
 
@@ -101,7 +104,7 @@ impl ParquetTables {
             .set_data_page_size_limit(PAGE_BYTES)
             .set_dictionary_page_size_limit(PAGE_BYTES)
             .set_dictionary_enabled(false)
-            // What there is to know of each page would be kept until the file's end.
+            // Metadata of each page would be kept until the file's end.
             .set_statistics_enabled(EnabledStatistics::Chunk)
             .set_offset_index_disabled(true)
             .set_created_by(concat!("hums ", env!("CARGO_PKG_VERSION")).to_owned());
@@ -132,7 +135,7 @@ impl ParquetTables {
         Ok(())
     }
 
-    /// Makes room: so many bytes of what waits, in as few row groups as can be.
+    /// Makes room: writes this many waiting bytes, in as few row groups as possible.
     fn write_largest(&mut self, bytes: usize) -> Result<()> {
         let mut sizes: Vec<_> =
             self.tables.iter().map(|(table, file)| (Reverse(file.pending_bytes), *table)).collect();
@@ -170,7 +173,7 @@ impl ParquetTables {
         Ok(())
     }
 
-    /// Writes what is still held, and each file's end: the folder gets its name. Gives it and how many tables there are.
+    /// Writes the rest, and each file's end: the folder gets its name. Returns it and the number of tables.
     pub fn finish(mut self) -> Result<(PathBuf, usize)> {
         let count = self.tables.len();
         let (folder, properties) = (&self.folder, &self.properties);
@@ -261,12 +264,12 @@ impl TableFile {
         Ok(())
     }
 
-    /// What it takes that its file is open.
+    /// Memory of its open file.
     fn open_bytes(&self) -> usize {
         self.open.as_ref().map_or(0, |open| open.bytes)
     }
 
-    /// Writes what waits, as a row group.
+    /// Writes the waiting rows as a row group.
     fn write_group(&mut self, folder: &Folder, properties: &Properties) -> Result<()> {
         if self.columns.rows() == 0 {
             return Ok(());
@@ -284,7 +287,7 @@ impl TableFile {
         open.write(rows.columns()).with_context(|| cannot_write(&open.path))
     }
 
-    /// Ends its file; what comes later goes into a further one.
+    /// Ends its file; later rows go into a further one.
     fn end_file(&mut self) -> Result<()> {
         let Some(Open { path, writer, .. }) = self.open.take() else { return Ok(()) };
         writer.close().map(|_| ()).with_context(|| cannot_write(&path))

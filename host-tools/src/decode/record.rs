@@ -139,7 +139,7 @@ fn recorder_rows(record: &Record<'_>) -> Vec<Row> {
     }
 }
 
-/// What of the log is kept, and how far it is whole.
+/// Kept parts of the log, and the extent of its completeness.
 fn extent_rows(record: &Record<'_>) -> Vec<Row> {
     let one = |table, cells| vec![Row::new(table, cells)];
     match record {

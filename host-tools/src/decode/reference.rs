@@ -1,10 +1,10 @@
-//! From what a vehicle says to the quantities of the reference system: the one place that maps them, for the line
-//! protocol (`influx`) and for the four tables (`thesis`), whichever autopilot speaks.
+//! From a vehicle's observations to the quantities of the reference system. This is the only mapping, for the
+//! line protocol (`influx`) and for the four tables (`thesis`), for any autopilot.
 //!
-//! The quantities come from the same observation model that the firmware checks health with, so its scales and its
-//! "unknown" values hold here too: ESC values from `ESC_STATUS` and `ESC_INFO` (PX4) or `ESC_TELEMETRY_*` (ArduPilot),
-//! the battery from `BATTERY_STATUS` or, where that is silent, `SYS_STATUS`, and so on.
-//! A value older than `AGE_MAX` is no value: better an empty cell than a stale number.
+//! The quantities come from the same observation model as the firmware's health checks, so its scales and its
+//! "unknown" values hold here too. ESC values are from `ESC_STATUS` and `ESC_INFO` (PX4) or `ESC_TELEMETRY_*`
+//! (ArduPilot). The battery is from `BATTERY_STATUS` or, without it, `SYS_STATUS`, and so on. A value older
+//! than `AGE_MAX` does not count: better an empty cell than a stale number.
 
 use hums_core::clock::Instant;
 use hums_core::flight::Flight;
@@ -27,7 +27,7 @@ pub const MOTORS: usize = 4;
 pub enum Quantity {
     /// Seconds since take-off; stays after landing until the next take-off. 0 before the first.
     FlightTime,
-    /// What is left of the battery, percent.
+    /// Remaining charge of the battery, percent.
     BatteryPercent,
     /// Battery voltage, V.
     BatteryVolts,
@@ -77,7 +77,7 @@ pub enum Quantity {
     EscTemperature(usize),
 }
 
-/// What of an ESC the reference system shows.
+/// ESC quantities in the reference system.
 const ESC: [fn(usize) -> Quantity; 6] = [
     Quantity::EscRpm,
     Quantity::EscVoltage,
@@ -88,7 +88,7 @@ const ESC: [fn(usize) -> Quantity; 6] = [
 ];
 
 impl Quantity {
-    /// The name of its field in the reference system's measurement `HUMS`; `None` where that has none.
+    /// The name of its field in the reference system's measurement `HUMS`; `None` without one.
     pub fn field(self) -> Option<String> {
         let axis = |names: [&str; 3], axis: usize| names.get(axis).map(|name| (*name).to_owned());
         Some(match self {
@@ -121,14 +121,14 @@ impl Quantity {
     }
 }
 
-/// What a frame told, kept until the frames before it have been taken.
+/// A frame's observation, kept until the frames before it have been taken.
 #[derive(Clone, Copy, Debug)]
 pub struct Observed {
     /// When it came.
     pub at: Instant,
-    /// Who said it.
+    /// The sender.
     pub source: Source,
-    /// What it says.
+    /// The observation.
     pub observation: Observation,
 }
 
@@ -149,7 +149,7 @@ impl Default for Reference {
 }
 
 impl Reference {
-    /// Nothing heard yet.
+    /// Empty.
     pub fn new() -> Self {
         Self {
             vehicle: Vehicle::unknown(),
@@ -183,7 +183,7 @@ impl Reference {
         &self.vehicle
     }
 
-    /// When the vehicle was heard last.
+    /// Time of the vehicle's last message.
     pub const fn heard(&self) -> Option<Instant> {
         self.heard
     }
@@ -243,7 +243,7 @@ impl Reference {
         local.or_else(|| self.vehicle.global.within(now, AGE_MAX).map(|global| global.velocity))
     }
 
-    /// The first battery, or what the autopilot's status says of it.
+    /// The first battery, or the battery in the autopilot's status.
     fn battery(&self, now: time::Instant, quantity: Quantity) -> Option<Scalar> {
         let battery = self.vehicle.batteries.first().and_then(|battery| battery.within(now, AGE_MAX));
         let system = || self.vehicle.system.within(now, AGE_MAX);
@@ -261,7 +261,7 @@ impl Reference {
         at(motor).filter(|at| now.since(*at) <= AGE_MAX).map(|_| &motor.esc)
     }
 
-    /// The quantities that an observation has just told anew. A motor is `Some` where all of them are that motor's.
+    /// The new quantities of an observation. A motor is `Some` if all of them are that motor's.
     pub fn told_by(&self, observation: &Observation) -> Vec<(Option<usize>, Vec<Quantity>)> {
         let one = |quantities: &[Quantity]| vec![(None, quantities.to_vec())];
         let imu = [

@@ -32,7 +32,7 @@ pub enum Cell {
     Unknown(CellType),
 }
 
-/// The type of a cell, which is that of its column.
+/// The type of a cell and its column.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum CellType {
     /// [`Cell::Count`]
@@ -85,7 +85,7 @@ impl Cell {
         }
     }
 
-    /// As a CSV cell; what is not known is empty.
+    /// As a CSV cell; unknown values are empty.
     pub fn push_csv(&self, out: &mut Vec<u8>) {
         match self {
             Self::Count(value) => push_integer(out, *value),

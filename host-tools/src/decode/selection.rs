@@ -26,7 +26,8 @@ impl Selection {
     /// As the command line says it; `native` says that there are messages other than MAVLink's, with names of their own.
     pub fn new(args: &cli::Decode, native: bool) -> Result<Self> {
         let ids = args.message.iter().map(|name| id_of(name));
-        // A name of its own is no id: none at all is not every one.
+        // A name other than an id selects a number that does not occur, because an empty list would select
+        // all.
         let other = |id: Result<u32>| id.or_else(|error| if native { Ok(u32::MAX) } else { Err(error) });
         let ids = ids.map(other).collect::<Result<_>>()?;
         let is_backwards = match (args.from, args.to) {
@@ -46,7 +47,7 @@ impl Selection {
         Self { from: limit(from), to: limit(to), ..self.clone() }
     }
 
-    /// The names of the messages that are wanted; none: all.
+    /// The names of the wanted messages; all if empty.
     pub fn names(&self) -> &[String] {
         &self.names
     }
@@ -61,7 +62,7 @@ impl Selection {
         self.has_limits() || !self.names.is_empty()
     }
 
-    /// A time in UTC selects nothing in a log that has none: that is told, not guessed.
+    /// A time in UTC selects nothing in a log without UTC: that is an error, not a guess.
     pub fn check_without_utc(&self, log: &str) -> Result<()> {
         if [self.from, self.to].iter().any(|when| matches!(when, Some(When::Utc(_)))) {
             return Err(usage(format!(
@@ -96,7 +97,7 @@ impl Selection {
     }
 }
 
-/// How a time lies to a limit; `None` where one is UTC and the other cannot be.
+/// Order of a time and a limit; `None` if one is UTC and the other cannot be.
 fn compare(at: Instant, limit: When, epochs: &Epochs) -> Option<Ordering> {
     match limit {
         When::Seconds(limit) => Some(at.as_micros().cmp(&limit)),

@@ -28,7 +28,7 @@ impl Table {
         }
     }
 
-    /// Its name: that of its file, and of the points of the line protocol.
+    /// Its name, also for its file and for the points of the line protocol.
     pub fn name(self) -> String {
         match self {
             Self::Message(id) | Self::Unknown(id) => message_name(id).into_owned(),

@@ -1,4 +1,4 @@
-//! The CSV tables of one log: a folder of files, of which only some are open at once.
+//! The CSV tables of one log: a folder of files with a limited number open at once.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::{BufWriter, Write as _};

@@ -27,12 +27,12 @@ fn is_text(field: &Field) -> bool {
     field.kind == Kind::Char
 }
 
-/// What a spreadsheet takes for the beginning of a formula, which it would run: a vehicle's text must not be one. The
-/// full-width forms count too where the system writes Japanese or Chinese (OWASP, "CSV Injection").
+/// First characters of a formula, which a spreadsheet would run: a vehicle's text must not become one. The
+/// full-width forms count too on systems with Japanese or Chinese (OWASP, "CSV Injection").
 const FORMULA: [char; 11] = ['=', '+', '-', '@', '\t', '\r', '\n', '＝', '＋', '－', '＠'];
 
-/// One cell of text, quoted where CSV (RFC 4180) needs it. One that would be a formula gets an apostrophe before it, and
-/// so does one that begins with an apostrophe: without the first apostrophe it is the text again, in any case.
+/// One cell of text, quoted if CSV (RFC 4180) needs it. A text that would be a formula, or begins with an
+/// apostrophe, gets an apostrophe before it. So removing the first apostrophe always restores the text.
 pub fn push_csv_text(out: &mut Vec<u8>, text: &[u8]) {
     let mut text = String::from_utf8_lossy(text);
     if text.starts_with('\'') || text.starts_with(FORMULA) {
@@ -93,7 +93,7 @@ fn special(value: f64) -> &'static [u8] {
     }
 }
 
-/// A number that is no NaN and not infinite.
+/// A finite number.
 pub fn push_finite(out: &mut Vec<u8>, scalar: Scalar) {
     match scalar {
         Scalar::Unsigned(value) => push_integer(out, value),

@@ -1,11 +1,11 @@
 //! The reference system's four tables, `;` between the columns, one row a second: `flightvalues.csv`,
 //! `esc_status.csv`, `esc_info.csv` and `vfr_hud.csv`. The n-th rows of all four are of the same second.
 //!
-//! Its columns and formats are kept, units in the cells of `flightvalues.csv` included, but for latitude and
-//! longitude: seven decimals (1 cm) instead of two (1 km). An empty cell is a value that nobody told for ten seconds.
-//! The flight time counts whole seconds from the monitor's power-on, as the reference counts from its program's start.
-//! Seconds in which the vehicle was not heard, or that fell into a gap of the log, have no row: the flight time jumps,
-//! and `gaps.csv` names the gaps.
+//! Its columns and formats are kept, also the units in the cells of `flightvalues.csv`. Only latitude and
+//! longitude have seven decimals (1 cm) instead of two (1 km). An empty cell means no value for ten seconds.
+//! The flight time counts whole seconds from the monitor's power-on, as the reference counts from its
+//! program's start. Seconds without messages of the vehicle, or in a gap of the log, have no row. There the
+//! flight time jumps, and `gaps.csv` names the gaps.
 
 use std::io::{BufWriter, Write};
 use std::path::PathBuf;
@@ -21,7 +21,7 @@ use crate::files::{Folder, FolderFile, buffered, settle};
 use crate::mavlink::values::Scalar;
 use crate::source::epochs::Epochs;
 
-/// A vehicle that was not heard for so long tells nothing about this second.
+/// After a silence of this length, the vehicle's values do not count for the second.
 const SILENCE_MAX: Span = Span::from_secs(10);
 const SECOND_US: u64 = 1_000_000;
 
@@ -43,7 +43,7 @@ pub struct Thesis {
     reference: Reference,
     selection: Selection,
     epochs: Epochs,
-    /// The next whole second, where the first frame has set it.
+    /// The next whole second, once the first frame has set it.
     next: Option<u64>,
     /// Rows written to each table.
     rows: u64,
@@ -89,7 +89,7 @@ impl Thesis {
         Ok(())
     }
 
-    /// What is missing has no rows.
+    /// Gaps have no rows.
     pub fn gap(&mut self, gap: &Gap) -> Result<()> {
         let seconds =
             |at: Option<Instant>| at.map_or_else(String::new, |at| format!("{:.3}", at.as_secs_f64()));

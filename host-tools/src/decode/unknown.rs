@@ -13,7 +13,7 @@ pub struct UnknownLines {
 #[derive(Clone, Copy, Debug)]
 struct Place {
     id: u32,
-    /// Where the id would stand.
+    /// Place for the id.
     middle: usize,
     end: usize,
 }

@@ -1,4 +1,4 @@
-//! The records of what wears, as rows: `HUMS_LIFETIME`, `HUMS_EXCEEDANCE`, `HUMS_COMPONENT`; and `HUMS_SNAPSHOT`.
+//! Wear records as rows: `HUMS_LIFETIME`, `HUMS_EXCEEDANCE`, `HUMS_COMPONENT`; and `HUMS_SNAPSHOT`.
 
 use hums_blackbox::record::{Component, Exceedance, Lifetime, Snapshot};
 

@@ -1,4 +1,4 @@
-//! The logs of one command, and what each is called.
+//! The logs of one command, and the names of their files.
 
 use anyhow::Result;
 
@@ -9,7 +9,7 @@ use crate::logs::side_by_side::side_by_side;
 use crate::outcome::usage as usage_error;
 use crate::source::recording::Place;
 
-/// A log, and what its files are called.
+/// A log, and the name of its files.
 pub(super) struct Work<'a> {
     pub(super) log: &'a Place,
     pub(super) traits: Traits,
@@ -33,7 +33,8 @@ pub(super) fn works<'a>(logs: &'a [Place], sessions: &Sessions) -> Result<Vec<Wo
     Ok(logs.into_iter().zip(names).map(|((log, traits), named)| Work { log, traits, named }).collect())
 }
 
-/// Whether any of these has messages of its own instead of MAVLink's; an error where one cannot become what is asked for.
+/// Whether any of these has messages of its own instead of MAVLink's; an error if one cannot become the
+/// requested format.
 pub(super) fn check_forms(works: &[Work<'_>], formats: Formats) -> Result<bool> {
     let mut native = false;
     for place in works.iter().map(|work| work.log).filter(|place| place.own().is_none()) {

@@ -43,7 +43,7 @@ impl Single {
         settle(self.0.write_all(bytes), self.0.path())
     }
 
-    /// Where the table of gaps of a tlog goes; none where the tlog is no file.
+    /// Path of a tlog's table of gaps; `None` if the tlog is not a file.
     fn gaps_path(&self) -> Option<PathBuf> {
         (!self.0.is_stream()).then(|| appended(self.0.path(), "gaps.csv"))
     }
@@ -55,10 +55,10 @@ impl Single {
     }
 }
 
-/// What was written.
+/// The outputs of a decoding.
 #[derive(Debug, Default)]
 pub struct Written {
-    /// Each file with what is in it.
+    /// Each file with its content.
     pub made: Vec<Made>,
     /// Rows of tables for whose names there was no room.
     pub rows_left_out: u64,
@@ -69,7 +69,7 @@ pub struct Written {
 }
 
 impl Written {
-    /// What was not written, as sentences.
+    /// Omitted data, as sentences.
     pub fn left_out(&self) -> impl Iterator<Item = String> {
         let rows = (self.rows_left_out > 0).then(|| {
             let rows = count(self.rows_left_out, "row");
@@ -96,7 +96,7 @@ pub struct Writers<'a> {
     csv: Option<Tables>,
     /// A tlog has no place for gaps: they lie beside it.
     gaps: Option<Single>,
-    /// Gaps of a tlog that is no file: nothing lies beside it.
+    /// Gaps of a tlog that is not a file and so has no table beside it.
     gaps_left_out: u64,
     frames: u64,
     records: u64,
@@ -106,7 +106,7 @@ pub struct Writers<'a> {
     rows_left_out: u64,
 }
 
-/// The line protocol's file, and what only can be told in order.
+/// The line protocol's file, and the state of points that are made in order.
 struct Influx {
     file: Single,
     messages: Clock,
@@ -118,7 +118,7 @@ struct Influx {
 }
 
 impl Influx {
-    /// The frames of a group as they are, and what they told of the reference system's quantities.
+    /// Writes the frames of a group, and their quantities of the reference system.
     fn put(&mut self, context: &Context, collected: &Collected<'_>) -> Result<()> {
         self.points.clear();
         self.messages.write(&collected.influx, &context.epochs, &mut self.points);
@@ -136,7 +136,7 @@ impl Influx {
 }
 
 impl<'a> Writers<'a> {
-    /// Opens what is sure to be written; tables are opened when they get their first row.
+    /// Opens the files that are always written; a table is opened for its first row.
     pub fn new(context: &'a Context, destination: Destination, parquet: Option<PathBuf>) -> Result<Self> {
         let (formats, inputs) = (context.formats, &context.inputs);
         let open = |wanted: bool, extension| {
@@ -187,8 +187,8 @@ impl<'a> Writers<'a> {
         })
     }
 
-    /// All of the log was read, up to this time: who checked the vehicle, and what this program found, known before or in this
-    /// reading. Gives why nobody did, as a part of a sentence.
+    /// The log was read up to this time. Writes its checker, and this program's findings, from an earlier
+    /// reading or this one. Returns the reason if it was not checked, as a part of a sentence.
     pub fn checked(
         &mut self,
         last: Option<Instant>,
@@ -274,7 +274,7 @@ impl<'a> Writers<'a> {
         file.write(&line)
     }
 
-    /// Whether nothing was written but what every file begins with.
+    /// Whether only the beginnings of files were written.
     pub fn is_empty(&self) -> bool {
         let has_records = self.context.formats.has_records() && self.records > 0;
         let has_points = self.influx.as_ref().is_some_and(|influx| influx.count > 0);
@@ -282,7 +282,7 @@ impl<'a> Writers<'a> {
         self.frames == 0 && !has_records && !has_points && !has_rows
     }
 
-    /// All of the log is there: the files get their names. Says what was written.
+    /// The log is complete: the files get their names. Returns the outputs.
     pub fn finish(mut self) -> Result<Written> {
         let mut made = Vec::new();
         let frames = (self.frames, "frame");
@@ -292,10 +292,10 @@ impl<'a> Writers<'a> {
             vec![frames, (self.records, "record")]
         };
         let of_tables = |tables: usize| [&[(tables as u64, "table")], &rows[..]].concat();
-        // An empty tlog would be taken for a log in which nothing came.
+        // An empty tlog would look like a log without any messages.
         let has_no_frame = self.frames == 0 && self.context.selection.is_part() && self.tlog.take().is_some();
         self.gaps = self.gaps.filter(|_| !has_no_frame);
-        // Gaps of an earlier decoding beside a tlog that has none now would be taken for its own.
+        // Old gaps beside a tlog without gaps would look like its own.
         let stale = self.tlog.as_ref().filter(|_| self.gaps.is_none()).and_then(Single::gaps_path);
         if let Some(path) = stale.filter(|path| path.exists()) {
             settle(fs::remove_file(&path), &path)?;
@@ -339,7 +339,7 @@ impl<'a> Writers<'a> {
 }
 
 fn lines_of(text: &[u8]) -> u64 {
-    // What follows the last line's end is none.
+    // The last line end has no line after it.
     text.split(|byte| *byte == b'\n').count() as u64 - 1
 }
 

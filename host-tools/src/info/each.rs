@@ -27,7 +27,8 @@ impl Read {
     }
 }
 
-/// Reads what was found, or one session of it, and shows each with what the others tell of its end: of one those beside it do.
+/// Reads all logs, or one session, and shows each with the evidence of the others about its end. For one
+/// session the logs beside it are read too.
 pub(super) fn each(
     found: &Found,
     wanted: Option<usize>,

@@ -1,4 +1,5 @@
-//! What `hums info --json` prints. Names carry their units; times are seconds since the monitor's power-on or UTC.
+//! Output of `hums info --json`. Names carry their units; times are seconds since the monitor's power-on or
+//! UTC.
 
 use hums_core::clock::Instant;
 use serde::Serialize;
@@ -20,7 +21,7 @@ pub struct ImageJson {
     damage: Vec<String>,
     lost_clusters: u64,
     found_by_scan: bool,
-    /// What was not looked at; `null` where every block was.
+    /// The blocks not searched; `null` if every block was.
     not_looked_at: Option<String>,
 }
 
@@ -52,7 +53,7 @@ pub struct LogJson {
     /// As its sectors name it, hexadecimal.
     session: Option<String>,
     closed: bool,
-    /// What is known of its end; `null` for a recording of another format, which has nothing that could prove it.
+    /// The evidence of its end; `null` for a recording of another format, which has none.
     end: Option<EndJson>,
     start_utc: Option<String>,
     end_utc: Option<String>,
@@ -66,12 +67,12 @@ pub struct LogJson {
     frame_bytes: u64,
     records: u64,
     messages: Vec<MessageJson>,
-    /// Frames of ids beyond those that are listed, none of which has a definition here.
+    /// Frames of ids beyond the list, without definitions here.
     frames_of_other_messages: u64,
     gaps_count: u64,
     /// As far as they were counted.
     frames_missing: u64,
-    /// Gaps of which nothing tells how many frames are missing in them.
+    /// Gaps with an unknown number of missing frames.
     gaps_uncounted: u64,
     gaps: Vec<GapJson>,
     losses: Vec<LossJson>,
@@ -89,7 +90,7 @@ pub struct LogJson {
     components: Vec<ComponentJson>,
     log_bytes: u64,
     tlog_bytes: u64,
-    /// `null` where it is no log of ours.
+    /// `null` for a recording of another format.
     ratio: Option<f64>,
     bytes_on_card: u64,
     sectors: u64,
@@ -169,7 +170,7 @@ struct FindingJson {
     time_utc: Option<String>,
     /// `null` where the input stopped.
     value: Option<f32>,
-    /// The state that the value is, where it is no quantity.
+    /// The state in the value, if it is not a quantity.
     state: Option<&'static str>,
     limit: Option<f32>,
     unit: String,
@@ -194,7 +195,7 @@ struct CrossingsJson {
     warning_s: f64,
     critical_s: f64,
     peak: Option<f32>,
-    /// The state that the peak is, where it is no quantity.
+    /// The state in the peak, if it is not a quantity.
     state: Option<&'static str>,
 }
 

@@ -24,7 +24,7 @@ use crate::source::recording::Format;
 use crate::summary::Overview;
 use crate::utc::{clock, date_and_time, iso8601};
 
-/// What `hums info --list --json` prints.
+/// Output of `hums info --list --json`.
 const SCHEMA: Schema = Schema::first("hums-info-list");
 
 /// Runs `hums info --list`.
@@ -42,7 +42,7 @@ pub(super) fn run(args: &cli::Info) -> Result<Outcome> {
             output::line(&heading(width))?;
         }
     }
-    // In the order in which they began; what does not tell stays behind the one before it.
+    // In the order of their starts; a log without a start stays after the one before it.
     let (mut lines, mut elements, mut begun_us) = (Vec::new(), Vec::new(), 0);
     let read = each(&found, wanted, |overview| {
         begun_us = start_utc_us(overview).unwrap_or(begun_us);
@@ -76,10 +76,10 @@ struct LogJson {
     name: String,
     format: &'static str,
     files: Vec<String>,
-    /// `null` where nothing told the time of day.
+    /// `null` if the time of day is unknown.
     start_utc: Option<String>,
     duration_s: f64,
-    /// `null` where nobody counted.
+    /// `null` if not counted.
     flight_s: Option<f64>,
     checked_by: &'static str,
     findings_count: u64,
@@ -89,14 +89,14 @@ struct LogJson {
     checks_judged: Option<usize>,
     /// Of so many.
     checks_all: Option<usize>,
-    /// The vehicle was in the air when it was heard first.
+    /// The vehicle was first received in the air.
     begins_in_air: bool,
     /// It ends in the air, as far as that was looked at.
     ends_in_air: bool,
     /// Part of the time was not recorded, in a recording of another program.
     lossy: bool,
     bytes: u64,
-    /// Nothing is lost, damaged or not proved.
+    /// Complete, undamaged and proved.
     whole: bool,
 }
 
@@ -142,7 +142,7 @@ fn heading(width: usize) -> String {
 fn line(log: &Overview, width: usize) -> String {
     let date = start_utc_us(log).map_or_else(|| "unknown".to_owned(), date_and_time);
     let length = clock(span(duration_s(log)));
-    // What the box counted until it stored it is the least.
+    // The box's count up to its last store is a lower bound.
     let is_least = log.counted_until().is_some() && !log.contents.is_recounted;
     let least = if is_least { ">" } else { "" };
     let air =
@@ -167,7 +167,7 @@ fn line(log: &Overview, width: usize) -> String {
         let _ = write!(text, "; {}", warning("part of the time was not recorded"));
     }
     if !log.is_sound() {
-        // What is no log of ours is judged by another command.
+        // A recording of another format is judged by another command.
         let teller = if log.format.is_some() { "check says where" } else { "info --verify says why" };
         let _ = write!(text, "; {} (hums {teller})", warning("not proved to be whole"));
     }
@@ -187,7 +187,7 @@ fn found(log: &Overview) -> String {
     format!("{}: {}", level(worst.level), word(&check_name(&worst.check, worst.instance)))
 }
 
-/// What `hums check` says first; good news is none.
+/// The first problem of `hums check`; `None` if all is well.
 fn worst(log: &Overview) -> Option<WorstJson> {
     let contents = &log.contents;
     let problems = problems(&contents.findings, contents.checked_by() == "board");
@@ -206,20 +206,20 @@ fn start_utc_us(log: &Overview) -> Option<u64> {
     log.ending.summary.first.and_then(|first: Instant| log.utc_us(first))
 }
 
-/// How long it was in the air by the usage counters, which count from the power-on on: a later log of one begins with those of the logs
-/// before it.
+/// Time in the air by the usage counters. They count from power-on: a later log of one power-on begins with
+/// the counts of the logs before it.
 fn flight_s(log: &Overview) -> Option<f64> {
     let is_later = log.ending.summary.first_number.is_some_and(|first| first > 0);
     let before = log.contents.flight_before_s.filter(|_| is_later).unwrap_or(0.0);
     log.contents.usage.get(UsageCounter::Flight.name()).map(|all| (all - before).max(0.0))
 }
 
-/// What is recorded of it, without the room that is set aside for it on a card.
+/// Size of the recording, without the space allocated for it on a card.
 fn bytes(log: &Overview) -> u64 {
     if log.format.is_some() { log.bytes_on_card } else { log.log_bytes() }
 }
 
-/// Bytes in the largest unit of which it is one at least.
+/// Bytes in the largest unit with a value of at least one.
 fn binary(bytes: u64) -> String {
     let (mut size, mut units) = (bytes as f64, ["KiB", "MiB", "GiB", "TiB"].iter());
     let mut unit = "B";
@@ -314,7 +314,7 @@ mod tests {
         assert!(told(None).contains("(hums info --verify says why)"));
     }
 
-    /// What the box had counted when power went in the air is the least.
+    /// The box's count at a power cut in the air is a lower bound.
     #[test]
     fn a_time_in_the_air_that_was_stored_before_the_records_end_says_so() {
         let mut log = Overview::default();

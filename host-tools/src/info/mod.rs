@@ -1,4 +1,5 @@
-//! `hums info`: what is in a log or a recording; with `--list` a line for each, with `--verify` each check. For people and as JSON.
+//! `hums info`: the contents of a log or a recording; with `--list` a line for each, with `--verify` each
+//! check. For people and as JSON.
 
 mod each;
 pub mod json;
@@ -19,7 +20,7 @@ use each::each;
 use json::{LogJson, images_json};
 use text::{image_text, text};
 
-/// What `hums info --json` prints.
+/// Output of `hums info --json`.
 const SCHEMA: Schema = Schema::first("hums-info");
 
 /// Runs `hums info`.

@@ -1,6 +1,6 @@
 //! Numbers for people.
 
-/// To three decimals, and no more than it needs; what is too large for any sensor or counter is not written out.
+/// To three decimals at most; a value too large for any sensor or counter is not written out.
 pub(super) fn short(value: f64) -> String {
     if value.abs() >= 1e15 {
         return format!("{value:.0e}");

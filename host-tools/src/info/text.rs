@@ -1,4 +1,4 @@
-//! What `hums info` prints for people.
+//! Text output of `hums info`.
 //!
 //! Writing to a `String` cannot fail; the results of `write!` are dropped on purpose in all of this.
 
@@ -119,13 +119,13 @@ fn heading(text: &mut String, log: &Overview) {
     text.push('\n');
 }
 
-/// Messages of a recording that is no log of ours.
+/// Number of messages of a recording of another format.
 fn messages(log: &Overview) -> u64 {
     let messages = log.contents.messages.iter().map(|message| message.amount.count).sum::<u64>();
     if log.format.is_some() { messages + log.contents.other_messages.count } else { 0 }
 }
 
-/// How it ends, and what lies behind that.
+/// Its end, and the blocks after that.
 fn ending(text: &mut String, log: &Overview) {
     let (ending, summary) = (&log.ending, &log.ending.summary);
     let _ = writeln!(text, "  end      {}", ending.words());
@@ -166,7 +166,7 @@ fn ending(text: &mut String, log: &Overview) {
 
 fn findings_text(text: &mut String, log: &Overview) {
     let contents = &log.contents;
-    // A recorder that ran no checks found nothing, which says nothing.
+    // A recorder without checks has no findings, which does not mean that all was well.
     let by = match contents.checked_by() {
         "hums" if contents.is_little() => "",
         "hums" => " (checked here: what recorded this ran no checks)",
@@ -206,10 +206,10 @@ fn findings_text(text: &mut String, log: &Overview) {
     more(text, contents.findings_count, told);
 }
 
-/// So many changes in a row that say nothing but that data stopped, or came again, are told in a line.
+/// This many changes in a row between data and no data become one line.
 const ROW_MIN: usize = 4;
 
-/// What a change says that says nothing else.
+/// The words for a change that only means that data stopped or came again.
 fn silence(finding: &FindingLine) -> Option<&'static str> {
     let [ok, stale] = [Level::Ok.name(), Level::Stale.name()];
     match (finding.previous, finding.level) {
@@ -221,7 +221,7 @@ fn silence(finding: &FindingLine) -> Option<&'static str> {
     }
 }
 
-/// What was found, the check that found it, the part that is due, and what explains it.
+/// The finding, its check, the part that is due, and its cause.
 fn sentence(finding: &FindingLine, due: Option<&(String, Option<String>)>, cause: Option<&str>) -> String {
     let FindingLine { subsystem, check, instance, previous, value, limit, unit, .. } = finding;
     let mut sentence = format!("{subsystem}: {}", check_name(check, *instance));
@@ -315,7 +315,7 @@ fn gaps_text(text: &mut String, log: &Overview) {
     }
 }
 
-/// What is missing in a recording that is no log of ours: when, where in the file, and what was found there.
+/// Gaps of a recording of another format: time, place in the file, and the data found there.
 fn foreign_gaps(text: &mut String, log: &Overview) {
     let (summary, contents) = (&log.ending.summary, &log.contents);
     for (gap, (place, found)) in contents.gaps.iter().zip(&contents.gap_words).take(SHOWN_MAX) {
@@ -427,7 +427,7 @@ mod tests {
             "{wrong}"
         );
         assert_eq!(*heard, "1:35.0  ok        5 checks have data again, and are ok");
-        // Three in a row are told one by one.
+        // Three in a row are printed one by one.
         log.contents.findings.truncate(3);
         let mut text = String::new();
         findings_text(&mut text, &log);

@@ -1,4 +1,4 @@
-//! The usage counters of a log, for people: what is zero is left out, lengths of time are hours and minutes.
+//! The usage counters of a log, for people: zeros are left out, durations are hours and minutes.
 
 use std::fmt::Write as _;
 
@@ -84,7 +84,7 @@ fn band((from, to, time_s): &Band, unit: &str) -> Option<String> {
 }
 
 fn seconds(value: f64) -> String {
-    // What a damaged log says may be any number: the cast saturates.
+    // A damaged log may hold any number: the cast saturates.
     clock(Span::from_micros((value * 1e6) as u64))
 }
 

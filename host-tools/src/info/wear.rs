@@ -1,4 +1,4 @@
-//! What was exceeded, and what wears, for people.
+//! Exceedances and wear, for people.
 
 use std::fmt::Write as _;
 
@@ -24,7 +24,7 @@ pub(super) fn text(text: &mut String, log: &Overview) {
     }
     for ((check, instance), line) in &contents.exceedances {
         for (of, crossings) in [("session", &line.session), ("life", &line.lifetime)] {
-            // What was checked here is of this recording alone.
+            // A check made here is of this recording alone.
             if of == "session" && !crossings.happened() || of == "life" && contents.checked_here {
                 continue;
             }

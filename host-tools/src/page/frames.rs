@@ -40,8 +40,8 @@ impl Frames {
         }
     }
 
-    /// A second that has ended goes to the plot, at its end: a page that was shown what came until then has no place for
-    /// anything earlier.
+    /// Adds a second to the plot at its end: a page that was shown the time up to then cannot take earlier
+    /// values.
     pub fn pass(&mut self, now: Instant, store: &mut Store<Plot>) {
         let end = |second: u64| Instant::from_millis(second.saturating_add(1).saturating_mul(1_000));
         let Some(at) = self.second.map(end).filter(|end| *end <= now) else { return };
@@ -51,7 +51,7 @@ impl Frames {
         (self.second, self.received, self.missing) = (None, 0, 0);
     }
 
-    /// What follows a gap follows no number before it.
+    /// Numbers after a gap start again.
     pub fn gap(&mut self) {
         self.last = None;
     }

@@ -1,11 +1,12 @@
-//! A flight as the page has it, bounded: series for the plots, the track, phases, modes, parameters, and what was said and
-//! found.
+//! A flight on the page, bounded: series for the plots, the track, phases, modes, parameters, texts and
+//! findings.
 //!
-//! It only grows at its end, so a page that has seen it up to some point asks for what came since ([`Cursor`]); however
-//! slow the page is, nothing queues for it. Where older parts changed (intervals were joined, the track was thinned) the page
-//! takes everything anew. A report is one part that is the whole.
+//! It only grows at its end, so a page asks for the part after its last one ([`Cursor`]); a slow page needs
+//! no queue. If older parts changed (joined intervals, a thinned track) the page takes everything again. A
+//! report is one part with the whole.
 //!
-//! Of a recording that is played it is made whole at the start; a page is then shown what is not later than the moment played.
+//! For playback of a recording it is complete at the start; a page is then shown the part up to the present
+//! moment.
 
 use std::borrow::Cow;
 use std::collections::VecDeque;
@@ -33,7 +34,7 @@ use crate::track::Point;
 
 /// Notes kept at most; older ones go.
 const NOTES_MAX: usize = 2_000;
-/// A page draws its plots so often, and is told as often what is new in them.
+/// Drawing period of a page's plots, and period of its updates.
 const DRAWN_EVERY: Span = Span::from_millis(100);
 /// A phase that lasts less is part of the one before.
 const PHASE_MIN: Span = Span::from_secs(2);
@@ -51,13 +52,13 @@ pub struct History {
     phases: Spans,
     modes: Spans,
     parameters: Parameters,
-    /// Where the recording has nothing.
+    /// Gaps of the recording.
     gaps: Vec<(Instant, Instant)>,
     autopilot: Autopilot,
     params: Option<Box<Params>>,
     /// Cells of the one battery.
     cells: u8,
-    /// Counts the changes of what plots are called and of their limits.
+    /// Counts the changes of plots' names and limits.
     words: u64,
 }
 
@@ -78,7 +79,7 @@ pub struct Cursor {
     modes: Seen,
     gaps: usize,
     until: Option<Instant>,
-    /// When it was told of its series last.
+    /// Time of its last update of series.
     drawn: Option<Instant>,
 }
 
@@ -87,7 +88,7 @@ pub struct Cursor {
 pub struct Part {
     pub(super) t: &'static str,
     pub(super) vehicle: u8,
-    /// Forget what you have of it.
+    /// Drop all earlier data of it.
     pub(super) reset: bool,
     pub(super) start_s: f64,
     pub(super) step_s: f64,
@@ -104,7 +105,7 @@ pub struct Part {
     pub(super) gaps: Option<Vec<(f64, f64)>>,
     pub(super) parameters: Vec<ParameterJson>,
     pub(super) parameters_left_out: u64,
-    /// The log tells what parameters are by default: one without a default is at it.
+    /// The log has defaults of parameters: a parameter without one is at its default.
     pub(super) tells_defaults: bool,
 }
 
@@ -146,9 +147,9 @@ impl Serialize for Series {
 }
 
 impl History {
-    /// Keeps something said or found: once, where a HUMS on board and the checks here found the same.
+    /// Keeps a text or a finding: once, if a HUMS on board and the checks here found the same.
     pub fn note(&mut self, at: Instant, note: Note) {
-        /// Notes that are looked at: more are no event.
+        /// Number of notes compared: a larger number is not a single event.
         const LOOKED_AT: usize = 64;
         if self.notes.iter().rev().take(LOOKED_AT).any(|(_, known)| known.is_again(&note)) {
             return;
@@ -160,7 +161,7 @@ impl History {
         self.notes.push_back((at, note));
     }
 
-    /// What stands on a time line: times and levels of findings, warning and worse.
+    /// Marks of a time line: times and levels of findings, warning and worse.
     pub fn marks(&self) -> Vec<(f64, &'static str)> {
         let marks = self.notes.iter().filter(|(_, note)| {
             note.kind == "event" || (note.kind == "finding" && matches!(note.level, "warning" | "critical"))
@@ -168,7 +169,7 @@ impl History {
         marks.map(|(_, note)| (note.at_s, if note.kind == "event" { "event" } else { note.level })).collect()
     }
 
-    /// Takes a frame of the vehicle's system: counts it, and what of it is no observation.
+    /// Takes a frame of the vehicle's system: counts it, and takes values other than observations.
     pub fn frame(&mut self, at: Instant, frame: &Frame<'_>, vehicle: Option<Source>) {
         if frame.check() != Check::Verified {
             return;
@@ -180,7 +181,7 @@ impl History {
         }
     }
 
-    /// Takes what of a row of an autopilot's own log is no observation.
+    /// Takes values other than observations from a row of an autopilot's own log.
     pub fn more(&mut self, at: Instant, more: &More) {
         match more {
             More::Values(values) => self.samples.values(at, values),
@@ -188,12 +189,12 @@ impl History {
         }
     }
 
-    /// Time passes: to be told before a page is shown what came until then.
+    /// Time passes: to be called before a page is shown the time up to `now`.
     pub fn pass(&mut self, now: Instant) {
         self.frames.pass(now, &mut self.samples.store);
     }
 
-    /// What follows a gap of the recording follows no frame before it. Some have a beginning and an end.
+    /// A gap of the recording: frame numbers start again after it. Some gaps have a beginning and an end.
     pub fn gap(&mut self, span: Option<(Instant, Instant)>) {
         self.frames.gap();
         if let Some(span) = span.filter(|_| self.gaps.len() < GAPS_MAX) {
@@ -202,7 +203,7 @@ impl History {
         }
     }
 
-    /// Takes what an observation told; `reference` has taken it before.
+    /// Takes an observation, after `reference` has taken it.
     pub fn sample(&mut self, at: Instant, reference: &Reference, observation: &Observation) {
         if let Observation::Heartbeat(heartbeat) = observation {
             self.words += u64::from(heartbeat.autopilot != self.autopilot);
@@ -212,7 +213,7 @@ impl History {
         self.samples.take(at, reference, observation);
     }
 
-    /// Takes what the vehicle is doing, as its monitor sees it.
+    /// Takes the vehicle's phase from its monitor.
     pub fn phase(&mut self, at: Instant, flight: &Flight, phase: Phase) {
         let phase = Cow::Borrowed(phase.name());
         if flight.airborne() && !flight.was_on_ground() {
@@ -222,7 +223,7 @@ impl History {
         self.phases.extend(at, phase, PHASE_MIN);
     }
 
-    /// Takes the limit of the vibration, which moves with what is usual in the flight.
+    /// Takes the limit of the vibration, which follows the usual level of the flight.
     pub fn vibration_limit(&mut self, at: Instant, limit: Option<f32>) {
         if let Some(limit) = limit {
             self.samples.store.push(at, (Plot::Vibration, plots::RISE), limit);
@@ -248,7 +249,7 @@ impl History {
         (&self.samples.store, self.autopilot, self.params.as_deref())
     }
 
-    /// What each parameter was last.
+    /// Last value of each parameter.
     pub fn last_parameters(&self) -> impl Iterator<Item = (&str, f64)> {
         self.parameters.last()
     }
@@ -258,8 +259,8 @@ impl History {
         self.samples.track.points()
     }
 
-    /// What a page that has this much does not have yet of the time up to `until`; moves the cursor there. `None` where
-    /// there is nothing new.
+    /// The part up to `until` that a page with this cursor lacks; moves the cursor there. `None` without
+    /// news.
     pub fn since(&self, vehicle: u8, cursor: &mut Cursor, until: Instant) -> Option<Part> {
         let Samples { store, track, thinned, .. } = &self.samples;
         let spacing_ms = store.spacing_ms();
@@ -272,7 +273,7 @@ impl History {
         let newest = until.as_millis().saturating_sub(start_ms) / step_ms.max(1);
         let newest = u16::try_from(newest).unwrap_or(u16::MAX - 1);
         let mut series = Vec::new();
-        // Where time stands, nothing more comes.
+        // While time stands still, the page gets no further values.
         let stands = cursor.until == Some(until);
         if stands || cursor.drawn.is_none_or(|drawn| until.since(drawn) >= DRAWN_EVERY) {
             cursor.drawn = Some(until);
@@ -394,7 +395,7 @@ mod tests {
         }
     }
 
-    /// The vehicle tells of its air speed, and of nothing else.
+    /// The vehicle reports only its airspeed.
     fn tell(history: &mut History, second: u64) {
         history.sample(seconds(second), &Reference::new(), &airspeed());
     }
@@ -403,7 +404,7 @@ mod tests {
         Observation::Hud(Hud { airspeed: Some(MetresPerSecond(1.0)), ..Hud::default() })
     }
 
-    /// All values that the parts of a history told, the newest of each interval.
+    /// All values in the parts of a history, the newest of each interval.
     fn follow(cursor: &mut Cursor, history: &History, until: Instant) -> (bool, usize, usize) {
         let Some(part) = history.since(1, cursor, until) else { return (false, 0, 0) };
         let values = part.series.0.iter().map(|(_, _, (numbers, _))| numbers.len()).sum();

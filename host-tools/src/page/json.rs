@@ -1,8 +1,8 @@
-//! JSON for the pages, in which no text can change how the text around it reads.
+//! JSON for the pages, safe against texts that change the display of their surroundings.
 //!
-//! A vehicle's texts may hold Unicode's bidirectional controls: U+202E shows what follows from right to left, so that
-//! `evil` looks like `live`. In JSON they can stand only inside of strings; there they are replaced by their name, as
-//! `<U+202E>`. The record keeps them as they came.
+//! A vehicle's texts may hold Unicode's bidirectional controls. U+202E reverses the text after it, so that
+//! `evil` looks like `live`. In JSON they occur only inside of strings; there they are replaced by their
+//! name, as `<U+202E>`. The record keeps them unchanged.
 
 use std::fmt::Write as _;
 
@@ -13,8 +13,8 @@ use crate::printable::{redirects, rewritten};
 /// Most texts fit in this: they are made many times a second.
 const ROOM_BYTES: usize = 4_096;
 
-/// A value as JSON that may stand in a `script` element: it ends none and begins none. `<`, `>` and `&` stand in strings only,
-/// where an escape is the same; the two line separators are no JavaScript.
+/// A value as JSON for a `script` element, without ending or beginning one. `<`, `>` and `&` occur in strings
+/// only, where an escape is the same; the two line separators are not valid in JavaScript.
 pub fn embedded(value: &impl Serialize) -> String {
     rewritten(
         &json(value),

@@ -1,5 +1,5 @@
-//! Several flights in the same plots: what each told, from its take-off on, as lines of one plot for each quantity. So they have one
-//! scale, and the page draws them as it draws one flight.
+//! Several flights in the same plots, from take-off on: each flight is a line in the plot of each quantity.
+//! So they have one scale, and the page draws them as it draws one flight.
 
 use hums_core::clock::Instant;
 use hums_core::observation::Autopilot;
@@ -8,7 +8,7 @@ use super::history::{History, Part, Place, PlotJson, Series, told};
 use super::plots::{self, Limits, Plot};
 use crate::series::Store;
 
-/// Series that each flight may have: all lines of what is compared.
+/// Maximum number of series of each flight: all lines that are compared.
 const SERIES_EACH: usize = 96;
 
 /// Places of a track side by side: a map there is small.
@@ -20,15 +20,15 @@ type Quantity = (Plot, u8, bool);
 /// A flight to be merged with others.
 #[derive(Clone, Copy, Debug)]
 pub struct Flight<'a> {
-    /// What it is called.
+    /// Its name.
     pub name: &'a str,
-    /// What was recorded.
+    /// Its history.
     pub history: &'a History,
     /// Take-off, and when it was in the air last.
     pub span: (Instant, Instant),
 }
 
-/// Whether a line is compared: what was measured, and not what was wanted or sent.
+/// Whether a line is compared: measurements are, setpoints and commands are not.
 const fn is_compared(plot: Plot, line: u8) -> bool {
     match plot {
         Plot::Height | Plot::Vertical => line == 0,
@@ -109,7 +109,8 @@ fn add(store: &mut Store<Quantity>, number: u8, flight: &Flight<'_>) {
     }
 }
 
-/// Where a flight was, from its take-off on: the first of each of `PLACES_MAX` pieces at most, and the last.
+/// The track of a flight, from its take-off on: the first place of each of at most `PLACES_MAX` pieces, and
+/// the last.
 pub fn places(flight: &Flight<'_>) -> Vec<Place> {
     let (from, to) = flight.span;
     let track = flight.history.track();

@@ -1,5 +1,5 @@
-//! What plots show and no check needs, so that it is no observation: sticks, wind, and what the autopilot wants. Of a link's messages, and of
-//! the rows of an autopilot's own log.
+//! Values for plots that are not observations, because checks do not need them: sticks, wind, setpoints. From
+//! messages of a link, and from rows of an autopilot's own log.
 
 use std::sync::LazyLock;
 
@@ -14,7 +14,7 @@ use crate::source::item::{Row, Rows, Value};
 
 /// Channels of radio control that are shown.
 const CHANNELS: u8 = 16;
-/// `POSITION_TARGET_TYPEMASK`: what of a target is to be ignored.
+/// `POSITION_TARGET_TYPEMASK`: ignored parts of a target.
 const IGNORES_Z: u16 = 1 << 2;
 const IGNORES_VELOCITY: [u16; 3] = [1 << 3, 1 << 4, 1 << 5];
 /// `MAV_FRAME_LOCAL_NED`
@@ -22,7 +22,7 @@ const LOCAL_NED: u8 = 1;
 /// `MAV_FRAME_GLOBAL`, `MAV_FRAME_GLOBAL_INT`: heights above mean sea level.
 const ABOVE_SEA: [u8; 2] = [0, 5];
 
-/// What gets each value.
+/// Callback for each value.
 pub type Put<'a> = dyn FnMut(Line, f32) + 'a;
 
 /// An angle from north as a compass has it, 0 to 360 degrees.
@@ -55,7 +55,7 @@ pub fn is_of_use(id: u32) -> bool {
     )
 }
 
-/// What a message tells.
+/// The values in a message.
 pub fn of_message(id: u32, payload: &[u8], put: &mut Put<'_>) {
     let fields = Fields(payload);
     match id {
@@ -128,7 +128,7 @@ pub fn rows() -> Rows<'static> {
     Rows::Named(&NAMES)
 }
 
-/// What a row tells: of `ArduPilot`'s `DataFlash` and of PX4's topics, by the names that they have there.
+/// The values in a row of `ArduPilot`'s `DataFlash` or of PX4's topics, by the names there.
 fn of_row(row: &Row<'_>, put: &mut Put<'_>) {
     let number = |name: &str| number(row, name);
     match row.table.name.as_str() {
@@ -188,7 +188,7 @@ fn of_row(row: &Row<'_>, put: &mut Put<'_>) {
     }
 }
 
-/// What a row tells that is no observation.
+/// Values in a row that are not observations.
 #[derive(Clone, Debug, PartialEq)]
 pub enum More {
     /// Values of plots.
@@ -198,7 +198,7 @@ pub enum More {
 }
 
 impl More {
-    /// What a row tells of this; `None` where that is nothing.
+    /// Such values in a row; `None` without any.
     pub fn of(row: &Row<'_>) -> Option<Self> {
         if let Some(default) = default_of(row) {
             return Some(Self::Default(default));
@@ -209,7 +209,8 @@ impl More {
     }
 }
 
-/// The default of a parameter, of which there may be two: that of an airframe's configuration comes before the system's.
+/// The default of a parameter. There may be two: an airframe configuration's default comes before the
+/// system's.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Default {
     /// The parameter.

@@ -1,4 +1,4 @@
-//! What stands in the list of a page: findings, texts, events.
+//! Entries in the list of a page: findings, texts, events.
 
 use hums_core::clock::Instant;
 use hums_core::happening::Happening;
@@ -13,13 +13,13 @@ use crate::states::{Shown, meaning, shown};
 use crate::statustext::Text;
 use crate::summary::FindingLine;
 
-/// What a finding of a HUMS begins with.
+/// Prefix of a finding of a HUMS.
 const OURS: &str = "HUMS: ";
 
-/// What there is to say of a battery whose number of cells nobody tells.
+/// The note on a battery with an unknown cell count.
 pub const CELLS_UNKNOWN: &str = "cells not known: the battery's voltage raises no alarm; set BAT_CELLS";
 
-/// Something that was found, said, or happened.
+/// A finding, text or event.
 #[derive(Clone, Debug, Serialize)]
 pub struct Note {
     /// Seconds since the first byte.
@@ -39,7 +39,7 @@ pub struct Note {
     pub found: Option<Found>,
 }
 
-/// What a check found.
+/// A finding of a check.
 #[derive(Clone, Debug, Serialize)]
 pub struct Found {
     /// The check's stable name.
@@ -48,21 +48,21 @@ pub struct Found {
     pub instance: u8,
     /// The level before.
     pub previous: &'static str,
-    /// The check no longer applies: what was bad is not known to be good.
+    /// The check no longer applies; a return to normal is not known.
     pub ended: bool,
-    /// What decided; `null` where the input stopped, and where it is no quantity.
+    /// The deciding value; `null` if the input stopped, and for a state.
     pub value: Option<f32>,
-    /// The state that the value is, where it is no quantity.
+    /// The state in the value, if it is not a quantity.
     pub state: Option<&'static str>,
-    /// What it crossed.
+    /// The limit it crossed.
     pub limit: Option<f32>,
     /// The unit of both, as people write it.
     pub unit: String,
-    /// What is so, as a sentence.
+    /// Its meaning, as a sentence.
     pub meaning: &'static str,
-    /// What to do, as a sentence.
+    /// The recommended action, as a sentence.
     pub action: &'static str,
-    /// What explains it: another check; `null` where nothing does.
+    /// Its cause: another check; `null` without one.
     pub because: Option<Cause>,
 }
 
@@ -86,10 +86,10 @@ impl Cause {
 
 /// A box tells three texts of half a minute at most, and a warning at the end of its event.
 const AGAIN_S: f64 = 45.0;
-/// Before the words of what is good again.
+/// Prefix of a return to normal.
 const OVER: &str = "over: ";
 
-/// Which check and which part of it the words of a HUMS's text are of, and what they say besides.
+/// Check and part in the text of a HUMS, and the rest of the text.
 fn told_check(words: &str) -> Option<(&'static str, u8, &str)> {
     let silent = words.strip_prefix("no data: ");
     let words = words.strip_prefix(OVER).unwrap_or(words);
@@ -147,7 +147,7 @@ impl Note {
         }
     }
 
-    /// With the part that it is of, where it tells that one is due.
+    /// With the part that is due, if it reports one.
     #[must_use]
     pub fn of_part(self, due: Option<&(String, Option<String>)>) -> Self {
         let Some(due) = due else { return self };
@@ -175,7 +175,7 @@ impl Note {
         Self::found(&line, Some(finding.because).filter(|because| !because.is_empty()))
     }
 
-    /// What a component said; a HUMS on board says findings, which have the names that they have here.
+    /// A text of a component. Texts of a HUMS on board are findings, with the names used here.
     pub fn text(text: Text) -> Self {
         let ours = text.source.component == COMPONENT && text.words.starts_with(OURS);
         if ours && let Some(note) = Self::on_board(&text) {
@@ -192,7 +192,7 @@ impl Note {
         Self { at_s: text.at.as_secs_f64(), kind, level, from, subsystem: "", words, found: None }
     }
 
-    /// What a HUMS on board found, by the words in which it tells it.
+    /// A finding of a HUMS on board, from its text.
     fn on_board(text: &Text) -> Option<Self> {
         let words = text.words.trim_start_matches(OURS);
         let (check, instance, rest) = told_check(words)?;
@@ -227,8 +227,8 @@ impl Note {
         })
     }
 
-    /// Whether it is the same finding as another one: of the same check and part, to the same level, within the time that a box waits before
-    /// it tells one, and a radio until it brings it.
+    /// Whether it is the same finding as another one: same check, part and level, within the delay of a box's
+    /// report and the radio.
     pub fn is_again(&self, other: &Self) -> bool {
         let (Some(one), Some(two)) = (&self.found, &other.found) else { return false };
         (&one.check, one.instance, self.level) == (&two.check, two.instance, other.level)
@@ -236,8 +236,8 @@ impl Note {
             && (self.at_s - other.at_s).abs() <= AGAIN_S
     }
 
-    /// What a pilot wants to see on the time line; `None` for all else that happens. What is so when the vehicle is first heard has not happened
-    /// then: `joined`.
+    /// An event for the pilot's time line; `None` for other happenings. After `joined` the state is older
+    /// than the first reception, so it is not an event.
     pub fn event(now: Instant, happening: Happening, joined: bool) -> Option<Self> {
         let words = match happening {
             Happening::Armed if joined => "armed when it was first heard",

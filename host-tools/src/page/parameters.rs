@@ -1,4 +1,4 @@
-//! The autopilot's parameters: what each was first, and how it changed.
+//! The autopilot's parameters: first values, and changes.
 
 use std::collections::BTreeMap;
 
@@ -12,11 +12,11 @@ const PARAMETERS_MAX: usize = 3_000;
 /// Changes of one that are kept; of more the last ones replace each other.
 const CHANGES_MAX: usize = 16;
 
-/// All that were told.
+/// All reported parameters.
 #[derive(Clone, Debug, Default)]
 pub struct Parameters {
     known: BTreeMap<String, Vec<(Instant, f64)>>,
-    /// What they are by default, where the log tells it.
+    /// Their defaults, if the log has them.
     defaults: BTreeMap<String, DefaultValue>,
     /// Values of parameters beyond [`PARAMETERS_MAX`].
     left_out: u64,
@@ -27,15 +27,15 @@ pub struct Parameters {
 #[derive(Clone, Debug, Serialize)]
 pub struct ParameterJson {
     name: String,
-    /// Times, seconds, and values: the first one that was told, and each that differed from the one before.
+    /// Times, seconds, and values: the first one, and each change.
     values: Vec<(f64, f64)>,
-    /// What it is by default, where the log tells it.
+    /// Its default, if the log has it.
     #[serde(skip_serializing_if = "Option::is_none")]
     default: Option<f64>,
 }
 
 impl Parameters {
-    /// Takes a value; one that is no number is none.
+    /// Takes a value; ignores NaN and infinity.
     pub fn take(&mut self, at: Instant, name: &str, value: f64) {
         if !value.is_finite() {
             return;
@@ -55,7 +55,7 @@ impl Parameters {
         self.newest = Some(at);
     }
 
-    /// Takes what a parameter is by default.
+    /// Takes a parameter's default.
     pub fn learn_default(&mut self, default: &DefaultValue) {
         let known = self.defaults.get(&default.name);
         let has_room = known.is_some() || self.defaults.len() < PARAMETERS_MAX;
@@ -64,12 +64,12 @@ impl Parameters {
         }
     }
 
-    /// Whether the log tells what parameters are by default.
+    /// Whether the log has defaults of parameters.
     pub fn tells_defaults(&self) -> bool {
         !self.defaults.is_empty()
     }
 
-    /// What each was last.
+    /// Last value of each.
     pub fn last(&self) -> impl Iterator<Item = (&str, f64)> {
         self.known.iter().filter_map(|(name, values)| Some((name.as_str(), values.last()?.1)))
     }
@@ -79,7 +79,7 @@ impl Parameters {
         self.left_out
     }
 
-    /// Those of which something was told after `from` (`None`: ever), with all that was told of them by `until`.
+    /// Parameters reported after `from` (`None`: ever), with all their values up to `until`.
     pub fn since(&self, from: Option<Instant>, until: Instant) -> Vec<ParameterJson> {
         if self.newest.is_none() || from.is_some_and(|from| self.newest <= Some(from)) {
             return Vec::new();

@@ -1,4 +1,4 @@
-//! What is drawn over time: which plots there are, what they and their lines are called, their units and limits.
+//! The plots over time: their names, lines, units and limits.
 //!
 //! A plot has one unit, and a line one source: two sensors are two lines.
 
@@ -8,25 +8,25 @@ use hums_core::params::{Param, Params};
 /// The plots, in the order of the page.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Plot {
-    /// Above home, and what the autopilot wants above its local origin, m.
+    /// Above home, and the setpoint above the autopilot's local origin, m.
     Height,
-    /// Above mean sea level by the first receiver, by the estimator, and what the autopilot wants, m.
+    /// Above mean sea level by the first receiver, by the estimator, and the setpoint, m.
     Altitude,
     /// Over ground, through the air, by the receiver, m/s.
     Speed,
-    /// Upwards, and what the autopilot wants, m/s.
+    /// Upwards, and the setpoint, m/s.
     Vertical,
-    /// North, east, down, and what the autopilot wants, m/s.
+    /// North, east, down, and the setpoint, m/s.
     Velocity,
     /// Roll, pitch, and those that the autopilot wants, degrees.
     Attitude,
-    /// From north, clockwise, and what the autopilot's attitude control and its navigation want, degrees.
+    /// From north, clockwise, and the setpoints of attitude control and of navigation, degrees.
     Heading,
-    /// About the body's axes, and what the autopilot wants, degrees a second.
+    /// About the body's axes, and the setpoint, degrees a second.
     Rates,
     /// Over ground, as the autopilot estimates it, m/s.
     Wind,
-    /// Where it comes from, degrees from north, clockwise.
+    /// Direction of origin, degrees from north, clockwise.
     WindFrom,
     /// A line a channel of radio control, microseconds.
     Sticks,
@@ -94,12 +94,12 @@ pub enum Plot {
     Load,
 }
 
-/// What the page needs to know of a plot.
+/// Properties of a plot for the page.
 #[derive(Clone, Copy, Debug)]
 pub struct About {
     /// The section of the page.
     pub group: &'static str,
-    /// What it is called.
+    /// Its name.
     pub title: &'static str,
     /// The unit of all its lines; empty for a plain number.
     pub unit: &'static str,
@@ -152,7 +152,7 @@ fn receiver(line: u8) -> String {
     numbered("Receiver", line)
 }
 
-/// What a plot is called, as this autopilot has it.
+/// The properties of a plot, for this autopilot.
 pub fn about(plot: Plot, autopilot: Autopilot) -> About {
     let px4 = autopilot == Autopilot::Px4;
     let axes: fn(u8) -> String = if px4 {
@@ -222,22 +222,22 @@ pub fn about(plot: Plot, autopilot: Autopilot) -> About {
     About { group, title, unit, decimals, name }
 }
 
-/// The line of vibration that is no axis: from there on it counts as risen.
+/// The line of vibration without an axis: the limit above which it counts as risen.
 pub(super) const RISE: u8 = 3;
 const LIMIT: &str = "Limit of the rise";
 
 /// A limit of warning and one of critical, where there are such.
 pub type Limits = [Option<f32>; 2];
 
-/// The limits that hold for every line of a plot; of both sides, where there are two. Where the second is the lower one, what is
-/// below is bad.
+/// The limits of every line of a plot; of both sides, if there are two. If the second is the lower one,
+/// values below are bad.
 pub fn limits(plot: Plot, autopilot: Autopilot, params: &Params, cells: u8) -> Vec<Limits> {
     let px4 = autopilot == Autopilot::Px4;
     let both = |warning, critical| [Some(params.get(warning)), Some(params.get(critical))];
     let warning = |param| [Some(params.get(param)), None];
     let pair = match plot {
         Plot::CellVolts => both(Param::CellVoltWarn, Param::CellVoltCrit),
-        // Those of a cell, where the pack alone is told.
+        // A cell's limits, if only the pack is reported.
         Plot::PackVolts if cells > 0 => both(Param::CellVoltWarn, Param::CellVoltCrit)
             .map(|volts| volts.map(|volts| volts * f32::from(cells))),
         Plot::PackPercent => both(Param::BatRemWarn, Param::BatRemCrit),

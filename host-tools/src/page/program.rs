@@ -1,9 +1,9 @@
-//! The page's program: one script of many modules, because a page that is whole in itself has no files to import from.
+//! The page's program: one script of many modules, because a self-contained page cannot import files.
 //!
-//! The files in `assets/` are ECMAScript modules, with two habits that make putting them together simple: an `import` is one
-//! line, and what is exported is a `const` where it is defined. Each becomes a function that is called once and gives what
-//! it exports; an import takes from that. `live`, `report`, `index` and `compare` are those that nobody imports: each with all that it
-//! needs is one program.
+//! The files in `assets/` are ECMAScript modules, with two habits that make joining them simple. An `import`
+//! is one line, and an export is a `const` at its definition. Each becomes a function that is called once and
+//! returns its exports; an import takes from that. `live`, `report`, `index` and `compare` are imported by no
+//! other module: each with its imports is one program.
 
 use std::fmt::Write as _;
 
@@ -81,13 +81,13 @@ fn push_module(out: &mut String, name: &str, text: &str) {
     let _ = writeln!(out, "return {{ {} }};\n}})();", exports.join(", "));
 }
 
-/// What a line imports, and from which module.
+/// The names imported by a line, and the module.
 fn import(line: &str) -> Option<(&str, &str)> {
     let (names, from) = line.strip_prefix("import {")?.split_once("} from \"./")?;
     Some((names, from.strip_suffix(".js\";")?))
 }
 
-/// What a line exports.
+/// The name exported by a line.
 fn export(line: &str) -> Option<&str> {
     line.strip_prefix("export const ")?.split([' ', '=']).next()
 }
@@ -185,7 +185,7 @@ mod tests {
             for markup in ["innerHTML", "outerHTML", "insertAdjacentHTML", "document.write", "eval("] {
                 assert!(!program.contains(markup), "{markup}");
             }
-            // The one address is a name: that of SVG's elements.
+            // The only address is a name: the namespace of SVG's elements.
             assert_eq!(program.matches("http").count(), 1);
         }
     }

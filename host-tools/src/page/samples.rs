@@ -1,4 +1,4 @@
-//! What the vehicle told, as points of series and of the track.
+//! The vehicle's values as points of series and of the track.
 
 use hums_core::clock::Instant;
 use hums_core::observation::{Air, Battery, CELLS_MAX, Esc, Imu, MOTORS_MAX, Observation};
@@ -27,7 +27,7 @@ pub struct Samples {
 }
 
 impl Samples {
-    /// Takes what an observation told.
+    /// Takes an observation.
     pub fn take(&mut self, at: Instant, reference: &Reference, observation: &Observation) {
         self.motion(at, reference, observation);
         self.power(at, reference, observation);
@@ -128,7 +128,7 @@ impl Samples {
                 }
             }
             Observation::Outputs(outputs) => {
-                // More ports than two nobody has; a line is a byte.
+                // Autopilots have two ports at most; a line is a byte.
                 let first = outputs.port.min(15) * MOTORS_MAX as u8;
                 for (line, pulse) in (first..).zip(outputs.pulses) {
                     push(Plot::Outputs, line, (pulse > 0).then_some(f32::from(pulse)));
@@ -243,7 +243,7 @@ impl Samples {
         }
     }
 
-    /// Takes what of a message of the vehicle is no observation: sticks, wind, what the autopilot wants.
+    /// Takes values of a message that are not observations: sticks, wind, setpoints.
     pub fn message(&mut self, at: Instant, id: u32, payload: &[u8]) {
         more::of_message(id, payload, &mut |line, value| self.put(at, line, Some(value)));
     }

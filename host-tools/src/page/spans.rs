@@ -1,10 +1,10 @@
-//! What a vehicle was in, one after the other: phases of flight, modes. Each goes on until the next one begins.
+//! States of a vehicle in a row: phases of flight, modes. Each one lasts until the next begins.
 
 use std::borrow::Cow;
 
 use hums_core::clock::{Instant, Span};
 
-/// Kept at most; what follows counts to the last one.
+/// Maximum number of spans; later ones count to the last one.
 const SPANS_MAX: usize = 2_000;
 
 /// Beginnings, in order.
@@ -21,12 +21,13 @@ pub struct Seen {
     count: usize,
 }
 
-/// What a page lacks: the number of those that it has and that stay, and those that follow: seconds and name.
+/// The part that a page lacks: the number of its spans that stay, and the spans after those: seconds and
+/// name.
 pub type Rest = (usize, Vec<(f64, Cow<'static, str>)>);
 
 impl Spans {
-    /// It is in this one now. One that lasted less than `shortest` is taken back, and is part of the one before; so is one that
-    /// lasted no time at all, if it is the first one too: a log's first message may tell a state before its mode.
+    /// Enters this state. A span shorter than `shortest` is removed, and becomes part of the one before. So
+    /// does a span of zero length, also the first: a log's first message may report a state before its mode.
     pub fn extend(&mut self, at: Instant, name: Cow<'static, str>, shortest: Span) {
         if let Some((begun, last)) = self.begun.last() {
             if *last == name || self.begun.len() >= SPANS_MAX {
@@ -52,7 +53,7 @@ impl Spans {
         }
     }
 
-    /// What a page that has this much lacks of the time up to `until`; `None` where that is nothing.
+    /// The part up to `until` that a page with these spans lacks; `None` if there is nothing new.
     pub fn since(&self, seen: &mut Seen, until: Instant) -> Option<Rest> {
         let count = self.begun.partition_point(|(at, _)| *at <= until);
         let now = Seen { revision: self.revision, count };

@@ -1,4 +1,5 @@
-//! Flights side by side: their figures, findings and parameters in columns, and what they told in the same plots, from take-off on.
+//! Flights side by side: their figures, findings and parameters in columns, and their values in the same
+//! plots, from take-off on.
 
 use std::collections::BTreeMap;
 
@@ -45,7 +46,7 @@ struct Data {
     flight: Part,
     /// The newest first.
     flights: Vec<FlightJson>,
-    /// Parameters that differ, and what each flight has; `null` where it told none.
+    /// Parameters that differ, and each flight's values; `null` without one.
     parameters: Vec<(String, Vec<Option<f64>>)>,
 }
 
@@ -105,7 +106,7 @@ pub fn html(recordings: &[Candidate<'_>]) -> Result<Option<String>> {
 }
 
 impl Recorded<'_> {
-    /// What a flight of it is called.
+    /// The name of one of its flights.
     fn name(&self, index: usize) -> String {
         let name = &self.overview.ending.name;
         if self.replay.flights.len() > 1 { format!("{name}, flight {}", index + 1) } else { name.clone() }
@@ -145,7 +146,7 @@ impl Recorded<'_> {
     }
 }
 
-/// Parameters that two of them told and that are not the same in all.
+/// Parameters that at least two flights have and that differ.
 fn differing(replays: &[&Replay]) -> Vec<(String, Vec<Option<f64>>)> {
     let mut all: BTreeMap<&str, Vec<Option<f64>>> = BTreeMap::new();
     for (place, replay) in replays.iter().enumerate() {

@@ -14,16 +14,16 @@ pub struct Flight {
     pub(super) to_s: f64,
     /// In the air, without stops on the ground and gaps of the record.
     pub(super) air_s: f64,
-    /// It was on the ground before; otherwise it was in the air when it was heard first.
+    /// It was on the ground before; otherwise it was first received in the air.
     pub(super) took_off: bool,
     pub(super) landed: bool,
-    /// Disarmed in the air, which is no landing.
+    /// Disarmed in the air, which is not a landing.
     pub(super) disarmed_in_air: bool,
-    /// When it hit what ended it.
+    /// Time of the impact that ended it.
     pub(super) impact_s: Option<f64>,
-    /// When it was down, where a mishap without an impact ended it.
+    /// Time at which it was down, if a mishap without an impact ended it.
     pub(super) down_s: Option<f64>,
-    /// `None` where nothing told it.
+    /// `None` if unknown.
     pub(super) height_max_m: Option<f32>,
     pub(super) speed_max_m_s: Option<f32>,
     pub(super) percent_from: Option<f32>,
@@ -38,7 +38,7 @@ impl Flight {
     }
 }
 
-/// How high and fast the vehicle was in each flight, and what it took of the battery.
+/// Height, speed and battery use of each flight.
 #[derive(Debug, Default)]
 pub struct Extents(Vec<Extent>);
 
@@ -51,7 +51,7 @@ struct Extent {
 }
 
 impl Extents {
-    /// The vehicle has just told something, in this flight.
+    /// Takes the vehicle's new values in this flight.
     pub fn take(&mut self, at: Instant, flight: Option<usize>, reference: &Reference) {
         let Some(index) = flight else { return };
         if index >= self.0.len() {
@@ -90,12 +90,12 @@ impl Extents {
     }
 }
 
-/// The greater of what is known.
+/// The greater of the known values.
 fn most(one: Option<f32>, other: Option<f32>) -> Option<f32> {
     [one, other].into_iter().flatten().reduce(f32::max)
 }
 
-/// What is left of the battery.
+/// Remaining charge of the battery.
 fn percent(at: Instant, reference: &Reference) -> Option<f32> {
     Some(reference.value(at, Quantity::BatteryPercent)?.as_f64() as f32)
 }

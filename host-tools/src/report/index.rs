@@ -1,4 +1,4 @@
-//! The pages of a folder in a table: what flew when, for how long, and what was found.
+//! The table of the pages in a folder: vehicle, date, duration and findings.
 
 use std::fs::File;
 use std::io::Read as _;
@@ -43,7 +43,7 @@ pub struct Row {
     begins_in_air: bool,
     #[serde(default)]
     ends_in_air: bool,
-    /// Nothing in it tells whether the vehicle flew.
+    /// It does not show whether the vehicle flew.
     #[serde(default)]
     flight_unknown: bool,
     /// Why the recording is not whole, as parts of sentences.
@@ -61,11 +61,11 @@ pub struct Pages {
     pub comparisons: Vec<(String, String)>,
 }
 
-/// A table is no larger: some hundred thousand rows.
+/// Maximum size of a table: some hundred thousand rows.
 const BYTES_MAX: u64 = 64 << 20;
 
 impl Pages {
-    /// Those of the table that is in a folder; `None` where it has none, or one that is not ours.
+    /// The pages in a folder's table; `None` without a table of ours.
     pub fn of(folder: &Path) -> Option<Self> {
         let mut text = String::new();
         File::open(folder.join(FILE)).ok()?.take(BYTES_MAX).read_to_string(&mut text).ok()?;
@@ -73,7 +73,7 @@ impl Pages {
         serde_json::from_str(data.split_once("</script>")?.0).ok()
     }
 
-    /// With what was there before in the folder and still is.
+    /// Adds the earlier pages that are still in the folder.
     pub fn with(mut self, before: Self, folder: &Path) -> Self {
         let is_there = |file: &str| folder.join(file).is_file();
         for row in before.pages {
@@ -95,7 +95,7 @@ impl Pages {
     }
 }
 
-/// Why a recording is not whole; of that of another program also what its recorder did not write.
+/// Faults of a recording; for one of another program also the data that its recorder did not write.
 fn faults(log: &Overview) -> Vec<String> {
     let mut faults = log.faults();
     let losses = log.ending.summary.losses;

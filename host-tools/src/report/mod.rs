@@ -1,12 +1,13 @@
-//! `hums report`: one page for each session, whole in itself: no network, no file beside it. A folder of pages has a table of them
-//! ([`index`]); flights are compared on a page of their own ([`compare`]).
+//! `hums report`: one self-contained page for each session, without network or further files. A folder of
+//! pages has a table of them ([`index`]); flights are compared on a page of their own ([`compare`]).
 //!
-//! [`replay`] reads the log in order: what the vehicle told becomes a history as `hums live` has it ([`crate::page`]),
-//! bounded, so that a page of hours stays below a few megabytes; [`flights`] finds flights with the firmware's own rules; [`trend`] compares with
-//! the sessions before on the same card; [`page`] puts all of it, as JSON, beside the program that draws it.
+//! [`replay`] reads the log in order. The vehicle's reports become a history as in `hums live`
+//! ([`crate::page`]), bounded, so that a page of hours stays below a few megabytes. [`flights`] finds flights
+//! with the firmware's own rules, and [`trend`] compares with the earlier sessions of the same card. [`page`]
+//! puts all of it, as JSON, beside the program that draws it.
 //!
-//! Nothing that a vehicle sent becomes markup: text goes into the page as data, and only as text onto it. The page's
-//! own policy lets no other script run and loads nothing.
+//! A vehicle's data never become markup: text goes into the page as data, and only as text onto it. The
+//! page's own policy blocks other scripts and all loading.
 
 pub mod compare;
 pub mod flights;
@@ -40,7 +41,7 @@ use crate::source::find::{Found, find, sessions_of};
 use crate::source::recording::Place;
 use crate::summary::Overview;
 
-/// What `hums report --json` prints.
+/// Output of `hums report --json`.
 const SCHEMA: Schema = Schema::first("hums-report");
 
 /// The pages that were written.
@@ -118,12 +119,12 @@ pub fn run(args: &cli::Report) -> Result<Outcome> {
     making.end(args.compare)
 }
 
-/// What is made, session by session.
+/// The pages in the making, session by session.
 struct Making<'a> {
     places: &'a [Place],
     inputs: &'a Inputs,
     wanted: &'a Wanted,
-    /// Of each session only what later ones are compared with is kept.
+    /// The data of each session that later ones are compared with.
     earlier: Vec<Option<trend::Session>>,
     /// Files of pages, by the index of their session.
     pages: BTreeMap<usize, String>,
@@ -132,7 +133,7 @@ struct Making<'a> {
     outcome: Outcome,
     /// The parameters of a session that was read last, by its index.
     parameters: Option<(usize, Vec<(String, f64)>)>,
-    /// Whether what was made is told as JSON, at the end.
+    /// Whether the outputs are reported as JSON, at the end.
     json: bool,
     made: PagesJson,
 }
@@ -163,7 +164,7 @@ impl Making<'_> {
             note!("{}: {why}", overview.ending.name);
         }
         self.outcome = self.outcome.and(Outcome::lossy(!overview.is_sound()));
-        // A session that is there twice counts once, and what a file held before is older than its name says.
+        // A session that is there twice counts once, and a file's old content is older than its name.
         let counts = overview.ending.is_counted() && overview.ending.begun_anew.is_none();
         self.earlier.push(counts.then_some(this));
         Ok(())
@@ -234,7 +235,7 @@ impl Making<'_> {
         if self.wanted.directory {
             let folder = &self.wanted.output;
             let known = index::Pages::of(folder);
-            // A table of ours goes on: that another flight has a page is no reason to ask.
+            // A table of ours is extended: pages of other flights in it are not a reason to ask.
             let inputs =
                 if known.is_some() { self.inputs.clone().forcing(true) } else { self.inputs.clone() };
             let pages =
@@ -262,7 +263,7 @@ impl Making<'_> {
         }
         let mut comparisons = Vec::new();
         for (airframe, mut sessions) in groups {
-            // By their times; what has none stands before all that have.
+            // By their times; sessions without a time come first.
             let start = |index: &usize| {
                 let session = self.earlier.get(*index).and_then(Option::as_ref);
                 session.and_then(trend::Session::start_utc).map(str::to_owned)
@@ -293,7 +294,7 @@ impl Making<'_> {
     }
 }
 
-/// What a page is.
+/// The kind of a page.
 enum What<'a> {
     Session(&'a str),
     /// Of a folder's pages, so many.
@@ -317,8 +318,8 @@ impl Display for What<'_> {
     }
 }
 
-/// Whether two sessions are of one card: in one image, or segments in one folder. Then one box recorded them. What lies
-/// beside a recording or a packed log may be anybody's.
+/// Whether two sessions are of one card, and so of one box: in one image, or segments in one folder. A
+/// recording or a packed log may have any neighbours.
 fn are_of_one_card(one: &Place, other: &Place) -> bool {
     let Some((one, other)) = one.own().zip(other.own()) else { return false };
     let image = |log: &Log| log.pieces.first().map(|piece| piece.path.clone());
@@ -359,7 +360,7 @@ fn wanted(args: &cli::Report, output: &Path, found: &Found, sessions: &Sessions)
         }
         None if directory => 0..=last,
         None => {
-            // What a file held that was to be written anew is not the last one, whatever its name says.
+            // The old content of a file to be rewritten is not the last session, in spite of its name.
             let is_own = |log: &Place| sessions.begun_anew(&log.name).is_none();
             let last = logs.iter().rposition(is_own).unwrap_or(last);
             last..=last

@@ -19,7 +19,7 @@ use crate::summary::{JudgedChecks, Overview};
 
 const TEMPLATE: &str = include_str!("../page/assets/report.html");
 
-/// What the page's program draws.
+/// Data for the page's program.
 #[derive(Serialize)]
 struct Data<'a> {
     version: &'static str,
@@ -28,17 +28,17 @@ struct Data<'a> {
     /// All of the flight.
     flight: Option<Part>,
     flights: &'a [Flight],
-    /// What was not recorded.
+    /// The gaps.
     missing: &'a [Missing],
     /// How many checks were critical at their worst, and how many warned.
     critical: usize,
     warning: usize,
-    /// When and what the worst of them was.
+    /// Time and words of the worst of them.
     first: Option<(f64, String)>,
     texts_count: u64,
-    /// How many checks had something to judge, and of how many; `null` where nothing was judged.
+    /// Number of checks with data, and of all; `null` if nothing was judged.
     judged: Option<(usize, usize)>,
-    /// They are so few that nothing found is no good news.
+    /// Too few for a clean result to mean anything.
     little: bool,
     tells_flight: bool,
     /// When and how, as a sentence.
@@ -46,7 +46,7 @@ struct Data<'a> {
     counters: Counters,
     /// Of which time the counters are, where that is not all of it.
     counted: Option<String>,
-    /// What the recorder tells of itself is of the time until then, where the recording goes on.
+    /// The recorder's reports about itself count until this time, if the recording goes on.
     counted_until_s: Option<f64>,
     /// The airframe's life is without this session.
     life_before: bool,
@@ -59,7 +59,7 @@ struct Data<'a> {
 /// The recording before of the same airframe.
 #[derive(Debug, Serialize)]
 pub struct Before {
-    /// What it is called.
+    /// Its name.
     pub name: String,
     /// The autopilot's parameters as they were at its end.
     pub values: Vec<(String, f64)>,
@@ -132,7 +132,7 @@ pub fn html(log: &Overview, replay: &Replay, trend: &Trend, before: Option<&Befo
     whole("report", &data)
 }
 
-/// A page that is whole in itself: the program that begins with `entry`, and what it draws.
+/// A self-contained page: the program of `entry`, and its data.
 pub fn whole(entry: &str, data: &impl Serialize) -> String {
     let program = program(entry);
     let programs = [UPLOT, program.as_str()];
@@ -147,7 +147,7 @@ pub fn whole(entry: &str, data: &impl Serialize) -> String {
         ("{{style}}", STYLE.concat().as_str()),
         ("{{uplot}}", UPLOT),
         ("{{program}}", program.as_str()),
-        // Last, so that nothing in it is taken for a mark.
+        // Last, so that nothing in it looks like a mark.
         ("{{data}}", embedded(data).as_str()),
     ] {
         page = page.replacen(mark, text, 1);

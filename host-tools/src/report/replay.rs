@@ -1,4 +1,4 @@
-//! A recording read in order: what the vehicle told becomes the history of its flight, and flights.
+//! A recording read in order: the vehicle's reports become the history of its flight, and flights.
 
 use anyhow::Result;
 use hums_core::clock::Instant;
@@ -36,28 +36,28 @@ pub struct Missing {
     words: String,
 }
 
-/// What a log told.
+/// Result of reading a log.
 #[derive(Debug, Default)]
 pub struct Replay {
     /// Its flight.
     pub history: History,
     /// Flights, as `hums check` finds them.
     pub flights: Vec<Flight>,
-    /// How often the vehicle said something in words.
+    /// Number of texts of the vehicle.
     pub texts_count: u64,
-    /// How many checks had something to judge; `None` where nothing was judged.
+    /// Number of checks with data; `None` if nothing was judged.
     pub judged: Option<JudgedChecks>,
     /// Something in it tells whether the vehicle flew.
     pub tells_flight: bool,
     /// How the vehicle was last, where its last flight goes on at the end.
     pub ends_in_air: Option<EndsInAir>,
-    /// What was not recorded, and where.
+    /// The gaps, with their places.
     pub missing: Vec<Missing>,
     /// How many checks were critical at their worst, and how many warned.
     pub found: (usize, usize),
-    /// When and what `hums check` says first.
+    /// Time and words of the first problem of `hums check`.
     pub first: Option<(f64, String)>,
-    /// What it said.
+    /// Its texts.
     notes: Vec<(Instant, Note)>,
     reference: Reference,
     extents: Extents,
@@ -76,7 +76,7 @@ pub fn parameters(place: &Place) -> Result<Vec<(String, f64)>> {
 }
 
 impl Replay {
-    /// Reads a recording, of which this is known.
+    /// Reads a recording with this overview.
     pub fn of(place: &Place, overview: &Overview) -> Result<Self> {
         let mut replay = Self::default();
         let want = Want { frames: true, observations: true, rows: rows(), ..Want::default() };
@@ -118,11 +118,12 @@ impl Replay {
         Ok(replay)
     }
 
-    /// Takes what the recording does not have.
+    /// Takes the gaps of the recording.
     fn gaps(&mut self, judged: &Judged) {
         for gap in &judged.gaps {
             let span = gap.from.or(gap.to).zip(gap.to.or(gap.from));
-            // One whose length is not known is a place, as is a count over much of it; one that is nowhere is told in the table alone.
+            // A gap of unknown length is a place, and so is a count over much of the recording. A gap without
+            // any time is only in the table.
             let is_empty = span.is_some_and(|span| judged.holes.is_one(&span));
             self.history.gap(span.map(|(from, to)| (from, if is_empty { to } else { from })));
             if gap.cause != Cause::NotKept && !gap.is_noise() {

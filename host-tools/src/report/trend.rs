@@ -10,8 +10,8 @@ use crate::utc::iso8601;
 /// Sessions before this one that are compared with at most.
 const EARLIER_MAX: usize = 30;
 
-/// Counters that are worth following from session to session, with title and decimals. What is counted over a session
-/// is divided by its time in the air where that makes sessions comparable.
+/// Counters followed from session to session, with title and decimals. A count over a session is divided by
+/// its time in the air if that makes sessions comparable.
 const FOLLOWED: [(&str, &str, &str, bool); 9] = [
     ("flight_time_s", "Time in the air", "s", false),
     ("vibration_max_m_s2", "Vibration, highest", "m/s\u{b2}", false),
@@ -23,7 +23,7 @@ const FOLLOWED: [(&str, &str, &str, bool); 9] = [
     ("touchdown_max_m_s", "Touchdown, fastest", "m/s", false),
     ("hard_landings", "Hard landings", "", false),
 ];
-/// A shorter flight tells nothing per hour, seconds.
+/// Shorter flights give no rates per hour, seconds.
 const FLIGHT_MIN_S: f64 = 30.0;
 
 /// The comparison.
@@ -44,17 +44,17 @@ struct SessionJson {
 struct RowJson {
     title: &'static str,
     unit: &'static str,
-    /// One a session; `null` where it has none.
+    /// One a session; `null` without one.
     values: Vec<Option<f64>>,
 }
 
-/// What later sessions are compared with.
+/// The data that later sessions are compared with.
 #[derive(Clone, Debug)]
 pub struct Session {
     json: SessionJson,
-    /// System, unique id, autopilot and type, where they are known.
+    /// System, unique id, autopilot and type, if known.
     vehicle: Option<(u8, u64, u8, u8)>,
-    /// Which airframe it was, as far as it is told: see [`airframe`].
+    /// The airframe, as far as known: see [`airframe`].
     pub airframe: Option<String>,
     /// By [`FOLLOWED`].
     values: [Option<f64>; FOLLOWED.len()],
@@ -86,7 +86,8 @@ impl Session {
     }
 }
 
-/// The airframe, as a part of a file's name: by the autopilot's unique id, and where that is not told by system, autopilot and type.
+/// The airframe, as a part of a file's name: by the autopilot's unique id, or else by system, autopilot and
+/// type.
 pub fn airframe(vehicle: &Vehicle) -> String {
     if vehicle.uid != 0 {
         return format!("uid-{:016x}", vehicle.uid);

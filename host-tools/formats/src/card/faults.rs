@@ -1,4 +1,4 @@
-//! What can go wrong with a card, as the command line says it.
+//! Faults of a card, as on the command line.
 
 use std::str::FromStr;
 
@@ -13,12 +13,12 @@ pub struct Faults {
     pub stalls: Vec<Stall>,
     /// Spans in which no card is there.
     pub outs: Vec<CardOut>,
-    /// The probability that a block write fails; nothing of the block is written then.
+    /// The probability that a block write fails and leaves the block unchanged.
     pub write_error: f64,
     /// Makes the write errors repeatable.
     pub seed: u64,
-    /// Block 0 is write protected: the recorder writes it only where it formats a card, and what a user's image holds is not
-    /// formatted over.
+    /// Block 0 is write protected. The recorder writes it only to format a card, and a user's image is never
+    /// formatted.
     pub keeps_table: bool,
 }
 
@@ -52,7 +52,7 @@ impl FromStr for Cut {
 pub struct Stall {
     /// When it begins, in microseconds since the first input byte.
     pub from_us: u64,
-    /// How long the card answers nothing, in microseconds.
+    /// Duration of the card's silence, in microseconds.
     pub for_us: u64,
 }
 

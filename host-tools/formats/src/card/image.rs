@@ -15,13 +15,13 @@ use crate::outcome::usage;
 
 /// The size of an image that is made, in MiB, unless `--card-size` says otherwise.
 pub const SIZE_MIB: u64 = 256;
-/// Nothing smaller can be FAT32, in MiB.
+/// The smallest size for FAT32, in MiB.
 pub const SIZE_MIB_MIN: u64 = (BLOCKS_MIN as u64 * 512).div_ceil(1 << 20);
 /// Block numbers have 32 bits, in MiB.
 pub const SIZE_MIB_MAX: u64 = 2 * 1024 * 1024 - 1;
 
-/// Opens the image for reading and writing, so that no other run does; or makes a sparse file of `size_mib`, which
-/// `format` formats, where there is none.
+/// Opens the image for reading and writing, for this run alone. Without an image it makes a sparse file of
+/// `size_mib` and lets `format` format it.
 pub fn open_or_make(
     path: &Path,
     size_mib: Option<u64>,
@@ -64,8 +64,8 @@ fn open(path: &Path, about: &Metadata, size_mib: Option<u64>) -> Result<File> {
         .with_context(|| format!("{shown}: cannot be opened for writing"))
 }
 
-/// Refuses an image that is no card: one on which the recorder finds no file system that it can use is only taken where
-/// nothing at all is in it, because such a card may be formatted by command. Gives what there is to say of an empty one.
+/// Refuses an image that is not a card. If the recorder finds no usable file system on it, the image must be
+/// completely empty, because such a card may be formatted by command. Returns the remark for an empty one.
 pub fn check(file: &File, path: &Path) -> Result<Option<String>> {
     let context = || format!("{}: cannot be read", path.display());
     let bytes = length(file).with_context(context)?;
@@ -81,7 +81,7 @@ pub fn check(file: &File, path: &Path) -> Result<Option<String>> {
         Err(LayoutError::Device(error)) => return Err(error).with_context(context),
         Err(why) => why,
     };
-    // A partition table alone, as a card may have it whose partition nobody has formatted, is nothing to lose.
+    // A partition table alone, as on a card with an unformatted partition, holds no data to lose.
     let from = if matches!(why, LayoutError::NoPartitionTable) { 0 } else { Block::LEN as u64 };
     if is_zero(file, from).with_context(context)? {
         return Ok(Some(format!(
@@ -96,12 +96,12 @@ pub fn check(file: &File, path: &Path) -> Result<Option<String>> {
     )
 }
 
-/// Whether an image has a partition table and a FAT32 volume: nobody writes that table anew.
+/// Whether an image has a partition table and a FAT32 volume: that table is never rewritten.
 pub fn is_card(file: &File) -> io::Result<bool> {
     Ok(Layout::read(&ReadOnlyImage::new(file.try_clone()?)?).is_ok())
 }
 
-/// Whether a file has nothing but zeros from here on. What a sparse file does not hold is not read.
+/// Whether a file has only zeros from here on. Holes of a sparse file are not read.
 fn is_zero(mut file: &File, mut at: u64) -> io::Result<bool> {
     let mut bytes = vec![0; 1 << 20];
     loop {
@@ -119,7 +119,7 @@ fn is_zero(mut file: &File, mut at: u64) -> io::Result<bool> {
     }
 }
 
-/// Where a sparse file holds something from here on; none up to its end.
+/// Place of a sparse file's next data from here on; `None` up to its end.
 #[cfg(target_os = "linux")]
 fn data_from(file: &File, at: u64) -> io::Result<Option<u64>> {
     match rustix::fs::seek(file, rustix::fs::SeekFrom::Data(at)) {

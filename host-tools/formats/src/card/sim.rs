@@ -1,8 +1,8 @@
-//! The simulated card: an image file behind the same block device interface as a real one, with a real one's faults
-//! and a real one's slowness, in the simulation's own time.
+//! The simulated card: an image file behind the same block device interface as a real one. It has a real
+//! one's faults and slowness, in the simulation's own time.
 //!
-//! Every operation takes virtual time, which the card adds to its clock: the caller sets the clock, lets the storage
-//! task run, and reads from the clock how long the card kept it. A stall is an operation that takes longer.
+//! Every operation takes virtual time, which the card adds to its clock. The caller sets the clock, lets the
+//! storage task run, and reads the time taken from the clock. A stall is an operation that takes longer.
 
 use std::cell::{Cell, RefCell};
 use std::fs::File;
@@ -14,7 +14,7 @@ use hums_recorder::CardDevice;
 use super::faults::{Cut, Faults, Stall};
 use crate::rng::Rng;
 
-/// What a command costs beside its data: a usual card's programming time, in microseconds.
+/// Time of a command besides its data: a usual card's programming time, in microseconds.
 const COMMAND_US: u64 = 300;
 /// One block over SPI at 21 MHz, in microseconds.
 const BLOCK_US: u64 = 200;
@@ -26,7 +26,7 @@ const PURPOSE: u64 = 2;
 /// Why an operation failed.
 #[derive(Debug)]
 pub enum CardError {
-    /// Power has gone: nothing answers any more.
+    /// The power is off: all operations fail.
     PowerGone,
     /// No card is in the slot.
     Absent,
@@ -115,7 +115,7 @@ impl SimCard {
         self.clock_us.set(now_us);
     }
 
-    /// The card's clock: what was set, and the time that the operations since then took.
+    /// The card's clock: the time set, plus the time of the operations since then.
     pub fn clock(&self) -> u64 {
         self.clock_us.get()
     }
@@ -130,7 +130,7 @@ impl SimCard {
         self.trace.replace(Some(Vec::new()));
     }
 
-    /// The block writes since [`Self::start_trace`]; none are kept any more.
+    /// The block writes since [`Self::start_trace`]; ends the trace.
     pub fn take_trace(&self) -> Vec<Written> {
         self.trace.take().unwrap_or_default()
     }
@@ -151,7 +151,7 @@ impl SimCard {
         self.image_error.borrow_mut().take()
     }
 
-    /// What every operation does first: take its time, and see whether the card is there.
+    /// Start of every operation: takes its time, and checks that the card is there.
     fn begin(&self, cost_us: u64) -> Result<(), CardError> {
         if self.is_dead() {
             return Err(CardError::PowerGone);

@@ -1,4 +1,4 @@
-//! Which sectors of a log's files are not of the log, which files are not there, and what lies behind its last sector.
+//! Foreign sectors in a log's files, missing files, and the blocks after its last sector.
 
 use std::path::Path;
 
@@ -11,14 +11,14 @@ use crate::logs::segment_name;
 use crate::logs::strangers::Strange;
 use crate::plural::{are, count};
 
-/// Clocks of two power-ons differ by more than this, or say nothing about which one was first: microseconds.
+/// Maximum difference of two power-ons' clocks that does not show their order: microseconds.
 const EPOCH_SLACK_US: u64 = 60_000_000;
 /// No box recorded before 2025, and a clock that says so is wrong: microseconds since 1970.
 const EARLIEST_US: u64 = 1_735_689_600_000_000;
 /// Files of a log that are named one by one.
 const NAMED_MAX: usize = 3;
 
-/// A log's files, and what was read of them.
+/// A log's files, and the result of reading them.
 pub(super) struct Files<'a> {
     pub(super) names: &'a [String],
     pub(super) summary: &'a Summary,
@@ -26,10 +26,11 @@ pub(super) struct Files<'a> {
 }
 
 impl Files<'_> {
-    /// Blocks behind the last sector that are neither empty nor sectors of any log, where nothing proves that the log ends
-    /// before them: sectors of the log that went wrong look so. What was on a card before the box used it is more than a card's
-    /// page, and goes on to the end of the last file. What begins as a sector and fails its check is counted only where no
-    /// sound sector of another session lies there too: then it is left over as they are.
+    /// Blocks after the last sector that are neither empty nor sectors of any log, if the log's end is not
+    /// proved before them. Damaged sectors of the log look like that. Data from before the card's use in the
+    /// box are larger than a card's page, and go on to the end of the last file. A block that begins as a
+    /// sector and fails its check may be left over like sectors of another session. So it counts only without
+    /// sound ones of those.
     pub(super) fn noise(&self) -> Option<String> {
         let behind = &self.summary.behind;
         let unsound = if behind.stale == 0 { behind.unsound } else { 0 };
@@ -75,8 +76,8 @@ impl Files<'_> {
         all
     }
 
-    /// Files without a sector. One that the next start found empty was made when the power went; the card refused one between
-    /// sectors that follow each other, or was out.
+    /// Files without a sector. The next start may have found one empty: it was made when the power failed.
+    /// The card may have refused one between consecutive sectors, or was missing.
     fn empty(&self) -> Option<String> {
         let is_usual = |strange: &Strange| {
             let is_between = strange.file + 1 < self.names.len() && self.summary.gaps == 0;
@@ -114,8 +115,8 @@ impl Files<'_> {
         all
     }
 
-    /// Whether the last file was to be written anew when power went, and still holds another session from its beginning on. Its
-    /// first sector may be torn.
+    /// Whether the last file was to be rewritten when the power failed, and still holds another session from
+    /// its beginning on. Its first sector may be torn.
     fn is_begun_anew(&self, strange: &Strange) -> bool {
         let is_last = strange.file + 1 == self.names.len();
         strange.hollow && is_last && strange.first <= 1 && matches!(self.proof, Proof::NextStart(None))
@@ -124,7 +125,7 @@ impl Files<'_> {
     /// Files of the log that are not there: the first ones, or those between two.
     fn missing(&self) -> Option<String> {
         let segment = |name: &String| segment_name(Path::new(name)).map(|name| name.segment);
-        // Where the card was out, or refused what came, a file may have been begun into which nothing came: it is not copied.
+        // If the card was missing or refused data, an empty file may exist: it is not copied.
         let is_passed = self.summary.gaps == 0 && self.summary.marks.has_card_trouble();
         let between = || {
             self.names.iter().zip(self.names.iter().skip(1)).find_map(|(before, after)| {
@@ -151,8 +152,8 @@ impl Files<'_> {
         })
     }
 
-    /// Whether sectors of a session that began later lie in the log's files. What is left over there is older: a file is
-    /// only ever overwritten by a newer session.
+    /// Whether the log's files hold sectors of a later session. Remains are always older: only a newer
+    /// session overwrites a file.
     pub(super) fn has_newer(&self) -> bool {
         let both =
             self.summary.other_epoch_us.zip(self.summary.epoch_us.filter(|epoch| *epoch >= EARLIEST_US));
@@ -160,7 +161,7 @@ impl Files<'_> {
     }
 }
 
-/// That a block is no sector of a log.
+/// The words for blocks that are not sectors.
 const fn foreign_words(number: u64) -> &'static str {
     if number == 1 { "that is no sector" } else { "that are no sectors" }
 }
@@ -168,7 +169,7 @@ const fn foreign_words(number: u64) -> &'static str {
 /// Of blocks that begin as a sector does.
 const UNSOUND: &str = "with the head of a sector and a wrong check";
 
-/// What lies behind the last sector, in words; empty where nothing does.
+/// The blocks after the last sector, in words; empty without any.
 pub fn behind_words(behind: &BlockCounts) -> String {
     words_of(&[
         (behind.damaged, "damaged"),
@@ -181,8 +182,8 @@ pub fn behind_words(behind: &BlockCounts) -> String {
     ])
 }
 
-/// What lies before its last sector and is not the log's, in words; empty where nothing does. A file that is not the last one
-/// may have been left before it was full.
+/// The foreign blocks before its last sector, in words; empty without any. A file other than the last may
+/// have been left before it was full.
 pub fn among_words(summary: &Summary) -> String {
     let (all, behind) = (&summary.blocks, &summary.behind);
     let foreign = all.foreign - behind.foreign;
@@ -193,7 +194,7 @@ pub fn among_words(summary: &Summary) -> String {
     ])
 }
 
-/// Sectors of the log that count once more or not at all, in words; empty where there are none.
+/// Sectors of the log that count as copies, in words; empty without any.
 pub fn copies_words(all: &BlockCounts) -> String {
     let kinds = [(all.superseded, "superseded"), (all.misplaced, "there twice or where others belong")];
     let kinds = kinds.iter().filter(|(number, _)| *number > 0);

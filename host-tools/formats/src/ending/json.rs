@@ -11,7 +11,7 @@ use crate::utc::iso8601;
 /// The end of a log as JSON.
 #[derive(Debug, Serialize)]
 pub struct EndJson {
-    /// What proves it: `closed`, `next_start`, `mark`, `none`, `short`.
+    /// Kind of proof: `closed`, `next_start`, `mark`, `none`, `short`.
     proof: &'static str,
     /// The same in words.
     words: String,
@@ -19,18 +19,19 @@ pub struct EndJson {
     mark: Option<MarkJson>,
     /// How many end marks there are.
     marks: u64,
-    /// Seconds after the last end mark, whose end nothing proves.
+    /// Seconds after the last end mark, without a proof of their end.
     after_mark_s: Option<f64>,
     /// When the vehicle was armed or took off after the last end mark, seconds since power-on.
     moved_s: Option<f64>,
     /// Sectors and frames that the next start found and that are gone.
     sectors_missing: u32,
     frames_missing: Option<u32>,
-    /// What lies behind the last sector.
+    /// The blocks after the last sector.
     behind: BlocksJson,
     /// Sectors of a session that began later lie in it.
     newer_session: bool,
-    /// Why the log is not called whole, and that sectors had to be made again, as sentences; none where neither is so.
+    /// Reasons why the log does not count as whole, and a remark on rebuilt sectors, as sentences; empty
+    /// without both.
     not_proved: Vec<String>,
 }
 
@@ -71,11 +72,11 @@ impl EndJson {
     }
 }
 
-/// Blocks of 512 bytes, by what they are.
+/// Blocks of 512 bytes, by kind.
 #[derive(Debug, Serialize)]
 pub struct BlocksJson {
     blocks: u64,
-    /// Copies of a sector in progress, and what the file held before from this session.
+    /// Copies of a sector in progress, and the file's older content of this session.
     superseded: u64,
     misplaced: u64,
     damaged: u64,
@@ -86,7 +87,7 @@ pub struct BlocksJson {
     repaired: u64,
     zero: u64,
     erased: u64,
-    /// They begin as a sector and fail the check of one, and are not of this session as far as can be told.
+    /// They begin as a sector, fail its check, and are not of this session as far as known.
     unsound: u64,
     foreign: u64,
     older_format: u64,

@@ -1,4 +1,4 @@
-//! A log that was read: what tells whether it is whole.
+//! The end of a log that was read: the evidence of its completeness.
 
 use super::files::{Files, behind_words};
 use super::place::SessionBefore;
@@ -10,29 +10,29 @@ use crate::logs::sessions::again_words;
 use crate::logs::strangers::Strange;
 use crate::plural::{are, count, noun};
 
-/// A log that was read: what tells whether it is whole, for every command alike.
+/// The end of a log that was read: the evidence of its completeness, the same for every command.
 #[derive(Clone, Debug, Default)]
 pub struct Ending {
     /// Its name.
     pub name: String,
     /// The files that hold it.
     pub files: Vec<String>,
-    /// What the reader saw.
+    /// Totals of the reading.
     pub summary: Summary,
-    /// What is known of its end.
+    /// Proof of its end.
     pub proof: Proof,
-    /// What became of the session that was recorded on the card just before this one.
+    /// State of the session just before it on the card.
     pub before: SessionBefore,
-    /// Power went when the recorder began to write its file anew, which holds what it held before.
+    /// Power failed when the recorder began to rewrite this file, which still holds its old content.
     pub begun_anew: Option<BegunAnew>,
-    /// The name of the log of which it is a mere copy.
+    /// The name of the original, if it is a mere copy.
     pub again: Option<String>,
-    /// It is what newer sessions left of one that no file holds any more.
+    /// It is the rest of a session outside of all files, left by newer ones.
     pub left_over: bool,
 }
 
 impl Ending {
-    /// A log by itself; [`crate::followed`] adds what later ones tell of it.
+    /// A log by itself; [`crate::followed`] adds the evidence of later ones.
     pub fn of(log: &Log, summary: Summary) -> Self {
         let proof = Proof::of(&summary, None);
         let (name, files, left_over) = (log.name.clone(), log.files.clone(), log.left_over);
@@ -44,8 +44,8 @@ impl Ending {
         self.proof.words(&self.summary)
     }
 
-    /// What it is, where it is no log of its own whose losses count: a mere copy of another one, what is left over of a
-    /// session, or what a file held before.
+    /// Its description, if its losses do not count: a mere copy of another log, the rest of a session, or a
+    /// file's old content.
     pub fn aside(&self) -> Option<String> {
         let left_over = || {
             format!(
@@ -58,8 +58,8 @@ impl Ending {
         again.or_else(|| self.left_over.then(left_over)).or_else(|| begun_anew.map(BegunAnew::words))
     }
 
-    /// What lies behind the last sector of a mere copy and is no sector: its original may not have it there. No finding, as in a
-    /// log that is no copy.
+    /// Blocks after the last sector of a mere copy that are not sectors: its original may not have them. A
+    /// remark, not a finding.
     fn behind_copy(&self) -> String {
         let behind = &self.summary.behind;
         if behind.foreign + behind.unsound == 0 {
@@ -73,48 +73,49 @@ impl Ending {
         self.again.is_none()
     }
 
-    /// Whether logs that were recorded before it on its card are not among what was read.
+    /// Whether earlier logs of its card were not among the inputs.
     pub const fn is_without_earlier(&self) -> bool {
         matches!(self.before, SessionBefore::NotLookedFor(_))
     }
 
-    /// Whether nothing was lost or damaged, and the log is proved to its end or at least to its last end mark.
+    /// Whether it has no loss or damage, and is proved to its end or at least to its last end mark.
     pub fn is_sound(&self) -> bool {
         self.faults().is_empty()
     }
 
-    /// The same of a log whose recorder found that the card refused blocks: these may be among them, so that it is no fault of the log.
+    /// Missing parity sectors of a log whose recorder reported refused blocks. They may be among those, so
+    /// they are not a fault of the log.
     pub fn not_taken(&self) -> u64 {
         if self.has_parity() && self.summary.marks.refused { self.summary.parity.missing } else { 0 }
     }
 
-    /// Why it is not, as parts of sentences: why it is not proved to be whole, that sectors had to be made again, and that its parity is
-    /// missing.
+    /// The faults, as parts of sentences: missing proof, rebuilt sectors, missing parity.
     pub fn faults(&self) -> Vec<String> {
         let weakened = [made_again_words(self.made_again()), unprotected_words(self.unprotected())];
         self.unproved().into_iter().chain(weakened.into_iter().flatten()).collect()
     }
 
-    /// Sectors that had to be made again from parity, which tells of a damaged card though nothing is lost. A file that was just
-    /// begun anew has lost those that the new session wrote over.
+    /// Number of sectors rebuilt from parity. They show a damaged card although nothing is lost. In a file
+    /// just begun anew the new session has overwritten some, which do not count.
     pub const fn made_again(&self) -> u64 {
         if self.begun_anew.is_some() { 0 } else { self.summary.blocks.repaired }
     }
 
-    /// Parity sectors that its recorder wrote and that are not there: nothing is lost, and what its card loses next cannot be made
-    /// again. One that the card refuses is not written again: where the recorder found that the card refused blocks, nothing tells that
-    /// it has lost any ([`Self::not_taken`]).
+    /// Number of missing parity sectors: nothing is lost, but further losses of the card cannot be rebuilt. A
+    /// refused block is not written again, so after refused blocks they do not prove a loss
+    /// ([`Self::not_taken`]).
     pub fn unprotected(&self) -> u64 {
         if self.has_parity() && !self.summary.marks.refused { self.summary.parity.missing } else { 0 }
     }
 
-    /// Whether its parity is to be there. Of what is no log of its own, or is gone with its sectors, it is no news that it is not.
+    /// Whether its parity should be there. It does not matter for copies and rests.
     fn has_parity(&self) -> bool {
         self.begun_anew.is_none() && self.aside().is_none() && self.summary.marks.has_boot
     }
 
-    /// Why it is not proved to be whole, as parts of sentences: what is lost, what is not proved, what of its files is not the
-    /// log's. What is missing in a mere copy is said of its original, and what it holds besides is said of it.
+    /// Reasons why it is not proved to be whole, as parts of sentences: losses, missing proof, foreign data
+    /// in its files. A mere copy's losses are reported with its original; its additional data are reported
+    /// here.
     pub fn unproved(&self) -> Vec<String> {
         if self.aside().is_some() {
             return self.besides();
@@ -171,8 +172,8 @@ impl Ending {
         if self.again.is_some() { self.file().others() } else { Vec::new() }
     }
 
-    /// The next start found sectors of this session in the log's last file. Whether that has none of the log's own, because it
-    /// was to be written anew, which is no finding then.
+    /// The next start found sectors of this session in the log's last file. Returns whether that file has no
+    /// sectors of the log, because it was to be rewritten. This is then not a finding.
     pub fn confirm_begun_anew(&mut self, session: u32) -> bool {
         let last = self.files.len().saturating_sub(1);
         let strange = &mut self.summary.strange;
@@ -188,7 +189,7 @@ impl Ending {
         Files { names: &self.files, summary: &self.summary, proof: self.proof }
     }
 
-    /// Blocks behind the last sector that are no sectors, where nothing proves that the log ends before them.
+    /// Blocks after the last sector that are not sectors, if the log's end is not proved before them.
     pub fn noise(&self) -> Option<String> {
         self.file().noise()
     }
@@ -209,7 +210,7 @@ impl Ending {
     }
 }
 
-/// That so many sectors had to be made again from parity, and what to do then; none where none had to.
+/// The sentence about this many rebuilt sectors, with advice; `None` without any.
 pub fn made_again_words(sectors: u64) -> Option<String> {
     (sectors > 0).then(|| {
         format!(
@@ -219,7 +220,7 @@ pub fn made_again_words(sectors: u64) -> Option<String> {
     })
 }
 
-/// That so many parity sectors are missing, and what to do then; none where none is.
+/// The sentence about this many missing parity sectors, with advice; `None` without any.
 pub fn unprotected_words(sectors: u64) -> Option<String> {
     (sectors > 0).then(|| {
         format!(
@@ -229,7 +230,7 @@ pub fn unprotected_words(sectors: u64) -> Option<String> {
     })
 }
 
-/// That so many parity sectors are not there, of a log whose recorder found that the card refused blocks; none where none is.
+/// The sentence about this many missing parity sectors after refused blocks; `None` without any.
 pub fn not_taken_words(sectors: u64) -> Option<String> {
     (sectors > 0).then(|| {
         format!(

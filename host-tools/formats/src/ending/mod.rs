@@ -1,9 +1,9 @@
-//! What is known of a log's end, and in which words.
+//! The evidence of a log's end, and its words.
 //!
-//! A log whose last sectors are gone looks like one whose power went earlier: nothing in it tells. So its end is proved
-//! only by what was written for that: the mark of a session that was ended in order, or what the next start on the card
-//! found. Without these the log is proved up to its last end mark (a disarming or a landing), as long as the vehicle did
-//! not move on after it.
+//! A log that lost its last sectors looks like one whose power failed earlier. So only two records prove its
+//! end: the mark of a session that ended properly, and the findings of the next start on the card. Without
+//! these the log is proved up to its last end mark (a disarming or a landing). That holds only if the vehicle
+//! did not move on after it.
 
 mod files;
 mod json;

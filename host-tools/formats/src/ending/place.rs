@@ -8,14 +8,14 @@ pub enum SessionBefore {
     NotNamed,
     /// It was read too.
     There,
-    /// It is not among what was read, and nothing tells that it should be: the oldest logs make room for new ones.
+    /// It is not among the inputs, and may be gone: the oldest logs make room for new ones.
     NotLookedFor(u32),
     /// It is not there, and an older log of the card is; or its files hold another session.
     Gone(u32),
 }
 
 impl SessionBefore {
-    /// What is missing, as a part of a sentence.
+    /// The missing session, as a part of a sentence.
     pub fn gone(self) -> Option<String> {
         match self {
             Self::Gone(number) => Some(format!(

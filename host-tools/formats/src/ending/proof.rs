@@ -1,4 +1,4 @@
-//! What proves how a log ends.
+//! The proof of a log's end.
 
 use hums_blackbox::record::{Before, Found, Resting};
 use hums_core::clock::Instant;
@@ -7,17 +7,17 @@ use crate::logs::reader::Summary;
 use crate::plural::count;
 use crate::utc::iso8601_ms;
 
-/// What proves how a log ends.
+/// The proof of a log's end.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Proof {
     /// Its last sector says that the session was ended in order.
     Closed,
-    /// The next start on the card found that it ends there; with when the vehicle was armed or took off, if power went
-    /// then: what the card did not take any more nobody knows.
+    /// The next start on the card found that it ends there. It has the time of arming or take-off if power
+    /// failed while the vehicle was armed or flying. The last data before the power cut are then unknown.
     NextStart(Option<Instant>),
     /// It is whole to its last end mark.
     Mark(Instant, Resting),
-    /// Nothing: it has no end mark, or the vehicle was armed or took off after the last one.
+    /// No proof: it has no end mark, or the vehicle was armed or took off after the last one.
     #[default]
     None,
     /// The next start found as many sectors and frames, and they were others.
@@ -33,7 +33,7 @@ pub enum Proof {
     },
 }
 
-/// What tells where a log ended.
+/// The source of a log's end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Teller {
     /// The next start on the card.
@@ -43,7 +43,7 @@ pub enum Teller {
 }
 
 impl Proof {
-    /// What proves it, by what was read of the log and what the next start on the card recorded, if that is known.
+    /// The proof from the log itself, and from the record of the next start on the card, if known.
     pub fn of(summary: &Summary, next: Option<&Before>) -> Self {
         let next = next.filter(|next| next.has_end() && Some(next.session) == summary.session);
         let sectors = summary.last_number.map_or(0, |last| last.wrapping_add(1));
@@ -79,7 +79,7 @@ impl Proof {
         }
     }
 
-    /// Whether nothing is known to be missing at the end, up to the last end mark at least.
+    /// Whether the end is complete, as far as known, up to the last end mark at least.
     pub const fn holds(self) -> bool {
         self.is_whole() || matches!(self, Self::Mark(..))
     }

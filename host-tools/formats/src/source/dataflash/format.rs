@@ -463,7 +463,7 @@ fn odd(name: &str, length: u8, unknown: Option<char>, fields: usize) -> Option<S
     Some(format!("FMT says that {name} has {length} bytes, and its columns make {fields}: {so}"))
 }
 
-/// A unit's name with its multiplier as a prefix. `!` and `/` stand for a factor to hours.
+/// A unit's name with its multiplier as a prefix. With the multipliers `!` and `/`, `A.s` becomes `mAh` or `Ah`.
 fn unit_of(name: &str, factor: Option<f64>) -> String {
     if matches!(name, "" | "UNKNOWN" | "instance") {
         return String::new();
