@@ -19,7 +19,7 @@
 //! | raw bytes (file or `-`) | none recorded: paced as on a line at 115,200 baud; [`booted`] has the autopilot's |
 //! | UDP, TCP, serial | the clock's |
 //!
-//! Files and `-` may be compressed by gzip. Times are microseconds since the first byte and never fall: see [`tlog::times`] for clocks that jumped.
+//! Files and `-` may be compressed by gzip. Times are microseconds since the first byte and never fall; [`tlog::times`] handles clocks that jumped.
 //! Everything streams: memory does not grow with the input.
 
 pub mod blocks;

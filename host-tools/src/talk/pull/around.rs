@@ -30,7 +30,7 @@ pub(super) struct Brought {
     pub(super) at: Option<Instant>,
     /// The finding, if one was requested.
     pub(super) found: Option<FindingLine>,
-    /// Sectors of other sessions that came, and are in no part.
+    /// Sectors of other sessions that came, and are not kept.
     pub(super) strange: u64,
     /// Whether all requested sectors were read. Unread ones are reported.
     pub(super) outcome: Outcome,
@@ -91,7 +91,7 @@ pub(super) fn pull(
     for reading in &readings {
         // Logs after one that goes beyond the moment do not count.
         let is_of_it = |unread: &Unread| !is_over && unread.is_within(from, to);
-        // The moment goes on behind all that the board has.
+        // The board's logs end within the requested span.
         let to_end = reading.is_to_end(names) && reading.span().is_none_or(|(_, end)| end < to);
         for fault in reading.faults_of(is_of_it, to_end) {
             note!("{}: of the moment: {fault}; `hums info --verify` says more", reading.name());
@@ -111,7 +111,8 @@ pub(super) fn pull(
     })
 }
 
-/// Refuses a moment at which nothing was recorded. Where something cannot be read, it may be that: then it is told.
+/// Refuses a moment without a recording. If a sector is unreadable, the recording may be there; then this is
+/// reported.
 fn check_recorded(
     at: Instant,
     readings: &[Reading],
@@ -181,7 +182,7 @@ impl Searched {
     }
 }
 
-/// UTC at power-on, as a log knows it.
+/// UTC at power-on, by a log's clock.
 #[derive(Clone, Copy)]
 struct Clock {
     /// Microseconds since 1970.
@@ -210,14 +211,14 @@ struct Board<'a> {
     names: &'a [String],
     left_out: &'a [String],
     output: &'a Path,
-    /// The parts of logs that were looked at, by their names.
+    /// The parts of logs read so far, by their names.
     parts: BTreeMap<String, Part>,
-    /// Sectors of other sessions that came, by their logs and places.
+    /// Sectors of other sessions, by their logs and places.
     strange: BTreeSet<(String, u32)>,
     /// Data recorded between the searched logs or before them, and in none of them, as the sectors' numbers
     /// show.
     missing: Option<Unread>,
-    /// The first log that begins after all that was wanted, and when it does.
+    /// The first log that begins after the requested span, and its start.
     next: Option<(String, Instant)>,
 }
 
@@ -238,14 +239,14 @@ impl<'a> Board<'a> {
         Self { ftp, names, left_out, output, parts, strange, missing: None, next: None }
     }
 
-    /// The parts with these stretches get their names; the others go.
+    /// Names the parts with these stretches; deletes the others.
     fn finish(&mut self, stretches: &[Stretch]) -> Result<Vec<(String, PathBuf)>> {
         let of = |stretch: &Stretch| Some((stretch.name.clone(), self.parts.remove(&stretch.name)?));
         let parts: Vec<_> = stretches.iter().filter_map(of).collect();
         parts.into_iter().map(|(name, part)| Ok((name, part.finish()?))).collect()
     }
 
-    /// Brings what was recorded from one time to the other.
+    /// Downloads the recording between these times.
     fn bring(&mut self, from: Instant, to: Instant) -> Result<Vec<Stretch>> {
         let (mut stretches, mut later) = (Vec::new(), None);
         // Sectors of a group whose beginning is still to be found, with their logs.
@@ -256,7 +257,7 @@ impl<'a> Board<'a> {
             let (at, number) = (first.map(|first| first.at), log.first_number());
             let is_further =
                 self.names.iter().any(|other| other < name && number_of(other) == number_of(name));
-            // A group may begin in the log before: the first sectors of this one are its last ones.
+            // A group may begin in the log before: then the first sectors of this one are its last.
             let is_later =
                 first.map_or(is_further, |first| first.at > to && (first.place == 0 || is_further));
             if is_later && stretches.is_empty() {
@@ -365,7 +366,8 @@ impl<'a> Board<'a> {
         Ok(None)
     }
 
-    /// The latest finding that is wanted: the logs are read from their end backwards, group by group, until it comes.
+    /// The latest matching finding: the logs are read from their end backwards, group by group, until it
+    /// comes.
     fn latest(&mut self, what: &Around) -> Result<Searched> {
         let (mut found, mut stretches, mut later) = (None, Vec::new(), None);
         let never = Instant::from_micros(u64::MAX);
@@ -398,7 +400,7 @@ impl<'a> Board<'a> {
         if let Some(first) = &later {
             self.hold_against(None, None, first, never)?;
         }
-        // All of it once more: a group may begin in one log and end in the next one.
+        // All of it again: a group may begin in one log and end in the next one.
         let mut unread = None;
         for stretches in by_number(&stretches) {
             let reading = Reading::of(stretches)?;

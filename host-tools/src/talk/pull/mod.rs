@@ -49,7 +49,7 @@ const SCHEMA: Schema = Schema::first("hums-pull");
 
 #[derive(Debug, Serialize)]
 struct PulledJson {
-    /// Whose board it is.
+    /// The board's identity.
     system: u8,
     logs: Vec<LogJson>,
     /// With `--around`.
@@ -83,7 +83,7 @@ pub fn run(args: &cli::Pull) -> Result<Outcome> {
     bring(client, args).with_context(|| format!("system {system}"))
 }
 
-/// Brings the logs that are asked for.
+/// Downloads the requested logs.
 fn bring(client: Client, args: &cli::Pull) -> Result<Outcome> {
     let mut ftp = Ftp::new(client)?;
     let (mut logs, skipped) = ftp.list()?;
@@ -129,7 +129,7 @@ fn bring(client: Client, args: &cli::Pull) -> Result<Outcome> {
     Ok(outcome)
 }
 
-/// Leaves the newest so many logs, or all, each with all of its files.
+/// Keeps this many of the newest logs, or all, each with all of its files.
 fn newest(logs: &mut Vec<(String, u32)>, most: Option<usize>) -> Asked {
     let Some(most) = most else { return Asked::between(Place::default(), Place::MAX) };
     // A log begun just now that is still empty is not counted, and comes with the others.
@@ -146,7 +146,7 @@ fn newest(logs: &mut Vec<(String, u32)>, most: Option<usize>) -> Asked {
     Asked::between(first, Place::MAX)
 }
 
-/// Says of files that the board had in its list, and gave away before they came, that they are lost.
+/// Reports files in the board's list that it deleted before their download as lost.
 fn tell_gone(gone: &[String]) -> Outcome {
     let Some(first) = gone.first() else { return Outcome::Done };
     note!(
@@ -165,7 +165,7 @@ struct Bringing<'a> {
     begun: Option<String>,
     args: &'a cli::Pull,
     pulled: Vec<LogJson>,
-    /// Files that the board had in its list, and gave away before they came.
+    /// Files in the board's list that it deleted before their download.
     gone: Vec<String>,
 }
 
@@ -224,14 +224,14 @@ impl Bringing<'_> {
         for (name, bytes) in logs {
             let brought = match pull(ftp, &name, &self.args.output).with_context(|| name.clone()) {
                 Ok(brought) => brought,
-                // Of the link or of the disk: so it would be with the others.
+                // An error of the link or of the disk would also stop the others.
                 Err(error) if error.root_cause().is::<io::Error>() => return Err(error),
                 Err(error) => {
                     failed.push((name, error));
                     continue;
                 }
             };
-            // Whether anything was to be in it, those of the same log behind it tell.
+            // Later files of the same log show whether it had data.
             let is_followed = || {
                 filled.iter().any(|other| *other > name && session::number(other) == session::number(&name))
             };
@@ -302,7 +302,7 @@ fn hold_against_next(
     Ok(outcome)
 }
 
-/// Brings a moment of the newest session of these logs.
+/// Downloads a moment of the newest session of these logs.
 fn around(
     ftp: &mut Ftp,
     logs: Vec<(String, u32)>,
@@ -474,7 +474,7 @@ fn check_same(first: &Heading, now: &Heading) -> Result<()> {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum There {
     Nothing,
-    /// So many bytes of it: the log has grown since.
+    /// This many bytes of it: the log has grown since.
     Beginning(u32),
     /// All of it.
     Whole,
@@ -525,7 +525,7 @@ fn begun(ftp: &mut Ftp, name: &str, file: &mut Output, length: u32) -> Result<(u
     Ok((0, likeness))
 }
 
-/// Brings what is missing.
+/// Downloads the missing sectors.
 fn fetch(ftp: &mut Ftp, name: &str, file: &mut Output, have: u32, length: u32) -> Result<()> {
     let (mut done, mut told) = (have, have);
     let brought = ftp.bring(have, length, |bytes| {

@@ -1,7 +1,8 @@
-//! A part of a log: a file in which each sector that was brought stands at its own place, and zeros stand for the others.
+//! A part of a log: a file with each downloaded sector at its own place, and zeros for the others.
 //!
-//! Its name says that it is a part, `00042-..._07.part.HUM`, and every reader says so too ([`crate::logs::naming::is_part`]). It is
-//! made by one call of `--around`, gets its name when all of the moment is in it, and nothing is added to it later.
+//! Its name marks it as a part, `00042-..._07.part.HUM`, and every reader reports that
+//! ([`crate::logs::naming::is_part`]). One call of `--around` makes it. It gets its name once the whole
+//! moment is in it, and is not extended later.
 
 use std::collections::BTreeSet;
 use std::fs::File;
@@ -21,21 +22,21 @@ use crate::outcome::exists;
 #[derive(Debug)]
 pub(super) struct Part {
     file: NamedTempFile<File>,
-    /// Its name, once it is whole.
+    /// Its name, once complete.
     target: PathBuf,
-    /// Which sectors are in it.
+    /// Which sectors it has.
     has: Vec<bool>,
-    /// The session of which it is a part, where a sector has told it.
+    /// The session of the part, once a sector has named it.
     session: Option<u32>,
-    /// The number of the sector that belongs at its beginning, where the first ones tell it.
+    /// The number of the sector at its beginning, if the first ones show it.
     base: Option<u32>,
-    /// The places of sectors of other sessions that came, and are not in it.
+    /// Places at which sectors of other sessions came, which are not kept.
     strange: BTreeSet<u32>,
 }
 
 impl Part {
-    /// Begins the part beside a log's own path, of a log of so many sectors that begins with these. One that is there is not
-    /// overwritten: its card may have lost since what is in it.
+    /// Begins the part beside a log's own path, for a log of this many sectors with these first ones. An
+    /// existing part is not overwritten: the card may have lost sectors that are in it.
     pub(super) fn begin(whole: &Path, sectors: u32, head: &[Sector]) -> Result<Self> {
         let target = part_name(whole);
         if target.symlink_metadata().is_ok() {
@@ -52,51 +53,51 @@ impl Part {
         Ok(part)
     }
 
-    /// How many sectors the log has.
+    /// Number of sectors of the log.
     pub(super) fn sectors(&self) -> u32 {
         self.has.len() as u32
     }
 
-    /// The places of sectors of other sessions that came, and are not in it: another log has come in its place, or the card has lost
-    /// some.
+    /// Places at which sectors of other sessions came, which are not kept: another log has replaced this one,
+    /// or the card has lost some.
     pub(super) const fn strange(&self) -> &BTreeSet<u32> {
         &self.strange
     }
 
-    /// The number of the sector that belongs at its beginning, where one tells it.
+    /// The number of the sector at its beginning, if known.
     pub(super) const fn base(&self) -> Option<u32> {
         self.base
     }
 
-    /// Where it is until it is whole.
+    /// Its path until it is complete.
     pub(super) fn path(&self) -> &Path {
         self.file.path()
     }
 
-    /// All of the moment is in it: it gets its name.
+    /// The whole moment is in it: it gets its name.
     pub(super) fn finish(self) -> Result<PathBuf> {
         let Self { file, target, .. } = self;
         file.persist_noclobber(&target).with_context(|| cannot_write(&target))?;
         Ok(target)
     }
 
-    /// Whether a sector is the one that belongs there. A copy of one in progress may lie one place further.
+    /// Whether a sector belongs at this place. A copy of a sector in progress may be one place further.
     pub(super) fn belongs(&self, place: u32, header: &Header) -> bool {
         let number = self.base.map_or(header.number, |base| base.wrapping_add(place));
         header.number == number || header.partial && header.number.wrapping_add(1) == number
     }
 
-    /// Whether a sector is in it.
+    /// Whether it has a sector.
     pub(super) fn has(&self, place: u32) -> bool {
         self.has.get(place as usize).is_some_and(|has| *has)
     }
 
-    /// The first place from this one on whose sector is in it, or is not.
+    /// The first place from this one on whose sector is there, or is missing.
     pub(super) fn next(&self, from: u32, is_in: bool) -> Option<u32> {
         (from..self.has.len() as u32).find(|place| self.has(*place) == is_in)
     }
 
-    /// What is at a place.
+    /// The sector at a place.
     pub(super) fn read(&mut self, place: u32) -> Result<Sector> {
         let mut bytes = [0; SECTOR_BYTES];
         self.seek(place)

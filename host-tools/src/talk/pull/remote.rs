@@ -1,4 +1,4 @@
-//! A log on the board of which sectors are brought one by one, into a part of it.
+//! A log on the board whose sectors are downloaded one by one, into a part of it.
 
 use std::collections::btree_map::Entry;
 use std::collections::{BTreeMap, BTreeSet};
@@ -15,10 +15,10 @@ use super::moment::Sectors;
 use super::part::Part;
 use super::stretch::Stretch;
 
-/// Twice the longest log that a recorder makes: of a longer one a part would fill the disk.
+/// Twice the longest log of any recorder: a part of a longer one would fill the disk.
 const LOG_BYTES_MAX: u64 = 2 * SEGMENT_BYTES_MAX as u64;
 
-/// A log on the board, and the part of it that is here.
+/// A log on the board, and its local part.
 pub(super) struct Remote<'a> {
     ftp: &'a mut Ftp,
     name: &'a str,
@@ -26,7 +26,8 @@ pub(super) struct Remote<'a> {
 }
 
 impl<'a> Remote<'a> {
-    /// Opens a log, which has something in it by the board's directory. `parts` are those of the logs that were opened before.
+    /// Opens a log that the board's directory lists as not empty. `parts` are those of the logs opened
+    /// before.
     pub(super) fn open(
         ftp: &'a mut Ftp,
         parts: &'a mut BTreeMap<String, Part>,
@@ -57,7 +58,7 @@ impl<'a> Remote<'a> {
         Ok(Self { ftp, name, part })
     }
 
-    /// Adds the places of sectors of other sessions that came, and are not in the part.
+    /// Adds the places of sectors of other sessions, which are not in the part.
     pub(super) fn add_strange(&self, all: &mut BTreeSet<(String, u32)>) {
         all.extend(self.part.strange().iter().map(|place| (self.name.to_owned(), *place)));
     }
@@ -68,12 +69,12 @@ impl<'a> Remote<'a> {
         Stretch { name, path, places, sectors: self.part.sectors() }
     }
 
-    /// The number of its first sector, where one tells it.
+    /// The number of its first sector, if known.
     pub(super) fn first_number(&self) -> Option<u32> {
         self.part.base()
     }
 
-    /// Brings the sectors of these places that did not come yet.
+    /// Downloads the missing sectors of these places.
     pub(super) fn bring(&mut self, places: Range<u32>) -> Result<Stretch> {
         let Range { start: mut place, end: to } = places;
         while let Some(first) = self.part.next(place, false).filter(|first| *first < to) {
