@@ -29,7 +29,7 @@ pub struct Checked {
 }
 
 impl Checked {
-    /// Of a recording that was judged; `None` where the monitor on board did that.
+    /// From a judged recording; `None` if the monitor on board checked it.
     pub fn new(judged: Judged) -> Option<Self> {
         if judged.by == JudgedBy::Board {
             return None;

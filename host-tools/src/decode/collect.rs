@@ -50,7 +50,7 @@ pub struct Collected<'a> {
     pub records: u64,
     /// Findings of the log's own monitor, wanted or not.
     pub on_board: OnBoard,
-    /// Rows of tables for whose names there was no room.
+    /// Rows of tables without room for their names.
     pub rows_left_out: u64,
     /// Bytes in `tables`, with the tables' own memory.
     tables_bytes: usize,
@@ -236,7 +236,7 @@ impl Collect for Collected<'_> {
         self.tlog.len()
             + self.jsonl.len()
             + self.tables_bytes
-            // Once more where it is parted by its tables.
+            // Twice, because it is also split by tables.
             + 2 * self.unknown.held_bytes()
             + self.influx.held_bytes()
             + self.parquet.held_bytes()

@@ -28,9 +28,9 @@ const TEXTS_AT_ONCE: usize = 1024;
 /// The type of a column's values.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Kind {
-    /// An integer of so many bits that is not negative.
+    /// An unsigned integer of this many bits.
     Unsigned(i8),
-    /// An integer of so many bits.
+    /// An integer of this many bits.
     Signed(i8),
     Single,
     Double,
@@ -104,7 +104,7 @@ enum Values {
     Texts(Texts),
 }
 
-/// Texts one behind the other, and where each ends.
+/// Texts in a row, and the end of each.
 #[derive(Debug, Default)]
 struct Texts {
     text: String,
@@ -123,7 +123,7 @@ impl Texts {
         self.ends.extend(next.ends.drain(..).map(|end| begin + end));
     }
 
-    /// So many texts from this one on.
+    /// This many texts from this one on.
     fn some(&self, from: usize, count: usize) -> Vec<ByteArray> {
         let begins = std::iter::once(0).chain(self.ends.iter().copied());
         let texts = begins.zip(&self.ends).skip(from).take(count);
@@ -276,7 +276,7 @@ impl Column {
             (Values::Longs(column), Scalar::Signed(value)) => column.push(value),
             (Values::Singles(column), Scalar::Single(value)) => column.push(value),
             (Values::Doubles(column), Scalar::Double(value)) => column.push(value),
-            // The reader of payloads gives each kind its own type; a test holds it to that.
+            // The reader of payloads gives each kind its own type; a test checks that.
             _ => {}
         }
     }

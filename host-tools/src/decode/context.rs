@@ -9,7 +9,7 @@ use crate::cli::Format;
 use crate::files::Inputs;
 use crate::source::epochs::Epochs;
 
-/// Which formats are asked for.
+/// The requested formats.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[expect(clippy::struct_excessive_bools, reason = "any set of formats can be asked for")]
 pub struct Formats {

@@ -13,12 +13,12 @@ pub enum Destination {
     Standard,
     /// The one file has this name.
     File(PathBuf),
-    /// Single files have this name with an extension; tables lie in directories of this name.
+    /// Single files have this name with an extension; tables are in directories of this name.
     Named(PathBuf),
 }
 
 impl Destination {
-    /// By the rule that `hums decode --help` tells; `name` is the log's.
+    /// By the rule in `hums decode --help`; `name` is the log's.
     pub fn new(output: &Path, name: &str, logs: usize, formats: Formats) -> Self {
         if logs == 1 && formats.is_single_file() && !says_directory(output) {
             return Self::File(output.to_owned());

@@ -49,7 +49,7 @@ pub fn identity(place: &Place, session: String, judges: bool) -> Result<(Identit
     let vehicle = known.vehicle();
     let first = match &summary.ending {
         Some(Ending { summary, .. }) => {
-            // One power-on has one clock, also where a recording that was packed has several.
+            // One power-on has one clock, also if a packed recording has several.
             epochs = Epochs::of(summary.epoch_us);
             summary.first
         }

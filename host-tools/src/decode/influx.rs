@@ -80,7 +80,7 @@ impl Lines {
         self.text.len() + size_of::<(usize, Instant)>() * self.ends.len()
     }
 
-    /// How many there are.
+    /// Number of lines.
     pub fn len(&self) -> usize {
         self.ends.len()
     }
@@ -266,7 +266,7 @@ impl<'a> Fields<'a> {
                 self.text(name, &value.to_string());
             }
             Scalar::Unsigned(value) => {
-                // Beyond it lie 292,000 years of microseconds.
+                // Larger values are more than 292,000 years of microseconds.
                 if let Ok(value) = i64::try_from(value) {
                     self.name(name).integer(value);
                 }

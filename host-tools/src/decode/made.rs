@@ -31,14 +31,14 @@ pub struct Made {
     path: PathBuf,
     /// `tlog`, `jsonl`, `influx`, `gaps`, `csv`, `thesis`, `parquet`.
     format: &'static str,
-    /// How much is in it: `frames`, `records`, `rows`, `tables`, `objects`, `points`, `seconds`.
+    /// Counts of its content: `frames`, `records`, `rows`, `tables`, `objects`, `points`, `seconds`.
     counts: BTreeMap<String, u64>,
     #[serde(skip)]
     words: String,
 }
 
 impl Made {
-    /// With so many things in it.
+    /// With these counts.
     pub fn of(path: PathBuf, format: &'static str, counts: &[(u64, &str)]) -> Self {
         let words: Vec<String> = counts.iter().map(|(number, thing)| count(*number, thing)).collect();
         let counts = counts.iter().map(|(number, thing)| (noun(2, thing), *number)).collect();

@@ -213,7 +213,7 @@ struct Task<'a> {
 struct Done {
     name: String,
     outcome: Outcome,
-    /// Whether it is whole, of a log of ours.
+    /// The evidence of its end, for a log of ours.
     ending: Option<Ending>,
     /// Whether there was anything to write.
     written: bool,

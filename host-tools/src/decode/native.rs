@@ -17,7 +17,7 @@ pub struct Tables(Mutex<BTreeMap<String, Option<Names>>>);
 type Names = (&'static str, Vec<&'static str>);
 
 impl Tables {
-    /// A row as cells; `None` where there was no room for the names of its table.
+    /// A row as cells; `None` if there was no room for the names of its table.
     pub fn row(&self, row: item::Row<'_>) -> Option<Row> {
         let item::Row { table, values } = row;
         let mut seen = self.0.lock().ok()?;

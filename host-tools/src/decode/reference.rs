@@ -159,7 +159,7 @@ impl Reference {
         }
     }
 
-    /// Takes an observation; `false` where it is not of the vehicle.
+    /// Takes an observation; `false` if it is not of the vehicle.
     pub fn observe(&mut self, at: Instant, source: Source, observation: &Observation) -> bool {
         if !self.vehicle.observe(at.into(), source, observation) {
             return false;
@@ -255,7 +255,7 @@ impl Reference {
         Some(Scalar::Single(percent(remaining?.0)))
     }
 
-    /// The fields of a motor's ESC, where its last message of that kind is young enough.
+    /// The fields of a motor's ESC, if its last message of that kind is recent enough.
     fn esc(&self, now: time::Instant, motor: usize, at: fn(&Motor) -> Option<time::Instant>) -> Option<&Esc> {
         let motor = self.vehicle.motors.get(motor)?;
         at(motor).filter(|at| now.since(*at) <= AGE_MAX).map(|_| &motor.esc)

@@ -52,12 +52,12 @@ impl Selection {
         &self.names
     }
 
-    /// Whether a time was asked for.
+    /// Whether the selection has a time limit.
     pub fn has_limits(&self) -> bool {
         self.from.is_some() || self.to.is_some()
     }
 
-    /// Whether anything less than all was asked for.
+    /// Whether it selects less than all.
     pub fn is_part(&self) -> bool {
         self.has_limits() || !self.names.is_empty()
     }

@@ -28,7 +28,7 @@ pub struct Tables {
 }
 
 impl Tables {
-    /// None yet; all of them will be in this folder.
+    /// Empty; all tables will be in this folder.
     pub fn new(folder: Folder) -> Self {
         Self {
             folder,

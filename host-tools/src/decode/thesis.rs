@@ -137,7 +137,7 @@ impl Thesis {
         self.rows == 0
     }
 
-    /// All rows are there: the folder gets its name. Gives it and the number of rows.
+    /// All rows are there: the folder gets its name. Returns it and the number of rows.
     pub fn finish(mut self) -> Result<(PathBuf, u64)> {
         self.tables.iter_mut().try_for_each(|(file, path)| settle(file.flush(), path))?;
         drop(self.tables);

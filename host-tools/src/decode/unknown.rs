@@ -1,5 +1,5 @@
-//! Lines of frames without a definition, in the order in which they came. Which table a line goes to is settled where all
-//! of a log comes by: there are 16 million ids, and files are few.
+//! Lines of frames without a definition, in order. The table of a line is chosen at the end of the log: there
+//! are 16 million ids, and few files.
 
 use super::text::push_integer;
 

@@ -48,7 +48,7 @@ impl Single {
         (!self.0.is_stream()).then(|| appended(self.0.path(), "gaps.csv"))
     }
 
-    /// All of it is there; gives its name.
+    /// The tlog is complete; returns its name.
     fn finish(mut self) -> Result<PathBuf> {
         self.0.finish()?;
         Ok(self.0.path().to_owned())
@@ -60,11 +60,11 @@ impl Single {
 pub struct Written {
     /// Each file with its content.
     pub made: Vec<Made>,
-    /// Rows of tables for whose names there was no room.
+    /// Rows of tables without room for their names.
     pub rows_left_out: u64,
-    /// Gaps of a tlog beside which no table can lie.
+    /// Gaps of a tlog that cannot have a table beside it.
     pub gaps_left_out: u64,
-    /// No tlog was made, as no frame was asked for that is there.
+    /// No tlog was made, because none of the requested frames is there.
     pub has_no_frame: bool,
 }
 
@@ -94,7 +94,7 @@ pub struct Writers<'a> {
     thesis: Option<Thesis>,
     parquet: Option<ParquetTables>,
     csv: Option<Tables>,
-    /// A tlog has no place for gaps: they lie beside it.
+    /// A tlog has no place for gaps: their table is beside it.
     gaps: Option<Single>,
     /// Gaps of a tlog that is not a file and so has no table beside it.
     gaps_left_out: u64,

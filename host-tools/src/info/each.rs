@@ -10,7 +10,7 @@ use crate::plural::count;
 use crate::source::find::{Found, sessions_of};
 use crate::summary::Overview;
 
-/// How reading went.
+/// Result of the reading.
 pub(super) struct Read {
     outcome: Outcome,
     failed: u64,
@@ -18,7 +18,7 @@ pub(super) struct Read {
 }
 
 impl Read {
-    /// An error where some could not be read.
+    /// An error if some were unreadable.
     pub(super) fn end(self) -> Result<Outcome> {
         if self.failed > 0 {
             bail!("{} of {} could not be read", self.failed, count(self.all as u64, "log"));

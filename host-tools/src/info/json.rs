@@ -76,7 +76,7 @@ pub struct LogJson {
     gaps_uncounted: u64,
     gaps: Vec<GapJson>,
     losses: Vec<LossJson>,
-    /// Who checked the vehicle's health: `board`; `hums` (this program, when it read the log); `nobody`.
+    /// The checker of the vehicle's health: `board`; `hums` (this program, when it read the log); `nobody`.
     checked_by: &'static str,
     checks_judged: Option<usize>,
     checks_all: Option<usize>,
@@ -168,7 +168,7 @@ struct FindingJson {
     previous: &'static str,
     time_s: f64,
     time_utc: Option<String>,
-    /// `null` where the input stopped.
+    /// `null` if the input stopped.
     value: Option<f32>,
     /// The state in the value, if it is not a quantity.
     state: Option<&'static str>,
@@ -184,7 +184,7 @@ struct ExceedanceJson {
     name: String,
     unit: String,
     session: CrossingsJson,
-    /// `null` where no life is known.
+    /// `null` without a known life.
     lifetime: Option<CrossingsJson>,
 }
 
@@ -207,7 +207,7 @@ struct ComponentJson {
     name: String,
     serial: String,
     status: &'static str,
-    /// `null` where it has no limit.
+    /// `null` without a limit.
     used_percent: Option<f32>,
     /// That which it reaches first.
     limit: Option<String>,

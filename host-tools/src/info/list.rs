@@ -83,11 +83,11 @@ struct LogJson {
     flight_s: Option<f64>,
     checked_by: &'static str,
     findings_count: u64,
-    /// `null` where no check has found anything.
+    /// `null` without findings.
     worst: Option<WorstJson>,
-    /// `null` where that was not looked at.
+    /// `null` if not counted.
     checks_judged: Option<usize>,
-    /// Of so many.
+    /// Of this many.
     checks_all: Option<usize>,
     /// The vehicle was first received in the air.
     begins_in_air: bool,

@@ -35,7 +35,7 @@ fn without_advice(finding: &Finding) -> String {
 pub struct Part {
     subsystem: &'static str,
     level: &'static str,
-    /// By whom: `on board`, `here`, or `nobody`.
+    /// The judge: `on board`, `here`, or `nobody`.
     by: &'static str,
     /// Meaning of a stale level without cause for worry. `idle`: its checks are for an armed or flying
     /// vehicle. `none`: the vehicle seems to have no such part.

@@ -10,9 +10,9 @@ use serde::Serialize;
 
 use crate::mavlink::ids::{HEARTBEAT, NAMED_VALUE_FLOAT, NAMED_VALUE_INT};
 
-/// Five heartbeats missed: it is gone.
+/// Five heartbeats missed.
 const GONE: Span = Span::from_secs(5);
-/// The levels come every two seconds where the budget allows; over the slowest radio every half minute.
+/// The levels come every two seconds if the budget allows; over the slowest radio every half minute.
 const LEVELS_AGE_MAX: Span = Span::from_secs(60);
 
 /// State of the HUMS on board.
@@ -109,7 +109,7 @@ impl Companion {
         levels.get(subsystem as usize).copied()
     }
 
-    /// As the page takes it; `None` where there never was one.
+    /// In the page's form; `None` without one.
     pub fn json(&self, now: Instant) -> Option<CompanionJson> {
         let heard = self.heard.filter(|_| self.named)?;
         let names = |levels: [Level; Subsystem::ALL.len()]| levels.into_iter().map(Level::name).collect();

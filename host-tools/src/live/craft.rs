@@ -41,7 +41,7 @@ const ESC_SILENT: &str = "esc_silent";
 const HEARTBEAT: &str = "heartbeat";
 /// A state within this time of the first heartbeat is older than that: flight is detected with a delay.
 const JOINED: Span = Span::from_secs(5);
-/// How often the limits are looked at.
+/// Period of the limits' update.
 const LIMITS_EVERY: Span = Span::from_secs(1);
 
 /// State of a vehicle.
@@ -123,7 +123,7 @@ impl Craft {
         }
     }
 
-    /// How long it has been in the air in the last flight, which may go on, in seconds: as the usage counts it.
+    /// Time in the air of the last flight, which may go on, in seconds: by the usage counters.
     pub fn flown_s(&self) -> f64 {
         self.airborne_s() - self.before_flight_s
     }
@@ -179,7 +179,7 @@ impl Craft {
         self.sequences = Sequences::new();
     }
 
-    /// Takes a parameter that its autopilot tells.
+    /// Takes a parameter reported by its autopilot.
     pub fn parameter(&self, at: Instant, frame: &Frame<'_>, history: &mut Option<&mut History>) {
         if let Some(history) = history
             && let Some((name, value)) = parameter(frame, self.autopilot())
@@ -352,7 +352,7 @@ impl Craft {
         if !self.monitor.flight().airborne() {
             self.grounded_s = self.airborne_s();
         }
-        // A box may know more of them, and says where it does not.
+        // A box may know more cell counts, and reports unknown ones itself.
         if !self.on_the_wire {
             let flies = self.monitor.flight().airborne();
             self.cells_unknown = self.monitor.lacks_cells() && (flies || cells_come);
@@ -422,7 +422,7 @@ impl Craft {
     }
 }
 
-/// Whether a check tells of the autopilot's own wire.
+/// Whether a check is about the autopilot's own wire.
 pub fn is_of_wire(check: &str) -> bool {
     static WIRE: LazyLock<Vec<&str>> = LazyLock::new(|| {
         let of_wire = VOCABULARY.iter().filter(|words| words.scope == Scope::Wire);

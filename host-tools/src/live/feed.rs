@@ -23,12 +23,12 @@ use crate::duplex::{self, Port};
 use crate::endpoint::Endpoint;
 use crate::interrupt;
 
-/// How long a byte is waited for: the page's clock goes on meanwhile.
+/// Timeout of a read: the page's clock goes on meanwhile.
 const SILENCE: Duration = Duration::from_millis(10);
 /// Time to gather bytes while no update is due. A vehicle sends hundreds of messages a second, and a wake-up
 /// for each would cost several times the message. Radios and USB adapters gather as long.
 const GATHER: Duration = Duration::from_millis(20);
-/// More than the fastest port brings in half of that (921,600 baud) is not waited on.
+/// More bytes than the fastest port (921,600 baud) delivers in half of that time end the gathering.
 const GATHERED_BYTES: usize = 1_024;
 /// Gathered bytes are spread evenly over the time since the last look, in this number of pieces.
 const PIECES: usize = 8;

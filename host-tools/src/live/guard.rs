@@ -16,7 +16,7 @@ use crate::outcome::usage;
 
 /// A token of this length cannot be guessed.
 const TOKEN_BYTES: usize = 16;
-/// One that the user makes is at least so long.
+/// Minimum length of the user's own token.
 const TOKEN_CHARS_MIN: usize = 8;
 
 /// The checks of a request.
@@ -29,7 +29,7 @@ pub struct Guard {
 }
 
 impl Guard {
-    /// For a server at `listen`, which the user called `host`; gives the token that the page needs.
+    /// For a server at `listen`, named `host` by the user; returns the token that the page needs.
     pub fn new(listen: SocketAddr, host: &str, token: Option<&str>) -> Result<(Self, Option<String>)> {
         let token = match token {
             Some(short) if short.len() < TOKEN_CHARS_MIN => {

@@ -38,7 +38,7 @@ pub enum Command {
     Play,
     /// Go to this time, seconds since the first byte.
     Seek(f64),
-    /// So many seconds a second.
+    /// Seconds of the recording per second.
     Speed(f64),
 }
 
@@ -79,7 +79,7 @@ impl Hub {
         self.histories().get(&vehicle)?.since(vehicle, cursor, until)
     }
 
-    /// A page asks for something; `false` where too much waits.
+    /// A page sends a command; `false` if too many wait.
     pub fn command(&self, command: Command) -> bool {
         self.commands.try_send(command).is_ok()
     }

@@ -207,8 +207,8 @@ fn page_addresses(
     [format!("http://localhost:{}/{token}", listen.port())].into_iter().chain(elsewhere).collect()
 }
 
-/// Addresses of this PC by which other machines may reach it, IPv4 first: without those that are good on one cable only
-/// (`fe80::`, 169.254.0.0/16). None where the system does not tell them.
+/// Addresses of this PC for other machines, IPv4 first, without those of one cable only (`fe80::`,
+/// 169.254.0.0/16). Empty if the system does not list them.
 fn others() -> Vec<IpAddr> {
     let interfaces = if_addrs::get_if_addrs().unwrap_or_default();
     let mut addresses: Vec<IpAddr> = interfaces

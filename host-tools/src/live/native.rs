@@ -68,7 +68,7 @@ impl Native {
         Self { place, batches: None, waiting: VecDeque::new() }
     }
 
-    /// Goes to where so many entries have been.
+    /// Goes to the place after this many entries.
     pub fn seek(&mut self, entries: u64) -> io::Result<()> {
         let (sender, batches) = sync_channel(BATCHES);
         let place = self.place.clone();

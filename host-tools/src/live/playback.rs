@@ -34,7 +34,7 @@ const TOLD_MAX: usize = 8_192;
 /// Frames between two looks at the clock while reading.
 const LOOK_EVERY: u64 = 4_096;
 
-/// The state at a moment, and where the recording goes on from there.
+/// The state at a moment, and the place in the recording after it.
 #[derive(Debug)]
 struct Copy {
     at: Instant,
@@ -152,7 +152,7 @@ pub struct Player {
     rate: Rate,
     /// See [`World::on_the_wire`].
     is_of_box: bool,
-    /// Counts how often the time went back.
+    /// Number of jumps back in time.
     epoch: u64,
     timeline: Arc<str>,
 }
@@ -270,7 +270,7 @@ impl Player {
         Ok(Loaded { played, told, told_next: 0, copies, start, end, frames })
     }
 
-    /// Gives all of it to the database, now that it is known who flew and when.
+    /// Writes the whole recording to the database, now that vehicle and date are known.
     fn write(&mut self, loaded: &mut Loaded) -> io::Result<()> {
         let Some(influx) = &mut self.influx else { return Ok(()) };
         let epoch_us = self.epoch_us.unwrap_or(0);
@@ -328,7 +328,8 @@ impl Player {
             before = Wall::now();
             turn = (turn + PUBLISH).max(before);
             if self.source.phase == "playing" {
-                // A PC that was asleep, or too slow for this speed, goes on from where it was.
+                // After sleep of the PC, or if it is too slow for this speed, playback goes on from its last
+                // place.
                 let passed_us = passed.min(Duration::from_millis(250)).as_micros() as f64 * self.source.speed;
                 now = (now + Span::from_micros(passed_us as u64)).min(loaded.end);
                 loaded.go(&mut world, now)?;
@@ -370,7 +371,7 @@ impl Player {
         Ok(())
     }
 
-    /// Goes to a time: from the last copy before it, or on from here where that is nearer.
+    /// Goes to a time: from the last copy before it, or on from here if that is nearer.
     fn seek(&mut self, to: Instant, loaded: &mut Loaded, world: &mut World, now: &mut Instant) -> Result<()> {
         let copy = loaded.copies.iter().rev().find(|copy| copy.at <= to);
         if to < *now {

@@ -27,7 +27,7 @@ impl Rate {
         (self.frames, self.since) = (frames, Wall::now());
     }
 
-    /// So many frames there were until now.
+    /// Takes the number of frames so far.
     pub fn count(&mut self, frames: u64) {
         let passed = self.since.elapsed().as_secs_f64();
         if passed >= 1.0 {

@@ -18,7 +18,7 @@ use crate::source::find::find;
 use crate::source::item::{Item, Stop, Want};
 use crate::source::recording::{Place, Recording};
 
-/// Sessions that are named where one is to be chosen.
+/// Maximum number of sessions listed for a choice.
 const LISTED_MAX: usize = 12;
 
 /// An input, found good.
@@ -104,7 +104,7 @@ pub enum Heard<'a> {
 /// `false` ends the reading.
 pub type Take<'a> = dyn FnMut(Instant, Option<u64>, f64, Heard<'_>) -> io::Result<bool> + 'a;
 
-/// Reads it from its beginning to its end, once; gives how a log of ours ends.
+/// Reads it from its beginning to its end, once; returns the evidence of a log's end.
 pub fn each(opened: &mut Opened, take: &mut Take<'_>) -> Result<Option<Ending>> {
     let Some(recording) = opened.recording.take() else { return Ok(None) };
     let progress = recording.progress.clone();

@@ -51,7 +51,7 @@ struct Shared {
 struct Place(Arc<AtomicUsize>);
 
 impl Place {
-    /// `None` where [`PAGES_MAX`] pages are open.
+    /// `None` if [`PAGES_MAX`] pages are open.
     fn take(pages: &Arc<AtomicUsize>) -> Option<Self> {
         let place = Self(Arc::clone(pages));
         (pages.fetch_add(1, Ordering::SeqCst) < PAGES_MAX).then_some(place)

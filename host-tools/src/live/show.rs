@@ -29,7 +29,7 @@ pub struct SourceJson {
     pub phase: &'static str,
     /// More about it, in words.
     pub words: String,
-    /// Of a log of ours: how it ends, in words.
+    /// The end of a log of ours, in words.
     pub log_end: Option<String>,
     /// Of reading, 0 to 1.
     pub progress: f64,
@@ -112,7 +112,7 @@ struct State<'a> {
     firmware: Option<String>,
     armed: bool,
     airborne: bool,
-    /// Something tells whether it is in the air.
+    /// The flight state is known.
     tells_flight: bool,
     phase: &'static str,
     mode: Cow<'static, str>,
@@ -146,7 +146,7 @@ struct CounterJson {
     title: &'static str,
     unit: &'static str,
     decimals: u8,
-    /// `null` if nothing tells it.
+    /// `null` if unknown.
     value: Option<f64>,
 }
 

@@ -19,7 +19,7 @@ pub struct SpoolWriter {
     offset: u64,
 }
 
-/// Gives them back.
+/// Reads the frames back.
 #[derive(Debug)]
 pub struct Spool {
     file: BufReader<File>,
@@ -69,7 +69,7 @@ impl SpoolWriter {
 }
 
 impl Spool {
-    /// Goes to where [`SpoolWriter::offset`] stood.
+    /// Goes to an offset from [`SpoolWriter::offset`].
     pub fn seek(&mut self, offset: u64) -> io::Result<()> {
         self.file.seek(SeekFrom::Start(offset)).map(|_| ())
     }

@@ -30,7 +30,7 @@ impl Limits {
         limits
     }
 
-    /// As they stand.
+    /// The present values.
     pub fn params(&self) -> &Params {
         &self.params
     }
@@ -56,7 +56,7 @@ pub fn place_of(name: &str) -> Option<usize> {
     name.strip_prefix("CMP")?.strip_suffix("_KIND")?.parse::<usize>().ok()?.checked_sub(1)
 }
 
-/// A parameter that the box on board tells a ground station, and its value.
+/// A parameter that the box on board reports to a ground station, and its value.
 pub fn parameter(frame: &Frame<'_>) -> Option<(String, f32)> {
     if frame.id() != PARAM_VALUE || frame.component() != COMPONENT || frame.check() != Check::Verified {
         return None;

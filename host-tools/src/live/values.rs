@@ -12,7 +12,7 @@ use crate::counters::tells_flight;
 use crate::decode::reference::Quantity;
 use crate::mavlink::values::Scalar;
 
-/// A value, its age in milliseconds, and 1 where it is stale.
+/// A value, its age in milliseconds, and 1 if stale.
 #[derive(Clone, Copy, Debug)]
 pub struct Shown {
     value: Scalar,
@@ -79,7 +79,7 @@ impl<'a> Values<'a> {
         self.engine(&mut put);
     }
 
-    /// Attitude, height, and where the receiver thinks it is.
+    /// Attitude, height, and the receiver's position.
     fn motion(&self, put: &mut Put<'_>) {
         let vehicle = self.craft.monitor.vehicle();
         let attitude = &vehicle.attitude;

@@ -40,7 +40,7 @@ pub struct World {
     pub crafts: BTreeMap<u8, Craft>,
     /// Number of frames received, from any sender.
     pub frames: u64,
-    /// Those of them that fit no definition of ours.
+    /// Number of frames among them that match no definition of ours.
     pub unverified: u64,
     /// Frames of vehicles beyond [`VEHICLES_MAX`].
     pub refused: u64,
@@ -340,7 +340,8 @@ mod tests {
         }));
     }
 
-    /// How many frames came in a second is known at its end, which a page that looks all the time has just seen.
+    /// The number of frames in a second is known at its end, which a page that looks all the time has just
+    /// seen.
     #[test]
     fn a_page_is_told_how_many_frames_came_in_each_second() {
         let (mut world, mut histories) = (World::new(Limits::default()), Histories::new());
@@ -430,7 +431,7 @@ mod tests {
         assert_eq!(words, ["armed when it was first heard", "in the air when it was first heard"]);
     }
 
-    /// A vehicle that is joined in the air, whose pack of 20.4 V has five cells or six.
+    /// A vehicle first received in the air, whose pack of 20.4 V has five cells or six.
     #[test]
     fn cells_that_are_not_known_are_said_at_once_in_the_air_and_a_box_that_knew_them_has_its_word() {
         let source = Source { system: 1, component: 1 };

@@ -1,4 +1,4 @@
-//! How many frames came in a second, and how many of the vehicle's are missing by its own count.
+//! Number of frames per second, and of the vehicle's missing frames by its own count.
 
 use hums_core::clock::Instant;
 use hums_core::observation::Source;

@@ -47,7 +47,7 @@ pub struct History {
     samples: Samples,
     frames: Frames,
     notes: VecDeque<(Instant, Note)>,
-    /// Notes that went, so that the others keep their numbers.
+    /// Number of dropped notes, so that the others keep their numbers.
     notes_gone: u64,
     phases: Spans,
     modes: Spans,
@@ -62,14 +62,14 @@ pub struct History {
     words: u64,
 }
 
-/// How much of a history a page has.
+/// The part of a history that a page has.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Cursor {
     thinned: u64,
     /// The row of intervals.
     spacing_ms: Option<(u64, u64)>,
-    /// The interval from which on it may miss something, and how many values were taken when it was seen; `None` before the
-    /// first part.
+    /// The first interval that may be incomplete on the page, and the number of values when it was sent;
+    /// `None` before the first part.
     interval: Option<(u16, u64)>,
     /// Lines and their words.
     described: (usize, u64),
@@ -92,7 +92,7 @@ pub struct Part {
     pub(super) reset: bool,
     pub(super) start_s: f64,
     pub(super) step_s: f64,
-    /// All plots, where there is a new one or one is called otherwise.
+    /// All plots, if there is a new one or a new name.
     pub(super) plots: Option<Vec<PlotJson>>,
     pub(super) series: Series,
     pub(super) notes: Vec<Note>,
@@ -101,7 +101,7 @@ pub struct Part {
     pub(super) track: Vec<Place>,
     pub(super) phases: Option<Rest>,
     pub(super) modes: Option<Rest>,
-    /// All gaps of the record, where there is a new one: from and to, seconds.
+    /// All gaps of the record, if there is a new one: from and to, seconds.
     pub(super) gaps: Option<Vec<(f64, f64)>>,
     pub(super) parameters: Vec<ParameterJson>,
     pub(super) parameters_left_out: u64,
@@ -254,7 +254,7 @@ impl History {
         self.parameters.last()
     }
 
-    /// Where it was.
+    /// Its track.
     pub fn track(&self) -> &[Point] {
         self.samples.track.points()
     }

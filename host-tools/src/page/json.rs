@@ -27,14 +27,14 @@ pub fn embedded(value: &impl Serialize) -> String {
     .into_owned()
 }
 
-/// A value as JSON; empty where it has no form in JSON, which no type of the pages lacks.
+/// A value as JSON; empty if it has no form in JSON, which does not occur for the types of the pages.
 pub fn json(value: &impl Serialize) -> String {
     let mut text = Vec::with_capacity(ROOM_BYTES);
     let text = match serde_json::to_writer(&mut text, value) {
         Ok(()) => String::from_utf8(text).unwrap_or_default(),
         Err(_) => String::new(),
     };
-    // None of them is in ASCII, and nearly all is: that is seen many bytes at a time.
+    // None of them is in ASCII, and nearly all text is. That check takes many bytes at a time.
     if text.is_ascii() {
         return text;
     }

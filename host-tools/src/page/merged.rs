@@ -11,10 +11,10 @@ use crate::series::Store;
 /// Maximum number of series of each flight: all lines that are compared.
 const SERIES_EACH: usize = 96;
 
-/// Places of a track side by side: a map there is small.
+/// Maximum number of places of a track in a comparison: the map there is small.
 const PLACES_MAX: usize = 1_000;
 
-/// A quantity: the plot, the line of it, and whether it is as PX4 has it, whose figures of vibration and estimator are others.
+/// A quantity: the plot, its line, and whether it is PX4's, whose figures of vibration and estimator differ.
 type Quantity = (Plot, u8, bool);
 
 /// A flight to be merged with others.

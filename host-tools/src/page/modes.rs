@@ -6,7 +6,7 @@ use hums_core::observation::{Autopilot, Heartbeat};
 
 use crate::source::{dataflash, ulog};
 
-/// The mode that a heartbeat tells; by its number where it has no name here.
+/// The mode in a heartbeat; its number if it has no name here.
 pub fn name(heartbeat: &Heartbeat) -> Cow<'static, str> {
     let known = match heartbeat.autopilot {
         Autopilot::ArduPilot => dataflash::mode_name(heartbeat.type_number, heartbeat.mode),

@@ -35,7 +35,7 @@ fn yaw_rad([w, x, y, z]: [f32; 4]) -> f32 {
     (2.0 * (w * z + x * y)).atan2(1.0 - 2.0 * (y * y + z * z))
 }
 
-/// Wind that blows to the north and to the east: how fast, and where it comes from.
+/// Wind to the north and to the east: its speed, and the direction from which it comes.
 fn wind(north: f32, east: f32, put: &mut Put<'_>) {
     put((Plot::Wind, 0), north.hypot(east));
     put((Plot::WindFrom, 0), compass_deg((-east).atan2(-north)));
@@ -221,7 +221,8 @@ pub struct Default {
     pub is_of_airframe: bool,
 }
 
-/// The default that a row tells: `PARM` of `ArduPilot` since 4.3 has one, and PX4's `ULog` those that are not in force.
+/// The default in a row: `PARM` of `ArduPilot` has one since 4.3, and PX4's `ULog` has those that are
+/// overridden.
 fn default_of(row: &Row<'_>) -> Option<Default> {
     let (name, value, is_of_airframe) = match row.table.name.as_str() {
         "PARM" => ("Name", "Default", false),

@@ -84,7 +84,7 @@ impl Cause {
     }
 }
 
-/// A box tells three texts of half a minute at most, and a warning at the end of its event.
+/// A box sends three texts in half a minute at most, and a warning at the end of its event.
 const AGAIN_S: f64 = 45.0;
 /// Prefix of a return to normal.
 const OVER: &str = "over: ";

@@ -32,7 +32,7 @@ pub enum Plot {
     Sticks,
     /// A line a battery, V.
     PackVolts,
-    /// A line a cell: so many ([`CELLS_MAX`]) a battery, V.
+    /// A line a cell: [`CELLS_MAX`] for each battery, V.
     CellVolts,
     /// A line a battery, A.
     PackAmperes,
@@ -226,7 +226,7 @@ pub fn about(plot: Plot, autopilot: Autopilot) -> About {
 pub(super) const RISE: u8 = 3;
 const LIMIT: &str = "Limit of the rise";
 
-/// A limit of warning and one of critical, where there are such.
+/// A warning limit and a critical limit, if any.
 pub type Limits = [Option<f32>; 2];
 
 /// The limits of every line of a plot; of both sides, if there are two. If the second is the lower one,

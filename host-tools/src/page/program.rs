@@ -18,7 +18,7 @@ modules! {
     "badge" "canvas" "colours" "dom" "elements" "flight" "layout" "map" "notes" "parameters" "plot" "plots" "text" "timeline" "view"
     // The whole one.
     "data" "recorder" "report" "summary" "trend" "usage"
-    // The table of a folder's pages, and flights side by side.
+    // The table of a folder's pages, and the comparison of flights.
     "index" "compare"
     // The one that grows.
     "bar" "compass" "condition" "esc" "gauge" "general" "health" "horizon" "keys" "link" "live" "movement" "player" "sound" "spark"

@@ -20,9 +20,9 @@ fn told(altitude: Option<Metres>) -> Option<f32> {
 pub struct Samples {
     /// The series.
     pub store: Store<Plot>,
-    /// Where it was.
+    /// Its track.
     pub track: Track,
-    /// How often every second place of it went, because it is bounded.
+    /// Number of times that every second place was dropped, because the track is bounded.
     pub thinned: u64,
 }
 
@@ -49,7 +49,7 @@ impl Samples {
                         .zip([north, east, down])
                         .for_each(|(axis, speed)| push(Plot::Velocity, axis, Some(speed)));
                 }
-                // Before it knows where it is, its altitude is 0.
+                // Before the position is known, its altitude is 0.
                 push(Plot::Altitude, 1, global.position.map(|_| global.altitude.0));
                 if let Some(position) = global.position {
                     self.place(at, position, Some(global.relative_altitude.0));

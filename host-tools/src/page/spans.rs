@@ -14,7 +14,7 @@ pub struct Spans {
     revision: u64,
 }
 
-/// How much of it a page has.
+/// The part of it that a page has.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Seen {
     revision: u64,

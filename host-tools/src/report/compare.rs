@@ -27,7 +27,7 @@ const FINDINGS_MAX: usize = 100;
 /// A recording that may be compared.
 #[derive(Clone, Copy, Debug)]
 pub struct Candidate<'a> {
-    /// Where it is.
+    /// Its place.
     pub place: &'a Place,
     /// The file of its page beside this one.
     pub page: Option<&'a str>,
@@ -67,7 +67,7 @@ struct FlightJson {
     track: Vec<Whereabouts>,
 }
 
-/// A page of the last flights in recordings, which stand in order; `None` where there are less than two.
+/// A page of the last flights in recordings, in order; `None` for fewer than two.
 pub fn html(recordings: &[Candidate<'_>]) -> Result<Option<String>> {
     let (mut recorded, mut count) = (Vec::new(), 0);
     for &candidate in recordings.iter().rev() {

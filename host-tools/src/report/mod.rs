@@ -90,7 +90,7 @@ pub fn run(args: &cli::Report) -> Result<Outcome> {
         // Before any page is written. That of a session is refused by itself, when its name is known.
         inputs.refuse(&output.join(index::FILE))?;
     }
-    // The next start on the card tells how a session ended.
+    // The next start on the card records how a session ended.
     let end = found.places.len().min(*wanted.sessions.end() + 1 + HELD_MAX);
     let mut followed = Followed::new(sessions);
     let mut making = Making {
@@ -139,7 +139,7 @@ struct Making<'a> {
 }
 
 impl Making<'_> {
-    /// Takes the next session, and makes its page where it is wanted.
+    /// Takes the next session, and makes its page if wanted.
     fn session(&mut self, overview: &Overview) -> Result<()> {
         let (index, this) = (self.earlier.len(), trend::Session::of(overview));
         let is_wanted = self.wanted.pages && self.wanted.sessions.contains(&index);
@@ -197,7 +197,8 @@ impl Making<'_> {
         Ok(())
     }
 
-    /// The recording before of the same airframe: by their times, where both are known, otherwise in their order.
+    /// The previous recording of the same airframe: by their times if both are known, otherwise in their
+    /// order.
     fn last_flight(&mut self, this: &trend::Session) -> Result<Option<page::Before>> {
         let is_before = |other: &trend::Session| {
             let is_later = this.start_utc().zip(other.start_utc()).is_some_and(|(this, other)| other > this);
@@ -251,7 +252,8 @@ impl Making<'_> {
         Ok(self.outcome)
     }
 
-    /// Compares the last flights: of each airframe in a folder, or of all in a file. Gives airframes and files.
+    /// Compares the last flights: of each airframe in a folder, or of all in a file. Returns airframes and
+    /// files.
     fn compare(&mut self) -> Result<Vec<(String, String)>> {
         let mut groups: BTreeMap<String, Vec<usize>> = BTreeMap::new();
         let known = self.earlier.iter().enumerate().take(*self.wanted.sessions.end() + 1);
@@ -297,7 +299,7 @@ impl Making<'_> {
 /// The kind of a page.
 enum What<'a> {
     Session(&'a str),
-    /// Of a folder's pages, so many.
+    /// The table of this many pages.
     Table(usize),
     Comparison,
 }
@@ -338,7 +340,7 @@ fn write(path: &Path, html: &str, inputs: &Inputs) -> Result<()> {
     file.finish()
 }
 
-/// Which sessions get a page, and where.
+/// The sessions that get a page, and its path.
 struct Wanted {
     sessions: RangeInclusive<usize>,
     output: PathBuf,
@@ -371,7 +373,7 @@ fn wanted(args: &cli::Report, output: &Path, found: &Found, sessions: &Sessions)
 }
 
 impl Wanted {
-    /// A page in a directory has the name that `hums decode` gives the session's files.
+    /// A page in a directory has the same name as the session's files by `hums decode`.
     fn path(&self, name: &str) -> PathBuf {
         if self.directory { appended(&self.output.join(name), "html") } else { self.output.clone() }
     }

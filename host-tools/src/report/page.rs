@@ -30,7 +30,7 @@ struct Data<'a> {
     flights: &'a [Flight],
     /// The gaps.
     missing: &'a [Missing],
-    /// How many checks were critical at their worst, and how many warned.
+    /// Number of checks with a critical problem, and with a warning.
     critical: usize,
     warning: usize,
     /// Time and words of the worst of them.
@@ -44,7 +44,7 @@ struct Data<'a> {
     /// When and how, as a sentence.
     ends_in_air: Option<(f64, String)>,
     counters: Counters,
-    /// Of which time the counters are, where that is not all of it.
+    /// The time covered by the counters, if it is not the whole.
     counted: Option<String>,
     /// The recorder's reports about itself count until this time, if the recording goes on.
     counted_until_s: Option<f64>,

@@ -30,7 +30,7 @@ const TEXTS_MAX: usize = 1_000;
 /// A part of the flight that is not in the record.
 #[derive(Debug, Serialize)]
 pub struct Missing {
-    /// Since when, where that is known.
+    /// Start, if known.
     from_s: Option<f64>,
     /// What, and why.
     words: String,
@@ -47,13 +47,13 @@ pub struct Replay {
     pub texts_count: u64,
     /// Number of checks with data; `None` if nothing was judged.
     pub judged: Option<JudgedChecks>,
-    /// Something in it tells whether the vehicle flew.
+    /// The flight state is known.
     pub tells_flight: bool,
-    /// How the vehicle was last, where its last flight goes on at the end.
+    /// The vehicle's last state, if its last flight goes on at the end.
     pub ends_in_air: Option<EndsInAir>,
     /// The gaps, with their places.
     pub missing: Vec<Missing>,
-    /// How many checks were critical at their worst, and how many warned.
+    /// Number of checks with a critical problem, and with a warning.
     pub found: (usize, usize),
     /// Time and words of the first problem of `hums check`.
     pub first: Option<(f64, String)>,

@@ -80,7 +80,7 @@ impl Session {
 }
 
 impl Session {
-    /// When it began, UTC, where that is known.
+    /// Its start, UTC, if known.
     pub fn start_utc(&self) -> Option<&str> {
         self.json.start_utc.as_deref()
     }

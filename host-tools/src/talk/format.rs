@@ -139,7 +139,7 @@ mod tests {
     use super::*;
     use crate::talk::fake::{self, found};
 
-    /// How it ends where the board answers the command so.
+    /// The result for this answer of the board to the command.
     fn end(silence_ms: u64, limit_ms: u64, said: fn() -> fake::Said) -> Result<()> {
         let mut client = found(&[1], move |_| said());
         format(&mut client, Duration::from_millis(silence_ms), Duration::from_millis(limit_ms))

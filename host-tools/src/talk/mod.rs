@@ -27,17 +27,17 @@ use crate::outcome::usage;
 
 /// `MAV_CMD_REQUEST_MESSAGE`
 const REQUEST_MESSAGE: u16 = 512;
-/// Where `AUTOPILOT_VERSION` has `uid2`.
+/// Offset of `uid2` in `AUTOPILOT_VERSION`.
 const UID_AT: usize = 60;
 /// A ground station's usual identity.
 const SYSTEM: u8 = 255;
 /// `MAV_COMP_ID_MISSIONPLANNER`
 const OUR_COMPONENT: u8 = 190;
-/// How long the board may keep silent at first.
+/// Timeout for the board's first message.
 const CONNECT: Duration = Duration::from_secs(15);
 /// Time to look for further boards after the first one: two heartbeats of each, because a radio may lose one.
 const LISTEN: Duration = Duration::from_millis(2_200);
-/// How often we say that we are there: radios and UDP peers learn from it where to answer.
+/// Period of our own heartbeats: radios and UDP peers learn from them where to answer.
 const PRESENCE: Duration = Duration::from_secs(1);
 const READ: Duration = Duration::from_millis(20);
 /// A passphrase has a line.
@@ -191,7 +191,7 @@ impl Client {
         }
     }
 
-    /// Asks, and asks again, until `look` makes something of an answer; `None` after the last try.
+    /// Asks, and asks again, until `look` accepts an answer; `None` after the last try.
     pub fn ask<T>(
         &mut self,
         packet: &Packet,

@@ -137,7 +137,7 @@ fn single(wanted: f64) -> Result<(f32, bool)> {
     Ok((value, wanted.is_finite() && value.to_string().parse() != Ok(wanted)))
 }
 
-/// Brings the board the key, or takes it away; gives its system. The board answers with a text.
+/// Sends the key to the board, or removes it; returns its system. The board answers with a text.
 fn sign(at: &Link, remove: bool) -> Result<u8> {
     let path = at.key.as_deref();
     let key = match path {
@@ -216,7 +216,7 @@ fn list(client: &mut Client) -> Result<(Vec<Param>, Vec<String>)> {
         if value.count != said && wrong.is_empty() {
             wrong.push(format!("the board says that it has {said} parameters, and {}", value.count));
         }
-        // One without a place in the list answers somebody who asked for it by its name.
+        // A value without a place in the list answers another program's request by name.
         if value.index < count {
             let (index, name) = (value.index, shown(&value.name));
             let before = values.insert(index, value).map(|before| shown(&before.name));

@@ -13,7 +13,7 @@ pub struct Checked {
     pub format: Format,
     /// The judgement.
     pub judged: Judged,
-    /// Whether it is whole, of a log of ours.
+    /// The evidence of its end, for a log of ours.
     pub ending: Option<Ending>,
 }
 

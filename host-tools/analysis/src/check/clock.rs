@@ -10,7 +10,7 @@ use hums_onboard::monitoring::TICK;
 /// Pause of the checks after a long gap: messages sent once a second have come again by then.
 pub const SETTLE: Span = Span::from_secs(1);
 
-/// The two times, side by side.
+/// The recording's time and the monitor's.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Clock {
     /// The recording's time of the next step; `None` before the first.

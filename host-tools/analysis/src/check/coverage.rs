@@ -16,7 +16,7 @@ use crate::counters::tells_flight;
 const OF_A_FIX: [&str; 4] = ["gps_satellites", "gps_hdop", "gps_accuracy", "gps_fix"];
 /// The check of a cell's voltage.
 const CELL_VOLTAGE: &str = "cell_voltage";
-/// How often it is noted.
+/// Period of the notes.
 const NOTE_EVERY: Span = Span::from_millis(500);
 
 /// Data that a check had to judge.
@@ -99,7 +99,7 @@ pub(super) struct Recording<'a> {
     pub(super) is_of_link: bool,
     /// The recording was taken on the monitor's own wire.
     pub(super) on_the_wire: bool,
-    /// How long it was armed.
+    /// Time armed.
     pub(super) armed: Span,
     /// Why the arming state is unknown, if the recording does not report it.
     pub(super) arming: Option<&'a str>,
@@ -199,7 +199,7 @@ impl Recording<'_> {
     }
 }
 
-/// Whether no value can be beyond the limits: they stand at the end of their range.
+/// Whether the limits are at the ends of their range, so that no value can cross them.
 fn is_off(check: &Check, params: &Params) -> bool {
     let off = |param: Param| {
         let (limit, spec) = (params.get(param), param.spec());

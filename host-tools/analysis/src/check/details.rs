@@ -70,7 +70,8 @@ impl Details {
         *self = Self { earlier, others, ..Self::default() };
     }
 
-    /// The autopilots of all recordings of a file, each once: one may tell who it is in one of them only.
+    /// The autopilots of all recordings of a file, each once: an autopilot may report its identity in only
+    /// one of them.
     fn all_autopilots(&self) -> Vec<Heard> {
         let mut all = self.others.clone();
         for heard in &self.autopilots {
@@ -125,7 +126,7 @@ impl Details {
         }
     }
 
-    /// An autopilot tells who it is.
+    /// An autopilot reports its identity.
     pub(super) fn identity(&mut self, source: Source, identity: &AutopilotIdentity) {
         let uid = identity.uid;
         let mut same = self.autopilots.iter_mut().filter(|known| known.system == source.system).rev();
@@ -144,7 +145,7 @@ impl Details {
         }
     }
 
-    /// Says that the recording is of more than one vehicle: files that were joined, or a ground station of several.
+    /// The remark on a recording of several vehicles: joined files, or a ground station of several.
     fn vehicles(&self, judged: Option<u8>) -> Option<String> {
         let first = self.autopilots.first()?;
         let how = match judged.filter(|_| self.autopilots.iter().any(|heard| heard.system != first.system)) {
@@ -158,7 +159,7 @@ impl Details {
             .then(|| format!("more than one vehicle is in it: {}; {how}", named(&self.autopilots)))
     }
 
-    /// Says that the recordings that were joined are of different vehicles.
+    /// The remark on joined recordings of different vehicles.
     fn vehicles_of_parts(&self) -> Option<String> {
         let all = self.all_autopilots();
         let is_new = self.autopilots.len() < 2 && !self.others.is_empty() && all.len() > 1;
@@ -168,7 +169,7 @@ impl Details {
         })
     }
 
-    /// A battery tells of itself.
+    /// A battery reports itself.
     pub(super) fn battery(&mut self, source: Source, id: u8) {
         let battery = (source.component, id);
         if self.batteries.contains(&battery) {

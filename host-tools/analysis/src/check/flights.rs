@@ -1,4 +1,4 @@
-//! The flights of a recording: from take-off to landing, or to where a mishap ended it.
+//! The flights of a recording: from take-off to landing, or to a mishap.
 
 use hums_core::Monitor;
 use hums_core::clock::{Instant, Span};
@@ -51,7 +51,7 @@ pub(super) struct Flights {
     /// The recording was silent in it, and the vehicle has not been seen to fly since.
     unseen: bool,
     silence: Option<Silence>,
-    /// How long the flight may have been over: flight, if it goes on.
+    /// Time since a possible landing: flight, if the flight goes on.
     landing: Span,
     /// The monitor's time of the last step.
     stepped_at: Option<Instant>,
@@ -72,7 +72,7 @@ struct Silence {
 const STEP_MAX: Span = Span::from_millis(SETTLE.as_millis() + 2 * TICK.as_millis());
 /// The longest delay of an impact's finding: the vehicle must lie still first.
 const FOUND_LATE: Span = Span::from_secs(5);
-/// Without a heartbeat for so long it is silent.
+/// Without a heartbeat for this long a vehicle is silent.
 const SILENT: Span = Span::from_secs(5);
 /// A vehicle received in the air for this long is still on its flight: longer than a landing takes to be
 /// seen.

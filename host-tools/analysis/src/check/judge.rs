@@ -44,9 +44,9 @@ const SILENCE_MAX: Span = Span::from_secs(75);
 
 /// A silence of an armed vehicle is reported after this time: three heartbeats of a link, ...
 const SILENT: Span = Span::from_secs(3);
-/// ... and of a log that the autopilot writes itself, whose slowest topics come once a second.
+/// ... and for the autopilot's own log, whose slowest topics come once a second.
 const NOT_WRITTEN: Span = Span::from_secs(2);
-/// Silence of a vehicle that is armed on the ground hides a flight where it is longer.
+/// A longer silence of a vehicle armed on the ground may hide a flight.
 const HIDES_FLIGHT: Span = Span::from_secs(10);
 /// A vehicle in flight is seen to fly this long after the silence: longer than a landing takes to be seen.
 const SEEN: Span = Span::from_secs(3);
@@ -64,7 +64,7 @@ pub enum Heard {
     OnTheWire,
 }
 
-/// Whose limits count.
+/// The source of each limit.
 #[derive(Clone, Debug, Default)]
 pub struct Limits {
     params: Params,
@@ -227,7 +227,7 @@ impl Judge {
         self.monitor.vibration_limit()
     }
 
-    /// How many cells the one battery has; 0 where that is not known.
+    /// Cell count of the single battery; 0 if unknown.
     pub fn cell_count(&self) -> u8 {
         self.monitor.cell_count()
     }
@@ -762,7 +762,7 @@ fn place_deg(vehicle: &Vehicle) -> Option<(f64, f64)> {
     estimated.or_else(received).map(|position| (position.latitude_deg, position.longitude_deg))
 }
 
-/// How long the vehicle was armed, as the usage counts it: without gaps.
+/// Time armed by the usage counters: without gaps.
 fn armed(monitor: &Monitor) -> Span {
     let mut seconds = 0.0;
     monitor.for_each_counter(|number, value| {
@@ -789,7 +789,7 @@ fn joined(joints: &[Instant]) -> Option<String> {
     })
 }
 
-/// Whether it tells of an impact.
+/// Whether it is an impact.
 fn is_hit(finding: &Finding) -> bool {
     finding.check == IMPACT && matches!(finding.level, Level::Warning | Level::Critical)
 }

@@ -14,7 +14,7 @@ use crate::source::item::{About, Cause, Gap};
 use crate::source::told::Finding;
 use crate::summary::{EndsInAir, JudgedChecks};
 
-/// The verdict where few checks had something to judge.
+/// The verdict if only few checks had data.
 pub const TOO_LITTLE: &str = "too_little";
 
 /// Who judged.
@@ -54,7 +54,7 @@ impl Holes {
         self.pauses.contains(span) || self.silences.contains(span)
     }
 
-    /// How much of this it does not have.
+    /// The missing part of this span.
     pub fn within(&self, from: Instant, to: Instant) -> Span {
         let parts = self.pauses.iter().map(|(begin, end)| (*end).min(to).since((*begin).max(from)));
         parts.fold(Span::ZERO, |sum, part| sum + part)
@@ -74,7 +74,7 @@ pub struct Judged {
     pub epochs: Epochs,
     /// The first and the last time.
     pub span: Option<(Instant, Instant)>,
-    /// How long it was armed.
+    /// Time armed.
     pub armed: Span,
     /// Flights, in order.
     pub flights: Vec<Flight>,
@@ -82,7 +82,7 @@ pub struct Judged {
     pub ends_in_air: Option<EndsInAir>,
     /// Changes of level, in order, up to [`super::problem::LISTED_MAX`].
     pub findings: Vec<Finding>,
-    /// How many there are.
+    /// Number of findings.
     pub findings_count: u64,
     /// The problems, worst first.
     pub problems: Vec<Problem>,
@@ -98,11 +98,11 @@ pub struct Judged {
     pub gaps: Vec<Gap>,
     /// The times without data.
     pub holes: Holes,
-    /// How many gaps are damage.
+    /// Number of gaps that are damage.
     pub damages: u64,
     /// Number of gaps that the recorder lost while it recorded.
     pub losses: u64,
-    /// How often the recording's clock began again.
+    /// Number of restarts of the recording's clock.
     pub restarts: u64,
     /// The recording has no times from its beginning, so nothing was judged.
     pub is_timeless: bool,
@@ -124,7 +124,7 @@ impl Judged {
         self.gaps.iter().any(|gap| gap.cause == Cause::Lost && !gap.is_noise())
     }
 
-    /// How long it was in the air, in all flights together.
+    /// Time in the air, in all flights together.
     pub fn flown(&self) -> Span {
         self.flights.iter().fold(Span::ZERO, |sum, flight| sum + flight.air)
     }
@@ -141,7 +141,7 @@ impl Judged {
         }
     }
 
-    /// How many checks had something to judge.
+    /// Number of checks with data.
     pub fn checks(&self) -> JudgedChecks {
         let is_of_box = |check: &&&str| {
             vocabulary(check)

@@ -34,7 +34,7 @@ const SILENT: Span = Span::from_secs(5);
 /// reports its forces later.
 const SHOWS: Span = Span::from_millis(2_400);
 const STARTS: Span = Span::from_secs(20);
-/// Values from before the silence have gone by then.
+/// Values from before the silence are replaced by then.
 const SETTLED: Span = Span::from_secs(1);
 const SIGN_LASTS: Span = Span::from_millis(500);
 /// Minimum loss of height, m.
@@ -44,7 +44,7 @@ const NEAR_GROUND_M: f32 = 2.0;
 /// Slow: m/s, rad/s.
 const STILL_MPS: f32 = 1.0;
 const STILL_RADPS: f32 = 0.3;
-/// Faster than this a multicopter leans, and does not lie, m/s.
+/// A multicopter faster than this leans in flight and is not on its side, m/s.
 const LEANS_MPS: f32 = 12.0;
 const TILTED_RAD: f32 = 0.785;
 /// Gravity on the underside beyond this, g, means that a multicopter lies on its back.
@@ -61,7 +61,7 @@ const FALLING_MPS: f32 = 2.5;
 const HPA_PER_METRE: f32 = 0.12;
 /// A vehicle is judged for this long after it is first received.
 const FIRST: Span = Span::from_secs(10);
-/// Sinks are looked back on for so long.
+/// Sinks are kept for this long.
 const WINDOW: Span = Span::from_millis(900);
 
 /// How the vehicle came down.
@@ -78,7 +78,7 @@ pub(super) struct Verdict {
 }
 
 impl Verdict {
-    /// As a finding; `None` where its check is off.
+    /// As a finding; `None` if its check is off.
     pub(super) fn finding(&self, at: clock::Instant, level: Level, params: &Params) -> Option<Finding> {
         let check = checks().find(|check| check.name == self.check)?;
         let limit = check.limits.critical.map(|limit| params.get(limit)).filter(|limit| limit.is_finite())?;
@@ -381,9 +381,9 @@ impl LinkLoss {
         recent.fold(0.0, |greatest: f32, (_, sink_mps)| greatest.max(*sink_mps))
     }
 
-    /// Whether the pressure rises as it does at this sink; `None` where it is not known, or never changes.
+    /// Whether the pressure rises at the rate of this sink; `None` if it is unknown, or never changes.
     fn is_sinking(&self, now: Instant, sink_mps: f32) -> Option<bool> {
-        /// The sink may have begun within the last second; wind and propellers make as much as this.
+        /// The sink may have begun within the last second; wind and propellers cause changes of this size.
         const PART_S: f32 = 0.3;
         const NOISE_M: f32 = 0.8;
         let (at, now_hpa) = *self.pressures.back()?;

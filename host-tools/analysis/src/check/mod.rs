@@ -46,7 +46,7 @@ use overview::Read;
 use past::Past;
 use text::Table;
 
-/// What `hums check` is asked.
+/// The request of `hums check`.
 #[derive(Clone, Copy, Debug)]
 pub struct Request<'a> {
     /// Recordings, logs, cards, or directories with such.

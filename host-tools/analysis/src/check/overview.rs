@@ -149,7 +149,7 @@ pub fn overview(place: &Place) -> Result<Overview> {
     })
 }
 
-/// An error where the system that is asked for is not in the recording: it says which are.
+/// An error if the requested system is not in the recording; it lists those that are.
 pub(super) fn is_heard(place: &Place, heard: bool) -> Result<()> {
     let Some(wanted) = place.system.filter(|_| !heard) else { return Ok(()) };
     let mut systems = BTreeSet::new();

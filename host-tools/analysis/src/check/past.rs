@@ -72,7 +72,7 @@ pub fn learn(limits: &Limits, places: &[Place]) -> Result<Baselines> {
     learnt(limits, places).map(|(baselines, _)| baselines)
 }
 
-/// The same, and whose flights they are, where that is known.
+/// The same, with the vehicle if known.
 fn learnt(limits: &Limits, places: &[Place]) -> Result<(Baselines, Option<Vehicle>)> {
     let (mut baselines, mut first) = (Baselines::new(), None::<(&str, Vehicle)>);
     for place in places {
@@ -96,7 +96,7 @@ fn learnt(limits: &Limits, places: &[Place]) -> Result<(Baselines, Option<Vehicl
     Ok((baselines, first.map(|(_, vehicle)| vehicle)))
 }
 
-/// Whose flight it is, where that is known. A DataFlash log does not tell the system id.
+/// The vehicle of a flight, if known. A DataFlash log does not have the system id.
 fn vehicle(read: &Read) -> Option<Vehicle> {
     let vehicle = overview::vehicle(&read.judged.monitor)?;
     let system = if read.format == Format::DataFlash { 0 } else { vehicle.system };

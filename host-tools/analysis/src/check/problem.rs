@@ -36,9 +36,9 @@ pub struct Problem {
     pub level: Level,
     /// When it had that level first.
     pub at: Instant,
-    /// How often it went from good to a warning or worse.
+    /// Number of changes from good to a warning or worse.
     pub times: u32,
-    /// How long it was at a warning or worse, in all, without the recording's gaps.
+    /// Time at a warning or worse, in all, without the recording's gaps.
     pub lasted: Span,
     /// It was still so at the end.
     pub lasting: bool,
@@ -52,7 +52,7 @@ pub struct Problem {
     pub details: Vec<String>,
     /// For a mishap in a radio gap, the last time the vehicle was received before it.
     pub unheard_from: Option<Instant>,
-    /// The check that explains it: one whose alarm was as bad when it was found, each time that it was wrong.
+    /// Its cause: a check whose alarm was as bad at the time of each finding.
     pub because: Option<String>,
 }
 
@@ -120,7 +120,7 @@ type Since = (Instant, Span);
 pub(super) struct Problems {
     /// The changes, up to [`LISTED_MAX`].
     pub findings: Vec<Finding>,
-    /// How many there were.
+    /// Number of findings.
     pub findings_count: u64,
     /// By check and part.
     open: BTreeMap<(String, u8), Followed>,
@@ -246,7 +246,7 @@ impl Problems {
         }
     }
 
-    /// The worst value of a part, where more is known of it than its changes tell.
+    /// The worst value of a part, which may exceed the values at its changes.
     pub(super) fn peak(&mut self, check: &str, instance: u8, value: f32) {
         if let Some(Followed { problem, .. }) = self.open.get_mut(&(check.to_owned(), instance)) {
             problem.value = worse(problem.value, measured(check, value, problem.limit), check);

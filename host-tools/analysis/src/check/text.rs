@@ -208,7 +208,7 @@ impl Table {
         }
     }
 
-    /// The table; so many logs besides could not be read.
+    /// The table; this many further logs could not be read.
     pub fn text(&self, failed: usize) -> String {
         let count = |level: &str| self.levels.get(level).copied().unwrap_or(0);
         let mut text = format!(
@@ -442,7 +442,7 @@ fn action(problem: &Problem) -> &'static str {
     vocabulary(&problem.check).map_or("", |words| words.action)
 }
 
-/// The one with the worst value; the first one of several, and where no value is known.
+/// The problem with the worst value; the first of several, or if the values are unknown.
 fn worst_of<'a>(group: &[&'a Problem]) -> Option<&'a Problem> {
     let is_worse = |one: &Problem, than: &Problem| match side(&one.check) {
         _ if than.value.is_nan() => !one.value.is_nan(),

@@ -7,7 +7,7 @@ use crate::utc::{parse_seconds, seconds_to_micros};
 /// All faults of one run.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Faults {
-    /// Where power goes; the first one reached ends the run.
+    /// Power cuts; the first one reached ends the run.
     pub cuts: Vec<Cut>,
     /// Pauses.
     pub stalls: Vec<Stall>,

@@ -131,14 +131,14 @@ fn data_from(file: &File, at: u64) -> io::Result<Option<u64>> {
     }
 }
 
-/// The same where no system tells.
+/// The same on a system without this call.
 #[cfg(not(target_os = "linux"))]
 #[expect(clippy::unnecessary_wraps, reason = "asking a system that tells may fail")]
 fn data_from(_: &File, at: u64) -> io::Result<Option<u64>> {
     Ok(Some(at))
 }
 
-/// Bytes of a file, or of a raw device, whose metadata says 0.
+/// Size of a file, or of a raw device, whose metadata has 0.
 pub fn length(mut file: &File) -> io::Result<u64> {
     file.seek(SeekFrom::End(0))
 }

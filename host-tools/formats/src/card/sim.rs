@@ -18,7 +18,7 @@ use crate::rng::Rng;
 const COMMAND_US: u64 = 300;
 /// One block over SPI at 21 MHz, in microseconds.
 const BLOCK_US: u64 = 200;
-/// How long the driver waits for a card that is not there, in microseconds.
+/// The driver's timeout for a missing card, in microseconds.
 const ABSENT_US: u64 = 10_000;
 
 const PURPOSE: u64 = 2;
@@ -135,7 +135,7 @@ impl SimCard {
         self.trace.take().unwrap_or_default()
     }
 
-    /// Whether power has gone.
+    /// Whether the power is off.
     pub fn is_dead(&self) -> bool {
         self.dead.get()
     }
@@ -170,7 +170,7 @@ impl SimCard {
         Err(CardError::Absent)
     }
 
-    /// One block write; false where power went with it.
+    /// One block write; false if the power failed during it.
     fn write_block(
         &self,
         bytes: &[u8; Block::LEN],
@@ -207,8 +207,8 @@ impl SimCard {
         Ok(())
     }
 
-    /// The image file failed, as on a full disk. Power goes with it: to the recorder it would be a card that refuses some
-    /// writes, on which it goes on where older logs are.
+    /// The image file failed, as on a full disk. The power fails with it. Otherwise the recorder would see a
+    /// card that refuses some writes, and would go on over older logs.
     fn keep(&self, error: io::Error) -> CardError {
         self.dead.set(true);
         let copy = io::Error::new(error.kind(), error.to_string());

@@ -141,7 +141,7 @@ impl Files<'_> {
         })
     }
 
-    /// Sectors of a session that began later lie where a recycled file may have older ones.
+    /// Sectors of a later session, in places where a recycled file may have older ones.
     pub(super) fn newer(&self) -> Option<String> {
         let told = self.summary.strange.iter().any(|strange| strange.sectors > 0);
         (self.has_newer() && !told).then(|| {

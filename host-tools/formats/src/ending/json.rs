@@ -17,18 +17,18 @@ pub struct EndJson {
     words: String,
     /// The last end mark.
     mark: Option<MarkJson>,
-    /// How many end marks there are.
+    /// Number of end marks.
     marks: u64,
     /// Seconds after the last end mark, without a proof of their end.
     after_mark_s: Option<f64>,
     /// When the vehicle was armed or took off after the last end mark, seconds since power-on.
     moved_s: Option<f64>,
-    /// Sectors and frames that the next start found and that are gone.
+    /// Missing sectors and frames that the next start found.
     sectors_missing: u32,
     frames_missing: Option<u32>,
     /// The blocks after the last sector.
     behind: BlocksJson,
-    /// Sectors of a session that began later lie in it.
+    /// It holds sectors of a later session.
     newer_session: bool,
     /// Reasons why the log does not count as whole, and a remark on rebuilt sectors, as sentences; empty
     /// without both.
@@ -81,9 +81,9 @@ pub struct BlocksJson {
     misplaced: u64,
     damaged: u64,
     other_session: u64,
-    /// Sectors from which others can be made again.
+    /// Sectors with parity of others.
     parity: u64,
-    /// Sectors that were lost or damaged and were made again from these.
+    /// Lost or damaged sectors that were rebuilt from parity.
     repaired: u64,
     zero: u64,
     erased: u64,

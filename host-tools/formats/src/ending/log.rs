@@ -204,7 +204,7 @@ impl Ending {
         self.file().strange()
     }
 
-    /// Whether sectors of a session that began later lie in the log's files.
+    /// Whether the log's files hold sectors of a later session.
     pub fn has_newer(&self) -> bool {
         self.file().has_newer()
     }

@@ -22,13 +22,13 @@ pub enum Proof {
     None,
     /// The next start found as many sectors and frames, and they were others.
     Differs,
-    /// There was more than is there now: so many sectors, and frames where they were counted.
+    /// Data were lost: this many sectors, and frames if counted.
     Short {
-        /// Sectors that are missing; 0 where the last one is there in an older copy, which has fewer frames.
+        /// Missing sectors; 0 if the last one is there in an older copy with fewer frames.
         sectors: u32,
         /// Frames that are missing.
         frames: Option<u32>,
-        /// Who tells.
+        /// The source.
         by: Teller,
     },
 }
@@ -160,7 +160,7 @@ pub(super) fn seconds_after(summary: &Summary, at: Instant) -> Option<f64> {
     summary.last.map(|last| last.since(at).as_micros() as f64 / 1e6)
 }
 
-/// A time in UTC where it is known, otherwise in seconds since power-on.
+/// A time in UTC if known, otherwise in seconds since power-on.
 fn moment(summary: &Summary, at: Instant) -> String {
     let utc = summary.epoch_us.map(|epoch| epoch.saturating_add(at.as_micros()));
     utc.map_or_else(|| crate::utc::moment(at), iso8601_ms)

@@ -83,7 +83,7 @@ pub(super) fn find(numbers: &BTreeSet<u32>, known: &[Known<'_>]) -> BTreeMap<u32
     };
     let (mut lower, mut torn) = (Lower::default(), Vec::new());
     for (nth, one) in known.iter().enumerate() {
-        // Its new name is the one after another log's, until that one is gone.
+        // Its new name is the one after another log's, until that one is deleted.
         let before = one.number.checked_sub(1);
         let has_place = one.number == oldest || before.is_some_and(|before| numbers.contains(&before));
         match has_place.then(|| held(one, &lower, &card)) {
@@ -172,7 +172,7 @@ enum Held {
     Older(BegunAnew),
     /// It is its own.
     Own,
-    /// Its beginning, which would tell, is lost.
+    /// The record in its beginning is lost.
     Unknown,
 }
 
@@ -191,7 +191,7 @@ fn held(one: &Known<'_>, lower: &Lower<'_>, card: &Card) -> Held {
         let is_older = card.oldest_names == Some(session) || lower.has_later_part(one);
         return if is_older { Held::Older(anew) } else { Held::Unknown };
     };
-    // Where another card was in the box, its first record tells of that; the last one tells of this card.
+    // If another card was in the box, the first record is about that one; the last one is about this card.
     match Some(before).filter(is_older).and_then(|_| own_last(one.log)).filter(is_older) {
         Some(before) => {
             Held::Older(BegunAnew { of: Some(before.number.saturating_add(1)), or_later: !is_first, ..anew })
@@ -217,7 +217,8 @@ fn is_torn(one: &Known<'_>, card: &Card) -> bool {
     is_first && is_other && !card.sessions.contains(&torn.session())
 }
 
-/// Whether a log began after one of a lower number by the clocks of both, where both know the time: then it is not older.
+/// Whether a log began after one of a lower number, by the clocks of both if both are set: then it is not
+/// older.
 fn is_newer(log: &Log, lower: Option<&Log>) -> bool {
     let epoch = |log: &Log| likely_epoch(log).ok().flatten();
     lower.and_then(epoch).is_some_and(|lower| epoch(log).is_some_and(|own| own > lower))

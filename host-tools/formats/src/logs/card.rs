@@ -1,4 +1,4 @@
-//! The logs in a file and on a card: by its file system, or where that does not tell, by looking at every block.
+//! The logs in a file and on a card: by its file system, or if that is damaged, by searching every block.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::File;
@@ -37,7 +37,7 @@ pub(super) fn whole_file(path: &Path) -> Result<Log> {
     })
 }
 
-/// Where things are on a card, or on its partition alone (`/dev/sdX1`).
+/// The layout of a card, or of its partition alone (`/dev/sdX1`).
 fn layout(device: &ReadOnlyImage) -> Result<Layout, LayoutError<io::Error>> {
     Layout::read(device).or_else(|error| Layout::volume(device).map_err(|_| error))
 }
@@ -66,7 +66,7 @@ pub struct Card {
 }
 
 impl Card {
-    /// None where it cannot be read.
+    /// `None` if unreadable.
     pub fn of(path: &Path) -> Option<Self> {
         let file = File::open(path).ok()?;
         let layout = layout(&ReadOnlyImage::new(file.try_clone().ok()?).ok()?).ok()?;
@@ -81,7 +81,7 @@ impl Card {
     }
 }
 
-/// The logs on a card: by its file system, or where that does not tell, by looking at every block.
+/// The logs on a card: by its file system, or if that is damaged, by searching every block.
 pub(super) fn image(path: &Path, salvage: bool, found: &mut Found) -> Result<()> {
     let context = || format!("{}: cannot be read", path.display());
     let file = File::open(path).with_context(context)?;

@@ -50,7 +50,7 @@ const ATTRIBUTE_LONG_NAME: u8 = 0x0f;
 pub struct Extent {
     /// Start of the volume, in bytes from the beginning of the image.
     pub start: u64,
-    /// How long it is, in bytes.
+    /// Its length, in bytes.
     pub length: u64,
 }
 
@@ -90,13 +90,13 @@ pub struct Walk {
     pub damage: Vec<String>,
     /// Clusters that are free.
     pub free_clusters: u64,
-    /// Clusters that are allocated and belong to no file: room that a cut left behind, or a file whose entry is lost.
+    /// Allocated clusters without a file: space left by a power cut, or a file with a lost entry.
     pub lost_clusters: u64,
     /// Their places, as far as there is room.
     pub lost: Vec<Extent>,
-    /// The deleted segments whose first clusters are free.
+    /// The deleted segments with a free first cluster.
     pub deleted: Vec<Deleted>,
-    /// Deleted segments whose first cluster is free and begins with a sector of a log.
+    /// Deleted segments with a free first cluster that begins with a sector of a log.
     pub deleted_logs: u64,
 }
 
@@ -211,7 +211,7 @@ impl<'a, I: ReadAt> Volume<'a, I> {
         Ok(raw & ENTRY_MASK)
     }
 
-    /// Marks a cluster as used; false where it already was.
+    /// Marks a cluster as used; false if it already was.
     fn claim(&mut self, cluster: u32) -> bool {
         let (word, bit) = (cluster as usize / 64, 1_u64 << (cluster % 64));
         match self.used.get_mut(word) {

@@ -200,14 +200,14 @@ pub fn passed_over(path: &Path, kind: FileType) -> String {
     format!("{}: is {what}, and passed over", path.display())
 }
 
-/// A log, or an image, that happens to lie in a folder.
+/// A log or an image in a folder.
 fn file(path: &Path, salvage: bool, found: &mut Found) -> Result<()> {
     match look(path)? {
         Content::Log => found.log(whole_file(path)?),
         Content::Image => {
             let before = found.logs.len();
             match image(path, salvage, found) {
-                // A large file of anything may be a card whose first blocks are gone.
+                // A large file may be a card without its first blocks.
                 Err(_) if !is_named_as_card(path) && !is_card(path)? => return Ok(()),
                 looked_at => looked_at?,
             }

@@ -116,11 +116,11 @@ pub struct Image {
     pub damage: Vec<String>,
     /// Clusters that belong to no file.
     pub lost_clusters: u64,
-    /// The logs were found by looking at every block, because the file system could not tell.
+    /// The logs were found by searching every block, because the file system is damaged.
     pub scanned: bool,
     /// Every block was looked at.
     pub searched: bool,
-    /// Deleted segments whose sectors may still be there.
+    /// Deleted segments whose sectors may still exist.
     pub deleted_logs: u64,
 }
 
@@ -144,7 +144,7 @@ impl Image {
     }
 }
 
-/// So many clusters belong to no file.
+/// Words for clusters that belong to no file.
 pub(super) fn belong(clusters: u64) -> String {
     let verb = if clusters == 1 { "belongs" } else { "belong" };
     format!("{} {verb} to no file", count(clusters, "cluster"))

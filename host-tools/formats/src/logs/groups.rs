@@ -9,7 +9,7 @@ use super::places::{BLOCK_BYTES, Blocks, Log};
 use super::repair::{Evidence, Repairs};
 use super::strangers::{Strange, Strangers};
 
-/// Sectors that belong together, in order: a group, or a part of one whose beginning is missing.
+/// Sectors of one group, in order, or of a part of one without its beginning.
 pub type Group = Vec<Step>;
 
 /// Whether a block was allocated and never written, like most of a short log's segment. The assembler only
@@ -49,7 +49,7 @@ pub struct Groups<'a> {
     repairs: Option<(Option<usize>, Repairs)>,
     /// The second of two sectors that are read in the place of one block.
     beside: Option<[u8; BLOCK_BYTES]>,
-    /// Sectors that were made again.
+    /// Number of rebuilt sectors.
     repaired: u64,
     /// Evidence from the parity of the files so far.
     evidence: Evidence,
@@ -188,7 +188,7 @@ impl<'a> Groups<'a> {
         self.foreign_at_end
     }
 
-    /// The latest power-on that sectors of other sessions tell, microseconds since 1970.
+    /// The latest power-on in sectors of other sessions, microseconds since 1970.
     pub const fn other_epoch_us(&self) -> Option<u64> {
         self.assembler.other_epoch_micros()
     }

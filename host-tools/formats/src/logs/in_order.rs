@@ -10,8 +10,7 @@ use std::thread;
 
 use anyhow::Result;
 
-/// How many may work: as many as there are processors that this program may use, or as `RAYON_NUM_THREADS` says, which
-/// other programs obey as well.
+/// Number of workers: the processors available to this program, or `RAYON_NUM_THREADS`, as in other programs.
 pub fn workers() -> usize {
     // Asked for by each log, and a dozen files of the system's to read.
     static WORKERS: LazyLock<usize> = LazyLock::new(|| {
@@ -22,8 +21,8 @@ pub fn workers() -> usize {
     *WORKERS
 }
 
-/// Calls `work` for each item that `next` gives, and `take` with the results in the items' order. `ahead_max` items at
-/// most are in work or wait for an earlier one. The first error ends it.
+/// Calls `work` for each item from `next`, and `take` with the results in the items' order. At most
+/// `ahead_max` items are in work or wait for an earlier one. The first error ends it.
 pub fn in_order<T: Send, R: Send>(
     workers: usize,
     ahead_max: usize,

@@ -11,7 +11,7 @@ use super::places::BLOCK_BYTES;
 use crate::archive;
 use crate::mavlink::frame::{Peek, peek};
 
-/// How far into a file to look for a first sector before calling it no log.
+/// Number of blocks searched for a first sector in a file.
 const LOOK_BLOCKS: usize = 2048;
 
 /// The kind of a file, by its content.
@@ -69,7 +69,7 @@ pub fn look(path: &Path) -> Result<Content> {
     let mut start = Vec::new();
     file.by_ref().take(BLOCK_BYTES as u64).read_to_end(&mut start).with_context(context)?;
     if start.first_chunk().is_some_and(|block| Header::read(block).is_ok()) {
-        // Nearly every log: its first block tells.
+        // Nearly every log: its first block is a sector.
         return Ok(Content::Log);
     }
     let rest = ((LOOK_BLOCKS - 1) * BLOCK_BYTES) as u64;
@@ -108,7 +108,7 @@ pub fn look(path: &Path) -> Result<Content> {
         _ if frame_at(0) || frame_at(8) => Content::Mavlink,
         // Large, and known to be something else.
         _ if start.starts_with(&archive::GZIP) || archive::hint(&start).is_some() => Content::Other,
-        // A card whose first blocks are gone: only looking at all of it tells.
+        // A card without its first blocks: only a search of all blocks shows it.
         _ if large => Content::Image,
         _ => Content::Other,
     })

@@ -13,7 +13,7 @@ const ARMED: u8 = 1;
 pub const TAKE_OFF: u8 = 3;
 /// The number of the event that says that it landed.
 pub const LANDING: u8 = 4;
-/// The number of the event that says that there is no card, or none that can be used.
+/// The number of the event for a missing or unusable card.
 pub(super) const CARD_OUT: u8 = 7;
 /// The check that finds that the card refused blocks.
 pub(super) const REFUSED: &str = "card_errors";
@@ -27,9 +27,9 @@ pub const PACKED: &str = "packed on a PC by hums decode --format hum";
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[expect(clippy::struct_excessive_bools, reason = "facts that have nothing to do with each other")]
 pub struct Marks {
-    /// How many end marks there are.
+    /// Number of end marks.
     pub count: u64,
-    /// How many of them tell another count of frames than was read.
+    /// Number of end marks with a different count of frames.
     pub wrong: u64,
     /// The last one.
     pub last: Option<(Instant, Resting)>,

@@ -71,7 +71,7 @@ impl SegmentName {
     }
 }
 
-/// The segment that a file's name says it is, in any case of letters, also where the ending was lost.
+/// The segment in a file's name, in upper or lower case, also without the ending.
 pub fn segment_name(path: &Path) -> Option<SegmentName> {
     let name = path.file_name()?.to_str()?.to_ascii_lowercase();
     let (base, extension) = name.split_once('.').unwrap_or((&name, "hum"));
@@ -89,7 +89,7 @@ pub fn segment_name(path: &Path) -> Option<SegmentName> {
 /// Mark of a part of a log, in front of the ending.
 const PART: &str = ".part";
 
-/// The path of a part of this log, which `hums box pull --around` brings: `00042-s1a2b3c4d_07.part.HUM`.
+/// The path of a part of this log, made by `hums box pull --around`: `00042-s1a2b3c4d_07.part.HUM`.
 pub fn part_name(whole: &Path) -> PathBuf {
     whole.with_extension("part.HUM")
 }
@@ -124,7 +124,7 @@ pub fn identity_at_end(stem: &str) -> Option<(&str, &str)> {
     Some((base, identity.get(1..)?))
 }
 
-/// The session that a name's end tells, `s1a2b3c4d`.
+/// The session at the end of a name, `s1a2b3c4d`.
 pub fn session_of(identity: &str) -> Option<u32> {
     u32::from_str_radix(identity.strip_prefix('s')?, 16).ok()
 }

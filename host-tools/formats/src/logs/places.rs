@@ -10,7 +10,7 @@ use super::naming::segment_name;
 
 /// Bytes of a block: a sector of the log.
 pub const BLOCK_BYTES: usize = 512;
-/// How much is read at once.
+/// Number of bytes in one read.
 const READ_BYTES: u64 = 64 * 1024;
 
 /// A part of a log: places in one file.
@@ -18,14 +18,14 @@ const READ_BYTES: u64 = 64 * 1024;
 pub struct Piece {
     /// The file: a segment, a packed log or a card image.
     pub path: PathBuf,
-    /// Where in it.
+    /// Its places in the file.
     pub extents: Vec<Extent>,
 }
 
 /// One log.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Log {
-    /// A name for directories and reports, unique within one call: `00042`, or `card/00042` where there are several
+    /// A name for directories and reports, unique within one call: `00042`, or `card/00042` with several
     /// inputs.
     pub name: String,
     /// The names of its files: on the card for a card's, on this PC otherwise.
@@ -80,7 +80,7 @@ pub struct Blocks<'a> {
 }
 
 impl<'a> Blocks<'a> {
-    /// The log whose blocks they are.
+    /// The log of the blocks.
     pub(super) const fn log(&self) -> &'a Log {
         self.log
     }
@@ -101,7 +101,7 @@ impl<'a> Blocks<'a> {
         (self.piece, (self.begun + self.at as u64).saturating_sub(1) / BLOCK_BYTES as u64)
     }
 
-    /// The same file from this block on, so many blocks of it at most, as a log of its own.
+    /// At most this many blocks of the same file from this block on, as a log of its own.
     pub fn from(&self, at: u64, blocks: u64) -> Log {
         let (piece, _) = self.place();
         let (mut skipped, mut left) = (at * BLOCK_BYTES as u64, blocks * BLOCK_BYTES as u64);

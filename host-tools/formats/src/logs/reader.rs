@@ -40,11 +40,11 @@ pub trait Collect: Send {
         false
     }
 
-    /// Takes the next entry, which is a frame of this id and so many bytes, sound in its form.
+    /// Takes the next entry, a well-formed frame of this id and size.
     fn frame(&mut self, _at: Instant, _id: u32, _bytes: usize, _verified: bool) {}
 }
 
-/// Where collected groups go, in order.
+/// Receives the collected groups, in order.
 pub trait Deliver<C> {
     /// Something is missing here.
     fn gap(&mut self, gap: &Gap) -> Result<()>;
@@ -57,7 +57,7 @@ pub trait Deliver<C> {
 pub struct Summary {
     /// The session that the sectors name.
     pub session: Option<u32>,
-    /// It was ended in order; otherwise power went.
+    /// It has a proper end; otherwise the power failed.
     pub closed: bool,
     /// Frames read.
     pub frames: u64,
@@ -65,15 +65,15 @@ pub struct Summary {
     pub groups: u64,
     /// Gaps.
     pub gaps: u64,
-    /// Places where the recorder itself lost something and says so, of recordings of other programs.
+    /// Losses reported by the recorder itself, in recordings of other programs.
     pub losses: u64,
     /// Frames that are known to be missing.
     pub frames_missing: u64,
     /// Gaps with an unknown number of missing frames.
     pub gaps_uncounted: u64,
-    /// Groups whose first entry came before the last one of the group before.
+    /// Groups that begin before the end of the group before them.
     pub times_fell: u64,
-    /// Entries whose time is before the entry before, within a group.
+    /// Entries with an earlier time than the entry before, within a group.
     pub entries_fell: u64,
     /// Counts of the blocks by kind.
     pub blocks: BlockCounts,
@@ -106,7 +106,8 @@ pub struct Summary {
     pub behind: BlockCounts,
     /// Number of blocks up to the end of its files that belong to no log.
     pub foreign_at_end: u64,
-    /// The latest power-on of another session whose sectors lie among this one's or behind it, microseconds since 1970.
+    /// The latest power-on of another session with sectors among or after this one's, microseconds since
+    /// 1970.
     pub other_epoch_us: Option<u64>,
     /// Evidence from its parity.
     pub parity: Evidence,
@@ -117,7 +118,7 @@ pub struct Summary {
 }
 
 impl Summary {
-    /// How many frames are missing, as far as that is known: the beginning of a phrase that goes on with `missing`.
+    /// Number of missing frames, as far as known: the beginning of a phrase that goes on with `missing`.
     pub fn missing_words(&self) -> String {
         match (self.gaps_uncounted, self.frames_missing) {
             (0, number) => count(number, "frame"),
@@ -246,7 +247,7 @@ struct Decoded<C> {
     check_end: Option<u32>,
     frames: u32,
     last: Option<Instant>,
-    /// Entries whose time is before the one before.
+    /// Entries with an earlier time than the one before.
     fell: u64,
     error: Option<GroupError>,
     ends_partial: bool,
@@ -354,7 +355,7 @@ impl<C: Collect> Decoded<C> {
     }
 }
 
-/// The next entry, of a frame no more than its outline where that is enough.
+/// The next entry; of a frame only its outline if that is enough.
 fn next(decoder: &mut GroupDecoder, counts: bool) -> Option<Result<Outline<'_>, GroupError>> {
     if counts { decoder.next_outline() } else { Some(decoder.next_entry()?.map(Outline::Whole)) }
 }
@@ -438,7 +439,7 @@ impl Stitch {
         Ok(())
     }
 
-    /// Frames that are missing before a group before which so many came.
+    /// Frames missing before a group whose own count before it is this.
     fn frames_missing(&self, before: u32) -> Option<u32> {
         let missing = before.wrapping_sub(self.expected.unwrap_or(0));
         Some(missing).filter(|missing| *missing < 1 << 31)
@@ -503,8 +504,8 @@ pub fn epoch(log: &Log) -> Result<Option<u64>> {
     last_epoch(log, |_| true)
 }
 
-/// The same without decoding anything where a group's start tells it. Wrong only where the last group learned another
-/// one, or learned it twice; [`Summary::epoch_us`] tells afterwards.
+/// The same without decoding if a group's start has it. It is wrong only if the last group learned another
+/// one, or learned it twice; [`Summary::epoch_us`] is exact.
 pub fn likely_epoch(log: &Log) -> Result<Option<u64>> {
     last_epoch(log, |epoch| epoch.is_none())
 }

@@ -31,7 +31,7 @@ pub struct Evidence {
     /// Parity sectors that the recorder had certainly written. It writes those of a full stretch before the
     /// next stretch, and those of the last one before a proper end.
     pub written: u64,
-    /// How many of these are not there, or not sound.
+    /// Number of missing or unsound ones among them.
     pub missing: u64,
     /// Columns of sectors that were held against it.
     pub columns: u64,
@@ -106,7 +106,7 @@ impl Repairs {
         Ok(all)
     }
 
-    /// The sector that was made again and belongs in this block.
+    /// The rebuilt sector of this block.
     pub(super) fn at(&self, block: u64) -> Option<&[u8; BLOCK_BYTES]> {
         self.made.get(&block)
     }
@@ -127,7 +127,7 @@ struct Found {
     session: u32,
     /// The number of the file's first sector; `None` without a sector of the session.
     base: Option<u32>,
-    /// The number of the whole sector of the session in each block, where there is one.
+    /// The number of the whole sector of the session in each block, if any.
     numbers: Vec<Option<u32>>,
     /// The number of the one that ends the log in order.
     closed: Option<u32>,
@@ -175,9 +175,9 @@ impl Found {
         Ok(Some(Self { session, base, numbers, closed, parity }))
     }
 
-    /// How many parity sectors were written for sure, and how many of them are not there. The recorder writes those of a stretch
-    /// before the first sector of the next one, and once a log has ended in order. They lie at the end of the file: one that was
-    /// trimmed behind its last sector, as a download is, never had them.
+    /// Number of parity sectors that were certainly written, and of the missing ones. The recorder writes
+    /// those of a stretch before the first sector of the next one, and the last ones at a proper end. They
+    /// are at the end of the file: a file trimmed after its last sector, like a download, never had them.
     fn written_and_missing(&self, base: u32) -> (u64, u64) {
         let last = (0..self.numbers.len() as u32).rev().find(|at| self.in_place(base, *at).is_some());
         let Some(last) = last else { return (0, 0) };
@@ -233,7 +233,7 @@ impl Found {
         only.into_values().collect()
     }
 
-    /// The columns that have parity and have lost no more sectors than can be made again: with the numbers of those.
+    /// The columns with parity and with few enough lost sectors to rebuild, with the numbers of those.
     fn columns(&self, base: u32) -> BTreeMap<(u32, u32), (Column, Vec<u32>)> {
         let mut columns = BTreeMap::new();
         for (one, block) in &self.parity {

@@ -32,7 +32,7 @@ pub(super) struct Scan {
 /// Sectors that follow each other, in place and in number; damaged ones between them are theirs.
 #[derive(Clone, Copy, Debug)]
 struct Run {
-    /// The block where it starts.
+    /// Its first block.
     start: u64,
     number: u32,
     blocks: u32,
@@ -96,7 +96,7 @@ impl Sessions {
 /// The files of a sound file system. Sectors of a log's own session are read through its files.
 #[derive(Debug, Default)]
 pub(super) struct Files {
-    /// The blocks of each extent and the session of its log, by the block where it begins.
+    /// The number of blocks of each extent and the session of its log, by its first block.
     extents: BTreeMap<u64, (u64, u32)>,
 }
 

@@ -259,7 +259,8 @@ mod tests {
     #[test]
     fn power_that_goes_several_times_at_the_start_renames_nothing() {
         let card = Card::new();
-        // The ring had 10 to 14. Power went just after 10 and 11 got the next names; then a start wrote over 12.
+        // The ring had 10 to 14. Power failed just after 10 and 11 got the next names; then a start overwrote
+        // 12.
         card.write(13, log(13, 12, 12));
         card.write(14, log(14, 13, 13));
         card.write(15, log(10, 9, 9));
@@ -328,7 +329,7 @@ mod tests {
         card.write(22, sector(old, 9));
         assert_eq!(card.anew(), []);
         card.write(22, log(22, 21, old));
-        // A byte of the session went wrong, or all of the head; or the head is of a log that is there.
+        // A byte of the session is wrong, or the whole head; or the head is of an existing log.
         let [mut byte, mut zeros, mut other] = [torn.clone(), torn.clone(), torn.clone()];
         byte[7] = 0x88;
         zeros[7..15].fill(0);

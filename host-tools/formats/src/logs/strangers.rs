@@ -15,7 +15,7 @@ pub struct Strange {
     pub file: usize,
     /// The file has no sector of the log.
     pub hollow: bool,
-    /// How many sectors there are of other sessions.
+    /// Number of sectors of other sessions.
     pub sectors: u64,
     /// The file's block with the first one.
     pub first: u64,
@@ -37,7 +37,7 @@ struct File {
 }
 
 impl Strangers {
-    /// Of a log of so many files.
+    /// For a log of this many files.
     pub(super) fn new(files: usize) -> Self {
         Self(vec![File::default(); files])
     }

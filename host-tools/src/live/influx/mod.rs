@@ -37,11 +37,11 @@ use crate::source::epochs::Epochs;
 const BATCH_BYTES: usize = 256 * 1024;
 /// Or when its first point is this old.
 const BATCH_AGE: Duration = Duration::from_millis(250);
-/// How often the usage counters are written.
+/// Period of the usage counters.
 const USAGE_EVERY: Span = Span::from_secs(10);
-/// How often it is looked whether it has all of them.
+/// Period of the check whether all points are written.
 const LOOK: Duration = Duration::from_millis(20);
-/// How long is waited for the database at the end.
+/// Maximum wait for the database at the end.
 const LAST_WAIT: Duration = Duration::from_secs(15);
 
 /// The side that makes points.
@@ -242,7 +242,7 @@ mod tests {
         Packet::new(AUTOPILOT_VERSION).u32(8, UID as u32).u32(12, (UID >> 32) as u32)
     }
 
-    /// Flies these packets past; gives the lines that the database would get, the last ones by the end.
+    /// Passes these packets; returns the lines for the database, the last ones at the end.
     fn fly(packets: &[Packet], know: bool) -> Vec<String> {
         let queue = Arc::new(Queue::new(false));
         let mut influx = Influx::new(Arc::clone(&queue), None, "s1".to_owned()).expect("random numbers");

@@ -77,7 +77,7 @@ impl Names {
         self.waiting.is_some()
     }
 
-    /// How many points wait for a name.
+    /// Number of points that wait for a name.
     pub fn points_waiting(&self) -> u64 {
         self.waiting.as_ref().map_or(0, |waiting| waiting.batch.points)
     }

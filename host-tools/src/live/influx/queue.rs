@@ -82,7 +82,8 @@ impl Queue {
         self.changed.notify_all();
     }
 
-    /// The oldest batch, once there is one; `None` when no more comes. Its points count as waiting until [`Self::done`].
+    /// The oldest batch, once there is one; `None` at the end. Its points count as waiting until
+    /// [`Self::done`].
     pub fn take(&self) -> Option<Batch> {
         let mut inner = self.lock();
         loop {
@@ -112,7 +113,7 @@ impl Queue {
         inner.figures.trouble = delivered.why;
     }
 
-    /// The database does not take anything now. Waits so long; `false` when the time at the end is up.
+    /// The database takes no data now. Waits this long; `false` when the time at the end is over.
     pub fn trouble(&self, why: String, wait: Duration) -> bool {
         let mut inner = self.lock();
         inner.figures.trouble = why;

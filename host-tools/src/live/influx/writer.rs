@@ -24,11 +24,11 @@ const WAIT_MAX: Duration = Duration::from_secs(5);
 const ANSWER_BYTES_MAX: u64 = 64 * 1024;
 /// Maximum number of characters reported from it.
 const WORDS_MAX: usize = 200;
-/// Requests for one batch. A bad point among 2,048 takes at most 30; where there are more bad ones than these find, the good
-/// ones beside them go with them.
+/// Requests for one batch. A bad point among 2,048 takes at most 30. Beyond this number of requests the good
+/// points beside bad ones are lost with them.
 const REQUESTS_MAX: usize = 64;
 
-/// How a request went.
+/// Result of a request.
 #[derive(Debug)]
 enum Answer {
     Taken,
@@ -76,7 +76,7 @@ fn write_all(agent: &Agent, target: &Target, queue: &Queue) {
     }
 }
 
-/// Writes these lines, again and again while the database is away; `None` when the time at the end is up.
+/// Writes these lines, again and again while the database is away; `None` when the time at the end is over.
 fn persist(agent: &Agent, target: &Target, queue: &Queue, lines: &[u8]) -> Option<Answer> {
     let mut wait = WAIT_MIN;
     loop {
@@ -125,7 +125,7 @@ fn in_halves(batch: &Batch, mut deliver: impl FnMut(&[u8]) -> Option<Answer>) ->
     Some(delivered)
 }
 
-/// Cuts lines into two parts of about equal length; `None` where it is one line.
+/// Cuts lines into two parts of about equal length; `None` for a single line.
 fn halves(lines: &[u8]) -> Option<(&[u8], &[u8])> {
     let end = |from: usize| lines.get(from..)?.iter().position(|byte| *byte == b'\n').map(|at| from + at + 1);
     let start = lines.get(..lines.len() / 2)?.iter().rposition(|byte| *byte == b'\n').map(|at| at + 1);

@@ -16,7 +16,7 @@ use crate::logs::naming::{segment_name, session_name};
 /// Bytes compared if the board computes no checksum: the first sector, which has the session's random number,
 /// and the last one.
 const SECTOR: u32 = 512;
-/// A file begins with the record of who records, behind at most three sectors of a group that was begun before.
+/// A file begins with the record of its box, after at most three sectors of an earlier group.
 const HEADING_SECTORS: u32 = 8;
 
 /// Result of a comparison.
@@ -64,7 +64,7 @@ pub(super) struct Heading {
     pub(super) sectors: Vec<Sector>,
 }
 
-/// The session of the log that begins with these sectors, and the number of its first one, as far as they tell.
+/// The session of the log with these first sectors, and the number of its first one, as far as known.
 pub(super) fn beginning_of(head: &[Sector]) -> (Option<u32>, Option<u32>) {
     let headers =
         || (0..).zip(head).filter_map(|(at, sector)| Some((at, Header::read(sector.bytes()).ok()?)));

@@ -188,13 +188,13 @@ impl Ftp {
         Ok(opened.word())
     }
 
-    /// The checksum of a log's first so many bytes (at least one), as [`hums_link::ftp::checksum`] computes it; `None`
-    /// where the board's firmware is too old to tell.
+    /// The checksum of a log's first bytes (at least one), as in [`hums_link::ftp::checksum`]; `None` if the
+    /// board's firmware is too old for it.
     pub(super) fn checksum(&mut self, name: &str, bytes: u32) -> Result<Option<u32>> {
         let answer = self.ask(CHECKSUM, bytes, 0, format!("/{name}").as_bytes(), CHECKSUM_TRIES)?;
         match answer.opcode {
             ACK if answer.offset == bytes => Ok(Some(answer.word())),
-            // Another server: of the whole file, whatever was asked for.
+            // Another server: its checksum is always of the whole file.
             ACK => Ok(None),
             _ if answer.is_nak(UNKNOWN_COMMAND) => Ok(None),
             _ => Err(refused(&answer, "the checksum")),
@@ -278,7 +278,7 @@ impl Ftp {
         }
     }
 
-    /// At least one and at most so many bytes of the open log from `offset` on.
+    /// Between one and this many bytes of the open log from `offset` on.
     pub(super) fn piece(&mut self, offset: u32, bytes: u32) -> Result<Vec<u8>> {
         let size = bytes.min(u32::from(DATA_MAX)) as u8;
         let mut answer = self.ask(READ, offset, size, b"", TRIES)?;

@@ -40,7 +40,7 @@ impl LogJson {
     }
 }
 
-/// Which of a board's logs were asked for: all from one to another, some times.
+/// The requested logs of a board: some ranges, each from one log to another.
 #[derive(Debug)]
 pub(super) struct Asked(Vec<(Place, Place)>);
 
@@ -78,7 +78,7 @@ impl Asked {
         }
     }
 
-    /// The files of a log, parted where files between them were left out.
+    /// The files of a log, split at the files that were left out.
     fn parted(&self, log: Log) -> Vec<Log> {
         let Log { name, files, pieces, session, left_over } = log;
         let mut parts: Vec<Log> = Vec::new();

@@ -12,10 +12,10 @@ const STEPS_BACK_MAX: u32 = 2 * GROUP_SECTORS as u32;
 
 /// A log with random access to its sectors.
 pub(super) trait Sectors {
-    /// How many it has.
+    /// Number of sectors.
     fn count(&self) -> u32;
 
-    /// The sector that belongs at this place; `None` where it is damaged, or another one is there.
+    /// The sector at this place; `None` if it is damaged, or another one is there.
     fn sector(&mut self, place: u32) -> Result<Option<(Header, Sector)>>;
 }
 
@@ -28,7 +28,7 @@ pub(super) struct Start {
     pub(super) at: Instant,
 }
 
-/// The group that a sector is in; where that cannot be read, the last one before it that can.
+/// The group of a sector; if that is unreadable, the last readable one before it.
 pub(super) fn group_of(log: &mut impl Sectors, place: u32) -> Result<Option<Start>> {
     let mut next = Some(place);
     for _ in 0..STEPS_BACK_MAX {
@@ -47,7 +47,7 @@ pub(super) fn group_of(log: &mut impl Sectors, place: u32) -> Result<Option<Star
     Ok(None)
 }
 
-/// The first group that begins in a log: before it lie the last sectors of one that began in the log before.
+/// The first group that begins in a log: the sectors before it end a group of the log before.
 pub(super) fn first_group(log: &mut impl Sectors) -> Result<Option<Start>> {
     for place in 0..log.count().min(STEPS_BACK_MAX) {
         if log.sector(place)?.is_some_and(|(header, _)| header.starts_group()) {

@@ -18,7 +18,8 @@ pub(super) struct Session {
     pub(super) unknown: Vec<String>,
 }
 
-/// A log's place among those of its card, as its name tells: the session's number there, and which of its files it is.
+/// A log's place among those of its card, by its name: the session's number there, and the number of the
+/// file.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct Place {
     pub(super) session: u32,

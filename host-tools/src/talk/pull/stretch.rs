@@ -17,7 +17,7 @@ use crate::summary::{FindingLine, Overview};
 use crate::utc::moment;
 use crate::verify::{Extent, failed};
 
-/// Places of a log that were asked for.
+/// Requested places of a log.
 #[derive(Clone, Debug)]
 pub(super) struct Stretch {
     /// As the board calls the log.
@@ -25,7 +25,7 @@ pub(super) struct Stretch {
     /// The file with the sectors on this PC.
     pub(super) path: PathBuf,
     pub(super) places: Range<u32>,
-    /// How many places the log has.
+    /// Number of places of the log.
     pub(super) sectors: u32,
 }
 
@@ -165,7 +165,7 @@ pub(super) fn by_number(stretches: &[Stretch]) -> impl Iterator<Item = &[Stretch
     stretches.chunk_by(|one, next| number(&one.name) == number(&next.name))
 }
 
-/// Sectors that were asked for and cannot be read.
+/// Requested sectors that cannot be read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Unread {
     pub(super) sectors: u64,

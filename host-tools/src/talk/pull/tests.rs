@@ -95,7 +95,7 @@ fn board_with(
     })
 }
 
-/// A board with this log, in whose place the other one comes with the so-many-th question for bytes.
+/// A board with this log, which is replaced by the other one at this number of requests for bytes.
 fn board(log: Vec<u8>, other: Vec<u8>, mut reads: u32) -> Ftp {
     let client = board_of(vec![(NAME.to_owned(), log)], move |files, opcode| {
         if matches!(opcode, 5 | 15) {
@@ -595,7 +595,7 @@ fn a_refusal_says_no_more_than_is_known() {
     }
 }
 
-/// A log in files of so many groups each, by the board's names.
+/// A log in files of this many groups each, by the board's names.
 fn files_of(log: &[u8], groups: usize) -> Files {
     let starts: Vec<usize> = (0..log.len() / SECTOR_BYTES)
         .filter(|place| {

@@ -28,7 +28,7 @@ fn battery(remaining: f32) -> Observation {
     Observation::Battery(Battery { voltage, remaining, ..Battery::default() })
 }
 
-/// Heartbeats and battery levels, so many a second, from this second to that.
+/// Heartbeats and battery levels at this rate per second, from this second to that.
 fn fly(judge: &mut Judge, from_s: u64, to_s: u64, per_s: u64, remaining: f32) {
     for tick in from_s * per_s..to_s * per_s {
         let at = Instant::from_micros(tick * 1_000_000 / per_s);
