@@ -59,7 +59,7 @@ fn plain(counter: &Plain) -> Option<[String; 3]> {
         .then(|| [title.clone(), said(*session), life.map_or_else(String::new, said)])
 }
 
-/// Running time and number of starts.
+/// Running time and revolutions.
 fn motor(motor: &Motor) -> Vec<[String; 3]> {
     let number = u16::from(motor.number) + 1;
     let line = |what: &str, session: Option<f64>, life: Option<f64>, said: fn(f64) -> String| {

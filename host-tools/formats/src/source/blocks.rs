@@ -12,7 +12,7 @@ const BLOCK_BYTES: u64 = 512;
 /// foreign data.
 const FOREIGN_BYTES: u64 = 64 * 1024;
 
-/// Some bytes, and where the first of them is.
+/// A number of bytes, and the place of the first one.
 #[derive(Clone, Copy, Debug, Default)]
 struct Bytes {
     count: u64,
@@ -56,7 +56,7 @@ pub struct Blocks {
 }
 
 impl Blocks {
-    /// Takes the next bytes; so many frames have come with them, in all.
+    /// Takes the next bytes; `frames` is the number of frames so far.
     pub fn take(&mut self, bytes: &[u8], frames: u64) {
         if self.frames != frames {
             self.end();
@@ -85,7 +85,7 @@ impl Blocks {
         self.since = self.place;
     }
 
-    /// How many bytes they are.
+    /// Number of these bytes.
     pub const fn bytes(&self) -> u64 {
         self.unwritten.count + self.foreign.count
     }

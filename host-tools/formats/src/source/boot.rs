@@ -17,9 +17,9 @@ use crate::mavlink::frame;
 
 /// A clock that jumps by more than this may belong to another recording: microseconds.
 pub(super) const JOINT_US: u64 = 3_600_000_000;
-/// Messages that tell the time since power-on come every few seconds at least, s.
+/// Messages with the time since power-on come at least this often, ms.
 const TOLD_MS: i64 = 60_000;
-/// Messages are out of order by so much at most.
+/// Messages are out of order by this at most.
 const DISORDER_MS: i64 = 1_000;
 
 /// `time_boot_ms` of an autopilot's `SYSTEM_TIME`, `ATTITUDE` and `GLOBAL_POSITION_INT`; zeros at the end of a payload are not sent.
@@ -49,11 +49,11 @@ pub(super) struct Joints {
     fell_us: Option<i64>,
 }
 
-/// So many of an autopilot's times are kept, ...
+/// Number of an autopilot's times kept, ...
 const KEPT: usize = 24;
-/// ... and of more than so many the least but two counts.
+/// ... and beyond this number the third lowest counts.
 const MANY: usize = 6;
-/// After a jump the autopilot's times are asked for this long.
+/// Time after a jump in which the autopilot's times are compared.
 const ASKED_MS: u32 = 5_000;
 /// No link holds back more.
 const HELD_BACK_US: i64 = 10_000_000;
@@ -78,7 +78,7 @@ impl Joints {
         *self = Self::default();
     }
 
-    /// The recorder's clock was set from one time to another, while so much passed.
+    /// The recorder's clock was set from one time to another, while this time passed.
     pub(super) fn set(&mut self, before_us: u64, time_us: u64, passed_us: u64) {
         let set_us = i128::from(time_us) - i128::from(before_us) - i128::from(passed_us);
         let set_us = i64::try_from(set_us).unwrap_or(0);

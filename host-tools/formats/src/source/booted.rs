@@ -20,7 +20,7 @@ const STARTS_MS: u32 = 10_000;
 /// time that a line takes for the bytes.
 #[derive(Debug, Default)]
 pub struct BootTimes {
-    /// Whose times count: the first system whose autopilot tells one.
+    /// The first system with an autopilot that reports its time: only its times count.
     system: Option<u8>,
     timeline: Option<Timeline>,
     /// The line's time at the first of them.
@@ -44,7 +44,7 @@ impl BootTimes {
         (self.timeline.map_or(line, |timeline| self.after_base(timeline.now())), None)
     }
 
-    /// Whether this frame is of the system whose times count.
+    /// Whether this frame is from that system.
     pub fn is_of(&self, frame: &hums_link::Frame<'_>) -> bool {
         self.system == Some(frame.system())
     }

@@ -7,7 +7,7 @@ use super::item::Gap;
 use crate::mavlink::frame::{Peek, peek};
 use crate::plural::count;
 
-/// So many frames have a checksum that does not fit, as words.
+/// The words for this number of frames with a wrong checksum.
 pub fn wrong_checksums(frames: u64) -> String {
     format!(
         "{} with a wrong checksum, which {} not read",
@@ -19,13 +19,13 @@ pub fn wrong_checksums(frames: u64) -> String {
 /// Finds the records with a wrong checksum. An unknown id, or one with another definition, cannot be checked.
 #[derive(Debug, Default)]
 pub struct Checksums {
-    /// Of the record at hand, whether the message is known; `None` once its frame has come.
+    /// Whether the message of the present record is known; `None` once its frame has come.
     waits: Option<bool>,
-    /// How long its frame is, and where it is.
+    /// Length of its frame, and its time and place.
     length: usize,
     at: Instant,
     place: u64,
-    /// Frames that are damaged, and where the first one is.
+    /// Number of damaged frames, and the first one.
     damaged: u64,
     first: Option<(Instant, u64)>,
     /// Number of frames that cannot be checked.
@@ -60,7 +60,7 @@ impl Checksums {
         Frame::again(bytes, Check::Unverified)
     }
 
-    /// How many are damaged.
+    /// Number of damaged frames.
     pub const fn damaged(&self) -> u64 {
         self.damaged
     }

@@ -18,17 +18,17 @@ use crate::plural::count;
 
 /// Messages of a series are steady if they come at least this often, ...
 const STEADY_US: u64 = 500_000;
-/// ... so many in a row.
+/// ... for this many in a row.
 const STEADY_MIN: u8 = 32;
 /// A clock stands still if this many messages of a series in a row have no later time, and no other message
 /// goes on.
 const STILL_MIN: u8 = 100;
-/// So many times have to be there, most of them before a log's own beginning, until that one is wrong.
+/// Number of times needed, most of them before a log's own beginning, to call that wrong.
 pub const BEGINNING_ASKED: usize = 64;
 /// Maximum number of series followed; further ones count as rare.
 const SERIES_MAX: usize = 65_537;
 
-/// A time as a message tells it.
+/// A time in a message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Stamp {
     /// Microseconds, by whatever clock the recording has.
@@ -40,7 +40,7 @@ pub struct Stamp {
 /// The times that follow a message in the file.
 #[derive(Clone, Debug, Default)]
 pub struct Ahead {
-    /// Up to [`super::doubt::ASKED`] of those that were asked for.
+    /// Up to [`super::doubt::ASKED`] of the requested ones.
     pub stamps: Vec<Stamp>,
     /// No times follow them.
     pub is_end: bool,
@@ -98,7 +98,7 @@ pub enum Reading {
 struct Series {
     /// The latest time, be it old or not.
     last_us: Option<u64>,
-    /// How many came in a row without a pause.
+    /// Number of messages in a row without a pause.
     steady: u8,
     /// Number of messages in a row without a later time than the one before, while the recording's time was
     /// this one.
@@ -119,7 +119,7 @@ pub struct Clock {
     steps: Steps,
 }
 
-/// How far the last times that counted are apart, microseconds: a ring.
+/// Steps between the last valid times, microseconds: a ring.
 #[derive(Clone, Copy, Debug, Default)]
 struct Steps {
     last_us: [u64; RUN as usize],
@@ -135,7 +135,8 @@ impl Steps {
         self.count += 1;
     }
 
-    /// How far times are apart now: as the last ones are at most. Where there are few, as most of them and of those that follow.
+    /// Usual step between times: the largest of the last ones. With few of them, the median of those and the
+    /// following ones.
     fn usual_us(&self, before: Option<u64>, times: &[Time]) -> u64 {
         let last = self.last_us.get(..self.count as usize).unwrap_or(&self.last_us);
         if self.count >= RUN as u64 {
@@ -156,12 +157,12 @@ impl Clock {
         Self { rules, timeline: Timeline::new(), begun: false, series: Vec::new(), steps }
     }
 
-    /// The first message is known to tell this time: it has been looked for.
+    /// The time of the first message, as found by a search.
     pub fn begin(&mut self, us: u64) {
         self.timeline.at(us);
     }
 
-    /// The log says itself when it began; `true` where another one came before it, which time goes on from.
+    /// The log's own record of its beginning; `true` if another log came before it, from which time goes on.
     pub fn begin_log(&mut self, us: u64) -> bool {
         let again = self.timeline.recorded_us().is_some();
         if again {
@@ -173,13 +174,13 @@ impl Clock {
         again
     }
 
-    /// The time of a message. `ahead` is asked where it is a jump, for the stamps that it is given a yes to.
+    /// The time of a message. At a jump `ahead` gives the next stamps that its argument accepts.
     pub fn take(&mut self, stamp: Stamp, ahead: impl FnOnce(&dyn Fn(Stamp) -> bool) -> Ahead) -> Reading {
         self.take_beside(stamp, ahead, || None)
     }
 
-    /// The same beside another clock, which knows better how much time passed: `passed` is asked where the time is a jump and
-    /// is not wrong; it tells microseconds, where this clock was set.
+    /// The same beside another clock that knows the time passed better. At a jump to a valid time, `passed`
+    /// returns the microseconds if this clock was set.
     pub fn take_beside(
         &mut self,
         stamp: Stamp,
@@ -280,7 +281,7 @@ impl Clock {
         self.begun
     }
 
-    /// So much more passed than the recorded times tell.
+    /// More time passed than the recorded times show.
     pub fn pass(&mut self, us: u64) {
         self.timeline.pass(us);
     }
@@ -296,7 +297,7 @@ impl Clock {
     }
 }
 
-/// Messages with a wrong time: how many, and where the first one is.
+/// Messages with a wrong time: their number, and the first one's place.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Wrong {
     count: u64,

@@ -5,14 +5,14 @@ use std::io;
 use super::input::Progress;
 use super::stream::{Chunk, Source};
 
-/// The source whose bytes come of an input that may be compressed.
+/// A source of bytes from an input that may be compressed.
 pub(super) struct Compressed<S> {
     inner: S,
     progress: Progress,
 }
 
 impl<S: Source> Compressed<S> {
-    /// The bytes of `inner`, which reads the input that `progress` tells of.
+    /// The bytes of `inner`, which reads the input of `progress`.
     pub(super) fn new(inner: S, progress: Progress) -> Self {
         Self { inner, progress }
     }

@@ -13,11 +13,11 @@
 
 use super::timeline::{STEP_BACK_US_MAX, STEP_FORWARD_US_MAX};
 
-/// So many of the times after a jump are asked: a run of wrong ones and twice as many others.
+/// Number of times compared after a jump: a run of wrong ones and twice as many others.
 pub const ASKED: usize = 24;
-/// So many wrong times in a row are outvoted.
+/// This many wrong times in a row are outvoted.
 pub const RUN: i32 = 8;
-/// Times that stand in a file side by side are out of order by so much at most, as a rule.
+/// Neighbouring times in a file are usually out of order by this at most.
 pub const DISORDER_US: u64 = 200_000;
 /// Times that are not further apart go on from each other.
 const GOES_ON_US: u64 = 500_000;
@@ -42,10 +42,10 @@ pub struct Time {
     pub steady: bool,
 }
 
-/// How long a pause may be at the ends of a recording.
+/// Maximum pauses at the ends of a recording.
 #[derive(Clone, Copy, Debug)]
 pub struct Ends {
-    /// Before the last few messages, where such messages came again and again until the pause.
+    /// Before the last few messages, if they came steadily until the pause.
     pub steady_us: u64,
     /// After the first few messages, and before the last few that come seldom.
     pub seldom_us: u64,
@@ -54,7 +54,7 @@ pub struct Ends {
 /// Whether a time is wrong.
 #[derive(Clone, Copy, Debug)]
 pub struct Question<'a> {
-    /// The right one before it; `None` for the first of all.
+    /// The last right one before it; `None` for the first of all.
     pub before: Option<u64>,
     /// It, and up to [`ASKED`] after it.
     pub times: &'a [Time],
@@ -62,7 +62,7 @@ pub struct Question<'a> {
     pub is_end: bool,
     /// How the recording's ends are judged.
     pub ends: Ends,
-    /// How far its times are apart, microseconds, as far as that is known.
+    /// Usual step between its times, microseconds, as far as known.
     pub usual_us: u64,
 }
 
@@ -137,7 +137,7 @@ impl Question<'_> {
         if step > longest.max(self.usual_us.saturating_mul(2)) { self.fall() } else { PAUSE }
     }
 
-    /// Where few times follow although the recording goes on, most of them decide.
+    /// If few times follow although the recording goes on, most of them decide.
     fn fall(&self) -> i32 {
         let most = self.times.len() as i32 * TIME / 2;
         if self.is_end { FALL } else { FALL.min(most) }

@@ -1,4 +1,4 @@
-//! UTC of a recording whose clock may begin again: each power-on has its own.
+//! UTC of a recording with several power-ons: each has its own.
 
 use hums_core::clock::Instant;
 
@@ -31,13 +31,13 @@ impl Epochs {
         }
     }
 
-    /// The part at hand tells its UTC.
+    /// Takes UTC of the present part.
     fn epoch(&mut self, epoch_us: u64) {
         let part = self.later.last_mut().map_or(&mut self.first_us, |(_, epoch_us)| epoch_us);
         *part = Some(epoch_us);
     }
 
-    /// The clock begins again. Beyond so many restarts the time of day is not known.
+    /// The clock begins again. After the maximum number of restarts the time of day is unknown.
     fn restart(&mut self, at: Instant) {
         if self.later.len() < PARTS_MAX {
             self.later.push((at, None));
@@ -59,7 +59,7 @@ impl Epochs {
         Some(epoch_us.saturating_add(at.as_micros()))
     }
 
-    /// UTC at time zero where the whole recording has one clock.
+    /// UTC at time zero, if the whole recording has one clock.
     pub fn whole(&self) -> Option<u64> {
         self.first_us.filter(|_| self.later.is_empty())
     }

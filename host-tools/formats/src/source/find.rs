@@ -1,4 +1,4 @@
-//! Where recordings are: files, folders, cards and images.
+//! Finds recordings: files, folders, cards and images.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -287,7 +287,8 @@ pub fn sessions_of(places: &[Place]) -> Sessions {
 /// Whether a file is a log of ours or a card's image.
 fn is_own(path: &Path) -> Result<bool> {
     const START_BYTES: usize = 512;
-    // Nearly every recording of an autopilot: its first bytes tell, and it is not looked through for a sector or a card.
+    // Nearly every recording of an autopilot: its first bytes show it, without a search for a sector or a
+    // card.
     if start_of_bytes(path, START_BYTES).is_some_and(|start| begins_recording(&start)) {
         return Ok(false);
     }

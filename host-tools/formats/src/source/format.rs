@@ -117,7 +117,7 @@ pub(super) fn detect(start: &[u8]) -> Option<Detected> {
     if let Some(form) = dataflash::begins(start) {
         return Some(Detected::DataFlash(form));
     }
-    // Before DataFlash's weaker signs. In 64 KiB of anything else a frame of version 1 whose checksum holds is rare, and
+    // Before DataFlash's weaker signs. A valid frame of version 1 in 64 KiB of other data is rare, but
     // happens.
     let (kind, frames) = sniff_bytes(start);
     let is_mavlink = frames > start.len() / BY_CHANCE_BYTES;

@@ -19,15 +19,15 @@ use crate::archive::GZIP;
 
 const BUFFER_BYTES: usize = 64 * 1024;
 
-/// How far an input has been read. Clones tell of the same input.
+/// Progress of reading an input; clones share it.
 #[derive(Clone, Debug, Default)]
 pub struct Progress(Arc<State>);
 
 #[derive(Debug, Default)]
 struct State {
-    /// Bytes taken from the file, as they lie there.
+    /// Bytes taken from the file, before unpacking.
     taken: AtomicU64,
-    /// The file's bytes; 0 where nobody knows.
+    /// Size of the file; 0 if unknown.
     total: AtomicU64,
     damage: Mutex<Option<String>>,
 }
@@ -38,12 +38,12 @@ impl Progress {
         self.0.taken.load(Ordering::Relaxed)
     }
 
-    /// The bytes of the file, where that is known.
+    /// Size of the file, if known.
     pub fn total(&self) -> Option<u64> {
         Some(self.0.total.load(Ordering::Relaxed)).filter(|total| *total > 0)
     }
 
-    /// The part that was read, 0 to 1; 0 where the size is not known.
+    /// The part read so far, 0 to 1; 0 if the size is unknown.
     pub fn part(&self) -> f64 {
         self.total().map_or(0.0, |total| (self.taken() as f64 / total as f64).min(1.0))
     }
@@ -112,7 +112,7 @@ impl Input {
         }
     }
 
-    /// How far it has been read.
+    /// Progress of reading.
     pub fn progress(&self) -> Progress {
         self.progress.clone()
     }

@@ -84,7 +84,7 @@ pub struct Text<'a> {
 pub struct Mode<'a> {
     /// The autopilot's own number.
     pub number: u32,
-    /// Its name, where that is known.
+    /// Its name, if known.
     pub name: Option<&'a str>,
 }
 
@@ -244,19 +244,19 @@ pub enum Value<'a> {
 /// Something is missing.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Gap {
-    /// The last time before it, where there is one.
+    /// The last time before it, if any.
     pub from: Option<Instant>,
-    /// The first time after it, where that is known.
+    /// The first time after it, if known.
     pub to: Option<Instant>,
     /// Why.
     pub cause: Cause,
-    /// Where in the file (uncompressed), in bytes from its beginning.
+    /// Place in the file (uncompressed), in bytes from its beginning.
     pub place: Option<u64>,
-    /// How many bytes of the file could not be read.
+    /// Number of unreadable bytes.
     pub bytes: u64,
     /// The data found there, as the end of a sentence: `a length of 3 bytes for FMT`.
     pub words: String,
-    /// The same as a log of ours has it, which counts sectors and frames.
+    /// The gap in the form of a log of ours, with counts of sectors and frames.
     pub own: Option<hums_blackbox::Gap>,
 }
 
@@ -272,7 +272,7 @@ impl Gap {
         self.cause == Cause::Lost && self.bytes > 0
     }
 
-    /// As logs of ours have it, which know neither place nor words.
+    /// In the form of our logs, without place and words.
     pub fn to_own(&self) -> hums_blackbox::Gap {
         if let Some(own) = self.own {
             return own;
@@ -379,7 +379,7 @@ impl Rows<'_> {
 /// failure.
 pub type Take<'a> = dyn FnMut(Instant, Item<'_>) -> Result<()> + 'a;
 
-/// Hands on a text or an event, and before it the alert that it is, where observations are wanted.
+/// Hands on a text or an event, after its alert if observations are wanted.
 pub fn hand_said(at: Instant, item: Item<'_>, want_observations: bool, take: &mut Take<'_>) -> Result<()> {
     if let Item::Text(Text { source, alert: Some(alert), .. })
     | Item::Event(Event { source, alert: Some(alert), .. }) = item
@@ -405,7 +405,7 @@ impl std::error::Error for Stop {}
 /// Messages, and their bytes in the file.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Amount {
-    /// How many.
+    /// Number of messages.
     pub count: u64,
     /// Their bytes.
     pub bytes: u64,
@@ -427,7 +427,7 @@ pub struct MessageCount {
     pub id: Option<(u32, bool)>,
     /// Its name.
     pub name: String,
-    /// How many.
+    /// Number and size.
     pub amount: Amount,
 }
 
@@ -444,9 +444,9 @@ pub struct Summary {
     pub span: Option<(Instant, Instant)>,
     /// Gaps that are damage.
     pub gaps: u64,
-    /// Places where the recorder lost something and says so.
+    /// Losses reported by the recorder.
     pub losses: u64,
-    /// Whether it is whole, of a log of ours.
+    /// The evidence of its end, for a log of ours.
     pub ending: Option<Ending>,
 }
 

@@ -16,7 +16,7 @@ use crate::duplex::{self, Port};
 use crate::endpoint::Endpoint;
 use crate::interrupt;
 
-/// How long silence may last before it is handed on.
+/// Silence before an empty chunk is handed on.
 const SILENCE: Duration = Duration::from_millis(50);
 /// The largest UDP datagram.
 const BUFFER_BYTES: usize = 65_536;

@@ -135,7 +135,7 @@ impl Noise {
     }
 }
 
-/// The raw bytes of a port, in the time that the autopilot's messages tell, or that a line at this rate takes for them.
+/// The raw bytes of a port, in the autopilot's time, or in the time that a line at this rate takes for them.
 pub struct RawReader {
     bytes: Paced<Raw<Input>>,
 }
@@ -224,7 +224,7 @@ struct Strays {
     /// Bytes outside of frames so far, and the harmless text among them.
     bytes: u64,
     words: u64,
-    /// When and where the first noise came, and when the last did.
+    /// Time and place of the first noise, and time of the last.
     noise: Option<(Instant, u64, Instant)>,
 }
 
@@ -278,7 +278,7 @@ impl Strays {
     }
 }
 
-/// Whether so many bytes in a row are words.
+/// Whether this many bytes in a row are text.
 fn has_words(bytes: &VecDeque<u8>, wanted: u64) -> bool {
     let mut run = 0;
     bytes.iter().any(|byte| {
@@ -291,7 +291,7 @@ fn gap(at: Instant, cause: Cause, place: u64, bytes: usize, words: String) -> Ga
     Gap { from: Some(at), to: None, cause, place: Some(place), bytes: bytes as u64, words, own: None }
 }
 
-/// Pushes bytes into a framer whose frames go to one that may fail. `idle` says that silence follows.
+/// Pushes bytes into a framer with a fallible receiver of frames. `idle` means that silence follows.
 fn push(
     framer: &mut Framer,
     bytes: &[u8],

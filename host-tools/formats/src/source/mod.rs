@@ -81,7 +81,7 @@ pub struct Timing {
     pub line_rate: Option<u32>,
 }
 
-/// Opens SRC, and where it can answer, the way to it.
+/// Opens SRC, and the way back to it, if any.
 pub fn open_both(endpoint: &Endpoint, timing: Timing) -> Result<(Box<dyn Source>, Option<Way>)> {
     if endpoint.is_live() && timing.line_rate.is_none() {
         let (source, writer) = live::open(endpoint)?;

@@ -1,4 +1,5 @@
-//! Logs of HUMS as the one stream. Groups are decoded side by side ([`crate::logs::reader`]) and handed on in order.
+//! Logs of HUMS as the one stream. Groups are decoded in parallel ([`crate::logs::reader`]) and handed on in
+//! order.
 
 use anyhow::Result;
 use hums_blackbox::record::{Loss, Lost, Note, RECORD_BYTES_MAX};
@@ -37,7 +38,7 @@ impl OwnReader {
         Self { log, progress }
     }
 
-    /// How far it has been read.
+    /// Progress of reading.
     pub fn progress(&self) -> Progress {
         self.progress.clone()
     }

@@ -27,14 +27,14 @@ const BURST_BYTES: u64 = 192 * 1024;
 pub const SLOWER: u64 = 100;
 /// The slow clock is reported after this much of the other clock.
 const WITNESSED: Span = Span::from_secs(10);
-/// The other clock itself was set where it jumps by more.
+/// A larger jump means that the other clock itself was set.
 const APART: Span = Span::from_secs(60);
 /// A clock that falls so often, ...
 const FALLS: u32 = 8;
 /// ... with less than this between, runs backwards.
 const BETWEEN: Span = Span::from_secs(5);
 
-/// Falls of a clock in a row: when and where it fell first, when last, and how often.
+/// Falls of a clock in a row: time and place of the first, time of the last, and their number.
 #[derive(Clone, Copy, Debug)]
 struct Falls {
     first: (Instant, u64),
@@ -50,14 +50,14 @@ pub struct Pace {
     last: Option<Instant>,
     /// Place of the latest message.
     place: u64,
-    /// Bytes for which there was no time yet, and where they begin.
+    /// Bytes still without time, and their beginning.
     level: u64,
     since: Option<(Instant, u64)>,
     /// The recording's time and the other clock's, when the first of them was not yet too slow.
     witness: Option<(Instant, u64)>,
     /// The clock's falls in a row.
     falls: Option<Falls>,
-    /// When and where it was first that the clock does not run.
+    /// Time and place at which the clock first did not run.
     stands: Option<(Instant, u64)>,
 }
 
@@ -80,7 +80,7 @@ impl Pace {
         }
     }
 
-    /// Another clock tells this time, microseconds of any beginning.
+    /// Another clock has this time, microseconds from any beginning.
     pub fn witness(&mut self, now: Instant, us: u64) {
         let Some((then, told)) = self.witness else {
             self.witness = Some((now, us));
@@ -156,7 +156,7 @@ mod tests {
         Instant::from_micros(us)
     }
 
-    /// A clock that goes on by so many microseconds with every 100 bytes, from some time on.
+    /// A clock that advances by this many microseconds with every 100 bytes, from some time on.
     fn is_told(step_us: u64, bytes: u64) -> bool {
         let mut pace = Pace::default();
         (0..bytes / 100).for_each(|message| pace.at(at(message * step_us), message * 100, 100));

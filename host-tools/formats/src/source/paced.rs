@@ -21,7 +21,7 @@ pub struct Paced<S> {
 }
 
 impl<S: Source> Paced<S> {
-    /// Takes the bytes of `inner` and gives them the times of a line at `baud` (at least 1).
+    /// The bytes of `inner` with the times of a line at `baud` (at least 1).
     pub fn new(inner: S, baud: u32) -> Self {
         Self { inner, baud: u64::from(baud.max(1)), waiting: VecDeque::new(), sent: 0 }
     }

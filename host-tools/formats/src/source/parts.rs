@@ -26,7 +26,7 @@ pub trait Collect: Send {
     fn held_bytes(&self) -> usize;
 }
 
-/// Where collected parts go, in order.
+/// Receives the collected parts, in order.
 pub trait Deliver<C> {
     /// Something is missing here.
     fn gap(&mut self, gap: &Gap) -> Result<()>;

@@ -29,7 +29,7 @@ pub const RAW_BAUD: u32 = 115_200;
 pub struct Place {
     /// Its place for people: its path, or path and session.
     pub title: String,
-    /// A name for files made of it, unique within one call: the file's own, or a session's as `hums info` gives it.
+    /// A name for files made of it, unique within one call: the file's own, or a session's as in `hums info`.
     pub name: String,
     /// Of several vehicles in it only that with this system id is read ([`Want::system`]).
     pub system: Option<u8>,
@@ -71,7 +71,7 @@ impl Place {
         Self { title, name: log.name.clone(), system: None, source: From::Log(Box::new(log)) }
     }
 
-    /// The log of ours that it is, if it is one.
+    /// The log of ours, if it is one.
     pub fn own(&self) -> Option<&Log> {
         match &self.source {
             From::Log(log) => Some(log),
@@ -199,7 +199,7 @@ pub(super) fn of_one_vehicle(title: &str) -> anyhow::Error {
 pub struct Recording {
     /// Its format.
     pub format: Format,
-    /// How far it has been read.
+    /// Progress of reading.
     pub progress: Progress,
     name: String,
     system: Option<u8>,

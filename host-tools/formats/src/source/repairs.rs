@@ -21,7 +21,7 @@ const LEADS_FOR: Span = Span::from_secs(5);
 const COPY_RAD: f32 = 0.01;
 /// Slower than this, rad/s, an attitude lags the wanted one by no more than [`COPY_RAD`]: by 0.1 s and more.
 const HOLDS_RADPS: f32 = 0.1;
-/// A vertical speed tells its sign from here on, m/s.
+/// Speed from which the sign of a vertical speed counts, m/s.
 const MOVES_MPS: f32 = 0.5;
 /// Votes for a sign; more are not counted.
 const SURE: i8 = 8;
@@ -116,7 +116,7 @@ mod tests {
 
     const AUTOPILOT: Source = Source { system: 1, component: 1 };
 
-    /// The vertical speed that is known after so many positions with this one, beside a displayed climb.
+    /// The vertical speed after this many positions with this one, beside a displayed climb.
     fn down_of(firmware: (Autopilot, u32), positions: u64, down_mps: f32, climb_mps: f32) -> f32 {
         let (mut repairs, mut known) = (Repairs::default(), f32::NAN);
         let (autopilot, firmware) = firmware;
@@ -156,7 +156,8 @@ mod tests {
     #[test]
     fn a_wanted_attitude_counts_while_it_is_not_the_attitude_itself() {
         let (mut repairs, mut tenth) = (Repairs::default(), 0);
-        // Apart by so much, turning so fast, for so many tenths of a second; and whether it is known at their end.
+        // Difference, turn rate, duration in tenths of a second, and whether the setpoint is known at the
+        // end.
         for (apart, rate, tenths, known) in [
             (0.0, 0.5, 100, false),
             (0.1, 0.5, 40, true),

@@ -82,7 +82,7 @@ impl Said {
     }
 }
 
-/// Hands on the texts that `make` gives; each has the time of its first part.
+/// Hands on the texts of `make`; each has the time of its first part.
 fn hand_texts(take: &mut Take<'_>, make: impl FnOnce(&mut dyn FnMut(statustext::Text))) -> Result<()> {
     let mut result = Ok(());
     make(&mut |text| {
@@ -103,7 +103,7 @@ fn hand_text(text: &statustext::Text, take: &mut Take<'_>) -> Result<()> {
     take(text.at, Item::Text(Text { source, severity, words, alert }))
 }
 
-/// `EVENT`: its number, its name where that is known, and its level outside. From 8 on it is not for people.
+/// `EVENT`: its number, its name if known, and its external level. From 8 on it is not for people.
 fn event(at: Instant, frame: &Frame<'_>, alert: Option<Alert>, take: &mut Take<'_>) -> Result<()> {
     let fields = Fields(frame.payload());
     let (number, severity) = (fields.u32(0), fields.u8(12) & 0xF);
@@ -112,8 +112,8 @@ fn event(at: Instant, frame: &Frame<'_>, alert: Option<Alert>, take: &mut Take<'
     if severity < 8 { take(at, Item::Event(event)) } else { Ok(()) }
 }
 
-/// A parameter that an autopilot tells of itself, and its value; `None` for any other frame. An integer is the bits of the float
-/// at PX4, and a number like any other at ArduPilot (MAVLink parameter protocol: byte-wise and cast encoding).
+/// A parameter in an autopilot's report, and its value; `None` for any other frame. PX4 sends an integer as
+/// the bits of the float, ArduPilot as a number (MAVLink parameter protocol: byte-wise and cast encoding).
 pub fn parameter(frame: &Frame<'_>, autopilot: Autopilot) -> Option<(String, f64)> {
     const INT32: u8 = 6;
     if frame.id() != PARAM_VALUE || frame.component() == COMPONENT || frame.check() != Check::Verified {
@@ -135,7 +135,7 @@ mod tests {
 
     use super::*;
 
-    /// The firmware that these words of a component tell.
+    /// The firmware named in this text of a component.
     fn firmware(component: u8, words: &str) -> Option<String> {
         let (mut encoder, mut buffer) = (Encoder::of(1, component), [0; FRAME_BYTES_MAX]);
         let bytes = encoder.frame(&mut buffer, &messages::status_text(Severity::Info, words));

@@ -10,7 +10,7 @@ use super::stream::read_some;
 use crate::mavlink::frame::FRAME_BYTES_MAX;
 use crate::mavlink::frame::{Check, Peek, peek};
 
-/// How far to look before calling it: room for a few hundred frames.
+/// Number of bytes searched: room for a few hundred frames.
 const WINDOW_BYTES: usize = 64 * 1024;
 
 /// Votes that settle it, so that a live pipe is not held up until the window is full.
@@ -97,7 +97,7 @@ fn count(bytes: &[u8]) -> (i32, usize) {
     (votes, good)
 }
 
-/// Where no frame has a neighbour, one whole record at the beginning still is a tlog.
+/// Without neighbouring frames, one whole record at the beginning still is a tlog.
 fn single_record(bytes: &[u8]) -> Kind {
     match bytes.get(8..).map(peek) {
         Some(Peek::Frame(_)) if !matches!(peek(bytes), Peek::Frame(_)) => Kind::Tlog,

@@ -36,7 +36,7 @@ pub trait Source: Send {
         self.inner().is_some_and(Source::begins_another)
     }
 
-    /// How many places of the input are damaged, as far as it has been read; all of them are known after its end.
+    /// Number of damaged places in the input so far; complete after its end.
     fn damages(&self) -> u64 {
         self.inner().map_or(0, Source::damages)
     }

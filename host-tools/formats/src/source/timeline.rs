@@ -41,18 +41,18 @@ impl Timeline {
         Self { last: None, restarts: 0 }
     }
 
-    /// A clock whose first time, whatever it says, is the stream's time zero.
+    /// A clock whose first time, of any value, is the stream's time zero.
     pub const fn from_first(first_us: u64) -> Self {
         Self { last: Some((first_us, 0)), restarts: 0 }
     }
 
-    /// Another recording goes on here, which begins at this time: time goes on from where it was.
+    /// Another recording begins here at this time: the stream's time goes on from its last value.
     pub fn begin_again(&mut self, recorded_us: u64) {
         self.restarts += 1;
         self.last = Some((recorded_us, self.now().as_micros().saturating_add(1)));
     }
 
-    /// The clock was set to this time, and so much passed meanwhile.
+    /// The clock was set to this time, and this much time passed meanwhile.
     pub fn set(&mut self, recorded_us: u64, passed_us: u64) -> Moment {
         self.restarts += 1;
         let at = self.now().as_micros().saturating_add(passed_us.max(1));
@@ -60,7 +60,7 @@ impl Timeline {
         Moment { at: Instant::from_micros(at), restarted: true }
     }
 
-    /// So much more passed than the recorded times tell.
+    /// More time passed than the recorded times show.
     pub fn pass(&mut self, us: u64) {
         if let Some((_, reached)) = &mut self.last {
             *reached = reached.saturating_add(us);
@@ -93,7 +93,8 @@ impl Timeline {
         Instant::from_micros(self.last.map_or(0, |(_, reached)| reached))
     }
 
-    /// Whether a recorded time is so far from the latest one, forward or back, that it may be wrong; the first one may.
+    /// Whether a recorded time is so far from the latest one, forward or back, that it may be wrong; the
+    /// first one may.
     pub fn is_jump(&self, recorded_us: u64) -> bool {
         self.last.is_none_or(|(before, _)| recorded_us.abs_diff(before) > STEP_BACK_US_MAX)
     }
@@ -106,7 +107,7 @@ impl Timeline {
         }
     }
 
-    /// How often the clock fell or jumped.
+    /// Number of falls and jumps of the clock.
     pub fn restarts(&self) -> u64 {
         self.restarts
     }

@@ -28,7 +28,7 @@ const DEFINED_MAX: usize = 256;
 /// The bytes after a message in the file.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Ahead<'a> {
-    /// As much of it as is here: [`AHEAD_BYTES`] or more, if there are so many.
+    /// Its part in the buffer: [`AHEAD_BYTES`] or more, unless the file ends.
     pub(super) bytes: &'a [u8],
     /// It is a text log.
     pub(super) is_text: bool,
@@ -59,7 +59,7 @@ impl Ahead<'_> {
         found == Some(true)
     }
 
-    /// The first few times that messages tell there and that are asked for.
+    /// The first few requested times of messages there.
     pub(super) fn stamps(self, formats: &Formats, week: Week, asks: &dyn Fn(Stamp) -> bool) -> clock::Ahead {
         let bytes = self.bytes.get(..AHEAD_BYTES).unwrap_or(self.bytes);
         let mut is_end = self.is_end && bytes.len() == self.bytes.len();
@@ -78,7 +78,7 @@ impl Ahead<'_> {
     }
 }
 
-/// Whether a message tells of arming or disarming: `EV` 10 and 11, and `ARM`.
+/// Whether a message is about arming or disarming: `EV` 10 and 11, and `ARM`.
 fn arming(message: &Message<'_>) -> Option<bool> {
     let format = message.format();
     let told = |field: &str| message.unsigned(format.field(field)?);

@@ -27,7 +27,7 @@ pub(super) enum Piece<'a> {
         kind: u8,
         /// The bytes after the header.
         payload: &'a [u8],
-        /// Where it begins.
+        /// Its beginning.
         place: u64,
         /// The bytes after it.
         after: Ahead<'a>,
@@ -39,9 +39,9 @@ pub(super) enum Piece<'a> {
 /// Bytes that could not be read.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Damage {
-    /// Where they begin.
+    /// Their beginning.
     pub(super) place: u64,
-    /// How many.
+    /// Their number.
     pub(super) bytes: u64,
     /// Whether the file ends with them.
     pub(super) at_end: bool,
@@ -79,7 +79,7 @@ impl<R: Read> Binary<R> {
         self.buffer.window(bytes)
     }
 
-    /// How far the reading is, in bytes.
+    /// Place of reading, in bytes.
     pub(super) fn place(&self) -> u64 {
         self.buffer.place()
     }
@@ -233,7 +233,8 @@ fn searched(rest: &[u8], ended: bool) -> &[u8] {
     rest.get(..limit).unwrap_or(rest)
 }
 
-/// How many bytes, at least one and at most those of `within`, begin no message that another one follows.
+/// Number of bytes, at least one and at most those of `within`, that begin no message with another one after
+/// it.
 fn none(within: &[u8], rest: &[u8], ended: bool, lengths: &Lengths) -> usize {
     let mut at = 1;
     while let Some(found) = within.get(at..).and_then(|rest| rest.iter().position(|byte| *byte == HEAD[0])) {

@@ -15,7 +15,7 @@ pub(super) struct Buffer<R> {
     bytes: Vec<u8>,
     /// Place of reading in the buffer.
     at: usize,
-    /// Where in the file the buffer begins.
+    /// Start of the buffer in the file.
     base: u64,
     ended: bool,
 }
@@ -31,7 +31,7 @@ impl<R: Read> Buffer<R> {
         Ok(self.rest())
     }
 
-    /// How far the reading is, in bytes.
+    /// Place of reading, in bytes.
     pub(super) fn place(&self) -> u64 {
         self.base + self.at as u64
     }
@@ -58,7 +58,7 @@ impl<R: Read> Buffer<R> {
         (self.bytes.get(start..self.at).unwrap_or_default(), self.rest())
     }
 
-    /// Sees to it that so many bytes are there, or all that there are.
+    /// Reads until this many bytes are there, or the file ends.
     pub(super) fn fill(&mut self, wanted: usize) -> io::Result<()> {
         if self.ended || self.rest().len() >= wanted {
             return Ok(());

@@ -27,7 +27,7 @@ const SILENCE: Span = Span::from_secs(1);
 #[derive(Clone, Debug)]
 pub(super) struct Clock {
     times: clock::Clock,
-    /// The first time of the week, where that is the log's only clock.
+    /// The first time of the week, if that is the log's only clock.
     week_first_us: Option<u64>,
     /// Start of a silence before the present message.
     silence: Option<Instant>,
@@ -71,7 +71,7 @@ impl Clock {
         self.times.begin(first_us);
     }
 
-    /// Another log begins, at this time if that is known: time goes on from where it was.
+    /// Another log begins, at this time if known: time goes on from its last value.
     pub(super) fn begin_another(&mut self, first_us: Option<u64>) {
         (self.week_first_us, self.silence) = (None, None);
         if let Some(first_us) = first_us {

@@ -1,9 +1,9 @@
-//! The date: UTC at the log's time zero, which the autopilot's GPS tells again and again.
+//! The date: UTC at the log's time zero, reported repeatedly by the autopilot's GPS.
 
 /// A new UTC is reported if it differs by more than the receiver's delay.
 const DIFFERS_US: u64 = 1_500_000;
 
-/// The UTC of time zero, as the GPS tells it.
+/// UTC of time zero by the GPS.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Epoch {
     known_us: Option<u64>,

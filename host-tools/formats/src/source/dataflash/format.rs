@@ -7,7 +7,7 @@ use crate::source::item::Table;
 
 /// Bytes before a message's first field: two of head, one of type.
 pub(super) const HEADER_BYTES: usize = 3;
-/// The type of FMT itself, whose layout no file changes.
+/// The type of FMT itself, with a fixed layout.
 pub(super) const FMT_TYPE: u8 = 128;
 /// Length of FMT with its header.
 pub(super) const FMT_BYTES: u8 = 89;
@@ -53,7 +53,7 @@ pub(super) enum FieldKind {
     CentiU32,
     /// `L`: 1e-7 degrees
     Degrees,
-    /// `n`, `N`, `Z`: text of so many bytes, ended by a NUL where it is shorter
+    /// `n`, `N`, `Z`: text of this many bytes, ended by a NUL if shorter
     Text(u8),
     /// `a`: 32 numbers of 16 bits
     Array,
@@ -149,7 +149,7 @@ pub(super) struct Format {
     pub(super) length: u8,
     /// Its columns.
     pub(super) fields: Vec<Field>,
-    /// The length that the fields make, with the header, where that is another one.
+    /// The length of the fields with the header, if it differs.
     pub(super) fields_length: Option<u8>,
     /// Its unreadable parts and the reason, until reported.
     odd: Option<String>,
@@ -159,7 +159,7 @@ pub(super) struct Format {
     lacks_names: bool,
     /// Its format characters.
     pub(super) characters: usize,
-    /// Which column tells the time, and how.
+    /// The column of the time, and its kind.
     pub(super) time: Option<TimeField>,
     /// Its rows' table, once a row was made.
     pub(super) table: Option<Arc<Table>>,
@@ -194,7 +194,7 @@ impl Role {
     }
 }
 
-/// How a message tells its time.
+/// Kind of a message's time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum TimeField {
     /// Microseconds since power-on in this column: since 2015.
@@ -258,7 +258,7 @@ impl Format {
         self.name == other.name && self.length == other.length && self.fields == other.fields
     }
 
-    /// Whether its last column is a text, in which commas may stand.
+    /// Whether its last column is a text, which may contain commas.
     pub(super) fn ends_in_text(&self) -> bool {
         self.fields.last().is_none_or(|field| matches!(field.kind, FieldKind::Text(_)))
     }
@@ -290,7 +290,7 @@ struct Units {
     multipliers: Vec<u8>,
 }
 
-/// Everything that a file has defined so far.
+/// All definitions of a file so far.
 pub(super) struct Formats {
     by_kind: Vec<Option<Box<Format>>>,
     /// Lengths with the header by type; 0 without a definition.
@@ -309,7 +309,7 @@ pub(super) struct Formats {
 pub(super) struct Lengths {
     /// From FMT; 0 without a usable definition.
     pub(super) told: [u8; 256],
-    /// As the fields say, where that differs; 0 otherwise.
+    /// From the fields, if different; 0 otherwise.
     pub(super) fields: [u8; 256],
 }
 

@@ -86,7 +86,7 @@ impl<'a> Message<'a> {
         }
     }
 
-    /// Microseconds since power-on, as it tells them.
+    /// Its microseconds since power-on.
     pub(super) fn time_us(&self) -> Option<u64> {
         match self.format.time? {
             TimeField::Micros(column) => self.unsigned(column.into()),
@@ -94,7 +94,7 @@ impl<'a> Message<'a> {
         }
     }
 
-    /// A number without a sign; `None` where it has one.
+    /// An unsigned number; `None` for a signed one.
     pub(super) fn unsigned(&self, column: usize) -> Option<u64> {
         let field = self.field(column)?;
         match self.body {
@@ -170,7 +170,7 @@ fn words(bytes: &[u8]) -> Cow<'_, str> {
         .map_or_else(|_| bytes.iter().map(|byte| char::from(*byte)).collect::<String>().into(), Cow::Borrowed)
 }
 
-/// Dividing is exact where multiplying by 0.01 is not.
+/// Division by 100 is exact, multiplication by 0.01 is not.
 fn number(kind: FieldKind, bytes: &[u8]) -> Option<f64> {
     Some(match kind {
         FieldKind::I8 => f64::from(i8::from_le_bytes(*bytes.first_chunk()?)),

@@ -42,7 +42,7 @@ use super::item::{Cause, Reader, Summary, Take, Want};
 /// The first part of a file, which is searched before it is read. A log of today writes its definitions and
 /// parameters, 100 KiB, within its first second, among up to 1 MiB of other messages.
 const FIRST_BYTES: usize = 2 * 1024 * 1024;
-/// How much of a file is searched for its first definition.
+/// Number of bytes searched for a file's first definition.
 const SEARCHED_BYTES: usize = 64 * 1024;
 
 /// How such a log is written.
@@ -81,7 +81,7 @@ pub fn detect(start: &[u8]) -> Option<Form> {
 /// and hardly any MAVLink frames. A recorded download of such a log consists of frames (90 bytes of the log
 /// in each).
 pub fn is_headless(start: &[u8], frames: usize) -> bool {
-    /// No message is longer; by chance two such bytes stand in 64 KiB once.
+    /// Maximum length of a message; by chance two such bytes occur in 64 KiB once.
     const MESSAGE_BYTES: usize = 256;
     const HEADS_MIN: usize = 8;
     let heads = start.windows(2).filter(|bytes| *bytes == [0xA3, 0x95]).count();

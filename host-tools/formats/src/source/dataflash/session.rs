@@ -38,7 +38,7 @@ pub(super) struct First {
     handlers: Handlers,
     /// For each type, whether the next messages have no facts about the whole file either.
     idle: Vec<bool>,
-    /// The first time that a message tells.
+    /// The first time in a message.
     begins_us: Option<u64>,
     /// A message that has a time has come.
     timed: bool,
@@ -111,8 +111,8 @@ impl First {
 }
 
 impl First {
-    /// After all was learned, the messages again: whether this one tells when the log begins. (Definitions stand between the
-    /// first messages, so only now can those after them be asked.)
+    /// After the first pass, the messages again: whether this one has the time of the log's beginning.
+    /// (Definitions are among the first messages, so only now can those after them be read.)
     pub(super) fn begins(&mut self, kind: u8, body: Body<'_>, ahead: Ahead<'_>) -> bool {
         let Self { formats, clock, begins_us, .. } = self;
         let Some(format) = formats.get(kind) else { return false };
@@ -122,7 +122,7 @@ impl First {
     }
 }
 
-/// Whether messages of a type tell the time, be it only the receiver's.
+/// Whether messages of a type have a time, also if only the receiver's.
 fn tells_time(format: &Format) -> bool {
     format.time.is_some() || format.name == "GPS"
 }
@@ -471,7 +471,7 @@ impl<'w> Session<'w> {
         })
     }
 
-    /// The table of a type's rows; `None` where the file has defined too many.
+    /// The table of a type's rows; `None` if the file has too many definitions.
     fn table(&mut self, kind: u8, is_words: bool) -> Option<Arc<Table>> {
         let format = self.formats.get(kind)?;
         if let Some(table) = &format.table {

@@ -51,7 +51,7 @@ pub(super) fn week_us(message: &Message<'_>, formats: &Formats) -> Option<u64> {
     Some(ms.saturating_mul(1_000))
 }
 
-/// The time of the week that a receiver tells, microseconds.
+/// A receiver's time of the week, microseconds.
 pub(super) fn receiver_us(message: &Message<'_>) -> Option<u64> {
     let format = message.format();
     if format.name != "GPS" {

@@ -22,8 +22,7 @@ pub(super) struct Tables {
 }
 
 impl Tables {
-    /// The table of a definition whose columns have these units; `None` where there are too many already.
-    /// `is_words`: of a text log.
+    /// The table of a definition with these units; `None` if there are too many. `is_words`: of a text log.
     pub(super) fn of(&mut self, format: &Format, units: Vec<String>, is_words: bool) -> Option<Arc<Table>> {
         let columns = columns(format, units, is_words);
         if self.taken.len() >= TABLES_MAX && !self.by_name.contains_key(&format.name) {

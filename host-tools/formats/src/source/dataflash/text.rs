@@ -13,7 +13,7 @@ const LINE_BYTES_MAX: usize = 64 * 1024;
 /// One line, without its end.
 #[derive(Debug)]
 pub(super) struct Line<'a> {
-    /// Where in the file it begins.
+    /// Its place in the file.
     pub(super) place: u64,
     /// Its bytes in the file, with its end.
     pub(super) bytes: u64,

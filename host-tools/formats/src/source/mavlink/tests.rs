@@ -219,7 +219,7 @@ fn records_of_two_lengths(records: u32) -> Vec<Vec<u8>> {
     (0..records).map(each).collect()
 }
 
-/// How many frames a tlog has, and its gaps.
+/// Number of frames of a tlog, and its gaps.
 fn frames_and_gaps(bytes: Vec<u8>) -> (usize, Vec<(Cause, Option<u64>)>) {
     let mut reader = TlogReader::new(Input::new(std::io::Cursor::new(bytes)).expect("memory"));
     let (mut frames, mut gaps) = (0, Vec::new());
@@ -261,7 +261,7 @@ fn a_record_whose_length_is_that_of_several_or_whose_end_is_missing_is_damage_an
         }
     }
     assert!(swallow >= 12, "{swallow}");
-    // Of a record so much is missing that its frame ends where the next one ends.
+    // The missing part of a record is so long that its frame ends with the next one.
     let mut cut = records;
     let (keep, start) = (cut[22].len() - record(&23).len(), place_of(&cut, 22));
     cut[22].truncate(keep);
@@ -277,7 +277,8 @@ fn a_clock_that_was_set_and_a_silence_are_none() {
     assert_eq!(told(&silent), (vec![], 0, 599));
 }
 
-/// The times, in milliseconds, of attitudes that tell these times since the autopilot's boot, and how often it restarted.
+/// The times, in milliseconds, of attitudes with these times since the autopilot's boot, and the number of
+/// restarts.
 fn read(component: u8, boot_ms: &[u32]) -> (Vec<u64>, usize) {
     let (mut encoder, mut buffer) = (Encoder::of(1, component), [0; FRAME_BYTES_MAX]);
     let frame = |boot_ms: &u32| encoder.frame(&mut buffer, &Packet::new(30).u32(0, *boot_ms)).to_vec();
@@ -381,7 +382,7 @@ fn where_the_recorded_times_stand_still_the_autopilots_count_and_it_is_damage() 
             of(&|passed_s| if passed_s < from_s { sound(passed_s) } else { sound(passed_s) / 1_000 });
         assert!(is_mended(milliseconds.clone()), "{from_s}: {milliseconds:?}");
     }
-    // They stand still for half a minute and go on right.
+    // They stand still for half a minute and then go on rightly.
     let stretch = of(&|passed_s| sound(if (50.0..80.0).contains(&passed_s) { 50.0 } else { passed_s }));
     assert!(is_mended(stretch.clone()), "{stretch:?}");
     // A link that holds back five seconds again and again is sound.
@@ -403,7 +404,7 @@ fn nine_times_that_are_hours_ahead_move_no_other_time() {
     // All records are of one length.
     let (before, after) = sound.split_at(sound.len() / 2);
     let time = u64::from_be_bytes(after[..8].try_into().expect("a time"));
-    // None of them tells the autopilot's time.
+    // Without any time of the autopilot.
     let ahead: Vec<u8> = (0..9)
         .flat_map(|record| {
             [&(time + 10_800 * SECOND + record * 1_000).to_be_bytes()[..], &HEARTBEAT].concat()

@@ -18,7 +18,7 @@ const AHEAD_BYTES: usize = 256 * 1024;
 /// After this many bytes without a record, the rest is not part of the log.
 const NOTHING_BYTES: usize = 64 * 1024;
 
-/// Recorded times before 2000 count from some power-on: they tell no UTC.
+/// Recorded times before 2000 count from a power-on and are not UTC.
 pub(in crate::source) const UTC_US_MIN: u64 = 946_684_800_000_000;
 /// No recording is from after the year 2255: a time beyond is damage. It may be small: time since boot.
 const TIME_US_MAX: u64 = 9_000_000_000_000_000;

@@ -26,11 +26,12 @@ const RULES: Rules = Rules {
 
 /// Times that stand still from the first to the last record are invalid if there are this many records.
 const STILL_RECORDS: u64 = 100;
-/// By so much the autopilot's clock is ahead until the recorder's does not run: a link that holds frames back makes them late, never early.
+/// A lead of the autopilot's clock from which the recorder's clock counts as stopped: a link that holds
+/// frames back makes them late, never early.
 const EARLY_US: i64 = 2_000_000;
 /// An autopilot's times further apart than this are of two power-ons, or of two recordings; microseconds.
 const APART_US: i64 = 60_000_000;
-/// Messages of an autopilot are out of order by so much at most, microseconds.
+/// Messages of an autopilot are out of order by this at most, microseconds.
 const DISORDER_US: i64 = 1_000_000;
 
 /// The recorder's clock beside the autopilot's. A frame is never received before it is sent. So if the
@@ -38,13 +39,13 @@ const DISORDER_US: i64 = 1_000_000;
 /// autopilot's clock counts.
 #[derive(Clone, Copy, Debug, Default)]
 struct Beside {
-    /// Whose: the first system whose autopilot tells its time, that time, and the recording's.
+    /// The first system with an autopilot that reports its time, that time, and the recording's.
     last: Option<(u8, i64, i64)>,
     /// By how much the recording's time is ahead of the autopilot's, at least.
     ahead_us: i64,
     /// The recorder's clock does not run.
     stands: bool,
-    /// How much passed by the autopilot's clock alone, and where that began.
+    /// Time passed by the autopilot's clock alone, and its beginning.
     passed_us: u64,
     began: Option<(Instant, u64)>,
 }
@@ -111,7 +112,7 @@ pub enum Begins {
 pub struct Told {
     /// Whether something begins with it.
     pub begins: Option<Begins>,
-    /// UTC at time zero, where that is new: microseconds since 1970.
+    /// New UTC at time zero, if any: microseconds since 1970.
     pub epoch_us: Option<u64>,
 }
 

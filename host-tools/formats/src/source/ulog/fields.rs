@@ -11,7 +11,7 @@ pub(super) struct Slot {
     count: u32,
 }
 
-/// Where these fields are.
+/// Places of these fields.
 pub(super) fn slots(layout: &Layout, fields: &[&str]) -> Vec<Option<Slot>> {
     let slot = |name: &&str| {
         let field = layout.fields.iter().find(|field| field.name == **name)?;
@@ -32,7 +32,7 @@ impl<'a> Fields<'a> {
         Self { slots, data }
     }
 
-    /// An element of a field; `None` where this version of PX4 does not have it.
+    /// An element of a field; `None` if this version of PX4 does not have it.
     pub(super) fn element(&self, field: usize, element: usize) -> Option<f64> {
         let slot = (*self.slots.get(field)?)?;
         if element >= slot.count as usize {

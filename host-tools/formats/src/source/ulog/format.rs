@@ -88,7 +88,7 @@ pub(super) struct Layout {
     pub(super) bytes: usize,
     /// The same without the padding at its end, which a writer leaves out.
     pub(super) least_bytes: usize,
-    /// Where its time is.
+    /// Place of its time.
     pub(super) timestamp: Option<u32>,
 }
 

@@ -32,7 +32,7 @@ pub(super) enum Message<'a> {
     Flags { incompatible: [u8; 8], appended: [u64; 3] },
     /// `F`
     Format(&'a [u8]),
-    /// `I`, and `M` where `multiple`.
+    /// `I`, and `M` if `multiple`.
     Information { value: Keyed<'a>, multiple: bool },
     /// `P`
     Parameter(Keyed<'a>),
@@ -131,7 +131,7 @@ pub(super) struct Parser<'a> {
     pub(super) fits: &'a Fits<'a>,
 }
 
-/// How far a message can be believed.
+/// Credibility of a message.
 enum Belief<'a> {
     /// Its contents are such that chance does not make them.
     Sure(Message<'a>),
@@ -208,7 +208,7 @@ impl Parser<'_> {
         })
     }
 
-    /// Whether another log begins within these first bytes, where no message follows them.
+    /// Whether another log begins within these first bytes, and no message follows them.
     fn swallows_a_beginning(&self, rest: &[u8], bytes: usize) -> bool {
         let inside = rest.get(HEADER_BYTES..bytes + MAGIC.len() - 1).unwrap_or_default();
         !self.goes_on(rest.get(bytes..).unwrap_or_default())
@@ -284,7 +284,7 @@ impl Parser<'_> {
 /// The kinds of message that there are.
 const KINDS: [u8; 13] = *b"BFIMPQARDLCSO";
 
-/// Whether a message of this kind can be so long.
+/// Whether a message of this kind can have this length.
 fn could_be(kind: u8, bytes: usize) -> bool {
     match kind {
         b'B' => (40..=1_024).contains(&bytes),

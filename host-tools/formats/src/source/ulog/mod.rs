@@ -1,22 +1,24 @@
 //! PX4's onboard logs (`ULog`): `.ulg`.
 //!
-//! A log begins with a header and definitions: formats of messages, parameters, information. Then come messages of data,
-//! each of a topic that a subscription gave a number. The format is described in PX4's guide, "`ULog` File Format".
+//! A log begins with a header and definitions: formats of messages, parameters, information. Then come
+//! messages of data, each of a topic that a subscription gave a number. The format is described in PX4's
+//! guide, "`ULog` File Format".
 //!
 //! | file | does |
 //! |---|---|
-//! | `window` | a part of the input in one piece |
+//! | `window` | a contiguous part of the input |
 //! | `message` | tells messages from damage, and finds the next one |
-//! | `format` | definitions, and the places of fields that they make |
-//! | `topics` | which number is which topic |
-//! | `fields` | where the fields are that the mapping needs |
+//! | `format` | definitions, and the places of fields that follow from them |
+//! | `topics` | the topic of each number |
+//! | `fields` | places of the fields for the mapping |
 //! | `times` | the times of messages, and of those after them |
 //! | `rows` | every field, by its own name |
-//! | `px4` | what PX4's topics say, as observations: the same that the MAVLink edge makes of what PX4 sends |
+//! | `px4` | observations from PX4's topics, the same as from PX4's MAVLink messages |
 //! | `session` | one pass over all of it |
 //!
-//! Memory is bounded whatever the file says: a window of 768 KiB, 1,024 definitions with 32,768 fields, 4,096
-//! subscriptions. Appended data (a crash dump) is read after what comes before it. Nothing here panics for any input.
+//! Memory is bounded for any file: a window of 768 KiB, 1,024 definitions with 32,768 fields, 4,096
+//! subscriptions. Appended data (a crash dump) is read after the data before it. Nothing here panics for any
+//! input.
 
 mod fields;
 mod format;

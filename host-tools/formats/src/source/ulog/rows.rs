@@ -26,7 +26,7 @@ pub(super) fn table(layout: &Layout) -> Table {
     Table { name: table_name(layout), columns: columns.finish() }
 }
 
-/// How many columns it has.
+/// Number of its columns.
 pub(super) fn columns(layout: &Layout) -> usize {
     1 + layout.fields.iter().map(|field| elements(field).unwrap_or(1) as usize).sum::<usize>()
 }
@@ -39,7 +39,7 @@ pub(super) const TEXTS: &str = "logged_messages";
 const OWN: [&str; 4] = [DEFAULTS, INFORMATION, PARAMETERS, TEXTS];
 
 /// Its name: the topic's, without characters that are invalid in file names. A topic with one of our own
-/// table names gets a prefix; PX4 has none.
+/// table names gets a prefix; PX4's topics have other names.
 pub(super) fn table_name(layout: &Layout) -> String {
     let name = layout.name.replace('/', "_");
     let is_taken =
@@ -135,7 +135,7 @@ const UNITS: [(&str, &str); 31] = [
     ("_filtered_a", "A"),
 ];
 
-/// Names whose unit their end does not say.
+/// Names without their unit at the end.
 const NAMED: [(&str, &str); 14] = [
     ("timestamp", "us"),
     ("timestamp_sample", "us"),

@@ -117,11 +117,11 @@ struct Session<'a, 'b> {
     own: OwnTables,
     information: BTreeMap<&'static str, String>,
     told_facts: bool,
-    /// Where data was appended and not yet reached, the first one first.
+    /// Places of appended data still to be read, in order.
     appended: Vec<u64>,
     /// Place of the present log in the file.
     base: u64,
-    /// Messages of data whose subscription is not known, and where the first one is.
+    /// Messages of data with an unknown subscription: their number, and the place of the first one.
     strays: (u64, u64),
     /// The last text reported: a topic and a logged string may have the same.
     last_words: String,
@@ -165,7 +165,7 @@ impl<'a, 'b> Session<'a, 'b> {
         }
     }
 
-    /// The rest up to where data was appended: a message does not go on behind that.
+    /// The rest up to the appended data: a message does not continue after that.
     fn part<'r>(&self, rest: &'r [u8], place: u64) -> &'r [u8] {
         let bytes = self
             .appended
@@ -400,8 +400,8 @@ impl<'a, 'b> Session<'a, 'b> {
         self.hand_on()
     }
 
-    /// Takes the time of the message at hand: whether it is wrong. Wrong ones are counted, except those of a topic that
-    /// PX4 keeps over a boot, until it tells the time of this one.
+    /// Takes the time of the present message; returns whether it is wrong. Wrong ones are counted. A topic
+    /// that PX4 keeps over a boot is excepted, until it reports the time of this one.
     fn time(&mut self, stamp: Stamp, place: u64, after: &[u8]) -> Result<bool> {
         let (subscriptions, left) = (&self.subscriptions, &mut self.asked_left);
         let ahead = |asks: &dyn Fn(Stamp) -> bool| times::ahead(subscriptions, after, left, asks);
@@ -427,7 +427,7 @@ impl<'a, 'b> Session<'a, 'b> {
         self.clock.recorded_us().unwrap_or(0)
     }
 
-    /// A log begins at this time, if its first data do; `true` where another one came before it.
+    /// A log begins at this time, if its first data do; `true` if another one came before it.
     fn begin(&mut self, place: u64, time_us: u64, first: &[u64], is_end: bool) -> bool {
         let (time_us, is_wrong) = clock::beginning(time_us, first, is_end);
         let again = self.clock.begin_log(time_us);

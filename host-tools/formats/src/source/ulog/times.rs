@@ -12,7 +12,7 @@ use crate::source::doubt::{ASKED, Ends};
 /// or two.
 pub(super) const RULES: Rules =
     Rules { from_first: false, old_values: true, ends: Ends { steady_us: 1_000_000, seldom_us: 10_000_000 } };
-/// How much of a log is looked at for the first messages of data: definitions come before them, 100 to 200 KiB.
+/// Number of bytes searched for the first messages of data: definitions come before them, 100 to 200 KiB.
 const FIRST_BYTES: usize = 512 * 1024;
 /// Number of bytes after a jump of the time that are looked at, damage too.
 pub(super) const AHEAD_BYTES: usize = 256 * 1024;

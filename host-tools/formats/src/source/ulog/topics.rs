@@ -27,7 +27,7 @@ pub(super) struct Subscription {
     pub(super) instance: u8,
     /// The mapping to observations, and the places of its fields.
     pub(super) topic: Option<(&'static Topic, Vec<Option<Slot>>)>,
-    /// Where rows are wanted.
+    /// If rows are wanted.
     pub(super) table: Option<Arc<Table>>,
     /// The recorded time of the message that was observed last.
     pub(super) observed_us: Option<u64>,

@@ -4,8 +4,8 @@ use std::io::{self, Read};
 
 use super::super::stream::read_some;
 
-/// How much is read at once: more than the longest message (65,538 bytes), and many times a usual one, so that little is
-/// moved. Pages that are touched for the first time cost a small log more than its messages.
+/// Size of one read: more than the longest message (65,538 bytes), and many times a usual one, so that little
+/// is moved. Pages touched for the first time cost a small log more than its messages.
 const READ_BYTES: usize = 128 * 1024;
 
 /// Part of the input, and its place.
@@ -46,7 +46,7 @@ impl<R: Read> Window<R> {
         self.trouble.take()
     }
 
-    /// Makes the rest at least so long, or reads to the end.
+    /// Reads until the rest has this length, or the input ends.
     pub(super) fn fill(&mut self, bytes: usize) {
         if self.rest().len() >= bytes || self.ended {
             return;

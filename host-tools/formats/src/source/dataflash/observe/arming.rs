@@ -10,7 +10,8 @@ use hums_core::clock::{Instant, Span};
 const ARMED_AFTER: Span = Span::from_secs(2);
 /// Evidence with a pause longer than this begins again: the slowest message that it comes from is logged at 1 Hz.
 const PAUSE_MAX: Span = Span::from_millis(2_500);
-/// Without any evidence for so long it is disarmed: a plane glides, and a copter descends, with less than idle.
+/// Without evidence for this long it counts as disarmed: a plane glides, and a copter descends, with less
+/// than idle.
 const DISARMED_AFTER: Span = Span::from_secs(10);
 
 /// How arming is known.
@@ -25,7 +26,7 @@ pub(super) enum Word {
 }
 
 impl Word {
-    /// For people; empty where the log says it.
+    /// For people; empty if the log reports it.
     pub(super) const fn words(self) -> &'static str {
         match self {
             Self::Unknown => "the log does not tell whether it was armed",

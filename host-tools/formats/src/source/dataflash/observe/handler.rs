@@ -10,7 +10,7 @@ use crate::source::dataflash::message::Message;
 /// Columns that one handler reads at most.
 const SLOTS_MAX: usize = 16;
 
-/// The column of each slot; `None` where the file does not have it.
+/// The column of each slot; `None` if the file does not have it.
 pub(in crate::source::dataflash) type Slots = [Option<u8>; SLOTS_MAX];
 
 /// The handler of a message.
@@ -21,7 +21,7 @@ pub(in crate::source::dataflash) struct Handler {
     pub(super) columns: &'static [&'static [&'static str]],
     /// Whether it reports a fact about the whole log: the first part of a file is searched for these.
     pub(in crate::source::dataflash) is_fact: bool,
-    /// Whether it is needed also where no observations are wanted.
+    /// Whether it is needed also without observations.
     pub(in crate::source::dataflash) is_said: bool,
     /// Does it.
     pub(super) take: fn(&mut State, &Given<'_>, &mut Out<'_>),
@@ -49,7 +49,7 @@ impl Handler {
 pub(super) struct Given<'a> {
     pub(super) message: &'a Message<'a>,
     pub(super) slots: &'a Slots,
-    /// The sensor that the message's name tells.
+    /// The sensor in the message's name.
     pub(super) base: u8,
     /// When it was written.
     pub(super) at: Instant,
@@ -100,7 +100,7 @@ impl Given<'_> {
         kind.is_some_and(FieldKind::is_integer)
     }
 
-    /// The sensor: by the column where there is one, by the message's name otherwise.
+    /// The sensor: from the column if there is one, otherwise from the message's name.
     pub(super) fn instance(&self, slot: usize) -> u8 {
         self.byte(slot).unwrap_or(self.base)
     }

@@ -97,7 +97,7 @@ impl Handlers {
     }
 }
 
-/// Gives a message to its handler.
+/// Passes a message to its handler.
 pub(super) fn take(
     state: &mut State,
     resolved: &Resolved,

@@ -362,7 +362,7 @@ fn position_of_gnss(state: &mut State, given: &Given<'_>, gnss: &Gnss, out: &mut
         relative_altitude: Metres(relative),
         velocity: velocity(state, given).map(MetresPerSecond),
     }));
-    // The receiver's own course, where no estimator tells better.
+    // The receiver's own course, without a better one of an estimator.
     if let Some([speed, course]) = given.singles(7) {
         let (east, north) = course.to_radians().sin_cos();
         let of_barometer = || state.climb.within(given.at, TOGETHER);
@@ -403,10 +403,10 @@ fn air(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
     out.observe(&Observation::Air(Air { instance, pressure, temperature }));
 }
 
-/// In mG; MAVLink tells it with the inertial sensor of the same number.
+/// In mG; MAVLink sends it with the inertial sensor of the same number.
 fn compass(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
     let instance = given.instance(0);
-    // SYS_STATUS tells of the first one.
+    // SYS_STATUS is about the first one.
     if instance == 0 {
         state.health(0, MAGNETOMETER, given.single(1));
     }

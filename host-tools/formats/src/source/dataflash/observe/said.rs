@@ -7,7 +7,7 @@ use super::say::{Out, Say};
 use super::state::{State, version_of};
 use super::words::{self, CRASH_CHECK, Craft};
 
-/// `MAV_SEVERITY_INFO`: MSG does not tell how grave its words are.
+/// `MAV_SEVERITY_INFO`: MSG has no severity.
 const INFO: u8 = 6;
 /// `MAV_SEVERITY_NOTICE`
 const NOTICE: u8 = 5;
@@ -54,7 +54,7 @@ fn parameter(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
         "LOG_DISARMED" => facts.logs_disarmed = Some(value != 0.0),
         "RSSI_TYPE" => facts.has_rssi = number > 0,
         "AHRS_EKF_TYPE" => facts.estimator = Some(number),
-        // Before 2016: 0 where it flies by the older estimator (DCM), and the filter runs beside it.
+        // Before 2016: 0 if the older estimator (DCM) is in use, and the filter runs beside it.
         "AHRS_EKF_USE" => facts.estimator = if number == 0 { Some(0) } else { facts.estimator },
         // Of helicopters alone; the name of the firmware is a copter's.
         "H_RSC_MODE" | "H_SV_MAN" if matches!(facts.craft, Craft::Unknown | Craft::Copter) => {
@@ -71,7 +71,7 @@ fn parameter(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
     out.say(&Say::Parameter(&name, value));
 }
 
-/// The battery whose capacity a parameter is.
+/// The battery of a capacity parameter.
 fn capacity_of(name: &str) -> Option<usize> {
     let number = name.strip_prefix("BATT")?.strip_suffix("_CAPACITY")?;
     if number.is_empty() { Some(0) } else { number.parse::<usize>().ok()?.checked_sub(1) }
@@ -98,7 +98,7 @@ fn message(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
 }
 
 fn firmware(state: &mut State, craft: Craft, words: &str, out: &mut Out<'_>) {
-    // VER tells helicopters apart; the name of the firmware does not.
+    // VER marks helicopters; the name of the firmware does not.
     if !(state.facts.craft == Craft::Heli && craft == Craft::Copter) {
         state.facts.craft = craft;
     }

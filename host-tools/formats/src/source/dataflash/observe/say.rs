@@ -27,11 +27,11 @@ pub(in crate::source::dataflash) enum Say<'a> {
     Arming(&'a str),
     /// UTC at this message, microseconds since 1970.
     Utc(u64),
-    /// The autopilot's logger lost so many messages.
+    /// The autopilot's logger lost this many messages.
     Lost(u64),
 }
 
-/// Where handlers say it.
+/// The receiver of handlers' outputs.
 pub(in crate::source::dataflash) struct Out<'a> {
     say: &'a mut dyn FnMut(&Say<'_>),
 }

@@ -82,7 +82,7 @@ impl RateUnit {
     }
 }
 
-/// Where messages tell arming.
+/// The part of the log with messages about arming.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) enum ToldArming {
     /// Nowhere, as far as the file is known.
@@ -120,12 +120,13 @@ pub(in crate::source::dataflash) struct Facts {
     pub(super) version: u32,
     /// POS is logged: the estimator's own position.
     pub(super) has_positions: bool,
-    /// Where messages tell arming.
+    /// The part of the log with messages about arming.
     pub(super) told_arming: ToldArming,
 }
 
 impl Facts {
-    /// The unit of `RATE`, degrees a second; `None` where the version is not known, and in those that were developed while it changed.
+    /// The unit of `RATE`, degrees a second; `None` if the version is unknown, or is a development version
+    /// from the time of the change.
     pub(super) fn rate_unit_deg(&self) -> Option<f32> {
         /// Versions are bytes from the top down.
         const DEGREES_SINCE: u32 = 0x0304_0000;
@@ -306,7 +307,7 @@ impl State {
     /// The event of arming came while armed, long after the last one: the disarming in between was not
     /// logged. The vehicle counts as disarmed for a moment.
     pub(super) fn arm_again(&mut self, at: Instant) {
-        /// Newer logs tell one arming by several messages.
+        /// Newer logs report one arming by several messages.
         const ONE_ARMING: Span = Span::from_secs(2);
         let before = self.armed_at.replace(at);
         if self.is_armed() && before.is_some_and(|before| at.since(before) > ONE_ARMING) {
@@ -343,8 +344,8 @@ impl State {
         self.facts.craft.tells_landing() && (self.facts.version == 0 || self.facts.version >= SINCE)
     }
 
-    /// The event comes when the motors spool up for a take-off. In the modes that climb by themselves the autopilot then
-    /// says `MAV_LANDED_STATE_TAKEOFF`, as long as it climbs; the log does not tell when that ends.
+    /// The event comes when the motors spool up for a take-off. In the modes that climb by themselves the
+    /// autopilot then reports `MAV_LANDED_STATE_TAKEOFF` while it climbs; the end of that is not in the log.
     pub(super) fn leave_ground(&mut self) {
         const AUTO: u32 = 3;
         const GUIDED: u32 = 4;
@@ -501,7 +502,7 @@ impl State {
     }
 }
 
-/// `MAV_TYPE` of a copter with so many motors; most have four.
+/// `MAV_TYPE` of a copter with this many motors; most have four.
 const fn type_with(motors: Option<u8>) -> u8 {
     match motors {
         Some(3) => 15,

@@ -71,7 +71,7 @@ impl Craft {
         matches!(self, Self::Copter | Self::Heli)
     }
 
-    /// Whether every version tells when it is armed.
+    /// Whether every version reports arming.
     pub(super) const fn tells_arming(self) -> bool {
         matches!(self, Self::Sub)
     }
@@ -380,7 +380,7 @@ pub(super) const fn is_failsafe(subsystem: u8) -> bool {
     matches!(subsystem, 5..=9 | 17 | 19 | 20 | 23 | 25..=27 | 29..=31)
 }
 
-/// A subsystem's name; empty where it is not known.
+/// A subsystem's name; empty if unknown.
 pub(super) fn subsystem(number: u8) -> &'static str {
     SUBSYSTEMS.iter().find(|(known, _)| *known == number).map_or("", |(_, name)| name)
 }

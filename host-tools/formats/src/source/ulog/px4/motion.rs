@@ -402,7 +402,7 @@ fn local_position(px4: &mut Px4, said: &Said<'_>) {
     }));
 }
 
-/// `GLOBAL_POSITION_INT`, as PX4's stream works it out: heights are those of the local position where it has any.
+/// `GLOBAL_POSITION_INT`, as in PX4's stream: heights are the local position's, if it has any.
 fn global_position(px4: &mut Px4, said: &Said<'_>) {
     let fields = &said.fields;
     let Some(altitude) = fields.finite(2) else { return };

@@ -65,7 +65,7 @@ pub(super) const TOPICS: &[Topic] = &[
 
 fn battery(px4: &mut Px4, said: &Said<'_>) {
     let fields = &said.fields;
-    // Logs before the field existed have a battery where its voltage is one.
+    // Logs from before this field have a battery if its voltage is plausible.
     let connected = fields.get(0).map_or(fields.finite(1) > Some(0.1), |flag| flag != 0.0);
     let when = |value: Option<f32>| value.filter(|_| connected);
     // MAVLink sends the filtered ones, which ended with v1.16. -1 is unknown.
@@ -174,7 +174,7 @@ fn celsius(temperature: f32) -> Celsius {
     Celsius(if temperature > 200.0 { temperature - ZERO_CELSIUS } else { temperature })
 }
 
-/// A place where speed, voltage and current are zero or no number has no ESC, or one without power.
+/// A place with zeros or NaN for speed, voltage and current has no ESC, or one without power.
 fn one_esc(said: &Said<'_>, at: usize) -> Esc {
     let fields = &said.fields;
     let nothing = |value: Option<f32>| value.is_none_or(|value| value == 0.0);

@@ -10,7 +10,7 @@ use super::super::fields::Fields;
 #[derive(Debug)]
 pub(in crate::source::ulog) struct Topic {
     pub(in crate::source::ulog) name: &'static str,
-    /// How many instances of it serve.
+    /// Number of its instances in use.
     pub(in crate::source::ulog) instances: u8,
     /// The least time between two messages that serve, microseconds.
     pub(in crate::source::ulog) every_us: u64,
@@ -56,7 +56,7 @@ pub(in crate::source::ulog) enum Told {
         utc_us: u64,
         recorded_us: u64,
     },
-    /// Why it is in failsafe, by name; empty where it is not.
+    /// Names of the failsafe's reasons; empty without a failsafe.
     Failsafes(String),
 }
 
@@ -95,7 +95,7 @@ impl Px4 {
 pub(super) struct System {
     /// `MAV_SYS_ID`.
     pub(super) number: Option<u8>,
-    /// `MAV_TYPE`, for logs whose `vehicle_status` has no type.
+    /// `MAV_TYPE`, for logs without a type in `vehicle_status`.
     pub(super) type_number: Option<u8>,
     /// `COM_FLIGHT_UUID`
     pub(super) flight: Option<u64>,
@@ -123,7 +123,7 @@ pub(super) struct System {
 pub(super) struct Status {
     pub(super) arming: u8,
     pub(super) nav: u8,
-    /// The mode that the pilot asked for, since v1.14.
+    /// The mode requested by the pilot, since v1.14.
     pub(super) meant: Option<u8>,
     pub(super) failsafe: bool,
     pub(super) type_number: u8,
@@ -197,7 +197,7 @@ pub(super) const BATTERIES_MAX: usize = 4;
 pub(super) struct Power {
     pub(super) batteries: [Option<Pack>; BATTERIES_MAX],
     pub(super) load: Option<f32>,
-    /// Whether the log has the processor's load, at whose rate `SYS_STATUS` is made.
+    /// Whether the log has the processor's load, which sets the rate of `SYS_STATUS`.
     pub(super) has_load: bool,
 }
 
