@@ -14,7 +14,7 @@ use sha2::{Digest as _, Sha256};
 
 use crate::cli;
 use crate::decode;
-use crate::decode::made::{LogJson, Made, MadeJson};
+use crate::decode::made::{LogJson, MadeJson, OutputFile};
 use crate::endpoint::Endpoint;
 use crate::files::{Inputs, Output, cannot_write, says_directory};
 use crate::logs::marks::PACKED;
@@ -89,7 +89,7 @@ pub fn run(args: &cli::Decode) -> Result<Outcome> {
         note!("{name}: {words}");
     }
     let whole = source.damages() == 0 && done.wrong_checksums.is_none();
-    let made = Made::of(path, "hum", &[(done.frames, "frame"), (done.log_bytes, "byte")]);
+    let made = OutputFile::of(path, "hum", &[(done.frames, "frame"), (done.log_bytes, "byte")]);
     if args.json {
         let logs = vec![LogJson { name, whole, files: vec![made] }];
         output::json(decode::SCHEMA, &MadeJson { logs })?;

@@ -13,7 +13,7 @@ use crate::ending::{
     BlocksJson, EndJson, Ending, SessionBefore, among_words, behind_words, copies_words, made_again_words,
     not_taken_words, unprotected_words,
 };
-use crate::followed::Followed;
+use crate::followed::EndResolver;
 use crate::info::json::images_json;
 use crate::logs::sessions::{Sessions, place};
 use crate::logs::side_by_side::side_by_side;
@@ -159,7 +159,7 @@ impl WithoutEarlier {
 /// read are told, and their number is given back.
 pub fn verify_each(found: &Found, mut done: impl FnMut(&Overview) -> Result<()>) -> Result<u64> {
     let named = found.logs.iter().map(|log| (log.name.as_str(), log));
-    let mut followed = Followed::new(Sessions::of(named));
+    let mut followed = EndResolver::new(Sessions::of(named));
     let mut failed = 0;
     side_by_side(&found.logs, Overview::verified, |overview| match overview {
         Ok(overview) => followed.push(overview).iter().try_for_each(&mut done),

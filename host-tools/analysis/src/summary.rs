@@ -14,7 +14,7 @@ use hums_core::usage::UsageCounter;
 use hums_link as link;
 
 use crate::ending::Ending;
-use crate::followed::Logged;
+use crate::followed::HasEnding;
 use crate::logs::{Log, marks};
 use crate::mavlink::frame::{Check, Peek, peek};
 use crate::names::counter_name;
@@ -569,7 +569,7 @@ pub struct Overview {
     pub contents: Contents,
 }
 
-impl Logged for Overview {
+impl HasEnding for Overview {
     fn ending(&mut self) -> Option<&mut Ending> {
         Some(&mut self.ending)
     }

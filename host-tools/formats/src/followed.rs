@@ -15,19 +15,19 @@ use crate::logs::sessions::{Sessions, place};
 pub const HELD_MAX: usize = 4;
 
 /// What is made of a log that was read.
-pub trait Logged {
+pub trait HasEnding {
     /// What is known of its end, where it is a log of ours.
     fn ending(&mut self) -> Option<&mut Ending>;
 }
 
 /// Holds logs back for as long as a later one may say something of their end.
 #[derive(Debug)]
-pub struct Followed<T> {
+pub struct EndResolver<T> {
     held: VecDeque<T>,
     sessions: Sessions,
 }
 
-impl<T: Logged> Followed<T> {
+impl<T: HasEnding> EndResolver<T> {
     /// Of logs whose first sectors were looked at.
     pub const fn new(sessions: Sessions) -> Self {
         Self { held: VecDeque::new(), sessions }
@@ -66,7 +66,7 @@ impl<T: Logged> Followed<T> {
     /// The start of `next` found no sector in the newest files, of which the last one has this number: those that are empty now
     /// were so then.
     fn tell_empty(&mut self, newest: u32, next: &str) {
-        for log in self.held.iter_mut().filter_map(Logged::ending) {
+        for log in self.held.iter_mut().filter_map(HasEnding::ending) {
             let ((card, number), blocks) = (place(&log.name), &log.summary.blocks);
             let is_looked_at = number.is_some_and(|number| {
                 number <= newest && newest - number < LOOKED_AT_MAX && log.files.len() == 1
@@ -81,7 +81,7 @@ impl<T: Logged> Followed<T> {
     /// What the start of `next` found of the log before it.
     fn tell(&mut self, before: &Before, next: &mut Ending) {
         let (card, number) = place(&next.name);
-        let mut held: Vec<&mut Ending> = self.held.iter_mut().filter_map(Logged::ending).collect();
+        let mut held: Vec<&mut Ending> = self.held.iter_mut().filter_map(HasEnding::ending).collect();
         // The start looked at the log's last file, which was to be written anew and held another session's sectors.
         let named = (card, Some(before.number));
         if self.sessions.may_be_oldest(card, before.session)
@@ -130,7 +130,7 @@ mod tests {
     use super::*;
     use crate::logs::strangers::Strange;
 
-    impl Logged for Ending {
+    impl HasEnding for Ending {
         fn ending(&mut self) -> Option<&mut Self> {
             Some(self)
         }
@@ -151,7 +151,7 @@ mod tests {
         next.summary.session = Some(9);
         let before = Before { found: Found::Frames, number: 6, session: 7, ..Before::default() };
         next.summary.marks.before = Some(before);
-        let mut followed = Followed::new(Sessions::default());
+        let mut followed = EndResolver::new(Sessions::default());
         let mut done = followed.push(log);
         done.extend(followed.push(next));
         done.extend(followed.finish());
@@ -171,7 +171,7 @@ mod tests {
             next.summary.session = Some(9);
             next.summary.marks.before =
                 Some(Before { found: Found::Unreadable, number, ..Before::default() });
-            let mut followed = Followed::new(Sessions::default());
+            let mut followed = EndResolver::new(Sessions::default());
             let mut done = followed.push(log);
             done.extend(followed.push(next));
             done.extend(followed.finish());

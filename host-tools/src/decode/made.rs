@@ -22,12 +22,12 @@ pub struct LogJson {
     /// The log is complete, undamaged and proved, and all requested outputs are there.
     pub whole: bool,
     /// Its files and folders.
-    pub files: Vec<Made>,
+    pub files: Vec<OutputFile>,
 }
 
 /// A file, or a folder of tables.
 #[derive(Debug, Serialize)]
-pub struct Made {
+pub struct OutputFile {
     path: PathBuf,
     /// `tlog`, `jsonl`, `influx`, `gaps`, `csv`, `thesis`, `parquet`.
     format: &'static str,
@@ -37,7 +37,7 @@ pub struct Made {
     words: String,
 }
 
-impl Made {
+impl OutputFile {
     /// With these counts.
     pub fn of(path: PathBuf, format: &'static str, counts: &[(u64, &str)]) -> Self {
         let words: Vec<String> = counts.iter().map(|(number, thing)| count(*number, thing)).collect();

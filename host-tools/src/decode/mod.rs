@@ -64,7 +64,7 @@ use crate::check::judge::{Judge, Limits};
 use crate::cli;
 use crate::ending::Ending;
 use crate::files::{Inputs, check_parent, means_standard_output, says_directory};
-use crate::followed::{Followed, Logged};
+use crate::followed::{EndResolver, HasEnding};
 use crate::logs::reader;
 use crate::logs::side_by_side::side_by_side;
 use crate::outcome::{Outcome, usage as usage_error};
@@ -83,11 +83,11 @@ use context::{Context, Formats};
 use destination::Destination;
 use identity::{Identity, identity};
 use influx::Tags;
-use made::{LogJson, Made, MadeJson};
+use made::{LogJson, MadeJson, OutputFile};
 use naming::Named;
 use selection::Selection;
 
-use works::{Work, check_forms, works};
+use works::{NamedLog, check_forms, works};
 use write::Writers;
 
 /// Output of `hums decode --json`.
@@ -122,7 +122,7 @@ pub fn run(args: &cli::Decode) -> Result<Outcome> {
     let native = check_forms(&works, formats)?;
     let selection = Selection::new(args, native)?;
     let logs = asked;
-    let mut followed = Followed::new(sessions);
+    let mut followed = EndResolver::new(sessions);
     let task = Task { formats, selection, inputs, output: &args.output, standard_output, logs };
     let taken = Mutex::new(BTreeSet::new());
     let mut written = works.is_empty();
@@ -151,7 +151,7 @@ pub fn run(args: &cli::Decode) -> Result<Outcome> {
 }
 
 /// A log beside the requested one, which may show how that one ends.
-fn beside(work: &Work<'_>) -> Result<Done> {
+fn beside(work: &NamedLog<'_>) -> Result<Done> {
     let ending = match work.log.own() {
         Some(_) => Some(check::overview(work.log)?.ending),
         None => None,
@@ -218,7 +218,7 @@ struct Done {
     /// Whether there was anything to write.
     written: bool,
     /// The files written.
-    made: Vec<Made>,
+    made: Vec<OutputFile>,
     /// Remarks on it.
     remarks: Vec<String>,
 }
@@ -263,7 +263,7 @@ impl Done {
     }
 }
 
-impl Logged for Done {
+impl HasEnding for Done {
     fn ending(&mut self) -> Option<&mut Ending> {
         self.ending.as_mut()
     }
@@ -289,7 +289,12 @@ fn check_clock(name: &str, context: &Context) -> Result<Option<String>> {
 
 impl Task<'_> {
     /// `taken` are the directories of Parquet tables that other logs of this command have.
-    fn decode(&self, work: &Work<'_>, all: &[Work<'_>], taken: &Mutex<BTreeSet<PathBuf>>) -> Result<Done> {
+    fn decode(
+        &self,
+        work: &NamedLog<'_>,
+        all: &[NamedLog<'_>],
+        taken: &Mutex<BTreeSet<PathBuf>>,
+    ) -> Result<Done> {
         let log = work.log;
         let (name, nth) = match &work.named {
             Named::As(name, nth) => (name, *nth),
@@ -316,7 +321,7 @@ impl Task<'_> {
     /// Decodes the selected part of a log into files of this name.
     fn decode_part(
         &self,
-        work: &Work<'_>,
+        work: &NamedLog<'_>,
         (name, nth): (&str, u32),
         mut context: Context,
         taken: &Mutex<BTreeSet<PathBuf>>,
@@ -374,7 +379,7 @@ impl Task<'_> {
     }
 
     /// The context of a log, needed before its first byte is written.
-    fn context(&self, work: &Work<'_>) -> Result<Context> {
+    fn context(&self, work: &NamedLog<'_>) -> Result<Context> {
         let mut context = Context {
             formats: self.formats,
             selection: self.selection.clone(),

@@ -10,14 +10,14 @@ use crate::outcome::usage as usage_error;
 use crate::source::recording::Place;
 
 /// A log, and the name of its files.
-pub(super) struct Work<'a> {
+pub(super) struct NamedLog<'a> {
     pub(super) log: &'a Place,
     pub(super) traits: Traits,
     pub(super) named: Named,
 }
 
 /// The logs of a command, named.
-pub(super) fn works<'a>(logs: &'a [Place], sessions: &Sessions) -> Result<Vec<Work<'a>>> {
+pub(super) fn works<'a>(logs: &'a [Place], sessions: &Sessions) -> Result<Vec<NamedLog<'a>>> {
     let mut traits = Vec::new();
     // A log that cannot be read is named all the same: reading it says why.
     side_by_side(
@@ -30,12 +30,12 @@ pub(super) fn works<'a>(logs: &'a [Place], sessions: &Sessions) -> Result<Vec<Wo
     )?;
     let logs: Vec<(&Place, Traits)> = logs.iter().zip(traits).collect();
     let names = naming::names(&logs, sessions);
-    Ok(logs.into_iter().zip(names).map(|((log, traits), named)| Work { log, traits, named }).collect())
+    Ok(logs.into_iter().zip(names).map(|((log, traits), named)| NamedLog { log, traits, named }).collect())
 }
 
 /// Whether any of these has messages of its own instead of MAVLink's; an error if one cannot become the
 /// requested format.
-pub(super) fn check_forms(works: &[Work<'_>], formats: Formats) -> Result<bool> {
+pub(super) fn check_forms(works: &[NamedLog<'_>], formats: Formats) -> Result<bool> {
     let mut native = false;
     for place in works.iter().map(|work| work.log).filter(|place| place.own().is_none()) {
         if place.is_standard() {

@@ -13,7 +13,7 @@ use super::collect::Collected;
 use super::context::Context;
 use super::destination::Destination;
 use super::influx::{Clock, Lines};
-use super::made::Made;
+use super::made::OutputFile;
 use super::parquet::ParquetTables;
 use super::record::gap_row;
 use super::reference::Reference;
@@ -59,7 +59,7 @@ impl Single {
 #[derive(Debug, Default)]
 pub struct Written {
     /// Each file with its content.
-    pub made: Vec<Made>,
+    pub made: Vec<OutputFile>,
     /// Rows of tables without room for their names.
     pub rows_left_out: u64,
     /// Gaps of a tlog that cannot have a table beside it.
@@ -308,30 +308,30 @@ impl<'a> Writers<'a> {
         }
         for (file, format, what) in singles {
             if let Some(file) = file {
-                made.push(Made::of(file.finish()?, format, &[what]));
+                made.push(OutputFile::of(file.finish()?, format, &[what]));
             }
         }
         if let Some(path) = gaps {
-            made.push(Made::with_words(path, "gaps", "gaps".to_owned()));
+            made.push(OutputFile::with_words(path, "gaps", "gaps".to_owned()));
         }
         if let (Some(csv), Some(dir)) = (self.csv.take(), self.destination.tables()) {
             let (tables, shared) = (csv.count(), csv.has_shared());
             csv.finish()?;
-            made.push(Made::of(dir.clone(), "csv", &of_tables(tables)));
+            made.push(OutputFile::of(dir.clone(), "csv", &of_tables(tables)));
             if shared {
                 let words = format!(
                     "the messages without a definition beyond the first {UNKNOWN_TABLES_MAX}, with their ids in a column"
                 );
-                made.push(Made::with_words(dir.join("UNKNOWN.csv"), "csv", words));
+                made.push(OutputFile::with_words(dir.join("UNKNOWN.csv"), "csv", words));
             }
         }
         if let Some(thesis) = self.thesis.take() {
             let (dir, seconds) = thesis.finish()?;
-            made.push(Made::of(dir, "thesis", &[(seconds, "second")]));
+            made.push(OutputFile::of(dir, "thesis", &[(seconds, "second")]));
         }
         if let Some(parquet) = self.parquet.take() {
             let (dir, tables) = parquet.finish()?;
-            made.push(Made::of(dir, "parquet", &of_tables(tables)));
+            made.push(OutputFile::of(dir, "parquet", &of_tables(tables)));
         }
         let Self { rows_left_out, gaps_left_out, .. } = self;
         Ok(Written { made, rows_left_out, gaps_left_out, has_no_frame })

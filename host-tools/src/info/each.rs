@@ -3,7 +3,7 @@
 use anyhow::{Result, bail};
 
 use crate::check;
-use crate::followed::{Followed, HELD_MAX};
+use crate::followed::{EndResolver, HELD_MAX};
 use crate::logs::side_by_side::side_by_side;
 use crate::outcome::Outcome;
 use crate::plural::count;
@@ -42,7 +42,7 @@ pub(super) fn each(
         note!("{remark}");
     }
     let mut outcome = Outcome::lossy(found.is_lossy());
-    let mut followed = Followed::new(sessions_of(&found.places));
+    let mut followed = EndResolver::new(sessions_of(&found.places));
     let mut done = |overview: &Overview| {
         if name.is_some_and(|name| overview.ending.name != *name) {
             return Ok(());

@@ -29,7 +29,7 @@ use crate::check;
 use crate::cli;
 use crate::decode::naming::{Named, Names, Traits, without_made};
 use crate::files::{Inputs, Output, appended, make_parent, says_directory, settle};
-use crate::followed::{Followed, HELD_MAX};
+use crate::followed::{EndResolver, HELD_MAX};
 use crate::logs::sessions::Sessions;
 use crate::logs::side_by_side::side_by_side;
 use crate::logs::{Log, segment_name};
@@ -92,7 +92,7 @@ pub fn run(args: &cli::Report) -> Result<Outcome> {
     }
     // The next start on the card records how a session ended.
     let end = found.places.len().min(*wanted.sessions.end() + 1 + HELD_MAX);
-    let mut followed = Followed::new(sessions);
+    let mut followed = EndResolver::new(sessions);
     let mut making = Making {
         places: &found.places,
         inputs: &inputs,

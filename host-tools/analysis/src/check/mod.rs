@@ -32,7 +32,7 @@ pub use clock::SETTLE;
 pub use overview::overview;
 
 use crate::ending::Ending;
-use crate::followed::{Followed, Logged};
+use crate::followed::{EndResolver, HasEnding};
 use crate::logs::side_by_side::side_by_side;
 use crate::outcome::{Outcome, Usage};
 use crate::output;
@@ -75,7 +75,7 @@ pub fn run(args: &Request<'_>) -> Result<Outcome> {
     let mut outcome = Outcome::lossy(found.is_lossy());
     let many = found.places.len() > 1 && wanted.is_none();
     let (bar, mut table) = (progress::logs(found.places.len()), Table::default());
-    let mut followed = Followed::new(sessions_of(&found.places));
+    let mut followed = EndResolver::new(sessions_of(&found.places));
     // A log next to the wanted one shows how it ends.
     let is_beside = |of: &str| wanted.as_ref().is_some_and(|wanted| wanted != of);
     let mut done = |Told { name, of, checked }: Told| match checked {
@@ -168,7 +168,7 @@ struct Told {
     checked: Result<Checked>,
 }
 
-impl Logged for Told {
+impl HasEnding for Told {
     fn ending(&mut self) -> Option<&mut Ending> {
         self.checked.as_mut().ok()?.ending.as_mut()
     }

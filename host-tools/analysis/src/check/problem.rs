@@ -123,14 +123,14 @@ pub(super) struct Problems {
     /// Number of findings.
     pub findings_count: u64,
     /// By check and part.
-    open: BTreeMap<(String, u8), Followed>,
+    open: BTreeMap<(String, u8), OpenProblem>,
     /// A box found them, when it did ([`began`]).
     of_box: bool,
 }
 
 /// One check of one part.
 #[derive(Debug)]
-struct Followed {
+struct OpenProblem {
     problem: Problem,
     /// Since when it is wrong again, with the sum of the gaps until then.
     since: Option<Since>,
@@ -141,7 +141,7 @@ struct Followed {
     alone: bool,
 }
 
-impl Followed {
+impl OpenProblem {
     /// It is so no more.
     fn end(&mut self, at: Instant, gaps: Span) {
         if let Some(since) = self.since.take() {
@@ -187,7 +187,7 @@ impl Problems {
             unheard_from: None,
             because: None,
         };
-        let followed = self.open.entry(key).or_insert_with(|| Followed {
+        let followed = self.open.entry(key).or_insert_with(|| OpenProblem {
             problem: new(),
             since: None,
             level: finding.level,
@@ -195,7 +195,7 @@ impl Problems {
             alone: false,
         });
         followed.level = finding.level;
-        let Followed { problem, since, unexplained, .. } = followed;
+        let OpenProblem { problem, since, unexplained, .. } = followed;
         if rank(finding.level) > rank(problem.level) {
             (problem.level, problem.at, problem.limit) = (finding.level, finding.at, finding.limit);
         }
@@ -248,7 +248,7 @@ impl Problems {
 
     /// The worst value of a part, which may exceed the values at its changes.
     pub(super) fn peak(&mut self, check: &str, instance: u8, value: f32) {
-        if let Some(Followed { problem, .. }) = self.open.get_mut(&(check.to_owned(), instance)) {
+        if let Some(OpenProblem { problem, .. }) = self.open.get_mut(&(check.to_owned(), instance)) {
             problem.value = worse(problem.value, measured(check, value, problem.limit), check);
         }
     }
@@ -261,7 +261,7 @@ impl Problems {
     /// Whether a mishap goes on.
     pub(super) fn is_in_mishap(&self) -> bool {
         self.open.values().any(|followed| {
-            let Followed { problem, since, level, .. } = followed;
+            let OpenProblem { problem, since, level, .. } = followed;
             problem.subsystem == Subsystem::Mishap && since.is_some() && *level == Level::Critical
         })
     }
@@ -274,7 +274,7 @@ impl Problems {
     /// Adds the name of a part to an open check.
     pub(super) fn detail(&mut self, check: &str, name: &str) {
         let known = self.open.get_mut(&(check.to_owned(), 0)).filter(|followed| followed.since.is_some());
-        let Some(Followed { problem, .. }) = known else { return };
+        let Some(OpenProblem { problem, .. }) = known else { return };
         if problem.details.len() < DETAILS_MAX && !problem.details.iter().any(|known| known == name) {
             problem.details.push(name.to_owned());
         }
@@ -283,14 +283,15 @@ impl Problems {
     /// A mishap of this check was in a radio gap, between two times.
     pub(super) fn unheard(&mut self, check: &str, from: Instant, to: Instant) {
         self.detail(check, &format!("not heard, between {} and {}", moment(from), moment(to)));
-        if let Some(Followed { problem, .. }) = self.open.get_mut(&(check.to_owned(), 0)) {
+        if let Some(OpenProblem { problem, .. }) = self.open.get_mut(&(check.to_owned(), 0)) {
             problem.unheard_from = Some(from);
         }
     }
 
     /// Names the part of each check that reports a part as due.
     pub(super) fn name_parts(&mut self, due: impl Fn(Subsystem) -> Option<(String, Option<String>)>) {
-        for Followed { problem, .. } in self.open.values_mut().filter(|of| part::is_due(&of.problem.check)) {
+        for OpenProblem { problem, .. } in self.open.values_mut().filter(|of| part::is_due(&of.problem.check))
+        {
             problem.details.extend(due(problem.subsystem).map(|due| part::due_words(&due)));
         }
     }
@@ -321,7 +322,7 @@ impl Problems {
         let mut problems: Vec<_> = self
             .open
             .into_values()
-            .map(|Followed { problem, alone, .. }| Problem {
+            .map(|OpenProblem { problem, alone, .. }| Problem {
                 because: problem.because.clone().filter(|_| !alone),
                 ..problem
             })

@@ -374,12 +374,12 @@ fn pull(ftp: &mut Ftp, name: &str, output: &Path) -> Result<Option<(PathBuf, boo
     let heading = heading_of(ftp, name, length)?;
     let path = output.join(&heading.name);
     let there = there(ftp, name, &path, length)?;
-    if there == There::Whole {
+    if there == LocalCopy::Whole {
         return Ok(Some((path, false)));
     }
     let mut file = Output::resume(&path)?;
     let (mut have, mut likeness) = begun(ftp, name, &mut file, length)?;
-    if let There::Beginning(bytes) = there
+    if let LocalCopy::Beginning(bytes) = there
         && have < bytes
     {
         file.begin_anew()?;
@@ -472,7 +472,7 @@ fn check_same(first: &Heading, now: &Heading) -> Result<()> {
 
 /// The file already on this PC under the log's name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum There {
+enum LocalCopy {
     Nothing,
     /// This many bytes of it: the log has grown since.
     Beginning(u32),
@@ -480,8 +480,8 @@ enum There {
     Whole,
 }
 
-fn there(ftp: &mut Ftp, name: &str, path: &Path, length: u32) -> Result<There> {
-    let Ok(about) = path.metadata() else { return Ok(There::Nothing) };
+fn there(ftp: &mut Ftp, name: &str, path: &Path, length: u32) -> Result<LocalCopy> {
+    let Ok(about) = path.metadata() else { return Ok(LocalCopy::Nothing) };
     if !about.is_file() {
         bail!(
             "{}: is no file, and stands where the log is to be: move it away, or name another directory with -o",
@@ -490,7 +490,7 @@ fn there(ftp: &mut Ftp, name: &str, path: &Path, length: u32) -> Result<There> {
     }
     let bytes = u32::try_from(about.len()).unwrap_or(u32::MAX);
     if bytes == 0 {
-        return Ok(There::Nothing);
+        return Ok(LocalCopy::Nothing);
     }
     match compare(ftp, name, path, bytes.min(length))? {
         Likeness::Same | Likeness::SameEnds if about.len() > u64::from(length) => bail!(
@@ -499,10 +499,10 @@ fn there(ftp: &mut Ftp, name: &str, path: &Path, length: u32) -> Result<There> {
             path.display(),
             count(about.len() - u64::from(length), "byte")
         ),
-        Likeness::Same if bytes < length => Ok(There::Beginning(bytes)),
-        Likeness::Same => Ok(There::Whole),
+        Likeness::Same if bytes < length => Ok(LocalCopy::Beginning(bytes)),
+        Likeness::Same => Ok(LocalCopy::Whole),
         // Equality is not proved: the log is downloaded again and replaces the file once complete.
-        Likeness::SameEnds => Ok(There::Nothing),
+        Likeness::SameEnds => Ok(LocalCopy::Nothing),
         Likeness::Other => bail!(
             "{} differs from the board's log of the same session: one of both is damaged or was changed, and `hums info --verify` \
              says whether this one is; it is left as it is: move it away, or name another directory with -o",
