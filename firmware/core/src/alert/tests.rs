@@ -120,83 +120,60 @@ fn armed() -> Alerts {
     alerts
 }
 
-#[test]
-fn what_was_said_holds_for_a_while_and_only_while_armed() {
+/// Plays a script of steps, each with its second: `arm`, `disarm`, a text (`critical Gnss`), flags of `SYS_STATUS` (`flags`, and the bit of a
+/// sensor that is not healthy), and the level that a cause then has (`Gnss = 2`; `-` where nothing was ever said).
+fn play(script: &str) {
     let mut alerts = Alerts::new();
-    assert_eq!(alerts.level(T0, Cause::Gnss, false), None);
-    alerts.tell(T0, Alert::warning(Cause::Gnss));
-    assert_eq!(alerts.level(T0, Cause::Gnss, false), None, "said before arming");
-    alerts.take_armed(T0, true);
-    alerts.tell(T0, Alert::critical(Cause::Gnss));
-    alerts.tell(after(5), Alert::warning(Cause::Gnss));
-    for (seconds, level) in [(0, 2.0), (14, 2.0), (15, 2.0), (16, ENDED)] {
-        assert_eq!(alerts.level(after(seconds), Cause::Gnss, false), Some(level), "{seconds} s");
+    for step in script.split("; ") {
+        let words: Vec<&str> = step.split(' ').collect();
+        let at = after(words[0].parse().unwrap());
+        let cause = |name: &str| Cause::ALL.into_iter().find(|cause| format!("{cause:?}") == name).unwrap();
+        match words[1..] {
+            ["arm"] => alerts.take_armed(at, true),
+            ["disarm"] => alerts.take_armed(at, false),
+            ["flags"] => alerts.take_sensors(at, &Sensors::of(u32::MAX, u32::MAX, u32::MAX)),
+            ["flags", bit] => {
+                let bit = 1 << bit.parse::<u32>().unwrap();
+                alerts.take_sensors(at, &Sensors::of(u32::MAX, u32::MAX, !bit));
+            }
+            [name, "=", level] => {
+                let level = match level {
+                    "-" => None,
+                    "ended" => Some(ENDED),
+                    level => Some(level.parse().unwrap()),
+                };
+                assert_eq!(alerts.level(at, cause(name), false), level, "{step} of {script}");
+            }
+            ["warning", name] => alerts.tell(at, Alert::warning(cause(name))),
+            ["critical", name] => alerts.tell(at, Alert::critical(cause(name))),
+            ["over", name] => alerts.tell(at, Alert::over(cause(name))),
+            _ => panic!("{step}"),
+        }
     }
-    assert_eq!(alerts.level(after(5), Cause::Gyro, false), None, "of the gyro nothing was said");
-    alerts.tell(after(20), Alert::warning(Cause::Gnss));
-    alerts.tell(after(21), Alert::over(Cause::Gnss));
-    assert_eq!(alerts.level(after(22), Cause::Gnss, false), Some(0.0), "it is over by its own word");
-    alerts.tell(after(23), Alert::warning(Cause::Gnss));
-    alerts.take_armed(after(24), false);
-    assert_eq!(alerts.level(after(24), Cause::Gnss, false), Some(1.0), "it was said while armed");
-    alerts.take_armed(after(25), true);
-    assert_eq!(alerts.level(after(25), Cause::Gnss, false), None, "another arming");
 }
 
 #[test]
-fn a_crash_is_heard_though_the_autopilot_disarms_with_the_word() {
-    let mut alerts = armed();
-    alerts.take_armed(after(1), false);
-    alerts.tell(after(1), Alert::warning(Cause::Gnss));
-    alerts.tell(after(2), Alert::critical(Cause::Crash));
-    assert_eq!(
-        (alerts.level(after(2), Cause::Crash, false), alerts.level(after(2), Cause::Gnss, false)),
-        (Some(2.0), None)
-    );
-    let mut alerts = armed();
-    alerts.take_armed(after(1), false);
-    alerts.tell(after(2), Alert::critical(Cause::Accelerometer));
-    assert_eq!(alerts.level(after(2), Cause::Accelerometer, false), Some(2.0), "what broke");
-    let mut alerts = armed();
-    alerts.take_armed(after(1), false);
-    alerts.tell(after(5), Alert::critical(Cause::Crash));
-    assert_eq!(alerts.level(after(5), Cause::Crash, false), None, "long after");
-}
-
-/// All sensors are there, and these are not healthy.
-const fn unhealthy(bits: u32) -> Sensors {
-    Sensors::of(u32::MAX, u32::MAX, !bits)
-}
-
-#[test]
-fn flags_count_when_two_messages_have_them_and_while_they_come() {
-    const COMPASS: u32 = 1 << 2;
-    let mut alerts = armed();
-    for (seconds, bits, level) in
-        [(0, 0, 0.0), (1, COMPASS, 0.0), (2, COMPASS, 1.0), (3, 0, 0.0), (4, COMPASS, 0.0), (5, COMPASS, 1.0)]
-    {
-        alerts.take_sensors(after(seconds), &unhealthy(bits));
-        assert_eq!(alerts.level(after(seconds), Cause::Compass, false), Some(level), "{seconds} s");
+fn words_and_flags_hold_as_long_as_they_should() {
+    for script in [
+        // What was said before arming does not count. A text holds for 10 s, the worst one of that time.
+        "0 Gnss = -; 0 warning Gnss; 0 Gnss = -; 0 arm; 0 critical Gnss; 5 warning Gnss; 0 Gnss = 2; 14 Gnss = 2; \
+         15 Gnss = 2; 16 Gnss = ended; 5 Gyro = -",
+        // It is over by its own word, outlasts disarming, and not the next arming.
+        "0 arm; 20 warning Gnss; 21 over Gnss; 22 Gnss = 0; 23 warning Gnss; 24 disarm; 24 Gnss = 1; 25 arm; 25 Gnss = -",
+        // An autopilot that crashes disarms with the word, and tells what broke right behind it.
+        "0 arm; 1 disarm; 1 warning Gnss; 2 critical Crash; 2 Crash = 2; 2 Gnss = -",
+        "0 arm; 1 disarm; 2 critical Accelerometer; 2 Accelerometer = 2",
+        "0 arm; 1 disarm; 5 critical Crash; 5 Crash = -",
+        // A flag counts when two messages have it, and while messages come. None tells of a crash.
+        "0 arm; 0 flags; 0 Compass = 0; 1 flags 2; 1 Compass = 0; 2 flags 2; 2 Compass = 1; 3 flags; 3 Compass = 0; \
+         4 flags 2; 4 Compass = 0; 5 flags 2; 5 Compass = 1; 10 Compass = 1; 11 Compass = ended; 12 flags; \
+         12 Compass = 0; 12 Crash = ended; 13 disarm; 13 Compass = ended",
+        // A remote control that was never switched on is not lost.
+        "0 arm; 0 flags 16; 0 RemoteControl = 0; 1 flags 16; 1 RemoteControl = ended; 2 flags; 2 RemoteControl = 0; \
+         3 flags 16; 3 RemoteControl = 0; 4 flags 16; 4 RemoteControl = 1",
+    ] {
+        play(script);
     }
-    assert_eq!(alerts.level(after(10), Cause::Compass, false), Some(1.0));
-    assert_eq!(alerts.level(after(11), Cause::Compass, false), Some(ENDED), "no message for more than 5 s");
-    alerts.take_sensors(after(12), &unhealthy(0));
-    assert_eq!(alerts.level(after(12), Cause::Compass, false), Some(0.0));
-    assert_eq!(alerts.level(after(12), Cause::Crash, false), Some(ENDED), "no flag tells of a crash");
-    alerts.take_armed(after(13), false);
-    assert_eq!(alerts.level(after(13), Cause::Compass, false), Some(ENDED), "disarmed");
-}
-
-#[test]
-fn a_remote_control_is_lost_only_where_there_was_one() {
-    const RECEIVER: u32 = 1 << 16;
-    let mut alerts = armed();
-    let mut says = |second, bits| {
-        alerts.take_sensors(after(second), &unhealthy(bits));
-        alerts.level(after(second), Cause::RemoteControl, false)
-    };
-    assert_eq!([says(0, RECEIVER), says(1, RECEIVER)], [Some(0.0), Some(ENDED)], "never switched on");
-    assert_eq!([says(2, 0), says(3, RECEIVER), says(4, RECEIVER)], [Some(0.0), Some(0.0), Some(1.0)]);
 }
 
 #[test]

@@ -120,13 +120,13 @@ pub struct Unit(u8);
 
 impl Unit {
     const NAMES: [&str; 19] = [
-        "", "%", "1/min", "V", "deg", "deg/s", "degC", "frames", "g", "hPa", "m", "m/s", "m/s2", "ms",
-        "rad/s", "rpm", "s", "times", "",
+        "", "", "%", "1/min", "V", "deg", "deg/s", "degC", "frames", "g", "hPa", "m", "m/s", "m/s2", "ms",
+        "rad/s", "rpm", "s", "times",
     ];
 
     /// A unit as it is written; empty for a plain number. A new one goes into `NAMES`.
     pub const fn of(name: &str) -> Self {
-        let mut place = 0;
+        let mut place = Self::FLAG.0 as usize + 1;
         while !is_same(Self::NAMES[place], name) {
             place += 1;
         }
@@ -134,7 +134,7 @@ impl Unit {
     }
 
     /// A flag, or the number of a state: the value tells a pilot nothing, and the alarm alone is sent. It is written like a plain number.
-    pub const FLAG: Self = Self(Self::NAMES.len() as u8 - 1);
+    pub const FLAG: Self = Self(0);
 
     /// Whether the value is a flag.
     pub const fn is_flag(self) -> bool {

@@ -182,7 +182,7 @@ impl Health {
     }
 
     /// The alarms that stand.
-    fn standing(&self) -> impl Iterator<Item = Alarm> + Clone {
+    fn standing(&self) -> impl Iterator<Item = Alarm> {
         self.alarms.iter().filter_map(|standing| Alarm::at(standing.slot, standing.level, standing.since))
     }
 

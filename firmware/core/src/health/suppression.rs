@@ -256,12 +256,12 @@ impl Alarm {
 
 /// Which of the alarms explains another one, or a lack of data: of mishaps the first one, or else the first in the order of groups and of the
 /// tables.
-pub fn root_cause(effect: &Alarm, alarms: impl Iterator<Item = Alarm> + Clone) -> Option<Alarm> {
-    let causes = alarms.filter(|cause| cause.explains(effect));
-    let mishaps = causes.clone().filter(|cause| cause.check.subsystem == Subsystem::Mishap);
-    mishaps
-        .min_by_key(|cause| cause.since.as_millis())
-        .or_else(|| causes.min_by_key(|cause| (cause.check.role.number(), cause.slot)))
+pub fn root_cause(effect: &Alarm, alarms: impl Iterator<Item = Alarm>) -> Option<Alarm> {
+    let order = |alarm: &Alarm| match alarm.check.subsystem {
+        Subsystem::Mishap => (false, alarm.since.as_millis(), alarm.slot),
+        _ => (true, alarm.check.role.number().into(), alarm.slot),
+    };
+    alarms.filter(|cause| cause.explains(effect)).min_by_key(order)
 }
 
 #[cfg(test)]

@@ -73,7 +73,14 @@ pub(super) fn slots() -> impl Iterator<Item = (u16, &'static Check, u8)> + Clone
 
 /// The check of a state, and which one of several.
 pub(super) fn check_of(slot: u16) -> Option<(&'static Check, u8)> {
-    slots().nth(slot.into()).map(|(_, check, instance)| (check, instance))
+    let mut left = slot;
+    for check in checks() {
+        match left.checked_sub(check.instances.into()) {
+            Some(beyond) => left = beyond,
+            None => return Some((check, left as u8)),
+        }
+    }
+    None
 }
 
 /// The state of a check.
