@@ -196,7 +196,8 @@ export const map = ({ id = "map", whose = flight, frame = null, name = "Track ov
       ),
       el("span", { class: "dim" }, "north is up"),
     );
-    attribute(surface, "aria-label", `${name}: ${[...legend.children].map((part) => part.textContent).join("; ")}`);
+    const words = [...legend.children].map((part) => [...part.childNodes].map((node) => node.textContent).join(" "));
+    attribute(surface, "aria-label", `${name}: ${words.join("; ")}`);
   };
   const self = {
     node,
