@@ -22,18 +22,19 @@
 //! A take-off and a landing have the time at which their majority began.
 //! Without power, or with less than 5 % of throttle on rotors, nothing takes off; with less than 10 % it does after 5 s, if two witnesses say so
 //! and no other one is against it.
-//! An inertial sensor that falls or turns for 5 s, while two others say that it flies and it does not sink, is no sign any more.
+//! A bad inertial sensor makes no sign: it falls or turns for 5 s while two other witnesses say that the vehicle flies, and it does not sink.
 //! Surface vehicles never fly (PX4 calls an armed rover "in air").
 //!
 //! Signs of a mishap (`signs`) count while the vehicle is armed and for 10 s afterwards; docs/health.md has their table. Outside of a flight
-//! they are told once for each arming ([`Change::OnBench`]); but a vehicle that its own rotors turned over has had a mishap. A fall
-//! that nobody heard is judged by `hums check`.
+//! they are reported once for each arming ([`Change::OnBench`]), but a vehicle that its own rotors turned over has had a mishap.
+//! `hums check` judges a fall during a loss of the link, and of a vehicle that was off before its first message.
 
 mod disarming;
 mod signs;
+mod touchdown;
 mod witness;
 
-use crate::latest::Reading;
+use crate::latest::{Latest, Reading};
 use crate::mishap::{Change, Kind, Place, Report};
 use crate::motion::{Kinematics, STILL_MPS, climb_mps, ground_speed_mps, height_m, throttle};
 use crate::observation::VehicleKind;
@@ -41,9 +42,11 @@ use crate::params::Params;
 use crate::pressure::Pressure;
 use crate::thrust::{Power, Thrust};
 use crate::time::{Instant, Span, Stamp};
+use crate::units::norm;
 use crate::vehicle::{LANDED_STATE_AGE, Vehicle};
 use disarming::DisarmWatch;
-use signs::{Lasting, Shock};
+use signs::{Peak, Shock, Signs};
+use touchdown::Touchdown;
 use witness::{HEIGHT, THRUST, Votes, WORD, is_on_wings, on_rotors};
 
 /// Below this throttle rotors are off, or as slow as they go.
@@ -68,7 +71,7 @@ const LANDS: Span = Span::from_secs(2);
 const GROUND_LASTS: Span = Span::from_secs(8);
 /// How long after disarming it is watched.
 const WATCHED: Span = Span::from_secs(10);
-/// A mishap goes on for so long after its last sign.
+/// A mishap ends this long after its last sign.
 const RECOVERED: Span = Span::from_secs(5);
 /// A mishap without a majority is decided after so long.
 const GIVEN_UP: Span = Span::from_secs(30);
@@ -82,12 +85,10 @@ const STILL_RADPS: f32 = 0.3;
 const STILL_G: core::ops::Range<f32> = 0.7..1.3;
 /// A pressure that rose no longer ago rises still.
 const RISES: Span = Span::from_millis(300);
-/// A vehicle that lies over so long after its last throttle was turned over by its rotors.
+/// If a vehicle had throttle within this time before it lay over, its rotors turned it over.
 const DRIVEN: Span = Span::from_secs(5);
-/// Heartbeats so far apart hide a disarming.
-const BEATS: Span = Span::from_millis(2_500);
 
-/// What the vehicle is doing.
+/// A part of the flight.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Phase {
     /// On the ground.
@@ -156,9 +157,44 @@ impl Stage {
     }
 }
 
-/// The phases of a flight.
+/// Whether the motors may turn.
 #[derive(Clone, Copy, Debug, Default)]
 #[expect(clippy::struct_excessive_bools, reason = "facts that have nothing to do with each other")]
+struct Arming {
+    is_armed: bool,
+    /// Armed and not terminated.
+    is_on: bool,
+    /// When the motors went off last.
+    off_at: Option<Instant>,
+    /// A disarmed vehicle was seen: it is at its place of arming when it is armed next.
+    seen_off: bool,
+    /// It was level since the arming.
+    stood: bool,
+    /// A sign outside of a flight was reported since the arming.
+    on_bench: bool,
+}
+
+/// The height above home at the latest heartbeat.
+#[derive(Clone, Copy, Debug, Default)]
+struct Beat {
+    at: Instant,
+    height_m: Option<f32>,
+}
+
+/// The latest inertial measurements.
+#[derive(Clone, Copy, Debug, Default)]
+struct Felt {
+    /// When the force changed last.
+    at: Instant,
+    load_g: Option<f32>,
+    /// The part of the force that pushes from above, g.
+    from_above_g: f32,
+    /// Body rate, rad/s.
+    rate_radps: f32,
+}
+
+/// The phases of a flight.
+#[derive(Clone, Copy, Debug, Default)]
 pub struct Flight {
     stage: Stage,
     /// Since when it is in the air; kept in a mishap.
@@ -167,60 +203,33 @@ pub struct Flight {
     flew_at: Option<Instant>,
     /// Since when a majority would move the phase.
     changing_since: Option<Instant>,
+    /// The vehicle was seen on the ground: a take-off follows.
+    seen_on_ground: bool,
+    arming: Arming,
+    beat: Beat,
+    /// When the autopilot was received last.
+    heard_at: Instant,
     pub(crate) pressure: Pressure,
     pub(crate) thrust: Thrust,
     pub(crate) motion: Kinematics,
-    /// The vehicle was heard disarmed: it is armed next at its place of arming.
-    seen_disarmed: bool,
-    /// The vehicle was seen on the ground: a take-off follows.
-    seen_on_ground: bool,
-    armed: bool,
-    /// Armed and not terminated.
-    powered: bool,
-    off_at: Option<Instant>,
-    /// The latest heartbeat, the height above home then, and when the autopilot was heard last.
-    beat_at: Instant,
-    beat_height_m: Option<f32>,
-    heard_at: Instant,
-    /// It was heard first then, and has not flown since.
-    first_at: Option<Instant>,
+    felt: Felt,
+    /// Its greatest height with all its thrust, which fades.
+    peak: Peak,
     watch: Option<DisarmWatch>,
-    /// The worst of each sign, in its own unit; 0 for none.
-    worst: [f32; Kind::COUNT],
-    /// A sign of this step; the time of the last one.
-    seen: Option<Kind>,
-    seen_at: Instant,
-    /// Since when an inertial sensor has fallen or turned while the others say that it flies.
-    doubted_since: Stamp,
-    on_bench: bool,
-    falls: Lasting,
-    unloaded: Lasting,
-    tumbles: Lasting,
-    overturned: Lasting,
-    sinks: Lasting,
-    still_since: Option<Instant>,
-    flies_since: Option<Instant>,
+    signs: Signs,
+    shock: Option<Shock>,
+    still_since: Stamp,
+    flies_since: Stamp,
     /// Since when it is carried without rotors, and the pressure then, hPa.
     supported: Option<(Instant, f32)>,
-    shock: Option<Shock>,
     /// The first of the shocks that belong together.
     hit_at: Instant,
-    /// The fastest sink that broke off in this mishap, m/s.
+    touchdown: Touchdown,
+    /// The hardest touch of this flight, or of its mishap, m/s.
     touch_mps: f32,
-    /// When the force changed last; its load factor, and its part from above, g.
-    felt_at: Instant,
-    load_g: Option<f32>,
-    from_above_g: f32,
-    /// Body rate, rad/s.
-    rate_radps: f32,
-    /// Its greatest height since it has had all its thrust, m, which fades; and when that was worked out last.
-    peak_m: Option<f32>,
-    peak_at: Instant,
-    /// It was level while it was armed.
-    stood: bool,
     /// When it leaned by more than 45 degrees, or turned fast, last, while armed.
     tilted_at: Option<Instant>,
-    /// Where a mishap began, or ended.
+    /// The position at which a mishap began, or ended.
     place: Place,
 }
 
@@ -314,7 +323,7 @@ impl Flight {
         self.judge_shock(now, vehicle, params);
         let votes = self.ask(now, vehicle);
         self.doubt(now, vehicle, votes);
-        let seen = self.seen.take();
+        let seen = self.signs.seen.take();
         let change = match (self.stage, seen) {
             (Stage::Falling | Stage::Impacted, _) => self.judge_mishap(now, vehicle, votes),
             (Stage::Down, _) => self.judge_wreck(now, vehicle, votes),
@@ -327,103 +336,111 @@ impl Flight {
             _ if self.watch.is_some() || self.may_have_hit() => self.hold(now),
             _ => self.advance(now, vehicle, votes),
         };
+        self.note_touch(now, vehicle);
         (change, event)
+    }
+
+    /// In the air a descent may break off; on the ground the last one was the touch. The estimate of a vehicle that lies has any speed.
+    fn note_touch(&mut self, now: Instant, vehicle: &Vehicle) {
+        let height_m = height_m(now, vehicle);
+        if !self.airborne() {
+            let touch_mps = self.touchdown.take(now, height_m);
+            self.touch_mps = self.touch_mps.max(if self.is_down() { 0.0 } else { touch_mps });
+        } else if let (Some(climb_mps), Some(height_m)) = (climb_mps(now, vehicle), height_m) {
+            self.touchdown.step(now, -climb_mps, self.motion.sink.greatest(now), height_m);
+        }
     }
 
     /// Arming, disarming and termination.
     fn note_power(&mut self, now: Instant, vehicle: &Vehicle, params: &Params) {
         let Some(heartbeat) = vehicle.heartbeat.get() else { return };
         let armed = heartbeat.armed;
-        if armed != self.armed {
-            let is_seen = armed && self.seen_disarmed;
+        if armed != self.arming.is_armed {
+            let is_seen = armed && self.arming.seen_off;
             self.pressure.arm(now, is_seen);
             self.motion.arm(now, vehicle, is_seen);
         }
-        self.seen_disarmed |= !armed;
-        self.armed = armed;
+        self.arming.seen_off |= !armed;
+        self.arming.is_armed = armed;
         if !self.airborne() && (!armed || self.power(now, vehicle) == Some(Power::Idle)) {
             self.motion.idle(now, vehicle);
         }
         // A terminated vehicle stays armed, and its motors are off.
         let powered = armed && vehicle.terminated_since.is_none();
-        if powered && !self.powered {
+        if powered && !self.arming.is_on {
             // Armed again in the air it flies on; on the ground another flight begins.
-            if self.stage == Stage::Down && self.off_at.is_some() {
+            if self.stage == Stage::Down && self.arming.off_at.is_some() {
                 self.calm();
             }
-            (self.on_bench, self.off_at, self.stood, self.heard_at) = (false, None, false, now);
-            (self.watch, self.first_at) = (None, None);
+            (self.arming.on_bench, self.arming.off_at, self.arming.stood, self.heard_at) =
+                (false, None, false, now);
+            self.watch = None;
             self.thrust.forget();
         }
-        let beat_at = vehicle.heartbeat.at().unwrap_or(self.beat_at);
+        let beat_at = vehicle.heartbeat.at().unwrap_or(self.beat.at);
         // The height of the beat before: PX4's is 0 from the disarming on, and home may be another one.
-        let (mut before_m, mut beats_missed) = (self.beat_height_m, false);
-        if beat_at != self.beat_at {
-            if self.beat_at == Instant::ZERO {
-                self.note_first(now, vehicle, powered);
-            }
-            beats_missed = beat_at.since(self.beat_at) > BEATS;
-            before_m = core::mem::replace(&mut self.beat_height_m, height_m(now, vehicle));
-            self.beat_at = beat_at;
+        let mut before_m = self.beat.height_m;
+        if beat_at != self.beat.at {
+            before_m = core::mem::replace(&mut self.beat.height_m, height_m(now, vehicle));
+            self.beat.at = beat_at;
         }
-        self.stood |= powered && vehicle.inertial.is_level(now);
-        if self.powered && !powered {
-            self.off_at = Some(now);
+        self.arming.stood |= powered && vehicle.inertial.is_level(now);
+        if self.arming.is_on && !powered {
+            self.arming.off_at = Some(now);
             if self.is_open() && !self.stage.is_mishap() {
                 let height_m = before_m.or_else(|| height_m(now, vehicle));
-                self.note_disarming(now, vehicle, params, height_m, beats_missed);
+                self.note_disarming(now, vehicle, params, height_m);
             }
         }
-        self.powered = powered;
+        self.arming.is_on = powered;
     }
 
     /// Since when it has been still. The sensors are believed, and not the estimate, of a vehicle that is off, lies on its back, or was hit.
     fn note_still(&mut self, now: Instant, vehicle: &Vehicle) {
         let ground_mps = ground_speed_mps(now, vehicle).unwrap_or(0.0);
         let speed_mps = ground_mps.max(climb_mps(now, vehicle).map_or(0.0, f32::abs));
-        let was_hit = self.worst[Kind::Impact as usize] > 0.0 || self.was_dropped();
+        let was_hit = self.signs.worst[Kind::Impact as usize] > 0.0 || self.was_dropped();
         let is_slow = speed_mps < STILL_MPS
-            || (!self.powered && on_rotors(now, vehicle))
+            || (!self.arming.is_on && on_rotors(now, vehicle))
             || self.lies_on_its_back(vehicle)
-            || (was_hit && self.rate_radps < STILL_RADPS / 3.0);
+            || (was_hit && self.felt.rate_radps < STILL_RADPS / 3.0);
         // Under a parachute it is carried, and goes down.
         let descends = self.pressure.steady_for(now).is_some_and(|span| span < RISES);
         let is_still = is_slow
             && !descends
             && self.is_slow_to_turn()
-            && self.load_g.is_none_or(|load_g| STILL_G.contains(&load_g));
-        self.still_since = if is_still { self.still_since.or(Some(now)) } else { None };
+            && self.felt.load_g.is_none_or(|load_g| STILL_G.contains(&load_g));
+        self.still_since.run(is_still, now, STILL);
     }
 
     fn is_slow_to_turn(&self) -> bool {
-        self.rate_radps < STILL_RADPS
+        self.felt.rate_radps < STILL_RADPS
     }
 
     fn is_still(&self, now: Instant) -> bool {
-        self.still_since.is_some_and(|since| now.since(since) >= STILL)
+        self.still_since.age(now).is_some_and(|age| age >= STILL)
     }
 
     /// A sign of a mishap, outside of one.
     fn judge_sign(&mut self, now: Instant, vehicle: &Vehicle, kind: Kind, params: &Params) -> Option<Change> {
-        let is_own = self.is_open()
-            || kind == Kind::Disarmed
-            || (kind == Kind::Impact && self.first_at.is_some() && !self.powered)
-            || self.is_turned_over(now, vehicle, kind);
+        let is_own = self.is_open() || kind == Kind::Disarmed || self.is_turned_over(now, vehicle, kind);
         if !is_own {
-            self.worst = [0.0; Kind::COUNT];
-            if !self.powered {
+            self.signs.worst = [0.0; Kind::COUNT];
+            if !self.arming.is_on {
                 return None;
             }
-            let is_told = core::mem::replace(&mut self.on_bench, true);
+            let is_told = core::mem::replace(&mut self.arming.on_bench, true);
             return (!is_told).then_some(Change::OnBench(kind));
         }
         self.stage = if kind == Kind::Impact { Stage::Impacted } else { Stage::Falling };
         self.place = Place::of(now, vehicle);
+        if kind != Kind::Impact {
+            self.touch_mps = 0.0;
+        }
         let before_m = self.watch.take().and_then(|watch| watch.height_m);
         if let Some(height_m) = before_m.filter(|_| kind == Kind::Disarmed) {
             self.place.height_m = height_m as i16;
         }
-        self.first_at = None;
         // A vehicle that turned over right after a shock hit something first.
         if let Some(shock) = self.shock.filter(|_| kind == Kind::Overturned) {
             self.touch(now, shock.sink_mps);
@@ -434,21 +451,21 @@ impl Flight {
 
     /// One step of a mishap: it is down, or flies on.
     fn judge_mishap(&mut self, now: Instant, vehicle: &Vehicle, votes: Votes) -> Option<Change> {
-        let passed = now.since(self.seen_at);
+        let passed = now.since(self.signs.seen_at);
         let (is_long, is_given_up) = (passed >= RECOVERED, passed >= GIVEN_UP);
         let (flies, stands) = votes.count();
         let is_silent = vehicle.heartbeat.within(now, RECOVERED).is_none();
         let is_down = (stands >= 2 && stands > flies && (is_long || self.is_still(now)))
-            || (is_given_up && (!self.powered || is_silent || (stands >= 2 && stands >= flies)));
+            || (is_given_up && (!self.arming.is_on || is_silent || (stands >= 2 && stands >= flies)));
         if is_down {
-            (self.stage, self.flies_since) = (Stage::Down, None);
+            (self.stage, self.flies_since) = (Stage::Down, Stamp::NONE);
             if !self.motion.has_strayed(now) {
                 self.touch(now, self.motion.sink.greatest(now));
             }
             self.place = Place::of(now, vehicle);
             return Some(Change::Down);
         }
-        let flies_on = self.powered && ((is_long && flies >= 2 && flies > stands) || is_given_up);
+        let flies_on = self.arming.is_on && ((is_long && flies >= 2 && flies > stands) || is_given_up);
         flies_on.then(|| {
             self.calm();
             Change::FliesOn
@@ -457,9 +474,9 @@ impl Flight {
 
     /// One step of a vehicle that is down: whether it has taken off again.
     fn judge_wreck(&mut self, now: Instant, vehicle: &Vehicle, votes: Votes) -> Option<Change> {
-        let is_flying = self.powered && self.takes_off(now, vehicle, votes).is_some() && votes.count().0 >= 2;
-        self.flies_since = if is_flying { self.flies_since.or(Some(now)) } else { None };
-        self.flies_since.filter(|since| now.since(*since) >= TAKEN_OFF).map(|_| {
+        let is_flying =
+            self.arming.is_on && self.takes_off(now, vehicle, votes).is_some() && votes.count().0 >= 2;
+        self.flies_since.run(is_flying, now, TAKEN_OFF).then(|| {
             self.calm();
             Change::FliesAgain
         })
@@ -472,9 +489,10 @@ impl Flight {
             (None, Some(_)) => Stage::Touched,
             (None, None) => Stage::Ground,
         };
-        (self.worst, self.seen) = ([0.0; Kind::COUNT], None);
-        (self.watch, self.first_at) = (None, None);
-        (self.shock, self.touch_mps, self.still_since, self.flies_since) = (None, 0.0, None, None);
+        (self.signs.worst, self.signs.seen) = ([0.0; Kind::COUNT], None);
+        self.watch = None;
+        (self.shock, self.touch_mps, self.still_since, self.flies_since) =
+            (None, 0.0, Stamp::NONE, Stamp::NONE);
         self.place = Place::default();
     }
 
@@ -495,14 +513,14 @@ impl Flight {
 
     /// One step without a mishap.
     fn advance(&mut self, now: Instant, vehicle: &Vehicle, votes: Votes) -> Option<FlightEvent> {
-        if self.airborne() && !self.armed {
+        if self.airborne() && !self.arming.is_armed {
             (self.airborne_since, self.changing_since) = (None, None);
         }
         let debounce = if self.airborne() { Self::lands(votes) } else { self.takes_off(now, vehicle, votes) };
         match debounce {
             None => {
                 self.changing_since = None;
-                let is_known = votes.known & (WORD | HEIGHT) != 0 || !self.armed;
+                let is_known = votes.known & (WORD | HEIGHT) != 0 || !self.arming.is_armed;
                 self.seen_on_ground |= !self.airborne() && is_known && vehicle.heartbeat.get().is_some();
             }
             Some(debounce) => {
@@ -519,7 +537,7 @@ impl Flight {
             (true, None) if self.seen_on_ground => (Stage::Airborne, Some(FlightEvent::TakeOff)),
             (true, None) => (Stage::Airborne, Some(FlightEvent::Resumed)),
             (true, Some(_)) => (Stage::Airborne, None),
-            (false, Some(last)) if !self.armed || now.since(last) >= GROUND_LASTS => {
+            (false, Some(last)) if !self.arming.is_armed || now.since(last) >= GROUND_LASTS => {
                 self.flew_at = None;
                 (Stage::Ground, Some(FlightEvent::Landing))
             }
@@ -528,6 +546,9 @@ impl Flight {
         };
         self.stage = stage;
         if self.airborne() {
+            if self.flew_at.is_none() {
+                self.touch_mps = 0.0;
+            }
             self.flew_at = Some(now);
         }
         event
@@ -536,8 +557,9 @@ impl Flight {
     /// For how long the witnesses must say so until it is in the air; `None` if they do not.
     fn takes_off(&self, now: Instant, vehicle: &Vehicle, votes: Votes) -> Option<Span> {
         let has_no_thrust = votes.stands & THRUST != 0
-            && (!is_on_wings(now, vehicle) && self.power(now, vehicle) != Some(Power::Full));
-        if !self.powered || vehicle.kind() == VehicleKind::Surface {
+            && !is_on_wings(now, vehicle)
+            && self.power(now, vehicle) != Some(Power::Full);
+        if !self.arming.is_on || vehicle.kind() == VehicleKind::Surface {
             return None;
         }
         let (flies, stands) = votes.count();
@@ -565,7 +587,7 @@ impl Flight {
         }
     }
 
-    /// What the vehicle is doing now.
+    /// The part of the flight now.
     pub fn phase(&self, now: Instant, vehicle: &Vehicle) -> Phase {
         if !self.airborne() {
             return Phase::Ground;
@@ -590,39 +612,30 @@ impl Flight {
 
     /// A check's reading: the worst of this mishap, 0 while there is none; `None` if the vehicle does not tell enough to see it.
     pub(crate) fn reading(&self, kind: Kind, now: Instant, vehicle: &Vehicle) -> Option<Reading> {
-        let value = self.worst[kind as usize];
+        let value = self.signs.worst[kind as usize];
         if value > 0.0 {
             return Some(Reading { at: now, value });
         }
-        let rotors = !matches!(vehicle.kind(), VehicleKind::Plane | VehicleKind::Surface);
         let Vehicle { imu, attitude, heartbeat, .. } = vehicle;
         let forces = || {
-            let known = imu
-                .get()
-                .and_then(|imu| imu.acceleration)
-                .is_some_and(|force| force.iter().all(|axis| axis.0.is_finite()));
-            imu.at().filter(|_| known)
+            measured(imu, |imu| {
+                imu.acceleration.is_some_and(|axes| norm(axes.map(|axis| axis.0)).is_finite())
+            })
         };
         let at = match kind {
-            Kind::FreeFall => forces().filter(|_| rotors),
-            Kind::Impact => forces(),
-            Kind::Overturned => {
-                let known = attitude.get().is_some_and(|it| it.roll.0.is_finite() && it.pitch.0.is_finite());
-                attitude.at().filter(|_| known && rotors)
-            }
-            Kind::Tumbling => {
-                let rates = attitude.get().and_then(|attitude| attitude.rates);
-                attitude
-                    .at()
-                    .filter(|_| rates.is_some_and(|rates| rates.iter().all(|rate| rate.0.is_finite())))
-            }
+            Kind::FreeFall | Kind::Overturned if vehicle.kind() == VehicleKind::Plane => None,
+            Kind::FreeFall | Kind::Impact => forces(),
+            Kind::Overturned => measured(attitude, |it| (it.roll.0 + it.pitch.0).is_finite()),
+            Kind::Tumbling => measured(attitude, |it| {
+                it.rates.is_some_and(|axes| norm(axes.map(|axis| axis.0)).is_finite())
+            }),
             Kind::Disarmed => heartbeat.at(),
             Kind::Sinking => climb_mps(now, vehicle).map(|_| now),
         };
         Reading::new(at.filter(|_| vehicle.kind() != VehicleKind::Surface), Some(0.0))
     }
 
-    /// What the ground is told of a change, at the tick of it.
+    /// The report of a change to the ground, at the tick of the change.
     pub fn report(&self, change: Change) -> Report {
         Report { change, place: self.place, touch: (self.touch_mps * 10.0) as u16 }
     }
@@ -634,7 +647,7 @@ impl Flight {
 
     /// When it first hit something in this mishap; `None` where it did not.
     pub fn struck_at(&self) -> Option<Instant> {
-        (self.worst[Kind::Impact as usize] > 0.0).then_some(self.hit_at)
+        (self.signs.worst[Kind::Impact as usize] > 0.0).then_some(self.hit_at)
     }
 
     /// The height above home of the last place that was told, metres.
@@ -646,6 +659,11 @@ impl Flight {
     pub(crate) const fn touch_mps(&self) -> f32 {
         self.touch_mps
     }
+}
+
+/// When a message was received last, if it has the values.
+fn measured<T>(latest: &Latest<T>, has_values: impl Fn(&T) -> bool) -> Option<Instant> {
+    latest.at().filter(|_| latest.get().is_some_and(has_values))
 }
 
 #[cfg(test)]

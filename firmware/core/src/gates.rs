@@ -27,12 +27,14 @@ pub(crate) const ONE_CONTROL: u16 = 1 << 8;
 /// The first receiver has been exact for 15 s: `AHRS_RP_P` 0.2 makes DCM level within three time constants of 5 s.
 pub(crate) const EXACT: u16 = 1 << 9;
 
-const TURNED: Span = Span::from_secs(1);
+/// It has turned fast if it did so within this.
+pub(crate) const TURNED: Span = Span::from_secs(1);
 /// Older motion says nothing.
 const FRESH: Span = Span::from_secs(1);
 const EXACT_FOR: Span = Span::from_secs(15);
 pub(crate) const LEVEL_MPS: f32 = 2.0;
-const LEANS_RAD: f32 = 0.6;
+/// 34 degrees: a bank in which all the thrust may not carry a multicopter.
+pub(crate) const LEANS_RAD: f32 = 0.6;
 
 /// The conditions at the last step.
 #[derive(Clone, Copy, Debug)]

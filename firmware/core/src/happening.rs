@@ -36,17 +36,13 @@ pub enum Happening {
 const WAITING_MAX: usize = 8;
 
 /// Happenings in order.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Happenings {
     waiting: [Option<Happening>; WAITING_MAX],
     lost: u16,
 }
 
 impl Happenings {
-    pub(crate) const fn new() -> Self {
-        Self { waiting: [None; WAITING_MAX], lost: 0 }
-    }
-
     pub(crate) fn push(&mut self, happening: Happening) {
         match self.waiting.iter_mut().find(|place| place.is_none()) {
             Some(place) => *place = Some(happening),

@@ -11,6 +11,7 @@
 //! Forces are smoothed (`SMOOTHING_S`), because motors shake a vehicle that stands. Where the messages do not have both force and
 //! rates, nothing is said.
 
+use crate::motion::TILTED_RAD;
 use crate::observation::Imu;
 use crate::time::{Instant, Span, Stamp};
 use crate::units::{GRAVITY, MetresPerSecond2, Radians, RadiansPerSecond, norm};
@@ -23,26 +24,25 @@ const SMOOTHING_S: f32 = 0.3;
 const LASTS: Span = Span::from_millis(1_500);
 /// Older samples say nothing.
 const FRESH: Span = Span::from_secs(1);
-/// What turns faster than this, rad/s (40 degrees a second), turns fast; what turns slower than that on the average, rad/s (29
-/// degrees a second: more than the offset of a gyro that still flies), is still.
+/// A fast turn is above 0.7 rad/s (40 degrees a second). A still vehicle turns slower than 0.5 rad/s (29 degrees a second) on the average: more
+/// than the offset of a gyro that still flies.
 const TURNS_RATE: f32 = 0.7;
 const STILL_RATE: f32 = 0.5;
 /// A rate that stays within the first of these, rad/s, and below the second, is an offset: nothing turns so steadily and is carried as
 /// at rest.
 const STEADY_RATE: f32 = 0.15;
 const OFFSET_RATE: f32 = 1.2;
-/// 45 degrees: an attitude beyond is contradicted by what is level. It is believed again within 20 degrees.
-const TILTED_RAD: f32 = 0.785;
+/// An attitude that was contradicted is believed again within 20 degrees.
 const AGREES_RAD: f32 = 0.35;
 const TILTED: Span = Span::from_millis(500);
-/// The weight of what is at rest, in units of gravity, with the scale error and the offset of a sensor.
+/// Load factor at rest, with the scale error and the offset of a sensor.
 const REST_G: core::ops::Range<f32> = 0.75..1.25;
 /// The cosines of 30 degrees, within which a vehicle is level, and of 60, beyond which it lies over.
 const LEVEL: f32 = 0.866;
 const OVER: f32 = 0.5;
 /// Time constant of the steps from sample to sample.
 const SHAKES_S: f32 = 0.5;
-/// They are known so long after the first.
+/// The steps are known this long after the first sample.
 const STEPS_KNOWN: Span = Span::from_secs(2);
 /// Motors that carry a vehicle make the steps so many times those at rest, and by more than a sensor's noise changes, m/s2.
 const SHAKES: f32 = 2.5;
@@ -50,10 +50,10 @@ const SHAKES_MPS2: f32 = 0.01;
 /// Rotors that carry a vehicle make the steps larger than this, m/s2: 0.11 is the least of real flights (5 % of 13 logs), 0.09 the
 /// most of boards that stood (95 % of 6 logs, but for where they were handled). Simulators have no noise.
 const CALM_MPS2: f32 = 0.1;
-/// What is not felt for so long is not known to have lasted, s.
+/// A longer gap between samples ends each course, s.
 const GAP_S: f32 = 2.0;
-/// It lies over for so long before that is believed.
-const LIES: Span = Span::from_millis(700);
+/// It lies over this long before it counts.
+pub(crate) const LIES: Span = Span::from_millis(700);
 
 /// What accelerometer and gyros say.
 #[derive(Clone, Copy, Debug)]
@@ -191,7 +191,7 @@ impl Inertial {
         known.then_some(self.step > SHAKES * self.step_at_rest + SHAKES_MPS2)
     }
 
-    /// Whether it shakes less than what is carried by rotors. What has no noise, as simulators have none, is calm too.
+    /// Whether it shakes less than what is carried by rotors. Simulators have no noise: they are calm too.
     pub(crate) fn is_calm(&self, now: Instant) -> bool {
         self.has_steps(now) && self.step < CALM_MPS2
     }
@@ -247,7 +247,7 @@ impl Inertial {
         along < FAR * norm(self.force)
     }
 
-    /// Whether the estimator's attitude is not that of the vehicle.
+    /// Whether the sensors contradict the estimator's attitude.
     pub fn contradicts(&self, now: Instant) -> bool {
         self.contradicts && self.is_fresh(now)
     }

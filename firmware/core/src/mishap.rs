@@ -1,4 +1,4 @@
-//! What is told of a mishap: what, where, and in which words.
+//! Reports of a mishap: kind, place and text.
 
 use core::fmt::Write as _;
 
@@ -83,13 +83,13 @@ pub enum Change {
     Down,
     /// It flies on.
     FliesOn,
-    /// What was down flies again.
+    /// A vehicle that was down flies again.
     FliesAgain,
     /// It was seen, but not in a flight.
     OnBench(Kind),
 }
 
-/// What the ground is told of a mishap.
+/// A report to the ground.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Report {
     /// What happened.
@@ -104,7 +104,7 @@ pub struct Report {
 const TEXT_MAX: usize = 44;
 
 impl Report {
-    /// What the ground is told, after our name: what and where.
+    /// The text for the ground, after our name: event and place.
     pub fn text(&self) -> String<TEXT_MAX> {
         let mut text = String::new();
         let Self { change, place, touch } = self;

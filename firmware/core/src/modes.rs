@@ -1,4 +1,4 @@
-//! What a flight mode says of who flies: the numbers are `HEARTBEAT.custom_mode` of `ArduPilot` and PX4.
+//! Flight modes, by who flies: the numbers are `HEARTBEAT.custom_mode` of `ArduPilot` and PX4.
 
 use crate::observation::{Autopilot, Heartbeat, VehicleKind};
 use crate::vehicle::Vehicle;

@@ -17,7 +17,6 @@ use crate::health::exceedance::Exceedances;
 use crate::health::{Finding, Health, Inputs, Subsystem};
 use crate::latest::Latest;
 use crate::lifetime::{ItemKey, Lifetime, Saving};
-use crate::mishap::Change;
 use crate::observation::{Feeds, Observation, Source};
 use crate::params::{Param, Params};
 use crate::protect::{Protect, Request, Situation};
@@ -130,9 +129,9 @@ impl Monitor {
                 wear_next: 0,
                 trends: Trends::new(),
                 snapshots: Snapshots::new(),
-                protect: Protect::new(),
+                protect: Protect::default(),
                 saving: Saving::new(),
-                happenings: Happenings::new(),
+                happenings: Happenings::default(),
                 before_tick: Before::NOTHING,
                 ticked_at: Instant::ZERO,
                 cells_told: false,
@@ -166,7 +165,7 @@ impl Monitor {
         self.wear = [None; COMPONENTS_MAX];
         self.health.clear();
         self.exceedances.end(self.ticked_at);
-        self.protect = Protect::new();
+        self.protect = Protect::default();
         self.usage.break_off();
         self.parameters_asked = false;
         self.happenings.push(Happening::OtherVehicle);
@@ -175,7 +174,7 @@ impl Monitor {
     /// The autopilot was powered on again since the last observation: the flight of before is over, though nobody saw how it ended.
     pub fn begin_anew(&mut self) {
         self.flight = Flight::grounded();
-        self.protect = Protect::new();
+        self.protect = Protect::default();
         self.usage.break_off();
     }
 
@@ -252,12 +251,9 @@ impl Monitor {
 
     /// The flight's own step.
     fn step_flight(&mut self, now: Instant) -> Option<FlightEvent> {
-        let Self { vehicle, flight, usage, params, happenings, .. } = self;
+        let Self { vehicle, flight, params, happenings, .. } = self;
         let (change, event) = flight.step(now, vehicle, params);
         if let Some(change) = change {
-            if change == Change::Down && event == Some(FlightEvent::Landing) {
-                usage.count_mishap(flight.touch_mps());
-            }
             happenings.push(Happening::Mishap(change));
         }
         if flight.is_at_rest(now, vehicle) {

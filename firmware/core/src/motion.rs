@@ -11,7 +11,7 @@ pub(crate) const SPEED_MAX_MPS: f32 = 1_000.0;
 /// With less throttle no rotors carry anything: hover takes a quarter to three quarters.
 pub(crate) const IDLE_THROTTLE: f32 = 0.1;
 
-/// Height above home; above the local origin where there is no global position.
+/// Height above home, or above the local origin without a global position.
 pub fn height_m(now: Instant, vehicle: &Vehicle) -> Option<f32> {
     let global = vehicle.global.within(now, MOTION_AGE).map(|global| global.relative_altitude.0);
     let local = || vehicle.local.within(now, MOTION_AGE).map(|local| -local.position[2].0);
@@ -32,7 +32,7 @@ pub(crate) fn airspeed_mps(now: Instant, vehicle: &Vehicle) -> Option<f32> {
         .filter(|speed| (0.0..=SPEED_MAX_MPS).contains(speed))
 }
 
-/// The altitude of the pilot's display, of the barometer where there is no position.
+/// The altitude of the pilot's display, which is the barometer's without a position.
 pub(crate) fn altitude_m(now: Instant, vehicle: &Vehicle) -> Option<f32> {
     let hud = vehicle.hud.within(now, MOTION_AGE);
     hud.and_then(|hud| hud.altitude).map(|altitude| altitude.0).filter(|height_m| height_m.is_finite())
@@ -43,7 +43,7 @@ pub fn climb_mps(now: Instant, vehicle: &Vehicle) -> Option<f32> {
     climb_within(now, vehicle, MOTION_AGE)
 }
 
-/// The same, of what is no older.
+/// The same, from values up to this age.
 pub(crate) fn climb_within(now: Instant, vehicle: &Vehicle, age: Span) -> Option<f32> {
     let global = vehicle.global.within(now, age).map(|global| -global.velocity[2].0);
     let local = || vehicle.local.within(now, age).map(|local| -local.velocity[2].0);
@@ -62,6 +62,9 @@ pub fn ground_speed_mps(now: Instant, vehicle: &Vehicle) -> Option<f32> {
     global.or_else(local).or_else(hud).filter(|speed| (0.0..=SPEED_MAX_MPS).contains(speed))
 }
 
+/// Beyond 45 degrees of roll or pitch rotors carry less than 0.7 of their thrust upwards: a level vehicle is not there, and one that rests
+/// there lies.
+pub(crate) const TILTED_RAD: f32 = core::f32::consts::FRAC_PI_4;
 /// Values older than this are none of now.
 pub(crate) const FRESH: Span = Span::from_secs(2);
 /// Above this height over the place of arming a vehicle is in the air, and clear of the ground: heights of receivers and barometers move by
@@ -116,7 +119,7 @@ impl WindowMax {
 pub(crate) struct Kinematics {
     pub(crate) speed: WindowMax,
     pub(crate) sink: WindowMax,
-    /// Height of the place of arming, m; `None` if nobody saw the arming.
+    /// Height of the place of arming, m; `None` if the arming was not received.
     armed_m: Option<f32>,
     /// Displayed altitude while it stood without thrust, m.
     idle_m: Option<f32>,
@@ -156,14 +159,10 @@ impl Kinematics {
             return;
         };
         let ground_mps = ground_speed_mps(now, vehicle).unwrap_or(0.0);
-        if self.stands_for(now, STANDS) && ground_mps > speed.0 + 2.0 * STILL_MPS {
+        let stands = self.moved_at.is_some_and(|at| now.since(at) >= STANDS);
+        if stands && ground_mps > speed.0 + 2.0 * STILL_MPS {
             self.strayed_at = Some(now);
         }
-    }
-
-    /// Whether the receiver has stood for so long.
-    pub(crate) fn stands_for(&self, now: Instant, span: Span) -> bool {
-        self.moved_at.is_some_and(|at| now.since(at) >= span)
     }
 
     /// Whether the estimate moved within the last seconds while the receiver stood: it is lost.

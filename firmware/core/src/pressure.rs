@@ -7,7 +7,7 @@ use crate::time::{Instant, Span};
 
 /// Metres of height for a relative change of pressure: the scale height of air at 15 degrees, R T / (M g).
 pub(crate) const SCALE_HEIGHT_M: f32 = 8_430.0;
-/// A pressure that is older, or has not changed for longer, is no measurement of now.
+/// Age of a pressure, and how long it may stay the same.
 const FRESH: Span = Span::from_secs(2);
 /// A barometer that repeats its value for longer is stuck: its height is not known. One at rest repeats a value for a second or two.
 const STUCK: Span = Span::from_secs(5);
@@ -76,7 +76,7 @@ impl Pressure {
         (self.is_fresh(now) && now.since(self.changed_at) <= FRESH).then_some(self.hpa)
     }
 
-    /// Height above the place of arming, m; `None` if nobody saw the arming, or the barometer is stuck.
+    /// Height above the place of arming, m; `None` if the arming was not received, or the barometer is stuck.
     pub(crate) fn height_m(&self, now: Instant) -> Option<f32> {
         let known = self.armed_hpa > 0.0 && self.is_fresh(now) && now.since(self.changed_at) <= STUCK;
         known.then(|| self.rise_m(self.armed_hpa))

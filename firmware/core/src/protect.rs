@@ -23,8 +23,7 @@
 //! A mode change is the autopilot's own if the autopilot reports a new problem within `SIGN` of it, if it enters a mode in which
 //! failsafes wait, or if a mission ended. Any other mode change is the pilot's, and cancels the action for the flight.
 //!
-//! A return that is refused (no position) is followed by a landing, where the vehicle can land as it hangs: multicopters,
-//! helicopters, and a VTOL that says that it hovers. Nothing is asked of a vehicle that returns or lands already, by its mode, by its
+//! If a return is refused (no position), a landing follows on multicopters, helicopters, and a VTOL that reports a hover. Nothing is asked of a vehicle that returns or lands already, by its mode, by its
 //! landed state or because it sinks close above the ground, once one of these has lasted 2 s; until then the action waits. `ArduPlane` and PX4 tell a mission's landing by none of these:
 //! a mission that sinks in the last `APPROACH_M` is one (`approaches`). The control structure and what could go wrong with it are in
 //! docs/safety.md.
@@ -73,7 +72,7 @@ const TEMPORARILY_REJECTED: u8 = 1;
 /// `MAV_RESULT_IN_PROGRESS`: the answer is to come.
 const IN_PROGRESS: u8 = 5;
 
-/// What is asked for. The numbers are those of `PROT_ACTION`, and are stored.
+/// A requested action. The numbers are those of `PROT_ACTION`, and are stored.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Action {
@@ -125,7 +124,7 @@ pub enum Stage {
     CancelledOnGround = 4,
     /// Somebody sent the command to cancel.
     CancelledByCommand = 5,
-    /// What was critical no longer is; it may be announced again.
+    /// The critical level is over; it may be announced again.
     CancelledClear = 6,
     /// The autopilot is on its way already.
     AlreadyDone = 7,
@@ -177,7 +176,7 @@ impl Stage {
 /// A step of the protective action: to be recorded, and told where it has a text.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Step {
-    /// What it is about.
+    /// The action.
     pub action: Action,
     /// What happened.
     pub stage: Stage,
@@ -186,7 +185,7 @@ pub struct Step {
 }
 
 impl Step {
-    /// What the pilot is told, with its `MAV_SEVERITY`.
+    /// The text for the pilot, with its `MAV_SEVERITY`.
     pub fn text(&self) -> (u8, String<TEXT_BYTES_MAX>) {
         let name = self.action.name();
         let mut text = String::new();
@@ -257,7 +256,7 @@ enum Way {
     Landing,
 }
 
-/// What moves the state: the first of these that is so.
+/// The first of these that holds moves the state.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Input {
     FlightOver,
@@ -294,7 +293,7 @@ pub struct Protect {
     reason: Option<u16>,
 }
 
-/// What a step looks at.
+/// The inputs of a step.
 #[derive(Clone, Copy)]
 pub(crate) struct Situation<'a> {
     pub(crate) now: Instant,
@@ -314,23 +313,7 @@ impl Situation<'_> {
 }
 
 impl Protect {
-    /// Nothing to do.
-    pub const fn new() -> Self {
-        Self {
-            state: State::Idle,
-            action: Action::Return,
-            request: None,
-            cancelled: false,
-            mode: None,
-            changed_at: Stamp::NONE,
-            stepped_at: Stamp::NONE,
-            lands_since: Stamp::NONE,
-            landing_at: Stamp::NONE,
-            reason: None,
-        }
-    }
-
-    /// What is to be sent to the autopilot now, once.
+    /// The request for the autopilot, once.
     pub(crate) const fn take_request(&mut self) -> Option<Request> {
         self.request.take()
     }
@@ -359,7 +342,7 @@ impl Protect {
                 (ModeChanged, Some((Stage::CancelledByMode, 0)))
             }
             (OnItsWay(..), Input::Way(way)) => (OnItsWay(way, now), None),
-            // A flight that is over by a silence may go on: what the pilot cancelled stays so until it is disarmed.
+            // A flight that ended in a silence may go on. The pilot's cancel holds until disarming.
             (ModeChanged | Done, FlightOver) if vehicle.armed() => (Done, None),
             (OnItsWay(Way::Accepted, at), Flies)
                 if now.since(at) > HEEDED && !self.has_changed_since(now, vehicle, at) =>
@@ -383,7 +366,7 @@ impl Protect {
         told.map(|(stage, detail)| Step { action: self.action, stage, detail })
     }
 
-    /// What moves the state now.
+    /// The input of this step.
     fn input(&mut self, situation: &Situation<'_>) -> Input {
         let Situation { now, vehicle, flight, .. } = *situation;
         let cancelled = core::mem::take(&mut self.cancelled);
@@ -490,7 +473,7 @@ impl Protect {
         (next, Some((Stage::Answered, result)))
     }
 
-    /// Asks again where there is no answer, or for a landing.
+    /// Asks again without an answer, or for a landing.
     fn insist(&mut self, now: Instant, attempt: u8, at: Instant, progress: bool) -> Move {
         if attempt == 0 {
             self.action = Action::Land;
@@ -504,7 +487,7 @@ impl Protect {
     }
 }
 
-/// Whether it can come down where it is. A VTOL has to say that it hovers: a wind that stops it over the ground is no hover.
+/// Whether it can come down where it is. A VTOL has to report a hover: a headwind can stop it over the ground.
 fn hovers(situation: &Situation<'_>) -> bool {
     let Situation { now, vehicle, .. } = *situation;
     vehicle.hovers(now) == Some(true)
@@ -582,7 +565,7 @@ const PLANE: Modes = Modes {
 const COPTER: Modes =
     Modes { returns: &[6, 9, 21, 27], waits: 17, mission: 3, after_mission: &[5, 17], tells_landing: true };
 
-/// The modes of the vehicle's autopilot, where they are known.
+/// The modes of the vehicle's autopilot, if they are known.
 fn modes(vehicle: &Vehicle) -> Option<&'static Modes> {
     let heartbeat = vehicle.heartbeat.get()?;
     match (heartbeat.autopilot, heartbeat.kind) {

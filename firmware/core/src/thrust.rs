@@ -17,7 +17,7 @@ const HOVER_S: f32 = 10.0;
 /// Throttles come more often than this, s.
 const STEP_MAX_S: f32 = 2.0;
 
-/// What a throttle does to a vehicle.
+/// The effect of a throttle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Power {
     /// It does not carry the vehicle.
@@ -88,9 +88,9 @@ impl Thrust {
         self.has_flown
     }
 
-    /// Whether it had more than idling throttle within so long; `None` if it never had any, or tells none.
-    pub(crate) fn was_driven(&self, now: Instant, within: Span) -> Option<bool> {
-        (self.driven_at != Instant::ZERO).then(|| now.since(self.driven_at) <= within)
+    /// Whether it had more than idling throttle within so long.
+    pub(crate) fn was_driven(&self, now: Instant, within: Span) -> bool {
+        self.driven_at != Instant::ZERO && now.since(self.driven_at) <= within
     }
 }
 

@@ -2,12 +2,9 @@
 
 mod common;
 
-use common::{AUTOPILOT, Quad};
-use hums_core::Monitor;
+use common::{Quad, Run};
 use hums_core::observation::{Autopilot, Observation, VehicleKind, Wanted};
 use hums_core::params::Params;
-use hums_core::status::LinkReading;
-use hums_core::time::Instant;
 use hums_core::units::Radians;
 
 const BANK: f32 = 1.2;
@@ -15,35 +12,16 @@ const NOTHING: [&str; 0] = [];
 
 /// A minute in which it banks from 20 s on; `wanted` is the roll that the autopilot wants then, where it says so.
 fn banks(vehicle: &Quad, wanted: Option<f32>) -> Vec<&'static str> {
-    let mut monitor = Monitor::new(Params::defaults());
-    let mut findings = Vec::new();
-    for now_ms in (0..60_000).step_by(100) {
-        let now = Instant::from_millis(now_ms);
-        let mut quad = vehicle.clone();
-        let banks_for_ms = now_ms.checked_sub(20_000).filter(|ms| *ms < 5_000);
-        if banks_for_ms.is_some() {
-            quad.roll = BANK;
-        }
-        if let Some(roll) = wanted {
-            let roll = if banks_for_ms.is_some() { roll } else { 0.0 };
-            let wanted = Wanted { roll: Radians(roll), ..Wanted::default() };
-            monitor.observe(now, AUTOPILOT, &Observation::Wanted(wanted));
-        }
-        for said in quad.says(now_ms) {
-            monitor.observe(now, AUTOPILOT, &said);
-        }
-        for step in [0, 50] {
-            let now = Instant::from_millis(now_ms + step);
-            let link = LinkReading { frames_lost: Some(0.0), at: now };
-            monitor.tick(now, &link, &quad.recorder, &mut |finding| {
-                if matches!(finding.check, "roll" | "pitch") {
-                    findings.push(finding.check);
-                }
-            });
-        }
-    }
-    findings.dedup();
-    findings
+    let mut run = Run::new(&Params::defaults());
+    run.says(0..60_000, |now_ms| {
+        let is_banked = (20_000..25_000).contains(&now_ms);
+        let quad = Quad { roll: if is_banked { BANK } else { vehicle.roll }, ..vehicle.clone() };
+        let roll = |roll| Wanted { roll: Radians(if is_banked { roll } else { 0.0 }), ..Wanted::default() };
+        wanted.map(|wanted| Observation::Wanted(roll(wanted))).into_iter().chain(quad.says(now_ms)).collect()
+    });
+    let mut checks = run.checks();
+    checks.retain(|check| matches!(*check, "roll" | "pitch"));
+    checks
 }
 
 fn quad(autopilot: Autopilot, mode: u32) -> Quad {

@@ -3,7 +3,7 @@
 
 mod common;
 
-use common::{AUTOPILOT, Quad};
+use common::{AUTOPILOT, Quad, Run, observe};
 use hums_core::Monitor;
 use hums_core::cause::{Alert, Cause, Urgency};
 use hums_core::happening::Happening;
@@ -12,7 +12,6 @@ use hums_core::observation::{
 };
 use hums_core::params::Params;
 use hums_core::protect::{Action, Request, Stage, Step};
-use hums_core::status::LinkReading;
 use hums_core::time::Instant;
 use hums_core::units::{Fraction, MetresPerSecond2, RadiansPerSecond};
 
@@ -33,7 +32,6 @@ const MISSION: u32 = 0x0404_0000;
 const PRECLAND: u32 = 0x0904_0000;
 
 /// Steps and requests of a flight with their times in milliseconds.
-#[derive(Default)]
 struct Outcome {
     steps: Vec<(u64, Step)>,
     requests: Vec<(u64, Request)>,
@@ -73,30 +71,22 @@ fn fly(script: impl Fn(u64, &mut Quad, &mut Monitor)) -> Outcome {
 }
 
 fn fly_with(params: &Params, script: impl Fn(u64, &mut Quad, &mut Monitor)) -> Outcome {
-    let mut monitor = Monitor::new(*params);
-    let mut outcome = Outcome::default();
-    for now_ms in (0..60_000).step_by(50) {
-        let now = Instant::from_millis(now_ms);
+    let mut run = Run::new(params);
+    run.steps(0..60_000, |now_ms, monitor| {
         let mut quad = Quad::healthy();
         if now_ms >= EMPTY_MS {
             quad.battery.remaining = Some(Fraction(0.05));
         }
-        script(now_ms, &mut quad, &mut monitor);
+        script(now_ms, &mut quad, monitor);
         if now_ms.is_multiple_of(100) {
-            for observation in quad.says(now_ms) {
-                monitor.observe(now, AUTOPILOT, &observation);
-            }
+            observe(monitor, now_ms, AUTOPILOT, quad.says(now_ms));
         }
-        let link = LinkReading { frames_lost: Some(0.0), at: now };
-        monitor.tick(now, &link, &quad.recorder, &mut |_| {});
-        while let Some(happening) = monitor.take_happening() {
-            if let Happening::Protect(step) = happening {
-                outcome.steps.push((now_ms, step));
-            }
-        }
-        outcome.requests.extend(monitor.take_request().map(|request| (now_ms, request)));
-    }
-    outcome
+    });
+    let step = |(at_ms, happening)| match happening {
+        Happening::Protect(step) => Some((at_ms, step)),
+        _ => None,
+    };
+    Outcome { steps: run.happenings.into_iter().filter_map(step).collect(), requests: run.requests }
 }
 
 /// Says something once.

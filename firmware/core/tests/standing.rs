@@ -2,28 +2,19 @@
 
 mod common;
 
-use common::{AUTOPILOT, Quad};
-use hums_core::Monitor;
+use common::{Quad, Run};
 use hums_core::observation::{Air, Hud, Imu, LandedState, Observation, VehicleKind};
 use hums_core::params::Params;
-use hums_core::status::{LinkReading, RecorderStatus};
-use hums_core::time::Instant;
 use hums_core::units::{Fraction, Hectopascals, Metres, MetresPerSecond, MetresPerSecond2, RadiansPerSecond};
 use hums_core::usage::UsageCounter;
 
 /// Flights and landings of two minutes, of what a script says.
 fn counts(script: impl Fn(u64) -> Vec<Observation>) -> (u32, u32) {
-    let mut monitor = Monitor::new(Params::defaults());
-    for now_ms in (0..120_000).step_by(100) {
-        let now = Instant::from_millis(now_ms);
-        for said in script(now_ms) {
-            monitor.observe(now, AUTOPILOT, &said);
-        }
-        let link = LinkReading { frames_lost: Some(0.0), at: now };
-        monitor.tick(now, &link, &RecorderStatus::default(), &mut |_| ());
-    }
-    let count = |of| monitor.usage().value(of).unwrap_or(0.0) as u32;
-    (count(UsageCounter::Flights), count(UsageCounter::Landings))
+    let mut run = Run::new(&Params::defaults());
+    run.says(0..120_000, script);
+    let [flights, landings, _] =
+        run.counts([UsageCounter::Flights, UsageCounter::Landings, UsageCounter::Mishaps]);
+    (flights, landings)
 }
 
 /// As the autopilot says: in the air from its arming on.

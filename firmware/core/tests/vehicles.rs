@@ -3,116 +3,95 @@
 
 mod common;
 
-use common::{AUTOPILOT, Quad};
-use hums_core::Monitor;
+use common::{AUTOPILOT, Quad, Run, observe};
 use hums_core::happening::Happening;
-use hums_core::health::Finding;
 use hums_core::lifetime::{Airframe, Item as _, ItemKey, Lifetime};
 use hums_core::observation::{
     Autopilot, AutopilotIdentity, Esc, EscGroup, Heartbeat, LandedState, Observation, Source, VehicleKind,
     VtolState,
 };
 use hums_core::params::Params;
-use hums_core::status::LinkReading;
-use hums_core::time::Instant;
 use hums_core::units::{Amperes, Rpm, Volts};
 use hums_core::usage::UsageCounter;
 
 const OTHER: Source = Source { system: 7, component: 1 };
 
 /// A monitor whose stored life is of this airframe.
-fn with_life_of(airframe: Airframe) -> Monitor {
-    let mut monitor = Monitor::new(Params::defaults());
+fn with_life_of(airframe: Airframe) -> Run {
+    let mut run = Run::new(&Params::defaults());
     let life = Lifetime { airframe, boots: 41, ..Lifetime::new() };
     let mut bytes = [0; Lifetime::BYTES];
     life.encode(&mut bytes);
-    monitor.restore(ItemKey::Lifetime, &bytes).unwrap();
-    monitor
+    run.monitor.restore(ItemKey::Lifetime, &bytes).unwrap();
+    run
 }
 
-/// Steps the monitor from `from_ms` to `to_ms`; `say` gives what is said at each tenth of a second, and by whom.
-fn run(
-    monitor: &mut Monitor,
-    from_ms: u64,
-    to_ms: u64,
-    say: impl Fn(u64) -> Vec<(Source, Vec<Observation>)>,
-) -> (Vec<Finding>, Vec<(u64, Happening)>) {
-    let (mut findings, mut happenings) = (Vec::new(), Vec::new());
-    for now_ms in (from_ms..to_ms).step_by(50) {
-        let now = Instant::from_millis(now_ms);
-        if now_ms.is_multiple_of(100) {
-            for (source, said) in say(now_ms) {
-                for observation in said {
-                    monitor.observe(now, source, &observation);
-                }
-            }
-        }
-        let link = LinkReading { frames_lost: Some(0.0), at: now };
-        monitor.tick(now, &link, &Quad::healthy().recorder, &mut |finding| findings.push(*finding));
-        while let Some(happening) = monitor.take_happening() {
-            happenings.push((now_ms, happening));
-        }
-    }
-    (findings, happenings)
-}
-
-fn forwarded_heartbeat(now_ms: u64) -> (Source, Vec<Observation>) {
-    let heartbeat = Heartbeat { kind: VehicleKind::Plane, ..Heartbeat::default() };
-    let due = now_ms.is_multiple_of(1_000);
-    (OTHER, due.then_some(Observation::Heartbeat(heartbeat)).into_iter().collect())
+/// A minute of what the autopilot says.
+fn minute(says: impl Fn(u64) -> Vec<Observation>) -> Run {
+    let mut run = Run::new(&Params::defaults());
+    run.says(0..60_000, says);
+    run
 }
 
 #[test]
 fn another_vehicles_heartbeat_that_is_forwarded_first_does_not_make_it_the_vehicle() {
-    let mut monitor = with_life_of(Airframe { system: 1, uid: 0 });
-    let (_, happenings) = run(&mut monitor, 0, 60_000, |now_ms| {
-        let quad = if now_ms < 200 { Vec::new() } else { Quad::healthy().says(now_ms) };
-        vec![forwarded_heartbeat(now_ms), (AUTOPILOT, quad)]
+    let mut run = with_life_of(Airframe { system: 1, uid: 0 });
+    run.steps(0..60_000, |now_ms, monitor| {
+        if now_ms.is_multiple_of(1_000) {
+            let heartbeat = Heartbeat { kind: VehicleKind::Plane, ..Heartbeat::default() };
+            observe(monitor, now_ms, OTHER, [Observation::Heartbeat(heartbeat)]);
+        }
+        if now_ms >= 200 && now_ms.is_multiple_of(100) {
+            observe(monitor, now_ms, AUTOPILOT, Quad::healthy().says(now_ms));
+        }
     });
-    assert_eq!(monitor.vehicle().source, Some(AUTOPILOT));
-    assert_eq!(monitor.usage().value(UsageCounter::Flights), Some(1.0));
-    let others = happenings.iter().filter(|(_, happening)| *happening == Happening::OtherAirframe);
-    assert_eq!(others.count(), 0, "its life goes on: {happenings:?}");
-    assert_eq!(monitor.lifetime().boots, 42);
+    assert_eq!(run.monitor.vehicle().source, Some(AUTOPILOT));
+    assert_eq!(run.monitor.usage().value(UsageCounter::Flights), Some(1.0));
+    let is_other = run.happenings.iter().any(|(_, happening)| *happening == Happening::OtherAirframe);
+    assert!(!is_other, "its life goes on: {:?}", run.happenings);
+    assert_eq!(run.monitor.lifetime().boots, 42);
 }
 
 #[test]
 fn a_system_id_that_is_changed_is_followed_and_the_life_of_its_unique_id_goes_on() {
     let airframe = Airframe { system: 1, uid: 99 };
-    let mut monitor = with_life_of(airframe);
+    let mut run = with_life_of(airframe);
     let identity = Observation::Identity(AutopilotIdentity { uid: 99, ..AutopilotIdentity::default() });
-    let says = |source: Source| {
-        move |now_ms: u64| {
-            let mut said = Quad { armed: false, height: 0.0, ..Quad::healthy() }.says(now_ms);
-            said.extend((now_ms % 20_000 == 19_000).then_some(identity));
-            vec![(source, said)]
-        }
-    };
-    run(&mut monitor, 0, 30_000, says(AUTOPILOT));
-    let (_, happenings) = run(&mut monitor, 30_000, 90_000, says(OTHER));
-    assert_eq!(monitor.vehicle().source, Some(OTHER));
-    let changes: Vec<_> = happenings.iter().filter(|(_, what)| *what == Happening::OtherVehicle).collect();
-    assert!(matches!(changes[..], [(59_900..62_000, _)]), "{happenings:?}");
-    assert!(happenings.iter().all(|(_, what)| *what != Happening::OtherAirframe), "{happenings:?}");
-    assert_eq!(monitor.lifetime().airframe, Airframe { system: 7, uid: 99 });
+    for (times_ms, source) in [(0..30_000, AUTOPILOT), (30_000..90_000, OTHER)] {
+        run.steps(times_ms, |now_ms, monitor| {
+            if now_ms.is_multiple_of(100) {
+                let said = Quad { armed: false, height: 0.0, ..Quad::healthy() }.says(now_ms);
+                let identity = (now_ms % 20_000 == 19_000).then_some(identity);
+                observe(monitor, now_ms, source, said.into_iter().chain(identity));
+            }
+        });
+    }
+    assert_eq!(run.monitor.vehicle().source, Some(OTHER));
+    let changes = run.happenings.iter().filter(|(_, what)| *what == Happening::OtherVehicle);
+    let changed_ms: Vec<_> = changes.map(|(at_ms, _)| *at_ms).collect();
+    assert!(matches!(changed_ms[..], [59_900..62_000]), "{:?}", run.happenings);
+    assert!(run.happenings.iter().all(|(_, what)| *what != Happening::OtherAirframe), "{:?}", run.happenings);
+    assert_eq!(run.monitor.lifetime().airframe, Airframe { system: 7, uid: 99 });
 }
 
 #[test]
 fn what_another_system_says_is_judged_by_nobody() {
-    let mut monitor = Monitor::new(Params::defaults());
-    let (findings, _) = run(&mut monitor, 0, 60_000, |now_ms| {
-        let mut bad = Quad::healthy();
-        bad.vibration.levels = [Some(90.0); 3];
-        bad.estimator.velocity = Some(9.0);
-        vec![(AUTOPILOT, Quad::healthy().says(now_ms)), (OTHER, bad.says(now_ms))]
+    let mut run = Run::new(&Params::defaults());
+    run.steps(0..60_000, |now_ms, monitor| {
+        if now_ms.is_multiple_of(100) {
+            let mut bad = Quad::healthy();
+            bad.vibration.levels = [Some(90.0); 3];
+            bad.estimator.velocity = Some(9.0);
+            observe(monitor, now_ms, AUTOPILOT, Quad::healthy().says(now_ms));
+            observe(monitor, now_ms, OTHER, bad.says(now_ms));
+        }
     });
-    assert_eq!(findings, []);
+    assert_eq!(run.findings, []);
 }
 
 /// A minute of flight of a vehicle of this kind that banks to 70 degrees and whose first motor turns half as fast.
 fn banked(kind: VehicleKind, type_number: u8) -> Vec<&'static str> {
-    let mut monitor = Monitor::new(Params::defaults());
-    let (findings, _) = run(&mut monitor, 0, 60_000, |now_ms| {
+    let run = minute(|now_ms| {
         let mut vehicle = Quad { kind, type_number, ..Quad::healthy() };
         if (20_000..25_000).contains(&now_ms) {
             vehicle.roll = 1.2;
@@ -120,12 +99,9 @@ fn banked(kind: VehicleKind, type_number: u8) -> Vec<&'static str> {
         if let Some(esc) = vehicle.escs[0].as_mut() {
             esc.rpm = Some(Rpm(2_500.0));
         }
-        vec![(AUTOPILOT, vehicle.says(now_ms))]
+        vehicle.says(now_ms)
     });
-    let mut checks: Vec<_> = findings.iter().map(|finding| finding.check).collect();
-    checks.sort_unstable();
-    checks.dedup();
-    checks
+    run.checks()
 }
 
 #[test]
@@ -137,83 +113,63 @@ fn what_is_a_fault_of_a_multicopter_is_none_of_a_plane_a_vtol_or_a_helicopter() 
     }
 }
 
-/// Says it restarted at 29 s, armed or not, after so long a silence; the findings.
-fn restarted(armed: bool, silent_ms: u64) -> Vec<&'static str> {
-    let mut monitor = Monitor::new(Params::defaults());
-    let (findings, _) = run(&mut monitor, 0, 60_000, |now_ms| {
+/// Says it restarted at 29 s, armed or not, after so long a silence; whether that is an alarm.
+fn restarted(armed: bool, silent_ms: u64) -> bool {
+    let run = minute(|now_ms| {
         let height = if armed { 20.0 } else { 0.0 };
         let mut quad = Quad { armed: armed && now_ms < 30_000, height, ..Quad::healthy() };
         if now_ms >= 30_000 {
             quad.boot_offset_ms = -29_000;
         }
         quad.silent = (30_000 - silent_ms..30_000).contains(&now_ms);
-        vec![(AUTOPILOT, quad.says(now_ms))]
+        quad.says(now_ms)
     });
-    assert_eq!(monitor.vehicle().reboots, 1);
-    findings
-        .iter()
-        .filter(|finding| finding.check == "autopilot_reboot")
-        .map(|finding| finding.check)
-        .collect()
+    assert_eq!(run.monitor.vehicle().reboots, 1);
+    run.checks().contains(&"autopilot_reboot")
 }
 
 #[test]
 fn an_autopilot_that_restarts_on_the_ground_is_counted_and_one_that_restarts_armed_is_an_alarm() {
-    assert!(restarted(false, 0).is_empty());
-    assert!(!restarted(true, 0).is_empty());
-    assert!(!restarted(true, 5_000).is_empty());
-    assert!(
-        restarted(true, 15_000).is_empty(),
-        "nobody knows what it did in a long silence: it may have landed"
-    );
+    // Nobody knows what it did in a long silence: it may have landed.
+    for (armed, silent_ms, is_alarm) in
+        [(false, 0, false), (true, 0, true), (true, 5_000, true), (true, 15_000, false)]
+    {
+        assert_eq!(restarted(armed, silent_ms), is_alarm, "{armed} {silent_ms}");
+    }
 }
 
 /// Flies a VTOL that is this way by its own word, with something wrong from 20 to 25 s; the checks that found something.
 fn checks_of_a_vtol(vtol: VtolState, wrong: impl Fn(&mut Quad)) -> Vec<&'static str> {
-    let mut monitor = Monitor::new(Params::defaults());
-    let (findings, _) = run(&mut monitor, 0, 60_000, |now_ms| {
+    let run = minute(|now_ms| {
         let kind = VehicleKind::Vtol;
         let landed = Some(if now_ms < 2_000 { LandedState::OnGround } else { LandedState::InAir });
         let mut vehicle = Quad { kind, type_number: 22, landed, vtol, mode: 10, ..Quad::healthy() };
         if (20_000..25_000).contains(&now_ms) {
             wrong(&mut vehicle);
         }
-        vec![(AUTOPILOT, vehicle.says(now_ms))]
+        vehicle.says(now_ms)
     });
-    let mut checks: Vec<_> = findings.iter().map(|finding| finding.check).collect();
-    checks.dedup();
-    checks
+    run.checks()
 }
 
 #[test]
-fn a_vtol_that_hovers_is_judged_as_what_hangs_on_rotors_and_on_its_wings_it_banks_as_it_needs() {
-    for (vtol, expected) in [
-        (VtolState::Hover, vec!["roll"]),
-        (VtolState::Forward, vec![]),
-        (VtolState::Transition, vec![]),
-        (VtolState::Unknown, vec![]),
-    ] {
-        assert_eq!(checks_of_a_vtol(vtol, |vehicle| vehicle.roll = 1.2), expected, "{vtol:?}");
-    }
-}
-
-#[test]
-fn the_motors_that_lift_a_vtol_may_stop_when_it_flies_on_its_wings() {
+fn a_vtol_that_hovers_is_judged_as_a_multicopter_and_on_its_wings_it_banks_and_its_lifting_motors_stop() {
     let stop = |vehicle: &mut Quad| vehicle.escs[1].as_mut().unwrap().current = Some(Amperes(0.0));
-    for (vtol, expected) in [
-        (VtolState::Hover, vec!["motor_loss"]),
-        (VtolState::Forward, vec![]),
-        (VtolState::Transition, vec![]),
+    for (vtol, banked, stopped) in [
+        (VtolState::Hover, Some("roll"), Some("motor_loss")),
+        (VtolState::Forward, None, None),
+        (VtolState::Transition, None, None),
     ] {
-        assert_eq!(checks_of_a_vtol(vtol, stop), expected, "{vtol:?}");
+        assert_eq!(checks_of_a_vtol(vtol, |vehicle| vehicle.roll = 1.2), Vec::from_iter(banked), "{vtol:?}");
+        assert_eq!(checks_of_a_vtol(vtol, stop), Vec::from_iter(stopped), "{vtol:?}");
     }
+    assert!(checks_of_a_vtol(VtolState::Unknown, |vehicle| vehicle.roll = 1.2).is_empty());
 }
 
 #[test]
 fn a_hexacopter_with_one_dead_motor_has_one_motor_named() {
     for dead in 0..6 {
-        let mut monitor = Monitor::new(Params::defaults());
-        let (findings, _) = run(&mut monitor, 0, 60_000, |now_ms| {
+        let run = minute(|now_ms| {
             let mut hexa = Quad { type_number: 13, ..Quad::healthy() };
             let esc = hexa.escs[0].unwrap();
             // The others make up for it, the one opposite less than its neighbours.
@@ -229,18 +185,18 @@ fn a_hexacopter_with_one_dead_motor_has_one_motor_named() {
             let more = [4, 5].map(|motor| Some(Esc { rpm: Some(Rpm(rpm(motor))), ..esc }));
             let mut said = hexa.says(now_ms);
             said.push(Observation::Escs(EscGroup { first: 4, escs: [more[0], more[1], None, None] }));
-            vec![(AUTOPILOT, said)]
+            said
         });
-        let mut named: Vec<_> = findings.iter().map(|finding| (finding.check, finding.instance)).collect();
+        let mut named: Vec<_> =
+            run.findings.iter().map(|finding| (finding.check, finding.instance)).collect();
         named.dedup();
-        assert_eq!(named, [("motor_imbalance", dead as u8)], "{findings:?}");
+        assert_eq!(named, [("motor_imbalance", dead as u8)], "{:?}", run.findings);
     }
 }
 
 #[test]
 fn a_link_that_is_silent_is_told_as_such_and_not_as_silent_escs() {
-    let mut monitor = Monitor::new(Params::defaults());
-    let (findings, _) = run(&mut monitor, 0, 60_000, |now_ms| {
+    let run = minute(|now_ms| {
         let mut said = Quad::healthy().says(now_ms);
         match now_ms {
             20_000..24_500 => said.clear(),
@@ -248,18 +204,15 @@ fn a_link_that_is_silent_is_told_as_such_and_not_as_silent_escs() {
             24_500..24_700 => said.retain(|said| !matches!(said, Observation::Escs(_))),
             _ => {}
         }
-        vec![(AUTOPILOT, said)]
+        said
     });
-    let mut checks: Vec<_> = findings.iter().map(|finding| finding.check).collect();
-    checks.dedup();
-    assert_eq!(checks, ["heartbeat"], "{findings:?}");
+    assert_eq!(run.checks(), ["heartbeat"], "{:?}", run.findings);
 }
 
 #[test]
 fn speeds_that_are_held_and_zeros_of_lost_telemetry_say_nothing_about_a_motor() {
     for silent in [true, false] {
-        let mut monitor = Monitor::new(Params::defaults());
-        let (findings, _) = run(&mut monitor, 0, 60_000, |now_ms| {
+        let run = minute(|now_ms| {
             let mut quad = Quad::healthy();
             // One motor is a little faster than the others, as they are.
             quad.escs[1].as_mut().unwrap().rpm = Some(Rpm(5_600.0));
@@ -272,9 +225,9 @@ fn speeds_that_are_held_and_zeros_of_lost_telemetry_say_nothing_about_a_motor() 
                     }
                 }
             }
-            vec![(AUTOPILOT, quad.says(now_ms))]
+            quad.says(now_ms)
         });
-        assert!(findings.iter().all(|finding| finding.check != "motor_imbalance"), "{silent}: {findings:?}");
+        assert!(!run.checks().contains(&"motor_imbalance"), "{silent}: {:?}", run.findings);
     }
 }
 
@@ -328,29 +281,16 @@ fn each_class_of_vehicle_flies_banks_and_is_protected_as_its_class_on_both_autop
         [Autopilot::ArduPilot, Autopilot::Px4].map(|autopilot| [(autopilot, false), (autopilot, true)]);
     for (autopilot, says_landed) in ways.into_iter().flatten() {
         for class in CLASSES {
-            let (mut monitor, mut checks, mut requests) = (Monitor::new(params), Vec::new(), 0);
-            for now_ms in (0..90_000).step_by(50) {
-                let now = Instant::from_millis(now_ms);
-                let vehicle = out_and_back(autopilot, class, says_landed, now_ms);
-                let said = if now_ms.is_multiple_of(100) { vehicle.says(now_ms) } else { Vec::new() };
-                for observation in said {
-                    monitor.observe(now, AUTOPILOT, &observation);
-                }
-                let link = LinkReading { frames_lost: Some(0.0), at: now };
-                monitor.tick(now, &link, &vehicle.recorder, &mut |finding| checks.push(finding.check));
-                requests += usize::from(monitor.take_request().is_some());
-            }
+            let mut run = Run::new(&params);
+            run.says(0..90_000, |now_ms| out_and_back(autopilot, class, says_landed, now_ms).says(now_ms));
             let of = format!("{autopilot:?} {class:?} {says_landed}");
             let flies = class.0 != VehicleKind::Surface;
-            let counted = [UsageCounter::Flights, UsageCounter::Landings, UsageCounter::Mishaps]
-                .map(|counter| monitor.usage().value(counter).unwrap_or(0.0) as u32);
+            let counted = run.counts([UsageCounter::Flights, UsageCounter::Landings, UsageCounter::Mishaps]);
             assert_eq!(counted, [u32::from(flies), u32::from(flies), 0], "{of}");
-            checks.sort_unstable();
-            checks.dedup();
             let hangs = class.0 == VehicleKind::Rotorcraft || (class.0 == VehicleKind::Vtol && says_landed);
             let expected: &[&str] = if hangs { &["cell_voltage", "roll"] } else { &["cell_voltage"] };
-            assert_eq!(checks, expected, "{of}");
-            assert_eq!(requests > 0, flies, "{of}: {requests}");
+            assert_eq!(run.checks(), expected, "{of}");
+            assert_eq!(!run.requests.is_empty(), flies, "{of}");
         }
     }
 }

@@ -1,22 +1,24 @@
 //! Signs of a mishap in each observation: no weight, shocks, rates, tilt and sink.
 
 use super::disarming::FALLING_MPS;
-use super::witness::{INERTIAL, Votes, is_fast, is_tilted, on_rotors};
+use super::witness::{INERTIAL, Votes, is_fast, on_rotors};
 use super::{DRIVEN, Flight, RECOVERED, Stage, WATCHED};
 use crate::derived::load_factor_g;
+use crate::gates::LEANS_RAD;
+use crate::inertial::LIES;
 use crate::mishap::Kind;
 use crate::modes::{has_pilots_throttle, is_made_to_turn, is_thrown};
-use crate::motion::{FRESH, STILL_MPS, climb_mps, ground_speed_mps, height_m, throttle};
+use crate::motion::{FRESH, STILL_MPS, TILTED_RAD, climb_mps, ground_speed_mps, height_m, throttle};
 use crate::observation::{Attitude, EstimatorScale, Imu, Observation, VehicleKind};
 use crate::params::{Param, Params};
 use crate::thrust::{FULL, Power};
-use crate::time::{Instant, Span};
+use crate::time::{Instant, Span, Stamp};
 use crate::units::{GRAVITY, MetresPerSecond2, RadiansPerSecond, norm};
 use crate::vehicle::Vehicle;
 
 /// Below this load factor, g, nothing carries the vehicle. A fall with the drag of a quad at its end speed is above it.
 const FALL_G: f32 = 0.3;
-/// Below this load factor, g, it falls: nobody asks a multicopter to sink so hard. A bounce is shorter than the first of these; a fall from
+/// Below this load factor, g, it falls: no multicopter sinks so hard on purpose. A bounce is shorter than the first of these; a fall from
 /// half a metre lasts as long as the second.
 const UNLOADED_G: f32 = 0.65;
 const UNLOADED: Span = Span::from_millis(200);
@@ -26,11 +28,11 @@ const BROKEN_OFF: f32 = 0.4;
 pub(super) const BREAKS_OFF: Span = Span::from_secs(1);
 /// A vehicle whose speed broke off thrashes about for so long at most.
 const THRASHES: Span = Span::from_secs(8);
-/// A shock counts if the vehicle is still within so long after it.
+/// A shock counts if the vehicle lies still within this time.
 const AFTER_SHOCK: Span = Span::from_secs(4);
 /// A shock stops a vehicle that was this fast, m/s.
 const IMPACT_MPS: f32 = 3.5;
-/// Legs take so much of a vehicle that comes down upright, g and m/s, at the fastest landing speeds that are set (2.5 m/s).
+/// Shock, g, and sink, m/s, of a landing on legs. The fastest landing speed that can be set is 2.5 m/s.
 const LEGS_G: f32 = 4.0;
 const LEGS_MPS: f32 = 3.0;
 /// A plane without throttle that sinks slower than this, m/s, lands and skids. Skids slow down by 8 m/s2 at most: a plane that is faster than
@@ -39,26 +41,20 @@ const FLARED_MPS: f32 = 2.0;
 const SKIDS_MPS: f32 = 15.0;
 /// Wings pull out of a dive with so much at most, g: the limit of CS-23 for the aerobatic category.
 const PULL_OUT_G: f32 = 6.0;
-/// Tumbling, turning over and sinking last so long at least.
-const TUMBLES: Span = Span::from_millis(500);
+/// Tumbling and sinking last so long at least.
+const LASTS: Span = Span::from_millis(500);
+/// A roll on wings takes a second.
 const TUMBLES_ON_WINGS: Span = Span::from_millis(1_500);
-const TURNS_OVER: Span = Span::from_millis(700);
-const SINKS: Span = Span::from_millis(500);
-/// A vehicle that is level and still by its sensors for so long is not turned over.
-const LEVEL: Span = Span::from_millis(500);
 /// Rotors that pull downwards for a moment more than level, by the estimator's attitude alone.
 const OVERTURNED_DEG: f32 = 100.0;
-/// A setpoint is followed if it is no older, and the vehicle sinks no faster than it by this, m/s.
+/// Age of a climb setpoint, and by how much the vehicle may sink faster, m/s.
 const SETPOINT_AGE: Span = Span::from_secs(1);
 const FOLLOWS_MPS: f32 = 2.0;
 /// A vehicle that stalls or has lost a propeller loses so much height with all its thrust, m; gusts take less.
 const LOST_M: f32 = 7.0;
 /// A vehicle that sinks slower with all its thrust follows a glide path against the wind, m/s.
 const GLIDES_MPS: f32 = 1.0;
-/// A bank in which all the thrust may not carry a multicopter, rad.
-const BANKS_RAD: f32 = 0.6;
-/// 45 degrees, and about 90 degrees a second: beyond, its thrust does not carry it.
-const LEANS_RAD: f32 = 0.785;
+/// A vehicle that turns by 90 degrees a second is not carried by its thrust, rad/s.
 const TURNS_RADPS: f32 = 1.5;
 /// All the throttle of a plane, which may need most of it on a steep path against the wind.
 const FULL_ON_WINGS: f32 = 0.97;
@@ -67,7 +63,7 @@ const SAMPLES: u8 = 3;
 
 /// How long something has been so, and in how many samples.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Lasting {
+struct Lasting {
     since: Instant,
     samples: u8,
     last: Instant,
@@ -94,6 +90,30 @@ impl Lasting {
     }
 }
 
+/// The detectors, and what they have seen.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Signs {
+    /// The worst of each sign, in its own unit; 0 for none.
+    pub(super) worst: [f32; Kind::COUNT],
+    /// A sign of this step; the time of the last one.
+    pub(super) seen: Option<Kind>,
+    pub(super) seen_at: Instant,
+    /// Since when an inertial sensor has fallen or turned while the others say that it flies.
+    doubted_since: Stamp,
+    falls: Lasting,
+    unloaded: Lasting,
+    tumbles: Lasting,
+    overturned: Lasting,
+    sinks: Lasting,
+}
+
+/// A height that fades, m.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Peak {
+    height_m: Option<f32>,
+    at: Instant,
+}
+
 /// A shock, and its effect.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Shock {
@@ -115,9 +135,9 @@ impl Flight {
     /// Takes an observation that the vehicle took.
     pub fn observe(&mut self, at: Instant, vehicle: &Vehicle, observation: &Observation, params: &Params) {
         self.estimate(at, vehicle, observation);
-        let watched = self.powered
+        let watched = self.arming.is_on
             || matches!(self.stage, Stage::Falling | Stage::Impacted)
-            || self.off_at.is_some_and(|since| at.since(since) <= WATCHED);
+            || self.arming.off_at.is_some_and(|since| at.since(since) <= WATCHED);
         if !watched || vehicle.kind() == VehicleKind::Surface {
             return;
         }
@@ -159,7 +179,7 @@ impl Flight {
                     self.pressure.take(at, pressure.0);
                 }
             }
-            Observation::Hud(_) if self.powered => {
+            Observation::Hud(_) if self.arming.is_on => {
                 let hovers = vehicle.is_multicopter()
                     && self.airborne()
                     && !self.stage.is_mishap()
@@ -181,24 +201,24 @@ impl Flight {
         let holds = climb_mps(now, vehicle).is_some_and(|climb_mps| climb_mps > -FALLING_MPS)
             && self.pressure.follows(now, -FALLING_MPS) != Some(true);
         let others_fly = (votes.flies & !INERTIAL).count_ones() >= 2 && votes.stands == 0;
-        let goes_on = now.since(self.falls.last.later(self.tumbles.last)) <= FRESH;
-        self.doubted_since.run(goes_on && others_fly && holds, now, RECOVERED);
+        let goes_on = now.since(self.signs.falls.last.later(self.signs.tumbles.last)) <= FRESH;
+        self.signs.doubted_since.run(goes_on && others_fly && holds, now, RECOVERED);
     }
 
     /// It was seen, with such a value, which is above the limit.
     pub(super) fn see(&mut self, at: Instant, kind: Kind, value: f32, params: &Params) {
         let is_felt = matches!(kind, Kind::FreeFall | Kind::Tumbling);
-        if is_felt && self.doubted_since.older_than(at, RECOVERED) {
+        if is_felt && self.signs.doubted_since.older_than(at, RECOVERED) {
             return;
         }
         let value = value.max(params.get(kind.limit()).next_up());
-        let worst = &mut self.worst[kind as usize];
+        let worst = &mut self.signs.worst[kind as usize];
         *worst = worst.max(value);
-        // What was disarmed in the air may tumble.
-        if self.seen.is_none() || kind == Kind::Disarmed {
-            self.seen = Some(kind);
+        // A vehicle that was disarmed in the air may tumble first.
+        if self.signs.seen.is_none() || kind == Kind::Disarmed {
+            self.signs.seen = Some(kind);
         }
-        self.seen_at = at;
+        self.signs.seen_at = at;
         if kind == Kind::Impact && self.stage == Stage::Falling {
             self.stage = Stage::Impacted;
         }
@@ -206,26 +226,26 @@ impl Flight {
 
     fn take_force(&mut self, at: Instant, force: [MetresPerSecond2; 3], vehicle: &Vehicle, params: &Params) {
         let Some(load_g) = load_factor_g(force) else {
-            // What is no force is no rest either.
-            self.load_g = Some(f32::INFINITY);
+            // Without a valid force the vehicle is not at rest.
+            self.felt.load_g = Some(f32::INFINITY);
             return;
         };
-        // A sensor that says the same again, or nothing but zeros, is no sensor that flies.
-        if load_g == 0.0 || self.load_g.is_some_and(|before| load_g.to_bits() == before.to_bits()) {
+        // Repeated values and zeros are not measurements.
+        if load_g == 0.0 || self.felt.load_g.is_some_and(|before| load_g.to_bits() == before.to_bits()) {
             return;
         }
         self.take_shock(at, load_g, vehicle, params);
-        self.felt_at = at;
-        (self.load_g, self.from_above_g) = (Some(load_g), force[2].0 / GRAVITY);
+        self.felt.at = at;
+        (self.felt.load_g, self.felt.from_above_g) = (Some(load_g), force[2].0 / GRAVITY);
         let falls = load_g < FALL_G && on_rotors(at, vehicle) && self.asks_for_thrust(at, vehicle);
         let least_s = params.get(Param::MisFallTime);
-        if let Some(span) = self.falls.take(at, falls)
+        if let Some(span) = self.signs.falls.take(at, falls)
             && span.as_secs_f32() >= least_s
         {
             self.see(at, Kind::FreeFall, span.as_secs_f32(), params);
         }
-        self.unloaded.take(at, load_g < UNLOADED_G);
-        if self.unloaded.lasts(at, UNLOADED)
+        self.signs.unloaded.take(at, load_g < UNLOADED_G);
+        if self.signs.unloaded.lasts(at, UNLOADED)
             && let Some(watch) = &mut self.watch
         {
             watch.is_unloaded = true;
@@ -233,7 +253,7 @@ impl Flight {
         let limit_deg = params.get(Param::MisOverturn);
         if let Some(tilt_deg) = self.lies_turned(at, vehicle).map(f32::to_degrees)
             && tilt_deg > limit_deg
-            && self.was_driven(at)
+            && self.thrust.was_driven(at, DRIVEN)
             && on_rotors(at, vehicle)
         {
             self.see(at, Kind::Overturned, tilt_deg, params);
@@ -257,9 +277,9 @@ impl Flight {
                 stopped: false,
                 has_hit: false,
                 dropped: self.shock.is_some_and(|shock| shock.dropped)
-                    || (self.unloaded.lasts(at, DROPS) && on_rotors(at, vehicle)),
+                    || (self.signs.unloaded.lasts(at, DROPS) && on_rotors(at, vehicle)),
             });
-            if self.shock.is_none() && self.worst[Kind::Impact as usize] == 0.0 {
+            if self.shock.is_none() && self.signs.worst[Kind::Impact as usize] == 0.0 {
                 self.hit_at = at;
             }
             // The greatest of several: what hits something bounces.
@@ -277,11 +297,11 @@ impl Flight {
         if !rate.is_finite() {
             return;
         }
-        self.rate_radps = rate;
+        self.felt.rate_radps = rate;
         let rate_dps = rate.to_degrees();
         let tumbles = rate_dps > params.get(Param::MisTumble) && !is_made_to_turn(vehicle);
-        let least = if on_rotors(at, vehicle) { TUMBLES } else { TUMBLES_ON_WINGS };
-        if self.tumbles.take(at, tumbles).is_some_and(|span| span >= least) {
+        let least = if on_rotors(at, vehicle) { LASTS } else { TUMBLES_ON_WINGS };
+        if self.signs.tumbles.take(at, tumbles).is_some_and(|span| span >= least) {
             self.see(at, Kind::Tumbling, rate_dps, params);
         }
     }
@@ -290,7 +310,7 @@ impl Flight {
     fn take_attitude(&mut self, at: Instant, attitude: &Attitude, vehicle: &Vehicle, params: &Params) {
         let Attitude { roll, pitch, .. } = attitude;
         let most = libm::fabsf(roll.0).max(libm::fabsf(pitch.0));
-        if (most > LEANS_RAD || self.rate_radps > TURNS_RADPS) && self.powered {
+        if (most > TILTED_RAD || self.felt.rate_radps > TURNS_RADPS) && self.arming.is_on {
             self.tilted_at = Some(at);
         }
         // Below 86 degrees of each, no cosine is asked for: this is done with each attitude.
@@ -298,12 +318,11 @@ impl Flight {
         let tilt_deg =
             if tilts { libm::acosf(libm::cosf(roll.0) * libm::cosf(pitch.0)).to_degrees() } else { 0.0 };
         let over = tilt_deg > OVERTURNED_DEG.max(params.get(Param::MisOverturn))
-            && self.powered
+            && self.arming.is_on
             && on_rotors(at, vehicle)
             && !is_made_to_turn(vehicle)
-            && !vehicle.inertial.contradicts(at)
-            && !vehicle.inertial.is_level_for(at, LEVEL);
-        if self.overturned.take(at, over).is_some_and(|span| span >= TURNS_OVER) {
+            && !vehicle.inertial.contradicts(at);
+        if self.signs.overturned.take(at, over).is_some_and(|span| span >= LIES) {
             self.see(at, Kind::Overturned, tilt_deg, params);
         }
     }
@@ -320,7 +339,7 @@ impl Flight {
             shock.stopped |= speed_mps < BROKEN_OFF * shock.speed_mps;
         }
         self.motion.speed.take(at, speed_mps);
-        // What breaks off in a mishap is the touch, where the estimate is not lost.
+        // If the sink breaks off in a mishap, the vehicle touched the ground.
         let goes = matches!(self.stage, Stage::Falling | Stage::Impacted);
         let lost = goes && self.motion.has_strayed(at);
         if goes && !lost && -climb_mps < BROKEN_OFF * self.motion.sink.greatest(at) {
@@ -332,7 +351,7 @@ impl Flight {
         }
     }
 
-    /// It touched with this sink, where the air pressure does not contradict it: an estimate that is lost has any speed.
+    /// It touched with this sink, unless the air pressure contradicts it.
     pub(super) fn touch(&mut self, at: Instant, sink_mps: f32) {
         if self.pressure.follows(at, -sink_mps) != Some(false) {
             self.touch_mps = self.touch_mps.max(sink_mps);
@@ -353,21 +372,22 @@ impl Flight {
             Some(false) => lost_m > LOST_M,
             None => false,
         };
-        let by_display = || is_believed(vehicle, params) && is_displayed(at, sink_mps, vehicle);
+        let by_display = || is_displayed(at, sink_mps, vehicle);
         let believed = || self.pressure.follows(at, -sink_mps).unwrap_or_else(by_display);
-        let sinks = sinks && self.powered && believed();
-        if self.sinks.take(at, sinks).is_some_and(|span| span >= SINKS) {
+        let sinks = sinks && self.arming.is_on && believed();
+        if self.signs.sinks.take(at, sinks).is_some_and(|span| span >= LASTS) {
             self.see(at, Kind::Sinking, sink_mps, params);
         }
     }
 
     /// How far it is below the highest that it was since it has had all its thrust, but for what a glide path takes.
     fn lose_height(&mut self, at: Instant, thrust: bool, vehicle: &Vehicle) -> f32 {
-        let since_s = at.since(core::mem::replace(&mut self.peak_at, at)).as_secs_f32();
-        let height_m = height_m(at, vehicle).filter(|_| thrust && self.powered);
-        let faded_m = self.peak_m.map(|peak_m| peak_m - GLIDES_MPS * since_s);
-        self.peak_m = height_m.map(|height_m| faded_m.map_or(height_m, |faded_m| faded_m.max(height_m)));
-        self.peak_m.zip(height_m).map_or(0.0, |(peak_m, height_m)| peak_m - height_m)
+        let since_s = at.since(core::mem::replace(&mut self.peak.at, at)).as_secs_f32();
+        let height_m = height_m(at, vehicle).filter(|_| thrust && self.arming.is_on);
+        let faded_m = self.peak.height_m.map(|peak_m| peak_m - GLIDES_MPS * since_s);
+        self.peak.height_m =
+            height_m.map(|height_m| faded_m.map_or(height_m, |faded_m| faded_m.max(height_m)));
+        self.peak.height_m.zip(height_m).map_or(0.0, |(peak_m, height_m)| peak_m - height_m)
     }
 
     /// Whether the throttle asks for thrust; not known is yes. Thrown into the air to start (`ArduCopter`'s THROW), it falls.
@@ -390,16 +410,15 @@ impl Flight {
             && power.is_none_or(|power| power == Power::Idle);
         let hard = shock.load_g > LEGS_G || shock.sink_mps > LEGS_MPS;
         let stopped = shock.stopped && shock.speed_mps >= IMPACT_MPS && hard && !lands;
-        // A vehicle that was not seen to fly may be knocked, and lie on its back for its battery.
         let has_hit = stopped
-            || (self.first_at.is_none()
-                && ((shock.dropped && shock.load_g > LEGS_G)
-                    || (on_rotors(now, vehicle) && is_tilted(now, vehicle))
-                    || self.lies_on_its_back(vehicle)));
+            || (shock.dropped && shock.load_g > LEGS_G)
+            || (on_rotors(now, vehicle) && self.lies(now, vehicle));
         self.shock = Some(Shock { has_hit, ..shock });
-        let rests = self.still_since.is_some_and(|since| !shock.at.is_after(since)) && self.is_still(now);
+        let rests =
+            self.is_still(now) && self.still_since.age(now).is_some_and(|age| age <= now.since(shock.at));
         if has_hit && rests && self.hangs_not(now, vehicle, power) {
-            self.touch_mps = self.touch_mps.max(shock.sink_mps);
+            self.touch_mps =
+                if self.stage.is_mishap() { self.touch_mps.max(shock.sink_mps) } else { shock.sink_mps };
             self.see(now, Kind::Impact, shock.load_g, params);
             self.shock = None;
         }
@@ -408,7 +427,7 @@ impl Flight {
     /// Whether a vehicle that is still does not hang in the air: off, on the ground by its word, on its side, without thrust or with all of
     /// it.
     fn hangs_not(&self, now: Instant, vehicle: &Vehicle, power: Option<Power>) -> bool {
-        !self.powered
+        !self.arming.is_on
             || self.calls_itself_landed(now, vehicle)
             || self.lies(now, vehicle)
             || matches!(power, Some(Power::Idle | Power::Full))
@@ -417,7 +436,7 @@ impl Flight {
     /// Whether a sign outside of a flight is the work of its own rotors, and of no hand: it had throttle just now, and the inertial messages show
     /// it.
     pub(super) fn is_turned_over(&self, now: Instant, vehicle: &Vehicle, kind: Kind) -> bool {
-        self.was_driven(now)
+        self.thrust.was_driven(now, DRIVEN)
             && on_rotors(now, vehicle)
             && (kind == Kind::Tumbling || self.lies_turned(now, vehicle).is_some())
     }
@@ -425,12 +444,8 @@ impl Flight {
     /// How far it lies over, rad, if it stood level while it was armed and turned since.
     fn lies_turned(&self, now: Instant, vehicle: &Vehicle) -> Option<f32> {
         let over = vehicle.inertial.lies_over(now)?;
-        let turned = self.stood && !vehicle.inertial.turns_little(now, DRIVEN);
+        let turned = self.arming.stood && !vehicle.inertial.turns_little(now, DRIVEN);
         (turned && !is_fast(now, vehicle)).then_some(over)
-    }
-
-    fn was_driven(&self, now: Instant) -> bool {
-        self.thrust.was_driven(now, DRIVEN) == Some(true)
     }
 
     /// Whether a shock was seen that is an impact if it lies still soon.
@@ -445,7 +460,7 @@ impl Flight {
 
     /// Whether nothing carries it just now: a vehicle that flew is in the air, though its autopilot may call it landed.
     pub fn is_unloaded(&self) -> bool {
-        self.unloaded.lasts(self.heard_at, UNLOADED)
+        self.signs.unloaded.lasts(self.heard_at, UNLOADED)
     }
 }
 
@@ -461,7 +476,7 @@ fn is_told_to_bank(at: Instant, vehicle: &Vehicle) -> bool {
     vehicle
         .wanted
         .within(at, SETPOINT_AGE)
-        .is_some_and(|[roll, pitch]| vehicle.is_multicopter() && roll.0.abs().max(pitch.0.abs()) > BANKS_RAD)
+        .is_some_and(|[roll, pitch]| vehicle.is_multicopter() && roll.0.abs().max(pitch.0.abs()) > LEANS_RAD)
 }
 
 /// Whether the display sinks too; so it is where no climb is displayed, or nothing but zeros. A receiver that loses its satellites tells

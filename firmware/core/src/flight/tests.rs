@@ -1,255 +1,138 @@
 //! The flight, on observations made for the purpose.
+//!
+//! A script has pieces, each until a second: `5 h0 t0.5 | 20 air h25`. A vehicle is armed unless it is `off`. It reports a landed state
+//! (`ground`, `takingoff`, `air`, `landing`), a height `h` m that climbs by `c` m/s, a throttle `t`, an air speed `a` and a speed over ground
+//! `v` m/s.
 
-use super::FlightEvent::{Landing, Resumed, TakeOff};
 use super::VehicleKind::{Plane, Rotorcraft, Surface};
 use super::*;
-use crate::observation::LandedState::{InAir, OnGround, TakingOff};
 use crate::observation::{GlobalPosition, Heartbeat, Hud, LandedState, Observation, Source, VtolState};
 use crate::units::{Fraction, Metres, MetresPerSecond};
 
 const AUTOPILOT: Source = Source { system: 1, component: 1 };
 
-/// What a vehicle reports: its landed state twice a second, the rest every 50 ms.
-#[derive(Clone, Copy, Debug, Default)]
-struct Says {
-    disarmed: bool,
-    word: Option<LandedState>,
-    /// The height at the beginning, and the climb from there, m and m/s.
-    height_m: Option<f32>,
-    climb_mps: f32,
-    throttle: Option<f32>,
-    air_mps: Option<f32>,
-    ground_mps: f32,
-}
-
-/// Each of these until a time, ms.
-type Script = Vec<(u64, Says)>;
-
-/// An event, when it was found, and the time that it has: of the take-off, and of the last moment in the air.
-type Event = (FlightEvent, u64, u64);
-
-/// Disarmed for a second.
-const OFF: (u64, Says) = (1_000, Says { disarmed: true, ..height(0.0) });
-
-const fn height(height_m: f32) -> Says {
-    Says { height_m: Some(height_m), ..word_of(None) }
-}
-
-const fn word(word: LandedState) -> Says {
-    word_of(Some(word))
-}
-
-const fn word_of(word: Option<LandedState>) -> Says {
-    let (disarmed, climb_mps, ground_mps) = (false, 0.0, 0.0);
-    Says { disarmed, word, height_m: None, climb_mps, throttle: None, air_mps: None, ground_mps }
-}
-
-/// By throttle and air speed alone.
-fn hud(throttle: f32, air_mps: f32) -> Says {
-    Says { throttle: Some(throttle), air_mps: Some(air_mps), ..word_of(None) }
-}
-
-/// By throttle and height; with a throttle it goes at 15 m/s.
-fn moves(word: Option<LandedState>, throttle: f32, height_m: f32) -> Says {
-    let ground_mps = if word.is_some() && throttle > 0.0 { 15.0 } else { 0.0 };
-    Says { throttle: Some(throttle), word, ground_mps, ..height(height_m) }
-}
-
-impl Says {
-    fn observations(self, now_ms: u64, since_ms: u64, kind: VehicleKind) -> Vec<Observation> {
-        let heartbeat = Heartbeat { armed: !self.disarmed, kind, ..Heartbeat::default() };
-        let word = self.word.filter(|_| now_ms.is_multiple_of(500));
-        let hud = Hud {
-            throttle: self.throttle.map(Fraction),
-            airspeed: self.air_mps.map(MetresPerSecond),
-            ..Hud::default()
-        };
-        let global = self.height_m.map(|height_m| GlobalPosition {
-            relative_altitude: Metres(height_m + self.climb_mps * (now_ms - since_ms) as f32 / 1_000.0),
-            velocity: [self.ground_mps, 0.0, 0.0].map(MetresPerSecond),
+/// The observations of a piece, `for_s` after it began.
+fn observations(words: &str, for_s: f32, kind: VehicleKind) -> Vec<Observation> {
+    let has = |word: &str| words.split(' ').any(|it| it == word);
+    let number = |name: char| words.split(' ').find_map(|word| word.strip_prefix(name)?.parse::<f32>().ok());
+    let heartbeat = Heartbeat { armed: !has("off"), kind, ..Heartbeat::default() };
+    let mut said = vec![Observation::Heartbeat(heartbeat)];
+    let landed = [
+        ("ground", LandedState::OnGround),
+        ("takingoff", LandedState::TakingOff),
+        ("air", LandedState::InAir),
+        ("landing", LandedState::Landing),
+    ];
+    said.extend(
+        landed
+            .into_iter()
+            .filter(|(word, _)| has(word))
+            .map(|(_, landed)| Observation::Landed(landed, VtolState::Unknown)),
+    );
+    let hud = Hud {
+        throttle: number('t').map(Fraction),
+        airspeed: number('a').map(MetresPerSecond),
+        ..Hud::default()
+    };
+    said.extend(hud.throttle.map(|_| Observation::Hud(hud)));
+    said.extend(number('h').map(|height_m| {
+        let relative_altitude = Metres(height_m + number('c').unwrap_or(0.0) * for_s);
+        let velocity = [number('v').unwrap_or(0.0), 0.0, 0.0].map(MetresPerSecond);
+        Observation::GlobalPosition(GlobalPosition {
+            relative_altitude,
+            velocity,
             ..GlobalPosition::default()
-        });
-        let mut said = vec![Observation::Heartbeat(heartbeat)];
-        said.extend(word.map(|word| Observation::Landed(word, VtolState::Unknown)));
-        said.extend((self.throttle.is_some()).then_some(Observation::Hud(hud)));
-        said.extend(global.map(Observation::GlobalPosition));
-        said
-    }
+        })
+    }));
+    said
 }
 
-fn fly(kind: VehicleKind, script: &[(u64, Says)]) -> Vec<Event> {
+/// The events of a script: when each was found, and the take-off or the last moment in the air, s.
+fn fly(kind: VehicleKind, script: &str) -> String {
     let (mut vehicle, mut flight, mut events) = (Vehicle::unknown(), Flight::grounded(), Vec::new());
     let (mut now_ms, mut flew_ms) = (0, 0);
-    for (until_ms, says) in script {
-        let since_ms = now_ms;
-        while now_ms < *until_ms {
+    for piece in script.split(" | ") {
+        let (until_s, words) = piece.split_once(' ').unwrap();
+        let (since_ms, until_ms) = (now_ms, (until_s.parse::<f32>().unwrap() * 1_000.0) as u64);
+        while now_ms < until_ms {
             let now = Instant::from_millis(now_ms);
-            for observation in says.observations(now_ms, since_ms, kind) {
-                vehicle.observe(now, AUTOPILOT, &observation);
+            for observation in observations(words, (now_ms - since_ms) as f32 / 1_000.0, kind) {
+                if now_ms.is_multiple_of(500) || !matches!(observation, Observation::Landed(..)) {
+                    vehicle.observe(now, AUTOPILOT, &observation);
+                }
             }
             let event = flight.step(now, &vehicle, &Params::defaults()).1;
             if flight.airborne() && !flight.may_have_landed() {
                 flew_ms = now_ms;
             }
-            let of_ms = flight.airborne_since().map_or(flew_ms, |since| since.as_millis());
-            events.extend(event.map(|event| (event, now_ms, of_ms)));
+            let of_ms = flight.airborne_since().map_or(flew_ms, Instant::as_millis);
+            events.extend(
+                event.map(|event| {
+                    format!("{event:?} {} of {}", now_ms as f32 / 1_000.0, of_ms as f32 / 1_000.0)
+                }),
+            );
             now_ms += 50;
         }
     }
-    let is_over = events.last().is_none_or(|(event, ..)| *event == Landing);
-    assert_eq!(flight.is_open(), !is_over, "{events:?}");
-    events
+    assert_eq!(
+        flight.is_open(),
+        events.last().is_some_and(|event| !event.starts_with("Landing")),
+        "{events:?}"
+    );
+    events.join(", ")
 }
 
 #[test]
 fn a_flight_begins_and_ends_by_what_is_known_of_it() {
-    let valley = (17_500, Says { climb_mps: -2.0, ..moves(None, 0.5, 10.0) });
-    let ground = || (5_000, moves(Some(OnGround), 0.0, 0.0));
-    let hidden = || (60_000, moves(Some(OnGround), 0.5, 30.0));
-    let cases: Vec<(&str, VehicleKind, Script, Vec<Event>)> = vec![
+    const LOST: &str = "1 off h0 | 5 h0 | 20 air h30 | 50 h30 | 60 h0";
+    const BOUNCES: &str = "1 off h0 | 5 h0 | 20 h25 | 25 h0 | 26 h3 | 32 h0 | 50 h25 | 70 h0";
+    const LANDED_STATE: &str = "5 ground | 7 takingoff | 17 air | 22 landing | 42 ground";
+    const BY_AIR_SPEED: &str = "1 off | 5 t0 a3 | 40 t0.6 a18 | 50 t0 a12 | 62 t0 a2";
+    const VALLEY: &str = "1 off h0 | 5 h0 t0 | 17.5 h10 c-2 t0.5 | 60 h-15 t0.5";
+    const HIDDEN: &str = "1 off h0 | 5 ground h0 t0 | 60 ground h30 t0.5 v15";
+    for (what, kind, script, events) in [
         (
-            "a height above the place of arming, which is 20 m above home",
+            "a height above the place of arming",
             Rotorcraft,
-            vec![OFF, (5_000, height(20.0)), (10_000, height(25.0)), (30_000, height(20.1))],
-            vec![(TakeOff, 5_600, 5_000), (Landing, 18_000, 9_950)],
+            "1 off h20 | 5 h20 | 10 h25 | 30 h20.1",
+            "TakeOff 5.6 of 5, Landing 18 of 9.95",
         ),
-        ("a submarine", Surface, vec![OFF, (5_000, height(0.0)), (10_000, height(25.0))], vec![]),
-        (
-            "a bounce, and a touch-and-go",
-            Rotorcraft,
-            vec![
-                OFF,
-                (5_000, height(0.0)),
-                (20_000, height(25.0)),
-                (25_000, height(0.0)),
-                (26_000, height(3.0)),
-                (32_000, height(0.0)),
-                (50_000, height(25.0)),
-                (70_000, height(0.0)),
-            ],
-            vec![(TakeOff, 5_600, 5_000), (Landing, 58_000, 49_950)],
-        ),
-        (
-            "the landed state alone",
-            Rotorcraft,
-            vec![
-                (5_000, word(OnGround)),
-                (7_000, word(TakingOff)),
-                (17_000, word(InAir)),
-                (22_000, word(LandedState::Landing)),
-                (42_000, word(OnGround)),
-            ],
-            vec![(TakeOff, 7_600, 7_000), (Landing, 30_000, 21_950)],
-        ),
-        (
-            "a rover that is called flying",
-            Surface,
-            vec![(5_000, word(OnGround)), (25_000, word(InAir))],
-            vec![],
-        ),
-        (
-            "one wrong word",
-            Rotorcraft,
-            vec![
-                (5_000, word(OnGround)),
-                (15_000, word(InAir)),
-                (15_500, word(OnGround)),
-                (35_000, word(InAir)),
-            ],
-            vec![(TakeOff, 5_600, 5_000)],
-        ),
-        (
-            "a landed state that is lost",
-            Rotorcraft,
-            vec![
-                OFF,
-                (5_000, height(0.0)),
-                (20_000, Says { word: Some(InAir), ..height(30.0) }),
-                (50_000, height(30.0)),
-                (60_000, height(0.0)),
-            ],
-            vec![(TakeOff, 5_600, 5_000), (Landing, 58_000, 49_950)],
-        ),
-        ("first received in the air", Rotorcraft, vec![(2_000, height(50.0))], vec![(Resumed, 600, 0)]),
-        (
-            "a plane by its air speed",
-            Plane,
-            vec![
-                OFF,
-                (5_000, hud(0.0, 3.0)),
-                (40_000, hud(0.6, 18.0)),
-                (50_000, hud(0.0, 12.0)),
-                (62_000, hud(0.0, 2.0)),
-            ],
-            vec![(TakeOff, 5_600, 5_000), (Landing, 58_000, 49_950)],
-        ),
-        ("a wind over the runway", Plane, vec![OFF, (60_000, hud(0.0, 12.0))], vec![]),
-        (
-            "a hover in a valley",
-            Rotorcraft,
-            vec![OFF, (5_000, moves(None, 0.0, 0.0)), valley, (60_000, moves(None, 0.5, -15.0))],
-            vec![(TakeOff, 5_600, 5_000)],
-        ),
+        ("a submarine", Surface, "1 off h0 | 5 h0 | 10 h25", ""),
+        ("a bounce and a touch-and-go", Rotorcraft, BOUNCES, "TakeOff 5.6 of 5, Landing 58 of 49.95"),
+        ("the landed state alone", Rotorcraft, LANDED_STATE, "TakeOff 7.6 of 7, Landing 30 of 21.95"),
+        ("a rover that is called flying", Surface, "5 ground | 25 air", ""),
+        ("one wrong word", Rotorcraft, "5 ground | 15 air | 15.5 ground | 35 air", "TakeOff 5.6 of 5"),
+        ("a landed state that is lost", Rotorcraft, LOST, "TakeOff 5.6 of 5, Landing 58 of 49.95"),
+        ("received first in the air", Rotorcraft, "2 h50", "Resumed 0.6 of 0"),
+        ("a plane by its air speed", Plane, BY_AIR_SPEED, "TakeOff 5.6 of 5, Landing 58 of 49.95"),
+        ("a wind over the runway", Plane, "1 off | 60 t0 a12", ""),
+        ("a hover in a valley", Rotorcraft, VALLEY, "TakeOff 5.6 of 5"),
         (
             "a landing in a valley",
             Rotorcraft,
-            vec![
-                OFF,
-                (5_000, moves(None, 0.0, 0.0)),
-                valley,
-                (60_000, moves(None, 0.5, -15.0)),
-                (80_000, moves(None, 0.02, -15.0)),
-            ],
-            vec![(TakeOff, 5_600, 5_000), (Landing, 68_000, 59_950)],
+            &format!("{VALLEY} | 80 h-15 t0.02"),
+            "TakeOff 5.6 of 5, Landing 68 of 59.95",
         ),
-        (
-            "a wrong word hides no flight",
-            Rotorcraft,
-            vec![OFF, ground(), hidden()],
-            vec![(TakeOff, 10_000, 5_000)],
-        ),
+        ("a wrong word hides no flight", Rotorcraft, HIDDEN, "TakeOff 10 of 5"),
         (
             "nor its landing",
             Rotorcraft,
-            vec![
-                OFF,
-                ground(),
-                hidden(),
-                (63_000, moves(Some(OnGround), 0.5, 1.5)),
-                (80_000, moves(Some(OnGround), 0.0, 0.0)),
-            ],
-            vec![(TakeOff, 10_000, 5_000), (Landing, 71_000, 62_950)],
+            &format!("{HIDDEN} | 63 ground h1.5 t0.5 v15 | 80 ground h0 t0"),
+            "TakeOff 10 of 5, Landing 71 of 62.95",
         ),
-        ("nor that of a plane", Plane, vec![OFF, ground(), hidden()], vec![(TakeOff, 10_000, 5_000)]),
-    ];
-    for (what, kind, script, events) in cases {
-        assert_eq!(fly(kind, &script), events, "{what}");
-    }
-}
-
-#[test]
-fn a_word_that_it_stands_ends_no_flight_in_the_air_and_counts_against_a_drift_and_a_moment() {
-    for wrong_until_ms in [36_000, 90_000] {
-        let script = [
-            OFF,
-            (5_000, moves(Some(OnGround), 0.0, 0.0)),
-            (30_000, moves(Some(InAir), 0.5, 30.0)),
-            (wrong_until_ms, moves(Some(OnGround), 0.5, 30.0)),
-            (95_000, moves(Some(InAir), 0.5, 30.0)),
-        ];
-        assert_eq!(fly(Rotorcraft, &script), [(TakeOff, 5_600, 5_000)], "{wrong_until_ms}");
-    }
-    for (kind, throttle, height_m, until_ms) in [
-        // An estimator that drifts, motors that are tried, a glitch of 4 s; a plane that is carried up a hill.
-        (Rotorcraft, 0.15, 30.0, 60_000),
-        (Rotorcraft, 0.5, 1.5, 60_000),
-        (Rotorcraft, 0.5, 30.0, 9_000),
-        (Plane, 0.0, 30.0, 60_000),
-        (Surface, 0.5, 30.0, 60_000),
+        ("nor that of a plane", Plane, HIDDEN, "TakeOff 10 of 5"),
+        ("an estimator that drifts", Rotorcraft, "1 off h0 | 5 ground h0 t0 | 60 ground h30 t0.15 v15", ""),
+        ("motors that are tried", Rotorcraft, "1 off h0 | 5 ground h0 t0 | 60 ground h1.5 t0.5 v15", ""),
+        ("4 s", Rotorcraft, "1 off h0 | 5 ground h0 t0 | 9 ground h30 t0.5 v15 | 70 ground h0 t0", ""),
+        ("a plane that is carried up a hill", Plane, "1 off h0 | 5 ground h0 t0 | 60 ground h30 t0", ""),
+        ("a rover on a hill", Surface, HIDDEN, ""),
     ] {
-        let stands = |until_ms| (until_ms, moves(Some(OnGround), 0.0, 0.0));
-        let script =
-            [OFF, stands(5_000), (until_ms, moves(Some(OnGround), throttle, height_m)), stands(70_000)];
-        assert_eq!(fly(kind, &script), [], "{kind:?} {throttle} {height_m}");
+        assert_eq!(fly(kind, script), events, "{what}");
+    }
+    for wrong_until_s in [36, 90] {
+        let script = format!(
+            "1 off h0 | 5 ground h0 t0 | 30 air h30 t0.5 v15 | {wrong_until_s} ground h30 t0.5 v15 | 95 air h30 t0.5 v15"
+        );
+        assert_eq!(fly(Rotorcraft, &script), "TakeOff 5.6 of 5", "a wrong word until {wrong_until_s} s");
     }
 }

@@ -2,8 +2,8 @@
 //!
 //! | witness | it flies | it stands |
 //! |---|---|---|
-//! | word | landed state "in air" or "landing", with power | landed state "on ground", newer than a termination |
-//! | height | more than 1.5 m above the place of arming, by pressure or position | within 1 m of it, 1.5 m in a mishap; motors off, and the pressure steady for 3 s |
+//! | word | landed state "in air" or "landing", with power | landed state "on ground" |
+//! | height | more than 1.5 m above the place of arming, by pressure or position | within 1 m of it; motors off, and the pressure steady for 3 s |
 //! | thrust | the throttle carries it ([`crate::thrust`]) | idle, off, all of it without a climb; or it lies over, where rotors carry nothing |
 //! | inertial | nothing carries it; it turned fast within a second | on rotors: level and still with idle throttle; no vibration of rotors and no height; it hit something; it lies over |
 //! | speed | faster than 1.5 m/s, up, down or over ground; wings: 8 m/s | slow, and no throttle that carries it; the receiver stands and the estimate moves |
@@ -12,10 +12,11 @@
 //! nothing of height and speed ([`crate::motion`]).
 
 use super::{Flight, Stage};
+use crate::gates::TURNED;
 use crate::mishap::Kind;
 use crate::motion::{
-    CLEAR_M, FRESH, LOW_M, MOVES_MPS, STILL_MPS, WINGS_MPS, airspeed_mps, climb_mps, ground_speed_mps,
-    throttle,
+    CLEAR_M, FRESH, LOW_M, MOVES_MPS, STILL_MPS, TILTED_RAD, WINGS_MPS, airspeed_mps, climb_mps,
+    ground_speed_mps, throttle,
 };
 use crate::observation::{LandedState, VehicleKind};
 use crate::params::Params;
@@ -25,12 +26,8 @@ use crate::time::{Instant, Span};
 use crate::units::{GRAVITY, norm};
 use crate::vehicle::{LANDED_STATE_AGE, Vehicle};
 
-/// 45 degrees: what rests at a greater tilt does not fly, rad.
-const LIES_RAD: f32 = 0.785;
 /// Rotors pull upwards: what carries the vehicle from above by more than this, g, is the ground under its back.
 const ON_BACK_G: f32 = 0.5;
-/// It was level, or did not turn fast, for so long.
-const TURNED: Span = Span::from_secs(1);
 /// With idle throttle, its weight on it and a steady pressure for so long, it stands: a flare takes its weight from the speed over ground for
 /// less.
 const SUPPORTED: Span = Span::from_secs(4);
@@ -43,13 +40,13 @@ const STEADY: Span = Span::from_secs(3);
 /// A climb or sink by this, m/s, shows in the pressure, or the estimate is lost.
 const LOST_MPS: f32 = 2.0;
 
-/// What one witness says.
+/// The vote of one witness.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Vote {
     /// It does not tell.
     Unknown,
     Undecided,
-    /// Its height is below the place of arming: a valley, or an estimate that drifts. It is no vote.
+    /// Its height is below the place of arming: a valley, or an estimate that drifts. It does not count.
     Below,
     Flies,
     Stands,
@@ -63,7 +60,7 @@ pub(super) const THRUST: u8 = 4;
 pub(super) const INERTIAL: u8 = 8;
 pub(super) const SPEED: u8 = 16;
 
-/// What all witnesses say, as bits.
+/// The votes of all witnesses, as bits.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Votes {
     pub(super) flies: u8,
@@ -113,12 +110,9 @@ impl Flight {
     }
 
     fn word(&self, now: Instant, vehicle: &Vehicle) -> Vote {
-        let is_older = vehicle
-            .terminated_since
-            .is_some_and(|since| vehicle.landed.at().is_none_or(|at| !at.is_after(since)));
         match vehicle.landed.within(now, LANDED_STATE_AGE) {
-            Some(LandedState::OnGround) if !is_older => Stands,
-            Some(LandedState::InAir | LandedState::Landing) if self.powered => Flies,
+            Some(LandedState::OnGround) => Stands,
+            Some(LandedState::InAir | LandedState::Landing) if self.arming.is_on => Flies,
             // Taking off: from the spooling up of the motors until the height that was asked for is reached.
             None | Some(LandedState::TakingOff | LandedState::Unknown) => Unknown,
             Some(_) => Undecided,
@@ -133,25 +127,19 @@ impl Flight {
     /// Height above the place of arming, by pressure and by position.
     fn heights(&self, now: Instant, vehicle: &Vehicle, is_lost: bool) -> [Vote; 2] {
         let by_position = self.motion.rise_m(now, vehicle).filter(|_| !is_lost);
-        let lows_m = if self.stage.is_mishap() { [CLEAR_M; 2] } else { [NOISE_M, LOW_M] };
-        let mut heights = [Unknown; 2];
-        for ((vote, height_m), low_m) in
-            heights.iter_mut().zip([self.pressure.height_m(now), by_position]).zip(lows_m)
+        [(self.pressure.height_m(now), NOISE_M), (by_position, LOW_M)].map(|(height_m, low_m)| match height_m
         {
-            *vote = match height_m {
-                None => Unknown,
-                Some(height_m) if height_m > CLEAR_M => Flies,
-                Some(height_m) if height_m < -CLEAR_M => Below,
-                Some(height_m) if height_m.abs() < low_m => Stands,
-                Some(_) => Undecided,
-            };
-        }
-        heights
+            None => Unknown,
+            Some(height_m) if height_m > CLEAR_M => Flies,
+            Some(height_m) if height_m < -CLEAR_M => Below,
+            Some(height_m) if height_m.abs() < low_m => Stands,
+            Some(_) => Undecided,
+        })
     }
 
     fn height(&self, now: Instant, heights: [Vote; 2]) -> Vote {
-        if !self.powered && self.stage.is_mishap() {
-            let passed = self.off_at.map_or(Span::ZERO, |since| now.since(since));
+        if !self.arming.is_on && self.stage.is_mishap() {
+            let passed = self.arming.off_at.map_or(Span::ZERO, |since| now.since(since));
             let steady_for = self.pressure.steady_for(now).map(|span| span.min(passed));
             return steady_for.map_or(Unknown, |span| if span >= STEADY { Stands } else { Flies });
         }
@@ -163,12 +151,12 @@ impl Flight {
         }
     }
 
-    /// Whether its height is another one than that of the place of arming.
+    /// Whether its height differs from the place of arming.
     pub(super) fn is_away(&self, now: Instant, vehicle: &Vehicle) -> bool {
         are_away(self.heights(now, vehicle, self.is_lost(now, vehicle)))
     }
 
-    /// What the throttle does; `None` if nobody tells, or it is zero in a log while motors shake the vehicle.
+    /// The effect of the throttle. `None` if it is not reported, or if it is reported as zero while motors shake the vehicle.
     pub(super) fn power(&self, now: Instant, vehicle: &Vehicle) -> Option<Power> {
         let power = throttle(now, vehicle).map(|part| self.thrust.power(part));
         power.filter(|power| {
@@ -177,23 +165,16 @@ impl Flight {
     }
 
     fn thrust_vote(&self, now: Instant, vehicle: &Vehicle, power: Option<Power>, speed: Vote) -> Vote {
-        if !self.powered {
-            return Stands;
-        }
-        let on_wings = is_on_wings(now, vehicle);
+        let climbs = || climb_mps(now, vehicle).is_some_and(|climb_mps| climb_mps.abs() > STILL_MPS);
         match power {
+            _ if !self.arming.is_on => Stands,
             None => Unknown,
-            // Wings glide.
-            Some(Power::Idle) if on_wings && speed == Flies => Undecided,
-            Some(Power::Idle) => Stands,
             Some(Power::Little) => Undecided,
+            // Wings glide.
+            Some(Power::Idle) if is_on_wings(now, vehicle) && speed == Flies => Undecided,
+            Some(Power::Idle) => Stands,
             // With all its thrust it would climb.
-            Some(Power::Full)
-                if !on_wings
-                    && !climb_mps(now, vehicle).is_some_and(|climb_mps| climb_mps.abs() > STILL_MPS) =>
-            {
-                Stands
-            }
+            Some(Power::Full) if !is_on_wings(now, vehicle) && !climbs() => Stands,
             Some(Power::Carries | Power::Full) => Flies,
         }
     }
@@ -203,13 +184,13 @@ impl Flight {
         now: Instant,
         vehicle: &Vehicle,
         power: Option<Power>,
-        heights: [Vote; 2],
+        [by_pressure, _]: [Vote; 2],
         may_hover: bool,
     ) -> Vote {
         if self.stage.has_hit() {
             return Stands;
         }
-        if self.felt_at == Instant::ZERO {
+        if self.felt.at == Instant::ZERO {
             return Unknown;
         }
         let turns = !vehicle.inertial.turns_little(now, TURNED);
@@ -221,10 +202,7 @@ impl Flight {
         }
         let rests = power == Some(Power::Idle) && vehicle.inertial.is_level(now) && !may_hover;
         // Simulators have no vibration.
-        let [by_pressure, by_position] = heights;
-        let is_quiet = (vehicle.inertial.is_calm(now) && by_pressure == Stands)
-            || ((vehicle.inertial.shakes(now) == Some(false) || vehicle.inertial.contradicts(now))
-                && by_position == Stands);
+        let is_quiet = vehicle.inertial.is_calm(now) && by_pressure == Stands;
         if rests || is_quiet || self.is_supported(now) { Stands } else { Undecided }
     }
 
@@ -242,7 +220,7 @@ impl Flight {
             |speed_mps: Option<f32>, limit_mps| speed_mps.is_some_and(|speed_mps| speed_mps > limit_mps);
         if is_on_wings(now, vehicle) {
             let air_mps = airspeed_mps(now, vehicle);
-            // Wind alone is no flight.
+            // Wind alone makes an air speed too.
             let has_thrust = matches!(power, Some(Power::Carries | Power::Full));
             let by_air = is_over(air_mps, WINGS_MPS) && (self.airborne() || has_thrust);
             return if ground_mps.or(air_mps).is_none() {
@@ -270,7 +248,7 @@ impl Flight {
         };
         let is_slow = !is_over(ground_mps, STILL_MPS) && !is_over(vertical_mps, STILL_MPS);
         let hovers =
-            self.powered && (power == Some(Power::Carries) || (may_hover && !self.stage.is_mishap()));
+            self.arming.is_on && (power == Some(Power::Carries) || (may_hover && !self.stage.is_mishap()));
         match (moves, is_slow && !hovers) {
             (true, _) => Flies,
             (false, true) => Stands,
@@ -294,14 +272,15 @@ impl Flight {
     /// and tail-sitters look up.
     pub(super) fn lies(&self, now: Instant, vehicle: &Vehicle) -> bool {
         let flies = vehicle.hovers(now) == Some(false) && is_fast(now, vehicle);
-        let is_over = self.stood && on_rotors(now, vehicle) && vehicle.inertial.lies_over(now).is_some();
+        let is_over =
+            self.arming.stood && on_rotors(now, vehicle) && vehicle.inertial.lies_over(now).is_some();
         (is_tilted(now, vehicle) && !flies)
             || self.lies_on_its_back(vehicle)
             || (is_over && !is_fast(now, vehicle))
     }
 
     pub(super) fn lies_on_its_back(&self, vehicle: &Vehicle) -> bool {
-        vehicle.is_multicopter() && self.from_above_g > ON_BACK_G
+        vehicle.is_multicopter() && self.felt.from_above_g > ON_BACK_G
     }
 
     /// Whether something carries it that is not its rotors, by no estimate: for a while it had idle throttle, its weight on it, and a steady
@@ -312,10 +291,10 @@ impl Flight {
 
     /// One step of the same. An autopilot whose estimate climbs takes the thrust away, and flies into the ground.
     pub(super) fn note_support(&mut self, now: Instant, vehicle: &Vehicle, params: &Params) {
-        let rests = self.powered
+        let rests = self.arming.is_on
             && self.thrust.is_learnt()
             && self.power(now, vehicle) == Some(Power::Idle)
-            && now.since(self.felt_at) <= FRESH
+            && now.since(self.felt.at) <= FRESH
             && WEIGHT_G.contains(&(norm(vehicle.inertial.force()) / GRAVITY))
             && self.is_slow_to_turn();
         self.supported = match (self.pressure.now(now).filter(|_| rests), self.supported) {
@@ -350,13 +329,13 @@ pub(super) fn is_on_wings(now: Instant, vehicle: &Vehicle) -> bool {
     !vehicle.hovers(now).unwrap_or(!has_wings)
 }
 
-/// Whether its attitude is that of a vehicle on its side or its back.
-pub(super) fn is_tilted(now: Instant, vehicle: &Vehicle) -> bool {
+/// Whether it is on its side or its back by its attitude.
+fn is_tilted(now: Instant, vehicle: &Vehicle) -> bool {
     !vehicle.inertial.contradicts(now)
         && vehicle
             .attitude
             .within(now, FRESH)
-            .is_some_and(|attitude| attitude.roll.0.abs().max(attitude.pitch.0.abs()) > LIES_RAD)
+            .is_some_and(|attitude| attitude.roll.0.abs().max(attitude.pitch.0.abs()) > TILTED_RAD)
 }
 
 /// Whether it is faster over ground than a vehicle that lies, or is dragged along: the air carries it from ahead besides its rotors.

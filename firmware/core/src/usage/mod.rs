@@ -1,9 +1,7 @@
-//! Usage: what a mechanic acts on. Counters since power-on, each a number that is stored, with a name that carries its
-//! unit.
+//! Usage: counters since power-on for a mechanic, each with a stored number and a name that ends in its unit.
 
 mod counters;
 mod totals;
-mod touchdown;
 
 pub use counters::{
     BASELINE_FIRST, CounterName, EXPOSURE_FIRST, Form, MOTOR_REVOLUTIONS_FIRST, MOTOR_TIME_FIRST,
@@ -13,7 +11,7 @@ pub use totals::{MotorTotals, Totals, Wear};
 
 use crate::derived::Derived;
 use crate::flight::{Flight, FlightEvent, Phase};
-use crate::motion::{climb_mps, ground_speed_mps, height_m};
+use crate::motion::ground_speed_mps;
 use crate::motors::turns;
 use crate::observation::Observation;
 use crate::params::{Param, Params};
@@ -21,7 +19,6 @@ use crate::power_draw::{Drawn, discharge_a, drawn};
 use crate::rainflow::Rainflow;
 use crate::time::{Instant, PAUSE, Span};
 use crate::vehicle::{BATTERIES_MAX, Vehicle};
-use touchdown::Touchdown;
 
 /// Integration steps longer than this are gaps: nothing is known of what happened in them.
 const STEP_MAX: Span = Span::from_secs(2);
@@ -48,11 +45,6 @@ pub struct Usage {
     current_a: Option<f32>,
     /// All but what is worked out when it is asked for: the cycles of the load factor.
     totals: Totals,
-    touchdown: Touchdown,
-    /// The flight that ends now ends by a mishap.
-    crashed: bool,
-    /// The hardest touch of this flight.
-    touched_mps: f32,
     capacity_ah: f32,
     /// Full discharges of each battery, where the capacity is known: each has an equal share of it.
     battery_cycles: [f64; BATTERIES_MAX],
@@ -83,9 +75,6 @@ impl Usage {
             last: None,
             current_a: None,
             totals: Totals::nothing(),
-            touchdown: Touchdown::NONE,
-            crashed: false,
-            touched_mps: 0.0,
             capacity_ah: 0.0,
             battery_cycles: [0.0; BATTERIES_MAX],
             load_cycles: Rainflow::new(LOAD_RANGES_G, LOAD_TURN_G),
@@ -158,9 +147,8 @@ impl Usage {
             let late = flight.airborne_since().map_or(Span::ZERO, |since| now.since(since));
             self.totals.add(UsageCounter::Flight, f64::from(late.as_secs_f32()));
         }
-        self.note_touch(now, vehicle, flight);
         if event == Some(FlightEvent::Landing) {
-            self.land(params);
+            self.land(flight, params);
         }
         self.totals.set(UsageCounter::AutopilotReboots, f64::from(vehicle.reboots));
         let set_ah = params.get(Param::BatCapacity);
@@ -222,41 +210,19 @@ impl Usage {
         }
     }
 
-    /// The flight is over.
-    fn land(&mut self, params: &Params) {
-        let touched_mps = core::mem::take(&mut self.touched_mps);
-        let ended =
-            if core::mem::take(&mut self.crashed) { UsageCounter::Mishaps } else { UsageCounter::Landings };
+    /// The flight is over, by a landing or a mishap.
+    fn land(&mut self, flight: &Flight, params: &Params) {
+        let ended = if flight.is_down() { UsageCounter::Mishaps } else { UsageCounter::Landings };
         self.totals.add(ended, 1.0);
-        self.totals.extend(UsageCounter::TouchdownMax, f64::from(touched_mps));
-        if touched_mps >= params.get(Param::HardLanding) {
+        self.totals.extend(UsageCounter::TouchdownMax, f64::from(flight.touch_mps()));
+        if flight.touch_mps() >= params.get(Param::HardLanding) {
             self.totals.add(UsageCounter::HardLandings, 1.0);
         }
     }
 
     /// The flight is over, and nobody saw how it ended.
     pub(crate) fn break_off(&mut self) {
-        (self.touchdown, self.crashed, self.touched_mps) = (Touchdown::NONE, false, 0.0);
         (self.held_s, self.landing_s) = ([0.0; 2], 0.0);
-    }
-
-    /// The flight ends now by a mishap, in which it touched with so many m/s: that is no landing.
-    pub(crate) fn count_mishap(&mut self, touch_mps: f32) {
-        self.crashed = true;
-        self.touched_mps = self.touched_mps.max(touch_mps);
-        // What the estimate of a vehicle that lies says of speeds is no touch.
-        self.touchdown = Touchdown::NONE;
-    }
-
-    fn note_touch(&mut self, now: Instant, vehicle: &Vehicle, flight: &Flight) {
-        let height_m = height_m(now, vehicle);
-        if flight.airborne() {
-            if let (Some(climb_mps), Some(height_m)) = (climb_mps(now, vehicle), height_m) {
-                self.touchdown.step(now, -climb_mps, flight.motion.sink.greatest(now), height_m);
-            }
-        } else {
-            self.touched_mps = self.touched_mps.max(self.touchdown.take(now, height_m));
-        }
     }
 
     fn step_motors(&mut self, now: Instant, vehicle: &Vehicle, step_s: f64) {

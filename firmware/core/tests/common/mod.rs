@@ -1,15 +1,23 @@
 //! A simulated quad, which scripts make say what they want.
 #![allow(dead_code, missing_docs, unreachable_pub, reason = "each test file uses its own part of this")]
 
+use hums_core::Monitor;
+use hums_core::happening::Happening;
+use hums_core::health::Finding;
+use hums_core::mishap::Report;
 use hums_core::observation::{
     Attitude, Autopilot, Battery, Esc, EscGroup, Estimator, EstimatorScale, GlobalPosition, Gnss,
     GnssIntegrity, Heartbeat, Hud, Imu, LandedState, Observation, Sensors, Source, SystemStatus, SystemTime,
     VehicleKind, Vibration, VtolState,
 };
-use hums_core::status::{RecorderStatus, Recording};
+use hums_core::params::Params;
+use hums_core::protect::Request;
+use hums_core::status::{LinkReading, RecorderStatus, Recording};
+use hums_core::time::Instant;
 use hums_core::units::{
     Amperes, Celsius, Fraction, Metres, MetresPerSecond, MetresPerSecond2, Radians, Rpm, Volts,
 };
+use hums_core::usage::UsageCounter;
 
 pub const AUTOPILOT: Source = Source { system: 1, component: 1 };
 
@@ -168,5 +176,74 @@ impl Quad {
             said.extend(self.landed.map(|landed| Observation::Landed(landed, self.vtol)));
         }
         said
+    }
+}
+
+/// A monitor, and everything that it told, with times in milliseconds.
+pub struct Run {
+    pub monitor: Monitor,
+    pub findings: Vec<Finding>,
+    pub happenings: Vec<(u64, Happening)>,
+    pub requests: Vec<(u64, Request)>,
+    /// What the ground is told of each change of a mishap.
+    pub reports: Vec<(u64, Report)>,
+}
+
+impl Run {
+    pub fn new(params: &Params) -> Self {
+        let monitor = Monitor::new(*params);
+        let (findings, happenings, requests, reports) = Default::default();
+        Self { monitor, findings, happenings, requests, reports }
+    }
+
+    /// Steps the monitor every 50 ms; before each step the script reports what it wants.
+    pub fn steps(&mut self, times_ms: core::ops::Range<u64>, mut script: impl FnMut(u64, &mut Monitor)) {
+        for now_ms in times_ms.step_by(50) {
+            let now = Instant::from_millis(now_ms);
+            script(now_ms, &mut self.monitor);
+            let link = LinkReading { frames_lost: Some(0.0), at: now };
+            let recorder = Quad::healthy().recorder;
+            self.monitor.tick(now, &link, &recorder, &mut |finding| self.findings.push(*finding));
+            while let Some(happening) = self.monitor.take_happening() {
+                if let Happening::Mishap(change) = happening {
+                    self.reports.push((now_ms, self.monitor.flight().report(change)));
+                }
+                self.happenings.push((now_ms, happening));
+            }
+            self.requests.extend(self.monitor.take_request().map(|request| (now_ms, request)));
+        }
+    }
+
+    /// The same; what the autopilot says comes every 100 ms.
+    pub fn says(&mut self, times_ms: core::ops::Range<u64>, mut says: impl FnMut(u64) -> Vec<Observation>) {
+        self.steps(times_ms, |now_ms, monitor| {
+            if now_ms.is_multiple_of(100) {
+                observe(monitor, now_ms, AUTOPILOT, says(now_ms));
+            }
+        });
+    }
+
+    /// The names of the checks that told something, each once, in alphabetical order.
+    pub fn checks(&self) -> Vec<&'static str> {
+        let mut checks: Vec<_> = self.findings.iter().map(|finding| finding.check).collect();
+        checks.sort_unstable();
+        checks.dedup();
+        checks
+    }
+
+    pub fn counts(&self, counters: [UsageCounter; 3]) -> [u32; 3] {
+        counters.map(|counter| self.monitor.usage().value(counter).unwrap_or(0.0) as u32)
+    }
+}
+
+/// A source says all this.
+pub fn observe(
+    monitor: &mut Monitor,
+    now_ms: u64,
+    source: Source,
+    said: impl IntoIterator<Item = Observation>,
+) {
+    for observation in said {
+        monitor.observe(Instant::from_millis(now_ms), source, &observation);
     }
 }

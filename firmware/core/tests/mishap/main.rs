@@ -8,9 +8,8 @@ mod silences;
 mod sinks;
 mod turns;
 
-use common::{AUTOPILOT, Quad};
+use common::{AUTOPILOT, Quad, Run, observe};
 use hums_core::Monitor;
-use hums_core::happening::Happening;
 use hums_core::health::{Finding, Level, Orders, Subsystem};
 use hums_core::mishap::{Change, Kind, Place, Report};
 use hums_core::observation::{
@@ -18,7 +17,6 @@ use hums_core::observation::{
     VehicleKind, VtolState, Wanted,
 };
 use hums_core::params::Params;
-use hums_core::status::LinkReading;
 use hums_core::time::Instant;
 use hums_core::units::{
     Amperes, Fraction, Hectopascals, Metres, MetresPerSecond, MetresPerSecond2, Position, Radians,
@@ -128,9 +126,8 @@ fn fly_between(
     vehicle: &Quad,
     script: impl Fn(u64, &mut Quad, &mut Motion),
 ) -> Outcome {
-    let mut monitor = Monitor::new(Params::defaults());
-    let (mut findings, mut changes, mut reports) = (Vec::new(), Vec::new(), Vec::new());
-    for now_ms in (0..end_ms).step_by(50) {
+    let mut run = Run::new(&Params::defaults());
+    run.steps(0..end_ms, |now_ms, monitor| {
         let now = Instant::from_millis(now_ms);
         let (mut quad, mut motion) = (vehicle.clone(), CALM);
         if now_ms >= at_ms {
@@ -173,20 +170,12 @@ fn fly_between(
                 .roll_wanted
                 .map(|roll| Observation::Wanted(Wanted { roll: Radians(roll), ..Wanted::default() }));
             let own = own.into_iter().filter(|_| !motion.beats_only);
-            for said in said.chain(hud).chain(wanted).chain(own) {
-                monitor.observe(now, AUTOPILOT, &said);
-            }
+            observe(monitor, now_ms, AUTOPILOT, said.chain(hud).chain(wanted).chain(own));
         }
-        let link = LinkReading { frames_lost: Some(0.0), at: now };
-        monitor.tick(now, &link, &quad.recorder, &mut |finding| findings.push(*finding));
-        while let Some(happening) = monitor.take_happening() {
-            if let Happening::Mishap(change) = happening {
-                changes.push((now_ms, change));
-                reports.push(monitor.flight().report(change));
-            }
-        }
-    }
-    Outcome { monitor, findings, changes, reports }
+    });
+    let changes = run.reports.iter().map(|(at_ms, report)| (*at_ms, report.change)).collect();
+    let reports = run.reports.iter().map(|(_, report)| *report).collect();
+    Outcome { monitor: run.monitor, findings: run.findings, changes, reports }
 }
 
 /// Autopilot, kind and `MAV_TYPE` of a vehicle.

@@ -1,20 +1,19 @@
-//! How fast the vehicle came down on the ground.
+//! The speed of the touchdown.
 //!
-//! Nobody says when a vehicle touches: the autopilot calls it landed a second or more later, and its estimate of the speed
-//! goes on sinking slowly meanwhile. The sink shows the touch by breaking off: it is half of the greatest of the last second
-//! ([`crate::motion::WindowMax`]). That speed counts if the vehicle then stays at this height until it has landed; a stop higher up
-//! was a hover.
+//! The autopilot reports a landing a second or more after the touch, and its estimate goes on sinking slowly meanwhile. At the touch the sink
+//! breaks off: it falls to half of the greatest sink of the last second ([`crate::motion::WindowMax`]). This speed counts if the vehicle stays at
+//! this height until it has landed. A stop higher up was a hover.
 
 use crate::time::{Instant, Span};
 
-/// Slower than this nothing breaks off.
+/// A slower sink does not count, m/s.
 const SINK_MIN_MPS: f32 = 0.3;
-/// The touch was at the height where the vehicle stands, give or take what pressure does near the ground.
+/// Height of the touch above or below the landed vehicle, with the error of the pressure in ground effect, m.
 const SAME_HEIGHT_M: f32 = 1.5;
-/// The touch is at most so long before the vehicle is known to stand.
+/// A vehicle is known to stand this long after the touch, at most.
 const KNOWN_AFTER: Span = Span::from_secs(8);
 
-/// Where a descent broke off.
+/// The end of a descent.
 #[derive(Clone, Copy, Debug)]
 struct Stop {
     at: Instant,
@@ -22,13 +21,11 @@ struct Stop {
     sink_mps: f32,
 }
 
-/// The last place where a descent broke off.
+/// The last end of a descent.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Touchdown(Option<Stop>);
 
 impl Touchdown {
-    pub(super) const NONE: Self = Self(None);
-
     /// One step in the air: how fast it sinks (negative: climbs), and sank at most in the last second, and how high it is.
     pub(super) fn step(&mut self, at: Instant, sink_mps: f32, fastest_mps: f32, height_m: f32) {
         if fastest_mps < SINK_MIN_MPS || sink_mps > fastest_mps / 2.0 {
@@ -58,7 +55,7 @@ mod tests {
 
     /// (seconds, sink) pieces from a height, at 5 Hz; then the vehicle stands.
     fn land(mut height_m: f32, pieces: &[(f32, f32)]) -> f32 {
-        let (mut touchdown, mut sink, mut now_ms) = (Touchdown::NONE, WindowMax::default(), 0);
+        let (mut touchdown, mut sink, mut now_ms) = (Touchdown::default(), WindowMax::default(), 0);
         for (seconds, sink_mps) in pieces {
             for _ in 0..(seconds * 5.0) as u32 {
                 now_ms += 200;
