@@ -105,7 +105,7 @@ fn sessions_add_up_and_the_greatest_stays() {
         run(&mut monitor, &mut store, 100, 20, 80, (1, 7));
         assert_eq!(total(&monitor, UsageCounter::Flights), f64::from(session));
         let flight_s = total(&monitor, UsageCounter::Flight);
-        assert!((flight_s - 61.0 * f64::from(session)).abs() < 1.0, "{flight_s} s");
+        assert!((flight_s - 60.0 * f64::from(session)).abs() < 0.5, "{flight_s} s");
         assert_eq!(total(&monitor, UsageCounter::HeightMax), 20.0);
         assert_eq!(monitor.usage().value(UsageCounter::Flights), Some(1.0), "the session's own");
         assert_eq!(monitor.lifetime().sessions, session);
