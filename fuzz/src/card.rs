@@ -9,10 +9,10 @@ use std::collections::BTreeMap;
 use std::io;
 use std::sync::OnceLock;
 
-use embedded_sdmmc::{Block, BlockCount, BlockDevice, BlockIdx};
 use hums::logs::fat::{ReadAt, Volume};
 use hums_recorder::format::{BLOCKS_MIN, format};
 use hums_recorder::layout::Layout;
+use hums_recorder::{Block, CardDevice};
 
 const BLOCK: u64 = 512;
 /// Sentences about damage that a walk tells at most: twenty, one about segments left out, one that counts the others.
@@ -73,25 +73,25 @@ pub fn block_at(layout: &Layout, place: u8) -> u32 {
     }
 }
 
-impl BlockDevice for Card {
+impl CardDevice for Card {
     type Error = io::Error;
 
-    fn read(&self, blocks: &mut [Block], start: BlockIdx) -> io::Result<()> {
+    fn read(&self, blocks: &mut [Block], start: u32) -> io::Result<()> {
         let held = self.blocks.borrow();
-        for (number, block) in (start.0..).zip(blocks) {
-            block.contents = held.get(&number).copied().unwrap_or([0; 512]);
+        for (number, block) in (start..).zip(blocks) {
+            *block = held.get(&number).copied().unwrap_or([0; 512]);
         }
         Ok(())
     }
 
-    fn write(&self, blocks: &[Block], start: BlockIdx) -> io::Result<()> {
-        let written = (start.0..).zip(blocks).map(|(number, block)| (number, block.contents));
+    fn write(&self, blocks: &[Block], start: u32) -> io::Result<()> {
+        let written = (start..).zip(blocks).map(|(number, block)| (number, *block));
         self.blocks.borrow_mut().extend(written);
         Ok(())
     }
 
-    fn num_blocks(&self) -> io::Result<BlockCount> {
-        Ok(BlockCount(BLOCKS_MIN))
+    fn num_blocks(&self) -> io::Result<u32> {
+        Ok(BLOCKS_MIN)
     }
 }
 

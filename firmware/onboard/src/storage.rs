@@ -4,8 +4,7 @@
 //! the sector queue, sized for a card that stands still for 2.5 s.
 
 use hums_core::clock::{Instant, Span};
-use hums_recorder::recorder::Written;
-use hums_recorder::{Buffers, CardDevice, CardStatus, Recorder};
+use hums_recorder::{Buffers, CardDevice, CardStatus, NotYet, Recorder};
 
 use crate::queues::SectorsOut;
 use crate::shelf::Server;
@@ -24,16 +23,6 @@ pub enum Service {
     NoCard,
 }
 
-impl Service {
-    /// What follows from what the recorder did.
-    const fn after(written: Written) -> Self {
-        match written {
-            Written::Done | Written::Searching => Self::Wrote,
-            Written::Later => Self::NoCard,
-        }
-    }
-}
-
 /// The recorder with its queue's other side.
 pub struct Storage<'a, D: CardDevice> {
     recorder: Recorder<'a, D>,
@@ -50,35 +39,20 @@ impl<'a, D: CardDevice> Storage<'a, D> {
         if self.recorder.format(now) {
             return Service::Wrote;
         }
-        while sectors.oldest().is_some_and(|sector| self.recorder.take(sector)) {
-            sectors.drop_oldest();
-        }
-        if self.recorder.waiting() == 0 {
-            // So that the card's state is known, and a session open, before there is anything to write.
-            let ready = self.recorder.ready(now);
-            if ready == Written::Done {
+        match sectors.lend(|waiting| self.recorder.write(now, waiting)) {
+            Ok(0) => {
                 self.recorder.idle();
-                return Service::Idle;
+                Service::Idle
             }
-            return Service::after(ready);
+            Ok(_) | Err(NotYet::Searching) => Service::Wrote,
+            Err(NotYet::Later) => Service::NoCard,
         }
-        Service::after(self.recorder.write(now))
     }
 
     /// Answers one question about the logs on the card, if there is one; whether there was. To be called only when
     /// [`Self::service`] found nothing to write.
     pub fn serve(&mut self, shelf: &mut Server<'_>) -> bool {
         shelf.serve(&mut self.recorder)
-    }
-
-    /// Whether everything that was given to it is on the card.
-    pub fn is_done(&self, sectors: &SectorsOut) -> bool {
-        self.recorder.waiting() == 0 && sectors.is_empty()
-    }
-
-    /// Drops what waits because there is no card to write it to; how many frames are lost with it.
-    pub fn abandon(&mut self, sectors: &mut SectorsOut) -> u64 {
-        self.recorder.abandon() + sectors.abandon()
     }
 
     /// Ends the session after the last sector: the card can be pulled.

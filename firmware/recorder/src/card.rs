@@ -5,9 +5,6 @@
 
 use core::ops::{ControlFlow, Range};
 
-use embedded_sdmmc::Block;
-
-use crate::CardDevice;
 pub use crate::card_error::CardError;
 use crate::chain::ClusterChain;
 use crate::directory::{
@@ -20,6 +17,7 @@ use crate::name::LogName;
 use crate::recorder::Buffers;
 use crate::status::{CardStatus, Counted};
 use crate::volume::Volume;
+use crate::{BLOCK_BYTES, Block, CardDevice};
 
 /// Bytes of a segment on a card with room for many: an hour of a busy vehicle.
 pub const SEGMENT_BYTES_MAX: u32 = 8 * 1024 * 1024;
@@ -87,7 +85,7 @@ impl Segment {
 
     /// How many whole blocks it has.
     pub const fn blocks(&self) -> u32 {
-        self.bytes / Block::LEN_U32
+        self.bytes / BLOCK_BYTES as u32
     }
 }
 
@@ -169,7 +167,7 @@ impl<'a, D: CardDevice> Card<'a, D> {
         each: &mut dyn FnMut(&Slot<'_>) -> ControlFlow<()>,
     ) -> Result<u32, CardError<D::Error>> {
         let mut chain = ClusterChain::new(self.volume.layout.root);
-        walk(&self.volume, &mut chain, from, &mut [Block::new()], &mut |slot| Ok(each(slot)))
+        walk(&self.volume, &mut chain, from, &mut [[0; BLOCK_BYTES]], &mut |slot| Ok(each(slot)))
     }
 
     /// The log that is not hidden behind so many others, from the directory's entry `from` on, and its own entry there.
@@ -251,7 +249,7 @@ impl<'a, D: CardDevice> Card<'a, D> {
         let place = self.place_for_new()?.ok_or(CardError::Damaged)?;
         let (first, last) = chain_free(&self.volume, &found, wanted)?;
         write_hint(&self.volume, last + 1);
-        let bytes = wanted.saturating_mul(self.volume.layout.cluster_blocks * Block::LEN_U32);
+        let bytes = wanted.saturating_mul(self.volume.layout.cluster_blocks * BLOCK_BYTES as u32);
         let made = self.make_entry(LogEntry { name, bytes, hidden: false, utc_secs: 0, first, place })?;
         self.directory.take_place();
         self.directory.add(made, wanted);
@@ -327,7 +325,7 @@ impl<'a, D: CardDevice> Card<'a, D> {
         let mut parity = self.buffers.parity.borrow_mut();
         let zeros = parity.lend();
         for block in zeros.iter_mut() {
-            block.contents.fill(0);
+            block.fill(0);
         }
         for at in (0..blocks).step_by(zeros.len()) {
             let zeros = zeros.get(..(blocks - at) as usize).unwrap_or(zeros);
@@ -393,10 +391,10 @@ impl<'a, D: CardDevice> Card<'a, D> {
     pub fn hide_logs(&mut self, from: u32, except: Option<u32>) -> Result<bool, CardError<D::Error>> {
         let mut chain = ClusterChain::new(self.volume.layout.root);
         let Some((at, _)) = chain.locate(&self.volume, from / BLOCK_ENTRIES, 1)? else { return Ok(false) };
-        let mut block = [Block::new()];
+        let mut block = [[0; BLOCK_BYTES]];
         self.volume.read(&mut block, at)?;
         let (mut is_changed, mut is_end) = (false, false);
-        for (index, bytes) in (0..).zip(block[0].contents.as_chunks_mut::<ENTRY_BYTES>().0) {
+        for (index, bytes) in (0..).zip(block[0].as_chunks_mut::<ENTRY_BYTES>().0) {
             is_end |= bytes[0] == 0;
             let slot = Slot { index, place: Place::of(at, index), bytes };
             let log = slot.log().filter(|log| !is_end && !log.hidden && log.bytes > 0);
@@ -429,7 +427,7 @@ impl<'a, D: CardDevice> Card<'a, D> {
         place: Place,
         change: impl FnOnce(&mut Entry) -> bool,
     ) -> Result<(), CardError<D::Error>> {
-        let mut block = [Block::new()];
+        let mut block = [[0; BLOCK_BYTES]];
         self.volume.read(&mut block, place.block)?;
         let entry = block[0].get_mut(usize::from(place.offset)..).and_then(|entry| entry.first_chunk_mut());
         if !change(entry.ok_or(CardError::Damaged)?) {
@@ -441,7 +439,7 @@ impl<'a, D: CardDevice> Card<'a, D> {
     /// Whether no file has the entry at this place.
     #[inline(never)]
     fn is_unused(&self, place: Place) -> Result<bool, CardError<D::Error>> {
-        let mut block = [Block::new()];
+        let mut block = [[0; BLOCK_BYTES]];
         self.volume.read(&mut block, place.block)?;
         Ok(block[0].get(usize::from(place.offset)..).is_some_and(is_unused))
     }
@@ -455,7 +453,7 @@ impl<'a, D: CardDevice> Card<'a, D> {
     pub fn settings(&self) -> Option<(Segment, u32)> {
         let (first, bytes) = self.directory.settings?;
         // Its last block is read whole.
-        let blocks = bytes.checked_next_multiple_of(Block::LEN_U32).unwrap_or(u32::MAX);
+        let blocks = bytes.checked_next_multiple_of(BLOCK_BYTES as u32).unwrap_or(u32::MAX);
         let (name, chain) = (LogName { session: 0, segment: 0 }, ClusterChain::new(first));
         Some((Segment { name, bytes: blocks, chain, place: Place::of(0, 0) }, bytes))
     }

@@ -12,20 +12,19 @@
 
 use core::ops::{ControlFlow, Range};
 
-use embedded_sdmmc::Block;
 use heapless::Vec;
 
-use crate::CardDevice;
 use crate::card::{CardError, LogEntry, Place, SEGMENT_BYTES_MAX};
 use crate::chain::ClusterChain;
 use crate::name::LogName;
 use crate::status::utc_secs;
 use crate::volume::{END_OF_CHAIN, ENTRIES, Volume, entry, set_entry};
+use crate::{BLOCK_BYTES, Block, CardDevice};
 
 /// Entries that a root directory may have before its chain counts as going in circles.
 const ENTRIES_MAX: u32 = 131_072;
 /// Entries of a block.
-pub(crate) const BLOCK_ENTRIES: u32 = Block::LEN_U32 / ENTRY_BYTES as u32;
+pub(crate) const BLOCK_ENTRIES: u32 = BLOCK_BYTES as u32 / ENTRY_BYTES as u32;
 /// Logs that are noted: the newest, and the oldest that may be overwritten.
 const NEWEST_MAX: usize = 4;
 const OLDEST_MAX: usize = 16;
@@ -334,7 +333,7 @@ pub(crate) fn walk<D: CardDevice>(
         };
         let blocks = buffer.get_mut(..wanted.min(in_row) as usize).unwrap_or_default();
         volume.read(blocks, block)?;
-        let mut entries = blocks.iter().flat_map(|block| block.contents.as_chunks::<ENTRY_BYTES>().0);
+        let mut entries = blocks.iter().flat_map(|block| block.as_chunks::<ENTRY_BYTES>().0);
         let first = index % BLOCK_ENTRIES;
         for (at, bytes) in (first..).zip(entries.by_ref().skip(first as usize)) {
             if bytes[0] == NEVER_USED {
@@ -352,7 +351,7 @@ pub(crate) fn walk<D: CardDevice>(
 
 /// Clusters that so many bytes take.
 pub(crate) const fn clusters_of<D>(volume: &Volume<'_, D>, bytes: u32) -> u32 {
-    bytes.div_ceil(volume.layout.cluster_blocks * Block::LEN_U32)
+    bytes.div_ceil(volume.layout.cluster_blocks * BLOCK_BYTES as u32)
 }
 
 /// A number for a name, such that a sum of several tells which they are.

@@ -4,9 +4,8 @@
 //! One FAT instead of two, deliberately: with two, every update has a moment in which the copies differ, and a cut
 //! there is what a file system check complains about. The second copy is never read by any system in use.
 
-use embedded_sdmmc::{Block, BlockDevice, BlockIdx};
-
 use crate::layout::FAT32_CLUSTERS_MIN;
+use crate::{BLOCK_BYTES, Block, CardDevice};
 
 /// The partition begins at 1 MiB, as SD cards and every partitioning tool have it.
 const PARTITION_START: u32 = 2048;
@@ -45,7 +44,7 @@ const fn cluster_blocks(volume_blocks: u32) -> u32 {
 const CLEAR_BLOCKS: u32 = 4;
 
 /// Makes a partition table and an empty FAT32 volume; everything on the card is lost.
-pub fn format<D: BlockDevice>(device: &D, volume_id: u32) -> Result<(), FormatError<D::Error>> {
+pub fn format<D: CardDevice>(device: &D, volume_id: u32) -> Result<(), FormatError<D::Error>> {
     let mut formatting = Formatting::new(volume_id);
     while !formatting.step(device)? {}
     Ok(())
@@ -107,9 +106,9 @@ impl Formatting {
     }
 
     /// Does one step; whether it was the last one.
-    pub fn step<D: BlockDevice>(&mut self, device: &D) -> Result<bool, FormatError<D::Error>> {
+    pub fn step<D: CardDevice>(&mut self, device: &D) -> Result<bool, FormatError<D::Error>> {
         let Some(plan) = &mut self.plan else {
-            let card_blocks = device.num_blocks().map_err(FormatError::Device)?.0;
+            let card_blocks = device.num_blocks().map_err(FormatError::Device)?;
             if card_blocks < BLOCKS_MIN {
                 return Err(FormatError::TooSmall);
             }
@@ -125,7 +124,7 @@ impl Formatting {
             return Ok(false);
         }
         if let Some((make, at)) = STRUCTURES.get(plan.structures) {
-            device.write(&[make(plan)], BlockIdx(*at)).map_err(FormatError::Device)?;
+            device.write(&[make(plan)], *at).map_err(FormatError::Device)?;
             plan.structures += 1;
         }
         Ok(plan.structures >= STRUCTURES.len())
@@ -135,10 +134,10 @@ impl Formatting {
 /// Clears blocks, [`CLEAR_BLOCKS`] at most.
 // Not within its caller, whose place on the stack others stand on.
 #[inline(never)]
-fn clear<D: BlockDevice>(device: &D, at: u32, count: u32) -> Result<(), FormatError<D::Error>> {
-    let zeros = [const { Block { contents: [0; Block::LEN] } }; CLEAR_BLOCKS as usize];
+fn clear<D: CardDevice>(device: &D, at: u32, count: u32) -> Result<(), FormatError<D::Error>> {
+    let zeros = [[0; BLOCK_BYTES]; CLEAR_BLOCKS as usize];
     let zeros = zeros.get(..count as usize).unwrap_or_default();
-    device.write(zeros, BlockIdx(at)).map_err(FormatError::Device)
+    device.write(zeros, at).map_err(FormatError::Device)
 }
 
 fn put(block: &mut Block, at: usize, bytes: &[u8]) {
@@ -146,7 +145,7 @@ fn put(block: &mut Block, at: usize, bytes: &[u8]) {
 }
 
 fn partition_table(plan: &Plan) -> Block {
-    let mut block = Block::new();
+    let mut block = [0; BLOCK_BYTES];
     // Status, CHS of the first block ("too far"), type FAT32 LBA, CHS of the last block.
     put(&mut block, 446, &[0x00, 0xFE, 0xFF, 0xFF, 0x0C, 0xFE, 0xFF, 0xFF]);
     put(&mut block, 454, &PARTITION_START.to_le_bytes());
@@ -157,10 +156,10 @@ fn partition_table(plan: &Plan) -> Block {
 
 fn boot_sector(plan: &Plan) -> Block {
     let Plan { total, cluster_blocks, fat_blocks, volume_id, .. } = *plan;
-    let mut block = Block::new();
+    let mut block = [0; BLOCK_BYTES];
     put(&mut block, 0, &[0xEB, 0x58, 0x90]);
     put(&mut block, 3, b"HUMS    ");
-    put(&mut block, 11, &(Block::LEN as u16).to_le_bytes());
+    put(&mut block, 11, &(BLOCK_BYTES as u16).to_le_bytes());
     put(&mut block, 13, &[cluster_blocks as u8]);
     put(&mut block, 14, &(RESERVED_BLOCKS as u16).to_le_bytes());
     put(&mut block, 16, &[1]); // one FAT
@@ -183,7 +182,7 @@ fn boot_sector(plan: &Plan) -> Block {
 
 /// The free count stays unknown for ever, so it can never be wrong.
 fn info_sector(_: &Plan) -> Block {
-    let mut block = Block::new();
+    let mut block = [0; BLOCK_BYTES];
     put(&mut block, 0, &0x4161_5252_u32.to_le_bytes());
     put(&mut block, 484, &0x6141_7272_u32.to_le_bytes());
     put(&mut block, 488, &u32::MAX.to_le_bytes());
@@ -194,7 +193,7 @@ fn info_sector(_: &Plan) -> Block {
 
 /// The FAT's first block: media, "clean" flags, and the root directory of one cluster.
 fn fat_begin(_: &Plan) -> Block {
-    let mut block = Block::new();
+    let mut block = [0; BLOCK_BYTES];
     for (entry, value) in [0x0FFF_FFF8_u32, 0x0FFF_FFFF, 0x0FFF_FFFF].iter().enumerate() {
         put(&mut block, entry * 4, &value.to_le_bytes());
     }

@@ -5,11 +5,9 @@
 
 use core::ops::Range;
 
-use embedded_sdmmc::Block;
-
-use crate::CardDevice;
 use crate::card::CardError;
 use crate::volume::{END_OF_CHAIN, ENTRIES, Volume, entry, set_entry};
+use crate::{BLOCK_BYTES, Block, CardDevice};
 
 /// FAT blocks that one call looks through, beside a segment's own: 64 ms of a usual card. All of a large card's FAT takes
 /// seconds, and no one service of the card may take so long.
@@ -43,7 +41,7 @@ pub(crate) struct FreeSearch {
 impl FreeSearch {
     /// A search that begins at the cluster that the information sector names.
     pub(crate) fn new<D: CardDevice>(volume: &Volume<'_, D>) -> Self {
-        let mut block = [Block::new()];
+        let mut block = [[0; BLOCK_BYTES]];
         // A sector that cannot be read tells nothing, as one that is not signed.
         let is_read = volume.read(&mut block, volume.layout.info).is_ok();
         let hint = Some(word(&block[0], HINT))
@@ -238,10 +236,10 @@ fn free_in_block<D: CardDevice>(volume: &Volume<'_, D>, index: u32) -> Result<u3
 /// is not known, so that it can never be wrong. A damaged sector is mended. A sector that the card refuses is left: files need no hint.
 #[inline(never)]
 pub(crate) fn write_hint<D: CardDevice>(volume: &Volume<'_, D>, cluster: u32) {
-    let mut block = [Block::new()];
+    let mut block = [[0; BLOCK_BYTES]];
     let is_read = volume.read(&mut block, volume.layout.info).is_ok();
     if !is_read || !is_signed(&block[0]) {
-        block = [Block::new()];
+        block = [[0; BLOCK_BYTES]];
     }
     let words = [(FREE_COUNT, u32::MAX), (HINT, cluster)];
     for (at, value) in SIGNATURES.into_iter().chain(words) {

@@ -6,7 +6,7 @@
 
 use core::fmt;
 
-use embedded_sdmmc::{Block, BlockCount, BlockDevice, BlockIdx};
+use crate::{BLOCK_BYTES, Block, CardDevice};
 
 /// Clusters below this number make a FAT16 volume, whatever else it says.
 pub const FAT32_CLUSTERS_MIN: u32 = 65_525;
@@ -78,25 +78,25 @@ impl<E> fmt::Display for LayoutError<E> {
 
 impl Layout {
     /// Reads and checks a card's first partition.
-    pub fn read<D: BlockDevice>(device: &D) -> Result<Self, LayoutError<D::Error>> {
-        let card_blocks = device.num_blocks().map_err(LayoutError::Device)?.0;
-        let mut block = [Block::new()];
-        device.read(&mut block, BlockIdx(0)).map_err(LayoutError::Device)?;
+    pub fn read<D: CardDevice>(device: &D) -> Result<Self, LayoutError<D::Error>> {
+        let card_blocks = device.num_blocks().map_err(LayoutError::Device)?;
+        let mut block = [[0; BLOCK_BYTES]];
+        device.read(&mut block, 0).map_err(LayoutError::Device)?;
         let (start, blocks) = partition(&block[0])?;
         if start >= card_blocks {
             return Err(LayoutError::BadVolume("the partition begins outside the card"));
         }
-        device.read(&mut block, BlockIdx(start)).map_err(LayoutError::Device)?;
+        device.read(&mut block, start).map_err(LayoutError::Device)?;
         Self::from_boot_sector(&block[0], start, blocks.min(card_blocks - start))
             .map_err(LayoutError::BadVolume)
     }
 
     /// The same of a volume without a partition table before it, as an image of a partition alone has it. The recorder
     /// writes to no such card.
-    pub fn volume<D: BlockDevice>(device: &D) -> Result<Self, LayoutError<D::Error>> {
-        let blocks = device.num_blocks().map_err(LayoutError::Device)?.0;
-        let mut block = [Block::new()];
-        device.read(&mut block, BlockIdx(0)).map_err(LayoutError::Device)?;
+    pub fn volume<D: CardDevice>(device: &D) -> Result<Self, LayoutError<D::Error>> {
+        let blocks = device.num_blocks().map_err(LayoutError::Device)?;
+        let mut block = [[0; BLOCK_BYTES]];
+        device.read(&mut block, 0).map_err(LayoutError::Device)?;
         Self::from_boot_sector(&block[0], 0, blocks).map_err(LayoutError::BadVolume)
     }
 
@@ -107,7 +107,7 @@ impl Layout {
         let check = |good: bool, what: &'static str| if good { Ok(()) } else { Err(what) };
 
         check(u16_at(510) == 0xAA55, "no boot signature")?;
-        check(u16_at(11) == Block::LEN_U32, "blocks are not of 512 bytes")?;
+        check(u16_at(11) == BLOCK_BYTES as u32, "blocks are not of 512 bytes")?;
         let cluster_blocks = u8_at(13);
         check(cluster_blocks.is_power_of_two(), "blocks a cluster")?;
         let reserved = u16_at(14);
@@ -152,12 +152,12 @@ impl Layout {
 
     /// Bytes that files and directories can hold.
     pub const fn data_bytes(&self) -> u64 {
-        self.clusters as u64 * self.cluster_blocks as u64 * Block::LEN as u64
+        self.clusters as u64 * self.cluster_blocks as u64 * BLOCK_BYTES as u64
     }
 
     /// The end of the card's blocks that this volume uses.
-    pub const fn end(&self) -> BlockCount {
-        BlockCount(self.data_start + self.clusters * self.cluster_blocks)
+    pub const fn end(&self) -> u32 {
+        self.data_start + self.clusters * self.cluster_blocks
     }
 }
 

@@ -35,7 +35,7 @@ mod volume;
 
 pub use card::{Card, CardError};
 pub use name::LogName;
-pub use recorder::{Buffers, Recorder, Written};
+pub use recorder::{Buffers, NotYet, Recorder};
 pub use spi::SpiCard;
 pub use status::{CardState, CardStatus};
 
@@ -54,8 +54,26 @@ pub enum Trouble {
     Locked,
 }
 
-/// A block device that can be told to start over, as a card must be after it was pulled and put back.
-pub trait CardDevice: embedded_sdmmc::BlockDevice {
+/// Bytes of a block.
+pub const BLOCK_BYTES: usize = 512;
+
+/// A block, in which cards are read and written.
+pub type Block = [u8; BLOCK_BYTES];
+
+/// A card: a device of blocks that can be told to start over, as it must be after it was pulled and put back.
+pub trait CardDevice {
+    /// Why an access failed.
+    type Error: core::fmt::Debug;
+
+    /// Reads blocks that lie in a row, from this one on.
+    fn read(&self, blocks: &mut [Block], start: u32) -> Result<(), Self::Error>;
+
+    /// Writes blocks that lie in a row, from this one on.
+    fn write(&self, blocks: &[Block], start: u32) -> Result<(), Self::Error>;
+
+    /// How many blocks the card has.
+    fn num_blocks(&self) -> Result<u32, Self::Error>;
+
     /// Forgets what is known of the card, so that the next access identifies it anew, and whichever it is.
     fn reset(&self) {}
 

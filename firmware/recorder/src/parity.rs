@@ -1,6 +1,6 @@
 //! The parity of the stretch in work: sums that grow with each sector that is on the card.
 
-use embedded_sdmmc::Block;
+use crate::{BLOCK_BYTES, Block};
 use hums_blackbox::SECTOR_BYTES;
 use hums_blackbox::parity::{COLUMNS, PARITY_SECTORS, STRETCH_SECTORS, Sum};
 use hums_core::clock::{Instant, Span};
@@ -28,7 +28,7 @@ impl Default for Parity {
 impl Parity {
     pub(crate) const fn new() -> Self {
         Self {
-            blocks: [const { Block { contents: [0; SECTOR_BYTES] } }; PARITY_SECTORS as usize],
+            blocks: [[0; BLOCK_BYTES]; PARITY_SECTORS as usize],
             rows: [0; COLUMNS],
             stretch: 0,
             since: None,
@@ -44,7 +44,7 @@ impl Parity {
 
     /// Starts afresh.
     pub(crate) fn begin(&mut self, stretch: u32) {
-        self.blocks.iter_mut().for_each(|block| block.contents.fill(0));
+        self.blocks.iter_mut().for_each(|block| block.fill(0));
         self.rows = [0; COLUMNS];
         (self.stretch, self.since) = (stretch, None);
     }
@@ -63,8 +63,8 @@ impl Parity {
         *rows = row + 1;
         for (sum, blocks) in Sum::ALL.into_iter().zip(self.blocks.chunks_mut(COLUMNS)) {
             if let Some(block) = blocks.get_mut(column) {
-                (0..passed).for_each(|_| sum.pass(&mut block.contents));
-                sum.add(&mut block.contents, sector);
+                (0..passed).for_each(|_| sum.pass(block));
+                sum.add(block, sector);
             }
         }
         self.since.get_or_insert(now);
@@ -97,7 +97,7 @@ impl Parity {
             for (column, (block, rows)) in (0..).zip(blocks.iter_mut().zip(self.rows)) {
                 if let Some(row) = rows.checked_sub(1) {
                     let index = u32::from(row) * COLUMNS as u32 + column;
-                    sum.seal(&mut block.contents, session, first.wrapping_add(index));
+                    sum.seal(block, session, first.wrapping_add(index));
                 }
             }
         }

@@ -18,13 +18,11 @@ mod trouble;
 
 use core::cell::RefCell;
 
-use embedded_sdmmc::Block;
-use heapless::Vec;
+use crate::{Block, CardDevice};
 use hums_blackbox::parity::{STRETCH_SECTORS, data_blocks, parity_block};
 use hums_blackbox::{GROUP_SECTORS, Sector};
 use hums_core::clock::{Instant, Span};
 
-use crate::CardDevice;
 use crate::card::{Card, CardError};
 use crate::format::FormatError;
 use crate::name::LogName;
@@ -40,14 +38,12 @@ const RETRY: Span = Span::from_secs(1);
 /// a new segment once in 100,000 sectors; the device bounds the time of all tries together.
 const WRITE_TRIES: u32 = 8;
 
-/// What became of a sector.
+/// Why nothing was written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Written {
-    /// It is on the card.
-    Done,
-    /// Room on the card is still looked for: keep it and call again at once.
+pub enum NotYet {
+    /// Room on the card is still looked for: call again at once.
     Searching,
-    /// There is no card to write it to now: keep it and try again later.
+    /// There is no card to write to now: try again later.
     Later,
 }
 
@@ -65,21 +61,19 @@ pub struct InWork {
     pub blocks: u32,
 }
 
-/// Blocks of log that are written with one command at most: the gain of more is small, and they take RAM.
-const BATCH_BLOCKS: usize = 8;
+/// Blocks of log that are written with one command at most: of more the gain is small.
+const ROW_BLOCKS: usize = 8;
 
-/// Room for the sectors that are being written, and for their parity. Lent, because the recorder is moved and this, 12 KiB, would come
-/// along on the firmware's stack.
+/// Room for parity. Lent, because the recorder is moved and this, 8 KiB, would come along on the firmware's stack.
 #[derive(Default)]
 pub struct Buffers {
-    batch: RefCell<Vec<Block, BATCH_BLOCKS>>,
     pub(crate) parity: RefCell<Parity>,
 }
 
 impl Buffers {
     /// Empty.
     pub const fn new() -> Self {
-        Self { batch: RefCell::new(Vec::new()), parity: RefCell::new(Parity::new()) }
+        Self { parity: RefCell::new(Parity::new()) }
     }
 }
 
@@ -115,92 +109,58 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
         }
     }
 
-    /// Looks for a card if there is none, at most once a second, and opens a session on it. [`Written::Done`]: one is open now.
-    pub fn ready(&mut self, now: Instant) -> Written {
+    /// Looks for a card if there is none, at most once a second, and opens a session on it.
+    fn ready(&mut self, now: Instant) -> Result<(), NotYet> {
         self.begin_service();
         if !self.socket.is_mounted() {
             if self.finished || now < self.retry_at {
-                return Written::Later;
+                return Err(NotYet::Later);
             }
             self.retry_at = now + RETRY;
             match self.socket.mount(self.status, self.buffers) {
                 Ok(true) => {}
-                Ok(false) => return Written::Later,
+                Ok(false) => return Err(NotYet::Later),
                 Err(error) => {
                     self.tell(&error);
-                    return Written::Later;
+                    return Err(NotYet::Later);
                 }
             }
             (self.segments.is_open, self.room_known) = (false, false);
             self.status.set_room(None);
         }
         if self.segments.is_open {
-            return Written::Done;
+            return Ok(());
         }
-        match self.begin() {
-            Ok(()) => Written::Done,
-            Err(CardError::Searching) => Written::Searching,
-            Err(error) => {
-                self.give_up(now, &error);
-                Written::Later
-            }
-        }
+        self.begin().map_err(|error| self.not_yet(now, &error))
     }
 
-    /// Takes a sector to be written; `false`: there is no room for more, [`Self::write`] makes some.
-    pub fn take(&mut self, sector: &Sector) -> bool {
-        let mut block = Block::new();
-        block.contents = *sector.bytes();
-        self.buffers.batch.borrow_mut().push(block).is_ok()
-    }
-
-    /// Sectors that were taken and are not on the card yet.
-    pub fn waiting(&self) -> usize {
-        self.buffers.batch.borrow().len()
-    }
-
-    /// Forgets them, because there is no card; how many frames are lost with them.
-    pub fn abandon(&mut self) -> u64 {
-        let mut batch = self.buffers.batch.borrow_mut();
-        let frames = batch.iter().map(sector_of).filter(|sector| !sector.is_partial());
-        let frames = frames.map(|sector| u64::from(sector.frames())).sum();
-        batch.clear();
-        frames
-    }
-
-    /// Writes sectors that were taken: the oldest, and with the same command those after it that belong right behind
-    /// it. With none taken there is nothing to do, which is [`Written::Done`].
-    pub fn write(&mut self, now: Instant) -> Written {
-        match self.ready(now) {
-            Written::Done => {}
-            not => return not,
-        }
-        let Some(first) = self.sector(0) else { return Written::Done };
+    /// Writes sectors that wait: the first, and with the same command those after it that belong right behind it. How many of them
+    /// are done with, which are to be dropped. With none a session is opened, so that the card's state is known before there is
+    /// anything to write.
+    pub fn write(&mut self, now: Instant, waiting: &mut [Block]) -> Result<usize, NotYet> {
+        self.ready(now)?;
+        let Some(first) = waiting.first().map(sector_of) else { return Ok(0) };
         self.await_group &= !first.starts_group();
         if self.await_group {
             if !first.is_partial() {
                 self.status.count_lost_sector(u32::from(first.frames()));
             }
-            self.drop_written(1);
-            return Written::Done;
+            return Ok(1);
         }
         for tries in 0..WRITE_TRIES {
             // Of a row in which one block was refused, the first alone is more likely to be taken.
-            let most = if tries == 0 { usize::MAX } else { 1 };
-            match self.try_write(now, &first, most) {
-                Ok(()) => {
-                    self.count_retries();
-                    return Written::Done;
-                }
-                Err(CardError::Searching) => return Written::Searching,
+            let most = waiting.len().min(if tries == 0 { ROW_BLOCKS } else { 1 });
+            let written = self.try_write(now, &first, waiting.get_mut(..most).unwrap_or_default());
+            self.count_retries();
+            match written {
+                Ok(count) => return Ok(count),
+                Err(CardError::Searching) => return Err(NotYet::Searching),
                 Err(error) => {
-                    self.count_retries();
                     if !matches!(error, CardError::Full) {
                         self.status.count_write_errors(1);
                     }
                     if !may_work_elsewhere::<D>(&error) {
-                        self.lose(now, &error);
-                        return Written::Later;
+                        return Err(self.lose(now, &error));
                     }
                 }
             }
@@ -208,17 +168,10 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
         // A new segment may lie where the card still works.
         let moved = self.next_segment(true).and_then(|()| {
             self.status.want_group();
-            self.try_write(now, &first, 1)
+            self.try_write(now, &first, waiting.get_mut(..1).unwrap_or_default())
         });
         self.count_retries();
-        match moved {
-            Ok(()) => Written::Done,
-            Err(CardError::Searching) => Written::Searching,
-            Err(error) => {
-                self.lose(now, &error);
-                Written::Later
-            }
-        }
+        moved.map_err(|error| self.lose(now, &error))
     }
 
     fn count_retries(&self) {
@@ -310,8 +263,13 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
         self.socket.begin_service();
     }
 
-    /// Writes the sector that waits first, and of those behind it so many as belong there, `most` in all.
-    fn try_write(&mut self, now: Instant, first: &Sector, most: usize) -> Result<(), CardError<D::Error>> {
+    /// Writes `first`, the first sector that waits, and of those behind it so many as belong there; how many.
+    fn try_write(
+        &mut self,
+        now: Instant,
+        first: &Sector,
+        waiting: &mut [Block],
+    ) -> Result<usize, CardError<D::Error>> {
         let number = first.number();
         if self.must_move(first)? {
             self.next_segment(false)?;
@@ -327,24 +285,25 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
             1
         } else {
             if log.newest_copy == NewestCopy::InPlace && has_next {
-                self.write_copy(log.session, at + 1)?;
+                self.write_copy(log.session, at + 1, waiting)?;
             }
             // A card may erase the blocks of a command before they come (SD specification, 4.3.4), and a copy lies in the second.
             let alone = core::mem::replace(&mut log.newest_copy, NewestCopy::None) != NewestCopy::None;
             self.begin_stretch(at / STRETCH_SECTORS);
             let in_stretch = STRETCH_SECTORS - at % STRETCH_SECTORS;
-            let most = if alone { 1 } else { most.min((blocks - at).min(in_stretch) as usize) };
-            self.count_in_row(number, most)
+            let most = if alone { 1 } else { (blocks - at).min(in_stretch) as usize };
+            count_in_row(number, waiting).min(most)
         };
-        let written = self.write_sealed(&log, at, count)?;
+        let row = waiting.get_mut(..count).ok_or(CardError::NotOpen)?;
+        seal(row, None, log.session);
+        let written = self.mounted()?.write(at, row)?;
         self.status.count_blocks(written as u32);
         self.segments.log = Some(log);
-        let is_closed = self.add_to_parity(now, at, written);
-        self.drop_written(written);
+        let is_closed = self.add_to_parity(now, at, row.get(..written).unwrap_or_default());
         if is_closed || self.buffers.parity.borrow().is_overdue(now) {
             self.write_parity();
         }
-        Ok(())
+        Ok(written)
     }
 
     /// The next sector is of this stretch.
@@ -355,11 +314,11 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
         }
     }
 
-    /// The first sectors that wait are on the card, from block `at` on; whether the log ends in order with one of them.
-    fn add_to_parity(&self, now: Instant, at: u32, written: usize) -> bool {
-        let (batch, mut parity) = (self.buffers.batch.borrow(), self.buffers.parity.borrow_mut());
+    /// These sectors are on the card, from block `at` on; whether the log ends in order with one of them.
+    fn add_to_parity(&self, now: Instant, at: u32, written: &[Block]) -> bool {
+        let mut parity = self.buffers.parity.borrow_mut();
         let mut is_closed = false;
-        for (at, block) in (at..).zip(batch.iter().take(written)) {
+        for (at, block) in (at..).zip(written) {
             let sector = sector_of(block);
             if !sector.is_partial() {
                 parity.add(now, at, sector.bytes());
@@ -391,24 +350,17 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
     /// Writes the first sector that waits as a partial copy, at the place after its own: a torn write at its own place then
     /// takes nothing with it.
     #[inline(never)]
-    fn write_copy(&mut self, session: u32, at: u32) -> Result<(), CardError<D::Error>> {
-        let mut batch = self.buffers.batch.borrow_mut();
-        let block = batch.get_mut(..1).ok_or(CardError::NotOpen)?;
-        mark(block, Some(session));
-        let written = self.mounted().and_then(|card| card.write(at, block));
-        mark(block, None);
+    fn write_copy(
+        &mut self,
+        session: u32,
+        at: u32,
+        waiting: &mut [Block],
+    ) -> Result<(), CardError<D::Error>> {
+        let first = waiting.get_mut(..1).ok_or(CardError::NotOpen)?;
+        seal(first, Some(true), session);
+        let written = self.mounted().and_then(|card| card.write(at, first));
+        seal(first, Some(false), session);
         written.map(|_| ())
-    }
-
-    fn write_sealed(&mut self, log: &Log, at: u32, count: usize) -> Result<usize, CardError<D::Error>> {
-        let mut batch = self.buffers.batch.borrow_mut();
-        let batch = batch.get_mut(..count).ok_or(CardError::NotOpen)?;
-        for block in batch.iter_mut() {
-            let mut sector = sector_of(block);
-            sector.seal(log.session);
-            block.contents = *sector.bytes();
-        }
-        self.mounted()?.write(at, batch)
     }
 
     /// Whether this sector belongs into a new segment.
@@ -422,26 +374,6 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
         }
         let fits = at.saturating_add(GROUP_SECTORS as u32) <= blocks;
         Ok(at > 0 && !fits && sector.starts_group())
-    }
-
-    /// How many of the sectors that wait, the first one being sector `number`, go right behind each other: full ones,
-    /// and only the first may begin a group, because a segment may end before the next.
-    fn count_in_row(&self, number: u32, max: usize) -> usize {
-        let batch = self.buffers.batch.borrow();
-        let follows = |(index, block): &(usize, &Block)| {
-            let sector = sector_of(block);
-            let in_order = sector.number() == number.wrapping_add(*index as u32);
-            *index == 0 || in_order && !sector.is_partial() && !sector.starts_group()
-        };
-        batch.iter().enumerate().take(max).take_while(follows).count()
-    }
-
-    fn sector(&self, index: usize) -> Option<Sector> {
-        self.buffers.batch.borrow().get(index).map(sector_of)
-    }
-
-    fn drop_written(&self, count: usize) {
-        self.buffers.batch.borrow_mut().drain(..count);
     }
 
     /// Opens a segment on a card just mounted.
@@ -467,15 +399,22 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
 
     /// The card in work is given up. The next one may be another one, for which only what comes from a group's start on
     /// can be read: the sooner there is one, the less is lost.
-    fn lose(&mut self, now: Instant, error: &CardError<D::Error>) {
-        self.status.want_group();
-        self.give_up(now, error);
+    fn lose(&mut self, now: Instant, error: &CardError<D::Error>) -> NotYet {
+        if !matches!(error, CardError::Searching) {
+            self.status.want_group();
+        }
+        self.not_yet(now, error)
     }
 
-    fn give_up(&mut self, now: Instant, error: &CardError<D::Error>) {
+    /// What an error means for the sectors that wait. A card that is not just being searched is given up.
+    fn not_yet(&mut self, now: Instant, error: &CardError<D::Error>) -> NotYet {
+        if matches!(error, CardError::Searching) {
+            return NotYet::Searching;
+        }
         self.tell(error);
         self.retry_at = now + RETRY;
         self.socket.release();
+        NotYet::Later
     }
 
     fn tell(&self, error: &CardError<D::Error>) {
@@ -483,17 +422,30 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
     }
 }
 
-/// Makes the block's sector a partial copy for this session, or the sector itself again.
+/// How many of the sectors that wait, the first one being sector `number`, go right behind each other: full ones,
+/// and only the first may begin a group, because a segment may end before the next.
+fn count_in_row(number: u32, waiting: &[Block]) -> usize {
+    let follows = |(index, block): &(usize, &Block)| {
+        let sector = sector_of(block);
+        let in_order = sector.number() == number.wrapping_add(*index as u32);
+        *index == 0 || in_order && !sector.is_partial() && !sector.starts_group()
+    };
+    waiting.iter().enumerate().take_while(follows).count()
+}
+
+/// Seals sectors for this session. Where `partial` says so, they become partial copies, or the sectors themselves again.
 #[inline(never)]
-fn mark(block: &mut [Block], session: Option<u32>) {
-    for block in block {
+fn seal(blocks: &mut [Block], partial: Option<bool>, session: u32) {
+    for block in blocks {
         let mut sector = sector_of(block);
-        sector.set_partial(session.is_some());
-        sector.seal(session.unwrap_or_default());
-        block.contents = *sector.bytes();
+        if let Some(partial) = partial {
+            sector.set_partial(partial);
+        }
+        sector.seal(session);
+        *block = *sector.bytes();
     }
 }
 
-fn sector_of(block: &Block) -> Sector {
-    Sector::from_bytes(block.contents)
+const fn sector_of(block: &Block) -> Sector {
+    Sector::from_bytes(*block)
 }

@@ -1,11 +1,9 @@
 //! A card's blocks as the file system accesses them: one command at a time, each of which is timed.
 
-use embedded_sdmmc::{Block, BlockIdx};
-
-use crate::CardDevice;
 use crate::card::CardError;
 use crate::layout::Layout;
 use crate::status::CardStatus;
+use crate::{BLOCK_BYTES, Block, CardDevice};
 
 /// How often a block of the file system is tried to be written. A chain of which only a part was written takes clusters that no
 /// file has. The device bounds the time of all tries together ([`CardDevice::begin_service`]).
@@ -40,12 +38,12 @@ impl<'a, D: CardDevice> Volume<'a, D> {
 
     /// Reads blocks that lie in a row.
     pub(crate) fn read(&self, blocks: &mut [Block], at: u32) -> Result<(), CardError<D::Error>> {
-        self.command(|device| device.read(blocks, BlockIdx(at)))
+        self.command(|device| device.read(blocks, at))
     }
 
     /// Writes blocks that lie in a row.
     pub(crate) fn write(&self, blocks: &[Block], at: u32) -> Result<(), CardError<D::Error>> {
-        self.command(|device| device.write(blocks, BlockIdx(at)))
+        self.command(|device| device.write(blocks, at))
     }
 
     /// Writes blocks of the file system, [`METADATA_TRIES`] times where that fails.
@@ -69,7 +67,7 @@ impl<'a, D: CardDevice> Volume<'a, D> {
 
     /// Reads one block of the FAT.
     pub(crate) fn read_fat(&self, index: u32) -> Result<[Block; 1], CardError<D::Error>> {
-        let mut block = [Block::new()];
+        let mut block = [[0; BLOCK_BYTES]];
         self.read(&mut block, self.layout.fat_start + index)?;
         Ok(block)
     }

@@ -3,11 +3,10 @@
 mod common;
 
 use common::{Broken, MIB_BLOCKS, MemCard, held};
-use embedded_sdmmc::Block;
 use hums_recorder::card::{Card, CardError, LogEntry};
 use hums_recorder::format::{BLOCKS_MIN, FormatError, format};
 use hums_recorder::layout::{Layout, LayoutError};
-use hums_recorder::{CardState, CardStatus, LogName};
+use hums_recorder::{BLOCK_BYTES, Block, CardState, CardStatus, LogName};
 
 const FIRST: LogName = LogName { session: 1, segment: 0 };
 const SECOND: LogName = LogName { session: 2, segment: 0 };
@@ -23,9 +22,7 @@ fn logs(card: &Card<'_, MemCard>) -> Vec<LogEntry> {
 }
 
 fn pattern(seed: u32) -> Block {
-    let mut block = Block::new();
-    block.contents = std::array::from_fn(|index| (seed as usize * 31 + index) as u8);
-    block
+    std::array::from_fn(|index| (seed as usize * 31 + index) as u8)
 }
 
 #[test]
@@ -42,10 +39,10 @@ fn a_segment_reads_back_after_a_remount() {
     let mut card = mount(&device, &status);
     assert_eq!(logs(&card).iter().map(|log| (log.name, log.bytes)).collect::<Vec<_>>(), [(FIRST, 1 << 20)]);
     let mut segment = card.segment(FIRST).expect("it is there");
-    let mut block = Block::new();
+    let mut block = [0; BLOCK_BYTES];
     for index in 0..2048 {
         card.read(&mut segment, index, &mut block).expect("it reads");
-        assert_eq!(block.contents, pattern(index).contents, "block {index}");
+        assert_eq!(block, pattern(index), "block {index}");
     }
     assert_eq!(card.read(&mut segment, 2048, &mut block), Err(CardError::NotFound));
     card.open(FIRST).expect("it is there");
@@ -89,9 +86,9 @@ fn a_write_of_many_blocks_takes_one_command_for_each_row_of_clusters() {
     assert_eq!((device.writes.get(), device.journal.borrow().len()), (2, 64));
     let mut segment = card.segment(FIRST).expect("it is there");
     for index in (0..64).rev() {
-        let mut block = Block::new();
+        let mut block = [0; BLOCK_BYTES];
         card.read(&mut segment, index, &mut block).expect("it reads");
-        assert_eq!(block.contents, pattern(index).contents, "block {index}");
+        assert_eq!(block, pattern(index), "block {index}");
     }
 }
 
@@ -162,13 +159,13 @@ fn check_in_order(device: &MemCard, cut: usize) {
     for log in found {
         let opened = card.segment(log.name).map_err(|error| format!("cut {cut}: {}: {error}", log.name));
         let mut segment = opened.expect("it is there");
-        let mut block = Block::new();
+        let mut block = [0; BLOCK_BYTES];
         for index in 0..segment.blocks() {
             card.read(&mut segment, index, &mut block)
                 .map_err(|error| format!("cut {cut}: {} {index}: {error}", log.name))
                 .expect("it reads");
             if log.name == FIRST && index == 7 {
-                assert_eq!(block.contents, pattern(7).contents, "cut {cut}");
+                assert_eq!(block, pattern(7), "cut {cut}");
             }
         }
     }
@@ -282,7 +279,7 @@ fn a_fat_full_of_nonsense_is_an_error_and_never_a_panic() {
             let _ = card.logs(|_| {});
             let _ = card.create(SECOND, 512 * 1024);
             let _ = card.open(FIRST);
-            let mut block = Block::new();
+            let mut block = [0; BLOCK_BYTES];
             let Ok(mut segment) = card.segment(FIRST) else { continue };
             for index in 0..segment.blocks().min(5_000) {
                 if card.read(&mut segment, index, &mut block).is_err()
@@ -380,12 +377,12 @@ fn a_log_whose_fat_was_lost_is_chained_again_and_not_written_over() {
             card.write(index, &[pattern(9999)]).expect("in place");
         }
         let mut segment = card.segment(FIRST).expect("it is there");
-        let mut block = Block::new();
+        let mut block = [0; BLOCK_BYTES];
         // Where the FAT goes on behind what was lost, only the place of the link to there is not known.
         let blocks = if lost.end == 17 { 2048 } else { lost.end * 128 - 3 };
         for index in 0..blocks {
             card.read(&mut segment, index, &mut block).expect("it reads");
-            assert_eq!(block.contents, pattern(index).contents, "block {index}, lost {lost:?}");
+            assert_eq!(block, pattern(index), "block {index}, lost {lost:?}");
         }
     }
 }
@@ -427,7 +424,7 @@ fn free_clusters_that_no_log_lost_are_taken() {
     let data_start = root;
     assert_eq!(first_block, data_start + 2051 - 2, "in the second log's place");
     let mut segment = card.segment(third).expect("it is there");
-    let mut block = Block::new();
+    let mut block = [0; BLOCK_BYTES];
     card.read(&mut segment, 3071, &mut block).expect("its chain is as it was");
 }
 
@@ -483,7 +480,7 @@ fn a_segment_is_chained_through_whatever_clusters_are_free() {
     let mut segment = card.segment(FIRST).expect("it is there");
     assert_eq!(segment.blocks(), wanted * layout.cluster_blocks);
     let last = segment.blocks() - 1;
-    card.read(&mut segment, last, &mut Block::new()).expect("its chain ends with it");
+    card.read(&mut segment, last, &mut [0; BLOCK_BYTES]).expect("its chain ends with it");
 }
 
 /// A card of which another computer deleted these of 21 logs, all before the last one's clusters.

@@ -6,7 +6,6 @@ use std::cell::RefCell;
 use std::rc::Rc;
 
 use common::{MIB_BLOCKS, MemCard, held};
-use embedded_sdmmc::Block;
 use hums_blackbox::parity::{
     COLUMNS, Column, PARITY_SECTORS, Parity, STRETCH_SECTORS, data_blocks, parity_block,
 };
@@ -14,7 +13,7 @@ use hums_blackbox::record::{Before, Found};
 use hums_blackbox::{Header, Sector, SectorSink, Writer};
 use hums_core::clock::{Instant, Span};
 use hums_recorder::card::Card;
-use hums_recorder::{CardDevice, CardState, CardStatus, LogName, Recorder, Written};
+use hums_recorder::{BLOCK_BYTES, Block, CardDevice, CardState, CardStatus, LogName, NotYet, Recorder};
 
 struct Sink(Vec<Sector>);
 
@@ -45,14 +44,24 @@ fn sectors(count: u32) -> Vec<Sector> {
     sink.0
 }
 
-/// Gives a sector to the recorder and lets it write.
-fn put(recorder: &mut Recorder<'_, impl CardDevice>, now: Instant, sector: &Sector) -> Written {
-    assert!(recorder.waiting() > 0 || recorder.take(sector));
+/// Lets the recorder write a sector.
+fn put(recorder: &mut Recorder<'_, impl CardDevice>, now: Instant, sector: &Sector) -> Result<usize, NotYet> {
+    let mut waiting = [*sector.bytes()];
     loop {
-        match recorder.write(now) {
-            Written::Searching => {}
+        match recorder.write(now, &mut waiting) {
+            Err(NotYet::Searching) => {}
             written => return written,
         }
+    }
+}
+
+/// Lets the recorder write what waits, with few commands.
+fn write_all(recorder: &mut Recorder<'_, impl CardDevice>, sectors: &[Sector]) {
+    let mut blocks: Vec<Block> = sectors.iter().map(|sector| *sector.bytes()).collect();
+    let mut waiting = blocks.as_mut_slice();
+    while !waiting.is_empty() {
+        let done = recorder.write(Instant::ZERO, waiting).expect("a card that takes it");
+        waiting = &mut waiting[done..];
     }
 }
 
@@ -67,9 +76,9 @@ fn stored(device: &MemCard) -> Vec<(LogName, u32, Header)> {
     for name in names {
         let mut segment = card.segment(name).expect("it is there");
         for at in 0..segment.blocks() {
-            let mut block = Block::new();
+            let mut block = [0; BLOCK_BYTES];
             card.read(&mut segment, at, &mut block).expect("it reads");
-            if let Ok(header) = Header::read(&block.contents) {
+            if let Ok(header) = Header::read(&block) {
                 found.push((name, at, header));
             }
         }
@@ -94,7 +103,7 @@ fn a_card_that_comes_back_goes_on_where_it_was() {
     let mut now_ms = 0;
     for (index, sector) in all.iter().enumerate() {
         device.broken.set((100..110).contains(&index) && now_ms < 5_000);
-        while put(&mut recorder, Instant::from_millis(now_ms), sector) == Written::Later {
+        while put(&mut recorder, Instant::from_millis(now_ms), sector) == Err(NotYet::Later) {
             assert_ne!(status.read().state, CardState::Recording);
             now_ms += 100;
             device.broken.set(now_ms < 5_000);
@@ -117,7 +126,7 @@ fn a_segment_that_the_card_made_and_did_not_say_so_is_of_the_session() {
     let mut now_ms = 0;
     for (index, sector) in all.iter().enumerate() {
         device.broken.set(index == 100);
-        while put(&mut recorder, Instant::from_millis(now_ms), sector) == Written::Later {
+        while put(&mut recorder, Instant::from_millis(now_ms), sector) == Err(NotYet::Later) {
             device.broken.set(false);
             device.unsaid.set((now_ms < 2_500).then(|| unsaid.short()));
             now_ms += 100;
@@ -139,13 +148,13 @@ fn on_another_card_the_next_group_begins_a_session_and_the_rest_is_counted() {
     let mut recorder = Recorder::new(slot.clone(), &status, held(), 7);
     let all = sectors(2_000);
     for sector in &all[..100] {
-        assert_eq!(put(&mut recorder, Instant::ZERO, sector), Written::Done);
+        assert_eq!(put(&mut recorder, Instant::ZERO, sector), Ok(1));
     }
     first.broken.set(true);
-    assert_eq!(put(&mut recorder, Instant::from_millis(10), &all[100]), Written::Later);
+    assert_eq!(put(&mut recorder, Instant::from_millis(10), &all[100]), Err(NotYet::Later));
     *slot.0.borrow_mut() = second.clone();
     for sector in &all[100..] {
-        assert_eq!(put(&mut recorder, Instant::from_millis(2_000), sector), Written::Done);
+        assert_eq!(put(&mut recorder, Instant::from_millis(2_000), sector), Ok(1));
     }
     first.broken.set(false);
     let (before, after) = (numbers(&first), numbers(&second));
@@ -160,28 +169,18 @@ fn on_another_card_the_next_group_begins_a_session_and_the_rest_is_counted() {
 #[derive(Clone)]
 struct Slot(Rc<RefCell<MemCard>>);
 
-impl embedded_sdmmc::BlockDevice for Slot {
+impl CardDevice for Slot {
     type Error = common::Broken;
-    fn read(
-        &self,
-        blocks: &mut [embedded_sdmmc::Block],
-        at: embedded_sdmmc::BlockIdx,
-    ) -> Result<(), Self::Error> {
+    fn read(&self, blocks: &mut [Block], at: u32) -> Result<(), Self::Error> {
         self.0.borrow().read(blocks, at)
     }
-    fn write(
-        &self,
-        blocks: &[embedded_sdmmc::Block],
-        at: embedded_sdmmc::BlockIdx,
-    ) -> Result<(), Self::Error> {
+    fn write(&self, blocks: &[Block], at: u32) -> Result<(), Self::Error> {
         self.0.borrow().write(blocks, at)
     }
-    fn num_blocks(&self) -> Result<embedded_sdmmc::BlockCount, Self::Error> {
+    fn num_blocks(&self) -> Result<u32, Self::Error> {
         self.0.borrow().num_blocks()
     }
 }
-
-impl hums_recorder::CardDevice for Slot {}
 
 #[test]
 fn a_full_card_overwrites_its_oldest_log_and_keeps_the_newest() {
@@ -191,7 +190,7 @@ fn a_full_card_overwrites_its_oldest_log_and_keeps_the_newest() {
     for session in 0..sessions {
         let mut recorder = Recorder::new(device.clone(), &status, held(), session);
         for sector in sectors(100) {
-            assert_eq!(put(&mut recorder, Instant::ZERO, &sector), Written::Done);
+            assert_eq!(put(&mut recorder, Instant::ZERO, &sector), Ok(1));
         }
         recorder.finish();
     }
@@ -203,7 +202,7 @@ fn a_full_card_overwrites_its_oldest_log_and_keeps_the_newest() {
     // One that may not go.
     device.keeps_logs.set(true);
     let mut recorder = Recorder::new(device.clone(), &status, held(), sessions);
-    assert_eq!(put(&mut recorder, Instant::ZERO, &sectors(10)[0]), Written::Later);
+    assert_eq!(put(&mut recorder, Instant::ZERO, &sectors(10)[0]), Err(NotYet::Later));
     assert_eq!((status.read().state, names()), (CardState::Full, before));
 }
 
@@ -220,7 +219,7 @@ fn a_card_without_room_or_logs_is_told_full() {
     drop(card);
     device.blocks.borrow_mut().get_mut(&root).expect("the directory")[8..11].copy_from_slice(b"JPG");
     let mut recorder = Recorder::new(device.clone(), &status, held(), 1);
-    assert_eq!(put(&mut recorder, Instant::ZERO, &sectors(10)[0]), Written::Later);
+    assert_eq!(put(&mut recorder, Instant::ZERO, &sectors(10)[0]), Err(NotYet::Later));
     assert_eq!(status.read().state, CardState::Full);
 }
 
@@ -230,7 +229,7 @@ fn no_log_is_overwritten_while_there_is_room_that_nothing_points_to() {
     let record = |session: u32| {
         let status = CardStatus::new();
         let mut recorder = Recorder::new(device.clone(), &status, held(), session);
-        assert_eq!(put(&mut recorder, Instant::ZERO, &sectors(10)[0]), Written::Done);
+        assert_eq!(put(&mut recorder, Instant::ZERO, &sectors(10)[0]), Ok(1));
         recorder.finish();
         status.read().segments_overwritten
     };
@@ -262,7 +261,7 @@ fn a_torn_partial_never_takes_the_older_copy_with_it() {
         writer.frame(Instant::from_millis(copy), &[0xFD; 30], false, &mut sink).expect("there is room");
         let mut partial = Sector::zeroed();
         assert!(writer.partial(&mut partial));
-        assert_eq!(put(&mut recorder, Instant::ZERO, &partial), Written::Done);
+        assert_eq!(put(&mut recorder, Instant::ZERO, &partial), Ok(1));
         places.push(device.journal.borrow().last().expect("a write").0);
     }
     assert!(sink.0.is_empty(), "the sector is still in progress");
@@ -284,10 +283,10 @@ fn a_torn_whole_sector_never_takes_the_newest_copy_with_it() {
             let mut partial = Sector::zeroed();
             assert!(writer.partial(&mut partial));
             frames = partial.frames();
-            assert_eq!(put(&mut recorder, Instant::ZERO, &partial), Written::Done);
+            assert_eq!(put(&mut recorder, Instant::ZERO, &partial), Ok(1));
         }
         writer.finish(&mut sink);
-        assert_eq!(put(&mut recorder, Instant::ZERO, &sink.0[0]), Written::Done);
+        assert_eq!(put(&mut recorder, Instant::ZERO, &sink.0[0]), Ok(1));
         assert_eq!(numbers(&device), [0], "the sector itself is whole");
         let is_sector = |(_, bytes): &&(u32, [u8; 512])| Header::read(bytes).is_ok();
         let torn = device.journal.borrow().iter().rfind(is_sector).expect("a write").0;
@@ -304,15 +303,9 @@ fn sectors_that_wait_together_are_written_together() {
     let status = CardStatus::new();
     let mut recorder = Recorder::new(device.clone(), &status, held(), 7);
     let all = sectors(2_000);
-    assert_eq!(recorder.write(Instant::ZERO), Written::Done, "the segment is made");
+    assert_eq!(recorder.write(Instant::ZERO, &mut []), Ok(0), "the segment is made");
     device.writes.set(0);
-    let mut next = all.iter().peekable();
-    while next.peek().is_some() || recorder.waiting() > 0 {
-        while next.peek().is_some_and(|sector| recorder.take(sector)) {
-            next.next();
-        }
-        assert_eq!(recorder.write(Instant::ZERO), Written::Done);
-    }
+    write_all(&mut recorder, &all);
     assert_eq!(numbers(&device), (0..all.len() as u32).collect::<Vec<_>>());
     let (blocks, commands) = (all.len() as u32 + PARITY_SECTORS, device.writes.get());
     assert_eq!((status.read().blocks_written, status.read().writes), (blocks, commands));
@@ -327,14 +320,9 @@ fn a_write_that_fails_half_way_is_repeated_from_its_first_sector() {
     let status = CardStatus::new();
     let mut recorder = Recorder::new(device.clone(), &status, held(), 7);
     let all = sectors(60);
-    assert_eq!(recorder.write(Instant::ZERO), Written::Done, "the segment is made");
-    for sector in &all[..8] {
-        assert!(recorder.take(sector));
-    }
+    assert_eq!(recorder.write(Instant::ZERO, &mut []), Ok(0), "the segment is made");
     device.fail_after.set(Some(5));
-    while recorder.waiting() > 0 {
-        assert_eq!(recorder.write(Instant::ZERO), Written::Done);
-    }
+    write_all(&mut recorder, &all[..8]);
     assert_eq!(numbers(&device), (0..8).collect::<Vec<_>>());
     assert_eq!(status.read().write_errors, 1);
     assert!(stored(&device).iter().all(|(name, ..)| name.segment == 0), "no new segment was needed");
@@ -348,7 +336,7 @@ fn a_card_that_refuses_writes_at_random_loses_no_earlier_log() {
     let status = CardStatus::new();
     let mut earlier = Recorder::new(device.clone(), &status, held(), 1);
     for sector in sectors(100) {
-        assert_eq!(put(&mut earlier, Instant::ZERO, &sector), Written::Done);
+        assert_eq!(put(&mut earlier, Instant::ZERO, &sector), Ok(1));
     }
     earlier.finish();
     let before: Vec<_> = stored(&device).into_iter().map(|(name, ..)| name).collect();
@@ -357,11 +345,8 @@ fn a_card_that_refuses_writes_at_random_loses_no_earlier_log() {
     for session in 2..8 {
         let mut recorder = Recorder::new(device.clone(), &status, held(), session);
         for row in sectors(2_000).chunks(8) {
-            assert_eq!(recorder.write(Instant::ZERO), Written::Done, "the segment is made");
-            assert!(row.iter().all(|sector| recorder.take(sector)));
-            while recorder.waiting() > 0 {
-                assert_eq!(recorder.write(Instant::ZERO), Written::Done);
-            }
+            assert_eq!(recorder.write(Instant::ZERO, &mut []), Ok(0), "the segment is made");
+            write_all(&mut recorder, row);
         }
         recorder.finish();
     }
@@ -389,16 +374,16 @@ fn lost_pages_are_made_again_from_parity() {
             device.fail_after.set(Some(0));
         }
         now = now + Span::from_millis(if index == left - 1 { 10_000 } else { 1 });
-        assert_eq!(put(&mut recorder, now, sector), Written::Done);
+        assert_eq!(put(&mut recorder, now, sector), Ok(1));
     }
     let status = CardStatus::new();
     let card = Card::mount(device.clone(), &status, held()).map_err(|(_, error)| error).expect("it mounts");
     let mut segment = card.segment(LogName { session: 1, segment: 0 }).expect("it is there");
     let blocks = segment.blocks();
     let mut read = |at: u32| {
-        let mut block = Block::new();
+        let mut block = [0; BLOCK_BYTES];
         card.read(&mut segment, at, &mut block).expect("it reads");
-        block.contents
+        block
     };
     assert_eq!(read(0)[11..15], [0; 4], "the first sector is where the file begins");
     let mut stretch = 0;
@@ -441,9 +426,9 @@ fn the_next_start_finds_where_the_session_before_ended() {
         let all = sectors(count);
         // The last one is not closed: power goes.
         let written = if count == 0 { &[] } else { &all[..all.len() - 1] };
-        assert_eq!(recorder.write(Instant::ZERO), Written::Done, "the segment is made");
+        assert_eq!(recorder.write(Instant::ZERO, &mut []), Ok(0), "the segment is made");
         for sector in written {
-            assert_eq!(put(&mut recorder, Instant::ZERO, sector), Written::Done);
+            assert_eq!(put(&mut recorder, Instant::ZERO, sector), Ok(1));
         }
         assert_eq!(status.take_before().map(|before| before.found), Some(Found::Nothing));
         assert_eq!(status.take_before(), None, "told once");
@@ -460,8 +445,8 @@ fn the_next_start_finds_where_the_session_before_ended() {
         assert_eq!(before, expected, "{count} frames");
         // A start whose power goes before its first sector: the same is found behind its empty segment.
         assert_eq!(
-            Recorder::new(device.clone(), &CardStatus::new(), held(), 9).ready(Instant::ZERO),
-            Written::Done
+            Recorder::new(device.clone(), &CardStatus::new(), held(), 9).write(Instant::ZERO, &mut []),
+            Ok(0)
         );
         let again = found_at_next_start(&device);
         assert_eq!((again.session, again.sectors), (session, written.len() as u32));
@@ -482,7 +467,7 @@ fn the_end_of_the_session_before_is_found_behind_damaged_pages_and_stale_sectors
     let mut recorder = Recorder::new(device.clone(), &status, held(), 7);
     let all = sectors(4_000);
     for sector in &all[..all.len() - 1] {
-        assert_eq!(put(&mut recorder, Instant::ZERO, sector), Written::Done);
+        assert_eq!(put(&mut recorder, Instant::ZERO, sector), Ok(1));
     }
     let (reads_before, whole) = (device.reads.get(), device.blocks.borrow().clone());
     let first =
@@ -522,7 +507,7 @@ fn the_end_is_found_wherever_power_goes_around_the_beginning_of_a_file() {
         for session in 0..older_sessions {
             let mut recorder = Recorder::new(device.clone(), leaked(), held(), session);
             for sector in sectors(300) {
-                assert_eq!(put(&mut recorder, Instant::ZERO, &sector), Written::Done);
+                assert_eq!(put(&mut recorder, Instant::ZERO, &sector), Ok(1));
             }
         }
         device.journal.borrow_mut().clear();
@@ -589,10 +574,10 @@ fn record_files(device: &MemCard) -> u32 {
         });
         writer.frame(now, &noise[..=index as usize % 200], false, &mut sink).expect("there is room");
         for sector in sink.0.drain(..) {
-            assert_eq!(put(&mut recorder, now, &sector), Written::Done);
+            assert_eq!(put(&mut recorder, now, &sector), Ok(1));
         }
         if index % 5000 < 400 && writer.partial(&mut partial) {
-            assert_eq!(put(&mut recorder, now, &partial), Written::Done);
+            assert_eq!(put(&mut recorder, now, &partial), Ok(1));
         }
     }
     recorder.in_work().expect("it records").session
@@ -610,15 +595,15 @@ fn the_session_before_is_looked_for_once_the_first_sector_is_on_the_card() {
     let earlier = CardStatus::new();
     let mut recorder = Recorder::new(device.clone(), &earlier, held(), 7);
     for sector in &all {
-        assert_eq!(put(&mut recorder, Instant::ZERO, sector), Written::Done);
+        assert_eq!(put(&mut recorder, Instant::ZERO, sector), Ok(1));
     }
     drop(recorder);
     let status = CardStatus::new();
     let mut recorder = Recorder::new(device.clone(), &status, held(), 8);
-    assert_eq!(recorder.ready(Instant::ZERO), Written::Done);
+    assert_eq!(recorder.write(Instant::ZERO, &mut []), Ok(0));
     recorder.idle();
     assert_eq!(status.take_before(), None, "there is no sector yet");
-    assert_eq!(put(&mut recorder, Instant::ZERO, &all[0]), Written::Done);
+    assert_eq!(put(&mut recorder, Instant::ZERO, &all[0]), Ok(1));
     assert_eq!(status.take_before(), None, "whatever waits is written first");
     recorder.idle();
     let before = status.take_before().expect("it was looked for");
@@ -639,14 +624,12 @@ fn the_only_log_of_a_full_card_is_looked_at_before_it_makes_room() {
     for (at, sector) in (0..).zip(&all) {
         let mut sealed = *sector;
         sealed.seal(0x55);
-        let mut block = Block::new();
-        block.contents = *sealed.bytes();
-        card.write(at, &[block]).expect("in place");
+        card.write(at, &[*sealed.bytes()]).expect("in place");
     }
     drop(card);
     let mut recorder = Recorder::new(device.clone(), &status, held(), 1);
     for sector in &all {
-        assert_eq!(put(&mut recorder, Instant::ZERO, sector), Written::Done);
+        assert_eq!(put(&mut recorder, Instant::ZERO, sector), Ok(1));
         recorder.idle();
     }
     assert!(stored(&device).iter().all(|(name, ..)| name.session == 6), "it made room");
@@ -659,7 +642,7 @@ fn found_at_next_start(device: &MemCard) -> Before {
     let whole = device.blocks.borrow().clone();
     let status = CardStatus::new();
     let mut recorder = Recorder::new(device.clone(), &status, held(), 8);
-    assert_eq!(put(&mut recorder, Instant::ZERO, &sectors(1)[0]), Written::Done);
+    assert_eq!(put(&mut recorder, Instant::ZERO, &sectors(1)[0]), Ok(1));
     recorder.idle();
     device.blocks.replace(whole);
     status.take_before().expect("it was looked for")
@@ -671,7 +654,7 @@ fn a_folder_with_the_name_of_the_next_log_is_passed_by() {
     let record = |session| {
         let status = CardStatus::new();
         let mut recorder = Recorder::new(device.clone(), &status, held(), session);
-        assert_eq!(put(&mut recorder, Instant::ZERO, &sectors(10)[0]), Written::Done);
+        assert_eq!(put(&mut recorder, Instant::ZERO, &sectors(10)[0]), Ok(1));
         recorder.log_name().expect("it records").session
     };
     assert_eq!((record(1), record(2)), (1, 2));
@@ -691,8 +674,7 @@ fn a_log_that_lost_its_part_of_the_fat_is_not_written_anew() {
     let record = |session, frames: u32| {
         let status = CardStatus::new();
         let mut recorder = Recorder::new(device.clone(), &status, held(), session);
-        let done =
-            sectors(frames).iter().all(|sector| put(&mut recorder, Instant::ZERO, sector) == Written::Done);
+        let done = sectors(frames).iter().all(|sector| put(&mut recorder, Instant::ZERO, sector) == Ok(1));
         (done, recorder.log_name().map(|name| name.segment), status.read().state)
     };
     for session in 1..=15 {
@@ -728,7 +710,7 @@ fn a_card_that_logs_fill_is_not_searched() {
         let status = CardStatus::new();
         let mut recorder = Recorder::new(device.clone(), &status, held(), session);
         let before = device.reads.get();
-        assert_eq!(put(&mut recorder, Instant::ZERO, &sectors(10)[0]), Written::Done);
+        assert_eq!(put(&mut recorder, Instant::ZERO, &sectors(10)[0]), Ok(1));
         assert_eq!(status.read().segments_overwritten, u32::from(session >= 15));
         // Its FAT has 540 blocks.
         assert!(device.reads.get() - before < 300, "{} blocks read", device.reads.get() - before);

@@ -18,7 +18,7 @@ mod wire;
 pub use fault::{Fault, Plan};
 pub use medium::Medium;
 pub use model::{Kind, Model};
-pub use slot::{Counts, Event, SimPort, SimSpi, Slot};
+pub use slot::{Counts, Event, SimPort, Slot};
 pub use wire::Card;
 
 /// Nanoseconds of a millisecond.

@@ -7,9 +7,8 @@ use std::fs::File;
 use std::io::{self, Read as _, Seek as _, SeekFrom, Write as _};
 use std::rc::Rc;
 
-use embedded_sdmmc::{Block, BlockCount, BlockDevice, BlockIdx};
-use hums_recorder::CardDevice;
 use hums_recorder::format::format;
+use hums_recorder::{Block, CardDevice};
 
 /// A row of blocks, zero where nothing was written. A clone is the same medium.
 #[derive(Clone, Debug)]
@@ -133,26 +132,24 @@ fn is_hole(file: &File, from: u64, bytes: u64) -> bool {
 }
 
 /// As a card reader has it: without a driver's troubles.
-impl BlockDevice for Medium {
+impl CardDevice for Medium {
     type Error = Infallible;
 
-    fn read(&self, blocks: &mut [Block], start: BlockIdx) -> Result<(), Infallible> {
-        for (at, block) in (start.0..).zip(blocks) {
-            block.contents = self.get(at);
+    fn read(&self, blocks: &mut [Block], start: u32) -> Result<(), Infallible> {
+        for (at, block) in (start..).zip(blocks) {
+            *block = self.get(at);
         }
         Ok(())
     }
 
-    fn write(&self, blocks: &[Block], start: BlockIdx) -> Result<(), Infallible> {
-        for (at, block) in (start.0..).zip(blocks) {
-            self.set(at, &block.contents);
+    fn write(&self, blocks: &[Block], start: u32) -> Result<(), Infallible> {
+        for (at, block) in (start..).zip(blocks) {
+            self.set(at, block);
         }
         Ok(())
     }
 
-    fn num_blocks(&self) -> Result<BlockCount, Infallible> {
-        Ok(BlockCount(self.size))
+    fn num_blocks(&self) -> Result<u32, Infallible> {
+        Ok(self.size)
     }
 }
-
-impl CardDevice for Medium {}

@@ -2,11 +2,8 @@
 
 use std::cell::RefCell;
 use std::collections::BTreeMap;
-use std::convert::Infallible;
 use std::rc::Rc;
 
-use embedded_hal::delay::DelayNs;
-use embedded_hal::spi::{ErrorType, Operation, SpiDevice};
 use hums_core::clock::Instant;
 use hums_recorder::spi::{Clock, Port, PortFailed};
 
@@ -131,21 +128,6 @@ impl Slot {
     pub fn port(&self) -> SimPort {
         SimPort { slot: self.clone(), transfer_hz: 21_000_000 }
     }
-
-    /// Eighty clocks at this rate with no card selected, as a card needs before its first command.
-    pub fn wake(&self, hz: u32) {
-        let mut inner = self.0.borrow_mut();
-        inner.hz = hz;
-        for _ in 0..10 {
-            inner.exchange(0xFF);
-        }
-    }
-
-    /// The slot as embedded-hal has it, at this clock.
-    pub fn spi(&self, hz: u32) -> SimSpi {
-        self.0.borrow_mut().hz = hz;
-        SimSpi(self.clone())
-    }
 }
 
 impl Inner {
@@ -246,47 +228,5 @@ impl Port for SimPort {
 
     fn now(&self) -> Instant {
         self.slot.now()
-    }
-}
-
-/// The slot as `embedded-sdmmc`'s own driver sees it, to compare with.
-pub struct SimSpi(Slot);
-
-impl ErrorType for SimSpi {
-    type Error = Infallible;
-}
-
-impl SpiDevice for SimSpi {
-    fn transaction(&mut self, operations: &mut [Operation<'_, u8>]) -> Result<(), Infallible> {
-        let mut inner = self.0.0.borrow_mut();
-        inner.select(true);
-        for operation in operations {
-            match operation {
-                Operation::Read(bytes) => bytes.iter_mut().for_each(|byte| *byte = inner.exchange(0xFF)),
-                Operation::Write(bytes) => bytes.iter().for_each(|byte| {
-                    inner.exchange(*byte);
-                }),
-                Operation::Transfer(read, write) => {
-                    for index in 0..read.len().max(write.len()) {
-                        let answer = inner.exchange(write.get(index).copied().unwrap_or(0xFF));
-                        if let Some(byte) = read.get_mut(index) {
-                            *byte = answer;
-                        }
-                    }
-                }
-                Operation::TransferInPlace(bytes) => {
-                    bytes.iter_mut().for_each(|byte| *byte = inner.exchange(*byte));
-                }
-                Operation::DelayNs(ns) => inner.now_ns += u64::from(*ns),
-            }
-        }
-        inner.select(false);
-        Ok(())
-    }
-}
-
-impl DelayNs for SimSpi {
-    fn delay_ns(&mut self, ns: u32) {
-        self.0.0.borrow_mut().now_ns += u64::from(ns);
     }
 }

@@ -1,22 +1,19 @@
-//! Costs of a driver on the bus, and its handling of a card's faults: `embedded-sdmmc`'s and ours, side by side. These
-//! are the measurements for which ours exists (`docs/cards.md`).
+//! What the driver costs on the bus, and what it makes of a card's faults (`docs/cards.md`).
 //!
 //! `cargo test -p hums-sdcard --test costs -- --nocapture` prints them.
 
-use embedded_sdmmc::{Block, BlockDevice, BlockIdx, SdCard};
-use hums_recorder::SpiCard;
+use hums_recorder::{Block, CardDevice as _, SpiCard};
 use hums_sdcard::{Counts, Fault, Kind, MS, Medium, Model, Plan, Slot};
 
-const CLOCK_HZ: u32 = 21_000_000;
 const BLOCKS: u32 = 64;
-/// When either driver has identified the card.
+/// When the driver has identified the card.
 const IDENTIFIED_NS: u64 = 200 * MS;
 
 fn model(medium: &Medium) -> Model {
     Model::new(Kind::Sdhc, medium.clone())
 }
 
-/// Result of one driver: success, content of the medium, costs.
+/// What the driver did: whether it was content, what is on the medium, and what it took.
 #[derive(Debug)]
 struct Run {
     is_content: bool,
@@ -29,16 +26,19 @@ struct Run {
     violations: u64,
 }
 
-fn run(driver: &impl BlockDevice, slot: &Slot, medium: &Medium, per_write: u32) -> Run {
+fn run(model: impl Fn(&Medium) -> Model, per_write: u32) -> Run {
+    let medium = Medium::new(1 << 17);
+    let slot = Slot::new(Some(model(&medium)));
+    let driver = SpiCard::new(slot.port());
     assert!(driver.num_blocks().is_ok());
     slot.advance_to(IDENTIFIED_NS);
-    let blocks: Vec<Block> = (0..BLOCKS).map(|index| Block { contents: [index as u8 + 1; 512] }).collect();
+    let blocks: Vec<Block> = (0..BLOCKS).map(|index| [index as u8 + 1; 512]).collect();
     let (before, started_ns): (Counts, u64) = (slot.counts(), slot.now_ns());
     let violations = |slot: &Slot| slot.violations().values().map(|count| u64::from(*count)).sum::<u64>();
-    let wrong = violations(slot);
+    let wrong = violations(&slot);
     let mut failed = 0;
     for (index, blocks) in blocks.chunks(per_write as usize).enumerate() {
-        failed += u32::from(driver.write(blocks, BlockIdx(1_000 + index as u32 * per_write)).is_err());
+        failed += u32::from(driver.write(blocks, 1_000 + index as u32 * per_write).is_err());
     }
     let after = slot.counts();
     Run {
@@ -48,54 +48,32 @@ fn run(driver: &impl BlockDevice, slot: &Slot, medium: &Medium, per_write: u32) 
         bytes: after.bytes - before.bytes,
         selects: after.selects - before.selects,
         ms: (slot.now_ns() - started_ns) / MS,
-        violations: violations(slot) - wrong,
+        violations: violations(&slot) - wrong,
     }
-}
-
-fn ours(model: impl Fn(&Medium) -> Model, per_write: u32) -> Run {
-    let medium = Medium::new(1 << 17);
-    let slot = Slot::new(Some(model(&medium)));
-    run(&SpiCard::new(slot.port()), &slot, &medium, per_write)
-}
-
-/// With the 74 clocks that it leaves to its user, and at the fast clock from the beginning, which it leaves to him too.
-fn theirs(model: impl Fn(&Medium) -> Model, per_write: u32) -> Run {
-    let medium = Medium::new(1 << 17);
-    let slot = Slot::new(Some(model(&medium)));
-    slot.wake(CLOCK_HZ);
-    run(&SdCard::new(slot.spi(CLOCK_HZ), slot.spi(CLOCK_HZ)), &slot, &medium, per_write)
 }
 
 #[test]
 fn bytes_on_the_bus_for_a_block() {
     // A card that takes its blocks at once, so that only the protocol counts.
     let quick = |medium: &Medium| Model { write_ns: (0, 0), ..model(medium) };
-    println!(
-        "| blocks a write | driver | bytes a block | selects a block | ms for {BLOCKS} on a usual card |"
-    );
-    println!("|---|---|---|---|---|");
+    println!("| blocks a write | bytes a block | selects a block | ms for {BLOCKS} on a usual card |");
+    println!("|---|---|---|---|");
     for per_write in [1, 8] {
-        for (name, at_once, usual) in [
-            ("embedded-sdmmc", theirs(quick, per_write), theirs(model, per_write)),
-            ("ours", ours(quick, per_write), ours(model, per_write)),
-        ] {
-            assert!(at_once.is_content && at_once.on_medium && usual.is_content && usual.on_medium);
-            let each = |count: u64| count as f64 / f64::from(BLOCKS);
-            let (bytes, selects) = (each(at_once.bytes), each(at_once.selects));
-            println!("| {per_write} | {name} | {bytes:.1} | {selects:.1} | {} |", usual.ms);
-            if name == "ours" {
-                assert_eq!(at_once.violations + usual.violations, 0);
-                assert!(bytes < if per_write == 1 { 560.0 } else { 530.0 }, "{bytes}");
-                assert!(selects <= 1.0);
-            }
-        }
+        let (at_once, usual) = (run(quick, per_write), run(model, per_write));
+        assert!(at_once.is_content && at_once.on_medium && usual.is_content && usual.on_medium);
+        let each = |count: u64| count as f64 / f64::from(BLOCKS);
+        let (bytes, selects) = (each(at_once.bytes), each(at_once.selects));
+        println!("| {per_write} | {bytes:.1} | {selects:.1} | {} |", usual.ms);
+        assert_eq!(at_once.violations + usual.violations, 0);
+        assert!(bytes < if per_write == 1 { 560.0 } else { 530.0 }, "{bytes}");
+        assert!(selects <= 1.0);
     }
-    assert!(ours(model, 8).ms * 2 < ours(model, 1).ms, "rows are what cards are fast at");
+    assert!(run(model, 8).ms * 2 < run(model, 1).ms, "rows are what cards are fast at");
 }
 
-/// Of two drivers the one that says how it went, and gets it onto the card.
+/// It says how it went, and gets it onto the card if that is possible.
 #[test]
-fn what_each_driver_makes_of_a_fault() {
+fn what_the_driver_makes_of_a_fault() {
     let cases = [
         ("busy for 2.5 s, once", Plan::always(Fault::Busy(2_500 * MS)).skip(20).times(1), true),
         ("a block damaged on its way, once", Plan::always(Fault::DamagedWrite).skip(20).times(1), true),
@@ -104,8 +82,8 @@ fn what_each_driver_makes_of_a_fault() {
         ("a write error, once", Plan::always(Fault::WriteError).skip(20).times(1), false),
         ("a block taken and not programmed", Plan::always(Fault::NotProgrammed).skip(20).times(1), false),
     ];
-    println!("| fault in a row of 8 | embedded-sdmmc | ours |");
-    println!("|---|---|---|");
+    println!("| fault in a row of 8 | result |");
+    println!("|---|---|");
     let told = |run: &Run| match (run.is_content, run.on_medium) {
         (true, true) => "on the card".to_owned(),
         (false, _) => format!("told: {} of {} rows fail", run.failed, BLOCKS / 8),
@@ -113,11 +91,11 @@ fn what_each_driver_makes_of_a_fault() {
     };
     for (name, plan, is_mended) in cases {
         let faulty = |medium: &Medium| model(medium).with(plan.from(IDENTIFIED_NS));
-        let (theirs, ours) = (theirs(faulty, 8), ours(faulty, 8));
-        println!("| {name} | {} | {} |", told(&theirs), told(&ours));
-        assert_eq!(ours.is_content, is_mended, "{name}");
-        assert_eq!(ours.on_medium, is_mended, "{name}");
-        assert!(ours.failed <= 1, "{name}: one fault costs one row");
-        assert_eq!(ours.violations, 0, "{name}");
+        let run = run(faulty, 8);
+        println!("| {name} | {} |", told(&run));
+        assert_eq!(run.is_content, is_mended, "{name}");
+        assert_eq!(run.on_medium, is_mended, "{name}");
+        assert!(run.failed <= 1, "{name}: one fault costs one row");
+        assert_eq!(run.violations, 0, "{name}");
     }
 }

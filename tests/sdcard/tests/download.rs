@@ -2,9 +2,8 @@
 
 mod rig;
 
-use embedded_sdmmc::Block;
 use hums_blackbox::Header;
-use hums_recorder::{Buffers, Card, CardState, CardStatus, LogName};
+use hums_recorder::{BLOCK_BYTES, Buffers, Card, CardState, CardStatus, LogName};
 use hums_sdcard::{Event, Fault, Kind, MS, Medium, Model, Plan};
 use rig::{FILE_TRANSFER_PROTOCOL, LOG_DATA, LOG_ENTRY, Rig, read as read_card};
 
@@ -290,11 +289,10 @@ fn places(medium: &Medium, name: LogName) -> (u32, u32) {
     let mounted = Card::mount(medium.clone(), &status, &held);
     let card = mounted.map_err(|(_, error)| error.to_string()).expect("it is in order");
     let mut segment = card.segment(name).expect("it is there");
-    let mut block = Block::new();
+    let mut block = [0; BLOCK_BYTES];
     card.read(&mut segment, 0, &mut block).expect("it reads");
     let content = medium.content();
-    let first =
-        content.iter().find(|(_, there)| **there == block.contents).map(|(at, _)| *at).expect("there");
+    let first = content.iter().find(|(_, there)| **there == block).map(|(at, _)| *at).expect("there");
     let is_recorded = |at: &u32| Header::read(&medium.get(first + at)).is_ok();
     (first, (0..segment.blocks()).take_while(is_recorded).count() as u32)
 }

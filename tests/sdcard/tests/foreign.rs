@@ -168,7 +168,7 @@ fn cards_of_odd_sizes_are_formatted_whole() {
         println!("{size} blocks: {} ms", rig.slot.now().since(begun).as_millis());
         rig.assert_state(CardState::Recording);
         let layout = Layout::read(&medium).expect("it is formatted");
-        assert!(layout.end().0 <= size && size - layout.end().0 < layout.cluster_blocks + 128, "{layout:?}");
+        assert!(layout.end() <= size && size - layout.end() < layout.cluster_blocks + 128, "{layout:?}");
         rig.run_to(rig.slot.now_ns() / MS + 8_000);
         let (found, _) = rig.finish(&[&medium]);
         assert!(found[0].gaps.is_empty() && found[0].frames.len() > 150, "{size}");
@@ -209,6 +209,21 @@ fn nobody_formats_a_card_by_mistake() {
     rig.run_to(10_000);
     rig.assert_state(CardState::Recording);
     rig.finish_whole(&ours);
+}
+
+/// The pilot was told of one card, and another one is in the slot when the command comes.
+#[test]
+fn a_card_that_was_put_in_after_the_one_that_was_told_is_not_formatted() {
+    let (told, other) = (exfat(), Medium::formatted(64 * MIB));
+    let before = Layout::read(&other).expect("it is formatted");
+    let mut rig = Rig::new(sdhc(&told));
+    rig.run_to(3_300);
+    rig.slot.event(Event::Insert(Model { serial: 3, ..sdhc(&other) }));
+    assert_eq!(rig.command(FORMAT, [1.0, 1.0]), Some(ACCEPTED));
+    rig.run_to(12_000);
+    rig.assert_state(CardState::Recording);
+    assert_eq!(Layout::read(&other).expect("as before").volume_id, before.volume_id);
+    rig.finish_whole(&other);
 }
 
 #[test]

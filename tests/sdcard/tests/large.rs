@@ -6,7 +6,7 @@ mod rig;
 use hums_core::clock::Span;
 use hums_recorder::card::SEGMENT_BYTES_MAX;
 use hums_recorder::layout::Layout;
-use hums_recorder::{CardState, LogName};
+use hums_recorder::{Buffers, Card, CardState, CardStatus, LogName};
 use hums_sdcard::{Fault, Kind, MS, Medium, Model, Plan};
 use rig::Rig;
 
@@ -87,6 +87,35 @@ fn a_large_card_of_own_logs_is_recorded_on_half_a_second_after_power_on() {
         let (found, lost) = rig.finish(&[&medium]);
         assert_eq!((lost, found[0].gaps.len()), (0, 0));
     }
+}
+
+/// More segments than the recorder has noted of the oldest logs, each at once after the one before: nothing waits for the directory.
+#[test]
+fn a_new_segment_on_a_full_large_card_takes_a_fifth_of_what_the_queue_rides_out() {
+    let medium = Medium::formatted(118 * GIB);
+    let logs = own_logs(&medium, 100);
+    let segments = 40;
+    let card = (0..segments).fold(Model::new(Kind::Sdxc, medium.clone()), |card, second| {
+        card.with(Plan::always(Fault::WriteError).from((3_000 + second * 500) * MS).times(8))
+    });
+    let mut rig = Rig::new(card);
+    rig.run_to(3_000 + segments * 500 + 3_000);
+    rig.assert_state(CardState::Recording);
+    assert!(!is_stall(&rig), "{:?} {:?}", rig.texts, rig.findings);
+    println!("{logs} logs: {:?} at most", rig.longest);
+    assert!(rig.longest < Span::from_millis(500), "{:?}", rig.longest);
+    let reading = rig.status.read();
+    assert_eq!((reading.segments, reading.segments_overwritten), (segments as u32 + 1, segments as u32 + 1));
+    let (found, lost) = rig.finish(&[&medium]);
+    assert_eq!((lost, found[0].gaps.len()), (0, 0));
+    // The oldest went.
+    let status = CardStatus::new();
+    let buffers = Buffers::new();
+    let card = Card::mount(medium, &status, &buffers).map_err(|(_, error)| error).expect("it mounts");
+    let mut oldest = LogName { session: LogName::SESSION_MAX, segment: 0 };
+    card.logs(|log| oldest = oldest.min(log.name)).expect("it lists");
+    let gone = segments as u32 + 1;
+    assert_eq!(oldest, LogName { session: gone / 4 + 1, segment: gone % 4 });
 }
 
 #[test]

@@ -2,9 +2,9 @@
 
 use std::collections::{BTreeMap, HashMap, VecDeque};
 
-use embedded_sdmmc::Block;
 use hums_blackbox::record::Record;
 use hums_blackbox::{Item, LogReader};
+use hums_recorder::BLOCK_BYTES;
 use hums_recorder::{Buffers, Card, CardStatus, LogName};
 use hums_sdcard::Medium;
 
@@ -50,15 +50,15 @@ fn some(medium: &Medium, skip: usize) -> Vec<Session> {
             // The newest copy of the last sector may lie at the place after it, and nothing yet at its own.
             let mut empty = 0;
             for index in 0..segment.blocks() {
-                let mut block = Block::new();
+                let mut block = [0; BLOCK_BYTES];
                 if card.read(&mut segment, index, &mut block).is_err() {
                     break;
                 }
-                empty = if block.contents == [0; 512] { empty + 1 } else { 0 };
+                empty = if block == [0; 512] { empty + 1 } else { 0 };
                 if empty > 1 {
                     break;
                 }
-                reader.feed(&block.contents);
+                reader.feed(&block);
                 take(&mut reader, &mut session);
             }
         }

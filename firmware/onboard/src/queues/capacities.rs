@@ -17,8 +17,8 @@ pub const UPLINK_QUEUE_BYTES: usize = 1024;
 /// A round of requests to the autopilot (9 commands of 45 bytes, signed 58) and two frames that pass through.
 pub const AUTOPILOT_QUEUE_BYTES: usize = 1100;
 
-/// 2.5 s of a standing card at 921,600 baud: 92 kB/s at 3.5 times smaller is 66 KB; storage holds eight sectors more.
-pub const SECTOR_QUEUE_SECTORS: usize = 132;
+/// 2.5 s of a standing card at 921,600 baud: 92 kB/s at 3.5 times smaller is 66 KB; and the sector that the card is taking.
+pub const SECTOR_QUEUE_SECTORS: usize = 133;
 
 /// Sectors kept free for findings and losses when frames are refused already: two sectors of them, as the last has to
 /// leave room for the longest entry there is.

@@ -15,8 +15,6 @@ mod ports;
 mod sectors;
 
 use bbqueue::nicknames::Churrasco;
-use heapless::spsc;
-use hums_blackbox::Sector;
 pub use hums_link::encode::FRAME_BYTES_MAX;
 
 use crate::shelf::{Server, Shelf};
@@ -27,10 +25,9 @@ pub use capacities::{
 pub use frames::{FramesIn, FramesOut, UplinkIn, UplinkOut};
 use level::Level;
 pub use ports::{AutopilotOut, GsIn, GsOut, PortIn, PortOut, SummaryRoute};
+use sectors::SectorQueue;
 pub use sectors::{SectorsIn, SectorsOut};
 
-// The queue keeps one place empty to tell full from empty.
-type SectorQueue = spsc::Queue<Sector, { SECTOR_QUEUE_SECTORS + 1 }>;
 const _: () = assert!(size_of::<SectorQueue>() <= 72 * 1024);
 const _: () = assert!(SECTOR_QUEUE_BYTES >= 66 * 1024);
 
@@ -88,7 +85,7 @@ impl Queues {
             gs: Churrasco::new(),
             uplink: Churrasco::new(),
             autopilot: Churrasco::new(),
-            sectors: spsc::Queue::new(),
+            sectors: SectorQueue::new(),
             shelf: Shelf::new(),
             levels: [const { Level::new() }; 4],
         }
@@ -96,14 +93,14 @@ impl Queues {
 
     /// Hands out the ends, once.
     pub fn split(&mut self) -> Ends<'_> {
-        let (sectors_in, sectors_out) = self.sectors.split();
+        let (sectors_in, sectors_out) = self.sectors.split(SECTOR_RESERVE);
         let (reader, shelf) = self.shelf.split();
         let [frames, gs, uplink, autopilot] = &self.levels;
         Ends {
             frames_in: FramesIn(self.frames.framed_producer(), frames),
             frames_out: FramesOut(self.frames.framed_consumer(), frames),
-            sectors_in: SectorsIn { queue: sectors_in, reserve: SECTOR_RESERVE, deepest: 0 },
-            sectors_out: SectorsOut(sectors_out),
+            sectors_in,
+            sectors_out,
             gs_in: GsIn {
                 gs: PortIn::new(self.gs.framed_producer(), gs),
                 autopilot: PortIn::new(self.autopilot.framed_producer(), autopilot),
@@ -122,7 +119,7 @@ impl Queues {
 #[cfg(test)]
 mod tests {
     use super::frames::STAMP_BYTES;
-    use hums_blackbox::SectorSink as _;
+    use hums_blackbox::{Sector, SectorSink as _};
     use hums_link::encode::Encoder;
     use hums_link::frame::Frame;
     use hums_link::packet::Packet;

@@ -1,13 +1,43 @@
 //! The queue of sectors, with its reserve for records.
 
-use heapless::spsc;
-use hums_blackbox::{Header, Sector, SectorSink};
+use core::sync::atomic::{AtomicUsize, Ordering};
+
+use bbqueue::nicknames::Churrasco;
+use bbqueue::prod_cons::stream::{StreamConsumer, StreamProducer};
+use hums_blackbox::{Header, SECTOR_BYTES, Sector, SectorSink};
+use hums_recorder::Block;
+
+use super::capacities::SECTOR_QUEUE_SECTORS;
+
+// The queue keeps one place empty to tell full from empty.
+type Queue = Churrasco<{ (SECTOR_QUEUE_SECTORS + 1) * SECTOR_BYTES }>;
+
+/// Sectors on their way to storage, which writes them to the card from where they lie.
+pub(super) struct SectorQueue {
+    queue: Queue,
+    len: AtomicUsize,
+}
+
+impl SectorQueue {
+    pub(super) const fn new() -> Self {
+        Self { queue: Queue::new(), len: AtomicUsize::new(0) }
+    }
+
+    pub(super) fn split(&self, reserve: usize) -> (SectorsIn<'_>, SectorsOut<'_>) {
+        let Self { queue, len } = self;
+        (
+            SectorsIn { queue: queue.stream_producer(), len, reserve, deepest: 0 },
+            SectorsOut { queue: queue.stream_consumer(), len },
+        )
+    }
+}
 
 /// The sector queue's writing end: refuses frames while only the reserve is left.
 pub struct SectorsIn<'a> {
-    pub(super) queue: spsc::Producer<'a, Sector>,
-    pub(super) reserve: usize,
-    pub(super) deepest: usize,
+    queue: StreamProducer<&'a Queue>,
+    len: &'a AtomicUsize,
+    reserve: usize,
+    deepest: usize,
 }
 
 impl SectorsIn<'_> {
@@ -21,12 +51,12 @@ impl SectorsIn<'_> {
 
     /// Whether storage has caught up.
     pub fn is_empty(&self) -> bool {
-        self.queue.len() == 0
+        self.len() == 0
     }
 
-    /// Sectors waiting.
+    /// Sectors waiting, with those that are being written.
     pub fn len(&self) -> usize {
-        self.queue.len()
+        self.len.load(Ordering::Acquire)
     }
 
     /// The most sectors that waited at once.
@@ -37,51 +67,62 @@ impl SectorsIn<'_> {
 
 impl SectorSink for SectorsIn<'_> {
     fn room(&self) -> usize {
-        self.queue.capacity().saturating_sub(self.queue.len()).saturating_sub(self.reserve)
+        SECTOR_QUEUE_SECTORS.saturating_sub(self.len()).saturating_sub(self.reserve)
     }
 
     fn put(&mut self, sector: &Sector) {
         // The writer asked for room first; there is no more to be done here if it did not.
-        let _ = self.queue.enqueue(*sector);
-        self.deepest = self.deepest.max(self.queue.len());
+        if let Ok(mut grant) = self.queue.grant_exact(SECTOR_BYTES) {
+            grant.copy_from_slice(sector.bytes());
+            // Before anybody can take it out.
+            let before = self.len.fetch_add(1, Ordering::AcqRel);
+            self.deepest = self.deepest.max(before + 1);
+            grant.commit(SECTOR_BYTES);
+        }
     }
 }
 
 /// The sector queue's reading end.
-pub struct SectorsOut<'a>(pub(super) spsc::Consumer<'a, Sector>);
+pub struct SectorsOut<'a> {
+    queue: StreamConsumer<&'a Queue>,
+    len: &'a AtomicUsize,
+}
 
 impl SectorsOut<'_> {
-    /// The oldest sector, which stays in the queue.
-    pub fn oldest(&mut self) -> Option<&Sector> {
-        self.0.peek()
-    }
-
-    /// Takes the oldest sector out.
-    pub(crate) fn drop_oldest(&mut self) {
-        let _ = self.0.dequeue();
+    /// Lends the oldest sectors, as many as lie in a row, or none where none waits. Those that `write` is done with are dropped.
+    pub fn lend<E>(&mut self, write: impl FnOnce(&mut [Block]) -> Result<usize, E>) -> Result<usize, E> {
+        let Ok(mut grant) = self.queue.read() else { return write(&mut []) };
+        let done = write(grant.as_chunks_mut().0)?;
+        grant.release(done * SECTOR_BYTES);
+        self.len.fetch_sub(done, Ordering::AcqRel);
+        Ok(done)
     }
 
     /// Empties the queue because there is no card to write to; how many frames are lost with it. Copies of a sector in
     /// progress hold no frames of their own.
     pub fn abandon(&mut self) -> u64 {
         let mut frames = 0;
-        while let Some(mut sector) = self.0.dequeue() {
-            // Only a sealed sector's header can be read; which session it names does not matter here.
-            sector.seal(0);
-            if let Ok(header) = Header::read(sector.bytes()) {
-                frames += if header.partial { 0 } else { u64::from(header.frames) };
+        let mut count = |blocks: &mut [Block]| {
+            for block in &mut *blocks {
+                // Only a sealed sector's header can be read; which session it names does not matter here.
+                let mut sector = Sector::from_bytes(*block);
+                sector.seal(0);
+                let header = Header::read(sector.bytes()).ok().filter(|header| !header.partial);
+                frames += header.map_or(0, |header| u64::from(header.frames));
             }
-        }
+            Ok::<_, ()>(blocks.len())
+        };
+        while self.lend(&mut count).is_ok_and(|done| done > 0) {}
         frames
     }
 
     /// Sectors waiting.
     pub fn len(&self) -> usize {
-        self.0.len()
+        self.len.load(Ordering::Acquire)
     }
 
     /// Whether nothing waits.
     pub fn is_empty(&self) -> bool {
-        self.0.len() == 0
+        self.len() == 0
     }
 }

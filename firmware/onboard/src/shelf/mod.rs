@@ -20,11 +20,10 @@ mod on_card;
 
 use bbqueue::nicknames::Churrasco;
 use bbqueue::prod_cons::framed::{FramedConsumer, FramedProducer};
-use embedded_sdmmc::Block;
 use heapless::spsc;
 use hums_link::ftp;
 use hums_recorder::card::{LogEntry, Segment};
-use hums_recorder::{Card, CardDevice, CardError, Recorder};
+use hums_recorder::{BLOCK_BYTES, Card, CardDevice, CardError, Recorder};
 
 use asked::HEAD;
 pub use asked::{Answer, DATA_MAX, LogId, NoLog, Want, What, Which};
@@ -212,7 +211,7 @@ impl Server<'_> {
             return false;
         };
         let Ok(mut grant) = self.answers.grant((HEAD + DATA_MAX) as u16) else { return false };
-        let end = answer.offset.min(done.saturating_add(SUM_BLOCKS * Block::LEN_U32));
+        let end = answer.offset.min(done.saturating_add(SUM_BLOCKS * BLOCK_BYTES as u32));
         let mut why = NoLog::Unread;
         let is_read = recorder.card().is_some_and(|card| {
             let add = |part: &[u8]| so_far = ftp::checksum(so_far, part);
@@ -245,7 +244,7 @@ impl Server<'_> {
 fn erase_next<D: CardDevice>(recorder: &mut Recorder<'_, D>, entry: u32) -> Option<u32> {
     let session = recorder.log_name().map(|name| name.session);
     let more = recorder.card()?.hide_logs(entry, session);
-    more.is_ok_and(|more| more).then_some(entry + Block::LEN_U32 / 32)
+    more.is_ok_and(|more| more).then_some(entry + BLOCK_BYTES as u32 / 32)
 }
 
 /// What was looked for: the answer, and where it lies if it is there.
@@ -298,7 +297,7 @@ fn find<D: CardDevice>(
     if matches!(want.which, Which::Same(wanted) if wanted != log) {
         return of_none(NoLog::Absent);
     }
-    (answer.log, answer.bytes, answer.found) = (log, blocks * Block::LEN_U32, Ok(()));
+    (answer.log, answer.bytes, answer.found) = (log, blocks * BLOCK_BYTES as u32, Ok(()));
     answer.utc_secs = entry.utc_secs;
     Looked { answer, segment: Some(segment) }
 }

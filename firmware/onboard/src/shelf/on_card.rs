@@ -10,12 +10,11 @@
 
 use core::ops::Range;
 
-use embedded_sdmmc::Block;
 use hums_blackbox::Header;
 use hums_blackbox::parity::{COLUMNS, PARITY_SECTORS, Parity, STRETCH_SECTORS, data_blocks, parity_block};
 use hums_recorder::card::Segment;
 use hums_recorder::recorder::InWork;
-use hums_recorder::{Card, CardDevice, CardError, LogName, Trouble};
+use hums_recorder::{BLOCK_BYTES, Block, Card, CardDevice, CardError, LogName, Trouble};
 
 use super::asked::LogId;
 
@@ -35,21 +34,21 @@ struct Blocks<'r, 'a, D: CardDevice> {
 
 impl<'r, 'a, D: CardDevice> Blocks<'r, 'a, D> {
     fn of(card: &'r Card<'a, D>, segment: &'r mut Segment) -> Self {
-        Self { card, segment, block: Block::new(), has_lost: false, is_gone: false }
+        Self { card, segment, block: [0; BLOCK_BYTES], has_lost: false, is_gone: false }
     }
 
     /// Of a card that no longer answers, zeros without another command: each would take its whole time again.
-    fn read(&mut self, at: u32) -> &[u8; Block::LEN] {
+    fn read(&mut self, at: u32) -> &Block {
         if self.is_gone {
-            self.block.contents.fill(0);
+            self.block.fill(0);
         } else if let Err(error) = self.card.read(self.segment, at, &mut self.block) {
             let trouble =
                 if let CardError::Device(error) = &error { D::trouble(error) } else { Trouble::Refusing };
             self.has_lost = true;
             self.is_gone |= trouble != Trouble::Refusing;
-            self.block.contents.fill(0);
+            self.block.fill(0);
         }
-        &self.block.contents
+        &self.block
     }
 
     /// How many of them are for sectors.
@@ -150,14 +149,14 @@ pub(super) fn for_each_part<D: CardDevice>(
     let mut blocks = Blocks::of(card, segment);
     let mut at = bytes.start;
     while at < bytes.end {
-        let index = at / Block::LEN_U32;
-        let start = index * Block::LEN_U32;
-        let end = bytes.end.min(start + Block::LEN_U32);
+        let index = at / BLOCK_BYTES as u32;
+        let start = index * BLOCK_BYTES as u32;
+        let end = bytes.end.min(start + BLOCK_BYTES as u32);
         blocks.read(index);
         if blocks.is_gone || blocks.has_lost && *log == LogId::NONE {
             return false;
         }
-        each(blocks.block.contents.get((at - start) as usize..(end - start) as usize).unwrap_or_default());
+        each(blocks.block.get((at - start) as usize..(end - start) as usize).unwrap_or_default());
         at = end;
     }
     true

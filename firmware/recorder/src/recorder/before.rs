@@ -7,12 +7,11 @@
 //! A file that was written anew holds older sectors behind its own, and nothing else before its first one is there. The file
 //! before it tells them apart: what goes on with that one's session has higher numbers.
 
-use embedded_sdmmc::Block;
+use crate::{BLOCK_BYTES, Block, CardDevice};
 use hums_blackbox::parity::data_blocks;
 use hums_blackbox::record::{Before, Found};
 use hums_blackbox::{GROUP_SECTORS, Header, Sector};
 
-use crate::CardDevice;
 use crate::card::{Card, CardError, LogEntry, Segment};
 use crate::directory::Newest;
 
@@ -42,7 +41,7 @@ fn end_of<D: CardDevice>(
     older: Option<&LogEntry>,
 ) -> Result<Option<Before>, CardError<D::Error>> {
     let mut segment = Segment::of(entry);
-    let mut reader = Reader { card, segment: &mut segment, block: Block::new() };
+    let mut reader = Reader { card, segment: &mut segment, block: [0; BLOCK_BYTES] };
     let begin = match older.and_then(|older| Some((older, first(card, older).ok()??))) {
         None => reader.probe(0, |_| true)?,
         Some((older, before)) => {
@@ -86,7 +85,7 @@ fn end_of<D: CardDevice>(
 /// The first sound sector of a segment.
 fn first<D: CardDevice>(card: &Card<'_, D>, entry: &LogEntry) -> Result<Option<Header>, CardError<D::Error>> {
     let mut segment = Segment::of(entry);
-    let mut reader = Reader { card, segment: &mut segment, block: Block::new() };
+    let mut reader = Reader { card, segment: &mut segment, block: [0; BLOCK_BYTES] };
     Ok(reader.probe(0, |_| true)?.map(|(_, header)| header))
 }
 
@@ -107,7 +106,7 @@ impl<D: CardDevice> Reader<'_, '_, D> {
     /// The sector in this block, if there is one.
     fn header(&mut self, at: u32) -> Result<Option<Header>, CardError<D::Error>> {
         self.card.read(self.segment, at, &mut self.block)?;
-        Ok(Header::read(&self.block.contents).ok())
+        Ok(Header::read(&self.block).ok())
     }
 
     /// The first sound sector from this block on that is wanted.
@@ -138,7 +137,7 @@ impl<D: CardDevice> Reader<'_, '_, D> {
             return Ok(None);
         }
         let Some(begin) = self.header(first)? else { return Ok(None) };
-        let Some(preamble) = Sector::from_bytes(self.block.contents).preamble() else { return Ok(None) };
+        let Some(preamble) = Sector::from_bytes(self.block).preamble() else { return Ok(None) };
         let (mut frames, mut sector) = (preamble.frames_before, begin);
         for at in first + 1..=last {
             let Some(next) = self.header(at)?.filter(|next| next.session == header.session) else {

@@ -1,10 +1,5 @@
 //! An SD card on an SPI bus, as a block device that never waits without a limit.
 //!
-//! `embedded-sdmmc` brings a driver of its own. Against a simulated card (`tests/sdcard`, `docs/cards.md` has the
-//! figures) it gave a busy card up after half a second, where good cards take 2.5; it did not ask whether what it wrote
-//! arrived ([`SpiError::NotWritten`]), left a failed write of many blocks open, and let go of the select pin after every
-//! byte, which the specification forbids within a command. So this one is over its `BlockDevice`:
-//!
 //! * Each wait has a limit, and all waits of one service together have one: [`SERVICE_MAX`]. Whoever records gives such a
 //!   card up, says so, and tries again.
 //! * Checksums both ways, on every card that can: what was damaged on its way is sent again, [`TRIES`] times in all.
@@ -24,14 +19,14 @@ mod registers;
 
 use core::cell::RefCell;
 
-use embedded_sdmmc::{Block, BlockCount, BlockDevice, BlockIdx};
+use crate::{BLOCK_BYTES, Block, CardDevice};
 use hums_core::clock::{Instant, Span};
 
 pub use error::SpiError;
 pub use line::BUSY_MAX;
 pub use port::{Clock, Port, PortFailed};
 
-use crate::{CardDevice, Trouble};
+use crate::Trouble;
 use identify::Identity;
 use line::{Line, TOKEN_MANY, TOKEN_ONE};
 
@@ -113,17 +108,17 @@ fn address(card: &Identity, block: u32, count: usize) -> Result<u32, SpiError> {
     if end > u64::from(card.csd.blocks) {
         return Err(SpiError::OutOfRange);
     }
-    let address = if card.by_bytes { block.checked_mul(Block::LEN_U32) } else { Some(block) };
+    let address = if card.by_bytes { block.checked_mul(BLOCK_BYTES as u32) } else { Some(block) };
     address.ok_or(SpiError::OutOfRange)
 }
 
 fn read<P: Port>(line: &mut Line<P>, address: u32, blocks: &mut [Block]) -> Result<(), SpiError> {
     if let [block] = blocks {
         line.must(READ, address)?;
-        return line.receive(&mut block.contents);
+        return line.receive(block);
     }
     line.must(READ_MANY, address)?;
-    let received = blocks.iter_mut().try_for_each(|block| line.receive(&mut block.contents));
+    let received = blocks.iter_mut().try_for_each(|block| line.receive(block));
     // What went wrong first is what counts.
     let stopped = line.stop_reading();
     received.and(stopped)
@@ -133,7 +128,7 @@ fn write<P: Port>(line: &mut Line<P>, address: u32, blocks: &[Block]) -> Result<
     let given = match blocks {
         [block] => {
             line.must(WRITE, address)?;
-            line.give(TOKEN_ONE, &block.contents)
+            line.give(TOKEN_ONE, block)
         }
         _ => give_many(line, address, blocks),
     };
@@ -151,7 +146,7 @@ fn give_many<P: Port>(line: &mut Line<P>, address: u32, blocks: &[Block]) -> Res
     // Some cards are faster when they know how many come (4.3.4); one that does not know the command writes as well.
     line.app_command(ERASE_BEFORE, blocks.len() as u32)?;
     line.must(WRITE_MANY, address)?;
-    match blocks.iter().try_for_each(|block| line.give(TOKEN_MANY, &block.contents)) {
+    match blocks.iter().try_for_each(|block| line.give(TOKEN_MANY, block)) {
         Ok(()) => line.stop(),
         Err(error) => {
             // What went wrong first is what counts.
@@ -161,17 +156,17 @@ fn give_many<P: Port>(line: &mut Line<P>, address: u32, blocks: &[Block]) -> Res
     }
 }
 
-impl<P: Port> BlockDevice for SpiCard<P> {
+impl<P: Port> CardDevice for SpiCard<P> {
     type Error = SpiError;
 
-    fn read(&self, blocks: &mut [Block], start: BlockIdx) -> Result<(), SpiError> {
+    fn read(&self, blocks: &mut [Block], start: u32) -> Result<(), SpiError> {
         if blocks.is_empty() {
             return Ok(());
         }
-        self.inner.borrow_mut().access(|line, card| read(line, address(card, start.0, blocks.len())?, blocks))
+        self.inner.borrow_mut().access(|line, card| read(line, address(card, start, blocks.len())?, blocks))
     }
 
-    fn write(&self, blocks: &[Block], start: BlockIdx) -> Result<(), SpiError> {
+    fn write(&self, blocks: &[Block], start: u32) -> Result<(), SpiError> {
         if blocks.is_empty() {
             return Ok(());
         }
@@ -179,16 +174,14 @@ impl<P: Port> BlockDevice for SpiCard<P> {
             if card.csd.is_locked {
                 return Err(SpiError::Locked);
             }
-            write(line, address(card, start.0, blocks.len())?, blocks)
+            write(line, address(card, start, blocks.len())?, blocks)
         })
     }
 
-    fn num_blocks(&self) -> Result<BlockCount, SpiError> {
-        self.inner.borrow_mut().access(|_, card| Ok(BlockCount(card.csd.blocks)))
+    fn num_blocks(&self) -> Result<u32, SpiError> {
+        self.inner.borrow_mut().access(|_, card| Ok(card.csd.blocks))
     }
-}
 
-impl<P: Port> CardDevice for SpiCard<P> {
     fn reset(&self) {
         let mut inner = self.inner.borrow_mut();
         (inner.card, inner.cid) = (None, None);

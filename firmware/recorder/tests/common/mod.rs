@@ -5,9 +5,8 @@ use std::cell::{Cell, RefCell};
 use std::collections::BTreeMap;
 use std::rc::Rc;
 
-use embedded_sdmmc::{Block, BlockCount, BlockDevice, BlockIdx};
 use hums_recorder::format::format;
-use hums_recorder::{Buffers, CardDevice};
+use hums_recorder::{Block, Buffers, CardDevice};
 
 /// Blocks of a mebibyte.
 pub const MIB_BLOCKS: u32 = 2048;
@@ -85,32 +84,32 @@ impl MemCard {
     }
 }
 
-impl BlockDevice for MemCard {
+impl CardDevice for MemCard {
     type Error = Broken;
 
-    fn read(&self, blocks: &mut [Block], start: BlockIdx) -> Result<(), Broken> {
+    fn read(&self, blocks: &mut [Block], start: u32) -> Result<(), Broken> {
         self.reads.set(self.reads.get() + blocks.len() as u32);
         let left = self.fail_read_after.get();
         self.fail_read_after.set(left.and_then(|left| left.checked_sub(1)));
         if left == Some(0) {
             return Err(Broken);
         }
-        for (at, block) in (start.0..).zip(blocks) {
+        for (at, block) in (start..).zip(blocks) {
             if self.broken.get() || at >= self.size {
                 return Err(Broken);
             }
-            block.contents = self.blocks.borrow().get(&at).copied().unwrap_or([0; 512]);
+            *block = self.blocks.borrow().get(&at).copied().unwrap_or([0; 512]);
         }
         Ok(())
     }
 
-    fn write(&self, blocks: &[Block], start: BlockIdx) -> Result<(), Broken> {
+    fn write(&self, blocks: &[Block], start: u32) -> Result<(), Broken> {
         self.writes.set(self.writes.get() + 1);
         if let Some(left) = self.refusals.get().checked_sub(1) {
             self.refusals.set(left);
             return Err(Broken);
         }
-        for (at, block) in (start.0..).zip(blocks) {
+        for (at, block) in (start..).zip(blocks) {
             if self.broken.get() || at >= self.size {
                 return Err(Broken);
             }
@@ -126,10 +125,10 @@ impl BlockDevice for MemCard {
                 }
                 left => self.fail_after.set(left.map(|left| left - 1)),
             }
-            self.journal.borrow_mut().push((at, block.contents));
-            self.blocks.borrow_mut().insert(at, block.contents);
+            self.journal.borrow_mut().push((at, *block));
+            self.blocks.borrow_mut().insert(at, *block);
             if let Some(name) = self.unsaid.get()
-                && block.contents.as_chunks::<32>().0.iter().any(|entry| entry.starts_with(&name))
+                && block.as_chunks::<32>().0.iter().any(|entry| entry.starts_with(&name))
             {
                 return Err(Broken);
             }
@@ -137,12 +136,10 @@ impl BlockDevice for MemCard {
         Ok(())
     }
 
-    fn num_blocks(&self) -> Result<BlockCount, Broken> {
-        Ok(BlockCount(self.size))
+    fn num_blocks(&self) -> Result<u32, Broken> {
+        Ok(self.size)
     }
-}
 
-impl CardDevice for MemCard {
     fn keeps_logs(&self) -> bool {
         self.keeps_logs.get()
     }

@@ -6,9 +6,9 @@ use std::io::{self, Read, Seek, SeekFrom};
 use std::path::Path;
 
 use anyhow::{Context, Result, bail};
-use embedded_sdmmc::{Block, BlockCount, BlockDevice, BlockIdx};
 use hums_recorder::format::BLOCKS_MIN;
 use hums_recorder::layout::{Layout, LayoutError};
+use hums_recorder::{BLOCK_BYTES, Block, CardDevice};
 
 use crate::files::{make_in_place, open_in_place};
 use crate::outcome::usage;
@@ -82,7 +82,7 @@ pub fn check(file: &File, path: &Path) -> Result<Option<String>> {
         Err(why) => why,
     };
     // A partition table alone, as on a card with an unformatted partition, holds no data to lose.
-    let from = if matches!(why, LayoutError::NoPartitionTable) { 0 } else { Block::LEN as u64 };
+    let from = if matches!(why, LayoutError::NoPartitionTable) { 0 } else { BLOCK_BYTES as u64 };
     if is_zero(file, from).with_context(context)? {
         return Ok(Some(format!(
             "{why}, so that nothing can be recorded on it before it is formatted; name an image of a card, or a new file, \
@@ -153,25 +153,25 @@ pub struct ReadOnlyImage {
 impl ReadOnlyImage {
     /// The whole blocks of `file`.
     pub fn new(file: File) -> io::Result<Self> {
-        let blocks = length(&file)? / Block::LEN as u64;
+        let blocks = length(&file)? / BLOCK_BYTES as u64;
         Ok(Self { file: RefCell::new(file), blocks: u32::try_from(blocks).unwrap_or(u32::MAX) })
     }
 }
 
-impl BlockDevice for ReadOnlyImage {
+impl CardDevice for ReadOnlyImage {
     type Error = io::Error;
 
-    fn read(&self, blocks: &mut [Block], start: BlockIdx) -> io::Result<()> {
+    fn read(&self, blocks: &mut [Block], start: u32) -> io::Result<()> {
         let mut file = self.file.borrow_mut();
-        file.seek(SeekFrom::Start(start.into_bytes()))?;
-        blocks.iter_mut().try_for_each(|block| file.read_exact(&mut block.contents))
+        file.seek(SeekFrom::Start(u64::from(start) * BLOCK_BYTES as u64))?;
+        blocks.iter_mut().try_for_each(|block| file.read_exact(block))
     }
 
-    fn write(&self, _: &[Block], _: BlockIdx) -> io::Result<()> {
+    fn write(&self, _: &[Block], _: u32) -> io::Result<()> {
         Err(io::ErrorKind::ReadOnlyFilesystem.into())
     }
 
-    fn num_blocks(&self) -> io::Result<BlockCount> {
-        Ok(BlockCount(self.blocks))
+    fn num_blocks(&self) -> io::Result<u32> {
+        Ok(self.blocks)
     }
 }

@@ -8,8 +8,7 @@ use std::cell::{Cell, RefCell};
 use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom, Write};
 
-use embedded_sdmmc::{Block, BlockCount, BlockDevice, BlockIdx};
-use hums_recorder::CardDevice;
+use hums_recorder::{BLOCK_BYTES, Block, CardDevice};
 
 use super::faults::{Cut, Faults, Stall};
 use crate::rng::Rng;
@@ -60,7 +59,7 @@ pub struct Written {
     /// Which block.
     pub block: u32,
     /// Its new content.
-    pub bytes: [u8; Block::LEN],
+    pub bytes: Block,
     /// Blocks behind it that the same command writes: undefined while it goes on (SD specification, 4.3.4).
     pub behind: u32,
 }
@@ -83,7 +82,7 @@ pub struct SimCard {
 impl SimCard {
     /// A card of the size of `image`, whole blocks only.
     pub fn new(image: File, faults: Faults) -> io::Result<Self> {
-        let blocks = image.metadata()?.len() / Block::LEN as u64;
+        let blocks = image.metadata()?.len() / BLOCK_BYTES as u64;
         let rng = RefCell::new(Rng::new(faults.seed, PURPOSE));
         Ok(Self {
             image: RefCell::new(image),
@@ -173,7 +172,7 @@ impl SimCard {
     /// One block write; false if the power failed during it.
     fn write_block(
         &self,
-        bytes: &[u8; Block::LEN],
+        bytes: &[u8; BLOCK_BYTES],
         block: u32,
         behind: u32,
         at_us: u64,
@@ -188,17 +187,18 @@ impl SimCard {
         }
         let cut = self.faults.cuts.iter().filter(|cut| cut.write <= count).min_by_key(|cut| cut.write);
         let bytes = match cut {
-            Some(Cut { torn: true, .. }) => bytes.get(..Block::LEN / 2).unwrap_or_default(),
+            Some(Cut { torn: true, .. }) => bytes.get(..BLOCK_BYTES / 2).unwrap_or_default(),
             _ => &bytes[..],
         };
         let mut image = self.image.borrow_mut();
-        let result =
-            image.seek(SeekFrom::Start(BlockIdx(block).into_bytes())).and_then(|_| image.write_all(bytes));
+        let result = image
+            .seek(SeekFrom::Start(u64::from(block) * BLOCK_BYTES as u64))
+            .and_then(|_| image.write_all(bytes));
         result.map_err(|error| self.keep(error))?;
         if cut.is_some() {
             for block in block + 1..=block + behind {
-                let at = SeekFrom::Start(BlockIdx(block).into_bytes());
-                let erased = image.seek(at).and_then(|_| image.write_all(&[0; Block::LEN]));
+                let at = SeekFrom::Start(u64::from(block) * BLOCK_BYTES as u64);
+                let erased = image.seek(at).and_then(|_| image.write_all(&[0; BLOCK_BYTES]));
                 erased.map_err(|error| self.keep(error))?;
             }
             self.dead.set(true);
@@ -216,48 +216,45 @@ impl SimCard {
         CardError::Image(error)
     }
 
-    fn check_range(&self, start: BlockIdx, count: usize) -> Result<(), CardError> {
-        let end = u64::from(start.0) + count as u64;
+    fn check_range(&self, start: u32, count: usize) -> Result<(), CardError> {
+        let end = u64::from(start) + count as u64;
         if end <= u64::from(self.blocks) { Ok(()) } else { Err(CardError::OutOfRange) }
     }
 }
 
-impl BlockDevice for SimCard {
+impl CardDevice for SimCard {
     type Error = CardError;
 
-    fn read(&self, blocks: &mut [Block], start: BlockIdx) -> Result<(), CardError> {
+    fn read(&self, blocks: &mut [Block], start: u32) -> Result<(), CardError> {
         self.begin(COMMAND_US + BLOCK_US * blocks.len() as u64)?;
         self.check_range(start, blocks.len())?;
         let mut image = self.image.borrow_mut();
-        image.seek(SeekFrom::Start(start.into_bytes())).map_err(|error| self.keep(error))?;
+        image.seek(SeekFrom::Start(u64::from(start) * BLOCK_BYTES as u64)).map_err(|error| self.keep(error))?;
         for block in blocks {
-            image.read_exact(&mut block.contents).map_err(|error| self.keep(error))?;
+            image.read_exact(block).map_err(|error| self.keep(error))?;
         }
         Ok(())
     }
 
-    fn write(&self, blocks: &[Block], start: BlockIdx) -> Result<(), CardError> {
+    fn write(&self, blocks: &[Block], start: u32) -> Result<(), CardError> {
         self.begin(COMMAND_US + BLOCK_US * blocks.len() as u64)?;
         self.check_range(start, blocks.len())?;
-        if self.faults.keeps_table && start.0 == 0 {
+        if self.faults.keeps_table && start == 0 {
             return Err(CardError::WriteRefused);
         }
         for (index, block) in (0..).zip(blocks) {
             let left = blocks.len() as u32 - index;
             let at_us = self.clock().saturating_sub(BLOCK_US * u64::from(left));
-            self.write_block(&block.contents, start.0 + index, left - 1, at_us)?;
+            self.write_block(block, start + index, left - 1, at_us)?;
         }
         Ok(())
     }
 
-    fn num_blocks(&self) -> Result<BlockCount, CardError> {
+    fn num_blocks(&self) -> Result<u32, CardError> {
         self.begin(COMMAND_US)?;
-        Ok(BlockCount(self.blocks))
+        Ok(self.blocks)
     }
 }
-
-/// The card on its own, outside of a power-on: for a look at its directory.
-impl CardDevice for SimCard {}
 
 #[cfg(test)]
 mod tests {
@@ -271,9 +268,7 @@ mod tests {
     }
 
     fn block(byte: u8) -> Block {
-        let mut block = Block::new();
-        block.contents = [byte; 512];
-        block
+        [byte; BLOCK_BYTES]
     }
 
     fn content(card: &SimCard, index: u32) -> [u8; 512] {
@@ -288,15 +283,15 @@ mod tests {
     fn power_goes_within_a_write_of_several_blocks() {
         for torn in [false, true] {
             let card = card(Faults { cuts: vec![Cut { write: 4, torn }], ..Faults::default() });
-            card.write(&[block(1)], BlockIdx(0)).expect("first");
-            card.write(&[block(9)], BlockIdx(3)).expect("before");
-            let cut = card.write(&[block(2), block(3), block(4)], BlockIdx(1));
+            card.write(&[block(1)], 0).expect("first");
+            card.write(&[block(9)], 3).expect("before");
+            let cut = card.write(&[block(2), block(3), block(4)], 1);
             assert!(matches!(cut, Err(CardError::PowerGone)));
             assert_eq!(content(&card, 1), [2; 512]);
             assert_eq!(content(&card, 2)[..256], [3; 256]);
             assert_eq!(content(&card, 2)[256..], [if torn { 0 } else { 3 }; 256]);
             assert_eq!(content(&card, 3), [0; 512], "erased before it came");
-            assert!(card.is_dead() && card.write(&[block(5)], BlockIdx(0)).is_err());
+            assert!(card.is_dead() && card.write(&[block(5)], 0).is_err());
             assert_eq!(card.writes(), 4);
         }
     }
@@ -306,10 +301,10 @@ mod tests {
         let stall = Stall { from_us: 1_000_000, for_us: 2_500_000 };
         let card = card(Faults { stalls: vec![stall], ..Faults::default() });
         card.set_clock(999_000);
-        card.write(&[block(1)], BlockIdx(0)).expect("before");
+        card.write(&[block(1)], 0).expect("before");
         assert!(card.clock() < 1_000_000);
         card.set_clock(1_400_000);
-        card.write(&[block(2)], BlockIdx(0)).expect("stalled");
+        card.write(&[block(2)], 0).expect("stalled");
         assert_eq!(card.clock(), 3_500_000 + COMMAND_US + BLOCK_US);
         assert_eq!(content(&card, 0), [2; 512]);
     }
@@ -318,20 +313,20 @@ mod tests {
     fn a_card_that_is_out_comes_back_with_its_content() {
         let out = CardOut { from_us: 1_000_000, to_us: 2_000_000 };
         let card = card(Faults { outs: vec![out], ..Faults::default() });
-        card.write(&[block(1)], BlockIdx(0)).expect("before");
+        card.write(&[block(1)], 0).expect("before");
         card.set_clock(1_500_000);
-        assert!(matches!(card.write(&[block(2)], BlockIdx(0)), Err(CardError::Absent)));
+        assert!(matches!(card.write(&[block(2)], 0), Err(CardError::Absent)));
         card.set_clock(2_000_000);
-        let mut back = [Block::new()];
-        card.read(&mut back, BlockIdx(0)).expect("after");
-        assert_eq!(back[0].contents, [1; 512]);
+        let mut back = [[0; BLOCK_BYTES]];
+        card.read(&mut back, 0).expect("after");
+        assert_eq!(back[0], [1; 512]);
     }
 
     #[test]
     fn write_errors_repeat_with_the_seed() {
         let run = |seed| {
             let card = card(Faults { write_error: 0.3, seed, ..Faults::default() });
-            (0..60).map(|at| card.write(&[block(1)], BlockIdx(at)).is_ok()).collect::<Vec<_>>()
+            (0..60).map(|at| card.write(&[block(1)], at).is_ok()).collect::<Vec<_>>()
         };
         assert_eq!(run(1), run(1));
         assert_ne!(run(1), run(2));
@@ -355,16 +350,16 @@ mod tests {
         image.as_file().set_len(64 * 512).expect("64 blocks");
         let card =
             SimCard::new(File::open(image.path()).expect("for reading"), Faults::default()).expect("card");
-        assert!(matches!(card.write(&[block(1)], BlockIdx(3)), Err(CardError::Image(_))));
-        assert!(matches!(card.read(&mut [block(1)], BlockIdx(3)), Err(CardError::PowerGone)));
+        assert!(matches!(card.write(&[block(1)], 3), Err(CardError::Image(_))));
+        assert!(matches!(card.read(&mut [block(1)], 3), Err(CardError::PowerGone)));
         assert!(card.take_image_error().is_some());
     }
 
     #[test]
     fn the_end_of_the_card_is_an_error() {
         let card = card(Faults::default());
-        assert!(matches!(card.write(&[block(1), block(1)], BlockIdx(63)), Err(CardError::OutOfRange)));
-        assert!(matches!(card.read(&mut [Block::new()], BlockIdx(u32::MAX)), Err(CardError::OutOfRange)));
-        assert_eq!(card.num_blocks().expect("size"), BlockCount(64));
+        assert!(matches!(card.write(&[block(1), block(1)], 63), Err(CardError::OutOfRange)));
+        assert!(matches!(card.read(&mut [[0; BLOCK_BYTES]], u32::MAX), Err(CardError::OutOfRange)));
+        assert_eq!(card.num_blocks().expect("size"), 64);
     }
 }

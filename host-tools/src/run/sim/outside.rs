@@ -3,7 +3,6 @@
 use std::io::Write;
 
 use anyhow::Result;
-use embedded_sdmmc::{Block, BlockCount, BlockDevice, BlockIdx};
 use hums_blackbox::Writer;
 use hums_core::Monitor;
 use hums_core::clock::Instant;
@@ -11,7 +10,7 @@ use hums_core::params::Params;
 use hums_onboard::queues::Queues;
 use hums_onboard::{Mailbox, PortStatus, StoreStatus};
 use hums_recorder::status::CardReading;
-use hums_recorder::{Buffers, CardDevice, CardStatus, Trouble};
+use hums_recorder::{Block, Buffers, CardDevice, CardStatus, Trouble};
 
 use crate::card::SimCard;
 use crate::card::sim::CardError;
@@ -70,23 +69,21 @@ pub(super) struct Slot<'a> {
     pub(super) power_on_us: u64,
 }
 
-impl BlockDevice for Slot<'_> {
+impl CardDevice for Slot<'_> {
     type Error = CardError;
 
-    fn read(&self, blocks: &mut [Block], start: BlockIdx) -> Result<(), CardError> {
+    fn read(&self, blocks: &mut [Block], start: u32) -> Result<(), CardError> {
         self.card.read(blocks, start)
     }
 
-    fn write(&self, blocks: &[Block], start: BlockIdx) -> Result<(), CardError> {
+    fn write(&self, blocks: &[Block], start: u32) -> Result<(), CardError> {
         self.card.write(blocks, start)
     }
 
-    fn num_blocks(&self) -> Result<BlockCount, CardError> {
+    fn num_blocks(&self) -> Result<u32, CardError> {
         self.card.num_blocks()
     }
-}
 
-impl CardDevice for Slot<'_> {
     fn now(&self) -> Instant {
         Instant::from_micros(self.card.clock().saturating_sub(self.power_on_us))
     }

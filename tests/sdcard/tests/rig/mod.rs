@@ -7,7 +7,6 @@
 
 use std::collections::BTreeMap;
 
-use embedded_sdmmc::Block;
 use hums_blackbox::record::{Boot, Record, Resting};
 use hums_blackbox::{Gap, Item, LogReader, Writer};
 use hums_core::Monitor;
@@ -18,7 +17,7 @@ use hums_link::frame::{Check, Frame};
 use hums_onboard::queues::{Ends, FRAME_BYTES_MAX, Queues};
 use hums_onboard::storage::NO_CARD_RETRY;
 use hums_onboard::{Monitoring, PortStatus, ResetCause, Service, Storage, Supervisor, Task};
-use hums_recorder::{Buffers, Card, CardState, CardStatus, LogName, SpiCard};
+use hums_recorder::{BLOCK_BYTES, Buffers, Card, CardState, CardStatus, LogName, SpiCard};
 use hums_sdcard::{MS, Medium, Model, SimPort, Slot};
 
 /// One frame of noise each so often: 2.5 kB/s of log.
@@ -263,13 +262,13 @@ impl Rig {
         let Ends { sectors_in, gs_in, .. } = &mut self.ends;
         self.monitoring.finish(self.slot.now(), sectors_in, gs_in);
         let end = self.slot.now() + Span::from_secs(10);
-        while !self.storage.is_done(&self.ends.sectors_out) && self.slot.now() < end {
+        while !self.ends.sectors_out.is_empty() && self.slot.now() < end {
             let begun = self.slot.now();
             self.storage.service(begun, &mut self.ends.sectors_out);
             self.slot.advance_to(self.slot.now_ns() + 10 * MS);
         }
         self.storage.finish();
-        let left = self.storage.abandon(&mut self.ends.sectors_out);
+        let left = self.ends.sectors_out.abandon();
         let card_lost = u64::from(self.status.read().frames_lost);
         let refused = self.monitoring.stats(&self.ends.gs_in).frames_lost;
         let lost = refused.max(card_lost) + left;
@@ -348,14 +347,14 @@ pub fn read(medium: &Medium) -> Found {
             // The newest copy of the last sector may lie at the place after it, and nothing yet at its own.
             let mut empty = 0;
             for index in 0..segment.blocks() {
-                let mut block = Block::new();
+                let mut block = [0; BLOCK_BYTES];
                 card.read(&mut segment, index, &mut block).expect("it reads");
-                empty = if block.contents == [0; 512] { empty + 1 } else { 0 };
+                empty = if block == [0; 512] { empty + 1 } else { 0 };
                 // Nothing was written from here on.
                 if empty > 1 {
                     break;
                 }
-                reader.feed(&block.contents);
+                reader.feed(&block);
                 take(&mut reader, &mut found);
             }
         }

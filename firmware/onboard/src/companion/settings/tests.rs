@@ -87,9 +87,7 @@ fn run_with(text: &str, cause: ResetCause, ticks_an_answer: u64, comes: &[(u64, 
         }
         while ends.gs_out.take(&mut out).is_some() {}
         while ends.autopilot_out.take(&mut out).is_some() {}
-        while ends.sectors_out.oldest().is_some() {
-            ends.sectors_out.drop_oldest();
-        }
+        ends.sectors_out.abandon();
     }
     let params = body.monitor().params();
     let is = |param, value: f32| params.get(param).to_bits() == value.to_bits();

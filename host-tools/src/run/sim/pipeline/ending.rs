@@ -22,7 +22,7 @@ impl Pipeline<'_, '_> {
         let Ends { sectors_in, gs_in, .. } = &mut self.ends;
         self.monitoring.finish(self.now, sectors_in, gs_in);
         let patience = self.now + CARD_PATIENCE;
-        while !self.storage.is_done(&self.ends.sectors_out) && !self.is_dead() {
+        while !self.ends.sectors_out.is_empty() && !self.is_dead() {
             let at = self.storage_at.unwrap_or(self.now).max(self.now);
             if at > patience && self.slot_is_empty() {
                 break;
@@ -38,7 +38,7 @@ impl Pipeline<'_, '_> {
             self.send_gs()?;
             self.now = self.now.max(self.gs_at);
         }
-        Ok(self.storage.abandon(&mut self.ends.sectors_out))
+        Ok(self.ends.sectors_out.abandon())
     }
 
     /// Hands over everything that is to outlive power, as fast as the store takes it.
