@@ -9,7 +9,7 @@ pub use crate::card_error::CardError;
 use crate::chain::ClusterChain;
 use crate::directory::{
     ARCHIVE, ATTRIBUTES, BLOCK_ENTRIES, CLUSTER_HIGH, CLUSTER_LOW, DELETED, Directory, ENTRY_BYTES, Entry,
-    HIDDEN, LENGTH, MADE, NEVER_USED, Newest, Slot, VERIFY_BLOCKS, WRITTEN, clusters_of, walk,
+    HIDDEN, LENGTH, MADE, NEVER_USED, Newest, Slot, WRITTEN, clusters_of, walk,
 };
 use crate::free::{FreeSearch, chain_free, free_chain, write_hint};
 use crate::layout::{Layout, LayoutError};
@@ -123,7 +123,8 @@ impl<'a, D: CardDevice> Card<'a, D> {
 
     /// Walks over the directory. Where the information sector names no free cluster, those behind all logs are looked at first.
     fn begin(&mut self) -> Result<(), CardError<D::Error>> {
-        self.learn(self.free.next(), None)?;
+        let mut parity = self.buffers.parity.borrow_mut();
+        self.directory.learn(&self.volume, parity.lend(), self.free.next())?;
         self.free.begin(&self.volume, self.directory.claimed_end())
     }
 
@@ -142,10 +143,31 @@ impl<'a, D: CardDevice> Card<'a, D> {
         &self.volume.layout
     }
 
-    /// Walks over the directory; whether what logs claim of the FAT from this block on was chained again.
-    fn learn(&mut self, verify: u32, of: Option<u32>) -> Result<bool, CardError<D::Error>> {
-        let mut parity = self.buffers.parity.borrow_mut();
-        self.directory.learn(&self.volume, parity.lend(), verify, of)
+    /// Looks through the next blocks of the directory.
+    fn look_on(&mut self, buffer: &mut [Block]) -> Result<(), CardError<D::Error>> {
+        if self.directory.look_on(&self.volume, buffer, self.free.next())? {
+            self.free.restart();
+        }
+        Ok(())
+    }
+
+    /// Looks through many blocks of the directory, for a segment that is waited for: the caller is to try again.
+    fn look_for_next(&mut self) -> Result<(), CardError<D::Error>> {
+        let buffers = self.buffers;
+        self.look_on(buffers.parity.borrow_mut().lend())?;
+        Err(CardError::Searching)
+    }
+
+    /// With nothing to write: looks a little further for what the next segment needs, a block of the directory or of the FAT.
+    #[inline(never)]
+    pub(crate) fn look_ahead(&mut self) -> Result<(), CardError<D::Error>> {
+        if self.directory.must_look(self.free.next()) {
+            return self.look_on(&mut [[0; BLOCK_BYTES]]);
+        }
+        match self.free.search_on(&self.volume) {
+            Err(CardError::Searching | CardError::Full) => Ok(()),
+            searched => searched,
+        }
     }
 
     /// Calls `each` for every log segment of the root directory, in directory order.
@@ -224,9 +246,6 @@ impl<'a, D: CardDevice> Card<'a, D> {
     /// held before. At every moment in between, the directory is as before or holds the whole segment.
     pub fn create(&mut self, name: LogName, bytes: u32) -> Result<(), CardError<D::Error>> {
         self.open = None;
-        if !self.directory.is_known {
-            self.learn(self.free.next(), None)?;
-        }
         let wanted = clusters_of(&self.volume, bytes).max(1);
         // A card that logs and the directory fill is not searched.
         let others = self.volume.layout.clusters.saturating_sub(self.directory.clusters).saturating_sub(1);
@@ -245,7 +264,6 @@ impl<'a, D: CardDevice> Card<'a, D> {
             }
             found => found?,
         };
-        // The search may have walked over the directory, and the walk notes the places anew.
         let place = self.place_for_new()?.ok_or(CardError::Damaged)?;
         let (first, last) = chain_free(&self.volume, &found, wanted)?;
         write_hint(&self.volume, last + 1);
@@ -286,32 +304,22 @@ impl<'a, D: CardDevice> Card<'a, D> {
         }
     }
 
-    /// The place of a new entry, where no file has one. Where one does, the directory is not as it was noted: it is walked over
-    /// again, once. `None`: the directory needs another cluster.
+    /// The place of a new entry, where no file has one: else the directory is not as it was noted. `None`: the directory needs another
+    /// cluster.
     fn place_for_new(&mut self) -> Result<Option<Place>, CardError<D::Error>> {
-        for _ in 0..2 {
-            let Some(place) = self.directory.place_for_new(&self.volume)? else { return Ok(None) };
-            if self.is_unused(place)? {
-                return Ok(Some(place));
-            }
-            self.learn(self.free.next(), None)?;
+        let place = self.directory.place_for_new(&self.volume)?;
+        match place {
+            Some(place) if !self.is_unused(place)? => Err(CardError::Damaged),
+            place => Ok(place),
         }
-        Err(CardError::Damaged)
     }
 
     /// Finds blocks of the FAT with so many free clusters that no log claims.
     fn find_free(&mut self, wanted: u32) -> Result<Range<u32>, CardError<D::Error>> {
-        let mut found = self.free.find(&self.volume, wanted)?;
-        // Once for each part of a chain that lies in pieces.
-        let mut verified = found.start;
-        while verified < found.end && !self.directory.is_verified(&(verified..found.end)) {
-            if self.learn(verified, None)? {
-                self.free.again(&found);
-                found = self.free.find(&self.volume, wanted)?;
-                verified = found.start;
-            } else {
-                verified += VERIFY_BLOCKS;
-            }
+        let found = self.free.find(&self.volume, wanted)?;
+        if !self.directory.is_verified(&found) {
+            self.free.again(&found);
+            self.look_for_next()?;
         }
         Ok(found)
     }
@@ -344,29 +352,19 @@ impl<'a, D: CardDevice> Card<'a, D> {
     /// Gives the oldest log the name `name`, and opens it to be written anew. A few whose clusters are no longer chained
     /// are passed by.
     pub(crate) fn recycle_oldest(&mut self, name: LogName) -> Result<(), CardError<D::Error>> {
-        let of = self.device().keeps_logs().then_some(name.session);
-        let (mut unchained, mut is_fresh) = (0, false);
-        loop {
-            if !self.directory.is_known || self.directory.oldest.is_empty() || of.is_some() && !is_fresh {
-                if is_fresh || self.directory.clusters == 0 {
-                    return Err(if unchained > 0 { CardError::Damaged } else { CardError::Full });
-                }
-                self.learn(self.free.next(), of)?;
-                is_fresh = true;
-                continue;
-            }
-            let oldest = self.directory.oldest.remove(0);
-            if oldest.name == name {
-                continue;
-            }
-            if self.is_chained(&oldest)? {
-                return self.recycle(&oldest, name);
-            }
-            unchained += 1;
-            if unchained == UNCHAINED_MAX {
-                return Err(CardError::Damaged);
+        if self.device().keeps_logs() {
+            return Err(CardError::Full);
+        }
+        for unchained in 0..UNCHAINED_MAX {
+            match self.directory.take_oldest() {
+                Some(oldest) if self.is_chained(&oldest)? => return self.recycle(&oldest, name),
+                Some(_) => {}
+                None if unchained > 0 => break,
+                None if self.directory.has_more() => self.look_for_next()?,
+                None => return Err(CardError::Full),
             }
         }
+        Err(CardError::Damaged)
     }
 
     /// Gives an existing segment a new name, and the date of now, in one block write, and opens it to be written anew.
@@ -499,14 +497,6 @@ impl<'a, D: CardDevice> Card<'a, D> {
         }
         let (start, _) = segment.chain.locate(&self.volume, index, 1)?.ok_or(CardError::Damaged)?;
         self.volume.read(core::slice::from_mut(block), start)
-    }
-
-    /// Looks a little further for the free clusters of a segment that were not found at once, one block of the FAT at a call.
-    pub(crate) fn search_on(&mut self) -> Result<(), CardError<D::Error>> {
-        match self.free.search_on(&self.volume) {
-            Err(CardError::Searching | CardError::Full) => Ok(()),
-            searched => searched,
-        }
     }
 
     /// Counts a little further how much of the card logs can have, one block of the FAT at a call; how much once all of it is

@@ -1,7 +1,8 @@
 //! The root directory: one walk over it when a card is mounted tells all that recording needs of it.
 //!
 //! The walk notes the newest logs, the oldest ones, where the next entry goes, and how many clusters logs have. So a new segment
-//! needs no walk. Once the oldest logs that were noted are overwritten, the next segment takes another walk.
+//! needs no walk. While the recorder has nothing to write, it looks on ([`Directory::look_on`]), a block at a call: for more of the
+//! oldest logs once half of those that were noted are overwritten, and for claims on the clusters that are taken next.
 //!
 //! # Clusters that a log claims although the FAT calls them free
 //! A card that lost power may have kept a log's directory entry and lost blocks of the FAT. The next segment would be written over
@@ -27,7 +28,7 @@ const ENTRIES_MAX: u32 = 131_072;
 pub(crate) const BLOCK_ENTRIES: u32 = BLOCK_BYTES as u32 / ENTRY_BYTES as u32;
 /// Logs that are noted: the newest, and the oldest that may be overwritten.
 const NEWEST_MAX: usize = 4;
-const OLDEST_MAX: usize = 16;
+const OLDEST_MAX: usize = 8;
 /// Deleted entries that are noted, for new ones.
 const DELETED_MAX: usize = 8;
 /// The shortest log that may be overwritten: two groups.
@@ -66,14 +67,15 @@ pub(crate) type Newest = Vec<LogEntry, NEWEST_MAX>;
 /// What is known of the root directory.
 pub(crate) struct Directory {
     root: ClusterChain,
-    /// The walk came to the directory's end. Until then there may be more than is noted.
-    pub(crate) is_known: bool,
     /// The newest names below the last session number. A folder has the length 0.
     pub(crate) newest: Newest,
     /// The newest name of the last session number.
     last: Option<LogName>,
-    /// The oldest logs that may be overwritten, the oldest first.
-    pub(crate) oldest: Vec<LogEntry, OLDEST_MAX>,
+    /// The oldest logs that may be overwritten, the oldest first; so many of them are sure to be older than all others.
+    oldest: Vec<LogEntry, OLDEST_MAX>,
+    sure: usize,
+    /// There are logs that may be overwritten beside those.
+    has_more: bool,
     deleted: Vec<u32, DELETED_MAX>,
     /// The first entry that was never used.
     end: u32,
@@ -84,10 +86,13 @@ pub(crate) struct Directory {
     pub(crate) names: u32,
     /// First cluster and length of the file of parameters.
     pub(crate) settings: Option<(u32, u32)>,
-    /// Behind all clusters that logs claim.
+    /// Behind all clusters that logs claimed when the card was mounted: those of later ones are chained.
     claimed_end: u32,
     /// FAT blocks that were looked through for claims.
     verified: Range<u32>,
+    /// Looking on: the next entry, and the FAT blocks that are looked through for claims meanwhile.
+    next: u32,
+    verifying: Range<u32>,
 }
 
 impl Directory {
@@ -95,10 +100,11 @@ impl Directory {
     pub(crate) const fn new(root: u32) -> Self {
         Self {
             root: ClusterChain::new(root),
-            is_known: false,
             newest: Vec::new(),
             last: None,
             oldest: Vec::new(),
+            sure: 0,
+            has_more: false,
             deleted: Vec::new(),
             end: 0,
             clusters: 0,
@@ -107,43 +113,95 @@ impl Directory {
             settings: None,
             claimed_end: 0,
             verified: 0..0,
+            next: 0,
+            verifying: 0..0,
         }
     }
 
-    /// Walks over the whole directory, and chains again what logs claim of the FAT from this block on; whether there was any. Where
-    /// `of` is given, only logs of that session may be overwritten.
+    /// Walks over the whole directory, and chains again what logs claim of the FAT from this block on.
     pub(crate) fn learn<D: CardDevice>(
         &mut self,
         volume: &Volume<'_, D>,
         buffer: &mut [Block],
         verify: u32,
-        of: Option<u32>,
-    ) -> Result<bool, CardError<D::Error>> {
+    ) -> Result<(), CardError<D::Error>> {
         let verified = verify..verify.saturating_add(VERIFY_BLOCKS).min(volume.layout.fat_blocks);
-        *self = Self::new(volume.layout.root);
-        let (mut root, mut changed) = (self.root, false);
+        let mut root = self.root;
         self.end = walk(volume, &mut root, 0, buffer, &mut |slot| {
             if slot.bytes[0] == DELETED {
                 // Of more than these the rest stays unused until the next walk.
                 let _ = self.deleted.push(slot.index);
             } else if slot.is_file(SETTINGS) {
                 self.settings = Some((slot.first(), slot.bytes()));
-            } else if let Some(row) = self.note(volume, slot, of) {
-                changed |= mend(volume, &row, &verified)?;
+            } else if let Some(row) = self.note(volume, slot) {
+                mend(volume, &row, &verified)?;
             }
             Ok(ControlFlow::Continue(()))
         })?;
-        (self.root, self.verified, self.is_known) = (root, verified, true);
+        (self.root, self.verified, self.sure) = (root, verified, self.oldest.len());
+        Ok(())
+    }
+
+    /// Whether there is something to look on for, where free clusters are taken from this block of the FAT on.
+    pub(crate) fn must_look(&self, free: u32) -> bool {
+        let first = self.unverified(free);
+        self.next > 0
+            || self.has_more && self.sure <= OLDEST_MAX / 2
+            || first * ENTRIES < self.claimed_end && first - free < VERIFY_BLOCKS / 2
+    }
+
+    /// The first block of the FAT from this one on that was not looked through for claims.
+    fn unverified(&self, from: u32) -> u32 {
+        if self.verified.contains(&from) { self.verified.end } else { from }
+    }
+
+    /// Looks through as many blocks of the directory as `buffer` has, and begins anew at its end: for the oldest logs, and for what
+    /// logs claim of the FAT behind what was looked through before, from the block `free` on. Whether claims were chained again.
+    pub(crate) fn look_on<D: CardDevice>(
+        &mut self,
+        volume: &Volume<'_, D>,
+        buffer: &mut [Block],
+        free: u32,
+    ) -> Result<bool, CardError<D::Error>> {
+        if self.next == 0 {
+            let first = self.unverified(free);
+            self.verifying = first..first.saturating_add(VERIFY_BLOCKS).min(volume.layout.fat_blocks);
+            self.has_more = false;
+        }
+        let (from, mut chain, mut changed) = (self.next, self.root, false);
+        let until = from + buffer.len() as u32 * BLOCK_ENTRIES;
+        let verifying = self.verifying.clone();
+        self.next = walk(volume, &mut chain, from, buffer, &mut |slot| {
+            if let Some(entry) = slot.log().filter(|entry| entry.bytes > 0) {
+                self.note_oldest(entry);
+                if let Some(row) = claimed(volume, &entry) {
+                    changed |= mend(volume, &row, &verifying)?;
+                }
+            }
+            Ok(if slot.index + 1 < until { ControlFlow::Continue(()) } else { ControlFlow::Break(()) })
+        })?;
+        if self.next < until {
+            let begin =
+                if verifying.start == self.verified.end { self.verified.start } else { verifying.start };
+            self.verified = begin..verifying.end;
+            (self.sure, self.next) = (self.oldest.len(), 0);
+        }
         Ok(changed)
     }
 
+    /// Takes the oldest log that may be overwritten. `None`: none is known, [`Self::look_on`] may find some if there are any.
+    pub(crate) fn take_oldest(&mut self) -> Option<LogEntry> {
+        self.sure = self.sure.checked_sub(1)?;
+        (!self.oldest.is_empty()).then(|| self.oldest.remove(0))
+    }
+
+    /// Whether there are logs that may be overwritten beside those that are known.
+    pub(crate) const fn has_more(&self) -> bool {
+        self.next > 0 || self.has_more
+    }
+
     /// Notes an entry; the clusters that it claims, if it is a log's.
-    fn note<D: CardDevice>(
-        &mut self,
-        volume: &Volume<'_, D>,
-        slot: &Slot<'_>,
-        of: Option<u32>,
-    ) -> Option<Range<u32>> {
+    fn note<D: CardDevice>(&mut self, volume: &Volume<'_, D>, slot: &Slot<'_>) -> Option<Range<u32>> {
         let entry = slot.log()?;
         self.note_newest(entry);
         if entry.bytes == 0 {
@@ -152,19 +210,30 @@ impl Directory {
         if !entry.hidden {
             self.show(entry.name);
         }
-        let claimed = clusters_of(volume, entry.bytes);
         self.clusters = self.clusters.saturating_add(clusters_of(volume, entry.bytes.min(SEGMENT_BYTES_MAX)));
-        if entry.bytes >= OVERWRITTEN_MIN && of.is_none_or(|session| session == entry.name.session) {
-            let place = self.oldest.partition_point(|older| older.name < entry.name);
-            if self.oldest.is_full() && place < OLDEST_MAX {
-                self.oldest.pop();
-            }
-            // No place for it: it is newer than all of them.
-            let _ = self.oldest.insert(place, entry);
+        self.note_oldest(entry);
+        let claimed = claimed(volume, &entry)?;
+        self.claimed_end = self.claimed_end.max(claimed.end);
+        Some(claimed).filter(|claimed| volume.is_cluster(claimed.start))
+    }
+
+    fn note_oldest(&mut self, entry: LogEntry) {
+        if entry.bytes < OVERWRITTEN_MIN {
+            return;
         }
-        let end = entry.first.checked_add(claimed).filter(|end| volume.is_cluster(end.saturating_sub(1)))?;
-        self.claimed_end = self.claimed_end.max(end);
-        volume.is_cluster(entry.first).then_some(entry.first..end)
+        let place = self.oldest.partition_point(|older| older.name < entry.name);
+        if self.oldest.get(place).is_some_and(|noted| noted.name == entry.name) {
+            return;
+        }
+        if self.oldest.is_full() {
+            self.has_more = true;
+            if place == OLDEST_MAX {
+                return;
+            }
+            self.oldest.pop();
+        }
+        // There is room.
+        let _ = self.oldest.insert(place, entry);
     }
 
     fn note_newest(&mut self, entry: LogEntry) {
@@ -199,14 +268,18 @@ impl Directory {
     pub(crate) fn add(&mut self, entry: LogEntry, clusters: u32) {
         self.note_newest(entry);
         self.show(entry.name);
+        self.has_more |= entry.bytes >= OVERWRITTEN_MIN;
         self.clusters = self.clusters.saturating_add(clusters);
-        self.claimed_end = self.claimed_end.max(entry.first.saturating_add(clusters));
     }
 
     /// The log `old` was overwritten by `new`.
     pub(crate) fn replace(&mut self, old: &LogEntry, new: LogEntry) {
         self.newest.retain(|entry| entry.name != old.name);
-        self.oldest.retain(|entry| entry.name != old.name);
+        if let Some(place) = self.oldest.iter().position(|entry| entry.name == old.name) {
+            self.oldest.remove(place);
+            self.sure -= usize::from(place < self.sure);
+        }
+        self.has_more |= new.bytes >= OVERWRITTEN_MIN;
         if !old.hidden {
             self.hide(old.name);
         }
@@ -352,6 +425,12 @@ pub(crate) fn walk<D: CardDevice>(
 /// Clusters that so many bytes take.
 pub(crate) const fn clusters_of<D>(volume: &Volume<'_, D>, bytes: u32) -> u32 {
     bytes.div_ceil(volume.layout.cluster_blocks * BLOCK_BYTES as u32)
+}
+
+/// The row of clusters that a log claims by its first one and its length.
+fn claimed<D: CardDevice>(volume: &Volume<'_, D>, entry: &LogEntry) -> Option<Range<u32>> {
+    let end = entry.first.checked_add(clusters_of(volume, entry.bytes))?;
+    volume.is_cluster(end.saturating_sub(1)).then_some(entry.first..end)
 }
 
 /// A number for a name, such that a sum of several tells which they are.

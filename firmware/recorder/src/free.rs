@@ -146,6 +146,11 @@ impl FreeSearch {
         Err(CardError::Searching)
     }
 
+    /// Begins anew at the block that is looked at next: what was found before may no longer be free.
+    pub(crate) const fn restart(&mut self) {
+        (self.first, self.found) = (self.next, 0);
+    }
+
     /// The blocks that were found last are to be looked through again.
     pub(crate) const fn again(&mut self, found: &Range<u32>) {
         (self.next, self.first) = (found.start, found.start);

@@ -186,11 +186,11 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
             self.segments.look_before(card);
             self.segments.date(card);
         }
+        // The next write meets the same trouble and deals with it.
+        let _ = card.look_ahead();
         if self.room_known {
             return;
         }
-        // The next write meets the same trouble and deals with it.
-        let _ = card.search_on();
         match card.count_room() {
             Ok(None) => {}
             Ok(room) => {

@@ -21,6 +21,16 @@ fn logs(card: &Card<'_, MemCard>) -> Vec<LogEntry> {
     logs
 }
 
+/// Makes a segment, however long its room is looked for.
+fn create(card: &mut Card<'_, MemCard>, name: LogName, bytes: u32) -> Result<(), CardError<Broken>> {
+    loop {
+        match card.create(name, bytes) {
+            Err(CardError::Searching) => {}
+            created => return created,
+        }
+    }
+}
+
 fn pattern(seed: u32) -> Block {
     std::array::from_fn(|index| (seed as usize * 31 + index) as u8)
 }
@@ -177,13 +187,7 @@ fn a_full_card_says_so_and_keeps_its_free_clusters() {
     let status = CardStatus::new();
     let mut card = mount(&device, &status);
     card.create(FIRST, 30 << 20).expect("there is room");
-    let full = loop {
-        match card.create(SECOND, 30 << 20) {
-            Err(CardError::Searching) => {}
-            created => break created,
-        }
-    };
-    assert_eq!(full, Err(CardError::Full));
+    assert_eq!(create(&mut card, SECOND, 30 << 20), Err(CardError::Full));
     card.create(SECOND, 4 << 20).expect("what is left can still be used");
     assert_eq!(logs(&card).len(), 2);
 }
@@ -511,7 +515,7 @@ fn a_directory_that_is_walked_over_while_a_segment_is_made_loses_no_log() {
     let status = CardStatus::new();
     let mut card = mount(&device, &status);
     for segment in 0..12 {
-        card.create(LogName { session: 30, segment }, 1 << 20).expect("there is room");
+        create(&mut card, LogName { session: 30, segment }, 1 << 20).expect("there is room");
         assert_eq!(logs(&card).len() as u32, 2 + segment);
     }
 }
@@ -525,7 +529,7 @@ fn a_read_that_fails_while_a_segment_is_made_costs_no_log() {
         device.fail_read_after.set(Some(reads));
         let mut made = 0;
         for segment in 0..4 {
-            made += usize::from(card.create(LogName { session: 30, segment }, 3 << 19).is_ok());
+            made += usize::from(create(&mut card, LogName { session: 30, segment }, 3 << 19).is_ok());
         }
         let is_all = device.fail_read_after.take().is_some();
         assert!(made >= 3, "{reads}: {made}");
