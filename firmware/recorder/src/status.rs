@@ -84,6 +84,8 @@ pub struct CardStatus {
     /// The longest command of the service that is going on: when it began, and how long it took.
     longest_since_ms: AtomicU32,
     longest_ms: AtomicU32,
+    /// The volume's serial number.
+    volume: AtomicU32,
     /// Thousandths of the card that logs can have.
     room: AtomicU32,
     used_mib: AtomicU32,
@@ -135,6 +137,8 @@ pub struct CardReading {
     pub sectors_lost: u32,
     /// The longest time that the card took for one command, in milliseconds.
     pub stall_ms_max: u32,
+    /// The serial number of the volume that was opened last.
+    pub volume: u32,
     /// The share of the card that logs can have, in thousandths: free clusters and those of logs. `None` until the
     /// file allocation table was counted, which takes a while on a large card.
     pub room_permille: Option<u32>,
@@ -165,6 +169,7 @@ impl CardStatus {
             busy_since_ms: AtomicU32::new(IDLE),
             longest_since_ms: AtomicU32::new(0),
             longest_ms: AtomicU32::new(0),
+            volume: AtomicU32::new(0),
             room: AtomicU32::new(UNCOUNTED),
             used_mib: AtomicU32::new(0),
             total_mib: AtomicU32::new(0),
@@ -194,6 +199,7 @@ impl CardStatus {
             frames_lost: self.frames_lost.load(Ordering::Relaxed),
             sectors_lost: self.sectors_lost.load(Ordering::Relaxed),
             stall_ms_max: self.stall_ms_max.load(Ordering::Relaxed),
+            volume: self.volume.load(Ordering::Relaxed),
             room_permille: Some(self.room.load(Ordering::Relaxed)).filter(|room| *room != UNCOUNTED),
             storage_mib: Some((
                 self.used_mib.load(Ordering::Relaxed),
@@ -206,6 +212,11 @@ impl CardStatus {
     /// Storage has found this out.
     pub fn set_state(&self, state: CardState) {
         self.state.store(state as u8, Ordering::Relaxed);
+    }
+
+    /// A volume with this serial number was opened.
+    pub fn set_volume(&self, volume: u32) {
+        self.volume.store(volume, Ordering::Relaxed);
     }
 
     pub(crate) fn begin_segment(&self, session: u32, overwrote: bool) {

@@ -2,7 +2,7 @@
 //!
 //! Nothing of it is set in flight. The file waits for a heartbeat that says disarmed; after a reset that may have come in
 //! flight ([`ResetCause::may_be_in_flight`](crate::ResetCause::may_be_in_flight)) and once the vehicle is armed it is not
-//! read, or not further, until another card is put in. If heartbeats stop, reading begins anew with the next one. Which
+//! read, or not further, until another card is put in: one with another volume's serial number. If heartbeats stop, reading begins anew with the next one. Which
 //! parameters may be set in flight is one rule for the file and for ground stations ([`Logbook::set_parameter`]).
 //!
 //! Each line is set, recorded and stored as if a ground station had set it, at every power-on as long as the file is there.
@@ -26,14 +26,12 @@ const LINE_MAX: usize = 64;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum State {
-    /// There is no card.
-    NoCard,
-    /// There is a card, and no heartbeat yet.
+    /// There is no card, or no heartbeat yet.
     Waiting,
     /// The bytes from here on are asked for.
     Reading(u32),
-    /// It was read, there is none, or the vehicle was armed.
-    Done,
+    /// Of this volume, all was read that may be.
+    Done(u32),
 }
 
 /// How far it is read.
@@ -51,7 +49,7 @@ pub(crate) struct Settings {
 impl Settings {
     pub(crate) const fn new() -> Self {
         Self {
-            state: State::NoCard,
+            state: State::Waiting,
             ticket: None,
             line: heapless::Vec::new(),
             is_cut: false,
@@ -84,18 +82,24 @@ impl Settings {
         sectors: &mut SectorsIn,
         shelf: &mut Reader<'_>,
     ) {
-        let has_card = book.card.read().state == CardState::Recording;
+        let reading = book.card.read();
+        let has_card = reading.state == CardState::Recording;
+        let done = State::Done(reading.volume);
         match (self.state, book.arming(now)) {
-            _ if !has_card => self.state = State::NoCard,
-            (State::NoCard, _) => self.state = State::Waiting,
-            (State::Done, _) => {}
-            (_, Arming::Armed) => self.state = State::Done,
-            _ if book.cause.may_be_in_flight() => self.state = State::Done,
+            (State::Done(_), _) if !has_card || self.state == done => {}
+            _ if !has_card => self.state = State::Waiting,
+            (_, Arming::Armed) => self.state = done,
+            _ if book.cause.may_be_in_flight() => self.state = done,
             (_, Arming::Unknown) => self.state = State::Waiting,
-            (State::Waiting, Arming::Disarmed) => *self = Self { state: State::Reading(0), ..Self::new() },
+            (State::Waiting | State::Done(_), Arming::Disarmed) => {
+                *self = Self { state: State::Reading(0), ..Self::new() };
+            }
             (State::Reading(offset), Arming::Disarmed) => {
-                self.read_on(now, offset, library, book, sectors, shelf);
-                if self.state == State::Done && self.refused > 0 {
+                if !self.read_on(now, offset, library, book, sectors, shelf) {
+                    return;
+                }
+                self.state = done;
+                if self.refused > 0 {
                     let text = "HUMS: PARAMS.TXT: lines refused, correct them";
                     notices.note(now, 4, text, &mut book.journal, sectors);
                 }
@@ -103,6 +107,7 @@ impl Settings {
         }
     }
 
+    /// Takes the piece from this offset on, if it has come; whether it was the last one.
     fn read_on(
         &mut self,
         now: Instant,
@@ -111,13 +116,13 @@ impl Settings {
         book: &mut Logbook<'_>,
         sectors: &mut SectorsIn,
         shelf: &mut Reader<'_>,
-    ) {
+    ) -> bool {
         let Some(ticket) = self.ticket else {
             let ticket = library.next_ticket();
             if shelf.want(Want { ticket, which: Which::Settings, what: What::Data(offset) }) {
                 self.ticket = Some(ticket);
             }
-            return;
+            return false;
         };
         let mut piece = heapless::Vec::<u8, DATA_MAX>::new();
         let mut length = None;
@@ -129,7 +134,7 @@ impl Settings {
             }
             true
         });
-        let Some(length) = length else { return };
+        let Some(length) = length else { return false };
         self.ticket = None;
         for byte in &piece {
             if self.take(*byte) {
@@ -139,11 +144,11 @@ impl Settings {
         let next = offset + piece.len() as u32;
         if !piece.is_empty() && next < length.min(BYTES_MAX) {
             self.state = State::Reading(next);
-            return;
+            return false;
         }
         self.is_cut |= next != length;
         self.line(now, book, sectors);
-        self.state = State::Done;
+        true
     }
 
     /// Sets what a line says.

@@ -71,6 +71,7 @@ impl<'a> Segments<'a> {
         card: &mut Card<'_, D>,
     ) -> Result<bool, CardError<D::Error>> {
         let volume_id = card.layout().volume_id;
+        self.status.set_volume(volume_id);
         let (newest, next) = card.next_session();
         // Entries of further segments may be there although the card did not say so.
         let is_of =

@@ -54,11 +54,11 @@ impl<'a, D: CardDevice> Socket<'a, D> {
         };
     }
 
-    /// Begins to format the card that is in; `false` where there is no device to do it with.
+    /// Begins to format the card that was looked at last; `false` where there is none. The device is not told to start over, and so
+    /// refuses another card that was put in since.
     pub(super) fn begin_format(&mut self, volume_id: u32) -> bool {
         self.release();
         let Self::Waiting(device) = core::mem::replace(self, Self::Moving) else { return false };
-        device.reset();
         *self = Self::Formatting(device, Formatting::new(volume_id));
         true
     }

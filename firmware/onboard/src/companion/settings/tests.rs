@@ -24,9 +24,10 @@ enum Comes {
     Baud(f32),
     /// A card is put in; it answers after 0.1 s.
     Card,
+    OtherCard,
     NoCard,
 }
-use Comes::{Baud, Card, Heartbeat, NoCard};
+use Comes::{Baud, Card, Heartbeat, NoCard, OtherCard};
 
 const ARMED: Comes = Heartbeat { armed: true };
 const DISARMED: Comes = Heartbeat { armed: false };
@@ -75,7 +76,10 @@ fn run_with(text: &str, cause: ResetCause, ticks_an_answer: u64, comes: &[(u64, 
                     let frame = Frame::parse(station.frame(&mut out, &packet.u8(22, 9))).expect("a frame");
                     ends.uplink_in.put(now.as_micros(), &frame);
                 }
-                Card => card.set_state(CardState::Recording),
+                Card | OtherCard => {
+                    card.set_volume(if matches!(come, Card) { 0x1234 } else { 0x5678 });
+                    card.set_state(CardState::Recording);
+                }
                 NoCard => card.set_state(CardState::Absent),
             }
         }
@@ -128,11 +132,24 @@ fn a_box_that_restarts_in_the_air_reads_no_parameters() {
 fn a_box_that_was_armed_before_reads_no_parameters_until_another_card_is_put_in() {
     let flown = [(0, Card), (1, ARMED), (2, ARMED), (3, DISARMED), (4, DISARMED)];
     assert_eq!(run(ResetCause::PowerOn, &flown), NOTHING);
-    let exchanged = [&flown[..], &[(5, NoCard), (7, DISARMED), (7, Card), (8, DISARMED)]].concat();
+    let exchanged = [&flown[..], &[(5, NoCard), (7, DISARMED), (7, OtherCard), (8, DISARMED)]].concat();
     assert_eq!(run(ResetCause::PowerOn, &exchanged), ALL);
+    // The same card, lost for a moment.
+    let back = [&flown[..], &[(5, NoCard), (7, DISARMED), (7, Card), (8, DISARMED)]].concat();
+    assert_eq!(run(ResetCause::PowerOn, &back), NOTHING);
     // A card that is lost for a moment in flight, and after it.
     let lost = [&flown[..2], &[(2, NoCard), (3, Card), (4, ARMED)]].concat();
     assert_eq!(run(ResetCause::PowerOn, &lost), NOTHING);
+}
+
+#[test]
+fn a_setting_by_hand_stays_when_the_card_comes_back() {
+    let baud = Baud(115_200.0);
+    let begin = [(0, Card), (1, DISARMED), (2, DISARMED), (3, baud), (4, NoCard)];
+    for (card, expected) in [(Card, 115_200.0_f32), (OtherCard, 57_600.0)] {
+        let comes = [&begin[..], &[(6, card), (7, DISARMED), (8, DISARMED)]].concat();
+        assert_eq!(run(ResetCause::PowerOn, &comes).1.to_bits(), expected.to_bits(), "{card:?}");
+    }
 }
 
 #[test]
