@@ -206,6 +206,19 @@ impl<'f, F: NorFlash> Sector<'f, F> {
         })
     }
 
+    /// Whether an item has this value.
+    pub(crate) fn holds(&mut self, item: &Item, value: &[u8]) -> Result<bool, F::Error> {
+        if item.length != value.len() {
+            return Ok(false);
+        }
+        for (at, bytes) in (item.value_at()..).step_by(WORD).zip(value.chunks(WORD)) {
+            if !self.word(at)?.to_le_bytes().starts_with(bytes) {
+                return Ok(false);
+            }
+        }
+        Ok(true)
+    }
+
     /// The next whole item from here on.
     pub(crate) fn next(&mut self, mut at: usize) -> Result<Option<Item>, F::Error> {
         while at + ITEM_BYTES <= self.end {

@@ -59,15 +59,13 @@ pub struct Store<F: NorFlash> {
     generation: u16,
     end: usize,
     may_erase: bool,
-    value: [u8; VALUE_BYTES_MAX],
 }
 
 impl<F: NorFlash> Store<F> {
     /// Starts with what is in the flash; ends whatever power cut short, for which erases are allowed here. Afterwards they are not,
     /// until [`Self::allow_erase`].
     pub fn mount(flash: F) -> Outcome<(Self, Found), F> {
-        let mut store =
-            Self { flash, in_use: 0, generation: 0, end: 0, may_erase: true, value: [0; VALUE_BYTES_MAX] };
+        let mut store = Self { flash, in_use: 0, generation: 0, end: 0, may_erase: true };
         let found = store.choose()?;
         let count = store.mounts()?.saturating_add(1);
         match store.save(Key::MOUNTS, &count.to_le_bytes()) {
@@ -137,12 +135,11 @@ impl<F: NorFlash> Store<F> {
     /// Hands every stored item to `found`, the values of one key in the order in which they were stored: the last one
     /// counts.
     pub fn for_each(&mut self, mut found: impl FnMut(Key, &[u8])) -> Outcome<(), F> {
-        let mut at = HEADER_BYTES;
+        let (mut at, mut value) = (HEADER_BYTES, [0; VALUE_BYTES_MAX]);
         while let Some(item) = self.current().next(at)? {
             at = item.end();
-            let Self { flash, in_use, end, value, .. } = self;
             if let Some(value) = value.get_mut(..item.length).filter(|_| !item.key.is_own()) {
-                Sector::new(flash, *in_use, *end).read(item.value_at(), value)?;
+                self.current().read(item.value_at(), value)?;
                 found(item.key, value);
             }
         }
@@ -175,14 +172,9 @@ impl<F: NorFlash> Store<F> {
             return Err(Error::TooLong);
         }
         if let Some(item) = self.find(key)?
-            && item.length == value.len()
+            && self.current().holds(&item, value)?
         {
-            let Self { flash, in_use, end, value: stored, .. } = self;
-            let stored = stored.get_mut(..item.length).unwrap_or_default();
-            Sector::new(flash, *in_use, *end).read(item.value_at(), stored)?;
-            if stored == value {
-                return Ok(Saved::Unchanged);
-            }
+            return Ok(Saved::Unchanged);
         }
         let bytes = ITEM_BYTES + value.len().next_multiple_of(WORD);
         if bytes > F::ERASE_SIZE - self.end {

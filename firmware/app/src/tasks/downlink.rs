@@ -5,7 +5,7 @@ use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
 use embassy_time::{Duration, with_timeout};
 use hums_onboard::Task;
-use hums_onboard::queues::{AutopilotOut, FRAME_BYTES_MAX, GsOut};
+use hums_onboard::queues::{AutopilotOut, GsOut};
 
 use crate::boards::board;
 use crate::links::{self, now};
@@ -27,13 +27,10 @@ pub(crate) static AUTOPILOT_STOOD_STILL: AtomicBool = AtomicBool::new(false);
 
 #[embassy_executor::task]
 pub(crate) async fn run(mut port: board::PortTx, mut queue: GsOut<'static>) -> ! {
-    let mut frame = [0; FRAME_BYTES_MAX];
     loop {
         SUPERVISOR.report(Task::Downlink, now());
         set_baud(&mut port, &BAUD_GS).await;
-        if let Some(length) = queue.take(&mut frame) {
-            send(&mut port, frame.get(..length).unwrap_or_default(), &GS_STOOD_STILL).await;
-        } else {
+        if !queue.lend(async |frame| send(&mut port, frame, &GS_STOOD_STILL).await).await {
             // Either way it looks into the queue.
             let _ = with_timeout(REPORT, links::GS.wait()).await;
         }
@@ -43,12 +40,9 @@ pub(crate) async fn run(mut port: board::PortTx, mut queue: GsOut<'static>) -> !
 /// To the autopilot.
 #[embassy_executor::task]
 pub(crate) async fn requests(mut port: board::PortTx, mut queue: AutopilotOut<'static>) -> ! {
-    let mut frame = [0; FRAME_BYTES_MAX];
     loop {
         set_baud(&mut port, &BAUD_AUTOPILOT).await;
-        if let Some(length) = queue.take(&mut frame) {
-            send(&mut port, frame.get(..length).unwrap_or_default(), &AUTOPILOT_STOOD_STILL).await;
-        } else {
+        if !queue.lend(async |frame| send(&mut port, frame, &AUTOPILOT_STOOD_STILL).await).await {
             links::AUTOPILOT.wait().await;
         }
     }

@@ -134,4 +134,13 @@ impl<const BYTES: usize> PortOut<'_, BYTES> {
         grant.release();
         Some(len)
     }
+
+    /// Lends the oldest frame to `send`, from where it lies, and takes it out of the queue; `false` when there is none.
+    pub async fn lend(&mut self, send: impl AsyncFnOnce(&[u8])) -> bool {
+        let Ok(grant) = self.0.read() else { return false };
+        send(&grant).await;
+        self.1.fall(grant.len());
+        grant.release();
+        true
+    }
 }

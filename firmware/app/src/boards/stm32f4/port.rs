@@ -151,7 +151,7 @@ impl PortTx {
             w.set_tc(false);
         });
         let to = self.registers.dr().as_ptr().cast::<u8>();
-        // SAFETY: `to` is the port's data register. The transfer borrows `bytes`, which lie in a task's memory, in RAM
+        // SAFETY: `to` is the port's data register. The transfer borrows `bytes`, which lie in a queue, in RAM
         // that DMA reaches, and stops when it is dropped.
         unsafe { self.channel.write(self.request, bytes, to, TransferOptions::default()) }.await;
     }
