@@ -77,6 +77,9 @@ pub trait CardDevice {
     /// Forgets what is known of the card, so that the next access identifies it anew, and whichever it is.
     fn reset(&self) {}
 
+    /// Identifies the card anew at the next access, which fails if it is another one by then.
+    fn recheck(&self) {}
+
     /// A service begins: all waits until the next call are together to have an end.
     fn begin_service(&self) {}
 

@@ -286,8 +286,7 @@ fn a_fat_full_of_nonsense_is_an_error_and_never_a_panic() {
             let mut block = [0; BLOCK_BYTES];
             let Ok(mut segment) = card.segment(FIRST) else { continue };
             for index in 0..segment.blocks().min(5_000) {
-                if card.read(&mut segment, index, &mut block).is_err()
-                    || card.write(index, &[block.clone()]).is_err()
+                if card.read(&mut segment, index, &mut block).is_err() || card.write(index, &[block]).is_err()
                 {
                     break;
                 }

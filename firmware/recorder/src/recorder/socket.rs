@@ -54,11 +54,11 @@ impl<'a, D: CardDevice> Socket<'a, D> {
         };
     }
 
-    /// Begins to format the card that was looked at last; `false` where there is none. The device is not told to start over, and so
-    /// refuses another card that was put in since.
+    /// Begins to format the card that was looked at last, and no other one; `false` where there is none.
     pub(super) fn begin_format(&mut self, volume_id: u32) -> bool {
         self.release();
         let Self::Waiting(device) = core::mem::replace(self, Self::Moving) else { return false };
+        device.recheck();
         *self = Self::Formatting(device, Formatting::new(volume_id));
         true
     }

@@ -187,6 +187,10 @@ impl<P: Port> CardDevice for SpiCard<P> {
         (inner.card, inner.cid) = (None, None);
     }
 
+    fn recheck(&self) {
+        self.inner.borrow_mut().card = None;
+    }
+
     fn begin_service(&self) {
         let mut inner = self.inner.borrow_mut();
         inner.line.deadline = Some(inner.line.port.now() + SERVICE_MAX);

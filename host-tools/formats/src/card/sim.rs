@@ -229,7 +229,9 @@ impl CardDevice for SimCard {
         self.begin(COMMAND_US + BLOCK_US * blocks.len() as u64)?;
         self.check_range(start, blocks.len())?;
         let mut image = self.image.borrow_mut();
-        image.seek(SeekFrom::Start(u64::from(start) * BLOCK_BYTES as u64)).map_err(|error| self.keep(error))?;
+        image
+            .seek(SeekFrom::Start(u64::from(start) * BLOCK_BYTES as u64))
+            .map_err(|error| self.keep(error))?;
         for block in blocks {
             image.read_exact(block).map_err(|error| self.keep(error))?;
         }

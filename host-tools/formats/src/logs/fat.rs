@@ -2,7 +2,7 @@
 //! is bounded. Damage is reported, and all sound parts are still read.
 //!
 //! Reading a whole card needs places (extents), not bytes, and a name for the damage. That is why this does
-//! not use `embedded-sdmmc`, whose reader stops at the first error. Source of the layout: Microsoft FAT
+//! not use the recorder, whose reader stops at the first error. Source of the layout: Microsoft FAT
 //! specification 1.03 (`fatgen103`).
 //!
 //! Memory: a bit for each cluster (32 MiB for the largest volume of FAT32), 64 KiB of the FAT, and at most
