@@ -1,12 +1,12 @@
-//! What an item is, and how a parameter is one.
+//! Keys of items, and the stored form of parameters.
 
-/// The longest name of a parameter: what `PARAM_VALUE` carries.
+/// Longest name of a parameter, as in `PARAM_VALUE`.
 pub const NAME_BYTES_MAX: usize = 16;
 
 /// The longest value that [`param_value`] makes.
 pub const PARAM_BYTES_MAX: usize = 1 + NAME_BYTES_MAX + 4;
 
-/// Which item. Numbers are stored and never change meaning.
+/// Key of an item. Numbers are stored and never change meaning.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Key(u32);
 
@@ -16,17 +16,17 @@ impl Key {
     /// Set in the store's own keys.
     const OWN: u32 = 1 << 30;
 
-    /// How often the store was mounted, as four bytes.
+    /// Mount count, four bytes.
     pub(crate) const MOUNTS: Self = Self(Self::OWN);
 
-    /// The item of this number, which its owner gave it for ever.
+    /// Key of an item by its number, which its owner never changes.
     pub const fn item(number: u8) -> Self {
         Self(number as u32)
     }
 
-    /// The parameter of this name: by its name and not by its place, so that a table that is ordered anew finds it.
+    /// Key of a parameter by its name, so that a reordered table still finds it.
     pub const fn param(name: &str) -> Self {
-        // FNV-1a (draft-eastlake-fnv, 32 bits); which name it really is stands in the value.
+        // FNV-1a (draft-eastlake-fnv, 32 bits). The value holds the name itself.
         let mut hash: u32 = 0x811C_9DC5;
         let mut at = 0;
         while at < name.len() {
@@ -51,19 +51,18 @@ impl Key {
         self.0
     }
 
-    /// The key of a stored form, whatever it is.
+    /// The key of any stored form.
     pub const fn from_stored(key: u32) -> Self {
         Self(key)
     }
 
-    /// Whether the store keeps it for itself.
+    /// Whether the key is reserved for the store.
     pub(crate) const fn is_own(self) -> bool {
         self.0 & (Self::PARAM | Self::OWN) == Self::OWN
     }
 }
 
-/// A parameter as a stored value; `None` where the name is longer than [`NAME_BYTES_MAX`]. Gives the bytes and how many
-/// of them count.
+/// A parameter as a stored value: the bytes and their count. `None` if the name is longer than [`NAME_BYTES_MAX`].
 pub fn param_value(name: &str, value: f32) -> Option<([u8; PARAM_BYTES_MAX], usize)> {
     let mut bytes = [0; PARAM_BYTES_MAX];
     let (length, rest) = bytes.split_first_mut()?;
@@ -73,7 +72,7 @@ pub fn param_value(name: &str, value: f32) -> Option<([u8; PARAM_BYTES_MAX], usi
     Some((bytes, 1 + name.len() + 4))
 }
 
-/// A stored parameter's name and value; `None` where it is none.
+/// Name and value of a stored parameter; `None` if the bytes are not a parameter.
 pub fn param(stored: &[u8]) -> Option<(&str, f32)> {
     let (length, rest) = stored.split_first()?;
     let (name, value) = rest.split_at_checked(usize::from(*length))?;

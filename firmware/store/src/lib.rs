@@ -1,22 +1,21 @@
-//! Small items in two sectors of NOR flash, each of which reads as its old or as its new value whatever word power went
-//! at: lifetime counters, baselines, components and changed parameters.
+//! Store of small items in two sectors of NOR flash: lifetime counters, baselines, components and changed parameters. After a
+//! power cut at any word, each item reads as its old or its new value.
 //!
-//! A sector is a log of checked items (`sector` has its layout); of a key the newest whole item counts. When the sector in use is
-//! full the store turns: it erases the other sector, copies all that counts into it, and marks it as complete. Until that mark is
-//! there the old sector is the one in use, and an erase that power cut short is never of a sector in use. Of two complete sectors the
-//! newer one counts. The older one then has a mark that it is superseded: so damage of the newer one's header is noticed, and its
-//! items still count.
+//! A sector is a log of items with checksums (layout: `sector`). For each key the newest complete item counts. When the active
+//! sector is full, the store erases the other one, copies all live items into it and marks it complete. Until that mark is
+//! written the old sector stays active, so an erase never touches the active sector. Of two complete sectors the newer one
+//! counts. The older one is marked as superseded. This mark reveals damage of the newer header, and the newer items still count.
 //!
-//! An item that is damaged later is passed over: the value before it counts, as long as that is there. Each start looks for such
-//! places ([`Found::Damaged`]), and turns to the other sector without them.
+//! A damaged item is skipped: the previous value of its key counts, if there is one. Each start reports damage
+//! ([`Found::Damaged`]) and copies the live items to the other sector.
 //!
-//! An erase also stops the processor for up to half a second where the program runs from the same flash. So it is
-//! refused unless [`Store::allow_erase`] said otherwise, and a save that would need one leaves the flash as it is:
-//! [`Error::NotNow`]. [`Store::turn_ahead`] does it at a moment of the caller's choice.
+//! An erase stops a processor that runs from the same flash, for up to 0.5 s. It needs permission by [`Store::allow_erase`].
+//! Without it, a save that needs an erase returns [`Error::NotNow`] and changes nothing. [`Store::turn_ahead`] erases early, at a
+//! moment of the caller's choice.
 //!
 //! # Costs
-//! An item takes 12 bytes and its value, rounded up to a word; a value that is stored already costs nothing. All calls
-//! return when the flash is done; nothing waits for anything else. A value of n bytes takes n / 4 + 3 word writes.
+//! An item takes 12 bytes and its value, rounded up to a word. A value of n bytes takes n / 4 + 3 word writes. Saving an
+//! unchanged value costs nothing. Calls block until the flash is done.
 #![cfg_attr(not(any(test, feature = "sim")), no_std)]
 
 mod key;

@@ -1,4 +1,4 @@
-//! The promise: whatever word power goes at, each item reads as its old or as its new value, and the store goes on.
+//! Power cuts at any word: each item reads as its old or its new value, and the store continues.
 
 use std::collections::BTreeMap;
 
@@ -35,7 +35,7 @@ fn items<F: NorFlash<Error: Copy>>(store: &mut Store<F>) -> Items {
     items
 }
 
-/// Cuts power `cuts` times at random, and looks after each; gives how many sectors were erased meanwhile.
+/// Cuts power `cuts` times at random and checks the store after each. Returns the number of erased sectors.
 fn cut_and_look<const SECTOR: usize>(cuts: u64, seed: u64, length_max: u64, steps_max: u64) -> u64 {
     let mut random = Random(seed);
     let mut flash = SimFlash::<SECTOR>::blank();
@@ -45,7 +45,7 @@ fn cut_and_look<const SECTOR: usize>(cuts: u64, seed: u64, length_max: u64, step
         let before = flash.erases();
         flash.cut_after(1 + random.below(steps_max), cut);
         let mut writing = None;
-        // The cut may meet the start itself.
+        // The cut may happen during the mount.
         if let Ok((mut store, found)) = Store::mount(&mut flash) {
             assert!(cut == 0 || found == Found::Kept, "{found:?} before cut {cut}");
             loop {
@@ -87,7 +87,7 @@ fn cut_and_look<const SECTOR: usize>(cuts: u64, seed: u64, length_max: u64, step
 
 #[test]
 fn after_ten_thousand_cuts_each_item_was_old_or_new_every_time() {
-    // Small sectors are full soon, so that many of the cuts meet the way into the other sector.
+    // Small sectors fill quickly, so many cuts happen during the copy into the other sector.
     let erases = cut_and_look::<2048>(9_000, 1, 200, 400);
     assert!(erases > 1_000, "{erases} erases for the cuts to meet");
     // As on the board.

@@ -3,8 +3,8 @@
 //! | word | header |
 //! |---|---|
 //! | 0 | [`MAGIC`] |
-//! | 1 | the sector's generation, [`coded`]: counts up with each turn to the other sector |
-//! | 2 | [`COMPLETE`]: all that is live was copied into it |
+//! | 1 | the sector's generation, [`coded`]: counts up with each change of the active sector |
+//! | 2 | [`COMPLETE`]: all live items were copied into it |
 //! | 3 | the generation of the sector that supersedes it, [`coded`] |
 //!
 //! | word | item |
@@ -14,9 +14,9 @@
 //! | 2.. | the value, zeros up to a word |
 //! | last | CRC-32C of length, key and value |
 //!
-//! Words are written in this order, so that a cut in the middle of an item leaves either a first word that is no length, or a last
-//! one that is not written whole. Bits only go from 1 to 0, so that a last word that is written in part has all ones of the right
-//! one ([`Check::Cut`]). All else that is no item is damage.
+//! Words are written in this order. A power cut in the middle of an item leaves an invalid length or a partly written last word.
+//! Bits only go from 1 to 0, so a partly written last word has all ones of the correct one ([`Check::Cut`]). Any other invalid
+//! item is damage.
 
 use embedded_storage::nor_flash::NorFlash;
 
@@ -26,11 +26,11 @@ use crate::key::Key;
 pub(crate) const WORD: usize = 4;
 /// Bytes of a header.
 pub(crate) const HEADER_BYTES: usize = 4 * WORD;
-/// Bytes of an item beside its value: length, key and check.
+/// Bytes of an item without its value: length, key and checksum.
 pub(crate) const ITEM_BYTES: usize = 3 * WORD;
-/// What erased flash reads as.
+/// Word of erased flash.
 pub(crate) const ERASED: u32 = u32::MAX;
-/// "HST2": a layout that differs needs another number.
+/// "HST2". Change it with the layout.
 pub(crate) const MAGIC: u32 = u32::from_be_bytes(*b"HST2");
 /// "done"
 const COMPLETE: u32 = u32::from_be_bytes(*b"done");
@@ -40,8 +40,8 @@ const GENERATION_AT: usize = WORD;
 const COMPLETE_AT: usize = 2 * WORD;
 const SUPERSEDED_AT: usize = 3 * WORD;
 
-/// A number such that no part of it, and no word that was written only in part, is taken for a number: each bit stands
-/// beside its opposite, and what power cut short lacks a zero somewhere.
+/// A number with its complement in the other half. A partly written word lacks a zero in one half, so it is never taken for a
+/// number.
 const fn coded(number: u16) -> u32 {
     number as u32 | ((!number as u32) << 16)
 }
@@ -51,28 +51,28 @@ const fn decoded(word: u32) -> Option<u16> {
     if coded(number) == word { Some(number) } else { None }
 }
 
-/// A sector's header, as it is read.
+/// A sector's header.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Header {
-    /// Its generation, also where the rest of the header is damaged.
+    /// Generation; readable even if the rest of the header is damaged.
     pub(crate) generation: Option<u16>,
-    /// It holds all that was live when it was begun.
+    /// All live items were copied into the sector.
     pub(crate) is_complete: bool,
-    /// Which generation supersedes it.
+    /// Generation of the superseding sector.
     pub(crate) superseded_by: Option<u16>,
 }
 
-/// An item's place.
+/// Location of an item.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Item {
     pub(crate) at: usize,
     pub(crate) key: Key,
-    /// The value's length.
+    /// Length of the value, bytes.
     pub(crate) length: usize,
 }
 
 impl Item {
-    /// Where the value begins.
+    /// Offset of the value.
     pub(crate) const fn value_at(&self) -> usize {
         self.at + 2 * WORD
     }
@@ -82,29 +82,29 @@ impl Item {
         ITEM_BYTES + self.length.next_multiple_of(WORD)
     }
 
-    /// Where the next item begins.
+    /// Offset of the next item.
     pub(crate) const fn end(&self) -> usize {
         self.at + self.bytes()
     }
 }
 
-/// What an item's last word says.
+/// Result of an item's checksum test.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Check {
     Whole,
-    /// Power went before it was whole.
+    /// Cut short by a loss of power.
     Cut,
     Damaged,
 }
 
-/// What a walk over a sector found.
+/// Result of a scan of a sector.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Content {
-    /// Items that are whole.
+    /// Complete items.
     pub(crate) items: usize,
-    /// Something there is neither an item nor what power cut short.
+    /// The sector holds bytes that are neither an item nor the trace of a power cut.
     pub(crate) is_damaged: bool,
-    /// Behind all that was written.
+    /// Offset after the last written word.
     pub(crate) end: usize,
 }
 
@@ -112,7 +112,7 @@ pub(crate) struct Content {
 pub(crate) struct Sector<'f, F> {
     flash: &'f mut F,
     start: usize,
-    /// Items go no further.
+    /// Upper limit of the items.
     end: usize,
 }
 
@@ -147,19 +147,19 @@ impl<'f, F: NorFlash> Sector<'f, F> {
         Ok(Header { generation, is_complete, superseded_by: decoded(self.word(SUPERSEDED_AT)?) })
     }
 
-    /// Erases it, and begins it anew.
+    /// Erases the sector and writes a new header.
     pub(crate) fn begin(&mut self, generation: u16) -> Result<(), F::Error> {
         self.flash.erase(self.start as u32, (self.start + F::ERASE_SIZE) as u32)?;
         self.write_word(GENERATION_AT, coded(generation))?;
         self.write_word(0, MAGIC)
     }
 
-    /// All that is live is in it.
+    /// Marks the sector as complete.
     pub(crate) fn complete(&mut self) -> Result<(), F::Error> {
         self.write_word(COMPLETE_AT, COMPLETE)
     }
 
-    /// Another sector supersedes it. The mark is of use only where that one's header is damaged later, so it may fail.
+    /// Marks the sector as superseded. The mark matters only if the newer header is damaged later, so this write may fail.
     pub(crate) fn supersede(&mut self, generation: u16) -> Result<(), F::Error> {
         if self.word(SUPERSEDED_AT)? == ERASED {
             self.write_word(SUPERSEDED_AT, coded(generation))?;
@@ -167,7 +167,7 @@ impl<'f, F: NorFlash> Sector<'f, F> {
         Ok(())
     }
 
-    /// Writes an item of this value there; it fits.
+    /// Writes an item at this offset. The caller checks that it fits.
     pub(crate) fn append(&mut self, at: usize, key: Key, value: &[u8]) -> Result<(), F::Error> {
         let mut crc = Crc::new();
         for (place, word) in [coded(value.len() as u16), key.stored()].into_iter().enumerate() {
@@ -182,7 +182,7 @@ impl<'f, F: NorFlash> Sector<'f, F> {
         self.write_word(at + 2 * WORD + value.len().next_multiple_of(WORD), crc.check())
     }
 
-    /// An item that may begin here, whole or not.
+    /// The item at this offset, complete or not.
     fn item(&mut self, at: usize) -> Result<Option<Item>, F::Error> {
         if at + ITEM_BYTES > self.end {
             return Ok(None);
@@ -219,7 +219,7 @@ impl<'f, F: NorFlash> Sector<'f, F> {
         Ok(true)
     }
 
-    /// The next whole item from here on.
+    /// The next complete item from this offset.
     pub(crate) fn next(&mut self, mut at: usize) -> Result<Option<Item>, F::Error> {
         while at + ITEM_BYTES <= self.end {
             match self.item(at)? {
@@ -230,7 +230,7 @@ impl<'f, F: NorFlash> Sector<'f, F> {
         Ok(None)
     }
 
-    /// Whether no whole item behind this one has its key.
+    /// Whether this is the last complete item of its key.
     pub(crate) fn is_newest(&mut self, item: &Item) -> Result<bool, F::Error> {
         let mut at = item.end();
         while let Some(later) = self.next(at)? {
@@ -242,11 +242,11 @@ impl<'f, F: NorFlash> Sector<'f, F> {
         Ok(true)
     }
 
-    /// Looks through all of it.
+    /// Scans the whole sector.
     ///
-    /// A place that power cut short is no damage: nothing is behind it, or the next start, which counts itself.
+    /// An item cut short by a power loss is not damage. Only free space or the mount count of the next start follows it.
     pub(crate) fn content(&mut self) -> Result<Content, F::Error> {
-        // Two starts in a row whose power went at the first word of their first item.
+        // Two starts in a row lost power at the first word of their first item.
         const CUT_WORDS: usize = 2;
         let mut content = Content { end: HEADER_BYTES, ..Content::default() };
         let (mut cut, mut words) = (false, 0);
@@ -282,7 +282,7 @@ impl<'f, F: NorFlash> Sector<'f, F> {
     }
 }
 
-/// CRC-32C of each number of four bits.
+/// CRC-32C of each 4-bit number.
 const NIBBLES: [u32; 16] = {
     let mut table = [0; 16];
     let mut at = 0;
@@ -310,7 +310,7 @@ impl Crc {
         self.0 = (0..8).fold(self.0 ^ word, |crc, _| crc >> 4 ^ NIBBLES[(crc & 15) as usize]);
     }
 
-    /// Never erased flash: an item whose check is not written is not whole.
+    /// Never the erased word: an item without a written checksum is incomplete.
     const fn check(&self) -> u32 {
         if !self.0 == ERASED { 0 } else { !self.0 }
     }

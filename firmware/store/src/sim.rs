@@ -1,12 +1,11 @@
-//! NOR flash in memory, as it really is: a write only turns ones into zeros, an erase takes a whole sector, and power may
-//! go in the middle of either.
+//! Simulated NOR flash: a write only turns ones into zeros, an erase clears a whole sector, and a power cut may interrupt both.
 
 use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashErrorKind, ReadNorFlash};
 
 use crate::sector::{HEADER_BYTES, MAGIC};
 
-/// Whether bytes can be those of two sectors of `SECTOR` bytes with a store in them: one sector has its magic, or one has
-/// nothing behind its header, as power may leave a store that it takes before there is any magic.
+/// Whether bytes look like two sectors of `SECTOR` bytes with a store. Either a sector has the magic, or a sector is empty after
+/// its header. A power cut before the magic is written leaves the second case.
 pub fn is_store<const SECTOR: usize>(bytes: &[u8]) -> bool {
     let mut sectors = bytes.chunks(SECTOR);
     let is_erased = |sector: &[u8]| sector.iter().skip(HEADER_BYTES).all(|byte| *byte == 0xFF);
@@ -32,14 +31,14 @@ impl<const SECTOR: usize> SimFlash<SECTOR> {
         Self::with(&[])
     }
 
-    /// Holding `bytes`, as many as fit; what is missing is erased.
+    /// Flash with as many of these bytes as fit; the rest is erased.
     pub fn with(bytes: &[u8]) -> Self {
         let mut all = bytes.to_vec();
         all.resize(2 * SECTOR, 0xFF);
         Self { bytes: all, steps: 0, erases: 0, cut_at: None, is_dead: false, random: 0x9E37_79B9_7F4A_7C15 }
     }
 
-    /// What it holds.
+    /// Contents.
     pub fn bytes(&self) -> &[u8] {
         &self.bytes
     }
@@ -54,23 +53,23 @@ impl<const SECTOR: usize> SimFlash<SECTOR> {
         self.erases
     }
 
-    /// Power goes in the middle of the `steps`-th step from now on, counted from 1. `seed` decides what is left of it.
+    /// Cuts power in the middle of the `steps`-th step from now, counted from 1. `seed` decides the result of that step.
     pub const fn cut_after(&mut self, steps: u64, seed: u64) {
         self.cut_at = Some(self.steps + steps);
         self.random ^= seed.wrapping_mul(0x2545_F491_4F6C_DD1D) | 1;
     }
 
-    /// Whether power has gone.
+    /// Whether power is cut.
     pub const fn is_dead(&self) -> bool {
         self.is_dead
     }
 
-    /// Power comes back: the flash as the cut left it.
+    /// Restores power; the contents stay as the cut left them.
     pub const fn revive(&mut self) {
         (self.is_dead, self.cut_at) = (false, None);
     }
 
-    /// Counts a step; `true` when power goes in the middle of it.
+    /// Counts a step; `true` if power is cut in it.
     fn step(&mut self) -> bool {
         self.steps += 1;
         self.is_dead = self.cut_at.is_some_and(|at| self.steps >= at);
@@ -105,7 +104,7 @@ impl<const SECTOR: usize> SimFlash<SECTOR> {
         }
     }
 
-    /// What a cut leaves of a word that was to become `new`: any mixture of old and new bits, or one of both.
+    /// Word after a cut write of `new`: the old one, the new one, or any mixture of their bits.
     fn torn(&mut self, old: u32, new: u32) -> u32 {
         match self.random() % 4 {
             0 => old,

@@ -10,16 +10,16 @@ pub const VALUE_BYTES_MAX: usize = 512;
 
 type Outcome<T, F> = Result<T, Error<<F as ErrorType>::Error>>;
 
-/// Why something was not stored, or not read.
+/// Error of a save or a read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Error<E> {
-    /// It would need an erase, and none is allowed now. Nothing changed.
+    /// An erase is needed and not allowed now. Nothing changed.
     NotNow,
     /// Longer than [`VALUE_BYTES_MAX`].
     TooLong,
     /// All items together do not fit into one sector.
     Full,
-    /// The flash itself.
+    /// Error of the flash.
     Flash(E),
 }
 
@@ -29,7 +29,7 @@ impl<E> From<E> for Error<E> {
     }
 }
 
-/// What a save did.
+/// Result of a save.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Saved {
     /// The value was stored already.
@@ -38,23 +38,23 @@ pub enum Saved {
     Written,
 }
 
-/// What a start found in the flash.
+/// State of the flash at a start.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Found {
-    /// What was stored.
+    /// An intact store.
     Kept,
-    /// What was stored, but for places that are damaged: of an item there the value before it counts, or none.
+    /// A store with damaged items. Of these the previous value counts, or none.
     Damaged,
-    /// Erased flash: nothing was ever stored.
+    /// Erased flash, never used.
     Blank,
-    /// Something that cannot be read: what was stored is lost, and the store was made anew.
+    /// Unreadable contents. All items are lost and a new store was created.
     Unreadable,
 }
 
-/// Items in two sectors of `F`, which has no more and no fewer.
+/// Store of items in flash `F` of exactly two sectors.
 pub struct Store<F: NorFlash> {
     flash: F,
-    /// The sector in use, its generation, and where the next item goes.
+    /// The active sector, its generation and the offset of the next item.
     in_use: usize,
     generation: u16,
     end: usize,
@@ -62,20 +62,20 @@ pub struct Store<F: NorFlash> {
 }
 
 impl<F: NorFlash> Store<F> {
-    /// Starts with what is in the flash; ends whatever power cut short, for which erases are allowed here. Afterwards they are not,
-    /// until [`Self::allow_erase`].
+    /// Opens the store and completes an interrupted change of sectors; erases are allowed here. Later erases need
+    /// [`Self::allow_erase`].
     pub fn mount(flash: F) -> Outcome<(Self, Found), F> {
         let mut store = Self { flash, in_use: 0, generation: 0, end: 0, may_erase: true };
         let found = store.choose()?;
         let count = store.mounts()?.saturating_add(1);
         match store.save(Key::MOUNTS, &count.to_le_bytes()) {
-            // A store that is full of items may stay so.
+            // A full store may stay full.
             Ok(_) | Err(Error::Full) => {}
             Err(error) => return Err(error),
         }
         match found {
             Found::Kept => {}
-            // What is damaged does not go along: it is told once. Where this fails the next start tries again.
+            // Damaged items are not copied, so they are reported once. If this fails, the next start tries again.
             Found::Damaged => drop(store.turn()),
             Found::Blank | Found::Unreadable => store.current().complete()?,
         }
@@ -83,8 +83,8 @@ impl<F: NorFlash> Store<F> {
         Ok((store, found))
     }
 
-    /// Takes the newer sector of those that are complete. If the other one was to supersede it, that one's header is damaged, and its
-    /// items count.
+    /// Selects the newer complete sector. If it is marked as superseded by the other one, the other header is damaged; the items
+    /// of the other sector count.
     fn choose(&mut self) -> Outcome<Found, F> {
         let headers = [self.sector(0).header()?, self.sector(1).header()?];
         let contents = [self.sector(0).content()?, self.sector(1).content()?];
@@ -105,7 +105,7 @@ impl<F: NorFlash> Store<F> {
             return Ok(if is_whole && !is_damaged { Found::Kept } else { Found::Damaged });
         }
         let is_empty = contents.iter().all(|content| content.end == HEADER_BYTES);
-        // A sector is complete with its first item: of one without any all items are lost.
+        // A complete sector has at least one item. Without any, all items are lost.
         let found = match headers.iter().any(|header| header.is_complete) {
             _ if !is_empty => Found::Unreadable,
             true => Found::Damaged,
@@ -122,18 +122,17 @@ impl<F: NorFlash> Store<F> {
         Sector::new(&mut self.flash, index, F::ERASE_SIZE)
     }
 
-    /// The sector in use, as far as it is written.
+    /// The written part of the active sector.
     const fn current(&mut self) -> Sector<'_, F> {
         Sector::new(&mut self.flash, self.in_use, self.end)
     }
 
-    /// Whether an erase is allowed from now on: it may stop the processor for half a second.
+    /// Allows or forbids erases. An erase may stop the processor for 0.5 s.
     pub const fn allow_erase(&mut self, allowed: bool) {
         self.may_erase = allowed;
     }
 
-    /// Hands every stored item to `found`, the values of one key in the order in which they were stored: the last one
-    /// counts.
+    /// Passes every stored item to `found`, oldest first. The last value of each key counts.
     pub fn for_each(&mut self, mut found: impl FnMut(Key, &[u8])) -> Outcome<(), F> {
         let (mut at, mut value) = (HEADER_BYTES, [0; VALUE_BYTES_MAX]);
         while let Some(item) = self.current().next(at)? {
@@ -146,7 +145,7 @@ impl<F: NorFlash> Store<F> {
         Ok(())
     }
 
-    /// Copies a value into `out`; its length, or `None` where there is none or it is longer than `out`.
+    /// Copies a value into `out` and returns its length. `None` if there is no value or `out` is too short.
     pub fn get(&mut self, key: Key, out: &mut [u8]) -> Outcome<Option<usize>, F> {
         let Some(item) = self.find(key)? else { return Ok(None) };
         let Some(out) = out.get_mut(..item.length) else { return Ok(None) };
@@ -166,7 +165,7 @@ impl<F: NorFlash> Store<F> {
         Ok(found)
     }
 
-    /// Stores a value. When this returns an error the old value still stands.
+    /// Stores a value. After an error the old value is still stored.
     pub fn save(&mut self, key: Key, value: &[u8]) -> Outcome<Saved, F> {
         if value.len() > VALUE_BYTES_MAX {
             return Err(Error::TooLong);
@@ -192,20 +191,20 @@ impl<F: NorFlash> Store<F> {
         Ok(Saved::Written)
     }
 
-    /// Bytes that are free in the sector in use; an item takes 12 and its value, rounded up to 4.
+    /// Free bytes of the active sector. An item takes 12 bytes and its value, rounded up to 4.
     pub const fn room(&self) -> usize {
         F::ERASE_SIZE.saturating_sub(self.end)
     }
 
-    /// How often the store was mounted since it was made, this time included.
+    /// Number of mounts since the store was created, this one included.
     pub fn mounts(&mut self) -> Outcome<u32, F> {
         let mut mounts = [0; 4];
         self.get(Key::MOUNTS, &mut mounts)?;
         Ok(u32::from_le_bytes(mounts))
     }
 
-    /// Goes on into the other sector now if less than `room` bytes are free and that gains some, so that it need not be done later;
-    /// whether it did. Takes an erase.
+    /// Changes to the other sector if less than `room` bytes are free and the change gains space. Returns whether it did. Needs
+    /// an erase.
     pub fn turn_ahead(&mut self, room: usize) -> Outcome<bool, F> {
         if self.room() >= room || HEADER_BYTES + self.live_bytes()? >= self.end {
             return Ok(false);
@@ -213,7 +212,7 @@ impl<F: NorFlash> Store<F> {
         self.turn().map(|()| true)
     }
 
-    /// Bytes of all items that count.
+    /// Bytes of all live items.
     fn live_bytes(&mut self) -> Outcome<usize, F> {
         let (mut bytes, mut at) = (0, HEADER_BYTES);
         while let Some(item) = self.current().next(at)? {
@@ -223,7 +222,7 @@ impl<F: NorFlash> Store<F> {
         Ok(bytes)
     }
 
-    /// Copies all that counts into the other sector, and goes on there.
+    /// Copies all live items into the other sector and makes it the active one.
     fn turn(&mut self) -> Outcome<(), F> {
         let (from, to) = (self.in_use, 1 - self.in_use);
         let generation = self.generation.saturating_add(1);

@@ -1,4 +1,4 @@
-//! What the store promises while power stays.
+//! Behaviour of the store without power cuts.
 
 use embedded_storage::nor_flash::{NorFlash as _, NorFlashErrorKind};
 
@@ -88,7 +88,7 @@ fn a_save_that_needs_an_erase_waits_until_it_is_allowed_and_changes_nothing() {
     assert_eq!(store.save(Key::item(1), b"new"), Ok(Saved::Written));
     assert_eq!(store.save(Key::item(1), &[number as u8; 200]), Ok(Saved::Written));
     assert!(store.room() > 15_000);
-    // Two when the store was made, one for the way into the other sector.
+    // Two at creation, one for the change of sectors.
     assert_eq!(flash.erases(), 3);
 }
 
@@ -168,7 +168,7 @@ fn whatever_is_in_the_flash_it_is_told_made_anew_and_works() {
             _ => noise(&mut bytes),
         }
         if run % 4 == 3 {
-            // Ours by its headers, and yet noise.
+            // Valid headers, random contents.
             bytes[..8].copy_from_slice(&[0x32, 0x54, 0x53, 0x48, 9, 0, 0xF6, 0xFF]);
             bytes[16_384..16_392].copy_from_slice(&[0x32, 0x54, 0x53, 0x48, 3, 0, 0xFC, 0xFF]);
             for sector in [0, 16_384] {
@@ -210,7 +210,7 @@ fn flash_that_does_not_work_is_told() {
     assert_eq!(Store::mount(&mut flash).map(|_| ()), Err(Error::Flash(NorFlashErrorKind::Other)));
 }
 
-/// Where these bytes stand last.
+/// Offset of the last occurrence of these bytes.
 fn last_of(bytes: &[u8], wanted: &[u8]) -> usize {
     bytes.windows(wanted.len()).rposition(|window| window == wanted).expect("it is there")
 }
@@ -226,7 +226,7 @@ fn an_item_that_is_damaged_is_told_once_and_the_value_before_it_counts() {
     }
     let whole = flash.bytes().to_vec();
     let (new, only) = (last_of(&whole, b"a new value"), last_of(&whole, b"the only value"));
-    // Of each: the length, all of it zeros, its opposite, the key, the data, the check.
+    // Of each item: the length, all zeros, its complement, the key, the data, the checksum.
     for (value, place, bytes) in [
         (new, -8, &[0x77][..]),
         (new, -8, &[0; 4]),
@@ -306,7 +306,7 @@ fn flash_that_is_no_longer_erased_takes_no_item() {
 fn whatever_is_damaged_no_value_goes_back_without_a_word() {
     type Small = SimFlash<2048>;
     let mut flash = Small::blank();
-    // Every value that an item had, the newest last.
+    // All values of an item, newest last.
     let mut had = vec![Vec::new(); 4];
     for round in 0..8_u8 {
         let (mut store, _) = Store::mount(&mut flash).expect("it works");
@@ -320,7 +320,7 @@ fn whatever_is_damaged_no_value_goes_back_without_a_word() {
     let whole = flash.bytes().to_vec();
     let newer = |at: usize| u16::from_le_bytes([whole[at + 4], whole[at + 5]]);
     let sector = if newer(2048) > newer(0) { 2048..4096 } else { 0..2048 };
-    // An item at the very end whose last byte is damaged is taken for one that power cut short.
+    // A last item with a damaged last byte looks like one cut short by a power loss.
     let last = whole[sector].iter().rposition(|byte| *byte != 0xFF).expect("items");
     let mut told = 0;
     for at in (0..whole.len() - 8).step_by(4).filter(|at| !(*at..at + 8).contains(&(at / 2048 * 2048 + last)))
@@ -339,7 +339,7 @@ fn whatever_is_damaged_no_value_goes_back_without_a_word() {
                 newest &= now.as_ref() == had.last();
             }
             assert!(newest || found != Found::Kept, "{fill:x} at {at}: {found:?}");
-            // A head that reads as erased hides all behind it.
+            // A length that reads as erased hides all later items.
             assert!(fill == 0xFF || found != Found::Unreadable, "{fill:x} at {at}: other items are whole");
             told += u32::from(found == Found::Damaged);
             assert_eq!(Store::mount(&mut flash).map(|(_, found)| found), Ok(Found::Kept), "{fill:x} at {at}");
