@@ -1,8 +1,6 @@
 //! Roll and pitch, against what is wanted.
 
-mod common;
-
-use common::{Quad, Run};
+use crate::common::{Quad, Run};
 use hums_core::observation::{Autopilot, Observation, VehicleKind, Wanted};
 use hums_core::params::Params;
 use hums_core::units::Radians;

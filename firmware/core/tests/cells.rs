@@ -1,9 +1,7 @@
 //! Cells of batteries, from the autopilot's word to an alarm: what is not known gives none, and is told.
 #![expect(clippy::unwrap_used, reason = "that is how a test fails")]
 
-mod common;
-
-use common::{AUTOPILOT, Quad};
+use crate::common::{AUTOPILOT, Quad};
 use hums_core::Monitor;
 use hums_core::happening::Happening;
 use hums_core::health::{Finding, Level};

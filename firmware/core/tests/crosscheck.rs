@@ -2,9 +2,7 @@
 //! estimator's compass. What is so from the beginning, what wind, load and turns do, and what is not fitted says nothing.
 #![expect(clippy::panic, reason = "that is how a test fails")]
 
-mod common;
-
-use common::{AUTOPILOT, Quad};
+use crate::common::{AUTOPILOT, Quad};
 use hums_core::Monitor;
 use hums_core::health::{Finding, Level};
 use hums_core::observation::{

@@ -1,6 +1,6 @@
 //! The documents that the tables make: `docs/parameters.md`, the table of checks in `docs/health.md` and that of their
 //! words in `docs/check.md` are what the code says, and `docs/usage.md` knows every counter.
-//! `HUMS_WRITE_DOCS=1 cargo test -p hums-core --test docs` writes the first three.
+//! `HUMS_WRITE_DOCS=1 cargo test -p hums-core-tests docs` writes the first three.
 #![expect(clippy::panic, clippy::unwrap_used, reason = "that is how a test fails")]
 
 use std::fmt::Write as _;
@@ -139,7 +139,7 @@ crash_alert: STATUSTEXT, EVENT
 ";
 
 fn path(name: &str) -> PathBuf {
-    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../docs").join(name)
+    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../../docs").join(name)
 }
 
 /// The document is `wanted`, or becomes it where that is asked for.

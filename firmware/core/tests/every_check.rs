@@ -2,9 +2,7 @@
 //! with an engine, with a second battery and with a twelfth motor.
 #![expect(clippy::panic, clippy::unwrap_used, reason = "that is how a test fails")]
 
-mod common;
-
-use common::{AUTOPILOT, Quad};
+use crate::common::{AUTOPILOT, Quad};
 use hums_core::Monitor;
 use hums_core::cause::{Alert, Cause, Urgency};
 use hums_core::health::{self, Finding, Level, checks};

@@ -1,8 +1,6 @@
 //! Speeds and currents of motors against each other: which frames, what turns, what stands, what pushes.
 
-mod common;
-
-use common::{AUTOPILOT, Quad};
+use crate::common::{AUTOPILOT, Quad};
 use hums_core::Monitor;
 use hums_core::health::{Finding, Level};
 use hums_core::observation::{

@@ -1,9 +1,7 @@
 //! The protective action, scripted: when it is requested, and everything that keeps it from being requested.
 #![expect(clippy::unwrap_used, reason = "that is how a test fails")]
 
-mod common;
-
-use common::{AUTOPILOT, Quad, Run, observe};
+use crate::common::{AUTOPILOT, Quad, Run, observe};
 use hums_core::Monitor;
 use hums_core::cause::{Alert, Cause, Urgency};
 use hums_core::happening::Happening;

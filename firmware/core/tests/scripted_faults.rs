@@ -2,9 +2,7 @@
 //! well for two seconds, by more than the hysteresis.
 #![expect(clippy::panic, reason = "that is how a test fails")]
 
-mod common;
-
-use common::{AUTOPILOT, Quad};
+use crate::common::{AUTOPILOT, Quad};
 use hums_core::Monitor;
 use hums_core::health::{CLEAR, Finding, Level, Subsystem};
 use hums_core::observation::{Autopilot, EstimatorScale, Observation, Sensors, SystemTime, VehicleKind};

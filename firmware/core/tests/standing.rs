@@ -1,8 +1,6 @@
 //! What stands and is called flying: on the bench, spooling up, landed by hand.
 
-mod common;
-
-use common::{Quad, Run};
+use crate::common::{Quad, Run};
 use hums_core::observation::{Air, Hud, Imu, LandedState, Observation, VehicleKind};
 use hums_core::params::Params;
 use hums_core::units::{Fraction, Hectopascals, Metres, MetresPerSecond, MetresPerSecond2, RadiansPerSecond};

@@ -1,11 +1,9 @@
 //! Flights one after the other: what is normal is learned, kept, and what leaves it is found.
 #![expect(clippy::unwrap_used, reason = "that is how a test fails")]
 
-mod common;
-
 use std::cell::Cell;
 
-use common::{AUTOPILOT, Quad};
+use crate::common::{AUTOPILOT, Quad};
 use hums_core::Monitor;
 use hums_core::baseline::Quantity;
 use hums_core::component::Label;

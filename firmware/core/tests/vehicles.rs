@@ -1,9 +1,7 @@
 //! More than one quad of ArduPilot: other systems on the port, other vehicles, other batteries.
 #![expect(clippy::unwrap_used, reason = "that is how a test fails")]
 
-mod common;
-
-use common::{AUTOPILOT, Quad, Run, observe};
+use crate::common::{AUTOPILOT, Quad, Run, observe};
 use hums_core::happening::Happening;
 use hums_core::lifetime::{Airframe, Item as _, ItemKey, Lifetime};
 use hums_core::observation::{

@@ -1,14 +1,12 @@
 //! Mishaps, scripted for each class of vehicle: what is one, what is none, and what becomes of the flight.
 
-#[path = "../common/mod.rs"]
-mod common;
 mod falls;
 mod impacts;
 mod silences;
 mod sinks;
 mod turns;
 
-use common::{AUTOPILOT, Quad, Run, observe};
+use crate::common::{AUTOPILOT, Quad, Run, observe};
 use hums_core::Monitor;
 use hums_core::health::{Finding, Level, Orders, Subsystem};
 use hums_core::mishap::{Change, Kind, Place, Report};
