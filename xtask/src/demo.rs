@@ -67,14 +67,14 @@ pub(crate) fn run(options: &Options) -> Result<()> {
     if !flashed && !options.pc {
         eprintln!("\nNo firmware here (what to type is above): the same pipeline runs on this PC instead.\n");
     }
-    // Both at once: the last part of each build is one core's work.
-    let (program, image) = std::thread::scope(|scope| {
-        let firmware = scope.spawn(|| flashed.then(|| firmware::build(Board::F405)).transpose());
-        (hums::build(), firmware.join())
-    });
-    program?;
-    let Ok(image) = image else { bail!("the build of the firmware panicked") };
-    fly(options, image?.as_deref(), start.elapsed())
+    let program = || hums::build().map(drop);
+    let image = if flashed {
+        Some(firmware::build_beside(Board::F405, program)?)
+    } else {
+        program()?;
+        None
+    };
+    fly(options, image.as_deref(), start.elapsed())
 }
 
 /// Records the flight with the firmware in `image`, or on this PC without one, and shows the results.

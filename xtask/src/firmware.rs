@@ -116,6 +116,15 @@ pub(crate) fn build(board: Board) -> Result<PathBuf> {
     Ok(image)
 }
 
+/// [`build`] and, at the same time, what is built for this PC: the last part of each is one core's work.
+pub(crate) fn build_beside(board: Board, pc: impl FnOnce() -> Result<()>) -> Result<PathBuf> {
+    std::thread::scope(|scope| {
+        let firmware = scope.spawn(|| build(board));
+        pc()?;
+        firmware.join().unwrap_or_else(|_| bail!("the build of the firmware panicked"))
+    })
+}
+
 /// The flashable files of the firmware of `board`: the name and the content of each file, the ELF file last.
 pub(crate) fn files(board: Board, elf: Vec<u8>) -> Result<[(String, Vec<u8>); 3]> {
     let name = format!("hums-{}", board.name());

@@ -41,6 +41,7 @@ cargo xtask COMMAND
                                  of it; with --pc through the same pipeline on this PC;
                                  on a terminal the dashboard plays it at the end, until Ctrl-C
   test [--only STEP]... [--list] everything that CI checks, or the steps named with what they need; a table at the end
+  test --quick                   format, lints and unit tests of the packages that changed
   prove [NAME]... [--short] [--seed N] [--runs N] [--list]
                                  the campaigns: power cuts, damage, stalls, endurance, hostile ground station, noise;
                                  all of them (an hour) make docs/proof.md
@@ -90,7 +91,7 @@ fn main() -> ExitCode {
 #[derive(Debug, PartialEq, Eq)]
 enum Command {
     Demo(demo::Options),
-    Test { only: Vec<String>, list: bool },
+    Test(Tests),
     Prove(Vec<String>),
     Firmware(Board),
     Flash(flash::Options),
@@ -104,6 +105,15 @@ enum Command {
     Grafana,
     Manifest,
     Help,
+}
+
+/// What of the tests.
+#[derive(Debug, PartialEq, Eq)]
+enum Tests {
+    /// The steps named, or all.
+    Steps(Vec<String>),
+    List,
+    Quick,
 }
 
 impl Command {
@@ -157,11 +167,12 @@ impl Command {
     fn run(self) -> Result<()> {
         match self {
             Self::Demo(options) => demo::run(&options),
-            Self::Test { list: true, .. } => {
+            Self::Test(Tests::List) => {
                 test::list();
                 Ok(())
             }
-            Self::Test { only, list: false } => test::run(&only),
+            Self::Test(Tests::Quick) => test::run_quick(),
+            Self::Test(Tests::Steps(only)) => test::run(&only),
             Self::Prove(arguments) => prove::run(&arguments),
             Self::Firmware(board) => {
                 setup::ensure(&[Need::Linker, Need::FirmwareTarget], false).require_all()?;
@@ -199,20 +210,16 @@ impl Command {
 }
 
 fn parse_test(rest: &[&str]) -> Result<Command> {
-    let (mut only, mut list) = (Vec::new(), false);
-    let mut words = rest.iter();
-    while let Some(word) = words.next() {
-        match *word {
-            "--list" => list = true,
-            "--only" => {
-                let Some(step) = words.next() else { bail!("--only wants the name of a step") };
-                only.push((*step).to_owned());
-            }
-            other => bail!("test takes --only STEP and --list, not {other}"),
-        }
+    if let [only @ ("--list" | "--quick")] = rest {
+        return Ok(Command::Test(if *only == "--list" { Tests::List } else { Tests::Quick }));
+    }
+    let mut only = Vec::new();
+    for words in rest.chunks(2) {
+        let ["--only", step] = words else { bail!("test takes --only STEP, or --quick, or --list") };
+        only.push((*step).to_owned());
     }
     test::check_names(&only)?;
-    Ok(Command::Test { only, list })
+    Ok(Command::Test(Tests::Steps(only)))
 }
 
 #[cfg(test)]
@@ -239,6 +246,7 @@ mod tests {
             "firmware --board f407",
             "test --only",
             "test --only fmtt",
+            "test --quick now",
             "demo --fligth x",
         ] {
             assert!(parse(line).is_err(), "{line}");
@@ -247,7 +255,8 @@ mod tests {
 
     #[test]
     fn steps_are_chosen_by_name() {
-        let expected = Command::Test { only: vec!["fmt".into(), "budgets".into()], list: false };
+        let expected = Command::Test(Tests::Steps(vec!["fmt".into(), "budgets".into()]));
         assert_eq!(parse("test --only fmt --only budgets").unwrap(), expected);
+        assert_eq!(parse("test --quick").unwrap(), Command::Test(Tests::Quick));
     }
 }

@@ -45,8 +45,7 @@ pub(crate) fn run(arguments: &[String]) -> Result<()> {
 fn chip(names: &[String]) -> Result<()> {
     let needs = [Need::Linker, Need::FirmwareTarget, Need::PythonVenv, Need::Dosfstools];
     setup::ensure(&needs, false).require_all()?;
-    firmware::build(Board::F405)?;
-    pc::build()?;
+    firmware::build_beside(Board::F405, pc::build)?;
     oracle::prepare()?;
     let mut options = vec!["--ignored", "--nocapture"];
     options.extend(names.iter().map(String::as_str));

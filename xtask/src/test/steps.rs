@@ -23,17 +23,30 @@ pub(super) struct Step {
     pub(super) name: &'static str,
     pub(super) about: &'static str,
     pub(super) needs: &'static [Need],
+    pub(super) stage: Stage,
     /// Steps whose results it uses.
     pub(super) after: &'static [&'static str],
     pub(super) run: fn() -> Result<()>,
 }
 
-/// In this order: first the steps that fail soonest, and each after those that it needs.
+/// When a step runs. The compiler of the lints has one core busy while tests wait for links and browsers.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum Stage {
+    /// First.
+    Build,
+    /// After the build, beside the tests.
+    Lint,
+    /// After the build.
+    Test,
+}
+
+/// Each after those that it needs. `--list` and the table of seconds have this order.
 pub(super) const STEPS: [Step; 18] = [
     Step {
         name: "fmt",
         about: "the formatting",
         needs: &[Need::Rustfmt],
+        stage: Stage::Build,
         after: &[],
         run: || Shell::cargo().args(["fmt", "--all", "--", "--check"]).run(),
     },
@@ -41,6 +54,7 @@ pub(super) const STEPS: [Step; 18] = [
         name: "lines",
         about: "lines of code by folder, within budgets.toml",
         needs: &[],
+        stage: Stage::Build,
         after: &[],
         run: lines::check,
     },
@@ -48,41 +62,47 @@ pub(super) const STEPS: [Step; 18] = [
         name: "oracle",
         about: "pymavlink and the other readers that the tests compare with are there",
         needs: &[Need::PythonVenv],
+        stage: Stage::Build,
         after: &[],
         run: oracle::prepare,
     },
     Step {
         name: "build",
-        about: "hums, the campaigns, all tests and the examples of this PC compile",
-        needs: &[],
+        about: "hums, the campaigns, all tests and the examples of this PC compile, and the firmware beside them",
+        needs: &[Need::FirmwareTarget],
+        stage: Stage::Build,
         after: &[],
-        run: pc::build,
+        run: || firmware::build_beside(FLOWN, pc::build).map(drop),
     },
     Step {
         name: "budgets",
-        about: "the firmware builds for the board f405, within budgets.toml",
+        about: "the firmware for the board f405 is within budgets.toml",
         needs: &[Need::FirmwareTarget],
-        after: &[],
+        stage: Stage::Build,
+        after: &["build"],
         run: check_budgets,
     },
     Step {
         name: "chip",
         about: "end to end with the image that is flashed, on the model of its chip",
         needs: &[Need::FirmwareTarget, Need::PythonVenv, Need::Dosfstools],
-        after: &["oracle", "build", "budgets"],
+        stage: Stage::Test,
+        after: &["oracle", "build"],
         run: chip,
     },
     Step {
         name: "clippy-firmware",
         about: "lints of the firmware for the board f405, warnings as errors",
         needs: &[Need::Clippy, Need::FirmwareTarget],
-        after: &["budgets"],
+        stage: Stage::Lint,
+        after: &["build"],
         run: || firmware::lint(FLOWN),
     },
     Step {
         name: "clippy",
         about: "lints of what runs on this PC, warnings as errors",
         needs: &[Need::Clippy],
+        stage: Stage::Lint,
         after: &["build"],
         run: pc::lint,
     },
@@ -90,6 +110,7 @@ pub(super) const STEPS: [Step; 18] = [
         name: "unit",
         about: "tests of each crate on this PC",
         needs: &[],
+        stage: Stage::Test,
         after: &["build"],
         run: pc::unit_tests,
     },
@@ -97,13 +118,15 @@ pub(super) const STEPS: [Step; 18] = [
         name: "sim",
         about: "end to end on this PC, against pymavlink",
         needs: &[Need::Mtools, Need::Dosfstools, Need::PythonVenv],
+        stage: Stage::Test,
         after: &["oracle", "build"],
         run: sim,
     },
     Step {
         name: "doc",
-        about: "the documentation builds without a warning, and its examples run",
+        about: "the documentation builds without a warning",
         needs: &[],
+        stage: Stage::Lint,
         after: &["build"],
         run: pc::document,
     },
@@ -111,6 +134,7 @@ pub(super) const STEPS: [Step; 18] = [
         name: "page",
         about: "formatting and lints of the page's scripts and style, by Biome",
         needs: &[Need::PythonVenv],
+        stage: Stage::Lint,
         after: &["oracle"],
         run: page,
     },
@@ -118,6 +142,7 @@ pub(super) const STEPS: [Step; 18] = [
         name: "browser",
         about: "the report and the live page in Chromium",
         needs: &[Need::PythonVenv, Need::Chromium],
+        stage: Stage::Test,
         after: &["oracle", "build"],
         run: || pc::end_to_end("browser", &[]),
     },
@@ -125,6 +150,7 @@ pub(super) const STEPS: [Step; 18] = [
         name: "prove",
         about: "the campaigns in their short form",
         needs: prove::NEEDS,
+        stage: Stage::Test,
         after: &["build"],
         run: pc::short_campaigns,
     },
@@ -132,6 +158,7 @@ pub(super) const STEPS: [Step; 18] = [
         name: "answer",
         about: "every format against pymavlink, with pyarrow, DuckDB and InfluxDB as readers",
         needs: &[Need::PythonVenv, Need::Influx],
+        stage: Stage::Test,
         after: &["oracle", "build"],
         run: || pc::end_to_end("answer", further()),
     },
@@ -139,6 +166,7 @@ pub(super) const STEPS: [Step; 18] = [
         name: "live",
         about: "live writing to InfluxDB and VictoriaMetrics, and the Grafana dashboards",
         needs: &[Need::PythonVenv, Need::Influx, Need::Victoria],
+        stage: Stage::Test,
         after: &["oracle", "build"],
         run: || pc::end_to_end("live", &[]),
     },
@@ -146,20 +174,22 @@ pub(super) const STEPS: [Step; 18] = [
         name: "costs",
         about: "cycles, load and stack of the firmware against budgets.toml",
         needs: &[Need::FirmwareTarget],
-        after: &["build", "budgets"],
+        stage: Stage::Test,
+        after: &["build"],
         run: || costs::check_built(&hums::program(), &FLOWN.image()),
     },
     Step {
         name: "demo",
         about: "cargo xtask demo",
         needs: &[Need::FirmwareTarget],
-        after: &["build", "budgets"],
+        stage: Stage::Test,
+        after: &["build"],
         run: demo::as_test,
     },
 ];
 
 /// The board that every change is tried for. `cargo xtask dist` looks at all of them.
-const FLOWN: Board = Board::F405;
+pub(super) const FLOWN: Board = Board::F405;
 
 fn check_budgets() -> Result<()> {
     println!("NOT TESTED: board f429 (cargo xtask dist lints and measures it)");

@@ -1,0 +1,72 @@
+//! `cargo xtask test --quick`: what is soon known about a change, before all steps run.
+
+use std::path::Path;
+
+use anyhow::{Context as _, Result};
+use cargo_metadata::{MetadataCommand, Package};
+
+use super::steps::FLOWN;
+use crate::firmware;
+use crate::repo;
+use crate::shell::Shell;
+
+/// The package that only cross-compiles.
+const FIRMWARE: &str = "hums-app";
+
+/// Format of all, lints and unit tests of the packages that changed: since the last commit, or in it if nothing has changed since.
+pub(super) fn run() -> Result<()> {
+    Shell::cargo().args(["fmt", "--all", "--", "--check"]).run()?;
+    let mut files =
+        git(&["diff", "--name-only", "HEAD"])? + &git(&["ls-files", "--others", "--exclude-standard"])?;
+    if files.is_empty() {
+        files = git(&["diff", "--name-only", "HEAD~1"])?;
+    }
+    let metadata = MetadataCommand::new().no_deps().current_dir(repo::root()).exec()?;
+    let mut changed: Vec<&str> =
+        files.lines().filter_map(|file| package(Path::new(file), &metadata.packages)).collect();
+    changed.sort_unstable();
+    changed.dedup();
+    if changed.contains(&FIRMWARE) {
+        firmware::lint(FLOWN)?;
+    }
+    let choice: Vec<String> =
+        changed.iter().filter(|name| **name != FIRMWARE).map(|name| format!("--package={name}")).collect();
+    if choice.is_empty() {
+        return Ok(());
+    }
+    Shell::cargo().arg("clippy").args(&choice).args(["--all-targets", "--", "-D", "warnings"]).run()?;
+    Shell::cargo().args(["test", "--quiet", "--lib", "--bins"]).args(&choice).run()
+}
+
+/// The package of a file: the one in the innermost folder.
+fn package<'a>(file: &Path, packages: &'a [Package]) -> Option<&'a str> {
+    let folder = |package: &Package| {
+        let folder = package.manifest_path.parent()?.as_std_path();
+        Some(folder.strip_prefix(repo::root()).ok()?.components().count())
+    };
+    let holds = |package: &&Package| {
+        package.manifest_path.parent().is_some_and(|folder| repo::root().join(file).starts_with(folder))
+    };
+    Some(packages.iter().filter(holds).max_by_key(|package| folder(package))?.name.as_str())
+}
+
+fn git(arguments: &[&str]) -> Result<String> {
+    Shell::new("git").args(arguments).ask().with_context(|| format!("git {} failed", arguments.join(" ")))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_belongs_to_the_innermost_package() {
+        let metadata = MetadataCommand::new().no_deps().current_dir(repo::root()).exec().unwrap();
+        for (file, name) in [
+            ("firmware/core/src/lib.rs", Some("hums-core")),
+            ("firmware/core/tests/docs.rs", Some("hums-core-tests")),
+            ("docs/check.md", None),
+        ] {
+            assert_eq!(package(Path::new(file), &metadata.packages), name, "{file}");
+        }
+    }
+}
