@@ -11,7 +11,6 @@ mod every_check;
 mod lifetime;
 mod mishap;
 mod motors;
-mod properties;
 mod protect;
 mod scripted_faults;
 mod standing;
