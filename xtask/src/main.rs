@@ -52,7 +52,7 @@ cargo xtask COMMAND
   prove foreign [EMBASSY]        programs of others on that model, built from what their packages bring; and embassy's examples, from
                                  the folder of a checkout of its repository
   firmware [--board BOARD]       build the firmware: f405 (the default) or f429
-  bench [sizes|speed|cost|logs]... what the record takes: bytes, decoding time, cycles; how fast logs are checked
+  bench [sizes|speed|logs]...    what the record takes: bytes and decoding time; how fast logs are checked
   fuzz [--seconds N]             the fuzz targets, each for so long (300); needs nightly Rust and cargo-fuzz
   dist [--check]                 the files of a release, in target/dist; --check builds them twice, compares,
                                  and runs what is for Windows under Wine

@@ -1,7 +1,7 @@
 //! `cargo xtask bench`: size and speed of the record, each figure beside its target.
 //!
-//! Recordings are those of `tests/flights` and below the folders that `HUMS_FLIGHTS` names (separated by colons). Sizes and
-//! costs repeat to the digit, so they are checked; speeds depend on the machine, so they are only shown.
+//! Recordings are those of `tests/flights` and below the folders that `HUMS_FLIGHTS` names (separated by colons). Sizes
+//! repeat to the digit, so they are checked; speeds depend on the machine, so they are only shown.
 
 mod logs;
 mod tools;
@@ -16,7 +16,6 @@ use serde_json::Value;
 
 use tools::{median, on_one_core, repeat, work_folder};
 
-use crate::firmware::{self, Board};
 use crate::hums;
 use crate::repo;
 use crate::setup::{self, Need};
@@ -26,16 +25,10 @@ use crate::shell::Shell;
 const SMALLER_MIN: f64 = 6.5;
 /// Ratio of the size to that of `xz -9e` of the tlog.
 const SMALLER_THAN_XZ_MIN: f64 = 2.3;
-/// The processor's clock, Hz.
-const CLOCK_HZ: f64 = 168e6;
 /// Bytes of MAVLink a second at 921,600 baud.
 pub(crate) const BYTES_PER_S: f64 = 92_160.0;
-/// Limit of the encoder's load.
-const LOAD_MAX: f64 = 0.16;
 /// How fast decoding is to be, as a part of the speed of `gzip -d`.
 const AGAINST_GZIP_MIN: f64 = 0.4;
-/// Steps of all checks, usage and trends, a second.
-const TICKS_PER_S: f64 = 20.0;
 /// The line on which costs are counted: at a slower one, work by the clock is a larger part of each byte.
 const BAUD: &str = "921600";
 /// Least length of a count, in seconds of that line, so that a short recording shows more than its start.
@@ -50,12 +43,11 @@ const ROUNDS: usize = 9;
 pub(crate) enum Bench {
     Sizes,
     Speed,
-    Cost,
     Logs,
 }
 
 impl Bench {
-    pub(crate) const ALL: [Self; 4] = [Self::Sizes, Self::Speed, Self::Cost, Self::Logs];
+    pub(crate) const ALL: [Self; 3] = [Self::Sizes, Self::Speed, Self::Logs];
 
     pub(crate) fn parse(words: &[&str]) -> Result<Vec<Self>> {
         if words.is_empty() {
@@ -64,9 +56,8 @@ impl Bench {
         let parse = |word: &&str| match *word {
             "sizes" => Ok(Self::Sizes),
             "speed" => Ok(Self::Speed),
-            "cost" => Ok(Self::Cost),
             "logs" => Ok(Self::Logs),
-            other => bail!("bench measures sizes, speed, cost or logs, not {other}"),
+            other => bail!("bench measures sizes, speed or logs, not {other}"),
         };
         words.iter().map(parse).collect()
     }
@@ -81,7 +72,6 @@ pub(crate) fn run(what: &[Bench]) -> Result<()> {
         let done = match bench {
             Bench::Sizes => sizes(&flights),
             Bench::Speed => speed(&flights),
-            Bench::Cost => cost(&flights),
             Bench::Logs => logs::run(),
         };
         if let Err(error) = done {
@@ -251,39 +241,6 @@ fn seconds(mut command: Command) -> Result<f64> {
     Ok(start.elapsed().as_secs_f64())
 }
 
-/// Runs recordings through the image that is flashed on the model of its chip, back to back at the fastest line rate; it counts
-/// the cycles of each stage.
-fn cost(flights: &[PathBuf]) -> Result<()> {
-    println!("\nModelled cycles of the STM32F405 at {BAUD} baud, by stage\n");
-    setup::ensure(&[Need::FirmwareTarget], false).require_all()?;
-    let (image, program) = (firmware::build(Board::F405)?, hums::build()?);
-    let (mut dearest, mut all) = (("none".to_owned(), 0.0), (0.0, 0.0));
-    for flight in unsigned(flights) {
-        let report = record_at_full_rate(&program, &image, flight)?;
-        let (encoding, bytes) = print_costs(&name(flight), &report)?;
-        all = (all.0 + encoding, all.1 + bytes);
-        if encoding / bytes > dearest.1 {
-            dearest = (name(flight), encoding / bytes);
-        }
-    }
-    let say = |what: &str, per_byte: f64| {
-        println!(
-            "encoding {what}: {per_byte:.1} cycles a byte, {:.2} % of {} MHz at {} kB/s",
-            load(per_byte) * 100.0,
-            CLOCK_HZ / 1e6,
-            BYTES_PER_S / 1e3,
-        );
-    };
-    say("all of them", all.0 / all.1);
-    say(&format!("the dearest, {}", dearest.0), dearest.1);
-    println!("(asked: at most {} %)", LOAD_MAX * 100.0);
-    let load = load(dearest.1);
-    if load > LOAD_MAX {
-        bail!("encoding {} takes {:.2} % of the processor", dearest.0, load * 100.0);
-    }
-    Ok(())
-}
-
 /// Runs a recording through the firmware on the model of its chip, back to back at the fastest line: its report. `program` is
 /// `hums`, `image` the firmware.
 pub(crate) fn record_at_full_rate(program: &Path, image: &Path, flight: &Path) -> Result<Value> {
@@ -302,46 +259,6 @@ pub(crate) fn record_at_full_rate(program: &Path, image: &Path, flight: &Path) -
     serde_json::from_str(&json).context("the report of hums sim --firmware")
 }
 
-/// One recording's stages; gives the cycles that encoding took, and the bytes.
-fn print_costs(flight: &str, report: &Value) -> Result<(f64, f64)> {
-    let number = |key: &str| report[key].as_f64().filter(|&number| number > 0.0);
-    let (Some(bytes), Some(frames)) = (number("bytes_in"), number("frames_in")) else {
-        bail!("nothing of {flight} was received")
-    };
-    let stages = report["cycles"].as_object().context("the firmware does not count cycles")?;
-    println!("{flight}: {frames} frames, {bytes} bytes");
-    for (stage, count) in stages {
-        let count = count.as_f64().unwrap_or(f64::NAN);
-        println!(
-            "  {stage:10} {:8.1} a byte {:9.0} a frame {:7.2} % of the processor",
-            count / bytes,
-            count / frames,
-            load(count / bytes) * 100.0
-        );
-    }
-    let all: f64 = stages.values().filter_map(Value::as_f64).sum();
-    println!(
-        "  {:10} {:8.1} a byte {:9.0} a frame {:7.2} % of the processor",
-        "all",
-        all / bytes,
-        all / frames,
-        load(all / bytes) * 100.0
-    );
-    if let (Some(powered_s), Some(steps)) =
-        (report["usage"]["powered_time_s"].as_f64(), stages.get("tick").and_then(Value::as_f64))
-    {
-        let step = steps / (powered_s * TICKS_PER_S);
-        let load = step * TICKS_PER_S / CLOCK_HZ;
-        println!("  {:10} {step:8.0} cycles every 50 ms {:11.2} % of the processor", "a step", load * 100.0);
-    }
-    Ok((report["cycles"]["encode"].as_f64().context("no stage encode")?, bytes))
-}
-
-/// The load of that many cycles a byte on the fastest line.
-fn load(cycles_per_byte: f64) -> f64 {
-    cycles_per_byte * BYTES_PER_S / CLOCK_HZ
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -349,21 +266,7 @@ mod tests {
     #[test]
     fn all_or_some_are_measured_and_a_mistyped_one_is_not_ignored() {
         assert_eq!(Bench::parse(&[]).unwrap(), Bench::ALL);
-        assert_eq!(Bench::parse(&["cost", "sizes"]).unwrap(), [Bench::Cost, Bench::Sizes]);
+        assert_eq!(Bench::parse(&["speed", "sizes"]).unwrap(), [Bench::Speed, Bench::Sizes]);
         assert!(Bench::parse(&["size"]).is_err());
-    }
-
-    #[test]
-    fn the_load_that_is_asked_for_is_some_291_cycles_a_byte() {
-        assert!(load(291.0) <= LOAD_MAX && load(292.0) > LOAD_MAX);
-    }
-
-    #[test]
-    fn costs_are_those_of_the_stage() {
-        let report = r#"{"bytes_in": 100, "frames_in": 4, "cycles": {"encode": 9000, "tick": 1}}"#;
-        let report: Value = serde_json::from_str(report).unwrap();
-        let (encoding, bytes) = print_costs("flight", &report).unwrap();
-        assert!((encoding / bytes - 90.0).abs() < 1e-9);
-        assert!(print_costs("flight", &Value::Null).is_err());
     }
 }

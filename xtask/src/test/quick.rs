@@ -40,14 +40,11 @@ pub(super) fn run() -> Result<()> {
 
 /// The package of a file: the one in the innermost folder.
 fn package<'a>(file: &Path, packages: &'a [Package]) -> Option<&'a str> {
-    let folder = |package: &Package| {
-        let folder = package.manifest_path.parent()?.as_std_path();
-        Some(folder.strip_prefix(repo::root()).ok()?.components().count())
-    };
     let holds = |package: &&Package| {
         package.manifest_path.parent().is_some_and(|folder| repo::root().join(file).starts_with(folder))
     };
-    Some(packages.iter().filter(holds).max_by_key(|package| folder(package))?.name.as_str())
+    let innermost = packages.iter().filter(holds).max_by_key(|package| package.manifest_path.as_str().len());
+    innermost.map(|package| package.name.as_str())
 }
 
 fn git(arguments: &[&str]) -> Result<String> {
