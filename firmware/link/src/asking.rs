@@ -1,22 +1,22 @@
-//! Asking the autopilot for the messages that the checks need, for who it is, and for its parameters that tell of batteries.
+//! Requests to the autopilot: the messages that the checks need, its version, and its battery parameters.
 //!
-//! # How
-//! First we listen for [`LISTEN`]: what already comes often enough is not asked for, so that nothing is ever made
-//! slower. Then one message after the other is asked for with `SET_MESSAGE_INTERVAL`, each answered before the next.
-//! Every [`ROUND`] the rates are looked at anew: what has stopped (a reboot that we did not see, a stream that somebody
-//! else changed) is asked for again, each time twice as patiently, because an autopilot may well promise a message that
-//! it never has. A message that is refused is not asked for again until the autopilot reboots. An ArduPilot that never
-//! answers such commands, or knows none, is asked for whole groups with `REQUEST_DATA_STREAM`.
+//! # Procedure
+//! Listen for [`LISTEN`]. A message that already arrives often enough is not requested, so no stream gets slower. Request the
+//! others with `SET_MESSAGE_INTERVAL`, one at a time, each answered before the next.
+//! Check the rates every [`ROUND`] and repeat the request for a stream that stopped (unseen reboot, stream changed by someone
+//! else). The interval between repeats doubles, because an autopilot may accept a request for a message that it never sends. A
+//! refused message is not requested again until the autopilot reboots. An ArduPilot that does not answer these commands gets
+//! `REQUEST_DATA_STREAM` for whole groups.
 //!
-//! ArduPilot tells its pilot of each interval that is asked for of a message that it does not have (that it has "no message" of that number), and refuses
-//! `REQUEST_MESSAGE` for it without a word (`GCS_Common.cpp`, 4.1 to 4.6). So it is asked for one of them first, and for the
-//! interval of those that it has. `ESC_TELEMETRY_5_TO_8` comes with `ESC_TELEMETRY_1_TO_4`, and has no interval of its own.
+//! ArduPilot warns its pilot ("no message" of that number) if an interval is requested for an unsupported message. It refuses
+//! `REQUEST_MESSAGE` silently (`GCS_Common.cpp`, 4.1 to 4.6). So one message is requested first, and the interval only if that
+//! message is supported. `ESC_TELEMETRY_5_TO_8` comes with `ESC_TELEMETRY_1_TO_4`, and has no interval of its own.
 //!
-//! Parameters are asked for after the messages, each once or twice after the vehicle is heard first or has rebooted. One that the
-//! autopilot does not have is not answered, and that says nothing of it.
+//! Parameters are requested after the messages, once or twice each after first contact or a reboot. The autopilot does not answer
+//! a request for an unknown parameter; no answer proves nothing.
 //!
-//! # How much
-//! What is asked for takes at most [`SHARE`] percent of the port's line, and all intervals are stretched until it does.
+//! # Bandwidth
+//! The requested messages take at most [`SHARE`] percent of the port's line. All intervals are stretched to fit.
 
 use hums_core::cells::{self, KNOWN};
 use hums_core::clock::{Instant, Span};
@@ -25,19 +25,19 @@ use hums_core::observation::{Autopilot, Source};
 use crate::messages;
 use crate::packet::Packet;
 
-/// How long we listen after the vehicle is heard first, or has rebooted.
+/// Listening time after first contact or a reboot.
 pub const LISTEN: Span = Span::from_secs(5);
-/// How often the rates are looked at.
+/// Interval between checks of the rates.
 pub const ROUND: Span = Span::from_secs(10);
-/// Of the line, in percent, what all messages asked for may take together.
+/// Share of the line for all requested messages, percent.
 pub const SHARE: u32 = 50;
-/// How long an answer may take.
+/// Timeout of an answer.
 const ANSWER: Span = Span::from_secs(1);
-/// How often a command is repeated when there is no answer.
+/// Repeats of an unanswered command.
 const TRIES: u8 = 3;
-/// Commands without any answer, one after the other, that make an autopilot one that does not answer.
+/// After this many unanswered commands in a row the autopilot counts as one that does not answer.
 const DEAF: u8 = 6;
-/// Rounds doubled at most: 10 s, 20 s ... 10 minutes and a half.
+/// Most doublings of the interval: 10 s, 20 s ... 10.5 min.
 const PATIENCE_MAX: u8 = 6;
 
 /// `MAV_CMD_SET_MESSAGE_INTERVAL`
@@ -54,7 +54,7 @@ const UNSUPPORTED: u8 = 3;
 /// As above.
 const IN_PROGRESS: u8 = 5;
 
-/// Who sends a message.
+/// Autopilots that send a message.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum By {
     Both,
@@ -62,10 +62,10 @@ enum By {
     ArduPilot,
 }
 
-/// id, who sends it, how many a second, bytes of a frame.
+/// Id, senders, rate in Hz, bytes of a frame.
 type Wanted = (u32, By, u8, u8);
 
-/// What the checks need, the most needed first.
+/// Messages that the checks need, most important first.
 const WANTED: [Wanted; 34] = [
     (1, By::Both, 5, 43),            // SYS_STATUS
     (30, By::Both, 10, 40),          // ATTITUDE
@@ -109,29 +109,29 @@ const GROUPS: [(u8, u16); 7] = [(1, 4), (2, 2), (3, 2), (6, 4), (10, 8), (11, 4)
 /// Whether an autopilot has a message.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 enum Has {
-    /// Nobody knows.
+    /// Unknown.
     #[default]
     Perhaps,
-    /// It came, or one of them was granted.
+    /// Received, or a request was accepted.
     Yes,
-    /// It was refused.
+    /// Refused.
     No,
 }
 
 #[derive(Clone, Copy, Debug, Default)]
 struct Message {
-    /// Frames since the last look.
+    /// Frames since the last check.
     seen: u8,
     has: Has,
-    /// How often it was promised and did not come.
+    /// Accepted requests without a message.
     patience: u8,
-    /// Rounds to wait before it is asked for again.
+    /// Rounds until the next request.
     wait: u8,
-    /// To be asked for in this round.
+    /// Due for a request in this round.
     due: bool,
 }
 
-/// What is asked for and not answered yet.
+/// Pending request.
 #[derive(Clone, Copy, Debug)]
 struct Asked {
     what: What,
@@ -141,30 +141,30 @@ struct Asked {
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum What {
-    /// One of a message, to see whether the autopilot has it.
+    /// A single message, to test whether the autopilot supports it.
     One(usize),
     Interval(usize),
     Identity,
-    /// The place of a parameter in [`KNOWN`].
+    /// Index of a parameter in [`KNOWN`].
     Parameter(usize),
 }
 
-/// What we ask of the autopilot.
+/// Requests to the autopilot.
 #[derive(Clone, Debug)]
 pub struct Asking {
     vehicle: Option<(Source, Autopilot)>,
     reboots: u32,
     messages: [Message; WANTED.len()],
     asked: Option<Asked>,
-    /// When rates are looked at next.
+    /// Time of the next check of the rates.
     look_at: Instant,
     window: Span,
-    /// Commands without an answer, one after the other.
+    /// Unanswered commands in a row.
     deaf: u8,
-    /// It knows no intervals: the next group to ask for, or how many there are when all are.
+    /// For an autopilot without intervals: the next group to request; the number of groups when done.
     groups: Option<usize>,
     identity: Message,
-    /// Parameters that were not told yet, a bit each by their place.
+    /// Parameters not yet received, one bit per index.
     parameters: u32,
 }
 
@@ -174,23 +174,23 @@ impl Default for Asking {
     }
 }
 
-/// What the vehicle is, at this moment.
+/// Current state of the vehicle.
 #[derive(Clone, Copy, Debug)]
 pub struct Known {
     /// The autopilot.
     pub source: Source,
-    /// Whose it is.
+    /// Its firmware.
     pub autopilot: Autopilot,
-    /// How often it has rebooted.
+    /// Number of reboots.
     pub reboots: u32,
-    /// Whether its `AUTOPILOT_VERSION` came.
+    /// Whether `AUTOPILOT_VERSION` was received.
     pub identified: bool,
     /// The port's line rate.
     pub baud: u32,
 }
 
 impl Asking {
-    /// Nobody heard yet.
+    /// Before first contact.
     pub const fn new() -> Self {
         const NONE: Message = Message { seen: 0, has: Has::Perhaps, patience: 0, wait: 0, due: false };
         Self {
@@ -207,12 +207,12 @@ impl Asking {
         }
     }
 
-    /// Who is asked.
+    /// Recipient of the requests.
     pub fn of(&self) -> Option<Source> {
         self.vehicle.map(|(source, _)| source)
     }
 
-    /// Whether it was asked for all parameters that it may have, and has answered or let the time for it go by.
+    /// Whether all parameters were requested, and each request was answered or timed out.
     pub fn has_parameters(&self, known: &Known) -> bool {
         known.autopilot != Autopilot::Other
             && self.of() == Some(known.source)
@@ -220,7 +220,7 @@ impl Asking {
             && self.parameter(known).is_none()
     }
 
-    /// A frame of the vehicle came.
+    /// Processes a frame of the vehicle.
     pub fn seen(&mut self, id: u32) {
         if let Some(index) = WANTED.iter().position(|wanted| wanted.0 == id) {
             let message = &mut self.messages[index];
@@ -228,7 +228,7 @@ impl Asking {
         }
     }
 
-    /// The autopilot told a parameter's value.
+    /// Processes a received parameter value.
     pub fn told(&mut self, name: &str) {
         if let Some(place) = cells::known(name) {
             self.parameters &= !(1 << place);
@@ -238,7 +238,7 @@ impl Asking {
         }
     }
 
-    /// The autopilot answered a command.
+    /// Processes an answer to a command.
     pub fn answered(&mut self, command: u16, result: u8) {
         let Some(asked) = self.asked else { return };
         let (expected, message) = match asked.what {
@@ -250,7 +250,7 @@ impl Asking {
         if command != expected || result == IN_PROGRESS {
             return;
         }
-        // One that does not know the question may know the other one.
+        // An autopilot that does not know this command may know the other one.
         let asks_one = matches!(asked.what, What::One(_));
         let is_granted = matches!(result, ACCEPTED | TEMPORARILY) || (asks_one && result == UNSUPPORTED);
         message.has = if is_granted { Has::Yes } else { Has::No };
@@ -259,11 +259,11 @@ impl Asking {
         self.deaf = 0;
     }
 
-    /// To be called at every tick; at most one message is given to `send`, which says whether it could be sent.
+    /// Call at every tick. Passes at most one message to `send`, which returns whether it was sent.
     pub fn tick(&mut self, now: Instant, known: Option<&Known>, send: &mut impl FnMut(&Packet) -> bool) {
         let Some(known) = known else { return };
         if self.vehicle != Some((known.source, known.autopilot)) || self.reboots != known.reboots {
-            // It knows nothing of what we asked before.
+            // A rebooted autopilot has forgotten all earlier requests.
             *self = Self::new();
             self.vehicle = Some((known.source, known.autopilot));
             self.reboots = known.reboots;
@@ -282,7 +282,7 @@ impl Asking {
         let window_ms = self.window.as_millis() as u32;
         let mut missing = false;
         for (message, wanted) in self.messages.iter_mut().zip(&WANTED) {
-            // Less than two thirds of what is wanted.
+            // Less than two thirds of the requested rate.
             let expected = u32::from(wanted.2) * window_ms / 1_000 * 2 / 3;
             let is_enough = u32::from(message.seen) * stretch >= expected.clamp(1, 200);
             message.seen = 0;
@@ -358,13 +358,13 @@ impl Asking {
                 What::Interval(index) => self.messages[index].due = false,
                 What::One(_) | What::Parameter(_) => {}
             }
-            // One that it does not have is asked for once more, and not twice.
+            // An unanswered parameter request is repeated once.
             let tries = if matches!(what, What::Parameter(_)) { TRIES - 1 } else { 1 };
             self.asked = Some(Asked { what, at: now, tries });
         }
     }
 
-    /// What is asked for next. One that knows no intervals is asked for parameters only.
+    /// The next request. An autopilot without intervals gets parameter requests only.
     fn next(&self, known: &Known) -> Option<What> {
         let commands = || {
             if self.identity.due {
@@ -378,7 +378,7 @@ impl Asking {
         command.or_else(|| self.parameter(known).map(What::Parameter))
     }
 
-    /// The next parameter that this autopilot may have, once the rates were looked at.
+    /// The next parameter that this autopilot may have, once the rates were checked.
     fn parameter(&self, known: &Known) -> Option<usize> {
         let px4 = match known.autopilot {
             Autopilot::Px4 => true,
@@ -389,7 +389,7 @@ impl Asking {
         (0..KNOWN.len()).find(due).filter(|_| self.window == ROUND)
     }
 
-    /// Everything that any autopilot has was refused.
+    /// The autopilot refused messages that every autopilot has.
     fn knows_no_intervals(&self) -> bool {
         let both = self.messages.iter().zip(&WANTED).filter(|(_, wanted)| wanted.1 == By::Both);
         both.filter(|(message, _)| message.has == Has::No).count() >= 3
@@ -403,7 +403,7 @@ const fn is_sent_by(wanted: &Wanted, autopilot: Autopilot) -> bool {
     )
 }
 
-/// By how much all intervals are stretched so that the line carries them.
+/// Factor by which all intervals are stretched to fit the line.
 fn stretch(known: &Known) -> u32 {
     let sent = WANTED.iter().filter(|wanted| is_sent_by(wanted, known.autopilot));
     let bytes_per_s: u32 = sent.map(|wanted| u32::from(wanted.2) * u32::from(wanted.3)).sum();

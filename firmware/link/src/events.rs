@@ -1,7 +1,8 @@
 //! PX4's events: which were missed on the way, and asking for them again (MAVLink events interface).
 //!
 //! Each `EVENT` has a sequence number, and `CURRENT_EVENT_SEQUENCE` tells the latest every 3 s. PX4 keeps the last ones and sends what
-//! `REQUEST_EVENT` names. What it no longer has, or does not send when asked three times, is gone: the checks do without.
+//! `REQUEST_EVENT` names. An event that the autopilot no longer has, or does not send after three requests, is lost; the checks
+//! do without it.
 
 use hums_core::clock::{Instant, Span};
 use hums_core::observation::Source;
@@ -110,7 +111,7 @@ impl Events {
         }
     }
 
-    /// What is older than this is gone.
+    /// Older events are lost.
     fn refused(&mut self, oldest: u16) {
         let Some(missing) = &mut self.missing else { return };
         let is_later = |one: u16, than: u16| one.wrapping_sub(than).wrapping_sub(1) < u16::MAX / 2;
@@ -128,7 +129,7 @@ mod tests {
 
     const PX4: Source = Source { system: 1, component: 1 };
 
-    /// What is asked for at this second.
+    /// Requests due in this second.
     fn asks(events: &mut Events, second: u64) -> Option<(u16, u16)> {
         let mut asked = None;
         events.tick(Instant::from_millis(1_000 * second), PX4, &mut |packet| {

@@ -1,5 +1,5 @@
-//! One MAVLink frame as it came: borrowed bytes and where its parts lie. Nothing is copied and nothing is altered, so
-//! that a frame can be recorded and forwarded bit for bit.
+//! One received MAVLink frame: borrowed bytes and the offsets of its parts. Bytes are never copied or altered, so a frame can be
+//! recorded and forwarded bit for bit.
 
 use hums_core::observation::Source;
 use hums_dialect::crc;
@@ -9,16 +9,16 @@ use hums_dialect::wire::{
 
 use crate::packet::Fields;
 
-/// What the checksum says.
+/// Result of the checksum test.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Check {
-    /// Right, with the definition that we know: the payload means what the definition says.
+    /// Correct with our definition of the message.
     Verified,
-    /// Framed consistently, but with a definition that we do not know: only to be kept and passed on.
+    /// Consistent frame of an unknown definition: record and forward it only.
     Unverified,
 }
 
-/// Where the parts of a frame lie; what its first bytes say.
+/// Header of a frame and the offsets of its parts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Header {
     /// 1 or 2.
@@ -31,17 +31,17 @@ pub(crate) struct Header {
     pub(crate) id: u32,
 }
 
-/// Why there is no header.
+/// Reason for a missing header.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum NoHeader {
-    /// It may become one: so many bytes are needed to say.
+    /// Undecided: this many bytes are needed.
     Incomplete(usize),
-    /// It is none: no start byte, or a flag that changes the frame in a way that we do not know.
+    /// Not a header: no start byte, or an unknown incompatibility flag.
     Invalid,
 }
 
 impl Header {
-    /// Reads the first bytes of what may be a frame.
+    /// Reads a header from the first bytes of a candidate.
     #[inline]
     pub(crate) fn read(bytes: &[u8]) -> Result<Self, NoHeader> {
         match *bytes {
@@ -81,13 +81,13 @@ impl Header {
         }
     }
 
-    /// Where the payload begins.
+    /// Offset of the payload.
     #[inline]
     pub(crate) const fn payload_at(&self) -> usize {
         if self.version == 1 { HEADER_V1_BYTES } else { HEADER_V2_BYTES }
     }
 
-    /// Where the checksum begins.
+    /// Offset of the checksum.
     #[inline]
     pub(crate) const fn checksum_at(&self) -> usize {
         self.payload_at() + self.payload_len as usize
@@ -100,7 +100,7 @@ impl Header {
     }
 }
 
-/// The checksum that was computed, before `crc_extra`, and the one that was sent.
+/// The computed checksum before `crc_extra`, and the transmitted one.
 #[inline]
 pub(crate) fn checksums(header: &Header, bytes: &[u8]) -> Option<(u16, u16)> {
     let at = header.checksum_at();
@@ -109,23 +109,22 @@ pub(crate) fn checksums(header: &Header, bytes: &[u8]) -> Option<(u16, u16)> {
     Some((computed, sent))
 }
 
-/// A whole frame, as it came.
+/// A complete received frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Frame<'a> {
     header: Header,
     bytes: &'a [u8],
     check: Check,
-    /// The message by its index in the dialect's table, where the checksum is right.
+    /// Index of the message in the dialect's table, if the checksum is correct.
     message: Option<u16>,
 }
 
 impl<'a> Frame<'a> {
-    /// The frame that `bytes` are, from the first byte to the last, or `None` where they are none: no start byte,
-    /// unknown flags, or another length than the header says. The checksum is compared with our definition of the
-    /// message: where it does not fit, or there is none, the frame is [`Check::Unverified`].
+    /// Reads `bytes` as exactly one frame. `None` without a start byte, with unknown flags, or if the length differs from the
+    /// header's. Without a matching definition of the message the frame is [`Check::Unverified`].
     ///
-    /// For bytes that were a frame before (from a log, or made by us); what comes from a line goes through
-    /// [`crate::framer::Framer`], which tells frames from noise.
+    /// For bytes from a log or from our encoder. Bytes from a line go through [`crate::framer::Framer`], which separates frames
+    /// from noise.
     pub fn parse(bytes: &'a [u8]) -> Option<Self> {
         let header = Header::read(bytes).ok()?;
         if header.frame_len() != bytes.len() {
@@ -139,7 +138,7 @@ impl<'a> Frame<'a> {
         Some(Self::from_parts(header, bytes, message))
     }
 
-    /// A frame that was checked before, for instance when it was recorded: not checked again.
+    /// A frame that was checked before, for example when it was recorded. Skips the checksum.
     pub fn again(bytes: &'a [u8], check: Check) -> Option<Self> {
         let header = Header::read(bytes).ok().filter(|header| header.frame_len() == bytes.len())?;
         let message = if check == Check::Verified { hums_dialect::index(header.id) } else { None };
@@ -160,7 +159,7 @@ impl<'a> Frame<'a> {
         Self { header, bytes, check, message }
     }
 
-    /// The message by its index in the dialect's table; `None` where the checksum is not that of our definition.
+    /// Index of the message in the dialect's table; `None` if the checksum does not match our definition.
     #[inline]
     pub const fn message(&self) -> Option<u16> {
         self.message
@@ -172,19 +171,19 @@ impl<'a> Frame<'a> {
         self.header.id
     }
 
-    /// The system that sent it.
+    /// System id of the sender.
     #[inline]
     pub const fn system(&self) -> u8 {
         self.header.system
     }
 
-    /// The component of that system.
+    /// Component id of the sender.
     #[inline]
     pub const fn component(&self) -> u8 {
         self.header.component
     }
 
-    /// Who sent it.
+    /// Sender.
     #[inline]
     pub const fn source(&self) -> Source {
         Source { system: self.header.system, component: self.header.component }
@@ -208,7 +207,7 @@ impl<'a> Frame<'a> {
         self.header.signed
     }
 
-    /// System and component whom it is for, 0 for all; `None` where its message names nobody, or is not known.
+    /// Target system and component, 0 for all; `None` if the message has no target or is unknown.
     pub fn target(&self) -> Option<(u8, u8)> {
         let message = hums_dialect::messages().get(usize::from(self.message?))?;
         if message.target_system == hums_dialect::Message::NO_TARGET {
@@ -218,8 +217,8 @@ impl<'a> Frame<'a> {
         Some((at(message.target_system), at(message.target_component)))
     }
 
-    /// What a signature is about (all bytes from the first to the checksum), and what follows them: link id, stamp and
-    /// hash. `None` where it is not signed.
+    /// The signed bytes (from the first to the checksum) and the signature (link id, timestamp, hash). `None` for an unsigned
+    /// frame.
     pub fn signature(&self) -> Option<(&'a [u8], &'a [u8; SIGNATURE_BYTES])> {
         self.bytes.split_last_chunk().filter(|_| self.header.signed)
     }
@@ -236,7 +235,7 @@ impl<'a> Frame<'a> {
         self.bytes
     }
 
-    /// What the checksum says.
+    /// Result of the checksum test.
     #[inline]
     pub const fn check(&self) -> Check {
         self.check

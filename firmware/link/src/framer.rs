@@ -4,9 +4,9 @@
 //! is there; [`Framer::idle`] says that the line is silent. Nothing depends on how the bytes are cut into pushes.
 //!
 //! # Resynchronising
-//! A *candidate* is a start byte and what follows it. Its bytes stay in the buffer until it is decided, and when it is
-//! no frame only its start byte is dropped and the search goes on from the next byte, so that a frame hidden behind a
-//! false start (a damaged length, a start byte in the payload, noise) is not lost with it.
+//! A *candidate* is a start byte and what follows it. Its bytes stay in the buffer until it is decided. If it is not a frame,
+//! only its start byte is dropped and the search continues from the next byte. So a false start (damaged length, start byte in
+//! the payload, noise) does not hide the frame behind it.
 //!
 //! # Frames of definitions that we do not have
 //! They must be recorded and passed on, yet line noise must not. For each checksum that does not fit we compute which
@@ -66,7 +66,7 @@ pub struct Framer {
     needed: usize,
     /// Bytes until the end of the last damaged frame: false starts inside are the same damage, counted once.
     damage_left: usize,
-    /// The first byte held follows a frame, a damaged frame or silence.
+    /// Whether the first byte held follows a frame, a damaged frame or silence.
     after_frame: bool,
     credit: u32,
     seen: Seen,
@@ -76,18 +76,18 @@ pub struct Framer {
 const _: () = assert!(size_of::<Framer>() <= 1_280);
 const _: () = assert!(BUFFER > FRAME_BYTES_MAX + 1, "a decided candidate must always make room");
 
-/// What becomes of the first bytes held.
+/// Decision about the first bytes held.
 enum Verdict {
     /// A frame, and its message if the checksum is ours.
     Frame(Header, Option<u16>),
-    /// So many bytes are of no frame.
+    /// This many bytes belong to no frame.
     Skip(usize),
-    /// Nobody can say with fewer bytes than this.
+    /// Undecided: this many bytes are needed.
     Wait(usize),
 }
 
 impl Framer {
-    /// A framer that has seen nothing.
+    /// An empty framer.
     pub const fn new() -> Self {
         Self {
             buffer: [0; BUFFER],
@@ -139,7 +139,7 @@ impl Framer {
         self.end - self.start
     }
 
-    /// What went through so far.
+    /// Counters.
     pub const fn counts(&self) -> FramerCounts {
         self.counts
     }
@@ -278,7 +278,7 @@ const fn is_start(byte: u8) -> bool {
     byte == START_V1 || byte == START_V2
 }
 
-/// What our definitions say of a header.
+/// Comparison of a header with our definitions.
 #[derive(Clone, Copy)]
 enum Known {
     /// There is a message of this id, and the payload may have this length.

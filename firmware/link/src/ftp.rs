@@ -45,7 +45,7 @@ pub fn checksum(before: u32, bytes: &[u8]) -> u32 {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Error {
-    /// For reasons that nobody knows.
+    /// Unspecified error.
     Fail = 1,
     /// No such session.
     InvalidSession = 4,
@@ -59,7 +59,7 @@ pub enum Error {
     FileNotFound = 10,
 }
 
-/// What a client asks.
+/// A client's request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Operation<'a> {
     /// Nothing: an answer is all.
@@ -126,7 +126,7 @@ pub struct Reply {
     pub session: u8,
     /// The operation that is answered.
     pub opcode: u8,
-    /// Where the data lies; with a checksum, how many bytes it is of.
+    /// Offset of the data; for a checksum, the number of bytes that it covers.
     pub offset: u32,
     /// The last one of a burst.
     pub complete: bool,

@@ -1,4 +1,4 @@
-//! The MAVLink edge: framer, decoding to observations, encoding of what we send.
+//! MAVLink interface: framer, decoder of observations, encoder of our messages.
 #![cfg_attr(not(test), no_std)]
 
 pub mod asking;

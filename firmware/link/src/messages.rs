@@ -1,4 +1,4 @@
-//! The messages that we send, field by field as they lie on the wire (`common.xml`).
+//! Our messages, fields in wire order (`common.xml`).
 
 use hums_core::clock::Instant;
 
@@ -8,7 +8,7 @@ use crate::text::{Severity, TEXT_BYTES_MAX};
 
 /// `MAV_TYPE_ONBOARD_CONTROLLER`
 const TYPE: u8 = 18;
-/// `MAV_AUTOPILOT_INVALID`: nobody takes us for a vehicle.
+/// `MAV_AUTOPILOT_INVALID`: marks a component that is not an autopilot.
 const AUTOPILOT: u8 = 8;
 /// `MAV_PARAM_TYPE_REAL32`
 const REAL32: u8 = 9;
@@ -86,14 +86,14 @@ pub struct ComputerStatus {
     pub links: [LinkStatus; 2],
 }
 
-/// How much goes over a port.
+/// Traffic of a port.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct LinkStatus {
-    /// Its rate, baud.
+    /// Line rate, baud.
     pub baud: u32,
-    /// What we send, bytes a second.
+    /// Sent, bytes per second.
     pub tx: Option<u32>,
-    /// What comes, bytes a second.
+    /// Received, bytes per second.
     pub rx: Option<u32>,
 }
 
@@ -162,7 +162,7 @@ pub fn file_transfer(system: u8, component: u8, payload: &[u8]) -> Packet {
     Packet::new(110).u8(1, system).u8(2, component).bytes(3, payload)
 }
 
-/// Whether a target is us: our component of our system, or anything of which we are a part.
+/// Whether a target includes us: our component, our whole system, or all systems.
 pub const fn concerns_us(target: (u8, u8), system: u8) -> bool {
     (target.0 == system || target.0 == 0) && (target.1 == COMPONENT || target.1 == 0)
 }

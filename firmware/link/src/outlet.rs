@@ -1,14 +1,12 @@
-//! What one port may send, and when: a byte budget that holds in every window of one second, the port's own line rate,
-//! and who goes first.
+//! Transmit scheduler of one port: a byte budget for every window of one second, the port's line rate, and priorities.
 //!
 //! # The budget
-//! Bytes are booked for the moment at which they will have left the port, by a model of its line: a frame begins when
-//! the one before it has left. A frame is let through when all bytes that leave the port in the second before its own
-//! beginning, together with its own, stay within its class's part of the budget. So no window of one second at the port
-//! itself ever holds more, whatever waits in the queue. Times are kept in slots of 20 ms and a slot counts whole, so at
-//! saturation up to 4 % of the budget stay unused.
+//! A model of the line gives each frame its transmission time: a frame starts when the previous one has left. The outlet accepts
+//! a frame if it fits its class's share of the budget. The bytes of the second before its start and its own bytes count. So no
+//! window of one second at the port exceeds the budget, whatever the queue holds. Times are kept in slots of 20 ms and a slot
+//! counts whole, so at saturation up to 4 % of the budget stay unused.
 //!
-//! # Who goes first
+//! # Priorities
 //! Each [`Class`] may fill the budget up to a mark of its own, so that the more urgent one always finds room above it;
 //! and only findings may wait behind more than [`BACKLOG`] of the line, so that a finding never waits longer than that.
 //! Events (the vehicle's texts and answers) and bulk (lists, logs) have half and three fifths of the budget at most, so
@@ -22,9 +20,9 @@ use crate::encode::{Encoder, FRAME_BYTES_MAX};
 use crate::packet::Packet;
 use crate::signing::Seal;
 
-/// How long the line may be busy when a frame that is no finding is added.
+/// Longest backlog of the line at which a frame other than a finding is accepted.
 pub const BACKLOG: Span = Span::from_millis(50);
-/// The same for findings, which come in bursts: no queue needs to hold more.
+/// The same for findings, which come in bursts. It limits the size of the queue.
 const BACKLOG_FINDINGS: Span = Span::from_millis(300);
 /// The same for what is forwarded, so that longer frames find the line free enough.
 const BACKLOG_FORWARD: Span = Span::from_millis(25);
@@ -44,9 +42,9 @@ pub enum Class {
     Finding,
     /// Heartbeats, and answers to those who ask.
     Own,
-    /// What the vehicle says once: texts, answers.
+    /// Single messages of the vehicle: texts, answers.
     Event,
-    /// The vehicle's frames that repeat, and our values.
+    /// Periodic frames of the vehicle, and our values.
     Forward,
     /// Lists and logs.
     Bulk,
@@ -63,7 +61,7 @@ struct Bucket {
 impl Bucket {
     const FULL: Self = Self { level: u64::MAX, at: Instant::ZERO };
 
-    /// What is in it now, in bytes; it holds one second of `bytes_per_s`.
+    /// Fill level, bytes; the capacity is one second of `bytes_per_s`.
     fn refresh(&mut self, now: Instant, bytes_per_s: u32) -> u32 {
         const UNIT: u64 = 1_000_000;
         let most = u64::from(bytes_per_s) * UNIT;
@@ -126,12 +124,12 @@ impl Window {
 pub struct Outlet {
     /// Makes our frames.
     pub encoder: Encoder,
-    /// Signs them, where they are to be signed.
+    /// Signs our frames, if signing is on.
     pub seal: Option<Seal>,
     window: Window,
     events: Bucket,
     bulk: Bucket,
-    /// What is forwarded while bulk waits.
+    /// Budget of forwarded frames while bulk waits.
     forward: Bucket,
     budget: u32,
     baud: u32,

@@ -72,7 +72,7 @@ impl Packet {
         Self { id, len: 0, payload: [0; PAYLOAD_BYTES_MAX] }
     }
 
-    /// Sets bytes; what lies beyond the longest payload is left out.
+    /// Sets bytes; bytes beyond the longest payload are dropped.
     #[inline(never)]
     pub fn bytes(mut self, at: usize, bytes: &[u8]) -> Self {
         for (index, byte) in bytes.iter().enumerate() {

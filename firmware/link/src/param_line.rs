@@ -11,7 +11,7 @@
 /// Our MAVLink component, as `QGroundControl`'s files name it.
 const COMPONENT: &str = "191";
 
-/// What a line says.
+/// Content of a line.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Line<'a> {
     /// Nothing, or nothing for us.

@@ -101,7 +101,7 @@ pub enum Reply {
     Metadata,
     /// HEARTBEAT
     Heartbeat,
-    /// What stands against a flight, as a text.
+    /// Objections to a flight, as a text.
     Preflight,
     /// Recording was stopped, as a text.
     Stopped,

@@ -1,4 +1,4 @@
-//! What a line has carried so far: which known messages each system has sent with our definition, and which
+//! History of a line: the known messages that each system has sent with our definition, and the
 //! `crc_extra` each system uses for messages that we do not know. Bounded; strict when full.
 
 /// Systems that are told apart; further ones share the last place.

@@ -9,7 +9,7 @@
 //!
 //! A date from a GPS receiver may be wrong (a week number that rolled over, a spoofer). One that is more than
 //! [`JUMP`] ahead of our time counts only when it has lasted for [`JUMP_LASTS`] ([`Clock::hear_utc`]): a clock that is years
-//! ahead would refuse every new stream for years. A good signature counts at once: whoever has the key has the time too.
+//! ahead would refuse every new stream for years. A good signature counts at once: a holder of the key also has the time.
 //!
 //! # Replay
 //! A frame whose stamp is not above its stream's last one is refused. A stream that was not heard since power-on has to
@@ -104,7 +104,7 @@ impl Clock {
         if stamp < STAMP_MAX { stamp } else { STAMP_MAX }
     }
 
-    /// What the autopilot says the time is; `false` where it is too far ahead to be believed yet.
+    /// Time reported by the autopilot; `false` where it is too far ahead to be believed yet.
     pub fn hear_utc(&mut self, at: Instant, stamp: u64) -> bool {
         let begin = stamp.min(STAMP_MAX).saturating_sub(at.as_micros() / 10);
         if begin > self.begin.saturating_add(JUMP) {
@@ -173,7 +173,7 @@ impl Seal {
     }
 }
 
-/// What a signature is worth.
+/// Result of a signature test.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Verdict {
     /// There is none.
@@ -194,7 +194,7 @@ struct Stream {
     who: [u8; 3],
 }
 
-/// What has to outlive power beside the key.
+/// State to store beside the key.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Times {
     /// The latest stamp of a frame that changed anything.

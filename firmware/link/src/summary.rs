@@ -1,12 +1,11 @@
-//! The summary stream to the ground station: the vehicle's own frames that matter to a pilot, unaltered and less often,
-//! and what the monitor has to say: heartbeat, findings as `STATUSTEXT`, levels and usage as `NAMED_VALUE_FLOAT`, and
-//! all levels together in one `NAMED_VALUE_INT` ([`state`]).
+//! Summary stream to the ground station. It forwards the vehicle's frames that a pilot needs, unaltered and at a lower rate. It
+//! adds the monitor's own messages: heartbeat, findings as `STATUSTEXT`, levels and usage as `NAMED_VALUE_FLOAT`, and all levels
+//! in one `NAMED_VALUE_INT` ([`state`]).
 //!
-//! All of it goes through an [`Outlet`], which keeps the byte budget and lets findings overtake. What repeats takes
-//! turns: a message may go when its interval is nearly over, and how long it has waited, in intervals, is its score.
-//! Where the budget does not carry them all, a frame goes only if the one with the highest score would still find room
-//! after it; so each becomes the highest in time, and nothing starves. One that has waited four times its interval
-//! goes like a heartbeat.
+//! An [`Outlet`] keeps the byte budget and lets findings overtake. A periodic message is due when its interval is nearly over.
+//! Its score is its waiting time in intervals. If the budget is short, a frame is sent only if the frame with the highest score
+//! still fits after it. So every score becomes the highest in time, and no message starves. A message that has waited four
+//! intervals gets the priority of a heartbeat.
 
 use core::fmt::Write as _;
 
@@ -83,7 +82,7 @@ const STARVED: u32 = 4;
 const GONE: u32 = 3;
 const GONE_MS: u32 = 3_000;
 
-/// When a message has its turn.
+/// Schedule of a message.
 #[derive(Clone, Copy, Debug)]
 struct Turn {
     /// Milliseconds since power-on, modulo 2^32, as `seen_ms`.
@@ -94,9 +93,9 @@ struct Turn {
 }
 
 impl Turn {
-    /// How long it has waited, in 16ths of its interval; at least 1. `None` before its turn.
+    /// Waiting time in 16ths of the interval, at least 1. `None` before it is due.
     fn score(&self, now_ms: u32, interval_ms: u32) -> Option<u32> {
-        // Streams jitter: what comes a quarter early is not told to come again.
+        // Streams jitter, so a frame may be a quarter of the interval early.
         let early = interval_ms / 4;
         let waited = now_ms.wrapping_add(early).wrapping_sub(self.due_ms);
         // The other half of the numbers is the future.
@@ -124,18 +123,18 @@ const fn interval_ms(index: usize) -> u32 {
     }) as u32
 }
 
-/// How the box itself is doing.
+/// State of the box.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct OwnFigures {
-    /// What the processor was busy in the last second, percent; 0 where nobody counts.
+    /// Processor load of the last second, percent; 0 if not measured.
     pub cpu_percent: f32,
-    /// The deepest the stack was, percent of it.
+    /// Highest use of the stack, percent.
     pub stack_percent: f32,
-    /// The fullest the sector queue was, percent.
+    /// Highest fill level of the sector queue, percent.
     pub queue_percent: f32,
-    /// The longest the card took for one call, seconds.
+    /// Longest call of the card, seconds.
     pub stall_s: f32,
-    /// What `ONBOARD_COMPUTER_STATUS` tells.
+    /// Content of `ONBOARD_COMPUTER_STATUS`.
     pub computer: ComputerStatus,
 }
 
@@ -146,7 +145,7 @@ pub struct Summary {
     pub outlet: Outlet,
     /// Whether the vehicle's frames are forwarded: not where the autopilot itself carries the stream.
     pub forwards: bool,
-    /// What the box says of itself.
+    /// The box's own status.
     pub own: OwnFigures,
     vehicle: Option<Source>,
     turns: [Turn; TURNS],
@@ -220,7 +219,7 @@ impl Summary {
         index == 0 || score.is_some_and(|score| score > 16 * STARVED)
     }
 
-    /// Whether it is its turn, and the one that has waited longest would still find room after it.
+    /// Whether the message is due and the longest-waiting one would still fit after it.
     fn has_turn(&mut self, index: usize, now: Instant, bytes: usize) -> bool {
         let now_ms = now.as_millis() as u32;
         let Some(score) = self.turns[index].score(now_ms, interval_ms(index)) else { return false };
@@ -241,9 +240,9 @@ impl Summary {
         self.outlet.fits_besides(now, class, bytes, first.1)
     }
 
-    /// Tells a finding that a pilot should hear of (`telling.rs`), now or as soon as the budget and its event allow.
+    /// Sends a finding to the pilot (`telling.rs`), now or as soon as the budget and its event allow.
     pub fn finding(&mut self, now: Instant, finding: &Finding, out: &mut impl FnMut(&[u8])) {
-        // What was not told yet is out of date.
+        // The waiting text is out of date.
         self.waiting.retain(|other| (other.check, other.instance) != (finding.check, finding.instance));
         let is_news = self.telling.is_news(finding);
         if severity(finding).is_none() || !is_news {
@@ -298,7 +297,7 @@ impl Summary {
         }
     }
 
-    /// What time alone asks for: heartbeat, values, and findings that wait.
+    /// Periodic work: heartbeat, values, and waiting findings.
     pub fn tick(&mut self, now: Instant, monitor: &Monitor, out: &mut impl FnMut(&[u8])) {
         if let Some(source) = monitor.vehicle().source {
             self.vehicle = Some(source);
@@ -313,7 +312,7 @@ impl Summary {
             self.heartbeat_at = Some(now);
         }
         let now_ms = now.as_millis() as u32;
-        // Where it is longer than what may hold up a finding, or than a slow budget carries, it would wait for ever.
+        // A message too long for the backlog limit or for a slow budget would wait for ever.
         let has_room = COMPUTER_BYTES <= self.outlet.bulk_frame_max();
         for (index, bytes) in [(STATE, VALUE_BYTES), (VALUES, VALUE_BYTES), (COMPUTER, COMPUTER_BYTES)] {
             if index == COMPUTER && !has_room {
@@ -352,21 +351,21 @@ pub fn heartbeat(monitor: &Monitor) -> Packet {
     })
 }
 
-/// A value that is told in its turn.
+/// A value that is sent in turn.
 #[derive(Clone, Copy)]
 enum Told {
     /// A part's level: 0 ok, 1 advisory, 2 warning, 3 critical, 4 stale.
     Level(Subsystem),
-    /// Usage that a pilot asks for.
+    /// A usage figure.
     Usage(UsageCounter),
-    /// How the box is doing.
+    /// A state of the box.
     Own(fn(&OwnFigures) -> f32),
 }
 
 /// The overall level, on the scale of [`Told::Level`]: it comes every other time, before each of [`VALUES_TOLD`].
 const OVERALL: &str = "HUMS_LEVEL";
 
-/// What is told in turn, by the name that a ground station plots it by.
+/// Values sent in turn, with the names under which a ground station plots them.
 const VALUES_TOLD: [(&str, Told); 17] = [
     ("L_POWER", Told::Level(Subsystem::Power)),
     ("L_PROPULS", Told::Level(Subsystem::Propulsion)),
@@ -387,7 +386,7 @@ const VALUES_TOLD: [(&str, Told); 17] = [
     ("SD_STALL_S", Told::Own(|own| own.stall_s)),
 ];
 
-/// The value whose turn it is at this place of the round.
+/// The value at this position of the round.
 fn value(now: Instant, monitor: &Monitor, own: &OwnFigures, turn: usize) -> Packet {
     let (name, value) = match VALUES_TOLD.get(turn / 2).filter(|_| turn % 2 == 1) {
         None => (OVERALL, f32::from(monitor.health().overall() as u8)),
@@ -407,7 +406,7 @@ pub fn state(monitor: &Monitor) -> i32 {
     levels.enumerate().fold(0, |sum, (index, level)| sum | level << (3 * index))
 }
 
-/// How a finding is told, or `None` where a pilot need not hear of it.
+/// Severity of a finding's text, or `None` if the pilot does not need it.
 fn severity(finding: &Finding) -> Option<Severity> {
     match (finding.level, finding.previous) {
         (Level::Critical, _) => Some(Severity::Critical),
@@ -453,7 +452,7 @@ pub fn text(finding: &Finding) -> Text {
         && value.is_finite()
     {
         let value = Text::new(format_args!(": {before}{}{after}", quantity(value, finding.unit).as_str()));
-        // What to do says more than how much.
+        // The action matters more than the amount.
         if text.as_str().len() + value.as_str().len() + advice.as_str().len() <= TEXT_BYTES_MAX {
             let _ = text.write_str(value.as_str());
         }

@@ -6,8 +6,8 @@
 //! * A critical finding is never delayed. It is told where it asks for something that the event's texts did not ask for yet: the
 //!   fourth motor that is lost, or the pitch beside the roll, does not say LAND NOW again.
 //! * A warning, which needs nothing at once, waits for [`HOLD`]: where it becomes critical only that is told. Then it is the first text
-//!   of an event, or waits for the event's end, and is told if it is still so. So is what has no data, or is good again. That a check no longer applies, as after landing, is no news: nobody knows
-//!   whether what was bad is good.
+//!   of an event, or waits for the event's end, and is told if it is still so. So is what has no data, or is good again. A check
+//!   that no longer applies, as after landing, is not reported: its state is unknown.
 //! * Of a mishap its first kind is told, and one more that asks for something else where nothing led to it; that it is down, and
 //!   where, comes by itself. One whose order does not fit the vehicle is told with the one that does ([`order`]); where none does,
 //!   what led to it is not counted. What is mild, began with it or after it, and waits is a consequence, and is not told any longer.
@@ -24,7 +24,7 @@ use hums_core::health::{self, Finding, Level, Subsystem};
 const EVENT: Span = Span::from_secs(10);
 /// How long a warning waits for becoming critical.
 const HOLD: Span = Span::from_secs(1);
-/// What is not critical: texts in any span of this length.
+/// Window for the limit of texts that are not critical.
 const MILD_MAX: usize = 3;
 /// See [`MILD_MAX`].
 const SPAN: Span = Span::from_secs(30);
@@ -49,12 +49,12 @@ const fn family(part: Subsystem) -> Subsystem {
     if matches!(part, Subsystem::Attitude) { Subsystem::Propulsion } else { part }
 }
 
-/// What was told of one family.
+/// Reports of one family.
 #[derive(Clone, Copy, Debug)]
 struct Event {
     /// When its first text went, in milliseconds modulo 2^32.
     begun_ms: u32,
-    /// Texts; 0: there is no event.
+    /// Texts; 0: no event.
     told: u8,
     /// The numbers of the critical checks that were told.
     critical: [Option<u8>; 3],
@@ -196,7 +196,7 @@ fn key(finding: &Finding) -> Option<(u8, u8)> {
     Some((number(finding.check)?, finding.instance))
 }
 
-/// What a finding orders where it is critical, as it fits the vehicle; empty for nothing.
+/// Action that a critical finding demands of this vehicle; empty if none.
 pub(crate) fn order(finding: &Finding) -> &'static str {
     health::said(finding.ordering()).map_or("", |said| said.advice)
 }
@@ -206,7 +206,7 @@ fn part(number: u8) -> Option<Subsystem> {
     Some(health::checks().nth(usize::from(number))?.subsystem)
 }
 
-/// What a critical finding asks the pilot for.
+/// Action that a critical finding demands of the pilot.
 fn advice(number: u8) -> &'static str {
     let check = health::checks().nth(usize::from(number));
     check.and_then(|check| health::said(check.name)).map_or("", |said| said.advice)

@@ -5,9 +5,9 @@ use crate::packet::Fields;
 #[derive(Default)]
 struct Script {
     autopilot: Autopilot,
-    /// What it sends: id and how often a second.
+    /// Messages sent: id and rate in Hz.
     streams: Vec<(u32, u32)>,
-    /// What it cannot send.
+    /// Unsupported messages.
     unknown: Vec<u32>,
     /// Promised and never sent.
     empty: Vec<u32>,
@@ -24,7 +24,7 @@ struct Script {
     parameters: Vec<&'static str>,
     /// Names of parameters that it was asked for, and when.
     parameters_asked: Vec<(u64, String)>,
-    /// What it was asked: when in ms, command (or stream with the highest bit), first parameter.
+    /// Received requests: time in ms, command (or stream with the highest bit), first parameter.
     asked: Vec<(u64, u16, u32)>,
 }
 

@@ -1,4 +1,4 @@
-//! What the messages have in common: how their fields are decoded, and how senders say "unknown".
+//! Decoding of message fields, and the values that stand for "unknown".
 
 use hums_core::units::{Amperes, Fraction, Volts};
 use hums_dialect::wire::PAYLOAD_BYTES_MAX;

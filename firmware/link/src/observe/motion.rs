@@ -1,4 +1,4 @@
-//! Where the vehicle is, how it moves and how well it knows.
+//! Position, motion and the estimator's accuracy.
 
 use core::num::NonZeroU32;
 
@@ -54,13 +54,13 @@ fn course(hundredths: u16) -> Option<Radians> {
     unless(hundredths, u16::MAX).map(|course| Radians((f32::from(course) / 100.0).to_radians()))
 }
 
-/// Modulo 2^32; 0 is what is sent where nobody knows.
+/// Modulo 2^32; 0 means unknown.
 const fn milliseconds(us: u64) -> Option<NonZeroU32> {
     NonZeroU32::new((us / 1_000) as u32)
 }
 
 pub(super) fn gnss(payload: &[u8]) -> Option<Gnss> {
-    /// Where the fix stands: the only enumeration.
+    /// Offset of the fix type, the only enumeration.
     const FIX: usize = 28;
     let gps = read::<ap::GPS_RAW_INT_DATA>(payload, &[FIX])?;
     let fix = Fields(payload).u8(FIX);
@@ -196,7 +196,7 @@ pub(super) fn outputs(payload: &[u8]) -> Outputs {
     Outputs { port: Fields(payload).u8(20), pulses: core::array::from_fn::<u16, MOTORS_MAX, _>(pulse) }
 }
 
-/// An attitude that is no number is none.
+/// A NaN attitude counts as missing.
 pub(super) fn attitude(payload: &[u8]) -> Option<Attitude> {
     let attitude = read::<ap::ATTITUDE_DATA>(payload, &[])?;
     let [roll, pitch, yaw] = vector([attitude.roll, attitude.pitch, attitude.yaw])?.map(Radians);
@@ -279,7 +279,7 @@ fn ratio(value: f32) -> Option<f32> {
     (value.is_finite() && value >= 0.0).then_some(value)
 }
 
-/// ArduPilot. Before the filter runs it sends zeros, which are no variances.
+/// ArduPilot. Before the filter runs it sends zeros; these are not variances.
 pub(super) fn ekf_status_report(payload: &[u8]) -> Option<Estimator> {
     const UNINITIALISED: u16 = 1_024;
     let ekf = read::<ap::EKF_STATUS_REPORT_DATA>(payload, &[])?;

@@ -7,7 +7,7 @@ use hums_dialect::ardupilotmega as ap;
 use super::fields::{current, percent, read, voltage};
 use crate::packet::Fields;
 
-/// No lithium cell is charged above this, mV: what says more is the sum of several.
+/// Highest charge voltage of a lithium cell, mV. A higher value is the sum of several cells.
 const CELL_MAX_MV: u16 = 5_000;
 /// `MAV_BATTERY_TYPE_LIFE`.
 const LITHIUM_IRON: u8 = 2;

@@ -17,7 +17,7 @@ use crate::packet::Packet;
 /// `commander_failsafe_enter_hold` of PX4's event definitions.
 const FAILSAFE_HOLD: u32 = 13_704_694;
 
-/// What the message says, as sent: MAVLink 2, zeros at the end left out.
+/// Message as sent: MAVLink 2, zeros at the end left out.
 fn said<M: MessageData>(message: &M) -> Option<Observation> {
     let mut bytes = [0; 255];
     let len = message.ser(MavlinkVersion::V2, &mut bytes);

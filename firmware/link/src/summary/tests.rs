@@ -268,7 +268,7 @@ fn the_state_holds_every_subsystem() {
 /// A finding that comes at these tenths of a second: check, instance, level, the one before.
 type Comes = (u64, &'static str, u8, Level, Level);
 
-/// What is told of findings: tenths of a second, and the text after our name.
+/// Sent findings: time in tenths of a second, and the text after our name.
 fn told(findings: &[Comes]) -> Vec<(u64, String)> {
     told_because(findings, "")
 }
