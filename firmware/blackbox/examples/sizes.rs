@@ -5,7 +5,7 @@
 //! ```
 //! Each log begins with the records that a session has (boot, clock, vehicle) and has statistics every 10 s. It is read
 //! back and compared with the recording frame by frame; a difference ends the program. Signed recordings are shown but
-//! not counted: a signature is random. Files that are no tlog are taken for what a line of 57,600 baud carried.
+//! not counted: a signature is random. A file that is not a tlog is read as the raw bytes of a line of 57,600 baud.
 //! `--quick` leaves xz out. Exit codes: 0, or 1 where a mean is below its target.
 
 #[path = "../tests/common/card.rs"]
@@ -143,7 +143,7 @@ fn pack(frames: &[Frame<'_>]) -> Result<Vec<u8>> {
     Ok(card.0.iter().flat_map(|sector| *sector.bytes()).collect())
 }
 
-/// Whether the checksum is that of our definition.
+/// Whether the checksum matches our definition.
 fn checks(frame: &[u8]) -> bool {
     let (id, payload_at) = match *frame {
         [0xfe, _, _, _, _, id, ..] => (u32::from(id), 6),

@@ -1,12 +1,12 @@
-//! From blocks as they lie on the medium to sectors in order: checks each block, drops what is stale, chooses among
-//! copies of one sector, and says what is missing.
+//! Assembler: puts the blocks of a medium in order as sectors. It checks each block, drops stale ones, selects among copies of a
+//! sector, and reports missing sectors.
 //!
-//! A sector in progress is written as partial copies at its own place and the one after, in turn, so several versions
-//! of one number may lie next to each other; the fullest one counts. That needs one sector held back.
+//! The recorder writes partial copies of an unfinished sector alternately to its own block and the next one. So several copies of
+//! one number may be adjacent. The fullest one counts, so one sector is held back.
 //!
-//! A card may also put a page in the wrong place. A number that jumps ahead is therefore believed only when the next
-//! [`PAGE_SECTORS`] sectors go on from there; if the numbers before it come after all, what was ahead of them does not
-//! belong there. So a misplaced page costs as much as a missing one, and not all that lies between.
+//! A card may also misplace a page. So a jump ahead is accepted only if the next [`PAGE_SECTORS`] sectors continue from it. If
+//! the skipped numbers follow after all, the sectors ahead of them are dropped as misplaced. A misplaced page thus costs no more
+//! than a missing one.
 
 use heapless::Deque;
 
@@ -19,7 +19,7 @@ pub const PAGE_SECTORS: usize = 32;
 /// One more decides.
 const AHEAD_MAX: usize = PAGE_SECTORS + 1;
 
-/// What was seen so far, in blocks of 512 bytes.
+/// Counts of blocks of 512 bytes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct BlockCounts {
     /// All blocks.
@@ -29,24 +29,23 @@ pub struct BlockCounts {
     /// Copies of a sector in progress that a fuller one supersedes, and sectors from before the log's first one, which
     /// its file held before.
     pub superseded: u64,
-    /// Whole sectors of this session that are there twice or lie where others belong.
+    /// Complete sectors of this session that are duplicates or misplaced.
     pub misplaced: u64,
-    /// Blocks of this session, as far as can be told, that fail their check: torn or damaged.
+    /// Blocks apparently of this session with a wrong checksum: torn or damaged.
     pub damaged: u64,
-    /// Sound sectors of another session: left over from an earlier file.
+    /// Valid sectors of another session, left from an earlier file.
     pub stale: u64,
-    /// Blocks that begin as a sector and fail the check of one, and are not of this session as far as can be told: of an
-    /// older one, or of none.
+    /// Blocks that begin like a sector, have a wrong checksum and apparently belong to an older session or to none.
     pub unsound: u64,
     /// Parity sectors of this session, sound or not; those of others are stale.
     pub parity: u64,
-    /// Sectors that were made again from parity, and are counted as what they are; for whoever does that.
+    /// Sectors rebuilt from parity, also counted by their kind. The rebuilding code sets this.
     pub repaired: u64,
     /// All zeros.
     pub empty: u64,
     /// All ones: erased.
     pub erased: u64,
-    /// Anything else, for instance sectors of another format version.
+    /// Any other block, for example a sector of another format version.
     pub foreign: u64,
     /// Sound sectors of an older format version, which this build does not read, also counted as foreign.
     pub older_version: u64,
@@ -55,7 +54,7 @@ pub struct BlockCounts {
 }
 
 impl BlockCounts {
-    /// What came after `before` was counted.
+    /// Counts since `before`.
     #[must_use]
     pub const fn since(&self, before: &Self) -> Self {
         Self {
@@ -77,43 +76,43 @@ impl BlockCounts {
     }
 }
 
-/// A sector in its order.
+/// A sector in order.
 #[derive(Clone, Copy, Debug)]
 pub struct Step {
     /// Its header.
     pub header: Header,
     /// The sector.
     pub sector: Sector,
-    /// Numbers missing between the sector before and this one.
+    /// Numbers missing before this sector.
     pub missing: u32,
-    /// Blocks between the sector before and this one that fail their check, are no sector or do not belong there.
+    /// Invalid or misplaced blocks between the previous sector and this one.
     pub damaged: u32,
 }
 
-/// Puts the sectors of one session in order. After each block, [`Self::next`] gives what is then known to be in order.
+/// Puts the sectors of one session in order. After each block, [`Self::next`] returns the sectors known to be in order.
 #[derive(Debug, Default)]
 pub struct Assembler {
     session: Option<u32>,
     held: Option<Step>,
-    /// The one that was held before it.
+    /// The previously held sector.
     out: Option<Step>,
-    /// Sectors whose number jumped, until it is clear whether the log goes on with them.
+    /// Sectors after a jump of the number, until the log is known to continue with them.
     ahead: Deque<Step, AHEAD_MAX>,
-    /// It does: they are given out.
+    /// The log continues with them; they are being returned.
     believed: bool,
-    /// The files before the first one are gone: it does not begin with number 0.
+    /// Earlier files of the log are lost, so the first file does not begin with number 0.
     late: bool,
     ended: bool,
     first_number: Option<u32>,
     last_number: Option<u32>,
-    /// Blocks that are no sector since the last one.
+    /// Invalid blocks since the last sector.
     bad_blocks: u32,
-    /// Those of them that were sectors of this session, as far as can be told.
+    /// Those apparently of this session.
     bad_own: u32,
     counts: BlockCounts,
     /// The counts at the last sector.
     at_last: BlockCounts,
-    /// The latest power-on that a sector of another session tells, microseconds since 1970.
+    /// Latest power-on time found in a sector of another session, microseconds since 1970.
     other_epoch: Option<u64>,
 }
 
@@ -135,8 +134,8 @@ impl Assembler {
         Self { late: true, ..self }
     }
 
-    /// Another file of the log begins: what is ahead in the first one is in its place. Call [`Self::next`] until it gives
-    /// `None` before the next block.
+    /// Starts another file of the log: sectors ahead in the first file are accepted. Call [`Self::next`] until it gives `None`
+    /// before the next block.
     pub fn begin_file(&mut self) {
         self.believed |= self.late && !self.has_begun();
     }
@@ -146,7 +145,7 @@ impl Assembler {
         self.held.is_some() || self.last_number.is_some()
     }
 
-    /// Takes the next block. Call [`Self::next`] until it gives `None` before the next one.
+    /// Takes the next block. Before each block, call [`Self::next`] until it returns `None`.
     pub fn feed(&mut self, block: &[u8; SECTOR_BYTES]) {
         self.counts.blocks += 1;
         let header = match Header::read(block) {
@@ -198,13 +197,13 @@ impl Assembler {
         }
     }
 
-    /// No more blocks: [`Self::next`] gives what is left.
+    /// Ends the input: [`Self::next`] returns the remaining sectors.
     pub const fn end(&mut self) {
         self.ended = true;
         self.believed = true;
     }
 
-    /// A sound sector of this session.
+    /// A valid sector of this session.
     fn place(&mut self, mut step: Step) {
         let number = step.header.number;
         let last = self.held.as_ref().map(|held| held.header.number).or(self.last_number);
@@ -220,7 +219,7 @@ impl Assembler {
         }
     }
 
-    /// A number that was there already, or that belongs before what is there.
+    /// A number that is a duplicate or too low.
     fn behind(&mut self, step: &Step, last: u32) {
         let number = step.header.number;
         let before_all = self.first_number.is_none_or(|first| number < first);
@@ -242,15 +241,15 @@ impl Assembler {
         }
     }
 
-    /// A number that does not follow: perhaps the log goes on there.
+    /// A jump of the number: the log may continue from it.
     fn jumped(&mut self, mut step: Step) {
         // Before anything was given out, only a log that begins at number 0 tells which sectors are in their place: lower
         // numbers in a ring's oldest file are left over.
         let number = step.header.number;
         let is_in_place = !self.late && u64::from(number) + 1 == self.counts.blocks;
         let begun = self.has_begun();
-        // The recorder writes a file anew only when others lie between what it holds and the new sectors: what is left over
-        // in it is older than its first new one by more than one.
+        // The recorder rewrites a file only if other files come between its old and its new sectors. So an old sector's number is
+        // lower than the first new one by more than one.
         let first = self.ahead.front().map(|first| first.header.number);
         let is_left_over = step.header.partial || first.is_none_or(|first| number.saturating_add(1) < first);
         match self.ahead.back_mut() {
@@ -276,7 +275,7 @@ impl Assembler {
         self.believed = self.ahead.is_full();
     }
 
-    /// What was ahead does not belong there.
+    /// The sectors ahead are misplaced.
     fn drop_ahead(&mut self) {
         while let Some(step) = self.ahead.pop_front() {
             self.counts.misplaced += 1;
@@ -304,24 +303,24 @@ impl Assembler {
         self.at_last.sectors += 1;
     }
 
-    /// What the blocks after the last sector were.
+    /// Kinds of the blocks after the last sector.
     pub const fn behind_last(&self) -> BlockCounts {
         self.counts.since(&self.at_last)
     }
 
-    /// The latest power-on that a sector of another session tells, microseconds since 1970. What is left over in a file
-    /// is older than the log that replaced it.
+    /// Latest power-on time found in a sector of another session, microseconds since 1970. Old sectors in a file are older than
+    /// the log that replaced it.
     pub const fn other_epoch_micros(&self) -> Option<u64> {
         self.other_epoch
     }
 
-    /// Blocks since the last sector that were sectors of this session and fail their check. What a file was before it
-    /// became a log may follow its last sector, and is no damage.
+    /// Blocks since the last sector that were sectors of this session and fail their check. Old contents of a file may follow its
+    /// last sector; they are not damage.
     pub const fn damaged_since(&self) -> u32 {
         self.bad_own
     }
 
-    /// What was seen so far.
+    /// Counts so far.
     pub const fn counts(&self) -> BlockCounts {
         self.counts
     }

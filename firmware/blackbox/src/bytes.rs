@@ -66,7 +66,7 @@ impl<'a> Fields<'a> {
         u64::from_le_bytes(self.array())
     }
 
-    /// A length and that many bytes; what is not UTF-8 ends the text.
+    /// A length and that many bytes; the first invalid UTF-8 byte ends the text.
     pub(crate) fn text(&mut self) -> &'a str {
         let len = self.u8();
         let bytes = self.bytes(usize::from(len));

@@ -1,4 +1,4 @@
-//! The check over a session's entries as they came: what a reader makes anew of the entries that it decoded.
+//! Chained check of a session's received entries. A reader computes it again from the decoded entries.
 //!
 //! Each entry gives a CRC-32C of its time, kind, length and bytes, which knows nothing of the codec: so a recorder whose memory has
 //! changed cannot write a wrong frame that passes for a right one. The values are chained, from the session's first entry to its
@@ -8,7 +8,7 @@
 use crate::codec::{Entry, Kind};
 use crate::crc::{Crc32c, crc32c};
 
-/// The value of one entry as it came.
+/// Value of one received entry.
 pub(crate) fn value_of(entry: &Entry<'_>) -> u32 {
     let kind = match entry.kind {
         Kind::Frame { verified } => u8::from(verified),

@@ -32,7 +32,7 @@ const fn cut(low: u32, range: u32) -> Option<u32> {
     }
 }
 
-/// Where the encoder's bytes go for one entry.
+/// Output buffer of the encoder for one entry.
 pub(crate) struct Scratch<const N: usize> {
     bytes: [u8; N],
     len: usize,
@@ -112,8 +112,8 @@ impl Encoder {
     }
 }
 
-/// One end of the coder. Writer and reader run the same code over it: what is given is written by the one and made
-/// up by the other, which gives back what it read.
+/// One end of the coder. Writer and reader run the same code over it. The writer codes the given value; the reader ignores it and
+/// returns the decoded one.
 pub(crate) trait Coder {
     /// Whether what is given counts.
     const WRITES: bool;
@@ -252,7 +252,7 @@ impl Decoder {
         (self.offset / self.range).min((1 << bits) - 1)
     }
 
-    /// Whether what comes next is one of the first so many of the `1 << bits` parts: `part` without dividing.
+    /// Whether the next value is among the first `parts` of the `1 << bits` parts: `part` without dividing.
     #[inline]
     pub(crate) fn is_below(&mut self, parts: u32, bits: u32) -> bool {
         self.range >>= bits;

@@ -5,8 +5,8 @@
 
 const POLYNOMIAL: u32 = 0x82f6_3b78;
 
-/// What a byte does to the check, and what it does when one, two or three bytes follow it: four bytes are taken in one
-/// step, which more than halves what a sector costs.
+/// Tables for a byte followed by zero, one, two or three bytes. Four bytes take one step, which more than halves the cost of a
+/// sector.
 static TABLES: [[u32; 256]; 4] = tables();
 
 const fn tables() -> [[u32; 256]; 4] {
@@ -39,7 +39,7 @@ impl Crc32c {
         Self(!value)
     }
 
-    /// The check of what is known when this is compiled.
+    /// Checksum of constants, at compile time.
     pub(crate) const fn of_constant(bytes: &[u8]) -> u32 {
         let tables = tables();
         let (mut crc, mut at) = (u32::MAX, 0);
@@ -74,7 +74,7 @@ impl Crc32c {
     }
 }
 
-/// The instruction that a PC has for it: a tenth of what reading took is making this check by the tables.
+/// The CRC instruction of a PC. With the tables this checksum took a tenth of the reading time.
 #[cfg(target_arch = "x86_64")]
 mod sse42 {
     use core::arch::x86_64::{__cpuid, _mm_crc32_u8, _mm_crc32_u64};

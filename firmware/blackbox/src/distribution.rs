@@ -1,4 +1,4 @@
-//! What the coder's probabilities are learned in: distributions over 16 symbols, and cells for single bits.
+//! Adaptive probabilities of the coder: distributions over 16 symbols, and cells for single bits.
 
 mod at_once;
 
@@ -17,7 +17,7 @@ pub(crate) const PROBABILITY_BITS: u32 = 16;
 #[repr(align(4))]
 pub(crate) struct Cdf([u16; SYMBOLS]);
 
-/// Where the uses are.
+/// Offset of the use count.
 const USES: usize = SYMBOLS - 1;
 
 /// How often a distribution is used until it adapts no more slowly.
@@ -33,7 +33,7 @@ const SPEEDS: [u8; USES_MAX as usize] = [1, 2, 2, 3, 3, 3, 3, 3, 4, 4, 4, 4, 4, 
 const SPEED_LAST: u32 = 5;
 const _: () = assert!(USES_MAX >> SPEED_LAST == 0);
 
-/// As sure of the first symbol as it gets: where the first place stops.
+/// Highest probability of the first symbol: upper limit of the first place.
 const SURE: u16 = 0xf800;
 
 /// What each place gains in a step towards a symbol, two places in a word.
@@ -67,7 +67,7 @@ const fn gains() -> [[Gains; SYMBOLS]; SPEED_LAST as usize] {
 }
 
 impl Cdf {
-    /// All zeros, which is no distribution: what a model holds before its first reset.
+    /// All zeros, an invalid distribution, as before the first reset of a model.
     pub(crate) const UNSET: Self = Self([0; SYMBOLS]);
     /// All symbols alike.
     pub(crate) const FLAT: Self = Self::from_sizes([1; SYMBOLS]);
@@ -97,7 +97,7 @@ impl Cdf {
         self
     }
 
-    /// Where a symbol (modulo 16) begins, and its size, of 2^16.
+    /// Start and size of a symbol (modulo 16), of 2^16.
     #[inline]
     pub(crate) fn part_of(&self, symbol: usize) -> (u32, u32) {
         let symbol = symbol % SYMBOLS;
@@ -106,7 +106,7 @@ impl Cdf {
         (start, end - start)
     }
 
-    /// Where a symbol begins between this distribution and another one, and its size.
+    /// Start and size of a symbol in the mean of this distribution and another one.
     #[inline]
     pub(crate) fn part_between(&self, other: &Self, symbol: usize) -> (u32, u32) {
         let ((one, size), (two, other)) = (self.part_of(symbol), other.part_of(symbol));
@@ -163,7 +163,7 @@ const fn rates() -> [i16; 16] {
 pub(crate) struct Cell(u16);
 
 impl Cell {
-    /// All zeros: what a model holds before its first reset.
+    /// All zeros, as before the first reset of a model.
     pub(crate) const UNSET: Self = Self(0);
     /// Zero and one alike.
     pub(crate) const EVEN: Self = Self(0x8000);
@@ -213,7 +213,7 @@ mod tests {
                 500..700 => 15,
                 _ => (state >> 20) as usize % 16,
             };
-            // The plain form of what is done in pairs and sometimes spared.
+            // Plain form of the paired computation.
             let mut expected = cdf.0;
             let speed = SPEEDS.get(usize::from(cdf.0[USES])).map_or(SPEED_LAST, |&speed| u32::from(speed));
             for (place, value) in expected.iter_mut().enumerate().take(USES) {

@@ -20,7 +20,7 @@ pub enum Entry<'a> {
         at: Instant,
         /// The frame, from its magic byte to its checksum or signature.
         bytes: &'a [u8],
-        /// Its checksum is that of the definition that the monitor knew.
+        /// The checksum matches the monitor's definition.
         verified: bool,
     },
     /// A record of the monitor's own.
@@ -43,10 +43,10 @@ pub enum Outline<'a> {
         id: u32,
         /// Its length, from its magic byte to its checksum or signature.
         bytes: usize,
-        /// Its checksum is that of the definition that the monitor knew.
+        /// The checksum matches the monitor's definition.
         verified: bool,
     },
-    /// All of it: a record, bytes that are no frame, or a frame with flags that nobody knows.
+    /// The whole entry: a record, bytes outside frames, or a frame with unknown flags.
     Whole(Entry<'a>),
 }
 
@@ -101,7 +101,7 @@ pub struct GroupDecoder {
     layouts: Option<(u32, Layouts)>,
     entry: [u8; ENTRY_BYTES_MAX],
     decoded: Decoded,
-    /// The decoded frame among the last ones, where it is not put together yet.
+    /// The decoded frame among the last ones, if it is not assembled yet.
     apart: Option<usize>,
 }
 
@@ -272,7 +272,7 @@ impl GroupDecoder {
         self.last = None;
     }
 
-    /// What the group said at its start.
+    /// Preamble of the group.
     pub const fn preamble(&self) -> Preamble {
         self.preamble
     }

@@ -74,7 +74,7 @@ impl Sum {
         }
     }
 
-    /// Makes a parity sector of what stands in `block`: the last sector that it covers has the number `last`.
+    /// Makes a parity sector from `block`: the last sector that it covers has the number `last`.
     pub fn seal(self, block: &mut [u8; SECTOR_BYTES], session: u32, last: u32) {
         (block[0], block[1]) = (MAGIC, self.mark());
         block[7..11].copy_from_slice(&session.to_le_bytes());
@@ -84,7 +84,7 @@ impl Sum {
     }
 }
 
-/// What a parity sector says of itself.
+/// Header of a parity sector.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Parity {
     /// Which sum it is.
@@ -101,7 +101,7 @@ impl Parity {
         block[0] == MAGIC && Sum::ALL.iter().any(|sum| sum.mark() == block[1])
     }
 
-    /// Checks a block; `None` where it is no parity sector, or not a sound one.
+    /// Checks a block; `None` if it is not a valid parity sector.
     pub fn read(block: &[u8; SECTOR_BYTES]) -> Option<Self> {
         let sum = Sum::ALL.into_iter().find(|sum| block[..2] == [MAGIC, sum.mark()])?;
         let sector = Sector::from_bytes(*block);
@@ -111,28 +111,28 @@ impl Parity {
     }
 }
 
-/// Holds the sums of one column against its sectors, and finds those that are lost.
+/// Compares the sums of one column with its sectors and rebuilds lost ones.
 #[derive(Clone, Debug)]
 pub struct Column {
     session: u32,
     sums: [Option<Held>; 2],
 }
 
-/// A sum that is there.
+/// An available sum.
 #[derive(Clone, Copy, Debug)]
 struct Held {
     /// The last number that it covers.
     last: u32,
-    /// As it is on the card.
+    /// Sum as on the card.
     block: [u8; SECTOR_BYTES],
-    /// The sum of the sectors that were taken, of which the latest one counts once.
+    /// Sum of the taken sectors; the latest one has the factor 1.
     taken: [u8; SECTOR_BYTES],
     /// Rows from that one to the last one; none before the first.
     rows: Option<u32>,
 }
 
 impl Column {
-    /// A column of which no sum is known.
+    /// A column without sums.
     pub const fn new(session: u32) -> Self {
         Self { session, sums: [None, None] }
     }
@@ -151,8 +151,8 @@ impl Column {
         self.sums.iter().flatten().map(|held| held.last).max()
     }
 
-    /// Takes a sector of the column that is there: what is left of the sums is of those that are not. In the order of their
-    /// numbers this is fastest.
+    /// Takes an existing sector of the column. The rest of each sum then belongs to the lost sectors. Ascending numbers are
+    /// fastest.
     pub fn sector(&mut self, number: u32, bytes: &[u8; SECTOR_BYTES]) {
         for (sum, held) in Sum::ALL.into_iter().zip(&mut self.sums) {
             if let Some(held) = held {
@@ -183,7 +183,7 @@ impl Column {
         !is_left && !is_other
     }
 
-    /// The sectors of these numbers, which are all of the column that are lost, as far as they can be made again.
+    /// Rebuilds the sectors of these numbers as far as possible. They must be all lost sectors of the column.
     pub fn solve(mut self, lost: &[u32]) -> [Option<Sector>; 2] {
         let mut found = [None, None];
         // One that a sum has lost alone is made of it, and may leave the other sum with one.
@@ -215,7 +215,7 @@ impl Column {
         found
     }
 
-    /// What is left of a sum once the sectors that were taken are taken off.
+    /// Rest of a sum without the taken sectors.
     fn held(&self, index: usize) -> Option<(Sum, u32, [u8; SECTOR_BYTES])> {
         let (held, sum) = (self.sums.get(index)?.as_ref()?, *Sum::ALL.get(index)?);
         let mut rest = held.block;
@@ -233,7 +233,7 @@ impl Column {
         (covered.next().is_none() && place < found.len()).then_some((place, *number))
     }
 
-    /// A sector of what the sums leave for it; `None` where that is none.
+    /// A sector from the rest of the sums; `None` if the result is not a valid sector.
     fn sector_of(&self, number: u32, rest: &[u8; SECTOR_BYTES], weight: u8) -> Option<Sector> {
         let mut bytes = [0; SECTOR_BYTES];
         add(&mut bytes, rest, weight);
@@ -259,7 +259,7 @@ impl Held {
     }
 }
 
-/// Rows from a sector to the last one that is covered; `None` where it is not covered.
+/// Rows from a sector to the last covered one; `None` if the sector is not covered.
 const fn rows(last: u32, number: u32) -> Option<u32> {
     match last.checked_sub(number) {
         Some(numbers) => Some(numbers / COLUMNS as u32),
@@ -267,12 +267,12 @@ const fn rows(last: u32, number: u32) -> Option<u32> {
     }
 }
 
-/// What a sector of this number counts in a sum whose last one has the number `last`; `None` where it is not covered.
+/// Factor of a sector of this number in a sum that ends at number `last`; `None` if the sector is not covered.
 fn weight(sum: Sum, last: u32, number: u32) -> Option<u8> {
     rows(last, number).map(|rows| power(sum, rows))
 }
 
-/// What a sector counts so many rows before the last one.
+/// Factor of a sector this many rows before the last one.
 fn power(sum: Sum, rows: u32) -> u8 {
     match sum {
         Sum::P => 1,
@@ -283,7 +283,7 @@ fn power(sum: Sum, rows: u32) -> u8 {
 /// Powers of two that there are in GF(256).
 const ORDER: u32 = 255;
 
-/// What is summed up of a sector: all that its place and its session do not tell.
+/// Summed part of a sector: all fields that its position and session do not determine.
 const PARTS: [core::ops::Range<usize>; 2] = [2..7, 15..CRC_AT];
 
 fn add(to: &mut [u8; SECTOR_BYTES], from: &[u8; SECTOR_BYTES], weight: u8) {
@@ -297,7 +297,7 @@ fn add(to: &mut [u8; SECTOR_BYTES], from: &[u8; SECTOR_BYTES], weight: u8) {
     }
 }
 
-/// Whether nothing is left of a sum.
+/// Whether the rest of a sum is zero.
 fn is_zero(rest: &[u8; SECTOR_BYTES]) -> bool {
     PARTS.into_iter().all(|part| rest[part].iter().all(|byte| *byte == 0))
 }

@@ -1,4 +1,4 @@
-//! The plain bytes at the start of each group's first sector: what a reader that starts there needs.
+//! Preamble: plain bytes at the start of each group's first sector, for a reader that starts there.
 //!
 //! ```text
 //!   0  u32: hash of the layout table that the group was written with
@@ -12,7 +12,7 @@ use crate::bytes::Fields;
 
 pub(crate) const PREAMBLE_BYTES: usize = 26;
 
-/// What a group says of itself before its first entry.
+/// Preamble of a group.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Preamble {
     /// Hash of the layout table that the group was written with.
@@ -21,7 +21,7 @@ pub struct Preamble {
     pub start_ms: u64,
     /// Frames of the session before this group, modulo 2^32: tells how many are missing.
     pub frames_before: u32,
-    /// UTC at power-on, microseconds since 1970, where it was known.
+    /// UTC at power-on, microseconds since 1970, if known.
     pub epoch_micros: Option<u64>,
     /// The check of all entries of the session before this group, which the last sector before it has.
     pub chain: u32,

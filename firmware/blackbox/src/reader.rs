@@ -4,8 +4,8 @@
 //! loop { reader.feed(&block); while let Some(item) = reader.next() { … } }
 //! reader.end(); while let Some(item) = reader.next() { … }      // the last item is `End`
 //! ```
-//! What cannot be read is an item too: a `Gap` with its times and its cause. After a gap reading goes on at the next
-//! group's start, never before. A gap with [`Cause::Altered`] says that up to a sector's entries before it may be wrong.
+//! An unreadable part is an item too: a `Gap` with its times and its cause. After a gap, reading continues at the start of the
+//! next group. Before a gap with [`Cause::Altered`], up to one sector's entries may be wrong.
 
 use hums_core::clock::Instant;
 
@@ -15,47 +15,47 @@ use crate::preamble::Preamble;
 use crate::record::Record;
 use crate::sector::{Header, SECTOR_BYTES};
 
-/// What a log holds, in its order.
+/// An item of a log, in order.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Item<'a> {
     /// A frame.
     Frame {
-        /// When it was received, on the monitor's clock; whole milliseconds.
+        /// Time of reception on the monitor's clock, whole milliseconds.
         at: Instant,
-        /// The same in UTC, microseconds since 1970, where it is known.
+        /// The same in UTC, microseconds since 1970, if known.
         utc_micros: Option<u64>,
         /// The frame, bit for bit.
         bytes: &'a [u8],
-        /// Its checksum is that of the definition that the monitor knew.
+        /// The checksum matches the monitor's definition.
         verified: bool,
     },
     /// A record of the monitor's own.
     Record {
-        /// When, on the monitor's clock; whole milliseconds.
+        /// Time on the monitor's clock, whole milliseconds.
         at: Instant,
-        /// The same in UTC, microseconds since 1970, where it is known.
+        /// The same in UTC, microseconds since 1970, if known.
         utc_micros: Option<u64>,
         /// The record.
         record: Record<'a>,
     },
-    /// Something is missing here.
+    /// A missing part.
     Gap(Gap),
-    /// The end of what was fed.
+    /// End of the input.
     End(Summary),
 }
 
-/// Why something is missing.
+/// Cause of a gap.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Cause {
-    /// Sectors are not there: never written, overwritten or lost.
+    /// Missing sectors: never written, overwritten or lost.
     Missing,
-    /// Sectors are there, but fail their check.
+    /// Sectors with a wrong checksum.
     Damaged,
-    /// The group was written with message layouts of this hash, which this program does not know.
+    /// The group uses message layouts of this unknown hash.
     UnknownLayouts(u32),
-    /// Sound sectors whose content is not what a writer makes.
+    /// Valid sectors with contents that no writer produces.
     Corrupt,
-    /// Sound sectors whose entries are not those that came: the recorder's memory had changed.
+    /// Valid sectors with altered entries: the recorder's memory had changed.
     Altered,
     /// The vehicle was disarmed and is recorded by arming: sectors were not kept, on purpose, and a record says so.
     Disarmed,
@@ -88,11 +88,11 @@ pub struct Gap {
     pub sectors_lost: u32,
     /// Sound sectors of the same group that cannot be decoded without those.
     pub sectors_skipped: u32,
-    /// Frames missing, where the counts on both sides tell; at a log's end only those of the sectors skipped.
+    /// Missing frames, if the counts on both sides are known; at a log's end only those of the skipped sectors.
     pub frames: Option<u32>,
 }
 
-/// What was read, in all.
+/// Totals.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Summary {
     /// The log's session.
@@ -111,15 +111,15 @@ pub struct Summary {
     pub gaps: u64,
     /// Frames known to be missing.
     pub frames_missing: u64,
-    /// What the blocks were.
+    /// Counts of the blocks.
     pub blocks: BlockCounts,
 }
 
-/// Reads one log. It is large (see `size_of`): box it.
+/// Reader of one log. It is large (see `size_of`): box it.
 pub struct LogReader {
     assembler: Assembler,
     decoder: GroupDecoder,
-    /// A gap that is still going on.
+    /// An open gap.
     open_gap: Option<Gap>,
     /// A gap to give out before the entries of the group that ended it.
     gap_due: Option<Gap>,
@@ -189,12 +189,12 @@ impl LogReader {
         self.epoch_micros
     }
 
-    /// Takes the next block. Call `next` until it gives `None` before the next one: entries not fetched are lost.
+    /// Takes the next block. Before each block, call `next` until it returns `None`: entries not fetched are lost.
     pub fn feed(&mut self, block: &[u8; SECTOR_BYTES]) {
         self.assembler.feed(block);
     }
 
-    /// There are no more blocks: `next` gives what is left, then `End`.
+    /// Ends the input: `next` returns the remaining items, then `End`.
     pub fn end(&mut self) {
         if self.state != State::Reading {
             return;
@@ -247,7 +247,7 @@ impl LogReader {
         Item::Gap(gap)
     }
 
-    /// The gap that is going on, begun here if there is none.
+    /// The open gap; opens one if there is none.
     fn open(&mut self, cause: Cause) -> &mut Gap {
         self.decoder.abandon();
         self.open_gap.get_or_insert(Gap {
@@ -262,7 +262,7 @@ impl LogReader {
 
     fn step(&mut self, step: &Step) {
         let header = &step.header;
-        // A partial sector that no full one superseded: what came after it in that sector is lost.
+        // A partial sector without a full one: later entries of that sector are lost.
         let cut = core::mem::replace(&mut self.cut, header.partial);
         self.damaged_partial = if header.partial { step.damaged } else { 0 };
         if step.missing > 0 || cut {
@@ -284,7 +284,7 @@ impl LogReader {
         gap.frames = Some(gap.frames.unwrap_or(0).saturating_add(u32::from(header.frames)));
     }
 
-    /// A group began: a gap, if there was one, ends here.
+    /// Starts a group, which ends an open gap.
     fn started(&mut self) {
         let Preamble { start_ms, frames_before, epoch_micros, .. } = self.decoder.preamble();
         let missing = self.frames_expected.map(|expected| frames_before.wrapping_sub(expected));

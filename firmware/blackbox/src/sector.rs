@@ -61,7 +61,7 @@ impl Default for Sector {
 }
 
 impl Sector {
-    /// All zeros, which is no valid sector.
+    /// All zeros, an invalid sector.
     pub const fn zeroed() -> Self {
         Self { bytes: [0; SECTOR_BYTES] }
     }
@@ -127,7 +127,7 @@ impl Sector {
         u16::from_le_bytes([self.bytes[5], self.bytes[6]])
     }
 
-    /// What the group that begins in it says of itself; `None` where none begins.
+    /// Preamble of the group that begins in it; `None` where none begins.
     pub fn preamble(&self) -> Option<Preamble> {
         Preamble::read(self.body()).filter(|_| self.starts_group())
     }
@@ -164,7 +164,7 @@ impl Sector {
     }
 }
 
-/// What a sector says of itself.
+/// Header of a sector.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Header {
     /// Which session: sectors of another one are left over from an earlier file.
@@ -187,7 +187,7 @@ pub struct Header {
     pub check: u32,
 }
 
-/// Why a block is no sector of this format.
+/// Reason for rejecting a block.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum NotASector {
     /// All zeros: space that was set aside and not written yet.

@@ -1,9 +1,9 @@
-//! The writer: frames and records in, sectors out. It allocates nothing, never waits, and keeps its stream decodable
-//! whatever happens behind it.
+//! Writer: frames and records in, sectors out. It allocates nothing, never waits, and keeps its stream decodable after any
+//! failure of the storage.
 //!
 //! *Admission:* before an entry is encoded the sink must have room for `ENTRY_SECTORS_MAX`; otherwise the writer
-//! returns `Full` and its state is as before. *Groups* end after `GROUP_SECTORS`: the entry that does not fit any more is
-//! taken back (the coder's state before it is kept) and becomes the first one of the next group.
+//! returns `Full` and its state is as before. *Groups* end after `GROUP_SECTORS`: the entry that no longer fits is undone (the
+//! coder's earlier state is kept) and becomes the first one of the next group.
 
 use hums_core::clock::Instant;
 use hums_dialect::wire::FRAME_BYTES_MAX;
@@ -24,15 +24,15 @@ pub const ENTRY_SECTORS_MAX: usize = 1 + (PREAMBLE_BYTES + CODED_BYTES_MAX + FLU
 /// A sector in the middle of a group has so many bytes at least: it is closed when no stream could end in it.
 const BODY_CLOSED_MIN: usize = BODY_BYTES + 1 - FLUSH_MAX;
 
-/// Where finished sectors go: a bounded queue.
+/// Sink of finished sectors: a bounded queue.
 pub trait SectorSink {
-    /// How many sectors it takes now.
+    /// Number of sectors that it can take now.
     fn room(&self) -> usize;
     /// Takes a sector; called at most `room` times. The sector is not sealed yet.
     fn put(&mut self, sector: &Sector);
 }
 
-/// An entry was not taken; the writer is as it was before.
+/// A refused entry; the writer's state is unchanged.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Full {
     /// The sink has no room for it.
@@ -52,7 +52,7 @@ impl core::fmt::Display for Full {
 
 impl core::error::Error for Full {}
 
-/// What the writer did so far.
+/// Counters of the writer.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counters {
     /// Frames taken.
@@ -80,7 +80,7 @@ pub struct Writer {
     ended: Ended,
     /// Over all entries of the session.
     chain: u32,
-    /// What it was at the end of the group before.
+    /// Its value at the end of the previous group.
     chain_before: u32,
     in_group: bool,
     /// The sector in progress has an entry that no copy of it has.
@@ -134,9 +134,9 @@ impl Writer {
         }
     }
 
-    /// Adds a frame as it was received. `verified`: its checksum was found to be that of our definition; it is not
-    /// checked again. A frame for which that is not so (the memory changed on its way here) would be read with the checksum
-    /// that is right, and not as it came: a reader finds that, and gives it up.
+    /// Adds a frame as it was received. `verified`: its checksum matched our definition; it is not checked again. If memory
+    /// changed since, the frame would decode with the correct checksum instead of the received one. A reader detects this and
+    /// rejects the frame.
     pub fn frame(
         &mut self,
         at: Instant,
@@ -193,7 +193,7 @@ impl Writer {
         true
     }
 
-    /// Ends the group: the next entry begins a new one, for instance in a new file or after sectors were lost.
+    /// Ends the group: the next entry begins a new one, for example in a new file or after lost sectors.
     /// Does nothing (and may be called again) while the sink has no room.
     pub fn restart(&mut self, sink: &mut impl SectorSink) -> bool {
         self.end_group(false, sink)
@@ -211,7 +211,7 @@ impl Writer {
         self.end_group(true, sink)
     }
 
-    /// What the writer did so far.
+    /// Counters of the writer.
     pub const fn counters(&self) -> Counters {
         self.counters
     }
@@ -303,7 +303,7 @@ impl Writer {
         let places = self.sector.body_mut().get_mut(at..);
         let bytes = self.scratch.bytes().and_then(|bytes| bytes.get(done..end));
         if let (Some(places), Some(bytes)) = (places, bytes) {
-            // Most entries have at most eight bytes. What is copied beyond them has no meaning yet.
+            // Most entries have at most eight bytes. Further copied bytes have no meaning yet.
             match places.first_chunk_mut() {
                 Some(place) if end <= 8 && done == 0 => *place = self.scratch.first(),
                 _ => copy_few(bytes, places),

@@ -409,7 +409,7 @@ proptest! {
         }
         reader.end();
         check(&mut reader);
-        // A last sector whose head says nothing any more of its session and its number is of nobody: the log is not closed.
+        // If the last sector's header has lost its session and its number, the log is not closed.
         prop_assert!(gaps >= 1 || !closed);
     }
 }

@@ -1,4 +1,4 @@
-//! The container, from outside: what is written reads back, whatever happens to the sectors in between.
+//! Container tests: entries read back as written, around any damaged sectors.
 
 use std::collections::HashSet;
 
@@ -282,7 +282,7 @@ fn records_stand_among_frames_and_restart_begins_a_group() {
     assert_eq!((log.frames.len(), log.gaps.len()), (25, 0));
 }
 
-/// What a card does that puts a page where it does not belong.
+/// A card that misplaces a page.
 #[derive(Clone, Copy, Debug)]
 enum Misplaced {
     /// Two pages are exchanged.

@@ -1,4 +1,4 @@
-//! Golden sums: length and CRC-32 of what version 3 makes of whole recordings and of a made-up stream of everything
+//! Golden sums: length and CRC-32 of version 3's output for whole recordings and for a synthetic stream of all kinds
 //! (`common/kinds.rs`). As the golden files they never change: writer and reader share the model, so that a change of it
 //! would still read back what it wrote, and only fixed bytes notice. A group names the table of layouts: a new dialect
 //! (`layouts`) makes new sums, a new version of the format adds its own.

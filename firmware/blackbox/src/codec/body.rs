@@ -13,13 +13,13 @@ use crate::coder::Coder;
 /// Context of bytes by their place.
 const AT: u32 = 0x100;
 
-/// What is known of all payloads.
+/// State for all payloads.
 pub(super) struct Body {
     pub(super) elements: Elements,
     pub(super) common: Common,
 }
 
-/// What the elements know in common.
+/// Shared state of the elements.
 pub(super) struct Common {
     pub(super) distributions: Distributions,
     pub(super) texts: Texts,
@@ -139,7 +139,7 @@ impl Body {
         Some(true)
     }
 
-    /// Whether the payload is that of the slot's last frame.
+    /// Whether the payload equals the slot's last one.
     pub(super) fn is_repeat(&self, slot: &Slot, frame: &Frame) -> bool {
         let mut copy = Frame::empty();
         copy.len = frame.len;
@@ -166,7 +166,7 @@ impl Body {
             end = usize::from(element.end);
             rest = after;
         }
-        // What lies beyond the layout is not kept.
+        // Bytes beyond the layout are not kept.
         (is_kept && (frame.len <= end || slot.length == Length::Trimmed)).then_some(())
     }
 }
@@ -249,8 +249,7 @@ impl Common {
         Some(())
     }
 
-    /// A time field proposes to move the clock: only forward, and not by more than ten seconds; anything else is no
-    /// advance of a clock.
+    /// A time field may advance the clock by at most 10 s. Any other change is ignored.
     #[inline]
     fn advance(&mut self, proposed_us: u32) {
         if proposed_us.wrapping_sub(self.clock_us) < 10_000_000 {

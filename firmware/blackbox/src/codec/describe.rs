@@ -12,7 +12,7 @@ use crate::layouts::{FieldLayout, Layout, Place};
 /// Arrays of so many bytes are data, not numbers.
 const DATA_BYTES: u8 = 16;
 
-/// Where a message's instance field is, and its size.
+/// Offset and size of a message's instance field.
 pub(super) fn instance_of(layout: Layout) -> Option<(usize, usize)> {
     let mut offset = 0;
     for index in 0.. {
@@ -47,7 +47,7 @@ fn elements_of(field: FieldLayout) -> (What, u8, u8) {
 }
 
 impl Body {
-    /// A new slot with its elements, or without a layout where there is no room for them.
+    /// A new slot with its elements; without a layout if there is no room for them.
     pub(super) fn describe(&mut self, key: Key, place: Option<Place>, layout: Option<Layout>) -> Slot {
         let (mut count, mut described) = (0, 0);
         let mut index = 0;

@@ -1,5 +1,4 @@
-//! A MAVLink frame taken apart and put together again. What does not come out as it went in is no frame here and is
-//! coded as plain bytes.
+//! A MAVLink frame taken apart and put together again. A frame that would not decode bit for bit is coded as plain bytes.
 
 use hums_dialect::crc;
 use hums_dialect::wire::{
@@ -172,8 +171,8 @@ impl Frame {
         }
     }
 
-    /// The payload's length without its zeros at the end, at least 1: what a MAVLink 2 sender keeps of it. Of a frame that
-    /// is read: there are only zeros beyond `full`.
+    /// Length of the payload without trailing zeros, at least 1, as a MAVLink 2 sender truncates it. Of a frame that is read:
+    /// there are only zeros beyond `full`.
     pub(crate) fn trimmed(&self, full: usize) -> usize {
         let words = self.payload.as_chunks().0;
         let words = words.get(..full.div_ceil(size_of::<u64>())).unwrap_or_default();

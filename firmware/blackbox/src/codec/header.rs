@@ -30,7 +30,7 @@ pub(super) struct Headers {
     signatures: Cdf,
 }
 
-/// What a frame's header said of what follows.
+/// Decoded header of a frame.
 pub(super) struct Plan {
     pub(super) header: usize,
     pub(super) length: Option<usize>,
@@ -180,8 +180,8 @@ fn take_flags(slot: &Slot, frame: &mut Frame) {
 
 /// Whether a frame is what its slot lets expect, but for its sequence number.
 fn is_usual(slot: &Slot, frame: &Frame, verified: bool) -> bool {
-    // Of a verified frame the checksum was found to be that of our definition. Where it is not so any more, memory has changed, and the
-    // chain tells readers.
+    // The checksum of a verified frame matched our definition. If it no longer matches, memory has changed; the chain reveals
+    // this to readers.
     let trusted = verified && slot.own_seed;
     frame.incompat == slot.incompat
         && frame.compat == slot.compat
@@ -193,12 +193,12 @@ fn is_usual(slot: &Slot, frame: &Frame, verified: bool) -> bool {
         && (trusted || checks(slot, frame))
 }
 
-/// Whether the checksum is that of the slot's seed.
+/// Whether the checksum matches the slot's seed.
 fn checks(slot: &Slot, frame: &Frame) -> bool {
     crc::step(frame.checksum_before_seed(), slot.seed) == frame.checksum
 }
 
-/// What is not as expected, in full.
+/// Unexpected values, in full.
 #[inline(never)]
 fn spelled_out<C: Coder>(coder: &mut C, slot: &mut Slot, frame: &mut Frame, verified: bool) -> Plan {
     let mut plan = Plan { header: SPELLED_OUT, length: None, checksum: None };

@@ -2,8 +2,8 @@
 //! another. Messages publish such quantities into registers; numbers are then also predicted from their register. A register may
 //! also be computed from others, as the autopilot computed it: exactly alike on every machine.
 //!
-//! The table is part of format version 3. It names fields by message id and byte offset; where a layout has something
-//! else there, the prediction is bad, but writer and reader still agree.
+//! The table is part of format version 3. It names fields by message id and byte offset. If a layout differs, the prediction is
+//! bad, but writer and reader still agree.
 
 use super::element::Element;
 
@@ -27,7 +27,7 @@ struct Link {
     scale: f32,
 }
 
-/// What a field has to do with registers.
+/// Link of a field to registers.
 struct Row {
     id: u32,
     offset: u8,
@@ -181,7 +181,7 @@ impl Registers {
         self.0.get(register).map_or(0.0, |&bits| f32::from_bits(bits))
     }
 
-    /// What a float's register lets expect of it, if it consults one, and whether that was computed as the sender computed it.
+    /// Prediction of a float's register, if it uses one, and whether it used the sender's own computation.
     #[inline]
     pub(super) fn consult(&mut self, row: u8) -> Option<(f32, bool)> {
         let row = ROWS.get(usize::from(row).wrapping_sub(1))?;
@@ -279,7 +279,7 @@ mod tests {
             assert!((f64::from(cosine) - c).abs() <= 1.5e-7, "{angle}: {cosine} for {c}");
             let any = sine_and_cosine(f32::from_bits(state));
             for number in [sine, cosine, any.0, any.1] {
-                // What is no number differs between machines and counts nowhere.
+                // NaN bits differ between machines, so NaN counts as 0.
                 let bits = if number.is_nan() { 0 } else { number.to_bits() };
                 sum = (sum ^ u64::from(bits)).wrapping_mul(0x0100_0000_01b3);
             }

@@ -29,15 +29,15 @@ use crate::distribution::Cdf;
 use crate::layouts::Layouts;
 use crate::limits::ENTRY_BYTES_MAX;
 
-/// What the coder may make of an entry at most, bytes. An entry that would become longer starts a new group, where
-/// its bytes go out as they are: with length and time that is `ENTRY_BYTES_MAX` and 20 more.
+/// Largest coded size of an entry, bytes. An entry that would become longer starts a new group, where its bytes go out as they
+/// are: with length and time that is `ENTRY_BYTES_MAX` and 20 more.
 pub(crate) const CODED_BYTES_MAX: usize = 640;
 const _: () = assert!(ENTRY_BYTES_MAX + 20 <= CODED_BYTES_MAX);
 
 /// What an entry is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Kind {
-    /// A frame, and whether its checksum is that of our definition.
+    /// A frame, and whether its checksum matches our definition.
     Frame { verified: bool },
     /// A record in its stored form.
     Record,

@@ -1,5 +1,5 @@
-//! What the reader remembers beyond what the model must know: whether each slot's last frame still has the last value of each
-//! element in its place. Most frames say that their quiet elements stay as they are: these need not be put there again.
+//! Reader's memory beside the model: whether each slot's last frame still holds the last value of each element. Most frames say
+//! that their quiet elements stay as they are: these need not be put there again.
 
 use super::slots::SLOTS;
 use crate::coder::{Coder, Reading, Writing};
@@ -11,7 +11,7 @@ const NONE: u16 = u16::MAX;
 pub(crate) struct Recall {
     /// The slot of the frame that is read.
     slot: usize,
-    /// What the frame's checksum is made with, where it was not sent.
+    /// Seed of the frame's checksum, if the checksum was not sent.
     pub(crate) seed: Option<u8>,
     /// What limited the fields of each slot's last payload, which has nothing else in it.
     limits: [u16; SLOTS],
@@ -46,9 +46,9 @@ impl Recall {
     }
 }
 
-/// One end of the coder, of which the reading one has its memory with it.
+/// One end of the coder; the reader includes its memory.
 pub(super) trait End: Coder {
-    /// The reading end, where it is that.
+    /// The reader, if this end is one.
     fn reading(&mut self) -> Option<Reading<'_, Recall>>;
 }
 

@@ -21,7 +21,7 @@ const CONTEXTS: usize = 16;
 const RAW: usize = 0;
 const OTHER_KIND: usize = 15;
 
-/// What is known of the records of a group.
+/// State for the records of a group.
 pub(super) struct Records {
     kinds: Cdf,
     kept: [[u32; KEPT]; KINDS],

@@ -6,7 +6,7 @@ use crate::coder::Coder;
 use crate::distribution::{Cdf, Cell};
 use crate::layouts::{Layout, Place};
 
-/// Slots at most. What comes beyond is coded as plain bytes.
+/// Slots at most. Further streams are coded as plain bytes.
 pub(crate) const SLOTS: usize = 112;
 
 /// Senders (system, component) at most.
@@ -45,7 +45,7 @@ pub(crate) struct Slot {
     pub(crate) times: u16,
     pub(crate) at_ms: u32,
     pub(crate) seed: u8,
-    /// The seed is that of our definition.
+    /// The seed comes from our definition.
     pub(crate) own_seed: bool,
     pub(crate) verified: bool,
     pub(crate) incompat: u8,
@@ -55,7 +55,7 @@ pub(crate) struct Slot {
     pub(crate) described: u8,
     /// How the header of its last frame was coded.
     pub(crate) header: u8,
-    /// Where the instance field is, and its size; 0 where there is none.
+    /// Offset and size of the instance field; 0 where there is none.
     pub(crate) instance_at: u8,
     pub(crate) instance_size: u8,
     /// Whether the quiet elements stayed as they are.
@@ -170,7 +170,7 @@ struct Guess {
     sure: u8,
 }
 
-/// All zeros: what the places hold before the first reset.
+/// All zeros, as before the first reset.
 const UNSET: Guess = Guess { slot: 0, sure: 0 };
 const NO_GUESS: Guess = Guess { slot: NONE, sure: 0 };
 
@@ -186,7 +186,7 @@ pub(crate) struct Slots {
     past: [u8; 3],
     /// Where what follows them is remembered, in `order_3` and `order_2`.
     places: (u16, u16),
-    /// What they let expect: the two likeliest slots, and how sure the first one is.
+    /// Prediction: the two likeliest slots, and the confidence in the first.
     guesses: (u8, u8, u8),
     kind: [Cdf; KINDS],
     high: Cdf,
@@ -376,7 +376,7 @@ impl Slots {
     }
 }
 
-/// The places of what follows these three slots, or these two.
+/// Indices of the contexts of these three slots, or these two.
 const fn places([a, b, c]: [u8; 3]) -> (u16, u16) {
     let (a, b, c) = (a as u32, b as u32, c as u32);
     let two = (a << 8 | b).wrapping_mul(0x9e37_79b1) >> 16;

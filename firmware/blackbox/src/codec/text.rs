@@ -1,5 +1,5 @@
-//! Bytes without a layout: text, payloads of unknown messages, the texts of records. Each is coded by halves of four bits
-//! in one context that the caller chooses; what is as in the text before costs one bit only.
+//! Bytes without a layout: text, payloads of unknown messages, the texts of records. Each byte is coded as two halves of four
+//! bits, in a context that the caller chooses. A byte equal to the one in the previous text costs one bit.
 
 use crate::coder::Coder;
 use crate::distribution::{Cdf, Cell};

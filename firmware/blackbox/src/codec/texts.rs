@@ -102,7 +102,7 @@ impl Texts {
     }
 }
 
-/// Where the last text of an element is kept.
+/// Location of an element's last text.
 fn range_of(element: &Element) -> Option<core::ops::Range<usize>> {
     let at = usize::try_from(element.aux).ok()?;
     Some(at..at.checked_add(element.size())?)

@@ -1,12 +1,12 @@
 //! The reader's side of a distribution on a PC: all places at once, and no branch. A reader's processor cannot foresee
 //! what the symbols are, so each branch on one is guessed wrongly about as often as the symbol is news; and a division
-//! and a search wait for one another. Both are most of what reading takes.
+//! and a search wait for one another. Both take most of the reading time.
 
 use super::Cdf;
 
 impl Cdf {
-    /// The symbol that holds a place among parts of this width, with where it begins and its size: what the reader
-    /// needs, who learns the symbol only here. Moves towards it as `adapt` does.
+    /// The symbol at a place among parts of this width, with its start and its size. Used by the reader, which does not know the
+    /// symbol before. Moves towards it as `adapt` does.
     #[inline]
     pub(crate) fn read(&mut self, width: u16, offset: u32) -> (usize, u32, u32) {
         #[cfg(target_arch = "x86_64")]
@@ -23,7 +23,7 @@ impl Cdf {
         }
     }
 
-    /// The same between this distribution and another one, of which both move.
+    /// The same for the mean of this distribution and another one; both adapt.
     #[inline]
     pub(crate) fn read_between(&mut self, other: &mut Self, width: u16, offset: u32) -> (usize, u32, u32) {
         #[cfg(target_arch = "x86_64")]
@@ -103,8 +103,8 @@ mod sse2 {
         gains
     }
 
-    /// The symbol that holds a place among parts of this width, where it begins and its size, of one distribution or
-    /// between two; adapts them.
+    /// The symbol at a place among parts of this width, its start and its size, for one distribution or the mean of two. Adapts
+    /// them.
     #[inline]
     #[target_feature(enable = "sse2")]
     pub(super) fn read<const N: usize>(

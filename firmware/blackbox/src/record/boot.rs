@@ -1,8 +1,8 @@
-//! Who recorded, what was on the card before, and how the boot before ended.
+//! Boot record: the recorder, the previous contents of the card, and the end of the previous boot.
 
 use super::stored::{Fields, Sink};
 
-/// What was found of the session before on the card.
+/// The previous session found on the card.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Found {
@@ -11,9 +11,9 @@ pub enum Found {
     Unknown = 0,
     /// The card holds no earlier log.
     Nothing = 1,
-    /// Where it ended; frames could not be counted.
+    /// Its end; the number of frames is unknown.
     Sectors = 2,
-    /// Where it ended, and how many frames it had.
+    /// Its end and its number of frames.
     Frames = 3,
     /// There is a log, but no sector of it can be read.
     Unreadable = 4,
@@ -62,7 +62,7 @@ pub struct Before {
 }
 
 impl Before {
-    /// Where the session before ended, if that was found.
+    /// End of the previous session, if found.
     pub const fn has_end(&self) -> bool {
         matches!(self.found, Found::Sectors | Found::Frames)
     }
@@ -130,7 +130,7 @@ pub struct Fault<'a> {
     pub place: &'a str,
     /// r0-r3, r12, lr, pc, xpsr, then CFSR, HFSR, MMFAR, BFAR.
     pub registers: [u32; 12],
-    /// What the panic said.
+    /// Panic message.
     pub message: &'a str,
 }
 

@@ -1,4 +1,4 @@
-//! What was found, and other moments worth a mark.
+//! Records of findings and of other marked moments.
 
 use hums_core::clock::Instant;
 use hums_core::health::{Finding, Level, Subsystem};

@@ -1,4 +1,4 @@
-//! What is missing, and what the recorder counted.
+//! Records of losses and of the recorder's counters.
 
 use hums_core::clock::Instant;
 
@@ -8,10 +8,10 @@ use super::stored::{Fields, Sink};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[repr(u8)]
 pub enum Lost {
-    /// Bytes that the UART received while nobody fetched them.
+    /// Bytes lost because the receive buffer overflowed.
     #[default]
     UartOverrun = 0,
-    /// Bytes that are no frame.
+    /// Bytes outside frames.
     NotFrames = 1,
     /// Frames that were cut or damaged.
     DamagedFrames = 2,
@@ -104,7 +104,7 @@ macro_rules! statistics {
             pub(super) fn store(&self, sink: &mut Sink<'_>) {
                 let numbers = [$(self.$name),+];
                 sink.head(8);
-                // What is cut short reads as zeros.
+                // Missing bytes read as zeros.
                 let stored = numbers.iter().rposition(|&number| number != 0).map_or(0, |last| last + 1);
                 for &number in numbers.iter().take(stored.max(STATS_MIN)) {
                     sink.u64(number);
@@ -136,7 +136,7 @@ statistics! {
     blocks_written,
     /// The fullest the sector queue was, bytes.
     queue_bytes_max,
-    /// What the sector queue holds, bytes.
+    /// Capacity of the sector queue, bytes.
     queue_bytes_capacity,
     /// The longest the card took for one call, milliseconds.
     sd_stall_ms_max,
@@ -146,19 +146,19 @@ statistics! {
     gs_bytes,
     /// The fullest the frame queue was, bytes.
     frame_queue_bytes_max,
-    /// What the frame queue holds, bytes.
+    /// Capacity of the frame queue, bytes.
     frame_queue_bytes_capacity,
     /// The fullest the queue to the ground station was, bytes.
     gs_queue_bytes_max,
-    /// What the queue to the ground station holds, bytes.
+    /// Capacity of the queue to the ground station, bytes.
     gs_queue_bytes_capacity,
-    /// What the processor was busy in the last second, thousandths; 0 where nobody counts.
+    /// Processor load of the last second, thousandths; 0 where nobody counts.
     cpu_permille,
     /// The same in the worst second.
     cpu_permille_max,
     /// The deepest the stack was, bytes.
     stack_bytes_max,
-    /// What the stack holds, bytes.
+    /// Size of the stack, bytes.
     stack_bytes_capacity,
     /// Frames for the ground station that found their queue full.
     gs_frames_lost,

@@ -33,8 +33,8 @@ impl Resting {
     }
 }
 
-/// An end mark. The sector that holds it is given to the card at once. A log that is read without a gap up to a mark
-/// holds all that was recorded until then; what comes after the last mark has an end that nothing proves.
+/// An end mark. The sector that holds it is given to the card at once. A log without a gap up to a mark is complete up to that
+/// mark. The end of the log after its last mark is unproven.
 ///
 /// The sector that completes it has the check of all entries of the session up to it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -1,4 +1,4 @@
-//! The monitor's own records: who recorded what, with which parameters, what it found, counted and lost.
+//! The monitor's own records: recorder, vehicle, parameters, findings, counters and losses.
 //!
 //! Stored form (`stored`): a head, then the numbers of 4 bytes, those of 2, and bytes, each in the order of the fields
 //! and little endian; a text is its length (u8) and its UTF-8 bytes. A later version may only append to each of the
@@ -130,7 +130,7 @@ impl<'a> Record<'a> {
         sink.len().ok_or(TooLong)
     }
 
-    /// Reads the stored form. What is cut short reads as zeros and empty texts; what it does not know, as `Unknown`.
+    /// Reads the stored form. Missing bytes read as zeros and empty texts; an unknown record reads as `Unknown`.
     pub fn read(stored: &'a [u8]) -> Self {
         let (Shape { kind, version, .. }, mut fields) = Fields::new(stored);
         let fields = &mut fields;

@@ -108,7 +108,7 @@ impl PartialEq for Snapshot<'_> {
             let Self { at, instance, subsystem, after, first, interval, width, .. } = *snapshot;
             (at, instance, subsystem, after, first, interval, width)
         };
-        // By bits: a value that was not known is no number.
+        // Compared by bits: an unknown value is NaN.
         head(self) == head(other) && self.check == other.check && self.values == other.values
     }
 }
@@ -128,7 +128,7 @@ impl Default for SnapshotValues {
 /// A step of the protective action.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Protection {
-    /// What is asked of the autopilot.
+    /// Action requested of the autopilot.
     pub action: Action,
     /// What happened.
     pub stage: Stage,

@@ -12,7 +12,7 @@ pub(crate) const HEAD_BYTES: usize = 4;
 /// The version of each record.
 const VERSION: u8 = 1;
 
-/// What the head says.
+/// Decoded head.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Shape {
     pub(crate) kind: u8,
@@ -37,12 +37,12 @@ impl Shape {
         2 * (self.version >> 4) as usize
     }
 
-    /// Where the numbers of 2 bytes begin.
+    /// Offset of the numbers of 2 bytes.
     pub(crate) const fn halves_at(self) -> usize {
         HEAD_BYTES + 4 * self.words as usize
     }
 
-    /// Where the bytes begin.
+    /// Offset of the bytes.
     pub(crate) const fn bytes_at(self) -> usize {
         self.halves_at() + 2 * self.halves as usize
     }
@@ -217,7 +217,7 @@ impl<'a> Sink<'a> {
 
     fn count(&mut self, place: usize) {
         if let Some(count) = self.out.get_mut(place) {
-            // What is more than a record holds is refused for its length.
+            // Contents too long for a record are refused.
             *count = count.saturating_add(1);
         }
     }

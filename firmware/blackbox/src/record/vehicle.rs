@@ -1,4 +1,4 @@
-//! What was recorded: the vehicle, its and our parameters, and the date.
+//! Records of the vehicle, its and our parameters, and the date.
 
 use hums_core::clock::Instant;
 

@@ -1,4 +1,4 @@
-//! What was exceeded, and what wears: limits that were crossed, and components.
+//! Records of exceeded limits and of components.
 
 use hums_core::component::{Figures, Kind, Status};
 use hums_core::health::exceedance::{self, Crossings};
@@ -111,17 +111,17 @@ pub struct Component<'a> {
     pub status: Status,
     /// How often the part in this place was replaced.
     pub replaced: u32,
-    /// What the operator calls it.
+    /// Operator's name of the component.
     pub name: &'a str,
     /// Its serial number.
     pub serial: &'a str,
-    /// What it has run.
+    /// Accumulated use.
     pub figures: Figures,
     /// The part of its life that is used, percent; NaN where it has no limit.
     pub used_percent: f32,
     /// Who replaced or named it: MAVLink system and component id; 0, 0 for the monitor itself.
     pub by: (u8, u8),
-    /// The new part's serial number, where it was replaced.
+    /// Serial number of the new part after a replacement.
     pub new_serial: &'a str,
 }
 

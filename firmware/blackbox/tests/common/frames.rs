@@ -1,6 +1,6 @@
 //! Frames of recordings, taken apart without the code under test.
 
-/// A frame: milliseconds since the first one, its bytes, and whether its checksum is that of our definition.
+/// A frame: milliseconds since the first one, its bytes, and whether its checksum matches our definition.
 pub(crate) type Frame = (u64, Vec<u8>, bool);
 
 /// CRC-16/MCRF4XX over the bytes and the seed.
@@ -13,7 +13,7 @@ pub(crate) fn checksum(bytes: &[u8], seed: u8) -> u16 {
     })
 }
 
-/// Whether the checksum is that of our definition.
+/// Whether the checksum matches our definition.
 pub(crate) fn checks(frame: &[u8]) -> bool {
     let (id, payload_at) = match *frame {
         [0xfe, _, _, _, _, id, ..] => (u32::from(id), 6),

@@ -56,7 +56,7 @@ struct Element {
     text: Vec<u8>,
 }
 
-/// What all sources see.
+/// State shared by all sources.
 struct World {
     at_ms: u64,
     clock_us: u64,

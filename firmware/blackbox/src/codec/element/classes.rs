@@ -30,7 +30,7 @@ pub(crate) struct Distributions {
     used: u16,
     /// For elements without their own: by kind.
     calm: [Cdf; KINDS],
-    /// What a new distribution begins as.
+    /// Initial distribution.
     young: [Cdf; KINDS],
     /// First values.
     first: [Cdf; KINDS],
@@ -72,7 +72,7 @@ impl Distributions {
         self.blocks.get_mut(usize::from(number).wrapping_sub(1))
     }
 
-    /// Codes a class with the element's distribution; what had none and changes gets one.
+    /// Codes a class with the element's distribution. An element without one gets one at its first change.
     #[expect(clippy::inline_always, reason = "so that each use has its kind as a constant")]
     #[inline(always)]
     pub(super) fn class<C: Coder>(

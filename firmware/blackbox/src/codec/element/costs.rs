@@ -3,13 +3,13 @@
 /// Predictions that are weighed.
 pub(super) const PREDICTIONS: usize = 6;
 
-/// What a prediction costs before it is known.
+/// Initial cost of a prediction.
 const UNKNOWN: u8 = 100;
 
 /// Costs of up to six predictions: four in a word, which are charged in one step, and two more.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Costs {
-    /// Bytes, so that an element is no longer than it must be.
+    /// Bytes, to keep the element small.
     first: [u8; 4],
     more: [u8; 2],
 }
@@ -47,7 +47,7 @@ impl Costs {
     /// Adds what the first four were off by: an eighth of the cost makes place for it.
     #[inline]
     pub(super) fn charge(&mut self, errors: [i32; 4]) {
-        // A sum of bytes that all stay below 256: what one carries over in between comes back.
+        // Adds four bytes at once. All sums stay below 256, so intermediate carries cancel.
         let word = self.word();
         let eighths = (word >> 3) & 0x1f1f_1f1f;
         let mut sum = word.wrapping_sub(eighths).wrapping_add(0x2020_2020);

@@ -1,4 +1,4 @@
-//! Integers of 1, 2 or 4 bytes that are no times.
+//! Integers of 1, 2 or 4 bytes, times excepted.
 
 use super::classes::{INTEGER_1, INTEGER_2, INTEGER_4};
 use super::rest::{integer_class, integer_rest};

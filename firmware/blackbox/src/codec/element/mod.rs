@@ -44,8 +44,8 @@ pub(crate) enum What {
 }
 
 impl What {
-    /// What an element says of itself. Memory may flip: what is none of these is taken for an element of which nothing is coded, because
-    /// a jump by it would go anywhere.
+    /// What an element says of itself. A bit flip in memory may give an unknown kind. Such an element is not coded, because a
+    /// jump by it could go anywhere.
     #[inline]
     const fn of(kind: u8) -> Self {
         match kind {
@@ -69,7 +69,7 @@ impl What {
     }
 }
 
-/// What is known of one element.
+/// State of one element.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Element {
     /// The last value's bits; of a 64-bit element the lower half.
@@ -86,7 +86,7 @@ pub(crate) struct Element {
     kind: u8,
     /// Of a text or instance its bytes; of a number its row in the table of links.
     detail: u8,
-    /// Where it ends in the payload.
+    /// End offset in the payload.
     pub(crate) end: u8,
     /// Bits 0-2: how surely it is a multiple of 1/100 (float) or of 1000 (64-bit integer): 3 and more. Bits 3-6: the last
     /// class. Bit 7: `step` is in hundredths.
@@ -179,7 +179,7 @@ impl Element {
         }
     }
 
-    /// Where it begins in the payload.
+    /// Start offset in the payload.
     #[inline]
     pub(crate) const fn offset(&self) -> usize {
         (self.end as usize).wrapping_sub(self.size())
@@ -232,7 +232,7 @@ impl Element {
     }
 }
 
-/// What the frame knows.
+/// State of the frame.
 pub(crate) struct Context {
     /// Milliseconds since the last frame of this slot.
     pub(crate) elapsed_ms: u32,
@@ -242,7 +242,7 @@ pub(crate) struct Context {
     pub(crate) clock_ms: u32,
     /// The float before in this frame: now and before.
     pub(crate) neighbour: Option<(f32, f32)>,
-    /// What the linked register predicts for the float that comes now, and whether it was computed as the sender did.
+    /// Prediction of the linked register for this float, and whether it used the sender's own computation.
     pub(crate) link: Option<(f32, bool)>,
 }
 
@@ -276,7 +276,7 @@ impl Elements {
 mod tests {
     use super::*;
 
-    /// What a flip makes of a kind is a kind, whatever it is: the image would jump by it.
+    /// A flipped kind must still be a valid kind, because the image jumps by it.
     #[test]
     fn whatever_memory_holds_is_a_kind() {
         for kind in 0..=u8::MAX {

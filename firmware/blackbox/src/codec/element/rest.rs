@@ -1,4 +1,4 @@
-//! What a class leaves open of a difference: its sign and its lower bits.
+//! Rest of a difference beyond its class: the sign and the lower bits.
 
 use crate::coder::Coder;
 
