@@ -25,7 +25,7 @@ use crate::motion::{IDLE_THROTTLE, throttle};
 use crate::observation::{Air, Attitude, Estimator, Gnss, Hud, Imu, SecondEstimate, WantedRates};
 use crate::pairs::{Kind, Pairs, SENSORS_MAX};
 use crate::rate_tracking::{self, RateSetpoint, Thrust};
-use crate::residual::{Comparison, Residuals};
+use crate::residual::Residuals;
 use crate::stuck::Repeats;
 use crate::time::{Instant, Span, Stamp};
 use crate::vehicle::{RECEIVERS_MAX, Vehicle};
@@ -41,16 +41,16 @@ const STEP_MAX: Span = Span::from_secs(1);
 /// The memory of all comparisons.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Crosschecks {
-    gates: Gates,
-    residuals: Residuals,
-    pairs: [Pairs; Kind::COUNT],
-    repeats: Repeats,
-    velocities: [GnssVelocity; RECEIVERS_MAX],
-    imu_gnss: ImuGnssResidual,
-    heights: Heights,
-    compass_use: CompassUse,
+    pub(crate) gates: Gates,
+    pub(crate) residuals: Residuals,
+    pub(crate) pairs: [Pairs; Kind::COUNT],
+    pub(crate) repeats: Repeats,
+    pub(crate) velocities: [GnssVelocity; RECEIVERS_MAX],
+    pub(crate) imu_gnss: ImuGnssResidual,
+    pub(crate) heights: Heights,
+    pub(crate) compass_use: CompassUse,
     rate_setpoint: RateSetpoint,
-    thrust: Thrust,
+    pub(crate) thrust: Thrust,
     /// The level of vibration in the last message, m/s2: a shock is in one message, and the lower of two counts.
     vibration: f32,
     /// The first sensor's messages are `HIGHRES_IMU`: of the sensor that PX4 has selected, less the offset of its estimator, which moves
@@ -198,11 +198,6 @@ impl Crosschecks {
         }
     }
 
-    /// The conditions of the flight at the last step.
-    pub(crate) const fn gates(&self) -> Gates {
-        self.gates
-    }
-
     /// Sensors up to the last one of any kind that has measured.
     pub(crate) fn sensors_known(&self) -> u8 {
         let measured = |sensor: usize| self.pairs.iter().any(|pairs| pairs.has_measured(sensor));
@@ -214,55 +209,10 @@ impl Crosschecks {
         self.pairs.iter().any(Pairs::are_compared)
     }
 
-    /// How far a sensor is apart from all others of its kind, beyond the baseline; of two, for the second one.
-    pub(crate) fn mismatch(&self, now: Instant, kind: Kind, sensor: u8) -> Option<Reading> {
-        self.pairs[kind as usize].mismatch(now, kind, sensor.into())
-    }
-
     /// For how long a sensor has repeated one value in flight, s; 0 if it does not.
     pub(crate) fn stuck(&self, now: Instant, kind: Kind, sensor: u8) -> Option<Reading> {
         let measures = |other: usize| self.pairs[kind as usize].measures(now, other);
         self.repeats.stuck(now, kind, sensor, measures)
-    }
-
-    /// The same of a receiver.
-    pub(crate) fn receiver_stuck(&self, now: Instant, receiver: u8) -> Option<Reading> {
-        self.repeats.receiver_stuck(now, receiver)
-    }
-
-    /// How far a receiver's velocity is from that of its positions, m/s.
-    pub(crate) fn gnss_velocity(&self, now: Instant, receiver: u8) -> Option<Reading> {
-        self.velocities.get(usize::from(receiver))?.residual(now)
-    }
-
-    /// A residual beyond its baseline.
-    pub(crate) fn residual(&self, now: Instant, of: Comparison) -> Option<Reading> {
-        self.residuals.reading(now, of)
-    }
-
-    /// All residuals but pairs.
-    pub(crate) const fn residuals(&self) -> &Residuals {
-        &self.residuals
-    }
-
-    /// Whether the estimator stopped using a compass whose heading moved away.
-    pub(crate) fn compass_unused(&self, now: Instant) -> Option<Reading> {
-        self.compass_use.unused(now)
-    }
-
-    /// How far the force is from the change of velocity, m/s2.
-    pub(crate) fn imu_gnss(&self, now: Instant) -> Option<Reading> {
-        self.imu_gnss.residual(now)
-    }
-
-    /// How far the receiver's height has leapt alone, m.
-    pub(crate) fn receiver_leapt(&self, now: Instant) -> Option<Reading> {
-        self.heights.receiver_leapt(now)
-    }
-
-    /// For how long full throttle has not made the vehicle climb, s.
-    pub(crate) fn full_in_vain(&self) -> Option<Reading> {
-        self.thrust.in_vain()
     }
 
     /// Vibration as a multiple of its baseline.

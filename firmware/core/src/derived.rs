@@ -38,11 +38,11 @@ const LOSS_MEMORY: Span = Span::from_secs(10);
 /// The memory of derived quantities.
 #[derive(Clone, Copy, Debug)]
 pub struct Derived {
-    cells: Cells,
+    pub(crate) cells: Cells,
     resistance: [Resistance; BATTERIES_MAX],
-    motors: Motors,
-    crosschecks: Crosschecks,
-    outputs: MotorOutputs,
+    pub(crate) motors: Motors,
+    pub(crate) crosschecks: Crosschecks,
+    pub(crate) outputs: MotorOutputs,
     /// Of the last sample, and smoothed.
     load_factor: Latest<[f32; 2]>,
     /// When anything at all was heard of the vehicle.
@@ -149,7 +149,7 @@ impl Derived {
             // On the scale that the vehicle knows.
             Observation::Vibration(_) => self.crosschecks.take_vibration(at, vehicle),
             Observation::Outputs(outputs) => {
-                let level = self.crosschecks.gates().are(gates::SETTLED | gates::CLEAR | gates::LEVEL);
+                let level = self.crosschecks.gates.are(gates::SETTLED | gates::CLEAR | gates::LEVEL);
                 self.outputs.take(at, outputs, vehicle, flight, level);
             }
             Observation::Gnss(gnss) => {
@@ -199,16 +199,6 @@ impl Derived {
         }
     }
 
-    /// Cells of the batteries.
-    pub(crate) const fn cells(&self) -> &Cells {
-        &self.cells
-    }
-
-    /// Cells of the batteries, to be told more.
-    pub(crate) const fn cells_mut(&mut self) -> &mut Cells {
-        &mut self.cells
-    }
-
     /// One step, at least every 50 ms, after the flight's own.
     pub fn step(
         &mut self,
@@ -233,28 +223,6 @@ impl Derived {
         self.motors.step();
         self.frames_lost.take(now, recorder.frames_lost);
         self.write_errors.take(now, recorder.write_errors);
-    }
-
-    /// Sensors against each other.
-    pub(crate) const fn crosschecks(&self) -> &Crosschecks {
-        &self.crosschecks
-    }
-
-    /// What the motors are given.
-    pub(crate) const fn outputs(&self) -> &MotorOutputs {
-        &self.outputs
-    }
-
-    /// Motors by what their ESCs send.
-    pub(crate) const fn motors(&self) -> &Motors {
-        &self.motors
-    }
-
-    /// What earlier flights found of a battery's internal resistance.
-    pub(crate) fn set_resistance_baseline(&mut self, battery: usize, ohm: f32) {
-        if let Some(resistance) = self.resistance.get_mut(battery) {
-            resistance.set_baseline(ohm);
-        }
     }
 
     /// The battery is another one.

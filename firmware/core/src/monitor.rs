@@ -6,11 +6,11 @@ mod stored;
 use core::mem::MaybeUninit;
 
 use crate::apart::{apart, place};
-use crate::baseline::{Baselines, Quantity};
 use crate::cells;
 use crate::component::{COMPONENTS_MAX, Component, Kind};
 use crate::derived::Derived;
 use crate::exposure::Exposure;
+use crate::figures::{Figures, Quantity};
 use crate::flight::{Flight, FlightEvent, Phase};
 use crate::happening::{Happening, Happenings};
 use crate::health::exceedance::Exceedances;
@@ -23,8 +23,7 @@ use crate::protect::{Protect, Request, Situation};
 use crate::snapshot::{Snapshot, Snapshots};
 use crate::status::{LinkReading, RecorderStatus};
 use crate::time::{Instant, Span};
-use crate::trends::Trends;
-use crate::usage::{Usage, UsageCounter, baseline_number, exposure_number};
+use crate::usage::{Usage, UsageCounter, exposure_number, figure_number};
 use crate::vehicle::{BATTERIES_MAX, Vehicle};
 
 /// How often [`Monitor::tick`] is to be called: a finding comes at most this much after its debounce.
@@ -41,14 +40,13 @@ pub struct Monitor {
     usage: Usage,
     /// What was lived before this session.
     before: Lifetime,
-    baselines: Baselines,
     exceedances: Exceedances,
     exposure: Exposure,
     components: [Component; COMPONENTS_MAX],
     /// Of each component, whose health it is and what is used of its life, percent; one a tick is worked out anew.
     wear: [Option<(Subsystem, f32)>; COMPONENTS_MAX],
     wear_next: u8,
-    trends: Trends,
+    figures: Figures,
     snapshots: Snapshots,
     protect: Protect,
     saving: Saving,
@@ -90,7 +88,7 @@ const PHASE_LASTS: Span = Span::from_secs(1);
 /// By then cells are told as not known, where nobody says that the autopilot's parameters were asked for.
 const CELLS_COME: Span = Span::from_secs(45);
 
-const _: () = assert!(size_of::<Monitor>() <= 16 * 1024 + 592);
+const _: () = assert!(size_of::<Monitor>() <= 16 * 1024 - 64);
 
 /// Whether a battery keeps the vehicle up: where none tells of itself, the first one does.
 fn carries(vehicle: &Vehicle, battery: usize) -> bool {
@@ -100,7 +98,7 @@ fn carries(vehicle: &Vehicle, battery: usize) -> bool {
 
 /// Whether nothing tells the cells of a battery that carries the vehicle, whose count is this one: then its voltage raises no alarm.
 fn lacks_cells(vehicle: &Vehicle, derived: &Derived, battery: usize, count: u8) -> bool {
-    count == 0 && carries(vehicle, battery) && derived.cells().has_voltage(battery)
+    count == 0 && carries(vehicle, battery) && derived.cells.has_voltage(battery)
 }
 
 impl Monitor {
@@ -121,13 +119,12 @@ impl Monitor {
                 health: Health::new(),
                 usage: Usage::new(),
                 before: Lifetime::new(),
-                baselines: Baselines::new(),
                 exceedances: Exceedances::new(),
                 exposure: Exposure::new(),
                 components: [Component::NONE; COMPONENTS_MAX],
                 wear: [None; COMPONENTS_MAX],
                 wear_next: 0,
-                trends: Trends::new(),
+                figures: Figures::NEW,
                 snapshots: Snapshots::new(),
                 protect: Protect::default(),
                 saving: Saving::new(),
@@ -161,7 +158,7 @@ impl Monitor {
         self.before_tick = Before { changes: self.vehicle.changes, ..Before::NOTHING };
         apart(|| self.flight = Flight::grounded());
         apart(|| self.derived = Derived::new());
-        apart(|| self.trends = Trends::new());
+        apart(|| self.figures = Figures::NEW);
         self.wear = [None; COMPONENTS_MAX];
         self.health.clear();
         self.exceedances.end(self.ticked_at);
@@ -196,7 +193,7 @@ impl Monitor {
         self.ticked_at = now;
         let event = self.step_flight(now);
         self.derived.step(now, &self.vehicle, &self.flight, event, recorder);
-        self.step_trends(now, event);
+        self.figures.step(now, &self.vehicle, &self.flight, event, &self.derived, &self.params);
         self.usage.step(now, &self.vehicle, &self.flight, event, &self.derived, &self.params);
         self.step_wear();
         let inputs = Inputs {
@@ -206,8 +203,6 @@ impl Monitor {
             derived: &self.derived,
             link,
             recorder,
-            trends: &self.trends,
-            baselines: &self.baselines,
             wear: &self.wear,
             params: &self.params,
         };
@@ -242,8 +237,6 @@ impl Monitor {
             derived: &self.derived,
             link,
             recorder,
-            trends: &self.trends,
-            baselines: &self.baselines,
             wear: &self.wear,
             params: &self.params,
         }
@@ -272,21 +265,6 @@ impl Monitor {
         count(UsageCounter::Flights) > count(UsageCounter::Landings) + count(UsageCounter::Mishaps)
     }
 
-    fn step_trends(&mut self, now: Instant, event: Option<FlightEvent>) {
-        let Self { vehicle, flight, derived, params, baselines, trends, saving, .. } = self;
-        if event.is_some_and(|event| event != FlightEvent::Landing) {
-            for battery in 0..BATTERIES_MAX {
-                if let Some(ohm) = baselines.get(Quantity::Resistance(battery as u8)).known() {
-                    derived.set_resistance_baseline(battery, ohm);
-                }
-            }
-        }
-        if event.is_some_and(|event| trends.event(event, params, baselines)) {
-            saving.change(ItemKey::Baselines);
-        }
-        trends.step(now, vehicle, flight, derived, params);
-    }
-
     /// One component a tick: there is time, and divisions cost.
     fn step_wear(&mut self) {
         let place = usize::from(self.wear_next);
@@ -308,7 +286,7 @@ impl Monitor {
     /// From which figure on vibration counts as risen, by what is usual in this flight; `None` until that is known.
     pub fn vibration_limit(&self) -> Option<f32> {
         let times = self.params.get(Param::VibeRiseWarn);
-        self.derived.crosschecks().vibration_limit(&self.vehicle, times)
+        self.derived.crosschecks.vibration_limit(&self.vehicle, times)
     }
 
     /// Whether nothing tells how many cells a battery has that carries the vehicle: then its voltage raises no alarm.
@@ -344,7 +322,7 @@ impl Monitor {
     /// A parameter of the autopilot that a recording tells by its name; what is no business of ours is left.
     pub fn learn_parameter(&mut self, name: &str, value: f32) {
         if let Some(place) = cells::known(name) {
-            self.derived.cells_mut().take_setting(place, value);
+            self.derived.cells.take_setting(place, value);
         }
     }
 
@@ -459,24 +437,18 @@ impl Monitor {
     pub fn for_each_counter(&self, mut each: impl FnMut(u8, f64)) {
         self.usage.for_each(&mut each);
         self.exposure.for_each(|quantity, bin, seconds| each(exposure_number(quantity, bin), seconds));
-    }
-
-    /// The same of the airframe's life, with its baselines.
-    pub fn for_each_counter_of_life(&self, mut each: impl FnMut(u8, f64)) {
-        self.lifetime().totals.for_each(&mut each);
-        self.exposure
-            .for_each_of_life(|quantity, bin, seconds| each(exposure_number(quantity, bin), seconds));
-        for quantity in (0..Quantity::COUNT).filter_map(Quantity::from_index) {
-            let baseline = self.baselines.get(quantity);
-            if baseline.flights > 0 {
-                each(baseline_number(quantity), f64::from(baseline.value));
+        for quantity in Quantity::all() {
+            if let Some(figure) = self.figures.get(quantity) {
+                each(figure_number(quantity), f64::from(figure));
             }
         }
     }
 
-    /// What is normal for this airframe.
-    pub const fn baselines(&self) -> &Baselines {
-        &self.baselines
+    /// The same of the airframe's life.
+    pub fn for_each_counter_of_life(&self, mut each: impl FnMut(u8, f64)) {
+        self.lifetime().totals.for_each(&mut each);
+        self.exposure
+            .for_each_of_life(|quantity, bin, seconds| each(exposure_number(quantity, bin), seconds));
     }
 
     /// Limits that were crossed.
@@ -519,8 +491,8 @@ impl Monitor {
         self.protect.cancel()
     }
 
-    /// Quantities of steady flight.
-    pub const fn trends(&self) -> &Trends {
-        &self.trends
+    /// Figures of the flight.
+    pub const fn figures(&self) -> &Figures {
+        &self.figures
     }
 }

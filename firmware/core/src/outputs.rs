@@ -31,7 +31,7 @@
 use core::ops::RangeInclusive;
 
 use crate::adaptive_baseline::AdaptiveBaseline;
-use crate::baseline::OUTPUTS_MAX;
+use crate::figures::OUTPUTS_MAX;
 use crate::flight::Flight;
 use crate::motion::IDLE_THROTTLE;
 use crate::observation::{MOTORS_MAX, Outputs};

@@ -96,13 +96,6 @@ impl Resistance {
         (enough && ohm > 0.001 && ohm < 1.0).then_some(ohm)
     }
 
-    /// Sets the baseline that earlier flights found, ohm.
-    pub(crate) fn set_baseline(&mut self, ohm: f32) {
-        if ohm.is_finite() && ohm > 0.0 {
-            self.baseline_ohm = ohm;
-        }
-    }
-
     /// How far it is above its baseline, percent.
     pub(crate) fn rise_percent(&self) -> Option<f32> {
         let ohm = self.ohm()?;

@@ -3,6 +3,7 @@
 
 use crate::common::{AUTOPILOT, Quad};
 use hums_core::Monitor;
+use hums_core::figures::Quantity;
 use hums_core::happening::Happening;
 use hums_core::health::{Finding, Level};
 use hums_core::lifetime::{ITEM_BYTES_MAX, Item as _, ItemKey, Lifetime};
@@ -264,4 +265,26 @@ fn cycles_count_by_the_capacity_that_the_autopilot_knows_and_a_setting_comes_fir
     let mut set = Params::defaults();
     set.set("BAT_CAPACITY", 10.0).unwrap();
     assert!((cycles(set) - 0.055).abs() < 0.002);
+}
+
+#[test]
+fn a_battery_whose_resistance_rises_is_found() {
+    // 20 milliohms for the first 50 s, then 45; the current goes up and down once in two seconds.
+    let mut monitor = Monitor::new(Params::defaults());
+    let outcome = fly_with(
+        &mut monitor,
+        |now_ms| {
+            let ohm = if now_ms < 50_000 { 0.020 } else { 0.045 };
+            let amperes = if now_ms / 1_000 % 2 == 0 { 10.0 } else { 30.0 };
+            (16.4 - ohm * amperes, amperes)
+        },
+        &[],
+    );
+    let of = |finding: &&Finding| finding.check == "batt_resistance";
+    let found = outcome.findings.iter().filter(of).find(|finding| finding.level == Level::Critical).unwrap();
+    // The mean looks back six seconds, and the debounce is ten.
+    assert!((60_000..=75_000).contains(&found.at.as_millis()), "{found:?}");
+    assert!((100.0..=130.0).contains(&found.value), "{found:?}");
+    let figure = monitor.figures().get(Quantity::Resistance(0)).unwrap();
+    assert!((0.03..0.05).contains(&figure), "{figure}");
 }

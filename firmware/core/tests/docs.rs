@@ -21,8 +21,7 @@ cell_voltage: BATTERY_STATUS: the lowest cell, or the pack by its cells, without
 batt_state: BATTERY_STATUS: charge_state; 1 low or unhealthy, 2 critical, emergency or failed
 cell_deviation: BATTERY_STATUS: highest less lowest cell
 cell_dev_lasting: BATTERY_STATUS: the same for a minute
-batt_resistance: BATTERY_STATUS: slope of voltage over current, against its baseline
-batt_capacity: BATTERY_STATUS: charge taken over the fall of the state of charge by its cells' voltage, below its baseline
+batt_resistance: BATTERY_STATUS: slope of voltage over current, above that earlier in the session
 batt_fault: BATTERY_STATUS: fault bits set
 batt_temperature: BATTERY_STATUS
 rail_5v_low: POWER_STATUS
@@ -40,10 +39,6 @@ motor_off: SERVO_OUTPUT_RAW: 2 if a motor is given next to nothing while the oth
 thrust_lost: VFR_HUD: how long throttle was full without a climb; on wings, with a sink
 roll_rate: ATTITUDE_TARGET against ATTITUDE: body rate that is wanted and missing, less a part of what is wanted
 pitch_rate: the same messages
-motor_trend: ESC_STATUS, ESC_TELEMETRY: the speed against the others with its sign, against its baseline; without them SERVO_OUTPUT_RAW: the output, of quadrotors and hexarotors
-throttle_trend: VFR_HUD: throttle in hover, for a set voltage and sea level, above its baseline, where it is not the weight
-power_trend: BATTERY_STATUS: power in hover, at sea level, above its baseline, where it is not the weight
-weight_trend: VFR_HUD, BATTERY_STATUS: throttle and power in hover above their baselines as they are with more weight
 drive_due: components of kind motor, propeller, ESC
 drive_alert: STATUSTEXT, EVENT; SYS_STATUS: motor outputs, propulsion; HIGH_LATENCY2
 cylinder_head: EFI_STATUS
@@ -56,7 +51,6 @@ vibration_px4: VIBRATION of PX4: the accelerometer metric
 vibration_rise: VIBRATION: the worst axis, or PX4's accelerometer metric, over what is usual in this flight; on rotors away from the ground
 clipping: VIBRATION: clipped samples of a flight, since ten seconds without any
 load_factor: SCALED_IMU, RAW_IMU, HIGHRES_IMU: specific force over gravity, while VIBRATION is below 60
-vibration_trend: VIBRATION in steady flight, above or below its baseline
 airframe_due: components of kind airframe, other
 vibration_alert: STATUSTEXT, EVENT
 ekf_variance: EKF_STATUS_REPORT: the largest variance but the compass's

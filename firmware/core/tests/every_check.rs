@@ -176,15 +176,14 @@ const FAULTS: &[(&str, u8, Level, Fault)] = &[
     ("card_room", 0, Level::Warning, |quad, _| quad.recorder.room = Some(0.05)),
 ];
 
-/// Found by scripts of their own: silence, restarts and rates in `scripted_faults.rs`, what departs from a baseline in
-/// `trends.rs`, mishaps in `mishap.rs`, what departs from its usual level in a flight in `crosscheck.rs`.
+/// Found by scripts of their own: silence, restarts and rates in `scripted_faults.rs`, a battery's resistance in
+/// `cells.rs`, mishaps in `mishap.rs`, what departs from its usual level in a flight in `crosscheck.rs`.
 const ELSEWHERE: &str = "\
     ahrs2_tilt ahrs2_height ahrs2_position gps_sats_fall gps_hdop_rise compass_heading gps_height \
     position_silent baro_height baro_noise ekf_climb accel_stuck gyro_stuck compass_stuck baro_stuck \
     gps_stuck thrust_lost roll_rate pitch_rate accel_mismatch gyro_mismatch imu_gps compass_mismatch \
     baro_mismatch compass_unused vibration_rise motor_output motor_off esc_silent esc_errors heartbeat \
-    autopilot_reboot batt_resistance batt_capacity gps_speed motor_trend throttle_trend power_trend \
-    weight_trend vibration_trend free_fall impact tumbling disarmed_in_air sinking overturned";
+    autopilot_reboot batt_resistance gps_speed free_fall impact tumbling disarmed_in_air sinking overturned";
 
 /// What is due, and the kind of component (`CMP1_KIND`) that is.
 const DUE: [(&str, f32); 8] = [

@@ -4,9 +4,8 @@
 use std::collections::BTreeMap;
 
 use hums_core::Monitor;
-use hums_core::baseline::{Baselines, Quantity};
 use hums_core::component::{Kind, Label, Status};
-use hums_core::lifetime::{EVERY, EVERY_ARMED, ITEM_BYTES_MAX, Item as _, ItemKey, Room};
+use hums_core::lifetime::{EVERY, EVERY_ARMED, ITEM_BYTES_MAX, ItemKey, Room};
 use hums_core::observation::{
     AutopilotIdentity, Battery, Esc, EscGroup, GlobalPosition, Heartbeat, Observation, Source, VehicleKind,
 };
@@ -226,19 +225,12 @@ fn a_flight_saves_little_until_it_lands() {
 #[test]
 fn another_airframe_begins_its_own_life() {
     let mut store = Store::default();
-    let mut baselines = Baselines::new();
-    (0..5).for_each(|_| baselines.learn(Quantity::HoverThrottle, 0.4));
-    let mut item = [0; Baselines::BYTES];
-    baselines.encode(&mut item);
-    store.0.insert(ItemKey::Baselines.number(), item.to_vec());
     let mut monitor = store.start(&Params::defaults());
     run(&mut monitor, &mut store, 60, 20, 40, (1, 7));
-    assert_eq!(*monitor.baselines(), baselines);
     let mut monitor = store.start(&Params::defaults());
     run(&mut monitor, &mut store, 60, 20, 40, (1, 8));
     assert_eq!(total(&monitor, UsageCounter::Flights), 1.0, "the second one's");
     assert_eq!(monitor.lifetime().airframe.uid, 8);
-    assert_eq!(*monitor.baselines(), Baselines::new());
     let mut monitor = store.start(&Params::defaults());
     run(&mut monitor, &mut store, 60, 20, 40, (3, 8));
     assert_eq!(total(&monitor, UsageCounter::Flights), 2.0, "a system id can be set; the unique id decides");
@@ -259,10 +251,7 @@ fn a_component_wears_over_sessions_and_is_replaced_at_once() {
     assert_eq!(monitor.replace_component(0, Label::new("S1")), None, "there is none");
     let old = monitor.replace_component(2, Label::new("S2")).unwrap();
     assert_eq!(old.ran().flights, 2.0);
-    assert_eq!(
-        store.save(&mut monitor, Instant::from_millis(50)),
-        [ItemKey::Baselines, ItemKey::Component(2)]
-    );
+    assert_eq!(store.save(&mut monitor, Instant::from_millis(50)), [ItemKey::Component(2)]);
     let again = store.start(&params);
     let component = again.components()[2];
     assert_eq!((component.serial.as_str(), component.replaced, component.ran().flights), ("S2", 1, 0.0));

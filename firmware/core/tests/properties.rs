@@ -20,7 +20,7 @@ use hums_core::units::{
     AmpereHours, Amperes, Celsius, Fraction, Gauss, Hectopascals, Metres, MetresPerSecond, MetresPerSecond2,
     Position, Radians, RadiansPerSecond, Rpm, Volts, WattHours,
 };
-use hums_core::usage::BASELINE_FIRST;
+use hums_core::usage::FIGURE_FIRST;
 
 const AUTOPILOT: Source = Source { system: 1, component: 1 };
 
@@ -349,7 +349,7 @@ impl Random {
 /// What must hold whatever was said.
 fn check(monitor: &mut Monitor, now: Instant) {
     let sane = |counter: u8, value: f64| {
-        let sign = counter >= BASELINE_FIRST || value >= 0.0;
+        let sign = counter >= FIGURE_FIRST || value >= 0.0;
         assert!(value.is_finite() && sign, "counter {counter} is {value}");
     };
     monitor.for_each_counter(sane);

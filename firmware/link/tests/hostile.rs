@@ -9,7 +9,7 @@ use hums_core::params::{Params, TABLE};
 use hums_core::snapshot::{COLUMNS_MAX, SAMPLES};
 use hums_core::status::{LinkReading, RecorderStatus};
 use hums_core::time::Instant;
-use hums_core::usage::BASELINE_FIRST;
+use hums_core::usage::FIGURE_FIRST;
 use hums_link::sequence::Sequences;
 use hums_link::{Framer, observe};
 use proptest::prelude::*;
@@ -78,8 +78,8 @@ fn params(settings: &[(usize, f32)]) -> Params {
 /// Everything that the monitor gives away, as the firmware takes it after each tick.
 fn look(monitor: &mut Monitor, now: Instant) {
     let sane = |counter: u8, value: f64| {
-        // A baseline may be negative: a motor slower than the others.
-        let sign = counter >= BASELINE_FIRST || value >= 0.0;
+        // A figure may be negative: a motor slower than the others.
+        let sign = counter >= FIGURE_FIRST || value >= 0.0;
         assert!(value.is_finite() && sign, "counter {counter} is {value}");
     };
     monitor.for_each_counter(sane);

@@ -1,4 +1,4 @@
-//! Store of small items in two sectors of NOR flash: lifetime counters, baselines, components and changed parameters. After a
+//! Store of small items in two sectors of NOR flash: lifetime counters, components and changed parameters. After a
 //! power cut at any word, each item reads as its old or its new value.
 //!
 //! A sector is a log of items with checksums (layout: `sector`). For each key the newest complete item counts. When the active

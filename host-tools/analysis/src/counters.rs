@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use hums_core::baseline::Quantity;
+use hums_core::figures::Quantity;
 use hums_core::usage::{CounterName, UsageCounter, counter_name as meaning};
 use hums_core::vehicle::Vehicle;
 use serde::Serialize;
@@ -141,23 +141,21 @@ fn of_vehicle(name: &str) -> (String, &'static str, u8) {
     (title.to_owned(), unit, decimals)
 }
 
-fn of_baseline(quantity: Quantity) -> (String, &'static str, u8) {
+fn of_figure(quantity: Quantity) -> (String, &'static str, u8) {
     match quantity {
-        Quantity::Vibration => ("Usual vibration".to_owned(), "m/s\u{b2}", 2),
-        Quantity::HoverThrottle => ("Usual hover throttle".to_owned(), "", 3),
+        Quantity::Vibration => ("Vibration in steady flight".to_owned(), "m/s\u{b2}", 2),
+        Quantity::HoverThrottle => ("Hover throttle".to_owned(), "", 3),
         Quantity::Resistance(battery) => {
-            (format!("Usual resistance of battery {}", u16::from(battery) + 1), "\u{3a9}", 4)
+            (format!("Resistance of battery {}", u16::from(battery) + 1), "\u{3a9}", 4)
         }
         Quantity::MotorSpeed(motor) => {
-            (format!("Usual difference of motor {}", u16::from(motor) + 1), "%", 1)
+            (format!("Speed of motor {} against the others", u16::from(motor) + 1), "%", 1)
         }
-        Quantity::HoverPower => ("Usual hover power".to_owned(), "W", 0),
+        Quantity::HoverPower => ("Hover power".to_owned(), "W", 0),
         Quantity::MotorOutput(motor) => {
-            (format!("Usual output of motor {} against the mean", u16::from(motor) + 1), "%", 1)
+            (format!("Output of motor {} against the mean", u16::from(motor) + 1), "%", 1)
         }
-        Quantity::Capacity(battery) => {
-            (format!("Usual capacity of battery {}", u16::from(battery) + 1), "Ah", 1)
-        }
+        Quantity::Capacity(battery) => (format!("Capacity of battery {}", u16::from(battery) + 1), "Ah", 1),
     }
 }
 
@@ -179,7 +177,7 @@ pub fn of(session: &BTreeMap<String, f64>, life: &BTreeMap<String, f64>) -> Coun
             // None in it, one landing: no contradiction.
             Some(CounterName::Vehicle(FLIGHTS)) if all.remark.is_some() => ("Take-offs".to_owned(), "", 0),
             Some(CounterName::Vehicle(name)) => of_vehicle(name),
-            Some(CounterName::Baseline(quantity)) => of_baseline(quantity),
+            Some(CounterName::Figure(quantity)) => of_figure(quantity),
             Some(CounterName::Motor(what, motor)) => {
                 all.motor(what == "run_time_s", motor, value, lived);
                 continue;

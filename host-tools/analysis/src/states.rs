@@ -1,6 +1,8 @@
 //! What people are shown of a check's value: a quantity with its limit, or the words of a state.
 
-use hums_core::health::{check_named, vocabulary};
+use hums_core::health::check_named;
+
+use crate::names::vocabulary;
 
 /// Counts of what should never happen: a limit below one means "any", which tells nobody anything.
 const COUNTS: [&str; 2] = ["card_errors", "record_lost"];

@@ -29,3 +29,4 @@ pub mod mavlink;
 pub mod names;
 pub mod source;
 pub mod statustext;
+pub mod trend_words;

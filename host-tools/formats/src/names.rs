@@ -2,9 +2,11 @@
 
 use std::borrow::Cow;
 
-use hums_core::baseline::Quantity;
-use hums_core::health::vocabulary;
+use hums_core::figures::Quantity;
+use hums_core::health::{self, Words};
 use hums_core::usage::{self, CounterName};
+
+use crate::trend_words::WORDS;
 
 /// The name of a message, `UNKNOWN_12345` where the dialect has none.
 pub fn message_name(id: u32) -> Cow<'static, str> {
@@ -12,6 +14,12 @@ pub fn message_name(id: u32) -> Cow<'static, str> {
         Some(message) => Cow::Borrowed(message.name),
         None => Cow::Owned(format!("UNKNOWN_{id}")),
     }
+}
+
+/// The words of a check, of the board's or of trends over flights.
+pub fn vocabulary(check: &str) -> Option<&'static Words> {
+    let of_trends = || WORDS.iter().find(|words| words.said.check == check);
+    health::vocabulary(check).or_else(of_trends)
 }
 
 /// What a check of one part is called wherever people read of it: `battery 1 cell voltage`. What a pilot is told is in other words.
@@ -53,14 +61,14 @@ pub fn counter_name(number: u8) -> String {
             };
             format!("{name}_{}_{unit}_s", range.replace('.', "_"))
         }
-        Some(CounterName::Baseline(quantity)) => match quantity {
-            Quantity::Vibration => "baseline_vibration_m_s2".to_owned(),
-            Quantity::HoverThrottle => "baseline_hover_throttle".to_owned(),
-            Quantity::Resistance(battery) => format!("baseline_battery{battery}_resistance_ohm"),
-            Quantity::MotorSpeed(motor) => format!("baseline_motor{motor}_speed_off_percent"),
-            Quantity::HoverPower => "baseline_hover_power_w".to_owned(),
-            Quantity::MotorOutput(motor) => format!("baseline_motor{motor}_output_off_percent"),
-            Quantity::Capacity(battery) => format!("baseline_battery{battery}_capacity_ah"),
+        Some(CounterName::Figure(quantity)) => match quantity {
+            Quantity::Vibration => "steady_vibration_m_s2".to_owned(),
+            Quantity::HoverThrottle => "steady_hover_throttle".to_owned(),
+            Quantity::Resistance(battery) => format!("steady_battery{battery}_resistance_ohm"),
+            Quantity::MotorSpeed(motor) => format!("steady_motor{motor}_speed_off_percent"),
+            Quantity::HoverPower => "steady_hover_power_w".to_owned(),
+            Quantity::MotorOutput(motor) => format!("steady_motor{motor}_output_off_percent"),
+            Quantity::Capacity(battery) => format!("steady_battery{battery}_capacity_ah"),
         },
         None => format!("counter_{number}"),
     }

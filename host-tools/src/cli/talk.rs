@@ -4,9 +4,10 @@ use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
 use hums_core::clock::Span;
-use hums_core::health::{Level, vocabulary};
+use hums_core::health::Level;
 
 use crate::endpoint::Endpoint;
+use crate::names::vocabulary;
 use crate::utc::{When, parse_seconds};
 
 const BOX_EXAMPLES: &str = "Examples:

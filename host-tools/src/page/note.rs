@@ -2,12 +2,13 @@
 
 use hums_core::clock::Instant;
 use hums_core::happening::Happening;
-use hums_core::health::{Finding, VOCABULARY, instances, vocabulary};
-use hums_core::observation::Feeds;
+use hums_core::health::{Finding, Said, VOCABULARY, instances};
+use hums_core::observation::{Feeds, MOTORS_MAX};
+use hums_formats::trend_words::WORDS;
 use hums_link::encode::COMPONENT;
 use serde::Serialize;
 
-use crate::names::{check_name, unit_name};
+use crate::names::{check_name, unit_name, vocabulary};
 use crate::part;
 use crate::states::{Shown, meaning, shown};
 use crate::statustext::Text;
@@ -93,9 +94,16 @@ const OVER: &str = "over: ";
 fn told_check(words: &str) -> Option<(&'static str, u8, &str)> {
     let silent = words.strip_prefix("no data: ");
     let words = words.strip_prefix(OVER).unwrap_or(words);
+    let parts = |said: &Said| match instances(said.check) {
+        // Of a trend, which boxes judged themselves.
+        0 if said.part.is_empty() => 1,
+        0 => MOTORS_MAX as u8,
+        parts => parts,
+    };
     let each = VOCABULARY
         .iter()
-        .flat_map(|words| (0..instances(words.said.check)).map(move |part| (words.said, part)));
+        .chain(&WORDS)
+        .flat_map(|words| (0..parts(&words.said)).map(move |part| (words.said, part)));
     let told = each.filter_map(|(said, part)| {
         let rest = match silent {
             Some(silent) => silent.strip_prefix(said.name_of(part).to_string().as_str()),

@@ -93,16 +93,16 @@ impl Reported {
     pub(super) fn of(inputs: &Inputs<'_>) -> Self {
         let Inputs { vehicle, derived, .. } = inputs;
         let batteries = vehicle.batteries_known();
-        let sensors = derived.crosschecks().sensors_known();
+        let sensors = derived.crosschecks.sensors_known();
         let mut counts = [u8::MAX; _];
         for (kind, count) in [
             (InstanceOf::Motor, vehicle.motors_known()),
-            (InstanceOf::Output, if derived.outputs().are_told() { u8::MAX } else { 0 }),
+            (InstanceOf::Output, if derived.outputs.are_told() { u8::MAX } else { 0 }),
             (InstanceOf::Supply, batteries.max(1)),
             (InstanceOf::Battery, batteries),
             (InstanceOf::Receiver, vehicle.receivers_known()),
             (InstanceOf::Sensor, sensors),
-            (InstanceOf::Pair, if derived.crosschecks().are_compared() { sensors } else { 0 }),
+            (InstanceOf::Pair, if derived.crosschecks.are_compared() { sensors } else { 0 }),
         ] {
             counts[kind as usize] = count;
         }

@@ -6,7 +6,6 @@ use super::check::{Check, Debounce, InstanceOf, Limits, Unit, When};
 use super::finding::Subsystem;
 use super::inputs::Inputs;
 use super::suppression::Role;
-use crate::baseline::Quantity;
 use crate::cause::Cause;
 use crate::latest::Reading;
 use crate::observation::VibrationScale;
@@ -80,23 +79,6 @@ fn used(inputs: &Inputs<'_>, subsystem: Subsystem) -> Option<Reading> {
     // A part at its limit is due, while a check's value must be beyond the limit.
     let percent = mine.map(|(_, percent)| percent.next_up()).reduce(f32::max);
     inputs.reading(percent?.min(most))
-}
-
-/// How much heavier than normal for this airframe it hovers, percent.
-pub(super) fn heavier(inputs: &Inputs<'_>) -> Option<Reading> {
-    inputs.reading(inputs.trends.heavier(inputs.baselines, inputs.params)?)
-}
-
-/// How much more of a quantity hovering takes, if the vehicle is not heavier.
-pub(super) fn takes_more(inputs: &Inputs<'_>, quantity: Quantity) -> Option<Reading> {
-    let is_heavier = heavier(inputs).is_some_and(|heavier| heavier.value > 0.0);
-    let departure = departure(inputs, quantity)?;
-    Some(if is_heavier { Reading { value: 0.0, ..departure } } else { departure })
-}
-
-/// How far a quantity is from what is normal for this airframe.
-pub(super) fn departure(inputs: &Inputs<'_>, quantity: Quantity) -> Option<Reading> {
-    inputs.reading(inputs.trends.departure(quantity, inputs.baselines, inputs.params)?)
 }
 
 /// A figure of VIBRATION's three, on this scale: an axis each of ArduPilot; of PX4 coning of the gyro, high-frequency rate (rad/s) and

@@ -1,14 +1,12 @@
 //! What checks read.
 
 use super::finding::Subsystem;
-use crate::baseline::Baselines;
 use crate::derived::Derived;
 use crate::flight::Flight;
 use crate::latest::Reading;
 use crate::params::Params;
 use crate::status::{LinkReading, RecorderStatus};
 use crate::time::Instant;
-use crate::trends::Trends;
 use crate::vehicle::Vehicle;
 
 /// What checks read. Nothing here changes while they do.
@@ -26,10 +24,6 @@ pub struct Inputs<'a> {
     pub link: &'a LinkReading,
     /// Our own recording.
     pub recorder: &'a RecorderStatus,
-    /// Quantities of steady flight.
-    pub trends: &'a Trends,
-    /// What is normal for this airframe.
-    pub baselines: &'a Baselines,
     /// Of each component, whose health it is and the part of its life that is used, percent.
     pub wear: &'a [Option<(Subsystem, f32)>],
     /// Limits and settings.

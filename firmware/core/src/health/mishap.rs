@@ -45,7 +45,7 @@ pub(super) fn orders(check: &Check, inputs: &Inputs<'_>, has_lost_drive: impl Fn
         return Orders::Disarm;
     }
     if check.name == Kind::Sinking.name() {
-        let in_vain = derived.crosschecks().full_in_vain().is_some_and(|full| full.value > 0.0);
+        let in_vain = derived.crosschecks.thrust.in_vain().is_some_and(|full| full.value > 0.0);
         return match vehicle.hovers(now) {
             Some(true) if !flight.has_tilted(now) && !in_vain && !has_lost_drive() => Orders::Own,
             Some(true) => Orders::Disarm,

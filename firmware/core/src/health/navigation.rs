@@ -133,7 +133,7 @@ pub(super) const CHECKS: &[Check] = &[
         limits: Limits::above(Some(Param::AlertWarn), None, 0.05),
         // That it is used says nothing about how well it is.
         alarm_only: true,
-        read: |inputs, _| inputs.derived.crosschecks().compass_unused(inputs.now),
+        read: |inputs, _| inputs.derived.crosschecks.compass_use.unused(inputs.now),
         ..ESTIMATOR
     },
     Check { role: Role::of(Group::AccelMismatch, Group::AccelFault.bit() | VIBRATION), ..MISMATCH },
@@ -164,7 +164,7 @@ pub(super) const CHECKS: &[Check] = &[
         instances: 1,
         // It goes by the attitude and a receiver too.
         of: InstanceOf::Vehicle,
-        read: |inputs, _| inputs.derived.crosschecks().imu_gnss(inputs.now),
+        read: |inputs, _| inputs.derived.crosschecks.imu_gnss.residual(inputs.now),
         ..MISMATCH
     },
     Check {
@@ -270,7 +270,7 @@ pub(super) const CHECKS: &[Check] = &[
         instances: RECEIVERS_MAX as u8,
         // It goes by how far the vehicle moved.
         of: InstanceOf::Vehicle,
-        read: |inputs, receiver| inputs.derived.crosschecks().receiver_stuck(inputs.now, receiver),
+        read: |inputs, receiver| inputs.derived.crosschecks.repeats.receiver_stuck(inputs.now, receiver),
         ..STUCK
     },
     Check {
@@ -286,7 +286,7 @@ pub(super) const CHECKS: &[Check] = &[
         limits: Limits::above(Some(Param::GpsSatsFall), None, 5.0),
         debounce: [Debounce::secs(1); 2],
         read: |inputs, receiver| {
-            let residuals = inputs.derived.crosschecks().residuals();
+            let residuals = &inputs.derived.crosschecks.residuals;
             gnss_constellation::satellites_lost(residuals, inputs.now, receiver)
         },
         ..GNSS
@@ -298,7 +298,9 @@ pub(super) const CHECKS: &[Check] = &[
         // Never stale: only what moves says something.
         stale_s: None,
         limits: Limits::above(Some(Param::GpsSpeedWarn), None, 0.2),
-        read: |inputs, receiver| inputs.derived.crosschecks().gnss_velocity(inputs.now, receiver),
+        read: |inputs, receiver| {
+            inputs.derived.crosschecks.velocities.get(usize::from(receiver))?.residual(inputs.now)
+        },
         ..GNSS
     },
     Check {
@@ -312,7 +314,7 @@ pub(super) const CHECKS: &[Check] = &[
         instances: 1,
         // It goes by the barometer too.
         of: InstanceOf::Vehicle,
-        read: |inputs, _| inputs.derived.crosschecks().receiver_leapt(inputs.now),
+        read: |inputs, _| inputs.derived.crosschecks.heights.receiver_leapt(inputs.now),
         ..GNSS
     },
     Check {
@@ -338,7 +340,7 @@ pub(super) const CHECKS: &[Check] = &[
         limits: Limits::above(Some(Param::GpsHdopRise), None, 0.1),
         debounce: [Debounce::secs(1); 2],
         read: |inputs, receiver| {
-            gnss_constellation::hdop_rise(inputs.derived.crosschecks().residuals(), inputs.now, receiver)
+            gnss_constellation::hdop_rise(&inputs.derived.crosschecks.residuals, inputs.now, receiver)
         },
         ..GNSS
     },
@@ -397,15 +399,15 @@ pub(super) const CHECKS: &[Check] = &[
 ];
 
 fn residual(inputs: &Inputs<'_>, of: Comparison) -> Option<Reading> {
-    inputs.derived.crosschecks().residual(inputs.now, of)
+    inputs.derived.crosschecks.residuals.reading(inputs.now, of)
 }
 
 fn mismatch(inputs: &Inputs<'_>, kind: Kind, sensor: u8) -> Option<Reading> {
-    inputs.derived.crosschecks().mismatch(inputs.now, kind, sensor)
+    inputs.derived.crosschecks.pairs[kind as usize].mismatch(inputs.now, kind, sensor.into())
 }
 
 fn stuck(inputs: &Inputs<'_>, kind: Kind, sensor: u8) -> Option<Reading> {
-    inputs.derived.crosschecks().stuck(inputs.now, kind, sensor)
+    inputs.derived.crosschecks.stuck(inputs.now, kind, sensor)
 }
 
 fn estimator(

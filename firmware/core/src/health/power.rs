@@ -1,11 +1,10 @@
 //! Batteries and rails.
 
 use super::check::{Check, Debounce, InstanceOf, Limits, Unit, When};
-use super::common::{PLAIN, STALE, STALE_SLOW, alert, departure, due};
+use super::common::{PLAIN, STALE, STALE_SLOW, alert, due};
 use super::finding::Subsystem;
 use super::inputs::Inputs;
 use super::suppression::{Group, Role};
-use crate::baseline::Quantity;
 use crate::cause::Cause;
 use crate::latest::{Latest, Reading};
 use crate::observation::{Battery, Feeds};
@@ -75,16 +74,6 @@ pub(super) const CHECKS: &[Check] = &[
             let resistance = inputs.derived.resistance(usize::from(battery))?;
             of(inputs, battery, |_| resistance.rise_percent())
         },
-        ..BATTERY
-    },
-    Check {
-        name: "batt_capacity",
-        limits: Limits::above(Some(Param::TrdCapWarn), Some(Param::TrdCapCrit), 5.0),
-        debounce: [Debounce::secs(10); 2],
-        when: When::InFlight,
-        stale_s: None,
-        of: InstanceOf::Vehicle,
-        read: |inputs, battery| departure(inputs, Quantity::Capacity(battery)),
         ..BATTERY
     },
     Check {

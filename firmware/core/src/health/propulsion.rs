@@ -1,11 +1,10 @@
 //! Motors, ESCs and propellers.
 
 use super::check::{Check, Debounce, InstanceOf, Limits, Unit, When};
-use super::common::{PLAIN, STALE_SLOW, alert, departure, due, heavier, takes_more};
+use super::common::{PLAIN, STALE_SLOW, alert, due};
 use super::finding::Subsystem;
 use super::inputs::Inputs;
 use super::suppression::{DRIVE, GYROS, Group, RATES, Role};
-use crate::baseline::{OUTPUTS_MAX, Quantity};
 use crate::cause::Cause;
 use crate::latest::Reading;
 use crate::observation::{Esc, MOTORS_MAX};
@@ -33,19 +32,6 @@ const RATE: Check = Check {
     when: When::InFlight,
     instances: 1,
     of: InstanceOf::Vehicle,
-    ..ESC
-};
-
-/// Against the airframe's own past.
-const TREND: Check = Check {
-    name: "throttle_trend",
-    unit: Unit::of("%"),
-    limits: Limits::above(Some(Param::TrdThrWarn), Some(Param::TrdThrCrit), 2.0),
-    debounce: [Debounce::secs(10); 2],
-    when: When::InFlight,
-    instances: 1,
-    of: InstanceOf::Vehicle,
-    read: |inputs, _| takes_more(inputs, Quantity::HoverThrottle),
     ..ESC
 };
 
@@ -78,7 +64,7 @@ pub(super) const CHECKS: &[Check] = &[
         limits: Limits::above(Some(Param::EscErrWarn), None, 2.0),
         debounce: [Debounce::secs(1), Debounce::NONE],
         stale_s: STALE_SLOW,
-        read: |inputs, motor| state(inputs, motor, |_| inputs.derived.motors().errors(motor)),
+        read: |inputs, motor| state(inputs, motor, |_| inputs.derived.motors.errors(motor)),
         ..ESC
     },
     Check {
@@ -89,7 +75,7 @@ pub(super) const CHECKS: &[Check] = &[
         debounce: [Debounce::NONE, Debounce::millis(500)],
         when: When::InFlight,
         read: |Inputs { now, vehicle, derived, .. }, motor| {
-            derived.motors().share(*now, vehicle, derived.outputs(), motor)
+            derived.motors.share(*now, vehicle, &derived.outputs, motor)
         },
         ..ESC
     },
@@ -102,7 +88,7 @@ pub(super) const CHECKS: &[Check] = &[
         when: When::InFlight,
         // Never stale: only steady flight says something, and ESCs that stop talking are `esc_silent`.
         read: |Inputs { now, vehicle, flight, derived, .. }, motor| {
-            derived.motors().imbalance(*now, vehicle, flight, derived.outputs(), motor)
+            derived.motors.imbalance(*now, vehicle, flight, &derived.outputs, motor)
         },
         ..ESC
     },
@@ -139,7 +125,7 @@ pub(super) const CHECKS: &[Check] = &[
         when: When::InFlight,
         instances: 1,
         of: InstanceOf::Vehicle,
-        read: |inputs, _| inputs.derived.crosschecks().full_in_vain(),
+        read: |inputs, _| inputs.derived.crosschecks.thrust.in_vain(),
         ..ESC
     },
     Check {
@@ -154,27 +140,6 @@ pub(super) const CHECKS: &[Check] = &[
         read: |inputs, _| rate_off_deg_s(inputs, 1),
         ..RATE
     },
-    Check {
-        name: "motor_trend",
-        role: Role::of(Group::MotorTrend, 0),
-        limits: Limits::above(Some(Param::TrdEscWarn), Some(Param::TrdEscCrit), 1.0),
-        instances: MOTORS_MAX as u8,
-        read: motor_departure,
-        ..TREND
-    },
-    Check { role: Role::of(Group::ThrottleTrend, Group::MotorTrend.bit()), ..TREND },
-    Check {
-        name: "power_trend",
-        role: Role::of(Group::Other, Group::MotorTrend.bit() | Group::ThrottleTrend.bit()),
-        read: |inputs, _| takes_more(inputs, Quantity::HoverPower),
-        ..TREND
-    },
-    Check {
-        name: "weight_trend",
-        limits: Limits::above(Some(Param::TrdThrWarn), None, 2.0),
-        read: |inputs, _| heavier(inputs),
-        ..TREND
-    },
     Check { name: "drive_due", ..due(Subsystem::Propulsion) },
     alert::<{ Cause::Propulsion as usize }>(
         Subsystem::Propulsion,
@@ -184,20 +149,14 @@ pub(super) const CHECKS: &[Check] = &[
 
 /// The verdict of the outputs on a motor, as a check's value.
 fn verdict(inputs: &Inputs<'_>, motor: u8, value: fn(Verdict) -> f32) -> Option<Reading> {
-    let (at, verdict) = inputs.derived.outputs().verdict(inputs.now, inputs.vehicle, motor)?;
+    let (at, verdict) = inputs.derived.outputs.verdict(inputs.now, inputs.vehicle, motor)?;
     Some(Reading { at, value: value(verdict) })
 }
 
 /// The body rate that the setpoint is not followed by, about roll (0) or pitch (1).
 fn rate_off_deg_s(inputs: &Inputs<'_>, axis: usize) -> Option<Reading> {
-    let reading = inputs.derived.crosschecks().residual(inputs.now, Comparison::RATES[axis])?;
+    let reading = inputs.derived.crosschecks.residuals.reading(inputs.now, Comparison::RATES[axis])?;
     Some(Reading { value: reading.value.to_degrees(), ..reading })
-}
-
-/// A motor's speed against the others', where its ESC tells it, or else its output.
-fn motor_departure(inputs: &Inputs<'_>, motor: u8) -> Option<Reading> {
-    let output = || (usize::from(motor) < OUTPUTS_MAX).then_some(Quantity::MotorOutput(motor));
-    departure(inputs, Quantity::MotorSpeed(motor)).or_else(|| departure(inputs, output()?))
 }
 
 /// A figure of a motor's last `ESC_INFO`.

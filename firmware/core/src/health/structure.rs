@@ -1,10 +1,9 @@
 //! Vibration, clipping and load factor.
 
 use super::check::{Check, Debounce, Limits, Unit, When};
-use super::common::{PLAIN, STALE, alert, departure, due, vibration};
+use super::common::{PLAIN, STALE, alert, due, vibration};
 use super::finding::Subsystem;
 use super::suppression::{DRIVE, Group, INERTIAL, Role, SHAKING};
-use crate::baseline::Quantity;
 use crate::cause::Cause;
 use crate::observation::VibrationScale;
 use crate::params::Param;
@@ -42,7 +41,7 @@ pub(super) const CHECKS: &[Check] = &[
         when: When::InFlight,
         // Never stale: only what flies on rotors says something.
         stale_s: None,
-        read: |inputs, _| inputs.derived.crosschecks().vibration_rise(inputs.now, inputs.vehicle),
+        read: |inputs, _| inputs.derived.crosschecks.vibration_rise(inputs.now, inputs.vehicle),
         ..VIBRATION
     },
     Check {
@@ -66,17 +65,6 @@ pub(super) const CHECKS: &[Check] = &[
         // Never stale: what shakes has none.
         stale_s: None,
         read: |inputs, _| inputs.derived.load_factor(),
-        ..VIBRATION
-    },
-    Check {
-        name: "vibration_trend",
-        unit: Unit::of("%"),
-        limits: Limits::above(Some(Param::TrdVibeWarn), Some(Param::TrdVibeCrit), 5.0),
-        debounce: [Debounce::secs(10); 2],
-        when: When::InFlight,
-        // A trend holds until the next figure.
-        stale_s: None,
-        read: |inputs, _| departure(inputs, Quantity::Vibration),
         ..VIBRATION
     },
     Check { name: "airframe_due", ..due(Subsystem::Structure) },

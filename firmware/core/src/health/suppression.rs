@@ -42,10 +42,6 @@ pub(super) enum Group {
     MotorOutput,
     /// A failure of the drive that an ESC or the autopilot reports.
     Drive,
-    /// A motor against earlier flights.
-    MotorTrend,
-    /// The hover throttle against earlier flights.
-    ThrottleTrend,
     /// Nothing is recorded.
     Recording,
     /// A receiver has no position, or a false one.

@@ -24,7 +24,7 @@ pub enum Scope {
     Recorder,
     /// The autopilot's own alerts. Silence cannot be judged.
     Said,
-    /// The monitor's store: earlier flights, and parts that wear.
+    /// Earlier flights, or what the monitor on board has stored of parts that wear.
     Stored,
 }
 
@@ -151,10 +151,8 @@ vocabulary! {
     "The cells of the battery differed in voltage."; "Balance the pack; replace it if it happens again.";
     "cell_dev_lasting" Vehicle "battery cell balance, lasting", "battery", says "battery # cells uneven", "LAND", needs "voltages of single cells";
     "The cells of the battery differed in voltage for more than a minute."; "Replace the pack.";
-    "batt_resistance" Stored "battery resistance", "battery", says "battery # worn|+~", "REPLACE IT", needs "resistance of earlier flights to compare with";
+    "batt_resistance" Stored "battery resistance", "battery", says "battery # worn|+~", "REPLACE IT", needs "voltage under a current that changes";
     "The battery's internal resistance has risen since it was new."; "Replace the pack soon.";
-    "batt_capacity" Stored "battery capacity", "battery", says "battery # holds less|-~", "REPLACE IT", needs "charge and cell voltage of earlier flights to compare with";
-    "The battery gave less charge for the voltage that it lost than in earlier flights."; "Replace the pack soon.";
     "batt_fault" Vehicle "battery fault", "battery", says "battery # fault", "", needs "battery status";
     "The battery reported a fault of its own."; "Do not use the battery until its fault is known.";
     "batt_temperature" Vehicle "battery temperature", "battery", says "battery # hot", "LAND NOW", needs "battery temperature";
@@ -202,14 +200,6 @@ vocabulary! {
     "pitch_rate" Vehicle "pitch rate against what is wanted", "", says "pitch does not follow", "LAND NOW", needs "body rates that the autopilot wants";
     "The vehicle did not pitch as the autopilot wanted: a motor, propeller, servo or surface failed.";
     "Do not fly until motors, propellers, servos and control surfaces are checked.";
-    "motor_trend" Stored "motor balance trend", "motor", says "motor # not as before|~ off", "CHECK IT", needs "speeds or outputs of single motors in earlier flights to compare with";
-    "The motor's speed or output has changed against the others since earlier flights."; "Check its propeller and bearings, and what is loaded on one side.";
-    "throttle_trend" Stored "hover throttle trend", "", says "hover throttle up|+~", "CHECK MOTORS", needs "throttle of earlier flights to compare with";
-    "Hovering took more throttle than in earlier flights, and not as more weight does."; "Check propellers and motors; and the weight, where power is not measured.";
-    "power_trend" Stored "hover power trend", "", says "hover power up|+~", "CHECK MOTORS", needs "power of earlier flights to compare with";
-    "Hovering took more power than in earlier flights."; "Check propellers, motors, bearings and weight.";
-    "weight_trend" Stored "weight trend", "", says "heavier than usual|+~", "", needs "throttle and power of earlier flights to compare with";
-    "Hovering took as much more throttle and power as a heavier vehicle takes."; "Check the load. Without more load: check propellers and motors.";
     "drive_due" Stored "life of motors, propellers, ESCs", "", says "motor/prop/ESC life used", "REPLACE IT", needs "motor, propeller or ESC registered with the monitor on board";
     "A motor, propeller or ESC has reached the end of its life."; "Replace it, and tell the monitor.";
 
@@ -243,9 +233,6 @@ vocabulary! {
     "load_factor" Vehicle "load factor", "", says "load factor high", "EASE OFF", needs "acceleration";
     "The airframe carried a high load: a hard manoeuvre, a shock or a landing.";
     "Inspect the airframe and the landing gear.";
-    "vibration_trend" Stored "vibration trend", "", says "vibration changed|by ~", "CHECK PROPS", needs "vibration of earlier flights to compare with";
-    "Vibration has changed against earlier flights; a cut propeller can lower it.";
-    "Check propellers, bearings and mounting.";
     "airframe_due" Stored "airframe life", "", says "airframe life used", "SERVICE IT", needs "airframe registered with the monitor on board";
     "The airframe or a part of it is due for maintenance."; "Do the maintenance, and tell the monitor.";
 

@@ -1,4 +1,4 @@
-//! What outlives power: totals over an airframe's life, its baselines, and its components, as items of bytes that a
+//! What outlives power: totals over an airframe's life, and its components, as items of bytes that a
 //! store keeps.
 //!
 //! Counters of the life before this session are saved once, at its beginning; what the session itself has counted is one
@@ -21,7 +21,6 @@ pub use session::Session;
 
 use core::ops::Range;
 
-use crate::baseline::Baselines;
 use crate::bytes::{Fields, fields};
 pub use crate::bytes::{Item, Unreadable};
 use crate::component::{COMPONENTS_MAX, Component};
@@ -34,14 +33,7 @@ use crate::vehicle::BATTERIES_MAX;
 pub const ITEM_BYTES_MAX: usize = 512;
 
 const _: () = {
-    let lengths = [
-        Lifetime::BYTES,
-        Baselines::BYTES,
-        Exceedances::BYTES,
-        Exposure::BYTES,
-        Component::BYTES,
-        Session::BYTES,
-    ];
+    let lengths = [Lifetime::BYTES, Exceedances::BYTES, Exposure::BYTES, Component::BYTES, Session::BYTES];
     let mut place = 0;
     while place < lengths.len() {
         assert!(lengths[place] <= ITEM_BYTES_MAX);
@@ -49,13 +41,11 @@ const _: () = {
     }
 };
 
-/// What a stored item is. The numbers are stored and never change meaning.
+/// What a stored item is. The numbers are stored and never change meaning; earlier versions stored baselines as 2.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum ItemKey {
     /// 1: [`Lifetime`].
     Lifetime,
-    /// 2: [`Baselines`].
-    Baselines,
     /// 3: [`Exceedances`].
     Exceedances,
     /// 4: [`Exposure`].
@@ -74,13 +64,12 @@ impl ItemKey {
     const SESSION: u8 = 24;
 
     /// All keys, by number.
-    pub const ALL: [Self; 5 + COMPONENTS_MAX] = {
-        let mut all = [Self::Session; 5 + COMPONENTS_MAX];
-        all[0] = Self::Lifetime;
-        (all[1], all[2], all[3]) = (Self::Baselines, Self::Exceedances, Self::Exposure);
+    pub const ALL: [Self; 4 + COMPONENTS_MAX] = {
+        let mut all = [Self::Session; 4 + COMPONENTS_MAX];
+        (all[0], all[1], all[2]) = (Self::Lifetime, Self::Exceedances, Self::Exposure);
         let mut place = 0;
         while place < COMPONENTS_MAX {
-            all[4 + place] = Self::Component(place as u8);
+            all[3 + place] = Self::Component(place as u8);
             place += 1;
         }
         all
@@ -90,7 +79,6 @@ impl ItemKey {
     pub const fn number(self) -> u8 {
         match self {
             Self::Lifetime => 1,
-            Self::Baselines => 2,
             Self::Exceedances => 3,
             Self::Exposure => 4,
             Self::Component(place) => Self::COMPONENT_FIRST + place,
@@ -106,9 +94,11 @@ impl ItemKey {
     /// Its place in [`Self::ALL`].
     const fn index(self) -> usize {
         match self {
-            Self::Component(place) => 4 + place as usize,
-            Self::Session => 4 + COMPONENTS_MAX,
-            _ => self.number() as usize - 1,
+            Self::Lifetime => 0,
+            Self::Exceedances => 1,
+            Self::Exposure => 2,
+            Self::Component(place) => 3 + place as usize,
+            Self::Session => 3 + COMPONENTS_MAX,
         }
     }
 }

@@ -7,7 +7,7 @@
 //! | what somebody changed by hand | at once |
 //!
 //! The life before this session does not change any more, so after the first save only the session's counters (160 bytes
-//! of a quad), exceedances and baselines are saved again. In T hours armed the counters are saved 30 (1 + ln T) times:
+//! of a quad) and exceedances are saved again. In T hours armed the counters are saved 30 (1 + ln T) times:
 //! 30 in one hour, 63 in three, 81 in five and a half; flash sets it, and `hums_onboard::persist` has the sums.
 
 use super::ItemKey;

@@ -1,10 +1,8 @@
 //! What the monitor knows of the vehicle's parts, and what becomes of that when one is replaced.
 
 use super::Monitor;
-use crate::baseline::{Baselines, OUTPUTS_MAX, Quantity};
 use crate::component::{Component, Figures, Kind, Label, Status};
 use crate::lifetime::ItemKey;
-use crate::observation::MOTORS_MAX;
 use crate::vehicle::BATTERIES_MAX;
 
 impl Monitor {
@@ -36,42 +34,11 @@ impl Monitor {
         let component = components.get_mut(place).filter(|component| component.kind != Kind::None)?;
         let old = component.replace(serial, &usage.wear());
         saving.hurry(ItemKey::Component(place as u8));
-        self.forget_baselines(old.kind, old.number);
-        Some(old)
-    }
-
-    /// Something was changed that is no component: propellers, the battery, the payload. What is normal is learnt anew.
-    pub fn forget_past(&mut self) {
-        self.forget_baselines(Kind::Airframe, 0);
-    }
-
-    /// What was normal for the old part is not for the new one.
-    fn forget_baselines(&mut self, kind: Kind, number: u8) {
-        let concerned = |index: usize| number == 0 || usize::from(number) == index + 1;
-        match kind {
-            Kind::Airframe => {
-                self.baselines = Baselines::new();
-                (0..BATTERIES_MAX).for_each(|battery| self.derived.forget_resistance(battery));
-            }
-            Kind::Battery => {
-                for battery in (0..BATTERIES_MAX).filter(|battery| concerned(*battery)) {
-                    self.baselines.forget(Quantity::Resistance(battery as u8));
-                    self.baselines.forget(Quantity::Capacity(battery as u8));
-                    self.derived.forget_resistance(battery);
-                }
-            }
-            Kind::Motor | Kind::Propeller | Kind::Esc => {
-                for motor in (0..MOTORS_MAX).filter(|motor| concerned(*motor)) {
-                    self.baselines.forget(Quantity::MotorSpeed(motor as u8));
-                }
-                // The share of one is of all.
-                (0..OUTPUTS_MAX).for_each(|motor| self.baselines.forget(Quantity::MotorOutput(motor as u8)));
-                self.baselines.forget(Quantity::HoverPower);
-                self.baselines.forget(Quantity::Vibration);
-                self.baselines.forget(Quantity::HoverThrottle);
-            }
-            Kind::None | Kind::Card | Kind::Engine | Kind::Other => return,
+        if old.kind == Kind::Battery {
+            (0..BATTERIES_MAX)
+                .filter(|battery| old.number == 0 || usize::from(old.number) == battery + 1)
+                .for_each(|battery| self.derived.forget_resistance(battery));
         }
-        self.saving.hurry(ItemKey::Baselines);
+        Some(old)
     }
 }

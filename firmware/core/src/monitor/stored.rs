@@ -1,7 +1,6 @@
 //! What of the monitor outlives power: items, to be stored when they are due and taken back at the next start.
 
 use super::Monitor;
-use crate::baseline::Baselines;
 use crate::component::Component;
 use crate::exposure::Exposure;
 use crate::flight::FlightEvent;
@@ -28,10 +27,9 @@ impl Monitor {
             // A lifetime belongs to an airframe: this one's begins with this session.
             self.happenings.push(Happening::OtherAirframe);
             self.before = Lifetime { boots: self.before.boots, ..Lifetime::new() };
-            self.baselines = Baselines::new();
             self.exceedances.forget_life();
             self.exposure.forget_life();
-            for key in [ItemKey::Lifetime, ItemKey::Baselines, ItemKey::Exceedances, ItemKey::Exposure] {
+            for key in [ItemKey::Lifetime, ItemKey::Exceedances, ItemKey::Exposure] {
                 self.saving.hurry(key);
             }
         }
@@ -57,10 +55,9 @@ impl Monitor {
             ItemKey::Lifetime => {
                 self.before = Lifetime::decode(stored)?;
                 for (battery, count) in self.before.cells.into_iter().enumerate() {
-                    self.derived.cells_mut().remember(battery, count);
+                    self.derived.cells.remember(battery, count);
                 }
             }
-            ItemKey::Baselines => self.baselines = Baselines::decode(stored)?,
             ItemKey::Exceedances => self.exceedances = Exceedances::decode(stored)?,
             ItemKey::Exposure => self.exposure = Exposure::decode(stored)?,
             ItemKey::Component(place) => {
@@ -79,11 +76,6 @@ impl Monitor {
         Ok(())
     }
 
-    /// Takes what earlier flights of this airframe found normal, as it was found elsewhere.
-    pub const fn remember(&mut self, past: &Baselines) {
-        self.baselines = *past;
-    }
-
     /// The item to be saved next, if any is due; the same until it is [`Self::saved`]. To be saved in this order.
     pub fn save_due(&mut self, now: Instant, room: Room) -> Option<ItemKey> {
         self.saving.due(now, self.vehicle.armed(), room)
@@ -99,7 +91,6 @@ impl Monitor {
         let boots = self.boots();
         match key {
             ItemKey::Lifetime => Lifetime { boots, ..self.before }.encode(out),
-            ItemKey::Baselines => self.baselines.encode(out),
             ItemKey::Exceedances => self.exceedances.encode(self.usage.until(), out),
             ItemKey::Exposure => self.exposure.as_of(boots).encode(out),
             ItemKey::Component(place) => {

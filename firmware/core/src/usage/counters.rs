@@ -1,7 +1,7 @@
 //! The counters: their stored numbers, their names, which carry the unit, and how they add up over sessions.
 
-use crate::baseline::Quantity as Normal;
 use crate::exposure::{BINS, Quantity as Exposed};
+use crate::figures::Quantity as Steady;
 use crate::observation::MOTORS_MAX;
 
 /// How a counter adds up over sessions, and its stored form.
@@ -158,11 +158,11 @@ pub const MOTOR_REVOLUTIONS_FIRST: u8 = 120;
 
 /// Time in ranges: seconds from this number on, quantity by quantity and range by range.
 pub const EXPOSURE_FIRST: u8 = 140;
-/// Baselines: from this number on, by [`crate::baseline::Quantity::index`].
-pub const BASELINE_FIRST: u8 = 200;
+/// Figures of a flight: from this number on, by [`crate::figures::Quantity::index`].
+pub const FIGURE_FIRST: u8 = 200;
 
-const _: () = assert!(EXPOSURE_FIRST as usize + BINS * Exposed::ALL.len() <= BASELINE_FIRST as usize);
-const _: () = assert!(BASELINE_FIRST as usize + Normal::COUNT <= 256);
+const _: () = assert!(EXPOSURE_FIRST as usize + BINS * Exposed::ALL.len() <= FIGURE_FIRST as usize);
+const _: () = assert!(FIGURE_FIRST as usize + Steady::COUNT <= 256);
 
 /// What a stored counter number means.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -173,8 +173,8 @@ pub enum CounterName {
     Motor(&'static str, u8),
     /// Seconds that a quantity stood from the first figure to the second; infinite where the range has no end.
     Exposure(Exposed, f32, f32),
-    /// A baseline.
-    Baseline(Normal),
+    /// A figure of a flight.
+    Figure(Steady),
 }
 
 /// The number of the time that a quantity stood in a range.
@@ -182,9 +182,9 @@ pub const fn exposure_number(quantity: Exposed, bin: usize) -> u8 {
     EXPOSURE_FIRST + quantity as u8 * BINS as u8 + bin as u8
 }
 
-/// The number of a baseline.
-pub const fn baseline_number(quantity: Normal) -> u8 {
-    BASELINE_FIRST + quantity.index() as u8
+/// The number of a flight's figure.
+pub const fn figure_number(quantity: Steady) -> u8 {
+    FIGURE_FIRST + quantity.index() as u8
 }
 
 /// The meaning of a stored counter number; `None` for one that a later version wrote.
@@ -196,8 +196,8 @@ pub fn counter_name(number: u8) -> Option<CounterName> {
     if let Some(motor) = motor(MOTOR_REVOLUTIONS_FIRST) {
         return Some(CounterName::Motor("revolutions", motor));
     }
-    if let Some(quantity) = number.checked_sub(BASELINE_FIRST) {
-        return Normal::from_index(usize::from(quantity)).map(CounterName::Baseline);
+    if let Some(quantity) = number.checked_sub(FIGURE_FIRST) {
+        return Steady::from_index(usize::from(quantity)).map(CounterName::Figure);
     }
     if let Some(range) = number.checked_sub(EXPOSURE_FIRST) {
         let quantity = Exposed::ALL.get(usize::from(range) / BINS)?;
@@ -217,14 +217,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn ranges_and_baselines_are_named_by_their_numbers() {
+    fn ranges_and_figures_are_named_by_their_numbers() {
         let first = exposure_number(Exposed::Vibration, 0);
         let name = counter_name(first);
         assert_eq!(name, Some(CounterName::Exposure(Exposed::Vibration, f32::NEG_INFINITY, 1.0)));
         let last = counter_name(exposure_number(Exposed::Current, BINS - 1));
         assert_eq!(last, Some(CounterName::Exposure(Exposed::Current, 160.0, f32::INFINITY)));
-        let motor = Normal::MotorSpeed(11);
-        assert_eq!(counter_name(baseline_number(motor)), Some(CounterName::Baseline(motor)));
+        let motor = Steady::MotorSpeed(11);
+        assert_eq!(counter_name(figure_number(motor)), Some(CounterName::Figure(motor)));
     }
 
     #[test]
@@ -238,7 +238,7 @@ mod tests {
         }
         assert_eq!(
             count,
-            UsageCounter::ALL.len() + 2 * MOTORS_MAX + BINS * Exposed::ALL.len() + Normal::COUNT
+            UsageCounter::ALL.len() + 2 * MOTORS_MAX + BINS * Exposed::ALL.len() + Steady::COUNT
         );
     }
 }

@@ -4,8 +4,8 @@ mod counters;
 mod totals;
 
 pub use counters::{
-    BASELINE_FIRST, CounterName, EXPOSURE_FIRST, Form, MOTOR_REVOLUTIONS_FIRST, MOTOR_TIME_FIRST,
-    UsageCounter, baseline_number, counter_name, exposure_number,
+    CounterName, EXPOSURE_FIRST, FIGURE_FIRST, Form, MOTOR_REVOLUTIONS_FIRST, MOTOR_TIME_FIRST, UsageCounter,
+    counter_name, exposure_number, figure_number,
 };
 pub use totals::{MotorTotals, Totals, Wear};
 
@@ -152,7 +152,7 @@ impl Usage {
         }
         self.totals.set(UsageCounter::AutopilotReboots, f64::from(vehicle.reboots));
         let set_ah = params.get(Param::BatCapacity);
-        self.capacity_ah = if set_ah > 0.0 { set_ah } else { derived.cells().capacity_ah() };
+        self.capacity_ah = if set_ah > 0.0 { set_ah } else { derived.cells.capacity_ah() };
         let before = self.last.replace(now);
         let step = before.map_or(Span::ZERO, |last| now.since(last));
         let powered = now.since(before.unwrap_or(Instant::ZERO));

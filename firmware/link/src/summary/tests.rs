@@ -119,12 +119,10 @@ fn a_value_says_what_it_is_of_or_is_not_told() {
     };
     let (warning, critical) = (Level::Warning, Level::Critical);
     for (check, value, level, text) in [
-        ("batt_capacity", 25.0, critical, "battery 1 holds less: -25 %, REPLACE IT"),
         ("batt_resistance", 160.0, critical, "battery 1 worn: +160 %, REPLACE IT"),
         ("motor_loss", 4.2, critical, "motor 1 lost: 4.2 % of normal amps, LAND NOW"),
         ("motor_output", 12.3, critical, "motor 1 weak: output +12.3 %, LAND NOW"),
         ("motor_off", 2.0, critical, "motor 1 off: no output, LAND NOW"),
-        ("throttle_trend", 25.0, critical, "hover throttle up: +25 %, CHECK MOTORS"),
         ("vibration_rise", 10.2, warning, "vibration up: 10.2 x usual"),
         ("gps_satellites", 5.0, warning, "GPS 1 few satellites: 5"),
         ("gps_hdop", 2.8, warning, "GPS 1 poor geometry: HDOP 2.8"),

@@ -26,6 +26,7 @@ use hums_recorder::CardState;
 use super::library::builtin::{self, BuiltinFile};
 use super::limiter::{Asker, Limiter};
 use crate::journal::{By, Journal, Logbook};
+use crate::monitoring::PARTS_CHANGED;
 use crate::queues::SectorsIn;
 use crate::records;
 
@@ -132,8 +133,7 @@ impl Commands {
             STOP | FORMAT | REPLACED if book.may_fly(now) => TEMPORARILY_REJECTED,
             FORMAT => format(now, by, book, sectors),
             REPLACED if number == 0 => {
-                book.monitor.forget_past();
-                book.journal.by_hand(now, format_args!("baselines anew by {}/{}", by.0, by.1), sectors);
+                book.journal.by_hand(now, format_args!("{PARTS_CHANGED} by {}/{}", by.0, by.1), sectors);
                 ACCEPTED
             }
             REPLACED => {

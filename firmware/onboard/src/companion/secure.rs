@@ -251,12 +251,7 @@ mod tests {
         }
         assert!((1..=u32::from(SIGNED_MAX) + 1).contains(&scarce), "{scarce}");
         // A landing: what it needs is stored without an erase.
-        let landing = [
-            (ItemKey::Exceedances, 505),
-            (ItemKey::Baselines, 100),
-            (ItemKey::Session, 160),
-            (ItemKey::Session, 160),
-        ];
+        let landing = [(ItemKey::Exceedances, 505), (ItemKey::Session, 160), (ItemKey::Session, 160)];
         for (key, length) in landing {
             assert!(handover.put(Item::item(key.number()), &[1; 512][..length]));
             assert_eq!(store_writer.service(false), Saved::Took, "{key:?}");

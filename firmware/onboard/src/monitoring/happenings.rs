@@ -14,6 +14,8 @@ use crate::records::Recorded;
 
 /// `MAV_SEVERITY_WARNING`
 const WARNING: u8 = 4;
+/// The event after somebody said that propellers, a battery or the payload were changed.
+pub const PARTS_CHANGED: &str = "baselines anew";
 /// What is told where nothing tells how many cells a battery has.
 pub const CELLS_UNKNOWN: &str = "HUMS: cells not known, set BAT_CELLS";
 /// The number of the event that marks a critical finding. The others are in [`record`].

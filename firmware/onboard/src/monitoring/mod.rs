@@ -32,8 +32,8 @@ use crate::supervisor::Task;
 use card_notices::CardNotices;
 use figures::Figures;
 pub use figures::Machine;
-pub use happenings::CELLS_UNKNOWN;
 use happenings::CRITICAL;
+pub use happenings::{CELLS_UNKNOWN, PARTS_CHANGED};
 use marks::Marks;
 
 /// How often [`Monitoring::tick`] is to be called.

@@ -1,4 +1,4 @@
-//! What outlives power: parameters, lifetime counters, baselines and components, between the monitor, which has them in
+//! What outlives power: parameters, lifetime counters and components, between the monitor, which has them in
 //! RAM, and the store, which has them in flash.
 //!
 //! ```text
@@ -34,7 +34,6 @@
 //! | exposure | 180 | once a power-on |
 //! | a component | 78 | once a power-on |
 //! | the session's counters, of a quad | 170 | in flight every two minutes, after an hour every thirtieth of the time; twice at the end of a flight |
-//! | baselines | 116 | a landing that taught something |
 //! | times of signatures | 40 | with a key: at first every two minutes, later every thirtieth of the time since power-on, every ten minutes at most; not out of the reserve |
 //! | exceedances | 36 with one, 520 with 24 | a quarter of an hour in which a limit was crossed, and landing |
 //!

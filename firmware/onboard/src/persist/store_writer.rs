@@ -2,9 +2,8 @@
 
 use embedded_storage::nor_flash::NorFlash;
 use hums_core::Monitor;
-use hums_core::baseline::Baselines;
 use hums_core::health::exceedance::Exceedances;
-use hums_core::lifetime::{ITEM_BYTES_MAX, Item as _, ItemKey, Room, Session};
+use hums_core::lifetime::{ITEM_BYTES_MAX, ItemKey, Room, Session};
 use hums_core::params::ParamError;
 use hums_store::{Error, Found, Key, Store, param};
 
@@ -15,11 +14,11 @@ use super::status::{Calm, StoreState, StoreStatus, count};
 const AHEAD: (usize, usize) = (5, 8);
 /// A sector with less than this part of it free is erased on the ground even while the autopilot talks.
 const SCARCE: (usize, usize) = (1, 4);
-/// What landing and disarming need: all exceedances, the baselines and the session's counters twice; beside them the times of
+/// What landing and disarming need: all exceedances and the session's counters twice; beside them the times of
 /// so many signed changes, 40 bytes each.
 const RESERVE: usize = 1_408;
 pub(crate) const SIGNED_MAX: u8 = 4;
-const LANDING: usize = Exceedances::BYTES + Baselines::BYTES + 2 * Session::BYTES_TYPICAL + 4 * 16;
+const LANDING: usize = Exceedances::BYTES + 2 * Session::BYTES_TYPICAL + 4 * 16;
 const _: () = assert!(LANDING + SIGNED_MAX as usize * 40 <= RESERVE);
 
 /// What one call of [`StoreWriter::service`] did.

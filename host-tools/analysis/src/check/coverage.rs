@@ -1,12 +1,12 @@
 //! Which checks had something to judge in a recording, and why the others had not.
 
 use hums_core::Monitor;
-use hums_core::baseline::Baselines;
 use hums_core::clock::{Instant, Span};
 use hums_core::health::{Check, Level, Scope, Side, VOCABULARY, When, checks, vocabulary};
 use hums_core::observation::{Autopilot, Gnss, Heartbeat};
 use hums_core::params::{Param, Params};
 use hums_core::status::{LinkReading, RecorderStatus};
+use hums_formats::trend_words::WORDS;
 
 use super::judged::JudgedBy;
 use super::problem::Problem;
@@ -16,6 +16,8 @@ use crate::counters::tells_flight;
 const OF_A_FIX: [&str; 4] = ["gps_satellites", "gps_hdop", "gps_accuracy", "gps_fix"];
 /// The check of a cell's voltage.
 const CELL_VOLTAGE: &str = "cell_voltage";
+/// Why checks of earlier flights and of worn parts are not judged.
+const UNTOLD: &str = "only earlier flights (--past) or a monitor on board tell";
 /// Period of the notes.
 const NOTE_EVERY: Span = Span::from_millis(500);
 
@@ -84,6 +86,9 @@ impl Coverage {
                 Verdict::NotMeant => {}
             }
         }
+        if recording.by == JudgedBy::Here {
+            not_judged.extend(WORDS.iter().map(|words| (words.said.check, UNTOLD.to_owned())));
+        }
         (judged, not_judged)
     }
 }
@@ -93,8 +98,6 @@ impl Coverage {
 pub(super) struct Recording<'a> {
     pub(super) by: JudgedBy,
     pub(super) monitor: &'a Monitor,
-    /// The vehicle's baselines, if earlier flights are known.
-    pub(super) past: Option<&'a Baselines>,
     /// The recording was received over a link.
     pub(super) is_of_link: bool,
     /// The recording was taken on the monitor's own wire.
@@ -153,10 +156,8 @@ impl Recording<'_> {
         if is_off(check, self.monitor.params()) {
             return not("its limit is off");
         }
-        if words.scope == Scope::Stored && self.past.is_none() {
-            return not(
-                "only a monitor on board knows earlier flights and parts that wear (--past gives it flights)",
-            );
+        if words.scope == Scope::Stored {
+            return not(UNTOLD);
         }
         if check.name == CELL_VOLTAGE && !is_found {
             if self.cells_unknown {
@@ -239,7 +240,6 @@ mod tests {
             let recording = Recording {
                 by: JudgedBy::Here,
                 monitor: &monitor,
-                past: None,
                 is_of_link: false,
                 on_the_wire: false,
                 armed: Span::from_secs(60),

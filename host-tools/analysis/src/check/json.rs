@@ -1,7 +1,6 @@
 //! `hums check --json`: one object a line for each log. Its names are a contract: `docs/check.md`.
 
 use hums_core::clock::Instant;
-use hums_core::health::vocabulary;
 use serde::Serialize;
 
 use super::checked::Checked;
@@ -9,7 +8,7 @@ use super::flights::Flight;
 use super::judged::{Judged, JudgedBy};
 use super::problem::Problem;
 use super::text::firmware;
-use crate::names::{autopilot_name, type_name};
+use crate::names::{autopilot_name, type_name, vocabulary};
 use crate::source::item::{About, Gap};
 use crate::source::told::Finding;
 use crate::states;

@@ -8,12 +8,11 @@
 use std::collections::BTreeMap;
 
 use hums_core::Monitor;
-use hums_core::baseline::Baselines;
 use hums_core::cause::{Alert, Cause};
 use hums_core::clock::{Instant, Span};
 use hums_core::flight::{Flight as FlightState, Phase};
 use hums_core::happening::Happening;
-use hums_core::health::{Level, Scope, vocabulary};
+use hums_core::health::{Level, Scope};
 use hums_core::motion::{climb_mps, ground_speed_mps, height_m};
 use hums_core::observation::{Estimator, LandedState, Observation, Source, SystemStatus, VehicleKind};
 use hums_core::params::Params;
@@ -31,6 +30,8 @@ use super::flights::{Flight, Flights, begin_in_air, is_in_air};
 use super::judged::{Holes, Judged, JudgedBy};
 use super::link_loss::{LinkLoss, Verdict};
 use super::problem::{IMPACT, LISTED_MAX, Problems};
+use super::trends::{self, Episode, Flown};
+use crate::names::vocabulary;
 use crate::part;
 use crate::source::epochs::Epochs;
 use crate::source::item::{About, Cause as Why, Event, Fact, Gap, Item, Text};
@@ -70,8 +71,6 @@ pub struct Limits {
     params: Params,
     /// Names that the user gave: they override the log's own values.
     given: Vec<&'static str>,
-    /// The vehicle's baselines, from its earlier flights.
-    past: Option<Box<Baselines>>,
 }
 
 impl Limits {
@@ -86,24 +85,9 @@ impl Limits {
         limits
     }
 
-    /// With the vehicle's baselines: trends are judged against them.
-    #[must_use]
-    pub fn after(self, past: &Baselines) -> Self {
-        Self { past: Some(Box::new(*past)), ..self }
-    }
-
-    /// A monitor before the first item, that knows these.
-    fn monitor(&self) -> Monitor {
-        let mut monitor = Monitor::new(self.params);
-        if let Some(past) = &self.past {
-            monitor.remember(past);
-        }
-        monitor
-    }
-
     /// Whether they are others than those that a log was judged with on board.
     fn is_given(&self) -> bool {
-        !self.given.is_empty() || self.past.is_some()
+        !self.given.is_empty()
     }
 }
 
@@ -148,6 +132,7 @@ pub struct Judge {
     checked_on_board: bool,
     cells: Cells,
     flights: Flights,
+    episodes: Vec<Episode>,
     facts: BTreeMap<About, String>,
     details: Details,
     epochs: Epochs,
@@ -167,7 +152,7 @@ impl Judge {
     /// Before the first item.
     pub fn new(limits: &Limits, format: Format) -> Self {
         Self {
-            monitor: Box::new(limits.monitor()),
+            monitor: Box::new(Monitor::new(limits.params)),
             earlier: None,
             limits: limits.clone(),
             format,
@@ -186,6 +171,7 @@ impl Judge {
             checked_on_board: false,
             cells: Cells::default(),
             flights: Flights::default(),
+            episodes: Vec::new(),
             facts: BTreeMap::new(),
             details: Details::default(),
             epochs: Epochs::default(),
@@ -265,6 +251,9 @@ impl Judge {
             }
             Item::Record(record) => {
                 self.recorded_to = self.recorded_to.max(at);
+                if trends::is_change(record) {
+                    self.episodes.push(Episode::Changed);
+                }
                 if let Some(told) = Told::of(record) {
                     self.told(&told);
                 }
@@ -559,7 +548,7 @@ impl Judge {
         self.monitor
             .tick(steps.into(), &link, &recorder, &mut |finding| found.push(Finding::new(steps, finding)));
         for finding in found {
-            if is_of(&finding.check, self.format, self.wire.is_some(), self.limits.past.is_some()) {
+            if is_of(&finding.check, self.format, self.wire.is_some()) {
                 // A vehicle is seen to lie still seconds after an impact.
                 let hit_at = if is_hit(&finding) { of(self.monitor.flight().hit_at()) } else { finding.at };
                 let at = Clock::recording(now, steps, hit_at.min(finding.at));
@@ -574,8 +563,14 @@ impl Judge {
                     let from = since.map_or(now, |since| Clock::recording(now, steps, of(since)));
                     self.flights.take_off(now, from, self.monitor.flight().was_on_ground());
                 }
-                Happening::Landing => self.flights.landing(),
-                Happening::OtherVehicle => self.flights.break_off(),
+                Happening::Landing => {
+                    self.flights.landing();
+                    self.episodes.push(Episode::Flown(Box::new(Flown::of(now, true, &self.monitor))));
+                }
+                Happening::OtherVehicle => {
+                    self.flights.break_off();
+                    self.episodes.clear();
+                }
                 Happening::Mishap(change) => {
                     let hit_at = self.monitor.flight().struck_at();
                     let hit_at = hit_at.map(|at| Clock::recording(now, steps, of(at)));
@@ -675,6 +670,9 @@ impl Judge {
             if self.flights.going_on().is_some() {
                 self.tick(self.last);
             }
+            if self.monitor.flight().is_open() {
+                self.episodes.push(Episode::Flown(Box::new(Flown::of(self.last, false, &self.monitor))));
+            }
         }
     }
 
@@ -719,7 +717,6 @@ impl Judge {
         let (judged, not_judged) = self.coverage.lists(&Recording {
             by,
             monitor: &self.monitor,
-            past: self.limits.past.as_deref(),
             is_of_link: self.format.is_of_link(),
             on_the_wire: self.wire.is_some(),
             armed,
@@ -742,6 +739,7 @@ impl Judge {
             problems: worst_first,
             judged,
             not_judged,
+            episodes: self.episodes,
             remarks,
             cells_unknown: self.cells.unknown_since(by),
             gaps: self.gaps,
@@ -794,12 +792,11 @@ fn is_hit(finding: &Finding) -> bool {
     finding.check == IMPACT && matches!(finding.level, Level::Warning | Level::Critical)
 }
 
-/// Whether a check applies to a recording of this format that is judged here. One recording shows neither
-/// earlier flights, unless these are known, nor worn parts.
-fn is_of(check: &str, format: Format, on_the_wire: bool, has_past: bool) -> bool {
+/// Whether a check applies to a recording of this format that is judged here. One recording shows neither earlier flights nor worn
+/// parts.
+fn is_of(check: &str, format: Format, on_the_wire: bool) -> bool {
     let scope = vocabulary(check).map(|words| words.scope);
-    !matches!(scope, Some(Scope::Recorder))
-        && (has_past || scope != Some(Scope::Stored))
+    !matches!(scope, Some(Scope::Recorder | Scope::Stored))
         && (format == Format::Hums || on_the_wire || scope != Some(Scope::Wire))
 }
 

@@ -1,14 +1,16 @@
 //! The judgement of a recording.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use hums_core::Monitor;
 use hums_core::clock::{Instant, Span};
-use hums_core::health::{Level, Scope, vocabulary};
+use hums_core::health::{Level, Scope};
 use hums_core::vehicle::Vehicle;
 
 use super::flights::{Flight, begin_in_air};
-use super::problem::{LISTED_MAX, Problem};
+use super::problem::{LISTED_MAX, Problem, Problems, worst_first};
+use super::trends::{Baselines, Episode, because};
+use crate::names::vocabulary;
 use crate::source::epochs::Epochs;
 use crate::source::item::{About, Cause, Gap};
 use crate::source::told::Finding;
@@ -90,6 +92,8 @@ pub struct Judged {
     pub judged: Vec<&'static str>,
     /// Checks that had not, with the reason. Checks that are made for another autopilot are in neither list.
     pub not_judged: Vec<(&'static str, String)>,
+    /// Its flights and changes of parts, for trends over flights.
+    pub episodes: Vec<Episode>,
     /// Further limits of the judgement, as sentences.
     pub remarks: Vec<String>,
     /// Start of the time in the air with an unknown cell count, so that no voltage raised an alarm.
@@ -127,6 +131,40 @@ impl Judged {
     /// Time in the air, in all flights together.
     pub fn flown(&self) -> Span {
         self.flights.iter().fold(Span::ZERO, |sum, flight| sum + flight.air)
+    }
+
+    /// Judges its flights against earlier ones, and learns from them.
+    pub fn judge_trends(&mut self, past: &mut Baselines) {
+        if self.is_timeless {
+            return;
+        }
+        let mut trends = Problems::default();
+        for episode in &self.episodes {
+            let Episode::Flown(flown) = episode else {
+                *past = Baselines::default();
+                continue;
+            };
+            let (found, judged) = past.judge(flown, self.monitor.params());
+            for finding in &found {
+                trends.take(finding, Span::ZERO);
+            }
+            let is_judged = |check: &str| judged.contains(&check);
+            self.not_judged.retain(|(check, _)| !is_judged(check));
+            let new = judged.iter().filter(|check| !self.judged.contains(check)).copied();
+            self.judged.extend(new.collect::<BTreeSet<_>>());
+        }
+        self.findings.append(&mut trends.findings);
+        self.findings.sort_by_key(|finding| finding.at);
+        self.findings_count += trends.findings_count;
+        let is_known = |of: &Problem| {
+            self.problems.iter().any(|known| (&known.check, known.instance) == (&of.check, of.instance))
+        };
+        let trends = trends.worst_first();
+        let new = trends.iter().filter(|problem| !is_known(problem));
+        let new = new.map(|problem| Problem { because: because(problem, &trends), ..problem.clone() });
+        let new: Vec<_> = new.collect();
+        self.problems.extend(new);
+        worst_first(&mut self.problems);
     }
 
     /// Why the vehicle is unknown, as words in its place; `None` if an autopilot was received.

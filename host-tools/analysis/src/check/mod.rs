@@ -23,6 +23,7 @@ pub mod past;
 mod pauses;
 pub mod problem;
 pub mod text;
+pub mod trends;
 
 use std::path::{Path, PathBuf};
 
@@ -43,7 +44,7 @@ use crate::source::recording::Place;
 use checked::Checked;
 use judge::{Heard, Limits};
 use overview::Read;
-use past::Past;
+use past::{Past, Series};
 use text::Table;
 
 /// The request of `hums check`.
@@ -78,7 +79,8 @@ pub fn run(args: &Request<'_>) -> Result<Outcome> {
     let mut followed = EndResolver::new(sessions_of(&found.places));
     // A log next to the wanted one shows how it ends.
     let is_beside = |of: &str| wanted.as_ref().is_some_and(|wanted| wanted != of);
-    let mut done = |Told { name, of, checked }: Told| match checked {
+    let mut series = Series::after(&past);
+    let mut done = |Told { name, of, checked }: Told| match series.judge(checked) {
         _ if is_beside(&of) => Ok(()),
         Ok(checked) => {
             outcome = outcome.and(checked.outcome());

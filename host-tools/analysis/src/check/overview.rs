@@ -48,28 +48,13 @@ pub(super) struct Read {
 
 /// Judges a recording; `shows` how far it is.
 pub(super) fn judge(place: &Place, limits: &Limits, heard: Heard, shows: bool) -> Result<Read> {
-    judge_twice(place, limits, None, heard, shows).map(|(read, _)| read)
-}
-
-/// The same, and by other limits too, in one reading.
-pub(super) fn judge_twice(
-    place: &Place,
-    limits: &Limits,
-    others: Option<&Limits>,
-    heard: Heard,
-    shows: bool,
-) -> Result<(Read, Option<Judged>)> {
     let recording = place.open()?;
     let (format, progress) = (recording.format, recording.progress.clone());
     let bar = progress::bytes(progress.total().filter(|_| shows), &place.title);
-    let new = |limits| Judge::new(limits, format).heard(heard);
-    let (mut judge, mut other, mut items) = (new(limits), others.map(new), 0_u32);
+    let (mut judge, mut items) = (Judge::new(limits, format).heard(heard), 0_u32);
     let want = Want { observations: true, frames: heard == Heard::OnTheWire, ..Want::default() };
     let summary = recording.read(want, &mut |at, item| {
         judge.item(at, item);
-        if let Some(other) = &mut other {
-            other.item(at, item);
-        }
         items = items.wrapping_add(1);
         if items.is_multiple_of(LOOK_EVERY) {
             bar.set_position(progress.taken());
@@ -77,8 +62,7 @@ pub(super) fn judge_twice(
         Ok(())
     })?;
     bar.finish_and_clear();
-    let read = Read { format, judged: judge.end(), summary, taken: progress.taken() };
-    Ok((read, other.map(Judge::end)))
+    Ok(Read { format, judged: judge.end(), summary, taken: progress.taken() })
 }
 
 /// Reads a recording once. The monitor here checks it if no monitor did.

@@ -4,11 +4,13 @@ use std::path::PathBuf;
 
 use anyhow::{Context as _, Result};
 use hums_blackbox::record::Vehicle;
-use hums_core::baseline::{Baselines, FLIGHTS_MIN, Quantity};
 use hums_core::lifetime::Airframe;
 
+use super::checked::Checked;
 use super::judge::{Heard, Limits};
+use super::judged::Judged;
 use super::overview::{self, Read};
+use super::trends::{Baselines, FLIGHTS_MIN};
 use crate::names::type_name;
 use crate::outcome::usage;
 use crate::source::find::find;
@@ -17,8 +19,8 @@ use crate::source::recording::{Format, Place};
 /// The basis of `hums check`: limits, and the earlier flights of one vehicle.
 pub(super) struct Past {
     limits: Limits,
-    /// The limits with the vehicle's baselines, if there are earlier flights.
-    taught: Option<(Limits, Option<Vehicle>)>,
+    /// The vehicle's baselines, if there are earlier flights.
+    taught: Option<(Baselines, Option<Vehicle>)>,
 }
 
 impl Past {
@@ -31,36 +33,59 @@ impl Past {
             return Ok(Self { limits, taught: None });
         }
         let found = find(past, false).context("--past")?.of_system(system)?;
-        let (baselines, vehicle) = learnt(&limits, &found.places)?;
-        let flights = quantities().map(|quantity| baselines.get(quantity).flights).max().unwrap_or(0);
+        let taught = learnt(&limits, &found.places)?;
+        let flights = taught.0.flights();
         if flights < FLIGHTS_MIN {
             note!(
                 "--past: {flights} of them have a steady flight in them, and a baseline needs {FLIGHTS_MIN}: trends are not judged"
             );
         }
-        let taught = Some((limits.clone().after(&baselines), vehicle));
-        Ok(Self { limits, taught })
+        Ok(Self { limits, taught: Some(taught) })
     }
 
-    /// Judges a recording; `shows` turns progress on. If it is of another vehicle, it is judged without the
-    /// baselines, and a message says so.
+    /// Judges a recording; `shows` turns progress on. If it is of another vehicle, its trends are not judged, and a message says so.
     pub(super) fn judge(&self, place: &Place, heard: Heard, shows: bool) -> Result<Read> {
-        let Some((taught, past)) = &self.taught else {
-            return overview::judge(place, &self.limits, heard, shows);
-        };
-        let (mut read, without) = overview::judge_twice(place, taught, Some(&self.limits), heard, shows)?;
-        let own = vehicle(&read);
-        if let (Some(past), Some(own), Some(without)) = (past, own, without)
-            && are_two(past, &own)
-        {
-            read.judged = without;
-            read.judged.remarks.push(format!(
+        let mut read = overview::judge(place, &self.limits, heard, shows)?;
+        let Some((baselines, past)) = &self.taught else { return Ok(read) };
+        match (past, vehicle(&read.judged, read.format)) {
+            (Some(past), Some(own)) if are_two(past, &own) => read.judged.remarks.push(format!(
                 "trends are not judged: the flights of --past are of another vehicle ({}; this is {})",
                 words(past),
                 words(&own)
-            ));
+            )),
+            _ => read.judged.judge_trends(&mut baselines.clone()),
         }
         Ok(read)
+    }
+}
+
+/// The logs of boxes one after the other: each is judged against those before it of the same vehicle.
+pub(super) struct Series {
+    /// Earlier flights were named: these count alone.
+    past_is_given: bool,
+    vehicles: Vec<(Vehicle, Baselines)>,
+}
+
+impl Series {
+    /// Before the first log.
+    pub(super) const fn after(past: &Past) -> Self {
+        Self { past_is_given: past.taught.is_some(), vehicles: Vec::new() }
+    }
+
+    /// Judges the trends of the next log.
+    pub(super) fn judge(&mut self, checked: Result<Checked>) -> Result<Checked> {
+        let mut checked = checked?;
+        let is_of_box = checked.format == Format::Hums && !self.past_is_given;
+        let Some(own) = vehicle(&checked.judged, checked.format).filter(|_| is_of_box) else {
+            return Ok(checked);
+        };
+        if !self.vehicles.iter().any(|(vehicle, _)| !are_two(vehicle, &own)) {
+            self.vehicles.push((own, Baselines::default()));
+        }
+        if let Some((_, past)) = self.vehicles.iter_mut().find(|(vehicle, _)| !are_two(vehicle, &own)) {
+            checked.judged.judge_trends(past);
+        }
+        Ok(checked)
     }
 }
 
@@ -74,11 +99,11 @@ pub fn learn(limits: &Limits, places: &[Place]) -> Result<Baselines> {
 
 /// The same, with the vehicle if known.
 fn learnt(limits: &Limits, places: &[Place]) -> Result<(Baselines, Option<Vehicle>)> {
-    let (mut baselines, mut first) = (Baselines::new(), None::<(&str, Vehicle)>);
+    let (mut baselines, mut first) = (Baselines::default(), None::<(&str, Vehicle)>);
     for place in places {
-        let read = overview::judge(place, &limits.clone().after(&baselines), Heard::Somewhere, false)?;
-        baselines = *read.judged.monitor.baselines();
-        let Some(own) = vehicle(&read) else { continue };
+        let mut read = overview::judge(place, limits, Heard::Somewhere, false)?;
+        read.judged.judge_trends(&mut baselines);
+        let Some(own) = vehicle(&read.judged, read.format) else { continue };
         let (title, vehicle) = first.get_or_insert((&place.title, own));
         if are_two(vehicle, &own) {
             return Err(usage(format!(
@@ -97,9 +122,9 @@ fn learnt(limits: &Limits, places: &[Place]) -> Result<(Baselines, Option<Vehicl
 }
 
 /// The vehicle of a flight, if known. A DataFlash log does not have the system id.
-fn vehicle(read: &Read) -> Option<Vehicle> {
-    let vehicle = overview::vehicle(&read.judged.monitor)?;
-    let system = if read.format == Format::DataFlash { 0 } else { vehicle.system };
+fn vehicle(judged: &Judged, format: Format) -> Option<Vehicle> {
+    let vehicle = overview::vehicle(&judged.monitor)?;
+    let system = if format == Format::DataFlash { 0 } else { vehicle.system };
     Some(Vehicle { system, ..vehicle })
 }
 
@@ -119,10 +144,6 @@ fn words(of: &Vehicle) -> String {
     let system = if of.system == 0 { String::new() } else { format!("system {}, ", of.system) };
     let id = if of.uid == 0 { String::new() } else { format!(", uid {:016x}", of.uid) };
     format!("{system}{}{id}", type_name(of.vehicle_type))
-}
-
-fn quantities() -> impl Iterator<Item = Quantity> {
-    (0..Quantity::COUNT).filter_map(Quantity::from_index)
 }
 
 #[cfg(test)]

@@ -327,10 +327,15 @@ impl Problems {
                 ..problem
             })
             .collect();
-        let mishaps = mishaps(&problems);
-        problems.sort_by_key(|problem| (std::cmp::Reverse(rank(problem.level)), problem.order(&mishaps)));
+        worst_first(&mut problems);
         problems
     }
+}
+
+/// Sorts problems: the worst first, and of the same level by [`Problem::order`].
+pub(super) fn worst_first(problems: &mut [Problem]) {
+    let mishaps = mishaps(problems);
+    problems.sort_by_key(|problem| (std::cmp::Reverse(rank(problem.level)), problem.order(&mishaps)));
 }
 
 /// The problems from a log's findings, worst first. The findings are by a box or by this program.

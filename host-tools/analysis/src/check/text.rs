@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
 use hums_core::clock::Span;
-use hums_core::health::{Level, Side, Subsystem, vocabulary};
+use hums_core::health::{Level, Side, Subsystem};
 
 use super::checked::Checked;
 use super::flights::{Flight, Mishap};
@@ -16,7 +16,7 @@ use super::judged::{Judged, JudgedBy};
 use super::problem::{Problem, side};
 use crate::colour::level as coloured;
 use crate::counters::tells_flight;
-use crate::names::{autopilot_name, type_name, unit_name};
+use crate::names::{autopilot_name, type_name, unit_name, vocabulary};
 use crate::plural::count;
 use crate::printable::word;
 use crate::source::item::{About, Cause, Gap};

@@ -161,7 +161,7 @@ pub(super) fn of(class: &str) -> Option<&'static Class> {
 mod tests {
     use std::collections::BTreeSet;
 
-    use hums_core::health::vocabulary;
+    use hums::names::vocabulary;
 
     use super::*;
 

@@ -6,9 +6,9 @@ use anyhow::Result;
 use hums::check::flights::Flight;
 use hums::check::judge::{Heard, Limits};
 use hums::check::judged::Judged;
+use hums::check::trends::Baselines;
 use hums::names::{autopilot_name, counter_name, type_name};
 use hums::source::recording::Place;
-use hums_core::baseline::Baselines;
 use hums_core::health::Level;
 
 use super::causes;
@@ -83,8 +83,10 @@ pub(super) fn judge(place: &Place, label: Option<&Label>) -> Result<Outcome> {
     // The labelled flights were recorded on a telemetry port; of the others nobody knows.
     let heard = if label.is_some() { Heard::OnTheWire } else { Heard::Somewhere };
     let past = label.map_or(&[][..], |label| &label.past);
-    let limits = if past.is_empty() { Limits::default() } else { Limits::default().after(&learn(past)?) };
-    let judged = hums::check::recording(place, &limits, heard)?.judged;
+    let mut judged = hums::check::recording(place, &Limits::default(), heard)?.judged;
+    if !past.is_empty() {
+        judged.judge_trends(&mut learn(past)?);
+    }
     let by_hand = if label.is_none() { verdicts::find(Path::new(&place.title))? } else { None };
     Ok(Outcome { by_hand, ..of(&judged, &place.name, label) })
 }

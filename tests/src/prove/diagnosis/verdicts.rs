@@ -98,7 +98,7 @@ pub(super) fn find(path: &Path) -> Result<Option<Recording>> {
 mod tests {
     use std::collections::BTreeSet;
 
-    use hums_core::health::vocabulary;
+    use hums::names::vocabulary;
 
     use super::*;
 

@@ -1,0 +1,311 @@
+//! Figures of a flight: quantities of steady flight that tell of wear and load, each as the mean of its last minute.
+//!
+//! Once a second in steady flight (hover, or cruise on wings; level) each quantity gives a sample. A sample far from the mean
+//! counts only for a part of its distance ([`BELIEVED`]): a gust or garbage moves the mean little. The mean at landing is the flight's
+//! figure. It is recorded with the session's counters; `hums check` compares the figures of flights.
+//!
+//! Hover throttle depends on air density and on the battery's voltage: rotor speed goes with duty times voltage, thrust with its square
+//! and with density. `ArduPilot`'s throttle is linear in thrust, PX4's in speed (`THR_MDL_FAC` is 0 by default). The figure is the
+//! throttle at 3.8 V a cell and at sea level. If the autopilot compensates the voltage itself (`MOT_BAT_VOLT_MAX`), the voltage is left out.
+//! Hover power is given at sea level: the power for the same lift goes with the inverse root of density.
+
+use crate::charge::Charge;
+use crate::derived::{Derived, pack_v};
+use crate::flight::{Flight, FlightEvent, Phase};
+use crate::observation::{Autopilot, MOTORS_MAX, VehicleKind, VibrationScale};
+use crate::params::Params;
+use crate::power_draw::drawn;
+use crate::time::{Instant, Span, Stamp};
+use crate::trend::Resistance;
+use crate::vehicle::{BATTERIES_MAX, Vehicle};
+
+/// Between samples.
+const EVERY: Span = Span::from_secs(1);
+/// Samples from which on a mean is a figure.
+const SAMPLES_MIN: u16 = 20;
+/// Samples that a mean looks back over.
+const SAMPLES: u16 = 60;
+/// A sample moves the mean as if it were no further away than this part of it (and [`Quantity::grain`]).
+const BELIEVED: f32 = 0.5;
+/// Voltage of a cell, and pressure at sea level, hPa, for which hover throttle is given.
+const CELL_V: f32 = 3.8;
+const SEA_LEVEL_HPA: f32 = 1_013.25;
+/// The exponent of density over pressure in the standard atmosphere, as a slope: 1 % wrong at 2,000 m.
+const DENSITY_SLOPE: f32 = 0.81;
+/// A value holds this long.
+const FRESH: Span = Span::from_secs(2);
+
+/// A quantity of steady flight.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Quantity {
+    /// Vibration in steady flight, on the autopilot's own scale.
+    Vibration,
+    /// Throttle in hover, 0 to 1.
+    HoverThrottle,
+    /// A battery's internal resistance, ohm, by its place.
+    Resistance(u8),
+    /// How far a motor's speed is from the mean of the others, percent of it, with its sign.
+    MotorSpeed(u8),
+    /// Power that hovers, drawn from the batteries, W.
+    HoverPower,
+    /// How far a motor's output is from the mean of all, percent of it, with its sign.
+    MotorOutput(u8),
+    /// A battery's charge from full to empty, Ah, by its place.
+    Capacity(u8),
+}
+
+/// Motors of the largest frame whose outputs are compared.
+pub const OUTPUTS_MAX: usize = 6;
+
+impl Quantity {
+    /// How many there are.
+    pub const COUNT: usize = 3 + 2 * BATTERIES_MAX + MOTORS_MAX + OUTPUTS_MAX;
+
+    /// All of them, by [`Self::index`].
+    pub fn all() -> impl Iterator<Item = Self> {
+        (0..Self::COUNT).filter_map(Self::from_index)
+    }
+
+    /// The quantity of a place in the record.
+    pub const fn from_index(index: usize) -> Option<Self> {
+        const RESISTANCES: usize = Quantity::Resistance(0).index();
+        const SPEEDS: usize = Quantity::MotorSpeed(0).index();
+        const POWER: usize = Quantity::HoverPower.index();
+        const OUTPUTS: usize = Quantity::MotorOutput(0).index();
+        const CAPACITIES: usize = Quantity::Capacity(0).index();
+        match index {
+            0 => Some(Self::Vibration),
+            1 => Some(Self::HoverThrottle),
+            RESISTANCES..SPEEDS => Some(Self::Resistance((index - RESISTANCES) as u8)),
+            SPEEDS..POWER => Some(Self::MotorSpeed((index - SPEEDS) as u8)),
+            POWER => Some(Self::HoverPower),
+            OUTPUTS..CAPACITIES => Some(Self::MotorOutput((index - OUTPUTS) as u8)),
+            CAPACITIES..Self::COUNT => Some(Self::Capacity((index - CAPACITIES) as u8)),
+            _ => None,
+        }
+    }
+
+    /// Its place in the record, which never changes.
+    pub const fn index(self) -> usize {
+        match self {
+            Self::Vibration => 0,
+            Self::HoverThrottle => 1,
+            Self::Resistance(battery) => 2 + battery as usize,
+            Self::MotorSpeed(motor) => 2 + BATTERIES_MAX + motor as usize,
+            Self::HoverPower => 2 + BATTERIES_MAX + MOTORS_MAX,
+            Self::MotorOutput(motor) => 3 + BATTERIES_MAX + MOTORS_MAX + motor as usize,
+            Self::Capacity(battery) => 3 + BATTERIES_MAX + MOTORS_MAX + OUTPUTS_MAX + battery as usize,
+        }
+    }
+
+    /// Figures that differ by less are equal, in the quantity's unit.
+    pub const fn grain(self) -> f32 {
+        match self {
+            Self::HoverThrottle | Self::Capacity(_) => 0.05,
+            Self::Resistance(_) => 0.002,
+            Self::Vibration | Self::HoverPower | Self::MotorSpeed(_) | Self::MotorOutput(_) => 1.0,
+        }
+    }
+
+    /// Whether a vehicle can have so much or so little.
+    fn is_sane(self, value: f32) -> bool {
+        let (least, most) = match self {
+            Self::Vibration => (0.0, 1_000.0),
+            Self::HoverThrottle => (0.02, 2.0),
+            Self::HoverPower => (1.0, 1e6),
+            Self::Resistance(_) => (0.0005, 1.0),
+            Self::Capacity(_) => (0.05, 10_000.0),
+            Self::MotorSpeed(_) | Self::MotorOutput(_) => (-100.0, 100.0),
+        };
+        (least..=most).contains(&value)
+    }
+}
+
+#[derive(Clone, Copy, Debug, Default)]
+struct Track {
+    mean: f32,
+    samples: u16,
+}
+
+impl Track {
+    fn take(&mut self, value: f32, grain: f32) {
+        self.samples = (self.samples + 1).min(SAMPLES);
+        if self.samples == 1 {
+            self.mean = value;
+            return;
+        }
+        let believed = BELIEVED * self.mean.abs() + grain;
+        // Not `clamp`: its panic would print floating-point numbers, 12 KB of flash that nothing else takes.
+        self.mean += (value - self.mean).max(-believed).min(believed) / f32::from(self.samples);
+    }
+}
+
+/// The figures of a flight.
+#[derive(Clone, Copy, Debug)]
+pub struct Figures {
+    tracks: [Track; Quantity::COUNT],
+    /// Charge of the batteries before take-off.
+    charged: [Option<Charge>; BATTERIES_MAX],
+    sampled_at: Stamp,
+}
+
+impl Figures {
+    /// Nothing sampled yet.
+    pub(crate) const NEW: Self = Self {
+        tracks: [Track { mean: 0.0, samples: 0 }; Quantity::COUNT],
+        charged: [None; BATTERIES_MAX],
+        sampled_at: Stamp::NONE,
+    };
+
+    /// One step, after flight and derived quantities.
+    pub(crate) fn step(
+        &mut self,
+        now: Instant,
+        vehicle: &Vehicle,
+        flight: &Flight,
+        event: Option<FlightEvent>,
+        derived: &Derived,
+        params: &Params,
+    ) {
+        match event {
+            Some(FlightEvent::TakeOff) => *self = Self { charged: self.charged, ..Self::NEW },
+            Some(FlightEvent::Resumed) => *self = Self::NEW,
+            Some(FlightEvent::Landing) | None => {}
+        }
+        if self.sampled_at.age(now).is_some_and(|age| age < EVERY) {
+            return;
+        }
+        self.sampled_at = Stamp::at(now);
+        if flight.stands() {
+            for (battery, charged) in (0..).zip(&mut self.charged) {
+                *charged = Charge::of(vehicle, derived, params, battery).or(*charged);
+            }
+        }
+        if !flight.airborne() {
+            return;
+        }
+        let steady = is_steady(now, vehicle, flight);
+        for quantity in Quantity::all() {
+            let value = match quantity {
+                // The resistance shows under a load that changes, and has a mean of its own; the charge sinks in any flight.
+                Quantity::Resistance(battery) => {
+                    derived.resistance(usize::from(battery)).and_then(Resistance::ohm)
+                }
+                Quantity::Capacity(battery) => self.capacity_ah(vehicle, derived, params, battery),
+                _ if !steady => continue,
+                _ => sample(now, quantity, vehicle, derived, params),
+            };
+            let track = self.tracks.get_mut(quantity.index());
+            if let (Some(value), Some(track)) = (value.filter(|value| quantity.is_sane(*value)), track) {
+                track.take(value, quantity.grain());
+            }
+        }
+    }
+
+    fn capacity_ah(&self, vehicle: &Vehicle, derived: &Derived, params: &Params, battery: u8) -> Option<f32> {
+        let charged = self.charged.get(usize::from(battery)).copied().flatten()?;
+        let now = Charge::of(vehicle, derived, params, battery)?;
+        charged.capacity_ah(&now, derived, battery)
+    }
+
+    /// The mean of the last minute of steady flight; `None` before there was enough of it.
+    pub fn get(&self, quantity: Quantity) -> Option<f32> {
+        self.tracks.get(quantity.index()).filter(|track| track.samples >= SAMPLES_MIN).map(|track| track.mean)
+    }
+}
+
+/// Hovering, or cruising on wings, and not leaning.
+fn is_steady(now: Instant, vehicle: &Vehicle, flight: &Flight) -> bool {
+    let wings = vehicle
+        .heartbeat
+        .get()
+        .is_some_and(|heartbeat| matches!(heartbeat.kind, VehicleKind::Plane | VehicleKind::Vtol));
+    let phase = flight.phase(now, vehicle);
+    let level = flight.is_steady(now, vehicle);
+    level && (phase == Phase::Hover || (wings && phase == Phase::Cruise))
+}
+
+/// What a quantity is in steady flight.
+fn sample(
+    now: Instant,
+    quantity: Quantity,
+    vehicle: &Vehicle,
+    derived: &Derived,
+    params: &Params,
+) -> Option<f32> {
+    match quantity {
+        Quantity::Vibration => {
+            let vibration = vehicle.vibration.within(now, FRESH)?;
+            match vibration.scale {
+                VibrationScale::PerAxis => vibration.levels.into_iter().flatten().reduce(f32::max),
+                VibrationScale::Px4Metrics => vibration.levels[2],
+            }
+        }
+        Quantity::HoverThrottle => {
+            let throttle = vehicle.hud.within(now, FRESH)?.throttle?.0;
+            Some(throttle * lift(now, vehicle, derived, params)?)
+        }
+        Quantity::HoverPower => {
+            let power_w = drawn(now, vehicle).power_w;
+            let hovers = vehicle.hovers(now) == Some(true);
+            (hovers && power_w > 0.0).then(|| power_w * libm::sqrtf(density(vehicle)))
+        }
+        Quantity::MotorSpeed(motor) => {
+            let at = vehicle.motors.get(usize::from(motor))?.moved_at?;
+            (now.since(at) <= FRESH).then(|| derived.motors.departure(motor)).flatten()
+        }
+        Quantity::MotorOutput(motor) => derived.outputs.share(now, vehicle, motor),
+        // They are no figures of steady flight.
+        Quantity::Resistance(_) | Quantity::Capacity(_) => None,
+    }
+}
+
+fn is_linear_in_thrust(vehicle: &Vehicle) -> bool {
+    vehicle.heartbeat.get().is_some_and(|heartbeat| heartbeat.autopilot == Autopilot::ArduPilot)
+}
+
+/// The air's density as a part of that at sea level.
+fn density(vehicle: &Vehicle) -> f32 {
+    let pressure =
+        vehicle.air.get().and_then(|air| air.pressure).map_or(SEA_LEVEL_HPA, |pressure| pressure.0);
+    (1.0 + DENSITY_SLOPE * (pressure / SEA_LEVEL_HPA - 1.0)).max(0.0)
+}
+
+/// What the throttle is multiplied by to be that of [`CELL_V`] at sea level. `None` where the voltage of a cell is not known; 1 on wings.
+fn lift(now: Instant, vehicle: &Vehicle, derived: &Derived, params: &Params) -> Option<f32> {
+    if vehicle.hovers(now) != Some(true) {
+        return Some(1.0);
+    }
+    let volts = match pack_v(vehicle, 0) {
+        Some(pack_v) if !derived.cells.is_compensated() => {
+            let cells = derived.cell_count(vehicle, 0, params);
+            pack_v / (CELL_V * f32::from((cells > 0).then_some(cells)?))
+        }
+        _ => 1.0,
+    };
+    let lift = volts * volts * density(vehicle);
+    Some(if is_linear_in_thrust(vehicle) { lift } else { libm::sqrtf(lift.max(0.0)) })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn garbage_moves_a_mean_little_and_a_change_moves_it() {
+        let mut track = Track::default();
+        (0..60).for_each(|_| track.take(10.0, 1.0));
+        track.take(1_000.0, 1.0);
+        assert!((track.mean - 10.1).abs() < 0.01, "{track:?}");
+        (0..240).for_each(|_| track.take(13.0, 1.0));
+        assert!((track.mean - 13.0).abs() < 0.1, "{track:?}");
+    }
+
+    #[test]
+    fn every_place_is_one_quantitys() {
+        for index in 0..Quantity::COUNT {
+            assert_eq!(Quantity::from_index(index).map(Quantity::index), Some(index));
+        }
+        assert_eq!(Quantity::from_index(Quantity::COUNT), None);
+    }
+}

@@ -1,0 +1,478 @@
+//! Trends: the figures of a flight against those of the vehicle's earlier flights.
+//!
+//! A monitor gives one figure of each quantity for a flight ([`hums_core::figures`]). Here they make baselines: the first [`FLIGHTS_MIN`]
+//! flights make one, each later flight moves it by a tenth of the difference, and a flight beyond the warning's limit does not
+//! move it, so that a fault never becomes normal.
+//!
+//! A baseline has the mean of the figures and their spread. A departure counts if only one unchanged flight in `TRD_FALSE` goes so far: by
+//! Student's t distribution (normal figures of unknown mean and spread, the spread with a conjugate prior; Gelman et al., Bayesian
+//! Data Analysis, 3.2 and 3.3). The test of one figure is the likelihood ratio test for a changed mean (Lehmann and Romano, Testing
+//! Statistical Hypotheses, 5.2), so its rate of false alarms can be set.
+//!
+//! # Heavier, or less thrust
+//! A heavier vehicle asks all its rotors for more thrust T, and these take power as T^1.5 (actuator disk; Leishman, Principles of Helicopter
+//! Aerodynamics, 2.4). With a shorter propeller blade, a weak motor or a weak ESC, throttle rises for the same thrust and power does
+//! not. So if throttle rose, the logarithm of power is compared with that of the thrust of that throttle: from
+//! [`WEIGHT_EXPONENT`] times on, half way between both, it is weight. Propellers of a real quadrotor cut by 10 to 25 mm have 0.5 to 1.1.
+//!
+//! # Better than before
+//! Wear never makes a vehicle hover with less, or a battery resist less and hold more. A flight that is better beyond its reach begins
+//! a new baseline: a part was changed.
+
+use hums_blackbox::Record;
+use hums_blackbox::record::Why;
+use hums_core::Monitor;
+use hums_core::clock::Instant;
+use hums_core::component::Kind;
+use hums_core::figures::Quantity;
+use hums_core::health::{Level, Subsystem};
+use hums_core::observation::Autopilot;
+use hums_core::params::{Param, Params};
+use hums_onboard::monitoring::PARTS_CHANGED;
+
+use super::problem::Problem;
+use crate::source::told::Finding;
+
+/// Flights that make a baseline; before, nothing is compared.
+pub const FLIGHTS_MIN: u16 = 3;
+/// Weight of a flight in a baseline of many.
+const WEIGHT: f32 = 0.1;
+/// As many flights as a baseline remembers.
+const REMEMBERED: u16 = 10;
+/// The prior spread of a quantity counts as so many flights.
+const PRIOR_FLIGHTS: f32 = 8.0;
+/// See above.
+const WEIGHT_EXPONENT: f32 = 1.25;
+
+/// The trend that explains another one of the same recording: a motor, or else less thrust, takes more throttle and power.
+pub(super) fn because(effect: &Problem, others: &[Problem]) -> Option<String> {
+    let causes: &[&str] = match effect.check.as_str() {
+        "throttle_trend" => &["motor_trend"],
+        "power_trend" => &["motor_trend", "throttle_trend"],
+        _ => &[],
+    };
+    let is_cause =
+        |cause: &&&str| others.iter().any(|of| of.check == **cause && of.level as u8 >= effect.level as u8);
+    causes.iter().find(is_cause).map(|cause| (*cause).to_owned())
+}
+
+/// Whether a record of a box tells that a part was changed which the figures are of.
+pub(super) fn is_change(record: &Record<'_>) -> bool {
+    match record {
+        Record::Component(part) => part.why == Why::Replaced && part.kind != Kind::Card,
+        Record::Event(event) => event.text.starts_with(PARTS_CHANGED),
+        _ => false,
+    }
+}
+
+/// Which way a quantity goes when something is wrong.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Bad {
+    Up,
+    Down,
+    Either,
+}
+
+/// How a quantity is compared.
+struct Terms {
+    check: &'static str,
+    part: u8,
+    subsystem: Subsystem,
+    bad: Bad,
+    /// It is percents of the others: a departure is a difference, and not a part of the baseline.
+    is_share: bool,
+    /// How far flights differ where nothing changed: as a part of the baseline, of a share in percents. Hover throttle, power and
+    /// outputs as in real flights of one quadrotor, at one place and day.
+    prior: f32,
+    /// A flight beyond this limit teaches nothing.
+    warn: Param,
+    critical: Param,
+}
+
+fn terms(quantity: Quantity) -> Terms {
+    use Param as P;
+    use Subsystem::{Power, Propulsion, Structure};
+    let (check, subsystem, bad, prior, (warn, critical)) = match quantity {
+        Quantity::Vibration => {
+            ("vibration_trend", Structure, Bad::Either, 0.1, (P::TrdVibeWarn, P::TrdVibeCrit))
+        }
+        Quantity::HoverThrottle => {
+            ("throttle_trend", Propulsion, Bad::Up, 0.007, (P::TrdThrWarn, P::TrdThrCrit))
+        }
+        Quantity::HoverPower => ("power_trend", Propulsion, Bad::Up, 0.0125, (P::TrdThrWarn, P::TrdThrCrit)),
+        Quantity::Resistance(_) => ("batt_resistance", Power, Bad::Up, 0.05, (P::BatResWarn, P::BatResCrit)),
+        Quantity::Capacity(_) => ("batt_capacity", Power, Bad::Down, 0.08, (P::TrdCapWarn, P::TrdCapCrit)),
+        Quantity::MotorSpeed(_) => {
+            ("motor_trend", Propulsion, Bad::Either, 1.0, (P::TrdEscWarn, P::TrdEscCrit))
+        }
+        Quantity::MotorOutput(_) => {
+            ("motor_trend", Propulsion, Bad::Either, 2.5, (P::TrdEscWarn, P::TrdEscCrit))
+        }
+    };
+    let (part, is_share) = match quantity {
+        Quantity::MotorSpeed(motor) | Quantity::MotorOutput(motor) => (motor, true),
+        Quantity::Resistance(battery) | Quantity::Capacity(battery) => (battery, false),
+        Quantity::Vibration | Quantity::HoverThrottle | Quantity::HoverPower => (0, false),
+    };
+    Terms { check, part, subsystem, bad, is_share, prior, warn, critical }
+}
+
+/// What a recording tells of trends, in order.
+#[derive(Clone, Debug)]
+pub enum Episode {
+    /// A flight.
+    Flown(Box<Flown>),
+    /// A part was changed: earlier flights tell nothing of later ones.
+    Changed,
+}
+
+/// The figures of one flight.
+#[derive(Clone, Debug)]
+pub struct Flown {
+    /// When it landed, or the recording ended.
+    at: Instant,
+    landed: bool,
+    figures: [Option<f32>; Quantity::COUNT],
+    /// The throttle stands for thrust, and not for its root.
+    is_linear_in_thrust: bool,
+}
+
+impl Flown {
+    /// The flight that a monitor saw, at its landing or at the end of the recording.
+    pub fn of(at: Instant, landed: bool, monitor: &Monitor) -> Self {
+        let autopilot = monitor.vehicle().heartbeat.get().map(|heartbeat| heartbeat.autopilot);
+        let mut figures = [None; Quantity::COUNT];
+        for (figure, quantity) in figures.iter_mut().zip(Quantity::all()) {
+            *figure = monitor.figures().get(quantity);
+        }
+        Self { at, landed, figures, is_linear_in_thrust: autopilot == Some(Autopilot::ArduPilot) }
+    }
+
+    fn figure(&self, quantity: Quantity) -> Option<f32> {
+        self.figures.get(quantity.index()).copied().flatten()
+    }
+}
+
+/// What is normal of one quantity.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Baseline {
+    /// In the quantity's unit.
+    value: f32,
+    /// Mean square distance of the flights' figures from it.
+    variance: f32,
+    /// Flights that it was learned from; it holds from [`FLIGHTS_MIN`] on.
+    flights: u16,
+}
+
+impl Baseline {
+    fn learn(&mut self, figure: f32) {
+        let weight = (1.0 / (f32::from(self.flights) + 1.0)).max(WEIGHT);
+        let off = figure - self.value;
+        // Mean and variance with weights: D. H. D. West, Communications of the ACM 22, 1979.
+        self.variance =
+            if self.flights == 0 { 0.0 } else { (1.0 - weight) * (self.variance + weight * off * off) };
+        self.value += weight * off;
+        self.flights = self.flights.saturating_add(1);
+    }
+
+    /// Mean distance of an unchanged flight's figure from the baseline; `prior` is the usual spread of such a quantity.
+    fn spread(&self, prior: f32) -> f32 {
+        let flights = f32::from(self.flights.clamp(1, REMEMBERED));
+        let squares = PRIOR_FLIGHTS * prior * prior + flights * self.variance;
+        (squares / (PRIOR_FLIGHTS + flights) * (1.0 + 1.0 / flights)).sqrt()
+    }
+
+    /// The distance from the baseline, either way, that one unchanged flight in `rarely` exceeds.
+    fn reach(&self, prior: f32, rarely: f32) -> f32 {
+        let flights = f32::from(self.flights.clamp(1, REMEMBERED));
+        self.spread(prior) * student_t(rarely, PRIOR_FLIGHTS + flights - 1.0)
+    }
+}
+
+/// What a Student's t of so many degrees of freedom (8 and more) exceeds, either way, once in `rarely`: the normal quantile by 26.2.23 and its
+/// expansion by 26.7.5 of Abramowitz and Stegun, Handbook of Mathematical Functions; within 1 % for one in 20 to one in 100,000.
+fn student_t(rarely: f32, degrees: f32) -> f32 {
+    let root = (2.0 * (2.0 * rarely).ln()).sqrt();
+    let above = 2.515_517 + root * (0.802_853 + root * 0.010_328);
+    let below = 1.0 + root * (1.432_788 + root * (0.189_269 + root * 0.001_308));
+    let normal = root - above / below;
+    let square = normal * normal;
+    let terms = [
+        (1.0 + square) / 4.0,
+        (3.0 + square * (16.0 + square * 5.0)) / 96.0,
+        (-15.0 + square * (17.0 + square * (19.0 + square * 3.0))) / 384.0,
+        (-945.0 + square * (-1_920.0 + square * (1_482.0 + square * (776.0 + square * 79.0)))) / 92_160.0,
+    ];
+    let more = terms.iter().rev().fold(0.0, |sum, term| (sum + term) / degrees);
+    normal * (1.0 + more)
+}
+
+/// What is normal for a vehicle.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Baselines([Baseline; Quantity::COUNT]);
+
+impl Default for Baselines {
+    fn default() -> Self {
+        Self([Baseline::default(); Quantity::COUNT])
+    }
+}
+
+impl Baselines {
+    /// The most flights that any baseline was learned from.
+    pub fn flights(&self) -> u16 {
+        self.0.iter().map(|baseline| baseline.flights).max().unwrap_or(0)
+    }
+
+    /// The normal figure of a quantity, once enough flights made it.
+    pub fn known(&self, quantity: Quantity) -> Option<f32> {
+        let Baseline { value, flights, .. } = self.0[quantity.index()];
+        (flights >= FLIGHTS_MIN).then_some(value)
+    }
+
+    /// How far a flight is from the baseline of a quantity.
+    fn off(&self, quantity: Quantity, flown: &Flown) -> Option<f32> {
+        Some(flown.figure(quantity)? - self.known(quantity)?)
+    }
+
+    /// Whether only few unchanged flights go so far.
+    fn exceeds(&self, quantity: Quantity, off: f32, params: &Params) -> bool {
+        let (baseline, Terms { is_share, prior, .. }) = (self.0[quantity.index()], terms(quantity));
+        let prior = if is_share { prior } else { prior * baseline.value };
+        off.abs() > baseline.reach(prior, params.get(Param::TrdFalse))
+    }
+
+    /// How far a quantity is from its baseline, the way that is bad: percent of it; of a motor against the others, percent of these. 0 where
+    /// an unchanged flight may go so far. `None` without a baseline or a figure.
+    fn departure(&self, quantity: Quantity, flown: &Flown, params: &Params) -> Option<f32> {
+        let off = self.off(quantity, flown)?;
+        let Terms { bad, is_share, .. } = terms(quantity);
+        let is_bad = match bad {
+            Bad::Up => off > 0.0,
+            Bad::Down => off < 0.0,
+            Bad::Either => true,
+        };
+        if !is_bad || !self.exceeds(quantity, off, params) {
+            return Some(0.0);
+        }
+        let whole = if is_share { 100.0 } else { self.0[quantity.index()].value.max(quantity.grain()) };
+        Some(off.abs() / whole * 100.0)
+    }
+
+    /// How much heavier the vehicle hovers than before, percent; 0 where it is not, or where it has less thrust. `None` where that is
+    /// not known.
+    fn heavier(&self, flown: &Flown, params: &Params) -> Option<f32> {
+        let throttle = self.departure(Quantity::HoverThrottle, flown, params)?;
+        let ratio =
+            |of: Quantity| Some(1.0 + self.off(of, flown)? / self.0[of.index()].value.max(of.grain()));
+        let (thrust, power) = (ratio(Quantity::HoverThrottle)?, ratio(Quantity::HoverPower)?);
+        let thrust = if flown.is_linear_in_thrust { thrust } else { thrust * thrust };
+        let is_weight = power.ln() >= WEIGHT_EXPONENT * thrust.ln();
+        Some(if throttle > 0.0 && is_weight { (thrust - 1.0) * 100.0 } else { 0.0 })
+    }
+
+    /// Learns from a flight: nothing from a quantity beyond its warning's limit, anew from one that became better.
+    fn learn(&mut self, flown: &Flown, params: &Params) {
+        let before = self.clone();
+        for quantity in Quantity::all() {
+            let Some(figure) = flown.figure(quantity) else { continue };
+            let departure = before.departure(quantity, flown, params).unwrap_or(0.0);
+            let Terms { bad, warn, .. } = terms(quantity);
+            if departure >= params.get(warn) {
+                continue;
+            }
+            let baseline = &mut self.0[quantity.index()];
+            let off = before.off(quantity, flown);
+            let is_better = bad != Bad::Either && departure.to_bits() == 0.0_f32.to_bits();
+            if is_better && off.is_some_and(|off| before.exceeds(quantity, off, params)) {
+                *baseline = Baseline::default();
+            }
+            baseline.learn(figure);
+        }
+    }
+
+    /// The departure of each trend check in a flight, with the terms of its quantity.
+    fn departures(&self, flown: &Flown, params: &Params) -> Vec<(Terms, f32)> {
+        let heavier = self.heavier(flown, params);
+        let mut all: Vec<(Terms, f32)> = Vec::new();
+        for quantity in Quantity::all() {
+            let Some(departure) = self.departure(quantity, flown, params) else { continue };
+            let terms = terms(quantity);
+            let takes_more = matches!(quantity, Quantity::HoverThrottle | Quantity::HoverPower);
+            let is_weight = takes_more && heavier.is_some_and(|percent| percent > 0.0);
+            // A motor's output is its figure only where no ESC tells its speed.
+            let is_told = all.iter().any(|(known, _)| (known.check, known.part) == (terms.check, terms.part));
+            if !is_told {
+                all.push((terms, if is_weight { 0.0 } else { departure }));
+            }
+        }
+        all.extend(
+            heavier
+                .map(|percent| (Terms { check: "weight_trend", ..terms(Quantity::HoverThrottle) }, percent)),
+        );
+        all
+    }
+
+    /// Judges a flight, and then learns from it: findings, and the checks that had a figure to compare.
+    pub fn judge(&mut self, flown: &Flown, params: &Params) -> (Vec<Finding>, Vec<&'static str>) {
+        let departures = self.departures(flown, params);
+        let judged = departures.iter().map(|(terms, _)| terms.check).collect();
+        let found = departures.into_iter().filter_map(|(terms, value)| {
+            let (warn, critical) = (params.get(terms.warn), params.get(terms.critical));
+            let (level, limit) = match () {
+                () if value > critical && terms.check != "weight_trend" => (Level::Critical, critical),
+                () if value > warn => (Level::Warning, warn),
+                () => return None,
+            };
+            Some(Finding {
+                at: flown.at,
+                subsystem: terms.subsystem,
+                check: terms.check.to_owned(),
+                instance: terms.part,
+                level,
+                previous: Level::Ok,
+                value,
+                limit,
+                unit: "%".to_owned(),
+            })
+        });
+        let found = found.collect();
+        if flown.landed {
+            self.learn(flown, params);
+        }
+        (found, judged)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn learnt(flights: u16, normal: &[(Quantity, f32)]) -> Baselines {
+        let mut baselines = Baselines::default();
+        for (quantity, normal) in normal {
+            (0..flights).for_each(|_| baselines.0[quantity.index()].learn(*normal));
+        }
+        baselines
+    }
+
+    fn flown(is_linear_in_thrust: bool, known: &[(Quantity, f32)]) -> Flown {
+        let mut figures = [None; Quantity::COUNT];
+        for (quantity, figure) in known {
+            figures[quantity.index()] = Some(*figure);
+        }
+        Flown { at: Instant::ZERO, landed: true, figures, is_linear_in_thrust }
+    }
+
+    /// A past of five flights at 0.4 of throttle and 160 W, and a flight.
+    fn hovered(throttle: f32, power_w: f32, is_linear_in_thrust: bool) -> (Flown, Baselines) {
+        let quantities = [Quantity::HoverThrottle, Quantity::HoverPower];
+        let past = learnt(5, &[(quantities[0], 0.4), (quantities[1], 160.0)]);
+        (flown(is_linear_in_thrust, &[(quantities[0], throttle), (quantities[1], power_w)]), past)
+    }
+
+    #[test]
+    fn three_flights_make_a_baseline_and_later_ones_move_it_slowly() {
+        let (of, mut baselines) = (Quantity::Vibration, Baselines::default());
+        for (figure, known) in [(9.0, None), (10.0, None), (11.0, Some(10.0))] {
+            baselines.0[of.index()].learn(figure);
+            assert_eq!(baselines.known(of), known);
+        }
+        baselines.0[of.index()].flights = 100;
+        baselines.0[of.index()].learn(20.0);
+        assert_eq!(baselines.known(of), Some(11.0));
+    }
+
+    #[test]
+    fn the_spread_comes_from_the_prior_and_then_from_the_flights() {
+        let mut baseline = Baseline::default();
+        (0..3).for_each(|_| baseline.learn(10.0));
+        let few = baseline.spread(1.0);
+        (0..200).for_each(|flight| baseline.learn(if flight % 2 == 0 { 13.0 } else { 7.0 }));
+        let wide = baseline.spread(1.0);
+        (0..200).for_each(|_| baseline.learn(10.0));
+        let narrow = baseline.spread(1.0);
+        for (spread, range) in [(few, 0.8..1.2), (wide, 1.8..2.8), (narrow, 0.5..0.8)] {
+            assert!(range.contains(&spread), "{spread}, not {range:?}");
+        }
+    }
+
+    #[test]
+    fn one_flight_in_as_many_as_are_asked_for_goes_beyond() {
+        // Two-sided points of Student's t, by integration of its density.
+        for (rarely, degrees, known) in [
+            (20.0, 10.0, 2.228),
+            (100.0, 10.0, 3.169),
+            (1_000.0, 10.0, 4.587),
+            (1_000.0, 17.0, 3.965),
+            (100_000.0, 17.0, 6.184),
+        ] {
+            let told = student_t(rarely, degrees);
+            assert!((told / known - 1.0).abs() < 0.01, "{told} for {known}");
+        }
+        let mut params = Params::defaults();
+        let (flight, past) = hovered(0.4 * 1.035, 160.0, true);
+        let departure = |params: &Params| past.departure(Quantity::HoverThrottle, &flight, params);
+        assert!(departure(&params).is_some_and(|percent| percent > 3.0));
+        params.set("TRD_FALSE", 100_000.0).expect("in range");
+        assert_eq!(departure(&params), Some(0.0));
+    }
+
+    #[test]
+    fn a_departure_is_a_part_of_the_baseline_and_of_motors_percent_points() {
+        let params = Params::defaults();
+        let capacity = Quantity::Capacity(0);
+        for (quantity, normal, figure, departure) in [
+            (Quantity::Vibration, 4.0, 6.0, 50.0),
+            (Quantity::HoverThrottle, 0.4, 0.5, 25.0),
+            (Quantity::MotorSpeed(2), -2.0, 5.0, 7.0),
+            (capacity, 5.0, 5.2, 0.0),
+            (capacity, 5.0, 9.0, 0.0),
+            (capacity, 5.0, 2.5, 50.0),
+        ] {
+            let (flight, past) = (flown(true, &[(quantity, figure)]), learnt(3, &[(quantity, normal)]));
+            let told = past.departure(quantity, &flight, &params).map(f32::round);
+            assert_eq!(told, Some(departure), "{quantity:?} {figure}");
+            assert_eq!(Baselines::default().departure(quantity, &flight, &params), None);
+            assert_eq!(past.departure(quantity, &flown(true, &[]), &params), None);
+        }
+    }
+
+    #[test]
+    fn a_heavier_vehicle_is_told_from_one_with_less_thrust() {
+        // A tenth more weight: throttle by as much where it is linear in thrust, by its root elsewhere, and power by its 1.5th power.
+        let power_w = 160.0 * 1.1_f32.powf(1.5);
+        let mut cases = vec![
+            (0.44, power_w, true, 10.0),
+            (0.4 * 1.1_f32.sqrt(), power_w, false, 10.0),
+            (0.40, 160.0, true, 0.0),
+            (0.36, 140.0, true, 0.0),
+        ];
+        // Propellers of a real quadrotor cut by 25, 20 and 10 mm.
+        let cut = [(1.10, 1.06), (1.20, 1.18), (1.17, 1.18)];
+        cases.extend(cut.map(|(throttle, power)| (0.4 * throttle, 160.0 * power, true, 0.0)));
+        for (throttle, power_w, is_linear, percent) in cases {
+            let (flight, past) = hovered(throttle, power_w, is_linear);
+            let told = past.heavier(&flight, &Params::defaults()).map(f32::round);
+            assert_eq!(told, Some(percent), "{throttle} {power_w} {is_linear}");
+        }
+        let (_, past) = hovered(0.4, 160.0, true);
+        let unknown = flown(true, &[(Quantity::HoverThrottle, 0.44)]);
+        assert_eq!(past.heavier(&unknown, &Params::defaults()), None, "nobody knows its power");
+    }
+
+    #[test]
+    fn a_fault_teaches_nothing_and_a_better_part_begins_anew() {
+        for (throttle, power_w, flights) in [
+            (0.41, 160.0, (6, 6)),
+            (0.60, 160.0, (5, 6)),
+            // New propellers, or less to carry; and more power than before.
+            (0.36, 190.0, (1, 5)),
+            (0.398, 161.0, (6, 6)),
+        ] {
+            let (flight, mut past) = hovered(throttle, power_w, true);
+            past.judge(&flight, &Params::defaults());
+            let of = |quantity: Quantity| past.0[quantity.index()].flights;
+            assert_eq!((of(Quantity::HoverThrottle), of(Quantity::HoverPower)), flights, "{throttle}");
+        }
+    }
+}
