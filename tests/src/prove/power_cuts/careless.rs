@@ -9,7 +9,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use anyhow::{Context as _, Result, ensure};
 use hums::ending::SessionBefore;
-use hums::followed::Followed;
+use hums::followed::EndResolver;
 use hums::logs::sessions::Sessions;
 use hums::logs::{Found, find};
 use hums::run::sim::power_on;
@@ -497,7 +497,7 @@ fn tells(found: &Found, less: &BTreeSet<u32>) -> Result<bool> {
         return Ok(true);
     }
     let logs = found.logs.iter().map(|log| (log.name.as_str(), log));
-    let (mut followed, mut overviews) = (Followed::new(Sessions::of(logs)), Vec::new());
+    let (mut followed, mut overviews) = (EndResolver::new(Sessions::of(logs)), Vec::new());
     for log in &found.logs {
         overviews.extend(followed.push(Overview::verified(log)?));
     }
