@@ -14,5 +14,4 @@ mod motors;
 mod protect;
 mod scripted_faults;
 mod standing;
-mod trends;
 mod vehicles;
