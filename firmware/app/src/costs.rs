@@ -1,7 +1,7 @@
-//! What each stage costs, in cycles of the processor.
+//! Cost of each stage in processor cycles.
 //!
 //! Stages interrupt each other, so time is charged to the stage that runs: entering one stops the clock of the one it
-//! interrupts. Idle is a stage too; what it leaves of the whole is the load.
+//! interrupts. Idle is a stage too; the load is the share of all others.
 
 use core::cell::Cell;
 
@@ -80,7 +80,7 @@ fn switch_to(stage: Stage) -> Stage {
     })
 }
 
-/// What the processor was busy, second by second.
+/// Processor load, second by second.
 pub(crate) struct Load {
     since: Instant,
     busy: u64,

@@ -1,5 +1,4 @@
-//! What runs, told by the number of the exception that it runs as: each task has an interrupt that no board uses
-//! otherwise.
+//! Tasks by exception number: each task runs on an interrupt that no board uses otherwise.
 
 use cortex_m::interrupt::InterruptNumber;
 use cortex_m::peripheral::scb::VectActive;
@@ -7,7 +6,7 @@ use cortex_m::peripheral::{NVIC, SCB};
 use embassy_stm32::interrupt::Interrupt;
 use hums_onboard::Task;
 
-/// What each task runs as. The handlers in `executors` bear these names, as the vector table has them.
+/// Interrupt of each task. The handlers in `executors` have these names, as in the vector table.
 pub(crate) const RECEPTION: Interrupt = Interrupt::CAN1_TX;
 pub(crate) const MONITOR: Interrupt = Interrupt::CAN1_RX0;
 pub(crate) const DOWNLINK: Interrupt = Interrupt::CAN1_RX1;
@@ -33,7 +32,7 @@ pub(crate) fn number_of(task: Task) -> u16 {
     16 + interrupt as u16
 }
 
-/// How little urgent it is, by the number of its exception: interrupts, then the tasks, then idle.
+/// Rank of an exception, most urgent first: interrupts, then the tasks, then idle.
 pub(crate) fn rank(number: u16) -> usize {
     let tasks = [Task::Reception, Task::Monitor, Task::Downlink, Task::Storage];
     match tasks.into_iter().position(|task| number_of(task) == number) {
@@ -43,7 +42,7 @@ pub(crate) fn rank(number: u16) -> usize {
     }
 }
 
-/// The most urgent task that has begun and not come to its end, for want of a stacked number: it ran until now.
+/// The most urgent active task, which ran until now. Used if no exception number was stacked.
 pub(crate) fn begun() -> u16 {
     // As they interrupt each other.
     let tasks = [Task::Reception, Task::Monitor, Task::Downlink, Task::Storage];
@@ -61,7 +60,7 @@ unsafe impl InterruptNumber for Number {
     }
 }
 
-/// What runs as an exception, by its number.
+/// Name of the code that runs as this exception.
 pub(crate) fn task_of(number: u16) -> &'static str {
     match Task::ALL.into_iter().find(|task| number_of(*task) == number) {
         Some(task) => task.name(),

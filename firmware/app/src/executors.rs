@@ -1,5 +1,5 @@
-//! Who may interrupt whom. One executor a task, each on an interrupt that the board does not use otherwise; thread mode
-//! is idle, and runs only when every task waits.
+//! Priorities of the tasks. Each task has an executor on an interrupt that the board does not use otherwise. Thread mode is idle
+//! and runs only while every task waits.
 //!
 //! | urgency | what | why |
 //! |---|---|---|
@@ -24,7 +24,7 @@ static MONITOR_EXECUTOR: InterruptExecutor = InterruptExecutor::new();
 static DOWNLINK_EXECUTOR: InterruptExecutor = InterruptExecutor::new();
 static STORAGE_EXECUTOR: InterruptExecutor = InterruptExecutor::new();
 
-/// Where to spawn each task.
+/// Spawners of the tasks.
 pub(crate) struct Spawners {
     pub(crate) reception: SendSpawner,
     pub(crate) monitor: SendSpawner,
@@ -32,7 +32,7 @@ pub(crate) struct Spawners {
     pub(crate) storage: SendSpawner,
 }
 
-/// Starts all executors. To be called once.
+/// Starts all executors. Call once.
 pub(crate) fn start() -> Spawners {
     for port in board::PORT_INTERRUPTS {
         port.set_priority(Priority::P1);

@@ -1,9 +1,9 @@
-//! What went wrong before the last reset: a panic, a processor fault, an overflow of the stack, a task that hangs or a
-//! supply that sags leaves its note in memory that a reset does not clear, and the next start reads it.
+//! Fault note of the last reset. A panic, a processor fault, a stack overflow, a hanging task or a low supply leaves a note in
+//! memory that survives a reset. The next start reads it.
 //!
-//! That memory is garbage after power-on, so a note counts only with its mark and its check sum. It is made of atomics
-//! because the writer may have interrupted anybody, itself included. The clock is not asked for the same reason: the
-//! time is that of the last frame or tick ([`seen`], [`tick`]).
+//! This memory is random after power-on, so a note needs a valid mark and checksum. It consists of atomics because the writer may
+//! interrupt any code, itself included. For the same reason it does not read the clock: the time is that of the last frame or
+//! tick ([`seen`], [`tick`]).
 
 use core::fmt::{self, Write as _};
 use core::panic::PanicInfo;
@@ -78,7 +78,7 @@ static LAST_SEEN: Seen = Seen {
 };
 /// An id that no message has: the place is empty.
 const NOTHING: u32 = u32::MAX;
-/// The task that was silent for too long, as a number of an exception; 0: none.
+/// Task that missed its deadline, as an exception number; 0: none.
 static SILENT: AtomicU32 = AtomicU32::new(0);
 
 struct Starts {
@@ -111,7 +111,7 @@ impl Fault {
         &self.last_messages
     }
 
-    /// The watchdog reset the machine and nobody left a note: interrupts were off, or memory did not survive.
+    /// Watchdog reset without a note: interrupts were off, or memory did not survive.
     pub(crate) fn without_note() -> Self {
         Self {
             kind: Kind::Watchdog as u8,
@@ -124,7 +124,7 @@ impl Fault {
     }
 }
 
-/// How the start before this one ended, if it left a note; gives it once.
+/// The note of the previous start, if any; returned once.
 pub(crate) fn take() -> Option<Fault> {
     let noted = NOTE.mark.swap(0, Ordering::Relaxed) == MARK;
     if !noted || NOTE.sum.load(Ordering::Relaxed) != NOTE.sum_now() {
@@ -195,16 +195,15 @@ pub(crate) fn count_start() -> u32 {
     starts
 }
 
-/// Which task has been silent for too long, if any has.
+/// Sets the task that missed its deadline, if any.
 pub(crate) fn silent(task: Option<Task>) {
     SILENT.store(task.map_or(0, |task| u32::from(exceptions::number_of(task))), Ordering::Relaxed);
 }
 
 /// The watchdog is about to bite. `interrupted` ran until now.
 ///
-/// To blame is the task that is silent. If none is known to be, the monitor does not look any more: because it waits, or
-/// because what runs does not let it: then what hangs lets nobody run that is less urgent, and so the least urgent that was seen
-/// running since the last feeding is to blame.
+/// The cause is the task that missed its deadline. If none is known, the monitor itself no longer runs: it waits or is blocked. A
+/// hanging task blocks all less urgent ones. So the cause is the least urgent task that ran since the last feeding.
 pub(crate) fn late(interrupted: &ExceptionFrame) {
     let running = (interrupted.xpsr() & 0x1FF) as u16;
     let silent = SILENT.load(Ordering::Relaxed) as u16;
@@ -223,7 +222,7 @@ pub(crate) fn late(interrupted: &ExceptionFrame) {
         let place = format_args!("pc {:08x}", interrupted.pc());
         NOTE.keep(Kind::Watchdog, blamed, place, format_args!("hangs"));
     } else if !noted {
-        // Else an earlier look has found more.
+        // Otherwise an earlier check has found more.
         NOTE.keep_registers(Registers::default());
         NOTE.keep(Kind::Watchdog, blamed, format_args!("waits"), format_args!("silent"));
     }
@@ -234,7 +233,7 @@ pub(crate) fn not_late() {
     NOTE.mark.store(0, Ordering::Relaxed);
 }
 
-/// The supply is too low to write anything: nobody is to go on before it is back.
+/// The supply is too low for any write: all code must wait until it returns.
 pub(crate) fn supply_low() {
     cortex_m::interrupt::disable();
     NOTE.keep_registers(Registers::default());

@@ -1,5 +1,5 @@
-//! Who wakes whom. The data itself goes through the queues of `hums_onboard::queues`; a signal only says «look».
-//! Signals coalesce, so nobody waits to give one.
+//! Signals between tasks. The data goes through the queues of `hums_onboard::queues`; a signal only wakes the reader. Signals
+//! coalesce, so sending one never blocks.
 
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::signal::Signal;

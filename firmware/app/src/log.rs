@@ -1,6 +1,6 @@
-//! Logs for a debugger, with the feature `log` only: they are no part of a release.
+//! Debugger logs, only with the feature `log`, which releases do not have.
 
-/// Logs at a level of `defmt`; without the feature nothing but the arguments' types is looked at.
+/// Logs at a level of `defmt`; without the feature only the arguments' types are checked.
 macro_rules! log {
     ($level:ident, $text:literal $(, $argument:expr)* $(,)?) => {{
         #[cfg(feature = "log")]

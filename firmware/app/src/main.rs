@@ -5,8 +5,8 @@
 //!        gs -> uplink    -/       \\-> downlink -> gs
 //!                                  \-> requests -> autopilot
 //! ```
-//! Everything is allocated here and once: queues, the codec, the tasks. What the tasks do is in `hums_onboard`, where
-//! it is tested on a PC; what the machine does is in `boards`.
+//! Everything is allocated here and once: queues, the codec, the tasks. The logic of the tasks is in `hums_onboard` and tested on
+//! a PC; the hardware is in `boards`.
 #![no_std]
 #![no_main]
 
@@ -45,7 +45,7 @@ static MONITORING: StaticCell<Monitoring<'static>> = StaticCell::new();
 static STORE_WRITER: StaticCell<StoreWriter<'static, board::StoreFlash>> = StaticCell::new();
 static HANDOVER: StaticCell<Handover<'static>> = StaticCell::new();
 
-/// What a second spawning of a task would be told.
+/// Panic message of a second spawn of a task.
 const ONCE: &str = "each task is spawned once";
 
 #[cortex_m_rt::entry]
@@ -53,11 +53,11 @@ fn main() -> ! {
     start().run()
 }
 
-/// Puts all together and starts the tasks.
+/// Connects the parts and starts the tasks.
 // Own stack frame (ARCHITECTURE.md, Memory).
 #[inline(never)]
 fn start() -> board::Idle {
-    // SAFETY: this is the program's first statement: nobody has touched CCM, no interrupt is unmasked.
+    // SAFETY: this is the program's first statement: CCM is untouched and no interrupt is unmasked.
     unsafe { memory::init() };
     let boots = fault::count_start();
     let parts = board::take();
@@ -100,8 +100,7 @@ fn start() -> board::Idle {
     parts.idle
 }
 
-/// Stands in for a random number: the store and the memory that survives a reset count the starts, and no two chips have one
-/// number.
+/// Substitute for a random number: the start counts of the store and of the surviving memory, and the chip's unique id.
 fn counted(mounts: u32, identity: &Boot<'_>) -> u32 {
     let words = identity.uid.as_chunks().0.iter().map(|word| u32::from_le_bytes(*word));
     words

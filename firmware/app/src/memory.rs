@@ -1,8 +1,8 @@
-//! The memories that the runtime does not look after: CCM's variables, and how deep the stack went.
+//! Memory that the runtime does not manage: variables in CCM, and the stack's high-water mark.
 
 use core::ptr;
 
-/// What unused stack is painted with.
+/// Paint of unused stack.
 const PAINT: u32 = 0x5AFE_57AC;
 
 unsafe extern "C" {
@@ -22,7 +22,7 @@ unsafe extern "C" {
 pub(crate) unsafe fn init() {
     let here = cortex_m::register::msp::read() as usize;
     // SAFETY: the linker script gives these addresses, which are aligned to words, and lets only variables into the
-    // section that begin as zeros. By the contract above nobody uses the section yet. Below the stack pointer nothing is live:
+    // section that begin as zeros. By the contract above the section is not in use yet. Below the stack pointer nothing is live:
     // 256 bytes are left to this function.
     unsafe {
         let words = (&raw const __eccm).offset_from_unsigned(&raw const __sccm);
@@ -34,7 +34,7 @@ pub(crate) unsafe fn init() {
     }
 }
 
-/// Bytes of stack that were ever used, and bytes there are.
+/// High-water mark and size of the stack, bytes.
 pub(crate) fn stack_used() -> (usize, usize) {
     let (bottom, top) = stack_bounds();
     let free = 4 * stack_words().take_while(|word| *word == PAINT).count();
@@ -55,7 +55,7 @@ pub(crate) fn stack_words() -> impl Iterator<Item = u32> {
     (0..all).map(move |word| unsafe { bottom.add(word).read_volatile() })
 }
 
-/// Where the program's functions are.
+/// Address range of the program's functions.
 pub(crate) fn code() -> core::ops::Range<usize> {
     (&raw const __stext).addr()..(&raw const __etext).addr()
 }

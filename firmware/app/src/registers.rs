@@ -1,21 +1,21 @@
-//! The processor's registers, for whoever notes what it was at.
+//! Processor registers for a fault note.
 
 use core::arch::asm;
 
 use cortex_m::peripheral::SCB;
 use cortex_m_rt::ExceptionFrame;
 
-/// In the order of [`hums_blackbox::record::Fault::registers`]: what the processor stacked, then four registers that say why.
+/// In the order of [`hums_blackbox::record::Fault::registers`]: the stacked registers, then four fault registers.
 pub(crate) type Registers = [u32; 12];
 
-/// What was stacked, and why.
+/// The stacked registers and the fault registers.
 pub(crate) fn stacked(frame: &ExceptionFrame) -> Registers {
     let f = frame;
     let [cfsr, hfsr, mmfar, bfar] = status();
     [f.r0(), f.r1(), f.r2(), f.r3(), f.r12(), f.lr(), f.pc(), f.xpsr(), cfsr, hfsr, mmfar, bfar]
 }
 
-/// The registers of whoever calls, as far as they tell something: where it returns to, where it is, and as what it runs.
+/// The useful registers of the caller: return address, current address and status.
 #[inline]
 pub(crate) fn now() -> Registers {
     let mut registers = Registers::default();
@@ -28,7 +28,7 @@ pub(crate) fn now() -> Registers {
     registers
 }
 
-/// Why the processor faulted: CFSR, HFSR, MMFAR, BFAR.
+/// The fault registers: CFSR, HFSR, MMFAR, BFAR.
 pub(crate) fn status() -> [u32; 4] {
     // SAFETY: reading the status registers that every Cortex-M4 has (ARMv7-M, B3.2.2) has no side effect.
     unsafe {

@@ -1,15 +1,15 @@
-//! What tasks know of each other without asking: written by one, read by any at any time.
+//! Shared status of the tasks: written by one, read by any at any time.
 
 use hums_onboard::{Mailbox, PortStatus, StoreStatus, Supervisor};
 use hums_recorder::CardStatus;
 
-/// Who has reported in.
+/// Check-ins of the tasks.
 pub(crate) static SUPERVISOR: Supervisor = Supervisor::new();
-/// What reception counts.
+/// Counters of reception.
 pub(crate) static PORT_STATUS: PortStatus = PortStatus::new();
-/// What storage counts.
+/// Counters of storage.
 pub(crate) static CARD_STATUS: CardStatus = CardStatus::new();
-/// Monitor to storage: what is to outlive power.
+/// Monitor to storage: items to store.
 pub(crate) static MAILBOX: Mailbox = Mailbox::new();
-/// What became of it.
+/// Results of the saves.
 pub(crate) static STORE_STATUS: StoreStatus = StoreStatus::new();

@@ -1,9 +1,9 @@
-//! What nothing goes on after: a panic, and the processor's own fault, caught whatever became of the stack. Each leaves
-//! its note ([`fault`]), and the board starts anew.
+//! Handlers of fatal errors: panics and processor faults, even with a broken stack. Each leaves a note ([`fault`]) and restarts
+//! the board.
 //!
-//! Every fault ends as `HardFault`, as the milder ones are not switched on. A stack that overflows does so below the
-//! memory that it lies at the bottom of (`memory.x`): nothing else is hurt, but the handler has no stack either. So it
-//! begins with a stack of its own: the other end of the same memory, whose contents nobody will ever go back to.
+//! Every fault becomes a `HardFault`, because the milder ones are disabled. The stack is at the bottom of its memory
+//! (`memory.x`). So an overflow damages no data, but leaves the handler without a stack. The handler therefore starts its own at
+//! the other end of the same memory, which is no longer needed.
 
 use core::arch::naked_asm;
 use core::fmt;
@@ -15,7 +15,7 @@ use crate::boards::board;
 use crate::registers::{self, Registers, stacked};
 use crate::{exceptions, fault, memory};
 
-/// Stack that is left to the handler: where less is, it takes the other end.
+/// Stack that the handler needs; with less it uses the other end.
 const HANDLER_BYTES: usize = 1_024;
 /// Words of the stack that are searched for a return address: with one in a dozen, the caller's is among them.
 const SEARCHED_WORDS: usize = 128;
@@ -69,7 +69,7 @@ fn return_address() -> u32 {
     memory::stack_words().take(SEARCHED_WORDS).find(is_return).map_or(0, |word| word & !1)
 }
 
-/// The processor cannot go on. `overflow`: the stack was full, `place` is all that is known.
+/// The processor cannot continue. `overflow`: the stack was full and only `place` is known.
 fn give_up(running: u16, registers: Registers, overflow: bool, place: fmt::Arguments) -> ! {
     fault::processor(running, registers, overflow, place);
     board::restart();

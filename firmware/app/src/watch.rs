@@ -1,9 +1,8 @@
-//! The watch over the watchdog: who is to blame when it bites.
+//! Watchdog monitor: finds the cause of a watchdog reset.
 //!
-//! The watchdog resets without a word. So `SysTick`, more urgent than all else, counts how long it was not fed, and
-//! leaves a note of what it interrupted before the time is over: a task that never comes back is caught with its
-//! registers, be it as urgent as it likes. Only what masks all interrupts for ever leaves no note; the next start says
-//! that too.
+//! A watchdog reset leaves no trace. So `SysTick`, the most urgent exception, counts the time since the last feeding. Before the
+//! timeout it leaves a note of the interrupted code with its registers, so it catches a hanging task of any urgency. Only code
+//! that masks all interrupts leaves no note; the next start reports that too.
 
 use core::arch::naked_asm;
 use core::sync::atomic::{AtomicU32, Ordering};

@@ -31,7 +31,7 @@ use super::stm32f4::{CardPort, halves, line, random_number, reset_cause, start};
 /// The board's name.
 pub(crate) const NAME: &str = "f429";
 
-/// What moves the bytes of ports and card: more urgent than every task.
+/// Interrupts of the ports and the card, more urgent than every task.
 pub(crate) const PORT_INTERRUPTS: [interrupt::Interrupt; 6] = [
     interrupt::DMA2_STREAM1,
     interrupt::DMA2_STREAM6,

@@ -1,17 +1,17 @@
-//! What every board is made of: the types of its parts, and what is known of its start.
+//! Parts common to all boards: their types, and the data of a start.
 
 use hums_onboard::ResetCause;
 
 use super::stm32f4::{Card, Idle, Led, PortRx, PortTx, StoreFlash, Watchdog};
 
-/// What `SysTick` begins again with: all of its bits, 0.1 s at 168 MHz.
+/// Reload value of `SysTick`: all bits set, 0.1 s at 168 MHz.
 pub(crate) const SYSTICK_RELOAD: u32 = (1 << 24) - 1;
 
 /// Bytes that reception fetches at a time: 2.8 ms at 921,600 baud, nearly three times what comes between two looks. After a delay
 /// it takes several, without a pause between them.
 pub(crate) const FETCH_BYTES: usize = 256;
 
-/// What the app gets of a board: each port's reception and transmission, and the rest.
+/// Parts of a board: reception and transmission of each port, and the rest.
 pub(crate) struct Parts {
     pub(crate) autopilot: (PortRx, PortTx),
     pub(crate) gs: (PortRx, PortTx),
@@ -24,22 +24,22 @@ pub(crate) struct Parts {
     pub(crate) boot: Boot,
 }
 
-/// Bytes were lost before the reception task could fetch them: it came too late and the receive buffer ran over. How many is not
-/// known; at most what comes in so many milliseconds.
+/// The receive buffer overflowed because the reception task ran too late. The number of lost bytes is unknown: at most those of
+/// this many milliseconds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Overrun {
     pub(crate) blind_ms: u32,
 }
 
-/// What is known about this machine and this start of it.
+/// Data of the machine and of this start.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Boot {
-    /// The processor's own number, the same for ever.
+    /// Unique id of the processor.
     pub(crate) id: [u8; 12],
-    /// Why it started.
+    /// Cause of the start.
     pub(crate) cause: ResetCause,
-    /// The register that says so.
+    /// Reset status register.
     pub(crate) cause_register: u32,
-    /// Differs from one start to the next; `None` where the board cannot tell such a number.
+    /// Random number of this start; `None` if the board has none.
     pub(crate) entropy: Option<u32>,
 }

@@ -1,7 +1,7 @@
-//! The boards: what the app needs of a machine, and one file a board that provides it.
+//! Boards: the app's interface to a machine, and one file per board that implements it.
 //!
-//! Nothing above this module knows which board it runs on; what a board is made of is in [`machine`]. A feature of this crate chooses it:
-//! `board-f405` or `board-f429`; both share `stm32f4`. A board is a file here and one for the linker beside it, which names its
+//! Code above this module does not depend on the board. [`machine`] has the parts of a board. A feature of this crate selects the
+//! board: `board-f405` or `board-f429`; both share `stm32f4`. A board is a source file here and a linker file beside it with its
 //! memories (`f405.x`). A board module has
 //!
 //! | name | what |

@@ -1,5 +1,4 @@
-//! Downlink and requests: the frames for the ground station and for the autopilot out of their ports, one after the
-//! other.
+//! Downlink and requests: send the frames for the ground station and the autopilot to their ports, one by one.
 
 use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
@@ -11,13 +10,12 @@ use crate::boards::board;
 use crate::links::{self, now};
 use crate::status::SUPERVISOR;
 
-/// How often it reports in while there is nothing to send.
+/// Check-in interval while idle.
 const REPORT: Duration = Duration::from_millis(500);
-/// How long a frame may take: the longest has 73 ms at 38,400 baud. What takes longer does not come to an end; within the second that
-/// the supervisor allows.
+/// Timeout of a frame. The longest frame takes 73 ms at 38,400 baud; the supervisor allows 1 s.
 const SEND_MAX: Duration = Duration::from_millis(500);
 
-/// Baud rates of the ports as the parameters want them; 0: as the board began.
+/// Baud rates set by the parameters; 0: the board's initial rate.
 pub(crate) static BAUD_GS: AtomicU32 = AtomicU32::new(0);
 pub(crate) static BAUD_AUTOPILOT: AtomicU32 = AtomicU32::new(0);
 
@@ -48,7 +46,7 @@ pub(crate) async fn requests(mut port: board::PortTx, mut queue: AutopilotOut<'s
     }
 }
 
-/// Sends a frame; gives it up where the port does not take it in time.
+/// Sends a frame; drops it after the timeout.
 async fn send(port: &mut board::PortTx, frame: &[u8], stood_still: &AtomicBool) {
     if with_timeout(SEND_MAX, port.transmit(frame)).await.is_err() {
         port.restart();

@@ -1,5 +1,5 @@
-//! Monitor: frames to records, findings and the summary. Also the one that feeds the watchdog, because it goes round
-//! every 50 ms whatever happens, and the one that works the LED.
+//! Monitor: frames to records, findings and the summary. It also feeds the watchdog, because it always runs every 50 ms, and
+//! drives the LED.
 
 use core::sync::atomic::{AtomicBool, Ordering};
 
@@ -26,7 +26,7 @@ const BLINK_RECORDING: u32 = 10;
 /// The same while it does not: 0.1 s.
 const BLINK_TROUBLE: u32 = 2;
 
-/// Frames in a row before others have their turn: some 10 ms of work.
+/// Frames in a row before other tasks run: some 10 ms of work.
 const DRAINED_MAX: usize = 64;
 /// That turn.
 const REST: Duration = Duration::from_millis(1);
@@ -58,7 +58,7 @@ pub(crate) async fn run(
     loop {
         SUPERVISOR.report(Task::Monitor, now());
         let mut is_behind = false;
-        // The tick first: where frames come faster than they are worked on, they are always due.
+        // The tick first: if frames arrive faster than they are processed, they are always due.
         match select3(ticker.next(), links::FRAMES.wait(), links::UPLINK.wait()).await {
             Either3::Second(()) => is_behind = drain(body, &mut ends),
             Either3::Third(()) => uplink(body, &mut ends),
@@ -82,7 +82,7 @@ pub(crate) async fn run(
                 fault::tick(now());
                 let silent = SUPERVISOR.silent(now());
                 fault::silent(silent);
-                // Else the watchdog does what is to be done.
+                // Otherwise the watchdog resets the machine.
                 if silent.is_none() {
                     watchdog.feed();
                     watch::fed();
@@ -98,7 +98,7 @@ pub(crate) async fn run(
     }
 }
 
-/// Records how the start before this one ended, and tells the ground station.
+/// Records the end of the previous start and reports it to the ground station.
 // Own stack frame (ARCHITECTURE.md, Memory).
 #[inline(never)]
 fn tell_fault(body: &mut Monitoring<'static>, ends: &mut Ends, cause: ResetCause) {
@@ -110,7 +110,7 @@ fn tell_fault(body: &mut Monitoring<'static>, ends: &mut Ends, cause: ResetCause
     }
 }
 
-/// Tells, once, what the board does without, and keeps in `told` what was told.
+/// Reports missing parts of the board once; `told` holds the reported ones.
 #[inline(never)]
 fn tell_board(body: &mut Monitoring<'static>, ends: &mut Ends, told: &mut [bool; 4], has_random: bool) {
     let stood_still = |port: &AtomicBool| port.load(Ordering::Relaxed);
@@ -129,7 +129,7 @@ fn tell_board(body: &mut Monitoring<'static>, ends: &mut Ends, told: &mut [bool;
 
 // Own stack frame (ARCHITECTURE.md, Memory). As all that follow.
 
-/// Takes the frames that are there, or [`DRAINED_MAX`] of them: `true`, there may be more.
+/// Processes the waiting frames, at most [`DRAINED_MAX`]; `true` if there may be more.
 #[inline(never)]
 fn drain(body: &mut Monitoring<'static>, ends: &mut Ends) -> bool {
     let Ends { frames, sectors, gs, .. } = ends;
@@ -153,7 +153,7 @@ fn uplink(body: &mut Monitoring<'static>, ends: &mut Ends) {
     while measure(Stage::Monitor, || body.uplink(now(), uplink, sectors, gs)) {}
 }
 
-/// Records what is new about the store.
+/// Records news of the store.
 #[inline(never)]
 fn note(body: &mut Monitoring<'static>, ends: &mut Ends, handover: &mut Handover<'static>) {
     while let Some(news) = handover.news() {
@@ -197,8 +197,7 @@ fn wake_others() {
     links::SECTORS.signal(());
 }
 
-/// Slow blinking: recording. Twice in a second, briefly: recording, but the board has a fault. Fast: no card, or one that cannot be
-/// used.
+/// Slow blinking: recording. Two short flashes a second: recording with a fault of the board. Fast: no usable card.
 fn lit(ticks: u32) -> bool {
     let half = match CARD_STATUS.read().state {
         CardState::Recording if board::crystal_failed() => {

@@ -1,5 +1,5 @@
-//! Storage: sectors onto the card, and between them what outlives power into the store. The least urgent task: the card's driver waits with the processor, and so may delay
-//! nobody but idle.
+//! Storage: writes sectors to the card and, between them, items to the store. It is the least urgent task, because the card's
+//! driver blocks the processor and may delay only idle.
 
 use embassy_time::{Duration, Timer, with_timeout};
 use hums_core::clock::Instant;
@@ -16,10 +16,10 @@ use crate::boards::board;
 use crate::costs::{Stage, measure};
 use crate::links::{self, now};
 
-/// How often it reports in while there is nothing to write.
+/// Check-in interval while idle.
 const REPORT: Duration = Duration::from_secs(1);
 
-/// What the task calls.
+/// Body of the task.
 type Body = Storage<'static, board::Card>;
 
 // Statics of their own: made within the task both would come to their place over the stack, 8 and 1.5 KiB of it.

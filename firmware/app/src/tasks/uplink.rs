@@ -1,4 +1,4 @@
-//! Uplink: the ground station's bytes to frames. What comes here is nobody's word: the monitor judges it.
+//! Uplink: the ground station's bytes to frames. They are untrusted; the monitor checks them.
 
 use embassy_time::with_timeout;
 use hums_onboard::queues::UplinkIn;
@@ -24,7 +24,7 @@ pub(crate) async fn run(mut port: board::PortRx, mut frames: UplinkIn<'static>) 
         begun = received.is_ok();
         match received {
             Ok(Ok(count)) => body.bytes(now(), bytes.get(..count).unwrap_or_default(), &mut frames),
-            // What is missing is missed by a checksum, and asked for again.
+            // A checksum detects lost bytes, and the ground station repeats the message.
             Ok(Err(_overrun)) => {}
             Err(_silence) => body.idle(now(), &mut frames),
         }

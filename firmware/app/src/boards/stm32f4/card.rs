@@ -1,8 +1,8 @@
 //! The microSD card on an SPI bus: its port; the driver is `hums_recorder::spi`.
 //!
-//! A block goes by DMA, and the processor sleeps meanwhile. A card is busy for some milliseconds after a block, and says so by a low
-//! line: bytes that are zero (SD specification, 7.2.4); while it looks for a block that is to be read, the line is high. The driver
-//! looks again and again; after some looks in a row the processor sleeps for a moment before the next one.
+//! DMA transfers a block while the processor sleeps. After a written block the card is busy for some milliseconds and holds the
+//! line low: it sends zeros (SD specification, 7.2.4). While it fetches a block for reading, the line is high. The driver polls
+//! the line. After several polls in a row the processor sleeps briefly before the next one.
 
 use core::future::Future;
 use core::pin::pin;
@@ -19,13 +19,13 @@ use hums_recorder::spi::{Clock, Port, PortFailed};
 use super::time;
 use crate::costs::{Stage, measure};
 
-/// Bytes that the driver exchanges at most to look whether the card is busy.
+/// Most bytes of one busy poll.
 const LOOK_BYTES: usize = 4;
-/// Looks in a row that find nothing before the processor sleeps: some 50 µs.
+/// Unsuccessful polls before the processor sleeps: some 50 µs.
 const LOOKS: u32 = 16;
-/// How long it sleeps before the next look, in microseconds.
+/// Sleep before the next poll, microseconds.
 const NAP_US: u32 = 100;
-/// Fewer bytes go one by one: to set the DMA up takes as long as some tens of them.
+/// Shorter transfers go byte by byte: DMA setup takes as long as some tens of bytes.
 const DMA_BYTES_MIN: usize = 128;
 /// A block takes 13 ms at the slowest clock.
 const TRANSFER_MAX: Span = Span::from_millis(20);
@@ -39,7 +39,7 @@ pub(crate) type Card = SpiCard<CardPort>;
 pub(crate) struct CardPort {
     bus: Spi<'static, Async, Master>,
     select: Output<'static>,
-    /// Looks in a row that found nothing.
+    /// Unsuccessful polls in a row.
     looks: u32,
 }
 
@@ -101,13 +101,13 @@ fn by_dma(bytes: &[u8]) -> bool {
     bytes.len() >= DMA_BYTES_MIN && bytes.as_ptr().addr() >= RAM
 }
 
-/// Sleeps until a transfer is done. One that does not come to its end is stopped.
+/// Sleeps until a transfer is done. Stops a transfer after its timeout.
 fn wait(transfer: impl Future<Output = Result<(), Error>>) -> Result<(), PortFailed> {
     let mut transfer = pin!(transfer);
     let mut context = Context::from_waker(Waker::noop());
     let done =
         hums_onboard::wait::until(crate::links::now() + TRANSFER_MAX, crate::links::now, |may_sleep| {
-            // Masked: an interrupt that comes between the two ends the sleep all the same, and is served right after it.
+            // Masked: an interrupt between the two still ends the sleep and is served right after it.
             cortex_m::interrupt::free(|_| {
                 let polled = transfer.as_mut().poll(&mut context);
                 if polled.is_pending() && may_sleep {

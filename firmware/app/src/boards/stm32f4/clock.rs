@@ -1,7 +1,7 @@
-//! The clock tree: 168 MHz from a crystal or, where that does not start or dies, from the chip's own oscillator.
+//! Clock tree: 168 MHz from a crystal, or from the chip's own oscillator if the crystal fails.
 //!
-//! The own oscillator is exact to 1 % at 25 °C and to 4 % from -10 to 85 °C (datasheet, table 38), and a UART stands some 3.5 % between
-//! both ends: the record goes on, its times are off by as much, and a note says so.
+//! The chip's oscillator is accurate to 1 % at 25 °C and to 4 % from -10 to 85 °C (datasheet, table 38). A UART tolerates some
+//! 3.5 % between both ends. So recording continues with the same error in its times, and a note reports it.
 
 use core::sync::atomic::{AtomicBool, Ordering};
 
@@ -10,9 +10,9 @@ use embassy_stm32::pac::{DBGMCU, FLASH, RCC};
 use embassy_stm32::rcc;
 use embassy_stm32::time::Hertz;
 
-/// Looks for the crystal: 0.1 s at the 16 MHz of a start, where it needs 2 ms (datasheet, table 36).
+/// Polls for the crystal: 0.1 s at the initial 16 MHz. A good crystal starts in 2 ms (datasheet, table 36).
 const TRIES_MAX: u32 = 200_000;
-/// The one revision whose prefetch does not work (ES0182, 2.1.1).
+/// The chip revision with a broken prefetch (ES0182, 2.1.1).
 const REVISION_A: u16 = 0x1000;
 
 /// The crystal does not run.
@@ -23,8 +23,8 @@ pub(crate) fn crystal_failed() -> bool {
     CRYSTAL_FAILED.load(Ordering::Relaxed)
 }
 
-/// What [`embassy_stm32::init`] is to set: 168 MHz from 8 MHz at the clock's pin: 8 / 4 * 168 / 2; from the chip's own 16 MHz,
-/// 16 / 8, where there are none. The peripheral buses at 42 and 84 MHz either way.
+/// Settings for [`embassy_stm32::init`]: 168 MHz from 8 MHz at the clock's pin: 8 / 4 * 168 / 2; from the chip's own 16 MHz, 16 /
+/// 8, where there are none. The peripheral buses at 42 and 84 MHz either way.
 pub(super) fn config(mode: rcc::HseMode) -> embassy_stm32::Config {
     let mut config = embassy_stm32::Config::default();
     let runs = crystal_starts(mode);
@@ -68,8 +68,8 @@ pub(super) fn finish() {
     }
 }
 
-/// The crystal died: the chip has gone over to its own oscillator, without the PLL (RM0090, 7.2.7). Nothing is shared with
-/// whoever was interrupted but registers that nobody else touches after the start.
+/// Crystal failure: the chip has switched to its own oscillator without the PLL (RM0090, 7.2.7). The handler uses only registers
+/// that no other code touches after the start.
 #[cortex_m_rt::exception]
 unsafe fn NonMaskableInt() {
     if !RCC.cir().read().cssf() {
@@ -82,7 +82,7 @@ unsafe fn NonMaskableInt() {
         w.set_hseon(false);
         w.set_pllon(false);
     });
-    // None of these waits has an end of its own: the watchdog's is theirs, and the next start asks for the crystal first.
+    // The watchdog limits these waits. The next start tries the crystal first.
     while RCC.cr().read().pllrdy() {}
     RCC.pllcfgr().modify(|w| {
         w.set_pllsrc(Pllsrc::HSI);

@@ -1,9 +1,10 @@
 //! Two sectors of the processor's own flash for the store, behind the vector table and before the program (`memory.x`).
 //!
-//! While a word is written (16 µs) or a sector erased (0.25 s, 0.5 s at the longest) the flash gives no instructions: the processor
-//! stands still, interrupts and all, and only DMA goes on. What that means is in `hums_onboard::persist`.
+//! While a word is written (16 µs) or a sector erased (0.25 s, 0.5 s at the longest) the flash delivers no instructions. The
+//! processor and its interrupts stop; only DMA continues. `hums_onboard::persist` describes the consequences.
 //!
-//! Words of 32 bits in parallel need 2.7 V (RM0090, 3.5.1, table 7): below, where the supply's watch stops everything, nothing is written.
+//! Writing 32 bits in parallel needs 2.7 V (RM0090, 3.5.1, table 7). Below that the supply monitor stops everything, so no write
+//! happens.
 
 use core::ptr;
 
@@ -13,7 +14,7 @@ use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashError, NorFlashEr
 
 use super::{supply, watchdog};
 
-/// Where the flash is in the processor's memory.
+/// Address of the flash.
 const FLASH_BEGIN: usize = 0x0800_0000;
 /// Sector 1 begins here (RM0090, table 5).
 const BEGIN: usize = FLASH_BEGIN + 16 * 1024;
@@ -23,19 +24,19 @@ const SECTOR: u8 = 1;
 const SECTOR_BYTES: usize = 16 * 1024;
 /// Sectors 1 and 2.
 const BYTES: usize = 2 * SECTOR_BYTES;
-/// What is written at once.
+/// Unit of a write.
 const WORD: usize = 4;
-/// What makes the flash's control writable (RM0090, 3.5.1).
+/// Unlock keys of the flash control (RM0090, 3.5.1).
 const KEYS: [u32; 2] = [0x4567_0123, 0xCDEF_89AB];
 
-/// Why the flash did not do it.
+/// Error of the flash.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum FlashError {
-    /// Not the store's, or not whole words or sectors.
+    /// Outside the store, or not whole words or sectors.
     Place,
     /// The supply is too low.
     Supply,
-    /// The flash itself: the bits of its status.
+    /// Error bits of the flash status.
     Refused(u32),
 }
 
@@ -123,7 +124,7 @@ impl NorFlash for StoreFlash {
                     w.set_ser(true);
                     w.set_snb(SECTOR + sector as u8);
                 });
-                // Nobody feeds it meanwhile.
+                // The watchdog is not fed during an erase.
                 watchdog::reload();
                 FLASH.cr().modify(|w| w.set_strt(true));
                 cortex_m::asm::dsb();
@@ -133,8 +134,8 @@ impl NorFlash for StoreFlash {
     }
 }
 
-/// Does `work` with the flash's control unlocked, its errors of before forgotten, and the data cache off and empty
-/// afterwards: it would still hold what was erased (RM0090, 3.5.2), and two banks damage it while one is written (`STM32F42x`, ES0206, 2.2.12).
+/// Runs `work` with the flash control unlocked, earlier errors cleared and the data cache off; the cache is empty afterwards. The
+/// cache would keep erased data (RM0090, 3.5.2). A write to one of two banks also corrupts it (`STM32F42x`, ES0206, 2.2.12).
 fn unlocked(work: impl FnOnce() -> Result<(), FlashError>) -> Result<(), FlashError> {
     if supply::is_low() {
         return Err(FlashError::Supply);
@@ -155,7 +156,7 @@ fn unlocked(work: impl FnOnce() -> Result<(), FlashError>) -> Result<(), FlashEr
     outcome
 }
 
-/// Waits until the flash is done, and says how that went.
+/// Waits until the flash is done and returns the result.
 fn finish() -> Result<(), FlashError> {
     while FLASH.sr().read().bsy() {}
     let status = FLASH.sr().read();
@@ -167,7 +168,7 @@ fn finish() -> Result<(), FlashError> {
     Ok(())
 }
 
-/// Each is cleared by a one; while one is set the flash takes no further word.
+/// Error bits are cleared by a one. While one is set the flash accepts no word.
 fn forget_errors() {
     FLASH.sr().write(|w| {
         w.set_eop(true);

@@ -1,4 +1,4 @@
-//! What the boards with an STM32F4 have in common: everything but clocks, pins and channels.
+//! Common part of the STM32F4 boards: everything except clocks, pins and channels.
 
 mod card;
 mod clock;
@@ -32,19 +32,19 @@ use defmt_rtt as _;
 pub(crate) const AUTOPILOT_BAUD: u32 = 921_600;
 /// Baud rate of the ground station's port: the radios' usual one.
 pub(crate) const GS_BAUD: u32 = 57_600;
-/// 22 ms at 921,600 baud, where reception comes every millisecond: it may be kept away 20 times as long.
+/// 22 ms at 921,600 baud. Reception runs every millisecond, so it may be delayed by 20 of its periods.
 pub(crate) const RING_BYTES: usize = 2_048;
-/// How often reception looks into the ring: the resolution of arrival times in the log.
+/// Period of reception, which is the resolution of arrival times in the log.
 pub(crate) const FETCH_EVERY: Duration = Duration::from_millis(1);
 /// Turns of `SysTick` without the watchdog being fed after which it counts as late: 0.6 s, as the watchdog's own clock may
 /// be fast by half (datasheet, table 36), so that its second is 0.68 s.
 pub(crate) const LATE_TURNS: u32 = 6;
 /// 88 ms at 57,600 baud.
 pub(crate) const GS_RING_BYTES: usize = 512;
-/// How often the uplink looks into its ring: nobody there is in a hurry.
+/// Period of the uplink, which is not urgent.
 pub(crate) const GS_FETCH_EVERY: Duration = Duration::from_millis(10);
 
-/// Starts clocks, counters and the watches over the machine; the chip's parts. `mode`: what is at the clock's pins.
+/// Starts clocks, counters and monitors of the machine. Returns the chip's parts. `mode`: crystal or external clock.
 pub(crate) fn start(mode: rcc::HseMode) -> Peripherals {
     watchdog::start();
     let parts = embassy_stm32::init(clock::config(mode));
@@ -55,7 +55,7 @@ pub(crate) fn start(mode: rcc::HseMode) -> Peripherals {
     parts
 }
 
-/// Starts the cycle counter, and `SysTick` for whoever watches the watchdog (`crate::watch`).
+/// Starts the cycle counter, and `SysTick` for `crate::watch`.
 fn start_counters() {
     if let Some(mut core) = cortex_m::Peripherals::take() {
         core.DCB.enable_trace();
@@ -68,7 +68,7 @@ fn start_counters() {
     }
 }
 
-/// A port at this rate. Its receiving pin is pulled up: a line that nobody drives would float and bring noise.
+/// A port at this rate. The receive pin has a pull-up, because an undriven line would float and bring noise.
 pub(crate) fn line(baudrate: u32) -> usart::Config {
     let mut line = usart::Config::default();
     line.baudrate = baudrate;

@@ -1,10 +1,11 @@
 //! A port: reception into a DMA ring, transmission by DMA.
 //!
-//! Reception is copied by DMA and fetched every millisecond: no interrupt a byte, none on a line error (a damaged byte
-//! is for the checksum to find), so that not one good byte is thrown away with a bad one.
+//! DMA copies received bytes to a ring, which is read every millisecond. There is no interrupt per byte and none on a line error:
+//! the checksum detects a damaged byte, and no good byte is dropped with it.
 //!
-//! While the processor stands still for an erase of flash, DMA goes round in the ring, and what counts its rounds is an interrupt
-//! that comes once for all of them. So a ring that nobody looked into for longer than it holds is lost as soon as anything came.
+//! During an erase of flash the processor stops and DMA continues around the ring. The interrupt that counts rounds then fires
+//! once for several rounds. So if bytes arrived and the ring was not read for longer than its capacity, its contents count as
+//! lost.
 
 use embassy_stm32::dma::{self, ReadableRingBuffer, Request, TransferOptions};
 use embassy_stm32::interrupt::typelevel::Binding;
@@ -52,11 +53,11 @@ pub(crate) struct PortRx {
     _port: UartRx<'static, Blocking>,
     ring: ReadableRingBuffer<'static, u8>,
     registers: pac::usart::Usart,
-    /// The port's rate is divided from this.
+    /// Clock of the port's rate divider.
     clock: Hertz,
     fetch_every: Duration,
     looked: Instant,
-    /// The last look took as much as it could: there may be more.
+    /// The last read was full, so there may be more bytes.
     is_behind: bool,
 }
 
@@ -72,8 +73,8 @@ impl PortRx {
         request: Request,
     ) -> Self {
         let from = registers.dr().as_ptr().cast::<u8>();
-        // SAFETY: `from` is the port's data register, `buffer` is a static in RAM that DMA reaches and that nobody else
-        // has, and the channel is owned by the ring from here on.
+        // SAFETY: `from` is the port's data register, `buffer` is a static in RAM that DMA reaches and that no other code uses,
+        // and the ring owns the channel from here on.
         let mut ring =
             unsafe { ReadableRingBuffer::new(channel, request, from, buffer, TransferOptions::default()) };
         ring.start();
@@ -81,7 +82,7 @@ impl PortRx {
         Self { _port: port, ring, registers, clock, fetch_every, looked: Instant::now(), is_behind: false }
     }
 
-    /// How long it takes to fill the ring at the port's rate of now: ten bits a byte.
+    /// Time to fill the ring at the current rate, ten bits a byte.
     fn holds(&self) -> Duration {
         let clocks = 10 * self.ring.capacity() as u64 * u64::from(self.registers.brr().read().0);
         Duration::from_micros(clocks * 1_000_000 / u64::from(self.clock.0))
@@ -89,12 +90,12 @@ impl PortRx {
 }
 
 impl PortRx {
-    /// Waits for bytes and gives as many as have come and fit, at least one. Damaged bytes are given like others: the
-    /// frame's checksum finds them.
+    /// Waits for bytes and returns at least one, at most as many as fit. Damaged bytes are included: the frame's checksum detects
+    /// them.
     pub(crate) async fn receive(&mut self, buffer: &mut [u8]) -> Result<usize, Overrun> {
         loop {
-            // Also after a look that found something: as soon as what is done with a byte takes longer than the next one needs to
-            // come, whoever looks again at once finds something each time, and nobody less urgent ever runs again.
+            // Wait also after a successful read. If processing a byte takes longer than a byte time, reading again at once would
+            // always find a byte, and less urgent tasks would never run.
             if !self.is_behind {
                 Timer::at(self.looked + self.fetch_every).await;
             }
@@ -156,7 +157,7 @@ impl PortTx {
         unsafe { self.channel.write(self.request, bytes, to, TransferOptions::default()) }.await;
     }
 
-    /// Begins anew after a transmission that did not come to its end.
+    /// Restarts after an incomplete transmission.
     pub(crate) fn restart(&mut self) {
         self.registers.cr1().modify(|w| w.set_te(false));
         self.registers.cr1().modify(|w| w.set_te(true));
@@ -169,14 +170,14 @@ impl PortTx {
         if divider == self.registers.brr().read().0 {
             return;
         }
-        // DMA is done when the port has taken the last byte of a frame, which then has yet to go out, as has the one before.
+        // DMA is done when the port has taken the last byte of a frame. The last two bytes are then still unsent.
         for _ in 0..LAST_LOOKS {
             if self.registers.sr().read().tc() {
                 break;
             }
             Timer::after(LAST_LOOK).await;
         }
-        // Both halves share the divider, and a byte that comes while it is set is lost.
+        // Both halves share the divider; a byte received during the change is lost.
         self.registers.brr().write(|w| w.0 = divider);
     }
 }

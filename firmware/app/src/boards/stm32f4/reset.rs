@@ -1,13 +1,13 @@
-//! Why the machine started, and how it starts anew.
+//! Cause of a start, and restart.
 
 use embassy_stm32::pac;
 use hums_onboard::ResetCause;
 
-/// Reads why the machine started, and clears it for the next time.
+/// Reads and clears the cause of the start.
 pub(crate) fn reset_cause() -> (ResetCause, u32) {
     let flags = pac::RCC.csr().read();
     pac::RCC.csr().modify(|w| w.set_rmvf(true));
-    // Several flags are set together; the most telling one first.
+    // Several flags are set together; the most specific one first.
     let cause = if flags.wdgrstf() || flags.wwdgrstf() {
         ResetCause::Watchdog
     } else if flags.sftrstf() {
@@ -22,7 +22,7 @@ pub(crate) fn reset_cause() -> (ResetCause, u32) {
     (cause, flags.0)
 }
 
-/// Starts anew.
+/// Restarts the machine.
 pub(crate) fn restart() -> ! {
     cortex_m::peripheral::SCB::sys_reset()
 }

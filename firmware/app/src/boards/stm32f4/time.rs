@@ -1,8 +1,8 @@
 //! The clock: TIM2 counts microseconds in 32 bits, and is embassy-time's driver here.
 //!
-//! The driver that embassy-stm32 has counts an overflow of 16 bits by an interrupt: while the processor stands still for an
-//! erase of flash (0.5 s) all but one of them are lost, each of them 65.536 ms of the record's time. This one has the time in its
-//! counter, and the wraps of 71.6 min are noticed by whoever asks for the time: reception does so each millisecond.
+//! The driver of embassy-stm32 counts 16-bit overflows by an interrupt. While an erase of flash stops the processor (0.5 s), it
+//! loses all but one, each 65.536 ms of the record's time. This driver reads the time from the counter. A wrap (71.6 min) is
+//! detected at the next reading of the time; reception reads it each millisecond.
 
 use core::cell::RefCell;
 use core::task::Waker;
@@ -18,13 +18,13 @@ use embassy_time_queue_utils::Queue;
 
 use crate::costs::{Stage, measure};
 
-/// What the counter's alarm is set to at the latest: half of its range, so that no alarm is mistaken for a later one.
+/// Longest alarm: half of the counter's range, so that no alarm is mistaken for a later one.
 const AHEAD_MAX: u64 = 1 << 31;
 
 struct State {
     /// Wraps of the counter.
     wraps: u32,
-    /// The counter as it was read last.
+    /// Last reading of the counter.
     last: u32,
     alarms: Queue,
 }
@@ -45,13 +45,13 @@ impl State {
         u64::from(self.wraps) << 32 | u64::from(count)
     }
 
-    /// Wakes what is due, and sets the counter's alarm to what comes next.
+    /// Wakes due tasks and sets the alarm to the next one.
     fn arm(&mut self) {
         loop {
             let now = self.now();
             let next = self.alarms.next_expiration(now).min(now + AHEAD_MAX);
             TIM2.ccr(0).write_value(next as u32);
-            // An alarm that was passed meanwhile would not ring.
+            // An alarm in the past would not fire.
             if self.now() < next {
                 return;
             }
@@ -85,12 +85,12 @@ pub(super) fn start() {
     TIM2.sr().write(|w| w.0 = 0);
     TIM2.dier().write(|w| w.set_ccie(0, true));
     TIM2.cr1().write(|w| w.set_cen(true));
-    // SAFETY: the handler below is the driver's own, and nobody relies on its being masked.
+    // SAFETY: the handler below is the driver's own, and no code relies on its being masked.
     unsafe { interrupt::TIM2.enable() };
 }
 
-/// The processor sleeps for so many microseconds, or until an interrupt that comes before. For one task, the least urgent: by the
-/// counter's second channel.
+/// Sleeps for this many microseconds or until an earlier interrupt. It uses the counter's second channel, so only one task may
+/// call it: the least urgent.
 pub(super) fn nap(micros: u32) {
     TIM2.ccr(1).write_value(TIM2.cnt().read().wrapping_add(micros));
     TIM2.dier().modify(|w| w.set_ccie(1, true));

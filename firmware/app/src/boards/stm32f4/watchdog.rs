@@ -1,8 +1,8 @@
-//! The independent watchdog: its own oscillator, and once it runs nothing stops it but a debugger's halt.
+//! Independent watchdog with its own oscillator. Once started, only a debugger's halt stops it.
 //!
-//! It runs from a start's first moments on: a start that hangs ends. Its second is 0.68 s where its oscillator is fast by half (47 kHz,
-//! datasheet, table 36), and the monitor feeds it every 50 ms. An erase of flash, in which nobody runs, takes 0.5 s at the longest
-//! and begins with the full time ([`reload`]).
+//! It starts early, so it also ends a hanging start. Its second is 0.68 s at its fastest oscillator (47 kHz, datasheet, table
+//! 36), and the monitor feeds it every 50 ms. An erase of flash stops all code for at most 0.5 s and begins with the full time
+//! ([`reload`]).
 
 use embassy_stm32::pac::iwdg::vals::{Key, Pr};
 use embassy_stm32::pac::{DBGMCU, IWDG};
@@ -17,7 +17,7 @@ pub(super) fn start() {
     IWDG.kr().write(|w| w.set_key(Key::ENABLE));
     IWDG.pr().write(|w| w.set_pr(Pr::DIVIDE_BY8));
     IWDG.rlr().write(|w| w.set_rl(RELOAD));
-    // What was written is taken over within five of its clocks (RM0090, 21.4.4); until then it counts from 0.5 s.
+    // Written values take effect within five of its clocks (RM0090, 21.4.4); until then it counts from 0.5 s.
     let mut tries = 0_u32;
     while (IWDG.sr().read().pvu() || IWDG.sr().read().rvu()) && tries < TRIES_MAX {
         tries += 1;
@@ -28,12 +28,12 @@ pub(super) fn start() {
 /// Looks until the watchdog's registers are taken over: 0.3 ms of its clock, some twenty times of that at the processor's first one.
 const TRIES_MAX: u32 = 20_000;
 
-/// Its time begins anew.
+/// Restarts its time.
 pub(super) fn reload() {
     IWDG.kr().write(|w| w.set_key(Key::RESET));
 }
 
-/// Who feeds it.
+/// Handle to feed it.
 pub(crate) struct Watchdog(());
 
 impl Watchdog {
