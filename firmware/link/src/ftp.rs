@@ -1,4 +1,4 @@
-//! MAVLink FTP: what a client asks, and the answers, byte for byte as they lie in `FILE_TRANSFER_PROTOCOL`
+//! MAVLink FTP: requests of a client and the answers, byte for byte as in `FILE_TRANSFER_PROTOCOL`
 //! (<https://mavlink.io/en/services/ftp.html>). Reading only.
 
 use crc::{Algorithm, Crc, NoTable};

@@ -1,8 +1,8 @@
 //! Payloads field by field: what we read of others, and what we send. Offsets are those of the wire (larger fields first,
 //! extensions after them), and stand beside the one function that knows the message.
 //!
-//! Not by the structures of the `mavlink` crate's generator, because those refuse a number that their enumeration lacks, and a command
-//! that nobody knows must be answered too.
+//! This does not use the structures of the `mavlink` crate's generator: those reject an unknown enumeration number, and an
+//! unknown command needs an answer too.
 
 use hums_dialect::wire::PAYLOAD_BYTES_MAX;
 

@@ -1,4 +1,4 @@
-//! What others ask of us, and what stands in line to be answered.
+//! Requests to us, and the queue of answers.
 
 use heapless::Deque;
 
@@ -6,10 +6,10 @@ use crate::frame::{Check, Frame};
 use crate::packet::Fields;
 use crate::signing::Key;
 
-/// Answers that may wait; further questions of a busy asker are dropped, and asked again.
+/// Most waiting answers. Further requests are dropped; the sender repeats them.
 const REPLIES_MAX: usize = 12;
 
-/// Where something comes from or goes to.
+/// Port of origin or destination.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Port {
@@ -45,22 +45,22 @@ pub enum Request<'a> {
     LogErase,
     /// `LOG_REQUEST_END`
     LogEnd,
-    /// `FILE_TRANSFER_PROTOCOL`: what is in it.
+    /// `FILE_TRANSFER_PROTOCOL` payload.
     File(&'a [u8]),
     /// `SETUP_SIGNING`: a key (all zeros: none), and the time that counts from now on.
     Key(Key, u64),
 }
 
-/// A request with whom it is for.
+/// A request and its target.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Asked<'a> {
     /// System and component; 0 is all.
     pub target: (u8, u8),
-    /// What is asked.
+    /// The request.
     pub request: Request<'a>,
 }
 
-/// What a frame asks, of whomever; `None` where it is no question that we could answer.
+/// The request in a frame, for any target; `None` if we have no answer to it.
 pub fn read<'a>(frame: &Frame<'a>) -> Option<Asked<'a>> {
     if frame.check() != Check::Verified {
         return None;
@@ -86,7 +86,7 @@ pub fn read<'a>(frame: &Frame<'a>) -> Option<Asked<'a>> {
     Some(Asked { target, request })
 }
 
-/// An answer in line.
+/// A queued answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Reply {
     /// `PARAM_VALUE` of the parameter with this index.
@@ -107,9 +107,9 @@ pub enum Reply {
     Stopped,
     /// Logs are being erased, as a text.
     Erased,
-    /// The log that was being downloaded is no longer on the card, as a text.
+    /// Text: the log in download is no longer on the card.
     LogGone,
-    /// A log is asked for by its place in a list that is no longer so, as a text.
+    /// Text: the list of logs has changed since it was sent, so the request by list index is refused.
     LogsChanged,
     /// The card did not give some of the logs, or the directory, for a list, as a text.
     LogsUnread,
@@ -139,7 +139,7 @@ impl Replies {
         Self { line: Deque::new(), lists: [List { next: 0, left: 0 }; 2], dropped: 0 }
     }
 
-    /// Puts an answer in line, once; a line that is full drops it.
+    /// Queues an answer once; a full queue drops it.
     pub fn push(&mut self, port: Port, reply: Reply) {
         if !self.line.iter().any(|waiting| *waiting == (port, reply))
             && self.line.push_back((port, reply)).is_err()
@@ -157,7 +157,7 @@ impl Replies {
         list.left = count;
     }
 
-    /// The answer that is next in line.
+    /// The next queued answer.
     pub fn first(&self) -> Option<(Port, Reply)> {
         self.line.front().copied()
     }
@@ -195,7 +195,7 @@ impl Replies {
         list.next = if list.next + 1 < count { list.next + 1 } else { 0 };
     }
 
-    /// Questions that found the line full.
+    /// Requests dropped because the queue was full.
     pub const fn dropped(&self) -> u32 {
         self.dropped
     }

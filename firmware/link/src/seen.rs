@@ -1,7 +1,7 @@
 //! History of a line: the known messages that each system has sent with our definition, and the
 //! `crc_extra` each system uses for messages that we do not know. Bounded; strict when full.
 
-/// Systems that are told apart; further ones share the last place.
+/// Most distinguished systems; further ones share the last place.
 const SYSTEMS: usize = 4;
 /// Words of 32 messages each: room for 512 known messages, and all.xml has 392.
 const WORDS: usize = 16;
@@ -10,7 +10,7 @@ const EXTRAS: usize = 64;
 /// A free place in the table of extras. Id `0xff_ffff` of system 255 looks the same, and is always "seen once".
 const FREE: u32 = u32::MAX;
 
-/// What is known of the `crc_extra` of a (system, id) pair.
+/// Knowledge about the `crc_extra` of a (system, id) pair.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Extra {
     /// Never seen.
@@ -72,7 +72,7 @@ impl Seen {
         self.verified[place].get(index / 32).is_none_or(|word| word & (1 << (index % 32)) != 0)
     }
 
-    /// What is known of the extra that `system` uses for `id`.
+    /// Knowledge about the extra that `system` uses for `id`.
     pub(crate) fn extra(&self, system: u8, id: u32) -> Extra {
         match self.keys.iter().position(|&key| key == key_of(system, id)) {
             Some(at) if self.confirmed & (1 << at) != 0 => Extra::Confirmed(self.extras[at]),

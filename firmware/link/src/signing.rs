@@ -1,5 +1,5 @@
-//! MAVLink 2 signing (<https://mavlink.io/en/guide/message_signing.html>): 13 bytes after the checksum say on which link
-//! and when a frame was made, and that whoever made it has the key.
+//! MAVLink 2 signing (<https://mavlink.io/en/guide/message_signing.html>): 13 bytes after the checksum give the link id and the
+//! time of the frame, and prove that the sender has the key.
 //!
 //! # Time
 //! A stamp counts 10 µs since 2015 and grows with every frame of a stream, which is a system, a component and a link id.
@@ -39,7 +39,7 @@ const EPOCH_MICROS: u64 = 1_420_070_400_000_000;
 pub const MINUTE: u64 = 6_000_000;
 /// A date that is further ahead of our time than this has to last: a day of stamps.
 pub const JUMP: u64 = 24 * 60 * MINUTE;
-/// How long it has to last.
+/// Duration for which it has to last.
 pub const JUMP_LASTS: Span = Span::from_secs(60);
 /// Dates of one clock agree to this: a second of stamps.
 const JUMP_AGREES: u64 = 100_000;
@@ -216,7 +216,7 @@ impl Times {
         } else {
             (last, MINUTE / 6)
         };
-        // A moment before it is too late: what is stored takes a while to get there.
+        // Slightly early, because a save takes some time.
         if from + MINUTE / 12 <= self.used {
             return false;
         }
@@ -262,7 +262,7 @@ impl Signing {
 
     /// A key, or none; `stamp` is the time that whoever brought it thinks it is, and it is the time from now on, also with
     /// the key that there was: this is how a clock that a wrong date has set is put right. Nothing older than a minute
-    /// before it is accepted. 0 is no time: the same key then changes nothing.
+    /// before it is accepted. 0 means no time: setting the same key then changes nothing.
     pub fn set(&mut self, now: Instant, key: Key, stamp: u64) {
         if stamp == 0 && self.key == Some(key) {
             return;

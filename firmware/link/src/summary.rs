@@ -427,8 +427,8 @@ fn urgency(finding: &Finding) -> u8 {
     }
 }
 
-/// A finding in words a pilot understands: what is wrong with which part, the value, and what to do where it is critical, for
-/// instance `HUMS: battery 1 low: 6.8 %, LAND NOW`. What is good again is called as it was told: `HUMS: over: battery 1 low`.
+/// Text of a finding for the pilot: part, fault, value and, if critical, the action: `HUMS: battery 1 low: 6.8 %, LAND NOW`. The
+/// end of a finding repeats its name: `HUMS: over: battery 1 low`.
 // Own stack frame (ARCHITECTURE.md, Memory).
 #[inline(never)]
 pub fn text(finding: &Finding) -> Text {

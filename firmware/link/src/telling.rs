@@ -1,39 +1,40 @@
-//! Which findings a pilot hears of: of one event at most three texts, and what is critical at once.
+//! Selection of the findings that a pilot receives: at most three texts of one event, critical ones at once.
 //!
-//! An event is what goes wrong in one family ([`family`]) within [`EVENT`] of the first text of it. A mishap is an event until it is over.
+//! An event is the set of findings of one family ([`family`]) within [`EVENT`] of its first text. A mishap is an event until it
+//! is over.
 //!
-//! * A finding that another one explains ([`Finding::because`]) is recorded, and not told.
+//! * A finding explained by another one ([`Finding::because`]) is recorded only.
 //! * A critical finding is never delayed. It is told where it asks for something that the event's texts did not ask for yet: the
 //!   fourth motor that is lost, or the pitch beside the roll, does not say LAND NOW again.
-//! * A warning, which needs nothing at once, waits for [`HOLD`]: where it becomes critical only that is told. Then it is the first text
+//! * A warning waits for [`HOLD`]. If it becomes critical meanwhile, only the critical finding is sent. Otherwise it is the first text
 //!   of an event, or waits for the event's end, and is told if it is still so. So is what has no data, or is good again. A check
 //!   that no longer applies, as after landing, is not reported: its state is unknown.
 //! * Of a mishap its first kind is told, and one more that asks for something else where nothing led to it; that it is down, and
 //!   where, comes by itself. One whose order does not fit the vehicle is told with the one that does ([`order`]); where none does,
 //!   what led to it is not counted. What is mild, began with it or after it, and waits is a consequence, and is not told any longer.
-//! * What is good again just now waits until it is over, or bad again: a text that was held is true when it goes.
-//! * That something is over is told only of what was told, and not while what explains it goes on; that there are no data, only while no
-//!   alarm is open.
-//! * What is not critical waits while an event goes on of which something critical was told, and at most [`MILD_MAX`] are told in any
+//! * A recovering finding waits until it is over or bad again, so a delayed text is true when sent.
+//! * The end of a finding is sent only if the finding was sent and its explanation has ended. Missing data are reported only
+//!   while no alarm is open.
+//! * Findings that are not critical wait during an event with a critical text. At most [`MILD_MAX`] of them are sent in any
 //!   [`SPAN`], the worst first.
 
 use hums_core::clock::{Instant, Span};
 use hums_core::health::{self, Finding, Level, Subsystem};
 
-/// How long an event lasts, from its first text.
+/// Duration of an event from its first text.
 const EVENT: Span = Span::from_secs(10);
-/// How long a warning waits for becoming critical.
+/// Time that a warning waits in case it becomes critical.
 const HOLD: Span = Span::from_secs(1);
-/// Window for the limit of texts that are not critical.
+/// Most texts that are not critical in any [`SPAN`].
 const MILD_MAX: usize = 3;
 /// See [`MILD_MAX`].
 const SPAN: Span = Span::from_secs(30);
 /// Texts of a mishap, with one that led to it; that it is down comes beside them.
 const MISHAP_MAX: u8 = 2;
-/// Alarms that were told and are not over, of which more is known.
+/// Open alarms with stored details.
 const OPEN_MAX: usize = 16;
 
-/// What becomes of a finding that waits.
+/// Decision about a waiting finding.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Fate {
     /// It is told now.
@@ -44,7 +45,7 @@ pub(crate) enum Fate {
     Never,
 }
 
-/// What goes wrong together: a motor that fails is seen in the attitude.
+/// Subsystems that fail together: a motor failure disturbs the attitude.
 const fn family(part: Subsystem) -> Subsystem {
     if matches!(part, Subsystem::Attitude) { Subsystem::Propulsion } else { part }
 }

@@ -1,5 +1,5 @@
-//! What the fuzz target of the framer checks (`fuzz/`), on a few thousand made-up inputs that are the same each time:
-//! noise in which start bytes are frequent, and frames with bytes changed.
+//! The checks of the framer's fuzz target (`fuzz/`), on a few thousand made-up inputs that are the same each time: noise in which
+//! start bytes are frequent, and frames with bytes changed.
 
 #![allow(unreachable_pub, reason = "the files are those of another crate")]
 

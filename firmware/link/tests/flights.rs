@@ -1,4 +1,4 @@
-//! The monitor over recorded flights: what it finds, and its usage figures against an independent computation.
+//! The monitor over recorded flights: its findings, and its usage figures against an independent computation.
 //!
 //! The expected figures were computed with pymavlink from the recordings' own messages: flight time by height above the
 //! place of arming (landing by `EXTENDED_SYS_STATE` where there is one), distance as the sum of the speeds of
@@ -17,7 +17,7 @@ use hums_core::usage::UsageCounter;
 use hums_link::sequence::Sequences;
 use hums_link::{Framer, observe};
 
-/// What the monitor made of a recording.
+/// Results of the monitor for a recording.
 struct Outcome {
     monitor: Monitor,
     findings: Vec<Finding>,

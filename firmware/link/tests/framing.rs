@@ -106,7 +106,7 @@ fn survives_noise(name: &str, bytes: &[u8], bounds: &[(usize, usize)], seed: u64
             if bytes == frame {
                 break;
             }
-            // A frame with a damaged signature has a right checksum: that is no noise.
+            // A frame with a damaged signature has a correct checksum, so it is not noise.
             besides += usize::from(*check == Check::Unverified);
         }
     }

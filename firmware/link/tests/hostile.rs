@@ -1,4 +1,4 @@
-//! Nothing that a line can carry may panic, overflow, or make a vehicle that nobody knows look healthy.
+//! No input may panic, overflow, or make an unknown vehicle look healthy.
 
 use hums_core::Monitor;
 use hums_core::clock;

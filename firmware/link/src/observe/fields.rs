@@ -4,8 +4,7 @@ use hums_core::units::{Amperes, Fraction, Volts};
 use hums_dialect::wire::PAYLOAD_BYTES_MAX;
 use hums_dialect::{MavlinkVersion, MessageData};
 
-/// Decodes a payload. `enumerations` are the offsets of the bytes that hold enumerations: where a sender uses a number
-/// that ours lacks, they are read as zero.
+/// Decodes a payload. `enumerations` are the offsets of the enumeration bytes; a number unknown to us is read as zero.
 pub(super) fn read<M: MessageData>(payload: &[u8], enumerations: &[usize]) -> Option<M> {
     if let Ok(message) = M::deser(MavlinkVersion::V2, payload) {
         return Some(message);

@@ -1,8 +1,8 @@
-//! From a frame to what it says, in SI units. One function a message; the traps of each stand beside it.
+//! Decoder from frames to observations in SI units. One function per message, with the pitfalls of that message.
 //!
-//! The payload is decoded by structures that the `mavlink` crate's generator makes of its definitions, message by message, so
-//! that only those used are linked. Their decoders refuse a message whole when one field has a number that their enumeration lacks; a newer
-//! sender's HEARTBEAT must not vanish for that, so such fields are set to zero and the rest is read.
+//! The structures come from the `mavlink` crate's generator, one per message, so only the used ones are linked. Their decoders
+//! reject a message with an unknown enumeration number. A newer sender's HEARTBEAT must not be lost for that, so such fields are
+//! set to zero and the rest is read.
 
 mod fields;
 mod motion;
@@ -16,8 +16,8 @@ use hums_dialect::ardupilotmega as ap;
 use crate::frame::{Check, Frame};
 use fields::read;
 
-/// What a frame says, and who says it; `None` where it is none of our business: an id that we do not use, a checksum
-/// that is not verified, a HEARTBEAT of something that is no vehicle.
+/// Observation and sender of a frame. `None` for an unused id, an unverified checksum, or the HEARTBEAT of a component that is
+/// not a vehicle.
 pub fn observe(frame: &Frame<'_>) -> Option<(Source, Observation)> {
     if frame.check() != Check::Verified {
         return None;

@@ -275,7 +275,7 @@ fn told_because(findings: &[Comes], because: &'static str) -> Vec<(u64, String)>
     told_where(findings, because, |_| Orders::Own)
 }
 
-/// What is told where some checks give other orders than their own.
+/// Texts sent if some checks have the orders of others.
 fn told_where(findings: &[Comes], because: &'static str, orders: fn(&str) -> Orders) -> Vec<(u64, String)> {
     let mut summary = Summary::new(&Params::defaults());
     let monitor = Monitor::new(Params::defaults());
