@@ -5,7 +5,7 @@
 
 use std::fmt::Write as _;
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use hums_tests::flights::{OWN, own, root};
 use hums_tests::program::{Machine, Recording};
