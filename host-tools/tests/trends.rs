@@ -1,5 +1,4 @@
 //! Flights one after the other: the normal figures are learnt, and a flight that leaves them is found.
-#![expect(clippy::unwrap_used, reason = "that is how a test fails")]
 
 #[path = "../../firmware/core/tests/common/mod.rs"]
 mod common;
@@ -18,6 +17,8 @@ use hums_core::time::Instant;
 use hums_core::units::{Amperes, Rpm, Volts};
 
 type Change = fn(&mut Quad);
+/// Check, part and level.
+type Expected = (&'static str, u8, Level);
 
 /// Flies for 80 s and lands, with these outputs in flight: what is found, after it was learnt.
 fn fly(past: &mut Baselines, change: Change, pulses: Option<[u16; 4]>) -> Vec<Finding> {
@@ -80,7 +81,7 @@ fn each_quantity_that_leaves_what_was_normal_is_found_and_not_learned() {
         quad.battery.voltage = Some(Volts(14.4));
         quad.throttle = 0.5 * (15.5_f32 / 14.4).powi(2);
     };
-    let cases: [(Option<(&str, u8, Level)>, Change); 9] = [
+    let cases: [(Option<Expected>, Change); 9] = [
         (Some(("power_trend", 0, Level::Warning)), |quad| {
             quad.battery.current = quad.battery.current.map(|current| Amperes(current.0 * 1.1));
         }),
