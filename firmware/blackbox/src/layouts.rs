@@ -1,7 +1,7 @@
 //! Message layouts by the hash that a group names, so that a log decodes with the layouts that it was written with.
 //!
-//! The dialect of this build is one table; the tables of older builds are kept here in their stored form, and a test
-//! sees to it that the present one is among them before it can become an older one. Stored form, ids ascending:
+//! The dialect of this build is one table. The tables of older builds are kept here in their stored form. A test requires the
+//! current table among them, before it becomes an older one. Stored form, ids ascending:
 //!
 //! ```text
 //! message: id u24, checksum seed u8, payload bytes without extensions u8, fields u8, then for each field in wire

@@ -9,18 +9,18 @@
 //! the payload, noise) does not hide the frame behind it.
 //!
 //! # Frames of definitions that we do not have
-//! They must be recorded and passed on, yet line noise must not. For each checksum that does not fit we compute which
-//! `crc_extra` would make it fit ([`hums_dialect::crc::extra_of`]; 1 in 256 of random bytes has one), and let the candidate through
-//! as [`Check::Unverified`](crate::frame::Check::Unverified) if that extra is the one that this system used for this id before, or, at first sight, if
-//! it stands between frames: a frame (a damaged one, silence) before it, a start byte (or silence) after it, and no whole frame of
-//! a known definition inside. Without a frame before it, its extra is only remembered, and the next one comes through.
-//! An id that this system has sent with our definition never comes through unverified: then it is damage.
+//! They must be recorded and forwarded, unlike line noise. For each wrong checksum we compute the
+//! `crc_extra` that would make it correct ([`hums_dialect::crc::extra_of`]; 1 in 256 of random bytes has one). The candidate
+//! passes as [`Check::Unverified`](crate::frame::Check::Unverified) if this system used that extra for this id before. At first
+//! sight it passes only between frames: a frame (or a damaged one, or silence) before it, a start byte (or silence) after it, and
+//! no complete frame of a known definition inside. Without a frame before it, its extra is only remembered, and the next one
+//! comes through. An id that this system has sent with our definition never passes unverified: it is damage.
 //!
 //! # Limits
-//! About 1 KiB. A candidate waits for at most 281 bytes (3 ms at 921,600 baud) or for `idle`. Per byte: one copy, one
-//! step of the checksum; candidates that are not trusted may cost no more than four such steps for each
-//! byte received, so that no input takes longer than it needs to come: the dearest known, start bytes without end, some 1,100 of the
-//! 1,823 cycles that the processor has for a byte at 921,600 baud.
+//! About 1 KiB. A candidate waits for at most 281 bytes (3 ms at 921,600 baud) or for `idle`. Per byte: one copy and one step of
+//! the checksum. Untrusted candidates may cost at most four such steps per received byte, so no input takes longer than its
+//! transmission. The most expensive known input, endless start bytes, takes some 1,100 of the 1,823 cycles per byte at 921,600
+//! baud.
 
 use hums_dialect::crc;
 use hums_dialect::wire::{FRAME_BYTES_MAX, START_V1, START_V2};
@@ -252,8 +252,8 @@ impl Framer {
         Verdict::Frame(*header, None)
     }
 
-    /// A wrong checksum where nothing but the checksum speaks for a frame: damage if id and length are those of a
-    /// message that we know, otherwise a false start.
+    /// A wrong checksum without other evidence of a frame: damage if id and length match a known message, otherwise a false
+    /// start.
     fn not_a_frame(&mut self, known: Known, len: usize) -> Verdict {
         if matches!(known, Known::Fits { .. }) { self.damaged(len) } else { Verdict::Skip(1) }
     }

@@ -7,11 +7,10 @@
 //! counts whole, so at saturation up to 4 % of the budget stay unused.
 //!
 //! # Priorities
-//! Each [`Class`] may fill the budget up to a mark of its own, so that the more urgent one always finds room above it;
-//! and only findings may wait behind more than [`BACKLOG`] of the line, so that a finding never waits longer than that.
-//! Events (the vehicle's texts and answers) and bulk (lists, logs) have half and three fifths of the budget at most, so
-//! that neither starves what is forwarded; and what is forwarded leaves three fifths, and half of the line's backlog,
-//! to bulk that waits.
+//! Each [`Class`] may fill the budget up to its own mark, so a more urgent class always finds room above it. Only findings may
+//! wait behind more than [`BACKLOG`] of the line, so a finding never waits longer than that.
+//! Events (the vehicle's texts and answers) get at most half of the budget, bulk (lists, logs) three fifths, so neither starves
+//! the forwarded frames. Forwarded frames leave three fifths, and half of the line's backlog, to waiting bulk.
 
 use hums_core::clock::{Instant, Span};
 use hums_dialect::wire::SIGNATURE_BYTES;
@@ -241,8 +240,8 @@ impl Outlet {
         bytes as u32 <= share && self.window.sum(start).saturating_add(wanted) <= self.mark(class)
     }
 
-    /// Ten bits a byte, and 2 % for the pauses between frames: a port that is slower than its model would fall behind
-    /// for good where the budget is more than the line carries.
+    /// Ten bits a byte, and 2 % for the pauses between frames. If the budget exceeds the line, a port slower than its model would
+    /// fall behind for ever.
     fn duration(&self, bytes: usize) -> Span {
         Span::from_micros(bytes as u64 * 10_200_000 / u64::from(self.baud.max(1)))
     }

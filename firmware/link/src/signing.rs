@@ -3,19 +3,19 @@
 //!
 //! # Time
 //! A stamp counts 10 µs since 2015 and grows with every frame of a stream, which is a system, a component and a link id.
-//! [`Clock`] gives it from UTC where that is known. It goes back for nothing but a key that is set, and neither do stamps
-//! over a power-off: a bound above all that were used is stored ahead of time ([`Times::used`]), and those of the next
-//! power-on begin there, one after the other until time has caught up.
+//! [`Clock`] gives it from UTC where that is known. It goes back only when a key is set. Stamps do not go back over a power-off
+//! either: a bound above all used stamps is stored ahead of time ([`Times::used`]). The stamps of the next power-on begin there
+//! and count up one by one until time has caught up.
 //!
 //! A date from a GPS receiver may be wrong (a week number that rolled over, a spoofer). One that is more than
 //! [`JUMP`] ahead of our time counts only when it has lasted for [`JUMP_LASTS`] ([`Clock::hear_utc`]): a clock that is years
 //! ahead would refuse every new stream for years. A good signature counts at once: a holder of the key also has the time.
 //!
 //! # Replay
-//! A frame whose stamp is not above its stream's last one is refused. A stream that was not heard since power-on has to
-//! be above [`Times::accepted`], the stamp of the latest frame that changed anything, and no more than a minute behind
-//! our own time. Streams that are remembered are [`STREAMS_MAX`]; one more takes the place of the oldest, whose last stamp
-//! new streams then have to be above: so nothing that was forgotten can be played again.
+//! A frame whose stamp is not above its stream's last one is refused. The first stamp of a stream since power-on must be above
+//! [`Times::accepted`], the stamp of the latest frame that changed anything. It must also be at most a minute behind our own
+//! time. [`STREAMS_MAX`] streams are remembered; one more replaces the oldest. New streams must then be above that one's last
+//! stamp, so a forgotten frame cannot be replayed.
 //!
 //! # Costs
 //! SHA-256 over the key and the frame: at most six blocks, 0.2 ms on a Cortex-M4 at 168 MHz. The key is nowhere but here,

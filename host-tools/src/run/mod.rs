@@ -1,7 +1,7 @@
 //! `hums sim`: a recording goes in at the UART and comes out on a card.
 //!
 //! Both get the same bytes at the same times ([`arrivals`]) and report alike ([`report`]); what differs is the machine:
-//! [`sim`] runs the tasks' bodies on this PC, [`emulate`] the image that is flashed on the model of its chip.
+//! [`sim`] runs the tasks' bodies on this PC, `emulate` the image that is flashed on the model of its chip.
 
 pub mod arrivals;
 mod earlier;

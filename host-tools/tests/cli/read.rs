@@ -562,7 +562,7 @@ fn each_flight_of_a_recording_becomes_files_of_its_own_and_no_frame_is_lost() {
     let flights = info["logs"][0]["flights"].as_array().expect("flights");
     let times: Vec<_> =
         flights.iter().map(|flight| (flight["from_s"].as_f64(), flight["to_s"].as_f64())).collect();
-    assert_eq!(times, [(Some(48.3), Some(266.05)), (Some(1442.45), Some(1750.15))]);
+    assert_eq!(times, [(Some(48.3), Some(264.35)), (Some(1442.45), Some(1748.65))]);
     attempt(dir.path(), "decode two.tlog -o whole.tlog --format tlog");
     attempt(dir.path(), "decode two.tlog -o out --format tlog,csv --split flights");
     let made = contents(&dir.path().join("out"));

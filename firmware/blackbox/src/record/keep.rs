@@ -2,9 +2,9 @@
 
 use super::stored::{Fields, Sink};
 
-/// Which sectors are kept. While a vehicle that is recorded by arming is disarmed, only the last while is: every group
-/// of that time says so, and so does the one in which it ends. A reader that misses sectors from `from` up to this
-/// record knows that they are missing on purpose.
+/// Which sectors are kept. While a vehicle recorded by arming is disarmed, only the latest part is kept. Every group of that time
+/// has this record, also the group in which it ends. A reader that misses sectors from `from` up to this record knows that they
+/// are missing on purpose.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Keep {
     /// From here on everything is kept; otherwise only the last while, until a record says `all`.

@@ -13,7 +13,7 @@
 //! A heavier vehicle asks all its rotors for more thrust T, and these take power as T^1.5 (actuator disk; Leishman, Principles of Helicopter
 //! Aerodynamics, 2.4). With a shorter propeller blade, a weak motor or a weak ESC, throttle rises for the same thrust and power does
 //! not. So if throttle rose, the logarithm of power is compared with that of the thrust of that throttle: from
-//! [`WEIGHT_EXPONENT`] times on, half way between both, it is weight. Propellers of a real quadrotor cut by 10 to 25 mm have 0.5 to 1.1.
+//! `WEIGHT_EXPONENT` times on, half way between both, it is weight. Propellers of a real quadrotor cut by 10 to 25 mm have 0.5 to 1.1.
 //!
 //! # Better than before
 //! Wear never makes a vehicle hover with less, or a battery resist less and hold more. A flight that is better beyond its reach begins
