@@ -5,7 +5,8 @@ usage: usage.py DIALECT.py FILE...        prints JSON: file name -> figures
 The figures are those of docs/usage.md, worked out after the flight with the whole of it at hand:
 
   flights, flight_time_s    from EXTENDED_SYS_STATE where it says in the air or on the ground; otherwise armed and a metre
-                            above the place of arming for half a second, until disarmed, or low and still for two seconds
+                            above the place of arming for half a second, until disarmed, or low, still and without
+                            thrust (less than 10 % of throttle) for two seconds
   armed_time_s              base_mode of the vehicle's heartbeats
   distance_m, speed_max_m_s the horizontal speed of GLOBAL_POSITION_INT in the air, times the time to the next one
   height_max_m              relative_alt of GLOBAL_POSITION_INT in the air
@@ -127,7 +128,7 @@ class Flight:
         self.positions.append((time_s, message.relative_alt / 1000, speed))
 
     def vfr_hud(self, time_s, message):
-        self.hud.append((time_s, message.groundspeed))
+        self.hud.append((time_s, message.groundspeed, message.throttle))
 
     def battery_status(self, time_s, message):
         cells = [value for value in message.voltages if value != 65535]
@@ -178,18 +179,21 @@ class Flight:
                     samples.append((time_s, True))
         return ranges_where(samples, self.end_s)
 
-    @staticmethod
-    def hops(samples, ground_m, end_s):
+    def hops(self, samples, ground_m, end_s):
         """The times in the air while armed."""
         ranges, since, since_low = [], None, None
+        throttles, throttle = iter(self.hud), 0
+        following = next(throttles, None)
         for time_s, height, speed in samples:
+            while following is not None and following[0] <= time_s:
+                throttle, following = following[2], next(throttles, None)
             height -= ground_m
             if since is None or not ranges or ranges[-1][1] is not None:
                 since = (since if since is not None else time_s) if height > 1.0 else None
                 if since is not None and time_s - since >= 0.5:
                     ranges.append((since, None))
                     since_low = None
-            elif height > 0.5 or speed > 0.5:
+            elif height > 0.5 or speed > 0.5 or throttle >= 10:
                 since_low = None
             else:
                 since_low = time_s if since_low is None else since_low

@@ -199,12 +199,13 @@ fn the_logs_of_a_large_folder_are_told_one_by_one() {
     for number in 0..4_000 {
         fs::write(logs.join(format!("{number:05}.hum")), &first).unwrap();
     }
-    for command in ["--verify", "--json"] {
-        let outcome = run(&["info", command, "--json", logs.to_str().unwrap()]);
-        assert_bounded(&format!("info {command}"), outcome.memory_kib_max, empty);
+    for command in [&["info", "--verify", "--json"][..], &["info", "--json"]] {
+        let outcome = run(&[command, &[logs.to_str().unwrap()]].concat());
+        let command = command.join(" ");
+        assert_bounded(&command, outcome.memory_kib_max, empty);
         let told: serde_json::Value = serde_json::from_str(&outcome.text()).unwrap();
         assert_eq!(told["logs"].as_array().unwrap().len(), 4_000, "{command}");
-        assert_eq!(command == "--verify", told["ok"].is_boolean(), "{command}");
+        assert_eq!(command.contains("--verify"), told["ok"].is_boolean(), "{command}");
     }
 }
 

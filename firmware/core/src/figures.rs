@@ -181,7 +181,7 @@ impl Figures {
                 *charged = Charge::of(vehicle, derived, params, battery).or(*charged);
             }
         }
-        if !flight.airborne() {
+        if !flight.airborne() || flight.may_have_landed() {
             return;
         }
         let steady = is_steady(now, vehicle, flight);

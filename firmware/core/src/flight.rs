@@ -19,7 +19,8 @@
 //! | falling, impacted | no majority: down if it is off or silent, or two say that it stands; it flies otherwise | 30 s after the last sign | down, airborne |
 //! | down | armed again; or two witnesses of flight, more than of standing | at once; 4 s | ground |
 //!
-//! A take-off and a landing have the time at which their majority began.
+//! A take-off and a landing have the time at which the majority began that decided them. A landing by the autopilot's word has the time of
+//! that word.
 //! Without power, or with less than 5 % of throttle on rotors, nothing takes off; with less than 10 % it does after 5 s, if two witnesses say so
 //! and no other one is against it.
 //! A bad inertial sensor makes no sign: it falls or turns for 5 s while two other witnesses say that the vehicle flies, and it does not sink.
@@ -524,10 +525,13 @@ impl Flight {
                 self.seen_on_ground |= !self.airborne() && is_known && vehicle.heartbeat.get().is_some();
             }
             Some(debounce) => {
+                if debounce == Span::ZERO {
+                    self.changing_since = Some(now);
+                }
                 let since = *self.changing_since.get_or_insert(now);
                 if now.since(since) >= debounce {
                     self.changing_since = None;
-                    // Both changes have the time at which their majority began.
+                    // Both changes have the time at which the deciding majority began: at once means now.
                     self.flew_at = self.flew_at.map(|_| since);
                     self.airborne_since = (!self.airborne()).then_some(since);
                 }
@@ -590,7 +594,8 @@ impl Flight {
     /// The part of the flight now.
     pub fn phase(&self, now: Instant, vehicle: &Vehicle) -> Phase {
         if !self.airborne() {
-            return Phase::Ground;
+            // The step that ends in a landing belongs to it.
+            return if self.flew_at == Some(now) { Phase::Landing } else { Phase::Ground };
         }
         let climb_mps = climb_mps(now, vehicle).unwrap_or(0.0);
         let near_ground =

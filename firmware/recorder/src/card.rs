@@ -145,10 +145,12 @@ impl<'a, D: CardDevice> Card<'a, D> {
 
     /// Looks through the next blocks of the directory.
     fn look_on(&mut self, buffer: &mut [Block]) -> Result<(), CardError<D::Error>> {
-        if self.directory.look_on(&self.volume, buffer, self.free.next())? {
+        let changed = self.directory.look_on(&self.volume, buffer, self.free.next());
+        // After an error too: chains may have been mended before it.
+        if !matches!(changed, Ok(false)) {
             self.free.restart();
         }
-        Ok(())
+        changed.map(|_| ())
     }
 
     /// Looks through many blocks of the directory, for a segment that is waited for: the caller is to try again.

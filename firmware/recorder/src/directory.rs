@@ -214,7 +214,7 @@ impl Directory {
         self.note_oldest(entry);
         let claimed = claimed(volume, &entry)?;
         self.claimed_end = self.claimed_end.max(claimed.end);
-        Some(claimed).filter(|claimed| volume.is_cluster(claimed.start))
+        Some(claimed)
     }
 
     fn note_oldest(&mut self, entry: LogEntry) {
@@ -430,7 +430,8 @@ pub(crate) const fn clusters_of<D>(volume: &Volume<'_, D>, bytes: u32) -> u32 {
 /// The row of clusters that a log claims by its first one and its length.
 fn claimed<D: CardDevice>(volume: &Volume<'_, D>, entry: &LogEntry) -> Option<Range<u32>> {
     let end = entry.first.checked_add(clusters_of(volume, entry.bytes))?;
-    volume.is_cluster(end.saturating_sub(1)).then_some(entry.first..end)
+    let is_sound = volume.is_cluster(entry.first) && volume.is_cluster(end.saturating_sub(1));
+    is_sound.then_some(entry.first..end)
 }
 
 /// A number for a name, such that a sum of several tells which they are.

@@ -62,7 +62,7 @@ pub struct InWork {
 }
 
 /// Blocks of log that are written with one command at most: of more the gain is small.
-const ROW_BLOCKS: usize = 8;
+pub const ROW_BLOCKS: usize = 8;
 
 /// Room for parity. Lent, because the recorder is moved and this, 8 KiB, would come along on the firmware's stack.
 #[derive(Default)]

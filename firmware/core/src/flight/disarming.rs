@@ -3,7 +3,6 @@
 //! The motors are off: that is one witness. The other is that it is unloaded, loses height, sinks, or glides on. A vehicle that stands within
 //! this time, or shows neither, has landed; a terminated one has not, unless it stands.
 
-use super::signs::BREAKS_OFF;
 use super::witness::on_rotors;
 use super::{Flight, STILL};
 use crate::mishap::Kind;
@@ -84,7 +83,8 @@ impl Flight {
         let sinks = passed > WindowMax::SPAN && self.motion.sink.now(now) > FALLING_MPS;
         // An estimator is shaken by the touch, and may fall on while the vehicle stands.
         let falls = (is_lower || sinks) && self.pressure.follows(now, -FALLING_MPS) != Some(false);
-        let glides = passed > BREAKS_OFF
+        // A plane that rolls on after its landing keeps its height.
+        let glides = is_lower
             && !on_rotors(now, vehicle)
             && ground_speed_mps(now, vehicle).is_some_and(|speed_mps| speed_mps > WINGS_MPS);
         // An autopilot that lost its estimate terminates the flight, and tells no more of heights and speeds.

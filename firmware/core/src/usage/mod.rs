@@ -176,7 +176,7 @@ impl Usage {
         let is_known = reports && !flight.may_have_landed();
         let states = [
             (UsageCounter::Armed, vehicle.armed(), reports),
-            (UsageCounter::Flight, flight.airborne(), is_known),
+            (UsageCounter::Flight, flight.phase(now, vehicle) != Phase::Ground, is_known),
         ];
         if !vehicle.armed() {
             self.held_s = [0.0; 2];

@@ -70,6 +70,10 @@ fn what_is_disarmed_in_the_air_is_told_and_what_has_landed_is_not() {
         motion.ground_mps = if ms < 8_000 { 18.0 } else { 0.0 };
         (quad.climb, quad.height) = if ms < 8_000 { (-2.0, 20.0 - ms as f32 / 500.0) } else { (0.0, 0.0) };
     });
+    judge(wings(), "a plane rolls on, on a field above home", (&[], LANDED), |ms, quad, motion| {
+        (quad.throttle, quad.armed, quad.height, quad.climb) = (0.0, ms < 4_000, 8.0, 0.0);
+        motion.ground_mps = if ms < 8_000 { 12.0 } else { 0.0 };
+    });
     for of in ROTORS {
         let landed = fly_until(AT_MS + 2_600, &hovering(of), |ms, quad, motion| {
             (motion.rates, motion.ground_mps) = ([0.0; 3], 0.0);

@@ -54,9 +54,12 @@ impl<'a, D: CardDevice> Socket<'a, D> {
         };
     }
 
-    /// Begins to format the card that was looked at last, and no other one; `false` where there is none.
+    /// Begins to format the card that was looked at last, and no other one; `false` if the slot is not waiting for a card. A card that could be
+    /// mounted since the command is never formatted.
     pub(super) fn begin_format(&mut self, volume_id: u32) -> bool {
-        self.release();
+        if !matches!(self, Self::Waiting(_)) {
+            return false;
+        }
         let Self::Waiting(device) = core::mem::replace(self, Self::Moving) else { return false };
         device.recheck();
         *self = Self::Formatting(device, Formatting::new(volume_id));

@@ -8,7 +8,7 @@ use hums_core::health::{Level, Scope};
 use hums_core::vehicle::Vehicle;
 
 use super::flights::{Flight, begin_in_air};
-use super::problem::{LISTED_MAX, Problem, Problems, worst_first};
+use super::problem::{LISTED_MAX, Problem, Problems, rank, worst_first};
 use super::trends::{Baselines, Episode, because};
 use crate::names::vocabulary;
 use crate::source::epochs::Epochs;
@@ -156,14 +156,16 @@ impl Judged {
         self.findings.append(&mut trends.findings);
         self.findings.sort_by_key(|finding| finding.at);
         self.findings_count += trends.findings_count;
-        let is_known = |of: &Problem| {
-            self.problems.iter().any(|known| (&known.check, known.instance) == (&of.check, of.instance))
-        };
         let trends = trends.worst_first();
-        let new = trends.iter().filter(|problem| !is_known(problem));
-        let new = new.map(|problem| Problem { because: because(problem, &trends), ..problem.clone() });
-        let new: Vec<_> = new.collect();
-        self.problems.extend(new);
+        for problem in &trends {
+            // A check of the box that is a trend too has the worse of both levels.
+            let is_same = |of: &Problem| (&of.check, of.instance) == (&problem.check, problem.instance);
+            let is_worse = |of: &Problem| rank(of.level) >= rank(problem.level);
+            if !self.problems.iter().any(|of| is_same(of) && is_worse(of)) {
+                self.problems.retain(|of| !is_same(of));
+                self.problems.push(Problem { because: because(problem, &trends), ..problem.clone() });
+            }
+        }
         worst_first(&mut self.problems);
     }
 

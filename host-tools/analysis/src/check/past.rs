@@ -82,7 +82,8 @@ impl Series {
         if !self.vehicles.iter().any(|(vehicle, _)| !are_two(vehicle, &own)) {
             self.vehicles.push((own, Baselines::default()));
         }
-        if let Some((_, past)) = self.vehicles.iter_mut().find(|(vehicle, _)| !are_two(vehicle, &own)) {
+        if let Some((vehicle, past)) = self.vehicles.iter_mut().find(|(vehicle, _)| !are_two(vehicle, &own)) {
+            learn_uid(vehicle, own);
             checked.judged.judge_trends(past);
         }
         Ok(checked)
@@ -113,10 +114,7 @@ fn learnt(limits: &Limits, places: &[Place]) -> Result<(Baselines, Option<Vehicl
                 words(&own)
             )));
         }
-        // Who says no id in one recording may do in the next.
-        if vehicle.uid == 0 {
-            *vehicle = own;
-        }
+        learn_uid(vehicle, own);
     }
     Ok((baselines, first.map(|(_, vehicle)| vehicle)))
 }
@@ -137,6 +135,13 @@ fn are_two(one: &Vehicle, other: &Vehicle) -> bool {
     airframe(one).differs(airframe(other))
         || differ(one.vehicle_type, other.vehicle_type)
         || differ(one.autopilot, other.autopilot)
+}
+
+/// A recording without the vehicle's id may be followed by one with it, which counts from then on.
+const fn learn_uid(vehicle: &mut Vehicle, own: Vehicle) {
+    if vehicle.uid == 0 {
+        *vehicle = own;
+    }
 }
 
 /// The vehicle as a part of a sentence.

@@ -84,7 +84,7 @@ pub(super) fn mishaps(problems: &[Problem]) -> Vec<Instant> {
 }
 
 /// Rank of a level as a problem; stale means unknown and does not count.
-const fn rank(level: Level) -> u8 {
+pub(super) const fn rank(level: Level) -> u8 {
     match level {
         Level::Critical => 2,
         Level::Warning => 1,
