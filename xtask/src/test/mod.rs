@@ -8,7 +8,7 @@ mod steps;
 
 use std::time::Instant;
 
-use anyhow::{Error, Result, bail};
+use anyhow::{Context as _, Error, Result, bail};
 
 use crate::setup::{self, Need, Outcome};
 use steps::{STEPS, Stage, Step};
@@ -44,8 +44,8 @@ fn chosen(only: &[String]) -> Vec<&'static Step> {
 /// Runs the steps named in `only`, or all; of those that run one after the other none follows one that failed.
 pub(crate) fn run(only: &[String]) -> Result<()> {
     let chosen = chosen(only);
-    let mut needs: Vec<Need> = chosen.iter().flat_map(|step| step.needs).copied().collect();
-    needs.push(Need::Linker);
+    let needed = chosen.iter().flat_map(|step| step.needs).copied();
+    let mut needs: Vec<Need> = needed.chain([Need::Linker]).collect();
     needs.sort_unstable();
     needs.dedup();
     let there = setup::ensure(&needs, false);
@@ -84,8 +84,7 @@ pub(crate) fn run_quick() -> Result<()> {
 
 /// Runs it and prints how long it took, and the processor's time of all programs that were started.
 fn timed(run: impl FnOnce() -> Result<()>) -> Result<()> {
-    let start = Instant::now();
-    let done = run();
+    let (start, done) = (Instant::now(), run());
     println!("{:<16} {:>8.1}", "in all", start.elapsed().as_secs_f64());
     if let Some(seconds) = processor_seconds() {
         println!("{:<16} {seconds:>8.1}", "processor");
@@ -110,12 +109,10 @@ fn one_after_the_other(steps: impl Iterator<Item = &'static Step>, there: &Outco
         }
         println!("\n=== {}: {}", step.name, step.about);
         let begun = Instant::now();
-        let failed = (step.run)().err();
-        let failed = failed
-            .map(|error| error.context(format!("step {0}; alone: cargo xtask test --only {0}", step.name)));
-        let is_last = failed.is_some();
+        let alone = || format!("step {0}; alone: cargo xtask test --only {0}", step.name);
+        let failed = (step.run)().with_context(alone).err();
         rows.push(Row { step: step.name, seconds: Some(begun.elapsed().as_secs_f64()), failed });
-        if is_last {
+        if rows.iter().any(|row| row.failed.is_some()) {
             break;
         }
     }
