@@ -4,9 +4,9 @@ usage: usage.py DIALECT.py FILE...        prints JSON: file name -> figures
 
 The figures are those of docs/usage.md, worked out after the flight with the whole of it at hand:
 
-  flights, flight_time_s    from EXTENDED_SYS_STATE where it says in the air or on the ground; otherwise armed and a metre
-                            above the place of arming for half a second, until disarmed, or low, still and without
-                            thrust (less than 10 % of throttle) for two seconds
+  flights, flight_time_s    from EXTENDED_SYS_STATE where it says in the air or on the ground; otherwise armed and 1.5 m
+                            above the place of arming for half a second, until the throttle is below 20 %, half of that of a hover (without VFR_HUD:
+                            until it is low and still) for two seconds or until it is disarmed
   armed_time_s              base_mode of the vehicle's heartbeats
   distance_m, speed_max_m_s the horizontal speed of GLOBAL_POSITION_INT in the air, times the time to the next one
   height_max_m              relative_alt of GLOBAL_POSITION_INT in the air
@@ -105,7 +105,7 @@ class Flight:
     """All that the figures need, in the order in which it came."""
 
     def __init__(self, messages):
-        self.armed, self.landed, self.positions, self.hud = [], [], [], []
+        self.armed, self.landed, self.positions, self.hud, self.throttles = [], [], [], [], []
         self.batteries, self.system, self.motors = {}, Series(BATTERY_HOLD_S), {}
         self.kind = 0
         self.end_s = messages[-1][0] if messages else 0.0
@@ -128,7 +128,8 @@ class Flight:
         self.positions.append((time_s, message.relative_alt / 1000, speed))
 
     def vfr_hud(self, time_s, message):
-        self.hud.append((time_s, message.groundspeed, message.throttle))
+        self.hud.append((time_s, message.groundspeed))
+        self.throttles.append((time_s, message.throttle))
 
     def battery_status(self, time_s, message):
         cells = [value for value in message.voltages if value != 65535]
@@ -182,24 +183,25 @@ class Flight:
     def hops(self, samples, ground_m, end_s):
         """The times in the air while armed."""
         ranges, since, since_low = [], None, None
-        throttles, throttle = iter(self.hud), 0
+        throttles, throttle = iter(self.throttles), 0
         following = next(throttles, None)
         for time_s, height, speed in samples:
             while following is not None and following[0] <= time_s:
-                throttle, following = following[2], next(throttles, None)
+                throttle, following = following[1], next(throttles, None)
             height -= ground_m
             if since is None or not ranges or ranges[-1][1] is not None:
-                since = (since if since is not None else time_s) if height > 1.0 else None
+                since = (since if since is not None else time_s) if height > 1.5 else None
                 if since is not None and time_s - since >= 0.5:
                     ranges.append((since, None))
                     since_low = None
-            elif height > 0.5 or speed > 0.5 or throttle >= 10:
+            elif (throttle >= 20) if self.throttles else (height > 0.5 or speed > 0.5):
                 since_low = None
             else:
                 since_low = time_s if since_low is None else since_low
                 if time_s - since_low >= 2.0:
-                    ranges[-1], since = (ranges[-1][0], time_s), None
-        return [(begin, end_s if end is None else end) for begin, end in ranges]
+                    ranges[-1], since = (ranges[-1][0], since_low), None
+        last_s = end_s if since_low is None else since_low
+        return [(begin, last_s if end is None else end) for begin, end in ranges]
 
     def drawn(self):
         """(series of volts and amperes) of what draws current; the first is what the voltage is taken of."""

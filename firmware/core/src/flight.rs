@@ -19,8 +19,7 @@
 //! | falling, impacted | no majority: down if it is off or silent, or two say that it stands; it flies otherwise | 30 s after the last sign | down, airborne |
 //! | down | armed again; or two witnesses of flight, more than of standing | at once; 4 s | ground |
 //!
-//! A take-off and a landing have the time at which the majority began that decided them. A landing by the autopilot's word has the time of
-//! that word.
+//! A take-off and a landing have the time at which their majority began. While the autopilot's word is that the vehicle flies, it has not landed.
 //! Without power, or with less than 5 % of throttle on rotors, nothing takes off; with less than 10 % it does after 5 s, if two witnesses say so
 //! and no other one is against it.
 //! A bad inertial sensor makes no sign: it falls or turns for 5 s while two other witnesses say that the vehicle flies, and it does not sink.
@@ -525,13 +524,12 @@ impl Flight {
                 self.seen_on_ground |= !self.airborne() && is_known && vehicle.heartbeat.get().is_some();
             }
             Some(debounce) => {
-                if debounce == Span::ZERO {
-                    self.changing_since = Some(now);
-                }
                 let since = *self.changing_since.get_or_insert(now);
                 if now.since(since) >= debounce {
                     self.changing_since = None;
-                    // Both changes have the time at which the deciding majority began: at once means now.
+                    // Both changes have the time at which their majority began; a landing not before the autopilot's word said that it flies.
+                    let flew_by_word = debounce == Span::ZERO || votes.flies & WORD != 0;
+                    let since = if self.airborne() && flew_by_word { now } else { since };
                     self.flew_at = self.flew_at.map(|_| since);
                     self.airborne_since = (!self.airborne()).then_some(since);
                 }
