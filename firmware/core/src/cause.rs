@@ -3,7 +3,7 @@
 use crate::numbered::numbered;
 
 numbered! {
-    /// What is wrong, as the autopilot sees it; its name is that of the check that tells it.
+    /// A fault that the autopilot reports. It has the name of its check.
     pub enum Cause {
         /// Gyro.
         Gyro "gyro_alert",

@@ -225,7 +225,7 @@ fn is_steady(now: Instant, vehicle: &Vehicle, flight: &Flight) -> bool {
     level && (phase == Phase::Hover || (wings && phase == Phase::Cruise))
 }
 
-/// What a quantity is in steady flight.
+/// The value of a quantity in steady flight.
 fn sample(
     now: Instant,
     quantity: Quantity,

@@ -527,7 +527,7 @@ impl Flight {
                 let since = *self.changing_since.get_or_insert(now);
                 if now.since(since) >= debounce {
                     self.changing_since = None;
-                    // Both changes have the time at which their majority began; a landing not before the autopilot's word said that it flies.
+                    // Both changes have the time at which their majority began. A landing is later if the autopilot's word was flight until now.
                     let flew_by_word = debounce == Span::ZERO || votes.flies & WORD != 0;
                     let since = if self.airborne() && flew_by_word { now } else { since };
                     self.flew_at = self.flew_at.map(|_| since);

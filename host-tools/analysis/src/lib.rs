@@ -1,6 +1,6 @@
 //! What a recording says of its vehicle.
 //!
-//! * [`check`]: the monitor of the board, run over a recording: flights, findings, what was judged and why not
+//! * [`check`]: the monitor of the board, run over a recording: flights, findings, and checks without data, with the reason
 //! * [`summary`]: what is in a recording, counted
 //! * [`series`], [`track`]: quantities over time and the way over ground, for pages
 //! * [`counters`], [`part`], [`states`], [`params`]: usage, components, words for states, limits from a file

@@ -21,7 +21,7 @@ pub struct Progress {
     drawn: Mutex<Option<Instant>>,
 }
 
-/// The progress over so many bytes; it is not shown if nobody knows how many.
+/// The progress over a number of bytes. It is hidden if that number is unknown.
 pub fn bytes(total: Option<u64>, name: &str) -> Progress {
     Progress::new(total.unwrap_or(0), word(name).into_owned())
 }

@@ -1,4 +1,4 @@
-//! What a kill or a full disk leaves.
+//! The files after a kill or on a full disk.
 
 use std::fs;
 use std::io::Write as _;

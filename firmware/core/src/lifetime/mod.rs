@@ -41,7 +41,7 @@ const _: () = {
     }
 };
 
-/// What a stored item is. The numbers are stored and never change meaning; earlier versions stored baselines as 2.
+/// The kind of a stored item. The numbers are stored and never change meaning; 2 is not used again.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum ItemKey {
     /// 1: [`Lifetime`].

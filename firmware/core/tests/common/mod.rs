@@ -214,7 +214,7 @@ impl Run {
         }
     }
 
-    /// The same; what the autopilot says comes every 100 ms.
+    /// The same, with the autopilot's messages every 100 ms.
     pub fn says(&mut self, times_ms: core::ops::Range<u64>, mut says: impl FnMut(u64) -> Vec<Observation>) {
         self.steps(times_ms, |now_ms, monitor| {
             if now_ms.is_multiple_of(100) {

@@ -153,7 +153,7 @@ impl Flown {
     }
 }
 
-/// What is normal of one quantity.
+/// The normal value of one quantity.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Baseline {
     /// In the quantity's unit.
