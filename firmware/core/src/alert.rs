@@ -1,11 +1,11 @@
-//! What the autopilot itself says is wrong: a text, an event, a flag of health or of the estimator.
+//! Alerts: problems that the autopilot itself reports, by a text, an event, a flag of health or of the estimator.
 //!
-//! Autopilots say the same thing in many ways. Each way is turned into a [`Cause`] in one place: texts in `alert/texts.rs`, PX4's
-//! events in `alert/events.rs`, flags of health in [`crate::cause`], the estimator's here. A way more is one row there. What stands in
-//! no table and is severe is [`Cause::Other`].
+//! Autopilots report one problem in many ways. Each way becomes a [`Cause`] in one place: texts in `alert/texts.rs`,
+//! PX4's events in `alert/events.rs`, flags of health in [`crate::cause`], the estimator's here. A new way is one row
+//! there. A severe report that is in no table is [`Cause::Other`].
 //!
-//! A text or an event is a moment: it holds for [`HOLDS`]. Flags hold as long as their message has them, and count from the second
-//! message that has them, because one message of nonsense is no alarm.
+//! A text or an event is a moment: it holds for [`HOLDS`]. A flag holds while its message has it, from the second
+//! such message on, because one wrong message is no alarm.
 
 mod events;
 mod texts;
@@ -16,26 +16,30 @@ use crate::cause::{Alert, Cause, Causes, Meaning, Urgency};
 use crate::observation::{Estimator, EstimatorScale, Sensors};
 use crate::time::{Instant, Span, Stamp};
 
-/// How long a text or an event is said to be so. PX4 tells its failing checks again when they change, some 2 s apart.
+/// Time for which a text or an event holds. PX4 repeats its failing checks when they change, some 2 s apart.
 pub const HOLDS: Span = Span::from_secs(10);
-/// What the autopilot says of a crash, or that is critical, comes at most so long after it disarmed: heartbeats are a second apart.
+/// A crash or a critical alert counts up to this long after disarming: heartbeats are a second apart.
 const DISARMED: Span = Span::from_secs(2);
-/// `MAV_STATE_CRITICAL`; `MAV_STATE_EMERGENCY` and what is worse have larger numbers.
+/// `MAV_STATE_CRITICAL`; `MAV_STATE_EMERGENCY` and worse states have larger numbers.
 const CRITICAL_STATE: u8 = 5;
-/// Flags come at 1 Hz or faster where they come at all.
+/// Flags come at 1 Hz or faster.
 const FLAGS_AGE: Span = Span::from_secs(5);
 
-/// In place of an [`Urgency`]: what was said is no longer said, and nothing says that it is good.
+/// In place of an [`Urgency`]: the alert is no longer reported, and nothing reports that all is well.
 pub const ENDED: f32 = -1.0;
 
-/// What a text of the autopilot says is wrong. `severity` is a `MAV_SEVERITY`: what is only a notice, or less, says nothing is
-/// wrong. `None` where a log keeps none: then only texts count that are known and tell by themselves that they are severe.
+/// The alert in a text of the autopilot.
 ///
-/// `MAV_SEVERITY_ALERT` is none either: until 3.2, of 2015, `ArduPilot` counted from 1 for low to 4 for critical, and says "Reached
-/// Command #1" with it; since then it has it of a parachute, a fuel cell's states and what developers look for, and PX4's texts never.
+/// `severity` is a `MAV_SEVERITY`; a notice, or less, is no alert. It is `None` for a log that stores no severity.
+/// Then only known texts count that are severe by their words.
 ///
-/// Nor what the autopilot only repeats: our own texts, where a script has it send them on to the pilot's radio
-/// (`docs/stations/hums_texts.lua`), and those of others in `ArduPilot`'s log, which marks them (`GCS_MAVLINK::handle_statustext`).
+/// `MAV_SEVERITY_ALERT` is treated as unknown. `ArduPilot` until 3.2 (2015) counted from 1 for low to 4 for critical,
+/// and sent "Reached Command #1" with it. Later versions use it for a parachute, a fuel cell's states and developers'
+/// messages, PX4 never.
+///
+/// Repeated texts are no alerts: our own texts, if a script forwards them to the pilot's radio
+/// (`docs/stations/hums_texts.lua`), and marked texts of others in `ArduPilot`'s log
+/// (`GCS_MAVLINK::handle_statustext`).
 pub fn of_text(severity: Option<u8>, text: &[u8]) -> Option<Alert> {
     const NOTICE: u8 = 5;
     const WARNING: u8 = 4;
@@ -57,7 +61,7 @@ pub fn of_text(severity: Option<u8>, text: &[u8]) -> Option<Alert> {
     }
 }
 
-/// What an event of PX4 says is wrong. `severity` is that of its level outside, the low nibble of `log_levels`.
+/// The alert in an event of PX4. `severity` is the low nibble of `log_levels`, its external level.
 pub fn of_event(id: u32, severity: u8, arguments: &[u8]) -> Option<Alert> {
     const CRITICAL: u8 = 2;
     match events::meaning(id, arguments) {
@@ -67,9 +71,12 @@ pub fn of_event(id: u32, severity: u8, arguments: &[u8]) -> Option<Alert> {
     }
 }
 
-/// What the estimator's flags say (`ESTIMATOR_STATUS_FLAGS`, `EKF_STATUS_FLAGS`), where it had attitude and position before, and a
-/// receiver a fix. Bits that both have: 0 attitude, 3 and 4 position. PX4: 10 GPS glitch, 11 accelerometer error. ArduPilot: 15 GPS
-/// glitching, which it also sets where there is no GPS: indoors it flies by beacons, optical flow or vision.
+/// The causes of the estimator's flags (`ESTIMATOR_STATUS_FLAGS`, `EKF_STATUS_FLAGS`). A glitch counts if the
+/// estimator had attitude and position before, and a receiver has a fix.
+///
+/// - Both autopilots: 0 attitude, 3 and 4 position.
+/// - PX4: 10 GPS glitch, 11 accelerometer error.
+/// - ArduPilot: 15 GPS glitching. It also sets this one indoors without GPS, with beacons, optical flow or vision.
 pub fn of_estimator(estimator: &Estimator, had_both: bool, has_fix: bool) -> Causes {
     const PX4_GLITCH: u32 = 1 << 10;
     const PX4_ACCELEROMETER: u32 = 1 << 11;
@@ -92,7 +99,7 @@ const fn has_both(flags: u16) -> bool {
     flags & ATTITUDE != 0 && flags & POSITION != 0
 }
 
-/// Flags of one message: the last two.
+/// The flags of the last two messages.
 #[derive(Clone, Copy, Debug)]
 struct Flags {
     now: Causes,
@@ -112,14 +119,15 @@ impl Flags {
     }
 }
 
-/// What the autopilot says is wrong, now. Only what is said while it is armed counts: before, it is about arming.
+/// The standing alerts of the autopilot. Only those of the armed time count: earlier ones are about arming.
 #[derive(Clone, Copy, Debug)]
 pub struct Alerts {
-    /// Of each cause, how bad it was said to be, and until when what was said once holds, milliseconds; and when anything was.
+    /// For each cause its reported urgency, and the time until which a single report holds, ms; then the time of the
+    /// last report.
     told: [Option<Urgency>; Cause::COUNT],
     until_ms: [u32; Cause::COUNT],
     told_at: Stamp,
-    /// When a cause was reported last that was not reported just before, or the autopilot's state became an emergency.
+    /// Last time of a cause that was not reported just before, or of an emergency state.
     began_at: Stamp,
     emergency: bool,
     sensors: Flags,
@@ -127,9 +135,9 @@ pub struct Alerts {
     estimator: Flags,
     armed: bool,
     armed_at: Stamp,
-    /// What a flag called healthy once: what never was is not fitted or not switched on.
+    /// Causes that a flag called healthy once. Parts that never were healthy are not fitted or not switched on.
     had: Causes,
-    /// What the flags of the last `SYS_STATUS` call healthy or not.
+    /// Causes that flags of the last `SYS_STATUS` cover, healthy or not.
     spoken_of: Causes,
     /// The estimator had attitude and position.
     had_both: bool,
@@ -154,7 +162,7 @@ impl Alerts {
         }
     }
 
-    /// A heartbeat: with each arming all begins anew.
+    /// A heartbeat. Each arming begins anew.
     pub(crate) const fn take_armed(&mut self, at: Instant, armed: bool) {
         if armed && !self.armed {
             let Self { had, had_both, .. } = *self;
@@ -180,7 +188,7 @@ impl Alerts {
         self.began_at.age(now).is_some_and(|age| age <= span)
     }
 
-    /// A text or an event. An autopilot that crashes disarms with the word; what broke then is told right behind it.
+    /// A text or an event. An autopilot that crashes disarms with that text, and reports the damage right behind it.
     pub(crate) fn tell(&mut self, at: Instant, alert: Alert) {
         let is_last_word = (alert.cause == Cause::Crash || alert.urgency == Urgency::Critical)
             && self.armed_at.age(at).is_some_and(|age| age <= DISARMED);
@@ -202,7 +210,7 @@ impl Alerts {
         };
     }
 
-    /// `SYS_STATUS`: sensors that are not healthy. PX4 calls one that it lost no longer present.
+    /// `SYS_STATUS`: sensors that are not healthy. PX4 calls a lost sensor no longer present.
     pub(crate) fn take_sensors(&mut self, at: Instant, sensors: &Sensors) {
         let healthy = Causes::of_sensors(sensors.healthy);
         self.had = self.had.or(healthy);
@@ -223,7 +231,7 @@ impl Alerts {
         self.estimator.take(at, of_estimator(estimator, self.had_both, has_fix));
     }
 
-    /// Whether flags were ever told: then each cause has a level.
+    /// Whether flags were ever received: then each cause has a level.
     pub(crate) fn has_flags(&self) -> bool {
         self.flags().iter().any(|flags| flags.at.is_set())
     }
@@ -232,8 +240,13 @@ impl Alerts {
         [&self.sensors, &self.failures, &self.estimator]
     }
 
-    /// How bad the autopilot says it is, as [`Urgency`] numbers it: 0 where it says that it is over, and where flags come that call it
-    /// healthy; [`ENDED`] where it says nothing more of it; `None` where nothing was ever said. In a mishap flags only echo it.
+    /// The level of a cause, as [`Urgency`] numbers it.
+    ///
+    /// - 0: the autopilot reports that it is over, or flags call it healthy.
+    /// - [`ENDED`]: it is no longer reported.
+    /// - `None`: it was never reported.
+    ///
+    /// In a mishap flags only echo the mishap.
     pub fn level(&self, now: Instant, cause: Cause, in_mishap: bool) -> Option<f32> {
         let (told, until_ms) = (self.told.get(cause as usize)?, self.until_ms.get(cause as usize)?);
         let is_judged = self.armed && !in_mishap;
@@ -248,7 +261,7 @@ impl Alerts {
         wrong.map(|urgency| f32::from(urgency as u8)).or(was_said.then_some(good))
     }
 
-    /// Whether flags come that would tell of it, and have none: those of `SYS_STATUS` call it healthy.
+    /// Whether flags of `SYS_STATUS` cover the cause and call it healthy.
     fn is_cleared(&self, now: Instant, cause: Cause) -> bool {
         let comes = |flags: &Flags| {
             let has = flags.now.both(flags.before).has(cause);

@@ -1,14 +1,14 @@
-//! Large values are made part by part, where they stay: a board's stack is as large as one of them, and a constant of it would be a
-//! copy in flash, zeros nearly all of it.
+//! Construction of large values in place, part by part. A whole value would fill a board's stack, and as a constant
+//! it would be a copy in flash, nearly all zeros.
 
-/// Does this with a stack of its own: what it builds there is gone when the next thing is built.
+/// Runs a step on a stack frame of its own, which is freed before the next step.
 #[inline(never)]
 pub(crate) fn apart(act: impl FnOnce()) {
     act();
 }
 
-/// Makes a structure in a place ([`core::mem::MaybeUninit`]) out of all its fields, one after the other; gives the reference to it. Who
-/// leaves a field out does not compile.
+/// Makes a structure in a place ([`core::mem::MaybeUninit`]) out of all its fields, one after the other; gives the
+/// reference to it. A missing field does not compile.
 macro_rules! place {
     ($place:expr, $Whole:ident { $($part:ident: $value:expr),* $(,)? }) => {{
         let place: &mut core::mem::MaybeUninit<$Whole> = $place;

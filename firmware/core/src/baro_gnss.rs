@@ -1,16 +1,18 @@
 //! The first barometer against the height of GNSS, its noise, and the climb of the estimator.
 //!
-//! 1. Barometer and GNSS ([`Comparison::BaroGnss`]): weather and site make an offset, which is learnt. Two effects on a healthy barometer
-//!    are allowed for. Air that is warmer or colder than standard makes a scale error: [`SCALE_PART`] of the change of height. The wind of
-//!    the flight presses on the housing: half of the change of the dynamic pressure.
-//! 2. Noise ([`Comparison::BaroNoise`]): how far the height steps from sample to sample, less the climb, less the error by a late message
-//!    ([`LATE_S`]) and by a climb that changed.
-//! 3. Climb ([`Comparison::BaroClimb`]): an accelerometer that folds vibration into an offset lets an estimator fall while the vehicle
-//!    climbs, and height control gives full throttle. On rotors only, by the climb of `VFR_HUD`. The change of the whole dynamic pressure
-//!    is taken off.
-//! 4. Which height leapt ([`Heights::receiver_leapt`]): the climb of the estimator, which is that of its accelerometer over so short a time,
-//!    votes. If the receiver's height moved within [`VOTE_S`] without that climb, and the barometer's by less than half as much, the receiver
-//!    is wrong. A slow drift leads the estimator with it, and is nobody's.
+//! 1. Barometer and GNSS ([`Comparison::BaroGnss`]): weather and site make an offset, which is learnt. Two effects on
+//!    a healthy barometer are allowed for. Air that is warmer or colder than standard makes a scale error:
+//!    [`SCALE_PART`] of the change of height. The wind of the flight presses on the housing: half of the change of
+//!    the dynamic pressure.
+//! 2. Noise ([`Comparison::BaroNoise`]): the step of the height from sample to sample, less the climb. The errors of
+//!    a late message ([`LATE_S`]) and of a changing climb are taken off.
+//! 3. Climb ([`Comparison::BaroClimb`]): an accelerometer that folds vibration into an offset lets an estimator fall
+//!    while the vehicle climbs, and height control gives full throttle. On rotors only, by the climb of `VFR_HUD`.
+//!    The change of the whole dynamic pressure is taken off.
+//! 4. The wrong height after a leap ([`Heights::receiver_leapt`]): the estimator's climb decides, which over so short
+//!    a time is its accelerometer's. If the receiver's height moved within [`VOTE_S`] without that climb, and the
+//!    barometer's by less than half as much, the receiver is wrong. A slow drift takes the estimator along and is
+//!    blamed on neither.
 
 use crate::gates::{self, Gates};
 use crate::latest::Reading;
@@ -22,36 +24,36 @@ use crate::time::{Instant, PAUSE, Span, Stamp};
 use crate::units::{GRAVITY, Hectopascals};
 use crate::vehicle::Vehicle;
 
-/// A standard atmosphere is wrong by so much of a climb in air that is 28 K warmer or colder.
+/// Error of the standard atmosphere as a part of the climb, in air that is 28 K warmer or colder.
 const SCALE_PART: f32 = 0.1;
-/// Messages on a link are late by so much: a step takes that much longer or shorter.
+/// Delay of messages on a link: a step takes that much longer or shorter.
 const LATE_S: f32 = 0.3;
-/// A receiver's height is so old, s: 1 of those of 2013.
+/// Delay of a receiver's height, s: 1 for those of 2013.
 const RECEIVER_LATE_S: f32 = 1.0;
 /// Heights and climb are summed over this time, s, when they vote.
 const VOTE_S: f32 = 4.0;
 /// Time constant of the usual height and speed, s.
 const AIR_S: f32 = 30.0;
-/// A sample that leaps by more is one wrong message unless the next one leaps too: no vehicle climbs so fast, m/s, and the noise, m, is
-/// above the default limit.
+/// A sample with a greater leap is one wrong message, unless the next one leaps too. No vehicle climbs so fast, m/s,
+/// and the noise, m, is above the default limit.
 const LEAPS_MPS: f32 = 50.0;
 const LEAPS_M: f32 = 5.0;
 
-/// How far a height has moved of late without a climb.
+/// Movement of a height without a climb, within [`VOTE_S`].
 #[derive(Clone, Copy, Debug)]
 struct Leap {
     /// The last height, m, and when it was measured.
     height_m: f32,
     at: Stamp,
     leapt_m: f32,
-    /// The error of a height that is late, by the climb, m.
+    /// The error of a late height, by the climb, m.
     late_m: f32,
 }
 
 impl Leap {
     const NONE: Self = Self { height_m: 0.0, at: Stamp::NONE, leapt_m: 0.0, late_m: 0.0 };
 
-    /// Takes a height; the climb is `None` where it is not known.
+    /// Takes a height; the climb is `None` if unknown.
     fn take(&mut self, at: Instant, height_m: f32, climb_mps: Option<f32>) {
         let step = self.at.age(at).filter(|step| *step <= PAUSE);
         let risen_m = height_m - self.height_m;
@@ -67,14 +69,14 @@ impl Leap {
         self.late_m = (kept * self.late_m).max(RECEIVER_LATE_S * libm::fabsf(climb_mps));
     }
 
-    /// How far, m, either way.
+    /// The movement in either direction, m.
     fn far_m(&self) -> f32 {
         (libm::fabsf(self.leapt_m) - self.late_m).max(0.0)
     }
 }
 
-/// The last sample of the barometer: height above that of the first one, m; the dynamic pressure of the speed over ground as a height, m;
-/// the climb, m/s.
+/// The last sample of the barometer: height above that of the first one, m; dynamic pressure of the ground speed as a
+/// height, m; climb, m/s.
 #[derive(Clone, Copy, Debug, Default)]
 struct Sample {
     at: Stamp,
@@ -89,7 +91,7 @@ pub(crate) struct Heights {
     /// The first pressure of the flight, hPa; 0 before it.
     first_hpa: f32,
     sample: Sample,
-    /// The last sample leapt, and was passed over.
+    /// The last sample leapt and was skipped.
     is_doubted: bool,
     /// Usual height and half of the usual dynamic pressure, both in m.
     air: Option<[f32; 2]>,
@@ -98,7 +100,6 @@ pub(crate) struct Heights {
 }
 
 impl Heights {
-    /// Nothing seen.
     pub(crate) const NEW: Self = Self {
         first_hpa: 0.0,
         sample: Sample { at: Stamp::NONE, height_m: 0.0, wind_m: 0.0, climb_mps: 0.0 },
@@ -145,7 +146,7 @@ impl Heights {
             residuals.take(Comparison::BaroNoise, at, gates, (off_m - late_m).max(0.0), 0.0);
         }
         let display = vehicle.hud.within(at, PAUSE).and_then(|hud| hud.climb).map(|climb| climb.0);
-        // Nothing but zeros is sent if no climb is known.
+        // Zero is sent if no climb is known.
         if let Some(climb_mps) = display.filter(|climb| climb.abs() > 0.0 && climb.abs() <= SPEED_MAX_MPS) {
             let missing_m = risen_m - step_s * climb_mps;
             let by_wind_m = libm::fabsf(wind_m - before.wind_m);
@@ -185,7 +186,7 @@ impl Heights {
         smooth(usual, air, learnt_s / (AIR_S + learnt_s), f32::INFINITY);
     }
 
-    /// How far the receiver's height has leapt alone, m.
+    /// The leap of the receiver's height alone, m.
     pub(crate) fn receiver_leapt(&self, now: Instant) -> Option<Reading> {
         let [barometer_m, receiver_m] = self.leaps.map(|leap| leap.far_m());
         let alone_m = if receiver_m > 2.0 * barometer_m { receiver_m } else { 0.0 };

@@ -2,14 +2,14 @@
 
 use crate::usage::Form;
 
-/// An item that cannot be read: too short, or of no version that this one knows.
+/// An item that cannot be read: too short, or without a known version.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Unreadable;
 
 /// An item that outlives power.
 ///
-/// A later version only appends fields: an earlier one leaves them out, and fields that an item of an earlier version lacks stay
-/// as they are in [`Self::EMPTY`].
+/// A later version only appends fields. An earlier one ignores them; fields that an older item lacks stay as in
+/// [`Self::EMPTY`].
 pub trait Item: Sized {
     /// The stored form's version, from 1.
     const VERSION: u8;
@@ -19,16 +19,16 @@ pub trait Item: Sized {
     const BYTES: usize;
     /// Whether numbers take only as many bytes as they need.
     const SHORT: bool = false;
-    /// Nothing counted.
+    /// Counts nothing.
     const EMPTY: Self;
 
     /// Every field in its stored order.
     ///
     /// # Errors
-    /// [`Unreadable`] where the stored form ends too early; writing has none.
+    /// [`Unreadable`] if the stored form ends too early; writing has none.
     fn fields(&mut self, fields: &mut Fields<'_>) -> Result<(), Unreadable>;
 
-    /// Writes the stored form; gives its length. `out` has [`Self::BYTES`] at least.
+    /// Writes the stored form; returns its length. `out` has [`Self::BYTES`] at least.
     fn encode(mut self, out: &mut [u8]) -> usize {
         let mut fields = Fields::write(out, Self::VERSION);
         fields.short = Self::SHORT;
@@ -40,7 +40,7 @@ pub trait Item: Sized {
     /// Reads the stored form, of this version or a later one, or of an earlier one from [`Self::OLDEST`] on.
     ///
     /// # Errors
-    /// [`Unreadable`] where it ends too early, or is of no such version.
+    /// [`Unreadable`] if it ends too early, or has an unknown version.
     fn decode(stored: &[u8]) -> Result<Self, Unreadable> {
         let mut item = Self::EMPTY;
         let mut fields = Fields::read(stored, Self::OLDEST, Self::VERSION)?;
@@ -60,7 +60,7 @@ pub struct Fields<'a> {
     way: Way<'a>,
     at: usize,
     short: bool,
-    /// It was written by an earlier version: fields are missing at its end.
+    /// An earlier version wrote it: fields are missing at its end.
     lacks: bool,
 }
 
@@ -111,7 +111,7 @@ impl<'a> Fields<'a> {
         Ok(())
     }
 
-    /// A count; where numbers are short, LEB128: seven bits a byte, the lowest first, the last byte with the top bit clear.
+    /// A count. The short form is LEB128: seven bits a byte, the lowest first, the last byte with the top bit clear.
     pub(crate) fn count(&mut self, count: &mut u32) -> Result<(), Unreadable> {
         if !self.short || (self.lacks && self.is_read()) {
             return count.code(self);
@@ -133,7 +133,7 @@ impl<'a> Fields<'a> {
         Err(Unreadable)
     }
 
-    /// A counter by its form; read, none is negative, and no sum or maximum is without end.
+    /// A counter by its form. On reading, negative and infinite values are rejected, except for a minimum.
     pub(crate) fn counter(&mut self, form: Form, value: &mut f64) -> Result<(), Unreadable> {
         let parts = match form {
             Form::Tenths => 10.0,
@@ -161,7 +161,7 @@ impl<'a> Fields<'a> {
         Ok(())
     }
 
-    /// A list; where numbers are short, with how many of it are used, and no more than these.
+    /// A list. The short form stores the number of used members, and only these.
     pub(crate) fn list<T>(
         &mut self,
         list: &mut [T],

@@ -1,4 +1,4 @@
-//! Causes: what is wrong, as an autopilot sees it, in terms that people know; and the flags that say so by themselves.
+//! Causes: faults as an autopilot reports them, in common terms, and the status flags that report each.
 
 use crate::numbered::numbered;
 
@@ -50,10 +50,10 @@ numbered! {
     }
 }
 
-/// What the autopilot says once, in a text or an event.
+/// A fault that the autopilot reports once, in a text or an event.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Alert {
-    /// What is wrong.
+    /// The fault.
     pub cause: Cause,
     /// How bad it is.
     pub urgency: Urgency,
@@ -85,12 +85,12 @@ impl Alert {
     }
 }
 
-/// What a table says of a text or an event.
+/// The meaning of a text or an event, by the tables.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Meaning {
     /// Something is wrong.
     Wrong(Alert),
-    /// Nothing is wrong in flight: about arming, set-up, a command, or the end of what was wrong.
+    /// No fault in flight: arming, set-up, a command, or the end of a fault.
     Fine,
     /// It is in no table.
     Unknown,
@@ -134,8 +134,9 @@ impl Causes {
         set.fold(Self::NONE, |causes, (_, cause)| causes.with(*cause))
     }
 
-    /// What bits of `MAV_SYS_STATUS_SENSOR` say (source: `common.xml`). Pre-arm checks (28) say nothing in
-    /// flight, the heights of the ground (22) come from a card or a ground station, and an autopilot that needs them says so itself.
+    /// The causes of bits of `MAV_SYS_STATUS_SENSOR` (source: `common.xml`). Pre-arm checks (28) mean nothing in
+    /// flight. Terrain (22) comes from a card or a ground station, and an autopilot that needs it reports that
+    /// itself.
     pub fn of_sensors(sensors: u32) -> Self {
         const SENSORS: &[(u32, Cause)] = &[
             (1 | 1 << 17, Cause::Gyro),
@@ -159,7 +160,7 @@ impl Causes {
         Self::of_bits(sensors, SENSORS)
     }
 
-    /// What `HIGH_LATENCY2.failure_flags` say (`HL_FAILURE_FLAG` of `common.xml`).
+    /// The causes of `HIGH_LATENCY2.failure_flags` (`HL_FAILURE_FLAG` of `common.xml`).
     pub fn of_failure_flags(flags: u16) -> Self {
         const FLAGS: &[(u32, Cause)] = &[
             (1, Cause::Gnss),

@@ -1,69 +1,74 @@
-//! How many cells in series a battery has. A wrong count is worse than none: it hides an empty pack, or calls a good one
-//! empty. So a count is known, or it is not; then nothing follows from the voltage of a cell, and the pilot is told what to set.
+//! Cells in series of a battery.
+//!
+//! A wrong count is worse than none: it hides an empty pack, or calls a good one empty. So without a certain count
+//! nothing follows from cell voltage, and the pilot gets a text that names the setting.
 //!
 //! In this order:
-//! 1. the setting `BAT_CELLS`, which is of every pack: for one whose voltage does not fit it (the second pack is another one) the
-//!    count is not known, unless its cells are reported one by one;
-//! 2. the cells that the battery reports one by one;
-//! 3. the autopilot's parameters, as far as the measured voltage does not contradict them;
-//! 4. the highest voltage since power-on, of a pack at rest, where only one count fits it: 3.5 to 4.4 V a cell;
-//! 5. the count of earlier flights, where it is one of several that fit and a cell has 3.7 V by it at rest. Packs are swapped: what
-//!    does not fit is not believed. A full pack of one cell less is told apart (a 5S after a 6S has 3.5 V a cell of six); one
-//!    of a cell more that is half empty is not (a 7S of 25.9 V after a 6S).
 //!
-//! A pack is another one when its voltage falls by a third while the vehicle is disarmed.
+//! 1. The setting `BAT_CELLS`, for every pack. If the voltage does not fit it (another second pack), the count is
+//!    unknown, unless the cells are reported one by one.
+//! 2. The cells that the battery reports one by one.
+//! 3. The autopilot's parameters, as far as the measured voltage does not contradict them.
+//! 4. The highest voltage since power-on, of a pack at rest, if only one count fits it: 3.5 to 4.4 V a cell.
+//! 5. The count of earlier flights, if it is one of several that fit and gives 3.7 V a cell at rest.
+//!
+//! Packs are swapped, so a stored count must fit the voltage. A full pack with one cell less is recognised (a 5S
+//! after a 6S has 3.5 V a cell of six). A half empty pack with one cell more is not (a 7S of 25.9 V after a 6S).
+//!
+//! A pack is a new one when its voltage falls by a third while the vehicle is disarmed.
 
 use crate::vehicle::BATTERIES_MAX;
 
-/// Cells of one battery at most.
+/// Maximum cells of one battery.
 pub const COUNT_MAX: usize = 24;
-/// Batteries of which autopilots have parameters.
+/// Batteries for which autopilots have parameters.
 const SET_MAX: usize = 2;
-/// No cell shows more: a full one has 4.2 V, a high-voltage one 4.35 V.
+/// The highest voltage of a cell: a full one has 4.2 V, a high-voltage one 4.35 V.
 const CELL_HIGHEST_V: f32 = 4.4;
-/// A pack at rest that is flown with has more than this a cell: lithium polymer is nearly empty there, lithium ion below half.
+/// The least voltage of a cell at rest before a flight: lithium polymer is nearly empty there, lithium ion below
+/// half.
 const CELL_RESTING_V: f32 = 3.5;
-/// A cell at rest has more than this by a count of earlier flights that one of several is chosen by.
+/// The least voltage of a cell at rest by which a count of earlier flights is chosen among several.
 const CELL_CONFIRMED_V: f32 = 3.7;
-/// A cell has this at least: nearly empty, and under load.
+/// The least voltage of a cell, nearly empty, at rest and under load.
 const CELL_EMPTY_V: f32 = 3.0;
 const CELL_LOADED_V: f32 = 2.8;
-/// A pack whose voltage falls below this part of its highest, disarmed, is another one.
+/// A pack whose voltage falls below this part of its highest while disarmed is a new one.
 const ANOTHER: f32 = 0.7;
-/// Beside a stored count: the last flight did not know it.
+/// Flag of a stored count that the last flight did not confirm.
 pub(crate) const DOUBTED: u8 = 0x80;
-/// Below this nothing is plugged in.
+/// Below this no battery is connected.
 const PLUGGED_V: f32 = 2.5;
-/// `ArduPilot`'s `BATT_LOW_VOLT` as delivered says nothing of the pack.
+/// The default of `ArduPilot`'s `BATT_LOW_VOLT`, which does not depend on the pack.
 const LOW_AS_DELIVERED_V: f32 = 10.5;
 
-/// What a parameter of the autopilot says of a battery.
+/// The meaning of an autopilot's parameter for a battery.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Setting {
-    /// How many cells.
+    /// The number of cells.
     Count = 0,
     /// The pack's voltage when it is full.
     Full = 1,
-    /// When it is empty.
+    /// The pack's voltage when it is empty.
     Empty = 2,
-    /// When it is low.
+    /// The pack's voltage when it is low.
     Low = 3,
-    /// When it is critical.
+    /// The pack's voltage when it is critical.
     Critical = 4,
-    /// Not of the cells: its capacity, mAh.
+    /// Not about cells: its capacity, mAh.
     Capacity = 5,
 }
 
 const SETTINGS: usize = 6;
 
-/// What a cell has at these settings, V: from, to.
+/// Range of a cell's voltage at these settings, V.
 const CELL_V: [(f32, f32); SETTINGS - 1] = [(0.0, 0.0), (4.08, 4.4), (2.7, 3.75), (3.25, 3.8), (2.9, 3.7)];
 
-/// A parameter of the autopilot that says something of a battery: who has it, its name, of which battery, and what.
+/// An autopilot's parameter for a battery: whether it is PX4's, its name, the battery, its meaning.
 pub type Known = (bool, &'static str, u8, Setting);
 
-/// All of them; `true`: PX4's.
+/// All of them.
 pub const KNOWN: [Known; 17] = [
     (true, "BAT1_N_CELLS", 0, Setting::Count),
     (true, "BAT2_N_CELLS", 1, Setting::Count),
@@ -92,23 +97,23 @@ pub fn known(name: &str) -> Option<u8> {
 #[derive(Clone, Copy, Debug)]
 struct Pack {
     highest_v: f32,
-    /// Which of the autopilot's: its parameters go by that, and not by the order in which batteries were heard.
+    /// The autopilot's id of the battery, by which parameters go. The order of first messages may differ.
     id: u8,
     /// The highest voltage, or part of it, was measured at rest.
     rested: bool,
-    /// Of earlier flights; 0 for none.
+    /// The count of earlier flights; 0 for none.
     before: u8,
-    /// The last of these could not confirm it.
+    /// The last flight did not confirm it.
     doubted: bool,
     /// 0: not known.
     count: u8,
 }
 
-/// What is known of the cells of all batteries.
+/// The cells of all batteries.
 #[derive(Clone, Copy, Debug)]
 pub struct Cells {
     packs: [Pack; BATTERIES_MAX],
-    /// By the battery's id and [`Setting`]; 0: not told, or not set.
+    /// By the battery's id and [`Setting`]; 0: unknown, or not set.
     settings: [[f32; SETTINGS]; SET_MAX],
 }
 
@@ -142,7 +147,7 @@ impl Cells {
         }
     }
 
-    /// The autopilot told the value of a parameter of [`KNOWN`].
+    /// The value of a parameter of [`KNOWN`].
     pub(crate) fn take_setting(&mut self, place: u8, value: f32) {
         let Some((_, _, battery, setting)) = KNOWN.get(usize::from(place)) else { return };
         let Some(of) = self.settings.get_mut(usize::from(*battery)) else { return };
@@ -152,7 +157,7 @@ impl Cells {
         (0..BATTERIES_MAX).for_each(|place| self.count(place));
     }
 
-    /// The count of earlier flights, with [`DOUBTED`] where the last one did not know it.
+    /// The count of earlier flights, with [`DOUBTED`] if the last one did not confirm it.
     pub(crate) fn remember(&mut self, battery: usize, count: u8) {
         if let Some(pack) = self.packs.get_mut(battery) {
             let known = count & !DOUBTED;
@@ -167,7 +172,7 @@ impl Cells {
         self.settings.first().is_some_and(|settings| settings[Setting::Full as usize] > 0.0)
     }
 
-    /// What the parameters leave of these counts; what contradicts all of them is not believed.
+    /// The counts that the parameters leave of these. A parameter that contradicts all of them is ignored.
     fn by_settings(&self, id: u8, possible: Counts) -> (Counts, bool) {
         let Some(settings) = self.settings.get(usize::from(id)) else { return (possible, false) };
         let (mut left, mut said) = (possible, false);
@@ -200,7 +205,7 @@ impl Cells {
             _ => resting,
         };
         let is_sure = left.is_power_of_two() && (said || rested);
-        // In the air a cell may have anything: only what was known up to then is believed.
+        // In the air a cell may have any voltage: only a count from before is believed.
         let is_likely = if rested { highest_v >= f32::from(before) * CELL_CONFIRMED_V } else { !doubted };
         let confirmed = before > 0 && left >> before & 1 == 1 && is_likely;
         if let Some(pack) = self.packs.get_mut(battery) {
@@ -212,7 +217,7 @@ impl Cells {
         }
     }
 
-    /// Whether the highest voltage of the battery at a place may be that of so many cells.
+    /// Whether this count fits the battery's highest voltage.
     pub(crate) fn fits(&self, battery: usize, count: u8) -> bool {
         self.packs.get(battery).is_some_and(|pack| {
             let lowest_v = if pack.rested { CELL_EMPTY_V } else { CELL_LOADED_V };
@@ -220,12 +225,12 @@ impl Cells {
         })
     }
 
-    /// How many; 0 where it is not known.
+    /// The count; 0 if unknown.
     pub(crate) fn of(&self, battery: usize) -> u8 {
         self.packs.get(battery).map_or(0, |pack| pack.count)
     }
 
-    /// Of all batteries that were heard, by the autopilot's parameters, Ah; 0 where it is not known of each.
+    /// Capacity of all batteries together, by the autopilot's parameters, Ah; 0 unless each is known.
     pub(crate) fn capacity_ah(&self) -> f32 {
         let heard = self.packs.iter().filter(|pack| pack.highest_v > 0.0);
         let each = heard.map(|pack| {
@@ -238,7 +243,7 @@ impl Cells {
         .unwrap_or(0.0)
     }
 
-    /// Whether a voltage was heard of this battery.
+    /// Whether a voltage of this battery was received.
     pub(crate) fn has_voltage(&self, battery: usize) -> bool {
         self.packs.get(battery).is_some_and(|pack| pack.highest_v > 0.0)
     }
@@ -271,7 +276,7 @@ mod tests {
                 );
             }
         }
-        // What is common is known without any help.
+        // Common packs are known without any help.
         for (pack_v, count) in
             [(4.2, 1), (3.8, 1), (8.4, 2), (12.6, 3), (11.4, 3), (16.8, 4), (15.2, 4), (17.4, 4)]
         {
@@ -336,7 +341,7 @@ mod tests {
         let mut unfit = plugged(30.4);
         unfit.remember(0, 6);
         assert_eq!(unfit.of(0), 0);
-        // A full 5S after a 6S is no empty 6S. A 6S at 3.7 V is one.
+        // A full 5S after a 6S is not taken for an empty 6S. A 6S at 3.7 V is.
         for (pack_v, before, count) in [(21.1, 6, 0), (21.7, 6, 0), (22.3, 6, 6), (25.2, 7, 0), (50.4, 14, 0)]
         {
             let mut cells = plugged(pack_v);

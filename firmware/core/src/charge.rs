@@ -1,8 +1,9 @@
-//! A battery's capacity: the charge that it gave over how far its cells' state of charge fell, from rest before a take-off on.
+//! A battery's capacity: the charge that it gave, divided by the fall of its cells' state of charge since the rest
+//! before take-off.
 //!
-//! The state of charge follows from the voltage that a cell has without load, which in flight is the measured one without its sag. The
-//! curve is that of one polymer lithium-ion cell; another cell's differs, and so the figure is not the capacity on its label. It is
-//! compared with its own past only.
+//! The state of charge follows from the cell voltage without load: in flight the measured one without its sag. The
+//! curve belongs to one polymer lithium-ion cell, and another cell differs. So the figure is not the capacity on the
+//! label, and is compared only with its own past.
 
 use crate::derived::Derived;
 use crate::latest::Latest;
@@ -10,12 +11,12 @@ use crate::params::Params;
 use crate::units::Amperes;
 use crate::vehicle::Vehicle;
 
-/// What no cell is charged beyond, by the curve: 4.25 V.
+/// The highest state on the curve: 4.25 V.
 const FULL: f32 = 1.15;
-/// The least fall of the state of charge that tells: what a measured voltage is wrong by (10 mV) is 5 % of it in the flat part.
+/// The least fall of the state of charge. An error of 10 mV is 5 % of it in the flat part of the curve.
 const FALL_MIN: f32 = 0.3;
 
-/// What a battery had before a flight.
+/// The state of a battery before a flight.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Charge {
     state: f32,
@@ -24,7 +25,7 @@ pub(crate) struct Charge {
 }
 
 impl Charge {
-    /// What a battery has; `None` for what is no lithium battery, or whose cells or charge are not known.
+    /// The state of a battery; `None` unless it is a lithium battery with known cells and charge.
     pub(crate) fn of(vehicle: &Vehicle, derived: &Derived, params: &Params, battery: u8) -> Option<Self> {
         let known = vehicle.batteries.get(usize::from(battery)).and_then(Latest::get)?;
         let consumed_ah = known.consumed?.0;
@@ -33,7 +34,8 @@ impl Charge {
             .then(|| Self { state: state_of_charge(cell_v), consumed_ah })
     }
 
-    /// The whole capacity, Ah, by what is left in flight; `None` where too little was taken, or the sag under the load is not known.
+    /// The whole capacity, Ah, from the state `now` in flight; `None` if too little was taken, or if the sag under
+    /// load is not known.
     pub(crate) fn capacity_ah(&self, now: &Self, derived: &Derived, battery: u8) -> Option<f32> {
         let sags = derived.resistance(usize::from(battery))?.sag_v(Amperes(1.0)) > 0.0;
         let fall = self.state - now.state;

@@ -1,8 +1,8 @@
 //! Components: parts that wear and are replaced, each with its own hours, flights and cycles and its own limits.
 //!
-//! What a component is, and its limits, are parameters (`CMP1_KIND` and so on); its name and serial number, and what it
-//! has run, are an item that outlives power. It is green, from [`Param::CompYellow`] percent of whichever limit trips
-//! first yellow, and from [`Param::CompRed`] percent red. Replacing one is recorded with the old part's figures.
+//! Kind and limits of a component are parameters (`CMP1_KIND` and so on). Its name, serial number and figures are an
+//! item that outlives power. It is green, from [`Param::CompYellow`] percent of whichever limit trips first yellow,
+//! and from [`Param::CompRed`] percent red. Replacing one is recorded with the old part's figures.
 
 use crate::bytes::{Fields, Item, Unreadable, fields};
 use crate::health::finding::Subsystem;
@@ -46,7 +46,7 @@ impl Label {
 }
 
 numbered! {
-    /// What a component is. The numbers are those of `CMPn_KIND`, and are stored.
+    /// The kind of a component. The numbers are those of `CMPn_KIND`, and are stored.
     #[derive(Default)]
     pub enum Kind {
         /// No component.
@@ -94,18 +94,18 @@ impl Kind {
     }
 }
 
-/// What a component has run.
+/// Wear figures of a component.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Figures {
     /// Seconds powered.
     pub powered_s: f64,
     /// Seconds in the air.
     pub flight_s: f64,
-    /// Seconds that its motor turned; of several, the one that turned longest.
+    /// Seconds that its motor turned; of several motors, the longest.
     pub motor_s: f64,
     /// Take-offs.
     pub flights: f64,
-    /// Full discharges of its battery; of several, of all together.
+    /// Full discharges of its battery; of several batteries, of all together.
     pub cycles: f64,
 }
 
@@ -123,7 +123,7 @@ impl Figures {
         }
     }
 
-    /// What a part of this kind and number has run in a session.
+    /// The figures of a part of this kind and number in one session.
     pub fn after(wear: &Wear<'_>, kind: Kind, number: u8) -> Self {
         if kind == Kind::None {
             return Self::ZERO;
@@ -152,7 +152,7 @@ impl Figures {
     }
 }
 
-/// What parameters say of a component. Those of all components follow each other, each in this order.
+/// The parameters of a component. Those of all components follow each other, each in this order.
 #[derive(Clone, Copy)]
 enum Setting {
     Kind,
@@ -171,7 +171,7 @@ const _: () = {
 impl Setting {
     const COUNT: usize = 6;
 
-    /// Of the component at a place; 0 where there is no such place.
+    /// The value for the component at a place; 0 if there is no such place.
     fn of(self, place: usize, params: &Params) -> f32 {
         let index = Param::Cmp1Kind as usize + place * Self::COUNT + self as usize;
         let param = Param::ALL.get(index).filter(|_| place < COMPONENTS_MAX);
@@ -214,19 +214,19 @@ impl Status {
 /// One component.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Component {
-    /// What the operator calls it.
+    /// The operator's name for it.
     pub name: Label,
     /// Its serial number.
     pub serial: Label,
-    /// What it is.
+    /// Its kind.
     pub kind: Kind,
     /// Which of its kind, from 1; 0 is all of them, or the only one.
     pub number: u8,
     /// How often the part in this place was replaced.
     pub replaced: u16,
-    /// What it has run, less what the session counted: it came into the session, or changed, in the middle of it.
+    /// Its figures less those of the session, because it may have come into the session, or changed, in the middle.
     base: Figures,
-    /// Before which power-on; stored items only.
+    /// The power-on before which `base` counts; stored items only.
     as_of: u32,
 }
 
@@ -242,12 +242,12 @@ impl Component {
         as_of: 0,
     };
 
-    /// What it has run over its life.
+    /// Its figures over its life.
     pub fn figures(&self, wear: &Wear<'_>) -> Figures {
         self.base.zip(Figures::after(wear, self.kind, self.number), |base, ran| (base + ran).max(0.0))
     }
 
-    /// The part of its life that is used, percent, by the limit that trips first; `None` where it has no limit.
+    /// The part of its life that is used, percent, by the limit that trips first; `None` if it has no limit.
     pub fn used_percent(&self, place: usize, wear: &Wear<'_>, params: &Params) -> Option<f32> {
         if self.kind == Kind::None {
             return None;
@@ -279,8 +279,7 @@ impl Component {
         }
     }
 
-    /// Takes what its parameters say it is; `true` where that is something else than before. What it ran as the other
-    /// stays.
+    /// Takes kind and number from its parameters; `true` if they changed. The figures stay.
     pub(crate) fn describe(&mut self, place: usize, wear: &Wear<'_>, params: &Params) -> bool {
         let kind = Kind::from_number(Setting::Kind.of(place, params) as u8).unwrap_or_default();
         let number = (Setting::Number.of(place, params) as u8).min(MOTORS_MAX as u8);
@@ -292,7 +291,7 @@ impl Component {
         true
     }
 
-    /// Another part is in its place: it has run nothing. Gives the old one.
+    /// Puts a new part in its place, with no wear. Returns the old one.
     pub(crate) fn replace(&mut self, serial: Label, wear: &Wear<'_>) -> Self {
         let old = Self { base: self.figures(wear), ..*self };
         self.serial = serial;
@@ -302,44 +301,45 @@ impl Component {
         old
     }
 
-    /// What it had run, of one that [`crate::Monitor`] gives away: no session adds to it.
+    /// Figures of a component from [`crate::Monitor`], to which no session adds.
     pub const fn ran(&self) -> Figures {
         self.base
     }
 
-    /// The same, having run so much.
+    /// The same component with these figures.
     pub const fn having_run(self, ran: Figures) -> Self {
         Self { base: ran, ..self }
     }
 
-    /// The same in a session that has counted so much of what it ran already.
+    /// The same component in a session that has counted a part of its figures already.
     pub(crate) fn in_session(self, wear: &Wear<'_>) -> Self {
         let counted = Figures::after(wear, self.kind, self.number);
         self.having_run(self.base.zip(counted, |ran, counted| ran - counted))
     }
 
-    /// Whether it is to be saved anew, because it was stored as of an earlier power-on.
+    /// Marks it as counted before this power-on; whether that is new, so that it is saved again.
     pub(crate) const fn begin(&mut self, boots: u32) -> bool {
         let begins = self.as_of != boots;
         self.as_of = boots;
         begins
     }
 
-    /// Adds what the session of power-on `boots` counted, if it is not in it already.
+    /// Adds the session of power-on `boots`, unless its figures include that session.
     pub(crate) fn add(&mut self, boots: u32, wear: &Wear<'_>) {
         if boots == self.as_of {
             self.base = self.figures(wear);
         }
     }
 
-    /// As it is stored: as of the beginning of this power-on.
+    /// The stored form: figures as of the beginning of this power-on.
     pub(crate) const fn as_of(self, boots: u32) -> Self {
         Self { as_of: boots, ..self }
     }
 }
 
-/// Version, kind, number, replaced, name, serial; powered, flight and motor time in tenths of a second, flights, and cycles, which
-/// are negative where the session had counted before the component came into it; since version 2 which power-on it is as of.
+/// Version, kind, number, replaced, name, serial; powered, flight and motor time in tenths of a second, flights,
+/// cycles. Figures are negative if the session had counted before the component came into it. Since version 2 the
+/// power-on follows.
 impl Item for Component {
     const VERSION: u8 = 2;
     const BYTES: usize = 65;

@@ -1,31 +1,33 @@
-//! Whose vehicle it is: of the systems on the autopilot's port, the one that streams most.
+//! Election of the vehicle: of the systems on the autopilot's port, the one that streams most.
 //!
-//! An autopilot forwards what other systems say, so the first heartbeat on the port may be of another vehicle. The first
-//! one heard is taken at once, so that nothing waits; for [`SETTLES`] another one takes its place if it says far more.
-//! Then the choice stands until the vehicle has been silent for [`SILENT`]: the autopilot was changed, or its system id.
+//! An autopilot forwards other systems' messages, so the first heartbeat on the port may be another vehicle's. The
+//! first system is taken at once, so that nothing waits. For [`SETTLES`] another one takes its place if it streams
+//! far more. Then the choice stands until the vehicle has been silent for [`SILENT`]: the autopilot was changed, or
+//! its system id.
 //!
-//! A vehicle that makes no stream gives way to one that does, at any time. Autopilots may be silent until they are asked, so
-//! while more than one is heard and none streamed by itself each is asked in `TURN`s, and the choice does not stand before
-//! each has had its turn: the one at the port streams more than one that is heard over a radio.
+//! A vehicle without a stream gives way to a system with one at any time. Autopilots may be silent until they are
+//! asked for streams. So while several send heartbeats and none streams by itself, each is asked for one `TURN`; the
+//! choice stands once all had theirs. The one at the port then streams more than one that is received over a radio.
 
 use crate::observation::{Autopilot, Source};
 use crate::time::{Instant, Span};
 
-/// Autopilots that are compared; more than these are not counted.
+/// Autopilots that are compared; others are not counted.
 const CANDIDATES_MAX: usize = 4;
 /// How long after the first heartbeat another system may take its place.
 pub const SETTLES: Span = Span::from_secs(10);
 /// How long the vehicle must have been silent before another one is chosen.
 pub const SILENT: Span = Span::from_secs(30);
-/// What is counted is of this long.
+/// Observations are counted in windows of this length.
 const WINDOW: Span = Span::from_secs(10);
 /// Observations in a window that make a stream: heartbeats alone, one a second, are fewer.
 const STREAM_MIN: u16 = 20;
-/// How long each is asked: it is listened to for 5 s, and then asked for one message after the other, or for groups of them.
+/// Time in which one system is asked. Its streams are awaited for 5 s before it is asked message by message, or by
+/// groups.
 const TURN: Span = Span::from_secs(15);
-/// Nobody is asked before. Who streams by then does it by itself.
+/// No system is asked before. One that streams by then does so by itself.
 const UNASKED: Span = Span::from_secs(5);
-/// Another system has to say so many times more.
+/// A system takes the vehicle's place if it has this many times its observations.
 const FAR_MORE: u16 = 2;
 
 /// An autopilot that sent a heartbeat.
@@ -40,7 +42,7 @@ struct Candidate {
 }
 
 impl Candidate {
-    /// What it says, in the busier of the last two windows.
+    /// Observations in the busier of the last two windows.
     const fn says(&self) -> u16 {
         if self.now > self.before { self.now } else { self.before }
     }
@@ -76,12 +78,12 @@ impl Election {
         }
     }
 
-    /// Whether the choice stands for as long as the vehicle is heard.
+    /// Whether the choice stands as long as heartbeats come.
     pub(crate) fn is_settled(&self, now: Instant) -> bool {
         self.settled || (self.lasts(now) >= SETTLES && self.heard(now).count() == 1)
     }
 
-    /// Who is to be asked for streams now.
+    /// The system to ask for streams now.
     pub(crate) fn asks(&self, now: Instant, vehicle: Source) -> Option<(Source, Autopilot)> {
         let count = self.heard(now).count();
         let asked = if self.settled || count < 2 || self.is_decided(now) {
@@ -93,24 +95,25 @@ impl Election {
         asked.map(|candidate| (candidate.source, candidate.autopilot))
     }
 
-    /// Whether nothing that is asked changes the choice any more.
+    /// Whether asking further cannot change the choice.
     fn is_decided(&self, now: Instant) -> bool {
         let turns = self.heard(now).count() as u64;
         let over = now.since(self.first).as_millis() >= turns * TURN.as_millis();
         self.by_itself || (self.streams && (turns < 2 || over))
     }
 
-    /// Who was heard of late.
+    /// Candidates with an observation within [`SILENT`].
     fn heard(&self, now: Instant) -> impl Iterator<Item = &Candidate> {
         self.candidates.iter().flatten().filter(move |candidate| now.since(candidate.heard) < SILENT)
     }
 
-    /// How long the vehicle has been the vehicle.
+    /// Time since this vehicle was chosen.
     pub(crate) fn lasts(&self, now: Instant) -> Span {
         self.since.map_or(Span::ZERO, |since| now.since(since))
     }
 
-    /// Takes note of an observation; who the vehicle is from now on. `heartbeat`: it is that of such an autopilot.
+    /// Counts an observation and returns the vehicle from now on. `heartbeat`: the autopilot, if the observation is a
+    /// heartbeat.
     pub(crate) fn hear(
         &mut self,
         at: Instant,
@@ -149,7 +152,7 @@ impl Election {
         source
     }
 
-    /// So much the vehicle says.
+    /// Notes whether the vehicle streams: `says` is its number of observations.
     fn note_stream(&mut self, at: Instant, says: u16) {
         if !self.streams && says >= STREAM_MIN {
             self.streams = true;
@@ -170,7 +173,7 @@ impl Election {
         }
         let known = |slot: &Option<Candidate>| slot.is_some_and(|candidate| candidate.source == source);
         let place = self.candidates.iter().position(known).or_else(|| {
-            // A newcomer takes a free place, or that of one who fell silent and is not the vehicle.
+            // A newcomer takes a free place, or the place of a silent system that is not the vehicle.
             let gone = |slot: &Option<Candidate>| {
                 slot.is_none_or(|old| at.since(old.heard) >= SILENT && Some(old.source) != vehicle)
             };
@@ -196,7 +199,8 @@ mod tests {
     const OURS: Source = Source { system: 1, component: 1 };
     const OTHER: Source = Source { system: 7, component: 1 };
 
-    /// Each tenth of a second: who speaks in it, with a heartbeat every second. Who is the vehicle at the end.
+    /// A run of tenths of a second: each system has a period in ms, and a heartbeat every second. Returns the vehicle
+    /// at the end.
     fn hear(
         election: &mut Election,
         mut vehicle: Option<Source>,
@@ -273,7 +277,7 @@ mod tests {
         }
     }
 
-    /// Two minutes in which the other's heartbeat comes first, and each streams so often once it was asked for 6 s, and for good.
+    /// Two minutes. The other system's heartbeat comes first; each streams for good once it was asked for 6 s.
     fn asked_in_turns(ours_ms: u64, others_ms: u64) -> (Option<Source>, Option<Source>, bool) {
         let mut election = Election::new();
         let (mut vehicle, mut asked) = (None, [(OTHER, 0), (OURS, 0)]);
@@ -298,7 +302,7 @@ mod tests {
     #[test]
     fn one_that_is_silent_until_it_is_asked_is_asked_though_another_was_heard_first() {
         assert_eq!(asked_in_turns(100, 1_000), (Some(OURS), Some(OURS), true));
-        // The other one streams too, when it is asked: over a radio, so far less.
+        // The other one streams too when it is asked, but less: over a radio.
         assert_eq!(asked_in_turns(100, 300), (Some(OURS), Some(OURS), true));
         let (_, _, settled) = asked_in_turns(1_000, 1_000);
         assert!(!settled, "nobody streams: they are asked on");

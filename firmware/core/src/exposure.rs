@@ -39,7 +39,7 @@ impl Quantity {
         }
     }
 
-    /// Where one range ends and the next begins. Stored counts are by range: these never change.
+    /// The edges between ranges. Stored counts are by range, so these never change.
     pub(crate) const fn edges(self) -> [f32; BINS - 1] {
         match self {
             Self::EscTemperature => [30.0, 45.0, 60.0, 75.0, 90.0, 100.0, 110.0],
@@ -89,13 +89,13 @@ pub struct Exposure {
     last: Option<Instant>,
     session: Tenths,
     before: Tenths,
-    /// Before which power-on.
+    /// The power-on before which `before` counts.
     as_of: u32,
 }
 
 /// How often the time in ranges is counted.
 const EVERY: Span = Span::from_millis(100);
-/// Longer steps are gaps: nothing is known of what happened in them.
+/// A longer step is a gap and is not counted.
 const STEP_MAX: Span = Span::from_secs(2);
 
 impl Default for Exposure {
@@ -105,12 +105,12 @@ impl Default for Exposure {
 }
 
 impl Exposure {
-    /// No time at all.
+    /// No time counted.
     pub const fn new() -> Self {
         Self { last: None, session: NOTHING, before: NOTHING, as_of: 0 }
     }
 
-    /// One step; `current_a` is what all batteries together give, where that is known.
+    /// One step; `current_a` is the sum of all batteries, if known.
     pub(crate) fn step(&mut self, now: Instant, vehicle: &Vehicle, current_a: Option<f32>) {
         let step = self.last.map_or(Span::ZERO, |last| now.since(last));
         if self.last.is_some() && step < EVERY {
@@ -147,30 +147,30 @@ impl Exposure {
         both
     }
 
-    /// It is another airframe: what was before this session was not its own.
+    /// Forgets earlier sessions: they were another airframe's.
     pub(crate) fn forget_life(&mut self) {
         self.before = NOTHING;
     }
 
-    /// What this session has counted.
+    /// Tenths of a second of this session.
     pub(crate) const fn session(&self) -> &Tenths {
         &self.session
     }
 
-    /// Adds the session of power-on `boots`, if it is not in it already.
+    /// Adds the session of power-on `boots`, unless it is counted already.
     pub(crate) fn add(&mut self, boots: u32, session: &Tenths) {
         if boots == self.as_of {
             add(&mut self.before, session);
         }
     }
 
-    /// As it is stored: as of the beginning of this power-on.
+    /// The stored form: as of the beginning of this power-on.
     pub(crate) const fn as_of(self, boots: u32) -> Self {
         Self { as_of: boots, ..self }
     }
 }
 
-/// Version; tenths of a second in each range of each quantity; since version 2 which power-on it is as of.
+/// Version; tenths of a second in each range of each quantity; since version 2 the power-on.
 impl Item for Exposure {
     const VERSION: u8 = 2;
     const BYTES: usize = 165;

@@ -1,13 +1,15 @@
-//! Figures of a flight: quantities of steady flight that tell of wear and load, each as the mean of its last minute.
+//! Figures of a flight: quantities of steady flight that show wear and load, each as the mean of its last minute.
 //!
-//! Once a second in steady flight (hover, or cruise on wings; level) each quantity gives a sample. A sample far from the mean
-//! counts only for a part of its distance (`BELIEVED`): a gust or garbage moves the mean little. The mean at landing is the flight's
-//! figure. It is recorded with the session's counters; `hums check` compares the figures of flights.
+//! Once a second in steady flight (hover, or cruise on wings; level) each quantity gives a sample. A sample far from
+//! the mean counts only for a part of its distance (`BELIEVED`): a gust or garbage moves the mean little. The mean at
+//! landing is the flight's figure. It is recorded with the session's counters; `hums check` compares the figures of
+//! flights.
 //!
-//! Hover throttle depends on air density and on the battery's voltage: rotor speed goes with duty times voltage, thrust with its square
-//! and with density. `ArduPilot`'s throttle is linear in thrust, PX4's in speed (`THR_MDL_FAC` is 0 by default). The figure is the
-//! throttle at 3.8 V a cell and at sea level. If the autopilot compensates the voltage itself (`MOT_BAT_VOLT_MAX`), the voltage is left out.
-//! Hover power is given at sea level: the power for the same lift goes with the inverse root of density.
+//! Hover throttle depends on air density and on the battery's voltage: rotor speed goes with duty times voltage,
+//! thrust with its square and with density. `ArduPilot`'s throttle is linear in thrust, PX4's in speed (`THR_MDL_FAC`
+//! is 0 by default). The figure is the throttle at 3.8 V a cell and at sea level. If the autopilot compensates the
+//! voltage itself (`MOT_BAT_VOLT_MAX`), the voltage is left out. Hover power is given at sea level: the power for the
+//! same lift goes with the inverse root of density.
 
 use crate::charge::Charge;
 use crate::derived::{Derived, pack_v};
@@ -107,7 +109,7 @@ impl Quantity {
         }
     }
 
-    /// Whether a vehicle can have so much or so little.
+    /// Whether a value is physically possible.
     fn is_sane(self, value: f32) -> bool {
         let (least, most) = match self {
             Self::Vibration => (0.0, 1_000.0),
@@ -135,7 +137,7 @@ impl Track {
             return;
         }
         let believed = BELIEVED * self.mean.abs() + grain;
-        // Not `clamp`: its panic would print floating-point numbers, 12 KB of flash that nothing else takes.
+        // Not `clamp`: its panic would print floating-point numbers, 12 KB of flash that is otherwise unused.
         self.mean += (value - self.mean).max(-believed).min(believed) / f32::from(self.samples);
     }
 }
@@ -150,7 +152,6 @@ pub struct Figures {
 }
 
 impl Figures {
-    /// Nothing sampled yet.
     pub(crate) const NEW: Self = Self {
         tracks: [Track { mean: 0.0, samples: 0 }; Quantity::COUNT],
         charged: [None; BATTERIES_MAX],
@@ -208,7 +209,7 @@ impl Figures {
         charged.capacity_ah(&now, derived, battery)
     }
 
-    /// The mean of the last minute of steady flight; `None` before there was enough of it.
+    /// The mean of the last minute of steady flight; `None` before there were enough samples.
     pub fn get(&self, quantity: Quantity) -> Option<f32> {
         self.tracks.get(quantity.index()).filter(|track| track.samples >= SAMPLES_MIN).map(|track| track.mean)
     }
@@ -255,7 +256,7 @@ fn sample(
             (now.since(at) <= FRESH).then(|| derived.motors.departure(motor)).flatten()
         }
         Quantity::MotorOutput(motor) => derived.outputs.share(now, vehicle, motor),
-        // They are no figures of steady flight.
+        // Not figures of steady flight.
         Quantity::Resistance(_) | Quantity::Capacity(_) => None,
     }
 }
@@ -271,7 +272,8 @@ fn density(vehicle: &Vehicle) -> f32 {
     (1.0 + DENSITY_SLOPE * (pressure / SEA_LEVEL_HPA - 1.0)).max(0.0)
 }
 
-/// What the throttle is multiplied by to be that of [`CELL_V`] at sea level. `None` where the voltage of a cell is not known; 1 on wings.
+/// The factor that turns the throttle into that at [`CELL_V`] and sea level. `None` if the cell voltage is unknown; 1
+/// on wings.
 fn lift(now: Instant, vehicle: &Vehicle, derived: &Derived, params: &Params) -> Option<f32> {
     if vehicle.hovers(now) != Some(true) {
         return Some(1.0);

@@ -1,8 +1,8 @@
 //! A receiver's satellites and its dilution of precision against their baselines in this flight.
 //!
-//! How many satellites a receiver uses, and how well they stand, depends on the receiver, on the site and on the view of the antenna. A site
-//! with few is as it is; a sudden loss is a jammer that begins, a cable that comes off, or a view that is gone, and is worth a word
-//! while there are enough left. Both figures are followed as logarithms, since the lost part counts.
+//! Both depend on the receiver, on the site and on the view of the antenna, so a site with few satellites is normal.
+//! A sudden loss is not: a jammer, a loose cable or a blocked view. It is reported while enough satellites are left.
+//! Both figures are followed as logarithms, since the lost part counts.
 
 use crate::gates::Gates;
 use crate::latest::Reading;
@@ -10,7 +10,7 @@ use crate::observation::Gnss;
 use crate::residual::{Comparison, Residuals};
 use crate::time::Instant;
 
-/// No geometry is worth more, and a receiver of several systems says so much less that its least change is a large part.
+/// The best geometry that counts. Receivers of several systems report less, and then a small change is a large part.
 const HDOP_IDEAL: f32 = 1.0;
 
 /// Takes a receiver's figures with a fix.
@@ -41,7 +41,8 @@ mod tests {
     use super::*;
     use crate::gates;
 
-    /// The lost part and the rise of the dilution after seconds with so many satellites and such a dilution, five times a second.
+    /// The lost part and the rise of the dilution after seconds with these satellites and this dilution, five times a
+    /// second.
     fn told(said: impl Iterator<Item = (usize, u8, f32)>) -> (Option<f32>, Option<f32>) {
         let (mut residuals, mut now) = (Residuals::NEW, Instant::ZERO);
         for (seconds, satellites, hdop) in said {

@@ -1,11 +1,12 @@
-//! A receiver's velocity against how far its position moves: both come from the same signals, by different measurements.
+//! A receiver's velocity against the movement of its position: both come from the same signals, by different
+//! measurements.
 //!
-//! The difference is smoothed with [`MEMORY_S`], as a vector: an error in one direction does not hide behind a course that changes. A
-//! position that is repeated bit for bit is the same measurement again. A receiver's filters may be late by [`LATE_S`] with one of the two:
-//! that part of the change of velocity is taken off.
+//! The difference is smoothed with [`MEMORY_S`], as a vector, so that an error in one direction does not hide in
+//! turns. A position that is repeated bit for bit is the same measurement. A receiver's filters may delay one of the
+//! two by [`LATE_S`]: that part of the change of velocity is taken off.
 //!
-//! The receiver itself says how long a step took ([`Gnss::measured_ms`]): messages wait on a link and then come all at once. Where that is
-//! not known nothing is said.
+//! The receiver itself reports the time of a step ([`Gnss::measured_ms`]), because messages wait on a link and then
+//! come all at once. Without that time nothing is judged.
 
 use core::num::NonZeroU32;
 
@@ -16,13 +17,13 @@ use crate::residual::smooth;
 use crate::time::{Instant, PAUSE, Span, Stamp};
 use crate::units::Position;
 
-/// Time constant, s; before it has passed nothing is said.
+/// Time constant, s; nothing is judged before it has passed.
 const MEMORY_S: f32 = 4.0;
-/// One of the two may be older by so much, s.
+/// Delay of one of the two against the other, s.
 const LATE_S: f32 = 0.3;
 /// Positions are compared in units of 1e-7 degrees of latitude, in metres.
 const UNIT_M: f32 = 0.011_132;
-/// Nothing jumps further, m: garbage, or the date line.
+/// Greater jumps, m, are garbage or the date line.
 const JUMP_MAX_M: f32 = 100_000.0;
 
 /// One measurement of a receiver.
@@ -39,7 +40,8 @@ struct Fix {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct GnssVelocity {
     before: Option<Fix>,
-    /// The velocity less that of the positions, and the velocity, both smoothed, m/s; for how long, s; when they were measured.
+    /// Velocity less the movement of the positions, and velocity, both smoothed, m/s; seconds known; time of
+    /// measurement.
     off: [f32; 2],
     mean: [f32; 2],
     known_s: f32,
@@ -47,7 +49,6 @@ pub(crate) struct GnssVelocity {
 }
 
 impl GnssVelocity {
-    /// Nothing seen.
     pub(crate) const NEW: Self =
         Self { before: None, off: [0.0; 2], mean: [0.0; 2], known_s: 0.0, at: Stamp::NONE };
 
@@ -72,7 +73,7 @@ impl GnssVelocity {
         let units = [0, 1].map(|axis| fix.place[axis].wrapping_sub(before.place[axis]) as f32 * UNIT_M);
         let latitude = fix.place[0] as f32 * 1e-7;
         let moved_m = [units[0], units[1] * libm::cosf(latitude.to_radians())];
-        // A time that stands still, or goes back, is none.
+        // A step without time is skipped.
         let is_leap = moved_m.iter().any(|moved_m| libm::fabsf(*moved_m) > JUMP_MAX_M);
         if step_ms == 0 || step > PAUSE || is_leap {
             *self = begun;
@@ -87,7 +88,7 @@ impl GnssVelocity {
         (self.known_s, self.at) = (self.known_s + step_s, Stamp::at(at));
     }
 
-    /// How far the velocity is from that of the positions, m/s.
+    /// The difference between velocity and movement of the positions, m/s.
     pub(crate) fn residual(&self, now: Instant) -> Option<Reading> {
         let velocity = self.before?.velocity;
         let changed_mps = length([0, 1].map(|axis| velocity[axis] - self.mean[axis]));
@@ -100,7 +101,7 @@ fn length([north, east]: [f32; 2]) -> f32 {
     libm::sqrtf(north * north + east * east)
 }
 
-/// What is said of where it is and how it moves, where that is exact.
+/// Position and velocity of an exact receiver.
 fn fix(gnss: &Gnss) -> Option<Fix> {
     let speed_mps = gnss.speed.map(|speed| speed.0).filter(|speed| (0.0..=SPEED_MAX_MPS).contains(speed))?;
     let course = gnss.course.map(|course| course.0).filter(|course| course.is_finite() && gnss.is_exact())?;
@@ -116,8 +117,8 @@ mod tests {
     use super::*;
     use crate::units::{Metres, MetresPerSecond, Radians};
 
-    /// Flies with a velocity that turns once in so many seconds, and tells one that is off by an error, both north and east in m/s; each
-    /// position twice. `measured` is when a step was measured, ms.
+    /// The residual of a flight whose velocity turns once in `turn_s` and is reported with an error, north and east
+    /// in m/s; each position comes twice. `measured` is the time of a step, ms.
     fn heard((speed_mps, turn_s): (f32, f32), error_mps: [f32; 2], measured: fn(u64) -> u32) -> Option<f32> {
         let mut velocity_residual = GnssVelocity::NEW;
         let mut place = [47.0, 8.0];

@@ -1,9 +1,9 @@
-//! What happened besides findings: to be recorded, and told where a pilot should hear of it.
+//! Events besides findings: for the record, and for the pilot if they have a text.
 
 use crate::flight::Phase;
 use crate::{mishap, protect};
 
-/// Something that happened.
+/// An event.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Happening {
     /// The motors may turn.
@@ -12,19 +12,19 @@ pub enum Happening {
     Disarmed,
     /// It left the ground.
     TakeOff,
-    /// It was in the air when it was first heard: we were started, or started again, in the air.
+    /// The vehicle was in the air at first contact: the monitor started, or restarted, in flight.
     FlightResumed,
     /// The flight is over: it is back on the ground, or disarmed.
     Landing,
-    /// It does something else now, for a second at least.
+    /// The phase changed, for a second at least.
     Phase(Phase),
     /// The autopilot restarted.
     AutopilotReboot,
-    /// The lifetime that was stored is that of another airframe; a new one begins.
+    /// The stored lifetime belongs to another airframe; a new one begins.
     OtherAirframe,
-    /// Another system on the autopilot's port is the vehicle from now on.
+    /// Another system on the autopilot's port became the vehicle.
     OtherVehicle,
-    /// How many cells the vehicle's battery has is not known: no alarm comes from the voltage of its cells.
+    /// The number of cells is unknown: cell voltage raises no alarm.
     CellsUnknown,
     /// A mishap began, ended, or was seen on the bench.
     Mishap(mishap::Change),
@@ -32,10 +32,10 @@ pub enum Happening {
     Protect(protect::Step),
 }
 
-/// Happenings that wait to be taken: the steps of one tick are far fewer.
+/// Events that wait to be taken: one tick makes far fewer.
 const WAITING_MAX: usize = 8;
 
-/// Happenings in order.
+/// Events in order.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Happenings {
     waiting: [Option<Happening>; WAITING_MAX],
@@ -55,7 +55,7 @@ impl Happenings {
         self.waiting[WAITING_MAX - 1].take()
     }
 
-    /// How many found no place since this was asked last.
+    /// Events without a place since the last call.
     pub(crate) const fn take_lost(&mut self) -> u16 {
         core::mem::replace(&mut self.lost, 0)
     }

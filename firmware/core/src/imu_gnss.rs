@@ -1,18 +1,19 @@
-//! The first inertial sensor against the first receiver: the force that the accelerometers measure, turned to north, east, down by the
+//! The first inertial sensor against the first receiver. The measured force, turned to north, east, down by the
 //! attitude, less gravity, is the change of velocity.
 //!
-//! Where it is not, the accelerometers are wrong, or the attitude is, which gyros led astray: an estimator that is fed by a gyro with an
-//! offset leans further and further, and 10 degrees are 1.7 m/s2. Horizontally the velocity is the receiver's own, which no accelerometer
-//! has a part in; vertically it is the climb of the estimator, which height holds over some seconds. On wings that is left out: a flare and
-//! a gust change it too fast.
+//! A difference means a wrong accelerometer, or an attitude that gyros led astray. An estimator with a gyro offset
+//! leans further and further, and 10 degrees are 1.7 m/s2. Horizontally the velocity is the receiver's own, without
+//! any accelerometer; vertically the estimator's climb, which follows height over some seconds. On wings the climb is
+//! left out: a flare and a gust change it too fast.
 //!
-//! Velocities of a receiver are late by about half of the time between two of them (of simulators; at 2 Hz and at 5 Hz): forces wait for so
-//! long. A receiver may be later by [`LATE_S`], and nobody knows by how much: what that may make of a force that changes is taken off, and of
-//! a force that stays nothing is. A leap of velocity counts for little ([`LEAP_MPS2`]), and of what shakes the force is known the less:
-//! samples are few, and fold vibration into an offset. What repeats a place bit for bit says nothing new.
+//! A receiver's velocity is late by about half of its interval (simulators, at 2 Hz and at 5 Hz), so forces wait for
+//! that time. The delay may be longer, by up to [`LATE_S`]. The effect of that on a changing force is taken off; a
+//! steady force has none. A leap of velocity counts for little ([`LEAP_MPS2`]). Vibration makes the force uncertain
+//! ([`SHAKE_PART`]): samples are few, and fold vibration into an offset. A place that is repeated bit for bit is
+//! skipped.
 //!
-//! A heading that is wrong turns a horizontal force, and makes it neither longer nor shorter: where the lengths agree, what 30 degrees make
-//! of the change of velocity is taken off. So a compass that led the attitude astray hardly shows here.
+//! A wrong heading turns a horizontal force without changing its length. If the lengths agree, the effect of 30
+//! degrees on the change of velocity is taken off. So a compass that led the attitude astray hardly shows here.
 
 use crate::gates::{self, Gates};
 use crate::inertial::FORCE_MAX;
@@ -25,44 +26,44 @@ use crate::time::{Instant, Span, Stamp};
 use crate::units::{GRAVITY, norm};
 use crate::vehicle::Vehicle;
 
-/// An attitude, and forces, that are older are not of one moment.
+/// Maximum age of an attitude and of forces that are of one moment.
 const FRESH: Span = Span::from_millis(300);
-/// Velocities further apart are not compared, and a climb that is older is of another moment.
+/// Maximum gap between compared velocities, and maximum age of a climb.
 const PAUSE: Span = Span::from_millis(1_500);
 const CLIMB_AGE: Span = Span::from_millis(500);
 /// Time constant, s.
 const SMOOTHING_S: f32 = 1.0;
-/// A receiver may be later than forces are by so much, s.
+/// Maximum delay of a receiver against the forces, s.
 const LATE_S: f32 = 0.6;
-/// A heading that is wrong by 30 degrees turns so much of a force aside: 2 sin 15.
+/// Part of a force that a heading error of 30 degrees turns aside: 2 sin 15.
 const HEADING_PART: f32 = 0.52;
 /// A change of velocity without a force counts as this much at most, m/s2.
 const LEAP_MPS2: f32 = 6.0;
-/// Of the steps of the force from sample to sample so much may be an offset.
+/// Part of the force's steps from sample to sample that may be an offset.
 const SHAKE_PART: f32 = 0.5;
 
 /// The memory of the comparison.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ImuGnssResidual {
-    /// Forces since the last step, their number, their mean, and when there was one.
+    /// Sum of forces since the last step, their number, their mean, and its time.
     sum: [f32; 3],
     count: u16,
     mean: [f32; 3],
     mean_at: Stamp,
-    /// What they made of the velocity since the receiver's last one, m/s, and their mean between the two before, m/s2.
+    /// Change of velocity by the forces since the receiver's last one, m/s, and mean force between the two before,
+    /// m/s2.
     delta_v: [f32; 3],
     force_before: Option<[f32; 3]>,
-    /// The last velocity, m/s; when it came, where it is compared.
+    /// The last velocity, m/s, and its time if it is compared.
     velocity: [f32; 3],
     at: Stamp,
-    /// The force, and what of it is missing in the velocity, both smoothed, m/s2.
+    /// The force, and the part that is missing in the velocity, both smoothed, m/s2.
     force: [f32; 3],
     missing: [f32; 3],
     residual: Option<f32>,
 }
 
 impl ImuGnssResidual {
-    /// Nothing seen.
     pub(crate) const NEW: Self = Self {
         sum: [0.0; 3],
         count: 0,
@@ -81,7 +82,7 @@ impl ImuGnssResidual {
         if !force.iter().all(|axis| axis.abs() <= FORCE_MAX) {
             return;
         }
-        // On the ground nothing takes them.
+        // On the ground no step takes them.
         let Some(count) = self.count.checked_add(1) else { return };
         self.count = count;
         for (sum, axis) in self.sum.iter_mut().zip(force) {
@@ -94,7 +95,7 @@ impl ImuGnssResidual {
             self.mean = core::mem::take(&mut self.sum).map(|sum| sum / f32::from(self.count));
             (self.count, self.mean_at) = (0, Stamp::at(now));
         }
-        // Turning forces is dear: nothing waits for them while velocities are not compared.
+        // Turning forces is expensive, so it is skipped while velocities are not compared.
         if !self.at.is_set() {
             return;
         }
@@ -109,7 +110,7 @@ impl ImuGnssResidual {
         }
     }
 
-    /// What a receiver says that does not repeat itself.
+    /// Takes a receiver's message unless it is a repetition.
     pub(crate) fn take_gnss(&mut self, at: Instant, gnss: &Gnss, vehicle: &Vehicle, gates: Gates) {
         let on_rotors = gates.are(gates::ROTORS);
         let judged = gnss.is_exact() && gates.are(gates::SETTLED | gates::CLEAR | gates::ONE_FRAME);
@@ -132,17 +133,17 @@ impl ImuGnssResidual {
             missing.filter(|_| gates.are(gates::STILL)).map(|missing| (missing - shaken).max(0.0));
     }
 
-    /// A velocity, and the time since the one before, where it is compared with that: what is missing in so many of the axes north, east,
-    /// down, m/s2.
+    /// Takes a velocity, with the time since the one before if the two are compared. Returns the missing force in the
+    /// first `axes` of north, east, down, m/s2.
     fn take_velocity(&mut self, step: Option<Span>, velocity: [f32; 3], axes: usize) -> Option<f32> {
         let before = core::mem::replace(&mut self.velocity, velocity);
         let delta_v = core::mem::take(&mut self.delta_v);
         let Some(step_s) = step.map(Span::as_secs_f32) else {
-            // Nobody knows since when the forces before it were summed.
+            // The start of the earlier sum is unknown.
             (self.force_before, self.force, self.missing) = (None, [0.0; 3], [0.0; 3]);
             return None;
         };
-        // Steps are not alike: messages are lost, and what repeats itself is left out.
+        // Steps differ: messages are lost, and repetitions are skipped.
         let force_now = delta_v.map(|delta_v| delta_v / step_s);
         let Some(force_before) = self.force_before.replace(force_now) else {
             self.force = force_now;
@@ -167,7 +168,7 @@ impl ImuGnssResidual {
         Some(norm([level, down, 0.0]) - LATE_S * norm(changes))
     }
 
-    /// How far the force is from the change of velocity, m/s2.
+    /// The difference between force and change of velocity, m/s2.
     pub(crate) fn residual(&self, now: Instant) -> Option<Reading> {
         Reading::new(self.at.instant(now), self.residual)
     }
@@ -179,8 +180,8 @@ mod tests {
 
     const STEP_S: f32 = 0.2;
 
-    /// The most that is missing in flights of 20 s: of a force that swings, without and with a part that no velocity has, and of a receiver
-    /// that is late by so much.
+    /// The greatest missing force in a flight of 20 s: of a swinging force, a part that no velocity has, and a
+    /// receiver with a delay.
     fn most(swings_mps2: f32, untrue_mps2: f32, late_s: f32) -> f32 {
         // One swing in 5 s, and the velocity that it makes.
         let turns = |time_s: f32| time_s * core::f32::consts::TAU / 5.0;

@@ -1,35 +1,39 @@
-//! What accelerometer and gyros say by themselves, without an estimator: whether the vehicle is level and still, and whether it
-//! lies on its side or its back.
+//! Judgement by accelerometer and gyros alone, without an estimator: whether the vehicle is level and still, and
+//! whether it lies on its side or its back.
 //!
-//! An estimator that is fed by a gyro with an offset turns its attitude over while the vehicle stands. What really turns over turns
-//! fast, and what flies at a great tilt is carried with more than its weight, or falls. So an attitude far from level is contradicted
-//! where the force has been that of a level vehicle at rest for `LASTS`, or has come from far elsewhere than the attitude has it, and
-//! nothing turned; and it is so until both agree again.
+//! An estimator with a gyro offset turns its attitude over while the vehicle stands. A vehicle that really turns over
+//! turns fast; at a great tilt it is carried with more than its weight, or falls. An attitude far from level is
+//! contradicted if for `LASTS` nothing turned and the force was one of these:
 //!
-//! Motors that run shake a vehicle. How far the force steps from sample to sample is compared with what it did at rest.
+//! - that of a level vehicle at rest;
+//! - far from the direction that the attitude demands.
 //!
-//! Forces are smoothed (`SMOOTHING_S`), because motors shake a vehicle that stands. Where the messages do not have both force and
-//! rates, nothing is said.
+//! The contradiction ends when both agree again.
+//!
+//! Running motors shake a vehicle. The steps of the force from sample to sample are compared with those at rest.
+//!
+//! Forces are smoothed (`SMOOTHING_S`), because motors shake a vehicle that stands. Without both force and rates
+//! nothing is judged.
 
 use crate::motion::TILTED_RAD;
 use crate::observation::Imu;
 use crate::time::{Instant, Span, Stamp};
 use crate::units::{GRAVITY, MetresPerSecond2, Radians, RadiansPerSecond, norm};
 
-/// No sensor that autopilots have measures more than 32 g an axis: beyond this, m/s2, it is garbage.
+/// No autopilot's sensor measures more than 32 g an axis: beyond this, m/s2, a value is garbage.
 pub(crate) const FORCE_MAX: f32 = 60.0 * GRAVITY;
-/// Time constant of the force, of 0.53 Hz: one shock counts for little, a turn that is held for nearly all.
+/// Time constant of the force, of 0.53 Hz: a shock counts for little, a lasting turn fully.
 const SMOOTHING_S: f32 = 0.3;
-/// It has been level and still for so long.
+/// Minimum time level and still.
 const LASTS: Span = Span::from_millis(1_500);
-/// Older samples say nothing.
+/// Maximum age of a sample.
 const FRESH: Span = Span::from_secs(1);
 /// A fast turn is above 0.7 rad/s (40 degrees a second). A still vehicle turns slower than 0.5 rad/s (29 degrees a second) on the average: more
 /// than the offset of a gyro that still flies.
 const TURNS_RATE: f32 = 0.7;
 const STILL_RATE: f32 = 0.5;
-/// A rate that stays within the first of these, rad/s, and below the second, is an offset: nothing turns so steadily and is carried as
-/// at rest.
+/// A rate within the first of these of its mean, and below the second, rad/s, is an offset: no vehicle turns so
+/// steadily and is carried as at rest.
 const STEADY_RATE: f32 = 0.15;
 const OFFSET_RATE: f32 = 1.2;
 /// An attitude that was contradicted is believed again within 20 degrees.
@@ -44,46 +48,47 @@ const OVER: f32 = 0.5;
 const SHAKES_S: f32 = 0.5;
 /// The steps are known this long after the first sample.
 const STEPS_KNOWN: Span = Span::from_secs(2);
-/// Motors that carry a vehicle make the steps so many times those at rest, and by more than a sensor's noise changes, m/s2.
+/// Carrying motors make the steps larger than at rest by this factor, and by this many m/s2, the change of a sensor's
+/// noise.
 const SHAKES: f32 = 2.5;
 const SHAKES_MPS2: f32 = 0.01;
-/// Rotors that carry a vehicle make the steps larger than this, m/s2: 0.11 is the least of real flights (5 % of 13 logs), 0.09 the
-/// most of boards that stood (95 % of 6 logs, but for where they were handled). Simulators have no noise.
+/// Rotors that carry a vehicle make the steps larger than this, m/s2. The least of real flights is 0.11 (5 % of 13
+/// logs), the most of standing boards 0.09 (95 % of 6 logs, without handling). Simulators have no noise.
 const CALM_MPS2: f32 = 0.1;
 /// A longer gap between samples ends each course, s.
 const GAP_S: f32 = 2.0;
-/// It lies over this long before it counts.
+/// Time that it must lie over.
 pub(crate) const LIES: Span = Span::from_millis(700);
 
-/// What accelerometer and gyros say.
+/// The state of accelerometer and gyros.
 #[derive(Clone, Copy, Debug)]
 pub struct Inertial {
     /// Specific force, smoothed, m/s2.
     force: [f32; 3],
-    /// The last sample's, along the body's axis downwards, and how far it steps from sample to sample, smoothed; m/s2.
+    /// The last sample along the body's downward axis, and its smoothed step from sample to sample; m/s2.
     down: f32,
     step: f32,
     steps_since: Instant,
-    /// The least that it stepped at rest; 0 where that is not known.
+    /// The least step at rest; 0 if unknown.
     step_at_rest: f32,
     at: Option<Instant>,
     /// Rates, smoothed, rad/s.
     rate: [f32; 3],
     rates_at: Stamp,
     still: bool,
-    /// When it turned fast last.
+    /// Time of the last fast turn.
     turned_at: Stamp,
-    /// The estimator's attitude is another one than that of the sensors; and since when it has been far from level.
+    /// Whether the estimator's attitude contradicts the sensors, and since when that attitude has been far from
+    /// level.
     contradicts: bool,
     tilted_since: Stamp,
-    /// Since when it has been carried by its weight and still, whichever way up; and level besides.
+    /// Since when the vehicle has been carried by its weight and still, in any attitude; then also level.
     rests_since: Stamp,
     level_since: Stamp,
     over_since: Stamp,
 }
 
 impl Inertial {
-    /// Nothing known.
     pub(crate) const fn new() -> Self {
         Self {
             force: [0.0; 3],
@@ -153,7 +158,7 @@ impl Inertial {
         let square = x * x + y * y + z * z;
         let rests =
             (REST_G.start * REST_G.start..REST_G.end * REST_G.end).contains(&(square / (GRAVITY * GRAVITY)));
-        // No root: squares of cosines, with the sign of z, which is negative in what is upright.
+        // No root: squares of cosines, with the sign of z, which is negative for an upright vehicle.
         let level = rests && self.still && z < 0.0 && z * z > LEVEL * LEVEL * square;
         let over = rests && (z > 0.0 || z * z < OVER * OVER * square);
         if step_s >= GAP_S {
@@ -185,13 +190,13 @@ impl Inertial {
         }
     }
 
-    /// Whether it shakes more than it did at rest; `None` where one of the two is not known.
+    /// Whether it shakes more than it did at rest; `None` if one of the two is unknown.
     pub(crate) fn shakes(&self, now: Instant) -> Option<bool> {
         let known = self.has_steps(now) && self.step_at_rest > 0.0;
         known.then_some(self.step > SHAKES * self.step_at_rest + SHAKES_MPS2)
     }
 
-    /// Whether it shakes less than what is carried by rotors. Simulators have no noise: they are calm too.
+    /// Whether it shakes less than on carrying rotors. Simulators have no noise: they are calm too.
     pub(crate) fn is_calm(&self, now: Instant) -> bool {
         self.has_steps(now) && self.step < CALM_MPS2
     }
@@ -211,17 +216,17 @@ impl Inertial {
             && self.rates_at.age(now).is_some_and(|age| age <= FRESH)
     }
 
-    /// Whether it has not turned fast for so long.
+    /// Whether it has not turned fast for this span.
     pub(crate) fn turns_little(&self, now: Instant, span: Span) -> bool {
         self.turned_at.age(now).is_none_or(|age| age > span)
     }
 
-    /// Whether it has been level and still for a while, whatever an estimator says.
+    /// Whether it has been level and still for a while, by the sensors alone.
     pub fn is_level(&self, now: Instant) -> bool {
         self.is_level_for(now, LASTS)
     }
 
-    /// Whether it has been level and still for so long.
+    /// Whether it has been level and still for this span.
     pub(crate) fn is_level_for(&self, now: Instant, span: Span) -> bool {
         self.is_fresh(now) && self.level_since.age(now).is_some_and(|age| age >= span)
     }
@@ -238,7 +243,7 @@ impl Inertial {
         }
     }
 
-    /// Whether the force is further than 45 degrees from the weight that a vehicle with this attitude carries.
+    /// Whether the force is further than 45 degrees from the direction that this attitude demands.
     fn is_carried_elsewhere(&self, roll: Radians, pitch: Radians) -> bool {
         const FAR: f32 = 0.707;
         let across = libm::cosf(pitch.0);
@@ -252,7 +257,7 @@ impl Inertial {
         self.contradicts && self.is_fresh(now)
     }
 
-    /// How far it lies over, in radians, once it has lain so for a moment: by the force that carries it.
+    /// The angle from upright in radians, once it has lain over for a moment, by the direction of the force.
     pub fn lies_over(&self, now: Instant) -> Option<f32> {
         let lasts = self.over_since.age(now).is_some_and(|age| age >= LIES) && self.is_fresh(now);
         let [x, y, z] = self.force;
@@ -260,7 +265,7 @@ impl Inertial {
     }
 }
 
-/// How much a sample counts.
+/// The weight of a sample.
 fn weight(step: Option<Span>, constant_s: f32) -> f32 {
     let step_s = step.map_or(f32::INFINITY, Span::as_secs_f32);
     if step_s < 1.0 { step_s / (constant_s + step_s) } else { 1.0 }
@@ -270,8 +275,8 @@ fn weight(step: Option<Span>, constant_s: f32) -> f32 {
 mod tests {
     use super::*;
 
-    /// Whether a still vehicle that is carried with this force for three seconds contradicts an attitude that rolls to so many degrees,
-    /// and then one that is level.
+    /// Whether a vehicle that is still and carried with this force for three seconds contradicts an attitude rolled
+    /// by these degrees, and then a level one.
     fn contradicts(force: [f32; 3], roll_deg: f32) -> (bool, bool) {
         let mut inertial = Inertial::new();
         let mut now = Instant::ZERO;

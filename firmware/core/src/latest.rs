@@ -1,4 +1,4 @@
-//! The latest value of something, with its time: what is known, and how old the knowledge is.
+//! The latest value of a quantity, with its time.
 
 use crate::time::{Instant, Span};
 
@@ -15,7 +15,7 @@ impl<T> Default for Latest<T> {
 }
 
 impl<T> Latest<T> {
-    /// Nothing yet.
+    /// No value.
     pub const fn nothing() -> Self {
         Self { slot: None }
     }
@@ -58,12 +58,12 @@ impl<T> Latest<T> {
 pub struct Reading {
     /// When it was measured.
     pub at: Instant,
-    /// In the unit of whoever asks. A value that is no number counts as not measured.
+    /// In the unit of the caller. NaN counts as not measured.
     pub value: f32,
 }
 
 impl Reading {
-    /// A value that was measured at `at`; `None` where either is missing.
+    /// A value that was measured at `at`; `None` if either is missing.
     pub fn new(at: Option<Instant>, value: Option<f32>) -> Option<Self> {
         Some(Self { at: at?, value: value? })
     }

@@ -1,5 +1,5 @@
-//! What the monitor knows and decides: observations in SI units, health checks and usage.
-//! Knows no MAVLink, no card and no executor; time comes in as an argument.
+//! The monitor's knowledge and decisions: observations in SI units, health checks and usage. Without MAVLink, card or
+//! executor; time comes in as an argument.
 #![cfg_attr(not(test), no_std)]
 
 mod adaptive_baseline;

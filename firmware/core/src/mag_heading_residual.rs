@@ -1,6 +1,7 @@
 //! The first compass's heading against the estimator's yaw, and whether the estimator stopped using its compass.
 //!
-//! The residual includes the declination, which the baseline takes up. An estimator follows a wrong compass by gyros, and only slowly.
+//! The residual includes the declination, which the baseline takes up. An estimator follows a wrong compass slowly,
+//! by its gyros.
 
 use crate::gates::Gates;
 use crate::latest::Reading;
@@ -10,14 +11,15 @@ use crate::time::{Instant, Span, Stamp};
 use crate::units::RadiansPerSecond;
 use crate::vehicle::Vehicle;
 
-/// The field is compared with an attitude that is so old at most, and turns slower about each axis, rad/s: the two are not of one moment.
+/// The attitude's maximum age, and the maximum rate about each axis, rad/s: field and attitude are not of one moment.
 const ATTITUDE_AGE: Span = Span::from_millis(200);
 const TURNS_RAD_S: f32 = 0.2;
-/// Samples that come sooner are passed over: angles are dear.
+/// Samples that come sooner are skipped: angles are expensive.
 const EVERY: Span = Span::from_millis(80);
-/// The heading of an unused compass has moved away at least so far, degrees, if something is wrong with the compass.
+/// Least change of the heading, degrees, of an unused compass that is faulty.
 const MOVES_DEG: f32 = 2.0;
-/// Ratios that the estimator sent of its compass in flight, before their end means that it does not use it any more: at 1 Hz or more.
+/// Compass ratios in flight after which a message without one means that the compass is no longer used; they come at
+/// 1 Hz or more.
 const RATIOS_KNOWN: u8 = 20;
 
 /// Takes the field by the attitude's roll and pitch.
@@ -44,10 +46,10 @@ pub(crate) fn take(
     residuals.take(Comparison::MagHeading, at, gates, off_deg, 0.0);
 }
 
-/// Whether the estimator uses its compass.
+/// The estimator's use of its compass.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct CompassUse {
-    /// Ratios of the compass in this flight, and whether the last message had none.
+    /// Compass ratios in this flight, and whether the last message had none.
     ratios: u8,
     unused: (Stamp, bool),
 }
@@ -64,7 +66,8 @@ impl CompassUse {
         // An estimator that sends no ratio at all says nothing about its compass.
         let sends = estimator.velocity.is_some() || estimator.position_horizontal.is_some();
         if sends && self.ratios >= RATIOS_KNOWN {
-            // It pauses the use of a sound one too, for half a minute at a time (in 7 of 20 healthy flights of PX4's simulator).
+            // PX4 also pauses the use of a sound compass, for half a minute at a time (in 7 of 20 healthy flights of
+            // its simulator).
             let moved = residuals.excess(Comparison::MagHeading).is_some_and(|excess| excess > MOVES_DEG);
             self.unused = (Stamp::at(at), estimator.compass.is_none() && moved);
         }

@@ -38,12 +38,12 @@ pub struct Monitor {
     derived: Derived,
     health: Health,
     usage: Usage,
-    /// What was lived before this session.
+    /// Totals of earlier sessions.
     before: Lifetime,
     exceedances: Exceedances,
     exposure: Exposure,
     components: [Component; COMPONENTS_MAX],
-    /// Of each component, whose health it is and what is used of its life, percent; one a tick is worked out anew.
+    /// For each component its subsystem and the used part of its life, percent; one is updated each tick.
     wear: [Option<(Subsystem, f32)>; COMPONENTS_MAX],
     wear_next: u8,
     figures: Figures,
@@ -58,14 +58,14 @@ pub struct Monitor {
     parameters_asked: bool,
 }
 
-/// What was so at the last tick.
+/// The state at the last tick.
 #[derive(Clone, Copy, Debug)]
 struct Before {
     armed: bool,
     reboots: u32,
-    /// The phase that was told last, and the one that would be next, since when.
+    /// The last reported phase; the next one, and since when.
     phase: Phase,
-    /// How often another system had become the vehicle.
+    /// Changes of the vehicle until then.
     changes: u32,
     next_phase: Phase,
     next_since: Instant,
@@ -82,21 +82,21 @@ impl Before {
     };
 }
 
-/// A phase that does not last this long is not told: speeds cross their limits back and forth.
+/// A phase that lasts less is not reported: speeds cross their limits back and forth.
 const PHASE_LASTS: Span = Span::from_secs(1);
 
-/// By then cells are told as not known, where nobody says that the autopilot's parameters were asked for.
+/// After this time unknown cells are reported, if the parameters were not asked for.
 const CELLS_COME: Span = Span::from_secs(45);
 
 const _: () = assert!(size_of::<Monitor>() <= 16 * 1024 - 64);
 
-/// Whether a battery keeps the vehicle up: where none tells of itself, the first one does.
+/// Whether a battery carries the vehicle: the first one does if none reports itself.
 fn carries(vehicle: &Vehicle, battery: usize) -> bool {
     let known = vehicle.batteries.get(battery).and_then(Latest::get);
     known.map_or(battery == 0, |known| known.lithium && known.feeds == Feeds::Vehicle)
 }
 
-/// Whether nothing tells the cells of a battery that carries the vehicle, whose count is this one: then its voltage raises no alarm.
+/// Whether the count of a carrying battery is unknown: then its voltage raises no alarm.
 fn lacks_cells(vehicle: &Vehicle, derived: &Derived, battery: usize, count: u8) -> bool {
     count == 0 && carries(vehicle, battery) && derived.cells.has_voltage(battery)
 }
@@ -107,7 +107,7 @@ impl Monitor {
         *Self::begin(&mut MaybeUninit::uninit(), &params)
     }
 
-    /// The same, made where it stays: never whole on the stack.
+    /// The same, built in place: never whole on the stack.
     pub fn begin<'a>(place: &'a mut MaybeUninit<Self>, params: &Params) -> &'a mut Self {
         place!(
             place,
@@ -137,7 +137,7 @@ impl Monitor {
         )
     }
 
-    /// Takes what somebody on the link said; `false` when it is not of the monitored vehicle.
+    /// Takes an observation from the link; `false` if it is not of the monitored vehicle.
     pub fn observe(&mut self, at: Instant, source: Source, observation: &Observation) -> bool {
         let known = self.vehicle.observe(at, source, observation);
         if self.before_tick.changes != self.vehicle.changes {
@@ -152,7 +152,7 @@ impl Monitor {
         true
     }
 
-    /// Another system on the port is the vehicle from now on: nothing that was known of the one before is of it.
+    /// Another system on the port becomes the vehicle: all knowledge of the previous one is dropped.
     #[inline(never)] // Its new states are large: not on the stack of every observation.
     fn begin_with_another(&mut self) {
         self.before_tick = Before { changes: self.vehicle.changes, ..Before::NOTHING };
@@ -168,21 +168,21 @@ impl Monitor {
         self.happenings.push(Happening::OtherVehicle);
     }
 
-    /// The autopilot was powered on again since the last observation: the flight of before is over, though nobody saw how it ended.
+    /// The autopilot was powered on again since the last observation: ends the previous flight, whose end is unknown.
     pub fn begin_anew(&mut self) {
         self.flight = Flight::grounded();
         self.protect = Protect::default();
         self.usage.break_off();
     }
 
-    /// What comes next is of another recording, of another day or another vehicle: nothing holds but what was counted.
+    /// Another recording begins, of another day or vehicle: only the counters stay.
     pub fn begin_another_recording(&mut self) {
         self.vehicle = Vehicle::unknown();
         self.begin_with_another();
         self.cells_told = false;
     }
 
-    /// One step, every [`TICK`]: flight, checks, usage. Each change of a check's level is given to `findings`, once.
+    /// One step, every [`TICK`]: flight, checks, usage. Each change of a check's level goes to `findings`, once.
     pub fn tick(
         &mut self,
         now: Instant,
@@ -223,7 +223,7 @@ impl Monitor {
         self.step_happenings(now, event);
     }
 
-    /// What the checks read now.
+    /// The inputs of the checks now.
     pub const fn inputs<'a>(
         &'a self,
         now: Instant,
@@ -253,7 +253,7 @@ impl Monitor {
             vehicle.inertial.rest(now);
         }
         match event {
-            // A recording that begins in the air: nobody has counted this flight yet.
+            // A recording that begins in the air: this flight is not counted yet.
             Some(FlightEvent::Resumed) if !self.has_open_flight() => Some(FlightEvent::TakeOff),
             event => event,
         }
@@ -265,7 +265,7 @@ impl Monitor {
         count(UsageCounter::Flights) > count(UsageCounter::Landings) + count(UsageCounter::Mishaps)
     }
 
-    /// One component a tick: there is time, and divisions cost.
+    /// One component each tick: divisions are expensive, and there is time.
     fn step_wear(&mut self) {
         let place = usize::from(self.wear_next);
         self.describe_component(place);
@@ -277,26 +277,26 @@ impl Monitor {
         self.wear_next = (self.wear_next + 1) % COMPONENTS_MAX as u8;
     }
 
-    /// How many cells the first battery has; 0 where that is not known, or is not asked for because there are several.
+    /// Cells of the first battery; 0 if unknown, or if there are several batteries.
     pub fn cell_count(&self) -> u8 {
         let several = self.vehicle.batteries.iter().skip(1).any(|battery| battery.get().is_some());
         if several { 0 } else { self.derived.cell_count(&self.vehicle, 0, &self.params) }
     }
 
-    /// From which figure on vibration counts as risen, by what is usual in this flight; `None` until that is known.
+    /// The figure from which on vibration counts as risen in this flight; `None` until its baseline is known.
     pub fn vibration_limit(&self) -> Option<f32> {
         let times = self.params.get(Param::VibeRiseWarn);
         self.derived.crosschecks.vibration_limit(&self.vehicle, times)
     }
 
-    /// Whether nothing tells how many cells a battery has that carries the vehicle: then its voltage raises no alarm.
+    /// Whether the cells of a carrying battery are unknown: then its voltage raises no alarm.
     pub fn lacks_cells(&self) -> bool {
         let Self { vehicle, derived, params, .. } = self;
         let count = |battery| derived.cell_count(vehicle, battery, params);
         (0..BATTERIES_MAX).any(|battery| lacks_cells(vehicle, derived, battery, count(battery)))
     }
 
-    /// Keeps the cells that are known for the next power-on, and tells once where they are not.
+    /// Keeps the known cells for the next power-on, and reports unknown ones once.
     fn step_cells(&mut self, now: Instant) {
         let Self { vehicle, derived, params, before, saving, happenings, cells_told, .. } = self;
         let come = self.parameters_asked || vehicle.known_for(now) >= CELLS_COME;
@@ -319,14 +319,14 @@ impl Monitor {
         }
     }
 
-    /// A parameter of the autopilot that a recording tells by its name; what is no business of ours is left.
+    /// A parameter of the autopilot in a recording, by its name; others than those of batteries are ignored.
     pub fn learn_parameter(&mut self, name: &str, value: f32) {
         if let Some(place) = cells::known(name) {
             self.derived.cells.take_setting(place, value);
         }
     }
 
-    /// Each parameter that tells of cells has been asked for: where they are not known now, they will not be.
+    /// All parameters about cells were asked for: unknown cells stay unknown.
     pub const fn parameters_asked(&mut self) {
         self.parameters_asked = true;
     }
@@ -413,7 +413,7 @@ impl Monitor {
         &mut self.params
     }
 
-    /// Which power-on this is, from 1.
+    /// The number of this power-on, from 1.
     const fn boots(&self) -> u32 {
         self.before.boots.saturating_add(1)
     }
@@ -433,7 +433,7 @@ impl Monitor {
         }
     }
 
-    /// Every figure of this session that has something to say: its stored number and its value.
+    /// Every known figure of this session: its stored number and its value.
     pub fn for_each_counter(&self, mut each: impl FnMut(u8, f64)) {
         self.usage.for_each(&mut each);
         self.exposure.for_each(|quantity, bin, seconds| each(exposure_number(quantity, bin), seconds));
@@ -461,32 +461,32 @@ impl Monitor {
         &self.exposure
     }
 
-    /// The components by place; those without a kind are none.
+    /// The components by place; without a kind there is none.
     pub const fn components(&self) -> &[Component; COMPONENTS_MAX] {
         &self.components
     }
 
-    /// What happened, in order, each once.
+    /// The events, in order, each once.
     pub fn take_happening(&mut self) -> Option<Happening> {
         self.happenings.take()
     }
 
-    /// How many happenings found no place since this was asked last.
+    /// Events without a place since the last call.
     pub const fn take_happenings_lost(&mut self) -> u16 {
         self.happenings.take_lost()
     }
 
-    /// Half of a snapshot of what went on around a critical finding, each once.
+    /// Half of a snapshot around a critical finding, each once.
     pub fn take_snapshot(&mut self, now: Instant) -> Option<Snapshot<'_>> {
         self.snapshots.take(now)
     }
 
-    /// What is to be asked of the autopilot now, once: the protective action.
+    /// The protective action to request from the autopilot now, once.
     pub const fn take_request(&mut self) -> Option<Request> {
         self.protect.take_request()
     }
 
-    /// Somebody does not want the protective action; `true` where one is on its way.
+    /// Cancels the protective action; `true` if one is on its way.
     pub const fn cancel_protection(&mut self) -> bool {
         self.protect.cancel()
     }

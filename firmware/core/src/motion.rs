@@ -62,27 +62,28 @@ pub fn ground_speed_mps(now: Instant, vehicle: &Vehicle) -> Option<f32> {
     global.or_else(local).or_else(hud).filter(|speed| (0.0..=SPEED_MAX_MPS).contains(speed))
 }
 
-/// Beyond 45 degrees of roll or pitch rotors carry less than 0.7 of their thrust upwards: a level vehicle is not there, and one that rests
-/// there lies.
+/// Beyond 45 degrees of roll or pitch rotors carry less than 0.7 of their thrust upwards. No level flight is there,
+/// and a vehicle at rest there has fallen over.
 pub(crate) const TILTED_RAD: f32 = core::f32::consts::FRAC_PI_4;
 /// Values older than this are none of now.
 pub(crate) const FRESH: Span = Span::from_secs(2);
-/// Above this height over the place of arming a vehicle is in the air, and clear of the ground: heights of receivers and barometers move by
-/// a metre while it stands.
+/// Above this height over the place of arming a vehicle is in the air and clear of the ground. Heights of receivers
+/// and barometers move by a metre while it stands.
 pub(crate) const CLEAR_M: f32 = 1.5;
 /// Within this height of the place of arming it is on the ground, m.
 pub(crate) const LOW_M: f32 = 1.0;
 /// Slower than this it may stand: estimators wander by half of it.
 pub(crate) const STILL_MPS: f32 = 1.0;
-/// Faster than this it moves, whatever wind and noise make of an estimate at rest.
+/// Faster than this it moves, despite wind and noise in an estimate at rest.
 pub(crate) const MOVES_MPS: f32 = 1.5;
 /// Wings carry a vehicle that is faster, and not one that is slower than half of it.
 pub(crate) const WINGS_MPS: f32 = 8.0;
-/// A receiver that stands for so long stands: its speed is a Doppler measurement, good to some tenths of a metre a second.
+/// Time after which a receiver without speed stands: its speed is a Doppler measurement, good to some tenths of a
+/// metre a second.
 const STANDS: Span = Span::from_secs(3);
 /// Heights of a receiver that stands stay within this, m.
 const RECEIVER_M: f32 = 3.0;
-/// An estimate that moved against the receiver is lost for so long.
+/// Time for which an estimate that moved against the receiver counts as lost.
 const STRAYED: Span = Span::from_secs(5);
 
 /// The greatest value of the last half to whole second.
@@ -141,7 +142,8 @@ impl Kinematics {
         self.idle_m = altitude_m(now, vehicle).or(self.idle_m);
     }
 
-    /// Height above the place of arming, m, by the position; above home if nobody saw the arming; by the display without a position.
+    /// Height above the place of arming, m, by the position; above home if the arming was not received; by the
+    /// display without a position.
     pub(crate) fn rise_m(&self, now: Instant, vehicle: &Vehicle) -> Option<f32> {
         let by_position = height_m(now, vehicle).map(|height_m| height_m - self.armed_m.unwrap_or(0.0));
         let by_display =

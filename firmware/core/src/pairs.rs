@@ -1,10 +1,12 @@
 //! Sensors of one kind against each other.
 //!
-//! 1. Two samples are compared if they are of one moment, and each sample once. Their difference is smoothed as a vector, so that noise and
-//!    the motion between the two samples cancel. One sample moves it by half of the limit at most: one wrong message is no fault.
-//! 2. The length of that vector is the residual ([`crate::residual::PAIRS`]). Calibration, mounting and currents make its baseline.
-//! 3. Of three sensors the one that is apart from both others is wrong. Of two nobody knows which is wrong: the second one is named. A sensor
-//!    that sends nothing any more is not counted.
+//! 1. Two samples are compared if they are of one moment, and each sample once. Their difference is smoothed as a
+//!    vector, so that noise and the motion between the two samples cancel. One sample moves it by half of the limit
+//!    at most, because one wrong message is no fault.
+//! 2. The length of that vector is the residual ([`crate::residual::PAIRS`]). Calibration, mounting and currents make
+//!    its baseline.
+//! 3. Of three sensors the one that is apart from both others is wrong. With two sensors it is open which is wrong:
+//!    the second one is named. A sensor that stopped is not counted.
 
 use crate::adaptive_baseline::AdaptiveBaseline;
 use crate::gates::{self, Gates};
@@ -18,13 +20,13 @@ use crate::units::norm;
 pub(crate) const SENSORS_MAX: usize = 3;
 /// Pairs of them.
 const PAIRS: [(usize, usize); SENSORS_MAX] = [(0, 1), (0, 2), (1, 2)];
-/// So long after the first comparison the difference is that of many samples, and learnt.
+/// After this time the difference is that of many samples, and is learnt.
 const SETTLES_S: f32 = 1.5;
-/// Gyros differ so in scale, and autopilots calibrate their offsets only (MPU-6000: 3 %, data sheet).
+/// Scale difference of gyros; autopilots calibrate only their offsets (MPU-6000: 3 %, data sheet).
 const GYRO_SCALE: f32 = 0.05;
-/// Until the baseline is known, one sample moves the difference by so many times as much.
+/// Factor on the effect of one sample until the baseline is known.
 const UNKNOWN_TIMES: f32 = 4.0;
-/// The turn of a vehicle within so many milliseconds is no difference, however fast it turns.
+/// Within this time the turn of a vehicle makes no difference, even a fast one.
 const AT_ONCE_MS: u64 = 5;
 
 /// A kind of sensors.
@@ -48,9 +50,9 @@ impl Kind {
         &ROWS[self as usize]
     }
 
-    /// Samples within so many milliseconds are of one moment, if the vehicle turns slower than 40 degrees a second: `ArduPilot` sends its
-    /// sensors within 20 ms, and at different rates if it is asked so; and a vehicle that climbs with 2.5 m/s does so by 0.6 m. 0 where no
-    /// samples are.
+    /// Samples within this time are of one moment, if the vehicle turns slower than 40 degrees a second. `ArduPilot`
+    /// sends its sensors within 20 ms, or at different rates if asked. A climb of 2.5 m/s makes 0.6 m. 0: no samples
+    /// are compared.
     fn one_moment(self, gates: Gates) -> Span {
         Span::from_millis(match self {
             _ if !self.row().is_open(gates) => 0,

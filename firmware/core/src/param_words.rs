@@ -1,6 +1,5 @@
-//! What people read of a parameter, wherever it is edited or listed: the words of its row, or, where it is the limit of one
-//! check, those of the check. The documents, the component information and Mission Planner's file are made of it; the
-//! firmware itself has no use for it.
+//! Texts of a parameter for editors and lists: the words of its row, or of its check if it is the limit of one.
+//! Documents, component information and Mission Planner's file are made of them; the firmware does not use them.
 
 use core::fmt;
 
@@ -10,7 +9,7 @@ use crate::params::Param;
 /// Decimal places that a quantity is shown with.
 pub const DECIMAL_PLACES: u8 = 3;
 
-/// What a parameter is, in a few words: `Battery cell voltage: warning below`.
+/// A parameter in a few words: `Battery cell voltage: warning below`.
 pub fn short(param: Param) -> impl fmt::Display {
     fmt::from_fn(move |f| {
         let what = param.words().what;
@@ -25,12 +24,12 @@ pub fn short(param: Param) -> impl fmt::Display {
     })
 }
 
-/// More of it, as a sentence: what else there is to know, and where the default comes from.
+/// Details as a sentence, with the source of the default.
 pub fn long(param: Param) -> impl fmt::Display {
     fmt::from_fn(move |f| write!(f, "{}.", capital(param.words().source)))
 }
 
-/// What is so beyond the limit, where it is that of one check.
+/// The state beyond the limit, for the limit of one check.
 pub fn meaning(param: Param) -> Option<&'static str> {
     let (check, _) = limits(param).next().filter(|_| param.words().what.is_empty())?;
     vocabulary(check.name).map(|words| words.meaning)
@@ -43,7 +42,7 @@ fn capital(text: &str) -> impl fmt::Display {
     fmt::from_fn(move |f| write!(f, "{first}{}", letters.as_str()))
 }
 
-/// What it is grouped with, in lists that are grouped.
+/// Its group in grouped lists.
 pub fn group(param: Param) -> &'static str {
     let mut subsystems = limits(param).map(|(check, _)| check.subsystem);
     if let Some(subsystem) = subsystems.next().filter(|first| subsystems.all(|other| other == *first)) {

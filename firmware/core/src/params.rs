@@ -1,7 +1,7 @@
 //! The parameter table: every limit and setting, in one place, with unit, default, range and source. Names are those
 //! that a ground station shows (at most 16 characters); a limit that is NaN is off.
 
-/// What is known of a parameter but its value.
+/// A parameter without its value.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ParamSpec {
     /// At most 16 characters: what `PARAM_VALUE` carries.
@@ -14,16 +14,17 @@ pub struct ParamSpec {
     pub max: f32,
 }
 
-/// What people read of a parameter: apart, because the firmware has no use for it and the table would link it.
+/// The words of a parameter for people. They are apart so that the firmware does not link them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ParamWords {
     /// The unit of value, default and range.
     pub unit: &'static str,
-    /// What it is, in a few words; empty where it is the limit of one check, whose name says it ([`crate::param_words`]).
+    /// A description in a few words; empty for the limit of one check, which the check's name describes
+    /// ([`crate::param_words`]).
     pub what: &'static str,
-    /// What its values mean, from 0; empty where they are quantities.
+    /// The meanings of its values from 0; empty for quantities.
     pub options: &'static [&'static str],
-    /// More of it, and where the default comes from.
+    /// Details, and the source of the default.
     pub source: &'static str,
 }
 
@@ -262,12 +263,12 @@ impl Param {
         Self::ALL.into_iter().find(|param| param.spec().name == name)
     }
 
-    /// What is known of it but its value.
+    /// Name, default and range.
     pub const fn spec(self) -> &'static ParamSpec {
         &TABLE[self as usize]
     }
 
-    /// What people read of it.
+    /// The words for people.
     pub const fn words(self) -> &'static ParamWords {
         &WORDS[self as usize]
     }
@@ -285,14 +286,14 @@ impl Params {
         self.values[param as usize]
     }
 
-    /// Sets a parameter by name; `Err` says what is wrong with name or value, and nothing changed.
+    /// Sets a parameter by name. After an error nothing changed.
     pub fn set(&mut self, name: &str, value: f32) -> Result<(), ParamError> {
         let param = Param::find(name).ok_or(ParamError::UnknownName)?;
         let (index, spec) = (param as usize, param.spec());
         if !(spec.min..=spec.max).contains(&value) {
             return Err(ParamError::OutOfRange { min: spec.min, max: spec.max });
         }
-        // Bit for bit: what is the same need not be saved.
+        // Compared bit for bit: an equal value need not be saved.
         if self.values[index].to_bits() != value.to_bits() {
             self.values[index] = value;
             self.unsaved[index / 32] |= 1 << (index % 32);
@@ -307,14 +308,14 @@ impl Params {
         Some((index, TABLE.get(index)?, self.values[index]))
     }
 
-    /// It is with the store.
+    /// Marks the parameter as saved.
     pub fn saved(&mut self, index: usize) {
         if let Some(word) = self.unsaved.get_mut(index / 32) {
             *word &= !(1 << (index % 32));
         }
     }
 
-    /// All of them are as they are stored, which is what they begin with.
+    /// Marks all as saved: they were just read from the store.
     pub const fn all_saved(&mut self) {
         self.unsaved = [0; TABLE.len().div_ceil(32)];
     }

@@ -1,17 +1,17 @@
-//! What the vehicle draws from its batteries, from the best source that is fresh.
+//! The power drawn from the batteries, from the best fresh source.
 
 use crate::time::{Instant, PAUSE, Span};
 use crate::units::{Amperes, Volts};
 use crate::vehicle::Vehicle;
 
-/// What no vehicle here has: beyond it a value is garbage.
+/// Beyond these a value is garbage: no vehicle here reaches them.
 const VOLTS_MAX: f32 = 1_000.0;
 const AMPERES_MAX: f32 = 10_000.0;
 /// A battery figure holds this long.
 const BATTERY_AGE: Span = Span::from_secs(5);
 
-/// The first battery's voltage, or the autopilot's figure where none reports itself; the discharge current and the power
-/// of all batteries together, or of all ESCs where no battery knows its current (PX4 in simulation).
+/// Voltage of the first battery (or the autopilot's figure if none reports itself), and discharge current and power
+/// of all batteries. Without a battery current: the sum of all ESCs (PX4 in simulation).
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Drawn {
     pub(crate) voltage_v: Option<f32>,
@@ -51,7 +51,7 @@ pub(crate) fn discharge_a(now: Instant, vehicle: &Vehicle, battery: usize) -> f6
 }
 
 impl Drawn {
-    /// Garbage is left out: it must not get into sums that are kept for good.
+    /// Garbage is left out: the sums are permanent.
     fn add(&mut self, voltage: Option<Volts>, current: Option<Amperes>) {
         let voltage_v = voltage.map(|voltage| voltage.0).filter(|volts| (0.0..=VOLTS_MAX).contains(volts));
         let current_a = current.map(|current| current.0).filter(|amperes| amperes.abs() <= AMPERES_MAX);

@@ -15,10 +15,10 @@ const STUCK: Span = Span::from_secs(5);
 const WINDOW: Span = Span::from_secs(1);
 /// Parachutes let drones down at 4 to 6 m/s (ASTM F3322 leaves it to the energy of the impact).
 const PARACHUTE_MPS: f32 = 4.0;
-/// Part of a speed that the pressure must show in a second: the vehicle may have begun within it, and pressures are as old as their
-/// stream is slow, s.
+/// Part of a speed, as seconds, that the pressure must show: the vehicle may have begun within it, and a slow stream
+/// has old pressures.
 const SHOWN_S: f32 = 0.3;
-/// Wind and propellers make as much of a height, m.
+/// Wind and propellers change the height by this much, m.
 pub(crate) const NOISE_M: f32 = 0.8;
 
 /// The estimator of the pressure: the first barometer's values, and that at the arming.
@@ -30,7 +30,7 @@ pub(crate) struct Pressure {
     began_hpa: f32,
     before_hpa: f32,
     window: Instant,
-    /// When the vehicle sank last as fast as under a parachute.
+    /// Last time of a sink as fast as under a parachute.
     sank_at: Instant,
     /// Pressure at the arming, hPa; 0 for none.
     armed_hpa: f32,
@@ -82,17 +82,17 @@ impl Pressure {
         known.then(|| self.rise_m(self.armed_hpa))
     }
 
-    /// Whether another pressure of this flight is within so many metres of the present one.
+    /// Whether another pressure of this flight is within this height of the present one.
     pub(crate) fn is_within(&self, of_hpa: f32, limit_m: f32) -> bool {
         libm::fabsf(self.rise_m(of_hpa)) < limit_m
     }
 
-    /// When the vehicle sank last as fast as under a parachute.
+    /// Last time of a sink as fast as under a parachute.
     pub(crate) const fn sank_at(&self) -> Instant {
         self.sank_at
     }
 
-    /// How long it has not sunk as fast as under a parachute; `None` without a barometer that measures.
+    /// Time since it last sank as fast as under a parachute; `None` without a barometer that measures.
     pub(crate) fn steady_for(&self, now: Instant) -> Option<Span> {
         self.now(now).map(|_| now.since(self.sank_at))
     }

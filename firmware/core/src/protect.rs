@@ -17,16 +17,18 @@
 //! | mode changed, done | the flight is over, and it is armed | done |
 //! | any other | the flight is over | idle |
 //!
-//! Only in flight and armed. While the vehicle is on the ground for a moment, or in a mishap, the countdown and the requests pause.
-//! Each step is a record, with the autopilot's answer.
+//! Only in flight and armed. While the vehicle is on the ground for a moment, or in a mishap, the countdown and the
+//! requests pause. Each step is a record, with the autopilot's answer.
 //!
-//! A mode change is the autopilot's own if the autopilot reports a new problem within `SIGN` of it, if it enters a mode in which
-//! failsafes wait, or if a mission ended. Any other mode change is the pilot's, and cancels the action for the flight.
+//! A mode change is the autopilot's own in three cases: a new problem is reported within `SIGN` of it, the mode is
+//! one in which failsafes wait, or a mission ended. Any other mode change is the pilot's, and cancels the action for
+//! the flight.
 //!
-//! If a return is refused (no position), a landing follows on multicopters, helicopters, and a VTOL that reports a hover. Nothing is asked of a vehicle that returns or lands already, by its mode, by its
-//! landed state or because it sinks close above the ground, once one of these has lasted 2 s; until then the action waits. `ArduPlane` and PX4 tell a mission's landing by none of these:
-//! a mission that sinks in the last `APPROACH_M` is one (`approaches`). The control structure and what could go wrong with it are in
-//! docs/safety.md.
+//! If a return is refused (no position), a landing follows on multicopters, helicopters, and a VTOL that reports a
+//! hover. A vehicle that returns or lands already gets no request, once a sign of that has lasted 2 s; until then the
+//! action waits. The signs are its mode, its landed state, and a sink close above the ground. `ArduPlane` and PX4
+//! show a mission's landing by none of these: a mission that sinks in the last `APPROACH_M` is one (`approaches`).
+//! The control structure and its hazards are in docs/safety.md.
 
 use core::fmt::Write as _;
 
@@ -43,7 +45,7 @@ use crate::params::{Param, Params};
 use crate::time::{Instant, PAUSE, Span, Stamp};
 use crate::vehicle::{BATTERIES_MAX, LANDED_STATE_AGE, Vehicle};
 
-/// Bytes of a text that a ground station shows to the pilot as it comes: those of one `STATUSTEXT`.
+/// Bytes of a text that a ground station shows to the pilot: one `STATUSTEXT`.
 pub const TEXT_BYTES_MAX: usize = 50;
 
 /// Between two requests that are not answered.
@@ -59,9 +61,10 @@ const MISSION_ENDS: Span = Span::from_secs(3);
 /// A mission that sinks faster than this, within this height of home, may be landing.
 const APPROACH_MPS: f32 = 0.5;
 const APPROACH_M: f32 = 40.0;
-/// A sign of landing that has lasted so long is believed. One message says nothing, nor do the pauses of a stream at 1 Hz.
+/// A sign of landing that has lasted so long is believed. One message is no proof, nor are the pauses of a stream at
+/// 1 Hz.
 const LANDING_SHOWS: Span = PAUSE;
-/// A vehicle that showed a sign of landing so lately is landing: it may flare.
+/// Time after the last sign of landing in which a vehicle still lands: it may flare.
 const LANDING_LASTS: Span = Span::from_secs(15);
 /// A mode change is the autopilot's own if a sign of that comes within this time, before or after.
 const SIGN: Span = Span::from_secs(2);
@@ -114,7 +117,7 @@ impl Action {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Stage {
-    /// It will be asked for in `detail` seconds.
+    /// The action follows in `detail` seconds.
     Announced = 1,
     /// `detail` seconds are left.
     Counting = 2,
@@ -122,13 +125,13 @@ pub enum Stage {
     CancelledByMode = 3,
     /// The flight is over: it was disarmed, landed, or lies where it came down.
     CancelledOnGround = 4,
-    /// Somebody sent the command to cancel.
+    /// The cancel command was received.
     CancelledByCommand = 5,
     /// The critical level is over; it may be announced again.
     CancelledClear = 6,
     /// The autopilot is on its way already.
     AlreadyDone = 7,
-    /// It was asked for, the `detail`-th time.
+    /// The action was requested, for the `detail`-th time.
     Asked = 8,
     /// The autopilot answered: `detail` is the `MAV_RESULT`.
     Answered = 9,
@@ -173,7 +176,7 @@ impl Stage {
     }
 }
 
-/// A step of the protective action: to be recorded, and told where it has a text.
+/// A step of the protective action: for the record, and for the pilot if it has a text.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Step {
     /// The action.
@@ -235,7 +238,7 @@ enum State {
         /// Requests so far; 0: a return was refused, and a landing is asked for next.
         attempt: u8,
         at: Instant,
-        /// It was understood; the answer is to come.
+        /// The autopilot is working on it; its result is to come.
         progress: bool,
     },
     OnItsWay(Way, Instant),
@@ -272,7 +275,7 @@ enum Input {
     Waits,
 }
 
-/// The next state, and what is told with it: a stage and its detail.
+/// The next state, and the reported stage with its detail.
 type Move = (State, Option<(Stage, u8)>);
 
 /// The protective action's memory.
@@ -318,7 +321,7 @@ impl Protect {
         self.request.take()
     }
 
-    /// Somebody sent the command to cancel; `true` where there is something to cancel.
+    /// The cancel command; `true` if there is something to cancel.
     pub(crate) const fn cancel(&mut self) -> bool {
         self.cancelled = matches!(self.state, State::Counting { .. } | State::Asking { .. });
         self.cancelled
@@ -510,9 +513,9 @@ fn is_ours(ack: &CommandAck, vehicle: &Vehicle, action: Action) -> bool {
     ack.command == action.command() && ack.target.is_none_or(|target| target == us)
 }
 
-/// The check that is critical, of those that `PROT_CHECK` names; or the one that was, while it is silent: that is no better level.
-/// It names: 0 an empty battery (by what remains or by its cells), from 1 on any check of a subsystem. A battery that feeds the
-/// avionics or the payload alone, or nobody knows what, is no reason to come down.
+/// The critical check, of those that `PROT_CHECK` selects: 0 an empty battery (by its remaining charge or its cells),
+/// from 1 on any check of a subsystem. A check that becomes stale stays the reason: silence is no better level.
+/// Batteries of avionics, of a payload or of an unknown consumer do not count.
 fn reason(situation: &Situation<'_>, before: Option<u16>) -> Option<u16> {
     let Situation { vehicle, health, params, .. } = *situation;
     let chosen = params.get(Param::ProtCheck) as u8;
@@ -536,10 +539,10 @@ fn reason(situation: &Situation<'_>, before: Option<u16>) -> Option<u16> {
 struct Modes {
     /// It returns or lands.
     returns: &'static [u32],
-    /// Failsafes wait in it: a pilot who chooses it has not cancelled.
+    /// Failsafes wait in it: a pilot's choice of it cancels nothing.
     waits: u32,
     mission: u32,
-    /// It goes there by itself from a mission's end.
+    /// The autopilot changes to it at a mission's end.
     after_mission: &'static [u32],
     /// A mission's landing shows in its landed state.
     tells_landing: bool,

@@ -1,8 +1,8 @@
-//! Rainflow counting after ASTM E1049-85, section 5.4.4, of a history that never ends: how often a load went up and down
-//! by how much, which is what fatigue depends on.
+//! Rainflow counting after ASTM E1049-85, section 5.4.4, of a history without end: the cycles of a load by their
+//! range, on which fatigue depends.
 //!
-//! Streaming and bounded: only the turning points that may still pair are kept, at most [`POINTS`] of them. Where more
-//! were needed the oldest range counts as the half cycle that it would be at the end of the history.
+//! Streaming and bounded: only turning points that may still pair are kept, at most [`POINTS`]. Beyond that the
+//! oldest range counts as a half cycle, as at the end of the history.
 
 /// Turning points kept. A residue grows and then shrinks: 2 N points need N distinct sizes of swing.
 const POINTS: usize = 32;
@@ -16,19 +16,19 @@ pub(crate) struct Rainflow<const BINS: usize> {
     halves: [u32; BINS],
     points: [f32; POINTS],
     used: u8,
-    /// The extreme since the last turning point, which the load has not turned back from yet.
+    /// The extreme since the last turning point.
     extreme: Option<f32>,
-    /// The load must turn back by so much to have turned.
+    /// The least change of a turn.
     turn: f32,
 }
 
 impl<const BINS: usize> Rainflow<BINS> {
-    /// Counts ranges from `edges[0]` on; what turns back by less than `turn` has not turned.
+    /// Counts ranges from `edges[0]` on; a change of less than `turn` is no turn.
     pub(crate) const fn new(edges: [f32; BINS], turn: f32) -> Self {
         Self { edges, halves: [0; BINS], points: [0.0; POINTS], used: 0, extreme: None, turn }
     }
 
-    /// Takes the next value of the load. A value that is no number is left out.
+    /// Takes the next value of the load; NaN and infinities are skipped.
     pub(crate) fn take(&mut self, value: f32) {
         if !value.is_finite() {
             return;
@@ -92,7 +92,7 @@ impl<const BINS: usize> Rainflow<BINS> {
         }
     }
 
-    /// Cycles of a bin as if the history ended now: what has not paired counts half.
+    /// Cycles of a bin as if the history ended now: open ranges count half.
     pub(crate) fn cycles(&self, bin: usize) -> f64 {
         let points = &self.points[..usize::from(self.used)];
         let open = self.extreme.filter(|_| !points.is_empty());

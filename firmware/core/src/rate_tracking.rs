@@ -1,9 +1,10 @@
 //! Setpoint tracking: how fast the vehicle turns, and whether it climbs with full throttle.
 //!
-//! 1. Control makes the body's rates those of the setpoint, within a fraction of a second. A motor, a propeller, a servo or a surface that
-//!    fails keeps them apart ([`Comparison::RATES`]). A part of the rates of the setpoint is allowed: in fast turns a vehicle is late by much.
-//! 2. Rates about the axes of the attitude's setpoint are turned to the body's first: a vehicle that is yawed fast lags that attitude by a
-//!    quarter of a turn.
+//! 1. Control makes the body's rates those of the setpoint, within a fraction of a second. A motor, a propeller, a
+//!    servo or a surface that fails keeps them apart ([`Comparison::RATES`]). A part of the rates of the setpoint is
+//!    allowed: in fast turns a vehicle is late by much.
+//! 2. Rates about the axes of the attitude's setpoint are turned to the body's first. In a fast yaw a vehicle lags
+//!    that attitude by a quarter of a turn.
 //! 3. With full throttle a multicopter climbs, and a plane does not sink ([`Thrust`]).
 
 use crate::gates::{self, Gates};
@@ -18,7 +19,7 @@ use crate::time::{Instant, Span};
 use crate::units::RadiansPerSecond;
 use crate::vehicle::Vehicle;
 
-/// A setpoint is as old as this at most: an agile vehicle turns otherwise after it.
+/// Maximum age of a setpoint: an agile vehicle turns differently after it.
 const FRESH: Span = Span::from_millis(150);
 /// A display that was not received for longer begins anew.
 const HOLE: Span = Span::from_millis(1_500);
@@ -26,11 +27,11 @@ const HOLE: Span = Span::from_millis(1_500);
 const LATE_PART: f32 = 0.3;
 /// No vehicle turns faster, rad/s: garbage.
 const RATE_MAX: f32 = 60.0;
-/// With full throttle multicopters climb faster than this, m/s, while they are not tilted further, rad; planes do not sink faster.
+/// At full throttle multicopters climb faster than this, m/s, unless tilted further, rad; planes sink more slowly.
 const CLIMBS_MPS: f32 = 0.3;
 const TILT_RAD: f32 = 0.52;
 const SINKS_MPS: f32 = -0.5;
-/// `THRUST_WARN` tells of what lasts so long.
+/// Time after which `THRUST_WARN` reports a lasting loss.
 const IN_VAIN: Span = Span::from_secs(2);
 
 /// The latest setpoint of the rates about roll and pitch.
@@ -71,7 +72,7 @@ pub(crate) fn take_attitude(
     }
 }
 
-/// For how long full throttle has not made the vehicle climb.
+/// Duration of full throttle without a climb.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Thrust {
     full_since: Option<Instant>,
@@ -79,7 +80,6 @@ pub(crate) struct Thrust {
 }
 
 impl Thrust {
-    /// Nothing seen.
     pub(crate) const NEW: Self = Self { full_since: None, full_at: None };
 
     /// A pilot's display: throttle.
@@ -92,7 +92,7 @@ impl Thrust {
         if self.full_at.is_none_or(|before| at.since(before) > HOLE) {
             self.full_since = None;
         }
-        // Once it was so for long, it is until it climbs.
+        // After this time a loss lasts until a climb.
         let was_long = self.full_since.is_some_and(|since| at.since(since) >= IN_VAIN);
         let in_vain = match vehicle.hovers(at) {
             Some(_) if was_long => climb_mps < CLIMBS_MPS,
@@ -106,7 +106,7 @@ impl Thrust {
         self.full_since = (is_full && in_vain).then(|| self.full_since.unwrap_or(at));
     }
 
-    /// For how long, s.
+    /// The duration, s.
     pub(crate) fn in_vain(&self) -> Option<Reading> {
         let at = self.full_at?;
         Some(Reading { at, value: self.full_since.map_or(0.0, |since| at.since(since).as_secs_f32()) })

@@ -1,10 +1,12 @@
-//! The residual engine: the difference between a measured figure and its reference, against its baseline in this flight.
+//! The residual engine: the difference between a measured figure and its reference, against its baseline in this
+//! flight.
 //!
 //! 1. A sample counts while all gates of its [`Row`] are open.
-//! 2. One sample moves the residual by `clamp` at most: one wrong message is no fault.
+//! 2. One sample moves the residual by `clamp` at most, because one wrong message is no fault.
 //! 3. The residual is smoothed. An allowance (delay, scale, wind) is smoothed with it and taken off.
-//! 4. Its baseline is the mean of the last minute ([`crate::adaptive_baseline`]). A residual further out than `hold` teaches nothing.
-//! 5. What is told is the excess over the baseline. It is as old as the sample.
+//! 4. Its baseline is the mean of the last minute ([`crate::adaptive_baseline`]). A residual further out than `hold`
+//!    teaches nothing.
+//! 5. The reported value is the excess over the baseline. It is as old as the sample.
 //!
 //! | comparison | reference | measured | unit |
 //! |---|---|---|---|
@@ -32,7 +34,7 @@ enum Side {
     Either,
 }
 
-/// What the baseline of a residual is.
+/// The baseline of a residual.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Learn {
     /// Zero, for good.
@@ -53,7 +55,7 @@ pub(crate) struct Row {
     /// A longer step counts as this; it teaches twice as much.
     step_max: Span,
     clamp: f32,
-    /// The residual comes round after so much; 0 where it does not.
+    /// Period of a circular residual; 0 for others.
     period: f32,
     side: Side,
     learn: Learn,
@@ -79,7 +81,7 @@ const AHRS2: Row = Row {
 };
 /// A part of the satellites is lost, or the dilution has grown, by more than the logarithm of 1.2.
 const CONSTELLATION: Row = Row { gates: gates::AIRBORNE, learn: Learn::Level, hold: 0.182, ..ROW };
-/// Of the lower of two messages. The hold is what a rise is at least, m/s2.
+/// The lower of two messages. The hold is the least rise, m/s2.
 const VIBRATION: Row =
     Row { gates: gates::SETTLED | gates::CLEAR | gates::ROTORS, smoothing_s: 0.25, hold: 2.5, ..ROW };
 const RATE: Row = Row {
@@ -150,9 +152,9 @@ impl Comparison {
     }
 }
 
-/// Pairs of sensors, by kind: how long their difference is. The clamp of a sample is that of the difference itself. Motors shake
-/// accelerometers most; on wings a vehicle is carried by more than its weight for as long as it turns; legs that touch shake one
-/// accelerometer more than the other.
+/// Pairs of sensors, by kind: the length of their difference. The difference itself is clamped. Motors shake
+/// accelerometers most. On wings a turn carries more than the weight. At a touchdown the legs shake one accelerometer
+/// more than the other.
 pub(crate) const PAIRS: [Row; 4] = {
     const PAIR: Row = Row {
         gates: gates::SETTLED | gates::ONE_FRAME | gates::STILL,
@@ -162,7 +164,7 @@ pub(crate) const PAIRS: [Row; 4] = {
     };
     [
         Row { gates: PAIR.gates | gates::ROTORS | gates::CLEAR, hold: 0.5, ..PAIR },
-        // Gyros that are noisy turn fast by themselves.
+        // Noisy gyros turn fast by themselves.
         Row { gates: gates::SETTLED | gates::ONE_FRAME, smoothing_s: 0.25, hold: 0.05, ..PAIR },
         Row { smoothing_s: 0.25, hold: 20.0, ..PAIR },
         PAIR,
@@ -179,7 +181,7 @@ impl Row {
         gates.are(self.gates)
     }
 
-    /// How much a sample counts that comes so long after the one before.
+    /// The weight of a sample this long after the one before.
     pub(crate) fn weight(&self, step: Span) -> f32 {
         let step_s = step.min(self.step_max).as_secs_f32();
         step_s / (self.smoothing_s + step_s)
@@ -205,7 +207,7 @@ impl Residual {
     /// Nothing compared yet.
     pub(crate) const NEW: Self = Self::after(0.0);
 
-    /// Of many samples: it settles for so long before it is learnt, s.
+    /// A residual of many samples: it settles for this time, s, before it is learnt.
     pub(crate) const fn after(settles_s: f32) -> Self {
         Self { at: Stamp::NONE, allowance: 0.0, figure: AdaptiveBaseline::after(settles_s) }
     }
@@ -215,7 +217,7 @@ impl Residual {
         self.at
     }
 
-    /// Takes a sample; gives how much of it was learnt, s.
+    /// Takes a sample; returns the learnt part, s.
     pub(crate) fn take(&mut self, row: &Row, at: Instant, sample: f32, allowance: f32) -> f32 {
         if !AdaptiveBaseline::is_sane(sample) || !allowance.is_finite() {
             return 0.0;
@@ -261,12 +263,12 @@ impl Residuals {
     /// Nothing compared yet.
     pub(crate) const NEW: Self = Self([Residual::NEW; Comparison::COUNT]);
 
-    /// Whether a sample counts now, and the last one is at least so old.
+    /// Whether a sample counts now, and the last one is old enough.
     pub(crate) fn is_due(&self, of: Comparison, at: Instant, gates: Gates, every: Span) -> bool {
         of.row().is_open(gates) && self.0[of as usize].at.age(at).is_none_or(|age| age >= every)
     }
 
-    /// Takes a sample, where its gates are open; gives how much of it was learnt, s.
+    /// Takes a sample if its gates are open; returns the learnt part, s.
     pub(crate) fn take(
         &mut self,
         of: Comparison,
@@ -294,13 +296,13 @@ impl Residuals {
         Reading::new(self.0[of as usize].at.instant(now), value)
     }
 
-    /// The figure as a multiple of its baseline, where it is beyond it by more than its hold; 1 where it is not.
+    /// The figure as a multiple of its baseline, if it exceeds it by more than its hold; 1 otherwise.
     pub(crate) fn multiple(&self, now: Instant, of: Comparison) -> Option<Reading> {
         let multiple = self.0[of as usize].figure.multiple(of.row().hold);
         self.as_measured(now, of, multiple)
     }
 
-    /// From which figure on that is more than so many times.
+    /// The figure from which on it is more than this multiple.
     pub(crate) fn limit(&self, of: Comparison, times: f32) -> Option<f32> {
         self.0[of as usize].figure.limit(times, of.row().hold)
     }

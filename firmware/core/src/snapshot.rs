@@ -1,6 +1,8 @@
-//! Snapshots: what went on around a critical finding. The key values of the vehicle are kept five times a second for five
-//! seconds; a critical finding takes those of its subsystem, and attitude and climb with them, as they were before, and
-//! five seconds later as they went on.
+//! Snapshots around critical findings.
+//!
+//! The key values of the vehicle are sampled five times a second and kept for five seconds. A critical finding takes
+//! those of its subsystem, with attitude and climb: the seconds before at once, the seconds after when they have
+//! passed.
 
 use crate::half;
 use crate::health::{Finding, Inputs, Level, Subsystem};
@@ -18,7 +20,7 @@ pub const COLUMNS_MAX: usize = 8;
 const PENDING_MAX: usize = 4;
 
 const AFTER: Span = Span::from_millis(INTERVAL.as_millis() * SAMPLES as u64);
-/// A value that is older than this is not known any more.
+/// Maximum age of a value.
 const FRESH: Span = Span::from_secs(3);
 
 type Read = fn(&Inputs<'_>) -> Option<f32>;
@@ -99,7 +101,7 @@ const KEPT: [Quantity; 24] = [
     Quantity("height_m", |inputs| Some(inputs.vehicle.global.within(inputs.now, FRESH)?.relative_altitude.0)),
 ];
 
-/// Of the first battery; of `SYS_STATUS` where no battery tells of itself.
+/// A figure of the first battery; of `SYS_STATUS` if none reports itself.
 fn of_battery<T>(
     inputs: &Inputs<'_>,
     battery: fn(&Battery) -> Option<T>,
@@ -197,7 +199,7 @@ impl Snapshots {
             return;
         }
         if inputs.now.since(self.newest) > INTERVAL + INTERVAL {
-            // A gap: what was before it is not what was just before.
+            // After a gap the earlier samples are not those just before.
             self.filled = 0;
         }
         self.newest = inputs.now;
@@ -213,7 +215,7 @@ impl Snapshots {
         (0..usize::from(self.filled)).map(move |sample| &self.ring[(first + sample) % SAMPLES])
     }
 
-    /// Takes a critical finding. One of a subsystem of which a snapshot is being taken is in that.
+    /// Takes a critical finding, unless a snapshot of its subsystem is being taken.
     pub(crate) fn trigger(&mut self, finding: &Finding) {
         let same = |pending: &Pending| pending.subsystem == finding.subsystem;
         if finding.level != Level::Critical || self.pending.iter().flatten().any(same) {
@@ -246,7 +248,7 @@ impl Snapshots {
         Some(Snapshot { at, check, instance, subsystem, after: before_told, first, snapshots: self })
     }
 
-    /// Findings of which no snapshot was taken because too many were being taken.
+    /// Findings without a snapshot because too many were being taken.
     pub const fn left_out(&self) -> u16 {
         self.left_out
     }

@@ -6,13 +6,13 @@
 use crate::motion::IDLE_THROTTLE;
 use crate::time::{Instant, Span};
 
-/// From this on it may fly as long as the hover throttle is not known.
+/// Above this the vehicle may fly, while the hover throttle is unknown.
 pub(crate) const CARRIES: f32 = 0.2;
-/// All of it. Controllers keep some back for attitude.
+/// Full throttle. Controllers keep some back for attitude.
 pub(crate) const FULL: f32 = 0.95;
 /// The part of the hover throttle below which rotors do not carry the vehicle.
 const HOVER_PART: f32 = 0.5;
-/// Time constant of the hover throttle, and how long a hover is until it is known, s.
+/// Time constant of the hover throttle, and the hover time until it is known, s.
 const HOVER_S: f32 = 10.0;
 /// Throttles come more often than this, s.
 const STEP_MAX_S: f32 = 2.0;
@@ -20,13 +20,13 @@ const STEP_MAX_S: f32 = 2.0;
 /// The effect of a throttle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Power {
-    /// It does not carry the vehicle.
+    /// Too little to carry the vehicle.
     Idle,
-    /// It may be that of idling or of hovering rotors.
+    /// Idling or hovering rotors.
     Little,
     /// It carries the vehicle.
     Carries,
-    /// It would climb.
+    /// Enough to climb.
     Full,
 }
 
@@ -36,9 +36,9 @@ pub(crate) struct Thrust {
     hover: f32,
     hovered_s: f32,
     at: Instant,
-    /// When it was armed with more than idling throttle last; zero for never.
+    /// Last time armed with more than idle throttle; zero for never.
     driven_at: Instant,
-    /// The throttle was that of flight since the arming: its values mean something.
+    /// Whether the throttle reached that of flight since arming: its values have a meaning then.
     has_flown: bool,
 }
 
@@ -48,7 +48,7 @@ impl Thrust {
         (self.hovered_s, self.has_flown) = (0.0, false);
     }
 
-    /// Takes a throttle of an armed vehicle, which hovers or not.
+    /// Takes a throttle of an armed vehicle, and whether it hovers.
     pub(crate) fn take(&mut self, at: Instant, part: f32, hovers: bool) {
         let step_s = at.since(core::mem::replace(&mut self.at, at)).as_secs_f32().min(STEP_MAX_S);
         if part > self.idle().min(IDLE_THROTTLE) {
@@ -67,12 +67,12 @@ impl Thrust {
         self.hovered_s >= HOVER_S
     }
 
-    /// The throttle below which nothing flies.
+    /// The throttle below which no vehicle flies.
     fn idle(&self) -> f32 {
         if self.is_learnt() { HOVER_PART * self.hover } else { IDLE_THROTTLE }
     }
 
-    /// What a throttle does.
+    /// The effect of a throttle.
     pub(crate) fn power(&self, part: f32) -> Power {
         let carries = if self.is_learnt() { self.idle() } else { CARRIES };
         match part {
@@ -83,12 +83,12 @@ impl Thrust {
         }
     }
 
-    /// Whether the throttle was that of flight since the arming.
+    /// Whether the throttle reached that of flight since arming.
     pub(crate) const fn has_flown(&self) -> bool {
         self.has_flown
     }
 
-    /// Whether it had more than idling throttle within so long.
+    /// Whether it had more than idle throttle within this span.
     pub(crate) fn was_driven(&self, now: Instant, within: Span) -> bool {
         self.driven_at != Instant::ZERO && now.since(self.driven_at) <= within
     }

@@ -7,8 +7,8 @@ use core::fmt;
 use core::num::NonZeroU32;
 use core::ops::{Add, Sub};
 
-/// A time that is later than `now` by up to this is in the future: messages may be processed in another order than they came.
-/// What lies back for 49.7 days less this would be mistaken for such a one.
+/// A time that is later than `now` by up to this is in the future: messages may be processed in another order than
+/// they came. A time 49.7 days less this in the past would be mistaken for a future one.
 const AHEAD_MAX: Span = Span::from_secs(3_600);
 
 /// A point in time: milliseconds since power-on, modulo 2^32. Kept one higher, so that an optional one takes no more room.
@@ -63,7 +63,7 @@ impl Instant {
         if other.is_after(self) { other } else { self }
     }
 
-    /// The earlier one of two, by the rule of [`Self::since`]: what is not up to `AHEAD_MAX` later than `other` lies before it.
+    /// The earlier one of two, by the rule of [`Self::since`].
     #[must_use]
     pub const fn earlier(self, other: Self) -> Self {
         if other.since(self).0 == 0 { other } else { self }
@@ -131,7 +131,7 @@ impl Stamp {
     }
 }
 
-/// Samples further apart than this are not of one course, and an older one is not of now: two messages of a stream at 1 Hz.
+/// Longest gap between samples of one course, and largest age of a current sample: two messages of a stream at 1 Hz.
 pub(crate) const PAUSE: Span = Span::from_secs(2);
 
 /// A length of time in milliseconds, up to 49.7 days.

@@ -3,7 +3,7 @@
 use crate::time::Instant;
 use crate::units::{Amperes, Volts};
 
-/// A battery's internal resistance: the slope of its voltage over its current, from means that forget slowly.
+/// A battery's internal resistance: the slope of its voltage over its current, from exponential means.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Resistance {
     current_a: f32,
@@ -12,7 +12,7 @@ pub(crate) struct Resistance {
     variance_v2: f32,
     covariance_va: f32,
     samples: u16,
-    /// What later figures are compared with, ohm; 0 before there is one.
+    /// The baseline of later figures, ohm; 0 before there is one.
     baseline_ohm: f32,
     /// The last figure from a large change of the current, ohm; 0 before there is one.
     sag_ohm: f32,
@@ -21,21 +21,20 @@ pub(crate) struct Resistance {
 impl Resistance {
     /// Weight of a new sample in the means: they look back about 60 samples.
     const WEIGHT: f32 = 1.0 / 60.0;
-    /// Below this spread of the current the slope says nothing, A2.
+    /// Minimum variance of the current for a slope, A2.
     const VARIANCE_MIN_A2: f32 = 0.5;
-    /// This part of the voltage's variance the current must explain: a voltage that falls for another reason (an empty
-    /// battery, a cell that fails) says nothing about resistance.
+    /// The part of the voltage's variance that the current must explain. A voltage that falls for another reason (an
+    /// empty battery, a failing cell) gives no resistance.
     const EXPLAINED_MIN: f32 = 0.7;
     /// Samples before there is a figure.
     const SAMPLES_MIN: u16 = 120;
     /// Samples before the figure is the baseline of this session.
     const SAMPLES_BASELINE: u16 = 480;
-    /// A figure from a large change: this many samples, and a spread of the current of this part of its mean. A voltage that
-    /// falls for another reason (a cell that fails) comes without such a change.
+    /// A figure from a large change: this many samples, and a spread of the current of this part of its mean. A
+    /// failing cell lowers the voltage without such a change.
     const SAMPLES_SAG: u16 = 20;
     const SPREAD_SAG: f32 = 0.2;
 
-    /// Nothing known.
     pub(crate) const fn new() -> Self {
         Self {
             current_a: 0.0,
@@ -49,7 +48,7 @@ impl Resistance {
         }
     }
 
-    /// Takes what the battery says.
+    /// Takes a measurement of the battery.
     pub(crate) fn take(&mut self, voltage: Option<Volts>, current: Option<Amperes>) {
         let (Some(voltage), Some(current)) = (voltage, current) else { return };
         let (voltage_v, current_a) = (voltage.0, current.0);
@@ -76,13 +75,13 @@ impl Resistance {
         }
     }
 
-    /// By how much this current makes the voltage sag, volts; 0 while that is not known.
+    /// The sag of the voltage under this current, volts; 0 while unknown.
     pub(crate) fn sag_v(&self, current: Amperes) -> f32 {
         let sag_v = self.sag_ohm * current.0;
         if sag_v.is_finite() { sag_v.max(0.0) } else { 0.0 }
     }
 
-    /// In ohm; `None` while the current has not varied enough to tell.
+    /// In ohm; `None` while the current has not varied enough.
     pub(crate) fn ohm(&self) -> Option<f32> {
         self.slope_ohm().filter(|_| self.samples >= Self::SAMPLES_MIN)
     }
@@ -92,11 +91,11 @@ impl Resistance {
             && self.covariance_va * self.covariance_va
                 >= Self::EXPLAINED_MIN * self.variance_a2 * self.variance_v2;
         let ohm = -self.covariance_va / self.variance_a2;
-        // Less than a milliohm, or more than one ohm, is no battery that flies.
+        // No flying battery has less than a milliohm or more than one ohm.
         (enough && ohm > 0.001 && ohm < 1.0).then_some(ohm)
     }
 
-    /// How far it is above its baseline, percent.
+    /// The rise above the baseline, percent.
     pub(crate) fn rise_percent(&self) -> Option<f32> {
         let ohm = self.ohm()?;
         (self.baseline_ohm > 0.0).then(|| (ohm / self.baseline_ohm - 1.0) * 100.0)
@@ -203,7 +202,7 @@ mod tests {
         assert!(take(16.0, 0.4, 60).abs() < f32::EPSILON, "nothing changed yet");
         assert!((take(14.6, 12.4, 60) - 1.44).abs() < 0.1, "1.4 V at 12 A more");
         assert!((take(14.6, 12.4, 1_000) - 1.44).abs() < 0.1, "still known in a steady hover");
-        // A cell fails, and a third of it is taken by a current that rises by a tenth.
+        // A failing cell takes a third of the voltage drop, with a current that rises by a tenth.
         assert!((take(13.0, 13.6, 600) - 1.58).abs() < 0.1);
     }
 

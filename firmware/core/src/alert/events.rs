@@ -1,8 +1,9 @@
-//! What PX4's events mean (`EVENT`, 410). Source: names, argument types and enumerations of PX4's public event definitions
-//! (`events/all_events.json` of a build of v1.17, BSD-3-Clause).
+//! Meanings of PX4's events (`EVENT`, 410). Source: names, argument types and enumerations of PX4's public event
+//! definitions (`events/all_events.json` of a build of v1.17, BSD-3-Clause).
 //!
-//! An event's number is its component, 1 for the autopilot, in the highest byte, and the FNV-1a hash of its name in the three others.
-//! So a name gives its number here, while the firmware is built, and stays the same for all versions that keep the name.
+//! An event's number is its component, 1 for the autopilot, in the highest byte, and the FNV-1a hash of its name in
+//! the three others. So a name gives its number here, while the firmware is built, and stays the same for all
+//! versions that keep the name.
 
 use crate::bytes::fnv1a;
 use crate::cause::{Alert, Cause, Meaning};
@@ -15,14 +16,14 @@ const fn number(name: &str) -> u32 {
     AUTOPILOT | fnv1a(name) & 0x00FF_FFFF
 }
 
-/// What an event means.
+/// The meaning of an event.
 #[derive(Clone, Copy, Debug)]
 enum Says {
-    /// Always this.
+    /// A fixed one.
     Is(Meaning),
     /// A failsafe whose cause is this byte of the arguments (`failsafe_cause_t`).
     Failsafe(u8),
-    /// A sensor that is left for another one; which, says the first byte (`sensor_type_t`).
+    /// A sensor that is left for another one: the first byte tells which (`sensor_type_t`).
     Failover,
 }
 
@@ -40,8 +41,9 @@ macro_rules! events {
 }
 
 events! {
-    // Severe in its own words, and nothing that is wrong with the vehicle: which mode may not be flown now, or why arming is refused. A flight
-    // termination is also a pilot's kill switch, after a landing too: HEARTBEAT says the same, and whether that matters is seen there.
+    // Severe by their level, but no fault of the vehicle: a mode that may not be flown now, or an arming that is
+    // refused. A flight termination is also a pilot's kill switch after a landing. HEARTBEAT reports it too, and
+    // decides whether it matters.
     fine:
         check_system_flight_term_active commander_kill_sw_engaged check_modes_angular_velocity
         check_modes_attitude check_modes_global_pos check_modes_local_alt check_modes_local_pos
@@ -124,7 +126,7 @@ events! {
         vtol_att_ctrl_quadchute_min_alt vtol_att_ctrl_quadchute_tout vtol_att_ctrl_quadchute_trans_alt_err;
 }
 
-/// The same by their numbers, worked out while the firmware is built: it holds no names.
+/// The same by number, computed when the firmware is built: the firmware holds no names.
 static NUMBERED: [(u32, Says); EVENTS.len()] = {
     let mut numbered = [(0, Says::Is(Meaning::Fine)); EVENTS.len()];
     let mut row = 0;
@@ -135,12 +137,12 @@ static NUMBERED: [(u32, Says); EVENTS.len()] = {
     numbered
 };
 
-/// The name of an event, where it is in the table.
+/// The name of an event; `None` if it is not in the table.
 pub fn name(id: u32) -> Option<&'static str> {
     EVENTS.iter().map(|(name, _)| *name).find(|name| number(name) == id)
 }
 
-/// What an event means.
+/// The meaning of an event.
 pub(super) fn meaning(id: u32, arguments: &[u8]) -> Meaning {
     let argument = |at: u8| arguments.get(usize::from(at)).copied().unwrap_or_default();
     let Some((_, says)) = NUMBERED.iter().find(|(known, _)| *known == id) else { return Meaning::Unknown };

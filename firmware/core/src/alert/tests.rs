@@ -120,8 +120,12 @@ fn armed() -> Alerts {
     alerts
 }
 
-/// Plays a script of steps, each with its second: `arm`, `disarm`, a text (`critical Gnss`), flags of `SYS_STATUS` (`flags`, and the bit of a
-/// sensor that is not healthy), and the level that a cause then has (`Gnss = 2`; `-` where nothing was ever said).
+/// Plays a script of steps, each with its second:
+///
+/// - `arm`, `disarm`;
+/// - a text (`critical Gnss`);
+/// - flags of `SYS_STATUS` (`flags`, and the bit of an unhealthy sensor);
+/// - the expected level of a cause (`Gnss = 2`; `-` if it was never reported).
 fn play(script: &str) {
     let mut alerts = Alerts::new();
     for step in script.split("; ") {
@@ -155,16 +159,16 @@ fn play(script: &str) {
 #[test]
 fn words_and_flags_hold_as_long_as_they_should() {
     for script in [
-        // What was said before arming does not count. A text holds for 10 s, the worst one of that time.
+        // Texts before arming do not count. A text holds for 10 s, the worst one of that time.
         "0 Gnss = -; 0 warning Gnss; 0 Gnss = -; 0 arm; 0 critical Gnss; 5 warning Gnss; 0 Gnss = 2; 14 Gnss = 2; \
          15 Gnss = 2; 16 Gnss = ended; 5 Gyro = -",
-        // It is over by its own word, outlasts disarming, and not the next arming.
+        // It ends by a text; it outlasts disarming, but not the next arming.
         "0 arm; 20 warning Gnss; 21 over Gnss; 22 Gnss = 0; 23 warning Gnss; 24 disarm; 24 Gnss = 1; 25 arm; 25 Gnss = -",
-        // An autopilot that crashes disarms with the word, and tells what broke right behind it.
+        // An autopilot that crashes disarms with that text, and reports the damage right behind it.
         "0 arm; 1 disarm; 1 warning Gnss; 2 critical Crash; 2 Crash = 2; 2 Gnss = -",
         "0 arm; 1 disarm; 2 critical Accelerometer; 2 Accelerometer = 2",
         "0 arm; 1 disarm; 5 critical Crash; 5 Crash = -",
-        // A flag counts when two messages have it, and while messages come. None tells of a crash.
+        // A flag counts when two messages have it, and while messages come. No flag reports a crash.
         "0 arm; 0 flags; 0 Compass = 0; 1 flags 2; 1 Compass = 0; 2 flags 2; 2 Compass = 1; 3 flags; 3 Compass = 0; \
          4 flags 2; 4 Compass = 0; 5 flags 2; 5 Compass = 1; 10 Compass = 1; 11 Compass = ended; 12 flags; \
          12 Compass = 0; 12 Crash = ended; 13 disarm; 13 Compass = ended",

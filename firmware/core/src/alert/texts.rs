@@ -1,12 +1,13 @@
-//! What the autopilots' texts mean. Source: the texts of `ArduPilot` (GPL-3.0) and `PX4` (BSD-3-Clause) of 2013 to 2026, as words that
-//! they have in common; no text of theirs is here whole.
+//! Meanings of the autopilots' texts. Source: common words of the texts of `ArduPilot` (GPL-3.0) and `PX4`
+//! (BSD-3-Clause) of 2013 to 2026; no whole text is copied.
 //!
-//! The first row that fits counts. Its pattern is in small letters; `*` stands for anything, `^` at its beginning for the beginning of
-//! the text. Most rows are ruled out without a look at the text: a pattern's pairs of letters must be among those of the text ([`PAIRS`]).
+//! The first row that fits counts. Its pattern is in small letters; `*` stands for anything, `^` at its beginning for
+//! the beginning of the text. Most rows are ruled out without a search: all pairs of letters of a pattern must be in
+//! the text ([`PAIRS`]).
 
 use crate::cause::{Alert, Cause, Meaning};
 
-/// Which texts a row is about.
+/// The texts to which a row applies.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Where {
     /// All.
@@ -17,12 +18,12 @@ enum Where {
     Sound,
 }
 
-/// What rows of a kind mean, and of which texts.
+/// Meaning and texts of a kind of rows.
 macro_rules! kind {
     (fine) => {
         (Meaning::Fine, Where::Everywhere)
     };
-    // Only what a text is about, which texts of failures have too.
+    // Only a topic, which texts of failures have too.
     (mild) => {
         (Meaning::Fine, Where::Sound)
     };
@@ -72,11 +73,12 @@ texts! {
     (fine): "landing sequence" "smartrtl" "rally" "fence upload" "log streaming" "log download"
         "avoidance enabled" "avoidance disabled" "avoid: performing" "locate copter"
         "command received" "throttle not zero" "not landed";
-    // Mishaps and what ends a flight.
+    // Mishaps and ends of a flight.
     (critical Crash): "crash" "ditching";
     (warning Crash): "hard landing";
     (critical Crash): "parachute*releas" "parachute*deploy";
-    // PX4, also of a pilot's kill switch, after a landing too: its HEARTBEAT says the same, and whether that matters is seen there.
+    // PX4 sends this also for a pilot's kill switch after a landing. HEARTBEAT reports it too, and decides whether it
+    // matters.
     (fine): "flight termination active";
     (critical Crash): "terminat";
     // Motors, before sensors: "thrust loss", "imbalanced propeller".
@@ -101,7 +103,7 @@ texts! {
     (broad RemoteControl): "manual control";
     (warning RemoteControl): "no rc receiver";
     (warning GroundStation): "gcs*failsafe" "gcs*lost" "link lost" "ground*station*lost";
-    // What shakes, before the sensors that it shakes.
+    // Vibration, before the sensors that it shakes.
     (warning Vibration): "vibration comp" "clipping";
     // The estimator, before the sensors that its words name.
     (critical Estimator): "ekf failsafe";
@@ -115,7 +117,7 @@ texts! {
     (broad Ranging): "rangefinder" "distance sensor" "lidar" "optflow" "optical flow";
     (broad Compass): "compass";
     (warning Compass): "mag *fail";
-    // PX4's voter of sensors, of the one that it flies by: "Accel #0 fail:  TIMEOUT!".
+    // PX4's sensor voter, about the selected sensor: "Accel #0 fail: TIMEOUT!".
     (critical Accelerometer): "accel #*fail";
     (critical Gyro): "gyro #*fail";
     (warning Barometer): "baro #*fail";
@@ -147,12 +149,13 @@ static PAIRS: [u64; TEXTS.len()] = {
     all
 };
 
-/// The pairs of letters of a text or a pattern, each as one of 64 bits: a text that a pattern fits has all bits of the pattern.
+/// The pairs of letters of a text or a pattern, each as one of 64 bits. A text that fits a pattern has all bits of
+/// the pattern.
 const fn pairs(text: &[u8]) -> u64 {
     let mut bits = 0;
     let mut rest = text;
     while let [first, second, ..] = rest {
-        // What stands for anything is no letter. (No text's own `*` or `^` is in a pattern.)
+        // Wildcards are no letters. (No text's own `*` or `^` is in a pattern.)
         if !matches!(first, b'*' | b'^') && !matches!(second, b'*' | b'^') {
             let sum = first.to_ascii_lowercase() as u32 * 7 + second.to_ascii_lowercase() as u32;
             bits |= 1 << (sum % u64::BITS);
@@ -163,7 +166,7 @@ const fn pairs(text: &[u8]) -> u64 {
     bits
 }
 
-/// What a text means, known to be severe or not.
+/// The meaning of a text, which is severe or of unknown severity.
 pub(super) fn meaning(text: &[u8], is_severe: bool) -> Meaning {
     let has = pairs(text);
     let is_about = |pattern: &str, place: Where| match place {

@@ -1,4 +1,4 @@
-//! The alarms that stand: since when each does, and which other one explains it.
+//! The standing alarms: their onsets, and the alarm that explains each.
 
 use super::finding::Level;
 use super::tables::STATES;
@@ -7,8 +7,8 @@ use crate::time::{Instant, Span};
 /// Alarms that are kept. One more is reported, explains nothing and is not explained.
 pub(super) const ALARMS_MAX: usize = 32;
 
-/// An explained alarm is reported by itself if it goes on for this long after its cause ended or fell below it: a disturbed estimator needs
-/// some seconds to settle.
+/// An explained alarm is reported by itself if it lasts this long after its cause ended or fell below it. A disturbed
+/// estimator needs some seconds to settle.
 pub(super) const OUTLIVES: Span = Span::from_secs(8);
 
 /// An alarm, by the number of its state.

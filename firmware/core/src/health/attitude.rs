@@ -58,7 +58,7 @@ fn degrees(inputs: &Inputs<'_>, angle: fn(&Attitude) -> Radians, axis: usize) ->
         let is = angle(attitude).0;
         let asked = is_made_to_turn(vehicle)
             || told.map_or_else(|| is_banked_by_hand(vehicle), |told| apart(is, told) < FOLLOWS_RAD);
-        // On wings, and between both, no angle is too much; and none counts that the sensors contradict.
+        // No angle is too much on wings or in transition, and none counts that the sensors contradict.
         let judged = vehicle.hovers(now) == Some(true) && !asked && !vehicle.inertial.contradicts(now);
         if judged || !is.is_finite() { is.to_degrees().abs() } else { 0.0 }
     };

@@ -3,8 +3,8 @@
 //! A check is data ([`Check`]) plus one pure function that reads its value; its memory is a [`State`]. Adding a check
 //! is one entry in its subsystem's table and one function.
 //!
-//! "Bad for `debounce`" takes time and samples: the value is beyond its limit for so long, and in [`SAMPLES`] measurements
-//! of it. A slow stream holds its last value: that is one sample, however long it is held.
+//! "Bad for `debounce`" takes time and samples: the value is beyond its limit for so long, and in [`SAMPLES`]
+//! measurements of it. A slow stream holds its last value: that is one sample, however long it is held.
 //!
 //! ```text
 //!            bad for `debounce`             silent for `stale_after`
@@ -14,9 +14,9 @@
 //!       \-----------------------------------------------------------/
 //! ```
 //!
-//! A value that goes up and down is one thing and not one each time: [`CLEAR`] grows eightfold with each level that it rises to
-//! again, up to [`CLEAR_MAX`], until the check no longer applies (the vehicle landed, or was disarmed). So does the time after
-//! which a bad value is stale: a slow stream gives no new alarm with each message.
+//! A value that goes up and down is one event, not many. [`CLEAR`] grows eightfold with each level that it rises to
+//! again, up to [`CLEAR_MAX`], until the check no longer applies (landing, disarming). So does the time after which a
+//! bad value is stale: a slow stream gives no new alarm with each message.
 
 use core::num::NonZeroU8;
 
@@ -266,7 +266,7 @@ const _: () = assert!(CLEAR.as_millis() << (3 * Repeats::MOST) == CLEAR_MAX.as_m
 /// An alarm whose value is never stale is stale itself this long after its last value.
 const UNSEEN: Span = Span::from_secs(15);
 
-/// So many measurements in a row must be bad: one wrong message is no alarm.
+/// Bad measurements in a row that make an alarm: one wrong message is none.
 pub const SAMPLES: u8 = 2;
 
 /// Two counts up to 15 in a byte.
@@ -385,7 +385,7 @@ impl Check {
             instance,
             level: change.level,
             previous: change.previous,
-            // A flag that is no longer reported is not known to be good, nor is a vehicle after a mishap.
+            // NaN if a flag is no longer reported, or if a mishap ended: neither is known to be good.
             value: if (self.unit.is_flag() && change.value < 0.0)
                 || (matches!(self.subsystem, Subsystem::Mishap) && matches!(change.level, Level::Ok))
             {
@@ -440,7 +440,7 @@ impl State {
         self.level.is_none() && self.held.is_none() && !self.seen.is_set()
     }
 
-    /// Whether it is good, and nothing says otherwise.
+    /// Whether it is good and no change is pending.
     fn is_calm(&self) -> bool {
         let counts = self.bad.is_set() || self.very_bad.is_set() || self.samples != Samples::NONE;
         self.level == Some(Level::Ok) && self.better.is_set() && !counts
@@ -469,7 +469,7 @@ impl State {
         true
     }
 
-    /// Notes when a value was measured, and judges it not.
+    /// Notes when a value was measured, without judging it.
     pub(super) fn see(&mut self, now: Instant, reading: Option<Reading>) {
         if let Some(reading) = reading.filter(|reading| reading.value.is_finite()) {
             self.seen = Stamp::at(reading.at.earlier(now));
@@ -569,7 +569,7 @@ impl State {
         let [debounce_warn, debounce_critical] = check.debounce.map(Debounce::span);
         let very_bad = self.samples.count(Samples::VERY_BAD, beyond(critical, 0.0), measured)
             & self.very_bad.run(beyond(critical, 0.0), now, debounce_critical);
-        // Without a warning limit there is no warning on the way to critical.
+        // Without a warning limit no warning precedes critical.
         let warned = beyond(warn, 0.0) || (!warn.is_nan() && beyond(critical, 0.0));
         let bad =
             self.samples.count(Samples::BAD, warned, measured) & self.bad.run(warned, now, debounce_warn);
@@ -588,7 +588,7 @@ impl State {
         } else if bad || (level == Level::Warning && !better) {
             Level::Warning
         } else if undecided && matches!(self.level, None | Some(Level::Stale)) {
-            // Bad, not yet for long enough, and nothing good is known from before.
+            // Bad for too short a time, and never good before.
             return None;
         } else {
             Level::Ok
@@ -596,7 +596,7 @@ impl State {
         self.go(next, value, check.limit(next, params))
     }
 
-    /// Changes the level. A first level that is good is no change.
+    /// Changes the level. A first level that is good counts as no change.
     fn go(&mut self, level: Level, value: f32, limit: f32) -> Option<Change> {
         let before = self.level.replace(level);
         let previous = before.unwrap_or(Level::Ok);

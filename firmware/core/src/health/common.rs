@@ -1,4 +1,4 @@
-//! What several subsystems' tables share.
+//! Parts that several subsystems' tables share.
 
 use core::num::NonZeroU8;
 
@@ -16,7 +16,7 @@ pub(super) const STALE: Option<NonZeroU8> = NonZeroU8::new(5);
 /// For streams that come at 0.5 Hz.
 pub(super) const STALE_SLOW: Option<NonZeroU8> = NonZeroU8::new(12);
 
-/// What most checks are like.
+/// The common values of most checks.
 pub(super) const PLAIN: Check = Check {
     name: "",
     subsystem: Subsystem::Power,
@@ -38,7 +38,7 @@ pub(super) const fn alert<const CAUSE: usize>(subsystem: Subsystem, role: Role) 
         name: Cause::ALL[CAUSE].name(),
         subsystem,
         limits: Limits::above(Some(Param::AlertWarn), Some(Param::AlertCrit), 0.0),
-        // Silence is no word about health.
+        // Silence tells nothing about health.
         alarm_only: true,
         unit: Unit::FLAG,
         role,
@@ -58,7 +58,7 @@ pub(super) const fn due(subsystem: Subsystem) -> Check {
         unit: Unit::of("%"),
         limits: Limits::above(Some(Param::CompYellow), Some(Param::CompRed), 0.0),
         debounce: [Debounce::secs(1); 2],
-        // That a part is not due does not make its subsystem healthy.
+        // A part that is not due does not make its subsystem healthy.
         alarm_only: true,
         read: match subsystem {
             Subsystem::Power => |inputs, _| used(inputs, Subsystem::Power),
@@ -81,8 +81,8 @@ fn used(inputs: &Inputs<'_>, subsystem: Subsystem) -> Option<Reading> {
     inputs.reading(percent?.min(most))
 }
 
-/// A figure of VIBRATION's three, on this scale: an axis each of ArduPilot; of PX4 coning of the gyro, high-frequency rate (rad/s) and
-/// high-frequency acceleration (m/s2).
+/// One of the three figures of VIBRATION on this scale. ArduPilot: one axis each. PX4: coning of the gyro,
+/// high-frequency rate (rad/s), high-frequency acceleration (m/s2).
 pub(super) fn vibration(
     inputs: &Inputs<'_>,
     scale: VibrationScale,

@@ -1,8 +1,8 @@
-//! Exceedances: how often a limit was crossed, how far and for how long, for each check and instance, in this session
-//! and over the airframe's life.
+//! Exceedances: crossings of limits, their peak and duration, for each check and instance, in this session and over
+//! the airframe's life.
 //!
-//! Bounded: [`EXCEEDANCES_MAX`] checks and instances. One more is counted as left out, unless it is critical and another
-//! never was: that one makes room.
+//! Bounded: [`EXCEEDANCES_MAX`] checks and instances. One more is counted as left out, unless it is critical and
+//! another never was: it takes that one's place.
 
 use super::check::{Check, Side};
 use super::finding::{Finding, Level};
@@ -97,7 +97,7 @@ impl Entry {
         self.since = now;
     }
 
-    /// With what lasts counted up to now.
+    /// The entry with its current level counted up to now.
     fn now(mut self, now: Instant) -> Option<Exceedance> {
         self.extend(now);
         let check = checks().nth(self.check.into())?;
@@ -136,7 +136,7 @@ impl Default for Exceedances {
 }
 
 impl Exceedances {
-    /// The longest stored form: version, then of each entry the FNV-1a hash of the check's name (u32),
+    /// The longest stored form: version, then the entries. Each has the FNV-1a hash of the check's name (u32),
     /// instance, warnings and criticals (u16), tenths of a second of both (u32), peak (f32).
     pub const BYTES: usize = 1 + EXCEEDANCES_MAX * ENTRY_BYTES;
 
@@ -208,18 +208,18 @@ impl Exceedances {
         }))
     }
 
-    /// Whatever was exceeded, with what lasts counted up to now.
+    /// Every exceedance, counted up to now.
     pub fn iter(&self, now: Instant) -> impl Iterator<Item = Exceedance> {
         self.entries.iter().flatten().filter_map(move |entry| entry.now(now))
     }
 
-    /// Whatever began, ended or lasted at a time or after it, with what lasts counted up to now.
+    /// Every exceedance that began, ended or lasted at a time or after it, counted up to now.
     pub fn changed(&self, now: Instant, since: Instant) -> impl Iterator<Item = Exceedance> {
         let changed = move |entry: &&Entry| rank(entry.level) > 0 || !since.is_after(entry.since);
         self.entries.iter().flatten().filter(changed).filter_map(move |entry| entry.now(now))
     }
 
-    /// Nothing is exceeded any more: the vehicle of before was heard last by now.
+    /// Ends all exceedances: the previous vehicle was heard last at this time.
     pub(crate) fn end(&mut self, now: Instant) {
         for entry in self.entries.iter_mut().flatten() {
             entry.extend(now);
@@ -237,7 +237,7 @@ impl Exceedances {
         self.left_out
     }
 
-    /// It is another airframe: earlier sessions were not its own.
+    /// Forgets earlier sessions: they were another airframe's.
     pub(crate) fn forget_life(&mut self) {
         for place in &mut self.entries {
             match place {
@@ -247,7 +247,7 @@ impl Exceedances {
         }
     }
 
-    /// Writes the stored form; gives its length, which is that of the entries in use.
+    /// Writes the stored form of the entries in use; returns its length.
     pub fn encode(&self, now: Instant, out: &mut [u8]) -> usize {
         let mut fields = Fields::write(out, VERSION);
         for Exceedance { check, mut instance, mut lifetime, .. } in self.iter(now) {
@@ -260,7 +260,7 @@ impl Exceedances {
     /// Reads the stored form, of this version or a later one. Checks that no longer exist are left out.
     ///
     /// # Errors
-    /// [`Unreadable`] where it ends within an entry, or has no version.
+    /// [`Unreadable`] if it ends within an entry, or has no version.
     pub fn decode(stored: &[u8]) -> Result<Self, Unreadable> {
         let mut fields = Fields::read(stored, VERSION, VERSION)?;
         let mut exceedances = Self::new();
@@ -284,7 +284,7 @@ impl Exceedances {
     }
 }
 
-/// Not knowing exceeds nothing.
+/// A stale value exceeds nothing.
 const fn rank(level: Level) -> u8 {
     match level {
         Level::Warning => 1,

@@ -68,18 +68,18 @@ pub struct Finding {
     pub limit: f32,
     /// The unit of both, for instance `V`, `%`, `degC`; empty for a plain number.
     pub unit: &'static str,
-    /// Of a battery: what it feeds.
+    /// The consumer of a battery.
     pub feeds: Feeds,
     /// The check whose alarm explains this one; empty where none does. Such a finding is recorded and not told to the ground.
     pub because: &'static str,
-    /// What its text orders where it is critical, as it fits the vehicle.
+    /// The order in its text if it is critical, which depends on the vehicle.
     pub orders: Orders,
 }
 
 /// The order in the text of a finding.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Orders {
-    /// What its check's words say.
+    /// The words of its check.
     Own,
     /// DISARM IF DOWN.
     Disarm,
@@ -101,7 +101,8 @@ impl Finding {
         }
     }
 
-    /// Whether its check no longer applies, as after landing, or nobody says it any more: what was bad is not known to be good.
+    /// Whether its check no longer applies (after landing), or its flag is no longer reported. The value is not known
+    /// to be good then.
     pub fn is_unjudged(&self) -> bool {
         self.level == Level::Ok && self.value.is_nan()
     }

@@ -1,4 +1,4 @@
-//! What checks read.
+//! Inputs of checks.
 
 use super::finding::Subsystem;
 use crate::derived::Derived;
@@ -9,7 +9,7 @@ use crate::status::{LinkReading, RecorderStatus};
 use crate::time::Instant;
 use crate::vehicle::Vehicle;
 
-/// What checks read. Nothing here changes while they do.
+/// Inputs of checks. They do not change during a step.
 #[derive(Clone, Copy, Debug)]
 pub struct Inputs<'a> {
     /// Now.
@@ -24,14 +24,14 @@ pub struct Inputs<'a> {
     pub link: &'a LinkReading,
     /// Our own recording.
     pub recorder: &'a RecorderStatus,
-    /// Of each component, whose health it is and the part of its life that is used, percent.
+    /// For each component: its subsystem, and the used part of its life, percent.
     pub wear: &'a [Option<(Subsystem, f32)>],
     /// Limits and settings.
     pub params: &'a Params,
 }
 
 impl Inputs<'_> {
-    /// A value that is so now.
+    /// A value measured now.
     pub(super) fn reading(&self, value: impl Into<Option<f32>>) -> Option<Reading> {
         Reading::new(Some(self.now), value.into())
     }

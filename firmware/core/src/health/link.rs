@@ -46,7 +46,7 @@ pub(super) const CHECKS: &[Check] = &[
         role: Role::of(Group::Other, Group::Silence.bit() | Group::FramesLost.bit() | RECEIVERS),
         limits: Limits::above(Some(Param::PosAgeWarn), None, 0.0),
         when: When::InFlight,
-        // That positions come says nothing about how good they are.
+        // Positions that come tell nothing about their quality.
         alarm_only: true,
         read: position_age_s,
         ..HEARTBEAT
@@ -74,7 +74,7 @@ pub(super) const CHECKS: &[Check] = &[
     ),
 ];
 
-/// Since the last position, global or local, while the autopilot is heard.
+/// Time since the last position, global or local, while the autopilot is heard.
 fn position_age_s(inputs: &Inputs<'_>, _: u8) -> Option<Reading> {
     let vehicle = inputs.vehicle;
     let at = match (vehicle.global.at(), vehicle.local.at()) {
@@ -85,9 +85,8 @@ fn position_age_s(inputs: &Inputs<'_>, _: u8) -> Option<Reading> {
     inputs.reading(heard.since(at).as_secs_f32())
 }
 
-/// The weaker end's signal above its noise. A radio that does not hear another one (its signal at the other end is 0) has no link
-/// that could be weak, and goes on telling what it heard last. An end that tells 0 of both tells nothing: a radio that does not
-/// measure.
+/// The weaker end's signal above its noise. A radio without a partner (remote signal 0) has no link, and repeats its
+/// last values. An end with 0 for both does not measure.
 fn radio_margin(radio: &TelemetryRadio) -> Option<f32> {
     let margin = |rssi: Option<u8>, noise: Option<u8>| {
         let (rssi, noise) = (rssi?, noise?);

@@ -33,14 +33,15 @@ fn reading(inputs: &Inputs<'_>, kind: Kind) -> Option<Reading> {
 /// The order in the text of a check:
 /// * WATCH IT if all ESCs are silent: it is their telemetry;
 /// * DISARM IF DOWN only while it is armed;
-/// * FLY FORWARD, CLIMB of a sinking vehicle on rotors only if it is upright, has lost no motor and has not had full throttle in vain;
+/// * FLY FORWARD, CLIMB of a sinking vehicle on rotors only if it is upright, has lost no motor and did not sink at
+///   full throttle;
 /// * none of a sinking vehicle on wings, which glides.
 pub(super) fn orders(check: &Check, inputs: &Inputs<'_>, has_lost_drive: impl FnOnce() -> bool) -> Orders {
     let Inputs { now, vehicle, derived, flight, .. } = *inputs;
     if check.name == "esc_silent" && derived.are_escs_silent() {
         return Orders::Watch;
     }
-    // It comes down, or lies, whatever it still says.
+    // It comes down or lies on the ground, even if it reports otherwise.
     if check.name == "autopilot_state" && vehicle.terminated_since.is_some() {
         return Orders::Disarm;
     }

@@ -1,7 +1,7 @@
 //! Health: the checks of all values, their findings, and the level of each subsystem and of the vehicle.
 //!
-//! Each subsystem's checks are a table in a file of its own; `tables` puts them together. A roll-up is never better than
-//! its worst part that is known, and where nothing is known it is not OK but stale.
+//! Each subsystem's checks are a table in a file of its own; `tables` puts them together. A roll-up is never better
+//! than its worst known part. With nothing known it is stale, not OK.
 
 mod alarms;
 mod attitude;
@@ -72,8 +72,8 @@ impl Health {
         self.alarms = Alarms::NONE;
     }
 
-    /// One step of all checks, at least every 50 ms; each change of level is a finding, and so is an alarm that outlives the one that
-    /// explained it.
+    /// One step of all checks, at least every 50 ms. Each change of level is a finding, and so is an alarm that
+    /// outlives its cause.
     pub fn step(
         &mut self,
         inputs: &Inputs<'_>,

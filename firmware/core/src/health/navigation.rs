@@ -20,7 +20,7 @@ use crate::vehicle::RECEIVERS_MAX;
 const SMOOTHED: Debounce = Debounce::millis(200);
 /// Four messages of a receiver at 5 Hz, two at 2 Hz. Dilutions of precision leap as satellites come and go, and wait longer.
 const RECEIVER_SAYS: Debounce = Debounce::millis(600);
-/// So far on the good side of its limit a value is good again.
+/// Hysteresis of these checks.
 const MARGIN: f32 = 0.5;
 
 const ESTIMATOR: Check = Check {
@@ -56,7 +56,7 @@ const MISMATCH: Check = Check {
     name: "accel_mismatch",
     unit: Unit::of("m/s2"),
     limits: Limits::above(Some(Param::AccMismWarn), None, 0.2),
-    // Never stale: they are compared where that says something.
+    // Never stale: sensors are compared only in conditions where that is valid.
     stale_s: None,
     instances: SENSORS_MAX as u8,
     of: InstanceOf::Pair,
@@ -64,7 +64,7 @@ const MISMATCH: Check = Check {
     ..ESTIMATOR
 };
 
-/// A sensor that repeats one value ([`crate::stuck`]). Never stale, and no word about how good it is.
+/// A sensor that repeats one value ([`crate::stuck`]). Never stale. A sensor that is not stuck is not thereby good.
 const STUCK: Check = Check {
     name: "accel_stuck",
     unit: Unit::of("s"),
@@ -82,7 +82,7 @@ const SECOND: Check = Check {
     role: Role::of(Group::Other, DISTURBANCES | ESTIMATORS),
     unit: Unit::of("deg"),
     limits: Limits::above(Some(Param::Ahrs2TiltWarn), None, 2.0),
-    // Who names the sensor is heard first.
+    // A check that names the faulty sensor comes first.
     debounce: [Debounce::secs(1); 2],
     instances: 1,
     of: InstanceOf::Vehicle,
@@ -93,8 +93,8 @@ const SECOND: Check = Check {
 pub(super) const CHECKS: &[Check] = &[
     Check { role: Role::of(Group::Ekf, DISTURBANCES | Group::EkfClimb.bit()), ..ESTIMATOR },
     Check {
-        // ArduPilot's failsafe wants two of compass, velocity and position beyond the limit; where nothing hovers there is none:
-        // a plane flies on by its airspeed.
+        // ArduPilot's failsafe needs two of compass, velocity and position beyond the limit. Planes have none: they
+        // fly on by airspeed.
         name: "ekf_failsafe",
         role: Role::of(Group::Ekf, DISTURBANCES | Group::EkfClimb.bit()),
         limits: Limits::above(None, Some(Param::EkfVarCrit), 0.05),
@@ -122,7 +122,7 @@ pub(super) const CHECKS: &[Check] = &[
         role: Role::of(Group::Sensor, COMPASS | Group::CompassUse.bit() | TURNS),
         limits: Limits::above(Some(Param::EkfRatioWarn), Some(Param::EkfRatioCrit), 0.05),
         read: |inputs, _| estimator(inputs, EstimatorScale::TestRatio, |estimator| estimator.compass),
-        // PX4 tells none of a compass that it does not use: that is `compass_unused`.
+        // PX4 reports no ratio of a compass that it does not use: see `compass_unused`.
         stale_s: None,
         ..ESTIMATOR
     },
@@ -131,7 +131,7 @@ pub(super) const CHECKS: &[Check] = &[
         role: Role::of(Group::CompassUse, COMPASS | TURNS),
         unit: Unit::FLAG,
         limits: Limits::above(Some(Param::AlertWarn), None, 0.05),
-        // That it is used says nothing about how well it is.
+        // A compass in use is not thereby good.
         alarm_only: true,
         read: |inputs, _| inputs.derived.crosschecks.compass_use.unused(inputs.now),
         ..ESTIMATOR
@@ -295,7 +295,7 @@ pub(super) const CHECKS: &[Check] = &[
         name: "gps_speed",
         role: Role::of(Group::GnssMotion, Group::GnssFrozen.bit()),
         unit: Unit::of("m/s"),
-        // Never stale: only what moves says something.
+        // Never stale: only a moving receiver can be judged.
         stale_s: None,
         limits: Limits::above(Some(Param::GpsSpeedWarn), None, 0.2),
         read: |inputs, receiver| {

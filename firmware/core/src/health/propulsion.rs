@@ -24,7 +24,7 @@ const ESC: Check = Check {
     ..PLAIN
 };
 
-/// A body rate that does not become what is wanted.
+/// A body rate that does not follow its setpoint.
 const RATE: Check = Check {
     unit: Unit::of("deg/s"),
     limits: Limits::above(Some(Param::RateWarn), Some(Param::RateCrit), 5.0),
@@ -113,7 +113,7 @@ pub(super) const CHECKS: &[Check] = &[
         when: When::InFlight,
         instances: JUDGED_MAX as u8,
         of: InstanceOf::Output,
-        // That a motor is driven says nothing about how well it is.
+        // A driven motor is not thereby good.
         alarm_only: true,
         read: |inputs, motor| verdict(inputs, motor, Verdict::off_rank),
         ..ESC
@@ -153,7 +153,7 @@ fn verdict(inputs: &Inputs<'_>, motor: u8, value: fn(Verdict) -> f32) -> Option<
     Some(Reading { at, value: value(verdict) })
 }
 
-/// The body rate that the setpoint is not followed by, about roll (0) or pitch (1).
+/// The difference between rate setpoint and rate, about roll (0) or pitch (1).
 fn rate_off_deg_s(inputs: &Inputs<'_>, axis: usize) -> Option<Reading> {
     let reading = inputs.derived.crosschecks.residuals.reading(inputs.now, Comparison::RATES[axis])?;
     Some(Reading { value: reading.value.to_degrees(), ..reading })

@@ -39,7 +39,7 @@ pub(super) const CHECKS: &[Check] = &[
         // Two messages at 5 Hz.
         debounce: [Debounce::millis(200), Debounce::secs(1)],
         when: When::InFlight,
-        // Never stale: only what flies on rotors says something.
+        // Never stale: only flight on rotors can be judged.
         stale_s: None,
         read: |inputs, _| inputs.derived.crosschecks.vibration_rise(inputs.now, inputs.vehicle),
         ..VIBRATION
@@ -59,10 +59,10 @@ pub(super) const CHECKS: &[Check] = &[
         role: Role::of(Group::Other, SHAKING),
         unit: Unit::of("g"),
         limits: Limits::above(Some(Param::LoadFacWarn), Some(Param::LoadFacCrit), 0.2),
-        // What lasts is a manoeuvre; a shock or vibration does not, and an impact is a mishap.
+        // A manoeuvre lasts; a shock or vibration does not, and an impact is a mishap.
         debounce: [Debounce::millis(500); 2],
         when: When::InFlight,
-        // Never stale: what shakes has none.
+        // Never stale: a shaking vehicle has no load factor.
         stale_s: None,
         read: |inputs, _| inputs.derived.load_factor(),
         ..VIBRATION

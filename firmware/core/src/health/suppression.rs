@@ -1,9 +1,9 @@
-//! One cause, one finding: the alarm of one check may explain that of another one.
+//! Suppression: one cause makes one finding. The alarm of one check may explain that of another.
 //!
-//! A failed motor tips the vehicle over, and a receiver without a fix makes the estimator doubt. So each check has a [`Role`]: its group,
-//! and the groups that explain it. A finding names the alarm that explains it if that alarm is as bad or worse, began within [`NEAR`]
-//! of it, and is of the same motor, battery or receiver. Such a finding is recorded like any other, and not sent to the ground.
-//! A rise of the level is an onset too.
+//! A failed motor tips the vehicle over, and a receiver without a fix makes the estimator doubt. So each check has a
+//! [`Role`]: its group, and the groups that explain it. An alarm explains another one if it is as bad or worse, began
+//! within [`NEAR`] of it, and is of the same motor, battery or receiver. The finding names it. Such a finding is
+//! recorded like any other, and not sent to the ground. A rise of the level is an onset too.
 //!
 //! A mishap explains only an alarm that begins with it or after it: an earlier one may be its cause.
 
@@ -172,7 +172,7 @@ impl Role {
 
 const _: () = assert!((Group::Other as u32) < Role::SETS);
 
-/// Whether a check's alarm tells better what to do than that the vehicle sinks.
+/// Whether its text is better advice than that of a sinking vehicle.
 pub(super) const fn is_of_drive(check: &Check) -> bool {
     check.role.is_of(DRIVE | Group::EscTelemetry.bit())
 }
@@ -215,7 +215,7 @@ pub struct Alarm {
 }
 
 impl Alarm {
-    /// Of a check by its name; `None` if there is no such check.
+    /// An alarm by its check's name; `None` if the name is unknown.
     pub fn of(check: &str, instance: u8, level: Level, since: Instant) -> Option<Self> {
         Self::at(slot_of(check, instance)?, level, since)
     }
@@ -250,7 +250,7 @@ impl Alarm {
     }
 }
 
-/// Which of the alarms explains another one, or a lack of data: of mishaps the first one, or else the first in the order of groups and of the
+/// The cause of an alarm or of a lack of data: the first mishap, or else the first alarm in the order of groups and
 /// tables.
 pub fn root_cause(effect: &Alarm, alarms: impl Iterator<Item = Alarm>) -> Option<Alarm> {
     let order = |alarm: &Alarm| match alarm.check.subsystem {

@@ -93,7 +93,7 @@ pub fn check_named(name: &str) -> Option<&'static Check> {
     checks().find(|check| check.name == name)
 }
 
-/// How many instances a check has; 0 where there is no such check.
+/// The number of instances of a check; 0 for an unknown name.
 pub fn instances(name: &str) -> u8 {
     check_named(name).map_or(0, |check| check.instances)
 }

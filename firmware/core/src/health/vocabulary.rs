@@ -1,9 +1,8 @@
-//! What each check means to people: one table for every text, page and document.
+//! The meaning of each check in words: one table for every text, page and document.
 //!
-//! `alarm` and `advice` are what a radio text says of it ([`Said`], all that the firmware links). `meaning` says what is so
-//! while the check's level is a warning or critical, `action` what to do about it (on the ground, before the next flight,
-//! where nothing else is said). `needs` names what the check reads, so that whoever reads a log can say why a check had
-//! nothing to judge.
+//! `alarm` and `advice` are the words of a radio text ([`Said`], the only ones that the firmware links). `meaning`
+//! describes the fault, and `action` the remedy: on the ground, before the next flight, unless it says otherwise.
+//! `needs` names the input, for reports of checks that had nothing to judge.
 
 use core::fmt;
 
@@ -77,7 +76,8 @@ impl Said {
     }
 }
 
-/// The number of a part, as the autopilot counts from 1, and of a battery what it feeds if that is not what keeps the vehicle up.
+/// The number of a part, counted from 1 as the autopilot does; for a battery also its consumer, if that is not the
+/// vehicle's lift.
 #[derive(Clone, Copy)]
 struct Number {
     instance: u8,
@@ -95,7 +95,7 @@ impl fmt::Display for Number {
     }
 }
 
-/// All that is known of a check besides its limits.
+/// All words of a check.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Words {
     /// The words in radio texts.

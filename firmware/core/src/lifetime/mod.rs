@@ -1,17 +1,18 @@
-//! What outlives power: totals over an airframe's life, and its components, as items of bytes that a
-//! store keeps.
+//! Items that outlive power: totals over an airframe's life, and its components, as bytes for a store.
 //!
-//! Counters of the life before this session are saved once, at its beginning; what the session itself has counted is one
-//! short item of its own ([`Session`]), saved often.
+//! Counters of earlier sessions are saved once, at the beginning of a session. The session's own counters are one
+//! short item ([`Session`]) that is saved often.
 //!
-//! An item is a version byte and then fields, little endian. A later version only appends, so version n reads what
-//! n + 1 wrote, and n + 1 reads what n wrote with nothing counted in what is missing. The store guards the bytes (a
-//! checksum, two copies); what is decoded here is checked again only so far as no figure can be nonsense.
+//! An item is a version byte and then fields, little endian. A later version only appends. So version n reads items
+//! of n + 1, and n + 1 reads items of n with zero in the missing fields. The store guards the bytes (a checksum, two
+//! copies); decoding only keeps figures in their ranges.
 //!
-//! Figures lose nothing over the life of an airframe: times are kept to a tenth of a second in 32 bits (119,000 hours;
-//! the rounding of a session is not added up within it, and is as often up as down), counts in 32 bits, amounts
-//! (distance, charge, energy, revolutions) in double precision, which at 10,000 hours of 10,000 rpm, 6e9 revolutions,
-//! still resolves a millionth of one.
+//! Figures keep their precision over the life of an airframe:
+//!
+//! - times are tenths of a second in 32 bits (119,000 hours), rounded once a session;
+//! - counts have 32 bits;
+//! - amounts (distance, charge, energy, revolutions) have double precision: after 10,000 hours at 10,000 rpm, a
+//!   millionth of a revolution.
 
 mod saving;
 mod session;
@@ -41,7 +42,7 @@ const _: () = {
     }
 };
 
-/// The kind of a stored item. The numbers are stored and never change meaning; 2 is not used again.
+/// The kind of a stored item. The numbers are stored and never change meaning; 2 is retired.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum ItemKey {
     /// 1: [`Lifetime`].
@@ -113,8 +114,8 @@ pub struct Airframe {
 }
 
 impl Airframe {
-    /// Whether `self` and `other` are certainly not the same. The unique id decides where both have one, because a
-    /// system id can be set; the system id otherwise.
+    /// Whether `self` and `other` are certainly different airframes. If both have a unique id, it decides; otherwise
+    /// the system id, which can be set.
     pub const fn differs(self, other: Self) -> bool {
         if self.uid != 0 && other.uid != 0 {
             self.uid != other.uid
@@ -123,7 +124,7 @@ impl Airframe {
         }
     }
 
-    /// What is known of it, `later` first.
+    /// The ids of both, `later` first.
     pub const fn learn(self, later: Self) -> Self {
         Self {
             system: if later.system == 0 { self.system } else { later.system },
@@ -132,8 +133,8 @@ impl Airframe {
     }
 }
 
-/// Totals over an airframe's life. Stored, they are as of the beginning of power-on [`Self::boots`], to which the stored
-/// [`Session`] of that power-on is added.
+/// Totals over an airframe's life. The stored form is as of the beginning of power-on [`Self::boots`]; the stored
+/// [`Session`] of that power-on is added to it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Lifetime {
     /// Whose life it is.
@@ -142,8 +143,8 @@ pub struct Lifetime {
     pub boots: u32,
     /// Power-ons in which the airframe was heard.
     pub sessions: u32,
-    /// Cells of its batteries as they were known last; 0 not known; with 128 added where they were not known since. They confirm, and
-    /// prove nothing.
+    /// Last known cells of its batteries: 0 not known, plus 128 if they were not confirmed since. They confirm a
+    /// count, and prove none.
     pub cells: [u8; BATTERIES_MAX],
     /// Every counter of usage.
     pub totals: Totals,
@@ -162,7 +163,7 @@ fn counters(totals: &mut Totals, places: Range<usize>, fields: &mut Fields<'_>) 
     Ok(())
 }
 
-/// Run time and revolutions of each motor; short, whole revolutions.
+/// Run time and revolutions of each motor; whole revolutions in the short form.
 fn motors(totals: &mut Totals, fields: &mut Fields<'_>) -> Result<(), Unreadable> {
     let revolutions = if fields.is_short() { Form::Count } else { Form::Amount };
     fields.list(
@@ -176,7 +177,7 @@ fn motors(totals: &mut Totals, fields: &mut Fields<'_>) -> Result<(), Unreadable
 }
 
 impl Lifetime {
-    /// Nothing lived yet.
+    /// No life yet.
     pub const fn new() -> Self {
         Self {
             airframe: Airframe { system: 0, uid: 0 },
@@ -188,8 +189,8 @@ impl Lifetime {
     }
 }
 
-/// Version, system id, unique id, boots, sessions; counters by their [`Form`]; seconds and revolutions of each motor; since
-/// version 2 the counters after the first 32, and the cells of each battery.
+/// Version, system id, unique id, boots, sessions; counters by their [`Form`]; seconds and revolutions of each motor.
+/// Since version 2: the counters after the first 32, and the cells of each battery.
 impl Item for Lifetime {
     const VERSION: u8 = 2;
     const BYTES: usize = 314;
@@ -263,7 +264,7 @@ mod tests {
         stored.iter().fold(0, |sum, byte| sum.wrapping_mul(31).wrapping_add(u32::from(*byte)))
     }
 
-    /// Reads back, also what a later version appended to, but not cut, nor without a version.
+    /// Reads an item back, also with bytes of a later version appended, but not cut short or without a version.
     fn reads_back<T: Item + Copy + PartialEq + core::fmt::Debug>(item: T) -> Vec<u8> {
         let known = stored(item);
         assert_eq!(T::decode(&known), Ok(item));

@@ -6,20 +6,20 @@
 //! | the session's counters | armed, every two minutes as well; in a power-on of more than an hour, every thirtieth of it |
 //! | what somebody changed by hand | at once |
 //!
-//! The life before this session does not change any more, so after the first save only the session's counters (160 bytes
-//! of a quad) and exceedances are saved again. In T hours armed the counters are saved 30 (1 + ln T) times:
-//! 30 in one hour, 63 in three, 81 in five and a half; flash sets it, and `hums_onboard::persist` has the sums.
+//! Totals of earlier sessions do not change. So after the first save only the session's counters (160 bytes for a
+//! quad) and exceedances are saved again. In T hours armed the counters are saved 30 (1 + ln T) times: 30 in one
+//! hour, 63 in three, 81 in five and a half. The flash sets this limit; `hums_onboard::persist` has the sums.
 
 use super::ItemKey;
 use crate::time::{Instant, Span};
 
 /// The first save: late enough for the store to be ready and the vehicle to be heard.
 const FIRST: Span = Span::from_secs(10);
-/// What changes is saved at least so often.
+/// The longest time until a change is saved.
 pub const EVERY: Span = Span::from_secs(15 * 60);
-/// What a power cut in flight costs at most of the counters, in the first hour of a power-on.
+/// The longest time until counters are saved in flight, in the first hour of a power-on; a power cut loses no more.
 pub const EVERY_ARMED: Span = Span::from_secs(2 * 60);
-/// Afterwards: this part of the time since power-on.
+/// Afterwards: this fraction of the time since power-on.
 const EVERY_PART: u64 = 30;
 
 /// Whether the store has room to spare.
@@ -32,7 +32,7 @@ pub enum Room {
     Reserve,
 }
 
-/// What waits to be saved.
+/// The items that wait to be saved.
 #[derive(Clone, Copy, Debug)]
 pub struct Saving {
     /// Items that changed since they were saved, one bit each by [`ItemKey::index`].
@@ -52,7 +52,7 @@ impl Default for Saving {
 }
 
 impl Saving {
-    /// What adds up over sessions is as of this one now.
+    /// Totals and exposure are due: they are as of a new session now.
     pub const fn new() -> Self {
         Self {
             changed: Self::bit(ItemKey::Lifetime) | Self::bit(ItemKey::Exposure),
@@ -66,23 +66,23 @@ impl Saving {
         1 << key.index()
     }
 
-    /// The item is no longer what is saved.
+    /// The item differs from its saved form.
     pub(crate) const fn change(&mut self, key: ItemKey) {
         self.changed |= Self::bit(key);
     }
 
-    /// The item is to be saved now: it was changed by hand.
+    /// Saves the item at once: it was changed by hand.
     pub(crate) const fn hurry(&mut self, key: ItemKey) {
         self.change(key);
         self.due |= Self::bit(key);
     }
 
-    /// Whatever changed is to be saved now.
+    /// Saves all changed items at once.
     pub(crate) const fn hurry_all(&mut self) {
         self.due |= self.changed;
     }
 
-    /// The item to be saved next; the same until it is [`Self::saved`].
+    /// The next item to save; the same one until it is [`Self::saved`].
     pub(crate) fn due(&mut self, now: Instant, armed: bool, room: Room) -> Option<ItemKey> {
         if room == Room::Enough {
             if !self.next.is_after(now) {
@@ -104,7 +104,7 @@ impl Saving {
         due
     }
 
-    /// The item's bytes are on their way.
+    /// The store has taken the item's bytes.
     pub(crate) const fn saved(&mut self, key: ItemKey) {
         self.changed &= !Self::bit(key);
         self.due &= !Self::bit(key);

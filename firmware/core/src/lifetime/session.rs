@@ -1,19 +1,24 @@
-//! What a session, that is a power-on, has counted so far: the one item that is saved again and again in flight, so it
-//! is short. At the next start it is added to what was saved of the life before it.
+//! Counters of a session, that is of a power-on. It is the one item that is saved again and again in flight, so it is
+//! short. At the next start it is added to the saved totals.
 //!
-//! Each item that adds up over sessions says which power-on it is *as of*: what was lived before that one began. The
-//! session is added to those that are as of the same power-on, and to no other. So whatever item power went at, in the
-//! middle of saving them all, each figure is counted once: an item that was not yet saved again still has the session
-//! added, and one that was has it in it.
+//! Each item that adds up over sessions names the power-on that it is *as of*: it counts everything before that one.
+//! The session is added to items that are as of the same power-on, and to no other. So each figure is counted once,
+//! even if power fails while items are saved. An item that was not saved again gets the session added; one that was
+//! saved includes it.
 //!
-//! Layout, version 1: version, power-on (u32), whether the airframe was heard (u8); the counters in the order of
-//! [`UsageCounter::ALL`], times in tenths of a second, counts and half cycles as variable-length numbers (LEB128),
-//! amounts and extremes as f32; motors, how many of them, and of each tenths of a second and whole revolutions (u32,
-//! variable length); batteries, how many, and the cycles of each (f32); time in ranges, a bit for each range that was
-//! entered (5 bytes), and of these tenths of a second, variable length. Version 2 appends the counters that came since, as the
-//! others.
+//! Layout, version 1:
 //!
-//! Of a quad with four ESCs after half an hour that is some 155 bytes; at most [`Session::BYTES`](super::Item::BYTES).
+//! - version, power-on (u32), whether the airframe was heard (u8);
+//! - counters in the order of [`UsageCounter::ALL`]: times in tenths of a second, counts and half cycles as LEB128,
+//!   amounts and extremes as f32;
+//! - number of motors, and of each tenths of a second and whole revolutions (LEB128 of u32);
+//! - number of batteries, and the cycles of each (f32);
+//! - time in ranges: a bit for each range that was entered (5 bytes), and of these tenths of a second (LEB128).
+//!
+//! Version 2 appends the newer counters in the same form.
+//!
+//! A quad with four ESCs has some 155 bytes after half an hour; the maximum is
+//! [`Session::BYTES`](super::Item::BYTES).
 
 use super::{COUNTERS_V1, Item, Lifetime, Unreadable, counters, motors};
 use crate::bytes::{Fields, fields};
@@ -26,18 +31,18 @@ const RANGE_BYTES: usize = (BINS * Quantity::ALL.len()).div_ceil(8);
 /// A session as it was stored.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Session {
-    /// Which power-on it was.
+    /// The number of its power-on.
     pub boots: u32,
     /// Whether the airframe was heard.
     pub heard: bool,
-    /// What it counted.
+    /// Its counters.
     pub totals: Totals,
     battery_cycles: [f64; BATTERIES_MAX],
     exposure: Tenths,
 }
 
 impl Session {
-    /// What a quad with four ESCs needs after half an hour, generously.
+    /// Bytes that a quad with four ESCs needs after half an hour, generously.
     pub const BYTES_TYPICAL: usize = 160;
 
     #[cfg(test)]
@@ -65,7 +70,7 @@ impl Session {
         Self { boots, heard, totals: *totals, battery_cycles, exposure: *exposure.session() }
     }
 
-    /// What components wore by it.
+    /// The wear of components in it.
     pub(crate) const fn wear(&self) -> Wear<'_> {
         Wear { totals: &self.totals, battery_cycles: &self.battery_cycles }
     }
@@ -113,7 +118,7 @@ impl Item for Session {
 }
 
 impl Lifetime {
-    /// Adds the session that was saved last, if it is not in it already.
+    /// Adds the session that was saved last, unless it is counted already.
     pub fn add(&mut self, session: &Session) {
         if session.boots == self.boots {
             self.sessions = self.sessions.saturating_add(u32::from(session.heard));

@@ -1,4 +1,4 @@
-//! What the monitor knows of the vehicle's parts, and what becomes of that when one is replaced.
+//! The vehicle's components in the monitor, and their replacement.
 
 use super::Monitor;
 use crate::component::{Component, Figures, Kind, Label, Status};
@@ -6,20 +6,19 @@ use crate::lifetime::ItemKey;
 use crate::vehicle::BATTERIES_MAX;
 
 impl Monitor {
-    /// What a component has run, and whether it may go on.
+    /// Figures and status of a component.
     pub fn component_figures(&self, place: usize) -> Option<(Figures, Status)> {
         let component = self.components.get(place).filter(|component| component.kind != Kind::None)?;
         let wear = self.usage.wear();
         Some((component.figures(&wear), component.status(place, &wear, &self.params)))
     }
 
-    /// The part of a component's life that is used, percent; `None` where it has no limit.
+    /// The part of a component's life that is used, percent; `None` if it has no limit.
     pub fn component_used_percent(&self, place: usize) -> Option<f32> {
         self.components.get(place)?.used_percent(place, &self.usage.wear(), &self.params)
     }
 
-    /// Takes a component as another monitor of this vehicle has it in this very session: what is counted from here on
-    /// adds to it.
+    /// Takes a component from another monitor of this vehicle in this session: later counts add to it.
     pub fn learn_component(&mut self, place: usize, known: Component) {
         let known = known.in_session(&self.usage.wear());
         if let Some(component) = self.components.get_mut(place) {
@@ -27,8 +26,8 @@ impl Monitor {
         }
     }
 
-    /// Another part is in a component's place. Gives the old one with what it had run, to be recorded; `None` where
-    /// there is no such component.
+    /// Puts a new part in a component's place. Returns the old one with its figures, for the record; `None` if there
+    /// is no such component.
     pub fn replace_component(&mut self, place: usize, serial: Label) -> Option<Component> {
         let Self { usage, components, saving, .. } = self;
         let component = components.get_mut(place).filter(|component| component.kind != Kind::None)?;

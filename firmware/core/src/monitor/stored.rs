@@ -1,4 +1,4 @@
-//! What of the monitor outlives power: items, to be stored when they are due and taken back at the next start.
+//! Items of the monitor that outlive power: stored when due, and restored at the next start.
 
 use super::Monitor;
 use crate::component::Component;
@@ -9,15 +9,15 @@ use crate::health::exceedance::Exceedances;
 use crate::lifetime::{Airframe, ITEM_BYTES_MAX, Item as _, ItemKey, Lifetime, Room, Session, Unreadable};
 use crate::time::{Instant, Span};
 
-/// `AUTOPILOT_VERSION` is asked for and answered long before: whoever has said no unique id by then says none.
+/// Time after which an autopilot without a unique id has none: the answer to `AUTOPILOT_VERSION` comes long before.
 const UID_COMES: Span = Span::from_secs(60);
 
 impl Monitor {
-    /// Whose life it is, and what of it is to be saved.
+    /// Checks whose lifetime it is, and which items are to be saved.
     pub(super) fn step_life(&mut self, now: Instant, event: Option<FlightEvent>) {
         let uid = self.vehicle.identity.get().map_or(0, |identity| identity.uid);
-        // A system id can be set: where the unique id is known it is waited for, and before the vehicle is surely the
-        // vehicle nothing is decided.
+        // A system id can be set, so a known unique id is waited for. Nothing is decided before the vehicle is
+        // settled.
         let waits = uid == 0 && self.before.airframe.uid != 0 && self.vehicle.known_for(now) < UID_COMES;
         if waits || !self.vehicle.is_settled(now) {
             return self.save_life(event);
@@ -49,7 +49,7 @@ impl Monitor {
     }
 
     /// Takes an item that was saved in an earlier session; to be called before the first tick, and for
-    /// [`ItemKey::Session`] once and last. One that cannot be read is as if there were none.
+    /// [`ItemKey::Session`] once and last. An unreadable item counts as none.
     pub fn restore(&mut self, key: ItemKey, stored: &[u8]) -> Result<(), Unreadable> {
         match key {
             ItemKey::Lifetime => {
@@ -76,17 +76,18 @@ impl Monitor {
         Ok(())
     }
 
-    /// The item to be saved next, if any is due; the same until it is [`Self::saved`]. To be saved in this order.
+    /// The item to be saved next, if any is due; the same until it is [`Self::saved`]. Items must be saved in this
+    /// order.
     pub fn save_due(&mut self, now: Instant, room: Room) -> Option<ItemKey> {
         self.saving.due(now, self.vehicle.armed(), room)
     }
 
-    /// Everything that changed is due: the session ends, or the power is about to go.
+    /// Marks all changes as due: the session ends, or the power is about to go.
     pub const fn save_all(&mut self) {
         self.saving.hurry_all();
     }
 
-    /// Writes an item as it is to be saved; gives its length.
+    /// Writes an item for the store; returns its length.
     pub fn encode_item(&self, key: ItemKey, out: &mut [u8; ITEM_BYTES_MAX]) -> usize {
         let boots = self.boots();
         match key {
@@ -104,7 +105,7 @@ impl Monitor {
         }
     }
 
-    /// The item's bytes are with the store.
+    /// The store has taken the item's bytes.
     pub const fn saved(&mut self, key: ItemKey) {
         self.saving.saved(key);
     }

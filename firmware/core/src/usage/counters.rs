@@ -41,7 +41,7 @@ impl Form {
 
 macro_rules! counters {
     ($($(#[$doc:meta])* $variant:ident = $number:literal $form:ident $name:literal;)*) => {
-        /// Where a counter stands in [`UsageCounter::ALL`].
+        /// The place of a counter in [`UsageCounter::ALL`].
         #[repr(u8)]
         enum Place {
             $($variant,)*
@@ -55,10 +55,10 @@ macro_rules! counters {
         }
 
         impl UsageCounter {
-            /// All counters that are not one a motor. New ones are appended: the stored lifetime follows this order.
+            /// All counters except those of motors. New ones are appended: the stored lifetime follows this order.
             pub const ALL: &[Self] = &[$(Self::$variant,)*];
 
-            /// Where it stands in [`Self::ALL`].
+            /// The place in [`Self::ALL`].
             pub const fn place(self) -> usize {
                 match self {
                     $(Self::$variant => Place::$variant as usize,)*
@@ -164,7 +164,7 @@ pub const FIGURE_FIRST: u8 = 200;
 const _: () = assert!(EXPOSURE_FIRST as usize + BINS * Exposed::ALL.len() <= FIGURE_FIRST as usize);
 const _: () = assert!(FIGURE_FIRST as usize + Steady::COUNT <= 256);
 
-/// What a stored counter number means.
+/// The meaning of a stored counter number.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum CounterName {
     /// A counter of the vehicle.
@@ -187,7 +187,7 @@ pub const fn figure_number(quantity: Steady) -> u8 {
     FIGURE_FIRST + quantity.index() as u8
 }
 
-/// The meaning of a stored counter number; `None` for one that a later version wrote.
+/// The meaning of a stored counter number; `None` for a number of a later version.
 pub fn counter_name(number: u8) -> Option<CounterName> {
     let motor = |first: u8| number.checked_sub(first).filter(|motor| usize::from(*motor) < MOTORS_MAX);
     if let Some(motor) = motor(MOTOR_TIME_FIRST) {

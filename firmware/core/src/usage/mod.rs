@@ -20,9 +20,9 @@ use crate::rainflow::Rainflow;
 use crate::time::{Instant, PAUSE, Span};
 use crate::vehicle::{BATTERIES_MAX, Vehicle};
 
-/// Integration steps longer than this are gaps: nothing is known of what happened in them.
+/// A longer integration step is a gap and is not counted.
 const STEP_MAX: Span = Span::from_secs(2);
-/// What no vehicle here has: beyond it a value is garbage.
+/// Beyond these a value is garbage: no vehicle here reaches them.
 const RPM_MAX: f32 = 1e6;
 const HEIGHT_MAX_M: f32 = 100_000.0;
 const ACCELERATION_MAX: f32 = 10_000.0;
@@ -43,23 +43,23 @@ pub struct Usage {
     last: Option<Instant>,
     /// The discharge current now.
     current_a: Option<f32>,
-    /// All but what is worked out when it is asked for: the cycles of the load factor.
+    /// All counters but the cycles of the load factor, which are computed when asked for.
     totals: Totals,
     capacity_ah: f32,
-    /// Full discharges of each battery, where the capacity is known: each has an equal share of it.
+    /// Full discharges of each battery, if the capacity is known. Batteries share it equally.
     battery_cycles: [f64; BATTERIES_MAX],
     load_cycles: Rainflow<7>,
-    /// Seconds armed and in the air that count once this is known.
+    /// Seconds armed and in the air that wait for the vehicle to report again.
     held_s: [f64; 2],
-    /// Seconds in which it may have landed, of no phase yet.
+    /// Seconds of a possible landing, not yet of a phase.
     landing_s: f64,
 }
 
 /// Lowest ranges of the load factor's cycles, g.
 const LOAD_RANGES_G: [f32; 7] = [0.25, 0.5, 1.0, 1.5, 2.0, 3.0, 4.0];
-/// A load factor that turns back by less has not turned: that much is vibration and noise.
+/// A load factor that turns back by less is vibration and noise.
 const LOAD_TURN_G: f32 = 0.1;
-/// An autopilot that was not heard for so long is not known to be powered.
+/// After this silence the autopilot may be off.
 const HEARD: Span = Span::from_secs(5);
 
 impl Default for Usage {
@@ -122,7 +122,7 @@ impl Usage {
         self.totals.extend(UsageCounter::CurrentMax, f64::from(current_a.unwrap_or(0.0)));
     }
 
-    /// What is no number, or beyond what there can be, is left out.
+    /// Takes a value unless it is NaN or beyond its limit.
     fn extend(&mut self, counter: UsageCounter, value: f32, limit: f32) {
         if value <= limit {
             self.totals.extend(counter, f64::from(value));
@@ -143,7 +143,7 @@ impl Usage {
             self.totals.add(UsageCounter::Flights, 1.0);
         }
         if event.is_some_and(|event| event != FlightEvent::Landing) {
-            // It was seen a moment after it happened.
+            // The event is found some time after it happened.
             let late = flight.airborne_since().map_or(Span::ZERO, |since| now.since(since));
             self.totals.add(UsageCounter::Flight, f64::from(late.as_secs_f32()));
         }
@@ -170,7 +170,8 @@ impl Usage {
         self.step_motors(now, vehicle, step_s);
     }
 
-    /// Silence counts once the vehicle reports again and still is armed, still in the air. So does the time in which it may have landed.
+    /// A silence counts once the vehicle reports again and is still armed or in the air. So does the time of a
+    /// possible landing.
     fn step_times(&mut self, now: Instant, vehicle: &Vehicle, flight: &Flight, step_s: f64) {
         let reports = vehicle.heartbeat.within(now, HEARD).is_some();
         let is_known = reports && !flight.may_have_landed();
@@ -210,7 +211,7 @@ impl Usage {
         }
     }
 
-    /// The flight is over, by a landing or a mishap.
+    /// Counts the end of a flight by a landing or a mishap.
     fn land(&mut self, flight: &Flight, params: &Params) {
         let ended = if flight.is_down() { UsageCounter::Mishaps } else { UsageCounter::Landings };
         self.totals.add(ended, 1.0);
@@ -220,7 +221,7 @@ impl Usage {
         }
     }
 
-    /// The flight is over, and nobody saw how it ended.
+    /// Ends a flight of unknown end.
     pub(crate) fn break_off(&mut self) {
         (self.held_s, self.landing_s) = ([0.0; 2], 0.0);
     }
@@ -237,7 +238,7 @@ impl Usage {
         }
     }
 
-    /// Every counter that has something to say: its stored number and its value.
+    /// Every known counter: its stored number and its value.
     pub fn for_each(&self, each: impl FnMut(u8, f64)) {
         self.totals().for_each(each);
     }
@@ -251,8 +252,8 @@ impl Usage {
         totals
     }
 
-    /// A counter's value; `None` for a minimum that was never measured, and for cycles of a battery whose capacity
-    /// nobody told.
+    /// A counter's value; `None` for a minimum that was never measured, and for battery cycles without a known
+    /// capacity.
     pub fn value(&self, counter: UsageCounter) -> Option<f64> {
         match LOAD_CYCLES.into_iter().position(|cycles| cycles == counter) {
             Some(bin) => Some(self.load_cycles.cycles(bin)),
@@ -270,7 +271,7 @@ impl Usage {
         self.current_a
     }
 
-    /// What components wear by.
+    /// The wear of components.
     pub const fn wear(&self) -> Wear<'_> {
         Wear { totals: &self.totals, battery_cycles: &self.battery_cycles }
     }

@@ -3,7 +3,7 @@
 use super::counters::{Form, MOTOR_REVOLUTIONS_FIRST, MOTOR_TIME_FIRST, UsageCounter};
 use crate::observation::MOTORS_MAX;
 
-/// What one motor has run.
+/// Run time and revolutions of one motor.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct MotorTotals {
     /// Seconds that it turned.
@@ -38,7 +38,7 @@ impl Totals {
         Self { counters, motors: [MotorTotals { seconds: 0.0, revolutions: 0.0 }; MOTORS_MAX] }
     }
 
-    /// A counter as it stands: infinite for a minimum that was never measured.
+    /// A counter's raw value: infinite for a minimum that was never measured.
     pub const fn raw(&self, counter: UsageCounter) -> f64 {
         self.counters[counter.place()]
     }
@@ -62,15 +62,15 @@ impl Totals {
         };
     }
 
-    /// A counter's value; `None` for a minimum that was never measured, and for cycles of a battery whose capacity
-    /// nobody told.
+    /// A counter's value; `None` for a minimum that was never measured, and for battery cycles without a known
+    /// capacity.
     pub fn value(&self, counter: UsageCounter) -> Option<f64> {
         let value = self.raw(counter);
         let unknown = counter == UsageCounter::BatteryCycles && value <= 0.0;
         (value.is_finite() && !unknown).then_some(value)
     }
 
-    /// Every counter that has something to say: its stored number and its value.
+    /// Every known counter: its stored number and its value.
     pub fn for_each(&self, mut each: impl FnMut(u8, f64)) {
         for counter in UsageCounter::ALL {
             if let Some(value) = self.value(*counter) {
@@ -85,7 +85,7 @@ impl Totals {
         }
     }
 
-    /// These and `later` together.
+    /// The sum of these and `later`.
     pub fn join(&self, later: &Self) -> Self {
         let mut both = *self;
         for counter in UsageCounter::ALL {
@@ -103,7 +103,7 @@ impl Totals {
     }
 }
 
-/// What a session has counted, as far as components wear by it: its sums, not yet the cycles of the load factor.
+/// The counters of a session by which components wear: sums, without the cycles of the load factor.
 #[derive(Clone, Copy, Debug)]
 pub struct Wear<'a> {
     /// The session's counters.

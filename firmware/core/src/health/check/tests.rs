@@ -1,4 +1,4 @@
-//! A value against its limits: when a level rises, falls, stays and is not known.
+//! A value against its limits: when a level rises, falls, stays and is unknown.
 
 use super::*;
 
@@ -17,9 +17,15 @@ const CHECK: Check = Check {
     read: |_, _| None,
 };
 
-/// Steps every 50 ms through a script, and gives the changes of level and the last level: `500 warning, 3000 ok | ok`. A script has times in
-/// milliseconds, the last one of which is the end: `10` is measured at each step from then on, `+10` after each step began, `=10` once and then
-/// held; from `-` on nothing is measured, and from `off` on the check does not apply.
+/// Steps every 50 ms through a script. Returns the changes of level and the last level: `500 warning, 3000 ok | ok`.
+///
+/// Each part of a script begins at a time in ms; the last time is the end.
+///
+/// - `10` is measured at each step from then on;
+/// - `+10` after each step began;
+/// - `=10` once, and then held;
+/// - `-` stops the measurements;
+/// - `off`: the check does not apply.
 fn changes(check: &Check, script: &str, start_ms: u64) -> String {
     let (mut state, mut told) = (State::new(), Vec::new());
     let mut parts = script.split(", ").peekable();
@@ -75,7 +81,7 @@ fn a_level_is_what_its_values_of_some_time_say() {
         (above, usual, 1, "0 45.1, 1000 40, 4000", "500 warning, 3000 ok | ok"),
         (battery, usual, 1, "0 14.9, 1000 16, 4000", "500 warning, 3000 ok | ok"),
         (above, usual, 1, "0 50, 1000 42, 20000 39, 30000", "500 warning, 22000 ok | ok"),
-        // Silence is stale, is told once, and is not healthy.
+        // Silence is stale, is reported once, and is not healthy.
         (above, usual, 1, "0 =1, 1500 =1, 2000", "1050 stale, 1500 ok | ok"),
         (above, usual, 1, "0 NaN, 50 inf, 100 -inf, 150 -, 200", " | none"),
         (above, usual, 1, "0 10, 1000 -, 3000 70, 5000", "2000 stale, 3200 critical | critical"),
@@ -88,7 +94,7 @@ fn a_level_is_what_its_values_of_some_time_say() {
         // A check that does not apply has no level.
         (above, usual, 1, "0 10, 50 off, 100", " | none"),
         (above, usual, 1, "0 50, 1000 off, 1050", "500 warning, 1000 ok | none"),
-        // One message of nonsense is no alarm, however long it is held, and also if it is the last one.
+        // One wrong message is no alarm, even if it is held for long or is the last one.
         (above, usual, 12, "0 =10, 2500 =170, 5000 =10, 10000", " | ok"),
         (above, usual, 12, "0 =10, 2500 =170, 14000", " | ok"),
         (above, usual, 12, "0 =10, 2500 =170, 5000 =170, 7500 =10, 12000", "5000 critical, 9500 ok | ok"),
@@ -132,7 +138,8 @@ fn a_change_tells_its_value_and_the_limit_it_crossed() {
     }
 }
 
-/// Bad for two seconds, every so often, and what is between: the changes of level, each without the times before its period.
+/// A value that is bad for two seconds in each period, with a script between: the changes of level, with times
+/// relative to their period.
 fn again(when: When, times: u64, period_ms: u64, after: impl Fn(u64) -> String) -> Vec<(u64, Level)> {
     let script: Vec<String> =
         (0..times).map(|time| format!("{} 50, {}", time * period_ms, after(time * period_ms))).collect();
@@ -158,10 +165,10 @@ fn a_value_that_goes_up_and_down_is_told_a_few_times_and_not_each_time() {
     let falls = |changes: Vec<(u64, Level)>| -> Vec<u64> {
         changes.into_iter().filter(|(_, level)| *level == Level::Ok).map(|(ms, _)| ms).collect()
     };
-    // Good for longer than ever asked for, it is news again.
+    // After a good time longer than any required, it is reported again.
     let times = falls(again(When::InFlight, 4, 150_000, good));
     assert_eq!(times, [4_000, 18_000, 130_000, 130_000], "2 s, 16 s, and then 128 s");
-    // Landed for a second every 20 s: how often it was bad is forgotten.
+    // Landed for a second every 20 s: earlier bad values are forgotten.
     let landed = |from_ms: u64| format!("{} 10, {} off", from_ms + 2_000, from_ms + 19_000);
     assert_eq!(falls(again(When::InFlight, 4, 20_000, landed)), [4_000; 4]);
 }

@@ -1,4 +1,4 @@
-//! What is counted of a crossing, what is kept of it, and how it is stored.
+//! Crossings: their counts, their peaks and their stored form.
 
 use super::*;
 use crate::health::{Orders, Subsystem};
