@@ -1,4 +1,4 @@
-//! Roll and pitch, against what is wanted.
+//! Roll and pitch against their setpoints.
 
 use crate::common::{Quad, Run};
 use hums_core::observation::{Autopilot, Observation, VehicleKind, Wanted};
@@ -8,7 +8,7 @@ use hums_core::units::Radians;
 const BANK: f32 = 1.2;
 const NOTHING: [&str; 0] = [];
 
-/// A minute in which it banks from 20 s on; `wanted` is the roll that the autopilot wants then, where it says so.
+/// A minute in which it banks from 20 s on; `wanted` is the autopilot's roll setpoint then, if it sends one.
 fn banks(vehicle: &Quad, wanted: Option<f32>) -> Vec<&'static str> {
     let mut run = Run::new(&Params::defaults());
     run.says(0..60_000, |now_ms| {
@@ -55,7 +55,7 @@ fn where_the_pilot_asks_for_rates_a_bank_says_nothing_by_itself() {
         assert_eq!(banks(&quad, None), NOTHING, "{autopilot:?} {mode:x}");
         assert_eq!(banks(&quad, Some(0.0)), ["roll"], "{autopilot:?} {mode:x}: it does not follow");
     }
-    // ACRO of both: what PX4 says to want is of the mode before.
+    // ACRO of both: PX4's setpoint is that of the mode before.
     for (autopilot, mode) in [(Autopilot::ArduPilot, 1), (Autopilot::Px4, 0x0005_0000)] {
         let quad = quad(autopilot, mode);
         assert!(

@@ -1,4 +1,4 @@
-//! Cells of batteries, from the autopilot's word to an alarm: what is not known gives none, and is told.
+//! Cells of batteries, from the autopilot's messages to an alarm. Unknown cells raise no alarm, and are reported.
 #![expect(clippy::unwrap_used, reason = "that is how a test fails")]
 
 use crate::common::{AUTOPILOT, Quad};
@@ -31,7 +31,7 @@ impl Outcome {
     }
 }
 
-/// A hundred seconds with a pack that has so many volts at rest, and then so many.
+/// A hundred seconds with a pack of `resting_v` at rest, and then `empty_v`.
 fn fly(monitor: &mut Monitor, resting_v: f32, empty_v: f32, more: &[Observation]) -> Outcome {
     fly_with(monitor, |now_ms| (if now_ms < EMPTY_MS { resting_v } else { empty_v }, 20.0), more)
 }
@@ -177,7 +177,7 @@ fn a_count_is_kept_for_the_next_power_on_and_only_confirms() {
     let length = monitor.encode_item(ItemKey::Lifetime, &mut item);
     let mut next = Monitor::new(Params::defaults());
     next.restore(ItemKey::Lifetime, &item[..length]).unwrap();
-    // A 4S in place of the 6S is no dead 6S: 3.9 V a cell.
+    // A 4S in place of the 6S is not taken for a dead 6S: 3.9 V a cell.
     let outcome = fly(&mut next, 16.8, 15.6, &[]);
     assert!(outcome.findings.is_empty() && outcome.told_ms.is_empty(), "{:?}", outcome.findings);
 }
@@ -199,7 +199,8 @@ fn a_payloads_pack_of_unknown_cells_is_no_news_and_two_packs_are_judged_each_by_
     assert!(outcome.cells().is_empty(), "{:?}", outcome.cells());
     let second = [Observation::Battery(second), setting("BATT2_LOW_VOLT", 10.8)];
     let outcome = fly(&mut Monitor::new(Params::defaults()), 16.8, 15.6, &second);
-    // It was heard first, before the vehicle's heartbeat let the other one count: places go by that, parameters by the id.
+    // It was received before the vehicle's heartbeat let the other one count: places go by that, parameters by the
+    // id.
     assert_eq!(outcome.cells(), [(0, Level::Critical)]);
 }
 
@@ -222,17 +223,17 @@ fn a_pack_that_sags_under_its_load_is_not_empty_until_its_cells_are() {
         _ => (13.7, 14.0),
     };
     assert!(fly_with(&mut Monitor::new(protected()), sags, &[]).findings.is_empty());
-    // However much is sag, 3.1 V are too little.
+    // 3.1 V are too little, with any sag.
     let outcome = fly_with(
         &mut Monitor::new(protected()),
         |now_ms| if now_ms < EMPTY_MS { sags(now_ms) } else { (12.4, 14.0) },
         &[],
     );
     assert_eq!(outcome.cells(), [(0, Level::Critical)]);
-    // A cell that fails under an even load is no sag.
+    // A failing cell under an even load is not a sag.
     let fails = |now_ms: u64| if now_ms < EMPTY_MS { (15.6, 14.0) } else { (13.7, 15.0) };
     assert_eq!(fly_with(&mut Monitor::new(protected()), fails, &[]).cells(), [(0, Level::Critical)]);
-    // Where no battery reports itself, the autopilot's figures tell it as well.
+    // If no battery reports itself, the autopilot's figures serve as well.
     let mut monitor = Monitor::new(protected());
     let mut outcome = Vec::new();
     for now_ms in (0..100_000).step_by(100) {

@@ -1,5 +1,5 @@
-//! What departs from its usual level in a flight is named in time: sensors against each other, vibration, a motor's output, the
-//! estimator's compass. What is so from the beginning, what wind, load and turns do, and what is not fitted says nothing.
+//! Departures from the usual level of a flight are named in time: sensors against each other, vibration, a motor's
+//! output, the estimator's compass. Offsets from the beginning, wind, load, turns and missing parts raise nothing.
 #![expect(clippy::panic, reason = "that is how a test fails")]
 
 use crate::common::{AUTOPILOT, Quad};
@@ -16,7 +16,7 @@ use hums_core::units::{
     Gauss, Hectopascals, Metres, MetresPerSecond, MetresPerSecond2, Position, Radians, RadiansPerSecond,
 };
 
-/// It takes off at 4 s; what is to be found begins at 30 s.
+/// Take-off at 4 s; faults begin at 30 s.
 const OFF_MS: u64 = 4_000;
 const FAULT_MS: u64 = 30_000;
 const END_MS: u64 = 60_000;
@@ -32,35 +32,35 @@ struct Fitted {
     pulses: [f32; MOTORS_MAX],
     /// How fast it turns, rad/s.
     yaw_rate: f32,
-    /// Body rates about roll and pitch, and those that are wanted, rad/s.
+    /// Body rates about roll and pitch, and their setpoints, rad/s.
     turns: [f32; 2],
     wanted: [f32; 2],
-    /// The attitude about whose axes these are.
+    /// The attitude whose axes these are about.
     wanted_of: Option<[f32; 4]>,
-    /// Whether it tells what is wanted now.
+    /// Whether setpoints come now.
     wants: bool,
-    /// How far GPS is above sea level, m.
+    /// Height of GPS above sea level, m.
     altitude: f32,
-    /// How far its attitude trembles, rad.
+    /// Amplitude of the attitude's noise, rad.
     attitude_noise: f32,
     /// The climb of `VFR_HUD`, m/s.
     hud_climb: Option<f32>,
     /// A second after this, GPS repeats its position.
     gps_until_ms: u64,
-    /// How fast it flies north, m/s.
+    /// Speed northwards, m/s.
     speed: f32,
-    /// The receiver's speed north, m/s, where it tells one, and how far north that has brought it, m.
+    /// The receiver's speed northwards, m/s, if it sends one, and the way north since, m.
     gps_speed: Option<f32>,
     gps_north: f32,
-    /// Whether it tells its position now.
+    /// Whether positions come now.
     places: bool,
-    /// How far the second estimator is apart: in roll, rad, in height and north, m.
+    /// Offset of the second estimator: roll, rad; height and north, m.
     second: Option<[f32; 3]>,
     /// The sensors whose messages come now.
     speaks: [bool; 3],
     /// The first sensor's message is `HIGHRES_IMU`.
     selects: bool,
-    /// Nothing comes from here to there, ms.
+    /// Time without any message, ms.
     silence: core::ops::Range<u64>,
 }
 
@@ -80,7 +80,7 @@ impl Fitted {
         for (motor, pulse) in (0..4).zip(&mut pulses) {
             *pulse = if now_ms < OFF_MS { 1_000.0 } else { 1_500.0 + 20.0 * noise(now_ms, motor) };
         }
-        // Each has its own offset, and shakes in its own way.
+        // Each has its own offset and its own noise.
         let shaken = |seed| noise(now_ms, seed) * 2.0;
         let force =
             [0, 1, 2].map(|sensor| [0.2 * sensor as f32, shaken(sensor + 10), -9.8 + shaken(sensor + 20)]);
@@ -198,12 +198,12 @@ impl Fitted {
     }
 }
 
-/// Flies; the script changes what it says, from the beginning on.
+/// Flies; the script changes the messages from the beginning on.
 fn fly(script: impl Fn(u64, &mut Fitted)) -> Vec<Finding> {
     fly_with([(100, 0); 3], script)
 }
 
-/// The same with sensors of which each tells every so many milliseconds, from so many on.
+/// The same with a period and an offset of each sensor's messages, ms.
 fn fly_with(rhythm: [(u64, u64); 3], script: impl Fn(u64, &mut Fitted)) -> Vec<Finding> {
     let mut monitor = Monitor::new(Params::defaults());
     let mut findings = Vec::new();
@@ -221,7 +221,7 @@ fn fly_with(rhythm: [(u64, u64); 3], script: impl Fn(u64, &mut Fitted)) -> Vec<F
     findings
 }
 
-/// The fault of a script is found as this check of this instance, in time, and as nothing else.
+/// The fault of a script is found as this check of this instance, in time, and as no other.
 #[track_caller]
 fn finds(check: &str, instance: u8, level: Level, within_ms: u64, fault: impl Fn(u64, &mut Fitted)) {
     let findings = fly(|now_ms, fitted| {
@@ -261,7 +261,7 @@ fn accelerometers_that_are_wrong_alike_are_told_by_the_velocity_of_gps() {
     // A gyro that led the attitude astray.
     finds(|fitted| {
         fitted.quad.roll += 0.4;
-        // Near the equator, where a lean that is none does not turn the compass's heading.
+        // Near the equator, where a false lean does not turn the compass's heading.
         fitted.field.iter_mut().for_each(|field| field[2] -= 0.4);
     });
 }
@@ -319,7 +319,7 @@ fn of_two_sensors_the_second_stands_for_both() {
     }
 }
 
-/// All sensors feel how it turns and is pushed: a little, and in gusts after a while.
+/// All sensors feel turns and pushes: a little, and in gusts after a while.
 fn gusts(now_ms: u64, fitted: &mut Fitted) {
     let strong = if now_ms < FAULT_MS { 0.05 } else { 1.0 };
     let wave = |period_ms: f32| (now_ms as f32 / period_ms).sin();
@@ -452,7 +452,7 @@ fn gyros_that_become_noisy_are_apart_though_they_seem_to_turn_fast() {
         assert_eq!((found.instance, found.level), (1, Level::Warning));
         assert!(found.at.as_millis() < FAULT_MS + 4_000, "{found:?}");
     }
-    // Hard turns at one moment are no difference, also where one gyro's scale is off by a hundredth.
+    // Hard turns at one moment make no difference, even with a scale error of a hundredth in one gyro.
     is_quiet(|now_ms, fitted| {
         let turns = if now_ms < FAULT_MS { 0.0 } else { 4.0 * (now_ms as f32 / 300.0).sin() };
         for (rate, scale) in fitted.rate.iter_mut().zip([1.0, 1.01, 0.99]) {
@@ -568,7 +568,7 @@ fn position_messages_that_stop_are_told() {
     let found = findings.first().expect("something");
     assert_eq!((found.check, found.level), ("position_silent", Level::Warning));
     assert!(found.at.as_millis() < FAULT_MS + 3_500, "{found:?}");
-    // What needs a position has none.
+    // Checks that need a position are stale.
     assert!(findings.iter().skip(1).all(|one| one.level == Level::Stale), "{findings:?}");
 }
 
@@ -593,7 +593,7 @@ fn of_two_heights_the_one_that_leapt_is_named() {
         let height = findings.iter().find(|one| one.check == "baro_height").expect("they are apart");
         assert_eq!(height.because, "gps_height");
     }
-    // A slow drift is nobody's, and a barometer that leaps is another check's.
+    // A slow drift is blamed on neither, and a leap of the barometer belongs to another check.
     let drifts = fly(|since_ms, fitted| fitted.altitude += since_ms as f32 * 0.0005);
     assert!(drifts.iter().all(|one| one.check == "baro_height"), "{drifts:?}");
     let leaps = fly(|_, fitted| fitted.pressure.iter_mut().for_each(|pressure| *pressure -= 1.8));
@@ -636,7 +636,7 @@ fn a_second_estimator_without_an_exact_receiver_is_no_witness() {
     let inexact = |until_ms: u64| {
         move |now_ms: u64, fitted: &mut Fitted| {
             fitted.second = Some([0.7, 15.0, 0.0]);
-            // A receiver that does not say how exact it is has its dilution only.
+            // A receiver without an accuracy has its dilution only.
             (fitted.quad.gnss.accuracy, fitted.quad.gnss.hdop) = (None, Some(1.0));
             if (20_000..until_ms).contains(&now_ms) {
                 fitted.quad.gnss.fix = 1;
@@ -669,7 +669,7 @@ fn satellites_that_go_are_told_while_the_receiver_is_still_exact() {
         fitted.quad.gnss.satellites = Some(if now_ms / 3_000 % 2 == 0 { 9 } else { 7 });
         fitted.quad.gnss.hdop = Some(if now_ms / 3_000 % 2 == 0 { 1.5 } else { 2.0 });
     });
-    // What is too few in any flight says so.
+    // Too few satellites for any flight have a check of their own.
     let findings = fly(|now_ms, fitted| {
         if now_ms >= FAULT_MS {
             (fitted.quad.gnss.satellites, fitted.quad.gnss.accuracy) = (Some(5), Some(Metres(2.0)));
@@ -694,7 +694,7 @@ fn vibration_that_jumps_is_named_and_gusts_are_not() {
     });
 }
 
-/// All compasses are turned by so much.
+/// Turns all compasses by these degrees.
 fn turned(fitted: &mut Fitted, degrees: f32) {
     let (sin, cos) = degrees.to_radians().sin_cos();
     for field in &mut fitted.field {
@@ -745,7 +745,7 @@ fn a_weak_motor_of_a_quadrotor_is_named() {
 
 #[test]
 fn a_motor_that_is_a_little_weak_is_named_once_it_has_been_so_for_long() {
-    // It stands out by 6 to 8 %, which is no warning at once.
+    // Its output stands out by 6 to 8 %, which is not a warning at once.
     finds("motor_output", 2, Level::Warning, 28_000, |_, fitted| fitted.pulses[2] += 44.0);
     is_quiet(|now_ms, fitted| {
         let is_gust = (FAULT_MS..FAULT_MS + 4_000).contains(&now_ms);
@@ -759,7 +759,7 @@ fn a_motor_that_is_a_little_weak_is_named_once_it_has_been_so_for_long() {
     });
 }
 
-/// A hexarotor's commands, where one motor has lost thrust worth `loss` us: the projection on thrust, roll, pitch and yaw.
+/// A hexarotor's commands after one motor lost thrust worth `loss` us: the projection on thrust, roll, pitch and yaw.
 fn hexa(fitted: &mut Fitted, now_ms: u64, shift: [f32; 6]) {
     fitted.quad.type_number = 13;
     for (motor, pulse) in (0..6).zip(&mut fitted.pulses) {
@@ -770,7 +770,7 @@ fn hexa(fitted: &mut Fitted, now_ms: u64, shift: [f32; 6]) {
 
 #[test]
 fn a_weak_motor_of_a_hexarotor_is_named() {
-    // Round the frame from the weak one on: 2/3, 1/6, 1/6, -1/3, 1/6, 1/6 of what it lost.
+    // Round the frame from the weak one on: 2/3, 1/6, 1/6, -1/3, 1/6, 1/6 of the loss.
     let weak = [267.0, 67.0, 67.0, -133.0, 67.0, 67.0];
     let findings =
         fly(|now_ms, fitted| hexa(fitted, now_ms, if now_ms < FAULT_MS { [0.0; 6] } else { weak }));
@@ -811,7 +811,7 @@ fn octa(fitted: &mut Fitted, now_ms: u64, shift: [f32; 8]) {
     }
 }
 
-/// What the commands of eight motors change by where these amounts of thrust, a tilt towards an arm and yaw are to be made up for.
+/// Changes of the commands of eight motors that make up for these amounts of thrust, tilt towards an arm, and yaw.
 fn eight(arms: bool, thrust: f32, tilt: f32, yaw: f32) -> [f32; 8] {
     core::array::from_fn(|motor| {
         let round = if arms { (motor / 2) as f32 / 4.0 } else { motor as f32 / 8.0 };
@@ -918,14 +918,14 @@ fn px4_that_stops_using_its_compass_is_named() {
     let [found] = told[..] else { panic!("{findings:?}") };
     assert_eq!((found.check, found.level), ("compass_unused", Level::Warning));
     assert!((FAULT_MS + 500..FAULT_MS + 900).contains(&found.at.as_millis()), "{found:?}");
-    // One that was never used is none that was lost.
+    // A compass that was never used is not lost.
     is_quiet(|_, fitted| {
         (fitted.quad.autopilot, fitted.quad.estimator) = (Autopilot::Px4, px4(None));
         fitted.quad.vibration.levels = [Some(0.0), Some(0.0), Some(1.0)];
     });
 }
 
-/// What a sensor says at the moment of the fault, from then on.
+/// A sensor that repeats its value of the moment of the fault.
 #[test]
 fn a_sensor_that_repeats_one_value_is_named() {
     for sensor in 0..3_u8 {
@@ -952,14 +952,14 @@ fn a_sensor_that_repeats_one_value_is_named() {
 #[test]
 fn compasses_that_all_repeat_their_values_are_stuck_once_the_vehicle_turns() {
     let held = Fitted::healthy(FAULT_MS);
-    // What holds still, and whose estimator drifts.
+    // A vehicle that holds still, with an estimator that drifts.
     is_quiet(|now_ms, fitted| {
         if now_ms >= FAULT_MS {
             (fitted.field, fitted.attitude_noise) = (held.field, 0.0);
             fitted.quad.roll = (now_ms - FAULT_MS).min(5_000) as f32 * 0.008 / 1_000.0;
         }
     });
-    // Of what changes all of them the first one's message tells 0.2 s later.
+    // A change of all of them comes 0.2 s later in the first one's message.
     is_quiet(|now_ms, fitted| {
         let late_ms = [200, 0, 0];
         for (field, late_ms) in fitted.field.iter_mut().zip(late_ms) {
@@ -1055,7 +1055,7 @@ fn what_does_not_turn_as_it_is_told_is_named_and_what_turns_fast_is_not() {
         (fitted.wanted, fitted.turns) = (turning(now_ms), turning(now_ms.saturating_sub(100)));
     });
     is_quiet(|now_ms, fitted| {
-        // What it was told a while ago is another thing than what it is told now, which nobody hears.
+        // An old setpoint differs from the present one, which was not received.
         fitted.wants = now_ms.is_multiple_of(400);
         fitted.turns = [if fitted.wants { 3.0 } else { -1.0 }, 0.0];
         fitted.wanted = fitted.turns;
@@ -1064,7 +1064,7 @@ fn what_does_not_turn_as_it_is_told_is_named_and_what_turns_fast_is_not() {
 
 #[test]
 fn rates_about_the_axes_of_the_wanted_attitude_are_turned_to_the_bodys() {
-    // A quarter of a turn behind the wanted heading: to pitch is to roll to the left, a tenth of a second late.
+    // A quarter of a turn behind the heading setpoint: to pitch is to roll to the left, a tenth of a second late.
     let lags = |now_ms: u64, fitted: &mut Fitted| {
         let turning = |now_ms: u64| 3.0 * (now_ms as f32 / 2_000.0).sin();
         let half = core::f32::consts::FRAC_1_SQRT_2;
@@ -1106,7 +1106,7 @@ fn full_throttle_that_was_in_vain_is_until_it_climbs() {
     assert!(told[1..].iter().all(|(_, at_ms)| *at_ms >= over_ms) && told.len() == 2, "{told:?}");
 }
 
-/// Pressures and the pilot's display of what climbs with so many m/s by each.
+/// Pressures and pilot's display of a climb, in m/s by pressure and by the estimator.
 fn climbs(fitted: &mut Fitted, seconds: f32, by_pressure: f32, by_estimator: f32) {
     fitted.pressure.iter_mut().for_each(|pressure| *pressure -= 0.12 * by_pressure * seconds);
     fitted.hud_climb = Some(by_estimator + 0.01);

@@ -1,6 +1,6 @@
-//! The documents that the tables make: `docs/parameters.md`, the table of checks in `docs/health.md` and that of their
-//! words in `docs/check.md` are what the code says, and `docs/usage.md` knows every counter.
-//! `HUMS_WRITE_DOCS=1 cargo test -p hums-core-tests docs` writes the first three.
+//! The documents that the tables make: `docs/parameters.md` and the tables of checks in `docs/health.md` and
+//! `docs/check.md` follow the code, and `docs/usage.md` names every counter. `HUMS_WRITE_DOCS=1 cargo test -p
+//! hums-core-tests docs` writes the first three.
 #![expect(clippy::panic, clippy::unwrap_used, reason = "that is how a test fails")]
 
 use std::fmt::Write as _;
@@ -14,7 +14,7 @@ use hums_core::params::{Param, Params, TABLE};
 use hums_core::time::Span;
 use hums_core::usage::UsageCounter;
 
-/// What each check reads, and where its limits come from where no parameter says it.
+/// The inputs of each check, and the source of its limits unless a parameter is.
 const INPUTS: &str = "\
 batt_remaining: BATTERY_STATUS; SYS_STATUS where no battery reports itself
 cell_voltage: BATTERY_STATUS: the lowest cell, or the pack by its cells, without the sag of its load; SYS_STATUS likewise; armed and lithium
@@ -136,7 +136,7 @@ fn path(name: &str) -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../../docs").join(name)
 }
 
-/// The document is `wanted`, or becomes it where that is asked for.
+/// The document is `wanted`, or is written so on request.
 #[track_caller]
 fn assert_is(name: &str, wanted: &str) {
     if std::env::var_os("HUMS_WRITE_DOCS").is_some() {
@@ -173,8 +173,8 @@ fn the_parameters_are_documented_as_they_are() {
     assert_is("parameters.md", &text);
 }
 
-/// The file that Mission Planner reads descriptions of parameters from that it knows no other of, in its own terms. It takes a component
-/// that is no autopilot for an `ArduCopter2`.
+/// The file of parameter descriptions that Mission Planner reads, in its own terms. It takes any component that is
+/// not an autopilot for an `ArduCopter2`.
 #[test]
 fn mission_planner_gets_the_words_of_every_parameter() {
     let mut text = "<?xml version=\"1.0\" encoding=\"utf-8\"?>\n\
@@ -204,7 +204,7 @@ fn mission_planner_gets_the_words_of_every_parameter() {
     assert_is("stations/ParameterMetaData.xml", &text);
 }
 
-/// A check and what it reads.
+/// A check and its inputs.
 fn inputs() -> impl Iterator<Item = (&'static str, &'static str)> {
     INPUTS.lines().filter_map(|line| line.split_once(": "))
 }

@@ -1,5 +1,5 @@
-//! Every check there is finds what it is there for, within its own debounce plus 100 ms: on either autopilot's scales,
-//! with an engine, with a second battery and with a twelfth motor.
+//! Every check finds its fault within its own debounce plus 100 ms: on the scales of both autopilots, with an engine,
+//! with a second battery and with a twelfth motor.
 #![expect(clippy::panic, clippy::unwrap_used, reason = "that is how a test fails")]
 
 use crate::common::{AUTOPILOT, Quad};
@@ -18,7 +18,7 @@ use hums_core::units::{Amperes, Celsius, Fraction, Hectopascals, Metres, Radians
 const FAULT_MS: u64 = 20_000;
 const END_MS: u64 = 95_000;
 
-/// What goes wrong: it changes the quad, and says what a quad does not say.
+/// A fault: it changes the quad, and adds other observations.
 type Fault = fn(&mut Quad, &mut Vec<Observation>);
 
 /// Off by default, since they depend on the engine and on the devices.
@@ -31,7 +31,7 @@ const LIMITS: [(&str, f32); 6] = [
     ("RADIO_RSSI_WARN", 60.0),
 ];
 
-/// Which scale vibration has, the heartbeat tells.
+/// The heartbeat decides the scale of vibration.
 fn px4() -> Observation {
     let kind = VehicleKind::Rotorcraft;
     Observation::Heartbeat(Heartbeat {
@@ -107,7 +107,7 @@ const FAULTS: &[(&str, u8, Level, Fault)] = &[
             ..Engine::default()
         }));
     }),
-    // It runs at its speed, and then does not.
+    // It runs at its speed, and then no longer.
     ("generator_speed", 0, Level::Critical, |_, more| {
         more.extend([6_000.0, 3_000.0].map(|rpm| generator(false, rpm)));
     }),
@@ -176,8 +176,8 @@ const FAULTS: &[(&str, u8, Level, Fault)] = &[
     ("card_room", 0, Level::Warning, |quad, _| quad.recorder.room = Some(0.05)),
 ];
 
-/// Found by scripts of their own: silence, restarts and rates in `scripted_faults.rs`, a battery's resistance in
-/// `cells.rs`, mishaps in `mishap.rs`, what departs from its usual level in a flight in `crosscheck.rs`.
+/// Checks with scripts of their own: silence, restarts and rates in `scripted_faults.rs`, a battery's resistance in
+/// `cells.rs`, mishaps in `mishap.rs`, departures from usual levels in `crosscheck.rs`.
 const ELSEWHERE: &str = "\
     ahrs2_tilt ahrs2_height ahrs2_position gps_sats_fall gps_hdop_rise compass_heading gps_height \
     position_silent baro_height baro_noise ekf_climb accel_stuck gyro_stuck compass_stuck baro_stuck \
@@ -185,7 +185,7 @@ const ELSEWHERE: &str = "\
     baro_mismatch compass_unused vibration_rise motor_output motor_off esc_silent esc_errors heartbeat \
     autopilot_reboot batt_resistance gps_speed free_fall impact tumbling disarmed_in_air sinking overturned";
 
-/// What is due, and the kind of component (`CMP1_KIND`) that is.
+/// Checks of due parts, and the kind of component (`CMP1_KIND`).
 const DUE: [(&str, f32); 8] = [
     ("airframe_due", 1.0),
     ("battery_due", 2.0),
@@ -212,7 +212,7 @@ fn esc(quad: &mut Quad, motor: usize) -> &mut Esc {
     quad.escs[motor].as_mut().unwrap()
 }
 
-/// What both ends hear, and the noise there.
+/// Signal of both ends, and their noise.
 fn radio(more: &mut Vec<Observation>, rssi: [u8; 2], noise: [u8; 2]) {
     let ([rssi, remote_rssi], [noise, remote_noise]) = (rssi.map(Some), noise.map(Some));
     let radio = TelemetryRadio { rssi, remote_rssi, noise, remote_noise, errors: 0 };
@@ -343,11 +343,11 @@ fn the_autopilots_figure_of_the_battery_counts_where_no_battery_reports_itself()
 fn each_kind_of_component_is_due_in_its_own_subsystem() {
     for (name, kind) in DUE {
         let limits = [("CMP1_KIND", kind), ("CMP1_FLIGHTS", 1.0)];
-        // It is disarmed on the ground, and its flight is over.
+        // It is disarmed on the ground, and its flight has ended.
         let findings = fly(&limits, |quad, _| (quad.armed, quad.height) = (false, 0.0));
         let found: Vec<_> = findings.iter().map(|finding| (finding.check, finding.level)).collect();
         assert_eq!(found, [(name, Level::Warning), (name, Level::Critical)], "kind {kind}: {findings:?}");
-        // In the air after 2.5 s; one component is looked at a tick, and the debounce is a second.
+        // In the air after 2.5 s; one component is updated each tick, and the debounce is a second.
         assert!((3_500..=4_000).contains(&findings[0].at.as_millis()), "{findings:?}");
         let due_ms = findings[1].at.as_millis() - FAULT_MS;
         assert!((1_000..=5_000).contains(&due_ms), "critical on the ground only: {findings:?}");

@@ -1,4 +1,4 @@
-//! What outlives power: sessions that end at any instant, and the sum that they make.
+//! Lifetime: sessions that end at any instant, and their sum.
 #![expect(clippy::float_cmp, clippy::unwrap_used, reason = "that is how a test fails")]
 
 use std::collections::BTreeMap;
@@ -15,7 +15,7 @@ use hums_core::time::Instant;
 use hums_core::units::{Amperes, Metres, MetresPerSecond, Rpm, Volts};
 use hums_core::usage::UsageCounter;
 
-/// A store that keeps what it is given.
+/// A store of all items.
 #[derive(Default)]
 struct Store(BTreeMap<u8, Vec<u8>>);
 
@@ -28,7 +28,7 @@ impl Store {
         monitor
     }
 
-    /// Saves what is due; gives the keys.
+    /// Saves all items that are due; returns the keys.
     fn save(&mut self, monitor: &mut Monitor, now: Instant) -> Vec<ItemKey> {
         let mut keys = Vec::new();
         while let Some(key) = self.save_one(monitor, now) {
@@ -73,7 +73,7 @@ fn step(monitor: &mut Monitor, now_ms: u64, from_s: u64, to_s: u64, vehicle: (u8
     monitor.tick(now, &LinkReading::default(), &RecorderStatus::default(), &mut |_| {});
 }
 
-/// Flies from `from_s` to `to_s`, and saves what is due at each tick.
+/// Flies from `from_s` to `to_s`, and saves due items at each tick.
 fn run(
     monitor: &mut Monitor,
     store: &mut Store,
@@ -111,7 +111,7 @@ fn sessions_add_up_and_the_greatest_stays() {
     }
 }
 
-/// What of a life may not be lost, and not be counted twice: sums, in the order in which they are compared.
+/// Sums of a life that may neither be lost nor counted twice, in the order of comparison.
 fn sums(monitor: &Monitor) -> Vec<f64> {
     let life = monitor.lifetime();
     let counters = [
@@ -176,7 +176,7 @@ fn power_that_goes_at_any_moment_costs_two_minutes_at_most_and_counts_nothing_tw
                 assert_eq!(again.len(), live.len());
                 cuts += 1;
                 for (index, ((again, live), before)) in again.iter().zip(&live).zip(&before).enumerate() {
-                    // Tenths of a second are rounded, once a session; and nothing goes back.
+                    // Tenths of a second are rounded once a session, and no sum falls.
                     assert!(*again <= live + 0.2, "{now_ms} ms, {key:?}: sum {index} is {again} of {live}");
                     assert!(
                         *again >= before - 0.2,
@@ -212,7 +212,7 @@ fn a_flight_saves_little_until_it_lands() {
     assert_eq!(session[0], 10, "the boot itself");
     let armed = session.windows(2).filter(|pair| pair[1] <= 1_820);
     assert!(armed.into_iter().all(|pair| pair[1] - pair[0] <= 121), "{session:?}");
-    // Landed (seen within 2 s of it, or at disarming).
+    // Landed (found within 2 s, or at disarming).
     assert!(session.iter().any(|at_s| (1_820..=1_822).contains(at_s)), "{session:?}");
     assert!(session.len() <= 20, "{session:?}");
     assert!(times(ItemKey::Lifetime).len() <= 2, "its owner, and as of this session");

@@ -1,6 +1,6 @@
-//! Scripted vehicles against the monitor, and what the tables say against the documents.
+//! Scripted vehicles against the monitor, and the tables against the documents.
 //!
-//! One program, in a package of its own: it is compiled without optimisation, the monitor that it tests with it.
+//! One program in a package of its own, compiled without optimisation together with the monitor.
 
 mod attitude;
 mod cells;

@@ -1,4 +1,4 @@
-//! Speeds and currents of motors against each other: which frames, what turns, what stands, what pushes.
+//! Speeds and currents of motors against each other: frames, turning, standing and pushing motors.
 
 use crate::common::{AUTOPILOT, Quad};
 use hums_core::Monitor;
@@ -11,12 +11,12 @@ use hums_core::status::LinkReading;
 use hums_core::time::Instant;
 use hums_core::units::{Amperes, Celsius, Radians, RadiansPerSecond, Rpm};
 
-/// A minute of flight; what is told of motors. `script` gives the vehicle, its ESCs and its yaw rate.
+/// A minute of flight; the findings about motors. `script` gives the vehicle, its ESCs and its yaw rate.
 fn told(script: impl Fn(u64) -> (Quad, Vec<Esc>, f32)) -> Vec<(&'static str, u8)> {
     told_given(script, |_| None)
 }
 
-/// The same, with the pulses that the motors are given.
+/// The same, with pulses of the motors.
 fn told_given(
     script: impl Fn(u64) -> (Quad, Vec<Esc>, f32),
     given: impl Fn(u64) -> Option<[u16; MOTORS_MAX]>,
@@ -50,7 +50,7 @@ fn told_given(
     findings
 }
 
-/// With these speeds from 20 s on, turning with `yaw_rate` then.
+/// With these speeds, and turning with `yaw_rate`, from 20 s on.
 fn flies(vehicle: &Quad, speeds: &[f32], yaw_rate: f32) -> Vec<(&'static str, u8)> {
     let esc = vehicle.escs[0].unwrap_or_default();
     told(|now_ms| {
@@ -61,7 +61,7 @@ fn flies(vehicle: &Quad, speeds: &[f32], yaw_rate: f32) -> Vec<(&'static str, u8
     })
 }
 
-/// What ESCs say that tell nothing but their currents.
+/// ESCs that report only their currents.
 fn escs_of(currents: &[f32]) -> Vec<Esc> {
     currents.iter().map(|current| Esc { current: Some(Amperes(*current)), ..Esc::default() }).collect()
 }
@@ -94,11 +94,11 @@ fn an_esc_whose_messages_come_once_a_second_is_silent_after_five_of_them() {
 
 #[test]
 fn motors_that_carry_different_loads_in_groups_are_none_of_them_off() {
-    // A Y6's upper and lower motors, and what a quad turns with; both slower than the limit of what counts as turning.
+    // A Y6's upper and lower motors, and a yawing quad; both turn slower than the limit of a turn.
     let y6 = Quad { type_number: 13, ..Quad::healthy() };
     assert_eq!(flies(&y6, &[5_100.0, 3_550.0, 5_050.0, 3_500.0, 3_520.0, 5_080.0], 0.4), []);
     assert_eq!(flies(&Quad::healthy(), &[4_200.0, 4_150.0, 5_900.0, 5_950.0], 0.5), []);
-    // The front ones of a quad whose load hangs before its middle.
+    // The front motors of a quad whose load hangs before its middle.
     assert_eq!(flies(&Quad::healthy(), &[5_800.0, 4_300.0, 5_750.0, 4_250.0], 0.0), []);
 }
 
@@ -147,7 +147,7 @@ fn a_motor_whose_command_was_cut_is_not_lost_and_one_that_stands_or_has_no_prope
     }
 }
 
-/// A quadplane in the air from 2 s on, and what it flies on.
+/// A quadplane in the air from 2 s on, on rotors or wings.
 fn quadplane(now_ms: u64, vtol: VtolState) -> Quad {
     let landed = Some(if now_ms < 2_000 { LandedState::OnGround } else { LandedState::InAir });
     Quad { kind: VehicleKind::Vtol, type_number: 22, mode: 10, landed, vtol, ..Quad::healthy() }
@@ -158,7 +158,7 @@ fn the_motor_that_pushes_a_vtol_is_not_lost_while_it_hovers() {
     let lifted = |pusher: f32| escs_of(&[5.0, 5.0, 5.0, 5.0, pusher]);
     let hovers = |now_ms| (quadplane(now_ms, VtolState::Hover), lifted(0.0), 0.0);
     assert_eq!(told(hovers), []);
-    // It helps against the wind for a while.
+    // The pusher helps against the wind for a while.
     let helped = |now_ms| {
         let pusher = if (10_000..30_000).contains(&now_ms) { 6.0 } else { 0.0 };
         (quadplane(now_ms, VtolState::Hover), lifted(pusher), 0.0)
@@ -173,7 +173,7 @@ fn the_motor_that_pushes_a_vtol_is_not_lost_while_it_hovers() {
         _ => (quadplane(now_ms, VtolState::Hover), lifted(if now_ms < 26_000 { 3.0 } else { 0.0 }), 0.0),
     };
     assert_eq!(told(returns), []);
-    // A motor that lifts is found, whatever pushes.
+    // A lifting motor is found, even beside a pusher.
     let lost = |now_ms| {
         let escs = escs_of(&[5.0, 5.0, if now_ms < 40_000 { 5.0 } else { 0.1 }, 5.0, 0.0]);
         (quadplane(now_ms, VtolState::Hover), escs, 0.0)
@@ -219,12 +219,12 @@ fn a_motor_that_is_idled_opposite_to_a_dead_one_is_not_a_second_dead_one() {
     assert_eq!(lost(1_500), [("motor_loss", 1), ("motor_loss", 4)], "it is given as much as the others");
 }
 
-/// A quad that is given these pulses from 20 s on, for so long, and turns so fast and sinks from then on.
+/// A quad with these pulses from 20 s on for a time, and these speeds and a sink from then on.
 fn quad_given(speeds: [f32; 4], given: [u16; 4], for_ms: u64) -> Vec<(&'static str, u8)> {
     quad_given_on(|pulse| pulse, speeds, given, for_ms)
 }
 
-/// The same, by a driver whose range is another one.
+/// The same with a driver of another range.
 fn quad_given_on(
     driver: fn(u16) -> u16,
     speeds: [f32; 4],
@@ -242,7 +242,7 @@ fn quad_given_on(
     };
     told_given(script, |now_ms| {
         let mut pulses = [900; MOTORS_MAX];
-        // A servo is no motor, at the end of its range either.
+        // A servo is not a motor, even at the end of its range.
         pulses[5] = 2_000;
         pulses[..4].copy_from_slice(&match now_ms {
             0..4_000 => [1_000; 4],
@@ -253,7 +253,7 @@ fn quad_given_on(
     })
 }
 
-/// `PX4`'s numbers for `DShot` and for ESCs on CAN, whose motors idle with a little.
+/// `PX4`'s numbers for `DShot` and for ESCs on CAN, whose motors idle above zero.
 const NUMBERS: [fn(u16) -> u16; 2] = [
     |pulse| ((f32::from(pulse) - 1_000.0) * 1.999).max(if pulse < 1_000 { 0.0 } else { 110.0 }) as u16,
     |pulse| ((f32::from(pulse) - 1_000.0) * 8.191).max(if pulse < 1_000 { 0.0 } else { 1.0 }) as u16,
@@ -299,7 +299,8 @@ fn what_a_driver_calls_its_outputs_changes_nothing() {
     }
 }
 
-/// What is told of a hexarotor that is heard first in the air, with these pulses and speeds; pulses within the range vary by as much.
+/// Findings about a hexarotor that is first received in the air, with these pulses and speeds. Pulses within the
+/// range vary by `varies_us`.
 fn heard_in_the_air(pulses: [u16; 6], varies_us: u16, speeds: [f32; 6]) -> Vec<(&'static str, u8)> {
     let hexa =
         Quad { type_number: 13, start_height: 20.0, landed: Some(LandedState::InAir), ..Quad::healthy() };
@@ -358,7 +359,7 @@ fn a_motor_that_was_dead_before_the_vehicle_was_heard_is_found_by_its_output() {
 
 #[test]
 fn a_motor_that_alone_is_given_all_in_wind_that_tilts_the_vehicle_is_weak() {
-    // It never flies level, so that nothing is usual.
+    // It never flies level, so no level is usual.
     let script = |now_ms: u64| {
         let height = if now_ms < 4_000 { 0.0 } else { 40.0 };
         (Quad { height, roll: 0.6, ..Quad::healthy() }, Vec::new(), 0.0)
@@ -375,7 +376,7 @@ fn a_motor_that_alone_is_given_all_in_wind_that_tilts_the_vehicle_is_weak() {
     assert!(told.contains(&("motor_output", 3)), "{told:?}");
 }
 
-/// What is told of ESCs of which PX4 tells by two messages: speeds ten times a second, and their state by `info` at a time in ms.
+/// Findings about PX4's ESCs with two messages: speeds ten times a second, and states by `info` at a time in ms.
 fn px4_escs(info: impl Fn(u64) -> Option<Esc>) -> Vec<Finding> {
     let mut monitor = Monitor::new(Params::defaults());
     let mut findings = Vec::new();

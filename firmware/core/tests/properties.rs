@@ -1,5 +1,5 @@
-//! Nothing that a vehicle can say, in whatever order, at whatever time and however often, panics or overflows, spoils a
-//! figure, or makes what is not known look healthy. (From bytes on: `hums-link`'s `tests/hostile.rs`.)
+//! No observation, in any order, at any time and at any rate, panics or overflows, spoils a figure, or makes an
+//! unknown value look healthy. (From bytes on: `hums-link`'s `tests/hostile.rs`.)
 
 use core::num::NonZeroU32;
 
@@ -24,12 +24,12 @@ use hums_core::usage::FIGURE_FIRST;
 
 const AUTOPILOT: Source = Source { system: 1, component: 1 };
 
-/// What values are like.
+/// The kind of values.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Values {
-    /// Anything: sane, extreme, or no number at all.
+    /// Anything: sane, extreme, NaN or infinite.
     Any,
-    /// Not one of them is known: missing, or no finite number.
+    /// All are unknown: missing, NaN or infinite.
     Unknown,
 }
 
@@ -84,7 +84,7 @@ impl Random {
         self.maybe(|random| unit(random.f32()))
     }
 
-    /// A whole number, which itself cannot say that it is unknown.
+    /// A whole number, which has no unknown value of its own.
     fn whole<T>(&mut self, from: fn(u32) -> T) -> Option<T> {
         if self.values == Values::Unknown {
             return None;
@@ -324,7 +324,7 @@ impl Random {
         for _ in 0..self.below(40) {
             let spec = &TABLE[self.below(TABLE.len() as u64) as usize];
             let part = self.below(1_001) as f32 / 1_000.0;
-            // Whole numbers choose; what is out of range by rounding is refused.
+            // Whole numbers select; a value that rounding moves out of its range is refused.
             let _ = params.set(spec.name, (spec.min + part * (spec.max - spec.min)).round());
         }
         params
@@ -346,7 +346,7 @@ impl Random {
     }
 }
 
-/// What must hold whatever was said.
+/// Invariants after any observation.
 fn check(monitor: &mut Monitor, now: Instant) {
     let sane = |counter: u8, value: f64| {
         let sign = counter >= FIGURE_FIRST || value >= 0.0;
@@ -393,7 +393,7 @@ fn not_better(whole: Level, part: Level) -> bool {
     rank(whole) >= rank(part)
 }
 
-/// Runs a thousand random things past a monitor; gives it as it is then, and when that is.
+/// Feeds a thousand random observations to a monitor; returns it and its time.
 fn run(random: &mut Random) -> (Monitor, Instant) {
     let mut monitor = Monitor::new(random.params());
     // At power-on, and where the clock wraps.
@@ -440,7 +440,7 @@ fn after_anything_at_all_a_vehicle_that_falls_silent_is_critical_and_nothing_tha
     for seed in 40..60 {
         let (mut monitor, end) = run(&mut Random { state: seed, values: Values::Any });
         let mut now = end;
-        // Longer than any check waits, and than anything of the future that was said.
+        // Longer than any debounce, and than any observed time in the future.
         for _ in 0..600 {
             now = now + Span::from_millis(200);
             monitor.tick(now, &LinkReading::default(), &RecorderStatus::default(), &mut |_| {});
@@ -454,7 +454,7 @@ fn after_anything_at_all_a_vehicle_that_falls_silent_is_critical_and_nothing_tha
     }
 }
 
-/// Checks of whole numbers that have no way of saying that they are unknown, of ages, and of ourselves.
+/// Checks of whole numbers without an unknown value, of ages, and of the monitor itself.
 const KNOWN_ANYWAY: [&str; 8] = [
     "batt_fault",
     "esc_silent",

@@ -1,4 +1,4 @@
-//! The protective action, scripted: when it is requested, and everything that keeps it from being requested.
+//! The protective action, scripted: when it is requested, and all reasons against it.
 #![expect(clippy::unwrap_used, reason = "that is how a test fails")]
 
 use crate::common::{AUTOPILOT, Quad, Run, observe};
@@ -20,7 +20,7 @@ use VehicleKind::{Plane, Rotorcraft, Surface, Vtol};
 const EMPTY_MS: u64 = 20_000;
 const FOUND_MS: u64 = EMPTY_MS + 2_000;
 const ASKED_MS: u64 = FOUND_MS + 10_000;
-/// Nobody answers.
+/// No answer comes.
 const UNANSWERED: &str = "announced, asked, asked, asked, unanswered";
 /// PX4's POSCTL, ALTCTL, HOLD, MISSION and PRECLAND.
 const POSCTL: u32 = 0x0003_0000;
@@ -87,7 +87,7 @@ fn fly_with(params: &Params, script: impl Fn(u64, &mut Quad, &mut Monitor)) -> O
     Outcome { steps: run.happenings.into_iter().filter_map(step).collect(), requests: run.requests }
 }
 
-/// Says something once.
+/// Feeds an observation once.
 fn say(now_ms: u64, monitor: &mut Monitor, at_ms: u64, source: Source, observation: Observation) {
     if now_ms == at_ms {
         monitor.observe(Instant::from_millis(now_ms), source, &observation);
@@ -122,7 +122,7 @@ const VEHICLES: [(Autopilot, VehicleKind, u32); 5] = [
     (Px4, Plane, POSCTL),
 ];
 
-/// Each vehicle flies the script, and its return is requested at this time or up to so much later.
+/// Each vehicle flies the script, and its return is requested at this time or up to this much later.
 fn all_are_asked(
     at_ms: u64,
     late_ms: u64,
@@ -258,7 +258,7 @@ fn a_landing_in_a_mission_is_left_alone() {
         ((ArduPilot, Vtol, 10), true),
         ((Px4, Plane, MISSION), true),
         ((Px4, Rotorcraft, MISSION), true),
-        // A pilot who sinks is no mission, and ArduCopter's landed state tells the landing.
+        // A pilot's sink is not a mission, and ArduCopter's landed state reports the landing.
         ((ArduPilot, Plane, 5), false),
         ((ArduPilot, Rotorcraft, 3), false),
     ] {
@@ -275,7 +275,7 @@ fn a_landing_in_a_mission_is_left_alone() {
             if is_told { "announced, already_done" } else { UNANSWERED },
             "{vehicle:?}"
         );
-        // 2 s after it was at 40 m; nothing is announced in the flare.
+        // 2 s after it was at 40 m; no step comes in the flare.
         let at_ms = outcome.steps.last().unwrap().0;
         assert!(!is_told || (32_600..32_900).contains(&at_ms), "{vehicle:?}: {at_ms}");
     }
@@ -298,7 +298,7 @@ fn a_mission_that_goes_lower_is_announced_once_it_flies_on() {
 
 #[test]
 fn the_end_of_a_mission_is_no_cancel() {
-    // HOLD and BRAKE are none of the pilot's either: failsafes wait in them.
+    // HOLD and BRAKE are not the pilot's choice either: failsafes wait in them.
     for (autopilot, kind, mission, after, is_waiting) in [
         (Px4, Rotorcraft, MISSION, HOLD, true),
         (Px4, Plane, MISSION, HOLD, true),
@@ -383,7 +383,7 @@ fn only_the_battery_of_the_vehicle_counts() {
     let unsaid = Battery::default().feeds;
     for (system, component, battery, is_ours) in [
         (1, 181, empty(0, Feeds::Payload), false),
-        // One that does not say what it feeds: of a gimbal, of a battery's own component, of the autopilot, of another vehicle.
+        // Batteries of unknown consumers: a gimbal's, a battery's own component, the autopilot's, another vehicle's.
         (1, 154, empty(3, unsaid), false),
         (1, 180, empty(3, unsaid), true),
         (1, 181, empty(3, unsaid), true),
@@ -473,7 +473,7 @@ fn a_wrong_landed_state_delays_the_action_by_no_more_than_it_lasts() {
     for height in [3.0, 20.0, 300.0, -15.0] {
         for from_ms in [FOUND_MS - 3_000, FOUND_MS - 500, FOUND_MS + 4_000, ASKED_MS - 500] {
             for lasts_ms in [500, 2_000, 4_000] {
-                // The vehicle is in the air again 0.6 s after its autopilot says so, twice a second.
+                // The vehicle flies again 0.6 s after its autopilot's report, which comes twice a second.
                 let late_ms = lasts_ms + 1_200;
                 all_are_asked(ASKED_MS, late_ms, &(height, from_ms, lasts_ms), |now_ms, quad, _| {
                     quad.height = height;
@@ -497,8 +497,8 @@ fn a_touch_and_go_pauses_the_countdown() {
 
 #[test]
 fn a_sink_that_ends_in_the_air_is_no_landing() {
-    // Height where it begins, and how fast it sinks for four seconds as the battery turns critical. Within 3 m of the height of the
-    // take-off it may be a landing, for 15 s.
+    // Height at its start, and sink rate for four seconds as the battery turns critical. Within 3 m of the take-off
+    // height it may be a landing, for 15 s.
     for (height, sink, late_ms) in [
         (-10.0, 0.6, 100),
         (-30.0, 0.6, 100),
@@ -569,7 +569,7 @@ fn the_autopilots_own_change_of_mode_is_announced_anew() {
             }
         }
     }
-    // A failsafe that began long before says nothing of who changed the mode.
+    // A failsafe that began long before does not tell who changed the mode.
     let outcome = fly(|now_ms, quad, _| {
         quad.state = if now_ms < FOUND_MS { 4 } else { 5 };
         quad.mode = if now_ms < CHANGED_MS { 4 } else { 5 };

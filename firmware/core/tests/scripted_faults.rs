@@ -1,5 +1,5 @@
-//! Scripted faults in a simulated flight: each is found within its debounce plus 100 ms, and cleared when it has been
-//! well for two seconds, by more than the hysteresis.
+//! Scripted faults in a simulated flight. Each is found within its debounce plus 100 ms, and cleared when its value
+//! was good by more than the hysteresis for two seconds.
 #![expect(clippy::panic, reason = "that is how a test fails")]
 
 use crate::common::{AUTOPILOT, Quad};
@@ -21,7 +21,7 @@ fn fly(script: impl Fn(u64, &mut Quad)) -> Vec<Finding> {
     fly_with(&Params::defaults(), script).1
 }
 
-/// The same with other parameters; gives the monitor as it is at the end as well.
+/// The same with other parameters; returns the monitor at the end as well.
 fn fly_with(params: &Params, script: impl Fn(u64, &mut Quad)) -> (Monitor, Vec<Finding>) {
     let mut monitor = Monitor::new(*params);
     let mut findings = Vec::new();
@@ -42,8 +42,8 @@ fn fly_with(params: &Params, script: impl Fn(u64, &mut Quad)) -> (Monitor, Vec<F
     (monitor, findings)
 }
 
-/// The check reaches the level within its debounce plus 100 ms, is the only one to complain besides `also`, and is
-/// well again once the fault has ended.
+/// The check reaches the level within its debounce plus 100 ms, and is good again after the fault. Only checks in
+/// `also` may have findings besides.
 fn found(findings: &[Finding], check: &str, instance: u8, level: Level, debounce_ms: u64, also: &[&str]) {
     let mine = |finding: &&Finding| finding.check == check && finding.instance == instance;
     let first = findings.iter().filter(mine).find(|finding| finding.level == level);
@@ -80,7 +80,7 @@ fn a_healthy_vehicle_is_ok_as_a_whole_and_in_each_part_that_it_has() {
 #[test]
 fn each_fault_is_found_alone_and_cleared() {
     type Fault = fn(&mut Quad);
-    // The check, which one of several, its level, its debounce in milliseconds, and what else may complain.
+    // The check, its instance, its level, its debounce in milliseconds, and other checks that may have findings.
     let cases: [(Fault, &str); 17] = [
         (|quad| quad.battery.voltage = Some(Volts(13.2)), "cell_voltage 0 critical 5000"),
         (|quad| quad.battery.remaining = Some(Fraction(0.05)), "batt_remaining 0 critical 2000"),
@@ -104,7 +104,7 @@ fn each_fault_is_found_alone_and_cleared() {
         (|quad| quad.system.load = Some(Fraction(0.97)), "load 0 critical 2000"),
         (|quad| quad.lost = 0.08, "frames_lost 0 critical 2000"),
         (|quad| quad.recorder.recording = Recording::Stopped, "recording 0 critical 1000"),
-        // Until the next heartbeat it is not known that the vehicle is disarmed, which is less than the debounce.
+        // The vehicle counts as armed until the next heartbeat, which is sooner than the debounce.
         (
             |quad| {
                 quad.armed = false;
@@ -166,7 +166,7 @@ fn an_esc_that_fell_silent_says_nothing_of_the_others_current() {
 #[test]
 fn one_esc_that_falls_silent() {
     let findings = fly(|_, quad| quad.escs[3] = None);
-    // Its last word came 100 ms before the fault; 2 s after that it is silent for good.
+    // Its last message came 100 ms before the fault; 2 s after that it is silent for good.
     let critical = findings.iter().find(|finding| finding.level == Level::Critical).expect("found");
     assert_eq!((critical.check, critical.instance), ("esc_silent", 3));
     assert!((21_900..=22_100).contains(&critical.at.as_millis()), "{critical:?}");
@@ -189,7 +189,7 @@ fn an_autopilot_that_falls_silent_makes_everything_else_stale() {
         let stale = findings.iter().any(|finding| finding.check == check && finding.level == Level::Stale);
         assert!(stale, "{check} stayed as it was without any data");
     }
-    // It is heard again with the first heartbeat, and what it says is believed at once.
+    // It is received again with the first heartbeat, and its messages count at once.
     for check in ["heartbeat", "batt_remaining", "ekf_variance", "vibration", "load", "roll"] {
         let last = findings.iter().rfind(|finding| finding.check == check).expect("there");
         assert_eq!(last.level, Level::Ok, "{last:?}");
@@ -203,7 +203,7 @@ fn an_autopilot_that_restarts() {
     let reboot = findings.iter().find(|finding| finding.check == "autopilot_reboot").expect("found");
     assert_eq!(reboot.level, Level::Critical);
     assert!((FAULT_MS..=FAULT_MS + 100).contains(&reboot.at.as_millis()), "{reboot:?}");
-    // It is told for 30 s, and then it has been well for two.
+    // The report lasts 30 s, and then two seconds of good values.
     let cleared = findings.iter().rfind(|finding| finding.check == "autopilot_reboot").expect("there");
     assert_eq!(cleared.level, Level::Ok);
     assert!((FAULT_MS + 32_000..=FAULT_MS + 32_200).contains(&cleared.at.as_millis()), "{cleared:?}");
@@ -359,7 +359,7 @@ fn an_alarm_that_outlives_the_one_that_explained_it_is_told_by_itself_once() {
         let mine = findings.iter().filter(|one| one.check == "ekf_variance" && one.level != Level::Ok);
         (end_ms, mine.map(|one| (one.at.as_millis(), one.because, one.previous)).collect::<Vec<_>>())
     };
-    // Whenever its cause ends, to any step.
+    // With the end of its cause at any step.
     for phase_ms in (0..2_000).step_by(150) {
         let (end_ms, told) = of_estimator(40_000 + phase_ms);
         let [(_, "gps_fix", Level::Ok), (at_ms, "", Level::Warning)] = told[..] else { panic!("{told:?}") };
@@ -382,7 +382,7 @@ fn an_esc_of_a_plane_that_glides_may_fall_silent() {
     assert!(!told(0.0));
 }
 
-/// When and because of which check an estimator's check is critical.
+/// Times of an estimator check's critical levels, and the check that explains each.
 fn critical_of(check: &str, findings: &[Finding]) -> Vec<(u64, &'static str)> {
     let mine = findings.iter().filter(|finding| finding.check == check && finding.level == Level::Critical);
     mine.map(|finding| (finding.at.as_millis() / 1_000, finding.because)).collect()

@@ -1,4 +1,4 @@
-//! What stands and is called flying: on the bench, spooling up, landed by hand.
+//! Standing vehicles that report flight: on the bench, spooling up, landed by hand.
 
 use crate::common::{Quad, Run};
 use hums_core::observation::{Air, Hud, Imu, LandedState, Observation, VehicleKind};
@@ -6,7 +6,7 @@ use hums_core::params::Params;
 use hums_core::units::{Fraction, Hectopascals, Metres, MetresPerSecond, MetresPerSecond2, RadiansPerSecond};
 use hums_core::usage::UsageCounter;
 
-/// Flights and landings of two minutes, of what a script says.
+/// Flights and landings in two minutes of a script.
 fn counts(script: impl Fn(u64) -> Vec<Observation>) -> (u32, u32) {
     let mut run = Run::new(&Params::defaults());
     run.says(0..120_000, script);
@@ -15,7 +15,7 @@ fn counts(script: impl Fn(u64) -> Vec<Observation>) -> (u32, u32) {
     (flights, landings)
 }
 
-/// As the autopilot says: in the air from its arming on.
+/// In the air from its arming on, by its autopilot.
 fn called_in_air(now_ms: u64) -> Quad {
     Quad { armed: now_ms >= 5_000, landed: Some(LandedState::InAir), climb: 0.0, ..Quad::healthy() }
 }
@@ -69,7 +69,7 @@ fn motors_tried_without_any_position_are_no_flight_where_the_barometer_does_not_
     assert_eq!(counts(tried(6.0)), (1, 0));
 }
 
-/// What the autopilot calls in the air from its arming at 5 s on, without a position.
+/// In the air from its arming at 5 s on, by its autopilot, without a position.
 fn without_position(now_ms: u64, throttle: f32, altitude_m: Option<f32>, climb_mps: f32) -> Vec<Observation> {
     let hud = Hud {
         throttle: Some(Fraction(throttle)),

@@ -24,7 +24,7 @@ fn with_life_of(airframe: Airframe) -> Run {
     run
 }
 
-/// A minute of what the autopilot says.
+/// A minute of the autopilot's messages.
 fn minute(says: impl Fn(u64) -> Vec<Observation>) -> Run {
     let mut run = Run::new(&Params::defaults());
     run.says(0..60_000, says);
@@ -111,7 +111,7 @@ fn what_is_a_fault_of_a_multicopter_is_none_of_a_plane_a_vtol_or_a_helicopter() 
     }
 }
 
-/// Says it restarted at 29 s, armed or not, after so long a silence; whether that is an alarm.
+/// Reports a restart at 29 s, armed or not, after a silence; whether that is an alarm.
 fn restarted(armed: bool, silent_ms: u64) -> bool {
     let run = minute(|now_ms| {
         let height = if armed { 20.0 } else { 0.0 };
@@ -128,7 +128,7 @@ fn restarted(armed: bool, silent_ms: u64) -> bool {
 
 #[test]
 fn an_autopilot_that_restarts_on_the_ground_is_counted_and_one_that_restarts_armed_is_an_alarm() {
-    // Nobody knows what it did in a long silence: it may have landed.
+    // Its state in a long silence is unknown: it may have landed.
     for (armed, silent_ms, is_alarm) in
         [(false, 0, false), (true, 0, true), (true, 5_000, true), (true, 15_000, false)]
     {
@@ -136,7 +136,7 @@ fn an_autopilot_that_restarts_on_the_ground_is_counted_and_one_that_restarts_arm
     }
 }
 
-/// Flies a VTOL that is this way by its own word, with something wrong from 20 to 25 s; the checks that found something.
+/// A VTOL that reports this state, with a fault from 20 to 25 s; the checks with findings.
 fn checks_of_a_vtol(vtol: VtolState, wrong: impl Fn(&mut Quad)) -> Vec<&'static str> {
     let run = minute(|now_ms| {
         let kind = VehicleKind::Vtol;
@@ -170,7 +170,7 @@ fn a_hexacopter_with_one_dead_motor_has_one_motor_named() {
         let run = minute(|now_ms| {
             let mut hexa = Quad { type_number: 13, ..Quad::healthy() };
             let esc = hexa.escs[0].unwrap();
-            // The others make up for it, the one opposite less than its neighbours.
+            // The others make up for it; the opposite one least.
             let rpm = |motor: usize| match (motor + 6 - dead) % 6 {
                 _ if now_ms < 20_000 => 5_000.0,
                 0 => 500.0,
@@ -212,7 +212,7 @@ fn speeds_that_are_held_and_zeros_of_lost_telemetry_say_nothing_about_a_motor() 
     for silent in [true, false] {
         let run = minute(|now_ms| {
             let mut quad = Quad::healthy();
-            // One motor is a little faster than the others, as they are.
+            // One motor is a little faster than the others, within the usual range.
             quad.escs[1].as_mut().unwrap().rpm = Some(Rpm(5_600.0));
             if now_ms >= 30_000 {
                 for esc in &mut quad.escs {
@@ -241,8 +241,9 @@ const CLASSES: [(VehicleKind, u8); 8] = [
     (VehicleKind::Surface, 12),
 ];
 
-/// A minute and a half: five seconds disarmed; armed and out, banked to 70 degrees for five seconds, with an empty pack at the end;
-/// back and disarmed. `says_landed`: `EXTENDED_SYS_STATE` is sent, which calls an armed rover "in air" on PX4.
+/// A minute and a half: five seconds disarmed; then armed and away, banked to 70 degrees for five seconds, with an
+/// empty pack at the end; back and disarmed. `says_landed`: `EXTENDED_SYS_STATE` is sent, which on PX4 calls an armed
+/// rover "in air".
 fn out_and_back(
     autopilot: Autopilot,
     (kind, type_number): (VehicleKind, u8),
@@ -257,7 +258,7 @@ fn out_and_back(
     };
     let mut vehicle = Quad { armed, mode, autopilot, kind, type_number, ..Quad::healthy() };
     vehicle.climb = 0.0;
-    // A multicopter is told as hovering too, and a plane as nothing.
+    // A multicopter reports hover too, a plane nothing.
     vehicle.vtol = if kind == VehicleKind::Plane { VtolState::Unknown } else { VtolState::Hover };
     let state = if out { LandedState::InAir } else { LandedState::OnGround };
     vehicle.landed = says_landed.then_some(state);

@@ -1,4 +1,4 @@
-//! A simulated quad, which scripts make say what they want.
+//! A simulated quad, driven by scripts.
 #![allow(dead_code, missing_docs, unreachable_pub, reason = "each test file uses its own part of this")]
 
 use hums_core::Monitor;
@@ -21,11 +21,11 @@ use hums_core::usage::UsageCounter;
 
 pub const AUTOPILOT: Source = Source { system: 1, component: 1 };
 
-/// A healthy quad in hover; a script changes what it says.
+/// A healthy quad in hover; a script changes its messages.
 #[derive(Clone)]
 pub struct Quad {
     pub silent: bool,
-    /// Its battery says nothing.
+    /// Its battery sends nothing.
     pub battery_silent: bool,
     pub armed: bool,
     pub boot_offset_ms: i64,
@@ -45,7 +45,7 @@ pub struct Quad {
     pub throttle: f32,
     /// `MAV_STATE`
     pub state: u8,
-    /// The climb that the autopilot wants, upwards, where it is sent.
+    /// The autopilot's climb setpoint, upwards, if it sends one.
     pub climb_wanted: Option<f32>,
     /// The autopilot's own mode number.
     pub mode: u32,
@@ -55,9 +55,9 @@ pub struct Quad {
     pub type_number: u8,
     /// Metres a second, upwards.
     pub climb: f32,
-    /// `EXTENDED_SYS_STATE`, where it is sent.
+    /// `EXTENDED_SYS_STATE`, if it is sent.
     pub landed: Option<LandedState>,
-    /// What a VTOL flies on.
+    /// Rotors or wings of a VTOL.
     pub vtol: VtolState,
     /// Metres above home before the flight, for its first two seconds.
     pub start_height: f32,
@@ -131,7 +131,7 @@ impl Quad {
         }
     }
 
-    /// What it says every 100 ms.
+    /// Its messages, every 100 ms.
     pub fn says(&self, now_ms: u64) -> Vec<Observation> {
         if self.silent {
             return Vec::new();
@@ -179,13 +179,13 @@ impl Quad {
     }
 }
 
-/// A monitor, and everything that it told, with times in milliseconds.
+/// A monitor and all its reports, with times in milliseconds.
 pub struct Run {
     pub monitor: Monitor,
     pub findings: Vec<Finding>,
     pub happenings: Vec<(u64, Happening)>,
     pub requests: Vec<(u64, Request)>,
-    /// What the ground is told of each change of a mishap.
+    /// The report to the ground for each change of a mishap.
     pub reports: Vec<(u64, Report)>,
 }
 
@@ -196,7 +196,7 @@ impl Run {
         Self { monitor, findings, happenings, requests, reports }
     }
 
-    /// Steps the monitor every 50 ms; before each step the script reports what it wants.
+    /// Steps the monitor every 50 ms; before each step the script feeds it.
     pub fn steps(&mut self, times_ms: core::ops::Range<u64>, mut script: impl FnMut(u64, &mut Monitor)) {
         for now_ms in times_ms.step_by(50) {
             let now = Instant::from_millis(now_ms);
@@ -223,7 +223,7 @@ impl Run {
         });
     }
 
-    /// The names of the checks that told something, each once, in alphabetical order.
+    /// The names of the checks with a finding, each once, in alphabetical order.
     pub fn checks(&self) -> Vec<&'static str> {
         let mut checks: Vec<_> = self.findings.iter().map(|finding| finding.check).collect();
         checks.sort_unstable();
@@ -236,7 +236,7 @@ impl Run {
     }
 }
 
-/// A source says all this.
+/// Feeds these observations of a source.
 pub fn observe(
     monitor: &mut Monitor,
     now_ms: u64,

@@ -1,4 +1,4 @@
-//! Free falls, disarming in the air, and what becomes of the flight.
+//! Free falls, disarming in the air, and the end of the flight.
 
 use super::*;
 
@@ -25,7 +25,7 @@ fn a_fall_with_the_motors_asked_for_thrust_ends_the_flight_with_its_touch() {
         assert_eq!(outcome.flights(), DOWN, "{of:?}");
         assert_eq!(outcome.count(UsageCounter::HardLandings), 1);
         assert!(outcome.count(UsageCounter::TouchdownMax) >= 15, "{of:?}");
-        // Nothing that would only echo it.
+        // No finding that would only echo it.
         let echoes = outcome.findings.iter().filter(|finding| {
             finding.subsystem != Subsystem::Mishap && finding.at.as_millis() > began_ms + 100
         });
@@ -51,7 +51,7 @@ fn what_is_disarmed_in_the_air_is_told_and_what_has_landed_is_not() {
     judge(rotors(), "on a hill", (&[], LANDED), |ms, quad, _| {
         (quad.armed, quad.throttle, quad.landed) = (ms < 1_000, 0.0, Some(LandedState::OnGround));
     });
-    // Without a landed state the height above home says that it flies; nothing falls, so nothing was disarmed in the air.
+    // Without a landed state the height above home shows flight; no fall, so no disarming in the air.
     let silent = ROTORS.map(|of| Quad { landed: None, ..hovering(of) });
     judge(silent, "on a hill, without a landed state", (&[], LANDED), |ms, quad, _| {
         (quad.armed, quad.throttle) = (ms < 1_000, 0.0);
@@ -119,7 +119,8 @@ fn after_a_mishap_the_next_arming_begins_anew() {
 
 #[test]
 fn what_was_wrong_before_a_mishap_ends_when_it_lies_disarmed_and_when_it_is_silent() {
-    // It shakes for 3 s, and then it falls. When the check of the vibration is good again, milliseconds after it began to shake.
+    // It shakes for 3 s, and then it falls. The time when the vibration check is good again, milliseconds after the
+    // vibration began.
     for (what, off_ms, silent_ms, good_ms) in [
         ("disarmed", 12_000, u64::MAX, Some(12_000..12_600)),
         ("silent", u64::MAX, 8_000, Some(12_400..13_200)),

@@ -9,7 +9,7 @@ fn a_quad_that_lies_on_its_back_has_crashed_whatever_its_estimator_says() {
         if ms < 1_000 {
             (motion.load_g, motion.rates) = (5.0, [12.0, 3.0, 0.0]);
         } else {
-            // The estimator goes on falling, the throttle stick is where it was.
+            // The estimator falls on; the throttle stick stays.
             (motion.load_g, motion.rates, quad.climb) = (-1.0, [0.0; 3], -12.0);
             (quad.height, quad.throttle) = (3.0 - ms as f32 / 100.0, 0.4);
         }
@@ -18,7 +18,7 @@ fn a_quad_that_lies_on_its_back_has_crashed_whatever_its_estimator_says() {
     assert_eq!(outcome.flights(), (1, 0, 1), "{:?}", outcome.changes);
 }
 
-/// Turns over between two bounces; its rotors are turned as fast as a second later.
+/// Turns over between two bounces; its rotors turn it as fast a second later.
 fn turns_over(ms: u64, quad: &mut Quad, motion: &mut Motion) {
     if (1_000..3_000).contains(&ms) {
         (quad.roll, motion.rates) = (2.5, [3.0, 0.5, 0.0]);
@@ -176,7 +176,7 @@ fn a_wreck_is_down_whatever_it_does_and_flies_again_where_it_hovers() {
     });
 }
 
-/// Falls from less than a metre for 0.45 s, and lies.
+/// Falls less than a metre in 0.45 s, and lies.
 fn drop_low(ms: u64, quad: &mut Quad, motion: &mut Motion) {
     if ms < 450 {
         (motion.load_g, quad.height, quad.climb) = (0.4, 0.7, -2.0);
@@ -198,7 +198,7 @@ fn a_shock_between_two_samples_of_what_fell_is_an_impact_at_its_own_time() {
     assert_eq!(fly(&hovering(ROTORS[0]), drop_low).told(), [""; 0]);
 }
 
-/// Sinks from 60 m and hits the ground with 12 m/s, and its rotors run on.
+/// Sinks from 60 m and hits the ground at 12 m/s; its rotors run on.
 fn hits_and_runs_on(ms: u64, quad: &mut Quad, motion: &mut Motion) {
     let seconds = ms as f32 / 1_000.0;
     quad.throttle = if ms < 5_000 { 0.95 } else { 0.5 };
@@ -226,13 +226,13 @@ fn what_lies_over_with_running_motors_never_flies_on() {
             outcome.changes.iter().any(|(_, change)| matches!(change, Change::FliesOn | Change::FliesAgain));
         assert!(!is_over, "{of:?}: {:?}", outcome.changes);
         assert_eq!(outcome.flights(), (1, 0, 1), "{of:?}: {:?}", outcome.changes);
-        // Upright, and where it fell.
+        // Upright, at the place of its fall.
         let upright = fly(&hovering(*of), hits_and_runs_on);
         assert_eq!(upright.flights(), (1, 0, 1), "{of:?}: {:?}", upright.changes);
     }
 }
 
-/// It fell, and its estimate moves on while the receiver, where it tells a speed, says that it stands.
+/// After a fall its estimate moves on while the receiver, if it sends a speed, stands.
 fn strays(ms: u64, quad: &mut Quad, motion: &mut Motion, receiver_mps: Option<f32>) {
     hits_and_runs_on(ms, quad, motion);
     if ms >= 5_000 {
@@ -308,7 +308,7 @@ fn a_second_shock_does_not_hide_the_first() {
     }
 }
 
-/// Upright on the ground, with a throttle far below that of a hover, while its estimate climbs away.
+/// Upright on the ground, with a throttle far below hover throttle, while its estimate climbs away.
 fn stands_with_a_lost_estimate(ms: u64, quad: &mut Quad, motion: &mut Motion, throttle: f32) {
     let seconds = ms as f32 / 1_000.0;
     (quad.throttle, quad.height, quad.climb) = (throttle, 20.0 + 3.0 * seconds, 3.0);
@@ -343,7 +343,7 @@ fn what_stands_with_little_throttle_flies_no_more_whatever_its_estimate_says() {
     }
 }
 
-/// Knocked with so many g while it tumbles for 0.8 s; then it holds its place.
+/// Knocked with these g while it tumbles for 0.8 s; then it holds its place.
 fn is_knocked(ms: u64, motion: &mut Motion, knock_g: f32) {
     if ms < 800 {
         (motion.load_g, motion.rates) = (knock_g, [6.2, 0.0, 0.0]);
@@ -354,7 +354,7 @@ fn is_knocked(ms: u64, motion: &mut Motion, knock_g: f32) {
 fn what_holds_its_place_in_the_air_after_a_knock_flies_on() {
     for (height, throttle) in [(3.0, 0.45), (20.0, 0.45), (20.0, 0.25), (300.0, 0.7), (-25.0, 0.45)] {
         for knock_g in [3.5, 5.0, 9.0] {
-            // Nobody sees it leave the ground downwards, but its autopilot.
+            // Only its autopilot notices that it leaves the ground downwards.
             let words = [Some(LandedState::InAir), None];
             for landed in words.into_iter().take(if height > 0.0 { 2 } else { 1 }) {
                 let quad = Quad { height, throttle, climb: 0.0, landed, ..Quad::healthy() };
@@ -396,7 +396,7 @@ fn little_throttle_alone_is_no_landing() {
             for (autopilot, type_number) in [(Autopilot::ArduPilot, 2), (Autopilot::Px4, 13)] {
                 let quad = Quad { autopilot, type_number, ..Quad::healthy() };
                 let outcome = fly_from(0, &quad, |ms, quad, motion| {
-                    // It stands without thrust, climbs with three times its hover throttle, hovers and goes at 3 m/s.
+                    // It stands without thrust, climbs at three times its hover throttle, hovers and moves at 3 m/s.
                     let hovers = ms >= 20_000;
                     quad.landed = Some(if ms < 8_000 { LandedState::OnGround } else { LandedState::InAir });
                     quad.throttle = if ms < 8_000 {

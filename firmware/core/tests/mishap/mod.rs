@@ -1,4 +1,4 @@
-//! Mishaps, scripted for each class of vehicle: what is one, what is none, and what becomes of the flight.
+//! Mishaps, scripted for each class of vehicle: signs, false signs, and the end of the flight.
 
 mod falls;
 mod impacts;
@@ -22,34 +22,34 @@ use hums_core::units::{
 };
 use hums_core::usage::UsageCounter;
 
-/// When it goes wrong.
+/// Start of the script, ms.
 const AT_MS: u64 = 20_000;
 
-/// The radio that the ground station hears it by.
+/// The ground station's radio.
 const RADIO: Source = Source { system: 51, component: 68 };
 
-/// How the vehicle moves besides what a [`Quad`] says.
+/// Motion of the vehicle besides the messages of a [`Quad`].
 #[derive(Clone, Copy)]
 struct Motion {
     load_g: f32,
-    /// What carries it from ahead, where the air does.
+    /// Force of the air from ahead.
     drag_g: f32,
     rates: [f32; 3],
     ground_mps: f32,
     pitch: f32,
-    /// What the barometer says; where it says anything.
+    /// The barometer's pressure, if it measures.
     pressure_hpa: Option<f32>,
-    /// The greatest specific force between the sample before and this one, where it is a shock.
+    /// The greatest specific force since the last sample, for a shock.
     shock_g: Option<f32>,
-    /// The climb of the pilot's display, where it has one.
+    /// The climb of the pilot's display, if it has one.
     displayed_mps: Option<f32>,
-    /// The roll that the autopilot wants, where it says so.
+    /// The autopilot's roll setpoint, if it sends one.
     roll_wanted: Option<f32>,
-    /// Nothing of it is heard, but of its radio.
+    /// No message comes but the radio's.
     unheard: bool,
-    /// Of its autopilot only heartbeats are, and whether it calls itself landed.
+    /// The autopilot sends only heartbeats, and whether it reports a landing.
     beats_only: bool,
-    /// Home is so much lower than before.
+    /// Fall of the home height, m.
     home_sank_m: f32,
 }
 
@@ -78,7 +78,7 @@ struct Outcome {
 }
 
 impl Outcome {
-    /// What was told of mishaps, each kind once, in order.
+    /// The reported mishaps, each kind once, in order.
     fn told(&self) -> Vec<&'static str> {
         let of_mishap =
             |finding: &&Finding| finding.subsystem == Subsystem::Mishap && finding.level == Level::Critical;
@@ -96,7 +96,7 @@ impl Outcome {
     }
 }
 
-/// Whether a vehicle says this besides what [`fly_from`] makes of its motion.
+/// Whether an observation is independent of the motion that [`fly_from`] adds.
 fn said_besides(said: &Observation, beats_only: bool) -> bool {
     let beats = matches!(said, Observation::Heartbeat(_) | Observation::Landed(..));
     let made =
@@ -104,7 +104,7 @@ fn said_besides(said: &Observation, beats_only: bool) -> bool {
     if beats_only { beats } else { !made }
 }
 
-/// A minute; `script` gets the time since it goes wrong.
+/// A minute; `script` gets the time since [`AT_MS`].
 fn fly(vehicle: &Quad, script: impl Fn(u64, &mut Quad, &mut Motion)) -> Outcome {
     fly_from(AT_MS, vehicle, script)
 }
@@ -113,7 +113,7 @@ fn fly_from(at_ms: u64, vehicle: &Quad, script: impl Fn(u64, &mut Quad, &mut Mot
     fly_between(at_ms, 60_000, vehicle, script)
 }
 
-/// The same, of a recording that ends then.
+/// The same for a recording that ends then.
 fn fly_until(end_ms: u64, vehicle: &Quad, script: impl Fn(u64, &mut Quad, &mut Motion)) -> Outcome {
     fly_between(AT_MS, end_ms, vehicle, script)
 }
@@ -134,7 +134,7 @@ fn fly_between(
         if motion.unheard {
             monitor.observe(now, RADIO, &Observation::TelemetryRadio(TelemetryRadio::default()));
         }
-        // No sensor says the same for ever.
+        // No sensor repeats one value for ever.
         let noise = (now_ms / 50 % 7) as f32 * 0.002;
         let forces_g = [motion.drag_g, 0.0, -(motion.load_g + noise)];
         let acceleration = Some(forces_g.map(|force_g| MetresPerSecond2(force_g * 9.806_65)));
@@ -182,10 +182,10 @@ type Of = (Autopilot, VehicleKind, u8);
 /// Flights, landings, and mishaps.
 type Counts = (u32, u32, u32);
 
-/// What comes of a flight: what is told of mishaps, in order, and after ".." more; and the counts.
+/// The outcome of a flight: reported mishaps in order, after ".." any others; and the counts.
 type Come<'a> = (&'a [&'a str], Counts);
 
-/// Each of these vehicles flies the script. `told` is what is told of mishaps, in order; after ".." there may be more.
+/// Each of these vehicles flies the script. `told` are the reported mishaps, in order; after ".." any others.
 fn judge(
     vehicles: impl IntoIterator<Item = Quad>,
     what: &str,
@@ -228,7 +228,7 @@ fn wings() -> impl Iterator<Item = Quad> {
 const FLIES: Counts = (1, 0, 0);
 const LANDED: Counts = (1, 1, 0);
 const DOWN: Counts = (1, 0, 1);
-/// Its flights are not asked.
+/// Flights are not counted.
 const ANY: Counts = (u32::MAX, 0, 0);
 
 /// Falls from 20 m for two seconds, hits with 15 g, and lies.

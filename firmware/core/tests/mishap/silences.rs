@@ -1,4 +1,4 @@
-//! What comes down, or is terminated, while nobody hears it.
+//! Mishaps and terminations during a silence of the link.
 
 use super::*;
 
@@ -67,7 +67,7 @@ fn a_silence_is_judged_by_what_comes_after_it() {
 
 #[test]
 fn a_landing_in_a_silence_is_a_landing() {
-    // It came down, its battery was changed, and for a while it tells no more than heartbeats.
+    // It came down, its battery was changed, and for a while only heartbeats come.
     judge(rotors(), "a landing", (&[], LANDED), |ms, quad, motion| {
         motion.unheard = (4_000..24_000).contains(&ms);
         motion.beats_only = (24_000..27_000).contains(&ms);
@@ -122,7 +122,7 @@ fn a_vehicle_that_was_off_before_it_was_received_is_not_judged() {
 #[test]
 fn what_is_terminated_in_the_air_and_neither_stands_nor_falls_at_once_is_a_mishap() {
     for of in ROTORS {
-        // Its motors go on for a while; it calls itself armed and in the air to the end.
+        // Its motors run on for a while; it reports armed and in the air to the end.
         let drifts = fly(&hovering(of), |ms, quad, motion| {
             (quad.state, motion.ground_mps) = (8, 4.0);
             if ms > 7_000 {

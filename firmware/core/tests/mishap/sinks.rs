@@ -1,4 +1,4 @@
-//! Sinking without being told to.
+//! Sinking without a command.
 
 use super::*;
 
@@ -35,7 +35,7 @@ fn sinking_is_a_mishap_where_the_autopilot_flies_and_not_where_the_pilot_asks_fo
 
 #[test]
 fn an_estimator_that_does_not_believe_itself_makes_no_mishap_unless_the_air_agrees() {
-    // It shakes, climbs by the air, and lands hard and safe while the estimator says that it falls.
+    // It shakes, climbs by the air, and lands hard and safe while the estimator falls.
     judge(rotors(), "against the air", (&[], ANY), |ms, quad, motion| {
         let seconds = ms as f32 / 1_000.0;
         motion.pressure_hpa = Some(1_000.0 - if ms < 6_000 { 0.4 * seconds } else { 2.4 });
@@ -89,7 +89,7 @@ fn a_multicopter_that_loses_height_with_all_its_thrust_sinks_though_it_sinks_slo
         ("it is told to bank", 0.97, Some(0.3), SINKS),
     ] {
         let high = rotors().map(|quad| Quad { height: 60.0, ..quad });
-        // The bank of a vehicle that hangs on more than rotors is no cause.
+        // The bank of a vehicle that is not carried by rotors alone is not a cause.
         let judged = high.filter(|quad| roll_wanted.is_none() || quad.kind == VehicleKind::Rotorcraft);
         let judged = judged.filter(|quad| roll_wanted.is_none() || quad.type_number != 4);
         judge(judged, what, come, |ms, quad, motion| {

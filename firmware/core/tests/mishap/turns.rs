@@ -2,7 +2,7 @@
 
 use super::*;
 
-/// Turns so fast for so long.
+/// Turns at these rates for this time.
 fn turns(rates: [f32; 3], lasts_ms: u64) -> impl Fn(u64, &mut Quad, &mut Motion) {
     move |ms, _, motion| motion.rates = if ms < lasts_ms { rates } else { CALM.rates }
 }
@@ -17,7 +17,7 @@ fn tumbling_is_told_by_body_rates_and_a_vehicle_that_recovers_has_one_flight() {
     assert!(began_ms <= AT_MS + 700 && (AT_MS + 6_000..AT_MS + 7_000).contains(&over_ms), "{over_ms}");
     let last = outcome.findings.last().unwrap();
     assert_eq!((last.check, last.level), ("tumbling", Level::Ok));
-    // In acro modes the pilot wants it.
+    // In acro modes the pilot asks for it.
     let acro = [(ROTORS[0], 1), (ROTORS[1], 0x0005_0000), (WINGS[0], 4)];
     let acro = acro.map(|(of, mode)| Quad { mode, ..hovering(of) });
     judge(acro, "acro", (&[], FLIES), turns([8.0, 0.0, 0.0], 3_000));
@@ -92,7 +92,7 @@ fn flips(quad: &mut Quad, motion: &mut Motion, ms: u64, throttle: f32) {
     if ms < 500 {
         (quad.roll, motion.rates) = (2.0 * ms as f32 / 500.0, [4.5, 0.0, 0.0]);
     } else {
-        // What the estimator makes of it is another thing.
+        // The estimator disagrees.
         (quad.roll, motion.rates, motion.load_g) = (0.3, [0.0; 3], -0.9);
     }
 }
@@ -114,7 +114,7 @@ fn what_its_own_rotors_turn_over_is_told_though_it_never_flew_and_what_a_hand_tu
 
 #[test]
 fn what_flies_fast_is_carried_by_the_air_too_and_does_not_lie_over() {
-    // It banks and then flies on, or is stopped, with what the air or the ground carries it with from ahead.
+    // It banks and then flies on, or is stopped, under a force from ahead by the air or the ground.
     let is_carried_from_ahead = |ground_mps: f32| {
         move |ms: u64, quad: &mut Quad, motion: &mut Motion| {
             (quad.height, quad.throttle, motion.ground_mps) = (40.0, 0.5, ground_mps);
