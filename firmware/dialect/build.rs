@@ -1,5 +1,5 @@
-//! Generates the layout table from the message definitions (XML) that the `mavlink` crate carries, and from the same
-//! definitions, by the generator of that crate, the structures of the messages that are read field by field.
+//! Generates two things from the message definitions (XML) of the `mavlink` crate: the layout table, and, by that
+//! crate's generator, the structures of the messages that are read field by field.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::error::Error;
@@ -19,13 +19,13 @@ mod wire;
 
 type Result<T> = std::result::Result<T, Box<dyn Error>>;
 
-/// The root of the definitions: everything that is published, ArduPilot's and PX4's dialects included.
+/// The root of the definitions: all published ones, ArduPilot's and PX4's dialects included.
 const ROOT: &str = "all.xml";
 
 /// The dialect whose messages are read field by field.
 const READ_FROM: &str = "ardupilotmega.xml";
 
-/// Those that are. A structure is generated for each; all of a dialect would take a compiler half a minute.
+/// Their names. A structure is generated for each; all of a dialect would take half a minute to compile.
 const READ: &[&str] = &[
     "AHRS2",
     "ATTITUDE",
@@ -95,7 +95,7 @@ fn main() -> Result<()> {
         println!("cargo::rerun-if-changed={ours}");
     }
     println!("cargo::rerun-if-changed=../../Cargo.lock");
-    // What is generated asks for these features; we have none of them.
+    // The generated code asks for these features, which do not exist here.
     println!("cargo::rustc-check-cfg=cfg(feature, values(\"arbitrary\", \"serde\", \"ts-rs\"))");
     let definitions = mavlink_crate_dir()?.join("mavlink/message_definitions/v1.0");
     let mut messages = BTreeMap::new();
@@ -105,7 +105,8 @@ fn main() -> Result<()> {
     write_structures(&definitions)
 }
 
-/// Structures of what is in [`READ`]: the definitions without all other messages, bound as those of the `mavlink` crate are.
+/// Structures of the messages in [`READ`]: the definitions without all other messages, bound as in the `mavlink`
+/// crate.
 fn write_structures(definitions: &Path) -> Result<()> {
     let out = PathBuf::from(env::var("OUT_DIR")?);
     let (mut files, mut messages) = (BTreeSet::new(), BTreeMap::new());
@@ -145,7 +146,7 @@ fn only(text: &str, kept: &BTreeSet<&str>) -> Result<String> {
     Ok(out)
 }
 
-/// Where cargo unpacked the `mavlink` crate that `Cargo.lock` names.
+/// The folder into which cargo unpacked the `mavlink` crate of `Cargo.lock`.
 fn mavlink_crate_dir() -> Result<PathBuf> {
     let metadata = cargo_metadata::MetadataCommand::new()
         .other_options(vec!["--filter-platform".into(), env::var("TARGET")?])
@@ -250,7 +251,7 @@ fn read_field(node: Node, extension: bool) -> Result<Field> {
     })
 }
 
-/// What the recorder's prediction needs to know of a field beyond its type.
+/// The property of a field for the recorder's prediction, beyond its type.
 fn role(node: Node) -> &'static str {
     let time = node.attribute("name").is_some_and(|name| name.starts_with("time"));
     match node.attribute("units") {
@@ -261,8 +262,9 @@ fn role(node: Node) -> &'static str {
     }
 }
 
-/// The seed that makes two definitions of one id incompatible: name, then type, name and array length of each
-/// field but the extensions, in wire order (MAVLink serialization guide, "`CRC_EXTRA` calculation").
+/// The checksum seed of a message, by which different definitions of one id are incompatible. It covers the name,
+/// then type, name and array length of each field but the extensions, in wire order (MAVLink serialization guide,
+/// "`CRC_EXTRA` calculation").
 fn crc_extra(message: &Message) -> u8 {
     let feed = |sum, text: &str| crc::step(crc::update(sum, text.as_bytes()), b' ');
     let mut sum = feed(crc::START, &message.name);

@@ -11,7 +11,7 @@ pub const START: u16 = 0xffff;
 /// The reflected polynomial 0x1021.
 const POLYNOMIAL: u16 = 0x8408;
 
-/// What a byte does to the checksum, and what it does when one, two or three bytes follow it.
+/// Effect of a byte on the checksum, without and with one, two or three bytes behind it.
 static TABLES: [[u16; 256]; 4] = tables();
 
 /// For each value of the high byte of an entry of the first table, the entry's index: in a reflected CRC it is a
@@ -46,13 +46,13 @@ const fn index_of_high() -> [u8; 256] {
     inverse
 }
 
-/// The checksum after `bytes`, where `crc` is the one before them.
+/// The checksum after `bytes`, with `crc` before them.
 #[inline]
 pub fn update(crc: u16, bytes: &[u8]) -> u16 {
     let [last, third, second, first] = &TABLES;
     let (words, rest) = bytes.as_chunks();
     let crc = words.iter().fold(crc, |crc, word| {
-        // By shifts: where the compiler minds the size, an array of the bytes becomes a loop.
+        // By shifts: optimised for size, an array of the bytes would become a loop.
         let four = u32::from(crc) ^ u32::from_le_bytes(*word);
         let at = |shift: u32| usize::from((four >> shift) as u8);
         first[at(0)] ^ second[at(8)] ^ third[at(16)] ^ last[at(24)]

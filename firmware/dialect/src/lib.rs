@@ -1,17 +1,17 @@
-//! What a MAVLink message looks like on the wire: one table, generated at build time from the message definitions
-//! (XML) that the `mavlink` crate carries, so nothing here is typed by hand.
+//! Layouts of MAVLink messages on the wire: one table, generated at build time from the message definitions (XML) of
+//! the `mavlink` crate.
 //!
-//! Three readers share it: the framer (length and checksum seed), the black box (the kind of each field, for its
-//! prediction) and, with the feature `names`, the host tools (names and units of every column). What all messages have in
-//! common stands beside it: the parts of a frame ([`wire`]) and its checksum ([`crc`]).
+//! Three readers share it. The framer needs length and checksum seed, the black box the kind of each field for its
+//! prediction, and the host tools names and units of columns (feature `names`). The common parts of all messages
+//! stand beside it: the parts of a frame ([`wire`]) and its checksum ([`crc`]).
 //!
-//! The messages that are read field by field are structures of the `mavlink` crate's making ([`ardupilotmega`]).
+//! Messages that are read field by field are structures from the `mavlink` crate's generator ([`ardupilotmega`]).
 #![cfg_attr(not(test), no_std)]
 
 pub mod crc;
 pub mod wire;
 
-// What is generated names the part that `mavlink` hands on.
+// The generated code uses this name for the core that `mavlink` re-exports.
 extern crate mavlink as mavlink_core;
 
 pub use mavlink::{MavlinkVersion, MessageData};
@@ -77,7 +77,7 @@ impl Kind {
     }
 }
 
-/// What a field is for, as far as the recorder's prediction makes use of it.
+/// The purpose of a field for the recorder's prediction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[repr(u8)]
 pub enum Role {
@@ -103,15 +103,15 @@ pub struct Field {
     pub kind: Kind,
     /// The number of elements of an array; 0 for a scalar.
     pub array: u8,
-    /// What it is for.
+    /// Its purpose.
     pub role: Role,
     /// As in the definition, for instance `time_boot_ms`.
     #[cfg(feature = "names")]
     pub name: &'static str,
-    /// As in the definition, for instance `degE7`; empty where it has none.
+    /// As in the definition, for instance `degE7`; empty if it has none.
     #[cfg(feature = "names")]
     pub units: &'static str,
-    /// The enum whose values the field takes, for instance `MAV_TYPE`; empty where it has none.
+    /// The enum of the field's values, for instance `MAV_TYPE`; empty if it has none.
     #[cfg(feature = "names")]
     pub enumeration: &'static str,
 }
@@ -139,7 +139,7 @@ pub struct Message {
     pub len_base: u8,
     /// Payload bytes with the extension fields: the longest payload of a MAVLink 2 frame (0 to 255).
     pub len_max: u8,
-    /// Where in the payload the system lies whom it is for; [`Message::NO_TARGET`] where it names none.
+    /// Offset of the target system in the payload; [`Message::NO_TARGET`] if there is none.
     pub target_system: u8,
     /// The same for the component.
     pub target_component: u8,
@@ -155,7 +155,7 @@ impl Message {
     pub const NO_TARGET: u8 = u8::MAX;
 }
 
-/// The definition of a message id, or `None` where the dialect has none.
+/// The definition of a message id; `None` if the dialect has none.
 pub fn message(id: u32) -> Option<&'static Message> {
     MESSAGES.get(usize::from(index(id)?))
 }

@@ -1,4 +1,4 @@
-//! The parts of a frame, whatever its message, and how long each is (MAVLink developer guide, "Packet serialization").
+//! The parts of any frame, and their lengths (MAVLink developer guide, "Packet serialization").
 //!
 //! ```text
 //! MAVLink 1: start, length, sequence, system, component, id (1 byte)                          | payload | checksum
@@ -9,18 +9,18 @@
 pub const START_V1: u8 = 0xfe;
 /// The first byte of a MAVLink 2 frame.
 pub const START_V2: u8 = 0xfd;
-/// What comes before the payload of a MAVLink 1 frame.
+/// Header bytes of a MAVLink 1 frame.
 pub const HEADER_V1_BYTES: usize = 6;
-/// What comes before the payload of a MAVLink 2 frame.
+/// Header bytes of a MAVLink 2 frame.
 pub const HEADER_V2_BYTES: usize = 10;
 /// The longest payload.
 pub const PAYLOAD_BYTES_MAX: usize = u8::MAX as usize;
 /// The checksum.
 pub const CHECKSUM_BYTES: usize = 2;
-/// What follows the checksum of a signed frame: link id, time stamp of 6 bytes, hash of 6 bytes.
+/// The signature behind the checksum of a signed frame: link id, time stamp of 6 bytes, hash of 6 bytes.
 pub const SIGNATURE_BYTES: usize = 13;
 /// The longest frame: MAVLink 2, signed.
 pub const FRAME_BYTES_MAX: usize = HEADER_V2_BYTES + PAYLOAD_BYTES_MAX + CHECKSUM_BYTES + SIGNATURE_BYTES;
 
-/// The only incompatibility flag there is: the frame is signed.
+/// The only defined incompatibility flag: the frame is signed.
 pub const INCOMPAT_SIGNED: u8 = 1;

@@ -1,8 +1,8 @@
 //! Functions of single precision: those of `libm`, but sine, cosine and square root.
 //!
-//! `libm` computes sine and cosine of any number with double precision, and the root bit by bit: 4 KiB of code that is
-//! slow on a processor whose FPU has single precision and an instruction for the root. A PC gets the same bits as the
-//! firmware: it runs the same sine and cosine, and a root is exact to the last bit on both.
+//! `libm` computes sine and cosine of any number with double precision, and the root bit by bit. That is 4 KiB of
+//! slow code on a processor whose FPU has single precision and an instruction for the root. ¶ A PC gets the same bits
+//! as the firmware: it runs the same sine and cosine, and a root is exact on both.
 #![cfg_attr(not(test), no_std)]
 
 pub use libm::{acosf, asinf, atan2f, copysignf, expf, fabsf, fminf, logf, round, roundevenf, roundf};
@@ -10,19 +10,20 @@ pub use libm::{acosf, asinf, atan2f, copysignf, expf, fabsf, fminf, logf, round,
 /// Angles up to here are turned back exactly enough; an attitude has less than one turn.
 const ANGLE_MAX: f32 = 8192.0;
 
-/// Sine of an angle in radians, to 2e-7. Beyond 8192 rad and of no number: that of 0.
+/// Sine of an angle in radians, to 2e-7. Beyond 8192 rad and for NaN: 0.
 pub fn sinf(angle: f32) -> f32 {
     let (quarter, rest) = reduce(angle);
     turned(quarter, rest)
 }
 
-/// Cosine of an angle in radians, to 2e-7. Beyond 8192 rad and of no number: that of 0.
+/// Cosine of an angle in radians, to 2e-7. Beyond 8192 rad and for NaN: 1.
 pub fn cosf(angle: f32) -> f32 {
     let (quarter, rest) = reduce(angle);
     turned(quarter + 1, rest)
 }
 
-/// Sine of so many quarter turns and `rest`, which is within an eighth of a turn. Polynomials of S. Moshier's Cephes library.
+/// Sine of these quarter turns and `rest`, which is within an eighth of a turn. Polynomials of S. Moshier's Cephes
+/// library.
 fn turned(quarter: i32, rest: f32) -> f32 {
     let square = rest * rest;
     let value = if quarter & 1 == 0 {
@@ -38,19 +39,19 @@ fn turned(quarter: i32, rest: f32) -> f32 {
 /// Quarter turns, and the rest of an angle. A quarter turn has three parts (Cody and Waite), whose products are exact.
 fn reduce(angle: f32) -> (i32, f32) {
     const PARTS: [f32; 3] = [1.570_312_5, 4.837_513e-4, 7.549_79e-8];
-    // No number is not in the range either.
+    // NaN is out of range too.
     let angle = if fabsf(angle) <= ANGLE_MAX { angle } else { 0.0 };
     let quarter = (angle * core::f32::consts::FRAC_2_PI + copysignf(0.5, angle)) as i32;
     (quarter, PARTS.iter().fold(angle, |rest, part| rest - quarter as f32 * part))
 }
 
-/// Square root; of less than 0 no number.
+/// Square root; NaN below 0.
 #[cfg(not(all(target_arch = "arm", target_abi = "eabihf")))]
 pub fn sqrtf(value: f32) -> f32 {
     libm::sqrtf(value)
 }
 
-/// Square root; of less than 0 no number.
+/// Square root; NaN below 0.
 #[cfg(all(target_arch = "arm", target_abi = "eabihf"))]
 pub fn sqrtf(value: f32) -> f32 {
     unsafe extern "C" {

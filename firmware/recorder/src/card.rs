@@ -25,10 +25,10 @@ pub const SEGMENT_BYTES_MAX: u32 = 8 * 1024 * 1024;
 /// Blocks of 512 bytes.
 const BLOCKS_PER_MIB: u64 = 2_048;
 
-/// Logs without their clusters that are passed by for one that can be overwritten: each takes looks at the FAT.
+/// Logs with broken chains that are skipped in the search for one to overwrite: each takes reads of the FAT.
 const UNCHAINED_MAX: usize = 8;
 
-/// Where logs have all of the card but one part of so many, the oldest one is overwritten before all of the FAT was searched.
+/// If logs have all of the card but this part, the oldest one is overwritten before all of the FAT was searched.
 const UNSEARCHED: u32 = 64;
 
 /// The place of a directory entry.
@@ -50,11 +50,11 @@ impl Place {
 pub struct LogEntry {
     /// Its name.
     pub name: LogName,
-    /// The file's length in bytes: what is allocated, not what is written.
+    /// The file's length in bytes: the allocated size, not the written one.
     pub bytes: u32,
-    /// It was erased over a link ([`Card::hide_logs`]): not offered any longer, and there until its room is wanted.
+    /// It was erased over a link ([`Card::hide_logs`]): no longer offered, and kept until its room is needed.
     pub hidden: bool,
-    /// When it was written, in seconds since 1970 UTC; 0: not known.
+    /// When it was written, in seconds since 1970 UTC; 0: unknown.
     pub utc_secs: u32,
     pub(crate) first: u32,
     pub(crate) place: Place,
@@ -83,7 +83,7 @@ impl Segment {
         }
     }
 
-    /// How many whole blocks it has.
+    /// Its whole blocks.
     pub const fn blocks(&self) -> u32 {
         self.bytes / BLOCK_BYTES as u32
     }
@@ -121,7 +121,8 @@ impl<'a, D: CardDevice> Card<'a, D> {
         }
     }
 
-    /// Walks over the directory. Where the information sector names no free cluster, those behind all logs are looked at first.
+    /// Walks over the directory. Without a free cluster in the information sector, the clusters behind all logs are
+    /// searched first.
     fn begin(&mut self) -> Result<(), CardError<D::Error>> {
         let mut parity = self.buffers.parity.borrow_mut();
         self.directory.learn(&self.volume, parity.lend(), self.free.next())?;
@@ -133,7 +134,7 @@ impl<'a, D: CardDevice> Card<'a, D> {
         self.volume.into_device()
     }
 
-    /// The device, for what is no matter of files.
+    /// The device, for accesses besides files.
     pub const fn device(&self) -> &D {
         self.volume.device()
     }
@@ -146,21 +147,22 @@ impl<'a, D: CardDevice> Card<'a, D> {
     /// Looks through the next blocks of the directory.
     fn look_on(&mut self, buffer: &mut [Block]) -> Result<(), CardError<D::Error>> {
         let changed = self.directory.look_on(&self.volume, buffer, self.free.next());
-        // After an error too: chains may have been mended before it.
+        // After an error too: chains may have been repaired before it.
         if !matches!(changed, Ok(false)) {
             self.free.restart();
         }
         changed.map(|_| ())
     }
 
-    /// Looks through many blocks of the directory, for a segment that is waited for: the caller is to try again.
+    /// Searches many blocks of the directory for a segment that is needed now; the caller tries again.
     fn look_for_next(&mut self) -> Result<(), CardError<D::Error>> {
         let buffers = self.buffers;
         self.look_on(buffers.parity.borrow_mut().lend())?;
         Err(CardError::Searching)
     }
 
-    /// With nothing to write: looks a little further for what the next segment needs, a block of the directory or of the FAT.
+    /// While nothing is to be written, searches a little further for the next segment: a block of the directory or of
+    /// the FAT.
     #[inline(never)]
     pub(crate) fn look_ahead(&mut self) -> Result<(), CardError<D::Error>> {
         if self.directory.must_look(self.free.next()) {
@@ -183,7 +185,7 @@ impl<'a, D: CardDevice> Card<'a, D> {
         Ok(())
     }
 
-    /// Shows `each` the directory's entries from this one on; the entry after that at which it broke off.
+    /// Shows `each` the directory's entries from this one on; returns the entry after the last one shown.
     #[inline(never)]
     fn walk(
         &self,
@@ -194,7 +196,7 @@ impl<'a, D: CardDevice> Card<'a, D> {
         walk(&self.volume, &mut chain, from, &mut [[0; BLOCK_BYTES]], &mut |slot| Ok(each(slot)))
     }
 
-    /// The log that is not hidden behind so many others, from the directory's entry `from` on, and its own entry there.
+    /// The shown log behind this many others, from the directory's entry `from` on, and its entry number.
     pub fn shown_behind(
         &self,
         from: u32,
@@ -229,7 +231,7 @@ impl<'a, D: CardDevice> Card<'a, D> {
         Ok(found)
     }
 
-    /// How many logs are not hidden, and a number that changes with their names.
+    /// The number of shown logs, and a number that changes with their names.
     pub const fn shown(&self) -> (u16, u32) {
         (self.directory.shown, self.directory.names)
     }
@@ -239,17 +241,17 @@ impl<'a, D: CardDevice> Card<'a, D> {
         &self.directory.newest
     }
 
-    /// The name from which the numbers of sessions go on, and the first name of the next session; `None` when they are used up.
+    /// The newest session's name, and the first name of the next session; `None` when the numbers are used up.
     pub(crate) fn next_session(&self) -> (Option<LogName>, Option<LogName>) {
         self.directory.next_session()
     }
 
-    /// Makes a segment of `bytes` (rounded up to whole clusters) and opens it. Its contents are whatever its clusters
-    /// held before. At every moment in between, the directory is as before or holds the whole segment.
+    /// Makes a segment of `bytes` (rounded up to whole clusters) and opens it. Its contents are those of the clusters
+    /// before. At every moment in between, the directory is as before or holds the whole segment.
     pub fn create(&mut self, name: LogName, bytes: u32) -> Result<(), CardError<D::Error>> {
         self.open = None;
         let wanted = clusters_of(&self.volume, bytes).max(1);
-        // A card that logs and the directory fill is not searched.
+        // A card that is filled by logs and the directory is not searched.
         let others = self.volume.layout.clusters.saturating_sub(self.directory.clusters).saturating_sub(1);
         if others < wanted {
             return Err(CardError::Full);
@@ -258,7 +260,7 @@ impl<'a, D: CardDevice> Card<'a, D> {
             self.lengthen_directory()?;
         }
         let found = match self.find_free(wanted) {
-            // Little can be free, and to search all of the FAT for it takes seconds in which nothing is written.
+            // Little can be free, and a search of all of the FAT takes seconds without recording.
             Err(CardError::Searching)
                 if others < self.volume.layout.clusters / UNSEARCHED && !self.device().keeps_logs() =>
             {
@@ -277,8 +279,8 @@ impl<'a, D: CardDevice> Card<'a, D> {
         Ok(())
     }
 
-    /// Writes the entry of a new segment, which is unused. One that the card does not write is passed by, as long as deleted ones are
-    /// known; where none takes it, the segment's clusters are free again.
+    /// Writes the entry of a new segment, which is unused. An entry that the card refuses is skipped, as long as
+    /// deleted ones are known. If no entry can be written, the segment's clusters are freed.
     fn make_entry(&mut self, mut made: LogEntry) -> Result<LogEntry, CardError<D::Error>> {
         let (name, first, date) = (made.name.short(), made.first.to_le_bytes(), self.status.fat_date());
         loop {
@@ -293,7 +295,7 @@ impl<'a, D: CardDevice> Card<'a, D> {
                 set_date(entry, date);
                 was_unused
             });
-            // The card may have written what it says it did not: then the clusters are the file's.
+            // The card may have written the entry despite its error: then the clusters are the file's.
             if written.is_ok() || !self.is_unused(made.place)? {
                 return written.map(|()| made);
             }
@@ -306,8 +308,8 @@ impl<'a, D: CardDevice> Card<'a, D> {
         }
     }
 
-    /// The place of a new entry, where no file has one: else the directory is not as it was noted. `None`: the directory needs another
-    /// cluster.
+    /// The place of a new entry; an error if a file has it, because the directory then differs from the notes.
+    /// `None`: the directory needs another cluster.
     fn place_for_new(&mut self) -> Result<Option<Place>, CardError<D::Error>> {
         let place = self.directory.place_for_new(&self.volume)?;
         match place {
@@ -316,7 +318,7 @@ impl<'a, D: CardDevice> Card<'a, D> {
         }
     }
 
-    /// Finds blocks of the FAT with so many free clusters that no log claims.
+    /// Finds blocks of the FAT with this many free clusters that no log claims.
     fn find_free(&mut self, wanted: u32) -> Result<Range<u32>, CardError<D::Error>> {
         let found = self.free.find(&self.volume, wanted)?;
         if !self.directory.is_verified(&found) {
@@ -344,15 +346,15 @@ impl<'a, D: CardDevice> Card<'a, D> {
         self.volume.link(last, cluster)
     }
 
-    /// Whether a segment's clusters are chained to its end: one whose part of the FAT was lost cannot be overwritten.
+    /// Whether a segment's clusters are chained to its end. One with a lost part of the FAT cannot be overwritten.
     fn is_chained(&self, entry: &LogEntry) -> Result<bool, CardError<D::Error>> {
         let mut segment = Segment::of(entry);
         let last = segment.blocks().saturating_sub(1);
         Ok(segment.chain.locate(&self.volume, last, 1)?.is_some())
     }
 
-    /// Gives the oldest log the name `name`, and opens it to be written anew. A few whose clusters are no longer chained
-    /// are passed by.
+    /// Renames the oldest log to `name`, and opens it for a new recording. Up to [`UNCHAINED_MAX`] logs with broken
+    /// chains are skipped.
     pub(crate) fn recycle_oldest(&mut self, name: LogName) -> Result<(), CardError<D::Error>> {
         if self.device().keeps_logs() {
             return Err(CardError::Full);
@@ -369,7 +371,7 @@ impl<'a, D: CardDevice> Card<'a, D> {
         Err(CardError::Damaged)
     }
 
-    /// Gives an existing segment a new name, and the date of now, in one block write, and opens it to be written anew.
+    /// Renames and dates an existing segment in one block write, and opens it for a new recording.
     pub fn recycle(&mut self, old: &LogEntry, name: LogName) -> Result<(), CardError<D::Error>> {
         self.open = None;
         let date = self.status.fat_date();
@@ -386,8 +388,8 @@ impl<'a, D: CardDevice> Card<'a, D> {
         Ok(())
     }
 
-    /// Hides the logs of other sessions than this one in the directory's block of entry `from`, in one block write; `false` where the
-    /// directory ends before it. They stay as they are, and the open one stays open.
+    /// Hides the logs of all sessions but `except` in the directory's block of entry `from`, in one block write;
+    /// `false` if the directory ends before it. The files stay, and the open one stays open.
     pub fn hide_logs(&mut self, from: u32, except: Option<u32>) -> Result<bool, CardError<D::Error>> {
         let mut chain = ClusterChain::new(self.volume.layout.root);
         let Some((at, _)) = chain.locate(&self.volume, from / BLOCK_ENTRIES, 1)? else { return Ok(false) };
@@ -410,7 +412,7 @@ impl<'a, D: CardDevice> Card<'a, D> {
         Ok(!is_end)
     }
 
-    /// Gives the open segment the date of now, in one block write. It stays open.
+    /// Dates the open segment in one block write. It stays open.
     pub(crate) fn date_open(&mut self) -> Result<(), CardError<D::Error>> {
         let Segment { name, place, .. } = self.open.ok_or(CardError::NotOpen)?;
         let date = self.status.fat_date();
@@ -420,7 +422,7 @@ impl<'a, D: CardDevice> Card<'a, D> {
         })
     }
 
-    /// Changes a directory entry. Where `change` says that the entry is another one, nothing is written.
+    /// Changes a directory entry. If `change` returns `false` (another entry is there), nothing is written.
     #[inline(never)]
     fn change_entry(
         &self,
@@ -449,7 +451,7 @@ impl<'a, D: CardDevice> Card<'a, D> {
         Ok(Segment::of(&self.find(name)?.ok_or(CardError::NotFound)?))
     }
 
-    /// The file of parameters, `PARAMS.TXT`, for reading; how long it is.
+    /// The file of parameters, `PARAMS.TXT`, for reading, and its length.
     pub fn settings(&self) -> Option<(Segment, u32)> {
         let (first, bytes) = self.directory.settings?;
         // Its last block is read whole.
@@ -470,13 +472,13 @@ impl<'a, D: CardDevice> Card<'a, D> {
         self.open.as_ref().map(|open| open.name)
     }
 
-    /// How many whole blocks the open segment has.
+    /// Whole blocks of the open segment.
     pub fn open_blocks(&self) -> u32 {
         self.open.as_ref().map_or(0, Segment::blocks)
     }
 
-    /// Writes the first of `blocks` of the open segment in place, as many as lie in a row, with one command. How many
-    /// that were: at least one. After an error any of them may have been written.
+    /// Writes the first of `blocks` of the open segment in place, as many as lie in a row, with one command. Returns
+    /// their number, at least one. After an error any of them may have been written.
     pub fn write(&mut self, index: u32, blocks: &[Block]) -> Result<usize, CardError<D::Error>> {
         let open = self.open.as_mut().filter(|open| index < open.blocks()).ok_or(CardError::NotOpen)?;
         let wanted = blocks.len().min((open.blocks() - index) as usize);
@@ -501,7 +503,7 @@ impl<'a, D: CardDevice> Card<'a, D> {
         self.volume.read(core::slice::from_mut(block), start)
     }
 
-    /// Counts a little further how much of the card logs can have, one block of the FAT at a call; how much once all of it is
+    /// Counts the share of the card that logs can have, one block of the FAT at a call; the result once all of it is
     /// counted.
     pub(crate) fn count_room(&mut self) -> Result<Option<Counted>, CardError<D::Error>> {
         let Some(free) = self.free.count(&self.volume)? else { return Ok(None) };

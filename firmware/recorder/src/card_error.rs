@@ -1,4 +1,4 @@
-//! Why a card cannot do what it was asked to.
+//! Errors of card operations.
 
 use core::fmt;
 
@@ -15,9 +15,9 @@ pub enum CardError<E> {
     Damaged,
     /// No free clusters.
     Full,
-    /// Free clusters are still looked for: to try again looks further.
+    /// The search for free clusters goes on: try again.
     Searching,
-    /// There is no such segment.
+    /// The segment does not exist.
     NotFound,
     /// No segment is open.
     NotOpen,

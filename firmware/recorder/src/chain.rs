@@ -1,7 +1,7 @@
-//! The chain of clusters of a file or directory, followed as far as it was needed.
+//! The chain of clusters of a file or directory, followed only as far as needed.
 //!
-//! The clusters of a segment mostly lie in a row. A known row lets the card take many blocks in one command, at which cards are
-//! fast.
+//! The clusters of a segment mostly lie in a row. A known row lets the card take many blocks in one command, at which
+//! cards are fast.
 
 use crate::CardDevice;
 use crate::card::CardError;
@@ -11,7 +11,7 @@ use crate::volume::{ENTRIES, Volume, entry};
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct ClusterChain {
     first: u32,
-    /// Clusters of the file before the row that is known.
+    /// Clusters of the file before the known row.
     before: u32,
     /// The row's first cluster.
     cluster: u32,
@@ -25,8 +25,8 @@ impl ClusterChain {
         Self { first, before: 0, cluster: first, length: 1 }
     }
 
-    /// The card's block that holds block `index` of the file, and how many of the file's blocks lie in a row from there
-    /// on: at least that one, and up to `wanted` where one look at the FAT shows it. `None`: the chain ends before it.
+    /// The card's block of block `index` of the file, and the number of blocks in a row from there: at least one, and
+    /// up to `wanted` if one read of the FAT shows it. `None`: the chain ends before it.
     pub(crate) fn locate<D: CardDevice>(
         &mut self,
         volume: &Volume<'_, D>,
@@ -55,7 +55,7 @@ impl ClusterChain {
         Ok(Some((volume.block_of(self.cluster + at) + offset, in_row(self))))
     }
 
-    /// The row becomes longer by what one block of the FAT tells; `false` where it does not.
+    /// Lengthens the row by the entries of one block of the FAT; `false` if it ends there.
     fn lengthen<D: CardDevice>(&mut self, volume: &Volume<'_, D>) -> Result<bool, CardError<D::Error>> {
         let before = self.length;
         let fat_block = self.last() / ENTRIES;
@@ -70,7 +70,7 @@ impl ClusterChain {
         Ok(self.length > before)
     }
 
-    /// Goes on to the row after this one; `false` where this one is the last.
+    /// Goes on to the next row; `false` if this is the last.
     fn next_row<D: CardDevice>(&mut self, volume: &Volume<'_, D>) -> Result<bool, CardError<D::Error>> {
         let next = volume.entry(self.last())?;
         if !volume.is_cluster(next) {

@@ -1,15 +1,16 @@
-//! The root directory: one walk over it when a card is mounted tells all that recording needs of it.
-//!
-//! The walk notes the newest logs, the oldest ones, where the next entry goes, and how many clusters logs have. So a new segment
-//! needs no walk. While the recorder has nothing to write, it looks on ([`Directory::look_on`]), a block at a call: for more of the
-//! oldest logs once half of those that were noted are overwritten, and for claims on the clusters that are taken next.
+//! The root directory: one walk over it at mounting collects all that recording needs. ¶ The walk notes the newest
+//! logs, the oldest ones, the place of the next entry, and the number of clusters of logs. So a new segment needs no
+//! walk. While nothing is to be written, the recorder looks on ([`Directory::look_on`]), a block at a call. It looks
+//! for more of the oldest logs once half of the noted ones are overwritten, and for claims on the clusters that come
+//! next.
 //!
 //! # Clusters that a log claims although the FAT calls them free
-//! A card that lost power may have kept a log's directory entry and lost blocks of the FAT. The next segment would be written over
-//! that log. A segment mostly lies in a row, so that its clusters are known all the same: as many as its size takes, from the
-//! first one on. Where the FAT follows this row up to an entry that says "free", which no sound chain holds, the free entries of
-//! the row are chained again. Clusters that belong to anything are not touched, and a log whose chain leaves the row is passed
-//! over. Behind the last cluster that any log claims, this need not be looked for ([`Directory::is_verified`]).
+//! A card that lost power may have kept a log's directory entry and lost blocks of the FAT. The next segment would be
+//! written over that log. A segment mostly lies in a row, so its clusters are known all the same: as many as its size
+//! takes, from the first one on. The FAT may follow this row up to an entry "free", which no sound chain contains.
+//! Then the free entries of the row are chained again. Clusters of other files are not touched, and a log whose chain
+//! leaves the row is skipped. Behind the last cluster that any log claims, this need not be looked for
+//! ([`Directory::is_verified`]).
 
 use core::ops::{ControlFlow, Range};
 
@@ -33,11 +34,11 @@ const OLDEST_MAX: usize = 8;
 const DELETED_MAX: usize = 8;
 /// The shortest log that may be overwritten: two groups.
 const OVERWRITTEN_MIN: u32 = 2 * (hums_blackbox::GROUP_SECTORS * hums_blackbox::SECTOR_BYTES) as u32;
-/// FAT blocks of which one walk looks for claims.
+/// FAT blocks that one walk checks for claims.
 pub(crate) const VERIFY_BLOCKS: u32 = 64;
 
-/// Bytes of an entry, and the offsets of its attributes, of the times when the file was made and written (time and date), of both
-/// halves of its first cluster's number, and of its length.
+/// Bytes of an entry, and offsets of its fields: attributes, times of creation and of writing (time and date), both
+/// halves of the first cluster's number, length.
 pub(crate) const ENTRY_BYTES: usize = 32;
 pub(crate) const ATTRIBUTES: usize = LogName::SHORT_BYTES;
 pub(crate) const MADE: usize = 14;
@@ -46,13 +47,13 @@ pub(crate) const CLUSTER_HIGH: usize = 20;
 pub(crate) const CLUSTER_LOW: usize = 26;
 pub(crate) const LENGTH: usize = 28;
 
-/// Attributes: not shown in lists; no file but a volume's label, a directory, or a part of a long name; written since a backup.
+/// Attributes: hidden in lists; a volume's label, a directory or a part of a long name; written since a backup.
 pub(crate) const HIDDEN: u8 = 0x02;
 const NO_FILE: u8 = 0x18;
 const LONG_NAME: u8 = 0x0F;
 pub(crate) const ARCHIVE: u8 = 0x20;
 
-/// First bytes of an entry: none from here on, and a deleted one.
+/// First bytes of an entry: end of the directory, and a deleted one.
 pub(crate) const NEVER_USED: u8 = 0;
 pub(crate) const DELETED: u8 = 0xE5;
 
@@ -64,39 +65,39 @@ const SETTINGS: &[u8; LogName::SHORT_BYTES] = b"PARAMS  TXT";
 /// The newest logs of a card, the newest first.
 pub(crate) type Newest = Vec<LogEntry, NEWEST_MAX>;
 
-/// What is known of the root directory.
+/// The known state of the root directory.
 pub(crate) struct Directory {
     root: ClusterChain,
     /// The newest names below the last session number. A folder has the length 0.
     pub(crate) newest: Newest,
     /// The newest name of the last session number.
     last: Option<LogName>,
-    /// The oldest logs that may be overwritten, the oldest first; so many of them are sure to be older than all others.
+    /// The oldest logs that may be overwritten, the oldest first; the first `sure` of them are older than all others.
     oldest: Vec<LogEntry, OLDEST_MAX>,
     sure: usize,
-    /// There are logs that may be overwritten beside those.
+    /// Other logs may be overwritten besides those.
     has_more: bool,
     deleted: Vec<u32, DELETED_MAX>,
     /// The first entry that was never used.
     end: u32,
-    /// Clusters that logs have. None has more than a segment can have, whatever its entry says.
+    /// Clusters that logs have. Each counts at most the clusters of the longest segment, since its entry may be
+    /// wrong.
     pub(crate) clusters: u32,
     /// Logs that are not hidden, and a sum over their names.
     pub(crate) shown: u16,
     pub(crate) names: u32,
     /// First cluster and length of the file of parameters.
     pub(crate) settings: Option<(u32, u32)>,
-    /// Behind all clusters that logs claimed when the card was mounted: those of later ones are chained.
+    /// The end of all clusters that logs claimed at mounting; later logs are chained.
     claimed_end: u32,
-    /// FAT blocks that were looked through for claims.
+    /// FAT blocks that were checked for claims.
     verified: Range<u32>,
-    /// Looking on: the next entry, and the FAT blocks that are looked through for claims meanwhile.
+    /// Looking on: the next entry, and the FAT blocks that are being checked for claims.
     next: u32,
     verifying: Range<u32>,
 }
 
 impl Directory {
-    /// Nothing is known.
     pub(crate) const fn new(root: u32) -> Self {
         Self {
             root: ClusterChain::new(root),
@@ -118,7 +119,7 @@ impl Directory {
         }
     }
 
-    /// Walks over the whole directory, and chains again what logs claim of the FAT from this block on.
+    /// Walks over the whole directory, and repairs chains that logs claim of the FAT from this block on.
     pub(crate) fn learn<D: CardDevice>(
         &mut self,
         volume: &Volume<'_, D>,
@@ -129,7 +130,7 @@ impl Directory {
         let mut root = self.root;
         self.end = walk(volume, &mut root, 0, buffer, &mut |slot| {
             if slot.bytes[0] == DELETED {
-                // Of more than these the rest stays unused until the next walk.
+                // Others stay unused until the next walk.
                 let _ = self.deleted.push(slot.index);
             } else if slot.is_file(SETTINGS) {
                 self.settings = Some((slot.first(), slot.bytes()));
@@ -142,7 +143,7 @@ impl Directory {
         Ok(())
     }
 
-    /// Whether there is something to look on for, where free clusters are taken from this block of the FAT on.
+    /// Whether looking on is needed, if free clusters come from this block of the FAT on.
     pub(crate) fn must_look(&self, free: u32) -> bool {
         let first = self.unverified(free);
         self.next > 0
@@ -150,13 +151,13 @@ impl Directory {
             || first * ENTRIES < self.claimed_end && first - free < VERIFY_BLOCKS / 2
     }
 
-    /// The first block of the FAT from this one on that was not looked through for claims.
+    /// The first block of the FAT from this one on that was not checked for claims.
     fn unverified(&self, from: u32) -> u32 {
         if self.verified.contains(&from) { self.verified.end } else { from }
     }
 
-    /// Looks through as many blocks of the directory as `buffer` has, and begins anew at its end: for the oldest logs, and for what
-    /// logs claim of the FAT behind what was looked through before, from the block `free` on. Whether claims were chained again.
+    /// Reads as many blocks of the directory as `buffer` has, and begins anew at its end. It collects the oldest
+    /// logs, and repairs claims of logs on the next FAT blocks from `free` on. Returns whether chains were repaired.
     pub(crate) fn look_on<D: CardDevice>(
         &mut self,
         volume: &Volume<'_, D>,
@@ -189,18 +190,18 @@ impl Directory {
         Ok(changed)
     }
 
-    /// Takes the oldest log that may be overwritten. `None`: none is known, [`Self::look_on`] may find some if there are any.
+    /// Takes the oldest log that may be overwritten. `None`: none is known, and [`Self::look_on`] may find some.
     pub(crate) fn take_oldest(&mut self) -> Option<LogEntry> {
         self.sure = self.sure.checked_sub(1)?;
         (!self.oldest.is_empty()).then(|| self.oldest.remove(0))
     }
 
-    /// Whether there are logs that may be overwritten beside those that are known.
+    /// Whether logs besides the known ones may be overwritten.
     pub(crate) const fn has_more(&self) -> bool {
         self.next > 0 || self.has_more
     }
 
-    /// Notes an entry; the clusters that it claims, if it is a log's.
+    /// Notes an entry; returns the clusters that it claims, if it is a log's.
     fn note<D: CardDevice>(&mut self, volume: &Volume<'_, D>, slot: &Slot<'_>) -> Option<Range<u32>> {
         let entry = slot.log()?;
         self.note_newest(entry);
@@ -245,17 +246,17 @@ impl Directory {
         if self.newest.is_full() && place < NEWEST_MAX {
             self.newest.pop();
         }
-        // No place for it: it is older than all of them.
+        // No place: it is older than all of them.
         let _ = self.newest.insert(place, entry);
     }
 
-    /// One log more is shown, or one less: the sum of names is of both kinds of change.
+    /// Adds a shown log; removing it changes the sum of names in the same way.
     fn show(&mut self, name: LogName) {
         self.shown = self.shown.saturating_add(1);
         self.names ^= hash(name);
     }
 
-    /// A log is no longer shown.
+    /// Hides a log.
     pub(crate) fn hide(&mut self, name: LogName) {
         for entry in self.oldest.iter_mut().filter(|entry| entry.name == name) {
             entry.hidden = true;
@@ -264,7 +265,7 @@ impl Directory {
         self.names ^= hash(name);
     }
 
-    /// A log of so many clusters more was made.
+    /// Adds a new log with its clusters.
     pub(crate) fn add(&mut self, entry: LogEntry, clusters: u32) {
         self.note_newest(entry);
         self.show(entry.name);
@@ -287,8 +288,8 @@ impl Directory {
         self.show(new.name);
     }
 
-    /// The name from which the numbers of sessions go on, and the next session's first name. A session number that is in use is
-    /// passed over, so that a foreign file with the last number does not end the numbers.
+    /// The newest session's name, and the next session's first name. A session number in use is skipped, so that a
+    /// foreign file with the last number does not end the numbers.
     pub(crate) fn next_session(&self) -> (Option<LogName>, Option<LogName>) {
         let is_free = |name: &LogName| {
             let is_last = name.session == LogName::SESSION_MAX && self.last.is_some();
@@ -305,7 +306,7 @@ impl Directory {
         }
     }
 
-    /// Whether no log may claim free clusters of these FAT blocks.
+    /// Whether no log can claim free clusters of these FAT blocks.
     pub(crate) fn is_verified(&self, blocks: &Range<u32>) -> bool {
         blocks.start * ENTRIES >= self.claimed_end
             || blocks.start >= self.verified.start && blocks.end <= self.verified.end
@@ -316,7 +317,7 @@ impl Directory {
         self.claimed_end
     }
 
-    /// Where a new entry goes: the block and offset; `None`: the directory needs another cluster.
+    /// The place of a new entry: block and offset; `None`: the directory needs another cluster.
     pub(crate) fn place_for_new<D: CardDevice>(
         &mut self,
         volume: &Volume<'_, D>,
@@ -326,19 +327,19 @@ impl Directory {
         Ok(located.map(|(block, _)| Place::of(block, index)))
     }
 
-    /// The place for a new entry is not used until the next walk; `false` where there is no other one.
+    /// Skips the place of a new entry until the next walk; `false` if there is no other.
     pub(crate) fn pass_by(&mut self) -> bool {
         self.deleted.pop().is_some()
     }
 
-    /// The place for a new entry is taken.
+    /// Takes the place of a new entry.
     pub(crate) fn take_place(&mut self) {
         if self.deleted.pop().is_none() {
             self.end += 1;
         }
     }
 
-    /// The last cluster of a directory that needs another one.
+    /// The last cluster of a full directory.
     pub(crate) const fn last_cluster(&self) -> u32 {
         self.root.last()
     }
@@ -389,8 +390,8 @@ impl Slot<'_> {
     }
 }
 
-/// Shows `each` the used and deleted entries of a directory, from entry `from` on, as many blocks with one command as `buffer` has.
-/// Gives the first entry that was never used, or the one after that at which `each` broke off.
+/// Shows `each` the used and deleted entries of a directory, from entry `from` on, reading as many blocks with one
+/// command as `buffer` has. Returns the first unused entry, or the one after that at which `each` broke off.
 pub(crate) fn walk<D: CardDevice>(
     volume: &Volume<'_, D>,
     chain: &mut ClusterChain,
@@ -422,7 +423,7 @@ pub(crate) fn walk<D: CardDevice>(
     Err(CardError::Damaged)
 }
 
-/// Clusters that so many bytes take.
+/// Clusters for this many bytes.
 pub(crate) const fn clusters_of<D>(volume: &Volume<'_, D>, bytes: u32) -> u32 {
     bytes.div_ceil(volume.layout.cluster_blocks * BLOCK_BYTES as u32)
 }
@@ -434,13 +435,13 @@ fn claimed<D: CardDevice>(volume: &Volume<'_, D>, entry: &LogEntry) -> Option<Ra
     is_sound.then_some(entry.first..end)
 }
 
-/// A number for a name, such that a sum of several tells which they are.
+/// A hash of a name; sums of them identify sets of names.
 const fn hash(name: LogName) -> u32 {
     let hash = (name.session << 7 | name.segment).wrapping_mul(0x9E37_79B1);
     (hash ^ hash >> 15).wrapping_mul(0x85EB_CA6B)
 }
 
-/// Chains a log's row of clusters again where these blocks of the FAT lost it; whether they did.
+/// Repairs the row of a log's clusters in these blocks of the FAT; whether any entry was lost.
 fn mend<D: CardDevice>(
     volume: &Volume<'_, D>,
     row: &Range<u32>,
@@ -458,7 +459,7 @@ fn mend<D: CardDevice>(
     Ok(changed)
 }
 
-/// The first cluster of the row that the FAT calls free, where it follows the row up to there.
+/// The first free cluster of the row, if the FAT follows the row up to there.
 #[inline(never)]
 fn broken_at<D: CardDevice>(
     volume: &Volume<'_, D>,
@@ -478,8 +479,8 @@ fn broken_at<D: CardDevice>(
     Ok(None)
 }
 
-/// Chains the free entries of one block of the FAT that lie in this row; whether there were any. One block is written in
-/// each copy of the FAT, and each of its entries is right by itself, however much of the block is.
+/// Chains the free entries of one block of the FAT in this row; whether there were any. One block is written in each
+/// copy of the FAT, and each of its entries is valid by itself, even in a torn block.
 #[inline(never)]
 fn chain_block<D: CardDevice>(
     volume: &Volume<'_, D>,
@@ -487,7 +488,7 @@ fn chain_block<D: CardDevice>(
     row: &Range<u32>,
 ) -> Result<bool, CardError<D::Error>> {
     let (first, end) = (row.start.max(index * ENTRIES), row.end.min((index + 1) * ENTRIES));
-    // What comes behind is chained to where it is free, and so the row's, too.
+    // Later entries are chained up to the next free one, and so belong to the row.
     let mut next = if end < row.end { volume.entry(end)? } else { END_OF_CHAIN };
     let mut block = volume.read_fat(index)?;
     let mut changed = false;

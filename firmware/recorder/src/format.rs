@@ -1,8 +1,8 @@
 //! Formats a card: one partition, FAT32. Used for the PC's card images, and on the board by command
 //! ([`crate::CardStatus::want_format`]), never unasked.
 //!
-//! One FAT instead of two, deliberately: with two, every update has a moment in which the copies differ, and a cut
-//! there is what a file system check complains about. The second copy is never read by any system in use.
+//! One FAT instead of two, deliberately. With two, each update has a moment in which the copies differ, and a cut
+//! there is an error for a file system check. The second copy is never read by any system in use.
 
 use crate::layout::FAT32_CLUSTERS_MIN;
 use crate::{BLOCK_BYTES, Block, CardDevice};
@@ -30,8 +30,8 @@ pub enum FormatError<E> {
     TooSmall,
 }
 
-/// The largest cluster that leaves a volume of this size enough clusters to be FAT32: the larger the clusters, the
-/// fewer FAT blocks a new segment takes. At most 32 KiB, which every system reads.
+/// The largest cluster with which a volume of this size is still FAT32: large clusters take few FAT blocks for a new
+/// segment. At most 32 KiB, which every system reads.
 const fn cluster_blocks(volume_blocks: u32) -> u32 {
     let mut blocks = 64;
     while blocks > 1 && volume_blocks / blocks < FAT32_CLUSTERS_MIN + FAT32_CLUSTERS_MIN / ENTRIES {
@@ -40,7 +40,7 @@ const fn cluster_blocks(volume_blocks: u32) -> u32 {
     blocks
 }
 
-/// Blocks that are cleared with one command: they lie on the stack meanwhile.
+/// Blocks that are cleared with one command; they lie on the stack.
 const CLEAR_BLOCKS: u32 = 4;
 
 /// Makes a partition table and an empty FAT32 volume; everything on the card is lost.
@@ -50,17 +50,17 @@ pub fn format<D: CardDevice>(device: &D, volume_id: u32) -> Result<(), FormatErr
     Ok(())
 }
 
-/// A card on its way to be formatted, one command at a step: the FAT of a large card is tens of megabytes.
+/// A card that is being formatted, one command at a step: the FAT of a large card is tens of megabytes.
 ///
-/// The partition table is cleared first and written last, so that a cut in between leaves an unformatted card, and not a
-/// damaged volume.
+/// The partition table is cleared first and written last, so that a cut in between leaves an unformatted card, and
+/// not a damaged volume.
 #[derive(Clone, Copy, Debug)]
 pub struct Formatting {
     volume_id: u32,
     plan: Option<Plan>,
 }
 
-/// What goes where.
+/// The places of all structures.
 #[derive(Clone, Copy, Debug)]
 struct Plan {
     volume_id: u32,
@@ -70,14 +70,14 @@ struct Plan {
     /// The next block to be cleared, of those before `end`.
     next: u32,
     end: u32,
-    /// How many of [`STRUCTURES`] are written.
+    /// Number of written [`STRUCTURES`].
     structures: usize,
 }
 
-/// Where the FAT begins.
+/// The first block of the FAT.
 const FAT_START: u32 = PARTITION_START + RESERVED_BLOCKS;
 type Make = fn(&Plan) -> Block;
-/// What is written once the FAT and the root directory are cleared, in this order.
+/// The blocks that are written after the FAT and the root directory are cleared, in this order.
 const STRUCTURES: [(Make, u32); 6] = [
     (fat_begin, FAT_START),
     (boot_sector, PARTITION_START),
@@ -91,7 +91,7 @@ impl Plan {
     const fn new(card_blocks: u32, volume_id: u32) -> Self {
         let total = card_blocks - PARTITION_START;
         let cluster_blocks = cluster_blocks(total);
-        // The FAT for all that is left is a little more than needed: it also covers the blocks that it takes itself.
+        // The FAT for all remaining blocks is a little larger than needed: it also covers its own blocks.
         let fat_blocks = ((total - RESERVED_BLOCKS) / cluster_blocks + 2).div_ceil(ENTRIES);
         // The FAT, and behind it the root directory's cluster.
         let end = FAT_START + fat_blocks + cluster_blocks;
@@ -100,7 +100,7 @@ impl Plan {
 }
 
 impl Formatting {
-    /// Nothing is done yet.
+    /// A card before the first step.
     pub const fn new(volume_id: u32) -> Self {
         Self { volume_id, plan: None }
     }
@@ -132,7 +132,7 @@ impl Formatting {
 }
 
 /// Clears blocks, [`CLEAR_BLOCKS`] at most.
-// Not within its caller, whose place on the stack others stand on.
+// Not inlined, to keep the caller's stack frame small.
 #[inline(never)]
 fn clear<D: CardDevice>(device: &D, at: u32, count: u32) -> Result<(), FormatError<D::Error>> {
     let zeros = [[0; BLOCK_BYTES]; CLEAR_BLOCKS as usize];

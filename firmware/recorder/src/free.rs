@@ -1,7 +1,8 @@
-//! Free clusters: found for one more segment, chained to be its own, and counted for the share of the card that logs can have.
+//! Free clusters: found for one more segment, chained to be its own, and counted for the share of the card that logs
+//! can have.
 //!
-//! A segment of 8 MiB costs its FAT blocks and no more. The data of an earlier file stays in those clusters until it is
-//! overwritten: readers tell it by its session.
+//! A segment of 8 MiB costs its FAT blocks and no more. Old data stays in those clusters until it is overwritten;
+//! readers recognise it by its session.
 
 use core::ops::Range;
 
@@ -9,11 +10,11 @@ use crate::card::CardError;
 use crate::volume::{END_OF_CHAIN, ENTRIES, Volume, entry, set_entry};
 use crate::{BLOCK_BYTES, Block, CardDevice};
 
-/// FAT blocks that one call looks through, beside a segment's own: 64 ms of a usual card. All of a large card's FAT takes
-/// seconds, and no one service of the card may take so long.
+/// FAT blocks that one call looks through, beside a segment's own: 64 ms of a usual card. All of a large card's FAT
+/// takes seconds, which one service may not take.
 const SEARCH_BLOCKS: u32 = 128;
 
-/// Offset of the cluster in the information sector from which on to look for free ones, and of the number of free ones.
+/// Offsets in the information sector: the cluster from which on to search, and the number of free ones.
 const HINT: usize = 492;
 const FREE_COUNT: usize = 488;
 /// Signatures of the information sector (Microsoft's FAT specification 1.03, `FSInfo`), and their offsets.
@@ -24,16 +25,16 @@ const SIGNATURES: [(usize, u32); 3] = [(0, 0x4161_5252), (484, 0x6141_7272), (50
 pub(crate) struct FreeSearch {
     /// The FAT block to look at next.
     next: u32,
-    /// FAT blocks looked through since enough clusters were found, and free clusters in the last ones of them.
+    /// FAT blocks searched since enough clusters were found, and free clusters in the last of them.
     searched: u32,
     found: u32,
-    /// The FAT block from which on these are.
+    /// The first FAT block of these.
     first: u32,
-    /// So many clusters are looked for, and were not found by the call before; 0: none are.
+    /// Clusters of a search that goes on; 0: none.
     wanted: u32,
-    /// So many clusters or more are not free. Nothing but another computer makes clusters free.
+    /// This many clusters are not free. Only another computer frees clusters.
     too_many: u32,
-    /// FAT blocks whose free entries are counted, and those.
+    /// FAT blocks whose free entries are counted, and their number.
     counted: u32,
     clusters: u32,
 }
@@ -42,7 +43,7 @@ impl FreeSearch {
     /// A search that begins at the cluster that the information sector names.
     pub(crate) fn new<D: CardDevice>(volume: &Volume<'_, D>) -> Self {
         let mut block = [[0; BLOCK_BYTES]];
-        // A sector that cannot be read tells nothing, as one that is not signed.
+        // An unreadable sector counts as an unsigned one.
         let is_read = volume.read(&mut block, volume.layout.info).is_ok();
         let hint = Some(word(&block[0], HINT))
             .filter(|hint| is_read && is_signed(&block[0]) && volume.is_cluster(*hint));
@@ -53,7 +54,7 @@ impl FreeSearch {
         Self { next, searched: 0, found: 0, first: next, wanted: 0, too_many, counted: 0, clusters: 0 }
     }
 
-    /// Begins at the FAT block after this cluster, where there is none free at the one that the information sector names.
+    /// Begins at the FAT block after this cluster, if the cluster in the information sector is not free.
     pub(crate) fn begin<D: CardDevice>(
         &mut self,
         volume: &Volume<'_, D>,
@@ -70,7 +71,7 @@ impl FreeSearch {
         self.next
     }
 
-    /// Counts the free clusters of one more block of the FAT; how many there are once all of it is counted.
+    /// Counts the free clusters of one more block of the FAT; the total once all of it is counted.
     pub(crate) fn count<D: CardDevice>(
         &mut self,
         volume: &Volume<'_, D>,
@@ -83,13 +84,12 @@ impl FreeSearch {
         Ok(None)
     }
 
-    /// Blocks of the FAT that tell of so many free clusters, no more of them than one call looks through; the search goes on at the
-    /// last of them. None of them lie on both sides of the FAT's end.
+    /// Blocks of the FAT with this many free clusters; one call searches a limited number, and the next goes on at
+    /// the last of them. A result never spans the FAT's end.
     ///
     /// # Errors
     ///
-    /// [`CardError::Searching`] where a part of the FAT was looked through and the next call looks further;
-    /// [`CardError::Full`] where all of it was.
+    /// [`CardError::Searching`] after a part of the FAT: the next call goes on. [`CardError::Full`] after all of it.
     pub(crate) fn find<D: CardDevice>(
         &mut self,
         volume: &Volume<'_, D>,
@@ -98,7 +98,8 @@ impl FreeSearch {
         self.find_within(volume, wanted, SEARCH_BLOCKS + wanted / ENTRIES)
     }
 
-    /// Goes on with a search that has not ended, one block of the FAT at a call. The next [`Self::find`] begins at what it found.
+    /// Continues an unfinished search, one block of the FAT at a call. The next [`Self::find`] begins with its
+    /// result.
     pub(crate) fn search_on<D: CardDevice>(
         &mut self,
         volume: &Volume<'_, D>,
@@ -131,7 +132,7 @@ impl FreeSearch {
             self.found += free;
             if self.found >= wanted {
                 let found = self.first..self.next + 1;
-                // The last block may have some left for the next segment. What is counted changes under the count.
+                // The last block may have free clusters for the next segment. A count in progress is now invalid.
                 *self = Self::at(self.next, self.too_many);
                 return Ok(found);
             }
@@ -146,19 +147,19 @@ impl FreeSearch {
         Err(CardError::Searching)
     }
 
-    /// Begins anew at the block that is looked at next: what was found before may no longer be free.
+    /// Begins anew at the next block: clusters found before may no longer be free.
     pub(crate) const fn restart(&mut self) {
         (self.first, self.found) = (self.next, 0);
     }
 
-    /// The blocks that were found last are to be looked through again.
+    /// Returns the blocks that were found last to the search.
     pub(crate) const fn again(&mut self, found: &Range<u32>) {
         (self.next, self.first) = (found.start, found.start);
     }
 }
 
-/// Makes so many free clusters of these blocks of the FAT one chain; its first and its last one. The blocks are written from the
-/// last to the first, so that each entry names a cluster that is chained already.
+/// Chains this many free clusters of these blocks of the FAT; returns the first and the last one. The blocks are
+/// written from the last to the first, so that each entry names a cluster that is chained already.
 pub(crate) fn chain_free<D: CardDevice>(
     volume: &Volume<'_, D>,
     found: &Range<u32>,
@@ -182,13 +183,13 @@ pub(crate) fn chain_free<D: CardDevice>(
     Ok((next, last))
 }
 
-/// Makes the clusters of a chain free, from its first one on.
+/// Frees the clusters of a chain, from its first one on.
 pub(crate) fn free_chain<D: CardDevice>(
     volume: &Volume<'_, D>,
     first: u32,
 ) -> Result<(), CardError<D::Error>> {
     let mut cluster = first;
-    // Each step makes one cluster free, which ends a chain that goes in a circle.
+    // Each step frees one cluster, which ends a circular chain.
     while volume.is_cluster(cluster) {
         let index = cluster / ENTRIES;
         let mut block = volume.read_fat(index)?;
@@ -202,8 +203,8 @@ pub(crate) fn free_chain<D: CardDevice>(
     Ok(())
 }
 
-/// Makes the free clusters of one block of the FAT a chain that goes on with `next`, or so many of them; the last one and the first.
-// Each function that holds a block is a call of its own, so that the stack never has two of them.
+/// Chains the free clusters of one block of the FAT, at most `most`, to `next`; returns the last and the first one.
+// Not inlined: two functions with a block each must not share a stack frame.
 #[inline(never)]
 fn chain_in_block<D: CardDevice>(
     volume: &Volume<'_, D>,
@@ -229,7 +230,7 @@ fn chain_in_block<D: CardDevice>(
     Ok((last, first))
 }
 
-/// Free clusters that one block of the FAT tells of.
+/// Free clusters in one block of the FAT.
 #[inline(never)]
 fn free_in_block<D: CardDevice>(volume: &Volume<'_, D>, index: u32) -> Result<u32, CardError<D::Error>> {
     let [block] = volume.read_fat(index)?;
@@ -237,8 +238,9 @@ fn free_in_block<D: CardDevice>(volume: &Volume<'_, D>, index: u32) -> Result<u3
     Ok(clusters.filter(|cluster| volume.is_free(&block, *cluster)).count() as u32)
 }
 
-/// Writes the information sector: the next search for free clusters, on whatever computer, begins at this one. How many are free
-/// is not known, so that it can never be wrong. A damaged sector is mended. A sector that the card refuses is left: files need no hint.
+/// Writes the information sector: the next search, on any computer, begins at this cluster. The free count is written
+/// as unknown, so that it can never be wrong. A damaged sector is repaired. A refused write is ignored: files need no
+/// hint.
 #[inline(never)]
 pub(crate) fn write_hint<D: CardDevice>(volume: &Volume<'_, D>, cluster: u32) {
     let mut block = [[0; BLOCK_BYTES]];

@@ -1,8 +1,7 @@
-//! Where things are on a card: read from its first blocks and checked before anything else looks at the card.
+//! The layout of a card: read from its first blocks and checked before any other access.
 //!
-//! A card is the world's data, so a number that does not fit is an error here ([`LayoutError`] says which), and never an overflow
-//! later.
-//! Source of the layout: Microsoft FAT specification 1.03 (`fatgen103`).
+//! A card may hold any data, so a number that does not fit is an error here ([`LayoutError`]), and never an overflow
+//! later. Source of the layout: Microsoft FAT specification 1.03 (`fatgen103`).
 
 use core::fmt;
 
@@ -27,7 +26,7 @@ pub struct Layout {
     pub info: u32,
     /// The first FAT's first block.
     pub fat_start: u32,
-    /// Blocks of one FAT that tell of clusters.
+    /// Blocks of one FAT with entries of clusters.
     pub fat_blocks: u32,
     /// Blocks from one copy of the FAT to the next.
     pub fat_stride: u32,
@@ -37,7 +36,7 @@ pub struct Layout {
     pub data_start: u32,
     /// Blocks of a cluster: a power of two, 1 to 128.
     pub cluster_blocks: u32,
-    /// How many clusters there are; they are numbered from 2.
+    /// The number of clusters; they are numbered from 2.
     pub clusters: u32,
     /// The root directory's first cluster.
     pub root: u32,
@@ -45,7 +44,7 @@ pub struct Layout {
     pub volume_id: u32,
 }
 
-/// Why a card cannot be used. It is told, never formatted unasked.
+/// Reasons why a card cannot be used. It is reported, and never formatted unasked.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LayoutError<E> {
     /// The card did not answer.
@@ -54,11 +53,11 @@ pub enum LayoutError<E> {
     NoPartitionTable,
     /// The first partition is not FAT32; its type byte (0x07 is exFAT or NTFS, 0xEE is GPT).
     NotFat32(u8),
-    /// The volume's first block does not describe a FAT32 volume; which field is wrong.
+    /// The volume's first block does not describe a FAT32 volume; the wrong field.
     BadVolume(&'static str),
 }
 
-// What is wrong, and no advice: there may be logs on such a card, and who reads this text may be about to lose them.
+// The fault alone, without advice: such a card may hold logs, and a reader in a hurry might erase them.
 impl<E> fmt::Display for LayoutError<E> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
@@ -91,8 +90,8 @@ impl Layout {
             .map_err(LayoutError::BadVolume)
     }
 
-    /// The same of a volume without a partition table before it, as an image of a partition alone has it. The recorder
-    /// writes to no such card.
+    /// The same for a volume without a partition table, as in an image of a partition alone. The recorder writes to
+    /// no such card.
     pub fn volume<D: CardDevice>(device: &D) -> Result<Self, LayoutError<D::Error>> {
         let blocks = device.num_blocks().map_err(LayoutError::Device)?;
         let mut block = [[0; BLOCK_BYTES]];

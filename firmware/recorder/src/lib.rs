@@ -1,22 +1,15 @@
-//! Log files on a FAT32 card: what the storage task does with sectors.
+//! Log files on a FAT32 card: the storage of sectors. ¶ Power can cut only the card's file system in half. So it is
+//! touched rarely, and in an order that leaves it whole at every single block write: ¶ * A log is a row of
+//! *segments*: files that are allocated whole when they are made ([`card::Card::create`]). They are written in place,
+//! one block write a sector, without an update of directory or FAT. ⏎ * A new segment's FAT blocks are written first,
+//! its directory entry last: a cut in between leaves unused clusters, nothing else. ⏎ * On a full card the oldest
+//! segment is renamed, one block write, and written anew ([`card::Card::recycle`]). ¶ * Lost sectors of a segment are
+//! rebuilt from parity at the segment's end (`hums_blackbox::parity`). ⏎ * Waiting sectors in a row are written with
+//! one command (`chain::ClusterChain`). ⏎ * The directory is read once, when a card is mounted
+//! (`directory::Directory`). ¶ [`spi`] is the driver of a real card; the PC's cards are files. ¶ No data on a card
+//! may stop the monitor:
 //!
-//! The card's file system is the one thing here that power can cut in half, so it is touched as rarely as possible and
-//! in an order that leaves it whole at every single block write:
-//!
-//! * A log is a row of *segments*: files that are allocated whole when they are made ([`card::Card::create`]) and
-//!   written in place from then on, one block write a sector, without a directory or FAT update.
-//! * A new segment's FAT blocks are written first, its directory entry last: a cut in between leaves unused clusters,
-//!   nothing else.
-//! * When the card is full the oldest segment is renamed, one block write, and written anew ([`card::Card::recycle`]).
-//!
-//! * What a card loses of a segment is made again from parity, at the segment's end (`hums_blackbox::parity`).
-//! * Sectors that wait together and lie in a row are written with one command (`chain::ClusterChain`).
-//! * The directory is read once, when a card is mounted (`directory::Directory`).
-//!
-//! [`spi`] is the driver of a real card; the PC's cards are files.
-//!
-//! Nothing on a card may stop the monitor: [`layout::Layout`] is checked before anything is computed from it, a number of a cluster
-//! before it is used, and each walk over a chain has an end.
+//! [`layout::Layout`] is checked before it is used, so is each cluster number, and each walk over a chain has an end.
 #![cfg_attr(not(test), no_std)]
 
 pub mod card;
@@ -41,14 +34,14 @@ pub use status::{CardState, CardStatus};
 
 use hums_core::clock::Instant;
 
-/// What an error of a card means for whoever records on it.
+/// The consequence of a card error for recording.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Trouble {
     /// No card answers, or another one does.
     Gone,
-    /// It does not become ready: nothing more is to be had of it before it is identified anew.
+    /// It does not become ready, and must be identified anew.
     Stuck,
-    /// It answers, and refused this access: the same again, or another place, may work.
+    /// It answers, but refused this access: another try or another place may work.
     Refusing,
     /// It must not be written.
     Locked,
@@ -60,7 +53,7 @@ pub const BLOCK_BYTES: usize = 512;
 /// A block, in which cards are read and written.
 pub type Block = [u8; BLOCK_BYTES];
 
-/// A card: a device of blocks that can be told to start over, as it must be after it was pulled and put back.
+/// A card: a device of blocks that can start over, as after it was pulled and put back.
 pub trait CardDevice {
     /// Why an access failed.
     type Error: core::fmt::Debug;
@@ -74,31 +67,31 @@ pub trait CardDevice {
     /// How many blocks the card has.
     fn num_blocks(&self) -> Result<u32, Self::Error>;
 
-    /// Forgets what is known of the card, so that the next access identifies it anew, and whichever it is.
+    /// Drops the card's identity: the next access identifies any card.
     fn reset(&self) {}
 
-    /// Identifies the card anew at the next access, which fails if it is another one by then.
+    /// Identifies the card at the next access, which fails if it is another one.
     fn recheck(&self) {}
 
-    /// A service begins: all waits until the next call are together to have an end.
+    /// A service begins: all waits until the next call together have a limit.
     fn begin_service(&self) {}
 
-    /// The time, by which the card's commands are timed.
+    /// The clock for timing the card's commands.
     fn now(&self) -> Instant {
         Instant::ZERO
     }
 
-    /// Accesses that the device itself tried again since the last call.
+    /// Accesses that the device itself repeated since the last call.
     fn take_retries(&self) -> u32 {
         0
     }
 
-    /// Whether logs of earlier power-ons are never overwritten: a card without room is full then. No card of a board asks for that.
+    /// Whether logs of earlier power-ons are never overwritten: a card without room is full then. No board uses this.
     fn keeps_logs(&self) -> bool {
         false
     }
 
-    /// What an error means.
+    /// The consequence of an error.
     fn trouble(_error: &Self::Error) -> Trouble {
         Trouble::Refusing
     }

@@ -1,5 +1,5 @@
-//! File names of log segments: `00042_07.HUM` is segment 7 of session 42. Eight characters and three, because that is
-//! what every FAT reader shows unaltered, and in an order that a file manager sorts by age.
+//! File names of log segments: `00042_07.HUM` is segment 7 of session 42. Every FAT reader shows eight characters and
+//! three unaltered, and file managers sort them by age.
 
 use core::fmt;
 
@@ -23,7 +23,7 @@ impl LogName {
     /// Bytes of a short name as a directory entry holds it.
     pub const SHORT_BYTES: usize = 11;
 
-    /// The name that follows within the session, or `None` when the numbers are used up.
+    /// The next name within the session; `None` when the numbers are used up.
     pub(crate) const fn next_segment(self) -> Option<Self> {
         if self.segment < Self::SEGMENT_MAX {
             Some(Self { session: self.session, segment: self.segment + 1 })
@@ -32,7 +32,7 @@ impl LogName {
         }
     }
 
-    /// The first segment of the next session, or `None` when the numbers are used up.
+    /// The first segment of the next session; `None` when the numbers are used up.
     pub(crate) const fn next_session(self) -> Option<Self> {
         if self.session < Self::SESSION_MAX {
             Some(Self { session: self.session + 1, segment: 0 })
@@ -53,7 +53,7 @@ impl LogName {
         short
     }
 
-    /// Reads a directory entry's name; `None` for a file that is not ours.
+    /// Reads a directory entry's name; `None` for a foreign file.
     pub fn from_short(base: &[u8], extension: &[u8]) -> Option<Self> {
         let (session, segment) = match base {
             [session @ .., b'_', tens, units] if session.len() == 5 => (session, [*tens, *units]),

@@ -1,21 +1,21 @@
-//! The parity of the stretch in work: sums that grow with each sector that is on the card.
+//! The parity of the current stretch: sums that grow with each written sector.
 
 use crate::{BLOCK_BYTES, Block};
 use hums_blackbox::SECTOR_BYTES;
 use hums_blackbox::parity::{COLUMNS, PARITY_SECTORS, STRETCH_SECTORS, Sum};
 use hums_core::clock::{Instant, Span};
 
-/// A stretch that is not full has its parity written so often, while sectors come: what a card loses of the last while before
-/// power goes cannot be made again.
+/// Longest time until the parity of an unfinished stretch is written: sectors lost by the card before a power cut
+/// cannot be rebuilt without it.
 const EVERY: Span = Span::from_secs(10);
 
 /// The sums of a stretch, in the blocks in which they are written.
 pub(crate) struct Parity {
     blocks: [Block; PARITY_SECTORS as usize],
-    /// Sectors that each column has so far, with those that are nowhere.
+    /// Sectors in each column so far, missing ones included.
     rows: [u8; COLUMNS],
     stretch: u32,
-    /// The first sector that came since the sums were written.
+    /// Time of the first sector since the sums were written.
     since: Option<Instant>,
 }
 
@@ -35,8 +35,8 @@ impl Parity {
         }
     }
 
-    /// The room, for blocks of the directory while a card is mounted or a segment is made. Then there is no parity until
-    /// [`Self::begin`].
+    /// Lends the buffer, for directory blocks while a card is mounted or a segment is made. Until [`Self::begin`]
+    /// there is no parity.
     pub(crate) const fn lend(&mut self) -> &mut [Block] {
         self.since = None;
         &mut self.blocks
@@ -49,12 +49,12 @@ impl Parity {
         (self.stretch, self.since) = (stretch, None);
     }
 
-    /// Which stretch of the file it is of.
+    /// The number of the stretch in the file.
     pub(crate) const fn stretch(&self) -> u32 {
         self.stretch
     }
 
-    /// A sector of the stretch is on the card, at this block of the file.
+    /// Adds a sector that was written at this block of the file.
     pub(crate) fn add(&mut self, now: Instant, at: u32, sector: &[u8; SECTOR_BYTES]) {
         let index = (at % STRETCH_SECTORS) as usize;
         let (row, column) = ((index / COLUMNS) as u8, index % COLUMNS);
@@ -70,7 +70,7 @@ impl Parity {
         self.since.get_or_insert(now);
     }
 
-    /// The block of the file behind the last sector that is on the card.
+    /// The block of the file behind the last written sector.
     pub(crate) fn end(&self) -> u32 {
         let of = |(column, rows): (u32, u8)| {
             rows.checked_sub(1).map(|row| u32::from(row) * COLUMNS as u32 + column + 1)
@@ -84,12 +84,13 @@ impl Parity {
         self.since.is_some()
     }
 
-    /// Whether it has waited for long enough, though the stretch is not full.
+    /// Whether it has waited for long enough without a full stretch.
     pub(crate) fn is_overdue(&self, now: Instant) -> bool {
         self.since.is_some_and(|since| now.since(since) >= EVERY)
     }
 
-    /// What is to be written, of a file whose first sector has the number `base`. It is not due again until more comes.
+    /// The parity blocks to write, for a file whose first sector has the number `base`. They are due again after the
+    /// next sector.
     pub(crate) fn blocks(&mut self, session: u32, base: u32) -> &[Block] {
         self.since = None;
         let first = base.wrapping_add(self.stretch.wrapping_mul(STRETCH_SECTORS));

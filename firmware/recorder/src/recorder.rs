@@ -1,15 +1,14 @@
-//! Sectors to segments: one session's log on whatever card is there.
+//! Sectors to segments: one session's log on the present card.
 //!
-//! A sector with number `n` belongs at block `n - base` of the open segment. A segment is left for the next one at the
-//! first group that no longer fits, so that each file can be read by itself. A *partial* sector (one still in progress)
-//! is written alternately at its own place and at the next one, so that a torn write never takes the older copy with it.
-//! Where the newest copy lies at the sector's own place, the whole sector is first written as a copy at the next one.
-//!
-//! Each stretch of a segment has its parity at the segment's end: written when it is full, when the segment is left, when the
-//! log ends in order, and every 10 s meanwhile. It may fail without consequence: the sectors themselves are there.
-//!
-//! What fails is tried again, then given a new segment, then the card is given up and looked for once a second. A
-//! sector is only counted lost when it can never be written: the caller keeps it until then.
+//! A sector with number `n` belongs at block `n - base` of the open segment. A segment is left for the next one at
+//! the first group that no longer fits, so that each file can be read by itself. A *partial* sector (one still in
+//! progress) is written alternately at its own place and at the next one, so that a torn write never destroys the
+//! older copy. If the newest copy is at the sector's own place, the whole sector is first written as a copy at the
+//! next one. ¶ Each stretch of a segment has its parity at the segment's end. It is written when the stretch is full,
+//! when the segment is left, when the log ends in order, and every 10 s meanwhile. It may fail without consequence:
+//! the sectors themselves are there. ¶ A failed write is tried again, then with a new segment; then the card is given
+//! up and looked for once a second. A sector counts as lost only when it can never be written: the caller keeps it
+//! until then.
 
 mod before;
 mod segments;
@@ -34,16 +33,16 @@ use trouble::may_work_elsewhere;
 
 /// How often a missing or failing card is looked for.
 const RETRY: Span = Span::from_secs(1);
-/// How often a sector is tried before the segment is given up. A card that refuses one block of five at random so comes to
-/// a new segment once in 100,000 sectors; the device bounds the time of all tries together.
+/// How often a sector is tried before the segment is given up. A card that refuses one block of five at random then
+/// needs a new segment once in 100,000 sectors. The device bounds the time of all tries together.
 const WRITE_TRIES: u32 = 8;
 
-/// Why nothing was written.
+/// Reasons for a delay.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum NotYet {
-    /// Room on the card is still looked for: call again at once.
+    /// The search for room goes on: call again at once.
     Searching,
-    /// There is no card to write to now: try again later.
+    /// No card can be written now: try again later.
     Later,
 }
 
@@ -52,19 +51,20 @@ pub enum NotYet {
 pub struct InWork {
     /// Its name.
     pub name: LogName,
-    /// What seals its sectors.
+    /// The session number in the seal of its sectors.
     pub session: u32,
-    /// The number of its first sector; 0 where it has none.
+    /// The number of its first sector; 0 if it has none.
     pub first: u32,
-    /// How many blocks, from its first one on, hold sectors that are whole. Copies of the sector in progress, behind them, are still
-    /// written over.
+    /// Blocks of finished sectors, from the first one on. Copies of the sector in progress, behind them, are still
+    /// overwritten.
     pub blocks: u32,
 }
 
-/// Blocks of log that are written with one command at most: of more the gain is small.
+/// Maximum blocks of log in one command: more gain little.
 pub const ROW_BLOCKS: usize = 8;
 
-/// Room for parity. Lent, because the recorder is moved and this, 8 KiB, would come along on the firmware's stack.
+/// The parity buffer, 8 KiB. It is lent, because the recorder is moved and would take it along on the firmware's
+/// stack.
 #[derive(Default)]
 pub struct Buffers {
     pub(crate) parity: RefCell<Parity>,
@@ -83,18 +83,17 @@ pub struct Recorder<'a, D: CardDevice> {
     buffers: &'a Buffers,
     socket: Socket<'a, D>,
     retry_at: Instant,
-    /// The card in the slot is another one than the group's beginning was written to: nothing is readable on it before
-    /// the next group.
+    /// The card was changed within a group: on the new card nothing is readable before the next group.
     await_group: bool,
     segments: Segments<'a>,
-    /// How much room this card has was counted.
+    /// The room on this card is counted.
     room_known: bool,
     finished: bool,
 }
 
 impl<'a, D: CardDevice> Recorder<'a, D> {
-    /// A recorder for the card in `device`. `entropy` keeps sessions of equal number on equal cards apart: random
-    /// where the board has a random number generator, else any number that changes from one power-on to the next.
+    /// A recorder for the card in `device`. `entropy` distinguishes sessions of equal number on equal cards: random
+    /// if the board has a random number generator, else any number that changes with each power-on.
     pub const fn new(device: D, status: &'a CardStatus, buffers: &'a Buffers, entropy: u32) -> Self {
         let socket = Socket::Waiting(device);
         Self {
@@ -134,9 +133,9 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
         self.begin().map_err(|error| self.not_yet(now, &error))
     }
 
-    /// Writes sectors that wait: the first, and with the same command those after it that belong right behind it. How many of them
-    /// are done with, which are to be dropped. With none a session is opened, so that the card's state is known before there is
-    /// anything to write.
+    /// Writes waiting sectors: the first, and with the same command those that belong right behind it. Returns the
+    /// number of finished ones, which are to be dropped. Without sectors it opens a session, so that the card's state
+    /// is known early.
     pub fn write(&mut self, now: Instant, waiting: &mut [Block]) -> Result<usize, NotYet> {
         self.ready(now)?;
         let Some(first) = waiting.first().map(sector_of) else { return Ok(0) };
@@ -148,7 +147,7 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
             return Ok(1);
         }
         for tries in 0..WRITE_TRIES {
-            // Of a row in which one block was refused, the first alone is more likely to be taken.
+            // After a refused row, the first block alone is more likely to be taken.
             let most = waiting.len().min(if tries == 0 { ROW_BLOCKS } else { 1 });
             let written = self.try_write(now, &first, waiting.get_mut(..most).unwrap_or_default());
             self.count_retries();
@@ -178,15 +177,15 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
         self.status.count_write_errors(self.socket.take_retries());
     }
 
-    /// With nothing to write: looks for where the session before ended, once the session has a sector on the card, gives the
-    /// segment its date, once it is known, and counts a little further how much room there is on the card.
+    /// While nothing is to be written: finds the end of the previous session once this one has a sector on the card,
+    /// dates the segment once the date is known, and continues the count of room.
     pub fn idle(&mut self) {
         let Some(card) = self.socket.card() else { return };
         if self.segments.has_sector() {
             self.segments.look_before(card);
             self.segments.date(card);
         }
-        // The next write meets the same trouble and deals with it.
+        // The next write handles the same trouble.
         let _ = card.look_ahead();
         if self.room_known {
             return;
@@ -221,7 +220,7 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
         self.open_segment().map(|log| log.name)
     }
 
-    /// What of the segment in work no longer changes. What lies behind it, also where it has nothing yet, is left over.
+    /// The finished part of the segment in work. Data behind it is old.
     pub fn in_work(&self) -> Option<InWork> {
         let log = self.open_segment()?;
         let blocks = log.base.map_or(0, |_| self.buffers.parity.borrow().end());
@@ -233,13 +232,13 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
         self.socket.card()
     }
 
-    /// Gives the device back, with whatever is on it.
+    /// Gives the device back, with its card.
     pub fn into_device(self) -> Option<D> {
         self.socket.into_device()
     }
 
-    /// Formats the card if somebody asked for it, a little at each call; whether there was something to do: call again
-    /// at once. What is on the card is lost; a new session begins on it.
+    /// Formats the card on request, a little at each call; returns whether to call again at once. All data on the
+    /// card is lost; a new session begins on it.
     pub fn format(&mut self, now: Instant) -> bool {
         if self.status.take_format_wanted() && !self.finished {
             self.retry_at = now + RETRY;
@@ -263,7 +262,7 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
         self.socket.begin_service();
     }
 
-    /// Writes `first`, the first sector that waits, and of those behind it so many as belong there; how many.
+    /// Writes the first waiting sector, and those behind it that follow directly; returns their number.
     fn try_write(
         &mut self,
         now: Instant,
@@ -306,7 +305,7 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
         Ok(written)
     }
 
-    /// The next sector is of this stretch.
+    /// Begins the parity of the next sector's stretch.
     fn begin_stretch(&mut self, stretch: u32) {
         if self.buffers.parity.borrow().stretch() != stretch {
             self.write_parity();
@@ -314,7 +313,7 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
         }
     }
 
-    /// These sectors are on the card, from block `at` on; whether the log ends in order with one of them.
+    /// Adds sectors that were written from block `at` on; whether the log ends in order with one of them.
     fn add_to_parity(&self, now: Instant, at: u32, written: &[Block]) -> bool {
         let mut parity = self.buffers.parity.borrow_mut();
         let mut is_closed = false;
@@ -328,7 +327,7 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
         is_closed
     }
 
-    /// Writes the parity of the stretch in work, if there is any that is not on the card. What fails is counted.
+    /// Writes new parity of the stretch in work, if there is any. A failure is counted.
     fn write_parity(&mut self) {
         let buffers = self.buffers;
         let mut parity = buffers.parity.borrow_mut();
@@ -347,8 +346,8 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
         }
     }
 
-    /// Writes the first sector that waits as a partial copy, at the place after its own: a torn write at its own place then
-    /// takes nothing with it.
+    /// Writes the first waiting sector as a partial copy, at the place after its own: a torn write at its own place
+    /// then destroys nothing.
     #[inline(never)]
     fn write_copy(
         &mut self,
@@ -363,7 +362,7 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
         written.map(|_| ())
     }
 
-    /// Whether this sector belongs into a new segment.
+    /// Whether this sector begins a new segment.
     fn must_move(&mut self, sector: &Sector) -> Result<bool, CardError<D::Error>> {
         let Some(Log { base: Some(base), .. }) = self.segments.log else { return Ok(false) };
         let blocks = data_blocks(self.mounted()?.open_blocks());
@@ -385,7 +384,7 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
         Ok(())
     }
 
-    /// Leaves the open segment for the next one, a short one where the open one did not take a sector.
+    /// Leaves the open segment for the next one, a short one after a refused sector.
     fn next_segment(&mut self, is_short: bool) -> Result<(), CardError<D::Error>> {
         self.write_parity();
         let next = self.segments.next(is_short, self.socket.card().ok_or(CardError::NotOpen)?);
@@ -397,8 +396,8 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
         self.card().ok_or(CardError::NotOpen)
     }
 
-    /// The card in work is given up. The next one may be another one, for which only what comes from a group's start on
-    /// can be read: the sooner there is one, the less is lost.
+    /// Gives the card up. The next one may be another one, on which only data from a group's start on is readable: an
+    /// early group start loses least.
     fn lose(&mut self, now: Instant, error: &CardError<D::Error>) -> NotYet {
         if !matches!(error, CardError::Searching) {
             self.status.want_group();
@@ -406,7 +405,7 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
         self.not_yet(now, error)
     }
 
-    /// What an error means for the sectors that wait. A card that is not just being searched is given up.
+    /// The consequence of an error for the waiting sectors. A card is given up unless it is being searched.
     fn not_yet(&mut self, now: Instant, error: &CardError<D::Error>) -> NotYet {
         if matches!(error, CardError::Searching) {
             return NotYet::Searching;
@@ -422,8 +421,8 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
     }
 }
 
-/// How many of the sectors that wait, the first one being sector `number`, go right behind each other: full ones,
-/// and only the first may begin a group, because a segment may end before the next.
+/// The number of waiting sectors, from sector `number` on, that go right behind each other. All are full ones, and
+/// only the first may begin a group, because a segment may end before the next.
 fn count_in_row(number: u32, waiting: &[Block]) -> usize {
     let follows = |(index, block): &(usize, &Block)| {
         let sector = sector_of(block);
@@ -433,7 +432,7 @@ fn count_in_row(number: u32, waiting: &[Block]) -> usize {
     waiting.iter().enumerate().take_while(follows).count()
 }
 
-/// Seals sectors for this session. Where `partial` says so, they become partial copies, or the sectors themselves again.
+/// Seals sectors for this session. With `partial` they become partial copies, or the sectors themselves again.
 #[inline(never)]
 fn seal(blocks: &mut [Block], partial: Option<bool>, session: u32) {
     for block in blocks {

@@ -1,16 +1,16 @@
-//! What the storage task tells the others, and what it is told: plain atomics, so that neither side ever waits.
+//! Status of the storage task, and requests to it: plain atomics, so that neither side ever waits.
 
 use core::sync::atomic::{AtomicBool, AtomicU8, AtomicU32, Ordering};
 
 use hums_blackbox::record::{Before, Found};
 use hums_core::clock::{Instant, Span};
 
-/// The card works on no command.
+/// No command is running.
 const IDLE: u32 = u32::MAX;
-/// How much room there is was not counted yet.
+/// The room is not counted yet.
 const UNCOUNTED: u32 = u32::MAX;
 
-/// What the card is doing. The numbers are stored in logs.
+/// The state of the card. The numbers are stored in logs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum CardState {
@@ -32,16 +32,16 @@ pub enum CardState {
     Locked = 7,
     /// The card is exFAT (or NTFS), as cards of more than 32 GB are when they are new.
     ExFat = 8,
-    /// The card has no partition table: what is on it, if anything, is not for us to tell.
+    /// The card has no partition table; its data, if any, is of unknown kind.
     Unpartitioned = 9,
     /// A FAT32 volume whose structures are damaged.
     Damaged = 10,
-    /// The card is being formatted, because somebody asked for it.
+    /// The card is being formatted on request.
     Formatting = 11,
 }
 
 impl CardState {
-    /// Whether the card can be used once it is formatted, and what is on it is nothing that we can use.
+    /// Whether the card can be used after formatting, and holds no data in a known form.
     pub const fn wants_format(self) -> bool {
         matches!(self, Self::Foreign | Self::ExFat | Self::Unpartitioned | Self::Damaged)
     }
@@ -79,9 +79,9 @@ pub struct CardStatus {
     frames_lost: AtomicU32,
     sectors_lost: AtomicU32,
     stall_ms_max: AtomicU32,
-    /// When the command began that the card works on, milliseconds modulo 2^32; [`IDLE`] between commands.
+    /// Start of the running command, milliseconds modulo 2^32; [`IDLE`] between commands.
     busy_since_ms: AtomicU32,
-    /// The longest command of the service that is going on: when it began, and how long it took.
+    /// The longest command of the present service: its start and its duration.
     longest_since_ms: AtomicU32,
     longest_ms: AtomicU32,
     /// The volume's serial number.
@@ -93,7 +93,7 @@ pub struct CardStatus {
     group_wanted: AtomicBool,
     format_wanted: AtomicBool,
     fat_time: AtomicU32,
-    /// The session before on this card: whether it is news, and what was found.
+    /// The previous session on this card: whether it is unread, and the result.
     before_news: AtomicBool,
     before_found: AtomicU8,
     before_number: AtomicU32,
@@ -103,21 +103,21 @@ pub struct CardStatus {
     before_check: AtomicU32,
 }
 
-/// How much room a card has.
+/// The room on a card.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Counted {
-    /// What logs can have of it, in thousandths.
+    /// The share for logs, in thousandths.
     pub(crate) permille: u32,
-    /// What is in use, logs included, in MiB.
+    /// Used space, logs included, in MiB.
     pub(crate) used_mib: u32,
-    /// All there is, in MiB.
+    /// Total space, in MiB.
     pub(crate) total_mib: u32,
 }
 
 /// A reading of [`CardStatus`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct CardReading {
-    /// What the card is doing.
+    /// The state of the card.
     pub state: CardState,
     /// The session's number on this card; 0 before there is one.
     pub session: u32,
@@ -127,7 +127,7 @@ pub struct CardReading {
     pub segments_overwritten: u32,
     /// Blocks of 512 bytes of log data that the card took.
     pub blocks_written: u32,
-    /// Write commands that took them: fewer, because sectors that wait together are written together.
+    /// Write commands for them: fewer, because waiting sectors are written together.
     pub writes: u32,
     /// Writes that failed, retries included.
     pub write_errors: u32,
@@ -142,7 +142,7 @@ pub struct CardReading {
     /// The share of the card that logs can have, in thousandths: free clusters and those of logs. `None` until the
     /// file allocation table was counted, which takes a while on a large card.
     pub room_permille: Option<u32>,
-    /// What was in use when that was counted, logs included, and all there is, in MiB.
+    /// Used space at that count, logs included, and total space, in MiB.
     pub storage_mib: Option<(u32, u32)>,
 }
 
@@ -186,7 +186,7 @@ impl CardStatus {
         }
     }
 
-    /// All figures; each is right by itself, they may be a moment apart.
+    /// All figures; each is valid by itself, but they may be of different moments.
     pub fn read(&self) -> CardReading {
         CardReading {
             state: CardState::from_number(self.state.load(Ordering::Relaxed)),
@@ -209,12 +209,12 @@ impl CardStatus {
         }
     }
 
-    /// Storage has found this out.
+    /// Sets the state.
     pub fn set_state(&self, state: CardState) {
         self.state.store(state as u8, Ordering::Relaxed);
     }
 
-    /// A volume with this serial number was opened.
+    /// Sets the serial number of the opened volume.
     pub fn set_volume(&self, volume: u32) {
         self.volume.store(volume, Ordering::Relaxed);
     }
@@ -239,7 +239,7 @@ impl CardStatus {
         self.frames_lost.fetch_add(frames, Ordering::Relaxed);
     }
 
-    /// Notes how much room the card has; `None`: not counted.
+    /// Sets the room on the card; `None`: not counted.
     pub(crate) fn set_room(&self, room: Option<Counted>) {
         let room = room.unwrap_or(Counted { permille: UNCOUNTED, used_mib: 0, total_mib: 0 });
         self.used_mib.store(room.used_mib, Ordering::Relaxed);
@@ -257,7 +257,7 @@ impl CardStatus {
         self.busy_since_ms.store((now.as_millis() as u32).min(IDLE - 1), Ordering::Relaxed);
     }
 
-    /// The card is done with the command.
+    /// The command has ended.
     pub(crate) fn end_command(&self, now: Instant) {
         let since_ms = self.busy_since_ms.swap(IDLE, Ordering::Relaxed);
         let took_ms = (now.as_millis() as u32).wrapping_sub(since_ms);
@@ -268,8 +268,8 @@ impl CardStatus {
         }
     }
 
-    /// How long the card has worked on a command by now; zero between commands. Commands of a simulated card end at a time that is still to
-    /// come, and of those the longest one of the service counts.
+    /// Duration of the running command so far; zero between commands. Commands of a simulated card end in the future;
+    /// of those the longest one of the service counts.
     pub fn stall(&self, now: Instant) -> Span {
         // A command is far shorter than the 49 days after which the number repeats.
         let since = |since_ms: u32| (now.as_millis() as u32).wrapping_sub(since_ms);
@@ -283,27 +283,27 @@ impl CardStatus {
         Span::from_millis(u64::from(ms))
     }
 
-    /// Storage asks for a new group: what comes next should be readable without what came before.
+    /// Requests a new group, so that the next data is readable without earlier sectors.
     pub fn want_group(&self) {
         self.group_wanted.store(true, Ordering::Release);
     }
 
-    /// Whether storage asked for a new group since the last call.
+    /// Whether a new group was requested since the last call.
     pub fn take_group_wanted(&self) -> bool {
         self.group_wanted.swap(false, Ordering::Acquire)
     }
 
-    /// Somebody asks for the card that is in to be formatted.
+    /// Requests that the present card be formatted.
     pub fn want_format(&self) {
         self.format_wanted.store(true, Ordering::Release);
     }
 
-    /// Whether somebody asked since the last call.
+    /// Whether that was requested since the last call.
     pub(crate) fn take_format_wanted(&self) -> bool {
         self.format_wanted.swap(false, Ordering::Acquire)
     }
 
-    /// Tells which session was recorded before on the card that is in.
+    /// Sets the previous session on the present card.
     pub(crate) fn set_before(&self, before: &Before) {
         self.before_found.store(before.found as u8, Ordering::Relaxed);
         self.before_number.store(before.number, Ordering::Relaxed);
@@ -314,8 +314,8 @@ impl CardStatus {
         self.before_news.store(true, Ordering::Release);
     }
 
-    /// Which session was recorded before, once for each card that is opened. The fields are written long before the next
-    /// card can be: storage looks for one once a second.
+    /// The previous session, once for each card that is opened. The fields are stable until the next card: storage
+    /// looks for one once a second.
     pub fn take_before(&self) -> Option<Before> {
         self.before_news.swap(false, Ordering::Acquire).then(|| Before {
             found: Found::from_number(self.before_found.load(Ordering::Relaxed)),
@@ -327,7 +327,7 @@ impl CardStatus {
         })
     }
 
-    /// Tells the date for directory entries, in seconds since 1970 UTC.
+    /// Sets the date for directory entries, in seconds since 1970 UTC.
     pub fn set_utc_secs(&self, utc_secs: u32) {
         self.fat_time.store(utc_secs, Ordering::Relaxed);
     }
@@ -337,7 +337,7 @@ impl CardStatus {
         fat_date(self.fat_time.load(Ordering::Relaxed))
     }
 
-    /// Whether the date was told.
+    /// Whether the date is known.
     pub(crate) fn is_utc_known(&self) -> bool {
         self.fat_time.load(Ordering::Relaxed) != 0
     }
@@ -362,8 +362,8 @@ const fn fat_date(utc_secs: u32) -> [u8; 4] {
     (date << 16 | time).to_le_bytes()
 }
 
-/// Seconds since 1970 of time and date of a directory entry; 0 for 1 January 1980, which stands for a date that was not known. The inverse
-/// of [`fat_date`], by the same algorithms.
+/// Seconds since 1970 of time and date of a directory entry; 0 for 1 January 1980, which stands for an unknown date.
+/// The inverse of [`fat_date`], by the same algorithms.
 pub(crate) const fn utc_secs(fat: &[u8; 4]) -> u32 {
     let (time, date) =
         (u16::from_le_bytes([fat[0], fat[1]]) as u32, u16::from_le_bytes([fat[2], fat[3]]) as u32);

@@ -1,12 +1,12 @@
-//! A card's blocks as the file system accesses them: one command at a time, each of which is timed.
+//! A card's blocks for the file system: one timed command at a time.
 
 use crate::card::CardError;
 use crate::layout::Layout;
 use crate::status::CardStatus;
 use crate::{BLOCK_BYTES, Block, CardDevice};
 
-/// How often a block of the file system is tried to be written. A chain of which only a part was written takes clusters that no
-/// file has. The device bounds the time of all tries together ([`CardDevice::begin_service`]).
+/// Tries of writing a block of the file system. A partly written chain takes clusters without a file. The device
+/// bounds the time of all tries together ([`CardDevice::begin_service`]).
 const METADATA_TRIES: u32 = 8;
 
 /// FAT entries of a block.
@@ -46,7 +46,7 @@ impl<'a, D: CardDevice> Volume<'a, D> {
         self.command(|device| device.write(blocks, at))
     }
 
-    /// Writes blocks of the file system, [`METADATA_TRIES`] times where that fails.
+    /// Writes blocks of the file system, up to [`METADATA_TRIES`] times.
     pub(crate) fn write_metadata(&self, blocks: &[Block], at: u32) -> Result<(), CardError<D::Error>> {
         let mut written = self.write(blocks, at);
         for _ in 1..METADATA_TRIES {
@@ -102,8 +102,8 @@ impl<'a, D: CardDevice> Volume<'a, D> {
         self.layout.data_start + (cluster - 2) * self.layout.cluster_blocks
     }
 
-    /// Whether this cluster is free by its entry in a block of the FAT. The root directory's first one never is, although a card
-    /// may have lost its part of the FAT.
+    /// Whether this cluster is free by its entry in a block of the FAT. The root directory's first one never is, even
+    /// if the card lost its part of the FAT.
     pub(crate) fn is_free(&self, block: &Block, cluster: u32) -> bool {
         self.is_cluster(cluster) && cluster != self.layout.root && entry(block, cluster) == 0
     }

@@ -1,4 +1,4 @@
-//! The card layer against a card in memory that remembers every block write, so that power can be cut at each of them.
+//! The card layer against a card in memory with a journal of block writes, so that power can be cut at each of them.
 
 mod common;
 
@@ -21,7 +21,7 @@ fn logs(card: &Card<'_, MemCard>) -> Vec<LogEntry> {
     logs
 }
 
-/// Makes a segment, however long its room is looked for.
+/// Makes a segment, with as many calls as the search for room takes.
 fn create(card: &mut Card<'_, MemCard>, name: LogName, bytes: u32) -> Result<(), CardError<Broken>> {
     loop {
         match card.create(name, bytes) {
@@ -59,7 +59,7 @@ fn a_segment_reads_back_after_a_remount() {
     assert_eq!(card.write(2048, &[block]), Err(CardError::NotOpen));
 }
 
-/// Two segments that grew in turns lie in pieces: a write ends where its piece does, and says so.
+/// Two segments that grew in turns lie in pieces: a write ends with its piece, and reports that.
 #[test]
 fn a_write_of_many_blocks_takes_one_command_for_each_row_of_clusters() {
     let device = MemCard::formatted(64 * MIB_BLOCKS);
@@ -124,8 +124,8 @@ fn writing_in_place_touches_neither_fat_nor_directory() {
     );
 }
 
-/// Every prefix of the journal, whole and with the last block torn either way, is a card in order: all logs that it
-/// lists can be read to their ends, and none of an earlier session has changed.
+/// Every prefix of the journal, whole and with the last block torn either way, is a valid card. All listed logs are
+/// readable to their ends, and logs of earlier sessions are unchanged.
 #[test]
 fn a_cut_at_any_write_leaves_the_card_in_order() {
     let device = MemCard::formatted(40 * MIB_BLOCKS);
@@ -304,7 +304,7 @@ fn a_card_too_small_for_fat32_is_not_formatted() {
     format(&MemCard::new(BLOCKS_MIN), 1).expect("the smallest card");
 }
 
-/// Where the card layer's formatting puts the FAT.
+/// The first block of the FAT after formatting.
 const FAT_START: u32 = 2048 + 32;
 
 /// Changes one block of a card.
@@ -312,7 +312,7 @@ fn change(device: &MemCard, at: u32, change: impl FnOnce(&mut [u8; 512])) {
     change(device.blocks.borrow_mut().entry(at).or_insert([0; 512]));
 }
 
-/// The information sector knows nothing.
+/// Erases the information sector's hint.
 fn forget_hint(device: &MemCard) {
     change(device, 2048 + 1, |info| info[488..496].fill(0xFF));
 }
@@ -330,7 +330,7 @@ fn a_damaged_information_sector_keeps_nobody_from_recording_and_is_mended() {
         change(&device, info, |block| block[at..at + bytes].fill(0));
         let status = CardStatus::new();
         mount(&device, &status).create(FIRST, 1 << 20).expect("there is room");
-        // Again: now as others read it.
+        // Again, by other readers.
         assert!(logs(&mount(&device, &status)).iter().any(|log| log.name == FIRST));
         change(&device, info, |block| {
             assert_eq!(
@@ -359,7 +359,7 @@ fn the_root_directory_is_no_free_cluster_where_its_fat_was_lost() {
 
 #[test]
 fn a_log_whose_fat_was_lost_is_chained_again_and_not_written_over() {
-    // All of it, its beginning, its middle and its end, in blocks of the FAT.
+    // The whole FAT, its beginning, its middle and its end.
     for lost in [0..17, 0..5, 5..9, 12..17] {
         let device = MemCard::formatted(64 * MIB_BLOCKS);
         let status = CardStatus::new();
@@ -381,7 +381,7 @@ fn a_log_whose_fat_was_lost_is_chained_again_and_not_written_over() {
         }
         let mut segment = card.segment(FIRST).expect("it is there");
         let mut block = [0; BLOCK_BYTES];
-        // Where the FAT goes on behind what was lost, only the place of the link to there is not known.
+        // If the FAT goes on behind the lost part, only the place of the link to there is unknown.
         let blocks = if lost.end == 17 { 2048 } else { lost.end * 128 - 3 };
         for index in 0..blocks {
             card.read(&mut segment, index, &mut block).expect("it reads");
@@ -431,8 +431,8 @@ fn free_clusters_that_no_log_lost_are_taken() {
     card.read(&mut segment, 3071, &mut block).expect("its chain is as it was");
 }
 
-/// Free clusters one by one, too few before the FAT's end, and many blocks of it from its beginning: a segment takes each that nobody has, in both
-/// copies of the FAT, and no other one.
+/// Free clusters one by one, too few before the FAT's end, and more in blocks from its beginning. A segment takes
+/// each free one, in both copies of the FAT, and no other.
 #[test]
 fn a_segment_is_chained_through_whatever_clusters_are_free() {
     const LAST: u32 = 0x0FFF_FFFF;
@@ -450,7 +450,7 @@ fn a_segment_is_chained_through_whatever_clusters_are_free() {
         let bytes: Vec<u8> = fat.collect();
         bytes.chunks_exact(4).map(|entry| u32::from_le_bytes(entry.try_into().expect("four"))).collect()
     };
-    // Somebody has two of three clusters, and the search begins in the last block but three.
+    // Two of three clusters are used, and the search begins in the last block but three.
     for cluster in (3..layout.clusters + 2).filter(|cluster| cluster % 3 != 0) {
         let at = cluster as usize % 128 * 4;
         for copy in 0..layout.fat_copies {
@@ -486,7 +486,7 @@ fn a_segment_is_chained_through_whatever_clusters_are_free() {
     card.read(&mut segment, last, &mut [0; BLOCK_BYTES]).expect("its chain ends with it");
 }
 
-/// A card of which another computer deleted these of 21 logs, all before the last one's clusters.
+/// A card on which another computer deleted these of 21 logs, all before the last one's clusters.
 fn with_deleted(is_deleted: impl Fn(u32) -> bool) -> MemCard {
     let device = MemCard::formatted(64 * MIB_BLOCKS);
     let status = CardStatus::new();

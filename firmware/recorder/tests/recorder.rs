@@ -1,4 +1,4 @@
-//! The recorder on a card in memory: what happens to sectors when the card is pulled, swapped, full or failing.
+//! The recorder on a card in memory: its sectors when the card is pulled, swapped, full or failing.
 
 mod common;
 
@@ -27,7 +27,7 @@ impl SectorSink for Sink {
     }
 }
 
-/// Sectors of a made-up recording: `count` frames of 100 bytes that do not compress.
+/// Sectors of a generated recording: `count` frames of 100 bytes that do not compress.
 fn sectors(count: u32) -> Vec<Sector> {
     let (mut sink, mut writer) = (Sink(Vec::new()), Box::new(Writer::new()));
     let mut state = 1_u32;
@@ -55,7 +55,7 @@ fn put(recorder: &mut Recorder<'_, impl CardDevice>, now: Instant, sector: &Sect
     }
 }
 
-/// Lets the recorder write what waits, with few commands.
+/// Lets the recorder write the waiting sectors, with few commands.
 fn write_all(recorder: &mut Recorder<'_, impl CardDevice>, sectors: &[Sector]) {
     let mut blocks: Vec<Block> = sectors.iter().map(|sector| *sector.bytes()).collect();
     let mut waiting = blocks.as_mut_slice();
@@ -199,7 +199,7 @@ fn a_full_card_overwrites_its_oldest_log_and_keeps_the_newest() {
     assert_eq!(before.iter().max(), Some(&sessions));
     assert!(*before.iter().min().unwrap() > 1, "the oldest one is gone");
     assert!(status.read().segments_overwritten > 0);
-    // One that may not go.
+    // A card whose logs must stay.
     device.keeps_logs.set(true);
     let mut recorder = Recorder::new(device.clone(), &status, held(), sessions);
     assert_eq!(put(&mut recorder, Instant::ZERO, &sectors(10)[0]), Err(NotYet::Later));
@@ -233,7 +233,7 @@ fn no_log_is_overwritten_while_there_is_room_that_nothing_points_to() {
         recorder.finish();
         status.read().segments_overwritten
     };
-    // Six segments of 2.5 MiB are 240 blocks of the FAT, more than are looked through at once.
+    // Six segments of 2.5 MiB are 240 blocks of the FAT, more than one call searches.
     for session in 1..=6 {
         assert_eq!(record(session), 0);
     }
@@ -242,7 +242,7 @@ fn no_log_is_overwritten_while_there_is_room_that_nothing_points_to() {
             .copy_from_slice(&hint.to_le_bytes());
         let before = device.reads.get();
         assert_eq!(record(hint), 0, "hint {hint}");
-        // All of the FAT is 640 blocks, and each is looked at once or twice.
+        // All of the FAT is 640 blocks, and each is read once or twice.
         assert!(device.reads.get() - before < 2_000, "{} blocks read", device.reads.get() - before);
     }
     let mut names: Vec<_> = stored(&device).into_iter().map(|(name, ..)| name.session).collect();
@@ -269,7 +269,7 @@ fn a_torn_partial_never_takes_the_older_copy_with_it() {
     assert_eq!(stored(&device).len(), 2, "the newest copy and the one before");
 }
 
-/// The sector that is whole now is written at its own place; where the newest copy lies there, it is elsewhere too by then.
+/// The finished sector is written at its own place; if the newest copy is there, a second copy exists by then.
 #[test]
 fn a_torn_whole_sector_never_takes_the_newest_copy_with_it() {
     for copies in 1..5_u64 {
@@ -296,7 +296,7 @@ fn a_torn_whole_sector_never_takes_the_newest_copy_with_it() {
     }
 }
 
-/// What waited while the card stood still is written with few commands.
+/// Sectors that waited for a busy card are written with few commands.
 #[test]
 fn sectors_that_wait_together_are_written_together() {
     let device = MemCard::formatted(64 * MIB_BLOCKS);
@@ -313,7 +313,7 @@ fn sectors_that_wait_together_are_written_together() {
     assert!(commands * 7 < blocks, "{blocks} blocks in {commands} commands");
 }
 
-/// A card that fails in the middle of a command: what it took before is written again, at the same places.
+/// A card that fails within a command: blocks that it took before are written again, at the same places.
 #[test]
 fn a_write_that_fails_half_way_is_repeated_from_its_first_sector() {
     let device = MemCard::formatted(64 * MIB_BLOCKS);
@@ -328,8 +328,8 @@ fn a_write_that_fails_half_way_is_repeated_from_its_first_sector() {
     assert!(stored(&device).iter().all(|(name, ..)| name.segment == 0), "no new segment was needed");
 }
 
-/// A card that refuses one block write of five: no segment is given up for it, so that the card does not fill and the logs
-/// of earlier sessions stay.
+/// A card that refuses one block write of five keeps its segment, so that it does not fill up and logs of earlier
+/// sessions stay.
 #[test]
 fn a_card_that_refuses_writes_at_random_loses_no_earlier_log() {
     let device = MemCard::formatted(64 * MIB_BLOCKS);
@@ -359,8 +359,8 @@ fn a_card_that_refuses_writes_at_random_loses_no_earlier_log() {
     assert!(status.read().write_errors > 500, "{:?}", status.read());
 }
 
-/// Of any two pages of a stretch all sectors are made again, also of one that is not full, and behind a segment that was left
-/// because the card refused a block.
+/// All sectors of any two pages of a stretch are rebuilt, also in an unfinished stretch, and behind a segment that
+/// was left after a refused block.
 #[test]
 fn lost_pages_are_made_again_from_parity() {
     let device = MemCard::formatted(64 * MIB_BLOCKS);
@@ -416,7 +416,7 @@ fn lost_pages_are_made_again_from_parity() {
     assert!(stretch >= 2, "{stretch} stretches");
 }
 
-/// Whatever the session before wrote, the next start finds where it ended.
+/// After any end of the previous session, the next start finds that end.
 #[test]
 fn the_next_start_finds_where_the_session_before_ended() {
     for count in [0_u32, 1, 7, 100, 2_000, 30_000] {
@@ -424,7 +424,7 @@ fn the_next_start_finds_where_the_session_before_ended() {
         let status = CardStatus::new();
         let mut recorder = Recorder::new(device.clone(), &status, held(), 7);
         let all = sectors(count);
-        // The last one is not closed: power goes.
+        // The last one stays open: power fails.
         let written = if count == 0 { &[] } else { &all[..all.len() - 1] };
         assert_eq!(recorder.write(Instant::ZERO, &mut []), Ok(0), "the segment is made");
         for sector in written {
@@ -443,7 +443,7 @@ fn the_next_start_finds_where_the_session_before_ended() {
         let sectors = written.len() as u32;
         let expected = Before { found: Found::Frames, number: 1, session, sectors, frames, check };
         assert_eq!(before, expected, "{count} frames");
-        // A start whose power goes before its first sector: the same is found behind its empty segment.
+        // After a start whose power fails before its first sector, the same is found behind its empty segment.
         assert_eq!(
             Recorder::new(device.clone(), &CardStatus::new(), held(), 9).write(Instant::ZERO, &mut []),
             Ok(0)
@@ -453,7 +453,7 @@ fn the_next_start_finds_where_the_session_before_ended() {
     }
 }
 
-/// The check that a sector has, which the writer did not seal.
+/// The check of a sector that the writer has not sealed.
 fn check_of(sector: &Sector) -> u32 {
     let mut sector = *sector;
     sector.seal(1);
@@ -475,9 +475,9 @@ fn the_end_of_the_session_before_is_found_behind_damaged_pages_and_stale_sectors
     let first = first.expect("a sector was written");
     assert_eq!(found_at_next_start(&device).sectors, all.len() as u32 - 1);
     let reads = device.reads.get() - reads_before;
-    // Of them some 80 are the FAT of the session before, which is followed once on its way to room for the next one, and some
-    // 60 that of the new one, on the way to its parity: clusters of a block, as on this small card, take 64 times the FAT that
-    // those of a large card take.
+    // Some 80 of them are the FAT of the previous session, which is followed once in the search for room. Some 60 are
+    // the new session's, up to its parity. Clusters of one block, as on this small card, take 64 times the FAT of a
+    // large card.
     assert!(reads < 600, "{reads} blocks were read");
     for page in (1..all.len() as u32 / 8 - 1).step_by(3) {
         device.blocks.replace(whole.clone());
@@ -487,7 +487,7 @@ fn the_end_of_the_session_before_is_found_behind_damaged_pages_and_stale_sectors
         let before = found_at_next_start(&device);
         assert_eq!(before.sectors, all.len() as u32 - 1, "page {page}");
     }
-    // Behind the end lies what another session left there.
+    // Behind the end are sectors of another session.
     device.blocks.replace(whole.clone());
     for at in 0..200 {
         let mut sector = Sector::from_bytes(*all[at].bytes());
@@ -497,8 +497,9 @@ fn the_end_of_the_session_before_is_found_behind_damaged_pages_and_stale_sectors
     assert_eq!(found_at_next_start(&device).sectors, all.len() as u32 - 1);
 }
 
-/// Power goes at each write around the beginning of a file: what that file held before is not taken for the end, on an empty card
-/// and on one that is full of older sessions. A frame that is in a copy of a sector and in the sector after it counts once.
+/// Power fails at each write around the beginning of a file, on an empty card and on one full of older sessions. Old
+/// data of that file is never taken for the end. A frame both in a copy of a sector and in the next sector counts
+/// once.
 #[test]
 fn the_end_is_found_wherever_power_goes_around_the_beginning_of_a_file() {
     let (mut begun, mut fuller_copies) = (0, 0);
@@ -556,7 +557,7 @@ fn the_end_is_found_wherever_power_goes_around_the_beginning_of_a_file() {
     assert!(begun > 8 && fuller_copies > 0, "{begun} writes to begin files, {fuller_copies} fuller copies");
 }
 
-/// Records several files, with a copy of the sector in progress now and then; the session.
+/// Records several files, with occasional copies of the sector in progress; returns the session.
 fn record_files(device: &MemCard) -> u32 {
     let status = leaked();
     let mut recorder = Recorder::new(device.clone(), status, held(), 99);
@@ -587,7 +588,8 @@ fn leaked() -> &'static CardStatus {
     Box::leak(Box::default())
 }
 
-/// Looking for the session before takes a while in which nothing is written: the session's first sector does not wait.
+/// The search for the previous session takes a while without recording; the session's first sector does not wait for
+/// it.
 #[test]
 fn the_session_before_is_looked_for_once_the_first_sector_is_on_the_card() {
     let device = MemCard::formatted(64 * MIB_BLOCKS);
@@ -637,7 +639,7 @@ fn the_only_log_of_a_full_card_is_looked_at_before_it_makes_room() {
     assert_eq!((before.number, before.session, before.sectors), (5, 0x55, all.len() as u32));
 }
 
-/// What a recorder that starts now says of the session before; the card stays as it is.
+/// The previous session as a recorder finds it at its next start; the card stays unchanged.
 fn found_at_next_start(device: &MemCard) -> Before {
     let whole = device.blocks.borrow().clone();
     let status = CardStatus::new();
@@ -680,7 +682,7 @@ fn a_log_that_lost_its_part_of_the_fat_is_not_written_anew() {
     for session in 1..=15 {
         record(session, 10);
     }
-    // The first log's second block of the FAT, and its third one, say that it ends there.
+    // The first log's second and third block of the FAT end its chain.
     let fat = 2048 + 32;
     let end = [0xFF_u8; 512];
     device.blocks.borrow_mut().extend([(fat + 1, end), (fat + 2, end)]);
@@ -695,7 +697,7 @@ fn a_log_that_lost_its_part_of_the_fat_is_not_written_anew() {
         names
     };
     assert!(names().contains(&1) && names().contains(&16), "what the first one has stays: {:?}", names());
-    // All of it: nothing is written anew, and the card is told as damaged.
+    // The whole FAT: nothing is overwritten, and the card is reported as damaged.
     let blocks = 600;
     device.blocks.borrow_mut().extend((fat..fat + blocks).map(|at| (at, end)));
     let before = names();

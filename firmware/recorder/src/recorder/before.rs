@@ -1,11 +1,11 @@
-//! Where the session before this one ended: looked for once for each card, when the session has its first sector on it.
+//! The end of the previous session: found once for each card, when the new session has its first sector on it.
 //!
-//! A segment is allocated whole and written from its beginning, so its last sector is found by bisection: some sixty
-//! reads of a segment of 8 MiB, and as many again at most to count the frames of its last group. That is 0.1 s of a usual
-//! card, in which frames wait in the sector queue.
+//! A segment is allocated whole and written from its beginning, so bisection finds its last sector. A segment of 8
+//! MiB takes some sixty reads, and at most as many again to count the frames of its last group. That is 0.1 s of a
+//! usual card, in which frames wait in the sector queue.
 //!
-//! A file that was written anew holds older sectors behind its own, and nothing else before its first one is there. The file
-//! before it tells them apart: what goes on with that one's session has higher numbers.
+//! A reused file holds older sectors behind its own, and nothing else before its first own sector. The file before it
+//! decides: sectors that continue that file's session have higher numbers.
 
 use crate::{BLOCK_BYTES, Block, CardDevice};
 use hums_blackbox::parity::data_blocks;
@@ -15,9 +15,10 @@ use hums_blackbox::{GROUP_SECTORS, Header, Sector};
 use crate::card::{Card, CardError, LogEntry, Segment};
 use crate::directory::Newest;
 
-/// Blocks that are looked at for one sound sector: a damaged page is not the end.
+/// Blocks that are searched for one sound sector: a damaged page is not the end.
 const PROBE_BLOCKS: u32 = 9;
-/// Where the newest log on the card ended. A segment that was made when the power went has no sector: then the one before it counts.
+/// The end of the newest log on the card. A segment without a sector (power failed when it was made) does not count;
+/// the one before it does.
 pub(super) fn look<D: CardDevice>(card: &Card<'_, D>, newest: &Newest) -> Before {
     let number = newest.first().map_or(0, |newest| newest.name.session);
     let unreadable = Before { found: Found::Unreadable, number, ..Before::default() };
@@ -34,7 +35,7 @@ fn search<D: CardDevice>(card: &Card<'_, D>, newest: &Newest) -> Result<Option<B
     Ok(None)
 }
 
-/// Where this segment ends; `None` where it has no sector of its own. `older` is the segment before it.
+/// The end of this segment; `None` if it has no sector of its own. `older` is the segment before it.
 fn end_of<D: CardDevice>(
     card: &Card<'_, D>,
     entry: &LogEntry,
@@ -58,13 +59,13 @@ fn end_of<D: CardDevice>(
     };
     let Some((mut last, mut header)) = begin else { return Ok(None) };
     let session = header.session;
-    // Number less place: that of the segment's first sector.
+    // The number of the segment's first sector.
     let base = header.number.wrapping_sub(last);
     let mut end = data_blocks(reader.segment.blocks());
     while last + 1 < end {
         let middle = last + (end - last) / 2;
         match reader.probe(middle, |header| header.session == session)? {
-            // A partial copy may lie one place further than its own; what is far from its place is another's.
+            // A partial copy may lie one place behind its own; a sector further away belongs to another segment.
             Some((at, found)) if at.wrapping_sub(found.number.wrapping_sub(base)) <= 1 && at < end => {
                 (last, header) = (at, found);
             }
@@ -109,7 +110,7 @@ impl<D: CardDevice> Reader<'_, '_, D> {
         Ok(Header::read(&self.block).ok())
     }
 
-    /// The first sound sector from this block on that is wanted.
+    /// The first sound sector from this block on that fits.
     fn probe(
         &mut self,
         from: u32,
@@ -124,7 +125,7 @@ impl<D: CardDevice> Reader<'_, '_, D> {
         Ok(None)
     }
 
-    /// Frames of the session up to its last sector, and the check that this one has; `None` where a sector of the last group is
+    /// Frames of the session up to its last sector, and that sector's check; `None` if a sector of the last group is
     /// missing.
     fn end(
         &mut self,
@@ -144,7 +145,7 @@ impl<D: CardDevice> Reader<'_, '_, D> {
                 return Ok(None);
             };
             if next.number == sector.number {
-                // Of several copies the whole sector counts, though a copy may have more: it ends within an entry.
+                // Of several copies the whole sector counts, even if a copy has more: it ends within an entry.
                 let is_fuller = !next.partial || next.entries() > sector.entries();
                 if sector.partial && is_fuller {
                     sector = next;

@@ -1,4 +1,4 @@
-//! Which segment is written: the session's next one, made where there is room and else in the place of the oldest.
+//! The choice of segments: the session's next one, made in free room, or else in place of the oldest.
 
 use hums_blackbox::record::{Before, Found};
 use hums_core::clock::Instant;
@@ -13,44 +13,45 @@ use crate::status::{CardState, CardStatus};
 /// Segments that even a small card should hold, so that overwriting the oldest loses little.
 const SEGMENTS_MIN: u64 = 16;
 
-/// Bytes of a segment for what another one did not take: 30 s of a full line (921,600 baud).
+/// Bytes of a segment after a refused write: 30 s of a full line (921,600 baud).
 const SHORT_SEGMENT_BYTES: u32 = 256 * 1024;
 
-/// The session's log on the card that is in.
+/// The session's log on the present card.
 #[derive(Clone, Copy)]
 pub(super) struct Log {
     pub(super) name: LogName,
-    /// What seals its sectors.
+    /// The session number in the seal of its sectors.
     pub(super) session: u32,
     volume_id: u32,
     /// The sector number at block 0 of the open segment; `None` before the first sector.
     pub(super) base: Option<u32>,
-    /// Where the newest copy of the sector in progress lies.
+    /// The newest copy of the sector in progress.
     pub(super) newest_copy: NewestCopy,
 }
 
-/// Where the newest copy of the sector in progress lies. The sector's number less that of the segment's first one is its place.
+/// The place of the newest copy of the sector in progress. A sector's place is its number less that of the segment's
+/// first one.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum NewestCopy {
     /// There is none.
     None,
     /// At the sector's own place.
     InPlace,
-    /// At the place after it. A segment begins as if there were one, so that its first block is the first one written.
+    /// At the place after it. A new segment starts in this state, so that its first block is written first.
     Further,
 }
 
-/// The session's segments on whatever card is there.
+/// The session's segments on the present card.
 pub(super) struct Segments<'a> {
     status: &'a CardStatus,
     /// Any number that differs from one power-on to the next.
     entropy: u32,
     pub(super) log: Option<Log>,
-    /// The card in the slot has a segment of it.
+    /// The present card has a segment of it.
     pub(super) is_open: bool,
-    /// The newest segments that were on the card before the session, until they were looked at.
+    /// The newest segments on the card from before the session, until they were read.
     earlier: Newest,
-    /// The open segment has a date in its directory entry, or there was trouble with it.
+    /// The open segment is dated in its directory entry, or dating failed.
     is_dated: bool,
 }
 
@@ -64,8 +65,8 @@ impl<'a> Segments<'a> {
         mix(self.entropy, now.as_micros() as u32)
     }
 
-    /// Opens a segment on a card just mounted: the session goes on where the same card came back, and is a new one on
-    /// another card. Whether it is another one than the group's beginning was written to.
+    /// Opens a segment on a card just mounted. On the same card the session goes on; another card gets a new one.
+    /// Returns whether the card was changed within a group.
     pub(super) fn begin<D: CardDevice>(
         &mut self,
         card: &mut Card<'_, D>,
@@ -73,7 +74,7 @@ impl<'a> Segments<'a> {
         let volume_id = card.layout().volume_id;
         self.status.set_volume(volume_id);
         let (newest, next) = card.next_session();
-        // Entries of further segments may be there although the card did not say so.
+        // Entries of further segments may exist despite an error of the card.
         let is_of =
             |log: &Log| newest.is_some_and(|newest| newest.session == log.name.session && newest >= log.name);
         let resumed = self.log.filter(|log| log.volume_id == volume_id && is_of(log));
@@ -102,10 +103,10 @@ impl<'a> Segments<'a> {
         Ok(before.is_some_and(|before| before.session != log.session))
     }
 
-    /// Looks for where the session before ended, once for each card, and tells it. This takes 0.1 s of a usual card, in which
-    /// nothing is written: so it waits until the session has its first sector on the card, or takes the place of an
-    /// older segment.
-    // Not within its callers: what it takes of the stack is not to lie below what makes a segment.
+    /// Finds the end of the previous session, once for each card, and reports it. This takes 0.1 s of a usual card
+    /// without recording. So it waits until the session has its first sector on the card, or overwrites an older
+    /// segment.
+    // Not inlined, so that its stack frame is not below that of making a segment.
     #[inline(never)]
     pub(super) fn look_before<D: CardDevice>(&mut self, card: &Card<'_, D>) {
         let earlier = core::mem::take(&mut self.earlier);
@@ -114,8 +115,8 @@ impl<'a> Segments<'a> {
         }
     }
 
-    /// Gives the open segment the date in its directory entry, if it was opened before UTC was known. A block is read and one
-    /// written, in which nothing else is: so it waits until there is nothing to write. What fails is not tried again.
+    /// Dates the open segment's directory entry, if it was opened before UTC was known. It reads and writes a block,
+    /// so it waits until nothing is to be written. A failure is not repeated.
     #[inline(never)]
     pub(super) fn date<D: CardDevice>(&mut self, card: &mut Card<'_, D>) {
         if !self.is_dated && self.status.is_utc_known() {
@@ -129,8 +130,8 @@ impl<'a> Segments<'a> {
         self.log.is_some_and(|log| log.base.is_some())
     }
 
-    /// Opens the segment after it. A short one is for what the segment before did not take: a card that goes away or refuses again and
-    /// again is not used up by what is begun.
+    /// Opens the next segment. A short one follows a refused write: a card that goes away or refuses again and again
+    /// is not filled by begun segments.
     pub(super) fn next<D: CardDevice>(
         &mut self,
         is_short: bool,
@@ -140,7 +141,7 @@ impl<'a> Segments<'a> {
         self.open(log.name.next_segment().ok_or(CardError::Full)?, is_short, card)
     }
 
-    /// Makes a segment, or overwrites the oldest log when the card has no room.
+    /// Makes a segment, or overwrites the oldest log on a full card.
     fn open<D: CardDevice>(
         &mut self,
         name: LogName,

@@ -1,4 +1,4 @@
-//! What is in the card's slot: a device without a usable card, a card, or one that is being formatted.
+//! The card slot: a device without a usable card, a mounted card, or a card that is being formatted.
 
 use super::Buffers;
 use crate::CardDevice;
@@ -16,13 +16,13 @@ pub(super) enum Socket<'a, D: CardDevice> {
     Mounted(Card<'a, D>),
     /// A card that is being formatted.
     Formatting(D, Formatting),
-    /// Only while the value is being replaced.
+    /// Only while the value is replaced.
     Moving,
 }
 
 impl<'a, D: CardDevice> Socket<'a, D> {
-    /// Opens the card that is in; `false` where the slot is not waiting for one.
-    // Not within its caller: the volumes that are moved here are not to lie on the stack below what follows.
+    /// Mounts the present card; `false` unless the slot waits for one.
+    // Not inlined: moved volumes must not lie on the stack below later calls.
     #[inline(never)]
     pub(super) fn mount(
         &mut self,
@@ -46,7 +46,7 @@ impl<'a, D: CardDevice> Socket<'a, D> {
         }
     }
 
-    /// Closes the card that is in.
+    /// Unmounts the card.
     pub(super) fn release(&mut self) {
         *self = match core::mem::replace(self, Self::Moving) {
             Self::Mounted(card) => Self::Waiting(card.unmount()),
@@ -54,8 +54,8 @@ impl<'a, D: CardDevice> Socket<'a, D> {
         };
     }
 
-    /// Begins to format the card that was looked at last, and no other one; `false` if the slot is not waiting for a card. A card that could be
-    /// mounted since the command is never formatted.
+    /// Begins to format the card that was examined last; `false` unless the slot waits for a card. A card that could
+    /// be mounted since the command is never formatted.
     pub(super) fn begin_format(&mut self, volume_id: u32) -> bool {
         if !matches!(self, Self::Waiting(_)) {
             return false;
@@ -66,7 +66,7 @@ impl<'a, D: CardDevice> Socket<'a, D> {
         true
     }
 
-    /// Formats a little further; whether it is done, and `None` where no card is being formatted.
+    /// Formats a little further; whether it is done, and `None` if no card is being formatted.
     pub(super) fn format(&mut self) -> Option<Result<bool, FormatError<D::Error>>> {
         let Self::Formatting(device, formatting) = self else { return None };
         let done = formatting.step(device);
@@ -78,7 +78,7 @@ impl<'a, D: CardDevice> Socket<'a, D> {
         Some(done)
     }
 
-    /// Tells the device that storage is served from now on: what it may take begins anew.
+    /// Tells the device that a service of storage begins: its time limit starts anew.
     pub(super) fn begin_service(&self) {
         match self {
             Self::Waiting(device) | Self::Formatting(device, _) => device.begin_service(),
@@ -87,7 +87,7 @@ impl<'a, D: CardDevice> Socket<'a, D> {
         }
     }
 
-    /// What the device tried again since it was asked last.
+    /// Repetitions by the device since the last call.
     pub(super) fn take_retries(&self) -> u32 {
         match self {
             Self::Mounted(card) => card.device().take_retries(),
@@ -103,7 +103,7 @@ impl<'a, D: CardDevice> Socket<'a, D> {
         if let Self::Mounted(card) = self { Some(card) } else { None }
     }
 
-    /// The device, with whatever is on its card.
+    /// The device, with its card.
     pub(super) fn into_device(mut self) -> Option<D> {
         self.release();
         if let Self::Waiting(device) = self { Some(device) } else { None }

@@ -1,11 +1,11 @@
-//! What an error of the card is to whoever records, and to the pilot.
+//! Consequences of card errors for recording and for the pilot.
 
 use crate::card::CardError;
 use crate::layout::{EXFAT_TYPE, LayoutError};
 use crate::status::CardState;
 use crate::{CardDevice, Trouble};
 
-/// What to tell of a card that met this error.
+/// The reported state of a card with this error.
 pub(super) fn state<D: CardDevice>(error: &CardError<D::Error>) -> CardState {
     match error {
         CardError::Device(error) => match D::trouble(error) {
@@ -22,7 +22,7 @@ pub(super) fn state<D: CardDevice>(error: &CardError<D::Error>) -> CardState {
     }
 }
 
-/// Whether a sector that met this error may still be written to this card now, to a new segment if need be.
+/// Whether a refused sector may still be written to this card now, if need be to a new segment.
 pub(super) fn may_work_elsewhere<D: CardDevice>(error: &CardError<D::Error>) -> bool {
     match error {
         CardError::Full | CardError::Searching => false,

@@ -1,4 +1,4 @@
-//! What can go wrong with a card on an SPI bus.
+//! Errors of a card on an SPI bus.
 
 use core::fmt;
 
@@ -9,21 +9,21 @@ use crate::Trouble;
 pub enum SpiError {
     /// The board's bus failed.
     Port,
-    /// Nothing answers: there is no card, or it has lost its power or its contact.
+    /// Nothing answers: no card, no power, or no contact.
     NoAnswer,
-    /// What answers is no SD card, or one that does not work at 3.3 V.
+    /// The device is not an SD card, or does not work at 3.3 V.
     NotSd,
-    /// Another card answers than the one that was identified: it must be looked at anew.
+    /// Another card answers than the identified one: it must be mounted anew.
     Changed,
-    /// The card did not become ready within the time that is given to it.
+    /// The card did not become ready in time.
     Busy,
     /// One service of the card took longer than [`super::SERVICE_MAX`] in all.
     OutOfTime,
     /// The card refused a command, with these bits (SD specification, 7.3.2.1).
     Refused(u8),
-    /// The card sent no block within the time that is given to it.
+    /// The card sent no block in time.
     NoData,
-    /// The card sent an error token in place of a block (7.3.3.3), or something that is no token.
+    /// The card sent an error token in place of a block (7.3.3.3), or an unknown token.
     Token(u8),
     /// A block was damaged on its way, in either direction.
     Damaged,
@@ -36,12 +36,12 @@ pub enum SpiError {
 }
 
 impl SpiError {
-    /// Whether the same access may well work a moment later.
+    /// Whether the same access may work a moment later.
     pub(super) const fn is_passing(self) -> bool {
         matches!(self, Self::NoAnswer | Self::Refused(_) | Self::NoData | Self::Token(_) | Self::Damaged)
     }
 
-    /// Whether the card must be identified anew before anything else is asked of it.
+    /// Whether the card must be identified again before the next access.
     pub(super) const fn has_lost_card(self) -> bool {
         const IDLE: u8 = 1;
         match self {
@@ -56,7 +56,7 @@ impl SpiError {
         }
     }
 
-    /// What it means for whoever records.
+    /// The consequence for recording.
     pub const fn trouble(self) -> Trouble {
         match self {
             Self::NoAnswer | Self::Changed => Trouble::Gone,

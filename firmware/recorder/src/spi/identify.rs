@@ -1,4 +1,4 @@
-//! Finds out what card is in the slot (SD specification, 7.2.1 and figure 7-2).
+//! Identification of the card in the slot (SD specification, 7.2.1 and figure 7-2).
 
 use hums_core::clock::Span;
 
@@ -21,16 +21,16 @@ const IDLE: u8 = 1;
 const ILLEGAL: u8 = 4;
 /// Of [`CONDITIONS`]: 2.7 to 3.6 V, and a pattern that comes back.
 const VOLTAGE: u32 = 0x1AA;
-/// Of [`START`]: we know cards of more than 2 GB.
+/// Of [`START`]: the host supports cards of more than 2 GB.
 const HIGH_CAPACITY: u32 = 1 << 30;
 
-/// How long a card may take to hear its first command. One that was in the middle of a block needs some of it.
+/// Maximum time until a card takes its first command. One in the middle of a block needs some of it.
 const RESET_MAX: Span = Span::from_millis(200);
-/// How long a card may take to end a row that it was in the middle of: what the specification allows.
+/// Maximum time until a card ends a row of blocks, by the specification.
 const STOP_MAX: Span = Span::from_millis(500);
-/// How often a busy card is waited for in vain before it is reset.
+/// Timeouts of a busy card before it is reset.
 const BUSY_TIMES: u8 = 4;
-/// How long a card may take to start. The specification allows 1 s.
+/// Maximum start time of a card. The specification allows 1 s.
 const START_MAX: Span = Span::from_secs(2);
 /// Bytes with the card not selected that wake it up: at least 74 clocks (6.4.1).
 const WAKE: [u8; 10] = [0xFF; 10];
@@ -38,9 +38,9 @@ const WAKE: [u8; 10] = [0xFF; 10];
 /// An identified card.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Identity {
-    /// Which card it is, of all there are (the CID register).
+    /// The card's unique identity (CID register).
     pub(super) cid: [u8; 16],
-    /// How many blocks it has, and whether they may be written.
+    /// Its number of blocks, and whether they may be written.
     pub(super) csd: Csd,
     /// Blocks are addressed by their first byte: cards up to 2 GB.
     pub(super) by_bytes: bool,
@@ -52,8 +52,8 @@ impl<P: Port> Line<P> {
         self.checks = false;
         self.port.select(false);
         self.port.send(&WAKE)?;
-        // A card that is at work is not interrupted, because that may cost more than the block in work (7.2.4). One that
-        // does not come to an end, however often it is waited for, has nothing to lose.
+        // A card that is at work is not interrupted, because that may cost more than the block in work (7.2.4). One
+        // that stays busy after [`BUSY_TIMES`] timeouts has nothing to lose.
         match self.selected(|line| line.ready(BUSY_MAX)) {
             Ok(()) => {}
             Err(SpiError::Busy) if self.busy_times >= BUSY_TIMES => {}
@@ -70,8 +70,8 @@ impl<P: Port> Line<P> {
         Ok(identity)
     }
 
-    /// The first command, until the card takes it. What it was in the middle of, when the processor restarted, is over
-    /// after at most a block and its busy time.
+    /// Sends the first command until the card takes it. A transfer from before a processor restart ends after at most
+    /// a block and its busy time.
     fn reset(&mut self) -> Result<(), SpiError> {
         let mut answers = false;
         let done = self.within(RESET_MAX, SpiError::NoAnswer, |line| {
@@ -83,25 +83,25 @@ impl<P: Port> Line<P> {
                 Err(error) => return Err(error),
             }
             line.selected(|line| {
-                // Ends a block that is being received, then the row that it belongs to, whichever way that went.
+                // Ends a block that is being received, then its row, in either direction.
                 for _ in 0..13 {
                     let mut bytes = [0xFF; 40];
                     line.port.exchange(&mut bytes)?;
                     answers |= bytes.iter().any(|byte| *byte != 0xFF);
                 }
-                // Whether it was in a row, and whether it comes to an end, shows at the next try.
+                // The next try shows whether a row was open and has ended.
                 let _ = line.command_now(STOP_TRANSMISSION, 0).and_then(|_| line.ready(STOP_MAX));
                 Ok(())
             })?;
             Ok(None)
         });
-        // Something drives the line, but does not understand.
+        // A device drives the line, but does not understand.
         done.map_err(|error| if answers && error == SpiError::NoAnswer { SpiError::Busy } else { error })
     }
 
     fn start(&mut self) -> Result<Identity, SpiError> {
         let is_old = self.conditions()?;
-        // A card that cannot check must be taken at its word; what we record has checksums of its own.
+        // A card without checksums must be trusted; records have checksums of their own.
         let checks = self.command(CHECKS, 1)? & !IDLE == 0;
         let start = if is_old { 0 } else { HIGH_CAPACITY };
         self.within(START_MAX, SpiError::Busy, |line| match line.app_command(START, start)? {
@@ -119,7 +119,7 @@ impl<P: Port> Line<P> {
         Ok(Identity { cid, csd, by_bytes })
     }
 
-    /// Whether the card is of before version 2, which does not know the question.
+    /// Whether the card is older than version 2, and does not know the question.
     fn conditions(&mut self) -> Result<bool, SpiError> {
         let answer = self.command(CONDITIONS, VOLTAGE)?;
         if answer & ILLEGAL != 0 {

@@ -6,15 +6,15 @@ use super::crc::{crc7, crc16};
 use super::error::SpiError;
 use super::port::{Port, PortFailed};
 
-/// How long a card may be busy with what it was given. The specification allows 250 to 500 ms (4.6.2.2); good cards
-/// have been seen to stand still for 2.5 s.
+/// Maximum busy time of a card. The specification allows 250 to 500 ms (4.6.2.2); good cards have been seen to stand
+/// still for 2.5 s.
 pub const BUSY_MAX: Span = Span::from_secs(3);
-/// How long a card may take to find a block. The specification allows 100 ms (4.6.2.1); a card that tidies up takes
+/// Maximum time until a card finds a block. The specification allows 100 ms (4.6.2.1); a card that tidies up takes
 /// longer for reading as well.
 const DATA_MAX: Span = Span::from_secs(1);
 /// Bytes after a command within which its answer comes: 8 by specification (7.5.4).
 const ANSWER_BYTES: usize = 10;
-/// Before a block, and before each of many.
+/// Tokens before a single block, before each of many, and at their end.
 pub(super) const TOKEN_ONE: u8 = 0xFE;
 pub(super) const TOKEN_MANY: u8 = 0xFC;
 const TOKEN_STOP: u8 = 0xFD;
@@ -24,14 +24,14 @@ const APP: u8 = 55;
 /// Bits of the second byte of a status: locked, and write protected (7.3.2.3).
 const STATUS_LOCKED: u8 = 0x01 | 0x20;
 
-/// The bus, with the time that all waits together have.
+/// The bus, with the common time limit of all waits.
 pub(super) struct Line<P> {
     pub(super) port: P,
-    /// When the service that is going on must be over.
+    /// The time limit of the present service.
     pub(super) deadline: Option<Instant>,
     /// Blocks carry checksums that count.
     pub(super) checks: bool,
-    /// How often it was waited for in vain to become ready, in a row.
+    /// Busy timeouts in a row.
     pub(super) busy_times: u8,
 }
 
@@ -42,7 +42,7 @@ impl From<PortFailed> for SpiError {
 }
 
 impl<P: Port> Line<P> {
-    /// The card listens; `act`; it listens no longer, and lets go of the line with the clocks of one byte more (7.5.1).
+    /// Selects the card, runs `act`, and deselects it with the clocks of one byte more (7.5.1).
     pub(super) fn selected<T>(
         &mut self,
         act: impl FnOnce(&mut Self) -> Result<T, SpiError>,
@@ -60,7 +60,7 @@ impl<P: Port> Line<P> {
         Ok(byte[0])
     }
 
-    /// Goes on with `step` until it gives something; fails with `late` after `limit`.
+    /// Repeats `step` until it returns a value; fails with `late` after `limit`.
     pub(super) fn within<T>(
         &mut self,
         limit: Span,
@@ -82,7 +82,7 @@ impl<P: Port> Line<P> {
         }
     }
 
-    /// Waits until the card is no longer busy.
+    /// Waits until the card is ready.
     pub(super) fn ready(&mut self, limit: Span) -> Result<(), SpiError> {
         self.within(limit, SpiError::Busy, |line| {
             // Several at a time: the last one counts.
@@ -99,7 +99,7 @@ impl<P: Port> Line<P> {
         frame[5] = crc7(&frame[..5]);
         self.port.send(&frame)?;
         if command == STOP_TRANSMISSION {
-            // A byte that says nothing (7.3.1.3).
+            // A stuff byte (7.3.1.3).
             self.byte()?;
         }
         for _ in 0..ANSWER_BYTES {
@@ -178,13 +178,13 @@ impl<P: Port> Line<P> {
         self.ready(BUSY_MAX)
     }
 
-    /// Ends a write of many blocks that did not (7.2.4).
+    /// Ends a failed write of many blocks (7.2.4).
     pub(super) fn abort(&mut self) -> Result<(), SpiError> {
         self.command(STOP_TRANSMISSION, 0)?;
         self.ready(BUSY_MAX)
     }
 
-    /// Asks how it went: what a card could not program shows only here.
+    /// Asks for the result: only the status shows blocks that the card could not program.
     pub(super) fn check_written(&mut self) -> Result<(), SpiError> {
         let answer = self.command(STATUS, 0)?;
         let status = self.byte()?;

@@ -1,13 +1,14 @@
-//! An SD card on an SPI bus, as a block device that never waits without a limit.
+//! An SD card on an SPI bus, as a block device with limited waits.
 //!
-//! * Each wait has a limit, and all waits of one service together have one: [`SERVICE_MAX`]. Whoever records gives such a
-//!   card up, says so, and tries again.
-//! * Checksums both ways, on every card that can: what was damaged on its way is sent again, [`TRIES`] times in all.
-//! * Many blocks go with one command, and the card is asked afterwards whether it could write them.
-//! * A card that lost its power for a moment is identified again at the next try, and used only if it is the same one
-//!   (its CID): everything above knows where its files lie.
+//! * Each wait has a limit, and all waits of one service together have one: [`SERVICE_MAX`]. The recorder then gives
+//!   the card up, reports it, and tries again.
+//! * Checksums in both directions, on every card with them: a damaged block is sent again, [`TRIES`] times in all.
+//! * Many blocks go with one command, and the card's status is read afterwards.
+//! * A card that lost its power for a moment is identified again at the next try. It is used only if it is the same
+//!   one (its CID), because the layers above know the places of its files.
 //!
 //! The driver waits with the processor: it belongs to the least urgent task.
+//!
 //! Source: SD Specifications Part 1, Physical Layer Simplified Specification 9.10, chapter 7.
 
 mod crc;
@@ -30,9 +31,9 @@ use crate::Trouble;
 use identify::Identity;
 use line::{Line, TOKEN_MANY, TOKEN_ONE};
 
-/// How long all waits of one service together may take. Storage must report in every 10 s.
+/// Time limit of all waits of one service together. Storage must report in every 10 s.
 pub const SERVICE_MAX: Span = Span::from_secs(8);
-/// How often an access is tried whose failure may be a passing one.
+/// Tries of an access whose failure may be temporary.
 pub const TRIES: u32 = 3;
 
 const READ: u8 = 17;
@@ -50,9 +51,9 @@ struct Inner<P> {
     line: Line<P>,
     /// `None`: the card must be identified before it is used.
     card: Option<Identity>,
-    /// Which card it was before that.
+    /// The identity of the last card.
     cid: Option<[u8; 16]>,
-    /// Accesses that were tried again, since they were asked for last.
+    /// Repeated accesses since the last call.
     retries: u32,
 }
 
@@ -79,14 +80,14 @@ impl<P: Port> Inner<P> {
         Ok(card)
     }
 
-    /// Accesses the card, again where that may help.
+    /// Accesses the card, with repetitions if these may help.
     fn access<T>(
         &mut self,
         mut act: impl FnMut(&mut Line<P>, &Identity) -> Result<T, SpiError>,
     ) -> Result<T, SpiError> {
         let mut tries = 1;
         loop {
-            // What cannot be identified is not waited for: whoever records looks again in a while.
+            // A failed identification is not repeated here: the recorder looks again in a while.
             let card = self.card()?;
             let done = self.line.selected(|line| act(line, &card));
             let Err(error) = done else { return done };
@@ -102,7 +103,7 @@ impl<P: Port> Inner<P> {
     }
 }
 
-/// What commands call a block of this card, if it and `count - 1` more are there.
+/// The address of a block in commands, if this and `count - 1` more exist on the card.
 fn address(card: &Identity, block: u32, count: usize) -> Result<u32, SpiError> {
     let end = u64::from(block) + count as u64;
     if end > u64::from(card.csd.blocks) {
@@ -119,7 +120,7 @@ fn read<P: Port>(line: &mut Line<P>, address: u32, blocks: &mut [Block]) -> Resu
     }
     line.must(READ_MANY, address)?;
     let received = blocks.iter_mut().try_for_each(|block| line.receive(block));
-    // What went wrong first is what counts.
+    // The first error counts.
     let stopped = line.stop_reading();
     received.and(stopped)
 }
@@ -132,7 +133,7 @@ fn write<P: Port>(line: &mut Line<P>, address: u32, blocks: &[Block]) -> Result<
         }
         _ => give_many(line, address, blocks),
     };
-    // A card that can still be asked knows better what went wrong.
+    // The status of a card that still answers is more precise.
     match given {
         Ok(()) => line.check_written(),
         Err(SpiError::NotWritten(response)) => {
@@ -143,13 +144,13 @@ fn write<P: Port>(line: &mut Line<P>, address: u32, blocks: &[Block]) -> Result<
 }
 
 fn give_many<P: Port>(line: &mut Line<P>, address: u32, blocks: &[Block]) -> Result<(), SpiError> {
-    // Some cards are faster when they know how many come (4.3.4); one that does not know the command writes as well.
+    // Some cards are faster if they know the number of blocks (4.3.4); a card without this command writes as well.
     line.app_command(ERASE_BEFORE, blocks.len() as u32)?;
     line.must(WRITE_MANY, address)?;
     match blocks.iter().try_for_each(|block| line.give(TOKEN_MANY, block)) {
         Ok(()) => line.stop(),
         Err(error) => {
-            // What went wrong first is what counts.
+            // The first error counts.
             let _ = line.abort();
             Err(error)
         }

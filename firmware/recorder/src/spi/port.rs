@@ -1,34 +1,34 @@
-//! What the driver needs of a board: a bus, a select pin and a clock.
+//! The driver's needs of a board: a bus, a select pin and a clock.
 
 use hums_core::clock::Instant;
 
-/// How fast the bus runs.
+/// The speed of the bus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Clock {
-    /// At most 400 kHz: what a card must be able to take before it is identified (SD specification, 4.2.1).
+    /// At most 400 kHz, which every card takes before identification (SD specification, 4.2.1).
     Identification,
-    /// As fast as the board can, at most 25 MHz: what every card takes afterwards (default speed, 4.3).
+    /// As fast as the board can, at most 25 MHz, which every card takes afterwards (default speed, 4.3).
     Transfer,
 }
 
-/// The bus failed by itself: a matter of the board, not of the card.
+/// The bus failed by itself: a fault of the board, not of the card.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PortFailed;
 
-/// A board's SPI port to a card: mode 0, most significant bit first, what the card sends pulled up.
+/// A board's SPI port to a card: mode 0, most significant bit first, input pulled up.
 pub trait Port {
     /// Drives the select pin: low when `selected`.
     fn select(&mut self, selected: bool);
 
-    /// Sends these bytes, and puts in their place what comes back.
+    /// Sends these bytes, and replaces them by the received ones.
     fn exchange(&mut self, bytes: &mut [u8]) -> Result<(), PortFailed>;
 
-    /// Sends these bytes; what comes back is dropped.
+    /// Sends these bytes and drops the received ones.
     fn send(&mut self, bytes: &[u8]) -> Result<(), PortFailed>;
 
     /// Sets the bus's speed.
     fn set_clock(&mut self, clock: Clock);
 
-    /// The time: what the driver's limits are counted by.
+    /// The time for the driver's limits.
     fn now(&self) -> Instant;
 }

@@ -1,6 +1,6 @@
-//! What a card says of itself: the CSD (SD specification, 5.3).
+//! The card's own data: the CSD (SD specification, 5.3).
 
-/// What of the CSD counts here.
+/// The relevant fields of the CSD.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Csd {
     /// Blocks of 512 bytes.
@@ -10,7 +10,7 @@ pub(super) struct Csd {
 }
 
 impl Csd {
-    /// `None`: a structure that this specification does not have.
+    /// `None`: a structure that is not in this specification.
     pub(super) const fn read(raw: &[u8; 16]) -> Option<Self> {
         let size = match raw[0] >> 6 {
             0 => size_v1(raw),
@@ -34,7 +34,7 @@ const fn size_v1(raw: &[u8; 16]) -> u64 {
 mod tests {
     use super::*;
 
-    /// Registers as cards have them, of which `embedded-sdmmc`'s tests say the same.
+    /// Registers of real cards, with the same results as in `embedded-sdmmc`'s tests.
     #[test]
     fn sizes_are_those_of_known_cards() {
         let v1 =

@@ -37,15 +37,15 @@ pub struct MemCard {
     pub writes: Rc<Cell<u32>>,
     /// Blocks that were read.
     pub reads: Rc<Cell<u32>>,
-    /// After so many more blocks one write fails.
+    /// After this many more blocks one write fails.
     pub fail_after: Rc<Cell<Option<u32>>>,
-    /// After so many more read commands one fails.
+    /// After this many more read commands one fails.
     pub fail_read_after: Rc<Cell<Option<u32>>>,
-    /// Blocks with this name in them are written, and called refused.
+    /// Blocks with this name are written, but reported as refused.
     pub unsaid: Rc<Cell<Option<[u8; 11]>>>,
-    /// So many write commands are refused from now on.
+    /// This many write commands are refused from now on.
     pub refusals: Rc<Cell<u32>>,
-    /// So many of a thousand block writes are refused, at random.
+    /// This many of a thousand block writes are refused, at random.
     pub refused_permille: Rc<Cell<u64>>,
     random: Rc<Cell<u64>>,
     /// No log of an earlier power-on is overwritten.
@@ -145,7 +145,7 @@ impl CardDevice for MemCard {
     }
 }
 
-/// Room for a gate to hold blocks back in, for as long as the test runs.
+/// A parity buffer for the whole test run.
 pub fn held() -> &'static Buffers {
     Box::leak(Box::default())
 }
