@@ -1,8 +1,9 @@
 //! Functions of single precision: those of `libm`, but sine, cosine and square root.
 //!
 //! `libm` computes sine and cosine of any number with double precision, and the root bit by bit. That is 4 KiB of
-//! slow code on a processor whose FPU has single precision and an instruction for the root. ¶ A PC gets the same bits
-//! as the firmware: it runs the same sine and cosine, and a root is exact on both.
+//! slow code on a processor whose FPU has single precision and an instruction for the root.
+//!
+//! A PC gets the same bits as the firmware: it runs the same sine and cosine, and a root is exact on both.
 #![cfg_attr(not(test), no_std)]
 
 pub use libm::{acosf, asinf, atan2f, copysignf, expf, fabsf, fminf, logf, round, roundevenf, roundf};

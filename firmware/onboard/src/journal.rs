@@ -1,5 +1,5 @@
-//! The record's writing end for the whole monitor task: frames and records go in, and what finds no room is a counted
-//! loss. With it, what most records are about: the monitor's knowledge and the card's state.
+//! The record's writing end for the whole monitor task: it takes frames and records, and counts losses for lack of
+//! room. With it the subjects of most records: the monitor and the card's state.
 
 use core::fmt::{Arguments, Write as _};
 
@@ -16,20 +16,20 @@ use crate::ResetCause;
 use crate::loss::Losses;
 use crate::queues::SectorsIn;
 
-/// Number of the event that records what somebody did over a link.
+/// Number of the event that records an action over a link.
 const BY_HAND: u8 = 12;
 
-/// Autopilots send a heartbeat each second; a link that lost this many says nothing of now.
+/// Maximum age of a current heartbeat; autopilots send one each second.
 const HEARTBEAT_AGE_MAX: Span = Span::from_secs(3);
 
-/// Who did something: MAVLink system and component id; 0, 0 is the monitor itself.
+/// The author of an action: MAVLink system and component id; 0, 0 is the monitor itself.
 pub(crate) type By = (u8, u8);
 
-/// The writer, and what could not be written.
+/// The writer, and its losses.
 pub(crate) struct Journal<'a> {
     writer: &'a mut Writer,
     losses: Losses,
-    /// Frames that found no room in the sector queue.
+    /// Frames lost because the sector queue was full.
     refused: u64,
 }
 
@@ -38,7 +38,7 @@ impl<'a> Journal<'a> {
         Self { writer, losses: Losses::new(), refused: 0 }
     }
 
-    /// Writes a frame, where that leaves the reserve to records.
+    /// Writes a frame, unless only the reserve for records is left.
     pub(crate) fn frame(&mut self, at: Instant, bytes: &[u8], verified: bool, sectors: &mut SectorsIn) {
         if self.writer.frame(at, bytes, verified, sectors).is_err() {
             self.refused += 1;
@@ -46,7 +46,7 @@ impl<'a> Journal<'a> {
         }
     }
 
-    /// Writes a record, from the reserve if need be; whether there was room. Where there was none it is a loss.
+    /// Writes a record, if need be from the reserve; whether there was room. Otherwise it is counted as lost.
     pub(crate) fn record(&mut self, now: Instant, record: &Record<'_>, sectors: &mut SectorsIn) -> bool {
         let written = sectors.with_reserve(|sink| self.writer.record(now, record, sink)).is_ok();
         if !written {
@@ -55,12 +55,12 @@ impl<'a> Journal<'a> {
         written
     }
 
-    /// Writes an end mark; whether there was room. Where there was none it is no loss: it can be written later.
+    /// Writes an end mark; whether there was room. It is never counted as lost: it can be written later.
     pub(crate) fn mark(&mut self, now: Instant, why: Resting, sectors: &mut SectorsIn) -> bool {
         sectors.with_reserve(|sink| self.writer.mark(now, why, sink)).is_ok()
     }
 
-    /// Records that somebody did something; what does not fit into 50 characters is cut.
+    /// Records an action over a link; the text is cut after 50 characters.
     pub(crate) fn by_hand(&mut self, now: Instant, what: Arguments<'_>, sectors: &mut SectorsIn) {
         let mut text = Text::default();
         // Cut where it is full.
@@ -78,7 +78,7 @@ impl<'a> Journal<'a> {
         self.losses.count(since, now, what, count);
     }
 
-    /// Records the losses whose time has come, or, at the end, all.
+    /// Records losses whose window is over, or, at the end, all.
     // Own stack frame (ARCHITECTURE.md, Memory).
     #[inline(never)]
     pub(crate) fn record_losses(&mut self, now: Instant, all: bool, sectors: &mut SectorsIn) {
@@ -113,23 +113,23 @@ impl<'a> Journal<'a> {
     }
 }
 
-/// What the monitor knows, and where it is written down.
+/// The monitor's knowledge with its record.
 pub(crate) struct Logbook<'a> {
-    /// Lent, as the writer is: either is too large to be moved over the firmware's stack.
+    /// Lent, like the writer: both are too large to be moved over the firmware's stack.
     pub(crate) monitor: &'a mut Monitor,
     pub(crate) journal: Journal<'a>,
     pub(crate) card: &'a CardStatus,
-    /// How this start came.
+    /// The cause of this start.
     pub(crate) cause: ResetCause,
 }
 
 /// Whether motors may turn, by the vehicle's heartbeats since this start.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Arming {
-    /// No heartbeat within the last 3 s, and none that said armed.
+    /// No heartbeat within the last 3 s, and none before with armed.
     Unknown,
     Disarmed,
-    /// By the last heartbeat, however old it is: a vehicle whose link fell silent flies on.
+    /// By the last heartbeat, even an old one: a vehicle on a silent link flies on.
     Armed,
 }
 
@@ -144,7 +144,8 @@ impl Logbook<'_> {
         }
     }
 
-    /// Whether the vehicle may be in flight: it is armed, or nothing is known of it after a reset that may have come in flight.
+    /// Whether the vehicle may be in flight: it is armed, or of unknown state after a reset that may have come in
+    /// flight.
     pub(crate) fn may_fly(&self, now: Instant) -> bool {
         match self.arming(now) {
             Arming::Unknown => self.cause.may_be_in_flight(),
@@ -152,12 +153,12 @@ impl Logbook<'_> {
         }
     }
 
-    /// Whether a parameter may be set now, whoever asks: with another rate at its port nothing is recorded any longer.
+    /// Whether a parameter may be set now, for any asker: with another rate at its port nothing more is recorded.
     fn may_set(&self, now: Instant, param: Param) -> bool {
         param != Param::ApBaud || !self.may_fly(now)
     }
 
-    /// Sets a parameter because a ground station or the card's file asks for it: recorded, and in force at once. `false` where it is
+    /// Sets a parameter for a ground station or the card's file: recorded, and in force at once. `false` if it is
     /// refused.
     pub(crate) fn set_parameter(
         &mut self,

@@ -1,5 +1,5 @@
-//! The pipeline between the ports and the card, with time and I/O as arguments: the bodies of the firmware's tasks,
-//! and, driven by a virtual clock, the whole of `hums sim`.
+//! The pipeline between the ports and the card, with time and I/O as arguments. It has the bodies of the firmware's
+//! tasks; driven by a virtual clock, it is all of `hums sim`.
 //!
 //! ```text
 //!              Reception            Monitoring                     Storage
@@ -7,7 +7,7 @@
 //!                          (queue)        \        (queue)
 //!                                          \-----> GS bytes (queue) ---------> GS port
 //! ```
-//! [`queues`] is the home of all queues, with their capacities and what happens when each is full.
+//! [`queues`] has all queues, their capacities, and their behaviour when full.
 #![cfg_attr(not(test), no_std)]
 
 mod companion;

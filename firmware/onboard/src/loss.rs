@@ -1,4 +1,4 @@
-//! Losses waiting to be recorded: what was lost is itself data, with its count and its first and last moment.
+//! Losses waiting to be recorded: a loss is data too, with its count and its first and last moment.
 
 use hums_blackbox::record::{Loss, Lost};
 use hums_core::clock::{Instant, Span};
@@ -30,8 +30,8 @@ impl Losses {
         loss.to = now;
     }
 
-    /// Hands each loss whose window is over (or every one, at the end) to `write`, which says whether it was written;
-    /// one that was not stays open.
+    /// Hands each loss whose window is over (or every one, at the end) to `write`, which returns whether it was
+    /// written. Otherwise the loss stays open.
     pub(crate) fn flush(&mut self, now: Instant, all: bool, mut write: impl FnMut(&Loss) -> bool) {
         for slot in &mut self.open {
             if let Some(loss) = slot

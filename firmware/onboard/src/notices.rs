@@ -1,6 +1,7 @@
-//! Texts of our own that are no findings: recorded at once, and told to the ground station when its budget allows. Those
-//! of the protective action and of a mishap are as urgent as a critical finding: the pilot has seconds to cancel the one, and
-//! the box may have no more than that to tell where the other was.
+//! Texts of our own besides findings: recorded at once, and sent to the ground station when its budget allows.
+//!
+//! Texts of the protective action and of a mishap are as urgent as a critical finding. The pilot has seconds to
+//! cancel an action, and after a mishap the box may have only seconds to send its place.
 
 use hums_blackbox::record::{Note, Record};
 use hums_core::clock::{Instant, Span};
@@ -14,14 +15,14 @@ use hums_link::text::{Severity, Text};
 use crate::journal::Journal;
 use crate::queues::{GsIn, SectorsIn};
 
-/// Texts that wait; one more is recorded only.
+/// Texts that wait; further ones are only recorded.
 const WAITING_MAX: usize = 4;
-/// How long a restart waits for the vehicle to be known.
+/// Time that a restart's text waits for a known vehicle.
 const UNKNOWN_MAX: Span = Span::from_secs(5);
-/// `MAV_SEVERITY` of what a pilot need not hear of, and whatever is milder.
+/// `MAV_SEVERITY` of texts that a pilot need not see, and of milder ones.
 const INFO: u8 = 6;
 
-/// A text that is still to be told.
+/// A text that is still to be sent.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Notice {
     /// `MAV_SEVERITY` and the text.
@@ -30,11 +31,11 @@ pub(crate) enum Notice {
     Protection(Step),
     /// A mishap began or ended.
     Mishap(Report),
-    /// We were restarted: why, and in which task, if it was one.
+    /// The monitor restarted: the cause, and the task, if known.
     Restarted(&'static str, Option<&'static str>),
 }
 
-/// Texts that are still to be told.
+/// Texts that are still to be sent.
 #[derive(Clone, Debug)]
 pub(crate) struct Notices(heapless::Vec<Notice, WAITING_MAX>);
 
@@ -43,12 +44,12 @@ impl Notices {
         Self(heapless::Vec::new())
     }
 
-    /// To be told; where no more can wait, the record has it.
+    /// Adds a text; if the queue is full, only the record has it.
     pub(crate) fn push(&mut self, notice: Notice) {
         let _ = self.0.push(notice);
     }
 
-    /// Records a text of our own, and tells the ground station; `severity` is a `MAV_SEVERITY`.
+    /// Records a text of ours, and sends it to the ground station; `severity` is a `MAV_SEVERITY`.
     pub(crate) fn note(
         &mut self,
         now: Instant,
@@ -63,12 +64,12 @@ impl Notices {
         }
     }
 
-    /// Tells what is as urgent as the protective action or a mishap, before whatever else waits.
+    /// Adds a text of the protective action or of a mishap, before all others.
     pub(crate) fn announce(&mut self, notice: Notice) {
         let Self(notices) = self;
         let is_text = |notice: &Notice| !matches!(notice, Notice::Protection(_) | Notice::Mishap(_));
         if notices.is_full() {
-            // One less urgent, or the oldest: the record has them all.
+            // Drops a less urgent one, or the oldest: the record has them all.
             notices.remove(if notices.last().is_some_and(is_text) { WAITING_MAX - 1 } else { 0 });
         }
         let place = notices.iter().position(is_text).unwrap_or(notices.len());
@@ -76,7 +77,7 @@ impl Notices {
         let _ = notices.insert(place, notice);
     }
 
-    /// Tells what waits, as far as the budget allows. Nobody knows whose companion we are before the vehicle is known.
+    /// Sends waiting texts as far as the budget allows. Our system is unknown before the vehicle is known.
     #[inline(never)]
     pub(crate) fn tell(&mut self, now: Instant, is_known: bool, outlet: &mut Outlet, gs: &mut GsIn) {
         while let Some(notice) = self.0.first() {

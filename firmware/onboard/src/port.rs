@@ -1,7 +1,7 @@
-//! What reception counts, for the monitor to read: plain atomics, so that neither side ever waits.
+//! Counters of reception for the monitor: plain atomics, so that neither side ever waits.
 //!
-//! 32 bits, because that is what this processor reads at once; the monitor adds up the differences in 64 bits, and a
-//! difference is right as long as it is read more often than once in 2^32 bytes (13 hours at 921,600 baud).
+//! They have 32 bits, which this processor reads at once. The monitor adds up the differences in 64 bits. A
+//! difference is right if it is read more often than once in 2^32 bytes (13 hours at 921,600 baud).
 
 use core::sync::atomic::{AtomicU32, Ordering};
 
@@ -25,7 +25,7 @@ pub struct PortReading {
     pub bytes: u32,
     /// Bytes that belong to no frame.
     pub bytes_not_frames: u32,
-    /// Frames of known shape whose checksum failed; their bytes are among the bytes that are no frame.
+    /// Frames of known shape with a wrong checksum; their bytes count as bytes outside frames.
     pub damaged: u32,
     /// Frames found.
     pub frames: u32,
@@ -36,7 +36,7 @@ pub struct PortReading {
 }
 
 impl PortReading {
-    /// What was counted since `earlier`.
+    /// Counts since `earlier`.
     pub const fn since(self, earlier: Self) -> Self {
         Self {
             bytes: self.bytes.wrapping_sub(earlier.bytes),
@@ -73,7 +73,7 @@ impl PortStatus {
         self.queue_bytes_max.store(bytes, Ordering::Relaxed);
     }
 
-    /// All counters; each is right by itself, they may be a moment apart.
+    /// All counters; each is valid by itself, but they may be of different moments.
     pub fn read(&self) -> PortReading {
         PortReading {
             bytes: self.bytes.load(Ordering::Relaxed),
@@ -93,7 +93,7 @@ impl PortStatus {
         self.frames_lost.store(reading.frames_lost, Ordering::Relaxed);
     }
 
-    /// Counts that the port lost bytes before reception fetched them, in a time of at most so many milliseconds.
+    /// Counts a loss of bytes before reception fetched them, within this time in ms.
     pub fn count_overrun(&self, blind_ms: u32) {
         self.blind_ms.fetch_add(blind_ms, Ordering::Relaxed);
         self.overrun.fetch_add(1, Ordering::Relaxed);

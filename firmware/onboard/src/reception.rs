@@ -1,7 +1,7 @@
 //! The reception task's body: bytes in, frames with their times into the frame queue.
 //!
-//! The most urgent task: the port's ring holds 22 ms at 921,600 baud. It does nothing but find frames, about ten
-//! instructions a byte, and never waits.
+//! The most urgent task: the port's ring holds 22 ms at 921,600 baud. It only finds frames, about ten instructions a
+//! byte, and never waits.
 
 use hums_core::clock::{Instant, Span};
 use hums_link::frame::Frame;
@@ -10,10 +10,10 @@ use hums_link::framer::Framer;
 use crate::port::{PortReading, PortStatus};
 use crate::queues::FramesIn;
 
-/// A line that is silent for this long will not finish the frame it began: [`Reception::idle`] is due.
+/// After this silence a begun frame will not be finished: [`Reception::idle`] is due.
 pub const SILENCE: Span = Span::from_millis(20);
 
-/// The autopilot port's framer, and what it lost.
+/// The autopilot port's framer, and its losses.
 pub struct Reception<'a> {
     framer: Framer,
     status: &'a PortStatus,
@@ -26,14 +26,14 @@ impl<'a> Reception<'a> {
         Self { framer: Framer::new(), status, frames_lost: 0 }
     }
 
-    /// Takes bytes that had come by `now`; each frame that they complete is queued with that time.
+    /// Takes bytes received by `now`; each completed frame is queued with that time.
     pub fn bytes(&mut self, now: Instant, bytes: &[u8], frames: &mut FramesIn) {
         let Self { framer, frames_lost, .. } = self;
         framer.push(bytes, &mut |frame| queue(now, &frame, frames, frames_lost));
         self.publish(frames);
     }
 
-    /// The line has been silent (or has ended): what waits for more bytes is decided now.
+    /// The line has been silent (or has ended): decides about bytes that wait for more.
     pub fn idle(&mut self, now: Instant, frames: &mut FramesIn) {
         let Self { framer, frames_lost, .. } = self;
         framer.idle(&mut |frame| queue(now, &frame, frames, frames_lost));

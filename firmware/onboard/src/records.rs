@@ -1,4 +1,4 @@
-//! What of the monitor's knowledge goes into the record: who and when, usage, wear.
+//! The monitor's knowledge for the record: identity and time, usage, wear.
 
 use hums_blackbox::record::{
     Boot, Clock, Component as ComponentRecord, Exceedance, LIFETIME_ENTRIES_MAX, Lifetime, Moment, Parameter,
@@ -10,14 +10,14 @@ use hums_core::component::{COMPONENTS_MAX, Component, Figures, Label, Status};
 use crate::journal::{By, Logbook};
 use crate::queues::SectorsIn;
 
-/// A UTC that differs more than this from the one that is recorded is recorded anew.
+/// A UTC that differs by more from the recorded one is recorded anew.
 const CLOCK_STEP_MICROS: u64 = 1_000_000;
 
-/// Counters of a record: fewer than there may be, as they gather on the stack, at 24 bytes each.
+/// Counters in one record: fewer than all, since they gather on the stack, at 24 bytes each.
 const GATHERED: usize = 16;
 const _: () = assert!(GATHERED <= USAGE_ENTRIES_MAX && GATHERED <= LIFETIME_ENTRIES_MAX);
 
-/// Counters on their way into records: whenever a record's worth is together it is written.
+/// Counters that gather for a record: a full one is written.
 struct Counters(heapless::Vec<(u8, f32), GATHERED>);
 
 impl Counters {
@@ -26,7 +26,7 @@ impl Counters {
     }
 
     fn push(&mut self, number: u8, value: f64, write: impl FnOnce(&[(u8, f32)])) {
-        // There is room: a full one was written.
+        // There is room: a full record was written.
         let _ = self.0.push((number, value as f32));
         if self.0.is_full() {
             self.flush(write);
@@ -41,7 +41,7 @@ impl Counters {
     }
 }
 
-/// What was recorded last, of what is recorded again when it has changed or when its time has come.
+/// The last recorded state of data that is recorded again after a change or after a time.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Recorded {
     vehicle: VehicleRecord,
@@ -55,8 +55,8 @@ impl Recorded {
         Self { vehicle: VehicleRecord::default(), epoch_micros: None, usage_at: Instant::ZERO }
     }
 
-    /// What each file of a log says of itself, who records and every parameter that is not at its default: one that is
-    /// read alone, because those before it made room, misses nothing but their time.
+    /// The head of each file of a log: the recorder's identity and every parameter that is not at its default. A file
+    /// that is read alone, after earlier ones were overwritten, misses only their time.
     pub(crate) fn heading(
         &mut self,
         now: Instant,
@@ -95,7 +95,7 @@ impl Recorded {
         }
     }
 
-    /// UTC as soon as the autopilot knows it; the reader dates the whole session with it.
+    /// UTC as soon as the autopilot knows it, which dates the whole session.
     pub(crate) fn clock(&mut self, now: Instant, book: &mut Logbook<'_>, sectors: &mut SectorsIn) {
         let time = &book.monitor.vehicle().time;
         let (Some(at), Some(utc_micros)) = (time.at(), time.get().and_then(|time| time.utc_micros)) else {
@@ -112,18 +112,18 @@ impl Recorded {
         }
     }
 
-    /// When usage was recorded last.
+    /// Time of the last usage record.
     pub(crate) const fn usage_at(&self) -> Instant {
         self.usage_at
     }
 
-    /// Usage as it is now, all of it, also what was recorded before: for a new file.
+    /// All usage again, for a new file.
     pub(crate) fn usage_anew(&mut self, now: Instant, book: &mut Logbook<'_>, sectors: &mut SectorsIn) {
         self.usage_at = Instant::ZERO;
         self.usage(now, Moment::Periodic, book, sectors);
     }
 
-    /// The session's counters, the airframe's life at the session's start and end, and what was exceeded.
+    /// The session's counters, the airframe's life at the session's start and end, and exceedances.
     pub(crate) fn usage(
         &mut self,
         now: Instant,
@@ -170,7 +170,7 @@ fn life(now: Instant, moment: Moment, book: &mut Logbook<'_>, sectors: &mut Sect
     counters.flush(put);
 }
 
-/// At the start what was exceeded in the airframe's life; later what was in this session, and has changed.
+/// At the start the exceedances of the airframe's life; later those of this session that changed.
 #[inline(never)]
 fn exceedances(
     now: Instant,
@@ -196,8 +196,8 @@ fn component(now: Instant, place: usize, why: Why, book: &mut Logbook<'_>, secto
     journal.record(now, &Record::Component(record), sectors);
 }
 
-/// Another part is in a component's place, from 0: recorded with what the old one has run. `false` where there is no
-/// such component.
+/// Replaces a component (place from 0), and records the old one with its figures. `false` if there is no such
+/// component.
 pub(crate) fn replace_component(
     now: Instant,
     place: usize,

@@ -1,6 +1,6 @@
-//! Why the machine started.
+//! Causes of a start.
 
-/// Why the machine started.
+/// The cause of a start.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ResetCause {
     /// Power came.
@@ -16,7 +16,8 @@ pub enum ResetCause {
 }
 
 impl ResetCause {
-    /// Whether the vehicle may be in flight. A pilot switches power on; a supply, a fault and a watchdog choose their own time.
+    /// Whether the vehicle may be in flight. A pilot switches power on, while a brown-out, a fault or a watchdog
+    /// comes at any time.
     pub const fn may_be_in_flight(self) -> bool {
         !matches!(self, Self::PowerOn | Self::Pin)
     }

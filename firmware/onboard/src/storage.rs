@@ -1,7 +1,7 @@
 //! The storage task's body: sectors from the queue onto the card, with one write command at a call.
 //!
-//! The least urgent task, because its library waits for the card: nothing else may wait with it. What waits for it is
-//! the sector queue, sized for a card that stands still for 2.5 s.
+//! It is the least urgent task, because its library waits for the card. Sectors wait in their queue, sized for a card
+//! that stalls for 2.5 s.
 
 use hums_core::clock::{Instant, Span};
 use hums_recorder::{Buffers, CardDevice, CardStatus, NotYet, Recorder};
@@ -12,18 +12,18 @@ use crate::shelf::Server;
 /// How soon to call again after [`Service::NoCard`].
 pub const NO_CARD_RETRY: Span = Span::from_millis(100);
 
-/// What one call did.
+/// The result of one call.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Service {
-    /// Something was written, formatted or looked through: call again at once.
+    /// It wrote, formatted or searched: call again at once.
     Wrote,
-    /// Nothing waits: call again when something does.
+    /// Nothing waits: call again with new work.
     Idle,
-    /// There is no card to write to: call again in a while (the card is looked for once a second).
+    /// No card accepts data: call again after a time (the card is looked for once a second).
     NoCard,
 }
 
-/// The recorder with its queue's other side.
+/// The recorder with the reading end of its queue.
 pub struct Storage<'a, D: CardDevice> {
     recorder: Recorder<'a, D>,
 }
@@ -34,7 +34,7 @@ impl<'a, D: CardDevice> Storage<'a, D> {
         Self { recorder: Recorder::new(device, status, held, entropy) }
     }
 
-    /// Writes what waits with at most one command.
+    /// Writes waiting sectors with at most one command.
     pub fn service(&mut self, now: Instant, sectors: &mut SectorsOut) -> Service {
         if self.recorder.format(now) {
             return Service::Wrote;
@@ -49,7 +49,7 @@ impl<'a, D: CardDevice> Storage<'a, D> {
         }
     }
 
-    /// Answers one question about the logs on the card, if there is one; whether there was. To be called only when
+    /// Answers one request about the logs on the card, if there is one; whether there was. To be called only if
     /// [`Self::service`] found nothing to write.
     pub fn serve(&mut self, shelf: &mut Server<'_>) -> bool {
         shelf.serve(&mut self.recorder)
@@ -60,7 +60,7 @@ impl<'a, D: CardDevice> Storage<'a, D> {
         self.recorder.finish();
     }
 
-    /// The recorder, for what is stored and for the card.
+    /// The recorder, for stored logs and for the card.
     pub const fn recorder(&mut self) -> &mut Recorder<'a, D> {
         &mut self.recorder
     }

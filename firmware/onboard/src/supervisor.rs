@@ -1,7 +1,7 @@
-//! Who may feed the watchdog: nobody, unless every task has reported in lately.
+//! The condition for feeding the watchdog: every task has reported in recently.
 //!
 //! Each task reports when it goes round its loop; the monitor's tick asks, and feeds the watchdog only on a yes. If
-//! the monitor itself stands still nobody asks, and the watchdog's own time runs out.
+//! the monitor itself stalls, the watchdog is not fed and resets the machine.
 
 use core::sync::atomic::{AtomicU32, Ordering};
 
@@ -11,9 +11,9 @@ use hums_recorder::spi::SERVICE_MAX;
 /// The tasks that must report.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Task {
-    /// Bytes to frames; goes round at least when the line is silent.
+    /// Bytes to frames; it loops at least when the line is silent.
     Reception,
-    /// Frames to records; goes round at every tick.
+    /// Frames to records; it loops at every tick.
     Monitor,
     /// To the ground station; waits for its port.
     Downlink,
@@ -35,8 +35,8 @@ impl Task {
         }
     }
 
-    /// How long it may be silent. The short ones have nothing to wait for but the ground station's port, 70 ms for its
-    /// longest frame at 38,400 baud; storage waits for its card, and that has an end ([`SERVICE_MAX`]).
+    /// Its longest allowed silence. The short ones wait only for the ground station's port, 70 ms for its longest
+    /// frame at 38,400 baud. Storage waits for its card, with a limit ([`SERVICE_MAX`]).
     pub(crate) const fn silence_max(self) -> Span {
         match self {
             Self::Reception | Self::Monitor | Self::Downlink => Span::from_secs(1),
@@ -45,10 +45,10 @@ impl Task {
     }
 }
 
-// A second for what is no waiting.
+// A second for its own work.
 const _: () = assert!(Task::Storage.silence_max().as_millis() > SERVICE_MAX.as_millis() + 1_000);
 
-/// When each task last reported in. One static, shared by all tasks.
+/// The last report of each task. One static, shared by all tasks.
 #[derive(Debug, Default)]
 pub struct Supervisor {
     /// Milliseconds since power-on, modulo 2^32: differences stay right for 49 days of silence.
@@ -61,7 +61,7 @@ impl Supervisor {
         Self { reported_ms: [const { AtomicU32::new(0) }; Task::ALL.len()] }
     }
 
-    /// `task` goes round its loop.
+    /// `task` has looped.
     pub fn report(&self, task: Task, now: Instant) {
         self.slot(task).store(now.as_millis() as u32, Ordering::Relaxed);
     }

@@ -1,8 +1,8 @@
 //! The uplink task's body: the ground station's bytes to frames, and each with its time into the uplink queue.
 //!
-//! As urgent as the downlink: nothing is lost while its port's ring holds (88 ms at 57,600 baud). Whoever is on the
-//! other side is a stranger, so nothing here costs more than a framer's bounded work for each byte, and a flood ends at
-//! a full queue: it keeps nobody from recording.
+//! It is as urgent as the downlink: nothing is lost while its port's ring holds (88 ms at 57,600 baud). Input here is
+//! untrusted. So each byte costs a framer's bounded work at most, and a flood ends at a full queue without an effect
+//! on recording.
 
 use hums_core::clock::{Instant, Span};
 use hums_link::frame::Frame;
@@ -10,7 +10,7 @@ use hums_link::framer::Framer;
 
 use crate::queues::UplinkIn;
 
-/// A line that is silent for this long will not finish the frame it began: [`Uplink::idle`] is due.
+/// After this silence a begun frame will not be finished: [`Uplink::idle`] is due.
 pub const SILENCE: Span = Span::from_millis(100);
 
 /// The ground station port's framer.
@@ -32,13 +32,13 @@ impl Uplink {
         Self { framer: Framer::new(), frames_lost: 0 }
     }
 
-    /// Takes bytes that had come by `now`; each frame that they complete is queued with that time.
+    /// Takes bytes received by `now`; each completed frame is queued with that time.
     pub fn bytes(&mut self, now: Instant, bytes: &[u8], frames: &mut UplinkIn) {
         let Self { framer, frames_lost } = self;
         framer.push(bytes, &mut |frame| queue(now, &frame, frames, frames_lost));
     }
 
-    /// The line has been silent: what waits for more bytes is decided now.
+    /// The line has been silent: decides about bytes that wait for more.
     pub fn idle(&mut self, now: Instant, frames: &mut UplinkIn) {
         let Self { framer, frames_lost } = self;
         framer.idle(&mut |frame| queue(now, &frame, frames, frames_lost));

@@ -1,13 +1,13 @@
-//! Waiting for a device with an end to it.
+//! Waits for a device with a time limit.
 
 use core::task::Poll;
 
 use hums_core::clock::Instant;
 
-/// Polls until it is ready; nothing if it is not by `end`. `poll` is told whether it may sleep until the next interrupt.
+/// Polls until the device is ready; `None` if it is not by `end`. The argument of `poll` is whether it may sleep
+/// until the next interrupt.
 ///
-/// The last poll begins at `end` or later: more urgent tasks may have had the processor since the one before, and the device is
-/// done meanwhile.
+/// The last poll begins at `end` or later: if more urgent tasks had the processor meanwhile, the device may be ready.
 pub fn until<T>(end: Instant, now: impl Fn() -> Instant, mut poll: impl FnMut(bool) -> Poll<T>) -> Option<T> {
     loop {
         let is_last = now() >= end;
@@ -25,7 +25,7 @@ mod tests {
 
     use super::*;
 
-    /// A device that is done after 5 ms, polled until `end_ms`, with so long from each poll to the next.
+    /// A device that is ready after 5 ms, polled until `end_ms`, with `away_ms` from each poll to the next.
     fn polled(end_ms: u64, away_ms: u64) -> (Option<u64>, u64) {
         let (now_ms, polls) = (Cell::new(0), Cell::new(0));
         let done = until(

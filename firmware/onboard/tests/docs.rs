@@ -1,11 +1,11 @@
-//! What a user is told is in the documents.
+//! Every text for a user is in the documents.
 
 use std::fs;
 use std::path::Path;
 
 use hums_link::text::TEXT_BYTES_MAX;
 
-/// Every string of the firmware's sources that begins with our name, without its tests.
+/// Every string of the firmware's sources that begins with our name, without tests.
 fn texts(folder: &Path, found: &mut Vec<String>) {
     for entry in fs::read_dir(folder).expect("readable").flatten() {
         let path = entry.path();
@@ -33,7 +33,7 @@ fn all_texts() -> Vec<String> {
 
 #[test]
 fn every_text_that_a_pilot_may_read_is_one_message() {
-    // Those with placeholders are tested where they are put together.
+    // Those with placeholders are tested at their source.
     for text in all_texts().iter().filter(|text| !text.contains('{')) {
         assert!("HUMS: ".len() + text.len() <= TEXT_BYTES_MAX, "{text}");
     }
@@ -46,7 +46,7 @@ fn every_text_that_a_pilot_may_read_is_in_the_runbook() {
     // The card's have a document of their own.
     let known = read("runbook.md") + &read("cards.md").replace("| ", "card: ");
     for text in all_texts() {
-        // What stands between the placeholders.
+        // The text between the placeholders.
         let pieces = text.split('{').map(|piece| piece.rsplit('}').next().unwrap_or_default().trim());
         for piece in pieces.filter(|piece| piece.chars().filter(char::is_ascii_alphabetic).count() > 3) {
             let piece = piece.trim_matches([':', '(', ',', ' ']);

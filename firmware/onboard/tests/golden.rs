@@ -22,7 +22,7 @@ use hums_onboard::monitoring::TICK;
 
 /// Bytes of a tlog's time before each frame: microseconds since 1970, big-endian.
 const TIME_BYTES: usize = 8;
-/// A step of the recorder's clock longer than this is no time of the flight, milliseconds.
+/// A longer step of the recorder's clock does not count as time of the flight, milliseconds.
 const STEP_MAX_MS: u64 = 60_000;
 
 #[test]

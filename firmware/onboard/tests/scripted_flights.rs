@@ -1,4 +1,4 @@
-//! Scripted flights of `tests/monitor`: what the monitor must make of each, as its README says.
+//! Scripted flights of `tests/monitor`, judged as its README describes.
 #![expect(clippy::unwrap_used, clippy::panic, reason = "that is how a test fails")]
 
 use std::fs::File;
@@ -20,7 +20,7 @@ use hums_onboard::monitoring::TICK;
 /// `MAV_CMD_NAV_RETURN_TO_LAUNCH`
 const RETURN: Request = Request { command: 20, confirmation: 0 };
 
-/// Everything that came of a flight, with times in seconds since its first frame.
+/// All results of a flight, with times in seconds since its first frame.
 struct Outcome {
     findings: Vec<(f32, Finding)>,
     happenings: Vec<(f32, Happening)>,

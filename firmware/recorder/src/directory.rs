@@ -1,8 +1,9 @@
-//! The root directory: one walk over it at mounting collects all that recording needs. ¶ The walk notes the newest
-//! logs, the oldest ones, the place of the next entry, and the number of clusters of logs. So a new segment needs no
-//! walk. While nothing is to be written, the recorder looks on ([`Directory::look_on`]), a block at a call. It looks
-//! for more of the oldest logs once half of the noted ones are overwritten, and for claims on the clusters that come
-//! next.
+//! The root directory: one walk over it at mounting collects all that recording needs.
+//!
+//! The walk notes the newest logs, the oldest ones, the place of the next entry, and the number of clusters of logs.
+//! So a new segment needs no walk. While nothing is to be written, the recorder looks on ([`Directory::look_on`]), a
+//! block at a call. It looks for more of the oldest logs once half of the noted ones are overwritten, and for claims
+//! on the clusters that come next.
 //!
 //! # Clusters that a log claims although the FAT calls them free
 //! A card that lost power may have kept a log's directory entry and lost blocks of the FAT. The next segment would be

@@ -1,15 +1,21 @@
-//! Log files on a FAT32 card: the storage of sectors. ¶ Power can cut only the card's file system in half. So it is
-//! touched rarely, and in an order that leaves it whole at every single block write: ¶ * A log is a row of
-//! *segments*: files that are allocated whole when they are made ([`card::Card::create`]). They are written in place,
-//! one block write a sector, without an update of directory or FAT. ⏎ * A new segment's FAT blocks are written first,
-//! its directory entry last: a cut in between leaves unused clusters, nothing else. ⏎ * On a full card the oldest
-//! segment is renamed, one block write, and written anew ([`card::Card::recycle`]). ¶ * Lost sectors of a segment are
-//! rebuilt from parity at the segment's end (`hums_blackbox::parity`). ⏎ * Waiting sectors in a row are written with
-//! one command (`chain::ClusterChain`). ⏎ * The directory is read once, when a card is mounted
-//! (`directory::Directory`). ¶ [`spi`] is the driver of a real card; the PC's cards are files. ¶ No data on a card
-//! may stop the monitor:
+//! Log files on a FAT32 card: the storage of sectors.
 //!
-//! [`layout::Layout`] is checked before it is used, so is each cluster number, and each walk over a chain has an end.
+//! Power can cut only the card's file system in half. So it is touched rarely, and in an order that leaves it whole
+//! at every single block write:
+//!
+//! * A log is a row of *segments*: files that are allocated whole when they are made ([`card::Card::create`]). They
+//!   are written in place, one block write a sector, without an update of directory or FAT.
+//! * A new segment's FAT blocks are written first, its directory entry last: a cut in between leaves unused clusters,
+//!   nothing else.
+//! * On a full card the oldest segment is renamed, one block write, and written anew ([`card::Card::recycle`]).
+//! * Lost sectors of a segment are rebuilt from parity at the segment's end (`hums_blackbox::parity`).
+//! * Waiting sectors in a row are written with one command (`chain::ClusterChain`).
+//! * The directory is read once, when a card is mounted (`directory::Directory`).
+//!
+//! [`spi`] is the driver of a real card; the PC's cards are files.
+//!
+//! No data on a card may stop the monitor: [`layout::Layout`] is checked before it is used, so is each cluster number,
+//! and each walk over a chain has an end.
 #![cfg_attr(not(test), no_std)]
 
 pub mod card;

@@ -4,11 +4,14 @@
 //! the first group that no longer fits, so that each file can be read by itself. A *partial* sector (one still in
 //! progress) is written alternately at its own place and at the next one, so that a torn write never destroys the
 //! older copy. If the newest copy is at the sector's own place, the whole sector is first written as a copy at the
-//! next one. ¶ Each stretch of a segment has its parity at the segment's end. It is written when the stretch is full,
-//! when the segment is left, when the log ends in order, and every 10 s meanwhile. It may fail without consequence:
-//! the sectors themselves are there. ¶ A failed write is tried again, then with a new segment; then the card is given
-//! up and looked for once a second. A sector counts as lost only when it can never be written: the caller keeps it
-//! until then.
+//! next one.
+//!
+//! Each stretch of a segment has its parity at the segment's end. It is written when the stretch is full, when the
+//! segment is left, when the log ends in order, and every 10 s meanwhile. It may fail without consequence: the
+//! sectors themselves are there.
+//!
+//! A failed write is tried again, then with a new segment; then the card is given up and looked for once a second. A
+//! sector counts as lost only when it can never be written: the caller keeps it until then.
 
 mod before;
 mod segments;

@@ -1,4 +1,4 @@
-//! What a command of a ground station does, and the answers in line as messages.
+//! Commands of a ground station, and the waiting answers as messages.
 //!
 //! | `MAV_CMD` | does |
 //! |---|---|
@@ -43,22 +43,22 @@ const CANCEL: u16 = 31_011;
 /// `MAV_RESULT`
 pub(crate) const ACCEPTED: u8 = 0;
 const TEMPORARILY_REJECTED: u8 = 1;
-/// Of `MAV_RESULT` as well.
+/// Also of `MAV_RESULT`.
 pub(crate) const DENIED: u8 = 2;
 const UNSUPPORTED: u8 = 3;
 const FAILED: u8 = 4;
 
-/// Whether a command only asks for a message, and changes nothing.
+/// Whether a command only requests a message, and changes nothing.
 pub(crate) const fn only_asks(command: u16) -> bool {
     matches!(command, MESSAGE | PROTOCOL | CAPABILITIES | PREFLIGHT)
 }
 
-/// Answers in line, and what commands decide.
+/// Waiting answers, and the state that commands change.
 #[derive(Clone, Debug)]
 pub(crate) struct Commands {
     pub(crate) replies: Replies,
     limits: [Limiter; 2],
-    /// Somebody stopped the record.
+    /// Recording is stopped by command.
     stopped: bool,
 }
 
@@ -67,17 +67,17 @@ impl Commands {
         Self { replies: Replies::new(), limits: [Limiter::new(); 2], stopped: false }
     }
 
-    /// Whether somebody at this port may change something now.
+    /// Whether a change from this port is allowed now.
     pub(crate) fn allows(&mut self, now: Instant, port: Port) -> bool {
         self.limits[port as usize].allows(now)
     }
 
-    /// Whether somebody stopped the record.
+    /// Whether recording is stopped by command.
     pub(crate) const fn stopped(&self) -> bool {
         self.stopped
     }
 
-    /// Does what a command says; its `MAV_RESULT`.
+    /// Executes a command; returns its `MAV_RESULT`.
     pub(crate) fn command(
         &mut self,
         now: Instant,
@@ -100,9 +100,9 @@ impl Commands {
                 reply(Reply::Preflight);
                 if preflight(book.monitor).is_none() { ACCEPTED } else { FAILED }
             }
-            // Which storage is it, and is it meant: a command that is sent by mistake has neither.
+            // The storage number and a confirmation: a command sent by mistake has neither.
             (FORMAT, storage) if storage > 1 || params[1].to_bits() != 1.0_f32.to_bits() => DENIED,
-            // Likewise: the ground station's button without numbers is no word about the propellers.
+            // Likewise: the ground station's button without numbers must not reset the baselines.
             (REPLACED, 0) if params.map(f32::to_bits) != [0.0_f32, 1.0].map(f32::to_bits) => DENIED,
             (RECORD | STOP | FORMAT | REPLACED | CANCEL, number) => {
                 if !self.allows(now, asker.port) {
@@ -138,7 +138,7 @@ impl Commands {
             }
             REPLACED => {
                 let place = (number as usize).wrapping_sub(1);
-                // Its serial number can be given later; who did it is in the component's record.
+                // Its serial number can be set later; the component's record names the sender.
                 if records::replace_component(now, place, "", by, book, sectors) { ACCEPTED } else { DENIED }
             }
             _ => {
@@ -148,8 +148,8 @@ impl Commands {
         }
     }
 
-    /// Never unnoticed: it is an event in the record, a text on the ground station, and a finding for as long as it
-    /// lasts; and it ends when the vehicle is armed.
+    /// Stops or starts recording. A stop is visible: an event in the record, a text on the ground station, and a
+    /// finding for as long as it lasts. It ends when the vehicle is armed.
     pub(crate) fn stop_or_record(
         &mut self,
         now: Instant,
@@ -170,7 +170,7 @@ impl Commands {
     }
 }
 
-/// Only a card that holds nothing for us is formatted over a link: nobody at a radio destroys logs.
+/// Formats only a card without logs of ours: no radio command may destroy logs.
 fn format(now: Instant, by: By, book: &mut Logbook<'_>, sectors: &mut SectorsIn) -> u8 {
     let state = book.card.read().state;
     let may = state.wants_format();
@@ -181,20 +181,20 @@ fn format(now: Instant, by: By, book: &mut Logbook<'_>, sectors: &mut SectorsIn)
             book.card.want_format();
             ACCEPTED
         }
-        // It was asked for already, and the answer was lost.
+        // It was requested already, and the answer was lost.
         CardState::Formatting => ACCEPTED,
         CardState::Recording | CardState::Finished | CardState::Full => DENIED,
         _ => FAILED,
     }
 }
 
-/// The first thing that stands against a flight.
+/// The first finding against a flight.
 fn preflight(monitor: &Monitor) -> Option<(&'static str, u8)> {
     let bad = |level| matches!(level, Level::Warning | Level::Critical);
     monitor.health().levels().find(|(_, _, level)| bad(*level)).map(|(check, part, _)| (check.name, part))
 }
 
-/// What stands against a flight.
+/// The text of a finding against a flight.
 // Own stack frame (ARCHITECTURE.md, Memory).
 #[inline(never)]
 fn not_ready(check: &str, part: u8) -> Text {
@@ -204,12 +204,12 @@ fn not_ready(check: &str, part: u8) -> Text {
     }
 }
 
-/// An answer as a message.
+/// A waiting answer as a message.
 pub(crate) fn packet(now: Instant, reply: Reply, monitor: &Monitor, identity: &Boot<'_>) -> Packet {
     match reply {
         Reply::Param(index) => match monitor.params().iter().nth(usize::from(index)) {
             Some((spec, value)) => messages::param_value(spec.name, value, index, TABLE.len() as u16),
-            // Only indices of the table are put in line.
+            // Only indices of the table are queued.
             None => messages::heartbeat(0),
         },
         Reply::Ack(command, result, (system, component)) => {

@@ -1,22 +1,22 @@
-//! Who asks, and how often somebody may change something.
+//! Askers, and limits on the changes that they make.
 
 use hums_core::clock::Instant;
 use hums_link::request::Port;
 
 use crate::journal::By;
 
-/// Who asks, and where the answer goes.
+/// An asker, and the port of the answer.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Asker {
     pub(crate) port: Port,
     pub(crate) by: By,
 }
 
-/// Settings and commands that a port may send at once, and how many more each second.
+/// Settings and commands that a port may send at once, and each second.
 const REQUESTS_MAX: u32 = 20;
 const REQUESTS_PER_S: u32 = 5;
 
-/// So many at once, and so many a second.
+/// A limit at once, and a limit each second.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Limiter {
     left: u32,

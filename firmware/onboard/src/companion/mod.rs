@@ -1,9 +1,11 @@
-//! The monitor as a companion: what it asks of the autopilot, and what it answers to those who ask.
+//! The monitor as a companion: its requests to the autopilot, and its answers to others.
 //!
-//! Part of the monitor task: a question comes as a frame, from the frame queue (the autopilot's port, which carries
-//! ground stations' questions as well) or from the uplink queue (the ground station's own port), and is answered at the
-//! port that it came from, within that port's budget. What is asked can change settings, stop the record and ask for
-//! data, and nothing else; a flood of it is cut by [`limiter`] and by the line of answers, which is short.
+//! It is a part of the monitor task. A request comes as a frame from the frame queue (the autopilot's port, also for
+//! ground stations) or from the uplink queue (the ground station's own port). The answer goes out at the same port,
+//! within its budget.
+//!
+//! A request can change settings, stop recording and ask for data, and nothing else. A flood of requests is cut by
+//! [`limiter`] and by the short queue of answers.
 
 mod commands;
 mod library;
@@ -45,15 +47,15 @@ use ways::Ways;
 /// Bytes that may wait at the autopilot's port. Its queue has room for them, for as many of the summary where the
 /// autopilot carries it, and for the longest frame.
 const WAITING_BYTES: u32 = 400;
-/// How often the autopilot hears of us: it routes only to those it has heard.
+/// Interval of heartbeats to the autopilot, which routes messages only to known systems.
 const HEARTBEAT: Span = Span::from_secs(1);
-/// The monitor itself: nobody waits for an answer.
+/// The monitor itself: no answer is expected.
 const NOBODY: Asker = Asker { port: Port::Gs, by: (0, 0) };
 
-/// What the monitor task keeps for its conversations.
+/// The monitor task's state of its conversations.
 #[derive(Clone, Debug)]
 pub(crate) struct Companion {
-    /// The autopilot port's way out.
+    /// The autopilot port's outlet.
     outlet: Outlet,
     asking: Asking,
     events: Events,
@@ -61,7 +63,7 @@ pub(crate) struct Companion {
     heartbeat_at: Option<Instant>,
     library: Library,
     secure: Secure,
-    /// What the protective action asks of the autopilot, until it is sent.
+    /// The protective action's request to the autopilot, until it is sent.
     protect: Option<protect::Request>,
     pass: Pass,
     settings: Settings,
@@ -87,17 +89,17 @@ impl Companion {
         }
     }
 
-    /// The rate of the autopilot's port that counts now.
+    /// The current rate of the autopilot's port.
     pub(crate) const fn baud(&self) -> u32 {
         self.outlet.baud()
     }
 
-    /// Whether somebody stopped the record.
+    /// Whether recording is stopped by command.
     pub(crate) const fn stopped(&self) -> bool {
         self.commands.stopped()
     }
 
-    /// Frames of others that found no room.
+    /// Frames of others that were lost for lack of room.
     pub(crate) const fn passed_lost(&self) -> u32 {
         self.pass.lost
     }
@@ -112,7 +114,7 @@ impl Companion {
         self.secure.restore(store_writer);
     }
 
-    /// Hands over what of the signing key is due.
+    /// Hands over items of the signing key that are due.
     pub(crate) fn save(&mut self, now: Instant, summary: &Summary, handover: &mut Handover<'_>) {
         let seals = [&summary.outlet.seal, &self.outlet.seal];
         self.secure.save(now, seals.into_iter().flatten().map(Seal::last).max(), handover);
@@ -133,7 +135,7 @@ impl Companion {
         self.pass.up(now, frame, book.monitor, &mut ways);
     }
 
-    /// Looks at a frame of the autopilot's port: an answer to us, a question, or what we need to know is there.
+    /// Takes a frame of the autopilot's port: an answer to us, a request, or data.
     pub(crate) fn heard(
         &mut self,
         now: Instant,
@@ -191,11 +193,11 @@ impl Companion {
         }
         let asker = Asker { port, by: (frame.system(), frame.component()) };
         if asker.by == (system, COMPONENT) {
-            // Our own, that came back; or somebody who says that he is us.
+            // Our own frame that came back, or one with our ids.
             return;
         }
         if let Request::Key(key, stamp) = asked.request {
-            // Never for all, says the guide: only for who is named.
+            // Only if it is addressed to us, by the guide: never a broadcast.
             if asked.target == (system, COMPONENT) {
                 self.key_brought(now, asker, key, stamp, book, sectors);
             }
@@ -207,13 +209,13 @@ impl Companion {
                 let Some(param) = Param::find(name) else { return };
                 let may =
                     self.secure.may_set(book.monitor, port, param, trust) && self.commands.allows(now, port);
-                // Refused or not, the answer is the value that counts now.
+                // Also after a refusal the answer is the current value.
                 if may && book.set_parameter(now, name, value, asker.by, sectors) {
                     self.secure.changed(trust);
                 }
                 self.commands.replies.push(port, Reply::Param(param as u16));
             }
-            // What is for all components of the vehicle is for the autopilot to answer, unless it is a question.
+            // Broadcasts to all components are left to the autopilot, unless they are requests for messages.
             Request::Command(command, params) if asked.target.1 != 0 || command == commands::MESSAGE => {
                 let result = match trust {
                     Trust::Refused => commands::DENIED,
@@ -232,7 +234,7 @@ impl Companion {
         }
     }
 
-    /// Parameters and logs are asked for.
+    /// Requests for parameters and logs.
     fn asked_for_data(
         &mut self,
         now: Instant,
@@ -254,7 +256,7 @@ impl Companion {
                 }
             }
             Request::LogErase if asked.target.1 != 0 => self.erase(now, asker, trust, book, sectors),
-            // Of the broadcasts of a vehicle only those that name us: the autopilot has logs and files of its own.
+            // Only with our component id: the autopilot has logs and files of its own.
             ref about_logs if asked.target.1 != 0 => {
                 self.library.asked(asker, about_logs);
             }
@@ -262,7 +264,7 @@ impl Companion {
         }
     }
 
-    /// Earlier logs are no longer offered and are the first to make room; not in flight.
+    /// Hides earlier logs and marks them as the first to be overwritten; not in flight.
     fn erase(
         &mut self,
         now: Instant,
@@ -310,7 +312,7 @@ impl Companion {
         }
     }
 
-    /// A key at the autopilot's port is not for the record: the record says that it came.
+    /// Withholds a key at the autopilot's port from the record, which gets an event.
     pub(crate) fn withhold(
         &mut self,
         now: Instant,
@@ -324,7 +326,7 @@ impl Companion {
         }
     }
 
-    /// What time alone asks for, every tick: our heartbeat to the autopilot, what we ask of it, settings on a card.
+    /// Periodic work, every tick: our heartbeat to the autopilot, our requests, settings on a card.
     #[inline(never)]
     pub(crate) fn converse(
         &mut self,
@@ -359,14 +361,14 @@ impl Companion {
         let mut out = |bytes: &[u8]| gs.autopilot.put(bytes);
         if let Some(source) = monitor.vehicle().source {
             outlet.encoder.set_system(source.system);
-            // Before it is known whose system we are part of, the autopilot need not hear of us.
+            // Before our system is known, the autopilot gets no heartbeat.
             if heartbeat_at.is_none_or(|at| now.since(at) >= HEARTBEAT)
                 && outlet.send(now, Class::Own, &summary::heartbeat(monitor), &mut out)
             {
                 *heartbeat_at = Some(now);
             }
         }
-        // The protective action: what the autopilot answers is the monitor's to see.
+        // The protective action; the monitor evaluates the autopilot's answer.
         if let (Some(request), Some(source)) = (*protect, monitor.vehicle().source) {
             let packet = messages::command_long(request.command, &[], source.system, source.component);
             if outlet.send(now, Class::Critical, &packet.u8(32, request.confirmation), &mut out) {
@@ -386,7 +388,7 @@ impl Companion {
         }
     }
 
-    /// Sends what can be sent of the answers in line.
+    /// Sends waiting answers as far as possible.
     pub(crate) fn answer(
         &mut self,
         now: Instant,
@@ -411,7 +413,7 @@ impl Companion {
                 replies.listed_done(port, TABLE.len() as u16);
             }
         }
-        // What the card answers meanwhile is not for those who download.
+        // Meanwhile the card's answers are not for downloads.
         if !self.settings.is_reading()
             && let Some((port, told)) = self.library.lend(now, &mut ways)
         {
@@ -420,7 +422,7 @@ impl Companion {
     }
 }
 
-/// Who is asked: the vehicle, and each autopilot on the port in turn until it is settled which of them that is.
+/// The systems to ask: the vehicle, or, until it is settled, each autopilot on the port in turn.
 fn known(now: Instant, monitor: &Monitor) -> Option<Known> {
     let vehicle = monitor.vehicle();
     let (source, autopilot) = vehicle.asks(now.into())?;

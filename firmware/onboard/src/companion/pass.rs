@@ -1,11 +1,17 @@
-//! The back-channel (`GS_PASS`): one radio, at our port, serves the autopilot too. What is not for us passes unaltered,
-//! signatures and all, within each port's budget; what finds no room is lost and counted, and asked for again by whoever
-//! needs it, as on any radio.
+//! The back-channel (`GS_PASS`): one radio, at our port, serves the autopilot too.
 //!
-//! Up goes everything but what names us, what says that it comes from the vehicle itself, reports of the radio about its
-//! link with us, and keys. Down goes, beside the summary stream, what names somebody else, what answers a question
-//! without naming who asked ([`ANSWERS`]), heartbeats of the vehicle's other components, and once a second a frame of a
-//! definition that we do not have.
+//! Frames of others pass unaltered, with their signatures, within each port's budget. Without room they are lost and
+//! counted, and the sender repeats them, as on any radio.
+//!
+//! All frames go up except those addressed to us, those from the vehicle itself, a radio's reports about its link
+//! with us, and keys.
+//!
+//! Besides the summary stream, these frames go down:
+//!
+//! - frames addressed to others;
+//! - answers without an address ([`ANSWERS`]);
+//! - heartbeats of the vehicle's other components;
+//! - once a second a frame of an unknown definition.
 
 use hums_core::Monitor;
 use hums_core::clock::{Instant, Span};
@@ -21,19 +27,19 @@ use crate::queues::SummaryRoute;
 
 /// `RADIO`, `RADIO_STATUS`
 const RADIO: [u32; 2] = [166, 109];
-/// Messages that answer and name nobody: `PARAM_VALUE`, `GPS_GLOBAL_ORIGIN`, `LOG_ENTRY`, `LOG_DATA`,
-/// `MAG_CAL_PROGRESS`, `MAG_CAL_REPORT`, `CAMERA_INFORMATION`, `PROTOCOL_VERSION`, `PARAM_EXT_VALUE`,
-/// `COMPONENT_INFORMATION`, `COMPONENT_METADATA`, `EVENT`, `CURRENT_EVENT_SEQUENCE`.
+/// Answers without an address: `PARAM_VALUE`, `GPS_GLOBAL_ORIGIN`, `LOG_ENTRY`, `LOG_DATA`, `MAG_CAL_PROGRESS`,
+/// `MAG_CAL_REPORT`, `CAMERA_INFORMATION`, `PROTOCOL_VERSION`, `PARAM_EXT_VALUE`, `COMPONENT_INFORMATION`,
+/// `COMPONENT_METADATA`, `EVENT`, `CURRENT_EVENT_SEQUENCE`.
 const ANSWERS: [u32; 13] = [22, 49, 118, 120, 191, 192, 259, 300, 322, 395, 397, 410, 411];
-/// Between two frames of definitions that we do not have.
+/// Time between two frames of unknown definitions.
 const UNKNOWN: Span = Span::from_secs(1);
 
-/// What passed, and what did not.
+/// Frames passed and lost.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Pass {
-    /// Frames that passed through for others, and found no room.
+    /// Lost frames of others.
     pub(super) lost: u32,
-    /// When a frame of a definition that we do not have was passed down last.
+    /// Last time of a frame of an unknown definition.
     unknown_at: Option<Instant>,
 }
 

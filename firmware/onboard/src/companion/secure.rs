@@ -1,18 +1,27 @@
-//! Who may do what: signatures of what is asked, keys, and what of it outlives power.
+//! Authorisation: signatures of requests, keys, and the items of both that outlive power.
 //!
-//! `GS_SIGN` and `AP_SIGN` say how a port is guarded once there is a key: 0 not at all; 1 our frames are signed, and what
-//! is signed has to be right; 2 whatever is not signed is refused as well. A refused setting is answered with the value
-//! that stays, a refused command with "denied", and anything else not at all.
+//! With a key, `GS_SIGN` and `AP_SIGN` set the guard of a port:
 //!
-//! # Where a key comes from
-//! With `SETUP_SIGNING`, over the port that `SIGN_PORT` trusts: none, unless the card's `PARAMS.TXT` says so. Not the
-//! autopilot's by default, because ArduPilot routes that message like any other that names us, from its own radio too.
-//! `SIGN_PORT` is changed over the trusted port, with a signature, or by the card, and so are the other two while there
-//! is a key: whoever guards the door may open it.
+//! - 0: none.
+//! - 1: our frames are signed, and a signature must be right.
+//! - 2: unsigned requests are refused as well.
 //!
-//! # Where a key never goes
-//! It is no parameter and no message of ours. A `SETUP_SIGNING` at the autopilot's port, for whomever it is, is the one
-//! frame that is not recorded, as the signing guide asks of logs; an event says that it came. It is not passed on.
+//! A refused setting is answered with the old value, a refused command with "denied", other requests not at all.
+//!
+//! # Source of a key
+//!
+//! A key comes with `SETUP_SIGNING`, over the port that `SIGN_PORT` trusts: none, unless the card's `PARAMS.TXT` sets
+//! one. The autopilot's port is not trusted by default, because ArduPilot routes that message like any other one to
+//! us, also from its own radio.
+//!
+//! `SIGN_PORT` is changed over the trusted port, with a signature, or by the card. With a key, the same holds for the
+//! other two parameters.
+//!
+//! # Secrecy of a key
+//!
+//! A key is in no parameter and in no message of ours. A `SETUP_SIGNING` at the autopilot's port, to any address, is
+//! the one frame that is not recorded, as the signing guide demands of logs. An event records its arrival. It is not
+//! passed on.
 
 use embedded_storage::nor_flash::NorFlash;
 use hums_core::Monitor;
@@ -35,14 +44,14 @@ const ITEM_TIMES: u8 = 33;
 const TIMES_BYTES: usize = 24;
 /// `SETUP_SIGNING`
 pub(crate) const SETUP: u32 = 256;
-/// Times are stored no more often.
+/// Minimum interval of stored times.
 const SAVE: Span = Span::from_secs(1);
-/// Nor than this while the store has little more than landing needs, and then [`SIGNED_MAX`] times at most.
+/// The same while the store has little more than its reserve, and then [`SIGNED_MAX`] times at most.
 const SAVE_SCARCE: Span = Span::from_secs(60);
-/// Link ids: the summary stream and the answers at the ground station's port, and what goes to the autopilot.
+/// Link ids: summary stream and answers at the ground station's port, and frames to the autopilot.
 const LINKS: [u8; 2] = [0, 1];
 
-/// How a port is guarded now: 0 to 2.
+/// The current guard of a port: 0 to 2.
 fn guard(params: &Params, port: Port) -> u8 {
     params.get(match port {
         Port::Gs => Param::GsSign,
@@ -55,14 +64,14 @@ pub(crate) fn is_trusted(params: &Params, port: Port) -> bool {
     params.get(Param::SignPort) as u8 == port as u8 + 1
 }
 
-/// What a request is worth.
+/// The authorisation of a request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Trust {
-    /// Nobody asks for more.
+    /// No signature is required.
     Open,
     /// It is signed with our key.
     Signed,
-    /// It should be signed and is not, or not rightly.
+    /// A required signature is missing or wrong.
     Refused,
 }
 
@@ -74,11 +83,11 @@ pub(crate) struct Secure {
     key_due: bool,
     times_due: bool,
     saved_at: Option<Instant>,
-    /// Times stored since the store had more room than landing needs.
+    /// Times stored since the store had more than its reserve.
     scarce: u8,
-    /// Stamps of ours go on from here.
+    /// Our next stamps follow this one.
     last: u64,
-    /// A key was set, and the time with it: both ways out begin anew.
+    /// A key was set together with the time: both outlets begin anew.
     reseal: bool,
     /// Requests that were refused for their signature.
     pub(super) refused: u32,
@@ -99,7 +108,7 @@ impl Secure {
         }
     }
 
-    /// Takes the key and its times out of the store. At power-on, before anything is sent.
+    /// Reads key and times from the store. At power-on, before the first frame is sent.
     pub(crate) fn restore<F: NorFlash>(&mut self, store_writer: &mut StoreWriter<'_, F>) {
         let mut bytes = [0; KEY_BYTES];
         let key = (store_writer.item(ITEM_KEY, &mut bytes) == KEY_BYTES).then_some(Key(bytes));
@@ -115,7 +124,7 @@ impl Secure {
         self.signing.restore(key, self.times);
     }
 
-    /// Hands over what is due, at every tick and at the end. `last` is the highest stamp that was signed with.
+    /// Hands over items that are due, at every tick and at the end. `last` is the highest stamp of our signatures.
     pub(crate) fn save(&mut self, now: Instant, last: Option<u64>, handover: &mut Handover<'_>) {
         let Self { signing, times, key_due, times_due, saved_at, scarce, .. } = self;
         let has_room = handover.room() == Room::Enough;
@@ -125,8 +134,8 @@ impl Secure {
             let bytes = signing.key().map_or([0; KEY_BYTES], |key| key.0);
             *key_due = !handover.put(Item::item(ITEM_KEY), &bytes);
         }
-        // By time alone nothing is stored that landing needs the room for. After a power-off stamps may then begin below
-        // the last one, and are refused until UTC is known.
+        // Periodic saves leave the reserve for landing. After a power-off stamps may then begin below the last one,
+        // and are refused until UTC is known.
         if let Some(last) = last.filter(|_| has_room) {
             *times_due |= times.keep_ahead(now, signing.clock.now(now), last);
         }
@@ -144,7 +153,7 @@ impl Secure {
         }
     }
 
-    /// What a frame's signature is worth on this port.
+    /// The authorisation by a frame's signature on this port.
     pub(crate) fn trust(&mut self, now: Instant, params: &Params, port: Port, frame: &Frame<'_>) -> Trust {
         let guard = guard(params, port);
         if guard == 0 || self.signing.key().is_none() {
@@ -160,7 +169,7 @@ impl Secure {
         }
     }
 
-    /// Something was changed; if by a signed frame, no frame that is older changes anything ever again.
+    /// Notes a change. After a change by a signed frame, no older frame is accepted any more.
     pub(crate) fn changed(&mut self, trust: Trust) {
         if trust == Trust::Signed {
             self.times.accepted = self.signing.latest();
@@ -168,7 +177,8 @@ impl Secure {
         }
     }
 
-    /// Whether a request that is worth so much may set a parameter. When one may be set is [`Logbook`](crate::journal::Logbook)'s.
+    /// Whether a request with this authorisation may set a parameter. [`Logbook`](crate::journal::Logbook) decides
+    /// whether it may be set now.
     pub(crate) fn may_set(&self, monitor: &Monitor, port: Port, param: Param, trust: Trust) -> bool {
         let guards = match param {
             Param::SignPort => true,
@@ -182,7 +192,7 @@ impl Secure {
         }
     }
 
-    /// Takes a key that a trusted port brought.
+    /// Takes a key from a trusted port.
     pub(crate) fn set_key(&mut self, now: Instant, key: Key, stamp: u64) {
         if stamp > 0 || self.signing.key() != Some(&key) {
             (self.last, self.reseal) = (0, true);
@@ -193,7 +203,7 @@ impl Secure {
         (self.key_due, self.times_due) = (true, true);
     }
 
-    /// Keeps both ways out signing as they should, in our time: the summary stream's, and the autopilot's.
+    /// Keeps both outlets signing by the settings, in our time: the summary stream's, and the autopilot's.
     pub(crate) fn seal(
         &mut self,
         now: Instant,
@@ -214,7 +224,7 @@ impl Secure {
             match (signing.key().filter(|_| guard > 0), &mut outlet.seal) {
                 (Some(key), Some(seal)) if seal.is_of(key) && !reseal => seal.clock = signing.clock,
                 (Some(key), seal) => *seal = Some(Seal::new(*key, link, signing.clock, *last)),
-                // Who signs again goes on from there.
+                // A new seal continues its stamps.
                 (None, seal) => *last = seal.take().map_or(*last, |seal| seal.last().max(*last)),
             }
         }
@@ -250,14 +260,14 @@ mod tests {
             }
         }
         assert!((1..=u32::from(SIGNED_MAX) + 1).contains(&scarce), "{scarce}");
-        // A landing: what it needs is stored without an erase.
+        // A landing: its items are stored without an erase.
         let landing = [(ItemKey::Exceedances, 505), (ItemKey::Session, 160), (ItemKey::Session, 160)];
         for (key, length) in landing {
             assert!(handover.put(Item::item(key.number()), &[1; 512][..length]));
             assert_eq!(store_writer.service(false), Saved::Took, "{key:?}");
         }
         assert_eq!(status.read().refused, 0);
-        // What waited is stored once there is room again.
+        // Waiting items are stored once there is room again.
         assert!(secure.times_due);
         assert!(store_writer.turn_ahead());
         secure.save(Instant::from_millis(86_400_000), None, &mut handover);

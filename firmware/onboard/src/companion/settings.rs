@@ -1,13 +1,14 @@
-//! `PARAMS.TXT` on the card: parameters for whoever has the card in hand, in the form that ground stations keep them.
+//! `PARAMS.TXT` on the card: parameters in the form of ground stations, set by inserting the card.
 //!
-//! Nothing of it is set in flight. The file waits for a heartbeat that says disarmed; after a reset that may have come in
-//! flight ([`ResetCause::may_be_in_flight`](crate::ResetCause::may_be_in_flight)) and once the vehicle is armed it is not
-//! read, or not further, until another card is put in: one with another volume's serial number. If heartbeats stop, reading begins anew with the next one. Which
-//! parameters may be set in flight is one rule for the file and for ground stations ([`Logbook::set_parameter`]).
+//! Nothing in it is set in flight. The file waits for a heartbeat that reports disarmed. It is not read, or not
+//! further, once the vehicle is armed, or after a reset that may have come in flight
+//! ([`ResetCause::may_be_in_flight`](crate::ResetCause::may_be_in_flight)). Only another card, with another volume's
+//! serial number, ends that. If heartbeats stop, reading begins anew with the next one. The parameters that may be
+//! set in flight follow one rule for the file and for ground stations ([`Logbook::set_parameter`]).
 //!
-//! Each line is set, recorded and stored as if a ground station had set it, at every power-on as long as the file is there.
-//! A refused line is an event in the record and a text for the ground station. [`BYTES_MAX`] of the file are read,
-//! [`LINE_MAX`] of a line. The last line is refused where the file's end was not read.
+//! Each line is set, recorded and stored like a setting by a ground station, at every power-on as long as the file is
+//! there. A refused line is an event in the record and a text for the ground station. [`BYTES_MAX`] of the file are
+//! read, [`LINE_MAX`] of a line. The last line is refused if the file's end was not read.
 
 use hums_core::clock::Instant;
 use hums_link::param_line::{self, Line};
@@ -19,28 +20,28 @@ use crate::notices::Notices;
 use crate::queues::SectorsIn;
 use crate::shelf::{DATA_MAX, Reader, Want, What, Which};
 
-/// All parameters, each in the longest line.
+/// Enough for all parameters, each in the longest line.
 const BYTES_MAX: u32 = 16 * 1024;
 /// A line without its comment.
 const LINE_MAX: usize = 64;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum State {
-    /// There is no card, or no heartbeat yet.
+    /// No card, or no heartbeat yet.
     Waiting,
-    /// The bytes from here on are asked for.
+    /// The bytes from this offset on are requested.
     Reading(u32),
-    /// Of this volume, all was read that may be.
+    /// The file of this volume is read, or must not be.
     Done(u32),
 }
 
-/// How far it is read.
+/// Progress of reading.
 #[derive(Clone, Debug)]
 pub(crate) struct Settings {
     state: State,
     ticket: Option<u16>,
     line: heapless::Vec<u8, LINE_MAX>,
-    /// The line is longer than there is room, or its end was not read.
+    /// The line is too long, or its end was not read.
     is_cut: bool,
     number: u16,
     refused: u16,
@@ -58,7 +59,7 @@ impl Settings {
         }
     }
 
-    /// Whether what the card answers is ours.
+    /// Whether the card's answers are for this file.
     pub(crate) const fn is_reading(&self) -> bool {
         matches!(self.state, State::Reading(_))
     }
@@ -72,7 +73,7 @@ impl Settings {
         byte == b'\n'
     }
 
-    /// Reads on, a piece at a tick.
+    /// Continues reading, one piece a tick.
     pub(crate) fn tick(
         &mut self,
         now: Instant,
@@ -151,7 +152,7 @@ impl Settings {
         true
     }
 
-    /// Sets what a line says.
+    /// Sets the parameter of a line.
     fn line(&mut self, now: Instant, book: &mut Logbook<'_>, sectors: &mut SectorsIn) {
         self.number = self.number.saturating_add(1);
         let (number, is_cut) = (self.number, core::mem::take(&mut self.is_cut));

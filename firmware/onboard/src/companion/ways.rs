@@ -1,4 +1,4 @@
-//! The ways out: each port's outlet, which says what may go when, with the queue behind it.
+//! The ways out: each port's outlet, which decides what may go when, with the queue behind it.
 
 use hums_core::clock::Instant;
 use hums_link::outlet::{Class, Outlet};
@@ -24,7 +24,7 @@ impl Ways<'_, '_> {
         }
     }
 
-    /// Passes a frame of somebody else's on, likewise.
+    /// Passes a frame of another system on, likewise.
     pub(crate) fn pass(&mut self, now: Instant, port: Port, class: Class, frame: &[u8]) -> bool {
         let Self { gs, autopilot, queues } = self;
         match port {

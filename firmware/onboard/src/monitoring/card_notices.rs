@@ -1,4 +1,4 @@
-//! What the card's slot is up to, told: why nothing is recorded, and that it is again.
+//! Texts about the card's slot: the reason why recording stopped, and its resumption.
 
 use hums_blackbox::record::{Event, Record};
 use hums_core::clock::{Instant, Span};
@@ -8,7 +8,7 @@ use crate::journal::Journal;
 use crate::notices::{Notice, Notices};
 use crate::queues::SectorsIn;
 
-/// The next change is told no sooner, so that a card that comes and goes does not fill the line.
+/// Minimum time between two texts, so that a card that comes and goes does not fill the line.
 const QUIET: Span = Span::from_secs(5);
 /// `MAV_SEVERITY`
 const WARNING: u8 = 4;
@@ -17,7 +17,7 @@ const NOTICE: u8 = 5;
 const CARD_IN: u8 = 6;
 const CARD_OUT: u8 = 7;
 
-/// What was told of the card.
+/// The last reported state of the card.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct CardNotices {
     told: CardState,
@@ -29,7 +29,8 @@ impl CardNotices {
         Self { told: CardState::Unknown, told_at: None }
     }
 
-    /// Records and tells a new state of the card. That all is well at the beginning is not told: the heartbeat says it.
+    /// Records and reports a new state of the card. A good state at the beginning is not reported: the heartbeat has
+    /// it.
     pub(super) fn tick(
         &mut self,
         now: Instant,
@@ -48,14 +49,14 @@ impl CardNotices {
         journal.record(now, &Record::Event(Event { number, text }), sectors);
         if !is_first {
             let severity = if state == CardState::Recording { NOTICE } else { WARNING };
-            // Where no more can wait, the finding tells that nothing is recorded.
+            // With a full queue the finding still reports that recording stopped.
             notices.push(Notice::Text(severity, text));
         }
     }
 }
 
-/// One STATUSTEXT each. `docs/cards.md` says what to do. None advises to format a card: logs may be on it, which only a
-/// look at all of its blocks tells.
+/// One STATUSTEXT each; `docs/cards.md` has the remedies. None advises to format a card: it may hold logs, which only
+/// a search of all its blocks finds.
 const fn words(state: CardState) -> Option<&'static str> {
     Some(match state {
         CardState::Unknown | CardState::Finished => return None,

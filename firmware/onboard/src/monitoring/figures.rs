@@ -1,4 +1,4 @@
-//! The pipeline's own figures: what came in, what was lost, and how the recording goes.
+//! The pipeline's own figures: input, losses, and the state of recording.
 
 use hums_blackbox::SECTOR_BYTES;
 use hums_blackbox::record::{Lost, Stats};
@@ -15,26 +15,26 @@ use crate::queues::{
     FRAME_QUEUE_BYTES, GS_QUEUE_BYTES, GsIn, SECTOR_QUEUE_BYTES, SECTOR_QUEUE_SECTORS, SectorsIn,
 };
 
-/// Over how long the rates of the ports are counted.
+/// Window of the ports' rates.
 const RATES: Span = Span::from_secs(5);
 
 /// How long a card may take to be found before it counts as missing.
 const START: Span = Span::from_secs(3);
 
-/// What the machine has to give for all this; zeros where nobody counts.
+/// Load of the processor; zeros if nothing measures it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Machine {
-    /// What the processor was busy in the last second, thousandths.
+    /// Busy time of the processor in the last second, thousandths.
     pub cpu_permille: u16,
     /// The same in the worst second.
     pub cpu_permille_max: u16,
-    /// The deepest the stack was, bytes.
+    /// The deepest use of the stack, bytes.
     pub stack_bytes_max: u32,
-    /// What the stack holds, bytes.
+    /// The size of the stack, bytes.
     pub stack_bytes: u32,
 }
 
-/// Sums in 64 bits of what the port counts in 32.
+/// 64-bit sums of the port's 32-bit counters.
 #[derive(Clone, Copy, Debug, Default)]
 struct Sums {
     bytes: u64,
@@ -43,7 +43,7 @@ struct Sums {
     frames_lost: u64,
 }
 
-/// What was counted since power-on.
+/// Counts since power-on.
 pub(super) struct Figures<'a> {
     port: &'a PortStatus,
     port_before: PortReading,
@@ -55,13 +55,13 @@ pub(super) struct Figures<'a> {
     rates: Rates,
 }
 
-/// How much goes over the ports, bytes a second, by what was counted every [`RATES`].
+/// Rates of the ports, bytes a second, over [`RATES`].
 #[derive(Clone, Copy, Debug, Default)]
 struct Rates {
-    /// When it was counted last, in milliseconds modulo 2^32, and the counts.
+    /// Time of the last count, in milliseconds modulo 2^32, and the counts.
     at_ms: u32,
     counts: [u32; 2],
-    /// What comes from the autopilot, and what goes to the ground station's port.
+    /// Input from the autopilot, and output at the ground station's port.
     a_second: [u32; 2],
 }
 
@@ -93,8 +93,8 @@ impl<'a> Figures<'a> {
         }
     }
 
-    /// In percent, with the worst of the queues and of the card: for the summary stream. `bauds` are the rates of the autopilot's
-    /// port and of the ground station's.
+    /// Figures for the summary stream, in percent, with the worst of the queues and of the card. `bauds` are the
+    /// rates of the autopilot's port and of the ground station's.
     pub(super) fn own(&mut self, now: Instant, card: &CardStatus, bauds: [u32; 2], gs: &GsIn) -> OwnFigures {
         let Machine { cpu_permille, stack_bytes_max, stack_bytes, .. } = self.machine;
         self.rates.count(now, [self.port_before.bytes, gs.bytes() as u32]);
@@ -116,7 +116,7 @@ impl<'a> Figures<'a> {
         }
     }
 
-    /// For the record.
+    /// Figures for the record.
     pub(super) fn stats(
         &self,
         card: &CardStatus,
@@ -155,7 +155,7 @@ impl<'a> Figures<'a> {
         }
     }
 
-    /// For the checks. `stopped`: somebody stopped the record.
+    /// Figures for the checks. `stopped`: recording is stopped by command.
     pub(super) fn recorder(
         &self,
         now: Instant,
@@ -182,7 +182,7 @@ impl<'a> Figures<'a> {
         }
     }
 
-    /// What is new since the last tick; what of it was lost is to be recorded.
+    /// Adds counts since the last tick, and passes losses on to be recorded.
     pub(super) fn count(
         &mut self,
         now: Instant,

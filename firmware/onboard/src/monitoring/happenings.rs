@@ -1,4 +1,4 @@
-//! What happened, into the record: take-off and landing, phases of flight, mishaps, snapshots around critical findings, the
+//! Events for the record: take-off and landing, phases of flight, mishaps, snapshots around critical findings, the
 //! protective action.
 
 use hums_blackbox::record::{Event, Lost, Moment, Protection, Record, Resting, Snapshot, SnapshotValues};
@@ -14,9 +14,9 @@ use crate::records::Recorded;
 
 /// `MAV_SEVERITY_WARNING`
 const WARNING: u8 = 4;
-/// The event after somebody said that propellers, a battery or the payload were changed.
+/// The text of the event after a change of propellers, battery or payload.
 pub const PARTS_CHANGED: &str = "baselines anew";
-/// What is told where nothing tells how many cells a battery has.
+/// The text about a battery with an unknown number of cells.
 pub const CELLS_UNKNOWN: &str = "HUMS: cells not known, set BAT_CELLS";
 /// The number of the event that marks a critical finding. The others are in [`record`].
 pub(super) const CRITICAL: u8 = 8;
@@ -74,7 +74,7 @@ pub(super) fn record(
     }
 }
 
-/// Marks the log, tells the ground station where, and lets everything go to the card at once.
+/// Marks the log, reports the place to the ground station, and writes all data to the card at once.
 fn mishap(
     now: Instant,
     change: Change,
@@ -95,7 +95,7 @@ fn mishap(
     };
     let report = book.monitor.flight().report(change);
     book.journal.record(now, &Record::Event(Event { number, text: &report.text() }), sectors);
-    // That it began is told as a finding.
+    // The beginning is reported as a finding.
     if !matches!(change, Change::Began(_)) {
         notices.announce(Notice::Mishap(report));
     }

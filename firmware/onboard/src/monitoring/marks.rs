@@ -1,8 +1,9 @@
-//! End marks: when the vehicle comes to rest, a mark says that the log is whole up to there, and goes to the card at once.
+//! End marks. When the vehicle comes to rest, a mark states that the log is whole up to there, and goes to the card
+//! at once.
 //!
 //! A mark is a record of some ten bytes, and costs one write of the sector in progress, in its place. At most one is
-//! written in [`APART`], so that a vehicle that is armed and disarmed all the time makes less than a kilobyte a minute. That of a
-//! mishap does not wait: there is one for each.
+//! written in [`APART`], so that frequent arming and disarming makes less than a kilobyte a minute. A mishap's mark
+//! does not wait.
 
 use hums_blackbox::SectorSink as _;
 use hums_blackbox::record::Resting;
@@ -11,15 +12,15 @@ use hums_core::clock::{Instant, Span};
 use crate::journal::Journal;
 use crate::queues::SectorsIn;
 
-/// From one mark to the next at least. One that comes sooner waits, and is dropped if the vehicle moves on meanwhile.
+/// Minimum time between two marks. An earlier one waits, and is dropped if the vehicle moves meanwhile.
 const APART: Span = Span::from_secs(1);
 
-/// Which mark is to be written, and what of it is to be done.
+/// The mark to write, and its progress.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Marks {
     due: Option<Resting>,
     at: Option<Instant>,
-    /// The sector that holds the last one is not with storage yet.
+    /// The sector with the last one is not with storage yet.
     unsent: bool,
 }
 
@@ -33,17 +34,17 @@ impl Marks {
         self.due = Some(why);
     }
 
-    /// Something happened after which the next moment may be the last: what is known now goes to the card at once.
+    /// Power may fail in the next moment: all data goes to the card at once.
     pub(super) const fn at_once(&mut self, why: Resting) {
         (self.due, self.at) = (Some(why), None);
     }
 
-    /// The vehicle is armed or takes off: a mark from before says nothing of what comes now.
+    /// The vehicle is armed or takes off: an earlier mark is outdated.
     pub(super) const fn moves(&mut self) {
         self.due = None;
     }
 
-    /// Writes the mark that is due, after all other records of the moment, and gives its sector to storage.
+    /// Writes the due mark after all other records of the moment, and gives its sector to storage.
     pub(super) fn tick(&mut self, now: Instant, journal: &mut Journal<'_>, sectors: &mut SectorsIn) {
         if let Some(why) = self.due
             && self.at.is_none_or(|at| now.since(at) >= APART)

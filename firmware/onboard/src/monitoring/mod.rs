@@ -1,8 +1,8 @@
 //! The monitor task's body: frames from the queue into the record, the checks and the summary stream.
 //!
-//! Less urgent than reception, whose frames wait up to 16 ms for it; more urgent than anything that waits for a device.
-//! One call of [`Monitoring::drain`] takes one frame through the whole pipeline; [`Monitoring::tick`] every 50 ms does
-//! what time alone asks for.
+//! It is less urgent than reception, whose frames wait up to 16 ms for it, and more urgent than tasks that wait for a
+//! device. One call of [`Monitoring::drain`] takes one frame through the whole pipeline; [`Monitoring::tick`] does
+//! the periodic work every 50 ms.
 
 mod card_notices;
 mod figures;
@@ -38,8 +38,8 @@ use marks::Marks;
 
 /// How often [`Monitoring::tick`] is to be called.
 pub const TICK: Span = Span::from_millis(monitor::TICK.as_millis());
-/// A sector in progress is given to storage at least this often: with the tick's 50 ms a power cut costs less than 200 ms,
-/// however little comes.
+/// Maximum time until a sector in progress is given to storage. With the tick's 50 ms a power cut costs less than 200
+/// ms, even at a low rate.
 const PARTIAL: Span = Span::from_millis(150);
 /// How often the recorder's statistics are recorded.
 const STATS: Span = Span::from_secs(10);
@@ -49,19 +49,19 @@ const USAGE: Span = Span::from_secs(60);
 /// The `MAV_SEVERITY` of a restart after a fault.
 const FAULT_SEVERITY: u8 = 4;
 
-/// What happens to a frame, one after the other.
+/// The steps of a frame, in order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Step {
-    /// Into the record.
+    /// Encoding into the record.
     Encode {
-        /// When it came.
+        /// Its arrival time.
         at: Instant,
-        /// Which message it is.
+        /// Its message id.
         id: u32,
     },
-    /// Into what the monitor knows.
+    /// Observation by the monitor.
     Observe,
-    /// On to the ground station, where it is its turn.
+    /// Forwarding to the ground station, when it is due.
     Summary,
 }
 
@@ -75,7 +75,7 @@ pub struct Monitoring<'a> {
     recorded: Recorded,
     notices: Notices,
     card_notices: CardNotices,
-    /// Files that storage had begun at the last tick.
+    /// Files of storage at the last tick.
     files: u32,
     figures: Figures<'a>,
     marks: Marks,
@@ -84,8 +84,8 @@ pub struct Monitoring<'a> {
 }
 
 impl<'a> Monitoring<'a> {
-    /// Before the first frame. `identity` is what the board knows of itself: the first record of each file.
-    /// `cause` is why it started.
+    /// Before the first frame. `identity` is the board's own data: the first record of each file. `cause` is the
+    /// cause of this start.
     pub fn new(
         monitor: &'a mut Monitor,
         writer: &'a mut Writer,
@@ -111,13 +111,13 @@ impl<'a> Monitoring<'a> {
         }
     }
 
-    /// Writes what a log begins with: who records, and every parameter that is not at its default.
+    /// Writes the head of a log: the recorder's identity, and every parameter that is not at its default.
     pub fn start(&mut self, now: Instant, sectors: &mut SectorsIn) {
         self.recorded.heading(now, &self.identity, &mut self.book, sectors);
         self.recorded.usage(now, Moment::Start, &mut self.book, sectors);
     }
 
-    /// Begins each file of the log but the first one with what a log begins with.
+    /// Begins each further file of the log with the same head.
     fn head_file(&mut self, now: Instant, sectors: &mut SectorsIn) {
         let Self { book, recorded, identity, files, .. } = self;
         let before = core::mem::replace(files, book.card.read().segments);
@@ -127,8 +127,8 @@ impl<'a> Monitoring<'a> {
         }
     }
 
-    /// The card is open: which session was recorded before on it stands in a second boot record, and in that of each
-    /// further file.
+    /// Reports the previous session on a card that was opened, in a second boot record and in that of each further
+    /// file.
     #[inline(never)]
     fn tell_before(&mut self, now: Instant, sectors: &mut SectorsIn) {
         let Some(before) = self.book.card.take_before() else { return };
@@ -136,8 +136,8 @@ impl<'a> Monitoring<'a> {
         self.book.journal.record(now, &Record::Boot(self.identity), sectors);
     }
 
-    /// Records how the boot before this one ended, with a word on what came before, and tells the ground station as soon
-    /// as the vehicle is known. To be called after [`Self::start`].
+    /// Records the end of the previous boot, with a note on what came before, and tells the ground station as soon as
+    /// the vehicle is known. To be called after [`Self::start`].
     pub fn fault(&mut self, now: Instant, fault: &Fault<'_>, before: &str, sectors: &mut SectorsIn) {
         let journal = &mut self.book.journal;
         journal.record(now, &Record::Fault(*fault), sectors);
@@ -146,17 +146,17 @@ impl<'a> Monitoring<'a> {
         self.notices.push(Notice::Restarted(restart_words(fault), task));
     }
 
-    /// Records a text of our own, and tells the ground station; `severity` is a `MAV_SEVERITY`.
+    /// Records a text of ours, and sends it to the ground station; `severity` is a `MAV_SEVERITY`.
     pub fn note(&mut self, now: Instant, severity: u8, text: &'static str, sectors: &mut SectorsIn) {
         self.notices.note(now, severity, text, &mut self.book.journal, sectors);
     }
 
-    /// Takes one frame from the queue through the pipeline; `false` when there is none.
+    /// Takes one frame from the queue through the pipeline; `false` if there is none.
     pub fn drain(&mut self, frames: &mut FramesOut, sectors: &mut SectorsIn, gs: &mut GsIn) -> bool {
         self.drain_in_steps(frames, sectors, gs, &mut |_| {})
     }
 
-    /// As [`Self::drain`], and says which step begins, for whoever measures what each costs.
+    /// As [`Self::drain`], with a call at the beginning of each step, for measurements.
     pub fn drain_in_steps(
         &mut self,
         frames: &mut FramesOut,
@@ -188,7 +188,7 @@ impl<'a> Monitoring<'a> {
         }
         begin(Step::Observe);
         let Some(frame) = frame else { return };
-        // What is not ours by its checksum is recorded but not believed.
+        // A frame that is not verified by its checksum is recorded but not observed.
         if frame.check() == Check::Unverified {
             companion.pass_down(at, &frame, book, summary, gs);
             return;
@@ -209,7 +209,7 @@ impl<'a> Monitoring<'a> {
         }
     }
 
-    /// Takes one frame of the ground station from its queue; `false` when there is none.
+    /// Takes one frame of the ground station from its queue; `false` if there is none.
     pub fn uplink(
         &mut self,
         now: Instant,
@@ -218,7 +218,7 @@ impl<'a> Monitoring<'a> {
         gs: &mut GsIn,
     ) -> bool {
         uplink.take(|_, message, bytes| {
-            // Where the autopilot carries our stream, the port is nobody's.
+            // If the autopilot carries our stream, the port has no user.
             if gs.route() == SummaryRoute::Autopilot {
                 return;
             }
@@ -230,7 +230,7 @@ impl<'a> Monitoring<'a> {
         })
     }
 
-    /// What time alone asks for, every [`TICK`]. Each finding is recorded, told to the GS, and given to `findings`.
+    /// Periodic work, every [`TICK`]. Each finding is recorded, sent to the GS, and given to `findings`.
     pub fn tick(
         &mut self,
         now: Instant,
@@ -269,7 +269,7 @@ impl<'a> Monitoring<'a> {
         self.talk(now, sectors, gs);
     }
 
-    /// What time alone asks for at the ports.
+    /// Periodic work at the ports.
     // Own stack frame (ARCHITECTURE.md, Memory).
     #[inline(never)]
     fn talk(&mut self, now: Instant, sectors: &mut SectorsIn, gs: &mut GsIn) {
@@ -282,8 +282,8 @@ impl<'a> Monitoring<'a> {
         companion.answer(now, book.monitor, identity, summary, gs);
     }
 
-    /// Ends the record in order: everything that is still open is written. The queues then hold what storage has to
-    /// write before the power may go.
+    /// Ends the record in order: all open data is written. The queues then hold the data that storage must write
+    /// before a power-off.
     pub fn finish(&mut self, now: Instant, sectors: &mut SectorsIn, gs: &GsIn) {
         let Self { book, figures, recorded, .. } = self;
         figures.count(now, book.card, &mut book.journal, sectors);
@@ -293,22 +293,22 @@ impl<'a> Monitoring<'a> {
         sectors.with_reserve(|sink| self.book.journal.writer().finish(sink));
     }
 
-    /// What the monitor knows.
+    /// The monitor.
     pub const fn monitor(&self) -> &Monitor {
         self.book.monitor
     }
 
-    /// What the monitor knows, to be changed: what is restored, saved, set.
+    /// The monitor, to restore, save and set its values.
     pub const fn monitor_mut(&mut self) -> &mut Monitor {
         self.book.monitor
     }
 
-    /// The line rates that count now, in baud: of the ground station's port and of the autopilot's.
+    /// The current line rates in baud: of the ground station's port and of the autopilot's.
     pub const fn bauds(&self) -> (u32, u32) {
         (self.summary.outlet.baud(), self.companion.baud())
     }
 
-    /// The machine's figures, as they are now: recorded with the others, and told to the ground station.
+    /// Sets the machine's current figures: recorded with the others, and sent to the ground station.
     pub const fn set_machine(&mut self, machine: Machine) {
         self.figures.machine = machine;
     }
@@ -318,12 +318,12 @@ impl<'a> Monitoring<'a> {
         self.figures.stats(self.book.card, &self.book.journal, &self.companion, gs)
     }
 
-    /// Takes the signing key and its times out of the store. At power-on, before anything is sent.
+    /// Reads the signing key and its times from the store. At power-on, before the first frame is sent.
     pub fn restore_signing<F: NorFlash>(&mut self, store_writer: &mut StoreWriter<'_, F>) {
         self.companion.restore(store_writer);
     }
 
-    /// Hands over what of the signing key and its times is due, at every tick and at the end.
+    /// Hands over due items of the signing key and its times, at every tick and at the end.
     pub fn save_signing(&mut self, now: Instant, handover: &mut Handover<'_>) {
         self.companion.save(now, &self.summary, handover);
     }
@@ -344,7 +344,7 @@ impl<'a> Monitoring<'a> {
         monitor.tick(now.into(), &link, &recorder, &mut |finding| {
             journal.record(now, &Record::Finding(FindingRecord::new(now, finding)), sectors);
             if finding.level == Level::Critical {
-                // Marks the place for whoever looks through the record.
+                // A mark for readers of the record.
                 let event = Event { number: CRITICAL, text: finding.check };
                 journal.record(now, &Record::Event(event), sectors);
             }
@@ -360,7 +360,7 @@ impl<'a> Monitoring<'a> {
     }
 }
 
-/// How a start ended, in words for a pilot.
+/// The cause of a restart, in words for a pilot.
 fn restart_words(fault: &Fault<'_>) -> &'static str {
     match fault.kind {
         1 => "panic",

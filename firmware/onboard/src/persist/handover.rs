@@ -1,4 +1,4 @@
-//! The monitor task's side: what is to be saved, and what is to be told about it.
+//! The monitor task's side of the store: items to save, and texts about them.
 
 use hums_core::Monitor;
 use hums_core::clock::{Instant, Span};
@@ -9,27 +9,27 @@ use hums_store::{Key, param_value};
 use super::mailbox::MailboxIn;
 use super::status::{Calm, StoreReading, StoreState, StoreStatus};
 
-/// What is said where nothing of earlier flights is known.
+/// The text if no earlier flights are known.
 pub const STORE_NEW: &str = "HUMS: the store is new, all counters begin";
 
-/// No frame for this long, and disarmed: nothing will be missed while the processor stands still for an erase.
+/// No frame for this long, and disarmed: an erase, which stops the processor, loses nothing.
 pub const QUIET: Span = Span::from_secs(5);
 
-/// Disarmed on the ground for this long: a store that is nearly full may be erased although the autopilot talks.
+/// Disarmed on the ground for this long: a nearly full store may be erased despite the autopilot's stream.
 pub const GROUNDED: Span = Span::from_secs(10);
 
-/// The monitor task's side: what is to be saved, and what is to be told about it.
+/// The monitor task's side of the store: items to save, and texts about them.
 pub struct Handover<'a> {
     items: MailboxIn<'a>,
     status: &'a StoreStatus,
     told: StoreReading,
     frames: u32,
     frames_at: Instant,
-    /// The vehicle was armed, flew, or was not known to be disarmed.
+    /// Last time that the vehicle was armed, flew, or was not known to be disarmed.
     active_at: Instant,
 }
 
-/// Something about the store that is to be recorded and told.
+/// A text about the store, for the record and the ground.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct News {
     /// `MAV_SEVERITY`.
@@ -39,14 +39,14 @@ pub struct News {
 }
 
 impl<'a> Handover<'a> {
-    /// After [`StoreWriter::load`](super::StoreWriter::load): the parameters are as they are stored.
+    /// After [`StoreWriter::load`](super::StoreWriter::load), since parameters then equal their stored values.
     pub fn new(items: MailboxIn<'a>, status: &'a StoreStatus, monitor: &mut Monitor) -> Self {
         monitor.params_mut().all_saved();
         let told = StoreReading { state: StoreState::Kept, ..StoreReading::default() };
         Self { items, status, told, frames: 0, frames_at: Instant::ZERO, active_at: Instant::ZERO }
     }
 
-    /// At every tick: hands over what is due. `frames` is what reception has counted.
+    /// At every tick: hands over items that are due. `frames` is reception's counter.
     pub fn step(&mut self, now: Instant, monitor: &mut Monitor, frames: u32) {
         if self.frames != frames {
             (self.frames, self.frames_at) = (frames, now);
@@ -66,14 +66,14 @@ impl<'a> Handover<'a> {
         self.put_items(now, monitor);
     }
 
-    /// At the end of a session: hands over everything that changed; `false` when it is to be called again after the
-    /// store's writer took something.
+    /// At the end of a session: hands over all changes; `false` if it must be called again after the store's writer
+    /// took an item.
     pub fn finish(&mut self, now: Instant, monitor: &mut Monitor) -> bool {
         monitor.save_all();
         self.put_params(monitor.params_mut()) && self.put_items(now, monitor)
     }
 
-    /// What is new about the store, one thing at a time.
+    /// The next text about the store.
     pub fn news(&mut self) -> Option<News> {
         let now = self.status.read();
         let Self { told, .. } = self;
@@ -114,12 +114,12 @@ impl<'a> Handover<'a> {
         self.status.read().room
     }
 
-    /// Hands over an item of somebody else's; `false` when it found no room.
+    /// Hands over another owner's item; `false` if there was no room.
     pub fn put(&mut self, key: Key, value: &[u8]) -> bool {
         self.items.put(key, value)
     }
 
-    /// Each parameter that was set; `false` when one found no room.
+    /// Hands over each parameter that was set; `false` if one found no room.
     fn put_params(&mut self, params: &mut Params) -> bool {
         while let Some((index, spec, value)) = params.unsaved() {
             if let Some((bytes, length)) = param_value(spec.name, value)
@@ -132,7 +132,7 @@ impl<'a> Handover<'a> {
         true
     }
 
-    /// Each item that is due; `false` when one found no room.
+    /// Hands over each item that is due; `false` if one found no room.
     fn put_items(&mut self, now: Instant, monitor: &mut Monitor) -> bool {
         while let Some(key) = monitor.save_due(now.into(), self.status.read().room) {
             let mut bytes = [0; ITEM_BYTES_MAX];

@@ -9,8 +9,8 @@ use hums_store::{Key, VALUE_BYTES_MAX};
 const KEY_BYTES: usize = 4;
 /// The longest item, and the queue's own two bytes.
 const PLACE_BYTES: usize = KEY_BYTES + ITEM_BYTES_MAX + 2;
-/// A queue of bytes must have room for the longest item before and behind where it stands, or there is a place from
-/// which it never goes on.
+/// A queue of bytes must have room for the longest item before and behind its position; otherwise it can block for
+/// ever.
 const MAILBOX_BYTES: usize = (2 * PLACE_BYTES + 8).next_multiple_of(8);
 const _: () = assert!(ITEM_BYTES_MAX <= VALUE_BYTES_MAX);
 
@@ -41,7 +41,7 @@ impl Mailbox {
 pub struct MailboxIn<'a>(FramedProducer<&'a Queue>);
 
 impl MailboxIn<'_> {
-    /// Hands an item over; `false` when there is no room for it now.
+    /// Hands an item over; `false` if there is no room for it now.
     pub fn put(&mut self, key: Key, value: &[u8]) -> bool {
         let length = KEY_BYTES + value.len();
         let Ok(mut grant) = self.0.grant(length as u16) else { return false };
@@ -56,11 +56,11 @@ impl MailboxIn<'_> {
     }
 }
 
-/// The end of the store's writer.
+/// The store writer's end.
 pub struct MailboxOut<'a>(FramedConsumer<&'a Queue>);
 
 impl MailboxOut<'_> {
-    /// Shows the oldest item to `take`, which says whether it is done with; `None` when there is none.
+    /// Shows the oldest item to `take`, which returns whether it is finished; `None` if there is none.
     pub(crate) fn oldest<R>(&mut self, take: impl FnOnce(Key, &[u8]) -> (R, bool)) -> Option<R> {
         let grant = self.0.read().ok()?;
         let Some((key, value)) = grant.split_first_chunk::<KEY_BYTES>() else {

@@ -1,40 +1,41 @@
-//! What the two sides tell each other: atomics, so that neither waits.
+//! Status between the two sides: atomics, so that neither waits.
 
 use core::sync::atomic::{AtomicBool, AtomicU8, AtomicU32, Ordering};
 
 use hums_core::lifetime::Room;
 
-/// What the store is doing.
+/// The state of the store.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(u8)]
 pub enum StoreState {
-    /// There is none: what is saved is gone with the power.
+    /// No store: saved items are lost at power-off.
     #[default]
     Absent = 0,
-    /// What was stored has been read.
+    /// The stored items have been read.
     Kept = 1,
-    /// It was new.
+    /// The store was new.
     New = 2,
-    /// What was stored could not be read, and it begins anew.
+    /// The stored items were unreadable, and the store begins anew.
     Remade = 3,
     /// The flash does not work.
     Failed = 4,
 }
 
-/// What an erase would cost now, as the monitor sees it. An erase stops the processor for up to 0.5 s.
+/// The cost of an erase now, by the vehicle's state. An erase stops the processor for up to 0.5 s.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 #[repr(u8)]
 pub enum Calm {
     /// The vehicle is armed, flies, or was disarmed a moment ago: no erase.
     #[default]
     None = 0,
-    /// Disarmed on the ground for [`GROUNDED`](super::handover::GROUNDED), and the autopilot talks: frames would be lost.
+    /// Disarmed on the ground for [`GROUNDED`](super::handover::GROUNDED), with a talking autopilot: frames would be
+    /// lost.
     Grounded = 1,
     /// Disarmed, and no frame for [`QUIET`](super::handover::QUIET): nothing would be lost.
     Silent = 2,
 }
 
-/// What the store's writer tells the monitor, and what it is told: atomics, so that neither waits.
+/// Status of the store's writer for the monitor, and back: atomics, so that neither waits.
 #[derive(Debug, Default)]
 pub struct StoreStatus {
     state: AtomicU8,
@@ -50,9 +51,9 @@ pub struct StoreStatus {
 /// A reading of [`StoreStatus`]; counters since power-on.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct StoreReading {
-    /// How it began.
+    /// The store's state at the start.
     pub state: StoreState,
-    /// Items that could not be read at the start, and one more where the flash was damaged.
+    /// Items that were unreadable at the start, plus one if the flash was damaged.
     pub unreadable: u32,
     /// Items saved.
     pub saved: u32,
@@ -81,7 +82,7 @@ impl StoreStatus {
         }
     }
 
-    /// All of it; each is right by itself.
+    /// All fields; each is valid by itself.
     pub fn read(&self) -> StoreReading {
         StoreReading {
             state: match self.state.load(Ordering::Relaxed) {
@@ -100,7 +101,7 @@ impl StoreStatus {
         }
     }
 
-    /// What an erase would cost now, as the monitor sees it.
+    /// The cost of an erase now, by the vehicle's state.
     pub fn calm(&self) -> Calm {
         match self.calm.load(Ordering::Relaxed) {
             1 => Calm::Grounded,
@@ -122,7 +123,7 @@ impl StoreStatus {
     }
 }
 
-/// One more.
+/// Counts one.
 pub(crate) fn count(counter: &AtomicU32) {
     counter.fetch_add(1, Ordering::Relaxed);
 }

@@ -1,4 +1,4 @@
-//! The storage task's side: the store and what goes into it.
+//! The storage task's side: the store and its saves.
 
 use embedded_storage::nor_flash::NorFlash;
 use hums_core::Monitor;
@@ -10,21 +10,21 @@ use hums_store::{Error, Found, Key, Store, param};
 use super::mailbox::MailboxOut;
 use super::status::{Calm, StoreState, StoreStatus, count};
 
-/// What part of a sector is free before a flight, at the least.
+/// Minimum free part of a sector before a flight.
 const AHEAD: (usize, usize) = (5, 8);
-/// A sector with less than this part of it free is erased on the ground even while the autopilot talks.
+/// A sector with a smaller free part is erased on the ground even while the autopilot talks.
 const SCARCE: (usize, usize) = (1, 4);
-/// What landing and disarming need: all exceedances and the session's counters twice; beside them the times of
-/// so many signed changes, 40 bytes each.
+/// Reserve for landing and disarming: all exceedances, the session's counters twice, and the times of [`SIGNED_MAX`]
+/// signed changes, 40 bytes each.
 const RESERVE: usize = 1_408;
 pub(crate) const SIGNED_MAX: u8 = 4;
 const LANDING: usize = Exceedances::BYTES + 2 * Session::BYTES_TYPICAL + 4 * 16;
 const _: () = assert!(LANDING + SIGNED_MAX as usize * 40 <= RESERVE);
 
-/// What one call of [`StoreWriter::service`] did.
+/// The result of one call of [`StoreWriter::service`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Saved {
-    /// An item was taken: there may be another.
+    /// An item was taken: another may wait.
     Took,
     /// There is nothing to do.
     Idle,
@@ -32,22 +32,22 @@ pub enum Saved {
     Waits,
 }
 
-/// The storage task's side: the store and what goes into it.
+/// The storage task's side: the store and its saves.
 pub struct StoreWriter<'a, F: NorFlash> {
     store: Option<Store<F>>,
     items: MailboxOut<'a>,
     pub(crate) status: &'a StoreStatus,
     /// The oldest item has been counted as waiting.
     waits: bool,
-    /// What there is to do in this calm has been done.
+    /// The work of this calm time is done.
     turned: bool,
     /// Less than [`SCARCE`] of the sector in use is free.
     scarce: bool,
 }
 
 impl<'a, F: NorFlash> StoreWriter<'a, F> {
-    /// With the store in `flash`, if there is one. Ends what power cut short, which may take an erase: before reception
-    /// begins.
+    /// Mounts the store in `flash`, if there is one. It completes interrupted work, which may take an erase: before
+    /// reception begins.
     pub fn mount(flash: Option<F>, items: MailboxOut<'a>, status: &'a StoreStatus) -> Self {
         let store = flash.and_then(|flash| {
             let Ok((store, found)) = Store::mount(flash) else {
@@ -68,8 +68,8 @@ impl<'a, F: NorFlash> StoreWriter<'a, F> {
         Self { store, items, status, waits: false, turned: false, scarce: false }
     }
 
-    /// Makes five eighths of a sector free where less is; whether that took an erase. Not after a reset that may have come
-    /// in flight.
+    /// Frees five eighths of a sector if less is free; whether that took an erase. Not after a reset that may have
+    /// come in flight.
     pub fn turn_ahead(&mut self) -> bool {
         let Some(store) = &mut self.store else { return false };
         let turned = store.turn_ahead(F::ERASE_SIZE * AHEAD.0 / AHEAD.1);
@@ -80,8 +80,8 @@ impl<'a, F: NorFlash> StoreWriter<'a, F> {
         turned.unwrap_or(false)
     }
 
-    /// Gives the monitor everything that is stored, the last session after all else: it is added to the others. An item
-    /// that cannot be read is counted, and is as if there were none.
+    /// Gives all stored items to the monitor, the session last, since it is added to the others. An unreadable item
+    /// is counted and ignored.
     pub fn load(&mut self, monitor: &mut Monitor) {
         const SESSION: Key = Key::item(ItemKey::Session.number());
         let Self { store: Some(store), status, .. } = self else { return };
@@ -102,24 +102,24 @@ impl<'a, F: NorFlash> StoreWriter<'a, F> {
         self.look_for_room();
     }
 
-    /// A stored item of somebody else's, by its number; how long it is, 0 where there is none.
+    /// Another owner's stored item, by its number; returns its length, 0 if there is none.
     pub fn item(&mut self, number: u8, out: &mut [u8]) -> usize {
         let got = self.store.as_mut().map(|store| store.get(Key::item(number), out));
         got.and_then(Result::ok).flatten().unwrap_or(0)
     }
 
-    /// How often the store was mounted since it was made; 0 where there is none.
+    /// Mounts of the store since it was made; 0 without a store.
     pub fn mounts(&mut self) -> u32 {
         self.store.as_mut().and_then(|store| store.mounts().ok()).unwrap_or(0)
     }
 
-    /// Saves one item. An erase is allowed where [`Calm`] allows it (the table in [`super`]), or if `may_erase` says so.
+    /// Saves one item. An erase is allowed by [`Calm`] (the table in [`super`]), or by `may_erase`.
     pub fn service(&mut self, may_erase: bool) -> Saved {
         let calm = self.status.calm();
         let erases = calm == Calm::Silent || (calm == Calm::Grounded && self.scarce);
         self.turned &= calm != Calm::None;
         if erases && !self.turned {
-            // Before anything is saved: the next flight has room then, and a save needs no erase of its own.
+            // Before the first save: the next flight then has room, and a save needs no erase of its own.
             self.turned = true;
             if self.turn_ahead() && calm == Calm::Grounded {
                 count(&self.status.erased);
@@ -140,7 +140,7 @@ impl<'a, F: NorFlash> StoreWriter<'a, F> {
                     (Saved::Took, true)
                 }
                 Err(Error::NotNow) => (Saved::Waits, false),
-                // Twice; its owner saves it again when it has changed.
+                // After two failures its owner saves it again when it has changed.
                 Err(_) => {
                     count(&status.failed);
                     (Saved::Took, true)
@@ -159,7 +159,7 @@ impl<'a, F: NorFlash> StoreWriter<'a, F> {
         kept
     }
 
-    /// Tells the monitor whether there is room to spare.
+    /// Reports to the monitor whether there is more than the reserve.
     fn look_for_room(&mut self) {
         if let Some(store) = &self.store {
             let room = store.room();
@@ -169,7 +169,7 @@ impl<'a, F: NorFlash> StoreWriter<'a, F> {
     }
 }
 
-/// Saves an item once more that met an error of the flash: it is tried at another place.
+/// Saves an item once more after an error of the flash, at another place.
 fn again<F: NorFlash>(
     store: &mut Store<F>,
     error: Error<F::Error>,
@@ -179,7 +179,7 @@ fn again<F: NorFlash>(
     if matches!(error, Error::Flash(_)) { store.save(key, value) } else { Err(error) }
 }
 
-/// `false` where the item cannot be read. One that this version does not know is left alone.
+/// `false` if the item is unreadable. Unknown items are ignored.
 fn restore(monitor: &mut Monitor, key: Key, value: &[u8]) -> bool {
     if key.is_param() {
         return match param(value).map(|(name, value)| monitor.params_mut().set(name, value)) {

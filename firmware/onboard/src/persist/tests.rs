@@ -1,4 +1,4 @@
-//! What outlives a power-on, both sides together.
+//! Items that outlive a power-on, with both sides together.
 
 use std::collections::BTreeSet;
 
@@ -21,7 +21,7 @@ use hums_store::{Key, Store, param_value};
 
 type Flash = SimFlash<16384>;
 
-/// One power-on, with nothing heard, and then power is gone.
+/// One power-on without any frame, ended by a power cut.
 fn session(flash: &mut Flash, act: impl FnOnce(&mut Monitor, &mut Handover, &mut StoreWriter<&mut Flash>)) {
     let (mailbox, status) = (Mailbox::new(), StoreStatus::new());
     let (items_in, items_out) = mailbox.split();
@@ -146,7 +146,7 @@ fn live(second: u64, flies: bool, monitor: &mut Monitor, handover: &mut Handover
     handover.step(now, monitor, frames);
 }
 
-/// Flies from the 20th second to the end; how many seconds of it the flash has after each.
+/// Flies from the 20th second to the end; returns the flight seconds in the flash after each.
 fn fly(flash: &mut Flash, seconds: u64) -> Vec<u64> {
     let mut kept = Vec::new();
     let mut copies = Vec::new();

@@ -1,4 +1,4 @@
-//! What each queue holds, and the sum that it comes from.
+//! Capacities of the queues, with their sums.
 
 use hums_blackbox::{ENTRY_SECTORS_MAX, SECTOR_BYTES};
 use hums_link::encode::FRAME_BYTES_MAX;
@@ -9,8 +9,8 @@ use hums_recorder::recorder::ROW_BLOCKS;
 /// is, takes 4 (`ARCHITECTURE.md` has the figures).
 pub const FRAME_QUEUE_BYTES: usize = 2 * 1024;
 
-/// The frames that the port's outlet lets wait, with findings; the frame being sent; and the end of the queue that the longest frame does not
-/// fit into.
+/// The waiting frames of the port's outlet, with findings; the frame being sent; and an end of the queue too short
+/// for the longest frame.
 pub const GS_QUEUE_BYTES: usize = (summary::WAITING_BYTES + outlet::FINDINGS) as usize + 2 * FRAME_BYTES_MAX;
 
 /// 0.17 s of a radio at 57,600 baud: the monitor looks at least every 50 ms. Three of the longest frames.
@@ -19,11 +19,12 @@ pub const UPLINK_QUEUE_BYTES: usize = 1024;
 /// A round of requests to the autopilot (9 commands of 45 bytes, signed 58), two frames that pass through, and the frame being sent.
 pub const AUTOPILOT_QUEUE_BYTES: usize = 1100 + FRAME_BYTES_MAX;
 
-/// 2.5 s of a standing card at 921,600 baud: 92 kB/s at 3.5 times smaller is 66 KB, 132 sectors; and the row that the card is taking.
+/// 2.5 s of a stalled card at 921,600 baud: 92 kB/s, compressed 3.5 times, is 66 KB, 132 sectors; and the row that
+/// the card is taking.
 pub const SECTOR_QUEUE_SECTORS: usize = 132 + ROW_BLOCKS;
 
-/// Sectors kept free for findings and losses when frames are refused already: two sectors of them, as the last has to
-/// leave room for the longest entry there is.
+/// Sectors for findings and losses when frames are refused already: two of them, as the last must have room for the
+/// longest entry.
 pub const SECTOR_RESERVE: usize = ENTRY_SECTORS_MAX + 1;
 
 /// Bytes of log that the sector queue holds.

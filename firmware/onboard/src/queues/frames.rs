@@ -8,7 +8,8 @@ use hums_link::frame::Frame;
 use super::capacities::{FRAME_QUEUE_BYTES, UPLINK_QUEUE_BYTES};
 use super::level::Level;
 
-/// Bytes before a frame in its queue: when it came (u64 microseconds) and its message (u16 as [`Frame::message`], [`UNKNOWN`] for none).
+/// Bytes before a frame in its queue: its arrival time (u64 microseconds) and its message (u16 as [`Frame::message`],
+/// [`UNKNOWN`] for none).
 pub(super) const STAMP_BYTES: usize = 10;
 const UNKNOWN: u16 = u16::MAX;
 
@@ -21,7 +22,7 @@ pub struct FramesIn<'a, const BYTES: usize = FRAME_QUEUE_BYTES>(
 pub type UplinkIn<'a> = FramesIn<'a, UPLINK_QUEUE_BYTES>;
 
 impl<const BYTES: usize> FramesIn<'_, BYTES> {
-    /// Queues a frame; `false` when there is no room for it.
+    /// Queues a frame; `false` if there is no room for it.
     pub fn put(&mut self, at_micros: u64, frame: &Frame<'_>) -> bool {
         let bytes = frame.bytes();
         let len = STAMP_BYTES + bytes.len();
@@ -29,7 +30,7 @@ impl<const BYTES: usize> FramesIn<'_, BYTES> {
         grant[..8].copy_from_slice(&at_micros.to_le_bytes());
         grant[8..STAMP_BYTES].copy_from_slice(&frame.message().unwrap_or(UNKNOWN).to_le_bytes());
         grant[STAMP_BYTES..len].copy_from_slice(bytes);
-        // Before anybody can take it out.
+        // Before the reader can take it out.
         self.1.rise(len);
         grant.commit(len as u16);
         true
@@ -50,7 +51,7 @@ pub struct FramesOut<'a, const BYTES: usize = FRAME_QUEUE_BYTES>(
 pub type UplinkOut<'a> = FramesOut<'a, UPLINK_QUEUE_BYTES>;
 
 impl<const BYTES: usize> FramesOut<'_, BYTES> {
-    /// Hands the oldest frame to `take` (time in microseconds, message, bytes); `false` when there is none.
+    /// Hands the oldest frame to `take` (time in microseconds, message, bytes); `false` if there is none.
     pub fn take(&mut self, take: impl FnOnce(u64, Option<u16>, &[u8])) -> bool {
         let Ok(grant) = self.0.read() else { return false };
         if let Some((at, rest)) = grant.split_first_chunk()

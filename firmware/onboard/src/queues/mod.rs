@@ -1,4 +1,4 @@
-//! All queues: one writer and one reader each, nobody ever waits, a full queue is a counted loss.
+//! All queues: one writer and one reader each, without waiting; a full queue is a counted loss.
 //!
 //! | queue | from | to | capacity | when it is full |
 //! |---|---|---|---|---|
@@ -126,7 +126,7 @@ mod tests {
 
     use super::*;
 
-    /// Puts a frame of these bytes in, with the header of MAVLink 1 in place of the first ones.
+    /// Puts in a frame of these bytes, the first ones replaced by a MAVLink 1 header.
     fn put<const BYTES: usize>(frames: &mut FramesIn, at_micros: u64, mut bytes: [u8; BYTES]) -> bool {
         bytes[..6].copy_from_slice(&[0xFE, BYTES as u8 - 8, 0, 1, 1, 255]);
         frames.put(at_micros, &Frame::parse(&bytes).expect("a frame"))

@@ -1,4 +1,4 @@
-//! What leaves by the ports: a queue each, and which way the summary stream goes.
+//! Output of the ports: a queue each, and the way of the summary stream.
 
 use bbqueue::nicknames::Churrasco;
 use bbqueue::prod_cons::framed::{FramedConsumer, FramedProducer};
@@ -8,7 +8,7 @@ use super::capacities::{AUTOPILOT_QUEUE_BYTES, GS_QUEUE_BYTES};
 use super::level::Level;
 use crate::shelf::Reader;
 
-/// The monitor's ends of what is around it: both ports, and the logs on the card.
+/// The monitor's ends: both ports, and the logs on the card.
 pub struct GsIn<'a> {
     pub(super) gs: PortIn<'a, GS_QUEUE_BYTES>,
     /// To the autopilot.
@@ -30,12 +30,12 @@ pub enum SummaryRoute {
 }
 
 impl GsIn<'_> {
-    /// Queues a frame for the GS, or counts it lost.
+    /// Queues a frame for the GS, or counts it as lost.
     pub fn put(&mut self, frame: &[u8]) {
         self.gs.put(frame);
     }
 
-    /// Queues a frame of the summary stream, on its way.
+    /// Queues a frame of the summary stream on its way.
     pub fn tell(&mut self, frame: &[u8]) {
         match self.route {
             SummaryRoute::Nobody => {}
@@ -49,7 +49,7 @@ impl GsIn<'_> {
         self.route
     }
 
-    /// Another way for the summary stream.
+    /// Sets the way of the summary stream.
     pub const fn set_route(&mut self, route: SummaryRoute) {
         self.route = route;
     }
@@ -75,7 +75,7 @@ impl GsIn<'_> {
     }
 }
 
-/// The writing end of a port's queue, with what went in.
+/// The writing end of a port's queue, with its counters.
 pub struct PortIn<'a, const BYTES: usize> {
     queue: FramedProducer<&'a Churrasco<BYTES>>,
     level: &'a Level,
@@ -89,7 +89,7 @@ impl<'a, const BYTES: usize> PortIn<'a, BYTES> {
         Self { queue, level, frames: 0, bytes: 0, lost: 0 }
     }
 
-    /// Queues a frame, or counts it lost.
+    /// Queues a frame, or counts it as lost.
     pub fn put(&mut self, frame: &[u8]) {
         let len = frame.len() as u16;
         let Ok(mut grant) = self.queue.grant(len) else {
@@ -125,7 +125,7 @@ pub type GsOut<'a> = PortOut<'a, GS_QUEUE_BYTES>;
 pub type AutopilotOut<'a> = PortOut<'a, AUTOPILOT_QUEUE_BYTES>;
 
 impl<const BYTES: usize> PortOut<'_, BYTES> {
-    /// Copies the oldest frame into `out` and takes it out of the queue; its length, or `None` when there is none.
+    /// Copies the oldest frame into `out` and removes it; returns its length, or `None` if there is none.
     pub fn take(&mut self, out: &mut [u8; FRAME_BYTES_MAX]) -> Option<usize> {
         let grant = self.0.read().ok()?;
         let len = grant.len().min(out.len());
@@ -135,7 +135,7 @@ impl<const BYTES: usize> PortOut<'_, BYTES> {
         Some(len)
     }
 
-    /// Lends the oldest frame to `send`, from where it lies, and takes it out of the queue; `false` when there is none.
+    /// Lends the oldest frame in place to `send`, and removes it; `false` if there is none.
     pub async fn lend(&mut self, send: impl AsyncFnOnce(&[u8])) -> bool {
         let Ok(grant) = self.0.read() else { return false };
         send(&grant).await;

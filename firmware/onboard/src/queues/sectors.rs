@@ -41,7 +41,7 @@ pub struct SectorsIn<'a> {
 }
 
 impl SectorsIn<'_> {
-    /// Lets what follows use the reserve as well: for records.
+    /// Lends the reserve too, for records.
     pub(crate) fn with_reserve<R>(&mut self, write: impl FnOnce(&mut Self) -> R) -> R {
         let reserve = core::mem::replace(&mut self.reserve, 0);
         let result = write(self);
@@ -71,10 +71,10 @@ impl SectorSink for SectorsIn<'_> {
     }
 
     fn put(&mut self, sector: &Sector) {
-        // The writer asked for room first; there is no more to be done here if it did not.
+        // The writer asks for room first, so this does not fail.
         if let Ok(mut grant) = self.queue.grant_exact(SECTOR_BYTES) {
             grant.copy_from_slice(sector.bytes());
-            // Before anybody can take it out.
+            // Before the reader can take it out.
             let before = self.len.fetch_add(1, Ordering::AcqRel);
             self.deepest = self.deepest.max(before + 1);
             grant.commit(SECTOR_BYTES);
@@ -89,7 +89,7 @@ pub struct SectorsOut<'a> {
 }
 
 impl SectorsOut<'_> {
-    /// Lends the oldest sectors, as many as lie in a row, or none where none waits. Those that `write` is done with are dropped.
+    /// Lends the oldest sectors in a row, or none. Those that `write` has finished are dropped.
     pub fn lend<E>(&mut self, write: impl FnOnce(&mut [Block]) -> Result<usize, E>) -> Result<usize, E> {
         let Ok(mut grant) = self.queue.read() else { return write(&mut []) };
         let done = write(grant.as_chunks_mut().0)?;
@@ -98,13 +98,13 @@ impl SectorsOut<'_> {
         Ok(done)
     }
 
-    /// Empties the queue because there is no card to write to; how many frames are lost with it. Copies of a sector in
-    /// progress hold no frames of their own.
+    /// Empties the queue without a card; returns the number of lost frames. Copies of a sector in progress hold no
+    /// frames of their own.
     pub fn abandon(&mut self) -> u64 {
         let mut frames = 0;
         let mut count = |blocks: &mut [Block]| {
             for block in &mut *blocks {
-                // Only a sealed sector's header can be read; which session it names does not matter here.
+                // Only a sealed sector's header is readable; the session in it does not matter here.
                 let mut sector = Sector::from_bytes(*block);
                 sector.seal(0);
                 let header = Header::read(sector.bytes()).ok().filter(|header| !header.partial);
@@ -121,7 +121,7 @@ impl SectorsOut<'_> {
         self.len.load(Ordering::Acquire)
     }
 
-    /// Whether nothing waits.
+    /// Whether the queue is empty.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }

@@ -1,37 +1,37 @@
-//! What the monitor asks of storage about a log, and what it is answered.
+//! The monitor's requests to storage about a log, and the answers.
 
 use hums_recorder::LogName;
 
 /// Bytes of a log in one answer.
 pub const DATA_MAX: usize = 240;
-/// What an answer's head takes.
+/// Bytes of an answer's head.
 pub(super) const HEAD: usize = 36;
-/// Which log it is, whatever happens to the card's directory: another one of the same name differs in the rest.
+/// The identity of a log, independent of the card's directory: another log of the same name differs in the rest.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct LogId {
     /// Its name.
     pub name: LogName,
-    /// The session of its first sector, a random number; 0 where that cannot be read.
+    /// The session of its first sector, a random number; 0 if unreadable.
     pub session: u32,
     /// Its first sector's number in the session.
     pub first: u32,
 }
 
 impl LogId {
-    /// Of a log that is not there.
+    /// Stands for no log.
     pub const NONE: Self = Self { name: LogName { session: 0, segment: 0 }, session: 0, first: 0 };
 }
 
-/// What is wanted of a log.
+/// The requested part of a log.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum What {
-    /// How long it is.
+    /// Its length.
     Length,
     /// Bytes from an offset on.
     Data(u32),
-    /// The checksum of the first so many bytes (`hums_link::ftp::checksum`), at most of all; 0 is all.
+    /// The checksum of the first bytes (`hums_link::ftp::checksum`), at most of all; 0 is all.
     Checksum(u32),
-    /// That all earlier logs are no longer offered, and make room first. Not answered.
+    /// An erase: all earlier logs are hidden, and overwritten first. It has no answer.
     Erase,
 }
 
@@ -42,66 +42,66 @@ pub enum Which {
     At(u16),
     /// By its name.
     Named(LogName),
-    /// This one and no other.
+    /// This log and no other.
     Same(LogId),
     /// No log: the file of parameters, `PARAMS.TXT`.
     Settings,
 }
 
-/// Something wanted; the ticket comes back with the answer.
+/// A request; the ticket comes back with the answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Want {
-    /// Tells answers to this from answers to an earlier one.
+    /// Distinguishes answers to this request from answers to earlier ones.
     pub ticket: u16,
-    /// Of which log.
+    /// The log.
     pub which: Which,
-    /// What.
+    /// The part.
     pub what: What,
 }
 
-/// Why an answer is of no log.
+/// Reasons for an answer without a log.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum NoLog {
-    /// There is no such log.
+    /// The log does not exist.
     Absent,
-    /// The card did not give it, or not the directory: nothing is known of it, also not that nothing is in it.
+    /// The card could not read the log or the directory: nothing is known.
     Unread,
 }
 
-/// What an answer's head has for each outcome.
+/// Outcomes in an answer's head.
 const FOUND: u16 = 0;
 const ABSENT: u16 = 1;
 const UNREAD: u16 = 2;
 
-/// What storage answers, without the data.
+/// The head of storage's answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Answer {
-    /// The want's.
+    /// The request's ticket.
     pub ticket: u16,
-    /// How many logs there are; 0 also where there is no card, and where the card did not give the directory.
+    /// The number of logs; 0 also without a card, and if the directory was unreadable.
     pub count: u16,
     /// Whether the log was found.
     pub found: Result<(), NoLog>,
-    /// Which log it is.
+    /// The log's identity.
     pub log: LogId,
     /// The log's length in bytes.
     pub bytes: u32,
-    /// When it was written last by its directory entry, in seconds since 1970 UTC; 0: not known.
+    /// Time of its last write by its directory entry, in seconds since 1970 UTC; 0: unknown.
     pub utc_secs: u32,
-    /// Where the data lies in the log; with a checksum, how many bytes it is of.
+    /// Offset of the data in the log; for a checksum, the number of summed bytes.
     pub offset: u32,
-    /// Changes with the names in the directory: a place means another log then.
+    /// A number that changes with the names in the directory: a place then means another log.
     pub directory: u32,
 }
 
 impl Answer {
-    /// That there is no such log.
+    /// An answer for a log that does not exist.
     pub(super) const fn none(ticket: u16) -> Self {
         let found = Err(NoLog::Absent);
         Self { ticket, count: 0, found, log: LogId::NONE, bytes: 0, utc_secs: 0, offset: 0, directory: 0 }
     }
 
-    /// The same of no log.
+    /// The same answer without a log.
     pub(super) const fn without(self, why: NoLog) -> Self {
         Self { found: Err(why), bytes: 0, ..self }
     }

@@ -1,19 +1,19 @@
-//! The logs that are on the card already, for those who download them: the monitor asks, storage answers when it has
-//! nothing to write. So reading never keeps a sector waiting, but for the time of one answer.
+//! Logs on the card for downloads: the monitor asks, and storage answers when it has nothing to write. So reading
+//! delays a sector by at most one answer.
 //!
 //! | queue | from | to | capacity | when it is full |
 //! |---|---|---|---|---|
 //! | wants | monitor | storage | 2 | the monitor asks again |
 //! | answers | storage | monitor | [`ANSWER_BYTES`] | storage waits with the next one |
 //!
-//! A log's length is what was recorded, not what its file has: storage looks for the last sector that has the first
-//! one's session (14 blocks of an 8 MiB segment). Of the log in work it is what no longer changes: without the copies of
-//! a sector in progress.
+//! A log's length is the recorded length, not the file's: storage finds the last sector of the first one's session
+//! (14 blocks of an 8 MiB segment). For the log in work it is the finished part, without copies of the sector in
+//! progress.
 //!
 //! A full card gives a segment's place to a later log. So a download asks for a log by its [`LogId`], and each answer
-//! looks at the log's first sector again: a log that was overwritten, or lies on another card, is not found any longer.
+//! checks the log's first sector again. A log that was overwritten, or is on another card, is not found.
 //!
-//! A checksum is computed a few blocks at a call, between which storage writes what waits.
+//! A checksum is computed a few blocks at a call; in between storage writes waiting sectors.
 
 mod asked;
 mod on_card;
@@ -29,7 +29,7 @@ use asked::HEAD;
 pub use asked::{Answer, DATA_MAX, LogId, NoLog, Want, What, Which};
 use on_card::{for_each_part, holds, in_work, measure};
 
-/// The longest answer in one piece, with the queue's own two bytes, wherever the last one ended: twice its length.
+/// Room for the longest answer in one piece, with the queue's own two bytes, behind any position: twice its length.
 pub const ANSWER_BYTES: usize = 2 * (HEAD + DATA_MAX + 2) + 8;
 /// Blocks of a checksum at a call: some 5 ms of a card on SPI, as a small answer takes.
 const SUM_BLOCKS: u32 = 4;
@@ -70,12 +70,12 @@ pub struct Reader<'a> {
 }
 
 impl Reader<'_> {
-    /// Asks; `false` while there is no room.
+    /// Sends a request; `false` while there is no room.
     pub fn want(&mut self, want: Want) -> bool {
         self.wants.enqueue(want).is_ok()
     }
 
-    /// Shows the oldest answer, if there is one; it is gone afterwards when `look` says so.
+    /// Shows the oldest answer, if there is one; it is removed if `look` returns `true`.
     pub fn answer(&mut self, look: impl FnOnce(&Answer, &[u8]) -> bool) -> bool {
         let Ok(grant) = self.answers.read() else { return false };
         let done = match grant.split_first_chunk::<HEAD>() {
@@ -95,15 +95,16 @@ pub struct Server<'a> {
     answers: FramedProducer<&'a Churrasco<ANSWER_BYTES>>,
     /// The log that was read last.
     last: Option<Found>,
-    /// A checksum in the making.
+    /// A checksum in progress.
     sum: Option<Sum>,
-    /// The log that was looked up last by its place in the list.
+    /// The log that was found last by its place in the list.
     listed: Listed,
-    /// Logs are being erased, a block of the directory at a call, from this entry of it on.
+    /// An erase in progress, a block of the directory at a call: its next entry.
     erases: Option<u32>,
 }
 
-/// The place of a log in the list of those that are shown, and its entry in the directory, while this has the same names.
+/// The place of a log in the list of shown logs, and its entry in the directory, valid while the directory has these
+/// names.
 #[derive(Clone, Copy, Default)]
 struct Listed {
     names: u32,
@@ -111,14 +112,14 @@ struct Listed {
     entry: u32,
 }
 
-/// A log, and where it lies.
+/// A log, and its place.
 #[derive(Clone, Copy)]
 struct Found {
     answer: Answer,
     segment: Segment,
 }
 
-/// A checksum in the making: of `done` bytes of the log's first `answer.offset` ones.
+/// A checksum in progress: of `done` bytes of the log's first `answer.offset` ones.
 #[derive(Clone, Copy)]
 struct Sum {
     log: Found,
@@ -127,12 +128,12 @@ struct Sum {
 }
 
 impl Server<'_> {
-    /// Whether somebody waits for an answer.
+    /// Whether a request waits.
     pub fn is_wanted(&self) -> bool {
         self.erases.is_some() || self.sum.is_some() || self.wants.ready()
     }
 
-    /// Answers what is wanted of `PARAMS.TXT`, whose text this is.
+    /// Answers a request for `PARAMS.TXT` with this text.
     #[cfg(test)]
     pub(crate) fn serve_text(&mut self, text: &[u8]) {
         let Some(Want { ticket, which: Which::Settings, what: What::Data(offset) }) = self.wants.dequeue()
@@ -148,7 +149,7 @@ impl Server<'_> {
         grant.commit((HEAD + data.len()) as u16);
     }
 
-    /// Does a little of what is wanted, if there is something and room for its answer; whether there was.
+    /// Does a part of a request, if there is one and room for its answer; whether there was.
     pub fn serve<D: CardDevice>(&mut self, recorder: &mut Recorder<'_, D>) -> bool {
         if let Some(entry) = self.erases {
             self.last = None;
@@ -166,12 +167,12 @@ impl Server<'_> {
         }
     }
 
-    /// Answers one want, or begins the checksum that is wanted.
+    /// Answers one request, or begins its checksum.
     fn answer<D: CardDevice>(&mut self, recorder: &mut Recorder<'_, D>, want: &Want) -> bool {
         let Ok(mut grant) = self.answers.grant((HEAD + DATA_MAX) as u16) else { return false };
         let _ = self.wants.dequeue();
         if want.which != Which::Settings {
-            // One conversation at a time: who asks for something else no longer waits for a checksum.
+            // One conversation at a time: a request for something else cancels a checksum.
             self.sum = None;
         }
         let log = find(recorder, want, self.last.take(), &mut self.listed);
@@ -195,7 +196,7 @@ impl Server<'_> {
                 .filter(|found| want.which != Which::Settings && found.answer.found.is_ok());
         }
         if self.sum.is_some() && matches!(want.what, What::Checksum(_)) {
-            // Its answer comes when it is done; what is not committed is given back.
+            // Its answer comes when it is finished; the uncommitted grant is returned.
             return true;
         }
         if let Some(head) = grant.get_mut(..HEAD) {
@@ -205,7 +206,7 @@ impl Server<'_> {
         true
     }
 
-    /// Goes on with a checksum, if there is one; its answer at the end.
+    /// Continues a checksum, if there is one; sends its answer at the end.
     fn add<D: CardDevice>(&mut self, recorder: &mut Recorder<'_, D>) -> bool {
         let Some(Sum { log: Found { mut answer, mut segment }, mut done, mut so_far }) = self.sum else {
             return false;
@@ -239,21 +240,21 @@ impl Server<'_> {
     }
 }
 
-/// Hides logs of earlier sessions in the directory's block of this entry; the next block's entry. `None`: that was all, or the card
-/// does not take it.
+/// Hides logs of earlier sessions in the directory's block of this entry; returns the next block's entry. `None` at
+/// the end, or if the card refuses.
 fn erase_next<D: CardDevice>(recorder: &mut Recorder<'_, D>, entry: u32) -> Option<u32> {
     let session = recorder.log_name().map(|name| name.session);
     let more = recorder.card()?.hide_logs(entry, session);
     more.is_ok_and(|more| more).then_some(entry + BLOCK_BYTES as u32 / 32)
 }
 
-/// What was looked for: the answer, and where it lies if it is there.
+/// The result of a search: the answer, and the segment if the log exists.
 struct Looked {
     answer: Answer,
     segment: Option<Segment>,
 }
 
-/// The log that is wanted, from the directory unless it is the one that was read last.
+/// Finds the requested log, in the directory unless it is the last one.
 fn find<D: CardDevice>(
     recorder: &mut Recorder<'_, D>,
     want: &Want,
@@ -302,7 +303,7 @@ fn find<D: CardDevice>(
     Looked { answer, segment: Some(segment) }
 }
 
-/// The log at this place of the list: from the one on that was looked up before, where the directory is the same.
+/// The log at this place of the list; the search starts at the previous result if the directory is the same.
 fn at_place<D: CardDevice>(
     card: &Card<'_, D>,
     place: u16,
@@ -319,7 +320,7 @@ fn at_place<D: CardDevice>(
     Ok(found.map(|(_, log)| log))
 }
 
-/// Copies what there is from the answer's offset on; how many bytes.
+/// Copies bytes from the answer's offset on; returns their number.
 fn copy<D: CardDevice>(card: &Card<'_, D>, segment: &mut Segment, answer: &Answer, to: &mut [u8]) -> usize {
     let end = answer.offset.saturating_add(to.len().min(DATA_MAX) as u32).min(answer.bytes);
     let mut done = 0;

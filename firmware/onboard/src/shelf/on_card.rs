@@ -1,12 +1,12 @@
-//! A log as it lies on the card: which one a segment holds, how much of it was recorded, and its bytes.
+//! A log on the card: the identity of the log in a segment, its recorded length, and its bytes.
 //!
-//! A card may have lost any sector, the first one too, and behind the end lies whatever the segment held before. So no one place
-//! tells where a log ends: parity, at the segment's end, says how far it goes at least, and from there on it ends where so many
-//! sectors in a row are none of it ([`LOST_MAX`]). What is lost before that is offered as it reads, for whoever reads the log to tell.
-//! Of the log in work the recorder knows the end.
+//! A card may have lost any sector, also the first one, and old data lies behind the end. So no single block marks
+//! the end of a log. Parity, at the segment's end, gives a minimum length. From there on the log ends at the first
+//! row of [`LOST_MAX`] blocks without a sector of it. Lost sectors before that are delivered as they read, and the
+//! log's reader reports them. The recorder knows the end of the log in work.
 //!
-//! An undamaged log takes about a hundred reads, 0.1 s of a usual card, in which frames wait in the sector queue; one of 8 MiB
-//! without its parity 400.
+//! An undamaged log takes about a hundred reads, 0.1 s of a usual card, in which frames wait in the sector queue. One
+//! of 8 MiB without parity takes 400.
 
 use core::ops::Range;
 
@@ -18,17 +18,17 @@ use hums_recorder::{BLOCK_BYTES, Block, Card, CardDevice, CardError, LogName, Tr
 
 use super::asked::LogId;
 
-/// Sectors in a row that a card may have lost: two of its largest pages, 16 KiB each.
+/// Sectors in a row that a card may lose: two of its largest pages, 16 KiB each.
 const LOST_MAX: u32 = 64;
 
-/// A segment's blocks, one by one. One that the card does not give is zeros, as one that it has lost.
+/// A segment's blocks, one by one. An unreadable one counts as zeros, like a lost one.
 struct Blocks<'r, 'a, D: CardDevice> {
     card: &'r Card<'a, D>,
     segment: &'r mut Segment,
     block: Block,
-    /// The card did not give one.
+    /// One was unreadable.
     has_lost: bool,
-    /// The card no longer answers: what was read since says nothing of it.
+    /// The card no longer answers: later reads are invalid.
     is_gone: bool,
 }
 
@@ -37,7 +37,7 @@ impl<'r, 'a, D: CardDevice> Blocks<'r, 'a, D> {
         Self { card, segment, block: [0; BLOCK_BYTES], has_lost: false, is_gone: false }
     }
 
-    /// Of a card that no longer answers, zeros without another command: each would take its whole time again.
+    /// After the card stopped answering, zeros without another command: each would take its full timeout.
     fn read(&mut self, at: u32) -> &Block {
         if self.is_gone {
             self.block.fill(0);
@@ -51,12 +51,12 @@ impl<'r, 'a, D: CardDevice> Blocks<'r, 'a, D> {
         &self.block
     }
 
-    /// How many of them are for sectors.
+    /// The number of blocks for sectors.
     const fn limit(&self) -> u32 {
         data_blocks(self.segment.blocks())
     }
 
-    /// The session of the segment's first sector, and its number, by the first one that can be read.
+    /// The session and the number of the segment's first sector, by the first readable one.
     fn begin(&mut self) -> Option<(u32, u32)> {
         let limit = self.limit();
         let far = (LOST_MAX..limit).step_by(LOST_MAX as usize);
@@ -66,11 +66,11 @@ impl<'r, 'a, D: CardDevice> Blocks<'r, 'a, D> {
         })
     }
 
-    /// How many blocks were recorded of the session, from the sector with this number on.
+    /// Recorded blocks of the session, from the sector with this number on.
     fn recorded(&mut self, session: u32, first: u32) -> u32 {
         let limit = self.limit();
         let mut end = self.covered(session, first).max(1);
-        // From the end on, nothing before this block is of it.
+        // Blocks from `end` up to this one hold no sector of it.
         let mut seen = end;
         loop {
             let until = (end + LOST_MAX + 1).min(limit);
@@ -85,12 +85,12 @@ impl<'r, 'a, D: CardDevice> Blocks<'r, 'a, D> {
         }
     }
 
-    /// How many blocks were recorded at least, by the parity of as many stretches as have one.
+    /// Minimum of recorded blocks, by the parity of all stretches that have one.
     fn covered(&mut self, session: u32, first: u32) -> u32 {
         let (blocks, limit) = (self.segment.blocks(), self.limit());
         let (mut end, mut absent) = (0, 0);
         for stretch in 0..limit.div_ceil(STRETCH_SECTORS) {
-            // P of the first column, and Q, which lies on another page.
+            // P of the first column, and Q, which is on another page.
             let p = parity_block(blocks, stretch);
             let covered = [p, p + COLUMNS as u32].into_iter().find_map(|at| {
                 let parity = Parity::read(self.read(at)).filter(|parity| parity.session == session)?;
@@ -108,14 +108,14 @@ impl<'r, 'a, D: CardDevice> Blocks<'r, 'a, D> {
     }
 }
 
-/// Whether the segment still holds this log; `None` where the card does not tell.
+/// Whether the segment still holds this log; `None` if the card does not answer.
 pub(super) fn holds<D: CardDevice>(card: &Card<'_, D>, segment: &mut Segment, log: &LogId) -> Option<bool> {
     let mut blocks = Blocks::of(card, segment);
     let begin = blocks.begin().or((!blocks.has_lost).then_some((0, 0)))?;
     Some(begin == (log.session, log.first))
 }
 
-/// Which log a segment holds, and how many blocks of it were recorded; `None` where the card does not tell.
+/// The identity of a segment's log, and its recorded blocks; `None` if the card does not answer.
 pub(super) fn measure<D: CardDevice>(
     card: &Card<'_, D>,
     segment: &mut Segment,
@@ -123,22 +123,22 @@ pub(super) fn measure<D: CardDevice>(
 ) -> Option<(LogId, u32)> {
     let mut blocks = Blocks::of(card, segment);
     let Some((session, first)) = blocks.begin() else {
-        // What was not read may have been a sector.
+        // An unread block may have been a sector.
         return (!blocks.has_lost).then_some((LogId { name, ..LogId::NONE }, 0));
     };
     let recorded = blocks.recorded(session, first);
     (!blocks.is_gone).then_some((LogId { name, session, first }, recorded))
 }
 
-/// The same of the log in work: what no longer changes. What was there before is none of it.
+/// The same for the log in work: its finished part. Earlier data in the file is excluded.
 pub(super) fn in_work(log: &InWork) -> (LogId, u32) {
     let InWork { name, session, first, blocks } = *log;
     let log = if blocks > 0 { LogId { name, session, first } } else { LogId { name, ..LogId::NONE } };
     (log, blocks)
 }
 
-/// Gives what is in these bytes of a log, block by block; `false` where the card no longer answers. The file of parameters, which is
-/// no log, must not lack any.
+/// Gives these bytes of a log to `each`, block by block; `false` if the card no longer answers. The file of
+/// parameters, which is not a log, must be complete.
 pub(super) fn for_each_part<D: CardDevice>(
     card: &Card<'_, D>,
     segment: &mut Segment,

@@ -1,25 +1,26 @@
-//! Files that the firmware holds itself: MAVLink's component information (<https://mavlink.io/en/services/component_information.html>),
-//! by which a ground station shows our settings with their words, units and ranges.
+//! Files that the firmware holds itself: MAVLink's component information
+//! (<https://mavlink.io/en/services/component_information.html>), by which a ground station shows our settings with
+//! their words, units and ranges.
 //!
-//! `firmware/onboard/metadata` has them as they are sent; `tests/sim/metadata.rs` makes them from the table of parameters, and
-//! fails where they are not what the table says.
+//! `firmware/onboard/metadata` has them as they are sent; `tests/sim/metadata.rs` makes them from the table of
+//! parameters, and fails if they differ from it.
 
 use hums_link::ftp;
 
-/// Where the general file is, as `COMPONENT_METADATA` says it.
+/// The address of the general file, as sent in `COMPONENT_METADATA`.
 pub(in crate::companion) const GENERAL_URI: &str = "mftp://[;comp=191]/general.json";
 
-/// One of them.
+/// A file of the firmware.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(in crate::companion) enum BuiltinFile {
-    /// Which others there are (`COMP_METADATA_TYPE_GENERAL`).
+    /// The list of the others (`COMP_METADATA_TYPE_GENERAL`).
     General,
     /// The parameters (`COMP_METADATA_TYPE_PARAMETER`), packed with xz.
     Parameters,
 }
 
 impl BuiltinFile {
-    /// The one of this name, with or without the directory before it.
+    /// The file of this name, with or without the directory before it.
     pub(super) fn named(path: &str) -> Option<Self> {
         match path.strip_prefix('/').unwrap_or(path) {
             "general.json" => Some(Self::General),
@@ -28,7 +29,7 @@ impl BuiltinFile {
         }
     }
 
-    /// All of it.
+    /// Its content.
     pub(super) const fn bytes(self) -> &'static [u8] {
         match self {
             Self::General => include_bytes!("../../../metadata/general.json"),
@@ -36,7 +37,7 @@ impl BuiltinFile {
         }
     }
 
-    /// Its checksum, by which a ground station knows the one that it has already.
+    /// Its checksum, by which a ground station recognises a known version.
     pub(in crate::companion) const fn crc(self) -> u32 {
         const GENERAL: u32 = ftp::checksum_of(BuiltinFile::General.bytes());
         const PARAMETERS: u32 = ftp::checksum_of(BuiltinFile::Parameters.bytes());

@@ -1,8 +1,7 @@
-//! Logs as files, as MAVLink FTP asks for them (<https://mavlink.io/en/services/ftp.html>): list, open, read, burst,
-//! checksum.
+//! Logs as files over MAVLink FTP (<https://mavlink.io/en/services/ftp.html>): list, open, read, burst, checksum.
 //!
-//! An open file is a log and not a name: once it is overwritten, or the card is another one, what is asked of it is
-//! answered with an error. Files that the firmware holds ([`super::builtin`]) are opened by their names, are in no list, and need
+//! An open file is a log and not a name. Once the log is overwritten, or the card is changed, requests for it get an
+//! error. Files that the firmware holds ([`super::builtin`]) are opened by their names, are in no list, and need
 //! nothing of the card.
 
 use core::fmt::Write as _;
@@ -15,11 +14,11 @@ use super::builtin::BuiltinFile;
 use super::step::{Out, Step};
 use crate::shelf::{Answer, LogId, NoLog, What, Which};
 
-/// Bytes of one burst, in messages of the longest data; the client then asks on, and so one that has gone is not sent a
-/// whole log.
+/// Bytes of one burst, in messages of the longest data. The client then asks for the next one, so a client that has
+/// gone does not get a whole log.
 const BURST_BYTES: u32 = 64 * ftp::DATA_MAX as u32;
 
-/// What is open.
+/// The open file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Open {
     /// A log on the card.
@@ -28,7 +27,7 @@ pub(super) enum Open {
     Builtin(BuiltinFile),
 }
 
-/// What is being answered.
+/// An answer in progress.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Job {
     reply: ftp::Reply,
@@ -41,20 +40,20 @@ enum Kind {
     Say(Option<Error>),
     /// One entry of the directory, by place.
     List(u16),
-    /// The log is to be opened.
+    /// A log to open.
     Open(LogName),
     /// An answer that is a number: the length or the checksum of a file that the firmware holds.
     Number(u32),
-    /// Bytes of what is open, so many a message, from the reply's offset on.
+    /// Bytes of the open file from the reply's offset on, `size` of them in each message.
     Read { of: Open, size: u8 },
-    /// The same, message after message; so many bytes are left of the burst.
+    /// The same, message after message; `left` bytes of the burst remain.
     Burst { of: Open, size: u8, left: u32 },
-    /// The checksum of the file's first so many bytes; 0 is all.
+    /// The checksum of the file's first `bytes`; 0 is all.
     Checksum { name: LogName, bytes: u32, sum: Option<u32> },
 }
 
 impl Job {
-    /// What a client asks, where this is open.
+    /// The answer to a client's request, with this file open.
     pub(super) fn new(asked: &ftp::Asked<'_>, open: &mut Option<Open>) -> Self {
         let mut reply = ftp::Reply::to(asked);
         let kind = match asked.operation {
@@ -78,7 +77,7 @@ impl Job {
             }
             Operation::Checksum(path, bytes) => match (BuiltinFile::named(path), name(path)) {
                 (Some(builtin), _) => {
-                    // Of all of it, whatever part is asked for.
+                    // The checksum of all of it, even if a part is requested.
                     reply.offset = builtin.bytes().len() as u32;
                     Kind::Number(builtin.crc())
                 }
@@ -99,7 +98,8 @@ impl Job {
         Self { reply, kind }
     }
 
-    /// Asks for the same checksum as `other`, which may take seconds: the one that is under way is for this question.
+    /// Whether `other` requests the same checksum, which may take seconds: the running computation then answers this
+    /// request.
     pub(super) fn takes_over(&mut self, other: &Self) -> bool {
         let wanted = |kind: Kind| match kind {
             Kind::Checksum { name, bytes, .. } => Some((name, bytes)),
@@ -140,11 +140,11 @@ impl Job {
         match (*kind, answer) {
             (Kind::Say(None), _) => out.file(reply.ack(&[], &mut buffer), Step::Done),
             (Kind::Say(Some(error)), _) => out.file(reply.nak(error, &mut buffer), Step::Done),
-            // An entry without a name has its place in the list; without a directory there is none.
+            // An entry without a name has its place in the list; without a directory there is no list.
             (Kind::List(_), Some((answer, _))) if answer.found == Err(NoLog::Unread) && answer.count > 0 => {
                 out.file(reply.ack(b"S\0", &mut buffer), Step::Done)
             }
-            // The card does not give it now. Who wants it asks again.
+            // The card cannot read it now. The client asks again.
             (_, Some((answer, _))) if answer.found == Err(NoLog::Unread) => {
                 out.file(reply.nak(Error::Fail, &mut buffer), Step::Done)
             }
@@ -167,7 +167,7 @@ impl Job {
             (Kind::Checksum { name, bytes, sum: None }, Some((answer, data))) => {
                 reply.offset = answer.offset;
                 let sum = data.first_chunk().map_or(0, |sum| u32::from_le_bytes(*sum));
-                // It is not computed again where the port is full now.
+                // It is not computed again if the port is full now.
                 *kind = Kind::Checksum { name, bytes, sum: Some(sum) };
                 out.file(reply.ack(&sum.to_le_bytes(), &mut buffer), Step::Done)
             }
@@ -195,17 +195,17 @@ impl Job {
                 let rest = bytes.get(self.reply.offset as usize..).unwrap_or_default();
                 self.read(bytes.len() as u32, rest, &mut buffer, out)
             }
-            // What is asked of the card and was not answered.
+            // A request to the card without an answer.
             (_, None) => Step::Done,
         }
     }
 
-    /// Sends what there is of a file of so many bytes, in messages of the size that was asked for, as far as the port's line allows.
+    /// Sends bytes of a file of this length, in messages of the requested size, as far as the port's budget allows.
     ///
-    /// A burst ends after [`BURST_BYTES`] with "burst complete", as those of `ArduPilot` and PX4 do: a client that has to wait for its
-    /// timeout at the end of each burst gives up. `MAVProxy` and pymavlink take a shorter message than they asked for with this mark
-    /// for the file's end. So where the line is too slow for messages of that size, the mark stands in a message without data. The
-    /// file's end is always said by itself.
+    /// A burst ends after [`BURST_BYTES`] with "burst complete", as with `ArduPilot` and PX4: a client that must wait
+    /// for its timeout after each burst gives up. `MAVProxy` and pymavlink take a shorter message with this mark for
+    /// the file's end. So if the line is too slow for messages of that size, the mark comes in a message without
+    /// data. The file's end is always a message of its own.
     fn read(
         &mut self,
         bytes: u32,

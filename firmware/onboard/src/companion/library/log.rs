@@ -1,8 +1,8 @@
-//! Logs as `LOG_REQUEST_LIST` and `LOG_REQUEST_DATA` ask for them: by a number, which is a place in the directory.
+//! Logs by `LOG_REQUEST_LIST` and `LOG_REQUEST_DATA`, with a number that is a place in the directory.
 //!
-//! A place means another log once the directory has changed, and a full card gives a segment to a later log while it is
-//! downloaded. So a download is bound to its log when it begins (at offset 0), and goes on with that log or not at all.
-//! What is asked for by place, in a list that is no longer so, is refused with a text. Refused is silence: a `LOG_DATA`
+//! A place means another log once the directory has changed, and a full card gives a segment to a later log while it
+//! is downloaded. So a download is bound to its log when it begins (at offset 0), and goes on with that log or not at
+//! all. A request by a place in an outdated list is refused with a text. A refusal sends no data: a `LOG_DATA`
 //! without bytes would mean that the log ends there.
 
 use hums_link::messages;
@@ -14,13 +14,13 @@ use crate::shelf::{Answer, LogId, NoLog, What, Which};
 /// Bytes in one `LOG_DATA`.
 const DATA_BYTES: usize = 90;
 
-/// What is remembered of lists and downloads, so that a number goes on meaning the same log.
+/// The memory of lists and downloads, so that a number keeps its log.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Places {
-    /// The directory when the list was begun.
+    /// Number of the directory when the list began.
     listed: Option<u32>,
     download: Option<Download>,
-    /// That a number means nothing any longer was told since.
+    /// A refusal was reported since.
     told: bool,
 }
 
@@ -30,7 +30,7 @@ struct Download {
     id: u16,
     /// `None` once the log is gone.
     log: Option<LogId>,
-    /// The list that the number is of.
+    /// The list of the number.
     listed: Option<u32>,
 }
 
@@ -39,12 +39,12 @@ impl Places {
         Self { listed: None, download: None, told: false }
     }
 
-    /// Nobody downloads any longer.
+    /// Ends the download.
     pub(super) const fn end(&mut self) {
         self.download = None;
     }
 
-    /// What to look for where this many bytes of a log were had before; `None`: nothing, it is gone.
+    /// The log to read, with this many bytes read before; `None`: it is gone.
     fn wanted(&self, id: u16, offset: u32) -> Option<Which> {
         let place = Which::At(id.saturating_sub(1));
         match self.download.filter(|download| download.id == id) {
@@ -54,7 +54,7 @@ impl Places {
         }
     }
 
-    /// Whether a place still is what the list says. Without a list only a beginning may be asked for.
+    /// Whether a place is still that of the list. Without a list only a beginning may be requested.
     fn is_listed(&self, offset: u32, directory: u32) -> bool {
         self.listed.map_or(offset == 0, |listed| listed == directory)
     }
@@ -68,23 +68,23 @@ impl Places {
         self.download = Some(Download { id, log: None, listed: self.listed });
     }
 
-    /// Once, until there is a list or a download again: who asks may ask for ever.
+    /// Reports a refusal once, until there is a list or a download again: a client may repeat its request for ever.
     fn refuse(&mut self) -> Step {
         if core::mem::replace(&mut self.told, true) { Step::Done } else { Step::End(Reply::LogsChanged) }
     }
 }
 
-/// A list under way: entries by place, from 0.
+/// A list in progress: entries by place, from 0.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct List {
     next: u16,
     last: u16,
-    /// The card did not give one, which is left out.
+    /// The card could not read one, which is left out.
     lacks: bool,
 }
 
 impl List {
-    /// Of the numbers from `first` to `last`.
+    /// Entries with numbers from `first` to `last`.
     pub(super) fn new(first: u16, last: u16) -> Self {
         Self { next: first.saturating_sub(1), last: last.saturating_sub(1), lacks: false }
     }
@@ -93,7 +93,7 @@ impl List {
         (Which::At(self.next), What::Length)
     }
 
-    /// The end of it, which is told where a log was left out.
+    /// The end of the list, with a report if a log was left out.
     const fn end(&self) -> Step {
         if self.lacks { Step::End(Reply::LogsUnread) } else { Step::Done }
     }
@@ -108,11 +108,11 @@ impl List {
             }
         }
         if self.next == 0 || places.listed.is_none() {
-            // The rest is of the same directory, or no longer right.
+            // The rest is of the same directory, or outdated.
             (places.listed, places.told) = (Some(answer.directory), false);
         }
         if answer.found == Err(NoLog::Absent) {
-            // "There are none" is an answer; past the last one there is nothing to say.
+            // An empty list is an answer; past the last log no answer comes.
             let none = messages::log_entry(0, 0, 0, 0, 0);
             return if count == 0 { out.say(&none, self.end()) } else { self.end() };
         }
@@ -121,7 +121,7 @@ impl List {
         let step = match answer.found {
             Ok(()) => out
                 .say(&messages::log_entry(self.next + 1, count, count, answer.bytes, answer.utc_secs), then),
-            // It has a length that nobody knows.
+            // Its length is unknown.
             Err(_) => then,
         };
         if step == Step::Next {
@@ -131,7 +131,7 @@ impl List {
     }
 }
 
-/// Bytes of a log that are asked for.
+/// Requested bytes of a log.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Data {
     id: u16,
@@ -141,7 +141,7 @@ pub(super) struct Data {
 }
 
 impl Data {
-    /// `None` where there is nothing to look for.
+    /// `None` if there is nothing to read.
     pub(super) fn new(id: u16, offset: u32, count: u32, places: &Places) -> Option<Self> {
         let which = places.wanted(id, offset)?;
         Some(Self { id, which, offset, end: offset.saturating_add(count) })
@@ -159,7 +159,7 @@ impl Data {
         out: &mut Out<'_, '_, '_>,
     ) -> Step {
         match self.which {
-            // The card does not give it now. Who wants it asks again.
+            // The card cannot read it now. The client asks again.
             _ if answer.found == Err(NoLog::Unread) => return Step::Done,
             Which::Same(_) if answer.found.is_err() => {
                 places.lose(self.id);
@@ -167,7 +167,7 @@ impl Data {
             }
             Which::Same(_) => {}
             _ if !places.is_listed(self.offset, answer.directory) => return places.refuse(),
-            // There never was such a log: it ends before it begins.
+            // No such log ever existed: it ends before it begins.
             _ if answer.found.is_err() => {
                 return out.say(&messages::log_data(self.id, self.offset, &[]), Step::Done);
             }
@@ -177,7 +177,7 @@ impl Data {
             }
         }
         if data.is_empty() && self.offset < answer.bytes {
-            // The same.
+            // As above.
             return Step::Done;
         }
         self.send(answer, data, out)
@@ -189,7 +189,7 @@ impl Data {
         loop {
             let wanted = (self.end.saturating_sub(self.offset) as usize).min(DATA_BYTES);
             let piece = rest.get(..wanted).unwrap_or(rest);
-            // Short, and the log goes on: the next answer has the rest.
+            // Short, but the log goes on: the next answer has the rest.
             if piece.len() < wanted && self.offset.saturating_add(piece.len() as u32) < answer.bytes {
                 return Step::Next;
             }
@@ -226,11 +226,11 @@ mod tests {
         places.bind(3, log(42));
         assert_eq!(places.wanted(3, 90), Some(Which::Same(log(42))));
         assert_eq!(places.wanted(3, 0), Some(Which::Same(log(42))), "the first piece was lost");
-        // Another list: the number means another log from its beginning on, but what was begun goes on.
+        // Another list: the number means another log from its beginning on, but a download in progress goes on.
         places.listed = Some(9);
         assert_eq!(places.wanted(3, 90), Some(Which::Same(log(42))));
         assert_eq!(places.wanted(3, 0), Some(Which::At(2)));
-        // Once it is gone nothing is added to what was had of it.
+        // Once it is gone, no bytes are added to its download.
         places.lose(3);
         assert_eq!(places.wanted(3, 90), None);
         assert_eq!(places.wanted(3, 0), Some(Which::At(2)));

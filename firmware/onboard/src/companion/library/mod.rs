@@ -1,9 +1,9 @@
 //! Logs for download: `LOG_REQUEST_LIST`, `LOG_REQUEST_DATA` as ground stations speak them ([`log`]), and MAVLink FTP
 //! (`file`), which also has the files that the firmware holds itself ([`builtin`]).
 //!
-//! One conversation at a time: who asks anew ends the one before. Nothing is remembered that a client could fill: a
-//! question that is lost, or its answer, is asked again by the client, from wherever it likes. Everything goes out in
-//! the class `Bulk`, in what the port's budget leaves to it.
+//! One conversation at a time: a new request ends the previous one. No client can fill a memory here: if a request or
+//! its answer is lost, the client asks again, from any offset. All data goes out in the class `Bulk`, in the rest of
+//! the port's budget.
 //!
 //! ```text
 //! question -> job -> what it wants of the card -> storage's answer -> messages -> what it wants next, or the end
@@ -25,7 +25,7 @@ use super::limiter::Asker;
 use super::ways::Ways;
 use crate::shelf::{Answer, DATA_MAX, Want, What, Which};
 
-/// Answers looked at in one call. The port's budget is the limit; this is one all the same.
+/// Answers looked at in one call. The port's budget limits them too.
 const LOOKS_MAX: usize = 64;
 
 /// The conversation.
@@ -33,13 +33,13 @@ const LOOKS_MAX: usize = 64;
 pub(crate) struct Library {
     job: Option<Job>,
     ticket: u16,
-    /// What is wanted next has been asked for.
+    /// The next part has been requested.
     asked: bool,
     /// Earlier logs are to be erased.
     pub(crate) erases: bool,
-    /// What the numbers of logs mean.
+    /// The meaning of log numbers.
     places: Places,
-    /// What is open over FTP.
+    /// The file that is open over FTP.
     open: Option<Open>,
 }
 
@@ -66,7 +66,7 @@ impl Kind {
     }
 }
 
-/// An answer of the card's. A copy, because to send needs everything else.
+/// An answer of the card, as a copy, because sending needs all queues.
 type Answered = (Answer, heapless::Vec<u8, DATA_MAX>);
 
 impl Library {
@@ -74,7 +74,7 @@ impl Library {
         Self { job: None, ticket: 0, asked: false, erases: false, places: Places::new(), open: None }
     }
 
-    /// For a question, also for somebody else's: the answer to the one before is waited for no longer.
+    /// For a new request: an answer to the previous one is no longer awaited.
     pub(crate) const fn next_ticket(&mut self) -> u16 {
         self.ticket = self.ticket.wrapping_add(1);
         self.asked = false;
@@ -86,7 +86,7 @@ impl Library {
         self.next_ticket();
     }
 
-    /// Takes a question; `false` when it is none about logs.
+    /// Takes a request; `false` unless it is about logs.
     pub(crate) fn asked(&mut self, asker: Asker, request: &Request<'_>) -> bool {
         match *request {
             Request::LogList(first, last) => self.begin(asker, Kind::List(log::List::new(first, last))),
@@ -115,8 +115,8 @@ impl Library {
         self.begin(asker, Kind::File(file));
     }
 
-    /// Goes on with the conversation as far as the card's answers and the port's budget allow; what is to be told of how
-    /// it ended.
+    /// Continues the conversation as far as the card's answers and the port's budget allow; returns a report of its
+    /// end.
     pub(crate) fn lend(&mut self, now: Instant, ways: &mut Ways) -> Option<(Port, Reply)> {
         if self.erases {
             let ticket = self.next_ticket();
@@ -150,11 +150,11 @@ impl Library {
         None
     }
 
-    /// The answer to what is wanted, if it has come, which stays in the queue; asks for it, if nobody has.
+    /// The answer to a request, if it has come, which stays in the queue; sends the request if that is still to do.
     fn answered(&mut self, (which, what): (Which, What), ways: &mut Ways) -> Option<Answered> {
         let ticket = self.ticket;
         let mut seen = None;
-        // Those to earlier questions are dropped.
+        // Answers to earlier requests are dropped.
         while seen.is_none()
             && ways.queues.shelf.answer(|answer, data| {
                 if answer.ticket == ticket {
@@ -173,14 +173,14 @@ impl Library {
         seen
     }
 
-    /// Says what an answer holds.
+    /// Sends an answer's content.
     fn step(&mut self, job: &mut Job, answered: Option<&Answered>, out: &mut Out<'_, '_, '_>) -> Step {
         let answer = answered.map(|(answer, data)| (answer, data.as_slice()));
         match (&mut job.kind, answer) {
             (Kind::List(list), Some((answer, _))) => list.step(answer, &mut self.places, out),
             (Kind::Data(data), Some(answer)) => data.step(answer, &mut self.places, out),
             (Kind::File(file), answer) => file.step(answer, &mut self.open, out),
-            // Both want something of the card.
+            // Both need the card.
             (Kind::List(_) | Kind::Data(_), None) => Step::Done,
         }
     }

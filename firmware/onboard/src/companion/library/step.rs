@@ -1,4 +1,4 @@
-//! What one look at an answer of the card's did, and the way to whoever asked.
+//! The result of one look at an answer of the card, and the way to the asker.
 
 use hums_core::clock::Instant;
 use hums_link::messages;
@@ -9,25 +9,25 @@ use hums_link::request::Reply;
 use super::super::limiter::Asker;
 use super::super::ways::Ways;
 
-/// What one look at an answer did.
+/// The result of one look at an answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Step {
     /// The port is full: the same again later.
     Wait,
-    /// The answer has no more to give: the next one.
+    /// The answer is used up: the next one.
     Next,
-    /// All is said.
+    /// All is sent.
     Done,
-    /// It ends here, and the ground station is told why.
+    /// It ends here, with a report to the ground station.
     End(Reply),
 }
 
-/// What an FTP message adds to its data, signed: frame, target, head.
+/// Bytes that an FTP message adds to its data, signed: frame, target, head.
 const FTP_FRAME: usize = 12 + 3 + hums_link::ftp::HEAD + 13;
 /// The least data that is worth such a message.
 const FTP_DATA_MIN: usize = 20;
 
-/// The way to whoever asked.
+/// The way to the asker.
 pub(super) struct Out<'o, 'w, 'q> {
     pub(super) now: Instant,
     pub(super) asker: Asker,
@@ -35,12 +35,12 @@ pub(super) struct Out<'o, 'w, 'q> {
 }
 
 impl Out<'_, '_, '_> {
-    /// Sends a message; `then` where it went.
+    /// Sends a message; `then` if it was sent.
     pub(super) fn say(&mut self, packet: &Packet, then: Step) -> Step {
         if self.ways.send(self.now, self.asker.port, Class::Bulk, packet) { then } else { Step::Wait }
     }
 
-    /// Sends what an FTP message holds; `then` where it went.
+    /// Sends the payload of an FTP message; `then` if it was sent.
     pub(super) fn file(&mut self, payload: &[u8], then: Step) -> Step {
         let (system, component) = self.asker.by;
         self.say(&messages::file_transfer(system, component, payload), then)

@@ -1,4 +1,4 @@
-//! `PARAMS.TXT` and settings over a link, by what is known of the vehicle.
+//! `PARAMS.TXT` and settings over a link, with a vehicle of known and unknown state.
 
 use hums_blackbox::Writer;
 use hums_blackbox::record::Boot;
@@ -14,7 +14,7 @@ use crate::monitoring::TICK;
 use crate::queues::Queues;
 use crate::{Monitoring, PortStatus, ResetCause};
 
-/// What comes at one second.
+/// An event at one second.
 #[derive(Clone, Copy, Debug)]
 enum Comes {
     Heartbeat {
@@ -38,8 +38,8 @@ fn text() -> String {
     format!("BAT_REM_WARN 31\n{comment}PROT_ACTION 1\nAP_BAUD 57600\n")
 }
 
-/// Runs a start with what comes at each second since it; whether the file's first and last lines are in force 10 s after the last,
-/// and the port's rate.
+/// Runs a start with events at seconds since it. Returns the port's rate, and whether the file's first and last lines
+/// are in force, 10 s after the last event.
 fn run(cause: ResetCause, comes: &[(u64, Comes)]) -> ([bool; 2], f32) {
     run_slowly(cause, 1, comes)
 }
@@ -48,7 +48,7 @@ fn run_slowly(cause: ResetCause, ticks_an_answer: u64, comes: &[(u64, Comes)]) -
     run_with(&text(), cause, ticks_an_answer, comes)
 }
 
-/// The same of a file with this text on a card that answers at one tick in so many.
+/// The same with this text in the file, on a card that answers every `ticks_an_answer`.
 fn run_with(text: &str, cause: ResetCause, ticks_an_answer: u64, comes: &[(u64, Comes)]) -> ([bool; 2], f32) {
     let (card, port) = (CardStatus::new(), PortStatus::new());
     let (mut monitor, mut writer) = (Box::new(Monitor::new(Params::defaults())), Box::new(Writer::new()));
@@ -122,7 +122,7 @@ fn a_box_that_restarts_in_the_air_reads_no_parameters() {
             assert_eq!(run(cause, &comes), NOTHING, "{cause:?}, {heartbeat:?}");
         }
     }
-    // Power that was gone for a moment: the first heartbeat tells.
+    // A short power cut: the first heartbeat decides.
     for cause in BY_HAND {
         assert_eq!(run(cause, &[(0, Card), (1, ARMED), (2, ARMED)]), NOTHING, "{cause:?}");
     }
@@ -188,7 +188,7 @@ fn the_port_s_rate_is_set_over_a_link_unless_the_vehicle_may_be_in_flight() {
     let set = |cause, comes: &[(u64, Comes)]| run(cause, comes).1.to_bits() == 115_200.0_f32.to_bits();
     let baud = Baud(115_200.0);
     for cause in BY_HAND {
-        // With a wrong rate there is no heartbeat.
+        // A wrong rate gives no heartbeat.
         assert!(set(cause, &[(2, baud)]), "{cause:?}");
         assert!(set(cause, &[(1, DISARMED), (2, baud)]), "{cause:?}");
         assert!(!set(cause, &[(1, ARMED), (2, baud)]), "{cause:?}");
