@@ -1,8 +1,8 @@
-//! Any bytes on a card, through the reader of its file system: what it finds lies on the card, once, and what does not
-//! hold is told in bounded words.
+//! Any bytes on a card, through the reader of its file system: each found file is on the card and found once, and
+//! damage is reported in bounded text.
 //!
-//! The input is a list of changes to a small formatted card: place, offset (two bytes), length, and so many bytes. A place
-//! is one of the blocks that matter: the partition table, the volume's first blocks, its FAT, its first clusters.
+//! The input is a list of changes to a small formatted card: place, offset (two bytes), length, and the bytes. A
+//! place is one of the important blocks: the partition table, the volume's first blocks, its FAT, its first clusters.
 
 use std::cell::RefCell;
 use std::collections::BTreeMap;
@@ -15,7 +15,7 @@ use hums_recorder::layout::Layout;
 use hums_recorder::{Block, CardDevice};
 
 const BLOCK: u64 = 512;
-/// Sentences about damage that a walk tells at most: twenty, one about segments left out, one that counts the others.
+/// Maximum sentences about damage: twenty, one about segments left out, one with the count of the others.
 const DAMAGE_MAX: usize = 22;
 
 /// A card in memory; blocks that were never written are zeros.
@@ -28,7 +28,7 @@ impl Card {
     /// The smallest card that can be FAT32, formatted.
     ///
     /// # Panics
-    /// If that fails, which it cannot.
+    /// If that fails, which is impossible.
     pub fn formatted() -> Self {
         static FORMATTED: OnceLock<BTreeMap<u32, [u8; 512]>> = OnceLock::new();
         let blocks = FORMATTED.get_or_init(|| {
@@ -41,7 +41,7 @@ impl Card {
         Self { blocks: RefCell::new(blocks.clone()) }
     }
 
-    /// Changes the card as the input says.
+    /// Applies the input's changes to the card.
     pub fn change(&mut self, mut data: &[u8]) {
         let layout = Layout::read(&Self::formatted()).expect("it was just formatted");
         while let [place, low, high, length, rest @ ..] = data {
@@ -62,7 +62,7 @@ impl Card {
     }
 }
 
-/// The block that the input calls so.
+/// The block of a place in the input.
 pub fn block_at(layout: &Layout, place: u8) -> u32 {
     match u32::from(place) {
         0 => 0,
@@ -110,7 +110,7 @@ impl ReadAt for Card {
     }
 }
 
-/// Takes the input for changes to a card.
+/// Takes the input as changes to a card.
 pub fn check(data: &[u8]) {
     let mut card = Card::formatted();
     card.change(data);

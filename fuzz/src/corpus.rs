@@ -1,4 +1,4 @@
-//! The inputs of the corpus that our own code can make.
+//! The inputs of the corpus that are generated.
 
 use hums_blackbox::SECTOR_BYTES;
 use hums_recorder::LogName;
@@ -68,7 +68,7 @@ fn entries() -> Vec<u8> {
     out
 }
 
-/// Texts that would be markup.
+/// Texts that are markup.
 fn markup() -> Vec<u8> {
     let mut out = Vec::new();
     push(&mut out, 0, 10, 0, &[0, 0, 0, 0, 2, 3, 81, 4, 3]);

@@ -1,5 +1,5 @@
-//! An onboard log of `ArduPilot`, binary or text: whatever it says, it comes to its end, its times never fall, every row
-//! has its table's columns, and the unreadable part is at most the file.
+//! An onboard log of `ArduPilot`, binary or text, of any content. Reading ends, its times never fall, every row has
+//! its table's columns, and the unreadable part is at most the file.
 
 use std::io::Cursor;
 
@@ -12,7 +12,7 @@ pub fn check(data: &[u8]) {
     let Some((first, log)) = data.split_first() else { return };
     let form = if first % 2 == 1 { Form::Text } else { Form::Binary };
     dataflash::detect(log);
-    // Compressed bytes are the matter of another reader.
+    // Compressed bytes belong to another reader.
     let Ok(input) = Input::new(Cursor::new(log.to_vec())) else { return };
     if log.starts_with(&[0x1f, 0x8b]) {
         return;

@@ -1,5 +1,5 @@
-//! Any coded stream, in sectors that are sound, through the decoder of a group: it may be no stream that a writer makes,
-//! but its output is bounded.
+//! Any coded stream in sound sectors, through the decoder of a group. A writer may never make such a stream, but its
+//! output is bounded.
 
 use hums_blackbox::{BODY_BYTES, Entry, GROUP_SECTORS, GroupDecoder, Header, SECTOR_BYTES, Sector};
 use hums_blackbox::{SectorSink, Writer};

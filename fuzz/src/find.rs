@@ -1,4 +1,4 @@
-//! Any file as a log or an image of a card: found logs can be read to their end.
+//! Any file as a log or an image of a card: found logs are readable to their end.
 
 use std::collections::BTreeSet;
 use std::fs::File;
@@ -13,11 +13,11 @@ use hums_recorder::format::BLOCKS_MIN;
 use crate::card::Card;
 use crate::file::with_file;
 
-/// Where on the card the input's blocks are put: among its first clusters.
+/// The card's block of the input: among its first clusters.
 const BLOCK: u32 = 4_096;
 
-/// Takes the first byte for what the file is: bit 0, sectors get the check that fits them; bit 1, every block is looked
-/// at; bits 2 to 4 all set, the bytes lie on a card, which is looked through. The others are the bytes.
+/// The first byte selects the kind of file: bit 0, sectors get a valid check; bit 1, every block is examined; bits 2
+/// to 4 all set, the bytes are put on a card. The others are the bytes.
 pub fn check(data: &[u8]) {
     let Some((&mode, bytes)) = data.split_first() else { return };
     let mut bytes = bytes.to_vec();

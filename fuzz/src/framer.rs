@@ -1,8 +1,8 @@
-//! Any bytes, cut anywhere, through the framer: each is accounted for, and how they are cut makes no difference.
+//! Any bytes, cut anywhere, through the framer: each is counted, and the cuts make no difference.
 
 use hums_link::{Framer, FramerCounts};
 
-/// The frames of the bytes when they come in pieces of `piece` bytes; and the counts after the line fell silent.
+/// The frames of the bytes in pieces of `piece` bytes; and the counts after the line fell silent.
 fn frames(bytes: &[u8], piece: usize) -> (Vec<Vec<u8>>, FramerCounts) {
     let mut framer = Box::new(Framer::new());
     let mut frames = Vec::new();

@@ -1,6 +1,6 @@
 //! Fuzz targets: rules for any bytes at a reader.
 //!
-//! A target is a function of bytes that panics where something does not hold. Three things run it:
+//! A target is a function of bytes that panics if a rule is broken. Three things run it:
 //!
 //! | what | when | inputs |
 //! |---|---|---|
@@ -9,15 +9,17 @@
 //! | libFuzzer (`fuzz/libfuzzer`) | `cargo xtask fuzz` | mutations that follow the code's branches, five minutes a target; needs nightly Rust and cargo-fuzz, and no test runs it |
 //!
 //! # To add a target
-//! 1. Write `fuzz/src/NAME.rs` with `pub fn check(data: &[u8])`. The framework limits the length of `data`; the function
-//!    bounds everything else. It gives any bytes to the reader, for instance a file's contents
-//!    ([`file::with_file`] makes a file of them), and asserts its rules. That the reader does not panic needs no assertion.
+//! 1. Write `fuzz/src/NAME.rs` with `pub fn check(data: &[u8])`. The framework limits the length of `data`; the
+//!    function bounds everything else. It gives any bytes to the reader, for instance a file's contents
+//!    ([`file::with_file`] makes a file of them), and asserts its rules. A panic of the reader itself needs no
+//!    assertion.
 //! 2. Add `pub mod NAME;` and a row of [`TARGETS`] to this file.
-//! 3. Put a few small inputs that the reader understands into `fuzz/corpus/NAME/` (some kB in all). They are made by us,
-//!    never taken from somebody's recording. Without a corpus the mutations begin from noise and reach little.
-//!    Inputs that a writer of ours can make are made by `fuzz/src/corpus.rs`; `cargo run -p hums-fuzz` writes them.
+//! 3. Put a few small inputs that the reader understands into `fuzz/corpus/NAME/` (some kB in all). They are
+//!    generated, never taken from foreign recordings. Without a corpus the mutations begin from noise and reach
+//!    little. Inputs that our own writers can make come from `fuzz/src/corpus.rs`; `cargo run -p hums-fuzz` writes
+//!    them.
 //!
-//! An input that breaks a target is written to `target/fuzz/NAME-HASH`; it goes into the corpus with the mend.
+//! An input that breaks a target is written to `target/fuzz/NAME-HASH`; it goes into the corpus with the fix.
 #![allow(clippy::missing_panics_doc, reason = "a target panics where something does not hold")]
 
 pub mod card;
@@ -43,7 +45,7 @@ pub struct Target {
     pub bytes_max: usize,
     /// Mutations that each `cargo xtask test` tries: about half a second of them.
     pub rounds: u64,
-    /// Panics where something does not hold.
+    /// Panics if a rule is broken.
     pub check: fn(&[u8]),
 }
 

@@ -1,5 +1,5 @@
-//! Mutations of inputs: the same ones for the same seed, with no tool but this. What libFuzzer adds to it is that it
-//! looks at which branches an input takes.
+//! Mutations of inputs: the same ones for the same seed, without other tools. LibFuzzer also follows the branches of
+//! the code.
 
 use std::fs;
 use std::io;
@@ -10,7 +10,7 @@ use hums::rng::Rng;
 
 use crate::Target;
 
-/// Values at which code decides.
+/// Values at limits of code.
 const NUMBERS: [u64; 12] = [0, 1, 2, 7, 0x7f, 0x80, 0xff, 0x7fff, 0x8000, 0xffff, 0x7fff_ffff, u64::MAX];
 
 /// Makes inputs from those of a corpus.
@@ -102,7 +102,7 @@ impl Mutator {
     }
 }
 
-/// An input for which something did not hold.
+/// An input that broke a rule.
 #[derive(Debug)]
 pub struct Broken {
     /// The target.
@@ -123,8 +123,8 @@ pub fn corpus(target: &Target) -> io::Result<Vec<Vec<u8>>> {
     paths.iter().map(fs::read).collect()
 }
 
-/// Runs the target on its corpus, then on mutations as long as `go_on`, which gets their number so far, says so. How
-/// many inputs were tried, or the first that broke it.
+/// Runs the target on its corpus, then on mutations while `go_on` agrees, which gets their number so far. Returns the
+/// number of inputs, or the first that broke it.
 pub fn run(
     target: &'static Target,
     seed: u64,
@@ -154,7 +154,7 @@ fn holds(target: &Target, input: &[u8]) -> bool {
     catch_unwind(AssertUnwindSafe(|| (target.check)(input))).is_ok()
 }
 
-/// Writes an input that broke a target where somebody finds it.
+/// Writes an input that broke a target to the folder of broken inputs.
 fn keep(target: &'static Target, input: &[u8]) -> io::Result<Broken> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../target/fuzz");
     fs::create_dir_all(&folder)?;

@@ -1,5 +1,5 @@
-//! Any messages in a log, as the report's page and the live page get them: the data that goes onto a page is JSON, and
-//! nothing in it ends the element that holds it.
+//! Any messages in a log, for the report's page and the live page: the data on a page is JSON, and nothing in it ends
+//! its element.
 
 use std::path::Path;
 
@@ -41,8 +41,8 @@ impl SectorSink for Log {
 }
 
 /// A log made from the input: entries of kind, time since the one before, two bytes of message, length, content. The
-/// kind's three lowest bits: 7 a note, 6 a frame that is not verified, others a frame of a known message;
-/// the four highest say which system it is of.
+/// kind's three lowest bits: 7 a note, 6 a frame that is not verified, others a frame of a known message. The four
+/// highest give the system.
 pub fn log(mut data: &[u8]) -> Vec<u8> {
     let (mut writer, mut log) = (Box::new(Writer::new()), Log::default());
     let (mut at_ms, messages) = (0, hums_dialect::messages());

@@ -1,9 +1,9 @@
-//! Any file through the reader of logs: it comes to its end, and counts each block by kind.
+//! Any file through the reader of logs: reading ends, and counts each block by kind.
 
 use hums_blackbox::{Header, Item, LogReader, SECTOR_BYTES, Sector};
 
-/// Takes the first byte's lowest bit for whether checks are made right, so that what is inside is reached; the others
-/// for the file.
+/// The first byte's lowest bit selects whether checks are corrected, so that the content is reached; the others are
+/// the file.
 pub fn check(data: &[u8]) {
     let Some((&mode, file)) = data.split_first() else { return };
     let mut blocks: Vec<[u8; SECTOR_BYTES]> = file.as_chunks().0.to_vec();
@@ -15,7 +15,7 @@ pub fn check(data: &[u8]) {
             *block = *sector.bytes();
         }
     }
-    // Each block completes no more entries than it says, and ends no more than one gap or begins one.
+    // Each block completes at most its own number of entries, and ends or begins at most one gap.
     let said: u64 =
         blocks.iter().filter_map(|block| Some(u64::from(Header::read(block).ok()?.entries()))).sum();
     let items_max = said + 2 * blocks.len() as u64 + 4;

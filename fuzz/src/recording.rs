@@ -1,5 +1,5 @@
-//! Any file that somebody calls a recording: whatever it is taken for, it comes to its end, its times never fall, and as
-//! a stream of bytes it has no byte that is not in the file.
+//! Any file as a recording of any kind. Reading ends, its times never fall, and as a stream of bytes it has only
+//! bytes of the file.
 
 use std::path::Path;
 
@@ -10,7 +10,7 @@ use hums::source::{self, Timing};
 
 use crate::file::with_file;
 
-/// Items that a byte of a recording becomes at most: a small frame is told, its observation, its text and its fact.
+/// Maximum items from one byte of a recording: a small frame, its observation, its text and its fact.
 const ITEMS_PER_BYTE: usize = 4;
 
 /// Takes the input for the file.
@@ -38,7 +38,7 @@ fn stream(path: &Path, length: usize) {
     source.remark();
 }
 
-/// A compressed file is left to `stream`: how many items it may become is not to be told by its length.
+/// A compressed file is left to `stream`: its length does not limit its items.
 fn items(path: &Path, length: usize) {
     let Ok(recording) = Place::file(path).open() else { return };
     let mut count = 0;

@@ -1,4 +1,4 @@
-//! Any pieces of bytes, most of them no frames, through writer and reader: they come back as they were.
+//! Any pieces of bytes, most of them no frames, through writer and reader: they come back unchanged.
 
 use hums_blackbox::{FRAME_BYTES_MAX, Item, LogReader, Sector, SectorSink, Writer};
 use hums_core::clock::Instant;
@@ -19,7 +19,7 @@ impl SectorSink for Card {
     }
 }
 
-/// Pieces of the input: each begins with how long it is, when it comes and how it is made a frame.
+/// Pieces of the input: each begins with its length, its time, and its way of becoming a frame.
 fn pieces(mut data: &[u8]) -> Vec<(u64, Vec<u8>)> {
     let (mut pieces, mut at_ms) = (Vec::new(), 0);
     while let [len, step, kind, rest @ ..] = data {

@@ -1,5 +1,5 @@
-//! Any bytes behind the header of a PX4 log: it comes to its end, its times never fall, each row has as many values as its
-//! table has columns, and all tables together have no more columns than they may.
+//! Any bytes behind the header of a PX4 log. Reading ends, its times never fall, each row has as many values as its
+//! table has columns, and the number of all columns is limited.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;

@@ -52,7 +52,7 @@ fn files(dir: &Path, ending: &str) -> BTreeMap<String, PathBuf> {
     found
 }
 
-/// What the files of a packed log are called in a directory: its own name and its session's.
+/// The name of a packed log's files in a directory: its own name and its session's.
 fn named(dir: &Path, stem: &str) -> String {
     let entries = fs::read_dir(dir).expect("a directory").map(|entry| entry.expect("an entry").file_name());
     let mut names: Vec<String> = entries
@@ -92,7 +92,7 @@ fn shape(line: &str) -> String {
     out
 }
 
-/// From the thesis, but with the seven decimals that ours has in a position.
+/// From the thesis, with the seven decimals of our positions.
 const EXAMPLE: &str = "15s; 93 %; 15.78 V; 11.77 C; 954.92 hPa; 3.62, 0.08, -0.08 m/s; 3.62 m/s; 3.19 m/s; \
      -1.13, 0.07, -9.64 m/s2; 9.71 m/s2; 488.13 m; 47.4000000 deg; 8.5500000 deg";
 
@@ -317,8 +317,8 @@ fn several_logs_side_by_side_are_what_each_is_alone() {
         for (name, path) in alone {
             assert!(fs::read(path).expect("text") == fs::read(&all[&name]).expect("text"), "{stem}/{name}");
         }
-        // Frames and the quantities made of them alternate by parts of a group, which are smaller where there are more
-        // formats: the points are the same, their order need not be.
+        // Frames and their quantities alternate by parts of a group, which are smaller with more formats. The points
+        // are the same, but their order may differ.
         let lines = |dir: &Path| {
             let text = fs::read_to_string(dir.join(format!("{name}.lp"))).expect("points");
             let mut lines: Vec<String> = text.lines().map(str::to_owned).collect();
@@ -332,7 +332,7 @@ fn several_logs_side_by_side_are_what_each_is_alone() {
     assert!(!sessions.is_empty());
 }
 
-/// A frame of an id that no dialect has, with a checksum that some definition would make.
+/// A frame of an id without a definition, with a valid checksum for some definition.
 fn private_frame(id: u32, sequence: u8) -> Vec<u8> {
     let [low, middle, high, _] = id.to_le_bytes();
     let mut frame = vec![0xfd, 4, 0, 0, sequence, 1, 1, low, middle, high, 1, 2, 3, sequence];

@@ -1,7 +1,7 @@
-//! The same flight as its autopilot logged it and as a telemetry port heard it: the monitor finds the same in both.
+//! The same flight from its autopilot's log and from a telemetry port: the monitor finds the same in both.
 //!
-//! PX4 in its simulator, a motor dies (`tests/labelled/px4`). The log is cut to topics that are mapped, and to the rates
-//! at which they are taken.
+//! PX4 in its simulator, a motor dies (`tests/labelled/px4`). The log is cut to the mapped topics, and to the rates
+//! at which they are read.
 
 use std::path::Path;
 
@@ -15,7 +15,7 @@ use hums_core::params::Params;
 use hums_core::status::{LinkReading, RecorderStatus, Recording};
 use hums_onboard::monitoring::TICK;
 
-/// What was found: check, instance, level, seconds since the autopilot's boot.
+/// Findings: check, instance, level, seconds since the autopilot's boot.
 type Found = Vec<(&'static str, u8, Level, f64)>;
 
 fn found(name: &str) -> Found {
@@ -57,10 +57,10 @@ fn found(name: &str) -> Found {
 fn a_log_and_a_recording_of_the_same_flight_have_the_same_findings_within_a_second() {
     let log = found("p23_motor_dead_quad.cut.ulg.gz");
     let recording = found("p23_motor_dead_quad.tlog.gz");
-    // What would only echo the mishap is quiet.
+    // Findings that would only echo the mishap are suppressed.
     assert_eq!(recording.len(), 8, "{recording:?}");
-    // The shock is shorter than the time between two samples of the recording, and its rates that are wanted (5 Hz) are too old for
-    // every other one that is flown.
+    // The shock is shorter than the interval of samples in the recording. Its rate setpoints (5 Hz) are too old for
+    // every other rate.
     let only_in_log = |&&(check, ..): &&(&str, u8, Level, f64)| check == "impact" || check == "pitch_rate";
     assert_eq!(log.iter().filter(only_in_log).count(), 2, "{log:?}");
     let log: Found = log.iter().filter(|finding| !only_in_log(finding)).copied().collect();

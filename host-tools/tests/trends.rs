@@ -1,4 +1,4 @@
-//! Flights one after the other: the normal figures are learnt, and a flight that leaves them is found.
+//! Consecutive flights: the normal figures are learnt, and a flight that leaves them is found.
 
 #[path = "../../firmware/core/tests/common/mod.rs"]
 mod common;
@@ -20,7 +20,7 @@ type Change = fn(&mut Quad);
 /// Check, part and level.
 type Expected = (&'static str, u8, Level);
 
-/// Flies for 80 s and lands, with these outputs in flight: what is found, after it was learnt.
+/// Flies for 80 s and lands, with these outputs in flight: the findings, before the flight is learnt.
 fn fly(past: &mut Baselines, change: Change, pulses: Option<[u16; 4]>) -> Vec<Finding> {
     let mut monitor = Monitor::new(Params::defaults());
     for now_ms in (0..100_000).step_by(50) {
@@ -62,7 +62,7 @@ fn what_was_normal_for_three_flights_stays_normal() {
     let mut past = three_flights(|_| {}, None);
     assert_eq!(fly(&mut past, |_| {}, None), []);
     let known = |quantity| past.known(quantity).unwrap();
-    // 0.5 at 15.5 V, told for 15.2 V.
+    // 0.5 at 15.5 V, converted to 15.2 V.
     assert!((known(Quantity::HoverThrottle) - 0.52).abs() < 0.01);
     assert!((known(Quantity::Vibration) - 5.0).abs() < 0.1);
     assert!(known(Quantity::MotorSpeed(3)).abs() < 0.1);

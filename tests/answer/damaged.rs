@@ -1,4 +1,4 @@
-//! Damaged, cut and foreign files: exit code 3 or 1, and what could be saved is in every format.
+//! Damaged, cut and foreign files: exit code 3 or 1, and the saved part is in every format.
 
 use std::fs;
 use std::path::Path;
@@ -68,7 +68,8 @@ fn what_is_left_of_a_damaged_log_is_in_every_format_and_in_its_report() {
     beside_a_tlog(&dir.path().join("zeroed.hum"), dir.path());
 }
 
-/// A tlog's table of gaps: told of where nothing can lie beside it, and no tlog without it where something else lies there.
+/// A tlog's table of gaps: reported if no second output is possible; no tlog is written without it if a file is in
+/// its way.
 fn beside_a_tlog(damaged: &Path, dir: &Path) {
     let (tlog, gaps) = (dir.join("one.tlog"), dir.join("one.tlog.gaps.csv"));
     let decode = |output: &Path| {

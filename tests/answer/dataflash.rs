@@ -7,7 +7,7 @@ use hums::source::recording::Place;
 use hums_tests::{flights, oracle};
 use serde_json::Value as Json;
 
-/// Whether a value is the one that pymavlink has.
+/// Whether a value equals pymavlink's.
 fn same(ours: &Value<'_>, theirs: &Json) -> bool {
     match ours {
         Value::Unknown => theirs.is_null(),
@@ -35,7 +35,7 @@ fn same(ours: &Value<'_>, theirs: &Json) -> bool {
 fn every_field_of_every_message_of_an_autopilots_own_log_is_read_as_pymavlink_reads_it() {
     let compressed = flights::root().join("tests/labelled/bin/f12_gps_jump.bin.gz");
     let recording = Place::file(&compressed).open().unwrap();
-    // pymavlink maps the file into its memory: it wants it without the compression.
+    // Pymavlink maps the file into its memory, and so needs it without compression.
     let mut plain = tempfile::Builder::new().suffix(".bin").tempfile().unwrap();
     let mut input = hums::source::input::Input::open(&compressed).unwrap();
     std::io::copy(&mut input, &mut plain).unwrap();
@@ -63,6 +63,6 @@ fn every_field_of_every_message_of_an_autopilots_own_log_is_read_as_pymavlink_re
         })
         .unwrap();
     assert!(theirs.next().is_none(), "pymavlink has more messages");
-    // A comparison of nothing would find no differences either.
+    // An empty comparison would find no differences either.
     assert!(messages > 20_000 && values > 200_000, "{messages} messages, {values} values");
 }

@@ -1,4 +1,4 @@
-//! A folder of cards as one table: the queries of `docs/fleet.md` answer what the cards say.
+//! A folder of cards as one table: the queries of `docs/fleet.md` return the content of the cards.
 
 use std::fs;
 use std::path::Path;
@@ -13,7 +13,8 @@ use serde_json::Value;
 /// Two cards, one with two flights.
 fn cards(dir: &Path) {
     fs::create_dir(dir.join("cards")).unwrap();
-    // A board has a source of randomness, by which sessions of equal number on two cards differ; here it is the seed.
+    // A board has a source of randomness that distinguishes sessions of equal number on two cards; here it is the
+    // seed.
     for (card, seed, flight) in [
         ("first", "1", "px4_hil_quad_low.tlog"),
         ("second", "2", "ap_quad_guided.tlog"),
@@ -23,7 +24,7 @@ fn cards(dir: &Path) {
         let image = dir.join("cards").join(format!("{card}.img"));
         child::run(sim.arg(own(flight)).arg("--sd").arg(image), LIMIT).expect_code(&[0]);
     }
-    // Recorders that check nothing: a packed recording, and one of which nobody can tell the vehicle.
+    // Recorders without checks: a packed recording, and one of an unknown vehicle.
     let packed = dir.join("cards/packed.hum");
     hums([
         "decode".as_ref(),
@@ -75,7 +76,7 @@ fn the_documents_queries_answer_what_the_cards_say() {
         child::run(decode.args(["--force", "--format", format]), LIMIT).expect_code(&[0]);
     };
     decode("parquet", &fleet);
-    // Again, over it: nothing is there twice.
+    // Again, over it: no row is there twice.
     decode("parquet", &fleet);
     let info = hums(["info".as_ref(), "--json".as_ref(), cards.as_os_str()]).expect_code(&[0]).text();
     let info: Value = serde_json::from_str(&info).unwrap();
@@ -114,7 +115,7 @@ fn the_documents_queries_answer_what_the_cards_say() {
 
     assert_all_are_told(&results, logs);
 
-    // What the other document shows in Python reads the same rows.
+    // The Python in the other document reads the same rows.
     let printed = oracle::snippets(&root().join("docs/decode.md"), dir.path());
     let printed: Vec<&str> = printed.as_array().unwrap().iter().filter_map(Value::as_str).collect();
     let attitude = |log: &Value| {
@@ -139,7 +140,7 @@ fn the_documents_queries_answer_what_the_cards_say() {
     assert_eq!(frames, expected);
 }
 
-/// No session is passed over in silence.
+/// No session is skipped silently.
 #[track_caller]
 fn assert_all_are_told(results: &Value, logs: &[Value]) {
     let mut checked: Vec<(String, String, u64)> = rows(results, "Who was checked").iter().map(told).collect();
@@ -164,7 +165,7 @@ fn word(value: &Value) -> String {
     value.as_str().unwrap_or_default().to_owned()
 }
 
-/// A session, who checked it, and how many findings there are.
+/// A session, the source of its checks, and its number of findings.
 fn told(row: &Value) -> (String, String, u64) {
     (word(&row["session"]), word(&row["checked_by"]), row["findings"].as_u64().unwrap())
 }

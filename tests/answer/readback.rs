@@ -1,4 +1,4 @@
-//! Every field and the times of every message in every format, as pymavlink and the tlog's own times have them.
+//! Every field and the times of every message in every format, against pymavlink and the tlog's own times.
 
 use std::path::Path;
 
@@ -29,7 +29,7 @@ fn compare(recording: &Path) {
     eprintln!("{name}: {found}");
     assert_eq!(found["differences"], serde_json::json!([]), "{name}");
     let values = &found["values"];
-    // A comparison of nothing would find no differences either.
+    // An empty comparison would find no differences either.
     assert!(values["csv"].as_u64().unwrap() > 4 * found["messages"].as_u64().unwrap(), "{name}: {found}");
     for format in ["jsonl", "parquet", "influx"] {
         assert_eq!(values[format], values["csv"], "{name}: {format} has other values than csv");

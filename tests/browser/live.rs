@@ -25,7 +25,7 @@ fn shown(page: &Value, name: &str) -> f64 {
     number(page["values"][name].as_str().unwrap_or_else(|| panic!("the page has no {name}")))
 }
 
-/// Every frame of a recording as an independent reader's fields, by the way of a packed log.
+/// Every frame of a recording with the fields of an independent reader, through a packed log.
 fn frames(recording: &Path) -> Vec<Value> {
     let dir = tempfile::tempdir().unwrap();
     let (log, out) = (dir.path().join("flight.hum"), dir.path().join("flight.jsonl"));
@@ -45,7 +45,7 @@ fn frames(recording: &Path) -> Vec<Value> {
     text.lines().map(|line| serde_json::from_str(line).unwrap()).collect()
 }
 
-/// What of a recording comes after its first so many seconds.
+/// The part of a recording after its first seconds.
 fn cut(recording: &Path, from_s: f64, to: &Path) -> PathBuf {
     let data = std::fs::read(recording).unwrap();
     let frames = hums_tests::frames::of_tlog(&data, &Manifest::own().seeds, false);
@@ -64,7 +64,7 @@ fn last<'a>(frames: &'a [Value], message: &str, by_s: f64) -> &'a Value {
     &found.unwrap_or_else(|| panic!("no {message} by {by_s} s"))["fields"]
 }
 
-/// What a panel shows, of which message and how finely, and the value by the message's fields.
+/// A panel, its message, its resolution, and its value from the message's fields.
 type Panel = (&'static str, &'static str, f64, fn(&Value) -> f64);
 
 fn of(fields: &Value, name: &str) -> f64 {
@@ -111,7 +111,7 @@ fn assert_shows(page: &Value, frames: &[Value]) {
     }
 }
 
-/// Goes to a time of a recording, as a hand on the slider would.
+/// Moves to a time of a recording, like a hand on the slider.
 fn seek(page: &mut LivePage, to_s: f64) -> Value {
     page.run(&format!(
         "const s = document.querySelector('input[type=range]'); s.value = {to_s}; \
@@ -125,13 +125,13 @@ fn seek(page: &mut LivePage, to_s: f64) -> Value {
 fn assert_sound(page: &mut LivePage) {
     assert_eq!(page.console(), json!([]), "the browser complains");
     let width = &page.read()["width"];
-    // Where something sticks out, a phone makes the page smaller and the window wider than itself.
+    // If an element is too wide, a phone shrinks the page and widens the window.
     let window = page.run("return outerWidth || innerWidth").as_f64();
     assert!(width[0].as_f64() <= width[1].as_f64(), "it is wider than the window: {width}");
     assert!(width[1].as_f64() <= window, "something sticks out: {width} in a window of {window:?}");
 }
 
-/// Where screenshots go, for those who want to look at them.
+/// The folder for screenshots, if they are wanted.
 fn shots() -> Option<PathBuf> {
     let folder = PathBuf::from(std::env::var_os("HUMS_SHOTS")?);
     std::fs::create_dir_all(&folder).unwrap();
@@ -163,7 +163,7 @@ fn every_panel_shows_the_recorded_flight_at_that_moment_and_seeking_goes_there()
     page.press(&["ESCAPE"]);
     page.wait("return !document.querySelector('dialog').open", 10);
 
-    // On, back, and on again; each time all of it is of that moment.
+    // On, back, and on again; each time the whole page shows that moment.
     for to_s in [60.0, 90.0, 45.0, 75.0] {
         assert_shows(&seek(&mut page, to_s), &frames);
     }
@@ -171,7 +171,7 @@ fn every_panel_shows_the_recorded_flight_at_that_moment_and_seeking_goes_there()
     page.press(&["ARROW_LEFT"]);
     page.wait(&format!("return document.documentElement.dataset.now < {there} - 4"), 10);
 
-    // A finding is there once its time has come, and not before.
+    // A finding shows from its time on, and not before.
     let found = |page: &Value| {
         let notes = page["notes"].as_array().unwrap();
         notes.iter().filter(|note| ["warning", "critical"].contains(&note[1].as_str().unwrap())).count()
@@ -194,7 +194,7 @@ fn every_panel_shows_the_recorded_flight_at_that_moment_and_seeking_goes_there()
     }
 }
 
-/// What the page says of a part that wears: its level, and the part of its life that is used, percent.
+/// The page's entry for a part that wears: its level, and the used part of its life, percent.
 fn part(page: &mut LivePage) -> (String, f64) {
     page.wait("return document.querySelector('.due li') !== null", 20);
     let level = page.run("return document.querySelector('.due .badge').textContent");
@@ -277,10 +277,10 @@ fn a_flight_over_udp_is_followed_until_it_stops_and_then_looks_stale() {
     let began = Instant::now();
     let sim = Running(sim.spawn().unwrap());
     page.wait("return document.getElementById('source').textContent === 'live'", 20);
-    // Once the receiver is heard, positions are its own.
+    // Once the receiver is received, positions are its own.
     page.wait("return document.querySelector('[data-value=satellites]').textContent.length > 1", 30);
 
-    // What stands there was sent in the last seconds.
+    // The shown values were sent in the last seconds.
     let until = Instant::now() + Duration::from_secs(8);
     let mut agreed = 0;
     while Instant::now() < until {
@@ -303,13 +303,13 @@ fn a_flight_over_udp_is_followed_until_it_stops_and_then_looks_stale() {
         std::thread::sleep(Duration::from_millis(250));
     }
     assert!(agreed > 10, "only {agreed} looks");
-    // The box on the same link is heard, and its word on itself counts.
+    // The box on the same link is received, and its own status counts.
     page.wait("return document.querySelector('[data-subsystem=recorder] .badge').textContent === 'ok'", 20);
     let seen = page.read();
     assert_eq!(seen["board"]["recorder"]["by"], "on board", "{}", seen["board"]);
     let loss = seen["values"]["link:loss"].as_str().unwrap();
     assert!(loss == "0.0 %" || loss == "not known yet", "what the box leaves out is no loss: {loss}");
-    // A finding comes while somebody looks.
+    // A finding comes while a page is open.
     page.wait("return [...document.querySelectorAll('.notes li .badge')].some((b) => ['warning', 'critical'].includes(b.textContent))", 60);
     assert_sound(&mut page);
     shoot(&mut page, "live-dark");
@@ -352,7 +352,7 @@ fn words_of_a_hostile_vehicle_stay_words_on_the_live_page() {
         "<img src=x onerror=\"document.title='owned'\">",
         "</script><script>document.title='owned'</script>",
         "{{now}} & \"quotes\" 'n' \\u003c <b>",
-        // Shown from right to left from here on: "live".
+        // Right to left from here on: "live".
         "rtl \u{202e}evil\u{2066}",
     ];
     let seeds = &Manifest::own().seeds;
@@ -433,7 +433,7 @@ fn a_foreign_page_a_foreign_name_and_a_stranger_are_refused() {
     }
 }
 
-/// Notes when the roll's number changes, and to what, in milliseconds since 1970.
+/// Notes changes of the roll's number, with their times in milliseconds since 1970.
 const WATCH: &str = "
 const roll = document.querySelector('[data-value=roll]');
 window.seen = [];
@@ -464,7 +464,7 @@ fn a_packet_changes_the_page_within_a_tenth_of_a_second() {
         let mut attitude = vec![0; 28];
         attitude[4..8].copy_from_slice(&roll_deg.to_radians().to_le_bytes());
         sent.push((format!("{roll_deg:.1}"), send(30, &attitude)));
-        // No multiple of the page's own step.
+        // Not a multiple of the page's own step.
         std::thread::sleep(Duration::from_millis(137));
     }
     let seen = page.run("return window.seen");

@@ -1,4 +1,4 @@
-//! Reports of recorded flights, looked at in Chromium.
+//! Reports of recorded flights in Chromium.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -25,7 +25,7 @@ fn report(source: &Path, codes: &[i32]) -> (tempfile::TempDir, PathBuf) {
     (dir, page)
 }
 
-/// What holds for every page.
+/// Conditions on every page.
 #[track_caller]
 fn assert_sound(shown: &Value) {
     assert_eq!(shown["console"], serde_json::json!([]), "the browser complains");
@@ -71,7 +71,7 @@ fn a_flights_page_shows_the_flight() {
     assert_eq!(findings.len(), expected.len());
     assert!(!expected.is_empty());
     for (row, finding) in findings.iter().zip(expected) {
-        // What no longer applies is not called good.
+        // A check that no longer applies is not called good.
         let ended = finding["level"] == "ok" && finding["value"].is_null();
         let level = if ended { &serde_json::json!("ended") } else { &finding["level"] };
         assert_eq!((&row[1], &row[2]), (level, &finding["check"]));
@@ -114,10 +114,10 @@ fn a_flights_page_shows_the_flight() {
 /// The values of a pixel's width and of an interval on both sides.
 const AROUND_S: f64 = 1.6;
 
-/// A plot, a line of it, the message it is of, how finely it is printed, and the value of the message's fields.
+/// A plot, one of its lines, its message, its resolution, and its value from the message's fields.
 type Line = (&'static str, &'static str, &'static str, f64, fn(&Value) -> f64);
 
-/// The modes are those of the heartbeats, one after the other.
+/// The modes are those of the heartbeats, in order.
 fn assert_modes(jsonl: &str, shown: &Value) {
     let beats = jsonl.lines().filter(|line| line.contains("\"message\":\"HEARTBEAT\"")).map(json);
     let of_autopilot = beats.filter(|entry| entry["component"] == 1);
@@ -138,7 +138,7 @@ fn assert_modes(jsonl: &str, shown: &Value) {
     assert!(!modes.is_empty());
 }
 
-/// Where the mouse points, a line says what the vehicle said there.
+/// At the mouse, a line has the vehicle's value of that time.
 fn assert_pointed_values(image: &Path, shown: &Value) {
     let mut decode = command(["decode".as_ref(), image.as_os_str()]);
     let jsonl = child::run(decode.args(["-o", "-", "--format", "jsonl"]), LIMIT).expect_code(&[0]).text();
@@ -245,7 +245,7 @@ fn labelled(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("labelled").join(name)
 }
 
-/// Frames of one vehicle that stands: heartbeats, and what else is given, each a second.
+/// Frames of one standing vehicle: heartbeats and the given messages, each once a second.
 fn standing(seconds: u8, more: impl Fn(u8) -> Vec<(u32, Vec<u8>)>) -> Vec<u8> {
     let seeds = &Manifest::own().seeds;
     let (mut data, mut sequence, start_us) = (Vec::new(), 0_u8, 1_700_000_000_000_000_u64);
@@ -271,7 +271,7 @@ fn each_battery_has_its_own_lines_and_two_barometers_are_two() {
         payload[32..36].copy_from_slice(&[id, 0, 1, 50]);
         payload
     };
-    // SCALED_PRESSURE and HIGHRES_IMU, of other temperatures.
+    // SCALED_PRESSURE and HIGHRES_IMU, with different temperatures.
     let pressure = || [&[0; 4][..], &1_000_f32.to_le_bytes(), &[0; 4], &1_180_i16.to_le_bytes()].concat();
     let highres = || {
         [&[0; 8][..], &[0; 36], &1_001_f32.to_le_bytes(), &[0; 8], &15_f32.to_le_bytes(), &[255, 31]].concat()
@@ -344,7 +344,7 @@ fn a_finding_stands_with_its_cause_and_with_its_consequences() {
     assert!(says("consequences", "Consequences: "), "{}", shown["consequences"]);
 }
 
-/// What stands in the cells of a table's rows.
+/// The cells of a table's rows.
 fn table(page: &mut LivePage, selector: &str) -> Vec<Vec<String>> {
     let rows = page.run(&format!(
         "return [...document.querySelectorAll('{selector} tbody tr')].map((row) => [...row.children].map((cell) => cell.textContent))"
@@ -358,7 +358,7 @@ fn data_of(path: &Path) -> Value {
     json(data.split_once("</script>").unwrap().0)
 }
 
-/// The parameters that a link told, as an independent reader has them: at the end, or as they were told first.
+/// The parameters on a link, by an independent reader: the last values, or the first ones.
 fn parameters(recording: &Path) -> BTreeMap<String, u32> {
     let dir = tempfile::tempdir().unwrap();
     let log = dir.path().join("flight.hum");
@@ -412,12 +412,12 @@ fn a_folder_of_pages_has_a_table_and_flights_stand_side_by_side() {
     assert_eq!(table(&mut page, "#pages").len(), 1);
     assert_eq!(page.console(), serde_json::json!([]));
     shoot(&mut page, "index");
-    // Each row leads to its page, which says what changed since the flight before.
+    // Each row leads to its page, which lists the changes since the previous flight.
     page.run("document.querySelector('#pages a').click()");
     page.wait("return document.title.includes('ap_quad_faults') && document.documentElement.dataset.ready === 'true'", 20);
     assert_times(&mut page, &flights[1]);
     let [before, now] = [0, 1].map(|flight: usize| parameters(&flights[flight]));
-    // What the autopilot counts or measures itself is no change.
+    // Values that the autopilot itself counts or measures are not changes.
     let is_own = |name: &str| name.starts_with("STAT_") || name.ends_with("_GND_PRESS");
     let differ: Vec<&String> = now
         .iter()
@@ -453,7 +453,7 @@ fn a_folder_of_pages_has_a_table_and_flights_stand_side_by_side() {
     assert_compared(&mut page, &pages, &now, &before);
 }
 
-/// Findings stand at the times that `hums check` and `hums info` tell.
+/// Findings have the times of `hums check` and `hums info`.
 #[track_caller]
 fn assert_times(page: &mut LivePage, recording: &Path) {
     let info = json(&hums(["info".as_ref(), "--json".as_ref(), recording.as_os_str()]).text());
@@ -473,7 +473,7 @@ fn page_of(pages: &Path, begins: &str) -> String {
     format!("file://{}", file.display())
 }
 
-/// The newest flight stands first: in the figures, in each plot, and in the parameters that differ.
+/// The newest flight comes first: in the figures, in each plot, and in the parameters that differ.
 fn assert_compared(
     page: &mut LivePage,
     pages: &Path,
@@ -523,11 +523,11 @@ fn assert_compared(
     shoot(page, "compare");
 }
 
-/// Each flight has its track, all in one scale, and the figure of how far it led is that of its own page's track.
+/// Each flight has its track, all in one scale, and its distance is that of the track on its own page.
 #[track_caller]
 fn assert_tracks(page: &mut LivePage, pages: &[Value; 2], far_m: [f64; 2]) {
     for (data, far_m) in pages.iter().zip(far_m) {
-        // Of several flights in a log the last stands first.
+        // Of several flights in a log the last comes first.
         let last = data["flights"].as_array().unwrap().last().unwrap();
         let within =
             |at: &Value| at.as_f64() >= last["from_s"].as_f64() && at.as_f64() <= last["to_s"].as_f64();
@@ -599,7 +599,8 @@ fn parameters_that_are_not_at_their_default_are_those_of_which_the_log_says_so()
     assert_eq!(shown.iter().collect::<Vec<_>>(), wanted);
 }
 
-/// The contrast of each text with what is behind it, as WCAG 2.2 defines it: the lowest, with its text. Small print is judged as such.
+/// The contrast of each text with its background, by WCAG 2.2: the lowest, with its text. Small print is judged by
+/// its own limit.
 const CONTRAST: &str = "
 const channel = (c) => (c /= 255) <= .04045 ? c / 12.92 : ((c + .055) / 1.055) ** 2.4;
 const light = ([r, g, b]) => .2126 * channel(r) + .7152 * channel(g) + .0722 * channel(b);
@@ -626,7 +627,8 @@ for (let text = walk.nextNode(); text; text = walk.nextNode()) {
 return worst;
 ";
 
-/// Also from a wide window all plots are drawn for paper, as wide as A4 within its margins, before they are laid out there.
+/// From a wide window too, all plots are drawn for paper, as wide as A4 within its margins, before the layout on
+/// paper.
 #[track_caller]
 fn assert_fits_on_paper(page: &mut LivePage, address: &str) {
     page.open(address, "light", 1920, 1000);
@@ -670,7 +672,7 @@ fn a_report_is_read_on_paper_in_the_dark_with_high_contrast_on_a_phone_and_from_
     let framed = page.run("return getComputedStyle(document.querySelector('.badge')).borderTopStyle");
     assert_eq!(framed, "solid", "a level without its colour");
     page.media("", &serde_json::json!({}));
-    // The keyboard: a step of the timeline moves the cursor in all plots, Enter looks closer, Escape goes back.
+    // The keyboard: a step of the timeline moves the cursor in all plots, Enter zooms in, Escape goes back.
     page.run("document.getElementById('timeline').focus()");
     page.press(&["HOME", "ARROW_RIGHT", "ARROW_RIGHT"]);
     let cursor = page.run("return document.querySelector('.cursor-time').textContent");
@@ -684,7 +686,7 @@ fn a_report_is_read_on_paper_in_the_dark_with_high_contrast_on_a_phone_and_from_
     shoot(&mut page, "report-keyboard");
     page.press(&["ESCAPE"]);
     page.wait("return document.querySelector('.back').hidden", 5);
-    // Nothing that can be clicked is out of its reach.
+    // The keyboard reaches all clickable elements.
     let mute = page.run("return [...document.querySelectorAll('[onclick], tr.go, .notes .when, canvas[role=slider]')].filter((node) => node.tabIndex < 0).length");
     assert_eq!(mute, 0);
     assert_fits_on_paper(&mut page, &address);

@@ -14,7 +14,7 @@ use crate::bench;
 /// The low-speed oscillator at its fastest (DS8626, table 36).
 const LSI_FASTEST: u32 = 47_000;
 
-/// All that was sent is recorded, in order, and nothing else.
+/// All sent frames are recorded, in order, and nothing else.
 #[track_caller]
 fn assert_whole(rig: &Rig) {
     let compared = rig.compared();
@@ -61,7 +61,8 @@ fn the_slowest_erases_leave_the_clock_right_and_the_fastest_watchdog_quiet() {
     }
 }
 
-/// 2 and 3: the store is full, and is erased in a calm, as slowly as can be; in the middle of it the autopilot resumes.
+/// 2 and 3: the store is full, and is erased in a calm time, as slowly as possible; in the middle of it the autopilot
+/// resumes.
 #[test]
 fn what_comes_in_an_erase_is_told_and_the_watchdog_does_not_bite() {
     let mut rig = bench().settled(Board { lsi_hz: LSI_FASTEST, ..Board::default() }).unwrap();
@@ -208,8 +209,8 @@ fn a_change_of_a_ports_rate_cuts_no_byte() {
     assert_no_reset(&rig);
 }
 
-/// A line that carries beginnings of frames and no frame, as fast as it can, costs the framer most. A reception
-/// that looked for the next byte at once would always find one, and no other task would run.
+/// A line with beginnings of frames only, at full rate, costs the framer most. A reception that immediately looked
+/// for the next byte would always find one, and no other task would run.
 #[test]
 fn beginnings_without_a_frame_at_full_rate_starve_nobody() {
     let mut rig = bench().settled(Board::default()).unwrap();

@@ -41,7 +41,7 @@ pub(crate) fn assert_verifies(card: &Path) {
     }
 }
 
-/// A card as large as usual ones: on a small one the first segment alone takes 0.6 s, and that is a finding.
+/// A card of usual size: on a small one the first segment alone takes 0.6 s, which is a finding.
 const CARD_MIB: [&str; 2] = ["--card-size", "4096"];
 /// Every step of the checks, on both machines.
 const TICK_US: u64 = 50_000;
@@ -49,21 +49,21 @@ const TICK_US: u64 = 50_000;
 /// The part that is compared with this PC.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Against {
-    /// Which records there are, by kind and texts.
+    /// The records, by kind and texts.
     Kinds,
-    /// Their times and numbers as well, and what goes to the ground station.
+    /// Their times and numbers too, and the output to the ground station.
     Numbers,
 }
 
-/// Records one flight by the image, and compares it with the recording and with what this PC makes of the same frames at the same
-/// times.
+/// Records one flight by the image. Compares it with the recording, and with this PC's record of the same frames at
+/// the same times.
 #[track_caller]
 fn the_record_is_the_one_of_this_pc(path: &Path, manifest: &Manifest, against: Against) {
     let data = fs::read(path).unwrap();
     let input = manifest.frames_of(path, &data);
     let found = manifest.found(path);
     let chip = Recording::make(Machine::Chip, path, &CARD_MIB);
-    // Where power ends the record in the air, decoding says so.
+    // If the record ends in the air by a power cut, decoding reports it.
     let log = chip.decode(&[0, 3]);
     let recorded = log.frames(&manifest.seeds);
     frames::assert_same(&input, &recorded, &stream(found.is_tlog, &data, &input));
@@ -110,13 +110,13 @@ fn phase_us(records: &[Value]) -> u64 {
     (stats["time_boot"].as_f64().unwrap() * 1e3).round() as u64 * 1_000 % TICK_US
 }
 
-/// The records that this PC makes of the frames on a card at their times there, and what it sends to the ground station. Its checks
+/// This PC's records of the frames on a card, at their times there, and its output to the ground station. Its checks
 /// are stepped at whole 50 ms: the chip's are `phase_us` later.
 fn on_this_pc(image: &Path, phase_us: u64, to: &Path) -> (Vec<Value>, Vec<u8>) {
     const MIB: u64 = 1 << 20;
     let medium = Medium::load(&File::open(image).unwrap()).unwrap();
     let session = record::read(&medium).pop().unwrap();
-    // Times on the card are cut off to a millisecond: a frame of a step's millisecond came after it.
+    // Times on the card are cut off to a millisecond: a frame in a step's millisecond came after it.
     let chunks = session
         .frames
         .into_iter()
@@ -131,9 +131,9 @@ fn on_this_pc(image: &Path, phase_us: u64, to: &Path) -> (Vec<Value>, Vec<u8>) {
     (records(to, &[0, 3]), gs)
 }
 
-/// Records that tell the machine itself, and which of their fields do: who it is, how busy it is, and how far its card has come.
+/// Records about the machine itself, and their fields of that kind: identity, load, and progress of the card.
 const OF_THE_MACHINE: [(&str, &[&str]); 4] = [
-    // How many bytes the figures of HUMS_STATS take in the log differs, and with it where a sector ends.
+    // The number of bytes of HUMS_STATS in the log differs, and with it the end of a sector.
     ("HUMS_MARK", &["sector"]),
     ("HUMS_BOOT", &["board", "uid", "reset", "reset_name", "git"]),
     ("HUMS_CHECKED", &["git"]),
@@ -159,13 +159,14 @@ const OF_THE_MACHINE: [(&str, &[&str]); 4] = [
 const TIME_MAX_S: f64 = 0.101;
 /// Tolerance of a number, relative to itself or to one: the effect of a frame within a millisecond of a step.
 const PART_MAX: f64 = 0.02;
-/// As many of all records may differ by more: momentary values at such a step.
+/// This part of all records may differ by more: momentary values at such a step.
 const ODD_PART_MAX: f64 = 0.02;
 
-/// This PC's store is empty, and it says so.
+/// This PC's store is empty, which is reported.
 const STORE_IS_NEW: &str = "HUMS: the store is new, all counters begin";
 
-/// The same records in the same order of their kinds, at the same times but for a step, with the same fields but for those of the machine.
+/// The same records in the same order of their kinds, at the same times within a step. Their fields are the same,
+/// except for those of the machine.
 #[track_caller]
 fn assert_same_records(of_chip: &[Value], of_pc: &[Value], against: Against) {
     assert!(of_chip.len() > 50, "{} records", of_chip.len());
@@ -177,7 +178,7 @@ fn assert_same_records(of_chip: &[Value], of_pc: &[Value], against: Against) {
         let texts: Vec<_> = texts.map(|(name, value)| format!("{name}={value}")).collect();
         format!("{} {}", record["record"], texts.join(" "))
     };
-    // Records at the end of the power: this PC is switched off in order.
+    // Records at the end of the power: this PC is shut down in order.
     let last_s = quiet_before_the_end_s(of_chip);
     let by_key = |records: &[Value]| {
         let mut rows = BTreeMap::<String, Vec<Value>>::new();
@@ -212,8 +213,8 @@ fn assert_same_records(of_chip: &[Value], of_pc: &[Value], against: Against) {
     assert!(odd.len() as f64 <= ODD_PART_MAX * f64::from(all), "{} of {all} differ", odd.len());
 }
 
-/// The middle of the longest pause between two records in the second and a half before the last 1.5 s: no record is on one side of it on
-/// one machine, and on the other side on the other one.
+/// The middle of the longest pause between records in the 1.5 s before the last 1.5 s. So no record is before it on
+/// one machine and after it on the other.
 #[track_caller]
 fn quiet_before_the_end_s(records: &[Value]) -> f64 {
     let mut times: Vec<_> = records.iter().filter_map(|record| record["time_boot"].as_f64()).collect();
@@ -250,7 +251,7 @@ fn difference(a: &Value, b: &Value) -> Option<String> {
     None
 }
 
-/// Frames to the ground station: the same texts in the same order, and of each message as many but for a few.
+/// Frames to the ground station: the same texts in the same order, and nearly the same number of each message.
 #[track_caller]
 fn assert_same_stream(of_chip: &[u8], of_pc: &[u8], seeds: &Seeds) {
     const STATUSTEXT: u32 = 253;
@@ -292,7 +293,7 @@ fn a_signed_flight_is_recorded_bit_for_bit() {
     fs::write(&part, &data[..BYTES]).unwrap();
     let manifest = Manifest::own();
     let input = manifest.frames_of(&flight, &data);
-    // In a first start one frame may come damaged, which is told: the record's loss counts it.
+    // In a first start one frame may be damaged, which is reported: the record counts it as lost.
     let chip = Recording::attempt(Machine::Chip, &part, &CARD_MIB).expect_code(&[0, 3]);
     let lost = chip.number("frames_lost");
     assert!(lost <= 1, "{lost}");

@@ -17,13 +17,13 @@ use stm32f405_model::time::{MS, Ps, SECOND, US};
 use crate::bench;
 use crate::flights::assert_verifies;
 
-/// How far the record's time of a frame may be from the sender's.
+/// Highest difference between the record's time of a frame and the sender's.
 const OFF_MS_MAX: u64 = 2;
 /// From power to the vehicle's first frame.
 const START: Ps = 2 * SECOND;
 
-/// How far the recorded times are from those at which frames ended on the line, at the most, in milliseconds: the clock begins a moment
-/// after power, and the record cuts off to a millisecond.
+/// Highest difference between recorded times and the ends of frames on the line, in milliseconds. The clock begins a
+/// moment after power-on, and the record cuts off to a millisecond.
 fn off_ms(ended: &[Ps], recorded: &[(u64, Vec<u8>)]) -> u64 {
     let late = |(end, (ms, _)): (&Ps, &(u64, Vec<u8>))| (end / MS).cast_signed() - ms.cast_signed();
     let mut lates = ended.iter().zip(recorded).map(late);
@@ -31,7 +31,7 @@ fn off_ms(ended: &[Ps], recorded: &[(u64, Vec<u8>)]) -> u64 {
     lates.map(|late| late.abs_diff(first)).max().unwrap_or(0)
 }
 
-/// The flight, over and over: a recording's frames at their own times, and three seconds without a word.
+/// The flight, again and again: a recording's frames at their own times, and three seconds of silence.
 struct Flight {
     frames: Vec<(u64, Vec<u8>)>,
     lap: Ps,
@@ -48,7 +48,7 @@ impl Flight {
         Self { frames, lap }
     }
 
-    /// The frame of this number, and when it begins.
+    /// The frame of this number, and its start.
     fn frame(&self, number: usize) -> (Ps, &[u8]) {
         let (us, frame) = &self.frames[number % self.frames.len()];
         ((number / self.frames.len()) as u64 * self.lap + us * US, frame)
@@ -63,7 +63,7 @@ impl Shelf {
         self.0.join("card.img")
     }
 
-    /// The shelf, and how many power-ons of this length it has behind it with this image; one of another image is emptied.
+    /// The shelf, and its number of power-ons of this length with this image; a shelf of another image is emptied.
     fn look(image: &str, minutes: u64) -> (Self, u64) {
         let shelf = Self(Path::new(env!("CARGO_TARGET_TMPDIR")).join("hours"));
         let done = fs::read_to_string(shelf.0.join("done.txt")).unwrap_or_default();
@@ -91,8 +91,8 @@ fn number(name: &str, otherwise: u64) -> u64 {
     std::env::var(name).map_or(otherwise, |text| text.parse().unwrap())
 }
 
-/// `HUMS_CHIP_HOURS` of flight (3) in power-ons of `HUMS_CHIP_MINUTES` (180), on one board with one card. Who stops it goes on with the
-/// power-on that was stopped: with 24 hours it is a day.
+/// `HUMS_CHIP_HOURS` of flight (3) in power-ons of `HUMS_CHIP_MINUTES` (180), on one board with one card. An
+/// interrupted run continues with the power-on that was stopped: with 24 hours it is a day.
 #[test]
 #[ignore = "three hours and more in the model's time (cargo xtask prove chip)"]
 fn hours_of_flight_are_recorded_whole_and_at_their_times() {
@@ -125,7 +125,7 @@ fn hours_of_flight_are_recorded_whole_and_at_their_times() {
     }
 }
 
-/// Flies until this moment, and switches off; gives when each frame ended on the line.
+/// Flies until this moment, and switches off; returns the end of each frame on the line.
 #[track_caller]
 fn fly(machine: &mut Machine, flight: &Flight, until: Ps) -> Vec<Ps> {
     let (mut ended, mut free) = (Vec::new(), 0);
@@ -154,7 +154,7 @@ fn fly(machine: &mut Machine, flight: &Flight, until: Ps) -> Vec<Ps> {
     ended
 }
 
-/// All frames, in their order, each at its time, and no word of a loss.
+/// All frames, in their order, each at its time, and no reported loss.
 #[track_caller]
 fn assert_recorded(session: &Session, flight: &Flight, ended: &[Ps]) {
     let Session { frames, losses, gaps, .. } = session;
@@ -167,8 +167,8 @@ fn assert_recorded(session: &Session, flight: &Flight, ended: &[Ps]) {
     assert!(off <= OFF_MS_MAX, "{off} ms");
 }
 
-/// The store is filled by settings ten times in an hour, on the ground; in the silence after that a sector is erased, and the processor stands
-/// still. Then the vehicle is heard again, ten times a second.
+/// The store is filled by settings ten times in an hour, on the ground. In the silence after that a sector is erased,
+/// and the processor stops. Then the vehicle sends again, ten times a second.
 #[test]
 #[ignore = "an hour in the model's time (cargo xtask prove chip)"]
 fn the_records_time_is_the_senders_for_an_hour_with_ten_erases() {

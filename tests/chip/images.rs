@@ -9,7 +9,7 @@ use stm32f405_model::machine::{Board, Machine};
 use stm32f405_model::memory::FLASH;
 use stm32f405_model::time::SECOND;
 
-/// `movs r0, #3; lsls r0, r0, #28; adds r0, #1; bx r0`: where there is nothing.
+/// `movs r0, #3; lsls r0, r0, #28; adds r0, #1; bx r0`: a jump to an address without memory.
 const TO_NOWHERE: [u16; 4] = [0x2003, 0x0700, 0x3001, 0x4700];
 /// `movw r0, #0xED0C; movt r0, #0xE000; movs r1, #4; movt r1, #0x05FA; str r1, [r0]; b .`: AIRCR.SYSRESETREQ.
 const RESET: [u16; 9] = [0xF64E, 0x500C, 0xF2CE, 0x0000, 0x2104, 0xF2C0, 0x51FA, 0x6001, 0xE7FE];
@@ -91,7 +91,7 @@ fn a_jump_into_nowhere_stops_with_registers_place_and_the_last_instructions() {
     let registers = said.split_once("  r15 30000000\n").expect("the registers");
     assert_eq!(registers.1.lines().count(), 32, "{said}");
     assert!(said.ends_with(&format!("  {:08x} main+0x6\n", main + 6)), "{said}");
-    // Where that handler is nowhere too, the processor is locked up.
+    // If that handler also has no memory, the processor is locked up.
     let mut image = Image::parse(&elf).unwrap();
     let (_, vectors) = image.pieces.iter_mut().find(|(address, _)| *address == FLASH.0).unwrap();
     vectors[12..16].copy_from_slice(&0x3000_0001_u32.to_le_bytes());

@@ -1,7 +1,7 @@
-//! The image that is flashed, byte for byte, on the model of its chip (`docs/chip.md`): it records, and goes on where the parts
-//! round it fail. Times and loads are modelled, not measured.
+//! The image that is flashed, byte for byte, on the model of its chip (`docs/chip.md`). It records, and continues
+//! when devices around it fail. Times and loads are modelled, not measured.
 //!
-//! Without the feature `chip` nothing of this is built: `cargo xtask test` turns it on, and builds the image.
+//! Without the feature `chip` none of this is built: `cargo xtask test` turns it on, and builds the image.
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
 
 #[cfg(feature = "chip")]

@@ -67,13 +67,14 @@ struct Outcome {
     read: Read,
     /// Beside those of power.
     resets: usize,
-    /// So many were made.
+    /// Number of flips.
     flips: u64,
-    /// A flip led the program to something that is not modelled: the chip's behaviour is unknown. None came after that.
+    /// A flip led the program to an instruction that is not modelled: the chip's behaviour is unknown. No flip came
+    /// after that.
     stopped: Option<Box<Report>>,
 }
 
-/// Flips so many bits, one at a time, in the memory that this name stands for, at full line rate, and reads the record.
+/// Flips `most` bits, one at a time, in the memory of this name, at full line rate, and reads the record.
 fn flipped(part: &str, most: u64, apart: Ps, seed: u64) -> Outcome {
     let mut rig = bench().settled(Board { seed, ..Board::default() }).unwrap();
     let begin = rig.machine.now() + SECOND;

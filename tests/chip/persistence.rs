@@ -53,7 +53,7 @@ fn power_that_goes_for_a_moment_begins_another_session_on_the_chip_and_on_this_p
         assert_eq!(recording.json()["log_files"].as_array().unwrap().len(), 3, "{machine:?}");
         assert!(recording.number("frames_lost") <= 60, "{machine:?}: {}", recording.json());
         assert!(recording.number("frames_in") > 2_000, "{machine:?}");
-        // A start that had saved nothing when power went is not counted: nothing is saved in the air.
+        // A start without a save before the power cut is not counted: nothing is saved in the air.
         let boots = Stored::read(&store).lifetime().boots;
         assert!((2..=3).contains(&boots), "{machine:?}: {boots}");
     }

@@ -1,4 +1,4 @@
-//! Power that goes, a supply that sags, a card that stands still, a line that is noisy.
+//! Power cuts, a brown-out, a stalled card, a noisy line.
 
 use hums_sdcard::{Fault, Plan};
 use hums_tests::chip::BAUD;
@@ -101,7 +101,7 @@ fn a_supply_that_sags_is_survived_recorded_and_told() {
     assert!(compared.wrong == 0 && compared.missing < 1_950 + IN_MEMORY_MAX, "{compared:?}");
 }
 
-/// Each tenth frame has a damaged bit, a start bit that is none, or a stop bit that is low; and between the frames is noise.
+/// Each tenth frame has a damaged bit, a false start bit, or a low stop bit; noise fills the pauses.
 #[test]
 fn a_noisy_line_costs_the_frames_that_it_damaged() {
     let mut rig = bench().settled(Board::default()).unwrap();
@@ -125,7 +125,7 @@ fn a_noisy_line_costs_the_frames_that_it_damaged() {
         } else {
             rig.sent.push((end, frame.clone()));
         }
-        // A sender that is not in a hurry: a silence in which the line may lie.
+        // A slow sender: a pause in which the line may stay low.
         free = end + if number % 40 == 35 { 30 * MS } else { 20 * US };
         rig.machine.send_chars(0, line);
         if number % 100 == 99 {

@@ -9,7 +9,7 @@ use stm32f405_model::time::{MS, SECOND};
 
 use crate::bench;
 
-/// The tasks' handlers, as the vector table names them.
+/// The tasks' handlers, by their names in the vector table.
 const RECEPTION: &str = "CAN1_TX";
 const MONITOR: &str = "CAN1_RX0";
 const DOWNLINK: &str = "CAN1_RX1";
@@ -17,7 +17,7 @@ const STORAGE: &str = "CAN1_SCE";
 
 /// `b .`
 const HANG: [u8; 2] = [0xFE, 0xE7];
-/// `mov.w r0, #0x30000000`, where there is nothing; `ldr r0, [r0]`
+/// `mov.w r0, #0x30000000`, an address without memory; `ldr r0, [r0]`
 const BUS_FAULT: [u8; 6] = [0x4F, 0xF0, 0x40, 0x50, 0x00, 0x68];
 /// `push {r0-r7, lr}`, again and again.
 const OVERFLOW: [u8; 4] = [0xFF, 0xB5, 0xFD, 0xE7];
@@ -32,7 +32,7 @@ const LOST_MAX: usize = 700;
 /// The expected result of a fault.
 struct Expected<'a> {
     cause: Cause,
-    /// As the record has it.
+    /// Its text in the record.
     fault: &'a str,
     /// Text for the ground station.
     told: &'a str,
@@ -48,7 +48,7 @@ fn flying() -> Rig {
     rig
 }
 
-/// Goes on after a reset, and looks at the note; `since` is the time of the fault.
+/// Continues after a reset, and reads the note; `since` is the time of the fault.
 #[track_caller]
 fn survives(rig: &mut Rig, since: u64, expected: &Expected<'_>) {
     let (at, cause) = *rig.machine.resets.last().unwrap();
@@ -118,7 +118,7 @@ fn a_full_stack_hurts_nobody_and_is_survived_recorded_and_told() {
     survives(&mut rig, since, &Expected { cause: Cause::Software, fault, told, within_ms: NOTICED_MS });
 }
 
-/// The handler takes an item past a slice's end, as code of a file of this name would.
+/// The handler reads an item beyond a slice's end, like code of a file of this name.
 #[test]
 fn a_panic_is_survived_recorded_and_told() {
     const FILE: &[u8] = b"firmware/provoked.rs";

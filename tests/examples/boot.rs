@@ -1,8 +1,7 @@
-//! Boots an image, feeds a recorded flight to its first port, and tells what became of it.
+//! Boots an image, feeds a recorded flight to its first port, and prints the result.
 //!
 //! `boot IMAGE SECONDS [FLIGHT.tlog|BYTES [CARD.img]]`: a tlog's frames come at their own times, other bytes back to
-//! back at 921,600 baud, both from
-//! 1.5 s on. Run it with `cargo run --release -p hums-tests --example boot -- ...`.
+//! back at 921,600 baud, both from 1.5 s on. Run it with `cargo run --release -p hums-tests --example boot -- ...`.
 
 use std::time::Instant;
 
@@ -38,7 +37,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     Ok(())
 }
 
-/// Flies it second by second; gives the part of the worst second that the processor was busy, after the first two.
+/// Flies it second by second; returns the highest load of the processor in a second, after the first two.
 fn fly(
     machine: &mut Machine,
     mut feed: chip::Feed,

@@ -1,5 +1,5 @@
-//! What becomes of a flight where something goes wrong that `cargo xtask test` has no time for, and who has the processor:
-//! `faults IMAGE FLIGHT.tlog [NAME...]`. Each prints what it saw.
+//! Results of faults that take too long for `cargo xtask test`, and the load of the processor: `faults IMAGE
+//! FLIGHT.tlog [NAME...]`. Each prints its observations.
 
 use std::error::Error;
 
@@ -42,7 +42,7 @@ fn main() -> Outcome {
     Ok(())
 }
 
-/// Keeps the card's image in the file that `CARD` names.
+/// Saves the card's image in the file of `CARD`.
 fn keep(rig: &Rig) -> Outcome {
     if let Some(path) = std::env::var_os("CARD") {
         chip::save(&rig.medium, path.as_ref())?;
@@ -71,7 +71,7 @@ fn told(rig: &Rig) -> Outcome {
     keep(rig)
 }
 
-/// 5: the processor's load at full rate, with the flash's caches as they are and as they could be.
+/// 5: the processor's load at full rate, with the flash's caches as set and as possible.
 fn caches(bench: &Bench) -> Outcome {
     for what in ["as the image sets it", "prefetch alone", "nothing", "no wait states"] {
         let mut rig = bench.settled(Board::default())?;
@@ -109,7 +109,7 @@ fn caches(bench: &Bench) -> Outcome {
     Ok(())
 }
 
-/// Who has the processor at full rate: samples of a second and a half, by the exception's number, and by the function.
+/// Load at full rate: samples of a second and a half, by the exception's number, and by the function.
 fn shares(bench: &Bench) -> Outcome {
     let mut rig = bench.settled(Board::default())?;
     let begin = rig.machine.now() + 4 * SECOND;
@@ -117,7 +117,7 @@ fn shares(bench: &Bench) -> Outcome {
     sample(&mut rig, 1_500)
 }
 
-/// The same in the first second and a half from power on, in which the card is mounted and the log made.
+/// The same in the first second and a half after power-on, when the card is mounted and the log made.
 fn first(bench: &Bench) -> Outcome {
     let mut rig = bench.settled(Board::default())?;
     for part in 1..=6 {
@@ -130,7 +130,7 @@ fn first(bench: &Bench) -> Outcome {
     Ok(())
 }
 
-/// Who has the processor in so many milliseconds.
+/// Load in this many milliseconds.
 fn sample(rig: &mut Rig, ms: u64) -> Outcome {
     let begin = rig.machine.now();
     let samples = ms * 10;
@@ -196,7 +196,7 @@ fn supply(bench: &Bench) -> Outcome {
     told(&rig)
 }
 
-/// Power cut at moments of full rate, and in the erase of a calm: what is on the card and in the store afterwards.
+/// Power cuts at moments of full rate, and in the erase of a calm time: the content of card and store afterwards.
 fn cuts(bench: &Bench) -> Outcome {
     let mut rig = bench.settled(Board::default())?;
     let begin = rig.machine.now() + 2 * SECOND;
@@ -230,7 +230,7 @@ fn cuts(bench: &Bench) -> Outcome {
     Ok(())
 }
 
-/// A card that stands still, is silent or out for a while, at full rate; all times count from power-on.
+/// A card that stalls, is silent or out for a while, at full rate; all times count from power-on.
 fn cards(bench: &Bench) -> Outcome {
     let ms = |ms: u64| ms * 1_000_000;
     let silent = |long: u64| Plan::always(Fault::Silent).from(ms(6_000)).until(ms(6_000 + long));
@@ -275,7 +275,7 @@ fn senders(bench: &Bench) -> Outcome {
     Ok(())
 }
 
-/// 10: memory that flips, ten times 30 bits.
+/// 10: flipping memory, ten times 30 bits.
 fn flips(bench: &Bench) -> Outcome {
     for seed in
         (1..=10_u64).filter(|seed| std::env::var("SEED").map_or(true, |only| only == seed.to_string()))

@@ -1,4 +1,4 @@
-//! What the dashboards ask, asked of the databases that can be had, which have a flight of a moment ago.
+//! The queries of the dashboards, sent to the available databases with a recent flight.
 
 use std::time::{SystemTime, UNIX_EPOCH};
 
@@ -7,10 +7,10 @@ use serde_json::Value;
 use crate::database::Database;
 use crate::grafana::{INFLUXQL, Kind, VICTORIA, dashboards, panels};
 
-/// Of an `ArduPilot` vehicle without `ESC_INFO` there is nothing to show in these.
+/// Panels without data for an `ArduPilot` vehicle without `ESC_INFO`.
 const OF_PX4: [&str; 3] = ["ESC Fails", "ESC currently failing", "Estimator, PX4"];
 
-/// From when to when is asked, seconds since 1970.
+/// Start and end of a query, seconds since 1970.
 type Span = [f64; 2];
 
 fn lately() -> Span {
@@ -18,7 +18,7 @@ fn lately() -> Span {
     [now_s - 300.0, now_s]
 }
 
-/// What Grafana puts in for its variables.
+/// A query with its variables filled in as by Grafana.
 fn filled(query: &str, [vehicle, session]: [&str; 2], [from_s, to_s]: Span) -> String {
     let between = format!("time >= {} AND time <= {}", (from_s * 1e9) as u64, (to_s * 1e9) as u64);
     let replaced = query.replace("$timeFilter", &between).replace("$__interval", "1s");
@@ -26,7 +26,7 @@ fn filled(query: &str, [vehicle, session]: [&str; 2], [from_s, to_s]: Span) -> S
     replaced.replace("$vehicle", vehicle).replace("$session", session)
 }
 
-/// Asks what a kind's dashboards ask, variables first: each panel has something to show. Gives how many queries there were.
+/// Sends the queries of a kind's dashboards, variables first: each panel has data. Returns the number of queries.
 fn ask_all(kind: Kind, span: Span, ask: impl Fn(&Value, &dyn Fn(&str) -> String) -> Vec<Value>) -> usize {
     let mut asked = 0;
     for (name, dashboard) in dashboards(kind) {
@@ -53,7 +53,7 @@ fn ask_all(kind: Kind, span: Span, ask: impl Fn(&Value, &dyn Fn(&str) -> String)
     asked
 }
 
-/// `InfluxDB` 1.x, which has the points of an `ArduPilot` flight of a moment ago, answers each query of its dashboards.
+/// `InfluxDB` 1.x with the points of a recent `ArduPilot` flight answers each query of its dashboards.
 pub(crate) fn assert_answered_by_influx(database: &Database) {
     let asked = ask_all(INFLUXQL, lately(), |query, fill| {
         let series = database.ask(&fill(query["query"].as_str().unwrap()));
@@ -63,7 +63,7 @@ pub(crate) fn assert_answered_by_influx(database: &Database) {
     assert!(asked > 40, "{asked}");
 }
 
-/// As [`assert_answered_by_influx`], of `VictoriaMetrics`.
+/// As [`assert_answered_by_influx`], for `VictoriaMetrics`.
 pub(crate) fn assert_answered_by_victoria(database: &Database) {
     let span = lately();
     let asked = ask_all(VICTORIA, span, |query, fill| {

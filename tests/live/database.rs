@@ -13,14 +13,14 @@ use serde_json::{Value, json};
 /// A database may read its own files for a while before it answers.
 const START: Duration = Duration::from_mins(1);
 
-/// Which one.
+/// The kind of database.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Kind {
     Influx,
     Victoria,
 }
 
-/// A database that can be ended and started again with what it has.
+/// A database that can be ended and started again with its data.
 pub(crate) struct Database {
     kind: Kind,
     folder: tempfile::TempDir,
@@ -29,7 +29,7 @@ pub(crate) struct Database {
 }
 
 impl Database {
-    /// Starts one. Its port is another one when a program took the first between the look and the start.
+    /// Starts one. Its port changes if a program took the first one before the start.
     pub(crate) fn start(kind: Kind) -> Self {
         let folder = tempfile::tempdir().unwrap();
         let mut database = Self { kind, folder, port: free_port(), running: None };
@@ -55,7 +55,7 @@ impl Database {
         )
     }
 
-    /// Starts it with what it has, at the port that it had.
+    /// Starts it with its data, at its previous port.
     pub(crate) fn again(&mut self) {
         let start = Instant::now();
         while !self.runs() {
@@ -63,7 +63,7 @@ impl Database {
         }
     }
 
-    /// Starts the program and waits until it answers; false if the program ends before it does.
+    /// Starts the program and waits for its first answer; false if the program ends before.
     fn runs(&mut self) -> bool {
         let mut command = match self.kind {
             Kind::Influx => Command::new(program("HUMS_INFLUXD", "/usr/bin/influxd")),
@@ -78,7 +78,7 @@ impl Database {
                 .arg(format!("-httpListenAddr=127.0.0.1:{}", self.port))
                 .arg(format!("-storageDataPath={}", self.folder.path().display()))
                 .arg("-retentionPeriod=100y")
-                // As the compose file of the dashboards has it: the newest half minute is not hidden.
+                // As in the compose file of the dashboards: the newest half minute is not hidden.
                 .arg("-search.latencyOffset=1s"),
         };
         let mut running = Running(command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap());
@@ -95,8 +95,8 @@ impl Database {
         false
     }
 
-    /// Ends it: `InfluxDB` at once, as power would; `VictoriaMetrics` in order, because it holds what it has accepted
-    /// in memory for some seconds by design.
+    /// Ends it: `InfluxDB` at once, like a power cut; `VictoriaMetrics` in order, because by design it holds accepted
+    /// data in memory for some seconds.
     pub(crate) fn end(&mut self) {
         let mut running = self.running.take().unwrap();
         running.signal(if self.kind == Kind::Influx { "KILL" } else { "TERM" });
@@ -115,7 +115,7 @@ impl Database {
         Ok((code, body.to_owned()))
     }
 
-    /// `InfluxDB`: writes a line into the database `hums`, which is made.
+    /// `InfluxDB`: writes a line into the database `hums`, which is created.
     pub(crate) fn write(&self, line: &str) {
         for (path, body) in [("/query?q=CREATE%20DATABASE%20hums", ""), ("/write?db=hums&precision=ns", line)]
         {
@@ -132,14 +132,14 @@ impl Database {
         }
     }
 
-    /// The JSON that a path gives.
+    /// The JSON at a path.
     fn json(&self, path: &str) -> Value {
         let (code, body) = self.get(path).unwrap();
         assert_eq!(code, 200, "{body}");
         serde_json::from_str(&body).unwrap()
     }
 
-    /// `InfluxDB`: the answer to a question.
+    /// `InfluxDB`: the answer to a query.
     pub(crate) fn ask(&self, question: &str) -> Vec<Value> {
         let answer = self.json(&format!("/query?db=hums&epoch=ns&q={}", escaped(question)));
         assert!(answer["results"][0]["error"].is_null(), "{question}: {answer}");
@@ -171,7 +171,7 @@ impl Database {
         self.json(&format!("/api/v1/label/{label}/values{of}"))["data"].as_array().unwrap().clone()
     }
 
-    /// `InfluxDB`: how many points a measurement has.
+    /// `InfluxDB`: the number of points of a measurement.
     pub(crate) fn points(&self, measurement: &str) -> u64 {
         let series = self.ask(&format!("SELECT * FROM \"{measurement}\""));
         series.iter().map(|one| one["values"].as_array().map_or(0, Vec::len) as u64).sum()
@@ -184,7 +184,7 @@ impl Database {
         values.map(|value| value[0].as_str().unwrap().to_owned()).collect()
     }
 
-    /// `VictoriaMetrics`: how many samples a metric has.
+    /// `VictoriaMetrics`: the number of samples of a metric.
     pub(crate) fn samples(&self, metric: &str) -> u64 {
         self.get("/internal/force_flush").unwrap();
         let (code, body) = self.get(&format!("/api/v1/export?match[]={metric}")).unwrap();
@@ -197,7 +197,7 @@ impl Database {
     }
 }
 
-/// As an address has it.
+/// A text escaped for an address.
 fn escaped(text: &str) -> String {
     text.bytes().fold(String::new(), |text, byte| text + &format!("%{byte:02X}"))
 }

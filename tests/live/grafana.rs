@@ -1,5 +1,5 @@
-//! The dashboards of `host-tools/grafana`, for each kind of database: whole by Grafana's own schema and by what it leaves
-//! open, and asking for what the points have; the databases that can be had answer each query, as `writes` shows.
+//! The dashboards of `host-tools/grafana`, for each kind of database. They are valid by Grafana's own schema and
+//! beyond it, and query existing fields. Available databases answer each query (`writes`).
 #![cfg(feature = "oracle")]
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -13,7 +13,7 @@ use serde_json::{Value, json};
 #[path = "../../host-tools/grafana/resolve.rs"]
 mod resolve;
 
-/// A folder of dashboards: the type of their data source, the member that is the query, and what each query has.
+/// A folder of dashboards: the type of their data source, the member with the query, and the members of each query.
 pub(crate) type Kind = (&'static str, &'static str, &'static str, &'static [&'static str]);
 const FLUX: Kind =
     ("flux", "influxdb", "query", &["v.defaultBucket", "v.timeRangeStart", "${vehicle}", "${session}"]);
@@ -102,7 +102,7 @@ fn grafanas_own_model_takes_every_member_of_the_dashboards() {
     let count: usize = all.iter().map(|(_, dashboard)| panels(dashboard).len()).sum();
     assert_eq!(said["panels"], count);
 
-    // That silence means something: each slip is told.
+    // Silence is a proof: each slip is reported.
     let (_, whole) = dashboards(FLUX).swap_remove(0);
     let place = panels(&whole).iter().position(|panel| panel["type"] == "stat").unwrap();
     let slips: [(&str, Value); 6] = [
@@ -124,7 +124,7 @@ fn grafanas_own_model_takes_every_member_of_the_dashboards() {
         fs::write(&path, slip.to_string()).unwrap();
         assert_ne!(oracle::grafana(&[path])["told"], json!([]), "{member}");
     }
-    // The model is that of the release that the compose file starts.
+    // The model's release is the one in the compose file.
     let model = fs::read_to_string(root().join("tests/oracle/requirements.txt")).unwrap();
     let release = model.lines().find_map(|line| line.strip_prefix("grafana-foundation-sdk==")).unwrap();
     let release = release.split('!').next_back().unwrap();
@@ -205,14 +205,14 @@ fn every_panel_of_the_reference_system_is_there_in_its_row() {
     assert!(flight["timepicker"]["refresh_intervals"].as_array().unwrap().contains(&"100ms".into()));
 }
 
-/// What the points of the flights have: fields by measurement, and counters.
+/// The contents of the flights' points: fields by measurement, and counters.
 #[derive(Default)]
 struct Points {
     fields: BTreeMap<String, BTreeSet<String>>,
     counters: BTreeSet<String>,
 }
 
-/// Splits at a character that neither a backslash nor quotes protect.
+/// Splits at a character outside of quotes and without a backslash.
 fn split(text: &str, at: char) -> Vec<String> {
     let (mut parts, mut quoted, mut escaped) = (vec![String::new()], false, false);
     for c in text.chars() {
@@ -276,7 +276,7 @@ fn whatever_a_panel_asks_for_is_in_the_points_of_the_recorded_flights() {
                     assert!(points.counters.contains(counter), "{place}: no counter {counter}");
                 }
                 for pattern in query.match_indices("=~ /^").map(|(at, _)| &query[at + 5..]) {
-                    // `esc_rpm[0-9]+$`: what stands before and after the number.
+                    // `esc_rpm[0-9]+$`: the text before and after the number.
                     let (before, rest) = pattern.split_once("[0-9]+").unwrap();
                     let after = rest.split('$').next().unwrap();
                     let first = format!("{before}0{after}");

@@ -1,5 +1,5 @@
-//! `hums live --influx` with real databases: every point arrives, whatever happens to the database meanwhile; and the
-//! dashboards ask for what is there.
+//! `hums live --influx` with real databases: every point arrives despite failures of the database, and the dashboards
+//! query existing data.
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
 
 #[cfg(feature = "databases")]

@@ -1,4 +1,4 @@
-//! A flight is written while it is flown; the database goes away in the middle and comes back.
+//! A flight is written during the flight; the database goes away in the middle and comes back.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -15,19 +15,19 @@ use hums_tests::{child, program};
 use crate::answers;
 use crate::database::{Database, Kind};
 
-/// As many messages a second as a fast link has.
+/// Messages a second of a fast link.
 const RATE: f64 = 2_000.0;
 /// Twelve seconds of them.
 const FRAMES: usize = 24_000;
-/// The database goes after so many, and is back after so many more.
+/// Frames until the database goes away, and until it is back.
 const GOES_AT: u64 = 8_000;
 const BACK_AT: u64 = 16_000;
 
-/// The first frames of a flight, and how many there are of each message.
+/// The first frames of a flight, and the number of each message.
 fn flight() -> (Vec<Vec<u8>>, BTreeMap<u32, u64>) {
     let data = fs::read(own("ap_quad_faults.tlog")).unwrap();
     let frames = of_tlog(&data, &Manifest::own().seeds, false);
-    // From the middle of the flight on, where everything is sent; its battery becomes low after 17,284 of them.
+    // From the middle of the flight on, with all messages; its battery becomes low after 17,284 of them.
     let frames: Vec<_> = frames.into_iter().skip(40_000).take(FRAMES).collect();
     let mut counts = BTreeMap::new();
     for frame in frames.iter().filter(|frame| frame.verified) {
@@ -36,11 +36,11 @@ fn flight() -> (Vec<Vec<u8>>, BTreeMap<u32, u64>) {
     (frames.into_iter().map(|frame| frame.bytes.to_vec()).collect(), counts)
 }
 
-/// Flies it past the database; gives what hums says it has written.
+/// Sends it past the database; returns the number of written points by hums.
 #[track_caller]
 fn fly(database: &mut Database, flags: &[&str]) -> (u64, BTreeMap<u32, u64>) {
     let (frames, counts) = flight();
-    // By TCP, so that nothing is lost before it is there.
+    // By TCP, so that nothing is lost before its arrival.
     let vehicle = TcpListener::bind("127.0.0.1:0").unwrap();
     let (input, url) =
         (format!("tcp:{}", vehicle.local_addr().unwrap()), format!("http://127.0.0.1:{}", database.port));
@@ -72,7 +72,7 @@ fn influxdb_is_killed_in_flight_and_has_every_point_in_the_end() {
     for (id, count) in counts {
         assert_eq!(database.points(&names[&id]), count, "{}", names[&id]);
     }
-    // As `hums decode` names and tags them.
+    // Names and tags as in `hums decode`.
     let tags: Vec<_> = database.ask("SHOW TAG KEYS FROM \"HUMS\"");
     let keys = tags[0]["values"].as_array().unwrap().iter().map(|key| key[0].as_str().unwrap().to_owned());
     assert_eq!(keys.collect::<Vec<_>>(), ["motor", "session", "vehicle"]);
@@ -128,7 +128,7 @@ fn victoriametrics_is_restarted_in_flight_and_has_every_sample_in_the_end() {
         (241, "VIBRATION_vibration_x"),
     ] {
         let samples = database.samples(field);
-        // A batch whose answer the end cut off is written twice.
+        // A batch whose answer was cut off is written twice.
         assert!(
             (counts[&id]..counts[&id] + 200).contains(&samples),
             "{field}: {samples}, sent {}",
@@ -150,7 +150,7 @@ fn a_bad_point_costs_itself_and_what_the_database_wrote_is_not_counted_as_refuse
     };
     let data = fs::read(own("px4_hil_quad_low.tlog")).unwrap();
     let frames = of_tlog(&data, &Manifest::own().seeds, false);
-    // One field of ATTITUDE is text there that week: each point of that message is refused, and no other.
+    // One field of ATTITUDE is text there that week: the points of that message are refused, and no others.
     let at_us = frames[0].time_us.expect("a tlog's frames have times");
     database.write(&format!("ATTITUDE,vehicle=x,session=x roll=\"text\" {at_us}000"));
     let (code, words) = flight(&database);

@@ -1,4 +1,5 @@
-//! The logs of both autopilots through every command that reads recordings: each tells what `hums check` tells of the same log.
+//! The logs of both autopilots through every command that reads recordings: all agree with `hums check` on the same
+//! log.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -10,7 +11,7 @@ use hums_tests::live::Live;
 use hums_tests::program::hums;
 use serde_json::Value;
 
-/// A log of an autopilot, and what its makers' own tools say of it.
+/// A log of an autopilot, and the results of its makers' own tools.
 struct Known {
     path: &'static str,
     format: &'static str,
@@ -43,7 +44,7 @@ impl Known {
         root().join(self.path)
     }
 
-    /// What `hums check` says of it.
+    /// The result of `hums check`.
     fn checked(&self) -> Value {
         let path = self.path();
         let text = hums(["check".as_ref(), "--json".as_ref(), path.as_os_str()]).expect_code(&[4]).text();
@@ -53,7 +54,7 @@ impl Known {
     }
 }
 
-/// Each finding in a line: when, what, which, how bad.
+/// Each finding in a line: time, check, instance, level.
 fn findings(object: &Value) -> Vec<String> {
     let findings = object["findings"].as_array().unwrap();
     assert!(!findings.is_empty(), "a comparison of nothing");
@@ -68,7 +69,7 @@ fn line(time_s: &Value, check: &Value, instance: &Value, level: &Value) -> Strin
     format!("{:.3} {} {instance} {}", time_s.as_f64().unwrap(), text(check), text(level))
 }
 
-/// What `hums info --json` says, or a page has, is what `hums check` says.
+/// `hums info --json`, or a page, agrees with `hums check`.
 fn agrees(log: &Value, known: &Known, checked: &Value) {
     assert_eq!((log["format"].as_str(), log["checked_by"].as_str()), (Some(known.format), Some("hums")));
     assert_eq!(findings(log), findings(checked));
@@ -93,7 +94,7 @@ fn info(known: &Known) {
     agrees(&json["logs"][0], known, &checked);
 }
 
-/// The data of a page, as its program gets it.
+/// The data of a page, as for its script.
 fn data(page: &str) -> Value {
     let (_, data) = page.split_once("<script type=\"application/json\" id=\"data\">").unwrap();
     serde_json::from_str(data.split_once("</script>").unwrap().0).unwrap()

@@ -1,4 +1,4 @@
-//! A simulated board in real time, for those who talk with it.
+//! A simulated board in real time, for clients.
 #![cfg_attr(not(feature = "oracle"), allow(dead_code, reason = "comparisons use the rest of it"))]
 
 use std::ffi::OsStr;
@@ -24,7 +24,7 @@ impl Board {
         Self::start_in(tempfile::tempdir().unwrap(), flags)
     }
 
-    /// On the card that lies in `dir`, if one does.
+    /// On the card in `dir`, if there is one.
     pub(crate) fn start_in(dir: TempDir, flags: &[&str]) -> Self {
         Self::start_with(own("ap_quad_guided.tlog").as_os_str(), dir, flags)
     }
@@ -39,7 +39,7 @@ impl Board {
         Self { dir: Some(dir), child, port }
     }
 
-    /// Ends it in order, as Ctrl-C does, and gives everything that its log holds, a line each.
+    /// Ends it in order, as Ctrl-C does, and returns the content of its log, a line each.
     pub(crate) fn end(self) -> String {
         let dir = self.switch_off();
         let image = dir.path().join("card.img");
@@ -47,7 +47,7 @@ impl Board {
         hums(command.into_iter().chain(["--format".as_ref(), "jsonl".as_ref()])).expect_code(&[0]).text()
     }
 
-    /// Ends it, and leaves the folder with its card and its store.
+    /// Ends it, and keeps the folder with its card and its store.
     pub(crate) fn switch_off(mut self) -> TempDir {
         let kill = Command::new("kill").args(["-INT", &self.child.id().to_string()]).status().unwrap();
         assert!(kill.success());
@@ -62,13 +62,13 @@ impl Board {
 
 impl Drop for Board {
     fn drop(&mut self) {
-        // Only one that is still running, after a failure, takes notice.
+        // Only needed after a failure, while it still runs.
         let _ = self.child.kill();
         let _ = self.child.wait();
     }
 }
 
-/// The log is on the card as it was downloaded, whole and in one row.
+/// The downloaded log is on the card, whole and in one row.
 #[track_caller]
 pub(crate) fn assert_on_card(log: &Path, card: &[u8]) {
     let log = fs::read(log).unwrap();
@@ -77,7 +77,7 @@ pub(crate) fn assert_on_card(log: &Path, card: &[u8]) {
     assert!(card[first * 512..].starts_with(&log), "the download differs from the card");
 }
 
-/// The first segment of the log of this number that `hums box pull` has brought into a folder: its name has the session.
+/// The first segment of this number that `hums box pull` downloaded into a folder: its name has the session.
 pub(crate) fn pulled_log(folder: &Path, number: &str) -> PathBuf {
     let all: Vec<PathBuf> = pulled_logs(folder, number);
     assert_eq!(all.len(), 1, "{all:?}");

@@ -1,5 +1,5 @@
-//! The ground station's port is never overrun: bytes in every window of a second, on every recording; nothing starves;
-//! a critical finding is soon out, however busy the port is.
+//! The ground station's port is never overrun. The bytes in every window of a second are limited on every recording,
+//! no message starves, and a critical finding goes out soon on a busy port.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -15,11 +15,11 @@ use hums_link::{Check, Frame};
 use hums_tests::flights::{self, OWN, own};
 
 const BUDGETS: [u32; 3] = [100, 1_000, 5_000];
-/// What the port has by default.
+/// The port's default rate.
 const BAUD: u64 = 57_600;
 const SECOND: u64 = 1_000_000;
 
-/// A frame at the port: when its first byte leaves, in microseconds, to a millisecond.
+/// A frame at the port: the time of its first byte, in microseconds, to a millisecond.
 struct Sent {
     at_us: u64,
     bytes: Vec<u8>,
@@ -30,13 +30,13 @@ impl Sent {
         Frame::again(&self.bytes, Check::Verified).expect("a frame")
     }
 
-    /// When its last byte has left.
+    /// The time of its last byte.
     fn end_us(&self) -> u64 {
         self.at_us + self.bytes.len() as u64 * 10 * SECOND / BAUD
     }
 }
 
-/// What arrives, and a moment to look each millisecond; `ask` says what the ground station sends every 100 ms.
+/// The input, with a look each millisecond; `ask` returns the ground station's bytes for each 100 ms.
 fn chunks(recording: &Path, mut ask: impl FnMut(u64) -> Vec<u8>) -> Vec<(Side, Chunk)> {
     let endpoint: Endpoint = recording.display().to_string().parse().unwrap();
     let mut source = source::open(&endpoint, Timing { line_rate: None }).unwrap();
@@ -106,8 +106,8 @@ fn on_every_recording_no_second_holds_more_than_the_budget_and_nothing_starves()
     }
 }
 
-/// What is told again and again is told to the end: between two of each message there is at most so long. The last
-/// minute is not judged: who stops may stop.
+/// Repeated messages go on to the end: the gap between two of a kind is limited. The last minute is excluded, since a
+/// message may stop there.
 fn assert_nothing_starves(name: &str, budget: u32, sent: &[Sent]) {
     let longest_s = match budget {
         100 => 150,
@@ -128,7 +128,7 @@ fn assert_nothing_starves(name: &str, budget: u32, sent: &[Sent]) {
     }
 }
 
-/// Somebody who asks for everything, all the time: the list of parameters, logs, files, commands.
+/// A client that requests everything, all the time: the list of parameters, logs, files, commands.
 fn greedy(now_us: u64) -> Vec<u8> {
     let mut encoder = Encoder::of(255, 190);
     encoder.set_sequence((now_us / 100_000) as u8);
@@ -164,7 +164,7 @@ fn a_critical_finding_is_out_within_fifty_milliseconds_however_busy_the_port_is(
             .filter(|finding| finding.level == "critical")
             .map(|finding| (finding.time_s * 1e6) as u64)
             .collect();
-        // What another finding explains has none.
+        // An explained finding has none.
         assert!(texts.len() <= critical.len(), "{}", recording.display());
         assert_eq!(texts.is_empty(), critical.is_empty(), "{}", recording.display());
         let (mut worst_begin, mut worst_end) = (0, 0);

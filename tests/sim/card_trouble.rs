@@ -6,8 +6,8 @@ use hums_tests::program::{Decoded, Machine, Recording};
 
 const FLIGHT: &str = "px4_hil_quad_low.tlog";
 
-/// Records with these flags and expects that each frame is either in the log or counted as lost, and that what is in the
-/// log is the flight's, in its order.
+/// Records with these flags. Each frame must be in the log or counted as lost, and the log must have the flight's
+/// frames in order.
 #[track_caller]
 fn assert_accounted(flags: &[&str]) -> (Recording, u64) {
     let recording = Recording::attempt(Machine::Sim, &own(FLIGHT), flags).expect_code(&[0, 3]);
@@ -82,7 +82,7 @@ fn a_card_that_is_out_for_half_a_minute_misses_nothing() {
 fn a_stall_of_a_second_loses_nothing() {
     let (recording, lost) = assert_accounted(&["--stall", "1000@50", "--stall", "1000@120"]);
     assert_eq!(lost, 0);
-    // The box sees the card stand still from its own next write on: it writes every 200 ms at least.
+    // The box notices a stalled card from its own next write on: it writes every 200 ms at least.
     assert!(recording.number("sd_stall_ms_max") >= 800);
     assert!(recording.number("queue_bytes_max") <= recording.number("queue_bytes_capacity"));
 }
@@ -108,7 +108,7 @@ fn a_card_that_fails_every_write_loses_everything_and_says_so() {
     }
 }
 
-/// The smallest card of FAT32 is some 33 MiB, and a flight's log is far smaller: it is filled by flight after flight.
+/// The smallest card of FAT32 has some 33 MiB, and a flight's log is far smaller: flight after flight fills it.
 #[test]
 fn a_small_card_takes_the_newest_data_and_stays_a_good_file_system() {
     let recording = Recording::make(Machine::Sim, &own("ap_quad_faults.tlog"), &["--card-size", "34"]);

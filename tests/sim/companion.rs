@@ -49,7 +49,7 @@ fn a_ground_station_lists_reads_sets_and_commands() {
     assert_eq!(said["protocol"], 200);
     assert_eq!(said["for_the_autopilot"], Value::Null, "that is not ours to answer");
 
-    // Each change, with who made it; not what was refused.
+    // Each change, with its author; no refused ones.
     let changes: Vec<Value> = log
         .lines()
         .map(|line| serde_json::from_str::<Value>(line).unwrap())
@@ -103,13 +103,13 @@ fn once_there_is_a_key_only_what_is_signed_with_it_and_new_does_anything_also_af
     }
     // The two that were not signed, at least, in each session.
     assert!(statistic(&dir, "requests_refused").into_iter().all(|refused| refused >= 2), "not recorded");
-    // The key is on the card in no form.
+    // The key is not on the card in any form.
     let card = fs::read(dir.path().join("card.img")).unwrap();
     let key: Vec<u8> = (1..33).collect();
     assert!(!card.windows(key.len()).any(|bytes| bytes == key), "the key is on the card");
 }
 
-/// What each session's last statistics on the card say.
+/// The last statistics of each session on the card.
 fn statistic(dir: &TempDir, name: &str) -> Vec<u64> {
     let (image, out) = (dir.path().join("card.img"), dir.path().join("decoded"));
     let command = ["decode".as_ref(), image.as_os_str(), "-o".as_ref(), out.as_os_str()];
@@ -123,7 +123,7 @@ fn statistic(dir: &TempDir, name: &str) -> Vec<u64> {
     .collect()
 }
 
-/// Both ports are pymavlink's: an autopilot of the test's own and a ground station.
+/// Pymavlink at both ports: a simulated autopilot and a ground station.
 fn between_autopilot_and_ground_station(kind: &str) -> (Value, TempDir) {
     let (dir, _) = card_with_a_log();
     let params = dir.path().join("params.txt");
@@ -141,13 +141,13 @@ fn assert_what_passes(said: &Value, dir: &TempDir) {
             assert_eq!(passed, &Value::from(expected), "{passes} {name}: {said}");
         }
     }
-    // The bytes of the key that passed by at both ports.
+    // The bytes of the key that passed at both ports.
     let key: Vec<u8> = (0..32).collect();
     let card = fs::read(dir.path().join("card.img")).unwrap();
     assert!(!card.windows(key.len()).any(|bytes| bytes == key), "the key is on the card");
     let (before, after) = (said["logs_before"].as_array().unwrap(), said["logs_after"].as_array().unwrap());
     assert_eq!((before.len(), after.len()), (2, 1), "erased but for the one in work: {said}");
-    // It is not offered any longer, and still there for whoever has the card.
+    // It is no longer offered, but still on the card.
     let image = dir.path().join("card.img");
     let info = hums(["info".as_ref(), image.as_os_str()]).expect_code(&[0, 3]).text();
     assert!(info.contains("00001_00.HUM"), "{info}");
@@ -157,14 +157,14 @@ fn assert_what_passes(said: &Value, dir: &TempDir) {
 fn a_px4_is_asked_for_what_is_missing_and_its_radio_is_shared() {
     let (said, dir) = between_autopilot_and_ground_station("px4");
     let asked: Vec<u64> = said["asked"].as_array().unwrap().iter().filter_map(Value::as_u64).collect();
-    // SYSTEM_TIME comes unasked; VIBRATION is refused by this one, and not asked for again.
+    // SYSTEM_TIME comes unasked; this autopilot refuses VIBRATION, which is not requested again.
     assert!(asked.contains(&30) && asked.contains(&291) && !asked.contains(&2), "{said}");
     assert!(!asked.contains(&11_030), "that is ArduPilot's: {said}");
     assert_eq!((&said["times_asked"], &said["groups"]), (&1.into(), &serde_json::json!([])), "{said}");
     assert!(said["version_asked"].as_u64() >= Some(1), "{said}");
     assert!(said["asked_again"].as_u64() >= Some(10), "after a reboot: {said}");
     assert_what_passes(&said, &dir);
-    // Announced, cancelled, accepted, and what the autopilot was asked until then: system, component, confirmation.
+    // Announced, cancelled, accepted, and the requests to the autopilot until then: system, component, confirmation.
     assert_eq!(said["cancelled"], serde_json::json!([true, true, false, []]), "{said}");
     assert_eq!(said["asked_for"], serde_json::json!([true, false, true, [[1, 1, 0]]]), "{said}");
 }
@@ -199,7 +199,7 @@ fn mavproxy_lists_sets_downloads_and_signs() {
     assert_eq!(crc, Some(hums_link::ftp::checksum(0, &whole)), "{said}");
     assert_eq!((&said["key"], &said["signed"]), (&"HUMS: signing key set".into(), &"34.0".into()), "{said}");
 
-    // Unsigned nothing is told any longer; with the passphrase our own tool may.
+    // Unsigned requests get no answer any more; with the passphrase our own tool gets one.
     let address = format!("udpout:127.0.0.1:{}", board.port);
     let unsigned =
         hums(["box", "params", "get", "BAT_REM_WARN", "--system", "1", "--link", &address]).expect_code(&[1]);
@@ -260,7 +260,7 @@ fn put_parameters(image: &Path, lines: &str) {
     assert!(copied.success());
 }
 
-/// The ground before a flight, its air, and the ground after it: only the first start may read the file.
+/// The ground before a flight, the flight, and the ground after it: only the first start may read the file.
 #[test]
 fn a_box_that_restarts_in_the_air_reads_no_parameters() {
     let dir = tempfile::tempdir().unwrap();
@@ -273,7 +273,7 @@ fn a_box_that_restarts_in_the_air_reads_no_parameters() {
     };
     record(&[], &[0]);
     put_parameters(&image, "PROT_ACTION 1\nBAT_REM_WARN 31\n");
-    // What comes while the power is off is lost.
+    // Input while the power is off is lost.
     record(&["--reboot-at", "60"], &[3]);
     let out = dir.path().join("out");
     let command = ["decode".as_ref(), image.as_os_str(), "-o".as_ref(), out.as_os_str()];
@@ -380,7 +380,7 @@ impl Drop for Lossy {
     }
 }
 
-/// A card with one finished session on it, of some seconds.
+/// A card with one finished session of some seconds.
 fn card_with_a_log() -> (TempDir, Vec<u8>) {
     let dir = tempfile::tempdir().unwrap();
     let recording = fs::read(own("ap_quad_signed.raw")).unwrap();
@@ -389,7 +389,7 @@ fn card_with_a_log() -> (TempDir, Vec<u8>) {
     let (input, image) = (dir.path().join("short.raw"), dir.path().join("card.img"));
     hums(["sim".as_ref(), "--input".as_ref(), input.as_os_str(), "--sd".as_ref(), image.as_os_str()])
         .expect_code(&[0]);
-    // What is downloaded is the part of the file that was recorded.
+    // A download has the recorded part of the file.
     let card = fs::read(&image).unwrap();
     (dir, card)
 }
@@ -407,7 +407,7 @@ fn a_log_pulled_over_a_link_that_loses_a_tenth_is_the_one_on_the_card() {
     hums(["box", "pull", "--link", &address, "--system", "1", "-o", output, log]).expect_code(&[0]);
     assert!(link.lost.load(Ordering::Relaxed) > 5, "nothing was lost: {:?}", link.lost);
     assert_on_card(&pulled_log(&pulled, "00001"), &card);
-    // Again: what is there is left.
+    // Again: existing files stay.
     let again =
         hums(["box", "pull", "--link", &address, "--system", "1", "-o", output, log]).expect_code(&[0]);
     assert!(again.stderr.contains("00001_00.HUM: is there already as "), "{}", again.stderr);
@@ -423,7 +423,7 @@ fn the_command_line_lists_reads_and_sets_parameters_over_a_bad_link() {
     let board = Board::start(&[]);
     let link = Lossy::to(board.port);
     let address = format!("udpout:127.0.0.1:{}", link.port);
-    // Nobody says which system's board: it is the only one.
+    // Without a system id: it is the only board.
     let listed = hums(["box", "params", "list", "--link", &address]).expect_code(&[0]);
     assert!(listed.stderr.contains("system 1: its board is heard"), "{}", listed.stderr);
     let list = listed.text();

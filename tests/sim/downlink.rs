@@ -1,4 +1,4 @@
-//! What the ground station gets is good MAVLink, with the vehicle's own heartbeat and ours in it.
+//! The ground station gets valid MAVLink, with the vehicle's own heartbeat and ours in it.
 #![cfg(feature = "oracle")]
 
 use hums_tests::flights::{self, OWN, own};

@@ -1,5 +1,5 @@
-//! What is said of a log's end: whole to the last landing or disarming where power went after it, not proved where it
-//! went in flight, and missing where the next start on the card found more than is there.
+//! Reports about a log's end: whole to the last landing or disarming, if power failed after it; not proved after a
+//! power cut in flight; missing, if the next start found more data on the card.
 
 use std::fs;
 use std::path::Path;
@@ -17,12 +17,12 @@ const BLOCK: usize = 512;
 /// An orderly end is one sector and the parity of the last stretch.
 const CLOSING_WRITES: u64 = 1 + 2 * COLUMNS as u64;
 
-/// Records the flight onto a card; power goes at this block write. How many there were.
+/// Records the flight onto a card, with a power cut at this block write. Returns the number of writes.
 fn record(image: &Path, cut: Option<u64>) -> u64 {
     record_of(&own(FLIGHT), image, cut)["blocks_written"].as_u64().unwrap()
 }
 
-/// Records a flight likewise: what `hums sim --json` says.
+/// Records a flight likewise: the output of `hums sim --json`.
 fn record_of(flight: &Path, image: &Path, cut: Option<u64>) -> Value {
     let mut arguments = vec!["sim".into(), "--json".into(), "--card-size".into(), "64".into()];
     arguments.extend(["--input".into(), flight.display().to_string()]);
@@ -31,7 +31,7 @@ fn record_of(flight: &Path, image: &Path, cut: Option<u64>) -> Value {
     serde_json::from_str(&hums(arguments).expect_code(&[0, 3]).text()).unwrap()
 }
 
-/// The logs as `verify --json` has them; the exit code must be this one.
+/// The logs in `verify --json`; the exit code must be this one.
 fn verify(image: &Path, code: i32) -> Vec<Value> {
     let text = hums(["info".as_ref(), "--verify".as_ref(), "--json".as_ref(), image.as_os_str()])
         .expect_code(&[code])
@@ -81,7 +81,7 @@ fn the_next_log_on_the_card_tells_that_the_end_of_the_one_before_is_gone() {
     record(&image, None);
     let logs = verify(&image, 0);
     assert_eq!(logs[0]["end"]["proof"], "next_start", "{}", logs[0]);
-    // The last 80 sectors of the first log are erased: more than parity makes again, wherever a stretch of it ends.
+    // The last 80 sectors of the first log are erased: more than parity can rebuild, at any end of a stretch.
     let mut bytes = fs::read(&image).unwrap();
     let blocks = bytes.as_chunks_mut::<BLOCK>().0;
     let first = blocks.iter().find_map(|block| Header::read(block).ok()).unwrap().session;
@@ -96,7 +96,7 @@ fn the_next_log_on_the_card_tells_that_the_end_of_the_one_before_is_gone() {
         end["sectors_missing"].as_u64().unwrap() >= 78 && end["frames_missing"].as_u64().unwrap() > 0,
         "{end}"
     );
-    // A partial sector that a whole one had superseded may be among them.
+    // A partial sector before its whole one may be among them.
     assert!(end["behind"]["erased"].as_u64().is_some_and(|erased| (79..=80).contains(&erased)), "{end}");
     assert_eq!(logs[1]["end"]["proof"], "closed");
 }
@@ -136,7 +136,7 @@ fn power_that_goes_after_a_landing_while_armed_leaves_a_log_that_is_whole_to_it_
             .text();
         (report, serde_json::from_str::<Value>(&text).unwrap()["logs"][0]["end"].clone())
     };
-    // The first write with which the mark is on the card.
+    // The first write with the mark on the card.
     let (mut without, mut with) = (1, cut(None).0["blocks_written"].as_u64().unwrap());
     while with - without > 1 {
         let middle = without.midpoint(with);
@@ -147,7 +147,7 @@ fn power_that_goes_after_a_landing_while_armed_leaves_a_log_that_is_whole_to_it_
     assert_eq!(end["proof"], "mark", "{end}");
     assert!(end["words"].as_str().unwrap().contains("whole to the landing at "), "{end}");
     hums(["info".as_ref(), "--verify".as_ref(), image.as_os_str()]).expect_code(&[0]);
-    // What came in between the mark and that write.
+    // The input between the mark and that write.
     let decode = [
         "decode".as_ref(),
         image.as_os_str(),

@@ -1,4 +1,4 @@
-//! The files on the card have the date of the flight, for whoever reads them with something else.
+//! The files on the card have the date of the flight, for other programs.
 
 use std::fs;
 use std::path::Path;
@@ -7,7 +7,7 @@ use std::process::Command;
 use hums_tests::flights::own;
 use hums_tests::program::hums;
 
-/// What `mdir` says of the logs on a card: name and date.
+/// The output of `mdir` for the logs on a card: name and date.
 fn dates(image: &Path) -> Vec<(String, String)> {
     let card = fs::read(image).unwrap();
     let start = u32::from_le_bytes(card[454..458].try_into().unwrap()) * 512;
@@ -30,7 +30,7 @@ fn a_log_has_the_date_of_its_flight_and_none_before_it_is_known() {
         hums(arguments).expect_code(codes);
     };
     record(&own("ap_quad_guided.tlog"), &[0]);
-    // The beginning of the same flight, from before the autopilot told the time.
+    // The beginning of the same flight, before the autopilot knew the time.
     let whole = fs::read(own("ap_quad_guided.tlog")).unwrap();
     let early = dir.path().join("early.tlog");
     fs::write(&early, &whole[..600]).unwrap();
@@ -46,7 +46,7 @@ fn a_log_has_the_date_of_its_flight_and_none_before_it_is_known() {
     hums(["info".as_ref(), "--verify".as_ref(), image.as_os_str()]).expect_code(&[0, 3]);
 }
 
-/// The day that `hums info` tells of a session.
+/// The day of a session in `hums info`.
 fn utc_day(image: &Path, session: u32) -> String {
     let session = format!("{session:05}");
     let text =
@@ -58,7 +58,7 @@ fn utc_day(image: &Path, session: u32) -> String {
     utc[..10].to_owned()
 }
 
-/// The first value that is called `utc` and a time of day.
+/// The first value with the name `utc` and a time of day.
 fn find_utc(json: &serde_json::Value) -> Option<String> {
     match json {
         serde_json::Value::Object(map) => map.iter().find_map(|(key, value)| match value.as_str() {

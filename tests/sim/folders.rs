@@ -1,4 +1,4 @@
-//! Folders with more in them than logs: links, pipes, sockets, names that mean the same file.
+//! Folders with other entries than logs: links, pipes, sockets, names of the same file.
 
 use std::ffi::OsString;
 use std::fs;
@@ -15,7 +15,7 @@ use hums_tests::not_tested;
 use hums_tests::program::{LIMIT, command, hums};
 use serde_json::Value;
 
-/// Longer than it takes to look at a handful of files, on a machine that has much to do.
+/// Longer than reading a handful of files on a busy machine.
 const SOON: Duration = Duration::from_secs(20);
 
 fn names(outcome: &child::Outcome) -> Vec<String> {
@@ -75,7 +75,7 @@ fn devices_in_a_folder_are_passed_over_and_said() {
         assert!(outcome.stderr.contains(said), "{}", outcome.stderr);
         return;
     }
-    // Who may not make one has one in this folder, in which there is no log.
+    // Without permission to make a device, one in this folder serves, which has no log.
     if Path::new("/dev/pts/ptmx").exists() {
         let outcome = info(Path::new("/dev/pts")).expect_code(&[1]);
         assert!(outcome.stderr.contains("ptmx: is a pipe, a socket or a device"), "{}", outcome.stderr);
@@ -117,7 +117,7 @@ fn a_pipe_beside_a_recording_is_passed_over_by_each_command_and_said() {
     let (dir, out) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
     fs::copy(flights::own("ap_quad_guided.tlog"), dir.path().join("flight.tlog")).unwrap();
     assert!(Command::new("mkfifo").arg(dir.path().join("pipe.bin")).status().unwrap().success());
-    // `live` would go on.
+    // `live` would keep running.
     for words in readers(dir.path(), out.path()).into_iter().filter(|words| words[0] != "live") {
         let outcome = child::run(&mut command(&words), LIMIT).expect_code(&[0, 4]);
         assert!(outcome.stderr.contains("pipe.bin: is a pipe"), "{words:?}: {}", outcome.stderr);

@@ -1,4 +1,4 @@
-//! Files that are not what they should be: a clear error or a counted loss, never a panic, never a hang, never much memory.
+//! Invalid files: a clear error or a counted loss, without a panic, a hang or much memory.
 
 use std::fs::{self, File, Permissions};
 use std::io::Write as _;
@@ -9,9 +9,9 @@ use hums_tests::damage::Random;
 use hums_tests::flights::{Manifest, own};
 use hums_tests::program::{Decoded, Machine, Recording, hums};
 
-/// More than the program may need for any input, in KiB.
+/// Memory limit for any input, in KiB.
 const MEMORY_KIB_MAX: u64 = 120 << 10;
-/// Bytes of a recording that is nearly all hole: more than twice that.
+/// Bytes of a recording that is nearly all a hole: more than twice that.
 const ENORMOUS: u64 = 256 << 20;
 
 /// The commands that read a log or an image.
@@ -34,7 +34,7 @@ fn assert_refused(file: &Path) {
     }
 }
 
-/// Each reader ends by itself with some code of the contract, without a panic.
+/// Each reader ends by itself with an exit code of the contract, without a panic.
 #[track_caller]
 fn assert_survived(file: &Path) {
     let dir = tempfile::tempdir().unwrap();
@@ -113,7 +113,7 @@ fn an_image_that_is_no_fat_costs_counted_frames_and_is_left_as_it_was() {
     fs::write(&image, &somebodys).unwrap();
     sim().expect_code(&[1]);
     assert!(fs::read(&image).unwrap() == somebodys, "somebody else's data was overwritten");
-    // Nothing is on it. As the box would: without a card that it can use, and with all frames counted as lost.
+    // It is empty. Like a box without a usable card: all frames count as lost.
     let before = vec![0; 40 << 20];
     fs::write(&image, &before).unwrap();
     let outcome = sim().expect_code(&[3]);
@@ -212,7 +212,7 @@ fn damaged_images_are_survived_and_give_no_wrong_frame() {
 fn enormous_files_take_little_memory_and_an_end() {
     let dir = tempfile::tempdir().unwrap();
     assert_refused(&sparse(dir.path().join("enormous.img"), 4 << 30));
-    // A frame, without which it is no recording, and a hole.
+    // A frame, without which it is not a recording, and a hole.
     let raw = sparse(dir.path().join("enormous.raw"), ENORMOUS);
     let flight = fs::read(own("px4_hil_quad_low.tlog")).unwrap();
     let frame = Manifest::own().frames_of(&own("px4_hil_quad_low.tlog"), &flight)[0].bytes;
@@ -235,7 +235,7 @@ fn a_read_only_image_is_read_and_not_recorded_to() {
     let flight = own("px4_hil_quad_low.tlog");
     let arguments =
         ["sim".as_ref(), "--input".as_ref(), flight.as_os_str(), "--sd".as_ref(), image.as_os_str()];
-    // For root too, who could write to it.
+    // Also for root, who has permission to write to it.
     hums(arguments).expect_clear_failure();
     assert!(fs::read(&image).unwrap() == before, "the image changed");
 }
@@ -243,12 +243,12 @@ fn a_read_only_image_is_read_and_not_recorded_to() {
 #[test]
 fn a_folder_that_cannot_be_made_is_a_clear_failure() {
     let recording = Recording::make(Machine::Sim, &own("px4_hil_quad_low.tlog"), &["--card-size", "64"]);
-    // A file stands where the folder should.
+    // A file has the folder's name.
     let blocked = recording.gs().join("out");
     let image = recording.image();
     let arguments = ["decode".as_ref(), image.as_os_str(), "-o".as_ref(), blocked.as_os_str()];
     hums(arguments.into_iter().chain(["--format".as_ref(), "tlog".as_ref()])).expect_clear_failure();
-    // A folder that is not there, for the image.
+    // A folder that does not exist, for the image.
     let nowhere = recording.image().with_file_name("nowhere").join("card.img");
     let flight = own("px4_hil_quad_low.tlog");
     let arguments =

@@ -1,4 +1,4 @@
-//! `hums live` as a server and as a service: pages that break off, addresses, and how it ends.
+//! `hums live` as a server and as a service: broken connections, addresses, and its end.
 
 use std::io::{BufRead as _, BufReader, Read as _, Write as _};
 use std::net::{TcpListener, TcpStream};
@@ -25,7 +25,7 @@ fn two_hundred_broken_off_handshakes_take_no_pages_place() {
     let host = live.address.trim_start_matches("http://").trim_end_matches('/');
     for number in 0..200_u64 {
         let stream = handshake(host);
-        // As a tablet on a bad radio: the connection is reset, at once or a moment later.
+        // Like a tablet on a bad radio: the connection is reset, at once or a moment later.
         set_socket_linger(&stream, Some(Duration::ZERO)).unwrap();
         std::thread::sleep(Duration::from_micros(number % 5 * 250));
     }
@@ -35,7 +35,7 @@ fn two_hundred_broken_off_handshakes_take_no_pages_place() {
         if line.contains("101") {
             break;
         }
-        // The last ones may still be on their way.
+        // The last ones may still be in transfer.
         assert!(Instant::now() < end, "no page opens any longer: {line}");
         std::thread::sleep(Duration::from_millis(50));
     }
@@ -73,7 +73,7 @@ fn a_phone_is_given_an_address_and_the_token() {
     let port: u16 = here.trim_start_matches("http://localhost:").split('/').next().unwrap().parse().unwrap();
     live.signal("TERM");
     assert_eq!(live.end(Duration::from_secs(20)), Some(0), "SIGTERM is Ctrl-C");
-    // As many as this PC has; one without a network has none.
+    // As many as this PC has; a PC without a network has none.
     for line in lines {
         let (address, rest) = line.trim_start_matches("http://").split_once('/').unwrap();
         let address: std::net::SocketAddr = address.parse().unwrap();
@@ -128,7 +128,7 @@ fn a_recording_that_is_broken_off_is_not_called_whole() {
 fn a_server_that_takes_no_point_refuses_none() {
     let server = TcpListener::bind("127.0.0.1:0").unwrap();
     let url = format!("http://{}", server.local_addr().unwrap());
-    // It says of everything what a database says of a bad point.
+    // It answers everything like a database with a bad point.
     std::thread::spawn(move || {
         for stream in server.incoming().flatten() {
             let mut reader = BufReader::new(stream);
@@ -155,7 +155,7 @@ fn a_server_that_takes_no_point_refuses_none() {
 
 #[test]
 fn sigterm_and_ctrl_c_alike_say_what_is_not_in_the_database_and_a_second_one_ends_the_wait() {
-    // Nobody listens there.
+    // A port without a listener.
     let url = format!("http://127.0.0.1:{}", free_port());
     let recording = own("px4_hil_quad_low.tlog");
     let input = ["--input", recording.to_str().unwrap(), "--influx", &url];
@@ -169,7 +169,7 @@ fn sigterm_and_ctrl_c_alike_say_what_is_not_in_the_database_and_a_second_one_end
     let live = Live::start(&input);
     let (code, words) = live.terminate(Duration::from_secs(40));
     assert_eq!(code, Some(3), "{words}");
-    // How many it is depends on how soon it is ended: one, or some.
+    // The number depends on the time of the end: one, or some.
     assert!(words.contains("not in the database"), "{words}");
 }
 
@@ -195,12 +195,12 @@ fn two_signals_at_once_are_one_wish_and_end_nothing_without_a_word() {
     let url = format!("http://127.0.0.1:{}", free_port());
     let recording = own("px4_hil_quad_low.tlog");
     let live = Live::start(&["--input", recording.to_str().unwrap(), "--influx", &url]);
-    // As `timeout -s INT` sends them: to the program and to its group.
+    // Like `timeout -s INT`: to the program and to its group.
     let interrupt = || live.program.signal("INT");
     interrupt();
     interrupt();
     std::thread::sleep(Duration::from_millis(300));
-    // The second wish ends the wait for the database.
+    // The second signal ends the wait for the database.
     let (code, words) = live.interrupt(Duration::from_secs(5));
     assert_eq!(code, Some(3), "{words}");
     assert!(words.contains("not in the database"), "{words}");

@@ -1,7 +1,7 @@
-//! End to end on this PC: the `hums` command as a user runs it, with recorded flights at the UART.
+//! End to end on this PC: the `hums` command as for a user, with recorded flights at the UART.
 //!
-//! Each module is one promise: what comes out of the card, what the ground station gets, what noise, hostile files, a
-//! failing card and power cuts may do and may not.
+//! Each module is one promise: the output of the card, the output to the ground station, the effects of noise,
+//! hostile files, failing cards and power cuts.
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
 
 mod any_log;
@@ -29,7 +29,7 @@ mod second_decoder;
 mod texts;
 mod usage;
 
-/// In the list of what was ignored: what was not tested is no success.
+/// In the list of ignored tests: an untested part is not a success.
 #[cfg(not(feature = "oracle"))]
 #[test]
 #[ignore = "comparisons with pymavlink: `cargo xtask test` runs them"]

@@ -1,7 +1,7 @@
-//! Memory: no input makes a command take more than 64 MiB above what it takes for nearly nothing. The commands are those of
-//! the command line's definition, the formats those that `decode` knows: one that is added is tried, or fails the tests.
+//! Memory: no input makes a command take more than 64 MiB above an empty run. The commands come from the command
+//! line's definition, the formats from `decode`: a new one is tested, or fails the tests.
 //!
-//! One worker; `docs/decode.md` says what each further one adds. The inputs are larger than what may be held.
+//! One worker; `docs/decode.md` has the figure for each further one. The inputs are larger than the limit.
 
 use std::fs;
 use std::path::Path;
@@ -15,7 +15,7 @@ use hums_tests::hostile;
 use hums_tests::live::Live;
 use hums_tests::program::{LIMIT, command};
 
-/// What a command may take beyond an empty run, KiB.
+/// Limit of a command's memory above an empty run, KiB.
 const ABOVE_KIB_MAX: u64 = 64 << 10;
 
 fn run<A: AsRef<std::ffi::OsStr>>(arguments: &[A]) -> Outcome {
@@ -24,10 +24,10 @@ fn run<A: AsRef<std::ffi::OsStr>>(arguments: &[A]) -> Outcome {
     child::run(&mut command, LIMIT).expect_code(&[0, 1, 2, 3, 4])
 }
 
-/// What a run takes that has nearly nothing to do, KiB.
+/// Memory of a run with nearly no input, KiB.
 fn empty_run(dir: &Path) -> u64 {
     let log = hostile::heartbeats(dir, 10);
-    // A run that has ended before it was looked at seems to take nothing.
+    // A run that ended before it was measured seems to take nothing.
     let of_one = |_| run(&["info", log.to_str().unwrap()]).memory_kib_max;
     (0..500).map(of_one).find(|kib| *kib > 4 << 10).expect("a look at an empty run")
 }
@@ -37,17 +37,17 @@ fn assert_bounded(what: &str, kib: u64, empty: u64) {
     assert!(kib <= empty + ABOVE_KIB_MAX, "{what} took {kib} KiB, an empty run {empty} KiB");
 }
 
-/// What of a command is tried.
+/// The tested use of a command.
 enum Tried {
     /// These command lines, in which `IN` is the input and `OUT/` a folder.
     Lines(Vec<String>),
-    /// It goes on until it is ended.
+    /// It runs until it is ended.
     Live,
-    /// It reads no file that has no limit; why.
+    /// It reads no file of unlimited size; the reason.
     Nothing(#[allow(dead_code, reason = "for the reader")] &'static str),
 }
 
-/// A command that is not here fails the test: say how it reads, and it is tried with every input from then on.
+/// A command that is not listed fails the test: enter its use, and it is tested with every input.
 fn tried(command: &str) -> Tried {
     let lines = |lines: &[&str]| Tried::Lines(lines.iter().map(|line| (*line).to_owned()).collect());
     match command {
@@ -79,13 +79,12 @@ fn tried(command: &str) -> Tried {
     }
 }
 
-/// Each command of the definition that reads, and each format, with this input. A command that refuses it is tried all the
-/// same.
+/// Each reading command of the definition, and each format, with this input. A command that refuses it is tested too.
 fn assert_all_bounded(input: &Path, empty: u64) {
     assert_bounded_but(input, empty, |_| false);
 }
 
-/// The same without the command lines that begin so.
+/// The same without command lines with this beginning.
 fn assert_bounded_but(input: &Path, empty: u64, is_left_out: impl Fn(&str) -> bool) {
     let shown = input.to_str().unwrap();
     for command in Cli::command().get_subcommands() {
@@ -112,7 +111,7 @@ fn assert_live_bounded(log: &Path, empty: u64) {
     let most = loop {
         thread::sleep(Duration::from_millis(300));
         let (seconds, _, most) = live.program.cost().expect("it runs");
-        // It publishes ten times a second once it plays, which takes next to nothing.
+        // In playback it publishes ten times a second, which takes nearly no time.
         quiet = if seconds - before < 0.06 { quiet + 1 } else { 0 };
         before = seconds;
         if quiet == 4 {
@@ -178,7 +177,8 @@ fn an_autopilots_log_of_thousands_of_tables_or_columns_takes_little_memory() {
 fn an_autopilots_log_that_is_larger_than_what_may_be_held_takes_little_memory_with_any_command() {
     let dir = tempfile::tempdir().unwrap();
     let empty = empty_run(dir.path());
-    // The formats are made of rows, which both logs are read as: each of one, and the plainest of the other.
+    // The formats are made of rows, to which both logs are read: each format with one log, and the plainest with the
+    // other.
     let dataflash = hostile::long_dataflash(dir.path());
     let ulog = hostile::long_ulog(dir.path());
     for log in [&dataflash, &ulog] {
@@ -271,7 +271,7 @@ fn a_log_of_very_many_sessions_takes_little_memory_with_any_command() {
     assert_all_bounded(&hostile::starts(dir.path(), count), empty);
 }
 
-/// The longest file in which lost sectors are made again, 16 MiB, and a longer one.
+/// The longest file in which lost sectors are rebuilt, 16 MiB, and a longer one.
 #[test]
 fn a_file_of_nothing_but_parity_takes_little_memory() {
     let dir = tempfile::tempdir().unwrap();
@@ -289,6 +289,6 @@ fn cards_full_of_entries_or_sessions_take_little_memory() {
     for bogus in [false, true] {
         assert_all_bounded(&hostile::directories(dir.path(), 12, bogus), empty);
     }
-    // Of each of these sessions `decode` would make a file.
+    // `decode` would make a file for each of these sessions.
     assert_bounded_but(&hostile::sessions(dir.path(), 60_000), empty, |line| line.starts_with("decode "));
 }

@@ -1,6 +1,8 @@
-//! The component information: what ground stations read of the box's parameters is what the table says, it is made as MAVLink's
-//! schemas want it, and comes whole over the link. `HUMS_WRITE_DOCS=1 cargo test -p hums-tests --features oracle --test sim metadata`
-//! writes `firmware/onboard/metadata` anew.
+//! The component information. Ground stations read the box's parameters with the words of the table, in files that
+//! follow MAVLink's schemas, and get them whole over the link.
+//!
+//! `HUMS_WRITE_DOCS=1 cargo test -p hums-tests --features oracle --test sim metadata` writes
+//! `firmware/onboard/metadata` anew.
 #![cfg(feature = "oracle")]
 
 use std::fs;
@@ -15,7 +17,8 @@ use serde_json::{Value, json};
 
 use crate::board::Board;
 
-/// The version of both files that `QGroundControl` reads. The schema of the parameters has 3 as its least (mavlink/mavlink f368676f).
+/// The version of both files that `QGroundControl` reads. The schema of the parameters has 3 as its minimum
+/// (mavlink/mavlink f368676f).
 const VERSION: u32 = 1;
 /// `COMP_METADATA_TYPE_PARAMETER`
 const PARAMETER: u32 = 1;
@@ -25,7 +28,7 @@ fn folder() -> PathBuf {
     root().join("firmware/onboard/metadata")
 }
 
-/// A number as people write it: not 0.30000001 for 0.3.
+/// A number in common form: not 0.30000001 for 0.3.
 fn number(value: f32) -> Value {
     serde_json::from_str(&value.to_string()).unwrap()
 }
@@ -59,7 +62,7 @@ fn parameters() -> String {
     json!({ "version": VERSION, "parameters": &rows[..] }).to_string()
 }
 
-/// What names the file of the parameters.
+/// The file that names the file of the parameters.
 fn general(packed: &[u8]) -> String {
     let uri = format!("mftp://[;comp=191]/{PACKED}");
     let types = json!([{ "type": PARAMETER, "uri": uri, "fileCrc": ftp::checksum(0, packed) }]);
@@ -85,7 +88,7 @@ fn what_the_firmware_holds_is_what_the_table_says() {
     assert_eq!(fs::read(&packed).unwrap()[..8], [0xFD, b'7', b'z', b'X', b'Z', 0, 0, 1]);
 }
 
-/// The rules of `parameter.schema.json` and `general.schema.json` (mavlink/mavlink f368676f), as far as they say more than JSON does.
+/// The rules of `parameter.schema.json` and `general.schema.json` (mavlink/mavlink f368676f), beyond those of JSON.
 #[test]
 fn both_files_are_as_the_public_schemas_want_them() {
     let general: Value = serde_json::from_slice(&fs::read(folder().join("general.json")).unwrap()).unwrap();
@@ -120,7 +123,7 @@ fn both_files_are_as_the_public_schemas_want_them() {
     }
 }
 
-/// An object has these, perhaps those, and nothing else.
+/// An object has all of these, some of those, and no others.
 #[track_caller]
 fn assert_members(object: &Value, required: &[&str], optional: &[&str]) {
     let object = object.as_object().expect("an object");

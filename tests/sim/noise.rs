@@ -1,4 +1,4 @@
-//! Damaged bytes cost the frames that they are in, and no others.
+//! Damaged bytes cost only the frames around them.
 
 use std::fs;
 use std::ops::Range;
@@ -7,10 +7,10 @@ use hums_tests::damage::{self, Random};
 use hums_tests::flights::{Manifest, OWN, own, stream};
 use hums_tests::program::{Machine, Recording};
 
-/// The frames of a flight, and the stream that they make.
+/// The frames of a flight, and their stream.
 struct Clean {
     stream: Vec<u8>,
-    /// Where each frame lies in the stream.
+    /// The place of each frame in the stream.
     frames: Vec<Range<usize>>,
 }
 
@@ -32,8 +32,8 @@ impl Clean {
         Self { stream, frames }
     }
 
-    /// What was recorded of `noisy`, which is this stream with damage: each whole frame, next to nothing else, and every
-    /// other byte counted.
+    /// The record of `noisy`, this stream with damage: each whole frame, next to nothing else, and every other byte
+    /// counted.
     #[track_caller]
     fn assert_whole_frames_survive(&self, noisy: &[u8], recording: &Recording) {
         assert_eq!(noisy.len(), self.stream.len());
@@ -78,8 +78,8 @@ impl Clean {
     }
 }
 
-/// How many bytes of a frame its checksum covers, itself included. Damage to the signature that may follow can be seen
-/// only by who has the key, and such a frame is a frame.
+/// Bytes of a frame that its checksum covers, itself included. Damage to a signature behind it can be found only with
+/// the key, and such a frame counts as a frame.
 fn covered(frame: &[u8]) -> usize {
     let signed = frame[0] == 0xFD && frame[2] & 1 == 1;
     if signed { frame.len() - 13 } else { frame.len() }
@@ -110,7 +110,7 @@ fn each_frame_that_the_programs_own_noise_leaves_whole_survives() {
     }
 }
 
-/// As many frames survive the program's own noise as chance lets: within five standard deviations.
+/// The number of frames that survive the program's own noise follows chance, within five standard deviations.
 #[test]
 fn the_noise_flag_damages_as_much_as_it_says_and_all_of_it_is_counted() {
     let path = own("px4_hil_quad_low.tlog");
@@ -136,7 +136,7 @@ fn the_noise_flag_damages_as_much_as_it_says_and_all_of_it_is_counted() {
         assert_eq!(recording.number("frames_logged"), output.len() as u64);
         assert!(recording.number("bytes_not_frames") > 0);
 
-        // What survives is from the flight, in its order.
+        // Survivors are frames of the flight, in its order.
         let mut originals = input.iter();
         let strange = output.iter().filter(|frame| {
             let before = originals.clone();
@@ -156,13 +156,13 @@ fn noise_behind_a_frame_is_counted_and_is_no_flight() {
     let dir = tempfile::tempdir().unwrap();
     let file = dir.path().join("noise.raw");
     let clean = Clean::read("px4_hil_quad_low.tlog");
-    // Without one it is no recording.
+    // Without a frame it is not a recording.
     let noise = [&clean.stream[clean.frames[0].clone()], &random.bytes(3_000_000)].concat();
     fs::write(&file, &noise).unwrap();
     let recording = Recording::make(Machine::Sim, &file, &[]);
     assert_eq!(recording.number("bytes_in"), noise.len() as u64);
     let decoded = recording.decode(&[0]);
     let verified = decoded.frames(&Manifest::own().seeds).iter().filter(|frame| frame.verified).count();
-    // Chance alone lets one start byte in some 65,536 through.
+    // By chance alone one start byte in some 65,536 passes.
     assert!(verified < 20, "{verified} frames in noise");
 }

@@ -1,5 +1,5 @@
-//! What outlives power: counters and parameters go on from flight to flight, whatever word of the store power went at,
-//! and whichever card is in the slot.
+//! Persistence: counters and parameters continue from flight to flight, after a power cut at any word of the store,
+//! and with any card in the slot.
 
 use std::fs;
 use std::path::Path;
@@ -62,7 +62,7 @@ fn whatever_word_of_the_store_power_goes_at_the_counters_are_the_old_or_the_new_
     let mut cuts = 0;
     for cut in 0..40 {
         let before = *Stored::read(&store).lifetime();
-        // A flight writes some 400 words; behind those no cut is met, and the flight counts.
+        // A flight writes some 400 words; a cut behind those is never met, and the flight counts.
         let at = (1 + random.below(500)).to_string();
         let flags = ["--cut-store-after", &at, "--seed", &cut.to_string()];
         let recording = fly(&store, &flags).expect_code(&[0, 3]);
@@ -109,7 +109,7 @@ fn power_that_goes_at_any_moment_of_a_flight_costs_two_minutes_of_it_at_most() {
             let lifetime = kept.lifetime.unwrap_or_default();
             let kept_s = lifetime.totals.raw(UsageCounter::Flight);
             let flown_s = end_s - take_off_s;
-            // What is in the record may be a second behind, and a take-off is seen half a second late.
+            // The record may be a second behind, and a take-off is found half a second late.
             assert!(
                 (flown_s - 121.0..flown_s + 2.0).contains(&kept_s),
                 "{flight}, cut at {at}: {kept_s} s of {flown_s} s are kept"
@@ -198,7 +198,7 @@ fn a_component_that_a_command_says_is_replaced_begins_anew_and_that_is_recorded(
     );
 }
 
-/// What `hums info --json` says of a component.
+/// The status of a component in `hums info --json`.
 fn component_status(info: &serde_json::Value, place: u64) -> Option<String> {
     match info {
         serde_json::Value::Object(fields) => {
@@ -253,12 +253,12 @@ fn a_file_that_is_no_store_or_cannot_be_read_is_refused_and_stays() {
     let dir = tempfile::tempdir().unwrap();
     let store = dir.path().join("store.bin");
     let mut spoiled = vec![0x5A; 32_768];
-    // Some other file of that length is refused, and left as it is.
+    // Another file of that length is refused, and stays unchanged.
     fs::write(&store, &spoiled).unwrap();
     let outcome = fly(&store, &[]).expect_code(&[1]).outcome;
     assert!(outcome.stderr.contains("is no store, though it has the length of one"), "{}", outcome.stderr);
     assert_eq!(fs::read(&store).unwrap(), spoiled);
-    // A store that was spoiled but for its magic.
+    // A spoiled store with a valid magic.
     spoiled[..4].copy_from_slice(b"2TSH");
     fs::write(&store, &spoiled).unwrap();
     let outcome = fly(&store, &[]).expect_code(&[1]).outcome;

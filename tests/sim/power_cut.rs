@@ -1,14 +1,15 @@
-//! Power may go at any block write: the card stays in order and holds the flight up to there.
+//! A power cut at any block write: the card is valid and holds the flight up to there.
 
 use hums_tests::damage::Random;
 use hums_tests::fat;
 use hums_tests::flights::{Manifest, own};
 use hums_tests::program::{Decoded, Machine, Recording};
 
-/// Enough to meet each kind of write (data, FAT, directory) whole and torn; the long campaign is the recorder's own.
+/// Enough to meet each kind of write (data, FAT, directory) whole and torn; the long campaign belongs to the
+/// recorder.
 const CUTS: usize = 50;
 
-/// What comes in the second that a log needs at most to begin, or waits in memory for its sector.
+/// Frames of the second in which a log begins, or that wait in memory for their sector.
 const LOST_MAX: u64 = 100;
 
 const FLIGHT: &str = "px4_hil_quad_low.tlog";
@@ -31,7 +32,7 @@ fn after_a_cut_at_any_write_the_card_is_in_order_and_gives_the_flight_up_to_ther
         let flags = ["--card-size", "40", "--cut-after-writes", &at];
         let recording = Recording::attempt(Machine::Sim, &path, &flags).expect_code(&[0, 3]);
         fat::assert_clean(&recording.image());
-        // A cut before the log's first sector leaves no log: code 1 says so.
+        // A cut before the log's first sector leaves no log, with exit code 1.
         let decoded = Decoded::of(&recording.image(), &[0, 1, 3]);
         let output = decoded.frames(&manifest.seeds);
         let prefix =

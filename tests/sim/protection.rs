@@ -1,5 +1,5 @@
-//! The protective action end to end: an autopilot in the air whose battery runs empty, at the autopilot's port, and its
-//! pilot at the ground station's; both are pymavlink's.
+//! The protective action end to end. Pymavlink simulates an autopilot in the air with an emptying battery at the
+//! autopilot's port, and its pilot at the ground station's.
 #![cfg(feature = "oracle")]
 
 use std::fs;
@@ -14,18 +14,18 @@ use serde_json::Value;
 const FOUND_S: f64 = 2.0;
 const DELAY_S: f64 = 3.0;
 
-/// What came of it: what the peers saw, and the steps in the record.
+/// The outcome: observations of the peers, and the steps in the record.
 struct Outcome {
     said: Value,
     steps: Vec<(String, u64)>,
 }
 
-/// Free a moment ago: the next one to ask gets another.
+/// A port that was free a moment ago: the next caller gets another.
 fn free_port() -> u16 {
     UdpSocket::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port()
 }
 
-/// The box, which ends in order, as Ctrl-C ends it, when it is no longer looked at.
+/// The box, which ends in order, as by Ctrl-C, when dropped.
 struct Board(Child);
 
 impl Drop for Board {
@@ -83,7 +83,7 @@ fn an_empty_battery_is_announced_counted_down_and_the_autopilot_told_once_and_it
         assert_eq!(asked["command"], command, "{said}");
         assert_eq!(asked["target"], serde_json::json!([1, 1]), "{said}");
         assert_eq!((&asked["confirmation"], &asked["params"][0]), (&0.into(), &0.0.into()), "{said}");
-        // The board's ticks, the scheduler of this PC, and its clock.
+        // Tolerances: the board's ticks, this PC's scheduler, and its clock.
         let asked_s = asked["s"].as_f64().unwrap() - FOUND_S - DELAY_S;
         assert!((-0.1..1.0).contains(&asked_s), "{said}");
         let texts = outcome.texts(action);

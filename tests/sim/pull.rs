@@ -1,4 +1,4 @@
-//! `hums box pull`: interrupted, gone on with, and never made of two logs.
+//! `hums box pull`: interrupted, continued, and never mixed from two logs.
 
 use std::fs;
 use std::io::{BufRead as _, BufReader};
@@ -44,7 +44,7 @@ fn pull(board: &Board, output: &Path, names: &[&str]) -> hums_tests::child::Outc
     hums(flags.into_iter().chain(names.iter().copied()))
 }
 
-/// Begins to pull and is killed when something has come.
+/// Begins a download and is killed after the first data.
 fn begin(board: &Board, output: &Path) -> PathBuf {
     let address = format!("udpout:127.0.0.1:{}", board.port);
     let mut pull = command(["box", "pull", "--link", &address, LOG, "-o"]);
@@ -59,7 +59,7 @@ fn begin(board: &Board, output: &Path) -> PathBuf {
     part
 }
 
-/// What a download has begun in a folder.
+/// The unfinished download in a folder.
 fn only_part(output: &Path) -> PathBuf {
     let names = fs::read_dir(output).unwrap().map(|entry| entry.unwrap().path());
     let is_part = |path: &PathBuf| path.to_string_lossy().ends_with("_00.HUM.pull.hums-part");
@@ -74,7 +74,7 @@ fn two_cards_are_never_made_into_one_log() {
     let home = tempfile::tempdir().unwrap();
     let output = home.path().join("logs");
 
-    // Interrupted; then another card is in the box, whose log has the same name.
+    // Interrupted; then the box has another card, whose log has the same name.
     let first = board(one);
     let part = begin(&first, &output);
     let kept = fs::read(&part).unwrap();
@@ -85,7 +85,7 @@ fn two_cards_are_never_made_into_one_log() {
     assert_on_card(&others, &other_card);
     assert_eq!(fs::read(&part).unwrap(), kept);
 
-    // Back to the first card: where it had got to, it goes on, unless another run is at it.
+    // With the first card again, it continues from there, unless another run is using it.
     second.switch_off();
     let first = board(one);
     let lock = fs::File::options().append(true).open(&part).unwrap();
@@ -103,7 +103,7 @@ fn two_cards_are_never_made_into_one_log() {
     let said = pull(&first, &output, &[LOG]).expect_code(&[0]);
     assert!(said.stderr.contains("is there already") && said.stdout.is_empty(), "{}", said.stderr);
 
-    // Each is a log of its own to whoever reads the folder, named as what is made of it.
+    // Each is a log of its own in the folder, with the name of its outputs.
     let folder = output.to_str().unwrap();
     let read = hums(["info", "--json", folder]).expect_code(&[0]);
     let read: serde_json::Value = serde_json::from_slice(&read.stdout).unwrap();
@@ -115,7 +115,7 @@ fn two_cards_are_never_made_into_one_log() {
         assert!(made.join(format!("{name}.tlog")).exists(), "{name}");
     }
 
-    // One bit of it is another one, or there is something behind it, or in the middle: it may be evidence of something.
+    // One changed bit, or bytes added behind or in the middle: the file may be evidence.
     let whole = fs::read(&log).unwrap();
     let flipped = |at: usize| {
         let mut spoiled = whole.clone();
@@ -135,7 +135,7 @@ fn two_cards_are_never_made_into_one_log() {
     }
 }
 
-/// A board's card may be damaged: that is told each time, also where its log is there already.
+/// A board's card may be damaged: that is reported each time, even if its log exists already.
 #[test]
 fn what_is_there_already_is_checked_as_what_comes_is() {
     let (dir, mut card) = card(0..30_000, "1");
@@ -153,7 +153,7 @@ fn what_is_there_already_is_checked_as_what_comes_is() {
 #[test]
 fn a_log_in_work_that_has_grown_is_completed() {
     let (dir, _) = card(0..80_000, "1");
-    // The end of a flight, and what a vehicle on the ground sends: the log has an end mark after 5 s.
+    // The end of a flight, and a vehicle's messages on the ground: the log has an end mark after 5 s.
     let flight = fs::read(own("ap_quad_guided.tlog")).unwrap();
     let input = dir.path().join("landed.tlog");
     fs::write(&input, [cut(&flight, 262, 270), cut(&flight, 0, 40)].concat()).unwrap();
@@ -167,7 +167,7 @@ fn a_log_in_work_that_has_grown_is_completed() {
         if pulled.code == Some(0) && !pulled_logs(home.path(), "00002").is_empty() {
             break;
         }
-        // Nothing proves its end until then; what nothing is recorded in yet is no log.
+        // Its end is not proved until then; a log without records is not a log.
         let told = pulled.expect_code(&[0, 3]).stderr;
         let words = ["not proved to its end", "nothing is recorded in it yet"];
         assert!(words.iter().any(|words| told.contains(words)), "{told}");
@@ -185,7 +185,7 @@ fn a_log_in_work_that_has_grown_is_completed() {
     assert_on_card(&log, &fs::read(dir.path().join("card.img")).unwrap());
 }
 
-/// The records of a tlog that lie between two times, seconds after its first one.
+/// The records of a tlog between two times, seconds after its first one.
 fn cut(tlog: &[u8], from_s: u64, to_s: u64) -> Vec<u8> {
     let (mut at, mut first, mut out) = (0, None, Vec::new());
     while let Some(record) = tlog.get(at..).filter(|record| record.len() > 11) {
@@ -219,7 +219,7 @@ fn a_finding_comes_first_as_a_part_that_says_so() {
     const GROUP: usize = 64;
     let dir = tempfile::tempdir().unwrap();
     let (input, image) = (dir.path().join("short.tlog"), dir.path().join("card.img"));
-    // The autopilot declares a failsafe 35 s after its beginning, in the second group of the log.
+    // The autopilot declares a failsafe 35 s after its start, in the second group of the log.
     fs::write(&input, cut(&fs::read(own("ap_quad_faults.tlog")).unwrap(), 232, 272)).unwrap();
     fs::write(dir.path().join("params.txt"), "GS_BUDGET 5000\n").unwrap();
     let mut sim = command(["sim", "--input"]);
@@ -241,7 +241,7 @@ fn a_finding_comes_first_as_a_part_that_says_so() {
     assert!(bytes.len() / 512 > GROUP + 20 && missing.len() > GROUP / 2, "{missing:?} of {}", bytes.len());
     assert!(missing.iter().all(|place| *place < GROUP), "the second group is there: {missing:?}");
 
-    // Every reader takes it, and says what it is.
+    // Every reader accepts it, and reports that it is a part.
     let name = part.to_str().unwrap();
     for words in [&["info", name][..], &["info", "--verify", name]] {
         let told = hums(words).expect_code(&[3]).text();
@@ -254,7 +254,7 @@ fn a_finding_comes_first_as_a_part_that_says_so() {
     let end = |tlog: &[u8]| tlog[tlog.len() - 12..].to_vec();
     assert!(decoded.len() > 10_000 && end(&decoded) == end(&whole), "{} bytes", decoded.len());
 
-    // Nothing is added to a part: another moment wants another folder, and the whole log lies beside it.
+    // A part is never extended: another moment needs another folder, and the whole log is stored beside it.
     let told = pull(&board, output, &[LOG, "--around", "0:00.5", "--span", "0.5"]).expect_code(&[1]).stderr;
     assert!(told.contains("exists, and was not overwritten"), "{told}");
     assert_eq!(fs::read(&part).unwrap(), bytes);
@@ -267,8 +267,8 @@ fn a_finding_comes_first_as_a_part_that_says_so() {
     assert!(told.contains("is no time (4:20, 260.8, 2026-11-21T10:13:42Z) and no finding"), "{told}");
 }
 
-/// Between a client and a board, as if the board's firmware did not know `CalcFileCRC32`: the client's opcode 14 reaches the
-/// board as one that nobody knows, and the refusal of that comes back as a refusal of opcode 14. Gives its port.
+/// A proxy that makes the board look as if it lacked `CalcFileCRC32`. The client's opcode 14 reaches the board as an
+/// unknown one, and its refusal comes back as one of opcode 14. Returns the proxy's port.
 fn without_checksums(board: u16) -> u16 {
     const OPCODE: usize = 10 + 3 + 3;
     const OF: usize = OPCODE + 2;
@@ -290,7 +290,7 @@ fn without_checksums(board: u16) -> u16 {
     });
     std::thread::spawn(move || {
         let mut buffer = [0; 2048];
-        // An error is a board that is not there yet.
+        // An error means a board that is not there yet.
         loop {
             let Ok(length) = board_side.recv(&mut buffer) else { continue };
             exchange(&mut buffer[..length], OF, 200, 14);
@@ -302,7 +302,7 @@ fn without_checksums(board: u16) -> u16 {
     port
 }
 
-/// In each `FILE_TRANSFER_PROTOCOL` of a datagram: this byte, where it has this value, gets that one.
+/// In each `FILE_TRANSFER_PROTOCOL` of a datagram, replaces this byte, if it has this value.
 fn exchange(datagram: &mut [u8], place: usize, from: u8, to: u8) {
     const ID: [u8; 3] = [110, 0, 0];
     const SEED: u8 = 84;
@@ -335,7 +335,7 @@ fn a_board_that_computes_no_checksum_is_read_whole_and_what_its_sectors_say_coun
     let log = pulled_log(&output, NUMBER);
     assert_on_card(&log, &card);
     let part = log.with_file_name(format!(".{}.pull.hums-part", log.file_name().unwrap().to_str().unwrap()));
-    // What a kill has left before anything came is no change of anything.
+    // An empty part of a killed run is not a change.
     let whole = fs::read(&log).unwrap();
     fs::remove_file(&log).unwrap();
     fs::write(&part, "").unwrap();
@@ -343,7 +343,7 @@ fn a_board_that_computes_no_checksum_is_read_whole_and_what_its_sectors_say_coun
     assert!(!told.contains("was changed"), "{told}");
     assert_eq!(fs::read(&log).unwrap(), whole);
 
-    // It goes on with what has the same ends; that its middle was changed, the sectors tell.
+    // A file with the same ends is continued; its sectors show the changed middle.
     fs::remove_file(&log).unwrap();
     let mut begun = whole[..whole.len() - 1024].to_vec();
     let middle = begun.len() / 2 + 100;

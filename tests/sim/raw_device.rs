@@ -1,4 +1,4 @@
-//! A card in a reader is a block device, whose metadata says that it has no bytes.
+//! A card in a reader is a block device, which has the length 0 in its metadata.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -13,7 +13,7 @@ use serde_json::Value;
 struct Loop(PathBuf);
 
 impl Loop {
-    /// None where this machine does not let us.
+    /// None if this machine does not allow it.
     fn over(image: &Path) -> Option<Self> {
         let made =
             Command::new("losetup").args(["--find", "--show", "--read-only"]).arg(image).output().ok()?;
@@ -63,7 +63,7 @@ fn a_raw_device_is_read_like_its_image_by_each_command_and_never_written() {
         format!("decode --format hum {tlog} -o {device}"),
         format!("report {tlog} -o {device}"),
         format!("sim --input {tlog} --sd {device}"),
-        // Before anything is waited for.
+        // Before any wait.
         format!("sim --input udpin:127.0.0.1:14559 --sd {device}"),
         format!("sim --input {tlog} --sd {}/card.img --gs {device}", out.path().display()),
         format!("sim --input {tlog} --sd {}/card.img --tap {device}", out.path().display()),

@@ -1,4 +1,4 @@
-//! Every valid frame of a recording comes out of the card bit for bit, in order, and as if at the time it arrived.
+//! Every valid frame of a recording comes out of the card bit for bit, in order, with its arrival time.
 
 use std::fs::{self, File};
 use std::path::Path;
@@ -8,7 +8,7 @@ use hums_tests::frames::{self, Frame, build_v2};
 use hums_tests::program::{self, Decoded, LIMIT, Machine, Recording};
 use hums_tests::{child, fat};
 
-/// Records and decodes one flight and compares all that can be compared.
+/// Records and decodes one flight and compares all of it.
 #[track_caller]
 fn round_trip(path: &Path, manifest: &Manifest) {
     let data = fs::read(path).unwrap();
@@ -26,7 +26,7 @@ fn round_trip(path: &Path, manifest: &Manifest) {
     assert_eq!(recording.number("frames_lost"), 0);
     assert_eq!(recording.number("frames_logged"), output.len() as u64, "logged, and found in the log");
     assert_eq!(recording.number("frames_in"), output.len() as u64);
-    // What of a damaged tlog belongs to no record arrives as well, as bytes that are no frame.
+    // Bytes of a damaged tlog outside its records arrive as well, and count as bytes outside frames.
     assert!(recording.number("bytes_in") >= bytes.len() as u64, "every byte arrives");
     let framed: u64 = output.iter().map(|frame| frame.bytes.len() as u64).sum();
     assert_eq!(
@@ -38,8 +38,8 @@ fn round_trip(path: &Path, manifest: &Manifest) {
     assert_times_kept(&input, &output);
 }
 
-/// The times between frames are those of the recording, to 1 ms (and 1 ms for rounding at either end). A recording whose
-/// clock was set back has no such times: from there on only the order can be compared.
+/// The times between frames are those of the recording, to 1 ms (and 1 ms for rounding at either end). A recording
+/// whose clock was set back has no such times: from there on only the order is compared.
 #[track_caller]
 fn assert_times_kept(input: &[Frame<'_>], output: &[Frame<'_>]) {
     let times = |frames: &[Frame<'_>]| -> Option<Vec<u64>> {
@@ -88,7 +88,7 @@ fn every_further_recording_comes_out_bit_for_bit() {
     }
 }
 
-/// The checked-in manifest is what pymavlink finds today.
+/// The checked-in manifest equals pymavlink's results of today.
 #[cfg(feature = "oracle")]
 #[test]
 fn the_manifest_is_what_pymavlink_finds() {

@@ -1,5 +1,5 @@
-//! Logs on cards whose file system is gone, files that were deleted, logs that a newer one has partly overwritten: what
-//! is there comes out, and what is missing is told with its times.
+//! Logs on cards without a file system, deleted files, logs that a newer one has partly overwritten: the remaining
+//! data comes out, and missing data is reported with its times.
 
 use std::fs::{self, File};
 use std::os::unix::fs::FileExt as _;
@@ -13,7 +13,7 @@ use serde_json::Value;
 
 const BLOCK: u64 = 512;
 
-/// Where things are on the card, in bytes: the partition, its FAT, its clusters, the first of which is the directory.
+/// Offsets on the card, in bytes: the partition, its FAT, its clusters, the first of which is the directory.
 struct Places {
     partition: u64,
     fat: u64,
@@ -49,7 +49,7 @@ fn json(command: &str, image: &Path, flags: &[&str], code: i32) -> Value {
 /// Destroys an image's file system.
 type Wreck = fn(&Path);
 
-/// What destroys the file system, by name.
+/// The ways to destroy the file system, by name.
 const WRECKS: [(&str, Wreck); 4] = [
     ("the FAT is zeros", |image| {
         let Places { fat, data, .. } = places(image);
@@ -79,7 +79,7 @@ fn a_card_without_a_file_system_gives_all_that_is_on_it() {
             fs::copy(recording.image(), &image).unwrap();
             wreck(&image);
             eprintln!("{name}: {what}");
-            // An empty directory tells that the card is empty; the FAT, and what lies there, tell otherwise.
+            // An empty directory claims an empty card; the FAT, and the data, show otherwise.
             let info = json("info", &image, &[], 3);
             assert_ne!(info["images"][0]["damage"], serde_json::json!([]), "{what}");
             assert_eq!(info["logs"].as_array().unwrap().len(), 1, "{what}: {info}");
@@ -94,7 +94,7 @@ fn a_card_without_a_file_system_gives_all_that_is_on_it() {
     }
 }
 
-/// Nothing that is said of a card which holds evidence advises to change anything on it.
+/// No output about a card with evidence advises a change of it.
 #[track_caller]
 fn changes_nothing(command: &str, image: &Path, what: &str) {
     let words = command.split(' ').map(AsRef::as_ref).chain([image.as_os_str()]);
@@ -106,7 +106,7 @@ fn changes_nothing(command: &str, image: &Path, what: &str) {
     }
 }
 
-/// The entry of a log is lost, its clusters are not free: nobody deleted it.
+/// The entry of a log is lost, but its clusters are not free: it was not deleted.
 #[test]
 fn a_log_whose_directory_entry_is_lost_is_found_and_told_beside_others() {
     let recording = Recording::make(Machine::Sim, &own("px4_hil_quad_low.tlog"), &["--card-size", "64"]);
@@ -121,7 +121,7 @@ fn a_log_whose_directory_entry_is_lost_is_found_and_told_beside_others() {
     assert!(info["images"][0]["damage"][0].as_str().unwrap().contains("belong to no file"), "{info}");
     assert_eq!(json("info --verify", &image, &[], 3)["logs"].as_array().unwrap().len(), 2);
 
-    // The FAT of its sectors is lost as well, and its parity is all that is left in clusters of no file.
+    // The FAT of its sectors is lost as well, and only its parity remains in clusters without a file.
     let Places { fat, data, cluster_bytes, .. } = places(&image);
     let first = entry_word(&content, entry + 26);
     let start = data as usize + (first - 2) * cluster_bytes as usize;
@@ -130,7 +130,7 @@ fn a_log_whose_directory_entry_is_lost_is_found_and_told_beside_others() {
     let clusters = (sectors * BLOCK as usize).div_ceil(cluster_bytes as usize);
     content[entry..entry + 32].fill(0);
     content[fat as usize + 4 * first..][..4 * clusters].fill(0);
-    // What is behind an entry of zeros is no directory: the other log's takes its place.
+    // An entry of zeros ends the directory: the other log's entry takes its place.
     content.copy_within(entry + 32..entry + 64, entry);
     content[entry + 32..entry + 64].fill(0);
     fs::write(&image, &content).unwrap();
@@ -145,7 +145,7 @@ fn entry_word(image: &[u8], at: usize) -> usize {
     usize::from(u16::from_le_bytes([image[at], image[at + 1]]))
 }
 
-/// The card was formatted on a PC: its file system is in order and empty, and may have known of more than is left.
+/// The card was formatted on a PC: its file system is valid and empty, and may have had more data than remains.
 #[test]
 fn a_card_that_was_formatted_gives_its_logs_and_says_so() {
     let recording = Recording::make(Machine::Sim, &own("px4_hil_quad_low.tlog"), &["--card-size", "64"]);
@@ -208,7 +208,7 @@ fn an_older_log_that_a_newer_one_overwrites_gives_what_is_left_of_it_and_never_m
     let data = fs::read(&old).unwrap();
     let input = manifest.frames_of(&old, &data);
     fs::write(&short, stream(true, &data, &input[..400])).unwrap();
-    // The smallest card holds sixteen segments: the first one makes room for the last session.
+    // The smallest card holds sixteen segments: the last session overwrites the first one.
     let recording = Recording::make(Machine::Sim, &old, &["--card-size", "34"]);
     let image = recording.image();
     for _ in 0..40 {
@@ -225,8 +225,8 @@ fn an_older_log_that_a_newer_one_overwrites_gives_what_is_left_of_it_and_never_m
     assert_eq!(newest.len(), 400);
     assert!(newest.iter().zip(&input).all(|(a, b)| a.bytes == b.bytes));
 
-    // What the newest one left of the oldest is there, from the group after the last overwritten one on.
-    // It is no damage of the card.
+    // The rest of the oldest one, after the newest one overwrote it, is found from the next group on. It does not
+    // count as damage of the card.
     let found = json("info", &image, &["--salvage"], 0);
     let verify = hums(["info".as_ref(), "--verify".as_ref(), "--salvage".as_ref(), image.as_os_str()])
         .expect_code(&[0])

@@ -1,4 +1,4 @@
-//! The format document is enough to write a decoder from: `tests/oracle/hums_log` is one, in Python, that shares no line
+//! The format document is sufficient for a decoder: `tests/oracle/hums_log` is one, in Python, that shares no line
 //! with `hums`. Both give the same frames with the same times, and the same records.
 #![cfg(feature = "oracle")]
 
@@ -14,7 +14,7 @@ use serde_json::{Value, json};
 /// Bytes of each recording: some thousands of frames over several groups, in seconds of Python.
 const RECORDING_BYTES: usize = 250_000;
 
-/// Tables of which the second decoder reads every field.
+/// Tables that the second decoder reads completely.
 const TABLES: [&str; 11] = [
     "HUMS_BOOT",
     "HUMS_VEHICLE",
@@ -29,7 +29,7 @@ const TABLES: [&str; 11] = [
     "HUMS_KEEP",
 ];
 
-/// Both decoders say the same of a log, ours with this exit code; gives how many frames and records that was.
+/// Both decoders agree on a log, ours with this exit code; returns the number of frames and records.
 #[track_caller]
 fn compare(log: &Path, code: i32) -> (usize, usize) {
     let ours = Decoded::of(log, &[code]);
@@ -54,7 +54,7 @@ fn rows(text: &[u8]) -> Vec<Value> {
     text.lines().map(|line| serde_json::from_str(line).unwrap()).collect()
 }
 
-/// Time, table and fields of the records, numbers in single precision: that is what most are stored in.
+/// Time, table and fields of the records, numbers in single precision, in which most are stored.
 fn records(rows: &[Value]) -> Vec<Value> {
     let mut found = Vec::new();
     for row in rows {
@@ -64,9 +64,9 @@ fn records(rows: &[Value]) -> Vec<Value> {
         else {
             continue;
         };
-        // Counters are stored by number; their names are another document's.
+        // Counters are stored by number; their names are in another document.
         fields.remove("counter");
-        // Whoever reads a record knows that the board wrote it.
+        // A record of the board needs no such field.
         fields.remove("checked_by");
         for value in fields.values_mut() {
             if let Some(number) = value.as_f64().filter(|_| value.is_f64()) {
@@ -92,7 +92,7 @@ fn recordings_of_each_kind_read_the_same() {
         let short = dir.path().join(&*flight);
         let data = fs::read(&path).unwrap();
         fs::write(&short, &data[..RECORDING_BYTES.min(data.len())]).unwrap();
-        // A parameter that is not at its default, so that there is one in the record.
+        // A parameter that is not at its default, so that the record has one.
         let params = dir.path().join("params.txt");
         fs::write(&params, "BAT_REM_WARN 25\n").unwrap();
         let flags = ["--params", params.to_str().unwrap()];
@@ -107,7 +107,7 @@ fn recordings_of_each_kind_read_the_same() {
         assert_eq!(frames as u64, recording.number("frames_logged"), "{flight}");
         assert!(frames > 2_000 && records > 20, "{flight}: {frames} frames, {records} records");
         if path == own(OWN[0]) {
-            // What parity makes again, in both: any two pages. Ours says so.
+            // Both rebuild any two pages from parity. Ours reports it.
             let mut bytes = fs::read(log).unwrap();
             for sector in [12, 65] {
                 bytes[512 * sector..][..8 * 512].fill(0xff);

@@ -1,4 +1,5 @@
-//! A pilot hears of one event in three texts at most, on every labelled flight and recording, and of what is critical at once.
+//! A pilot gets at most three texts about one event, on every labelled flight and recording, and critical ones at
+//! once.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -14,15 +15,15 @@ use hums_link::{Check, Frame};
 use hums_tests::flights::{self, OWN, own, root};
 use rayon::prelude::*;
 
-/// What belongs together begins within this time of the first text of it.
+/// Texts of one event begin within this time of its first one.
 const EVENT_S: f64 = 10.0;
 const TEXTS_MAX: usize = 3;
-/// Texts in any ten seconds: three that are not critical, and those that are. In the worst of these flights vibration and the autopilot's
-/// own failsafe are critical at the same time.
+/// Texts in any ten seconds: three that are not critical, and the critical ones. In the worst of these flights
+/// vibration and the autopilot's own failsafe are critical at the same time.
 const AT_A_TIME_MAX: usize = 5;
 
-/// What is critical waits for nothing but the line: a text of 80 bytes after one of 250 takes 60 ms at 57,600 baud.
-/// It is known to [`LOOK_US`] when a text is said.
+/// A critical text waits only for the line: a text of 80 bytes after one of 250 takes 60 ms at 57,600 baud. The time
+/// of a text is known to [`LOOK_US`].
 const LATE_MAX_S: f64 = 0.25;
 const LOOK_US: u64 = 100_000;
 
@@ -34,7 +35,7 @@ struct Said {
     text: String,
 }
 
-/// What the box says on a recording, and when a check became critical.
+/// The box's texts on a recording, and the times of critical checks.
 fn listen(recording: &Path) -> (Vec<Said>, Vec<f64>) {
     let dir = tempfile::tempdir().unwrap();
     let file = image::open_or_make(&dir.path().join("card.img"), Some(256), |_| Ok(())).unwrap();
@@ -44,7 +45,7 @@ fn listen(recording: &Path) -> (Vec<Said>, Vec<f64>) {
     let board = Board { card: &card, params: &params, key: None };
     let endpoint: Endpoint = recording.display().to_string().parse().unwrap();
     let mut source = source::open(&endpoint, Timing { line_rate: None }).unwrap();
-    // Also where nothing arrives it is known when something is said.
+    // Times of texts are known without input too.
     let (mut chunks, mut now_us) = (Vec::new(), 0);
     while let Some(chunk) = source.next().unwrap() {
         while now_us < chunk.at_us {
@@ -66,7 +67,7 @@ fn listen(recording: &Path) -> (Vec<Said>, Vec<f64>) {
     (said, critical.map(|finding| finding.time_s).collect())
 }
 
-/// What a text is of: attitude goes with what turns the motors.
+/// The subject of a text: attitude belongs to the motors.
 fn family(text: &str) -> Subsystem {
     let words = text.strip_prefix("HUMS: ").unwrap_or(text);
     let words = words.strip_prefix("over: ").unwrap_or(words);
@@ -98,7 +99,7 @@ fn events(said: &[Said]) -> Vec<Vec<&Said>> {
     for one in said {
         let family = family(&one.text);
         let event = running.entry(family as u8).or_default();
-        // A mishap lasts until it is over, or the vehicle is down.
+        // A mishap lasts until its end, or until the vehicle is down.
         let ends = |one: &&Said| one.text.contains("mishap over") || one.text.starts_with("HUMS: down at");
         let goes_on = event.first().is_some_and(|first| {
             family == Subsystem::Mishap && !event.iter().any(ends) || one.at_s - first.at_s < EVENT_S
@@ -139,7 +140,7 @@ fn one_event_is_three_texts_at_most_and_what_is_critical_is_told_at_once() {
             let together: Vec<_> = said.iter().filter(|other| span.contains(&other.at_s)).collect();
             assert!(together.len() <= AT_A_TIME_MAX, "{name}: {together:#?}");
         }
-        // Where it is down, and that it flies again, no check tells.
+        // These two texts about a vehicle that is down, or flies again, come from no check.
         let is_checks = |text: &str| {
             !["HUMS: down at", "HUMS: it flies again"].iter().any(|begin| text.starts_with(begin))
         };

@@ -1,7 +1,7 @@
-//! Findings and usage of each recording: against pymavlink's own computation, and as the documentation has them.
+//! Findings and usage of each recording, against pymavlink's own computation and the documentation.
 //!
-//! `cargo xtask test --only sim` prints nothing of it; the tables of every recording there is:
-//! `HUMS_FLIGHTS=... cargo test -p hums-tests --features oracle --test sim usage -- --nocapture`.
+//! `cargo xtask test --only sim` prints none of it; the tables of all recordings: `HUMS_FLIGHTS=... cargo test -p
+//! hums-tests --features oracle --test sim usage -- --nocapture`.
 
 use std::fmt::Write as _;
 use std::fs;
@@ -11,7 +11,7 @@ use hums_tests::flights::{OWN, own, root};
 use hums_tests::program::{Machine, Recording};
 use serde_json::Value;
 
-/// The columns of the table of usage, each with how many places it is shown with.
+/// The columns of the table of usage, each with its number of decimals.
 const COLUMNS: [(&str, usize); 12] = [
     ("flights", 0),
     ("flight_time_s", 1),
@@ -42,7 +42,7 @@ fn usage_row(flight: &Path, json: &Value) -> String {
     row
 }
 
-/// One row for each warning and critical finding, up to what it is.
+/// One row for each warning and critical finding, without its text.
 fn finding_rows(flight: &Path, json: &Value) -> Vec<String> {
     let findings = json["findings"].as_array().unwrap().iter();
     let bad = findings.filter(|finding| finding["level"] == "warning" || finding["level"] == "critical");

@@ -6,7 +6,7 @@ use std::process::{Child, Command, ExitStatus, Stdio};
 use std::thread;
 use std::time::{Duration, Instant};
 
-/// How often a running program is looked at: more often in its first moments, for many run for a few milliseconds only.
+/// Polling interval of a running program: shorter in its first moments, because many run for a few milliseconds only.
 const POLL: Duration = Duration::from_millis(5);
 const POLL_FIRST: Duration = Duration::from_micros(300);
 
@@ -15,11 +15,11 @@ const POLL_FIRST: Duration = Duration::from_micros(300);
 pub struct Outcome {
     /// The exit code; `None` if a signal ended it.
     pub code: Option<i32>,
-    /// What it wrote to stdout.
+    /// Its output on stdout.
     pub stdout: Vec<u8>,
-    /// What it wrote to stderr.
+    /// Its output on stderr.
     pub stderr: String,
-    /// The most memory it had resident at once, in KiB, as far as looking at it every 5 ms, at first more often, shows.
+    /// Its highest resident memory, in KiB, as far as polling every 5 ms, at first more often, shows.
     pub memory_kib_max: u64,
 }
 
@@ -38,7 +38,7 @@ impl Outcome {
         self
     }
 
-    /// It failed with code 1 and told the user why in a line or a few.
+    /// It failed with code 1 and gave the user the reason in a few lines.
     #[track_caller]
     #[allow(clippy::return_self_not_must_use, reason = "most callers are done when it ended so")]
     pub fn expect_clear_failure(self) -> Self {
@@ -72,7 +72,7 @@ pub fn run(command: &mut Command, limit: Duration) -> Outcome {
 #[track_caller]
 pub fn run_with_input(command: &mut Command, input: Option<File>, limit: Duration) -> Outcome {
     let dir = tempfile::tempdir().unwrap();
-    // Files and not pipes: nobody has to read while the program runs.
+    // Files and not pipes: no reader is needed while the program runs.
     let (out, err) = (dir.path().join("stdout"), dir.path().join("stderr"));
     let mut child = command
         .stdin(input.map_or_else(Stdio::null, Stdio::from))
@@ -89,7 +89,7 @@ pub fn run_with_input(command: &mut Command, input: Option<File>, limit: Duratio
     Outcome { code: status.code(), stdout: fs::read(&out).unwrap(), stderr, memory_kib_max }
 }
 
-/// How it ended and the most memory it had; no status if its time was up, and then it is ended.
+/// Its exit status and its highest memory; after a timeout it is ended, and there is no status.
 fn wait(child: &mut Child, limit: Duration) -> (Option<ExitStatus>, u64) {
     let start = Instant::now();
     let mut memory_kib_max = 0;
@@ -107,7 +107,8 @@ fn wait(child: &mut Child, limit: Duration) -> (Option<ExitStatus>, u64) {
     }
 }
 
-/// The most memory that a process had. None while it is between `vfork` and `exec`: its memory is this program's own then.
+/// The highest memory of a process. None while it is between `vfork` and `exec`: its memory is then this program's
+/// own.
 fn resident_kib_max(process: u32) -> Option<u64> {
     let program = |of: &str| fs::read_link(format!("/proc/{of}/exe")).ok();
     if program(&process.to_string())? == program("self")? {

@@ -1,4 +1,4 @@
-//! What documents say was shown, and by what: each test that they name is there, and so is each campaign.
+//! Proofs named in documents: each named test exists, and so does each campaign.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -7,7 +7,7 @@ use std::path::Path;
 use crate::flights::root;
 use crate::prove::{CAMPAIGNS, diagnosis::DIAGNOSIS};
 
-/// Documents that promise something and name what shows it.
+/// Documents with promises and the names of their proofs.
 const DOCUMENTS: [&str; 2] = ["docs/safety.md", "docs/cards.md"];
 
 /// The functions in all files of Rust below a folder.
@@ -24,7 +24,7 @@ fn functions(folder: &Path, found: &mut BTreeSet<String>) {
     }
 }
 
-/// What stands in a document between backquotes.
+/// The texts between backquotes in a document.
 fn quoted(text: &str) -> impl Iterator<Item = &str> {
     text.split('`').skip(1).step_by(2)
 }
@@ -58,7 +58,7 @@ fn each_test_and_each_campaign_that_a_document_names_is_there() {
     assert!(tests > 20, "{tests} tests");
 }
 
-/// Each row of the table of failures in docs/safety.md names what shows it.
+/// Each row of the table of failures in docs/safety.md names its proof.
 #[test]
 fn nothing_is_said_of_a_failure_that_nothing_shows() {
     let text = fs::read_to_string(root().join("docs/safety.md")).unwrap();

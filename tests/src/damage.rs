@@ -35,7 +35,7 @@ impl Random {
     }
 }
 
-/// Changes each byte with this probability into another one; tells for each whether it was.
+/// Changes each byte with this probability; returns for each whether it was changed.
 pub fn noise(data: &mut [u8], probability: f64, seed: u64) -> Vec<bool> {
     let mut random = Random::new(seed);
     data.iter_mut()

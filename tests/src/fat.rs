@@ -1,4 +1,4 @@
-//! The file system of a card's image, looked at with dosfstools and mtools.
+//! The file system of a card's image, examined with dosfstools and mtools.
 
 use std::fs::File;
 use std::io::{Read as _, Seek as _, SeekFrom, Write as _};
@@ -9,10 +9,10 @@ use std::time::Duration;
 use crate::child;
 
 const SECTOR: u64 = 512;
-/// Copied in pieces of this size; a piece of zeros is left out, so that sparse stays sparse.
+/// Size of a copied piece; a piece of zeros is left out, so that sparse files stay sparse.
 const PIECE: usize = 1 << 16;
 
-/// Where the first partition of an image starts and how long it is, in bytes.
+/// Start and length of an image's first partition, in bytes.
 fn partition(image: &mut File) -> (u64, u64) {
     let mut table = [0; 512];
     image.read_exact(&mut table).unwrap();
@@ -21,10 +21,11 @@ fn partition(image: &mut File) -> (u64, u64) {
     (number(0x1BE + 8) * SECTOR, number(0x1BE + 12) * SECTOR)
 }
 
-/// `fsck.vfat -n` finds nothing but what a power cut may leave: clusters that belong to no file, the count of free
-/// clusters that goes with them, and the mark that the card was in use.
+/// `fsck.vfat -n` finds only effects of a power cut: clusters without a file, their part of the free count, and the
+/// mark of a card in use.
 ///
 /// # Panics
+///
 /// If it finds anything else.
 #[track_caller]
 pub fn assert_clean(image: &Path) {
@@ -35,9 +36,10 @@ pub fn assert_clean(image: &Path) {
     assert!(odd.is_empty(), "fsck.vfat says: {odd:#?}");
 }
 
-/// What `fsck.vfat -n` says of a partition beyond what a power cut may leave.
+/// Complaints of `fsck.vfat -n` about a partition, beyond effects of a power cut.
 ///
 /// # Panics
+///
 /// If it does not run.
 pub fn complaints(partition: &Path) -> Vec<String> {
     let outcome = child::run(Command::new(fsck()).arg("-n").arg(partition), Duration::from_mins(1));
@@ -87,7 +89,7 @@ fn fsck() -> PathBuf {
     found.expect("fsck.vfat is missing: `cargo xtask setup` installs dosfstools")
 }
 
-/// Copies the first partition of an image into a file; where it begins in the image, in bytes.
+/// Copies the first partition of an image into a file; returns its start in the image, in bytes.
 pub(crate) fn extract(image: &Path, to: &Path) -> u64 {
     let mut from = File::open(image).unwrap();
     let (start, length) = partition(&mut from);

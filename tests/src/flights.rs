@@ -1,4 +1,4 @@
-//! The recorded flights and what pymavlink found in them.
+//! The recorded flights and pymavlink's results on them.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -20,24 +20,25 @@ pub fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap()
 }
 
-/// Where a recording of the repository lies.
+/// The path of a recording of the repository.
 pub fn own(name: &str) -> PathBuf {
     root().join("tests/flights").join(name)
 }
 
-/// The recordings in the folders below `HUMS_FLIGHTS`, for a test of nothing else. Those that the repository has
-/// itself are left out.
+/// The recordings in the folders below `HUMS_FLIGHTS`, for tests of these alone. Those of the repository are left
+/// out.
 ///
 /// # Panics
-/// Where `HUMS_FLIGHTS` names none: a test of nothing is no success.
+///
+/// If `HUMS_FLIGHTS` names none: a test without input is not a success.
 pub fn further() -> Vec<PathBuf> {
     let found = more();
     assert!(!found.is_empty(), "HUMS_FLIGHTS names no folder of recordings");
     found
 }
 
-/// The recordings in the folders below `HUMS_FLIGHTS`, for a test that reads those of the repository too; none where
-/// that is not set.
+/// The recordings in the folders below `HUMS_FLIGHTS`, for tests that read those of the repository too; none if it is
+/// not set.
 pub fn more() -> Vec<PathBuf> {
     let Some(folder) = std::env::var_os("HUMS_FLIGHTS").filter(|folder| !folder.is_empty()) else {
         return Vec::new();
@@ -63,22 +64,22 @@ fn collect(folder: &Path, found: &mut Vec<PathBuf>) {
     }
 }
 
-/// What pymavlink found in one recording.
+/// Pymavlink's result on one recording.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Found {
     /// A tlog, with times; otherwise the raw bytes of a port.
     pub is_tlog: bool,
-    /// How many frames it verified.
+    /// Its number of verified frames.
     pub frames: u64,
     /// The same per message id.
     pub frames_by_id: BTreeMap<u32, u64>,
-    /// Bytes that belong to no frame and, in a tlog, to no time of one.
+    /// Bytes outside frames and, in a tlog, outside their times.
     pub bytes_other: u64,
     /// SHA-256 over the bytes of those frames, in their order.
     pub sha256: String,
 }
 
-/// What a manifest says.
+/// A manifest of recordings.
 #[derive(Debug)]
 pub struct Manifest {
     flights: BTreeMap<String, Found>,
@@ -113,13 +114,13 @@ impl Manifest {
         })
     }
 
-    /// What was found in the recording of this path.
+    /// The entry of this recording.
     pub fn found(&self, path: &Path) -> &Found {
         let name = path.file_name().unwrap_or_default().to_string_lossy();
         self.flights.get(&*name).unwrap_or_else(|| panic!("the manifest has no {name}"))
     }
 
-    /// The frames of a recording in the kind of file that the manifest says it is.
+    /// The frames of a recording, by its kind of file in the manifest.
     pub fn frames_of<'a>(&self, path: &Path, data: &'a [u8]) -> Vec<Frame<'a>> {
         if self.found(path).is_tlog {
             frames::of_tlog(data, &self.seeds, false)

@@ -1,5 +1,5 @@
-//! MAVLink frames, read with as little code as it takes. The checksum seeds come from pymavlink, by way of the manifest,
-//! so nothing here shares a line with the framer that the tests check.
+//! MAVLink frames, read with minimal code. The checksum seeds come from pymavlink, through the manifest, so this
+//! shares no line with the framer that the tests check.
 
 use std::collections::BTreeMap;
 
@@ -13,7 +13,7 @@ pub type Seeds = BTreeMap<u32, u8>;
 /// One frame of a recording.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Frame<'a> {
-    /// Microseconds since 1970, where the recording has times.
+    /// Microseconds since 1970, if the recording has times.
     pub time_us: Option<u64>,
     /// The message id.
     pub id: u32,
@@ -104,10 +104,11 @@ pub fn build_v2(sequence: u8, id: u32, payload: &[u8], seed: u8) -> Vec<u8> {
     frame
 }
 
-/// The verified frames of both are the same ones, bit for bit and in the same order, and whatever else is in `output`
-/// is in the bytes of `stream`, in the same order.
+/// Both have the same verified frames, bit for bit and in the same order. All other bytes in `output` are bytes of
+/// `stream`, in the same order.
 ///
 /// # Panics
+///
 /// If not, naming the first difference.
 #[track_caller]
 pub fn assert_same(expected: &[Frame<'_>], output: &[Frame<'_>], stream: &[u8]) {

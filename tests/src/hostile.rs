@@ -1,4 +1,4 @@
-//! Inputs that are made to take memory: well-formed, and far larger inside than outside.
+//! Inputs that try to take memory: well-formed, and far larger inside than outside.
 
 use std::fs::{self, File};
 use std::io::{BufWriter, Seek as _, SeekFrom, Write};
@@ -20,7 +20,7 @@ use crate::program::hums;
 const HEARTBEAT: [u8; 17] = [0xfe, 9, 0x4e, 1, 1, 0, 0, 0, 0, 0, 2, 3, 0x51, 4, 3, 0x1c, 0x7f];
 /// Blocks of a directory at most: 65,536 entries of 32 bytes.
 const DIRECTORY_BLOCKS: u32 = 4_096;
-/// The first of the clusters that are given away: what lies before them stays as it is.
+/// The first of the clusters that are given away; those before it stay.
 const CLUSTER: u32 = 60_000;
 
 /// Packs these bytes of a line.
@@ -43,7 +43,7 @@ fn packed(dir: &Path, name: &str, raw: &[u8]) -> PathBuf {
     log
 }
 
-/// A file of so many sectors, each the beginning of a session of its own.
+/// A file of `count` sectors, each the beginning of a session of its own.
 pub fn starts(dir: &Path, count: u32) -> PathBuf {
     let first = fs::read(heartbeats(dir, 100)).unwrap();
     let mut sector = Sector::from_bytes(*first.first_chunk::<SECTOR_BYTES>().unwrap());
@@ -57,7 +57,7 @@ pub fn starts(dir: &Path, count: u32) -> PathBuf {
     path
 }
 
-/// A log of ten heartbeats, and behind it so many parity sectors of its session.
+/// A log of ten heartbeats, and behind it `count` parity sectors of its session.
 pub fn parity(dir: &Path, count: u32) -> PathBuf {
     let log = heartbeats(dir, 10);
     let session = Header::read(fs::read(&log).unwrap().first_chunk().unwrap()).unwrap().session;
@@ -73,14 +73,14 @@ pub fn parity(dir: &Path, count: u32) -> PathBuf {
     path
 }
 
-/// The same heartbeat so many times, as a port's bytes.
+/// The same heartbeat `count` times, as a port's bytes.
 pub fn raw_heartbeats(dir: &Path, count: usize) -> PathBuf {
     let path = dir.join("heartbeats.raw");
     fs::write(&path, HEARTBEAT.repeat(count)).unwrap();
     path
 }
 
-/// The same heartbeat so many times: 200 bytes of the log are 30,000 frames.
+/// The same heartbeat `count` times: 200 bytes of the log are 30,000 frames.
 pub fn heartbeats(dir: &Path, count: usize) -> PathBuf {
     packed(dir, "heartbeats", &HEARTBEAT.repeat(count))
 }
@@ -109,13 +109,13 @@ pub fn parameters(dir: &Path, count: u32) -> PathBuf {
     })
 }
 
-/// Nothing but messages that nobody knows, each with an id of its own.
+/// Only unknown messages, each with an id of its own.
 pub fn unknown_ids(dir: &Path, count: u32) -> PathBuf {
     let mut raw = HEARTBEAT.to_vec();
     for number in 0..count {
         let [low, middle, high, _] = (70_000 + number).to_le_bytes();
         let mut frame = vec![0xfd, 1, 0, 0, number as u8, 1, 1, low, middle, high, 1];
-        // With the seed 0: some seed is right for it, so it is a frame.
+        // With the seed 0: the checksum is valid for some seed, so it is a frame.
         let crc = crc::step(crc::update(crc::START, &frame[1..]), 0);
         frame.extend_from_slice(&crc.to_le_bytes());
         raw.extend_from_slice(&frame);
@@ -123,7 +123,8 @@ pub fn unknown_ids(dir: &Path, count: u32) -> PathBuf {
     packed(dir, "unknown", &raw)
 }
 
-/// A ground station's log of so many vehicles that tell each quantity of each of twelve motors twenty times a second.
+/// A ground station's log of this many vehicles that send each quantity of each of twelve motors twenty times a
+/// second.
 pub fn fleet(dir: &Path, vehicles: u8, seconds: u64) -> PathBuf {
     let (mut log, log_path) = (Vec::new(), dir.join("fleet.tlog"));
     let mut encoders: Vec<Encoder> = (1..=vehicles).map(|system| Encoder::of(system, 1)).collect();
@@ -149,7 +150,7 @@ pub fn fleet(dir: &Path, vehicles: u8, seconds: u64) -> PathBuf {
     log_path
 }
 
-/// A log of PX4's with more topics than it has, two joined: 2,000 tables of 30 columns each.
+/// A log of PX4's with two joined sets of topics, more than PX4 has: 2,000 tables of 30 columns each.
 pub fn wide_ulog(dir: &Path) -> PathBuf {
     const TOPICS: u16 = 1_000;
     const FIELDS: usize = 30;
@@ -185,7 +186,7 @@ pub fn wide_ulog(dir: &Path) -> PathBuf {
     path
 }
 
-/// A log of PX4's whose topics are arrays of so many bytes, each a column.
+/// A log of PX4's whose topics are arrays of bytes, each a column.
 pub fn long_arrays(dir: &Path) -> PathBuf {
     let mut log = b"ULog\x01\x12\x35\x01".to_vec();
     log.extend_from_slice(&1_000_000_u64.to_le_bytes());
@@ -311,7 +312,8 @@ fn dataflash_format(kind: u8, bytes: usize, name: &str, format: &str, columns: &
     message
 }
 
-/// A log of `ArduPilot`'s that defines each of 64 messages sixteen times with other columns: as many tables as are kept.
+/// A log of `ArduPilot`'s that defines each of 64 messages sixteen times with other columns: the maximum number of
+/// tables.
 pub fn wide_dataflash(dir: &Path) -> PathBuf {
     const COLUMNS: usize = 14;
     let mut log = dataflash_format(128, 89, "FMT", "BBnNZ", "Type,Length,Name,Format,Columns");
@@ -372,7 +374,7 @@ fn entry(name: &[u8; 11], attributes: u8, cluster: u32, size: u32) -> [u8; 32] {
     entry
 }
 
-/// A card whose directories are full of segments: empty ones, or such as lie in no cluster.
+/// A card whose directories are full of segments: empty ones, or ones without a cluster.
 pub fn directories(dir: &Path, count: u32, bogus: bool) -> PathBuf {
     let (image, mut file, layout) = card(dir, if bogus { "bogus" } else { "empty" });
     let root: Vec<u8> = (0..count)
@@ -401,7 +403,7 @@ pub fn directories(dir: &Path, count: u32, bogus: bool) -> PathBuf {
     image
 }
 
-/// A card with so many sectors, each of a session of its own.
+/// A card with `count` sectors, each of a session of its own.
 pub fn sessions(dir: &Path, count: u32) -> PathBuf {
     let (image, mut file, layout) = card(dir, "sessions");
     let mut sectors = Vec::new();

@@ -1,16 +1,16 @@
-//! Helpers of the end-to-end tests: the `hums` program as a user runs it, the recorded flights, and readers of MAVLink
-//! that share no code with what they check.
+//! Helpers of the end-to-end tests: the `hums` program as for a user, the recorded flights, and readers of MAVLink
+//! that share no code with the tested ones.
 //!
 //! * [`chip`] is a board on the model of the chip, with the image that is flashed.
-//! * [`child`] runs a program with a limit on its time, and tells what it said and the memory it took.
-//! * [`program`] runs `hums` and reads what it left behind.
+//! * [`child`] runs a program with a time limit, and returns its output and its memory.
+//! * [`program`] runs `hums` and reads its output files.
 //! * [`frames`] reads MAVLink frames with a few lines of its own and the checksum seeds of pymavlink.
-//! * [`flights`] knows the recordings and what pymavlink found in them; [`oracle`] asks it about others.
+//! * [`flights`] has the recordings and pymavlink's results on them; [`oracle`] asks it about others.
 //! * [`live`] starts `hums live`, and sends it frames.
 //! * [`prove`] are the campaigns, thousands of cases each.
 //! * [`hostile`] makes inputs that are far larger inside than outside.
-//! * [`store`] reads what outlives power.
-//! * [`not_tested`] tells what a machine does not let us test.
+//! * [`store`] reads the items that outlive power.
+//! * [`not_tested`] reports tests that a machine does not allow.
 //! * [`damage`] makes noise; [`fat`] checks a card's file system with the system's own tools.
 #![allow(
     clippy::missing_panics_doc,
@@ -34,10 +34,10 @@ pub mod program;
 pub mod prove;
 pub mod store;
 
-/// Tells `cargo xtask test` that something was not tested on this machine, so that its table says so: what was not tested
-/// is no success.
+/// Reports to `cargo xtask test` that a part was not tested on this machine, for its table: an untested part is not a
+/// success.
 pub fn not_tested(what: &str) {
     use std::io::Write as _;
-    // Not `println!`, which libtest keeps to itself. On a line of its own, whatever it was printing.
+    // Not `println!`, which libtest captures. It begins a new line.
     let _ = write!(std::io::stdout().lock(), "\nNOT TESTED: {what}\n");
 }

@@ -1,4 +1,4 @@
-//! `hums live` as a program that goes on, and a vehicle for it.
+//! `hums live` as a running program, and a vehicle for it.
 
 use std::io::{BufRead as _, BufReader, Read as _, Write as _};
 use std::net::{TcpStream, UdpSocket};
@@ -7,7 +7,7 @@ use std::process::{Child, ChildStderr, Command, Stdio};
 use std::thread;
 use std::time::{Duration, Instant};
 
-/// A program that ends with what holds it.
+/// A program that is ended when dropped.
 #[derive(Debug)]
 pub struct Running(pub Child);
 
@@ -25,7 +25,7 @@ impl Running {
         assert!(status.unwrap().success(), "no such process");
     }
 
-    /// Its exit code, which it is to have within `limit`.
+    /// Its exit code, within `limit`.
     #[track_caller]
     pub fn end(&mut self, limit: Duration) -> Option<i32> {
         let start = Instant::now();
@@ -38,10 +38,10 @@ impl Running {
         }
     }
 
-    /// Processor time that it has taken, seconds, and its memory, now and at most, KiB.
+    /// Its processor time, seconds, and its memory, now and at most, KiB.
     pub fn cost(&self) -> Option<(f64, u64, u64)> {
         let stat = std::fs::read_to_string(format!("/proc/{}/stat", self.0.id())).ok()?;
-        // After the name, which may have spaces in it.
+        // After the name, which may contain spaces.
         let fields: Vec<&str> = stat.rsplit_once(')')?.1.split_whitespace().collect();
         let ticks: u64 = fields.get(11)?.parse::<u64>().ok()? + fields.get(12)?.parse::<u64>().ok()?;
         let status = std::fs::read_to_string(format!("/proc/{}/status", self.0.id())).ok()?;
@@ -76,7 +76,7 @@ impl Live {
         Self::attempt_at(program, arguments).unwrap_or_else(|words| panic!("no address: {words}"))
     }
 
-    /// As [`Self::start`]; none where it ends with an error, as it does with what is no recording.
+    /// As [`Self::start`]; none if it ends with an error, for instance for a file that is not a recording.
     #[track_caller]
     pub fn attempt(arguments: &[&str]) -> Option<Self> {
         Self::attempt_at(crate::program::path(), arguments).ok()
@@ -104,13 +104,13 @@ impl Live {
         Ok(Self { program: Running(child), address: address.trim().to_owned(), stderr })
     }
 
-    /// Ends it as Ctrl-C does: its exit code, and what it said.
+    /// Ends it by Ctrl-C: its exit code, and its output.
     #[track_caller]
     pub fn interrupt(self, limit: Duration) -> (Option<i32>, String) {
         self.end_by("INT", limit)
     }
 
-    /// Ends it as a service is ended; as [`Self::interrupt`].
+    /// Ends it like a service; as [`Self::interrupt`].
     #[track_caller]
     pub fn terminate(self, limit: Duration) -> (Option<i32>, String) {
         self.end_by("TERM", limit)
@@ -150,7 +150,7 @@ pub fn handshake(host: &str) -> TcpStream {
     stream
 }
 
-/// What a page of `hums live` is sent.
+/// The messages of a page of `hums live`.
 #[derive(Debug)]
 pub struct Page(BufReader<TcpStream>);
 
@@ -182,7 +182,7 @@ pub fn free_port() -> u16 {
     UdpSocket::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port()
 }
 
-/// Gives frames to `put`, evenly, so many a second; `each` is told how many are gone.
+/// Gives frames to `put`, evenly, at a rate each second; `each` gets the number sent so far.
 pub fn send<'a>(
     frames: impl Iterator<Item = &'a [u8]>,
     rate: f64,

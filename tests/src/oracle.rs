@@ -31,7 +31,7 @@ fn run(script: &str, arguments: &[PathBuf]) -> String {
 fn outcome(script: &str, arguments: &[PathBuf]) -> child::Outcome {
     let mut command = Command::new(from_environment("HUMS_PYTHON", "target/venv/bin/python"));
     command.arg(root().join("tests/oracle").join(script)).args(arguments);
-    // The repository stays as it is: no compiled scripts in it.
+    // The repository stays unchanged: no compiled scripts in it.
     command.env("PYTHONDONTWRITEBYTECODE", "1");
     child::run(&mut command, LIMIT).expect_code(&[0])
 }
@@ -40,18 +40,18 @@ fn json(text: &str) -> Value {
     serde_json::from_str(text).expect("the script prints JSON")
 }
 
-/// Where the system's packages put a program, unless the environment says otherwise.
+/// The path of a program from the system's packages, unless the environment sets another.
 fn program(variable: &str, path: &str) -> PathBuf {
     std::env::var_os(variable).map_or_else(|| PathBuf::from(path), PathBuf::from)
 }
 
-/// Compares what a log was decoded to with its recording, field by field: see `tests/oracle/readback.py`.
+/// Compares a decoded log with its recording, field by field: see `tests/oracle/readback.py`.
 pub fn readback(recording: &Path, out: &Path) -> Value {
     let influxd = program("HUMS_INFLUXD", "/usr/bin/influxd");
     json(&ask("readback.py", &[recording.to_owned(), out.to_owned(), influxd]))
 }
 
-/// Compares what was read of a PX4 log with what pyulog reads: see `tests/oracle/ulog.py`.
+/// Compares our reading of a PX4 log with pyulog's: see `tests/oracle/ulog.py`.
 pub fn ulog(log: &Path, folder: &Path) -> Value {
     json(&run("ulog.py", &[log.to_owned(), folder.to_owned()]))
 }
@@ -71,17 +71,17 @@ pub fn fleet(document: &Path, folder: &Path) -> Value {
     json(&run("fleet.py", &[document.to_owned(), folder.to_owned()]))
 }
 
-/// Runs a document's Python in a folder and gives what each block printed: see `tests/oracle/snippets.py`.
+/// Runs a document's Python in a folder and returns the output of each block: see `tests/oracle/snippets.py`.
 pub fn snippets(document: &Path, folder: &Path) -> Value {
     json(&run("snippets.py", &[document.to_owned(), folder.to_owned()]))
 }
 
-/// What Grafana's own model of dashboards says to these: see `tests/oracle/grafana.py`.
+/// The verdict of Grafana's own model on these dashboards: see `tests/oracle/grafana.py`.
 pub fn grafana(dashboards: &[PathBuf]) -> Value {
     json(&run("grafana.py", dashboards))
 }
 
-/// Looks at a page in a browser, with the mouse at these parts of each plot: see `tests/oracle/browser.py`.
+/// Opens a page in a browser, with the mouse at these parts of each plot: see `tests/oracle/browser.py`.
 pub fn browser(page: &Path, parts: &[f32]) -> Value {
     let chromium = program("HUMS_CHROMIUM", "/usr/bin/chromium");
     let driver = program("HUMS_CHROMEDRIVER", "/usr/bin/chromedriver");
@@ -125,12 +125,12 @@ impl LivePage {
     /// Opens an address, in a window of this size.
     #[track_caller]
     pub fn open(&mut self, url: &str, scheme: &str, width: u32, height: u32) {
-        // Another fragment alone would not load the page anew.
+        // Another fragment alone would not reload the page.
         self.ask(&serde_json::json!({ "do": "open", "url": "about:blank", "scheme": scheme, "width": width, "height": height }));
         self.ask(&serde_json::json!({ "do": "open", "url": url, "scheme": scheme, "width": width, "height": height }));
     }
 
-    /// Shows it on a screen or, with `print`, on paper, with these of the reader's preferences.
+    /// Shows it on a screen or, with `print`, on paper, with these preferences of the reader.
     #[track_caller]
     pub fn media(&mut self, media: &str, features: &Value) {
         self.ask(&serde_json::json!({ "do": "media", "media": media, "features": features }));
@@ -142,7 +142,7 @@ impl LivePage {
         self.ask(&serde_json::json!({ "do": "pdf", "path": path }));
     }
 
-    /// What the page shows at one moment.
+    /// The content of the page at one moment.
     #[track_caller]
     pub fn read(&mut self) -> Value {
         self.ask(&serde_json::json!({ "do": "read" }))
@@ -154,7 +154,7 @@ impl LivePage {
         self.ask(&serde_json::json!({ "do": "wait", "script": script, "limit_s": limit_s }))
     }
 
-    /// What a script returns.
+    /// The result of a script.
     #[track_caller]
     pub fn run(&mut self, script: &str) -> Value {
         self.ask(&serde_json::json!({ "do": "run", "script": script }))
@@ -166,7 +166,7 @@ impl LivePage {
         self.ask(&serde_json::json!({ "do": "press", "keys": keys }));
     }
 
-    /// Milliseconds that each frame of the browser takes until it is painted, for so long.
+    /// Times of the browser's frames until they are painted, in milliseconds, over this span.
     #[track_caller]
     pub fn frames_ms(&mut self, seconds: u32) -> Vec<f64> {
         let frames = self.ask(&serde_json::json!({ "do": "frames", "seconds": seconds }));
@@ -179,7 +179,7 @@ impl LivePage {
         self.ask(&serde_json::json!({ "do": "shot", "path": path, "whole": whole }));
     }
 
-    /// What the browser has complained about.
+    /// The browser's complaints.
     #[track_caller]
     pub fn console(&mut self) -> Value {
         self.ask(&serde_json::json!({ "do": "console" }))
@@ -188,7 +188,7 @@ impl LivePage {
 
 impl Drop for LivePage {
     fn drop(&mut self) {
-        // The script ends its browser when nothing more is asked; one that hangs is ended.
+        // The script ends its browser at end of input; one that hangs is ended.
         let _ = self.asked.write_all(b"{\"do\": \"quit\"}\n");
         for _ in 0..100 {
             if !matches!(self.browser.try_wait(), Ok(None)) {
@@ -201,41 +201,42 @@ impl Drop for LivePage {
     }
 }
 
-/// What pymavlink finds in these recordings.
+/// Pymavlink's results on these recordings.
 pub fn manifest(files: &[PathBuf]) -> Manifest {
     Manifest::parse(&ask("manifest.py", files))
 }
 
-/// Usage of these recordings as pymavlink's messages have it: see `tests/oracle/usage.py`.
+/// Usage of these recordings by pymavlink's messages: see `tests/oracle/usage.py`.
 pub fn usage(files: &[PathBuf]) -> Value {
     json(&ask("usage.py", files))
 }
 
-/// Parses a stream to the ground station strictly and tells what was in it: see `tests/oracle/gs_stream.py`.
+/// Parses a stream to the ground station strictly and returns its content: see `tests/oracle/gs_stream.py`.
 ///
 /// # Panics
-/// If a single byte of it is not part of a good frame.
+///
+/// If a single byte of it is not part of a valid frame.
 pub fn ground_station(stream: &Path) -> Value {
     serde_json::from_str(&ask("gs_stream.py", &[stream.to_owned()])).expect("gs_stream.py prints JSON")
 }
 
-/// Talks to the box at this UDP port as a ground station does: see `tests/oracle/companion.py`.
+/// Talks to the box at this UDP port like a ground station: see `tests/oracle/companion.py`.
 pub fn companion(port: u16) -> Value {
     let said = ask("companion.py", &[PathBuf::from(port.to_string())]);
     serde_json::from_str(&said).expect("companion.py prints JSON")
 }
 
-/// Packs a text as the firmware holds it: see `tests/oracle/metadata.py`.
+/// Packs a text as the firmware stores it: see `tests/oracle/metadata.py`.
 pub fn pack(text: &Path, into: &Path) {
     run("metadata.py", &["pack".into(), text.to_owned(), into.to_owned()]);
 }
 
-/// What is packed in a file, by Python's xz.
+/// The content of a packed file, by Python's xz.
 pub fn unpack(file: &Path) -> String {
     run("metadata.py", &["unpack".into(), file.to_owned()])
 }
 
-/// What Mission Planner finds in its file of descriptions.
+/// Mission Planner's reading of its file of descriptions.
 pub fn descriptions(file: &Path) -> Value {
     json(&run("metadata.py", &["words".into(), file.to_owned()]))
 }
@@ -245,7 +246,7 @@ pub fn metadata(port: u16, folder: &Path) -> Value {
     json(&ask("metadata.py", &["fetch".into(), port.to_string().into(), folder.to_owned()]))
 }
 
-/// Talks to the box at this UDP port with pymavlink's signing; `state` is what a run leaves for the next one: see
+/// Talks to the box at this UDP port with pymavlink's signing; `state` passes from one run to the next: see
 /// `tests/oracle/signing.py`.
 pub fn signing(port: u16, state: &Path) -> Value {
     json(&ask("signing.py", &[PathBuf::from(port.to_string()), state.to_owned()]))
@@ -264,7 +265,7 @@ pub fn vehicle(autopilot: u16, ground: u16, kind: &str) -> Value {
     json(&ask("vehicle.py", &arguments.map(PathBuf::from)))
 }
 
-/// Sits at MAVProxy's prompt: see `tests/oracle/gs_mavproxy.py`.
+/// Talks to MAVProxy's prompt: see `tests/oracle/gs_mavproxy.py`.
 pub fn mavproxy(port: u16, folder: &Path) -> Value {
     json(&run("gs_mavproxy.py", &[PathBuf::from(port.to_string()), folder.to_owned()]))
 }
@@ -275,7 +276,7 @@ pub fn mavproxy_alerts(stream: &Path, modules: &Path, folder: &Path) -> Value {
     json(&run("gs_mavproxy_alerts.py", &[stream.to_owned(), modules.to_owned(), folder.to_owned()]))
 }
 
-/// Downloads the oldest log to `out` as a ground station does, `loss` of all frames lost: see
+/// Downloads the oldest log to `out` like a ground station, with a `loss` of all frames: see
 /// `tests/oracle/log_download.py`.
 pub fn log_download(port: u16, out: &Path, loss: f64) -> Value {
     let arguments = [PathBuf::from(port.to_string()), out.to_owned(), PathBuf::from(loss.to_string())];

@@ -1,4 +1,4 @@
-//! The `hums` program, run as a user runs it.
+//! The `hums` program, run as by a user.
 
 use std::ffi::OsStr;
 use std::fs;
@@ -14,13 +14,13 @@ use crate::child::{self, Outcome};
 use crate::flights::root;
 use crate::frames::{self, Frame, Seeds};
 
-/// No command of the tests may take longer on this PC; one that does hangs.
+/// Time limit of all commands of the tests; one that takes longer hangs.
 pub const LIMIT: Duration = Duration::from_mins(2);
 
 /// A second of flight takes some 0.15 s on the model of the chip, on a core of its own.
 pub const LIMIT_CHIP: Duration = Duration::from_mins(20);
 
-/// Where `hums` lies: `HUMS_BIN` names it, or it is built, once.
+/// The path of `hums`: from `HUMS_BIN`, or built once.
 pub fn path() -> &'static Path {
     static PATH: OnceLock<PathBuf> = OnceLock::new();
     PATH.get_or_init(|| match std::env::var_os("HUMS_BIN") {
@@ -39,9 +39,10 @@ fn build() -> PathBuf {
     executable.expect("the package hums has a program")
 }
 
-/// The F405's image, made as a release is: `HUMS_FIRMWARE` names the ELF file, otherwise it is where xtask leaves it.
+/// The F405's image, made like a release: the ELF file of `HUMS_FIRMWARE`, otherwise the one from xtask.
 ///
 /// # Panics
+///
 /// If it is not there.
 pub fn firmware() -> PathBuf {
     let built = || root().join("target/firmware/hums-f405.elf");
@@ -63,7 +64,7 @@ pub fn hums<A: AsRef<OsStr>>(arguments: impl IntoIterator<Item = A>) -> Outcome 
     child::run(&mut command(arguments), LIMIT)
 }
 
-/// What runs the pipeline.
+/// The machine that runs the pipeline.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Machine {
     /// `hums sim`: this PC.
@@ -72,7 +73,7 @@ pub enum Machine {
     Chip,
 }
 
-/// A recording that was made, in a folder that goes with it.
+/// A finished recording, in a folder of its own.
 #[derive(Debug)]
 pub struct Recording {
     dir: TempDir,
@@ -81,7 +82,7 @@ pub struct Recording {
 }
 
 impl Recording {
-    /// Records `input` with these further flags, whatever comes of it.
+    /// Records `input` with these further flags, with any result.
     #[track_caller]
     pub fn attempt(machine: Machine, input: &Path, flags: &[&str]) -> Self {
         let dir = tempfile::tempdir().unwrap();
@@ -100,7 +101,8 @@ impl Recording {
         Self { dir, outcome }
     }
 
-    /// Records `input`; exit code 0 is expected, or 3 where the input itself has bytes of no record, which is said.
+    /// Records `input`; exit code 0 is expected, or 3 if the input itself has bytes outside records, which is
+    /// reported.
     #[track_caller]
     pub fn make(machine: Machine, input: &Path, flags: &[&str]) -> Self {
         let recording = Self::attempt(machine, input, flags);
@@ -121,7 +123,7 @@ impl Recording {
         self.dir.path().join("card.img")
     }
 
-    /// What the ground station got.
+    /// The ground station's bytes.
     pub fn gs(&self) -> PathBuf {
         self.dir.path().join("gs.bin")
     }
@@ -171,7 +173,7 @@ impl Decoded {
     #[track_caller]
     pub fn of(source: &Path, codes: &[i32]) -> Self {
         let dir = tempfile::tempdir().unwrap();
-        // A file where there is one log, a folder where there are several.
+        // A file for one log, a folder for several.
         let out = dir.path().join("out");
         let mut command = command(["decode".as_ref(), source.as_os_str(), "-o".as_ref(), out.as_os_str()]);
         child::run(command.args(["--format", "tlog"]), LIMIT).expect_code(codes);
@@ -192,7 +194,7 @@ impl Decoded {
     }
 }
 
-/// The files at or below `path`, which may not be there at all.
+/// The files at or below `path`, which may not exist.
 fn collect(path: &Path, files: &mut Vec<PathBuf>) {
     if path.is_file() {
         files.push(path.to_owned());

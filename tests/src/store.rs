@@ -1,4 +1,4 @@
-//! What a store's file holds, read with the firmware's own crates: there is no other reader.
+//! The content of a store's file, read with the firmware's own crates: there is no other reader.
 
 use std::fs;
 use std::path::Path;
@@ -7,7 +7,7 @@ use hums_core::lifetime::{Item as _, ItemKey, Lifetime, Session};
 use hums_store::sim::SimFlash;
 use hums_store::{Found, Store, param};
 
-/// What outlived power.
+/// The items that outlived power.
 #[derive(Debug, Default)]
 pub struct Stored {
     /// The counters over the airframe's life, the last session included.

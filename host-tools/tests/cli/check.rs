@@ -9,7 +9,7 @@ use hums_link::packet::Packet;
 
 use super::support::{attempt, end_of, flight, frames_of, hums, json, px4, recorded, records, run, text};
 
-/// Checks that tell of the place on a link, which a recording of another place cannot.
+/// Checks of the place on a link, which other recordings lack.
 const OF_THE_WIRE: [&str; 2] = ["heartbeat", "frames_lost"];
 
 fn faults(dir: &Path) {
@@ -107,7 +107,7 @@ fn damage_is_said_with_its_place_and_wins_over_findings() {
     let verdict = screen.lines().find(|line| line.contains("  verdict  ")).unwrap_or_default();
     assert!(verdict.ends_with("; part of the log is missing or damaged, and was not judged"), "{screen}");
 
-    // A log whose recorder lost its power ends within a message: that is told as what it is.
+    // A log whose recorder lost its power ends within a message, and is reported so.
     fs::write(dir.path().join("cut.tlog"), &bytes[..999_001]).expect("written");
     assert!(text(&run(dir.path(), "check cut.tlog", 3)).contains("\n  cut  "));
     let both = text(&run(dir.path(), "check hit.tlog cut.tlog", 3));
@@ -139,7 +139,7 @@ fn a_log_whose_middle_is_gone_is_not_called_all_right_anywhere() {
     let line = |name: &str| table.lines().find(|line| line.contains(name)).unwrap_or_default().to_owned();
     assert!(line("log.hum").starts_with("damaged ") && line("calm.tlog").starts_with("ok "), "{table}");
     assert!(line("log.hum").ends_with("part of it is missing or damaged"), "{table}");
-    // Where nobody knows how many frames are missing, nothing says that none is.
+    // Without a number of missing frames, no text gives zero.
     fs::write(dir.path().join("log.hum"), [&log[..512], &log[from..]].concat()).expect("written");
     for command in ["check", "info", "info --verify", "decode -o out --format tlog"] {
         let ended = run(dir.path(), &format!("{command} log.hum"), 3);
@@ -239,7 +239,7 @@ fn a_recording_is_decoded_without_a_log_of_ours_between() {
     run(dir.path(), "decode faults.tlog -o out --format csv,jsonl,parquet", 0);
     run(dir.path(), "decode --format hum faults.tlog -o packed.hum", 0);
     run(dir.path(), "decode packed.hum -o packed --format csv", 0);
-    // The tables of the recording are those of its pack, but for what a log of ours has besides.
+    // The tables of the recording are those of its pack, which has further ones of our log.
     let table = |folder: &str| {
         let folders = fs::read_dir(dir.path().join(folder)).expect("a folder");
         let folder = folders
@@ -265,7 +265,7 @@ fn a_recording_of_two_vehicles_is_told_as_that() {
     assert!(json(&attempt(dir.path(), "check --json both.tlog"))["remarks"][0].as_str().is_some());
     let info = text(&attempt(dir.path(), "info both.tlog"));
     assert!(info.contains(words), "{info}");
-    // Two recordings of one command are two logs.
+    // Two recordings in one command are two logs.
     fs::write(dir.path().join("one.tlog"), &both[0]).expect("written");
     fs::write(dir.path().join("two.tlog"), &both[1]).expect("written");
     let objects = text(&attempt(dir.path(), "check --json one.tlog two.tlog"));
@@ -309,7 +309,7 @@ fn dataflash(messages: &[(u8, Vec<u8>)]) -> Vec<u8> {
     log
 }
 
-/// What FMT says of a type.
+/// The FMT message of a type.
 fn format_of(kind: u8, length: u8, name: &str, characters: &str, columns: &str) -> Vec<u8> {
     let mut payload = vec![kind, length];
     for (words, size) in [(name, 4), (characters, 16), (columns, 64)] {
@@ -318,7 +318,7 @@ fn format_of(kind: u8, length: u8, name: &str, characters: &str, columns: &str) 
     payload
 }
 
-/// What a terminal obeys, and what turns the direction of writing.
+/// Control characters of terminals, and marks of writing direction.
 fn obeyed(text: &str) -> Vec<char> {
     let is_bad = |c: &char| (c.is_control() && *c != '\n') || matches!(c, '\u{202a}'..='\u{202e}');
     text.chars().filter(is_bad).collect()
@@ -448,7 +448,7 @@ fn a_log_in_which_there_was_nothing_to_judge_does_not_look_good_to_a_script() {
         assert!(checked["vehicle"].is_null() == (verdict == "unknown"), "{checked}");
         assert!(text(&run(dir.path(), &format!("check {name}"), 0)).contains(words));
     }
-    // It neither hides what is wrong with another log nor counts as good.
+    // It neither hides faults of another log nor counts as good.
     faults(dir.path());
     let table = text(&run(dir.path(), "check little.bin faults.tlog", 4));
     assert!(table.contains("1  not enough in it to judge") && !table.contains("nothing wrong"), "{table}");
@@ -479,7 +479,7 @@ fn ulog_of_nothing_known() -> Vec<u8> {
     log
 }
 
-/// A ULog in which a vehicle is heard for 20 s, and whose logger lost something.
+/// A ULog with a vehicle for 20 s, whose logger lost a part.
 fn ulog_with_a_dropout() -> Vec<u8> {
     let mut log = ulog_begun();
     let mut message = |kind: u8, body: &[u8]| ulog_message(&mut log, kind, body);
@@ -510,7 +510,7 @@ fn what_a_logger_itself_lost_is_said_and_is_no_damage_to_any_command() {
     let info = text(&run(dir.path(), "info drop.ulg", 0));
     assert!(info.contains("1 place of loss or noise"), "{info}");
     run(dir.path(), "report drop.ulg -o page.html", 0);
-    // It is of one vehicle.
+    // It has one vehicle.
     run(dir.path(), "check --system 1 drop.ulg", 2);
     let output = run(dir.path(), "decode drop.ulg -o out --format csv", 0);
     let told = String::from_utf8_lossy(&output.stderr).into_owned();
@@ -549,7 +549,7 @@ fn a_failsafe_and_a_crash_are_found_by_their_names() {
         (162, [&at(15_000)[..], &[12, 1]].concat()),
         (161, [&at(15_000)[..], &[11]].concat()),
     ];
-    // Something goes on all the time.
+    // A stream that never pauses.
     messages.extend((0..200_u64).map(|step| (160, [&at(1_000 + 100 * step)[..], &padded("x")].concat())));
     messages.sort_by_key(|(kind, payload)| {
         if *kind == 128 { 0 } else { u64::from_le_bytes(*payload.first_chunk().expect("a time")) }
@@ -564,7 +564,7 @@ fn a_failsafe_and_a_crash_are_found_by_their_names() {
     assert!(screen.contains("autopilot failsafe: emergency: vibration failsafe, crash check"), "{screen}");
 }
 
-/// A tlog with other times: of each record's number and its own.
+/// A tlog with other times: a function of each record's number and time.
 fn with_times(log: &[u8], time: impl Fn(usize, u64) -> u64) -> Vec<u8> {
     let records = records(log).into_iter().enumerate();
     records.flat_map(|(index, (us, frame))| [&time(index, us).to_be_bytes()[..], frame].concat()).collect()
@@ -695,7 +695,7 @@ fn a_packed_recording_has_the_times_the_damage_and_the_joints_that_check_sees() 
     assert_eq!(checked["gaps"][0]["why"], "1 frame with a wrong checksum, which is not read");
 }
 
-/// Nobody can say whether such a frame is damaged: it is kept as it is.
+/// Such a frame cannot be verified: it is kept unchanged.
 #[test]
 fn a_frame_whose_id_is_not_known_is_kept_bit_for_bit() {
     let dir = tempfile::tempdir().expect("directory");
@@ -741,7 +741,7 @@ fn what_another_vehicle_flew_teaches_nothing_and_is_said() {
     let words = "trends are not judged: the flights of --past are of another vehicle (system 1, quadrotor";
     assert!(told(ardupilot).contains(words), "{}", told(ardupilot));
     assert!(!told(px4).contains("another vehicle"), "{}", told(px4));
-    // It is read once: also what can be read but once.
+    // It is read once, as a pipe can be.
     let piped = hums()
         .current_dir(dir.path())
         .args(["check", "--past", ardupilot, "-"])
@@ -758,7 +758,7 @@ fn bytes_of_no_frame_are_told_as_that_and_not_as_time_that_is_missing() {
     let dir = tempfile::tempdir().expect("directory");
     let signed = fs::read(flight("ap_quad_signed.raw")).expect("there");
     fs::write(dir.path().join("signed.raw"), &signed).expect("a copy");
-    // What an autopilot says while it boots is no loss.
+    // Boot texts of an autopilot are not a loss.
     let checked = text(&run(dir.path(), "check signed.raw", 0));
     assert!(
         !checked.contains("of no frame") && checked.contains("160 bytes at its beginning are words"),
@@ -769,7 +769,7 @@ fn bytes_of_no_frame_are_told_as_that_and_not_as_time_that_is_missing() {
     run(dir.path(), "report signed.raw -o pages/", 0);
     let table = fs::read_to_string(dir.path().join("pages/index.html")).expect("a table");
     assert!(table.contains("\"faults\":[]"));
-    // Noise stands where it came.
+    // Noise stays at its place.
     let (before, after) = signed.split_at(signed.len() / 2);
     let noisy = [before, &[0x80; 300], after].concat();
     fs::write(dir.path().join("noisy.raw"), noisy).expect("a copy");
@@ -784,7 +784,7 @@ fn bytes_of_no_frame_are_told_as_that_and_not_as_time_that_is_missing() {
     assert!(table.contains("\"faults\":[\"1 place of loss or noise; hums check says what\"]"));
 }
 
-/// `SYSTEM_TIME` tells the time of day of bytes without recorded times, as the box learns it of the same.
+/// `SYSTEM_TIME` gives the time of day of bytes without recorded times, as the box learns it.
 #[test]
 fn raw_bytes_have_the_time_of_day_that_their_autopilot_tells() {
     let dir = tempfile::tempdir().expect("directory");
@@ -817,7 +817,7 @@ fn filtered(name: &str, dir: &Path, file: &str, keep: impl Fn(usize, usize, u32)
     fs::write(dir.join(file), bytes).expect("written");
 }
 
-/// Heartbeats and texts alone: nobody knows whether it flew, how high, or whether anything was wrong.
+/// Heartbeats and texts alone: flight, height and faults are unknown.
 #[test]
 fn what_nothing_tells_is_told_neither_as_good_nor_as_zero() {
     let dir = tempfile::tempdir().expect("directory");
@@ -837,7 +837,7 @@ fn what_nothing_tells_is_told_neither_as_good_nor_as_zero() {
     run(dir.path(), "report beats.tlog -o pages/", 0);
     let table = fs::read_to_string(dir.path().join("pages/index.html")).expect("a table");
     assert!(table.contains("\"little\":true") && table.contains("\"flight_unknown\":true"));
-    // A box that checks knows no more of a vehicle that says nothing else.
+    // A box with checks knows no more about a vehicle that sends nothing else.
     let (mut encoder, mut buffer) = (Encoder::of(1, 1), [0; FRAME_BYTES_MAX]);
     let beat = Packet::new(0).u8(4, 2).u8(5, 3).u8(7, 3).u8(8, 3);
     let mut beats = Vec::new();
@@ -867,7 +867,7 @@ fn a_recording_that_ends_in_the_air_says_so_everywhere_and_where_it_was_heard_la
     assert!(table.contains("\"ends_in_air\":true"));
     let end = json(&attempt(dir.path(), "check --json cut.tlog"))["ends_in_air"].clone();
     assert!(end["latitude_deg"].as_f64().is_some_and(|north| north.abs() > 1.0), "{end}");
-    // What a box recorded that was started in the air says so too.
+    // A record of a box that started in the air says so too.
     let later = |place: usize, all: usize| place > all / 2 && place < all / 3 * 2;
     filtered("ap_quad_faults.tlog", dir.path(), "later.tlog", |place, all, _| later(place, all));
     run(dir.path(), "sim --input later.tlog --sd later.img", 0);
@@ -875,7 +875,7 @@ fn a_recording_that_ends_in_the_air_says_so_everywhere_and_where_it_was_heard_la
     assert!(listed.contains("; begins in the air; ends in the air"), "{listed}");
 }
 
-/// What the box found has the worst value of the flight, and not that of the moment in which it found it.
+/// A finding of the box has the worst value of the flight, not that at its beginning.
 #[test]
 fn a_card_tells_the_worst_value_of_what_the_box_found() {
     let dir = tempfile::tempdir().expect("directory");

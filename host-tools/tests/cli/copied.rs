@@ -1,4 +1,4 @@
-//! What was copied off cards, and what every command that reads says of it: the same, with the same exit code.
+//! Copies of logs from cards: all commands that read report the same about them, with the same exit code.
 
 use std::fs;
 use std::path::Path;
@@ -13,8 +13,8 @@ pub(crate) const BLOCK: usize = 512;
 /// A segment of the cards here, with its parity at its end.
 pub(crate) const SEGMENT: usize = 7_999 * BLOCK;
 
-/// Every command that reads, with these inputs: its exit code and what it said on both streams. A finding of the vehicle's
-/// health is no damage.
+/// Every command that reads, with these inputs: its exit code and its output on both streams. A finding about the
+/// vehicle's health is not damage.
 pub(crate) fn readers(dir: &Path, inputs: &str) -> Vec<(&'static str, i32, String)> {
     ["decode -o out --format csv", "report -o pages/", "info --verify", "info", "check"]
         .into_iter()
@@ -30,7 +30,7 @@ pub(crate) fn readers(dir: &Path, inputs: &str) -> Vec<(&'static str, i32, Strin
         .collect()
 }
 
-/// Each of them ends with this code and says this.
+/// Each of them ends with this code and prints this.
 #[track_caller]
 pub(crate) fn all_say(dir: &Path, inputs: &str, code: i32, words: &[&str]) {
     for (command, ended, said) in readers(dir, inputs) {
@@ -41,7 +41,8 @@ pub(crate) fn all_say(dir: &Path, inputs: &str, code: i32, words: &[&str]) {
     }
 }
 
-/// A folder `copied` with the first segments of a card's sessions, as a copy has them: each as long as it was allocated.
+/// A folder `copied` with the first segments of a card's sessions, as a copy has them: each with its allocated
+/// length.
 pub(crate) fn copied(sessions: usize) -> TempDir {
     made_once(&format!("copied {sessions}"), |dir| copy(dir, sessions))
 }
@@ -70,7 +71,7 @@ fn copy(dir: &Path, sessions: usize) {
     }
 }
 
-/// Deletes a file as an operating system does it: its entry and its chain in the FAT.
+/// Deletes a file like an operating system: its entry and its chain in the FAT.
 pub(crate) fn delete(image: &mut [u8], name: &[u8; 11]) {
     let at = image.windows(11).position(|bytes| bytes == name).expect("an entry");
     let word = |image: &[u8], at: usize| u32::from_le_bytes(image[at..at + 4].try_into().expect("four"));

@@ -1,4 +1,4 @@
-//! Copies of one session beside each other: each flight counts once, and what is wrong with a copy is told.
+//! Copies of one session side by side: each flight counts once, and damage of a copy is reported.
 
 use std::fs;
 
@@ -16,7 +16,7 @@ fn one_session_under_two_names_is_told_by_every_command_and_counted_once() {
     assert!(said.contains("\n2 sessions: "), "{said}");
     let said = text(&attempt(dir.path(), "check copied"));
     assert!(said.contains("2 logs checked") && said.contains("1  the same session once more"), "{said}");
-    // In a folder of its own a copy is nothing strange.
+    // In a folder of its own a copy is expected.
     fs::create_dir(dir.path().join("other")).expect("made");
     fs::remove_file(at("00003_00.HUM")).expect("removed");
     fs::copy(at("00001_00.HUM"), dir.path().join("other/00001_00.HUM")).expect("copied");
@@ -48,7 +48,7 @@ fn a_mere_copy_is_told_and_its_flight_counted_once() {
         let said = text(&attempt(dir.path(), &format!("check {inputs}")));
         assert!(said.contains("1 log checked") && said.contains("the same session once more"), "{said}");
     }
-    // One that differs is a log as any other.
+    // A different one is a log of its own.
     let mut copy = without(&fs::read(&log).expect("there"), usize::MAX, 0);
     copy[20 * BLOCK + 100] ^= 1;
     fs::write(dir.path().join("copied/flight.hum"), copy).expect("written");
@@ -87,7 +87,8 @@ fn two_copies_of_one_session_have_two_pages_and_the_damaged_one_is_not_kept_alon
     }
 }
 
-/// A copy of a log with another log behind it: only the copied one is read, and it counts once. The other one is in no output.
+/// A copy of a log with another log behind it: only the copied one is read, and it counts once. The other one is in
+/// no output.
 #[test]
 fn another_log_behind_a_copy_is_told_by_every_command() {
     let dir = copied(2);
@@ -102,7 +103,7 @@ fn another_log_behind_a_copy_is_told_by_every_command() {
     let said = text(&run(dir.path(), "info --verify copied", 3));
     assert!(said.contains("FAILED  files ") && said.contains("1 session: damage"), "{said}");
     assert!(text(&run(dir.path(), "info --list copied", 3)).contains("not proved to be whole"));
-    // A copy alone is no finding.
+    // A copy alone gives no finding.
     fs::write(at("all.hum"), &one).expect("written");
     all_say(dir.path(), "copied", 0, &["00001 once more (not counted)"]);
 }

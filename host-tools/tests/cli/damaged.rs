@@ -1,4 +1,4 @@
-//! Logs that are cut, damaged, or lack their parity, and what lies between and behind their sectors.
+//! Logs that are cut, damaged, or lack their parity, and data between and behind their sectors.
 
 use std::fs;
 
@@ -19,7 +19,7 @@ fn a_log_that_is_cut_in_flight_is_told_in_the_same_words_by_every_command() {
         ),
     );
     all_say(dir.path(), "card.img", 3, &["not proved to its end: armed or in the air since "]);
-    // The next start on the card tells what was there: then all of them know.
+    // The next start on the card records the previous end: then all commands know it.
     run(dir.path(), "sim --input PX4 --sd card.img", 0);
     all_say(
         dir.path(),
@@ -29,7 +29,7 @@ fn a_log_that_is_cut_in_flight_is_told_in_the_same_words_by_every_command() {
     );
 }
 
-/// A header with a right check, of which frames and records are not what comes out: an entry that is none, or one that is lost.
+/// A header with a valid check, but wrong counts of frames and records: an invalid entry, or a lost one.
 #[test]
 fn a_header_that_counts_what_is_not_there_is_told_by_every_command() {
     let dir = copied(1);
@@ -58,8 +58,7 @@ fn a_header_that_counts_what_is_not_there_is_told_by_every_command() {
     }
 }
 
-/// Parity covers sectors once they are on the card, and is made of them: it tells of an end that is gone, and of what was altered with a check
-/// that fits.
+/// Parity is made of sectors that are on the card. So it shows a lost end, and altered sectors with a valid check.
 #[test]
 fn what_parity_contradicts_is_told_by_every_command() {
     let dir = copied(1);
@@ -69,7 +68,7 @@ fn what_parity_contradicts_is_told_by_every_command() {
     let header = |block: &[u8; BLOCK]| Header::read(block).ok();
     let closed =
         blocks().position(|block| header(block).is_some_and(|header| header.closed)).expect("it is closed");
-    // A page of 16 KiB at the end, of which each column has lost four.
+    // A page of 16 KiB at the end: four lost sectors of each column.
     let mut erased = whole.clone();
     erased[(closed - 31) * BLOCK..(closed + 1) * BLOCK].fill(0xff);
     fs::write(&path, erased).expect("written");
@@ -80,7 +79,7 @@ fn what_parity_contradicts_is_told_by_every_command() {
         (said.contains("FAILED  parity "), said.contains("1 sector had to be made again from parity"))
     };
     assert_eq!(verified(&whole), (false, false));
-    // A sector that is altered.
+    // An altered sector.
     let sealed = |block: &mut [u8; BLOCK]| {
         let mut sector = Sector::from_bytes(*block);
         sector.seal(sector.session());
@@ -93,7 +92,7 @@ fn what_parity_contradicts_is_told_by_every_command() {
     assert_eq!(verified(&altered), (true, false));
     let words = "every eighth sector from 4 to ";
     all_say(dir.path(), "copied", 3, &[words, "00001_00.HUM and the parity of these disagree"]);
-    // A sector that is lost, and one of the two from which it would be made again.
+    // A lost sector, and one of the two from which it would be rebuilt.
     let mut parity = blocks().enumerate().filter_map(|(at, block)| Some((at, Parity::read(block)?)));
     let (at, one) = parity.find(|(_, one)| one.sum == Sum::P && one.last % 8 == 4).expect("parity of it");
     let mut lost = whole.clone();
@@ -105,7 +104,7 @@ fn what_parity_contradicts_is_told_by_every_command() {
     assert_eq!(verified(&lost), (true, false));
 }
 
-/// Nothing is lost of them, and a card that damaged them will damage others: no reader calls such a log good.
+/// No data of them is lost, but the card may damage others: no reader calls such a log good.
 #[test]
 fn sectors_that_parity_made_again_are_told_by_every_command() {
     let dir = copied(1);
@@ -144,7 +143,7 @@ fn sectors_that_parity_made_again_are_told_by_every_command() {
         assert_eq!((&json["ok"], &json["logs"][0]["ok"]), (&false.into(), &false.into()));
         assert!(count.starts_with(&made_again.to_string()), "{json}");
         assert_eq!(frames(&text(&run(dir.path(), "info copied", 3))), before);
-        // What people look at says it too, and not only standard error.
+        // The screen shows it too, not only standard error.
         let screen = text(&run(dir.path(), "check copied", 3));
         assert!(screen.contains("; the log was damaged, and made whole from its parity"), "{screen}");
     }
@@ -153,13 +152,13 @@ fn sectors_that_parity_made_again_are_told_by_every_command() {
     assert!(table.contains("damaged, and made whole from its parity\n"), "{table}");
     assert!(table.contains("1  damaged, and made whole from their parity (counted above too)"), "{table}");
     fs::remove_file(dir.path().join("copied/00002_00.HUM")).expect("ours");
-    // Also of a copy, whose losses are its original's.
+    // Also for a copy, which shares its original's losses.
     fs::write(dir.path().join("copied/Copy of 00001_00.HUM"), &whole).expect("written");
     let said = text(&run(dir.path(), "info --verify copied", 3));
     assert!(said.contains("not counted") && said.contains("2 sectors had to be made again"), "{said}");
 }
 
-/// The log is whole, and nothing can be made again of what its card loses next.
+/// The log is whole, but the card's next losses cannot be rebuilt.
 #[test]
 fn parity_that_is_gone_is_told_by_every_command() {
     let dir = copied(1);
@@ -183,7 +182,7 @@ fn parity_that_is_gone_is_told_by_every_command() {
         let screen = text(&run(dir.path(), "check copied", 3));
         assert!(screen.contains("; the log is whole, without all of its parity"), "{screen}");
     }
-    // Of a log whose power went: that of each stretch but the last was written.
+    // After a power cut: parity of each stretch but the last was written.
     let long = flight("ap_quad_guided.tlog");
     run(dir.path(), &format!("sim --input {} --sd long.img --card-size 64", long.display()), 0);
     let mut long = with_parity(&dir.path().join("long.img"));
@@ -200,7 +199,7 @@ fn parity_that_is_gone_is_told_by_every_command() {
     }
 }
 
-/// What follows lies in other blocks then, and parity makes some of it again: what lies in the place of that is read too.
+/// Later sectors are then at other blocks, and parity rebuilds some of them: the sectors in their place are read too.
 #[test]
 fn a_sector_that_was_put_between_others_costs_no_frame() {
     let dir = copied(1);
@@ -213,7 +212,7 @@ fn a_sector_that_was_put_between_others_costs_no_frame() {
         (json["logs"][0]["frames"].clone(), json["logs"][0]["gaps_count"].clone())
     };
     let before = frames();
-    // Of the eight columns none, some or all have lost more than the two that are made again.
+    // Of the eight columns none, some or all lost more than the two that can be rebuilt.
     for (back, put) in [(3, 1), (9, 1), (16, 1), (18, 1), (21, 1), (30, 1), (9, 8), (16, 8), (19, 8), (30, 8)]
     {
         let mut longer = whole.clone();
@@ -225,7 +224,7 @@ fn a_sector_that_was_put_between_others_costs_no_frame() {
     }
 }
 
-/// What of a log's file is superseded, of another session or no sector is counted by `verify` as by `info`.
+/// `verify` and `info` count the same superseded sectors, foreign sectors and other blocks of a log's file.
 #[test]
 fn blocks_that_do_not_count_are_counted_by_verify_and_info() {
     let dir = copied(1);
@@ -233,7 +232,7 @@ fn blocks_that_do_not_count_are_counted_by_verify_and_info() {
     let mut log = fs::read(&path).expect("there");
     let last =
         log.as_chunks::<BLOCK>().0.iter().rposition(|block| Header::read(block).is_ok()).expect("a sector");
-    // Behind its last sector: a copy of that while it was in progress, a sector of another session, a block that is none.
+    // Behind its last sector: an earlier copy of it, a sector of another session, a block that is not a sector.
     let mut block = |at: usize, change: &dyn Fn(&mut [u8; BLOCK])| {
         let (from, to) = (last * BLOCK, (last + at) * BLOCK);
         log.copy_within(from..from + BLOCK, to);
@@ -280,7 +279,7 @@ fn noise_behind_the_last_end_mark_is_told_by_every_command() {
     all_say(dir.path(), "copied", 3, &["1 block that is no sector"]);
     let said = text(&run(dir.path(), "info --verify copied", 3));
     assert!(said.contains("FAILED  end "), "{said}");
-    // The head of a sector makes none: what fails the check is of nobody.
+    // A sector's head alone is not enough: with a wrong check it belongs to no session.
     let mut forged = log.clone();
     forged[last * BLOCK..(last + 1) * BLOCK].iter_mut().enumerate().for_each(noise);
     forged[last * BLOCK..][..2].copy_from_slice(&[0x48, 0xb3]);
@@ -290,13 +289,13 @@ fn noise_behind_the_last_end_mark_is_told_by_every_command() {
         said.contains("1 block with the head of a sector") && !said.contains("of another session"),
         "{said}"
     );
-    // What a card held before the box used it, films for instance, goes on behind that, and is no finding.
+    // Old data of the card, for instance films, continues behind that, and is not a finding.
     let mut film = log.clone();
     film[last * BLOCK..].iter_mut().enumerate().for_each(noise);
     fs::write(&path, film).expect("written");
     let said = text(&run(dir.path(), "info --verify copied", 0));
     assert!(said.contains("blocks that are no sectors") && said.contains("cannot be proved"), "{said}");
-    // Nothing there: whether there was anything nobody knows.
+    // An empty block: whether there was a sector is unknown.
     for empty in [0x00, 0xff] {
         let mut log = log.clone();
         log[last * BLOCK..(last + 1) * BLOCK].fill(empty);

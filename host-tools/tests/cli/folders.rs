@@ -1,5 +1,5 @@
-//! Folders of what was copied off cards, and files that are named one by one: what holds nothing of a log is told, and keeps nothing
-//! else from being read.
+//! Folders of copies from cards, and files that are named one by one. An input without a log is reported, and does
+//! not keep others from being read.
 
 use std::fs;
 use std::io::Write as _;
@@ -29,7 +29,7 @@ fn a_copied_card_is_whole_and_each_file_that_holds_nothing_of_ours_is_told_by_ev
     fs::write(&path, vec![0; SEGMENT]).expect("written");
     all_say(dir.path(), "copied", 3, &["00001_00.HUM has the name of a segment and holds nothing of ours"]);
     fs::write(&path, was).expect("written");
-    // A log by another name.
+    // A log with another name.
     fs::write(dir.path().join("copied/flight.hum"), "nothing").expect("written");
     all_say(dir.path(), "copied", 3, &["flight.hum: has the name of a log and holds nothing of ours"]);
 }
@@ -44,7 +44,7 @@ fn a_recording_in_a_folder_that_holds_nothing_is_told() {
         all_say(dir.path(), "copied", 3, &[&format!("{name}: has the name of a recording and holds none")]);
         fs::remove_file(path).expect("removed");
     }
-    // A log in an archive is not read; nor does `verify` judge recordings of others.
+    // A log in an archive is not read; and `verify` does not judge recordings of other programs.
     let mut gzip = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::fast());
     gzip.write_all(&fs::read(dir.path().join("copied/00001_00.HUM")).expect("there")).expect("packed");
     let path = dir.path().join("copied/00003_00.HUM.gz");
@@ -96,7 +96,7 @@ fn files_that_are_named_one_by_one_are_judged_as_their_folder_is() {
     run(dir.path(), &format!("info --verify {named} other/copied/00002_00.HUM"), 3);
 }
 
-/// Power went before the second session had a sector; the third one found none there.
+/// Power failed before the second session had a sector; the third one found none there.
 #[test]
 fn a_file_that_the_next_start_found_empty_is_no_loss() {
     let dir = copied(2);
@@ -106,7 +106,7 @@ fn a_file_that_the_next_start_found_empty_is_no_loss() {
     for (command, code, said) in readers(dir.path(), "copied") {
         assert_eq!(code, 0, "{command}: {said}");
     }
-    // Without the third one nothing tells that.
+    // Without the third one this is unknown.
     fs::remove_file(at("00003_00.HUM")).expect("removed");
     all_say(dir.path(), "copied", 3, &["00002_00.HUM has the name of a segment and holds nothing of ours"]);
 }
@@ -114,7 +114,7 @@ fn a_file_that_the_next_start_found_empty_is_no_loss() {
 #[test]
 fn a_folder_that_cannot_be_read_keeps_nothing_else_from_being_read() {
     let dir = copied(1);
-    // No system reads a path this long: it is made of two halves.
+    // No system accepts a path this long: it is made of two halves.
     let half = |name: &str| {
         let root = dir.path().join(name);
         let deep = (0..8).fold(root.clone(), |path, _| path.join("x".repeat(255)));

@@ -1,4 +1,4 @@
-//! The examples of every `--help`, taken out of its text and run in a directory that has the files that they name.
+//! The examples of every `--help`, extracted from its text and run in a directory with their files.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -14,12 +14,12 @@ use tempfile::TempDir;
 use super::inputs::leaves;
 use super::support::{hums, px4, run, text};
 
-/// What runs until Ctrl-C, and is well when it has told where its page is.
+/// The commands that run until Ctrl-C; they work if they print the address of their page.
 const SERVES: &str = "live";
-/// Examples that need a firmware image (`tests/chip` runs one) or a board (`tests/sim/companion.rs` plays one).
+/// Examples that need a firmware image (`tests/chip` runs one) or a board (`tests/sim/companion.rs` simulates one).
 const ELSEWHERE: [&str; 2] = ["--firmware", "box "];
 
-/// The examples of a help text, without remarks and without what the shell does with their output.
+/// The examples of a help text, without remarks, pipes and redirections.
 fn examples(help: &str) -> Vec<String> {
     let lines = help.lines().filter_map(|line| line.strip_prefix("  hums "));
     let plain = |line: &str| {
@@ -40,14 +40,15 @@ fn helps(dir: &Path) -> Vec<String> {
         .collect()
 }
 
-/// Whether an example waits for somebody, takes as long as the flight did, or needs a port that another program may have.
+/// Whether an example waits for a connection, takes as long as the flight, or needs a port that another program may
+/// use.
 fn waits(example: &str) -> bool {
     let for_a_link = ["serial:", "tcp:", "192.168.", "--listen"].iter().any(|form| example.contains(form));
     let live = example.starts_with(SERVES);
     for_a_link || (!live && (example.contains("udpin:") || example.contains("udpout:")))
 }
 
-/// Starts what serves a page, and ends it when it has told where.
+/// Starts a server of a page, and ends it when it has printed the address.
 fn serve(dir: &Path, example: &str) {
     let port = UdpSocket::bind("127.0.0.1:0").expect("a port").local_addr().expect("its address").port();
     let example = example.replace(":14550", &format!(":{port}"));
@@ -55,7 +56,7 @@ fn serve(dir: &Path, example: &str) {
     command
         .current_dir(dir)
         .env("PATH", "")
-        // What waits for a database lies there.
+        // The output of the example that waits for a database is there.
         .args(example.split_whitespace())
         .args(["--listen", "127.0.0.1:0"]);
     let mut program = command.stdout(Stdio::piped()).spawn().expect("it runs");
@@ -83,13 +84,13 @@ fn furnished() -> TempDir {
     dir
 }
 
-/// Copies a file or a folder. An image is nearly all holes, which only the system's own program keeps.
+/// Copies a file or a folder. An image is nearly all holes, which only the system's own program preserves.
 fn copy(from: &Path, to: &Path) {
     let copied = Command::new("cp").args(["-r", "--sparse=always"]).arg(from).arg(to).status().expect("cp");
     assert!(copied.success(), "cp {} {}", from.display(), to.display());
 }
 
-/// Runs an example to its end. The output of another one that has the same name is removed before.
+/// Runs an example to its end. Earlier output of the same name is removed before.
 fn works(dir: &Path, example: &str) {
     let named = example.split_whitespace().skip_while(|word| *word != "-o").nth(1);
     let made = dir.join(named.unwrap_or("made"));
@@ -98,7 +99,7 @@ fn works(dir: &Path, example: &str) {
     }
     let output = hums().current_dir(dir).args(example.split_whitespace()).output().expect("it runs");
     let said = String::from_utf8_lossy(&output.stderr);
-    // 3: what an example of a fault recorded has losses; 4: a check found something.
+    // 3: the example of a fault recorded losses; 4: a check has a finding.
     assert!(matches!(output.status.code(), Some(0 | 3 | 4)), "hums {example}\n{said}");
 }
 

@@ -21,12 +21,12 @@ fn numbers_begin_anew_where_all_logs_were_deleted() {
         run(dir.path(), &format!("sim --input {} --sd card.img", flight.display()), 0);
     };
     rewrite(&[b"00001_00HUM", b"00002_00HUM"]);
-    // Its clock is 23 minutes later than that of the deleted session 00002.
+    // Its clock is 23 minutes behind that of the deleted session 00002.
     record(&flight("ap_quad_faults.tlog"));
     all_say(dir.path(), "card.img", 0, &[]);
     let logs = json(&run(dir.path(), "info --verify card.img --json", 0));
     assert_eq!(logs["logs"].as_array().map(Vec::len), Some(1), "the deleted ones are not the card's");
-    // One that was recorded after it, of which no clock tells that it is older.
+    // A later log, which no clock shows to be older.
     record(&px4());
     rewrite(&[b"00002_00HUM"]);
     all_say(
@@ -44,7 +44,7 @@ fn a_wiped_card_and_a_deleted_newest_log_are_told_with_and_without_salvage() {
     let image = fs::read(&path).expect("an image");
     let codes = || -> Vec<i32> {
         let codes = readers(dir.path(), "card.img --salvage").into_iter();
-        // A report takes no such flag.
+        // A report has no such flag.
         codes.filter(|(command, ..)| !command.starts_with("report")).map(|(_, code, _)| code).collect()
     };
     assert_eq!(codes(), [0; 4]);
@@ -59,7 +59,7 @@ fn a_wiped_card_and_a_deleted_newest_log_are_told_with_and_without_salvage() {
         &["session 00002, which is newer than all that are there, was deleted"],
     );
     assert_eq!(codes(), [3; 4]);
-    // The first digit of a deleted name is lost: an older one is not taken for a newer one, nor a newer one for an older one.
+    // The first digit of a deleted name is lost: an older log is not taken for a newer one, nor a newer for an older.
     let two = [b"00001_00HUM", b"00002_00HUM"].map(|name| entry(name));
     for (there, gone, is_newer) in [(b"10001", b"09998", false), (b"09999", b"10002", true)] {
         let mut cards = deleted.clone();
@@ -70,7 +70,7 @@ fn a_wiped_card_and_a_deleted_newest_log_are_told_with_and_without_salvage() {
         let words = "session 10002, which is newer than all that are there, was deleted";
         assert_eq!((said.contains(words), said.contains("was deleted")), (is_newer, is_newer), "{said}");
     }
-    // All of them: a card that was formatted in haste.
+    // All of them: a quick format.
     let mut wiped = image.clone();
     for name in [b"00001_00HUM", b"00002_00HUM"] {
         wiped[entry(name)..entry(name) + 32].fill(0);
@@ -80,7 +80,7 @@ fn a_wiped_card_and_a_deleted_newest_log_are_told_with_and_without_salvage() {
     assert_eq!(codes(), [3; 4]);
 }
 
-/// Order is by number and by what a log says was recorded before it: a clock may have been wrong.
+/// The order follows the number and a log's record of the previous session: a clock may have been wrong.
 #[test]
 fn a_newest_log_that_was_deleted_is_told_whatever_its_clock_says() {
     let dir = tempfile::tempdir().expect("directory");
@@ -139,7 +139,7 @@ fn a_log_under_another_name_is_read_and_one_that_only_salvage_finds_is_not_calle
     }
     let told = json(&run(dir.path(), "info --json card.img", 0));
     assert_eq!(told["images"][0]["not_looked_at"], words);
-    // The oldest one was deleted: that makes room, and is told.
+    // The oldest one was deleted: that makes room, and is reported.
     let mut oldest = image.clone();
     let at = entry(b"00001_00HUM");
     free(&mut oldest, at);
@@ -155,7 +155,7 @@ fn a_report_of_the_newest_session_tells_that_an_older_one_on_the_card_is_damaged
     let path = dir.path().join("card.img");
     let mut image = fs::read(&path).expect("an image");
     let blocks = image.as_chunks_mut::<BLOCK>().0;
-    // Every eighth: three of them are more than parity makes again.
+    // Every eighth: three of them are more than parity can rebuild.
     let sectors = blocks.iter_mut().filter(|block| block.starts_with(&[0x48, 0xb3])).skip(20).step_by(8);
     sectors.take(3).for_each(|block| block[100] ^= 4);
     fs::write(&path, image).expect("written");
@@ -177,7 +177,7 @@ fn a_report_compares_sessions_of_one_card_only() {
         trend.split_once(']').map_or(0, |(sessions, _)| sessions.matches("\"name\"").count())
     };
     assert_eq!((sessions("report card.img"), sessions("report copied")), (2, 2));
-    // Packed logs may be anybody's: of two vehicles, for instance.
+    // Packed logs may be of different vehicles.
     for name in ["one", "two"] {
         run(dir.path(), &format!("decode --format hum PX4 -o {name}.hum"), 0);
     }
@@ -223,7 +223,7 @@ fn a_damaged_image_in_a_folder_is_read_as_where_it_is_named() {
     for (command, code, said) in readers(dir.path(), "cards") {
         assert!(code == 3 && !said.contains("no log"), "{command}: {said}");
     }
-    // What is left of an image is told, and what is none is passed over and named.
+    // The rest of an image is reported; a file that is not an image is skipped and named.
     fs::write(cards.join("card.img"), &image[..300]).expect("written");
     fs::write(cards.join("notes.xyz"), "notes").expect("written");
     fs::copy(px4(), cards.join("flight.tlog")).expect("copied");

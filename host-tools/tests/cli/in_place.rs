@@ -1,4 +1,4 @@
-//! What is updated in place (a card's image, a store), and what recordings' times and counts are called.
+//! Files that are updated in place (a card's image, a store), and names of times and counts of recordings.
 
 use std::fs;
 use std::io::Write as _;
@@ -7,7 +7,7 @@ use std::process::{Command, Stdio};
 
 use crate::support::{attempt, contents, flight, hums, json, px4, recorded, run, text, until};
 
-/// Whether a run has begun what a ground station gets.
+/// Whether a run has begun the ground station's output.
 fn is_begun(dir: &Path) -> bool {
     let mut names = fs::read_dir(dir).expect("a folder").map(|entry| entry.expect("an entry").file_name());
     names.any(|name| name.to_string_lossy().starts_with(".gs."))
@@ -147,7 +147,7 @@ fn a_damaged_store_is_told_and_one_that_cannot_be_read_is_refused_and_stays() {
         let records = String::from_utf8_lossy(&records);
         assert_eq!(records.matches("a saved value was lost, using an older one").count(), told, "{at}");
     }
-    // Erased but for what stands first in it.
+    // Erased except for its first log.
     let mut emptied = whole.clone();
     emptied[16..].fill(0xFF);
     fs::write(&store, &emptied).expect("written");
@@ -195,11 +195,11 @@ fn an_image_is_whole_or_not_there_and_one_without_a_partition_table_is_told() {
     assert_eq!(ended.status.code(), Some(1), "{said}");
     assert!(said.contains("card.img: cannot have"), "{said}");
     assert_eq!(fs::read_dir(dir.path()).expect("a directory").count(), 0, "nothing is left");
-    // What a killed run has left is in nobody's way, and stays.
+    // Leftovers of a killed run do no harm, and stay.
     fs::write(dir.path().join(".card.img.hums-part"), [0; 512]).expect("written");
     run(dir.path(), "sim --input PX4 --sd card.img", 0);
     assert_eq!(fs::read_dir(dir.path()).expect("a directory").count(), 2);
-    // One that a run of an earlier version left, which was killed while it made it.
+    // A leftover of an earlier version, killed while it made the image.
     fs::File::create(&image).and_then(|file| file.set_len(64 << 20)).expect("made");
     let said = run(dir.path(), "sim --input PX4 --sd card.img", 3);
     let said = String::from_utf8_lossy(&said.stderr);
@@ -223,12 +223,12 @@ fn a_store_beside_recordings_is_named_and_is_no_loss() {
     }
     let said = run(dir.path(), "check store.bin", 1);
     assert!(String::from_utf8_lossy(&said.stderr).contains("is the memory of a simulated board"));
-    // Of another file with such a name that holds nothing, it is.
+    // An empty file with another name of this kind is accepted.
     fs::write(dir.path().join("flight.bin"), vec![7; 32 << 10]).expect("written");
     run(dir.path(), "info .", 3);
 }
 
-/// A store of which a half is there would be refused from then on.
+/// A half store would be refused from then on.
 #[test]
 fn a_store_that_cannot_be_made_leaves_nothing_that_is_in_the_way() {
     let dir = tempfile::tempdir().expect("a folder");
@@ -249,7 +249,7 @@ fn a_store_that_cannot_be_made_leaves_nothing_that_is_in_the_way() {
     assert!(contents(dir.path()) == before, "{said}");
 }
 
-/// At whatever write of it: the card is in order, and goes on with the next run; so does the store.
+/// After a kill at any write the card is valid, and the next run continues on it; so does the store.
 #[test]
 fn a_run_that_is_killed_leaves_a_card_and_a_store_that_the_next_one_goes_on_with() {
     let dir = recorded();
@@ -265,7 +265,7 @@ fn a_run_that_is_killed_leaves_a_card_and_a_store_that_the_next_one_goes_on_with
         std::thread::sleep(std::time::Duration::from_millis(after_ms));
         sim.kill().expect("it is ours");
         sim.wait().expect("it is ours");
-        // A log that a kill has ended has no end that is proved, and nothing else is wrong.
+        // A log that a kill ended has no proved end, and no other fault.
         let told = text(&attempt(dir.path(), "info --verify card.img"));
         assert!(told.contains("  ok      file system"), "{after_ms} ms: {told}");
     }
@@ -309,7 +309,7 @@ fn what_is_no_card_is_no_card_for_a_run_and_stays_as_it_is() {
     fs::write(at("few.tlog"), &tlog[..4000]).expect("written");
     let said = run(dir.path(), "sim --input PX4 --sd few.tlog", 1);
     assert!(String::from_utf8_lossy(&said.stderr).contains("is no image of an SD card"));
-    // A card on which there is nothing but a table may be formatted by command, and is told.
+    // A card with nothing but a table may be formatted by command, and is reported.
     fs::write(at("new.img"), &exfat).expect("written");
     fs::File::options()
         .write(true)
@@ -354,6 +354,6 @@ fn the_times_asked_for_are_those_that_the_tables_have_and_what_was_written_is_co
     let said = String::from_utf8_lossy(&said.stderr);
     assert!(said.contains("its times go from 300.000 s to 310.000 s"), "{said}");
     let said = text(&run(dir.path(), "decode late.log -o out/ --format jsonl,csv --message ATT", 0));
-    // And the row that tells who checked the vehicle.
+    // With the row that names the recorder of the checks.
     assert!(said.contains(".jsonl: 12 objects") && said.contains(": 2 tables, 12 rows"), "{said}");
 }

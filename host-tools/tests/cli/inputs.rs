@@ -1,4 +1,4 @@
-//! No command writes over any of its inputs.
+//! No command overwrites any of its inputs.
 
 use std::fs;
 use std::path::Path;
@@ -8,7 +8,7 @@ use hums::cli::Cli;
 
 use crate::support::{Stamp, attempt, contents, furnished, recorded, run, stamps, text};
 
-/// What an argument names.
+/// The kind of file that an argument names.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Role {
     /// A file or a folder that is only read.
@@ -19,7 +19,7 @@ enum Role {
     Other,
 }
 
-/// An argument that is not here fails the test: decide what it names, and the test tries it from then on.
+/// An argument that is not listed fails the test: decide its kind, and the test covers it from then on.
 fn role(arg: &Arg) -> Role {
     match arg.get_id().as_str() {
         "inputs" | "input" | "gs_input" | "params" | "key" | "firmware" | "past" => Role::Input,
@@ -33,11 +33,11 @@ fn role(arg: &Arg) -> Role {
     }
 }
 
-/// What a command says of an output that is one of its inputs.
+/// The error about an output that is one of its inputs.
 const IS_INPUT: &str = "input of this command";
 
-/// Where an output is no file, what is said instead of [`IS_INPUT`]: the command, the output, the words, and why that is all
-/// there is to say.
+/// For an output that is not a file, the error instead of [`IS_INPUT`]: the command, the output, the text, and the
+/// reason.
 const ELSE_REFUSED: [(&str, &str, &str, &str); 1] = [(
     "box pull",
     "output",
@@ -45,7 +45,7 @@ const ELSE_REFUSED: [(&str, &str, &str, &str); 1] = [(
     "what it writes lies in that folder",
 )];
 
-/// Commands that have inputs and write no file, or outputs and no input, and why there is no pair to try.
+/// Commands that have inputs and write no file, or outputs and no input, with the reason why there is no pair to try.
 const NO_PAIRS: [(&str, &str); 10] = [
     ("check", "prints"),
     ("live", "shows and sends"),
@@ -59,7 +59,7 @@ const NO_PAIRS: [(&str, &str); 10] = [
     ("box params set", "talks with a board"),
 ];
 
-/// A good value for an argument, where one is needed.
+/// A valid value for an argument that needs one.
 pub(crate) fn value(command: &str, arg: &str) -> &'static str {
     match (command, arg) {
         ("decode" | "report" | "info", "inputs") | ("check", "past") => "log.hum",
@@ -79,7 +79,7 @@ pub(crate) fn value(command: &str, arg: &str) -> &'static str {
     }
 }
 
-/// The words of a command line: its name, what it requires, and these arguments.
+/// The words of a command line: its name, its required arguments, and these.
 pub(crate) fn words(command: &clap::Command, path: &[&str], given: &[(&Arg, String)]) -> Vec<String> {
     let mut words: Vec<String> = path.iter().map(|word| (*word).to_owned()).collect();
     let mut push = |arg: &Arg, value: String| {
@@ -105,7 +105,7 @@ fn flags(command: &clap::Command) -> Vec<String> {
     command.get_arguments().filter(is_flag).filter_map(|arg| Some(format!("--{}", arg.get_long()?))).collect()
 }
 
-/// All commands that do something, with the words that call them.
+/// All commands without subcommands, with their words.
 pub(crate) fn leaves<'a>(
     command: &'a clap::Command,
     path: &[&'a str],
@@ -175,7 +175,7 @@ fn no_command_writes_over_any_of_its_inputs() {
     assert!(contents(dir.path()) == whole, "something was changed");
 }
 
-/// The table of a folder's pages has a name of its own, which may be a link.
+/// The table of a folder's pages has a fixed name, which may be a link.
 #[test]
 fn a_page_that_would_go_into_an_input_is_refused_before_any_other_is_written() {
     let dir = furnished();
@@ -225,7 +225,7 @@ fn refused(dir: &Path, words: &[String], words_said: &str, before: &[(String, St
     let output = attempt(dir, &line);
     let said = String::from_utf8_lossy(&output.stderr);
     assert!(matches!(output.status.code(), Some(1 | 2)), "hums {line}: {:?}\n{said}", output.status);
-    // Nothing was changed, and nothing was left either.
+    // Nothing was changed or left behind.
     let after = stamps(dir);
     for file in before {
         assert!(after.contains(file), "hums {line}: {} is not what it was\n{said}", file.0);
@@ -248,7 +248,7 @@ fn an_output_into_an_input_folder_replaces_nothing_there() {
     for line in ["decode folder -o folder --format csv,parquet,thesis,tlog", "report folder -o folder/"] {
         run(dir.path(), line, 0);
         let made = contents(&dir.path().join("folder"));
-        // And again. A tlog that was made is no input, though it is a recording.
+        // And again. A generated tlog is not an input, though it is a recording.
         run(dir.path(), &format!("{line} --force"), 0);
         assert_eq!(contents(&dir.path().join("folder")), made);
     }

@@ -1,4 +1,4 @@
-//! `--json` of every command that prints: which object it is, and that `docs/json.md` has every name in it.
+//! `--json` of every command that prints: its object, and that `docs/json.md` has every name in it.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -27,10 +27,10 @@ fn members(value: &Value, around: &str, names: &mut BTreeSet<String>) {
     }
 }
 
-/// Objects that several schemas have: a row that links to one has all of its names.
+/// Objects in several schemas: a row that links to one has all of its names.
 const SHARED: [&str; 5] = ["image", "end", "blocks", "finding", "exceedance"];
 
-/// Adds the names in the section with this heading of the document, behind `around`: the first column of its table.
+/// Adds the names in the document's section with this heading, below `around`: the first column of its table.
 fn documented(document: &str, heading: &str, around: &str, names: &mut BTreeSet<String>) {
     let start = format!("\n## {heading}\n");
     let section = document.split_once(&start).unwrap_or_else(|| panic!("no section {heading}")).1;
@@ -88,7 +88,7 @@ fn every_object_says_which_one_it_is_and_the_document_has_all_of_its_names() {
 fn a_session_alone_is_what_it_is_among_all() {
     let dir = recorded();
     for seed in 1..=5 {
-        // Where power goes in the flight depends on how small the log is.
+        // The place of the power cut in the flight depends on the size of the log.
         attempt(dir.path(), &format!("sim --input PX4 --sd card.img --seed {seed} --cut-after-writes 400"));
     }
     let all: Value =

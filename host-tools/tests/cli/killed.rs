@@ -71,7 +71,7 @@ fn what_is_written_beside_a_recording_may_fail_and_the_recording_goes_on() {
         assert_eq!(said.matches(&words).count(), 1, "{said}");
     }
     assert_eq!(frames("full.img"), 16_645);
-    // Whoever read it has gone.
+    // The reader has closed the pipe.
     let mut sim = Command::new(env!("CARGO_BIN_EXE_hums"));
     sim.args(["sim", "--sd", "pipe.img", "--gs", "-", "--input"]).arg(px4()).current_dir(dir.path());
     let mut sim = sim.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("it runs");
@@ -137,7 +137,7 @@ fn tables_of_a_killed_run_are_the_old_ones_or_the_new_ones() {
         for tables in [format!("{name}/"), "vehicle=".to_owned()] {
             let found = of(&now, &tables);
             assert!(
-                // Old ones go one by one before the new ones take their place.
+                // Old ones are removed one by one before the new ones take their place.
                 found == of(&whole, &tables) || found.iter().all(|file| few.contains(file)),
                 "{tables} after {after_ms} ms: {:?}",
                 found.iter().map(|(name, bytes)| (name, bytes.len())).collect::<Vec<_>>()
@@ -199,13 +199,13 @@ fn what_is_not_whole_in_a_folder_is_passed_over_and_told() {
     assert_eq!(all_named(&dir.path().join("out"), "00001").len(), 1);
 }
 
-/// What sends two signals at once (a shell and `timeout`, say) means one end.
+/// Two signals at once (from a shell and `timeout`, say) are one request to end.
 #[test]
 fn two_signals_right_after_each_other_end_the_page_in_good_order() {
     let mut live = Command::new(env!("CARGO_BIN_EXE_hums"));
     live.args(["live", "--listen", "127.0.0.1:0", "--input"]).arg(flight("ap_quad_guided.tlog"));
     let mut live = live.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("it runs");
-    // It serves, so it watches for signals.
+    // It serves, so it handles signals.
     let mut said = [0; 1];
     std::io::Read::read_exact(live.stdout.as_mut().expect("piped"), &mut said).expect("it says where");
     let twice = format!("kill -INT {0}; kill -INT {0}", live.id());
@@ -249,7 +249,7 @@ fn a_standard_error_on_a_full_disk_ends_nothing() {
         Command::new("bash").args(["-c", &hums]).current_dir(dir.path()).status().expect("a shell").code()
     };
     assert_eq!(shell("hums info --list nosuch 2> /dev/full"), Some(1));
-    // What is said in flight cannot be said: the card has all of it.
+    // The texts in flight cannot be printed: the card has all of it.
     let line = "hums sim --input flight.tlog --sd card.img --card-size 34 --tap /dev/full 2> /dev/full";
     assert_eq!(shell(line), Some(3));
     assert_eq!(shell("hums decode card.img -o all.tlog --format tlog"), Some(0));

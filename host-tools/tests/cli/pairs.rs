@@ -1,4 +1,4 @@
-//! One flight as its autopilot logged it and as a telemetry port heard it, through the program.
+//! One flight from its autopilot's log and from a telemetry port, through the program.
 
 use std::fs;
 use std::io::Read as _;
@@ -17,7 +17,7 @@ fn uncompressed(name: &str) -> Vec<u8> {
     bytes
 }
 
-/// What is wrong with the vehicle: check, instance, level, seconds since take-off.
+/// The problems of a vehicle: check, instance, level, seconds since take-off.
 fn problems(dir: &Path, name: &str) -> Vec<(String, u64, String, f64)> {
     let code = if name.contains("n03") { 0 } else { 4 };
     let checked = json(&run(dir, &format!("check --json {}", labelled(name).display()), code));
@@ -35,7 +35,7 @@ fn problems(dir: &Path, name: &str) -> Vec<(String, u64, String, f64)> {
 #[test]
 fn an_autopilots_log_and_a_recording_of_the_same_flight_are_judged_alike() {
     let dir = tempfile::tempdir().expect("a directory");
-    // The shock of a crash is shorter than the time between two samples of a recording; and what is wanted in a fall is told too
+    // The shock of a crash is shorter than the interval of samples in a recording. Rate setpoints in a fall come too
     // seldom there to be compared with each rate.
     for (log, recording, only_in_log) in [
         ("bin/f12_gps_jump.bin.gz", "f12_gps_jump.tlog.gz", &[][..]),
@@ -71,9 +71,9 @@ fn a_damaged_log_of_an_autopilot_is_read_around_the_damage_which_is_told_with_it
         let place = |gap: &serde_json::Value| gap["place"].as_u64().unwrap_or(0);
         let is_there = |gap: &&serde_json::Value| place(gap).abs_diff(middle as u64) < 1_000;
         let gap = gaps.iter().find(is_there).unwrap_or_else(|| panic!("{name}: {gaps:?}"));
-        // What is left of the message in which it begins may look like one.
+        // The rest of the message in which it begins may look like one.
         assert!(gap["bytes"].as_u64() >= Some(800), "{name}: {gap}");
-        // What lies before and behind it is judged.
+        // The data before and behind it is judged.
         let (from, to) = (checked["from_s"].as_f64(), checked["to_s"].as_f64());
         assert!(to.zip(from).is_some_and(|(to, from)| to - from > 60.0), "{name}: {checked}");
         let said = text(&run(dir.path(), &format!("check {name}"), 3));

@@ -1,4 +1,4 @@
-//! Reading: every format, filters, damage and what is no log at all.
+//! Reading: every format, filters, damage, and files that are not logs.
 
 use std::fs;
 use std::io::Write as _;
@@ -132,7 +132,7 @@ fn tables_have_a_row_for_each_frame_and_both_times() {
     for message in info["logs"][0]["messages"].as_array().expect("messages") {
         let name = message["name"].as_str().expect("a name");
         let rows = table(&format!("{name}.csv")).lines().count() as u64 - 1;
-        // A text may have a line break of its own.
+        // A text may contain a line break.
         assert!(message["frames"] == rows || name == "STATUSTEXT", "{name}: {rows}");
     }
     assert!(table("HUMS_USAGE.csv").contains("flight_time_s"));
@@ -156,13 +156,13 @@ fn each_line_is_an_object_and_they_are_in_order() {
 
 #[test]
 fn filters_choose_by_time_and_by_message() {
-    // A packed recording knows UTC; this vehicle's own frames tell none.
+    // A packed recording has UTC; this vehicle's own frames have none.
     let dir = tempfile::tempdir().expect("directory");
     packed(dir.path());
     let decode = |more: &str| {
         let line = format!("decode flight.hum -o - --format jsonl --message ATTITUDE {more}");
         let lines = text(&run(dir.path(), &line, 0));
-        // Who checked the vehicle stands behind the rest.
+        // The recorder of the checks comes last.
         lines.lines().filter(|line| !line.contains("HUMS_CHECKED")).collect::<Vec<_>>().join("\n")
     };
     let all = decode("");
@@ -182,7 +182,7 @@ fn filters_choose_by_time_and_by_message() {
     run(dir.path(), "decode flight.hum -o - --format jsonl --from yesterday", 2);
 }
 
-/// Findings as `hums decode` writes them: level, check, seconds, who found it.
+/// Findings in the output of `hums decode`: level, check, seconds, source.
 fn findings_of(jsonl: &str) -> Vec<String> {
     let rows = jsonl.lines().map(|line| serde_json::from_str::<serde_json::Value>(line).expect(line));
     let findings = rows.filter(|row| row["record"] == "HUMS_FINDING");
@@ -221,7 +221,7 @@ fn a_recording_that_nobody_checked_has_the_findings_of_this_program_and_says_so(
             (&last["fields"]["verdict"], last["fields"]["findings"].as_u64()),
             (&"critical".into(), Some(found.len() as u64))
         );
-        // Of a part, what was found in it.
+        // A part has the findings in its time.
         let until = format!(
             "decode {input} -o - --format jsonl --to {}",
             found[2].split(' ').nth(2).expect("a time")
@@ -309,7 +309,7 @@ fn a_cut_log_gives_what_it_has() {
         for name in ["cut.tlog", "cut.tlog.gaps.csv"] {
             let _ = fs::remove_file(dir.path().join(name));
         }
-        // Nothing in it tells that it ended there.
+        // Nothing in it shows that it ended there.
         run(dir.path(), "decode cut.hum -o cut.tlog --format tlog", 3);
         let back = frames_of(&dir.path().join("cut.tlog"));
         assert!(frames_of(&px4()).starts_with(&back), "{length} bytes");
@@ -334,7 +334,7 @@ fn a_card_without_its_file_system_is_read_block_by_block() {
 fn segments_copied_off_a_card_are_a_log() {
     let dir = recorded();
     let image = fs::read(dir.path().join("card.img")).expect("an image");
-    // The first sector of the log, wherever the card has it; segments are allocated in one piece on an empty card.
+    // The first sector of the log, anywhere on the card; segments are allocated in one piece on an empty card.
     let start =
         image.chunks(512).position(|block| block[0] == b'H' && block[1] >> 4 == 0xb).expect("a sector") * 512;
     let folder = dir.path().join("copied/box7");
@@ -343,8 +343,7 @@ fn segments_copied_off_a_card_are_a_log() {
     fs::write(folder.join("notes.txt"), "not a log").expect("written");
     run(dir.path(), "decode copied -o back.tlog --format tlog", 0);
     assert_eq!(frames_of(&dir.path().join("back.tlog")), frames_of(&px4()));
-    // In two files that are named one by one, in any order.
-    // Without its parity, which is of the file as it was.
+    // In two files that are named one by one, in any order. Without its parity, which belongs to the original file.
     let (first, second) = image[start..start + (1 << 20)].split_at(100 * 512);
     fs::create_dir(folder.join("two")).expect("made");
     fs::write(folder.join("two/00001_00.hum"), first).expect("written");
@@ -366,7 +365,7 @@ fn what_is_no_log_is_told_apart() {
     let ulog = [&b"ULog\x01\x12\x35\x01"[..], &[0; 8]].concat();
     fs::write(at.join("ArduPilot"), dataflash).expect("written");
     fs::write(at.join("ULog"), &ulog).expect("written");
-    // As large as what may be a card without a partition table.
+    // As large as a possible card without a partition table.
     fs::write(at.join("large"), [&dataflash[..], &vec![b'\n'; 3 << 20]].concat()).expect("written");
     for input in ["ArduPilot", "ULog", "large", "PX4"] {
         let output = run(at, &format!("info --verify {input}"), 1);
@@ -390,7 +389,7 @@ fn what_is_no_log_is_told_apart() {
             let output = run(at, &format!("{command} {input}"), 1);
             let error = String::from_utf8_lossy(&output.stderr).into_owned();
             assert!(error.contains(said), "{command} {input}: {error}");
-            // Whoever named a large file of something else learns what is read.
+            // For a large file of another kind the error lists the readable kinds.
             let lists = command == "info --verify"
                 || input != "zeros"
                 || error.contains("an ArduPilot log (.bin, .log)");
@@ -444,7 +443,7 @@ fn slips_of_the_command_line_are_usage_errors() {
     assert!(!dir.path().join("c.img").exists(), "a slip left an image behind");
 }
 
-/// A process may have no room for threads (`ulimit -v`): here no stack is as large as it is asked to be.
+/// A process may have no room for threads (`ulimit -v`): here no stack gets its requested size.
 #[test]
 fn where_the_system_gives_no_thread_the_work_is_done_without() {
     let dir = recorded();
@@ -466,7 +465,7 @@ fn where_the_system_gives_no_thread_the_work_is_done_without() {
     assert!(decoded("out", None) == decoded("again", Some("140737488355328")));
 }
 
-/// A box that is restarted in flight: the first log breaks off in the air, the second one begins there.
+/// A box that is restarted in flight: the first log ends in the air, the second one begins there.
 #[test]
 fn a_log_that_breaks_off_in_the_air_has_one_time_in_the_air_and_logs_stand_in_the_order_in_which_they_began()
 {
@@ -517,7 +516,7 @@ fn session_of_points(folder: &Path, recording: &str) -> String {
     tag.split([',', ' ']).next().expect("a name").to_owned()
 }
 
-/// A companion computer alone sends nothing that the monitor knows; its recordings are told apart by their bytes.
+/// A companion computer alone sends only unknown messages; its recordings are distinguished by their bytes.
 #[test]
 fn recordings_without_a_known_message_are_sessions_with_dates_of_their_own() {
     let dir = tempfile::tempdir().expect("a directory");

@@ -1,5 +1,4 @@
-//! Recording: where the bytes come from and go to, and settings. What comes out of a card is tested end to end
-//! (`tests/sim`).
+//! Recording: sources, destinations and settings. The contents of cards are tested end to end (`tests/sim`).
 
 use std::fs;
 use std::io::Write;
@@ -71,11 +70,11 @@ fn a_tcp_server_is_listened_to_until_it_closes() {
     let line = format!("sim --input tcp:{address} --sd card.img --gs udpout:{sink} --json");
     let json = json(&run(dir.path(), &line, 0));
     sender.join().expect("the server");
-    // A frame in two pieces that this machine reads 20 ms apart, because others keep it busy, is none: as on a UART.
+    // A frame in two pieces that a busy machine reads 20 ms apart is lost, as on a UART.
     let frames = json["frames_in"].as_u64().expect("a count");
     assert!((1990..=2000).contains(&frames), "{frames} of 2000 frames");
     let mut datagram = [0; 2048];
-    // The first, empty one only says where to answer.
+    // The first, empty one only gives the address for answers.
     assert_eq!(ground.recv(&mut datagram).expect("a datagram"), 0);
     assert!(ground.recv(&mut datagram).is_ok_and(|got| got > 8), "nothing reached the ground station");
 }
@@ -134,7 +133,7 @@ fn a_full_card_keeps_its_sessions_unless_the_user_says_so_and_then_each_that_goe
     };
     let before = sessions("info card.img --json");
     assert_eq!(before[0], "00001");
-    // A store changes nothing of it, and each start needs a file of its own.
+    // A store changes nothing, and each start needs a file of its own.
     let stored = attempt(dir.path(), &format!("{sim} --store store.bin"));
     assert_eq!(stored.status.code(), Some(2), "{}", String::from_utf8_lossy(&stored.stderr));
     assert_eq!(sessions("info card.img --json"), before);

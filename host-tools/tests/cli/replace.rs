@@ -1,4 +1,4 @@
-//! What is there already stays, and two sessions are never mixed.
+//! Existing files stay, and two sessions are never mixed.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -63,7 +63,7 @@ fn two_cards_decoded_into_one_folder_stay_apart() {
     assert_eq!(contents(&dir.path().join("one_by_one")), contents(&dir.path().join("at_once")));
 }
 
-/// Two folders, each with a log of the same name: the whole one, and one whose last half is gone.
+/// Two folders, each with a log of the same name: the whole one, and one without its last half.
 fn whole_and_cut() -> TempDir {
     let dir = tempfile::tempdir().expect("directory");
     for folder in ["whole", "cut", "one"] {
@@ -103,7 +103,7 @@ fn an_output_that_exists_is_overwritten_with_force_only_by_every_format() {
         assert!(contents(&out) == made, "a table of the part is left");
         fs::remove_dir_all(&out).expect("removed");
     }
-    // Parquet tables of two parts of a session never lie side by side: a query reads all that is there.
+    // Parquet tables of two parts of a session never lie side by side: a query reads all files.
     run(dir.path(), "decode cut/log.hum -o fleet --format parquet", 3);
     run(dir.path(), "decode whole/log.hum -o fleet --format parquet", 1);
     run(dir.path(), "decode whole/log.hum -o fleet --format parquet --force", 0);
@@ -114,7 +114,7 @@ fn an_output_that_exists_is_overwritten_with_force_only_by_every_format() {
     assert_eq!(parquet_sessions(&fleet).len(), 1);
 }
 
-/// Every command that has the flag, found by the definition of the command line, with every format of its.
+/// Every command with the flag, found in the definition of the command line, with each of its formats.
 #[test]
 fn every_command_with_the_flag_makes_the_same_again_with_it() {
     let mut root = Cli::command();
@@ -158,7 +158,7 @@ fn a_slip_in_the_name_of_an_output_costs_no_recording() {
     run(dir.path(), "sim --input PX4 --sd card.img --card-size 64", 0);
     let at = |name: &str| dir.path().join(name);
     fs::write(at("thesis.txt"), "months of work").expect("written");
-    // What a port sent, and a log off the card: originals of the kinds that the commands make.
+    // Bytes of a port, and a log from a card: originals of the kinds that the commands make.
     fs::write(at("gs"), frames_of(&px4())[..50].concat()).expect("written");
     let before = stamps(dir.path());
     let names = ["card.img", "thesis.txt", "hums.elf", "flight.tlog", "gs", "log.hum"];
@@ -173,7 +173,7 @@ fn a_slip_in_the_name_of_an_output_costs_no_recording() {
             let line = line.replace("OUT", name);
             let said = run(dir.path(), &line, 1);
             assert!(stamps(dir.path()) == before, "{line}");
-            // What has no such flag does not advise it.
+            // A command without the flag does not advise it.
             let said = String::from_utf8_lossy(&said.stderr);
             assert_eq!(said.contains("--force"), !line.starts_with("sim"), "{line}: {said}");
         }
@@ -259,7 +259,7 @@ fn a_message_that_is_not_there_is_told_and_makes_no_empty_tlog() {
         assert!(String::from_utf8_lossy(&said.stderr).contains(": no AIRSPEED_AUTOCAL of it is within"));
     }
     assert_eq!(contents(dir.path()).len(), 1);
-    // Records are there: they are written, and no tlog.
+    // Records exist: they are written, and no tlog.
     let said =
         run(dir.path(), "decode log.hum -o out --format tlog,jsonl,thesis --message AIRSPEED_AUTOCAL", 0);
     assert!(String::from_utf8_lossy(&said.stderr).contains("log: no frame of what was asked for is in it"));

@@ -1,4 +1,4 @@
-//! What the tests of the program share.
+//! Shared parts of the program's tests.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -28,7 +28,7 @@ pub(crate) fn records(mut rest: &[u8]) -> Vec<(u64, &[u8])> {
     while let Some((time, frame)) =
         rest.split_first_chunk::<TIME_BYTES>().filter(|(_, frame)| frame.len() > 2)
     {
-        // MAVLink 2 and 1: header, payload, checksum; a signature where the header says so.
+        // MAVLink 2 and 1: header, payload, checksum; a signature if the header has its flag.
         let (head, signature) = if frame[0] == 0xFD { (12, 13 * usize::from(frame[2] & 1)) } else { (8, 0) };
         let (frame, after) = frame.split_at((head + usize::from(frame[1]) + signature).min(frame.len()));
         records.push((u64::from_be_bytes(*time), frame));
@@ -37,7 +37,7 @@ pub(crate) fn records(mut rest: &[u8]) -> Vec<(u64, &[u8])> {
     records
 }
 
-/// The last fifth of a recording, in a file of this folder: for tests that need another flight and not a long one.
+/// The last fifth of a recording, in a file of this folder: another short flight for tests.
 pub(crate) fn end_of(name: &str, folder: &Path) -> PathBuf {
     let log = fs::read(flight(name)).expect("a recording");
     let records = records(&log);
@@ -48,14 +48,14 @@ pub(crate) fn end_of(name: &str, folder: &Path) -> PathBuf {
     path
 }
 
-/// The program; nothing may take a minute.
+/// The program, with a minute as its limit.
 pub(crate) fn hums() -> Command {
     let mut command = Command::cargo_bin("hums").expect("the program");
     command.timeout(std::time::Duration::from_mins(1));
     command
 }
 
-/// Runs it in `dir` and gives its output; the exit code must be this one.
+/// Runs it in `dir` and returns its output; the exit code must be this one.
 #[track_caller]
 pub(crate) fn run(dir: &Path, line: &str, code: i32) -> Output {
     let output = attempt(dir, line);
@@ -64,7 +64,7 @@ pub(crate) fn run(dir: &Path, line: &str, code: i32) -> Output {
     output
 }
 
-/// Runs it in `dir` and gives its output, whatever the exit code.
+/// Runs it in `dir` and returns its output, with any exit code.
 #[track_caller]
 pub(crate) fn attempt(dir: &Path, line: &str) -> Output {
     let arguments = line.split_whitespace().map(|word| match word {
@@ -94,11 +94,11 @@ pub(crate) fn recorded() -> TempDir {
     })
 }
 
-/// A file that is made once. A card is nearly empty: only what is on it is kept.
+/// A file that is made once. A card is nearly empty, so only its used parts are stored.
 struct Made {
     name: String,
     long: u64,
-    /// Where they lie in it, and what is there.
+    /// Their offsets, and their bytes.
     parts: Vec<(u64, Vec<u8>)>,
 }
 
@@ -121,7 +121,7 @@ impl Made {
     }
 }
 
-/// A new directory with these files, which the first test that asks for them makes.
+/// A new directory with these files, which the first test that needs them makes.
 pub(crate) fn made_once(what: &str, make: impl FnOnce(&Path)) -> TempDir {
     static MADE: Mutex<BTreeMap<String, Arc<OnceLock<Vec<Made>>>>> = Mutex::new(BTreeMap::new());
     let slot = MADE.lock().expect("nothing fails under it").entry(what.to_owned()).or_default().clone();
@@ -158,8 +158,8 @@ pub(crate) fn frames_of(path: &Path) -> Vec<Vec<u8>> {
     frames(&fs::read(path).expect("a recording"))
 }
 
-/// What the files of the log `base` (`00001`, or a packed log's own name) are called in a directory: that, the box and
-/// the session. There must be one such log.
+/// The name of the log `base` in a directory (`00001`, or a packed log's own name), with box and session. There must
+/// be one such log.
 #[track_caller]
 pub(crate) fn named(dir: &Path, base: &str) -> String {
     let names = all_named(dir, base);
@@ -205,12 +205,13 @@ pub(crate) fn furnished() -> TempDir {
     dir
 }
 
-/// Everything that a directory has, by name.
+/// All files of a directory, by name.
 pub(crate) fn contents(dir: &Path) -> Vec<(String, Vec<u8>)> {
     each_file(dir, |path| fs::read(path).expect("a file"))
 }
 
-/// Which file it is, how long, and when it was changed last (`st_ctime`, which no program sets): one that has the same is untouched.
+/// Identity, length and time of the last change (`st_ctime`, which no program sets): with the same values a file is
+/// untouched.
 pub(crate) type Stamp = (u64, u64, i64, i64);
 
 /// All files below a directory by name, without reading them: a card's image is large.
@@ -221,7 +222,7 @@ pub(crate) fn stamps(dir: &Path) -> Vec<(String, Stamp)> {
     })
 }
 
-/// All files below a directory by name, in order, and what there is to say of each.
+/// All files below a directory by name, in order, with a property of each.
 fn each_file<T: Ord>(dir: &Path, of: impl Fn(&Path) -> T + Copy) -> Vec<(String, T)> {
     let mut found = Vec::new();
     let entries = fs::read_dir(dir).expect("a directory");
@@ -238,7 +239,7 @@ fn each_file<T: Ord>(dir: &Path, of: impl Fn(&Path) -> T + Copy) -> Vec<(String,
     found
 }
 
-/// Waits until something is so.
+/// Waits until a condition holds.
 #[track_caller]
 pub(crate) fn until(what: &str, is: impl Fn() -> bool) {
     let limit = Instant::now() + Duration::from_secs(30);

@@ -6,7 +6,7 @@ use crate::MS;
 use crate::fault::Fault;
 use crate::model::{Kind, Model, crc7, crc16};
 
-/// Clocks with the card not selected that it needs before its first command (6.4.1).
+/// Clocks with an unselected card that it needs before its first command (6.4.1).
 const WAKE_CLOCKS: u32 = 74;
 /// Clock limits of a card before its identification, and afterwards.
 const IDENTIFICATION_HZ: u32 = 400_000;
@@ -46,7 +46,7 @@ enum Transfer {
     },
 }
 
-// Each is a flag of the specification's own.
+// Each is a flag of the specification.
 #[allow(clippy::struct_excessive_bools)]
 pub(crate) struct SdCard {
     pub(crate) model: Model,
@@ -120,7 +120,7 @@ impl SdCard {
         answer
     }
 
-    /// The select pin goes up: not in the middle of something (7.2).
+    /// The select pin goes up: not during a transfer (7.2).
     pub(crate) fn deselected(&mut self, wrong: &mut impl FnMut(String)) {
         if !self.command.is_empty() {
             wrong(format!("deselected within command {}", self.command[0] & 0x3F));
@@ -133,7 +133,7 @@ impl SdCard {
         }
     }
 
-    /// Its power goes: of a block that is being programmed only the first half is new.
+    /// Its power fails: only the first half of a block in programming is new.
     pub(crate) fn power_off(&self, now_ns: u64) {
         if let Some((at, before)) = self.programmed.filter(|_| self.is_busy(now_ns)) {
             self.model.medium.patch(at, 256, &before[256..]);
@@ -156,7 +156,7 @@ impl SdCard {
             self.out.extend(block);
             if let Transfer::Read { next: at } = self.transfer {
                 self.transfer = Transfer::Read { next: at + 1 };
-                // Behind the last block there is an error in the place of the next one.
+                // Behind the last block an error comes in place of the next one.
                 let is_there = at < self.model.medium.size();
                 let bytes = if is_there {
                     let data = self.model.medium.get(at);
@@ -206,7 +206,8 @@ impl SdCard {
         if self.command.len() == 6 {
             let command: [u8; 6] = std::mem::take(&mut self.command).try_into().unwrap_or_default();
             if self.is_busy(now_ns) {
-                // One that will never be ready is past hearing; any other one may be reset, which should not be done.
+                // One that stays busy for ever ignores commands; any other one may be reset, which should not be
+                // done.
                 if self.busy_until_ns == u64::MAX {
                     return;
                 }
@@ -298,7 +299,7 @@ impl SdCard {
 
     fn start(&mut self, now_ns: u64, argument: u32) {
         let since = *self.started_ns.get_or_insert(now_ns);
-        // A large card does not start for a host that does not know large cards (4.2.3).
+        // A large card does not start for a host without support of large cards (4.2.3).
         let is_known = self.model.kind.by_bytes() || argument >> 30 & 1 == 1 && self.knows_conditions;
         if is_known && now_ns - since >= self.model.start_ns {
             self.state = State::Ready;

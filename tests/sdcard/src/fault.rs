@@ -5,7 +5,7 @@
 pub enum Fault {
     /// A command gets no answer.
     Silent,
-    /// A command arrives damaged: the card says so by its checksum.
+    /// A command arrives damaged: the card finds it by its checksum.
     DamagedCommand,
     /// A block that is read is damaged on its way.
     DamagedRead,
@@ -13,19 +13,19 @@ pub enum Fault {
     DamagedWrite,
     /// A block that is written is refused with a write error.
     WriteError,
-    /// A block that is written is taken, and not programmed; only the status says so.
+    /// A written block is taken, and not programmed; only the status shows it.
     NotProgrammed,
     /// This comes in place of a block's token.
     Token(u8),
-    /// A block that is asked for never comes.
+    /// A requested block never comes.
     NoBlock,
-    /// A block that is written keeps the card busy for so many nanoseconds.
+    /// A written block keeps the card busy for this time, nanoseconds.
     Busy(u64),
     /// The line carries noise.
     Noise,
 }
 
-/// A fault, and when it strikes.
+/// A fault, and its time.
 #[derive(Clone, Copy, Debug)]
 pub struct Plan {
     pub(crate) fault: Fault,
@@ -53,13 +53,13 @@ impl Plan {
         self
     }
 
-    /// Not the first so many times that it could strike.
+    /// Not the first times that it could strike.
     pub const fn skip(mut self, skip: u32) -> Self {
         self.skip = skip;
         self
     }
 
-    /// No more than so many times.
+    /// At most this many times.
     pub const fn times(mut self, times: u32) -> Self {
         self.times = times;
         self

@@ -10,7 +10,7 @@ use std::rc::Rc;
 use hums_recorder::format::format;
 use hums_recorder::{Block, CardDevice};
 
-/// A row of blocks, zero where nothing was written. A clone is the same medium.
+/// A row of blocks, zero if never written. A clone is the same medium.
 #[derive(Clone, Debug)]
 pub struct Medium {
     blocks: Rc<RefCell<BTreeMap<u32, [u8; 512]>>>,
@@ -19,7 +19,7 @@ pub struct Medium {
 }
 
 impl Medium {
-    /// An empty one of so many blocks.
+    /// An empty one of `size` blocks.
     pub fn new(size: u32) -> Self {
         Self { blocks: Rc::default(), size, writes: Rc::default() }
     }
@@ -27,7 +27,7 @@ impl Medium {
     /// One that holds an empty FAT32 volume.
     ///
     /// # Panics
-    /// If it is too small for that.
+    /// If it is too small.
     pub fn formatted(size: u32) -> Self {
         let medium = Self::new(size);
         assert!(format(&medium, size ^ 0x5D5D_0001).is_ok(), "{size} blocks are too few");
@@ -35,10 +35,11 @@ impl Medium {
         medium
     }
 
-    /// A medium with this image's content, which may be sparse. A last part of a block is left out.
+    /// A medium with this image's content, which may be sparse. An incomplete last block is left out.
     ///
     /// # Errors
-    /// Of the image's reading; `InvalidInput` where it has more blocks than a card can.
+    ///
+    /// Errors of reading; `InvalidInput` for more blocks than a card can have.
     pub fn load(mut image: &File) -> io::Result<Self> {
         const CHUNK: usize = 2_048 * 512;
         let size = u32::try_from(image.metadata()?.len() / 512).map_err(|_| io::ErrorKind::InvalidInput)?;
@@ -115,13 +116,13 @@ impl Medium {
     }
 }
 
-/// Whether a sparse file has nothing there; reading it would tell as much, and take long.
+/// Whether a sparse file has a hole there; reading it would give the same, but slowly.
 #[cfg(not(target_os = "linux"))]
 fn is_hole(_file: &File, _from: u64, _bytes: u64) -> bool {
     false
 }
 
-/// Whether a sparse file has nothing there.
+/// Whether a sparse file has a hole there.
 #[cfg(target_os = "linux")]
 fn is_hole(file: &File, from: u64, bytes: u64) -> bool {
     match rustix::fs::seek(file, rustix::fs::SeekFrom::Data(from)) {
@@ -131,7 +132,7 @@ fn is_hole(file: &File, from: u64, bytes: u64) -> bool {
     }
 }
 
-/// As a card reader has it: without a driver's troubles.
+/// As in a card reader, without a driver's faults.
 impl CardDevice for Medium {
     type Error = Infallible;
 

@@ -36,9 +36,9 @@ pub struct Model {
     pub start_ns: u64,
     /// How long it takes to find a block.
     pub read_ns: u64,
-    /// How long it takes from one block to the next that it sends in a row.
+    /// Time between two blocks of a row that it sends.
     pub read_next_ns: u64,
-    /// How long it takes to take one block alone, and one of many.
+    /// Time to take one block alone, and one of many.
     pub write_ns: (u64, u64),
     /// Write protected, in its CSD: for now, for ever.
     pub locked: (bool, bool),
@@ -47,7 +47,7 @@ pub struct Model {
 }
 
 impl Model {
-    /// A card of this kind in good order, with times as measured on usual ones.
+    /// A card of this kind without faults, with usual times.
     pub fn new(kind: Kind, medium: Medium) -> Self {
         Self {
             kind,
@@ -62,13 +62,13 @@ impl Model {
         }
     }
 
-    /// The same with something wrong.
+    /// The same with a fault.
     pub fn with(mut self, plan: Plan) -> Self {
         self.plans.push(plan);
         self
     }
 
-    /// The same with nothing wrong.
+    /// The same without faults.
     pub fn healed(&self) -> Self {
         Self { plans: Vec::new(), ..self.clone() }
     }
@@ -117,7 +117,7 @@ impl Model {
     }
 }
 
-/// Written from the specification, bit by bit, and not the driver's.
+/// From the specification, bit by bit, and not the driver's code.
 pub(crate) fn crc7(bytes: &[u8]) -> u8 {
     let mut crc = 0_u8;
     for byte in bytes {

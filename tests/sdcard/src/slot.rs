@@ -40,10 +40,10 @@ struct Inner {
     counts: Counts,
     at_time: Vec<(u64, Event)>,
     at_byte: Vec<(u64, Event)>,
-    /// The soonest of each: looked at for every byte.
+    /// The time of the next one of each, for a fast check at every byte.
     soonest: (u64, u64),
     violations: BTreeMap<String, u32>,
-    /// The processor has stopped once so many bytes went over the bus: no more of them do.
+    /// The processor stops after this many bytes on the bus.
     stop_at: Option<u64>,
 }
 
@@ -68,26 +68,26 @@ impl Slot {
         })))
     }
 
-    /// At this moment this happens.
+    /// Schedules an event at a time.
     pub fn at(&self, ns: u64, event: Event) {
         let mut inner = self.0.borrow_mut();
         inner.at_time.push((ns, event));
         inner.find_soonest();
     }
 
-    /// When so many bytes went over the bus this happens.
+    /// Schedules an event after this many bytes on the bus.
     pub fn at_byte(&self, bytes: u64, event: Event) {
         let mut inner = self.0.borrow_mut();
         inner.at_byte.push((bytes, event));
         inner.find_soonest();
     }
 
-    /// From so many bytes on nothing goes over the bus any more, as when the processor restarts; `None`: it does again.
+    /// Stops the bus after this many bytes, like a restart of the processor; `None`: it runs again.
     pub fn stop_at(&self, bytes: Option<u64>) {
         self.0.borrow_mut().stop_at = bytes;
     }
 
-    /// Now.
+    /// Lets an event happen now.
     pub fn event(&self, event: Event) {
         self.0.borrow_mut().happen(event);
     }
@@ -102,12 +102,12 @@ impl Slot {
         self.0.borrow().now_ns
     }
 
-    /// As the driver sees it.
+    /// The time for the driver.
     pub fn now(&self) -> Instant {
         Instant::from_micros(self.now_ns() / 1_000)
     }
 
-    /// Time goes on to this moment with the bus at rest.
+    /// Advances the time to this moment with an idle bus.
     pub fn advance_to(&self, ns: u64) {
         let mut inner = self.0.borrow_mut();
         inner.now_ns = inner.now_ns.max(ns);
@@ -192,7 +192,7 @@ impl Inner {
     }
 }
 
-/// The slot as [`hums_recorder::spi::SpiCard`] sees it: the F405 board's clocks.
+/// The slot for [`hums_recorder::spi::SpiCard`]: the F405 board's clocks.
 pub struct SimPort {
     slot: Slot,
     transfer_hz: u32,

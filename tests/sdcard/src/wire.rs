@@ -1,4 +1,4 @@
-//! The card at a bus of the chip's model: as the flashed image sees it.
+//! The card at a bus of the chip's model, for the flashed image.
 
 use hums_recorder::spi::{Clock, Port as _};
 use stm32f405_model::spi::Wire;
@@ -13,7 +13,7 @@ pub struct Card {
 }
 
 impl Card {
-    /// At the bus's beginning.
+    /// At the start of the bus.
     pub fn new(slot: &Slot) -> Self {
         Self { slot: slot.clone(), port: slot.port(), hz: 0 }
     }

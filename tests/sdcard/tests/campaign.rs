@@ -1,5 +1,5 @@
-//! The card campaign: whatever the card does, it ends in recording or in a state that the pilot is told, and in
-//! recording again when the card does. Every frame is on a card or counted as lost.
+//! The card campaign. After any fault of the card the recorder records, or reports its state to the pilot, and
+//! records again with the card. Every frame is on a card or counted as lost.
 
 mod rig;
 
@@ -22,7 +22,7 @@ fn sdhc(medium: &Medium) -> Model {
     Model::new(Kind::Sdhc, medium.clone())
 }
 
-/// Records for 10 s; then something happens.
+/// Records for 10 s before an event.
 fn recording(model: Model) -> Rig {
     let mut rig = Rig::new(model);
     rig.run_to(9_000);
@@ -58,7 +58,7 @@ fn a_silent_line_wears_no_card() {
     rig.finish_whole(&medium);
 }
 
-/// A line so slow that a copy of the sector in progress is all that is known of seconds; then the card stands still until full
+/// A slow line: for seconds the only data is a copy of the sector in progress. Then the card stalls until full
 /// sectors wait behind it, and is pulled while they are written.
 #[test]
 fn a_card_that_erases_ahead_never_holds_less_than_was_on_it() {
@@ -197,7 +197,7 @@ fn noise_on_the_line_is_told_and_recorded_over_again_once_it_is_gone() {
     assert_eq!((lost, found[0].gaps.len()), (0, 0));
 }
 
-/// The card takes a block, and says only when it is asked that it could not program it.
+/// The card takes a block, and reports only on request that it could not program it.
 #[test]
 fn a_block_that_was_taken_but_not_programmed_is_written_again() {
     for skip in [0, 1, 5] {
@@ -267,8 +267,8 @@ fn a_card_that_is_out_for_longer_than_the_queue_lasts_loses_counted_frames() {
     assert!(found.frames.last().is_some_and(|last| *last > 2_600), "it went on");
 }
 
-/// Pulled at bytes spread over all commands, from the first on, and put back two seconds later.
-/// A block that is being programmed then is torn.
+/// Pulled at bytes spread over all commands, from the first on, and put back two seconds later. A block that is being
+/// programmed then is torn.
 #[test]
 fn a_card_that_is_pulled_at_any_byte_misses_nothing() {
     const PULLS: u64 = 60;
@@ -294,7 +294,7 @@ fn a_card_that_is_pulled_at_any_byte_misses_nothing() {
     assert!((3..PULLS).contains(&torn), "{torn} of {PULLS} pulls tore a sector");
 }
 
-/// Sectors that are torn.
+/// Torn sectors.
 fn damaged(medium: &Medium) -> usize {
     let is_damaged = |block: &&[u8; 512]| matches!(Header::read(block), Err(NotASector::Damaged));
     medium.content().values().filter(is_damaged).count()
@@ -362,7 +362,7 @@ fn a_card_full_of_other_files_is_told_and_not_touched() {
     assert_eq!(medium.content(), before);
 }
 
-/// Marks every cluster as somebody's.
+/// Marks every cluster as used by others.
 fn fill(medium: &Medium) {
     let layout = hums_recorder::layout::Layout::read(medium).expect("it is formatted");
     for fat_block in 0..layout.fat_blocks {
@@ -374,7 +374,7 @@ fn fill(medium: &Medium) {
     }
 }
 
-/// A socket that wears out: the pilot hears of it, and of other things too.
+/// A socket that wears out: the pilot gets texts about it, and others too.
 #[test]
 fn a_card_that_comes_and_goes_does_not_fill_the_line() {
     let medium = medium();

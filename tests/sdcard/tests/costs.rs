@@ -1,4 +1,4 @@
-//! What the driver costs on the bus, and what it makes of a card's faults (`docs/cards.md`).
+//! The driver's costs on the bus, and its results for a card's faults (`docs/cards.md`).
 //!
 //! `cargo test -p hums-sdcard --test costs -- --nocapture` prints them.
 
@@ -6,14 +6,14 @@ use hums_recorder::{Block, CardDevice as _, SpiCard};
 use hums_sdcard::{Counts, Fault, Kind, MS, Medium, Model, Plan, Slot};
 
 const BLOCKS: u32 = 64;
-/// When the driver has identified the card.
+/// Time of the card's identification by the driver.
 const IDENTIFIED_NS: u64 = 200 * MS;
 
 fn model(medium: &Medium) -> Model {
     Model::new(Kind::Sdhc, medium.clone())
 }
 
-/// What the driver did: whether it was content, what is on the medium, and what it took.
+/// The driver's result: its own report, the medium's content, and the traffic.
 #[derive(Debug)]
 struct Run {
     is_content: bool,
@@ -54,7 +54,7 @@ fn run(model: impl Fn(&Medium) -> Model, per_write: u32) -> Run {
 
 #[test]
 fn bytes_on_the_bus_for_a_block() {
-    // A card that takes its blocks at once, so that only the protocol counts.
+    // A card that takes its blocks at once, so that only the protocol takes time.
     let quick = |medium: &Medium| Model { write_ns: (0, 0), ..model(medium) };
     println!("| blocks a write | bytes a block | selects a block | ms for {BLOCKS} on a usual card |");
     println!("|---|---|---|---|");
@@ -71,7 +71,7 @@ fn bytes_on_the_bus_for_a_block() {
     assert!(run(model, 8).ms * 2 < run(model, 1).ms, "rows are what cards are fast at");
 }
 
-/// It says how it went, and gets it onto the card if that is possible.
+/// It reports its result, and writes the block if possible.
 #[test]
 fn what_the_driver_makes_of_a_fault() {
     let cases = [

@@ -1,4 +1,4 @@
-//! Cards that are not ours to use: told which they are, never touched unasked, and formatted when somebody asks.
+//! Foreign cards: reported with their kind, never touched unasked, and formatted on request.
 
 mod rig;
 
@@ -24,7 +24,7 @@ fn partitioned(kind: u8) -> Medium {
     medium
 }
 
-/// As a new card of more than 32 GB comes from the shop.
+/// A new card of more than 32 GB.
 fn exfat() -> Medium {
     let medium = partitioned(0x07);
     medium.patch(2_048, 0, b"\xEB\x76\x90EXFAT   ");
@@ -42,7 +42,7 @@ fn without_partitions() -> Medium {
     medium
 }
 
-/// As `mkfs.vfat` makes it of a whole disk.
+/// The layout of `mkfs.vfat` on a whole disk.
 fn partition_of_everything() -> Medium {
     let medium = without_partitions();
     medium.patch(0, 446, &[0x80, 0, 1, 0, 0x0C, 0xFE, 0xFF, 0xFF, 0, 0, 0, 0, 0, 0, 4, 0]);
@@ -145,7 +145,7 @@ fn each_is_formatted_by_command_and_recorded_on() {
     }
 }
 
-/// Sizes that cards have, and the smallest that can be.
+/// Sizes of real cards, and the smallest possible one.
 #[test]
 fn cards_of_odd_sizes_are_formatted_whole() {
     let smallest = BLOCKS_MIN.next_multiple_of(512);
@@ -211,7 +211,7 @@ fn nobody_formats_a_card_by_mistake() {
     rig.finish_whole(&ours);
 }
 
-/// The pilot was told of one card, and another one is in the slot when the command comes.
+/// The pilot got a text about one card, and another one is in the slot at the command.
 #[test]
 fn a_card_that_was_put_in_after_the_one_that_was_told_is_not_formatted() {
     let (told, other) = (exfat(), Medium::formatted(64 * MIB));
@@ -233,7 +233,8 @@ fn there_must_be_a_card_to_format() {
     assert_eq!(rig.command(FORMAT, [1.0, 1.0]), Some(FAILED));
 }
 
-/// Pulled at any moment of being formatted: it is unformatted then, is told, and is formatted when somebody asks again.
+/// Pulled at any moment of formatting: the card is then unformatted and reported, and is formatted on another
+/// request.
 #[test]
 fn a_card_that_is_pulled_while_it_is_formatted_can_be_formatted_again() {
     for step in 0..12 {

@@ -1,4 +1,4 @@
-//! How fast a card becomes an answer, as ratios in one run, and how much memory a long log takes.
+//! Speed from a card to an answer, as ratios in one run, and memory for a long log.
 //!
 //! ```text
 //! answer_speed HUMS PYTHON RECORDING.tlog...      the ratios: pymavlink's mavlogdump and gzip beside it
@@ -6,7 +6,7 @@
 //!                                                 memory: a log of so many MiB, made of one recording over and over, and
 //!                                                 all that can be made of it, or only what is named (`info`, `csv`, …)
 //! ```
-//! What goes into files takes up to 30 times the log's size for as long as it is measured.
+//! Output files take up to 30 times the log's size while it is measured.
 //!
 //! For instance: `cargo run --release -p hums-tests --bin answer_speed -- target/release/hums target/venv/bin/python
 //! tests/flights/ap_quad_guided.tlog`.
@@ -22,15 +22,15 @@ use anyhow::{Context as _, Result, bail};
 use hums_blackbox::{Header, Preamble, SECTOR_BYTES, Sector};
 use hums_tests::child;
 
-/// A program is run this often, and the fastest counts: what else the machine does only ever adds.
+/// Runs of a program, of which the fastest counts: other load only adds time.
 const RUNS: u32 = 5;
-/// Nothing here takes longer, but for a long log on a busy machine.
+/// Time limit of a run; only a long log on a busy machine comes near.
 const LIMIT: Duration = Duration::from_hours(2);
-/// Where a group's sector holds its start in ms, and the frames before it.
+/// Offsets in a group's sector: its start in ms, and the number of earlier frames.
 const START_AT: usize = 15 + 4;
 const FRAMES_AT: usize = 15 + 10;
 const NUMBER_AT: usize = 11;
-/// How much later each round is, ms. What the codec expects depends on the lower 32 bits of the time.
+/// Delay of each round, ms. The codec's prediction depends on the lower 32 bits of the time.
 const ROUND_MS: u64 = 1 << 32;
 
 fn main() -> ExitCode {
@@ -149,8 +149,8 @@ print('\\n'.join(sorted(t for t in types if t != 'BAD_DATA' and not t.startswith
     Ok(types)
 }
 
-/// What is made of a long log: its name and the command's words. What goes to standard output is not kept: all of a
-/// long log is hundreds of gigabytes of text.
+/// Outputs of a long log: name and words of the command. Standard output is not stored: all of a long log is hundreds
+/// of gigabytes of text.
 const MADE: [(&str, &[&str]); 9] = [
     ("info", &["info"]),
     ("verify", &["info", "--verify"]),
@@ -200,7 +200,7 @@ fn lengthen(short: &Path, long: &Path, bytes: u64) -> Result<(u64, u64)> {
     let data = fs::read(short)?;
     let sectors: Vec<[u8; SECTOR_BYTES]> =
         data.chunks_exact(SECTOR_BYTES).filter_map(|chunk| chunk.try_into().ok()).collect();
-    // The last group ends early: it would not be followed by another in the middle of a log.
+    // The last group ends early: in the middle of a log no group would follow it.
     let last = sectors.iter().rposition(|sector| Header::read(sector).is_ok_and(|h| h.since_first == 0));
     let whole = sectors.get(..last.unwrap_or(0)).filter(|whole| !whole.is_empty()).context("too short")?;
     let session = Header::read(&whole[0]).map_or(0, |header| header.session);

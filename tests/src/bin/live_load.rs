@@ -1,11 +1,11 @@
-//! What `hums live` costs while a vehicle sends many messages a second, and whether the page stays smooth.
+//! The cost of `hums live` while a vehicle sends many messages a second, and the smoothness of the page.
 //!
 //! ```text
 //! live_load HUMS SECONDS MESSAGES_PER_SECOND RECORDING.tlog
 //! ```
 //! For instance: `cargo run --release -p hums-tests --bin live_load -- target/release/hums 600 2000
-//! tests/flights/ap_quad_faults.tlog`. Prints the server's share of one core, its memory, and what a frame of the
-//! page takes in Chromium until it is painted, in the first and in the last seconds.
+//! tests/flights/ap_quad_faults.tlog`. Prints the server's share of one core, its memory, and the time of a page's
+//! frame in Chromium until it is painted, in the first and in the last seconds.
 
 use std::net::UdpSocket;
 use std::path::Path;
@@ -18,7 +18,7 @@ use hums_tests::frames::of_tlog;
 use hums_tests::live::{Live, free_port, send};
 use hums_tests::oracle::LivePage;
 
-/// How long the page's frames are looked at, each time.
+/// Duration of each measurement of the page's frames.
 const LOOK_S: u32 = 20;
 
 fn main() -> ExitCode {

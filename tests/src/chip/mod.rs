@@ -1,5 +1,5 @@
-//! A board on the model of the chip, with the simulated SD card of `hums-sdcard` at its bus: the image that is flashed, run where
-//! everything round it can be made to fail (`docs/chip.md`).
+//! A board on the model of the chip, with the simulated SD card of `hums-sdcard` at its bus. It runs the image that
+//! is flashed, and all devices around it can be made to fail (`docs/chip.md`).
 
 pub mod record;
 pub mod rig;
@@ -21,7 +21,7 @@ pub const BAUD: f64 = 921_600.0;
 pub struct Feed {
     pieces: VecDeque<(Ps, Vec<u8>)>,
     free: Ps,
-    /// By how much the sender's clock is fast.
+    /// How much too fast the sender's clock is.
     pub fast: f64,
 }
 
@@ -43,7 +43,7 @@ impl Feed {
     pub fn give(&mut self, machine: &mut Machine, until: Ps) {
         while let Some((at, bytes)) = self.pieces.pop_front_if(|(at, _)| *at < until && self.free < until) {
             let start = at.max(self.free);
-            // Not more of it at once than until then.
+            // No more of it at once than until then.
             let fit = ((until - start.min(until)) as f64 * BAUD / 10.0 / SECOND as f64) as usize + 1;
             let now = bytes.len().min(fit);
             self.free = machine.send(0, &bytes[..now], start, BAUD * (1.0 + self.fast));
@@ -54,7 +54,7 @@ impl Feed {
     }
 }
 
-/// The frames of a tlog: microseconds and bytes, by the lengths that MAVLink's headers tell.
+/// The frames of a tlog: microseconds and bytes, by the lengths in MAVLink's headers.
 pub fn frames(mut tlog: &[u8]) -> Vec<(u64, &[u8])> {
     let mut frames = Vec::new();
     while let Some((time, rest)) = tlog.split_first_chunk::<8>() {

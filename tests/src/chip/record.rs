@@ -13,7 +13,7 @@ use hums_sdcard::Medium;
 pub struct Session {
     /// Frames: milliseconds of the record's clock and bytes.
     pub frames: Vec<(u64, Vec<u8>)>,
-    /// Losses told: what, how many, from and to in milliseconds.
+    /// Reported losses: kind, count, from and to in milliseconds.
     pub losses: Vec<(&'static str, u64, u64, u64)>,
     /// Its own messages: faults, notes.
     pub texts: Vec<String>,
@@ -31,7 +31,7 @@ pub fn last(medium: &Medium) -> Option<Session> {
     some(medium, usize::MAX).pop()
 }
 
-/// All sessions but the first `skip`, and the last one at least.
+/// All sessions but the first `skip`, and at least the last one.
 fn some(medium: &Medium, skip: usize) -> Vec<Session> {
     let (status, held) = (CardStatus::new(), Buffers::new());
     let Ok(card) = Card::mount(medium.clone(), &status, &held) else { return Vec::new() };
@@ -47,7 +47,7 @@ fn some(medium: &Medium, skip: usize) -> Vec<Session> {
         let mut session = Session::default();
         for name in names {
             let Ok(mut segment) = card.segment(name) else { continue };
-            // The newest copy of the last sector may lie at the place after it, and nothing yet at its own.
+            // The newest copy of the last sector may be at the place after it, with nothing yet at its own.
             let mut empty = 0;
             for index in 0..segment.blocks() {
                 let mut block = [0; BLOCK_BYTES];
@@ -94,7 +94,7 @@ fn take(reader: &mut LogReader, session: &mut Session) {
 /// How recorded frames compare with those sent.
 #[derive(Debug, Default, PartialEq, Eq)]
 pub struct Compared {
-    /// Frames that are there as they were sent.
+    /// Frames that are there unchanged.
     pub right: usize,
     /// Frames that were sent and are not there.
     pub missing: usize,
@@ -104,7 +104,7 @@ pub struct Compared {
     pub ends: (usize, usize),
 }
 
-/// Compares by content; their order is the reader's to check.
+/// Compares by content; the reader checks their order.
 pub fn compare<'a>(sent: &[Vec<u8>], recorded: impl Iterator<Item = &'a [u8]>) -> Compared {
     let mut places: HashMap<&[u8], VecDeque<usize>> = HashMap::new();
     for (place, frame) in sent.iter().enumerate() {

@@ -1,4 +1,4 @@
-//! A board on a bench: frames come at its first port as fast as it takes them, and the record is compared with them.
+//! A board on a bench: frames come at its first port at full rate, and the record is compared with them.
 
 use hums_sdcard::{Medium, Plan, Slot};
 use stm32f405_model::gpio::Pin;
@@ -14,7 +14,7 @@ use super::{BAUD, board_with};
 /// The board's LED, lit when low.
 const LED: Pin = Pin(2, 12);
 
-/// Frames and the image that is to record them.
+/// Frames and the image that records them.
 #[derive(Debug)]
 pub struct Bench {
     /// The board's image.
@@ -49,14 +49,14 @@ pub struct Rig {
     pub slot: Slot,
     /// The record on the card.
     pub medium: Medium,
-    /// Frames that were sent, and when each one's last bit was.
+    /// Sent frames, with the time of their last bits.
     pub sent: Vec<(Ps, Vec<u8>)>,
     frames: Vec<Vec<u8>>,
     next: usize,
     free: Ps,
-    /// By how much the sender's clock is fast.
+    /// How much too fast the sender's clock is.
     pub fast: f64,
-    /// When the LED changed, and whether it was lit then.
+    /// Times when the LED changed, and whether it was lit then.
     pub led: Vec<(Ps, bool)>,
 }
 
@@ -116,10 +116,11 @@ impl Rig {
         Ok(())
     }
 
-    /// The interrupt's handler of this name begins with other instructions until the next reset (15 s at the most), at full rate or on a
-    /// line that is at rest. Gives the handler's address.
+    /// Other instructions at the beginning of this interrupt handler until the next reset (at most 15 s), at full
+    /// rate or with an idle line. Returns the handler's address.
     ///
     /// # Panics
+    ///
     /// If the image has no such handler.
     pub fn replace(&mut self, handler: &str, code: &[u8], busy: bool) -> Result<u32, Box<Report>> {
         let symbol = self.machine.image().symbols.iter().find(|symbol| symbol.name == handler);
@@ -183,7 +184,7 @@ pub fn set(name: &str, value: f32, sequence: u8) -> Vec<u8> {
 /// A heartbeat of a disarmed quadrotor of ArduPilot's.
 pub fn heartbeat(sequence: u8) -> Vec<u8> {
     let mut frame = frame(0, &[0, 0, 0, 0, 2, 3, 0x51, 3, 3], 50, sequence);
-    // Of the autopilot's own component.
+    // From the autopilot's own component.
     frame[5] = 1;
     frame[6] = 1;
     let body = frame[..frame.len() - 2].to_vec();

@@ -23,7 +23,7 @@ pub(super) const BLOCK: usize = 512;
 pub(super) struct Card {
     dir: TempDir,
     file: File,
-    /// Made when it is first asked for, and kept up to date from then on.
+    /// Made on first use, and kept up to date from then on.
     partition: Option<(File, u64)>,
 }
 
@@ -52,7 +52,7 @@ impl Card {
         power_on(&device, &Params::defaults(), boots, &mut std::io::sink(), stream.chunks(), |_| Ok(()))
     }
 
-    /// All of it.
+    /// Its content.
     pub(super) fn content(&self) -> Result<Vec<u8>> {
         let mut bytes = Vec::new();
         let mut file = self.file.try_clone()?;
@@ -78,14 +78,14 @@ impl Card {
         Ok(())
     }
 
-    /// What the file system says.
+    /// The files of its file system.
     pub(super) fn walk(&self) -> Result<Walk> {
         let device = ReadOnlyImage::new(self.file.try_clone()?)?;
         let layout = Layout::read(&device).map_err(|error| anyhow!("{error}"))?;
         Volume::new(&self.file, layout)?.walk().context("the file system cannot be walked")
     }
 
-    /// `fsck.vfat -n` finds nothing but what a cut may leave.
+    /// `fsck.vfat -n` finds only effects of a cut.
     pub(super) fn check(&mut self) -> Result<()> {
         let path = self.dir.path().join("partition");
         if self.partition.is_none() {

@@ -1,7 +1,7 @@
-//! Bits flip anywhere in a log; whole pages and ends are in [`super::pages`].
+//! Bit errors anywhere in a log; whole pages and ends are in [`super::pages`].
 //!
-//! A log is recorded once, and read: every frame that went in comes out. Then a bit, or a burst of some, is flipped in
-//! the image, the log is read, and the bits are put back: what comes out is compared with what came out before.
+//! A log is recorded once and read: every sent frame comes out. Then a bit, or a burst of bits, is flipped in the
+//! image, the log is read, and the bits are restored. The result is compared with the frames of the whole log.
 
 use std::collections::BTreeSet;
 
@@ -24,7 +24,6 @@ const SECONDS: f64 = 15.0;
 /// The longest burst, in bits: a sector.
 const BURST_BITS_MAX: u64 = 8 * BLOCK as u64;
 
-/// What it prints.
 pub(super) const LABELS: Labels = Labels {
     facts: &[
         "bit errors",
@@ -85,7 +84,7 @@ fn bits(options: &Options, figures: &mut Figures) -> Result<()> {
     Ok(())
 }
 
-/// Pages and ends, of logs that were closed and of logs that were not.
+/// Pages and ends, of closed and of open logs.
 fn whole_pages(options: &Options, figures: &mut Figures) -> Result<()> {
     let logs: Vec<_> =
         OWN.into_iter().flat_map(|flight| [(flight, true), (flight, false)]).zip(1..).collect();
@@ -162,7 +161,7 @@ impl Subject {
         Ok(Self { card, log, blocks, whole })
     }
 
-    /// On the card; or, `in_memory`, before the sectors that are touched got their checksums.
+    /// On the card, or, with `in_memory`, before the touched sectors got their checksums.
     fn damage_often(&self, count: u64, in_memory: bool, seed: u64) -> Result<Outcome> {
         let mut random = Random::new(seed);
         let mut outcome = Outcome::default();
@@ -193,7 +192,7 @@ impl Subject {
         Ok(outcome)
     }
 
-    /// Flips the first and the last bit of the burst and those between by chance; gives the blocks as they were.
+    /// Flips the first and the last bit of the burst and those between by chance; returns the original blocks.
     fn flip(&self, bit: u64, length: u64, random: &mut Random) -> Result<Vec<(u32, [u8; BLOCK])>> {
         let bits_of_block = 8 * BLOCK as u64;
         let mut before: Vec<(u32, [u8; BLOCK])> = Vec::new();
@@ -214,7 +213,7 @@ impl Subject {
         Ok(before)
     }
 
-    /// Gives a sector the checksum of what it has.
+    /// Gives a sector the checksum of its content.
     fn seal(&self, block: u32) -> Result<()> {
         let mut sector = Sector::from_bytes(self.card.read_block(block)?);
         sector.seal(self.whole.summary.session.context("no session")?);
@@ -226,7 +225,7 @@ impl Subject {
         let is_noticed =
             !damaged.gaps.is_empty() || blocks.damaged > 0 || blocks.foreign > 0 || blocks.repaired > 0;
         outcome.noticed += u64::from(is_noticed);
-        // What came out is what was there, in its order; what is missing is known by its place.
+        // Decoded frames are original ones, in order; missing ones are known by their place.
         let mut missing = Vec::new();
         let mut given = damaged.frames.iter().peekable();
         for (index, frame) in self.whole.frames.iter().enumerate() {

@@ -24,7 +24,7 @@ const BAUD: u64 = 200_000;
 struct Form {
     card_mib: u64,
     seconds: u64,
-    /// How often the card is looked at.
+    /// Number of looks at the card.
     looks: u64,
     flights: &'static [&'static str],
 }
@@ -32,15 +32,14 @@ struct Form {
 const LONG: Form = Form { card_mib: 64, seconds: 24 * 3600, looks: 24, flights: &OWN };
 /// The smallest card and the flight that compresses least, so that the card is full after an hour and a half.
 const SHORT: Form = Form { card_mib: 34, seconds: 6_500, looks: 4, flights: &["px4_hil_quad_low.tlog"] };
-/// How far the log may be behind at any moment, in milliseconds.
+/// Longest delay of the log at any moment, in milliseconds.
 const BEHIND_MS_MAX: u64 = 200;
-/// Of the card's space, what the newest data has at least: one segment of sixteen is being overwritten, and the file
+/// Least share of the card's space for the newest data: one segment of sixteen is being overwritten, and the file
 /// system takes some.
 const KEPT_MIN: f64 = 0.8;
-/// What may be allocated beyond that of the second look at the card, in bytes: the list of looks, a file's name.
+/// Highest growth of allocations since the second look at the card, in bytes: the list of looks, a file's name.
 const GROWTH_BYTES_MAX: usize = 64 << 10;
 
-/// What it prints.
 pub(super) const LABELS: Labels = Labels {
     facts: &[
         "simulated hours",
@@ -92,7 +91,7 @@ pub(super) fn run(options: &Options) -> Result<Figures> {
     let last = look(&path, form, seconds * 1_000_000).context("at the end")?;
     ensure!(done.stats.frames_lost == 0, "{} frames lost", done.stats.frames_lost);
     ensure!(done.card.segments_overwritten > 0, "the card never became full");
-    // Before the second look what reading the card keeps for the next time is there already.
+    // By the second look, data that is cached for later readings is already there.
     let early = seen.get(1).context("looked too rarely")?.held_bytes;
     let late = seen.iter().skip(2).map(|about| about.held_bytes).max().unwrap_or(early);
     ensure!(late <= early + GROWTH_BYTES_MAX, "memory grew from {early} to {late} bytes");

@@ -1,13 +1,13 @@
-//! What a campaign found.
+//! The results of a campaign.
 
 use std::fmt::Write as _;
 
-/// What a campaign's figures are called. `docs/proof.md` is held against it, in every run of the tests.
+/// The labels of a campaign's figures. Every test run compares `docs/proof.md` with them.
 #[derive(Debug)]
 pub struct Labels {
     /// The single figures, in the order in which they are printed.
     pub facts: &'static [&'static str],
-    /// The heading of its table; nothing where it has none.
+    /// The heading of its table; empty without a table.
     pub columns: &'static [&'static str],
 }
 
@@ -24,7 +24,7 @@ fn heading(columns: &[&str]) -> String {
     format!("| {} |", columns.join(" | "))
 }
 
-/// What a campaign found.
+/// The results of a campaign.
 #[derive(Debug, Clone)]
 pub struct Figures {
     labels: &'static Labels,
@@ -33,7 +33,7 @@ pub struct Figures {
 }
 
 impl Figures {
-    /// None yet, of those that have these labels.
+    /// No figures yet, with these labels.
     pub(super) fn new(labels: &'static Labels) -> Self {
         Self { labels, facts: Vec::new(), rows: Vec::new() }
     }

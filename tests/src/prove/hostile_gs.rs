@@ -1,4 +1,4 @@
-//! A ground station that means no good, for a day.
+//! A hostile ground station, for a day.
 
 use std::collections::{BTreeMap, VecDeque};
 
@@ -27,26 +27,25 @@ use crate::flights::{OWN, own};
 const BAUD: u64 = 100_000;
 /// The ground station's line, always full.
 const GS_BAUD: u64 = 57_600;
-/// How finely the port is watched, in microseconds.
+/// Time resolution of watching the port, in microseconds.
 const STEP_US: u64 = 5_000;
 const SECOND_US: u64 = 1_000_000;
 const KEY: [u8; 32] = [0x5a; 32];
 /// The budget of the board that has a key, in bytes a second.
 const BUDGET: u32 = 1_000;
-/// The most that anybody may set.
+/// The highest value that anybody may set.
 const BUDGET_MAX: u32 = 5_000;
 const AP_BUDGET_MAX: u32 = 10_000;
 
 /// Earlier sessions on the card, and how long each is in seconds.
 const EARLIER: u32 = 3;
 const EARLIER_S: f64 = 3.0;
-/// What the box sends the autopilot by itself (docs/safety.md): HEARTBEAT, `PARAM_REQUEST_READ`, `REQUEST_DATA_STREAM` and
-/// `COMMAND_LONG`, of the latter these.
+/// Messages that the box sends to the autopilot by itself (docs/safety.md): HEARTBEAT, `PARAM_REQUEST_READ`,
+/// `REQUEST_DATA_STREAM` and `COMMAND_LONG`, of the latter these.
 const OWN_IDS: [u32; 4] = [0, 20, 66, 76];
 const OWN_COMMANDS: [u16; 2] = [511, 512];
 const COMPONENT: u8 = 191;
 
-/// What it prints.
 pub(super) const LABELS: Labels = Labels {
     facts: &[
         "simulated hours",
@@ -74,7 +73,7 @@ pub(super) fn run(options: &Options) -> Result<Figures> {
     let seconds = options.runs(24 * 3600, 300);
     let mut figures = Figures::new(&LABELS);
     figures.fact("simulated hours", format!("{:.1}", seconds as f64 / 3600.0));
-    // Half of the time it may set what it likes, half of the time it would need the key.
+    // Half of the time all settings are allowed, half of the time the key is needed.
     for (name, key) in [("without a key", None), ("with a key", Some(KEY))] {
         let half = attack(options, seconds / 2, key).with_context(|| name.to_owned())?;
         figures.fact(format!("{name}: hostile bytes, MB"), format!("{:.1}", half.hostile_bytes as f64 / 1e6));
@@ -122,12 +121,12 @@ struct Half {
     erased: usize,
 }
 
-/// What reached the autopilot.
+/// Frames that reached the autopilot.
 #[derive(Default)]
 struct ToAutopilot {
     window: Window,
     frames: u64,
-    /// Of them those of the kinds that the box sends by itself, in its own name.
+    /// Of them frames of the kinds that the box sends by itself, in its own name.
     own: u64,
 }
 
@@ -145,7 +144,7 @@ impl ToAutopilot {
     }
 }
 
-/// The frames of each log of the earlier sessions, and how many logs of the card are marked as erased.
+/// The frames of each log of the earlier sessions, and the number of logs on the card that are marked as erased.
 fn logs_of(card: &Card) -> Result<(BTreeMap<String, Vec<u64>>, usize)> {
     let mut frames = BTreeMap::new();
     for log in on_card(&card.path()).into_iter().take(EARLIER as usize) {
@@ -160,7 +159,7 @@ fn logs_of(card: &Card) -> Result<(BTreeMap<String, Vec<u64>>, usize)> {
     Ok((frames, erased))
 }
 
-/// With room for all logs of a day: without a key anybody on the radio begins and ends logs, and a full card overwrites the
+/// Room for all logs of a day: without a key any station can begin and end logs, and a full card overwrites the
 /// oldest of them.
 const CARD_MIB: u64 = 4096;
 
@@ -209,7 +208,7 @@ fn attack(options: &Options, seconds: u64, key: Option<[u8; 32]>) -> Result<Half
     Ok(half)
 }
 
-/// The board's parameters; with a key nothing is answered that is not signed.
+/// The board's parameters; with a key unsigned requests get no answer.
 fn params(keyed: bool) -> Result<Params> {
     let mut params = Params::defaults();
     let mut set = |name: &str, value: f32| {
@@ -224,7 +223,7 @@ fn params(keyed: bool) -> Result<Params> {
 }
 
 impl Half {
-    /// What holds with and without a key.
+    /// Conditions with and without a key.
     fn judge(&self) -> Result<()> {
         let (stats, left) = (self.outcome.done.stats, self.outcome.done.frames_left);
         ensure!(
@@ -239,13 +238,13 @@ impl Half {
         Ok(())
     }
 
-    /// What holds with one.
+    /// Conditions with a key.
     fn judge_with_key(&self, card: &Card) -> Result<()> {
         let Self { changed, erased, to_autopilot: ToAutopilot { frames, own, .. }, .. } = self;
         ensure!(*changed == 0, "{changed} parameters were changed without the key");
         ensure!(*erased == 0, "{erased} logs were marked as erased without the key");
         ensure!(frames == own && *own > 0, "{own} of {frames} frames to the autopilot are the box's own");
-        // Nobody stopped it for a moment, and none of it is a frame that the vehicle did not send.
+        // Recording never stopped, and none of its frames is foreign.
         let stats = self.outcome.done.stats;
         ensure!(stats.frames_logged == stats.frames_in, "{} of {}", stats.frames_logged, stats.frames_in);
         let logs = on_card(&card.path());
@@ -266,7 +265,7 @@ struct Window {
 
 impl Window {
     fn add(&mut self, at_us: u64, bytes: usize) {
-        // What is seen at a step has begun since the step before.
+        // An event at a step began after the previous step.
         while self.frames.front().is_some_and(|(first, _)| at_us - first >= SECOND_US - STEP_US) {
             self.bytes -= self.frames.pop_front().map_or(0, |(_, bytes)| bytes);
         }
@@ -292,15 +291,15 @@ fn both_sides<'a>(
     })
 }
 
-/// What it sends.
+/// The attacker's output.
 struct Hostile {
     rng: Rng,
     encoder: Encoder,
     waiting: VecDeque<u8>,
-    /// The same again, for so many frames.
+    /// The same frame again, this many times.
     flood: (u64, u64),
     bytes: u64,
-    /// Something that was sent before.
+    /// A frame that was sent before.
     old: Vec<u8>,
     frames: u64,
 }
@@ -362,7 +361,7 @@ impl Hostile {
                 let command = if self.rng.chance(0.7) { known } else { self.rng.next_u64() as u16 };
                 let first = if self.rng.chance(0.5) { self.below(400) as f32 } else { self.value() };
                 let id = 75 + self.below(2) as u32;
-                // As the box wants it for formatting, often enough.
+                // A valid format command, often enough.
                 let (first, second) =
                     if command == 526 && self.rng.chance(0.5) { (1.0, 1.0) } else { (first, 0.0) };
                 at_target(Packet::new(id).f32(0, first).f32(4, second).u16(28, command), 30)
@@ -387,7 +386,7 @@ impl Hostile {
                 let key = self.random_bytes(32);
                 at_target(Packet::new(256).u64(0, self.rng.next_u64()).bytes(10, &key), 8)
             }
-            // Any message, with anything in it; also as somebody else.
+            // Any message with any content; also under another identity.
             12 | 13 => {
                 let id = self.below(512) as u32;
                 let size = self.below(255) as usize;
@@ -398,7 +397,7 @@ impl Hostile {
                 self.waiting.extend(old);
                 return;
             }
-            // As much as there can be.
+            // As much as possible.
             _ if self.rng.chance(0.5) => {
                 Packet::new(23).f32(0, 5_000.0).u8(4, 1).u8(5, 191).text(6, 16, "GS_BUDGET")
             }
@@ -419,7 +418,7 @@ impl Hostile {
         if self.rng.chance(0.2) {
             return self.random_bytes(16);
         }
-        // Who turns his own port off is not heard any longer, and that would be the end of the attack.
+        // Turning its own port off would end the attack.
         let name =
             Some(TABLE[self.below(TABLE.len() as u64) as usize].name).filter(|name| *name != "GS_PATH");
         let mut name = name.unwrap_or("GS_BUDGET").as_bytes().to_vec();
@@ -436,7 +435,8 @@ impl Hostile {
         }
     }
 
-    /// As itself, as the vehicle, as the board, or as anybody; sometimes damaged, sometimes signed with another key.
+    /// As itself, as the vehicle, as the board, or with any ids; sometimes damaged, sometimes signed with another
+    /// key.
     fn say(&mut self, packet: &Packet) {
         let who = match self.below(8) {
             0 => (1, 1),
@@ -469,7 +469,7 @@ impl Hostile {
         if self.rng.chance(0.1) {
             self.old.clone_from(&frame);
         }
-        // A message that nobody knows is no frame.
+        // An unknown message gives no frame.
         if frame.is_empty() {
             frame = self.random_bytes(8);
         }

@@ -1,16 +1,16 @@
-//! What a campaign holds in memory, to the byte: resident memory tells of the allocator's habits as well.
+//! Memory that a campaign allocates, to the byte: resident memory also depends on the allocator.
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 static HELD: AtomicUsize = AtomicUsize::new(0);
 
-/// The system's allocator, with a count of the bytes that are held. A program that wants to know what it
-/// `held_bytes` names it as its `#[global_allocator]`.
+/// The system's allocator, with a count of allocated bytes. A program that uses `held_bytes` sets it as its
+/// `#[global_allocator]`.
 #[derive(Debug)]
 pub struct Counting;
 
-// SAFETY: every call is the system allocator's, with the arguments as they came; counting allocates nothing.
+// SAFETY: every call is the system allocator's, with unchanged arguments; counting allocates nothing.
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         HELD.fetch_add(layout.size(), Ordering::Relaxed);

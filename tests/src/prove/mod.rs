@@ -1,9 +1,9 @@
-//! Campaigns: what the record promises, tried in thousands of cases each.
+//! Campaigns: the promises about the record, tested in thousands of cases each.
 //!
-//! Each campaign runs in this process, on the same bodies of tasks as `hums sim`, because ten thousand runs of a program
-//! would take a day. What it finds is compared with the recording itself, the card with `fsck.vfat`. A campaign is one
-//! file here and one line in [`CAMPAIGNS`]; `cargo xtask prove` runs them and writes `docs/proof.md`, whose labels are held
-//! against those of the campaigns by a test.
+//! Each campaign runs in this process, on the same bodies of tasks as `hums sim`, because ten thousand runs of a
+//! program would take a day. Results are compared with the recording itself, the card with `fsck.vfat`. A campaign is
+//! one file here and one line in [`CAMPAIGNS`]; `cargo xtask prove` runs them and writes `docs/proof.md`; a test
+//! compares its labels with those of the campaigns.
 
 mod card;
 mod damage;
@@ -32,13 +32,13 @@ pub use report::{Part, Provenance, write as write_report};
 /// One campaign.
 #[derive(Debug)]
 pub struct Campaign {
-    /// What it is called on the command line.
+    /// Its name on the command line.
     pub name: &'static str,
-    /// What it tries, as a sentence.
+    /// The tested promise, as a sentence.
     pub about: &'static str,
-    /// What its figures are called.
+    /// The labels of its figures.
     pub labels: Labels,
-    /// Runs it; an error is a promise that was not kept.
+    /// Runs it; an error is a broken promise.
     pub run: fn(&Options) -> Result<Figures>,
 }
 

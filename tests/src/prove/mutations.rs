@@ -1,7 +1,7 @@
 //! Mutations of inputs for the readers: the fuzz targets of `hums-fuzz` on stable Rust, in a long round.
 //!
-//! Each target takes any bytes for what its reader would get, and asserts what must hold. A short round of the same
-//! mutations with another seed is a test of `hums-fuzz`.
+//! Each target takes any bytes as its reader's input, and asserts its rules. A short round of the same mutations with
+//! another seed is a test of `hums-fuzz`.
 
 use anyhow::{Context as _, Result, bail};
 use hums_fuzz::{TARGETS, Target, mutate};
@@ -10,12 +10,11 @@ use rayon::prelude::*;
 use super::figures::{Figures, Labels};
 use super::options::Options;
 
-/// The long round is so many times that of the test, which takes half a second a target.
+/// The long round has this many times the inputs of the test, which takes half a second a target.
 const LONG: u64 = 400;
-/// The short round is so many times shorter than that of the test.
+/// The short round has this part of the test's inputs.
 const SHORT: u64 = 5;
 
-/// What it prints.
 pub(super) const LABELS: Labels = Labels {
     facts: &["readers", "inputs tried", "inputs that broke a rule"],
     columns: &["reader", "inputs"],
@@ -37,7 +36,7 @@ pub(super) fn run(options: &Options) -> Result<Figures> {
     Ok(figures)
 }
 
-/// How many inputs were tried.
+/// The number of inputs tried.
 fn try_often(target: &'static Target, options: &Options, seed: u64) -> Result<u64> {
     let rounds = options.runs(LONG * target.rounds, target.rounds / SHORT);
     match mutate::run(target, seed, |mutations| mutations < rounds).context(target.name)? {

@@ -14,15 +14,14 @@ use crate::flights::{OWN, own};
 
 /// The probability that a byte is damaged.
 const PROBABILITIES: [f64; 5] = [0.000_01, 0.000_1, 0.001, 0.003, 0.01];
-/// Far below what the recorder keeps up with: only the noise matters.
+/// Far below the recorder's limit: only the noise matters.
 const BAUD: u64 = 230_400;
-/// Whole frames that one false frame, of 280 bytes, can lie over: none is shorter than 17 with its header.
+/// Whole frames that one false frame, of 280 bytes, can cover: none is shorter than 17 with its header.
 const HIDDEN_MAX: usize = 16;
-/// A damaged frame that fits its checksum by chance, of 65,536; and a damaged header that makes a candidate of bytes
-/// within a frame, each of which has that chance again.
+/// A damaged frame whose checksum fits by chance, 1 in 65,536; and a damaged header that makes a candidate of bytes
+/// within a frame, each with that chance.
 const INVENTED_MAX: f64 = 1.0 / 2_000.0;
 
-/// What it prints.
 pub(super) const LABELS: Labels = Labels {
     facts: &["runs", "frames", "undamaged frames that were not recorded"],
     columns: &[
@@ -80,7 +79,7 @@ pub(super) fn run(options: &Options) -> Result<Figures> {
 struct Outcome {
     frames: u64,
     whole: u64,
-    /// Whole frames that one made up by the noise lay over.
+    /// Whole frames under a false one from the noise.
     missing: u64,
     invented: u64,
 }
@@ -101,7 +100,7 @@ fn record(mut stream: Stream, probability: f64, seed: u64) -> Result<Outcome> {
     let record = Record::of(&log)?;
     ensure!(record.gaps.is_empty(), "gaps: {:?}", record.gaps);
     let (missing, invented) = compare(&whole, &record);
-    // Only what the noise made into a frame, by a checksum that fits by chance, can hide a whole one: it lies over it.
+    // Only a false frame from the noise, with a checksum that fits by chance, can hide a whole one: it covers it.
     ensure!(
         missing <= 3 * invented,
         "{missing} whole frames are missing, {invented} were made up, seed {seed}"
@@ -114,7 +113,7 @@ fn record(mut stream: Stream, probability: f64, seed: u64) -> Result<Outcome> {
     Ok(Outcome { frames: stream.frames.len() as u64, whole, missing, invented })
 }
 
-/// How many whole frames are not in the record, and how many frames there were made by the noise. Both are in order.
+/// The number of whole frames that are not in the record, and of false frames from the noise. Both are in order.
 fn compare(whole: &[u64], record: &Record) -> (usize, usize) {
     let (mut next, mut missing, mut invented) = (0, 0, 0);
     for frame in &record.frames {
@@ -130,8 +129,8 @@ fn compare(whole: &[u64], record: &Record) -> (usize, usize) {
     (missing + whole.len() - next, invented)
 }
 
-/// How many bytes of a frame its checksum covers, itself included: whether the signature after it is right can be told
-/// only by who has the key.
+/// Bytes of a frame that its checksum covers, itself included. The signature after it can be verified only with the
+/// key.
 fn covered(frame: &[u8]) -> usize {
     let is_signed = frame[0] == 0xFD && frame[2] & 1 == 1;
     if is_signed { frame.len() - 13 } else { frame.len() }

@@ -1,10 +1,16 @@
-//! Whole pages of a log go wrong, and its end goes missing.
+//! Damage of whole pages of a log, and lost ends.
 //!
-//! A log is recorded once. Then its file is cut, pages of it are erased, zeroed, copied, exchanged or replaced by what an
-//! older session left there, or it goes on with the second half of another log, or with all of one; what is left is read and verified, and
-//! compared with the whole log. Besides, a sector is altered, or one is lost and a parity sector of it is altered, with checks that fit.
-//! *Noticed* is what `hums info --verify` does not call good; that is also what parity has made again without a loss. A cut behind an end mark cannot be
-//! told from power that went there: that is *told* if `verify` says up to which mark the log is whole, and all of it is.
+//! A log is recorded once. Then its file is changed in one of these ways:
+//!
+//! - it is cut;
+//! - pages are erased, zeroed, copied, exchanged or replaced by those of an older session;
+//! - it continues with the second half of another log, or with all of one;
+//! - a sector is altered with a valid check;
+//! - a sector is lost and a parity sector of it is altered with a valid check.
+//!
+//! The rest is read and verified, and compared with the whole log. *Noticed* means that `hums info --verify` does not
+//! call it good; that includes lossless repair by parity. A cut behind an end mark looks like a power cut at that
+//! place. It is *told* if `verify` names the mark up to which the log is whole, and all of it is.
 
 use std::collections::BTreeSet;
 use std::fmt;
@@ -31,7 +37,7 @@ use crate::flights::own;
 /// Blocks of zeros behind the last sector, as in a segment that is not full.
 const SPACE_BLOCKS: usize = 64;
 
-/// What can happen to a log.
+/// The kinds of damage.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Kind {
     /// It ends at any byte.
@@ -40,23 +46,23 @@ pub(super) enum Kind {
     CutAtSector,
     /// One page is all ones or all zeros.
     Erased,
-    /// Everything from a page on is.
+    /// All blocks from a page on are.
     ErasedToTheEnd,
     /// It goes on with the second half of another log.
     Spliced,
     /// All of another log follows, at once or behind some space.
     Joined,
-    /// One page lies in the place of another one as well.
+    /// One page is also in the place of another one.
     Copied,
-    /// One page is there twice, and what follows lies further back.
+    /// One page is there twice, and later ones are moved back.
     Inserted,
     /// Two pages are exchanged.
     Swapped,
-    /// One page is what another session left there.
+    /// One page has the content of another session.
     Stale,
-    /// A byte of a sector is another one, and its check fits.
+    /// A byte of a sector is changed, with a valid check.
     Altered,
-    /// A sector is lost, and a byte of one of the two from which it would be made again is another one, and its check fits.
+    /// A sector is lost, and a byte of one of the two from which it would be rebuilt is changed, with a valid check.
     ParityAltered,
 }
 
@@ -95,7 +101,7 @@ impl Kind {
     }
 }
 
-/// What became of the damages of one kind.
+/// Results for the damages of one kind.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Tally {
     pub(super) damages: u64,
@@ -103,7 +109,7 @@ pub(super) struct Tally {
     pub(super) noticed: u64,
     /// `verify` calls it whole up to an end mark, and it is.
     pub(super) told: u64,
-    /// Of those that were noticed: nothing is missing, and `verify` says what was made again.
+    /// Of the noticed ones: nothing is missing, and `verify` reports the repair.
     pub(super) repaired: u64,
     /// Read as the other session, because its sector is the first one.
     pub(super) other: u64,
@@ -124,7 +130,7 @@ impl Tally {
         self.frames += other.frames;
     }
 
-    /// A row for each kind of damage, of the sum over all that was damaged, and the sum of all; `of` gives a kind's tallies.
+    /// A row for each kind of damage, with the sum over all subjects, and the total; `of` returns a kind's tallies.
     pub(super) fn tabulate<'a, I: Iterator<Item = &'a Self>>(
         figures: &mut Figures,
         kinds: impl IntoIterator<Item = &'static str>,
@@ -144,7 +150,7 @@ impl Tally {
     }
 }
 
-/// What became of the damages of one log.
+/// Results for the damages of one log.
 pub(super) struct Outcome {
     pub(super) tallies: Vec<(Kind, Tally)>,
     /// Each miss in words.
@@ -156,12 +162,12 @@ struct Damage {
     kind: Kind,
     what: String,
     bytes: Vec<u8>,
-    /// The sectors that are not as they were; what follows from them is lost to the end of their groups.
+    /// The changed sectors; the rest of their groups is lost too.
     touched: Vec<usize>,
 }
 
 impl Damage {
-    /// What parity always makes again: up to eight sectors in a row are not what they were.
+    /// Damage that parity always repairs: up to eight changed sectors in a row.
     fn is_one_page(&self) -> bool {
         matches!(self.kind, Kind::Erased | Kind::Copied | Kind::Stale) && self.touched.len() <= COLUMNS
     }
@@ -173,10 +179,10 @@ impl fmt::Display for Damage {
     }
 }
 
-/// A log that was recorded, whole.
+/// A whole recorded log.
 pub(super) struct Subject {
     dir: TempDir,
-    /// Its sectors, and some space behind them; then, of one that was closed, the parity.
+    /// Its sectors, and some space behind them; then, of a closed one, the parity.
     bytes: Vec<u8>,
     sectors: usize,
     /// The number of each sector's group, from 0.
@@ -186,12 +192,12 @@ pub(super) struct Subject {
 }
 
 impl Subject {
-    /// Records a vehicle that flies, rests, flies and rests; `closed`: the log was ended in order, otherwise power went
-    /// while the vehicle rested. `boots` tells its session from others.
+    /// Records a vehicle that flies, rests, flies and rests; `closed`: the log was ended in order, otherwise power
+    /// failed while the vehicle rested. `boots` distinguishes its session from others.
     pub(super) fn record(flight: &str, closed: bool, boots: u32) -> Result<Self> {
         let card = Card::new(64)?;
         let stream = Stream::of_flight(&own(flight), FULL_RATE)?;
-        // An open one ends before its first parity: what was written and is not there would be told before any damage.
+        // An open one ends before its first parity: missing sectors would be reported before any damage.
         let stream = stream.flying_and_resting(if closed {
             &[(9.0, 1.5), (4.0, 1.5)]
         } else {
@@ -255,7 +261,7 @@ impl Subject {
         })
     }
 
-    /// So many damages, of all kinds in turn; the first misses in words.
+    /// This many damages, of all kinds in turn; the first misses in words.
     pub(super) fn damage_often(&self, other: &Self, count: u64, seed: u64) -> Outcome {
         let mut random = Random::new(seed);
         let tallies = Kind::ALL.into_iter().map(|kind| (kind, Tally::default())).collect();
@@ -347,7 +353,7 @@ impl Subject {
         Damage { kind, what, bytes, touched }
     }
 
-    /// All of another log behind this one. Packed logs end with their last sector; files off a card have room behind it.
+    /// Appends another log. Packed logs end with their last sector; files from a card have free blocks behind it.
     fn join(&self, bytes: &mut Vec<u8>, other: &Self, random: &mut Random) -> String {
         let space = random.below(SPACE_BLOCKS as u64 + 1) as usize;
         bytes.truncate((self.sectors + space) * BLOCK);
@@ -355,8 +361,8 @@ impl Subject {
         format!("{} sectors behind {} and {space} blocks of zeros", other.sectors, self.sectors)
     }
 
-    /// Alters a sector, or a parity sector: the sector that it covers and that is to be lost, and where. Nothing contradicts it where there
-    /// is no parity.
+    /// Alters a sector, or a parity sector; returns the covered sector that is to be lost, and the place. Without
+    /// parity nothing contradicts it.
     fn alter(
         &self,
         kind: Kind,
@@ -388,7 +394,7 @@ impl Subject {
         Some(told)
     }
 
-    /// Whether what is left is told as it is.
+    /// Whether the result is reported correctly.
     fn judge(&self, damage: &Damage, tally: &mut Tally) -> Result<()> {
         if damage.bytes == self.bytes {
             // A page exchanged with itself.
@@ -400,7 +406,7 @@ impl Subject {
         let verdict = verdict(&overview);
         tally.frames += read.frames.len() as u64;
         if read.summary.session.is_some() && read.summary.session != self.whole.summary.session {
-            // Which of two sessions a file belongs to, its first sector tells. It is said that the other one is there.
+            // The first sector decides which of two sessions a file belongs to. The other one is reported.
             ensure!(
                 verdict == Verdict::NotProved && overview.ending.summary.blocks.stale > 0,
                 "not told apart"
@@ -410,7 +416,7 @@ impl Subject {
             return Ok(());
         }
         if damage.kind == Kind::Altered {
-            // What comes out of it may be anything.
+            // Its content may be anything.
             ensure!(verdict == Verdict::NotProved, "{verdict:?} is said: {}", overview.ending.words());
             tally.noticed += 1;
             return Ok(());
@@ -448,7 +454,7 @@ impl Subject {
         Ok(())
     }
 
-    /// The frames that did not come out, by their index; those that did are all of the log, in their order.
+    /// The missing frames, by their index; all others are frames of the log, in their order.
     fn missing(&self, read: &[Frame]) -> Result<Vec<usize>> {
         let (mut missing, mut given) = (Vec::new(), read.iter().peekable());
         for (index, frame) in self.whole.frames.iter().enumerate() {

@@ -1,9 +1,9 @@
-//! Power goes at any block write.
+//! Power cuts at any block write.
 //!
-//! A session is recorded once, at full rate, with every block write kept. Then its beginning is played back onto the
-//! card as it was before, up to a write chosen by chance, that one whole or in part, and the card is looked at: as many
-//! cuts as are wanted from one recording, each exactly what the card would hold. What is decoded is compared with the
-//! frames that went in, one by one and in order, and with when each arrived.
+//! A session is recorded once, at full rate, with every block write kept. Then the card is restored to its state
+//! before, and the writes are replayed up to one chosen by chance, that one whole or in part. So one recording gives
+//! any number of cuts, each with the exact content of the card. Decoded frames are compared with the sent ones, one
+//! by one and in order, and with their arrival times.
 
 pub(super) mod careless;
 
@@ -30,27 +30,27 @@ use crate::flights::own;
 
 /// A directory entry.
 const ENTRY: usize = 32;
-/// What a cut may cost at most, once the log has begun.
+/// Highest loss by a cut, once the log has begun.
 const LOSS_MAX_US: u64 = 200_000;
-/// Until the log has begun: the card is opened, the session before is looked for, and the first segment is made.
+/// Time until the log has begun: the card is opened, the previous session is searched, and the first segment is made.
 const BEGIN_MAX_US: u64 = 300_000;
 
-/// No smaller part of a block is new by itself: an entry of the FAT has four bytes, and half an entry is damage to any
-/// file system of this kind.
+/// The smallest part of a block that is new by itself: an entry of the FAT has four bytes. Half an entry would damage
+/// any file system of this kind.
 const WORD: usize = 4;
 
-/// A card that is back is found within a second, and has what waited for it within half of one.
+/// A card that is back is found within a second, and has the waiting sectors half a second later.
 const CATCH_UP_US: u64 = 1_500_000;
 
-/// What is recorded before and when power goes.
+/// The recording before and at the cut.
 struct Scenario {
     name: &'static str,
     flight: &'static str,
     card_mib: u64,
-    /// Sessions that are on the card before.
+    /// Earlier sessions on the card.
     earlier: u32,
     seconds: f64,
-    /// How fast it comes, in baud.
+    /// Its rate, in baud.
     baud: u64,
     /// When the card is out, in seconds.
     out: Option<(f64, f64)>,
@@ -99,7 +99,6 @@ const SCENARIOS: &[Scenario] = &[
     Scenario { flight: FAULTS, ..RETURN },
 ];
 
-/// What it prints.
 pub(super) const LABELS: Labels = Labels {
     facts: &[
         "cuts",
@@ -116,7 +115,7 @@ pub(super) const LABELS: Labels = Labels {
 pub(super) fn run(options: &Options) -> Result<Figures> {
     let runs = options.runs(10_000, 240);
     let share = runs.div_ceil(SCENARIOS.len() as u64);
-    // The split of a log takes minutes of recording: left to the long form.
+    // The split of a log takes minutes of recording, and is left to the long form.
     let chosen: Vec<_> =
         (0..).zip(SCENARIOS).filter(|(_, one)| !options.short || one.seconds < 60.0).collect();
     let outcomes = chosen.into_par_iter().with_max_len(1).map(|(index, scenario)| {
@@ -164,7 +163,7 @@ struct Outcome {
     begin_us_max: u64,
 }
 
-/// What of the block is new.
+/// The new part of the block.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 enum Tear {
     Whole,
@@ -182,7 +181,7 @@ impl Tear {
         if random.chance(0.5) { Self::Before(at) } else { Self::From(at) }
     }
 
-    /// What the card holds then.
+    /// The card's content after the cut.
     fn apply(self, old: &[u8; BLOCK], new: &[u8; BLOCK]) -> [u8; BLOCK] {
         let mut block = *new;
         match self {
@@ -194,23 +193,23 @@ impl Tear {
     }
 }
 
-/// A session that was recorded, on the card as it was before it.
+/// A recorded session, on the card in its state before.
 struct Session {
     card: Card,
     before: Vec<u8>,
     files: Vec<CardFile>,
-    /// Files of earlier sessions that made room for this one.
+    /// Files of earlier sessions that this one overwrote.
     overwritten: BTreeSet<String>,
-    /// Which file of an earlier session a block belongs to.
+    /// The earlier session's file of a block.
     owners: BTreeMap<u32, usize>,
     trace: Vec<Written>,
-    /// The names of the session's own logs, and what its sectors name.
+    /// The names of the session's own logs, and the session number in its sectors.
     logs: BTreeSet<String>,
     sealed_as: u32,
     arrivals_us: Vec<u64>,
     hashes: Vec<u64>,
     data_start: u32,
-    /// From when until when the card was out and what waited for it was written, in microseconds.
+    /// Times, in microseconds, when the card was out, and when the waiting sectors were written.
     out_us: Option<(u64, u64)>,
 }
 
@@ -272,7 +271,7 @@ impl Session {
         Ok(session)
     }
 
-    /// The card as it was before the session.
+    /// Restores the card to its state before the session.
     fn rewind(&self) -> Result<()> {
         self.trace
             .iter()
@@ -289,13 +288,13 @@ impl Session {
         write.block <= self.data_start
     }
 
-    /// What of a block is old or new as a whole. A directory entry that is torn itself is a name that no system accepts
-    /// (fsck renames it); the log is found by its sectors then. That is not tried here.
+    /// The parts of a block that are old or new as a whole. A torn directory entry is a name that no system accepts
+    /// (fsck renames it); the log is then found by its sectors. That is not tested here.
     fn piece(&self, write: usize) -> usize {
         if self.trace.get(write).is_some_and(|write| self.is_metadata(write)) { ENTRY } else { WORD }
     }
 
-    /// Chosen by chance: half of them torn, either way.
+    /// Cuts by chance: half of them torn, either way.
     fn choose(&self, count: u64, seed: u64) -> Vec<(usize, Tear)> {
         let mut random = Random::new(seed);
         let mut cuts: Vec<_> = (0..count)
@@ -311,8 +310,8 @@ impl Session {
                 )
             })
             .collect();
-        // Few writes are about the file system: those of the directory, and evenly chosen ones of the FAT, each of them
-        // whole and torn.
+        // Few writes belong to the file system: those of the directory, and evenly chosen ones of the FAT, each of
+        // them whole and torn.
         let all = (0..self.trace.len()).filter(|index| self.is_metadata(&self.trace[*index]));
         let (directory, fat): (Vec<_>, Vec<_>) =
             all.partition(|index| self.trace[*index].block == self.data_start);
@@ -355,7 +354,7 @@ impl Session {
         Ok(outcome)
     }
 
-    /// Everything that is promised of a card whose power went at this write.
+    /// All promises about a card after a power cut at this write.
     fn look(&mut self, cut: usize, outcome: &mut Outcome) -> Result<()> {
         self.card.check()?;
         outcome.files += self.earlier_files(cut)?;
@@ -364,7 +363,7 @@ impl Session {
         let cut_us = self.trace[cut].at_us;
         let given = self.arrivals_us.partition_point(|at| *at <= cut_us);
         let given_us = given.checked_sub(1).map_or(0, |last| self.arrivals_us[last]);
-        // What waits for a card that is out is in memory only, and power takes it along.
+        // Sectors for a card that is out are in memory only, and lost with power.
         let out = self.out_us.filter(|(from, to)| (*from..*to).contains(&cut_us));
         let due_us = out.map_or(given_us, |(from, _)| given_us.min(from));
         let loss_us = due_us.saturating_sub(known_us);
@@ -378,7 +377,7 @@ impl Session {
         Ok(())
     }
 
-    /// Each file of an earlier session is as it was, unless it made room. How many were compared.
+    /// Each file of an earlier session is unchanged, unless it was overwritten. Returns the number of compared files.
     fn earlier_files(&self, cut: usize) -> Result<u64> {
         let walk = self.card.walk()?;
         ensure!(walk.damage.is_empty(), "{:?}", walk.damage);
@@ -399,13 +398,14 @@ impl Session {
         Ok(same.iter().filter(|same| **same).count() as u64)
     }
 
-    /// Decodes the session's log: how many frames, and when the last one came. Each is the one that went in.
+    /// Decodes the session's log; returns the number of frames, and the arrival of the last one. Each equals the sent
+    /// one.
     fn decode(&self) -> Result<(u64, u64)> {
         let (mut count, mut next, mut last_us) = (0, 0, 0);
         for log in on_card(&self.card.path()).iter().filter(|log| self.logs.contains(&log.name)) {
             let record = Record::of(log)?;
             if record.summary.session != Some(self.sealed_as) {
-                // No sector of it was written yet: what is there is left over from the log that made room.
+                // It has no sector yet: the content belongs to the overwritten log.
                 continue;
             }
             let mut gaps = record.gaps.iter().peekable();

@@ -1,4 +1,4 @@
-//! What a log says, small enough to be compared ten thousand times.
+//! The content of a log, small enough to be compared ten thousand times.
 
 use anyhow::Result;
 use hums::logs::Log;
@@ -7,14 +7,14 @@ use hums_blackbox::{Entry, Gap};
 
 use super::stream::hash;
 
-/// A frame that came out.
+/// A decoded frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Frame {
     pub(super) at_ms: u64,
     pub(super) hash: u64,
 }
 
-/// What came out, in order.
+/// The decoded content, in order.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Record {
     pub(super) frames: Vec<Frame>,
@@ -44,7 +44,7 @@ impl Collect for Group {
         }
     }
 
-    /// A campaign reads flights of ours: each group is handed on whole.
+    /// A campaign reads flights of ours: each group is passed on whole.
     fn held_bytes(&self) -> usize {
         0
     }

@@ -1,4 +1,4 @@
-//! What the campaigns found, as `docs/proof.md`.
+//! The results of the campaigns, as `docs/proof.md`.
 //!
 //! The document is written whole, by one run of all campaigns on one commit with one seed.
 
@@ -11,7 +11,7 @@ use anyhow::{Context as _, Result};
 use super::Campaign;
 use super::figures::Figures;
 
-/// Where figures come from.
+/// The source of figures.
 #[derive(Debug)]
 pub struct Provenance {
     /// The commit, without any change.
@@ -20,18 +20,18 @@ pub struct Provenance {
     pub seed: u64,
 }
 
-/// What one campaign found.
+/// The results of one campaign.
 #[derive(Debug)]
 pub struct Part {
     /// Which.
     pub campaign: &'static Campaign,
-    /// What it found.
+    /// Its results.
     pub figures: Figures,
     /// How long it took, in seconds.
     pub seconds: f64,
 }
 
-/// What stands before the campaigns.
+/// The text before the campaigns.
 const HEAD: &str = "\
 # Proof
 
@@ -41,7 +41,7 @@ For people who ask how far the record can be trusted. Each section is a campaign
 prints one. `cargo xtask test` runs a short form of each. The same commit and seed give the same figures, apart from the seconds.
 ";
 
-/// What the document says in place of its commit where campaigns changed and have not been run as a whole since.
+/// The text in place of the commit, if campaigns changed and have not been run as a whole since.
 #[cfg(test)]
 const OUTDATED: &str = "**Outdated:** the figures below are of several older commits, and campaigns have changed since. The \
                         next `cargo xtask prove` replaces all of them.";
@@ -70,7 +70,7 @@ fn heading(campaign: &Campaign) -> String {
     format!("## {}", campaign.name)
 }
 
-/// What the campaign tries, with a capital letter and a full stop.
+/// The tested promise, with a capital letter and a full stop.
 fn sentence(about: &str) -> String {
     let mut letters = about.chars();
     letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect()) + "."
@@ -102,7 +102,7 @@ mod tests {
         labels
     }
 
-    /// What the campaigns print.
+    /// The labels of the campaigns.
     fn expected() -> Vec<String> {
         CAMPAIGNS.iter().flat_map(|one| std::iter::once(heading(one)).chain(one.labels.lines())).collect()
     }

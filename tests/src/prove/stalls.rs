@@ -14,14 +14,13 @@ use super::options::Options;
 use super::stream::{FULL_RATE, Stream};
 use crate::flights::{OWN, own};
 
-/// When the card stops answering, in seconds: at a moment for the short form, and at each of these for the long one.
+/// Times when the card stops answering, in seconds: the first for the short form, all for the long one.
 const STALLS_AT_S: [u64; 7] = [5, 2, 3, 4, 6, 7, 8];
-/// For how long.
+/// Length of a stall.
 const STALL_MS: u64 = 2_500;
-/// What is recorded at least, in seconds: a recording that is shorter comes again from its beginning.
+/// Minimum recording time, in seconds: a shorter recording is repeated.
 const SECONDS_MIN: f64 = 12.0;
 
-/// What it prints.
 pub(super) const LABELS: Labels = Labels {
     facts: &["unsigned recordings", "one stall of 2.5 s a run, from second", "frames", "frames lost"],
     columns: &["recording", "seconds", "frames", "lost, at most", "queue, at most", "queue size"],
@@ -66,14 +65,14 @@ fn seconds_of(moments: &[u64]) -> String {
     moments.iter().map(u64::to_string).collect::<Vec<_>>().join(", ")
 }
 
-/// Records all of a stream while the card stands still once; an error where a frame is lost that is not signed.
+/// Records all of a stream while the card stalls once; an error if an unsigned frame is lost.
 fn stall(stream: &Stream, at_s: u64) -> Result<Stats> {
     let stall = Stall { from_us: at_s * 1_000_000, for_us: STALL_MS * 1_000 };
     let card = Card::new(256)?;
     let device = card.device(Faults { stalls: vec![stall], ..Faults::default() })?;
     let done = power_on(&device, &Params::defaults(), 1, &mut std::io::sink(), stream.chunks(), |_| Ok(()))?;
     let stats = done.stats;
-    // The write that meets it comes a little after it has begun.
+    // The write in which it happens begins a little before it.
     ensure!(stats.sd_stall_ms_max >= STALL_MS - 250, "the card never stood still");
     ensure!(
         stream.is_signed || stats.frames_lost + done.frames_left == 0,

@@ -1,4 +1,4 @@
-//! What arrives at the port: a recording's bytes back to back at a line rate, as often as it takes.
+//! The bytes at the port: a recording, back to back at a line rate, repeated as often as needed.
 
 use std::fs;
 use std::hash::{DefaultHasher, Hash as _, Hasher as _};
@@ -13,13 +13,13 @@ use crate::frames;
 
 /// Bytes that arrive together: 0.35 ms at 921,600 baud.
 const SLICE: usize = 32;
-/// The fastest line that the recorder promises to keep up with, in baud.
+/// The fastest line that the recorder supports, in baud.
 pub(super) const FULL_RATE: u64 = 921_600;
 
 /// Bytes with the frames in them.
 pub(super) struct Stream {
     pub(super) bytes: Vec<u8>,
-    /// Where each frame lies.
+    /// The place of each frame.
     pub(super) frames: Vec<Range<usize>>,
     /// Whether most frames are signed.
     pub(super) is_signed: bool,
@@ -45,7 +45,7 @@ impl Stream {
         Ok(Self { bytes, frames: places, is_signed, baud })
     }
 
-    /// So many seconds of it: again from the beginning where it is shorter.
+    /// This many seconds of it; a shorter recording is repeated.
     pub(super) fn for_seconds(&self, seconds: f64) -> Self {
         let wanted = (seconds * self.baud as f64 / 10.0) as usize;
         let (mut bytes, mut places) = (Vec::with_capacity(wanted + 512), Vec::new());
@@ -60,7 +60,7 @@ impl Stream {
         Self { bytes, frames: places, is_signed: self.is_signed, baud: self.baud }
     }
 
-    /// So many seconds of everything and then so many of what the vehicle sends before it is armed, in turn.
+    /// Seconds of all data, and then seconds of the data before arming, in turn.
     pub(super) fn flying_and_resting(&self, seconds: &[(f64, f64)]) -> Result<Self> {
         let armed = self.frames.iter().position(|frame| is_armed(&self.bytes[frame.clone()]));
         let armed =
@@ -98,7 +98,7 @@ impl Stream {
         self.frames.iter().map(|frame| self.at_us(slice_end(frame.end))).collect()
     }
 
-    /// What tells one frame from another.
+    /// A hash of each frame.
     pub(super) fn hashes(&self) -> Vec<u64> {
         self.frames.iter().map(|frame| hash(&self.bytes[frame.clone()])).collect()
     }

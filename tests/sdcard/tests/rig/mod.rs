@@ -1,7 +1,7 @@
 //! The firmware's own monitor and storage over the simulated card, in virtual time, and the pilot's view of it.
 //!
-//! Storage waits for the card with the processor, and whatever is more urgent goes on meanwhile: so, when a service of
-//! the card has taken its time, frames and ticks of that time come first and then the next service.
+//! Storage waits for the card with the processor, while more urgent tasks run. So, after a service of the card,
+//! frames and ticks of its time come first, and then the next service.
 // Each test file uses its own part of this.
 #![allow(dead_code, missing_docs, unreachable_pub)]
 
@@ -20,7 +20,7 @@ use hums_onboard::{Monitoring, PortStatus, ResetCause, Service, Storage, Supervi
 use hums_recorder::{BLOCK_BYTES, Buffers, Card, CardState, CardStatus, LogName, SpiCard};
 use hums_sdcard::{MS, Medium, Model, SimPort, Slot};
 
-/// One frame of noise each so often: 2.5 kB/s of log.
+/// Interval of the frames of noise: 2.5 kB/s of log.
 const FRAME_EVERY: Span = Span::from_millis(40);
 const TICK: Span = Span::from_millis(50);
 const NOISE_ID: u32 = 0xC0DE;
@@ -39,7 +39,7 @@ pub struct Rig {
     pub armed: bool,
     /// The autopilot sends nothing.
     pub is_silent: bool,
-    /// The longest that one service of the card took.
+    /// The longest service of the card.
     pub longest: Span,
     supervisor: Supervisor,
     port: &'static PortStatus,
@@ -62,10 +62,10 @@ pub struct Found {
     pub gaps: Vec<Gap>,
     pub sessions: usize,
     pub segments: usize,
-    /// Numbers and texts of events, and why there are end marks.
+    /// Numbers and texts of events, and reasons of end marks.
     pub events: Vec<(u8, String)>,
     pub marks: Vec<Resting>,
-    /// Checks of snapshots, and whether each is of the time after the finding.
+    /// Checks of snapshots, and whether each is from after the finding.
     pub snapshots: Vec<(String, bool)>,
 }
 
@@ -104,7 +104,7 @@ impl Rig {
         rig
     }
 
-    /// Goes on until so many milliseconds after the start.
+    /// Runs until this many milliseconds after the start.
     pub fn run_to(&mut self, ms: u64) {
         while self.slot.now_ns() < ms * MS {
             self.service();
@@ -208,13 +208,13 @@ impl Rig {
         while self.ends.autopilot_out.take(&mut bytes).is_some() {}
     }
 
-    /// The autopilot says something.
+    /// A message of the autopilot.
     pub fn say(&mut self, id: u32, payload: &[u8]) {
         self.said += 1;
         self.give(id, payload);
     }
 
-    /// A ground station sends a command; its answer.
+    /// A command of a ground station; returns its answer.
     pub fn command(&mut self, command: u16, params: [f32; 2]) -> Option<u8> {
         let mut payload: Vec<u8> = params.iter().flat_map(|param| param.to_le_bytes()).collect();
         payload.resize(28, 0);
@@ -226,7 +226,7 @@ impl Rig {
         self.acks[before..].iter().find(|(number, _)| *number == command).map(|(_, result)| *result)
     }
 
-    /// A ground station sends a message.
+    /// A message of a ground station.
     pub fn ask(&mut self, id: u32, payload: &[u8]) {
         let bytes = frame(255, 190, id, payload);
         let now = self.slot.now();
@@ -240,7 +240,7 @@ impl Rig {
         self.status.read().state
     }
 
-    /// Whether the pilot was told this since then.
+    /// Whether the pilot got this text since then.
     pub fn was_told(&self, text: &str, since_ms: u64) -> bool {
         self.texts.iter().any(|(at, told)| at.as_millis() >= since_ms && told.contains(text))
     }
@@ -255,8 +255,8 @@ impl Rig {
         assert_eq!(self.state(), state, "{:?}", self.texts);
     }
 
-    /// Ends the power-on in order. Every frame is on one of these cards, once and in order, or counted as lost; how many
-    /// are lost.
+    /// Ends the power-on in order. Every frame is on one of these cards, once and in order, or counted as lost.
+    /// Returns the number of lost frames.
     #[track_caller]
     pub fn finish(mut self, cards: &[&Medium]) -> (Vec<Found>, u64) {
         let Ends { sectors_in, gs_in, .. } = &mut self.ends;
@@ -288,7 +288,7 @@ impl Rig {
         (found, lost)
     }
 
-    /// As [`Self::finish`], with nothing lost, and nothing on the bus that the specification forbids.
+    /// As [`Self::finish`], without losses, and without violations of the specification on the bus.
     #[track_caller]
     pub fn finish_whole(self, medium: &Medium) -> Found {
         let slot = self.slot.clone();
@@ -305,7 +305,7 @@ fn frame(system: u8, component: u8, id: u32, payload: &[u8]) -> Vec<u8> {
     let [a, b, c, _] = id.to_le_bytes();
     let mut bytes = vec![0xFD, payload.len() as u8, 0, 0, 0, system, component, a, b, c];
     bytes.extend(payload);
-    // CRC-16/MCRF4XX over all but the first byte, and a byte that stands for the definition.
+    // CRC-16/MCRF4XX over all but the first byte, and a byte for the definition.
     let seed = match id {
         0 => 50,
         23 => 168,
@@ -329,7 +329,7 @@ fn frame(system: u8, component: u8, id: u32, payload: &[u8]) -> Vec<u8> {
     bytes
 }
 
-/// Reads a card as `hums` does: its segments in order, one session after the other.
+/// Reads a card like `hums`: its segments in order, one session after the other.
 #[track_caller]
 pub fn read(medium: &Medium) -> Found {
     let (status, held) = (CardStatus::new(), Buffers::new());
@@ -344,13 +344,13 @@ pub fn read(medium: &Medium) -> Found {
         let mut reader = Box::new(LogReader::new());
         for name in names {
             let mut segment = card.segment(name).expect("it is there");
-            // The newest copy of the last sector may lie at the place after it, and nothing yet at its own.
+            // The newest copy of the last sector may be at the place after it, with nothing yet at its own.
             let mut empty = 0;
             for index in 0..segment.blocks() {
                 let mut block = [0; BLOCK_BYTES];
                 card.read(&mut segment, index, &mut block).expect("it reads");
                 empty = if block == [0; 512] { empty + 1 } else { 0 };
-                // Nothing was written from here on.
+                // From here on the segment was never written.
                 if empty > 1 {
                     break;
                 }

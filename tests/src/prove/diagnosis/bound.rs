@@ -1,12 +1,12 @@
-//! How far a rate may be from what was counted: exact bounds, one-sided, at 95 %.
+//! Bounds of a rate from a count: exact, one-sided, at 95 %.
 
-/// What is left outside.
+/// The probability outside.
 const OUTSIDE: f64 = 0.05;
 /// Halvings of an interval: each gives a bit, and a double has 53.
 const HALVINGS: usize = 60;
 
-/// The greatest mean of a Poisson distribution that gives this count or fewer with 5 %: what a count of events can stand
-/// for at most. Exact (Garwood 1936): half the 95 % quantile of chi-squared with `2 (count + 1)` degrees of freedom.
+/// The greatest mean of a Poisson distribution that gives this count or fewer with 5 %: the upper bound for a count
+/// of events. Exact (Garwood 1936): half the 95 % quantile of chi-squared with `2 (count + 1)` degrees of freedom.
 pub(super) fn events_at_most(count: u64) -> f64 {
     let highest = count as f64 + 10.0 * (count as f64 + 10.0).sqrt();
     boundary(highest, |mean| poisson_up_to(count, mean) > OUTSIDE)
@@ -17,7 +17,7 @@ pub(super) fn share_at_most(count: u64, all: u64) -> f64 {
     if count >= all { 1.0 } else { boundary(1.0, |share| binomial_up_to(count, all, share) > OUTSIDE) }
 }
 
-/// Where a condition that holds at zero ends to hold.
+/// The end of a condition that holds at zero.
 fn boundary(highest: f64, holds: impl Fn(f64) -> bool) -> f64 {
     let (mut low, mut high) = (0.0, highest);
     for _ in 0..HALVINGS {

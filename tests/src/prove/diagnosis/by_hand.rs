@@ -1,4 +1,4 @@
-//! The tables of recordings of other people: how many of the alarms were true, and each of them.
+//! The tables of foreign recordings: the share of true alarms, and each of them.
 
 use std::collections::BTreeMap;
 
@@ -51,7 +51,7 @@ fn flown(outcome: &Outcome) -> &'static str {
     }
 }
 
-/// Whether it is of a vehicle, and was judged by hand.
+/// Whether it is from a vehicle, and was judged by hand.
 pub(super) fn is_vehicle(outcome: &Outcome) -> bool {
     outcome.by_hand.as_ref().is_some_and(|known| known.flown == Flown::Vehicle)
 }

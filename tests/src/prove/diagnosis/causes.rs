@@ -1,15 +1,15 @@
-//! Which checks name the cause of which class of fault.
+//! The checks that name the cause of each class of fault.
 //!
-//! A check names a cause where a pilot or a mechanic who reads its text knows what to look at. What only says that
-//! something is wrong (a failsafe, "a sensor is unhealthy", a large variance of the estimator) tells of a fault, and names
-//! none. The table is the judge's own: no monitor and no check knows it, or the labels.
+//! A check names a cause if a pilot or a mechanic who reads its text knows which part to examine. A general check (a
+//! failsafe, "a sensor is unhealthy", a large variance of the estimator) reports a fault, and names no cause. The
+//! table is the judge's own: no monitor and no check knows it, or the labels.
 
 /// A class of faults, with the checks that name its cause.
 #[derive(Debug)]
 pub(super) struct Class {
     /// As in `labels.json`.
     pub(super) name: &'static str,
-    /// What it is, for the document.
+    /// Its description for the document.
     pub(super) about: &'static str,
     /// The checks that name the cause; none where no check does yet.
     pub(super) checks: &'static [&'static str],
@@ -33,7 +33,7 @@ pub(super) const CLASSES: &[Class] = &[
             "roll_rate",
             "pitch_rate",
             "drive_alert",
-            // They tell people to look at propellers and motors first.
+            // They point people to propellers and motors first.
             "vibration",
             "vibration_px4",
             "vibration_rise",

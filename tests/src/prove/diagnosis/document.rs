@@ -1,4 +1,4 @@
-//! What was found, as `docs/diagnosis.md`: one page for users, written whole by one run on one commit.
+//! The results, as `docs/diagnosis.md`: one page for users, written whole by one run on one commit.
 
 use super::alarms::{self, BY_CHECK};
 use super::by_hand::{self, BY_HAND};
@@ -24,7 +24,7 @@ fewer faults are found or more false alarms come than before.
 * Bounds (\"at least\", \"at most\") are exact, 95 %. Delays are seconds after the fault. Hours are in the air.
 ";
 
-/// What no table shows, and the measurements of before.
+/// Limits that no table shows, and earlier measurements.
 const LIMITS: &str = "\
 ## Known limits
 

@@ -1,4 +1,4 @@
-//! The tables of faults: how many were found, how fast, and each of them.
+//! The tables of faults: the share that was found, the delays, and each of them.
 
 use hums_core::health::Level;
 

@@ -1,4 +1,4 @@
-//! `labels.json`: what is known of flights whose faults were put in on purpose.
+//! `labels.json`: the truth about flights with deliberate faults.
 //!
 //! The file is a list with an object for each flight. Seconds count from the recording's first frame.
 //!
@@ -16,7 +16,7 @@
 //! | `battery_low_s` | when the autopilot itself first called a battery low (null: never) |
 //! | `past` | recordings, in the same folder, of the same vehicle's earlier flights: trends are judged against them |
 //!
-//! Other fields are passed over. Without `flights`, the flight takes no part in the count of flights, landings and mishaps.
+//! Other fields are ignored. Without `flights`, the flight does not count for flights, landings and mishaps.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -27,14 +27,14 @@ use serde::Deserialize;
 
 use super::causes;
 
-/// A mishap that is told from so long before a crash to so long after it is that crash.
+/// A mishap reported within this time before and after a crash is that crash.
 const CRASH_BEFORE_S: f64 = 3.0;
 const CRASH_AFTER_S: f64 = 10.0;
 
 /// The name of the file.
 pub(super) const FILE: &str = "labels.json";
 
-/// What is known of one flight.
+/// The truth about one flight.
 #[derive(Clone, Debug, Deserialize)]
 pub(super) struct Label {
     pub(super) file: String,
@@ -91,7 +91,7 @@ impl Label {
         Ok(())
     }
 
-    /// Whether an alarm is true though nothing was done to the vehicle: it crashed all the same, or its own battery ran low.
+    /// Whether an alarm is true without a deliberate fault: a crash, or a low battery.
     pub(super) fn explains(&self, alarm: &str, at_s: f64) -> bool {
         let of =
             |subsystem: Subsystem| checks().any(|check| check.name == alarm && check.subsystem == subsystem);
@@ -100,7 +100,7 @@ impl Label {
             || (self.battery_low_s.is_some_and(|low_s| at_s >= low_s) && of(Subsystem::Power))
     }
 
-    /// The autopilot and the frame, without its version and what stands in brackets: `ArduCopter quad`.
+    /// The autopilot and the frame, without version and brackets: `ArduCopter quad`.
     pub(super) fn group(&self) -> String {
         let plain = self.vehicle.split('(').enumerate().map(|(place, part)| match part.split_once(')') {
             Some((_, rest)) if place > 0 => rest,

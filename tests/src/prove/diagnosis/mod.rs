@@ -1,10 +1,10 @@
-//! The judge of the diagnosis: what the monitor finds of known faults, how fast, and how often it alarms for nothing.
+//! The judge of the diagnosis: the monitor's findings on known faults, their delays, and its false alarms.
 //!
-//! Flights are recordings with labels (`labels`), kept apart in sets by who knew them when the limits were chosen (`sets`).
-//! Each is judged by the monitor as `hums check` runs it (`outcome`); what comes of all of them are the tables of
-//! `docs/diagnosis.md` (`document`). Recordings of other people have no labels; of those that were judged by hand `verdicts` knows what
-//! was true. It is no campaign of `docs/proof.md`: those try what is promised, and this one measures
-//! what is not perfect.
+//! Flights are recordings with labels (`labels`), in sets by whether they were known when the limits were chosen
+//! (`sets`). The monitor judges each as in `hums check` (`outcome`); the results of all are the tables of
+//! `docs/diagnosis.md` (`document`). Foreign recordings have no labels; `verdicts` has the truth about those that
+//! were judged by hand. It is not a campaign of `docs/proof.md`: those test promises, and this one measures an
+//! imperfect diagnosis.
 
 mod alarms;
 mod bound;
@@ -31,13 +31,12 @@ use crate::flights::root;
 use judged::judge_all;
 pub use options::Flights;
 
-/// What `prove` calls it.
+/// Its name for `prove`.
 pub const DIAGNOSIS: &str = "diagnosis";
-/// What it does, for a list.
+/// Its description for a list.
 pub const ABOUT: &str = "faults found and false alarms, on labelled flights";
 
-/// Judges flights; the text to print. `commit` is asked for the commit where the
-/// document is written.
+/// Judges flights; returns the text to print. `commit` is called for the commit if the document is written.
 pub fn run(flights: &Flights, commit: impl FnOnce() -> Result<String>) -> Result<String> {
     if flights.short {
         return short::run();

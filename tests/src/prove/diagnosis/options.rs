@@ -1,4 +1,4 @@
-//! What is asked for on the command line.
+//! Options of the command line.
 
 use std::path::PathBuf;
 
@@ -9,18 +9,18 @@ use anyhow::{Context as _, Result, bail};
 pub(super) enum Known {
     /// They were, or might have been.
     Yes,
-    /// Nobody who chose the limits had seen them.
+    /// They were new to all who chose the limits.
     No,
-    /// Nobody labelled them, and no limit was fitted to them; but their findings have been seen.
+    /// They have no labels, and no limit was fitted to them; but their findings have been seen.
     Seen,
 }
 
-/// What is judged, and what becomes of it.
+/// The flights to judge, and the use of the results.
 #[derive(Debug, Default, PartialEq, Eq)]
 pub struct Flights {
     /// Folders of flights besides those of the repository.
     pub(super) folders: Vec<(PathBuf, Known)>,
-    /// The flights of the repository alone, with limits for what comes out.
+    /// The flights of the repository alone, with limits for the results.
     pub(super) short: bool,
     /// Write `docs/diagnosis.md`.
     pub(super) write: bool,
@@ -32,7 +32,7 @@ impl Flights {
         Self { short: true, ..Self::default() }
     }
 
-    /// Of the words of a command line.
+    /// From the words of a command line.
     pub fn parse(words: &[String]) -> Result<Self> {
         let (mut options, mut words) = (Self::default(), words.iter());
         while let Some(word) = words.next() {

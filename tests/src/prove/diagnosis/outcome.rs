@@ -1,4 +1,4 @@
-//! One flight, judged: what the monitor said while nothing was wrong, and what it said of the fault.
+//! One judged flight: alarms without a fault, and alarms about the fault.
 
 use std::path::{Path, PathBuf};
 
@@ -15,10 +15,10 @@ use super::causes;
 use super::labels::Label;
 use super::verdicts::{self, Recording};
 
-/// What is said so soon after a landing was in the air: an alarm waits for its debounce.
+/// An alarm this soon after a landing belongs to the air: it waits for its debounce.
 const AFTER_LANDING_S: f64 = 3.0;
 
-/// A level rose to a warning or to critical: what a pilot is told.
+/// A rise of a level to a warning or to critical, as a pilot gets it.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Alarm {
     pub(super) check: String,
@@ -27,14 +27,14 @@ pub(super) struct Alarm {
     pub(super) at_s: f64,
 }
 
-/// An alarm while nothing was wrong.
+/// An alarm without a fault.
 #[derive(Clone, Debug)]
 pub(super) struct False {
     pub(super) alarm: Alarm,
     pub(super) in_air: bool,
 }
 
-/// What came of a fault.
+/// The result for a fault.
 #[derive(Clone, Debug)]
 pub(super) struct Fault {
     /// Whether the messages show it at all.
@@ -43,7 +43,7 @@ pub(super) struct Fault {
     pub(super) told: Option<Alarm>,
     /// The first alarm that names its cause.
     pub(super) named: Option<Alarm>,
-    /// What the autopilot itself said first: seconds after the fault, and its text.
+    /// The autopilot's first own report: seconds after the fault, and its text.
     pub(super) autopilot: Option<(f64, String)>,
 }
 
@@ -55,7 +55,7 @@ pub(super) struct Counts {
     pub(super) mishaps: u64,
 }
 
-/// What came of one flight.
+/// The result for one flight.
 #[derive(Clone, Debug)]
 pub(super) struct Outcome {
     pub(super) file: String,
@@ -63,24 +63,24 @@ pub(super) struct Outcome {
     pub(super) vehicle: String,
     pub(super) class: &'static str,
     pub(super) what: String,
-    /// Time in the air, and on the ground, in which nothing was wrong.
+    /// Time in the air, and on the ground, without a fault.
     pub(super) air_s: f64,
     pub(super) alarms: Vec<False>,
     pub(super) fault: Option<Fault>,
-    /// What is true and what was counted; none where the truth is not known.
+    /// True and counted numbers; none if the truth is unknown.
     pub(super) counts: Option<(Counts, Counts)>,
-    /// What was found out about a recording without a label.
+    /// The verdict on a recording without a label.
     pub(super) by_hand: Option<Recording>,
 }
 
-/// How many alarms of a level rose, in the air or on the ground.
+/// The number of alarms that rose to a level, in the air or on the ground.
 pub(super) fn count<'a>(alarms: impl IntoIterator<Item = &'a False>, level: Level, in_air: bool) -> u64 {
     alarms.into_iter().filter(|one| one.alarm.level == level && one.in_air == in_air).count() as u64
 }
 
 /// Judges one flight.
 pub(super) fn judge(place: &Place, label: Option<&Label>) -> Result<Outcome> {
-    // The labelled flights were recorded on a telemetry port; of the others nobody knows.
+    // The labelled flights were recorded on a telemetry port; the place of the others is unknown.
     let heard = if label.is_some() { Heard::OnTheWire } else { Heard::Somewhere };
     let past = label.map_or(&[][..], |label| &label.past);
     let mut judged = hums::check::recording(place, &Limits::default(), heard)?.judged;
@@ -91,7 +91,7 @@ pub(super) fn judge(place: &Place, label: Option<&Label>) -> Result<Outcome> {
     Ok(Outcome { by_hand, ..of(&judged, &place.name, label) })
 }
 
-/// What is normal after these flights.
+/// The normal figures after these flights.
 fn learn(past: &[PathBuf]) -> Result<Baselines> {
     let places: Vec<_> = past.iter().map(|path| Place::file(path)).collect();
     hums::check::past::learn(&Limits::default(), &places)
@@ -135,7 +135,7 @@ fn span_s(flight: &Flight) -> (f64, f64) {
     (flight.from.as_secs_f64(), flight.to.as_secs_f64())
 }
 
-/// How bad a level is to a pilot; what is stale or good is no alarm.
+/// The severity of a level for a pilot; a stale or good one is 0.
 const fn rank(level: Level) -> u8 {
     match level {
         Level::Critical => 2,
@@ -173,7 +173,7 @@ fn truth(label: &Label) -> Option<Counts> {
     Some(Counts { flights, landings: label.landings, mishaps: label.crashes_s.len() as u64 })
 }
 
-/// What the odometer counted.
+/// The odometer's counts.
 fn counted(judged: &Judged) -> Counts {
     let mut counts = Counts::default();
     judged.monitor.for_each_counter(|number, value| match counter_name(number).as_str() {

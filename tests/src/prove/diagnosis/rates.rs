@@ -1,4 +1,4 @@
-//! Counts with the bounds that they allow, as text.
+//! Counts with their bounds, as text.
 
 use super::bound::{events_at_most, share_at_most};
 
@@ -9,7 +9,7 @@ pub(super) fn hours(seconds: f64) -> String {
     format!("{:.2}", seconds / SECONDS_AN_HOUR)
 }
 
-/// So many events in so many seconds, by the hour: what was counted, and what it can stand for at most.
+/// The rate of events by the hour: the counted one, and its upper bound.
 pub(super) fn an_hour(events: u64, seconds: f64) -> [String; 2] {
     let hours = seconds / SECONDS_AN_HOUR;
     if hours <= 0.0 {
@@ -18,7 +18,7 @@ pub(super) fn an_hour(events: u64, seconds: f64) -> [String; 2] {
     [short(events as f64 / hours), short(events_at_most(events) / hours)]
 }
 
-/// A share in percent, and what it is at least.
+/// A share in percent, and its lower bound.
 pub(super) fn share(count: u64, all: u64) -> [String; 2] {
     if all == 0 {
         return ["-".to_owned(), "-".to_owned()];

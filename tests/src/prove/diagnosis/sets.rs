@@ -1,4 +1,4 @@
-//! The flights that are judged: the labelled ones of the repository, folders that are given, recordings of `HUMS_FLIGHTS`.
+//! The flights to judge: the labelled ones of the repository, given folders, recordings of `HUMS_FLIGHTS`.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -11,16 +11,16 @@ use super::labels::{self, FILE, Label};
 use super::options::{Flights, Known};
 use crate::flights;
 
-/// How deep folders are looked through for labels.
+/// Depth of the search for labels in folders.
 const DEPTH_MAX: usize = 4;
 
 /// Flights that are counted together.
 #[derive(Debug)]
 pub(super) struct Set {
-    /// What tables call it.
+    /// Its name in tables.
     pub(super) name: String,
     pub(super) known: Known,
-    /// In the order of their labels or their names; those without a label are recordings of which nothing is known.
+    /// In the order of their labels or names; those without a label have no known truth.
     pub(super) flights: Vec<(Place, Option<Label>)>,
 }
 
@@ -30,7 +30,7 @@ impl Set {
     }
 }
 
-/// All sets that are asked for, those with labels first.
+/// All requested sets, those with labels first.
 pub(super) fn find_all(options: &Flights) -> Result<Vec<Set>> {
     let mut sets = vec![
         repository("labelled, ArduPilot", "tests/labelled")?,
@@ -61,7 +61,7 @@ fn has_labels_beside(path: &Path) -> bool {
     path.parent().is_some_and(|folder| folder.join(FILE).is_file())
 }
 
-/// A folder that the user names: the flights of every `labels.json` in and below it, or all its recordings.
+/// A folder from the user: the flights of every `labels.json` in and below it, or all its recordings.
 fn given(folder: &Path, known: Known) -> Result<Set> {
     let mut found = Vec::new();
     below(folder, 0, &mut found)?;

@@ -1,7 +1,8 @@
-//! The short form, for every change: the flights of the repository, a floor for what is found and a ceiling for false alarms.
+//! The short form, for every change: the flights of the repository, a floor for found faults and a ceiling for false
+//! alarms.
 //!
-//! The limits are what the checks reached when the limits were set here. Whoever makes a check better raises the floor or lowers
-//! the ceiling; whoever needs one eased says why in the commit.
+//! The limits are the results at the time when they were set. A commit that improves a check raises the floor or
+//! lowers the ceiling; a commit that eases one gives the reason.
 
 use anyhow::{Result, ensure};
 use hums_core::health::Level;
@@ -11,18 +12,19 @@ use super::options::Flights;
 use super::outcome::count;
 use super::sets::find_all;
 
-/// Faults that are told at least, of those that the messages show, and those whose cause is named.
+/// Least number of reported faults, among those that the messages show, and least number with a named cause.
 const TOLD_MIN: usize = 71;
 const NAMED_MIN: usize = 69;
-/// False warnings and false criticals in the air at most, and false alarms on the ground. The third warning repeats a failsafe that PX4 declared before the labelled fault (p39); the
-/// critical one is the same failsafe.
+/// Highest number of false warnings and false criticals in the air, and of false alarms on the ground. The third
+/// warning repeats a failsafe that PX4 declared before the labelled fault (p39); the critical one is the same
+/// failsafe.
 const WARNINGS_MAX: usize = 3;
 const CRITICAL_MAX: usize = 1;
 const GROUND_MAX: usize = 0;
-/// Flights whose flights, landings or mishaps were counted wrong at most.
+/// Highest number of flights with wrong counts of flights, landings or mishaps.
 const MISCOUNTED_MAX: usize = 0;
 
-/// What came of all flights together.
+/// The sums over all flights.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 struct Sums {
     faults: usize,

@@ -1,4 +1,4 @@
-//! The figures that count, in a few sentences: of flights that nobody knew when the limits were chosen, where there are any.
+//! The main figures in a few sentences: of flights that were new when the limits were chosen, if there are any.
 
 use std::fmt::Write as _;
 

@@ -2,14 +2,14 @@
 
 use std::fmt::Write as _;
 
-/// What is the same of a table in every run: the document is held against it by a test.
+/// The constant parts of a table: a test compares the document with them.
 #[derive(Debug)]
 pub(super) struct Form {
     /// The section's heading.
     pub(super) title: &'static str,
     /// How to read it.
     pub(super) about: &'static str,
-    /// What its columns are called.
+    /// The names of its columns.
     pub(super) columns: &'static [&'static str],
 }
 

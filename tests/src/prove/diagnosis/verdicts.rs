@@ -1,9 +1,10 @@
-//! Recordings of other people that were judged by hand, alarm by alarm: by the values around the moment, the mode, what the pilot
-//! did, and the autopilot's own texts, errors and events.
+//! Foreign recordings, judged by hand, alarm by alarm: by the values around the moment, the mode, the pilot's
+//! actions, and the autopilot's own texts, errors and events.
 //!
-//! `verdicts.json` has no content of them: a recording is known by its name and the beginning of its SHA-256. An alarm is true
-//! where the vehicle crashed or was about to, where the autopilot itself says the same, or where a value is beyond the limit that
-//! its autopilot publishes. One verdict is for all alarms of a check in a recording. What is not listed is not known.
+//! `verdicts.json` has no content of them: it identifies a recording by its name and the beginning of its SHA-256. An
+//! alarm is true in three cases: the vehicle crashed or was about to, the autopilot reports the same, or a value is
+//! beyond its autopilot's published limit. One verdict is for all alarms of a check in a recording. Recordings that
+//! are not listed have no verdict.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -16,7 +17,7 @@ use sha2::{Digest as _, Sha256};
 
 const JUDGED: &str = include_str!("verdicts.json");
 
-/// What flew.
+/// The kind of vehicle.
 #[derive(Clone, Copy, Debug, Deserialize, PartialEq, Eq, PartialOrd, Ord)]
 #[serde(rename_all = "lowercase")]
 pub(super) enum Flown {
@@ -30,11 +31,11 @@ pub(super) enum Flown {
 #[derive(Clone, Copy, Debug, Deserialize, PartialEq, Eq, PartialOrd, Ord)]
 #[serde(rename_all = "lowercase")]
 pub(super) enum Verdict {
-    /// Something was wrong.
+    /// There was a fault.
     True,
-    /// Nothing was wrong.
+    /// There was no fault.
     False,
-    /// Nobody looked.
+    /// It was not examined.
     #[serde(skip)]
     Unknown,
 }
@@ -82,7 +83,7 @@ fn all() -> Result<Vec<Recording>> {
     serde_json::from_str(JUDGED).context("verdicts.json")
 }
 
-/// What is known of a recording: of this name, and with this content.
+/// The verdict on a recording, by name and content.
 pub(super) fn find(path: &Path) -> Result<Option<Recording>> {
     let name = path.file_name().unwrap_or_default();
     let Some(known) = all()?.into_iter().find(|known| name == known.file.as_str()) else { return Ok(None) };

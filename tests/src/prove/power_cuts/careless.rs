@@ -1,9 +1,13 @@
-//! Power goes at a card that does not keep what it acknowledged, or spoils what it was not asked to write.
+//! Power cuts with a card that loses acknowledged blocks, or spoils others.
 //!
-//! The recorder takes each block that the card reports as written for a barrier. These cards do not: one writes the last
-//! blocks in any order, so that any of them may be missing; one has lost a single block that it acknowledged; one spoils
-//! the whole page of flash that the last block lies in. What such a card holds is looked at in three ways: by `fsck.vfat`,
-//! whose complaints are counted; by the readers behind `hums info --verify`; and by the recorder, which is started on it again.
+//! For the recorder each block that the card acknowledges is a barrier. These cards break that:
+//!
+//! - one writes the last blocks in any order, so that any of them may be missing;
+//! - one has lost a single acknowledged block;
+//! - one spoils the whole flash page of the last block.
+//!
+//! Such a card is examined in three ways: by `fsck.vfat`, whose complaints are counted; by the readers behind `hums
+//! info --verify`; and by the recorder, which starts on it again.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -28,13 +32,13 @@ use crate::prove::options::Options;
 use crate::prove::record::Record;
 use crate::prove::stream::{FULL_RATE, Stream};
 
-/// Blocks that a card may hold in its memory at most, in any order.
+/// Highest number of blocks in a card's write cache, in any order.
 const CACHE_BLOCKS_MAX: u64 = 64;
 /// Pages of flash, in blocks: 4 and 16 KiB.
 const PAGE_BLOCKS: [u32; 2] = [8, 32];
-/// How long the next power-on records, in seconds.
+/// Recording time of the next power-on, in seconds.
 const NEXT_S: f64 = 0.3;
-/// The number of boots at the next power-on: one that no session before it had.
+/// The boot number of the next power-on, which no earlier session has.
 const NEXT_BOOTS: u32 = 1_000;
 
 const SHORT: Scenario = Scenario { seconds: 10.0, ..LATER };
@@ -44,12 +48,11 @@ const SCENARIOS: &[Scenario] = &[
     Scenario { seconds: 10.0, ..NEW_CARD },
     Scenario { flight: PX4, card_mib: 300, ..SHORT },
 ];
-/// Cases that are told in words.
+/// Cases that are described in words.
 const NOTES_MAX: usize = 40;
 /// Scenarios of the short form.
 const SCENARIOS_SHORT: usize = 2;
 
-/// What it prints.
 pub(in crate::prove) const LABELS: Labels = Labels {
     facts: &[
         "cuts",
@@ -124,7 +127,7 @@ pub(in crate::prove) fn run(options: &Options) -> Result<Figures> {
     }
     ensure!(all.beyond == 0, "more was lost than was spoiled:\n{}", figures.text());
     ensure!(all.untold == 0, "earlier sessions lost something and nothing tells:\n{}", figures.text());
-    // In some of a thousand cuts nothing tells the recorder: counted, and said in docs/cards.md.
+    // In some of a thousand cuts the recorder cannot know: counted, and described in docs/cards.md.
     ensure!(
         !options.short || all.written_over == 0,
         "the next power-on wrote over earlier sessions:\n{}",
@@ -133,7 +136,7 @@ pub(in crate::prove) fn run(options: &Options) -> Result<Figures> {
     Ok(figures)
 }
 
-/// What the card does wrong.
+/// The card's fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Fault {
     /// Of the last blocks, any may be missing.
@@ -156,7 +159,7 @@ impl Fault {
     }
 }
 
-/// What came of the cuts.
+/// Results of the cuts.
 #[derive(Clone, Copy, Debug, Default)]
 struct Tally {
     cuts: u64,
@@ -165,14 +168,14 @@ struct Tally {
     spoiled: u64,
     /// Cards that gave fewer frames of an earlier session than before.
     less: u64,
-    /// Of them those on which nothing tells so.
+    /// Of them those without any report.
     untold: u64,
     /// Frames of earlier sessions that were lost although none of the session's sectors was spoiled.
     beyond: u64,
     recorded: u64,
     said_why: u64,
-    /// Sectors of the session before, in a file that it had taken over: the card lost the new name, so the file counts as
-    /// the oldest one and makes room again.
+    /// Sectors of the previous session in a file that it had taken over. The card lost the new name, so the file
+    /// counts as the oldest one and is overwritten again.
     name_lost: u64,
     written_over: u64,
 }
@@ -192,10 +195,10 @@ impl Tally {
     }
 }
 
-/// What came of the cuts of one session.
+/// Results of the cuts of one session.
 struct Outcome {
     tallies: [Tally; Fault::ALL.len()],
-    /// What nothing told, and what was written over, in words.
+    /// Unreported losses, and overwritten sectors, in words.
     notes: Vec<String>,
 }
 
@@ -209,16 +212,16 @@ struct Kept {
     file: usize,
 }
 
-/// A session that was recorded, and what was on the card before it.
+/// A recorded session, and the earlier content of the card.
 struct Subject {
     session: Session,
     /// Sectors of earlier sessions by their block.
     kept: BTreeMap<u32, Kept>,
     /// Frames of each earlier session.
     frames: BTreeMap<u32, usize>,
-    /// What the next power-on records.
+    /// The recording of the next power-on.
     next: Stream,
-    /// What the card would hold if it did nothing wrong, where that differs from what it held before.
+    /// The content of a faultless card, for blocks that differ from the earlier content.
     now: Blocks,
     name: &'static str,
     notes: Vec<String>,
@@ -233,7 +236,7 @@ impl Subject {
         for (index, file) in session.files.iter().enumerate() {
             for block in blocks_of(file) {
                 let Ok(header) = Header::read(&session.block_before(block)) else { continue };
-                // What lies behind a file's own sectors is left over from a session that made room.
+                // Blocks behind a file's own sectors belong to an overwritten session.
                 if *sealed_as.entry(index).or_insert(header.session) == header.session {
                     kept.insert(block, Kept { session: header.session, file: index });
                 }
@@ -244,7 +247,7 @@ impl Subject {
         Ok(Self { session, kept, frames, next, now: Blocks::new(), name: scenario.name, notes: Vec::new() })
     }
 
-    /// Chosen by chance, half of them where the file system is written.
+    /// Cuts by chance, half of them at writes of the file system.
     fn choose(&self, count: u64, random: &mut Random) -> Vec<(usize, Fault)> {
         let trace = &self.session.trace;
         let metadata: Vec<_> =
@@ -299,13 +302,13 @@ impl Subject {
         Ok(Outcome { tallies, notes: self.notes })
     }
 
-    /// What a block holds: what the fault made of it, or what it should hold.
+    /// The content of a block: the faulty one, or the correct one.
     fn at(&self, block: u32, wrong: &Blocks) -> [u8; BLOCK] {
         let known = wrong.get(&block).or_else(|| self.now.get(&block));
         known.copied().unwrap_or_else(|| self.session.block_before(block))
     }
 
-    /// The blocks that are not as they should be.
+    /// The blocks with wrong content.
     fn wrong(&self, cut: usize, fault: Fault, random: &mut Random) -> Blocks {
         match fault {
             Fault::Reordered => {
@@ -347,13 +350,13 @@ impl Subject {
         }
     }
 
-    /// What a block held before this write.
+    /// The content of a block before this write.
     fn earlier(&self, block: u32, before: usize) -> [u8; BLOCK] {
         let write = self.session.trace[..before].iter().rev().find(|write| write.block == block);
         write.map_or_else(|| self.session.block_before(block), |write| write.bytes)
     }
 
-    /// All that is looked at on one card; the blocks that the next power-on wrote.
+    /// Examines one card; returns the blocks that the next power-on wrote.
     fn look(&mut self, wrong: &Blocks, tally: &mut Tally) -> Result<BTreeSet<u32>> {
         tally.cuts += 1;
         tally.complaints += u64::from(self.session.card.check().is_err());
@@ -361,9 +364,9 @@ impl Subject {
         self.record_again(wrong, tally)
     }
 
-    /// What the readers give of the earlier sessions.
+    /// The readers' results on the earlier sessions.
     fn read(&self, wrong: &Blocks, tally: &mut Tally) -> Result<()> {
-        // Sessions that made room for this one, in the course of things, and those of which the fault took sectors.
+        // Sessions that were overwritten in normal operation, and those with sectors that the fault changed.
         let (mut made_room, mut spoiled) = (BTreeSet::new(), BTreeSet::new());
         for (block, kept) in &self.kept {
             let before = self.session.block_before(*block);
@@ -380,7 +383,7 @@ impl Subject {
                 of_file.filter(|_| self.session.overwritten.contains(&file.path)).map(|kept| kept.session),
             );
         }
-        // A card on which nothing is found is told as one, with an error.
+        // A card without any log is reported, with an error.
         let Ok(found) = find(&[self.session.card.path()], false) else {
             tally.less += u64::from(!self.frames.is_empty());
             return Ok(());
@@ -401,7 +404,7 @@ impl Subject {
         Ok(())
     }
 
-    /// The recorder is started on this card, records, and writes over nothing that was readable.
+    /// The recorder starts on this card, records, and overwrites no readable sector.
     fn record_again(&self, wrong: &Blocks, tally: &mut Tally) -> Result<BTreeSet<u32>> {
         let card = &self.session.card;
         let names = || card.walk().map(|walk| walk.files.into_iter().map(|file| (file.name, file.path))).ok();
@@ -432,7 +435,7 @@ impl Subject {
             tally.said_why += 1;
         }
 
-        // The oldest files may make room, and no other ones.
+        // Only the oldest files may be overwritten.
         let gone: Vec<_> = before.iter().filter(|(name, _)| !after.contains_key(name)).collect();
         ensure!(gone.iter().zip(&before).all(|(gone, oldest)| *gone == oldest), "not the oldest: {gone:?}");
         let made_room: BTreeSet<_> = gone.into_iter().map(|(_, path)| path.as_str()).collect();
@@ -443,7 +446,7 @@ impl Subject {
         Ok(written)
     }
 
-    /// Whether this block of the card holds a sector of a session, and of a file that did not make room.
+    /// Whether this block of the card holds a sector of a session, in a file that was not overwritten.
     fn is_readable(&self, block: u32, wrong: &Blocks, made_room: &BTreeSet<&str>) -> bool {
         let Ok(header) = Header::read(&self.at(block, wrong)) else { return false };
         if header.session == self.session.sealed_as {
@@ -459,7 +462,7 @@ impl Subject {
         self.session.owners.get(&block).map(|file| self.session.files[*file].path.as_str())
     }
 
-    /// Whether the next power-on's frames can be read back.
+    /// Whether the next power-on's frames are readable.
     fn is_recorded(&self) -> Result<bool> {
         let hashes = self.next.hashes();
         for log in find(&[self.session.card.path()], false)?.logs.iter().rev() {
@@ -491,7 +494,8 @@ fn frames_by_session(found: &Found) -> Result<BTreeMap<u32, usize>> {
     Ok(frames)
 }
 
-/// Whether `hums info --verify` tells that something of these sessions is missing: of the card, of the log, or of the log after.
+/// Whether `hums info --verify` reports missing data of these sessions: for the card, for the log, or for the log
+/// after.
 fn tells(found: &Found, less: &BTreeSet<u32>) -> Result<bool> {
     if found.images.iter().any(|image| !image.damage.is_empty()) {
         return Ok(true);
