@@ -1,10 +1,11 @@
 //! The interface between the processor and the chip round it.
 //!
-//! The processor's own registers (`0xE000_0000` to `0xE00F_FFFF`: SCS, NVIC, `SysTick`, DWT, ...) never reach the bus. Bit-band
-//! aliases (`0x2200_0000`, `0x4200_0000`) reach it as a read of the byte, halfword or word that holds the bit, by the size of the
-//! access; for a store a write follows. All other accesses reach it.
+//! The processor's own registers (`0xE000_0000` to `0xE00F_FFFF`: SCS, NVIC, `SysTick`, DWT, ...) never reach the
+//! bus. Bit-band aliases (`0x2200_0000`, `0x4200_0000`) reach it as a read of the byte, halfword or word with the
+//! bit, by the access size. A store adds a write. All other accesses reach it.
 //!
-//! `now` is the processor's count of cycles ([`crate::Core::cycles`]) at the start of the access. A timer's counter is read at this time.
+//! `now` is the processor's count of cycles ([`crate::Core::cycles`]) at the start of the access. A timer's counter
+//! is read at this time.
 
 /// The width of an access.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

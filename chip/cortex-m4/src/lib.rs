@@ -1,17 +1,17 @@
 //! The processor: an instruction-level model of the Arm Cortex-M4 with its single-precision FPU (ARMv7E-M, FPv4-SP).
 //!
-//! [`Core`] is the processor, [`Bus`] its interface to the chip round it. A run is deterministic: nothing looks at a clock, time is
-//! the count of cycles of a documented model (`timing.rs`; modelled, not measured).
+//! [`Core`] is the processor, [`Bus`] its interface to the chip round it. A run is deterministic: nothing looks at a
+//! clock, time is the count of cycles of a documented model (`timing.rs`; modelled, not measured).
 //!
-//! Modelled: all instructions of ARMv7E-M with FPv4-SP. Exceptions with priorities, groups, pre-emption, tail-chaining, late
-//! arrival, lazy stacking of floating-point registers. Faults with their status and escalation, lockup; NVIC, `SysTick`, SCB,
-//! MPU, FPU's registers, DWT's cycle counter; privilege, both stacks, masks; WFI, WFE, SEV, sleep on exit; bit-band aliases;
-//! the local exclusive monitor.
+//! Modelled: all instructions of ARMv7E-M with FPv4-SP. Exceptions with priorities, groups, pre-emption,
+//! tail-chaining, late arrival, lazy stacking of floating-point registers. Faults with their status and escalation,
+//! lockup; NVIC, `SysTick`, SCB, MPU, FPU's registers, DWT's cycle counter; privilege, both stacks, masks; WFI, WFE,
+//! SEV, sleep on exit; bit-band aliases; the local exclusive monitor.
 //!
-//! Not modelled: a debugger, FPB, ITM, TPIU, ETM, DWT's comparators and other counters (an access is [`Outcome::Unmodelled`]).
-//! Also: abandoned and continued instructions (LDM, STM: an interrupt waits for their end); the write buffer's time (a refused
-//! store is imprecise, but reported at once); the bus matrix. UNPREDICTABLE encodings are undefined here, as
-//! far as the decoder sees it.
+//! Not modelled: a debugger, FPB, ITM, TPIU, ETM, DWT's comparators and other counters (an access is
+//! [`Outcome::Unmodelled`]). Also abandoned and continued instructions (LDM, STM: an interrupt waits for their end),
+//! the write buffer's time, and the bus matrix. A refused store is imprecise, but reported at once. UNPREDICTABLE
+//! encodings are undefined here, as far as the decoder sees it.
 #![forbid(unsafe_code)]
 #![expect(clippy::inline_always, reason = "the path of every instruction: measured, a third of the speed")]
 #![expect(

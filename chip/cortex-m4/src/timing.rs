@@ -1,17 +1,20 @@
 //! Cycles: how long an instruction takes with memory that never waits.
 //!
-//! Source: Arm's Cortex-M4 Technical Reference Manual (DDI 0439), table 3-1 (instruction set summary), section 3.3.2 (load/store
-//! timings) and table 7-1 (FPU instructions). Cycles that depend on more than the instruction are added at execution:
-//! * a branch that is taken: the refill of the pipeline, P, which the manual gives as 1 to 3. Here: 2 if the distance is in the
-//!   instruction (the processor fetches ahead to it), 3 if a register or memory gives the target;
-//! * a load: 2 cycles, 1 if it directly follows a load that does not give its address (they are pipelined); a store: 1;
+//! Source: Arm's Cortex-M4 Technical Reference Manual (DDI 0439), table 3-1 (instruction set summary), section 3.3.2
+//! (load/store timings) and table 7-1 (FPU instructions). Cycles that depend on more than the instruction are added
+//! at execution:
+//! * a branch that is taken: the refill of the pipeline, P, which the manual gives as 1 to 3. Here: 2 if the distance
+//!   is in the instruction (the processor fetches ahead to it), 3 if a register or memory gives the target;
+//! * a load: 2 cycles, 1 if it directly follows a load that does not give its address (they are pipelined); a store:
+//!   1;
 //! * a load or store whose address depends on the result of the data-processing instruction before it: 1 more;
-//! * a division: 2 to 12, here 2 and one for each 4 bits by which the quotient is long (early termination is by both operands);
+//! * a division: 2 to 12, here 2 and one for each 4 bits by which the quotient is long (early termination is by both
+//!   operands);
 //! * an access that is not aligned: 1 for each part more.
 //!
-//! Not modelled: the alignment of a branch's target (but for the chip's fetch hook), the contention of literal loads with the
-//! fetch unit, and integer instructions that run beside VDIV and VSQRT. IT takes 1 cycle, without folding. A store's wait states
-//! count in full, without a write buffer.
+//! Not modelled: the alignment of a branch's target (except in the chip's fetch hook), and the contention of literal
+//! loads with the fetch unit. Nor do integer instructions run beside VDIV and VSQRT. IT takes 1 cycle, without
+//! folding. A store's wait states count in full, without a write buffer.
 
 use crate::op::{Float2, Float3, Op};
 

@@ -1,5 +1,5 @@
-//! The map: the devices' addresses and clock gates (RM0090, tables 1 and the gates of 7.3), the interrupts'
-//! numbers (table 62) and the pins' alternate functions (DS8626, table 9), as far as they are modelled.
+//! The map, as far as modelled: the devices' addresses and clock gates (RM0090, table 1 and 7.3), the interrupts'
+//! numbers (table 62), the pins' alternate functions (DS8626, table 9).
 
 use crate::gpio::Pin;
 use crate::rcc::Bank;

@@ -1,5 +1,5 @@
-//! Reset and clock control (RM0090, chapter 7; reset values of the STM32F405): oscillators with their start times and
-//! failures, the PLL, the prescalers, clock gates, resets of single devices, causes of reset.
+//! Reset and clock control (RM0090, chapter 7; reset values of the STM32F405). It has oscillators with start times
+//! and failures, the PLL, prescalers, clock gates, resets of single devices, and causes of reset.
 //!
 //! Not modelled: interrupts of ready oscillators (an enabled one stops the machine), the clock outputs, spread
 //! spectrum, `PLLI2S`'s output.

@@ -1,8 +1,8 @@
-//! SPI1 to SPI3 as master (RM0090, chapter 28): a word on its way and one behind it, reception with overrun, the
-//! clock's divider, DMA requests and interrupts. The other end is a [`Wire`].
+//! SPI1 to SPI3 as master (RM0090, chapter 28): one word in transfer and one behind it, reception with overrun, the
+//! clock's divider, DMA requests, interrupts. The other end is a [`Wire`].
 //!
-//! Not modelled: slave mode, one line for both ways, the CRC unit, I2S, TI's frame: they stop the machine. The
-//! card decides by time, so that a word is exchanged at its last clock.
+//! Not modelled: slave mode, one line for both ways, the CRC unit, I2S, TI's frame: they stop the machine. The card
+//! decides by time, so that a word is exchanged at its last clock.
 
 use crate::time::{NEVER, Now, Timebase};
 

@@ -1,9 +1,9 @@
-//! Fault note of the last reset. A panic, a processor fault, a stack overflow, a hanging task or a low supply leaves a note in
-//! memory that survives a reset. The next start reads it.
+//! Fault note of the last reset. A panic, a processor fault, a stack overflow, a hanging task or a low supply leaves
+//! a note in memory that survives a reset. The next start reads it.
 //!
-//! This memory is random after power-on, so a note needs a valid mark and checksum. It consists of atomics because the writer may
-//! interrupt any code, itself included. For the same reason it does not read the clock: the time is that of the last frame or
-//! tick ([`seen`], [`tick`]).
+//! This memory is random after power-on, so a note needs a valid mark and checksum. It consists of atomics because
+//! the writer may interrupt any code, itself included. For the same reason it does not read the clock: it takes the
+//! time of the last frame or tick ([`seen`], [`tick`]).
 
 use core::fmt::{self, Write as _};
 use core::panic::PanicInfo;

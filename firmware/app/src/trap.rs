@@ -1,9 +1,9 @@
-//! Handlers of fatal errors: panics and processor faults, even with a broken stack. Each leaves a note ([`fault`]) and restarts
-//! the board.
+//! Handlers of fatal errors: panics and processor faults, even with a broken stack. Each leaves a note ([`fault`])
+//! and restarts the board.
 //!
 //! Every fault becomes a `HardFault`, because the milder ones are disabled. The stack is at the bottom of its memory
-//! (`memory.x`). So an overflow damages no data, but leaves the handler without a stack. The handler therefore starts its own at
-//! the other end of the same memory, which is no longer needed.
+//! (`memory.x`). So an overflow damages no data, but leaves the handler without a stack. The handler therefore starts
+//! a stack of its own at the other end of that memory, which is free by then.
 
 use core::arch::naked_asm;
 use core::fmt;

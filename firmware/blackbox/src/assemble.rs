@@ -127,8 +127,8 @@ impl Assembler {
         Self { session: Some(session), ..Self::default() }
     }
 
-    /// Of a log whose first files are gone, as the names of the others tell. So its first file does not begin with number 0,
-    /// and lower numbers in it are left over: the recorder wrote a file of this session anew.
+    /// A log whose first files are gone, by the names of the others. So its first file does not begin with number 0,
+    /// and lower numbers in it are old: the recorder reused a file of this session.
     #[must_use]
     pub fn beginning_late(self) -> Self {
         Self { late: true, ..self }
@@ -243,8 +243,8 @@ impl Assembler {
 
     /// A jump of the number: the log may continue from it.
     fn jumped(&mut self, mut step: Step) {
-        // Before anything was given out, only a log that begins at number 0 tells which sectors are in their place: lower
-        // numbers in a ring's oldest file are left over.
+        // Before the first output, only a log that begins at number 0 shows which sectors are in their place: lower
+        // numbers in a ring's oldest file are old.
         let number = step.header.number;
         let is_in_place = !self.late && u64::from(number) + 1 == self.counts.blocks;
         let begun = self.has_begun();
@@ -330,8 +330,8 @@ impl Assembler {
         self.session
     }
 
-    /// Whether a block that fails its check was a sector of this session. It says so where it says which one it is, and
-    /// where all that is wrong is one bit of what makes it a sector.
+    /// Whether a block that fails its check was a sector of this session. It was, if it names the session or the next
+    /// number, or if only one bit of its first two bytes is wrong.
     fn is_own(&self, block: &[u8; SECTOR_BYTES]) -> bool {
         let Some(session) = self.session else { return true };
         let sector = Sector::from_bytes(*block);

@@ -1,7 +1,7 @@
 //! CRC-32C (Castagnoli, reflected 0x82F63B78, initial value and final exclusive-or all ones): the check of a sector.
 //!
-//! It finds every burst of up to 32 bits and, over 508 bytes, every pattern of up to five bit errors
-//! (Koopman, "32-Bit Cyclic Redundancy Codes for Internet Applications", DSN 2002).
+//! It finds every burst of up to 32 bits. Over 508 bytes it finds every pattern of up to five bit errors (Koopman,
+//! "32-Bit Cyclic Redundancy Codes for Internet Applications", DSN 2002).
 
 const POLYNOMIAL: u32 = 0x82f6_3b78;
 

@@ -10,9 +10,9 @@ pub(crate) const PROBABILITY_BITS: u32 = 16;
 
 /// A distribution over 16 symbols that adapts to those it codes: quickly at first, then ever more slowly.
 ///
-/// Place `i` (0 to 14) is where symbol `i + 1` begins, of 2^16; place 15 counts how often the distribution was used,
-/// as far as the speed of adaptation depends on it. Two places are adapted in one step, as the halves of a word: most
-/// of the writer's time goes here.
+/// Place `i` (0 to 14) is the beginning of symbol `i + 1`, of 2^16. Place 15 counts the uses of the distribution, as
+/// far as the speed of adaptation depends on it. Two places are adapted in one step, as the halves of a word: most of
+/// the writer's time goes here.
 #[derive(Clone, Copy, Debug)]
 #[repr(align(4))]
 pub(crate) struct Cdf([u16; SYMBOLS]);
@@ -47,7 +47,7 @@ const fn reach(speed: u32) -> u16 {
     (u16::MAX >> speed) - SYMBOLS as u16
 }
 
-/// What a place gains in a step: all gain a little, ever more, so that no symbol's share gets lost; those above the
+/// The gain of a place in a step. All gain a little, ever more, so that each symbol keeps a share; those above the
 /// symbol gain the step.
 const fn gain(place: usize, symbol: usize, speed: u32) -> u16 {
     place as u16 + 1 + if place >= symbol { reach(speed) } else { 0 }

@@ -196,8 +196,8 @@ impl GroupDecoder {
         }
     }
 
-    /// The same for those who only count: spares putting frames together and making their checksums, which is an eighth
-    /// of the work. A group of which an entry was given out so is not held against its check from there on.
+    /// The same for counting only: without reassembled frames and their checksums, an eighth of the work. After such
+    /// an entry the rest of a group is not compared with its check.
     pub fn next_outline(&mut self) -> Option<Result<Outline<'_>, GroupError>> {
         if let Err(error) = self.advance()? {
             return Some(Err(error));

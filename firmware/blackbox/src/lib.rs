@@ -7,7 +7,7 @@
 //! * The *model* (`codec`) predicts each entry from those before and codes only what it did not foresee.
 //! * A *group* of up to 64 sectors (32 KiB) starts the model afresh: reading can start there, damage ends there.
 //! * A *sector* says what it is and is checked; *parity* makes those again that a card has lost.
-//! * The *chain* is a check of all entries as they came, which a reader makes anew of what it decoded.
+//! * The *chain* is a check of all received entries, which a reader computes again from the decoded ones.
 //!
 //! `docs/log-format.md` describes the format completely. Everything here is bounded and needs no allocation.
 #![cfg_attr(not(test), no_std)]

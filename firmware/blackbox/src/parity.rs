@@ -1,15 +1,15 @@
-//! Parity: sectors from which others that the card has lost are made again.
+//! Parity: sectors from which lost sectors are rebuilt.
 //!
-//! A file's sectors are taken in *stretches* of [`STRETCH_SECTORS`], from its first one on, and those of a stretch in
-//! [`COLUMNS`] *columns*: sector `i` of a stretch is in column `i mod 8`, so that no run of eight sectors, wherever a page
-//! begins, has two of a column. Each column has two parity sectors, P and Q. With one of them one lost sector of the column
-//! is made again, with both two: any two pages of 4 KiB of a stretch, or one of 8 KiB.
+//! A file's sectors form *stretches* of [`STRETCH_SECTORS`], from its first one on, and those of a stretch form
+//! [`COLUMNS`] *columns*: sector `i` of a stretch is in column `i mod 8`. So no run of eight sectors, from any
+//! beginning of a page, has two of a column. Each column has two parity sectors, P and Q. One of them rebuilds one
+//! lost sector of the column, both rebuild two: any two pages of 4 KiB of a stretch, or one of 8 KiB.
 //!
-//! P is the exclusive-or of the sectors, Q their sum in GF(256), each sector times `2^n`, where `n` counts from the last one
-//! of the column back (H. P. Anvin, "The mathematics of RAID-6"). Both are of what a reader does not know of a lost sector:
-//! all but the magic byte and the version, the session, the number and the check.
+//! P is the exclusive-or of the sectors. Q is their sum in GF(256), each sector times `2^n`, where `n` counts back
+//! from the last one of the column (H. P. Anvin, "The mathematics of RAID-6"). Both cover the unknown part of a lost
+//! sector: all but the magic byte and the version, the session, the number and the check.
 //!
-//! A parity sector may be written while its stretch is not full: it names the last sector that it covers.
+//! A parity sector may be written before its stretch is full: it names the last sector that it covers.
 
 use crate::crc::crc32c;
 use crate::sector::{Header, SECTOR_BYTES, Sector};
@@ -161,9 +161,9 @@ impl Column {
         }
     }
 
-    /// Whether the sums agree with the sectors that were taken and with each other, as far as that can be told; `lost` are the numbers of
-    /// those that are not there, ascending, three at least where there are more. A sum that covers none of them is that of
-    /// the others, and one sector that both cover alone is the same by either.
+    /// Whether the sums agree with the sectors and with each other, as far as this is known. `lost` are the numbers
+    /// of missing sectors, ascending, at least three if there are more. A sum without missing sectors must equal that
+    /// of the others, and a single missing sector must be the same by either sum.
     pub fn agrees(&self, lost: &[u32]) -> bool {
         let of = |index: usize| {
             let (sum, last, rest) = self.held(index)?;

@@ -132,7 +132,7 @@ impl Sector {
         Preamble::read(self.body()).filter(|_| self.starts_group())
     }
 
-    /// The body: what is in use of it is for `Header::body_bytes` to say.
+    /// The body; `Header::body_bytes` gives its used part.
     pub(crate) fn body(&self) -> &[u8] {
         &self.bytes[BODY_AT..CRC_AT]
     }

@@ -1,9 +1,9 @@
-//! Writer: frames and records in, sectors out. It allocates nothing, never waits, and keeps its stream decodable after any
-//! failure of the storage.
+//! Writer: frames and records in, sectors out. It allocates nothing, never waits, and keeps its stream decodable
+//! after any failure of the storage.
 //!
 //! *Admission:* before an entry is encoded the sink must have room for `ENTRY_SECTORS_MAX`; otherwise the writer
-//! returns `Full` and its state is as before. *Groups* end after `GROUP_SECTORS`: the entry that no longer fits is undone (the
-//! coder's earlier state is kept) and becomes the first one of the next group.
+//! returns `Full` and its state is as before. *Groups* end after `GROUP_SECTORS`. The entry that no longer fits is
+//! undone (the coder's earlier state is kept), and becomes the first one of the next group.
 
 use hums_core::clock::Instant;
 use hums_dialect::wire::FRAME_BYTES_MAX;
@@ -17,8 +17,8 @@ use crate::preamble::{PREAMBLE_BYTES, Preamble};
 use crate::record::{Mark, RECORD_BYTES_MAX, Record, Resting};
 use crate::sector::{BODY_BYTES, GROUP_SECTORS, Header, RECORDS_MAX, Sector};
 
-/// Sectors that one entry completes at most: the one that ends the old group, and those that a longest entry fills
-/// with the preamble before it.
+/// Maximum sectors that one entry completes: the last of the old group, and those of a longest entry with the
+/// preamble before it.
 pub const ENTRY_SECTORS_MAX: usize = 1 + (PREAMBLE_BYTES + CODED_BYTES_MAX + FLUSH_MAX).div_ceil(BODY_BYTES);
 
 /// A sector in the middle of a group has so many bytes at least: it is closed when no stream could end in it.

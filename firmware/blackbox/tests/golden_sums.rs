@@ -1,7 +1,7 @@
 //! Golden sums: length and CRC-32 of version 3's output for whole recordings and for a synthetic stream of all kinds
-//! (`common/kinds.rs`). As the golden files they never change: writer and reader share the model, so that a change of it
-//! would still read back what it wrote, and only fixed bytes notice. A group names the table of layouts: a new dialect
-//! (`layouts`) makes new sums, a new version of the format adds its own.
+//! (`common/kinds.rs`). Like the golden files they never change. Writer and reader share the model, so a changed
+//! model would still read back its own output: only fixed bytes show the change. A group names the table of layouts:
+//! a new dialect (`layouts`) makes new sums, a new version of the format adds its own.
 #![expect(clippy::panic, reason = "that is how a test fails")]
 
 #[path = "common/card.rs"]

@@ -1,4 +1,4 @@
-//! What the fuzz targets check (`fuzz/`), on a few thousand made-up inputs that are the same each time: pure noise, and
+//! The checks of the fuzz targets (`fuzz/`), on a few thousand generated inputs, the same each time: pure noise, and
 //! a real log with bytes changed, moved, cut and doubled.
 
 #![allow(unreachable_pub, reason = "the files are those of another crate")]

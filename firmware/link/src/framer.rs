@@ -1,26 +1,28 @@
 //! Bytes of a line in, frames out: MAVLink 1, MAVLink 2 and signed frames, mixed, from any number of systems.
 //!
-//! Sans-io: [`Framer::push`] takes whatever bytes have come and calls the sink with each frame as soon as its last byte
-//! is there; [`Framer::idle`] says that the line is silent. Nothing depends on how the bytes are cut into pushes.
+//! Sans-io: [`Framer::push`] takes whatever bytes have come and calls the sink with each frame as soon as its last
+//! byte is there; [`Framer::idle`] says that the line is silent. Nothing depends on how the bytes are cut into
+//! pushes.
 //!
 //! # Resynchronising
-//! A *candidate* is a start byte and what follows it. Its bytes stay in the buffer until it is decided. If it is not a frame,
-//! only its start byte is dropped and the search continues from the next byte. So a false start (damaged length, start byte in
-//! the payload, noise) does not hide the frame behind it.
+//! A *candidate* is a start byte and what follows it. Its bytes stay in the buffer until it is decided. If it is not
+//! a frame, only its start byte is dropped and the search continues from the next byte. So a false start (damaged
+//! length, start byte in the payload, noise) does not hide the frame behind it.
 //!
 //! # Frames of definitions that we do not have
-//! They must be recorded and forwarded, unlike line noise. For each wrong checksum we compute the
-//! `crc_extra` that would make it correct ([`hums_dialect::crc::extra_of`]; 1 in 256 of random bytes has one). The candidate
-//! passes as [`Check::Unverified`](crate::frame::Check::Unverified) if this system used that extra for this id before. At first
-//! sight it passes only between frames: a frame (or a damaged one, or silence) before it, a start byte (or silence) after it, and
-//! no complete frame of a known definition inside. Without a frame before it, its extra is only remembered, and the next one
-//! comes through. An id that this system has sent with our definition never passes unverified: it is damage.
+//! They must be recorded and forwarded, unlike line noise. For each wrong checksum we compute the `crc_extra` that
+//! would make it correct ([`hums_dialect::crc::extra_of`]; 1 in 256 of random bytes has one). The candidate passes as
+//! [`Check::Unverified`](crate::frame::Check::Unverified) if this system used that extra for this id before. At first
+//! sight it passes only between frames: behind a frame (or a damaged one, or silence), before a start byte (or
+//! silence), and without a known complete frame inside. Without a frame before it, its extra is only remembered, and
+//! the next one comes through. An id that this system has sent with our definition never passes unverified: it is
+//! damage.
 //!
 //! # Limits
-//! About 1 KiB. A candidate waits for at most 281 bytes (3 ms at 921,600 baud) or for `idle`. Per byte: one copy and one step of
-//! the checksum. Untrusted candidates may cost at most four such steps per received byte, so no input takes longer than its
-//! transmission. The most expensive known input, endless start bytes, takes some 1,100 of the 1,823 cycles per byte at 921,600
-//! baud.
+//! About 1 KiB. A candidate waits for at most 281 bytes (3 ms at 921,600 baud) or for `idle`. Per byte: one copy and
+//! one step of the checksum. Untrusted candidates may cost at most four such steps per received byte, so no input
+//! takes longer than its transmission. The most expensive known input, endless start bytes, takes some 1,100 of the
+//! 1,823 cycles per byte at 921,600 baud.
 
 use hums_dialect::crc;
 use hums_dialect::wire::{FRAME_BYTES_MAX, START_V1, START_V2};

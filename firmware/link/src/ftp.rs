@@ -15,8 +15,9 @@ pub const CHECKSUM: u8 = 14;
 /// The number of `BurstReadFile` (`MAV_FTP_OPCODE_BURSTREADFILE`).
 pub const BURST: u8 = 15;
 
-/// The CRC-32 that MAVLink FTP means by `CalcFileCRC32`: the polynomial of Ethernet, reflected, but from 0 and without a
-/// final inversion, as PX4 (`crc32part` with 0) and `ArduPilot` (`crc_crc32` with 0) compute it. Bit by bit: a table is 1 KiB for what is seldom asked.
+/// The CRC-32 of `CalcFileCRC32` in MAVLink FTP: the reflected polynomial of Ethernet, but from 0 and without a final
+/// inversion. PX4 (`crc32part` with 0) and `ArduPilot` (`crc_crc32` with 0) compute it so. Bit by bit: a table would
+/// take 1 KiB for a rare request.
 const CRC: Crc<u32, NoTable> = Crc::<u32, NoTable>::new(&Algorithm {
     width: 32,
     poly: 0x04c1_1db7,
@@ -33,7 +34,7 @@ pub const fn checksum_of(file: &[u8]) -> u32 {
     CRC.checksum(file)
 }
 
-/// The checksum of a file of which `before` is that of what comes before `bytes`; 0 where nothing does.
+/// The checksum of a file, with `before` that of the bytes before `bytes`; 0 for the beginning.
 pub fn checksum(before: u32, bytes: &[u8]) -> u32 {
     // The library takes its first value as the polynomial is written, and gives the result as it is reflected.
     let mut digest = CRC.digest_with_initial(before.reverse_bits());

@@ -133,7 +133,7 @@ pub fn computer_status(now: Instant, status: &ComputerStatus) -> Packet {
     Packet::new(390).bytes(0, &payload)
 }
 
-/// `COMPONENT_METADATA`: where the general file of the component information is, and its checksum.
+/// `COMPONENT_METADATA`: the address of the component information's general file, and its checksum.
 pub fn component_metadata(now: Instant, crc: u32, uri: &str) -> Packet {
     // The text ends with a zero: it is shorter than its 100 bytes.
     Packet::new(397).u32(0, now.as_millis() as u32).u32(4, crc).text(8, 99, uri)

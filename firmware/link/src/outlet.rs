@@ -134,8 +134,8 @@ pub struct Outlet {
     baud: u32,
     /// Bytes that may wait, findings apart.
     room: u32,
-    /// The line is to get another rate, and nothing is added until it is empty: what waits would leave at another time
-    /// than it is booked for.
+    /// The line's rate is about to change, and nothing is added until it is empty: waiting bytes would leave at
+    /// another time than planned.
     changing: bool,
     /// When the line has sent everything.
     free_at: Instant,
@@ -147,8 +147,8 @@ pub struct Outlet {
 const BULK_WAITS: Span = Span::from_secs(1);
 
 impl Outlet {
-    /// A port that may send `budget` bytes a second on a line of `baud`, with a queue before it that has room for so many
-    /// bytes, and for [`FINDINGS`] of findings.
+    /// A port with `budget` bytes a second on a line of `baud`. The queue before it has `room` bytes, and room for
+    /// [`FINDINGS`] of findings.
     pub const fn new(budget: u32, baud: u32, room: u32) -> Self {
         Self {
             encoder: Encoder::new(),
@@ -246,9 +246,9 @@ impl Outlet {
         Span::from_micros(bytes as u64 * 10_200_000 / u64::from(self.baud.max(1)))
     }
 
-    /// The longest frame of bulk that finds its way, and that a finding need not wait for longer than [`BACKLOG`]: as
-    /// much as the line sends in that time, and half of a second's share. From 57,600 baud and a budget of 1,130 bytes a
-    /// second up it is the longest that there is.
+    /// The longest frame of bulk that passes, and that delays a finding by at most [`BACKLOG`]: the bytes of the line
+    /// in that time, and half of a second's share. From 57,600 baud and a budget of 1,130 bytes a second on it is the
+    /// longest possible frame.
     pub fn bulk_frame_max(&self) -> usize {
         let line = u64::from(self.baud) * BACKLOG.as_micros() / 10_200_000;
         ((line as u32).min(self.mark(Class::Bulk) / 5 * 3 / 2) as usize).min(FRAME_BYTES_MAX)

@@ -49,7 +49,7 @@ impl<'a> Fields<'a> {
         f32::from_le_bytes(self.bytes(at))
     }
 
-    /// Text of at most `len` bytes that ends at a zero; `None` where it is no UTF-8.
+    /// Text of at most `len` bytes that ends at a zero; `None` unless it is UTF-8.
     pub fn text(&self, at: usize, len: usize) -> Option<&'a str> {
         let end = at.saturating_add(len).min(self.0.len());
         let bytes = self.0.get(at..end).unwrap_or_default();

@@ -107,7 +107,7 @@ pub enum Reply {
     Stopped,
     /// Logs are being erased, as a text.
     Erased,
-    /// Text: the log in download is no longer on the card.
+    /// Text: the downloaded log has left the card.
     LogGone,
     /// Text: the list of logs has changed since it was sent, so the request by list index is refused.
     LogsChanged,

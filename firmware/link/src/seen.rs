@@ -1,5 +1,5 @@
-//! History of a line: the known messages that each system has sent with our definition, and the
-//! `crc_extra` each system uses for messages that we do not know. Bounded; strict when full.
+//! History of a line: the known messages that each system has sent with our definition, and each system's `crc_extra`
+//! for unknown messages. Bounded; strict when full.
 
 /// Most distinguished systems; further ones share the last place.
 const SYSTEMS: usize = 4;
@@ -82,8 +82,8 @@ impl Seen {
         }
     }
 
-    /// Remembers that `system` used `extra` for `id`. A pair seen once may have been chance: it gives way to a new
-    /// one when the table is full, and to another extra of the same pair.
+    /// Remembers that `system` used `extra` for `id`. A pair seen once may be chance: in a full table it gives way to
+    /// a new one, and also to another extra of the same pair.
     pub(crate) fn learn(&mut self, system: u8, id: u32, extra: u8) {
         let key = key_of(system, id);
         let known = self.keys.iter().position(|&other| other == key);

@@ -26,7 +26,7 @@ struct Second {
 struct Sender {
     source: Source,
     sequence: u8,
-    /// The most frames of a window since the last loss: a loss is no larger part because less is sent after it.
+    /// The most frames of a window since the last loss: a falling rate does not make a loss a larger part.
     of: u16,
     /// One entry a second of the window, by second modulo its length.
     seconds: [Second; WINDOW_SECS],

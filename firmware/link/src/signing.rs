@@ -1,25 +1,25 @@
-//! MAVLink 2 signing (<https://mavlink.io/en/guide/message_signing.html>): 13 bytes after the checksum give the link id and the
-//! time of the frame, and prove that the sender has the key.
+//! MAVLink 2 signing (<https://mavlink.io/en/guide/message_signing.html>): 13 bytes after the checksum give the link
+//! id and the time of the frame, and prove that the sender has the key.
 //!
 //! # Time
-//! A stamp counts 10 µs since 2015 and grows with every frame of a stream, which is a system, a component and a link id.
-//! [`Clock`] gives it from UTC where that is known. It goes back only when a key is set. Stamps do not go back over a power-off
-//! either: a bound above all used stamps is stored ahead of time ([`Times::used`]). The stamps of the next power-on begin there
-//! and count up one by one until time has caught up.
+//! A stamp counts 10 µs since 2015 and grows with every frame of a stream, which is a system, a component and a link
+//! id. [`Clock`] gives it from UTC where that is known. It goes back only when a key is set. Stamps do not go back
+//! over a power-off either: a bound above all used stamps is stored ahead of time ([`Times::used`]). The stamps of
+//! the next power-on begin there and count up one by one until time has caught up.
 //!
-//! A date from a GPS receiver may be wrong (a week number that rolled over, a spoofer). One that is more than
-//! [`JUMP`] ahead of our time counts only when it has lasted for [`JUMP_LASTS`] ([`Clock::hear_utc`]): a clock that is years
-//! ahead would refuse every new stream for years. A good signature counts at once: a holder of the key also has the time.
+//! A date from a GPS receiver may be wrong (a week number that rolled over, a spoofer). A time more than [`JUMP`]
+//! ahead of ours counts only after [`JUMP_LASTS`] ([`Clock::hear_utc`]): a clock that is years ahead would refuse
+//! every new stream for years. A good signature counts at once: a holder of the key also has the time.
 //!
 //! # Replay
-//! A frame whose stamp is not above its stream's last one is refused. The first stamp of a stream since power-on must be above
-//! [`Times::accepted`], the stamp of the latest frame that changed anything. It must also be at most a minute behind our own
-//! time. [`STREAMS_MAX`] streams are remembered; one more replaces the oldest. New streams must then be above that one's last
-//! stamp, so a forgotten frame cannot be replayed.
+//! A frame whose stamp is not above its stream's last one is refused. The first stamp of a stream since power-on must
+//! be above [`Times::accepted`], the stamp of the latest frame that changed anything. It must also be at most a
+//! minute behind our own time. [`STREAMS_MAX`] streams are remembered; one more replaces the oldest. New streams must
+//! then be above that one's last stamp, so a forgotten frame cannot be replayed.
 //!
 //! # Costs
-//! SHA-256 over the key and the frame: at most six blocks, 0.2 ms on a Cortex-M4 at 168 MHz. The key is nowhere but here,
-//! in the store, and in the `SETUP_SIGNING` that brought it, which is not recorded.
+//! SHA-256 over the key and the frame: at most six blocks, 0.2 ms on a Cortex-M4 at 168 MHz. The key is nowhere but
+//! here, in the store, and in the `SETUP_SIGNING` that brought it, which is not recorded.
 
 use core::fmt;
 
@@ -260,9 +260,9 @@ impl Signing {
         self.clock.is_at_least(Instant::ZERO, times.time.min(STAMP_MAX));
     }
 
-    /// A key, or none; `stamp` is the time that whoever brought it thinks it is, and it is the time from now on, also with
-    /// the key that there was: this is how a clock that a wrong date has set is put right. Nothing older than a minute
-    /// before it is accepted. 0 means no time: setting the same key then changes nothing.
+    /// Sets a key, or none. `stamp` is the time by the sender of the key; it becomes the present time, also with the
+    /// old key, which corrects a clock that a wrong date has set. Frames more than a minute older are refused. 0
+    /// means no time: setting the same key then changes nothing.
     pub fn set(&mut self, now: Instant, key: Key, stamp: u64) {
         if stamp == 0 && self.key == Some(key) {
             return;

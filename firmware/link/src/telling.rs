@@ -1,22 +1,23 @@
 //! Selection of the findings that a pilot receives: at most three texts of one event, critical ones at once.
 //!
-//! An event is the set of findings of one family ([`family`]) within [`EVENT`] of its first text. A mishap is an event until it
-//! is over.
+//! An event is the set of findings of one family ([`family`]) within [`EVENT`] of its first text. A mishap is an
+//! event until it is over.
 //!
 //! * A finding explained by another one ([`Finding::because`]) is recorded only.
-//! * A critical finding is never delayed. It is told where it asks for something that the event's texts did not ask for yet: the
-//!   fourth motor that is lost, or the pitch beside the roll, does not say LAND NOW again.
-//! * A warning waits for [`HOLD`]. If it becomes critical meanwhile, only the critical finding is sent. Otherwise it is the first text
-//!   of an event, or waits for the event's end, and is told if it is still so. So is what has no data, or is good again. A check
-//!   that no longer applies, as after landing, is not reported: its state is unknown.
-//! * Of a mishap its first kind is told, and one more that asks for something else where nothing led to it; that it is down, and
-//!   where, comes by itself. One whose order does not fit the vehicle is told with the one that does ([`order`]); where none does,
-//!   what led to it is not counted. What is mild, began with it or after it, and waits is a consequence, and is not told any longer.
+//! * A critical finding is never delayed. It is sent if its order differs from those of the event's earlier texts:
+//!   the fourth lost motor, or the pitch beside the roll, does not repeat LAND NOW.
+//! * A warning waits for [`HOLD`]. If it becomes critical meanwhile, only the critical finding is sent. Otherwise it
+//!   is the first text of an event, or waits for the event's end, and is told if it is still so. So is what has no
+//!   data, or is good again. A check that no longer applies, as after landing, is not reported: its state is unknown.
+//! * Of a mishap the first kind is sent. Another one is sent if its order differs and nothing led to it. The text
+//!   that it is down, with the place, comes by itself. A kind whose order does not fit the vehicle is sent with the
+//!   one that fits ([`order`]); if none fits, its cause does not count. A waiting mild finding that began with the
+//!   mishap or after it is a consequence, and is dropped.
 //! * A recovering finding waits until it is over or bad again, so a delayed text is true when sent.
-//! * The end of a finding is sent only if the finding was sent and its explanation has ended. Missing data are reported only
-//!   while no alarm is open.
-//! * Findings that are not critical wait during an event with a critical text. At most [`MILD_MAX`] of them are sent in any
-//!   [`SPAN`], the worst first.
+//! * The end of a finding is sent only if the finding was sent and its explanation has ended. Missing data are
+//!   reported only while no alarm is open.
+//! * Findings that are not critical wait during an event with a critical text. At most [`MILD_MAX`] of them are sent
+//!   in any [`SPAN`], the worst first.
 
 use hums_core::clock::{Instant, Span};
 use hums_core::health::{self, Finding, Level, Subsystem};

@@ -1,4 +1,4 @@
-//! `STATUSTEXT`: what a ground station shows, or speaks, to the pilot.
+//! `STATUSTEXT`: a text that a ground station shows, or speaks, to the pilot.
 
 use core::fmt::{self, Write as _};
 

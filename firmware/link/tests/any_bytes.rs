@@ -1,5 +1,5 @@
-//! The checks of the framer's fuzz target (`fuzz/`), on a few thousand made-up inputs that are the same each time: noise in which
-//! start bytes are frequent, and frames with bytes changed.
+//! The checks of the framer's fuzz target (`fuzz/`), on a few thousand generated inputs, the same each time: noise
+//! with frequent start bytes, and frames with changed bytes.
 
 #![allow(unreachable_pub, reason = "the files are those of another crate")]
 

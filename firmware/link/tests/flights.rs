@@ -1,8 +1,9 @@
 //! The monitor over recorded flights: its findings, and its usage figures against an independent computation.
 //!
-//! The expected figures were computed with pymavlink from the recordings' own messages: flight time by height above the
-//! place of arming (landing by `EXTENDED_SYS_STATE` where there is one), distance as the sum of the speeds of
-//! `GLOBAL_POSITION_INT`, charge and energy from `BATTERY_STATUS` (or `SYS_STATUS`, or `ESC_STATUS`) by trapezoids.
+//! The expected figures were computed with pymavlink from the recordings' own messages. Flight time comes from the
+//! height above the place of arming, landing from `EXTENDED_SYS_STATE` if sent. Distance is the sum of the speeds of
+//! `GLOBAL_POSITION_INT`. Charge and energy come from `BATTERY_STATUS` (or `SYS_STATUS`, or `ESC_STATUS`) by
+//! trapezoids.
 #![expect(clippy::panic, reason = "that is how a test fails")]
 
 mod common;
@@ -256,8 +257,8 @@ fn what_was_wrong_with_real_vehicles_is_found() {
         let outcome = watch(&recording);
         let alarms = outcome.alarms();
         let has = |check: &str, level| alarms.iter().any(|alarm| alarm.1 == check && alarm.2 == level);
-        // Its pilot was told "Low Battery"; the autopilot restarted (its boot time falls from 279 s to 19 s), on the ground:
-        // that is counted and is no alarm.
+        // Its pilot was told "Low Battery". The autopilot restarted on the ground (its boot time falls from 279 s to
+        // 19 s), which is counted without an alarm.
         assert!(has("cell_voltage", Level::Critical), "{alarms:?}");
         assert!(!has("autopilot_reboot", Level::Critical), "{alarms:?}");
         assert!(has("vibration", Level::Critical) && has("clipping", Level::Critical), "{alarms:?}");

@@ -68,7 +68,7 @@ fn params(settings: &[(usize, f32)]) -> Params {
     let mut params = Params::defaults();
     for (index, place) in settings {
         let spec = &TABLE[*index];
-        // Whole numbers choose; what is out of range by rounding is refused.
+        // Whole numbers select; a value that rounding moves out of its range is refused.
         let value = (spec.min + place * (spec.max - spec.min)).round();
         let _ = params.set(spec.name, value);
     }

@@ -145,7 +145,7 @@ impl<F: NorFlash> Store<F> {
         Ok(())
     }
 
-    /// Copies a value into `out` and returns its length. `None` if there is no value or `out` is too short.
+    /// Copies a value into `out` and returns its length. `None` without a value, or if `out` is too short.
     pub fn get(&mut self, key: Key, out: &mut [u8]) -> Outcome<Option<usize>, F> {
         let Some(item) = self.find(key)? else { return Ok(None) };
         let Some(out) = out.get_mut(..item.length) else { return Ok(None) };

@@ -51,7 +51,7 @@ pub struct Motor {
     pub life_revolutions: Option<f64>,
 }
 
-/// Where a quantity stood for how long.
+/// The time of a quantity in its ranges.
 #[derive(Debug, Serialize)]
 pub struct Ranges {
     /// The quantity's name.
@@ -62,11 +62,11 @@ pub struct Ranges {
     pub bands: Vec<Band>,
 }
 
-/// From, to (`null` where there is no end), seconds.
+/// From, to (`null` for an open range), seconds.
 pub type Band = (Option<f32>, Option<f32>, f64);
 
-/// Whether anything of the vehicle's told what a counter counts: otherwise its zero is no zero. Counters of motors, ranges and the past
-/// have no zero that is shown.
+/// Whether any message of the vehicle has a counter's quantity: otherwise its zero means unknown. Counters of motors,
+/// ranges and the past never show a zero.
 pub fn is_told(name: &str, vehicle: &Vehicle) -> bool {
     use UsageCounter as U;
     let Some(counter) = UsageCounter::ALL.iter().find(|counter| counter.name() == name) else { return true };

@@ -1,11 +1,12 @@
-//! What a recording says of its vehicle.
+//! Analysis of a vehicle's recording.
 //!
-//! * [`check`]: the monitor of the board, run over a recording: flights, findings, and checks without data, with the reason
-//! * [`summary`]: what is in a recording, counted
+//! * [`check`]: the monitor of the board, run over a recording: flights, findings, and checks without data, with the
+//!   reason
+//! * [`summary`]: the contents of a recording, counted
 //! * [`series`], [`track`]: quantities over time and the way over ground, for pages
 //! * [`counters`], [`part`], [`states`], [`params`]: usage, components, words for states, limits from a file
 //!
-//! It reads recordings through `hums_formats` only, and writes nothing but what is wrong.
+//! It reads recordings through `hums_formats` only, and writes nothing but errors.
 
 #![deny(
     clippy::print_stderr,

@@ -12,7 +12,7 @@ use crate::outcome::usage;
 /// A ground station's file of all parameters of a vehicle has some 40 KiB.
 const BYTES_MAX: u64 = 1 << 20;
 
-/// The parameters that a file sets, in its order; none where there is no file.
+/// The parameters of a file, in its order; none without a file.
 pub fn read(path: Option<&Path>) -> Result<Vec<(&'static ParamSpec, f32)>> {
     let Some(path) = path else { return Ok(Vec::new()) };
     let bytes = read_short(path, BYTES_MAX).context("--params")?;
@@ -31,7 +31,7 @@ pub fn read(path: Option<&Path>) -> Result<Vec<(&'static ParamSpec, f32)>> {
     Ok(params)
 }
 
-/// What a line sets, if anything; `Err` says what is wrong with it.
+/// The parameter of a line, if any; `Err` gives the line's error.
 fn parameter(line: &str) -> Result<Option<(&'static ParamSpec, f32)>, String> {
     let (name, value) = match param_line::read(line) {
         Line::Nothing => return Ok(None),

@@ -1,10 +1,11 @@
-//! Parts that wear: what they are called, and the limit that each reaches first.
+//! Parts that wear: their names, and the limit that each reaches first.
 
 use hums_core::Monitor;
 use hums_core::component::{COMPONENTS_MAX, Figures, Kind};
 use hums_core::health::Subsystem;
 
-/// What a part may run at most, as its parameters have it: hours, flights, battery cycles, hours that its motor turned; 0 where there is no limit.
+/// The limits of a part, by its parameters: hours, flights, battery cycles, hours that its motor turned; 0 without a
+/// limit.
 pub type Limits = [f64; 4];
 
 /// How the names of their parameters end.
@@ -17,7 +18,7 @@ pub fn limit_of(parameter: &str) -> Option<(usize, usize)> {
     Some((place, ENDS.iter().position(|known| *known == end)?))
 }
 
-/// What a part is called: `motor 3`, with the name that its operator gave it.
+/// The name of a part: `motor 3`, with its operator's name.
 pub fn name(kind: &str, number: u8, given: &str) -> String {
     let number = if number == 0 { String::new() } else { format!(" {number}") };
     let given = if given.is_empty() { String::new() } else { format!(" \"{given}\"") };
@@ -43,7 +44,7 @@ pub fn limit(kind: &str, figures: &Figures, limits: &Limits) -> Option<String> {
     Some(format!("{} {unit}{how}", limit as f32))
 }
 
-/// Of the parts of a subsystem that of which most is used, as a check of them judges it: its name, and its limit.
+/// The most used part of a subsystem, as a check judges it: its name, and its limit.
 pub fn due(monitor: &Monitor, subsystem: Subsystem) -> Option<(String, Option<String>)> {
     let used = |place: &usize| monitor.component_used_percent(*place).unwrap_or(f32::NEG_INFINITY);
     let mine = |place: &usize| {
@@ -52,7 +53,7 @@ pub fn due(monitor: &Monitor, subsystem: Subsystem) -> Option<(String, Option<St
     of(monitor, (0..COMPONENTS_MAX).filter(mine).max_by(|one, other| used(one).total_cmp(&used(other)))?)
 }
 
-/// What a part is called, and the limit that it reaches first, by its place from 0.
+/// The name of a part, and the limit that it reaches first, by its place from 0.
 pub fn of(monitor: &Monitor, place: usize) -> Option<(String, Option<String>)> {
     let part = monitor.components().get(place)?;
     let (figures, _) = monitor.component_figures(place)?;
@@ -68,7 +69,7 @@ pub fn of(monitor: &Monitor, place: usize) -> Option<(String, Option<String>)> {
     Some((name(kind, part.number, part.name.as_str()), limit(kind, &figures, &limits)))
 }
 
-/// What a check that a part is due is of, in words: `motor 3 (limit 25 h turning)`.
+/// A due part in words: `motor 3 (limit 25 h turning)`.
 pub fn due_words((name, limit): &(String, Option<String>)) -> String {
     limit.as_ref().map_or_else(|| name.clone(), |limit| format!("{name} (limit {limit})"))
 }

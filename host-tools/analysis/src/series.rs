@@ -1,6 +1,6 @@
-//! Quantities over time, sampled so that no extreme is lost: all of them share one row of equal intervals, of which
-//! each keeps its lowest and its highest value in the order in which they came. When the row is full, neighbours are
-//! joined and the intervals become twice as long: memory and page are bounded, however long the flight is.
+//! Quantities over time, sampled so that no extreme is lost. All share one row of equal intervals; each interval has
+//! the lowest and the highest value in the order of time. When the row is full, neighbours are joined and the
+//! intervals become twice as long. So memory and page are bounded for a flight of any length.
 
 use std::collections::BTreeMap;
 use std::ops::RangeInclusive;
@@ -24,7 +24,7 @@ pub struct Grid {
     interval_ms: u64,
 }
 
-/// What one interval keeps of one series.
+/// One interval of one series.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Extremes {
     low: f32,
@@ -62,7 +62,7 @@ struct Series {
 }
 
 impl Series {
-    /// What it has in these intervals.
+    /// Its values in these intervals.
     fn part(&self, intervals: RangeInclusive<u16>) -> Option<Part> {
         // Most have nothing new at a look.
         let (last, _) = self.values.last()?;
@@ -122,7 +122,7 @@ pub struct Store<P> {
     taken: u64,
 }
 
-/// What a series has in some of the intervals: their numbers, and the values of each in their order, a pair each.
+/// A part of a series: the numbers of intervals, and a pair of values in order for each.
 pub type Part = (Vec<u16>, Vec<f32>);
 
 impl<P> Default for Store<P> {
@@ -140,7 +140,7 @@ impl<P> Store<P> {
 }
 
 impl<P: Copy + Ord> Store<P> {
-    /// Takes a value; what is not finite is none.
+    /// Takes a value; NaN and infinities are skipped.
     pub fn push(&mut self, at: Instant, line: Line<P>, value: f32) {
         if !value.is_finite() {
             return;
@@ -157,7 +157,7 @@ impl<P: Copy + Ord> Store<P> {
         self.filled += usize::from(series.push(interval, value));
     }
 
-    /// The interval of a time; makes room for it first. What is before the first one counts to it.
+    /// The interval of a time; makes room for it first. Times before the first one count to it.
     pub fn interval(&mut self, at: Instant) -> u16 {
         let start_ms = *self.grid.start_ms.get_or_insert(at.as_millis());
         let since_ms = at.as_millis().saturating_sub(start_ms);
@@ -196,13 +196,13 @@ impl<P: Copy + Ord> Store<P> {
         self.taken
     }
 
-    /// What all series have in these intervals, for those that have anything.
+    /// The values of all series in these intervals, for those that have any.
     pub fn part(&self, intervals: RangeInclusive<u16>) -> impl Iterator<Item = (Line<P>, Part)> {
         self.series.iter().filter_map(move |(line, series)| Some((*line, series.part(intervals.clone())?)))
     }
 
-    /// The same for who has seen the first of these intervals when so many values were taken: that one again only of the
-    /// series that had another value since.
+    /// The same for a reader that saw the first of these intervals when `seen` values were taken. That interval is
+    /// repeated only for series with a value since.
     pub fn news(&self, intervals: RangeInclusive<u16>, seen: u64) -> impl Iterator<Item = (Line<P>, Part)> {
         let (from, to) = intervals.into_inner();
         self.series.iter().filter_map(move |(line, series)| {
@@ -286,7 +286,7 @@ mod tests {
         store.push(at(0), (HEIGHT, 1), 3.0);
         let news: Vec<_> = store.news(0..=1, seen).collect();
         assert_eq!(news, [((HEIGHT, 1), (vec![0], vec![2.0, 3.0]))]);
-        // What a recording holds is there before it is looked at.
+        // A recording's values exist before the first reader.
         let seen = store.taken();
         store.push(at(1), (HEIGHT, 0), 4.0);
         let news: Vec<_> = store.news(0..=1, seen + 1).collect();

@@ -4,20 +4,20 @@ use hums_core::health::check_named;
 
 use crate::names::vocabulary;
 
-/// Counts of what should never happen: a limit below one means "any", which tells nobody anything.
+/// Counts that should be zero: a limit below one means "any", which is not shown.
 const COUNTS: [&str; 2] = ["card_errors", "record_lost"];
 
 /// A value for people.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Shown {
-    /// What the number stands for; `None` where nobody knows. The number is not for people, and neither is its limit, which
-    /// lies between two of them.
+    /// The name of the state; `None` if unknown. Neither the number is for people, nor the limit, which lies between
+    /// two of them.
     State(Option<&'static str>),
     /// A quantity, where there is one, and its limit, where that says something.
     Quantity(Option<f32>, Option<f32>),
 }
 
-/// What is shown of a check's value and of the limit that it crossed.
+/// The shown value and limit of a check.
 pub fn shown(check: &str, value: f32, limit: f32) -> Shown {
     if check_named(check).is_some_and(|check| check.unit.is_flag()) {
         return Shown::State(name(check, value));
@@ -70,18 +70,18 @@ pub fn name(check: &str, value: f32) -> Option<&'static str> {
         alert if alert.ends_with("_alert") => &["over", "a warning", "critical"],
         _ => return None,
     };
-    // What no state has is no number of one.
+    // A number without a state.
     let place = (value >= 0.0 && value.fract() == 0.0).then_some(value as usize)?;
     names.get(place).copied()
 }
 
-/// What is so where a check has an alarm, as a sentence.
+/// The meaning of a check's alarm, as a sentence.
 pub fn meaning(check: &str) -> &'static str {
     vocabulary(check).map_or("", |words| words.meaning)
 }
 
-/// Names of the bits of `MAV_SYS_STATUS_SENSOR`, from bit 0; empty where it is no sensor (the check `sensors` leaves those
-/// two out).
+/// Names of the bits of `MAV_SYS_STATUS_SENSOR`, from bit 0; empty for bits that are not sensors (the check `sensors`
+/// ignores those two).
 const SENSORS: [&str; 32] = [
     "gyroscope",
     "accelerometer",

@@ -1,4 +1,4 @@
-//! What is in a log, in one pass: for `info`, `verify` and `demo`.
+//! The contents of a log, in one pass: for `info`, `verify` and `demo`.
 
 use std::collections::BTreeMap;
 use std::fmt::{self, Display, Formatter};
@@ -35,7 +35,7 @@ pub const LISTED_MAX: usize = 10_000;
 /// The airframe's life and the counters of a session are stored together within this.
 const STORED_WITH: Span = Span::from_secs(5);
 
-/// What is counted after the counters were stored is worth telling from here on.
+/// From this time on, counts after the counters were stored are reported.
 const COUNTED_LATE: Span = Span::from_secs(1);
 
 /// Checks with exceedances that are kept: four times those that there are, with all their instances.
@@ -78,7 +78,7 @@ impl FindingLine {
     /// What people read of a check that no longer applies.
     pub const UNJUDGED: &str = "no longer judged (on the ground, disarmed, or no longer told)";
 
-    /// Whether the check no longer applies, as after landing: what was bad is not known to be good.
+    /// Whether the check no longer applies (after landing): its value is not known to be good then.
     pub fn is_unjudged(&self) -> bool {
         self.level == Level::Ok.name() && self.value.is_nan()
     }
@@ -144,7 +144,7 @@ pub struct JudgedChecks {
 }
 
 impl JudgedChecks {
-    /// Whether those of the vehicle are so few that nothing found is no good news: fewer than one in ten.
+    /// Whether so few of the vehicle's checks were judged that no finding means nothing: fewer than one in ten.
     pub const fn is_little(self) -> bool {
         self.judged.saturating_sub(self.of_box) * 10 < self.all
     }
@@ -156,7 +156,7 @@ impl Display for JudgedChecks {
     }
 }
 
-/// The vehicle as it was heard last, where a recording ends in the air.
+/// The vehicle's last state, if a recording ends in the air.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EndsInAir {
     /// When.
@@ -218,11 +218,11 @@ pub struct FlightLine {
 /// A part that wears.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ComponentLine {
-    /// What it is, and which.
+    /// Its kind.
     pub kind: &'static str,
     /// Which of its kind, from 1; 0 is all.
     pub number: u8,
-    /// What the operator calls it.
+    /// The operator's name for it.
     pub name: String,
     /// Its serial number.
     pub serial: String,
@@ -230,7 +230,7 @@ pub struct ComponentLine {
     pub status: &'static str,
     /// The part of its life that is used.
     pub used_percent: f32,
-    /// What it has run.
+    /// Its figures.
     pub figures: Figures,
     /// How often it was replaced.
     pub replaced: u32,
@@ -247,7 +247,7 @@ pub fn damaged_places(count: u64) -> String {
 pub struct Contents {
     /// Messages by their ids, or by their names where they have none.
     pub messages: Vec<MessageCount>,
-    /// Frames of further messages, none of which is verified: only so many ids are told apart.
+    /// Frames of further messages, all unverified: the number of distinguished ids is limited.
     pub other_messages: Amount,
     /// Records of the monitor's own.
     pub records: u64,
@@ -297,13 +297,13 @@ pub struct Contents {
     pub stats: Option<Stats>,
     /// Gaps, in order, up to [`LISTED_MAX`].
     pub gaps: Vec<Gap>,
-    /// Of each of them where it is in the file and what was found there, in a recording that is no log of ours.
+    /// For each of them its offset in the file and its cause, in a recording of another format.
     pub gap_words: Vec<(Option<u64>, String)>,
     /// Why nothing is known of the vehicle, where this program judged the recording and heard none.
     pub unheard: Option<String>,
     /// What else there is to say of the vehicles in it, as sentences.
     pub remarks: Vec<String>,
-    /// Entries that are no frame at all.
+    /// Entries that are not frames.
     pub not_frames: u64,
     /// Frames that were verified on board, whose checksum fails here.
     pub bad_frames: u64,
@@ -359,20 +359,20 @@ impl Contents {
         self.frame_bytes() + 8 * self.frames()
     }
 
-    /// Whether little was judged, and nothing was found there: that is no good news.
+    /// Whether little was judged without a finding: that is not good news.
     pub fn is_little(&self) -> bool {
         let is_worry = |finding: &FindingLine| matches!(finding.level, "warning" | "critical");
         self.judged.is_some_and(JudgedChecks::is_little) && !self.findings.iter().any(is_worry)
     }
 
-    /// What a part is called, and the limit that it reaches first, by its place from 1.
+    /// The name of a part, and the limit that it reaches first, by its place from 1.
     pub fn part(&self, place: u8, line: &ComponentLine) -> (String, Option<String>) {
         let limits = self.part_limits.get(usize::from(place).wrapping_sub(1)).copied().unwrap_or_default();
         let name = part::name(line.kind, line.number, &line.name);
         (name, part::limit(line.kind, &line.figures, &limits))
     }
 
-    /// The part that a finding is of which tells that one is due; `None` for another check.
+    /// The due part of a finding; `None` for another check.
     pub fn due(&self, finding: &FindingLine) -> Option<(String, Option<String>)> {
         let of = |line: &ComponentLine| {
             let kind = Kind::ALL.into_iter().find(|kind| kind.name() == line.kind);
@@ -557,15 +557,15 @@ impl Deliver<Self> for Contents {
 /// A log, read through.
 #[derive(Clone, Debug, Default)]
 pub struct Overview {
-    /// What the reader saw, and what tells whether it is whole.
+    /// The reader's counts, and the proofs of completeness.
     pub ending: Ending,
-    /// What it is, where it is no log of ours.
+    /// Its format, unless it is a log of ours.
     pub format: Option<Format>,
     /// Bytes of these files that are set aside for it.
     pub bytes_on_card: u64,
     /// UTC by the clock of each part.
     pub epochs: Epochs,
-    /// What is in it.
+    /// Its contents.
     pub contents: Contents,
 }
 
@@ -625,7 +625,7 @@ impl Overview {
         }
     }
 
-    /// UTC at this time, where it is known.
+    /// UTC at this time, if known.
     pub fn utc_us(&self, at: Instant) -> Option<u64> {
         self.epochs.utc_us(at)
     }
@@ -641,8 +641,8 @@ impl Overview {
         (self.format.is_none() && bytes > 0).then(|| self.contents.tlog_bytes() as f64 / bytes as f64)
     }
 
-    /// When the counters of its session were stored, where the vehicle was armed or in the air after that: they are of the time until then.
-    /// A log that ends soon after a touch-down may lack the landing, with which they are stored.
+    /// The time of the session's stored counters, if the vehicle was armed or in the air after that: they end there.
+    /// The counters are stored at a landing, which a log may lack that ends soon after a touchdown.
     pub fn counted_until(&self) -> Option<Instant> {
         let summary = &self.ending.summary;
         let flew = summary.marks.moved.is_some() || summary.marks.took_off == Some(true);

@@ -1,4 +1,4 @@
-//! Where a vehicle was: a bounded track, as dense as its length allows.
+//! The track of a vehicle: bounded, as dense as its length allows.
 
 use hums_core::clock::{Instant, Span};
 use hums_core::units::Position;

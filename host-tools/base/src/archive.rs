@@ -22,7 +22,7 @@ const TAR: &str = "is a tar archive; unpack it (tar -xf), and give what is in it
 const UTF_16: &str = "is text in UTF-16; a text log is read as UTF-8: convert it (iconv -f UTF-16 -t UTF-8)";
 /// The first bytes of a gzip file (RFC 1952), with the only compression method there is.
 pub const GZIP: [u8; 3] = [0x1f, 0x8b, 8];
-/// Where a tar's first header says what it is (POSIX.1-1988 and later, GNU).
+/// Offset of the format's name in a tar's first header (POSIX.1-1988 and later, GNU).
 const USTAR_AT: usize = 257;
 
 /// PX4's logs from before 2017 look like ArduPilot's, with a format of another kind: its `TIME` is a message of its own.
@@ -30,7 +30,8 @@ const SDLOG2: &str = "is a log of PX4 from before 2017 (sdlog2, .px4log), which 
 /// The first bytes of such a log and of ArduPilot's: the definition of definitions.
 const FMT: [u8; 3] = [0xA3, 0x95, 0x80];
 
-/// What a file that begins so (some hundred bytes, some thousand of a log) is and what to do with it, where it is one of these.
+/// The kind of a file with this beginning (some hundred bytes, some thousand of a log), and the advice for it, if
+/// known.
 pub fn hint(start: &[u8]) -> Option<&'static str> {
     if let Some((_, what)) = KNOWN.iter().find(|(magic, _)| start.starts_with(magic)) {
         return Some(what);

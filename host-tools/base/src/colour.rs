@@ -1,16 +1,16 @@
 //! Colours on a terminal, for the words that decide: levels and verdicts.
 //!
-//! A text is made with marks in it, and [`crate::output`] prints colours in their place where standard output is a terminal
-//! that wants them (`NO_COLOR`, `CLICOLOR`, `CLICOLOR_FORCE` and `TERM=dumb` count, as in the crate `anstream`), and nothing
-//! elsewhere. Marks are noncharacters, which Unicode sets aside for a program's own use (The Unicode Standard, 23.7); in words
-//! of the world they are shown by their numbers ([`crate::printable::word`]).
+//! A text is made with marks in it. [`crate::output`] prints colours in their place if standard output is a terminal
+//! with colours (`NO_COLOR`, `CLICOLOR`, `CLICOLOR_FORCE` and `TERM=dumb` count, as in the crate `anstream`), and
+//! nothing elsewhere. Marks are noncharacters, which Unicode reserves for a program's own use (The Unicode Standard,
+//! 23.7). In foreign texts they are shown by their numbers ([`crate::printable::word`]).
 
 use std::borrow::Cow;
 use std::fmt;
 
 use anstyle::{AnsiColor, Style};
 
-/// What a word's colour says.
+/// The meaning of a word's colour.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Colour {
     /// Something is badly wrong.

@@ -1,7 +1,7 @@
 //! Both directions of a live endpoint: a reader that waits a while, and a writer.
 //!
-//! UDP answers whoever spoke last, or is kept to ([`Port::keep_to`]) (`udpin`), or its fixed peer (`udpout`); before anyone did, bytes go nowhere, as on a
-//! UART that nothing is plugged into.
+//! `udpin` answers the last sender, or one fixed by [`Port::keep_to`]; `udpout` its fixed peer. Before the first
+//! datagram bytes go nowhere, as on a UART without a plug.
 
 use std::io::{self, ErrorKind, Read, Write};
 use std::net::{SocketAddr, TcpStream, UdpSocket};
@@ -22,7 +22,7 @@ pub trait Port: Send {
     /// As `Read::read`; silence is an error that [`is_silence`] knows.
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize>;
 
-    /// As [`Port::read`], and with it all else that has come already; the buffer has room for [`ALL_BYTES`]. What is
+    /// As [`Port::read`], and with it all else that has come already; the buffer has room for [`ALL_BYTES`]. Bytes
     /// written meanwhile may be lost.
     fn read_all(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         // A stream gives what it has.
@@ -105,7 +105,7 @@ fn datagrams(socket: UdpSocket, peer: Option<SocketAddr>, silence: Duration) -> 
 
 struct Stream<R>(R);
 
-/// What is taken from a stream at once: 11 ms of the fastest port.
+/// Bytes taken from a stream at once: 11 ms of the fastest port.
 const STREAM_BYTES: usize = 1024;
 
 impl<R: Read + Send> Port for Stream<R> {
@@ -129,7 +129,7 @@ struct DatagramReader {
 const LARGEST_BYTES: usize = 65_536;
 /// What [`Port::read_all`] needs room for: as long as another datagram fits for sure, it is taken.
 pub const ALL_BYTES: usize = 2 * LARGEST_BYTES;
-/// Datagrams that are taken at once at most: whoever floods the port keeps nobody for ever.
+/// Maximum datagrams taken at once: a flood of the port must not block the program.
 const AT_ONCE_MAX: usize = 4_096;
 
 impl DatagramReader {
@@ -167,7 +167,7 @@ impl Port for DatagramReader {
             let Some(room) = buffer.get_mut(count..).filter(|room| room.len() >= LARGEST_BYTES) else {
                 break;
             };
-            // What is wrong with the port shows at the next read.
+            // The next read reports the port's error.
             let Ok(more) = self.next(room) else { break };
             count += more;
         }

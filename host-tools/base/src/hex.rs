@@ -16,7 +16,7 @@ pub fn hex(bytes: &[u8]) -> String {
     String::from_utf8_lossy(&text).into_owned()
 }
 
-/// So many bytes of which this is the text; none where it is that of no bytes, or of more or fewer.
+/// The `N` bytes of a text; none if it is not hexadecimal, or has another length.
 pub fn bytes_of<const N: usize>(text: &str) -> Option<[u8; N]> {
     let (pairs, rest) = text.as_bytes().as_chunks::<2>();
     let byte = |pair: &[u8; 2]| u8::from_str_radix(std::str::from_utf8(pair).ok()?, 16).ok();

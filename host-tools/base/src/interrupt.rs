@@ -1,9 +1,10 @@
-//! Ctrl-C and SIGTERM end a run that would go on for ever in good order: what waits is written, the log is closed and
-//! the results are printed. A second one ends the program at once (with a database it ends the wait for that, and the third
-//! one the program), unless it comes right after the first: that is the same wish. SIGTERM is what `systemctl stop` and `docker stop` send.
+//! Ctrl-C and SIGTERM end an endless run in good order: waiting data is written, the log is closed and the results
+//! are printed. A second signal ends the program at once, unless it follows so closely that it belongs to the first.
+//! With a database the second one ends the wait for that, and the third one the program. SIGTERM is what `systemctl
+//! stop` and `docker stop` send.
 //!
-//! SIGHUP keeps its default, so that `nohup` works. SIGXFSZ, which a file beyond the limit of `ulimit -f` sends, is only
-//! noted: then the write fails with an error that names the file.
+//! SIGHUP keeps its default, so that `nohup` works. SIGXFSZ, which a file beyond the limit of `ulimit -f` sends, is
+//! only noted: then the write fails with an error that names the file.
 
 use std::io;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -13,12 +14,12 @@ use std::time::{Duration, Instant};
 use signal_hook::consts::{SIGINT, SIGTERM};
 use signal_hook::flag;
 
-/// What a shell reports of a program that Ctrl-C ended.
+/// The exit code that a shell reports after Ctrl-C.
 const EXIT_CODE: i32 = 130;
 
-/// Signals that come within so long after one are the same wish: `timeout -s INT` sends two.
+/// Signals within this time after one belong to it: `timeout -s INT` sends two.
 const ECHO: Duration = Duration::from_millis(50);
-/// How often it is looked whether one has come, where the system cannot wait for one.
+/// Polling interval, if the system cannot wait for a signal.
 #[cfg(not(unix))]
 const LOOK: Duration = Duration::from_millis(20);
 
@@ -41,7 +42,8 @@ fn watch_for(wishes: u32) {
     REQUESTED.get_or_init(|| watched(wishes, next));
 }
 
-/// What is set once one has come. From the first thing on that keeps a signal from ending the program it is set: none is passed over.
+/// The flag of a signal. It is set from the moment on in which a signal no longer ends the program, so none is
+/// missed.
 fn watched<N: FnMut() + Send + 'static>(
     wishes: u32,
     next: impl FnOnce() -> io::Result<N>,
@@ -54,8 +56,8 @@ fn watched<N: FnMut() + Send + 'static>(
         next().and_then(|next| thread.spawn(move || tell_apart(wishes, next, &ready))).is_ok();
     note_failure(end_once(&armed));
     if !is_told_apart {
-        // Where the system gives no thread, the second one ends the program, however soon it comes. In this order: the first one
-        // must not find the flag set.
+        // Without a thread the second one ends the program, at any time. In this order: the first one must not find
+        // the flag set.
         note_failure(set_by_signals(&armed));
     }
     requested

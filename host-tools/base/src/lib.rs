@@ -1,14 +1,14 @@
-//! What all of hums is built on: files that are whole or not there ([`files`]), links ([`endpoint`], [`duplex`], [`sink`]), results
-//! and messages ([`output`], [`outcome`]), and how numbers and times are written ([`utc`], [`plural`], [`hex`]).
+//! The base of all of hums: complete or absent files ([`files`]), links ([`endpoint`], [`duplex`], [`sink`]), results
+//! and messages ([`output`], [`outcome`]), numbers and times as text ([`utc`], [`plural`], [`hex`]).
 //!
-//! It knows nothing of recordings or vehicles.
+//! It has no knowledge of recordings or vehicles.
 
 #![deny(
     clippy::print_stderr,
     reason = "`eprintln!` panics where standard error lies on a full disk: `output::note`, `output::aside`"
 )]
 
-/// A message on standard error: what the world put into it obeys no terminal.
+/// A message on standard error, without control characters from foreign texts.
 #[macro_export]
 macro_rules! note {
     ($($words:tt)*) => {

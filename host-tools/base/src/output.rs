@@ -11,16 +11,16 @@ use crate::colour;
 use crate::outcome::ReaderGone;
 use crate::printable;
 
-/// What a command makes goes to standard output itself.
+/// Whether a command's output uses standard output.
 static TAKEN: AtomicBool = AtomicBool::new(false);
 
-/// What a command makes goes to standard output: results are printed on standard error from now on.
+/// Reserves standard output for a command's output: results go to standard error from now on.
 pub fn leave_standard_output() {
     TAKEN.store(true, Ordering::Relaxed);
 }
 
-/// Name and version of what `--json` prints. The version rises when a name goes or changes its meaning, not when one is
-/// added (`docs/json.md`).
+/// Name and version of the output of `--json`. The version rises when a name goes or changes its meaning, not when
+/// one is added (`docs/json.md`).
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct Schema {
     schema: &'static str,
@@ -43,7 +43,7 @@ struct Named<'a, T> {
     value: &'a T,
 }
 
-/// Prints one line, or several, with the colours of its levels; what the world put into it obeys no terminal.
+/// Prints one line, or several, with the colours of its levels, and without control characters from foreign texts.
 pub fn line(text: &str) -> Result<()> {
     raw_line(&colour::shown(&printable::lines(text), is_in_colour()))
 }
@@ -89,8 +89,8 @@ pub fn json(schema: Schema, value: &impl Serialize) -> Result<()> {
     json_line(&serde_json::to_string_pretty(&Named { schema, value })?)
 }
 
-/// A JSON object that is printed as it is made: some members, then a list that is too long to be held. Its text is that
-/// of [`json`].
+/// A JSON object that is printed as it is made: some members, then a list that is too long to be held. Its text is
+/// the same as that of [`json`].
 pub struct JsonList {
     empty: bool,
 }

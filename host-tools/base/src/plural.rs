@@ -2,7 +2,7 @@
 
 /// A count with its thing: `count(1, "damaged sector")` is `1 damaged sector`, of two it is `2 damaged sectors`.
 pub fn count(number: impl TryInto<u64>, thing: &str) -> String {
-    // What has no place in 64 bits is many.
+    // A number beyond 64 bits is plural.
     let number = number.try_into().unwrap_or(u64::MAX);
     format!("{number} {}", noun(number, thing))
 }

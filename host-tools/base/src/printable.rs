@@ -1,9 +1,8 @@
-//! Words of the world on a terminal: what comes from a log, from a vehicle or from a file's name may hold characters that a
-//! terminal obeys (escape sequences that clear the screen or write elsewhere) or that change how the text around them
-//! reads (`U+202E` shows what follows from right to left, so that `evil` looks like `live`). They are shown by their
-//! numbers, as `\u{1b}`.
+//! Foreign texts on a terminal. A text from a log, a vehicle or a file's name may hold characters that control a
+//! terminal: escape sequences clear the screen or write elsewhere. Others change the reading of the text: after
+//! `U+202E`, which turns the direction, `evil` looks like `live`. They are shown by their numbers, as `\u{1b}`.
 //!
-//! What is printed passes through here: standard output in [`crate::output`], standard error by `note!`.
+//! All printed text passes through here: standard output in [`crate::output`], standard error by `note!`.
 
 use std::borrow::Cow;
 use std::fmt::Write as _;
@@ -20,7 +19,7 @@ pub const fn redirects(c: char) -> bool {
     )
 }
 
-/// What a terminal obeys: C0, DEL, C1 (Unicode category Cc), and what changes the direction of writing.
+/// Whether a character controls a terminal: C0, DEL, C1 (Unicode category Cc), and changes of writing direction.
 fn is_obeyed(c: char) -> bool {
     c.is_control() || redirects(c)
 }

@@ -1,4 +1,4 @@
-//! Where the bytes of the ground-station UART go, and, where somebody is there to answer, where its own come from.
+//! The ground-station UART: the destination of its bytes, and the source of answers, if there is one.
 
 use std::io::{self, BufWriter, Write};
 use std::sync::mpsc::{Receiver, TryRecvError, TrySendError, sync_channel};
@@ -22,14 +22,14 @@ const BUFFER_BYTES: usize = 65_536;
 
 /// The other side of the ground station's port.
 pub struct Ground {
-    /// What goes to it.
+    /// Its output.
     pub writer: Beside,
-    /// What comes from it.
+    /// Its input.
     pub heard: Heard,
 }
 
-/// What is written beside a recording: `--gs`, `--tap`. Where it fails, that is said at once, and the recording goes on
-/// without it: writing never fails. A clone writes the same.
+/// Output beside a recording: `--gs`, `--tap`. A failure is reported at once, and the recording continues without it:
+/// writing never fails. A clone writes to the same output.
 #[derive(Clone)]
 pub struct Beside(Arc<Mutex<Inside>>);
 
@@ -48,7 +48,7 @@ enum To {
 }
 
 impl Beside {
-    /// A writer that nobody reads.
+    /// A writer without a reader.
     pub fn nowhere() -> Self {
         Self::new("", To::Nowhere)
     }
@@ -78,7 +78,7 @@ impl Beside {
     }
 
     fn lock(&self) -> MutexGuard<'_, Inside> {
-        // What a thread that failed has left is whole.
+        // The state after a failed thread is consistent.
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
@@ -118,7 +118,7 @@ impl Write for Beside {
     }
 }
 
-/// What the ground station sends.
+/// The ground station's bytes.
 pub struct Heard(Option<Receiver<Vec<u8>>>);
 
 impl Heard {
@@ -185,7 +185,7 @@ fn listen(mut port: Box<dyn Port>) -> io::Result<Heard> {
     Ok(Heard(Some(receiver)))
 }
 
-/// A writer that nobody reads.
+/// A writer without a reader.
 pub fn nowhere() -> Box<dyn Write + Send> {
     Box::new(io::sink())
 }

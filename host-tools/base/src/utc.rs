@@ -103,7 +103,7 @@ pub fn parse_seconds(text: &str) -> Option<u64> {
     text.parse().ok().and_then(seconds_to_micros)
 }
 
-/// Seconds in microseconds, where they are a time.
+/// Seconds in microseconds, if they are a valid time.
 pub fn seconds_to_micros(seconds: f64) -> Option<u64> {
     (seconds.is_finite() && (0.0..1e12).contains(&seconds)).then_some((seconds * 1e6).round() as u64)
 }

@@ -4,8 +4,8 @@ use super::fields::{Place, barred, field, reg, sign_extend};
 use super::narrow::immediate_shift;
 use crate::op::{Alu, Op, Shift};
 
-/// The operation of the four bits that immediate and register forms share, by whether `d` is 15 and flags are set (the
-/// comparisons) and whether `n` is 15 (the moves).
+/// The operation of the four bits that immediate and register forms share. With `d` 15 and flags it is a comparison,
+/// with `n` 15 a move.
 fn alu(op: u32, d: u8, n: u8, flags: bool) -> Option<Alu> {
     let compares = d == 15 && flags;
     Some(match op {

@@ -200,8 +200,8 @@ impl Core {
         Ok(())
     }
 
-    /// The cycles of a load beyond the first: one more unless it is pipelined with a load before it, and one if its base was
-    /// computed just before.
+    /// The cycles of a load beyond the first. One more unless it is pipelined with a load before it; one more if its
+    /// base was computed just before.
     #[inline(always)]
     pub(crate) fn wait_for(&mut self, n: u8) {
         self.cycles += u64::from(self.previous & LOADED == 0 || self.previous == LOADED | n);

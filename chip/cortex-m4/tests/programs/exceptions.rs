@@ -1,7 +1,8 @@
-//! Exceptions, faults, masks, privilege, late floating-point state, sleep, MPU: each scenario prints its observations.
+//! Exceptions, faults, masks, privilege, late floating-point state, sleep, MPU: each scenario prints its
+//! observations.
 //!
-//! The text is compared between QEMU and the model. Every vector leads to `on_exception`, which prints number, return code and
-//! status, does the scenario's action for that number, and steps over the instruction of a fault.
+//! The text is compared between QEMU and the model. Every vector leads to `on_exception`. It prints number, return
+//! code and status, does the scenario's action for that number, and steps over the instruction of a fault.
 #![no_std]
 #![no_main]
 

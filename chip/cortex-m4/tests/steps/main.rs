@@ -56,7 +56,7 @@ fn parts(cases: &[Case], seed: u64) -> Vec<(u32, Vec<u8>)> {
     let mut random = Random(seed ^ 0x5EED | 1);
     let mut pattern: Vec<u32> = (0..SCRATCH_WORDS)
         .map(|_| {
-            // An address without memory: odd, or that of a word.
+            // An address without memory: odd, or a word's address.
             let word = random.next() & 0x0FFF_FFFF | random.of(&[3u32, 7, 9, 11]) << 28;
             if word & 1 == 1 { word } else { word & !3 }
         })

@@ -1,5 +1,5 @@
-//! Examples that packages of boards bring: the Adafruit Feather STM32F405 (`feather-f405`) and ST's discovery board with an
-//! STM32F407 (`stm32f407g-disc`), each on an older `stm32f4xx-hal`.
+//! Examples of board packages: the Adafruit Feather STM32F405 (`feather-f405`) and ST's discovery board with an
+//! STM32F407 (`stm32f407g-disc`). Each uses an older `stm32f4xx-hal`.
 
 use stm32f405_model::gpio::Pin;
 use stm32f405_model::machine::Machine;

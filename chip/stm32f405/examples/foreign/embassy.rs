@@ -1,5 +1,5 @@
-//! embassy's examples for the STM32F4 (`examples/stm32f4/src/bin` of its repository, at the release of `embassy-stm32` that
-//! they are built with), on an STM32F405ZG with its default clocks, 16 MHz, and its time driver on TIM12.
+//! Embassy's examples for the STM32F4: `examples/stm32f4/src/bin` of its repository, at the release of the
+//! `embassy-stm32` in use. They run on an STM32F405ZG with its default clocks, 16 MHz, and the time driver on TIM12.
 
 use stm32f405_model::gpio::Pin;
 use stm32f405_model::machine::Machine;

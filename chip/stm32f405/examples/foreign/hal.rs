@@ -28,8 +28,8 @@ pub(crate) fn serial_dma(machine: &mut Machine) -> Outcome {
     expect(heard == ["by DMA", "by ask", ""], format!("it echoed {heard:?}"))
 }
 
-/// Receives into one of two buffers, by DMA through its FIFO; the line's silence ends it. (Its interrupt never clears that flag, so that
-/// the buffers change again and again until the next byte: which of the two is taken is chance.)
+/// Receives into one of two buffers, by DMA through its FIFO; the line's silence ends it. (Its interrupt never clears
+/// that flag, so the buffers change again and again until the next byte: the choice is chance.)
 pub(crate) fn rtic_serial_dma_rx_idle(machine: &mut Machine) -> Outcome {
     const TEXTS: [&[u8]; 3] = [b"the first of them", b"another one", b"a third text, longer than the first"];
     const SRAM: u32 = 0x2000_0000;
@@ -54,7 +54,8 @@ pub(crate) fn rtic_serial_dma_rx_idle(machine: &mut Machine) -> Outcome {
     expect(counts == 0, format!("{counts} overruns"))
 }
 
-/// Sends 0 to 99 by DMA, at the HAL's choice for 3 MHz (16 MHz by four), then 1 to 100 by the interrupt of the first, and halts as it takes a buffer twice.
+/// Sends 0 to 99 by DMA, at the HAL's choice for 3 MHz (16 MHz by four). Then it sends 1 to 100 by the interrupt of
+/// the first, and halts as it takes a buffer twice.
 pub(crate) fn spi_dma(machine: &mut Machine) -> Outcome {
     let tap = Tap::default();
     let heard = tap.0.clone();

@@ -63,7 +63,7 @@ pub(crate) async fn run(
             Either3::Second(()) => is_behind = drain(body, &mut ends),
             Either3::Third(()) => uplink(body, &mut ends),
             Either3::First(()) => {
-                // What came before this tick.
+                // Frames from before this tick.
                 is_behind = drain(body, &mut ends);
                 if let Some((cpu_permille, cpu_permille_max)) = load.step(now()) {
                     let (stack_bytes_max, stack_bytes) = memory::stack_used();

@@ -234,8 +234,8 @@ impl Registers {
     }
 }
 
-/// Of an angle of up to a right one, by their series: the same on every machine, since each operation is rounded to the nearest number
-/// of single precision.
+/// Sine and cosine of an angle up to a right one, by their series. They are the same on every machine, since each
+/// operation is rounded to the nearest single-precision number.
 fn sine_and_cosine(angle: f32) -> (f32, f32) {
     const SINE: [f32; 6] = [
         1.0 / 6_227_020_800.0,

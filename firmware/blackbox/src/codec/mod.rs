@@ -29,8 +29,8 @@ use crate::distribution::Cdf;
 use crate::layouts::Layouts;
 use crate::limits::ENTRY_BYTES_MAX;
 
-/// Largest coded size of an entry, bytes. An entry that would become longer starts a new group, where its bytes go out as they
-/// are: with length and time that is `ENTRY_BYTES_MAX` and 20 more.
+/// Largest coded size of an entry, bytes. A longer entry starts a new group, where its bytes are stored uncoded: with
+/// length and time that is at most `ENTRY_BYTES_MAX` and 20 more.
 pub(crate) const CODED_BYTES_MAX: usize = 640;
 const _: () = assert!(ENTRY_BYTES_MAX + 20 <= CODED_BYTES_MAX);
 
@@ -134,8 +134,8 @@ impl Model {
         self.plain(coder, decoded, &mut buffer, plain);
     }
 
-    /// Reads an entry. Its bytes are in the buffer; those of a frame of the model are not put together yet, and it gives
-    /// which of `frames` it is.
+    /// Reads an entry. Its bytes are in the buffer; a frame of the model is not reassembled yet, and its index in
+    /// `frames` is returned.
     pub(crate) fn decode(
         &mut self,
         coder: &mut Reading<'_, Recall>,
@@ -167,7 +167,7 @@ impl Model {
         Headers::is_expected(slot, sender, frame, verified)
     }
 
-    /// Which slot a frame belongs to; `None` where there is no room for it in the model.
+    /// The slot of a frame; `None` if the model has no room for it.
     fn route(&mut self, frame: &Frame) -> Option<(Next, Key)> {
         if let Some(slot) = self.slots.find_guessed(frame).or_else(|| self.slots.find(frame)) {
             return Some((Next::Slot(slot), NO_KEY));
@@ -181,7 +181,7 @@ impl Model {
         self.slots.has_room().then_some((Next::NewSlot, key))
     }
 
-    /// An entry that is no frame of a slot: a record, or bytes as they are (`raw`) or by the text model.
+    /// An entry without a slot's frame: a record, or bytes, uncoded (`raw`) or by the text model.
     fn plain<C: Coder>(
         &mut self,
         coder: &mut C,

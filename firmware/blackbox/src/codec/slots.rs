@@ -1,5 +1,5 @@
-//! Slots: each stream of one message from one sender (and one instance, where the message tells several apart). A
-//! slot remembers what its last frame looked like, and which slot came after which.
+//! Slots: each stream of one message from one sender (and one instance, for messages with several). A slot stores the
+//! shape of its last frame, and the order of slots.
 
 use super::frame::Frame;
 use crate::coder::Coder;
@@ -312,8 +312,8 @@ impl Slots {
         (first, second, if agree && sure >= 7 { 12 + (sure & 3) } else { sure })
     }
 
-    /// Codes what comes next, and of a slot's frame whether its header is as expected. `rough`: that of the last
-    /// frame was not.
+    /// Codes what comes next, and of a slot's frame whether its header is as expected. `rough`: the last frame's
+    /// header was unexpected.
     pub(crate) fn next<C: Coder>(
         &mut self,
         coder: &mut C,

@@ -1,6 +1,7 @@
-//! The reader's side of a distribution on a PC: all places at once, and no branch. A reader's processor cannot foresee
-//! what the symbols are, so each branch on one is guessed wrongly about as often as the symbol is news; and a division
-//! and a search wait for one another. Both take most of the reading time.
+//! The reader's side of a distribution on a PC: all places at once, without a branch.
+//!
+//! A processor cannot predict the symbols, so a branch on one is mispredicted about as often as the symbol is new.
+//! Also a division and a search wait for each other. Both take most of the reading time.
 
 use super::Cdf;
 

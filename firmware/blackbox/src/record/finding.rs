@@ -71,8 +71,12 @@ impl<'a> FindingRecord<'a> {
 /// A mark in time.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Event<'a> {
-    /// Which event: 0 other, 1 armed, 2 disarmed, 3 take-off, 4 landing, 5 snapshot asked for, 6 card in, 7 card out,
-    /// 8 a critical finding (its check), 9 phase of flight (its name), 10 autopilot restarted, 11 another airframe.
+    /// The number of the event:
+    ///
+    /// - 0 other, 1 armed, 2 disarmed, 3 take-off, 4 landing;
+    /// - 5 snapshot requested, 6 card in, 7 card out;
+    /// - 8 a critical finding (its check), 9 phase of flight (its name);
+    /// - 10 autopilot restarted, 11 another airframe.
     pub number: u8,
     /// More, where there is more to say.
     pub text: &'a str,

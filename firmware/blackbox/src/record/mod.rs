@@ -1,8 +1,8 @@
 //! The monitor's own records: recorder, vehicle, parameters, findings, counters and losses.
 //!
-//! Stored form (`stored`): a head, then the numbers of 4 bytes, those of 2, and bytes, each in the order of the fields
-//! and little endian; a text is its length (u8) and its UTF-8 bytes. A later version may only append to each of the
-//! three, so a reader of version n reads n + 1; a kind that it does not know is given out as `Record::Unknown` and stays
+//! Stored form (`stored`): a head, then numbers of 4 bytes, numbers of 2 bytes, and bytes, each in the order of the
+//! fields and little endian. A text is its length (u8) and its UTF-8 bytes. A later version may only append to each
+//! of the three, so a reader of version n reads n + 1. An unknown kind becomes `Record::Unknown`, and the log stays
 //! decodable.
 
 mod boot;

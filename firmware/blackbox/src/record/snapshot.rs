@@ -33,8 +33,8 @@ pub struct Snapshot<'a> {
     pub interval: Span,
     /// Columns of a sample.
     pub width: u8,
-    /// Sample by sample, column by column: half-precision numbers, each less the one of the sample before in its
-    /// column (modulo 2^16; of the first sample, as it is), little endian.
+    /// Half-precision numbers, sample by sample, column by column, little endian. Each is stored less the previous
+    /// sample's in its column (modulo 2^16), the first sample unchanged.
     values: &'a [u8],
 }
 

@@ -1,5 +1,5 @@
-//! A made-up stream that reaches every part of the codec's model: every message of the dialect, and in its elements
-//! every habit that values have; both versions of MAVLink, signed frames, and every way in which a frame is odd.
+//! A generated stream that reaches every part of the codec's model. It has every message of the dialect with every
+//! pattern of values, both versions of MAVLink, signed frames, and every kind of odd frame.
 //!
 //! The stream is part of the golden sums: it never changes either.
 

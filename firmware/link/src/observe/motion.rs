@@ -187,7 +187,7 @@ pub(super) fn air(id: u32, payload: &[u8]) -> Option<Air> {
 
 /// Eight outputs in the message of old, the others in its extension; 65535 is none.
 pub(super) fn outputs(payload: &[u8]) -> Outputs {
-    /// Where the ninth stands.
+    /// Offset of the ninth output.
     const EXTENSION: usize = 21;
     let pulse = |output: usize| {
         let at = if output < 8 { 4 + 2 * output } else { EXTENSION + 2 * (output - 8) };

@@ -47,8 +47,8 @@ pub(super) fn battery(payload: &[u8]) -> Option<Battery> {
     })
 }
 
-/// The sum, and the cells where they are known one by one. A sender that knows only the sum puts it into the first
-/// place, and what does not fit there into the next; an unused place is 65535, in the extension 0.
+/// The sum, and the cells if each is known. A sender that knows only the sum puts it into the first place, and the
+/// part beyond its range into the next. An unused place is 65535, in the extension 0.
 fn cells(base: &[u16; 10], extension: [u16; 4]) -> (Option<Volts>, [Option<CellVoltage>; CELLS_MAX]) {
     let mut cells = [None; CELLS_MAX];
     let mut sum_mv = 0_u32;

@@ -14,9 +14,9 @@ use super::fields::{current, percent, read, unix_time, unless, voltage};
 use crate::packet::Fields;
 use crate::text::TEXT_BYTES_MAX;
 
-/// A vehicle is one whose autopilot is not INVALID; some ground stations and companions claim one nevertheless, so
-/// types that cannot be vehicles are left out too. Type, autopilot and state are bytes 4, 5 and 7: read as they are,
-/// because the list of vehicle types grows every year.
+/// A vehicle is a sender whose autopilot is not INVALID. Some ground stations and companions claim one nevertheless,
+/// so types that cannot be vehicles are left out too. Type, autopilot and state are bytes 4, 5 and 7: read as they
+/// are, because the list of vehicle types grows every year.
 pub(super) fn heartbeat(payload: &[u8]) -> Option<Heartbeat> {
     const AUTOPILOT_INVALID: u8 = 8;
     const ARMED: u8 = 1 << 7;
@@ -119,8 +119,8 @@ pub(super) fn flight_information(payload: &[u8]) -> Option<Observation> {
     Some(Observation::FlightInformation { flight: information.flight_uuid, takeoff_boot_ms })
 }
 
-/// A parameter that says something of the batteries' cells. PX4 sends an integer's bits, `ArduPilot` its value: no parameter of
-/// these is as small as the bits of a small integer are as a number.
+/// A parameter about the batteries' cells. PX4 sends an integer's bits, `ArduPilot` its value: none of these values
+/// is as small as a small integer's bits read as a float.
 pub(super) fn parameter(payload: &[u8]) -> Option<Observation> {
     let fields = Fields(payload);
     let place = cells::known(fields.text(8, 16)?)?;

@@ -41,7 +41,7 @@ fn frame(id: u32, bytes: usize) -> Vec<u8> {
     frame
 }
 
-/// What a summary sends when each of `streams` (id, bytes, every so many ms) comes with jitter.
+/// The messages of a summary, with each of `streams` (id, bytes, interval in ms) coming with jitter.
 fn run(budget: f32, seconds: u64, streams: &[(u32, usize, u64)]) -> Vec<(u64, u32, usize)> {
     let params = params(budget);
     let mut summary = Summary::new(&params);

@@ -1,23 +1,25 @@
 //! Trends: the figures of a flight against those of the vehicle's earlier flights.
 //!
-//! A monitor gives one figure of each quantity for a flight ([`hums_core::figures`]). Here they make baselines: the first [`FLIGHTS_MIN`]
-//! flights make one, each later flight moves it by a tenth of the difference, and a flight beyond the warning's limit does not
-//! move it, so that a fault never becomes normal.
+//! A monitor gives one figure of each quantity for a flight ([`hums_core::figures`]). Here they make baselines. The
+//! first [`FLIGHTS_MIN`] flights make one, and each later flight moves it by a tenth of the difference. A flight
+//! beyond the warning's limit does not move it, so a fault never becomes normal.
 //!
-//! A baseline has the mean of the figures and their spread. A departure counts if only one unchanged flight in `TRD_FALSE` goes so far: by
-//! Student's t distribution (normal figures of unknown mean and spread, the spread with a conjugate prior; Gelman et al., Bayesian
-//! Data Analysis, 3.2 and 3.3). The test of one figure is the likelihood ratio test for a changed mean (Lehmann and Romano, Testing
-//! Statistical Hypotheses, 5.2), so its rate of false alarms can be set.
+//! A baseline has the mean of the figures and their spread. A departure counts if only one unchanged flight in
+//! `TRD_FALSE` goes so far, by Student's t distribution. The figures are normal with unknown mean and spread, the
+//! spread with a conjugate prior; Gelman et al., Bayesian Data Analysis, 3.2 and 3.3). The test of one figure is the
+//! likelihood ratio test for a changed mean, so its rate of false alarms can be set (Lehmann and Romano, Testing
+//! Statistical Hypotheses, 5.2).
 //!
 //! # Heavier, or less thrust
-//! A heavier vehicle asks all its rotors for more thrust T, and these take power as T^1.5 (actuator disk; Leishman, Principles of Helicopter
-//! Aerodynamics, 2.4). With a shorter propeller blade, a weak motor or a weak ESC, throttle rises for the same thrust and power does
-//! not. So if throttle rose, the logarithm of power is compared with that of the thrust of that throttle: from
-//! `WEIGHT_EXPONENT` times on, half way between both, it is weight. Propellers of a real quadrotor cut by 10 to 25 mm have 0.5 to 1.1.
+//! A heavier vehicle asks all its rotors for more thrust T, and these take power as T^1.5 (actuator disk; Leishman,
+//! Principles of Helicopter Aerodynamics, 2.4). With a shorter propeller blade, a weak motor or a weak ESC, throttle
+//! rises for the same thrust and power does not. So if throttle rose, the logarithm of power is compared with that of
+//! the thrust at this throttle. From `WEIGHT_EXPONENT` times on, half way between both, the cause is weight.
+//! Propellers of a real quadrotor cut by 10 to 25 mm have 0.5 to 1.1.
 //!
 //! # Better than before
-//! Wear never makes a vehicle hover with less, or a battery resist less and hold more. A flight that is better beyond its reach begins
-//! a new baseline: a part was changed.
+//! Wear never makes a vehicle hover with less, or a battery resist less and hold more. A flight that is better beyond
+//! its reach begins a new baseline: a part was changed.
 
 use hums_blackbox::Record;
 use hums_blackbox::record::Why;
@@ -117,7 +119,7 @@ fn terms(quantity: Quantity) -> Terms {
     Terms { check, part, subsystem, bad, is_share, prior, warn, critical }
 }
 
-/// What a recording tells of trends, in order.
+/// An event of a recording's trends, in order.
 #[derive(Clone, Debug)]
 pub enum Episode {
     /// A flight.
@@ -189,8 +191,9 @@ impl Baseline {
     }
 }
 
-/// What a Student's t of so many degrees of freedom (8 and more) exceeds, either way, once in `rarely`: the normal quantile by 26.2.23 and its
-/// expansion by 26.7.5 of Abramowitz and Stegun, Handbook of Mathematical Functions; within 1 % for one in 20 to one in 100,000.
+/// The value that a Student's t of these degrees of freedom (8 and more) exceeds, in either direction, once in
+/// `rarely`. The normal quantile is 26.2.23 and its expansion 26.7.5 of Abramowitz and Stegun, Handbook of
+/// Mathematical Functions. Within 1 % for one in 20 to one in 100,000.
 fn student_t(rarely: f32, degrees: f32) -> f32 {
     let root = (2.0 * (2.0 * rarely).ln()).sqrt();
     let above = 2.515_517 + root * (0.802_853 + root * 0.010_328);
@@ -207,7 +210,7 @@ fn student_t(rarely: f32, degrees: f32) -> f32 {
     normal * (1.0 + more)
 }
 
-/// What is normal for a vehicle.
+/// The normal figures of a vehicle.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Baselines([Baseline; Quantity::COUNT]);
 

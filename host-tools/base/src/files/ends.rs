@@ -34,7 +34,8 @@ pub fn digest(path: &Path) -> io::Result<[u8; 32]> {
     }
 }
 
-/// A number that tells a file from others, as the names of what is made of it have it: `r1a2b3c4d`; none where it cannot be read.
+/// A number that distinguishes a file from others, as in the names of its outputs: `r1a2b3c4d`; none if it is
+/// unreadable.
 pub fn content_identity(path: &Path) -> Option<String> {
     let mut hash = Sha256::new();
     add_ends(&mut hash, path).ok()?;

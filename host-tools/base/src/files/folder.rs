@@ -1,8 +1,8 @@
-//! A folder of output files that belong together: a session's tables. It is made beside its place and takes its name
-//! when all of it is there, so that there are the old tables, the new ones, or none, and never some of both.
+//! A folder of output files that belong together: a session's tables. It is made beside its place and renamed when
+//! complete. So the old tables, the new ones, or none are there, and never some of both.
 //!
-//! Its [stamp](super::stamp) says of which session it is and which files are ours: `--force` replaces only a folder of the same
-//! session, in which nobody put files of his own.
+//! Its [stamp](super::stamp) names its session and our files: `--force` replaces only a folder of the same session
+//! without foreign files.
 
 use std::collections::BTreeSet;
 use std::fs::{self, File};
@@ -33,7 +33,7 @@ pub struct Folder {
     path: PathBuf,
     /// Without links.
     target: PathBuf,
-    /// Where it is until it is whole.
+    /// Its path until it is complete.
     part: TempDir,
     session: String,
     files: Mutex<BTreeSet<String>>,
@@ -66,7 +66,7 @@ impl Folder {
     fn is_free(path: &Path) -> bool {
         match fs::read_dir(path) {
             Ok(mut entries) => entries.next().is_none(),
-            // Below a file, or where nobody may look, nothing of this name is known to be there: making it says why.
+            // Below a file, or without permission, no file of this name is known: creating it gives the reason.
             Err(error) => error.kind() == io::ErrorKind::NotFound || fs::symlink_metadata(path).is_err(),
         }
     }
@@ -102,7 +102,7 @@ impl Folder {
             .and_then(|file| stamp.write(&file))
             .and_then(|()| sync_all(part.path()))
             .and_then(|()| {
-                // What was there before was looked at by `create`.
+                // `create` has checked the existing files.
                 if let Some(old) = Stamp::of(&target) {
                     old.files.iter().map(String::as_str).chain([STAMP]).try_for_each(|name| {
                         let removed = fs::remove_file(target.join(name));

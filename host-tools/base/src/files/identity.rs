@@ -9,7 +9,7 @@ use std::path::{Component, Path, PathBuf};
 pub enum FileId {
     /// A file that exists.
     Existing(Node),
-    /// A place where there is no file yet: its folder without links, and its name.
+    /// A place without a file yet: its folder without links, and its name.
     Place(PathBuf),
 }
 
@@ -29,8 +29,8 @@ fn node(path: &Path) -> io::Result<Node> {
 }
 
 impl FileId {
-    /// The identity of what `path` means. Links are followed, also one to a file that is not there yet. `..` behind a folder
-    /// that is not there leads back to where that folder would be made, and a slash behind a file's name says nothing.
+    /// The identity of a path's file. Links are followed, also to a file that does not exist yet. `..` behind a
+    /// missing folder leads back to its future parent, and a slash behind a file's name is ignored.
     pub fn of(path: &Path) -> io::Result<Self> {
         match node(path) {
             Ok(node) => Ok(Self::Existing(node)),
@@ -71,7 +71,7 @@ pub(super) fn folded(path: &Path) -> Option<PathBuf> {
     is_folded.then_some(kept)
 }
 
-/// A path whose last part is no link, and whose folder is without links. The folder must be there.
+/// A path whose last part is not a link, and whose folder is without links. The folder must be there.
 fn place(path: &Path) -> io::Result<PathBuf> {
     let path = without_links(path)?;
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
@@ -83,7 +83,7 @@ fn place(path: &Path) -> io::Result<PathBuf> {
 /// Links in a row that are followed: as many as Linux follows.
 const LINKS_MAX: usize = 40;
 
-/// What a link leads to, through as many links as there are, also where nothing is there yet.
+/// The target of a chain of links, even if it does not exist yet.
 pub(super) fn without_links(path: &Path) -> io::Result<PathBuf> {
     let mut path = path.to_owned();
     for _ in 0..LINKS_MAX {
@@ -95,7 +95,7 @@ pub(super) fn without_links(path: &Path) -> io::Result<PathBuf> {
     Err(io::Error::other("too many links"))
 }
 
-/// Where one link leads to.
+/// The target of one link.
 fn linked(path: &Path) -> io::Result<PathBuf> {
     let to = fs::read_link(path)?;
     Ok(path.parent().unwrap_or(Path::new("")).join(to))

@@ -1,4 +1,4 @@
-//! What a command reads, which no output may be, and whether its outputs may replace what is there.
+//! A command's inputs, which no output may be, and whether its outputs may replace existing files.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -16,7 +16,7 @@ pub struct Inputs {
     files: BTreeMap<FileId, String>,
     /// `--force`; none if the command has no such flag.
     force: Option<bool>,
-    /// One of them comes live: what is made of it cannot be made again.
+    /// One of them is live: its output cannot be made again.
     live: bool,
 }
 
@@ -50,8 +50,8 @@ impl Inputs {
         self.force.is_some()
     }
 
-    /// Adds a file. One that cannot be looked at is none: whoever opens it says so. A folder is none either (what is
-    /// read of it is named file by file), and a device such as `/dev/null` may be read and written.
+    /// Adds a file. An unreadable one is ignored: the reader reports it. Folders are ignored too (their files are
+    /// added one by one), and devices such as `/dev/null`, which may be read and written.
     pub fn add(&mut self, path: &Path) {
         let Ok(id) = FileId::of(path) else { return };
         if fs::metadata(path).is_ok_and(|about| !about.is_file()) {

@@ -17,8 +17,8 @@ use crate::output::Stdout;
 /// Room for a group's lines of a busy message.
 const BUFFER_BYTES: usize = 16 * 1024;
 
-/// A file that is written by the rules of this [module](super). An output that is made of a live source has its name from the
-/// beginning, and each write is in the file at once: the source cannot be read again.
+/// A file that is written by the rules of this [module](super). An output from a live source has its final name from
+/// the beginning, and each write is in the file at once: the source cannot be read again.
 #[derive(Debug)]
 pub struct Output {
     to: BufWriter<To>,
@@ -27,7 +27,7 @@ pub struct Output {
     part: Part,
 }
 
-/// Where the bytes go.
+/// The destination of the bytes.
 #[derive(Debug)]
 enum To {
     File(File),
@@ -74,7 +74,7 @@ impl Output {
         Ok(Self::new(To::File(file), path, part))
     }
 
-    /// Refuses an output that is an input, is no file, or exists, unless it may be replaced.
+    /// Refuses an output that is an input, is not a file, or exists, unless it may be replaced.
     pub fn check(path: &Path, inputs: &Inputs) -> Result<()> {
         if means_standard_output(path) {
             return Ok(());
@@ -109,7 +109,8 @@ impl Output {
     pub fn resume(path: &Path) -> Result<Self> {
         let to = without_links(path).with_context(|| cannot_write(path))?;
         let from = begun_of(&to)?;
-        // Windows lets nobody cut a file that is open to append; one run at a time has it, so its end is where this run left it.
+        // Windows does not allow cutting a file that is open to append. One run at a time has it, so its end is where
+        // this run left it.
         let mut options = File::options();
         options.read(true).write(true).create(true).truncate(false);
         let mut file = open_in_place(&mut options, &from).with_context(|| cannot_write(path))?;
@@ -131,7 +132,7 @@ impl Output {
         &self.path
     }
 
-    /// Where the bytes are until the file is whole.
+    /// The path of the bytes until the file is complete.
     pub fn part(&self) -> &Path {
         match &self.part {
             Part::None => &self.path,
@@ -183,7 +184,7 @@ impl Drop for Output {
         if let Part::Begun { from, .. } = &self.part
             && from.metadata().is_ok_and(|about| about.len() == 0)
         {
-            // One that cannot be removed is in nobody's way.
+            // A leftover that cannot be removed does no harm.
             let _ = fs::remove_file(from);
         }
     }

@@ -6,8 +6,8 @@ use std::path::Path;
 
 use anyhow::{Context as _, Result, bail};
 
-/// All bytes of a file, or of a pipe, that has `most` at most: a longer one is refused before more of it is read, so that
-/// no file named by mistake fills this PC's memory.
+/// All bytes of a file or a pipe of at most `most` bytes. A longer one is refused before more of it is read, so that
+/// a wrong file cannot fill this PC's memory.
 pub fn read_short(path: &Path, most: u64) -> Result<Vec<u8>> {
     let context = || format!("{}: cannot be read", path.display());
     let file = File::open(path).with_context(context)?;

@@ -17,7 +17,7 @@ pub(super) const STAMP: &str = ".hums";
 /// A stamp is a line and some hundred names.
 const BYTES_MAX: u64 = 4 << 20;
 
-/// What a stamp says.
+/// The content of a stamp.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(super) struct Stamp {
     /// The session that the tables are of.

@@ -74,7 +74,7 @@ impl ReadNorFlash for StoreFlash {
     fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), FlashError> {
         let from = ptr::with_exposed_provenance::<u8>(Self::place(offset, bytes.len())?);
         for (index, byte) in bytes.iter_mut().enumerate() {
-            // SAFETY: within the store's sectors, which can always be read and are no variable of the program's.
+            // SAFETY: within the store's sectors, which are always readable and hold no variable of the program.
             *byte = unsafe { from.add(index).read_volatile() };
         }
         Ok(())
@@ -102,7 +102,8 @@ impl NorFlash for StoreFlash {
                     w.set_pg(true);
                 });
                 let at = ptr::with_exposed_provenance_mut::<u32>(begin + index * WORD);
-                // SAFETY: an aligned word within the store's sectors, which are no variable of the program's; the flash takes it.
+                // SAFETY: an aligned word within the store's sectors, which hold no variable of the program; the
+                // flash takes it.
                 unsafe { at.write_volatile(u32::from_le_bytes(*word)) };
                 cortex_m::asm::dsb();
                 finish()

@@ -1,11 +1,11 @@
 //! A port: reception into a DMA ring, transmission by DMA.
 //!
-//! DMA copies received bytes to a ring, which is read every millisecond. There is no interrupt per byte and none on a line error:
-//! the checksum detects a damaged byte, and no good byte is dropped with it.
+//! DMA copies received bytes to a ring, which is read every millisecond. No interrupt comes per byte or on a line
+//! error: the checksum detects a damaged byte, and no good byte is dropped with it.
 //!
-//! During an erase of flash the processor stops and DMA continues around the ring. The interrupt that counts rounds then fires
-//! once for several rounds. So if bytes arrived and the ring was not read for longer than its capacity, its contents count as
-//! lost.
+//! During an erase of flash the processor stops and DMA continues around the ring. The interrupt that counts rounds
+//! then fires once for several rounds. So if bytes arrived and the ring was not read for longer than its capacity,
+//! its contents count as lost.
 
 use embassy_stm32::dma::{self, ReadableRingBuffer, Request, TransferOptions};
 use embassy_stm32::interrupt::typelevel::Binding;
@@ -22,11 +22,11 @@ use crate::boards::machine::Overrun;
 const LAST_LOOK: Duration = Duration::from_micros(100);
 const LAST_LOOKS: u32 = 30;
 
-/// Both halves of a port: reception into this ring, which is looked into so often, and transmission. `registers` must be those of
-/// `T`. The channels are its own, or it does not compile.
+/// Both halves of a port: reception into this ring, which is read at this interval, and transmission. `registers`
+/// must be those of `T`. The channels are its own, or it does not compile.
 ///
 /// # Panics
-/// Where the clocks do not allow the port's baud rate.
+/// If the clocks do not allow the port's baud rate.
 pub(crate) fn halves<T: Instance, R: RxDma<T>, S: TxDma<T>>(
     port: Result<Uart<'static, Blocking>, ConfigError>,
     registers: pac::usart::Usart,
@@ -73,8 +73,8 @@ impl PortRx {
         request: Request,
     ) -> Self {
         let from = registers.dr().as_ptr().cast::<u8>();
-        // SAFETY: `from` is the port's data register, `buffer` is a static in RAM that DMA reaches and that no other code uses,
-        // and the ring owns the channel from here on.
+        // SAFETY: `from` is the port's data register. `buffer` is a static in RAM that DMA reaches and no other code
+        // uses. The ring owns the channel from here on.
         let mut ring =
             unsafe { ReadableRingBuffer::new(channel, request, from, buffer, TransferOptions::default()) };
         ring.start();
@@ -94,8 +94,8 @@ impl PortRx {
     /// them.
     pub(crate) async fn receive(&mut self, buffer: &mut [u8]) -> Result<usize, Overrun> {
         loop {
-            // Wait also after a successful read. If processing a byte takes longer than a byte time, reading again at once would
-            // always find a byte, and less urgent tasks would never run.
+            // Wait also after a successful read. If a byte takes longer than a byte time, an immediate read would
+            // always find another one, and less urgent tasks would never run.
             if !self.is_behind {
                 Timer::at(self.looked + self.fetch_every).await;
             }

@@ -1,9 +1,9 @@
-//! Supply monitor. Below 2.7 V a microSD card is out of specification (SD specification, 6.6), so the board stops writing. The
-//! chip's voltage detector (PVD) interrupts everything and leaves a note in memory. The processor then waits for the supply to
-//! return, and restarts, or for power off.
+//! Supply monitor. Below 2.7 V a microSD card is out of specification (SD specification, 6.6), so the board stops
+//! writing. The chip's voltage detector (PVD) interrupts everything and leaves a note in memory. The processor then
+//! waits for the supply to return, and restarts, or for power off.
 //!
-//! The brown-out reset (BOR) is set in option bytes, which stay as delivered: a supply failure while they are written can lock
-//! the chip for ever. With BOR off the chip resets at 1.7 V (RM0090, 5.2.2).
+//! The brown-out reset (BOR) is set in option bytes, which stay as delivered: a supply failure during their write can
+//! lock the chip for ever. With BOR off the chip resets at 1.7 V (RM0090, 5.2.2).
 
 use cortex_m::peripheral::NVIC;
 use embassy_stm32::interrupt;

@@ -1,5 +1,5 @@
-//! Floats of 4 bytes: compared in the order of their values; those that are hundredths of whole numbers are counted in
-//! hundredths, and those that nothing predicts are coded by their parts.
+//! Floats of 4 bytes, compared in the order of their values. Hundredths of whole numbers are counted in hundredths,
+//! and unpredictable values are coded by their parts.
 
 use super::classes::{COMPUTED, DECIMAL, FLOAT, RANDOM_FLOAT};
 use super::costs::PREDICTIONS;
@@ -7,8 +7,8 @@ use super::rest::{ESCAPE, float_class, float_rest, integer_class, integer_rest};
 use super::{Context, Distributions, Element, STEP_DECIMAL};
 use crate::coder::Coder;
 
-/// From the last value: as it is, with the last step, with half of it, changed as the float before in the frame;
-/// changed as, or equal to, the linked register.
+/// Predictions from the last value: unchanged, with the last step, with half of it, changed like the previous float
+/// in the frame. Then two from the linked register: changed like it, or equal to it.
 const LAST: usize = 0;
 const LINEAR: usize = 1;
 const HALF: usize = 2;
@@ -113,7 +113,7 @@ impl Distributions {
         unorder(guess.wrapping_add(integer_rest(coder, symbol, difference)))
     }
 
-    /// The difference from a guess in the order of floats. `cost`: what the guess cost lately.
+    /// The difference from a guess in the order of floats. `cost`: the recent cost of the guess.
     #[inline]
     fn difference<C: Coder>(
         &mut self,

@@ -1,8 +1,8 @@
 //! One element of a field: predicted from its past, and the difference coded.
 //!
 //! A difference becomes a *class* (about the length of its magnitude in bits), coded with the element's own adaptive
-//! distribution (`classes`), then sign and lower bits as they are (`rest`): in a flight they are noise. Which of
-//! several predictions counts is decided by what each would have cost lately (`costs`).
+//! distribution (`classes`). Sign and lower bits follow uncoded (`rest`): in a flight they are noise. The prediction
+//! with the lowest recent cost is used (`costs`).
 
 mod classes;
 mod costs;
@@ -76,7 +76,7 @@ pub(crate) struct Element {
     pub(crate) last: u32,
     /// The last difference.
     step: i32,
-    /// The clock at the last value, or the linked number's bits; of a text, where it is kept.
+    /// The clock at the last value, or the linked number's bits; for a text, the place of its copy.
     pub(crate) aux: u32,
     costs: Costs,
     /// Its own distribution, and the one for its other mode; 0: none yet.
@@ -156,7 +156,7 @@ impl Element {
         self.quiet & QUIET != 0
     }
 
-    /// Bits of which one is set where it is quiet: `any_quiet` tells of them, or-ed for many elements.
+    /// Bits of which one is set in a quiet element: `any_quiet` reads them or-ed for many elements.
     #[inline]
     pub(crate) const fn quiet_bits(&self) -> u8 {
         self.quiet
