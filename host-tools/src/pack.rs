@@ -1,5 +1,5 @@
-//! `hums decode --format hum`: a recording becomes one log file, through the same framer and the same writer as on board, but without
-//! a card's file system, queues or checks. `hums decode` reads it back.
+//! `hums decode --format hum`: a recording becomes one log file. It passes the same framer and writer as on board,
+//! but no card's file system, queues or checks. `hums decode` reads it back.
 
 use std::collections::VecDeque;
 use std::io::Write;
@@ -129,8 +129,8 @@ fn output(args: &cli::Decode) -> PathBuf {
 /// So many bytes of frames make the session's number: few, because a recording that has grown is the same one.
 const FIRST_BYTES: usize = 2 * 1024;
 
-/// The session's number by the recording's first time and its first frames with theirs: a log packed twice is the same to the byte, and two
-/// recordings do not look like parts of one session.
+/// The session's number, by the recording's first time and its first frames with theirs. So a log packed twice is the
+/// same to the byte, and two recordings do not look like parts of one session.
 fn session_of(hash: Sha256) -> u32 {
     let number: [u8; 4] = hash.finalize().first_chunk().copied().unwrap_or_default();
     u32::from_be_bytes(number) | 1
@@ -232,14 +232,15 @@ impl<W: Write> Packer<W> {
         self.write_out()
     }
 
-    /// Another recording was joined on: what is packed says so.
+    /// Notes in the log that another recording was joined on.
     fn joint(&mut self, at_us: u64) -> Result<()> {
         let at = Instant::from_micros(at_us);
         self.framer.idle(&mut |_: hums_link::Frame<'_>| {});
         self.record(at, &Record::Note(Note { severity: 6, text: JOINED }))
     }
 
-    /// So many places of the recording are damaged by now: what is new since the chunk before is a loss of what is packed.
+    /// Notes new damage: the recording has this many damaged places by now, and the increase since the previous chunk
+    /// is a loss.
     fn damaged(&mut self, before_us: u64, at_us: u64, damages: u64) -> Result<()> {
         let count = damages - std::mem::replace(&mut self.damages, damages).min(damages);
         if count == 0 {

@@ -1,4 +1,5 @@
-//! `hums completions` and `hums man`: what a shell and a reader of manuals take, made from the definition of the command line.
+//! `hums completions` and `hums man`: outputs for a shell and for readers of manuals, made from the definition of the
+//! command line.
 
 use std::io::Write as _;
 

@@ -1,7 +1,7 @@
-//! Logs one after the other, each with what a later one says of its end.
+//! Logs in order, each with the end that a later one recorded for it.
 //!
-//! The recorder notes at each start where the session before ended on that card. A log is therefore held back until the
-//! next ones were read: a file that was made when the power went has no sector, and says nothing.
+//! The recorder notes at each start where the session before ended on that card. A log is therefore held back until
+//! the next ones were read: a file from the moment of a power cut has no sector, and so no such record.
 
 use std::collections::VecDeque;
 
@@ -11,12 +11,12 @@ use crate::ending::{Ending, Proof, SessionBefore};
 use crate::logs::begun_anew::LOOKED_AT_MAX;
 use crate::logs::sessions::{Sessions, place};
 
-/// Logs held back at most; so many after a log may say something of its end.
+/// Logs held back at most; this many later ones may record its end.
 pub const HELD_MAX: usize = 4;
 
-/// What is made of a log that was read.
+/// The result of a log that was read.
 pub trait HasEnding {
-    /// What is known of its end, where it is a log of ours.
+    /// Its end, if it is a log of ours.
     fn ending(&mut self) -> Option<&mut Ending>;
 }
 
@@ -33,7 +33,7 @@ impl<T: HasEnding> EndResolver<T> {
         Self { held: VecDeque::new(), sessions }
     }
 
-    /// Takes the next log; gives those of which nothing more will be said, in order.
+    /// Takes the next log; returns those that no later one can concern, in order.
     pub fn push(&mut self, mut next: T) -> Vec<T> {
         let mut has_sectors = false;
         if let Some(ending) = next.ending() {
@@ -58,13 +58,13 @@ impl<T: HasEnding> EndResolver<T> {
         self.held.drain(..done).collect()
     }
 
-    /// There are no more logs.
+    /// Ends the list of logs.
     pub fn finish(self) -> impl Iterator<Item = T> {
         self.held.into_iter()
     }
 
-    /// The start of `next` found no sector in the newest files, of which the last one has this number: those that are empty now
-    /// were so then.
+    /// The start of `next` found no sector in the newest files, of which the last one has this number. Those that are
+    /// empty now were empty then.
     fn tell_empty(&mut self, newest: u32, next: &str) {
         for log in self.held.iter_mut().filter_map(HasEnding::ending) {
             let ((card, number), blocks) = (place(&log.name), &log.summary.blocks);
@@ -78,7 +78,7 @@ impl<T: HasEnding> EndResolver<T> {
         }
     }
 
-    /// What the start of `next` found of the log before it.
+    /// Applies the record of `next` about the previous log.
     fn tell(&mut self, before: &Before, next: &mut Ending) {
         let (card, number) = place(&next.name);
         let mut held: Vec<&mut Ending> = self.held.iter_mut().filter_map(HasEnding::ending).collect();
@@ -91,8 +91,8 @@ impl<T: HasEnding> EndResolver<T> {
             next.before = SessionBefore::There;
             return;
         }
-        // Its place is between a log that was read and the next one, on the same card; or a log of its number is there, and
-        // is another session.
+        // Its place is between a log that was read and the next one, on the same card. Or a log of its number is
+        // there, from another session.
         let is_looked_at = |name: &str| {
             let (other, read) = place(name);
             let numbers = number.zip(read);

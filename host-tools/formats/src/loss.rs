@@ -23,7 +23,7 @@ pub fn lost(loss: &Loss) -> u64 {
 /// The queue was full: it lasts for 2.5 s of a card that stalls or is out of its slot.
 const CARD_LATE: &str = "the card took nothing for too long";
 
-/// What a loss record says was not recorded, as the end of a sentence; `None` where it says nothing of the recorder.
+/// A loss record as the end of a sentence; `None` unless it concerns the recorder.
 pub fn words(loss: &Loss) -> Option<String> {
     let (one, why) = match loss.what {
         Lost::NotFrames | Lost::DamagedFrames | Lost::WrongChecksums | Lost::DamagedPlaces => return None,

@@ -1,4 +1,4 @@
-//! Names of what a log stores as numbers: messages, usage counters, events, faults, sources of time, vehicles.
+//! Names of numbers in a log: messages, usage counters, events, faults, sources of time, vehicles.
 
 use std::borrow::Cow;
 
@@ -22,13 +22,13 @@ pub fn vocabulary(check: &str) -> Option<&'static Words> {
     health::vocabulary(check).or_else(of_trends)
 }
 
-/// What a check of one part is called wherever people read of it: `battery 1 cell voltage`. What a pilot is told is in other words.
+/// The name of one part's check in outputs: `battery 1 cell voltage`. A pilot's texts have other words.
 pub fn check_name(check: &str, instance: u8) -> String {
     vocabulary(check)
         .map_or_else(|| check.replace('_', " "), |words| words.said.name_of(instance).to_string())
 }
 
-/// What a check is called where it is not known of which part it is: `battery cell voltage`.
+/// The name of a check without its part: `battery cell voltage`.
 pub fn check_kind(check: &str) -> &str {
     vocabulary(check).map_or(check, |words| words.said.name)
 }
@@ -74,7 +74,7 @@ pub fn counter_name(number: u8) -> String {
     }
 }
 
-/// Where the time of day came from, by the number that a log stores.
+/// The source of the time of day, by the stored number.
 pub fn clock_source_name(number: u8) -> &'static str {
     match number {
         1 => "SYSTEM_TIME",

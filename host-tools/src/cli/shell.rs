@@ -1,4 +1,5 @@
-//! What a shell and a reader of manuals take from the command line's own definition: `hums completions`, `hums man`.
+//! Outputs for a shell and for readers of manuals, from the command line's definition: `hums completions`, `hums
+//! man`.
 
 use clap::Args;
 use clap_complete::Shell;

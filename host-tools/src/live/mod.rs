@@ -5,9 +5,9 @@
 //!                                       \-> points -> InfluxDB
 //! ```
 //!
-//! One thread follows the vehicle (`feed` on this PC's clock, `playback` on a recording's). The first thread
-//! serves the pages, and one writes to a database if requested. The vehicle's thread waits for neither: pages
-//! take the newest state and the part of the history that they lack (`hub`); points wait in memory (`influx`).
+//! One thread follows the vehicle (`feed` on this PC's clock, `playback` on a recording's). The first thread serves
+//! the pages, and one writes to a database if requested. The vehicle's thread never waits for the others. Pages take
+//! the newest state and the missing part of the history (`hub`); points wait in memory (`influx`).
 
 pub mod assets;
 pub mod board;

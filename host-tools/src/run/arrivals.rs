@@ -24,7 +24,7 @@ const FIRST_BYTES_MAX: usize = 16 << 20;
 /// The stream of arrivals.
 pub struct Arrivals {
     source: Noisy<Box<dyn Source>>,
-    /// What was read of standard input to find its first frame.
+    /// The part of standard input that was read to find its first frame.
     first: VecDeque<Chunk>,
     name: String,
     waiting: VecDeque<Chunk>,
@@ -37,9 +37,9 @@ pub struct Arrivals {
 }
 
 impl Arrivals {
-    /// As the command line says it; --tap gets a copy of the bytes, and is none of the inputs. `prepare` is what else must be ready: done after a
-    /// stored input was found to have a MAVLink frame, so that a slip leaves nothing behind, and before a live one, which waits for
-    /// nobody.
+    /// Opens the input of the command line; --tap gets a copy of the bytes, and is not an input. `prepare` makes
+    /// everything else ready. For a stored input it runs after a MAVLink frame was found, so that a slip leaves
+    /// nothing behind. For a live one it runs before, because that does not wait.
     pub fn open<T>(run: &Sim, inputs: &Inputs, prepare: impl FnOnce() -> Result<T>) -> Result<(Self, T)> {
         if run.input.is_live() {
             let prepared = prepare()?;
@@ -109,7 +109,7 @@ impl Arrivals {
         self.waiting.push_front(chunk);
     }
 
-    /// The way to the autopilot, once; nobody hears what is sent to a recording.
+    /// The way to the autopilot, once; bytes to a recording are dropped.
     pub fn take_autopilot(&mut self) -> Box<dyn Write + Send> {
         self.autopilot.take().unwrap_or_else(nowhere)
     }
@@ -119,7 +119,7 @@ impl Arrivals {
         self.bytes
     }
 
-    /// The recording is damaged, as far as it has come. (Of raw bytes nobody knows: a line may be noisy.)
+    /// The recording is damaged, as far as it has come. (Raw bytes are never damaged: a line may be noisy.)
     pub fn is_damaged(&self) -> bool {
         self.broken_off || self.source.damages() > 0
     }
@@ -129,7 +129,7 @@ impl Arrivals {
         self.broken_off = true;
     }
 
-    /// What was strange in the input.
+    /// Oddities of the input.
     pub fn remark(&self) -> Option<String> {
         let broken_off =
             self.broken_off.then(|| "was not read to its end: the run was ended before".to_owned());
@@ -138,7 +138,7 @@ impl Arrivals {
     }
 }
 
-/// Reads to the first frame whose checksum holds, while `go_on` says so of what was read. An error where there is none.
+/// Reads to the first frame with a valid checksum, while `go_on` agrees. An error if there is none.
 fn until_frame(
     source: &mut dyn Source,
     input: &Endpoint,

@@ -1,6 +1,6 @@
-//! The sessions that are on a card before a run. A card without room makes the recorder overwrite the oldest of them: right
-//! on a vehicle, and a surprise on a PC. So a run does not begin on a card that may become full in it unless it is told to, and what
-//! was overwritten is said by session.
+//! The sessions that are on a card before a run. A card without room makes the recorder overwrite the oldest of them:
+//! right on a vehicle, and a surprise on a PC. So a run does not begin on a card that may become full, unless it is
+//! told to. Overwritten logs are reported by session.
 
 use std::path::Path;
 
@@ -95,14 +95,14 @@ impl EarlierSessions {
     }
 }
 
-/// The session that a recorder without room overwrites. It knows the root directory only: what lies in folders are copies that
-/// somebody made.
+/// The session that a recorder without room overwrites. It knows the root directory only: logs in folders are copies
+/// by hand.
 fn oldest(logs: &[Log]) -> Option<&Log> {
     let is_segment = |file: &String| !file.contains('/') && segment_name(Path::new(file)).is_some();
     logs.iter().find(|log| log.files.iter().any(is_segment))
 }
 
-/// Whether a card has room for what a run may write: as much as it reads, and a segment that is begun at each of its starts.
+/// Whether a card has room for a run's output: as much as its input, and one new segment for each of its starts.
 /// Writing errors may use up any room: segments are left early.
 fn has_room(card: &Card, run: &cli::Sim, unknown: u64) -> bool {
     if run.faults.write_error.is_some_and(|probability| probability > 0.0) {

@@ -1,5 +1,5 @@
-//! The ground station: what it gets, and what it sends, either live or from a file with its own times (`--gs-input`), which
-//! makes a conversation that repeats to the byte.
+//! The ground station: its output, and its input, either live or from a file with its own times (`--gs-input`). With
+//! a file the conversation repeats to the byte.
 
 use std::io::Write;
 
@@ -12,7 +12,7 @@ use crate::outcome::Outcome;
 use crate::sink::{self, Beside, Heard};
 use crate::source::{self, Chunk, Source, Timing};
 
-/// What the ground station sends.
+/// The ground station's messages.
 pub struct Ground {
     heard: Heard,
     stored: Option<Box<dyn Source>>,
@@ -20,7 +20,7 @@ pub struct Ground {
     got: Beside,
 }
 
-/// Opens both directions as the command line says it. What is written is none of the inputs.
+/// Opens both directions as the command line says it. Outputs must differ from the inputs.
 pub fn open(run: &Sim, inputs: &Inputs) -> Result<(Ground, Box<dyn Write + Send>)> {
     let sink::Ground { writer, heard } = match &run.gs {
         Some(endpoint) => sink::open(endpoint, inputs)?,
@@ -32,12 +32,12 @@ pub fn open(run: &Sim, inputs: &Inputs) -> Result<(Ground, Box<dyn Write + Send>
 }
 
 impl Ground {
-    /// The run is over: a file of what it got is whole, unless something failed, which was said.
+    /// The run is over: an output file is complete, unless an error was reported.
     pub fn finish(&self) -> Outcome {
         self.got.finish()
     }
 
-    /// What it sent by `now_us`, the oldest first; `None` when that is all.
+    /// Its bytes until `now_us`, the oldest first; `None` at the end.
     pub fn until(&mut self, now_us: u64) -> Result<Option<Chunk>> {
         if self.next.is_none()
             && let Some(stored) = &mut self.stored

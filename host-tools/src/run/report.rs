@@ -82,19 +82,19 @@ pub struct Report {
     /// Cycles of the processor by stage, where measured.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub cycles: Option<serde_json::Value>,
-    /// What the processor was busy in the worst second but the first, in percent, where measured.
+    /// Load of the processor in the worst second except the first, in percent, if measured.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub busy_percent_max: Option<f64>,
 }
 
-/// What the logs of a run are, by the card.
+/// The logs of a run on the card.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct OnCard {
     /// Bytes of log.
     pub bytes: u64,
-    /// Frames that were recorded and are not there: of each stretch of which nothing tells how many, one.
+    /// Recorded frames that are missing: each stretch of unknown length counts as one.
     pub frames_missing: u64,
-    /// The recorder's last figures, where it has told any.
+    /// The recorder's last figures, if it recorded any.
     pub stats: Option<Stats>,
 }
 
@@ -180,8 +180,8 @@ impl Report {
         self.gs_bytes = stats.gs_bytes;
     }
 
-    /// Adds what the card's logs of this run say, and which earlier ones it overwrote; gives how many frames the run's have in how
-    /// many bytes, and the recorder's last figures.
+    /// Adds the card's logs of this run, and the earlier ones that it overwrote. Returns the number of frames and
+    /// bytes of the run's logs, and the recorder's last figures.
     pub fn read_card(&mut self, card: &Path, earlier: &EarlierSessions) -> Result<(u64, OnCard)> {
         let mut frames = 0;
         let mut on_card = OnCard::default();
@@ -208,7 +208,7 @@ impl Report {
         Ok((frames, on_card))
     }
 
-    /// Prints it, and says how the run ended: what was lost because power was cut on purpose is no loss of the recorder.
+    /// Prints it, and returns how the run ended: a deliberate power cut is not a loss of the recorder.
     pub fn print(&self, json: bool, quiet: bool) -> Result<Outcome> {
         if json {
             output::json(SCHEMA, self)?;
@@ -231,7 +231,7 @@ impl Report {
         Ok(Outcome::lossy(self.frames_lost > 0 || !self.overwritten.is_empty() && !self.may_overwrite))
     }
 
-    /// What is strange about an input of which nothing came out.
+    /// A remark about an input without any frame.
     pub fn remark(&self, input: &Endpoint) -> Option<String> {
         (self.bytes_in > 0 && self.frames_in == 0).then(|| {
             format!(

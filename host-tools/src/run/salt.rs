@@ -1,5 +1,5 @@
-//! What stands for a board's true random number: on a board every session has a number of its own; here two recordings
-//! have two, and the same run has the same one again.
+//! A substitute for a board's true random number. On a board every session has a number of its own. Here two
+//! recordings have two, and the same run has the same one again.
 
 use anyhow::{Context as _, Result};
 use sha2::{Digest as _, Sha256};
@@ -9,8 +9,8 @@ use crate::cli::Sim;
 use crate::endpoint::Endpoint;
 use crate::files::{add_ends, short};
 
-/// A number that depends on the input, on the parameters and on what is put in the way. What comes live comes once, so it
-/// is random then.
+/// A number that depends on the input, on the parameters and on the chosen faults. Live input cannot be repeated, so
+/// it is random then.
 pub(super) fn salt(run: &Sim, arrivals: &mut Arrivals) -> Result<u32> {
     let mut hash = Sha256::new();
     hash.update(format!("{:?}", run.faults));

@@ -12,18 +12,18 @@ const MAGIC_V2: u8 = 0xfd;
 /// The bit of MAVLink 2's incompatibility flags that announces a signature; no other bit is known.
 const SIGNED: u8 = 0x01;
 
-/// Whether the checksum is that of our definition.
+/// Whether the checksum follows our definition.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Check {
     /// It holds.
     Good,
     /// It does not: damage, or another definition of this id.
     Bad,
-    /// The dialect has no message of this id, so nobody can say.
+    /// The dialect lacks this message id, so it is unknown.
     Unknown,
 }
 
-/// What stands at the beginning of some bytes.
+/// The structure at the beginning of some bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Peek<'a> {
     /// Not the beginning of a frame.
@@ -61,7 +61,7 @@ impl Frame<'_> {
         if checked == Some(hums_link::Check::Verified) { Check::Good } else { Check::Bad }
     }
 
-    /// The definition of the message, where the dialect has one.
+    /// The definition of the message, if the dialect has one.
     pub fn message(&self) -> Option<&'static Message> {
         hums_dialect::message(self.id)
     }

@@ -1,7 +1,7 @@
 //! Payload bytes as typed values, by the message's definition: the one place that does it, for every output format.
 //!
-//! MAVLink 2 leaves out the trailing zero bytes of a payload and MAVLink 1 the extension fields: what is missing reads
-//! as zero. A payload longer than our definition (a newer one with more extensions) keeps its known fields.
+//! MAVLink 2 omits the trailing zero bytes of a payload, and MAVLink 1 the extension fields: missing bytes read as
+//! zero. A payload longer than our definition (a newer one with more extensions) keeps its known fields.
 
 use hums_dialect::{Field, Kind, Message};
 
@@ -54,7 +54,7 @@ impl<'a> Array<'a> {
         self.bytes.chunks_exact(self.kind.size()).map(move |bytes| scalar(self.kind, bytes))
     }
 
-    /// The raw bytes: what a `uint8_t` array often is (tunnelled data, a file's content).
+    /// The raw bytes: a `uint8_t` array is often tunnelled data, or a file's content.
     pub fn as_bytes(self) -> Option<&'a [u8]> {
         (self.kind == Kind::U8).then_some(self.bytes)
     }

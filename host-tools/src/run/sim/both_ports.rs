@@ -28,7 +28,7 @@ pub enum Side {
     Ground,
 }
 
-/// What the board is before its first byte.
+/// The board before its first byte.
 #[derive(Clone, Copy, Debug)]
 pub struct Board<'a> {
     /// Its card.
@@ -39,7 +39,7 @@ pub struct Board<'a> {
     pub key: Option<[u8; 32]>,
 }
 
-/// What a power-on came to, and each change of level with its time.
+/// The result of a power-on, and each change of level with its time.
 #[derive(Clone, Debug)]
 pub struct Outcome {
     /// The figures.
@@ -50,9 +50,8 @@ pub struct Outcome {
     pub params: Params,
 }
 
-/// Gives both ports their bytes in time until there are none, and `told` each frame that begins to leave one of them, with
-/// its port and the time of the chunk before which that was. To know it to a millisecond, give a chunk, which
-/// may be empty, each millisecond.
+/// Gives both ports their bytes in time. `told` gets each frame that begins to leave a port, with the port and the
+/// time of the chunk before. For times to a millisecond, give a chunk, which may be empty, each millisecond.
 pub fn run(
     board: &Board<'_>,
     chunks: impl IntoIterator<Item = (Side, Chunk)>,

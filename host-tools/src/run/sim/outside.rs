@@ -1,4 +1,4 @@
-//! What a power-on begins with, and what is around the board.
+//! The empty memory at a power-on, and the surroundings of the board.
 
 use std::io::Write;
 
@@ -17,7 +17,7 @@ use crate::card::sim::CardError;
 use crate::run::report::Finding;
 use crate::run::store::FileFlash;
 
-/// What a power-on begins with empty: all that is static on the board.
+/// The empty memory at a power-on: everything static on the board.
 pub(super) struct Memory {
     pub(super) card_status: CardStatus,
     pub(super) port_status: PortStatus,
@@ -49,7 +49,7 @@ impl Memory {
     }
 }
 
-/// What is around the board.
+/// The surroundings of the board.
 pub(super) struct Outside<'a, 'w> {
     pub(super) card: &'a SimCard,
     pub(super) flash: &'a FileFlash,

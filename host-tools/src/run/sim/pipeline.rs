@@ -225,7 +225,7 @@ impl<'a, 'w> Pipeline<'a, 'w> {
         self.send_gs()
     }
 
-    /// What the GS port can have sent by now.
+    /// Sends the bytes for which the GS port has had time by now.
     fn send_gs(&mut self) -> Result<()> {
         let mut frame = [0; FRAME_BYTES_MAX];
         while let Some(length) = self.ends.autopilot_out.take(&mut frame) {
