@@ -22,11 +22,11 @@ pub(crate) enum Stage {
     Monitor,
     /// Frames to sectors.
     Encode,
-    /// Frames to observations, and those to what the monitor knows.
+    /// Frames to observations, and these into the monitor.
     Observe,
     /// Frames on to the ground station.
     Summary,
-    /// What happens by the clock: checks for silence, the summary.
+    /// Periodic work: checks for silence, the summary.
     Tick,
     /// Sectors to the card.
     Storage,
@@ -52,7 +52,7 @@ pub(crate) fn measure<R>(stage: Stage, work: impl FnOnce() -> R) -> R {
     result
 }
 
-/// Within `measure`: what follows is on the account of `stage`.
+/// Within `measure`: later time counts for `stage`.
 pub(crate) fn enter(stage: Stage) {
     switch_to(stage);
 }

@@ -18,11 +18,10 @@ use hums_onboard::Task;
 use crate::exceptions;
 use crate::registers::{Registers, stacked};
 
-/// Bytes of the place that are kept: a file of ours and its line.
+/// Stored bytes of the place: a source file and its line.
 const PLACE_BYTES: usize = 64;
 /// Bytes of the file's path within the place: the rest is for the line.
 const FILE_BYTES: usize = PLACE_BYTES - 8;
-/// Bytes of the message that are kept.
 const MESSAGE_BYTES: usize = 128;
 /// Messages that are remembered.
 const SEEN: usize = 8;
@@ -161,7 +160,7 @@ pub(crate) fn seen(at: Instant, id: u32) {
     tick(at);
 }
 
-/// Time goes on without messages as well.
+/// Time also passes without messages.
 pub(crate) fn tick(now: Instant) {
     LAST_SEEN.now_ms.store(now.as_millis() as u32, Ordering::Relaxed);
 }
@@ -171,7 +170,7 @@ impl Seen {
         let mut text = String::new();
         let at_ms = NOTE.at_ms.load(Ordering::Relaxed);
         let next = self.next.load(Ordering::Relaxed) as usize;
-        // What does not fit is cut off: the newest come first.
+        // The text is cut if full, so the newest come first.
         let _ = write!(text, "restart at {at_ms} ms; last messages:");
         for back in 1..=SEEN {
             let Some((at, id)) = self.messages.get((next % SEEN + SEEN - back) % SEEN) else { continue };
@@ -248,13 +247,14 @@ pub(crate) fn processor(running: u16, registers: Registers, overflow: bool, plac
     NOTE.keep(Kind::HardFault, running, place, format_args!("{message}"));
 }
 
-/// The program cannot go on. The place says why; to keep the message needs the `Debug` of everything, 10 KiB of flash.
+/// The program cannot go on. The place shows the reason; the message would need the `Debug` of everything, 10 KiB of
+/// flash.
 pub(crate) fn panicked(registers: Registers, info: &PanicInfo) {
     NOTE.keep_registers(registers);
     let running = exceptions::running();
     match info.location() {
         Some(place) => {
-            // The end of a long path says more than its beginning.
+            // The end of a long path is more telling than its beginning.
             let file = place.file();
             let file = file.get(file.len().saturating_sub(FILE_BYTES)..).unwrap_or(file);
             let place = format_args!("{file}:{}", place.line());
@@ -308,7 +308,7 @@ impl<const WORDS: usize> Text<WORDS> {
         for word in &self.0 {
             word.store(0, Ordering::Relaxed);
         }
-        // It never refuses: what does not fit is cut off.
+        // It never fails: a long text is cut.
         let _ = TextWriter { words: &self.0, bytes: 0 }.write_fmt(text);
     }
 

@@ -23,7 +23,7 @@ pub(crate) fn now() -> Instant {
     Instant::from_micros(embassy_time::Instant::now().as_micros())
 }
 
-/// A span of ours as the executor counts time.
+/// A span in the executor's time.
 pub(crate) const fn wait(span: hums_core::clock::Span) -> embassy_time::Duration {
     embassy_time::Duration::from_micros(span.as_micros())
 }

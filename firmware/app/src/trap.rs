@@ -19,7 +19,7 @@ use crate::{exceptions, fault, memory};
 const HANDLER_BYTES: usize = 1_024;
 /// Words of the stack that are searched for a return address: with one in a dozen, the caller's is among them.
 const SEARCHED_WORDS: usize = 128;
-/// Bits of CFSR that say that the registers could not be stacked: STKERR and MSTKERR.
+/// Bits of CFSR for registers that could not be stacked: STKERR and MSTKERR.
 const STACKING: u32 = 1 << 12 | 1 << 4;
 
 /// The exception itself. Goes on in [`caught`] with the stack pointer as it was.
@@ -57,12 +57,12 @@ extern "C" fn caught(stack: usize) -> ! {
     }
     // SAFETY: the processor stacked its registers there, in memory that is the stack's by the checks above.
     let frame = unsafe { &*core::ptr::with_exposed_provenance::<ExceptionFrame>(stack) };
-    // What ran before this exception is in the stacked status.
+    // The stacked status has the interrupted exception.
     let running = (frame.xpsr() & 0x1FF) as u16;
     give_up(running, stacked(frame), false, format_args!("pc {:08x}", frame.pc()));
 }
 
-/// The innermost address on a full stack that a function of ours would return to; 0 where there is none.
+/// The innermost return address on a full stack in our code; 0 if there is none.
 fn return_address() -> u32 {
     let code = memory::code();
     let is_return = |word: &u32| word & 1 == 1 && code.contains(&(*word as usize));

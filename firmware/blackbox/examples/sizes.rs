@@ -1,12 +1,12 @@
-//! How small the log of a recording is: one row a recording, then the means against what is asked for.
+//! Size of a recording's log: one row a recording, then the means against their targets.
 //!
 //! ```text
 //! cargo run --release -p hums-blackbox --example sizes -- tests/flights/*
 //! ```
-//! Each log begins with the records that a session has (boot, clock, vehicle) and has statistics every 10 s. It is read
-//! back and compared with the recording frame by frame; a difference ends the program. Signed recordings are shown but
-//! not counted: a signature is random. A file that is not a tlog is read as the raw bytes of a line of 57,600 baud.
-//! `--quick` leaves xz out. Exit codes: 0, or 1 where a mean is below its target.
+//! Each log begins with the records that a session has (boot, clock, vehicle) and has statistics every 10 s. It is
+//! read back and compared with the recording frame by frame; a difference ends the program. Signed recordings are
+//! shown but not counted: a signature is random. A file that is not a tlog is read as the raw bytes of a line of
+//! 57,600 baud. `--quick` leaves xz out. Exit codes: 0, or 1 where a mean is below its target.
 
 #[path = "../tests/common/card.rs"]
 mod card;

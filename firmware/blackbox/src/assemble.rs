@@ -89,7 +89,7 @@ pub struct Step {
     pub damaged: u32,
 }
 
-/// Puts the sectors of one session in order. After each block, [`Self::next`] returns the sectors known to be in order.
+/// Orders the sectors of one session. After each block, [`Self::next`] returns the sectors known to be in order.
 #[derive(Debug, Default)]
 pub struct Assembler {
     session: Option<u32>,
@@ -173,7 +173,7 @@ impl Assembler {
         self.counts.blocks += 1;
     }
 
-    /// The next sector that is known to be in order and the fullest of its number; `None`: feed the next block.
+    /// The next sector in order, the fullest of its number; `None`: feed the next block.
     #[expect(clippy::should_implement_trait, reason = "it goes on after `None`")]
     pub fn next(&mut self) -> Option<Step> {
         loop {
@@ -243,13 +243,12 @@ impl Assembler {
 
     /// A jump of the number: the log may continue from it.
     fn jumped(&mut self, mut step: Step) {
-        // Before the first output, only a log that begins at number 0 shows which sectors are in their place: lower
-        // numbers in a ring's oldest file are old.
+        // Before the first output, only a log that begins at number 0 has known places: lower numbers in a ring's
+        // oldest file are old.
         let number = step.header.number;
         let is_in_place = !self.late && u64::from(number) + 1 == self.counts.blocks;
         let begun = self.has_begun();
-        // The recorder rewrites a file only if other files come between its old and its new sectors. So an old sector's number is
-        // lower than the first new one by more than one.
+        // The recorder rewrites a file only with other files between its old and its new sectors.
         let first = self.ahead.front().map(|first| first.header.number);
         let is_left_over = step.header.partial || first.is_none_or(|first| number.saturating_add(1) < first);
         match self.ahead.back_mut() {

@@ -18,7 +18,7 @@ pub(crate) fn copy_few(from: &[u8], to: &mut [u8]) {
     copy_piece::<1>(rest);
 }
 
-/// Copies `N` bytes if there are so many, and gives the rest.
+/// Copies `N` bytes if there are that many, and returns the rest.
 #[inline]
 fn copy_piece<'f, 't, const N: usize>((from, to): (&'f [u8], &'t mut [u8])) -> (&'f [u8], &'t mut [u8]) {
     if from.len() < N || to.len() < N {
@@ -40,7 +40,7 @@ impl<'a> Fields<'a> {
         Self { rest: bytes }
     }
 
-    /// Up to `count` bytes: what there is.
+    /// Up to `count` bytes.
     pub(crate) fn bytes(&mut self, count: usize) -> &'a [u8] {
         let (taken, rest) = self.rest.split_at(count.min(self.rest.len()));
         self.rest = rest;

@@ -1,10 +1,10 @@
 //! The range coder: symbols with known probabilities become bytes, nearly at their entropy.
 //!
-//! Subbotin's carryless form: a byte that has been given out never changes, so it may lie in a sector that is already
-//! on the card. All arithmetic is in 32 bits; writing needs no division.
+//! Subbotin's carryless form: an output byte never changes, so it may be in a sector on the card already. All
+//! arithmetic is in 32 bits; writing needs no division.
 //!
-//! *State:* the interval `[low, low + range)` of 32-bit numbers that begin with what has not been given out yet.
-//! After each step `range >= 2^16`, so a symbol may have a probability down to 2^-16.
+//! *State:* the interval `[low, low + range)` of 32-bit numbers that begin with the pending output. After each step
+//! `range >= 2^16`, so a symbol may have a probability down to 2^-16.
 
 use crate::distribution::{Cdf, PROBABILITY_BITS};
 
@@ -96,7 +96,7 @@ impl Encoder {
         }
     }
 
-    /// The fewest bytes that, followed by zeros, decode to all that was put so far; they leave the state as it is.
+    /// The fewest bytes that, followed by zeros, decode to everything so far; the state is unchanged.
     pub(crate) fn flush(&self) -> ([u8; FLUSH_MAX], usize) {
         for len in 0..FLUSH_MAX {
             let mask = u32::MAX >> (8 * len);
@@ -115,7 +115,7 @@ impl Encoder {
 /// One end of the coder. Writer and reader run the same code over it. The writer codes the given value; the reader ignores it and
 /// returns the decoded one.
 pub(crate) trait Coder {
-    /// Whether what is given counts.
+    /// Whether this end writes.
     const WRITES: bool;
 
     /// A symbol below 16.
@@ -183,7 +183,7 @@ impl<const N: usize> Coder for Writing<'_, N> {
     }
 }
 
-/// The reading end of the coder, and what its user remembers beyond what both ends must.
+/// The reading end of the coder, with its user's extra memory.
 pub(crate) struct Reading<'a, R> {
     pub(crate) decoder: &'a mut Decoder,
     pub(crate) input: &'a [u8],
@@ -245,7 +245,7 @@ impl Decoder {
         Self { low: 0, range: u32::MAX, offset: ahead(input, at), at: at.saturating_add(LOOKAHEAD) }
     }
 
-    /// Which of the `1 << bits` parts comes next. `take` must follow with the symbol that holds it.
+    /// The next of the `1 << bits` parts. `take` must follow with the symbol that holds it.
     #[inline]
     pub(crate) fn part(&mut self, bits: u32) -> u32 {
         self.range >>= bits;
@@ -274,7 +274,7 @@ impl Decoder {
         self.low = self.low.wrapping_add(below);
         self.offset = self.offset.wrapping_sub(below);
         self.range = self.range.wrapping_mul(size);
-        // All bytes that are settled go at once: how many there are is as hard to foresee as the symbols.
+        // All settled bytes are output together: their number is as unpredictable as the symbols.
         let settled = (self.low ^ self.low.wrapping_add(self.range)).leading_zeros() & 0x18;
         self.shift(settled, input);
         if self.range < BOTTOM {
@@ -303,7 +303,7 @@ impl Decoder {
         self.at += bits as usize / 8;
     }
 
-    /// Bytes read of the group's bytes so far, those ahead included.
+    /// Bytes read of the group, including those ahead.
     pub(crate) fn position(&self) -> usize {
         self.at
     }

@@ -80,13 +80,13 @@ mod sse42 {
     use core::arch::x86_64::{__cpuid, _mm_crc32_u8, _mm_crc32_u64};
     use core::sync::atomic::{AtomicU8, Ordering};
 
-    /// Whether the processor has it: asked once, as asking takes long on a virtual machine.
+    /// Whether the processor has it: read once, because that is slow on a virtual machine.
     static HAS: AtomicU8 = AtomicU8::new(UNKNOWN);
     const UNKNOWN: u8 = 0;
     const YES: u8 = 1;
     const NO: u8 = 2;
 
-    /// The check after these bytes; nothing where the processor cannot.
+    /// The check after these bytes; `None` if the processor lacks it.
     #[inline]
     pub(super) fn add(crc: u32, bytes: &[u8]) -> Option<u32> {
         let has = match HAS.load(Ordering::Relaxed) {

@@ -29,20 +29,21 @@ const USES_RENEWED: u16 = 2;
 /// The speed of adaptation by uses: a step goes `1 / 2^n` of the way.
 const SPEEDS: [u8; USES_MAX as usize] = [1, 2, 2, 3, 3, 3, 3, 3, 4, 4, 4, 4, 4, 4, 4, 4, 4, 4, 4, 4];
 
-/// The speed after that. The uses, in their place, are less than 2 to the power of it: so they stay as they are.
+/// The speed after that. The number of uses, in its place, is less than 2 to this power, and so is unchanged by a
+/// step.
 const SPEED_LAST: u32 = 5;
 const _: () = assert!(USES_MAX >> SPEED_LAST == 0);
 
 /// Highest probability of the first symbol: upper limit of the first place.
 const SURE: u16 = 0xf800;
 
-/// What each place gains in a step towards a symbol, two places in a word.
+/// The gains of places in a step towards a symbol, two places in a word.
 type Gains = [u32; SYMBOLS / 2];
 
 /// Gains by speed (from 1 on) and symbol.
 static GAINS: [[Gains; SYMBOLS]; SPEED_LAST as usize] = gains();
 
-/// How far a step at this speed goes for the places above the symbol, beside what every place gains.
+/// The gain of the places above the symbol at this speed, beside the gain of every place.
 const fn reach(speed: u32) -> u16 {
     (u16::MAX >> speed) - SYMBOLS as u16
 }

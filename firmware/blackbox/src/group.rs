@@ -1,4 +1,4 @@
-//! Decoding one group: sectors in, entries out. Groups know nothing of each other, so a host decodes many at once.
+//! Decoding one group: sectors in, entries out. Groups are independent, so a host decodes many in parallel.
 
 use hums_core::clock::Instant;
 
@@ -32,7 +32,7 @@ pub enum Entry<'a> {
     },
 }
 
-/// What there is to know of an entry without a frame's bytes.
+/// An entry without a frame's bytes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Outline<'a> {
     /// A frame whose bytes were not put together.
@@ -57,7 +57,7 @@ pub enum GroupError {
     OutOfOrder,
     /// It was written with layouts that this build does not know.
     UnknownLayouts(u32),
-    /// Its sectors are sound, but what is in them is not what a writer makes.
+    /// Its sectors are sound, but their content is not a writer's.
     Corrupt,
     /// The entries that the last sector completes are not those that came: the recorder's memory had changed.
     Altered,
@@ -135,8 +135,8 @@ impl GroupDecoder {
         }
     }
 
-    /// Takes the next sector of the group, which `Header::read` has checked; one that starts a group drops what is
-    /// left of the group before.
+    /// Takes the next sector of the group, checked by `Header::read`; one that starts a group drops the rest of the
+    /// previous one.
     pub fn push(&mut self, header: &Header, sector: &Sector) -> Result<(), GroupError> {
         if header.starts_group() {
             self.begin(header, sector)?;
@@ -187,8 +187,8 @@ impl GroupDecoder {
         self.input.get(..self.filled).unwrap_or_default()
     }
 
-    /// The next entry that the sectors taken so far complete; `None`: more sectors, please. After an error the group
-    /// is over. After [`GroupError::Altered`] those that the last sector completes may be wrong, which were given out before.
+    /// The next entry in the sectors so far; `None`: it needs more sectors. After an error the group is over. After
+    /// [`GroupError::Altered`] the entries of the last sector, already returned, may be wrong.
     pub fn next_entry(&mut self) -> Option<Result<Entry<'_>, GroupError>> {
         match self.advance()? {
             Ok(()) => Some(Ok(self.entry())),
@@ -210,7 +210,7 @@ impl GroupDecoder {
         Some(Ok(Outline::Whole(self.entry())))
     }
 
-    /// Decodes the next entry, for `entry` to give out.
+    /// Decodes the next entry, which `entry` returns.
     pub(crate) fn advance(&mut self) -> Option<Result<(), GroupError>> {
         let last = self.last?;
         if core::mem::take(&mut self.is_unchecked) {
@@ -262,12 +262,12 @@ impl GroupDecoder {
         }
     }
 
-    /// Frames given out of this group so far.
+    /// Frames returned from this group so far.
     pub const fn frames(&self) -> u32 {
         self.frames
     }
 
-    /// Drops what is left of the group.
+    /// Drops the rest of the group.
     pub(crate) fn abandon(&mut self) {
         self.last = None;
     }
@@ -278,7 +278,7 @@ impl GroupDecoder {
     }
 }
 
-/// Whether `next` continues the group of `last`: nothing follows a partial sector.
+/// Whether `next` continues the group of `last`: a partial sector ends it.
 fn follows(last: &Header, next: &Header) -> bool {
     last.session == next.session
         && last.number.wrapping_add(1) == next.number

@@ -1,7 +1,7 @@
 //! Message layouts by the hash that a group names, so that a log decodes with the layouts that it was written with.
 //!
-//! The dialect of this build is one table. The tables of older builds are kept here in their stored form. A test requires the
-//! current table among them, before it becomes an older one. Stored form, ids ascending:
+//! The dialect of this build is one table. The tables of older builds are here in their stored form. A test requires
+//! the current table among them, before it becomes an older one. Stored form, ids ascending:
 //!
 //! ```text
 //! message: id u24, checksum seed u8, payload bytes without extensions u8, fields u8, then for each field in wire
@@ -45,7 +45,7 @@ pub(crate) enum Layouts {
     Stored(&'static [u8]),
 }
 
-/// Where in a table a message's layout is: small, to be kept for each slot.
+/// The place of a message's layout in a table, small enough for each slot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Place(u16);
 
@@ -58,7 +58,7 @@ pub(crate) enum Layout {
 }
 
 impl Layouts {
-    /// The table with this hash, where this build knows it.
+    /// The table with this hash, if this build has it.
     pub(crate) fn by_hash(hash: u32) -> Option<Self> {
         if hash == CURRENT {
             return Some(Self::Current);

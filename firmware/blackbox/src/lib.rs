@@ -4,9 +4,9 @@
 //! frames, records -> Writer -> sectors of 512 bytes -> card … blocks -> LogReader -> frames, records, gaps
 //! ```
 //! * An *entry* is a frame as it was received or a record of the monitor's own, with its time.
-//! * The *model* (`codec`) predicts each entry from those before and codes only what it did not foresee.
+//! * The *model* (`codec`) predicts each entry from earlier ones and codes only the unpredicted part.
 //! * A *group* of up to 64 sectors (32 KiB) starts the model afresh: reading can start there, damage ends there.
-//! * A *sector* says what it is and is checked; *parity* makes those again that a card has lost.
+//! * A *sector* identifies itself and has a check; *parity* rebuilds lost ones.
 //! * The *chain* is a check of all received entries, which a reader computes again from the decoded ones.
 //!
 //! `docs/log-format.md` describes the format completely. Everything here is bounded and needs no allocation.

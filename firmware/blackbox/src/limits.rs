@@ -1,4 +1,4 @@
-//! How long entries may be, and what they are made of.
+//! Limits of entries.
 
 use hums_dialect::wire::FRAME_BYTES_MAX;
 

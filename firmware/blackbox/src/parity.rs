@@ -25,7 +25,7 @@ const _: () = assert!(STRETCH_SECTORS.is_multiple_of(COLUMNS as u32));
 
 const MAGIC: u8 = b'H';
 const CRC_AT: usize = SECTOR_BYTES - 4;
-/// Of the polynomial x^8 + x^4 + x^3 + x^2 + 1, without its highest term.
+/// The polynomial x^8 + x^4 + x^3 + x^2 + 1, without its highest term.
 const POLYNOMIAL: u8 = 0x1d;
 
 /// How many of `blocks` of a file are for data sectors. The others, at its end, are for parity: those of stretch `n` begin at
@@ -49,7 +49,7 @@ pub enum Sum {
 }
 
 impl Sum {
-    /// Both, in the order in which they lie on the card.
+    /// Both, in their order on the card.
     pub const ALL: [Self; 2] = [Self::P, Self::Q];
 
     const fn mark(self) -> u8 {
@@ -59,7 +59,7 @@ impl Sum {
         }
     }
 
-    /// Adds a sector to what stands in `block`, after those before it in its column.
+    /// Adds a sector to `block`, after those before it in its column.
     pub fn add(self, block: &mut [u8; SECTOR_BYTES], sector: &[u8; SECTOR_BYTES]) {
         if self == Self::Q {
             double(block);
@@ -436,7 +436,7 @@ mod tests {
         let (first, rows) = (3, 20);
         let numbers = || (0..rows).map(|row| first + 8 * row);
         let sums = sums(first, rows, None);
-        // One bit is other in what is named, with a check that fits; so many sectors are lost.
+        // One bit of the named sum is wrong, with a valid check; these sectors are lost.
         let agrees = |sum: Option<usize>, wrong: Option<u32>, lost: &[u32], used: &[usize]| {
             let mut column = Column::new(SESSION);
             for index in used {
@@ -460,7 +460,7 @@ mod tests {
                 assert_eq!(!agrees(Some(sum), None, lost, &[0, 1]), is_told, "{lost:?}");
             }
             assert_eq!(!agrees(None, Some(first), lost, &[0, 1]), is_told, "{lost:?}");
-            // One sum alone says the same as the sectors only where all of them are there.
+            // With one sum alone, an error shows only if no sector is lost.
             assert_eq!(!agrees(None, Some(first), lost, &[0]), lost.is_empty(), "{lost:?}");
         }
         // In any order.

@@ -19,7 +19,7 @@ pub struct Preamble {
     pub layouts: u32,
     /// Time of the first entry, milliseconds since power-on.
     pub start_ms: u64,
-    /// Frames of the session before this group, modulo 2^32: tells how many are missing.
+    /// Frames of the session before this group, modulo 2^32, for the number of missing ones.
     pub frames_before: u32,
     /// UTC at power-on, microseconds since 1970, if known.
     pub epoch_micros: Option<u64>,

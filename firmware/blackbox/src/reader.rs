@@ -57,7 +57,7 @@ pub enum Cause {
     Corrupt,
     /// Valid sectors with altered entries: the recorder's memory had changed.
     Altered,
-    /// The vehicle was disarmed and is recorded by arming: sectors were not kept, on purpose, and a record says so.
+    /// The vehicle was disarmed and is recorded by arming: sectors were dropped on purpose, by a record.
     Disarmed,
 }
 
@@ -78,9 +78,9 @@ impl Cause {
 /// A part of the log that cannot be read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Gap {
-    /// The last entry before it; `None`: nothing was read before.
+    /// The last entry before it; `None`: nothing was read before it.
     pub from: Option<Instant>,
-    /// The first entry after it; `None`: nothing could be read after.
+    /// The first entry after it; `None`: nothing is readable after it.
     pub to: Option<Instant>,
     /// Why.
     pub cause: Cause,
@@ -97,7 +97,7 @@ pub struct Gap {
 pub struct Summary {
     /// The log's session.
     pub session: Option<u32>,
-    /// The session was ended in order; otherwise the power was cut or the log goes on in another file.
+    /// The session ended in order; otherwise power failed or the log continues in another file.
     pub closed: bool,
     /// Frames given out.
     pub frames: u64,
@@ -121,15 +121,15 @@ pub struct LogReader {
     decoder: GroupDecoder,
     /// An open gap.
     open_gap: Option<Gap>,
-    /// A gap to give out before the entries of the group that ended it.
+    /// A gap to return before the entries of the group that ended it.
     gap_due: Option<Gap>,
-    /// The last sector was partial, and what follows it is not known yet.
+    /// The last sector was partial, and its successor is still unknown.
     cut: bool,
     last_at: Option<Instant>,
     /// Frames of the session up to here, while the count is unbroken.
     frames_expected: Option<u32>,
     epoch_micros: Option<u64>,
-    /// Damaged blocks at the place of the last sector, where that is a partial one: one may have been the whole one.
+    /// Damaged blocks at the place of the last, partial sector: one may have been the whole one.
     damaged_partial: u32,
     /// Damaged blocks after the last sector were given out as a gap.
     counted_end: bool,
@@ -184,7 +184,7 @@ impl LogReader {
         self.epoch_micros = epoch_micros;
     }
 
-    /// UTC at power-on, microseconds since 1970, as far as it is known by now.
+    /// UTC at power-on, microseconds since 1970, if known by now.
     pub const fn epoch_micros(&self) -> Option<u64> {
         self.epoch_micros
     }

@@ -1,5 +1,5 @@
-//! The sector: 512 bytes that say what they are and are checked, so that a torn, stale, flipped or missing one is
-//! always noticed.
+//! The sector: 512 bytes with an identity and a check, so that a torn, stale, flipped or missing one is always
+//! noticed.
 //!
 //! ```text
 //!   0  magic 0x48 'H'
@@ -35,7 +35,7 @@ pub const VERSION: u8 = 3;
 pub(crate) const BODY_AT: usize = 19;
 const CRC_AT: usize = SECTOR_BYTES - 4;
 const MAGIC: u8 = b'H';
-/// With the format version: what byte 1 is.
+/// Byte 1, with the format version.
 const PLAIN: u8 = 0xb0;
 /// The same of a sector that is sealed by means that this format does not have yet.
 const SEALED: u8 = 0xa0;
@@ -43,7 +43,7 @@ const PARTIAL: u8 = 0x40;
 const CLOSED: u8 = 0x80;
 const SINCE_FIRST: u8 = 0x3f;
 
-/// Records completed in a sector at most: what its field holds.
+/// Maximum records completed in a sector: the limit of its field.
 pub(crate) const RECORDS_MAX: u8 = 127;
 
 const _: () = assert!(GROUP_SECTORS == SINCE_FIRST as usize + 1 && BODY_BYTES < 1 << 9);
@@ -78,7 +78,7 @@ impl Sector {
         self.bytes[CRC_AT..].copy_from_slice(&crc.to_le_bytes());
     }
 
-    /// From what parity gives of a lost sector.
+    /// A sector rebuilt from parity.
     pub(crate) fn made_again(bytes: &[u8; SECTOR_BYTES], session: u32, number: u32) -> Self {
         let mut sector = Self { bytes: *bytes };
         (sector.bytes[0], sector.bytes[1]) = (MAGIC, PLAIN | VERSION);
@@ -97,7 +97,7 @@ impl Sector {
         self.bytes[2] & PARTIAL != 0
     }
 
-    /// Whether it is the last one of a log that was ended in order.
+    /// Whether it is the last one of a log that ended in order.
     pub const fn is_closed(&self) -> bool {
         self.bytes[2] & CLOSED != 0
     }
@@ -207,7 +207,7 @@ pub enum NotASector {
 impl Header {
     /// Checks a block and reads its header.
     pub fn read(block: &[u8; SECTOR_BYTES]) -> Result<Self, NotASector> {
-        // A search for lost logs asks this of each block of a card: nothing is copied before it looks like one of ours.
+        // A search for lost logs calls this for each block of a card: it copies nothing before the magic byte fits.
         if block[0] != MAGIC {
             return Err(match block[0] {
                 0 if *block == [0; SECTOR_BYTES] => NotASector::Empty,

@@ -3,7 +3,7 @@
 //!
 //! *Admission:* before an entry is encoded the sink must have room for `ENTRY_SECTORS_MAX`; otherwise the writer
 //! returns `Full` and its state is as before. *Groups* end after `GROUP_SECTORS`. The entry that no longer fits is
-//! undone (the coder's earlier state is kept), and becomes the first one of the next group.
+//! undone (the coder's earlier state is stored), and becomes the first one of the next group.
 
 use hums_core::clock::Instant;
 use hums_dialect::wire::FRAME_BYTES_MAX;
@@ -21,7 +21,7 @@ use crate::sector::{BODY_BYTES, GROUP_SECTORS, Header, RECORDS_MAX, Sector};
 /// preamble before it.
 pub const ENTRY_SECTORS_MAX: usize = 1 + (PREAMBLE_BYTES + CODED_BYTES_MAX + FLUSH_MAX).div_ceil(BODY_BYTES);
 
-/// A sector in the middle of a group has so many bytes at least: it is closed when no stream could end in it.
+/// Minimum bytes of a sector in the middle of a group: it is closed when no stream could end in it.
 const BODY_CLOSED_MIN: usize = BODY_BYTES + 1 - FLUSH_MAX;
 
 /// Sink of finished sectors: a bounded queue.
@@ -193,8 +193,8 @@ impl Writer {
         true
     }
 
-    /// Ends the group: the next entry begins a new one, for example in a new file or after lost sectors.
-    /// Does nothing (and may be called again) while the sink has no room.
+    /// Ends the group: the next entry begins a new one, for example in a new file or after lost sectors. Does nothing
+    /// while the sink has no room; it may be called again.
     pub fn restart(&mut self, sink: &mut impl SectorSink) -> bool {
         self.end_group(false, sink)
     }
@@ -240,7 +240,7 @@ impl Writer {
             self.begin_group(entry.at_ms);
         }
         if !self.append(&entry, value, false, sink) {
-            // The model makes it longer than it is: its bytes as they are always fit.
+            // The model makes it longer: uncoded it always fits.
             self.begin_group(entry.at_ms);
             self.append(&entry, value, true, sink);
         }
@@ -271,14 +271,14 @@ impl Writer {
         if self.header.body_bytes + FLUSH_MAX > BODY_BYTES {
             self.next_sector(sink);
         }
-        // The header's counts are full: far beyond what real entries reach.
+        // The header's counts are full: real entries never reach that.
         if self.header.records >= RECORDS_MAX - 1 || self.header.frames >= u16::MAX - 1 {
             self.end_group(false, sink);
         }
         true
     }
 
-    /// Encodes an entry; gives its length, or nothing where it has no place in the group.
+    /// Encodes an entry; returns its length, or `None` if the group has no place for it.
     // Apart from `append`, which is compiled with the sink's crate, and for size there.
     #[inline(never)]
     fn encode(&mut self, entry: &Entry<'_>, plain: bool) -> Option<usize> {
@@ -295,7 +295,7 @@ impl Writer {
         len
     }
 
-    /// Adds coded bytes `done` to `len` to the sector in progress, as far as it has room; gives how far.
+    /// Adds coded bytes `done` to `len` to the sector in progress, as far as there is room; returns the end.
     #[inline(never)]
     fn add(&mut self, done: usize, len: usize) -> usize {
         let at = self.header.body_bytes;
@@ -401,7 +401,7 @@ impl Writer {
 mod tests {
     use super::*;
 
-    /// Of each sector whether it starts a group.
+    /// Whether each sector starts a group.
     struct Starts(Vec<bool>);
 
     impl SectorSink for Starts {

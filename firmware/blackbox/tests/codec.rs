@@ -1,4 +1,4 @@
-//! The codec, from outside: whatever a link carries comes back bit for bit, with its times.
+//! The codec, from outside: any input of a link comes back bit for bit, with its times.
 #![expect(clippy::panic, reason = "that is how a test fails")]
 
 #[path = "common/card.rs"]
@@ -41,7 +41,7 @@ fn read(sectors: &[Sector]) -> (Vec<Frame>, Vec<String>) {
     }
 }
 
-/// Writes the frames, reads them back, compares; gives the log's bytes.
+/// Writes the frames, reads them back, compares; returns the size of the log.
 fn round_trip(frames: &[Frame]) -> usize {
     let (mut writer, mut card) = (Box::new(Writer::new()), Card::default());
     for (at, bytes, verified) in frames {
@@ -66,7 +66,7 @@ impl Random {
 #[derive(Clone, Copy, Debug)]
 struct Link {
     messages: usize,
-    /// One frame in so many is odd in one of many ways; 0: none.
+    /// Rate of odd frames, one in this many; 0: none.
     odd_one_in: usize,
     signed: bool,
 }
@@ -155,7 +155,7 @@ fn a_rough_link_comes_back() {
     round_trip(&stream(8, 20_000, Link { messages: 60, odd_one_in: 5, signed: false }));
 }
 
-/// Reads with outlines only, but every seventh entry in full, and gives each frame's time, id, length and word.
+/// Reads outlines only, with every seventh entry in full. Returns each frame's time, id, length and verification.
 fn outlines(sectors: &[Sector]) -> Vec<(u64, u32, usize, bool)> {
     let id = |bytes: &[u8]| match *bytes {
         [0xfe, _, _, _, _, id, ..] => u32::from(id),
@@ -297,7 +297,7 @@ fn records_of_any_shape_and_with_any_numbers_come_back() {
         .map(|index| {
             let (words, halves) = (random.below(125), random.below(10));
             let calm = random.below(2) == 0;
-            // Sometimes with more or less than the head says, and up to the longest; numbers that stay or that jump.
+            // Sometimes with more or less than in the head, and up to the longest; with constant and jumping numbers.
             let len = match index % 10 {
                 0 => random.below(RECORD_BYTES_MAX + 1),
                 1 => RECORD_BYTES_MAX,

@@ -287,9 +287,9 @@ fn records_stand_among_frames_and_restart_begins_a_group() {
 enum Misplaced {
     /// Two pages are exchanged.
     Swapped,
-    /// A page lies in the place of another one as well.
+    /// A page is also in the place of another one.
     Copied,
-    /// A page is there twice, and what follows it lies further back.
+    /// A page is there twice, and later ones are moved back.
     Inserted,
 }
 

@@ -1,7 +1,7 @@
-//! Golden files: what version 3 looks like on the card. They never change; a new version adds its own.
+//! Golden files: version 3 on the card. They never change; a new version adds its own.
 //!
-//! `mixed-3.log` holds frames and records made by `stream` below, in several groups. When it must be made anew (only
-//! before the version is published): `HUMS_GOLDEN=write cargo test -p hums-blackbox --test golden`.
+//! `mixed-3.log` holds frames and records made by `stream` below, in several groups. To write it anew (only before
+//! the version is published): `HUMS_GOLDEN=write cargo test -p hums-blackbox --test golden`.
 
 #[path = "common/card.rs"]
 mod card;
@@ -106,7 +106,7 @@ fn write() -> Vec<u8> {
             writer
                 .record(at, &Record::Usage(Usage::new(Moment::Periodic, &counters)), &mut card)
                 .expect("room");
-            // A kind that there is not, with a time, halves and bytes; and one whose head says more than there is.
+            // An unknown kind with a time, halves and bytes; and one with a head that counts too much.
             let [a, b, c, d, ..] = at.as_micros().to_le_bytes();
             let known =
                 [200, 0x1f, 3, 4, a, b, c, d, 0, 0, 0, 0, 1, 2, 3, 4, 0, 0, 9, 0, 0, 0x80, 255, 255, 1, 2];

@@ -41,7 +41,7 @@ fn write(batches: &[Vec<Entry>]) -> Vec<u8> {
     card.0.iter().flat_map(|sector| *sector.bytes()).collect()
 }
 
-/// The log reads back as what was written: to the writer times only advance.
+/// The log reads back as written: for the writer times only advance.
 fn reads_back(log: &[u8], batches: &[Vec<Entry>]) {
     let (mut expected, mut latest) = (batches.iter().flatten(), 0);
     let mut reader = Box::new(LogReader::new());
@@ -124,7 +124,7 @@ fn recordings_are_coded_as_they_always_were() {
     assert_eq!(found, RECORDINGS, "{CHANGED}");
 }
 
-/// All messages of the dialect, so many at once; entries of each batch; one frame in so many odd.
+/// All messages of the dialect, in batches: messages of a batch, its entries, and one odd frame in this many.
 const MADE_UP: [(usize, usize, usize, Sum); 3] = [
     (16, 1_000, 0, ("calm", 427_008, 0xf89c_525e)),
     (20, 1_000, 6, ("rough", 411_648, 0x4b56_d140)),

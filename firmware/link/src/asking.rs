@@ -1,19 +1,20 @@
 //! Requests to the autopilot: the messages that the checks need, its version, and its battery parameters.
 //!
 //! # Procedure
-//! Listen for [`LISTEN`]. A message that already arrives often enough is not requested, so no stream gets slower. Request the
-//! others with `SET_MESSAGE_INTERVAL`, one at a time, each answered before the next.
-//! Check the rates every [`ROUND`] and repeat the request for a stream that stopped (unseen reboot, stream changed by someone
-//! else). The interval between repeats doubles, because an autopilot may accept a request for a message that it never sends. A
-//! refused message is not requested again until the autopilot reboots. An ArduPilot that does not answer these commands gets
-//! `REQUEST_DATA_STREAM` for whole groups.
+//! Listen for [`LISTEN`]. A message that already arrives often enough is not requested, so no stream gets slower.
+//! Request the others with `SET_MESSAGE_INTERVAL`, one at a time, each answered before the next. Check the rates
+//! every [`ROUND`] and repeat the request for a stream that stopped (unseen reboot, stream changed by someone else).
+//! The interval between repeats doubles, because an autopilot may accept a request for a message that it never sends.
+//! A refused message is not requested again until the autopilot reboots. An ArduPilot that does not answer these
+//! commands gets `REQUEST_DATA_STREAM` for whole groups.
 //!
-//! ArduPilot warns its pilot ("no message" of that number) if an interval is requested for an unsupported message. It refuses
-//! `REQUEST_MESSAGE` silently (`GCS_Common.cpp`, 4.1 to 4.6). So one message is requested first, and the interval only if that
-//! message is supported. `ESC_TELEMETRY_5_TO_8` comes with `ESC_TELEMETRY_1_TO_4`, and has no interval of its own.
+//! ArduPilot warns its pilot ("no message" of that number) if an interval is requested for an unsupported message. It
+//! refuses `REQUEST_MESSAGE` silently (`GCS_Common.cpp`, 4.1 to 4.6). So one message is requested first, and the
+//! interval only if that message is supported. `ESC_TELEMETRY_5_TO_8` comes with `ESC_TELEMETRY_1_TO_4`, and has no
+//! interval of its own.
 //!
-//! Parameters are requested after the messages, once or twice each after first contact or a reboot. The autopilot does not answer
-//! a request for an unknown parameter; no answer proves nothing.
+//! Parameters are requested after the messages, once or twice each after first contact or a reboot. The autopilot
+//! does not answer a request for an unknown parameter, so silence proves nothing.
 //!
 //! # Bandwidth
 //! The requested messages take at most [`SHARE`] percent of the port's line. All intervals are stretched to fit.
@@ -45,7 +46,7 @@ pub const SET_MESSAGE_INTERVAL: u16 = 511;
 /// `MAV_CMD_REQUEST_MESSAGE`
 pub const REQUEST_MESSAGE: u16 = 512;
 const AUTOPILOT_VERSION: u32 = 148;
-/// Of `MAV_RESULT`.
+/// A `MAV_RESULT`.
 const ACCEPTED: u8 = 0;
 /// As above.
 const TEMPORARILY: u8 = 1;

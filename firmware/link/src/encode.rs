@@ -10,7 +10,7 @@ use crate::signing::Seal;
 
 /// `MAV_COMP_ID_ONBOARD_COMPUTER`
 pub const COMPONENT: u8 = hums_core::observation::OUR_COMPONENT;
-/// The system id until the vehicle's is known: what most autopilots have by default.
+/// The system id until the vehicle's is known: the default of most autopilots.
 const SYSTEM_DEFAULT: u8 = 1;
 
 /// Makes our frames and counts them.
@@ -58,7 +58,7 @@ impl Encoder {
         HEADER_V2_BYTES + packet.payload().len() + CHECKSUM_BYTES
     }
 
-    /// The frame that carries `packet`; empty for a message that no definition of ours knows.
+    /// The frame of `packet`; empty for a message without a definition.
     pub fn frame<'a>(&mut self, out: &'a mut [u8; FRAME_BYTES_MAX], packet: &Packet) -> &'a [u8] {
         let len = self.put(out, packet, 0);
         out.get(..len).unwrap_or_default()

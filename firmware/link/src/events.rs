@@ -1,8 +1,8 @@
-//! PX4's events: which were missed on the way, and asking for them again (MAVLink events interface).
+//! PX4's events: detection of missed ones, and requests for them (MAVLink events interface).
 //!
-//! Each `EVENT` has a sequence number, and `CURRENT_EVENT_SEQUENCE` tells the latest every 3 s. PX4 keeps the last ones and sends what
-//! `REQUEST_EVENT` names. An event that the autopilot no longer has, or does not send after three requests, is lost; the checks
-//! do without it.
+//! Each `EVENT` has a sequence number, and `CURRENT_EVENT_SEQUENCE` has the latest every 3 s. PX4 stores the last
+//! ones and repeats those in `REQUEST_EVENT`. An event that the autopilot no longer has, or does not send after three
+//! requests, is lost; the checks do without it.
 
 use hums_core::clock::{Instant, Span};
 use hums_core::observation::Source;
@@ -16,11 +16,11 @@ const EVENT: u32 = 410;
 const CURRENT_EVENT_SEQUENCE: u32 = 411;
 /// `RESPONSE_EVENT_ERROR`
 const RESPONSE_EVENT_ERROR: u32 = 413;
-/// More than PX4 keeps: a gap that is wider is another start of the autopilot, or long ago.
+/// More than PX4 stores: a wider gap is a restart of the autopilot, or too old.
 const GAP_MAX: u16 = 20;
 /// How long an answer may take.
 const ANSWER: Span = Span::from_secs(1);
-/// How often the same events are asked for.
+/// Requests for the same events.
 const TRIES: u8 = 3;
 
 /// Events that were missed, first and last.
@@ -34,14 +34,14 @@ struct Missing {
 /// The events of one autopilot.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Events {
-    /// The number that comes next.
+    /// The next number.
     next: Option<u16>,
     missing: Option<Missing>,
     asked_at: Option<Instant>,
 }
 
 impl Events {
-    /// Nothing heard yet.
+    /// No event yet.
     pub const fn new() -> Self {
         Self { next: None, missing: None, asked_at: None }
     }
@@ -65,7 +65,7 @@ impl Events {
         }
     }
 
-    /// To be called at every tick; at most one message is given to `send`, which says whether it could be sent.
+    /// To be called at every tick; `send` gets at most one message, and returns whether it was sent.
     pub fn tick(&mut self, now: Instant, of: Source, send: &mut impl FnMut(&Packet) -> bool) {
         if self.asked_at.is_some_and(|at| now.since(at) < ANSWER) {
             return;
@@ -81,7 +81,7 @@ impl Events {
 
     fn came(&mut self, number: u16) {
         if self.next.is_some_and(|next| number.wrapping_sub(next) > u16::MAX / 2) {
-            // An older one: asked for, or sent twice.
+            // An older one: requested, or sent twice.
             if let Some(missing) = &mut self.missing
                 && number == missing.first
             {

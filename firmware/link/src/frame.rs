@@ -70,7 +70,7 @@ impl Header {
             [START_V1] | [START_V1, _, ..] if bytes.len() < HEADER_V1_BYTES => {
                 Err(NoHeader::Incomplete(HEADER_V1_BYTES))
             }
-            // The flags come early: most false starts end here without waiting for more.
+            // The flags come early: most false starts end here immediately.
             [START_V2] | [START_V2, _] => Err(NoHeader::Incomplete(3)),
             [START_V2, _, incompat, ..]
                 if incompat & !INCOMPAT_SIGNED == 0 && bytes.len() < HEADER_V2_BYTES =>

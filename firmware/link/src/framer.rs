@@ -1,12 +1,11 @@
 //! Bytes of a line in, frames out: MAVLink 1, MAVLink 2 and signed frames, mixed, from any number of systems.
 //!
-//! Sans-io: [`Framer::push`] takes whatever bytes have come and calls the sink with each frame as soon as its last
-//! byte is there; [`Framer::idle`] says that the line is silent. Nothing depends on how the bytes are cut into
-//! pushes.
+//! Sans-io: [`Framer::push`] takes the received bytes and calls the sink with each frame at its last byte;
+//! [`Framer::idle`] reports a silent line. Nothing depends on how the bytes are cut into pushes.
 //!
 //! # Resynchronising
-//! A *candidate* is a start byte and what follows it. Its bytes stay in the buffer until it is decided. If it is not
-//! a frame, only its start byte is dropped and the search continues from the next byte. So a false start (damaged
+//! A *candidate* is a start byte and the bytes behind it. Its bytes stay in the buffer until it is decided. If it is
+//! not a frame, only its start byte is dropped and the search continues from the next byte. So a false start (damaged
 //! length, start byte in the payload, noise) does not hide the frame behind it.
 //!
 //! # Frames of definitions that we do not have
@@ -15,8 +14,7 @@
 //! [`Check::Unverified`](crate::frame::Check::Unverified) if this system used that extra for this id before. At first
 //! sight it passes only between frames: behind a frame (or a damaged one, or silence), before a start byte (or
 //! silence), and without a known complete frame inside. Without a frame before it, its extra is only remembered, and
-//! the next one comes through. An id that this system has sent with our definition never passes unverified: it is
-//! damage.
+//! the next one passes. An id that this system has sent with our definition never passes unverified: it is damage.
 //!
 //! # Limits
 //! About 1 KiB. A candidate waits for at most 281 bytes (3 ms at 921,600 baud) or for `idle`. Per byte: one copy and
@@ -35,10 +33,10 @@ const BUFFER: usize = 2 * FRAME_BYTES_MAX;
 
 /// Steps of the checksum that candidates which are not trusted may cost, for each byte received.
 const CREDIT_PER_BYTE: u32 = 4;
-/// Credit that can be saved up: some dozens of frames of a private definition at once.
+/// Maximum credit: some dozens of frames of a private definition at once.
 const CREDIT_MAX: u32 = 4_096;
 
-/// What went through a [`Framer`]. Always `bytes == bytes_in_frames + bytes_not_frames +` [`Framer::held`].
+/// Counts of a [`Framer`]. Always `bytes == bytes_in_frames + bytes_not_frames +` [`Framer::held`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct FramerCounts {
     /// Bytes received.
@@ -47,8 +45,7 @@ pub struct FramerCounts {
     pub frames: u64,
     /// Those of them whose definition we do not know.
     pub unverified: u64,
-    /// What looked like a frame and has a wrong checksum. Damage to a start byte or a length shows only in
-    /// `bytes_not_frames`.
+    /// Frames with a wrong checksum. Damage to a start byte or a length shows only in `bytes_not_frames`.
     pub damaged: u64,
     /// Bytes of the frames given to the sink.
     pub bytes_in_frames: u64,
@@ -111,7 +108,7 @@ impl Framer {
         }
     }
 
-    /// Takes the bytes that came and calls `sink` with every frame that they complete, in order.
+    /// Takes received bytes and calls `sink` with every completed frame, in order.
     pub fn push(&mut self, bytes: &[u8], sink: &mut impl FnMut(Frame<'_>)) {
         self.counts.bytes = self.counts.bytes.wrapping_add(bytes.len() as u64);
         let mut rest = bytes;
@@ -129,8 +126,8 @@ impl Framer {
         }
     }
 
-    /// The line has been silent for longer than a sender pauses inside a frame, or has ended: no byte is waited for
-    /// any longer. A candidate that lacks bytes is abandoned and what it held is searched; afterwards nothing is held.
+    /// The line has been silent for longer than a pause inside a frame, or has ended: no more bytes are expected. An
+    /// incomplete candidate is dropped and its bytes are searched; afterwards no byte is held.
     pub fn idle(&mut self, sink: &mut impl FnMut(Frame<'_>)) {
         self.scan(true, sink);
         self.after_frame = true;
@@ -186,7 +183,7 @@ impl Framer {
         }
     }
 
-    /// Decides the first candidate. With `idle`, nothing is waited for.
+    /// Decides the first candidate. With `idle` no more bytes are expected.
     fn judge(&mut self, idle: bool) -> Verdict {
         let held = &self.buffer[self.start..self.end];
         match held.iter().position(|&byte| is_start(byte)) {
@@ -221,7 +218,7 @@ impl Framer {
     fn judge_unknown(&mut self, header: &Header, known: Known, idle: bool) -> Verdict {
         let held = &self.buffer[self.start..self.end];
         let len = header.frame_len();
-        // The cheap check comes first: a false start in noise is seldom followed by a start byte where it ends.
+        // The cheap check comes first: behind a false start in noise there is seldom a start byte.
         let learned = self.seen.extra(header.system, header.id);
         if !matches!(learned, Extra::Confirmed(_)) {
             match held.get(len) {
@@ -285,7 +282,7 @@ const fn is_start(byte: u8) -> bool {
 enum Known {
     /// There is a message of this id, and the payload may have this length.
     Fits { index: u16, crc_extra: u8 },
-    /// There is a message of this id, but no encoder makes it so long or so short.
+    /// The id is known, but no encoder makes this length.
     Misfits { index: u16, crc_extra: u8 },
     /// No such message.
     No,

@@ -34,15 +34,15 @@ pub const fn checksum_of(file: &[u8]) -> u32 {
     CRC.checksum(file)
 }
 
-/// The checksum of a file, with `before` that of the bytes before `bytes`; 0 for the beginning.
+/// The checksum of a file: `before` is that of the bytes before `bytes`, 0 for the beginning.
 pub fn checksum(before: u32, bytes: &[u8]) -> u32 {
-    // The library takes its first value as the polynomial is written, and gives the result as it is reflected.
+    // The library takes its first value as the polynomial is written, and returns the reflected result.
     let mut digest = CRC.digest_with_initial(before.reverse_bits());
     digest.update(bytes);
     digest.finalize()
 }
 
-/// What went wrong (`MAV_FTP_ERR`).
+/// The error (`MAV_FTP_ERR`).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Error {
@@ -50,7 +50,7 @@ pub enum Error {
     Fail = 1,
     /// No such session.
     InvalidSession = 4,
-    /// Nothing lies there: after the last byte, after the last entry.
+    /// Behind the last byte or the last entry.
     EndOfFile = 6,
     /// Not something that we do.
     UnknownCommand = 7,
@@ -71,12 +71,12 @@ pub enum Operation<'a> {
     List(&'a str, u32),
     /// Open a file.
     Open(&'a str),
-    /// Bytes from an offset, so many.
+    /// Bytes from an offset: offset and number.
     Read(u32, u8),
-    /// Bytes from an offset to the end, so many a message.
+    /// Bytes from an offset to the end: offset and size of a message.
     Burst(u32, u8),
-    /// The checksum of a file's first so many bytes; 0 is all of it, as the protocol has it. That a part may be asked
-    /// for is our own addition: `offset`, which means nothing else here, says how much.
+    /// The checksum of a file's first bytes; 0 is all of it, as in the protocol. A part is our own extension:
+    /// `offset`, which has no other meaning here, is its length.
     Checksum(&'a str, u32),
     /// Writing of any kind.
     Write,
@@ -93,7 +93,7 @@ pub struct Asked<'a> {
     pub session: u8,
     /// The number of the operation, for the answer.
     pub opcode: u8,
-    /// What is asked.
+    /// The requested operation.
     pub operation: Operation<'a>,
 }
 
@@ -134,7 +134,7 @@ pub struct Reply {
 }
 
 impl Reply {
-    /// To `asked`.
+    /// A reply to `asked`.
     pub const fn to(asked: &Asked<'_>) -> Self {
         Self {
             sequence: asked.sequence.wrapping_add(1),

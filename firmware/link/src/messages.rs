@@ -12,7 +12,7 @@ const TYPE: u8 = 18;
 const AUTOPILOT: u8 = 8;
 /// `MAV_PARAM_TYPE_REAL32`
 const REAL32: u8 = 9;
-/// Of `MAV_PROTOCOL_CAPABILITY`: `COMMAND_INT`, `FTP`, `MAVLINK2`, `PARAM_ENCODE_C_CAST`.
+/// Bits of `MAV_PROTOCOL_CAPABILITY`: `COMMAND_INT`, `FTP`, `MAVLINK2`, `PARAM_ENCODE_C_CAST`.
 const CAPABILITIES: u64 = 8 | 32 | 8_192 | 131_072;
 
 /// HEARTBEAT; `state` is a `MAV_STATE`: 3 standby, 4 active, 5 critical, 6 emergency.
@@ -50,7 +50,7 @@ pub fn param_value(name: &str, value: f32, index: u16, count: u16) -> Packet {
     Packet::new(22).f32(0, value).u16(4, count).u16(6, index).text(8, 16, name).u8(24, REAL32)
 }
 
-/// `COMMAND_ACK` to the one who asked; `result` is a `MAV_RESULT`.
+/// `COMMAND_ACK` to the asker; `result` is a `MAV_RESULT`.
 pub fn command_ack(command: u16, result: u8, system: u8, component: u8) -> Packet {
     Packet::new(77).u16(0, command).u8(2, result).u8(8, system).u8(9, component)
 }
@@ -66,7 +66,7 @@ pub(crate) fn request_data_stream(stream: u8, rate_hz: u16, system: u8, componen
     Packet::new(66).u16(0, rate_hz).u8(2, system).u8(3, component).u8(4, stream).u8(5, 1)
 }
 
-/// `AUTOPILOT_VERSION` of ours: what we can, our version (major, minor, patch), the chip's own number.
+/// Our `AUTOPILOT_VERSION`: capabilities, version (major, minor, patch), the chip's own number.
 pub fn autopilot_version(version: [u8; 3], git: &str, uid: &[u8; 12]) -> Packet {
     let [major, minor, patch] = version;
     // The lowest byte is FIRMWARE_VERSION_TYPE: 255 is official, 0 development.
@@ -75,7 +75,7 @@ pub fn autopilot_version(version: [u8; 3], git: &str, uid: &[u8; 12]) -> Packet 
     Packet::new(148).u64(0, CAPABILITIES).u64(8, short).u32(16, number).text(36, 8, git).bytes(60, uid)
 }
 
-/// How a computer is doing, as far as it knows: `None` is told as unknown.
+/// The state of a computer; `None` is sent as unknown.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ComputerStatus {
     /// Busy, percent.
@@ -97,12 +97,13 @@ pub struct LinkStatus {
     pub rx: Option<u32>,
 }
 
-/// `ONBOARD_COMPUTER_STATUS`. Of memory it tells nothing, because its unit is MiB; of temperatures and fans nothing, because there are none.
+/// `ONBOARD_COMPUTER_STATUS`. Memory is left out, because its unit is MiB; temperatures and fans, because there are
+/// none.
 #[inline(never)]
 pub fn computer_status(now: Instant, status: &ComputerStatus) -> Packet {
     /// Storage of this kind: a card that can be taken out.
     const CARD: u32 = 4;
-    // The largest number is what is unknown, or unused.
+    // The largest number means unknown, or unused.
     let mut payload = [0xFF_u8; 238];
     let mut put = |at: usize, bytes: &[u8]| payload[at..at + bytes.len()].copy_from_slice(bytes);
     put(0, &now.as_micros().to_le_bytes());
@@ -139,7 +140,7 @@ pub fn component_metadata(now: Instant, crc: u32, uri: &str) -> Packet {
     Packet::new(397).u32(0, now.as_millis() as u32).u32(4, crc).text(8, 99, uri)
 }
 
-/// `PROTOCOL_VERSION`: MAVLink 2.0, and nothing older.
+/// `PROTOCOL_VERSION`: MAVLink 2.0 only.
 pub fn protocol_version() -> Packet {
     Packet::new(300).u16(0, 200).u16(2, 200).u16(4, 200)
 }
@@ -152,11 +153,11 @@ pub fn log_entry(id: u16, count: u16, last: u16, bytes: u32, utc_s: u32) -> Pack
 /// `LOG_DATA`: at most 90 bytes.
 pub fn log_data(id: u16, offset: u32, data: &[u8]) -> Packet {
     let data = data.get(..90).unwrap_or(data);
-    // The count is set last, so that a block that ends in zeros is told whole by it.
+    // The count is set last, so that a block that ends in zeros is sent whole.
     Packet::new(120).u32(0, offset).u16(4, id).bytes(7, data).u8(6, data.len() as u8)
 }
 
-/// `FILE_TRANSFER_PROTOCOL` to the one who asked.
+/// `FILE_TRANSFER_PROTOCOL` to the asker.
 pub fn file_transfer(system: u8, component: u8, payload: &[u8]) -> Packet {
     let payload = payload.get(..251).unwrap_or(payload);
     Packet::new(110).u8(1, system).u8(2, component).bytes(3, payload)
@@ -173,7 +174,7 @@ mod tests {
     use crate::encode::{Encoder, FRAME_BYTES_MAX};
     use crate::frame::{Check, Frame};
 
-    /// That the layouts are right is pymavlink's to say, in the end to end tests; here that they fit their messages.
+    /// The end-to-end tests check the layouts with pymavlink; this test checks their lengths.
     #[test]
     fn every_message_of_ours_is_as_long_as_its_definition_allows() {
         let name = "SIXTEEN_LETTERS_";

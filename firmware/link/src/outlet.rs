@@ -1,15 +1,16 @@
-//! Transmit scheduler of one port: a byte budget for every window of one second, the port's line rate, and priorities.
+//! Transmit scheduler of one port: a byte budget for every window of one second, the port's line rate, and
+//! priorities.
 //!
 //! # The budget
-//! A model of the line gives each frame its transmission time: a frame starts when the previous one has left. The outlet accepts
-//! a frame if it fits its class's share of the budget. The bytes of the second before its start and its own bytes count. So no
-//! window of one second at the port exceeds the budget, whatever the queue holds. Times are kept in slots of 20 ms and a slot
-//! counts whole, so at saturation up to 4 % of the budget stay unused.
+//! A model of the line computes each frame's transmission time: a frame starts when the previous one has left. The
+//! outlet accepts a frame if it fits its class's share of the budget. The bytes of the second before its start and
+//! its own bytes count. So no window of one second at the port exceeds the budget, whatever the queue holds. Times
+//! are counted in slots of 20 ms and a slot counts whole, so at saturation up to 4 % of the budget stay unused.
 //!
 //! # Priorities
-//! Each [`Class`] may fill the budget up to its own mark, so a more urgent class always finds room above it. Only findings may
-//! wait behind more than [`BACKLOG`] of the line, so a finding never waits longer than that.
-//! Events (the vehicle's texts and answers) get at most half of the budget, bulk (lists, logs) three fifths, so neither starves
+//! Each [`Class`] may fill the budget up to its own mark, so a more urgent class always finds room above it. Only
+//! findings may wait behind more than [`BACKLOG`] of the line, so a finding never waits longer than that. Events (the
+//! vehicle's texts and answers) get at most half of the budget, bulk (lists, logs) three fifths, so neither starves
 //! the forwarded frames. Forwarded frames leave three fifths, and half of the line's backlog, to waiting bulk.
 
 use hums_core::clock::{Instant, Span};
@@ -23,13 +24,13 @@ use crate::signing::Seal;
 pub const BACKLOG: Span = Span::from_millis(50);
 /// The same for findings, which come in bursts. It limits the size of the queue.
 const BACKLOG_FINDINGS: Span = Span::from_millis(300);
-/// The same for what is forwarded, so that longer frames find the line free enough.
+/// The same for forwarded frames, so that longer frames find the line free enough.
 const BACKLOG_FORWARD: Span = Span::from_millis(25);
 /// Bytes of findings that may wait beside everything else: eleven texts, signed.
 pub const FINDINGS: u32 = 11 * 92;
-/// A finding's text with its header, and a signature: what stays free for a critical one.
+/// Room for a critical finding: a text with its header, and a signature.
 const RESERVE: u32 = 80;
-/// The least budget that has such a reserve: below, it would leave nothing for anything else.
+/// The least budget with such a reserve: below, it would block everything else.
 const RESERVE_FROM: u32 = 400;
 
 /// How urgent a frame is, the most urgent first.
@@ -39,7 +40,7 @@ pub enum Class {
     Critical,
     /// Any other finding.
     Finding,
-    /// Heartbeats, and answers to those who ask.
+    /// Heartbeats, and answers.
     Own,
     /// Single messages of the vehicle: texts, answers.
     Event,
@@ -143,7 +144,7 @@ pub struct Outlet {
     bulk_at: Option<Instant>,
 }
 
-/// How long bulk counts as waiting after it asked.
+/// Time for which bulk counts as waiting after its request.
 const BULK_WAITS: Span = Span::from_secs(1);
 
 impl Outlet {
@@ -166,7 +167,7 @@ impl Outlet {
         }
     }
 
-    /// Another budget in bytes a second, at once; and another line rate in baud (9,600 or more), once the line is empty.
+    /// Sets a budget in bytes a second, immediately, and a line rate in baud (9,600 or more), once the line is empty.
     pub fn set(&mut self, now: Instant, budget: u32, baud: u32) {
         self.budget = budget;
         let baud = baud.max(9_600);
@@ -203,7 +204,7 @@ impl Outlet {
         self.fits_besides(now, class, bytes, 0)
     }
 
-    /// The same, where `more` bytes shall find room in the same second.
+    /// The same, with room for `more` bytes in the same second.
     pub(crate) fn fits_besides(&mut self, now: Instant, class: Class, bytes: usize, more: usize) -> bool {
         let start = self.free_at.max(now);
         let busy = start.since(now);
@@ -254,7 +255,7 @@ impl Outlet {
         ((line as u32).min(self.mark(Class::Bulk) / 5 * 3 / 2) as usize).min(FRAME_BYTES_MAX)
     }
 
-    /// Sends a frame as it is, if it may go now.
+    /// Sends a frame unaltered, if it may go now.
     pub fn pass(&mut self, now: Instant, class: Class, frame: &[u8], out: &mut impl FnMut(&[u8])) -> bool {
         if !self.fits(now, class, frame.len()) {
             return false;
@@ -286,7 +287,7 @@ impl Outlet {
         };
         let sent = !frame.is_empty() && self.pass(now, class, frame, out);
         if sent {
-            // Only what is sent uses a sequence number.
+            // Only a sent frame uses a sequence number.
             self.encoder = encoder;
         }
         sent

@@ -1,12 +1,12 @@
-//! Payloads field by field: what we read of others, and what we send. Offsets are those of the wire (larger fields first,
-//! extensions after them), and stand beside the one function that knows the message.
+//! Payloads field by field, for reading and for sending. Offsets are those of the wire (larger fields first,
+//! extensions after them), beside the one function for the message.
 //!
-//! This does not use the structures of the `mavlink` crate's generator: those reject an unknown enumeration number, and an
-//! unknown command needs an answer too.
+//! This does not use the structures of the `mavlink` crate's generator: those reject an unknown enumeration number,
+//! and an unknown command needs an answer too.
 
 use hums_dialect::wire::PAYLOAD_BYTES_MAX;
 
-/// A payload as sent: what MAVLink 2 left out at its end reads as zero.
+/// A payload as sent: the part that MAVLink 2 left out at its end reads as zero.
 #[derive(Clone, Copy, Debug)]
 pub struct Fields<'a>(pub &'a [u8]);
 

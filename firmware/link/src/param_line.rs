@@ -1,4 +1,4 @@
-//! A line of a parameter file, as ground stations keep them.
+//! A line of a parameter file in the form of ground stations.
 //!
 //! | program | a line |
 //! |---|---|
@@ -14,9 +14,9 @@ const COMPONENT: &str = "191";
 /// Content of a line.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Line<'a> {
-    /// Nothing, or nothing for us.
+    /// Nothing for us.
     Nothing,
-    /// A parameter's name, and its value as it is written.
+    /// A parameter's name, and its value as text.
     Set(&'a str, &'a str),
     /// Nothing that can be understood.
     Wrong,
@@ -39,8 +39,8 @@ pub fn read(line: &str) -> Line<'_> {
     }
 }
 
-/// The number that a text says, as people write it: `-3.6`, `0.070000000298`, `1e-05`; `None` where it says none. For
-/// the board: the standard library's way, which is exact for whatever digits, takes 14 KB of flash.
+/// A number in common notation: `-3.6`, `0.070000000298`, `1e-05`; `None` without a number. For the board: the
+/// standard library's exact conversion takes 14 KB of flash.
 pub fn value(text: &str) -> Option<f32> {
     let (sign, text) = match text.strip_prefix('-') {
         Some(rest) => (-1.0, rest),
@@ -59,7 +59,7 @@ pub fn value(text: &str) -> Option<f32> {
         whole.bytes().map(|digit| (false, digit)).chain(part.bytes().map(|digit| (true, digit)))
     {
         let digit = digit.is_ascii_digit().then_some(u64::from(digit.wrapping_sub(b'0')))?;
-        // Digits beyond what 64 bits hold are far beyond what the value has.
+        // Digits beyond 64 bits are far beyond the value's precision.
         match number.checked_mul(10).and_then(|number| number.checked_add(digit)) {
             Some(more) => (number, scale) = (more, scale - i32::from(is_part)),
             None => scale += i32::from(!is_part),

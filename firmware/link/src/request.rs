@@ -15,7 +15,7 @@ const REPLIES_MAX: usize = 12;
 pub enum Port {
     /// The ground station's own.
     Gs = 0,
-    /// The autopilot's, which carries what ground stations send through it as well.
+    /// The autopilot's, also for ground stations behind it.
     Autopilot = 1,
 }
 
@@ -24,7 +24,7 @@ impl Port {
     pub const ALL: [Self; 2] = [Self::Gs, Self::Autopilot];
 }
 
-/// Something asked of us.
+/// A request to us.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Request<'a> {
     /// `PARAM_REQUEST_LIST`
@@ -91,7 +91,7 @@ pub fn read<'a>(frame: &Frame<'a>) -> Option<Asked<'a>> {
 pub enum Reply {
     /// `PARAM_VALUE` of the parameter with this index.
     Param(u16),
-    /// `COMMAND_ACK`: command, `MAV_RESULT`, system and component of the one who asked.
+    /// `COMMAND_ACK`: command, `MAV_RESULT`, system and component of the asker.
     Ack(u16, u8, (u8, u8)),
     /// `AUTOPILOT_VERSION`
     Version,
@@ -111,7 +111,7 @@ pub enum Reply {
     LogGone,
     /// Text: the list of logs has changed since it was sent, so the request by list index is refused.
     LogsChanged,
-    /// The card did not give some of the logs, or the directory, for a list, as a text.
+    /// Text: the card could not read some of the logs, or the directory, for a list.
     LogsUnread,
     /// A signing key was set (or, `false`, removed), as a text.
     Keyed(bool),
@@ -125,8 +125,8 @@ pub struct Replies {
     dropped: u32,
 }
 
-/// A list of all parameters under way. Who asks again meanwhile gets every one once more from where we are: so also
-/// somebody who never stops asking gets them all.
+/// A list of all parameters in progress. A new request meanwhile restarts the count from the present place, so that
+/// an endless asker gets them all too.
 #[derive(Clone, Copy, Debug, Default)]
 struct List {
     next: u16,

@@ -64,8 +64,8 @@ impl Seen {
         }
     }
 
-    /// Whether the message at `index` has come from `system` with a right checksum. Of a system that has no place of
-    /// its own: whether it came from any that share the last one.
+    /// Whether the message at `index` came from `system` with a valid checksum. For a system without a place of its
+    /// own: whether any in the shared last place sent it.
     pub(crate) fn was_verified(&self, system: u8, index: usize) -> bool {
         // The last place is empty until a system has it.
         let place = self.place_of(system).unwrap_or(SYSTEMS - 1);
@@ -131,7 +131,7 @@ mod tests {
             seen.verified(system, usize::from(system));
         }
         assert!(seen.was_verified(1, 1) && !seen.was_verified(1, 2) && !seen.was_verified(2, 1));
-        // 5 shares the place of 4, and so does anyone who comes later: strict, never lenient.
+        // 5 shares the place of 4, and so does any later one: strict, never lenient.
         assert!(seen.was_verified(4, 5) && seen.was_verified(5, 4) && seen.was_verified(9, 5));
     }
 

@@ -1,7 +1,7 @@
 //! Frames lost on the way to us, by the senders' sequence numbers.
 //!
-//! Each component counts its frames modulo 256, so a gap tells how many are missing. A gap of half the range or more is
-//! a sender that started anew or a frame that came late, and counts for nothing.
+//! Each component counts its frames modulo 256, so a gap gives the number of missing ones. A gap of half the range or
+//! more is a restarted sender or a late frame, and is ignored.
 
 use hums_core::clock::{Instant, Span};
 use hums_core::observation::Source;
@@ -13,7 +13,7 @@ use crate::frame::Frame;
 const SENDERS_MAX: usize = 8;
 /// Seconds that a reading looks back.
 const WINDOW_SECS: usize = 10;
-/// Frames that a reading needs before it says anything.
+/// Minimum frames for a reading.
 const FRAMES_MIN: u32 = 20;
 
 #[derive(Clone, Copy, Debug, Default)]
@@ -61,7 +61,7 @@ pub struct Sequences {
 }
 
 impl Sequences {
-    /// Nobody heard yet.
+    /// No sender yet.
     pub const fn new() -> Self {
         Self { senders: [None; SENDERS_MAX] }
     }
@@ -80,7 +80,7 @@ impl Sequences {
         lost
     }
 
-    /// What part of one sender's frames was lost in the last ten seconds.
+    /// The lost part of one sender's frames in the last ten seconds.
     pub fn reading(&mut self, now: Instant, source: Option<Source>) -> LinkReading {
         let now_s = seconds(now);
         let sender = self.senders.iter_mut().flatten().find(|sender| Some(sender.source) == source);
@@ -144,7 +144,7 @@ mod tests {
         heartbeats(&mut sequences, 7_000, (200..255_u8).filter(|number| !(240..250).contains(number)));
         let before = part(&mut sequences, 8_000);
         assert!((before - 10.0 / 255.0).abs() < 0.001, "{before}");
-        // Those of the first seconds leave the window, and few come.
+        // Those of the first seconds leave the window, and few new ones arrive.
         heartbeats(&mut sequences, 14_000, [255]);
         let after = part(&mut sequences, 14_500);
         assert!((after - before).abs() < 0.001, "{after}");

@@ -1,15 +1,15 @@
-//! MAVLink 2 signing (<https://mavlink.io/en/guide/message_signing.html>): 13 bytes after the checksum give the link
+//! MAVLink 2 signing (<https://mavlink.io/en/guide/message_signing.html>): 13 bytes after the checksum have the link
 //! id and the time of the frame, and prove that the sender has the key.
 //!
 //! # Time
 //! A stamp counts 10 µs since 2015 and grows with every frame of a stream, which is a system, a component and a link
-//! id. [`Clock`] gives it from UTC where that is known. It goes back only when a key is set. Stamps do not go back
-//! over a power-off either: a bound above all used stamps is stored ahead of time ([`Times::used`]). The stamps of
-//! the next power-on begin there and count up one by one until time has caught up.
+//! id. [`Clock`] derives it from UTC, if known. It goes back only when a key is set. Stamps do not go back over a
+//! power-off either: a bound above all used stamps is stored ahead of time ([`Times::used`]). The stamps of the next
+//! power-on begin there and count up one by one until time has caught up.
 //!
 //! A date from a GPS receiver may be wrong (a week number that rolled over, a spoofer). A time more than [`JUMP`]
 //! ahead of ours counts only after [`JUMP_LASTS`] ([`Clock::hear_utc`]): a clock that is years ahead would refuse
-//! every new stream for years. A good signature counts at once: a holder of the key also has the time.
+//! every new stream for years. A valid signature counts immediately: a holder of the key also has the time.
 //!
 //! # Replay
 //! A frame whose stamp is not above its stream's last one is refused. The first stamp of a stream since power-on must
@@ -47,14 +47,14 @@ const JUMP_AGREES: u64 = 100_000;
 const AHEAD_MIN: u64 = 2 * MINUTE;
 /// ... this part of the time since power-on later, ...
 const AHEAD_PART: u64 = 30;
-/// ... and by this at most. After power-off we begin so much ahead of UTC, and whoever hears us follows.
+/// ... and by this at most. After a power-off our stamps begin this far ahead of UTC, and receivers follow.
 const AHEAD_MAX: u64 = 10 * MINUTE;
 /// Stamps have 48 bits: until the year 2104.
 const STAMP_MAX: u64 = (1 << 48) - 1;
 /// Bytes of the hash that are sent.
 const HASH: usize = 6;
 
-/// A secret that all who talk to each other share. Never shown.
+/// The common secret of all partners. Never shown.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub struct Key(pub [u8; KEY_BYTES]);
 
@@ -75,7 +75,7 @@ impl Key {
         self.0 == [0; KEY_BYTES]
     }
 
-    /// Of a frame from its first byte to its checksum, then link id and stamp.
+    /// The hash of a frame from its first byte to its checksum, then link id and stamp.
     fn hash(&self, frame: &[u8], link_and_stamp: &[u8]) -> [u8; HASH] {
         let hash =
             Sha256::new().chain_update(self.0).chain_update(frame).chain_update(link_and_stamp).finalize();
@@ -93,7 +93,7 @@ pub const fn stamp(utc_micros: u64) -> u64 {
 pub struct Clock {
     /// The stamp of power-on.
     begin: u64,
-    /// A date far ahead that has to last: the stamp of power-on by it, and when it was heard first.
+    /// A date far ahead that has to last: its stamp of power-on, and the time of its first arrival.
     jump: Option<(u64, Instant)>,
 }
 
@@ -134,13 +134,13 @@ impl Clock {
     }
 }
 
-/// What makes the signatures of one way out.
+/// The signer of one way out.
 #[derive(Clone, Copy, Debug)]
 pub struct Seal {
     key: Key,
     /// Tells this way from our others.
     link: u8,
-    /// Our time, to be kept up to date.
+    /// Our time, updated by the caller.
     pub clock: Clock,
     last: u64,
 }
@@ -161,7 +161,7 @@ impl Seal {
         self.key == *key
     }
 
-    /// What follows `frame`, which ends with its checksum and says that it is signed.
+    /// The signature of `frame`, which ends with its checksum and has the signed flag.
     pub fn sign(&mut self, now: Instant, frame: &[u8]) -> [u8; SIGNATURE_BYTES] {
         self.last = (self.last + 1).max(self.clock.now(now)).min(STAMP_MAX);
         let mut tail = [0; SIGNATURE_BYTES];
@@ -178,7 +178,7 @@ impl Seal {
 pub enum Verdict {
     /// There is none.
     Unsigned,
-    /// Made with our key, and not heard before.
+    /// Signed with our key, and new.
     Good,
     /// Made with another key.
     Wrong,
@@ -199,7 +199,7 @@ struct Stream {
 pub struct Times {
     /// The latest stamp of a frame that changed anything.
     pub accepted: u64,
-    /// No stamp of ours is above this one.
+    /// The highest of our stamps.
     pub used: u64,
     /// Our time when this was stored.
     pub time: u64,
@@ -226,7 +226,7 @@ impl Times {
     }
 }
 
-/// The key, who used it, and when.
+/// The key, and the history of its use.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Signing {
     key: Option<Key>,
@@ -253,7 +253,7 @@ impl Signing {
         self.key.as_ref()
     }
 
-    /// What was stored. To be called at power-on.
+    /// Takes the stored state. To be called at power-on.
     pub fn restore(&mut self, key: Option<Key>, times: Times) {
         self.key = key.filter(|key| !key.is_none());
         self.floor = times.accepted;
@@ -278,7 +278,7 @@ impl Signing {
         let Some((key, tail)) = self.key.zip(frame.signature()) else { return Verdict::Unsigned };
         let (signed, [link, stamp @ .., _, _, _, _, _, _]) = tail;
         let hash = key.hash(signed, &tail.1[..7]);
-        // All six bytes are looked at, wherever they begin to differ.
+        // All six bytes are compared, in constant time.
         let differs = hash.iter().zip(&tail.1[7..]).fold(0, |sum, (ours, theirs)| sum | (ours ^ theirs));
         if differs != 0 {
             return Verdict::Wrong;

@@ -1,11 +1,11 @@
-//! Summary stream to the ground station. It forwards the vehicle's frames that a pilot needs, unaltered and at a lower rate. It
-//! adds the monitor's own messages: heartbeat, findings as `STATUSTEXT`, levels and usage as `NAMED_VALUE_FLOAT`, and all levels
-//! in one `NAMED_VALUE_INT` ([`state`]).
+//! Summary stream to the ground station. It forwards the vehicle's frames that a pilot needs, unaltered and at a
+//! lower rate. It adds the monitor's own messages: heartbeat, findings as `STATUSTEXT`, levels and usage as
+//! `NAMED_VALUE_FLOAT`, and all levels in one `NAMED_VALUE_INT` ([`state`]).
 //!
-//! An [`Outlet`] keeps the byte budget and lets findings overtake. A periodic message is due when its interval is nearly over.
-//! Its score is its waiting time in intervals. If the budget is short, a frame is sent only if the frame with the highest score
-//! still fits after it. So every score becomes the highest in time, and no message starves. A message that has waited four
-//! intervals gets the priority of a heartbeat.
+//! An [`Outlet`] guards the byte budget and lets findings overtake. A periodic message is due when its interval is
+//! nearly over. Its score is its waiting time in intervals. If the budget is short, a frame is sent only if the frame
+//! with the highest score still fits after it. So every score becomes the highest in time, and no message starves. A
+//! message that has waited four intervals gets the priority of a heartbeat.
 
 use core::fmt::Write as _;
 
@@ -56,7 +56,7 @@ const FORWARDED: &[(u32, u16)] = &[
     (11_031, 1_000), // ESC_TELEMETRY_5_TO_8
     (11_032, 1_000), // ESC_TELEMETRY_9_TO_12
 ];
-/// Our values, which take turns with what is forwarded.
+/// Our values, which alternate with forwarded messages.
 const VALUES: usize = FORWARDED.len();
 /// All levels together.
 const STATE: usize = VALUES + 1;
@@ -78,7 +78,7 @@ const WAITING_MAX: usize = 16;
 const HEARTBEAT: Span = Span::from_secs(1);
 /// Intervals after which a message goes like a heartbeat.
 const STARVED: u32 = 4;
-/// A message that did not come for so many intervals, and [`GONE_MS`], is not waited for.
+/// A message without a frame for this many intervals, and [`GONE_MS`], is not waited for.
 const GONE: u32 = 3;
 const GONE_MS: u32 = 3_000;
 
@@ -150,7 +150,7 @@ pub struct Summary {
     vehicle: Option<Source>,
     turns: [Turn; TURNS],
     next_value: usize,
-    /// The most urgent first, then in order.
+    /// The most urgent first, then by age.
     waiting: heapless::Vec<Finding, WAITING_MAX>,
     dropped: u32,
     telling: Telling,
@@ -213,7 +213,7 @@ impl Summary {
         *turn = Turn { seen_ms: now_ms, bytes: bytes as u16, known: true, ..*turn };
     }
 
-    /// The vehicle's heartbeat is what makes it a vehicle on the ground station's map.
+    /// The vehicle's heartbeat puts it on the ground station's map.
     fn is_urgent(&self, index: usize, now_ms: u32) -> bool {
         let score = self.turns[index].score(now_ms, interval_ms(index));
         index == 0 || score.is_some_and(|score| score > 16 * STARVED)
@@ -262,7 +262,7 @@ impl Summary {
         self.tell(now, None, out);
     }
 
-    /// Tells what waits and has its turn; only what is critical where it is not known what is so now.
+    /// Sends waiting findings whose turn it is; without `health` only the critical ones.
     fn tell(&mut self, now: Instant, health: Option<&Health>, out: &mut impl FnMut(&[u8])) {
         let mut place = 0;
         while let Some(finding) = self.waiting.get(place) {
@@ -336,7 +336,7 @@ impl Summary {
         }
     }
 
-    /// Findings that were not told because more urgent ones took all room.
+    /// Findings that were dropped for more urgent ones.
     pub const fn dropped(&self) -> u32 {
         self.dropped
     }
@@ -362,7 +362,7 @@ enum Told {
     Own(fn(&OwnFigures) -> f32),
 }
 
-/// The overall level, on the scale of [`Told::Level`]: it comes every other time, before each of [`VALUES_TOLD`].
+/// The overall level, on the scale of [`Told::Level`]: every other value, before each of [`VALUES_TOLD`].
 const OVERALL: &str = "HUMS_LEVEL";
 
 /// Values sent in turn, with the names under which a ground station plots them.

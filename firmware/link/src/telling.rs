@@ -7,8 +7,9 @@
 //! * A critical finding is never delayed. It is sent if its order differs from those of the event's earlier texts:
 //!   the fourth lost motor, or the pitch beside the roll, does not repeat LAND NOW.
 //! * A warning waits for [`HOLD`]. If it becomes critical meanwhile, only the critical finding is sent. Otherwise it
-//!   is the first text of an event, or waits for the event's end, and is told if it is still so. So is what has no
-//!   data, or is good again. A check that no longer applies, as after landing, is not reported: its state is unknown.
+//!   is the first text of an event, or waits for the event's end, and is sent if it still holds. The same goes for
+//!   missing data, and for the end of a finding. A check that no longer applies, as after landing, is not reported:
+//!   its state is unknown.
 //! * Of a mishap the first kind is sent. Another one is sent if its order differs and nothing led to it. The text
 //!   that it is down, with the place, comes by itself. A kind whose order does not fit the vehicle is sent with the
 //!   one that fits ([`order`]); if none fits, its cause does not count. A waiting mild finding that began with the
@@ -30,7 +31,7 @@ const HOLD: Span = Span::from_secs(1);
 const MILD_MAX: usize = 3;
 /// See [`MILD_MAX`].
 const SPAN: Span = Span::from_secs(30);
-/// Texts of a mishap, with one that led to it; that it is down comes beside them.
+/// Texts of a mishap, one of its cause included; the text that it is down comes beside them.
 const MISHAP_MAX: u8 = 2;
 /// Open alarms with stored details.
 const OPEN_MAX: usize = 16;
@@ -38,9 +39,9 @@ const OPEN_MAX: usize = 16;
 /// Decision about a waiting finding.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Fate {
-    /// It is told now.
+    /// It is sent now.
     Now,
-    /// It is told later, if it is still so.
+    /// It is sent later, if it still holds.
     Later,
     /// It is in the record.
     Never,
@@ -58,7 +59,7 @@ struct Event {
     begun_ms: u32,
     /// Texts; 0: no event.
     told: u8,
-    /// The numbers of the critical checks that were told.
+    /// The numbers of the critical checks that were sent.
     critical: [Option<u8>; 3],
 }
 
@@ -74,14 +75,14 @@ impl Event {
     }
 }
 
-/// What was told.
+/// The sent findings.
 #[derive(Clone, Debug)]
 pub(crate) struct Telling {
     /// By family.
     events: [Event; Subsystem::ALL.len()],
     /// When the last texts went that were not critical, in milliseconds modulo 2^32.
     mild: heapless::Deque<u32, MILD_MAX>,
-    /// The check's number, and the instance, of the alarms that were told and are not over.
+    /// Check number and instance of the sent alarms that are not over.
     open: heapless::Vec<(u8, u8), OPEN_MAX>,
 }
 
@@ -94,12 +95,12 @@ impl Telling {
         }
     }
 
-    /// Whether a pilot is to hear of it, now or later.
+    /// Whether a pilot should get it, now or later.
     pub(crate) fn is_news(&mut self, finding: &Finding) -> bool {
         let Some(key) = key(finding) else { return finding.because.is_empty() };
         match finding.level {
             Level::Ok if finding.subsystem == Subsystem::Mishap => {
-                // It flies on, which is told by itself, or something new begins.
+                // Its flying on has a text of its own, or a new event begins.
                 self.events[Subsystem::Mishap as usize] = Event::NONE;
                 false
             }
@@ -113,14 +114,14 @@ impl Telling {
         }
     }
 
-    /// Whether an alarm that was told explains it: a sensor that is dead agrees with others by chance.
+    /// Whether a sent alarm explains it: a dead sensor agrees with others by chance.
     fn is_explained(&self, finding: &Finding) -> bool {
         let Some(check) = health::check_named(finding.check) else { return false };
         let mut open = self.open.iter().filter_map(|(number, _)| health::checks().nth(usize::from(*number)));
         open.any(|cause| health::explains(cause, check))
     }
 
-    /// What becomes of it now.
+    /// The decision on a finding now.
     pub(crate) fn fate(&mut self, now: Instant, finding: &Finding) -> Fate {
         let event = &self.events[family(finding.subsystem) as usize];
         let is_mishap = finding.subsystem == Subsystem::Mishap;
@@ -143,7 +144,7 @@ impl Telling {
         if is_held || is_busy || self.mild.is_full() { Fate::Later } else { Fate::Now }
     }
 
-    /// Whether what waits is not told any longer once this was: a mishap, and what it brings with it.
+    /// Whether `told` makes a waiting finding obsolete: a mishap, and its consequences.
     pub(crate) fn is_consequence(told: &Finding, waits: &Finding) -> bool {
         told.subsystem == Subsystem::Mishap
             && waits.level != Level::Critical

@@ -19,7 +19,7 @@ pub enum Severity {
     Info = 6,
 }
 
-/// A text that is put together; what does not fit is cut.
+/// A text in assembly; it is cut at its limit.
 #[derive(Clone, Debug, Default)]
 pub struct Text(heapless::String<TEXT_BYTES_MAX>);
 
@@ -27,7 +27,7 @@ impl Text {
     /// Formats a text.
     pub fn new(arguments: fmt::Arguments<'_>) -> Self {
         let mut text = Self::default();
-        // Cut where it is full: that is what a text of 50 bytes is.
+        // Cut when full: a text has 50 bytes.
         let _ = text.write_fmt(arguments);
         text
     }

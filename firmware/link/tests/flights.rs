@@ -69,7 +69,7 @@ struct Expected {
     height_max_m: f64,
     charge_ah: f64,
     energy_wh: f64,
-    /// Of charge and energy. Where current comes every few seconds, the two ways of filling the gaps differ.
+    /// Tolerance of charge and energy. If current comes every few seconds, the two ways of filling the gaps differ.
     power_tolerance: f64,
 }
 
@@ -219,7 +219,7 @@ fn healthy_flights_have_no_critical_finding() {
     ] {
         let Some(recording) = flight(name) else { continue };
         let alarms = watch(&recording).alarms();
-        // The link of this one was silent from 186 s on for a while: that is what the finding says.
+        // Its link was silent from 186 s on for a while, as the finding says.
         let silent = |alarm: &&(f64, &str, Level)| name == "eagle_ac740ecf.tlog" && alarm.1 == "heartbeat";
         let critical = alarms.iter().filter(|alarm| alarm.2 == Level::Critical && !silent(alarm));
         let critical: Vec<_> = critical.collect();
@@ -231,14 +231,14 @@ fn healthy_flights_have_no_critical_finding() {
 fn the_faults_that_show_in_the_telemetry_of_the_faulty_flight_are_found() {
     let recording = flight("ap_quad_faults.tlog").expect("in the repository");
     let alarms = watch(&recording).alarms();
-    // The battery falls to 3.4 V a cell at 255.7 s; its own fail-safe at 265.8 s declares the vehicle critical and the
-    // battery unhealthy. The simulator's fewer satellites and jammed receiver never reached its messages (ten satellites
-    // throughout, enough for a flight). Its vibration from 85.5 s on stays at 15 m/s2, half of the limit, and is far above
-    // what this flight had.
+    // The battery falls to 3.4 V a cell at 255.7 s; its own fail-safe at 265.8 s declares the vehicle critical and
+    // the battery unhealthy. The simulator's fewer satellites and jammed receiver never reached its messages (ten
+    // satellites throughout, enough for a flight). Its vibration from 85.5 s on stays at 15 m/s2, half of the limit,
+    // and far above the earlier level of this flight.
     let expected = [
         ("vibration_rise", Level::Warning, 86.5, 87.5),
         ("cell_voltage", Level::Critical, 260.7, 260.9),
-        // Its texts, and two heartbeats, one a second, say so.
+        // By its texts, and two heartbeats, one a second.
         ("battery_alert", Level::Warning, 265.7, 266.0),
         ("autopilot_state", Level::Critical, 266.5, 267.5),
         // The autopilot calls the battery low.

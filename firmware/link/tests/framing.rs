@@ -7,7 +7,7 @@ use common::{Random, crc32, excerpt, flight};
 use hums_link::{Check, Frame, Framer};
 use std::collections::HashSet;
 
-/// All frames of `bytes`, which come in pieces of `piece` bytes; then the line ends.
+/// All frames of `bytes`, in pieces of `piece` bytes; then the line ends.
 fn frames_in_pieces(bytes: &[u8], piece: usize) -> (Vec<(Vec<u8>, Check)>, Framer) {
     let mut framer = Framer::new();
     let mut frames = Vec::new();
@@ -49,7 +49,7 @@ fn excerpts_come_through_whole_however_the_bytes_are_cut() {
     }
 }
 
-/// File, frames that fit our definitions, frames of another definition, crc32 of all, where pymavlink agrees on all.
+/// File, frames of our definitions, frames of other definitions, crc32 of all; pymavlink agrees on all.
 const FLIGHTS: [(&str, usize, usize, u32); 9] = [
     ("ap_quad_faults.tlog", 77_633, 0, 0x4159_f976),
     ("ap_quad_guided.tlog", 57_874, 0, 0xe20a_0b8e),
@@ -75,7 +75,7 @@ fn whole_flights_come_through_bit_for_bit() {
     }
 }
 
-/// Damages each byte with probability `1 / one_in`; says which bytes.
+/// Damages each byte with probability `1 / one_in`; returns which ones.
 fn with_noise(bytes: &[u8], one_in: u64, random: &mut Random) -> (Vec<u8>, Vec<bool>) {
     bytes
         .iter()
@@ -86,7 +86,8 @@ fn with_noise(bytes: &[u8], one_in: u64, random: &mut Random) -> (Vec<u8>, Vec<b
         .unzip()
 }
 
-/// Every undamaged frame of the recording survives noise; returns how many were damaged and what came through besides.
+/// Every undamaged frame of the recording survives noise; returns the numbers of damaged frames and of additional
+/// ones.
 fn survives_noise(name: &str, bytes: &[u8], bounds: &[(usize, usize)], seed: u64) -> (usize, usize) {
     let mut random = Random(seed);
     let (noisy, hits) = with_noise(bytes, 1_000, &mut random);

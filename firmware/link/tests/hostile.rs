@@ -75,7 +75,7 @@ fn params(settings: &[(usize, f32)]) -> Params {
     params
 }
 
-/// Everything that the monitor gives away, as the firmware takes it after each tick.
+/// Every output of the monitor, as the firmware takes it after each tick.
 fn look(monitor: &mut Monitor, now: Instant) {
     let sane = |counter: u8, value: f64| {
         // A figure may be negative: a motor slower than the others.
@@ -167,7 +167,7 @@ proptest! {
         for beat in 0..beats {
             let now = Instant::from_millis(u64::from(beat) * 500);
             let mut bytes = frame(0, beat, &heartbeat(beat % 2 == 0, 3));
-            // Every integer at the value that says unknown, every float not a number.
+            // Every integer at its unknown value, every float NaN.
             bytes.extend(frame(unknown, beat, &[0xff; 100]));
             framer.push(&bytes, &mut |frame| {
                 if let Some((source, observation)) = observe(&frame) {

@@ -87,7 +87,7 @@ fn cut_and_look<const SECTOR: usize>(cuts: u64, seed: u64, length_max: u64, step
 
 #[test]
 fn after_ten_thousand_cuts_each_item_was_old_or_new_every_time() {
-    // Small sectors fill quickly, so many cuts happen during the copy into the other sector.
+    // Small sectors fill quickly, so many cuts hit the copy into the other sector.
     let erases = cut_and_look::<2048>(9_000, 1, 200, 400);
     assert!(erases > 1_000, "{erases} erases for the cuts to meet");
     // As on the board.

@@ -7,8 +7,8 @@ use super::stm32f4::{Card, Idle, Led, PortRx, PortTx, StoreFlash, Watchdog};
 /// Reload value of `SysTick`: all bits set, 0.1 s at 168 MHz.
 pub(crate) const SYSTICK_RELOAD: u32 = (1 << 24) - 1;
 
-/// Bytes that reception fetches at a time: 2.8 ms at 921,600 baud, nearly three times what comes between two looks. After a delay
-/// it takes several, without a pause between them.
+/// Bytes that reception fetches at a time: 2.8 ms at 921,600 baud, nearly three times the input between two reads.
+/// After a delay it takes several, without a pause between them.
 pub(crate) const FETCH_BYTES: usize = 256;
 
 /// Parts of a board: reception and transmission of each port, and the rest.

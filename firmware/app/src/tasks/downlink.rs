@@ -19,7 +19,7 @@ const SEND_MAX: Duration = Duration::from_millis(500);
 pub(crate) static BAUD_GS: AtomicU32 = AtomicU32::new(0);
 pub(crate) static BAUD_AUTOPILOT: AtomicU32 = AtomicU32::new(0);
 
-/// A transmission did not come to its end since the start.
+/// A transmission since the start did not end.
 pub(crate) static GS_STOOD_STILL: AtomicBool = AtomicBool::new(false);
 pub(crate) static AUTOPILOT_STOOD_STILL: AtomicBool = AtomicBool::new(false);
 

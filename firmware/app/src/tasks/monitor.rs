@@ -91,7 +91,7 @@ pub(crate) async fn run(
         }
         wake_others();
         if is_behind {
-            // Those less urgent go on, and what does not fit into the frame queue meanwhile is lost and counted.
+            // Less urgent tasks run; frames that overflow the queue meanwhile are lost and counted.
             links::FRAMES.signal(());
             Timer::after(REST).await;
         }
@@ -110,7 +110,7 @@ fn tell_fault(body: &mut Monitoring<'static>, ends: &mut Ends, cause: ResetCause
     }
 }
 
-/// Reports missing parts of the board once; `told` holds the reported ones.
+/// Reports missing parts of the board once; `told` stores the reported ones.
 #[inline(never)]
 fn tell_board(body: &mut Monitoring<'static>, ends: &mut Ends, told: &mut [bool; 4], has_random: bool) {
     let stood_still = |port: &AtomicBool| port.load(Ordering::Relaxed);

@@ -22,7 +22,7 @@ const REPORT: Duration = Duration::from_secs(1);
 /// Body of the task.
 type Body = Storage<'static, board::Card>;
 
-// Statics of their own: made within the task both would come to their place over the stack, 8 and 1.5 KiB of it.
+// Statics of their own: made within the task, both would take 8 and 1.5 KiB of its stack first.
 static HELD: ConstStaticCell<Buffers> = ConstStaticCell::new(Buffers::new());
 static BODY: StaticCell<Body> = StaticCell::new();
 

@@ -77,7 +77,7 @@ impl Body {
         Some(())
     }
 
-    /// The fields that the layout describes; gives where they end. `calm`: the quiet ones stay as they are.
+    /// The fields of the layout; returns their end. `calm`: the quiet ones are unchanged.
     #[inline(never)]
     fn fields<C: Coder>(
         &mut self,
@@ -107,7 +107,7 @@ impl Body {
         Some(end)
     }
 
-    /// Whether all quiet elements stay as they are: one bit for all of them.
+    /// Whether all quiet elements are unchanged: one bit for all of them.
     #[inline(never)]
     fn calm<C: Coder>(&mut self, coder: &mut C, slot: &mut Slot, frame: &mut Frame) -> Option<bool> {
         let same = C::WRITES && self.stays(slot, frame)?;
@@ -116,7 +116,7 @@ impl Body {
         Some(same)
     }
 
-    /// Whether the frame has the quiet elements as they are.
+    /// Whether the frame has unchanged quiet elements.
     fn stays(&self, slot: &Slot, frame: &mut Frame) -> Option<bool> {
         let mut rest = self.elements.list.get(elements_in(slot))?;
         while let Some((element, after)) = rest.split_first()
@@ -146,7 +146,7 @@ impl Body {
         self.restore(slot, &mut copy).is_some() && copy.payload == frame.payload
     }
 
-    /// Puts together the last payload from the elements; nothing where not all of it was kept.
+    /// Assembles the last payload from the elements; `None` unless all of it was stored.
     pub(super) fn restore(&self, slot: &Slot, frame: &mut Frame) -> Option<()> {
         let (mut end, mut is_kept) = (0, slot.layout.is_some());
         let mut rest = self.elements.list.get(elements_in(slot))?;
@@ -166,19 +166,19 @@ impl Body {
             end = usize::from(element.end);
             rest = after;
         }
-        // Bytes beyond the layout are not kept.
+        // Bytes beyond the layout are not stored.
         (is_kept && (frame.len <= end || slot.length == Length::Trimmed)).then_some(())
     }
 }
 
-/// What an element had last.
+/// The last value of an element.
 enum Last<'a> {
     Number(u64),
     Bytes(&'a [u8]),
 }
 
 impl Common {
-    /// What an element had last, those after it being these; nothing where it was not kept.
+    /// The last value of an element, with the elements `after` it; `None` unless it was stored.
     #[inline]
     fn last<'a>(&'a self, slot: &'a Slot, element: &Element, after: &[Element]) -> Option<Last<'a>> {
         Some(match element.what() {
@@ -276,7 +276,7 @@ fn word(place: &[u8; 8]) -> u32 {
     u32::from_le_bytes([place[0], place[1], place[2], place[3]])
 }
 
-/// A value of 1, 2, 4 or 8 bytes in its place, and nothing else; the writer has it there.
+/// A value of 1, 2, 4 or 8 bytes in its place; the writer has it there already.
 #[inline]
 fn put<C: Coder>(place: &mut [u8; 8], value: u64, size: usize) {
     let bytes = value.to_le_bytes();

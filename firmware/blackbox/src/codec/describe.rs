@@ -9,7 +9,7 @@ use super::links;
 use super::slots::{INSTANCE_BYTES, Key, Slot};
 use crate::layouts::{FieldLayout, Layout, Place};
 
-/// Arrays of so many bytes are data, not numbers.
+/// Arrays of this many bytes or more are data, not numbers.
 const DATA_BYTES: u8 = 16;
 
 /// Offset and size of a message's instance field.

@@ -63,14 +63,14 @@ impl Frame {
         self.clear_payload(0);
     }
 
-    /// Keeps `len` bytes of the payload; clears what a frame before left beyond.
+    /// Clears bytes of an earlier frame beyond the first `len` of the payload.
     fn clear_payload(&mut self, len: usize) {
         if len < self.used
             && let Some(beyond) = self.payload.get_mut(len..self.used)
         {
             beyond.fill(0);
         }
-        // Whoever fills it in says less.
+        // A caller that fills fewer bytes lowers it.
         self.used = self.payload.len();
     }
 
@@ -133,7 +133,7 @@ impl Frame {
         }
     }
 
-    /// The message id as its head has it, if anyone knows what a frame with its flags means.
+    /// The message id in the head, if the frame's flags are known.
     pub(crate) fn known_id(&self) -> Option<u32> {
         match (self.v2, self.incompat) {
             (false, _) => Some(self.id & 0xff),
@@ -171,8 +171,8 @@ impl Frame {
         }
     }
 
-    /// Length of the payload without trailing zeros, at least 1, as a MAVLink 2 sender truncates it. Of a frame that is read:
-    /// there are only zeros beyond `full`.
+    /// Length of the payload without trailing zeros, at least 1, as a MAVLink 2 sender truncates it. For a frame that
+    /// was read, only zeros are beyond `full`.
     pub(crate) fn trimmed(&self, full: usize) -> usize {
         let words = self.payload.as_chunks().0;
         let words = words.get(..full.div_ceil(size_of::<u64>())).unwrap_or_default();
@@ -185,7 +185,7 @@ impl Frame {
         1
     }
 
-    /// Of a frame that was read: bytes of the payload that may not be zero.
+    /// For a frame that was read: bytes of the payload that may not be zero.
     pub(crate) fn fill_ends(&mut self, at: usize) {
         self.used = (at + size_of::<u64>()).min(self.payload.len());
     }

@@ -19,12 +19,12 @@ const SPELLED_OUT: usize = 3;
 const UNEXPECTED: Cdf = Cdf::from_sizes([4, 8, 80, 20, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1]);
 const SYMBOL: Cdf = Cdf::from_sizes([80, 4, 8, 4, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1]);
 
-/// How headers were coded so far.
+/// Statistics of headers.
 pub(super) struct Headers {
     last: u8,
-    /// Of a slot's first frame.
+    /// For a slot's first frame.
     first: Cdf,
-    /// Of frames that are not as expected, by how the slot's last one was coded, and the one before.
+    /// For unexpected frames, by the coding of the slot's last one, and of the one before.
     symbols: [Cdf; 16],
     jumps: [Cdf; 2],
     signatures: Cdf,
@@ -62,7 +62,7 @@ impl Headers {
         self.last != AS_EXPECTED as u8
     }
 
-    /// Of a frame to be written: whether its header, length and checksum are as expected.
+    /// Whether a frame to be written has the expected header, length and checksum.
     #[inline]
     pub(super) fn is_expected(slot: &Slot, sender: &Sender, frame: &Frame, verified: bool) -> bool {
         frame.sequence == sender.sequence && is_usual(slot, frame, verified)
@@ -85,7 +85,7 @@ impl Headers {
         Plan { header: AS_EXPECTED, length: None, checksum: None }
     }
 
-    /// Header, flags, length and checksum, as far as they are not as expected.
+    /// Header, flags, length and checksum, as far as they are unexpected.
     #[inline(never)]
     pub(super) fn code<C: Coder>(
         &mut self,
@@ -178,7 +178,7 @@ fn take_flags(slot: &Slot, frame: &mut Frame) {
     }
 }
 
-/// Whether a frame is what its slot lets expect, but for its sequence number.
+/// Whether a frame is as its slot expects, except for its sequence number.
 fn is_usual(slot: &Slot, frame: &Frame, verified: bool) -> bool {
     // The checksum of a verified frame matched our definition. If it no longer matches, memory has changed; the chain reveals
     // this to readers.

@@ -1,17 +1,17 @@
-//! The same quantity in several messages: a velocity comes in centimetres per second in one message and as a float in
-//! another. Messages publish such quantities into registers; numbers are then also predicted from their register. A register may
-//! also be computed from others, as the autopilot computed it: exactly alike on every machine.
+//! Quantities in several messages: a velocity, for instance, is centimetres per second in one and a float in another.
+//! Messages publish such quantities into registers; numbers are then also predicted from their register. A register
+//! may also be computed from others, as in the autopilot: exactly alike on every machine.
 //!
-//! The table is part of format version 3. It names fields by message id and byte offset. If a layout differs, the prediction is
-//! bad, but writer and reader still agree.
+//! The table is part of format version 3. It names fields by message id and byte offset. If a layout differs, the
+//! prediction is bad, but writer and reader still agree.
 
 use super::element::Element;
 
-/// Quantities kept: single-precision numbers, and from `WHOLE` on whole ones of 32 bits, which have no scale.
+/// Stored quantities: single-precision numbers, and from `WHOLE` on whole ones of 32 bits, without a scale.
 const REGISTERS: usize = 45;
 const WHOLE: usize = 31;
 
-/// The first registers of an attitude's angles, of the quaternion that is made of them, and of the quaternion told last.
+/// The first registers of an attitude's angles, of their quaternion, and of the last received quaternion.
 const ANGLES: usize = 0;
 const QUATERNION: usize = 23;
 const TOLD: usize = 27;
@@ -19,7 +19,7 @@ const TOLD: usize = 27;
 const TIMES: usize = 43;
 const ATTITUDE_QUATERNION: u32 = 31;
 
-/// A register, and what turns the field's unit into the register's or back.
+/// A register, and the factor from the field's unit to the register's.
 #[derive(Clone, Copy, Debug)]
 struct Link {
     register: u8,
@@ -57,11 +57,13 @@ const DEGREES: f32 = 57.295_78;
 /// 1e-7 degrees of latitude in a metre: 1e7 / 111,319.
 const LATITUDE: f32 = 89.832;
 
-/// By id, then offset. Registers: 0-2 roll, pitch, yaw in rad; 3-5 body rates in rad/s; 6-8 the same from the raw IMU; 9, 10 horizontal NED
-/// velocity in m/s (`GLOBAL_POSITION_INT`), 14, 15 the same (`LOCAL_POSITION_NED`); 11 velocity downwards, as the latest float has it; 12 relative
-/// altitude, 13 altitude in m; 16-18 local position in m; 19 altitude (`AHRS2`); 20 pressure altitude; 21, 22 monotonic and relative altitude
-/// (`ALTITUDE`); 23-26 the quaternion of 0-2, 27-30 the one told last. Whole ones: 31, 32 latitude and longitude in 1e-7 degrees; 33-40 channels
-/// of the remote control; 41, 42 voltage and current of the battery; 43, 44 times of the attitude and of the message with its quaternion.
+/// By id, then offset. Registers: 0-2 roll, pitch, yaw in rad; 3-5 body rates in rad/s; 6-8 the same from the raw
+/// IMU; 9, 10 horizontal NED velocity in m/s (`GLOBAL_POSITION_INT`), 14, 15 the same (`LOCAL_POSITION_NED`); 11
+/// velocity downwards, as the latest float has it; 12 relative altitude, 13 altitude in m; 16-18 local position in m;
+/// 19 altitude (`AHRS2`); 20 pressure altitude; 21, 22 monotonic and relative altitude (`ALTITUDE`); 23-26 the
+/// quaternion of 0-2, 27-30 the last received one. Whole ones: 31, 32 latitude and longitude in 1e-7 degrees; 33-40
+/// channels of the remote control; 41, 42 voltage and current of the battery; 43, 44 times of the attitude and of the
+/// message with its quaternion.
 static ROWS: [Row; 98] = [
     row(1, 14).consults(41, 1.0).publishes(41, 1.0),
     row(1, 16).consults(42, 1.0).publishes(42, 1.0),
@@ -169,7 +171,7 @@ pub(super) fn row_of(id: u32, offset: usize) -> u8 {
     found.map_or(0, |index| index as u8 + 1)
 }
 
-/// The quantities as they were told last.
+/// The last values of the quantities.
 pub(super) struct Registers([u32; REGISTERS]);
 
 impl Registers {
@@ -207,7 +209,7 @@ impl Registers {
         Some((self.get(register) * link.scale) as i32 as u32)
     }
 
-    /// A field tells its register.
+    /// Stores a field in its register.
     #[inline]
     pub(super) fn publish(&mut self, element: &Element) {
         if let Some(row) = ROWS.get(usize::from(element.row()).wrapping_sub(1))
@@ -219,7 +221,7 @@ impl Registers {
         }
     }
 
-    /// The attitude's quaternion, with the sign of the one told last: both signs say the same attitude.
+    /// The attitude's quaternion, with the sign of the last received one: both signs mean the same attitude.
     #[inline(never)]
     fn quaternion(&mut self) {
         let [(sr, cr), (sp, cp), (sy, cy)] =

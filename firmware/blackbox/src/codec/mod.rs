@@ -34,7 +34,7 @@ use crate::limits::ENTRY_BYTES_MAX;
 pub(crate) const CODED_BYTES_MAX: usize = 640;
 const _: () = assert!(ENTRY_BYTES_MAX + 20 <= CODED_BYTES_MAX);
 
-/// What an entry is.
+/// The kind of an entry.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Kind {
     /// A frame, and whether its checksum matches our definition.
@@ -43,7 +43,7 @@ pub(crate) enum Kind {
     Record,
 }
 
-/// An entry as it is written.
+/// An entry for the writer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Entry<'a> {
     pub(crate) kind: Kind,
@@ -65,7 +65,7 @@ pub(crate) struct Corrupt;
 
 pub(crate) type Out = Scratch<CODED_BYTES_MAX>;
 
-/// What writer and reader know alike of the group so far.
+/// The common knowledge of writer and reader about the group so far.
 pub(crate) struct Model {
     layouts: Layouts,
     last_ms: u64,
@@ -104,7 +104,7 @@ impl Model {
         self.times = TIME;
     }
 
-    /// Writes an entry. `plain`: as it is, because the model makes it too long.
+    /// Writes an entry. `plain`: uncoded, because the model makes it too long.
     pub(crate) fn encode(
         &mut self,
         entry: &Entry<'_>,
@@ -300,7 +300,7 @@ impl Model {
         Some((slot.verified, at_ms))
     }
 
-    /// A slot's first frame: who sends what.
+    /// A slot's first frame: sender and message.
     fn new_slot<C: Coder>(&mut self, coder: &mut C, key: Key) -> Option<u8> {
         let sender = self.slots.senders.get(usize::from(key.sender))?;
         let (system, component) = (u32::from(sender.system), u32::from(sender.component));

@@ -1,10 +1,10 @@
-//! Reader's memory beside the model: whether each slot's last frame still holds the last value of each element. Most frames say
-//! that their quiet elements stay as they are: these need not be put there again.
+//! Reader's memory beside the model: whether each slot's last frame still holds the last value of each element. In
+//! most frames the quiet elements are unchanged, and need not be written again.
 
 use super::slots::SLOTS;
 use crate::coder::{Coder, Reading, Writing};
 
-/// No payload: nothing is limited there.
+/// No payload, and so no limit.
 const NONE: u16 = u16::MAX;
 
 /// The last payloads of all slots.
@@ -13,7 +13,7 @@ pub(crate) struct Recall {
     slot: usize,
     /// Seed of the frame's checksum, if the checksum was not sent.
     pub(crate) seed: Option<u8>,
-    /// What limited the fields of each slot's last payload, which has nothing else in it.
+    /// Limits of the fields in each slot's last payload, which has no other bytes.
     limits: [u16; SLOTS],
 }
 
@@ -26,7 +26,7 @@ impl Recall {
         self.limits = [NONE; SLOTS];
     }
 
-    /// A frame of this slot comes.
+    /// Begins a frame of this slot.
     pub(super) fn turn_to(&mut self, slot: usize) {
         self.slot = slot;
     }
@@ -37,7 +37,7 @@ impl Recall {
         self.limits.get(self.slot).is_some_and(|&known| usize::from(known) == limit)
     }
 
-    /// The payload has fields limited there; `only`: and nothing else.
+    /// The payload has fields limited there; `only`: and no other bytes.
     #[inline]
     pub(super) fn keep(&mut self, limit: usize, only: bool) {
         if let Some(known) = self.limits.get_mut(self.slot) {

@@ -8,16 +8,16 @@ use crate::distribution::Cdf;
 use crate::limits::ENTRY_BYTES_MAX;
 use crate::record::Shape;
 
-/// Kinds whose last record is kept, each in the place of its number modulo this.
+/// Kinds with a stored last record, each in the place of its number modulo this.
 const KINDS: usize = 16;
 
-/// Numbers of a record that are kept: its shape, its length, and the first words. Statistics have 24.
+/// Stored numbers of a record: its shape, its length, and the first words. Statistics have 24.
 const KEPT: usize = 26;
 
 /// Distributions of the words' classes: each word's of each kind, as far as they go round.
 const CONTEXTS: usize = 16;
 
-/// How a record begins: bytes as they are, its kind, or a kind that is spelled out.
+/// The beginning of a record: uncoded bytes, its kind, or a kind that is spelled out.
 const RAW: usize = 0;
 const OTHER_KIND: usize = 15;
 
@@ -26,7 +26,7 @@ pub(super) struct Records {
     kinds: Cdf,
     kept: [[u32; KEPT]; KINDS],
     words: [Cdf; CONTEXTS],
-    /// Of the halves, by whether the one before was 0, small or large.
+    /// For the halves, by whether the previous one was 0, small or large.
     halves: [Cdf; 4],
 }
 
@@ -40,7 +40,7 @@ impl Records {
         }
     }
 
-    /// In place: a new one would lie on the stack first.
+    /// In place: a new one would go through the stack.
     pub(super) fn reset(&mut self) {
         self.kinds = Cdf::FLAT;
         self.kept.as_flattened_mut().fill(0);
@@ -48,7 +48,7 @@ impl Records {
         self.halves.fill(Cdf::FLAT);
     }
 
-    /// Codes a record in its stored form, `len` bytes of the buffer; gives its length. `raw`: as it is.
+    /// Codes a record in its stored form, `len` bytes of the buffer; returns its length. `raw`: uncoded.
     #[inline(never)]
     pub(super) fn code<C: Coder>(
         &mut self,
@@ -127,7 +127,7 @@ impl Records {
     }
 }
 
-/// A record as it is: any bytes.
+/// A record of any bytes, uncoded.
 fn raw_bytes<C: Coder>(coder: &mut C, buffer: &mut [u8; ENTRY_BYTES_MAX], len: usize) -> Option<usize> {
     let len = coder.bits16(len as u32, 10) as usize;
     for place in buffer.get_mut(..len)? {

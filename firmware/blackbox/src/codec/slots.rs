@@ -15,7 +15,7 @@ pub(crate) const SENDERS: usize = 16;
 /// The longest instance field: a name of 10 characters.
 pub(crate) const INSTANCE_BYTES: usize = 10;
 
-/// What names a slot.
+/// The identity of a slot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Key {
     pub(crate) id: u32,
@@ -45,7 +45,7 @@ pub(crate) struct Slot {
     pub(crate) times: u16,
     pub(crate) at_ms: u32,
     pub(crate) seed: u8,
-    /// The seed comes from our definition.
+    /// The seed is that of our definition.
     pub(crate) own_seed: bool,
     pub(crate) verified: bool,
     pub(crate) incompat: u8,
@@ -58,7 +58,7 @@ pub(crate) struct Slot {
     /// Offset and size of the instance field; 0 where there is none.
     pub(crate) instance_at: u8,
     pub(crate) instance_size: u8,
-    /// Whether the quiet elements stayed as they are.
+    /// Whether the quiet elements were unchanged.
     pub(crate) calm: Cell,
     /// There were quiet elements after the last frame.
     pub(crate) quiet: bool,
@@ -138,7 +138,7 @@ pub(crate) struct Sender {
     pub(crate) signature_time: u64,
 }
 
-/// What comes next.
+/// The next entry.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Next {
     Slot(u8),
@@ -184,7 +184,7 @@ pub(crate) struct Slots {
     order_2: [Guess; ORDER_2],
     /// The last three slots, the latest first.
     past: [u8; 3],
-    /// Where what follows them is remembered, in `order_3` and `order_2`.
+    /// The places in `order_3` and `order_2` for its successor.
     places: (u16, u16),
     /// Prediction: the two likeliest slots, and the confidence in the first.
     guesses: (u8, u8, u8),
@@ -284,7 +284,7 @@ impl Slots {
         Some(self.used - 1)
     }
 
-    /// The two slots that are likeliest to come, and how sure the first one is.
+    /// The two most likely next slots, and the certainty of the first one.
     fn guess(&self) -> (u8, u8, u8) {
         let (three, two) = self.places;
         let three = self.order_3[usize::from(three) % ORDER_3];
@@ -312,8 +312,8 @@ impl Slots {
         (first, second, if agree && sure >= 7 { 12 + (sure & 3) } else { sure })
     }
 
-    /// Codes what comes next, and of a slot's frame whether its header is as expected. `rough`: the last frame's
-    /// header was unexpected.
+    /// Codes the next entry's slot, and for a slot's frame whether its header is as expected. `rough`: the last
+    /// frame's header was unexpected.
     pub(crate) fn next<C: Coder>(
         &mut self,
         coder: &mut C,

@@ -21,7 +21,7 @@ impl TextModel {
         Self { rows: [Cdf::UNSET; ROWS], same: [Cell::UNSET; MATCHES] }
     }
 
-    /// In place: a new one would lie on the stack first.
+    /// In place: a new one would go through the stack.
     pub(crate) fn reset(&mut self) {
         self.rows.fill(Cdf::FLAT);
         self.same.fill(Cell::EVEN);

@@ -1,17 +1,16 @@
-//! Text and data fields: the last text of each is kept, as far as there is room.
+//! Text and data fields: the last text of each is stored while there is room.
 
 use super::element::Element;
 use super::text::TextModel;
 use crate::coder::Coder;
 use crate::distribution::Cdf;
 
-/// Bytes kept of text fields.
 const TEXT_BYTES: usize = 1_024;
 
 /// The longest text: a payload.
 const TEXT_BYTES_MAX: usize = 255;
 
-/// A text that is not kept.
+/// A text that is not stored.
 const NOT_KEPT: u32 = u32::MAX;
 
 /// The last texts, and how texts change.

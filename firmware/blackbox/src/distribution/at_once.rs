@@ -43,7 +43,7 @@ impl Cdf {
     }
 }
 
-/// The symbol that holds a place among parts of this width, each beginning where `part_of` says.
+/// The symbol at a place among parts of this width, each beginning at `part_of`.
 #[cfg(not(target_arch = "x86_64"))]
 fn find(width: u16, offset: u32, part_of: impl Fn(usize) -> (u32, u32)) -> usize {
     let part = (offset / u32::from(width)).min(u32::from(u16::MAX));
@@ -65,11 +65,11 @@ mod sse2 {
 
     use super::super::{PROBABILITY_BITS, SPEED_LAST, SPEEDS, SURE, SYMBOLS, USES, USES_MAX, gain};
 
-    /// Ways to adapt, for the reader: by uses, and the last one for what is sure already and stays as it is.
+    /// Ways to adapt, for the reader: by uses, and the last one for certain symbols, which changes nothing.
     const WAYS: usize = USES_MAX as usize + 2;
     const STAYS: usize = WAYS - 1;
 
-    /// How far each way goes: `1 / 2^n` of it; nothing of 16 bits is left of it where it stays.
+    /// How far each way goes: `1 / 2^n` of it; for the last way nothing of 16 bits remains.
     static SHIFTS: [u8; WAYS] = shifts();
 
     const fn shifts() -> [u8; WAYS] {
@@ -83,7 +83,7 @@ mod sse2 {
         shifts
     }
 
-    /// What each place gains, the uses among them, by way and symbol.
+    /// The gains of places and uses, by way and symbol.
     static ALL_GAINS: [[[u16; SYMBOLS]; SYMBOLS]; WAYS] = all_gains();
 
     const fn all_gains() -> [[[u16; SYMBOLS]; SYMBOLS]; WAYS] {
@@ -96,7 +96,7 @@ mod sse2 {
             gains[uses][symbol][place] = if place < USES {
                 gain(place, symbol, shifts[uses] as u32)
             } else {
-                // One more, and what the step takes away from them.
+                // One more, and the loss in the step.
                 (uses < USES_MAX as usize) as u16 + (uses as u16 >> shifts[uses])
             };
             index += 1;
@@ -156,7 +156,7 @@ mod sse2 {
         let adapted =
             |places, gains| _mm_add_epi16(_mm_sub_epi16(places, _mm_srl_epi16(places, shift)), gains);
         let (to_lower, to_upper) = places.split_at_mut(SYMBOLS / 2);
-        // SAFETY: each is a half, of eight numbers: the 16 bytes that are written. They may lie anywhere.
+        // SAFETY: each is a half, of eight numbers: the 16 bytes that are written. Any alignment is allowed.
         unsafe {
             _mm_storeu_si128(to_lower.as_mut_ptr().cast(), adapted(lower, gains.0));
             _mm_storeu_si128(to_upper.as_mut_ptr().cast(), adapted(upper, gains.1));
@@ -167,7 +167,7 @@ mod sse2 {
     #[target_feature(enable = "sse2")]
     fn halves(places: &[u16; SYMBOLS]) -> (__m128i, __m128i) {
         let (lower, upper) = places.split_at(SYMBOLS / 2);
-        // SAFETY: each is a half, of eight numbers: the 16 bytes that are read. They may lie anywhere.
+        // SAFETY: each is a half, of eight numbers: the 16 bytes that are read. Any alignment is allowed.
         unsafe { (_mm_loadu_si128(lower.as_ptr().cast()), _mm_loadu_si128(upper.as_ptr().cast())) }
     }
 }

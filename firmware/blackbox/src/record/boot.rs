@@ -47,7 +47,7 @@ impl Found {
 /// the end of an earlier log is known, and that something is missing there is seen.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Before {
-    /// What was found.
+    /// The result of the search.
     pub found: Found,
     /// Its number on the card, which its files' names begin with.
     pub number: u32,

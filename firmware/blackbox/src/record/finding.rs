@@ -14,7 +14,7 @@ pub struct FindingRecord<'a> {
     pub subsystem: Subsystem,
     /// The check's stable name.
     pub check: &'a str,
-    /// Which one, where there are several.
+    /// The number of the part, if there are several.
     pub instance: u8,
     /// The new level.
     pub level: Level,
@@ -78,7 +78,7 @@ pub struct Event<'a> {
     /// - 8 a critical finding (its check), 9 phase of flight (its name);
     /// - 10 autopilot restarted, 11 another airframe.
     pub number: u8,
-    /// More, where there is more to say.
+    /// Details, if any.
     pub text: &'a str,
 }
 

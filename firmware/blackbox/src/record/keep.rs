@@ -1,17 +1,17 @@
-//! What of a session is kept, where not all of it is.
+//! The stored part of a session, if it is not all of it.
 
 use super::stored::{Fields, Sink};
 
-/// Which sectors are kept. While a vehicle recorded by arming is disarmed, only the latest part is kept. Every group of that time
-/// has this record, also the group in which it ends. A reader that misses sectors from `from` up to this record knows that they
-/// are missing on purpose.
+/// The range of stored sectors. While a vehicle recorded by arming is disarmed, only the latest part is stored. Every
+/// group of that time has this record, also the group in which it ends. A reader that misses sectors from `from` up
+/// to this record knows that they are missing on purpose.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Keep {
-    /// From here on everything is kept; otherwise only the last while, until a record says `all`.
+    /// From here on everything is stored; otherwise only the latest part, until a record with `all`.
     pub all: bool,
-    /// The number of the sector from which on only the last while is kept, or was until now.
+    /// The first sector number of the part that is, or was until now, stored only briefly.
     pub from: u32,
-    /// How much is kept at least, in seconds.
+    /// Minimum length of the stored part, in seconds.
     pub seconds: u32,
 }
 

@@ -4,7 +4,7 @@ use hums_core::clock::Instant;
 
 use super::stored::{Fields, Sink};
 
-/// What was lost. The numbers are stored.
+/// The kind of a loss. The numbers are stored.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[repr(u8)]
 pub enum Lost {
@@ -63,7 +63,7 @@ impl Lost {
 /// Something was lost.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Loss {
-    /// What and why.
+    /// Kind and cause.
     pub what: Lost,
     /// How many bytes, frames, sectors or records.
     pub count: u64,
@@ -88,7 +88,7 @@ impl Loss {
     }
 }
 
-/// The numbers that the first version had: always stored. Those that came later are where there is something to say.
+/// The numbers that the first version had: always stored. Later ones are stored if they are not zero.
 const STATS_MIN: usize = 12;
 
 /// The struct with its numbers in stored order, each named once. A further number goes to the end.
@@ -152,7 +152,7 @@ statistics! {
     gs_queue_bytes_max,
     /// Capacity of the queue to the ground station, bytes.
     gs_queue_bytes_capacity,
-    /// Processor load of the last second, thousandths; 0 where nobody counts.
+    /// Processor load of the last second, thousandths; 0 if not measured.
     cpu_permille,
     /// The same in the worst second.
     cpu_permille_max,

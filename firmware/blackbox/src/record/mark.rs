@@ -1,4 +1,4 @@
-//! End marks: moments up to which a log is known to be whole, written while nothing more is to come for a while.
+//! End marks: moments up to which a log is known to be whole, written when no data is expected for a while.
 
 use super::stored::{Fields, Sink};
 
@@ -23,7 +23,7 @@ impl Resting {
         }
     }
 
-    /// What happened, in a sentence.
+    /// The event, in a sentence.
     pub const fn words(self) -> &'static str {
         match self {
             Self::Disarmed => "disarming",
@@ -33,8 +33,8 @@ impl Resting {
     }
 }
 
-/// An end mark. The sector that holds it is given to the card at once. A log without a gap up to a mark is complete up to that
-/// mark. The end of the log after its last mark is unproven.
+/// An end mark. Its sector is written to the card immediately. A log without a gap up to a mark is complete up to
+/// that mark. The end of the log after its last mark is unproven.
 ///
 /// The sector that completes it has the check of all entries of the session up to it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

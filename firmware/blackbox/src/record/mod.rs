@@ -43,7 +43,7 @@ const _: () =
 pub enum Record<'a> {
     /// Kind 1: the monitor started.
     Boot(Boot<'a>),
-    /// Kind 2: the vehicle that is recorded, as far as it said.
+    /// Kind 2: the recorded vehicle, as far as known.
     Vehicle(Vehicle),
     /// Kind 3: a parameter's value.
     Parameter(Parameter<'a>),
@@ -69,7 +69,7 @@ pub enum Record<'a> {
     Exceedance(Exceedance<'a>),
     /// Kind 14: a part that wears.
     Component(Component<'a>),
-    /// Kind 15: what of the session is kept, where not all of it is.
+    /// Kind 15: the stored part of the session.
     Keep(Keep),
     /// Kind 16: half of a snapshot around a critical finding.
     Snapshot(Snapshot<'a>),
@@ -83,7 +83,7 @@ pub enum Record<'a> {
         kind: u8,
         /// The stored version.
         version: u8,
-        /// What follows: the rest of the head, numbers, bytes.
+        /// The rest of the head, numbers, bytes.
         bytes: &'a [u8],
     },
 }
@@ -101,7 +101,7 @@ impl fmt::Display for TooLong {
 impl core::error::Error for TooLong {}
 
 impl<'a> Record<'a> {
-    /// Writes the stored form; gives its length.
+    /// Writes the stored form; returns its length.
     pub fn store(&self, out: &mut [u8; RECORD_BYTES_MAX]) -> Result<usize, TooLong> {
         let mut sink = Sink::new(out);
         match self {

@@ -1,4 +1,4 @@
-//! What went on around a critical finding, and what was asked of the autopilot because of one.
+//! Values around a critical finding, and the request to the autopilot because of one.
 
 use hums_core::clock::{Instant, Span};
 use hums_core::half;
@@ -23,7 +23,7 @@ pub struct Snapshot<'a> {
     pub check: &'a str,
     /// The finding's instance.
     pub instance: u8,
-    /// The part of the vehicle, which says what the columns are.
+    /// The part of the vehicle, which decides the columns.
     pub subsystem: Subsystem,
     /// `false`: before the finding; `true`: after it.
     pub after: bool,
@@ -130,9 +130,9 @@ impl Default for SnapshotValues {
 pub struct Protection {
     /// Action requested of the autopilot.
     pub action: Action,
-    /// What happened.
+    /// The stage.
     pub stage: Stage,
-    /// Seconds, attempt or `MAV_RESULT`, as the stage says.
+    /// Seconds, attempt or `MAV_RESULT`, by the stage.
     pub detail: u8,
     /// `MAV_CMD`
     pub command: u16,

@@ -1,5 +1,5 @@
-//! The stored form of a record: a head that says how many numbers there are, then the numbers, then bytes. So the coder
-//! knows the numbers of a record of any kind, also of one that comes later.
+//! The stored form of a record: a head with the number of numbers, then the numbers, then bytes. So the coder knows
+//! the numbers of any record, also of later kinds.
 
 use hums_core::clock::Instant;
 

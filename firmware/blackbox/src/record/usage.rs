@@ -27,8 +27,8 @@ const _: () = assert!(HEAD_BYTES + 4 * 4 + 2 + LIFETIME_ENTRIES_MAX * ENTRY_BYTE
 /// A value, and a run of numbers for it alone.
 const ENTRY_BYTES: usize = 4 + 2;
 
-/// Usage counters at one moment: up to `USAGE_ENTRIES_MAX`, more are cut off. Where there are more, another record
-/// follows; a reader keeps the latest value of each counter.
+/// Usage counters at one moment: up to `USAGE_ENTRIES_MAX`, more are cut off. Another record has the rest; a reader
+/// takes the latest value of each counter.
 #[derive(Clone, Copy, Debug)]
 pub struct Usage<'a> {
     /// When it was taken.

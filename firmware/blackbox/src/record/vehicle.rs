@@ -15,9 +15,9 @@ pub struct Vehicle {
     pub autopilot: u8,
     /// `MAV_TYPE`.
     pub vehicle_type: u8,
-    /// `AUTOPILOT_VERSION.flight_sw_version`, 0 where it has not said.
+    /// `AUTOPILOT_VERSION.flight_sw_version`, 0 if unknown.
     pub firmware: u32,
-    /// `AUTOPILOT_VERSION.uid`, 0 where it has not said.
+    /// `AUTOPILOT_VERSION.uid`, 0 if unknown.
     pub uid: u64,
 }
 
@@ -75,7 +75,7 @@ pub struct Clock {
     pub boot: Instant,
     /// UTC at that moment, microseconds since 1970.
     pub utc_micros: u64,
-    /// Where UTC came from: 0 unknown, 1 `SYSTEM_TIME`, 2 the recording's own times, 3 GNSS.
+    /// The source of UTC: 0 unknown, 1 `SYSTEM_TIME`, 2 the recording's own times, 3 GNSS.
     pub source: u8,
 }
 

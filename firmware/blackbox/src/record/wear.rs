@@ -13,13 +13,13 @@ pub struct Exceedance<'a> {
     pub moment: Moment,
     /// The check's stable name.
     pub check: &'a str,
-    /// Which one, where there are several.
+    /// The number of the part, if there are several.
     pub instance: u8,
     /// The unit of the peaks.
     pub unit: &'a str,
-    /// Of this session.
+    /// In this session.
     pub session: Crossings,
-    /// Of the airframe's life, this session included.
+    /// In the airframe's life, this session included.
     pub lifetime: Crossings,
 }
 
@@ -66,7 +66,7 @@ impl<'a> Exceedance<'a> {
 pub enum Why {
     /// As it stood at the start of the session.
     Start = 0,
-    /// As it stands, or stood at the end.
+    /// The status, now or at the end.
     #[default]
     Status = 1,
     /// It was replaced: the figures are those of the old part.
@@ -96,14 +96,14 @@ impl Why {
     }
 }
 
-/// A part that wears, and what it has run.
+/// A part that wears, with its figures.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Component<'a> {
     /// Why it is recorded.
     pub why: Why,
     /// Its place, from 0.
     pub place: u8,
-    /// What it is.
+    /// Its kind.
     pub kind: Kind,
     /// Which of its kind, from 1; 0 is all.
     pub number: u8,

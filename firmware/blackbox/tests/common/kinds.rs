@@ -8,23 +8,23 @@ use hums_dialect::{Kind, Message, Role};
 use crate::common::Random;
 use crate::frames::{checks, checksum};
 
-/// An entry: milliseconds, and a frame with what is known of its checksum, or a stored record.
+/// An entry: milliseconds, and a frame with its verification, or a stored record.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Entry {
     Frame(u64, Vec<u8>, bool),
     Record(u64, Vec<u8>),
 }
 
-/// How a value goes on from frame to frame.
+/// The course of a value from frame to frame.
 #[derive(Clone, Copy)]
 enum Habit {
     Constant,
     Counts,
     Walks,
     ChangesRarely,
-    /// Of hundredths; of 64 bits in thousands.
+    /// Hundredths; for 64 bits thousands.
     Decimal,
-    /// The same quantity in many fields: floats as it is, integers in thousandths.
+    /// The same quantity in many fields: a plain float, integers in thousandths.
     Shared,
     Random,
     /// Not-a-numbers, infinities, the ends of integers.
@@ -173,7 +173,7 @@ impl Source {
 /// Ways in which a frame is odd.
 const ODDITIES: usize = 13;
 
-/// One frame; `odd` below `ODDITIES` says how it is odd.
+/// One frame; `odd` below `ODDITIES` selects the oddity.
 fn frame(
     source: &mut Source,
     sequence: u8,
@@ -251,7 +251,7 @@ pub(crate) fn entries(
         if index % 40 == 39 {
             entries.push(Entry::Record(world.at_ms, record(index / 40, &mut random)));
         }
-        // In turn, as streams come, but not always.
+        // In turn, like streams, with exceptions.
         let which = if random.below(4) == 0 { random.below(sources.len()) } else { index % sources.len() };
         let is_odd = odd_one_in > 0 && random.below(odd_one_in) == 0;
         let odd = if is_odd { random.below(ODDITIES) } else { ODDITIES };
@@ -263,7 +263,7 @@ pub(crate) fn entries(
         let (bytes, verified) = frame(source, *sequence, odd, &mut world, &mut random);
         *sequence = sequence.wrapping_add(1);
         let frame = Entry::Frame(world.at_ms, bytes, verified);
-        // Some frames come twice.
+        // Some frames are repeated.
         entries.extend((random.below(50) == 0).then(|| frame.clone()));
         entries.push(frame);
     }

@@ -1,4 +1,4 @@
-//! What several of the tests need.
+//! Shared parts of the tests.
 
 /// A small generator of numbers (xorshift), so that streams are repeatable.
 pub(crate) struct Random(pub(crate) u64);

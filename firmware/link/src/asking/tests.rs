@@ -22,7 +22,7 @@ struct Script {
     baud: u32,
     /// Parameters that it has.
     parameters: Vec<&'static str>,
-    /// Names of parameters that it was asked for, and when.
+    /// Requested parameters, and the times.
     parameters_asked: Vec<(u64, String)>,
     /// Received requests: time in ms, command (or stream with the highest bit), first parameter.
     asked: Vec<(u64, u16, u32)>,

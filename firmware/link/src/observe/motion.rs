@@ -25,7 +25,7 @@ fn vector(values: [f32; 3]) -> Option<[f32; 3]> {
     values.iter().all(|value| value.is_finite()).then_some(values)
 }
 
-/// Degrees x 1e7. 0, 0 is what receivers send that do not know, and no place to fly.
+/// Degrees x 1e7. Receivers without a position send 0, 0, where no vehicle flies.
 fn position(latitude: i32, longitude: i32) -> Option<Position> {
     let valid = (-900_000_000..=900_000_000).contains(&latitude)
         && (-1_800_000_000..=1_800_000_000).contains(&longitude);
@@ -109,7 +109,7 @@ pub(super) fn gnss_integrity(payload: &[u8]) -> GnssIntegrity {
     }
 }
 
-/// A compass that is not there measures nothing.
+/// A missing compass measures zeros.
 fn field(gauss: [f32; 3]) -> Option<[Gauss; 3]> {
     vector(gauss).filter(|gauss| gauss.iter().any(|axis| axis.abs() > 0.0)).map(|gauss| gauss.map(Gauss))
 }
@@ -150,7 +150,7 @@ pub(super) fn imu(id: u32, payload: &[u8]) -> Option<Imu> {
     Some(scaled(instance, [imu.xacc, imu.yacc, imu.zacc], rotation, magnetic, imu.temperature))
 }
 
-/// Only what `fields_updated` names is new; the rest repeats an older sample.
+/// Only fields in `fields_updated` are new; the rest repeats an older sample.
 pub(super) fn highres_imu(payload: &[u8]) -> Option<(Imu, Air)> {
     let imu = read::<ap::HIGHRES_IMU_DATA>(payload, &[])?;
     let updated = imu.fields_updated.bits();
@@ -205,7 +205,7 @@ pub(super) fn attitude(payload: &[u8]) -> Option<Attitude> {
     Some(Attitude { roll, pitch, yaw, rates, boot_ms: Some(attitude.time_boot_ms) })
 }
 
-/// `AHRS2`: zeros are what it does not know.
+/// `AHRS2`: zeros are unknown values.
 pub(super) fn second_estimate(payload: &[u8]) -> SecondEstimate {
     let angles = vector([0, 4, 8].map(|at| float(payload, at)));
     let angles = angles.filter(|angles| angles.iter().any(|angle| angle.abs() > 0.0));
@@ -224,7 +224,7 @@ pub(super) fn nav_controller_output(payload: &[u8]) -> Option<Wanted> {
     (roll.0.is_finite() && pitch.0.is_finite()).then_some(Wanted { roll, pitch, rates: None })
 }
 
-/// `type_mask` names what is to be ignored: the rates of roll 1, pitch 2, yaw 4.
+/// `type_mask` names the ignored rates: roll 1, pitch 2, yaw 4.
 pub(super) fn attitude_target(payload: &[u8]) -> Option<Wanted> {
     const RATES: u8 = 7;
     let of = [4, 8, 12, 16].map(|at| float(payload, at));
@@ -234,7 +234,7 @@ pub(super) fn attitude_target(payload: &[u8]) -> Option<Wanted> {
     Some(Wanted { rates, ..Wanted::from_quaternion(of)? })
 }
 
-/// `POSITION_TARGET_LOCAL_NED`: `type_mask` 32 says that the vertical speed is to be ignored.
+/// `POSITION_TARGET_LOCAL_NED`: `type_mask` 32 means that the vertical speed is ignored.
 pub(super) fn climb_wanted(payload: &[u8]) -> Option<MetresPerSecond> {
     const NO_VZ: u16 = 32;
     let down = float(payload, 24);

@@ -60,7 +60,7 @@ pub(super) fn esc_telemetry(id: u32, payload: &[u8]) -> Option<EscGroup> {
             rpm: Some(Rpm(f32::from(rpm))),
             voltage: Some(Volts(f32::from(telemetry.voltage[place]) / 100.0)),
             current: Some(Amperes(f32::from(telemetry.current[place]) / 100.0)),
-            // An ESC without a sensor says 0.
+            // An ESC without a sensor sends 0.
             temperature: unless(telemetry.temperature[place], 0).map(|degrees| Celsius(f32::from(degrees))),
             ..Esc::default()
         });

@@ -60,7 +60,7 @@ fn run(budget: f32, seconds: u64, streams: &[(u32, usize, u64)]) -> Vec<(u64, u3
         for (index, (_, _, every)) in streams.iter().enumerate() {
             if now_ms == next[index] {
                 random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
-                // Each comes up to a tenth of its interval early or late.
+                // Each arrives up to a tenth of its interval early or late.
                 let jitter = (random >> 33) % (every / 5 + 1);
                 next[index] = (now_ms / every + 1) * every + every / 2 + jitter - every / 10;
                 next[index] = next[index].max(now_ms + 1);
@@ -110,7 +110,7 @@ fn a_finding_is_told_in_the_words_of_a_pilot_and_fits() {
     assert_eq!(told(Finding { check: "of_later", ..motor }), "HUMS: of_later");
 }
 
-/// What more or less of something is, no number without a unit, and what a pilot does who may still fly.
+/// The quantity of the value, no number without a unit, and the action of a pilot in flight.
 #[test]
 fn a_value_says_what_it_is_of_or_is_not_told() {
     let told = |check, value, level| {
@@ -263,7 +263,7 @@ fn the_state_holds_every_subsystem() {
     assert!(VALUES_TOLD.iter().all(|(name, _)| name.len() <= 10));
 }
 
-/// A finding that comes at these tenths of a second: check, instance, level, the one before.
+/// A finding at these tenths of a second: check, instance, level, previous level.
 type Comes = (u64, &'static str, u8, Level, Level);
 
 /// Sent findings: time in tenths of a second, and the text after our name.

@@ -88,7 +88,7 @@ impl Port for CardPort {
             Clock::Identification => Self::IDENTIFICATION,
             Clock::Transfer => Self::TRANSFER,
         };
-        // Cannot fail: both clocks are within what the bus can divide down to.
+        // Cannot fail: the bus can divide down to both clocks.
         let _ = self.bus.set_config(&config);
     }
 

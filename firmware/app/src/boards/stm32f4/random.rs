@@ -1,4 +1,4 @@
-//! One true random number, if the generator gives one.
+//! One true random number, if the generator works.
 
 use embassy_stm32::pac::RNG;
 use embassy_stm32::{peripherals, rcc};

@@ -44,7 +44,7 @@ pub(super) fn is_low() -> bool {
 fn PVD() {
     fault::supply_low();
     while is_low() {
-        // A reset would not restore the supply. The note tells why no other code feeds the watchdog.
+        // A reset would not restore the supply. The note explains why no other code feeds the watchdog.
         watchdog::reload();
     }
     restart();

@@ -34,7 +34,7 @@ pub(crate) struct Distributions {
     young: [Cdf; KINDS],
     /// First values.
     first: [Cdf; KINDS],
-    /// Of all elements with distributions of their own, by the class before
+    /// For all elements with distributions of their own, by the previous class
     after: [[Cdf; SYMBOLS]; 4],
 }
 

@@ -1,4 +1,4 @@
-//! What each of an element's predictions cost lately: their lengths of error in bits, averaged, in eighths of a bit.
+//! Recent costs of an element's predictions: their lengths of error in bits, averaged, in eighths of a bit.
 
 /// Predictions that are weighed.
 pub(super) const PREDICTIONS: usize = 6;
@@ -44,7 +44,7 @@ impl Costs {
         best
     }
 
-    /// Adds what the first four were off by: an eighth of the cost makes place for it.
+    /// Adds the errors of the first four: each cost first falls by an eighth.
     #[inline]
     pub(super) fn charge(&mut self, errors: [i32; 4]) {
         // Adds four bytes at once. All sums stay below 256, so intermediate carries cancel.
@@ -65,7 +65,7 @@ impl Costs {
         self.first = (word - eighths + length(error) * 0x0101_0101).to_le_bytes();
     }
 
-    /// Adds what one of the two further ones was off by.
+    /// Adds the error of one of the other two.
     #[inline]
     pub(super) fn charge_more(&mut self, prediction: usize, error: i32) {
         if let Some(cost) = self.more.get_mut(prediction.wrapping_sub(4)) {

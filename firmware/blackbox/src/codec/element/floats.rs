@@ -84,7 +84,7 @@ impl Distributions {
         value
     }
 
-    /// A float that is a number of hundredths, so far: the difference in hundredths. Nothing where it is none now.
+    /// A float that was a number of hundredths so far: the difference in hundredths. `None` if it is not one now.
     fn decimal<C: Coder>(
         &mut self,
         coder: &mut C,
@@ -105,7 +105,7 @@ impl Distributions {
         (Some((now as f32 * 0.01).to_bits()), Some(now.wrapping_sub(last)))
     }
 
-    /// A float that was computed as the sender did: the difference in order is a few steps, if any.
+    /// A float that was computed like the sender's: the difference in order is a few steps at most.
     #[inline(never)]
     fn computed<C: Coder>(&mut self, coder: &mut C, element: &mut Element, guess: i32, value: u32) -> u32 {
         let difference = order(value).wrapping_sub(guess);
@@ -134,7 +134,7 @@ impl Distributions {
         unorder(guess.wrapping_add(float_rest(coder, symbol, difference)))
     }
 
-    /// A float that nothing predicts: its exponent by class, the rest as it is.
+    /// An unpredictable float: its exponent by class, the rest uncoded.
     fn random<C: Coder>(&mut self, coder: &mut C, element: &mut Element, value: u32) -> u32 {
         let exponent = (value >> 23 & 0xff) as i32;
         let offset = exponent - i32::from(element.exponent) + 8;
@@ -172,7 +172,7 @@ const fn unorder(order: i32) -> u32 {
     (order ^ ((order >> 31) & 0x7fff_ffff)) as u32
 }
 
-/// A computed float in order; not-a-numbers differ between machines, so they do not count.
+/// A computed float in order; NaN differs between machines, so it does not count.
 #[inline]
 fn order_or(number: f32, otherwise: i32) -> i32 {
     if number.is_nan() { otherwise } else { order(number.to_bits()) }

@@ -5,7 +5,8 @@ use super::rest::{integer_class, integer_rest};
 use super::{Distributions, Element, What};
 use crate::coder::Coder;
 
-/// From the last value: as it is, with the last step, with half of it; equal to the linked register, or changed as it.
+/// Predictions from the last value: unchanged, with the last step, with half of it. Then two from the linked
+/// register: equal to it, or changed like it.
 const HALF: usize = 2;
 const LINKED: usize = 3;
 const AS_LINK: usize = 4;
@@ -28,7 +29,7 @@ impl Distributions {
         };
         let fold = |difference: u32| ((difference << spare) as i32) >> spare;
         let (last, step, known) = (element.last, element.step, element.known());
-        // The first value is predicted as zero, which is what `last` is then.
+        // The first value is predicted as zero, the initial value of `last`.
         let mut ahead_by = [0, step, step / 2, 0, 0];
         if let Some(linked) = linked {
             ahead_by[LINKED] = fold(linked.wrapping_sub(last));

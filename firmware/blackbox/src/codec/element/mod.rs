@@ -39,12 +39,12 @@ pub(crate) enum What {
     Upper,
     /// Text or data.
     Text,
-    /// The slot says it.
+    /// Implied by the slot.
     Instance,
 }
 
 impl What {
-    /// What an element says of itself. A bit flip in memory may give an unknown kind. Such an element is not coded, because a
+    /// The kind of an element. A bit flip in memory may give an unknown kind. Such an element is not coded, because a
     /// jump by it could go anywhere.
     #[inline]
     const fn of(kind: u8) -> Self {
@@ -82,16 +82,16 @@ pub(crate) struct Element {
     /// Its own distribution, and the one for its other mode; 0: none yet.
     block: u16,
     other: u16,
-    /// How it is coded, a [`What`].
+    /// Its coding, a [`What`].
     kind: u8,
-    /// Of a text or instance its bytes; of a number its row in the table of links.
+    /// For a text or instance its bytes; for a number its row in the table of links.
     detail: u8,
     /// End offset in the payload.
     pub(crate) end: u8,
     /// Bits 0-2: how surely it is a multiple of 1/100 (float) or of 1000 (64-bit integer): 3 and more. Bits 3-6: the last
     /// class. Bit 7: `step` is in hundredths.
     decimal: u8,
-    /// The exponent that the classes of a random float are counted from. Of an integer with links: 1 if signed.
+    /// The exponent from which the classes of a random float count. For an integer with links: 1 if signed.
     pub(crate) exponent: u8,
     /// Frames since it changed, up to 63; bit 7: it has a last value.
     quiet: u8,
@@ -171,7 +171,7 @@ impl Element {
     /// Bytes on the wire.
     #[inline]
     pub(crate) const fn size(&self) -> usize {
-        /// Of the kinds in their order; 0 where the element says it.
+        /// By kind; 0 for kinds of variable size.
         const BYTES: [u8; 11] = [1, 2, 4, 4, 4, 4, 8, 8, 0, 0, 0];
         match self.what() {
             What::Text | What::Instance => self.detail as usize,

@@ -2,7 +2,7 @@
 
 use crate::coder::Coder;
 
-/// The class that says that more follows.
+/// The class of longer values.
 pub(super) const ESCAPE: usize = 15;
 
 /// Integers: 0 for none, 1 for +-1, then the length in bits; 15 for 15 bits and more.

@@ -86,7 +86,7 @@ impl Distributions {
         value
     }
 
-    /// The value as its difference from a guess, in thousands as long as it is one.
+    /// The value as its difference from a guess, in thousands while all differences are.
     fn wide_from<C: Coder>(
         &mut self,
         coder: &mut C,
@@ -113,7 +113,7 @@ impl Distributions {
     }
 }
 
-/// An error of 64 bits as far as costs tell it: beyond 32 bits it is as large as it gets.
+/// An error of 64 bits for costs: beyond 32 bits it is cut to the greatest.
 #[inline]
 fn within_32_bits(error: i64) -> i32 {
     i32::try_from(error).unwrap_or(i32::MAX)
