@@ -132,7 +132,6 @@ impl Database {
         }
     }
 
-    /// The JSON at a path.
     fn json(&self, path: &str) -> Value {
         let (code, body) = self.get(path).unwrap();
         assert_eq!(code, 200, "{body}");

@@ -35,7 +35,6 @@ impl Core {
         }
     }
 
-    /// One instruction.
     #[inline(always)]
     fn instruction<B: Bus>(&mut self, bus: &mut B) -> Result<(), Trap> {
         let pc = self.pc;

@@ -20,7 +20,6 @@ const INFINITY: u32 = 0x7F80_0000;
 const DEFAULT_NAN: u32 = 0x7FC0_0000;
 const QUIET: u32 = 1 << 22;
 
-/// How to round.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Rounding {
     Nearest,

@@ -14,9 +14,7 @@ use cortex_m4_model::Size;
 
 use crate::memory::{FLASH, Memory};
 
-/// Lines for instructions.
 const INSTRUCTION_LINES: usize = 64;
-/// Lines for data.
 const DATA_LINES: usize = 8;
 /// Lines of the whole flash.
 const FLASH_LINES: usize = (FLASH.1 / LINE) as usize;

@@ -82,7 +82,6 @@ impl core::error::Error for GroupError {}
 pub struct GroupDecoder {
     model: Model,
     recall: Recall,
-    /// Each slot's last frame.
     last_frames: [Frame; SLOTS],
     decoder: Decoder,
     input: [u8; GROUP_SECTORS * BODY_BYTES],

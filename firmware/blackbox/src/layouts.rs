@@ -143,7 +143,6 @@ impl Layout {
     }
 }
 
-/// One field.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct FieldLayout {
     pub(crate) kind: Kind,

@@ -119,7 +119,6 @@ pub struct Summary {
 pub struct LogReader {
     assembler: Assembler,
     decoder: GroupDecoder,
-    /// An open gap.
     open_gap: Option<Gap>,
     /// A gap to return before the entries of the group that ended it.
     gap_due: Option<Gap>,

@@ -253,7 +253,6 @@ enum State {
 enum Way {
     /// It accepted the request.
     Accepted,
-    /// Its mode.
     Mode,
     /// The vehicle sinks as in a landing, or the autopilot calls it one.
     Landing,

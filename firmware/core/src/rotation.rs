@@ -2,7 +2,6 @@
 
 use crate::observation::Attitude;
 
-/// Turns a vector.
 fn turn([w, x, y, z]: [f32; 4], vector: [f32; 3]) -> [f32; 3] {
     let cross = |[a, b, c]: [f32; 3]| [y * c - z * b, z * a - x * c, x * b - y * a];
     let once = cross(vector).map(|part| 2.0 * part);

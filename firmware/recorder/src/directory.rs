@@ -26,7 +26,6 @@ use crate::{BLOCK_BYTES, Block, CardDevice};
 
 /// Entries that a root directory may have before its chain counts as going in circles.
 const ENTRIES_MAX: u32 = 131_072;
-/// Entries of a block.
 pub(crate) const BLOCK_ENTRIES: u32 = BLOCK_BYTES as u32 / ENTRY_BYTES as u32;
 /// Logs that are noted: the newest, and the oldest that may be overwritten.
 const NEWEST_MAX: usize = 4;
@@ -257,7 +256,6 @@ impl Directory {
         self.names ^= hash(name);
     }
 
-    /// Hides a log.
     pub(crate) fn hide(&mut self, name: LogName) {
         for entry in self.oldest.iter_mut().filter(|entry| entry.name == name) {
             entry.hidden = true;

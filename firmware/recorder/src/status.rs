@@ -257,7 +257,6 @@ impl CardStatus {
         self.busy_since_ms.store((now.as_millis() as u32).min(IDLE - 1), Ordering::Relaxed);
     }
 
-    /// The command has ended.
     pub(crate) fn end_command(&self, now: Instant) {
         let since_ms = self.busy_since_ms.swap(IDLE, Ordering::Relaxed);
         let took_ms = (now.as_millis() as u32).wrapping_sub(since_ms);

@@ -26,7 +26,6 @@ impl<'a, D: CardDevice> Volume<'a, D> {
         Self { device, status, layout }
     }
 
-    /// The card.
     pub(crate) const fn device(&self) -> &D {
         &self.device
     }
@@ -65,7 +64,6 @@ impl<'a, D: CardDevice> Volume<'a, D> {
         done.map_err(CardError::Device)
     }
 
-    /// Reads one block of the FAT.
     pub(crate) fn read_fat(&self, index: u32) -> Result<[Block; 1], CardError<D::Error>> {
         let mut block = [[0; BLOCK_BYTES]];
         self.read(&mut block, self.layout.fat_start + index)?;

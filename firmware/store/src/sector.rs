@@ -24,7 +24,6 @@ use crate::key::Key;
 
 /// Bytes of a word.
 pub(crate) const WORD: usize = 4;
-/// Bytes of a header.
 pub(crate) const HEADER_BYTES: usize = 4 * WORD;
 /// Bytes of an item without its value: length, key and checksum.
 pub(crate) const ITEM_BYTES: usize = 3 * WORD;
@@ -206,7 +205,6 @@ impl<'f, F: NorFlash> Sector<'f, F> {
         })
     }
 
-    /// Whether an item has this value.
     pub(crate) fn holds(&mut self, item: &Item, value: &[u8]) -> Result<bool, F::Error> {
         if item.length != value.len() {
             return Ok(false);

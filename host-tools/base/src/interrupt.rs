@@ -102,7 +102,6 @@ fn next() -> io::Result<impl FnMut() + Send + 'static> {
     })
 }
 
-/// Each signal sets this.
 fn set_by_signals(set: &Arc<AtomicBool>) -> io::Result<()> {
     [SIGINT, SIGTERM].into_iter().try_for_each(|signal| flag::register(signal, Arc::clone(set)).map(|_| ()))
 }

@@ -131,7 +131,6 @@ impl Texts {
     }
 }
 
-/// One column.
 #[derive(Debug)]
 pub(super) struct Column {
     name: String,
@@ -194,7 +193,6 @@ impl Column {
             .map(move |(what, value)| (format!("{what}.{name}"), value))
     }
 
-    /// The name of a column of texts.
     pub(super) fn text_name(&self) -> Option<&str> {
         (self.kind == Kind::Text).then_some(self.name.as_str())
     }
@@ -316,7 +314,6 @@ impl Column {
         size_of::<Self>() + values + size_of::<i16>() * self.levels.capacity()
     }
 
-    /// Writes all of it.
     pub(super) fn write(&self, writer: &mut SerializedColumnWriter<'_>) -> Result<()> {
         let values = match &self.values {
             Values::Flags(values) => values.len(),
@@ -458,7 +455,6 @@ impl TableRows {
         Self { columns: columns.iter_mut().map(take).collect(), rows, has_frames: self.has_frames }
     }
 
-    /// The columns.
     pub(super) fn columns(&self) -> &[Column] {
         &self.columns
     }

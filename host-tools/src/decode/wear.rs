@@ -42,7 +42,6 @@ pub(super) fn exceedance(exceedance: &Exceedance<'_>) -> Vec<Row> {
     [("session", exceedance.session), ("lifetime", exceedance.lifetime)].into_iter().map(row).collect()
 }
 
-/// One row.
 pub(super) fn component(component: &Component<'_>) -> Row {
     let figures = &component.figures;
     let by = format!("{}:{}", component.by.0, component.by.1);

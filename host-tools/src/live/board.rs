@@ -20,7 +20,6 @@ const SILENT: Span = Span::from_secs(5);
 /// Prefix of a finding of a HUMS on the radio.
 const OURS: &str = "HUMS: ";
 
-/// A finding in words.
 fn words(finding: &Finding) -> String {
     summary::text(finding).as_str().trim_start_matches(OURS).to_owned()
 }

@@ -49,7 +49,6 @@ struct Copy {
 struct Loaded {
     played: Played,
     told: Vec<(Instant, Told)>,
-    /// The next one of these.
     told_next: usize,
     copies: Vec<Copy>,
     start: Instant,

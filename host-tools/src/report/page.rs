@@ -25,7 +25,6 @@ struct Data<'a> {
     version: &'static str,
     log: LogJson,
     epoch_us: Option<u64>,
-    /// All of the flight.
     flight: Option<Part>,
     flights: &'a [Flight],
     /// The gaps.

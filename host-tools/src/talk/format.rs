@@ -55,7 +55,6 @@ pub fn run(args: &cli::FormatCard) -> Result<Outcome> {
 enum Said {
     /// To our command: a `MAV_RESULT`.
     Result(u8),
-    /// How its card is.
     Card(String),
 }
 

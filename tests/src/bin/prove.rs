@@ -41,7 +41,6 @@ fn ended(result: Result<()>) -> ExitCode {
     }
 }
 
-/// Judges flights, and prints the results.
 fn judge(flights: &Flights) -> Result<()> {
     let start = Instant::now();
     let text = diagnosis::run(flights, || commit("docs/diagnosis.md"))?;

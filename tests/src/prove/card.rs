@@ -19,7 +19,6 @@ use crate::fat;
 
 pub(super) const BLOCK: usize = 512;
 
-/// A card.
 pub(super) struct Card {
     dir: TempDir,
     file: File,
@@ -46,13 +45,11 @@ impl Card {
         Ok(SimCard::new(self.file.try_clone()?, faults)?)
     }
 
-    /// Records all of a stream in one power-on.
     pub(super) fn record(&self, stream: &Stream, boots: u32) -> Result<PowerOn> {
         let device = self.device(Faults::default())?;
         power_on(&device, &Params::defaults(), boots, &mut std::io::sink(), stream.chunks(), |_| Ok(()))
     }
 
-    /// Its content.
     pub(super) fn content(&self) -> Result<Vec<u8>> {
         let mut bytes = Vec::new();
         let mut file = self.file.try_clone()?;

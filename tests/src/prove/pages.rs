@@ -157,7 +157,6 @@ pub(super) struct Outcome {
     pub(super) misses: Vec<String>,
 }
 
-/// One damage.
 struct Damage {
     kind: Kind,
     what: String,

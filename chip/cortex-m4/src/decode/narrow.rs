@@ -3,7 +3,6 @@
 use super::fields::{Place, field, reg, sign_extend};
 use crate::op::{Alu, Extend, Op, Shift, Unary, Width};
 
-/// One halfword.
 pub(super) fn decode(place: Place, halfword: u16) -> Op {
     let h = u32::from(halfword);
     match h >> 10 {

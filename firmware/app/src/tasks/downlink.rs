@@ -35,7 +35,6 @@ pub(crate) async fn run(mut port: board::PortTx, mut queue: GsOut<'static>) -> !
     }
 }
 
-/// To the autopilot.
 #[embassy_executor::task]
 pub(crate) async fn requests(mut port: board::PortTx, mut queue: AutopilotOut<'static>) -> ! {
     loop {

@@ -50,7 +50,6 @@ impl Body {
         (self.common.clock_us, self.common.clock_ms) = (0, 0);
     }
 
-    /// All of the payload.
     pub(super) fn payload<C: End>(
         &mut self,
         coder: &mut C,

@@ -48,7 +48,6 @@ impl Recall {
 
 /// One end of the coder; the reader includes its memory.
 pub(super) trait End: Coder {
-    /// The reader, if this end is one.
     fn reading(&mut self) -> Option<Reading<'_, Recall>>;
 }
 

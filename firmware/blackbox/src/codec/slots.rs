@@ -33,7 +33,6 @@ pub(crate) enum Length {
     Fixed(u8),
 }
 
-/// One slot.
 #[derive(Clone, Copy)]
 pub(crate) struct Slot {
     pub(crate) key: Key,
@@ -271,7 +270,6 @@ impl Slots {
             && (slot.instance_size == 0 || slot.is_instance(frame))
     }
 
-    /// The slot of this frame.
     #[inline(never)]
     pub(crate) fn find(&self, frame: &Frame) -> Option<u8> {
         (0..self.used).find(|&slot| self.is_of(slot, frame))

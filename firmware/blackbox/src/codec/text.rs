@@ -27,7 +27,6 @@ impl TextModel {
         self.same.fill(Cell::EVEN);
     }
 
-    /// One byte in a context.
     pub(crate) fn byte<C: Coder>(&mut self, coder: &mut C, byte: u8, context: u32) -> u8 {
         let upper = coder.symbol(&mut self.rows[row(context)], usize::from(byte >> 4));
         let context = context ^ (16 + upper as u32) << 24;

@@ -40,12 +40,10 @@ impl Texts {
         self.lengths = [Cdf::FLAT; 2];
     }
 
-    /// The last text of an element.
     pub(super) fn last(&self, element: &Element) -> Option<&[u8]> {
         self.kept.get(range_of(element)?)
     }
 
-    /// Codes a text.
     pub(super) fn code<C: Coder>(
         &mut self,
         coder: &mut C,

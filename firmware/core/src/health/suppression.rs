@@ -159,12 +159,10 @@ impl Role {
         (self.0 >> Self::SETS) as u8
     }
 
-    /// Whether it is of this group.
     pub(super) const fn is(self, group: Group) -> bool {
         self.number() == group as u8
     }
 
-    /// Whether it is of one of these groups.
     pub(super) const fn is_of(self, groups: u64) -> bool {
         groups >> self.number() & 1 != 0
     }

@@ -20,7 +20,6 @@ struct Script {
     reboots: u32,
     identified: bool,
     baud: u32,
-    /// Parameters that it has.
     parameters: Vec<&'static str>,
     /// Requested parameters, and the times.
     parameters_asked: Vec<(u64, String)>,

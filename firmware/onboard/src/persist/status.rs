@@ -123,7 +123,6 @@ impl StoreStatus {
     }
 }
 
-/// Counts one.
 pub(crate) fn count(counter: &AtomicU32) {
     counter.fetch_add(1, Ordering::Relaxed);
 }

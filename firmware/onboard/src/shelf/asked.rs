@@ -101,7 +101,6 @@ impl Answer {
         Self { ticket, count: 0, found, log: LogId::NONE, bytes: 0, utc_secs: 0, offset: 0, directory: 0 }
     }
 
-    /// The same answer without a log.
     pub(super) const fn without(self, why: NoLog) -> Self {
         Self { found: Err(why), bytes: 0, ..self }
     }

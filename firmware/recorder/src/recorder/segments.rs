@@ -33,7 +33,6 @@ pub(super) struct Log {
 /// first one.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum NewestCopy {
-    /// There is none.
     None,
     /// At the sector's own place.
     InPlace,

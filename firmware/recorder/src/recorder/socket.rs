@@ -103,7 +103,6 @@ impl<'a, D: CardDevice> Socket<'a, D> {
         if let Self::Mounted(card) = self { Some(card) } else { None }
     }
 
-    /// The device, with its card.
     pub(super) fn into_device(mut self) -> Option<D> {
         self.release();
         if let Self::Waiting(device) = self { Some(device) } else { None }

@@ -254,7 +254,6 @@ impl Flights {
         self.crashed = false;
     }
 
-    /// All has ended.
     pub(super) fn end(mut self, monitor: &Monitor) -> Vec<Flight> {
         self.end_of_recording(monitor);
         // Its fall may go on after the recording.

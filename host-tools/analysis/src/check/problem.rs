@@ -62,7 +62,6 @@ impl Problem {
         (!self.is_mishap() && !self.leads_to(mishaps), part::is_due(&self.check), self.at)
     }
 
-    /// Whether it is a mishap.
     pub(super) fn is_mishap(&self) -> bool {
         self.subsystem == Subsystem::Mishap && self.level == Level::Critical
     }

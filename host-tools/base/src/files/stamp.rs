@@ -27,7 +27,6 @@ pub(super) struct Stamp {
 }
 
 impl Stamp {
-    /// That of a folder, if it has one.
     pub(super) fn of(folder: &Path) -> Option<Self> {
         let path = folder.join(STAMP);
         fs::symlink_metadata(&path).ok().filter(|about| about.is_file() && about.len() <= BYTES_MAX)?;
@@ -43,7 +42,6 @@ impl Stamp {
         Some(Self { session, files })
     }
 
-    /// Writes it.
     pub(super) fn write(&self, mut file: &File) -> io::Result<()> {
         let mut text = format!("{}\nfiles {}\n", self.session, self.files.len());
         for line in &self.files {

@@ -12,7 +12,6 @@ use hums_recorder::LogName;
 use super::board::Board;
 use crate::hex::hex;
 
-/// The digits of a session.
 const SESSION_DIGITS: usize = 8;
 
 /// The name of a session: its name on the card, and its board and session. Unknown parts are left out: a

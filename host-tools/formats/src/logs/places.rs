@@ -80,7 +80,6 @@ pub struct Blocks<'a> {
 }
 
 impl<'a> Blocks<'a> {
-    /// The log of the blocks.
     pub(super) const fn log(&self) -> &'a Log {
         self.log
     }

@@ -101,7 +101,6 @@ pub(super) struct Files {
 }
 
 impl Files {
-    /// Of these logs' files.
     pub(super) fn of(logs: &[Log]) -> Self {
         let mut files = Self::default();
         for (log, session) in logs.iter().filter_map(|log| Some((log, first_session(log)?))) {

@@ -15,7 +15,6 @@ pub(super) struct Class {
     pub(super) checks: &'static [&'static str],
 }
 
-/// All classes.
 pub(super) const CLASSES: &[Class] = &[
     Class {
         name: "propulsion",

@@ -13,7 +13,6 @@ use super::rates::{an_hour, hours, quantile_s, share};
 /// The section's heading.
 pub(super) const TITLE: &str = "## In short";
 
-/// The section.
 pub(super) fn section(sets: &[Judged]) -> String {
     let labelled = |known| {
         let of_it = sets.iter().filter(move |set| set.is_labelled && set.known == known);

@@ -21,7 +21,6 @@ const JUDGED: &str = include_str!("verdicts.json");
 #[derive(Clone, Copy, Debug, Deserialize, PartialEq, Eq, PartialOrd, Ord)]
 #[serde(rename_all = "lowercase")]
 pub(super) enum Flown {
-    /// A vehicle.
     Vehicle,
     /// A simulator, with sensors or without.
     Simulator,

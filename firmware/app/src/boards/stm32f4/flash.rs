@@ -29,7 +29,6 @@ const WORD: usize = 4;
 /// Unlock keys of the flash control (RM0090, 3.5.1).
 const KEYS: [u32; 2] = [0x4567_0123, 0xCDEF_89AB];
 
-/// Error of the flash.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum FlashError {
     /// Outside the store, or not whole words or sectors.

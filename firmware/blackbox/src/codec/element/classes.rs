@@ -66,7 +66,6 @@ impl Distributions {
         self.used
     }
 
-    /// That distribution.
     #[inline]
     pub(crate) fn get(&mut self, number: u16) -> Option<&mut Cdf> {
         self.blocks.get_mut(usize::from(number).wrapping_sub(1))

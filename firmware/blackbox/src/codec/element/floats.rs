@@ -20,7 +20,6 @@ const LINKED: usize = 5;
 const RANDOM: u32 = 192;
 
 impl Distributions {
-    /// A float.
     #[inline(never)]
     pub(crate) fn float<C: Coder>(
         &mut self,

@@ -157,7 +157,6 @@ pub(super) struct Format {
     is_known: bool,
     /// Fewer columns have names than there are format characters.
     lacks_names: bool,
-    /// Its format characters.
     pub(super) characters: usize,
     /// The column of the time, and its kind.
     pub(super) time: Option<TimeField>,
@@ -318,7 +317,6 @@ pub(super) struct Lengths {
 pub(super) enum Defined {
     /// It is new, or a change.
     New,
-    /// It was known.
     Known,
     /// It is not followed.
     Refused(String),

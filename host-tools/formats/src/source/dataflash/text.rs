@@ -86,7 +86,6 @@ pub(super) fn beginning(line: &str) -> Option<usize> {
     line.find("FMT, 128, 89, FMT")
 }
 
-/// The name of a line.
 pub(super) fn name(line: &str) -> &str {
     line.split(',').next().unwrap_or_default().trim()
 }

@@ -20,7 +20,6 @@ impl Writer {
         Self { bytes }
     }
 
-    /// Any message.
     pub(super) fn message(mut self, kind: u8, body: &[&[u8]]) -> Self {
         let body = body.concat();
         self.bytes.extend(u16::try_from(body.len()).expect("a message of 64 KiB").to_le_bytes());
