@@ -1,20 +1,19 @@
-"""Looks at a report in Chromium, as a person would, and tells what it shows.
+"""Opens a report in Chromium and prints its content.
 
 usage: browser.py CHROMIUM CHROMEDRIVER PAGE PART...        prints JSON
   PART          how far from the left the mouse points in each plot, 0 to 1
 
-  console       what the browser complained about
-  requests      addresses that the page asked for, but for itself
-  title, text   what stands there
+  console       the browser's complaints
+  requests      addresses that the page requested, except its own
+  title, text   of the page
   findings      time, level, check and words of each finding in the list
   tiles         label and value
-  plots         for each plot: id, lines, the pixels of each line's colour, and what its lines say where the mouse points,
-                with the time there
+  plots         for each plot: id, lines, the pixels of each line's colour, and the lines' values and the time at the mouse
   cursor        the time under the cursor, at the last of these
   modes         names of the flight modes, in order
   limits        pairs of warning and critical, by plot
-  why           what findings mean, and what to do
-  because, consequences   what explains findings, and what they explain
+  why           meanings of findings, and remedies
+  because, consequences   causes of findings, and their effects
   map           the part of the map's pixels that is drawn on
   width         of the page and of the window, at the width of a phone
 """
@@ -41,7 +40,7 @@ for (const pixel of pixels) counts.set(pixel, (counts.get(pixel) ?? 0) + 1);
 return 1 - Math.max(...counts.values()) / pixels.length;
 """
 
-# How many pixels of a plot have the colour of each of its lines, but for the smoothing of edges.
+# Pixels of a plot in the colour of each of its lines, without smoothed edges.
 LINE_PIXELS = """
 const [canvas, keys] = arguments;
 const pixels = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height).data;
@@ -61,7 +60,7 @@ return [log.start_s, log.end_s];
 """
 
 
-# The names of the flight modes, one after the other.
+# The names of the flight modes, in order.
 MODES = """
 return JSON.parse(document.getElementById("data").textContent).flight.modes[1].map(([, name]) => name);
 """
@@ -72,7 +71,7 @@ return Object.fromEntries(plots.filter(({ limits }) => limits.length).map(({ id,
 """
 
 
-# What stands there, read at once: each question to the browser takes its time.
+# The content of the page, read in one request: each one takes time.
 SHOWN = """
 const all = (selector, within = document) => [...within.querySelectorAll(selector)];
 const text = (node) => node.textContent;
@@ -89,7 +88,7 @@ return {
   consequences: all(".notes .consequences:not([hidden])").map(text),
 };
 """
-# The lines of a plot, and what they say.
+# The lines of a plot, and their values.
 VALUES = """
 return Object.fromEntries([...arguments[0].querySelectorAll(".keys button")].map((key) => {
   const value = key.querySelector("b").innerText.trim(), name = key.innerText.trim();
@@ -148,7 +147,7 @@ def look(driver, page, parts):
     shown["map"] = [driver.execute_script(DRAWN, canvas) for canvas in all_of("#map")]
     shown["timeline"] = driver.execute_script(DRAWN, driver.find_element("id", "timeline"))
     if all_of(".notes .finding"):
-        # A click on a finding looks closer; the button goes back.
+        # A click on a finding zooms in; the button goes back.
         driver.execute_script("arguments[0].click()", all_of(".notes .finding")[0])
         back = driver.find_element("css selector", ".back")
         WebDriverWait(driver, 10).until(lambda _: back.is_displayed())
@@ -161,7 +160,7 @@ def look(driver, page, parts):
     shown["width"] = driver.execute_script("return [document.documentElement.scrollWidth, innerWidth]")
     shown["console"] = [entry["message"] for entry in driver.get_log("browser")]
     events = [json.loads(entry["message"])["message"] for entry in driver.get_log("performance")]
-    # The browser's own first tab asks for things too.
+    # The browser's own first tab makes requests too.
     asked = [event["params"] for event in events if event["method"] == "Network.requestWillBeSent"]
     urls = {request["request"]["url"] for request in asked if request["documentURL"] == address}
     shown["requests"] = sorted(url for url in urls if url != address and not url.startswith("data:"))

@@ -1,9 +1,9 @@
-"""Talks to the box as a ground station does, with pymavlink, and prints what came of it.
+"""Talks to the box like a ground station, with pymavlink, and prints the results.
 
 usage: companion.py DIALECT.py PORT        prints JSON
   PORT  the UDP port at which `hums sim --gs udpin:127.0.0.1:PORT` listens
 
-A step whose answer does not come within its time is null, so that the caller says what is missing.
+A step without an answer in time is null, so that the caller reports the missing one.
 """
 
 import json
@@ -133,7 +133,7 @@ def main():
     out["preflight"] = result(peer.command(401))
     out["stop"] = result(peer.command(2511))
     out["record"] = result(peer.command(2510))
-    # 31010: another part is in this component's place; 31011: cancel the protective action.
+    # 31010: a component was replaced; 31011: cancel the protective action.
     out["no_component"] = result(peer.command(31010, 1))
     put("CMP1_KIND", 4.0)
     # In force at the next tick, 50 ms later.

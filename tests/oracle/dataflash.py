@@ -2,7 +2,7 @@
 
 usage: dataflash.py LOG        prints a line of JSON for each message: [name, [value, ...]]
 
-An array is a value for each element. What is no number (NaN) is null.
+An array is a value for each element. NaN is null.
 """
 
 import json
@@ -13,12 +13,12 @@ from pymavlink import DFReader
 
 
 def value_of(message, column, character):
-    """A list: an array has many."""
+    """A list, of one value unless it is an array."""
     if character == "a":
         return list(message._elements[message.fmt.colhash[column]])
     value = getattr(message, column)
     if isinstance(value, bytes):
-        # The contents of files are left as bytes: hexadecimal digits.
+        # The contents of files stay bytes: hexadecimal digits.
         value = value.hex()
     if isinstance(value, float) and not math.isfinite(value):
         value = None

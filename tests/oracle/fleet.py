@@ -2,7 +2,7 @@
 
 usage: fleet.py DOCUMENT FOLDER        prints JSON
 
-Each ```sql block of the Markdown DOCUMENT is a query; they run with FOLDER as the working folder, where `fleet/` lies.
+Each ```sql block of the Markdown DOCUMENT is a query; they run in FOLDER, which has `fleet/`.
 For each: the heading above it, its columns and its rows.
 """
 

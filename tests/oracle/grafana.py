@@ -1,10 +1,10 @@
 """Reads dashboards with Grafana's own model of them, which Grafana's makers generate from its schema for each release
-(`grafana-foundation-sdk`, Apache-2.0), and tells as JSON what that model does not know or takes otherwise.
+(`grafana-foundation-sdk`, Apache-2.0), and prints as JSON the members that this model lacks or reads differently.
 
 usage: grafana.py DASHBOARD.json...
 
-A member that the model has no place for is lost when it is read and written again; one of the wrong type shows against
-the model's annotations, down to each panel's options; a panel type without a model of its own is told as well.
+An unknown member is lost when it is read and written again. A wrong type is found by the model's annotations, down to
+each panel's options. A panel type without a model of its own is reported as well.
 """
 
 import enum
@@ -20,7 +20,7 @@ from grafana_foundation_sdk.models.dashboard import Dashboard
 
 
 def lost(before, after, path, tell):
-    """What is not there any more, or is something else."""
+    """The members that are lost or changed."""
     if isinstance(before, dict) and isinstance(after, dict):
         for name, value in before.items():
             if name in after:
@@ -46,7 +46,7 @@ def fits(value, kind):
     if origin is dict:
         return isinstance(value, dict) and all(fits(one, arguments[1]) for one in value.values())
     if inspect.isclass(kind) and hasattr(kind, "from_json") and isinstance(value, dict):
-        # The model's own reader leaves it as it is.
+        # The model's own reader does not change it.
         told, one = [], kind.from_json(value)
         lost(value, json.loads(JSONEncoder().encode(one)), "", told.append)
         typed(one, "", told.append)

@@ -1,10 +1,10 @@
-"""Sits at MAVProxy's prompt, with the box as its vehicle, and prints what came of it.
+"""Uses MAVProxy's prompt, with the box as its vehicle, and prints the results.
 
 usage: gs_mavproxy.py PORT FOLDER        prints JSON
   PORT    the UDP port at which `hums sim --gs udpin:127.0.0.1:PORT` listens; its SIGN_PORT is 1 and its GS_SIGN 2
   FOLDER  gets MAVProxy's own files and the oldest log: log.bin by LOG_REQUEST_DATA, ftp.hum by FTP
 
-Each step is what MAVProxy said, or null where it did not say it in time.
+Each step is MAVProxy's output, or null if it did not come in time.
 """
 
 import json

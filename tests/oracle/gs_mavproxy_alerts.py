@@ -1,12 +1,12 @@
-"""Plays what the box sends to MAVProxy, without and then with the module of docs/stations, and prints what MAVProxy shows.
+"""Plays the box's stream to MAVProxy, without and then with the module of docs/stations, and prints MAVProxy's output.
 
 usage: gs_mavproxy_alerts.py STREAM MODULES FOLDER        prints JSON
-  STREAM   what `hums sim --gs FILE` wrote
+  STREAM   the output of `hums sim --gs FILE`
   MODULES  the folder with mavproxy_hums.py
   FOLDER   gets MAVProxy's own files
 
-`texts` are the box's texts in STREAM, `without` and `with` what stood in MAVProxy's console, `autopilot` whether a text of the
-autopilot itself was shown, `again` what the command `hums` prints.
+`texts` are the box's texts in STREAM, `without` and `with` the lines in MAVProxy's console, `autopilot` whether a text of the
+autopilot itself was shown, `again` the output of the command `hums`.
 """
 
 import json
@@ -57,7 +57,7 @@ class Prompt:
         self.process.stdin.flush()
 
     def until(self, pattern, seconds, repeat=None):
-        """The lines up to one that matches; empty where none did in time."""
+        """The lines up to one that matches; empty if none did in time."""
         seen, end = [], time.time() + seconds
         while time.time() < end:
             if repeat is not None:
@@ -94,12 +94,12 @@ def main():
     beats = [frame for frame in sent if frame.get_type() == "HEARTBEAT" and frame.get_srcComponent() != MINE]
     wanted = [frame for frame in sent
               if frame.get_srcComponent() == MINE and frame.get_type() in ("STATUSTEXT", "NAMED_VALUE_FLOAT", "HEARTBEAT")]
-    # The autopilot's own, as the end of what was played.
+    # A text of the autopilot, which marks the end.
     sender = mavlink.MAVLink(None, srcSystem=sent[0].get_srcSystem(), srcComponent=beats[0].get_srcComponent())
     mark = mavlink.MAVLink_statustext_message(6, b"the end of it")
     mark.pack(sender)
     prompt = Prompt(modules, folder)
-    # Its first start compiles all of it: a slow machine takes half a minute.
+    # Its first start compiles everything: half a minute on a slow machine.
     out = {"texts": texts, "started": bool(prompt.until(r"Detected vehicle", 60, repeat=beats[0]))}
 
     def shown():

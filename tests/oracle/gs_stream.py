@@ -1,12 +1,12 @@
-"""Parses what the box sent to the ground station, as a ground station would, and strictly.
+"""Parses the box's stream to the ground station like a ground station, and strictly.
 
 usage: gs_stream.py DIALECT.py STREAM        prints JSON
 
-robust_parsing is off, so the first byte that is not part of a good frame ends this with an error.
+robust_parsing is off, so the first byte outside a valid frame ends this with an error.
   frames            all of them
   frames_by_sender  per "system/component"
   heartbeats        per "system/component/autopilot/type"
-  computer          the last ONBOARD_COMPUTER_STATUS, and how many there were
+  computer          the last ONBOARD_COMPUTER_STATUS, and their number
 """
 
 import collections

@@ -1,17 +1,17 @@
-"""Looks at `hums live` in Chromium, step by step.
+"""Controls `hums live` in Chromium, step by step.
 
 usage: live.py CHROMIUM CHROMEDRIVER        a JSON object a line on standard input is answered by one on standard output
 
   {"do": "open", "url": U, "scheme": "light" | "dark", "width": W, "height": H}
-  {"do": "media", "media": "" | "print", "features": {NAME: VALUE}}     how it is shown: `prefers-color-scheme`, `prefers-contrast`, ...
-  {"do": "pdf", "path": P}                  as it is printed on A4
-  {"do": "read"}                            what the page shows at one moment: see READ
-  {"do": "wait", "script": JS, "limit_s": S}  until the script returns something true; answers what it returned
-  {"do": "run", "script": JS}               answers what it returned
+  {"do": "media", "media": "" | "print", "features": {NAME: VALUE}}     the medium and preferences: `prefers-color-scheme`, `prefers-contrast`, ...
+  {"do": "pdf", "path": P}                  a print on A4
+  {"do": "read"}                            the content of the page at one moment: see READ
+  {"do": "wait", "script": JS, "limit_s": S}  until the script returns something true; answers its result
+  {"do": "run", "script": JS}               answers its result
   {"do": "press", "keys": [...]}            key presses, by name or as the character
-  {"do": "frames", "seconds": S}            milliseconds that each frame takes, from its beginning until it is painted
+  {"do": "frames", "seconds": S}            milliseconds of each frame, from its beginning until it is painted
   {"do": "shot", "path": P, "whole": BOOL}  a screenshot, of the window or of the whole page
-  {"do": "console"}                         what the browser complained about since the last time
+  {"do": "console"}                         the browser's complaints since the last time
   {"do": "quit"}                            the end
 """
 

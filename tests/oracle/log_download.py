@@ -1,9 +1,9 @@
-"""Downloads a log as a ground station does, with LOG_REQUEST_LIST and LOG_REQUEST_DATA, over a link that loses frames.
+"""Downloads a log like a ground station, with LOG_REQUEST_LIST and LOG_REQUEST_DATA, over a link that loses frames.
 
 usage: log_download.py DIALECT.py PORT OUT LOSS        prints JSON
   PORT  the UDP port at which `hums sim --gs udpin:127.0.0.1:PORT` listens
   OUT   gets the oldest log's bytes
-  LOSS  what part of the frames is lost, each way, from 0 to 1
+  LOSS  the part of frames that is lost, each way, from 0 to 1
 """
 
 import json
@@ -54,7 +54,7 @@ def main():
     end = time.time() + 100
     while missing and time.time() < end:
         first = min(missing)
-        # All that is missing in one row, as ground stations ask.
+        # All missing bytes of one row, like ground stations.
         last = first
         while last in missing:
             last += 90

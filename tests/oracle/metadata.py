@@ -1,9 +1,9 @@
-"""The component information of the box, by others than ourselves: Python's xz, and pymavlink's client of MAVLink FTP.
+"""The component information of the box, through foreign readers: Python's xz, and pymavlink's client of MAVLink FTP.
 
-usage: metadata.py pack JSON FILE         packs a text as firmware/onboard/metadata keeps it
-       metadata.py unpack FILE            prints what is packed in a file
-       metadata.py DIALECT.py fetch PORT FOLDER      asks the box for COMPONENT_METADATA, fetches what it names into FOLDER, prints JSON
-       metadata.py words FILE             what Mission Planner finds in its file of descriptions, as it looks for it; prints JSON
+usage: metadata.py pack JSON FILE         packs a text as in firmware/onboard/metadata
+       metadata.py unpack FILE            prints the unpacked file
+       metadata.py DIALECT.py fetch PORT FOLDER      requests COMPONENT_METADATA, fetches the files in it into FOLDER, prints JSON
+       metadata.py words FILE             Mission Planner's reading of its file of descriptions; prints JSON
   PORT  the UDP port at which `hums sim --gs udpin:127.0.0.1:PORT` listens
 """
 
@@ -22,7 +22,7 @@ COMPONENT_METADATA = 397
 
 
 def pack(text):
-    # The check that the smallest decoders have, and a dictionary as long as the text.
+    # The check of the smallest decoders, and a dictionary as long as the text.
     chain = [{"id": lzma.FILTER_LZMA2, "preset": 9 | lzma.PRESET_EXTREME, "dict_size": 1 << 17, "pb": 0}]
     return lzma.compress(text, format=lzma.FORMAT_XZ, check=lzma.CHECK_CRC32, filters=chain)
 

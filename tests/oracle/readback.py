@@ -1,14 +1,14 @@
-"""Reads what `hums decode` wrote with readers that are not ours, and compares every field of every message with what
-pymavlink reads from the recording itself.
+"""Reads the output of `hums decode` with foreign readers, and compares every field of every message with pymavlink's
+reading of the recording itself.
 
 usage: readback.py DIALECT.py RECORDING OUT INFLUXD        prints JSON
 
 OUT is the folder of one log, decoded as csv, jsonl, influx and parquet. The readers are Python's csv and json, pyarrow,
-and InfluxDB (INFLUXD is the program), which takes every point of the line protocol and is asked for them again.
-A number may differ from pymavlink's by nothing at all: each format prints what reads back as the same number. Times are
-compared with those before the frames of a tlog: seconds since the first one, to the millisecond, and UTC, which is the
-first one's and these seconds. A raw recording has no times: its frames come when the autopilot's messages tell, to a tenth of a
-second, and before the first of these as on a line at 115,200 baud, up to 32 bytes at once. No UTC is known.
+and InfluxDB (INFLUXD is the program), which takes every point of the line protocol and returns them.
+Numbers must equal pymavlink's: each format prints digits that read back as the same number. Times are compared with
+those before the frames of a tlog: seconds since the first one, to the millisecond, and UTC, which is the first one's
+plus these seconds. A raw recording has no times. Its frames have those of the autopilot's messages, to a tenth of a second;
+before the first of these they come as on a line at 115,200 baud, up to 32 bytes together. UTC is unknown.
 """
 
 import collections
@@ -36,26 +36,26 @@ csv.field_size_limit(1 << 24)
 
 
 SECOND_US, DAY_US = 1_000_000, 86_400_000_000
-# Bytes a second of a raw recording, and how much later than its last byte a frame may come; how much later than the autopilot's
-# latest time, once it tells one, and with which messages: SYSTEM_TIME, ATTITUDE, GLOBAL_POSITION_INT.
+# Bytes a second of a raw recording, and the delay of a frame after its last byte; its delay after the autopilot's latest
+# time, once there is one, and the messages with that time: SYSTEM_TIME, ATTITUDE, GLOBAL_POSITION_INT.
 RAW_BYTES_S, RAW_LATE_US = 11_520, 32 * SECOND_US // 11_520
 TOLD_LATE_US, TELLING, AUTOPILOT = 100_000, (2, 30, 33), 1
 EPOCH = datetime.datetime(1970, 1, 1, tzinfo=datetime.timezone.utc)
 
 
 class Arrival:
-    """When frames came, in microseconds since the first one. A PC's clock may be set while it records: after a step back
-    of more than a second, or forward of more than a day, time goes on from where it was; it never falls."""
+    """Arrival times, in microseconds since the first one. A PC's clock may be set while it records: after a step back of
+    more than a second, or forward of more than a day, time continues from before; it never falls."""
 
     def __init__(self):
         self.first = self.last = None
         self.at = 0
         self.late = 0
-        # Of a raw recording: whose time counts, its first time, and when that came.
+        # For a raw recording: the source of the time, its first time, and its arrival.
         self.teller = None
 
     def byte(self, place, message):
-        """Of a raw recording: so many bytes came, the last of them of this message."""
+        """For a raw recording: the number of bytes so far, and the message of the last one."""
         system = message.get_srcSystem()
         tells = message.get_msgId() in TELLING and message.get_srcComponent() == AUTOPILOT
         if self.teller is None:
@@ -79,7 +79,7 @@ class Arrival:
 
 
 def messages_of(data, dialect, arrival):
-    """Each verified message in order; `arrival` tells when it came."""
+    """Each verified message in order; `arrival` has its time."""
     reader, at, tlog = Reader(dialect), 0, is_tlog(data)
     skip = 8 if tlog else 0
     while at + skip < len(data):
@@ -133,10 +133,10 @@ def same_number(kind, expected, found):
 
 
 class Comparison:
-    """Counts what was compared, and keeps the first differences."""
+    """Counts comparisons, and stores the first differences."""
 
     def __init__(self, arrival):
-        """`first_us` is UTC of the first frame, in microseconds since 1970; None where the recording has no times."""
+        """`first_us` is UTC of the first frame, in microseconds since 1970; None if the recording has no times."""
         self.first_us, self.late = arrival.first, arrival.late
         self.values = collections.Counter()
         self.times = collections.Counter()
@@ -149,7 +149,7 @@ class Comparison:
             self.differences.append(f"{form} {where}: {expected!r} became {found!r}")
 
     def field(self, form, where, kind, expected, get):
-        """`get(index)` is the value found; the index is None for what is no array."""
+        """`get(index)` is the value found; the index is None unless it is an array."""
         if isinstance(expected, list):
             for index, element in enumerate(expected):
                 self.check(form, f"{where}[{index}]", kind, element, get(index))
@@ -167,7 +167,7 @@ class Comparison:
                 f"{form} {name}: came {message['at']} us after {self.first_us}, became {boot_s} s, {utc_us}")
 
     def in_time(self, late_us):
-        """Within the millisecond that times are given to, or as late as bytes that come together make it."""
+        """Within the millisecond of times, or within the delay of bytes that arrive together."""
         return -1000 < late_us < 1000 + self.late
 
     def point_time(self, name, message, ns):
@@ -183,14 +183,14 @@ class Comparison:
 
 
 def micros_of(text):
-    """UTC as text, in microseconds since 1970; None where there is none."""
+    """UTC as text, in microseconds since 1970; None if there is none."""
     if not text:
         return None
     return (datetime.datetime.fromisoformat(text.replace("Z", "+00:00")) - EPOCH) // datetime.timedelta(microseconds=1)
 
 
 def text_of(cell):
-    """A cell of text as it was sent: one that a spreadsheet would run has an apostrophe before it (docs/decode.md)."""
+    """A cell of text as sent: one that a spreadsheet would execute has an apostrophe before it (docs/decode.md)."""
     return cell[1:] if cell.startswith("'") else cell
 
 
@@ -344,7 +344,7 @@ def compare_influx(out, expected, comparison, program):
 
 
 def compare_measurement(influx, name, count, messages, comparison):
-    """Asks for all points of a measurement; rows come in order of time, which is that of the record."""
+    """Asks for all points of a measurement; rows come in order of time, as in the record."""
     series = influx.ask(f'SELECT * FROM "{name}"')
     columns = {column: place for place, column in enumerate(series[0]["columns"])} if series else {}
     rows = series[0]["values"] if series else []

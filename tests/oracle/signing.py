@@ -1,9 +1,9 @@
-"""Asks the box with pymavlink's own signing: unsigned, with the key, with another one, and by playing frames again.
+"""Sends requests with pymavlink's own signing: unsigned, with the key, with another one, and replayed.
 
 usage: signing.py DIALECT.py PORT STATE        prints JSON
   PORT   the UDP port at which `hums sim --gs udpin:127.0.0.1:PORT` listens
-  STATE  a file: where it is missing, the box has no key yet and gets one; otherwise it is what an earlier run left, and
-         the box, which has been switched off meanwhile, has to know all of it
+  STATE  a file: if it is missing, the box has no key yet and gets one; otherwise it is the state of an earlier run, which
+         the box must have kept over a power-off
 """
 
 import json
@@ -24,7 +24,7 @@ def now():
 
 
 class Signer(Peer):
-    """A ground station that signs, and keeps what it sent."""
+    """A ground station that signs, and stores its frames."""
 
     def __init__(self, dialect, port, stamp):
         super().__init__(dialect, port)
@@ -46,7 +46,7 @@ class Signer(Peer):
         signing.sign_outgoing = signs
 
         def unsigned(mav, msg_id):
-            # The vehicle's own frames come as they are.
+            # The vehicle's own frames come unaltered.
             return True
 
         signing.allow_unsigned_callback = unsigned
@@ -61,7 +61,7 @@ class Signer(Peer):
         return value(message)
 
     def tally(self, seconds):
-        """Of our frames: signed and unsigned ones, bad ones, and the first and the last stamp."""
+        """Counts of our frames: signed, unsigned and bad ones; the first and the last stamp."""
         signed = unsigned = bad = 0
         judged = self.mav.signing
         good_before, wrong_before = judged.goodsig_count, judged.badsig_count
@@ -76,7 +76,7 @@ class Signer(Peer):
             else:
                 unsigned += 1
         rises = all(a < b for a, b in zip(stamps, stamps[1:]))
-        # As pymavlink judges them, the vehicle's own frames included.
+        # By pymavlink's verdict, the vehicle's own frames included.
         good, wrong = judged.goodsig_count - good_before, judged.badsig_count - wrong_before
         return {"signed": signed, "unsigned": unsigned, "bad": bad, "rises": rises, "good": good, "wrong": wrong,
                 "first": stamps[0] if stamps else None, "last": stamps[-1] if stamps else None}
@@ -104,7 +104,7 @@ def main():
         )
         out["key"] = None if said is None else said.text
     else:
-        # What an earlier power-on accepted is played again, before anything else is said.
+        # Frames that an earlier power-on accepted are replayed first.
         peer.use(KEY, signs=False)
         for frame in state["frames"]:
             peer.link.write(bytes.fromhex(frame))
@@ -112,7 +112,7 @@ def main():
         out["replayed_after_power_off"] = sorted(set(answers))
 
     peer.use(KEY)
-    # What was on its way when the key was set is not signed.
+    # Frames in transfer when the key was set are not signed.
     peer.tally(0.5)
     out["sealed"] = peer.tally(4)
     if state:
@@ -135,7 +135,7 @@ def main():
     frames.append(peer.sent.hex())
     peer.keep_stamp()
 
-    # pymavlink would refuse our answers with another key: the answer is looked at with ours.
+    # pymavlink would refuse our answers with another key: the answer is read with ours.
     peer.use(OTHER)
     mav.param_set_send(1, OURS, NAME, 50.0, 9)
     peer.use(KEY, signs=False)

@@ -2,8 +2,8 @@
 
 usage: snippets.py DOCUMENT FOLDER        prints JSON
 
-Each ```python block of the Markdown DOCUMENT runs by itself with FOLDER as the working folder. The output is a list of
-what each printed.
+Each ```python block of the Markdown DOCUMENT runs by itself in FOLDER. The result is a list of their
+outputs.
 """
 
 import contextlib

@@ -1,13 +1,13 @@
-"""How often each labelled flight took off, landed and crashed, from its recording alone: pymavlink and a few rules, no HUMS.
+"""Take-offs, landings and crashes of each labelled flight, from its recording alone: pymavlink and a few rules, no HUMS.
 
 usage: truth.py DIALECT.py FOLDER        rewrites FOLDER/labels.json
 
 DIALECT.py is made by pymavlink's mavgen. Each entry of labels.json gets four fields:
 
   flights    from and to of each time in the air, in seconds since the first frame
-  landings   how many of them ended on the ground without a crash
-  crashes_s  when it hit the ground in a crash, each time
-  battery_low_s  when the autopilot itself first called a battery low; null where it never did
+  landings   the number of them that ended on the ground without a crash
+  crashes_s  times of hitting the ground in a crash
+  battery_low_s  time of the autopilot's own first report of a low battery; null if it never came
 
 The rules:
 
@@ -17,8 +17,8 @@ The rules:
              later flies once more
   crash      it came below 1.5 m with a sink speed of more than 3 m/s in the second before (6 m/s for a plane), or with more
              than 4 g within a second and a speed of more than 1.5 m/s before (a simulator's legs are hard), or was disarmed above 5 m;
-             a plane without rotors that touches at less than 3.05 m/s of sink (CS-23.473: a landing gear takes 10 ft/s) lands,
-             however it skids, where it has no throttle, or goes on where it is 2 m up again before it stands
+             a plane without rotors that touches at less than 3.05 m/s of sink (CS-23.473: a landing gear takes 10 ft/s) and
+             without throttle lands, even if it skids; it flies on if it is 2 m up again before it stands
   landing    a flight that ended by disarming or by standing for 8 s, without a crash
 
   battery    BATTERY_STATUS.charge_state is MAV_BATTERY_CHARGE_STATE_LOW or worse, up to UNHEALTHY

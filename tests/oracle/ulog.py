@@ -1,6 +1,6 @@
-"""Compares every field of a ULog as hums read it with what pyulog reads.
+"""Compares every field of a ULog between hums and pyulog.
 
-Usage: ulog.py LOG.ulg[.gz] FOLDER. FOLDER has what hums read: tables.json, and for each table NAME.bin, eight bytes a
+Usage: ulog.py LOG.ulg[.gz] FOLDER. FOLDER has the reading of hums: tables.json, and for each table NAME.bin, eight bytes a
 value, row by row (unsigned and signed integers, flags, bits of float and double; text as zero)."""
 
 import gzip
@@ -42,13 +42,13 @@ def main():
         result["topics"] += 1
         for field in dataset.field_data:
             name = field.field_name
-            # The format says that nobody should show padding; pyulog shows that of definitions within others.
+            # By the format padding is not shown; pyulog shows that of nested definitions.
             if field.type_str == "char" or "_padding" in name:
                 continue
             if name not in names:
                 result["wrong"].append(f"{dataset.name}: no {name}")
                 continue
-            # A flag that was never set to anything may have any bits in the log.
+            # A flag that was never set may have any bits in the log.
             flag = field.type_str == "bool"
             expected = (dataset.data[name] != 0).astype(np.uint64) if flag else bits(dataset.data[name])
             got = rows[:, columns.index(name)]

@@ -1,10 +1,10 @@
-"""Usage of each recorded flight, computed by itself from the messages that pymavlink decodes.
+"""Usage of each recorded flight, computed independently from pymavlink's messages.
 
 usage: usage.py DIALECT.py FILE...        prints JSON: file name -> figures
 
-The figures are those of docs/usage.md, worked out after the flight with the whole of it at hand:
+The figures of docs/usage.md, computed after the flight from all of it:
 
-  flights, flight_time_s    from EXTENDED_SYS_STATE where it says in the air or on the ground; otherwise armed and 1.5 m
+  flights, flight_time_s    from EXTENDED_SYS_STATE if it reports in the air or on the ground; otherwise armed and 1.5 m
                             above the place of arming for half a second, until the throttle is below 20 %, half of that of a hover (without VFR_HUD:
                             until it is low and still) for two seconds or until it is disarmed
   armed_time_s              base_mode of the vehicle's heartbeats
@@ -16,7 +16,7 @@ The figures are those of docs/usage.md, worked out after the flight with the who
   load_factor_max_g         the norm of the first accelerometer, each axis through a first-order filter of 0.3 s, in the air and where
                             VIBRATION is below 60
 
-A recording without times (raw) is taken as what a line at 115,200 baud carries.
+A recording without times (raw) counts as a line at 115,200 baud.
 """
 
 import json
@@ -30,10 +30,10 @@ BATTERY_HOLD_S, ESC_HOLD_S, MOTION_HOLD_S, STATE_HOLD_S = 5.0, 2.0, 3.0, 5.0
 LINE_BYTES_PER_S = 11_520
 INVALID_AUTOPILOT = 8
 GRAVITY = 9.80665
-# What a manoeuvre is, and what no sensor measures; vibration that leaves no load factor, and how long a word of it holds.
+# Limits: a manoeuvre, and the range of sensors; vibration without a valid load factor, and the time for which a report holds.
 LOAD_FILTER_S, LOAD_MAX_G = 0.3, 60.0
 SHAKES_M_S2, SHAKEN_S = 60.0, 3.0
-# BATTERY_STATUS and SYS_STATUS: -1, and what PX4 makes of its own -1 A.
+# BATTERY_STATUS and SYS_STATUS: -1, and PX4's number for its own -1 A.
 UNKNOWN_CURRENT = (-1, -100)
 ON_GROUND, IN_AIR, TAKING_OFF, LANDING = 1, 2, 3, 4
 
@@ -102,7 +102,7 @@ def vehicle_of(messages):
 
 
 class Flight:
-    """All that the figures need, in the order in which it came."""
+    """All inputs of the figures, in the order of arrival."""
 
     def __init__(self, messages):
         self.armed, self.landed, self.positions, self.hud, self.throttles = [], [], [], [], []
@@ -151,7 +151,7 @@ class Flight:
         return ranges_where(self.armed, self.end_s)
 
     def air_ranges(self):
-        """In the air, by the autopilot's word where it gives one, by height otherwise."""
+        """In the air, by the autopilot's report if there is one, by height otherwise."""
         armed = self.armed_ranges()
         if any(state in (IN_AIR, LANDING) for _, state in self.landed):
             return self.said(armed)
@@ -165,7 +165,7 @@ class Flight:
         return ranges
 
     def said(self, armed):
-        """By the autopilot's word; while it takes off, which begins on the ground, a metre of height decides."""
+        """By the autopilot's report; during a take-off, which begins on the ground, a metre of height decides."""
         events = [(time_s, state, None) for time_s, state in self.landed]
         events += [(time_s, None, height) for time_s, height, _ in self.positions if within(time_s, armed)]
         samples, state, ground_m = [], ON_GROUND, None
@@ -204,7 +204,7 @@ class Flight:
         return [(begin, last_s if end is None else end) for begin, end in ranges]
 
     def drawn(self):
-        """(series of volts and amperes) of what draws current; the first is what the voltage is taken of."""
+        """(series of volts and amperes) of all consumers; the first one gives the voltage."""
         batteries = [self.batteries[key] for key in sorted(self.batteries)] or [self.system]
         known = any(amperes is not None for series in batteries for _, (_, amperes) in series.items)
         return batteries, batteries if known else list(self.motors.values())
@@ -250,7 +250,7 @@ def figures(messages):
 
 
 def current_max(sources, armed):
-    """The most that all of them drew together."""
+    """The highest sum of all of them."""
     now, most = {}, 0.0
     events = [(time_s, place, value[1]) for place, series in enumerate(sources) for time_s, value in series.items]
     for time_s, place, amperes in sorted(events, key=lambda event: event[0]):
@@ -261,7 +261,7 @@ def current_max(sources, armed):
 
 
 def load_factors(messages):
-    """The time and the load factor of each sample, where vibration leaves one."""
+    """The time and the load factor of each sample, if vibration allows one."""
     force, before_s, shaken_s = None, None, -math.inf
     for time_s, message in messages:
         if message.get_type() == "VIBRATION":

@@ -2,10 +2,10 @@
 
 usage: hums_log [--format tlog|jsonl] LOG
 
-`tlog` writes what `hums decode --format tlog` does: for each frame its time (8 bytes, big endian, microseconds since
+`tlog` writes the same as `hums decode --format tlog`: for each frame its time (8 bytes, big endian, microseconds since
 1970) and the frame. `jsonl` writes an object a line: each frame in hexadecimal, and the fields of the records. Gaps are
-told on stderr; the exit code is 3 if there are any. The modules follow the document's sections, which they name; the
-tables of layouts and links are read from where the document has them.
+reported on stderr, with exit code 3. The modules follow the document's sections, which they name; the tables of layouts
+and links are read from the document's sources.
 """
 
 import json

@@ -1,4 +1,4 @@
-"""Numbers as the format counts with them, and its checksums."""
+"""Arithmetic of the format, and its checksums."""
 
 import math
 import struct
@@ -32,7 +32,7 @@ def bits_of(value):
 
 
 def crc32c(data, before=0):
-    """Of what gave `before` and this after it."""
+    """The checksum of these bytes behind those of `before`."""
     crc = before ^ M32
     for byte in data:
         crc = CRC32C[(crc ^ byte) & 0xFF] ^ (crc >> 8)

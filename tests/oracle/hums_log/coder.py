@@ -91,7 +91,7 @@ class Coder:
         return int(one)
 
     def magnitude(self, bits):
-        """A number of so many bits whose first one is known, with its sign."""
+        """A number with its sign, of this many bits, the first of which is known."""
         if bits == 32:
             value = 1 << 31 | self.bits(31)
             return -value if self.bits(1) else value
@@ -119,7 +119,7 @@ class TextModel:
         return self.rows[scramble(context, 0x20000003) * 0x9E3779B1 % (1 << 32) >> 26]
 
     def text(self, length, above=None):
-        """So many bytes; with a text above (zeros beyond its end), each may be as there."""
+        """This many bytes; each may repeat the text above (zeros beyond its end)."""
         text, before, matched = bytearray(), 0, 0
         for i in range(length):
             over = None

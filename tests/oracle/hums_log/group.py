@@ -1,4 +1,4 @@
-"""Sections 4 and 5: what comes in a group, and the headers of frames."""
+"""Sections 4 and 5: the entries of a group, and the headers of frames."""
 
 from arithmetic import M32, crc16_mcrf4xx
 from coder import Cell, Coder, Distribution, TextModel
@@ -72,7 +72,7 @@ class Group:
         self.came(slot)
         return self.frame(slot, expected and what != 3)
 
-    # What comes.
+    # The next entry.
 
     def places(self):
         a, b, c = self.recent

@@ -25,7 +25,7 @@ class Sector:
 
 
 def sectors_of(data):
-    """The sound sectors by their number, of the session of the first one; the best copy of each."""
+    """The sound sectors of the first one's session by number; the best copy of each."""
     sectors, whole, parity, bases, session, begins = {}, {}, {}, Counter(), None, None
     for at in range(0, len(data) - 511, 512):
         block = data[at:at + 512]
@@ -53,7 +53,7 @@ def sectors_of(data):
 
 
 def made_again(whole, parity, base):
-    """The sectors that are lost, from the parity sectors by (last number, P or Q): of up to two in a column, of one age."""
+    """The lost sectors, from the parity sectors by (last number, P or Q): up to two in a column, from sums of one age."""
     for last in sorted({last for last, _ in parity if last >= base}):
         numbers = [base + at for at in range((last - base) // 504 * 504 + (last - base) % 8, last - base + 1, 8)]
         lost = [number for number in numbers if number not in whole]
@@ -85,7 +85,7 @@ def made_again(whole, parity, base):
 
 
 def groups_of(sectors):
-    """The sectors of each group that begins, as far as they follow one another."""
+    """The sectors of each group, as far as they are consecutive."""
     for first in sorted(number for number, sector in sectors.items() if sector.since == 0):
         group = [sectors[first]]
         while not group[-1].partial and len(group) < 64:
@@ -97,7 +97,7 @@ def groups_of(sectors):
 
 
 def checked(decoder, group, chain, complain):
-    """The entries of a group, sector by sector, up to one whose entries are not those that came."""
+    """The entries of a group, sector by sector, up to one whose chained check fails."""
     for sector in group:
         entries = list(decoder.decode(sector.frames + sector.records))
         for ms, what, content, verified in entries:

@@ -12,7 +12,7 @@ WHOLE, ANGLES, QUATERNION, TOLD, TIMES = 31, 0, 23, 27, 43
 
 
 class Element:
-    """One value of a payload, with what is known of it."""
+    """One value of a payload, with its history."""
 
     def __init__(self, what, offset, size, kind, role, links):
         self.what, self.offset, self.size, self.kind, self.role = what, offset, size, kind, role
@@ -54,7 +54,7 @@ def out_of_order(order):
 
 
 def hundredths(bits):
-    """n where the value is n * 0.01, otherwise None."""
+    """n if the value is n * 0.01, otherwise None."""
     value = single(float_of(bits) * 100)
     if not abs(value) < 1 << 23:
         return None
@@ -84,11 +84,11 @@ def sine_and_cosine(angle):
 
 
 class Payload:
-    """Reads payloads; what all slots of a group share."""
+    """Reads payloads; the common state of a group's slots."""
 
     KINDS = {("int", 1): 0, ("int", 2): 1, ("int", 4): 2, ("float", 4): 3, ("time", 4): 6, ("wide", 8): 6}
     HUNDREDTHS, RANDOM, COMPUTED = 4, 5, 7
-    # Which distributions by the class before a kind has.
+    # The kinds with distributions by the previous class.
     AFTER = {0: 0, 1: 0, 2: 0, 3: 1, 4: 2, 6: 3}
 
     def __init__(self, group):
@@ -178,7 +178,7 @@ class Payload:
             self.registers[register] = single(number * scale)
 
     def make_quaternion(self):
-        """Of the angles, with the sign of the one told last."""
+        """The quaternion of the angles, with the sign of the last received one."""
         def product(*factors):
             result = factors[0]
             for factor in factors[1:]:
@@ -216,7 +216,7 @@ class Payload:
         return symbol
 
     def difference(self, symbol):
-        """Of an integer: its class is there already."""
+        """An integer, whose class is read already."""
         if symbol == 15:
             symbol += self.coder.bits(5)
         return self.coder.magnitude(symbol) if symbol else 0
@@ -310,7 +310,7 @@ class Payload:
         return value
 
     def float_value(self, one, predictions, is_computed):
-        """The value's bits, and its step where that is in hundredths."""
+        """The value's bits, and its step if that is in hundredths."""
         bits, n = self.coder.bits, hundredths(one.value)
         if one.decimals >= 3 and n is not None:
             linear = one.step_in_hundredths and one.costs[1] < one.costs[0]

@@ -1,4 +1,4 @@
-"""Section 9: records, how they are coded and what they say."""
+"""Section 9: coding and fields of records."""
 
 import math
 import struct
@@ -24,7 +24,7 @@ STATISTICS = ["frames_in", "frames_logged", "frames_lost", "bytes_in", "bytes_no
               "gs_queue_bytes_capacity", "cpu_permille", "cpu_permille_max", "stack_bytes_max",
               "stack_bytes_capacity", "gs_frames_lost", "autopilot_frames_lost", "passed_frames_lost",
               "requests_refused"]
-# Fields with their types: those of the module struct, `text`, `time` (in seconds), so many bytes (negative: of words),
+# Fields with their types: those of the module struct, `text`, `time` (in seconds), a number of bytes (negative: of words),
 # or a list of names.
 RECORDS = {
     1: ("HUMS_BOOT", {"version": "text", "git": "text", "board": "text", "reset": "I", "reset_name": "text", "uid": 12,
@@ -46,7 +46,7 @@ RECORDS = {
 
 
 class Records:
-    """What is known of the records of a group."""
+    """The state of a group's records."""
 
     def __init__(self, coder, model):
         self.coder, self.model = coder, model
@@ -119,7 +119,7 @@ class Fields:
 
 
 def counters(fields):
-    """What usage and lifetime end in: one row a counter, which is said by its number, in runs of numbers."""
+    """The end of usage and lifetime: one row a counter, in runs of counter numbers."""
     while fields.data:
         first, count = fields.take(2)
         for number in range(first, first + count):
@@ -127,7 +127,7 @@ def counters(fields):
 
 
 def rows_of(record):
-    """A record as `hums decode` shows it: its name and the fields, in as many rows."""
+    """The rows of a record in `hums decode`: its name and the fields."""
     kind, fields = record[0], Fields(record)
     if kind in RECORDS:
         name, kinds = RECORDS[kind]

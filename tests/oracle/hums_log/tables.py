@@ -1,4 +1,4 @@
-"""Sections 8 and 10: the layouts of messages and their links, read from where the document has them."""
+"""Sections 8 and 10: the layouts of messages and their links, read from the document's sources."""
 
 import re
 from pathlib import Path
@@ -6,7 +6,7 @@ from pathlib import Path
 from arithmetic import crc32c, single
 
 ROOT = Path(__file__).resolve().parents[3]
-# The sizes of kinds 0 to 10, which of them are signed, and the roles.
+# The sizes of kinds 0 to 10, the signed ones among them, and the roles.
 SIZES = [1, 1, 1, 2, 2, 4, 4, 4, 8, 8, 8]
 SIGNED = {1, 4, 6, 9}
 CHAR, FLOAT = 2, 7
