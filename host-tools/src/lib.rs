@@ -51,7 +51,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
 fn command(command: &Command) -> anyhow::Result<Outcome> {
     match command {
         Command::Check(args) => check::run(&args.request()),
-        Command::Report(args) => report::run(args),
+        Command::Report(args) => report::run(&args.request()),
         Command::Live(args) => live::run(args),
         Command::Decode(args) => decode::run(args),
         Command::Info(args) => info::run(args),

@@ -6,6 +6,7 @@ use clap::builder::{PathBufValueParser, TypedValueParser};
 use clap::{Args, ValueEnum};
 
 use crate::endpoint::without_slash;
+use crate::report;
 use crate::utc::When;
 
 const DECODE_EXAMPLES: &str = "Examples:
@@ -172,4 +173,19 @@ pub struct Report {
     /// Print the result as one JSON object (docs/json.md)
     #[arg(long)]
     pub json: bool,
+}
+
+impl Report {
+    /// The request to the report.
+    pub fn request(&self) -> report::Request<'_> {
+        report::Request {
+            inputs: &self.inputs,
+            output: self.output.as_deref(),
+            session: self.session.as_deref(),
+            compare: self.compare,
+            system: self.system,
+            force: self.force,
+            json: self.json,
+        }
+    }
 }

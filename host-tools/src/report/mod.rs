@@ -26,7 +26,6 @@ use anyhow::{Result, bail};
 use serde::Serialize;
 
 use crate::check;
-use crate::cli;
 use crate::decode::naming::{Named, Names, Traits, without_made};
 use crate::files::{Inputs, Output, appended, make_parent, says_directory, settle};
 use crate::followed::{EndResolver, HELD_MAX};
@@ -58,14 +57,33 @@ struct PageJson {
     bytes: u64,
 }
 
+/// The request of `hums report`.
+#[derive(Clone, Copy, Debug)]
+pub struct Request<'a> {
+    /// Recordings, logs, cards, or directories with such.
+    pub inputs: &'a [PathBuf],
+    /// The page, or a directory for a page a session.
+    pub output: Option<&'a Path>,
+    /// Only this session.
+    pub session: Option<&'a str>,
+    /// Show the last flights side by side.
+    pub compare: bool,
+    /// Only this vehicle.
+    pub system: Option<u8>,
+    /// Replace pages that exist.
+    pub force: bool,
+    /// Print JSON.
+    pub json: bool,
+}
+
 /// Runs `hums report`.
-pub fn run(args: &cli::Report) -> Result<Outcome> {
-    let Some(output) = &args.output else {
+pub fn run(args: &Request<'_>) -> Result<Outcome> {
+    let Some(output) = args.output else {
         return Err(usage(
             "-o is missing: say where the page goes, for instance -o flight.html, or -o pages/ for a page of each flight",
         ));
     };
-    let (given, remarks) = without_made(&args.inputs);
+    let (given, remarks) = without_made(args.inputs);
     let found = find(&given, false)?.of_system(args.system)?;
     for remark in remarks.iter().chain(&found.remarks) {
         note!("{remark}");
@@ -349,13 +367,13 @@ struct Wanted {
     pages: bool,
 }
 
-fn wanted(args: &cli::Report, output: &Path, found: &Found, sessions: &Sessions) -> Result<Wanted> {
+fn wanted(args: &Request<'_>, output: &Path, found: &Found, sessions: &Sessions) -> Result<Wanted> {
     let logs = &found.places;
     let Some(last) = logs.len().checked_sub(1) else {
         bail!("no log is in there, so there is nothing to report")
     };
     let directory = says_directory(output);
-    let sessions = match &args.session {
+    let sessions = match args.session {
         Some(name) => {
             let index = found.session(name)?;
             index..=index
