@@ -8,20 +8,19 @@
 #[macro_use(note)]
 extern crate hums_base;
 
-pub use hums_analysis::{check, counters, params, part, series, states, summary, track};
+pub use hums_analysis::{check, counters, params, part, reference, series, states, summary, track};
 pub use hums_base::{
     archive, colour, duplex, endpoint, files, hex, interrupt, outcome, output, plural, printable, progress,
     rng, sink, utc,
 };
-pub use hums_formats::{card, ending, followed, logs, loss, mavlink, names, source, statustext};
+pub use hums_formats::{card, ending, followed, logs, loss, mavlink, names, naming, source, statustext};
+pub use hums_report::{page, report};
 
 pub mod cli;
 pub mod decode;
 pub mod info;
 pub mod live;
 pub mod pack;
-pub mod page;
-pub mod report;
 pub mod run;
 pub mod shell;
 pub mod talk;

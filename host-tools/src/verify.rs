@@ -14,7 +14,6 @@ use crate::ending::{
     not_taken_words, unprotected_words,
 };
 use crate::followed::EndResolver;
-use crate::info::json::images_json;
 use crate::logs::sessions::{Sessions, place};
 use crate::logs::side_by_side::side_by_side;
 use crate::logs::{self, Found, find::Image};
@@ -25,6 +24,7 @@ use crate::plural::count;
 use crate::printable::{path, word};
 use crate::source::find::{besides, not_ours};
 use crate::summary::{Contents, Overview};
+use hums_analysis::log_json::images_json;
 
 /// What `hums info --verify --json` prints.
 const SCHEMA: Schema = Schema::first("hums-info-verify");

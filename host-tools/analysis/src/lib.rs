@@ -4,6 +4,7 @@
 //!   reason
 //! * [`summary`]: the contents of a recording, counted
 //! * [`series`], [`track`]: quantities over time and the way over ground, for pages
+//! * [`reference`]: the quantities of the reference system; [`log_json`]: a recording as JSON
 //! * [`counters`], [`part`], [`states`], [`params`]: usage, components, words for states, limits from a file
 //!
 //! It reads recordings through `hums_formats` only, and writes nothing but errors.
@@ -17,12 +18,14 @@
 extern crate hums_base;
 
 use hums_base::{colour, files, outcome, output, plural, printable, progress, utc};
-use hums_formats::{ending, followed, logs, mavlink, names, source};
+use hums_formats::{ending, followed, logs, loss, mavlink, names, source};
 
 pub mod check;
 pub mod counters;
+pub mod log_json;
 pub mod params;
 pub mod part;
+pub mod reference;
 pub mod series;
 pub mod states;
 pub mod summary;

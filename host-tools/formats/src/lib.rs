@@ -5,6 +5,7 @@
 //! * [`ending`], [`followed`]: how a HUMS log ends, and what proves that
 //! * [`card`]: card images and the simulated card
 //! * [`mavlink`], [`names`], [`statustext`]: fields, names and texts
+//! * [`naming`]: names of the files that are made of a recording
 //!
 //! It judges no vehicle and writes no output.
 
@@ -16,9 +17,9 @@
 #[macro_use(note)]
 extern crate hums_base;
 
-use hums_base::{
-    archive, duplex, endpoint, files, hex, interrupt, outcome, plural, printable, progress, rng, utc,
-};
+use hums_base::{archive, endpoint, files, hex, outcome, plural, printable, progress, rng, utc};
+#[cfg(not(target_family = "wasm"))]
+use hums_base::{duplex, interrupt};
 
 pub mod card;
 pub mod ending;
@@ -27,6 +28,7 @@ pub mod logs;
 pub mod loss;
 pub mod mavlink;
 pub mod names;
+pub mod naming;
 pub mod source;
 pub mod statustext;
 pub mod trend_words;

@@ -21,7 +21,6 @@ use hums_core::observation::Observation;
 use hums_dialect::{Field, Kind};
 
 use super::field_names::free_name;
-use super::reference::{Quantity, Reference};
 use super::row::{Cell, Row};
 use super::table::Table;
 use super::text::{push_finite, push_integer};
@@ -29,6 +28,7 @@ use crate::hex::push_hex;
 use crate::mavlink::frame::Frame;
 use crate::mavlink::ids::ACTUATOR_OUTPUT_STATUS;
 use crate::mavlink::values::{Payload, Scalar, Value};
+use crate::reference::{Quantity, Reference};
 use crate::source::epochs::Epochs;
 
 /// Columns of records that are tags: few values, used for grouping.

@@ -15,10 +15,10 @@ use hums_blackbox::Gap;
 use hums_core::clock::{Instant, Span};
 use hums_core::observation::{Observation, Source};
 
-use super::reference::{MOTORS, Quantity, Reference};
 use super::selection::Selection;
 use crate::files::{Folder, FolderFile, buffered, settle};
 use crate::mavlink::values::Scalar;
+use crate::reference::{MOTORS, Quantity, Reference};
 use crate::source::epochs::Epochs;
 
 /// After a silence of this length, the vehicle's values do not count for the second.

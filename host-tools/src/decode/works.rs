@@ -3,9 +3,9 @@
 use anyhow::Result;
 
 use super::context::Formats;
-use super::naming::{self, Named, Traits};
 use crate::logs::sessions::Sessions;
 use crate::logs::side_by_side::side_by_side;
+use crate::naming::{self, Named, Traits};
 use crate::outcome::usage as usage_error;
 use crate::source::recording::Place;
 

@@ -16,11 +16,11 @@ use super::influx::{Clock, Lines};
 use super::made::OutputFile;
 use super::parquet::ParquetTables;
 use super::record::gap_row;
-use super::reference::Reference;
 use super::tables::{Tables, UNKNOWN_TABLES_MAX};
 use super::thesis::Thesis;
 use crate::files::{Folder, Output, appended, make_parent, settle};
 use crate::plural::count;
+use crate::reference::Reference;
 use crate::source::item;
 use crate::source::parts::Deliver;
 

@@ -9,7 +9,6 @@ use hums_core::usage::UsageCounter;
 use serde::Serialize;
 
 use super::each::each;
-use super::json::{duration_s, images_json};
 use super::text::image_text;
 use crate::check::grouped::grouped;
 use crate::check::problem::problems;
@@ -23,6 +22,7 @@ use crate::source::find::find;
 use crate::source::recording::Format;
 use crate::summary::Overview;
 use crate::utc::{clock, date_and_time, iso8601};
+use hums_analysis::log_json::{duration_s, images_json};
 
 /// Output of `hums info --list --json`.
 const SCHEMA: Schema = Schema::first("hums-info-list");

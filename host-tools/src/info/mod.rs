@@ -2,7 +2,6 @@
 //! check. For people and as JSON.
 
 mod each;
-pub mod json;
 mod list;
 mod number;
 mod text;
@@ -17,7 +16,7 @@ use crate::output::{self, JsonList, Schema};
 use crate::source::find::find;
 use crate::verify;
 use each::each;
-use json::{LogJson, images_json};
+use hums_analysis::log_json::{LogJson, images_json};
 use text::{image_text, text};
 
 /// Output of `hums info --json`.

@@ -9,7 +9,6 @@ use hums_blackbox::{Cause, Gap};
 use hums_core::clock::Instant;
 use hums_core::health::Level;
 
-use super::json::{duration_s, vehicle};
 use super::number::short;
 use super::{usage, wear};
 use crate::check::causes::causes;
@@ -29,6 +28,7 @@ use crate::source::item::MessageCount;
 use crate::states::{Shown, shown};
 use crate::summary::{FindingLine, LISTED_MAX, Overview};
 use crate::utc::{clock, iso8601_ms, moment};
+use hums_analysis::log_json::{duration_s, vehicle};
 
 /// Findings and gaps that people are shown; the rest is counted, and is in `--json` and `hums decode`.
 const SHOWN_MAX: usize = 40;

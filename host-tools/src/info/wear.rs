@@ -5,7 +5,6 @@ use std::fmt::Write as _;
 use hums_core::clock::Instant;
 use hums_core::health::exceedance::Crossings;
 
-use super::json::finite;
 use super::number::short;
 use crate::names::{check_name, unit_name};
 use crate::plural::count;
@@ -13,6 +12,7 @@ use crate::printable::word;
 use crate::states::{Shown, shown};
 use crate::summary::Overview;
 use crate::utc::moment;
+use hums_analysis::log_json::finite;
 
 /// Exceedances and components of a log.
 pub(super) fn text(text: &mut String, log: &Overview) {

@@ -3,15 +3,15 @@
 use std::borrow::Cow;
 use std::sync::OnceLock;
 
-use crate::page::program::{STYLE, UPLOT, program};
+use crate::page::program::{ICON, LIVE, STYLE, UPLOT, program};
 
 /// A file's type and text.
 pub fn find(name: &str) -> Option<(&'static str, Cow<'static, str>)> {
     const SCRIPT: &str = "text/javascript; charset=utf-8";
     static PROGRAM: OnceLock<String> = OnceLock::new();
     Some(match name {
-        "index.html" => ("text/html; charset=utf-8", include_str!("../page/assets/live.html").into()),
-        "icon.svg" => ("image/svg+xml", include_str!("../page/assets/icon.svg").into()),
+        "index.html" => ("text/html; charset=utf-8", LIVE.into()),
+        "icon.svg" => ("image/svg+xml", ICON.into()),
         "page.css" => ("text/css; charset=utf-8", STYLE.concat().into()),
         "uPlot.js" => (SCRIPT, UPLOT.into()),
         "page.js" => (SCRIPT, PROGRAM.get_or_init(|| program("live")).as_str().into()),

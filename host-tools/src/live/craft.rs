@@ -22,11 +22,11 @@ use hums_link::{Check, Frame, observe};
 
 use super::companion::Companion;
 use super::latest::Latest;
-use crate::decode::reference::{Quantity, Reference};
 use crate::mavlink::ids::STATUSTEXT;
 use crate::page::history::History;
 use crate::page::note::Note;
 use crate::part;
+use crate::reference::{Quantity, Reference};
 use crate::source::parameter;
 use crate::source::told;
 use crate::statustext::{Text, Texts};

@@ -3,8 +3,8 @@
 use hums_core::clock::{Instant, Span};
 use hums_core::observation::MOTORS_MAX;
 
-use crate::decode::reference::Quantity;
 use crate::mavlink::values::Scalar;
+use crate::reference::Quantity;
 
 /// Streams of motion come several times a second, over a thin radio once a second.
 pub const MOTION: Span = Span::from_millis(2_500);

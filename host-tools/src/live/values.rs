@@ -9,8 +9,8 @@ use serde::ser::{SerializeMap, SerializeTuple, Serializer};
 use super::craft::Craft;
 use super::latest::{ESC, MOTION, QUANTITIES, SLOW};
 use crate::counters::tells_flight;
-use crate::decode::reference::Quantity;
 use crate::mavlink::values::Scalar;
+use crate::reference::Quantity;
 
 /// A value, its age in milliseconds, and 1 if stale.
 #[derive(Clone, Copy, Debug)]

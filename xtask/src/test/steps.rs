@@ -197,10 +197,10 @@ fn check_budgets() -> Result<()> {
     budgets::check(&[FLOWN], false)
 }
 
-/// As `host-tools/src/page/biome.json` has it. To format: `target/venv/bin/biome format --write` in that folder.
+/// As `host-tools/report/src/page/biome.json` has it. To format: `target/venv/bin/biome format --write` in that folder.
 fn page() -> Result<()> {
     let biome = oracle::python().with_file_name("biome");
-    let folder = repo::root().join("host-tools/src/page");
+    let folder = repo::root().join("host-tools/report/src/page");
     Shell::new(biome).args(["ci", "--error-on-warnings", "--colors=off"]).within(&folder).run()
 }
 

@@ -6,7 +6,7 @@ use hums_core::units::{Metres, Position};
 
 use super::more::{self, compass_deg};
 use super::plots::{Line, Plot};
-use crate::decode::reference::Reference;
+use crate::reference::Reference;
 use crate::series::Store;
 use crate::track::Track;
 

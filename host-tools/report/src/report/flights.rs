@@ -5,7 +5,7 @@ use hums_core::motion::ground_speed_mps;
 use serde::Serialize;
 
 use crate::check::flights::Flight as Judged;
-use crate::decode::reference::{Quantity, Reference};
+use crate::reference::{Quantity, Reference};
 
 /// One flight: from take-off to landing, or to the end of the log.
 #[derive(Clone, Copy, Debug, Serialize)]

@@ -162,7 +162,7 @@ mod tests {
     use hums_core::units::Metres;
 
     use super::*;
-    use crate::decode::reference::Reference;
+    use crate::reference::Reference;
 
     /// Rises by a metre a second from its take-off on.
     fn rises(take_off_s: u64) -> History {

@@ -26,12 +26,12 @@ use anyhow::{Result, bail};
 use serde::Serialize;
 
 use crate::check;
-use crate::decode::naming::{Named, Names, Traits, without_made};
 use crate::files::{Inputs, Output, appended, make_parent, says_directory, settle};
 use crate::followed::{EndResolver, HELD_MAX};
 use crate::logs::sessions::Sessions;
 use crate::logs::side_by_side::side_by_side;
 use crate::logs::{Log, segment_name};
+use crate::naming::{Named, Names, Traits, without_made};
 use crate::outcome::{Outcome, usage};
 use crate::output::{self, Schema};
 use crate::plural::count;

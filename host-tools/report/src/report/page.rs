@@ -11,7 +11,7 @@ use super::flights::Flight;
 use super::replay::{Missing, Replay};
 use super::trend::Trend;
 use crate::counters::{self, Counters};
-use crate::info::json::LogJson;
+use crate::log_json::LogJson;
 use crate::page::history::{Cursor, Part};
 use crate::page::json::embedded;
 use crate::page::program::{STYLE, UPLOT, program};

@@ -108,14 +108,21 @@ struct MonitorJson {
     boots: u32,
 }
 
+/// The vehicle of a recording.
 #[derive(Debug, Serialize)]
-pub(super) struct VehicleJson {
-    pub(super) system: u8,
-    pub(super) component: u8,
-    pub(super) autopilot: String,
-    pub(super) r#type: String,
-    pub(super) firmware: Option<String>,
-    pub(super) uid: Option<String>,
+pub struct VehicleJson {
+    /// MAVLink system id.
+    pub system: u8,
+    /// MAVLink component id.
+    pub component: u8,
+    /// For instance `PX4`.
+    pub autopilot: String,
+    /// For instance `quadrotor`.
+    pub r#type: String,
+    /// Version of the autopilot's firmware.
+    pub firmware: Option<String>,
+    /// Hexadecimal.
+    pub uid: Option<String>,
 }
 
 #[derive(Debug, Serialize)]
@@ -259,7 +266,8 @@ fn components(contents: &Contents) -> Vec<ComponentJson> {
     contents.components.iter().map(json).collect()
 }
 
-pub(super) fn finite(value: f32) -> Option<f32> {
+/// A number that JSON has.
+pub fn finite(value: f32) -> Option<f32> {
     value.is_finite().then_some(value)
 }
 
@@ -371,14 +379,16 @@ fn findings(log: &Overview) -> Vec<FindingJson> {
     log.contents.findings.iter().map(json).collect()
 }
 
-pub(super) fn duration_s(log: &Overview) -> f64 {
+/// From the first to the last time of a log, in seconds; 0 if unknown.
+pub fn duration_s(log: &Overview) -> f64 {
     match (log.ending.summary.first, log.ending.summary.last) {
         (Some(first), Some(last)) => last.since(first).as_micros() as f64 / 1e6,
         _ => 0.0,
     }
 }
 
-pub(super) fn vehicle(log: &Overview) -> Option<VehicleJson> {
+/// The vehicle, if it was heard.
+pub fn vehicle(log: &Overview) -> Option<VehicleJson> {
     let vehicle = log.contents.vehicle?;
     let [major, minor, patch, _] = vehicle.firmware.to_be_bytes();
     Some(VehicleJson {

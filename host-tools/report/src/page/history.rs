@@ -28,7 +28,7 @@ use super::parameters::{ParameterJson, Parameters};
 use super::plots::{self, Line, Plot};
 use super::samples::Samples;
 use super::spans::{Rest, Seen, Spans};
-use crate::decode::reference::Reference;
+use crate::reference::Reference;
 use crate::series::{self, Store};
 use crate::track::Point;
 

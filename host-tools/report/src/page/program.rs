@@ -29,6 +29,11 @@ pub const UPLOT: &str = include_str!("assets/uPlot.iife.min.js");
 /// The style sheets, to be put together.
 pub const STYLE: [&str; 2] = [include_str!("assets/uPlot.min.css"), include_str!("assets/page.css")];
 
+/// The document of the live page.
+pub const LIVE: &str = include_str!("assets/live.html");
+/// Its icon.
+pub const ICON: &str = include_str!("assets/icon.svg");
+
 /// The program that begins with a module.
 pub fn program(entry: &str) -> String {
     let mut program = String::from("\"use strict\";\n(() => {\n");
