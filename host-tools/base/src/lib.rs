@@ -1,7 +1,7 @@
 //! The base of all of hums: complete or absent files ([`files`]), links ([`endpoint`], [`duplex`], [`sink`]), results
 //! and messages ([`output`], [`outcome`]), numbers and times as text ([`utc`], [`plural`], [`hex`]).
 //!
-//! It has no knowledge of recordings or vehicles.
+//! It has no knowledge of recordings or vehicles. In a browser (WASI) there are files, and neither links nor signals.
 
 #![deny(
     clippy::print_stderr,
@@ -18,10 +18,12 @@ macro_rules! note {
 
 pub mod archive;
 pub mod colour;
+#[cfg(not(target_family = "wasm"))]
 pub mod duplex;
 pub mod endpoint;
 pub mod files;
 pub mod hex;
+#[cfg(not(target_family = "wasm"))]
 pub mod interrupt;
 pub mod outcome;
 pub mod output;
@@ -29,5 +31,6 @@ pub mod plural;
 pub mod printable;
 pub mod progress;
 pub mod rng;
+#[cfg(not(target_family = "wasm"))]
 pub mod sink;
 pub mod utc;

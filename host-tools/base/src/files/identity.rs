@@ -22,6 +22,18 @@ fn node(path: &Path) -> io::Result<Node> {
     fs::metadata(path).map(|about| (about.dev(), about.ino()))
 }
 
+/// A browser's files have no links: a path is one file.
+#[cfg(target_family = "wasm")]
+fn node(path: &Path) -> io::Result<Node> {
+    use std::hash::{DefaultHasher, Hash as _, Hasher as _};
+    fs::metadata(path)?;
+    let mut hasher = DefaultHasher::new();
+    path.components()
+        .filter(|part| !matches!(part, Component::RootDir | Component::CurDir))
+        .for_each(|part| part.hash(&mut hasher));
+    Ok((0, hasher.finish()))
+}
+
 #[cfg(windows)]
 fn node(path: &Path) -> io::Result<Node> {
     let about = winapi_util::file::information(winapi_util::Handle::from_path_any(path)?)?;

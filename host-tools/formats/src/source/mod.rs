@@ -37,6 +37,10 @@ pub mod find;
 pub mod format;
 pub mod input;
 pub mod item;
+#[cfg(not(target_family = "wasm"))]
+pub mod live;
+#[cfg(target_family = "wasm")]
+#[path = "no_live.rs"]
 pub mod live;
 pub mod mavlink;
 pub mod noise;
