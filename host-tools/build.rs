@@ -10,7 +10,7 @@ fn main() {
     println!("cargo::rustc-env=HUMS_VERSION={version} ({commit})");
 }
 
-/// The commit that is built; none where there is no git.
+/// The commit of the build; `None` without git.
 fn commit() -> Option<String> {
     // The log of HEAD grows with every commit, so that the next build looks again.
     let log = git(&["rev-parse", "--git-path", "logs/HEAD"])?;

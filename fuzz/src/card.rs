@@ -1,5 +1,5 @@
-//! Any bytes on a card, through the reader of its file system: each found file is on the card and found once, and
-//! damage is reported in bounded text.
+//! Any bytes on a card, through the reader of its file system: each found file is on the card and found once; damage
+//! is reported in bounded text.
 //!
 //! The input is a list of changes to a small formatted card: place, offset (two bytes), length, and the bytes. A
 //! place is one of the important blocks: the partition table, the volume's first blocks, its FAT, its first clusters.

@@ -16,8 +16,10 @@ use crate::file::with_file;
 /// The card's block of the input: among its first clusters.
 const BLOCK: u32 = 4_096;
 
-/// The first byte selects the kind of file: bit 0, sectors get a valid check; bit 1, every block is examined; bits 2
-/// to 4 all set, the bytes are put on a card. The others are the bytes.
+/// The first byte selects the kind of file, the others are its bytes:
+/// - bit 0: sectors get a valid check;
+/// - bit 1: every block is examined;
+/// - bits 2 to 4 all set: the bytes are put on a card.
 pub fn check(data: &[u8]) {
     let Some((&mode, bytes)) = data.split_first() else { return };
     let mut bytes = bytes.to_vec();

@@ -1,5 +1,5 @@
-//! Any messages in a log, for the report's page and the live page: the data on a page is JSON, and nothing in it ends
-//! its element.
+//! Any messages in a log, for the report's page and the live page: data on a page is JSON, and cannot end its
+//! element.
 
 use std::path::Path;
 

@@ -89,7 +89,7 @@ pub fn run_with_input(command: &mut Command, input: Option<File>, limit: Duratio
     Outcome { code: status.code(), stdout: fs::read(&out).unwrap(), stderr, memory_kib_max }
 }
 
-/// Its exit status and its highest memory; after a timeout it is ended, and there is no status.
+/// The exit status of `child`, and its highest memory. After a timeout it is killed and has no status.
 fn wait(child: &mut Child, limit: Duration) -> (Option<ExitStatus>, u64) {
     let start = Instant::now();
     let mut memory_kib_max = 0;

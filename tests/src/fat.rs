@@ -21,8 +21,8 @@ fn partition(image: &mut File) -> (u64, u64) {
     (number(0x1BE + 8) * SECTOR, number(0x1BE + 12) * SECTOR)
 }
 
-/// `fsck.vfat -n` finds only effects of a power cut: clusters without a file, their part of the free count, and the
-/// mark of a card in use.
+/// `fsck.vfat -n` finds only effects of a power cut: clusters without a file, their share of the free count, the mark
+/// of a card in use.
 ///
 /// # Panics
 ///

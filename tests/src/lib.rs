@@ -1,5 +1,5 @@
-//! Helpers of the end-to-end tests: the `hums` program as for a user, the recorded flights, and readers of MAVLink
-//! that share no code with the tested ones.
+//! Helpers of the end-to-end tests: the `hums` program as for a user, recorded flights, and readers of MAVLink
+//! without code of ours.
 //!
 //! * [`chip`] is a board on the model of the chip, with the image that is flashed.
 //! * [`child`] runs a program with a time limit, and returns its output and its memory.

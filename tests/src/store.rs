@@ -1,4 +1,4 @@
-//! The content of a store's file, read with the firmware's own crates: there is no other reader.
+//! The content of a store's file, read with the firmware's own crates. No other reader exists.
 
 use std::fs;
 use std::path::Path;

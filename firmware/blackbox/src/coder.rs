@@ -259,8 +259,8 @@ impl Decoder {
         self.offset < self.range.wrapping_mul(parts)
     }
 
-    /// The width of each of the `2^16` parts, and the offset of the next one in all of them: the operands of `part`,
-    /// for callers that need no division. `take` must follow.
+    /// Operands of `part`, for callers that need no division: the width of each of the `2^16` parts, and the offset
+    /// of the next one in all of them. `take` must follow.
     #[inline]
     pub(crate) fn parts(&mut self) -> (u16, u32) {
         self.range >>= PROBABILITY_BITS;

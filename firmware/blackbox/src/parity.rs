@@ -1,9 +1,9 @@
 //! Parity: sectors from which lost sectors are rebuilt.
 //!
-//! A file's sectors form *stretches* of [`STRETCH_SECTORS`], from its first one on, and those of a stretch form
-//! [`COLUMNS`] *columns*: sector `i` of a stretch is in column `i mod 8`. So no run of eight sectors, from any
-//! beginning of a page, has two of a column. Each column has two parity sectors, P and Q. One of them rebuilds one
-//! lost sector of the column, both rebuild two: any two pages of 4 KiB of a stretch, or one of 8 KiB.
+//! A file's sectors form *stretches* of [`STRETCH_SECTORS`], from its first one on. A stretch's sectors form
+//! [`COLUMNS`] *columns*: sector `i` is in column `i mod 8`. So no run of eight sectors, from any beginning of a
+//! page, has two of a column. Each column has two parity sectors, P and Q. One of them rebuilds one lost sector of
+//! the column, both rebuild two: any two pages of 4 KiB of a stretch, or one of 8 KiB.
 //!
 //! P is the exclusive-or of the sectors. Q is their sum in GF(256), each sector times `2^n`, where `n` counts back
 //! from the last one of the column (H. P. Anvin, "The mathematics of RAID-6"). Both cover the unknown part of a lost
@@ -163,7 +163,7 @@ impl Column {
 
     /// Whether the sums agree with the sectors and with each other, as far as this is known. `lost` are the numbers
     /// of missing sectors, ascending, at least three if there are more. A sum without missing sectors must equal that
-    /// of the others, and a single missing sector must be the same by either sum.
+    /// of the others. A single missing sector must be the same by either sum.
     pub fn agrees(&self, lost: &[u32]) -> bool {
         let of = |index: usize| {
             let (sum, last, rest) = self.held(index)?;

@@ -44,7 +44,7 @@ pub(crate) fn is_made_to_turn(vehicle: &Vehicle) -> bool {
     }
 }
 
-/// Modes in which the sticks ask for rates of roll and pitch, so that the pilot banks freely: those made for turning
+/// Modes in which the sticks command rates of roll and pitch, so that the pilot banks freely: those made for turning
 /// over, `ArduCopter`'s DRIFT and SPORT, PX4's RATTITUDE.
 pub(crate) fn is_banked_by_hand(vehicle: &Vehicle) -> bool {
     is_made_to_turn(vehicle)

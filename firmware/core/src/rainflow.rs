@@ -23,7 +23,7 @@ pub(crate) struct Rainflow<const BINS: usize> {
 }
 
 impl<const BINS: usize> Rainflow<BINS> {
-    /// Counts ranges from `edges[0]` on; a change of less than `turn` is no turn.
+    /// Counts ranges from `edges[0]` on; ignores changes of less than `turn`.
     pub(crate) const fn new(edges: [f32; BINS], turn: f32) -> Self {
         Self { edges, halves: [0; BINS], points: [0.0; POINTS], used: 0, extreme: None, turn }
     }

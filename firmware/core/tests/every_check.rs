@@ -1,5 +1,5 @@
-//! Every check finds its fault within its own debounce plus 100 ms: on the scales of both autopilots, with an engine,
-//! with a second battery and with a twelfth motor.
+//! Every check finds its fault within its own debounce plus 100 ms: on both autopilots, with an engine, a second
+//! battery and a twelfth motor.
 #![expect(clippy::panic, clippy::unwrap_used, reason = "that is how a test fails")]
 
 use crate::common::{AUTOPILOT, Quad};

@@ -247,9 +247,9 @@ impl Outlet {
         Span::from_micros(bytes as u64 * 10_200_000 / u64::from(self.baud.max(1)))
     }
 
-    /// The longest frame of bulk that passes, and that delays a finding by at most [`BACKLOG`]: the bytes of the line
-    /// in that time, and half of a second's share. From 57,600 baud and a budget of 1,130 bytes a second on it is the
-    /// longest possible frame.
+    /// The longest frame of bulk that passes, and that delays a finding by at most [`BACKLOG`]. It is the bytes of
+    /// the line in that time, and half of a second's share. From 57,600 baud and a budget of 1,130 bytes a second on
+    /// it is the longest possible frame.
     pub fn bulk_frame_max(&self) -> usize {
         let line = u64::from(self.baud) * BACKLOG.as_micros() / 10_200_000;
         ((line as u32).min(self.mark(Class::Bulk) / 5 * 3 / 2) as usize).min(FRAME_BYTES_MAX)

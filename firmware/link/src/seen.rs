@@ -83,7 +83,7 @@ impl Seen {
     }
 
     /// Remembers that `system` used `extra` for `id`. A pair seen once may be chance: in a full table it gives way to
-    /// a new one, and also to another extra of the same pair.
+    /// a new one, or to another extra of its own.
     pub(crate) fn learn(&mut self, system: u8, id: u32, extra: u8) {
         let key = key_of(system, id);
         let known = self.keys.iter().position(|&other| other == key);

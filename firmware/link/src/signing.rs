@@ -8,8 +8,8 @@
 //! power-on begin there and count up one by one until time has caught up.
 //!
 //! A date from a GPS receiver may be wrong (a week number that rolled over, a spoofer). A time more than [`JUMP`]
-//! ahead of ours counts only after [`JUMP_LASTS`] ([`Clock::hear_utc`]): a clock that is years ahead would refuse
-//! every new stream for years. A valid signature counts immediately: a holder of the key also has the time.
+//! ahead of ours counts only after [`JUMP_LASTS`] ([`Clock::hear_utc`]): a wrong clock would refuse every new stream
+//! for years. A valid signature counts immediately: a holder of the key also has the time.
 //!
 //! # Replay
 //! A frame whose stamp is not above its stream's last one is refused. The first stamp of a stream since power-on must
@@ -260,9 +260,9 @@ impl Signing {
         self.clock.is_at_least(Instant::ZERO, times.time.min(STAMP_MAX));
     }
 
-    /// Sets a key, or none. `stamp` is the time by the sender of the key; it becomes the present time, also with the
-    /// old key, which corrects a clock that a wrong date has set. Frames more than a minute older are refused. 0
-    /// means no time: setting the same key then changes nothing.
+    /// Sets a key, or none. `stamp` is the time by the sender of the key. It becomes the present time, also with the
+    /// old key: so a sender corrects a wrong clock. Frames more than a minute older are refused. 0 means no time:
+    /// setting the same key then changes nothing.
     pub fn set(&mut self, now: Instant, key: Key, stamp: u64) {
         if stamp == 0 && self.key == Some(key) {
             return;

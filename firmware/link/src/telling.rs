@@ -4,8 +4,8 @@
 //! event until it is over.
 //!
 //! * A finding explained by another one ([`Finding::because`]) is recorded only.
-//! * A critical finding is never delayed. It is sent if its order differs from those of the event's earlier texts:
-//!   the fourth lost motor, or the pitch beside the roll, does not repeat LAND NOW.
+//! * A critical finding is never delayed. It is sent if its order differs from those of the event's earlier texts. So
+//!   a fourth lost motor, or the pitch beside the roll, does not repeat LAND NOW.
 //! * A warning waits for [`HOLD`]. If it becomes critical meanwhile, only the critical finding is sent. Otherwise it
 //!   is the first text of an event, or waits for the event's end, and is sent if it still holds. The same goes for
 //!   missing data, and for the end of a finding. A check that no longer applies, as after landing, is not reported:

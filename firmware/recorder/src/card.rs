@@ -503,8 +503,8 @@ impl<'a, D: CardDevice> Card<'a, D> {
         self.volume.read(core::slice::from_mut(block), start)
     }
 
-    /// Counts the share of the card that logs can have, one block of the FAT at a call; the result once all of it is
-    /// counted.
+    /// Counts the share of the card that logs can have, one block of the FAT per call. Returns the result at the last
+    /// block.
     pub(crate) fn count_room(&mut self) -> Result<Option<Counted>, CardError<D::Error>> {
         let Some(free) = self.free.count(&self.volume)? else { return Ok(None) };
         let Layout { clusters, cluster_blocks, .. } = self.volume.layout;

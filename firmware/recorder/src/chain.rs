@@ -25,8 +25,8 @@ impl ClusterChain {
         Self { first, before: 0, cluster: first, length: 1 }
     }
 
-    /// The card's block of block `index` of the file, and the number of blocks in a row from there: at least one, and
-    /// up to `wanted` if one read of the FAT shows it. `None`: the chain ends before it.
+    /// The card's block of block `index` of the file, and the number of blocks in a row from there: 1 to `wanted`, as
+    /// far as one read of the FAT shows it. `None`: the chain ends before it.
     pub(crate) fn locate<D: CardDevice>(
         &mut self,
         volume: &Volume<'_, D>,

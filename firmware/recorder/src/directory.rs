@@ -7,7 +7,7 @@
 //!
 //! # Clusters that a log claims although the FAT calls them free
 //! A card that lost power may have kept a log's directory entry and lost blocks of the FAT. The next segment would be
-//! written over that log. A segment mostly lies in a row, so its clusters are known all the same: as many as its size
+//! written over that log. A segment mostly lies in a row. So its clusters are known all the same: as many as its size
 //! takes, from the first one on. The FAT may follow this row up to an entry "free", which no sound chain contains.
 //! Then the free entries of the row are chained again. Clusters of other files are not touched, and a log whose chain
 //! leaves the row is skipped. Behind the last cluster that any log claims, this need not be looked for
@@ -37,8 +37,8 @@ const OVERWRITTEN_MIN: u32 = 2 * (hums_blackbox::GROUP_SECTORS * hums_blackbox::
 /// FAT blocks that one walk checks for claims.
 pub(crate) const VERIFY_BLOCKS: u32 = 64;
 
-/// Bytes of an entry, and offsets of its fields: attributes, times of creation and of writing (time and date), both
-/// halves of the first cluster's number, length.
+/// Bytes of an entry, and offsets of its fields: attributes, times of creation and of writing, both halves of the
+/// first cluster's number, length.
 pub(crate) const ENTRY_BYTES: usize = 32;
 pub(crate) const ATTRIBUTES: usize = LogName::SHORT_BYTES;
 pub(crate) const MADE: usize = 14;
@@ -326,7 +326,7 @@ impl Directory {
         Ok(located.map(|(block, _)| Place::of(block, index)))
     }
 
-    /// Skips the place of a new entry until the next walk; `false` if there is no other.
+    /// Skips the place of a new entry until the next walk. Returns `false` if there is no other.
     pub(crate) fn pass_by(&mut self) -> bool {
         self.deleted.pop().is_some()
     }

@@ -35,8 +35,8 @@ impl Parity {
         }
     }
 
-    /// Lends the buffer, for directory blocks while a card is mounted or a segment is made. Until [`Self::begin`]
-    /// there is no parity.
+    /// Lends the buffer, for directory blocks while a card is mounted or a segment is made. No parity is made until
+    /// [`Self::begin`].
     pub(crate) const fn lend(&mut self) -> &mut [Block] {
         self.since = None;
         &mut self.blocks

@@ -2,9 +2,8 @@
 //!
 //! A sector with number `n` belongs at block `n - base` of the open segment. A segment is left for the next one at
 //! the first group that no longer fits, so that each file can be read by itself. A *partial* sector (one still in
-//! progress) is written alternately at its own place and at the next one, so that a torn write never destroys the
-//! older copy. If the newest copy is at the sector's own place, the whole sector is first written as a copy at the
-//! next one.
+//! progress) goes alternately to its own place and to the next one, so a torn write never destroys the older copy. If
+//! the newest copy is at the sector's own place, the whole sector is first written as a copy at the next one.
 //!
 //! Each stretch of a segment has its parity at the segment's end. It is written when the stretch is full, when the
 //! segment is left, when the log ends in order, and every 10 s meanwhile. It may fail without consequence: the
@@ -95,8 +94,8 @@ pub struct Recorder<'a, D: CardDevice> {
 }
 
 impl<'a, D: CardDevice> Recorder<'a, D> {
-    /// A recorder for the card in `device`. `entropy` distinguishes sessions of equal number on equal cards: random
-    /// if the board has a random number generator, else any number that changes with each power-on.
+    /// A recorder for the card in `device`. `entropy` distinguishes sessions of equal number on equal cards: a random
+    /// number, or any number that changes with each power-on.
     pub const fn new(device: D, status: &'a CardStatus, buffers: &'a Buffers, entropy: u32) -> Self {
         let socket = Socket::Waiting(device);
         Self {
@@ -180,8 +179,8 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
         self.status.count_write_errors(self.socket.take_retries());
     }
 
-    /// While nothing is to be written: finds the end of the previous session once this one has a sector on the card,
-    /// dates the segment once the date is known, and continues the count of room.
+    /// Work for times without writes: finds the end of the previous session, dates the segment, and continues the
+    /// count of room. The first needs a sector of this session on the card, the second the date.
     pub fn idle(&mut self) {
         let Some(card) = self.socket.card() else { return };
         if self.segments.has_sector() {

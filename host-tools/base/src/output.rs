@@ -89,8 +89,8 @@ pub fn json(schema: Schema, value: &impl Serialize) -> Result<()> {
     json_line(&serde_json::to_string_pretty(&Named { schema, value })?)
 }
 
-/// A JSON object that is printed as it is made: some members, then a list that is too long to be held. Its text is
-/// the same as that of [`json`].
+/// A JSON object that is printed as it is made: some members, then a list that is too long to be held. It prints the
+/// same text as [`json`].
 pub struct JsonList {
     empty: bool,
 }

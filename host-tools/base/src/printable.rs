@@ -1,6 +1,6 @@
-//! Foreign texts on a terminal. A text from a log, a vehicle or a file's name may hold characters that control a
-//! terminal: escape sequences clear the screen or write elsewhere. Others change the reading of the text: after
-//! `U+202E`, which turns the direction, `evil` looks like `live`. They are shown by their numbers, as `\u{1b}`.
+//! Foreign texts on a terminal. A text from a log, a vehicle or a file's name may control a terminal: escape
+//! sequences clear the screen or write elsewhere. Others change the reading of the text: after `U+202E`, which turns
+//! the direction, `evil` looks like `live`. They are shown by their numbers, as `\u{1b}`.
 //!
 //! All printed text passes through here: standard output in [`crate::output`], standard error by `note!`.
 

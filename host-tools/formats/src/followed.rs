@@ -1,7 +1,7 @@
 //! Logs in order, each with the end that a later one recorded for it.
 //!
-//! The recorder notes at each start where the session before ended on that card. A log is therefore held back until
-//! the next ones were read: a file from the moment of a power cut has no sector, and so no such record.
+//! The recorder notes at each start where the session before ended on that card. So a log is held back until the next
+//! ones were read. A file from the moment of a power cut has no sector, and so no such record.
 
 use std::collections::VecDeque;
 
@@ -63,8 +63,8 @@ impl<T: HasEnding> EndResolver<T> {
         self.held.into_iter()
     }
 
-    /// The start of `next` found no sector in the newest files, of which the last one has this number. Those that are
-    /// empty now were empty then.
+    /// Notes that the start of `next` found no sector in the newest files, of which `newest` is the last number.
+    /// Those that are empty now were empty then.
     fn tell_empty(&mut self, newest: u32, next: &str) {
         for log in self.held.iter_mut().filter_map(HasEnding::ending) {
             let ((card, number), blocks) = (place(&log.name), &log.summary.blocks);

@@ -22,7 +22,7 @@ use anyhow::{Context as _, Result, bail};
 use hums_blackbox::{Header, Preamble, SECTOR_BYTES, Sector};
 use hums_tests::child;
 
-/// Runs of a program, of which the fastest counts: other load only adds time.
+/// Runs of a program. The fastest counts: other load only adds time.
 const RUNS: u32 = 5;
 /// Time limit of a run; only a long log on a busy machine comes near.
 const LIMIT: Duration = Duration::from_hours(2);

@@ -159,8 +159,8 @@ fn logs_of(card: &Card) -> Result<(BTreeMap<String, Vec<u64>>, usize)> {
     Ok((frames, erased))
 }
 
-/// Room for all logs of a day: without a key any station can begin and end logs, and a full card overwrites the
-/// oldest of them.
+/// Room for all logs of a day. Without a key any station can begin and end logs, and a full card overwrites the
+/// oldest.
 const CARD_MIB: u64 = 4096;
 
 fn attack(options: &Options, seconds: u64, key: Option<[u8; 32]>) -> Result<Half> {

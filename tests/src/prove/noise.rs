@@ -18,8 +18,8 @@ const PROBABILITIES: [f64; 5] = [0.000_01, 0.000_1, 0.001, 0.003, 0.01];
 const BAUD: u64 = 230_400;
 /// Whole frames that one false frame, of 280 bytes, can cover: none is shorter than 17 with its header.
 const HIDDEN_MAX: usize = 16;
-/// A damaged frame whose checksum fits by chance, 1 in 65,536; and a damaged header that makes a candidate of bytes
-/// within a frame, each with that chance.
+/// Two causes, each with a chance of 1 in 65,536: a damaged frame whose checksum fits, and a damaged header that
+/// makes a candidate within a frame.
 const INVENTED_MAX: f64 = 1.0 / 2_000.0;
 
 pub(super) const LABELS: Labels = Labels {

@@ -1,9 +1,9 @@
 //! Power cuts at any block write.
 //!
 //! A session is recorded once, at full rate, with every block write kept. Then the card is restored to its state
-//! before, and the writes are replayed up to one chosen by chance, that one whole or in part. So one recording gives
-//! any number of cuts, each with the exact content of the card. Decoded frames are compared with the sent ones, one
-//! by one and in order, and with their arrival times.
+//! before, and the writes are replayed up to a random one, that one whole or in part. So one recording gives any
+//! number of cuts, each with the exact content of the card. Decoded frames are compared with the sent ones, one by
+//! one and in order, and with their arrival times.
 
 pub(super) mod careless;
 

@@ -1,5 +1,5 @@
-//! Records: each number against the same number of the previous record of its kind, times against the entry's own
-//! time, and bytes by the text model.
+//! Records: numbers are coded against the previous record of their kind, times against the entry's own time, bytes by
+//! the text model.
 
 use super::element::{integer_class, integer_rest};
 use super::text::TextModel;

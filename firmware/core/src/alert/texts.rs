@@ -155,7 +155,7 @@ const fn pairs(text: &[u8]) -> u64 {
     let mut bits = 0;
     let mut rest = text;
     while let [first, second, ..] = rest {
-        // Wildcards are no letters. (No text's own `*` or `^` is in a pattern.)
+        // Wildcards do not count as letters. (No text's own `*` or `^` is in a pattern.)
         if !matches!(first, b'*' | b'^') && !matches!(second, b'*' | b'^') {
             let sum = first.to_ascii_lowercase() as u32 * 7 + second.to_ascii_lowercase() as u32;
             bits |= 1 << (sum % u64::BITS);

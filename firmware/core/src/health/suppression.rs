@@ -248,8 +248,7 @@ impl Alarm {
     }
 }
 
-/// The cause of an alarm or of a lack of data: the first mishap, or else the first alarm in the order of groups and
-/// tables.
+/// The cause of an alarm or of a lack of data: the first mishap, or else the first alarm by group and table.
 pub fn root_cause(effect: &Alarm, alarms: impl Iterator<Item = Alarm>) -> Option<Alarm> {
     let order = |alarm: &Alarm| match alarm.check.subsystem {
         Subsystem::Mishap => (false, alarm.since.as_millis(), alarm.slot),

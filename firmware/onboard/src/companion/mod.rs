@@ -1,8 +1,7 @@
 //! The monitor as a companion: its requests to the autopilot, and its answers to others.
 //!
-//! It is a part of the monitor task. A request comes as a frame from the frame queue (the autopilot's port, also for
-//! ground stations) or from the uplink queue (the ground station's own port). The answer goes out at the same port,
-//! within its budget.
+//! It is a part of the monitor task. A request comes as a frame from the frame queue (the autopilot's port) or from
+//! the uplink queue (the ground station's own port). The answer goes out at the same port, within its budget.
 //!
 //! A request can change settings, stop recording and ask for data, and nothing else. A flood of requests is cut by
 //! [`limiter`] and by the short queue of answers.

@@ -29,8 +29,8 @@ pub(super) struct Log {
     pub(super) newest_copy: NewestCopy,
 }
 
-/// The place of the newest copy of the sector in progress. A sector's place is its number less that of the segment's
-/// first one.
+/// The place of the newest copy of the sector in progress. A sector's place is its number less the number of the
+/// segment's first sector.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum NewestCopy {
     None,
@@ -105,7 +105,7 @@ impl<'a> Segments<'a> {
     /// Finds the end of the previous session, once for each card, and reports it. This takes 0.1 s of a usual card
     /// without recording. So it waits until the session has its first sector on the card, or overwrites an older
     /// segment.
-    // Not inlined, so that its stack frame is not below that of making a segment.
+    // Not inlined: its stack frame must not lie below that of making a segment.
     #[inline(never)]
     pub(super) fn look_before<D: CardDevice>(&mut self, card: &Card<'_, D>) {
         let earlier = core::mem::take(&mut self.earlier);

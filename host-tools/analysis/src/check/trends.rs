@@ -7,15 +7,15 @@
 //! A baseline has the mean of the figures and their spread. A departure counts if only one unchanged flight in
 //! `TRD_FALSE` goes so far, by Student's t distribution. The figures are normal with unknown mean and spread, the
 //! spread with a conjugate prior; Gelman et al., Bayesian Data Analysis, 3.2 and 3.3). The test of one figure is the
-//! likelihood ratio test for a changed mean, so its rate of false alarms can be set (Lehmann and Romano, Testing
-//! Statistical Hypotheses, 5.2).
+//! likelihood ratio test for a changed mean, so its rate of false alarms can be set. (Lehmann and Romano, Testing
+//! Statistical Hypotheses, 5.2.)
 //!
 //! # Heavier, or less thrust
 //! A heavier vehicle asks all its rotors for more thrust T, and these take power as T^1.5 (actuator disk; Leishman,
 //! Principles of Helicopter Aerodynamics, 2.4). With a shorter propeller blade, a weak motor or a weak ESC, throttle
-//! rises for the same thrust and power does not. So if throttle rose, the logarithm of power is compared with that of
-//! the thrust at this throttle. From `WEIGHT_EXPONENT` times on, half way between both, the cause is weight.
-//! Propellers of a real quadrotor cut by 10 to 25 mm have 0.5 to 1.1.
+//! rises for the same thrust and power does not. So if throttle rose, the logarithm of power is compared with the
+//! logarithm of the thrust at this throttle. From `WEIGHT_EXPONENT` times on, half way between both, the cause is
+//! weight. Propellers of a real quadrotor cut by 10 to 25 mm have 0.5 to 1.1.
 //!
 //! # Better than before
 //! Wear never makes a vehicle hover with less, or a battery resist less and hold more. A flight that is better beyond

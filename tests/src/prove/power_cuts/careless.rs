@@ -6,8 +6,8 @@
 //! - one has lost a single acknowledged block;
 //! - one spoils the whole flash page of the last block.
 //!
-//! Such a card is examined in three ways: by `fsck.vfat`, whose complaints are counted; by the readers behind `hums
-//! info --verify`; and by the recorder, which starts on it again.
+//! Such a card is examined in three ways: by `fsck.vfat`, by the readers behind `hums info --verify`, and by the
+//! recorder, which starts on it again.
 
 use std::collections::{BTreeMap, BTreeSet};
 

@@ -156,7 +156,8 @@ impl Element {
         self.quiet & QUIET != 0
     }
 
-    /// Bits of which one is set in a quiet element: `any_quiet` reads them or-ed for many elements.
+    /// The bits of a quiet element: one is set if the element is quiet. `any_quiet` reads them or-ed for many
+    /// elements.
     #[inline]
     pub(crate) const fn quiet_bits(&self) -> u8 {
         self.quiet

@@ -74,7 +74,7 @@ impl Library {
         Self { job: None, ticket: 0, asked: false, erases: false, places: Places::new(), open: None }
     }
 
-    /// For a new request: an answer to the previous one is no longer awaited.
+    /// The number of a new request. An answer to the previous one is no longer awaited.
     pub(crate) const fn next_ticket(&mut self) -> u16 {
         self.ticket = self.ticket.wrapping_add(1);
         self.asked = false;
