@@ -150,7 +150,7 @@ def main():
         (read_tlog if kind == "tlog" else read_raw)(data, reader, tally)
         flights[os.path.basename(path)] = tally.as_dict(path, kind)
     seeds = {str(key): dialect.mavlink_map[key].crc_extra for key in sorted(dialect.mavlink_map)}
-    print(json.dumps({"made_by": "cargo xtask manifest", "flights": flights, "crc_extra": seeds}, indent=1))
+    print(json.dumps({"made_by": "HUMS_WRITE_DOCS=1 cargo xtask test --only sim", "flights": flights, "crc_extra": seeds}, indent=1))
 
 
 if __name__ == "__main__":

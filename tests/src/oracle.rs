@@ -203,7 +203,12 @@ impl Drop for LivePage {
 
 /// Pymavlink's results on these recordings.
 pub fn manifest(files: &[PathBuf]) -> Manifest {
-    Manifest::parse(&ask("manifest.py", files))
+    Manifest::parse(&manifest_text(files))
+}
+
+/// The same as a file.
+pub fn manifest_text(files: &[PathBuf]) -> String {
+    ask("manifest.py", files)
 }
 
 /// Usage of these recordings by pymavlink's messages: see `tests/oracle/usage.py`.

@@ -26,7 +26,7 @@ const STAGES: [(&str, &str); 5] = [
 
 /// Builds, measures and compares.
 pub(crate) fn check() -> Result<()> {
-    setup::ensure(&[Need::Linker, Need::FirmwareTarget], false).require_all()?;
+    setup::require(&[Need::Linker, Need::FirmwareTarget])?;
     let image = firmware::build(Board::F405)?;
     check_built(&hums::build()?, &image)
 }

@@ -19,44 +19,36 @@ const FLIGHT: &str = "tests/flights/ap_quad_faults.tlog";
 /// `hums` did all it could, and there are losses to report.
 const DONE_WITH_LOSSES: i32 = 3;
 
-#[derive(Debug, PartialEq, Eq)]
+#[derive(Debug, clap::Args)]
 pub(crate) struct Options {
-    flight: PathBuf,
-    /// On this PC, without the firmware.
+    /// A tlog or a raw recording; without it one with faults
+    #[arg(long, value_name = "FILE")]
+    flight: Option<PathBuf>,
+    /// On this PC, without the firmware
+    #[arg(long)]
     pc: bool,
-    /// At the end, until Ctrl-C.
-    dashboard: bool,
+    /// Not the live page, which plays the flight on a terminal until Ctrl-C
+    #[arg(long)]
+    no_dashboard: bool,
 }
 
 impl Options {
-    pub(crate) fn parse(words: &[&str]) -> Result<Self> {
-        let dashboard = std::io::stdout().is_terminal();
-        let mut options = Self { flight: repo::root().join(FLIGHT), pc: false, dashboard };
-        let mut words = words.iter();
-        while let Some(word) = words.next() {
-            match *word {
-                "--pc" => options.pc = true,
-                "--no-dashboard" => options.dashboard = false,
-                "--flight" => {
-                    let Some(flight) = words.next() else {
-                        bail!("--flight wants a tlog or a raw recording")
-                    };
-                    // As typed in the user's folder: the commands themselves run at the root.
-                    options.flight = std::path::absolute(flight)?;
-                }
-                other => bail!("demo takes --flight FILE, --pc and --no-dashboard, not {other}"),
-            }
-        }
-        Ok(options)
+    /// As typed in the user's folder: the commands themselves run at the root.
+    fn flight(&self) -> Result<PathBuf> {
+        let own = || Ok(repo::root().join(FLIGHT));
+        self.flight.as_ref().map_or_else(own, |path| Ok(std::path::absolute(path)?))
     }
 }
 
-/// In CI the demo must run the firmware, and end. Program and firmware are there already. The shortest recording: the demo's own flight
-/// is what the step `chip` flies, by the same program and image, and compares frame by frame.
+/// In CI the demo must run the firmware, and end. Program and firmware are there already. The beginning of the shortest recording: the
+/// demo's own flight is what the step `chip` flies, by the same program and image, and compares frame by frame.
 pub(crate) fn as_test() -> Result<()> {
     const SHORT: &str = "tests/flights/px4_hil_quad_low.tlog";
-    let flight = repo::root().join(SHORT);
-    let options = Options { flight, pc: false, dashboard: false };
+    const BYTES: usize = 120_000;
+    let beginning = fs::read(repo::root().join(SHORT))?.into_iter().take(BYTES).collect::<Vec<u8>>();
+    let flight = repo::target().join("beginning.tlog");
+    fs::write(&flight, beginning)?;
+    let options = Options { flight: Some(flight), pc: false, no_dashboard: true };
     fly(&options, Some(&Board::F405.image()), Duration::ZERO)
 }
 
@@ -91,7 +83,8 @@ fn fly(options: &Options, image: Option<&Path>, built: Duration) -> Result<()> {
         None => Shell::new(hums::program()).arg("sim"),
     };
     let recording = Instant::now();
-    let json = record(pipeline, &options.flight, &card, &gs)?;
+    let flight = options.flight()?;
+    let json = record(pipeline, &flight, &card, &gs)?;
     fs::write(&figures, &json)?;
     let recorded = recording.elapsed();
     let decoded = folder.join("decoded");
@@ -101,7 +94,7 @@ fn fly(options: &Options, image: Option<&Path>, built: Duration) -> Result<()> {
     Shell::new(hums::program()).arg("info").arg(&card).run()?;
     let run: serde_json::Value = serde_json::from_str(&json).context("what hums --json printed")?;
     show_figures(&run);
-    println!("{:<30} {}", "the flight", repo::shown(&options.flight));
+    println!("{:<30} {}", "the flight", repo::shown(&flight));
     let by = if image.is_some() {
         "the image that is flashed, on a model of its chip"
     } else {
@@ -121,7 +114,7 @@ fn fly(options: &Options, image: Option<&Path>, built: Duration) -> Result<()> {
     if run.get("frames_lost").and_then(serde_json::Value::as_u64) != Some(0) {
         bail!("frames were lost");
     }
-    if options.dashboard {
+    if !options.no_dashboard && std::io::stdout().is_terminal() {
         println!("{:<30} until Ctrl-C, at", "the dashboard plays it");
         return Shell::new(hums::program())
             .args(["live", "--listen", "127.0.0.1:0", "--input"])
@@ -150,18 +143,21 @@ fn show_figures(run: &serde_json::Value) {
 
 /// Runs the flight through a pipeline; returns its figures.
 fn record(pipeline: Shell, flight: &Path, card: &Path, gs: &Path) -> Result<String> {
-    let (json, code) = pipeline
-        .args(["--json".as_ref(), "--input".as_ref(), flight.as_os_str()])
-        .args(["--sd".as_ref(), card.as_os_str(), "--gs".as_ref(), gs.as_os_str()])
-        .output_and_code()?;
-    if code != 0 && code != DONE_WITH_LOSSES {
-        bail!("the recording failed with exit code {code}");
-    }
-    Ok(json)
+    let paths = ["--input".as_ref(), flight.as_os_str(), "--sd".as_ref(), card.as_os_str()];
+    done(pipeline.arg("--json").args(paths).arg("--gs").arg(gs)).context("the recording failed")
 }
 
-fn decode(card: &Path, to: &Path) -> Result<()> {
-    Shell::new(hums::program()).arg("decode").arg(card).arg("-o").arg(to).args(["--format", "tlog,csv"]).run()
+fn decode(card: &Path, to: &Path) -> Result<String> {
+    let decode = Shell::new(hums::program()).arg("decode").arg(card).arg("-o").arg(to);
+    done(decode.args(["--format", "tlog,csv"])).context("the card cannot be decoded")
+}
+
+/// The output of a command; losses are told, and no failure: so is a recording that ends in the air.
+fn done(command: Shell) -> Result<String> {
+    match command.output_and_code()? {
+        (text, 0 | DONE_WITH_LOSSES) => Ok(text),
+        (_, code) => bail!("exit code {code}"),
+    }
 }
 
 #[cfg(test)]
@@ -169,14 +165,11 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_flight_of_the_demo_is_in_the_repository() {
-        assert!(Options::parse(&[]).unwrap().flight.is_file());
-    }
-
-    #[test]
-    fn a_flight_is_named_from_where_the_user_is() {
-        let options = Options::parse(&["--flight", "mine.tlog", "--pc"]).unwrap();
-        assert_eq!(options.flight, std::env::current_dir().unwrap().join("mine.tlog"));
-        assert!(options.pc);
+    fn the_flight_is_one_of_the_repository_or_named_from_where_the_user_is() {
+        let flight = |flight: Option<&str>| {
+            Options { flight: flight.map(PathBuf::from), pc: false, no_dashboard: true }.flight().unwrap()
+        };
+        assert!(flight(None).is_file());
+        assert_eq!(flight(Some("mine.tlog")), std::env::current_dir().unwrap().join("mine.tlog"));
     }
 }

@@ -24,7 +24,7 @@ pub(crate) fn run(check: bool) -> Result<()> {
     let mut needs = vec![Need::Linker, Need::Clippy, Need::FirmwareTarget, Need::StaticTarget];
     needs.extend([Need::WindowsTarget, Need::Mingw, Need::MacTarget]);
     needs.extend(check.then_some(Need::Wine));
-    setup::ensure(&needs, false).require_all()?;
+    setup::require(&needs)?;
     ensure_tool("cyclonedx", &[])?;
     // It has little to do: building it without optimisation takes a third of the time.
     ensure_tool("deny", &["--debug"])?;

@@ -16,7 +16,7 @@ use crate::shell::Shell;
 pub(crate) const LAST: [&str; 2] = ["--", "-Cllvm-args=-inline-threshold=40"];
 
 /// The firmware's targets.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
 pub(crate) enum Board {
     /// A real board with an STM32F405.
     F405,
@@ -26,13 +26,6 @@ pub(crate) enum Board {
 
 impl Board {
     pub(crate) const ALL: [Self; 2] = [Self::F405, Self::F429];
-
-    pub(crate) fn parse(name: &str) -> Result<Self> {
-        match Self::ALL.into_iter().find(|board| board.name() == name) {
-            Some(board) => Ok(board),
-            None => bail!("there is no board {name}: f405 or f429"),
-        }
-    }
 
     pub(crate) fn name(self) -> &'static str {
         match self {
@@ -157,9 +150,8 @@ mod tests {
     #[test]
     fn boards_are_known_by_name() {
         for board in Board::ALL {
-            assert_eq!(Board::parse(board.name()).unwrap(), board);
+            assert_eq!(<Board as clap::ValueEnum>::from_str(board.name(), false), Ok(board));
         }
-        assert!(Board::parse("f407").unwrap_err().to_string().contains("f405 or f429"));
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context as _, Result, bail};
+use anyhow::{Result, bail};
 
 use crate::firmware::{self, Board};
 use crate::setup::{self, Need};
@@ -12,68 +12,37 @@ const PROBE_RS: (&str, &str) =
     ("probe-rs", "cargo install probe-rs-tools --locked (or see https://probe.rs)");
 const DFU_UTIL: (&str, &str) = ("dfu-util", "apt-get install dfu-util (macOS: brew install dfu-util)");
 
-/// How the firmware gets onto the board.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Way {
-    /// A debug probe.
-    Probe,
-    /// The chip's own boot loader, over USB.
-    Dfu,
-}
-
-/// Arguments of `flash` and `attach`.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+/// Arguments of `flash`.
+#[derive(Debug, clap::Args)]
 pub(crate) struct Options {
-    pub(crate) board: Board,
-    pub(crate) way: Way,
-}
-
-impl Options {
-    /// `with_dfu`: whether `--dfu` means anything.
-    pub(crate) fn parse(words: &[&str], with_dfu: bool) -> Result<Self> {
-        let mut options = Self { board: Board::F405, way: Way::Probe };
-        let mut words = words.iter();
-        while let Some(word) = words.next() {
-            match *word {
-                "--board" => {
-                    options.board = Board::parse(words.next().context("--board wants the name of a board")?)?;
-                }
-                "--dfu" if with_dfu => options.way = Way::Dfu,
-                other => bail!(
-                    "{other} is not understood here: --board BOARD{}",
-                    if with_dfu { ", --dfu" } else { "" }
-                ),
-            }
-        }
-        Ok(options)
-    }
+    #[arg(long, value_enum, default_value_t = Board::F405)]
+    board: Board,
+    /// Over USB by the chip's own boot loader (dfu-util), not by a debug probe (probe-rs)
+    #[arg(long)]
+    dfu: bool,
 }
 
 /// Builds the firmware and programs it. The board's store is kept.
-pub(crate) fn flash(options: Options) -> Result<()> {
-    setup::ensure(&[Need::Linker, Need::FirmwareTarget], false).require_all()?;
+pub(crate) fn flash(options: &Options) -> Result<()> {
+    setup::require(&[Need::Linker, Need::FirmwareTarget])?;
     let elf = firmware::build(options.board)?;
-    match options.way {
-        Way::Probe => {
-            require(PROBE_RS)?;
-            // Without --chip-erase it erases the sectors that the image has bytes in, and no others.
-            probe("download", options.board, &elf).run()?;
-            Shell::new(PROBE_RS.0).args(["reset", "--chip", chip(options.board)]).run()
-        }
-        Way::Dfu => {
-            let path = elf.with_extension("dfu");
-            println!("{}", path.display());
-            require(DFU_UTIL)?;
-            load(&path).run()
-        }
+    if options.dfu {
+        let path = elf.with_extension("dfu");
+        println!("{}", path.display());
+        require(DFU_UTIL)?;
+        return load(&path).run();
     }
+    require(PROBE_RS)?;
+    // Without --chip-erase it erases the sectors that the image has bytes in, and no others.
+    probe("download", options.board, &elf).run()?;
+    Shell::new(PROBE_RS.0).args(["reset", "--chip", chip(options.board)]).run()
 }
 
 /// Builds the firmware with its feature `log`, programs it and shows the log as it goes on.
-pub(crate) fn attach(options: Options) -> Result<()> {
-    let elf = firmware::build_with_log(options.board)?;
+pub(crate) fn attach(board: Board) -> Result<()> {
+    let elf = firmware::build_with_log(board)?;
     require(PROBE_RS)?;
-    probe("run", options.board, &elf).run()
+    probe("run", board, &elf).run()
 }
 
 fn probe(command: &str, board: Board, elf: &PathBuf) -> Shell {
@@ -111,18 +80,6 @@ mod tests {
         let error = require(("no-such-program", "apt-get install such-program")).unwrap_err().to_string();
         assert_eq!(error, "no-such-program is not installed. Type: apt-get install such-program");
         require(("cargo", "")).unwrap();
-    }
-
-    #[test]
-    fn boards_and_ways_are_chosen() {
-        let parse = |line: &str, dfu| Options::parse(&line.split_whitespace().collect::<Vec<_>>(), dfu);
-        assert_eq!(parse("", true).unwrap(), Options { board: Board::F405, way: Way::Probe });
-        let both = Options { board: Board::F429, way: Way::Dfu };
-        assert_eq!(parse("--dfu --board f429", true).unwrap(), both);
-        for line in ["--board", "--board f407", "--board emulated", "--erase"] {
-            assert!(parse(line, true).is_err(), "{line}");
-        }
-        assert!(parse("--dfu", false).is_err(), "there is nothing to attach to");
     }
 
     #[test]

@@ -19,32 +19,24 @@ struct Package {
     name: &'static str,
     version: &'static str,
     features: &'static str,
-    examples: &'static [&'static str],
+    /// Separated by spaces.
+    examples: &'static str,
 }
 
-const PACKAGES: &[Package] = &[
+const PACKAGES: [Package; 3] = [
     Package {
         name: "stm32f4xx-hal",
         version: "0.23.0",
         features: "stm32f405,rtic1",
-        examples: &[
-            "serial-dma",
-            "rtic-serial-dma-rx-idle",
-            "spi-dma",
-            "rtic-button",
-            "rtic-tick",
-            "rtic-usart-shell",
-            "delay-timer-blinky",
-            "blinky-timer-irq",
-            "delay-syst-blinky",
-        ],
+        examples: "serial-dma rtic-serial-dma-rx-idle spi-dma rtic-button rtic-tick rtic-usart-shell \
+                   delay-timer-blinky blinky-timer-irq delay-syst-blinky",
     },
-    Package { name: "feather-f405", version: "0.2.0", features: "", examples: &["flash"] },
+    Package { name: "feather-f405", version: "0.2.0", features: "", examples: "flash" },
     Package {
         name: "stm32f407g-disc",
         version: "0.4.1",
         features: "",
-        examples: &["serial_echo", "gpio_hal_blinky"],
+        examples: "serial_echo gpio_hal_blinky",
     },
 ];
 
@@ -52,34 +44,10 @@ const PACKAGES: &[Package] = &[
 const EMBASSY: &[&str] = &["wdt", "flash", "usart_dma", "usart_buffered", "button_exti", "multiprio"];
 const EMBASSY_TAG: &str = "embassy-stm32-v0.6.0";
 /// Their dependencies: the packages of that tag, for an STM32F405.
-const EMBASSY_MANIFEST: &str = r#"
-[package]
-name = "foreign"
-version = "0.0.0"
-edition = "2024"
-
-[workspace]
-
-[dependencies]
-embassy-stm32 = { version = "=0.6.0", features = ["defmt", "stm32f405zg", "unstable-pac", "memory-x", "time-driver-tim12", "exti"] }
-embassy-executor = { version = "=0.10.0", features = ["platform-cortex-m", "executor-thread", "executor-interrupt", "defmt"] }
-embassy-time = { version = "=0.5.1", features = ["defmt", "defmt-timestamp-uptime", "tick-hz-32_768"] }
-defmt = "1"
-defmt-rtt = "1"
-cortex-m = { version = "0.7", features = ["inline-asm", "critical-section-single-core"] }
-cortex-m-rt = "0.7"
-embedded-io-async = "0.7"
-panic-probe = { version = "1", features = ["print-defmt"] }
-static_cell = "2"
-heapless = { version = "0.9", default-features = false }
-"#;
-const EMBASSY_BUILD: &str = r#"
-fn main() {
-    for argument in ["--nmagic", "-Tlink.x", "-Tdefmt.x"] {
-        println!("cargo:rustc-link-arg-bins={argument}");
-    }
-}
-"#;
+const EMBASSY_MANIFEST: &str = include_str!("../../chip/stm32f405/examples/foreign/embassy.toml");
+const EMBASSY_BUILD: &str = r#"fn main() {
+    ["--nmagic", "-Tlink.x", "-Tdefmt.x"].map(|argument| println!("cargo:rustc-link-arg-bins={argument}"));
+}"#;
 
 /// Builds and judges them; `embassy` is the folder of a checkout of its repository.
 pub(crate) fn run(arguments: &[String]) -> Result<()> {
@@ -88,14 +56,14 @@ pub(crate) fn run(arguments: &[String]) -> Result<()> {
         [folder] => Some(PathBuf::from(folder).join("examples/stm32f4/src/bin")),
         _ => bail!("prove foreign [EMBASSY]: one folder, a checkout of embassy's repository"),
     };
-    setup::ensure(&[Need::Linker, Need::FirmwareTarget], false).require_all()?;
+    setup::require(&[Need::Linker, Need::FirmwareTarget])?;
     let programs = folder().join("programs");
     empty(&programs)?;
-    for package in PACKAGES {
+    for package in &PACKAGES {
         let source = fetch(package)?;
-        let examples = package.examples.iter().flat_map(|name| ["--example", name]);
+        let examples = package.examples.split(' ').flat_map(|name| ["--example", name]);
         build(&source, ["--locked", "--features", package.features].into_iter().chain(examples))?;
-        for name in package.examples {
+        for name in package.examples.split(' ') {
             keep(&format!("examples/{name}"), &programs.join(format!("{}.{name}", package.name)))?;
         }
     }
@@ -146,7 +114,7 @@ fn fetch(package: &Package) -> Result<PathBuf> {
     let from = from.context("a manifest is in a folder")?.as_std_path();
     let to = folder().join("sources").join(format!("{name}-{version}"));
     empty(&to)?;
-    copy(from, &to).with_context(|| format!("cannot copy {}", from.display()))?;
+    Shell::new("cp").arg("-R").arg(from.join(".")).arg(&to).run()?;
     let manifest = fs::read_to_string(from.join("Cargo.toml"))?;
     fs::write(to.join("Cargo.toml"), for_any_chip(&manifest)?)?;
     Ok(to)
@@ -161,20 +129,6 @@ fn for_any_chip(manifest: &str) -> Result<String> {
     }
     manifest.insert("workspace".to_owned(), toml::Table::new().into());
     Ok(toml::to_string(&manifest)?)
-}
-
-fn copy(from: &Path, to: &Path) -> Result<()> {
-    for entry in fs::read_dir(from)? {
-        let entry = entry?;
-        let (from, to) = (entry.path(), to.join(entry.file_name()));
-        if from.is_dir() {
-            fs::create_dir(&to)?;
-            copy(&from, &to)?;
-        } else {
-            fs::copy(&from, &to)?;
-        }
-    }
-    Ok(())
 }
 
 /// A package of embassy's programs.

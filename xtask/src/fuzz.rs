@@ -15,17 +15,6 @@ const FOUND: &str = "target/fuzz/found";
 /// The longest input, in bytes; each target's own limit is for the mutations on stable Rust.
 const BYTES_MAX: u32 = 16_384;
 
-/// How long each target runs unless told.
-pub(crate) const SECONDS: u32 = 300;
-
-pub(crate) fn parse(words: &[&str]) -> Result<u32> {
-    match words {
-        [] => Ok(SECONDS),
-        ["--seconds", seconds] => Ok(seconds.parse()?),
-        _ => bail!("fuzz takes --seconds N"),
-    }
-}
-
 /// Runs each target for that many seconds. Inputs that break one are in `fuzz/libfuzzer/artifacts`.
 pub(crate) fn run(seconds: u32) -> Result<()> {
     require(&["+nightly", "--version"], "a nightly compiler: rustup toolchain install nightly")?;
@@ -79,13 +68,5 @@ mod tests {
         assert!(
             ["card", "find", "page", "recording"].iter().all(|name| targets.contains(&(*name).to_owned()))
         );
-    }
-
-    #[test]
-    fn the_time_is_five_minutes_or_what_is_said() {
-        assert_eq!(parse(&[]).unwrap(), SECONDS);
-        assert_eq!(parse(&["--seconds", "7"]).unwrap(), 7);
-        assert!(parse(&["--seconds"]).is_err());
-        assert!(parse(&["--second", "7"]).is_err());
     }
 }

@@ -28,57 +28,85 @@ mod wine;
 
 use std::process::ExitCode;
 
-use anyhow::{Result, bail};
+use anyhow::Result;
+use clap::Parser;
 
 use crate::firmware::Board;
 use crate::setup::Need;
 
-const HELP: &str = "\
-cargo xtask COMMAND
-
-  demo [--flight FILE] [--pc] [--no-dashboard]
-                                 a recorded flight through the image that is flashed, on a model of its chip, and what came
-                                 of it; with --pc through the same pipeline on this PC;
-                                 on a terminal the dashboard plays it at the end, until Ctrl-C
-  test [--only STEP]... [--list] everything that CI checks, or the steps named with what they need; a table at the end
-  test --quick                   format, lints and unit tests of the packages that changed
-  prove [NAME]... [--short] [--seed N] [--runs N] [--list]
-                                 the campaigns: power cuts, damage, stalls, endurance, hostile ground station, noise;
-                                 all of them (an hour) make docs/proof.md
-  prove diagnosis [FOLDER]... [--unseen FOLDER]... [--write]
-                                 faults found and false alarms, on the labelled flights of the repository and of folders;
-                                 --write makes docs/diagnosis.md
-  prove chip [TEST]...           the long tests of the image that is flashed, on the model of its chip
-  prove foreign [EMBASSY]        programs of others on that model, built from what their packages bring; and embassy's examples, from
-                                 the folder of a checkout of its repository
-  firmware [--board BOARD]       build the firmware: f405 (the default) or f429
-  bench [sizes|speed|logs]...    what the record takes: bytes and decoding time; how fast logs are checked
-  fuzz [--seconds N]             the fuzz targets, each for so long (300); needs nightly Rust and cargo-fuzz
-  dist [--check]                 the files of a release, in target/dist; --check builds them twice, compares,
-                                 and runs what is for Windows under Wine
-  flash [--board BOARD] [--dfu]  build the firmware and program it: by a debug probe (probe-rs), or over USB by the chip's own
-                                 boot loader (dfu-util); what the board has stored stays
-  attach [--board BOARD]         build the firmware with a log, program it and show the log (probe-rs)
-  size [--write]                 flash and RAM of all boards against budgets.toml; --write notes what is taken there and in
-                                 ARCHITECTURE.md
-  costs                          cycles, load and stack, on the model of the chip, against budgets.toml
-  setup [--dry-run]              install what demo and test need, or only say what is missing
-  grafana                        make the dashboards of each database in host-tools/grafana
-  manifest                       make tests/flights/manifest.json anew with pymavlink
-  help                           this text
-
-Exit codes: 0 done, 1 failed, 2 usage.";
+/// The tasks of this repository
+#[derive(Parser)]
+#[command(bin_name = "cargo xtask", after_help = "Exit codes: 0 done, 1 failed, 2 usage.")]
+enum Command {
+    /// Fly a recording through the firmware's image on a model of its chip, and show what came of it
+    Demo(demo::Options),
+    /// Run all that CI checks, with a table of seconds at the end
+    Test(test::Options),
+    /// Run the campaigns: power cuts, damage, stalls, endurance, hostile ground station, noise
+    ///
+    /// All of them take an hour and make docs/proof.md. Three names are no campaigns:
+    ///
+    /// `prove diagnosis [FOLDER]... [--unseen FOLDER]... [--write]` counts found faults and false alarms in labelled
+    /// flights; --write makes docs/diagnosis.md.
+    ///
+    /// `prove chip [TEST]...` runs the long tests of the image on the model of its chip.
+    ///
+    /// `prove foreign [EMBASSY]` runs other people's programs on that model: examples of registry packages, and of a
+    /// checkout of embassy's repository.
+    Prove {
+        /// [NAME]... [--short] [--seed N] [--runs N] [--list]
+        #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
+        arguments: Vec<String>,
+    },
+    /// Build the firmware and print the image's path
+    Firmware {
+        #[arg(long, value_enum, default_value_t = Board::F405)]
+        board: Board,
+    },
+    /// Measure what the record takes, and how fast logs are decoded and checked
+    Bench {
+        /// All, if none is named
+        what: Vec<bench::Bench>,
+    },
+    /// Run the fuzz targets; needs nightly Rust and cargo-fuzz
+    Fuzz {
+        /// Seconds for each target
+        #[arg(long, default_value_t = 300)]
+        seconds: u32,
+    },
+    /// Make the files of a release in target/dist
+    Dist {
+        /// Build them twice and compare, and run what is for Windows under Wine
+        #[arg(long)]
+        check: bool,
+    },
+    /// Build the firmware and program it; what the board has stored stays
+    Flash(flash::Options),
+    /// Build the firmware with a log, program it and show the log (probe-rs)
+    Attach {
+        #[arg(long, value_enum, default_value_t = Board::F405)]
+        board: Board,
+    },
+    /// Compare flash and RAM of all boards with budgets.toml
+    Size {
+        /// Note what is taken there and in ARCHITECTURE.md
+        #[arg(long)]
+        write: bool,
+    },
+    /// Compare cycles, load and stack on the model of the chip with budgets.toml
+    Costs,
+    /// Install what demo and test need
+    Setup {
+        /// Only print what is missing
+        #[arg(long)]
+        dry_run: bool,
+    },
+    /// Make the dashboards of each database in host-tools/grafana
+    Grafana,
+}
 
 fn main() -> ExitCode {
-    let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let command = match Command::parse(&arguments) {
-        Ok(command) => command,
-        Err(error) => {
-            eprintln!("{error}\n\n{HELP}");
-            return ExitCode::from(2);
-        }
-    };
-    match command.run() {
+    match Command::parse().run() {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("\nerror: {error:#}");
@@ -87,108 +115,27 @@ fn main() -> ExitCode {
     }
 }
 
-/// The requested command.
-#[derive(Debug, PartialEq, Eq)]
-enum Command {
-    Demo(demo::Options),
-    Test(Tests),
-    Prove(Vec<String>),
-    Firmware(Board),
-    Flash(flash::Options),
-    Attach(flash::Options),
-    Bench(Vec<bench::Bench>),
-    Fuzz { seconds: u32 },
-    Dist { check: bool },
-    Size { write: bool },
-    Costs,
-    Setup { dry_run: bool },
-    Grafana,
-    Manifest,
-    Help,
-}
-
-/// What of the tests.
-#[derive(Debug, PartialEq, Eq)]
-enum Tests {
-    /// The steps named, or all.
-    Steps(Vec<String>),
-    List,
-    Quick,
-}
-
 impl Command {
-    fn parse(arguments: &[String]) -> Result<Self> {
-        let mut words = arguments.iter().map(String::as_str);
-        let Some(name) = words.next() else { return Ok(Self::Help) };
-        let rest: Vec<&str> = words.collect();
-        if rest.iter().any(|word| matches!(*word, "--help" | "-h")) {
-            return Ok(Self::Help);
-        }
-        match name {
-            "demo" => Ok(Self::Demo(demo::Options::parse(&rest)?)),
-            "test" => parse_test(&rest),
-            // The campaigns know their names and flags themselves.
-            "prove" => Ok(Self::Prove(rest.iter().map(|word| (*word).to_owned()).collect())),
-            "bench" => Ok(Self::Bench(bench::Bench::parse(&rest)?)),
-            "fuzz" => Ok(Self::Fuzz { seconds: fuzz::parse(&rest)? }),
-            "firmware" => match rest.as_slice() {
-                [] => Ok(Self::Firmware(Board::F405)),
-                ["--board", board] => Ok(Self::Firmware(Board::parse(board)?)),
-                _ => bail!("firmware takes --board f405 or f429"),
-            },
-            "dist" => match rest.as_slice() {
-                [] => Ok(Self::Dist { check: false }),
-                ["--check"] => Ok(Self::Dist { check: true }),
-                _ => bail!("dist takes nothing or --check"),
-            },
-            "flash" => Ok(Self::Flash(flash::Options::parse(&rest, true)?)),
-            "attach" => Ok(Self::Attach(flash::Options::parse(&rest, false)?)),
-            "setup" => match rest.as_slice() {
-                [] => Ok(Self::Setup { dry_run: false }),
-                ["--dry-run"] => Ok(Self::Setup { dry_run: true }),
-                _ => bail!("setup takes nothing or --dry-run"),
-            },
-            "size" => match rest.as_slice() {
-                [] => Ok(Self::Size { write: false }),
-                ["--write"] => Ok(Self::Size { write: true }),
-                _ => bail!("size takes nothing or --write"),
-            },
-            "costs" | "grafana" | "manifest" | "help" | "--help" | "-h" if !rest.is_empty() => {
-                bail!("{name} takes nothing")
-            }
-            "costs" => Ok(Self::Costs),
-            "grafana" => Ok(Self::Grafana),
-            "manifest" => Ok(Self::Manifest),
-            "help" | "--help" | "-h" => Ok(Self::Help),
-            other => bail!("there is no command {other}"),
-        }
-    }
-
     fn run(self) -> Result<()> {
         match self {
             Self::Demo(options) => demo::run(&options),
-            Self::Test(Tests::List) => {
-                test::list();
-                Ok(())
-            }
-            Self::Test(Tests::Quick) => test::run_quick(),
-            Self::Test(Tests::Steps(only)) => test::run(&only),
-            Self::Prove(arguments) => prove::run(&arguments),
-            Self::Firmware(board) => {
-                setup::ensure(&[Need::Linker, Need::FirmwareTarget], false).require_all()?;
+            Self::Test(options) => test::run(&options),
+            Self::Prove { arguments } => prove::run(&arguments),
+            Self::Firmware { board } => {
+                setup::require(&[Need::Linker, Need::FirmwareTarget])?;
                 println!("{}", firmware::build(board)?.display());
                 Ok(())
             }
-            Self::Flash(options) => flash::flash(options),
-            Self::Attach(options) => flash::attach(options),
-            Self::Costs => costs::check(),
-            Self::Bench(what) => bench::run(&what),
+            Self::Bench { what } => bench::run(&what),
             Self::Fuzz { seconds } => fuzz::run(seconds),
             Self::Dist { check } => dist::run(check),
+            Self::Flash(options) => flash::flash(&options),
+            Self::Attach { board } => flash::attach(board),
             Self::Size { write } => {
-                setup::ensure(&[Need::Linker, Need::FirmwareTarget], false).require_all()?;
+                setup::require(&[Need::Linker, Need::FirmwareTarget])?;
                 budgets::check(&Board::ALL, write)
             }
+            Self::Costs => costs::check(),
             Self::Setup { dry_run } => {
                 let outcome = setup::ensure(&Need::all(), dry_run);
                 if !dry_run && outcome.has(Need::PythonVenv) {
@@ -197,45 +144,13 @@ impl Command {
                 outcome.require_all()
             }
             Self::Grafana => grafana::write(),
-            Self::Manifest => {
-                setup::ensure(&[Need::PythonVenv], false).require_all()?;
-                oracle::write_manifest()
-            }
-            Self::Help => {
-                println!("{HELP}");
-                Ok(())
-            }
         }
     }
-}
-
-fn parse_test(rest: &[&str]) -> Result<Command> {
-    if let [only @ ("--list" | "--quick")] = rest {
-        return Ok(Command::Test(if *only == "--list" { Tests::List } else { Tests::Quick }));
-    }
-    let mut only = Vec::new();
-    for words in rest.chunks(2) {
-        let ["--only", step] = words else { bail!("test takes --only STEP, or --quick, or --list") };
-        only.push((*step).to_owned());
-    }
-    test::check_names(&only)?;
-    Ok(Command::Test(Tests::Steps(only)))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn parse(line: &str) -> Result<Command> {
-        Command::parse(&line.split_whitespace().map(str::to_owned).collect::<Vec<_>>())
-    }
-
-    #[test]
-    fn nothing_and_help_show_the_help() {
-        for line in ["", "help", "--help", "-h", "test --help"] {
-            assert_eq!(parse(line).unwrap(), Command::Help, "{line}");
-        }
-    }
 
     #[test]
     fn a_mistyped_word_is_a_usage_error_and_not_ignored() {
@@ -244,19 +159,25 @@ mod tests {
             "size now",
             "setup --dry",
             "firmware --board f407",
+            "flash --erase",
+            "attach --dfu",
+            "bench size",
+            "fuzz --seconds x",
             "test --only",
             "test --only fmtt",
             "test --quick now",
+            "test --quick --list",
             "demo --fligth x",
         ] {
-            assert!(parse(line).is_err(), "{line}");
+            let words = ["cargo xtask"].into_iter().chain(line.split_whitespace());
+            assert!(Command::try_parse_from(words).is_err_and(|error| error.exit_code() == 2), "{line}");
         }
     }
 
     #[test]
-    fn steps_are_chosen_by_name() {
-        let expected = Command::Test(Tests::Steps(vec!["fmt".into(), "budgets".into()]));
-        assert_eq!(parse("test --only fmt --only budgets").unwrap(), expected);
-        assert_eq!(parse("test --quick").unwrap(), Command::Test(Tests::Quick));
+    fn the_campaigns_get_their_own_words() {
+        let words = ["cargo xtask", "prove", "noise", "--runs", "7", "--short"];
+        let Command::Prove { arguments } = Command::try_parse_from(words).unwrap() else { panic!() };
+        assert_eq!(arguments, words[2..]);
     }
 }

@@ -77,19 +77,3 @@ fn definitions() -> Result<PathBuf> {
     let folder = package.manifest_path.parent().context("the mavlink crate has no folder")?;
     Ok(folder.join("mavlink/message_definitions/v1.0/all.xml").into())
 }
-
-/// Makes `tests/flights/manifest.json` anew.
-pub(crate) fn write_manifest() -> Result<()> {
-    prepare()?;
-    let flights = repo::root().join("tests/flights");
-    let mut files: Vec<PathBuf> =
-        fs::read_dir(&flights)?.filter_map(|entry| Some(entry.ok()?.path())).collect();
-    files.retain(|file| file.extension().is_some_and(|kind| kind == "tlog" || kind == "raw"));
-    files.sort();
-    let script = repo::root().join(FOLDER).join("manifest.py");
-    let manifest = Shell::new(python()).arg(script).arg(dialect()).args(files).output()?;
-    let path = flights.join("manifest.json");
-    fs::write(&path, manifest)?;
-    println!("{}", repo::shown(&path));
-    Ok(())
-}

@@ -1,13 +1,12 @@
 //! Builds for this PC: one choice of packages, features and profile, so that tests and campaigns share
 //! the compiled crates. Test programs are run directly, without asking cargo again.
 
-use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
+use std::sync::OnceLock;
 
 use anyhow::{Context as _, Result, bail};
 use cargo_metadata::diagnostic::DiagnosticLevel;
 use cargo_metadata::{Artifact, Message, Metadata, MetadataCommand, TargetKind};
-use serde::{Deserialize, Serialize};
 
 use crate::firmware::Board;
 use crate::hums;
@@ -25,8 +24,8 @@ const FEATURES: &str = "hums-tests/chip,hums-tests/browser,hums-tests/databases"
 const END_TO_END: &str = "hums-tests";
 
 /// A program of tests.
-#[derive(Debug, Clone, Serialize, Deserialize)]
-pub(crate) struct TestProgram {
+#[derive(Debug)]
+struct TestProgram {
     package: String,
     /// Cargo's name of the target: the crate's name for its own tests.
     name: String,
@@ -35,6 +34,9 @@ pub(crate) struct TestProgram {
     folder: PathBuf,
     path: PathBuf,
 }
+
+/// Those that [`build`] built.
+static PROGRAMS: OnceLock<Vec<TestProgram>> = OnceLock::new();
 
 /// Builds `hums`, the campaigns, all tests and the examples by one call of cargo; a warning is an error.
 pub(crate) fn build() -> Result<()> {
@@ -57,9 +59,8 @@ pub(crate) fn build() -> Result<()> {
     let metadata = MetadataCommand::new().no_deps().current_dir(repo::root()).exec()?;
     let mut programs = test_programs(artifacts, &metadata)?;
     programs.sort_by(|a, b| (&a.package, &a.name).cmp(&(&b.package, &b.name)));
-    fs::create_dir_all(list().parent().unwrap_or(Path::new(".")))?;
-    fs::write(list(), serde_json::to_vec(&programs)?)?;
     println!("{} test programs", programs.len());
+    PROGRAMS.get_or_init(|| programs);
     if warned {
         bail!("the compiler has warnings");
     }
@@ -84,14 +85,8 @@ fn test_programs(artifacts: Vec<Artifact>, metadata: &Metadata) -> Result<Vec<Te
     Ok(programs)
 }
 
-fn list() -> PathBuf {
-    repo::target().join("test/programs.json")
-}
-
-fn programs() -> Result<Vec<TestProgram>> {
-    let path = list();
-    let bytes = fs::read(&path).with_context(|| format!("{}", path.display()))?;
-    Ok(serde_json::from_slice(&bytes)?)
+fn programs() -> Result<&'static [TestProgram]> {
+    PROGRAMS.get().map(Vec::as_slice).context("the tests are not built")
 }
 
 /// Runs the tests of each crate: all but the end-to-end ones.
@@ -110,6 +105,11 @@ pub(crate) fn end_to_end(name: &str, options: &[&str]) -> Result<()> {
         Some(program) => run(program, options),
         None => bail!("{END_TO_END} has no tests named {name}"),
     }
+}
+
+/// The formatting of all packages.
+pub(crate) fn check_format() -> Result<()> {
+    Shell::cargo().args(["fmt", "--all", "--", "--check"]).run()
 }
 
 /// Lints all of it; a warning is an error.

@@ -36,7 +36,7 @@ pub(crate) fn run(arguments: &[String]) -> Result<()> {
     let is_diagnosis = arguments.first().is_some_and(|first| first == DIAGNOSIS);
     let mut needs = if is_diagnosis { Vec::new() } else { NEEDS.to_vec() };
     needs.push(Need::Linker);
-    setup::ensure(&needs, false).require_all()?;
+    setup::require(&needs)?;
     let run = ["run", "--release", "--quiet", "--package=hums-tests", "--bin", "prove", "--"];
     Shell::cargo().args(run).args(arguments).run()
 }
@@ -44,7 +44,7 @@ pub(crate) fn run(arguments: &[String]) -> Result<()> {
 /// The long tests, some of them or all.
 fn chip(names: &[String]) -> Result<()> {
     let needs = [Need::Linker, Need::FirmwareTarget, Need::PythonVenv, Need::Dosfstools];
-    setup::ensure(&needs, false).require_all()?;
+    setup::require(&needs)?;
     firmware::build_beside(Board::F405, pc::build)?;
     oracle::prepare()?;
     let mut options = vec!["--ignored", "--nocapture"];

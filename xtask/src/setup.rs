@@ -9,6 +9,8 @@ use std::path::PathBuf;
 
 use anyhow::{Result, bail};
 
+use Source::{Component, Packages, Target};
+
 use crate::repo::FIRMWARE_TARGET;
 use crate::shell::{Shell, is_root};
 
@@ -53,58 +55,28 @@ enum Source {
 }
 
 /// Each need with its purpose.
-const TABLE: [(Need, &str, Source); 15] = {
-    use Source::{Component, Packages, Target};
-    [
-        (Need::Linker, "a C linker, for all that rustc builds", Packages("command -v cc", "gcc libc6-dev")),
-        (Need::FirmwareTarget, "Rust's target of the firmware", Target(FIRMWARE_TARGET)),
-        (Need::StaticTarget, "Rust's musl target, for the hums of a release", Target(STATIC_TARGET)),
-        (
-            Need::WindowsTarget,
-            "Rust's target for Windows, for the hums.exe of a release",
-            Target(WINDOWS_TARGET),
-        ),
-        (
-            Need::Mingw,
-            "MinGW's linker for Windows, for the same",
-            Packages("command -v x86_64-w64-mingw32-gcc", "gcc-mingw-w64-x86-64"),
-        ),
-        (Need::Wine, "Wine, which runs hums.exe for dist --check", Packages(FIND_WINE, "wine64")),
-        (Need::MacTarget, "Rust's target for macOS, for which hums is type-checked", Target(MAC_TARGET)),
-        (Need::Rustfmt, "rustfmt, for the check of the formatting", Component("fmt", "rustfmt")),
-        (Need::Clippy, "clippy, for the lints", Component("clippy", "clippy")),
-        (
-            Need::Mtools,
-            "mtools, an independent reader of card images",
-            Packages("command -v mcopy", "mtools"),
-        ),
-        (
-            Need::Dosfstools,
-            "fsck.vfat, which checks a card's files",
-            Packages("command -v fsck.vfat", "dosfstools"),
-        ),
-        (
-            Need::PythonVenv,
-            "Python with venv, for pymavlink, the independent reader of MAVLink",
-            Packages("python3 -c 'import venv, ensurepip'", "python3-venv"),
-        ),
-        (Need::Influx, "InfluxDB, which takes the line protocol", Packages("command -v influxd", "influxdb")),
-        (
-            Need::Victoria,
-            "VictoriaMetrics, another database that takes it",
-            Packages("command -v victoria-metrics", "victoria-metrics"),
-        ),
-        (
-            Need::Chromium,
-            "Chromium and its driver, which look at the pages",
-            Packages(
-                "command -v chromium && command -v chromedriver",
-                "chromium chromium-driver fonts-dejavu-core",
-            ),
-        ),
-    ]
-};
+const TABLE: [(Need, &str, Source); 15] = [
+    (Need::Linker, "a C linker", Packages("command -v cc", "gcc libc6-dev")),
+    (Need::FirmwareTarget, "Rust's target of the firmware", Target(FIRMWARE_TARGET)),
+    (Need::StaticTarget, "Rust's musl target, for the hums of a release", Target(STATIC_TARGET)),
+    (Need::WindowsTarget, "Rust's target for hums.exe", Target(WINDOWS_TARGET)),
+    (Need::Mingw, "MinGW, which links hums.exe", Packages(FIND_MINGW, "gcc-mingw-w64-x86-64")),
+    (Need::Wine, "Wine, which runs hums.exe for dist --check", Packages(FIND_WINE, "wine64")),
+    (Need::MacTarget, "Rust's target for macOS, for which hums is type-checked", Target(MAC_TARGET)),
+    (Need::Rustfmt, "rustfmt, which checks the formatting", Component("fmt", "rustfmt")),
+    (Need::Clippy, "clippy, for the lints", Component("clippy", "clippy")),
+    (Need::Mtools, "mtools, another reader of card images", Packages("command -v mcopy", "mtools")),
+    (Need::Dosfstools, "fsck.vfat, which checks cards", Packages("command -v fsck.vfat", "dosfstools")),
+    (Need::PythonVenv, "Python with venv, for pymavlink", Packages(FIND_VENV, "python3-venv")),
+    (Need::Influx, "InfluxDB", Packages("command -v influxd", "influxdb")),
+    (Need::Victoria, "VictoriaMetrics", Packages("command -v victoria-metrics", "victoria-metrics")),
+    (Need::Chromium, "Chromium and its driver", Packages(FIND_CHROMIUM, CHROMIUM)),
+];
 
+const FIND_MINGW: &str = "command -v x86_64-w64-mingw32-gcc";
+const FIND_VENV: &str = "python3 -c 'import venv, ensurepip'";
+const FIND_CHROMIUM: &str = "command -v chromium && command -v chromedriver";
+const CHROMIUM: &str = "chromium chromium-driver fonts-dejavu-core";
 /// Debian keeps the program of its package `wine64` out of `PATH`.
 const FIND_WINE: &str = "command -v wine64 || command -v wine || ls /usr/lib/wine/wine64";
 
@@ -173,6 +145,11 @@ impl Outcome {
         let names: Vec<&str> = self.missing.iter().map(|need| need.row().0).collect();
         bail!("missing: {}; what to type is above", names.join("; "))
     }
+}
+
+/// [`ensure`]; what is still missing is an error.
+pub(crate) fn require(needs: &[Need]) -> Result<()> {
+    ensure(needs, false).require_all()
 }
 
 /// Prints missing `needs` and installs them (never with `dry_run`). Gives those that are missing in the end.

@@ -110,22 +110,11 @@ pub(crate) fn is_root() -> bool {
     *ROOT.get_or_init(|| Shell::new("id").arg("-u").ask().is_some_and(|id| id.trim() == "0"))
 }
 
-/// In quotes if a shell would otherwise read it differently. A control character (cargo's flags have such between them) is shown as
-/// its number: a file into which this is sent stays a text.
+/// In quotes if a shell would otherwise read it differently; a control character (cargo's flags have such) as its number, so that a
+/// file into which this is sent stays a text.
 fn quoted(word: &str) -> String {
     let plain = |c: char| c.is_ascii_alphanumeric() || "-_./=:,+@%".contains(c);
-    if !word.is_empty() && word.chars().all(plain) {
-        return word.to_owned();
-    }
-    if !word.chars().any(|c| c.is_ascii_control()) {
-        return format!("'{}'", word.replace('\'', r"'\''"));
-    }
-    let shown = word.chars().fold(String::new(), |shown, c| match c {
-        '\'' | '\\' => format!("{shown}\\{c}"),
-        c if c.is_ascii_control() => format!("{shown}\\x{:02x}", u32::from(c)),
-        c => format!("{shown}{c}"),
-    });
-    format!("$'{shown}'")
+    if !word.is_empty() && word.chars().all(plain) { word.to_owned() } else { format!("{word:?}") }
 }
 
 #[cfg(test)]
@@ -133,14 +122,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_shown_can_be_typed() {
+    fn what_is_shown_can_be_typed_and_is_text() {
         let shell = Shell::new("printf").arg("%s").arg("it's here").env("A", "b c");
-        assert_eq!(shell.shown, r"A='b c' printf %s 'it'\''s here'");
-        // The character between cargo's flags would make a file of this output binary.
-        let shell = Shell::new("printf").arg("%s").arg("it's\u{1f}a\\b");
-        assert_eq!(shell.shown, r"printf %s $'it\'s\x1fa\\b'");
-        let typed = Command::new("bash").args(["-c", &shell.shown]).output().unwrap();
-        assert_eq!(typed.stdout, b"it's\x1fa\\b");
+        assert_eq!(shell.shown, r#"A="b c" printf %s "it's here""#);
+        let typed = Command::new("sh").args(["-c", &shell.shown]).output().unwrap();
+        assert_eq!(typed.stdout, b"it's here");
+        assert_eq!(Shell::new("x").arg("a\u{1f}b").shown, r#"x "a\u{1f}b""#);
     }
 
     #[test]

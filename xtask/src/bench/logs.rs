@@ -8,7 +8,6 @@
 //!
 //! Logs are those below the folders that `HUMS_LOGS` names (separated by colons), else those of `tests`.
 
-use std::env;
 use std::ffi::OsStr;
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
@@ -16,10 +15,9 @@ use std::process::Command;
 
 use anyhow::{Context as _, Result, bail};
 
-use super::tools::{on_one_core, repeat, work_folder};
+use super::tools::{files_below, folders, on_one_core, repeat, work_folder};
 use crate::hums;
 use crate::oracle;
-use crate::repo;
 
 /// Target of `hums check`, in MB a second, on one core.
 const ASKED_MB_S: f64 = 100.0;
@@ -81,30 +79,11 @@ pub(crate) fn run() -> Result<()> {
 
 /// The logs, with their other readers.
 fn logs() -> Result<Vec<(PathBuf, &'static str)>> {
-    let named = env::var_os("HUMS_LOGS").map(|folders| env::split_paths(&folders).collect::<Vec<_>>());
-    let mut waiting = named.unwrap_or_else(|| vec![repo::root().join("tests")]);
-    let mut logs = Vec::new();
-    while let Some(folder) = waiting.pop() {
-        for entry in fs::read_dir(&folder).with_context(|| folder.display().to_string())? {
-            let (path, kind) = {
-                let entry = entry?;
-                (entry.path(), entry.file_type()?)
-            };
-            let is = |path: &Path, wanted: &str| {
-                path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case(wanted))
-            };
-            let unpacked = if is(&path, "gz") { path.with_extension("") } else { path.clone() };
-            if kind.is_dir() {
-                waiting.push(path);
-            } else if is(&unpacked, "bin") {
-                logs.push((path, DATAFLASH));
-            } else if is(&unpacked, "ulg") {
-                logs.push((path, ULOG));
-            }
-        }
-    }
-    logs.sort();
-    Ok(logs)
+    let with = |reader, kinds: &[&str]| -> Result<Vec<_>> {
+        let logs = files_below(&folders("HUMS_LOGS", false), kinds)?;
+        Ok(logs.into_iter().map(|log| (log, reader)).collect())
+    };
+    Ok([with(DATAFLASH, &[".bin", ".bin.gz"])?, with(ULOG, &[".ulg", ".ulg.gz"])?].concat())
 }
 
 /// The log without its compression, which is not measured.

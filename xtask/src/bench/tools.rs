@@ -1,5 +1,6 @@
 //! Shared by the benches.
 
+use std::env;
 use std::ffi::OsStr;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -11,8 +12,7 @@ use crate::repo;
 
 /// A program on the first core only, where `taskset` is there to see to it.
 pub(super) fn on_one_core(program: &OsStr, one: bool) -> Command {
-    let pinned = one && Command::new("taskset").arg("--version").output().is_ok();
-    if !pinned {
+    if !one || Command::new("taskset").arg("--version").output().is_err() {
         return Command::new(program);
     }
     let mut command = Command::new("taskset");
@@ -24,6 +24,36 @@ pub(super) fn on_one_core(program: &OsStr, one: bool) -> Command {
 pub(super) fn median(values: &mut [f64]) -> f64 {
     values.sort_by(f64::total_cmp);
     values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
+}
+
+/// The folders that a variable names, separated by colons: besides `tests/flights`, or instead of `tests`.
+pub(super) fn folders(variable: &str, besides: bool) -> Vec<PathBuf> {
+    let named = env::var_os(variable).unwrap_or_default();
+    let named = env::split_paths(&named).filter(|folder| !folder.as_os_str().is_empty());
+    let mut folders: Vec<PathBuf> = named.collect();
+    if besides || folders.is_empty() {
+        folders.push(repo::root().join(if besides { "tests/flights" } else { "tests" }));
+    }
+    folders
+}
+
+/// The files in these folders and below them whose names end so.
+pub(super) fn files_below(folders: &[PathBuf], ends: &[&str]) -> Result<Vec<PathBuf>> {
+    let (mut waiting, mut files) = (folders.to_vec(), Vec::new());
+    while let Some(folder) = waiting.pop() {
+        let entries = fs::read_dir(&folder).with_context(|| format!("cannot read {}", folder.display()))?;
+        for entry in entries {
+            let path = entry?.path();
+            let name = path.to_string_lossy().to_ascii_lowercase();
+            if path.is_dir() {
+                waiting.push(path);
+            } else if ends.iter().any(|end| name.ends_with(end)) {
+                files.push(path);
+            }
+        }
+    }
+    files.sort();
+    Ok(files)
 }
 
 /// Place of the measured files.

@@ -7,6 +7,7 @@ use cargo_metadata::{MetadataCommand, Package};
 
 use super::steps::FLOWN;
 use crate::firmware;
+use crate::pc;
 use crate::repo;
 use crate::shell::Shell;
 
@@ -15,7 +16,7 @@ const FIRMWARE: &str = "hums-app";
 
 /// Format of all, lints and unit tests of the packages that changed: since the last commit, or in it if nothing has changed since.
 pub(super) fn run() -> Result<()> {
-    Shell::cargo().args(["fmt", "--all", "--", "--check"]).run()?;
+    pc::check_format()?;
     let mut files =
         git(&["diff", "--name-only", "HEAD"])? + &git(&["ls-files", "--others", "--exclude-standard"])?;
     if files.is_empty() {

@@ -4,6 +4,8 @@ use std::fs;
 
 use anyhow::{Context as _, Result};
 
+use Stage::{Build, Lint, Test};
+
 use crate::budgets;
 use crate::costs;
 use crate::demo;
@@ -15,18 +17,39 @@ use crate::oracle;
 use crate::pc;
 use crate::prove;
 use crate::repo;
-use crate::setup::Need;
+use crate::setup::Need::{
+    self, Chromium, Clippy, Dosfstools, FirmwareTarget, Influx, Mtools, PythonVenv, Rustfmt, Victoria,
+};
 use crate::shell::Shell;
 
 /// One thing that is checked.
 pub(super) struct Step {
+    pub(super) stage: Stage,
     pub(super) name: &'static str,
     pub(super) about: &'static str,
     pub(super) needs: &'static [Need],
-    pub(super) stage: Stage,
-    /// Steps whose results it uses.
-    pub(super) after: &'static [&'static str],
     pub(super) run: fn() -> Result<()>,
+}
+
+impl Step {
+    const fn new(
+        stage: Stage,
+        name: &'static str,
+        about: &'static str,
+        needs: &'static [Need],
+        run: fn() -> Result<()>,
+    ) -> Self {
+        Self { stage, name, about, needs, run }
+    }
+
+    /// Whether it uses results of the step `build`, or of `oracle`.
+    pub(super) fn follows(&self, other: &str) -> bool {
+        match other {
+            "build" => self.stage != Build || self.name == "budgets",
+            "oracle" => self.name != "oracle" && self.needs.contains(&PythonVenv),
+            _ => false,
+        }
+    }
 }
 
 /// When a step runs. The compiler of the lints has one core busy while tests wait for links and browsers.
@@ -42,159 +65,49 @@ pub(super) enum Stage {
 
 /// Each after those that it needs. `--list` and the table of seconds have this order.
 pub(super) const STEPS: [Step; 18] = [
-    Step {
-        name: "fmt",
-        about: "the formatting",
-        needs: &[Need::Rustfmt],
-        stage: Stage::Build,
-        after: &[],
-        run: || Shell::cargo().args(["fmt", "--all", "--", "--check"]).run(),
-    },
-    Step {
-        name: "lines",
-        about: "lines of code by folder, within budgets.toml",
-        needs: &[],
-        stage: Stage::Build,
-        after: &[],
-        run: lines::check,
-    },
-    Step {
-        name: "oracle",
-        about: "pymavlink and the other readers that the tests compare with are there",
-        needs: &[Need::PythonVenv],
-        stage: Stage::Build,
-        after: &[],
-        run: oracle::prepare,
-    },
-    Step {
-        name: "build",
-        about: "hums, the campaigns, all tests and the examples of this PC compile, and the firmware beside them",
-        needs: &[Need::FirmwareTarget],
-        stage: Stage::Build,
-        after: &[],
-        run: || firmware::build_beside(FLOWN, pc::build).map(drop),
-    },
-    Step {
-        name: "budgets",
-        about: "the firmware for the board f405 is within budgets.toml",
-        needs: &[Need::FirmwareTarget],
-        stage: Stage::Build,
-        after: &["build"],
-        run: check_budgets,
-    },
-    Step {
-        name: "chip",
-        about: "end to end with the image that is flashed, on the model of its chip",
-        needs: &[Need::FirmwareTarget, Need::PythonVenv, Need::Dosfstools],
-        stage: Stage::Test,
-        after: &["oracle", "build"],
-        run: chip,
-    },
-    Step {
-        name: "clippy-firmware",
-        about: "lints of the firmware for the board f405, warnings as errors",
-        needs: &[Need::Clippy, Need::FirmwareTarget],
-        stage: Stage::Lint,
-        after: &["build"],
-        run: || firmware::lint(FLOWN),
-    },
-    Step {
-        name: "clippy",
-        about: "lints of what runs on this PC, warnings as errors",
-        needs: &[Need::Clippy],
-        stage: Stage::Lint,
-        after: &["build"],
-        run: pc::lint,
-    },
-    Step {
-        name: "unit",
-        about: "tests of each crate on this PC",
-        needs: &[],
-        stage: Stage::Test,
-        after: &["build"],
-        run: pc::unit_tests,
-    },
-    Step {
-        name: "sim",
-        about: "end to end on this PC, against pymavlink",
-        needs: &[Need::Mtools, Need::Dosfstools, Need::PythonVenv],
-        stage: Stage::Test,
-        after: &["oracle", "build"],
-        run: sim,
-    },
-    Step {
-        name: "doc",
-        about: "the documentation builds without a warning",
-        needs: &[],
-        stage: Stage::Lint,
-        after: &["build"],
-        run: pc::document,
-    },
-    Step {
-        name: "page",
-        about: "formatting and lints of the page's scripts and style, by Biome",
-        needs: &[Need::PythonVenv],
-        stage: Stage::Lint,
-        after: &["oracle"],
-        run: page,
-    },
-    Step {
-        name: "browser",
-        about: "the report and the live page in Chromium",
-        needs: &[Need::PythonVenv, Need::Chromium],
-        stage: Stage::Test,
-        after: &["oracle", "build"],
-        run: || pc::end_to_end("browser", &[]),
-    },
-    Step {
-        name: "prove",
-        about: "the campaigns in their short form",
-        needs: prove::NEEDS,
-        stage: Stage::Test,
-        after: &["build"],
-        run: pc::short_campaigns,
-    },
-    Step {
-        name: "answer",
-        about: "every format against pymavlink, with pyarrow, DuckDB and InfluxDB as readers",
-        needs: &[Need::PythonVenv, Need::Influx],
-        stage: Stage::Test,
-        after: &["oracle", "build"],
-        run: || pc::end_to_end("answer", further()),
-    },
-    Step {
-        name: "live",
-        about: "live writing to InfluxDB and VictoriaMetrics, and the Grafana dashboards",
-        needs: &[Need::PythonVenv, Need::Influx, Need::Victoria],
-        stage: Stage::Test,
-        after: &["oracle", "build"],
-        run: || pc::end_to_end("live", &[]),
-    },
-    Step {
-        name: "costs",
-        about: "cycles, load and stack of the firmware against budgets.toml",
-        needs: &[Need::FirmwareTarget],
-        stage: Stage::Test,
-        after: &["build"],
-        run: || costs::check_built(&hums::program(), &FLOWN.image()),
-    },
-    Step {
-        name: "demo",
-        about: "cargo xtask demo",
-        needs: &[Need::FirmwareTarget],
-        stage: Stage::Test,
-        after: &["build"],
-        run: demo::as_test,
-    },
+    Step::new(Build, "fmt", "the formatting", &[Rustfmt], pc::check_format),
+    Step::new(Build, "lines", "lines of code by folder, within budgets.toml", &[], lines::check),
+    Step::new(Build, "oracle", "pymavlink and other readers, installed", &[PythonVenv], oracle::prepare),
+    Step::new(Build, "page", "formatting and lints of the page, by Biome", &[PythonVenv], page),
+    Step::new(Build, "build", "hums, all tests and the firmware compile", &[FirmwareTarget], build),
+    Step::new(Build, "budgets", "the size of the firmware, within budgets.toml", &[FirmwareTarget], size),
+    Step::new(Lint, "clippy-firmware", "lints of the firmware", &[Clippy, FirmwareTarget], lint),
+    Step::new(Lint, "clippy", "lints of what runs on this PC", &[Clippy], pc::lint),
+    Step::new(Lint, "doc", "the documentation builds without a warning", &[], pc::document),
+    Step::new(Test, "chip", "the image that is flashed, on the model of its chip", CHIP, chip),
+    Step::new(Test, "unit", "tests of each crate on this PC", &[], pc::unit_tests),
+    Step::new(
+        Test,
+        "sim",
+        "end to end on this PC, against pymavlink",
+        &[Mtools, Dosfstools, PythonVenv],
+        sim,
+    ),
+    Step::new(Test, "browser", "the report and the live page in Chromium", &[PythonVenv, Chromium], browser),
+    Step::new(Test, "prove", "the campaigns in their short form", prove::NEEDS, pc::short_campaigns),
+    Step::new(Test, "answer", "every format against other readers", &[PythonVenv, Influx], answer),
+    Step::new(Test, "live", "databases and Grafana dashboards", &[PythonVenv, Influx, Victoria], live),
+    Step::new(Test, "costs", "cycles, load and stack, within budgets.toml", &[FirmwareTarget], measure_costs),
+    Step::new(Test, "demo", "cargo xtask demo", &[FirmwareTarget], demo::as_test),
 ];
+
+const CHIP: &[Need] = &[FirmwareTarget, PythonVenv, Dosfstools];
 
 /// The board that every change is tried for. `cargo xtask dist` looks at all of them.
 pub(super) const FLOWN: Board = Board::F405;
 
-fn check_budgets() -> Result<()> {
+fn build() -> Result<()> {
+    firmware::build_beside(FLOWN, pc::build).map(drop)
+}
+
+fn size() -> Result<()> {
     println!("NOT TESTED: board f429 (cargo xtask dist lints and measures it)");
     println!("NOT TESTED: licences and sources of the dependencies (cargo xtask dist)");
     budgets::check(&[FLOWN], false)
+}
+
+fn lint() -> Result<()> {
+    firmware::lint(FLOWN)
 }
 
 /// As `host-tools/report/src/page/biome.json` has it. To format: `target/venv/bin/biome format --write` in that folder.
@@ -218,6 +131,22 @@ fn sim() -> Result<()> {
     let mut options = vec!["--test-threads", &threads];
     options.extend(further());
     pc::end_to_end("sim", &options)
+}
+
+fn browser() -> Result<()> {
+    pc::end_to_end("browser", &[])
+}
+
+fn answer() -> Result<()> {
+    pc::end_to_end("answer", further())
+}
+
+fn live() -> Result<()> {
+    pc::end_to_end("live", &[])
+}
+
+fn measure_costs() -> Result<()> {
+    costs::check_built(&hums::program(), &FLOWN.image())
 }
 
 /// The tests of further recordings are left out without such recordings. On the model of the chip they are for `cargo xtask prove`.
